@@ -1,0 +1,111 @@
+//! What stops the tool, or keeps a job from being loaded: a state with a code, a place and the value at fault.
+
+/// Why a run stopped or a job was refused. The code of a kind never changes; new kinds get new codes.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
+#[repr(u8)]
+pub enum FaultKind {
+    /// A principal curvature towards the tool leaves no room for the ball (local gouge).
+    /// Value: the surface's principal curvature towards the tool times the ball radius (at least 1 where nothing fits).
+    BallDoesNotFit = 1,
+    /// `S_u x S_v` is too near zero for a normal. Value: `|S_u x S_v| / (|S_u| |S_v|)`, the sine between them.
+    DegenerateSurface = 2,
+    /// The step of the path parameter for one period would not run forwards.
+    /// Value: second- and third-order terms of the step over its first-order term (at most -1 where it runs backwards).
+    ParameterBackwards = 3,
+    /// A cutter location does not fit an i32 of nanometres (±2.147 m). Value: the coordinate in metres.
+    OutOfRange = 4,
+    /// The job has more data than the store holds. Value: words asked for.
+    TooManyPatches = 5,
+    /// One period's arc would cross more patches than a tick may change. Value: the arc in mm that was left over.
+    PatchTooShort = 6,
+    /// The path interval is too small to advance the side parameter. Value: the interval as a fraction of a patch.
+    IntervalTooSmall = 7,
+    /// A header value is not finite or out of its range. Value: the value.
+    BadHeader = 8,
+    /// A patch's coefficients exceed the range in which its polynomials cannot overflow, its weights vary more than
+    /// 4 : 1, or a flagged pole is none. Value: the patch's index.
+    BadPatch = 9,
+    /// The job's data are not complete or do not have the length that the header implies. Value: words received.
+    BadLength = 10,
+    /// A request that does not fit the state, for instance loading while a job runs. Value: the state's code.
+    WrongState = 11,
+    /// A tick of the sample timer was missed. Value: ticks missed.
+    DeadlineMissed = 12,
+}
+
+impl FaultKind {
+    /// Every kind, in order of its code.
+    pub const ALL: [Self; 12] = [
+        Self::BallDoesNotFit,
+        Self::DegenerateSurface,
+        Self::ParameterBackwards,
+        Self::OutOfRange,
+        Self::TooManyPatches,
+        Self::PatchTooShort,
+        Self::IntervalTooSmall,
+        Self::BadHeader,
+        Self::BadPatch,
+        Self::BadLength,
+        Self::WrongState,
+        Self::DeadlineMissed,
+    ];
+
+    /// The stable code.
+    #[must_use]
+    pub const fn code(self) -> u8 {
+        self as u8
+    }
+
+    /// The kind with this code.
+    #[must_use]
+    pub fn from_code(code: u8) -> Option<Self> {
+        Self::ALL.into_iter().find(|kind| kind.code() == code)
+    }
+
+    /// The kind's name in scripts and JSON.
+    #[must_use]
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::BallDoesNotFit => "ball-does-not-fit",
+            Self::DegenerateSurface => "degenerate-surface",
+            Self::ParameterBackwards => "parameter-backwards",
+            Self::OutOfRange => "out-of-range",
+            Self::TooManyPatches => "too-many-patches",
+            Self::PatchTooShort => "patch-too-short",
+            Self::IntervalTooSmall => "interval-too-small",
+            Self::BadHeader => "bad-header",
+            Self::BadPatch => "bad-patch",
+            Self::BadLength => "bad-length",
+            Self::WrongState => "wrong-state",
+            Self::DeadlineMissed => "deadline-missed",
+        }
+    }
+}
+
+/// A fault: what, and the value that shows how far off it is (meaning per [`FaultKind`]).
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Fault {
+    /// What went wrong.
+    pub kind: FaultKind,
+    /// The value at fault; its meaning is the kind's.
+    pub value: f32,
+}
+
+impl Fault {
+    /// A fault of this kind with its value.
+    #[must_use]
+    pub const fn new(kind: FaultKind, value: f32) -> Self {
+        Self { kind, value }
+    }
+}
+
+impl core::fmt::Display for Fault {
+    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
+        write!(f, "{} ({})", self.kind.name(), self.value)
+    }
+}
+
+impl core::error::Error for Fault {}
+
+/// Result of anything in this crate that can meet a fault.
+pub type Result<T> = core::result::Result<T, Fault>;

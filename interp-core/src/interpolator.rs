@@ -1,0 +1,425 @@
+//! The one file that chains the stages: load, tick, hold, resume, abort.
+
+use crate::arith::{centred, fraction_to_f32};
+use crate::contact::Step;
+use crate::fault::{Fault, FaultKind, Result};
+use crate::interval::Interval;
+use crate::job::{Header, Pattern, STORE_WORDS, ToolSide};
+use crate::offset::Offset;
+use crate::program::{PassSurface, Program};
+use crate::sample::{Place, Sample, State};
+use crate::schedule;
+use crate::surface::{Contact, PassLine, PathSpeed};
+
+/// Patch boundaries that one period's arc may cross: each costs the collapse of a patch. Three lets a tick pass two whole
+/// patches that are shorter than its arc; shorter ones than that say the feed is not meant for the part.
+const CROSSINGS_MAX: u8 = 3;
+
+/// What the operator or the host wants, taken up with the next tick. A request that the state does not allow is ignored.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[repr(u8)]
+pub enum Request {
+    /// Nothing new.
+    #[default]
+    None = 0,
+    /// Ready or finished: run the job from its beginning.
+    Start = 1,
+    /// Running: stand on the path.
+    Hold = 2,
+    /// Held: go on.
+    Resume = 3,
+    /// Running or held: give the run up; faulted: acknowledge the fault. The position is kept, the job stays loaded (ready).
+    Abort = 4,
+}
+
+/// What the next tick has to do.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Next {
+    /// Begin the pass at the current side place.
+    Pass,
+    /// One period's arc further.
+    Along,
+    /// Find the next pass, and begin it.
+    Over,
+    /// Nothing: the last sample is out.
+    End,
+}
+
+/// The pass that runs.
+#[derive(Clone, Copy, Debug)]
+struct Run {
+    next: Next,
+    /// Samples so far.
+    ticks: u32,
+    pass: u32,
+    side: Place,
+    reversed: bool,
+    /// Path span, in the surface's own direction.
+    span: u16,
+    /// Fraction of the span, in the direction of travel.
+    fraction: u64,
+    surface: Option<PassSurface>,
+    offset: Offset,
+    /// The parametrisation at the last sample.
+    path: PathSpeed,
+    /// Least interval candidate of the pass, fractions of the side span.
+    least: f32,
+}
+
+impl Run {
+    const START: Self = Self {
+        next: Next::Pass,
+        ticks: 0,
+        pass: 0,
+        side: Place { span: 0, fraction: 0 },
+        reversed: false,
+        span: 0,
+        fraction: 0,
+        surface: None,
+        offset: Offset::NONE,
+        path: PathSpeed { speed: 0.0, inverse: 0.0, stretch: 0.0, stretch_change: 0.0 },
+        least: f32::INFINITY,
+    };
+
+    /// Where the tool is on the path parameter, in the surface's own direction.
+    const fn place(&self) -> Place {
+        let fraction = if self.reversed { !self.fraction } else { self.fraction };
+        Place { span: self.span, fraction }
+    }
+}
+
+/// Everything that decides where the tool goes, behind one [`Interpolator::tick`] a period.
+///
+/// `WORDS` is the capacity of the job store, in 32-bit words.
+#[derive(Debug)]
+pub struct Interpolator<const WORDS: usize = STORE_WORDS> {
+    program: Program<WORDS>,
+    state: State,
+    run: Run,
+    last: Sample,
+    fault: Option<Fault>,
+    interval: Interval,
+    arc_mm: f32,
+    last_interval: f32,
+}
+
+impl<const WORDS: usize> Default for Interpolator<WORDS> {
+    fn default() -> Self {
+        Self::new()
+    }
+}
+
+impl<const WORDS: usize> Interpolator<WORDS> {
+    /// An idle machine without a job.
+    #[must_use]
+    pub const fn new() -> Self {
+        Self {
+            program: Program::new(),
+            state: State::Idle,
+            run: Run::START,
+            last: Sample::START,
+            fault: None,
+            interval: Interval::NONE,
+            arc_mm: 0.0,
+            last_interval: f32::INFINITY,
+        }
+    }
+
+    fn may_load(&self) -> Result<()> {
+        match self.state {
+            State::Idle | State::Ready | State::Finished | State::Faulted => Ok(()),
+            State::Running | State::Holding | State::Held | State::Stopping => {
+                Err(Fault::new(FaultKind::WrongState, f32::from(self.state as u8)))
+            }
+        }
+    }
+
+    /// Begins to load a job of so many data words; what was loaded before is gone, and the machine is idle.
+    ///
+    /// # Errors
+    /// Refused, and nothing changes: [`FaultKind::WrongState`] while a job runs or is held, [`FaultKind::BadHeader`],
+    /// [`FaultKind::TooManyPatches`] with the words that the header implies, [`FaultKind::BadLength`] where `words` are not
+    /// as many.
+    pub fn load_begin(&mut self, header: &Header, words: u32) -> Result<()> {
+        self.may_load()?;
+        self.program.begin(header, words)?;
+        self.state = State::Idle;
+        self.fault = None;
+        Ok(())
+    }
+
+    /// Writes data words at this offset: in order, or again over what was written.
+    ///
+    /// # Errors
+    /// [`FaultKind::WrongState`]; [`FaultKind::BadLength`] where no load has begun, the words leave a gap or reach past the
+    /// job's end. Nothing is written then.
+    pub fn load_words(&mut self, offset: u32, words: &[i32]) -> Result<()> {
+        self.may_load()?;
+        self.program.write(offset, words)
+    }
+
+    /// Records that [`Self::load_check`] has to be called for.
+    #[must_use]
+    pub fn load_records(&self) -> u32 {
+        self.program.records()
+    }
+
+    /// Checks one record: a few microseconds of work, so that a board can do it between ticks. In order from 0.
+    ///
+    /// # Errors
+    /// [`FaultKind::BadPatch`] with the record's index, [`FaultKind::BadHeader`] for a span width,
+    /// [`FaultKind::BadLength`] where words are missing or the order is not kept.
+    pub fn load_check(&mut self, record: u32) -> Result<()> {
+        self.may_load()?;
+        self.program.check(record)
+    }
+
+    /// Seals the job: the machine is ready.
+    ///
+    /// # Errors
+    /// [`FaultKind::BadLength`] where words or checks are missing; the machine stays idle.
+    pub fn load_finish(&mut self) -> Result<()> {
+        self.may_load()?;
+        self.program.seal()?;
+        let header = self.program.header();
+        self.interval = Interval::new(header.ball_radius_mm, header.scallop_mm);
+        self.arc_mm = schedule::arc_mm(header.feed_mm_s, header.period_s);
+        self.state = State::Ready;
+        self.reset_run();
+        Ok(())
+    }
+
+    /// Gives up what was loaded: the machine is idle. Refused like [`Self::load_begin`].
+    ///
+    /// # Errors
+    /// [`FaultKind::WrongState`] while a job runs or is held.
+    pub fn unload(&mut self) -> Result<()> {
+        self.may_load()?;
+        self.program.clear();
+        self.state = State::Idle;
+        self.fault = None;
+        Ok(())
+    }
+
+    /// State after the last tick or load call.
+    #[must_use]
+    pub const fn state(&self) -> State {
+        self.state
+    }
+
+    /// The fault, while the state is [`State::Faulted`].
+    #[must_use]
+    pub const fn fault(&self) -> Option<Fault> {
+        self.fault
+    }
+
+    /// The last sample: position and place, also after a fault.
+    #[must_use]
+    pub const fn last(&self) -> &Sample {
+        &self.last
+    }
+
+    /// Least path interval of the pass that was finished last, in units of the side parameter.
+    #[must_use]
+    pub const fn last_interval(&self) -> f32 {
+        self.last_interval
+    }
+
+    /// Stops a run with a fault from outside, such as a missed deadline. Ignored where nothing runs or is held.
+    pub fn trip(&mut self, fault: Fault) {
+        if matches!(self.state, State::Running | State::Held) {
+            self.fail(fault);
+        }
+    }
+
+    fn fail(&mut self, fault: Fault) {
+        self.state = State::Faulted;
+        self.fault = Some(fault);
+    }
+
+    fn reset_run(&mut self) {
+        self.run = Run::START;
+        self.fault = None;
+        self.last_interval = f32::INFINITY;
+    }
+
+    /// One period. Never blocks, never panics; bounded by the collapse and evaluation of [`CROSSINGS_MAX`] + 1 patches.
+    ///
+    /// While the job runs, each call yields a sample with [`State::Running`], counted by its `tick` from 0; the one after
+    /// the last has [`State::Finished`]. In every state that does not move, the sample repeats the last position.
+    pub fn tick(&mut self, request: Request) -> Sample {
+        self.take_up(request);
+        if self.state == State::Running {
+            match self.advance() {
+                Ok(Some(sample)) => self.last = sample,
+                Ok(None) => self.state = State::Finished,
+                Err(fault) => self.fail(fault),
+            }
+        }
+        self.last.state = self.state;
+        self.last
+    }
+
+    fn take_up(&mut self, request: Request) {
+        self.state = match (request, self.state) {
+            (Request::Start, State::Ready | State::Finished) => {
+                self.reset_run();
+                State::Running
+            }
+            (Request::Hold, State::Running) => State::Held,
+            (Request::Resume, State::Held) => State::Running,
+            (Request::Abort, State::Running | State::Held | State::Faulted) => {
+                self.fault = None;
+                State::Ready
+            }
+            (_, state) => state,
+        };
+    }
+
+    /// The next sample of the run; none when the last is out.
+    #[inline]
+    fn advance(&mut self) -> Result<Option<Sample>> {
+        let point = match self.run.next {
+            Next::Along => {
+                self.step()?;
+                false
+            }
+            Next::Pass => self.begin_pass()?,
+            Next::Over => {
+                self.step_over()?;
+                self.begin_pass()?
+            }
+            Next::End => return Ok(None),
+        };
+        if point {
+            self.end_pass();
+        }
+        let run = &mut self.run;
+        let (contact, origin_nm) = contact(run)?;
+        run.offset.check_fit(&contact)?;
+        let located = run.offset.locate(&contact, &origin_nm)?;
+        let candidate = self.interval.candidate(&contact);
+        if candidate < run.least {
+            run.least = candidate;
+        }
+        run.path = contact.path;
+        let tick = run.ticks;
+        run.ticks = tick.wrapping_add(1);
+        Ok(Some(Sample {
+            tick,
+            state: State::Running,
+            pass: run.pass,
+            path: run.place(),
+            side: run.side,
+            feed_mm_s: self.program.header().feed_mm_s,
+            cc_nm: located.cc_nm,
+            cl_nm: located.cl_nm,
+            interval: candidate * self.program.side_width(run.side.span),
+        }))
+    }
+
+    /// One period's arc along the pass: within the patch, or over its boundary with the arc that is left.
+    #[inline]
+    fn step(&mut self) -> Result<()> {
+        let mut rest = self.arc_mm;
+        for _ in 0..=CROSSINGS_MAX {
+            let run = &mut self.run;
+            let step = Step { from: &run.path };
+            let fraction = step.fraction(rest)?;
+            let room = !run.fraction;
+            if let Some(next) = whole(fraction).and_then(|step| run.fraction.checked_add(step)) {
+                run.fraction = next;
+                return Ok(());
+            }
+            rest -= step.arc(fraction_to_f32(room));
+            if !self.next_span()? {
+                self.run.fraction = u64::MAX;
+                self.end_pass();
+                return Ok(());
+            }
+            self.run.path = contact(&self.run)?.0.path;
+        }
+        Err(Fault::new(FaultKind::PatchTooShort, rest))
+    }
+
+    /// Goes to the start of the next patch along the pass; false at the pass's end.
+    #[inline(never)]
+    fn next_span(&mut self) -> Result<bool> {
+        let spans = self.program.header().path_spans;
+        let next = if self.run.reversed { self.run.span.checked_sub(1) } else { self.run.span.checked_add(1) };
+        let Some(span) = next.filter(|span| *span < spans) else {
+            return Ok(false);
+        };
+        self.run.span = span;
+        self.run.fraction = 0;
+        self.collapse()?;
+        Ok(true)
+    }
+
+    /// Begins the pass at the current side place; true where it is a single point.
+    #[inline(never)]
+    fn begin_pass(&mut self) -> Result<bool> {
+        let header = self.program.header();
+        self.run.reversed = header.pattern == Pattern::Zigzag && self.run.pass % 2 == 1;
+        self.run.span = if self.run.reversed { header.path_spans.saturating_sub(1) } else { 0 };
+        self.run.fraction = 0;
+        self.run.least = f32::INFINITY;
+        self.run.next = Next::Along;
+        self.collapse()
+    }
+
+    /// The side place of the next pass.
+    fn step_over(&mut self) -> Result<()> {
+        let program = &self.program;
+        let spans = program.header().side_spans;
+        let width = |span| program.side_width(span);
+        self.run.side = schedule::next_side(self.run.side, self.run.least, spans, width)?;
+        self.run.pass += 1;
+        Ok(())
+    }
+
+    fn end_pass(&mut self) {
+        let last = schedule::is_last(self.run.side, self.program.header().side_spans);
+        self.run.next = if last { Next::End } else { Next::Over };
+    }
+
+    /// Collapses the current patch; true where the pass is a single point.
+    fn collapse(&mut self) -> Result<bool> {
+        let header = self.program.header();
+        let run = &mut self.run;
+        let at = PassLine {
+            side: centred(run.side.fraction),
+            reversed: run.reversed,
+            tool_sign: if header.tool_side == ToolSide::Plus { 1.0 } else { -1.0 },
+        };
+        let surface = self.program.collapse(run.span, run.side, &at)?;
+        let (shift, point) = match &surface {
+            PassSurface::Polynomial(pass) => (pass.shift, pass.is_point()),
+            PassSurface::Rational(pass) => (pass.shift, pass.is_point()),
+            PassSurface::Profile(pass) => (pass.shift, false),
+            PassSurface::Circle(pass) => (pass.shift, pass.is_point()),
+        };
+        run.surface = Some(surface);
+        run.offset = Offset::new(header.ball_radius_mm, shift);
+        Ok(point)
+    }
+}
+
+/// A step of the fraction below a whole span.
+#[inline(always)]
+fn whole(fraction: f32) -> Option<u64> {
+    (fraction < 1.0).then(|| crate::arith::fraction_from_f32(fraction))
+}
+
+/// The contact where the run is, and the origin it is relative to.
+#[inline(always)]
+fn contact(run: &Run) -> Result<(Contact, [i32; 3])> {
+    let w = centred(run.fraction);
+    match &run.surface {
+        Some(PassSurface::Polynomial(pass)) => Ok((pass.contact(w)?, pass.origin_nm)),
+        Some(PassSurface::Rational(pass)) => Ok((pass.contact(w)?, pass.origin_nm)),
+        Some(PassSurface::Profile(pass)) => Ok((pass.contact(w)?, [0, 0, pass.height_origin_nm])),
+        Some(PassSurface::Circle(pass)) => Ok((pass.contact(run.fraction), [0, 0, pass.height_origin_nm])),
+        None => Err(Fault::new(FaultKind::WrongState, 0.0)),
+    }
+}

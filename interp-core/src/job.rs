@@ -1,0 +1,90 @@
+//! A job as it is asked for: the [`Header`] and, as plain words, the surface's data.
+//!
+//! The words (i32) of a job, in order:
+//!
+//! | words | what |
+//! |---|---|
+//! | `side_spans` | width of each side span in units of the surface's side parameter, f32 bits |
+//! | `path_spans` | width of each path span, f32 bits (reported, never used to step) |
+//! | rest | [`SurfaceKind::Polynomial`], [`SurfaceKind::Rational`]: one record a patch, path index fastest; [`SurfaceKind::RevolvedAlongProfile`], [`SurfaceKind::RevolvedAroundAxis`]: one record |
+//!
+//! The records are described in the files of [`crate::surface`].
+
+/// Words of surface data that the reference machine stores: 64 KiB of its 128 KiB RAM, hence 315 polynomial or 240
+/// rational patches.
+pub const STORE_WORDS: usize = 16_384;
+
+/// Spans a surface may have in one direction. It bounds every loop over spans.
+pub const SPANS_MAX: u16 = 1_024;
+
+/// The kind of surface, and with it the record of its data.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[repr(u8)]
+pub enum SurfaceKind {
+    /// A grid of bicubic polynomial patches: bicubic, ruled, non-rational B-spline surfaces.
+    #[default]
+    Polynomial = 0,
+    /// A grid of rational bicubic patches.
+    Rational = 1,
+    /// Cubic profile turned about z; passes run along the profile, the side parameter is the angle.
+    RevolvedAlongProfile = 2,
+    /// Cubic profile turned about z; passes run around the axis, the side parameter is the profile's.
+    RevolvedAroundAxis = 3,
+}
+
+impl SurfaceKind {
+    /// Every kind, in order of its code.
+    pub const ALL: [Self; 4] =
+        [Self::Polynomial, Self::Rational, Self::RevolvedAlongProfile, Self::RevolvedAroundAxis];
+
+    /// The kind with this code.
+    #[must_use]
+    pub fn from_code(code: u8) -> Option<Self> {
+        Self::ALL.into_iter().find(|kind| *kind as u8 == code)
+    }
+}
+
+/// Order of the passes.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[repr(u8)]
+pub enum Pattern {
+    /// Every pass runs the same way.
+    #[default]
+    Zig = 0,
+    /// Every second pass runs backwards.
+    Zigzag = 1,
+}
+
+/// Side of the surface that the tool is on.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[repr(u8)]
+pub enum ToolSide {
+    /// The tool normal is `+ S_path x S_side`.
+    #[default]
+    Plus = 0,
+    /// The tool normal is `- S_path x S_side`.
+    Minus = 1,
+}
+
+/// What a job asks for, besides its surface data. Ranges are checked when it is loaded.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Header {
+    /// Kind of surface.
+    pub kind: SurfaceKind,
+    /// Order of the passes.
+    pub pattern: Pattern,
+    /// Side of the surface that the tool is on.
+    pub tool_side: ToolSide,
+    /// Spans along the path parameter, 1 to [`SPANS_MAX`] (1 for a revolved surface).
+    pub path_spans: u16,
+    /// Spans along the side parameter, 1 to [`SPANS_MAX`] (1 for a revolved surface).
+    pub side_spans: u16,
+    /// Ball radius r, mm, above 0 and at most 1000.
+    pub ball_radius_mm: f32,
+    /// Feed of the cutter contact along the surface, mm/s, above 0 and at most 10 000.
+    pub feed_mm_s: f32,
+    /// Scallop height limit h, mm, above 0 and below the ball radius.
+    pub scallop_mm: f32,
+    /// Sampling period T, s, 1e-5 to 0.1.
+    pub period_s: f32,
+}

@@ -1,0 +1,66 @@
+//! The surface interpolator (C.-C. Lo, "A new approach to CNC tool path generation", Computer-Aided Design 30, 1998):
+//! a parametric surface, a ball-end tool, a feed and a scallop limit in; each period the next cutter location out.
+//!
+//! ```text
+//!  Header + words ── program ──► sealed job
+//!                                   │ collapse: once a pass and patch
+//!                                   ▼
+//!            ┌──────────────────► surface ──► Contact (point, normal, speed, curvatures)
+//!            │                                  │
+//!   contact: next parameter            ┌────────┼─────────────┐
+//!   at one period's arc  ◄─────────────┘        ▼             ▼
+//!            ▲                               offset        interval
+//!            │                              CL = CC + rN   candidate of the pass
+//!         interpolator::tick                    │             │
+//!            ▲                                  ▼             ▼
+//!       one call a period                    Sample       schedule: next pass
+//! ```
+//!
+//! Nothing here allocates, blocks, panics or uses f64; the same calls give the same bits on every machine. Lengths are mm
+//! (f32) or nm (i32), angles turns or radians as named, parameters fractions of a span. Build job data from ordinary
+//! coefficients with [`encode`].
+//!
+//! # Accuracy
+//! CL within 5 nm of the exact surface's for a ball of up to 10 mm radius and patches of up to about 100 mm; the arc
+//! between two samples within 0.001 % of feed times period.
+#![no_std]
+#![warn(clippy::indexing_slicing, clippy::panic, clippy::expect_used)]
+#![warn(
+    clippy::cast_possible_truncation,
+    clippy::cast_sign_loss,
+    clippy::cast_possible_wrap,
+    clippy::cast_precision_loss
+)]
+#![allow(clippy::neg_cmp_op_on_partial_ord, reason = "written so that a NaN fails the test")]
+#![cfg_attr(
+    test,
+    allow(
+        clippy::cast_possible_truncation,
+        clippy::cast_sign_loss,
+        clippy::cast_possible_wrap,
+        clippy::cast_precision_loss,
+        reason = "tests convert freely"
+    )
+)]
+
+#[cfg(test)]
+extern crate std;
+
+mod arith;
+mod contact;
+pub mod encode;
+pub mod fault;
+pub mod interpolator;
+mod interval;
+pub mod job;
+mod offset;
+mod program;
+pub mod sample;
+mod schedule;
+pub mod surface;
+mod vec3;
+
+pub use fault::{Fault, FaultKind};
+pub use interpolator::{Interpolator, Request};
+pub use job::{Header, Pattern, STORE_WORDS, SurfaceKind, ToolSide};
+pub use sample::{Place, Sample, State};

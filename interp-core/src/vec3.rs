@@ -1,0 +1,79 @@
+//! Three floats, and the products the geometry needs.
+
+use crate::arith::to_f32;
+use core::ops::{Add, Mul, Sub};
+
+/// A vector or a derivative, mm or per mm as its name says.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub(crate) struct Vec3 {
+    /// Along x.
+    pub(crate) x: f32,
+    /// Along y.
+    pub(crate) y: f32,
+    /// Along z.
+    pub(crate) z: f32,
+}
+
+impl Vec3 {
+    /// A vector from its components.
+    #[inline(always)]
+    #[must_use]
+    pub(crate) const fn new(x: f32, y: f32, z: f32) -> Self {
+        Self { x, y, z }
+    }
+
+    /// Integers times a scale.
+    #[inline(always)]
+    #[must_use]
+    pub(crate) fn scaled([x, y, z]: [i32; 3], scale: f32) -> Self {
+        Self::new(to_f32(x) * scale, to_f32(y) * scale, to_f32(z) * scale)
+    }
+
+    /// Applies a function to each of three things.
+    #[inline(always)]
+    pub(crate) fn each<T>([x, y, z]: &[T; 3], f: impl Fn(&T) -> f32) -> Self {
+        Self::new(f(x), f(y), f(z))
+    }
+
+    /// Scalar product.
+    #[inline(always)]
+    #[must_use]
+    pub(crate) fn dot(self, other: Self) -> f32 {
+        self.x * other.x + self.y * other.y + self.z * other.z
+    }
+
+    /// Vector product.
+    #[inline(always)]
+    #[must_use]
+    pub(crate) fn cross(self, other: Self) -> Self {
+        Self::new(
+            self.y * other.z - self.z * other.y,
+            self.z * other.x - self.x * other.z,
+            self.x * other.y - self.y * other.x,
+        )
+    }
+}
+
+impl Add for Vec3 {
+    type Output = Self;
+    #[inline(always)]
+    fn add(self, other: Self) -> Self {
+        Self::new(self.x + other.x, self.y + other.y, self.z + other.z)
+    }
+}
+
+impl Sub for Vec3 {
+    type Output = Self;
+    #[inline(always)]
+    fn sub(self, other: Self) -> Self {
+        Self::new(self.x - other.x, self.y - other.y, self.z - other.z)
+    }
+}
+
+impl Mul<f32> for Vec3 {
+    type Output = Self;
+    #[inline(always)]
+    fn mul(self, factor: f32) -> Self {
+        Self::new(self.x * factor, self.y * factor, self.z * factor)
+    }
+}
