@@ -7,7 +7,8 @@ pub enum FaultKind {
     /// A principal curvature towards the tool leaves no room for the ball (local gouge).
     /// Value: the surface's principal curvature towards the tool times the ball radius (at least 1 where nothing fits).
     BallDoesNotFit = 1,
-    /// `S_u x S_v` is too near zero for a normal. Value: `|S_u x S_v| / (|S_u| |S_v|)`, the sine between them.
+    /// `S_u x S_v` is too near zero for a normal, or went through zero between two samples so that the tool would change
+    /// sides. Value: `|S_u x S_v| / (|S_u| |S_v|)`, the sine between them; 0 where it went through zero.
     DegenerateSurface = 2,
     /// The step of the path parameter for one period would not run forwards.
     /// Value: second- and third-order terms of the step over its first-order term (at most -1 where it runs backwards).

@@ -10,6 +10,7 @@ use crate::program::{PassSurface, Program};
 use crate::sample::{Place, Sample, State};
 use crate::schedule;
 use crate::surface::{Contact, PassLine, PathSpeed};
+use crate::vec3::Vec3;
 
 /// Patch boundaries that one period's arc may cross: each costs the collapse of a patch. Three lets a tick pass two whole
 /// patches that are shorter than its arc; shorter ones than that say the feed is not meant for the part.
@@ -30,6 +31,20 @@ pub enum Request {
     Resume = 3,
     /// Running or held: give the run up; faulted: acknowledge the fault. The position is kept, the job stays loaded (ready).
     Abort = 4,
+}
+
+impl Request {
+    /// Whether a machine in this state takes the request up.
+    #[must_use]
+    pub const fn is_allowed(self, state: State) -> bool {
+        match self {
+            Self::None => true,
+            Self::Start => matches!(state, State::Ready | State::Finished),
+            Self::Hold => matches!(state, State::Running),
+            Self::Resume => matches!(state, State::Held),
+            Self::Abort => matches!(state, State::Running | State::Held | State::Faulted),
+        }
+    }
 }
 
 /// What the next tick has to do.
@@ -62,6 +77,9 @@ struct Run {
     offset: Offset,
     /// The parametrisation at the last sample.
     path: PathSpeed,
+    /// Tool normal at the last sample, and at the pass's first.
+    normal: Vec3,
+    first_normal: Vec3,
     /// Least interval candidate of the pass, fractions of the side span.
     least: f32,
 }
@@ -78,6 +96,8 @@ impl Run {
         surface: None,
         offset: Offset::NONE,
         path: PathSpeed { speed: 0.0, inverse: 0.0, stretch: 0.0, stretch_change: 0.0 },
+        normal: Vec3::ZERO,
+        first_normal: Vec3::ZERO,
         least: f32::INFINITY,
     };
 
@@ -86,6 +106,19 @@ impl Run {
         let fraction = if self.reversed { !self.fraction } else { self.fraction };
         Place { span: self.span, fraction }
     }
+}
+
+/// The loaded surface at one place, outside of any run.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Probe {
+    /// Cutter contact, nm.
+    pub cc_nm: [i32; 3],
+    /// Cutter location, nm.
+    pub cl_nm: [i32; 3],
+    /// Unit normal towards the tool.
+    pub normal: [f32; 3],
+    /// Candidate of the path interval, in units of the side parameter; infinite where it sets no limit.
+    pub interval: f32,
 }
 
 /// Everything that decides where the tool goes, behind one [`Interpolator::tick`] a period.
@@ -126,12 +159,10 @@ impl<const WORDS: usize> Interpolator<WORDS> {
     }
 
     fn may_load(&self) -> Result<()> {
-        match self.state {
-            State::Idle | State::Ready | State::Finished | State::Faulted => Ok(()),
-            State::Running | State::Holding | State::Held | State::Stopping => {
-                Err(Fault::new(FaultKind::WrongState, f32::from(self.state as u8)))
-            }
+        if self.state.is_under_way() {
+            return Err(Fault::new(FaultKind::WrongState, f32::from(self.state as u8)));
         }
+        Ok(())
     }
 
     /// Begins to load a job of so many data words; what was loaded before is gone, and the machine is idle.
@@ -225,9 +256,34 @@ impl<const WORDS: usize> Interpolator<WORDS> {
         self.last_interval
     }
 
+    /// The loaded surface at a place: what a sample there would say, whatever the machine is doing. Not for the sample path:
+    /// it collapses a patch each time. The side fraction counts in steps of 2^-32.
+    ///
+    /// # Errors
+    /// [`FaultKind::WrongState`] without a loaded job or for a span that it does not have; what is wrong with the surface
+    /// there.
+    pub fn probe(&self, path: Place, side: Place) -> Result<Probe> {
+        let header = self.program.header();
+        if path.span >= header.path_spans || side.span >= header.side_spans {
+            return Err(Fault::new(FaultKind::WrongState, f32::from(self.state as u8)));
+        }
+        let mut run = Run { side, span: path.span, fraction: path.fraction, ..Run::START };
+        collapse(&self.program, &mut run)?;
+        let (contact, origin_nm) = contact(&run)?;
+        run.offset.check_fit(&contact)?;
+        let located = run.offset.locate(&contact, &origin_nm)?;
+        let normal = contact.normal;
+        Ok(Probe {
+            cc_nm: located.cc_nm,
+            cl_nm: located.cl_nm,
+            normal: [normal.x, normal.y, normal.z],
+            interval: self.interval.candidate(&contact) * self.program.side_width(side.span),
+        })
+    }
+
     /// Stops a run with a fault from outside, such as a missed deadline. Ignored where nothing runs or is held.
     pub fn trip(&mut self, fault: Fault) {
-        if matches!(self.state, State::Running | State::Held) {
+        if self.state.is_under_way() {
             self.fail(fault);
         }
     }
@@ -261,43 +317,52 @@ impl<const WORDS: usize> Interpolator<WORDS> {
     }
 
     fn take_up(&mut self, request: Request) {
-        self.state = match (request, self.state) {
-            (Request::Start, State::Ready | State::Finished) => {
+        if !request.is_allowed(self.state) {
+            return;
+        }
+        self.state = match request {
+            Request::None => return,
+            Request::Start => {
                 self.reset_run();
                 State::Running
             }
-            (Request::Hold, State::Running) => State::Held,
-            (Request::Resume, State::Held) => State::Running,
-            (Request::Abort, State::Running | State::Held | State::Faulted) => {
+            Request::Hold => State::Held,
+            Request::Resume => State::Running,
+            Request::Abort => {
                 self.fault = None;
                 State::Ready
             }
-            (_, state) => state,
         };
     }
 
     /// The next sample of the run; none when the last is out.
     #[inline]
     fn advance(&mut self) -> Result<Option<Sample>> {
-        let point = match self.run.next {
-            Next::Along => {
-                self.step()?;
-                false
-            }
+        let begins = self.run.next != Next::Along;
+        match self.run.next {
+            Next::Along => self.step()?,
             Next::Pass => self.begin_pass()?,
             Next::Over => {
                 self.step_over()?;
-                self.begin_pass()?
+                self.begin_pass()?;
             }
-            Next::End => return Ok(None),
-        };
-        if point {
-            self.end_pass();
+            Next::End => {
+                self.note_interval();
+                return Ok(None);
+            }
         }
         let run = &mut self.run;
         let (contact, origin_nm) = contact(run)?;
         run.offset.check_fit(&contact)?;
         let located = run.offset.locate(&contact, &origin_nm)?;
+        // More than a right angle from one sample to the next: the surface folded over in between.
+        if run.normal.dot(contact.normal) < 0.0 {
+            return Err(Fault::new(FaultKind::DegenerateSurface, 0.0));
+        }
+        if begins {
+            run.first_normal = contact.normal;
+        }
+        run.normal = contact.normal;
         let candidate = self.interval.candidate(&contact);
         if candidate < run.least {
             run.least = candidate;
@@ -352,29 +417,42 @@ impl<const WORDS: usize> Interpolator<WORDS> {
         };
         self.run.span = span;
         self.run.fraction = 0;
-        self.collapse()?;
+        collapse(&self.program, &mut self.run)?;
         Ok(true)
     }
 
-    /// Begins the pass at the current side place; true where it is a single point.
+    /// Begins the pass at the current side place. A pass that is a single point ends with it.
     #[inline(never)]
-    fn begin_pass(&mut self) -> Result<bool> {
+    fn begin_pass(&mut self) -> Result<()> {
         let header = self.program.header();
         self.run.reversed = header.pattern == Pattern::Zigzag && self.run.pass % 2 == 1;
         self.run.span = if self.run.reversed { header.path_spans.saturating_sub(1) } else { 0 };
         self.run.fraction = 0;
         self.run.least = f32::INFINITY;
         self.run.next = Next::Along;
-        self.collapse()
+        if collapse(&self.program, &mut self.run)? {
+            self.end_pass();
+        }
+        Ok(())
     }
 
-    /// The side place of the next pass.
+    /// Least interval of the pass that is over, in units of the side parameter.
+    fn note_interval(&mut self) {
+        self.last_interval = self.run.least * self.program.side_width(self.run.side.span);
+    }
+
+    /// The side place of the next pass; its first sample is a neighbour of the last pass's first, or of its last where the
+    /// passes run to and fro.
     fn step_over(&mut self) -> Result<()> {
+        self.note_interval();
         let program = &self.program;
         let spans = program.header().side_spans;
         let width = |span| program.side_width(span);
         self.run.side = schedule::next_side(self.run.side, self.run.least, spans, width)?;
-        self.run.pass += 1;
+        self.run.pass = self.run.pass.wrapping_add(1);
+        if program.header().pattern == Pattern::Zig {
+            self.run.normal = self.run.first_normal;
+        }
         Ok(())
     }
 
@@ -382,27 +460,26 @@ impl<const WORDS: usize> Interpolator<WORDS> {
         let last = schedule::is_last(self.run.side, self.program.header().side_spans);
         self.run.next = if last { Next::End } else { Next::Over };
     }
+}
 
-    /// Collapses the current patch; true where the pass is a single point.
-    fn collapse(&mut self) -> Result<bool> {
-        let header = self.program.header();
-        let run = &mut self.run;
-        let at = PassLine {
-            side: centred(run.side.fraction),
-            reversed: run.reversed,
-            tool_sign: if header.tool_side == ToolSide::Plus { 1.0 } else { -1.0 },
-        };
-        let surface = self.program.collapse(run.span, run.side, &at)?;
-        let (shift, point) = match &surface {
-            PassSurface::Polynomial(pass) => (pass.shift, pass.is_point()),
-            PassSurface::Rational(pass) => (pass.shift, pass.is_point()),
-            PassSurface::Profile(pass) => (pass.shift, false),
-            PassSurface::Circle(pass) => (pass.shift, pass.is_point()),
-        };
-        run.surface = Some(surface);
-        run.offset = Offset::new(header.ball_radius_mm, shift);
-        Ok(point)
-    }
+/// Collapses the patch where the run is; true where the pass is a single point.
+fn collapse<const WORDS: usize>(program: &Program<WORDS>, run: &mut Run) -> Result<bool> {
+    let header = program.header();
+    let at = PassLine {
+        side: centred(run.side.fraction),
+        reversed: run.reversed,
+        tool_sign: if header.tool_side == ToolSide::Plus { 1.0 } else { -1.0 },
+    };
+    let surface = program.collapse(run.span, run.side, &at)?;
+    let (shift, point) = match &surface {
+        PassSurface::Polynomial(pass) => (pass.shift, pass.is_point()),
+        PassSurface::Rational(pass) => (pass.shift, pass.is_point()),
+        PassSurface::Profile(pass) => (pass.shift, false),
+        PassSurface::Circle(pass) => (pass.shift, pass.is_point()),
+    };
+    run.surface = Some(surface);
+    run.offset = Offset::new(header.ball_radius_mm, shift);
+    Ok(point)
 }
 
 /// A step of the fraction below a whole span.

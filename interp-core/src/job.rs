@@ -10,9 +10,21 @@
 //!
 //! The records are described in the files of [`crate::surface`].
 
-/// Words of surface data that the reference machine stores: 64 KiB of its 128 KiB RAM, hence 315 polynomial or 240
-/// rational patches.
+/// Words of surface data that the reference machine stores: 64 KiB of its 128 KiB RAM, hence 309 polynomial or 237
+/// rational patches ([`patches_max`]).
 pub const STORE_WORDS: usize = 16_384;
+
+/// Patches that surely fit a store of so many words, however they are arranged: each may need a span width of its own,
+/// and one direction has one more.
+#[must_use]
+pub const fn patches_max(kind: SurfaceKind, store_words: usize) -> usize {
+    let words = match kind {
+        SurfaceKind::Polynomial => crate::surface::POLYNOMIAL_WORDS,
+        SurfaceKind::Rational => crate::surface::RATIONAL_WORDS,
+        SurfaceKind::RevolvedAlongProfile | SurfaceKind::RevolvedAroundAxis => return 1,
+    };
+    store_words.saturating_sub(1) / (words + 1)
+}
 
 /// Spans a surface may have in one direction. It bounds every loop over spans.
 pub const SPANS_MAX: u16 = 1_024;

@@ -61,6 +61,6 @@ pub mod surface;
 mod vec3;
 
 pub use fault::{Fault, FaultKind};
-pub use interpolator::{Interpolator, Request};
+pub use interpolator::{Interpolator, Probe, Request};
 pub use job::{Header, Pattern, STORE_WORDS, SurfaceKind, ToolSide};
 pub use sample::{Place, Sample, State};

@@ -42,6 +42,12 @@ impl State {
         Self::ALL.into_iter().find(|state| *state as u8 == code)
     }
 
+    /// Whether a run is under way: moving, or standing on its path to be resumed.
+    #[must_use]
+    pub const fn is_under_way(self) -> bool {
+        matches!(self, Self::Running | Self::Holding | Self::Held | Self::Stopping)
+    }
+
     /// The state's name in traces and JSON.
     #[must_use]
     pub const fn name(self) -> &'static str {

@@ -15,6 +15,9 @@ pub(crate) struct Vec3 {
 }
 
 impl Vec3 {
+    /// Nowhere.
+    pub(crate) const ZERO: Self = Self::new(0.0, 0.0, 0.0);
+
     /// A vector from its components.
     #[inline(always)]
     #[must_use]
