@@ -1,0 +1,132 @@
+//! A board on the desk: both halves joined by plain calls, a byte stream on one side, ticks on the other.
+
+use std::collections::VecDeque;
+use std::vec::Vec;
+
+use interp_core::{
+    fault::Fault,
+    job::{Header, STORE_WORDS},
+};
+use protocol::message::{Description, Status};
+
+use crate::{
+    link::Link,
+    machine::{Busy, Command, Machine, describe},
+    realtime::{RealTime, TickInput, TickOutput},
+};
+
+/// Commands that may wait for the next tick, as in the firmware.
+pub const COMMANDS_MAX: usize = 4;
+
+/// The real-time half and the queue before it: what the link talks to.
+#[derive(Debug, Default)]
+struct Half<const WORDS: usize> {
+    real_time: RealTime<WORDS>,
+    commands: VecDeque<Command>,
+}
+
+impl<const WORDS: usize> Machine for Half<WORDS> {
+    fn description(&mut self) -> Description {
+        describe([0, 1, 0], "in-process", WORDS, 1000)
+    }
+
+    fn status(&mut self) -> Status {
+        self.real_time.status()
+    }
+
+    fn load_begin(&mut self, header: &Header, words: u32) -> Result<(), Fault> {
+        self.real_time.load_begin(header, words)
+    }
+
+    fn load_words(&mut self, offset: u32, words: &[i32]) -> Result<(), Fault> {
+        self.real_time.load_words(offset, words)
+    }
+
+    fn load_records(&mut self) -> u32 {
+        self.real_time.load_records()
+    }
+
+    fn load_check(&mut self, record: u32) -> Result<(), Fault> {
+        self.real_time.load_check(record)
+    }
+
+    fn load_finish(&mut self) -> Result<(), Fault> {
+        self.real_time.load_finish()
+    }
+
+    fn send(&mut self, command: Command) -> Result<(), Busy> {
+        if self.commands.len() >= COMMANDS_MAX {
+            return Err(Busy);
+        }
+        self.commands.push_back(command);
+        Ok(())
+    }
+
+    fn commands_wait(&mut self) -> bool {
+        !self.commands.is_empty()
+    }
+}
+
+/// The whole board but for its pins.
+#[derive(Debug, Default)]
+pub struct Board<const WORDS: usize = STORE_WORDS> {
+    half: Half<WORDS>,
+    link: Link,
+    sent: Vec<u8>,
+}
+
+impl<const WORDS: usize> Board<WORDS> {
+    /// A board as after power-up.
+    #[must_use]
+    pub fn new() -> Self {
+        Self::default()
+    }
+
+    /// Bytes from the host, as they come off the line.
+    pub fn receive(&mut self, bytes: &[u8]) {
+        let sent = &mut self.sent;
+        for byte in bytes {
+            self.link.receive(*byte, &mut self.half, &mut |answer| {
+                sent.extend_from_slice(answer)
+            });
+        }
+    }
+
+    /// One tick of the sample timer, with its events on the line afterwards.
+    pub fn tick(&mut self) -> TickOutput {
+        self.tick_with(0, 0)
+    }
+
+    /// One tick of the sample timer before which so many were missed, the last one having taken so many cycles.
+    pub fn tick_with(&mut self, missed: u32, cycles: u32) -> TickOutput {
+        let command = self.half.commands.pop_front();
+        let output = self.half.real_time.tick(TickInput {
+            command,
+            missed,
+            cycles,
+            output_full: false,
+        });
+        let sent = &mut self.sent;
+        for event in output.events() {
+            self.link
+                .event(&event, &mut |bytes| sent.extend_from_slice(bytes));
+        }
+        output
+    }
+
+    /// The bytes that the board has sent since the last call.
+    pub fn take_sent(&mut self) -> Vec<u8> {
+        core::mem::take(&mut self.sent)
+    }
+
+    /// The status, beside the line.
+    #[must_use]
+    pub fn status(&mut self) -> Status {
+        self.half.status()
+    }
+
+    /// The real-time half, beside the line.
+    pub const fn real_time(&mut self) -> &mut RealTime<WORDS> {
+        &mut self.half.real_time
+    }
+}

@@ -1,0 +1,36 @@
+//! The board's logic without the board, so that the firmware and a test on the desk run the same code.
+//!
+//! ```text
+//!            idle, or a low-priority task          |        sample timer, one call a period
+//!                                                  |
+//!  bytes ──► Link ── Command ──────────────────────┼──queue──► RealTime ──► Interpolator::tick
+//!             │ └──── load_.., status (lock) ──────┼─────────►    │
+//!  bytes ◄── Link ◄── Event ───────────────────────┼──queue───────┘
+//! ```
+//!
+//! [`realtime::RealTime`] owns the interpolator and decides, once a timer tick, whether a period passes; it keeps the
+//! digests and counters of the run. [`link::Link`] keeps the session with the host: it reads frames, answers every
+//! request, and writes events. Between them stands [`machine::Machine`], which the firmware implements with short locks
+//! and a queue, and the desk with plain calls (`in_process`, feature `std`).
+#![no_std]
+#![warn(clippy::indexing_slicing, clippy::panic, clippy::expect_used)]
+#![cfg_attr(
+    test,
+    allow(
+        clippy::indexing_slicing,
+        clippy::panic,
+        clippy::unwrap_used,
+        reason = "a test may fail by panic"
+    )
+)]
+
+#[cfg(any(test, feature = "std"))]
+extern crate std;
+
+#[cfg(any(test, feature = "std"))]
+pub mod in_process;
+pub mod link;
+pub mod machine;
+pub mod realtime;
+mod session;
+mod upload;

@@ -1,0 +1,327 @@
+//! A session with the host: who speaks, which request is next, and what is answered to it.
+
+use heapless::Vec;
+use interp_core::{interpolator, job::Header};
+use protocol::{
+    frame::{DELIMITER, FRAME_MAX, Frame, write_reply},
+    message::{Capabilities, Clock, NO_NUMBER, Reason, Reply, Request, Status, next_number, read_request},
+    version::PROTOCOL_VERSION,
+};
+
+use crate::{
+    machine::{Busy, Command, Machine},
+    upload::Upload,
+};
+
+/// Longest answer kept for a retransmission, bytes: a frame of `Status` with every varint at its longest.
+const ANSWER_MAX: usize = 93;
+
+/// Who is at the other end.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Peer {
+    Nobody,
+    /// Said `Hello` with another version.
+    Stranger {
+        version: u16,
+    },
+    /// Said `Hello`.
+    Host {
+        session: u32,
+    },
+}
+
+/// The last request that was answered: asked again, it is answered again.
+#[derive(Debug)]
+struct Last {
+    number: u16,
+    length: usize,
+    crc: u32,
+    answer: Vec<u8, ANSWER_MAX>,
+}
+
+impl Last {
+    const fn new() -> Self {
+        Self {
+            number: NO_NUMBER,
+            length: 0,
+            crc: 0,
+            answer: Vec::new(),
+        }
+    }
+
+    fn is(&self, number: u16, frame: &Frame<'_>) -> bool {
+        !self.answer.is_empty()
+            && self.number == number
+            && self.length == frame.payload.len()
+            && self.crc == frame.crc
+    }
+
+    fn set(&mut self, number: u16, frame: &Frame<'_>, answer: &Reply) {
+        *self = Self {
+            number,
+            length: frame.payload.len(),
+            crc: frame.crc,
+            answer: Vec::new(),
+        };
+        let capacity = self.answer.capacity();
+        self.answer.resize_default(capacity).ok();
+        let length = write_reply(answer, &mut self.answer).map_or(0, <[u8]>::len);
+        self.answer.truncate(length);
+    }
+}
+
+#[derive(Debug)]
+pub(crate) struct Session {
+    peer: Peer,
+    last: Last,
+    upload: Option<Upload>,
+    /// What the commands sent so far make of the clock; the status shows it a tick later.
+    clock: Clock,
+    /// A start, hold, resume or abort was sent, and may still wait.
+    wished: bool,
+    frames_bad: u32,
+}
+
+impl Session {
+    pub(crate) const fn new() -> Self {
+        Self {
+            peer: Peer::Nobody,
+            last: Last::new(),
+            upload: None,
+            clock: Clock::Free,
+            wished: false,
+            frames_bad: 0,
+        }
+    }
+
+    pub(crate) const fn is_open(&self) -> bool {
+        matches!(self.peer, Peer::Host { .. })
+    }
+
+    pub(crate) const fn count_bad_frame(&mut self) {
+        self.frames_bad = self.frames_bad.saturating_add(1);
+    }
+
+    /// The machine's status with the link's own counter.
+    pub(crate) const fn complete(&self, status: Status) -> Status {
+        Status {
+            frames_bad: self.frames_bad,
+            ..status
+        }
+    }
+
+    /// Answers a frame.
+    pub(crate) fn frame(
+        &mut self,
+        frame: Frame<'_>,
+        machine: &mut impl Machine,
+        out: &mut impl FnMut(&[u8]),
+    ) {
+        let (number, request) = match read_request(frame.payload) {
+            Ok((number, request)) => (number, Some(request)),
+            Err(unreadable) => (unreadable.number, None),
+        };
+        if let Some(Request::Hello { version, session }) = request {
+            self.hello(number, version, session);
+            let description = machine.description();
+            let capabilities = Capabilities {
+                number,
+                version: PROTOCOL_VERSION,
+                session,
+                description,
+            };
+            out(&[DELIMITER]);
+            send(&Reply::Capabilities(capabilities), out);
+        } else if self.last.is(number, &frame) {
+            out(&self.last.answer);
+        } else if let Some(reason) = self.refusal(number) {
+            send(&Reply::Nak { number, reason }, out);
+        } else if let Some(request) = request {
+            let answer = self.answer(number, request, machine);
+            self.last.set(number, &frame, &answer);
+            out(&self.last.answer);
+        } else {
+            send(
+                &Reply::Nak {
+                    number,
+                    reason: Reason::Unreadable,
+                },
+                out,
+            );
+        }
+    }
+
+    /// Opens a session, unless it is open already: then this `Hello` is a retransmission, and changes nothing.
+    fn hello(&mut self, number: u16, version: u16, session: u32) {
+        let peer = if version == PROTOCOL_VERSION {
+            Peer::Host { session }
+        } else {
+            Peer::Stranger { version }
+        };
+        if peer != self.peer {
+            self.peer = peer;
+            self.upload = None;
+            self.last = Last {
+                number,
+                ..Last::new()
+            };
+        }
+    }
+
+    /// Why no request with this number is looked at, if so.
+    fn refusal(&self, number: u16) -> Option<Reason> {
+        match self.peer {
+            Peer::Nobody => Some(Reason::SayHello),
+            Peer::Stranger { version } => Some(Reason::Version {
+                host: version,
+                board: PROTOCOL_VERSION,
+            }),
+            Peer::Host { .. } => {
+                let expected = next_number(self.last.number);
+                (number != expected).then_some(Reason::OutOfOrder { expected })
+            }
+        }
+    }
+
+    /// Does what a request asks for.
+    fn answer(&mut self, number: u16, request: Request, machine: &mut impl Machine) -> Reply {
+        use interpolator::Request as Wish;
+        let done = match request {
+            Request::Status => {
+                return Reply::Status {
+                    number,
+                    status: self.complete(machine.status()),
+                };
+            }
+            Request::JobBegin {
+                header,
+                words,
+                digest,
+            } => self.job_begin(machine, &header, words, digest),
+            Request::JobChunk { offset, words } => match &mut self.upload {
+                Some(upload) => upload.chunk(machine, offset, words.as_slice()),
+                None => Err(Reason::NoUpload),
+            },
+            Request::JobEnd => self.job_end(machine),
+            Request::Start => self.wish(machine, Wish::Start),
+            Request::Hold => self.wish(machine, Wish::Hold),
+            Request::Resume => self.wish(machine, Wish::Resume),
+            Request::Abort => self.wish(machine, Wish::Abort),
+            Request::Clock(clock) => self.set_clock(machine, clock),
+            Request::Run { .. } if self.clock != Clock::Lockstep => {
+                Err(Reason::WrongClock { clock: self.clock })
+            }
+            Request::Run { ticks } => command(machine, Command::Run { ticks }),
+            Request::Report(report) => command(machine, Command::Report(report)),
+            // Answered before it comes here.
+            Request::Hello { .. } => Err(Reason::Unreadable),
+        };
+        match done {
+            Ok(()) => Reply::Ack { number },
+            Err(reason) => Reply::Nak { number, reason },
+        }
+    }
+
+    /// Not before the commands for the job before are taken up.
+    fn job_begin(
+        &mut self,
+        machine: &mut impl Machine,
+        header: &Header,
+        words: u32,
+        digest: u64,
+    ) -> Result<(), Reason> {
+        if self.wished && machine.commands_wait() {
+            return Err(Reason::Busy);
+        }
+        self.wished = false;
+        self.upload = Some(Upload::begin(machine, header, words, digest)?);
+        Ok(())
+    }
+
+    fn job_end(&mut self, machine: &mut impl Machine) -> Result<(), Reason> {
+        let upload = self.upload.ok_or(Reason::NoUpload)?;
+        upload.check_complete()?;
+        self.upload = None;
+        upload.finish(machine)
+    }
+
+    /// Queues what the state allows.
+    fn wish(&mut self, machine: &mut impl Machine, wish: interpolator::Request) -> Result<(), Reason> {
+        let state = machine.status().state;
+        if !wish.is_allowed(state) {
+            return Err(Reason::WrongState { state });
+        }
+        command(machine, Command::Request(wish))?;
+        self.wished = true;
+        Ok(())
+    }
+
+    /// To stop or release time under a moving tool would tear at the axes.
+    fn set_clock(&mut self, machine: &mut impl Machine, clock: Clock) -> Result<(), Reason> {
+        let state = machine.status().state;
+        if state.is_under_way() {
+            return Err(Reason::WrongState { state });
+        }
+        command(machine, Command::Clock(clock))?;
+        self.clock = clock;
+        Ok(())
+    }
+}
+
+fn command(machine: &mut impl Machine, command: Command) -> Result<(), Reason> {
+    machine.send(command).map_err(|Busy| Reason::Busy)
+}
+
+/// Writes one reply as a frame. Every message fits into [`FRAME_MAX`]; a test of the protocol holds that.
+pub(crate) fn send(reply: &Reply, out: &mut impl FnMut(&[u8])) {
+    let mut buffer = [0; FRAME_MAX];
+    if let Ok(frame) = write_reply(reply, &mut buffer) {
+        out(frame);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use interp_core::sample::{Place, State};
+    use protocol::message::{FaultReport, Report};
+
+    #[test]
+    fn the_longest_status_is_kept() {
+        let place = Place {
+            span: u16::MAX,
+            fraction: u64::MAX,
+        };
+        let status = Status {
+            state: State::Faulted,
+            fault: Some(FaultReport {
+                code: u8::MAX,
+                value: f32::MAX,
+            }),
+            clock: Clock::Lockstep,
+            credit: u32::MAX,
+            report: Report::Samples,
+            tick: u32::MAX,
+            pass: u32::MAX,
+            path: place,
+            side: place,
+            samples: u32::MAX,
+            digest: u64::MAX,
+            interval: f32::MAX,
+            deadline_misses: u32::MAX,
+            tick_cycles_max: u32::MAX,
+            samples_lost: u32::MAX,
+            frames_bad: u32::MAX,
+        };
+        let mut last = Last::new();
+        last.set(
+            u16::MAX,
+            &Frame { payload: &[], crc: 0 },
+            &Reply::Status {
+                number: u16::MAX,
+                status,
+            },
+        );
+        assert_eq!(last.answer.len(), ANSWER_MAX);
+    }
+}

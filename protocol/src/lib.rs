@@ -1,0 +1,76 @@
+//! What host and board say to each other, layer by layer, from the wire up. `no_std`, no allocation, no panic on any
+//! input; both ends use this code.
+//!
+//! # The line
+//!
+//! Eight-bit bytes, any of which may be lost, added or flipped. Nothing is assumed but that they keep their order.
+//!
+//! # Frames: [`frame`]
+//!
+//! A payload of at most [`frame::PAYLOAD_MAX`] bytes, its CRC-32, both stuffed by COBS, ended by a zero byte. A frame
+//! either arrives as it was sent, or is an error; damage never reaches the frame after the next zero.
+//!
+//! # Messages: [`message`]
+//!
+//! | host to board | | board to host |
+//! |---|---|---|
+//! | `Hello` | → ← | `Capabilities` |
+//! | `JobBegin`, `JobChunk` .., `JobEnd` | → ← | `Ack` or `Nak` each |
+//! | `Clock`, `Report` | → ← | `Ack` or `Nak` |
+//! | `Start`, `Hold`, `Resume`, `Abort` | → ← | `Ack` or `Nak` |
+//! | `Run` | → ← | `Ack` or `Nak`, later `Halted` |
+//! | `Status` | → ← | `Status` |
+//! | | ← | `Samples`, `PassDigest`, `Halted` while a run goes on |
+//!
+//! The module's documentation has every message's bytes. One request is under way at a time; each has a number, and gets
+//! one answer.
+//!
+//! # What happens when
+//!
+//! | the board gets | it answers | and |
+//! |---|---|---|
+//! | a damaged frame | `Nak` 0, [`message::Reason::BadFrame`] | counts it |
+//! | a whole frame that is no message | `Nak`, `Unreadable` | |
+//! | anything before `Hello` | `Nak`, `SayHello` | |
+//! | `Hello` of another version | `Capabilities`, whose version says so; then `Nak`, `Version` with both versions | closes the session |
+//! | `Hello` of the same session again | `Capabilities` | |
+//! | the last request again, byte for byte | the same answer again, byte for byte | |
+//! | a number that is not the next | `Nak`, `OutOfOrder` with the one expected | |
+//! | a job, or another clock, while a run is under way | `Nak`, `WrongState` with the state | |
+//! | a chunk that is not the next, or too many words | `Nak`, `WrongOffset`, `TooLong` | |
+//! | `JobEnd` too early | `Nak`, `Incomplete` | the upload may go on |
+//! | `JobEnd` with other words than announced | `Nak`, `WrongDigest` | the upload is over, no job is loaded |
+//! | `JobEnd` of a job that the core refuses | `Nak`, `Job` with fault, value, record | the upload is over, no job is loaded |
+//! | a command that the state does not allow | `Nak`, `WrongState` | |
+//!
+//! Where the last column is empty, nothing has changed. An event that the line damages is lost: the host sees it by a
+//! tick or pass that is missing, and by `Status`, whose digest covers the whole run.
+//!
+//! # Digests: [`digest`]
+//!
+//! 64 bits that two ends compare instead of all samples of a pass, or all words of a job.
+//!
+//! # Versions: [`version`]
+//!
+//! The frame, `Hello` and `Capabilities` are the same in all versions; everything else needs the same version.
+#![no_std]
+#![warn(clippy::indexing_slicing, clippy::panic, clippy::expect_used)]
+#![cfg_attr(
+    test,
+    allow(
+        clippy::indexing_slicing,
+        clippy::panic,
+        clippy::unwrap_used,
+        reason = "a test may fail by panic"
+    )
+)]
+
+mod codes;
+pub mod digest;
+pub mod frame;
+pub mod message;
+mod reason;
+mod records;
+pub mod version;
+
+pub use version::{PROTOCOL_VERSION, VersionMismatch};

@@ -1,0 +1,322 @@
+//! The messages, in one table for both ends.
+//!
+//! # Bytes
+//!
+//! The payload of a frame is written by [postcard](https://postcard.jamesmunns.com/wire-format): fields one after the
+//! other, no names, no gaps.
+//!
+//! | type | bytes |
+//! |---|---|
+//! | `u8` | 1 |
+//! | `u16`, `u32` | varint: seven bits a byte, low ones first, top bit set on all but the last; at most 3 and 5 bytes |
+//! | `i32` | zigzag (0, -1, 1, -2 .. become 0, 1, 2, 3 ..), then varint |
+//! | `f32` | 4, IEEE 754 bits, low byte first |
+//! | digest, fraction | 8, low byte first |
+//! | word of a job | 4, low byte first |
+//! | enumeration | 1: the code given where the type is defined |
+//! | option | 0, or 1 and the value |
+//! | list, text | varint of the number of elements (bytes), then these |
+//!
+//! # Host to board
+//!
+//! Payload: number of the request (`u16`), code (1 byte), fields.
+//!
+//! | code | message | fields | answer, if all is well |
+//! |---|---|---|---|
+//! | 0 | `Hello` | version `u16`, session `u32` | `Capabilities` |
+//! | 1 | `JobBegin` | header, words `u32`, digest | `Ack` |
+//! | 2 | `JobChunk` | offset `u32`, words | `Ack` |
+//! | 3 | `JobEnd` | | `Ack` once the job is checked: the machine is ready |
+//! | 4 | `Start` | | `Ack`, taken up with the next period |
+//! | 5 | `Hold` | | as `Start` |
+//! | 6 | `Resume` | | as `Start` |
+//! | 7 | `Abort` | | as `Start` |
+//! | 8 | `Status` | | `Status` |
+//! | 9 | `Clock` | 0 free, 1 lockstep | `Ack` |
+//! | 10 | `Run` | ticks `u32` | `Ack`, and `Halted` when the ticks are used up |
+//! | 11 | `Report` | 0 digests, 1 samples | `Ack` |
+//!
+//! Header: kind, pattern, tool side (a byte each), spans along path and side (`u16`), ball radius (mm), feed (mm/s),
+//! scallop height (mm), period (s) (`f32`).
+//!
+//! # Board to host
+//!
+//! Payload: code (1 byte), fields. The first four answer a request and carry its number; the others come by themselves.
+//!
+//! | code | message | fields |
+//! |---|---|---|
+//! | 0 | `Capabilities` | number, version `u16`, session `u32`, then the fields of [`Description`] |
+//! | 1 | `Ack` | number |
+//! | 2 | `Nak` | number, [`Reason`] (its code and fields) |
+//! | 3 | `Status` | number, the fields of [`Status`] |
+//! | 4 | `Samples` | list of samples (tick, state, pass, path and side place, feed, CC and CL, interval) |
+//! | 5 | `PassDigest` | the fields of [`PassDigest`] |
+//! | 6 | `Halted` | the fields of [`Status`] |
+//!
+//! A place is its span (`u16`) and fraction. `Halted` comes when the ticks of a `Run` are used up, or when a run is over
+//! (finished, faulted, aborted), whichever is first.
+//!
+//! # For ever
+//!
+//! Frame, number, `Hello` and `Capabilities` keep their bytes in every version; what a later version adds to these two
+//! comes behind, and is skipped by an earlier one. So two ends of any versions can tell each other which they speak.
+//!
+//! # Numbers
+//!
+//! Requests count 1, 2, .. 65535, 1, ..; [`next_number`] says it. `Hello` may have any number, and the count goes on from
+//! there. One request at a time: the host waits for the answer, or sends the same bytes again. Which answers use a number
+//! up is said at [`Reason::uses_number`].
+
+use interp_core::job::Header;
+use serde::{Deserialize, Serialize};
+
+pub use crate::reason::Reason;
+pub use crate::records::{
+    BOARD_NAME_MAX, Batch, CHUNK_WORDS_MAX, Clock, Description, FaultReport, PassDigest, Report, SAMPLES_MAX,
+    SampleRecord, Status, Words,
+};
+use crate::{
+    records::HeaderFields,
+    version::{PROTOCOL_VERSION, VersionMismatch},
+};
+
+/// Number of a `Nak` that answers no request that could be read.
+pub const NO_NUMBER: u16 = 0;
+
+/// The number of the request after this one.
+#[must_use]
+pub const fn next_number(number: u16) -> u16 {
+    if number == u16::MAX { 1 } else { number + 1 }
+}
+
+/// Host to board.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[allow(
+    clippy::large_enum_variant,
+    reason = "without an allocator a chunk can only be carried in place"
+)]
+pub enum Request {
+    /// Opens a session. A session's number differs from that of the one before; the same one again is a retransmission.
+    Hello {
+        /// Version of the host.
+        version: u16,
+        /// Number of the session, any.
+        session: u32,
+    },
+    /// Begins a job's upload; what was loaded before is gone. Refused while a run is under way.
+    JobBegin {
+        /// All but the surface's data.
+        #[serde(with = "HeaderFields")]
+        header: Header,
+        /// Data words that follow.
+        words: u32,
+        /// [`crate::digest::job_digest`] of the data words.
+        #[serde(with = "postcard::fixint::le")]
+        digest: u64,
+    },
+    /// The next data words, in order.
+    JobChunk {
+        /// Index of the first word.
+        offset: u32,
+        /// The words.
+        words: Words,
+    },
+    /// All words were sent: check them and make the machine ready.
+    JobEnd,
+    /// Run the job from its beginning.
+    Start,
+    /// Stand on the path.
+    Hold,
+    /// Go on after a hold.
+    Resume,
+    /// Give the run up; the job stays loaded.
+    Abort,
+    /// How is it going?
+    Status,
+    /// What drives time. Refused while a run is under way.
+    Clock(Clock),
+    /// Lockstep: let so many more periods pass.
+    Run {
+        /// Periods, added to those left of the last `Run`.
+        ticks: u32,
+    },
+    /// What a run tells the host.
+    Report(Report),
+}
+
+/// What opens a session: who the board is.
+#[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Capabilities {
+    /// Number of the `Hello` that this answers.
+    pub number: u16,
+    /// Version of the board.
+    pub version: u16,
+    /// Session of the `Hello`.
+    pub session: u32,
+    /// The board and what it can hold.
+    pub description: Description,
+}
+
+impl Capabilities {
+    /// Whether the board speaks this end's version; the error names both.
+    ///
+    /// # Errors
+    /// The versions, where they differ.
+    pub const fn check_version(&self) -> Result<(), VersionMismatch> {
+        if self.version == PROTOCOL_VERSION {
+            Ok(())
+        } else {
+            Err(VersionMismatch {
+                host: PROTOCOL_VERSION,
+                board: self.version,
+            })
+        }
+    }
+}
+
+/// Board to host: answers to requests, and events.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[allow(
+    clippy::large_enum_variant,
+    reason = "without an allocator samples can only be carried in place"
+)]
+pub enum Reply {
+    /// Answer to `Hello`, whatever the host's version.
+    Capabilities(Capabilities),
+    /// Done, or queued where it takes effect with the next period.
+    Ack {
+        /// Number of the request.
+        number: u16,
+    },
+    /// Not done, and nothing changed, unless the reason says otherwise.
+    Nak {
+        /// Number of the request; [`NO_NUMBER`] where it could not be read.
+        number: u16,
+        /// Why.
+        reason: Reason,
+    },
+    /// Answer to `Status`.
+    Status {
+        /// Number of the request.
+        number: u16,
+        /// The status.
+        status: Status,
+    },
+    /// Samples of the run, in order.
+    Samples(Batch),
+    /// A pass is over.
+    PassDigest(PassDigest),
+    /// The ticks of a `Run` are used up, or the run is over.
+    Halted(Status),
+}
+
+/// A payload whose CRC is right, but which is none of the messages of this version.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Unreadable {
+    /// Number of the request; [`NO_NUMBER`] where even that is missing, or for a reply.
+    pub number: u16,
+}
+
+/// A request with its number: the payload of a frame to the board.
+#[derive(Serialize)]
+pub(crate) struct Numbered<'a> {
+    pub(crate) number: u16,
+    pub(crate) request: &'a Request,
+}
+
+/// Reads the payload of a frame from the host. Never panics.
+///
+/// # Errors
+/// [`Unreadable`] for an unknown code, a value out of range, or bytes missing or left over.
+pub fn read_request(payload: &[u8]) -> Result<(u16, Request), Unreadable> {
+    let (number, rest) =
+        postcard::take_from_bytes::<u16>(payload).map_err(|_| Unreadable { number: NO_NUMBER })?;
+    match postcard::take_from_bytes::<Request>(rest) {
+        Ok((request @ Request::Hello { .. }, _)) => Ok((number, request)),
+        Ok((request, [])) => Ok((number, request)),
+        _ => Err(Unreadable { number }),
+    }
+}
+
+/// Reads the payload of a frame from the board. Never panics.
+///
+/// # Errors
+/// [`Unreadable`] for an unknown code, a value out of range, or bytes missing or left over.
+pub fn read_reply(payload: &[u8]) -> Result<Reply, Unreadable> {
+    match postcard::take_from_bytes::<Reply>(payload) {
+        Ok((reply @ Reply::Capabilities(_), _)) => Ok(reply),
+        Ok((reply, [])) => Ok(reply),
+        _ => Err(Unreadable { number: NO_NUMBER }),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn numbers_skip_the_one_that_means_none() {
+        assert_eq!(next_number(NO_NUMBER), 1);
+        assert_eq!(next_number(1), 2);
+        assert_eq!(next_number(u16::MAX), 1);
+    }
+
+    #[test]
+    fn a_later_versions_hello_and_capabilities_are_read() {
+        // number 1, code 0, version 300, session 7, then what only version 300 knows
+        let hello = [1, 0, 0xac, 0x02, 7, 0xde, 0xad];
+        assert_eq!(
+            read_request(&hello),
+            Ok((
+                1,
+                Request::Hello {
+                    version: 300,
+                    session: 7
+                }
+            ))
+        );
+        // code 0, number 1, version 300, session 7, firmware 1.2.3, board "b", five figures, then the unknown
+        let capabilities = [
+            0, 1, 0xac, 0x02, 7, 1, 2, 3, 1, b'b', 10, 2, 1, 64, 100, 0xde, 0xad,
+        ];
+        let Ok(Reply::Capabilities(capabilities)) = read_reply(&capabilities) else {
+            panic!("not read");
+        };
+        assert_eq!(capabilities.description.period_us, 100);
+        assert_eq!(
+            capabilities.check_version(),
+            Err(VersionMismatch {
+                host: PROTOCOL_VERSION,
+                board: 300
+            })
+        );
+    }
+
+    #[test]
+    fn what_is_no_message_keeps_its_number() {
+        assert_eq!(read_request(&[]), Err(Unreadable { number: NO_NUMBER }));
+        assert_eq!(read_request(&[9]), Err(Unreadable { number: 9 }));
+        // an unknown code, a missing field, a byte left over, an unknown clock
+        for payload in [&[9, 12][..], &[9, 10], &[9, 4, 0], &[9, 9, 2]] {
+            assert_eq!(
+                read_request(payload),
+                Err(Unreadable { number: 9 }),
+                "{payload:?}"
+            );
+        }
+    }
+
+    #[test]
+    fn codes_out_of_range_are_no_header() {
+        let good = [1, 1, 0, 0, 0, 1, 1];
+        let rest = [0; 4 * 4 + 1 + 8];
+        for (place, code) in [(2, 4), (3, 2), (4, 2)] {
+            let mut payload = [0; 7 + 25];
+            payload[..7].copy_from_slice(&good);
+            payload[7..].copy_from_slice(&rest);
+            assert!(read_request(&payload).is_ok());
+            payload[place] = code;
+            assert_eq!(read_request(&payload), Err(Unreadable { number: 1 }));
+        }
+    }
+}

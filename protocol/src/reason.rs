@@ -1,0 +1,149 @@
+//! Why the board did not do what it was asked: the reasons of a `Nak`.
+
+use core::fmt;
+
+use interp_core::sample::State;
+use serde::{Deserialize, Serialize};
+
+use crate::{
+    codes,
+    frame::FrameError,
+    records::{Clock, FaultReport},
+    version::VersionMismatch,
+};
+
+/// Why a request was refused. A refused request changes nothing, unless said here. The codes on the wire count from 0 in this order.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub enum Reason {
+    /// 0: a frame was damaged; send again what was not answered.
+    BadFrame {
+        /// What was wrong with it.
+        error: FrameError,
+    },
+    /// 1: the frame was whole, but is no message of this version.
+    Unreadable,
+    /// 2: no session is open; say `Hello` first.
+    SayHello,
+    /// 3: the host of this session speaks another version.
+    Version {
+        /// Version of the host.
+        host: u16,
+        /// Version of the board.
+        board: u16,
+    },
+    /// 4: neither the next request nor the last one again.
+    OutOfOrder {
+        /// The number that the next request must have.
+        expected: u16,
+    },
+    /// 5: the state forbids it.
+    WrongState {
+        /// The state.
+        #[serde(with = "codes::state")]
+        state: State,
+    },
+    /// 6: `Run` without lockstep.
+    WrongClock {
+        /// What drives time.
+        clock: Clock,
+    },
+    /// 7: too many commands wait for the next period, or one for the job that this request would replace; ask again, with
+    /// a new number.
+    Busy,
+    /// 8: the core refuses the job. From `JobBegin` and `JobChunk` nothing has changed; from `JobEnd` the upload is given
+    /// up and the machine is idle.
+    Job {
+        /// What is wrong with it.
+        fault: FaultReport,
+        /// In which record of the surface data, where it is one.
+        record: Option<u32>,
+    },
+    /// 9: more words than there is room for.
+    TooLong {
+        /// Words that there is room for.
+        limit: u32,
+        /// Words asked for.
+        wanted: u32,
+    },
+    /// 10: `JobChunk` or `JobEnd` without `JobBegin`.
+    NoUpload,
+    /// 11: not the next chunk.
+    WrongOffset {
+        /// Offset that the next chunk must have.
+        expected: u32,
+    },
+    /// 12: `JobEnd` before all words were there; the upload may go on.
+    Incomplete {
+        /// Words announced.
+        wanted: u32,
+        /// Words received.
+        received: u32,
+    },
+    /// 13: the words are not those announced; the upload is given up, the machine is idle.
+    WrongDigest {
+        /// Digest announced.
+        #[serde(with = "postcard::fixint::le")]
+        wanted: u64,
+        /// Digest of the words received.
+        #[serde(with = "postcard::fixint::le")]
+        received: u64,
+    },
+}
+
+impl Reason {
+    /// Whether the request counts as answered, so that the next one needs the next number. Otherwise the board forgets
+    /// that it ever came.
+    #[must_use]
+    pub const fn uses_number(self) -> bool {
+        !matches!(
+            self,
+            Self::BadFrame { .. }
+                | Self::Unreadable
+                | Self::SayHello
+                | Self::Version { .. }
+                | Self::OutOfOrder { .. }
+        )
+    }
+}
+
+impl fmt::Display for Reason {
+    fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match *self {
+            Self::BadFrame { error } => write!(formatter, "the board received a damaged frame: {error}"),
+            Self::Unreadable => write!(formatter, "the board cannot read this message"),
+            Self::SayHello => write!(formatter, "no session is open"),
+            Self::Version { host, board } => VersionMismatch { host, board }.fmt(formatter),
+            Self::OutOfOrder { expected } => write!(formatter, "the board expected request {expected}"),
+            Self::WrongState { state } => {
+                write!(formatter, "not possible while the machine is {}", state.name())
+            }
+            Self::WrongClock { .. } => write!(formatter, "`Run` is possible in lockstep only"),
+            Self::Busy => write!(formatter, "commands still wait for the next period"),
+            Self::Job { fault, record } => {
+                let name = fault.kind().map_or("unknown fault", |kind| kind.name());
+                write!(
+                    formatter,
+                    "the board refuses the job: {name} (code {}), value {}",
+                    fault.code, fault.value
+                )?;
+                record.map_or(Ok(()), |record| write!(formatter, ", record {record}"))
+            }
+            Self::TooLong { limit, wanted } => {
+                write!(formatter, "{wanted} words do not fit into {limit}")
+            }
+            Self::NoUpload => write!(formatter, "no job is being uploaded"),
+            Self::WrongOffset { expected } => {
+                write!(formatter, "the next chunk must begin at word {expected}")
+            }
+            Self::Incomplete { wanted, received } => {
+                write!(formatter, "{received} of {wanted} words arrived")
+            }
+            Self::WrongDigest { wanted, received } => {
+                write!(
+                    formatter,
+                    "the words' digest is {received:016x}, announced was {wanted:016x}"
+                )
+            }
+        }
+    }
+}

@@ -1,0 +1,266 @@
+//! The structures that messages are made of, and their bytes.
+//!
+//! Field after field, in the order written here, without gaps. `u16`, `u32`, `i32` are varints, `f32` and the digests
+//! have fixed width; see [`crate::message`] for what that means.
+
+use heapless::{String, Vec};
+use interp_core::{
+    fault::{Fault, FaultKind},
+    job::{Header, Pattern, SurfaceKind, ToolSide},
+    sample::{Place, Sample, State},
+};
+use serde::{Deserialize, Deserializer, Serialize, Serializer, de, ser::SerializeSeq};
+
+use crate::codes;
+
+/// Words a `JobChunk` may carry: 256 bytes, so that storing one holds up the sample timer for microseconds only.
+pub const CHUNK_WORDS_MAX: usize = 64;
+
+/// Samples a `Samples` message may carry. Four fill a frame about as far as a full chunk does the other way.
+pub const SAMPLES_MAX: usize = 4;
+
+/// Longest name of a board, bytes.
+pub const BOARD_NAME_MAX: usize = 24;
+
+/// What drives time on the board.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+pub enum Clock {
+    /// Every period of the sample timer is one step.
+    #[default]
+    Free,
+    /// Steps only while the ticks given by `Run` last; otherwise time stands still.
+    Lockstep,
+}
+
+/// What a run tells the host while it goes on.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+pub enum Report {
+    /// One `PassDigest` a pass.
+    #[default]
+    Digests,
+    /// Every sample too.
+    Samples,
+}
+
+/// The board and what it can hold: the part of `Capabilities` that belongs to the machine.
+#[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Description {
+    /// Version of the firmware: major, minor, patch.
+    pub firmware: [u16; 3],
+    /// Name of the board, for people.
+    pub board: String<BOARD_NAME_MAX>,
+    /// Data words that a job may have.
+    pub store_words: u32,
+    /// Polynomial patches that fit into them, at most: the widths of the spans need words too.
+    pub patches_max_polynomial: u32,
+    /// Rational patches that fit into them, at most.
+    pub patches_max_rational: u32,
+    /// Words a `JobChunk` may carry.
+    pub chunk_words_max: u16,
+    /// Period of the sample timer, microseconds.
+    pub period_us: u32,
+}
+
+/// A fault as it travels. The code stays a number, because a newer board may know kinds that the host does not.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct FaultReport {
+    /// Code of the [`FaultKind`].
+    pub code: u8,
+    /// The value at fault; its meaning is the kind's.
+    pub value: f32,
+}
+
+impl FaultReport {
+    /// The kind, where this end knows it.
+    #[must_use]
+    pub fn kind(self) -> Option<FaultKind> {
+        FaultKind::from_code(self.code)
+    }
+}
+
+impl From<Fault> for FaultReport {
+    fn from(fault: Fault) -> Self {
+        Self {
+            code: fault.kind.code(),
+            value: fault.value,
+        }
+    }
+}
+
+/// All that the board knows of its run. Counters belong to the run and restart with it, save `frames_bad`.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Status {
+    /// State after the last step.
+    #[serde(with = "codes::state")]
+    pub state: State,
+    /// The fault, while the state is faulted.
+    pub fault: Option<FaultReport>,
+    /// What drives time.
+    pub clock: Clock,
+    /// Ticks of the last `Run` that are left.
+    pub credit: u32,
+    /// What a run tells the host.
+    pub report: Report,
+    /// Tick of the last sample.
+    pub tick: u32,
+    /// Pass of the last sample.
+    pub pass: u32,
+    /// Path place of the last sample.
+    #[serde(with = "codes::place")]
+    pub path: Place,
+    /// Side place of the last sample.
+    #[serde(with = "codes::place")]
+    pub side: Place,
+    /// Samples of the run so far: those that the digest covers.
+    pub samples: u32,
+    /// Digest of the whole run so far.
+    #[serde(with = "postcard::fixint::le")]
+    pub digest: u64,
+    /// Path interval after the last finished pass, in units of the side parameter.
+    pub interval: f32,
+    /// Ticks of the sample timer that were missed.
+    pub deadline_misses: u32,
+    /// Most CPU cycles that a tick took; 0 where the board cannot measure.
+    pub tick_cycles_max: u32,
+    /// Samples (and other events) that found no room on their way to the link.
+    pub samples_lost: u32,
+    /// Frames from the host that could not be read since power-up.
+    pub frames_bad: u32,
+}
+
+impl Default for Status {
+    fn default() -> Self {
+        Self {
+            state: State::Idle,
+            fault: None,
+            clock: Clock::Free,
+            credit: 0,
+            report: Report::Digests,
+            tick: 0,
+            pass: 0,
+            path: Place::default(),
+            side: Place::default(),
+            samples: 0,
+            digest: crate::digest::Digest::EMPTY,
+            interval: 0.0,
+            deadline_misses: 0,
+            tick_cycles_max: 0,
+            samples_lost: 0,
+            frames_bad: 0,
+        }
+    }
+}
+
+/// One finished (or cut short) pass.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct PassDigest {
+    /// Pass, from 0.
+    pub pass: u32,
+    /// Tick of its first sample.
+    pub first_tick: u32,
+    /// Its samples.
+    pub samples: u32,
+    /// Digest of the whole run up to the pass's end: the first pass that differs is the first whose digest does.
+    #[serde(with = "postcard::fixint::le")]
+    pub digest: u64,
+    /// Path interval that followed from it, in units of the side parameter; that of the pass before where it was cut
+    /// short.
+    pub interval: f32,
+}
+
+/// The wire's view of [`Sample`]; it stops compiling when the core's grows a field.
+#[derive(Serialize, Deserialize)]
+#[serde(remote = "Sample")]
+struct SampleFields {
+    tick: u32,
+    #[serde(with = "codes::state")]
+    state: State,
+    pass: u32,
+    #[serde(with = "codes::place")]
+    path: Place,
+    #[serde(with = "codes::place")]
+    side: Place,
+    feed_mm_s: f32,
+    cc_nm: [i32; 3],
+    cl_nm: [i32; 3],
+    interval: f32,
+}
+
+/// A [`Sample`] as it travels.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct SampleRecord(#[serde(with = "SampleFields")] pub Sample);
+
+/// Up to [`SAMPLES_MAX`] samples, the oldest first: their number, then each.
+pub type Batch = Vec<SampleRecord, SAMPLES_MAX>;
+
+/// The wire's view of [`Header`]; it stops compiling when the core's grows a field.
+#[derive(Serialize, Deserialize)]
+#[serde(remote = "Header")]
+pub(crate) struct HeaderFields {
+    #[serde(with = "codes::surface_kind")]
+    kind: SurfaceKind,
+    #[serde(with = "codes::pattern")]
+    pattern: Pattern,
+    #[serde(with = "codes::tool_side")]
+    tool_side: ToolSide,
+    path_spans: u16,
+    side_spans: u16,
+    ball_radius_mm: f32,
+    feed_mm_s: f32,
+    scallop_mm: f32,
+    period_s: f32,
+}
+
+/// Up to [`CHUNK_WORDS_MAX`] data words: their number, then four bytes each, low byte first.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct Words(Vec<i32, CHUNK_WORDS_MAX>);
+
+impl Words {
+    /// These words, if they are not too many for one chunk.
+    #[must_use]
+    pub fn new(words: &[i32]) -> Option<Self> {
+        Vec::from_slice(words).ok().map(Self)
+    }
+
+    /// The words.
+    #[must_use]
+    pub fn as_slice(&self) -> &[i32] {
+        &self.0
+    }
+}
+
+impl Serialize for Words {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        let mut sequence = serializer.serialize_seq(Some(self.0.len()))?;
+        for word in &self.0 {
+            sequence.serialize_element(&word.to_le_bytes())?;
+        }
+        sequence.end()
+    }
+}
+
+impl<'de> Deserialize<'de> for Words {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        struct Visitor;
+
+        impl<'de> de::Visitor<'de> for Visitor {
+            type Value = Words;
+
+            fn expecting(&self, formatter: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
+                write!(formatter, "at most {CHUNK_WORDS_MAX} words")
+            }
+
+            fn visit_seq<A: de::SeqAccess<'de>>(self, mut sequence: A) -> Result<Words, A::Error> {
+                let mut words = Vec::new();
+                while let Some(bytes) = sequence.next_element::<[u8; 4]>()? {
+                    if words.push(i32::from_le_bytes(bytes)).is_err() {
+                        return Err(de::Error::custom("too many words"));
+                    }
+                }
+                Ok(Words(words))
+            }
+        }
+
+        deserializer.deserialize_seq(Visitor)
+    }
+}
