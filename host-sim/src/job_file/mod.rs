@@ -1,0 +1,293 @@
+//! What people write (TOML) -> a raw job in f64, checked for shape and range.
+//!
+//! ```text
+//! text --toml--> spanned tables --section.rs--> typed values --mod.rs, surface.rs--> JobFile
+//!                                  any step --error.rs--> JobFileError: file, line, caret, remedy
+//! ```
+//!
+//! Lengths are millimetres and angles radians, as in the file; the feed stays in mm/min. What a [`JobFile`] holds is
+//! finite and in its documented range, but whether the ball fits the surface is not known here.
+
+mod error;
+mod section;
+mod surface;
+#[cfg(test)]
+mod tests;
+
+use std::collections::BTreeMap;
+use std::ops::Range;
+use std::path::Path;
+use std::sync::Arc;
+
+pub use error::JobFileError;
+use section::{Reader, Section};
+pub use surface::{NurbsSpec, SurfaceSpec};
+
+/// Largest ball radius, mm: ten times any ball-end mill; what the core accepts.
+pub const RADIUS_MAX_MM: f64 = 1000.0;
+/// Largest feed, mm/min (10 m/s): what the core accepts.
+pub const FEED_MAX_MM_MIN: f64 = 600_000.0;
+/// Shortest and longest sampling period, µs: what the core accepts.
+pub const PERIOD_RANGE_US: [f64; 2] = [10.0, 100_000.0];
+/// Sampling period of a job that names none, µs: the paper's.
+pub const PERIOD_DEFAULT_US: f64 = 1000.0;
+/// Chord error limit of a job that names none, mm: the paper's.
+pub const CHORD_DEFAULT_MM: f64 = 0.005;
+
+/// The surface parameter that runs along a pass.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Along {
+    /// Passes run along u; v is fixed on a pass.
+    U,
+    /// Passes run along v; u is fixed on a pass.
+    V,
+}
+
+/// The side of the surface that the tool is on.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Side {
+    /// Towards +z, whichever sign of `S_u x S_v` that is.
+    Up,
+    /// The tool normal is `+ S_u x S_v`, whatever the pass direction.
+    Plus,
+    /// The tool normal is `- S_u x S_v`, whatever the pass direction.
+    Minus,
+}
+
+/// Order of the passes.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Pattern {
+    /// Every pass runs the same way.
+    Zig,
+    /// Every second pass runs backwards.
+    Zigzag,
+}
+
+/// The machine that is to run the job. Where a limit is `None`, the file gave none.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Machine {
+    /// Sampling period T, µs, in [`PERIOD_RANGE_US`].
+    pub period_us: f64,
+    /// Velocity limit of the axes x, y, z, mm/s, above 0.
+    pub velocity_max_mm_s: Option<[f64; 3]>,
+    /// Acceleration limit of the axes, mm/s², above 0.
+    pub acceleration_max_mm_s2: Option<[f64; 3]>,
+    /// Jerk limit of the axes, mm/s³, above 0.
+    pub jerk_max_mm_s3: Option<[f64; 3]>,
+    /// Travel of the axes, mm, `[least, most]`.
+    pub travel_mm: Option<[[f64; 2]; 3]>,
+    /// Motor steps a millimetre of the axes, above 0.
+    pub steps_per_mm: Option<[f64; 3]>,
+}
+
+impl Default for Machine {
+    fn default() -> Self {
+        Self {
+            period_us: PERIOD_DEFAULT_US,
+            velocity_max_mm_s: None,
+            acceleration_max_mm_s2: None,
+            jerk_max_mm_s3: None,
+            travel_mm: None,
+            steps_per_mm: None,
+        }
+    }
+}
+
+impl Machine {
+    /// Sampling period T, s.
+    #[must_use]
+    pub fn period_s(&self) -> f64 {
+        self.period_us * 1e-6
+    }
+}
+
+/// A job as its file states it.
+#[derive(Clone, Debug, PartialEq)]
+pub struct JobFile {
+    /// The surface to be cut.
+    pub surface: SurfaceSpec,
+    /// Ball radius r, mm, above 0, at most [`RADIUS_MAX_MM`].
+    pub radius_mm: f64,
+    /// Feed of the cutter contact along the surface, mm/min, above 0, at most [`FEED_MAX_MM_MIN`].
+    pub feed_mm_min: f64,
+    /// Scallop height limit h, mm, above 0, below the ball radius.
+    pub scallop_mm: f64,
+    /// The path parameter.
+    pub along: Along,
+    /// The side of the tool.
+    pub side: Side,
+    /// Order of the passes.
+    pub pattern: Pattern,
+    /// Chord error limit delta, mm, above 0, below the ball radius; for the approaches that cut chords.
+    pub chord_mm: f64,
+    /// The machine.
+    pub machine: Machine,
+    /// Where in which file all this stands.
+    pub origin: Origin,
+}
+
+impl JobFile {
+    /// Reads a job from a file.
+    ///
+    /// # Errors
+    /// The file cannot be read, is not TOML, or a value in it is missing, unknown, of the wrong shape or out of range.
+    pub fn load(path: &Path) -> Result<Self, JobFileError> {
+        let name = path.display().to_string();
+        match std::fs::read_to_string(path) {
+            Ok(text) => Self::parse(&name, &text),
+            Err(cause) => Err(JobFileError::unreadable(&name, &cause)),
+        }
+    }
+
+    /// Reads a job from text; `name` stands for the file in errors.
+    ///
+    /// # Errors
+    /// As [`JobFile::load`].
+    pub fn parse(name: &str, text: &str) -> Result<Self, JobFileError> {
+        let reader = Reader::new(name, text);
+        let document = reader.document()?;
+        document.only(&["surface", "tool", "cut", "machine"], &[])?;
+        let surface = surface::read(&document.section("surface")?)?;
+        let radius_mm = read_tool(&document.section("tool")?)?;
+        let cut = document.section("cut")?;
+        cut.only(
+            &[
+                "feed_mm_min",
+                "scallop_mm",
+                "along",
+                "side",
+                "pattern",
+                "chord_mm",
+            ],
+            &[],
+        )?;
+        let below_radius = |key: &str, remedy: &str| {
+            let value = cut.number(key)?;
+            if value > 0.0 && value < radius_mm {
+                return Ok(value);
+            }
+            let what =
+                format!("`{key}` must be above 0 and below the ball radius of {radius_mm} mm, not {value}");
+            Err(cut.error(key, what, remedy))
+        };
+        Ok(Self {
+            surface,
+            radius_mm,
+            feed_mm_min: cut.number_within(
+                "feed_mm_min",
+                0.0,
+                FEED_MAX_MM_MIN,
+                "the feed in mm/min, e.g. 600",
+            )?,
+            scallop_mm: below_radius("scallop_mm", "give the scallop height limit in mm, e.g. 0.005")?,
+            along: cut.choice("along", &[("u", Along::U), ("v", Along::V)])?,
+            side: cut.choice("side", &[("up", Side::Up), ("+", Side::Plus), ("-", Side::Minus)])?,
+            pattern: match cut.has("pattern") {
+                true => cut.choice("pattern", &[("zig", Pattern::Zig), ("zigzag", Pattern::Zigzag)])?,
+                false => Pattern::Zig,
+            },
+            chord_mm: match cut.has("chord_mm") {
+                true => below_radius("chord_mm", "give the chord error limit in mm, e.g. 0.005")?,
+                false => CHORD_DEFAULT_MM.min(0.5 * radius_mm),
+            },
+            machine: document
+                .optional_section("machine")?
+                .map_or(Ok(Machine::default()), |s| read_machine(&s))?,
+            origin: reader.origin(&document),
+        })
+    }
+
+    /// Feed along the surface, mm/s.
+    #[must_use]
+    pub fn feed_mm_s(&self) -> f64 {
+        self.feed_mm_min / 60.0
+    }
+}
+
+/// The tool's radius, mm.
+fn read_tool(tool: &Section<'_>) -> Result<f64, JobFileError> {
+    tool.only(&["kind", "radius_mm"], &[])?;
+    tool.choice("kind", &[("ball", ())])?;
+    tool.number_within(
+        "radius_mm",
+        0.0,
+        RADIUS_MAX_MM,
+        "the ball's radius in mm (half its diameter), e.g. 10",
+    )
+}
+
+/// The optional section `[machine]`.
+fn read_machine(machine: &Section<'_>) -> Result<Machine, JobFileError> {
+    const AXES: &str = "three numbers above 0, one each for x, y and z, e.g. [100, 100, 50]";
+    machine.only(
+        &[
+            "period_us",
+            "velocity_max_mm_s",
+            "acceleration_max_mm_s2",
+            "jerk_max_mm_s3",
+            "travel_mm",
+            "steps_per_mm",
+        ],
+        &[],
+    )?;
+    let mut read = Machine::default();
+    if machine.has("period_us") {
+        let [least, most] = PERIOD_RANGE_US;
+        read.period_us = machine.number("period_us")?;
+        if !(least..=most).contains(&read.period_us) {
+            let what = format!("`period_us` must be {least} to {most}, not {}", read.period_us);
+            return Err(machine.error(
+                "period_us",
+                what,
+                "give the sampling period in microseconds, e.g. 1000",
+            ));
+        }
+    }
+    read.velocity_max_mm_s = machine.positive_axes("velocity_max_mm_s", AXES)?;
+    read.acceleration_max_mm_s2 = machine.positive_axes("acceleration_max_mm_s2", AXES)?;
+    read.jerk_max_mm_s3 = machine.positive_axes("jerk_max_mm_s3", AXES)?;
+    read.steps_per_mm = machine.positive_axes("steps_per_mm", AXES)?;
+    if machine.has("travel_mm") {
+        let travel: [[f64; 2]; 3] = machine.matrix("travel_mm")?;
+        for (range, axis) in travel.iter().zip(["x", "y", "z"]) {
+            if range[0] >= range[1] {
+                let what = format!(
+                    "the travel of {axis} must ascend, not run from {} to {}",
+                    range[0], range[1]
+                );
+                return Err(machine.error("travel_mm", what, "give [least, most] for each axis, in mm"));
+            }
+        }
+        read.travel_mm = Some(travel);
+    }
+    Ok(read)
+}
+
+/// The file that a job came from: what an error found later needs to point at the line.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct Origin {
+    name: Arc<str>,
+    text: Arc<str>,
+    keys: BTreeMap<String, Range<usize>>,
+}
+
+impl Origin {
+    /// The file's name as it was given, empty for a job that came from no file.
+    #[must_use]
+    pub fn name(&self) -> &str {
+        &self.name
+    }
+
+    /// An error that points at the value of `section.key` (or at the section, or at the file, where there is none).
+    #[must_use]
+    pub fn error(&self, key: &str, what: impl Into<String>, remedy: impl Into<String>) -> JobFileError {
+        let section = key.split('.').next().unwrap_or(key);
+        let span = self
+            .keys
+            .get(key)
+            .or_else(|| self.keys.get(section))
+            .cloned()
+            .unwrap_or(0..0);
+        JobFileError::at(&self.name, &self.text, span, what.into(), remedy.into())
+    }
+}

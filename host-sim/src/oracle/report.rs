@@ -1,0 +1,223 @@
+//! What a verification found, and whether it is good enough.
+
+/// Where and when something was worst.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Spot {
+    /// Tick of the sample.
+    pub tick: u64,
+    /// Pass, from 0.
+    pub pass: u32,
+    /// Parameter u.
+    pub u: f64,
+    /// Parameter v.
+    pub v: f64,
+}
+
+/// A figure gathered over many samples: its largest magnitude with the place, and its root mean square.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Figure {
+    /// Largest magnitude; infinite if any value was not a number.
+    pub max: f64,
+    /// Place of the largest magnitude.
+    pub at: Spot,
+    /// Values gathered.
+    pub count: u64,
+    sum_of_squares: f64,
+}
+
+impl Figure {
+    /// Root mean square; 0 without values.
+    #[must_use]
+    pub fn rms(&self) -> f64 {
+        if self.count == 0 {
+            0.0
+        } else {
+            (self.sum_of_squares / self.count as f64).sqrt()
+        }
+    }
+
+    pub(super) fn add(&mut self, value: f64, at: Spot) {
+        let magnitude = if value.is_nan() {
+            f64::INFINITY
+        } else {
+            value.abs()
+        };
+        self.count += 1;
+        self.sum_of_squares += magnitude * magnitude;
+        if magnitude > self.max {
+            self.max = magnitude;
+            self.at = at;
+        }
+    }
+}
+
+/// Result of a verification. Every figure is emitted against oracle.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Report {
+    /// Samples seen.
+    pub samples: u64,
+    /// Passes seen.
+    pub passes: u32,
+    /// |CL emitted - CL|, nm. Rounding to whole nanometres alone gives up to 0.87.
+    pub position_nm: Figure,
+    /// |CC emitted - CC|, nm. Rounding as above.
+    pub contact_nm: Figure,
+    /// Angle between (CL - CC) as emitted and N, rad. Rounding alone gives up to 1.7 nm / r: see `normal_floor_rad`.
+    pub normal_rad: Figure,
+    /// What rounding to whole nanometres can add to `normal_rad`: sqrt(3) nm / r.
+    pub normal_floor_rad: f64,
+    /// 100 (arc / (f T) - 1), %, of every step within a pass but the last; f is the feed of the step's second sample.
+    pub ripple_pct: Figure,
+    /// Arc of the last step of a pass as a share of f T: above 0 and at most 1.
+    pub last_step: Figure,
+    /// Emitted interval candidate / oracle's - 1, where either is shorter than the side range.
+    pub interval: Figure,
+    /// (side parameter of a pass - (that of the pass before + its least interval)) / that interval. The sum is cut at
+    /// the boundary; the least is taken over the emitted samples.
+    pub side_step: Figure,
+    /// Largest scallop height after each pass by Lo's formula (eqn 11), mm: h times (actual / candidate interval)^2.
+    pub scallop_mm: Figure,
+    /// Sum of that height over all samples of all passes but the last, and their number.
+    pub(super) scallop_sum_mm: f64,
+    pub(super) scallop_samples: u64,
+    /// Ball radius times the largest principal curvature towards the tool: local gouge from 1 on.
+    pub fit: Figure,
+    /// Length of all passes, mm.
+    pub cc_length_mm: f64,
+    /// Samples where the oracle has no normal.
+    pub degenerate: u64,
+    /// Passes that do not start or end exactly on the path parameter's boundaries.
+    pub off_boundary: u32,
+    /// Samples whose side parameter is not the one of their pass, or that run against the pass.
+    pub astray: u64,
+    /// The first pass lies exactly on the first boundary of the side parameter.
+    pub first_on_boundary: bool,
+    /// The last pass lies exactly on the other boundary.
+    pub last_on_boundary: bool,
+    /// The last pass was complete when the verification ended.
+    pub complete: bool,
+}
+
+impl Report {
+    /// Mean of the scallop height over all samples, mm; 0 with a single pass.
+    #[must_use]
+    pub fn scallop_mean_mm(&self) -> f64 {
+        if self.scallop_samples == 0 {
+            0.0
+        } else {
+            self.scallop_sum_mm / self.scallop_samples as f64
+        }
+    }
+
+    /// Whether every figure is within its bound and every pass where it belongs.
+    #[must_use]
+    pub fn passed(&self, bounds: &Bounds) -> bool {
+        self.failures(bounds).is_empty()
+    }
+
+    /// A sentence for everything that is out of its bound.
+    #[must_use]
+    pub fn failures(&self, bounds: &Bounds) -> Vec<String> {
+        let figures = [
+            ("position error", self.position_nm, bounds.position_nm, "nm"),
+            ("contact error", self.contact_nm, bounds.contact_nm, "nm"),
+            (
+                "normal error",
+                self.normal_rad,
+                bounds.normal_rad + self.normal_floor_rad,
+                "rad",
+            ),
+            ("feed ripple", self.ripple_pct, bounds.ripple_pct, "%"),
+            (
+                "last step of a pass",
+                self.last_step,
+                1.0 + bounds.ripple_pct / 100.0,
+                "of a full step",
+            ),
+            (
+                "path interval error",
+                self.interval,
+                bounds.interval,
+                "(relative)",
+            ),
+            (
+                "pass off its place by",
+                self.side_step,
+                bounds.side_step,
+                "of its interval",
+            ),
+            ("curvature times ball radius", self.fit, bounds.fit, ""),
+        ];
+        let mut failures: Vec<String> = figures
+            .into_iter()
+            .filter(|(_, figure, bound, _)| figure.max > *bound)
+            .map(|(name, figure, bound, unit)| {
+                let Spot { tick, pass, u, v } = figure.at;
+                format!(
+                    "{name} {:.6e} {unit} exceeds {bound:.6e} at tick {tick}, pass {pass}, u = {u}, v = {v}",
+                    figure.max
+                )
+            })
+            .collect();
+        let counts = [
+            (self.degenerate, "samples without a surface normal"),
+            (
+                u64::from(self.off_boundary),
+                "passes that do not start and end on the boundaries",
+            ),
+            (self.astray, "samples off their pass or against it"),
+        ];
+        failures.extend(
+            counts
+                .iter()
+                .filter(|(count, _)| *count > 0)
+                .map(|(count, what)| format!("{count} {what}")),
+        );
+        let conditions = [
+            (self.first_on_boundary, "the first pass is not on the boundary"),
+            (self.last_on_boundary, "the last pass is not on the boundary"),
+            (self.complete, "the last pass is not complete"),
+        ];
+        failures.extend(
+            conditions
+                .iter()
+                .filter(|(met, _)| !met)
+                .map(|(_, what)| (*what).to_owned()),
+        );
+        failures
+    }
+}
+
+/// What a verification accepts. Each bound is for the largest magnitude.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Bounds {
+    /// Cutter location, nm.
+    pub position_nm: f64,
+    /// Cutter contact, nm.
+    pub contact_nm: f64,
+    /// Normal, rad, on top of the rounding of the emitted positions.
+    pub normal_rad: f64,
+    /// Feed ripple, %.
+    pub ripple_pct: f64,
+    /// Interval candidate, relative.
+    pub interval: f64,
+    /// Place of a pass, as a share of its interval.
+    pub side_step: f64,
+    /// Ball radius times curvature towards the tool.
+    pub fit: f64,
+}
+
+impl Default for Bounds {
+    /// A tenth of a micrometre is a good machine's resolution; the core, in 32-bit floats, is to stay a decade below.
+    fn default() -> Self {
+        Self {
+            position_nm: 10.0,
+            contact_nm: 10.0,
+            normal_rad: 1e-6,
+            ripple_pct: 0.01,
+            interval: 1e-4,
+            side_step: 1e-4,
+            fit: 1.0,
+        }
+    }
+}

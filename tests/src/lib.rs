@@ -1,0 +1,188 @@
+//! What the tests across crates share: a host's end of the line, a machine that only writes down what it is told, and a
+//! small job.
+#![allow(clippy::unwrap_used, reason = "a test may fail by panic")]
+
+pub mod golden;
+
+use controller::machine::{Busy, Command, Machine, describe};
+use interp_core::{
+    encode,
+    fault::{Fault, FaultKind},
+    job::Header,
+};
+use protocol::{
+    PROTOCOL_VERSION,
+    digest::job_digest,
+    frame::{Decoder, FRAME_MAX, write_request},
+    message::{Description, NO_NUMBER, Reply, Request, Status, Words, next_number, read_reply},
+};
+
+/// One frame of a request with this number.
+pub fn frame(number: u16, request: &Request) -> Vec<u8> {
+    write_request(number, request, &mut [0; FRAME_MAX])
+        .unwrap()
+        .to_vec()
+}
+
+/// The host's end of the line.
+#[derive(Debug, Default)]
+pub struct Host {
+    /// Number of the last request.
+    pub number: u16,
+    decoder: Decoder,
+}
+
+impl Host {
+    /// The frame of the next request.
+    pub fn next(&mut self, request: &Request) -> Vec<u8> {
+        self.number = next_number(self.number);
+        frame(self.number, request)
+    }
+
+    /// The messages in these bytes from the board; panics on what is none.
+    pub fn read(&mut self, bytes: &[u8]) -> Vec<Reply> {
+        let mut replies = Vec::new();
+        for byte in bytes {
+            if let Some(frame) = self.decoder.push(*byte) {
+                replies.push(read_reply(frame.unwrap().payload).unwrap());
+            }
+        }
+        replies
+    }
+}
+
+/// A `Hello` of this version.
+pub const HELLO: Request = Request::Hello {
+    version: PROTOCOL_VERSION,
+    session: 1,
+};
+
+/// A `Nak` without a number: what a damaged frame is answered with.
+pub fn is_bad_frame(reply: &Reply) -> bool {
+    use protocol::message::Reason;
+    matches!(
+        reply,
+        Reply::Nak {
+            number: NO_NUMBER,
+            reason: Reason::BadFrame { .. }
+        }
+    )
+}
+
+/// The requests that upload a job.
+pub fn upload(header: Header, words: &[i32]) -> Vec<Request> {
+    let count = u32::try_from(words.len()).unwrap();
+    let mut requests = vec![Request::JobBegin {
+        header,
+        words: count,
+        digest: job_digest(words),
+    }];
+    let mut offset = 0;
+    for chunk in words.chunks(20) {
+        requests.push(Request::JobChunk {
+            offset,
+            words: Words::new(chunk).unwrap(),
+        });
+        offset += u32::try_from(chunk.len()).unwrap();
+    }
+    requests.push(Request::JobEnd);
+    requests
+}
+
+/// A shallow dome of 80 mm x 60 mm in about ten coarse passes: 54 words, some 900 samples.
+pub fn dome() -> (Header, Vec<i32>) {
+    let mut c = [[[0.0; 4]; 4]; 3];
+    (c[0][0][0], c[0][1][0]) = (-40.0, 80.0);
+    (c[1][0][0], c[1][0][1]) = (-30.0, 60.0);
+    (c[2][0][0], c[2][1][0], c[2][2][0], c[2][0][1], c[2][0][2]) = (-5.0, 64.0, -64.0, 36.0, -36.0);
+    let c = c.map(|axis| encode::substitute(&axis, [0.0, 1.0], [0.0, 1.0]));
+    let header = Header {
+        path_spans: 1,
+        side_spans: 1,
+        ball_radius_mm: 5.0,
+        feed_mm_s: 1000.0,
+        scallop_mm: 1.0,
+        period_s: 0.001,
+        ..Header::default()
+    };
+    let one = encode::width(1.0).unwrap();
+    let mut words = vec![one, one];
+    words.extend(encode::polynomial(&c, Default::default()).unwrap().to_words());
+    (header, words)
+}
+
+/// What a [`Mock`] was told.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Call {
+    /// `load_begin` with so many words.
+    Begin(u32),
+    /// `load_words`.
+    Words(u32, Vec<i32>),
+    /// `load_check`.
+    Check(u32),
+    /// `load_finish`.
+    Finish,
+    /// `send`.
+    Send(Command),
+}
+
+/// A machine that does nothing but write down what it is told.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Mock {
+    /// The status that it shows.
+    pub status: Status,
+    /// What it was told.
+    pub calls: Vec<Call>,
+    /// Its queue is full.
+    pub busy: bool,
+    /// Records that its job has.
+    pub records: u32,
+    /// The record that it finds bad.
+    pub bad: Option<u32>,
+}
+
+impl Machine for Mock {
+    fn description(&mut self) -> Description {
+        describe([1, 2, 3], "mock", 1000, 1000)
+    }
+
+    fn status(&mut self) -> Status {
+        self.status
+    }
+
+    fn load_begin(&mut self, _: &Header, words: u32) -> Result<(), Fault> {
+        self.calls.push(Call::Begin(words));
+        Ok(())
+    }
+
+    fn load_words(&mut self, offset: u32, words: &[i32]) -> Result<(), Fault> {
+        self.calls.push(Call::Words(offset, words.to_vec()));
+        Ok(())
+    }
+
+    fn load_records(&mut self) -> u32 {
+        self.records
+    }
+
+    fn load_check(&mut self, record: u32) -> Result<(), Fault> {
+        self.calls.push(Call::Check(record));
+        if self.bad == Some(record) {
+            Err(Fault::new(FaultKind::BadPatch, 0.5))
+        } else {
+            Ok(())
+        }
+    }
+
+    fn load_finish(&mut self) -> Result<(), Fault> {
+        self.calls.push(Call::Finish);
+        Ok(())
+    }
+
+    fn send(&mut self, command: Command) -> Result<(), Busy> {
+        if self.busy {
+            return Err(Busy);
+        }
+        self.calls.push(Call::Send(command));
+        Ok(())
+    }
+}
