@@ -241,16 +241,22 @@ impl<const WORDS: usize> RealTime<WORDS> {
     #[must_use]
     pub fn status(&self) -> Status {
         let last = self.interpolator.last();
+        let fault = self.interpolator.fault();
+        let (pass, path, side) = if fault.is_some() {
+            self.interpolator.place()
+        } else {
+            (last.pass, last.path, last.side)
+        };
         Status {
             state: self.interpolator.state(),
-            fault: self.interpolator.fault().map(FaultReport::from),
+            fault: fault.map(FaultReport::from),
             clock: self.clock,
             credit: self.credit,
             report: self.report,
             tick: last.tick,
-            pass: last.pass,
-            path: last.path,
-            side: last.side,
+            pass,
+            path,
+            side,
             samples: self.run.samples,
             digest: self.run.digest.value(),
             interval: self.interpolator.last_interval(),

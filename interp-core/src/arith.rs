@@ -166,9 +166,23 @@ pub(crate) fn sqrt(value: f32) -> f32 {
 }
 
 /// Taylor coefficients of sin(pi/4 t)/t in z = t^2/4, units of 2^-31. Truncation below 1e-11.
-const SINE: [i32; 6] = [1_686_629_713, -693_598_668, 85_569_306, -5_026_995, 172_272, -3_864];
+const SINE: [i32; 6] = [
+    1_686_629_713,
+    -693_598_668,
+    85_569_306,
+    -5_026_995,
+    172_272,
+    -3_864,
+];
 /// Taylor coefficients of cos(pi/4 t) in z = t^2/4, units of 2^-30. Truncation below 2e-10.
-const COSINE: [i32; 6] = [1_073_741_824, -1_324_675_879, 272_375_560, -22_401_992, 987_048, -27_060];
+const COSINE: [i32; 6] = [
+    1_073_741_824,
+    -1_324_675_879,
+    272_375_560,
+    -22_401_992,
+    987_048,
+    -27_060,
+];
 
 /// Horner steps of a polynomial of degree 5.
 #[inline(always)]
@@ -245,7 +259,10 @@ mod tests {
             let exact = 2_f64.powi(59) / f64::from(weight);
             let float = 1.0 / (weight as f32 / 1_073_741_824.0);
             let got = f64::from(reciprocal_q29(weight, float));
-            assert!((got / exact - 1.0).abs() < 2_f64.powi(-28), "weight {weight}: {got} for {exact}");
+            assert!(
+                (got / exact - 1.0).abs() < 2_f64.powi(-28),
+                "weight {weight}: {got} for {exact}"
+            );
         }
     }
 
@@ -253,7 +270,10 @@ mod tests {
     fn steps_of_a_fraction() {
         for step in [1e-9_f32, 1e-6, 1e-3, 0.003_9, 0.003_91, 0.3, 0.999] {
             let got = fraction_from_f32(step) as f64 / 2_f64.powi(64);
-            assert!((got - f64::from(step)).abs() <= (f64::from(step) * 6e-8).max(2_f64.powi(-41)), "{step}: {got}");
+            assert!(
+                (got - f64::from(step)).abs() <= (f64::from(step) * 6e-8).max(2_f64.powi(-41)),
+                "{step}: {got}"
+            );
         }
         assert_eq!(fraction_from_f32(1.0), u64::MAX);
         assert_eq!(fraction_from_f32(f32::INFINITY), u64::MAX);

@@ -34,7 +34,11 @@
 //! assert_eq!(second.state, State::Running);
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
-#![allow(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "ranges are checked before each cast")]
+#![allow(
+    clippy::cast_possible_truncation,
+    clippy::cast_sign_loss,
+    reason = "ranges are checked before each cast"
+)]
 
 use crate::surface::{Edges, PolynomialRecord, RationalRecord, RevolvedRecord, SHIFT_MAX};
 use core::fmt;
@@ -114,7 +118,11 @@ fn transpose(c: &Bicubic) -> Bicubic {
 /// [`EncodeError::NotFinite`] where the width is not above 0 as an f32.
 pub fn width(width: f64) -> Result<i32, EncodeError> {
     let width = width as f32;
-    if width > 0.0 && width.is_finite() { Ok(width.to_bits().cast_signed()) } else { Err(EncodeError::NotFinite) }
+    if width > 0.0 && width.is_finite() {
+        Ok(width.to_bits().cast_signed())
+    } else {
+        Err(EncodeError::NotFinite)
+    }
 }
 
 fn quantise(value: f64, unit: f64) -> Option<i32> {
@@ -131,7 +139,11 @@ fn origin(point: [f64; 3]) -> Result<[i32; 3], EncodeError> {
 }
 
 fn check_finite<'a>(values: impl IntoIterator<Item = &'a f64>) -> Result<(), EncodeError> {
-    if values.into_iter().all(|value| value.is_finite()) { Ok(()) } else { Err(EncodeError::NotFinite) }
+    if values.into_iter().all(|value| value.is_finite()) {
+        Ok(())
+    } else {
+        Err(EncodeError::NotFinite)
+    }
 }
 
 fn quantise_patch<const N: usize>(c: &[Bicubic; N], units: [f64; N]) -> Option<[[[i32; 4]; 4]; N]> {
@@ -161,12 +173,27 @@ pub fn polynomial(c: &[Bicubic; 3], edges: Edges) -> Result<PolynomialRecord, En
     }
     let mut failure = EncodeError::TooLarge;
     for shift in (0..=SHIFT_MAX).rev() {
-        let Some(coefficients) = quantise_patch(&local, [unit_mm(shift); 3]) else { continue };
-        let record = PolynomialRecord { origin_nm, shift, edges, coefficients };
+        let Some(coefficients) = quantise_patch(&local, [unit_mm(shift); 3]) else {
+            continue;
+        };
+        let record = PolynomialRecord {
+            origin_nm,
+            shift,
+            edges,
+            coefficients,
+        };
         if PolynomialRecord::check(&record.to_words()).is_ok() {
             return Ok(record);
         }
-        if PolynomialRecord::check(&PolynomialRecord { edges: Edges::default(), ..record }.to_words()).is_ok() {
+        if PolynomialRecord::check(
+            &PolynomialRecord {
+                edges: Edges::default(),
+                ..record
+            }
+            .to_words(),
+        )
+        .is_ok()
+        {
             failure = EncodeError::NotAPole;
         }
     }
@@ -186,8 +213,19 @@ pub fn rational(c: &[Bicubic; 4], edges: Edges) -> Result<RationalRecord, Encode
         return Err(EncodeError::Weights);
     }
     let scale = 1.0 / libm::sqrt(least * most);
-    let end = |start: bool, end: bool| if start { -0.5 } else if end { 0.5 } else { 0.0 };
-    let (u, v) = (end(edges.path_start, edges.path_end), end(edges.side_start, edges.side_end));
+    let end = |start: bool, end: bool| {
+        if start {
+            -0.5
+        } else if end {
+            0.5
+        } else {
+            0.0
+        }
+    };
+    let (u, v) = (
+        end(edges.path_start, edges.path_end),
+        end(edges.side_start, edges.side_end),
+    );
     let w = evaluate(weight, u, v);
     let origin_nm = origin([x, y, z].map(|c| evaluate(c, u, v) / w))?;
     let mut local = *c;
@@ -206,12 +244,27 @@ pub fn rational(c: &[Bicubic; 4], edges: Edges) -> Result<RationalRecord, Encode
     for shift in (0..=SHIFT_MAX).rev() {
         let unit = unit_mm(shift);
         let units = [unit, unit, unit, 1.0 / 1_073_741_824.0];
-        let Some(coefficients) = quantise_patch(&local, units) else { continue };
-        let record = RationalRecord { origin_nm, shift, edges, coefficients };
+        let Some(coefficients) = quantise_patch(&local, units) else {
+            continue;
+        };
+        let record = RationalRecord {
+            origin_nm,
+            shift,
+            edges,
+            coefficients,
+        };
         if RationalRecord::check(&record.to_words()).is_ok() {
             return Ok(record);
         }
-        if RationalRecord::check(&RationalRecord { edges: Edges::default(), ..record }.to_words()).is_ok() {
+        if RationalRecord::check(
+            &RationalRecord {
+                edges: Edges::default(),
+                ..record
+            }
+            .to_words(),
+        )
+        .is_ok()
+        {
             failure = EncodeError::NotAPole;
         }
     }
@@ -226,8 +279,12 @@ fn evaluate(c: &Bicubic, u: f64, v: f64) -> f64 {
 /// Least and largest value over a 9 x 9 grid of the patch.
 fn extremes(c: &Bicubic) -> (f64, f64) {
     let at = |i: i32| f64::from(i) / 8.0 - 0.5;
-    let values = (0..9).flat_map(|i| (0..9).map(move |j| (i, j))).map(|(i, j)| evaluate(c, at(i), at(j)));
-    values.fold((f64::INFINITY, f64::NEG_INFINITY), |(least, most), value| (least.min(value), most.max(value)))
+    let values = (0..9)
+        .flat_map(|i| (0..9).map(move |j| (i, j)))
+        .map(|(i, j)| evaluate(c, at(i), at(j)));
+    values.fold((f64::INFINITY, f64::NEG_INFINITY), |(least, most), value| {
+        (least.min(value), most.max(value))
+    })
 }
 
 /// A revolved surface from profile coefficients in mm (lowest power first) of a parameter from -1/2 to 1/2, and the range
@@ -235,7 +292,11 @@ fn extremes(c: &Bicubic) -> (f64, f64) {
 ///
 /// # Errors
 /// [`EncodeError`] as its variants say.
-pub fn revolved(radius: &[f64; 4], height: &[f64; 4], [start, end]: [f64; 2]) -> Result<RevolvedRecord, EncodeError> {
+pub fn revolved(
+    radius: &[f64; 4],
+    height: &[f64; 4],
+    [start, end]: [f64; 2],
+) -> Result<RevolvedRecord, EncodeError> {
     check_finite(radius.iter().chain(height).chain(&[start, end]))?;
     let turns = |rad: f64| rad / core::f64::consts::TAU;
     let extent = round(turns(end - start) * 2_147_483_648.0);
@@ -257,7 +318,9 @@ pub fn revolved(radius: &[f64; 4], height: &[f64; 4], [start, end]: [f64; 2]) ->
             }
             Some(out)
         };
-        let (Some(radius), Some(height)) = (row(radius), row(&local)) else { continue };
+        let (Some(radius), Some(height)) = (row(radius), row(&local)) else {
+            continue;
+        };
         let record = RevolvedRecord {
             shift,
             radius,

@@ -1,7 +1,7 @@
 //! The one file that chains the stages: load, tick, hold, resume, abort.
 
-use crate::arith::{centred, fraction_to_f32};
-use crate::contact::Step;
+use crate::arith::{centred, fraction_from_f32, fraction_to_f32};
+use crate::contact;
 use crate::fault::{Fault, FaultKind, Result};
 use crate::interval::Interval;
 use crate::job::{Header, Pattern, STORE_WORDS, ToolSide};
@@ -15,6 +15,14 @@ use crate::vec3::Vec3;
 /// Patch boundaries that one period's arc may cross: each costs the collapse of a patch. Three lets a tick pass two whole
 /// patches that are shorter than its arc; shorter ones than that say the feed is not meant for the part.
 const CROSSINGS_MAX: u8 = 3;
+
+/// Cosine between the normals of neighbouring samples (120 degrees) below which the surface has folded over in between.
+/// A fold turns the normal by 180 degrees less what the surface bends on the way; what bends by 120 degrees without a fold
+/// has a radius below the scallop height.
+const FOLD_COSINE: f32 = -0.5;
+
+/// First-order step, as a fraction of the patch, beyond which the patch's end is looked at before the series.
+const LONG_STEP: f32 = 0.25;
 
 /// What the operator or the host wants, taken up with the next tick. A request that the state does not allow is ignored.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -95,7 +103,12 @@ impl Run {
         fraction: 0,
         surface: None,
         offset: Offset::NONE,
-        path: PathSpeed { speed: 0.0, inverse: 0.0, stretch: 0.0, stretch_change: 0.0 },
+        path: PathSpeed {
+            speed: 0.0,
+            inverse: 0.0,
+            stretch: 0.0,
+            stretch_change: 0.0,
+        },
         normal: Vec3::ZERO,
         first_normal: Vec3::ZERO,
         least: f32::INFINITY,
@@ -103,8 +116,15 @@ impl Run {
 
     /// Where the tool is on the path parameter, in the surface's own direction.
     const fn place(&self) -> Place {
-        let fraction = if self.reversed { !self.fraction } else { self.fraction };
-        Place { span: self.span, fraction }
+        let fraction = if self.reversed {
+            !self.fraction
+        } else {
+            self.fraction
+        };
+        Place {
+            span: self.span,
+            fraction,
+        }
     }
 }
 
@@ -244,7 +264,13 @@ impl<const WORDS: usize> Interpolator<WORDS> {
         self.fault
     }
 
-    /// The last sample: position and place, also after a fault.
+    /// Where the run is: pass, path and side place. After a fault, where that is, which is past the last sample.
+    #[must_use]
+    pub const fn place(&self) -> (u32, Place, Place) {
+        (self.run.pass, self.run.place(), self.run.side)
+    }
+
+    /// The last sample: its position is kept after a fault.
     #[must_use]
     pub const fn last(&self) -> &Sample {
         &self.last
@@ -267,9 +293,14 @@ impl<const WORDS: usize> Interpolator<WORDS> {
         if path.span >= header.path_spans || side.span >= header.side_spans {
             return Err(Fault::new(FaultKind::WrongState, f32::from(self.state as u8)));
         }
-        let mut run = Run { side, span: path.span, fraction: path.fraction, ..Run::START };
+        let mut run = Run {
+            side,
+            span: path.span,
+            fraction: path.fraction,
+            ..Run::START
+        };
         collapse(&self.program, &mut run)?;
-        let (contact, origin_nm) = contact(&run)?;
+        let (contact, origin_nm) = contact_here(&run)?;
         run.offset.check_fit(&contact)?;
         let located = run.offset.locate(&contact, &origin_nm)?;
         let normal = contact.normal;
@@ -352,11 +383,10 @@ impl<const WORDS: usize> Interpolator<WORDS> {
             }
         }
         let run = &mut self.run;
-        let (contact, origin_nm) = contact(run)?;
+        let (contact, origin_nm) = contact_here(run)?;
         run.offset.check_fit(&contact)?;
         let located = run.offset.locate(&contact, &origin_nm)?;
-        // More than a right angle from one sample to the next: the surface folded over in between.
-        if run.normal.dot(contact.normal) < 0.0 {
+        if run.normal.dot(contact.normal) < FOLD_COSINE {
             return Err(Fault::new(FaultKind::DegenerateSurface, 0.0));
         }
         if begins {
@@ -388,30 +418,62 @@ impl<const WORDS: usize> Interpolator<WORDS> {
     fn step(&mut self) -> Result<()> {
         let mut rest = self.arc_mm;
         for _ in 0..=CROSSINGS_MAX {
-            let run = &mut self.run;
-            let step = Step { from: &run.path };
-            let fraction = step.fraction(rest)?;
-            let room = !run.fraction;
-            if let Some(next) = whole(fraction).and_then(|step| run.fraction.checked_add(step)) {
-                run.fraction = next;
+            if let Some(fraction) = self.within(rest)? {
+                self.run.fraction = fraction;
                 return Ok(());
             }
-            rest -= step.arc(fraction_to_f32(room));
+            let covered = self.arc_to_end()?;
+            rest = if rest > covered { rest - covered } else { 0.0 };
             if !self.next_span()? {
                 self.run.fraction = u64::MAX;
                 self.end_pass();
                 return Ok(());
             }
-            self.run.path = contact(&self.run)?.0.path;
+            self.run.path = contact_here(&self.run)?.0.path;
         }
         Err(Fault::new(FaultKind::PatchTooShort, rest))
+    }
+
+    /// The fraction after an arc, if that lies within the patch.
+    #[inline]
+    fn within(&self, arc_mm: f32) -> Result<Option<u64>> {
+        let run = &self.run;
+        // The series is about a small part of the patch: where the arc may be all of it, the end is looked at first.
+        if arc_mm * run.path.inverse > LONG_STEP && self.arc_to_end()? <= arc_mm {
+            return Ok(None);
+        }
+        let step = contact::step(&run.path, arc_mm)?;
+        let mut fraction = step.fraction;
+        if step.coarse {
+            let half = fraction_from_f32(0.5 * fraction);
+            let Some(middle) = run.fraction.checked_add(half) else {
+                return Ok(None);
+            };
+            fraction = contact::corrected(fraction, arc_mm, &speed_at(run, middle)?);
+        }
+        if fraction >= 1.0 {
+            return Ok(None);
+        }
+        Ok(run.fraction.checked_add(fraction_from_f32(fraction)))
+    }
+
+    /// Arc from here to the end of the patch, mm.
+    #[inline(never)]
+    fn arc_to_end(&self) -> Result<f32> {
+        let room = !self.run.fraction;
+        let middle = speed_at(&self.run, self.run.fraction + room / 2)?;
+        Ok(contact::arc_about(&middle, fraction_to_f32(room)))
     }
 
     /// Goes to the start of the next patch along the pass; false at the pass's end.
     #[inline(never)]
     fn next_span(&mut self) -> Result<bool> {
         let spans = self.program.header().path_spans;
-        let next = if self.run.reversed { self.run.span.checked_sub(1) } else { self.run.span.checked_add(1) };
+        let next = if self.run.reversed {
+            self.run.span.checked_sub(1)
+        } else {
+            self.run.span.checked_add(1)
+        };
         let Some(span) = next.filter(|span| *span < spans) else {
             return Ok(false);
         };
@@ -426,7 +488,11 @@ impl<const WORDS: usize> Interpolator<WORDS> {
     fn begin_pass(&mut self) -> Result<()> {
         let header = self.program.header();
         self.run.reversed = header.pattern == Pattern::Zigzag && self.run.pass % 2 == 1;
-        self.run.span = if self.run.reversed { header.path_spans.saturating_sub(1) } else { 0 };
+        self.run.span = if self.run.reversed {
+            header.path_spans.saturating_sub(1)
+        } else {
+            0
+        };
         self.run.fraction = 0;
         self.run.least = f32::INFINITY;
         self.run.next = Next::Along;
@@ -468,7 +534,11 @@ fn collapse<const WORDS: usize>(program: &Program<WORDS>, run: &mut Run) -> Resu
     let at = PassLine {
         side: centred(run.side.fraction),
         reversed: run.reversed,
-        tool_sign: if header.tool_side == ToolSide::Plus { 1.0 } else { -1.0 },
+        tool_sign: if header.tool_side == ToolSide::Plus {
+            1.0
+        } else {
+            -1.0
+        },
     };
     let surface = program.collapse(run.span, run.side, &at)?;
     let (shift, point) = match &surface {
@@ -482,21 +552,27 @@ fn collapse<const WORDS: usize>(program: &Program<WORDS>, run: &mut Run) -> Resu
     Ok(point)
 }
 
-/// A step of the fraction below a whole span.
-#[inline(always)]
-fn whole(fraction: f32) -> Option<u64> {
-    (fraction < 1.0).then(|| crate::arith::fraction_from_f32(fraction))
+/// The parametrisation at another fraction of the patch.
+#[inline(never)]
+fn speed_at(run: &Run, fraction: u64) -> Result<PathSpeed> {
+    Ok(contact_at(run, fraction)?.0.path)
 }
 
 /// The contact where the run is, and the origin it is relative to.
 #[inline(always)]
-fn contact(run: &Run) -> Result<(Contact, [i32; 3])> {
-    let w = centred(run.fraction);
+fn contact_here(run: &Run) -> Result<(Contact, [i32; 3])> {
+    contact_at(run, run.fraction)
+}
+
+/// The contact at a fraction of the patch, in the direction of travel.
+#[inline(always)]
+fn contact_at(run: &Run, fraction: u64) -> Result<(Contact, [i32; 3])> {
+    let w = centred(fraction);
     match &run.surface {
         Some(PassSurface::Polynomial(pass)) => Ok((pass.contact(w)?, pass.origin_nm)),
         Some(PassSurface::Rational(pass)) => Ok((pass.contact(w)?, pass.origin_nm)),
         Some(PassSurface::Profile(pass)) => Ok((pass.contact(w)?, [0, 0, pass.height_origin_nm])),
-        Some(PassSurface::Circle(pass)) => Ok((pass.contact(run.fraction), [0, 0, pass.height_origin_nm])),
+        Some(PassSurface::Circle(pass)) => Ok((pass.contact(fraction), [0, 0, pass.height_origin_nm])),
         None => Err(Fault::new(FaultKind::WrongState, 0.0)),
     }
 }

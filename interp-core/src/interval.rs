@@ -17,11 +17,17 @@ pub(crate) struct Interval {
 
 impl Interval {
     /// No limit yet.
-    pub(crate) const NONE: Self = Self { radius_mm: 0.0, eight_rh: 0.0 };
+    pub(crate) const NONE: Self = Self {
+        radius_mm: 0.0,
+        eight_rh: 0.0,
+    };
 
     /// The interval of a ball and a scallop limit, mm.
     pub(crate) fn new(radius_mm: f32, scallop_mm: f32) -> Self {
-        Self { radius_mm, eight_rh: 8.0 * radius_mm * scallop_mm }
+        Self {
+            radius_mm,
+            eight_rh: 8.0 * radius_mm * scallop_mm,
+        }
     }
 
     /// Candidate at a contact that the ball fits, in fractions of the side span; infinite at a pole, where the side
@@ -29,7 +35,11 @@ impl Interval {
     #[inline(always)]
     pub(crate) fn candidate(&self, contact: &Contact) -> f32 {
         let room = contact.lateral_squared - self.radius_mm * contact.lateral_bend;
-        if room > 0.0 { sqrt(self.eight_rh / room) } else { f32::INFINITY }
+        if room > 0.0 {
+            sqrt(self.eight_rh / room)
+        } else {
+            f32::INFINITY
+        }
     }
 }
 
@@ -57,7 +67,10 @@ mod tests {
             } else {
                 2.0 * radius * ((centre * centre + cusp * cusp - r * r) / (2.0 * centre * cusp)).acos()
             };
-            assert!((got / want - 1.0).abs() < 2.0 * h / r, "R {radius}: {got} for {want}");
+            assert!(
+                (got / want - 1.0).abs() < 2.0 * h / r,
+                "R {radius}: {got} for {want}"
+            );
         }
     }
 }

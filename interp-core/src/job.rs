@@ -46,8 +46,12 @@ pub enum SurfaceKind {
 
 impl SurfaceKind {
     /// Every kind, in order of its code.
-    pub const ALL: [Self; 4] =
-        [Self::Polynomial, Self::Rational, Self::RevolvedAlongProfile, Self::RevolvedAroundAxis];
+    pub const ALL: [Self; 4] = [
+        Self::Polynomial,
+        Self::Rational,
+        Self::RevolvedAlongProfile,
+        Self::RevolvedAroundAxis,
+    ];
 
     /// The kind with this code.
     #[must_use]

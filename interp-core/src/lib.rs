@@ -31,7 +31,10 @@
     clippy::cast_possible_wrap,
     clippy::cast_precision_loss
 )]
-#![allow(clippy::neg_cmp_op_on_partial_ord, reason = "written so that a NaN fails the test")]
+#![allow(
+    clippy::neg_cmp_op_on_partial_ord,
+    reason = "written so that a NaN fails the test"
+)]
 #![cfg_attr(
     test,
     allow(

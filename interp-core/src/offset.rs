@@ -30,12 +30,20 @@ pub(crate) struct Located {
 
 impl Offset {
     /// No ball yet.
-    pub(crate) const NONE: Self = Self { radius_mm: 0.0, radius_units: 0.0, shift: 0 };
+    pub(crate) const NONE: Self = Self {
+        radius_mm: 0.0,
+        radius_units: 0.0,
+        shift: 0,
+    };
 
     /// The ball of this radius, for contacts in units of 2^-shift nm.
     pub(crate) fn new(radius_mm: f32, shift: u8) -> Self {
         let units_per_mm = 1e6 * count_to_f32(1 << shift.min(crate::surface::SHIFT_MAX));
-        Self { radius_mm, radius_units: radius_mm * units_per_mm, shift }
+        Self {
+            radius_mm,
+            radius_units: radius_mm * units_per_mm,
+            shift,
+        }
     }
 
     /// The ball touches the surface in this point alone, up to second order: with t along the path and d across it,
@@ -92,9 +100,10 @@ impl Offset {
             Some((cc, cl))
         };
         match (place(x, ox, x0), place(y, oy, y0), place(z, oz, z0)) {
-            (Some((cx, lx)), Some((cy, ly)), Some((cz, lz))) => {
-                Ok(Located { cc_nm: [cx, cy, cz], cl_nm: [lx, ly, lz] })
-            }
+            (Some((cx, lx)), Some((cy, ly)), Some((cz, lz))) => Ok(Located {
+                cc_nm: [cx, cy, cz],
+                cl_nm: [lx, ly, lz],
+            }),
             _ => Err(self.explain_range(contact, origin_nm)),
         }
     }
@@ -102,12 +111,17 @@ impl Offset {
     #[cold]
     fn explain_range(&self, contact: &Contact, origin_nm: &[i32; 3]) -> Fault {
         let metres_per_unit = 1e-9 / count_to_f32(1 << self.shift);
-        let [x, y, z] = contact.position.map(|p| crate::arith::to_f32(p) * metres_per_unit);
+        let [x, y, z] = contact
+            .position
+            .map(|p| crate::arith::to_f32(p) * metres_per_unit);
         let [x0, y0, z0] = origin_nm.map(|o| crate::arith::to_f32(o) * 1e-9);
         let (n, r) = (contact.normal, self.radius_mm * 1e-3);
         let worst = [x0 + x + r * n.x, y0 + y + r * n.y, z0 + z + r * n.z]
             .into_iter()
-            .fold(0.0_f32, |worst, value| if value.abs() > worst.abs() { value } else { worst });
+            .fold(
+                0.0_f32,
+                |worst, value| if value.abs() > worst.abs() { value } else { worst },
+            );
         Fault::new(FaultKind::OutOfRange, worst)
     }
 }

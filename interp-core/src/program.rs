@@ -5,8 +5,8 @@ use crate::job::{Header, SPANS_MAX, SurfaceKind};
 use crate::sample::Place;
 use crate::schedule::width_words;
 use crate::surface::{
-    CirclePass, PassLine, POLYNOMIAL_WORDS, PolynomialPass, PolynomialRecord, ProfilePass, RATIONAL_WORDS, RationalPass,
-    RationalRecord, REVOLVED_WORDS, RevolvedRecord,
+    CirclePass, POLYNOMIAL_WORDS, PassLine, PolynomialPass, PolynomialRecord, ProfilePass, RATIONAL_WORDS,
+    REVOLVED_WORDS, RationalPass, RationalRecord, RevolvedRecord,
 };
 
 /// Which part of the checks a job has passed.
@@ -14,7 +14,10 @@ use crate::surface::{
 enum Stage {
     Empty,
     /// Words received and records checked so far.
-    Loading { received: u32, checked: u32 },
+    Loading {
+        received: u32,
+        checked: u32,
+    },
     Sealed,
 }
 
@@ -30,7 +33,10 @@ pub(crate) struct Program<const WORDS: usize> {
 
 /// A surface on one pass.
 #[derive(Clone, Copy, Debug)]
-#[allow(clippy::large_enum_variant, reason = "one lives in the interpolator for ever; nothing is allocated")]
+#[allow(
+    clippy::large_enum_variant,
+    reason = "one lives in the interpolator for ever; nothing is allocated"
+)]
 pub(crate) enum PassSurface {
     Polynomial(PolynomialPass),
     Rational(RationalPass),
@@ -51,7 +57,10 @@ const fn record_words(kind: SurfaceKind) -> usize {
 pub(crate) fn extent(header: &Header) -> (u32, u64) {
     let records = u32::from(header.path_spans) * u32::from(header.side_spans);
     let words = u64::from(records) * record_words(header.kind) as u64;
-    (records, words + u64::from(width_words(header.path_spans, header.side_spans)))
+    (
+        records,
+        words + u64::from(width_words(header.path_spans, header.side_spans)),
+    )
 }
 
 fn check_header(header: &Header) -> Result<()> {
@@ -92,7 +101,12 @@ impl<const WORDS: usize> Program<WORDS> {
             scallop_mm: 0.0,
             period_s: 0.0,
         };
-        Self { stage: Stage::Empty, header: HEADER, length: 0, words: [0; WORDS] }
+        Self {
+            stage: Stage::Empty,
+            header: HEADER,
+            length: 0,
+            words: [0; WORDS],
+        }
     }
 
     pub(crate) fn begin(&mut self, header: &Header, words: u32) -> Result<()> {
@@ -105,7 +119,10 @@ impl<const WORDS: usize> Program<WORDS> {
         if u64::from(words) != needed {
             return Err(bad_length(words));
         }
-        self.stage = Stage::Loading { received: 0, checked: 0 };
+        self.stage = Stage::Loading {
+            received: 0,
+            checked: 0,
+        };
         self.header = *header;
         self.length = words;
         Ok(())
@@ -119,7 +136,9 @@ impl<const WORDS: usize> Program<WORDS> {
         let Stage::Loading { received, .. } = self.stage else {
             return Err(bad_length(offset));
         };
-        let end = u32::try_from(words.len()).ok().and_then(|length| offset.checked_add(length));
+        let end = u32::try_from(words.len())
+            .ok()
+            .and_then(|length| offset.checked_add(length));
         let Some(end) = end.filter(|end| *end <= self.length && offset <= received) else {
             return Err(bad_length(offset));
         };
@@ -127,7 +146,10 @@ impl<const WORDS: usize> Program<WORDS> {
             return Err(bad_length(end));
         };
         slots.copy_from_slice(words);
-        self.stage = Stage::Loading { received: received.max(end), checked: 0 };
+        self.stage = Stage::Loading {
+            received: received.max(end),
+            checked: 0,
+        };
         Ok(())
     }
 
@@ -155,7 +177,10 @@ impl<const WORDS: usize> Program<WORDS> {
         };
         match result {
             Some(Ok(())) => {
-                self.stage = Stage::Loading { received, checked: checked.max(record + 1) };
+                self.stage = Stage::Loading {
+                    received,
+                    checked: checked.max(record + 1),
+                };
                 Ok(())
             }
             #[allow(clippy::cast_precision_loss, reason = "an index below 2^20")]
@@ -191,7 +216,9 @@ impl<const WORDS: usize> Program<WORDS> {
 
     /// Width of a side span, in units of the side parameter.
     pub(crate) fn side_width(&self, span: u16) -> f32 {
-        self.words.get(usize::from(span)).map_or(1.0, |word| f32::from_bits(word.cast_unsigned()))
+        self.words
+            .get(usize::from(span))
+            .map_or(1.0, |word| f32::from_bits(word.cast_unsigned()))
     }
 
     fn record<const N: usize>(&self, index: usize) -> Option<&[i32; N]> {
@@ -209,15 +236,15 @@ impl<const WORDS: usize> Program<WORDS> {
         }
         let index = usize::from(side.span) * usize::from(self.header.path_spans) + usize::from(path_span);
         let pass = match self.header.kind {
-            SurfaceKind::Polynomial => {
-                self.record(index).map(|words| PassSurface::Polynomial(PolynomialPass::collapse(words, at)))
-            }
-            SurfaceKind::Rational => {
-                self.record(index).map(|words| PassSurface::Rational(RationalPass::collapse(words, at)))
-            }
-            SurfaceKind::RevolvedAlongProfile => {
-                self.record(index).map(|words| PassSurface::Profile(ProfilePass::collapse(words, at, side.fraction)))
-            }
+            SurfaceKind::Polynomial => self
+                .record(index)
+                .map(|words| PassSurface::Polynomial(PolynomialPass::collapse(words, at))),
+            SurfaceKind::Rational => self
+                .record(index)
+                .map(|words| PassSurface::Rational(RationalPass::collapse(words, at))),
+            SurfaceKind::RevolvedAlongProfile => self
+                .record(index)
+                .map(|words| PassSurface::Profile(ProfilePass::collapse(words, at, side.fraction))),
             SurfaceKind::RevolvedAroundAxis => match self.record(index) {
                 Some(words) => Some(PassSurface::Circle(CirclePass::collapse(words, at)?)),
                 None => None,

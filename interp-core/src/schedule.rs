@@ -24,17 +24,27 @@ pub(crate) fn next_side(from: Place, interval: f32, spans: u16, width: impl Fn(u
             if step == 0 && span == from.span {
                 return Err(Fault::new(FaultKind::IntervalTooSmall, interval));
             }
-            return Ok(Place { span, fraction: (at + step) << 32 });
+            return Ok(Place {
+                span,
+                fraction: (at + step) << 32,
+            });
         }
         if span + 1 >= spans {
             break;
         }
-        let covered = if at == 0 { 1.0 } else { fraction_32(u32::try_from(room).unwrap_or(u32::MAX)) };
+        let covered = if at == 0 {
+            1.0
+        } else {
+            fraction_32(u32::try_from(room).unwrap_or(u32::MAX))
+        };
         let over = (rest - covered) * width(span) / width(span + 1);
         rest = if over > 0.0 { over } else { 0.0 };
         at = 0;
     }
-    Ok(Place { span: spans.saturating_sub(1), fraction: u64::MAX })
+    Ok(Place {
+        span: spans.saturating_sub(1),
+        fraction: u64::MAX,
+    })
 }
 
 /// Whether a pass there is the last.
@@ -64,7 +74,10 @@ mod tests {
     fn goes_on_in_the_next_spans_measure() {
         let widths = [1.0, 0.5, 0.25, 4.0];
         let width = |span: u16| widths[usize::from(span)];
-        let at = |span, fraction: f64| Place { span, fraction: ((fraction * 4_294_967_296.0) as u64) << 32 };
+        let at = |span, fraction: f64| Place {
+            span,
+            fraction: ((fraction * 4_294_967_296.0) as u64) << 32,
+        };
         let near = |from, interval, want: f64| {
             let got = fraction(next_side(from, interval, 4, width).unwrap());
             assert!((got - want).abs() < 1e-6, "{got} for {want}");
@@ -74,10 +87,31 @@ mod tests {
         near(at(0, 0.75), 0.25 + 0.5 + 0.125, 2.5);
         near(at(0, 0.0), 1.0, 1.0);
         near(at(0, 0.5), 0.5 + 0.5 + 0.25 + 2.0, 3.5);
-        assert_eq!(next_side(at(3, 0.5), 0.5, 4, width).unwrap(), Place { span: 3, fraction: u64::MAX });
-        assert_eq!(next_side(at(1, 0.5), f32::INFINITY, 4, width).unwrap(), Place { span: 3, fraction: u64::MAX });
-        assert_eq!(next_side(at(1, 0.5), 1e-12, 4, width).unwrap_err().kind, FaultKind::IntervalTooSmall);
-        assert!(is_last(Place { span: 3, fraction: u64::MAX }, 4));
+        assert_eq!(
+            next_side(at(3, 0.5), 0.5, 4, width).unwrap(),
+            Place {
+                span: 3,
+                fraction: u64::MAX
+            }
+        );
+        assert_eq!(
+            next_side(at(1, 0.5), f32::INFINITY, 4, width).unwrap(),
+            Place {
+                span: 3,
+                fraction: u64::MAX
+            }
+        );
+        assert_eq!(
+            next_side(at(1, 0.5), 1e-12, 4, width).unwrap_err().kind,
+            FaultKind::IntervalTooSmall
+        );
+        assert!(is_last(
+            Place {
+                span: 3,
+                fraction: u64::MAX
+            },
+            4
+        ));
         assert!(!is_last(at(3, 0.999), 4));
     }
 }

@@ -103,12 +103,12 @@ pub struct Status {
     pub report: Report,
     /// Tick of the last sample.
     pub tick: u32,
-    /// Pass of the last sample.
+    /// Pass of the last sample; while faulted, of the fault.
     pub pass: u32,
-    /// Path place of the last sample.
+    /// Path place of the last sample; while faulted, of the fault.
     #[serde(with = "codes::place")]
     pub path: Place,
-    /// Side place of the last sample.
+    /// Side place of the last sample; while faulted, of the fault.
     #[serde(with = "codes::place")]
     pub side: Place,
     /// Samples of the run so far: those that the digest covers.

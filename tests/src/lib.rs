@@ -185,4 +185,9 @@ impl Machine for Mock {
         self.calls.push(Call::Send(command));
         Ok(())
     }
+
+    /// Commands are taken up at once.
+    fn commands_wait(&mut self) -> bool {
+        false
+    }
 }

@@ -20,7 +20,7 @@ mod rational;
 mod revolved;
 
 pub use polynomial::{POLYNOMIAL_WORDS, PolynomialRecord};
-pub use range::{SHIFT_MAX, Edges};
+pub use range::{Edges, SHIFT_MAX};
 pub use rational::{RATIONAL_WORDS, RationalRecord};
 pub use revolved::{REVOLVED_WORDS, RevolvedRecord};
 
@@ -90,10 +90,16 @@ impl PathFactor {
     /// The factor of a patch with these collapsed boundaries, on this pass.
     pub(crate) fn of(edges: Edges, at: &PassLine) -> Self {
         match edges.side_root() {
-            None => Self { factor: 1.0, inverse: 1.0 },
+            None => Self {
+                factor: 1.0,
+                inverse: 1.0,
+            },
             Some(root) => {
                 let factor = fraction_32(root.factor(at.side));
-                Self { factor, inverse: if factor > 0.0 { 1.0 / factor } else { 0.0 } }
+                Self {
+                    factor,
+                    inverse: if factor > 0.0 { 1.0 / factor } else { 0.0 },
+                }
             }
         }
     }
@@ -127,7 +133,10 @@ impl Derivatives {
     /// F^2 and d = B - (F/E) A: lateral speed^2 = |d|^2 = W^2/E, II(d, d) = N - 2 M F/E + L (F/E)^2, II(t, d) = (M - L F/E)/sqrt E.
     #[inline(always)]
     pub(crate) fn contact(&self, position: [i32; 3]) -> Result<Contact> {
-        let PathFactor { factor: a, inverse: inverse_a } = self.path_factor;
+        let PathFactor {
+            factor: a,
+            inverse: inverse_a,
+        } = self.path_factor;
         let b = self.side_factor;
         let cross = self.path.cross(self.side);
         let e = self.path.dot(self.path);

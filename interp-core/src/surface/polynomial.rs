@@ -34,8 +34,16 @@ impl PolynomialRecord {
     #[must_use]
     pub fn to_words(&self) -> [i32; POLYNOMIAL_WORDS] {
         let mut words = [0; POLYNOMIAL_WORDS];
-        let head = HeadWord { shift: self.shift, edges: self.edges }.to_word();
-        let all = self.origin_nm.into_iter().chain([head]).chain(self.coefficients.into_iter().flatten().flatten());
+        let head = HeadWord {
+            shift: self.shift,
+            edges: self.edges,
+        }
+        .to_word();
+        let all = self
+            .origin_nm
+            .into_iter()
+            .chain([head])
+            .chain(self.coefficients.into_iter().flatten().flatten());
         for (word, value) in words.iter_mut().zip(all) {
             *word = value;
         }
@@ -51,7 +59,12 @@ impl PolynomialRecord {
         for (slot, value) in coefficients.iter_mut().flatten().flatten().zip(rest) {
             *slot = *value;
         }
-        Self { origin_nm: [x, y, z], shift, edges, coefficients }
+        Self {
+            origin_nm: [x, y, z],
+            shift,
+            edges,
+            coefficients,
+        }
     }
 
     /// Whether the board takes the patch: nothing can overflow, and flagged boundaries do collapse (to 8 units).
@@ -65,7 +78,11 @@ impl PolynomialRecord {
             return BAD_PATCH;
         }
         let collapses = |c: &[[i32; 4]; 4]| collapses(c, record.edges);
-        if record.coefficients.iter().all(collapses) { Ok(()) } else { BAD_PATCH }
+        if record.coefficients.iter().all(collapses) {
+            Ok(())
+        } else {
+            BAD_PATCH
+        }
     }
 }
 
@@ -85,9 +102,13 @@ pub(super) fn collapses(c: &[[i32; 4]; 4], edges: Edges) -> bool {
     let small = |value: i32| value.abs() <= COLLAPSE_UNITS;
     let at = |root: Root, c: &[i32; 4]| cubic(c, if root == Root::Start { i32::MIN } else { i32::MAX });
     let [c0, c1, c2, c3] = c;
-    let across = edges.side_root().is_none_or(|root| [c1, c2, c3].into_iter().all(|row| small(at(root, row))));
+    let across = edges
+        .side_root()
+        .is_none_or(|root| [c1, c2, c3].into_iter().all(|row| small(at(root, row))));
     let column = |j: usize| [c0, c1, c2, c3].map(|row| row.get(j).copied().unwrap_or(0));
-    let along = edges.path_root(false).is_none_or(|root| (1..4).all(|j| small(at(root, &column(j)))));
+    let along = edges
+        .path_root(false)
+        .is_none_or(|root| (1..4).all(|j| small(at(root, &column(j)))));
     across && along
 }
 
@@ -181,10 +202,17 @@ fn collapse_axis(rows: &[[i32; 4]; 4], at: &PassLine, edges: Edges, scale: f32) 
     let position = turn(rows.map(|row| cubic(&row, y)), at.reversed);
     let side = turn(rows.map(|row| slope(&row, y)), at.reversed);
     let [b0, b1, b2, b3] = rows.map(|row| second(&row, y_float) * scale);
-    let side2 = if at.reversed { [b0, -b1, b2, -b3] } else { [b0, b1, b2, b3] };
+    let side2 = if at.reversed {
+        [b0, -b1, b2, -b3]
+    } else {
+        [b0, b1, b2, b3]
+    };
     let path = match edges.side_root() {
         None => derivative(&position),
-        Some(root) => derivative(&turn(rows.map(|row| quadratic(&root.divide(&row), y)), at.reversed)),
+        Some(root) => derivative(&turn(
+            rows.map(|row| quadratic(&root.divide(&row), y)),
+            at.reversed,
+        )),
     };
     let divided = match edges.path_root(at.reversed) {
         None => side,
@@ -193,7 +221,13 @@ fn collapse_axis(rows: &[[i32; 4]; 4], at: &PassLine, edges: Edges, scale: f32) 
             [q0, q1, q2, 0]
         }
     };
-    Axis { position, path, side: divided, mixed: float_derivative(&side, scale), side2 }
+    Axis {
+        position,
+        path,
+        side: divided,
+        mixed: float_derivative(&side, scale),
+        side2,
+    }
 }
 
 /// b of a patch with these collapsed boundaries, as offset and slope.
@@ -216,7 +250,10 @@ impl PolynomialPass {
     pub(crate) fn collapse(words: &[i32; POLYNOMIAL_WORDS], at: &PassLine) -> Self {
         let record = PolynomialRecord::from_words(words);
         let scale = unit_mm(record.shift);
-        let axes = record.coefficients.each_ref().map(|rows| collapse_axis(rows, at, record.edges, scale));
+        let axes = record
+            .coefficients
+            .each_ref()
+            .map(|rows| collapse_axis(rows, at, record.edges, scale));
         let path2 = axes.each_ref().map(|axis| {
             let [_, p1, p2] = axis.path.map(to_f32);
             [p1 * scale, 2.0 * p2 * scale]

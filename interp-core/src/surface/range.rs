@@ -66,7 +66,11 @@ impl Root {
             // (1/2 - w) q
             Self::End => {
                 let q1 = c2.wrapping_add(c3 >> 1);
-                [c1.wrapping_add(q1 >> 1).wrapping_neg(), q1.wrapping_neg(), c3.wrapping_neg()]
+                [
+                    c1.wrapping_add(q1 >> 1).wrapping_neg(),
+                    q1.wrapping_neg(),
+                    c3.wrapping_neg(),
+                ]
             }
         }
     }
@@ -145,7 +149,12 @@ pub(crate) fn bound(c: &[i64; 4]) -> i64 {
 pub(crate) fn patch_bound(c: &[[i32; 4]; 4]) -> i64 {
     let wide = |row: &[i32; 4]| -> [i64; 4] { row.map(i64::from) };
     let [c0, c1, c2, c3] = c;
-    let rows = [bound(&wide(c0)), bound(&wide(c1)), bound(&wide(c2)), bound(&wide(c3))];
+    let rows = [
+        bound(&wide(c0)),
+        bound(&wide(c1)),
+        bound(&wide(c2)),
+        bound(&wide(c3)),
+    ];
     let slope = |row: &[i32; 4]| {
         let [_, r1, r2, r3] = wide(row);
         // Divided by a root, a quotient's coefficients are at most these tails; the derivative's own bound is below.

@@ -6,8 +6,8 @@
 //! origin is that point, so that the numerators vanish there; at most one boundary of a patch may collapse.
 
 use super::polynomial::{
-    collapses, derivative, float_cubic, float_derivative, line, parabola, second, side_factor, slope, split_head, travel_sign,
-    turn, unit_mm,
+    collapses, derivative, float_cubic, float_derivative, line, parabola, second, side_factor, slope,
+    split_head, travel_sign, turn, unit_mm,
 };
 use super::range::{BAD_PATCH, Edges, HeadWord, Root, fits, patch_bound};
 use super::{Contact, Derivatives, PassLine, PathFactor};
@@ -43,8 +43,16 @@ impl RationalRecord {
     #[must_use]
     pub fn to_words(&self) -> [i32; RATIONAL_WORDS] {
         let mut words = [0; RATIONAL_WORDS];
-        let head = HeadWord { shift: self.shift, edges: self.edges }.to_word();
-        let all = self.origin_nm.into_iter().chain([head]).chain(self.coefficients.into_iter().flatten().flatten());
+        let head = HeadWord {
+            shift: self.shift,
+            edges: self.edges,
+        }
+        .to_word();
+        let all = self
+            .origin_nm
+            .into_iter()
+            .chain([head])
+            .chain(self.coefficients.into_iter().flatten().flatten());
         for (word, value) in words.iter_mut().zip(all) {
             *word = value;
         }
@@ -60,7 +68,12 @@ impl RationalRecord {
         for (slot, value) in coefficients.iter_mut().flatten().flatten().zip(rest) {
             *slot = *value;
         }
-        Self { origin_nm: [x, y, z], shift, edges, coefficients }
+        Self {
+            origin_nm: [x, y, z],
+            shift,
+            edges,
+            coefficients,
+        }
     }
 
     /// Whether the board takes the patch: nothing can overflow, the weight stays within [1/2, 2), at most one boundary
@@ -73,7 +86,8 @@ impl RationalRecord {
         let record = Self::from_words(words);
         let [x, y, z, weight] = &record.coefficients;
         let edges = record.edges;
-        let vanishes = |c: &[[i32; 4]; 4]| edges.count() == 0 || (collapses(c, edges) && touches_zero(c, edges));
+        let vanishes =
+            |c: &[[i32; 4]; 4]| edges.count() == 0 || (collapses(c, edges) && touches_zero(c, edges));
         let good = HeadWord::check(head)
             && edges.count() <= 1
             && fits(weight)
@@ -88,7 +102,10 @@ impl RationalRecord {
 /// Whether a coordinate is zero (to 8 units) in the middle of its collapsed boundary.
 fn touches_zero(c: &[[i32; 4]; 4], edges: Edges) -> bool {
     let end = |root: Root| if root == Root::Start { i32::MIN } else { i32::MAX };
-    let (w, y) = (edges.path_root(false).map_or(0, end), edges.side_root().map_or(0, end));
+    let (w, y) = (
+        edges.path_root(false).map_or(0, end),
+        edges.side_root().map_or(0, end),
+    );
     cubic(&c.map(|row| cubic(&row, y)), w).abs() <= 8
 }
 
@@ -99,7 +116,12 @@ fn weight_in_range(c: &[[i32; 4]; 4]) -> bool {
         let [c0, c1, c2, c3] = c;
         // p(w), w = t - 1/2, as 24 p = sum of (24, 12, 6, 3) c_i (2w)^i; 2w = -1 .. 1 has the coefficients below.
         let (d0, d1, d2, d3) = (24 * c0, 12 * c1, 6 * c2, 3 * c3);
-        [d0 - d1 + d2 - d3, d0 - d1 / 3 - d2 / 3 + d3, d0 + d1 / 3 - d2 / 3 - d3, d0 + d1 + d2 + d3]
+        [
+            d0 - d1 + d2 - d3,
+            d0 - d1 / 3 - d2 / 3 + d3,
+            d0 + d1 / 3 - d2 / 3 - d3,
+            d0 + d1 + d2 + d3,
+        ]
     };
     let [r0, r1, r2, r3] = c.map(|row| bernstein(row.map(i64::from)));
     let columns = [0, 1, 2, 3_usize].map(|j| {
@@ -172,18 +194,37 @@ fn with_zero([q0, q1, q2]: [i32; 3]) -> [i32; 4] {
 
 fn second_side(rows: &[[i32; 4]; 4], at: &PassLine, scale: f32) -> [f32; 4] {
     let [b0, b1, b2, b3] = rows.map(|row| second(&row, centred_to_f32(at.side)) * scale);
-    if at.reversed { [b0, -b1, b2, -b3] } else { [b0, b1, b2, b3] }
+    if at.reversed {
+        [b0, -b1, b2, -b3]
+    } else {
+        [b0, b1, b2, b3]
+    }
 }
 
 fn collapse_axis(rows: &[[i32; 4]; 4], at: &PassLine, edges: Edges, scale: f32) -> Axis {
     let position = turn(rows.map(|row| cubic(&row, at.side)), at.reversed);
     let side_plain = turn(rows.map(|row| slope(&row, at.side)), at.reversed);
     let (reduced, side) = match (edges.side_root(), edges.path_root(at.reversed)) {
-        (Some(root), _) => (turn(rows.map(|row| quadratic(&root.divide(&row), at.side)), at.reversed), side_plain),
-        (None, Some(root)) => (with_zero(root.divide(&position)), with_zero(root.divide(&side_plain))),
+        (Some(root), _) => (
+            turn(
+                rows.map(|row| quadratic(&root.divide(&row), at.side)),
+                at.reversed,
+            ),
+            side_plain,
+        ),
+        (None, Some(root)) => (
+            with_zero(root.divide(&position)),
+            with_zero(root.divide(&side_plain)),
+        ),
         (None, None) => (position, side_plain),
     };
-    Axis { position, reduced, side, side_plain, side2: second_side(rows, at, scale) }
+    Axis {
+        position,
+        reduced,
+        side,
+        side_plain,
+        side2: second_side(rows, at, scale),
+    }
 }
 
 fn collapse_weight(rows: &[[i32; 4]; 4], at: &PassLine) -> Weight {
@@ -214,7 +255,13 @@ impl RationalPass {
             (None, Some(_)) => Pole::AtEnd,
             (None, None) => Pole::None,
         };
-        let path_of = |axis: &Axis| if pole == Pole::Beside { axis.reduced } else { axis.position };
+        let path_of = |axis: &Axis| {
+            if pole == Pole::Beside {
+                axis.reduced
+            } else {
+                axis.position
+            }
+        };
         let path2 = axes.each_ref().map(|axis| {
             let [_, p1, p2] = float_derivative(&path_of(axis), scale);
             [p1, 2.0 * p2]
@@ -231,7 +278,9 @@ impl RationalPass {
             path2,
             path3: Vec3::each(&path2, |[_, slope]| *slope),
             side: axes.each_ref().map(|axis| axis.side),
-            mixed: axes.each_ref().map(|axis| float_derivative(&axis.side_plain, scale)),
+            mixed: axes
+                .each_ref()
+                .map(|axis| float_derivative(&axis.side_plain, scale)),
             side2: axes.each_ref().map(|axis| axis.side2),
             path_factor: PathFactor::of(record.edges, at),
             side_factor: side_factor(record.edges, at),

@@ -4,8 +4,8 @@
 //! centred profile parameter, units of 2^-shift nm, the height relative to its origin; the height's origin, nm; the start
 //! angle in turns (units of 2^-32, wrapping); the angle's extent in turns (units of 2^-31, above 0, at most 2^31).
 
-use super::range::{BAD_PATCH, SHIFT_MAX, bound};
 use super::polynomial::unit_mm;
+use super::range::{BAD_PATCH, SHIFT_MAX, bound};
 use super::{Contact, PassLine, PathSpeed};
 use crate::arith::{angle, centred_to_f32, count_to_f32, cubic, mul_q30, quadratic, sin_cos, sqrt, to_f32};
 use crate::fault::{Fault, FaultKind, Result};
@@ -44,13 +44,39 @@ impl RevolvedRecord {
         let [z0, z1, z2, z3] = self.height;
         let angles = [self.start.cast_signed(), self.extent.cast_signed()];
         let [start, extent] = angles;
-        [self.shift as i32, r0, r1, r2, r3, z0, z1, z2, z3, self.height_origin_nm, start, extent]
+        [
+            self.shift as i32,
+            r0,
+            r1,
+            r2,
+            r3,
+            z0,
+            z1,
+            z2,
+            z3,
+            self.height_origin_nm,
+            start,
+            extent,
+        ]
     }
 
     /// The record of these words.
     #[must_use]
     pub const fn from_words(words: &[i32; REVOLVED_WORDS]) -> Self {
-        let [shift, r0, r1, r2, r3, z0, z1, z2, z3, height_origin_nm, start, extent] = *words;
+        let [
+            shift,
+            r0,
+            r1,
+            r2,
+            r3,
+            z0,
+            z1,
+            z2,
+            z3,
+            height_origin_nm,
+            start,
+            extent,
+        ] = *words;
         let [shift, ..] = shift.to_le_bytes();
         Self {
             shift: if shift > SHIFT_MAX { SHIFT_MAX } else { shift },
@@ -126,7 +152,14 @@ impl Profile {
             6.0 * c3 * self.scale
         });
         let [radius_units, height_units] = both.map(|c| cubic(c, w));
-        ProfilePoint { radius_units, height_units, radius_mm: to_f32(radius_units) * self.scale, first, second, third }
+        ProfilePoint {
+            radius_units,
+            height_units,
+            radius_mm: to_f32(radius_units) * self.scale,
+            first,
+            second,
+            third,
+        }
     }
 }
 
@@ -193,7 +226,8 @@ impl ProfilePass {
                 speed,
                 inverse,
                 stretch: plane_dot(point.first, point.second) * inverse_e,
-                stretch_change: (plane_dot(point.second, point.second) + plane_dot(point.first, point.third)) * inverse_e,
+                stretch_change: (plane_dot(point.second, point.second) + plane_dot(point.first, point.third))
+                    * inverse_e,
             },
             path_bend: plane_dot([out, up], point.second) * inverse_e,
             lateral_squared: lateral * lateral,
@@ -236,7 +270,11 @@ impl CirclePass {
         let signed = at.tool_sign / sqrt(e);
         let (out, up) = (height1 * signed, -radius1 * signed);
         let speed = point.radius_mm * count_to_f32(record.extent) * RADIANS_PER_EXTENT;
-        let (inverse, path_bend) = if speed > 0.0 { (1.0 / speed, -out / point.radius_mm) } else { (0.0, 0.0) };
+        let (inverse, path_bend) = if speed > 0.0 {
+            (1.0 / speed, -out / point.radius_mm)
+        } else {
+            (0.0, 0.0)
+        };
         Ok(Self {
             height_origin_nm: record.height_origin_nm,
             shift: record.shift,
@@ -248,7 +286,12 @@ impl CirclePass {
             out,
             up,
             shape: Contact {
-                path: PathSpeed { speed, inverse, stretch: 0.0, stretch_change: 0.0 },
+                path: PathSpeed {
+                    speed,
+                    inverse,
+                    stretch: 0.0,
+                    stretch_change: 0.0,
+                },
                 path_bend,
                 lateral_squared: e,
                 lateral_bend: plane_dot([out, up], point.second),
@@ -269,7 +312,11 @@ impl CirclePass {
         let (sin, cos) = sin_cos(angle(self.start, self.extent, travelled));
         let out = self.out * SINE_UNIT;
         Contact {
-            position: [mul_q30(self.radius_units, cos), mul_q30(self.radius_units, sin), self.height_units],
+            position: [
+                mul_q30(self.radius_units, cos),
+                mul_q30(self.radius_units, sin),
+                self.height_units,
+            ],
             normal: Vec3::new(out * to_f32(cos), out * to_f32(sin), self.up),
             ..self.shape
         }

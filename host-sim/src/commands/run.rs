@@ -1,0 +1,354 @@
+//! `run`: loads the job into the firmware, runs it there, and compares with `simulate` sample by sample.
+
+use std::path::PathBuf;
+use std::time::Instant;
+
+use clap::Args;
+use interp_core::{Sample, State};
+use protocol::digest::Digest;
+use protocol::message::Status;
+use serde_json::json;
+
+use super::outcome::{FaultAt, Outcome};
+use super::simulate::{Timed, machine, surveyed, timed};
+use super::{Failure, Result, cannot_write, load, progress, trace, unheld_limits, warn_of_limits};
+use crate::job_file::JobFile;
+use crate::oracle::Emitted;
+use crate::prepare::Prepared;
+use crate::remote::qemu::{self, Qemu, QemuError};
+use crate::remote::{RemoteError, Session, drive, port};
+use crate::report::Sketch;
+
+/// Runs a job in the firmware, in QEMU or on a board, and compares every sample with this machine's.
+///
+/// Example: cargo sim run jobs/freeform.toml --qemu
+#[derive(Debug, Args)]
+#[command(verbatim_doc_comment)]
+pub(super) struct Arguments {
+    /// Job file (TOML).
+    job: PathBuf,
+    #[command(flatten)]
+    place: Place,
+    /// Firmware image for QEMU; without it, the image is built.
+    #[arg(long, value_name = "ELF", requires = "qemu")]
+    firmware: Option<PathBuf>,
+    /// Writes every sample that the board sent as a row of this CSV file.
+    #[arg(long, value_name = "FILE")]
+    trace: Option<PathBuf>,
+    /// Writes a page with pictures into this folder.
+    #[arg(long, value_name = "DIR")]
+    report: Option<PathBuf>,
+    /// Runs a job on a board although the axis limits that it asks for are not held yet.
+    #[arg(long)]
+    ignore_limits: bool,
+    /// Prints one JSON object instead of text.
+    #[arg(long)]
+    json: bool,
+}
+
+#[derive(Debug, Args)]
+#[group(required = true, multiple = false)]
+struct Place {
+    /// In QEMU, which this command starts and ends.
+    #[arg(long)]
+    qemu: bool,
+    /// On a board behind this serial port.
+    #[arg(long, value_name = "DEV")]
+    port: Option<String>,
+}
+
+/// What the board did.
+struct Ran {
+    status: Status,
+    compared: u64,
+    first_difference: Option<u64>,
+    ticks_per_second: f64,
+}
+
+impl From<RemoteError> for Failure {
+    fn from(error: RemoteError) -> Self {
+        Self::Failed(Some(error.to_string()))
+    }
+}
+
+impl From<QemuError> for Failure {
+    fn from(error: QemuError) -> Self {
+        match error {
+            QemuError::Missing => {
+                Self::input(error.to_string(), "install it, or run the job with `simulate`")
+            }
+            QemuError::Firmware(_) | QemuError::Start(_) => Self::Failed(Some(error.to_string())),
+        }
+    }
+}
+
+/// Opens the line, and keeps QEMU alive with it.
+fn connect(arguments: &Arguments) -> Result<(Option<Qemu>, Session)> {
+    // Sessions need different numbers, no more than that.
+    let number = std::time::SystemTime::now()
+        .duration_since(std::time::UNIX_EPOCH)
+        .map_or(1, |now| now.subsec_nanos() ^ std::process::id().rotate_left(16));
+    if let Some(name) = &arguments.place.port {
+        let stream = port::open(name).map_err(|error| {
+            Failure::input(
+                format!("{name}: {error}"),
+                "name the board's serial port, such as /dev/ttyUSB0",
+            )
+        })?;
+        return Ok((None, Session::open(stream, number)?));
+    }
+    let image = match &arguments.firmware {
+        Some(image) if !image.exists() => {
+            return Err(Failure::input(
+                format!("there is no {}", image.display()),
+                "build it with `cargo fw-qemu`",
+            ));
+        }
+        Some(image) => image.clone(),
+        None => qemu::firmware()?,
+    };
+    let (qemu, stream) = Qemu::start(&image)?;
+    Ok((Some(qemu), Session::open(stream, number)?))
+}
+
+/// The board's timer has to tick as the job wants it.
+fn check_period(job: &JobFile, session: &Session) -> Result<()> {
+    let period_us = session.capabilities().description.period_us;
+    if f64::from(period_us) == job.machine.period_us {
+        return Ok(());
+    }
+    let what = format!(
+        "the job wants a period of {} us, the board's is {period_us} us",
+        job.machine.period_us
+    );
+    Err(job
+        .origin
+        .error(
+            "machine.period_us",
+            what,
+            "say period_us as the board has it, or build the firmware for the other",
+        )
+        .into())
+}
+
+/// Runs and compares the digest of each pass; where one differs in QEMU, finds the first sample that does.
+fn by_digest(
+    arguments: &Arguments,
+    job: &JobFile,
+    prepared: &Prepared,
+    here: &Timed,
+    session: &mut Session,
+) -> Result<Ran> {
+    let expected: Vec<_> = here
+        .passes
+        .iter()
+        .map(|&(first_tick, samples, digest)| drive::Expected {
+            first_tick,
+            samples,
+            digest,
+        })
+        .collect();
+    let bar = progress(here.samples, "running");
+    let start = Instant::now();
+    let compared = drive::run_digests(session, &expected, arguments.place.qemu, |samples| {
+        bar.set_position(samples)
+    })?;
+    let seconds = start.elapsed().as_secs_f64();
+    bar.finish_and_clear();
+    let mut first_difference = None;
+    if let Some(pass) = compared.first_bad_pass {
+        let from = expected.get(pass as usize).map_or_else(
+            || expected.last().map_or(0, |last| last.first_tick + last.samples),
+            |pass| pass.first_tick,
+        );
+        first_difference = Some(from.into());
+        if arguments.place.qemu {
+            let count = expected.get(pass as usize).map_or(0, |pass| pass.samples) + 1;
+            let there = drive::samples_between(session, from, count)?;
+            let there = &there[..there.len().min(count as usize)];
+            let ours = samples_here(job, prepared, from, count)?;
+            first_difference = drive::first_difference(&ours, there)
+                .map(u64::from)
+                .or(first_difference);
+        }
+    } else if compared.status.digest != here.digest {
+        first_difference = Some(here.samples);
+    }
+    #[allow(clippy::cast_precision_loss, reason = "below 2^53")]
+    let ticks_per_second = compared.samples as f64 / seconds.max(1e-9);
+    Ok(Ran {
+        status: compared.status,
+        compared: compared.samples,
+        first_difference,
+        ticks_per_second,
+    })
+}
+
+fn samples_here(job: &JobFile, prepared: &Prepared, from: u32, count: u32) -> Result<Vec<Sample>> {
+    let mut samples = Vec::new();
+    // A fault ends the samples, which is what is compared.
+    let _fault = machine(job, prepared)?.run(|sample| {
+        if sample.tick >= from {
+            samples.push(*sample);
+        }
+        samples.len() < count as usize
+    });
+    Ok(samples)
+}
+
+/// Runs with every sample on the line, writes them, and compares each.
+fn by_sample(
+    arguments: &Arguments,
+    job: &JobFile,
+    prepared: &Prepared,
+    here: &Timed,
+    session: &mut Session,
+) -> Result<Ran> {
+    let ours = samples_here(job, prepared, 0, u32::MAX)?;
+    let mut file = trace(arguments.trace.as_ref(), job)?;
+    let mut written = Ok(());
+    let mut theirs = Vec::with_capacity(ours.len());
+    let mut digest = Digest::new();
+    let bar = progress(here.samples, "running");
+    let start = Instant::now();
+    let status = drive::run_samples(session, arguments.place.qemu, |sample| {
+        digest.sample(sample);
+        if let (Some(file), Ok(())) = (&mut file, &written) {
+            written = file.write(sample, prepared.parameters(sample.path, sample.side));
+        }
+        theirs.push(*sample);
+        if sample.tick % 4096 == 0 {
+            bar.set_position(sample.tick.into());
+        }
+    })?;
+    let seconds = start.elapsed().as_secs_f64();
+    bar.finish_and_clear();
+    let name = arguments.trace.clone().unwrap_or_default();
+    written
+        .and_then(|()| file.map_or(Ok(()), crate::trace::Trace::finish))
+        .map_err(|error| cannot_write(&name, &error))?;
+    let difference = drive::first_difference(&ours, &theirs).map(u64::from);
+    #[allow(clippy::cast_precision_loss, reason = "below 2^53")]
+    let ticks_per_second = theirs.len() as f64 / seconds.max(1e-9);
+    let wrong_digest = (status.digest != digest.value()).then_some(here.samples);
+    Ok(Ran {
+        status,
+        compared: theirs.len().min(ours.len()) as u64,
+        first_difference: difference.or(wrong_digest),
+        ticks_per_second,
+    })
+}
+
+/// What is wrong with the board's run, if anything is.
+fn complaint(ran: &Ran, here: &Timed) -> Option<String> {
+    let status = &ran.status;
+    if status.deadline_misses > 0 {
+        return Some(format!(
+            "{} ticks of the sample timer were missed",
+            status.deadline_misses
+        ));
+    }
+    if let Some(tick) = ran.first_difference {
+        return Some(format!(
+            "the board differs from this machine, first at tick {tick}"
+        ));
+    }
+    if status.samples_lost > 0 {
+        return Some(format!("{} samples were lost on the line", status.samples_lost));
+    }
+    let expected = if here.fault.is_some() {
+        State::Faulted
+    } else {
+        State::Finished
+    };
+    let code = status.fault.map(|fault| fault.code);
+    if status.state != expected || code != here.fault.map(|at| at.fault.kind.code()) {
+        return Some(format!(
+            "the board ended {}, this machine {}",
+            status.state.name(),
+            expected.name()
+        ));
+    }
+    here.fault.as_ref().map(FaultAt::sentence)
+}
+
+pub(super) fn command(arguments: &Arguments) -> Result<()> {
+    let (job, prepared) = load(&arguments.job)?;
+    if let Some(limits) =
+        unheld_limits(&job).filter(|_| arguments.place.port.is_some() && !arguments.ignore_limits)
+    {
+        return Err(Failure::input(
+            limits,
+            "leave the limits out of the job, or say --ignore-limits",
+        ));
+    }
+    warn_of_limits(&job);
+    let here = timed(&job, &prepared)?;
+    let (_qemu, mut session) = connect(arguments)?;
+    check_period(&job, &session)?;
+    drive::upload(&mut session, &prepared, |_| {})?;
+    let ran = if arguments.trace.is_some() {
+        by_sample(arguments, &job, &prepared, &here, &mut session)?
+    } else {
+        by_digest(arguments, &job, &prepared, &here, &mut session)?
+    };
+    let mut sketch = arguments
+        .report
+        .as_ref()
+        .map(|_| Sketch::new(&job, here.passes.len()));
+    let findings = {
+        let mut draw = sketch
+            .as_mut()
+            .map(|sketch| |emitted: &Emitted| sketch.add(emitted));
+        let each = draw.as_mut().map(|draw| draw as &mut dyn FnMut(&Emitted));
+        surveyed(&job, &prepared, here.samples, None, each)?
+    };
+    if let (Some(directory), Some(sketch)) = (&arguments.report, &sketch) {
+        let page = sketch
+            .write(directory, &arguments.job, &findings)
+            .map_err(|error| cannot_write(directory, &error))?;
+        if !arguments.json {
+            println!("report: {}", page.display());
+        }
+    }
+    let outcome = Outcome {
+        prepared: &prepared,
+        findings: &findings,
+        period_s: job.machine.period_s(),
+        digest: ran.status.digest,
+        samples_per_second: here.samples_per_second,
+        fault: here.fault,
+    };
+    let complaint = complaint(&ran, &here);
+    let description = &session.capabilities().description;
+    if arguments.json {
+        let mut keys = outcome.json();
+        let mut put = |key: &str, value| keys.insert(key.to_owned(), value);
+        put("compared_samples", json!(ran.compared));
+        put("first_difference", json!(ran.first_difference));
+        put("deadline_misses", json!(ran.status.deadline_misses));
+        put("tick_cycles_max", json!(ran.status.tick_cycles_max));
+        put("ticks_per_second", json!(ran.ticks_per_second));
+        put("samples_lost", json!(ran.status.samples_lost));
+        put("board", json!(description.board.as_str()));
+        println!("{}", serde_json::Value::Object(keys));
+    } else {
+        println!("{} on {}", arguments.job.display(), description.board);
+        outcome.print();
+        println!(
+            "  board        {} ticks a second, {} missed",
+            ran.ticks_per_second.round(),
+            ran.status.deadline_misses
+        );
+        let verdict = if ran.first_difference.is_none() {
+            "bit for bit the same"
+        } else {
+            "NOT the same"
+        };
+        println!(
+            "  compared     {} samples with this machine's: {verdict}",
+            ran.compared
+        );
+    }
+    complaint.map_or(Ok(()), |complaint| Err(Failure::Failed(Some(complaint))))
+}

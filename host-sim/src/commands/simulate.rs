@@ -1,0 +1,183 @@
+//! `simulate`: runs the core on this machine.
+
+use std::path::PathBuf;
+use std::time::Instant;
+
+use clap::Args;
+use interp_core::Fault;
+use protocol::digest::Digest;
+
+use super::outcome::{FaultAt, Outcome};
+use super::{Approach, Failure, Result, cannot_write, load, progress, trace, warn_of_limits};
+use crate::explain;
+use crate::job_file::JobFile;
+use crate::machine::Machine;
+use crate::oracle::{Emitted, Oracle};
+use crate::prepare::Prepared;
+use crate::report::Sketch;
+use crate::survey::{Findings, Survey};
+
+/// Runs a job on this machine: the same core, the same bits as on the board.
+///
+/// Example: cargo sim simulate jobs/freeform.toml --trace out.csv
+#[derive(Debug, Args)]
+#[command(verbatim_doc_comment)]
+pub(super) struct Arguments {
+    /// Job file (TOML).
+    job: PathBuf,
+    /// Writes every sample as a row of this CSV file.
+    #[arg(long, value_name = "FILE")]
+    trace: Option<PathBuf>,
+    /// Writes a page with pictures into this folder.
+    #[arg(long, value_name = "DIR")]
+    report: Option<PathBuf>,
+    /// Prints one JSON object instead of text.
+    #[arg(long)]
+    json: bool,
+    /// How the tool path is made.
+    #[arg(long, value_enum, default_value = "surface")]
+    approach: Approach,
+}
+
+/// A run of the core alone, timed: digests of the run and of each pass.
+#[derive(Debug)]
+pub(super) struct Timed {
+    pub(super) digest: u64,
+    pub(super) samples: u64,
+    pub(super) samples_per_second: f64,
+    /// Of each pass: first tick, samples, digest of the run up to its end.
+    pub(super) passes: Vec<(u32, u32, u64)>,
+    pub(super) fault: Option<FaultAt>,
+}
+
+/// A machine with the job loaded, or the reason against it as bad input.
+pub(super) fn machine(job: &JobFile, prepared: &Prepared) -> Result<Machine> {
+    Machine::load(prepared).map_err(|fault| refused(job, fault))
+}
+
+fn refused(job: &JobFile, fault: Fault) -> Failure {
+    let (what, remedy) = explain::fault(fault);
+    job.origin.error("surface", what, remedy).into()
+}
+
+/// Runs the core alone.
+pub(super) fn timed(job: &JobFile, prepared: &Prepared) -> Result<Timed> {
+    let mut machine = machine(job, prepared)?;
+    let mut run = Digest::new();
+    let mut passes: Vec<(u32, u32, u64)> = Vec::new();
+    let mut current = None;
+    let mut samples = 0_u64;
+    let start = Instant::now();
+    let result = machine.run(|sample| {
+        if current != Some(sample.pass) {
+            if let Some(last) = passes.last_mut() {
+                last.2 = run.value();
+            }
+            current = Some(sample.pass);
+            passes.push((sample.tick, 0, 0));
+        }
+        run.sample(sample);
+        if let Some(last) = passes.last_mut() {
+            last.1 += 1;
+        }
+        samples += 1;
+        true
+    });
+    let elapsed = start.elapsed().as_secs_f64();
+    if let Some(last) = passes.last_mut() {
+        last.2 = run.value();
+    }
+    #[allow(clippy::cast_precision_loss, reason = "below 2^53")]
+    let samples_per_second = samples as f64 / elapsed.max(1e-9);
+    let fault = result
+        .err()
+        .map(|fault| FaultAt::of(fault, &machine, samples, prepared));
+    Ok(Timed {
+        digest: run.value(),
+        samples,
+        samples_per_second,
+        passes,
+        fault,
+    })
+}
+
+/// Runs the core again, and measures every sample.
+pub(super) fn surveyed(
+    job: &JobFile,
+    prepared: &Prepared,
+    samples: u64,
+    trace_file: Option<&PathBuf>,
+    mut each: Option<&mut dyn FnMut(&Emitted)>,
+) -> Result<Findings> {
+    let oracle = oracle(job)?;
+    let mut survey = Survey::new(
+        prepared,
+        &oracle,
+        trace(trace_file, job)?,
+        each.as_mut().map(|each| &mut **each as _),
+    );
+    let bar = progress(samples, "measuring");
+    let mut written = Ok(());
+    let mut machine = machine(job, prepared)?;
+    let _fault_was_seen_before = machine.run(|sample| {
+        written = survey.add(sample);
+        if sample.tick % 65_536 == 0 {
+            bar.set_position(sample.tick.into());
+        }
+        written.is_ok()
+    });
+    bar.finish_and_clear();
+    let name = trace_file.cloned().unwrap_or_default();
+    written
+        .and_then(|()| survey.finish())
+        .map_err(|error| cannot_write(&name, &error))
+}
+
+/// The oracle of a job that was prepared, hence has one.
+pub(super) fn oracle(job: &JobFile) -> Result<Oracle> {
+    Oracle::new(job).map_err(|error| Failure::input(error.to_string(), "say side = \"+\" or \"-\""))
+}
+
+pub(super) fn command(arguments: &Arguments) -> Result<()> {
+    let Approach::Surface = arguments.approach;
+    let (job, prepared) = load(&arguments.job)?;
+    warn_of_limits(&job);
+    let timed = timed(&job, &prepared)?;
+    let mut sketch = arguments
+        .report
+        .as_ref()
+        .map(|_| Sketch::new(&job, timed.passes.len()));
+    let findings = {
+        let mut draw = sketch
+            .as_mut()
+            .map(|sketch| |emitted: &Emitted| sketch.add(emitted));
+        let each = draw.as_mut().map(|draw| draw as &mut dyn FnMut(&Emitted));
+        surveyed(&job, &prepared, timed.samples, arguments.trace.as_ref(), each)?
+    };
+    let outcome = Outcome {
+        prepared: &prepared,
+        findings: &findings,
+        period_s: job.machine.period_s(),
+        digest: timed.digest,
+        samples_per_second: timed.samples_per_second,
+        fault: timed.fault,
+    };
+    if let (Some(directory), Some(sketch)) = (&arguments.report, &sketch) {
+        let page = sketch
+            .write(directory, &arguments.job, &findings)
+            .map_err(|error| cannot_write(directory, &error))?;
+        if !arguments.json {
+            println!("report: {}", page.display());
+        }
+    }
+    if arguments.json {
+        println!("{}", serde_json::Value::Object(outcome.json()));
+    } else {
+        println!("{}", arguments.job.display());
+        outcome.print();
+    }
+    match outcome.fault {
+        None => Ok(()),
+        Some(fault) => Err(Failure::Failed(Some(fault.sentence()))),
+    }
+}

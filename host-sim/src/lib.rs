@@ -1,0 +1,28 @@
+//! The tool on the desk: reads a job, runs the surface interpolator on it here or on a board, and checks what comes out.
+//!
+//! ```text
+//! job file ──job_file──► JobFile ──prepare──► Prepared ──machine──► samples ──survey──► trace, figures, report
+//!                           │                    │                                ▲
+//!                           │                    └──remote──► the same from a board or QEMU, compared
+//!                           └──oracle──► independent f64 geometry ────────────────┘
+//! ```
+#![cfg_attr(
+    test,
+    allow(
+        clippy::unwrap_used,
+        clippy::cast_precision_loss,
+        clippy::cast_possible_truncation,
+        reason = "tests convert freely"
+    )
+)]
+
+pub mod commands;
+pub mod explain;
+pub mod job_file;
+pub mod machine;
+pub mod oracle;
+pub mod prepare;
+pub mod remote;
+pub mod report;
+pub mod survey;
+pub mod trace;

@@ -1,0 +1,64 @@
+//! The machine in this process: the core with a job loaded, one call a period.
+
+use interp_core::{Fault, Interpolator, Place, Probe, Request, STORE_WORDS, Sample, State};
+
+use crate::prepare::Prepared;
+
+/// The core, with the same store as the board's.
+#[derive(Debug)]
+pub struct Machine {
+    core: Box<Interpolator<STORE_WORDS>>,
+}
+
+impl Machine {
+    /// A machine that is ready to run this job.
+    ///
+    /// # Errors
+    /// What the core says against the job: too many patches, a header value out of range, a bad patch.
+    pub fn load(job: &Prepared) -> Result<Self, Fault> {
+        let mut core = Box::new(Interpolator::new());
+        let words = u32::try_from(job.words.len()).unwrap_or(u32::MAX);
+        core.load_begin(&job.header, words)?;
+        core.load_words(0, &job.words)?;
+        for record in 0..core.load_records() {
+            core.load_check(record)?;
+        }
+        core.load_finish()?;
+        Ok(Self { core })
+    }
+
+    /// Runs the job from its beginning, and hands every sample on, until its end or a fault. Stops early, and returns
+    /// `Ok`, when `each` says so by returning `false`.
+    ///
+    /// # Errors
+    /// The fault that stopped the run; [`Self::place`] says where.
+    pub fn run(&mut self, mut each: impl FnMut(&Sample) -> bool) -> Result<(), Fault> {
+        let mut request = Request::Start;
+        loop {
+            let sample = self.core.tick(request);
+            request = Request::None;
+            if sample.state != State::Running {
+                break;
+            }
+            if !each(&sample) {
+                self.core.tick(Request::Abort);
+                break;
+            }
+        }
+        self.core.fault().map_or(Ok(()), Err)
+    }
+
+    /// The surface at a place, outside of any run.
+    ///
+    /// # Errors
+    /// As [`Interpolator::probe`].
+    pub fn probe(&self, path: Place, side: Place) -> Result<Probe, Fault> {
+        self.core.probe(path, side)
+    }
+
+    /// Where the run is: pass, path and side place; after a fault, where that is.
+    #[must_use]
+    pub fn place(&self) -> (u32, Place, Place) {
+        self.core.place()
+    }
+}

@@ -1,0 +1,205 @@
+//! Loads a job into a board, runs it there, and compares with what the core computed here.
+
+use interp_core::{Sample, State};
+use protocol::digest::job_digest;
+use protocol::message::{CHUNK_WORDS_MAX, Clock, PassDigest, Report, Request, Status, Words};
+
+use super::session::{Event, RemoteError, Session};
+use crate::prepare::Prepared;
+
+/// A pass as it was computed here.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Expected {
+    /// Tick of its first sample.
+    pub first_tick: u32,
+    /// Its samples.
+    pub samples: u32,
+    /// Digest of the run up to its end.
+    pub digest: u64,
+}
+
+/// What the comparison came to.
+#[derive(Clone, Debug)]
+pub struct Compared {
+    /// The board's last word of the run.
+    pub status: Status,
+    /// Samples whose digest (or every bit) was compared.
+    pub samples: u64,
+    /// Passes that differ, are missing or too many; the first of them.
+    pub first_bad_pass: Option<u32>,
+}
+
+/// Uploads a job. `progress` is told the words that arrived.
+///
+/// # Errors
+/// The line breaks, or the board refuses the job.
+pub fn upload(
+    session: &mut Session,
+    job: &Prepared,
+    mut progress: impl FnMut(usize),
+) -> Result<(), RemoteError> {
+    let words = u32::try_from(job.words.len()).unwrap_or(u32::MAX);
+    let digest = job_digest(&job.words);
+    session.command(&Request::JobBegin {
+        header: job.header,
+        words,
+        digest,
+    })?;
+    let most = usize::from(session.capabilities().description.chunk_words_max).clamp(1, CHUNK_WORDS_MAX);
+    let mut offset = 0_u32;
+    for chunk in job.words.chunks(most) {
+        let words = Words::new(chunk).unwrap_or_default();
+        session.command(&Request::JobChunk { offset, words })?;
+        offset += u32::try_from(chunk.len()).unwrap_or(0);
+        progress(offset as usize);
+    }
+    session.command(&Request::JobEnd)
+}
+
+/// Starts the loaded job: in lockstep with so many periods, or on the board's own clock.
+fn start(session: &mut Session, report: Report, lockstep: Option<u32>) -> Result<(), RemoteError> {
+    let clock = if lockstep.is_some() {
+        Clock::Lockstep
+    } else {
+        Clock::Free
+    };
+    session.command(&Request::Clock(clock))?;
+    session.command(&Request::Report(report))?;
+    session.command(&Request::Start)?;
+    lockstep.map_or(Ok(()), |ticks| session.command(&Request::Run { ticks }))
+}
+
+/// Whether a pass of the board is the one expected in its place.
+fn agrees(pass: &PassDigest, expected: &[Expected]) -> bool {
+    let here = Expected {
+        first_tick: pass.first_tick,
+        samples: pass.samples,
+        digest: pass.digest,
+    };
+    expected.get(pass.pass as usize) == Some(&here)
+}
+
+/// Runs the loaded job to its end, and compares the digest of every pass. `progress` is told the samples so far.
+///
+/// # Errors
+/// The line breaks, or the board refuses to start.
+pub fn run_digests(
+    session: &mut Session,
+    expected: &[Expected],
+    lockstep: bool,
+    mut progress: impl FnMut(u64),
+) -> Result<Compared, RemoteError> {
+    start(session, Report::Digests, lockstep.then_some(u32::MAX))?;
+    let mut next = 0_u32;
+    let mut samples = 0_u64;
+    let mut first_bad_pass = None;
+    loop {
+        match session.event()? {
+            Event::Pass(pass) => {
+                samples += u64::from(pass.samples);
+                if first_bad_pass.is_none() && (pass.pass != next || !agrees(&pass, expected)) {
+                    first_bad_pass = Some(pass.pass.min(next));
+                }
+                next = pass.pass + 1;
+                progress(samples);
+            }
+            Event::Halted(status) => {
+                if first_bad_pass.is_none() && next as usize != expected.len() {
+                    first_bad_pass = Some(next);
+                }
+                return Ok(Compared {
+                    status,
+                    samples,
+                    first_bad_pass,
+                });
+            }
+            Event::Sample(_) => {}
+        }
+    }
+}
+
+/// Runs the loaded job to its end, and hands on every sample.
+///
+/// # Errors
+/// The line breaks, or the board refuses to start.
+pub fn run_samples(
+    session: &mut Session,
+    lockstep: bool,
+    mut each: impl FnMut(&Sample),
+) -> Result<Status, RemoteError> {
+    start(session, Report::Samples, lockstep.then_some(u32::MAX))?;
+    loop {
+        match session.event()? {
+            Event::Sample(sample) => each(&sample),
+            Event::Halted(status) => return Ok(status),
+            Event::Pass(_) => {}
+        }
+    }
+}
+
+/// The board's samples of ticks `from..from + count`, by running the loaded job once more in lockstep. Only for a board
+/// without a machine behind it: it moves.
+///
+/// # Errors
+/// The line breaks, or the board refuses.
+pub fn samples_between(session: &mut Session, from: u32, count: u32) -> Result<Vec<Sample>, RemoteError> {
+    if !matches!(session.status()?.state, State::Ready | State::Finished) {
+        session.command(&Request::Abort)?;
+        session.command(&Request::Run { ticks: 1 })?;
+        wait_halted(session, &mut Vec::new())?;
+    }
+    let mut samples = Vec::new();
+    if from > 0 {
+        start(session, Report::Digests, Some(from))?;
+        wait_halted(session, &mut samples)?;
+        session.command(&Request::Report(Report::Samples))?;
+        session.command(&Request::Run { ticks: count })?;
+    } else {
+        start(session, Report::Samples, Some(count))?;
+    }
+    wait_halted(session, &mut samples)?;
+    samples.retain(|sample| sample.tick >= from);
+    Ok(samples)
+}
+
+fn wait_halted(session: &mut Session, samples: &mut Vec<Sample>) -> Result<Status, RemoteError> {
+    loop {
+        match session.event()? {
+            Event::Sample(sample) => samples.push(sample),
+            Event::Halted(status) => return Ok(status),
+            Event::Pass(_) => {}
+        }
+    }
+}
+
+/// Tick of the first sample that differs in any bit, or is missing on one side.
+#[must_use]
+pub fn first_difference(here: &[Sample], there: &[Sample]) -> Option<u32> {
+    let same = |a: &Sample, b: &Sample| {
+        let bits = |s: &Sample| {
+            (
+                s.tick,
+                s.state,
+                s.pass,
+                s.path,
+                s.side,
+                s.cc_nm,
+                s.cl_nm,
+                s.feed_mm_s.to_bits(),
+                s.interval.to_bits(),
+            )
+        };
+        bits(a) == bits(b)
+    };
+    let differing = here
+        .iter()
+        .zip(there)
+        .find(|(a, b)| !same(a, b))
+        .map(|(a, _)| a.tick);
+    differing.or_else(|| {
+        let shorter = here.len().min(there.len());
+        here.get(shorter)
+            .or_else(|| there.get(shorter))
+            .map(|sample| sample.tick)
+    })
+}

@@ -1,0 +1,14 @@
+//! The same machine behind a serial line: on a board, or in QEMU.
+//!
+//! ```text
+//! drive.rs    loads and runs a job there, compares with what was computed here
+//! session.rs  requests, answers, events; retransmission
+//! qemu.rs     starts and ends QEMU with the firmware   |   port.rs  a serial port
+//! ```
+
+pub mod drive;
+pub mod port;
+pub mod qemu;
+pub mod session;
+
+pub use session::{RemoteError, Session, Stream};

@@ -1,0 +1,20 @@
+//! A board behind a serial port.
+
+use std::time::Duration;
+
+use super::{RemoteError, Stream};
+
+/// Baud rate of the firmware's link (USART1, 8N1).
+pub const BAUD: u32 = 921_600;
+
+/// Opens the port.
+///
+/// # Errors
+/// There is no such port, or it may not be opened.
+pub fn open(name: &str) -> Result<Box<dyn Stream>, RemoteError> {
+    let port = serialport::new(name, BAUD)
+        .timeout(Duration::from_millis(20))
+        .open()
+        .map_err(|error| RemoteError::Line(error.into()))?;
+    Ok(Box::new(port))
+}

@@ -1,0 +1,161 @@
+//! The firmware in QEMU: a child process with a socket for its serial line, ended when it is dropped.
+
+use std::fs::File;
+use std::io::{self, Read};
+use std::os::unix::net::UnixStream;
+use std::path::{Path, PathBuf};
+use std::process::{Child, Command, Stdio};
+use std::time::{Duration, Instant};
+
+use super::Stream;
+
+/// Program and machine: the STM32F405 as QEMU has it.
+const PROGRAM: &str = "qemu-system-arm";
+const MACHINE: &str = "netduinoplus2";
+
+/// Deterministic time: 8 ns an instruction, and sleeping costs none.
+const CLOCK: &str = "shift=3,sleep=off";
+
+/// Time in which QEMU has to open its socket.
+const START_TIMEOUT: Duration = Duration::from_secs(20);
+
+/// Why QEMU does not run.
+#[derive(Debug, thiserror::Error)]
+pub enum QemuError {
+    /// The program is not there.
+    #[error("{PROGRAM} is not installed; on Debian and Ubuntu: sudo apt-get install qemu-system-arm")]
+    Missing,
+    /// The firmware could not be built.
+    #[error("the firmware for QEMU could not be built: {0}")]
+    Firmware(String),
+    /// It did not start, or ended.
+    #[error("QEMU did not start: {0}")]
+    Start(String),
+}
+
+/// A running QEMU.
+#[derive(Debug)]
+pub struct Qemu {
+    child: Child,
+    folder: tempfile::TempDir,
+}
+
+/// The workspace that this tool was built in.
+#[must_use]
+pub fn workspace() -> PathBuf {
+    let here = Path::new(env!("CARGO_MANIFEST_DIR"));
+    here.parent().unwrap_or(here).to_owned()
+}
+
+/// Builds the firmware for QEMU (`cargo fw-qemu`; at once where nothing changed), and returns the image.
+///
+/// # Errors
+/// Cargo is missing or fails; its own words are passed on.
+pub fn firmware() -> Result<PathBuf, QemuError> {
+    let workspace = workspace();
+    let cargo = std::env::var_os("CARGO").unwrap_or_else(|| "cargo".into());
+    let output = Command::new(cargo)
+        .args(["fw-qemu", "--quiet"])
+        .current_dir(&workspace)
+        .stdin(Stdio::null())
+        .output()
+        .map_err(|error| QemuError::Firmware(error.to_string()))?;
+    if !output.status.success() {
+        return Err(QemuError::Firmware(
+            String::from_utf8_lossy(&output.stderr).into_owned(),
+        ));
+    }
+    Ok(workspace.join("target/qemu/thumbv7em-none-eabihf/release/firmware"))
+}
+
+impl Qemu {
+    /// Starts QEMU with a firmware image, and connects to its serial line.
+    ///
+    /// # Errors
+    /// QEMU is missing, or does not start.
+    pub fn start(image: &Path) -> Result<(Self, Box<dyn Stream>), QemuError> {
+        let failed = |error: io::Error| QemuError::Start(error.to_string());
+        let folder = tempfile::tempdir().map_err(failed)?;
+        let socket = folder.path().join("serial");
+        // The log (defmt frames) comes on stdout, QEMU's own words on stderr.
+        let log = File::create(folder.path().join("log")).map_err(failed)?;
+        let child = Command::new(PROGRAM)
+            .args([
+                "-machine",
+                MACHINE,
+                "-nodefaults",
+                "-nographic",
+                "-monitor",
+                "none",
+                "-icount",
+                CLOCK,
+            ])
+            .args(["-semihosting-config", "enable=on,target=native"])
+            .arg("-chardev")
+            .arg(format!(
+                "socket,id=link,path={},server=on,wait=on",
+                socket.display()
+            ))
+            .args(["-serial", "chardev:link"])
+            .arg("-kernel")
+            .arg(image)
+            .stdin(Stdio::null())
+            .stdout(log)
+            .stderr(Stdio::piped())
+            .spawn()
+            .map_err(|error| match error.kind() {
+                io::ErrorKind::NotFound => QemuError::Missing,
+                _ => failed(error),
+            })?;
+        let mut qemu = Self { child, folder };
+        let stream = qemu.connect(&socket)?;
+        stream
+            .set_read_timeout(Some(Duration::from_millis(20)))
+            .map_err(failed)?;
+        Ok((qemu, Box::new(stream)))
+    }
+
+    fn connect(&mut self, socket: &Path) -> Result<UnixStream, QemuError> {
+        let deadline = Instant::now() + START_TIMEOUT;
+        loop {
+            if let Ok(stream) = UnixStream::connect(socket) {
+                return Ok(stream);
+            }
+            let ended = self.child.try_wait().ok().flatten().is_some();
+            if ended || Instant::now() > deadline {
+                return Err(QemuError::Start(self.last_words()));
+            }
+            std::thread::sleep(Duration::from_millis(5));
+        }
+    }
+
+    /// What QEMU said on stderr; ends it.
+    #[must_use]
+    pub fn last_words(&mut self) -> String {
+        self.end();
+        let mut words = String::new();
+        if let Some(mut stderr) = self.child.stderr.take() {
+            // What cannot be read is not worth an error of its own.
+            let _ = stderr.read_to_string(&mut words);
+        }
+        words.trim().to_owned()
+    }
+
+    /// The firmware's log so far: defmt frames, to be decoded with the image.
+    #[must_use]
+    pub fn log(&self) -> PathBuf {
+        self.folder.path().join("log")
+    }
+
+    fn end(&mut self) {
+        // Either it is gone already, or it goes now.
+        let _ = self.child.kill();
+        let _ = self.child.wait();
+    }
+}
+
+impl Drop for Qemu {
+    fn drop(&mut self) {
+        self.end();
+    }
+}

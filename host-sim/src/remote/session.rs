@@ -1,0 +1,272 @@
+//! One session with a board: numbered requests with their answers, and events in between.
+
+use std::collections::VecDeque;
+use std::io::{self, Read, Write};
+use std::time::{Duration, Instant};
+
+use protocol::frame::{DELIMITER, Decoder, FRAME_MAX, write_request};
+use protocol::message::{Capabilities, PassDigest, Reason, Reply, Request, Status, next_number, read_reply};
+use protocol::version::{PROTOCOL_VERSION, VersionMismatch};
+
+use interp_core::Sample;
+
+/// Time after which a request is sent again. An answer takes 0.2 ms in QEMU and a few ms over a serial line; a board that
+/// checks a job, or a QEMU that shares its processor, may take longer.
+const ANSWER_TIMEOUT: Duration = Duration::from_millis(1500);
+
+/// Times a request is sent before it is given up.
+const TRIES: u32 = 4;
+
+/// Time without any event of a run after which the board counts as gone.
+const SILENCE_TIMEOUT: Duration = Duration::from_secs(20);
+
+/// A line to a board. Reading returns [`io::ErrorKind::TimedOut`] or [`io::ErrorKind::WouldBlock`] after some
+/// milliseconds without a byte.
+pub trait Stream: Read + Write + Send {}
+
+impl<T: Read + Write + Send> Stream for T {}
+
+/// What can go wrong between here and the board.
+#[derive(Debug, thiserror::Error)]
+pub enum RemoteError {
+    /// The line broke.
+    #[error("the line to the board broke: {0}")]
+    Line(#[from] io::Error),
+    /// No answer.
+    #[error("the board does not answer ({0})")]
+    Silent(&'static str),
+    /// The two ends speak different versions.
+    #[error("{0}")]
+    Version(VersionMismatch),
+    /// The board refused a request.
+    #[error("the board refused {request}: {reason}")]
+    Refused {
+        /// Name of the request.
+        request: &'static str,
+        /// The board's reason.
+        reason: Reason,
+    },
+}
+
+/// What a board sends by itself.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Event {
+    /// The next sample, in order.
+    Sample(Sample),
+    /// A pass is over.
+    Pass(PassDigest),
+    /// The ticks of a `Run` are used up, or the run is over.
+    Halted(Status),
+}
+
+/// An open session.
+pub struct Session {
+    stream: Box<dyn Stream>,
+    decoder: Decoder,
+    number: u16,
+    events: VecDeque<Event>,
+    input: Vec<u8>,
+    capabilities: Capabilities,
+}
+
+fn name(request: &Request) -> &'static str {
+    match request {
+        Request::Hello { .. } => "hello",
+        Request::JobBegin { .. } => "the job",
+        Request::JobChunk { .. } => "a part of the job",
+        Request::JobEnd => "the job",
+        Request::Start => "to start",
+        Request::Hold => "to hold",
+        Request::Resume => "to resume",
+        Request::Abort => "to abort",
+        Request::Status => "its status",
+        Request::Clock(_) => "the clock",
+        Request::Run { .. } => "to run",
+        Request::Report(_) => "the kind of report",
+    }
+}
+
+impl Session {
+    /// Opens a session: says hello, and checks that both ends speak the same version.
+    ///
+    /// # Errors
+    /// The line breaks, nobody answers, or the versions differ.
+    pub fn open(stream: Box<dyn Stream>, number: u32) -> Result<Self, RemoteError> {
+        let mut session = Self {
+            stream,
+            decoder: Decoder::new(),
+            number: 0,
+            events: VecDeque::new(),
+            input: Vec::new(),
+            capabilities: Capabilities::default(),
+        };
+        // Ends what noise, or a host that went away, may have left half-sent.
+        session.stream.write_all(&[DELIMITER])?;
+        let hello = Request::Hello {
+            version: PROTOCOL_VERSION,
+            session: number,
+        };
+        match session.ask(&hello)? {
+            Reply::Capabilities(capabilities) => {
+                capabilities.check_version().map_err(RemoteError::Version)?;
+                session.capabilities = capabilities;
+                session.events.clear();
+                Ok(session)
+            }
+            _ => Err(RemoteError::Silent(
+                "it did not answer hello with its capabilities",
+            )),
+        }
+    }
+
+    /// What the board said of itself.
+    #[must_use]
+    pub fn capabilities(&self) -> &Capabilities {
+        &self.capabilities
+    }
+
+    /// Sends a request that is answered by an acknowledgement.
+    ///
+    /// # Errors
+    /// The line breaks, nobody answers, or the board refuses.
+    pub fn command(&mut self, request: &Request) -> Result<(), RemoteError> {
+        loop {
+            match self.ask(request)? {
+                Reply::Nak {
+                    reason: Reason::Busy, ..
+                } => std::thread::sleep(Duration::from_millis(2)),
+                Reply::Nak { reason, .. } => {
+                    return Err(RemoteError::Refused {
+                        request: name(request),
+                        reason,
+                    });
+                }
+                _ => return Ok(()),
+            }
+        }
+    }
+
+    /// Asks for the status.
+    ///
+    /// # Errors
+    /// As [`Self::command`].
+    pub fn status(&mut self) -> Result<Status, RemoteError> {
+        match self.ask(&Request::Status)? {
+            Reply::Status { status, .. } => Ok(status),
+            Reply::Nak { reason, .. } => Err(RemoteError::Refused {
+                request: "its status",
+                reason,
+            }),
+            _ => Err(RemoteError::Silent("it did not answer with its status")),
+        }
+    }
+
+    /// The next event; waits for it.
+    ///
+    /// # Errors
+    /// The line breaks, or nothing comes for a long time.
+    pub fn event(&mut self) -> Result<Event, RemoteError> {
+        let mut since = Instant::now();
+        loop {
+            if let Some(event) = self.events.pop_front() {
+                return Ok(event);
+            }
+            let before = self.input.len();
+            // An answer that comes now belongs to a request that was answered before.
+            self.read_some()?;
+            let grew = self.input.len() != before;
+            while self.next_reply()?.is_some() {}
+            if grew {
+                since = Instant::now();
+            } else if since.elapsed() > SILENCE_TIMEOUT {
+                return Err(RemoteError::Silent("no word of the run for 20 s"));
+            }
+        }
+    }
+
+    /// Sends a request, again if need be, and waits for the answer that carries its number.
+    fn ask(&mut self, request: &Request) -> Result<Reply, RemoteError> {
+        let number = next_number(self.number);
+        let mut buffer = [0; FRAME_MAX];
+        let frame = write_request(number, request, &mut buffer).map_err(|_| {
+            io::Error::new(
+                io::ErrorKind::InvalidInput,
+                "the request does not fit into a frame",
+            )
+        })?;
+        for _ in 0..TRIES {
+            self.stream.write_all(frame)?;
+            self.stream.flush()?;
+            let deadline = Instant::now() + ANSWER_TIMEOUT;
+            while Instant::now() < deadline {
+                match self.next_reply()? {
+                    Some(reply) => match answered(&reply) {
+                        Some(answered) if answered == number => {
+                            if !matches!(&reply, Reply::Nak { reason, .. } if !reason.uses_number()) {
+                                self.number = number;
+                            }
+                            return Ok(reply);
+                        }
+                        // A frame was damaged on its way: send it again at once.
+                        Some(0) => break,
+                        _ => {}
+                    },
+                    None => self.read_some()?,
+                }
+            }
+            self.stream.write_all(&[DELIMITER])?;
+        }
+        Err(RemoteError::Silent("a request was sent four times"))
+    }
+
+    /// Reads what has arrived, or waits a moment.
+    fn read_some(&mut self) -> Result<(), RemoteError> {
+        let mut bytes = [0; 16_384];
+        match self.stream.read(&mut bytes) {
+            Ok(0) => Err(RemoteError::Line(io::ErrorKind::UnexpectedEof.into())),
+            Ok(count) => {
+                self.input.extend_from_slice(&bytes[..count]);
+                Ok(())
+            }
+            Err(error) => match error.kind() {
+                io::ErrorKind::TimedOut | io::ErrorKind::WouldBlock | io::ErrorKind::Interrupted => Ok(()),
+                _ => Err(error.into()),
+            },
+        }
+    }
+
+    /// The next answer among the bytes that were read; events on the way are kept. Damaged frames are passed over: what they
+    /// answered is asked again.
+    fn next_reply(&mut self) -> Result<Option<Reply>, RemoteError> {
+        let input = std::mem::take(&mut self.input);
+        for (index, &byte) in input.iter().enumerate() {
+            let Some(Ok(frame)) = self.decoder.push(byte) else {
+                continue;
+            };
+            let Ok(reply) = read_reply(frame.payload) else {
+                continue;
+            };
+            match reply {
+                Reply::Samples(samples) => self
+                    .events
+                    .extend(samples.iter().map(|record| Event::Sample(record.0))),
+                Reply::PassDigest(pass) => self.events.push_back(Event::Pass(pass)),
+                Reply::Halted(status) => self.events.push_back(Event::Halted(status)),
+                answer => {
+                    self.input = input[index + 1..].to_vec();
+                    return Ok(Some(answer));
+                }
+            }
+        }
+        Ok(None)
+    }
+}
+
+/// Number of the request that a reply answers.
+fn answered(reply: &Reply) -> Option<u16> {
+    match reply {
+        Reply::Capabilities(capabilities) => Some(capabilities.number),
+        Reply::Ack { number } | Reply::Nak { number, .. } | Reply::Status { number, .. } => Some(*number),
+        Reply::Samples(_) | Reply::PassDigest(_) | Reply::Halted(_) => None,
+    }
+}

@@ -1,0 +1,268 @@
+//! `path.svg`: the surface with the passes on it.
+
+use std::fmt::Write;
+
+use super::furniture;
+use super::mesh::{Mesh, Quad};
+use super::record::{Place, Record};
+use super::scene::{Layer, Scene};
+use super::svg::{polyline, simplified, tenths};
+use super::vector::{Vector, add_scaled, dot, subtract, unit};
+use super::view::Frame;
+
+/// Size of the picture.
+pub(super) const SIZE: [f64; 2] = [960.0, 620.0];
+/// Where surface and tool may lie.
+const FRAME: Frame = [44.0, 84.0, 872.0, 432.0];
+/// Lines may leave their points by this much, pixels.
+const TOLERANCE: f64 = 0.12;
+/// Direction to the light: right, up, towards the viewer.
+const LIGHT: Vector = [-0.45, 0.62, 0.64];
+/// The tool side from shadow to full light, red, green, blue; and the back.
+const RAMP: [[f64; 3]; 3] = [[74.0, 91.0, 112.0], [156.0, 173.0, 192.0], [232.0, 239.0, 246.0]];
+const BACK_RAMP: [[f64; 3]; 3] = [
+    [146.0, 138.0, 130.0],
+    [172.0, 165.0, 157.0],
+    [203.0, 197.0, 190.0],
+];
+/// The span of brightness that contrast is stretched to, by how much at most, and about which brightness.
+const CONTRAST: f64 = 0.62;
+const GAIN_MAX: f64 = 2.2;
+const MIDDLE: f64 = 0.66;
+/// Passes that carry an arrow, about, and where on them it may be, the best liked first.
+const ARROWS: usize = 7;
+const ARROW_PLACES: [f64; 4] = [0.72, 0.25, 0.86, 0.5];
+/// Normals that are drawn between the highlighted pass and its tool path.
+const COMB: usize = 36;
+
+/// What the picture says about the job.
+#[derive(Clone, Debug)]
+pub(super) struct Words {
+    pub(super) title: String,
+    pub(super) subtitle: String,
+    /// What the thin lines are: "cutter contact, 55 of 164 passes".
+    pub(super) passes: String,
+    /// The ball: "ball, radius 6 mm".
+    pub(super) ball: String,
+    /// For those who cannot see it.
+    pub(super) description: String,
+}
+
+/// The whole picture.
+pub(super) fn picture(mesh: &Mesh, record: &Record, radius_mm: f64, words: &Words) -> String {
+    let scene = Scene::new(mesh, record, radius_mm, FRAME);
+    let mut out = String::new();
+    furniture::open(&mut out, SIZE, words);
+    let (quads, front) = scene.quads();
+    let shading = Shading::new(&scene, &quads);
+    surface(&mut out, &scene, &quads, &shading);
+    lines(
+        &mut out,
+        "iso-line iso-edge",
+        scene.edges().iter().map(|(_, run)| run),
+    );
+    passes(&mut out, &scene, record, Layer::Under);
+    one(&mut out, &scene, Layer::Under);
+    if let Some(ball) = &scene.ball {
+        normals(&mut out, &scene, Layer::Under);
+        furniture::ball(&mut out, ball);
+    }
+    surface(&mut out, &scene, &front, &shading);
+    passes(&mut out, &scene, record, Layer::Over);
+    one(&mut out, &scene, Layer::Over);
+    arrows(&mut out, &scene, record);
+    if let Some(ball) = &scene.ball {
+        tool_path(&mut out, &scene);
+        furniture::contact(&mut out, ball);
+    }
+    furniture::triad(&mut out, &scene.camera.view, [70.0, SIZE[1] - 58.0]);
+    furniture::scale_bar(&mut out, scene.camera.scale, [SIZE[0] - 44.0, SIZE[1] - 44.0]);
+    furniture::key(&mut out, words, scene.ball.is_some(), [150.0, SIZE[1] - 62.0]);
+    out.push_str("</svg>\n");
+    out
+}
+
+/// Shaded quads. Each is stroked in its own colour, so that no seam shows between neighbours.
+fn surface(out: &mut String, scene: &Scene<'_>, quads: &[Quad], shading: &Shading) {
+    if quads.is_empty() {
+        return;
+    }
+    out.push_str(
+        "<g fill=\"currentColor\" stroke=\"currentColor\" stroke-width=\"1.2\" stroke-linejoin=\"round\">\n",
+    );
+    for quad in quads {
+        let corners = quad
+            .corners
+            .map(|corner| scene.camera.place(corner))
+            .map(|[x, y, _]| [x, y]);
+        let [r, g, b] = shading.colour(scene.camera.view.turn(quad.normal));
+        let _ = writeln!(
+            out,
+            "<path color=\"#{r:02x}{g:02x}{b:02x}\" d=\"{}z\"/>",
+            polyline(&corners)
+        );
+    }
+    out.push_str("</g>\n");
+}
+
+/// From the light on a face to its colour.
+#[derive(Clone, Copy, Debug)]
+struct Shading {
+    middle: f64,
+    gain: f64,
+}
+
+impl Shading {
+    /// Contrast enough to see the shape of a surface that is nearly flat.
+    fn new(scene: &Scene<'_>, quads: &[Quad]) -> Self {
+        let turned = quads
+            .iter()
+            .map(|quad| scene.camera.view.turn(quad.normal))
+            .filter(|normal| normal[2] > 0.0);
+        let [low, high] = turned
+            .map(brightness)
+            .fold([1.0, 0.0], |[low, high]: [f64; 2], bright| {
+                [low.min(bright), high.max(bright)]
+            });
+        let gain = (CONTRAST / (high - low).max(1e-3)).clamp(1.0, GAIN_MAX);
+        Self {
+            middle: 0.5 * (low + high),
+            gain,
+        }
+    }
+
+    /// The colour of a face with this normal in the picture's directions.
+    fn colour(&self, normal: Vector) -> [u8; 3] {
+        let is_back = normal[2] < 0.0;
+        let normal = if is_back { normal.map(|x| -x) } else { normal };
+        // The more the contrast is stretched, the more it is centred on the ramp's light half.
+        let middle = self.middle + (1.0 - 1.0 / self.gain) * (MIDDLE - self.middle);
+        let bright = (middle + self.gain * (brightness(normal) - self.middle)).clamp(0.0, 1.0);
+        let [dark, medium, light] = if is_back { BACK_RAMP } else { RAMP };
+        let (from, to, share) = if bright < 0.5 {
+            (dark, medium, 2.0 * bright)
+        } else {
+            (medium, light, 2.0 * bright - 1.0)
+        };
+        std::array::from_fn(|k| (from[k] + (to[k] - from[k]) * share).round() as u8)
+    }
+}
+
+/// Light that a face sends to the viewer, 0 to 1.
+fn brightness(normal: Vector) -> f64 {
+    let light = unit(LIGHT);
+    let half = unit(add_scaled(light, [0.0, 0.0, 1.0], 1.0));
+    let gloss = dot(normal, half).max(0.0).powi(24);
+    (0.08 + 0.84 * dot(normal, light).max(0.0) + 0.1 * gloss).min(1.0)
+}
+
+/// One path of all these lines.
+fn lines<'a>(out: &mut String, class: &str, runs: impl Iterator<Item = &'a Vec<[f64; 2]>>) {
+    let data: String = runs.map(|run| polyline(&simplified(run, TOLERANCE))).collect();
+    if !data.is_empty() {
+        let _ = writeln!(out, "<path class=\"{class}\" d=\"{data}\"/>");
+    }
+}
+
+/// Every drawn pass.
+fn passes(out: &mut String, scene: &Scene<'_>, record: &Record, layer: Layer) {
+    let runs: Vec<_> = record
+        .drawn
+        .iter()
+        .flat_map(|drawn| scene.on_surface(&drawn.places.items()))
+        .collect();
+    lines(out, "iso-line iso-pass", of_layer(&runs, layer));
+}
+
+/// The highlighted pass.
+fn one(out: &mut String, scene: &Scene<'_>, layer: Layer) {
+    if let Some((_, places)) = &scene.one {
+        let runs = scene.on_surface(places);
+        lines(out, "iso-line iso-casing", of_layer(&runs, layer));
+        lines(out, "iso-line iso-one", of_layer(&runs, layer));
+    }
+}
+
+fn of_layer(runs: &[(Layer, Vec<[f64; 2]>)], layer: Layer) -> impl Iterator<Item = &Vec<[f64; 2]>> {
+    runs.iter()
+        .filter(move |(of, _)| *of == layer)
+        .map(|(_, run)| run)
+}
+
+/// Normals between the highlighted pass and the tool centre's path.
+fn normals(out: &mut String, scene: &Scene<'_>, layer: Layer) {
+    const STEPS: u32 = 8;
+    let Some((_, places)) = &scene.one else {
+        return;
+    };
+    let normal = |place: &Place| {
+        let apart = subtract(place.cl_mm, place.cc_mm);
+        let points = (0..=STEPS).map(|k| add_scaled(place.cc_mm, apart, f64::from(k) / f64::from(STEPS)));
+        scene.in_space(&points.collect::<Vec<_>>())
+    };
+    let runs: Vec<_> = even(places, COMB).flat_map(normal).collect();
+    lines(out, "iso-line iso-comb", of_layer(&runs, layer));
+}
+
+/// The tool centre's path over the highlighted pass.
+fn tool_path(out: &mut String, scene: &Scene<'_>) {
+    let Some((_, places)) = &scene.one else {
+        return;
+    };
+    normals(out, scene, Layer::Over);
+    let centres: Vec<Vector> = places.iter().map(|place| place.cl_mm).collect();
+    let runs = scene.in_space(&centres);
+    lines(out, "iso-line iso-casing", runs.iter().map(|(_, run)| run));
+    lines(out, "iso-line iso-cl", runs.iter().map(|(_, run)| run));
+}
+
+/// So many places spread evenly over a pass, ends included.
+fn even(places: &[Place], count: usize) -> impl Iterator<Item = &Place> {
+    let last = places.len().saturating_sub(1);
+    (0..=count).filter_map(move |k| places.get(k * last / count))
+}
+
+/// Arrow heads that say which way the passes run.
+fn arrows(out: &mut String, scene: &Scene<'_>, record: &Record) {
+    let one = scene.one.as_ref().map(|(pass, _)| *pass);
+    // Odd, so that passes to and fro both carry arrows.
+    let every = (record.drawn.len() / ARROWS).max(1) | 1;
+    let others = record
+        .drawn
+        .iter()
+        .skip(every / 2)
+        .step_by(every)
+        .filter(|drawn| Some(drawn.pass) != one);
+    for drawn in others {
+        arrow(out, scene, &drawn.places.items(), "iso-head", 1.0);
+    }
+    if let Some((_, places)) = &scene.one {
+        arrow(out, scene, places, "iso-one-fill iso-head-one", 2.1);
+    }
+}
+
+fn arrow(out: &mut String, scene: &Scene<'_>, places: &[Place], class: &str, size: f64) {
+    let found = ARROW_PLACES.iter().find_map(|share| scene.arrow(places, *share));
+    let Some([[x, y], [dx, dy]]) = found else {
+        return;
+    };
+    let length = dx.hypot(dy).max(1e-9);
+    let (dx, dy) = (dx / length * size, dy / length * size);
+    let corner = |along: f64, across: f64| {
+        format!(
+            "{} {}",
+            tenths(x + along * dx - across * dy),
+            tenths(y + along * dy + across * dx)
+        )
+    };
+    let (tip, left, notch, right) = (
+        corner(6.0, 0.0),
+        corner(-4.0, 3.2),
+        corner(-2.2, 0.0),
+        corner(-4.0, -3.2),
+    );
+    let _ = writeln!(
+        out,
+        "<path class=\"{class}\" d=\"M{tip} {left} {notch} {right}z\"/>"
+    );
+}

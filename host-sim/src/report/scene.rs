@@ -1,0 +1,247 @@
+//! What lies before what: the ball's place, and the parts of lines that can be seen.
+
+use super::mesh::{FINE, Mesh, Quad};
+use super::record::{Drawn, Place, Record};
+use super::vector::{Vector, add_scaled, dot, subtract};
+use super::view::{Camera, Depth, Frame, View};
+
+/// A ball whose radius is above this share of the surface's diagonal is left out: it would be the whole picture.
+const BALL_SHARE: f64 = 0.4;
+/// Places along the highlighted pass that are tried for the ball, the best liked first.
+const BALL_PLACES: [f64; 9] = [0.5, 0.56, 0.44, 0.62, 0.38, 0.68, 0.32, 0.76, 0.24];
+/// The contact must face the viewer by this cosine to be seen well under the ball.
+const BALL_FACING: f64 = 0.15;
+/// Share of a worse-liked place that a better view of the ball must gain.
+const BALL_GAIN: f64 = 0.04;
+
+/// The order in which a part of a line is drawn.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Layer {
+    /// Behind the surface: not at all.
+    Hidden,
+    /// Before the ball is drawn, which lies in front.
+    Under,
+    /// After the ball.
+    Over,
+}
+
+/// The ball in the picture.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Ball {
+    /// Its contact and centre, placed.
+    pub(super) cc: Vector,
+    pub(super) cl: Vector,
+    /// Pixels.
+    pub(super) radius: f64,
+}
+
+impl Ball {
+    /// Whether a placed point lies behind the ball. Nothing lies within it, so its middle plane decides.
+    fn hides(&self, placed: Vector, margin: f64) -> bool {
+        self.covers(placed, margin) && placed[2] < self.cl[2]
+    }
+
+    /// Whether a point of the picture lies in the ball's disc, widened by a margin.
+    fn covers(&self, placed: Vector, margin: f64) -> bool {
+        (placed[0] - self.cl[0]).hypot(placed[1] - self.cl[1]) < self.radius + margin
+    }
+}
+
+/// The surface seen by a camera, with the tool on it.
+#[derive(Debug)]
+pub(super) struct Scene<'a> {
+    mesh: &'a Mesh,
+    pub(super) camera: Camera,
+    depth: Depth,
+    pub(super) ball: Option<Ball>,
+    /// The highlighted pass.
+    pub(super) one: Option<(u32, Vec<Place>)>,
+}
+
+impl<'a> Scene<'a> {
+    /// The best view of the surface and of the tool on the record's middle pass.
+    pub(super) fn new(mesh: &'a Mesh, record: &Record, radius_mm: f64, frame: Frame) -> Self {
+        let one = highlighted(record).map(|drawn| (drawn.pass, drawn.places.items()));
+        let has_tool = radius_mm < BALL_SHARE * mesh.diagonal();
+        let mut extent = mesh.extent();
+        let view = View::best(mesh, &extent, frame);
+        if let (Some((_, places)), true) = (&one, has_tool) {
+            extent.extend(places.iter().map(|place| place.cl_mm));
+            let middle = places.len() / 3..(2 * places.len()).div_ceil(3);
+            for place in &places[middle] {
+                let axes = (0..3).flat_map(|k| [(k, radius_mm), (k, -radius_mm)]);
+                extent.extend(axes.map(|(k, by)| {
+                    let mut point = place.cl_mm;
+                    point[k] += by;
+                    point
+                }));
+            }
+        }
+        let camera = Camera::new(view, &extent, frame);
+        let mut scene = Self {
+            mesh,
+            camera,
+            depth: Depth::of(mesh, &camera),
+            ball: None,
+            one,
+        };
+        if has_tool {
+            scene.ball = scene.best_ball(radius_mm * camera.scale);
+        }
+        scene
+    }
+
+    /// The ball where it can be seen best.
+    fn best_ball(&self, radius: f64) -> Option<Ball> {
+        let (_, places) = self.one.as_ref()?;
+        let mut best: Option<(f64, Ball)> = None;
+        for (rank, share) in BALL_PLACES.iter().enumerate() {
+            let index = ((places.len().checked_sub(1)?) as f64 * share) as usize;
+            let place = places[index];
+            let ball = Ball {
+                cc: self.camera.place(place.cc_mm),
+                cl: self.camera.place(place.cl_mm),
+                radius,
+            };
+            let facing = self.facing(&place);
+            let score = self.uncovered(&ball) + facing.min(BALL_FACING) - BALL_GAIN * rank as f64;
+            if best.is_none_or(|(most, _)| score > most) {
+                best = Some((score, ball));
+            }
+        }
+        best.map(|(_, ball)| ball)
+    }
+
+    /// Cosine between the tool normal at a place and the direction to the viewer.
+    fn facing(&self, place: &Place) -> f64 {
+        let normal = subtract(place.cl_mm, place.cc_mm);
+        dot(normal, self.camera.view.toward) / dot(normal, normal).sqrt().max(1e-12)
+    }
+
+    /// Share of the ball's disc that nothing covers.
+    fn uncovered(&self, ball: &Ball) -> f64 {
+        const STEPS: i32 = 8;
+        let offsets = || (-STEPS..=STEPS).map(|k| f64::from(k) / f64::from(STEPS));
+        let disc = offsets()
+            .flat_map(|x| offsets().map(move |y| (x, y)))
+            .filter(|(x, y)| x.hypot(*y) <= 1.0);
+        let (shown, all) = disc.fold((0.0, 0.0), |(shown, all), (x, y)| {
+            let spot = [
+                ball.cl[0] + x * ball.radius,
+                ball.cl[1] + y * ball.radius,
+                ball.cl[2],
+            ];
+            (shown + f64::from(u8::from(self.depth.shows(spot))), all + 1.0)
+        });
+        shown / all
+    }
+
+    /// The quads of the surface, the farthest first; and of them those in front of the ball.
+    pub(super) fn quads(&self) -> (Vec<Quad>, Vec<Quad>) {
+        let depth = |quad: &Quad| self.camera.place(middle(quad))[2];
+        let mut quads: Vec<_> = self.mesh.quads(FINE).collect();
+        quads.sort_by(|a, b| depth(a).total_cmp(&depth(b)));
+        let in_front = |quad: &&Quad| {
+            let placed = self.camera.place(middle(quad));
+            let reach = 0.5 * quad.area.sqrt() * self.camera.scale;
+            self.ball
+                .is_some_and(|ball| ball.covers(placed, reach) && !ball.hides(placed, reach))
+        };
+        let front = quads.iter().filter(in_front).copied().collect();
+        (quads, front)
+    }
+
+    /// The parts of a line on the surface's tool side that can be seen.
+    pub(super) fn on_surface(&self, places: &[Place]) -> Vec<(Layer, Vec<[f64; 2]>)> {
+        let layers = places.iter().map(|place| {
+            let placed = self.camera.place(place.cc_mm);
+            let layer = if self.facing(place) > 0.0 {
+                self.layer(placed)
+            } else {
+                Layer::Hidden
+            };
+            (placed, layer)
+        });
+        runs(layers)
+    }
+
+    /// The parts of a line in space that can be seen.
+    pub(super) fn in_space(&self, points: &[Vector]) -> Vec<(Layer, Vec<[f64; 2]>)> {
+        runs(points.iter().map(|point| {
+            let placed = self.camera.place(*point);
+            (placed, self.layer(placed))
+        }))
+    }
+
+    /// The edges of the surface, the parts that can be seen.
+    pub(super) fn edges(&self) -> Vec<(Layer, Vec<[f64; 2]>)> {
+        self.mesh
+            .edges()
+            .iter()
+            .flat_map(|edge| self.in_space(edge))
+            .collect()
+    }
+
+    /// Where a place's contact lies in the picture and which way the pass runs there, if it can be seen.
+    pub(super) fn arrow(&self, places: &[Place], share: f64) -> Option<[[f64; 2]; 2]> {
+        let index = (places.len() as f64 * share) as usize;
+        let reach = (places.len() / 40).max(1);
+        let (from, at, to) = (
+            places.get(index.checked_sub(reach)?)?,
+            places.get(index)?,
+            places.get(index + reach)?,
+        );
+        let placed = self.camera.place(at.cc_mm);
+        if self.facing(at) < 0.1
+            || !self.depth.shows(placed)
+            || self.ball.is_some_and(|b| b.covers(placed, 8.0))
+        {
+            return None;
+        }
+        let [from, to] = [from, to].map(|place| self.camera.place(place.cc_mm));
+        Some([[placed[0], placed[1]], [to[0] - from[0], to[1] - from[1]]])
+    }
+
+    fn layer(&self, placed: Vector) -> Layer {
+        if !self.depth.shows(placed) {
+            Layer::Hidden
+        } else if self.ball.is_some_and(|ball| ball.hides(placed, 0.0)) {
+            Layer::Under
+        } else {
+            Layer::Over
+        }
+    }
+}
+
+/// The middle pass, or the pass nearest to the middle if the run ended before it.
+pub(super) fn highlighted(record: &Record) -> Option<&Drawn> {
+    let middle = record.drawn.iter().find(|drawn| drawn.pass == record.middle_pass);
+    middle.or_else(|| record.drawn.get(record.drawn.len() / 2))
+}
+
+/// The middle of a quad.
+pub(super) fn middle(quad: &Quad) -> Vector {
+    quad.corners
+        .iter()
+        .fold([0.0; 3], |sum, corner| add_scaled(sum, *corner, 0.25))
+}
+
+/// Consecutive points of one layer, hidden ones left out. Where a line passes from one layer to the other, both parts
+/// share the point.
+fn runs(points: impl Iterator<Item = (Vector, Layer)>) -> Vec<(Layer, Vec<[f64; 2]>)> {
+    let mut runs: Vec<(Layer, Vec<[f64; 2]>)> = Vec::new();
+    let mut before: Option<([f64; 2], Layer)> = None;
+    for (placed, layer) in points {
+        let point = [placed[0], placed[1]];
+        if layer != Layer::Hidden {
+            match (runs.last_mut(), before) {
+                (Some((_, run)), Some((_, was))) if was == layer => run.push(point),
+                (_, Some((from, was))) if was != Layer::Hidden => runs.push((layer, vec![from, point])),
+                _ => runs.push((layer, vec![point])),
+            }
+        }
+        before = Some((point, layer));
+    }
+    runs.retain(|(_, run)| run.len() > 1);
+    runs
+}

@@ -1,0 +1,267 @@
+//! The camera: a parallel projection, and what of the surface can be seen in it.
+
+use super::mesh::{FINE, Mesh};
+use super::vector::{Vector, cross, dot, subtract};
+
+/// Cells of the depth buffer a pixel of the picture.
+const CELLS_PER_PIXEL: f64 = 2.0;
+/// A point this many pixels behind the surface still counts as lying on it: facets, rounding.
+const DEPTH_SLACK: f64 = 1.5;
+/// Heights of the camera over the horizon that are tried, degrees, with the preference for each: lower is livelier,
+/// higher looks into hollows.
+const ELEVATIONS: [(f64, f64); 4] = [(26.0, 0.95), (34.0, 1.0), (43.0, 0.82), (56.0, 0.62)];
+/// Directions around z that are tried.
+const AZIMUTHS: u32 = 36;
+/// The direction that is preferred, degrees: x to the right and towards the viewer, y away; and how much it counts.
+const AZIMUTH_LIKED: f64 = -60.0;
+const AZIMUTH_WEIGHT: f64 = 0.15;
+/// What a view is worth that looks straight along a side of the surface, against one that looks across its corner.
+const STRAIGHT_ON: f64 = 0.5;
+/// How much more a piece of the back counts against a view than a piece of the tool side counts for it.
+const BACK_COUNTS: f64 = 5.0;
+/// How much it counts that the surface is seen, and that it fills the frame.
+const SEEN_POWER: f64 = 0.6;
+const FILL_POWER: f64 = 0.4;
+
+/// A frame in the picture: left, top, width, height.
+pub(super) type Frame = [f64; 4];
+
+/// Directions of the picture in space.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct View {
+    right: Vector,
+    up: Vector,
+    /// Towards the viewer.
+    pub(super) toward: Vector,
+}
+
+impl View {
+    /// A camera at these angles around z and over the horizon, degrees.
+    fn at(azimuth: f64, elevation: f64) -> Self {
+        let (sin_a, cos_a) = azimuth.to_radians().sin_cos();
+        let (sin_e, cos_e) = elevation.to_radians().sin_cos();
+        let toward = [cos_a * cos_e, sin_a * cos_e, sin_e];
+        let right = [-sin_a, cos_a, 0.0];
+        Self {
+            right,
+            up: cross(toward, right),
+            toward,
+        }
+    }
+
+    /// A direction in the picture: right, up, towards the viewer.
+    pub(super) fn turn(&self, direction: Vector) -> Vector {
+        [
+            dot(direction, self.right),
+            dot(direction, self.up),
+            dot(direction, self.toward),
+        ]
+    }
+
+    /// The view that shows the surface's tool side best: much of it, large, from across a corner.
+    pub(super) fn best(mesh: &Mesh, extent: &[Vector], frame: Frame) -> Self {
+        let small = [0.0, 0.0, frame[2] / 6.0, frame[3] / 6.0];
+        let below = mesh.mean_normal()[2] < -0.1;
+        let mut best = (f64::NEG_INFINITY, Self::at(AZIMUTH_LIKED, 34.0));
+        for (elevation, liking) in ELEVATIONS {
+            for step in 0..AZIMUTHS {
+                let azimuth = AZIMUTH_LIKED + 360.0 * f64::from(step) / f64::from(AZIMUTHS);
+                let view = Self::at(azimuth, if below { -elevation } else { elevation });
+                let turned = (azimuth - AZIMUTH_LIKED).to_radians().cos();
+                let worth = liking * (1.0 + AZIMUTH_WEIGHT * turned) * view.across_corner(mesh.side());
+                let score = worth * shown(mesh, &Camera::new(view, extent, small));
+                if score > best.0 {
+                    best = (score, view);
+                }
+            }
+        }
+        best.1
+    }
+
+    /// 1 where a side of the surface runs aslant in the picture, less where it runs straight across or away.
+    fn across_corner(&self, side: Vector) -> f64 {
+        let away = cross([0.0, 0.0, 1.0], self.right);
+        let aslant = (2.0 * dot(side, away).atan2(dot(side, self.right))).sin().abs();
+        STRAIGHT_ON + (1.0 - STRAIGHT_ON) * (aslant / 0.8).min(1.0)
+    }
+}
+
+/// How well a camera shows the tool side: its seen area, less that of the back, as a share of the surface, and the
+/// share of the frame that it fills.
+fn shown(mesh: &Mesh, camera: &Camera) -> f64 {
+    const CELLS: f64 = 0.5;
+    let mut depth = Depth::new(camera, CELLS);
+    let mut area = 0.0;
+    for quad in mesh.quads(FINE) {
+        area += quad.area;
+        depth.quad(&quad.corners, dot(quad.normal, camera.view.toward) > 0.0);
+    }
+    let (front, back) = depth.seen();
+    let cell_mm = 1.0 / (CELLS * camera.scale);
+    let seen = ((front - BACK_COUNTS * back) * cell_mm * cell_mm / area.max(1e-12)).max(0.0);
+    let fill = front / (CELLS * CELLS * camera.frame[2] * camera.frame[3]);
+    seen.powf(SEEN_POWER) * fill.powf(FILL_POWER)
+}
+
+/// A view with the scale and the place in the frame.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Camera {
+    pub(super) view: View,
+    /// Pixels a millimetre.
+    pub(super) scale: f64,
+    origin: Vector,
+    centre: [f64; 2],
+    frame: Frame,
+}
+
+impl Camera {
+    /// The camera that fits these points into the frame.
+    pub(super) fn new(view: View, points: &[Vector], frame: Frame) -> Self {
+        let origin = points.first().copied().unwrap_or_default();
+        let mut low = [f64::INFINITY; 2];
+        let mut high = [f64::NEG_INFINITY; 2];
+        for point in points {
+            let turned = view.turn(subtract(*point, origin));
+            for k in 0..2 {
+                low[k] = low[k].min(turned[k]);
+                high[k] = high[k].max(turned[k]);
+            }
+        }
+        let size = [0, 1].map(|k| (high[k] - low[k]).max(1e-9));
+        let scale = (frame[2] / size[0]).min(frame[3] / size[1]);
+        let centre = [
+            frame[0] + 0.5 * frame[2] - 0.5 * (low[0] + high[0]) * scale,
+            frame[1] + 0.5 * frame[3] + 0.5 * (low[1] + high[1]) * scale,
+        ];
+        Self {
+            view,
+            scale,
+            origin,
+            centre,
+            frame,
+        }
+    }
+
+    /// A point in the picture: x to the right, y down, depth towards the viewer; all in pixels.
+    pub(super) fn place(&self, point: Vector) -> Vector {
+        let turned = self.view.turn(subtract(point, self.origin));
+        [
+            self.centre[0] + turned[0] * self.scale,
+            self.centre[1] - turned[1] * self.scale,
+            turned[2] * self.scale,
+        ]
+    }
+}
+
+/// What lies foremost in every cell of the frame.
+#[derive(Clone, Debug)]
+pub(super) struct Depth {
+    camera: Camera,
+    cells: f64,
+    size: [usize; 2],
+    foremost: Vec<f32>,
+    is_front: Vec<bool>,
+}
+
+impl Depth {
+    fn new(camera: &Camera, cells: f64) -> Self {
+        // A margin of one cell each way.
+        let size = [camera.frame[2], camera.frame[3]].map(|length| (length * cells).ceil() as usize + 3);
+        let count = size[0] * size[1];
+        Self {
+            camera: *camera,
+            cells,
+            size,
+            foremost: vec![f32::NEG_INFINITY; count],
+            is_front: vec![false; count],
+        }
+    }
+
+    /// The depths of a surface.
+    pub(super) fn of(mesh: &Mesh, camera: &Camera) -> Self {
+        let mut depth = Self::new(camera, CELLS_PER_PIXEL);
+        for quad in mesh.quads(1) {
+            depth.quad(&quad.corners, dot(quad.normal, camera.view.toward) > 0.0);
+        }
+        depth
+    }
+
+    fn quad(&mut self, corners: &[Vector; 4], is_front: bool) {
+        let [a, b, c, d] = corners.map(|corner| self.cell(self.camera.place(corner)));
+        self.triangle([a, b, c], is_front);
+        self.triangle([a, c, d], is_front);
+    }
+
+    /// A placed point in cells.
+    fn cell(&self, placed: Vector) -> Vector {
+        let [left, top, ..] = self.camera.frame;
+        [
+            (placed[0] - left) * self.cells + 1.0,
+            (placed[1] - top) * self.cells + 1.0,
+            placed[2],
+        ]
+    }
+
+    /// Fills the cells whose middle lies in a triangle.
+    fn triangle(&mut self, [a, b, c]: [Vector; 3], is_front: bool) {
+        let area = (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0]);
+        if area == 0.0 || !area.is_finite() {
+            return;
+        }
+        let range = |k: usize| {
+            let low = a[k].min(b[k]).min(c[k]).floor().max(0.0) as usize;
+            let high = a[k].max(b[k]).max(c[k]).ceil().max(0.0) as usize;
+            low..(high + 1).min(self.size[k])
+        };
+        let (columns, rows) = (range(0), range(1));
+        for row in rows {
+            for column in columns.clone() {
+                let (x, y) = (column as f64, row as f64);
+                let at_b = ((x - a[0]) * (c[1] - a[1]) - (y - a[1]) * (c[0] - a[0])) / area;
+                let at_c = ((b[0] - a[0]) * (y - a[1]) - (b[1] - a[1]) * (x - a[0])) / area;
+                if at_b < -1e-9 || at_c < -1e-9 || at_b + at_c > 1.0 + 1e-9 {
+                    continue;
+                }
+                let depth = (a[2] + at_b * (b[2] - a[2]) + at_c * (c[2] - a[2])) as f32;
+                let index = row * self.size[0] + column;
+                if depth > self.foremost[index] {
+                    self.foremost[index] = depth;
+                    self.is_front[index] = is_front;
+                }
+            }
+        }
+    }
+
+    /// Cells that show the tool side, and cells that show the back.
+    fn seen(&self) -> (f64, f64) {
+        let covered = self
+            .foremost
+            .iter()
+            .zip(&self.is_front)
+            .filter(|(depth, _)| depth.is_finite());
+        covered.fold((0.0, 0.0), |(front, back), (_, is_front)| {
+            if *is_front {
+                (front + 1.0, back)
+            } else {
+                (front, back + 1.0)
+            }
+        })
+    }
+
+    /// Whether nothing of the surface lies before a placed point. At silhouettes the farthest of the cells around
+    /// counts, so that lines on the surface run to its very edge.
+    pub(super) fn shows(&self, placed: Vector) -> bool {
+        let [x, y, depth] = self.cell(placed);
+        let around = |value: f64, size: usize| {
+            let middle = value.round().clamp(0.0, (size - 1) as f64) as usize;
+            middle.saturating_sub(1)..(middle + 2).min(size)
+        };
+        let columns = around(x, self.size[0]);
+        around(y, self.size[1]).any(|row| {
+            columns.clone().any(|column| {
+                let foremost = f64::from(self.foremost[row * self.size[0] + column]);
+                foremost <= depth + DEPTH_SLACK
+            })
+        })
+    }
+}

@@ -1,0 +1,136 @@
+//! Follows a stream of samples: counts, measures against the oracle, writes the trace.
+
+use interp_core::{Sample, sample::Place};
+
+use crate::oracle::{Emitted, Oracle, Report, Verifier};
+use crate::prepare::Prepared;
+use crate::trace::Trace;
+
+/// What a run came to.
+#[derive(Clone, Debug)]
+pub struct Findings {
+    /// Samples, which is also the periods that the run took.
+    pub samples: u64,
+    /// Passes.
+    pub passes: u32,
+    /// Length of the tool centre's path within the passes, mm.
+    pub cl_length_mm: f64,
+    /// Least candidate of the path interval, in units of the side parameter; infinite where there was none.
+    pub interval_min: f64,
+    /// What the oracle found.
+    pub report: Report,
+}
+
+/// A sample that waits for the next one, which tells whether it is the last of its pass.
+#[derive(Clone, Copy)]
+struct Pending {
+    sample: Sample,
+    first: bool,
+}
+
+/// The follower of one run.
+pub struct Survey<'a> {
+    prepared: &'a Prepared,
+    verifier: Verifier,
+    trace: Option<Trace>,
+    each: Option<&'a mut dyn FnMut(&Emitted)>,
+    pending: Option<Pending>,
+    samples: u64,
+    cl_length_nm: f64,
+    interval_min: f64,
+}
+
+impl<'a> Survey<'a> {
+    /// A follower of a run of this job; it writes the trace, if there is one, and hands every sample on to `each`.
+    #[must_use]
+    pub fn new(
+        prepared: &'a Prepared,
+        oracle: &Oracle,
+        trace: Option<Trace>,
+        each: Option<&'a mut dyn FnMut(&Emitted)>,
+    ) -> Self {
+        Self {
+            prepared,
+            verifier: Verifier::new(oracle),
+            trace,
+            each,
+            pending: None,
+            samples: 0,
+            cl_length_nm: 0.0,
+            interval_min: f64::INFINITY,
+        }
+    }
+
+    /// The next sample of the run.
+    ///
+    /// # Errors
+    /// The trace cannot be written.
+    pub fn add(&mut self, sample: &Sample) -> std::io::Result<()> {
+        let first = match self.pending {
+            Some(before) => {
+                let over = before.sample.pass != sample.pass;
+                self.emit(before, over);
+                if !over {
+                    let square =
+                        |k: usize| (f64::from(sample.cl_nm[k]) - f64::from(before.sample.cl_nm[k])).powi(2);
+                    self.cl_length_nm += (square(0) + square(1) + square(2)).sqrt();
+                }
+                over
+            }
+            None => true,
+        };
+        self.samples += 1;
+        self.interval_min = self.interval_min.min(sample.interval.into());
+        if let Some(trace) = &mut self.trace {
+            trace.write(sample, self.prepared.parameters(sample.path, sample.side))?;
+        }
+        self.pending = Some(Pending {
+            sample: *sample,
+            first,
+        });
+        Ok(())
+    }
+
+    fn emit(&mut self, Pending { sample, first }: Pending, last: bool) {
+        let [u, v] = self.prepared.parameters(sample.path, sample.side);
+        let emitted = Emitted {
+            tick: sample.tick.into(),
+            pass: sample.pass,
+            u,
+            v,
+            cc_nm: sample.cc_nm,
+            cl_nm: sample.cl_nm,
+            feed_mm_s: sample.feed_mm_s.into(),
+            interval: sample.interval.into(),
+            first_of_pass: first,
+            last_of_pass: last,
+        };
+        self.verifier.add(&emitted);
+        if let Some(each) = &mut self.each {
+            each(&emitted);
+        }
+    }
+
+    /// The findings, after the run's last sample.
+    ///
+    /// # Errors
+    /// The trace cannot be written.
+    pub fn finish(mut self) -> std::io::Result<Findings> {
+        if let Some(pending) = self.pending {
+            let Place { fraction, .. } = pending.sample.path;
+            let ended = fraction == 0 || fraction == u64::MAX;
+            self.emit(pending, ended);
+        }
+        if let Some(trace) = self.trace {
+            trace.finish()?;
+        }
+        let report = self.verifier.finish();
+        Ok(Findings {
+            samples: self.samples,
+            passes: self.pending.map_or(0, |pending| pending.sample.pass + 1),
+            cl_length_mm: self.cl_length_nm * 1e-6,
+            interval_min: self.interval_min,
+            report,
+        })
+    }
+}

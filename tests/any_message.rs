@@ -1,0 +1,159 @@
+//! Messages of any content, for properties.
+
+use interp_core::{
+    job::{Header, Pattern, SurfaceKind, ToolSide},
+    sample::{Place, Sample, State},
+};
+use proptest::prelude::*;
+use protocol::message::{
+    CHUNK_WORDS_MAX, Capabilities, Clock, Description, FaultReport, PassDigest, Reason, Reply, Report,
+    Request, SAMPLES_MAX, SampleRecord, Status, Words,
+};
+
+use super::{reasons, requests};
+
+fn place() -> impl Strategy<Value = Place> {
+    let fraction = prop_oneof![Just(0), Just(u64::MAX), any::<u64>()];
+    (any::<u16>(), fraction).prop_map(|(span, fraction)| Place { span, fraction })
+}
+
+fn real() -> impl Strategy<Value = f32> {
+    any::<f32>().prop_filter("equal to itself", |value| !value.is_nan())
+}
+
+prop_compose! {
+    fn any_header()(codes in (0_u8..4, any::<bool>(), any::<bool>()), spans in any::<[u16; 2]>(),
+                    values in [real(), real(), real(), real()]) -> Header {
+        Header {
+            kind: SurfaceKind::from_code(codes.0).unwrap(),
+            pattern: if codes.1 { Pattern::Zigzag } else { Pattern::Zig },
+            tool_side: if codes.2 { ToolSide::Minus } else { ToolSide::Plus },
+            path_spans: spans[0],
+            side_spans: spans[1],
+            ball_radius_mm: values[0],
+            feed_mm_s: values[1],
+            scallop_mm: values[2],
+            period_s: values[3],
+        }
+    }
+}
+
+fn any_clock() -> impl Strategy<Value = Clock> {
+    prop_oneof![Just(Clock::Free), Just(Clock::Lockstep)]
+}
+
+fn any_report() -> impl Strategy<Value = Report> {
+    prop_oneof![Just(Report::Digests), Just(Report::Samples)]
+}
+
+pub(crate) fn any_request() -> impl Strategy<Value = Request> {
+    let words = prop::collection::vec(any::<i32>(), 0..=CHUNK_WORDS_MAX);
+    prop_oneof![
+        any::<(u16, u32)>().prop_map(|(version, session)| Request::Hello { version, session }),
+        (any_header(), any::<u32>(), any::<u64>()).prop_map(|(header, words, digest)| Request::JobBegin {
+            header,
+            words,
+            digest
+        }),
+        (any::<u32>(), words).prop_map(|(offset, words)| Request::JobChunk {
+            offset,
+            words: Words::new(&words).unwrap()
+        }),
+        prop::sample::select(requests()),
+        any_clock().prop_map(Request::Clock),
+        any::<u32>().prop_map(|ticks| Request::Run { ticks }),
+        any_report().prop_map(Request::Report),
+    ]
+}
+
+prop_compose! {
+    fn any_sample()(state in prop::sample::select(&State::ALL[..]), places in [place(), place()],
+                    counts in any::<[u32; 2]>(), cc_nm in any::<[i32; 3]>(), cl_nm in any::<[i32; 3]>(),
+                    feed_mm_s in real(), interval in real()) -> Sample {
+        let ([tick, pass], [path, side]) = (counts, places);
+        Sample { tick, state, pass, path, side, feed_mm_s, cc_nm, cl_nm, interval }
+    }
+}
+
+prop_compose! {
+    fn any_status()(at in any_sample(), fault in prop::option::of((any::<u8>(), real())), clock in any_clock(),
+                    report in any_report(), counts in any::<[u32; 6]>(), digest in any::<u64>()) -> Status {
+        let [credit, samples, deadline_misses, tick_cycles_max, samples_lost, frames_bad] = counts;
+        Status {
+            state: at.state,
+            fault: fault.map(|(code, value)| FaultReport { code, value }),
+            clock,
+            credit,
+            report,
+            tick: at.tick,
+            pass: at.pass,
+            path: at.path,
+            side: at.side,
+            samples,
+            digest,
+            interval: at.interval,
+            deadline_misses,
+            tick_cycles_max,
+            samples_lost,
+            frames_bad,
+        }
+    }
+}
+
+prop_compose! {
+    fn any_capabilities()(name in "[ -~]{0,24}", numbers in any::<[u16; 6]>(), counts in any::<[u32; 5]>())
+        -> Capabilities {
+        let [number, version, major, minor, patch, chunk_words_max] = numbers;
+        let [session, store_words, patches_max_polynomial, patches_max_rational, period_us] = counts;
+        let description = Description {
+            firmware: [major, minor, patch],
+            board: name.as_str().try_into().unwrap(),
+            store_words,
+            patches_max_polynomial,
+            patches_max_rational,
+            chunk_words_max,
+            period_us,
+        };
+        Capabilities { number, version, session, description }
+    }
+}
+
+fn any_reason() -> impl Strategy<Value = Reason> {
+    prop_oneof![
+        prop::sample::select(reasons()),
+        any::<(u16, u16)>().prop_map(|(host, board)| Reason::Version { host, board }),
+        any::<u16>().prop_map(|expected| Reason::OutOfOrder { expected }),
+        prop::sample::select(&State::ALL[..]).prop_map(|state| Reason::WrongState { state }),
+        (any::<u8>(), real(), any::<Option<u32>>()).prop_map(|(code, value, record)| Reason::Job {
+            fault: FaultReport { code, value },
+            record
+        }),
+        any::<(u32, u32)>().prop_map(|(limit, wanted)| Reason::TooLong { limit, wanted }),
+        any::<(u32, u32)>().prop_map(|(wanted, received)| Reason::Incomplete { wanted, received }),
+        any::<(u64, u64)>().prop_map(|(wanted, received)| Reason::WrongDigest { wanted, received }),
+        any::<u32>().prop_map(|expected| Reason::WrongOffset { expected }),
+    ]
+}
+
+pub(crate) fn any_reply() -> impl Strategy<Value = Reply> {
+    let samples = prop::collection::vec(any_sample().prop_map(SampleRecord), 0..=SAMPLES_MAX);
+    prop_oneof![
+        any_capabilities().prop_map(Reply::Capabilities),
+        any::<u16>().prop_map(|number| Reply::Ack { number }),
+        (any::<u16>(), any_reason()).prop_map(|(number, reason)| Reply::Nak { number, reason }),
+        (any::<u16>(), any_status()).prop_map(|(number, status)| Reply::Status { number, status }),
+        samples.prop_map(|samples| Reply::Samples(samples.into_iter().collect())),
+        (any::<[u32; 3]>(), any::<u64>(), real()).prop_map(
+            |([pass, first_tick, samples], digest, interval)| {
+                Reply::PassDigest(PassDigest {
+                    pass,
+                    first_tick,
+                    samples,
+                    digest,
+                    interval,
+                })
+            }
+        ),
+        any_status().prop_map(Reply::Halted),
+    ]
+}

@@ -1,0 +1,458 @@
+//! A whole board in this process, with a real job: what comes over the line is what the interpolator did, and nothing
+//! that the line does can make it otherwise.
+#![allow(clippy::unwrap_used, reason = "a test may fail by panic")]
+
+use controller::{
+    in_process::Board,
+    machine::Command,
+    realtime::{RealTime, TickInput},
+};
+use integration_tests::{HELLO, Host, dome, upload};
+use interp_core::{
+    fault::FaultKind,
+    interpolator::{self, Interpolator},
+    sample::{Sample, State},
+};
+use proptest::prelude::*;
+use protocol::{
+    digest::Digest,
+    message::{Clock, PassDigest, Reason, Reply, Report, Request, Status},
+};
+
+const WORDS: usize = 64;
+
+/// The samples of the dome, by the core alone.
+fn reference() -> Vec<Sample> {
+    let (header, words) = dome();
+    let mut core = Interpolator::<WORDS>::new();
+    core.load_begin(&header, u32::try_from(words.len()).unwrap())
+        .unwrap();
+    core.load_words(0, &words).unwrap();
+    core.load_check(0).unwrap();
+    core.load_finish().unwrap();
+    let mut samples = vec![core.tick(interpolator::Request::Start)];
+    while core.state() == State::Running {
+        samples.push(core.tick(interpolator::Request::None));
+    }
+    assert_eq!(core.state(), State::Finished);
+    samples.pop();
+    assert!((500..2000).contains(&samples.len()), "{} samples", samples.len());
+    samples
+}
+
+fn digest(samples: &[Sample]) -> u64 {
+    let mut digest = Digest::new();
+    samples.iter().for_each(|sample| digest.sample(sample));
+    digest.value()
+}
+
+/// Host and board, and what the board has told by itself.
+#[derive(Default)]
+struct Desk {
+    host: Host,
+    board: Board<WORDS>,
+    samples: Vec<Sample>,
+    passes: Vec<PassDigest>,
+    halts: Vec<Status>,
+}
+
+impl Desk {
+    /// A board in session with the dome loaded, on this clock, reporting this.
+    fn loaded(clock: Clock, report: Report) -> Self {
+        let mut desk = Self::default();
+        assert!(matches!(desk.ask(&HELLO), Reply::Capabilities(_)));
+        let (header, words) = dome();
+        for request in upload(header, &words) {
+            desk.accepted(&request);
+        }
+        desk.accepted(&Request::Clock(clock));
+        desk.accepted(&Request::Report(report));
+        desk.ticks(3);
+        desk
+    }
+
+    /// Sorts what the board sent; the answers are left over.
+    fn collect(&mut self) -> Vec<Reply> {
+        let sent = self.board.take_sent();
+        let mut answers = Vec::new();
+        for reply in self.host.read(&sent) {
+            match reply {
+                Reply::Samples(batch) => self.samples.extend(batch.iter().map(|record| record.0)),
+                Reply::PassDigest(pass) => self.passes.push(pass),
+                Reply::Halted(status) => self.halts.push(status),
+                answer => answers.push(answer),
+            }
+        }
+        answers
+    }
+
+    fn ask(&mut self, request: &Request) -> Reply {
+        let frame = self.host.next(request);
+        self.board.receive(&frame);
+        let mut answers = self.collect();
+        assert_eq!(answers.len(), 1, "{request:?}");
+        answers.remove(0)
+    }
+
+    fn accepted(&mut self, request: &Request) {
+        assert_eq!(
+            self.ask(request),
+            Reply::Ack {
+                number: self.host.number
+            },
+            "{request:?}"
+        );
+    }
+
+    fn ticks(&mut self, ticks: usize) {
+        for _ in 0..ticks {
+            self.board.tick();
+        }
+        assert_eq!(self.collect(), []);
+    }
+
+    /// Runs until the board says that it has halted.
+    fn run(&mut self, ticks: u32) -> Status {
+        self.accepted(&Request::Run { ticks });
+        let before = self.halts.len();
+        while self.halts.len() == before {
+            self.ticks(1);
+        }
+        *self.halts.last().unwrap()
+    }
+}
+
+/// The passes that these samples make.
+fn check_passes(passes: &[PassDigest], samples: &[Sample]) {
+    let mut rest = samples;
+    for (pass, number) in passes.iter().zip(0..) {
+        let (own, others) = rest.split_at(usize::try_from(pass.samples).unwrap());
+        assert!(own.iter().all(|sample| sample.pass == number), "pass {number}");
+        assert_eq!((pass.pass, pass.first_tick), (number, own[0].tick));
+        let so_far = samples.len() - others.len();
+        assert_eq!(pass.digest, digest(&samples[..so_far]), "pass {number}");
+        rest = others;
+    }
+    assert!(rest.is_empty());
+}
+
+#[test]
+fn every_sample_comes_over_the_line_as_the_core_made_it() {
+    let mut desk = Desk::loaded(Clock::Lockstep, Report::Samples);
+    desk.accepted(&Request::Start);
+    let status = desk.run(1_000_000);
+    let samples = reference();
+    assert_eq!(desk.samples, samples);
+    check_passes(&desk.passes, &samples);
+    assert_eq!((status.state, status.credit), (State::Finished, 0));
+    assert_eq!(
+        (status.digest, status.samples),
+        (digest(&samples), u32::try_from(samples.len()).unwrap())
+    );
+    assert_eq!(
+        Reply::Status {
+            number: desk.host.number + 1,
+            status
+        },
+        desk.ask(&Request::Status)
+    );
+}
+
+#[test]
+fn a_free_clock_gives_the_same_digest_as_lockstep_in_small_steps() {
+    let samples = reference();
+    let mut desk = Desk::loaded(Clock::Free, Report::Digests);
+    desk.accepted(&Request::Start);
+    desk.ticks(samples.len() + 10);
+    assert_eq!(desk.halts.len(), 1);
+    assert!(desk.samples.is_empty());
+    check_passes(&desk.passes, &samples);
+    let free = desk.halts[0];
+
+    let mut desk = Desk::loaded(Clock::Lockstep, Report::Digests);
+    desk.accepted(&Request::Start);
+    while desk.run(7).state != State::Finished {}
+    let lockstep = *desk.halts.last().unwrap();
+    assert_eq!(
+        free,
+        Status {
+            clock: Clock::Free,
+            ..lockstep
+        }
+    );
+    assert_eq!(free.digest, digest(&samples));
+}
+
+#[test]
+fn a_second_run_is_like_the_first() {
+    let mut desk = Desk::loaded(Clock::Lockstep, Report::Digests);
+    desk.accepted(&Request::Start);
+    let first = desk.run(1_000_000);
+    desk.accepted(&Request::Start);
+    assert_eq!(desk.run(1_000_000), first);
+}
+
+#[test]
+fn time_stands_still_in_lockstep_without_credit() {
+    let mut desk = Desk::loaded(Clock::Lockstep, Report::Samples);
+    desk.accepted(&Request::Start);
+    desk.ticks(100);
+    assert!(desk.samples.is_empty() && desk.halts.is_empty());
+    let status = desk.run(25);
+    assert_eq!(
+        (status.state, status.tick, status.samples),
+        (State::Running, 24, 25)
+    );
+    desk.ticks(100);
+    assert_eq!(desk.samples, reference()[..25]);
+    // no time at all is used up at once
+    assert_eq!(desk.run(0), status);
+}
+
+#[test]
+fn hold_and_resume_lose_no_sample() {
+    let mut desk = Desk::loaded(Clock::Lockstep, Report::Samples);
+    desk.accepted(&Request::Start);
+    desk.run(100);
+    desk.accepted(&Request::Hold);
+    assert_eq!(desk.run(50).state, State::Held);
+    assert_eq!(
+        desk.ask(&Request::Start),
+        Reply::Nak {
+            number: desk.host.number,
+            reason: Reason::WrongState { state: State::Held }
+        }
+    );
+    desk.accepted(&Request::Resume);
+    let status = desk.run(1_000_000);
+    assert_eq!(status.digest, digest(&reference()));
+    assert_eq!(desk.samples, reference());
+}
+
+#[test]
+fn an_abort_ends_the_run_and_keeps_the_job() {
+    let mut desk = Desk::loaded(Clock::Lockstep, Report::Samples);
+    desk.accepted(&Request::Start);
+    desk.run(100);
+    desk.accepted(&Request::Abort);
+    // what comes behind an abort does not undo it
+    desk.accepted(&Request::Hold);
+    let status = desk.run(100);
+    assert_eq!(
+        (status.state, status.samples, status.credit),
+        (State::Ready, 100, 0)
+    );
+    check_passes(&desk.passes, &desk.samples);
+    desk.accepted(&Request::Start);
+    assert_eq!(desk.run(1_000_000).digest, digest(&reference()));
+}
+
+#[test]
+fn a_job_in_the_middle_of_a_run_changes_nothing() {
+    let mut desk = Desk::loaded(Clock::Lockstep, Report::Samples);
+    desk.accepted(&Request::Start);
+    let before = desk.run(100);
+    let (header, words) = dome();
+    for request in upload(header, &words) {
+        assert!(matches!(desk.ask(&request), Reply::Nak { .. }));
+    }
+    assert_eq!(desk.board.status(), before);
+    assert_eq!(desk.run(1_000_000).digest, digest(&reference()));
+}
+
+#[test]
+fn a_job_begun_withdraws_a_start_that_waits() {
+    let mut desk = Desk::loaded(Clock::Lockstep, Report::Samples);
+    desk.accepted(&Request::Start);
+    let (header, words) = dome();
+    let requests = upload(header, &words);
+    // still in the queue: it would meet the other job
+    assert_eq!(
+        desk.ask(&requests[0]),
+        Reply::Nak {
+            number: desk.host.number,
+            reason: Reason::Busy
+        }
+    );
+    // taken, but time stands still
+    desk.ticks(1);
+    for request in &requests {
+        desk.accepted(request);
+    }
+    assert_eq!(desk.run(10).state, State::Ready);
+}
+
+#[test]
+fn a_missed_tick_trips_a_free_run_and_is_only_counted_in_lockstep() {
+    let mut desk = Desk::loaded(Clock::Free, Report::Digests);
+    desk.board.tick_with(3, 0);
+    desk.accepted(&Request::Start);
+    desk.ticks(50);
+    desk.board.tick_with(2, 4321);
+    desk.collect();
+    let status = desk.halts[0];
+    assert_eq!((status.state, status.samples), (State::Faulted, 50));
+    assert_eq!((status.deadline_misses, status.tick_cycles_max), (2, 4321));
+    let fault = status.fault.unwrap();
+    assert_eq!(
+        (fault.kind(), fault.value),
+        (Some(FaultKind::DeadlineMissed), 2.0)
+    );
+    check_passes(&desk.passes, &reference()[..50]);
+
+    let mut desk = Desk::loaded(Clock::Lockstep, Report::Digests);
+    desk.accepted(&Request::Start);
+    desk.run(50);
+    desk.board.tick_with(2, 0);
+    let status = desk.run(1_000_000);
+    assert_eq!((status.state, status.deadline_misses), (State::Finished, 2));
+    assert_eq!(status.digest, digest(&reference()));
+}
+
+#[test]
+fn a_full_output_stops_time_in_lockstep_only() {
+    let (header, words) = dome();
+    let mut half = RealTime::<WORDS>::new();
+    half.load_begin(&header, 54).unwrap();
+    half.load_words(0, &words).unwrap();
+    half.load_check(0).unwrap();
+    half.load_finish().unwrap();
+    let tell = |command| TickInput {
+        command: Some(command),
+        ..TickInput::default()
+    };
+    half.tick(tell(Command::Report(Report::Samples)));
+    half.tick(tell(Command::Clock(Clock::Lockstep)));
+    half.tick(tell(Command::Request(interpolator::Request::Start)));
+    let full = TickInput {
+        output_full: true,
+        ..TickInput::default()
+    };
+    let output = half.tick(TickInput {
+        output_full: true,
+        ..tell(Command::Run { ticks: 10 })
+    });
+    assert_eq!(output.events().count(), 0);
+    assert_eq!(half.tick(full).events().count(), 0);
+    assert_eq!(half.status().credit, 10);
+    assert_eq!(half.tick(TickInput::default()).sample, Some(reference()[0]));
+    assert_eq!(half.tick(full).events().count(), 0);
+    assert_eq!(half.tick(TickInput::default()).sample, Some(reference()[1]));
+}
+
+/// What a host, or a line gone mad, may do next.
+#[derive(Clone, Debug)]
+enum Deed {
+    Noise(Vec<u8>),
+    Upload,
+    Ask(Request),
+    /// A number that is most likely wrong.
+    Stray(u16, Request),
+    Damage(Request, usize),
+    Ticks(u8),
+    /// Ticks of the sample timer missed.
+    Miss(u8),
+}
+
+fn any_deed() -> impl Strategy<Value = Deed> {
+    let (header, words) = dome();
+    let mut requests = upload(header, &words);
+    requests.extend([
+        Request::Start,
+        Request::Start,
+        Request::Hold,
+        Request::Resume,
+        Request::Abort,
+    ]);
+    requests.extend([
+        Request::Status,
+        Request::Clock(Clock::Free),
+        Request::Clock(Clock::Lockstep),
+        HELLO,
+    ]);
+    requests.extend([Request::Report(Report::Samples), Request::Report(Report::Digests)]);
+    requests.extend([Request::Run { ticks: 40 }, Request::Run { ticks: 0 }]);
+    let request = prop::sample::select(requests);
+    prop_oneof![
+        2 => prop::collection::vec(any::<u8>(), 0..400).prop_map(Deed::Noise),
+        2 => Just(Deed::Upload),
+        12 => request.clone().prop_map(Deed::Ask),
+        2 => (any::<u16>(), request.clone()).prop_map(|(number, request)| Deed::Stray(number, request)),
+        2 => (request, any::<usize>()).prop_map(|(request, bit)| Deed::Damage(request, bit)),
+        6 => any::<u8>().prop_map(Deed::Ticks),
+        1 => any::<u8>().prop_map(Deed::Miss),
+    ]
+}
+
+/// Gives bytes to the board that are no next request; the status must not notice, but for what the link counts.
+fn give_without_effect(desk: &mut Desk, bytes: &[u8]) {
+    let before = desk.board.status();
+    desk.board.receive(&[0]);
+    desk.board.receive(bytes);
+    desk.board.receive(&[0]);
+    for answer in desk.collect() {
+        assert!(matches!(answer, Reply::Nak { .. }), "{answer:?}");
+    }
+    assert_eq!(desk.board.status(), before);
+}
+
+fn act(desk: &mut Desk, deed: Deed) {
+    match deed {
+        Deed::Noise(bytes) => give_without_effect(desk, &bytes),
+        Deed::Upload => {
+            let (header, words) = dome();
+            for request in upload(header, &words) {
+                desk.ask(&request);
+            }
+        }
+        Deed::Ask(HELLO) => {
+            let before = desk.board.status();
+            desk.board.receive(&integration_tests::frame(1, &HELLO));
+            assert!(matches!(desk.collect()[..], [Reply::Capabilities(_)]));
+            assert_eq!(desk.board.status(), before);
+        }
+        Deed::Ask(request) => {
+            desk.ask(&request);
+        }
+        Deed::Stray(number, request) => {
+            // Neither the last number nor the next.
+            let number = desk.host.number.wrapping_add(2 + number % 60_000);
+            if !matches!(request, Request::Hello { .. }) {
+                give_without_effect(desk, &integration_tests::frame(number, &request));
+            }
+        }
+        Deed::Damage(request, bit) => {
+            let mut frame = integration_tests::frame(desk.host.number.wrapping_add(1), &request);
+            let bit = bit % (8 * (frame.len() - 1));
+            frame[bit / 8] ^= 1 << (bit % 8);
+            give_without_effect(desk, &frame);
+        }
+        Deed::Ticks(ticks) => desk.ticks(usize::from(ticks)),
+        Deed::Miss(missed) => {
+            desk.board.tick_with(u32::from(missed), 0);
+            assert_eq!(desk.collect(), []);
+        }
+    }
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(300))]
+
+    /// Whatever happens: no panic, one answer a request, damage without effect, and never a sample that the core
+    /// would not have made.
+    #[test]
+    fn any_order_of_anything_is_survived(deeds in prop::collection::vec(any_deed(), 0..60)) {
+        let samples = reference();
+        let mut desk = Desk::loaded(Clock::Lockstep, Report::Samples);
+        for deed in deeds {
+            act(&mut desk, deed);
+            let status = desk.board.status();
+            let count = usize::try_from(status.samples).unwrap();
+            prop_assert!(count <= samples.len());
+            prop_assert_eq!(status.digest, digest(&samples[..count]));
+        }
+        for sample in &desk.samples {
+            prop_assert_eq!(*sample, samples[usize::try_from(sample.tick).unwrap()]);
+        }
+    }
+}

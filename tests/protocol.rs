@@ -1,0 +1,395 @@
+//! The messages and their frames: every message there and back, the bytes that never change unnoticed, and a line that
+//! damages what it carries.
+#![allow(clippy::unwrap_used, reason = "a test may fail by panic")]
+
+mod any_message;
+
+use std::fmt::Write as _;
+
+use any_message::{any_reply, any_request};
+
+use controller::link::Link;
+use integration_tests::{HELLO, Mock, frame, is_bad_frame};
+use interp_core::{
+    job::{Header, Pattern, SurfaceKind, ToolSide},
+    sample::{Place, Sample, State},
+};
+use proptest::prelude::*;
+use protocol::{
+    frame::{Decoder, FRAME_MAX, FrameError, write_reply},
+    message::{
+        Batch, Capabilities, Clock, Description, FaultReport, PassDigest, Reason, Reply, Report, Request,
+        SampleRecord, Status, Words, read_reply, read_request,
+    },
+};
+
+fn header() -> Header {
+    Header {
+        kind: SurfaceKind::Rational,
+        pattern: Pattern::Zigzag,
+        tool_side: ToolSide::Minus,
+        path_spans: 3,
+        side_spans: 200,
+        ball_radius_mm: 10.0,
+        feed_mm_s: 10.0,
+        scallop_mm: 0.005,
+        period_s: 0.001,
+    }
+}
+
+/// One of each, in order of the codes.
+fn requests() -> Vec<Request> {
+    vec![
+        HELLO,
+        Request::JobBegin {
+            header: header(),
+            words: 300,
+            digest: 0x0123_4567_89ab_cdef,
+        },
+        Request::JobChunk {
+            offset: 128,
+            words: Words::new(&[0, 1, -1, i32::MAX, i32::MIN]).unwrap(),
+        },
+        Request::JobEnd,
+        Request::Start,
+        Request::Hold,
+        Request::Resume,
+        Request::Abort,
+        Request::Status,
+        Request::Clock(Clock::Lockstep),
+        Request::Run { ticks: 1000 },
+        Request::Report(Report::Samples),
+    ]
+}
+
+fn sample() -> Sample {
+    Sample {
+        tick: 1000,
+        state: State::Running,
+        pass: 2,
+        path: Place {
+            span: 1,
+            fraction: 1 << 63,
+        },
+        side: Place {
+            span: 130,
+            fraction: u64::MAX,
+        },
+        feed_mm_s: 10.0,
+        cc_nm: [1, -2, 3_000_000],
+        cl_nm: [i32::MAX, i32::MIN, 0],
+        interval: f32::INFINITY,
+    }
+}
+
+fn status() -> Status {
+    Status {
+        state: State::Faulted,
+        fault: Some(FaultReport { code: 12, value: 1.0 }),
+        clock: Clock::Lockstep,
+        credit: 5,
+        report: Report::Samples,
+        tick: 1000,
+        pass: 2,
+        path: Place {
+            span: 1,
+            fraction: 1 << 63,
+        },
+        side: Place {
+            span: 130,
+            fraction: u64::MAX,
+        },
+        samples: 1001,
+        digest: 0x0123_4567_89ab_cdef,
+        interval: 0.25,
+        deadline_misses: 1,
+        tick_cycles_max: 20_000,
+        samples_lost: 2,
+        frames_bad: 3,
+    }
+}
+
+fn reasons() -> Vec<Reason> {
+    vec![
+        Reason::BadFrame {
+            error: FrameError::Checksum,
+        },
+        Reason::Unreadable,
+        Reason::SayHello,
+        Reason::Version { host: 2, board: 1 },
+        Reason::OutOfOrder { expected: 300 },
+        Reason::WrongState {
+            state: State::Running,
+        },
+        Reason::WrongClock { clock: Clock::Free },
+        Reason::Busy,
+        Reason::Job {
+            fault: FaultReport { code: 9, value: 1.5 },
+            record: Some(7),
+        },
+        Reason::TooLong {
+            limit: 16_384,
+            wanted: 20_000,
+        },
+        Reason::NoUpload,
+        Reason::WrongOffset { expected: 64 },
+        Reason::Incomplete {
+            wanted: 300,
+            received: 128,
+        },
+        Reason::WrongDigest {
+            wanted: 1,
+            received: 2,
+        },
+    ]
+}
+
+/// One of each, in order of the codes; `Nak` with every reason.
+fn replies() -> Vec<Reply> {
+    let description = Description {
+        firmware: [0, 1, 0],
+        board: "netduinoplus2".try_into().unwrap(),
+        store_words: 16_384,
+        patches_max_polynomial: 315,
+        patches_max_rational: 240,
+        chunk_words_max: 64,
+        period_us: 1000,
+    };
+    let mut replies = vec![
+        Reply::Capabilities(Capabilities {
+            number: 1,
+            version: 1,
+            session: 1,
+            description,
+        }),
+        Reply::Ack { number: 300 },
+    ];
+    replies.extend(
+        reasons()
+            .into_iter()
+            .map(|reason| Reply::Nak { number: 2, reason }),
+    );
+    let pass = PassDigest {
+        pass: 2,
+        first_tick: 900,
+        samples: 101,
+        digest: 0x0123_4567_89ab_cdef,
+        interval: 0.25,
+    };
+    replies.extend([
+        Reply::Status {
+            number: 3,
+            status: status(),
+        },
+        Reply::Samples(Batch::from_slice(&[SampleRecord(sample()); 2]).unwrap()),
+        Reply::PassDigest(pass),
+        Reply::Halted(status()),
+    ]);
+    replies
+}
+
+fn reply_frame(reply: &Reply) -> Vec<u8> {
+    write_reply(reply, &mut [0; FRAME_MAX]).unwrap().to_vec()
+}
+
+/// The payload of the one frame in these bytes.
+fn payload(bytes: &[u8]) -> Vec<u8> {
+    let mut decoder = Decoder::new();
+    let mut found = Vec::new();
+    for byte in bytes {
+        if let Some(frame) = decoder.push(*byte) {
+            found.push(frame.unwrap().payload.to_vec());
+        }
+    }
+    assert_eq!(found.len(), 1);
+    found.remove(0)
+}
+
+#[test]
+fn the_bytes_are_those_in_the_golden_file() {
+    let mut text = String::from(
+        "One example of each message: what it is, its payload, its frame (hexadecimal). BLESS=1 writes this file anew;\n\
+         a change of it is a change of the protocol's version.\n",
+    );
+    let mut add = |name: String, frame: Vec<u8>| {
+        let hex = |bytes: &[u8]| {
+            bytes
+                .iter()
+                .map(|byte| format!(" {byte:02x}"))
+                .collect::<String>()
+        };
+        writeln!(
+            text,
+            "\n{name}\n payload{}\n frame  {}",
+            hex(&payload(&frame)),
+            hex(&frame)
+        )
+        .unwrap();
+    };
+    for (number, request) in (1..).zip(requests()) {
+        add(
+            format!("host, number {number}: {request:?}"),
+            frame(number, &request),
+        );
+    }
+    for reply in replies() {
+        add(format!("board: {reply:?}"), reply_frame(&reply));
+    }
+    let path = concat!(env!("CARGO_MANIFEST_DIR"), "/golden/protocol.txt");
+    if std::env::var_os("BLESS").is_some_and(|value| value == "1") {
+        std::fs::write(path, &text).unwrap();
+    }
+    let golden = std::fs::read_to_string(path).unwrap();
+    assert!(
+        golden == text,
+        "the protocol's bytes differ from {path}; see `BLESS=1` there. Now:\n{text}"
+    );
+}
+
+#[test]
+fn the_examples_go_there_and_back() {
+    for (number, request) in (1..).zip(requests()) {
+        assert_eq!(
+            read_request(&payload(&frame(number, &request))),
+            Ok((number, request))
+        );
+    }
+    for reply in replies() {
+        assert_eq!(read_reply(&payload(&reply_frame(&reply))), Ok(reply));
+    }
+}
+
+#[test]
+fn every_reason_is_a_sentence_with_its_values() {
+    let texts: Vec<_> = reasons().iter().map(ToString::to_string).collect();
+    assert_eq!(
+        texts[3],
+        "the host speaks protocol version 2, the board version 1"
+    );
+    assert_eq!(
+        texts[8],
+        "the board refuses the job: bad-patch (code 9), value 1.5, record 7"
+    );
+    assert_eq!(texts[12], "128 of 300 words arrived");
+}
+
+/// A link in session, waiting for request 2, and the machine behind it.
+fn open_link() -> (Link, Mock) {
+    let (mut link, mut mock) = (Link::new(), Mock::default());
+    give(&mut link, &mut mock, &frame(1, &HELLO));
+    (link, mock)
+}
+
+fn give(link: &mut Link, mock: &mut Mock, bytes: &[u8]) -> Vec<Reply> {
+    let mut sent = Vec::new();
+    for byte in bytes {
+        link.receive(*byte, mock, &mut |bytes| sent.extend_from_slice(bytes));
+    }
+    integration_tests::Host::default().read(&sent)
+}
+
+/// Damage is answered, has no effect, and does not reach the request behind it.
+fn check_damage(damaged: &[u8], what: &str) {
+    let (mut link, mut mock) = open_link();
+    let replies = give(&mut link, &mut mock, damaged);
+    assert!(
+        !replies.is_empty() && replies.iter().all(is_bad_frame),
+        "{what}: {replies:?}"
+    );
+    assert_eq!(mock, Mock::default(), "{what}");
+    let [Reply::Status { number: 2, status }] = give(&mut link, &mut mock, &frame(2, &Request::Status))[..]
+    else {
+        panic!("{what}: no status");
+    };
+    let bad = u32::try_from(replies.len()).unwrap();
+    assert_eq!(
+        status,
+        Status {
+            frames_bad: bad,
+            ..Status::default()
+        },
+        "{what}"
+    );
+}
+
+#[test]
+fn a_truncated_frame_is_refused_and_changes_nothing() {
+    for request in requests() {
+        let whole = frame(2, &request);
+        for length in 1..whole.len() - 1 {
+            let mut part = whole[..length].to_vec();
+            part.push(0);
+            check_damage(&part, &format!("{length} bytes of {request:?}"));
+        }
+    }
+}
+
+#[test]
+fn a_flipped_bit_is_refused_and_changes_nothing() {
+    for request in requests() {
+        let whole = frame(2, &request);
+        for bit in 0..8 * whole.len() {
+            let mut flipped = whole.clone();
+            flipped[bit / 8] ^= 1 << (bit % 8);
+            flipped.push(0);
+            check_damage(&flipped, &format!("bit {bit} of {request:?}"));
+        }
+    }
+}
+
+#[test]
+fn too_long_a_frame_is_refused_once() {
+    for length in [FRAME_MAX, FRAME_MAX + 1, 2 * FRAME_MAX, 100_000] {
+        let mut long = vec![1; length];
+        long.push(0);
+        check_damage(&long, &format!("{length} bytes"));
+    }
+}
+
+#[test]
+fn noise_before_the_first_frame_does_not_touch_it() {
+    let (mut link, mut mock) = (Link::new(), Mock::default());
+    let replies = give(&mut link, &mut mock, &[0xff, 0x00, 0x13, 0x37, 0x00]);
+    assert!(replies.len() == 2 && replies.iter().all(is_bad_frame));
+    let replies = give(&mut link, &mut mock, &frame(1, &HELLO));
+    assert!(matches!(replies[..], [Reply::Capabilities(_)]));
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(1000))]
+
+    #[test]
+    fn every_request_goes_there_and_back(number: u16, request in any_request()) {
+        prop_assert_eq!(read_request(&payload(&frame(number, &request))), Ok((number, request)));
+    }
+
+    #[test]
+    fn every_reply_goes_there_and_back(reply in any_reply()) {
+        prop_assert_eq!(read_reply(&payload(&reply_frame(&reply))), Ok(reply));
+    }
+
+    #[test]
+    fn any_bytes_are_read_without_a_panic(bytes in prop::collection::vec(any::<u8>(), 0..400)) {
+        let _ = read_request(&bytes);
+        let _ = read_reply(&bytes);
+        let mut decoder = Decoder::new();
+        for byte in bytes {
+            if let Some(Ok(frame)) = decoder.push(byte) {
+                let _ = read_request(frame.payload);
+            }
+        }
+    }
+
+    /// What the frame's payload is, whole: an error, or bytes that mean something again.
+    #[test]
+    fn a_payload_with_any_bytes_is_a_message_or_none(bytes in prop::collection::vec(any::<u8>(), 0..60), code in 0_u8..16) {
+        let mut bytes = bytes;
+        bytes.splice(0..0, [2, code]);
+        if let Ok((number, request)) = read_request(&bytes) {
+            let again = payload(&frame(number, &request));
+            let (number_again, request_again) = read_request(&again).unwrap();
+            prop_assert_eq!(number, number_again);
+            prop_assert_eq!(format!("{request:?}"), format!("{request_again:?}"));
+        }
+    }
+}
