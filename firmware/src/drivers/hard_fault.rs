@@ -1,0 +1,18 @@
+//! Says what the processor stumbled over before the board stops for good.
+
+use cortex_m_rt::{ExceptionFrame, exception};
+
+use crate::board;
+
+// SAFETY: an exception handler has to be declared `unsafe`; this one only reads the frame that it is given
+// and never returns.
+#[allow(unsafe_code, reason = "the exception's declaration")]
+#[exception]
+unsafe fn HardFault(frame: &ExceptionFrame) -> ! {
+    defmt::error!(
+        "hard fault at {=u32:#010x}, called from {=u32:#010x}",
+        frame.pc(),
+        frame.lr()
+    );
+    board::stop_for_good()
+}

@@ -1,0 +1,75 @@
+//! The link's bytes: USART1, eight bits, no parity, one stop bit.
+//!
+//! Receiving is by interrupt, sending by polling: QEMU 7.2 raises no interrupt for an empty transmitter.
+//!
+//! The port holds one byte. At 921 600 baud the next is there after 11 us; a byte that arrives while a longer
+//! tick has the processor is lost, counted, and its frame repeated by the host. While a job is loaded ticks
+//! are short; while it runs the host has little to say. (The chip's way out is DMA, which QEMU has not.)
+
+use stm32f4xx_hal::pac;
+
+/// Sets the port up and parts it.
+pub(crate) fn open(usart: pac::USART1, divider: u16) -> (Transmitter, Receiver) {
+    usart.brr().write(|w| {
+        w.div_mantissa()
+            .set(divider >> 4)
+            .div_fraction()
+            .set((divider & 0xF) as u8)
+    });
+    usart
+        .cr1()
+        .write(|w| w.ue().set_bit().te().set_bit().re().set_bit().rxneie().set_bit());
+    // SAFETY: the one port becomes two halves that are never the whole again. The transmitter only reads SR
+    // and writes DR, the receiver only reads SR and reads DR, and a read of SR changes nothing by itself.
+    #[allow(unsafe_code, reason = "one port, two halves")]
+    let second = unsafe { pac::USART1::steal() };
+    (Transmitter { usart }, Receiver { usart: second })
+}
+
+/// The sending half.
+pub(crate) struct Transmitter {
+    usart: pac::USART1,
+}
+
+impl Transmitter {
+    /// Sends these bytes; waits until the last one is on its way, at most the line's time for as many and one
+    /// more.
+    pub(crate) fn write(&mut self, bytes: &[u8]) {
+        for &byte in bytes {
+            while self.usart.sr().read().txe().bit_is_clear() {}
+            self.usart.dr().write(|w| w.dr().set(u16::from(byte)));
+        }
+    }
+}
+
+/// What the port has to say when it asks for attention.
+#[derive(Clone, Copy, Debug, Default)]
+pub(crate) struct Received {
+    /// A byte, if there is one.
+    pub(crate) byte: Option<u8>,
+    /// A byte before it was lost or damaged: it came before the last one was taken, or its stop bit was
+    /// missing.
+    pub(crate) error: bool,
+}
+
+/// The receiving half.
+pub(crate) struct Receiver {
+    usart: pac::USART1,
+}
+
+impl Receiver {
+    /// Takes what has arrived. Reading the status and then the data takes the error flags back, too.
+    pub(crate) fn read(&mut self) -> Received {
+        let status = self.usart.sr().read();
+        let error = status.ore().bit_is_set() || status.fe().bit_is_set() || status.nf().bit_is_set();
+        let full = status.rxne().bit_is_set();
+        if !full && !error {
+            return Received::default();
+        }
+        let data = self.usart.dr().read().dr().bits();
+        Received {
+            byte: full.then_some((data & 0xFF) as u8),
+            error,
+        }
+    }
+}

@@ -1,0 +1,40 @@
+//! The status LED: off without a run, on while the tool moves, blinking after a fault. Any output pin that
+//! `embedded-hal` knows.
+
+use embedded_hal::digital::{OutputPin, PinState};
+use interp_core::sample::State;
+
+/// Half a blink, in periods, as a power of two: 256 ms at 1 ms.
+const BLINK_BIT: u32 = 8;
+
+/// An LED that shines when its pin is low.
+pub(crate) struct StatusLed<P> {
+    pin: P,
+    lit: bool,
+}
+
+impl<P: OutputPin> StatusLed<P> {
+    /// The LED on this pin, dark.
+    pub(crate) fn new(pin: P) -> Self {
+        let mut led = Self { pin, lit: true };
+        led.set(false);
+        led
+    }
+
+    /// Shows this state; `periods` is the time that a blink is made of.
+    pub(crate) fn show(&mut self, state: State, periods: u32) {
+        self.set(match state {
+            State::Idle | State::Ready | State::Held | State::Finished => false,
+            State::Running | State::Holding | State::Stopping => true,
+            State::Faulted => (periods >> BLINK_BIT) & 1 == 0,
+        });
+    }
+
+    fn set(&mut self, lit: bool) {
+        if lit != self.lit {
+            self.lit = lit;
+            // A status light that cannot be switched is no reason to stop anything.
+            let _ = self.pin.set_state(PinState::from(!lit));
+        }
+    }
+}

@@ -1,0 +1,68 @@
+//! The machine as the link sees it: behind a lock that holds up the sample timer for one short call at a
+//! time, and a queue.
+
+use controller::{
+    machine::{Busy, Command, Machine, describe},
+    realtime::RealTime,
+};
+use heapless::spsc::Producer;
+use interp_core::{fault::Fault, job::Header};
+use protocol::message::{Description, Status};
+use rtic::Mutex;
+
+use crate::{
+    board,
+    design_parameters::{FIRMWARE_VERSION, JOB_WORDS, PERIOD_US},
+};
+
+/// The real-time half of this board.
+pub(crate) type BoardRealTime = RealTime<JOB_WORDS>;
+
+/// [`Machine`] by means of RTIC. Every lock is held for one call of [`RealTime`], each of bounded length: a
+/// chunk of words, a record, or a copy of the status.
+pub(crate) struct GuardedMachine<'a, M> {
+    /// The real-time half.
+    pub(crate) real_time: M,
+    /// Commands to the next tick.
+    pub(crate) commands: &'a mut Producer<'static, Command>,
+}
+
+impl<M: Mutex<T = &'static mut BoardRealTime>> Machine for GuardedMachine<'_, M> {
+    fn description(&mut self) -> Description {
+        describe(FIRMWARE_VERSION, board::NAME, JOB_WORDS, PERIOD_US)
+    }
+
+    fn status(&mut self) -> Status {
+        self.real_time.lock(|real_time| real_time.status())
+    }
+
+    fn load_begin(&mut self, header: &Header, words: u32) -> Result<(), Fault> {
+        self.real_time
+            .lock(|real_time| real_time.load_begin(header, words))
+    }
+
+    fn load_words(&mut self, offset: u32, words: &[i32]) -> Result<(), Fault> {
+        self.real_time
+            .lock(|real_time| real_time.load_words(offset, words))
+    }
+
+    fn load_records(&mut self) -> u32 {
+        self.real_time.lock(|real_time| real_time.load_records())
+    }
+
+    fn load_check(&mut self, record: u32) -> Result<(), Fault> {
+        self.real_time.lock(|real_time| real_time.load_check(record))
+    }
+
+    fn load_finish(&mut self) -> Result<(), Fault> {
+        self.real_time.lock(|real_time| real_time.load_finish())
+    }
+
+    fn send(&mut self, command: Command) -> Result<(), Busy> {
+        self.commands.enqueue(command).map_err(|_| Busy)
+    }
+
+    fn commands_wait(&mut self) -> bool {
+        !self.commands.is_empty()
+    }
+}

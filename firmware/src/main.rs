@@ -1,0 +1,250 @@
+//! The firmware: three tasks around the machine.
+//!
+//! ```text
+//!  priority 3   sample    TIM2, every period      commands ──► RealTime::tick ──► events
+//!  priority 2   receive   USART1, every byte      port ──► bytes
+//!  priority 0   idle      when nothing else is    bytes ──► Link ──► commands;   events ──► Link ──► port
+//! ```
+//!
+//! What crosses between two tasks does so by a queue of fixed capacity with one writer and one reader. The
+//! machine itself is shared by `sample`, which gets it without a lock, and `idle`, which locks it for one
+//! short call at a time ([`guarded_machine`]). Everything that decides where the tool goes is in
+//! `interp-core`; what is done with a request is in `controller`; what differs between boards is in
+//! [`board`].
+#![no_std]
+#![no_main]
+
+mod board;
+mod design_parameters;
+mod drivers;
+mod guarded_machine;
+mod watch;
+
+use crate::{design_parameters::PERIOD_US, drivers::sample_timer::uptime_periods};
+
+// The log's time stamp is that of the sample timer: it stands still where the timer does.
+defmt::timestamp!("{=u64:us}", u64::from(uptime_periods()) * u64::from(PERIOD_US));
+
+#[rtic::app(device = stm32f4xx_hal::pac, peripherals = true)]
+mod app {
+    use core::mem::MaybeUninit;
+
+    use controller::{
+        link::Link,
+        machine::{Command, Event},
+        realtime::{RealTime, TickInput, TickOutput},
+    };
+    use heapless::spsc::{Consumer, Producer, Queue};
+
+    use crate::{
+        board::{self, StatusPin},
+        design_parameters::{
+            COMMAND_PLACES, EVENT_PLACES, FLUSH_PERIODS, JOB_WORDS, PERIOD_COUNTS, RECEIVE_PLACES,
+        },
+        drivers::{
+            cycle_counter::CycleCounter,
+            sample_timer::{SampleTimer, uptime_periods},
+            serial::{self, Receiver, Transmitter},
+            status_led::StatusLed,
+        },
+        guarded_machine::{BoardRealTime, GuardedMachine},
+        watch::Watch,
+    };
+
+    #[shared]
+    struct Shared {
+        /// A reference, because 64 KiB do not fit on the stack.
+        real_time: &'static mut BoardRealTime,
+        /// Bytes from the host that were lost.
+        bytes_lost: u32,
+    }
+
+    #[local]
+    struct Local {
+        timer: SampleTimer,
+        counter: CycleCounter,
+        receiver: Receiver,
+        transmitter: Transmitter,
+        led: StatusLed<StatusPin>,
+        bytes_in: Producer<'static, u8>,
+        bytes_out: Consumer<'static, u8>,
+        commands_in: Producer<'static, Command>,
+        commands_out: Consumer<'static, Command>,
+        events_in: Producer<'static, Event>,
+        events_out: Consumer<'static, Event>,
+    }
+
+    /// Interrupts are off until this returns: the first tick finds everything in place.
+    ///
+    /// The machine is made in place instead of by its static's initial value: that is not all zeros, and
+    /// would be stored in flash, all 64 KiB of it. Should a compiler make it on the stack first, the stack
+    /// overflows, and the board stops here.
+    #[init(local = [
+        real_time: MaybeUninit<BoardRealTime> = MaybeUninit::uninit(),
+        bytes: Queue<u8, RECEIVE_PLACES> = Queue::new(),
+        commands: Queue<Command, COMMAND_PLACES> = Queue::new(),
+        events: Queue<Event, EVENT_PLACES> = Queue::new(),
+    ])]
+    fn init(context: init::Context) -> (Shared, Local) {
+        let board = board::init(context.device);
+        let counter = CycleCounter::new(context.core.DCB, context.core.DWT);
+        let (transmitter, receiver) = serial::open(board.usart1, board::SERIAL_DIVIDER);
+        let (bytes_in, bytes_out) = context.local.bytes.split();
+        let (commands_in, commands_out) = context.local.commands.split();
+        let (events_in, events_out) = context.local.events.split();
+        let timer = SampleTimer::new(board.tim2, board.tim5, board::TIMER_RELOAD, PERIOD_COUNTS);
+        defmt::info!(
+            "isofeed {=str} on {=str}, room for {=usize} words",
+            env!("CARGO_PKG_VERSION"),
+            board::NAME,
+            JOB_WORDS
+        );
+        (
+            Shared {
+                real_time: context.local.real_time.write(RealTime::new()),
+                bytes_lost: 0,
+            },
+            Local {
+                timer,
+                counter,
+                receiver,
+                transmitter,
+                led: StatusLed::new(board.status_pin),
+                bytes_in,
+                bytes_out,
+                commands_in,
+                commands_out,
+                events_in,
+                events_out,
+            },
+        )
+    }
+
+    /// One period of the machine.
+    ///
+    /// | | |
+    /// |---|---|
+    /// | priority | 3, the highest |
+    /// | period | 1 ms, by TIM2 |
+    /// | worst case | measured by `cargo sim budget`, to come; the board reports the most it has seen (`tick_cycles_max`) |
+    /// | a miss | counted, reported, and a fault of the run (`deadline-missed`): the tool would have stood still where a feed was commanded |
+    #[task(
+        binds = TIM2,
+        priority = 3,
+        shared = [real_time],
+        local = [timer, counter, commands_out, events_in, missed: u32 = 0, cycles: u32 = 0]
+    )]
+    fn sample(mut context: sample::Context) {
+        let sample::LocalResources {
+            timer,
+            counter,
+            commands_out,
+            events_in,
+            missed,
+            cycles,
+            ..
+        } = context.local;
+        let begun = counter.now();
+        timer.begin();
+        let input = TickInput {
+            command: commands_out.dequeue(),
+            missed: *missed,
+            cycles: *cycles,
+            output_full: events_in.capacity() - events_in.len() < TickOutput::EVENTS_MAX,
+        };
+        // No other task has a higher priority: this lock costs nothing.
+        context.shared.real_time.lock(|real_time| {
+            for event in real_time.tick(input).events() {
+                if events_in.enqueue(event).is_err() {
+                    real_time.count_lost(1);
+                }
+            }
+        });
+        *cycles = counter.since(begun);
+        *missed = timer.end();
+    }
+
+    /// Takes a byte off the port.
+    ///
+    /// | | |
+    /// |---|---|
+    /// | priority | 2 |
+    /// | period | 11 us at 921 600 baud, while the host sends |
+    /// | worst case | a few dozen cycles, and `sample` before it |
+    /// | a miss | the byte is lost and counted; its frame fails its check, and the host repeats it |
+    #[task(binds = USART1, priority = 2, shared = [bytes_lost], local = [receiver, bytes_in])]
+    fn receive(mut context: receive::Context) {
+        let received = context.local.receiver.read();
+        let full = received
+            .byte
+            .is_some_and(|byte| context.local.bytes_in.enqueue(byte).is_err());
+        if received.error || full {
+            context
+                .shared
+                .bytes_lost
+                .lock(|lost| *lost = lost.saturating_add(1));
+        }
+    }
+
+    /// The link with the host, the LED and the log; sleeps when there is nothing to do.
+    ///
+    /// | | |
+    /// |---|---|
+    /// | priority | 0 |
+    /// | period | none; woken by every interrupt |
+    /// | worst case | one frame's answer and its time on the line, 3.3 ms; a finished upload checks every record before its answer |
+    /// | a miss | in lockstep time waits for it; on a free clock events are lost once their queue is full, and counted (`samples_lost`) |
+    #[idle(
+        shared = [real_time, bytes_lost],
+        local = [transmitter, led, bytes_out, commands_in, events_out]
+    )]
+    fn idle(context: idle::Context) -> ! {
+        let idle::LocalResources {
+            transmitter,
+            led,
+            bytes_out,
+            commands_in,
+            events_out,
+            ..
+        } = context.local;
+        let idle::SharedResources {
+            real_time,
+            mut bytes_lost,
+            ..
+        } = context.shared;
+        let mut machine = GuardedMachine {
+            real_time,
+            commands: commands_in,
+        };
+        let mut link = Link::new();
+        let mut watch = Watch::default();
+        let mut last_event = None;
+        loop {
+            let mut send = |bytes: &[u8]| transmitter.write(bytes);
+            let now = uptime_periods();
+            while let Some(event) = events_out.dequeue() {
+                link.event(&event, &mut send);
+                last_event = Some(now);
+            }
+            if let Some(byte) = bytes_out.dequeue() {
+                link.receive(byte, &mut machine, &mut send);
+            }
+            if last_event.is_some_and(|then| now.wrapping_sub(then) >= FLUSH_PERIODS) {
+                link.flush(&mut send);
+                last_event = None;
+            }
+            if watch.is_due(now) {
+                let lost = bytes_lost.lock(|lost| *lost);
+                watch.look(now, &mut machine, lost);
+                led.show(watch.state, now);
+            }
+            // With interrupts held back none can slip in between the question and the sleep; it still ends
+            // the sleep.
+            cortex_m::interrupt::free(|_| {
+                if !bytes_out.ready() && !events_out.ready() {
+                    cortex_m::asm::wfi();
+                }
+            });
+        }
+    }
+}

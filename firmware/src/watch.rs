@@ -1,0 +1,60 @@
+//! A look at the machine now and then: what has changed goes to the log.
+
+use controller::machine::Machine;
+use interp_core::{fault::FaultKind, sample::State};
+use protocol::message::Status;
+
+use crate::design_parameters::LOOK_PERIODS;
+
+/// What was seen last.
+#[derive(Default)]
+pub(crate) struct Watch {
+    /// The machine's state.
+    pub(crate) state: State,
+    looked: u32,
+    deadline_misses: u32,
+    bytes_lost: u32,
+}
+
+impl Watch {
+    /// Whether it is time for a look; `now` counts periods.
+    pub(crate) fn is_due(&self, now: u32) -> bool {
+        now.wrapping_sub(self.looked) >= LOOK_PERIODS
+    }
+
+    /// Looks, and writes what has changed.
+    pub(crate) fn look(&mut self, now: u32, machine: &mut impl Machine, bytes_lost: u32) {
+        self.looked = now;
+        let status = machine.status();
+        if status.state != self.state {
+            self.state = status.state;
+            log_state(&status);
+        }
+        if status.deadline_misses > self.deadline_misses {
+            defmt::warn!("{=u32} ticks missed in this run", status.deadline_misses);
+        }
+        self.deadline_misses = status.deadline_misses;
+        if bytes_lost != self.bytes_lost {
+            defmt::warn!("{=u32} bytes lost on the link since the start", bytes_lost);
+            self.bytes_lost = bytes_lost;
+        }
+    }
+}
+
+fn log_state(status: &Status) {
+    let Status {
+        state, tick, pass, ..
+    } = status;
+    match status.fault {
+        None => defmt::info!("{=str}: tick {=u32}, pass {=u32}", state.name(), *tick, *pass),
+        Some(fault) => defmt::error!(
+            "{=str}: tick {=u32}, pass {=u32}: fault {=u8} ({=str}), value {=f32}",
+            state.name(),
+            *tick,
+            *pass,
+            fault.code,
+            fault.kind().map_or("unknown", FaultKind::name),
+            fault.value
+        ),
+    }
+}
