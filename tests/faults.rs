@@ -1,4 +1,5 @@
 //! Faults are states: each kind that a surface can cause, with its code, value and place; the position is kept.
+#![allow(clippy::unwrap_used, reason = "a test may fail by panic")]
 
 use host_sim::job_file::{Along, JobFile, Pattern, Side, SurfaceSpec};
 use host_sim::prepare::{Prepared, prepare};

@@ -1,4 +1,5 @@
 //! Random surfaces, also nearly degenerate ones: every sample is right, or the fault that stopped the run is.
+#![allow(clippy::unwrap_used, reason = "a test may fail by panic")]
 
 use host_sim::job_file::{Along, JobFile, Pattern, Side, SurfaceSpec};
 use host_sim::machine::Machine;

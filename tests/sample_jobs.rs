@@ -1,4 +1,5 @@
 //! Every sample of every sample job against the independent oracle, and the figures that the README states.
+#![allow(clippy::unwrap_used, reason = "a test may fail by panic")]
 
 use std::path::PathBuf;
 
@@ -11,7 +12,7 @@ use host_sim::survey::{Findings, Survey};
 
 /// Jobs with their number of passes: the paper's, the golden table's, and for the others the oracle's dense scan.
 const PASSES: [(&str, u32); 10] = [
-    ("far_plate", 31),
+    ("far_plate", 18),
     ("freeform", 134),
     ("plate", 164),
     ("plate_v", 146),

@@ -330,7 +330,7 @@ impl<const WORDS: usize> Interpolator<WORDS> {
         self.last_interval = f32::INFINITY;
     }
 
-    /// One period. Never blocks, never panics; bounded by the collapse and evaluation of [`CROSSINGS_MAX`] + 1 patches.
+    /// One period. Never blocks, never panics; bounded by the collapse and evaluation of four patches.
     ///
     /// While the job runs, each call yields a sample with [`State::Running`], counted by its `tick` from 0; the one after
     /// the last has [`State::Finished`]. In every state that does not move, the sample repeats the last position.

@@ -9,6 +9,7 @@ pub(super) type Piece = [Bicubic; 4];
 
 /// A surface that has such pieces.
 #[derive(Clone, Debug)]
+#[allow(clippy::large_enum_variant, reason = "there is one a job")]
 pub(super) enum Source {
     /// Polynomial in powers, lowest first, `[i][j]` of `u^i v^j`.
     Powers {

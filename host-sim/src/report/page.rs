@@ -15,6 +15,9 @@ use crate::survey::Findings;
 
 const STYLE: &str = include_str!("page.css");
 
+/// A speed that keeps within this share of the feed is called steady.
+const STEADY_SHARE: f64 = 0.01;
+
 /// What the page is made of.
 pub(super) struct Content<'a> {
     pub(super) job: &'a JobFile,
@@ -189,7 +192,7 @@ fn speed(out: &mut String, content: &Content<'_>) -> io::Result<()> {
                 [low.min(*y), high.max(*y)]
             })
     };
-    let ([slowest, fastest], pass) = (range(&centre), content.record.middle_pass);
+    let sentence = speed_sentence(content.job.feed_mm_s(), range(&contact), range(&centre));
     let chart = Chart {
         x_title: "arc along the pass, mm",
         y_title: "speed, mm/s",
@@ -208,20 +211,13 @@ fn speed(out: &mut String, content: &Content<'_>) -> io::Result<()> {
     let Some(svg) = chart.svg()? else {
         return Ok(());
     };
-    let feed = content.job.feed_mm_s();
-    let bends = if fastest - slowest > 0.01 * feed {
-        format!(
-            "the tool's centre has to run at {slowest:.2} to {fastest:.2} mm/s, as the surface bends under it"
-        )
-    } else {
-        format!("the tool's centre runs at {fastest:.2} mm/s, as the surface bends evenly along the pass")
-    };
+    let (pass, last) = (
+        content.record.middle_pass,
+        content.findings.passes.saturating_sub(1),
+    );
     let _ = writeln!(
         out,
-        "<section><h2>Speed along pass {pass} (of 0 to {})</h2>\n<p>The feed of {} mm/s is held where the cutter touches the \
-         surface; {bends}.</p>",
-        content.findings.passes.saturating_sub(1),
-        significant(feed)
+        "<section><h2>Speed along pass {pass} (of 0 to {last})</h2>\n<p>{sentence}</p>"
     );
     legend(
         out,
@@ -232,6 +228,35 @@ fn speed(out: &mut String, content: &Content<'_>) -> io::Result<()> {
     );
     let _ = writeln!(out, "<figure class=\"chart\">{svg}</figure></section>");
     Ok(())
+}
+
+/// What the speeds come to: slowest and fastest of the contact and of the centre.
+fn speed_sentence(feed: f64, contact: [f64; 2], centre: [f64; 2]) -> String {
+    let is_steady = |[slowest, fastest]: [f64; 2]| fastest - slowest < STEADY_SHARE * feed;
+    let is_held = contact
+        .iter()
+        .all(|speed| (speed - feed).abs() < STEADY_SHARE * feed);
+    let feed = significant(feed);
+    let held = if is_held {
+        format!("The feed of {feed} mm/s is held where the cutter touches the surface")
+    } else {
+        format!(
+            "Of the feed of {feed} mm/s the cutter contact runs at {:.2} to {:.2} mm/s",
+            contact[0], contact[1]
+        )
+    };
+    let bends = if is_steady(centre) {
+        format!(
+            "the tool's centre runs at {:.2} mm/s, as the surface bends evenly along the pass",
+            centre[1]
+        )
+    } else {
+        format!(
+            "the tool's centre has to run at {:.2} to {:.2} mm/s, as the surface bends under it",
+            centre[0], centre[1]
+        )
+    };
+    format!("{held}; {bends}.")
 }
 
 /// Intervals and distances, pass by pass.

@@ -1,0 +1,232 @@
+//! The firmware in QEMU against the core on this machine: every sample of every sample job, and what happens when they
+//! differ. Needs `qemu-system-arm`; builds the firmware.
+#![allow(clippy::unwrap_used, reason = "a test may fail by panic")]
+
+use std::path::{Path, PathBuf};
+use std::sync::OnceLock;
+
+use host_sim::job_file::JobFile;
+use host_sim::machine::Machine;
+use host_sim::prepare::{Prepared, prepare};
+use host_sim::remote::drive::{self, Expected};
+use host_sim::remote::qemu::{self, Qemu};
+use host_sim::remote::{RemoteError, Session};
+use interp_core::{FaultKind, Sample, State};
+use protocol::digest::Digest;
+use protocol::message::{Clock, Reason, Report, Request};
+
+fn image() -> &'static Path {
+    static IMAGE: OnceLock<PathBuf> = OnceLock::new();
+    IMAGE.get_or_init(|| qemu::firmware().unwrap())
+}
+
+fn board() -> (Qemu, Session) {
+    let (qemu, stream) = Qemu::start(image()).unwrap();
+    let session = Session::open(stream, 1).unwrap();
+    (qemu, session)
+}
+
+fn job(name: &str) -> Prepared {
+    let path = format!("{}/../jobs/{name}.toml", env!("CARGO_MANIFEST_DIR"));
+    prepare(&JobFile::load(path.as_ref()).unwrap()).unwrap()
+}
+
+/// Samples and passes as this machine computes them.
+fn here(job: &Prepared) -> (Vec<Expected>, u64) {
+    let mut passes: Vec<Expected> = Vec::new();
+    let mut digest = Digest::new();
+    Machine::load(job)
+        .unwrap()
+        .run(|sample| {
+            if passes.len() <= sample.pass as usize {
+                passes.push(Expected {
+                    first_tick: sample.tick,
+                    samples: 0,
+                    digest: 0,
+                });
+            }
+            digest.sample(sample);
+            let pass = passes.last_mut().unwrap();
+            pass.samples += 1;
+            pass.digest = digest.value();
+            true
+        })
+        .unwrap();
+    (passes, digest.value())
+}
+
+/// Runs these jobs one after the other on one board, without a restart in between.
+fn compare(names: &[&str]) {
+    let (_qemu, mut session) = board();
+    for name in names {
+        let job = job(name);
+        let (passes, digest) = here(&job);
+        drive::upload(&mut session, &job, |_| {}).unwrap();
+        let start = std::time::Instant::now();
+        let compared = drive::run_digests(&mut session, &passes, true, |_| {}).unwrap();
+        let samples: u64 = passes.iter().map(|pass| u64::from(pass.samples)).sum();
+        println!(
+            "{name}: {:.0} ticks a second",
+            samples as f64 / start.elapsed().as_secs_f64()
+        );
+        assert_eq!(compared.first_bad_pass, None, "{name}");
+        assert_eq!(
+            (compared.samples, compared.status.digest),
+            (samples, digest),
+            "{name}"
+        );
+        assert_eq!(compared.status.state, State::Finished, "{name}");
+        assert_eq!(
+            (compared.status.deadline_misses, compared.status.samples_lost),
+            (0, 0),
+            "{name}"
+        );
+    }
+}
+
+// Two tests of about the same length, for two processors.
+
+#[test]
+fn jobs_of_the_paper() {
+    compare(&["revolved", "ruled_printed", "ruled_reconstructed"]);
+}
+
+#[test]
+fn other_jobs() {
+    compare(&[
+        "far_plate",
+        "freeform",
+        "plate",
+        "plate_v",
+        "revolved_v",
+        "sphere_cap",
+        "torus",
+    ]);
+}
+
+/// One unit (2^-5 nm or so) more in one coefficient of the board's job: the pass and the tick of the first sample that
+/// differs are named, and are those at which this machine differs from itself with the two jobs.
+#[test]
+fn the_first_difference_is_named() {
+    let ours = job("torus");
+    let mut theirs = ours.clone();
+    // The last record's height at the patch's middle, in the part of the surface that later passes reach.
+    let coefficient = theirs.words.len() - 2 * 16;
+    theirs.words[coefficient] += 40;
+    let samples = |job: &Prepared| {
+        let mut samples: Vec<Sample> = Vec::new();
+        Machine::load(job)
+            .unwrap()
+            .run(|sample| {
+                samples.push(*sample);
+                true
+            })
+            .unwrap();
+        samples
+    };
+    let (mine, other) = (samples(&ours), samples(&theirs));
+    let tick = drive::first_difference(&mine, &other).unwrap();
+    assert!(tick > 10_000, "a difference at tick {tick} would test little");
+
+    let (passes, _) = here(&ours);
+    let (_qemu, mut session) = board();
+    drive::upload(&mut session, &theirs, |_| {}).unwrap();
+    let compared = drive::run_digests(&mut session, &passes, true, |_| {}).unwrap();
+    let pass = compared.first_bad_pass.unwrap();
+    assert_eq!(pass, mine[tick as usize].pass);
+    let first = passes[pass as usize].first_tick;
+    let there = drive::samples_between(&mut session, first, passes[pass as usize].samples).unwrap();
+    assert_eq!(
+        drive::first_difference(&mine[first as usize..][..there.len()], &there),
+        Some(tick)
+    );
+}
+
+/// A fault on the board is the fault here, at the same tick and place; it is acknowledged, and another job runs.
+#[test]
+fn a_fault_is_the_same_fault() {
+    let mut job = job("torus");
+    job.header.ball_radius_mm = 8.5;
+    let mut last = None;
+    let mut machine = Machine::load(&job).unwrap();
+    let fault = machine
+        .run(|sample| {
+            last = Some(*sample);
+            true
+        })
+        .unwrap_err();
+    assert_eq!((fault.kind, last), (FaultKind::BallDoesNotFit, None));
+    let (_qemu, mut session) = board();
+    drive::upload(&mut session, &job, |_| {}).unwrap();
+    let status = drive::run_samples(&mut session, true, |_| panic!("no sample before the fault")).unwrap();
+    let report = status.fault.unwrap();
+    assert_eq!(
+        (report.code, report.value.to_bits()),
+        (fault.kind.code(), fault.value.to_bits())
+    );
+    assert_eq!((status.pass, status.path, status.side), machine.place());
+    assert_eq!(status.state, State::Faulted);
+    session.command(&Request::Abort).unwrap();
+    session.command(&Request::Run { ticks: 1 }).unwrap();
+}
+
+/// A job that is too large is refused with the limit; one in the middle of a run, too; and the run goes on as if nothing had
+/// been said.
+#[test]
+fn refusals_change_nothing() {
+    let job = job("freeform");
+    let (passes, digest) = here(&job);
+    let (_qemu, mut session) = board();
+    let description = session.capabilities().description.clone();
+    assert!(description.patches_max_polynomial >= 200);
+    let mut large = job.header;
+    (large.path_spans, large.side_spans) = (64, 64);
+    let words = 64 * 64 * 52 + 128;
+    let begin = Request::JobBegin {
+        header: large,
+        words,
+        digest: 0,
+    };
+    match session.command(&begin) {
+        Err(RemoteError::Refused {
+            reason: Reason::TooLong { limit, wanted },
+            ..
+        }) => {
+            assert_eq!((limit, wanted), (description.store_words, words));
+        }
+        other => panic!("{other:?}"),
+    }
+    drive::upload(&mut session, &job, |_| {}).unwrap();
+    session.command(&Request::Clock(Clock::Lockstep)).unwrap();
+    session.command(&Request::Report(Report::Digests)).unwrap();
+    session.command(&Request::Start).unwrap();
+    session.command(&Request::Run { ticks: 1000 }).unwrap();
+    while session.status().unwrap().credit > 0 {}
+    match session.command(&Request::JobBegin {
+        header: job.header,
+        words: 1,
+        digest: 0,
+    }) {
+        Err(RemoteError::Refused {
+            reason: Reason::WrongState { state },
+            ..
+        }) => assert_eq!(state, State::Running),
+        other => panic!("{other:?}"),
+    }
+    assert!(session.command(&Request::Start).is_err());
+    session.command(&Request::Hold).unwrap();
+    session.command(&Request::Run { ticks: 100 }).unwrap();
+    while session.status().unwrap().credit > 0 {}
+    assert_eq!(session.status().unwrap().state, State::Held);
+    session.command(&Request::Resume).unwrap();
+    session.command(&Request::Run { ticks: u32::MAX }).unwrap();
+    let samples: u32 = passes.iter().map(|pass| pass.samples).sum();
+    let status = loop {
+        let status = session.status().unwrap();
+        if status.state == State::Finished {
+            break status;
+        }
+        std::thread::sleep(std::time::Duration::from_millis(50));
+    };
+    assert_eq!((status.samples, status.digest), (samples, digest));
+}
