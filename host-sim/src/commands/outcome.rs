@@ -138,8 +138,5 @@ impl Outcome<'_> {
             "  speed        {:.2} million samples a second",
             self.samples_per_second / 1e6
         );
-        if let Some(fault) = &self.fault {
-            println!("  stopped      {}", fault.sentence());
-        }
     }
 }

@@ -148,8 +148,13 @@ fn oracle_rows(findings: &Findings) -> [Row; 7] {
         Row("Tool centre error", cl, fixed(cl, 2), "nm"),
         Row("Cutter contact error", cc, fixed(cc, 2), "nm"),
         Row("Normal error", normal, significant(normal), "rad"),
-        Row("Scallop height", scallop, fixed(scallop, 6), "mm"),
-        Row("Scallop, mean", scallop_mean, fixed(scallop_mean, 6), "mm"),
+        Row("Scallop by formula", scallop, fixed(scallop, 6), "mm"),
+        Row(
+            "Scallop by formula, mean",
+            scallop_mean,
+            fixed(scallop_mean, 6),
+            "mm",
+        ),
     ]
 }
 
@@ -310,7 +315,7 @@ fn intervals(out: &mut String, content: &Content<'_>) -> io::Result<()> {
     };
     let _ = writeln!(
         out,
-        "<section><h2>Path interval</h2>\n<p>The next pass lies where the scallop between the two stays within {} mm \
+        "<section><h2>Path interval</h2>\n<p>The next pass lies where the scallop between the two stays, to first order, within {} mm \
          everywhere: the least interval that any sample of a pass allowed, in the side parameter {side}.{thinned}</p>\n\
          <figure class=\"chart\">{interval}</figure>\n<p>The same in millimetres across the passes. The shaded range \
          lies between the widest and the narrowest place of each pass: where it is broad, passes of constant {side} \

@@ -207,7 +207,7 @@ fn report_is_well_formed_small_and_says_what_was_found() {
         ("Feed ripple", report.ripple_pct.max),
         ("Feed ripple, rms", report.ripple_pct.rms()),
         ("Tool centre error", report.position_nm.max),
-        ("Scallop height", report.scallop_mm.max),
+        ("Scallop by formula", report.scallop_mm.max),
     ] {
         assert_eq!(value_of(&page, what), value, "{what}");
     }
