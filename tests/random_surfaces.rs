@@ -43,7 +43,7 @@ fn run(job: &JobFile, most: u64) -> Ran {
     let (pass, path, side) = machine.place();
     let across = last.is_some_and(|(last, _)| last != pass) && job.pattern == Pattern::Zig;
     let neighbour = if across { first } else { last }.map(|(_, parameters)| parameters);
-    let report = survey.finish().unwrap().report;
+    let report = survey.finish(result.is_ok() && samples < most).unwrap().report;
     Ran {
         fault: result.err(),
         position_nm: report.position_nm.max,
@@ -269,5 +269,197 @@ fn poles() {
                 }
             }
         }
+    }
+}
+
+/// The fan of [`poles`], turned away from the axes: what cancels there must not be left to the coordinates' zeros.
+fn turned_fan(pole_on_u: bool, weights: bool) -> SurfaceSpec {
+    let turn = |[x, y, z]: [f64; 3]| {
+        let (s, c) = 0.7_f64.sin_cos();
+        let [x, y, z] = [x, c * y - s * z, s * y + c * z];
+        let (s, c) = 0.6_f64.sin_cos();
+        [c * x + s * z, y, c * z - s * x]
+    };
+    let pole = |i: usize, j: usize| {
+        let (t, s) = if pole_on_u { (i, j) } else { (j, i) };
+        let (angle, reach) = (0.3 + 0.35 * s as f64, [30.0, 20.0, 10.0, 0.0][t]);
+        let [x, y, z] = turn([reach * angle.cos(), reach * angle.sin(), [-6.0, 1.5, 4.0, 4.0][t]]);
+        let w = if weights {
+            1.0 + 0.15 * (t as f64 - 1.5) * (s as f64 - 1.0)
+        } else {
+            1.0
+        };
+        [x, y, z, w]
+    };
+    let knots = vec![0.0, 0.0, 0.0, 0.0, 1.0, 1.0, 1.0, 1.0];
+    SurfaceSpec::Nurbs(host_sim::job_file::NurbsSpec {
+        degree: [3, 3],
+        knots_u: knots.clone(),
+        knots_v: knots,
+        poles_mm: (0..4).map(|i| (0..4).map(|j| pole(i, j)).collect()).collect(),
+        rational: weights,
+    })
+}
+
+/// Passes into a pole that lies askew, fast and slow, with small and large balls: no false gouge.
+#[test]
+fn poles_askew() {
+    for weights in [false, true] {
+        for along in [Along::U, Along::V] {
+            for (radius_mm, feed_mm_min) in [(4.0, 600.0), (20.0, 600.0), (4.0, 60.0), (20.0, 37.0)] {
+                let mut job = job(turned_fan(true, weights), along, Pattern::Zig);
+                (job.radius_mm, job.feed_mm_min) = (radius_mm, feed_mm_min);
+                (job.side, job.scallop_mm) = (Side::Up, 2.0);
+                let name = format!("weights {weights}, {along:?}, ball {radius_mm}, feed {feed_mm_min}");
+                let ran = run(&job, u64::MAX);
+                assert_eq!(ran.fault, None, "{name} at {:?}", ran.place);
+                assert!(
+                    ran.position_nm <= 10.0 * radius_mm.max(10.0) / 10.0,
+                    "{name}: CL off by {} nm",
+                    ran.position_nm
+                );
+            }
+        }
+    }
+}
+
+/// The first interval beside a pole is that of its fastest side line.
+#[test]
+fn interval_beside_a_pole() {
+    // S = v (2 + 18 u, 20 u, 0): the side lines' speed runs from 2 to 27 mm.
+    let mut c = [[[0.0; 4]; 4]; 3];
+    (c[0][3][2], c[0][2][2], c[1][2][2]) = (2.0, 18.0, 20.0);
+    let surface = SurfaceSpec::Bicubic {
+        coefficients_mm: c,
+        u: [0.0, 1.0],
+        v: [0.0, 1.0],
+    };
+    for pattern in [Pattern::Zig, Pattern::Zigzag] {
+        let mut job = job(surface.clone(), Along::U, pattern);
+        (job.radius_mm, job.scallop_mm) = (2.0, 0.01);
+        let prepared = prepare(&job).unwrap();
+        let mut second = None;
+        Machine::load(&prepared)
+            .unwrap()
+            .run(|sample| {
+                second = (sample.pass == 1).then_some(prepared.side.parameter(sample.side));
+                second.is_none()
+            })
+            .unwrap();
+        let want = (8.0_f64 * 2.0 * 0.01).sqrt() / 20.0_f64.hypot(20.0);
+        assert!(
+            (second.unwrap() / want - 1.0).abs() < 1e-5,
+            "{second:?} for {want}"
+        );
+        assert_eq!(run(&job, u64::MAX).fault, None);
+    }
+}
+
+/// Patches smaller than the ball: its radius in the patch's fine units is beyond i32.
+#[test]
+fn patches_smaller_than_the_ball() {
+    for size in [1.0, 2.0, 5.0, 8.0, 15.0] {
+        for radius_mm in [4.0, 6.0, 10.0, 50.0] {
+            let mut c = [[[0.0; 4]; 4]; 3];
+            (c[0][2][3], c[1][3][2]) = (size, size);
+            (c[2][1][3], c[2][2][3], c[2][3][2]) = (-0.08 * size, 0.08 * size, -2e-4 * size);
+            let surface = SurfaceSpec::Bicubic {
+                coefficients_mm: c,
+                u: [0.0, 1.0],
+                v: [0.0, 1.0],
+            };
+            let mut job = job(surface, Along::U, Pattern::Zig);
+            (job.radius_mm, job.scallop_mm) = (radius_mm, 1e-3);
+            let ran = run(&job, u64::MAX);
+            let bound = 1.0 + 2.5e-7 * radius_mm * 1e6;
+            assert_eq!(ran.fault, None, "{size} mm, ball {radius_mm}");
+            assert!(
+                ran.position_nm <= bound,
+                "{size} mm, ball {radius_mm}: CL off by {} nm",
+                ran.position_nm
+            );
+        }
+    }
+}
+
+/// Domes and cones that end on the axis, both ways, to and fro.
+#[test]
+fn profiles_that_end_on_the_axis() {
+    for k in 0..40 {
+        let (a, b) = (20.0 + 0.377 * f64::from(k), 0.1 * f64::from(k % 7));
+        // R = a u + b u^2, Z falls: a cone for b = 0; the axis at u = 0.
+        let surface = SurfaceSpec::Revolved {
+            radius_mm: [0.0, b, a, 0.0],
+            height_mm: [-1.001, -1.003 - b, -10.0, 0.0],
+            u: [0.0, 1.0],
+            v_rad: [0.1, 5.0],
+        };
+        for along in [Along::U, Along::V] {
+            for pattern in [Pattern::Zig, Pattern::Zigzag] {
+                let mut job = job(surface.clone(), along, pattern);
+                (job.side, job.radius_mm, job.feed_mm_min) = (Side::Up, 2.0, 3000.0);
+                // Passes along the profile crowd at the axis; a few say all.
+                let most = if along == Along::U { 20_000 } else { u64::MAX };
+                let ran = run(&job, most);
+                assert_eq!(ran.fault, None, "{k}, {along:?}, {pattern:?} at {:?}", ran.place);
+                assert!(
+                    ran.position_nm <= 10.0,
+                    "{k}, {along:?}, {pattern:?}: {} nm",
+                    ran.position_nm
+                );
+            }
+        }
+    }
+}
+
+/// A boundary of which one span is a point and the next is not cannot become passes: refused, with a sentence.
+#[test]
+fn boundary_that_is_a_point_in_part() {
+    let pole = |x: f64, y: f64| [x, y, 0.0, 1.0];
+    let nurbs = host_sim::job_file::NurbsSpec {
+        degree: [1, 1],
+        knots_u: vec![0.0, 0.0, 1.0, 2.0, 2.0],
+        knots_v: vec![0.0, 0.0, 1.0, 1.0],
+        poles_mm: vec![
+            vec![pole(0.0, 0.0), pole(0.0, 10.0)],
+            vec![pole(10.0, 0.0), pole(10.0, 10.0)],
+            vec![pole(10.0, 0.0), pole(20.0, 10.0)],
+        ],
+        rational: false,
+    };
+    let error = prepare(&job(SurfaceSpec::Nurbs(nurbs), Along::U, Pattern::Zig)).unwrap_err();
+    assert!(error.to_string().contains("not all of it"), "{error}");
+}
+
+/// A parametrisation whose speed changes by a large part of itself in one period faults; it never runs at another feed.
+#[test]
+fn uneven_parametrisations_keep_the_feed_or_fault() {
+    // x = a u + b u^2/2 + c u^3/3, and the arc of one period.
+    for (a, b, c, arc) in [
+        (0.019_147, 0.221_538_9, 3.513_668_9, 0.020_080_0),
+        (0.011_214_9, -0.114_487_4, 1.899_846_6, 0.012_100_8),
+    ] {
+        let mut coefficients_mm = [[[0.0; 4]; 4]; 3];
+        (
+            coefficients_mm[0][2][3],
+            coefficients_mm[0][1][3],
+            coefficients_mm[0][0][3],
+        ) = (a, b / 2.0, c / 3.0);
+        coefficients_mm[1][3][2] = 1.0;
+        let surface = SurfaceSpec::Bicubic {
+            coefficients_mm,
+            u: [0.0, 1.0],
+            v: [0.0, 1.0],
+        };
+        let mut job = job(surface, Along::U, Pattern::Zig);
+        (job.radius_mm, job.scallop_mm, job.feed_mm_min) = (0.5, 0.01, arc * 60_000.0);
+        let ran = run(&job, u64::MAX);
+        assert!(
+            ran.fault
+                .is_some_and(|fault| fault.kind == FaultKind::ParameterBackwards)
+                || ran.ripple_pct < 0.1,
+            "{}",
+            ran.ripple_pct
+        );
     }
 }

@@ -40,7 +40,7 @@ fn survey(job: &JobFile) -> Findings {
         .unwrap()
         .run(|sample| survey.add(sample).is_ok())
         .unwrap();
-    survey.finish().unwrap()
+    survey.finish(true).unwrap()
 }
 
 #[test]

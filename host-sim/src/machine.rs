@@ -33,6 +33,8 @@ impl Machine {
     /// # Errors
     /// The fault that stopped the run; [`Self::place`] says where.
     pub fn run(&mut self, mut each: impl FnMut(&Sample) -> bool) -> Result<(), Fault> {
+        // A fault of the run before is acknowledged by an abort; otherwise it is ignored.
+        self.core.tick(Request::Abort);
         let mut request = Request::Start;
         loop {
             let sample = self.core.tick(request);

@@ -1,6 +1,6 @@
 //! Follows a stream of samples: counts, measures against the oracle, writes the trace.
 
-use interp_core::{Sample, sample::Place};
+use interp_core::Sample;
 
 use crate::oracle::{Emitted, Oracle, Report, Verifier};
 use crate::prepare::Prepared;
@@ -111,15 +111,13 @@ impl<'a> Survey<'a> {
         }
     }
 
-    /// The findings, after the run's last sample.
+    /// The findings, after the run's last sample; `complete` if the run came to its end.
     ///
     /// # Errors
     /// The trace cannot be written.
-    pub fn finish(mut self) -> std::io::Result<Findings> {
+    pub fn finish(mut self, complete: bool) -> std::io::Result<Findings> {
         if let Some(pending) = self.pending {
-            let Place { fraction, .. } = pending.sample.path;
-            let ended = fraction == 0 || fraction == u64::MAX;
-            self.emit(pending, ended);
+            self.emit(pending, complete);
         }
         if let Some(trace) = self.trace {
             trace.finish()?;

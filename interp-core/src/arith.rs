@@ -17,7 +17,7 @@
 /// 2^-32: turns a centred fixed-point parameter into a float.
 const UNIT_32: f32 = 1.0 / 4_294_967_296.0;
 
-/// Half the product's upper word: `a b / 2^32`, rounded to nearest, ties up.
+/// The product's upper word: `a b / 2^32`, rounded to nearest, ties up.
 #[inline(always)]
 #[must_use]
 pub(crate) const fn mul_hi(a: i32, b: i32) -> i32 {
@@ -89,13 +89,16 @@ pub(crate) const fn centred(fraction: u64) -> i32 {
     ((fraction >> 32) as u32 ^ 0x8000_0000) as i32
 }
 
-/// A step of a fraction in units of 2^-64; saturates at 0 and at 1 (NaN: 1). Steps below 2^-8 are rounded
-/// to 2^-40, larger ones to 2^-32: always at least as fine as the float.
+/// A step of a fraction in units of 2^-64; saturates at 0 and at 1 (NaN: 1). Steps below 2^-16 are rounded to 2^-48, below 2^-8
+/// to 2^-40, larger ones to 2^-32: down to 2^-24 as fine as the float.
 #[inline(always)]
 #[must_use]
 pub(crate) fn fraction_from_f32(step: f32) -> u64 {
     const FINE: f32 = 1.0 / 256.0;
-    if step < FINE {
+    const FINEST: f32 = FINE * FINE;
+    if step < FINEST {
+        ((step * 281_474_976_710_656.0 + 0.5) as u32 as u64) << 16
+    } else if step < FINE {
         ((step * 1_099_511_627_776.0 + 0.5) as u32 as u64) << 24
     } else if step < 1.0 {
         ((step * 4_294_967_296.0) as u32 as u64) << 32
@@ -268,10 +271,12 @@ mod tests {
 
     #[test]
     fn steps_of_a_fraction() {
-        for step in [1e-9_f32, 1e-6, 1e-3, 0.003_9, 0.003_91, 0.3, 0.999] {
+        for step in [
+            1e-9_f32, 1e-6, 1.5e-5, 1.6e-5, 1e-3, 0.003_9, 0.003_91, 0.3, 0.999,
+        ] {
             let got = fraction_from_f32(step) as f64 / 2_f64.powi(64);
             assert!(
-                (got - f64::from(step)).abs() <= (f64::from(step) * 6e-8).max(2_f64.powi(-41)),
+                (got - f64::from(step)).abs() <= (f64::from(step) * 6e-8).max(2_f64.powi(-49)),
                 "{step}: {got}"
             );
         }

@@ -69,8 +69,14 @@ pub(crate) fn arc_about(middle: &PathSpeed, fraction: f32) -> f32 {
     speed * fraction * (1.0 + fraction * fraction * bend * (1.0 / 24.0))
 }
 
-/// A coarse step, corrected by what its arc misses. Never less than half of it, so that the parameter runs forwards.
-pub(crate) fn corrected(coarse: f32, arc_mm: f32, middle: &PathSpeed) -> f32 {
+/// Largest correction of a coarse step, relative: its square times a small factor is what one corrector step leaves.
+const CORRECTED_MAX: f32 = 1.0 / 16.0;
+
+/// A coarse step, corrected by what its arc misses.
+///
+/// # Errors
+/// [`FaultKind::ParameterBackwards`] where it misses too much for one corrector step; its value is the correction.
+pub(crate) fn corrected(coarse: f32, arc_mm: f32, middle: &PathSpeed) -> Result<f32> {
     let PathSpeed {
         speed,
         stretch,
@@ -81,11 +87,11 @@ pub(crate) fn corrected(coarse: f32, arc_mm: f32, middle: &PathSpeed) -> f32 {
     let end_speed = speed * (1.0 + half * (stretch + 0.5 * half * (stretch_change - stretch * stretch)));
     let more = (arc_mm - arc_about(middle, coarse)) / end_speed;
     let fraction = coarse + more * (1.0 - 0.5 * stretch * more);
-    if fraction > 0.5 * coarse {
-        fraction
-    } else {
-        0.5 * coarse
+    // Not `>`: a NaN must not pass.
+    if !((fraction - coarse).abs() <= CORRECTED_MAX * coarse) {
+        return Err(Fault::new(FaultKind::ParameterBackwards, fraction / coarse - 1.0));
     }
+    Ok(fraction)
 }
 
 #[cfg(test)]
@@ -127,7 +133,7 @@ mod tests {
                 "{k} {arc}: {coarse:?}"
             );
             let middle = exponential(k as f32, 0.5 * coarse.fraction);
-            let fine = corrected(coarse.fraction, arc as f32, &middle);
+            let fine = corrected(coarse.fraction, arc as f32, &middle).unwrap();
             assert!(
                 error(fine) < (k * arc).powi(4) / 200.0 + 2e-7,
                 "{k} {arc}: {fine} for {want}"
@@ -142,7 +148,10 @@ mod tests {
                 Ok(step) => assert!(step.fraction > 0.0),
                 Err(fault) => assert_eq!(fault.kind, FaultKind::ParameterBackwards),
             }
-            assert!(corrected(0.01, 0.01, &exponential(k, 0.5)) >= 0.005);
+            match corrected(0.01, 0.01, &exponential(k, 0.5)) {
+                Ok(fraction) => assert!(fraction > 0.0),
+                Err(fault) => assert_eq!(fault.kind, FaultKind::ParameterBackwards),
+            }
         }
     }
 }

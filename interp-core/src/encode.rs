@@ -240,7 +240,8 @@ pub fn rational(c: &[Bicubic; 4], edges: Edges) -> Result<RationalRecord, Encode
             *value = *value * scale - origin_mm * w;
         }
     }
-    let mut failure = EncodeError::TooLarge;
+    // The weights' Bernstein coefficients may leave the range although their values do not.
+    let mut failure = EncodeError::Weights;
     for shift in (0..=SHIFT_MAX).rev() {
         let unit = unit_mm(shift);
         let units = [unit, unit, unit, 1.0 / 1_073_741_824.0];

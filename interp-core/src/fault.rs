@@ -5,7 +5,7 @@
 #[repr(u8)]
 pub enum FaultKind {
     /// A principal curvature towards the tool leaves no room for the ball (local gouge).
-    /// Value: the surface's principal curvature towards the tool times the ball radius (at least 1 where nothing fits).
+    /// Value: the surface's principal curvature towards the tool times the ball radius (at least 0.99999 where nothing fits).
     BallDoesNotFit = 1,
     /// `S_u x S_v` is too near zero for a normal, or went through zero between two samples so that the tool would change
     /// sides. Value: `|S_u x S_v| / (|S_u| |S_v|)`, the sine between them; 0 where it went through zero.
@@ -26,7 +26,7 @@ pub enum FaultKind {
     /// A patch's coefficients exceed the range in which its polynomials cannot overflow, its weights vary more than
     /// 4 : 1, or a flagged pole is none. Value: the patch's index.
     BadPatch = 9,
-    /// The job's data are not complete or do not have the length that the header implies. Value: words received.
+    /// The job's data are not complete or do not have the length that the header implies. Value: the number of words, or the offset, that does not belong.
     BadLength = 10,
     /// A request that does not fit the state, for instance loading while a job runs. Value: the state's code.
     WrongState = 11,

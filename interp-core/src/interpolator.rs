@@ -21,6 +21,10 @@ const CROSSINGS_MAX: u8 = 3;
 /// has a radius below the scallop height.
 const FOLD_COSINE: f32 = -0.5;
 
+/// Step from place to place on a pole: 16 to a span. Between two the speed of the side lines, a rational cubic of the path
+/// parameter, changes by a small part of itself.
+const POLE_STEP: u64 = 1 << 60;
+
 /// First-order step, as a fraction of the patch, beyond which the patch's end is looked at before the series.
 const LONG_STEP: f32 = 0.25;
 
@@ -82,6 +86,8 @@ struct Run {
     /// Fraction of the span, in the direction of travel.
     fraction: u64,
     surface: Option<PassSurface>,
+    /// The pass is a single point.
+    point: bool,
     offset: Offset,
     /// The parametrisation at the last sample.
     path: PathSpeed,
@@ -102,6 +108,7 @@ impl Run {
         span: 0,
         fraction: 0,
         surface: None,
+        point: false,
         offset: Offset::NONE,
         path: PathSpeed {
             speed: 0.0,
@@ -215,7 +222,7 @@ impl<const WORDS: usize> Interpolator<WORDS> {
         self.program.records()
     }
 
-    /// Checks one record: a few microseconds of work, so that a board can do it between ticks. In order from 0.
+    /// Checks one record: some thousand cycles, so that a board can do it between ticks. In order from 0.
     ///
     /// # Errors
     /// [`FaultKind::BadPatch`] with the record's index, [`FaultKind::BadHeader`] for a span width,
@@ -234,7 +241,7 @@ impl<const WORDS: usize> Interpolator<WORDS> {
         self.program.seal()?;
         let header = self.program.header();
         self.interval = Interval::new(header.ball_radius_mm, header.scallop_mm);
-        self.arc_mm = schedule::arc_mm(header.feed_mm_s, header.period_s);
+        self.arc_mm = header.feed_mm_s * header.period_s;
         self.state = State::Ready;
         self.reset_run();
         Ok(())
@@ -330,10 +337,12 @@ impl<const WORDS: usize> Interpolator<WORDS> {
         self.last_interval = f32::INFINITY;
     }
 
-    /// One period. Never blocks, never panics; bounded by the collapse and evaluation of four patches.
+    /// One period. Never blocks, never panics; bounded by the collapse and evaluation of four patches, and at
+    /// the start of a pass by a walk over the side spans.
     ///
     /// While the job runs, each call yields a sample with [`State::Running`], counted by its `tick` from 0; the one after
     /// the last has [`State::Finished`]. In every state that does not move, the sample repeats the last position.
+    #[inline(never)]
     pub fn tick(&mut self, request: Request) -> Sample {
         self.take_up(request);
         if self.state == State::Running {
@@ -406,7 +415,11 @@ impl<const WORDS: usize> Interpolator<WORDS> {
             pass: run.pass,
             path: run.place(),
             side: run.side,
-            feed_mm_s: self.program.header().feed_mm_s,
+            feed_mm_s: if run.point {
+                0.0
+            } else {
+                self.program.header().feed_mm_s
+            },
             cc_nm: located.cc_nm,
             cl_nm: located.cl_nm,
             interval: candidate * self.program.side_width(run.side.span),
@@ -416,6 +429,9 @@ impl<const WORDS: usize> Interpolator<WORDS> {
     /// One period's arc along the pass: within the patch, or over its boundary with the arc that is left.
     #[inline]
     fn step(&mut self) -> Result<()> {
+        if self.run.point {
+            return self.step_on_pole();
+        }
         let mut rest = self.arc_mm;
         for _ in 0..=CROSSINGS_MAX {
             if let Some(fraction) = self.within(rest)? {
@@ -434,6 +450,18 @@ impl<const WORDS: usize> Interpolator<WORDS> {
         Err(Fault::new(FaultKind::PatchTooShort, rest))
     }
 
+    /// On a pole, the next of its places: the tool stands, but the interval that the pass allows differs from place to place.
+    #[inline(never)]
+    fn step_on_pole(&mut self) -> Result<()> {
+        if let Some(fraction) = self.run.fraction.checked_add(POLE_STEP) {
+            self.run.fraction = fraction;
+        } else if !self.next_span()? {
+            self.run.fraction = u64::MAX;
+            self.end_pass();
+        }
+        Ok(())
+    }
+
     /// The fraction after an arc, if that lies within the patch.
     #[inline]
     fn within(&self, arc_mm: f32) -> Result<Option<u64>> {
@@ -449,7 +477,7 @@ impl<const WORDS: usize> Interpolator<WORDS> {
             let Some(middle) = run.fraction.checked_add(half) else {
                 return Ok(None);
             };
-            fraction = contact::corrected(fraction, arc_mm, &speed_at(run, middle)?);
+            fraction = contact::corrected(fraction, arc_mm, &speed_at(run, middle)?)?;
         }
         if fraction >= 1.0 {
             return Ok(None);
@@ -483,7 +511,7 @@ impl<const WORDS: usize> Interpolator<WORDS> {
         Ok(true)
     }
 
-    /// Begins the pass at the current side place. A pass that is a single point ends with it.
+    /// Begins the pass at the current side place.
     #[inline(never)]
     fn begin_pass(&mut self) -> Result<()> {
         let header = self.program.header();
@@ -496,10 +524,7 @@ impl<const WORDS: usize> Interpolator<WORDS> {
         self.run.fraction = 0;
         self.run.least = f32::INFINITY;
         self.run.next = Next::Along;
-        if collapse(&self.program, &mut self.run)? {
-            self.end_pass();
-        }
-        Ok(())
+        collapse(&self.program, &mut self.run)
     }
 
     /// Least interval of the pass that is over, in units of the side parameter.
@@ -528,8 +553,8 @@ impl<const WORDS: usize> Interpolator<WORDS> {
     }
 }
 
-/// Collapses the patch where the run is; true where the pass is a single point.
-fn collapse<const WORDS: usize>(program: &Program<WORDS>, run: &mut Run) -> Result<bool> {
+/// Collapses the patch where the run is.
+fn collapse<const WORDS: usize>(program: &Program<WORDS>, run: &mut Run) -> Result<()> {
     let header = program.header();
     let at = PassLine {
         side: centred(run.side.fraction),
@@ -541,15 +566,10 @@ fn collapse<const WORDS: usize>(program: &Program<WORDS>, run: &mut Run) -> Resu
         },
     };
     let surface = program.collapse(run.span, run.side, &at)?;
-    let (shift, point) = match &surface {
-        PassSurface::Polynomial(pass) => (pass.shift, pass.is_point()),
-        PassSurface::Rational(pass) => (pass.shift, pass.is_point()),
-        PassSurface::Profile(pass) => (pass.shift, false),
-        PassSurface::Circle(pass) => (pass.shift, pass.is_point()),
-    };
+    run.point = surface.is_point();
+    run.offset = Offset::new(header.ball_radius_mm, surface.shift());
     run.surface = Some(surface);
-    run.offset = Offset::new(header.ball_radius_mm, shift);
-    Ok(point)
+    Ok(())
 }
 
 /// The parametrisation at another fraction of the patch.
@@ -567,12 +587,8 @@ fn contact_here(run: &Run) -> Result<(Contact, [i32; 3])> {
 /// The contact at a fraction of the patch, in the direction of travel.
 #[inline(always)]
 fn contact_at(run: &Run, fraction: u64) -> Result<(Contact, [i32; 3])> {
-    let w = centred(fraction);
     match &run.surface {
-        Some(PassSurface::Polynomial(pass)) => Ok((pass.contact(w)?, pass.origin_nm)),
-        Some(PassSurface::Rational(pass)) => Ok((pass.contact(w)?, pass.origin_nm)),
-        Some(PassSurface::Profile(pass)) => Ok((pass.contact(w)?, [0, 0, pass.height_origin_nm])),
-        Some(PassSurface::Circle(pass)) => Ok((pass.contact(fraction), [0, 0, pass.height_origin_nm])),
+        Some(surface) => surface.contact(fraction),
         None => Err(Fault::new(FaultKind::WrongState, 0.0)),
     }
 }

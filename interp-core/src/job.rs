@@ -97,9 +97,9 @@ pub struct Header {
     pub side_spans: u16,
     /// Ball radius r, mm, above 0 and at most 1000.
     pub ball_radius_mm: f32,
-    /// Feed of the cutter contact along the surface, mm/s, above 0 and at most 10 000.
+    /// Feed of the cutter contact along the surface, mm/s, 0.001 to 10 000.
     pub feed_mm_s: f32,
-    /// Scallop height limit h, mm, above 0 and below the ball radius.
+    /// Scallop height limit h, mm, above 0, at most the ball radius.
     pub scallop_mm: f32,
     /// Sampling period T, s, 1e-5 to 0.1.
     pub period_s: f32,

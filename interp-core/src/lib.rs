@@ -21,8 +21,10 @@
 //! coefficients with [`encode`].
 //!
 //! # Accuracy
-//! CL within 5 nm of the exact surface's for a ball of up to 10 mm radius and patches of up to about 100 mm; the arc
-//! between two samples within 0.001 % of feed times period.
+//! CL within 5 nm of the exact surface's for a ball of up to 10 mm radius, patches of up to about 100 mm, and first derivatives
+//! at more than 30 degrees (the normal's error grows as 1e-7 rad over their sine); the arc between two samples within
+//! 0.001 % of feed times period where the parametrisation's speed changes by less than a tenth in a period, and a fault before
+//! it could be off by much more than that.
 #![no_std]
 #![warn(clippy::indexing_slicing, clippy::panic, clippy::expect_used)]
 #![warn(

@@ -2,7 +2,7 @@
 
 use crate::arith::{count_to_f32, round_to_i32};
 use crate::fault::{Fault, FaultKind, Result};
-use crate::surface::Contact;
+use crate::surface::{Contact, SHIFT_MAX};
 
 /// Least room between ball and surface, as 1 - r k: the f32 curvature is good to a few 1e-6, so a ball that is within 1e-5
 /// of the surface's own radius counts as not fitting.
@@ -16,9 +16,13 @@ const POLE_MIN: f32 = 1e-10;
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct Offset {
     radius_mm: f32,
-    /// r in units of 2^-shift nm.
+    /// r in units of 2^-sum_shift nm.
     radius_units: f32,
+    /// The contact's units are 2^-shift nm.
     shift: u8,
+    /// Units in which contact and offset are added: coarser than the contact's where the ball asks for it, and by a bit in
+    /// any case, so that neither exceeds 2^30 and their sum fits.
+    sum_shift: u8,
 }
 
 /// Cutter contact and cutter location, nm.
@@ -34,15 +38,25 @@ impl Offset {
         radius_mm: 0.0,
         radius_units: 0.0,
         shift: 0,
+        sum_shift: 0,
     };
 
     /// The ball of this radius, for contacts in units of 2^-shift nm.
     pub(crate) fn new(radius_mm: f32, shift: u8) -> Self {
-        let units_per_mm = 1e6 * count_to_f32(1 << shift.min(crate::surface::SHIFT_MAX));
+        const HALF_RANGE: f32 = 1_073_741_824.0;
+        let shift = shift.min(SHIFT_MAX);
+        let mut sum_shift = shift.saturating_sub(1);
+        let mut radius_units = radius_mm * (1e6 * count_to_f32(1 << sum_shift));
+        // At most SHIFT_MAX rounds.
+        while sum_shift > 0 && radius_units >= HALF_RANGE {
+            sum_shift -= 1;
+            radius_units *= 0.5;
+        }
         Self {
             radius_mm,
-            radius_units: radius_mm * units_per_mm,
+            radius_units,
             shift,
+            sum_shift,
         }
     }
 
@@ -71,8 +85,12 @@ impl Offset {
     fn explain_fit(&self, contact: &Contact, along: f32, across: f32, twist: f32) -> Result<()> {
         let lateral = contact.lateral_squared;
         let speed = contact.path.speed;
-        if lateral <= POLE_MIN * speed * speed && along > ROOM_MIN {
-            return Ok(());
+        if !(lateral > POLE_MIN * speed * speed) {
+            return if along > ROOM_MIN {
+                Ok(())
+            } else {
+                Err(Fault::new(FaultKind::BallDoesNotFit, 1.0 - along))
+            };
         }
         // Least eigenvalue of [[along, t], [t, across]] with the lateral speed scaled out; 1 minus it is r k.
         let (p, q, t_squared) = (along, across / lateral, twist / lateral);
@@ -88,15 +106,17 @@ impl Offset {
     #[inline(always)]
     pub(crate) fn locate(&self, contact: &Contact, origin_nm: &[i32; 3]) -> Result<Located> {
         let half = (1_i32 << self.shift) >> 1;
+        let sum_half = (1_i32 << self.sum_shift) >> 1;
+        let coarser = self.shift - self.sum_shift;
         let [x, y, z] = contact.position;
         let n = contact.normal;
         let offset = [n.x, n.y, n.z].map(|n| round_to_i32(n * self.radius_units));
         let [ox, oy, oz] = offset;
         let [x0, y0, z0] = *origin_nm;
         let place = |position: i32, offset: i32, origin: i32| {
-            let local = position.checked_add(half)?;
-            let cc = origin.checked_add(local >> self.shift)?;
-            let cl = origin.checked_add(local.checked_add(offset)? >> self.shift)?;
+            let cc = origin.checked_add(position.checked_add(half)? >> self.shift)?;
+            let sum = (position >> coarser).checked_add(offset)?.checked_add(sum_half)?;
+            let cl = origin.checked_add(sum >> self.sum_shift)?;
             Some((cc, cl))
         };
         match (place(x, ox, x0), place(y, oy, y0), place(z, oz, z0)) {

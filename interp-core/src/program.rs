@@ -1,12 +1,13 @@
 //! A job in the machine: raw words go in, and only a complete, checked job comes out.
 
+use crate::arith::centred;
 use crate::fault::{Fault, FaultKind, Result};
 use crate::job::{Header, SPANS_MAX, SurfaceKind};
 use crate::sample::Place;
 use crate::schedule::width_words;
 use crate::surface::{
-    CirclePass, POLYNOMIAL_WORDS, PassLine, PolynomialPass, PolynomialRecord, ProfilePass, RATIONAL_WORDS,
-    REVOLVED_WORDS, RationalPass, RationalRecord, RevolvedRecord,
+    CirclePass, Contact, POLYNOMIAL_WORDS, PassLine, PolynomialPass, PolynomialRecord, ProfilePass,
+    RATIONAL_WORDS, REVOLVED_WORDS, RationalPass, RationalRecord, RevolvedRecord,
 };
 
 /// Which part of the checks a job has passed.
@@ -44,6 +45,40 @@ pub(crate) enum PassSurface {
     Circle(CirclePass),
 }
 
+impl PassSurface {
+    /// Its units are 2^-shift nm.
+    pub(crate) fn shift(&self) -> u8 {
+        match self {
+            Self::Polynomial(pass) => pass.shift,
+            Self::Rational(pass) => pass.shift,
+            Self::Profile(pass) => pass.shift,
+            Self::Circle(pass) => pass.shift,
+        }
+    }
+
+    /// The pass is a single point.
+    pub(crate) fn is_point(&self) -> bool {
+        match self {
+            Self::Polynomial(pass) => pass.is_point(),
+            Self::Rational(pass) => pass.is_point(),
+            Self::Profile(_) => false,
+            Self::Circle(pass) => pass.is_point(),
+        }
+    }
+
+    /// The contact at a fraction of the patch, in the direction of travel, and the origin it is relative to, nm.
+    #[inline(always)]
+    pub(crate) fn contact(&self, fraction: u64) -> Result<(Contact, [i32; 3])> {
+        let w = centred(fraction);
+        match self {
+            Self::Polynomial(pass) => Ok((pass.contact(w)?, pass.origin_nm)),
+            Self::Rational(pass) => Ok((pass.contact(w)?, pass.origin_nm)),
+            Self::Profile(pass) => Ok((pass.contact(w)?, [0, 0, pass.height_origin_nm])),
+            Self::Circle(pass) => Ok((pass.contact(fraction), [0, 0, pass.height_origin_nm])),
+        }
+    }
+}
+
 /// Words of one record of a kind of surface.
 const fn record_words(kind: SurfaceKind) -> usize {
     match kind {
@@ -75,7 +110,7 @@ fn check_header(header: &Header) -> Result<()> {
     }
     let ranges = [
         (header.ball_radius_mm, f32::MIN_POSITIVE, 1000.0),
-        (header.feed_mm_s, f32::MIN_POSITIVE, 10_000.0),
+        (header.feed_mm_s, 1e-3, 10_000.0),
         (header.scallop_mm, f32::MIN_POSITIVE, header.ball_radius_mm),
         (header.period_s, 1e-5, 0.1),
     ];
@@ -161,7 +196,7 @@ impl<const WORDS: usize> Program<WORDS> {
         let Stage::Loading { received, checked } = self.stage else {
             return Err(bad_length(0));
         };
-        if received != self.length || record > checked {
+        if received != self.length || record > checked || record >= self.records() {
             return Err(bad_length(received));
         }
         if record == 0 {
@@ -176,6 +211,7 @@ impl<const WORDS: usize> Program<WORDS> {
             }
         };
         match result {
+            Some(Ok(())) if !self.is_alike(index) => Err(bad_patch(record)),
             Some(Ok(())) => {
                 self.stage = Stage::Loading {
                     received,
@@ -183,9 +219,23 @@ impl<const WORDS: usize> Program<WORDS> {
                 };
                 Ok(())
             }
-            #[allow(clippy::cast_precision_loss, reason = "an index below 2^20")]
-            _ => Err(Fault::new(FaultKind::BadPatch, record as f32)),
+            _ => Err(bad_patch(record)),
         }
+    }
+
+    /// Whether a patch's side boundaries collapse like those of the first patch beside the same pass: a pass is a point as a
+    /// whole or not at all.
+    fn is_alike(&self, index: usize) -> bool {
+        let head = |index: usize| match self.header.kind {
+            SurfaceKind::Polynomial => self
+                .record::<POLYNOMIAL_WORDS>(index)
+                .map(PolynomialRecord::side_edges),
+            SurfaceKind::Rational => self
+                .record::<RATIONAL_WORDS>(index)
+                .map(RationalRecord::side_edges),
+            SurfaceKind::RevolvedAlongProfile | SurfaceKind::RevolvedAroundAxis => None,
+        };
+        head(index) == head(index - index % usize::from(self.header.path_spans.max(1)))
     }
 
     fn check_widths(&self) -> Result<()> {
@@ -255,6 +305,10 @@ impl<const WORDS: usize> Program<WORDS> {
 }
 
 const NO_RECORD: Result<PassSurface> = Err(Fault::new(FaultKind::WrongState, 0.0));
+
+fn bad_patch(record: u32) -> Fault {
+    Fault::new(FaultKind::BadPatch, crate::arith::count_to_f32(record))
+}
 
 fn bad_length(words: u32) -> Fault {
     Fault::new(FaultKind::BadLength, crate::arith::count_to_f32(words))

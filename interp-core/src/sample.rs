@@ -19,7 +19,7 @@ pub enum State {
     Stopping = 5,
     /// The job's last sample is out.
     Finished = 6,
-    /// Stopped by a fault or an abort; the position is kept.
+    /// Stopped by a fault; the position is kept.
     Faulted = 7,
 }
 

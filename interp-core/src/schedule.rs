@@ -52,11 +52,6 @@ pub(crate) fn is_last(side: Place, spans: u16) -> bool {
     side.span + 1 >= spans && side.fraction == u64::MAX
 }
 
-/// Arc of one period, mm.
-pub(crate) fn arc_mm(feed_mm_s: f32, period_s: f32) -> f32 {
-    feed_mm_s * period_s
-}
-
 /// Words of the span widths that head a job's data.
 pub(crate) fn width_words(path_spans: u16, side_spans: u16) -> u32 {
     u32::from(path_spans) + u32::from(side_spans)

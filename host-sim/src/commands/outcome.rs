@@ -1,5 +1,7 @@
 //! What `simulate` and `run` tell of a run: on the terminal and as JSON.
 
+use std::path::Path;
+
 use interp_core::Fault;
 use serde_json::{Map, Value, json};
 
@@ -106,8 +108,8 @@ impl Outcome<'_> {
         }
     }
 
-    /// The same for a person.
-    pub(super) fn print(&self) {
+    /// The same for a person, with the page if there is one.
+    pub(super) fn print(&self, page: Option<&Path>) {
         let (findings, report) = (self.findings, &self.findings.report);
         let time = self.machining_time_s();
         println!(
@@ -138,5 +140,8 @@ impl Outcome<'_> {
             "  speed        {:.2} million samples a second",
             self.samples_per_second / 1e6
         );
+        if let Some(page) = page {
+            println!("  report       {}", page.display());
+        }
     }
 }

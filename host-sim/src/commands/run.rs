@@ -7,17 +7,15 @@ use clap::Args;
 use interp_core::{Sample, State};
 use protocol::digest::Digest;
 use protocol::message::Status;
-use serde_json::json;
+use serde_json::{Value, json};
 
 use super::outcome::{FaultAt, Outcome};
 use super::simulate::{Timed, machine, surveyed, timed};
 use super::{Failure, Result, cannot_write, load, progress, trace, unheld_limits, warn_of_limits};
 use crate::job_file::JobFile;
-use crate::oracle::Emitted;
 use crate::prepare::Prepared;
 use crate::remote::qemu::{self, Qemu, QemuError};
 use crate::remote::{RemoteError, Session, drive, port};
-use crate::report::Sketch;
 
 /// Runs a job in the firmware, in QEMU or on a board, and compares every sample with this machine's.
 ///
@@ -292,25 +290,7 @@ pub(super) fn command(arguments: &Arguments) -> Result<()> {
     } else {
         by_digest(arguments, &job, &prepared, &here, &mut session)?
     };
-    let mut sketch = arguments
-        .report
-        .as_ref()
-        .map(|_| Sketch::new(&job, here.passes.len()));
-    let findings = {
-        let mut draw = sketch
-            .as_mut()
-            .map(|sketch| |emitted: &Emitted| sketch.add(emitted));
-        let each = draw.as_mut().map(|draw| draw as &mut dyn FnMut(&Emitted));
-        surveyed(&job, &prepared, here.samples, None, each)?
-    };
-    if let (Some(directory), Some(sketch)) = (&arguments.report, &sketch) {
-        let page = sketch
-            .write(directory, &arguments.job, &findings)
-            .map_err(|error| cannot_write(directory, &error))?;
-        if !arguments.json {
-            println!("report: {}", page.display());
-        }
-    }
+    let (findings, page) = surveyed(&job, &prepared, &here, None, arguments.report.as_deref())?;
     let outcome = Outcome {
         prepared: &prepared,
         findings: &findings,
@@ -320,26 +300,14 @@ pub(super) fn command(arguments: &Arguments) -> Result<()> {
         fault: here.fault,
     };
     let complaint = complaint(&ran, &here);
-    let description = &session.capabilities().description;
+    let board = session.capabilities().description.board.as_str();
     if arguments.json {
-        let mut keys = outcome.json();
-        let mut put = |key: &str, value| keys.insert(key.to_owned(), value);
-        put("compared_samples", json!(ran.compared));
-        put("first_difference", json!(ran.first_difference));
-        put("deadline_misses", json!(ran.status.deadline_misses));
-        put("tick_cycles_max", json!(ran.status.tick_cycles_max));
-        put("ticks_per_second", json!(ran.ticks_per_second));
-        put("samples_lost", json!(ran.status.samples_lost));
-        put("board", json!(description.board.as_str()));
-        println!("{}", serde_json::Value::Object(keys));
+        println!("{}", json_of(&outcome, &ran, board));
     } else {
-        println!("{} on {}", arguments.job.display(), description.board);
-        outcome.print();
-        println!(
-            "  board        {} ticks a second, {} missed",
-            ran.ticks_per_second.round(),
-            ran.status.deadline_misses
-        );
+        println!("{} on {board}", arguments.job.display());
+        outcome.print(page.as_deref());
+        let (speed, missed) = (ran.ticks_per_second.round(), ran.status.deadline_misses);
+        println!("  board        {speed} ticks a second, {missed} missed");
         let verdict = if ran.first_difference.is_none() {
             "bit for bit the same"
         } else {
@@ -351,4 +319,18 @@ pub(super) fn command(arguments: &Arguments) -> Result<()> {
         );
     }
     complaint.map_or(Ok(()), |complaint| Err(Failure::Failed(Some(complaint))))
+}
+
+/// The keys of `simulate`, and those of the board.
+fn json_of(outcome: &Outcome<'_>, ran: &Ran, board: &str) -> Value {
+    let mut keys = outcome.json();
+    let mut put = |key: &str, value| keys.insert(key.to_owned(), value);
+    put("compared_samples", json!(ran.compared));
+    put("first_difference", json!(ran.first_difference));
+    put("deadline_misses", json!(ran.status.deadline_misses));
+    put("tick_cycles_max", json!(ran.status.tick_cycles_max));
+    put("ticks_per_second", json!(ran.ticks_per_second));
+    put("samples_lost", json!(ran.status.samples_lost));
+    put("board", json!(board));
+    Value::Object(keys)
 }

@@ -1,6 +1,6 @@
 //! `simulate`: runs the core on this machine.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::time::Instant;
 
 use clap::Args;
@@ -101,25 +101,25 @@ pub(super) fn timed(job: &JobFile, prepared: &Prepared) -> Result<Timed> {
     })
 }
 
-/// Runs the core again, and measures every sample.
+/// Runs the core again, measures every sample, and writes trace and page where they are wanted; returns the page's path too.
 pub(super) fn surveyed(
     job: &JobFile,
     prepared: &Prepared,
-    samples: u64,
+    timed: &Timed,
     trace_file: Option<&PathBuf>,
-    mut each: Option<&mut dyn FnMut(&Emitted)>,
-) -> Result<Findings> {
+    directory: Option<&Path>,
+) -> Result<(Findings, Option<PathBuf>)> {
     let oracle = oracle(job)?;
-    let mut survey = Survey::new(
-        prepared,
-        &oracle,
-        trace(trace_file, job)?,
-        each.as_mut().map(|each| &mut **each as _),
-    );
-    let bar = progress(samples, "measuring");
+    let mut sketch = directory.map(|_| Sketch::new(job, timed.passes.len()));
+    let mut draw = sketch
+        .as_mut()
+        .map(|sketch| |emitted: &Emitted| sketch.add(emitted));
+    let each = draw.as_mut().map(|draw| draw as &mut dyn FnMut(&Emitted));
+    let mut survey = Survey::new(prepared, &oracle, trace(trace_file, job)?, each);
+    let bar = progress(timed.samples, "measuring");
     let mut written = Ok(());
     let mut machine = machine(job, prepared)?;
-    let _fault_was_seen_before = machine.run(|sample| {
+    let ran = machine.run(|sample| {
         written = survey.add(sample);
         if sample.tick % 65_536 == 0 {
             bar.set_position(sample.tick.into());
@@ -128,9 +128,16 @@ pub(super) fn surveyed(
     });
     bar.finish_and_clear();
     let name = trace_file.cloned().unwrap_or_default();
-    written
-        .and_then(|()| survey.finish())
-        .map_err(|error| cannot_write(&name, &error))
+    let findings = written
+        .and_then(|()| survey.finish(ran.is_ok()))
+        .map_err(|error| cannot_write(&name, &error))?;
+    let write = |(directory, sketch): (&Path, &Sketch)| {
+        sketch
+            .write(directory, Path::new(job.origin.name()), &findings)
+            .map_err(|error| cannot_write(directory, &error))
+    };
+    let page = directory.zip(sketch.as_ref()).map(write).transpose()?;
+    Ok((findings, page))
 }
 
 /// The oracle of a job that was prepared, hence has one.
@@ -143,17 +150,13 @@ pub(super) fn command(arguments: &Arguments) -> Result<()> {
     let (job, prepared) = load(&arguments.job)?;
     warn_of_limits(&job);
     let timed = timed(&job, &prepared)?;
-    let mut sketch = arguments
-        .report
-        .as_ref()
-        .map(|_| Sketch::new(&job, timed.passes.len()));
-    let findings = {
-        let mut draw = sketch
-            .as_mut()
-            .map(|sketch| |emitted: &Emitted| sketch.add(emitted));
-        let each = draw.as_mut().map(|draw| draw as &mut dyn FnMut(&Emitted));
-        surveyed(&job, &prepared, timed.samples, arguments.trace.as_ref(), each)?
-    };
+    let (findings, page) = surveyed(
+        &job,
+        &prepared,
+        &timed,
+        arguments.trace.as_ref(),
+        arguments.report.as_deref(),
+    )?;
     let outcome = Outcome {
         prepared: &prepared,
         findings: &findings,
@@ -162,19 +165,11 @@ pub(super) fn command(arguments: &Arguments) -> Result<()> {
         samples_per_second: timed.samples_per_second,
         fault: timed.fault,
     };
-    if let (Some(directory), Some(sketch)) = (&arguments.report, &sketch) {
-        let page = sketch
-            .write(directory, &arguments.job, &findings)
-            .map_err(|error| cannot_write(directory, &error))?;
-        if !arguments.json {
-            println!("report: {}", page.display());
-        }
-    }
     if arguments.json {
         println!("{}", serde_json::Value::Object(outcome.json()));
     } else {
         println!("{}", arguments.job.display());
-        outcome.print();
+        outcome.print(page.as_deref());
     }
     match outcome.fault {
         None => Ok(()),

@@ -81,7 +81,7 @@ pub(super) fn command(arguments: &Arguments) -> Result<()> {
     let (job, prepared) = load(&arguments.job)?;
     warn_of_limits(&job);
     let timed = timed(&job, &prepared)?;
-    let findings = surveyed(&job, &prepared, timed.samples, None, None)?;
+    let (findings, _) = surveyed(&job, &prepared, &timed, None, None)?;
     let report = &findings.report;
     let scanned = scanned_passes(&job)?;
     let mut failures = report.failures(&BOUNDS);

@@ -25,6 +25,8 @@ pub use surface::{NurbsSpec, SurfaceSpec};
 
 /// Largest ball radius, mm: ten times any ball-end mill; what the core accepts.
 pub const RADIUS_MAX_MM: f64 = 1000.0;
+/// Least feed, mm/min (1 um/s): below it the core's parameter step loses digits; a feed is above it.
+pub const FEED_MIN_MM_MIN: f64 = 0.06;
 /// Largest feed, mm/min (10 m/s): what the core accepts.
 pub const FEED_MAX_MM_MIN: f64 = 600_000.0;
 /// Shortest and longest sampling period, µs: what the core accepts.
@@ -108,7 +110,7 @@ pub struct JobFile {
     pub surface: SurfaceSpec,
     /// Ball radius r, mm, above 0, at most [`RADIUS_MAX_MM`].
     pub radius_mm: f64,
-    /// Feed of the cutter contact along the surface, mm/min, above 0, at most [`FEED_MAX_MM_MIN`].
+    /// Feed of the cutter contact along the surface, mm/min, above [`FEED_MIN_MM_MIN`], at most [`FEED_MAX_MM_MIN`].
     pub feed_mm_min: f64,
     /// Scallop height limit h, mm, above 0, below the ball radius.
     pub scallop_mm: f64,
@@ -175,7 +177,7 @@ impl JobFile {
             radius_mm,
             feed_mm_min: cut.number_within(
                 "feed_mm_min",
-                0.0,
+                FEED_MIN_MM_MIN,
                 FEED_MAX_MM_MIN,
                 "the feed in mm/min, e.g. 600",
             )?,

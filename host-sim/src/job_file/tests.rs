@@ -188,7 +188,7 @@ fn types_and_shapes() {
 #[rustfmt::skip] // a table: a row a line
 fn ranges() {
     check(&[
-        (REVOLVED, "600", "0", 13, 15, "must be above 0 and at most 600000, not 0"),
+        (REVOLVED, "600", "0", 13, 15, "must be above 0.06 and at most 600000, not 0"),
         (REVOLVED, "600", "nan", 13, 15, "must be a finite number"),
         (REVOLVED, "600", "1e999", 13, 15, "must be a finite number"),
         (REVOLVED, "radius_mm = 10", "radius_mm = -inf", 10, 13, "must be a finite number"),

@@ -301,12 +301,14 @@ impl Oracle {
         } else {
             length(if u_vanishes { at.v } else { at.u })
         };
-        let lateral_speed = if pass_collapses {
-            limit(|c| c.lateral_speed)
+        // On a pole every side line leaves in its own direction: its own speed and curvature count.
+        let (side, side2) = if u_vanishes { (at.v, at.vv) } else { (at.u, at.uu) };
+        let (lateral_speed, curvature_side) = if pass_collapses {
+            (length(side), dot(side2, normal) / dot(side, side))
         } else {
-            0.0
+            (0.0, limit(|c| c.curvature_side))
         };
-        let curvatures = [limit(|c| c.curvature_path), limit(|c| c.curvature_side)];
+        let curvatures = [limit(|c| c.curvature_path), curvature_side];
         let principal = [limit(|c| c.principal[0]), limit(|c| c.principal[1])];
         Ok(self.with_curvatures(at.point, normal, path_speed, lateral_speed, curvatures, principal))
     }

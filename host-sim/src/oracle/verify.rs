@@ -89,9 +89,7 @@ impl Verifier {
         }
         self.check_geometry(sample, spot);
         if sample.last_of_pass {
-            // A pass on a pole is a single point, wherever on its boundary it is said to be.
-            let point = sample.first_of_pass && self.is_point(side);
-            if path != self.pass_ends(sample.pass)[1] && !point {
+            if path != self.pass_ends(sample.pass)[1] {
                 self.report.off_boundary += 1;
             }
             if let Some(pass) = &mut self.current {
@@ -108,12 +106,6 @@ impl Verifier {
             self.report.last_on_boundary = pass.side == self.oracle.side_range()[1];
         }
         self.report
-    }
-
-    /// Whether the pass at a side parameter has no length to speak of: less than a thousandth of a nanometre.
-    fn is_point(&self, side: f64) -> bool {
-        let [low, high] = self.oracle.path_range();
-        self.oracle.arc_between(&self.breaks, low, high, side) < 1e-9
     }
 
     /// Path parameters where a pass starts and ends.

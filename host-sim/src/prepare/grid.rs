@@ -1,5 +1,7 @@
 //! The grid of records: pieces in the pass's orientation, split further where a record cannot hold one.
 
+use std::collections::BTreeSet;
+
 use interp_core::encode::{self, Bicubic, EncodeError};
 use interp_core::job::SPANS_MAX;
 use interp_core::surface::Edges;
@@ -14,7 +16,7 @@ pub(super) const REMEDY: &str = "move the part nearer to the origin (±2 m), or 
 /// Distance within which the poles of a boundary count as one point, mm: 1/1000 of the machine's nanometre.
 const POINT_MM: f64 = 1e-9;
 
-/// Rounds of splitting before it is given up: halving a 2 m patch so often makes it 8 mm.
+/// Rounds of splitting before it is given up; each halves every patch that a record cannot hold.
 const ROUNDS_MAX: usize = 8;
 
 /// Which way a piece has to be split.
@@ -22,6 +24,16 @@ struct Split {
     path: bool,
     side: bool,
     why: EncodeError,
+}
+
+/// What the patches of a grid come to.
+struct Grid {
+    /// The records, path index fastest.
+    words: Vec<i32>,
+    /// Path and side spans that have to be halved.
+    halve: [BTreeSet<usize>; 2],
+    /// Side spans beside which a part of the boundary is a point, but not all of it.
+    mixed: Option<usize>,
 }
 
 /// Prepares a grid of patches.
@@ -32,23 +44,25 @@ pub(super) fn prepare(job: &JobFile, header: Header, source: &Source) -> Result<
         Along::V => (v, u),
     };
     for _ in 0..ROUNDS_MAX {
-        match records(source, job.along, &path, &side) {
-            Ok(records) => return finish(job, header, source.rational(), path, side, records),
-            Err((_, split)) if matches!(split.why, EncodeError::NotFinite | EncodeError::TooFar) => {
-                let what = format!("the machine cannot hold this surface: {}", split.why);
-                return Err(job.origin.error("surface", what, REMEDY));
+        let grid = grid(source, job.along, &path, &side).map_err(|why| {
+            let what = format!("the machine cannot hold this surface: {why}");
+            job.origin.error("surface", what, REMEDY)
+        })?;
+        let [path_spans, side_spans] = &grid.halve;
+        if path_spans.is_empty() && side_spans.is_empty() {
+            if let Some(span) = grid.mixed {
+                let what = format!(
+                    "beside side span {span} a part of the boundary is a single point, but not all of it"
+                );
+                let remedy = "end the surface where the boundary becomes a point, and make two jobs of it";
+                return Err(job.origin.error("surface", what, remedy));
             }
-            Err(([path_span, side_span], split)) => {
-                if split.path {
-                    halve(&mut path, path_span);
-                }
-                if split.side {
-                    halve(&mut side, side_span);
-                }
-                if path.len().max(side.len()) > usize::from(SPANS_MAX) {
-                    break;
-                }
-            }
+            return finish(job, header, source.rational(), path, side, grid.words);
+        }
+        halve(&mut path, path_spans);
+        halve(&mut side, side_spans);
+        if path.len().max(side.len()) > usize::from(SPANS_MAX) {
+            break;
         }
     }
     Err(job.origin.error(
@@ -58,62 +72,107 @@ pub(super) fn prepare(job: &JobFile, header: Header, source: &Source) -> Result<
     ))
 }
 
-fn halve(breaks: &mut Vec<f64>, span: usize) {
-    let middle = 0.5 * (breaks[span] + breaks[span + 1]);
-    breaks.insert(span + 1, middle);
+fn halve(breaks: &mut Vec<f64>, spans: &BTreeSet<usize>) {
+    for &span in spans.iter().rev() {
+        breaks.insert(span + 1, 0.5 * (breaks[span] + breaks[span + 1]));
+    }
 }
 
-/// The records of all patches, path index fastest; or the first patch that has to be split.
-fn records(
-    source: &Source,
-    along: Along,
-    path: &[f64],
-    side: &[f64],
-) -> Result<Vec<i32>, ([usize; 2], Split)> {
-    let mut words = Vec::new();
+/// The records of all patches, and which spans have to be halved instead.
+fn grid(source: &Source, along: Along, path: &[f64], side: &[f64]) -> Result<Grid, EncodeError> {
+    let mut grid = Grid {
+        words: Vec::new(),
+        halve: [BTreeSet::new(), BTreeSet::new()],
+        mixed: None,
+    };
     for (j, side) in side.windows(2).enumerate() {
+        let mut first = None;
         for (i, path) in path.windows(2).enumerate() {
             let (path, side) = ([path[0], path[1]], [side[0], side[1]]);
             let piece = match along {
                 Along::U => source.piece(path, side),
                 Along::V => source.piece(side, path).map(|axis| transpose(&axis)),
             };
-            record(&piece, source.rational(), &mut words).map_err(|split| ([i, j], split))?;
+            let edges = collapsed(&piece);
+            let beside = [edges.side_start, edges.side_end];
+            if *first.get_or_insert(beside) != beside {
+                grid.mixed = Some(j);
+            }
+            match record(&piece, edges, source.rational(), &mut grid.words) {
+                Ok(()) => {}
+                Err(split) if matches!(split.why, EncodeError::NotFinite | EncodeError::TooFar) => {
+                    return Err(split.why);
+                }
+                Err(split) => {
+                    let [path_spans, side_spans] = &mut grid.halve;
+                    path_spans.extend(split.path.then_some(i));
+                    side_spans.extend(split.side.then_some(j));
+                }
+            }
         }
     }
-    Ok(words)
+    Ok(grid)
 }
 
 fn transpose(c: &Bicubic) -> Bicubic {
     std::array::from_fn(|i| std::array::from_fn(|j| c[j][i]))
 }
 
-fn record(piece: &Piece, rational: bool, words: &mut Vec<i32>) -> Result<(), Split> {
-    let edges = collapsed(piece);
+fn record(piece: &Piece, edges: Edges, rational: bool, words: &mut Vec<i32>) -> Result<(), Split> {
+    if edges.count() > 1 {
+        // Opposite boundaries are parted by a cut between them.
+        let path = edges.path_start && edges.path_end;
+        let side = edges.side_start && edges.side_end;
+        let neither = !path && !side;
+        return Err(Split {
+            path: path || neither,
+            side: side || neither,
+            why: EncodeError::NotAPole,
+        });
+    }
     let both = |why| Split {
         path: true,
         side: true,
         why,
     };
-    let along = edges.path_start && edges.path_end;
-    let across = edges.side_start && edges.side_end;
-    if along || across {
-        return Err(Split {
-            path: along,
-            side: across,
-            why: EncodeError::NotAPole,
-        });
-    }
-    if rational && edges.count() > 1 {
-        return Err(both(EncodeError::NotAPole));
-    }
-    if rational {
-        words.extend(encode::rational(piece, edges).map_err(both)?.to_words());
+    let words_of = if rational {
+        let one_way = |why| match why {
+            EncodeError::Weights => weight_split(piece),
+            why => both(why),
+        };
+        encode::rational(piece, edges)
+            .map_err(one_way)?
+            .to_words()
+            .to_vec()
     } else {
         let [x, y, z, _] = *piece;
-        words.extend(encode::polynomial(&[x, y, z], edges).map_err(both)?.to_words());
-    }
+        encode::polynomial(&[x, y, z], edges)
+            .map_err(both)?
+            .to_words()
+            .to_vec()
+    };
+    words.extend(words_of);
     Ok(())
+}
+
+/// Splits the way in which the weights vary more.
+fn weight_split(piece: &Piece) -> Split {
+    let [.., weight] = piece;
+    let cubic = |[c0, c1, c2, c3]: [f64; 4], t: f64| c0 + t * (c1 + t * (c2 + t * c3));
+    let ratio = |at: &dyn Fn(f64) -> f64| {
+        let values = (0..9).map(|k| at(f64::from(k) / 8.0 - 0.5));
+        let (least, most) = values.fold((f64::INFINITY, 0.0_f64), |(a, b), value| {
+            (a.min(value), b.max(value))
+        });
+        most / least
+    };
+    let along = ratio(&|t| cubic(weight.map(|row| cubic(row, 0.0)), t));
+    let across = ratio(&|t| cubic(weight.map(|row| cubic(row, t)), 0.0));
+    Split {
+        path: along >= across,
+        side: across >= along,
+        why: EncodeError::Weights,
+    }
 }
 
 /// Which boundaries of a piece are single points.

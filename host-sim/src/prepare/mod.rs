@@ -11,7 +11,7 @@ mod patches;
 use interp_core::sample::Place;
 use interp_core::{Header, Pattern, SurfaceKind, ToolSide, encode};
 
-use crate::job_file::{self, Along, JobFile, JobFileError, Side, SurfaceSpec};
+use crate::job_file::{self, Along, JobFile, JobFileError, SurfaceSpec};
 use crate::oracle::Oracle;
 
 /// One parameter of the prepared surface: its spans, in the parameter's own units.
@@ -111,7 +111,6 @@ pub fn prepare(job: &JobFile) -> Result<Prepared, JobFileError> {
         scallop_mm: job.scallop_mm as f32,
         period_s: job.machine.period_s() as f32,
     };
-    debug_assert!(matches!(job.side, Side::Up | Side::Plus | Side::Minus));
     match &job.surface {
         SurfaceSpec::Revolved {
             radius_mm,

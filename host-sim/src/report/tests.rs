@@ -44,7 +44,7 @@ fn run(text: &str) -> (JobFile, Sketch, Findings) {
         .unwrap()
         .run(|sample| survey.add(sample).is_ok())
         .unwrap();
-    let findings = survey.finish().unwrap();
+    let findings = survey.finish(true).unwrap();
     (job, sketch, findings)
 }
 

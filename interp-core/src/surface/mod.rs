@@ -1,9 +1,9 @@
-//! Surfaces: from stored words to what the stages need at one point of a pass, a [`Contact`].
+//! Surfaces: from stored words to what the stages need at one point of a pass, a `Contact`.
 //!
 //! On a pass the side parameter is fixed. A surface kind therefore has two parts, both in one file:
 //!
 //! * `collapse`, once a pass and patch: the patch at this side parameter becomes a handful of cubics in the path parameter;
-//! * `contact`, once a sample: the cubics at a path parameter become the [`Contact`].
+//! * `contact`, once a sample: the cubics at a path parameter become the `Contact`.
 //!
 //! Positions are fixed point, relative to the patch's own origin, in units of 2^-shift nm; first derivatives are evaluated
 //! in fixed point too (31 bits instead of 24) and then become f32, like everything after them. Both parameters are
@@ -118,7 +118,7 @@ pub(crate) struct Derivatives {
     pub(crate) side: Vec3,
     /// Mixed derivative of S, up to tangential parts.
     pub(crate) mixed: Vec3,
-    /// Second side derivative of S, up to tangential parts.
+    /// Second side derivative of S over b, up to tangential parts.
     pub(crate) side2: Vec3,
     /// a and 1/a: fixed on a pass; both 0 where the whole pass is a pole.
     pub(crate) path_factor: PathFactor,
@@ -157,7 +157,7 @@ impl Derivatives {
         let slant = b * f * inverse_e;
         let l = normal.dot(self.path2);
         let m = normal.dot(self.mixed);
-        let n = normal.dot(self.side2);
+        let n = b * normal.dot(self.side2);
         let shear = m - slant * l;
         let twist = shear * inverse * inverse_a;
         Ok(Contact {

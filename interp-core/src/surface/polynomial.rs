@@ -67,6 +67,13 @@ impl PolynomialRecord {
         }
     }
 
+    /// Whether the side boundaries collapse, start and end.
+    pub(crate) fn side_edges(words: &[i32; POLYNOMIAL_WORDS]) -> [bool; 2] {
+        let ([.., head], _) = split_head(words);
+        let edges = HeadWord::from_word(head).edges;
+        [edges.side_start, edges.side_end]
+    }
+
     /// Whether the board takes the patch: nothing can overflow, and flagged boundaries do collapse (to 8 units).
     ///
     /// # Errors
@@ -196,17 +203,37 @@ pub(super) fn float_cubic(c: &[f32; 4], w: f32) -> f32 {
     c0 + (c1 + (c2 + c3 * w) * w) * w
 }
 
-fn collapse_axis(rows: &[[i32; 4]; 4], at: &PassLine, edges: Edges, scale: f32) -> Axis {
-    let y = at.side;
-    let y_float = centred_to_f32(y);
-    let position = turn(rows.map(|row| cubic(&row, y)), at.reversed);
-    let side = turn(rows.map(|row| slope(&row, y)), at.reversed);
-    let [b0, b1, b2, b3] = rows.map(|row| second(&row, y_float) * scale);
-    let side2 = if at.reversed {
+/// The second side derivative on the pass, as a cubic in mm (or weight).
+pub(super) fn second_side(rows: &[[i32; 4]; 4], at: &PassLine, scale: f32) -> [f32; 4] {
+    let [b0, b1, b2, b3] = rows.map(|row| second(&row, centred_to_f32(at.side)) * scale);
+    if at.reversed {
         [b0, -b1, b2, -b3]
     } else {
         [b0, b1, b2, b3]
-    };
+    }
+}
+
+/// A float cubic with a root divided out; the same where there is none.
+pub(super) fn divided(c: [f32; 4], root: Option<Root>) -> [f32; 4] {
+    let [_, c1, c2, c3] = c;
+    match root {
+        None => c,
+        Some(Root::Start) => {
+            let q1 = c2 - 0.5 * c3;
+            [c1 - 0.5 * q1, q1, c3, 0.0]
+        }
+        Some(Root::End) => {
+            let q1 = c2 + 0.5 * c3;
+            [-(c1 + 0.5 * q1), -q1, -c3, 0.0]
+        }
+    }
+}
+
+fn collapse_axis(rows: &[[i32; 4]; 4], at: &PassLine, edges: Edges, scale: f32) -> Axis {
+    let y = at.side;
+    let position = turn(rows.map(|row| cubic(&row, y)), at.reversed);
+    let side = turn(rows.map(|row| slope(&row, y)), at.reversed);
+    let side2 = divided(second_side(rows, at, scale), edges.path_root(at.reversed));
     let path = match edges.side_root() {
         None => derivative(&position),
         Some(root) => derivative(&turn(
@@ -214,7 +241,7 @@ fn collapse_axis(rows: &[[i32; 4]; 4], at: &PassLine, edges: Edges, scale: f32) 
             at.reversed,
         )),
     };
-    let divided = match edges.path_root(at.reversed) {
+    let side_divided = match edges.path_root(at.reversed) {
         None => side,
         Some(root) => {
             let [q0, q1, q2] = root.divide(&side);
@@ -224,7 +251,7 @@ fn collapse_axis(rows: &[[i32; 4]; 4], at: &PassLine, edges: Edges, scale: f32) 
     Axis {
         position,
         path,
-        side: divided,
+        side: side_divided,
         mixed: float_derivative(&side, scale),
         side2,
     }

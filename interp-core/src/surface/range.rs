@@ -2,10 +2,10 @@
 
 use crate::fault::{Fault, FaultKind, Result};
 
-/// Largest shift: units of 2^-12 nm. Finer than any use; it bounds the float conversion of an offset.
+/// Largest shift: units of 2^-12 nm, finer than any use.
 pub const SHIFT_MAX: u8 = 12;
 
-/// Which boundaries of a patch collapse into a point. At most one of each pair, and for rational patches at most one in all.
+/// Which boundary of a patch collapses into a point: at most one.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Edges {
     /// The boundary at the start of the path parameter.
@@ -125,11 +125,10 @@ impl HeadWord {
         }
     }
 
-    /// Whether the word means what it says: no unknown bit, no boundary pair collapsed on both sides.
+    /// Whether the word means what it says: no unknown bit, at most one boundary collapsed.
     pub(crate) const fn check(word: i32) -> bool {
         let head = Self::from_word(word);
-        let e = head.edges;
-        head.to_word() == word && !(e.path_start && e.path_end) && !(e.side_start && e.side_end)
+        head.to_word() == word && head.edges.count() <= 1
     }
 }
 
@@ -210,8 +209,7 @@ mod tests {
     fn head_word_round_trip() {
         for word in 0..=0xfff {
             assert_eq!(HeadWord::check(word), {
-                let pairs = word >> 8;
-                word & 0xff <= i32::from(SHIFT_MAX) && pairs & 3 != 3 && pairs & 12 != 12
+                word & 0xff <= i32::from(SHIFT_MAX) && (word >> 8).count_ones() <= 1
             });
         }
         assert!(!HeadWord::check(0x1000));

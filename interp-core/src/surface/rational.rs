@@ -6,8 +6,8 @@
 //! origin is that point, so that the numerators vanish there; at most one boundary of a patch may collapse.
 
 use super::polynomial::{
-    collapses, derivative, float_cubic, float_derivative, line, parabola, second, side_factor, slope,
-    split_head, travel_sign, turn, unit_mm,
+    collapses, derivative, divided, float_cubic, float_derivative, line, parabola, second_side, side_factor,
+    slope, split_head, travel_sign, turn, unit_mm,
 };
 use super::range::{BAD_PATCH, Edges, HeadWord, Root, fits, patch_bound};
 use super::{Contact, Derivatives, PassLine, PathFactor};
@@ -76,6 +76,13 @@ impl RationalRecord {
         }
     }
 
+    /// Whether the side boundaries collapse, start and end.
+    pub(crate) fn side_edges(words: &[i32; RATIONAL_WORDS]) -> [bool; 2] {
+        let ([.., head], _) = split_head(words);
+        let edges = HeadWord::from_word(head).edges;
+        [edges.side_start, edges.side_end]
+    }
+
     /// Whether the board takes the patch: nothing can overflow, the weight stays within [1/2, 2), at most one boundary
     /// collapses, and where one does the numerators vanish.
     ///
@@ -89,7 +96,6 @@ impl RationalRecord {
         let vanishes =
             |c: &[[i32; 4]; 4]| edges.count() == 0 || (collapses(c, edges) && touches_zero(c, edges));
         let good = HeadWord::check(head)
-            && edges.count() <= 1
             && fits(weight)
             // Half of i32: the quotient by a weight of at least 1/2 has to fit too.
             && [x, y, z].into_iter().all(|c| patch_bound(c) < 1 << 30)
@@ -192,18 +198,10 @@ fn with_zero([q0, q1, q2]: [i32; 3]) -> [i32; 4] {
     [q0, q1, q2, 0]
 }
 
-fn second_side(rows: &[[i32; 4]; 4], at: &PassLine, scale: f32) -> [f32; 4] {
-    let [b0, b1, b2, b3] = rows.map(|row| second(&row, centred_to_f32(at.side)) * scale);
-    if at.reversed {
-        [b0, -b1, b2, -b3]
-    } else {
-        [b0, b1, b2, b3]
-    }
-}
-
 fn collapse_axis(rows: &[[i32; 4]; 4], at: &PassLine, edges: Edges, scale: f32) -> Axis {
     let position = turn(rows.map(|row| cubic(&row, at.side)), at.reversed);
     let side_plain = turn(rows.map(|row| slope(&row, at.side)), at.reversed);
+    let plain = second_side(rows, at, scale);
     let (reduced, side) = match (edges.side_root(), edges.path_root(at.reversed)) {
         (Some(root), _) => (
             turn(
@@ -223,7 +221,7 @@ fn collapse_axis(rows: &[[i32; 4]; 4], at: &PassLine, edges: Edges, scale: f32) 
         reduced,
         side,
         side_plain,
-        side2: second_side(rows, at, scale),
+        side2: divided(plain, edges.path_root(at.reversed)),
     }
 }
 
@@ -323,7 +321,7 @@ impl RationalPass {
         let p_mixed = Vec3::each(&self.mixed, |c| parabola(c, at));
         let mixed = (p_mixed - s * parabola(&self.weight.mixed, at)) * inverse;
         let p_side2 = Vec3::each(&self.side2, |c| float_cubic(c, at));
-        let side2 = (p_side2 - s * float_cubic(&self.weight.side2, at)) * inverse;
+        let side2 = (p_side2 - s_side * float_cubic(&self.weight.side2, at)) * inverse;
         Derivatives {
             path,
             path2,

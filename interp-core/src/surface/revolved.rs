@@ -107,6 +107,9 @@ impl RevolvedRecord {
     }
 }
 
+/// Units by which a radius may fall below 0: the rounding of a profile that ends on the axis.
+const AXIS_UNITS: i32 = 4;
+
 /// The profile at one parameter, per unit of the (travelled) parameter.
 #[derive(Clone, Copy, Debug)]
 struct ProfilePoint {
@@ -152,6 +155,9 @@ impl Profile {
             6.0 * c3 * self.scale
         });
         let [radius_units, height_units] = both.map(|c| cubic(c, w));
+        let near_axis =
+            radius_units.wrapping_add(AXIS_UNITS).cast_unsigned() <= 2 * AXIS_UNITS.cast_unsigned();
+        let radius_units = if near_axis { 0 } else { radius_units };
         ProfilePoint {
             radius_units,
             height_units,
