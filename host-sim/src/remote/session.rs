@@ -20,6 +20,10 @@ const TRIES: u32 = 4;
 /// Time without any event of a run after which the board counts as gone.
 const SILENCE_TIMEOUT: Duration = Duration::from_secs(20);
 
+/// Pause before each read of events: QEMU hands its serial line's bytes over one by one, and a reader that is woken by each
+/// takes the processor from it.
+const GATHER: Duration = Duration::from_millis(1);
+
 /// A line to a board. Reading returns [`io::ErrorKind::TimedOut`] or [`io::ErrorKind::WouldBlock`] after some
 /// milliseconds without a byte.
 pub trait Stream: Read + Write + Send {}
@@ -171,6 +175,7 @@ impl Session {
             if let Some(event) = self.events.pop_front() {
                 return Ok(event);
             }
+            std::thread::sleep(GATHER);
             let before = self.input.len();
             // An answer that comes now belongs to a request that was answered before.
             self.read_some()?;
