@@ -457,7 +457,7 @@ fn uneven_parametrisations_keep_the_feed_or_fault() {
         assert!(
             ran.fault
                 .is_some_and(|fault| fault.kind == FaultKind::ParameterBackwards)
-                || ran.ripple_pct < 0.1,
+                || ran.ripple_pct <= 0.001,
             "{}",
             ran.ripple_pct
         );
