@@ -264,6 +264,7 @@ fn poles() {
                         ran.position_nm
                     );
                     assert!(ran.ripple_pct <= 0.001, "{name}: ripple {} %", ran.ripple_pct);
+                    assert!(ran.interval <= 1e-4, "{name}: interval off by {}", ran.interval);
                     assert_eq!(ran.off_boundary, 0, "{name}");
                     assert!(ran.samples > 1000, "{name}");
                 }
