@@ -16,6 +16,7 @@
     )
 )]
 
+pub mod budget;
 pub mod commands;
 pub mod explain;
 pub mod job_file;

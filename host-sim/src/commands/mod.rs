@@ -1,5 +1,6 @@
 //! The commands, one file each; this one reads the arguments and turns results into exit codes.
 
+mod budget;
 mod outcome;
 mod run;
 mod simulate;
@@ -54,6 +55,7 @@ enum Command {
     Simulate(simulate::Arguments),
     Run(run::Arguments),
     Verify(verify::Arguments),
+    Budget(budget::Arguments),
 }
 
 /// How the tool path is made.
@@ -70,6 +72,7 @@ pub fn main() -> ExitCode {
         Command::Simulate(arguments) => simulate::command(&arguments),
         Command::Run(arguments) => run::command(&arguments),
         Command::Verify(arguments) => verify::command(&arguments),
+        Command::Budget(arguments) => budget::command(&arguments),
     };
     match result {
         Ok(()) => ExitCode::SUCCESS,

@@ -29,6 +29,9 @@ pub enum QemuError {
     /// The firmware could not be built.
     #[error("the firmware for QEMU could not be built: {0}")]
     Firmware(String),
+    /// The plugin that counts cycles could not be built.
+    #[error("the plugin that counts cycles could not be built: {0}")]
+    Plugin(String),
     /// It did not start, or ended.
     #[error("QEMU did not start: {0}")]
     Start(String),
@@ -114,12 +117,42 @@ fn processors() -> Vec<usize> {
     list.trim().split(',').filter_map(range).flatten().collect()
 }
 
+/// Builds the plugin that counts cycles, and returns the library.
+///
+/// # Errors
+/// Cargo is missing or fails; its own words are passed on.
+pub fn cycle_plugin() -> Result<PathBuf, QemuError> {
+    let workspace = workspace();
+    let cargo = std::env::var_os("CARGO").unwrap_or_else(|| "cargo".into());
+    let output = Command::new(cargo)
+        .args(["build", "--release", "--quiet", "-p", "cycle-plugin"])
+        .args(["--target-dir", "target/plugin"])
+        .current_dir(&workspace)
+        .stdin(Stdio::null())
+        .output()
+        .map_err(|error| QemuError::Plugin(error.to_string()))?;
+    if !output.status.success() {
+        return Err(QemuError::Plugin(
+            String::from_utf8_lossy(&output.stderr).into_owned(),
+        ));
+    }
+    Ok(workspace.join("target/plugin/release/libcycle_plugin.so"))
+}
+
 impl Qemu {
     /// Starts QEMU with a firmware image, and connects to its serial line.
     ///
     /// # Errors
     /// QEMU is missing, or does not start.
     pub fn start(image: &Path) -> Result<(Self, Box<dyn Stream>), QemuError> {
+        Self::start_with(image, &[])
+    }
+
+    /// The same with further arguments.
+    ///
+    /// # Errors
+    /// As [`Self::start`].
+    pub fn start_with(image: &Path, further: &[String]) -> Result<(Self, Box<dyn Stream>), QemuError> {
         let failed = |error: io::Error| QemuError::Start(error.to_string());
         let folder = tempfile::tempdir().map_err(failed)?;
         let socket = folder.path().join("serial");
@@ -143,6 +176,7 @@ impl Qemu {
                 socket.display()
             ))
             .args(["-serial", "chardev:link"])
+            .args(further)
             .arg("-kernel")
             .arg(image)
             .stdin(Stdio::null())

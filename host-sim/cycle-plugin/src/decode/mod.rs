@@ -1,0 +1,273 @@
+//! Thumb-2 and single-precision VFP instructions as far as their cost depends on them: length, class, and the registers
+//! that are read, written and used for an address (ARMv7-M Architecture Reference Manual, A5 to A7).
+//!
+//! Not for executing: immediates and conditions are dropped, except for the target of a direct branch.
+
+mod float;
+mod narrow;
+mod wide;
+
+/// A set of registers: bits 0 to 15 are R0 to R15, bits 16 to 47 are S0 to S31.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Registers(pub u64);
+
+impl Registers {
+    /// No register.
+    pub const NONE: Self = Self(0);
+    /// The stack pointer.
+    pub const SP: Self = Self(1 << 13);
+    /// The program counter.
+    pub const PC: Self = Self(1 << 15);
+
+    /// A core register, by the lowest four bits.
+    #[must_use]
+    pub const fn core(number: u16) -> Self {
+        Self(1 << (number & 15))
+    }
+
+    /// A single-precision register, by the lowest five bits.
+    #[must_use]
+    pub const fn single(number: u16) -> Self {
+        Self(1 << (16 + (number & 31)))
+    }
+
+    /// So many single-precision registers from this one on.
+    #[must_use]
+    pub const fn singles(first: u16, count: u16) -> Self {
+        let count = if count > 32 { 32 } else { count };
+        Self((((1_u64 << count) - 1) << (16 + (first & 31))) & 0xffff_ffff_0000)
+    }
+
+    /// Registers of a list such as that of `PUSH`.
+    #[must_use]
+    pub const fn list(list: u16) -> Self {
+        Self(list as u64)
+    }
+
+    /// All of both.
+    #[must_use]
+    pub const fn and(self, other: Self) -> Self {
+        Self(self.0 | other.0)
+    }
+
+    /// This set without another's registers.
+    #[must_use]
+    pub const fn without(self, other: Self) -> Self {
+        Self(self.0 & !other.0)
+    }
+
+    /// Whether a register is in both.
+    #[must_use]
+    pub const fn meets(self, other: Self) -> bool {
+        self.0 & other.0 != 0
+    }
+}
+
+/// How a branch finds its target.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Branch {
+    /// `B`, with or without a condition, `CBZ`, `CBNZ`: to this address.
+    Direct(u32),
+    /// `BL`: to this address.
+    Call(u32),
+    /// `BLX` to a register.
+    CallIndirect,
+    /// `BX`, `MOV PC`, `ADD PC` to anything but the link register.
+    Indirect,
+    /// `BX LR`.
+    Return,
+}
+
+/// What an instruction's cost depends on.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Class {
+    /// Data processing.
+    Simple,
+    /// `MUL`, `MLA`, `SMMLAR`, `UMULL` and their like.
+    Multiply,
+    /// `SDIV`, `UDIV`.
+    Divide,
+    /// A branch.
+    Branch(Branch),
+    /// `TBB`, `TBH`.
+    Table,
+    /// Loads a byte, halfword or word; into PC it is a branch.
+    Load,
+    /// The same from a literal pool.
+    LoadLiteral,
+    /// Stores a byte, halfword or word; the address is a base and an immediate.
+    Store,
+    /// The same with a register added to the base.
+    StoreIndexed,
+    /// `LDRD`, `LDM`, `POP`: so many words.
+    LoadMultiple(u8),
+    /// `STRD`, `STM`, `PUSH`: so many words.
+    StoreMultiple(u8),
+    /// `IT`.
+    IfThen,
+    /// `NOP`, `SEV`, `PLD`.
+    Hint,
+    /// `WFI`, `WFE`.
+    Wait,
+    /// `DMB`, `DSB`, `ISB`.
+    Barrier,
+    /// `MRS`, `MSR`.
+    SpecialRegister,
+    /// `CPSIE`, `CPSID`.
+    ChangeState,
+    /// `BKPT`, `SVC`, `UDF`.
+    Trap,
+    /// VFP: add, subtract, multiply, convert.
+    FloatArithmetic,
+    /// VFP: move, absolute value, negate, compare, immediate, to and from a core register.
+    FloatMove,
+    /// VFP: two core registers to or from two single registers.
+    FloatMovePair,
+    /// VFP: `VMLA`, `VFMA` and their like.
+    FloatMultiplyAdd,
+    /// VFP: `VDIV`, `VSQRT`.
+    FloatDivide,
+    /// `VLDR` of a single.
+    FloatLoad,
+    /// `VSTR` of a single.
+    FloatStore,
+    /// `VLDM`, `VPOP`, `VLDR` of a double: so many words.
+    FloatLoadMultiple(u8),
+    /// `VSTM`, `VPUSH`, `VSTR` of a double: so many words.
+    FloatStoreMultiple(u8),
+    /// Nothing that a Cortex-M4F executes, or not known here.
+    Unknown,
+}
+
+impl Class {
+    /// Whether the floating-point unit takes part: such an instruction sets lazy stacking off.
+    #[must_use]
+    pub const fn is_float(self) -> bool {
+        matches!(
+            self,
+            Self::FloatArithmetic
+                | Self::FloatMove
+                | Self::FloatMovePair
+                | Self::FloatMultiplyAdd
+                | Self::FloatDivide
+                | Self::FloatLoad
+                | Self::FloatStore
+                | Self::FloatLoadMultiple(_)
+                | Self::FloatStoreMultiple(_)
+        )
+    }
+
+    /// Whether it reads memory into registers.
+    #[must_use]
+    pub const fn is_load(self) -> bool {
+        matches!(
+            self,
+            Self::Load
+                | Self::LoadLiteral
+                | Self::LoadMultiple(_)
+                | Self::FloatLoad
+                | Self::FloatLoadMultiple(_)
+        )
+    }
+
+    /// Whether it writes memory.
+    #[must_use]
+    pub const fn is_store(self) -> bool {
+        matches!(
+            self,
+            Self::Store
+                | Self::StoreIndexed
+                | Self::StoreMultiple(_)
+                | Self::FloatStore
+                | Self::FloatStoreMultiple(_)
+        )
+    }
+}
+
+/// A decoded instruction.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Instruction {
+    /// Bytes: 2 or 4.
+    pub length: u8,
+    /// What its cost depends on.
+    pub class: Class,
+    /// Registers that it needs, those for an address included.
+    pub reads: Registers,
+    /// Registers that it sets.
+    pub writes: Registers,
+    /// Registers that an address is made of.
+    pub address: Registers,
+}
+
+impl Instruction {
+    const fn new(length: u8, class: Class, reads: Registers, writes: Registers) -> Self {
+        Self {
+            length,
+            class,
+            reads,
+            writes,
+            address: Registers::NONE,
+        }
+    }
+
+    const fn at(mut self, address: Registers) -> Self {
+        self.address = address;
+        self.reads = self.reads.and(address);
+        self
+    }
+
+    /// Data processing whose result may be the program counter.
+    const fn data(length: u8, reads: Registers, writes: Registers) -> Self {
+        let class = if writes.meets(Registers::PC) {
+            Class::Branch(Branch::Indirect)
+        } else {
+            Class::Simple
+        };
+        Self::new(length, class, reads, writes)
+    }
+
+    /// Whether what follows it in time may be elsewhere in memory.
+    #[must_use]
+    pub const fn may_branch(&self) -> bool {
+        matches!(self.class, Class::Branch(_) | Class::Table) || self.writes.meets(Registers::PC)
+    }
+
+    /// Whether it calls, so that a return comes back behind it.
+    #[must_use]
+    pub const fn is_call(&self) -> bool {
+        matches!(self.class, Class::Branch(Branch::Call(_) | Branch::CallIndirect))
+    }
+
+    /// Whether it returns, from a function or from an exception: `BX LR`, and loads of PC from the stack.
+    #[must_use]
+    pub const fn is_return(&self) -> bool {
+        let popped = self.class.is_load()
+            && self.writes.meets(Registers::PC)
+            && self.address.meets(Registers::SP);
+        popped || matches!(self.class, Class::Branch(Branch::Return))
+    }
+}
+
+/// Whether an instruction that begins with this halfword has a second one.
+#[must_use]
+pub const fn is_wide(first: u16) -> bool {
+    first >> 11 >= 0b11101
+}
+
+/// Decodes the instruction at an address; `second` is only looked at where the first halfword asks for it.
+#[must_use]
+pub const fn decode(address: u32, first: u16, second: u16) -> Instruction {
+    if is_wide(first) {
+        wide::decode(address, first, second)
+    } else {
+        narrow::decode(address, first)
+    }
+}
+
+/// The address that a branch with this offset, in bytes and of so many bits, reaches.
+const fn target(address: u32, offset: u32, bits: u32) -> u32 {
+    let shift = 32 - bits;
+    #[allow(clippy::cast_sign_loss, clippy::cast_possible_wrap, reason = "extends the sign")]
+    let extended = (((offset << shift) as i32) >> shift) as u32;
+    address.wrapping_add(4).wrapping_add(extended)
+}

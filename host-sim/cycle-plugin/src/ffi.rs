@@ -1,0 +1,214 @@
+//! QEMU's side: the few functions of its plugin interface that all versions from 7.2 to 10 have alike.
+//!
+//! They are looked up when QEMU loads the library, so that the host tool and the tests can link it without QEMU. The
+//! version that QEMU asks for is set at the same time: 7.2 refuses what is newer than 1, 9 and 10 what is older than
+//! theirs, and nothing used here has changed between them.
+#![allow(
+    unreachable_pub,
+    reason = "QEMU reaches what no Rust code does: by its name"
+)]
+#![allow(
+    unsafe_code,
+    reason = "a C interface; everything behind it is safe code in the other modules"
+)]
+
+use std::ffi::{CStr, c_char, c_int, c_uint, c_void};
+use std::fs::File;
+use std::io::Write;
+use std::sync::Mutex;
+use std::sync::atomic::{AtomicI32, Ordering};
+
+use crate::account::Account;
+use crate::plan::Plan;
+use crate::record::Record;
+
+/// `QEMU_PLUGIN_CB_NO_REGS`.
+const NO_REGISTERS: c_uint = 0;
+
+/// `QEMU_PLUGIN_MEM_W`.
+const WRITES: c_uint = 2;
+
+/// Version of the interface that QEMU 7.2 to 8.2 have.
+const VERSION_OLD: c_int = 1;
+
+/// Version that QEMU 9.2 and 10.0 have.
+const VERSION_NEW: c_int = 4;
+
+/// Version that QEMU 9.0 has, the last before `qemu_plugin_insn_data` copies.
+const VERSION_9_0: c_int = 2;
+
+/// What QEMU reads before it calls [`qemu_plugin_install`]: a plain `int`, set when the library is loaded.
+#[unsafe(no_mangle)]
+pub static qemu_plugin_version: AtomicI32 = AtomicI32::new(VERSION_OLD);
+
+type Execute = extern "C" fn(c_uint, *mut c_void);
+type Store = extern "C" fn(c_uint, c_uint, u64, *mut c_void);
+type Translate = extern "C" fn(u64, *mut c_void);
+
+/// The functions of QEMU.
+#[derive(Clone, Copy)]
+struct Api {
+    on_translation: extern "C" fn(u64, Translate),
+    instructions: extern "C" fn(*const c_void) -> usize,
+    instruction: extern "C" fn(*const c_void, usize) -> *mut c_void,
+    address: extern "C" fn(*const c_void) -> u64,
+    on_execution: extern "C" fn(*mut c_void, Execute, c_uint, *mut c_void),
+    on_memory: extern "C" fn(*mut c_void, Store, c_uint, c_uint, *mut c_void),
+}
+
+unsafe extern "C" {
+    safe fn dlsym(handle: *mut c_void, name: *const c_char) -> *mut c_void;
+}
+
+fn symbol(name: &CStr) -> Option<*mut c_void> {
+    // A null handle (RTLD_DEFAULT) looks in the program itself.
+    let found = dlsym(std::ptr::null_mut(), name.as_ptr());
+    (!found.is_null()).then_some(found)
+}
+
+/// A function of QEMU by name, as the type that the caller gives it.
+macro_rules! function {
+    ($name:literal) => {{
+        let found = symbol($name)?;
+        // SAFETY: QEMU declares the function of this name with this signature in `qemu-plugin.h`, versions 1 to 4.
+        unsafe { std::mem::transmute::<*mut c_void, _>(found) }
+    }};
+}
+
+impl Api {
+    fn find() -> Option<Self> {
+        Some(Self {
+            on_translation: function!(c"qemu_plugin_register_vcpu_tb_trans_cb"),
+            instructions: function!(c"qemu_plugin_tb_n_insns"),
+            instruction: function!(c"qemu_plugin_tb_get_insn"),
+            address: function!(c"qemu_plugin_insn_vaddr"),
+            on_execution: function!(c"qemu_plugin_register_vcpu_insn_exec_cb"),
+            on_memory: function!(c"qemu_plugin_register_vcpu_mem_cb"),
+        })
+    }
+}
+
+/// Runs when the library is loaded, before QEMU reads the version.
+extern "C" fn choose_version() {
+    let version = if symbol(c"qemu_plugin_read_memory_vaddr").is_some() {
+        VERSION_NEW
+    } else if symbol(c"qemu_plugin_num_vcpus").is_some() {
+        VERSION_9_0
+    } else {
+        VERSION_OLD
+    };
+    qemu_plugin_version.store(version, Ordering::Relaxed);
+}
+
+// SAFETY: the loader calls each function of this section once, with arguments that a C function may ignore.
+#[unsafe(link_section = ".init_array")]
+#[used]
+static CHOOSE_VERSION: extern "C" fn() = choose_version;
+
+struct Plugin {
+    api: Api,
+    account: Account,
+    records: File,
+}
+
+static PLUGIN: Mutex<Option<Plugin>> = Mutex::new(None);
+
+fn with_plugin(f: impl FnOnce(&mut Plugin)) {
+    if let Ok(mut plugin) = PLUGIN.lock()
+        && let Some(plugin) = plugin.as_mut()
+    {
+        f(plugin);
+    }
+}
+
+impl Plugin {
+    fn new(arguments: &[String]) -> Result<Self, String> {
+        let value = |key: &str| {
+            arguments
+                .iter()
+                .find_map(|argument| argument.strip_prefix(key)?.strip_prefix('='))
+                .ok_or(format!("argument {key}= is missing"))
+        };
+        let (plan, records) = (value("plan")?, value("records")?);
+        let bytes = std::fs::read(plan).map_err(|error| format!("{plan}: {error}"))?;
+        let plan = Plan::from_bytes(&bytes).ok_or(format!("{plan} is not a plan of this version"))?;
+        Ok(Self {
+            api: Api::find().ok_or("QEMU lacks a function of its plugin interface")?,
+            account: Account::new(plan),
+            records: File::create(records).map_err(|error| format!("{records}: {error}"))?,
+        })
+    }
+
+    fn write(&mut self, record: &Record) {
+        // At once: QEMU may be ended at any time. Who reads too few records notices.
+        let _ = self.records.write_all(&record.to_bytes());
+    }
+}
+
+/// QEMU calls this once, with the arguments given after the library's name.
+///
+/// # Safety
+/// `arguments` has to be as many C strings as `count` says.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn qemu_plugin_install(
+    id: u64,
+    _information: *const c_void,
+    count: c_int,
+    arguments: *const *const c_char,
+) -> c_int {
+    let arguments: Vec<String> = (0..usize::try_from(count).unwrap_or(0))
+        .map(|index| {
+            // SAFETY: `arguments` holds `count` C strings, as the caller vouches.
+            let text = unsafe { CStr::from_ptr(*arguments.add(index)) };
+            text.to_string_lossy().into_owned()
+        })
+        .collect();
+    match Plugin::new(&arguments) {
+        Ok(plugin) => {
+            let api = plugin.api;
+            if let Ok(mut place) = PLUGIN.lock() {
+                *place = Some(plugin);
+            }
+            (api.on_translation)(id, translated);
+            0
+        }
+        Err(error) => {
+            eprintln!("cycle-plugin: {error}");
+            1
+        }
+    }
+}
+
+/// A block was translated: asks to be told of each instruction and each store in it.
+extern "C" fn translated(_id: u64, block: *mut c_void) {
+    with_plugin(|plugin| {
+        let api = plugin.api;
+        for number in 0..(api.instructions)(block) {
+            let instruction = (api.instruction)(block, number);
+            let address = u32::try_from((api.address)(instruction)).unwrap_or(u32::MAX);
+            let Some(index) = plugin.account.place(address) else {
+                continue;
+            };
+            // The pointer only carries a number.
+            let index = std::ptr::without_provenance_mut(index);
+            (api.on_execution)(instruction, executed, NO_REGISTERS, index);
+            (api.on_memory)(instruction, stored, NO_REGISTERS, WRITES, std::ptr::null_mut());
+        }
+    });
+}
+
+extern "C" fn executed(_processor: c_uint, index: *mut c_void) {
+    with_plugin(|plugin| {
+        if let Some(record) = plugin.account.execute(index.addr()) {
+            plugin.write(&record);
+        }
+    });
+}
+
+extern "C" fn stored(_processor: c_uint, _access: c_uint, address: u64, _data: *mut c_void) {
+    with_plugin(|plugin| {
+        if let Ok(address) = u32::try_from(address) {
+            plugin.account.wrote(address);
+        }
+    });
+}

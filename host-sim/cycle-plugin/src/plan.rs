@@ -1,0 +1,136 @@
+//! What the plugin is to watch: the image's code, the stage of each instruction, the task whose ticks are recorded.
+//!
+//! The code comes with the plan, because the function that would read it from QEMU has changed between versions.
+
+/// First word of the file: `ISOP` and a version.
+const MAGIC: u32 = 0x4953_4f02;
+
+/// Words before the code.
+const HEAD_WORDS: usize = 5;
+
+/// Stages that cycles are charged to.
+pub const STAGES: usize = 8;
+
+/// A stage of the sample task.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+#[repr(u8)]
+pub enum Stage {
+    /// Step 2: the parameter's step for one period's arc.
+    Step = 0,
+    /// Step 2: the surface at the new parameter.
+    Surface = 1,
+    /// Step 3: fit of the ball, cutter location.
+    Offset = 2,
+    /// Step 4: candidate of the path interval.
+    Interval = 3,
+    /// A patch is collapsed.
+    PatchChange = 4,
+    /// A pass begins or ends.
+    PassChange = 5,
+    /// Everything else in the task.
+    Rest = 6,
+    /// Exception entry and exit.
+    Exception = 7,
+}
+
+impl Stage {
+    /// All of them, in the order of their numbers.
+    pub const ALL: [Self; STAGES] = [
+        Self::Step,
+        Self::Surface,
+        Self::Offset,
+        Self::Interval,
+        Self::PatchChange,
+        Self::PassChange,
+        Self::Rest,
+        Self::Exception,
+    ];
+
+    /// Name in tables and JSON.
+    #[must_use]
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Step => "step",
+            Self::Surface => "surface",
+            Self::Offset => "offset",
+            Self::Interval => "interval",
+            Self::PatchChange => "patch change",
+            Self::PassChange => "pass change",
+            Self::Rest => "everything else",
+            Self::Exception => "exception entry and exit",
+        }
+    }
+
+    /// Whether what it calls is charged to it, whatever that is: it works on behalf of the change.
+    #[must_use]
+    pub const fn keeps_callees(self) -> bool {
+        matches!(self, Self::PatchChange | Self::PassChange)
+    }
+
+    const fn from_byte(byte: u8) -> Option<Self> {
+        if (byte as usize) < STAGES { Some(Self::ALL[byte as usize]) } else { None }
+    }
+}
+
+/// The plan.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct Plan {
+    /// Address of the first byte of code; the vector table stands there.
+    pub base: u32,
+    /// Exception number of the task: 16 more than the interrupt's.
+    pub exception: u32,
+    /// Addresses below this and from 0x20000000 on are the stack.
+    pub stack_end: u32,
+    /// The code.
+    pub code: Vec<u8>,
+    /// Stage of the instruction at each halfword of the code; none for helpers, which are charged to their callers.
+    pub stages: Vec<Option<Stage>>,
+}
+
+const NO_STAGE: u8 = 0xff;
+
+impl Plan {
+    /// The halfword at an index.
+    #[must_use]
+    pub fn halfword(&self, index: usize) -> u16 {
+        let byte = |at: usize| self.code.get(at).copied().unwrap_or(0);
+        u16::from_le_bytes([byte(2 * index), byte(2 * index + 1)])
+    }
+
+    /// A word of the vector table, without the Thumb bit.
+    #[must_use]
+    pub fn vector(&self, exception: u32) -> u32 {
+        let index = 2 * exception as usize;
+        (u32::from(self.halfword(index)) | u32::from(self.halfword(index + 1)) << 16) & !1
+    }
+
+    /// As the plugin reads it.
+    #[must_use]
+    pub fn to_bytes(&self) -> Vec<u8> {
+        let length = u32::try_from(self.code.len()).unwrap_or(0);
+        let head = [MAGIC, self.base, self.exception, self.stack_end, length];
+        let mut bytes: Vec<u8> = head.iter().flat_map(|word| word.to_le_bytes()).collect();
+        bytes.extend_from_slice(&self.code);
+        bytes.extend(self.stages.iter().map(|stage| stage.map_or(NO_STAGE, |stage| stage as u8)));
+        bytes
+    }
+
+    /// What [`Self::to_bytes`] wrote; none if it is something else.
+    #[must_use]
+    pub fn from_bytes(bytes: &[u8]) -> Option<Self> {
+        let (words, rest) = bytes.split_at_checked(4 * HEAD_WORDS)?;
+        let mut words = words.chunks_exact(4).map(|word| word.try_into().map_or(0, u32::from_le_bytes));
+        if words.next() != Some(MAGIC) {
+            return None;
+        }
+        let (base, exception, stack_end) = (words.next()?, words.next()?, words.next()?);
+        let (code, stages) = rest.split_at_checked(words.next()? as usize)?;
+        Some(Self {
+            base,
+            exception,
+            stack_end,
+            code: code.to_vec(),
+            stages: stages.iter().map(|byte| Stage::from_byte(*byte)).collect(),
+        })
+    }
+}

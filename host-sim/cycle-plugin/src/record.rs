@@ -1,0 +1,58 @@
+//! One record a tick: what the plugin writes and the host reads.
+
+use crate::cost::Cycles;
+use crate::plan::STAGES;
+
+/// Words of a record.
+const WORDS: usize = 4 + 2 * STAGES;
+
+/// Bytes of a record, little endian.
+pub const RECORD_BYTES: usize = 4 * WORDS;
+
+/// What a tick of the watched task took.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Record {
+    /// Instructions of the task.
+    pub instructions: u32,
+    /// Instructions of everything else between the last tick and this.
+    pub elsewhere: u32,
+    /// Instructions not known to the decoder, since the start. Has to be 0.
+    pub unknown: u32,
+    /// Lowest address of the stack that has been written since the start.
+    pub stack_low: u32,
+    /// Cycles of each stage.
+    pub stages: [Cycles; STAGES],
+}
+
+impl Record {
+    /// As it stands in the file.
+    #[must_use]
+    pub fn to_bytes(&self) -> Vec<u8> {
+        let head = [self.instructions, self.elsewhere, self.unknown, self.stack_low];
+        let cycles = self.stages.iter().flat_map(|cycles| [cycles.nominal, cycles.pessimistic]);
+        head.into_iter().chain(cycles).flat_map(u32::to_le_bytes).collect()
+    }
+
+    /// All whole records of a file.
+    #[must_use]
+    pub fn read_all(bytes: &[u8]) -> Vec<Self> {
+        bytes.chunks_exact(RECORD_BYTES).map(Self::from_bytes).collect()
+    }
+
+    fn from_bytes(bytes: &[u8]) -> Self {
+        let mut words = bytes.chunks_exact(4).map(|word| word.try_into().map_or(0, u32::from_le_bytes));
+        let mut next = || words.next().unwrap_or(0);
+        let mut record = Self {
+            instructions: next(),
+            elsewhere: next(),
+            unknown: next(),
+            stack_low: next(),
+            ..Self::default()
+        };
+        for cycles in &mut record.stages {
+            cycles.nominal = next();
+            cycles.pessimistic = next();
+        }
+        record
+    }
+}

@@ -1,0 +1,160 @@
+//! Least, mean and most cycles of each stage, and the histogram of the whole tick.
+
+use cycle_plugin::cost::Cycles;
+use cycle_plugin::plan::Stage;
+use cycle_plugin::record::Record;
+
+use super::PERIOD_CYCLES;
+use super::measure::Ticks;
+
+/// A model of the plugin's.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Model {
+    /// Reference manual, no wait states.
+    Nominal,
+    /// With stalls, wait states and lazy stacking.
+    Pessimistic,
+}
+
+impl Model {
+    /// Both.
+    pub const ALL: [Self; 2] = [Self::Nominal, Self::Pessimistic];
+
+    /// Name in tables and JSON.
+    #[must_use]
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Nominal => "nominal",
+            Self::Pessimistic => "pessimistic",
+        }
+    }
+
+    const fn of(self, cycles: Cycles) -> u32 {
+        match self {
+            Self::Nominal => cycles.nominal,
+            Self::Pessimistic => cycles.pessimistic,
+        }
+    }
+}
+
+/// What is reported: a name, and the stages whose cycles are added up.
+const ROWS: [(&str, &[Stage]); 10] = [
+    ("contact: step", &[Stage::Step]),
+    ("contact: surface", &[Stage::Surface]),
+    ("contact", &[Stage::Step, Stage::Surface]),
+    ("offset", &[Stage::Offset]),
+    ("interval", &[Stage::Interval]),
+    (STEPS_2_TO_4, &[Stage::Step, Stage::Surface, Stage::Offset, Stage::Interval]),
+    ("patch change", &[Stage::PatchChange]),
+    ("pass change", &[Stage::PassChange]),
+    ("everything else", &[Stage::Rest]),
+    ("exception entry and exit", &[Stage::Exception]),
+];
+
+/// The row of the paper's steps 2 to 4.
+pub const STEPS_2_TO_4: &str = "steps 2-4";
+
+/// The row of the whole task.
+pub const TICK: &str = "tick";
+
+/// Cycles of a stage in those ticks of a job in which it took any.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Figure {
+    /// Kind of surface.
+    pub surface: String,
+    /// Stage, or a sum of some.
+    pub stage: &'static str,
+    /// Model.
+    pub model: Model,
+    /// Ticks in which it took any.
+    pub ticks: u32,
+    /// Least.
+    pub min: u32,
+    /// Mean.
+    pub mean: f64,
+    /// Most.
+    pub max: u32,
+    /// High-water mark of the stack over the job, bytes.
+    pub stack_bytes: u32,
+}
+
+impl Figure {
+    /// The most, as a share of the period.
+    #[must_use]
+    pub fn period_share_pct(&self) -> f64 {
+        100.0 * f64::from(self.max) / f64::from(PERIOD_CYCLES)
+    }
+
+    fn of(
+        surface: &str,
+        stage: &'static str,
+        model: Model,
+        ticks: &Ticks,
+        cycles: impl Fn(&Record) -> u32,
+    ) -> Self {
+        let (mut count, mut sum, mut min, mut max) = (0_u32, 0_u64, u32::MAX, 0);
+        for cycles in ticks.records.iter().map(cycles).filter(|cycles| *cycles > 0) {
+            count += 1;
+            sum += u64::from(cycles);
+            min = min.min(cycles);
+            max = max.max(cycles);
+        }
+        #[allow(clippy::cast_precision_loss, reason = "below 2^53")]
+        let mean = sum as f64 / f64::from(count.max(1));
+        Self {
+            surface: surface.to_owned(),
+            stage,
+            model,
+            ticks: count,
+            min: if count == 0 { 0 } else { min },
+            mean,
+            max,
+            stack_bytes: ticks.stack_bytes,
+        }
+    }
+}
+
+/// Cycles of the whole task in a tick.
+#[must_use]
+pub fn whole(record: &Record, model: Model) -> u32 {
+    record.stages.iter().map(|cycles| model.of(*cycles)).sum()
+}
+
+/// All figures of a job's ticks: each stage in both models, then the whole tick.
+#[must_use]
+pub fn figures(surface: &str, ticks: &Ticks) -> Vec<Figure> {
+    let mut figures = Vec::new();
+    for model in Model::ALL {
+        for (name, stages) in ROWS {
+            figures.push(Figure::of(surface, name, model, ticks, |record| {
+                let cycles = stages.iter().map(|stage| record.stages[*stage as usize]);
+                cycles.map(|cycles| model.of(cycles)).sum()
+            }));
+        }
+        figures.push(Figure::of(surface, TICK, model, ticks, |record| whole(record, model)));
+    }
+    figures
+}
+
+/// A histogram of the whole tick: cycles at which a bin begins, and its ticks.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct Histogram {
+    /// Cycles of a bin.
+    pub width: u32,
+    /// Bins with ticks, in order.
+    pub bins: Vec<(u32, u32)>,
+}
+
+/// The histogram of a job's ticks.
+#[must_use]
+pub fn histogram(ticks: &Ticks, model: Model, width: u32) -> Histogram {
+    let mut bins = std::collections::BTreeMap::new();
+    for record in &ticks.records {
+        let begin = whole(record, model) / width * width;
+        *bins.entry(begin).or_insert(0) += 1;
+    }
+    Histogram {
+        width,
+        bins: bins.into_iter().collect(),
+    }
+}

@@ -1,0 +1,57 @@
+//! Cycle budgets: the firmware in QEMU with the plugin that counts what each tick takes on a Cortex-M4F.
+//!
+//! ```text
+//!  image ──stages──► plan ──► plugin in QEMU ──► a record a tick ──figures──► min, mean, max, histogram
+//!    (which stage an instruction belongs to,      │ measure                      │ golden, chart
+//!     from the image's line tables)               └─ runs a job's first ticks    ▼ table, JSON, SVG
+//! ```
+//!
+//! What a cycle is, and what the two models leave out, is said in `cycle_plugin::cost`.
+
+pub mod chart;
+pub mod figures;
+pub mod golden;
+pub mod image;
+pub mod measure;
+pub mod stages;
+
+use std::path::PathBuf;
+
+use crate::remote::RemoteError;
+use crate::remote::qemu::QemuError;
+
+/// Cycles of a period: 1 ms at 168 MHz.
+pub const PERIOD_CYCLES: u32 = 168_000;
+
+/// Ticks of each job: enough for changes of passes and of patches.
+pub const TICKS: u32 = 20_000;
+
+/// The kinds of surface, each with a job of it.
+pub const SURFACES: [(&str, &str); 6] = [
+    ("revolved along u", "revolved"),
+    ("revolved along v", "revolved_v"),
+    ("ruled", "ruled_printed"),
+    ("bicubic", "plate"),
+    ("NURBS non-rational", "freeform"),
+    ("NURBS rational", "torus"),
+];
+
+/// Why there is no figure.
+#[derive(Debug, thiserror::Error)]
+pub enum BudgetError {
+    /// QEMU, the firmware or the plugin is missing.
+    #[error(transparent)]
+    Qemu(#[from] QemuError),
+    /// The board does not answer, or refuses.
+    #[error(transparent)]
+    Remote(#[from] RemoteError),
+    /// A file cannot be read or written.
+    #[error("{0}: {1}")]
+    File(PathBuf, String),
+    /// The image is not what is expected.
+    #[error("the firmware image cannot be used: {0}")]
+    Image(String),
+    /// The plugin's figures are not whole.
+    #[error("the figures are not whole: {0}")]
+    Figures(String),
+}

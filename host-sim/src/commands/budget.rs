@@ -1,0 +1,184 @@
+//! `budget`: what each stage of the sample task takes on the Cortex-M4F.
+
+use std::path::PathBuf;
+
+use clap::Args;
+use serde_json::{Value, json};
+
+use super::{Failure, Result, cannot_write, load, progress};
+use crate::budget::figures::{Figure, Histogram, Model, figures, histogram};
+use crate::budget::image::{self, Sizes};
+use crate::budget::measure::{Bench, Ticks};
+use crate::budget::{BudgetError, PERIOD_CYCLES, SURFACES, TICKS, chart, golden};
+use crate::remote::qemu;
+
+/// Cycles of a bin of the printed histogram.
+const BIN_CYCLES: u32 = 50;
+
+/// Counts the cycles of each stage of the sample task, for each kind of surface, in the firmware in QEMU.
+///
+/// Example: cargo sim budget --report out
+#[derive(Debug, Args)]
+#[command(verbatim_doc_comment)]
+pub(super) struct Arguments {
+    /// Job files to count instead of the six kinds of surface.
+    jobs: Vec<PathBuf>,
+    /// Ticks of each job.
+    #[arg(long, default_value_t = TICKS)]
+    ticks: u32,
+    /// Writes a chart (SVG) into this folder.
+    #[arg(long, value_name = "DIR")]
+    report: Option<PathBuf>,
+    /// Prints JSON instead of tables.
+    #[arg(long)]
+    json: bool,
+    /// Fails where a stage has grown by more than 2 % against the golden table.
+    #[arg(long, conflicts_with = "jobs")]
+    check: bool,
+    /// Writes the golden table anew.
+    #[arg(long, conflicts_with_all = ["jobs", "check", "ticks"])]
+    bless: bool,
+}
+
+impl From<BudgetError> for Failure {
+    fn from(error: BudgetError) -> Self {
+        match error {
+            BudgetError::Qemu(error) => error.into(),
+            BudgetError::Remote(error) => error.into(),
+            other => Self::Failed(Some(other.to_string())),
+        }
+    }
+}
+
+/// A job's name and ticks.
+type Counted = (String, Ticks);
+
+fn count(arguments: &Arguments, bench: &Bench) -> Result<Vec<Counted>> {
+    let jobs: Vec<(String, PathBuf)> = if arguments.jobs.is_empty() {
+        let folder = qemu::workspace().join("jobs");
+        let path = |job: &str| folder.join(format!("{job}.toml"));
+        SURFACES.iter().map(|(name, job)| ((*name).to_owned(), path(job))).collect()
+    } else {
+        let name = |path: &PathBuf| path.display().to_string();
+        arguments.jobs.iter().map(|path| (name(path), path.clone())).collect()
+    };
+    let bar = progress(jobs.len() as u64, "counting");
+    let mut counted = Vec::new();
+    for (name, path) in jobs {
+        let (_, prepared) = load(&path)?;
+        counted.push((name, bench.run(&prepared, arguments.ticks)?));
+        bar.inc(1);
+    }
+    bar.finish_and_clear();
+    Ok(counted)
+}
+
+fn json(figures: &[Figure], sizes: Sizes) -> Value {
+    let rows = figures.iter().map(|figure| {
+        json!({
+            "surface": figure.surface,
+            "stage": figure.stage,
+            "model": figure.model.name(),
+            "ticks": figure.ticks,
+            "cycles_min": figure.min,
+            "cycles_mean": figure.mean,
+            "cycles_max": figure.max,
+            "period_share_pct": figure.period_share_pct(),
+            "stack_bytes": figure.stack_bytes,
+            "flash_bytes": sizes.flash,
+            "ram_bytes": sizes.ram,
+        })
+    });
+    rows.collect()
+}
+
+fn print(name: &str, ticks: &Ticks, figures: &[Figure]) {
+    println!("\n{name}: {} ticks, stack {} bytes", ticks.records.len(), ticks.stack_bytes);
+    println!(
+        "  {:<25} {:>6} |{:^29} |{:^29}",
+        "cycles", "ticks", "nominal: min, mean, max, %", "pessimistic: min, mean, max, %"
+    );
+    let of = |model| figures.iter().filter(move |figure| figure.model == model);
+    for (nominal, pessimistic) in of(Model::Nominal).zip(of(Model::Pessimistic)) {
+        print!("  {:<25} {:>6}", nominal.stage, nominal.ticks);
+        for figure in [nominal, pessimistic] {
+            print!(
+                " | {:>6} {:>8.1} {:>6} {:>5.2}",
+                figure.min,
+                figure.mean,
+                figure.max,
+                figure.period_share_pct()
+            );
+        }
+        println!();
+    }
+}
+
+fn print_histogram(histogram: &Histogram) {
+    let most = histogram.bins.iter().map(|bin| bin.1).max().unwrap_or(1).max(1);
+    println!("  whole tick, pessimistic:");
+    for (begin, count) in &histogram.bins {
+        let bar = "#".repeat((count * 40).div_ceil(most) as usize);
+        println!("  {begin:>6}.. {count:>7} {bar}");
+    }
+}
+
+fn report(arguments: &Arguments, counted: &[Counted]) -> Result<()> {
+    let Some(folder) = &arguments.report else {
+        return Ok(());
+    };
+    let path = folder.join("budget.svg");
+    let histograms: Vec<_> = counted
+        .iter()
+        .map(|(name, ticks)| (name.clone(), histogram(ticks, Model::Pessimistic, BIN_CYCLES)))
+        .collect();
+    std::fs::create_dir_all(folder)
+        .and_then(|()| chart::write(&path, &histograms))
+        .map_err(|error| cannot_write(&path, &error))?;
+    if !arguments.json {
+        println!("\nchart: {}", path.display());
+    }
+    Ok(())
+}
+
+/// Compares with the golden table, or writes it.
+fn hold(arguments: &Arguments, figures: &[Figure]) -> Result<()> {
+    let path = golden::path();
+    if arguments.bless {
+        return std::fs::write(&path, golden::table(figures)).map_err(|error| cannot_write(&path, &error));
+    }
+    if !arguments.check {
+        return Ok(());
+    }
+    let table = std::fs::read_to_string(&path).map_err(|error| cannot_write(&path, &error))?;
+    let complaints = golden::complaints(&table, figures);
+    if complaints.is_empty() {
+        return Ok(());
+    }
+    Err(Failure::Failed(Some(format!(
+        "stages take more than the golden table allows (old -> new):\n  {}\nif that is meant: cargo sim budget --bless",
+        complaints.join("\n  ")
+    ))))
+}
+
+pub(super) fn command(arguments: &Arguments) -> Result<()> {
+    let image = qemu::firmware()?;
+    let (plan, sizes) = image::read(&image)?;
+    let bench = Bench::new(&image, &plan)?;
+    let counted = count(arguments, &bench)?;
+    let figures: Vec<Vec<Figure>> = counted.iter().map(|(name, ticks)| figures(name, ticks)).collect();
+    if arguments.json {
+        println!("{}", json(&figures.concat(), sizes));
+    } else {
+        println!(
+            "Cortex-M4F, {PERIOD_CYCLES} cycles a period; flash {} bytes, RAM {} bytes, room for the stack {} bytes",
+            sizes.flash, sizes.ram, sizes.stack_room
+        );
+        for ((name, ticks), figures) in counted.iter().zip(&figures) {
+            print(name, ticks, figures);
+            print_histogram(&histogram(ticks, Model::Pessimistic, BIN_CYCLES));
+        }
+    }
+    report(arguments, &counted)?;
+    hold(arguments, &figures.concat())
+}
