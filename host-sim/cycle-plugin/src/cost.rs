@@ -226,7 +226,11 @@ mod tests {
             at += usize::from(instruction.length) / 2;
             before = Some(instruction);
         }
-        assert_eq!((total.nominal, total.pessimistic), (nominal, pessimistic), "{what}");
+        assert_eq!(
+            (total.nominal, total.pessimistic),
+            (nominal, pessimistic),
+            "{what}"
+        );
     }
 
     #[test]
@@ -250,9 +254,19 @@ mod tests {
         // adds r1,r1,#4; ldr r0,[r1]: 1 + 2, and a wait for the address
         check("address", &[0x1d09, 0x6808], 3, 4);
         // push {r4-r7,lr}: 1 + 5; ldrd r0,r1,[r2]: 1 + 2; ldr r0,[pc,#4]: 2 and the fetch unit in the way
-        check("several words", &[0xb5f0, 0xe9d2, 0x0100, 0x4801], 6 + 3 + 2, 6 + 3 + 3);
+        check(
+            "several words",
+            &[0xb5f0, 0xe9d2, 0x0100, 0x4801],
+            6 + 3 + 2,
+            6 + 3 + 3,
+        );
         // udiv r0,r1,r2: at most 12; dmb: 4; mrs r0,basepri: 2
-        check("slow ones", &[0xfbb1, 0xf0f2, 0xf3bf, 0x8f5f, 0xf3ef, 0x8011], 18, 18);
+        check(
+            "slow ones",
+            &[0xfbb1, 0xf0f2, 0xf3bf, 0x8f5f, 0xf3ef, 0x8011],
+            18,
+            18,
+        );
         // smmlar r0,r1,r2,r3: 1
         check("smmlar", &[0xfb51, 0x3012], 1, 1);
     }
@@ -262,9 +276,19 @@ mod tests {
         // vmul.f32 s0,s1,s2; vadd.f32 s3,s0,s4: 2, and a wait for the product
         check("multiply, add", &[0xee20, 0x0a81, 0xee70, 0x1a02], 2, 3);
         // vmul.f32 s0,s1,s2; vmul.f32 s3,s1,s2; vadd.f32 s4,s0,s1: 3, nothing waits
-        check("two products", &[0xee20, 0x0a81, 0xee60, 0x1a81, 0xee30, 0x2a20], 3, 3);
+        check(
+            "two products",
+            &[0xee20, 0x0a81, 0xee60, 0x1a81, 0xee30, 0x2a20],
+            3,
+            3,
+        );
         // vmla.f32 s0,s1,s2: 3; vdiv.f32 s0,s1,s2: 14; vsqrt.f32 s1,s1: 14
-        check("slow ones", &[0xee00, 0x0a81, 0xeec0, 0x2a81, 0xeef1, 0x0ae0], 31, 31);
+        check(
+            "slow ones",
+            &[0xee00, 0x0a81, 0xeec0, 0x2a81, 0xeef1, 0x0ae0],
+            31,
+            31,
+        );
         // vldr s0,[r0]; vldr s1,[r0,#4]: 2 + 1; vpush {s16-s19}: 1 + 4; vmov r0,r1,s2,s3: 2
         check(
             "memory and moves",

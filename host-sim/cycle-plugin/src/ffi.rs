@@ -3,10 +3,7 @@
 //! They are looked up when QEMU loads the library, so that the host tool and the tests can link it without QEMU. The
 //! version that QEMU asks for is set at the same time: 7.2 refuses what is newer than 1, 9 and 10 what is older than
 //! theirs, and nothing used here has changed between them.
-#![allow(
-    unreachable_pub,
-    reason = "QEMU reaches what no Rust code does: by its name"
-)]
+#![allow(unreachable_pub, reason = "QEMU reaches what no Rust code does: by its name")]
 #![allow(
     unsafe_code,
     reason = "a C interface; everything behind it is safe code in the other modules"

@@ -68,7 +68,11 @@ impl Stage {
     }
 
     const fn from_byte(byte: u8) -> Option<Self> {
-        if (byte as usize) < STAGES { Some(Self::ALL[byte as usize]) } else { None }
+        if (byte as usize) < STAGES {
+            Some(Self::ALL[byte as usize])
+        } else {
+            None
+        }
     }
 }
 
@@ -111,7 +115,11 @@ impl Plan {
         let head = [MAGIC, self.base, self.exception, self.stack_end, length];
         let mut bytes: Vec<u8> = head.iter().flat_map(|word| word.to_le_bytes()).collect();
         bytes.extend_from_slice(&self.code);
-        bytes.extend(self.stages.iter().map(|stage| stage.map_or(NO_STAGE, |stage| stage as u8)));
+        bytes.extend(
+            self.stages
+                .iter()
+                .map(|stage| stage.map_or(NO_STAGE, |stage| stage as u8)),
+        );
         bytes
     }
 
@@ -119,7 +127,9 @@ impl Plan {
     #[must_use]
     pub fn from_bytes(bytes: &[u8]) -> Option<Self> {
         let (words, rest) = bytes.split_at_checked(4 * HEAD_WORDS)?;
-        let mut words = words.chunks_exact(4).map(|word| word.try_into().map_or(0, u32::from_le_bytes));
+        let mut words = words
+            .chunks_exact(4)
+            .map(|word| word.try_into().map_or(0, u32::from_le_bytes));
         if words.next() != Some(MAGIC) {
             return None;
         }

@@ -29,8 +29,14 @@ impl Record {
     #[must_use]
     pub fn to_bytes(&self) -> Vec<u8> {
         let head = [self.instructions, self.elsewhere, self.unknown, self.stack_low];
-        let cycles = self.stages.iter().flat_map(|cycles| [cycles.nominal, cycles.pessimistic]);
-        head.into_iter().chain(cycles).flat_map(u32::to_le_bytes).collect()
+        let cycles = self
+            .stages
+            .iter()
+            .flat_map(|cycles| [cycles.nominal, cycles.pessimistic]);
+        head.into_iter()
+            .chain(cycles)
+            .flat_map(u32::to_le_bytes)
+            .collect()
     }
 
     /// All whole records of a file.
@@ -40,7 +46,9 @@ impl Record {
     }
 
     fn from_bytes(bytes: &[u8]) -> Self {
-        let mut words = bytes.chunks_exact(4).map(|word| word.try_into().map_or(0, u32::from_le_bytes));
+        let mut words = bytes
+            .chunks_exact(4)
+            .map(|word| word.try_into().map_or(0, u32::from_le_bytes));
         let mut next = || words.next().unwrap_or(0);
         let mut record = Self {
             instructions: next(),

@@ -44,7 +44,10 @@ const ROWS: [(&str, &[Stage]); 10] = [
     ("contact", &[Stage::Step, Stage::Surface]),
     ("offset", &[Stage::Offset]),
     ("interval", &[Stage::Interval]),
-    (STEPS_2_TO_4, &[Stage::Step, Stage::Surface, Stage::Offset, Stage::Interval]),
+    (
+        STEPS_2_TO_4,
+        &[Stage::Step, Stage::Surface, Stage::Offset, Stage::Interval],
+    ),
     ("patch change", &[Stage::PatchChange]),
     ("pass change", &[Stage::PassChange]),
     ("everything else", &[Stage::Rest]),
@@ -131,7 +134,9 @@ pub fn figures(surface: &str, ticks: &Ticks) -> Vec<Figure> {
                 cycles.map(|cycles| model.of(cycles)).sum()
             }));
         }
-        figures.push(Figure::of(surface, TICK, model, ticks, |record| whole(record, model)));
+        figures.push(Figure::of(surface, TICK, model, ticks, |record| {
+            whole(record, model)
+        }));
     }
     figures
 }

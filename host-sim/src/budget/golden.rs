@@ -39,7 +39,10 @@ fn key(figure: &Figure) -> String {
 /// What is wrong with these figures by a table: stages that grew by more than [`GROWTH_MAX`], and lines that are missing.
 #[must_use]
 pub fn complaints(table: &str, figures: &[Figure]) -> Vec<String> {
-    figures.iter().filter_map(|figure| complaint(table, figure)).collect()
+    figures
+        .iter()
+        .filter_map(|figure| complaint(table, figure))
+        .collect()
 }
 
 fn complaint(table: &str, figure: &Figure) -> Option<String> {
@@ -50,10 +53,17 @@ fn complaint(table: &str, figure: &Figure) -> Option<String> {
     let Some((mean, max)) = line.and_then(|line| line.split_once(" | ")) else {
         return Some(format!("{key}: not in the golden table"));
     };
-    let grew = |old: &str, new: f64| old.trim().parse::<f64>().is_ok_and(|old| new <= old * (1.0 + GROWTH_MAX));
+    let grew = |old: &str, new: f64| {
+        old.trim()
+            .parse::<f64>()
+            .is_ok_and(|old| new <= old * (1.0 + GROWTH_MAX))
+    };
     let holds = grew(mean, figure.mean) && grew(max, f64::from(figure.max));
     (!holds).then(|| {
-        format!("{key}: mean {mean} -> {:.1}, max {max} -> {}", figure.mean, figure.max)
+        format!(
+            "{key}: mean {mean} -> {:.1}, max {max} -> {}",
+            figure.mean, figure.max
+        )
     })
 }
 

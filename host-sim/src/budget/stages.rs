@@ -28,7 +28,14 @@ const INTERPOLATOR: [(&str, Stage); 12] = [
 ];
 
 /// Crates of which every function is everything else.
-const REST: [&str; 6] = ["controller", "protocol", "firmware", "heapless", "rtic", "stm32f4xx_hal"];
+const REST: [&str; 6] = [
+    "controller",
+    "protocol",
+    "firmware",
+    "heapless",
+    "rtic",
+    "stm32f4xx_hal",
+];
 
 /// Stage of a function by its path; none for helpers.
 #[must_use]
@@ -75,7 +82,10 @@ fn chain(loader: &Loader, address: u32) -> Vec<String> {
     let mut functions = Vec::new();
     if let Ok(mut frames) = loader.find_frames(address.into()) {
         while let Ok(Some(frame)) = frames.next() {
-            let name = frame.function.as_ref().and_then(|function| function.demangle().ok());
+            let name = frame
+                .function
+                .as_ref()
+                .and_then(|function| function.demangle().ok());
             functions.push(name.map(std::borrow::Cow::into_owned).unwrap_or_default());
         }
     }
@@ -88,7 +98,10 @@ pub fn map(loader: &Loader, base: u32, code: &[u8]) -> Vec<Option<Stage>> {
     (0..code.len() / 2)
         .map(|index| {
             let address = base + 2 * u32::try_from(index).unwrap_or(0);
-            let stages: Vec<_> = chain(loader, address).iter().map(|path| of_function(path)).collect();
+            let stages: Vec<_> = chain(loader, address)
+                .iter()
+                .map(|path| of_function(path))
+                .collect();
             of_chain(&stages)
         })
         .collect()
@@ -110,14 +123,22 @@ mod tests {
             stage("interp_core::interpolator::Interpolator<_>::begin_pass"),
             Some(Stage::PassChange)
         );
-        assert_eq!(stage("<interp_core::vec3::Vec3 as core::ops::arith::Add>::add"), None);
+        assert_eq!(
+            stage("<interp_core::vec3::Vec3 as core::ops::arith::Add>::add"),
+            None
+        );
         assert_eq!(stage("core::num::<impl u32>::wrapping_add"), None);
         assert_eq!(stage("controller::realtime::Run::add"), Some(Stage::Rest));
     }
 
     #[test]
     fn a_change_takes_what_is_inlined_into_it() {
-        let chain = [None, Some(Stage::Surface), Some(Stage::PassChange), Some(Stage::Rest)];
+        let chain = [
+            None,
+            Some(Stage::Surface),
+            Some(Stage::PassChange),
+            Some(Stage::Rest),
+        ];
         assert_eq!(of_chain(&chain), Some(Stage::PassChange));
         assert_eq!(of_chain(&chain[..2]), Some(Stage::Surface));
         assert_eq!(of_chain(&[None]), None);

@@ -57,10 +57,17 @@ fn count(arguments: &Arguments, bench: &Bench) -> Result<Vec<Counted>> {
     let jobs: Vec<(String, PathBuf)> = if arguments.jobs.is_empty() {
         let folder = qemu::workspace().join("jobs");
         let path = |job: &str| folder.join(format!("{job}.toml"));
-        SURFACES.iter().map(|(name, job)| ((*name).to_owned(), path(job))).collect()
+        SURFACES
+            .iter()
+            .map(|(name, job)| ((*name).to_owned(), path(job)))
+            .collect()
     } else {
         let name = |path: &PathBuf| path.display().to_string();
-        arguments.jobs.iter().map(|path| (name(path), path.clone())).collect()
+        arguments
+            .jobs
+            .iter()
+            .map(|path| (name(path), path.clone()))
+            .collect()
     };
     let bar = progress(jobs.len() as u64, "counting");
     let mut counted = Vec::new();
@@ -93,7 +100,11 @@ fn json(figures: &[Figure], sizes: Sizes) -> Value {
 }
 
 fn print(name: &str, ticks: &Ticks, figures: &[Figure]) {
-    println!("\n{name}: {} ticks, stack {} bytes", ticks.records.len(), ticks.stack_bytes);
+    println!(
+        "\n{name}: {} ticks, stack {} bytes",
+        ticks.records.len(),
+        ticks.stack_bytes
+    );
     println!(
         "  {:<25} {:>6} |{:^29} |{:^29}",
         "cycles", "ticks", "nominal: min, mean, max, %", "pessimistic: min, mean, max, %"

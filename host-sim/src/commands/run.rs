@@ -75,7 +75,9 @@ impl From<QemuError> for Failure {
             QemuError::Missing => {
                 Self::input(error.to_string(), "install it, or run the job with `simulate`")
             }
-            QemuError::Firmware(_) | QemuError::Plugin(_) | QemuError::Start(_) => Self::Failed(Some(error.to_string())),
+            QemuError::Firmware(_) | QemuError::Plugin(_) | QemuError::Start(_) => {
+                Self::Failed(Some(error.to_string()))
+            }
         }
     }
 }

@@ -58,7 +58,11 @@ const fn memory(first: u16, second: u16) -> Instruction {
     } else {
         1
     };
-    let from = if double { (second >> 11) & 30 } else { d(first, second) };
+    let from = if double {
+        (second >> 11) & 30
+    } else {
+        d(first, second)
+    };
     let registers = Registers::singles(from, count);
     let updated = if one || first & 0x20 == 0 { NONE } else { base };
     #[allow(clippy::cast_possible_truncation, reason = "eight bits")]
@@ -66,9 +70,7 @@ const fn memory(first: u16, second: u16) -> Instruction {
     match (load, one && !double) {
         (true, true) => float(Class::FloatLoad, NONE, registers).at(base),
         (false, true) => float(Class::FloatStore, registers, NONE).at(base),
-        (true, false) => {
-            float(Class::FloatLoadMultiple(words), NONE, registers.and(updated)).at(base)
-        }
+        (true, false) => float(Class::FloatLoadMultiple(words), NONE, registers.and(updated)).at(base),
         (false, false) => float(Class::FloatStoreMultiple(words), registers, updated).at(base),
     }
 }

@@ -241,9 +241,8 @@ impl Instruction {
     /// Whether it returns, from a function or from an exception: `BX LR`, and loads of PC from the stack.
     #[must_use]
     pub const fn is_return(&self) -> bool {
-        let popped = self.class.is_load()
-            && self.writes.meets(Registers::PC)
-            && self.address.meets(Registers::SP);
+        let popped =
+            self.class.is_load() && self.writes.meets(Registers::PC) && self.address.meets(Registers::SP);
         popped || matches!(self.class, Class::Branch(Branch::Return))
     }
 }
@@ -267,7 +266,11 @@ pub const fn decode(address: u32, first: u16, second: u16) -> Instruction {
 /// The address that a branch with this offset, in bytes and of so many bits, reaches.
 const fn target(address: u32, offset: u32, bits: u32) -> u32 {
     let shift = 32 - bits;
-    #[allow(clippy::cast_sign_loss, clippy::cast_possible_wrap, reason = "extends the sign")]
+    #[allow(
+        clippy::cast_sign_loss,
+        clippy::cast_possible_wrap,
+        reason = "extends the sign"
+    )]
     let extended = (((offset << shift) as i32) >> shift) as u32;
     address.wrapping_add(4).wrapping_add(extended)
 }

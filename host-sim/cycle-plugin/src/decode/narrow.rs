@@ -31,7 +31,11 @@ pub(super) const fn decode(address: u32, code: u16) -> Instruction {
         0b0101..=0b1000 => memory(code),
         0b1001 => access(code & 0x0800 != 0, low(code, 8), Registers::SP),
         0b1010 => {
-            let base = if code & 0x0800 == 0 { Registers::PC } else { Registers::SP };
+            let base = if code & 0x0800 == 0 {
+                Registers::PC
+            } else {
+                Registers::SP
+            };
             narrow(Class::Simple, base, low(code, 8))
         }
         0b1011 => miscellaneous(address, code),
@@ -143,7 +147,12 @@ const fn miscellaneous(address: u32, code: u16) -> Instruction {
         }
         12 | 13 => {
             let list = (code & 0xff) | ((code & 0x100) << 7);
-            narrow(Class::LoadMultiple(words(list)), NONE, Registers::list(list).and(sp)).at(sp)
+            narrow(
+                Class::LoadMultiple(words(list)),
+                NONE,
+                Registers::list(list).and(sp),
+            )
+            .at(sp)
         }
         6 => narrow(Class::ChangeState, NONE, NONE),
         14 => narrow(Class::Trap, NONE, NONE),

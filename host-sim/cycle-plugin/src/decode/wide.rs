@@ -15,7 +15,11 @@ struct Fields {
 
 /// A register, or none for number 15.
 const fn unless_15(number: u16) -> Registers {
-    if number == 15 { NONE } else { Registers::core(number) }
+    if number == 15 {
+        NONE
+    } else {
+        Registers::core(number)
+    }
 }
 
 const fn wide(class: Class, reads: Registers, writes: Registers) -> Instruction {
@@ -121,22 +125,28 @@ const fn control(address: u32, first: u16, second: u16) -> Instruction {
     let (j1, j2) = (((second as u32) >> 13) & 1, ((second as u32) >> 11) & 1);
     if second & 0x1000 != 0 {
         let (i1, i2) = ((j1 ^ sign) ^ 1, (j2 ^ sign) ^ 1);
-        let offset =
-            (sign << 24) | (i1 << 23) | (i2 << 22) | (((first & 0x3ff) as u32) << 12) | offset;
+        let offset = (sign << 24) | (i1 << 23) | (i2 << 22) | (((first & 0x3ff) as u32) << 12) | offset;
         let to = target(address, offset, 25);
         return if second & 0x4000 == 0 {
             wide(Class::Branch(Branch::Direct(to)), NONE, Registers::PC)
         } else {
-            wide(Class::Branch(Branch::Call(to)), NONE, Registers::PC.and(Registers::core(14)))
+            wide(
+                Class::Branch(Branch::Call(to)),
+                NONE,
+                Registers::PC.and(Registers::core(14)),
+            )
         };
     }
     if second & 0x4000 != 0 {
         return UNKNOWN;
     }
     if (first >> 7) & 7 != 7 {
-        let offset =
-            (sign << 20) | (j2 << 19) | (j1 << 18) | (((first & 0x3f) as u32) << 12) | offset;
-        return wide(Class::Branch(Branch::Direct(target(address, offset, 21))), NONE, Registers::PC);
+        let offset = (sign << 20) | (j2 << 19) | (j1 << 18) | (((first & 0x3f) as u32) << 12) | offset;
+        return wide(
+            Class::Branch(Branch::Direct(target(address, offset, 21))),
+            NONE,
+            Registers::PC,
+        );
     }
     match (first >> 4) & 0x7f {
         0b011_1000 | 0b011_1001 => wide(Class::SpecialRegister, Registers::core(first), NONE),
@@ -168,8 +178,16 @@ const fn memory(first: u16, second: u16, fields: Fields) -> Instruction {
     }
     let long_offset = first & 0x80 != 0;
     let indexed = !long_offset && second & 0x800 == 0;
-    let updated = if !long_offset && second & 0x900 == 0x900 { base } else { NONE };
-    let address = if indexed { base.and(Registers::core(fields.m)) } else { base };
+    let updated = if !long_offset && second & 0x900 == 0x900 {
+        base
+    } else {
+        NONE
+    };
+    let address = if indexed {
+        base.and(Registers::core(fields.m))
+    } else {
+        base
+    };
     match (load, indexed) {
         (true, _) => wide(Class::Load, NONE, data.and(updated)).at(address),
         (false, true) => wide(Class::StoreIndexed, data, updated).at(address),

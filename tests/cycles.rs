@@ -1,0 +1,333 @@
+//! The cycle counter: its decoder against a disassembler over the whole image, its count against a counter in the guest,
+//! and what the sample task takes against the golden table. Needs `qemu-system-arm`; builds the firmware and the plugin.
+#![allow(clippy::unwrap_used, reason = "a test may fail by panic")]
+
+use std::fmt::Write;
+use std::io::Read;
+use std::path::Path;
+use std::process::Command;
+use std::time::{Duration, Instant};
+
+use cycle_plugin::account::Account;
+use cycle_plugin::decode::{Branch, Class, decode};
+use cycle_plugin::plan::{Plan, Stage};
+use cycle_plugin::record::{RECORD_BYTES, Record};
+use host_sim::budget::{SURFACES, TICKS, figures, golden, image, measure::Bench};
+use host_sim::job_file::JobFile;
+use host_sim::prepare::prepare;
+use host_sim::remote::qemu::{self, Qemu};
+
+/// A guest of a few instructions. The thread starts TIM5 and pends USART1; USART1's handler pends TIM2, whose priority is
+/// higher, twice; TIM2's handler reads TIM5 before and after its work, and sends the difference, four bytes.
+mod guest {
+    /// Words of the vector table.
+    pub(super) const VECTORS: u32 = 98;
+    /// From the end of the vector table.
+    pub(super) const OUTER: u32 = 0x40;
+    /// From the end of the vector table.
+    pub(super) const TICK: u32 = 0x68;
+
+    pub(super) const CODE: [u16; 92] = [
+        // reset: enable the floating-point unit
+        0x4827, 0xf44f, 0x0170, 0x6001, // ldr r0,=CPACR; mov r1,#0xf00000; str r1,[r0]
+        0x4826, 0x2101, 0x6001, // ldr r0,=TIM5; movs r1,#1; str r1,[r0]
+        0xf06f, 0x0100, 0x62c1, // mvn r1,#0; str r1,[r0,#ARR]
+        0x4d24, 0xf04f, 0x5180, 0x6029, // ldr r5,=ISER0; mov r1,#1<<28; str r1,[r5]
+        0x2120, 0x6069, // movs r1,#0x20; str r1,[r5,#4]
+        0x4b22, 0x2180, 0xf883, 0x1025, // ldr r3,=IPR; movs r1,#0x80; strb r1,[r3,#37]
+        0x4c21, 0xf242, 0x0108, 0x60e1, // ldr r4,=USART1; movw r1,#0x2008; str r1,[r4,#CR1]
+        0x4d20, 0x2120, 0x6069, // ldr r5,=ISPR0; movs r1,#0x20; str r1,[r5,#4]
+        0xf3bf, 0x8f4f, 0xf3bf, 0x8f6f, 0xe7fe, // dsb; isb; b .
+        // outer
+        0xb510, 0x260a, 0x3e01, 0xd1fd, // push {r4,lr}; movs r6,#10; 1: subs r6,#1; bne 1b
+        0xf04f, 0x5180, 0x6029, // mov r1,#1<<28; str r1,[r5]
+        0xf3bf, 0x8f4f, 0xf3bf, 0x8f6f, // dsb; isb
+        0x2664, 0x3e01, 0xd1fd, 0x6029, // movs r6,#100; 2: subs r6,#1; bne 2b; str r1,[r5]
+        0xf3bf, 0x8f4f, 0xf3bf, 0x8f6f, 0xbd10, // dsb; isb; pop {r4,pc}
+        // tick
+        0xb590, 0x6a42, 0x2632, 0xbf00, // push {r4,r7,lr}; ldr r2,[r0,#CNT]; movs r6,#50; nop
+        0xf000, 0xf814, 0x3e01, 0xbf18, // 3: bl callee; subs r6,#1; it ne
+        0x3701, 0x2e00, 0xd1f8, // addne r7,#1; cmp r6,#0; bne 3b
+        0xee20, 0x0a81, 0xee70, 0x1a00, // vmul.f32 s0,s1,s2; vadd.f32 s3,s0,s0
+        0x6a43, 0x1a9b, // ldr r3,[r0,#CNT]; subs r3,r3,r2
+        0x6063, 0x0a1b, 0x6063, 0x0a1b, // str r3,[r4,#DR]; lsrs r3,#8; ..
+        0x6063, 0x0a1b, 0x6063, // .. four times
+        0xbd90, 0xbf00, // pop {r4,r7,pc}; nop
+        0x2103, 0x4770, // callee: movs r1,#3; bx lr
+        // literals
+        0xed88, 0xe000, 0x0c00, 0x4000, 0xe100, 0xe000, 0xe400, 0xe000, 0x1000, 0x4001, 0xe200, 0xe000,
+    ];
+
+    /// Calls of the tick's loop.
+    pub(super) const CALLS: u32 = 50;
+}
+
+/// Image and plan of the guest, all of it one stage.
+fn guest_plan() -> Plan {
+    let code_at = 4 * guest::VECTORS;
+    let mut words = vec![code_at + 1; guest::VECTORS as usize];
+    words[0] = 0x2000_1000;
+    words[16 + 37] = code_at + guest::OUTER + 1;
+    words[16 + 28] = code_at + guest::TICK + 1;
+    let mut code: Vec<u8> = words.iter().flat_map(|word| word.to_le_bytes()).collect();
+    code.extend(guest::CODE.iter().flat_map(|halfword| halfword.to_le_bytes()));
+    Plan {
+        base: 0,
+        exception: 16 + 28,
+        stack_end: 0x2000_1000,
+        stages: vec![Some(Stage::Rest); code.len() / 2],
+        code,
+    }
+}
+
+/// Runs the guest: the differences that it sent, in instructions, and the plugin's records.
+fn run_guest(folder: &Path) -> (Vec<u32>, Vec<Record>) {
+    let path = |name: &str| folder.join(name);
+    let plan = guest_plan();
+    std::fs::write(path("plan"), plan.to_bytes()).unwrap();
+    std::fs::write(path("image"), &plan.code).unwrap();
+    let plugin = format!(
+        "{},plan={},records={}",
+        qemu::cycle_plugin().unwrap().display(),
+        path("plan").display(),
+        path("records").display()
+    );
+    let (_qemu, mut stream) = Qemu::start_with(&path("image"), &["-plugin".to_owned(), plugin]).unwrap();
+    let mut bytes = Vec::new();
+    let deadline = Instant::now() + Duration::from_secs(20);
+    while bytes.len() < 8 && Instant::now() < deadline {
+        let mut some = [0; 8];
+        if let Ok(count) = stream.read(&mut some) {
+            bytes.extend_from_slice(&some[..count]);
+        }
+    }
+    // The second record comes with the first instruction after the handler.
+    let mut records = Vec::new();
+    while records.len() < 2 * RECORD_BYTES && Instant::now() < deadline {
+        records = std::fs::read(path("records")).unwrap();
+        std::thread::sleep(Duration::from_millis(5));
+    }
+    // TIM5 counts nanoseconds, and an instruction takes 8 of them.
+    let counted = bytes
+        .chunks_exact(4)
+        .map(|word| u32::from_le_bytes(word.try_into().unwrap()) / 8)
+        .collect();
+    (counted, Record::read_all(&records))
+}
+
+/// Two ticks that preempt another handler: instructions as a timer in the guest counts them, cycles as counted by hand,
+/// and the other handler's instructions on its own account.
+#[test]
+fn instructions_agree_with_a_counter_in_the_guest() {
+    let folder = std::env::temp_dir().join(format!("isofeed-cycles-{}", std::process::id()));
+    std::fs::create_dir_all(&folder).unwrap();
+    let (counted, records) = run_guest(&folder);
+    std::fs::remove_dir_all(&folder).unwrap();
+    assert_eq!((counted.len(), records.len()), (2, 2));
+    // bl, movs, bx, subs, it, addne, cmp, bne; around them movs, nop, vmul, vadd and the second ldr.
+    let work = 8 * guest::CALLS + 5;
+    // push and the first ldr; subs, four str, three lsrs, pop.
+    let around = 2 + 9;
+    // bl 1+1, movs 1, bx 1+2, subs, it, addne, cmp 1 each, bne 1+1, but for the last 1.
+    let calls = 12 * guest::CALLS - 1;
+    // Entry, exit; push 4, ldr 2, movs, nop; vmul, vadd, ldr 2, subs; four str, three lsrs, pop 4 and what its branch
+    // takes is the exit's.
+    let nominal = 24 + (4 + 2 + 1 + 1) + calls + (1 + 1 + 2 + 1) + (4 + 3 + 4);
+    for (record, counted) in records.iter().zip(counted) {
+        assert_eq!(counted, work);
+        assert_eq!((record.instructions, record.unknown), (work + around, 0));
+        let cycles: u32 = record.stages.iter().map(|cycles| cycles.nominal).sum();
+        assert_eq!(cycles, nominal);
+        assert_eq!(record.stages[Stage::Exception as usize].nominal, 24);
+        // Both flash lines, and lazy stacking there and back.
+        let exception = record.stages[Stage::Exception as usize].pessimistic;
+        assert_eq!(exception, 24 + 5 + 5 + 2 * 17);
+    }
+    // Between the two ticks: dsb, isb, movs, a hundred times subs and bne, str.
+    assert_eq!(records[1].elsewhere, 2 + 1 + 2 * 100 + 1);
+}
+
+/// The accounts without QEMU: a branch that is taken and one that is not, to the cycle.
+#[test]
+fn the_account_follows_a_loop() {
+    let plan = guest_plan();
+    let code_at = 4 * guest::VECTORS;
+    let (outer, tick) = (code_at + guest::OUTER, code_at + guest::TICK);
+    let mut account = Account::new(plan);
+    let mut at = |address: u32| {
+        let index = account.place(address).unwrap();
+        account.execute(index)
+    };
+    // The thread, the outer handler, the tick in it, straight to its return, and back.
+    assert_eq!(at(code_at), None);
+    assert_eq!(at(outer), None);
+    assert_eq!(at(outer + 2), None);
+    assert_eq!(at(tick), None);
+    assert_eq!(at(tick + 0x30), None);
+    let record = at(outer + 4).unwrap();
+    // push {r4,r7,lr} and pop {r4,r7,pc}, four each.
+    assert_eq!((record.instructions, record.elsewhere), (2, 3));
+    assert_eq!(record.stages[Stage::Rest as usize].nominal, 4 + 4);
+}
+
+/// Lines of a disassembler: address, mnemonic without width, operands.
+fn disassembly(image: &Path) -> Option<Vec<(u32, String, String)>> {
+    let tool = ["arm-none-eabi-objdump", "llvm-objdump", "rust-objdump"]
+        .into_iter()
+        .find_map(|tool| {
+            let output = Command::new(tool)
+                .args(["-d", "--no-show-raw-insn"])
+                .arg(image)
+                .output()
+                .ok()?;
+            output
+                .status
+                .success()
+                .then(|| String::from_utf8_lossy(&output.stdout).into_owned())
+        })?;
+    let line = |line: &str| {
+        let (address, rest) = line.split_once(':')?;
+        let address = u32::from_str_radix(address.trim(), 16).ok()?;
+        let mut parts = rest.trim().splitn(2, char::is_whitespace);
+        let mnemonic = parts
+            .next()?
+            .trim_end_matches(".w")
+            .trim_end_matches(".n")
+            .to_owned();
+        let known = mnemonic.starts_with(|c: char| c.is_ascii_lowercase());
+        known.then(|| (address, mnemonic, parts.next().unwrap_or("").trim().to_owned()))
+    };
+    Some(tool.lines().filter_map(line).collect())
+}
+
+/// The class that a mnemonic stands for; words of several transfers as 0.
+fn class_of(mnemonic: &str, operands: &str) -> Class {
+    let begins = |names: &[&str]| names.iter().any(|name| mnemonic.starts_with(name));
+    let base = mnemonic.split('.').next().unwrap_or(mnemonic);
+    let conditions = [
+        "", "eq", "ne", "hs", "cs", "lo", "cc", "mi", "pl", "vs", "vc", "hi", "ls", "ge", "lt", "gt", "le",
+    ];
+    let is = |name: &str| {
+        base.strip_prefix(name)
+            .is_some_and(|rest| conditions.contains(&rest))
+    };
+    let double = operands.starts_with('d');
+    let literal = operands.contains("[pc");
+    let indexed = operands
+        .split_once('[')
+        .and_then(|(_, inside)| inside.split(']').next()?.split_once(','))
+        .is_some_and(|(_, offset)| !offset.trim().starts_with('#'));
+    let into_pc = operands.starts_with("pc");
+    match base {
+        _ if is("bl") => Class::Branch(Branch::Call(0)),
+        _ if is("blx") => Class::Branch(Branch::CallIndirect),
+        _ if is("bx") && operands == "lr" => Class::Branch(Branch::Return),
+        _ if is("bx") => Class::Branch(Branch::Indirect),
+        "cbz" | "cbnz" => Class::Branch(Branch::Direct(0)),
+        _ if is("b") => Class::Branch(Branch::Direct(0)),
+        "tbb" | "tbh" => Class::Table,
+        "bkpt" | "svc" | "udf" | "trap" => Class::Trap,
+        "nop" | "sev" | "pld" | "clrex" | "yield" => Class::Hint,
+        "wfi" | "wfe" => Class::Wait,
+        "dmb" | "dsb" | "isb" => Class::Barrier,
+        "mrs" | "msr" => Class::SpecialRegister,
+        "cpsie" | "cpsid" => Class::ChangeState,
+        _ if begins(&["it"]) => Class::IfThen,
+        _ if is("udiv") || is("sdiv") => Class::Divide,
+        _ if begins(&["vmla", "vmls", "vnmla", "vnmls", "vfma", "vfms", "vfnm"]) => Class::FloatMultiplyAdd,
+        _ if begins(&["vdiv", "vsqrt"]) => Class::FloatDivide,
+        _ if begins(&["vadd", "vsub", "vmul", "vnmul", "vcvt"]) => Class::FloatArithmetic,
+        _ if begins(&["vmov"]) && operands.matches(',').count() >= 2 => Class::FloatMovePair,
+        _ if begins(&["vmov"]) && double && operands.matches(',').count() == 2 => Class::FloatMovePair,
+        _ if begins(&["vmov", "vabs", "vneg", "vcmp", "vmrs", "vmsr"]) => Class::FloatMove,
+        _ if begins(&["vldr"]) && !double => Class::FloatLoad,
+        _ if begins(&["vstr"]) && !double => Class::FloatStore,
+        _ if begins(&["vldr", "vldm", "vpop"]) => Class::FloatLoadMultiple(0),
+        _ if begins(&["vstr", "vstm", "vpush"]) => Class::FloatStoreMultiple(0),
+        _ if begins(&["ldrd", "ldm", "pop"]) => Class::LoadMultiple(0),
+        _ if begins(&["strd", "stm", "push"]) && !begins(&["strexd"]) => Class::StoreMultiple(0),
+        _ if begins(&["ldr"]) && literal => Class::LoadLiteral,
+        _ if begins(&["ldr"]) => Class::Load,
+        _ if begins(&["strex"]) => Class::Store,
+        _ if begins(&["str"]) && indexed => Class::StoreIndexed,
+        _ if begins(&["str"]) => Class::Store,
+        _ if begins(&[
+            "mul", "mla", "mls", "sml", "smm", "smul", "smull", "umull", "umlal", "umaal",
+        ]) =>
+        {
+            Class::Multiply
+        }
+        _ if into_pc && begins(&["mov", "add"]) => Class::Branch(Branch::Indirect),
+        _ => Class::Simple,
+    }
+}
+
+/// A class without what the mnemonic alone does not say.
+fn plain(class: Class) -> Class {
+    match class {
+        Class::Branch(Branch::Direct(_)) => Class::Branch(Branch::Direct(0)),
+        Class::Branch(Branch::Call(_)) => Class::Branch(Branch::Call(0)),
+        Class::LoadMultiple(_) => Class::LoadMultiple(0),
+        Class::StoreMultiple(_) => Class::StoreMultiple(0),
+        Class::FloatLoadMultiple(_) => Class::FloatLoadMultiple(0),
+        Class::FloatStoreMultiple(_) => Class::FloatStoreMultiple(0),
+        other => other,
+    }
+}
+
+/// Each instruction of the image: its class is what the disassembler's mnemonic says, the next begins where it ends, and
+/// a direct branch goes where the disassembler says.
+#[test]
+fn the_decoder_agrees_with_a_disassembler() {
+    let path = qemu::firmware().unwrap();
+    let Some(lines) = disassembly(&path) else {
+        println!("no disassembler for ARM is installed: nothing compared");
+        return;
+    };
+    let (plan, _) = image::read(&path).unwrap();
+    let mut wrong = String::new();
+    for pair in lines.windows(2) {
+        let (address, mnemonic, operands) = &pair[0];
+        let index = ((address - plan.base) / 2) as usize;
+        let instruction = decode(*address, plan.halfword(index), plan.halfword(index + 1));
+        let target = match instruction.class {
+            Class::Branch(Branch::Direct(to) | Branch::Call(to)) => Some(format!("{to:x}")),
+            _ => None,
+        };
+        // Between functions and in front of tables there is room.
+        let length = pair[1].0 - address;
+        let agrees = plain(instruction.class) == class_of(mnemonic, operands)
+            && (u32::from(instruction.length) == length || length > 4)
+            && target.is_none_or(|target| operands.contains(&target));
+        if !agrees {
+            let _ = writeln!(
+                wrong,
+                "{address:x}: {mnemonic} {operands}: {instruction:?}, {length} bytes"
+            );
+        }
+    }
+    assert!(lines.len() > 10_000, "{} lines", lines.len());
+    assert!(wrong.is_empty(), "{wrong}");
+    println!("{} instructions agree", lines.len());
+}
+
+/// No stage takes more than 2 % longer than it did when the golden table was written.
+#[test]
+fn no_stage_has_grown() {
+    let path = qemu::firmware().unwrap();
+    let (plan, _) = image::read(&path).unwrap();
+    let bench = Bench::new(&path, &plan).unwrap();
+    let mut all = Vec::new();
+    for (name, job) in SURFACES {
+        let job = qemu::workspace().join(format!("jobs/{job}.toml"));
+        let prepared = prepare(&JobFile::load(&job).unwrap()).unwrap();
+        all.extend(figures::figures(name, &bench.run(&prepared, TICKS).unwrap()));
+    }
+    let table = std::fs::read_to_string(golden::path()).unwrap();
+    let complaints = golden::complaints(&table, &all);
+    assert!(
+        complaints.is_empty(),
+        "old -> new; if it is meant to be so, `cargo sim budget --bless`:\n{}",
+        complaints.join("\n")
+    );
+}
