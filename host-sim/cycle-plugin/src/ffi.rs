@@ -42,15 +42,22 @@ type Execute = extern "C" fn(c_uint, *mut c_void);
 type Store = extern "C" fn(c_uint, c_uint, u64, *mut c_void);
 type Translate = extern "C" fn(u64, *mut c_void);
 
+type Register = extern "C" fn(u64, Translate);
+type Count = extern "C" fn(*const c_void) -> usize;
+type Get = extern "C" fn(*const c_void, usize) -> *mut c_void;
+type Address = extern "C" fn(*const c_void) -> u64;
+type OnExecution = extern "C" fn(*mut c_void, Execute, c_uint, *mut c_void);
+type OnMemory = extern "C" fn(*mut c_void, Store, c_uint, c_uint, *mut c_void);
+
 /// The functions of QEMU.
 #[derive(Clone, Copy)]
 struct Api {
-    on_translation: extern "C" fn(u64, Translate),
-    instructions: extern "C" fn(*const c_void) -> usize,
-    instruction: extern "C" fn(*const c_void, usize) -> *mut c_void,
-    address: extern "C" fn(*const c_void) -> u64,
-    on_execution: extern "C" fn(*mut c_void, Execute, c_uint, *mut c_void),
-    on_memory: extern "C" fn(*mut c_void, Store, c_uint, c_uint, *mut c_void),
+    on_translation: Register,
+    instructions: Count,
+    instruction: Get,
+    address: Address,
+    on_execution: OnExecution,
+    on_memory: OnMemory,
 }
 
 unsafe extern "C" {
@@ -63,24 +70,24 @@ fn symbol(name: &CStr) -> Option<*mut c_void> {
     (!found.is_null()).then_some(found)
 }
 
-/// A function of QEMU by name, as the type that the caller gives it.
+/// A function of QEMU by name, as this type.
 macro_rules! function {
-    ($name:literal) => {{
+    ($name:literal, $kind:ty) => {{
         let found = symbol($name)?;
         // SAFETY: QEMU declares the function of this name with this signature in `qemu-plugin.h`, versions 1 to 4.
-        unsafe { std::mem::transmute::<*mut c_void, _>(found) }
+        unsafe { std::mem::transmute::<*mut c_void, $kind>(found) }
     }};
 }
 
 impl Api {
     fn find() -> Option<Self> {
         Some(Self {
-            on_translation: function!(c"qemu_plugin_register_vcpu_tb_trans_cb"),
-            instructions: function!(c"qemu_plugin_tb_n_insns"),
-            instruction: function!(c"qemu_plugin_tb_get_insn"),
-            address: function!(c"qemu_plugin_insn_vaddr"),
-            on_execution: function!(c"qemu_plugin_register_vcpu_insn_exec_cb"),
-            on_memory: function!(c"qemu_plugin_register_vcpu_mem_cb"),
+            on_translation: function!(c"qemu_plugin_register_vcpu_tb_trans_cb", Register),
+            instructions: function!(c"qemu_plugin_tb_n_insns", Count),
+            instruction: function!(c"qemu_plugin_tb_get_insn", Get),
+            address: function!(c"qemu_plugin_insn_vaddr", Address),
+            on_execution: function!(c"qemu_plugin_register_vcpu_insn_exec_cb", OnExecution),
+            on_memory: function!(c"qemu_plugin_register_vcpu_mem_cb", OnMemory),
         })
     }
 }

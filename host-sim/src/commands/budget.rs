@@ -33,7 +33,7 @@ pub(super) struct Arguments {
     #[arg(long)]
     json: bool,
     /// Fails where a stage has grown by more than 2 % against the golden table.
-    #[arg(long, conflicts_with = "jobs")]
+    #[arg(long, conflicts_with_all = ["jobs", "ticks"])]
     check: bool,
     /// Writes the golden table anew.
     #[arg(long, conflicts_with_all = ["jobs", "check", "ticks"])]
