@@ -30,9 +30,9 @@ fn reference() -> Vec<Sample> {
     core.load_words(0, &words).unwrap();
     core.load_check(0).unwrap();
     core.load_finish().unwrap();
-    let mut samples = vec![core.tick(interpolator::Request::Start)];
+    let mut samples = vec![*core.tick(interpolator::Request::Start)];
     while core.state() == State::Running {
-        samples.push(core.tick(interpolator::Request::None));
+        samples.push(*core.tick(interpolator::Request::None));
     }
     assert_eq!(core.state(), State::Finished);
     samples.pop();

@@ -49,10 +49,10 @@ fn load(prepared: &Prepared) -> Box<Interpolator> {
 fn run(prepared: &Prepared) -> (Option<Sample>, Box<Interpolator>) {
     let mut core = load(prepared);
     let mut last = None;
-    let mut sample = core.tick(Request::Start);
+    let mut sample = *core.tick(Request::Start);
     while sample.state == State::Running {
         last = Some(sample);
-        sample = core.tick(Request::None);
+        sample = *core.tick(Request::None);
     }
     (last, core)
 }
@@ -218,7 +218,7 @@ fn loading_while_a_job_runs() {
     let prepared = prepare(&job(patch(&[(0, 1, 0, 20.0), (1, 0, 1, 20.0)]), 1.0)).unwrap();
     let mut core = load(&prepared);
     core.tick(Request::Start);
-    let before = core.tick(Request::Hold);
+    let before = *core.tick(Request::Hold);
     assert_eq!(before.state, State::Held);
     let fault = core
         .load_begin(&prepared.header, prepared.words.len() as u32)
@@ -237,8 +237,8 @@ fn hold_and_resume_change_nothing() {
     let prepared = prepare(&job).unwrap();
     let mut plain = load(&prepared);
     let mut held = load(&prepared);
-    let mut expected = plain.tick(Request::Start);
-    let mut sample = held.tick(Request::Start);
+    let mut expected = *plain.tick(Request::Start);
+    let mut sample = *held.tick(Request::Start);
     while expected.state == State::Running {
         assert_eq!(sample, expected);
         for _ in 0..3 {
@@ -248,8 +248,8 @@ fn hold_and_resume_change_nothing() {
                 (State::Held, sample.cl_nm, sample.tick)
             );
         }
-        sample = held.tick(Request::Resume);
-        expected = plain.tick(Request::None);
+        sample = *held.tick(Request::Resume);
+        expected = *plain.tick(Request::None);
     }
     assert_eq!(sample, expected);
 }

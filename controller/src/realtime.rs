@@ -217,7 +217,7 @@ impl<const WORDS: usize> RealTime<WORDS> {
         if starts && request.is_allowed(self.interpolator.state()) {
             self.run = Run::NEW;
         }
-        let sample = self.interpolator.tick(request);
+        let sample = *self.interpolator.tick(request);
         if sample.state == State::Running {
             output.pass = self.run.add(&sample, self.interpolator.last_interval());
             output.sample = (self.report == Report::Samples).then_some(sample);

@@ -42,7 +42,7 @@ impl Machine {
             if sample.state != State::Running {
                 break;
             }
-            if !each(&sample) {
+            if !each(sample) {
                 self.core.tick(Request::Abort);
                 break;
             }

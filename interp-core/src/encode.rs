@@ -28,7 +28,7 @@
 //! machine.load_check(0)?;
 //! machine.load_finish()?;
 //!
-//! let first = machine.tick(Request::Start);
+//! let first = *machine.tick(Request::Start);
 //! assert_eq!(first.cc_nm, [-40_000_000, -30_000_000, -5_000_000]);
 //! let second = machine.tick(Request::None);
 //! assert_eq!(second.state, State::Running);

@@ -343,7 +343,7 @@ impl<const WORDS: usize> Interpolator<WORDS> {
     /// While the job runs, each call yields a sample with [`State::Running`], counted by its `tick` from 0; the one after
     /// the last has [`State::Finished`]. In every state that does not move, the sample repeats the last position.
     #[inline(never)]
-    pub fn tick(&mut self, request: Request) -> Sample {
+    pub fn tick(&mut self, request: Request) -> &Sample {
         self.take_up(request);
         if self.state == State::Running {
             match self.advance() {
@@ -353,7 +353,7 @@ impl<const WORDS: usize> Interpolator<WORDS> {
             }
         }
         self.last.state = self.state;
-        self.last
+        &self.last
     }
 
     fn take_up(&mut self, request: Request) {
