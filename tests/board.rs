@@ -24,7 +24,7 @@ const WORDS: usize = 64;
 /// The samples of the dome, by the core alone.
 fn reference() -> Vec<Sample> {
     let (header, words) = dome();
-    let mut core = Interpolator::<WORDS>::new();
+    let mut core = Interpolator::<[i32; WORDS]>::new();
     core.load_begin(&header, u32::try_from(words.len()).unwrap())
         .unwrap();
     core.load_words(0, &words).unwrap();
@@ -312,7 +312,7 @@ fn a_missed_tick_trips_a_free_run_and_is_only_counted_in_lockstep() {
 #[test]
 fn a_full_output_stops_time_in_lockstep_only() {
     let (header, words) = dome();
-    let mut half = RealTime::<WORDS>::new();
+    let mut half = RealTime::<[i32; WORDS]>::new();
     half.load_begin(&header, 54).unwrap();
     half.load_words(0, &words).unwrap();
     half.load_check(0).unwrap();

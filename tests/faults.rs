@@ -34,7 +34,7 @@ fn patch(terms: &[(usize, usize, usize, f64)]) -> SurfaceSpec {
 }
 
 fn load(prepared: &Prepared) -> Box<Interpolator> {
-    let mut core = Box::new(Interpolator::<STORE_WORDS>::new());
+    let mut core = Box::new(<Interpolator>::new());
     core.load_begin(&prepared.header, prepared.words.len() as u32)
         .unwrap();
     core.load_words(0, &prepared.words).unwrap();

@@ -48,8 +48,9 @@ impl Trace {
     pub fn write(&mut self, sample: &Sample, [u, v]: [f64; 2]) -> io::Result<()> {
         let [cc_x, cc_y, cc_z] = sample.cc_nm.map(millimetres);
         let [cl_x, cl_y, cl_z] = sample.cl_nm;
-        let interval = if sample.interval.is_finite() {
-            sample.interval.to_string()
+        let interval = sample.interval();
+        let interval = if interval.is_finite() {
+            interval.to_string()
         } else {
             String::new()
         };
