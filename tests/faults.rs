@@ -3,7 +3,7 @@
 
 use host_sim::job_file::{Along, JobFile, Pattern, Side, SurfaceSpec};
 use host_sim::prepare::{Prepared, prepare};
-use interp_core::{FaultKind, Interpolator, Place, Request, STORE_WORDS, Sample, State};
+use interp_core::{FaultKind, Interpolator, Place, Request, Sample, State};
 
 fn job(surface: SurfaceSpec, radius_mm: f64) -> JobFile {
     JobFile {

@@ -62,7 +62,9 @@ pub(crate) const fn jet(c: &[i32; 4], w: i32) -> [i32; 3] {
 #[must_use]
 pub(crate) const fn dot_hi(a: &[i32; 3], b: &[i32; 3]) -> i32 {
     let ([a0, a1, a2], [b0, b1, b2]) = (*a, *b);
-    mul_hi(a0, b0).wrapping_add(mul_hi(a1, b1)).wrapping_add(mul_hi(a2, b2))
+    mul_hi(a0, b0)
+        .wrapping_add(mul_hi(a1, b1))
+        .wrapping_add(mul_hi(a2, b2))
 }
 
 /// A centred parameter as a float in [-1/2, 1/2].
@@ -392,7 +394,10 @@ mod tests {
             assert_eq!(small.is_some(), (2_f32.powi(-32)..2_f32.powi(-8)).contains(&step));
             assert!(small.is_none_or(|small| small == fraction_from_f32(step)));
         }
-        assert_eq!(small_step(f32::NAN).or(small_step(-1e-3)).or(small_step(0.0)), None);
+        assert_eq!(
+            small_step(f32::NAN).or(small_step(-1e-3)).or(small_step(0.0)),
+            None
+        );
         assert_eq!(fraction_from_f32(1.0), u64::MAX);
         assert_eq!(fraction_from_f32(f32::INFINITY), u64::MAX);
         assert_eq!(fraction_from_f32(f32::NAN), u64::MAX);

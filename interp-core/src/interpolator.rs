@@ -89,7 +89,6 @@ impl<S> Interpolator<S> {
             store,
         }
     }
-
 }
 
 impl<S: AsRef<[i32]> + AsMut<[i32]>> Interpolator<S> {

@@ -158,7 +158,9 @@ impl Ball {
         let mut worst = 0.0_f32;
         let places = contact.position.into_iter().zip(contact.offset).zip(*origin_nm);
         for ((position, offset), origin) in places {
-            let value = metres(origin, 0) + metres(position, self.shift) + metres(offset, self.sum_shift + self.coarser_offset);
+            let value = metres(origin, 0)
+                + metres(position, self.shift)
+                + metres(offset, self.sum_shift + self.coarser_offset);
             if value.abs() > worst.abs() {
                 worst = value;
             }

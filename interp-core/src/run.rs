@@ -85,7 +85,11 @@ impl Travel {
 
     /// Fraction of the span, in the surface's own direction.
     const fn own_fraction(&self) -> u64 {
-        if self.reversed { !self.fraction } else { self.fraction }
+        if self.reversed {
+            !self.fraction
+        } else {
+            self.fraction
+        }
     }
 
     /// Steps 2 to 4 at the place where the run now is. Nothing of `last` changes if there is a fault.

@@ -58,8 +58,7 @@ pub fn of_function(path: &str) -> Option<Stage> {
         "interpolator" => Some(Stage::Rest),
         "schedule" => Some(Stage::PassChange),
         "run" => Some(
-            RUN
-                .iter()
+            RUN.iter()
                 .find(|(function, _)| path.contains(&format!("::{function}::")) || name == *function)
                 .map_or(Stage::Rest, |(_, stage)| *stage),
         ),

@@ -94,7 +94,8 @@ impl PolynomialPass {
     fn local(&self, fraction: u64) -> Local {
         let w = centred(fraction);
         let [x, y, z] = &self.axes;
-        let ([x0, x1, x2], [y0, y1, y2], [z0, z1, z2]) = (jet(&x.value, w), jet(&y.value, w), jet(&z.value, w));
+        let ([x0, x1, x2], [y0, y1, y2], [z0, z1, z2]) =
+            (jet(&x.value, w), jet(&y.value, w), jet(&z.value, w));
         let ([xs, xm, _], [ys, ym, _], [zs, zm, _]) = (jet(&x.side, w), jet(&y.side, w), jet(&z.side, w));
         Local {
             position: [x0, y0, z0],
