@@ -228,7 +228,7 @@ impl<S: AsRef<[i32]> + AsMut<[i32]>> RealTime<S> {
             self.run = Run::NEW;
         }
         let sample = *self.interpolator.tick(request);
-        if sample.state == State::Running {
+        if matches!(sample.state, State::Running | State::Stopping) {
             output.pass = self.run.add(&sample, self.interpolator.last_interval());
             output.sample = (self.report == Report::Samples).then_some(sample);
         }
