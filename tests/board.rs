@@ -4,7 +4,7 @@
 
 use controller::{
     in_process::Board,
-    machine::Command,
+    machine::{Command, Event, Events},
     realtime::{RealTime, TickInput},
 };
 use integration_tests::{HELLO, Host, dome, upload};
@@ -284,13 +284,16 @@ fn a_job_begun_withdraws_a_start_that_waits() {
 
 #[test]
 fn a_missed_tick_trips_a_free_run_and_is_only_counted_in_lockstep() {
-    let mut desk = Desk::loaded(Clock::Free, Report::Digests);
+    let mut desk = Desk::loaded(Clock::Free, Report::Samples);
     desk.board.tick_with(3, 0);
     desk.accepted(&Request::Start);
     desk.ticks(50);
     desk.board.tick_with(2, 4321);
     desk.ticks(40);
     desk.collect();
+    while desk.halts.is_empty() {
+        desk.ticks(1);
+    }
     let status = desk.halts[0];
     // Along the path, 1/32 of the feed less with each of 31 samples.
     assert_eq!((status.state, status.samples), (State::Faulted, 50 + 31));
@@ -311,6 +314,24 @@ fn a_missed_tick_trips_a_free_run_and_is_only_counted_in_lockstep() {
     assert_eq!(status.digest, digest(&reference()));
 }
 
+/// A way to the link with or without room.
+#[derive(Default)]
+struct Way {
+    full: bool,
+    events: Vec<Event>,
+}
+
+impl Events for Way {
+    fn has_room(&self) -> bool {
+        !self.full
+    }
+
+    fn put(&mut self, event: Event) -> bool {
+        self.events.push(event);
+        !self.full
+    }
+}
+
 #[test]
 fn a_full_output_stops_time_in_lockstep_only() {
     let (header, words) = dome();
@@ -319,27 +340,98 @@ fn a_full_output_stops_time_in_lockstep_only() {
     half.load_words(0, &words).unwrap();
     half.load_check(0).unwrap();
     half.load_finish().unwrap();
-    let tell = |command| TickInput {
-        command: Some(command),
-        ..TickInput::default()
+    let mut way = Way::default();
+    let start = Command::Request(interpolator::Request::Start);
+    half.obey(Command::Report(Report::Samples), &mut way);
+    half.obey(Command::Clock(Clock::Lockstep), &mut way);
+    half.obey(start, &mut way);
+    half.obey(Command::Run { ticks: 10 }, &mut way);
+    let mut tick = |half: &mut RealTime<[i32; WORDS]>, full| {
+        way.full = full;
+        half.tick(TickInput::default(), &mut way);
+        core::mem::take(&mut way.events)
     };
-    half.tick(tell(Command::Report(Report::Samples)));
-    half.tick(tell(Command::Clock(Clock::Lockstep)));
-    half.tick(tell(Command::Request(interpolator::Request::Start)));
-    let full = TickInput {
-        output_full: true,
-        ..TickInput::default()
-    };
-    let output = half.tick(TickInput {
-        output_full: true,
-        ..tell(Command::Run { ticks: 10 })
-    });
-    assert_eq!(output.events().count(), 0);
-    assert_eq!(half.tick(full).events().count(), 0);
+    assert_eq!(tick(&mut half, true), []);
+    assert_eq!(tick(&mut half, true), []);
     assert_eq!(half.status().credit, 10);
-    assert_eq!(half.tick(TickInput::default()).sample, Some(reference()[0]));
-    assert_eq!(half.tick(full).events().count(), 0);
-    assert_eq!(half.tick(TickInput::default()).sample, Some(reference()[1]));
+    assert_eq!(tick(&mut half, false), [Event::Sample(reference()[0])]);
+    assert_eq!(tick(&mut half, true), []);
+    assert_eq!(tick(&mut half, false), [Event::Sample(reference()[1])]);
+    assert_eq!((half.status().credit, half.status().samples_lost), (8, 0));
+
+    half.obey(
+        Command::Request(interpolator::Request::Abort),
+        &mut Way::default(),
+    );
+    while half.status().state.is_under_way() {
+        half.tick(TickInput::default(), &mut Way::default());
+    }
+    half.obey(Command::Clock(Clock::Free), &mut Way::default());
+    half.obey(start, &mut Way::default());
+    let mut way = Way {
+        full: true,
+        ..Way::default()
+    };
+    for _ in 0..3 {
+        half.tick(TickInput::default(), &mut way);
+    }
+    assert_eq!((half.status().samples, half.status().samples_lost), (3, 3));
+}
+
+#[test]
+fn a_tick_over_its_budget_trips_a_run_that_moves_on_a_free_clock() {
+    const BUDGET: u32 = 16_800;
+    let mut desk = Desk::loaded(Clock::Free, Report::Digests);
+    desk.board.real_time().set_tick_budget(BUDGET);
+    // nothing moves yet
+    desk.board.tick_with(0, 2 * BUDGET);
+    assert_eq!(desk.board.status().state, State::Ready);
+    desk.accepted(&Request::Start);
+    desk.ticks(50);
+    // as much as is allowed, as often as one likes
+    desk.board.tick_with(0, BUDGET);
+    desk.board.tick_with(0, BUDGET);
+    assert_eq!(desk.board.status().state, State::Running);
+    // held, it is no fault, but counts as the most that a tick took
+    desk.accepted(&Request::Hold);
+    while desk.board.status().state != State::Held {
+        desk.ticks(1);
+    }
+    desk.board.tick_with(0, BUDGET + 9);
+    assert_eq!(desk.board.status().fault, None);
+    desk.accepted(&Request::Resume);
+    desk.ticks(2);
+    // less than the most so far, and still too much
+    let before = desk.board.status();
+    assert_eq!(
+        (before.state, before.tick_cycles_max),
+        (State::Running, BUDGET + 9)
+    );
+    desk.board.tick_with(0, BUDGET + 1);
+    while desk.halts.is_empty() {
+        desk.ticks(1);
+    }
+    let status = desk.halts[0];
+    let fault = status.fault.unwrap();
+    assert_eq!(status.state, State::Faulted);
+    assert_eq!(
+        (fault.kind(), fault.value),
+        (Some(FaultKind::TickOverBudget), 16_801.0)
+    );
+    assert_eq!((status.deadline_misses, status.tick_cycles_max), (0, BUDGET + 9));
+
+    // in lockstep nobody waits for the tool
+    let mut desk = Desk::loaded(Clock::Lockstep, Report::Digests);
+    desk.board.real_time().set_tick_budget(BUDGET);
+    desk.accepted(&Request::Start);
+    desk.run(50);
+    desk.board.tick_with(0, 2 * BUDGET);
+    let status = desk.run(1_000_000);
+    assert_eq!(
+        (status.state, status.tick_cycles_max),
+        (State::Finished, 2 * BUDGET)
+    );
+    assert_eq!(status.digest, digest(&reference()));
 }
 
 /// What a host, or a line gone mad, may do next.
