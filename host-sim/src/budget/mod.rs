@@ -11,6 +11,7 @@
 pub mod chart;
 pub mod figures;
 pub mod golden;
+pub mod graph;
 pub mod image;
 pub mod measure;
 pub mod stages;
