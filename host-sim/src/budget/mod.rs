@@ -13,7 +13,9 @@ pub mod figures;
 pub mod golden;
 pub mod graph;
 pub mod image;
+pub mod lab;
 pub mod measure;
+pub mod search;
 pub mod stages;
 
 use std::path::PathBuf;

@@ -1,5 +1,7 @@
 //! `budget`: what each stage of the sample task takes on the Cortex-M4F.
 
+mod worst;
+
 use std::path::PathBuf;
 
 use clap::Args;
@@ -8,6 +10,7 @@ use serde_json::{Value, json};
 use super::{Failure, Result, cannot_write, load, progress};
 use crate::budget::figures::{Figure, Histogram, Model, figures, histogram};
 use crate::budget::image::{self, Sizes};
+use crate::budget::lab::Lab;
 use crate::budget::measure::{Bench, Ticks};
 use crate::budget::{BudgetError, PERIOD_CYCLES, SURFACES, TICKS, chart, golden};
 use crate::remote::qemu;
@@ -29,6 +32,15 @@ pub(super) struct Arguments {
     /// Writes a chart (SVG) into this folder.
     #[arg(long, value_name = "DIR")]
     report: Option<PathBuf>,
+    /// Tries so many jobs, at random and made to be bad, for the worst tick, and writes the job that causes it.
+    #[arg(long, value_name = "JOBS", conflicts_with_all = ["jobs", "ticks", "report", "check", "bless"])]
+    search: Option<u32>,
+    /// Seed of the search: the same finds the same.
+    #[arg(long, default_value_t = 1, requires = "search")]
+    seed: u64,
+    /// Job file that the search writes.
+    #[arg(long, value_name = "FILE", default_value = "worst-tick.toml", requires = "search")]
+    out: PathBuf,
     /// Prints JSON instead of tables.
     #[arg(long)]
     json: bool,
@@ -134,17 +146,24 @@ fn print_histogram(histogram: &Histogram) {
     }
 }
 
+/// The worst tick of each job named.
+fn print_worst(arguments: &Arguments, bench: &Bench) -> Result<()> {
+    for path in &arguments.jobs {
+        let (_, prepared) = load(path)?;
+        let mut lab = Lab::new(bench)?;
+        let run = lab.run(&prepared, arguments.ticks)?;
+        print!("\n{}: {}", path.display(), worst::describe(&lab.worst(&run)?));
+    }
+    Ok(())
+}
+
 fn report(arguments: &Arguments, counted: &[Counted]) -> Result<()> {
     let Some(folder) = &arguments.report else {
         return Ok(());
     };
     let path = folder.join("budget.svg");
-    let histograms: Vec<_> = counted
-        .iter()
-        .map(|(name, ticks)| (name.clone(), histogram(ticks, Model::Pessimistic, BIN_CYCLES)))
-        .collect();
     std::fs::create_dir_all(folder)
-        .and_then(|()| chart::write(&path, &histograms))
+        .and_then(|()| chart::write(&path, counted))
         .map_err(|error| cannot_write(&path, &error))?;
     if !arguments.json {
         println!("\nchart: {}", path.display());
@@ -176,6 +195,9 @@ pub(super) fn command(arguments: &Arguments) -> Result<()> {
     let image = qemu::firmware()?;
     let (plan, sizes) = image::read(&image)?;
     let bench = Bench::new(&image, &plan)?;
+    if let Some(jobs) = arguments.search {
+        return worst::command(&bench, jobs, arguments.seed, &arguments.out, arguments.json);
+    }
     let counted = count(arguments, &bench)?;
     let figures: Vec<Vec<Figure>> = counted.iter().map(|(name, ticks)| figures(name, ticks)).collect();
     if arguments.json {
@@ -189,6 +211,9 @@ pub(super) fn command(arguments: &Arguments) -> Result<()> {
             print(name, ticks, figures);
             print_histogram(&histogram(ticks, Model::Pessimistic, BIN_CYCLES));
         }
+    }
+    if !arguments.json {
+        print_worst(arguments, &bench)?;
     }
     report(arguments, &counted)?;
     hold(arguments, &figures.concat())
