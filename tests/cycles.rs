@@ -12,7 +12,9 @@ use cycle_plugin::account::Account;
 use cycle_plugin::decode::{Branch, Class, decode};
 use cycle_plugin::plan::{Plan, Stage};
 use cycle_plugin::record::{RECORD_BYTES, Record};
-use host_sim::budget::{SURFACES, TICKS, figures, golden, graph, image, measure::Bench};
+use host_sim::budget::lab::Lab;
+use host_sim::budget::search::search;
+use host_sim::budget::{PERIOD_CYCLES, SURFACES, TICKS, figures, golden, graph, image, measure::Bench};
 use host_sim::job_file::JobFile;
 use host_sim::prepare::prepare;
 use host_sim::remote::qemu::{self, Qemu};
@@ -377,11 +379,30 @@ fn no_stage_has_grown() {
         let prepared = prepare(&JobFile::load(&job).unwrap()).unwrap();
         all.extend(figures::figures(name, &bench.run(&prepared, TICKS).unwrap()));
     }
+    all.extend(golden::worst(&bench).unwrap());
     let table = std::fs::read_to_string(golden::path()).unwrap();
     let complaints = golden::complaints(&table, &all);
     assert!(
         complaints.is_empty(),
         "old -> new; if it is meant to be so, `cargo sim budget --bless`:\n{}",
         complaints.join("\n")
+    );
+}
+
+/// Jobs of a short search: none has a tick that takes more than half the period.
+#[test]
+fn a_short_search_finds_no_tick_beyond_half_the_period() {
+    let path = qemu::firmware().unwrap();
+    let (plan, _) = image::read(&path).unwrap();
+    let mut lab = Lab::new(&Bench::new(&path, &plan).unwrap()).unwrap();
+    let campaign = search(&mut lab, 16, 3, || {}).unwrap();
+    assert!(campaign.ran >= 6, "{} jobs ran", campaign.ran);
+    let found = &campaign.elite[0];
+    let cycles = figures::whole(&found.worst.record, figures::Model::Pessimistic);
+    assert!(cycles < PERIOD_CYCLES / 2, "{cycles} cycles: {found:?}");
+    let analysis = graph::analyse(&path).unwrap();
+    assert!(
+        lab.stack_bytes() <= analysis.stack_bytes(),
+        "more stack than the image says"
     );
 }

@@ -131,8 +131,14 @@ fn draw_bars(area: &DrawingArea<SVGBackend, Shift>, bars: &[Bar], most: f64) -> 
         .label_style((FONT, 14))
         .axis_desc_style((FONT, 14))
         .draw()?;
-    let right = (FONT, 15).into_font().color(&BLACK).pos(Pos::new(HPos::Right, VPos::Center));
-    let left = (FONT, 14).into_font().color(&BLACK).pos(Pos::new(HPos::Left, VPos::Center));
+    let right = (FONT, 15)
+        .into_font()
+        .color(&BLACK)
+        .pos(Pos::new(HPos::Right, VPos::Center));
+    let left = (FONT, 14)
+        .into_font()
+        .color(&BLACK)
+        .pos(Pos::new(HPos::Left, VPos::Center));
     let top = bars.len() as f64;
     for (index, bar) in bars.iter().enumerate() {
         let middle = top - index as f64 - 0.5;
@@ -145,10 +151,21 @@ fn draw_bars(area: &DrawingArea<SVGBackend, Shift>, bars: &[Bar], most: f64) -> 
         let worst = f64::from(bar.worst);
         chart.draw_series([
             PathElement::new([(from, middle), (worst, middle)], BLACK.stroke_width(1)),
-            PathElement::new([(worst, middle - 0.3), (worst, middle + 0.3)], BLACK.stroke_width(3)),
+            PathElement::new(
+                [(worst, middle - 0.3), (worst, middle + 0.3)],
+                BLACK.stroke_width(3),
+            ),
         ])?;
-        chart.draw_series([Text::new(format!("{}", bar.worst), (worst + 0.008 * most, middle), left.clone())])?;
-        chart.draw_series([Text::new(format!("{from:.0}"), (from + 0.006 * most, middle + 0.2), left.clone())])?;
+        chart.draw_series([Text::new(
+            format!("{}", bar.worst),
+            (worst + 0.008 * most, middle),
+            left.clone(),
+        )])?;
+        chart.draw_series([Text::new(
+            format!("{from:.0}"),
+            (from + 0.006 * most, middle + 0.2),
+            left.clone(),
+        )])?;
         let name = EmptyElement::at((0.0, middle)) + Text::new(bar.name.clone(), (-10, 0), right.clone());
         chart.plotting_area().draw(&name)?;
     }
@@ -192,7 +209,10 @@ fn at_least(histogram: &Histogram) -> Vec<(f64, f64)> {
 
 fn draw_lines(area: &DrawingArea<SVGBackend, Shift>, bars: &[Bar], most: f64) -> Drawn {
     let mut chart = ChartBuilder::on(area)
-        .caption("Distribution: share of the ticks that take at least so many cycles", (FONT, 18))
+        .caption(
+            "Distribution: share of the ticks that take at least so many cycles",
+            (FONT, 18),
+        )
         .margin(12)
         .margin_right(24)
         .x_label_area_size(46)

@@ -1,6 +1,7 @@
 //! What the budget needs to know of the firmware's image: its code, its sizes, and the plan for the plugin.
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
+use std::process::Command;
 
 use addr2line::Loader;
 use cycle_plugin::plan::Plan;
@@ -8,6 +9,7 @@ use interp_core::STORE_WORDS;
 use object::{File, Object, ObjectSection, ObjectSymbol, SectionFlags, SectionKind, SymbolKind};
 
 use super::{BudgetError, stages};
+use crate::remote::qemu::{self, QemuError};
 
 /// Flash begins here.
 const FLASH: u64 = 0x0800_0000;
@@ -33,6 +35,24 @@ pub struct Sizes {
 
 fn bad(error: &dyn std::fmt::Display) -> BudgetError {
     BudgetError::Image(error.to_string())
+}
+
+/// Builds the firmware for the chip (`cargo fw-chip`), and returns the image: what counts for flash and RAM.
+///
+/// # Errors
+/// Cargo is missing or fails; its own words are passed on.
+pub fn chip() -> Result<PathBuf, BudgetError> {
+    let workspace = qemu::workspace();
+    let failed = |words: String| BudgetError::Qemu(QemuError::Firmware(words));
+    let output = Command::new(std::env::var_os("CARGO").unwrap_or_else(|| "cargo".into()))
+        .args(["fw-chip", "--quiet"])
+        .current_dir(&workspace)
+        .output()
+        .map_err(|error| failed(error.to_string()))?;
+    if !output.status.success() {
+        return Err(failed(String::from_utf8_lossy(&output.stderr).into_owned()));
+    }
+    Ok(workspace.join("target/chip/thumbv7em-none-eabihf/release/firmware"))
 }
 
 /// Whether a section is in the board's memory.

@@ -58,7 +58,10 @@ impl Run {
     /// Most cycles of a tick.
     #[must_use]
     pub fn most(&self) -> u32 {
-        let cycles = self.records.iter().map(|record| whole(record, Model::Pessimistic));
+        let cycles = self
+            .records
+            .iter()
+            .map(|record| whole(record, Model::Pessimistic));
         cycles.max().unwrap_or(0)
     }
 
@@ -231,7 +234,11 @@ impl Lab {
             self.pass(1)?;
         }
         self.take()?;
-        let begin = if tick == 0 { Request::Start } else { Request::Resume };
+        let begin = if tick == 0 {
+            Request::Start
+        } else {
+            Request::Resume
+        };
         self.commands(&[Request::Report(Report::Samples), begin])?;
         let status = self.pass(1)?;
         let records = self.take()?;
@@ -248,7 +255,11 @@ impl Lab {
             .unwrap_or_default();
         let mut events = events(&worst, &run, 0);
         events.extend([
-            if tick == 0 { "the start" } else { "a resume from a hold" },
+            if tick == 0 {
+                "the start"
+            } else {
+                "a resume from a hold"
+            },
             "a command",
             "the end of the run's ticks",
         ]);

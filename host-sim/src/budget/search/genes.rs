@@ -209,7 +209,8 @@ impl Genes {
     fn revolved(&self, random: &mut Rng) -> SurfaceSpec {
         let [u, v] = self.lengths();
         let bump = self.bump();
-        let mut cubic = |last: f64, constant: f64| [bump * random.f64(), -bump * random.f64(), last, constant];
+        let mut cubic =
+            |last: f64, constant: f64| [bump * random.f64(), -bump * random.f64(), last, constant];
         SurfaceSpec::Revolved {
             radius_mm: cubic(0.3 * u, 2.0 * bump + v),
             height_mm: cubic(u, 0.0),
@@ -299,7 +300,10 @@ impl Genes {
         }
         self.collapse(&mut poles_mm);
         let first = poles_mm[0][0][3];
-        let rational = poles_mm.iter().flatten().any(|pole| pole[3].to_bits() != first.to_bits());
+        let rational = poles_mm
+            .iter()
+            .flatten()
+            .any(|pole| pole[3].to_bits() != first.to_bits());
         if !rational {
             poles_mm.iter_mut().flatten().for_each(|pole| pole[3] = 1.0);
         }

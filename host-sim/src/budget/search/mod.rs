@@ -86,7 +86,12 @@ fn prepared(job: &JobFile) -> Option<(Prepared, bool)> {
 ///
 /// # Errors
 /// QEMU or the line to it breaks.
-pub fn search(lab: &mut Lab, jobs: u32, seed: u64, mut progress: impl FnMut()) -> Result<Campaign, BudgetError> {
+pub fn search(
+    lab: &mut Lab,
+    jobs: u32,
+    seed: u64,
+    mut progress: impl FnMut(),
+) -> Result<Campaign, BudgetError> {
     let mut random = Rng::with_seed(seed);
     let mut campaign = Campaign::default();
     for _ in 0..jobs {
@@ -141,7 +146,9 @@ fn try_job(
     }
     let worst = lab.worst(&run)?;
     campaign.elite.push(Found { job, worst, genes });
-    campaign.elite.sort_by_key(|found| std::cmp::Reverse(found.cycles()));
+    campaign
+        .elite
+        .sort_by_key(|found| std::cmp::Reverse(found.cycles()));
     campaign.elite.truncate(ELITE);
     Ok(())
 }

@@ -59,7 +59,10 @@ fn surface(surface: &SurfaceSpec) -> Vec<(&'static str, String)> {
             ("degree", format!("{:?}", nurbs.degree)),
             ("knots_u", numbers(&nurbs.knots_u)),
             ("knots_v", numbers(&nurbs.knots_v)),
-            ("poles_mm", list(&nurbs.poles_mm, |row| list(row, |pole| numbers(pole)))),
+            (
+                "poles_mm",
+                list(&nurbs.poles_mm, |row| list(row, |pole| numbers(pole))),
+            ),
         ],
     }
 }
@@ -76,7 +79,11 @@ pub fn text(job: &JobFile, comment: &str) -> String {
     for (key, value) in surface(&job.surface) {
         let _ = writeln!(text, "{key} = {value}");
     }
-    let _ = writeln!(text, "\n[tool]\nkind = \"ball\"\nradius_mm = {}", number(job.radius_mm));
+    let _ = writeln!(
+        text,
+        "\n[tool]\nkind = \"ball\"\nradius_mm = {}",
+        number(job.radius_mm)
+    );
     let along = match job.along {
         Along::U => "u",
         Along::V => "v",
@@ -116,7 +123,8 @@ mod tests {
         let mut random = fastrand::Rng::with_seed(1);
         for _ in 0..200 {
             let job = Genes::random(&mut random).job();
-            let mut read = JobFile::parse("a job", &text(&job, "one\ntwo")).unwrap_or_else(|error| panic!("{error:?}"));
+            let mut read =
+                JobFile::parse("a job", &text(&job, "one\ntwo")).unwrap_or_else(|error| panic!("{error:?}"));
             read.origin = Origin::default();
             assert_eq!(read, job);
         }

@@ -69,7 +69,11 @@ fn print(campaign: &Campaign, lab: &Lab, seed: u64, out: &Path) {
         campaign.refused,
         campaign.ticks,
         lab.stack_bytes(),
-        if faults.is_empty() { "none".to_owned() } else { faults.join(", ") }
+        if faults.is_empty() {
+            "none".to_owned()
+        } else {
+            faults.join(", ")
+        }
     );
     if let Some(found) = campaign.elite.first() {
         print!("{}", describe(&found.worst));
@@ -85,7 +89,9 @@ pub(super) fn command(bench: &Bench, jobs: u32, seed: u64, out: &PathBuf, as_jso
     let campaign = search(&mut lab, jobs, seed, || bar.inc(1))?;
     bar.finish_and_clear();
     let Some(found) = campaign.elite.first() else {
-        return Err(Failure::Failed(Some(format!("none of {jobs} jobs ran; try more"))));
+        return Err(Failure::Failed(Some(format!(
+            "none of {jobs} jobs ran; try more"
+        ))));
     };
     let comment = format!(
         "The worst job that `cargo sim budget --search {jobs} --seed {seed}` found.\n{}",
