@@ -63,8 +63,8 @@ pub struct Campaign {
     pub refused: u32,
     /// Jobs that would have faulted at once.
     pub skipped: u32,
-    /// Ticks counted.
-    pub ticks: u64,
+    /// Samples that they made: ticks besides those that ended a run.
+    pub samples: u64,
     /// Names of the faults that ended runs.
     pub faults: BTreeSet<&'static str>,
 }
@@ -137,7 +137,7 @@ fn try_job(
         run => run?,
     };
     campaign.ran += 1;
-    campaign.ticks += run.records.len() as u64;
+    campaign.samples += u64::from(run.samples);
     campaign.faults.extend(run.fault);
     let least = campaign.elite.last().map_or(0, Found::cycles);
     // What comes together with a tick costs some hundred cycles; a tick that is far off is not worth a second run.

@@ -63,11 +63,11 @@ fn json(worst: &Worst) -> Value {
 fn print(campaign: &Campaign, lab: &Lab, seed: u64, out: &Path) {
     let faults: Vec<&str> = campaign.faults.iter().copied().collect();
     println!(
-        "seed {seed}: {} jobs ran, {} faulted at once, {} were refused, {} ticks counted, stack {} bytes; faults met: {}",
+        "seed {seed}: {} jobs ran, {} faulted at once, {} were refused, {} samples, stack {} bytes; faults met: {}",
         campaign.ran,
         campaign.skipped,
         campaign.refused,
-        campaign.ticks,
+        campaign.samples,
         lab.stack_bytes(),
         if faults.is_empty() {
             "none".to_owned()
@@ -104,7 +104,7 @@ pub(super) fn command(bench: &Bench, jobs: u32, seed: u64, out: &PathBuf, as_jso
             "jobs": campaign.ran,
             "faulted_at_once": campaign.skipped,
             "refused": campaign.refused,
-            "ticks": campaign.ticks,
+            "samples": campaign.samples,
             "faults": campaign.faults,
             "stack_bytes": lab.stack_bytes(),
             "job": out,
