@@ -67,6 +67,27 @@ pub(crate) const fn dot_hi(a: &[i32; 3], b: &[i32; 3]) -> i32 {
         .wrapping_add(mul_hi(a2, b2))
 }
 
+/// The whole product. Added to a sum, it is one `SMLAL` (1 cycle).
+#[inline(always)]
+#[must_use]
+pub(crate) const fn product(a: i32, b: i32) -> i64 {
+    a as i64 * b as i64
+}
+
+/// A value in units of 2^-30, rounded down, and whether that fits: the two upper bits of the second are zero then.
+#[inline(always)]
+#[must_use]
+pub(crate) const fn whole_q30(value: i64) -> (i32, u32) {
+    let high = (value >> 32) as u32;
+    ((value >> 30) as i32, high ^ high << 1)
+}
+
+/// A value in units of 2^-30 as a float.
+#[must_use]
+pub(crate) const fn q30_to_f32(value: i64) -> f32 {
+    value as f32 * (4.0 * UNIT_32)
+}
+
 /// A centred parameter as a float in [-1/2, 1/2].
 #[inline(always)]
 #[must_use]
@@ -371,6 +392,24 @@ mod tests {
             let (top, exponent) = to_top(value);
             assert!((536_870_912.0..1_073_741_824.0).contains(&top), "{value}");
             assert_eq!(top, value * 2_f32.powi(exponent.into()));
+        }
+    }
+
+    #[test]
+    fn whole_numbers_of_q30() {
+        for nm in [i64::from(i32::MIN), -5_000, -1, 0, 7, i64::from(i32::MAX)] {
+            for part in [0, 1, (1 << 30) - 1] {
+                let (whole, excess) = whole_q30((nm << 30) + part);
+                assert_eq!((i64::from(whole), excess >> 30), (nm, 0));
+            }
+        }
+        for value in [
+            i64::from(i32::MAX) + 1,
+            i64::from(i32::MIN) - 1,
+            1 << 32,
+            -(1 << 32),
+        ] {
+            assert_ne!(whole_q30(value << 30).1 >> 30, 0, "{value}");
         }
     }
 

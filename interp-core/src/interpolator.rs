@@ -357,7 +357,7 @@ impl Motion {
             Surface::Circle(pass) => pass.contact(path.fraction, &patch.ball),
         }?;
         patch.ball.check_fit(&contact)?;
-        let located = patch.ball.locate(&contact, &patch.origin_nm)?;
+        let located = patch.ball.locate(&contact, &patch.origin)?;
         let normal = patch.ball.normal(contact.offset);
         Ok(Probe {
             cc_nm: located.cc_nm,

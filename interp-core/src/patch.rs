@@ -4,7 +4,7 @@ use crate::arith::{centred, power_of_two};
 use crate::fault::Result;
 use crate::interval::Interval;
 use crate::job::{SurfaceKind, ToolSide};
-use crate::offset::Ball;
+use crate::offset::{Ball, origin_q30};
 use crate::program::Job;
 use crate::sample::Place;
 use crate::surface::{
@@ -18,7 +18,8 @@ pub(crate) struct Patch {
     pub(crate) surface: Surface,
     pub(crate) ball: Ball,
     pub(crate) interval: Interval,
-    pub(crate) origin_nm: [i32; 3],
+    /// Units of 2^-30 nm, see [`origin_q30`].
+    pub(crate) origin: [i64; 3],
     /// One period's arc, units.
     pub(crate) arc: f32,
     /// Units a mm.
@@ -33,7 +34,7 @@ impl Patch {
         surface: Surface::Polynomial(PolynomialPass::NONE),
         ball: Ball::NONE,
         interval: Interval::NONE,
-        origin_nm: [0; 3],
+        origin: [0; 3],
         arc: 0.0,
         per_mm: 1.0,
         point: false,
@@ -73,7 +74,7 @@ impl Patch {
             kind => {
                 let words = job.patch::<REVOLVED_WORDS>(span, side.span)?;
                 let (shift, height_nm) = split_revolved(words);
-                self.origin_nm = [0, 0, height_nm];
+                self.origin = origin_q30([0, 0, height_nm]);
                 self.measure(job, shift, side.span, sign);
                 let radius = sign * job.header.ball_radius_mm * self.per_mm;
                 if kind == SurfaceKind::RevolvedAlongProfile {
@@ -94,7 +95,7 @@ impl Patch {
     /// A patch of a grid, with as many blocks as it has coordinates. Where the kind is that of the patch before, in its place.
     fn collapse_grid(&mut self, job: &Job<'_>, words: &[i32], side_span: u16, sign: f32, at: &PassLine) {
         let (origin_nm, shift, edges, blocks) = split_patch(words);
-        self.origin_nm = origin_nm;
+        self.origin = origin_q30(origin_nm);
         self.measure(job, shift, side_span, sign);
         if edges.count() > 0 {
             let mut pass = PolePass::default();

@@ -92,12 +92,13 @@ impl Travel {
         }
     }
 
-    /// Steps 2 to 4 at the place where the run now is. Nothing of `last` changes if there is a fault.
-    #[inline(always)]
+    /// Steps 2 to 4 at the place where the run now is. Nothing of `last` changes if there is a fault. Not inlined: a function for
+    /// each kind of surface saves no more registers than that kind needs.
+    #[inline(never)]
     fn sample<P: Pass>(&mut self, pass: &P, patch: &Patch, last: &mut Sample) -> Result<()> {
         let contact = pass.contact(self.fraction, &patch.ball)?;
         patch.ball.check_fit(&contact)?;
-        let located = patch.ball.locate(&contact, &patch.origin_nm)?;
+        let located = patch.ball.locate(&contact, &patch.origin)?;
         if patch.ball.folds(dot_hi(&self.offset, &contact.offset)) {
             return Err(folded());
         }
@@ -214,7 +215,7 @@ impl Run {
     }
 
     /// The sample where the run is.
-    #[inline(never)]
+    #[inline(always)]
     fn sample(&mut self, last: &mut Sample) -> Result<()> {
         let Self { travel, patch, .. } = self;
         match &patch.surface {
