@@ -9,7 +9,7 @@ use crate::patch::Patch;
 use crate::program::Job;
 use crate::sample::{Place, Sample};
 use crate::schedule;
-use crate::surface::{Pass, PathSpeed, Surface};
+use crate::surface::{Extruded, Pass, PathSpeed, Ruled, Shape, Surface};
 
 /// Patch boundaries that one period's arc may cross: each costs the collapse of a patch and some evaluations. Two lets a
 /// tick pass a whole patch that is shorter than its arc; more of them in a row say the feed is not meant for the part.
@@ -219,7 +219,11 @@ impl Run {
     fn sample(&mut self, last: &mut Sample) -> Result<()> {
         let Self { travel, patch, .. } = self;
         match &patch.surface {
-            Surface::Polynomial(pass) => travel.sample(pass, patch, last),
+            Surface::Polynomial(pass) => match pass.shape() {
+                Shape::Free => travel.sample(pass, patch, last),
+                Shape::Ruled => travel.sample(&Ruled(pass), patch, last),
+                Shape::Extruded => travel.sample(&Extruded(pass), patch, last),
+            },
             Surface::Rational(pass) => travel.sample(pass, patch, last),
             Surface::Pole(pass) => travel.sample(pass, patch, last),
             Surface::Profile(pass) => travel.sample(pass, patch, last),

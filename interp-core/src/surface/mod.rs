@@ -28,7 +28,7 @@ pub use rational::{RATIONAL_WORDS, RationalRecord};
 pub use revolved::{REVOLVED_WORDS, RevolvedRecord};
 
 pub(crate) use pole::PolePass;
-pub(crate) use polynomial::PolynomialPass;
+pub(crate) use polynomial::{Extruded, PolynomialPass, Ruled, Shape};
 pub(crate) use rational::RationalPass;
 pub(crate) use revolved::{CirclePass, ProfilePass};
 
@@ -141,8 +141,14 @@ fn stretch(path: &[i32; 3], path2: &[i32; 3], inverse_e: f32, excess: f32) -> f3
 impl Local {
     /// The contact's differential geometry (Lo 1998, eqns 9 to 11). With E, F, G, L, M, N the fundamental forms, W^2 = EG -
     /// F^2 and d = B - (F/E) A: lateral speed^2 = |d|^2 = W^2/E, II(d, d) = N - 2 M F/E + L (F/E)^2, II(t, d) = (M - L F/E)/sqrt E.
+    ///
+    /// Where the mixed or the second side derivative is known to vanish, `MIXED` and `SIDE2` leave their products out.
     #[inline(always)]
-    pub(crate) fn contact(&self, ball: &Ball, factors: &Factors) -> Result<Contact> {
+    pub(crate) fn contact<const MIXED: bool, const SIDE2: bool>(
+        &self,
+        ball: &Ball,
+        factors: &Factors,
+    ) -> Result<Contact> {
         let Factors {
             path: a,
             inverse_path: inverse_a,
@@ -165,10 +171,16 @@ impl Local {
         let product = ball.product() * self.g;
         let slant = b * f * inverse_e;
         let l = to_f32(dot_hi(&offset, &self.path2)) * product;
-        let m = to_f32(dot_hi(&offset, &self.mixed)) * (0.5 * product);
-        let n = b * (to_f32(dot_hi(&offset, &self.side2)) * product);
-        let shear = m - slant * l;
+        let (shear, shear_sum) = if MIXED {
+            let m = to_f32(dot_hi(&offset, &self.mixed)) * (0.5 * product);
+            let shear = m - slant * l;
+            (shear, m + shear)
+        } else {
+            let shear = -slant * l;
+            (shear, shear)
+        };
         let twist = shear * inverse * inverse_a;
+        let sheared = shear_sum * slant * inverse_a;
         // On a pole every side line leaves in its own direction, and its own speed counts.
         let lateral_squared = if a > 0.0 {
             b * b * (area_squared * inverse_e)
@@ -184,7 +196,12 @@ impl Local {
             },
             along: 1.0 - l * inverse_e * inverse_a,
             lateral_squared,
-            across: lateral_squared - (n - (m + shear) * slant * inverse_a),
+            across: if SIDE2 {
+                let n = b * (to_f32(dot_hi(&offset, &self.side2)) * product);
+                lateral_squared - (n - sheared)
+            } else {
+                lateral_squared + sheared
+            },
             twist_squared: twist * twist,
             speed_squared: a * a * e,
             gauge: self.inverse_g * self.inverse_g,

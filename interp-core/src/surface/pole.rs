@@ -158,6 +158,6 @@ impl Pass for PolePass {
             inverse_path: self.inverse_path_factor,
             side,
         };
-        self.local(w).contact(ball, &factors)
+        self.local(w).contact::<true, true>(ball, &factors)
     }
 }

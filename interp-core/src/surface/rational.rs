@@ -229,6 +229,6 @@ impl RationalPass {
 impl Pass for RationalPass {
     #[inline(always)]
     fn contact(&self, fraction: u64, ball: &Ball) -> Result<Contact> {
-        self.local(fraction).contact(ball, &Factors::ONE)
+        self.local(fraction).contact::<true, true>(ball, &Factors::ONE)
     }
 }
