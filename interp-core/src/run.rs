@@ -237,7 +237,13 @@ impl Run {
         for crossings in 0..=CROSSINGS_MAX {
             let Self { travel, patch, .. } = self;
             let arc = rest * patch.per_mm;
-            let covered = match contact::solve(&patch.surface, travel.fraction, &travel.path, arc)? {
+            let covered = match contact::solve(
+                &patch.surface,
+                travel.fraction,
+                &travel.path,
+                || patch.surface.path_at(u64::MAX),
+                arc,
+            )? {
                 Reach::Within(fraction) => {
                     travel.fraction = fraction;
                     return Ok(());
@@ -252,7 +258,7 @@ impl Run {
                 self.end_pass(job);
                 return Ok(());
             }
-            self.travel.path = self.patch.surface.path_at(0)?;
+            self.travel.path = self.patch.surface.path_at(0).checked()?;
         }
         Err(Fault::new(FaultKind::PatchTooShort, rest))
     }

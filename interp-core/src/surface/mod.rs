@@ -88,6 +88,26 @@ pub(crate) struct PathSpeed {
     pub(crate) stretch: f32,
 }
 
+impl PathSpeed {
+    /// None known.
+    pub(crate) const NONE: Self = Self {
+        inverse: 0.0,
+        stretch: 0.0,
+    };
+
+    /// The same where there is a speed.
+    ///
+    /// # Errors
+    /// [`FaultKind::DegenerateSurface`] where it vanishes.
+    pub(crate) fn checked(self) -> Result<Self> {
+        if self.inverse > 0.0 && self.inverse < f32::INFINITY {
+            Ok(self)
+        } else {
+            Err(Fault::new(FaultKind::DegenerateSurface, 0.0))
+        }
+    }
+}
+
 /// The factors of A = a Ã and B = b B̃.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Factors {
@@ -262,22 +282,14 @@ impl Surface {
     }
 
     /// The parametrisation at a fraction of the patch, in the direction of travel.
-    ///
-    /// # Errors
-    /// [`FaultKind::DegenerateSurface`] where the speed vanishes.
     #[inline(never)]
-    pub(crate) fn path_at(&self, fraction: u64) -> Result<PathSpeed> {
-        let speed = match self {
+    pub(crate) fn path_at(&self, fraction: u64) -> PathSpeed {
+        match self {
             Self::Polynomial(pass) => pass.path_at(fraction),
             Self::Rational(pass) => pass.path_at(fraction),
             Self::Pole(pass) => pass.path_at(fraction),
             Self::Profile(pass) => pass.path_at(fraction),
             Self::Circle(pass) => pass.path(),
-        };
-        if speed.inverse > 0.0 && speed.inverse < f32::INFINITY {
-            Ok(speed)
-        } else {
-            Err(Fault::new(FaultKind::DegenerateSurface, 0.0))
         }
     }
 }

@@ -88,6 +88,7 @@ impl PolePass {
         self.local(centred(fraction)).path_speed(self.inverse_path_factor)
     }
 
+    #[inline(always)]
     fn local(&self, w: i32) -> Local {
         let weight = Weight::at(&self.weight, w);
         let axes = self.axes.each_ref().map(|axis| axis.at(self.pole, &weight, w));
@@ -111,6 +112,7 @@ impl PolePass {
 
 impl PoleLine {
     /// One coordinate of a [`Local`]: position, path, path2, side, mixed, side2.
+    #[inline(always)]
     fn at(&self, pole: Pole, weight: &Weight, w: i32) -> [i32; 6] {
         let [value, path, path2] = jet(&self.line.value, w);
         let [reduced, reduced_path, reduced_path2] = jet(&self.reduced, w);
