@@ -3,6 +3,7 @@
 use crate::fault::{Fault, FaultKind, Result};
 use crate::interval::interval;
 use crate::job::{Header, STORE_WORDS};
+use crate::lane::Line;
 use crate::patch::Patch;
 use crate::program::Program;
 use crate::run::Run;
@@ -348,7 +349,14 @@ impl Motion {
             return Err(Fault::new(FaultKind::WrongState, f32::from(self.state as u8)));
         }
         let mut patch = Patch::NONE;
-        patch.collapse(&job, path.span, side, false)?;
+        patch.collapse(
+            &job,
+            &Line {
+                side,
+                reversed: false,
+                span: path.span,
+            },
+        )?;
         let contact = match &patch.surface {
             Surface::Polynomial(pass) => pass.contact(path.fraction, &patch.ball),
             Surface::Rational(pass) => pass.contact(path.fraction, &patch.ball),

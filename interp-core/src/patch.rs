@@ -4,11 +4,11 @@ use crate::arith::{centred, power_of_two};
 use crate::fault::Result;
 use crate::interval::Interval;
 use crate::job::{SurfaceKind, ToolSide};
+use crate::lane::Line;
 use crate::offset::{Ball, origin_q30};
 use crate::program::Job;
-use crate::sample::Place;
 use crate::surface::{
-    CirclePass, POLYNOMIAL_WORDS, PassLine, PolePass, PolynomialPass, ProfilePass, RATIONAL_WORDS,
+    CirclePass, POLYNOMIAL_WORDS, PassLine, PathSpeed, PolePass, PolynomialPass, ProfilePass, RATIONAL_WORDS,
     REVOLVED_WORDS, RationalPass, Surface, split_patch, split_revolved,
 };
 
@@ -26,6 +26,8 @@ pub(crate) struct Patch {
     pub(crate) per_mm: f32,
     /// The pass is a single point here.
     pub(crate) point: bool,
+    /// The parametrisation at start and end, once [`Self::find_ends`] has it.
+    ends: Option<[PathSpeed; 2]>,
 }
 
 impl Patch {
@@ -38,14 +40,16 @@ impl Patch {
         arc: 0.0,
         per_mm: 1.0,
         point: false,
+        ends: None,
     };
 
-    /// Collapses the patch at a path span and a side place, to be travelled in one direction or the other.
+    /// Collapses the patch of a pass.
     ///
     /// # Errors
     /// [`crate::FaultKind::WrongState`] where the job has no such patch; what the surface's kind finds wrong.
     #[inline(never)]
-    pub(crate) fn collapse(&mut self, job: &Job<'_>, span: u16, side: Place, reversed: bool) -> Result<()> {
+    pub(crate) fn collapse(&mut self, job: &Job<'_>, line: &Line) -> Result<()> {
+        let Line { side, reversed, span } = *line;
         let at = PassLine {
             fraction: side.fraction,
             side: centred(side.fraction),
@@ -89,7 +93,34 @@ impl Patch {
             }
         }
         self.point = self.surface.is_point();
+        self.ends = None;
         Ok(())
+    }
+
+    /// Finds the parametrisation at both ends, for [`Self::start`] and [`Self::end`] to have it at hand.
+    pub(crate) fn find_ends(&mut self) {
+        self.ends = Some([self.start(), self.end()]);
+    }
+
+    /// Whether [`Self::find_ends`] was here.
+    pub(crate) const fn has_ends(&self) -> bool {
+        self.ends.is_some()
+    }
+
+    /// The parametrisation where the patch begins, in the direction of travel.
+    pub(crate) fn start(&self) -> PathSpeed {
+        match self.ends {
+            Some([start, _]) => start,
+            None => self.surface.path_at(0),
+        }
+    }
+
+    /// The parametrisation where it ends.
+    pub(crate) fn end(&self) -> PathSpeed {
+        match self.ends {
+            Some([_, end]) => end,
+            None => self.surface.path_at(u64::MAX),
+        }
     }
 
     /// A patch of a grid, with as many blocks as it has coordinates. Where the kind is that of the patch before, in its place.
@@ -98,9 +129,13 @@ impl Patch {
         self.origin = origin_q30(origin_nm);
         self.measure(job, shift, side_span, sign);
         if edges.count() > 0 {
-            let mut pass = PolePass::default();
-            pass.collapse(blocks, edges, at);
-            self.surface = Surface::Pole(pass);
+            if let Surface::Pole(pass) = &mut self.surface {
+                pass.collapse(blocks, edges, at);
+            } else {
+                let mut pass = PolePass::default();
+                pass.collapse(blocks, edges, at);
+                self.surface = Surface::Pole(pass);
+            }
             return;
         }
         match (&mut self.surface, job.header.kind) {

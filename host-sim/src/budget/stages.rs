@@ -24,7 +24,7 @@ const STAGES: [(&str, &str, Stage); 16] = [
     ("patch", "", Stage::PatchChange),
     ("schedule", "", Stage::PassChange),
     ("run", "step_far", Stage::Step),
-    ("run", "enter_patch", Stage::PatchChange),
+    ("lane", "", Stage::PatchChange),
     ("run", "next_span", Stage::PatchChange),
     ("run", "begin_pass", Stage::PassChange),
     ("run", "step_over", Stage::PassChange),

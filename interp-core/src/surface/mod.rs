@@ -89,11 +89,16 @@ pub(crate) struct PathSpeed {
 }
 
 impl PathSpeed {
-    /// None known.
-    pub(crate) const NONE: Self = Self {
-        inverse: 0.0,
-        stretch: 0.0,
-    };
+    /// From g Ã, half of its derivative, the excess of its stretch, and g/a.
+    #[inline(always)]
+    fn new(path: &[i32; 3], path2: &[i32; 3], excess: f32, gauge: f32) -> Self {
+        let speed = Vec3::of(*path);
+        let inverse = inverse_sqrt(speed.dot(speed));
+        Self {
+            inverse: inverse * gauge,
+            stretch: stretch(path, path2, inverse * inverse, excess),
+        }
+    }
 
     /// The same where there is a speed.
     ///
@@ -226,17 +231,6 @@ impl Local {
             speed_squared: a * a * e,
             gauge: self.inverse_g * self.inverse_g,
         })
-    }
-
-    /// The parametrisation alone.
-    #[inline(always)]
-    pub(crate) fn path_speed(&self, inverse_a: f32) -> PathSpeed {
-        let path = Vec3::of(self.path);
-        let inverse = inverse_sqrt(path.dot(path));
-        PathSpeed {
-            inverse: inverse * inverse_a * self.g,
-            stretch: stretch(&self.path, &self.path2, inverse * inverse, self.excess),
-        }
     }
 }
 

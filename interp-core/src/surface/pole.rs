@@ -85,32 +85,42 @@ impl PolePass {
 
     /// The parametrisation at a fraction of the patch.
     pub(crate) fn path_at(&self, fraction: u64) -> PathSpeed {
-        self.local(centred(fraction)).path_speed(self.inverse_path_factor)
+        let w = centred(fraction);
+        let weight = Weight::at(&self.weight, w);
+        let [x, y, z] = &self.axes;
+        let along = |axis: &PoleLine| axis.along(self.pole, &weight, w);
+        let ([x1, x2], [y1, y2], [z1, z2]) = (along(x), along(y), along(z));
+        let gauge = weight.g * self.inverse_path_factor;
+        PathSpeed::new(&[x1, y1, z1], &[x2, y2, z2], weight.excess, gauge)
     }
 
     #[inline(always)]
     fn local(&self, w: i32) -> Local {
         let weight = Weight::at(&self.weight, w);
-        let axes = self.axes.each_ref().map(|axis| axis.at(self.pole, &weight, w));
-        let [x, y, z] = axes;
-        let [x0, x1, x2, xs, xm, xx] = x;
-        let [y0, y1, y2, ys, ym, yy] = y;
-        let [z0, z1, z2, zs, zm, zz] = z;
-        Local {
-            position: [x0, y0, z0],
-            path: [x1, y1, z1],
-            side: [xs, ys, zs],
-            path2: [x2, y2, z2],
-            mixed: [xm, ym, zm],
-            side2: [xx, yy, zz],
-            g: weight.g,
-            inverse_g: weight.inverse_g,
-            excess: weight.excess,
-        }
+        let [x, y, z] = &self.axes;
+        let at = |axis: &PoleLine| axis.at(self.pole, &weight, w);
+        weight.local(at(x), at(y), at(z))
     }
 }
 
 impl PoleLine {
+    /// Along the path: the first derivative and half the second, as [`Self::at`] has them.
+    #[inline(always)]
+    fn along(&self, pole: Pole, weight: &Weight, w: i32) -> [i32; 2] {
+        match pole {
+            Pole::Beside => {
+                let [reduced, path, path2] = jet(&self.reduced, w);
+                let part = Part::new(reduced, weight);
+                [part.rule(path, weight.path), part.rule(path2, weight.path2)]
+            }
+            Pole::AtEnd(_) => {
+                let [value, path, path2] = jet(&self.line.value, w);
+                let s = weight.divide(value);
+                [quarter(path, s, weight.path), quarter(path2, s, weight.path2)]
+            }
+        }
+    }
+
     /// One coordinate of a [`Local`]: position, path, path2, side, mixed, side2.
     #[inline(always)]
     fn at(&self, pole: Pole, weight: &Weight, w: i32) -> [i32; 6] {
@@ -119,15 +129,13 @@ impl PoleLine {
         let [_, mixed, _] = jet(&self.line.side, w);
         let (side, side2) = (cubic(&self.side, w), cubic(&self.side2, w));
         let s = weight.divide(value);
-        // A quarter of the reduced point: whole it may be beyond i32.
-        let part = weight.divide(reduced >> 2);
-        let by_part = |numerator: i32, weight: i32| (numerator >> 2).wrapping_sub(mul_hi(part, weight) << 2);
+        let part = Part::new(reduced, weight);
         let mixed = quarter(mixed, s, weight.mixed);
         match pole {
             Pole::Beside => [
                 s,
-                by_part(reduced_path, weight.path),
-                by_part(reduced_path2, weight.path2),
+                part.rule(reduced_path, weight.path),
+                part.rule(reduced_path2, weight.path2),
                 quarter(side, s, weight.side),
                 mixed,
                 quarter(side2, s, weight.side2),
@@ -136,11 +144,27 @@ impl PoleLine {
                 s,
                 quarter(path, s, weight.path),
                 quarter(path2, s, weight.path2),
-                by_part(side, weight.side),
+                part.rule(side, weight.side),
                 mixed,
-                by_part(side2, weight.side2),
+                part.rule(side2, weight.side2),
             ],
         }
+    }
+}
+
+/// A quarter of a coordinate of the reduced point: whole it may be beyond i32.
+struct Part(i32);
+
+impl Part {
+    #[inline(always)]
+    const fn new(reduced: i32, weight: &Weight) -> Self {
+        Self(weight.divide(reduced >> 2))
+    }
+
+    /// [`quarter`] with the reduced point.
+    #[inline(always)]
+    const fn rule(&self, numerator: i32, weight: i32) -> i32 {
+        (numerator >> 2).wrapping_sub(mul_hi(self.0, weight) << 2)
     }
 }
 

@@ -121,7 +121,8 @@ impl PolynomialPass {
 
     /// The parametrisation at a fraction of the patch.
     pub(crate) fn path_at(&self, fraction: u64) -> PathSpeed {
-        self.local::<false, false>(fraction).path_speed(1.0)
+        let local = self.local::<false, false>(fraction);
+        PathSpeed::new(&local.path, &local.path2, 0.0, 1.0)
     }
 
     /// `MIXED` and `SIDE2`: whether those derivatives are wanted; without the former the side derivative is constant.

@@ -152,6 +152,23 @@ impl Weight {
         }
     }
 
+    /// A [`Local`] of three coordinates: of each position, path, path2, side, mixed, side2.
+    #[inline(always)]
+    pub(super) const fn local(&self, x: [i32; 6], y: [i32; 6], z: [i32; 6]) -> Local {
+        let ([x0, x1, x2, xs, xm, xx], [y0, y1, y2, ys, ym, yy], [z0, z1, z2, zs, zm, zz]) = (x, y, z);
+        Local {
+            position: [x0, y0, z0],
+            path: [x1, y1, z1],
+            side: [xs, ys, zs],
+            path2: [x2, y2, z2],
+            mixed: [xm, ym, zm],
+            side2: [xx, yy, zz],
+            g: self.g,
+            inverse_g: self.inverse_g,
+            excess: self.excess,
+        }
+    }
+
     /// A numerator over the weight.
     #[inline(always)]
     pub(super) const fn divide(&self, numerator: i32) -> i32 {
@@ -199,7 +216,8 @@ impl RationalPass {
 
     /// The parametrisation at a fraction of the patch.
     pub(crate) fn path_at(&self, fraction: u64) -> PathSpeed {
-        self.local(fraction).path_speed(1.0)
+        let local = self.local(fraction);
+        PathSpeed::new(&local.path, &local.path2, local.excess, local.g)
     }
 
     /// The quotient rule with the numerators' derivatives relative to the point: `w S_path = P_path - S w_path`, and
@@ -209,20 +227,7 @@ impl RationalPass {
         let w = centred(fraction);
         let weight = Weight::at(&self.weight, w);
         let [x, y, z] = &self.axes;
-        let [x0, x1, x2, xs, xm, xx] = axis(x, &weight, w);
-        let [y0, y1, y2, ys, ym, yy] = axis(y, &weight, w);
-        let [z0, z1, z2, zs, zm, zz] = axis(z, &weight, w);
-        Local {
-            position: [x0, y0, z0],
-            path: [x1, y1, z1],
-            side: [xs, ys, zs],
-            path2: [x2, y2, z2],
-            mixed: [xm, ym, zm],
-            side2: [xx, yy, zz],
-            g: weight.g,
-            inverse_g: weight.inverse_g,
-            excess: weight.excess,
-        }
+        weight.local(axis(x, &weight, w), axis(y, &weight, w), axis(z, &weight, w))
     }
 }
 
