@@ -8,7 +8,6 @@ use crate::patch::Patch;
 use crate::program::Program;
 use crate::run::Run;
 use crate::sample::{Place, Sample, State};
-use crate::surface::{Pass, Surface};
 
 /// Periods over which the feed falls to nothing when a fault from outside stops the run: 1/32 less each period.
 pub const STOP_PERIODS: u8 = 32;
@@ -357,13 +356,7 @@ impl Motion {
                 span: path.span,
             },
         )?;
-        let contact = match &patch.surface {
-            Surface::Polynomial(pass) => pass.contact(path.fraction, &patch.ball),
-            Surface::Rational(pass) => pass.contact(path.fraction, &patch.ball),
-            Surface::Pole(pass) => pass.contact(path.fraction, &patch.ball),
-            Surface::Profile(pass) => pass.contact(path.fraction, &patch.ball),
-            Surface::Circle(pass) => pass.contact(path.fraction, &patch.ball),
-        }?;
+        let contact = patch.surface.contact(path.fraction, &patch.ball)?;
         patch.ball.check_fit(&contact)?;
         let located = patch.ball.locate(&contact, &patch.origin)?;
         let normal = patch.ball.normal(contact.offset);

@@ -8,8 +8,8 @@ use crate::lane::Line;
 use crate::offset::{Ball, origin_q30};
 use crate::program::Job;
 use crate::surface::{
-    CirclePass, POLYNOMIAL_WORDS, PassLine, PathSpeed, PolePass, PolynomialPass, ProfilePass, RATIONAL_WORDS,
-    REVOLVED_WORDS, RationalPass, Surface, split_patch, split_revolved,
+    CirclePass, GridPass, POLYNOMIAL_WORDS, PassLine, PathSpeed, ProfilePass, RATIONAL_WORDS, REVOLVED_WORDS,
+    Surface, split_patch, split_revolved,
 };
 
 /// A patch on a pass. Units are 2^-shift nm of the patch.
@@ -33,7 +33,7 @@ pub(crate) struct Patch {
 impl Patch {
     /// None yet.
     pub(crate) const NONE: Self = Self {
-        surface: Surface::Polynomial(PolynomialPass::NONE),
+        surface: Surface::Grid(GridPass::NONE),
         ball: Ball::NONE,
         interval: Interval::NONE,
         origin: [0; 3],
@@ -123,34 +123,16 @@ impl Patch {
         }
     }
 
-    /// A patch of a grid, with as many blocks as it has coordinates. Where the kind is that of the patch before, in its place.
+    /// A patch of a grid, with as many blocks as it has coordinates.
     fn collapse_grid(&mut self, job: &Job<'_>, words: &[i32], side_span: u16, sign: f32, at: &PassLine) {
         let (origin_nm, shift, edges, blocks) = split_patch(words);
         self.origin = origin_q30(origin_nm);
         self.measure(job, shift, side_span, sign);
-        if edges.count() > 0 {
-            if let Surface::Pole(pass) = &mut self.surface {
-                pass.collapse(blocks, edges, at);
-            } else {
-                let mut pass = PolePass::default();
-                pass.collapse(blocks, edges, at);
-                self.surface = Surface::Pole(pass);
-            }
-            return;
+        if !matches!(self.surface, Surface::Grid(_)) {
+            self.surface = Surface::Grid(GridPass::NONE);
         }
-        match (&mut self.surface, job.header.kind) {
-            (Surface::Polynomial(pass), SurfaceKind::Polynomial) => pass.collapse(blocks, at),
-            (Surface::Rational(pass), SurfaceKind::Rational) => pass.collapse(blocks, at),
-            (surface, SurfaceKind::Polynomial) => {
-                let mut pass = PolynomialPass::default();
-                pass.collapse(blocks, at);
-                *surface = Surface::Polynomial(pass);
-            }
-            (surface, _) => {
-                let mut pass = RationalPass::default();
-                pass.collapse(blocks, at);
-                *surface = Surface::Rational(pass);
-            }
+        if let Surface::Grid(pass) = &mut self.surface {
+            pass.collapse(blocks, edges, at);
         }
     }
 

@@ -10,7 +10,7 @@ use crate::patch::Patch;
 use crate::program::Job;
 use crate::sample::{Place, Sample};
 use crate::schedule;
-use crate::surface::{Extruded, Pass, PathSpeed, Ruled, Shape, Surface};
+use crate::surface::{AnyPass, Pass, PathSpeed};
 
 /// Patch boundaries that one period's arc may cross. One lets every patch through that is longer than the arc; the cost of a second,
 /// of patches that are not, would come on top of the dearest tick there is.
@@ -232,16 +232,14 @@ impl Run {
     fn sample(&mut self, last: &mut Sample) -> Result<()> {
         let Self { travel, lane, .. } = self;
         let patch = lane.patch();
-        match &patch.surface {
-            Surface::Polynomial(pass) => match pass.shape() {
-                Shape::Free => travel.sample(pass, patch, last),
-                Shape::Ruled => travel.sample(&Ruled(pass), patch, last),
-                Shape::Extruded => travel.sample(&Extruded(pass), patch, last),
-            },
-            Surface::Rational(pass) => travel.sample(pass, patch, last),
-            Surface::Pole(pass) => travel.sample(pass, patch, last),
-            Surface::Profile(pass) => travel.sample(pass, patch, last),
-            Surface::Circle(pass) => travel.sample(pass, patch, last),
+        match patch.surface.pass() {
+            AnyPass::Polynomial(pass) => travel.sample(&pass, patch, last),
+            AnyPass::Ruled(pass) => travel.sample(&pass, patch, last),
+            AnyPass::Extruded(pass) => travel.sample(&pass, patch, last),
+            AnyPass::Rational(pass) => travel.sample(&pass, patch, last),
+            AnyPass::Pole(pass) => travel.sample(&pass, patch, last),
+            AnyPass::Profile(pass) => travel.sample(pass, patch, last),
+            AnyPass::Circle(pass) => travel.sample(pass, patch, last),
         }
     }
 

@@ -15,6 +15,7 @@
 //! with scalars a (fixed on a pass) and b (linear along it) that carry the zero. The normal comes from `Ã x B̃`, as exact
 //! at the pole as anywhere, and nothing is divided by a or b unless it is known not to vanish.
 
+mod grid;
 mod lines;
 mod pole;
 mod polynomial;
@@ -27,8 +28,9 @@ pub use range::{Edges, SHIFT_MAX};
 pub use rational::{RATIONAL_WORDS, RationalRecord};
 pub use revolved::{REVOLVED_WORDS, RevolvedRecord};
 
+pub(crate) use grid::{GridKind, GridPass};
 pub(crate) use pole::PolePass;
-pub(crate) use polynomial::{Extruded, PolynomialPass, Ruled, Shape};
+pub(crate) use polynomial::{ExtrudedPass, PolynomialPass, RuledPass};
 pub(crate) use rational::RationalPass;
 pub(crate) use revolved::{CirclePass, ProfilePass};
 
@@ -242,18 +244,27 @@ fn degenerate(area_squared: f32, f: f32) -> Fault {
     Fault::new(FaultKind::DegenerateSurface, sine)
 }
 
-/// A surface on one pass. The variant is a job's, but for patches with a pole.
+/// A surface on one pass. The variant is a job's.
 #[derive(Clone, Copy, Debug)]
 #[allow(
     clippy::large_enum_variant,
-    reason = "one lives in the interpolator for ever; nothing is allocated"
+    reason = "two live in the interpolator for ever; nothing is allocated"
 )]
 pub(crate) enum Surface {
-    Polynomial(PolynomialPass),
-    Rational(RationalPass),
-    Pole(PolePass),
+    Grid(GridPass),
     Profile(ProfilePass),
     Circle(CirclePass),
+}
+
+/// A surface on one pass by what evaluates it.
+pub(crate) enum AnyPass<'a> {
+    Polynomial(PolynomialPass<'a>),
+    Ruled(RuledPass<'a>),
+    Extruded(ExtrudedPass<'a>),
+    Rational(RationalPass<'a>),
+    Pole(PolePass<'a>),
+    Profile(&'a ProfilePass),
+    Circle(&'a CirclePass),
 }
 
 /// What the sample path asks of a surface on a pass.
@@ -266,24 +277,58 @@ pub(crate) trait Pass {
 }
 
 impl Surface {
+    /// What evaluates it.
+    #[inline(always)]
+    pub(crate) const fn pass(&self) -> AnyPass<'_> {
+        match self {
+            Self::Grid(pass) => match pass.kind {
+                GridKind::Free => AnyPass::Polynomial(PolynomialPass(pass)),
+                GridKind::Ruled => AnyPass::Ruled(RuledPass(pass)),
+                GridKind::Extruded => AnyPass::Extruded(ExtrudedPass(pass)),
+                GridKind::Rational => AnyPass::Rational(RationalPass(pass)),
+                GridKind::Pole => AnyPass::Pole(PolePass(pass)),
+            },
+            Self::Profile(pass) => AnyPass::Profile(pass),
+            Self::Circle(pass) => AnyPass::Circle(pass),
+        }
+    }
+
     /// The pass is a single point.
     pub(crate) fn is_point(&self) -> bool {
-        match self {
-            Self::Polynomial(_) | Self::Rational(_) | Self::Profile(_) => false,
-            Self::Pole(pass) => pass.is_point(),
-            Self::Circle(pass) => pass.is_point(),
+        match self.pass() {
+            AnyPass::Pole(pass) => pass.is_point(),
+            AnyPass::Circle(pass) => pass.is_point(),
+            _ => false,
         }
     }
 
     /// The parametrisation at a fraction of the patch, in the direction of travel.
     #[inline(never)]
     pub(crate) fn path_at(&self, fraction: u64) -> PathSpeed {
-        match self {
-            Self::Polynomial(pass) => pass.path_at(fraction),
-            Self::Rational(pass) => pass.path_at(fraction),
-            Self::Pole(pass) => pass.path_at(fraction),
-            Self::Profile(pass) => pass.path_at(fraction),
-            Self::Circle(pass) => pass.path(),
+        match self.pass() {
+            AnyPass::Polynomial(PolynomialPass(pass))
+            | AnyPass::Ruled(RuledPass(pass))
+            | AnyPass::Extruded(ExtrudedPass(pass)) => PolynomialPass(pass).path_at(fraction),
+            AnyPass::Rational(pass) => pass.path_at(fraction),
+            AnyPass::Pole(pass) => pass.path_at(fraction),
+            AnyPass::Profile(pass) => pass.path_at(fraction),
+            AnyPass::Circle(pass) => pass.path(),
+        }
+    }
+
+    /// The contact at a fraction of the patch: for a caller that has the time to find out what evaluates it.
+    ///
+    /// # Errors
+    /// Those of [`Pass::contact`].
+    pub(crate) fn contact(&self, fraction: u64, ball: &Ball) -> Result<Contact> {
+        match self.pass() {
+            AnyPass::Polynomial(pass) => pass.contact(fraction, ball),
+            AnyPass::Ruled(pass) => pass.contact(fraction, ball),
+            AnyPass::Extruded(pass) => pass.contact(fraction, ball),
+            AnyPass::Rational(pass) => pass.contact(fraction, ball),
+            AnyPass::Pole(pass) => pass.contact(fraction, ball),
+            AnyPass::Profile(pass) => pass.contact(fraction, ball),
+            AnyPass::Circle(pass) => pass.contact(fraction, ball),
         }
     }
 }

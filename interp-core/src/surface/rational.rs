@@ -5,9 +5,10 @@
 //! [1/2, 2) on the patch (a host scales it, and splits a patch whose weights vary more). Where a boundary collapses, the
 //! origin is that point, so that the numerators vanish there; at most one boundary of a patch may collapse.
 
+use super::grid::GridPass;
 use super::lines::{Line, coefficients, collapses, record_words, split};
 use super::range::{BAD_PATCH, Edges, HeadWord, Root, fits, patch_bound};
-use super::{Contact, Factors, Local, Pass, PassLine, PathSpeed};
+use super::{Contact, Factors, Local, Pass, PathSpeed};
 use crate::arith::{centred, cubic, jet, mul_hi, mul_q29, reciprocal_q29, to_f32};
 use crate::fault::Result;
 use crate::offset::Ball;
@@ -182,12 +183,8 @@ pub(super) const fn quarter(numerator: i32, quotient: i32, weight: i32) -> i32 {
     (numerator >> 2).wrapping_sub(mul_hi(quotient, weight))
 }
 
-/// A rational patch on one pass: cubics of the path parameter.
-#[derive(Clone, Copy, Debug, Default)]
-pub(crate) struct RationalPass {
-    axes: [Line; 3],
-    weight: Line,
-}
+/// A rational patch on one pass.
+pub(crate) struct RationalPass<'a>(pub(super) &'a GridPass);
 
 /// One coordinate of a [`Local`]: position, path, path2, side, mixed, side2.
 #[inline(always)]
@@ -205,15 +202,7 @@ fn axis(line: &Line, weight: &Weight, w: i32) -> [i32; 6] {
     ]
 }
 
-impl RationalPass {
-    /// Collapses a patch without a pole.
-    pub(crate) fn collapse(&mut self, blocks: &[[i32; 16]], at: &PassLine) {
-        let lines = self.axes.iter_mut().chain([&mut self.weight]);
-        for (line, block) in lines.zip(blocks) {
-            line.collapse(block, at);
-        }
-    }
-
+impl RationalPass<'_> {
     /// The parametrisation at a fraction of the patch.
     pub(crate) fn path_at(&self, fraction: u64) -> PathSpeed {
         let local = self.local(fraction);
@@ -225,13 +214,13 @@ impl RationalPass {
     #[inline(always)]
     fn local(&self, fraction: u64) -> Local {
         let w = centred(fraction);
-        let weight = Weight::at(&self.weight, w);
-        let [x, y, z] = &self.axes;
+        let weight = Weight::at(&self.0.weight, w);
+        let [x, y, z] = &self.0.axes;
         weight.local(axis(x, &weight, w), axis(y, &weight, w), axis(z, &weight, w))
     }
 }
 
-impl Pass for RationalPass {
+impl Pass for RationalPass<'_> {
     #[inline(always)]
     fn contact(&self, fraction: u64, ball: &Ball) -> Result<Contact> {
         self.local(fraction).contact::<true, true>(ball, &Factors::ONE)
