@@ -26,7 +26,11 @@ const BOUNDS: &[(&str, u32, &str)] = &[
         "less than is filled by words",
     ),
     ("interp_core::schedule::next_side", 1024, "side spans: SPANS_MAX"),
-    ("interp_core::surface::lines::Line::collapse", 4, "rows of a block"),
+    (
+        "interp_core::surface::lines::Line::collapse",
+        4,
+        "rows of a block",
+    ),
     ("interp_core::surface::pole::PoleLine::at", 3, "axes"),
     ("interp_core::surface::pole::PolePass::collapse", 3, "axes"),
     (
