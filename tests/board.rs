@@ -9,7 +9,7 @@ use controller::{
 };
 use integration_tests::{HELLO, Host, dome, upload};
 use interp_core::{
-    fault::FaultKind,
+    fault::{Fault, FaultKind},
     interpolator::{self, Interpolator},
     sample::{Sample, State},
 };
@@ -21,8 +21,8 @@ use protocol::{
 
 const WORDS: usize = 64;
 
-/// The samples of the dome, by the core alone.
-fn reference() -> Vec<Sample> {
+/// The samples of the dome, by the core alone: all, or so many until a missed tick stops the run.
+fn samples_of_dome(missed_after: Option<usize>) -> Vec<Sample> {
     let (header, words) = dome();
     let mut core = Interpolator::<[i32; WORDS]>::new();
     core.load_begin(&header, u32::try_from(words.len()).unwrap())
@@ -31,12 +31,21 @@ fn reference() -> Vec<Sample> {
     core.load_check(0).unwrap();
     core.load_finish().unwrap();
     let mut samples = vec![*core.tick(interpolator::Request::Start)];
-    while core.state() == State::Running {
+    while matches!(core.state(), State::Running | State::Stopping) {
+        if missed_after == Some(samples.len()) {
+            core.trip(Fault::new(FaultKind::DeadlineMissed, 1.0));
+        }
         samples.push(*core.tick(interpolator::Request::None));
     }
-    assert_eq!(core.state(), State::Finished);
     samples.pop();
+    samples
+}
+
+/// The whole run.
+fn reference() -> Vec<Sample> {
+    let samples = samples_of_dome(None);
     assert!((500..2000).contains(&samples.len()), "{} samples", samples.len());
+    assert!(samples.iter().all(|sample| sample.state == State::Running));
     samples
 }
 
@@ -529,30 +538,94 @@ fn act(desk: &mut Desk, deed: Deed) {
     }
 }
 
+/// What the run must be, by what has happened to the board.
+struct Model {
+    whole: Vec<Sample>,
+    before: Status,
+    /// The run that a missed tick has stopped, as long as it is the last; and how many ticks were missed.
+    stopped: Option<(Vec<Sample>, f32)>,
+}
+
+impl Model {
+    fn new(before: Status) -> Self {
+        Self {
+            whole: reference(),
+            before,
+            stopped: None,
+        }
+    }
+
+    /// Follows one deed: the status after it, and the samples that were told of during it.
+    fn follow(&mut self, deed: &Deed, status: Status, told: &[Sample]) -> Result<(), TestCaseError> {
+        if let (None, Some(fault)) = (self.before.fault, status.fault) {
+            // Only a missed tick can have done that, in the one tick of its deed: it stops what was there before.
+            let Deed::Miss(missed @ 1..) = *deed else {
+                return Err(TestCaseError::fail(format!("{fault:?} by {deed:?}")));
+            };
+            prop_assert_eq!(self.before.state, State::Running);
+            prop_assert_eq!(status.clock, Clock::Free);
+            let after = usize::try_from(self.before.samples).unwrap();
+            self.stopped = Some((samples_of_dome(Some(after)), missed.into()));
+        }
+        let count = usize::try_from(status.samples).unwrap();
+        let is_of = |run: &[Sample]| run.get(..count).is_some_and(|run| status.digest == digest(run));
+        match &self.stopped {
+            Some((run, missed)) if status.fault.is_some() => {
+                let fault = status.fault.unwrap();
+                prop_assert_eq!(
+                    (fault.kind(), fault.value),
+                    (Some(FaultKind::DeadlineMissed), *missed)
+                );
+                prop_assert!(is_of(run));
+                let over = count == run.len();
+                prop_assert!(
+                    matches!(
+                        (status.state, over),
+                        (State::Stopping, _) | (State::Faulted, true)
+                    ),
+                    "{:?} after {} of {}",
+                    status.state,
+                    count,
+                    run.len()
+                );
+            }
+            // Acknowledged when it stood; its counters stay until the next run begins.
+            Some((run, _)) if count == run.len() && is_of(run) => {}
+            _ => {
+                self.stopped = None;
+                prop_assert!(is_of(&self.whole), "{count} samples");
+                prop_assert!(status.state != State::Finished || count == self.whole.len());
+            }
+        }
+        for sample in told {
+            let run = match &self.stopped {
+                Some((run, _)) if sample.state == State::Stopping => run,
+                _ => &self.whole,
+            };
+            prop_assert_eq!(Some(sample), run.get(usize::try_from(sample.tick).unwrap()));
+        }
+        self.before = status;
+        Ok(())
+    }
+}
+
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(300))]
 
     /// Whatever happens: no panic, one answer a request, damage without effect, and never a sample that the core
-    /// would not have made.
+    /// would not have made, also while a missed tick stops the run.
     #[test]
-    fn any_order_of_anything_is_survived(deeds in prop::collection::vec(any_deed(), 0..60)) {
-        let samples = reference();
-        let mut desk = Desk::loaded(Clock::Lockstep, Report::Samples);
-        // A run that a missed tick has stopped ends with shorter steps than the reference; the next one is whole again.
-        let (mut stopped, mut before) = (false, 0);
+    fn any_order_of_anything_is_survived(
+        clock in prop::sample::select(&[Clock::Free, Clock::Lockstep]),
+        deeds in prop::collection::vec(any_deed(), 0..60),
+    ) {
+        let mut desk = Desk::loaded(clock, Report::Samples);
+        let mut model = Model::new(desk.board.status());
         for deed in deeds {
-            act(&mut desk, deed);
+            act(&mut desk, deed.clone());
+            let told = core::mem::take(&mut desk.samples);
             let status = desk.board.status();
-            let count = usize::try_from(status.samples).unwrap();
-            stopped = status.fault.is_some() || (stopped && count >= before);
-            before = count;
-            if !stopped {
-                prop_assert!(count <= samples.len());
-                prop_assert_eq!(status.digest, digest(&samples[..count]));
-            }
-        }
-        for sample in desk.samples.iter().filter(|sample| sample.state == State::Running) {
-            prop_assert_eq!(*sample, samples[usize::try_from(sample.tick).unwrap()]);
+            model.follow(&deed, status, &told)?;
         }
     }
 }

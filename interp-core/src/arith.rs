@@ -242,8 +242,14 @@ pub(crate) fn sqrt(value: f32) -> f32 {
     libm::sqrtf(value)
 }
 
-/// `1 / sqrt(value)` for normal values above 0, within 1.5 units in the last place: an estimate from the bits (3.4 %), two Newton
+/// `1 / sqrt(value)` for values from 2^-125 on, within 1.5 units in the last place: an estimate from the bits (3.4 %), two Newton
 /// steps, and a third that adds a residual. 19 cycles on a Cortex-M4F, where its square root and division take 32.
+///
+/// The bound, with u = 2^-24: the second step y is off by e, |e| < 4.8e-6 of itself. `half y` and its product with y are rounded by
+/// at most u of themselves each, and come to 1/2; the difference from 1/2 is exact. So the residual is off by at most u, and what
+/// it adds by u y, at most one unit in the last place of the result (a unit is u y to 2 u y). The addition rounds by half a unit.
+/// What is left, 3/2 e^2 of the series and |e| u of the last product, is below 0.001 units. Over all mantissas the worst is
+/// 1.22 units. Below 2^-125 `half` loses its last bit (2.2 units).
 #[inline(always)]
 #[must_use]
 pub(crate) fn inverse_sqrt(value: f32) -> f32 {

@@ -26,7 +26,7 @@ mod schedule;
 mod surface;
 #[cfg(test)]
 mod tests;
-mod vector;
+pub(crate) mod vector;
 mod verify;
 
 pub use contact::{Contact, Oracle, OracleError};
