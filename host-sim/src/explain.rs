@@ -40,9 +40,7 @@ pub fn fault(fault: Fault) -> (String, &'static str) {
             "use fewer knots, or cut the part into several jobs",
         ),
         FaultKind::PatchTooShort => (
-            format!(
-                "one period's arc crosses more patches than a tick may change; {value:.4} mm were left over"
-            ),
+            format!("one period's arc reaches past a whole patch; {value:.4} mm of it were left over"),
             "lower the feed, or remove knots that lie closer together than one period's arc",
         ),
         FaultKind::IntervalTooSmall => (

@@ -17,7 +17,7 @@ pub enum FaultKind {
     OutOfRange = 4,
     /// The job has more data than the store holds. Value: words asked for.
     TooManyPatches = 5,
-    /// One period's arc would cross more patches than a tick may change. Value: the arc in mm that was left over.
+    /// One period's arc reaches past a whole patch. Value: the arc in mm that was left over.
     PatchTooShort = 6,
     /// The path interval is too small to advance the side parameter. Value: the interval as a fraction of a patch.
     IntervalTooSmall = 7,

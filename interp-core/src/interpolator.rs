@@ -191,8 +191,8 @@ impl<S: AsRef<[i32]> + AsMut<[i32]>> Interpolator<S> {
         self.motion.trip(fault);
     }
 
-    /// One period. Never blocks, never panics; bounded by the collapse and evaluation of three patches, and at
-    /// the start of a pass by a walk over the side spans.
+    /// One period. Never blocks, never panics; bounded by the collapse of a patch and its evaluation at a few
+    /// places, and at the start of a pass by a walk over 16 side spans.
     ///
     /// While the job runs, each call yields a sample with [`State::Running`] or [`State::Stopping`], counted by its `tick` from 0;
     /// the one after the last has [`State::Finished`]. In every state that does not move, the sample repeats the last position.

@@ -17,10 +17,10 @@ const WALK_MAX: u16 = 16;
 /// [`FaultKind::IntervalTooSmall`] where the interval does not advance the parameter.
 pub(crate) fn next_side(from: Place, interval: f32, spans: u16, width: impl Fn(u16) -> f32) -> Result<Place> {
     const SPAN: u64 = 1 << 32;
-    let mut span = from.span;
     let mut at = from.fraction >> 32;
     let mut rest = interval;
-    for _ in 0..WALK_MAX {
+    let end = spans.min(from.span.saturating_add(WALK_MAX));
+    for span in from.span..end {
         let room = if at == 0 {
             width(span)
         } else {
@@ -34,17 +34,20 @@ pub(crate) fn next_side(from: Place, interval: f32, spans: u16, width: impl Fn(u
             let fraction = (at + step).min(SPAN - 1) << 32;
             return Ok(Place { span, fraction });
         }
-        if span + 1 >= spans {
-            return Ok(Place {
-                span,
-                fraction: u64::MAX,
-            });
-        }
         rest -= room;
-        span += 1;
         at = 0;
     }
-    Ok(Place { span, fraction: 0 })
+    Ok(if end < spans {
+        Place {
+            span: end,
+            fraction: 0,
+        }
+    } else {
+        Place {
+            span: spans.saturating_sub(1),
+            fraction: u64::MAX,
+        }
+    })
 }
 
 /// Whether a pass there is the last.

@@ -4,7 +4,6 @@
 /// Place of a loop, the rounds that it makes at most, and why.
 const BOUNDS: &[(&str, u32, &str)] = &[
     ("compiler_builtins::arm::__aeabi_memcpy4", 512, COPIED),
-    ("compiler_builtins::arm::__aeabi_memset4", 512, COPIED),
     (
         "compiler_builtins::mem::impls::copy_forward::copy_forward_aligned_words",
         512,
@@ -20,24 +19,23 @@ const BOUNDS: &[(&str, u32, &str)] = &[
         512,
         COPIED,
     ),
+    ("interp_core::contact::solve", 2, "NEWTON_STEPS"),
     (
-        "compiler_builtins::mem::impls::set_bytes::set_bytes_bytes",
-        15,
-        "less than is filled by words",
+        "interp_core::run::Run::step_far",
+        2,
+        "patches of an arc: CROSSINGS_MAX + 1",
     ),
-    ("interp_core::schedule::next_side", 1024, "side spans: SPANS_MAX"),
+    (
+        "interp_core::schedule::next_side",
+        16,
+        "boundaries between side spans: WALK_MAX",
+    ),
     (
         "interp_core::surface::lines::Line::collapse",
         4,
         "rows of a block",
     ),
-    ("interp_core::surface::pole::PoleLine::at", 3, "axes"),
-    ("interp_core::surface::pole::PolePass::collapse", 3, "axes"),
-    (
-        "interp_core::surface::rational::RationalPass::collapse",
-        4,
-        "three axes and the weight",
-    ),
+    ("interp_core::surface::pole::Reduced::collapse", 3, "axes"),
 ];
 
 /// Copies and fills are of values whose size the compiler knows.
