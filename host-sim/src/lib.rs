@@ -16,12 +16,14 @@
     )
 )]
 
+pub mod approach;
 pub mod budget;
 pub mod commands;
 pub mod explain;
 pub mod job_file;
 pub mod machine;
 pub mod oracle;
+pub mod paper;
 pub mod prepare;
 pub mod remote;
 pub mod report;

@@ -9,11 +9,12 @@ use super::measure;
 use super::picture::Words;
 use super::record::Record;
 use super::svg::escape;
+use crate::approach::Kind;
 use crate::job_file::{Along, JobFile, Pattern};
 use crate::oracle::Oracle;
 use crate::survey::Findings;
 
-const STYLE: &str = include_str!("page.css");
+pub(super) const STYLE: &str = include_str!("page.css");
 
 /// A speed that keeps within this share of the feed is called steady.
 const STEADY_SHARE: f64 = 0.01;
@@ -21,6 +22,7 @@ const STEADY_SHARE: f64 = 0.01;
 /// What the page is made of.
 pub(super) struct Content<'a> {
     pub(super) job: &'a JobFile,
+    pub(super) approach: Kind,
     pub(super) oracle: &'a Oracle,
     pub(super) record: &'a Record,
     pub(super) findings: &'a Findings,
@@ -93,10 +95,15 @@ pub(super) fn page(content: &Content<'_>) -> io::Result<String> {
     tables(&mut out, content);
     speed(&mut out, content)?;
     intervals(&mut out, content)?;
-    out.push_str(
-        "<footer>Written by <code>cargo sim</code>. Positions and speeds are those that the \
-         core emitted; surface, arc lengths and errors are by the independent f64 oracle.</footer>\n\
-         </main>\n</body>\n</html>\n",
+    let emitter = match content.approach {
+        Kind::Surface => "those that the core emitted".to_owned(),
+        other => format!("those of the approach <code>{}</code>, in f64", other.name()),
+    };
+    let _ = writeln!(
+        out,
+        "<footer>Written by <code>cargo sim</code>. Positions and speeds are {emitter}; \
+         surface, arc lengths and errors are by the independent f64 oracle.</footer>\n\
+         </main>\n</body>\n</html>"
     );
     Ok(out)
 }
@@ -211,7 +218,7 @@ fn speed(out: &mut String, content: &Content<'_>) -> io::Result<()> {
                 points: centre,
             },
         ],
-        band: false,
+        ..Chart::default()
     };
     let Some(svg) = chart.svg()? else {
         return Ok(());
@@ -283,7 +290,7 @@ fn intervals(out: &mut String, content: &Content<'_>) -> io::Result<()> {
             colour: BLUE,
             points: least,
         }],
-        band: false,
+        ..Chart::default()
     };
     let gaps = measure::gaps(content.oracle, &passes);
     let pick = |of: fn(&measure::Gap) -> f64| {
@@ -305,6 +312,7 @@ fn intervals(out: &mut String, content: &Content<'_>) -> io::Result<()> {
             },
         ],
         band: true,
+        ..Chart::default()
     };
     let (Some(interval), Some(gap)) = (interval.svg()?, gap.svg()?) else {
         return Ok(());
@@ -333,7 +341,7 @@ fn intervals(out: &mut String, content: &Content<'_>) -> io::Result<()> {
     Ok(())
 }
 
-fn legend(out: &mut String, entries: &[(&str, &str)]) {
+pub(super) fn legend(out: &mut String, entries: &[(&str, &str)]) {
     out.push_str("<p class=\"legend\">");
     for (class, what) in entries {
         let _ = write!(out, "<span><i class=\"{class}\"></i>{what}</span>");
@@ -342,7 +350,7 @@ fn legend(out: &mut String, entries: &[(&str, &str)]) {
 }
 
 /// A count in groups of three digits.
-fn grouped(count: u64) -> String {
+pub(super) fn grouped(count: u64) -> String {
     let digits = count.to_string();
     let mut text = String::new();
     for (index, digit) in digits.chars().enumerate() {

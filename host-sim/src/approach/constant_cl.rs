@@ -1,0 +1,94 @@
+//! Existing practice: the tool centre's path at constant speed of the centre. The contact's speed varies by eqn 4.
+
+use super::linear::{Chord, even_chords, write_point};
+use super::{Approach, ApproachError, PassPath, Program};
+use crate::job_file::JobFile;
+use crate::oracle::vector::length;
+
+/// A step that would leave less than this share of itself to the end is taken to the end.
+const END_SHARE: f64 = 1e-9;
+
+/// The approach for a job.
+#[derive(Clone, Copy, Debug)]
+pub struct ConstantCl {
+    chord_mm: f64,
+    feed_mm_s: f64,
+}
+
+impl ConstantCl {
+    /// The approach with a job's feed, as the speed of the centre, and chord error limit.
+    #[must_use]
+    pub fn new(job: &JobFile) -> Self {
+        Self {
+            chord_mm: job.chord_mm,
+            feed_mm_s: job.feed_mm_s(),
+        }
+    }
+}
+
+impl Approach for ConstantCl {
+    fn plan(&self, pass: &PassPath<'_>) -> Result<Box<dyn Program>, ApproachError> {
+        Ok(Box::new(Path {
+            chords: even_chords(pass, self.chord_mm, self.feed_mm_s)?,
+            feed_mm_s: self.feed_mm_s,
+        }))
+    }
+}
+
+/// The centre's path of one pass. A CNC is fed its chords; it is followed as if it were exact, so that what is seen is the
+/// effect of the constant speed alone.
+struct Path {
+    chords: Vec<Chord>,
+    feed_mm_s: f64,
+}
+
+impl Program for Path {
+    fn segments(&self) -> usize {
+        self.chords.len()
+    }
+
+    /// The feed stands in the program once, so the blocks are points alone.
+    fn write(&self, out: &mut String) {
+        for chord in &self.chords {
+            out.push_str("G1");
+            write_point(out, chord.to_mm);
+            out.push('\n');
+        }
+    }
+
+    fn speed_step_mm_s(&self) -> f64 {
+        0.0
+    }
+
+    fn follow(
+        &self,
+        pass: &PassPath<'_>,
+        period_s: f64,
+        each: &mut dyn FnMut([f64; 3], f64) -> Result<(), ApproachError>,
+    ) -> Result<(), ApproachError> {
+        if self.chords.is_empty() {
+            return Ok(());
+        }
+        let way = self.feed_mm_s * period_s;
+        let rate = |path: f64| -> Result<f64, ApproachError> {
+            let speed = length(pass.at(pass.kept(path))?.cl_velocity);
+            Ok(pass.sense() / speed.max(1e-9))
+        };
+        let mut path = pass.ends[0];
+        // Bounded by the length over the way of a period.
+        loop {
+            // Runge and Kutta's rule, with the length as the independent variable.
+            let first = rate(path)?;
+            let second = rate(path + 0.5 * way * first)?;
+            let third = rate(path + 0.5 * way * second)?;
+            let fourth = rate(path + way * third)?;
+            let step = way * (first + 2.0 * (second + third) + fourth) / 6.0;
+            if step.abs() * (1.0 + END_SHARE) >= pass.left(path) {
+                let end = pass.at(pass.ends[1])?;
+                return each(end.contact.cl_mm, end.path);
+            }
+            path += step;
+            each(pass.at(path)?.contact.cl_mm, path)?;
+        }
+    }
+}

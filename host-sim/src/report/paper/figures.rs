@@ -1,0 +1,216 @@
+//! Figures 3, 4, 5, 7, 8, 9, and one of all approaches.
+
+use std::fmt::Write;
+use std::io;
+use std::path::Path;
+
+use super::super::chart::{BLUE, Chart, GREEN, Series, VIOLET, WARM};
+use super::super::page::legend;
+use crate::approach::{Kind, Speed};
+use crate::paper::figures::Track;
+use crate::paper::{Comparison, Study};
+
+/// Ranges of the section: millimetres, the same scale both ways in a chart of this height.
+const SECTION: [[f64; 2]; 2] = [[10.0, 97.0], [15.0, 65.0]];
+const SECTION_HEIGHT: u32 = 520;
+/// Range of the speeds, mm/s, one for all so that the figures compare.
+const SPEEDS: [f64; 2] = [4.0, 16.0];
+/// Range of the deviations from the feed, %.
+const DEVIATIONS: [f64; 2] = [-6.0, 2.0];
+
+const LENGTH: &str = "length along the pass on the surface, mm";
+const SPEED: &str = "speed, mm/s";
+
+/// All figures.
+pub(super) fn figures(out: &mut String, study: &Study) -> io::Result<()> {
+    out.push_str(
+        "<section><h2>The figures</h2>\n<p>All of one pass along u of Example 1's bell, r = 10 mm, wanted feed 10 mm/s, unless they say \
+         otherwise. CC is the cutter's contact on the surface, CL the centre of the ball.</p>\n",
+    );
+    figure_3(out, study)?;
+    speeds(out, study)?;
+    deviations(out, study)?;
+    out.push_str("</section>\n");
+    pictures(out, study)
+}
+
+fn put(out: &mut String, class: &str, chart: &Chart<'_>, caption: &str) -> io::Result<()> {
+    if let Some(svg) = chart.svg()? {
+        let _ = writeln!(
+            out,
+            "<figure class=\"chart{class}\">{svg}</figure>\n<p class=\"caption\">{caption}</p>"
+        );
+    }
+    Ok(())
+}
+
+const CONTACT_AND_CENTRE: [(&str, &str); 2] = [
+    ("warm", "cutter contact (CC)"),
+    ("violet dashed", "tool centre (CL)"),
+];
+
+/// The paths, and the surface.
+fn figure_3(out: &mut String, study: &Study) -> io::Result<()> {
+    let section = &study.figures.section;
+    legend(out, &CONTACT_AND_CENTRE);
+    let line = |colour, points: &[[f64; 2]]| Series {
+        colour,
+        points: points.to_vec(),
+    };
+    let chart = Chart {
+        x_title: "distance from the axis, mm",
+        y_title: "height, mm",
+        series: vec![line(WARM, &section.cc_mm), line(VIOLET, &section.cl_mm)],
+        ranges: SECTION.map(Some),
+        height: Some(SECTION_HEIGHT),
+        ..Chart::default()
+    };
+    put(
+        out,
+        "",
+        &chart,
+        "<b>Figure 3.</b> The profile that is turned about the axis, and the path of the tool's centre over it. Near the axis the surface \
+         bends away from the tool, and the centre has the longer way; near the rim it bends towards it. Both paths are 69.33 mm long.",
+    )
+}
+
+/// Speeds of contact and centre of a track.
+fn of_track(track: &Track) -> Vec<Series> {
+    let pick = |of: fn(&Speed) -> f64| track.speeds.iter().map(|at| [at.arc_mm, of(at)]).collect();
+    vec![
+        Series {
+            colour: WARM,
+            points: pick(|at| at.cc_mm_s),
+        },
+        Series {
+            colour: VIOLET,
+            points: pick(|at| at.cl_mm_s),
+        },
+    ]
+}
+
+fn speeds(out: &mut String, study: &Study) -> io::Result<()> {
+    let figures = &study.figures;
+    let chart = |series, marks| Chart {
+        x_title: LENGTH,
+        y_title: SPEED,
+        series,
+        marks,
+        ranges: [None, Some(SPEEDS)],
+        ..Chart::default()
+    };
+    let of = |track| chart(of_track(track), Vec::new());
+    legend(out, &CONTACT_AND_CENTRE);
+    put(
+        out,
+        "",
+        &of(&figures.constant_cl),
+        "<b>Figure 4.</b> Existing practice. The centre runs at a constant 10 mm/s; the contact crawls at 7.58 where the surface bends away \
+         from the tool and races at 14.70 where it bends towards it.",
+    )?;
+    let wanted = Series {
+        colour: VIOLET,
+        points: figures.wanted.clone(),
+    };
+    put(
+        out,
+        "",
+        &chart(vec![wanted], Vec::new()),
+        "<b>Figure 5.</b> The speed that the centre would have to have for the contact to run at a constant 10 mm/s: 6.80 to 13.20.",
+    )?;
+    put(
+        out,
+        " steps",
+        &of(&figures.linear_printed),
+        "<b>Figure 7.</b> Method 1, linear interpolator, the 46 segments of eqn 6, sampled each 5 ms. Each segment has one speed (the \
+         stairs of the centre), the contact ripples about the feed. The flaw in the middle is the one segment that steps over the \
+         inflection.",
+    )?;
+    put(
+        out,
+        " steps",
+        &of(&figures.linear_held),
+        "<b>Figure 7, with segments that hold the tolerance.</b> The same with 54 segments whose error is measured, not estimated.",
+    )?;
+    let marks = figures.curve_ends.iter().map(|end| (VIOLET, *end)).collect();
+    put(
+        out,
+        "",
+        &chart(of_track(&figures.curve), marks),
+        "<b>Figure 8.</b> Method 2, curve interpolator. Four cubics for the path and, on the same segments, four for the speed of the \
+         centre; the dots are their ends.",
+    )?;
+    put(
+        out,
+        "",
+        &of(&figures.surface),
+        "<b>Figure 9.</b> Method 3, surface interpolator, as the core runs it each millisecond. The contact keeps the feed; the speed of the \
+         centre follows of itself.",
+    )
+}
+
+/// What is left of the ripple, for the methods that care.
+fn deviations(out: &mut String, study: &Study) -> io::Result<()> {
+    let figures = &study.figures;
+    let feed = study.cases.revolved.job.feed_mm_s();
+    let series = |track: &Track, colour| Series {
+        colour,
+        points: track
+            .speeds
+            .iter()
+            .map(|at| [at.arc_mm, 100.0 * (at.cc_mm_s / feed - 1.0)])
+            .collect(),
+    };
+    legend(
+        out,
+        &[
+            ("violet", "linear, 1 ms, 54 segments"),
+            ("green dashdot", "curve, 4 cubics"),
+            ("blue", "surface"),
+        ],
+    );
+    let chart = Chart {
+        x_title: LENGTH,
+        y_title: "contact against feed, %",
+        series: vec![
+            series(&figures.linear_1_ms, VIOLET),
+            series(&figures.curve, GREEN),
+            series(&figures.surface, BLUE),
+        ],
+        ranges: [None, Some(DEVIATIONS)],
+        ..Chart::default()
+    };
+    put(
+        out,
+        " steps",
+        &chart,
+        "<b>Side by side.</b> Speed of the contact against the wanted feed, at a period of 1 ms. Constant speed of the centre, Figure 4, would \
+         lie between −24 and +47 %, far outside.",
+    )
+}
+
+/// The surfaces with their passes.
+fn pictures(out: &mut String, study: &Study) -> io::Result<()> {
+    out.push_str("<section><h2>The surfaces and their passes</h2>\n<p>As the core cuts them; the first belongs to Figure 3.</p>\n");
+    for (index, comparison) in study.comparisons.iter().enumerate() {
+        if let Some(picture) = picture(comparison)? {
+            // Each picture's names are its own on a page of several.
+            let picture = picture
+                .replace("iso-title", &format!("iso-title-{index}"))
+                .replace("iso-desc", &format!("iso-desc-{index}"))
+                .replace("iso-ball", &format!("iso-ball-{index}"));
+            let _ = writeln!(out, "<figure class=\"picture\">\n{picture}</figure>");
+        }
+    }
+    out.push_str("</section>\n");
+    Ok(())
+}
+
+fn picture(comparison: &Comparison) -> io::Result<Option<String>> {
+    let Some(row) = comparison.row(Kind::Surface) else {
+        return Ok(None);
+    };
+    let name = format!("{}.toml", comparison.name);
+    let draw = |sketch: &super::super::Sketch| sketch.picture(Path::new(&name), &row.measured.findings());
+    row.sketch.as_ref().map(draw).transpose()
+}
