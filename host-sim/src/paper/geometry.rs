@@ -6,6 +6,8 @@ use crate::oracle::{Oracle, OracleError};
 
 /// Cells along the path and across of the quadrature over the surface; midpoints. Relative error about 1e-6.
 const CELLS: [u32; 2] = [768, 64];
+/// Steps that narrow the bracket of a speed's extreme, each to two thirds.
+const EXTREME_STEPS: u32 = 24;
 /// Places at which a chord's error is taken.
 const PROBES: u32 = 40;
 
@@ -50,7 +52,7 @@ impl Geometry {
         for pass in passes(oracle)? {
             let nodes = Nodes::new(&pass)?;
             let [cc, cl] = nodes.lengths_mm();
-            let [low, high] = nodes.ratios();
+            let [low, high] = extremes(&pass, &nodes)?;
             geometry.cc_length_mm += cc;
             geometry.cl_length_mm += cl;
             if cc > geometry.pass_mm[0] {
@@ -66,6 +68,30 @@ impl Geometry {
     pub fn waste_pct(&self) -> f64 {
         100.0 * (1.0 - self.even_scallop_mm / self.cc_length_mm)
     }
+}
+
+/// Least and largest speed ratio of a pass: those of the nodes, refined between their neighbours.
+fn extremes(pass: &PassPath<'_>, nodes: &Nodes) -> Result<[f64; 2], OracleError> {
+    let mut found = nodes.ratios();
+    for (extreme, sign) in found.iter_mut().zip([-1.0, 1.0]) {
+        let place = nodes.0.iter().position(|node| node.at.ratio() == *extreme);
+        let Some(k) = place.filter(|k| *k > 0 && k + 1 < nodes.0.len()) else {
+            continue;
+        };
+        let (mut low, mut high) = (nodes.0[k - 1].at.path, nodes.0[k + 1].at.path);
+        // A ratio is flat at its extreme, so a bracket of a thousandth is exact.
+        for _ in 0..EXTREME_STEPS {
+            let third = (high - low) / 3.0;
+            let [left, right] = [pass.at(low + third)?.ratio(), pass.at(high - third)?.ratio()];
+            if sign * left < sign * right {
+                low += third;
+            } else {
+                high -= third;
+            }
+        }
+        *extreme = pass.at(0.5 * (low + high))?.ratio();
+    }
+    Ok(found)
 }
 
 /// The integral of |A| / interval over the surface.

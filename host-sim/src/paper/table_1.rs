@@ -128,8 +128,8 @@ pub fn items(operations: Option<&[Operations; 3]>, cycles: Option<&Cycles>) -> V
             printed: Some(microseconds * PAPER_MHZ),
             ours,
             note: if ours.is_some() {
-                "printed: its microseconds times 66 MHz; ours: mean, by the model of a Cortex-M4F (cargo sim budget), second \
-                 order with the corrector and every check"
+                "printed: its microseconds times 66 MHz; ours: mean, by the model of a Cortex-M4F (cargo sim budget), third \
+                 order, with every check"
                     .into()
             } else {
                 unmeasured.into()

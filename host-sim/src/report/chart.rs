@@ -90,7 +90,7 @@ impl Chart<'_> {
             .axis_style(AXIS.stroke_width(FINE))
             .set_all_tick_mark_size(5 * FINE)
             .x_labels(10)
-            .y_labels(6)
+            .y_labels(8)
             .label_style(font(17))
             .axis_desc_style(font(17))
             .x_label_formatter(&|value| short(*value))

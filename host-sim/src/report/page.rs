@@ -389,10 +389,13 @@ pub(super) fn significant(value: f64) -> String {
         } else {
             value.abs().log10().floor()
         };
-        return format!("{value:.*}", (4.0 - digits).clamp(0.0, 9.0) as usize)
-            .trim_end_matches('0')
-            .trim_end_matches('.')
-            .to_owned();
+        let text = format!("{value:.*}", (4.0 - digits).clamp(0.0, 9.0) as usize);
+        // Zeros before the point count.
+        return if text.contains('.') {
+            text.trim_end_matches('0').trim_end_matches('.').to_owned()
+        } else {
+            text
+        };
     }
     let text = format!("{value:.1e}");
     let (mantissa, exponent) = text.split_once('e').unwrap_or((&text, "0"));

@@ -16,7 +16,7 @@ const SECTION_HEIGHT: u32 = 520;
 /// Range of the speeds, mm/s, one for all so that the figures compare.
 const SPEEDS: [f64; 2] = [4.0, 16.0];
 /// Range of the deviations from the feed, %.
-const DEVIATIONS: [f64; 2] = [-6.0, 2.0];
+const DEVIATIONS: [f64; 2] = [-8.0, 8.0];
 
 const LENGTH: &str = "length along the pass on the surface, mm";
 const SPEED: &str = "speed, mm/s";
@@ -89,6 +89,19 @@ fn of_track(track: &Track) -> Vec<Series> {
     ]
 }
 
+/// A chart of speeds with its legend; on stairs the centre's line is not dashed.
+fn put_speeds(out: &mut String, class: &str, chart: &Chart<'_>, caption: &str) -> io::Result<()> {
+    let centre = if class.is_empty() {
+        "violet dashed"
+    } else {
+        "violet"
+    };
+    let entries = [("warm", "cutter contact (CC)"), (centre, "tool centre (CL)")];
+    let first = if chart.series.len() == 1 { 1 } else { 0 };
+    legend(out, &entries[first..]);
+    put(out, class, chart, caption)
+}
+
 fn speeds(out: &mut String, study: &Study) -> io::Result<()> {
     let figures = &study.figures;
     let chart = |series, marks| Chart {
@@ -100,8 +113,7 @@ fn speeds(out: &mut String, study: &Study) -> io::Result<()> {
         ..Chart::default()
     };
     let of = |track| chart(of_track(track), Vec::new());
-    legend(out, &CONTACT_AND_CENTRE);
-    put(
+    put_speeds(
         out,
         "",
         &of(&figures.constant_cl),
@@ -112,13 +124,13 @@ fn speeds(out: &mut String, study: &Study) -> io::Result<()> {
         colour: VIOLET,
         points: figures.wanted.clone(),
     };
-    put(
+    put_speeds(
         out,
         "",
         &chart(vec![wanted], Vec::new()),
         "<b>Figure 5.</b> The speed that the centre would have to have for the contact to run at a constant 10 mm/s: 6.80 to 13.20.",
     )?;
-    put(
+    put_speeds(
         out,
         " steps",
         &of(&figures.linear_printed),
@@ -126,21 +138,21 @@ fn speeds(out: &mut String, study: &Study) -> io::Result<()> {
          stairs of the centre), the contact ripples about the feed. The flaw in the middle is the one segment that steps over the \
          inflection.",
     )?;
-    put(
+    put_speeds(
         out,
         " steps",
         &of(&figures.linear_held),
         "<b>Figure 7, with segments that hold the tolerance.</b> The same with 54 segments whose error is measured, not estimated.",
     )?;
     let marks = figures.curve_ends.iter().map(|end| (VIOLET, *end)).collect();
-    put(
+    put_speeds(
         out,
         "",
         &chart(of_track(&figures.curve), marks),
         "<b>Figure 8.</b> Method 2, curve interpolator. Four cubics for the path and, on the same segments, four for the speed of the \
          centre; the dots are their ends.",
     )?;
-    put(
+    put_speeds(
         out,
         "",
         &of(&figures.surface),

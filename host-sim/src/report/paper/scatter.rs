@@ -120,7 +120,8 @@ fn mark(
 fn decimal(value: f64) -> String {
     let exponent = value.log10().round() as i32;
     match exponent {
-        -2..=3 => super::super::chart::short(value),
+        -3..=3 => super::super::chart::short(value),
+        exponent if exponent > 3 => format!("{value:.0}"),
         _ => super::super::page::significant(value).replace("1.0·", ""),
     }
 }
