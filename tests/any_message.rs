@@ -69,9 +69,9 @@ pub(crate) fn any_request() -> impl Strategy<Value = Request> {
 prop_compose! {
     fn any_sample()(state in prop::sample::select(&State::ALL[..]), places in [place(), place()],
                     counts in any::<[u32; 2]>(), cc_nm in any::<[i32; 3]>(), cl_nm in any::<[i32; 3]>(),
-                    feed_mm_s in real(), interval in real()) -> Sample {
+                    feed_mm_s in real(), density in real()) -> Sample {
         let ([tick, pass], [path, side]) = (counts, places);
-        Sample { tick, state, pass, path, side, feed_mm_s, cc_nm, cl_nm, interval }
+        Sample { tick, state, pass, path, side, feed_mm_s, cc_nm, cl_nm, density }
     }
 }
 
@@ -91,7 +91,7 @@ prop_compose! {
             side: at.side,
             samples,
             digest,
-            interval: at.interval,
+            interval: at.density,
             deadline_misses,
             tick_cycles_max,
             samples_lost,

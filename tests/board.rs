@@ -24,7 +24,7 @@ const WORDS: usize = 64;
 /// The samples of the dome, by the core alone.
 fn reference() -> Vec<Sample> {
     let (header, words) = dome();
-    let mut core = Interpolator::<WORDS>::new();
+    let mut core = Interpolator::<[i32; WORDS]>::new();
     core.load_begin(&header, u32::try_from(words.len()).unwrap())
         .unwrap();
     core.load_words(0, &words).unwrap();
@@ -289,16 +289,18 @@ fn a_missed_tick_trips_a_free_run_and_is_only_counted_in_lockstep() {
     desk.accepted(&Request::Start);
     desk.ticks(50);
     desk.board.tick_with(2, 4321);
+    desk.ticks(40);
     desk.collect();
     let status = desk.halts[0];
-    assert_eq!((status.state, status.samples), (State::Faulted, 50));
+    // Along the path, 1/32 of the feed less with each of 31 samples.
+    assert_eq!((status.state, status.samples), (State::Faulted, 50 + 31));
     assert_eq!((status.deadline_misses, status.tick_cycles_max), (2, 4321));
     let fault = status.fault.unwrap();
     assert_eq!(
         (fault.kind(), fault.value),
         (Some(FaultKind::DeadlineMissed), 2.0)
     );
-    check_passes(&desk.passes, &reference()[..50]);
+    assert_eq!(desk.passes.last().map(|pass| pass.samples), Some(status.samples));
 
     let mut desk = Desk::loaded(Clock::Lockstep, Report::Digests);
     desk.accepted(&Request::Start);
@@ -312,7 +314,7 @@ fn a_missed_tick_trips_a_free_run_and_is_only_counted_in_lockstep() {
 #[test]
 fn a_full_output_stops_time_in_lockstep_only() {
     let (header, words) = dome();
-    let mut half = RealTime::<WORDS>::new();
+    let mut half = RealTime::<[i32; WORDS]>::new();
     half.load_begin(&header, 54).unwrap();
     half.load_words(0, &words).unwrap();
     half.load_check(0).unwrap();
@@ -444,14 +446,20 @@ proptest! {
     fn any_order_of_anything_is_survived(deeds in prop::collection::vec(any_deed(), 0..60)) {
         let samples = reference();
         let mut desk = Desk::loaded(Clock::Lockstep, Report::Samples);
+        // A run that a missed tick has stopped ends with shorter steps than the reference; the next one is whole again.
+        let (mut stopped, mut before) = (false, 0);
         for deed in deeds {
             act(&mut desk, deed);
             let status = desk.board.status();
             let count = usize::try_from(status.samples).unwrap();
-            prop_assert!(count <= samples.len());
-            prop_assert_eq!(status.digest, digest(&samples[..count]));
+            stopped = status.fault.is_some() || (stopped && count >= before);
+            before = count;
+            if !stopped {
+                prop_assert!(count <= samples.len());
+                prop_assert_eq!(status.digest, digest(&samples[..count]));
+            }
         }
-        for sample in &desk.samples {
+        for sample in desk.samples.iter().filter(|sample| sample.state == State::Running) {
             prop_assert_eq!(*sample, samples[usize::try_from(sample.tick).unwrap()]);
         }
     }

@@ -3,7 +3,7 @@
 
 use host_sim::job_file::{Along, JobFile, Pattern, Side, SurfaceSpec};
 use host_sim::prepare::{Prepared, prepare};
-use interp_core::{FaultKind, Interpolator, Place, Request, STORE_WORDS, Sample, State};
+use interp_core::{FaultKind, Interpolator, Place, Request, Sample, State};
 
 fn job(surface: SurfaceSpec, radius_mm: f64) -> JobFile {
     JobFile {
@@ -34,7 +34,7 @@ fn patch(terms: &[(usize, usize, usize, f64)]) -> SurfaceSpec {
 }
 
 fn load(prepared: &Prepared) -> Box<Interpolator> {
-    let mut core = Box::new(Interpolator::<STORE_WORDS>::new());
+    let mut core = Box::new(<Interpolator>::new());
     core.load_begin(&prepared.header, prepared.words.len() as u32)
         .unwrap();
     core.load_words(0, &prepared.words).unwrap();

@@ -107,7 +107,7 @@ fn every_golden_schedule() {
                     passes.push([prepared.side.parameter(sample.side), f64::INFINITY]);
                 }
                 let last = passes.last_mut().unwrap();
-                last[1] = last[1].min(sample.interval.into());
+                last[1] = last[1].min(sample.interval().into());
                 samples += 1;
                 true
             })

@@ -78,7 +78,7 @@ fn sample() -> Sample {
         feed_mm_s: 10.0,
         cc_nm: [1, -2, 3_000_000],
         cl_nm: [i32::MAX, i32::MIN, 0],
-        interval: f32::INFINITY,
+        density: f32::INFINITY,
     }
 }
 

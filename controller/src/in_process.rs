@@ -21,7 +21,7 @@ pub const COMMANDS_MAX: usize = 4;
 /// The real-time half and the queue before it: what the link talks to.
 #[derive(Debug, Default)]
 struct Half<const WORDS: usize> {
-    real_time: RealTime<WORDS>,
+    real_time: RealTime<[i32; WORDS]>,
     commands: VecDeque<Command>,
 }
 
@@ -126,7 +126,7 @@ impl<const WORDS: usize> Board<WORDS> {
     }
 
     /// The real-time half, beside the line.
-    pub const fn real_time(&mut self) -> &mut RealTime<WORDS> {
+    pub const fn real_time(&mut self) -> &mut RealTime<[i32; WORDS]> {
         &mut self.half.real_time
     }
 }

@@ -113,10 +113,10 @@ impl Run {
     }
 }
 
-/// The real-time half of the board. `WORDS`: see [`Interpolator`].
+/// The real-time half of the board. `S`: the job store, see [`Interpolator`].
 #[derive(Debug)]
-pub struct RealTime<const WORDS: usize = STORE_WORDS> {
-    interpolator: Interpolator<WORDS>,
+pub struct RealTime<S = [i32; STORE_WORDS]> {
+    interpolator: Interpolator<S>,
     clock: Clock,
     credit: u32,
     report: Report,
@@ -125,18 +125,26 @@ pub struct RealTime<const WORDS: usize = STORE_WORDS> {
     run: Run,
 }
 
-impl<const WORDS: usize> Default for RealTime<WORDS> {
+impl<const WORDS: usize> Default for RealTime<[i32; WORDS]> {
     fn default() -> Self {
         Self::new()
     }
 }
 
-impl<const WORDS: usize> RealTime<WORDS> {
-    /// An idle machine on a free clock, reporting digests.
+impl<const WORDS: usize> RealTime<[i32; WORDS]> {
+    /// An idle machine on a free clock, reporting digests, with a store of its own.
     #[must_use]
     pub const fn new() -> Self {
+        Self::with_store([0; WORDS])
+    }
+}
+
+impl<S> RealTime<S> {
+    /// An idle machine on a free clock, reporting digests.
+    #[must_use]
+    pub const fn with_store(store: S) -> Self {
         Self {
-            interpolator: Interpolator::new(),
+            interpolator: Interpolator::with_store(store),
             clock: Clock::Free,
             credit: 0,
             report: Report::Digests,
@@ -144,7 +152,9 @@ impl<const WORDS: usize> RealTime<WORDS> {
             run: Run::NEW,
         }
     }
+}
 
+impl<S: AsRef<[i32]> + AsMut<[i32]>> RealTime<S> {
     /// One tick of the sample timer.
     pub fn tick(&mut self, input: TickInput) -> TickOutput {
         self.run.tick_cycles_max = self.run.tick_cycles_max.max(input.cycles);
@@ -218,7 +228,7 @@ impl<const WORDS: usize> RealTime<WORDS> {
             self.run = Run::NEW;
         }
         let sample = *self.interpolator.tick(request);
-        if sample.state == State::Running {
+        if matches!(sample.state, State::Running | State::Stopping) {
             output.pass = self.run.add(&sample, self.interpolator.last_interval());
             output.sample = (self.report == Report::Samples).then_some(sample);
         }

@@ -4,9 +4,10 @@
 
 use core::mem::size_of;
 
+use crate::guarded_machine::BoardRealTime;
 use controller::{
     machine::{Command, Event},
-    realtime::{RealTime, TickOutput},
+    realtime::TickOutput,
 };
 use interp_core::job::{STORE_WORDS, SurfaceKind, patches_max};
 use protocol::{frame::FRAME_MAX, message::SAMPLES_MAX};
@@ -94,7 +95,7 @@ const _: () = {
     );
 
     // Memory.
-    let machine = size_of::<RealTime<JOB_WORDS>>();
+    let machine = size_of::<BoardRealTime>() + 4 * JOB_WORDS;
     let queues = RECEIVE_PLACES + COMMAND_PLACES * size_of::<Command>() + EVENT_PLACES * size_of::<Event>();
     assert!(
         machine + queues + STACK_BYTES <= RAM_BYTES,

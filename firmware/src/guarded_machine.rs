@@ -16,7 +16,7 @@ use crate::{
 };
 
 /// The real-time half of this board.
-pub(crate) type BoardRealTime = RealTime<JOB_WORDS>;
+pub(crate) type BoardRealTime = RealTime<&'static mut [i32; JOB_WORDS]>;
 
 /// [`Machine`] by means of RTIC. Every lock is held for one call of [`RealTime`], each of bounded length: a
 /// chunk of words, a record, or a copy of the status.
@@ -27,7 +27,7 @@ pub(crate) struct GuardedMachine<'a, M> {
     pub(crate) commands: &'a mut Producer<'static, Command>,
 }
 
-impl<M: Mutex<T = &'static mut BoardRealTime>> Machine for GuardedMachine<'_, M> {
+impl<M: Mutex<T = BoardRealTime>> Machine for GuardedMachine<'_, M> {
     fn description(&mut self) -> Description {
         describe(FIRMWARE_VERSION, board::NAME, JOB_WORDS, PERIOD_US)
     }

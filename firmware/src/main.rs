@@ -27,7 +27,6 @@ defmt::timestamp!("{=u64:us}", u64::from(uptime_periods()) * u64::from(PERIOD_US
 
 #[rtic::app(device = stm32f4xx_hal::pac, peripherals = true)]
 mod app {
-    use core::mem::MaybeUninit;
 
     use controller::{
         link::Link,
@@ -54,7 +53,7 @@ mod app {
     #[shared]
     struct Shared {
         /// A reference, because 64 KiB do not fit on the stack.
-        real_time: &'static mut BoardRealTime,
+        real_time: BoardRealTime,
         /// Bytes from the host that were lost.
         bytes_lost: u32,
     }
@@ -76,11 +75,9 @@ mod app {
 
     /// Interrupts are off until this returns: the first tick finds everything in place.
     ///
-    /// The machine is made in place instead of by its static's initial value: that is not all zeros, and
-    /// would be stored in flash, all 64 KiB of it. Should a compiler make it on the stack first, the stack
-    /// overflows, and the board stops here.
+    /// The store is a static of its own: all zeros, it takes no flash, and the 64 KiB never pass over the stack.
     #[init(local = [
-        real_time: MaybeUninit<BoardRealTime> = MaybeUninit::uninit(),
+        store: [i32; JOB_WORDS] = [0; JOB_WORDS],
         bytes: Queue<u8, RECEIVE_PLACES> = Queue::new(),
         commands: Queue<Command, COMMAND_PLACES> = Queue::new(),
         events: Queue<Event, EVENT_PLACES> = Queue::new(),
@@ -101,7 +98,7 @@ mod app {
         );
         (
             Shared {
-                real_time: context.local.real_time.write(RealTime::new()),
+                real_time: RealTime::with_store(context.local.store),
                 bytes_lost: 0,
             },
             Local {

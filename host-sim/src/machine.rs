@@ -1,13 +1,13 @@
 //! The machine in this process: the core with a job loaded, one call a period.
 
-use interp_core::{Fault, Interpolator, Place, Probe, Request, STORE_WORDS, Sample, State};
+use interp_core::{Fault, Interpolator, Place, Probe, Request, Sample, State};
 
 use crate::prepare::Prepared;
 
 /// The core, with the same store as the board's.
 #[derive(Debug)]
 pub struct Machine {
-    core: Box<Interpolator<STORE_WORDS>>,
+    core: Box<Interpolator>,
 }
 
 impl Machine {

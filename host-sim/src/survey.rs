@@ -80,7 +80,7 @@ impl<'a> Survey<'a> {
             None => true,
         };
         self.samples += 1;
-        self.interval_min = self.interval_min.min(sample.interval.into());
+        self.interval_min = self.interval_min.min(sample.interval().into());
         if let Some(trace) = &mut self.trace {
             trace.write(sample, self.prepared.parameters(sample.path, sample.side))?;
         }
@@ -101,7 +101,7 @@ impl<'a> Survey<'a> {
             cc_nm: sample.cc_nm,
             cl_nm: sample.cl_nm,
             feed_mm_s: sample.feed_mm_s.into(),
-            interval: sample.interval.into(),
+            interval: sample.interval().into(),
             first_of_pass: first,
             last_of_pass: last,
         };

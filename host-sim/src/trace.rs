@@ -68,7 +68,7 @@ impl Trace {
             feed_mm_s: sample.feed_mm_s.to_string(),
             cc_nm: sample.cc_nm,
             cl_nm: sample.cl_nm,
-            interval: sample.interval.is_finite().then(|| sample.interval.to_string()),
+            interval: finite(sample.interval()),
         })
     }
 
@@ -85,7 +85,7 @@ impl Trace {
             feed_mm_s: emitted.feed_mm_s.to_string(),
             cc_nm: emitted.cc_nm,
             cl_nm: emitted.cl_nm,
-            interval: emitted.interval.is_finite().then(|| emitted.interval.to_string()),
+            interval: finite(emitted.interval),
         })
     }
 
@@ -127,6 +127,11 @@ impl Trace {
 /// 17 significant digits: every f64 exactly.
 fn digits(value: f64) -> String {
     format!("{value:.16e}")
+}
+
+/// An interval's digits, where there is one.
+fn finite(interval: impl Into<f64> + Copy + ToString) -> Option<String> {
+    interval.into().is_finite().then(|| interval.to_string())
 }
 
 /// Nanometres as millimetres, exactly.

@@ -21,7 +21,7 @@
 //!     ..Header::default()
 //! };
 //! let one = encode::width(1.0)?;
-//! let mut machine = Interpolator::<64>::new();
+//! let mut machine = Interpolator::<[i32; 64]>::new();
 //! machine.load_begin(&header, 54)?;
 //! machine.load_words(0, &[one, one])?; // one span each way, as wide as the parameter's range
 //! machine.load_words(2, &patch.to_words())?;

@@ -1,45 +1,48 @@
 //! Step 4: from the scallop limit to the path interval (Lo 1998, eqns 10 and 11).
 //!
 //! With k the normal curvature across the path towards the tool and c = -k, the step-over along the surface is
-//! `l = sqrt(8 r h / (1 + r c))`, and the interval of the side parameter `l / |(N x t) . S_side|`. Squared and with the
-//! lateral speed inside, that is one division and one square root: `sqrt(8 r h / (lateral^2 - r lateral^2 k))`.
+//! `l = sqrt(8 r h / (1 + r c))`, and the interval of the side parameter `l / |(N x t) . S_side|`. With the lateral speed inside,
+//! `interval^2 = 8 r h / (lateral^2 - r lateral^2 k)`. A pass wants the least interval of all its samples: a sample yields
+//! the [`Sample::density`](crate::Sample::density), `1 / interval^2`, which is a product, and root and quotient are
+//! taken once a pass.
 
 use crate::arith::sqrt;
 use crate::surface::Contact;
 
-/// The interval of one ball and scallop limit.
+/// The densities of one ball and scallop limit on one patch.
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct Interval {
-    radius_mm: f32,
-    /// 8 r h, mm^2.
-    eight_rh: f32,
+    /// 1 / (8 r h), per units^2, over the square of the side span's width.
+    factor: f32,
 }
 
 impl Interval {
     /// No limit yet.
-    pub(crate) const NONE: Self = Self {
-        radius_mm: 0.0,
-        eight_rh: 0.0,
-    };
+    pub(crate) const NONE: Self = Self { factor: 0.0 };
 
-    /// The interval of a ball and a scallop limit, mm.
-    pub(crate) fn new(radius_mm: f32, scallop_mm: f32) -> Self {
+    /// For a ball and a scallop limit, mm, on a patch with so many units a mm, in a span of this width.
+    pub(crate) fn new(radius_mm: f32, scallop_mm: f32, units_per_mm: f32, width: f32) -> Self {
+        let span = units_per_mm * width;
         Self {
-            radius_mm,
-            eight_rh: 8.0 * radius_mm * scallop_mm,
+            factor: 1.0 / (8.0 * radius_mm * scallop_mm * (span * span)),
         }
     }
 
-    /// Candidate at a contact that the ball fits, in fractions of the side span; infinite at a pole, where the side
-    /// direction moves nothing.
+    /// Density at a contact that the ball fits, in the side parameter's units; 0 at a pole, where the side direction moves
+    /// nothing.
     #[inline(always)]
-    pub(crate) fn candidate(&self, contact: &Contact) -> f32 {
-        let room = contact.lateral_squared - self.radius_mm * contact.lateral_bend;
-        if room > 0.0 {
-            sqrt(self.eight_rh / room)
-        } else {
-            f32::INFINITY
-        }
+    pub(crate) fn density(&self, contact: &Contact) -> f32 {
+        contact.across * contact.gauge * self.factor
+    }
+}
+
+/// The interval of a density, in units of the side parameter; infinite where nothing sets a limit.
+#[must_use]
+pub(crate) fn interval(density: f32) -> f32 {
+    if density > 0.0 {
+        1.0 / sqrt(density)
+    } else {
+        f32::INFINITY
     }
 }
 
@@ -54,11 +57,12 @@ mod tests {
         for (radius, side) in [(50.0_f64, -1.0_f64), (50.0, 1.0), (1e9, 1.0)] {
             let (r, h) = (4.0_f64, 0.005_f64);
             let contact = Contact {
-                lateral_squared: 1.0,
-                lateral_bend: (side / radius) as f32,
+                across: (1.0 - r * side / radius) as f32,
+                gauge: 1.0,
                 ..Contact::default()
             };
-            let got = f64::from(Interval::new(r as f32, h as f32).candidate(&contact));
+            let density = Interval::new(r as f32, h as f32, 1.0, 1.0).density(&contact);
+            let got = f64::from(interval(density));
             // Exact: centres at R - side r, cusp at R - side h (side = +1 is the inside), half angle by the cosine law.
             let centre = radius - side * r;
             let cusp = radius - side * h;

@@ -1,13 +1,11 @@
 //! A job in the machine: raw words go in, and only a complete, checked job comes out.
 
-use crate::arith::centred;
 use crate::fault::{Fault, FaultKind, Result};
 use crate::job::{Header, SPANS_MAX, SurfaceKind};
-use crate::sample::Place;
 use crate::schedule::width_words;
 use crate::surface::{
-    CirclePass, Contact, POLYNOMIAL_WORDS, PassLine, PolynomialPass, PolynomialRecord, ProfilePass,
-    RATIONAL_WORDS, REVOLVED_WORDS, RationalPass, RationalRecord, RevolvedRecord,
+    POLYNOMIAL_WORDS, PolynomialRecord, RATIONAL_WORDS, REVOLVED_WORDS, RationalRecord, RevolvedRecord,
+    split_patch,
 };
 
 /// Which part of the checks a job has passed.
@@ -22,61 +20,14 @@ enum Stage {
     Sealed,
 }
 
-/// The job's store. Its surface can be read only once the job is sealed.
+/// What is known of the job in the store, which is the caller's and handed in with every call. Its surface can be read only
+/// once the job is sealed.
 #[derive(Debug)]
-pub(crate) struct Program<const WORDS: usize> {
+pub(crate) struct Program {
     stage: Stage,
     header: Header,
     /// Words that the job has.
     length: u32,
-    words: [i32; WORDS],
-}
-
-/// A surface on one pass.
-#[derive(Clone, Copy, Debug)]
-#[allow(
-    clippy::large_enum_variant,
-    reason = "one lives in the interpolator for ever; nothing is allocated"
-)]
-pub(crate) enum PassSurface {
-    Polynomial(PolynomialPass),
-    Rational(RationalPass),
-    Profile(ProfilePass),
-    Circle(CirclePass),
-}
-
-impl PassSurface {
-    /// Its units are 2^-shift nm.
-    pub(crate) fn shift(&self) -> u8 {
-        match self {
-            Self::Polynomial(pass) => pass.shift,
-            Self::Rational(pass) => pass.shift,
-            Self::Profile(pass) => pass.shift,
-            Self::Circle(pass) => pass.shift,
-        }
-    }
-
-    /// The pass is a single point.
-    pub(crate) fn is_point(&self) -> bool {
-        match self {
-            Self::Polynomial(pass) => pass.is_point(),
-            Self::Rational(pass) => pass.is_point(),
-            Self::Profile(_) => false,
-            Self::Circle(pass) => pass.is_point(),
-        }
-    }
-
-    /// The contact at a fraction of the patch, in the direction of travel, and the origin it is relative to, nm.
-    #[inline(always)]
-    pub(crate) fn contact(&self, fraction: u64) -> Result<(Contact, [i32; 3])> {
-        let w = centred(fraction);
-        match self {
-            Self::Polynomial(pass) => Ok((pass.contact(w)?, pass.origin_nm)),
-            Self::Rational(pass) => Ok((pass.contact(w)?, pass.origin_nm)),
-            Self::Profile(pass) => Ok((pass.contact(w)?, [0, 0, pass.height_origin_nm])),
-            Self::Circle(pass) => Ok((pass.contact(fraction), [0, 0, pass.height_origin_nm])),
-        }
-    }
 }
 
 /// Words of one record of a kind of surface.
@@ -123,7 +74,7 @@ fn check_header(header: &Header) -> Result<()> {
     Ok(())
 }
 
-impl<const WORDS: usize> Program<WORDS> {
+impl Program {
     pub(crate) const fn new() -> Self {
         const HEADER: Header = Header {
             kind: SurfaceKind::Polynomial,
@@ -140,14 +91,13 @@ impl<const WORDS: usize> Program<WORDS> {
             stage: Stage::Empty,
             header: HEADER,
             length: 0,
-            words: [0; WORDS],
         }
     }
 
-    pub(crate) fn begin(&mut self, header: &Header, words: u32) -> Result<()> {
+    pub(crate) fn begin(&mut self, header: &Header, words: u32, capacity: usize) -> Result<()> {
         check_header(header)?;
         let (_, needed) = extent(header);
-        if needed > WORDS as u64 {
+        if needed > capacity as u64 {
             #[allow(clippy::cast_precision_loss, reason = "a report; at most 2^27")]
             return Err(Fault::new(FaultKind::TooManyPatches, needed as f32));
         }
@@ -167,7 +117,7 @@ impl<const WORDS: usize> Program<WORDS> {
         self.stage = Stage::Empty;
     }
 
-    pub(crate) fn write(&mut self, offset: u32, words: &[i32]) -> Result<()> {
+    pub(crate) fn write(&mut self, store: &mut [i32], offset: u32, words: &[i32]) -> Result<()> {
         let Stage::Loading { received, .. } = self.stage else {
             return Err(bad_length(offset));
         };
@@ -177,10 +127,12 @@ impl<const WORDS: usize> Program<WORDS> {
         let Some(end) = end.filter(|end| *end <= self.length && offset <= received) else {
             return Err(bad_length(offset));
         };
-        let Some(slots) = self.words.get_mut(offset as usize..end as usize) else {
+        let Some(slots) = store.get_mut(offset as usize..end as usize) else {
             return Err(bad_length(end));
         };
-        slots.copy_from_slice(words);
+        for (slot, word) in slots.iter_mut().zip(words) {
+            *slot = *word;
+        }
         self.stage = Stage::Loading {
             received: received.max(end),
             checked: 0,
@@ -192,26 +144,30 @@ impl<const WORDS: usize> Program<WORDS> {
         extent(&self.header).0
     }
 
-    pub(crate) fn check(&mut self, record: u32) -> Result<()> {
+    pub(crate) fn check(&mut self, store: &[i32], record: u32) -> Result<()> {
         let Stage::Loading { received, checked } = self.stage else {
             return Err(bad_length(0));
         };
         if received != self.length || record > checked || record >= self.records() {
             return Err(bad_length(received));
         }
+        let job = Job {
+            header: &self.header,
+            store,
+        };
         if record == 0 {
-            self.check_widths()?;
+            job.check_widths()?;
         }
         let index = record as usize;
         let result = match self.header.kind {
-            SurfaceKind::Polynomial => self.record(index).map(PolynomialRecord::check),
-            SurfaceKind::Rational => self.record(index).map(RationalRecord::check),
+            SurfaceKind::Polynomial => job.record(index).map(PolynomialRecord::check),
+            SurfaceKind::Rational => job.record(index).map(RationalRecord::check),
             SurfaceKind::RevolvedAlongProfile | SurfaceKind::RevolvedAroundAxis => {
-                self.record(index).map(RevolvedRecord::check)
+                job.record(index).map(RevolvedRecord::check)
             }
         };
         match result {
-            Some(Ok(())) if !self.is_alike(index) => Err(bad_patch(record)),
+            Some(Ok(())) if !job.is_alike(index) => Err(bad_patch(record)),
             Some(Ok(())) => {
                 self.stage = Stage::Loading {
                     received,
@@ -221,32 +177,6 @@ impl<const WORDS: usize> Program<WORDS> {
             }
             _ => Err(bad_patch(record)),
         }
-    }
-
-    /// Whether a patch's side boundaries collapse like those of the first patch beside the same pass: a pass is a point as a
-    /// whole or not at all.
-    fn is_alike(&self, index: usize) -> bool {
-        let head = |index: usize| match self.header.kind {
-            SurfaceKind::Polynomial => self
-                .record::<POLYNOMIAL_WORDS>(index)
-                .map(PolynomialRecord::side_edges),
-            SurfaceKind::Rational => self
-                .record::<RATIONAL_WORDS>(index)
-                .map(RationalRecord::side_edges),
-            SurfaceKind::RevolvedAlongProfile | SurfaceKind::RevolvedAroundAxis => None,
-        };
-        head(index) == head(index - index % usize::from(self.header.path_spans.max(1)))
-    }
-
-    fn check_widths(&self) -> Result<()> {
-        let count = width_words(self.header.path_spans, self.header.side_spans) as usize;
-        for word in self.words.iter().take(count) {
-            let width = f32::from_bits(word.cast_unsigned());
-            if !(width > 0.0 && width.is_finite()) {
-                return Err(Fault::new(FaultKind::BadHeader, width));
-            }
-        }
-        Ok(())
     }
 
     pub(crate) fn seal(&mut self) -> Result<()> {
@@ -264,47 +194,78 @@ impl<const WORDS: usize> Program<WORDS> {
         &self.header
     }
 
+    /// The sealed job.
+    ///
+    /// # Errors
+    /// [`FaultKind::WrongState`] where none is.
+    pub(crate) fn job<'a>(&'a self, store: &'a [i32]) -> Result<Job<'a>> {
+        if self.stage == Stage::Sealed {
+            Ok(Job {
+                header: &self.header,
+                store,
+            })
+        } else {
+            Err(Fault::new(FaultKind::WrongState, 0.0))
+        }
+    }
+}
+
+/// A job and its store.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Job<'a> {
+    pub(crate) header: &'a Header,
+    store: &'a [i32],
+}
+
+impl<'a> Job<'a> {
     /// Width of a side span, in units of the side parameter.
     pub(crate) fn side_width(&self, span: u16) -> f32 {
-        self.words
+        self.store
             .get(usize::from(span))
             .map_or(1.0, |word| f32::from_bits(word.cast_unsigned()))
     }
 
-    fn record<const N: usize>(&self, index: usize) -> Option<&[i32; N]> {
+    fn record<const N: usize>(&self, index: usize) -> Option<&'a [i32; N]> {
         let start = width_words(self.header.path_spans, self.header.side_spans) as usize + index * N;
-        self.words.get(start..)?.first_chunk::<N>()
+        self.store.get(start..)?.first_chunk::<N>()
     }
 
-    /// The sealed surface's patch at these spans, on a pass at this side fraction.
+    /// The record of the patch at these spans; `N` is the number of words of the job's kind.
     ///
     /// # Errors
-    /// [`FaultKind::WrongState`] where no job is sealed; what the surface's kind finds wrong.
-    pub(crate) fn collapse(&self, path_span: u16, side: Place, at: &PassLine) -> Result<PassSurface> {
-        if self.stage != Stage::Sealed {
-            return NO_RECORD;
-        }
-        let index = usize::from(side.span) * usize::from(self.header.path_spans) + usize::from(path_span);
-        let pass = match self.header.kind {
-            SurfaceKind::Polynomial => self
-                .record(index)
-                .map(|words| PassSurface::Polynomial(PolynomialPass::collapse(words, at))),
-            SurfaceKind::Rational => self
-                .record(index)
-                .map(|words| PassSurface::Rational(RationalPass::collapse(words, at))),
-            SurfaceKind::RevolvedAlongProfile => self
-                .record(index)
-                .map(|words| PassSurface::Profile(ProfilePass::collapse(words, at, side.fraction))),
-            SurfaceKind::RevolvedAroundAxis => match self.record(index) {
-                Some(words) => Some(PassSurface::Circle(CirclePass::collapse(words, at)?)),
-                None => None,
-            },
+    /// [`FaultKind::WrongState`] where there is none.
+    pub(crate) fn patch<const N: usize>(&self, path_span: u16, side_span: u16) -> Result<&'a [i32; N]> {
+        let index = usize::from(side_span) * usize::from(self.header.path_spans) + usize::from(path_span);
+        self.record(index)
+            .ok_or(const { Fault::new(FaultKind::WrongState, 0.0) })
+    }
+
+    /// Whether a patch's side boundaries collapse like those of the first patch beside the same pass: a pass is a point as a
+    /// whole or not at all.
+    fn is_alike(&self, index: usize) -> bool {
+        let beside = |index: usize| {
+            let words: &[i32] = match self.header.kind {
+                SurfaceKind::Polynomial => self.record::<POLYNOMIAL_WORDS>(index)?,
+                SurfaceKind::Rational => self.record::<RATIONAL_WORDS>(index)?,
+                SurfaceKind::RevolvedAlongProfile | SurfaceKind::RevolvedAroundAxis => return None,
+            };
+            let (_, _, edges, _) = split_patch(words);
+            Some((edges.side_start, edges.side_end))
         };
-        pass.map_or(NO_RECORD, Ok)
+        beside(index) == beside(index - index % usize::from(self.header.path_spans.max(1)))
+    }
+
+    fn check_widths(&self) -> Result<()> {
+        let count = width_words(self.header.path_spans, self.header.side_spans) as usize;
+        for word in self.store.iter().take(count) {
+            let width = f32::from_bits(word.cast_unsigned());
+            if !(width > 0.0 && width.is_finite()) {
+                return Err(Fault::new(FaultKind::BadHeader, width));
+            }
+        }
+        Ok(())
     }
 }
-
-const NO_RECORD: Result<PassSurface> = Err(Fault::new(FaultKind::WrongState, 0.0));
 
 fn bad_patch(record: u32) -> Fault {
     Fault::new(FaultKind::BadPatch, crate::arith::count_to_f32(record))

@@ -92,8 +92,9 @@ pub struct Sample {
     pub cc_nm: [i32; 3],
     /// Cutter location (ball centre), nm: what the axes are told.
     pub cl_nm: [i32; 3],
-    /// Candidate of the path interval at this sample, in units of the side parameter; infinite where it sets no limit.
-    pub interval: f32,
+    /// `1 / interval^2`: square of the passes that the scallop limit asks for per unit of the side parameter, by this sample
+    /// alone. The greatest of a pass decides; see [`Self::interval`].
+    pub density: f32,
 }
 
 impl Sample {
@@ -107,6 +108,12 @@ impl Sample {
         feed_mm_s: 0.0,
         cc_nm: [0; 3],
         cl_nm: [0; 3],
-        interval: f32::INFINITY,
+        density: 0.0,
     };
+
+    /// Candidate of the path interval at this sample, in units of the side parameter; infinite where it sets no limit.
+    #[must_use]
+    pub fn interval(&self) -> f32 {
+        crate::interval::interval(self.density)
+    }
 }

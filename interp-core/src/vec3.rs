@@ -15,9 +15,6 @@ pub(crate) struct Vec3 {
 }
 
 impl Vec3 {
-    /// Nowhere.
-    pub(crate) const ZERO: Self = Self::new(0.0, 0.0, 0.0);
-
     /// A vector from its components.
     #[inline(always)]
     #[must_use]
@@ -25,11 +22,11 @@ impl Vec3 {
         Self { x, y, z }
     }
 
-    /// Integers times a scale.
+    /// Integers as the nearest floats.
     #[inline(always)]
     #[must_use]
-    pub(crate) fn scaled([x, y, z]: [i32; 3], scale: f32) -> Self {
-        Self::new(to_f32(x) * scale, to_f32(y) * scale, to_f32(z) * scale)
+    pub(crate) fn of([x, y, z]: [i32; 3]) -> Self {
+        Self::new(to_f32(x), to_f32(y), to_f32(z))
     }
 
     /// Applies a function to each of three things.

@@ -47,7 +47,7 @@ impl Digest {
     }
 
     /// Feeds every field of a sample as 17 words: tick, state code, pass, path span, low and high half of the path
-    /// fraction, the side's span, low and high half, feed (f32 bits), CC x y z (nm), CL x y z (nm), interval (f32 bits).
+    /// fraction, the side's span, low and high half, feed (f32 bits), CC x y z (nm), CL x y z (nm), density (f32 bits).
     #[inline]
     pub fn sample(&mut self, sample: &Sample) {
         self.word(sample.tick);
@@ -61,7 +61,7 @@ impl Digest {
         self.word(sample.feed_mm_s.to_bits());
         self.words(&sample.cc_nm);
         self.words(&sample.cl_nm);
-        self.word(sample.interval.to_bits());
+        self.word(sample.density.to_bits());
     }
 }
 
@@ -114,7 +114,7 @@ mod tests {
             feed_mm_s: f32::from_bits(10),
             cc_nm: [11, 12, 13],
             cl_nm: [14, 15, 16],
-            interval: f32::from_bits(17),
+            density: f32::from_bits(17),
         };
         let mut digest = Digest::new();
         digest.sample(&sample);

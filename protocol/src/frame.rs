@@ -184,7 +184,7 @@ mod tests {
             feed_mm_s: f32::MAX,
             cc_nm: [i32::MIN; 3],
             cl_nm: [i32::MIN; 3],
-            interval: f32::MAX,
+            density: f32::MAX,
         };
         let samples = Reply::Samples([SampleRecord(sample); SAMPLES_MAX].into_iter().collect());
         let mut buffer = [0; FRAME_MAX];

@@ -183,7 +183,7 @@ struct SampleFields {
     feed_mm_s: f32,
     cc_nm: [i32; 3],
     cl_nm: [i32; 3],
-    interval: f32,
+    density: f32,
 }
 
 /// A [`Sample`] as it travels.

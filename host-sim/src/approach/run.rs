@@ -168,7 +168,7 @@ fn of_sample(prepared: &Prepared, sample: &Sample, first: bool) -> Motion {
             cc_nm: sample.cc_nm,
             cl_nm: sample.cl_nm,
             feed_mm_s: sample.feed_mm_s.into(),
-            interval: sample.interval.into(),
+            interval: sample.interval().into(),
             first_of_pass: first,
             last_of_pass: false,
         },

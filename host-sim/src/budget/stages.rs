@@ -11,18 +11,14 @@
 use addr2line::Loader;
 use cycle_plugin::plan::Stage;
 
-/// Functions of `interp_core::interpolator` that work for a stage; the others are everything else.
-const INTERPOLATOR: [(&str, Stage); 12] = [
-    ("step", Stage::Step),
-    ("within", Stage::Step),
-    ("speed_at", Stage::Step),
-    ("arc_to_end", Stage::Step),
-    ("contact_here", Stage::Surface),
-    ("contact_at", Stage::Surface),
+/// Functions of `interp_core::run` that work for a stage; the others are everything else.
+const RUN: [(&str, Stage); 8] = [
+    ("step_far", Stage::Step),
+    ("enter_patch", Stage::PatchChange),
     ("next_span", Stage::PatchChange),
-    ("collapse", Stage::PatchChange),
     ("begin_pass", Stage::PassChange),
     ("step_over", Stage::PassChange),
+    ("step_on_pole", Stage::PassChange),
     ("note_interval", Stage::PassChange),
     ("end_pass", Stage::PassChange),
 ];
@@ -57,11 +53,12 @@ pub fn of_function(path: &str) -> Option<Stage> {
         "surface" => Some(Stage::Surface),
         "offset" => Some(Stage::Offset),
         "interval" => Some(Stage::Interval),
-        "program" if path.contains("::collapse") => Some(Stage::PatchChange),
+        "patch" => Some(Stage::PatchChange),
+        "program" => None,
+        "interpolator" => Some(Stage::Rest),
         "schedule" => Some(Stage::PassChange),
-        "interpolator" => Some(
-            INTERPOLATOR
-                .iter()
+        "run" => Some(
+            RUN.iter()
                 .find(|(function, _)| path.contains(&format!("::{function}::")) || name == *function)
                 .map_or(Stage::Rest, |(_, stage)| *stage),
         ),
@@ -120,7 +117,7 @@ mod tests {
             Some(Stage::PatchChange)
         );
         assert_eq!(
-            stage("interp_core::interpolator::Interpolator<_>::begin_pass"),
+            stage("interp_core::run::Run::begin_pass"),
             Some(Stage::PassChange)
         );
         assert_eq!(

@@ -3,17 +3,20 @@
 //! On a pass the side parameter is fixed. A surface kind therefore has two parts, both in one file:
 //!
 //! * `collapse`, once a pass and patch: the patch at this side parameter becomes a handful of cubics in the path parameter;
-//! * `contact`, once a sample: the cubics at a path parameter become the `Contact`.
+//! * `local`, once a sample: the cubics at a path parameter become a `Local`, whose `contact` is the same for all kinds.
 //!
-//! Positions are fixed point, relative to the patch's own origin, in units of 2^-shift nm; first derivatives are evaluated
-//! in fixed point too (31 bits instead of 24) and then become f32, like everything after them. Both parameters are
-//! centred, -1/2 to 1/2 over a span.
+//! Positions are fixed point, relative to the patch's own origin, in units of 2^-shift nm, and so are all derivatives (31 bits
+//! instead of 24, one cycle a Horner step instead of two). First derivatives become f32 for lengths and the normal. The
+//! normal times the ball's radius is an integer vector again, which the cutter location needs, and its products with the
+//! second derivatives are r times the second fundamental form. Both parameters are centred, -1/2 to 1/2 over a span.
 //!
 //! **Poles.** Where a boundary collapses into a point, one first derivative vanishes along it. A patch says so by a flag,
 //! and `collapse` divides that derivative by its root exactly (synthetic division of the polynomial): `A = a Ã`, `B = b B̃`
 //! with scalars a (fixed on a pass) and b (linear along it) that carry the zero. The normal comes from `Ã x B̃`, as exact
 //! at the pole as anywhere, and nothing is divided by a or b unless it is known not to vanish.
 
+mod lines;
+mod pole;
 mod polynomial;
 mod range;
 mod rational;
@@ -24,156 +27,264 @@ pub use range::{Edges, SHIFT_MAX};
 pub use rational::{RATIONAL_WORDS, RationalRecord};
 pub use revolved::{REVOLVED_WORDS, RevolvedRecord};
 
+pub(crate) use pole::PolePass;
 pub(crate) use polynomial::PolynomialPass;
 pub(crate) use rational::RationalPass;
 pub(crate) use revolved::{CirclePass, ProfilePass};
 
-use crate::arith::{fraction_32, sqrt};
+use crate::arith::{dot_hi, fraction_32, inverse_sqrt, power_of_two, sqrt, to_f32};
 use crate::fault::{Fault, FaultKind, Result};
+use crate::offset::Ball;
 use crate::vec3::Vec3;
 
 /// Least sine between the two first derivatives (after any flagged zero is divided out) at which a normal is taken.
 /// At 1e-3 the f32 cross product still gives the normal to 1e-4 rad; below, [`FaultKind::DegenerateSurface`].
 pub const SINE_MIN: f32 = 1e-3;
 
+/// Square of the tangent of the angle whose sine is [`SINE_MIN`].
+const TANGENT_MIN_SQUARED: f32 = SINE_MIN * SINE_MIN / (1.0 - SINE_MIN * SINE_MIN);
+
 /// Where a pass runs: everything `collapse` needs besides the patch.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct PassLine {
-    /// Side parameter within its span, centred fixed point.
+    /// Side parameter within its span, units of 2^-64.
+    pub(crate) fraction: u64,
+    /// The same, centred fixed point.
     pub(crate) side: i32,
     /// The pass runs against the path parameter.
     pub(crate) reversed: bool,
-    /// +1 or -1: side of `S_path x S_side` (of the surface's own directions) that the tool is on.
-    pub(crate) tool_sign: f32,
 }
 
-/// The surface at one point of a pass, as the stages want it. "Per path" and "per side" mean per span fraction.
+/// The surface and the ball on it at one point of a pass, as the stages want it. "Per path" and "per side" mean per span fraction;
+/// g is the factor that a surface kind scales its derivatives by (1, or a part of the weight).
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct Contact {
     /// Cutter contact relative to the patch's origin, units of 2^-shift nm.
     pub(crate) position: [i32; 3],
-    /// Unit normal towards the tool.
-    pub(crate) normal: Vec3,
+    /// r N, towards the tool, in the ball's units.
+    pub(crate) offset: [i32; 3],
     /// The parametrisation along the path.
     pub(crate) path: PathSpeed,
-    /// Normal curvature along the path towards the tool, 1/mm.
-    pub(crate) path_bend: f32,
-    /// Square of the lateral speed |(N x t) . S_side|, mm^2 per side^2.
+    /// 1 - r k, k the normal curvature along the path towards the tool.
+    pub(crate) along: f32,
+    /// 1 - r k across the path, times `lateral_squared`.
+    pub(crate) across: f32,
+    /// Square of the lateral speed |(N x t) . S_side|, (g units)^2 per side^2.
     pub(crate) lateral_squared: f32,
-    /// Normal curvature across the path towards the tool times `lateral_squared`, mm per side^2.
-    pub(crate) lateral_bend: f32,
-    /// Square of geodesic torsion times lateral speed, 1 per side^2.
+    /// Square of r times geodesic torsion times lateral speed, (g units)^2 per side^2.
     pub(crate) twist_squared: f32,
+    /// |A|^2, (g units)^2.
+    pub(crate) speed_squared: f32,
+    /// 1/g^2.
+    pub(crate) gauge: f32,
 }
 
-/// Speed of the path parametrisation and how it changes: what a step along the path needs.
+/// The path parametrisation at a place: what a step along the path needs.
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct PathSpeed {
-    /// |A|, mm per path.
-    pub(crate) speed: f32,
-    /// 1/|A|.
+    /// 1/|A|, path per unit.
     pub(crate) inverse: f32,
     /// A . A' / |A|^2: relative change of the speed, per path.
     pub(crate) stretch: f32,
-    /// (A' . A' + A . A'') / |A|^2, per path^2.
-    pub(crate) stretch_change: f32,
 }
 
-/// The factor a of A = a Ã, and its reciprocal.
+/// The factors of A = a Ã and B = b B̃.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct PathFactor {
-    pub(crate) factor: f32,
-    pub(crate) inverse: f32,
+pub(crate) struct Factors {
+    /// a and 1/a: fixed on a pass; both 0 where the whole pass is a pole.
+    pub(crate) path: f32,
+    pub(crate) inverse_path: f32,
+    /// b: 0 at a pole at the pass's end.
+    pub(crate) side: f32,
 }
 
-impl PathFactor {
-    /// The factor of a patch with these collapsed boundaries, on this pass.
-    pub(crate) fn of(edges: Edges, at: &PassLine) -> Self {
-        match edges.side_root() {
-            None => Self {
-                factor: 1.0,
-                inverse: 1.0,
+impl Factors {
+    /// Away from poles.
+    pub(crate) const ONE: Self = Self {
+        path: 1.0,
+        inverse_path: 1.0,
+        side: 1.0,
+    };
+}
+
+/// First derivatives with their zeros divided out, and what else the curvatures need. Derivatives are times g; those of
+/// second order up to tangential parts.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Local {
+    /// Relative to the patch's origin, units of 2^-shift nm.
+    pub(crate) position: [i32; 3],
+    /// Ã, so that A = a Ã.
+    pub(crate) path: [i32; 3],
+    /// B̃, so that B = b B̃.
+    pub(crate) side: [i32; 3],
+    /// Half the derivative of Ã along the path.
+    pub(crate) path2: [i32; 3],
+    /// Mixed derivative of S.
+    pub(crate) mixed: [i32; 3],
+    /// Half the second side derivative of S over b.
+    pub(crate) side2: [i32; 3],
+    /// g.
+    pub(crate) g: f32,
+    /// 1/g.
+    pub(crate) inverse_g: f32,
+    /// What the stretch of Ã has more than that of S, because g varies.
+    pub(crate) excess: f32,
+}
+
+/// `A . A' / |A|^2` from g A, half of g A' and 1/|g A|^2.
+#[inline(always)]
+fn stretch(path: &[i32; 3], path2: &[i32; 3], inverse_e: f32, excess: f32) -> f32 {
+    const PRODUCT: f32 = power_of_two(33);
+    to_f32(dot_hi(path, path2)) * (inverse_e * PRODUCT) - excess
+}
+
+impl Local {
+    /// The contact's differential geometry (Lo 1998, eqns 9 to 11). With E, F, G, L, M, N the fundamental forms, W^2 = EG -
+    /// F^2 and d = B - (F/E) A: lateral speed^2 = |d|^2 = W^2/E, II(d, d) = N - 2 M F/E + L (F/E)^2, II(t, d) = (M - L F/E)/sqrt E.
+    #[inline(always)]
+    pub(crate) fn contact(&self, ball: &Ball, factors: &Factors) -> Result<Contact> {
+        let Factors {
+            path: a,
+            inverse_path: inverse_a,
+            side: b,
+        } = *factors;
+        let (path, side) = (Vec3::of(self.path), Vec3::of(self.side));
+        let cross = path.cross(side);
+        let e = path.dot(path);
+        let f = path.dot(side);
+        let area_squared = cross.dot(cross);
+        // Not `<=`: a NaN must not pass.
+        if !(area_squared > TANGENT_MIN_SQUARED * (f * f)) {
+            return Err(degenerate(area_squared, f));
+        }
+        let inverse_area = inverse_sqrt(area_squared);
+        let offset = ball.offset(cross, inverse_area);
+        let inverse = inverse_sqrt(e);
+        let inverse_e = inverse * inverse;
+
+        let product = ball.product() * self.g;
+        let slant = b * f * inverse_e;
+        let l = to_f32(dot_hi(&offset, &self.path2)) * product;
+        let m = to_f32(dot_hi(&offset, &self.mixed)) * (0.5 * product);
+        let n = b * (to_f32(dot_hi(&offset, &self.side2)) * product);
+        let shear = m - slant * l;
+        let twist = shear * inverse * inverse_a;
+        // On a pole every side line leaves in its own direction, and its own speed counts.
+        let lateral_squared = if a > 0.0 {
+            b * b * (area_squared * inverse_e)
+        } else {
+            b * b * side.dot(side)
+        };
+        Ok(Contact {
+            position: self.position,
+            offset,
+            path: PathSpeed {
+                inverse: inverse * inverse_a * self.g,
+                stretch: stretch(&self.path, &self.path2, inverse_e, self.excess),
             },
-            Some(root) => {
-                let factor = fraction_32(root.factor(at.side));
-                Self {
-                    factor,
-                    inverse: if factor > 0.0 { 1.0 / factor } else { 0.0 },
-                }
-            }
+            along: 1.0 - l * inverse_e * inverse_a,
+            lateral_squared,
+            across: lateral_squared - (n - (m + shear) * slant * inverse_a),
+            twist_squared: twist * twist,
+            speed_squared: a * a * e,
+            gauge: self.inverse_g * self.inverse_g,
+        })
+    }
+
+    /// The parametrisation alone.
+    #[inline(always)]
+    pub(crate) fn path_speed(&self, inverse_a: f32) -> PathSpeed {
+        let path = Vec3::of(self.path);
+        let inverse = inverse_sqrt(path.dot(path));
+        PathSpeed {
+            inverse: inverse * inverse_a * self.g,
+            stretch: stretch(&self.path, &self.path2, inverse * inverse, self.excess),
         }
     }
 }
 
-/// First derivatives with their zeros divided out, and what else the curvatures need.
-#[derive(Clone, Copy, Debug)]
-pub(crate) struct Derivatives {
-    /// Ã, so that A = a Ã.
-    pub(crate) path: Vec3,
-    /// Derivative of Ã along the path.
-    pub(crate) path2: Vec3,
-    /// Second derivative of Ã along the path.
-    pub(crate) path3: Vec3,
-    /// B̃, so that B = b B̃.
-    pub(crate) side: Vec3,
-    /// Mixed derivative of S, up to tangential parts.
-    pub(crate) mixed: Vec3,
-    /// Second side derivative of S over b, up to tangential parts.
-    pub(crate) side2: Vec3,
-    /// a and 1/a: fixed on a pass; both 0 where the whole pass is a pole.
-    pub(crate) path_factor: PathFactor,
-    /// b: 0 at a pole at the pass's end.
-    pub(crate) side_factor: f32,
-    /// Sign on `path x side` that gives the tool's side.
-    pub(crate) tool_sign: f32,
+#[cold]
+#[inline(never)]
+fn degenerate(area_squared: f32, f: f32) -> Fault {
+    let eg = area_squared + f * f;
+    let sine = if eg > 0.0 { sqrt(area_squared / eg) } else { 0.0 };
+    Fault::new(FaultKind::DegenerateSurface, sine)
 }
 
-impl Derivatives {
-    /// The contact's differential geometry (Lo 1998, eqns 9 to 11). With E, F, G, L, M, N the fundamental forms, W^2 = EG -
-    /// F^2 and d = B - (F/E) A: lateral speed^2 = |d|^2 = W^2/E, II(d, d) = N - 2 M F/E + L (F/E)^2, II(t, d) = (M - L F/E)/sqrt E.
-    #[inline(always)]
-    pub(crate) fn contact(&self, position: [i32; 3]) -> Result<Contact> {
-        let PathFactor {
-            factor: a,
-            inverse: inverse_a,
-        } = self.path_factor;
-        let b = self.side_factor;
-        let cross = self.path.cross(self.side);
-        let e = self.path.dot(self.path);
-        let f = self.path.dot(self.side);
-        let g = self.side.dot(self.side);
-        let area_squared = cross.dot(cross);
-        let eg = e * g;
-        // Not `<=`: a NaN must not pass.
-        if !(area_squared > SINE_MIN * SINE_MIN * eg) {
-            let sine = if eg > 0.0 { sqrt(area_squared / eg) } else { 0.0 };
-            return Err(Fault::new(FaultKind::DegenerateSurface, sine));
-        }
-        let normal = cross * (self.tool_sign / sqrt(area_squared));
-        let speed = sqrt(e);
-        let inverse = 1.0 / speed;
-        let inverse_e = inverse * inverse;
+/// A surface on one pass. The variant is a job's, but for patches with a pole.
+#[derive(Clone, Copy, Debug)]
+#[allow(
+    clippy::large_enum_variant,
+    reason = "one lives in the interpolator for ever; nothing is allocated"
+)]
+pub(crate) enum Surface {
+    Polynomial(PolynomialPass),
+    Rational(RationalPass),
+    Pole(PolePass),
+    Profile(ProfilePass),
+    Circle(CirclePass),
+}
 
-        let slant = b * f * inverse_e;
-        let l = normal.dot(self.path2);
-        let m = normal.dot(self.mixed);
-        let n = b * normal.dot(self.side2);
-        let shear = m - slant * l;
-        let twist = shear * inverse * inverse_a;
-        Ok(Contact {
-            position,
-            normal,
-            path: PathSpeed {
-                speed: a * speed,
-                inverse: inverse * inverse_a,
-                stretch: self.path.dot(self.path2) * inverse_e,
-                stretch_change: (self.path2.dot(self.path2) + self.path.dot(self.path3)) * inverse_e,
-            },
-            path_bend: l * inverse_e * inverse_a,
-            // On a pole every side line leaves in its own direction, and its own speed counts.
-            lateral_squared: b * b * if a > 0.0 { area_squared * inverse_e } else { g },
-            lateral_bend: n - (m + shear) * slant * inverse_a,
-            twist_squared: twist * twist,
-        })
+/// What the sample path asks of a surface on a pass.
+pub(crate) trait Pass {
+    /// The contact at a fraction of the patch, in the direction of travel.
+    ///
+    /// # Errors
+    /// [`FaultKind::DegenerateSurface`] where there is no normal.
+    fn contact(&self, fraction: u64, ball: &Ball) -> Result<Contact>;
+}
+
+impl Surface {
+    /// The pass is a single point.
+    pub(crate) fn is_point(&self) -> bool {
+        match self {
+            Self::Polynomial(_) | Self::Rational(_) | Self::Profile(_) => false,
+            Self::Pole(pass) => pass.is_point(),
+            Self::Circle(pass) => pass.is_point(),
+        }
+    }
+
+    /// The parametrisation at a fraction of the patch, in the direction of travel.
+    ///
+    /// # Errors
+    /// [`FaultKind::DegenerateSurface`] where the speed vanishes.
+    #[inline(never)]
+    pub(crate) fn path_at(&self, fraction: u64) -> Result<PathSpeed> {
+        let speed = match self {
+            Self::Polynomial(pass) => pass.path_at(fraction),
+            Self::Rational(pass) => pass.path_at(fraction),
+            Self::Pole(pass) => pass.path_at(fraction),
+            Self::Profile(pass) => pass.path_at(fraction),
+            Self::Circle(pass) => pass.path(),
+        };
+        if speed.inverse > 0.0 && speed.inverse < f32::INFINITY {
+            Ok(speed)
+        } else {
+            Err(Fault::new(FaultKind::DegenerateSurface, 0.0))
+        }
+    }
+}
+
+/// A patch record's origin in nm, its shift, its collapsed boundaries and the blocks of its coordinates.
+pub(crate) fn split_patch(words: &[i32]) -> ([i32; 3], u8, Edges, &[[i32; 16]]) {
+    let ([x, y, z, head], blocks) = lines::split(words);
+    let range::HeadWord { shift, edges } = range::HeadWord::from_word(head);
+    ([x, y, z], shift, edges, blocks)
+}
+
+/// A revolved record's shift, and the origin of its height in nm.
+pub(crate) fn split_revolved(words: &[i32; REVOLVED_WORDS]) -> (u8, i32) {
+    let record = RevolvedRecord::from_words(words);
+    (record.shift, record.height_origin_nm)
+}
+
+/// Factors of a patch with these collapsed boundaries, fixed on this pass: a and 1/a.
+pub(crate) fn path_factor(edges: Edges, at: &PassLine) -> (f32, f32) {
+    match edges.side_root() {
+        None => (1.0, 1.0),
+        Some(root) => {
+            let factor = fraction_32(root.factor(at.side));
+            (factor, if factor > 0.0 { 1.0 / factor } else { 0.0 })
+        }
     }
 }

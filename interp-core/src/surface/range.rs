@@ -144,7 +144,7 @@ pub(crate) fn bound(c: &[i64; 4]) -> i64 {
 }
 
 /// Bound of one coordinate of a patch, `c[i][j]` times `path^i side^j`, over everything that `collapse` and `contact` evaluate
-/// in fixed point: the cubics, their path and side derivatives, those divided by a root.
+/// in fixed point: the cubics, their derivatives up to the second (halves of the pure ones), those divided by a root.
 pub(crate) fn patch_bound(c: &[[i32; 4]; 4]) -> i64 {
     let wide = |row: &[i32; 4]| -> [i64; 4] { row.map(i64::from) };
     let [c0, c1, c2, c3] = c;
@@ -170,15 +170,27 @@ pub(crate) fn patch_bound(c: &[[i32; 4]; 4]) -> i64 {
     let [s0, s1, s2, s3] = slopes;
     let (t3, t2) = (s3, s2 + s3 / 2 + 1);
     let across = bound(&[s0, s1, s2, s3]).max(s1 + t2 / 2 + 1 + t2 / 2 + t3 / 4);
-    // A path derivative of a quotient across the pass.
-    let [_, q1, q2, q3] = slopes;
-    let divided = bound(&[q1, 2 * q2, 3 * q3, 0]);
-    value.max(along).max(across).max(divided)
+    // The mixed derivative, or a path derivative of a quotient across the pass.
+    let mixed = bound(&[s1, 2 * s2, 3 * s3, 0]);
+    // Half the second side derivative, and its quotient along the path.
+    let half = |row: &[i32; 4]| {
+        let [_, _, r2, r3] = wide(row);
+        r2.abs() + (3 * r3.abs() + 1) / 2 + 1
+    };
+    let [h0, h1, h2, h3] = [half(c0), half(c1), half(c2), half(c3)];
+    let t2 = h2 + h3 / 2 + 1;
+    let second = bound(&[h0, h1, h2, h3]).max(h1 + t2 / 2 + 1 + t2 / 2 + h3 / 4);
+    value.max(along).max(across).max(mixed).max(second)
 }
 
-/// Whether all of that stays within i32.
+/// Whether a bound stays within i32, with room for half a nanometre.
+pub(crate) fn fits_range(bound: i64) -> bool {
+    bound < i64::from(i32::MAX) - (1 << SHIFT_MAX)
+}
+
+/// Whether all of a coordinate's values stay within i32.
 pub(crate) fn fits(c: &[[i32; 4]; 4]) -> bool {
-    patch_bound(c) < i64::from(i32::MAX)
+    fits_range(patch_bound(c))
 }
 
 /// [`FaultKind::BadPatch`]; the caller puts the patch's index in.

@@ -4,18 +4,19 @@
 //! centred profile parameter, units of 2^-shift nm, the height relative to its origin; the height's origin, nm; the start
 //! angle in turns (units of 2^-32, wrapping); the angle's extent in turns (units of 2^-31, above 0, at most 2^31).
 
-use super::polynomial::unit_mm;
-use super::range::{BAD_PATCH, SHIFT_MAX, bound};
-use super::{Contact, PassLine, PathSpeed};
-use crate::arith::{angle, centred_to_f32, count_to_f32, cubic, mul_q30, quadratic, sin_cos, sqrt, to_f32};
+use super::lines::turn_cubic;
+use super::range::{BAD_PATCH, SHIFT_MAX, bound, fits_range};
+use super::{Contact, Pass, PassLine, PathSpeed};
+use crate::arith::{angle, centred, count_to_f32, inverse_sqrt, jet, mul_hi, sin_cos, to_f32};
 use crate::fault::{Fault, FaultKind, Result};
+use crate::offset::Ball;
 use crate::vec3::Vec3;
 
 /// Words of a revolved surface.
 pub const REVOLVED_WORDS: usize = 12;
 
-/// 2^-30, the unit of sine and cosine.
-const SINE_UNIT: f32 = 1.0 / 1_073_741_824.0;
+/// 2^-31, the unit of sine and cosine here.
+const SINE_UNIT: f32 = 1.0 / 2_147_483_648.0;
 /// Radians per 2^-31 turn.
 const RADIANS_PER_EXTENT: f32 = core::f32::consts::TAU / 2_147_483_648.0;
 
@@ -100,8 +101,7 @@ impl RevolvedRecord {
             && [record.radius, record.height].into_iter().all(|c| {
                 let [c0, c1, c2, c3] = c.map(i64::from);
                 // 4: the radius turns by sine and cosine, and the rounding of both.
-                let worst = bound(&[c0, c1, c2, c3]).max(bound(&[c1, 2 * c2, 3 * c3, 0]));
-                worst < i64::from(i32::MAX) - 4
+                fits_range(4 + bound(&[c0, c1, c2, c3]).max(bound(&[c1, 2 * c2, 3 * c3, 0])))
             });
         if good { Ok(()) } else { BAD_PATCH }
     }
@@ -110,221 +110,250 @@ impl RevolvedRecord {
 /// Units by which a radius may fall below 0: the rounding of a profile that ends on the axis.
 const AXIS_UNITS: i32 = 4;
 
-/// The profile at one parameter, per unit of the (travelled) parameter.
+/// Sine and cosine of an angle in turns (units of 2^-32), in units of 2^-31; 1 is a unit less.
+#[inline(always)]
+const fn sin_cos_q31(turns: u32) -> [i32; 2] {
+    let (sin, cos) = sin_cos(turns);
+    [sin.saturating_add(sin), cos.saturating_add(cos)]
+}
+
+/// A length turned by an angle: `length` times a sine in units of 2^-31, within 2 units.
+#[inline(always)]
+const fn turned(length: i32, sine: i32) -> i32 {
+    mul_hi(length, sine) << 1
+}
+
+/// The profile at one parameter: radius and height, with their first derivative and half the second, per unit of the
+/// (travelled) parameter.
 #[derive(Clone, Copy, Debug)]
 struct ProfilePoint {
-    radius_units: i32,
-    height_units: i32,
-    radius_mm: f32,
-    /// First, second and third derivatives of radius and height, mm.
-    first: [f32; 2],
-    second: [f32; 2],
-    third: [f32; 2],
+    radius: [i32; 3],
+    height: [i32; 3],
 }
 
 /// A polynomial profile, maybe travelled backwards.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, Default)]
 struct Profile {
-    scale: f32,
     radius: [i32; 4],
     height: [i32; 4],
 }
 
 impl Profile {
     fn new(record: &RevolvedRecord, reversed: bool) -> Self {
-        use super::polynomial::turn;
         Self {
-            scale: unit_mm(record.shift),
-            radius: turn(record.radius, reversed),
-            height: turn(record.height, reversed),
+            radius: turn_cubic(record.radius, reversed),
+            height: turn_cubic(record.height, reversed),
         }
     }
 
     #[inline(always)]
     fn at(&self, w: i32) -> ProfilePoint {
-        use super::polynomial::derivative;
-        let float = centred_to_f32(w);
-        let both = [&self.radius, &self.height];
-        let first = both.map(|c| to_f32(quadratic(&derivative(c), w)) * self.scale);
-        let second = both.map(|c| {
-            let [_, _, c2, c3] = c.map(to_f32);
-            (2.0 * c2 + 6.0 * c3 * float) * self.scale
-        });
-        let third = both.map(|c| {
-            let [_, _, _, c3] = c.map(to_f32);
-            6.0 * c3 * self.scale
-        });
-        let [radius_units, height_units] = both.map(|c| cubic(c, w));
-        let near_axis =
-            radius_units.wrapping_add(AXIS_UNITS).cast_unsigned() <= 2 * AXIS_UNITS.cast_unsigned();
-        let radius_units = if near_axis { 0 } else { radius_units };
+        let [radius, radius1, radius2] = jet(&self.radius, w);
+        let near_axis = radius.wrapping_add(AXIS_UNITS).cast_unsigned() <= 2 * AXIS_UNITS.cast_unsigned();
         ProfilePoint {
-            radius_units,
-            height_units,
-            radius_mm: to_f32(radius_units) * self.scale,
-            first,
-            second,
-            third,
+            radius: [if near_axis { 0 } else { radius }, radius1, radius2],
+            height: jet(&self.height, w),
         }
     }
 }
 
+impl ProfilePoint {
+    /// First derivatives of radius and height, and the square of their length.
+    #[inline(always)]
+    fn tangent(&self) -> ([f32; 2], f32) {
+        let ([_, radius1, _], [_, height1, _]) = (self.radius, self.height);
+        let tangent = [to_f32(radius1), to_f32(height1)];
+        (tangent, plane_dot(tangent, tangent))
+    }
+
+    /// Second derivatives.
+    #[inline(always)]
+    fn bend(&self) -> [f32; 2] {
+        let ([_, _, radius2], [_, _, height2]) = (self.radius, self.height);
+        [2.0 * to_f32(radius2), 2.0 * to_f32(height2)]
+    }
+}
+
+#[inline(always)]
 fn plane_dot([a0, a1]: [f32; 2], [b0, b1]: [f32; 2]) -> f32 {
     a0 * b0 + a1 * b1
 }
 
+#[cold]
+#[inline(never)]
+fn degenerate() -> Fault {
+    Fault::new(FaultKind::DegenerateSurface, 0.0)
+}
+
 /// A pass along the profile, at a fixed angle.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct ProfilePass {
-    pub(crate) height_origin_nm: i32,
-    pub(crate) shift: u8,
     profile: Profile,
-    cos: i32,
     sin: i32,
-    cos_float: f32,
+    cos: i32,
     sin_float: f32,
+    cos_float: f32,
     /// Extent of the angle, rad per side.
     extent_rad: f32,
-    tool_sign: f32,
+    /// Ball radius in units, with the sign of the side that the tool is on.
+    radius: f32,
 }
 
 impl ProfilePass {
-    /// The profile at the pass's angle.
-    pub(crate) fn collapse(words: &[i32; REVOLVED_WORDS], at: &PassLine, side_fraction: u64) -> Self {
+    /// The profile at the pass's angle, for a ball of this radius in units.
+    pub(crate) fn collapse(&mut self, words: &[i32; REVOLVED_WORDS], at: &PassLine, radius: f32) {
         let record = RevolvedRecord::from_words(words);
-        let (sin, cos) = sin_cos(angle(record.start, record.extent, side_fraction));
-        Self {
-            height_origin_nm: record.height_origin_nm,
-            shift: record.shift,
+        let [sin, cos] = sin_cos_q31(angle(record.start, record.extent, at.fraction));
+        *self = Self {
             profile: Profile::new(&record, at.reversed),
-            cos,
             sin,
-            cos_float: to_f32(cos) * SINE_UNIT,
+            cos,
             sin_float: to_f32(sin) * SINE_UNIT,
+            cos_float: to_f32(cos) * SINE_UNIT,
             extent_rad: count_to_f32(record.extent) * RADIANS_PER_EXTENT,
-            tool_sign: super::polynomial::travel_sign(at),
-        }
+            radius,
+        };
     }
 
-    /// The contact at a centred profile parameter. `S_path x S_side = R extent (-z' cos, -z' sin, R')`.
-    #[inline(always)]
-    pub(crate) fn contact(&self, w: i32) -> Result<Contact> {
-        let point = self.profile.at(w);
-        let [radius1, height1] = point.first;
-        let e = plane_dot(point.first, point.first);
-        if !(e > 0.0) || point.radius_units < 0 {
-            return Err(Fault::new(FaultKind::DegenerateSurface, 0.0));
+    /// The parametrisation at a fraction of the profile.
+    pub(crate) fn path_at(&self, fraction: u64) -> PathSpeed {
+        let point = self.profile.at(centred(fraction));
+        let (tangent, e) = point.tangent();
+        let inverse = inverse_sqrt(e);
+        PathSpeed {
+            inverse,
+            stretch: plane_dot(tangent, point.bend()) * (inverse * inverse),
         }
-        let speed = sqrt(e);
-        let inverse = 1.0 / speed;
+    }
+}
+
+impl Pass for ProfilePass {
+    /// `S_path x S_side = R extent (-z' cos, -z' sin, R')`.
+    #[inline(always)]
+    fn contact(&self, fraction: u64, ball: &Ball) -> Result<Contact> {
+        let point = self.profile.at(centred(fraction));
+        let ([radius, ..], [height, ..]) = (point.radius, point.height);
+        let (tangent, e) = point.tangent();
+        if !(e > 0.0) || radius < 0 {
+            return Err(degenerate());
+        }
+        let bend = point.bend();
+        let inverse = inverse_sqrt(e);
         let inverse_e = inverse * inverse;
-        let signed = self.tool_sign * inverse;
-        let (out, up) = (-height1 * signed, radius1 * signed);
-        let lateral = point.radius_mm * self.extent_rad;
+        let [radius1, height1] = tangent;
+        let lateral = to_f32(radius) * self.extent_rad;
+        // r times the unit normal, away from the axis and up.
+        let length = self.radius * inverse;
+        let (out, up) = (-height1 * length, radius1 * length);
         Ok(Contact {
-            position: [
-                mul_q30(point.radius_units, self.cos),
-                mul_q30(point.radius_units, self.sin),
-                point.height_units,
-            ],
-            normal: Vec3::new(out * self.cos_float, out * self.sin_float, up),
-            path: PathSpeed {
-                speed,
+            position: [turned(radius, self.cos), turned(radius, self.sin), height],
+            offset: ball.offset(
+                Vec3::new(-height1 * self.cos_float, -height1 * self.sin_float, radius1),
                 inverse,
-                stretch: plane_dot(point.first, point.second) * inverse_e,
-                stretch_change: (plane_dot(point.second, point.second) + plane_dot(point.first, point.third))
-                    * inverse_e,
+            ),
+            path: PathSpeed {
+                inverse,
+                stretch: plane_dot(tangent, bend) * inverse_e,
             },
-            path_bend: plane_dot([out, up], point.second) * inverse_e,
+            along: 1.0 - plane_dot([out, up], bend) * inverse_e,
             lateral_squared: lateral * lateral,
-            lateral_bend: -lateral * self.extent_rad * out,
+            across: lateral * (lateral + self.extent_rad * out),
             twist_squared: 0.0,
+            speed_squared: e,
+            gauge: 1.0,
         })
     }
 }
 
 /// A pass around the axis: a circle, on which only the angle changes.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct CirclePass {
-    pub(crate) height_origin_nm: i32,
-    pub(crate) shift: u8,
     start: u32,
     extent: u32,
     reversed: bool,
-    radius_units: i32,
-    height_units: i32,
+    radius: i32,
+    height: i32,
     /// Normal, away from the axis and up.
     out: f32,
     up: f32,
-    /// The contact without position and normal, which is the same all around.
+    /// The contact without position and offset, which is the same all around.
     shape: Contact,
 }
 
 impl CirclePass {
-    /// The circle at the pass's profile parameter. `S_path x S_side = R extent (z' cos, z' sin, -R')`.
+    /// The circle at the pass's profile parameter, for a ball of this radius in units; `side` is the sign of the tool's side.
+    /// `S_path x S_side = R extent (z' cos, z' sin, -R')`.
     ///
     /// # Errors
     /// [`FaultKind::DegenerateSurface`] where the profile's derivative vanishes or its radius is negative.
-    pub(crate) fn collapse(words: &[i32; REVOLVED_WORDS], at: &PassLine) -> Result<Self> {
+    pub(crate) fn collapse(
+        &mut self,
+        words: &[i32; REVOLVED_WORDS],
+        at: &PassLine,
+        radius: f32,
+    ) -> Result<()> {
         let record = RevolvedRecord::from_words(words);
         let point = Profile::new(&record, false).at(at.side);
-        let e = plane_dot(point.first, point.first);
-        if !(e > 0.0) || point.radius_units < 0 {
-            return Err(Fault::new(FaultKind::DegenerateSurface, 0.0));
+        let ([circle, ..], [height, ..]) = (point.radius, point.height);
+        let ([radius1, height1], e) = point.tangent();
+        if !(e > 0.0) || circle < 0 {
+            return Err(degenerate());
         }
-        let [radius1, height1] = point.first;
-        let signed = at.tool_sign / sqrt(e);
-        let (out, up) = (height1 * signed, -radius1 * signed);
-        let speed = point.radius_mm * count_to_f32(record.extent) * RADIANS_PER_EXTENT;
-        let (inverse, path_bend) = if speed > 0.0 {
-            (1.0 / speed, -out / point.radius_mm)
+        let inverse = inverse_sqrt(e);
+        let (out, up) = (height1 * inverse, -radius1 * inverse);
+        let circle_float = to_f32(circle);
+        let speed = circle_float * count_to_f32(record.extent) * RADIANS_PER_EXTENT;
+        // The ball's side is the tool's, not the travelled one's: a circle is the same both ways.
+        let (inverse_speed, bend) = if speed > 0.0 {
+            (1.0 / speed, -out * radius / circle_float)
         } else {
             (0.0, 0.0)
         };
-        Ok(Self {
-            height_origin_nm: record.height_origin_nm,
-            shift: record.shift,
+        *self = Self {
             start: record.start,
             extent: record.extent,
             reversed: at.reversed,
-            radius_units: point.radius_units,
-            height_units: point.height_units,
+            radius: circle,
+            height,
             out,
             up,
             shape: Contact {
                 path: PathSpeed {
-                    speed,
-                    inverse,
+                    inverse: inverse_speed,
                     stretch: 0.0,
-                    stretch_change: 0.0,
                 },
-                path_bend,
+                along: 1.0 - bend,
                 lateral_squared: e,
-                lateral_bend: plane_dot([out, up], point.second),
+                across: e - radius * plane_dot([out, up], point.bend()),
+                speed_squared: speed * speed,
+                gauge: 1.0,
                 ..Contact::default()
             },
-        })
+        };
+        Ok(())
     }
 
     /// The whole pass is one point on the axis.
     pub(crate) fn is_point(&self) -> bool {
-        self.radius_units == 0
+        self.radius == 0
     }
 
-    /// The contact at a fraction of the pass.
+    /// The parametrisation, the same all around.
+    pub(crate) const fn path(&self) -> PathSpeed {
+        self.shape.path
+    }
+}
+
+impl Pass for CirclePass {
     #[inline(always)]
-    pub(crate) fn contact(&self, fraction: u64) -> Contact {
+    fn contact(&self, fraction: u64, ball: &Ball) -> Result<Contact> {
         let travelled = if self.reversed { !fraction } else { fraction };
-        let (sin, cos) = sin_cos(angle(self.start, self.extent, travelled));
+        let [sin, cos] = sin_cos_q31(angle(self.start, self.extent, travelled));
         let out = self.out * SINE_UNIT;
-        Contact {
-            position: [
-                mul_q30(self.radius_units, cos),
-                mul_q30(self.radius_units, sin),
-                self.height_units,
-            ],
-            normal: Vec3::new(out * to_f32(cos), out * to_f32(sin), self.up),
+        Ok(Contact {
+            position: [turned(self.radius, cos), turned(self.radius, sin), self.height],
+            offset: ball.offset(Vec3::new(out * to_f32(cos), out * to_f32(sin), self.up), 1.0),
             ..self.shape
-        }
+        })
     }
 }

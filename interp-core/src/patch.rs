@@ -1,0 +1,130 @@
+//! The patch that a pass is on: the surface at the pass's side parameter, and what ball, feed and scallop limit are in its units.
+
+use crate::arith::{centred, power_of_two};
+use crate::fault::Result;
+use crate::interval::Interval;
+use crate::job::{SurfaceKind, ToolSide};
+use crate::offset::Ball;
+use crate::program::Job;
+use crate::sample::Place;
+use crate::surface::{
+    CirclePass, POLYNOMIAL_WORDS, PassLine, PolePass, PolynomialPass, ProfilePass, RATIONAL_WORDS,
+    REVOLVED_WORDS, RationalPass, Surface, split_patch, split_revolved,
+};
+
+/// A patch on a pass. Units are 2^-shift nm of the patch.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Patch {
+    pub(crate) surface: Surface,
+    pub(crate) ball: Ball,
+    pub(crate) interval: Interval,
+    pub(crate) origin_nm: [i32; 3],
+    /// One period's arc, units.
+    pub(crate) arc: f32,
+    /// Units a mm.
+    pub(crate) per_mm: f32,
+    /// The pass is a single point here.
+    pub(crate) point: bool,
+}
+
+impl Patch {
+    /// None yet.
+    pub(crate) const NONE: Self = Self {
+        surface: Surface::Polynomial(PolynomialPass::NONE),
+        ball: Ball::NONE,
+        interval: Interval::NONE,
+        origin_nm: [0; 3],
+        arc: 0.0,
+        per_mm: 1.0,
+        point: false,
+    };
+
+    /// Collapses the patch at a path span and a side place, to be travelled in one direction or the other.
+    ///
+    /// # Errors
+    /// [`crate::FaultKind::WrongState`] where the job has no such patch; what the surface's kind finds wrong.
+    #[inline(never)]
+    pub(crate) fn collapse(&mut self, job: &Job<'_>, span: u16, side: Place, reversed: bool) -> Result<()> {
+        let at = PassLine {
+            fraction: side.fraction,
+            side: centred(side.fraction),
+            reversed,
+        };
+        let tool = if job.header.tool_side == ToolSide::Plus {
+            1.0
+        } else {
+            -1.0
+        };
+        // `path x side` turns round with the path, but for a circle, which is the same both ways.
+        let sign = if reversed && job.header.kind != SurfaceKind::RevolvedAroundAxis {
+            -tool
+        } else {
+            tool
+        };
+        match job.header.kind {
+            SurfaceKind::Polynomial => {
+                let words = job.patch::<POLYNOMIAL_WORDS>(span, side.span)?;
+                self.collapse_grid(job, words, side.span, sign, &at);
+            }
+            SurfaceKind::Rational => {
+                let words = job.patch::<RATIONAL_WORDS>(span, side.span)?;
+                self.collapse_grid(job, words, side.span, sign, &at);
+            }
+            kind => {
+                let words = job.patch::<REVOLVED_WORDS>(span, side.span)?;
+                let (shift, height_nm) = split_revolved(words);
+                self.origin_nm = [0, 0, height_nm];
+                self.measure(job, shift, side.span, sign);
+                let radius = sign * job.header.ball_radius_mm * self.per_mm;
+                if kind == SurfaceKind::RevolvedAlongProfile {
+                    let mut pass = ProfilePass::default();
+                    pass.collapse(words, &at, radius);
+                    self.surface = Surface::Profile(pass);
+                } else {
+                    let mut pass = CirclePass::default();
+                    pass.collapse(words, &at, radius)?;
+                    self.surface = Surface::Circle(pass);
+                }
+            }
+        }
+        self.point = self.surface.is_point();
+        Ok(())
+    }
+
+    /// A patch of a grid, with as many blocks as it has coordinates. Where the kind is that of the patch before, in its place.
+    fn collapse_grid(&mut self, job: &Job<'_>, words: &[i32], side_span: u16, sign: f32, at: &PassLine) {
+        let (origin_nm, shift, edges, blocks) = split_patch(words);
+        self.origin_nm = origin_nm;
+        self.measure(job, shift, side_span, sign);
+        if edges.count() > 0 {
+            let mut pass = PolePass::default();
+            pass.collapse(blocks, edges, at);
+            self.surface = Surface::Pole(pass);
+            return;
+        }
+        match (&mut self.surface, job.header.kind) {
+            (Surface::Polynomial(pass), SurfaceKind::Polynomial) => pass.collapse(blocks, at),
+            (Surface::Rational(pass), SurfaceKind::Rational) => pass.collapse(blocks, at),
+            (surface, SurfaceKind::Polynomial) => {
+                let mut pass = PolynomialPass::default();
+                pass.collapse(blocks, at);
+                *surface = Surface::Polynomial(pass);
+            }
+            (surface, _) => {
+                let mut pass = RationalPass::default();
+                pass.collapse(blocks, at);
+                *surface = Surface::Rational(pass);
+            }
+        }
+    }
+
+    /// Ball, feed and scallop limit in the patch's units.
+    fn measure(&mut self, job: &Job<'_>, shift: u8, side_span: u16, sign: f32) {
+        let header = job.header;
+        self.per_mm = 1e6 * power_of_two(shift.into());
+        self.ball = Ball::new(header.ball_radius_mm, shift, sign);
+        self.arc = header.feed_mm_s * header.period_s * self.per_mm;
+        let width = job.side_width(side_span);
+        self.interval = Interval::new(header.ball_radius_mm, header.scallop_mm, self.per_mm, width);
+    }
+}

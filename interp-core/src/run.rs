@@ -1,0 +1,333 @@
+//! A run of a job, sample by sample: the one file that chains the stages.
+
+use crate::arith::dot_hi;
+use crate::contact::{self, Reach};
+use crate::fault::{Fault, FaultKind, Result};
+use crate::interval::interval;
+use crate::job::Pattern;
+use crate::patch::Patch;
+use crate::program::Job;
+use crate::sample::{Place, Sample};
+use crate::schedule;
+use crate::surface::{Pass, PathSpeed, Surface};
+
+/// Patch boundaries that one period's arc may cross: each costs the collapse of a patch and some evaluations. Two lets a
+/// tick pass a whole patch that is shorter than its arc; more of them in a row say the feed is not meant for the part.
+const CROSSINGS_MAX: u8 = 2;
+
+/// Step from place to place on a pole: 16 to a span. Between two the speed of the side lines, a rational cubic of the path
+/// parameter, changes by a small part of itself.
+const POLE_STEP: u64 = 1 << 60;
+
+/// What the next tick has to do.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Next {
+    /// Begin the pass at the current side place.
+    Pass,
+    /// One period's arc further.
+    Along,
+    /// Find the next pass, and begin it.
+    Over,
+    /// Nothing: the last sample is out.
+    End,
+}
+
+/// Where the run is.
+#[derive(Clone, Copy, Debug)]
+struct Travel {
+    next: Next,
+    reversed: bool,
+    /// Path span, in the surface's own direction.
+    span: u16,
+    /// Fraction of the span, in the direction of travel.
+    fraction: u64,
+    /// The parametrisation at the last sample, and its stretch at the one before; NaN where that is on another patch.
+    path: PathSpeed,
+    stretch_before: f32,
+    /// r N at the last sample, in the ball's units.
+    offset: [i32; 3],
+    /// Greatest density of the pass.
+    most: f32,
+    /// Samples so far.
+    ticks: u32,
+    pass: u32,
+    side: Place,
+}
+
+/// A run: the travel, and the patch that it is on.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Run {
+    travel: Travel,
+    patch: Patch,
+    /// r N at the pass's first sample.
+    first_offset: [i32; 3],
+    /// Least interval of the pass that was finished last, in units of the side parameter.
+    last_interval: f32,
+}
+
+impl Travel {
+    const START: Self = Self {
+        next: Next::Pass,
+        reversed: false,
+        span: 0,
+        fraction: 0,
+        path: PathSpeed {
+            inverse: 0.0,
+            stretch: 0.0,
+        },
+        stretch_before: f32::NAN,
+        offset: [0; 3],
+        most: 0.0,
+        ticks: 0,
+        pass: 0,
+        side: Place { span: 0, fraction: 0 },
+    };
+
+    /// Fraction of the span, in the surface's own direction.
+    const fn own_fraction(&self) -> u64 {
+        if self.reversed {
+            !self.fraction
+        } else {
+            self.fraction
+        }
+    }
+
+    /// Steps 2 to 4 at the place where the run now is. Nothing of `last` changes if there is a fault.
+    #[inline(always)]
+    fn sample<P: Pass>(&mut self, pass: &P, patch: &Patch, last: &mut Sample) -> Result<()> {
+        let contact = pass.contact(self.fraction, &patch.ball)?;
+        patch.ball.check_fit(&contact)?;
+        let located = patch.ball.locate(&contact, &patch.origin_nm)?;
+        if patch.ball.folds(dot_hi(&self.offset, &contact.offset)) {
+            return Err(folded());
+        }
+        let density = patch.interval.density(&contact);
+        if density > self.most {
+            self.most = density;
+        }
+        self.offset = contact.offset;
+        self.stretch_before = self.path.stretch;
+        self.path = contact.path;
+        last.tick = self.ticks;
+        last.path.fraction = self.own_fraction();
+        last.cc_nm = located.cc_nm;
+        last.cl_nm = located.cl_nm;
+        last.density = density;
+        self.ticks = self.ticks.wrapping_add(1);
+        Ok(())
+    }
+}
+
+#[cold]
+#[inline(never)]
+fn folded() -> Fault {
+    Fault::new(FaultKind::DegenerateSurface, 0.0)
+}
+
+impl Run {
+    /// Before the first sample.
+    pub(crate) const START: Self = Self {
+        travel: Travel::START,
+        patch: Patch::NONE,
+        first_offset: [0; 3],
+        last_interval: f32::INFINITY,
+    };
+
+    /// Back to the start.
+    pub(crate) fn restart(&mut self) {
+        self.travel = Travel::START;
+        self.last_interval = f32::INFINITY;
+    }
+
+    /// Pass, and where the tool is on the path and the side parameter, in the surface's own direction.
+    pub(crate) const fn place(&self) -> (u32, Place, Place) {
+        let travel = &self.travel;
+        let path = Place {
+            span: travel.span,
+            fraction: travel.own_fraction(),
+        };
+        (travel.pass, path, travel.side)
+    }
+
+    /// Least path interval of the pass that was finished last.
+    pub(crate) const fn last_interval(&self) -> f32 {
+        self.last_interval
+    }
+
+    /// Whether the next sample continues the pass.
+    pub(crate) fn is_along(&self) -> bool {
+        self.travel.next == Next::Along
+    }
+
+    /// The next sample, into `last`; false when the last is out.
+    ///
+    /// # Errors
+    /// The fault that stops the run; `last` is as it was.
+    #[inline(always)]
+    pub(crate) fn advance(&mut self, job: &Job<'_>, last: &mut Sample) -> Result<bool> {
+        let travel = &mut self.travel;
+        if travel.next == Next::Along {
+            let step = contact::step(&travel.path, travel.stretch_before, self.patch.arc);
+            if let Some(fraction) = step.and_then(|step| travel.fraction.checked_add(step)) {
+                travel.fraction = fraction;
+                self.sample(last)?;
+                return Ok(true);
+            }
+        }
+        self.advance_far(job, 1.0, last)
+    }
+
+    /// The next sample, when it is not just a small step further: a share of a period's arc along the pass, or the next pass.
+    ///
+    /// # Errors
+    /// As [`Self::advance`].
+    #[inline(never)]
+    pub(crate) fn advance_far(&mut self, job: &Job<'_>, share: f32, last: &mut Sample) -> Result<bool> {
+        let begins = !self.is_along();
+        match self.travel.next {
+            Next::Along if self.patch.point => self.step_on_pole(job)?,
+            Next::Along => self.step_far(job, share)?,
+            Next::Pass => self.begin_pass(job)?,
+            Next::Over => {
+                self.step_over(job)?;
+                self.begin_pass(job)?;
+            }
+            Next::End => {
+                self.note_interval();
+                return Ok(false);
+            }
+        }
+        self.sample(last)?;
+        let travel = &self.travel;
+        if begins {
+            self.first_offset = travel.offset;
+        }
+        last.pass = travel.pass;
+        last.path.span = travel.span;
+        last.side = travel.side;
+        last.feed_mm_s = if self.patch.point {
+            0.0
+        } else {
+            job.header.feed_mm_s * share
+        };
+        Ok(true)
+    }
+
+    /// The sample where the run is.
+    #[inline(never)]
+    fn sample(&mut self, last: &mut Sample) -> Result<()> {
+        let Self { travel, patch, .. } = self;
+        match &patch.surface {
+            Surface::Polynomial(pass) => travel.sample(pass, patch, last),
+            Surface::Rational(pass) => travel.sample(pass, patch, last),
+            Surface::Pole(pass) => travel.sample(pass, patch, last),
+            Surface::Profile(pass) => travel.sample(pass, patch, last),
+            Surface::Circle(pass) => travel.sample(pass, patch, last),
+        }
+    }
+
+    /// A share of a period's arc along the pass, by quadrature, over as many patches as it takes.
+    fn step_far(&mut self, job: &Job<'_>, share: f32) -> Result<()> {
+        let mut rest = share * job.header.feed_mm_s * job.header.period_s;
+        for crossings in 0..=CROSSINGS_MAX {
+            let Self { travel, patch, .. } = self;
+            let arc = rest * patch.per_mm;
+            let covered = match contact::solve(&patch.surface, travel.fraction, &travel.path, arc)? {
+                Reach::Within(fraction) => {
+                    travel.fraction = fraction;
+                    return Ok(());
+                }
+                Reach::Beyond(covered) => covered,
+            };
+            rest = (arc - covered) / patch.per_mm;
+            if crossings == CROSSINGS_MAX {
+                break;
+            }
+            if !self.next_span(job)? {
+                self.end_pass(job);
+                return Ok(());
+            }
+            self.travel.path = self.patch.surface.path_at(0)?;
+        }
+        Err(Fault::new(FaultKind::PatchTooShort, rest))
+    }
+
+    /// On a pole, the next of its places: the tool stands, but the interval that the pass allows differs from place to place.
+    fn step_on_pole(&mut self, job: &Job<'_>) -> Result<()> {
+        if let Some(fraction) = self.travel.fraction.checked_add(POLE_STEP) {
+            self.travel.fraction = fraction;
+        } else if !self.next_span(job)? {
+            self.end_pass(job);
+        }
+        Ok(())
+    }
+
+    /// Collapses the patch where the run is, and has no sample on it yet.
+    fn enter_patch(&mut self, job: &Job<'_>) -> Result<()> {
+        let travel = &mut self.travel;
+        self.patch
+            .collapse(job, travel.span, travel.side, travel.reversed)?;
+        travel.path.stretch = f32::NAN;
+        Ok(())
+    }
+
+    /// Goes to the start of the next patch along the pass; false at the pass's end.
+    fn next_span(&mut self, job: &Job<'_>) -> Result<bool> {
+        let travel = &mut self.travel;
+        let next = if travel.reversed {
+            travel.span.checked_sub(1)
+        } else {
+            travel.span.checked_add(1)
+        };
+        let Some(span) = next.filter(|span| *span < job.header.path_spans) else {
+            return Ok(false);
+        };
+        travel.span = span;
+        travel.fraction = 0;
+        self.enter_patch(job)?;
+        Ok(true)
+    }
+
+    /// Begins the pass at the current side place.
+    fn begin_pass(&mut self, job: &Job<'_>) -> Result<()> {
+        let header = job.header;
+        let travel = &mut self.travel;
+        travel.reversed = header.pattern == Pattern::Zigzag && travel.pass % 2 == 1;
+        travel.span = if travel.reversed {
+            header.path_spans.saturating_sub(1)
+        } else {
+            0
+        };
+        travel.fraction = 0;
+        travel.most = 0.0;
+        travel.next = Next::Along;
+        self.enter_patch(job)
+    }
+
+    /// Least interval of the pass that is over, in units of the side parameter.
+    fn note_interval(&mut self) {
+        self.last_interval = interval(self.travel.most);
+    }
+
+    /// The side place of the next pass; its first sample is a neighbour of the last pass's first, or of its last where the
+    /// passes run to and fro.
+    fn step_over(&mut self, job: &Job<'_>) -> Result<()> {
+        self.note_interval();
+        let travel = &mut self.travel;
+        let width = |span| job.side_width(span);
+        let fractions = self.last_interval / width(travel.side.span);
+        travel.side = schedule::next_side(travel.side, fractions, job.header.side_spans, width)?;
+        travel.pass = travel.pass.wrapping_add(1);
+        if job.header.pattern == Pattern::Zig {
+            travel.offset = self.first_offset;
+        }
+        Ok(())
+    }
+
+    /// The run is exactly at the end of the pass.
+    fn end_pass(&mut self, job: &Job<'_>) {
+        self.travel.fraction = u64::MAX;
+        let last = schedule::is_last(self.travel.side, job.header.side_spans);
+        self.travel.next = if last { Next::End } else { Next::Over };
+    }
+}

@@ -1,0 +1,121 @@
+//! One coordinate of a patch on a pass, and the records' common parts.
+
+use super::range::{HeadWord, Root};
+use super::{Edges, PassLine};
+use crate::arith::{cubic, jet, quadratic};
+
+/// One coordinate on a pass: cubics of the path parameter, fixed point.
+#[derive(Clone, Copy, Debug, Default)]
+pub(crate) struct Line {
+    /// S.
+    pub(crate) value: [i32; 4],
+    /// S_side.
+    pub(crate) side: [i32; 4],
+    /// Half of S_side,side.
+    pub(crate) side2: [i32; 4],
+}
+
+impl Line {
+    /// Zero.
+    pub(crate) const NONE: Self = Self {
+        value: [0; 4],
+        side: [0; 4],
+        side2: [0; 4],
+    };
+
+    /// Collapses `c[i][j]` of `path^i side^j`, j fastest, at a side parameter.
+    #[inline(always)]
+    pub(crate) fn collapse(&mut self, block: &[i32; 16], at: &PassLine) {
+        let (rows, _) = block.as_chunks::<4>();
+        let slots = self.value.iter_mut().zip(&mut self.side).zip(&mut self.side2);
+        let mut odd = false;
+        for (row, ((value, side), side2)) in rows.iter().zip(slots) {
+            let [v, s, h] = jet(row, at.side);
+            let turned = odd && at.reversed;
+            *value = turn(v, turned);
+            *side = turn(s, turned);
+            *side2 = turn(h, turned);
+            odd = !odd;
+        }
+    }
+}
+
+/// Negates a coefficient of an odd power, where the pass runs backwards.
+#[inline(always)]
+pub(crate) const fn turn(value: i32, turned: bool) -> i32 {
+    let mask = -(turned as i32);
+    (value ^ mask).wrapping_sub(mask)
+}
+
+/// A cubic travelled backwards.
+pub(crate) const fn turn_cubic([c0, c1, c2, c3]: [i32; 4], turned: bool) -> [i32; 4] {
+    [c0, turn(c1, turned), c2, turn(c3, turned)]
+}
+
+/// Splits a record into its four head words and the blocks of its coordinates.
+pub(super) fn split(words: &[i32]) -> ([i32; 4], &[[i32; 16]]) {
+    match words.split_first_chunk::<4>() {
+        Some((head, rest)) => (*head, rest.as_chunks().0),
+        None => ([0; 4], &[]),
+    }
+}
+
+/// The words of a patch record: origin, head, coefficients.
+pub(super) fn record_words<const WORDS: usize, const AXES: usize>(
+    origin_nm: [i32; 3],
+    shift: u8,
+    edges: Edges,
+    coefficients: &[[[i32; 4]; 4]; AXES],
+) -> [i32; WORDS] {
+    let mut words = [0; WORDS];
+    let head = HeadWord { shift, edges }.to_word();
+    let coefficients = coefficients.iter().flatten().flatten();
+    let all = origin_nm.into_iter().chain([head]).chain(coefficients.copied());
+    for (word, value) in words.iter_mut().zip(all) {
+        *word = value;
+    }
+    words
+}
+
+/// The coefficients of a record's blocks.
+pub(super) fn coefficients<const AXES: usize>(blocks: &[[i32; 16]]) -> [[[i32; 4]; 4]; AXES] {
+    let mut coefficients = [[[0; 4]; 4]; AXES];
+    let slots = coefficients.iter_mut().flatten().flatten();
+    for (slot, value) in slots.zip(blocks.iter().flatten()) {
+        *slot = *value;
+    }
+    coefficients
+}
+
+/// Units by which a collapsed boundary may miss being a point: the rounding of its coefficients.
+const COLLAPSE_UNITS: i32 = 8;
+
+/// Whether the flagged boundaries of one coordinate are constant along themselves.
+pub(super) fn collapses(c: &[[i32; 4]; 4], edges: Edges) -> bool {
+    let small = |value: i32| value.abs() <= COLLAPSE_UNITS;
+    let at = |root: Root, c: &[i32; 4]| cubic(c, if root == Root::Start { i32::MIN } else { i32::MAX });
+    let [c0, c1, c2, c3] = c;
+    let across = edges
+        .side_root()
+        .is_none_or(|root| [c1, c2, c3].into_iter().all(|row| small(at(root, row))));
+    let column = |j: usize| [c0, c1, c2, c3].map(|row| row.get(j).copied().unwrap_or(0));
+    let along = edges
+        .path_root(false)
+        .is_none_or(|root| (1..4).all(|j| small(at(root, &column(j)))));
+    across && along
+}
+
+/// The quotient of each row by a root, at a side parameter: a cubic of the path.
+pub(super) fn quotient_across(block: &[i32; 16], root: Root, at: &PassLine) -> [i32; 4] {
+    let mut out = [0; 4];
+    for (slot, row) in out.iter_mut().zip(block.as_chunks::<4>().0) {
+        *slot = quadratic(&root.divide(row), at.side);
+    }
+    turn_cubic(out, at.reversed)
+}
+
+/// A cubic divided by a root, as a cubic.
+pub(super) fn quotient_along(c: &[i32; 4], root: Root) -> [i32; 4] {
+    let [q0, q1, q2] = root.divide(c);
+    [q0, q1, q2, 0]
+}
