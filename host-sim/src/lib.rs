@@ -20,6 +20,8 @@ pub mod approach;
 pub mod budget;
 pub mod commands;
 pub mod explain;
+pub mod export;
+pub mod gcode;
 pub mod job_file;
 pub mod machine;
 pub mod oracle;

@@ -1,6 +1,6 @@
 //! Existing practice: the tool centre's path at constant speed of the centre. The contact's speed varies by eqn 4.
 
-use super::linear::{Chord, even_chords, write_point};
+use super::linear::{Chord, even_chords, write_blocks};
 use super::{Approach, ApproachError, PassPath, Program};
 use crate::job_file::JobFile;
 use crate::oracle::vector::length;
@@ -24,12 +24,24 @@ impl ConstantCl {
             feed_mm_s: job.feed_mm_s(),
         }
     }
+
+    /// Chords of a pass, all at the feed.
+    ///
+    /// # Errors
+    /// As [`Approach::plan`].
+    pub fn chords(&self, pass: &PassPath<'_>) -> Result<Vec<Chord>, ApproachError> {
+        let mut chords = even_chords(pass, self.chord_mm, self.feed_mm_s)?;
+        for chord in &mut chords {
+            chord.speed_mm_s = self.feed_mm_s;
+        }
+        Ok(chords)
+    }
 }
 
 impl Approach for ConstantCl {
     fn plan(&self, pass: &PassPath<'_>) -> Result<Box<dyn Program>, ApproachError> {
         Ok(Box::new(Path {
-            chords: even_chords(pass, self.chord_mm, self.feed_mm_s)?,
+            chords: self.chords(pass)?,
             feed_mm_s: self.feed_mm_s,
         }))
     }
@@ -47,13 +59,8 @@ impl Program for Path {
         self.chords.len()
     }
 
-    /// The feed stands in the program once, so the blocks are points alone.
     fn write(&self, out: &mut String) {
-        for chord in &self.chords {
-            out.push_str("G1");
-            write_point(out, chord.to_mm);
-            out.push('\n');
-        }
+        write_blocks(&self.chords, out);
     }
 
     fn speed_step_mm_s(&self) -> f64 {

@@ -54,8 +54,6 @@ impl Curve {
     /// The longest segments one after another within a share of the tolerances.
     fn longest(&self, pass: &PassPath<'_>, nodes: &Nodes, share: f64) -> Result<Vec<Cubic>, ApproachError> {
         let nodes = &nodes.0;
-        let mut cubics = Vec::new();
-        let mut first = 0;
         let holds = |errors: &Errors| {
             errors.path_mm <= share * self.path_mm
                 && errors.speed_mm_s <= share * SPEED_SHARE * self.feed_mm_s
@@ -65,33 +63,37 @@ impl Curve {
                 .filter(|(_, errors)| holds(errors))
                 .map(|(cubic, _)| cubic)
         };
-        while first + 1 < nodes.len() {
-            let end = nodes.len() - 1;
-            let (mut reach, mut cubic) = (first + 1, good(first, first + 1));
-            if cubic.is_none() {
-                return Err(ApproachError::NoSegment {
-                    path: nodes[first].at.path,
-                    side: pass.side,
-                });
-            }
-            // Doubled, then halved, until no longer one holds.
-            let mut step = 1;
-            let mut growing = true;
-            while step > 0 {
-                let further = (reach + step).min(end);
-                match good(first, further).filter(|_| further > reach) {
-                    Some(found) => {
-                        (reach, cubic) = (further, Some(found));
-                        step = if growing { 2 * step } else { step / 2 };
-                    }
-                    None => (step, growing) = (step / 2, false),
-                }
-            }
-            cubics.extend(cubic);
-            first = reach;
-        }
-        Ok(cubics)
+        longest(nodes.len(), good).map_err(|first| ApproachError::NoSegment {
+            path: nodes[first].at.path,
+            side: pass.side,
+        })
     }
+}
+
+/// The longest stretches one after another for which `good(first, last)` has an answer, over so many places; or the place
+/// from which there is none.
+pub(super) fn longest<T>(count: usize, good: impl Fn(usize, usize) -> Option<T>) -> Result<Vec<T>, usize> {
+    let mut stretches = Vec::new();
+    let mut first = 0;
+    while first + 1 < count {
+        let (mut reach, mut best) = (first + 1, good(first, first + 1).ok_or(first)?);
+        // Doubled, then halved, until no longer one holds.
+        let mut step = 1;
+        let mut growing = true;
+        while step > 0 {
+            let further = (reach + step).min(count - 1);
+            match (further > reach).then(|| good(first, further)).flatten() {
+                Some(found) => {
+                    (reach, best) = (further, found);
+                    step = if growing { 2 * step } else { step / 2 };
+                }
+                None => (step, growing) = (step / 2, false),
+            }
+        }
+        stretches.push(best);
+        first = reach;
+    }
+    Ok(stretches)
 }
 
 impl Approach for Curve {

@@ -1,12 +1,11 @@
 //! Method 1: cutter contacts by chord error, the offset centres joined by straight segments, each at the speed that keeps
 //! the contact at the feed (Lo eqns 6, 7), followed by a linear interpolator that cuts a segment into whole periods.
 
-use std::fmt::Write;
-
 use super::pass::from_segment;
 use super::{Approach, ApproachError, PassPath, Program};
+use crate::gcode::{Blocks, Cut, FeedMode};
 use crate::job_file::JobFile;
-use crate::oracle::vector::{Vector, add, cross, dot, length, scale, subtract};
+use crate::oracle::vector::{add, cross, dot, length, scale, subtract};
 use crate::oracle::{Offset, OracleError};
 
 /// Places within a chord at which its error is taken.
@@ -64,6 +63,14 @@ pub struct Chord {
     pub to_mm: [f64; 3],
     /// Speed of the centre, mm/s.
     pub speed_mm_s: f64,
+}
+
+impl Chord {
+    /// The chord as a CNC cuts it.
+    #[must_use]
+    pub fn cut(&self) -> Cut {
+        Cut::line(self.from_mm, self.to_mm, self.speed_mm_s)
+    }
 }
 
 /// Chords of a pass by a rule; `chord_mm` is the limit of their error.
@@ -219,10 +226,12 @@ struct Chain {
     chords: Vec<Chord>,
 }
 
-/// A point's words, mm to a tenth of a micrometre.
-pub(super) fn write_point(out: &mut String, [x, y, z]: Vector) {
-    // Writing to a string cannot fail.
-    let _ = write!(out, "X{x:.4}Y{y:.4}Z{z:.4}");
+/// Appends the blocks of chords.
+pub(super) fn write_blocks(chords: &[Chord], out: &mut String) {
+    let mut blocks = Blocks::new(out, FeedMode::G94);
+    for chord in chords {
+        blocks.cut(&chord.cut());
+    }
 }
 
 impl Program for Chain {
@@ -231,11 +240,7 @@ impl Program for Chain {
     }
 
     fn write(&self, out: &mut String) {
-        for chord in &self.chords {
-            out.push_str("G1");
-            write_point(out, chord.to_mm);
-            let _ = writeln!(out, "F{:.1}", chord.speed_mm_s * 60.0);
-        }
+        write_blocks(&self.chords, out);
     }
 
     fn speed_step_mm_s(&self) -> f64 {

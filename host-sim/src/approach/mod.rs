@@ -11,6 +11,7 @@
 //! their contact speed and ripple are measured with the same yardstick as the product's: arc length between two contacts.
 //! All plan in f64 on the oracle's geometry: they get every digit that they could wish for, and what is left is theirs.
 
+mod arcs;
 mod constant_cl;
 mod cubic;
 mod curve;
@@ -22,6 +23,7 @@ mod run;
 
 use std::fmt;
 
+pub use arcs::Arcs;
 pub use constant_cl::ConstantCl;
 pub use cubic::Cubic;
 pub use curve::{Curve, SPEED_SHARE};
@@ -29,6 +31,7 @@ pub use linear::{Chord, Chords, Linear, chords, even_chords};
 pub use measure::{Measured, Speed, measure, measure_run};
 pub use nodes::{Node, Nodes};
 pub use pass::PassPath;
+pub(crate) use pass::from_segment;
 pub use run::{Motion, Planned, passes, planned, run};
 
 use crate::job_file::JobFile;

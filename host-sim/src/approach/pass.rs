@@ -59,7 +59,7 @@ impl PassPath<'_> {
 }
 
 /// Distance of a point from a segment, mm.
-pub(super) fn from_segment(point: Vector, from: Vector, to: Vector) -> f64 {
+pub(crate) fn from_segment(point: Vector, from: Vector, to: Vector) -> f64 {
     use crate::oracle::vector::{add, dot, scale};
     let (along, away) = (subtract(to, from), subtract(point, from));
     let squared = dot(along, along);

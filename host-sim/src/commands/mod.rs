@@ -2,6 +2,7 @@
 
 mod approach;
 mod budget;
+mod export;
 mod outcome;
 mod paper;
 mod run;
@@ -68,6 +69,7 @@ enum Command {
     Simulate(simulate::Arguments),
     Run(run::Arguments),
     Verify(verify::Arguments),
+    Export(export::Arguments),
     Paper(paper::Arguments),
     Budget(budget::Arguments),
 }
@@ -79,6 +81,7 @@ pub fn main() -> ExitCode {
         Command::Simulate(arguments) => simulate::command(&arguments),
         Command::Run(arguments) => run::command(&arguments),
         Command::Verify(arguments) => verify::command(&arguments),
+        Command::Export(arguments) => export::command(&arguments),
         Command::Paper(arguments) => paper::command(&arguments),
         Command::Budget(arguments) => budget::command(&arguments),
     };
