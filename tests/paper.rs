@@ -143,21 +143,24 @@ fn approaches_hold_what_they_promise_on_every_job() {
         let name = comparison.name;
         for kind in [Kind::Linear, Kind::Curve] {
             // Nearest distance to the offset path is measured between the planner's probes too: 2 % over.
-            let off_mm = of(kind).report.position_nm.max * 1e-6;
+            let off_mm = of(kind).findings.report.position_nm.max * 1e-6;
             assert!(
                 off_mm <= 1.02 * comparison.chord_mm,
                 "{name}, {}: {off_mm} mm",
                 kind.name()
             );
         }
-        assert!(of(Kind::Surface).report.ripple_pct.max <= 0.001, "{name}");
+        assert!(
+            of(Kind::Surface).findings.report.ripple_pct.max <= 0.001,
+            "{name}"
+        );
         // Speeds meet at the cubics' ends, but for the rounding of a sum of coefficients.
-        assert!(of(Kind::Curve).planned.speed_step_mm_s <= 1e-12, "{name}");
-        let ripple =
-            [Kind::ConstantCl, Kind::Linear, Kind::Curve, Kind::Surface].map(|k| of(k).report.ripple_pct.max);
+        assert!(of(Kind::Curve).findings.speeds.cl_step_mm_s <= 1e-12, "{name}");
+        let ripple = [Kind::ConstantCl, Kind::Linear, Kind::Curve, Kind::Surface]
+            .map(|k| of(k).findings.report.ripple_pct.max);
         assert!(ripple.is_sorted_by(|a, b| a > b), "{name}: {ripple:?}");
         for row in &comparison.rows {
-            assert!(row.measured.report.complete, "{name}, {}", row.name());
+            assert!(row.measured.findings.report.complete, "{name}, {}", row.name());
             assert_eq!(
                 row.measured.planned.passes,
                 of(Kind::Surface).planned.passes,
@@ -176,8 +179,8 @@ fn data_of_the_figures() {
         near((cl[0] - cc[0]).hypot(cl[1] - cc[1]), 10.0, 1e-9);
     }
     // Figures 4 and 5: one is the inverse of the other.
-    near(figures.constant_cl.measured.cc_mm_s[0], 7.577, 1e-3);
-    near(figures.constant_cl.measured.cc_mm_s[1], 14.701, 1e-3);
+    near(figures.constant_cl.measured.findings.speeds.cc.min, 7.577, 1e-3);
+    near(figures.constant_cl.measured.findings.speeds.cc.max, 14.701, 1e-3);
     let wanted = figures.wanted.iter().map(|point| point[1]);
     near(wanted.clone().fold(f64::INFINITY, f64::min), 6.802, 1e-3);
     near(wanted.fold(0.0, f64::max), 13.198, 1e-3);

@@ -29,5 +29,6 @@ pub mod paper;
 pub mod prepare;
 pub mod remote;
 pub mod report;
+pub mod speeds;
 pub mod survey;
 pub mod trace;

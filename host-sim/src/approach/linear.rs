@@ -12,8 +12,8 @@ use crate::oracle::{Offset, OracleError};
 const PROBES: u32 = 12;
 /// Halvings of a step that may be tried before a pass is given up.
 const HALVINGS: u32 = 40;
-/// Steps that narrow a chord's length to what the error allows: the length is within 2^-14.
-const BISECTIONS: u32 = 14;
+/// Steps that narrow a chord's length to what the error allows: the length is within 2^-9, the error within 2^-8.
+const BISECTIONS: u32 = 9;
 /// Halvings of the limit's share that evens out the chords' errors.
 const EVENING: u32 = 8;
 /// A segment that takes this much more than whole periods by rounding alone does not take another.
@@ -158,7 +158,7 @@ fn equation_step(pass: &PassPath<'_>, at: &Offset, chord_mm: f64, curvature: f64
 /// The longest step whose chord holds the limit.
 fn held_step(pass: &PassPath<'_>, at: &Offset, chord_mm: f64) -> Result<f64, ApproachError> {
     let left = pass.left(at.path);
-    let holds = |step: f64| chord_error(pass, at, step).map(|error| error <= chord_mm);
+    let holds = |step: f64| chord_holds(pass, at, step, chord_mm);
     // Eqn 6 for a start; doubled while it holds, halved until it does.
     let mut good = equation_step(pass, at, chord_mm, path_curvature(pass, at.path));
     let mut bad = None;
@@ -197,18 +197,21 @@ fn held_step(pass: &PassPath<'_>, at: &Offset, chord_mm: f64) -> Result<f64, App
     Ok(good)
 }
 
-/// Largest distance of the contact's and the centre's path from their chords, mm.
-fn chord_error(pass: &PassPath<'_>, at: &Offset, step: f64) -> Result<f64, OracleError> {
+/// Whether the contact's and the centre's path stay within the limit of their chords.
+fn chord_holds(pass: &PassPath<'_>, at: &Offset, step: f64, chord_mm: f64) -> Result<bool, OracleError> {
     let place = |share: f64| pass.at(pass.kept(at.path + share * step * pass.sense()));
     let end = place(1.0)?;
-    let mut most = 0.0_f64;
-    for k in 1..PROBES {
+    // From the middle outwards: a chord that does not hold mostly fails there.
+    let outwards = (1..PROBES / 2).rev().flat_map(|k| [k, PROBES - k]);
+    for k in std::iter::once(PROBES / 2).chain(outwards) {
         let between = place(f64::from(k) / f64::from(PROBES))?;
         let contact = from_segment(between.contact.cc_mm, at.contact.cc_mm, end.contact.cc_mm);
         let centre = from_segment(between.contact.cl_mm, at.contact.cl_mm, end.contact.cl_mm);
-        most = most.max(contact).max(centre);
+        if contact.max(centre) > chord_mm {
+            return Ok(false);
+        }
     }
-    Ok(most)
+    Ok(true)
 }
 
 impl Approach for Linear {

@@ -28,7 +28,7 @@ pub use constant_cl::ConstantCl;
 pub use cubic::Cubic;
 pub use curve::{Curve, SPEED_SHARE};
 pub use linear::{Chord, Chords, Linear, chords, even_chords};
-pub use measure::{Measured, Speed, measure, measure_run};
+pub use measure::{Measured, measure, measure_run};
 pub use nodes::{Node, Nodes};
 pub use pass::PassPath;
 pub(crate) use pass::from_segment;

@@ -186,6 +186,8 @@ fn on_the_core(job: &JobFile, each: &mut dyn FnMut(&Motion)) -> Result<Planned, 
         ApproachError::Fault(format!("{what}\n  help: {remedy}"))
     };
     let mut machine = Machine::load(&prepared).map_err(sentence)?;
+    let oracle = Oracle::new(job)?;
+    let mut ratio_step = 0.0_f64;
     let mut pending: Option<Motion> = None;
     let ran = machine.run(|sample| {
         let before = pending.take();
@@ -194,7 +196,11 @@ fn on_the_core(job: &JobFile, each: &mut dyn FnMut(&Motion)) -> Result<Planned, 
             before.emitted.last_of_pass = first;
             each(&before);
         }
-        pending = Some(of_sample(&prepared, sample, first));
+        let motion = of_sample(&prepared, sample, first);
+        if first {
+            ratio_step = ratio_step.max(oracle.ratio_step(motion.side).unwrap_or(0.0));
+        }
+        pending = Some(motion);
         true
     });
     let last_pass = pending.map_or(0, |last| last.emitted.pass as usize + 1);
@@ -207,6 +213,6 @@ fn on_the_core(job: &JobFile, each: &mut dyn FnMut(&Motion)) -> Result<Planned, 
         passes: last_pass,
         segments: prepared.patches(),
         bytes: prepared.bytes(),
-        speed_step_mm_s: 0.0,
+        speed_step_mm_s: ratio_step * job.feed_mm_s(),
     })
 }

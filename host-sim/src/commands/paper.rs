@@ -8,6 +8,7 @@ use serde_json::{Value, json};
 use super::{Result, cannot_write, progress};
 use crate::paper::{Comparison, Item, Row, STEPS, study};
 use crate::report::paper as page;
+use crate::speeds::Span;
 
 /// Reproduces Lo's paper (1998): every example, table and figure, printed against ours; four approaches side by side.
 ///
@@ -47,23 +48,23 @@ fn compared(comparisons: &[Comparison]) -> Vec<Item> {
                 ("machining time", "min", 3, measured.time_s / 60.0),
                 ("segments", "", 0, measured.planned.segments as f64),
                 ("program", "bytes", 0, measured.planned.bytes as f64),
-                ("ripple at most", "%", 5, measured.report.ripple_pct.max),
-                ("ripple rms", "%", 5, measured.report.ripple_pct.rms()),
-                ("slowest contact", "mm/s", 4, measured.cc_mm_s[0]),
-                ("fastest contact", "mm/s", 4, measured.cc_mm_s[1]),
-                ("slowest centre", "mm/s", 4, measured.cl_mm_s[0]),
-                ("fastest centre", "mm/s", 4, measured.cl_mm_s[1]),
+                ("ripple at most", "%", 5, measured.findings.report.ripple_pct.max),
+                ("ripple rms", "%", 5, measured.findings.report.ripple_pct.rms()),
+                ("slowest contact", "mm/s", 4, measured.findings.speeds.cc.min),
+                ("fastest contact", "mm/s", 4, measured.findings.speeds.cc.max),
+                ("slowest centre", "mm/s", 4, measured.findings.speeds.cl.min),
+                ("fastest centre", "mm/s", 4, measured.findings.speeds.cl.max),
                 (
                     "step of the centre's speed",
                     "mm/s",
                     4,
-                    measured.planned.speed_step_mm_s,
+                    measured.findings.speeds.cl_step_mm_s,
                 ),
                 (
                     "centre off its path",
                     "mm",
                     6,
-                    measured.report.position_nm.max * 1e-6,
+                    measured.findings.report.position_nm.max * 1e-6,
                 ),
             ];
             items.extend(figures.map(|(what, unit, decimals, ours)| Item {
@@ -121,18 +122,18 @@ fn print_comparison(comparison: &Comparison) {
     );
     for row in &comparison.rows {
         let Row { measured, .. } = row;
-        let range = |[low, high]: [f64; 2]| format!("{low:.3}..{high:.3}");
+        let range = |span: &Span| format!("{:.3}..{:.3}", span.min, span.max);
         println!(
             "  {:<14} {:>9.2} {:>9} {:>10} {:>10} {:>10} {:>17} {:>17} {:>10.3}",
             row.name(),
             measured.time_s / 60.0,
             measured.planned.segments,
             measured.planned.bytes,
-            page::percent(measured.report.ripple_pct.max),
-            page::percent(measured.report.ripple_pct.rms()),
-            range(measured.cc_mm_s),
-            range(measured.cl_mm_s),
-            measured.planned.speed_step_mm_s,
+            page::percent(measured.findings.report.ripple_pct.max),
+            page::percent(measured.findings.report.ripple_pct.rms()),
+            range(&measured.findings.speeds.cc),
+            range(&measured.findings.speeds.cl),
+            measured.findings.speeds.cl_step_mm_s,
         );
     }
 }

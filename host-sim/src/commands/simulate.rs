@@ -165,21 +165,16 @@ pub(super) fn command(arguments: &Arguments) -> Result<()> {
         arguments.report.as_deref(),
     )?;
     let outcome = Outcome {
-        prepared: &prepared,
+        kind: Kind::Surface,
+        job: &job,
+        segments: prepared.patches(),
+        bytes: prepared.bytes(),
         findings: &findings,
-        period_s: job.machine.period_s(),
         digest: timed.digest,
         samples_per_second: timed.samples_per_second,
         fault: timed.fault,
     };
-    if arguments.json {
-        let mut keys = outcome.json();
-        keys.extend(approach::data_keys(prepared.patches(), prepared.bytes()));
-        println!("{}", serde_json::Value::Object(keys));
-    } else {
-        println!("{}", arguments.job.display());
-        outcome.print(page.as_deref());
-    }
+    outcome.tell(arguments.json, page.as_deref());
     match outcome.fault {
         None => Ok(()),
         Some(fault) => Err(Failure::Failed(Some(fault.sentence()))),

@@ -2,11 +2,15 @@
 //! commanded centre.
 
 use super::contact::{Contact, Oracle, OracleError};
+use super::surface::Derivatives;
 use super::vector::{Vector, add, cross, dot, length, scale, subtract};
 use crate::job_file::Along;
 
 /// Step into the surface, as a share of the range, that derivatives at a pole are taken at.
 const INWARDS: f64 = 1e-6;
+/// Distance from a break, as a share of the range, at which its two sides are compared: a ratio that is continuous
+/// changes by less than 1e-9 of itself between them.
+const BESIDE: f64 = 1e-10;
 /// Iterations of [`Oracle::foot`]. Each leaves (distance from the path) x (its curvature) of the error, 1e-3 at most for
 /// what any approach here commands; six bring a hundredth of a millimetre to the rounding.
 const FOOT_STEPS: usize = 6;
@@ -43,8 +47,9 @@ impl Oracle {
     /// [`OracleError::Degenerate`] where there is no normal.
     pub fn offset(&self, path: f64, side: f64) -> Result<Offset, OracleError> {
         let (u, v) = self.swapped(path, side);
-        let contact = self.contact(u, v)?;
-        let cl_velocity = match self.cl_velocity(u, v, contact.normal) {
+        let at = self.surface.at(u, v);
+        let contact = self.contact_of(&at, u, v)?;
+        let cl_velocity = match self.cl_velocity(&at, contact.normal) {
             Some(velocity) => velocity,
             None => self.velocity_beside(path, side).unwrap_or_default(),
         };
@@ -56,8 +61,7 @@ impl Oracle {
     }
 
     /// `A + r N_A` by the Weingarten equations; `None` where the tangent plane is not spanned.
-    fn cl_velocity(&self, u: f64, v: f64, normal: Vector) -> Option<Vector> {
-        let at = self.surface.at(u, v);
+    fn cl_velocity(&self, at: &Derivatives, normal: Vector) -> Option<Vector> {
         let (a, b, aa) = match self.along {
             Along::U => (at.u, at.v, at.uu),
             Along::V => (at.v, at.u, at.vv),
@@ -87,12 +91,27 @@ impl Oracle {
             let velocity = self
                 .contact(u, v)
                 .ok()
-                .and_then(|contact| self.cl_velocity(u, v, contact.normal));
+                .and_then(|contact| self.cl_velocity(&self.surface.at(u, v), contact.normal));
             if velocity.is_some() {
                 return velocity;
             }
         }
         None
+    }
+
+    /// Largest step of the centre's speed, for a unit speed of the contact, where the surface's patches meet on a pass:
+    /// 0, but for rounding, where they meet with equal curvature.
+    ///
+    /// # Errors
+    /// As [`Oracle::offset`].
+    pub fn ratio_step(&self, side: f64) -> Result<f64, OracleError> {
+        let breaks = self.surface.breaks(self.along);
+        let mut most = 0.0_f64;
+        for at in &breaks[1..breaks.len() - 1] {
+            let beside = |by: f64| self.offset(at + by * (breaks[breaks.len() - 1] - breaks[0]), side);
+            most = most.max((beside(BESIDE)?.ratio() - beside(-BESIDE)?.ratio()).abs());
+        }
+        Ok(most)
     }
 
     /// Path parameter at which the offset path comes nearest to a centre that was commanded near it; `guess`: a

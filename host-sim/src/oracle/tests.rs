@@ -360,7 +360,9 @@ fn ideal_samples(oracle: &Oracle, feed_mm_s: f64) -> Vec<Emitted> {
 
 fn report_of(oracle: &Oracle, samples: &[Emitted]) -> Report {
     let mut verifier = Verifier::new(oracle);
-    samples.iter().for_each(|sample| verifier.add(sample));
+    for sample in samples {
+        verifier.add(sample);
+    }
     verifier.finish()
 }
 

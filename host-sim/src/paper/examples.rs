@@ -261,21 +261,21 @@ fn example_3(case: &Case, held: Option<&Measured>) -> Result<Vec<Item>, Approach
         "ripple of the contact at 5 ms, at most",
         RIPPLE,
         None,
-        run.report.ripple_pct.max,
+        run.findings.report.ripple_pct.max,
         "each segment in whole periods, rounded up; the worst is that one chord",
     );
     part.add(
         "ripple of the contact at 5 ms, rms",
         RIPPLE,
         None,
-        run.report.ripple_pct.rms(),
+        run.findings.report.ripple_pct.rms(),
         "",
     );
     part.add(
         "step of the centre's speed",
         SPEED,
         None,
-        run.planned.speed_step_mm_s,
+        run.findings.speeds.cl_step_mm_s,
         "",
     );
     if let Some(held) = held {
@@ -291,14 +291,14 @@ fn example_3(case: &Case, held: Option<&Measured>) -> Result<Vec<Item>, Approach
             "their ripple at 1 ms, at most",
             RIPPLE,
             None,
-            held.report.ripple_pct.max,
+            held.findings.report.ripple_pct.max,
             "the centre's speed is constant on a chord, the wanted one is not",
         );
         part.add(
             "their step of the centre's speed",
             SPEED,
             None,
-            held.planned.speed_step_mm_s,
+            held.findings.speeds.cl_step_mm_s,
             "",
         );
     }
@@ -322,14 +322,14 @@ fn example_4(curve: Option<&Measured>) -> Vec<Item> {
             "error of the centre's path",
             MM,
             None,
-            curve.report.position_nm.max * 1e-6,
+            curve.findings.report.position_nm.max * 1e-6,
             "",
         );
         part.add(
             "ripple of the contact, at most",
             RIPPLE,
             None,
-            curve.report.ripple_pct.max,
+            curve.findings.report.ripple_pct.max,
             "",
         );
     }
@@ -358,14 +358,14 @@ fn example_5(surface: Option<&Measured>) -> Vec<Item> {
             "error of the centre's path",
             ("nm", 1),
             None,
-            surface.report.position_nm.max,
+            surface.findings.report.position_nm.max,
             "",
         );
         part.add(
             "ripple of the contact, at most",
             ("%", 6),
             None,
-            surface.report.ripple_pct.max,
+            surface.findings.report.ripple_pct.max,
             "",
         );
     }

@@ -3,9 +3,10 @@
 use super::{Case, Cases};
 use crate::approach::{
     Approach, ApproachError, Chords, ConstantCl, Curve, Kind, Linear, Measured, Node, Nodes, PassPath,
-    Planned, Speed, measure_run, passes, planned,
+    Planned, measure_run, passes, planned,
 };
 use crate::job_file::{Along, JobFile, SurfaceSpec};
+use crate::speeds::Speed;
 
 /// Speeds along one pass.
 #[derive(Clone, Debug)]

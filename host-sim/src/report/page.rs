@@ -126,7 +126,7 @@ fn run_rows(job: &JobFile, findings: &Findings) -> [Row; 6] {
     };
     let samples = findings.samples as f64;
     let time_s = samples * job.machine.period_s();
-    let [cc_mm, cl_mm] = [findings.report.cc_length_mm, findings.cl_length_mm];
+    let [cc_mm, cl_mm] = [findings.report.cc_length_mm, findings.speeds.cl_length_mm];
     let interval = findings.interval_min;
     [
         Row(

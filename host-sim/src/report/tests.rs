@@ -202,7 +202,7 @@ fn report_is_well_formed_small_and_says_what_was_found() {
         ("Samples", findings.samples as f64),
         ("Machining time", findings.samples as f64 * job.machine.period_s()),
         ("Cutter contact path", report.cc_length_mm),
-        ("Tool centre path", findings.cl_length_mm),
+        ("Tool centre path", findings.speeds.cl_length_mm),
         ("Least path interval", findings.interval_min),
         ("Feed ripple", report.ripple_pct.max),
         ("Feed ripple, rms", report.ripple_pct.rms()),

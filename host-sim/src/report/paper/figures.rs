@@ -6,9 +6,10 @@ use std::path::Path;
 
 use super::super::chart::{BLUE, Chart, GREEN, Series, VIOLET, WARM};
 use super::super::page::legend;
-use crate::approach::{Kind, Speed};
+use crate::approach::Kind;
 use crate::paper::figures::Track;
 use crate::paper::{Comparison, Study};
+use crate::speeds::Speed;
 
 /// Ranges of the section: millimetres, the same scale both ways in a chart of this height.
 const SECTION: [[f64; 2]; 2] = [[10.0, 97.0], [15.0, 65.0]];
@@ -223,6 +224,6 @@ fn picture(comparison: &Comparison) -> io::Result<Option<String>> {
         return Ok(None);
     };
     let name = format!("{}.toml", comparison.name);
-    let draw = |sketch: &super::super::Sketch| sketch.picture(Path::new(&name), &row.measured.findings());
+    let draw = |sketch: &super::super::Sketch| sketch.picture(Path::new(&name), &row.measured.findings);
     row.sketch.as_ref().map(draw).transpose()
 }

@@ -85,7 +85,7 @@ pub fn page(study: &Study) -> io::Result<String> {
 /// The figures' data.
 fn data(figures: &Figures) -> Value {
     let track = |track: &Track| {
-        let column = |of: fn(&crate::approach::Speed) -> f64| track.speeds.iter().map(of).collect::<Vec<_>>();
+        let column = |of: fn(&crate::speeds::Speed) -> f64| track.speeds.iter().map(of).collect::<Vec<_>>();
         json!({
             "approach": track.kind.name(),
             "period_us": track.period_us,

@@ -82,7 +82,7 @@ fn draw(text: &mut String, study: &Study) -> Result<(), Box<dyn std::error::Erro
             if let Some(row) = comparison.row(kind) {
                 let place = (
                     row.measured.planned.bytes as f64,
-                    row.measured.report.ripple_pct.max,
+                    row.measured.findings.report.ripple_pct.max,
                 );
                 mark(&mut chart, index, place, colour(kind))?;
             }

@@ -7,6 +7,7 @@ use super::super::svg::escape;
 use super::{percent, shown};
 use crate::approach::Kind;
 use crate::paper::{Comparison, Item, Row, Study};
+use crate::speeds::Span;
 
 /// The four approaches on whole jobs.
 pub(super) fn comparisons(out: &mut String, study: &Study) {
@@ -34,7 +35,7 @@ fn table(out: &mut String, comparison: &Comparison) {
     );
     for row in &comparison.rows {
         let Row { measured, .. } = row;
-        let range = |[low, high]: [f64; 2]| format!("{low:.2} to {high:.2}");
+        let range = |span: &Span| format!("{:.2} to {:.2}", span.min, span.max);
         let segments = shown(measured.planned.segments as f64, 0);
         let segments = match (row.kind, measured.planned.segments) {
             (Kind::Surface, 1) => "1 patch".to_owned(),
@@ -53,11 +54,11 @@ fn table(out: &mut String, comparison: &Comparison) {
             row.name(),
             measured.time_s / 60.0,
             shown(measured.planned.bytes as f64, 0),
-            percent(measured.report.ripple_pct.max),
-            percent(measured.report.ripple_pct.rms()),
-            range(measured.cc_mm_s),
-            range(measured.cl_mm_s),
-            measured.planned.speed_step_mm_s
+            percent(measured.findings.report.ripple_pct.max),
+            percent(measured.findings.report.ripple_pct.rms()),
+            range(&measured.findings.speeds.cc),
+            range(&measured.findings.speeds.cl),
+            measured.findings.speeds.cl_step_mm_s
         );
     }
     out.push_str("</tbody></table></div>\n");

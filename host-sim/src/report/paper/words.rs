@@ -11,7 +11,7 @@ fn told(comparison: &Comparison, kind: Kind) -> String {
     comparison.row(kind).map_or(String::new(), |row| {
         format!(
             "{} % with {} bytes",
-            percent(row.measured.report.ripple_pct.max),
+            percent(row.measured.findings.report.ripple_pct.max),
             shown(row.measured.planned.bytes as f64, 0)
         )
     })
