@@ -6,6 +6,8 @@ use std::sync::OnceLock;
 use host_sim::approach::Kind;
 use host_sim::paper::table_1::{Operations, PRINTED, cycles_of, items};
 use host_sim::paper::{Study, study};
+use host_sim::report::paper::percent;
+use host_sim::speeds::Speed;
 
 fn shared() -> &'static Study {
     static STUDY: OnceLock<Study> = OnceLock::new();
@@ -191,6 +193,112 @@ fn data_of_the_figures() {
     assert_eq!(figures.surface.speeds.len(), 6933);
     for speed in &figures.surface.speeds {
         near(speed.cc_mm_s, 10.0, 1e-4);
+    }
+}
+
+/// What of the page could load something from elsewhere.
+fn loads(page: &str) -> Vec<&str> {
+    [
+        "src=", "href=", "url(", "@import", "<script", "<iframe", "<link", "://",
+    ]
+    .into_iter()
+    .filter(|what| {
+        let inert = page
+            .replace("http://www.w3.org/2000/svg", "")
+            .replace("url(#", "");
+        inert.contains(what)
+    })
+    .collect()
+}
+
+#[test]
+fn page_needs_nothing_else_and_shows_every_figure() {
+    let page = host_sim::report::paper::page(shared()).unwrap();
+    assert_eq!(loads(&page), [""; 0], "asks for something");
+    assert!(!page.contains("NaN") && !page.contains("inf ") && !page.contains(env!("CARGO_MANIFEST_DIR")));
+    for figure in [3, 4, 5, 7, 8, 9] {
+        assert_eq!(
+            page.matches(&format!("<b>Figure {figure}.</b>")).count(),
+            1,
+            "Figure {figure}"
+        );
+    }
+    // Figures 3, 4, 5, 7 twice, 8, 9, deviations, data against ripple; each with both axes and their units.
+    let charts: Vec<&str> = page.split("<figure class=\"chart").skip(1).collect();
+    assert_eq!(charts.len(), 9);
+    for chart in charts {
+        let chart = &chart[..chart.find("</figure>").unwrap()];
+        let units = [", mm", ", mm/s", ", %", ", bytes"];
+        let titles = chart
+            .split("</text>")
+            .filter(|text| units.iter().any(|unit| text.trim_end().ends_with(unit)));
+        assert_eq!(titles.count(), 2, "axes with units");
+    }
+    for item in &shared().items {
+        assert!(page.contains(item.part), "{}", item.part);
+    }
+}
+
+#[test]
+fn written_data_are_the_figures() {
+    let folder = tempfile::tempdir().unwrap();
+    host_sim::report::paper::write(folder.path(), shared()).unwrap();
+    let text = std::fs::read_to_string(folder.path().join("figures.json")).unwrap();
+    let data: serde_json::Value = serde_json::from_str(&text).unwrap();
+    let column = |figure: &serde_json::Value, name: &str| -> Vec<f64> {
+        let values = figure[name].as_array().unwrap();
+        values.iter().map(|value| value.as_f64().unwrap()).collect()
+    };
+    for (figure, track) in [
+        (&data["figure_4"], &shared().figures.constant_cl),
+        (&data["figure_7"]["equation_6"], &shared().figures.linear_printed),
+        (&data["figure_7"]["tolerance_held"], &shared().figures.linear_held),
+        (&data["figure_8"]["cubics"], &shared().figures.curve),
+        (&data["figure_9"], &shared().figures.surface),
+    ] {
+        assert_eq!(figure["approach"], track.kind.name());
+        let written = column(figure, "cc_mm_s");
+        assert_eq!(written.len(), track.speeds.len());
+        let same = |(written, speed): (&f64, &Speed)| (written - speed.cc_mm_s).abs() < 1e-12;
+        assert!(written.iter().zip(&track.speeds).all(same));
+        assert_eq!(column(figure, "arc_mm").len(), column(figure, "cl_mm_s").len());
+        let period_s = figure["period_us"].as_f64().unwrap() * 1e-6;
+        let times = column(figure, "time_s");
+        assert!(
+            times
+                .iter()
+                .zip(1..)
+                .all(|(time, k)| (time - f64::from(k) * period_s).abs() < 1e-9)
+        );
+    }
+    assert_eq!(
+        data["figure_3"]["cc_radius_height_mm"].as_array().unwrap().len(),
+        shared().figures.section.cc_mm.len()
+    );
+}
+
+/// The table of the README is that of the freeform job.
+#[test]
+fn readme_says_what_a_user_gains() {
+    let readme = std::fs::read_to_string(host_sim::remote::qemu::workspace().join("README.md")).unwrap();
+    let freeform = shared()
+        .comparisons
+        .iter()
+        .find(|of| of.name == "freeform")
+        .unwrap();
+    assert_eq!(freeform.rows.len(), 5);
+    for row in &freeform.rows {
+        let line = format!(
+            "| {:.2} min | {} | {} | {} % |",
+            row.measured.time_s / 60.0,
+            row.measured.planned.segments,
+            row.measured.planned.bytes,
+            percent(row.measured.findings.report.ripple_pct.max)
+        );
+        let found = readme
+            .lines()
+            .any(|text| text.starts_with(&format!("| `{}`", row.kind.name())) && text.ends_with(&line));
+        assert!(found, "the README has no row {} {line}", row.name());
     }
 }
 

@@ -103,7 +103,7 @@ fn print(items: &[Item]) {
             "  {:<56} {:>12} {:>14} {difference:>9}",
             format!("{}{unit}", item.what),
             shown(item.printed, ""),
-            shown(item.ours, "not measured"),
+            shown(item.ours, "not yet"),
         );
         if !item.note.is_empty() {
             println!("      {}", item.note);

@@ -14,8 +14,8 @@ const BESIDE: f64 = 1e-10;
 /// Iterations of [`Oracle::foot`]. Each leaves (distance from the path) x (its curvature) of the error, 1e-3 at most for
 /// what any approach here commands; six bring a hundredth of a millimetre to the rounding.
 const FOOT_STEPS: usize = 6;
-/// A correction below this share of the range ends them.
-const FOOT_ENOUGH: f64 = 1e-14;
+/// A correction below this share of the range ends them: what it leaves is a thousandth of it.
+const FOOT_ENOUGH: f64 = 1e-11;
 
 /// A place on a pass with the tool centre's motion there.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -1,6 +1,6 @@
 //! Examples 1 to 6 as items.
 
-use super::geometry::{Geometry, chords_of_pass};
+use super::geometry::{ChordsOfPass, Geometry};
 use super::{Case, Cases, Comparison, Item};
 use crate::approach::{
     ApproachError, Chords, Kind, Linear, Measured, PassPath, measure_run, passes, planned,
@@ -81,7 +81,10 @@ fn example_1(case: &Case, u: &Geometry, v: &Geometry) -> Vec<Item> {
         COUNT,
         Some(319.0),
         u.passes as f64,
-        "317.907 intervals: the first and the last pass lie on the boundaries",
+        format!(
+            "{:.3} intervals: the first and the last pass lie on the boundaries",
+            intervals(case, u)
+        ),
     );
     part.add(
         "least interval",
@@ -111,7 +114,11 @@ fn example_1(case: &Case, u: &Geometry, v: &Geometry) -> Vec<Item> {
         SPEED,
         None,
         feed / low,
-        "of a wanted 10: the surface is cut at 76 % to 147 % of the feed",
+        format!(
+            "of a wanted {feed}: the surface is cut at {:.0} % to {:.0} % of the feed",
+            100.0 / high,
+            100.0 / low
+        ),
     );
     part.add(
         "slowest centre at constant speed of the contact",
@@ -154,6 +161,12 @@ fn example_1(case: &Case, u: &Geometry, v: &Geometry) -> Vec<Item> {
     part.items
 }
 
+/// How often the least interval goes into the range of the side parameter.
+fn intervals(case: &Case, geometry: &Geometry) -> f64 {
+    let [first, last] = case.oracle.side_range();
+    (last - first) / geometry.interval_min
+}
+
 /// The ruled surface, printed and reconstructed.
 fn example_2(cases: &Cases) -> Result<Vec<Item>, ApproachError> {
     let mut part = Part::new("Example 2");
@@ -166,7 +179,7 @@ fn example_2(cases: &Cases) -> Result<Vec<Item>, ApproachError> {
         let Some(pass) = all.get(all.len() / 2) else {
             continue;
         };
-        let count = |rule| chords_of_pass(pass, rule, case.job.chord_mm).map(|(count, _)| count as f64);
+        let count = |rule| ChordsOfPass::new(pass, rule, case.job.chord_mm).map(|chords| chords.count as f64);
         let (curve, normal) = (count(Chords::Equation)?, count(Chords::EquationNormal)?);
         let minutes = |length_mm: f64| length_mm / case.job.feed_mm_s() / MINUTE_S;
         let (cl, cc) = (minutes(geometry.cl_length_mm), minutes(geometry.cc_length_mm));
@@ -197,7 +210,7 @@ fn example_2(cases: &Cases) -> Result<Vec<Item>, ApproachError> {
         let rounding = if differs {
             told
         } else {
-            "the paper is 0.5 % above: its one figure that does not fit to rounding"
+            "the paper's one figure that does not fit to rounding"
         };
         part.add(
             what("time at constant speed of the centre"),
@@ -243,19 +256,28 @@ fn example_3(case: &Case, held: Option<&Measured>) -> Result<Vec<Item>, Approach
     let Some(pass) = all.first() else {
         return Ok(Vec::new());
     };
-    let (count, error) = chords_of_pass(pass, Chords::Equation, case.job.chord_mm)?;
-    let total = (count * all.len()) as f64;
+    let chords = ChordsOfPass::new(pass, Chords::Equation, case.job.chord_mm)?;
+    let total = (chords.count * all.len()) as f64;
     let slow = case.with_period_us(PAPER_PERIOD_US);
     let run = by_equation(&slow, pass)?;
-    part.add("segments a pass by eqn 6", COUNT, Some(46.0), count as f64, "");
+    part.add(
+        "segments a pass by eqn 6",
+        COUNT,
+        Some(46.0),
+        chords.count as f64,
+        "",
+    );
     part.add("segments by eqn 6", COUNT, Some(14674.0), total, "");
     part.add(
         "chord error that eqn 6 leaves",
         MM,
         Some(case.job.chord_mm),
-        error,
-        "eqn 6 judges by the curvature where a chord begins, and steps over the inflection at u = 0.5 in one chord from 0.498 \
-         to 0.705",
+        chords.error_mm,
+        format!(
+            "eqn 6 judges by the curvature where a chord begins, and steps over the inflection at u = 0.5 in one chord from {:.3} \
+             to {:.3}",
+            chords.worst[0], chords.worst[1]
+        ),
     );
     part.add(
         "ripple of the contact at 5 ms, at most",

@@ -26,6 +26,8 @@ pub struct Track {
 pub struct Figures {
     /// Figure 3: the pass in its plane: distance from the axis and height of contact and centre, mm.
     pub section: Section,
+    /// Lengths of the contact's and of the centre's path on it, mm.
+    pub lengths_mm: [f64; 2],
     /// Figure 4: existing practice, constant speed of the centre.
     pub constant_cl: Track,
     /// Figure 5: the centre's speed that keeps the contact at the feed: path length, speed.
@@ -131,6 +133,7 @@ impl Figures {
             |case: &Case, rule| planned_track(Kind::Linear, case, &Linear::new(&case.job, rule), pass);
         Ok(Self {
             section: section(&nodes.0),
+            lengths_mm: nodes.lengths_mm(),
             constant_cl: planned_track(Kind::ConstantCl, case, &ConstantCl::new(job), pass)?,
             wanted: nodes
                 .0

@@ -111,30 +111,46 @@ fn even_scallop_mm(oracle: &Oracle) -> Result<f64, OracleError> {
     Ok(sum * (high - low) * (last - first) / f64::from(along) / f64::from(across))
 }
 
-/// Chords of the middle pass by a rule: their number and the largest error of the contact's path, mm.
-///
-/// # Errors
-/// As [`chords`].
-pub fn chords_of_pass(
-    pass: &PassPath<'_>,
-    rule: Chords,
-    chord_mm: f64,
-) -> Result<(usize, f64), ApproachError> {
-    let chords = chords(pass, rule, chord_mm, 1.0)?;
-    let mut worst = 0.0_f64;
-    let mut begin = pass.ends[0];
-    for chord in &chords {
-        let at = |share: f64| {
-            pass.at(begin + (chord.path - begin) * share)
-                .map(|at| at.contact.cc_mm)
+/// Chords of a pass by a rule.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct ChordsOfPass {
+    /// Their number.
+    pub count: usize,
+    /// Largest error of the contact's path, mm.
+    pub error_mm: f64,
+    /// Path parameters at the ends of the chord that errs so.
+    pub worst: [f64; 2],
+}
+
+impl ChordsOfPass {
+    /// Chords of a pass.
+    ///
+    /// # Errors
+    /// As [`chords`].
+    pub fn new(pass: &PassPath<'_>, rule: Chords, chord_mm: f64) -> Result<Self, ApproachError> {
+        let chords = chords(pass, rule, chord_mm, 1.0)?;
+        let mut found = Self {
+            count: chords.len(),
+            error_mm: 0.0,
+            worst: [pass.ends[0]; 2],
         };
-        let (from, to) = (at(0.0)?, at(1.0)?);
-        for k in 1..PROBES {
-            worst = worst.max(from_line(at(f64::from(k) / f64::from(PROBES))?, from, to));
+        let mut begin = pass.ends[0];
+        for chord in &chords {
+            let at = |share: f64| {
+                pass.at(begin + (chord.path - begin) * share)
+                    .map(|at| at.contact.cc_mm)
+            };
+            let (from, to) = (at(0.0)?, at(1.0)?);
+            for k in 1..PROBES {
+                let error_mm = from_line(at(f64::from(k) / f64::from(PROBES))?, from, to);
+                if error_mm > found.error_mm {
+                    (found.error_mm, found.worst) = (error_mm, [begin, chord.path]);
+                }
+            }
+            begin = chord.path;
         }
-        begin = chord.path;
+        Ok(found)
     }
-    Ok((chords.len(), worst))
 }
 
 /// Distance of a point from a line, mm.

@@ -38,7 +38,7 @@ impl Operations {
 /// A row of the paper's table: what, the golden table's name of that surface, operations, microseconds.
 pub const PRINTED: [(&str, &str, Operations, f64); 3] = [
     (
-        "revolved, path along u",
+        "Example 5, revolved, path along u",
         "revolved along u",
         Operations {
             add: 39,
@@ -50,7 +50,7 @@ pub const PRINTED: [(&str, &str, Operations, f64); 3] = [
         88.0,
     ),
     (
-        "revolved, path along v",
+        "Example 5, revolved, path along v",
         "revolved along v",
         Operations {
             add: 21,
@@ -62,7 +62,7 @@ pub const PRINTED: [(&str, &str, Operations, f64); 3] = [
         80.0,
     ),
     (
-        "general bicubic",
+        "Example 6, general bicubic",
         "bicubic",
         Operations {
             add: 75,
@@ -113,7 +113,7 @@ pub fn items(operations: Option<&[Operations; 3]>, cycles: Option<&Cycles>) -> V
                 note: if ours.is_some() {
                     ""
                 } else {
-                    "ours is not measured"
+                    "ours are not counted yet"
                 }
                 .into(),
             });

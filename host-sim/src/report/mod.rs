@@ -3,7 +3,7 @@
 //! ```text
 //! samples ──record.rs──► a bounded record ──┬─ scene.rs, picture.rs, furniture.rs ─► path.svg
 //! job ──oracle──► mesh.rs ──► view.rs ──────┘                                          │
-//!                 record, findings ──────────────── chart.rs, page.rs ──────────► index.html
+//!                 record, findings ──────────────── chart.rs, curves.rs, page.rs ──────────► index.html
 //! study of the paper ────────────────────────────── chart.rs, paper/   ──────────► index.html of `cargo sim paper`
 //! ```
 //!
@@ -11,9 +11,11 @@
 //! between passes are the oracle's. Nothing that is written names a folder of this machine or asks for the network.
 
 mod chart;
+mod curves;
 mod furniture;
 mod measure;
 mod mesh;
+mod number;
 mod page;
 pub mod paper;
 mod picture;

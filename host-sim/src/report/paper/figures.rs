@@ -66,12 +66,16 @@ fn figure_3(out: &mut String, study: &Study) -> io::Result<()> {
         height: Some(SECTION_HEIGHT),
         ..Chart::default()
     };
+    let [contact, centre] = study.figures.lengths_mm;
     put(
         out,
         "",
         &chart,
-        "<b>Figure 3.</b> The profile that is turned about the axis, and the path of the tool's centre over it. Near the axis the surface \
-         bends away from the tool, and the centre has the longer way; near the rim it bends towards it. Both paths are 69.33 mm long.",
+        &format!(
+            "<b>Figure 3.</b> The profile that is turned about the axis, and the path of the tool's centre over it. Near the axis the \
+             surface bends away from the tool, and the centre has the longer way; near the rim it bends towards it. The paths are \
+             {contact:.2} and {centre:.2} mm long."
+        ),
     )
 }
 
@@ -105,6 +109,7 @@ fn put_speeds(out: &mut String, class: &str, chart: &Chart<'_>, caption: &str) -
 
 fn speeds(out: &mut String, study: &Study) -> io::Result<()> {
     let figures = &study.figures;
+    let feed = study.cases.revolved.job.feed_mm_s();
     let chart = |series, marks| Chart {
         x_title: LENGTH,
         y_title: SPEED,
@@ -114,12 +119,25 @@ fn speeds(out: &mut String, study: &Study) -> io::Result<()> {
         ..Chart::default()
     };
     let of = |track| chart(of_track(track), Vec::new());
+    let slow = figures.constant_cl.measured.findings.speeds.cc;
+    let wanted_ends = figures
+        .wanted
+        .iter()
+        .fold([f64::INFINITY, 0.0_f64], |[low, high], [_, speed]| {
+            [low.min(*speed), high.max(*speed)]
+        });
+    let segments = |track: &Track| track.measured.planned.segments;
     put_speeds(
         out,
         "",
         &of(&figures.constant_cl),
-        "<b>Figure 4.</b> Existing practice. The centre runs at a constant 10 mm/s; the contact crawls at 7.58 where the surface bends away \
-         from the tool and races at 14.70 where it bends towards it.",
+        &format!(
+            "<b>Figure 4.</b> Existing practice. The centre runs at a constant {:.0} mm/s; the contact crawls at {:.2} where the surface \
+             bends away from the tool and races at {:.2} where it bends towards it.",
+            figures.constant_cl.measured.findings.speeds.cl.mean(),
+            slow.min,
+            slow.max
+        ),
     )?;
     let wanted = Series {
         colour: VIOLET,
@@ -129,29 +147,42 @@ fn speeds(out: &mut String, study: &Study) -> io::Result<()> {
         out,
         "",
         &chart(vec![wanted], Vec::new()),
-        "<b>Figure 5.</b> The speed that the centre would have to have for the contact to run at a constant 10 mm/s: 6.80 to 13.20.",
+        &format!(
+            "<b>Figure 5.</b> The speed that the centre would have to have for the contact to run at a constant {feed} mm/s: {:.2} to {:.2}.",
+            wanted_ends[0], wanted_ends[1]
+        ),
     )?;
     put_speeds(
         out,
         " steps",
         &of(&figures.linear_printed),
-        "<b>Figure 7.</b> Method 1, linear interpolator, the 46 segments of eqn 6, sampled each 5 ms. Each segment has one speed (the \
-         stairs of the centre), the contact ripples about the feed. The flaw in the middle is the one segment that steps over the \
-         inflection.",
+        &format!(
+            "<b>Figure 7.</b> Method 1, linear interpolator, the {} segments of eqn 6, sampled each {} ms. Each segment has one speed \
+             (the stairs of the centre), the contact ripples about the feed. The flaw in the middle is the one segment that steps over \
+             the inflection; the drop at the end is what is left for the last one.",
+            segments(&figures.linear_printed),
+            figures.linear_printed.period_us * 1e-3
+        ),
     )?;
     put_speeds(
         out,
         " steps",
         &of(&figures.linear_held),
-        "<b>Figure 7, with segments that hold the tolerance.</b> The same with 54 segments whose error is measured, not estimated.",
+        &format!(
+            "<b>Figure 7, with segments that hold the tolerance.</b> The same with {} segments whose error is measured, not estimated.",
+            segments(&figures.linear_held)
+        ),
     )?;
     let marks = figures.curve_ends.iter().map(|end| (VIOLET, *end)).collect();
     put_speeds(
         out,
         "",
         &chart(of_track(&figures.curve), marks),
-        "<b>Figure 8.</b> Method 2, curve interpolator. Four cubics for the path and, on the same segments, four for the speed of the \
-         centre; the dots are their ends.",
+        &format!(
+            "<b>Figure 8.</b> Method 2, curve interpolator. {0} cubics for the path and, on the same segments, {0} for the speed of the \
+             centre; the dots are their ends.",
+            segments(&figures.curve)
+        ),
     )?;
     put_speeds(
         out,
@@ -174,12 +205,16 @@ fn deviations(out: &mut String, study: &Study) -> io::Result<()> {
             .map(|at| [at.arc_mm, 100.0 * (at.cc_mm_s / feed - 1.0)])
             .collect(),
     };
+    let segments = |track: &Track| track.measured.planned.segments;
+    let linear = format!("linear, 1 ms, {} segments", segments(&figures.linear_1_ms));
+    let curve = format!("curve, {} cubics", segments(&figures.curve));
+    let slow = figures.constant_cl.measured.findings.speeds.cc;
     legend(
         out,
         &[
-            ("violet", "linear, 1 ms, 54 segments"),
-            ("green dashdot", "curve, 4 cubics"),
-            ("blue", "surface"),
+            ("violet", &*linear),
+            ("green dashdot", &*curve),
+            ("blue dashed", "surface"),
         ],
     );
     let chart = Chart {
@@ -195,10 +230,14 @@ fn deviations(out: &mut String, study: &Study) -> io::Result<()> {
     };
     put(
         out,
-        " steps",
+        " steps broken",
         &chart,
-        "<b>Side by side.</b> Speed of the contact against the wanted feed, at a period of 1 ms. Constant speed of the centre, Figure 4, would \
-         lie between −24 and +47 %, far outside.",
+        &format!(
+            "<b>Side by side.</b> Speed of the contact against the wanted feed, at a period of 1 ms. Constant speed of the centre, Figure 4, \
+             would lie between −{:.0} and +{:.0} %, far outside.",
+            100.0 * (1.0 - slow.min / feed),
+            100.0 * (slow.max / feed - 1.0)
+        ),
     )
 }
 

@@ -11,7 +11,8 @@ use std::path::{Path, PathBuf};
 
 use serde_json::{Value, json};
 
-use super::page::{STYLE, fixed};
+use super::number::fixed;
+use super::page::STYLE;
 use crate::paper::figures::Track;
 use crate::paper::{Figures, Study};
 

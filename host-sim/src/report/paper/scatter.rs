@@ -7,7 +7,6 @@ use plotters::coord::combinators::LogCoord;
 use plotters::prelude::*;
 
 use super::super::chart::{AXIS, BLUE, FINE, GREEN, GRID, INK, SIZE, VIOLET, WARM};
-use super::super::page::legend;
 use crate::approach::Kind;
 use crate::paper::Study;
 
@@ -17,15 +16,20 @@ const RIPPLE: [f64; 2] = [3e-6, 300.0];
 /// Pixels.
 const HEIGHT: u32 = 460;
 const MARK: i32 = 7;
+/// From a mark to its label, right and up.
+const BESIDE: i32 = 9;
+/// Labels of the jobs, in the study's order.
+const NAMES: [&str; 3] = ["1", "2", "F"];
 
 type Area<'a, 'b> = ChartContext<'a, SVGBackend<'b>, Cartesian2d<LogCoord<f64>, LogCoord<f64>>>;
 
-fn colour(kind: Kind) -> RGBColor {
+/// Colour, class of the colour in the style sheet, and shape of an approach.
+fn look(kind: Kind) -> (RGBColor, &'static str, char) {
     match kind {
-        Kind::ConstantCl => WARM,
-        Kind::Linear => VIOLET,
-        Kind::Curve => GREEN,
-        Kind::Surface => BLUE,
+        Kind::ConstantCl => (WARM, "warm", '✕'),
+        Kind::Linear => (VIOLET, "violet", '■'),
+        Kind::Curve => (GREEN, "green", '▲'),
+        Kind::Surface => (BLUE, "blue", '●'),
     }
 }
 
@@ -33,21 +37,20 @@ fn colour(kind: Kind) -> RGBColor {
 pub(super) fn section(out: &mut String, study: &Study) -> io::Result<()> {
     let mut svg = String::new();
     draw(&mut svg, study).map_err(|error| io::Error::other(error.to_string()))?;
-    out.push_str("<section><h2>Data against ripple</h2>\n");
-    legend(
-        out,
-        &[
-            ("warm", "constant-cl"),
-            ("violet", "linear, 1 ms"),
-            ("green", "curve"),
-            ("blue", "surface"),
-        ],
-    );
+    out.push_str("<section><h2>Data against ripple</h2>\n<p class=\"legend\">");
+    for kind in Kind::ALL {
+        let (_, class, shape) = look(kind);
+        let _ = write!(
+            out,
+            "<span><b class=\"{class}\">{shape}</b>{}</span>",
+            kind.name()
+        );
+    }
     let _ = writeln!(
         out,
-        "<figure class=\"chart\">{svg}</figure>\n<p class=\"caption\">What the CNC has to be fed for the whole job, and how far the contact's \
-         speed is off at worst; both axes are logarithmic, best is bottom left. Circles: Example 1; squares: Example 2, reconstructed; \
-         triangles: the freeform shell.</p></section>"
+        "</p>\n<figure class=\"chart\">{svg}</figure>\n<p class=\"caption\">What the CNC has to be fed for the whole job, and how far the \
+         contact's speed is off at worst, at 1 ms; both axes are logarithmic, best is bottom left. 1: Example 1; 2: Example 2, \
+         reconstructed; F: the freeform shell.</p></section>"
     );
     Ok(())
 }
@@ -84,7 +87,11 @@ fn draw(text: &mut String, study: &Study) -> Result<(), Box<dyn std::error::Erro
                     row.measured.planned.bytes as f64,
                     row.measured.findings.report.ripple_pct.max,
                 );
-                mark(&mut chart, index, place, colour(kind))?;
+                mark(&mut chart, kind, place)?;
+                let name = NAMES.get(index).copied().unwrap_or("?");
+                let label = EmptyElement::at(place)
+                    + Text::new(name, (BESIDE * FINE as i32, -BESIDE * FINE as i32), font(15));
+                chart.draw_series([label])?;
             }
         }
     }
@@ -92,25 +99,24 @@ fn draw(text: &mut String, study: &Study) -> Result<(), Box<dyn std::error::Erro
     Ok(())
 }
 
-/// One point, its shape by the job.
-fn mark(
-    chart: &mut Area<'_, '_>,
-    job: usize,
-    place: (f64, f64),
-    colour: RGBColor,
-) -> Result<(), Box<dyn std::error::Error>> {
+/// One point, its shape by the approach.
+fn mark(chart: &mut Area<'_, '_>, kind: Kind, place: (f64, f64)) -> Result<(), Box<dyn std::error::Error>> {
+    let (colour, ..) = look(kind);
     let size = MARK * FINE as i32;
-    match job {
-        0 => {
-            chart.draw_series([Circle::new(place, size, colour.filled())])?;
+    match kind {
+        Kind::ConstantCl => {
+            chart.draw_series([Cross::new(place, size, colour.stroke_width(3 * FINE))])?;
         }
-        1 => {
+        Kind::Linear => {
             let square =
                 EmptyElement::at(place) + Rectangle::new([(-size, -size), (size, size)], colour.filled());
             chart.draw_series([square])?;
         }
-        _ => {
+        Kind::Curve => {
             chart.draw_series([TriangleMarker::new(place, size + size / 2, colour.filled())])?;
+        }
+        Kind::Surface => {
+            chart.draw_series([Circle::new(place, size, colour.filled())])?;
         }
     }
     Ok(())
@@ -122,6 +128,6 @@ fn decimal(value: f64) -> String {
     match exponent {
         -3..=3 => super::super::chart::short(value),
         exponent if exponent > 3 => format!("{value:.0}"),
-        _ => super::super::page::significant(value).replace("1.0·", ""),
+        _ => super::super::number::significant(value).replace("1.0·", ""),
     }
 }

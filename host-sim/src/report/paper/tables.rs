@@ -2,7 +2,7 @@
 
 use std::fmt::Write;
 
-use super::super::page::fixed;
+use super::super::number::fixed;
 use super::super::svg::escape;
 use super::{percent, shown};
 use crate::approach::Kind;
@@ -106,7 +106,7 @@ fn row(out: &mut String, item: &Item) {
         "<tr><th scope=\"row\">{}{unit}</th><td>{}</td><td>{}</td><td>{difference}</td><td class=\"note\">{}</td></tr>",
         escape(&item.what),
         value(item.printed, ""),
-        value(item.ours, "not measured"),
+        value(item.ours, "not yet"),
         escape(&item.note)
     );
 }
