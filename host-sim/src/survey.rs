@@ -31,6 +31,23 @@ struct Pending {
     first: bool,
 }
 
+/// A sample of the core in plain numbers.
+pub(crate) fn emitted(prepared: &Prepared, sample: &Sample, first: bool, last: bool) -> Emitted {
+    let [u, v] = prepared.parameters(sample.path, sample.side);
+    Emitted {
+        tick: sample.tick.into(),
+        pass: sample.pass,
+        u,
+        v,
+        cc_nm: sample.cc_nm,
+        cl_nm: sample.cl_nm,
+        feed_mm_s: sample.feed_mm_s.into(),
+        interval: sample.interval().into(),
+        first_of_pass: first,
+        last_of_pass: last,
+    }
+}
+
 /// The follower of one run.
 pub struct Survey<'a> {
     prepared: &'a Prepared,
@@ -96,25 +113,13 @@ impl<'a> Survey<'a> {
     }
 
     fn emit(&mut self, Pending { sample, first }: Pending, last: bool) {
-        let [u, v] = self.prepared.parameters(sample.path, sample.side);
-        let emitted = Emitted {
-            tick: sample.tick.into(),
-            pass: sample.pass,
-            u,
-            v,
-            cc_nm: sample.cc_nm,
-            cl_nm: sample.cl_nm,
-            feed_mm_s: sample.feed_mm_s.into(),
-            interval: sample.interval().into(),
-            first_of_pass: first,
-            last_of_pass: last,
-        };
+        let emitted = emitted(self.prepared, &sample, first, last);
         let arc_mm = self.verifier.add(&emitted);
         self.speeds
             .add(&emitted, arc_mm, sample.cl_nm.map(|nm| f64::from(nm) * MM_PER_NM));
         if first {
             // A place without a normal is the verifier's to report.
-            let (_, side) = self.oracle.swapped(u, v);
+            let (_, side) = self.oracle.swapped(emitted.u, emitted.v);
             self.ratio_step = self.ratio_step.max(self.oracle.ratio_step(side).unwrap_or(0.0));
             self.feed_mm_s = self.feed_mm_s.max(emitted.feed_mm_s);
         }

@@ -8,6 +8,7 @@ use crate::job_file::{JobFile, Pattern};
 use crate::machine::Machine;
 use crate::oracle::{Emitted, Oracle, OracleError};
 use crate::prepare::{Prepared, prepare};
+use crate::survey::emitted;
 
 const NM_PER_MM: f64 = 1e6;
 
@@ -158,20 +159,8 @@ fn of_sample(prepared: &Prepared, sample: &Sample, first: bool) -> Motion {
         prepared.path.parameter(sample.path),
         prepared.side.parameter(sample.side),
     );
-    let [u, v] = prepared.parameters(sample.path, sample.side);
     Motion {
-        emitted: Emitted {
-            tick: sample.tick.into(),
-            pass: sample.pass,
-            u,
-            v,
-            cc_nm: sample.cc_nm,
-            cl_nm: sample.cl_nm,
-            feed_mm_s: sample.feed_mm_s.into(),
-            interval: sample.interval().into(),
-            first_of_pass: first,
-            last_of_pass: false,
-        },
+        emitted: emitted(prepared, sample, first, false),
         path,
         side,
         cl_mm: sample.cl_nm.map(|nm| f64::from(nm) / NM_PER_MM),
