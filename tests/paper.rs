@@ -191,6 +191,12 @@ fn data_of_the_figures() {
     assert_eq!(figures.curve_ends.len(), 5);
     near(figures.curve_ends[4][0], 69.3309, 5e-5);
     assert_eq!(figures.surface.speeds.len(), 6933);
+    let speeds = &figures.surface.measured.findings.speeds;
+    near(speeds.cc.mean(), 10.0, 1e-5);
+    near(speeds.cl.min, 6.802, 1e-3);
+    near(speeds.cl.max, 13.198, 1e-3);
+    // Both paths are equally long.
+    near(speeds.cl.mean(), 10.0, 1e-3);
     for speed in &figures.surface.speeds {
         near(speed.cc_mm_s, 10.0, 1e-4);
     }

@@ -120,10 +120,14 @@ impl Outcome<'_> {
             "samples_per_second": self.samples_per_second,
             "fault": self.fault.as_ref().map_or(Value::Null, FaultAt::json),
         });
-        match value {
+        let mut keys = match value {
             Value::Object(map) => map,
             _ => Map::new(),
+        };
+        if self.kind == Kind::Surface {
+            keys.insert("patches".to_owned(), json!(self.segments));
         }
+        keys
     }
 
     /// One JSON object, or the same for a person.
