@@ -102,6 +102,7 @@ setup() {
 
 # What only the check needs.
 setup_check() {
+    need_program arm-none-eabi-objdump binutils-arm-none-eabi
     need_tool cargo-deny "$CARGO_DENY_VERSION"
     need_rs274
 }

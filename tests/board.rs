@@ -4,12 +4,12 @@
 
 use controller::{
     in_process::Board,
-    machine::Command,
+    machine::{Command, Event, Events},
     realtime::{RealTime, TickInput},
 };
 use integration_tests::{HELLO, Host, dome, upload};
 use interp_core::{
-    fault::FaultKind,
+    fault::{Fault, FaultKind},
     interpolator::{self, Interpolator},
     sample::{Sample, State},
 };
@@ -21,8 +21,8 @@ use protocol::{
 
 const WORDS: usize = 64;
 
-/// The samples of the dome, by the core alone.
-fn reference() -> Vec<Sample> {
+/// The samples of the dome, by the core alone: all, or so many until a missed tick stops the run.
+fn samples_of_dome(missed_after: Option<usize>) -> Vec<Sample> {
     let (header, words) = dome();
     let mut core = Interpolator::<[i32; WORDS]>::new();
     core.load_begin(&header, u32::try_from(words.len()).unwrap())
@@ -31,12 +31,21 @@ fn reference() -> Vec<Sample> {
     core.load_check(0).unwrap();
     core.load_finish().unwrap();
     let mut samples = vec![*core.tick(interpolator::Request::Start)];
-    while core.state() == State::Running {
+    while matches!(core.state(), State::Running | State::Stopping) {
+        if missed_after == Some(samples.len()) {
+            core.trip(Fault::new(FaultKind::DeadlineMissed, 1.0));
+        }
         samples.push(*core.tick(interpolator::Request::None));
     }
-    assert_eq!(core.state(), State::Finished);
     samples.pop();
+    samples
+}
+
+/// The whole run.
+fn reference() -> Vec<Sample> {
+    let samples = samples_of_dome(None);
     assert!((500..2000).contains(&samples.len()), "{} samples", samples.len());
+    assert!(samples.iter().all(|sample| sample.state == State::Running));
     samples
 }
 
@@ -284,13 +293,16 @@ fn a_job_begun_withdraws_a_start_that_waits() {
 
 #[test]
 fn a_missed_tick_trips_a_free_run_and_is_only_counted_in_lockstep() {
-    let mut desk = Desk::loaded(Clock::Free, Report::Digests);
+    let mut desk = Desk::loaded(Clock::Free, Report::Samples);
     desk.board.tick_with(3, 0);
     desk.accepted(&Request::Start);
     desk.ticks(50);
     desk.board.tick_with(2, 4321);
     desk.ticks(40);
     desk.collect();
+    while desk.halts.is_empty() {
+        desk.ticks(1);
+    }
     let status = desk.halts[0];
     // Along the path, 1/32 of the feed less with each of 31 samples.
     assert_eq!((status.state, status.samples), (State::Faulted, 50 + 31));
@@ -311,6 +323,24 @@ fn a_missed_tick_trips_a_free_run_and_is_only_counted_in_lockstep() {
     assert_eq!(status.digest, digest(&reference()));
 }
 
+/// A way to the link with or without room.
+#[derive(Default)]
+struct Way {
+    full: bool,
+    events: Vec<Event>,
+}
+
+impl Events for Way {
+    fn has_room(&self) -> bool {
+        !self.full
+    }
+
+    fn put(&mut self, event: Event) -> bool {
+        self.events.push(event);
+        !self.full
+    }
+}
+
 #[test]
 fn a_full_output_stops_time_in_lockstep_only() {
     let (header, words) = dome();
@@ -319,27 +349,98 @@ fn a_full_output_stops_time_in_lockstep_only() {
     half.load_words(0, &words).unwrap();
     half.load_check(0).unwrap();
     half.load_finish().unwrap();
-    let tell = |command| TickInput {
-        command: Some(command),
-        ..TickInput::default()
+    let mut way = Way::default();
+    let start = Command::Request(interpolator::Request::Start);
+    half.obey(Command::Report(Report::Samples), &mut way);
+    half.obey(Command::Clock(Clock::Lockstep), &mut way);
+    half.obey(start, &mut way);
+    half.obey(Command::Run { ticks: 10 }, &mut way);
+    let mut tick = |half: &mut RealTime<[i32; WORDS]>, full| {
+        way.full = full;
+        half.tick(TickInput::default(), &mut way);
+        core::mem::take(&mut way.events)
     };
-    half.tick(tell(Command::Report(Report::Samples)));
-    half.tick(tell(Command::Clock(Clock::Lockstep)));
-    half.tick(tell(Command::Request(interpolator::Request::Start)));
-    let full = TickInput {
-        output_full: true,
-        ..TickInput::default()
-    };
-    let output = half.tick(TickInput {
-        output_full: true,
-        ..tell(Command::Run { ticks: 10 })
-    });
-    assert_eq!(output.events().count(), 0);
-    assert_eq!(half.tick(full).events().count(), 0);
+    assert_eq!(tick(&mut half, true), []);
+    assert_eq!(tick(&mut half, true), []);
     assert_eq!(half.status().credit, 10);
-    assert_eq!(half.tick(TickInput::default()).sample, Some(reference()[0]));
-    assert_eq!(half.tick(full).events().count(), 0);
-    assert_eq!(half.tick(TickInput::default()).sample, Some(reference()[1]));
+    assert_eq!(tick(&mut half, false), [Event::Sample(reference()[0])]);
+    assert_eq!(tick(&mut half, true), []);
+    assert_eq!(tick(&mut half, false), [Event::Sample(reference()[1])]);
+    assert_eq!((half.status().credit, half.status().samples_lost), (8, 0));
+
+    half.obey(
+        Command::Request(interpolator::Request::Abort),
+        &mut Way::default(),
+    );
+    while half.status().state.is_under_way() {
+        half.tick(TickInput::default(), &mut Way::default());
+    }
+    half.obey(Command::Clock(Clock::Free), &mut Way::default());
+    half.obey(start, &mut Way::default());
+    let mut way = Way {
+        full: true,
+        ..Way::default()
+    };
+    for _ in 0..3 {
+        half.tick(TickInput::default(), &mut way);
+    }
+    assert_eq!((half.status().samples, half.status().samples_lost), (3, 3));
+}
+
+#[test]
+fn a_tick_over_its_budget_trips_a_run_that_moves_on_a_free_clock() {
+    const BUDGET: u32 = 16_800;
+    let mut desk = Desk::loaded(Clock::Free, Report::Digests);
+    desk.board.real_time().set_tick_budget(BUDGET);
+    // nothing moves yet
+    desk.board.tick_with(0, 2 * BUDGET);
+    assert_eq!(desk.board.status().state, State::Ready);
+    desk.accepted(&Request::Start);
+    desk.ticks(50);
+    // as much as is allowed, as often as one likes
+    desk.board.tick_with(0, BUDGET);
+    desk.board.tick_with(0, BUDGET);
+    assert_eq!(desk.board.status().state, State::Running);
+    // held, it is no fault, but counts as the most that a tick took
+    desk.accepted(&Request::Hold);
+    while desk.board.status().state != State::Held {
+        desk.ticks(1);
+    }
+    desk.board.tick_with(0, BUDGET + 9);
+    assert_eq!(desk.board.status().fault, None);
+    desk.accepted(&Request::Resume);
+    desk.ticks(2);
+    // less than the most so far, and still too much
+    let before = desk.board.status();
+    assert_eq!(
+        (before.state, before.tick_cycles_max),
+        (State::Running, BUDGET + 9)
+    );
+    desk.board.tick_with(0, BUDGET + 1);
+    while desk.halts.is_empty() {
+        desk.ticks(1);
+    }
+    let status = desk.halts[0];
+    let fault = status.fault.unwrap();
+    assert_eq!(status.state, State::Faulted);
+    assert_eq!(
+        (fault.kind(), fault.value),
+        (Some(FaultKind::TickOverBudget), 16_801.0)
+    );
+    assert_eq!((status.deadline_misses, status.tick_cycles_max), (0, BUDGET + 9));
+
+    // in lockstep nobody waits for the tool
+    let mut desk = Desk::loaded(Clock::Lockstep, Report::Digests);
+    desk.board.real_time().set_tick_budget(BUDGET);
+    desk.accepted(&Request::Start);
+    desk.run(50);
+    desk.board.tick_with(0, 2 * BUDGET);
+    let status = desk.run(1_000_000);
+    assert_eq!(
+        (status.state, status.tick_cycles_max),
+        (State::Finished, 2 * BUDGET)
+    );
+    assert_eq!(status.digest, digest(&reference()));
 }
 
 /// What a host, or a line gone mad, may do next.
@@ -437,30 +538,94 @@ fn act(desk: &mut Desk, deed: Deed) {
     }
 }
 
+/// What the run must be, by what has happened to the board.
+struct Model {
+    whole: Vec<Sample>,
+    before: Status,
+    /// The run that a missed tick has stopped, as long as it is the last; and how many ticks were missed.
+    stopped: Option<(Vec<Sample>, f32)>,
+}
+
+impl Model {
+    fn new(before: Status) -> Self {
+        Self {
+            whole: reference(),
+            before,
+            stopped: None,
+        }
+    }
+
+    /// Follows one deed: the status after it, and the samples that were told of during it.
+    fn follow(&mut self, deed: &Deed, status: Status, told: &[Sample]) -> Result<(), TestCaseError> {
+        if let (None, Some(fault)) = (self.before.fault, status.fault) {
+            // Only a missed tick can have done that, in the one tick of its deed: it stops what was there before.
+            let Deed::Miss(missed @ 1..) = *deed else {
+                return Err(TestCaseError::fail(format!("{fault:?} by {deed:?}")));
+            };
+            prop_assert_eq!(self.before.state, State::Running);
+            prop_assert_eq!(status.clock, Clock::Free);
+            let after = usize::try_from(self.before.samples).unwrap();
+            self.stopped = Some((samples_of_dome(Some(after)), missed.into()));
+        }
+        let count = usize::try_from(status.samples).unwrap();
+        let is_of = |run: &[Sample]| run.get(..count).is_some_and(|run| status.digest == digest(run));
+        match &self.stopped {
+            Some((run, missed)) if status.fault.is_some() => {
+                let fault = status.fault.unwrap();
+                prop_assert_eq!(
+                    (fault.kind(), fault.value),
+                    (Some(FaultKind::DeadlineMissed), *missed)
+                );
+                prop_assert!(is_of(run));
+                let over = count == run.len();
+                prop_assert!(
+                    matches!(
+                        (status.state, over),
+                        (State::Stopping, _) | (State::Faulted, true)
+                    ),
+                    "{:?} after {} of {}",
+                    status.state,
+                    count,
+                    run.len()
+                );
+            }
+            // Acknowledged when it stood; its counters stay until the next run begins.
+            Some((run, _)) if count == run.len() && is_of(run) => {}
+            _ => {
+                self.stopped = None;
+                prop_assert!(is_of(&self.whole), "{count} samples");
+                prop_assert!(status.state != State::Finished || count == self.whole.len());
+            }
+        }
+        for sample in told {
+            let run = match &self.stopped {
+                Some((run, _)) if sample.state == State::Stopping => run,
+                _ => &self.whole,
+            };
+            prop_assert_eq!(Some(sample), run.get(usize::try_from(sample.tick).unwrap()));
+        }
+        self.before = status;
+        Ok(())
+    }
+}
+
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(300))]
 
     /// Whatever happens: no panic, one answer a request, damage without effect, and never a sample that the core
-    /// would not have made.
+    /// would not have made, also while a missed tick stops the run.
     #[test]
-    fn any_order_of_anything_is_survived(deeds in prop::collection::vec(any_deed(), 0..60)) {
-        let samples = reference();
-        let mut desk = Desk::loaded(Clock::Lockstep, Report::Samples);
-        // A run that a missed tick has stopped ends with shorter steps than the reference; the next one is whole again.
-        let (mut stopped, mut before) = (false, 0);
+    fn any_order_of_anything_is_survived(
+        clock in prop::sample::select(&[Clock::Free, Clock::Lockstep]),
+        deeds in prop::collection::vec(any_deed(), 0..60),
+    ) {
+        let mut desk = Desk::loaded(clock, Report::Samples);
+        let mut model = Model::new(desk.board.status());
         for deed in deeds {
-            act(&mut desk, deed);
+            act(&mut desk, deed.clone());
+            let told = core::mem::take(&mut desk.samples);
             let status = desk.board.status();
-            let count = usize::try_from(status.samples).unwrap();
-            stopped = status.fault.is_some() || (stopped && count >= before);
-            before = count;
-            if !stopped {
-                prop_assert!(count <= samples.len());
-                prop_assert_eq!(status.digest, digest(&samples[..count]));
-            }
-        }
-        for sample in desk.samples.iter().filter(|sample| sample.state == State::Running) {
-            prop_assert_eq!(*sample, samples[usize::try_from(sample.tick).unwrap()]);
+            model.follow(&deed, status, &told)?;
         }
     }
 }

@@ -3,7 +3,8 @@
 
 use host_sim::job_file::{Along, JobFile, Pattern, Side, SurfaceSpec};
 use host_sim::prepare::{Prepared, prepare};
-use interp_core::{FaultKind, Interpolator, Place, Request, Sample, State};
+use interp_core::interpolator::STOP_PERIODS;
+use interp_core::{Fault, FaultKind, Interpolator, Place, Request, Sample, State};
 
 fn job(surface: SurfaceSpec, radius_mm: f64) -> JobFile {
     JobFile {
@@ -252,4 +253,243 @@ fn hold_and_resume_change_nothing() {
         expected = *plain.tick(Request::None);
     }
     assert_eq!(sample, expected);
+}
+
+/// A trough of two patches that meet at u = 0.4: x = 20 u, y = 20 v, z = 8 u^2.
+fn trough(pattern: Pattern) -> JobFile {
+    const KNOT: f64 = 0.4;
+    // Poles of a quadratic by its polar form: u -> (a + b)/2, u^2 -> a b.
+    let pole = |a: f64, b: f64, y: f64| [10.0 * (a + b), y, 8.0 * a * b, 1.0];
+    let row = |(a, b)| vec![pole(a, b, 0.0), pole(a, b, 20.0)];
+    let surface = SurfaceSpec::Nurbs(host_sim::job_file::NurbsSpec {
+        degree: [2, 1],
+        knots_u: vec![0.0, 0.0, 0.0, KNOT, 1.0, 1.0, 1.0],
+        knots_v: vec![0.0, 0.0, 1.0, 1.0],
+        poles_mm: [(0.0, 0.0), (0.0, KNOT), (KNOT, 1.0), (1.0, 1.0)].map(row).into(),
+        rational: false,
+    });
+    let mut job = job(surface, 1.0);
+    job.pattern = pattern;
+    job
+}
+
+/// Length of the trough's path from 0 to u, mm: |A| = 20 sqrt(1 + t^2) with t = 0.8 u.
+fn trough_arc_mm(u: f64) -> f64 {
+    let t = 0.8 * u;
+    12.5 * (t * t.hypot(1.0) + t.asinh())
+}
+
+const MISSED: Fault = Fault::new(FaultKind::DeadlineMissed, 2.0);
+const OVER_BUDGET: Fault = Fault::new(FaultKind::TickOverBudget, 20_000.0);
+
+/// Runs to a sample that fulfils this.
+fn run_until(core: &mut Interpolator, reached: impl Fn(&Sample) -> bool) -> Sample {
+    let mut sample = *core.tick(Request::Start);
+    while !reached(&sample) {
+        assert_eq!(sample.state, State::Running);
+        sample = *core.tick(Request::None);
+    }
+    sample
+}
+
+/// The samples of a stop, and the first that stands.
+fn stop(core: &mut Interpolator, request: Request) -> (Vec<Sample>, Sample) {
+    let mut samples = Vec::new();
+    loop {
+        let sample = *core.tick(request);
+        if sample.state != State::Stopping {
+            return (samples, sample);
+        }
+        assert_eq!(core.fault(), Some(MISSED));
+        samples.push(sample);
+    }
+}
+
+/// The tool slows down along its path, over the patches' boundary too and backwards too: on the surface, each period by 1/32 of
+/// the feed less, to the last nanometre what the samples say of it.
+#[test]
+fn a_fault_from_outside_stops_along_the_path() {
+    for (pattern, pass) in [(Pattern::Zig, 0), (Pattern::Zig, 2), (Pattern::Zigzag, 1)] {
+        // Just begun, half-way, and 0.07 mm before the next patch, where the stop is 0.155 mm long.
+        for from in [0.0_f64, 0.05, 0.7, 0.3965, 0.4035] {
+            let prepared = prepare(&trough(pattern)).unwrap();
+            let mut core = load(&prepared);
+            let u = |sample: &Sample| prepared.parameters(sample.path, sample.side)[0];
+            let backwards = pattern == Pattern::Zigzag;
+            let begun = |sample: &Sample| {
+                let travelled = if backwards { 1.0 - u(sample) } else { u(sample) };
+                let from = if backwards { 1.0 - from } else { from };
+                sample.pass == pass && travelled >= from.min(0.95)
+            };
+            let before = run_until(&mut core, begun);
+            core.trip(MISSED);
+            assert_eq!((core.state(), core.fault()), (State::Stopping, Some(MISSED)));
+            // Nobody can hold it up or make it go on.
+            let (samples, standing) = stop(&mut core, Request::Hold);
+            assert_eq!(samples.len(), usize::from(STOP_PERIODS) - 1);
+
+            let mut last = before;
+            for (sample, k) in samples.iter().zip((1..STOP_PERIODS).rev()) {
+                let share = f32::from(k) / f32::from(STOP_PERIODS);
+                assert_eq!(sample.feed_mm_s, 10.0 * share);
+                assert_eq!((sample.tick, sample.pass), (last.tick + 1, before.pass));
+                assert_eq!(sample.side, before.side);
+                // On the path ...
+                let [u, v] = prepared.parameters(sample.path, sample.side);
+                for (nm, mm) in sample.cc_nm.into_iter().zip([20.0 * u, 20.0 * v, 8.0 * u * u]) {
+                    assert!((f64::from(nm) - mm * 1e6).abs() < 2.0, "{nm} nm for {mm} mm");
+                }
+                let slope = 0.8 * u;
+                let normal = [-slope / slope.hypot(1.0), 0.0, 1.0 / slope.hypot(1.0)];
+                for ((cl, cc), n) in sample.cl_nm.into_iter().zip(sample.cc_nm).zip(normal) {
+                    assert!((f64::from(cl - cc) - n * 1e6).abs() < 3.0, "{} for {n}", cl - cc);
+                }
+                // ... and as far along it as the feed says.
+                let [from, _] = prepared.parameters(last.path, last.side);
+                let arc_mm = (trough_arc_mm(u) - trough_arc_mm(from)).abs();
+                let want_mm = 0.01 * f64::from(share);
+                assert!(
+                    (arc_mm / want_mm - 1.0).abs() < 1e-5,
+                    "{k}: {arc_mm} for {want_mm}"
+                );
+                assert_eq!(u < from, backwards);
+                last = *sample;
+            }
+            if from == 0.3965 || from == 0.4035 {
+                assert_eq!((before.path.span != last.path.span), backwards == (from > 0.4));
+            }
+
+            // It stands where it came to a stop; the fault and the place say why and where.
+            assert_eq!(core.fault(), Some(MISSED));
+            assert_eq!(
+                standing,
+                Sample {
+                    state: State::Faulted,
+                    ..last
+                }
+            );
+            assert_eq!(core.place(), (last.pass, last.path, last.side));
+            assert_eq!(*core.tick(Request::Resume), standing);
+        }
+    }
+}
+
+/// Nearer to the end of the pass than a stop is long, it stops there, and begins no other pass.
+#[test]
+fn a_fault_from_outside_stops_at_the_end_of_the_pass() {
+    let prepared = prepare(&trough(Pattern::Zig)).unwrap();
+    let length_mm = trough_arc_mm(1.0);
+    for left_mm in [0.15, 0.1, 0.05, 0.015, 0.005] {
+        let mut core = load(&prepared);
+        let u = |sample: &Sample| prepared.parameters(sample.path, sample.side)[0];
+        let before = run_until(&mut core, |sample| {
+            sample.pass == 1 && length_mm - trough_arc_mm(u(sample)) < left_mm
+        });
+        core.trip(MISSED);
+        let (samples, standing) = stop(&mut core, Request::None);
+        let last = *samples.last().unwrap();
+        assert!(samples.len() < usize::from(STOP_PERIODS), "{left_mm}");
+        assert_eq!((last.pass, last.side, u(&last)), (1, before.side, 1.0));
+        assert_eq!(last.path.fraction, u64::MAX);
+        // As many as it takes to spend what was left, the last one shorter.
+        let left_mm = length_mm - trough_arc_mm(u(&before));
+        let spent = |count: usize| (1..=count).map(|k| 0.01 * (32 - k) as f64 / 32.0).sum::<f64>();
+        assert!(spent(samples.len()) >= left_mm && spent(samples.len() - 1) < left_mm);
+        assert_eq!(
+            standing,
+            Sample {
+                state: State::Faulted,
+                ..last
+            }
+        );
+        assert_eq!(core.fault(), Some(MISSED));
+    }
+    // On the last sample of a pass, there is nothing left.
+    let mut core = load(&prepared);
+    let before = run_until(&mut core, |sample| {
+        sample.path.span == 1 && sample.path.fraction == u64::MAX
+    });
+    core.trip(MISSED);
+    let (samples, standing) = stop(&mut core, Request::None);
+    assert_eq!(
+        (samples, standing),
+        (
+            vec![],
+            Sample {
+                state: State::Faulted,
+                ..before
+            }
+        )
+    );
+}
+
+/// Held, the tool stands already; where nothing runs, there is nothing to stop. The first fault is the one that is told, also
+/// where the surface has one on the way, and an abort acknowledges it.
+#[test]
+fn a_fault_from_outside_in_every_state() {
+    let prepared = prepare(&trough(Pattern::Zig)).unwrap();
+    let mut idle = <Interpolator>::new();
+    idle.trip(MISSED);
+    assert_eq!((idle.state(), idle.fault()), (State::Idle, None));
+
+    let mut core = load(&prepared);
+    core.trip(MISSED);
+    assert_eq!((core.state(), core.fault()), (State::Ready, None));
+    let first = *core.tick(Request::Start);
+    core.tick(Request::Hold);
+    let held = *core.tick(Request::None);
+    assert_eq!(held.state, State::Held);
+    core.trip(MISSED);
+    assert_eq!((core.state(), core.fault()), (State::Faulted, Some(MISSED)));
+    assert_eq!(
+        *core.tick(Request::Resume),
+        Sample {
+            state: State::Faulted,
+            ..held
+        }
+    );
+    core.trip(OVER_BUDGET);
+    assert_eq!((core.state(), core.fault()), (State::Faulted, Some(MISSED)));
+    assert_eq!(core.tick(Request::Abort).state, State::Ready);
+    assert_eq!(core.fault(), None);
+
+    // A run after it is a whole one, and a second fault of a stop neither begins it anew nor replaces the first.
+    assert_eq!(*core.tick(Request::Start), first);
+    core.trip(MISSED);
+    let mut stopping = 0;
+    while core.tick(Request::Abort).state == State::Stopping {
+        core.trip(OVER_BUDGET);
+        stopping += 1;
+    }
+    assert_eq!(
+        (stopping, core.state(), core.fault()),
+        (31, State::Faulted, Some(MISSED))
+    );
+    assert_eq!(core.tick(Request::Abort).state, State::Ready);
+    assert_eq!((core.fault(), *core.tick(Request::Start)), (None, first));
+    let mut sample = first;
+    while sample.state == State::Running {
+        assert_eq!(sample.feed_mm_s, 10.0);
+        sample = *core.tick(Request::None);
+    }
+    assert_eq!(sample.state, State::Finished);
+    core.trip(MISSED);
+    assert_eq!((core.state(), core.fault()), (State::Finished, None));
+
+    // A valley that is too tight comes within the stop.
+    let valley = patch(&[
+        (0, 1, 0, 20.0),
+        (1, 0, 1, 20.0),
+        (2, 2, 0, 60.0),
+        (2, 1, 0, -60.0),
+    ]);
+    let prepared = prepare(&job(valley, 4.0)).unwrap();
+    let (last, _) = run(&prepared);
+    let mut core = load(&prepared);
+    run_until(&mut core, |sample| sample.tick + 5 == last.unwrap().tick);
+    core.trip(MISSED);
+    let (samples, standing) = stop(&mut core, Request::None);
+    assert!((1..10).contains(&samples.len()), "{}", samples.len());
+    assert_eq!((standing.state, core.fault()), (State::Faulted, Some(MISSED)));
+    assert_eq!(standing.cl_nm, samples.last().unwrap().cl_nm);
 }

@@ -62,19 +62,22 @@ fn requests() -> Vec<Request> {
     ]
 }
 
+const PATH: Place = Place {
+    span: 1,
+    fraction: 1 << 63,
+};
+const SIDE: Place = Place {
+    span: 130,
+    fraction: u64::MAX,
+};
+
 fn sample() -> Sample {
     Sample {
         tick: 1000,
         state: State::Running,
         pass: 2,
-        path: Place {
-            span: 1,
-            fraction: 1 << 63,
-        },
-        side: Place {
-            span: 130,
-            fraction: u64::MAX,
-        },
+        path: PATH,
+        side: SIDE,
         feed_mm_s: 10.0,
         cc_nm: [1, -2, 3_000_000],
         cl_nm: [i32::MAX, i32::MIN, 0],
@@ -91,14 +94,8 @@ fn status() -> Status {
         report: Report::Samples,
         tick: 1000,
         pass: 2,
-        path: Place {
-            span: 1,
-            fraction: 1 << 63,
-        },
-        side: Place {
-            span: 130,
-            fraction: u64::MAX,
-        },
+        path: PATH,
+        side: SIDE,
         samples: 1001,
         digest: 0x0123_4567_89ab_cdef,
         interval: 0.25,

@@ -19,6 +19,8 @@ struct Ran {
     off_boundary: u32,
     samples: u64,
     place: [f64; 2],
+    /// The pass runs against its parameter.
+    backwards: bool,
     /// The sample before the fault that is its neighbour, along the pass or across.
     neighbour: Option<[f64; 2]>,
 }
@@ -57,6 +59,7 @@ fn run(job: &JobFile, most: u64) -> Ran {
         },
         samples,
         place: prepared.parameters(path, side),
+        backwards: job.pattern == Pattern::Zigzag && pass % 2 == 1,
         neighbour,
     }
 }
@@ -123,6 +126,28 @@ fn turns(job: &JobFile, ran: &Ran) -> bool {
     }
 }
 
+/// How far the series to second order, from the oracle's derivatives, is from one period's arc at the place of the fault: what it
+/// would add to the first-order step, and the relative error of the arc that it covers.
+fn series(job: &JobFile, ran: &Ran) -> (f64, f64) {
+    let oracle = Oracle::new(job).unwrap();
+    let [u, v] = ran.place;
+    let d = oracle.surface.at(u, v);
+    let (a, a2, path, side) = match job.along {
+        Along::U => (d.u, d.uu, u, v),
+        Along::V => (d.v, d.vv, v, u),
+    };
+    let dot = |a: [f64; 3], b: [f64; 3]| a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
+    let way = if ran.backwards { -1.0 } else { 1.0 };
+    let room = if ran.backwards { path } else { 1.0 - path };
+    let arc_mm = job.feed_mm_min / 60.0 * 1e-3;
+    let first = arc_mm / dot(a, a).sqrt();
+    let bend = way * first * dot(a, a2) / dot(a, a);
+    let added = bend * (bend - 1.0) / 2.0;
+    let step = (first * (1.0 + added)).min(room);
+    let covered_mm = way * oracle.arc_of_step(path, way * step, side);
+    (added, covered_mm / arc_mm - 1.0)
+}
+
 fn justified(job: &JobFile, ran: &Ran) -> Result<(), TestCaseError> {
     let Some(fault) = ran.fault else { return Ok(()) };
     let place = ran.place;
@@ -139,7 +164,18 @@ fn justified(job: &JobFile, ran: &Ran) -> Result<(), TestCaseError> {
             );
         }
         FaultKind::ParameterBackwards => {
-            prop_assert!(sine < 0.2, "{fault:?} where the sine is {sine}, around {place:?}")
+            // More than 1/2, or 1/16 of the step by what the speed makes of it.
+            let (added, missed) = series(job, ran);
+            prop_assert!(
+                added.abs() > 0.499 || missed.abs() > 0.02,
+                "{fault:?}, but the series adds {added} and misses by {missed} at {place:?}"
+            );
+            if added.abs() > 0.501 {
+                prop_assert!(
+                    (f64::from(fault.value) / added - 1.0).abs() < 0.01,
+                    "{fault:?} for {added}"
+                );
+            }
         }
         _ => prop_assert!(false, "{fault:?} around {place:?}"),
     }
@@ -462,5 +498,32 @@ fn uneven_parametrisations_keep_the_feed_or_fault() {
             "{}",
             ran.ripple_pct
         );
+    }
+}
+
+/// A ridge so sharp that the path all but turns back: S_u shrinks to a few per cent and turns by 180 degrees within some steps,
+/// at right angles to S_v throughout. The surface is regular there, and any ball fits outside.
+#[test]
+fn ridge_on_which_the_path_all_but_stands() {
+    let ridge = |breadth: f64| {
+        let mut c = [[[0.0; 4]; 4]; 3];
+        (c[0][1][3], c[0][2][3], c[1][3][2], c[2][2][3]) = (20.0, -20.0, 20.0, breadth);
+        let surface = SurfaceSpec::Bicubic {
+            coefficients_mm: c,
+            u: [0.0, 1.0],
+            v: [0.0, 1.0],
+        };
+        job(surface, Along::U, Pattern::Zig)
+    };
+    for breadth in [0.1, 0.2, 0.3, 0.5, 0.8] {
+        let job = ridge(breadth);
+        let ran = run(&job, u64::MAX);
+        let kind = ran.fault.map(|fault| fault.kind);
+        assert_eq!(kind, Some(FaultKind::ParameterBackwards), "{breadth}");
+        assert!((ran.place[0] - 0.5).abs() < 0.03, "{breadth}: {:?}", ran.place);
+        justified(&job, &ran).unwrap();
+    }
+    for breadth in [1.5, 3.0, 8.0] {
+        assert_eq!(run(&ridge(breadth), u64::MAX).fault, None, "{breadth}");
     }
 }

@@ -11,12 +11,24 @@ use protocol::message::{Description, Status};
 
 use crate::{
     link::Link,
-    machine::{Busy, Command, Machine, describe},
-    realtime::{RealTime, TickInput, TickOutput},
+    machine::{Busy, Command, Event, Events, Machine, describe},
+    realtime::{RealTime, TickInput},
 };
 
 /// Commands that may wait for the next tick, as in the firmware.
 pub const COMMANDS_MAX: usize = 4;
+
+/// Events without end, as the desk has room.
+impl Events for Vec<Event> {
+    fn has_room(&self) -> bool {
+        true
+    }
+
+    fn put(&mut self, event: Event) -> bool {
+        self.push(event);
+        true
+    }
+}
 
 /// The real-time half and the queue before it: what the link talks to.
 #[derive(Debug, Default)]
@@ -93,25 +105,24 @@ impl<const WORDS: usize> Board<WORDS> {
     }
 
     /// One tick of the sample timer, with its events on the line afterwards.
-    pub fn tick(&mut self) -> TickOutput {
-        self.tick_with(0, 0)
+    pub fn tick(&mut self) {
+        self.tick_with(0, 0);
     }
 
     /// One tick of the sample timer before which so many were missed, the last one having taken so many cycles.
-    pub fn tick_with(&mut self, missed: u32, cycles: u32) -> TickOutput {
-        let command = self.half.commands.pop_front();
-        let output = self.half.real_time.tick(TickInput {
-            command,
-            missed,
-            cycles,
-            output_full: false,
-        });
+    pub fn tick_with(&mut self, missed: u32, cycles: u32) {
+        let mut events = Vec::new();
+        if let Some(command) = self.half.commands.pop_front() {
+            self.half.real_time.obey(command, &mut events);
+        }
+        self.half
+            .real_time
+            .tick(TickInput { missed, cycles }, &mut events);
         let sent = &mut self.sent;
-        for event in output.events() {
+        for event in events {
             self.link
                 .event(&event, &mut |bytes| sent.extend_from_slice(bytes));
         }
-        output
     }
 
     /// The bytes that the board has sent since the last call.

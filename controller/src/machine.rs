@@ -38,6 +38,18 @@ pub enum Event {
     Halted(Status),
 }
 
+/// Where the real-time half puts its events: a queue that never makes it wait.
+pub trait Events {
+    /// Most events that one tick puts in.
+    const TICK_MAX: usize = 3;
+
+    /// Whether so many find room.
+    fn has_room(&self) -> bool;
+
+    /// Puts an event in; false where it found no room, and is lost.
+    fn put(&mut self, event: Event) -> bool;
+}
+
 /// No room in the queue of commands.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Busy;

@@ -1,8 +1,13 @@
 //! The real-time half: one call a tick of the sample timer.
 //!
 //! **Bound.** One [`Interpolator::tick`], a digest of 17 words (about 125 cycles on a Cortex-M4), no loop.
+//! **Cost.** What happens seldom (commands, misses, ends of passes and runs) is out of line: a tick in the middle of a
+//! pass copies nothing, and builds no event but the sample where the host wants it.
 //! **Missed tick.** Counted; on a free clock while the tool moves it trips the run with
-//! [`FaultKind::DeadlineMissed`], because the tool stood still for a period in which the feed was commanded.
+//! [`FaultKind::DeadlineMissed`], because the tool stood still for a period in which the feed was commanded. The run stops
+//! along the path ([`Interpolator::trip`]).
+//! **Tick over budget.** Its cycles are known to the next tick, which trips the run with [`FaultKind::TickOverBudget`] on the
+//! same terms: before ticks are missed.
 
 use interp_core::{
     fault::{Fault, FaultKind, Result},
@@ -15,44 +20,15 @@ use protocol::{
     message::{Clock, FaultReport, PassDigest, Report, Status},
 };
 
-use crate::machine::{Command, Event};
+use crate::machine::{Command, Event, Events};
 
-/// What a tick of the sample timer brings.
+/// What a tick of the sample timer learns of the one before.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct TickInput {
-    /// The next command of the queue, if there is one.
-    pub command: Option<Command>,
     /// Ticks of the sample timer that were missed since the last call.
     pub missed: u32,
     /// CPU cycles of the last tick; 0 where the board cannot measure.
     pub cycles: u32,
-    /// Fewer than [`TickOutput::EVENTS_MAX`] places are left on the way to the link. In lockstep time stands still
-    /// meanwhile, so that nothing is lost.
-    pub output_full: bool,
-}
-
-/// What a tick of the sample timer yields.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct TickOutput {
-    /// The pass that is over: the one before `sample`'s, or the last.
-    pub pass: Option<PassDigest>,
-    /// The sample, if the host wants samples and this is one of the run.
-    pub sample: Option<Sample>,
-    /// The ticks of a `Run` are used up, or the run is over.
-    pub halted: Option<Status>,
-}
-
-impl TickOutput {
-    /// Most events that one tick yields.
-    pub const EVENTS_MAX: usize = 3;
-
-    /// The events, in the order in which the host is to see them.
-    pub fn events(&self) -> impl Iterator<Item = Event> + use<> {
-        let pass = self.pass.map(Event::Pass);
-        let sample = self.sample.map(Event::Sample);
-        let halted = self.halted.map(Event::Halted);
-        pass.into_iter().chain(sample).chain(halted)
-    }
 }
 
 /// What is kept of a run: counters and digests.
@@ -82,22 +58,26 @@ impl Run {
         events_lost: 0,
     };
 
-    /// Counts a sample in; yields the pass before if the sample is the first of another.
-    #[inline]
-    fn add(&mut self, sample: &Sample, interval: f32) -> Option<PassDigest> {
-        let over = if sample.pass == self.pass.pass {
-            None
-        } else {
-            self.end_pass(interval)
-        };
-        if self.pass.samples == 0 {
-            self.pass.pass = sample.pass;
-            self.pass.first_tick = sample.tick;
-        }
+    /// Whether the sample is the first of a pass.
+    const fn begins_pass(&self, sample: &Sample) -> bool {
+        self.pass.samples == 0 || sample.pass != self.pass.pass
+    }
+
+    /// Begins the pass of this sample; yields the one before.
+    #[cold]
+    fn begin_pass(&mut self, sample: &Sample, interval: f32) -> Option<PassDigest> {
+        let over = self.end_pass(interval);
+        self.pass.pass = sample.pass;
+        self.pass.first_tick = sample.tick;
+        over
+    }
+
+    /// Counts a sample in. Not generic and not inlined: compiled here for speed, whatever its callers are compiled for.
+    #[inline(never)]
+    fn add(&mut self, sample: &Sample) {
         self.pass.samples = self.pass.samples.saturating_add(1);
         self.samples = self.samples.saturating_add(1);
         self.digest.sample(sample);
-        over
     }
 
     /// The pass so far, if it has samples; the next sample begins another.
@@ -113,65 +93,39 @@ impl Run {
     }
 }
 
-/// The real-time half of the board. `S`: the job store, see [`Interpolator`].
+/// All of the real-time half but the interpolator.
 #[derive(Debug)]
-pub struct RealTime<S = [i32; STORE_WORDS]> {
-    interpolator: Interpolator<S>,
-    clock: Clock,
+struct Control {
+    run: Run,
     credit: u32,
+    tick_budget: u32,
+    clock: Clock,
     report: Report,
     /// Waits for a period to pass.
     request: Request,
-    run: Run,
 }
 
-impl<const WORDS: usize> Default for RealTime<[i32; WORDS]> {
-    fn default() -> Self {
-        Self::new()
-    }
-}
-
-impl<const WORDS: usize> RealTime<[i32; WORDS]> {
-    /// An idle machine on a free clock, reporting digests, with a store of its own.
-    #[must_use]
-    pub const fn new() -> Self {
-        Self::with_store([0; WORDS])
-    }
-}
-
-impl<S> RealTime<S> {
-    /// An idle machine on a free clock, reporting digests.
-    #[must_use]
-    pub const fn with_store(store: S) -> Self {
+impl Control {
+    const fn new() -> Self {
         Self {
-            interpolator: Interpolator::with_store(store),
-            clock: Clock::Free,
+            run: Run::NEW,
             credit: 0,
+            tick_budget: u32::MAX,
+            clock: Clock::Free,
             report: Report::Digests,
             request: Request::None,
-            run: Run::NEW,
         }
     }
-}
 
-impl<S: AsRef<[i32]> + AsMut<[i32]>> RealTime<S> {
-    /// One tick of the sample timer.
-    pub fn tick(&mut self, input: TickInput) -> TickOutput {
-        self.run.tick_cycles_max = self.run.tick_cycles_max.max(input.cycles);
-        let mut output = TickOutput::default();
-        if let Some(command) = input.command {
-            output.halted = self.obey(command);
+    /// Puts an event in its queue, or counts it as lost.
+    fn put(&mut self, event: Event, events: &mut impl Events) {
+        if !events.put(event) {
+            self.run.events_lost = self.run.events_lost.saturating_add(1);
         }
-        let was_under_way = self.interpolator.state().is_under_way();
-        self.count_missed(input.missed);
-        if self.time_passes(input.output_full) {
-            self.step(was_under_way, &mut output);
-        }
-        output
     }
 
-    /// Takes a command up; a `Run` that gives no time halts at once.
-    fn obey(&mut self, command: Command) -> Option<Status> {
+    /// Takes a command up; false for a `Run` that leaves no time, which halts at once.
+    fn obey(&mut self, command: Command) -> bool {
         match command {
             // An abort that waits for its period is not to be undone by what comes behind it.
             Command::Request(_) if self.request == Request::Abort => {}
@@ -184,72 +138,176 @@ impl<S: AsRef<[i32]> + AsMut<[i32]>> RealTime<S> {
                 if self.clock == Clock::Lockstep {
                     self.credit = self.credit.saturating_add(ticks);
                 }
-                if self.credit == 0 {
-                    return Some(self.status());
-                }
+                return self.credit > 0;
             }
             Command::Report(report) => self.report = report,
         }
-        None
+        true
     }
 
-    fn count_missed(&mut self, missed: u32) {
-        if missed == 0 {
-            return;
+    /// Whether the last tick left nothing to note: none was missed, and it took no longer than others and than allowed.
+    #[inline]
+    const fn is_in_time(&self, input: TickInput) -> bool {
+        input.missed == 0 && input.cycles <= self.run.tick_cycles_max && input.cycles <= self.tick_budget
+    }
+
+    /// Notes misses and cycles; the fault that they are to a tool that moves on a free clock.
+    #[cold]
+    fn note_time(&mut self, input: TickInput) -> Option<Fault> {
+        self.run.deadline_misses = self.run.deadline_misses.saturating_add(input.missed);
+        self.run.tick_cycles_max = self.run.tick_cycles_max.max(input.cycles);
+        if self.clock != Clock::Free {
+            None
+        } else if input.missed > 0 {
+            Some(Fault::new(FaultKind::DeadlineMissed, count(input.missed)))
+        } else if input.cycles > self.tick_budget {
+            Some(Fault::new(FaultKind::TickOverBudget, count(input.cycles)))
+        } else {
+            None
         }
-        self.run.deadline_misses = self.run.deadline_misses.saturating_add(missed);
-        let moves = matches!(
-            self.interpolator.state(),
-            State::Running | State::Holding | State::Stopping
-        );
-        if self.clock == Clock::Free && moves {
-            self.interpolator
-                .trip(Fault::new(FaultKind::DeadlineMissed, count(missed)));
+    }
+}
+
+/// Whether the tool moves, so that each sample is one of the run.
+const fn moves(state: State) -> bool {
+    matches!(state, State::Running | State::Holding | State::Stopping)
+}
+
+/// The real-time half of the board. `S`: the job store, see [`Interpolator`].
+#[derive(Debug)]
+pub struct RealTime<S = [i32; STORE_WORDS]> {
+    control: Control,
+    interpolator: Interpolator<S>,
+}
+
+impl<const WORDS: usize> Default for RealTime<[i32; WORDS]> {
+    fn default() -> Self {
+        Self::new()
+    }
+}
+
+impl<const WORDS: usize> RealTime<[i32; WORDS]> {
+    /// An idle machine on a free clock, reporting digests, with a store of its own; a tick may take any time.
+    #[must_use]
+    pub const fn new() -> Self {
+        Self::with_store([0; WORDS])
+    }
+}
+
+impl<S> RealTime<S> {
+    /// An idle machine on a free clock, reporting digests; a tick may take any time.
+    #[must_use]
+    pub const fn with_store(store: S) -> Self {
+        Self {
+            control: Control::new(),
+            interpolator: Interpolator::with_store(store),
+        }
+    }
+}
+
+impl<S: AsRef<[i32]> + AsMut<[i32]>> RealTime<S> {
+    /// Sets the most CPU cycles that a tick may take while the tool moves on a free clock.
+    pub const fn set_tick_budget(&mut self, cycles: u32) {
+        self.control.tick_budget = cycles;
+    }
+
+    /// Takes a command up, before the tick.
+    #[cold]
+    #[inline(never)]
+    pub fn obey(&mut self, command: Command, events: &mut impl Events) {
+        if !self.control.obey(command) {
+            self.halt(events);
         }
     }
 
-    fn time_passes(&mut self, output_full: bool) -> bool {
-        match self.clock {
-            Clock::Free => true,
-            Clock::Lockstep if output_full || self.credit == 0 => false,
-            Clock::Lockstep => {
-                self.credit -= 1;
-                true
+    /// One tick of the sample timer. In lockstep time stands still while there is no room for events, so that none is lost.
+    #[inline]
+    pub fn tick(&mut self, input: TickInput, events: &mut impl Events) {
+        let was_under_way = self.interpolator.state().is_under_way();
+        if !self.control.is_in_time(input)
+            && let Some(fault) = self.control.note_time(input)
+            && moves(self.interpolator.state())
+        {
+            self.interpolator.trip(fault);
+        }
+        if self.control.clock == Clock::Lockstep {
+            if self.control.credit == 0 || !events.has_room() {
+                return;
             }
+            self.control.credit -= 1;
         }
+        self.step(was_under_way, events);
     }
 
     /// Lets one period pass.
     #[inline]
-    fn step(&mut self, was_under_way: bool, output: &mut TickOutput) {
-        let request = core::mem::take(&mut self.request);
+    fn step(&mut self, was_under_way: bool, events: &mut impl Events) {
+        let request = core::mem::take(&mut self.control.request);
         let starts = request == Request::Start;
         if starts && request.is_allowed(self.interpolator.state()) {
-            self.run = Run::NEW;
+            self.control.run = Run::NEW;
         }
-        let sample = *self.interpolator.tick(request);
-        if matches!(sample.state, State::Running | State::Stopping) {
-            output.pass = self.run.add(&sample, self.interpolator.last_interval());
-            output.sample = (self.report == Report::Samples).then_some(sample);
+        let state = self.interpolator.tick(request).state;
+        if moves(state) {
+            self.count_sample(events);
         }
-        let over = (was_under_way || starts) && !sample.state.is_under_way();
-        if over {
-            output.pass = self.run.end_pass(self.interpolator.last_interval());
-            self.credit = 0;
-        }
-        if over || (self.clock == Clock::Lockstep && self.credit == 0) {
-            output.halted = Some(self.status());
+        if (was_under_way || starts) && !state.is_under_way() {
+            self.end_run(events);
+        } else if self.control.clock == Clock::Lockstep && self.control.credit == 0 {
+            self.halt(events);
         }
     }
 
-    /// Counts events that found no room on their way to the link.
-    pub const fn count_lost(&mut self, events: u32) {
-        self.run.events_lost = self.run.events_lost.saturating_add(events);
+    /// Counts the last sample in, and tells the host what it wants of it.
+    #[inline]
+    fn count_sample(&mut self, events: &mut impl Events) {
+        let Self {
+            control,
+            interpolator,
+        } = self;
+        let sample = interpolator.last();
+        if control.run.begins_pass(sample)
+            && let Some(over) = control.run.begin_pass(sample, interpolator.last_interval())
+        {
+            control.put(Event::Pass(over), events);
+        }
+        control.run.add(sample);
+        if control.report == Report::Samples {
+            control.put(Event::Sample(*sample), events);
+        }
+    }
+
+    /// The run is over.
+    #[cold]
+    #[inline(never)]
+    fn end_run(&mut self, events: &mut impl Events) {
+        let interval = self.interpolator.last_interval();
+        if let Some(over) = self.control.run.end_pass(interval) {
+            self.control.put(Event::Pass(over), events);
+        }
+        self.control.credit = 0;
+        self.halt(events);
+    }
+
+    /// Tells the host that time stands still, or the run is over.
+    #[cold]
+    #[inline(never)]
+    fn halt(&mut self, events: &mut impl Events) {
+        let halted = Event::Halted(self.status_now());
+        self.control.put(halted, events);
     }
 
     /// All that is known of the run; `frames_bad` is the link's to fill in.
     #[must_use]
+    #[inline(never)]
     pub fn status(&self) -> Status {
+        self.status_now()
+    }
+
+    /// The status, made where it is wanted.
+    #[inline(always)]
+    fn status_now(&self) -> Status {
+        let run = &self.control.run;
         let last = self.interpolator.last();
         let fault = self.interpolator.fault();
         let (pass, path, side) = if fault.is_some() {
@@ -260,19 +318,19 @@ impl<S: AsRef<[i32]> + AsMut<[i32]>> RealTime<S> {
         Status {
             state: self.interpolator.state(),
             fault: fault.map(FaultReport::from),
-            clock: self.clock,
-            credit: self.credit,
-            report: self.report,
+            clock: self.control.clock,
+            credit: self.control.credit,
+            report: self.control.report,
             tick: last.tick,
             pass,
             path,
             side,
-            samples: self.run.samples,
-            digest: self.run.digest.value(),
+            samples: run.samples,
+            digest: run.digest.value(),
             interval: self.interpolator.last_interval(),
-            deadline_misses: self.run.deadline_misses,
-            tick_cycles_max: self.run.tick_cycles_max,
-            samples_lost: self.run.events_lost,
+            deadline_misses: run.deadline_misses,
+            tick_cycles_max: run.tick_cycles_max,
+            samples_lost: run.events_lost,
             frames_bad: 0,
         }
     }
@@ -289,7 +347,7 @@ impl<S: AsRef<[i32]> + AsMut<[i32]>> RealTime<S> {
     /// Those of [`Interpolator::load_begin`]; nothing changes then.
     pub fn load_begin(&mut self, header: &Header, words: u32) -> Result<()> {
         self.interpolator.load_begin(header, words)?;
-        self.request = Request::None;
+        self.control.request = Request::None;
         Ok(())
     }
 
@@ -321,17 +379,17 @@ impl<S: AsRef<[i32]> + AsMut<[i32]>> RealTime<S> {
     /// Those of [`Interpolator::load_finish`].
     pub fn load_finish(&mut self) -> Result<()> {
         self.interpolator.load_finish()?;
-        self.request = Request::None;
-        self.run = Run::NEW;
+        self.control.request = Request::None;
+        self.control.run = Run::NEW;
         Ok(())
     }
 }
 
-/// A count as the value of a fault: exact to 2^24, which is hours of missed ticks.
+/// A count as the value of a fault: exact to 2^24, which is hours of missed ticks and a tenth of a second of cycles.
 #[allow(
     clippy::cast_precision_loss,
-    reason = "a count of missed ticks beyond 2^24 needs no last digit"
+    reason = "a count beyond 2^24 needs no last digit"
 )]
-const fn count(ticks: u32) -> f32 {
-    ticks as f32
+const fn count(number: u32) -> f32 {
+    number as f32
 }

@@ -5,14 +5,11 @@
 use core::mem::size_of;
 
 use crate::guarded_machine::BoardRealTime;
-use controller::{
-    machine::{Command, Event},
-    realtime::TickOutput,
-};
+use controller::machine::{Command, Event, Events};
 use interp_core::job::{STORE_WORDS, SurfaceKind, patches_max};
 use protocol::{frame::FRAME_MAX, message::SAMPLES_MAX};
 
-use crate::board;
+use crate::{board, sample_task::EventQueue};
 
 /// Version that the host is told and the log begins with.
 pub(crate) const FIRMWARE_VERSION: [u16; 3] = [
@@ -26,6 +23,13 @@ pub(crate) const PERIOD_US: u32 = 1_000;
 
 /// One period in counts of the reference clock (TIM5).
 pub(crate) const PERIOD_COUNTS: u32 = board::TIMER_HZ / 1_000_000 * PERIOD_US;
+
+/// The chip's fastest clock, Hz, which the figures in cycles are for.
+const CORE_HZ: u32 = 168_000_000;
+
+/// Cycles that a tick may take while the tool moves: a tenth of the period. What `cargo sim budget` shows of the
+/// worst tick is well below, so more is a defect; nine tenths are left to the link.
+pub(crate) const TICK_BUDGET_CYCLES: u32 = CORE_HZ / 1_000_000 * PERIOD_US / 10;
 
 /// Baud rate of the link: the first usual rate at which every sample of a run can be reported.
 pub(crate) const SERIAL_BAUD: u32 = 921_600;
@@ -90,7 +94,7 @@ const _: () = {
     );
     let frame_periods = (FRAME_MAX * 10 * 1_000_000).div_ceil(SERIAL_BAUD as usize * PERIOD_US as usize);
     assert!(
-        EVENT_PLACES > 2 * frame_periods * TickOutput::EVENTS_MAX,
+        EVENT_PLACES > 2 * frame_periods * EventQueue::TICK_MAX,
         "events have to outlast a frame"
     );
 

@@ -18,6 +18,7 @@ mod board;
 mod design_parameters;
 mod drivers;
 mod guarded_machine;
+mod sample_task;
 mod watch;
 
 use crate::{design_parameters::PERIOD_US, drivers::sample_timer::uptime_periods};
@@ -27,11 +28,10 @@ defmt::timestamp!("{=u64:us}", u64::from(uptime_periods()) * u64::from(PERIOD_US
 
 #[rtic::app(device = stm32f4xx_hal::pac, peripherals = true)]
 mod app {
-
     use controller::{
         link::Link,
         machine::{Command, Event},
-        realtime::{RealTime, TickInput, TickOutput},
+        realtime::RealTime,
     };
     use heapless::spsc::{Consumer, Producer, Queue};
 
@@ -39,6 +39,7 @@ mod app {
         board::{self, StatusPin},
         design_parameters::{
             COMMAND_PLACES, EVENT_PLACES, FLUSH_PERIODS, JOB_WORDS, PERIOD_COUNTS, RECEIVE_PLACES,
+            TICK_BUDGET_CYCLES,
         },
         drivers::{
             cycle_counter::CycleCounter,
@@ -47,12 +48,12 @@ mod app {
             status_led::StatusLed,
         },
         guarded_machine::{BoardRealTime, GuardedMachine},
+        sample_task::SampleTask,
         watch::Watch,
     };
 
     #[shared]
     struct Shared {
-        /// A reference, because 64 KiB do not fit on the stack.
         real_time: BoardRealTime,
         /// Bytes from the host that were lost.
         bytes_lost: u32,
@@ -60,16 +61,13 @@ mod app {
 
     #[local]
     struct Local {
-        timer: SampleTimer,
-        counter: CycleCounter,
+        task: SampleTask,
         receiver: Receiver,
         transmitter: Transmitter,
         led: StatusLed<StatusPin>,
         bytes_in: Producer<'static, u8>,
         bytes_out: Consumer<'static, u8>,
         commands_in: Producer<'static, Command>,
-        commands_out: Consumer<'static, Command>,
-        events_in: Producer<'static, Event>,
         events_out: Consumer<'static, Event>,
     }
 
@@ -96,22 +94,21 @@ mod app {
             board::NAME,
             JOB_WORDS
         );
+        let mut real_time = RealTime::with_store(context.local.store);
+        real_time.set_tick_budget(TICK_BUDGET_CYCLES);
         (
             Shared {
-                real_time: RealTime::with_store(context.local.store),
+                real_time,
                 bytes_lost: 0,
             },
             Local {
-                timer,
-                counter,
+                task: SampleTask::new(timer, counter, commands_out, events_in),
                 receiver,
                 transmitter,
                 led: StatusLed::new(board.status_pin),
                 bytes_in,
                 bytes_out,
                 commands_in,
-                commands_out,
-                events_in,
                 events_out,
             },
         )
@@ -123,42 +120,14 @@ mod app {
     /// |---|---|
     /// | priority | 3, the highest |
     /// | period | 1 ms, by TIM2 |
-    /// | worst case | measured by `cargo sim budget`, to come; the board reports the most it has seen (`tick_cycles_max`) |
-    /// | a miss | counted, reported, and a fault of the run (`deadline-missed`): the tool would have stood still where a feed was commanded |
-    #[task(
-        binds = TIM2,
-        priority = 3,
-        shared = [real_time],
-        local = [timer, counter, commands_out, events_in, missed: u32 = 0, cycles: u32 = 0]
-    )]
+    /// | worst case | see `cargo sim budget`; the board measures each tick and reports the most (`tick_cycles_max`) |
+    /// | over a tenth of the period | a fault of the run (`tick-over-budget`), which stops along the path |
+    /// | a miss | counted, reported, and a fault of the run (`deadline-missed`), which stops along the path |
+    /// | a panic | cannot be reached: `firmware/no-panic` does not link otherwise |
+    #[task(binds = TIM2, priority = 3, shared = [real_time], local = [task])]
     fn sample(mut context: sample::Context) {
-        let sample::LocalResources {
-            timer,
-            counter,
-            commands_out,
-            events_in,
-            missed,
-            cycles,
-            ..
-        } = context.local;
-        let begun = counter.now();
-        timer.begin();
-        let input = TickInput {
-            command: commands_out.dequeue(),
-            missed: *missed,
-            cycles: *cycles,
-            output_full: events_in.capacity() - events_in.len() < TickOutput::EVENTS_MAX,
-        };
-        // No other task has a higher priority: this lock costs nothing.
-        context.shared.real_time.lock(|real_time| {
-            for event in real_time.tick(input).events() {
-                if events_in.enqueue(event).is_err() {
-                    real_time.count_lost(1);
-                }
-            }
-        });
-        *cycles = counter.since(begun);
-        *missed = timer.end();
+        let task = context.local.task;
+        context.shared.real_time.lock(|real_time| task.tick(real_time));
     }
 
     /// Takes a byte off the port.

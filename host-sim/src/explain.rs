@@ -69,5 +69,9 @@ pub fn fault(fault: Fault) -> (String, &'static str) {
             format!("{value} ticks of the sample timer were missed"),
             "this is a defect of the firmware, or a debugger held the chip",
         ),
+        FaultKind::TickOverBudget => (
+            format!("a tick took {value} cycles, more than the board allows it"),
+            "this is a defect of the firmware: please report the job",
+        ),
     }
 }

@@ -32,11 +32,13 @@ pub enum FaultKind {
     WrongState = 11,
     /// A tick of the sample timer was missed. Value: ticks missed.
     DeadlineMissed = 12,
+    /// A tick took more of its period than the board allows it. Value: processor cycles.
+    TickOverBudget = 13,
 }
 
 impl FaultKind {
     /// Every kind, in order of its code.
-    pub const ALL: [Self; 12] = [
+    pub const ALL: [Self; 13] = [
         Self::BallDoesNotFit,
         Self::DegenerateSurface,
         Self::ParameterBackwards,
@@ -49,6 +51,7 @@ impl FaultKind {
         Self::BadLength,
         Self::WrongState,
         Self::DeadlineMissed,
+        Self::TickOverBudget,
     ];
 
     /// The stable code.
@@ -79,6 +82,7 @@ impl FaultKind {
             Self::BadLength => "bad-length",
             Self::WrongState => "wrong-state",
             Self::DeadlineMissed => "deadline-missed",
+            Self::TickOverBudget => "tick-over-budget",
         }
     }
 }

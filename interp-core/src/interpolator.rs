@@ -3,11 +3,11 @@
 use crate::fault::{Fault, FaultKind, Result};
 use crate::interval::interval;
 use crate::job::{Header, STORE_WORDS};
+use crate::lane::Line;
 use crate::patch::Patch;
 use crate::program::Program;
 use crate::run::Run;
 use crate::sample::{Place, Sample, State};
-use crate::surface::{Pass, Surface};
 
 /// Periods over which the feed falls to nothing when a fault from outside stops the run: 1/32 less each period.
 pub const STOP_PERIODS: u8 = 32;
@@ -348,16 +348,17 @@ impl Motion {
             return Err(Fault::new(FaultKind::WrongState, f32::from(self.state as u8)));
         }
         let mut patch = Patch::NONE;
-        patch.collapse(&job, path.span, side, false)?;
-        let contact = match &patch.surface {
-            Surface::Polynomial(pass) => pass.contact(path.fraction, &patch.ball),
-            Surface::Rational(pass) => pass.contact(path.fraction, &patch.ball),
-            Surface::Pole(pass) => pass.contact(path.fraction, &patch.ball),
-            Surface::Profile(pass) => pass.contact(path.fraction, &patch.ball),
-            Surface::Circle(pass) => pass.contact(path.fraction, &patch.ball),
-        }?;
+        patch.collapse(
+            &job,
+            &Line {
+                side,
+                reversed: false,
+                span: path.span,
+            },
+        )?;
+        let contact = patch.surface.contact(path.fraction, &patch.ball)?;
         patch.ball.check_fit(&contact)?;
-        let located = patch.ball.locate(&contact, &patch.origin_nm)?;
+        let located = patch.ball.locate(&contact, &patch.origin)?;
         let normal = patch.ball.normal(contact.offset);
         Ok(Probe {
             cc_nm: located.cc_nm,

@@ -58,6 +58,7 @@ pub mod fault;
 pub mod interpolator;
 mod interval;
 pub mod job;
+mod lane;
 mod offset;
 mod patch;
 mod program;

@@ -1,6 +1,6 @@
 //! Step 3: from cutter contact to cutter location, `CL = CC + r N` (Lo 1998, eqns 2 and 3), and whether the ball fits.
 
-use crate::arith::{power_of_two, sqrt, to_f32, to_top, truncated};
+use crate::arith::{power_of_two, product, q30_to_f32, sqrt, to_f32, to_top, truncated, whole_q30};
 use crate::fault::{Fault, FaultKind, Result};
 use crate::surface::{Contact, SHIFT_MAX};
 use crate::vec3::Vec3;
@@ -28,16 +28,9 @@ pub(crate) struct Ball {
     product: f32,
     /// Least upper word of the product of two neighbours' offsets.
     fold_min: i32,
-    /// Half a nanometre in the patch's units, and in those of the sum.
-    half: i32,
-    sum_half: i32,
-    shift: u8,
-    /// Units in which contact and offset are added, 2^-sum_shift nm: coarser than both where one asks for it, and by a bit in any
-    /// case, so that neither exceeds 2^30 and their sum fits.
-    sum_shift: u8,
-    /// From the patch's units, and from the offsets', to those of the sum.
-    coarser: u8,
-    coarser_offset: u8,
+    /// The patch's unit and the offsets', in units of 2^-30 nm.
+    unit: i32,
+    offset_unit: i32,
 }
 
 /// Cutter contact and cutter location, nm.
@@ -53,30 +46,21 @@ impl Ball {
         signed_radius: 0.0,
         product: 0.0,
         fold_min: 0,
-        half: 0,
-        sum_half: 0,
-        shift: 0,
-        sum_shift: 0,
-        coarser: 0,
-        coarser_offset: 0,
+        unit: 0,
+        offset_unit: 0,
     };
 
     /// The ball of this radius, 1e-6 to 1000 mm, for a patch in units of 2^-shift nm.
     pub(crate) fn new(radius_mm: f32, shift: u8, sign: f32) -> Self {
         let shift = shift.min(SHIFT_MAX);
         let (radius, fine) = to_top(radius_mm * 1e6);
-        let sum_shift = shift.saturating_sub(1).min(fine);
         let change = i32::from(shift) - i32::from(fine);
         Self {
             signed_radius: sign * radius,
             product: power_of_two(33 + change),
             fold_min: truncated(radius * power_of_two(-32) * radius * FOLD_COSINE),
-            half: (1 << shift) >> 1,
-            sum_half: (1 << sum_shift) >> 1,
-            shift,
-            sum_shift,
-            coarser: shift - sum_shift,
-            coarser_offset: fine - sum_shift,
+            unit: 1 << (30 - shift),
+            offset_unit: 1 << (30 - fine),
         }
     }
 
@@ -117,70 +101,69 @@ impl Ball {
         if contact.along > ROOM_MIN && contact.along * contact.across - contact.twist_squared > room {
             return Ok(());
         }
-        explain_fit(contact)
+        explain_fit(
+            contact.along,
+            contact.across,
+            contact.twist_squared,
+            contact.lateral_squared,
+            contact.speed_squared,
+        )
     }
 
-    /// Cutter contact and location. The contact is rounded to the nanometre for the report only.
+    /// Cutter contact and location on a patch with this origin ([`origin_q30`]), each rounded to the nanometre once.
     ///
     /// # Errors
     /// [`FaultKind::OutOfRange`] where a coordinate is outside ±2.147 m.
     #[inline(always)]
-    pub(crate) fn locate(&self, contact: &Contact, origin_nm: &[i32; 3]) -> Result<Located> {
+    pub(crate) fn locate(&self, contact: &Contact, origin: &[i64; 3]) -> Result<Located> {
         let ([x, y, z], [ox, oy, oz]) = (contact.position, contact.offset);
-        let [x0, y0, z0] = *origin_nm;
-        // A position stays half a nanometre clear of the range (`surface::range`).
-        let cc = |position: i32, origin: i32| {
-            origin.checked_add(position.wrapping_add(self.half).wrapping_shr(self.shift.into()))
+        let [x0, y0, z0] = *origin;
+        // Neither sum reaches 2^63: they are of the origin, 2^61, the position, 2^61, and the offset, 2^60.
+        let axis = |origin: i64, position: i32, offset: i32| {
+            let contact = origin.wrapping_add(product(position, self.unit));
+            let ((cc, cc_excess), (cl, cl_excess)) = (
+                whole_q30(contact),
+                whole_q30(contact.wrapping_add(product(offset, self.offset_unit))),
+            );
+            (cc, cl, cc_excess | cl_excess)
         };
-        let cl = |position: i32, offset: i32, origin: i32| {
-            let position = position.wrapping_shr(self.coarser.into());
-            let offset = offset.wrapping_shr(self.coarser_offset.into());
-            let sum = position.wrapping_add(self.sum_half).checked_add(offset)?;
-            origin.checked_add(sum.wrapping_shr(self.sum_shift.into()))
-        };
-        match (
-            (cc(x, x0), cl(x, ox, x0)),
-            (cc(y, y0), cl(y, oy, y0)),
-            (cc(z, z0), cl(z, oz, z0)),
-        ) {
-            ((Some(cx), Some(lx)), (Some(cy), Some(ly)), (Some(cz), Some(lz))) => Ok(Located {
-                cc_nm: [cx, cy, cz],
-                cl_nm: [lx, ly, lz],
-            }),
-            _ => Err(self.explain_range(contact, origin_nm)),
+        let ((cx, lx, ex), (cy, ly, ey), (cz, lz, ez)) = (axis(x0, x, ox), axis(y0, y, oy), axis(z0, z, oz));
+        if (ex | ey | ez) >> 30 != 0 {
+            return Err(self.explain_range(contact.position, contact.offset, origin));
         }
+        Ok(Located {
+            cc_nm: [cx, cy, cz],
+            cl_nm: [lx, ly, lz],
+        })
     }
 
     #[cold]
     #[inline(never)]
-    fn explain_range(&self, contact: &Contact, origin_nm: &[i32; 3]) -> Fault {
-        let metres = |count: i32, shift: u8| to_f32(count) * 1e-9 * power_of_two(-i32::from(shift));
+    fn explain_range(&self, position: [i32; 3], offset: [i32; 3], origin: &[i64; 3]) -> Fault {
         let mut worst = 0.0_f32;
-        let places = contact.position.into_iter().zip(contact.offset).zip(*origin_nm);
-        for ((position, offset), origin) in places {
-            let value = metres(origin, 0)
-                + metres(position, self.shift)
-                + metres(offset, self.sum_shift + self.coarser_offset);
-            if value.abs() > worst.abs() {
-                worst = value;
+        for ((position, offset), origin) in position.into_iter().zip(offset).zip(*origin) {
+            let contact = origin.wrapping_add(product(position, self.unit));
+            for value in [contact, contact.wrapping_add(product(offset, self.offset_unit))] {
+                let metres = q30_to_f32(value) * 1e-9;
+                if metres.abs() > worst.abs() {
+                    worst = metres;
+                }
             }
         }
         Fault::new(FaultKind::OutOfRange, worst)
     }
 }
 
+/// A patch's origin in units of 2^-30 nm, and half a nanometre for the rounding.
+pub(crate) fn origin_q30(origin_nm: [i32; 3]) -> [i64; 3] {
+    origin_nm.map(|nm| (i64::from(nm) << 30) + (1 << 29))
+}
+
 /// The uncommon end of [`Ball::check_fit`]: a pole, or the fault with its value.
 #[cold]
 #[inline(never)]
-fn explain_fit(contact: &Contact) -> Result<()> {
-    let Contact {
-        along,
-        across,
-        twist_squared,
-        lateral_squared: lateral,
-        ..
-    } = *contact;
-    if !(lateral > POLE_MIN * contact.speed_squared) {
+fn explain_fit(along: f32, across: f32, twist_squared: f32, lateral: f32, speed_squared: f32) -> Result<()> {
+    if !(lateral > POLE_MIN * speed_squared) {
         return if along > ROOM_MIN {
             Ok(())
         } else {

@@ -4,12 +4,12 @@ use crate::arith::{centred, power_of_two};
 use crate::fault::Result;
 use crate::interval::Interval;
 use crate::job::{SurfaceKind, ToolSide};
-use crate::offset::Ball;
+use crate::lane::Line;
+use crate::offset::{Ball, origin_q30};
 use crate::program::Job;
-use crate::sample::Place;
 use crate::surface::{
-    CirclePass, POLYNOMIAL_WORDS, PassLine, PolePass, PolynomialPass, ProfilePass, RATIONAL_WORDS,
-    REVOLVED_WORDS, RationalPass, Surface, split_patch, split_revolved,
+    CirclePass, GridPass, POLYNOMIAL_WORDS, PassLine, PathSpeed, ProfilePass, RATIONAL_WORDS, REVOLVED_WORDS,
+    Surface, split_patch, split_revolved,
 };
 
 /// A patch on a pass. Units are 2^-shift nm of the patch.
@@ -18,33 +18,38 @@ pub(crate) struct Patch {
     pub(crate) surface: Surface,
     pub(crate) ball: Ball,
     pub(crate) interval: Interval,
-    pub(crate) origin_nm: [i32; 3],
+    /// Units of 2^-30 nm, see [`origin_q30`].
+    pub(crate) origin: [i64; 3],
     /// One period's arc, units.
     pub(crate) arc: f32,
     /// Units a mm.
     pub(crate) per_mm: f32,
     /// The pass is a single point here.
     pub(crate) point: bool,
+    /// The parametrisation at start and end, once [`Self::find_ends`] has it.
+    ends: Option<[PathSpeed; 2]>,
 }
 
 impl Patch {
     /// None yet.
     pub(crate) const NONE: Self = Self {
-        surface: Surface::Polynomial(PolynomialPass::NONE),
+        surface: Surface::Grid(GridPass::NONE),
         ball: Ball::NONE,
         interval: Interval::NONE,
-        origin_nm: [0; 3],
+        origin: [0; 3],
         arc: 0.0,
         per_mm: 1.0,
         point: false,
+        ends: None,
     };
 
-    /// Collapses the patch at a path span and a side place, to be travelled in one direction or the other.
+    /// Collapses the patch of a pass.
     ///
     /// # Errors
     /// [`crate::FaultKind::WrongState`] where the job has no such patch; what the surface's kind finds wrong.
     #[inline(never)]
-    pub(crate) fn collapse(&mut self, job: &Job<'_>, span: u16, side: Place, reversed: bool) -> Result<()> {
+    pub(crate) fn collapse(&mut self, job: &Job<'_>, line: &Line) -> Result<()> {
+        let Line { side, reversed, span } = *line;
         let at = PassLine {
             fraction: side.fraction,
             side: centred(side.fraction),
@@ -73,7 +78,7 @@ impl Patch {
             kind => {
                 let words = job.patch::<REVOLVED_WORDS>(span, side.span)?;
                 let (shift, height_nm) = split_revolved(words);
-                self.origin_nm = [0, 0, height_nm];
+                self.origin = origin_q30([0, 0, height_nm]);
                 self.measure(job, shift, side.span, sign);
                 let radius = sign * job.header.ball_radius_mm * self.per_mm;
                 if kind == SurfaceKind::RevolvedAlongProfile {
@@ -88,33 +93,46 @@ impl Patch {
             }
         }
         self.point = self.surface.is_point();
+        self.ends = None;
         Ok(())
     }
 
-    /// A patch of a grid, with as many blocks as it has coordinates. Where the kind is that of the patch before, in its place.
+    /// Finds the parametrisation at both ends, for [`Self::start`] and [`Self::end`] to have it at hand.
+    pub(crate) fn find_ends(&mut self) {
+        self.ends = Some([self.start(), self.end()]);
+    }
+
+    /// Whether [`Self::find_ends`] was here.
+    pub(crate) const fn has_ends(&self) -> bool {
+        self.ends.is_some()
+    }
+
+    /// The parametrisation where the patch begins, in the direction of travel.
+    pub(crate) fn start(&self) -> PathSpeed {
+        match self.ends {
+            Some([start, _]) => start,
+            None => self.surface.path_at(0),
+        }
+    }
+
+    /// The parametrisation where it ends.
+    pub(crate) fn end(&self) -> PathSpeed {
+        match self.ends {
+            Some([_, end]) => end,
+            None => self.surface.path_at(u64::MAX),
+        }
+    }
+
+    /// A patch of a grid, with as many blocks as it has coordinates.
     fn collapse_grid(&mut self, job: &Job<'_>, words: &[i32], side_span: u16, sign: f32, at: &PassLine) {
         let (origin_nm, shift, edges, blocks) = split_patch(words);
-        self.origin_nm = origin_nm;
+        self.origin = origin_q30(origin_nm);
         self.measure(job, shift, side_span, sign);
-        if edges.count() > 0 {
-            let mut pass = PolePass::default();
-            pass.collapse(blocks, edges, at);
-            self.surface = Surface::Pole(pass);
-            return;
+        if !matches!(self.surface, Surface::Grid(_)) {
+            self.surface = Surface::Grid(GridPass::NONE);
         }
-        match (&mut self.surface, job.header.kind) {
-            (Surface::Polynomial(pass), SurfaceKind::Polynomial) => pass.collapse(blocks, at),
-            (Surface::Rational(pass), SurfaceKind::Rational) => pass.collapse(blocks, at),
-            (surface, SurfaceKind::Polynomial) => {
-                let mut pass = PolynomialPass::default();
-                pass.collapse(blocks, at);
-                *surface = Surface::Polynomial(pass);
-            }
-            (surface, _) => {
-                let mut pass = RationalPass::default();
-                pass.collapse(blocks, at);
-                *surface = Surface::Rational(pass);
-            }
+        if let Surface::Grid(pass) = &mut self.surface {
+            pass.collapse(blocks, edges, at);
         }
     }
 

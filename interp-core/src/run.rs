@@ -5,15 +5,16 @@ use crate::contact::{self, Reach};
 use crate::fault::{Fault, FaultKind, Result};
 use crate::interval::interval;
 use crate::job::Pattern;
+use crate::lane::{Lane, Line};
 use crate::patch::Patch;
 use crate::program::Job;
 use crate::sample::{Place, Sample};
 use crate::schedule;
-use crate::surface::{Pass, PathSpeed, Surface};
+use crate::surface::{AnyPass, Pass, PathSpeed};
 
-/// Patch boundaries that one period's arc may cross: each costs the collapse of a patch and some evaluations. Two lets a
-/// tick pass a whole patch that is shorter than its arc; more of them in a row say the feed is not meant for the part.
-const CROSSINGS_MAX: u8 = 2;
+/// Patch boundaries that one period's arc may cross. One lets every patch through that is longer than the arc; the cost of a second,
+/// of patches that are not, would come on top of the dearest tick there is.
+const CROSSINGS_MAX: u8 = 1;
 
 /// Step from place to place on a pole: 16 to a span. Between two the speed of the side lines, a rational cubic of the path
 /// parameter, changes by a small part of itself.
@@ -54,11 +55,11 @@ struct Travel {
     side: Place,
 }
 
-/// A run: the travel, and the patch that it is on.
+/// A run: the travel, and the patches that it is on.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Run {
     travel: Travel,
-    patch: Patch,
+    lane: Lane,
     /// r N at the pass's first sample.
     first_offset: [i32; 3],
     /// Least interval of the pass that was finished last, in units of the side parameter.
@@ -92,12 +93,22 @@ impl Travel {
         }
     }
 
-    /// Steps 2 to 4 at the place where the run now is. Nothing of `last` changes if there is a fault.
-    #[inline(always)]
+    /// The patch that the run is on.
+    const fn line(&self) -> Line {
+        Line {
+            side: self.side,
+            reversed: self.reversed,
+            span: self.span,
+        }
+    }
+
+    /// Steps 2 to 4 at the place where the run now is. Nothing of `last` changes if there is a fault. Not inlined: a function for
+    /// each kind of surface saves no more registers than that kind needs.
+    #[inline(never)]
     fn sample<P: Pass>(&mut self, pass: &P, patch: &Patch, last: &mut Sample) -> Result<()> {
         let contact = pass.contact(self.fraction, &patch.ball)?;
         patch.ball.check_fit(&contact)?;
-        let located = patch.ball.locate(&contact, &patch.origin_nm)?;
+        let located = patch.ball.locate(&contact, &patch.origin)?;
         if patch.ball.folds(dot_hi(&self.offset, &contact.offset)) {
             return Err(folded());
         }
@@ -128,7 +139,7 @@ impl Run {
     /// Before the first sample.
     pub(crate) const START: Self = Self {
         travel: Travel::START,
-        patch: Patch::NONE,
+        lane: Lane::START,
         first_offset: [0; 3],
         last_interval: f32::INFINITY,
     };
@@ -167,10 +178,13 @@ impl Run {
     pub(crate) fn advance(&mut self, job: &Job<'_>, last: &mut Sample) -> Result<bool> {
         let travel = &mut self.travel;
         if travel.next == Next::Along {
-            let step = contact::step(&travel.path, travel.stretch_before, self.patch.arc);
+            let step = contact::step(&travel.path, travel.stretch_before, self.lane.patch().arc);
             if let Some(fraction) = step.and_then(|step| travel.fraction.checked_add(step)) {
                 travel.fraction = fraction;
                 self.sample(last)?;
+                if self.lane.has_work() {
+                    self.lane.work(job, &self.travel.line());
+                }
                 return Ok(true);
             }
         }
@@ -185,7 +199,7 @@ impl Run {
     pub(crate) fn advance_far(&mut self, job: &Job<'_>, share: f32, last: &mut Sample) -> Result<bool> {
         let begins = !self.is_along();
         match self.travel.next {
-            Next::Along if self.patch.point => self.step_on_pole(job)?,
+            Next::Along if self.lane.patch().point => self.step_on_pole(job)?,
             Next::Along => self.step_far(job, share)?,
             Next::Pass => self.begin_pass(job)?,
             Next::Over => {
@@ -205,7 +219,7 @@ impl Run {
         last.pass = travel.pass;
         last.path.span = travel.span;
         last.side = travel.side;
-        last.feed_mm_s = if self.patch.point {
+        last.feed_mm_s = if self.lane.patch().point {
             0.0
         } else {
             job.header.feed_mm_s * share
@@ -214,15 +228,18 @@ impl Run {
     }
 
     /// The sample where the run is.
-    #[inline(never)]
+    #[inline(always)]
     fn sample(&mut self, last: &mut Sample) -> Result<()> {
-        let Self { travel, patch, .. } = self;
-        match &patch.surface {
-            Surface::Polynomial(pass) => travel.sample(pass, patch, last),
-            Surface::Rational(pass) => travel.sample(pass, patch, last),
-            Surface::Pole(pass) => travel.sample(pass, patch, last),
-            Surface::Profile(pass) => travel.sample(pass, patch, last),
-            Surface::Circle(pass) => travel.sample(pass, patch, last),
+        let Self { travel, lane, .. } = self;
+        let patch = lane.patch();
+        match patch.surface.pass() {
+            AnyPass::Polynomial(pass) => travel.sample(&pass, patch, last),
+            AnyPass::Ruled(pass) => travel.sample(&pass, patch, last),
+            AnyPass::Extruded(pass) => travel.sample(&pass, patch, last),
+            AnyPass::Rational(pass) => travel.sample(&pass, patch, last),
+            AnyPass::Pole(pass) => travel.sample(&pass, patch, last),
+            AnyPass::Profile(pass) => travel.sample(pass, patch, last),
+            AnyPass::Circle(pass) => travel.sample(pass, patch, last),
         }
     }
 
@@ -230,9 +247,11 @@ impl Run {
     fn step_far(&mut self, job: &Job<'_>, share: f32) -> Result<()> {
         let mut rest = share * job.header.feed_mm_s * job.header.period_s;
         for crossings in 0..=CROSSINGS_MAX {
-            let Self { travel, patch, .. } = self;
+            let Self { travel, lane, .. } = self;
+            let patch = lane.patch();
             let arc = rest * patch.per_mm;
-            let covered = match contact::solve(&patch.surface, travel.fraction, &travel.path, arc)? {
+            let end = || patch.end();
+            let covered = match contact::solve(&patch.surface, travel.fraction, &travel.path, end, arc)? {
                 Reach::Within(fraction) => {
                     travel.fraction = fraction;
                     return Ok(());
@@ -247,7 +266,7 @@ impl Run {
                 self.end_pass(job);
                 return Ok(());
             }
-            self.travel.path = self.patch.surface.path_at(0)?;
+            self.travel.path = self.lane.patch().start().checked()?;
         }
         Err(Fault::new(FaultKind::PatchTooShort, rest))
     }
@@ -262,29 +281,16 @@ impl Run {
         Ok(())
     }
 
-    /// Collapses the patch where the run is, and has no sample on it yet.
-    fn enter_patch(&mut self, job: &Job<'_>) -> Result<()> {
-        let travel = &mut self.travel;
-        self.patch
-            .collapse(job, travel.span, travel.side, travel.reversed)?;
-        travel.path.stretch = f32::NAN;
-        Ok(())
-    }
-
     /// Goes to the start of the next patch along the pass; false at the pass's end.
     fn next_span(&mut self, job: &Job<'_>) -> Result<bool> {
         let travel = &mut self.travel;
-        let next = if travel.reversed {
-            travel.span.checked_sub(1)
-        } else {
-            travel.span.checked_add(1)
-        };
-        let Some(span) = next.filter(|span| *span < job.header.path_spans) else {
+        let Some(line) = travel.line().next(job.header.path_spans) else {
             return Ok(false);
         };
-        travel.span = span;
+        travel.span = line.span;
         travel.fraction = 0;
-        self.enter_patch(job)?;
+        travel.path.stretch = f32::NAN;
+        self.lane.go_on(job, &line)?;
         Ok(true)
     }
 
@@ -301,7 +307,8 @@ impl Run {
         travel.fraction = 0;
         travel.most = 0.0;
         travel.next = Next::Along;
-        self.enter_patch(job)
+        travel.path.stretch = f32::NAN;
+        self.lane.begin(job, &travel.line())
     }
 
     /// Least interval of the pass that is over, in units of the side parameter.
@@ -315,8 +322,7 @@ impl Run {
         self.note_interval();
         let travel = &mut self.travel;
         let width = |span| job.side_width(span);
-        let fractions = self.last_interval / width(travel.side.span);
-        travel.side = schedule::next_side(travel.side, fractions, job.header.side_spans, width)?;
+        travel.side = schedule::next_side(travel.side, self.last_interval, job.header.side_spans, width)?;
         travel.pass = travel.pass.wrapping_add(1);
         if job.header.pattern == Pattern::Zig {
             travel.offset = self.first_offset;

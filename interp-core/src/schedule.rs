@@ -3,48 +3,48 @@
 
 use crate::arith::{fraction_32, fraction_from_f32};
 use crate::fault::{Fault, FaultKind, Result};
-use crate::job::SPANS_MAX;
 use crate::sample::Place;
 
-/// The next pass's side parameter, `interval` fractions of this side span further; the end of the last span at most.
-/// Fractions are kept to 2^-32, so that the place that is reported is the one that is used. `width` gives the span's
-/// width in units of the side parameter: an interval that reaches past a span's end goes on in the next span's measure.
+/// Boundaries between side spans that an interval reaches over at most, so that the walk is bounded; one that reaches further
+/// ends on the last of them: nearer than the scallop asks for, where patches are that much narrower than it.
+const WALK_MAX: u16 = 16;
+
+/// The next pass's side parameter, `interval` (in units of the side parameter) further; the end of the last span at most.
+/// Fractions are kept to 2^-32, so that the place that is reported is the one that is used. `width` gives a span's
+/// width in units of the side parameter.
 ///
 /// # Errors
 /// [`FaultKind::IntervalTooSmall`] where the interval does not advance the parameter.
 pub(crate) fn next_side(from: Place, interval: f32, spans: u16, width: impl Fn(u16) -> f32) -> Result<Place> {
     const SPAN: u64 = 1 << 32;
+    let mut span = from.span;
     let mut at = from.fraction >> 32;
     let mut rest = interval;
-    // At most SPANS_MAX rounds: a surface has no more spans.
-    for span in from.span..spans.min(SPANS_MAX) {
-        let room = SPAN - at;
-        let step = fraction_from_f32(rest) >> 32;
-        if rest < 1.0 && step < room {
+    for _ in 0..WALK_MAX {
+        let room = if at == 0 {
+            width(span)
+        } else {
+            width(span) * fraction_32(u32::try_from(SPAN - at).unwrap_or(u32::MAX))
+        };
+        if rest < room {
+            let step = fraction_from_f32(rest / width(span)) >> 32;
             if step == 0 && span == from.span {
-                return Err(Fault::new(FaultKind::IntervalTooSmall, interval));
+                return Err(Fault::new(FaultKind::IntervalTooSmall, interval / width(span)));
             }
-            return Ok(Place {
-                span,
-                fraction: (at + step) << 32,
-            });
+            let fraction = (at + step).min(SPAN - 1) << 32;
+            return Ok(Place { span, fraction });
         }
         if span + 1 >= spans {
-            break;
+            return Ok(Place {
+                span,
+                fraction: u64::MAX,
+            });
         }
-        let covered = if at == 0 {
-            1.0
-        } else {
-            fraction_32(u32::try_from(room).unwrap_or(u32::MAX))
-        };
-        let over = (rest - covered) * width(span) / width(span + 1);
-        rest = if over > 0.0 { over } else { 0.0 };
+        rest -= room;
+        span += 1;
         at = 0;
     }
-    Ok(Place {
-        span: spans.saturating_sub(1),
-        fraction: u64::MAX,
-    })
+    Ok(Place { span, fraction: 0 })
 }
 
 /// Whether a pass there is the last.
@@ -79,11 +79,12 @@ mod tests {
         };
         near(at(0, 0.25), 0.5, 0.75);
         near(at(0, 0.75), 0.5, 1.5);
+        near(at(1, 0.75), 0.125 + 0.125, 2.5);
         near(at(0, 0.75), 0.25 + 0.5 + 0.125, 2.5);
         near(at(0, 0.0), 1.0, 1.0);
         near(at(0, 0.5), 0.5 + 0.5 + 0.25 + 2.0, 3.5);
         assert_eq!(
-            next_side(at(3, 0.5), 0.5, 4, width).unwrap(),
+            next_side(at(3, 0.5), 2.0, 4, width).unwrap(),
             Place {
                 span: 3,
                 fraction: u64::MAX
@@ -100,6 +101,12 @@ mod tests {
             next_side(at(1, 0.5), 1e-12, 4, width).unwrap_err().kind,
             FaultKind::IntervalTooSmall
         );
+        // No further than so many boundaries, and the last pass is at the end all the same.
+        let even = |_| 1.0;
+        let near = next_side(at(2, 0.5), f32::INFINITY, 40, even).unwrap();
+        assert_eq!(near, at(2 + WALK_MAX, 0.0));
+        let last = next_side(at(30, 0.5), f32::INFINITY, 40, even).unwrap();
+        assert!(is_last(last, 40));
         assert!(is_last(
             Place {
                 span: 3,

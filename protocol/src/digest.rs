@@ -9,6 +9,8 @@
 //!
 //! Every step is a bijection of `h`, so a single word that differs always shows. It is no protection against intent.
 
+use core::hint::black_box;
+
 use interp_core::sample::Sample;
 
 /// Running digest; see the module's documentation for its definition.
@@ -19,7 +21,8 @@ impl Digest {
     /// The digest of nothing.
     pub const EMPTY: u64 = 0xcbf2_9ce4_8422_2325;
 
-    const PRIME: u64 = 0x0000_0100_0000_01b3;
+    /// Low half of the prime; its high half is 2^8.
+    const PRIME_LOW: u32 = 0x1b3;
 
     /// A digest that was fed nothing yet.
     #[must_use]
@@ -36,7 +39,19 @@ impl Digest {
     /// Feeds one word.
     #[inline]
     pub const fn word(&mut self, word: u32) {
-        self.0 = (self.0 ^ word as u64).wrapping_mul(Self::PRIME);
+        self.word_and(word, 0);
+    }
+
+    /// Feeds one word; `zero` is added. By halves, because that is four instructions: exclusive or, product, shifted add, and
+    /// the long product that accumulates.
+    #[inline]
+    const fn word_and(&mut self, word: u32, zero: u32) {
+        let bottom = low(self.0) ^ word;
+        let top = low(self.0 >> 32)
+            .wrapping_mul(Self::PRIME_LOW)
+            .wrapping_add(bottom << 8);
+        let product = bottom as u64 * Self::PRIME_LOW as u64;
+        self.0 = product.wrapping_add((top as u64) << 32 | zero as u64);
     }
 
     /// Feeds the data words of a job, in order.
@@ -50,18 +65,27 @@ impl Digest {
     /// fraction, the side's span, low and high half, feed (f32 bits), CC x y z (nm), CL x y z (nm), density (f32 bits).
     #[inline]
     pub fn sample(&mut self, sample: &Sample) {
-        self.word(sample.tick);
-        self.word(u32::from(sample.state as u8));
-        self.word(sample.pass);
-        for place in [sample.path, sample.side] {
-            self.word(u32::from(place.span));
-            self.word(low(place.fraction));
-            self.word(low(place.fraction >> 32));
+        // The low halves do not need the high ones: a compiler that knows so computes all of the former first, and runs out
+        // of registers. A zero that it cannot see through keeps each word's two halves together: 111 instructions, not 164.
+        let zero = black_box(0);
+        let mut digest = *self;
+        let mut feed = |word| digest.word_and(word, zero);
+        feed(sample.tick);
+        feed(u32::from(sample.state as u8));
+        feed(sample.pass);
+        for place in [&sample.path, &sample.side] {
+            feed(u32::from(place.span));
+            feed(low(place.fraction));
+            feed(low(place.fraction >> 32));
         }
-        self.word(sample.feed_mm_s.to_bits());
-        self.words(&sample.cc_nm);
-        self.words(&sample.cl_nm);
-        self.word(sample.density.to_bits());
+        feed(sample.feed_mm_s.to_bits());
+        for [x, y, z] in [&sample.cc_nm, &sample.cl_nm] {
+            feed(x.cast_unsigned());
+            feed(y.cast_unsigned());
+            feed(z.cast_unsigned());
+        }
+        feed(sample.density.to_bits());
+        *self = digest;
     }
 }
 

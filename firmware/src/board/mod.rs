@@ -44,3 +44,12 @@ pub(crate) struct Board {
     /// The status LED.
     pub(crate) status_pin: StatusPin,
 }
+
+/// Where a panic happened, and its message where that is a plain text: `core`'s machinery for any other is 4 KB.
+fn log_panic(info: &core::panic::PanicInfo<'_>) {
+    let message = info.message().as_str().unwrap_or("");
+    match info.location() {
+        Some(at) => defmt::error!("panic at {=str}:{=u32}: {=str}", at.file(), at.line(), message),
+        None => defmt::error!("panic: {=str}", message),
+    }
+}

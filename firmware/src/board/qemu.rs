@@ -73,7 +73,7 @@ fn panic(info: &core::panic::PanicInfo<'_>) -> ! {
     static AGAIN: AtomicBool = AtomicBool::new(false);
     // The log itself may be what panicked; then the exit code has to do.
     if !AGAIN.swap(true, Ordering::Relaxed) {
-        defmt::error!("{}", defmt::Display2Format(info));
+        super::log_panic(info);
     }
     semihosting::process::exit(EXIT_PANIC)
 }

@@ -4,7 +4,6 @@
 //! An STM32F4DISCOVERY runs it too, with its LED elsewhere (PD12) and the capacitor on PA9 removed.
 
 use defmt_rtt as _;
-use panic_probe as _;
 use stm32f4xx_hal::{
     gpio::{Output, PC12},
     pac,
@@ -103,4 +102,12 @@ pub(crate) fn stop_for_good() -> ! {
     loop {
         cortex_m::asm::nop();
     }
+}
+
+#[panic_handler]
+fn panic(info: &core::panic::PanicInfo<'_>) -> ! {
+    // Nothing is to move meanwhile, nor to panic in between.
+    cortex_m::interrupt::disable();
+    super::log_panic(info);
+    stop_for_good()
 }

@@ -53,15 +53,29 @@ impl SampleTimer {
 
     /// At the end of a tick: how many further periods have begun since this one was due. 0 as long as every
     /// tick is over before the next; every one counted has missed its deadline.
+    #[inline]
     pub(crate) fn end(&mut self) -> u32 {
         let now = self.clock.cnt().read().cnt().bits();
         let due = self.due.unwrap_or(now);
-        let begun = now.wrapping_sub(due) / self.period_counts;
+        let late = now.wrapping_sub(due);
         // The flag is the last word on whether a period has begun; the clock can only say how many.
-        let missed = begun.max(u32::from(self.timer.sr().read().uif().bit_is_set()));
+        let pending = self.timer.sr().read().uif().bit_is_set();
+        self.due = Some(due.wrapping_add(self.period_counts));
+        if late < self.period_counts && !pending {
+            return 0;
+        }
+        self.missed(due, late)
+    }
+
+    /// Counts the periods that have begun, one at least.
+    #[cold]
+    #[inline(never)]
+    fn missed(&mut self, due: u32, late: u32) -> u32 {
+        // The period is no zero; checked, so that no panic is there to be proved unreachable.
+        let missed = late.checked_div(self.period_counts).unwrap_or(0).max(1);
         // One interrupt is pending however many periods have begun: the next tick stands for the latest of
         // them.
-        self.due = Some(due.wrapping_add(missed.max(1).wrapping_mul(self.period_counts)));
+        self.due = Some(due.wrapping_add(missed.wrapping_mul(self.period_counts)));
         missed
     }
 }

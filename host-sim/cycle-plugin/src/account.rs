@@ -21,6 +21,8 @@ struct Known {
     placed: Placed,
     stage: Option<Stage>,
     handler: Option<u32>,
+    /// A function begins here.
+    starts: bool,
 }
 
 /// What runs: the thread, or a handler.
@@ -93,6 +95,7 @@ impl Account {
             },
             stage: self.plan.stages.get(index).copied().flatten(),
             handler,
+            starts: self.plan.starts.get(index).copied().unwrap_or(false),
         });
         Some(index)
     }
@@ -194,7 +197,7 @@ impl Account {
             return;
         };
         if let Some(before) = before {
-            follow(context, &before.placed, &known.placed);
+            follow(context, &before.placed, known);
         }
         let instruction = &known.placed.instruction;
         // Nothing of what was before a jump is left in the pipeline.
@@ -224,16 +227,19 @@ impl Account {
 }
 
 /// The instruction before was a branch if what runs now does not stand behind it: charges that, and keeps the callers.
-fn follow(context: &mut Context, before: &Placed, now: &Placed) {
+fn follow(context: &mut Context, before: &Placed, now: &Known) {
     let instruction = &before.instruction;
-    if now.address == before.end() || !instruction.may_branch() {
+    if now.placed.address == before.end() || !instruction.may_branch() {
         return;
     }
-    context.charge(context.charged, cost::taken(before, now));
+    context.charge(context.charged, cost::taken(before, &now.placed));
+    let stage = Stage::ALL.get(context.charged).copied().unwrap_or(Stage::Rest);
     if instruction.is_call() {
-        let stage = Stage::ALL.get(context.charged).copied().unwrap_or(Stage::Rest);
         context.callers.push(stage);
     } else if instruction.is_return() {
         context.callers.pop();
+    } else if let Some(caller) = context.callers.last_mut().filter(|_| now.starts) {
+        // A tail call: who branches here takes the place of his caller, to whom the function returns.
+        *caller = stage;
     }
 }

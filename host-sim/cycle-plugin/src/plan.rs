@@ -3,7 +3,7 @@
 //! The code comes with the plan, because the function that would read it from QEMU has changed between versions.
 
 /// First word of the file: `ISOP` and a version.
-const MAGIC: u32 = 0x4953_4f02;
+const MAGIC: u32 = 0x4953_4f03;
 
 /// Words before the code.
 const HEAD_WORDS: usize = 5;
@@ -89,9 +89,14 @@ pub struct Plan {
     pub code: Vec<u8>,
     /// Stage of the instruction at each halfword of the code; none for helpers, which are charged to their callers.
     pub stages: Vec<Option<Stage>>,
+    /// Whether a function begins at each halfword of the code: a branch there is a tail call.
+    pub starts: Vec<bool>,
 }
 
-const NO_STAGE: u8 = 0xff;
+const NO_STAGE: u8 = 0x7f;
+
+/// Set where a function begins.
+const START: u8 = 0x80;
 
 impl Plan {
     /// The halfword at an index.
@@ -115,11 +120,11 @@ impl Plan {
         let head = [MAGIC, self.base, self.exception, self.stack_end, length];
         let mut bytes: Vec<u8> = head.iter().flat_map(|word| word.to_le_bytes()).collect();
         bytes.extend_from_slice(&self.code);
-        bytes.extend(
-            self.stages
-                .iter()
-                .map(|stage| stage.map_or(NO_STAGE, |stage| stage as u8)),
-        );
+        let starts = self.starts.iter().copied().chain(std::iter::repeat(false));
+        bytes.extend(self.stages.iter().zip(starts).map(|(stage, starts)| {
+            let start = if starts { START } else { 0 };
+            start | stage.map_or(NO_STAGE, |stage| stage as u8)
+        }));
         bytes
     }
 
@@ -140,7 +145,11 @@ impl Plan {
             exception,
             stack_end,
             code: code.to_vec(),
-            stages: stages.iter().map(|byte| Stage::from_byte(*byte)).collect(),
+            stages: stages
+                .iter()
+                .map(|byte| Stage::from_byte(*byte & !START))
+                .collect(),
+            starts: stages.iter().map(|byte| byte & START != 0).collect(),
         })
     }
 }

@@ -1,7 +1,7 @@
-//! One record a tick: what the plugin writes and the host reads.
+//! One record a tick: what the plugin writes and the host reads. An idle tick that repeats the one before is left out.
 
 use crate::cost::Cycles;
-use crate::plan::STAGES;
+use crate::plan::{STAGES, Stage};
 
 /// Words of a record.
 const WORDS: usize = 4 + 2 * STAGES;
@@ -25,6 +25,16 @@ pub struct Record {
 }
 
 impl Record {
+    /// Whether nothing but the task's surroundings ran.
+    #[must_use]
+    pub fn is_idle(&self) -> bool {
+        let surroundings = [Stage::Rest, Stage::Exception];
+        Stage::ALL
+            .into_iter()
+            .filter(|stage| !surroundings.contains(stage))
+            .all(|stage| self.stages[stage as usize].nominal == 0)
+    }
+
     /// As it stands in the file.
     #[must_use]
     pub fn to_bytes(&self) -> Vec<u8> {

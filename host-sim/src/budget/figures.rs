@@ -79,6 +79,8 @@ pub struct Figure {
     pub max: u32,
     /// High-water mark of the stack over the job, bytes.
     pub stack_bytes: u32,
+    /// Those ticks by their cycles.
+    pub histogram: Histogram,
 }
 
 impl Figure {
@@ -96,7 +98,13 @@ impl Figure {
         cycles: impl Fn(&Record) -> u32,
     ) -> Self {
         let (mut count, mut sum, mut min, mut max) = (0_u32, 0_u64, u32::MAX, 0);
-        for cycles in ticks.records.iter().map(cycles).filter(|cycles| *cycles > 0) {
+        let all: Vec<u32> = ticks
+            .records
+            .iter()
+            .map(cycles)
+            .filter(|cycles| *cycles > 0)
+            .collect();
+        for cycles in all.iter().copied() {
             count += 1;
             sum += u64::from(cycles);
             min = min.min(cycles);
@@ -113,9 +121,23 @@ impl Figure {
             mean,
             max,
             stack_bytes: ticks.stack_bytes,
+            histogram: Histogram::of(all.into_iter(), max.saturating_sub(min) / BINS + 1),
         }
     }
+
+    /// The whole of a single tick.
+    #[must_use]
+    pub fn of_tick(surface: &str, model: Model, record: &Record) -> Self {
+        let ticks = Ticks {
+            records: vec![*record],
+            stack_bytes: 0,
+        };
+        Self::of(surface, TICK, model, &ticks, |record| whole(record, model))
+    }
 }
+
+/// Bins of a stage's histogram, from its least to its most.
+const BINS: u32 = 16;
 
 /// Cycles of the whole task in a tick.
 #[must_use]
@@ -141,7 +163,7 @@ pub fn figures(surface: &str, ticks: &Ticks) -> Vec<Figure> {
     figures
 }
 
-/// A histogram of the whole tick: cycles at which a bin begins, and its ticks.
+/// A histogram: cycles at which a bin begins, and its ticks.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Histogram {
     /// Cycles of a bin.
@@ -150,16 +172,41 @@ pub struct Histogram {
     pub bins: Vec<(u32, u32)>,
 }
 
+impl Histogram {
+    fn of(cycles: impl Iterator<Item = u32>, width: u32) -> Self {
+        let mut bins = std::collections::BTreeMap::new();
+        for cycles in cycles {
+            *bins.entry(cycles / width * width).or_insert(0) += 1;
+        }
+        Self {
+            width,
+            bins: bins.into_iter().collect(),
+        }
+    }
+
+    /// A line of characters, one a bin, as high as the logarithm of its ticks: a single tick is seen too.
+    #[must_use]
+    pub fn sparkline(&self) -> String {
+        const HEIGHTS: [char; 8] = [
+            '\u{2581}', '\u{2582}', '\u{2583}', '\u{2584}', '\u{2585}', '\u{2586}', '\u{2587}', '\u{2588}',
+        ];
+        let (Some(first), Some(last)) = (self.bins.first(), self.bins.last()) else {
+            return String::new();
+        };
+        let most = self.bins.iter().map(|bin| bin.1).max().unwrap_or(1);
+        let height = |count: u32| (7 * (count.ilog2() + 1)).div_ceil(most.ilog2() + 1) as usize;
+        (first.0..=last.0)
+            .step_by(self.width.max(1) as usize)
+            .map(|begin| {
+                let bin = self.bins.iter().find(|bin| bin.0 == begin);
+                bin.map_or(' ', |bin| HEIGHTS[height(bin.1.max(1)).min(7)])
+            })
+            .collect()
+    }
+}
+
 /// The histogram of a job's ticks.
 #[must_use]
 pub fn histogram(ticks: &Ticks, model: Model, width: u32) -> Histogram {
-    let mut bins = std::collections::BTreeMap::new();
-    for record in &ticks.records {
-        let begin = whole(record, model) / width * width;
-        *bins.entry(begin).or_insert(0) += 1;
-    }
-    Histogram {
-        width,
-        bins: bins.into_iter().collect(),
-    }
+    Histogram::of(ticks.records.iter().map(|record| whole(record, model)), width)
 }

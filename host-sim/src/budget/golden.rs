@@ -3,7 +3,12 @@
 use std::fmt::Write;
 use std::path::PathBuf;
 
-use super::figures::Figure;
+use super::BudgetError;
+use super::figures::{Figure, Model};
+use super::lab::Lab;
+use super::measure::Bench;
+use crate::job_file::JobFile;
+use crate::prepare::prepare;
 use crate::remote::qemu::workspace;
 
 /// Growth that passes.
@@ -20,6 +25,32 @@ const HEADER: &str = "\
 pub fn path() -> PathBuf {
     workspace().join("tests/golden/cycles.txt")
 }
+
+/// The worst job that a search has found; its worst tick is part of the table.
+#[must_use]
+pub fn worst_job() -> PathBuf {
+    workspace().join("tests/golden/worst_tick.toml")
+}
+
+/// Rows of the worst tick of [`worst_job`].
+///
+/// # Errors
+/// As [`Lab::run`]; the job cannot be read.
+pub fn worst(bench: &Bench) -> Result<Vec<Figure>, BudgetError> {
+    let path = worst_job();
+    let unusable = |error: &dyn std::fmt::Display| BudgetError::File(path.clone(), error.to_string());
+    let job = JobFile::load(&path).map_err(|error| unusable(&error))?;
+    let prepared = prepare(&job).map_err(|error| unusable(&error))?;
+    let mut lab = Lab::new(bench)?;
+    let run = lab.run(&prepared, WORST_TICKS)?;
+    let worst = lab.worst(&run)?;
+    Ok(Model::ALL
+        .map(|model| Figure::of_tick("worst job found", model, &worst.record))
+        .to_vec())
+}
+
+/// Ticks of the worst job.
+const WORST_TICKS: u32 = 2000;
 
 /// The table of these figures.
 #[must_use]
@@ -70,7 +101,6 @@ fn complaint(table: &str, figure: &Figure) -> Option<String> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::budget::figures::Model;
 
     fn figure(mean: f64, max: u32) -> Figure {
         Figure {
@@ -82,6 +112,7 @@ mod tests {
             mean,
             max,
             stack_bytes: 0,
+            histogram: crate::budget::figures::Histogram::default(),
         }
     }
 

@@ -1,6 +1,6 @@
 //! Runs the first ticks of a job in QEMU, and reads what each of them took.
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use cycle_plugin::plan::{Plan, Stage};
 use cycle_plugin::record::Record;
@@ -15,8 +15,8 @@ use crate::remote::{Session, drive};
 /// The image, the plan made of it, and the plugin: what every measurement starts from.
 #[derive(Debug)]
 pub struct Bench {
-    image: std::path::PathBuf,
-    plugin: std::path::PathBuf,
+    image: PathBuf,
+    plugin: PathBuf,
     plan: Vec<u8>,
     stack_end: u32,
 }
@@ -48,14 +48,19 @@ impl Bench {
         })
     }
 
-    /// Runs so many ticks of a job in lockstep, and reads the plugin's records.
-    ///
-    /// # Errors
-    /// QEMU does not start, the board refuses the job, or the records are not whole.
-    pub fn run(&self, job: &Prepared, ticks: u32) -> Result<Ticks, BudgetError> {
-        let here = Path::new("a temporary file");
-        let folder = tempfile::tempdir().map_err(|error| file_error(here, &error))?;
-        let (plan, records) = (folder.path().join("plan"), folder.path().join("records"));
+    /// The image.
+    pub(super) fn image(&self) -> &Path {
+        &self.image
+    }
+
+    /// Where the stack begins.
+    pub(super) const fn stack_end(&self) -> u32 {
+        self.stack_end
+    }
+
+    /// QEMU's arguments for the plugin, which writes into this folder; and the file of its records.
+    pub(super) fn plugin(&self, folder: &Path) -> Result<([String; 2], PathBuf), BudgetError> {
+        let (plan, records) = (folder.join("plan"), folder.join("records"));
         std::fs::write(&plan, &self.plan).map_err(|error| file_error(&plan, &error))?;
         let plugin = format!(
             "{},plan={},records={}",
@@ -63,8 +68,19 @@ impl Bench {
             plan.display(),
             records.display()
         );
+        Ok((["-plugin".to_owned(), plugin], records))
+    }
+
+    /// Runs so many ticks of a job in lockstep, and reads the plugin's records.
+    ///
+    /// # Errors
+    /// QEMU does not start, the board refuses the job, or the records are not whole.
+    pub fn run(&self, job: &Prepared, ticks: u32) -> Result<Ticks, BudgetError> {
+        let here = Path::new("a temporary file");
+        let folder = tempfile::tempdir().map_err(|error| file_error(here, &error))?;
+        let (arguments, records) = self.plugin(folder.path())?;
         let samples = {
-            let (_qemu, stream) = Qemu::start_with(&self.image, &["-plugin".to_owned(), plugin])?;
+            let (_qemu, stream) = Qemu::start_with(&self.image, &arguments)?;
             let mut session = Session::open(stream, 1)?;
             drive::upload(&mut session, job, |_| {})?;
             run_ticks(&mut session, ticks)?

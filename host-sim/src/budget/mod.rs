@@ -11,8 +11,11 @@
 pub mod chart;
 pub mod figures;
 pub mod golden;
+pub mod graph;
 pub mod image;
+pub mod lab;
 pub mod measure;
+pub mod search;
 pub mod stages;
 
 use std::path::PathBuf;

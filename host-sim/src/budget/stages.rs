@@ -8,19 +8,30 @@
 //! Limits: what the compiler merged or moved out of two stages carries the place of one; evaluations at the end of
 //! a patch, which a change of patch needs, count to `step` and `surface`.
 
+use std::collections::BTreeMap;
+
 use addr2line::Loader;
 use cycle_plugin::plan::Stage;
 
-/// Functions of `interp_core::run` that work for a stage; the others are everything else.
-const RUN: [(&str, Stage); 8] = [
-    ("step_far", Stage::Step),
-    ("enter_patch", Stage::PatchChange),
-    ("next_span", Stage::PatchChange),
-    ("begin_pass", Stage::PassChange),
-    ("step_over", Stage::PassChange),
-    ("step_on_pole", Stage::PassChange),
-    ("note_interval", Stage::PassChange),
-    ("end_pass", Stage::PassChange),
+/// A module of `interp_core` (a function in it, or all of it) and its stage; the first that fits counts. What is renamed there
+/// is renamed here: a name that occurs nowhere in the image is an error.
+const STAGES: [(&str, &str, Stage); 16] = [
+    ("contact", "", Stage::Step),
+    ("surface", "collapse", Stage::PatchChange),
+    ("surface", "", Stage::Surface),
+    ("offset", "", Stage::Offset),
+    ("interval", "", Stage::Interval),
+    ("patch", "", Stage::PatchChange),
+    ("schedule", "", Stage::PassChange),
+    ("run", "step_far", Stage::Step),
+    ("lane", "", Stage::PatchChange),
+    ("run", "next_span", Stage::PatchChange),
+    ("run", "begin_pass", Stage::PassChange),
+    ("run", "step_over", Stage::PassChange),
+    ("run", "note_interval", Stage::PassChange),
+    ("run", "end_pass", Stage::PassChange),
+    ("run", "", Stage::Rest),
+    ("interpolator", "", Stage::Rest),
 ];
 
 /// Crates of which every function is everything else.
@@ -33,37 +44,57 @@ const REST: [&str; 6] = [
     "stm32f4xx_hal",
 ];
 
+/// What a function's name comes to.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Entry {
+    /// A line of [`STAGES`].
+    Line(usize),
+    /// A crate of [`REST`].
+    Rest,
+    /// Charged to its caller.
+    Helper,
+}
+
+impl Entry {
+    /// By a function's path.
+    fn of(path: &str) -> Self {
+        let path = path.trim_start_matches(['<', '&']);
+        let mut parts = path
+            .split("::")
+            .map(|part| part.split('<').next().unwrap_or(part));
+        match parts.next() {
+            Some("interp_core") => {}
+            Some(root) if REST.contains(&root) => return Self::Rest,
+            _ => return Self::Helper,
+        }
+        let module = parts.next().unwrap_or_default();
+        let names: Vec<&str> = parts.collect();
+        // `collapse_axis` works for `collapse`, which it is inlined into or called by.
+        let fits = |name: &str| name.is_empty() || names.iter().any(|part| is_name(part, name));
+        STAGES
+            .iter()
+            .position(|(of, name, _)| *of == module && fits(name))
+            .map_or(Self::Helper, Self::Line)
+    }
+
+    const fn stage(self) -> Option<Stage> {
+        match self {
+            Self::Line(line) => Some(STAGES[line].2),
+            Self::Rest => Some(Stage::Rest),
+            Self::Helper => None,
+        }
+    }
+}
+
+/// Whether a part of a path is this function; those of the surfaces that begin with its name are its helpers.
+fn is_name(part: &str, name: &str) -> bool {
+    part == name || (name == "collapse" && part.starts_with("collapse"))
+}
+
 /// Stage of a function by its path; none for helpers.
 #[must_use]
 pub fn of_function(path: &str) -> Option<Stage> {
-    let path = path.trim_start_matches(['<', '&']);
-    let mut parts = path.split("::");
-    let root = parts.next()?;
-    if root != "interp_core" {
-        return REST.contains(&root).then_some(Stage::Rest);
-    }
-    let module = parts.next()?;
-    let name = path
-        .rsplit("::")
-        .find(|part| !part.starts_with('{') && !part.starts_with('h'))
-        .unwrap_or(path);
-    match module {
-        "contact" => Some(Stage::Step),
-        "surface" if path.contains("::collapse") => Some(Stage::PatchChange),
-        "surface" => Some(Stage::Surface),
-        "offset" => Some(Stage::Offset),
-        "interval" => Some(Stage::Interval),
-        "patch" => Some(Stage::PatchChange),
-        "program" => None,
-        "interpolator" => Some(Stage::Rest),
-        "schedule" => Some(Stage::PassChange),
-        "run" => Some(
-            RUN.iter()
-                .find(|(function, _)| path.contains(&format!("::{function}::")) || name == *function)
-                .map_or(Stage::Rest, |(_, stage)| *stage),
-        ),
-        _ => None,
-    }
+    Entry::of(path).stage()
 }
 
 /// Stage of a chain of functions, the innermost first.
@@ -75,9 +106,10 @@ fn of_chain(chain: &[Option<Stage>]) -> Option<Stage> {
 }
 
 /// The functions at an address, the innermost first, demangled; none where the image says nothing.
-fn chain(loader: &Loader, address: u32) -> Vec<String> {
+#[must_use]
+pub fn chain(lines: &Loader, address: u32) -> Vec<String> {
     let mut functions = Vec::new();
-    if let Ok(mut frames) = loader.find_frames(address.into()) {
+    if let Ok(mut frames) = lines.find_frames(address.into()) {
         while let Ok(Some(frame)) = frames.next() {
             let name = frame
                 .function
@@ -89,19 +121,57 @@ fn chain(loader: &Loader, address: u32) -> Vec<String> {
     functions
 }
 
-/// Stage of the instruction at each halfword of the code from `base` on.
+/// Whether a function belongs to Rust's `core`.
 #[must_use]
-pub fn map(loader: &Loader, base: u32, code: &[u8]) -> Vec<Option<Stage>> {
-    (0..code.len() / 2)
+pub fn is_of_core(path: &str) -> bool {
+    let path = path.trim_start_matches(['<', '&', '*', '[']);
+    let root = path.split("::").next().unwrap_or(path);
+    root == "core" || !path.contains("::") || path.starts_with("const ") || path.starts_with("mut ")
+}
+
+/// A function's path without types, closures and instances.
+#[must_use]
+pub fn plain(path: &str) -> String {
+    let mut depth = 0_u32;
+    let mut text = String::new();
+    let path = path.trim_start_matches(['<', '&']);
+    for character in path.chars() {
+        match character {
+            '<' | '{' => depth += 1,
+            '>' | '}' => depth = depth.saturating_sub(1),
+            _ if depth == 0 => text.push(character),
+            _ => {}
+        }
+    }
+    let parts = text.split("::").filter(|part| !part.is_empty());
+    parts.collect::<Vec<_>>().join("::")
+}
+
+/// Stage of the instruction at each halfword of the code from `base` on.
+///
+/// # Errors
+/// The lines of the table that fit no function of the image.
+pub fn map(lines: &Loader, base: u32, code: &[u8]) -> Result<Vec<Option<Stage>>, Vec<String>> {
+    let mut known: BTreeMap<String, Entry> = BTreeMap::new();
+    let map = (0..code.len() / 2)
         .map(|index| {
             let address = base + 2 * u32::try_from(index).unwrap_or(0);
-            let stages: Vec<_> = chain(loader, address)
-                .iter()
-                .map(|path| of_function(path))
+            let stages: Vec<_> = chain(lines, address)
+                .into_iter()
+                .map(|path| {
+                    let entry = Entry::of(&path);
+                    known.entry(path).or_insert(entry).stage()
+                })
                 .collect();
             of_chain(&stages)
         })
-        .collect()
+        .collect();
+    let found: Vec<Entry> = known.into_values().collect();
+    let missing: Vec<String> = (0..STAGES.len())
+        .filter(|line| !found.contains(&Entry::Line(*line)))
+        .map(|line| format!("{}::{}", STAGES[line].0, STAGES[line].1))
+        .collect();
+    if missing.is_empty() { Ok(map) } else { Err(missing) }
 }
 
 #[cfg(test)]
@@ -139,5 +209,18 @@ mod tests {
         assert_eq!(of_chain(&chain), Some(Stage::PassChange));
         assert_eq!(of_chain(&chain[..2]), Some(Stage::Surface));
         assert_eq!(of_chain(&[None]), None);
+    }
+
+    #[test]
+    fn paths_without_types() {
+        assert_eq!(
+            plain("interp_core::interpolator::Interpolator<_>::step::{{closure}}"),
+            "interp_core::interpolator::Interpolator::step"
+        );
+        assert!(is_of_core(
+            "<core::ops::range::Range<u16> as core::iter::Iterator>::next"
+        ));
+        assert!(is_of_core("<*mut u32>::offset"));
+        assert!(!is_of_core("interp_core::offset::Offset::new"));
     }
 }

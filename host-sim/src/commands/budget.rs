@@ -1,13 +1,17 @@
 //! `budget`: what each stage of the sample task takes on the Cortex-M4F.
 
-use std::path::PathBuf;
+mod worst;
+
+use std::path::{Path, PathBuf};
 
 use clap::Args;
 use serde_json::{Value, json};
 
 use super::{Failure, Result, cannot_write, load, progress};
 use crate::budget::figures::{Figure, Histogram, Model, figures, histogram};
+use crate::budget::graph::{self, Analysis, EXCEPTION_BYTES};
 use crate::budget::image::{self, Sizes};
+use crate::budget::lab::Lab;
 use crate::budget::measure::{Bench, Ticks};
 use crate::budget::{BudgetError, PERIOD_CYCLES, SURFACES, TICKS, chart, golden};
 use crate::remote::qemu;
@@ -29,6 +33,20 @@ pub(super) struct Arguments {
     /// Writes a chart (SVG) into this folder.
     #[arg(long, value_name = "DIR")]
     report: Option<PathBuf>,
+    /// Tries so many jobs, at random and made to be bad, for the worst tick, and writes the job that causes it.
+    #[arg(long, value_name = "JOBS", conflicts_with_all = ["jobs", "ticks", "report", "check", "bless"])]
+    search: Option<u32>,
+    /// Seed of the search: the same finds the same.
+    #[arg(long, default_value_t = 1, requires = "search")]
+    seed: u64,
+    /// Job file that the search writes.
+    #[arg(
+        long,
+        value_name = "FILE",
+        default_value = "worst-tick.toml",
+        requires = "search"
+    )]
+    out: PathBuf,
     /// Prints JSON instead of tables.
     #[arg(long)]
     json: bool,
@@ -80,7 +98,50 @@ fn count(arguments: &Arguments, bench: &Bench) -> Result<Vec<Counted>> {
     Ok(counted)
 }
 
-fn json(figures: &[Figure], sizes: Sizes) -> Value {
+/// What the images say without being run.
+struct Images {
+    qemu: Sizes,
+    chip: Sizes,
+    /// Deepest stack of each.
+    qemu_stack: Analysis,
+    chip_stack: Analysis,
+}
+
+impl Images {
+    fn read(qemu: &Path) -> Result<Self> {
+        let chip = image::chip()?;
+        Ok(Self {
+            qemu: image::sizes(qemu)?,
+            chip: image::sizes(&chip)?,
+            qemu_stack: graph::analyse(qemu)?,
+            chip_stack: graph::analyse(&chip)?,
+        })
+    }
+
+    fn print(&self) {
+        println!("Cortex-M4F, {PERIOD_CYCLES} cycles a period; bytes:");
+        for (board, sizes, stack) in [
+            ("chip", self.chip, &self.chip_stack),
+            ("QEMU", self.qemu, &self.qemu_stack),
+        ] {
+            let contexts = stack
+                .contexts
+                .iter()
+                .map(|context| format!("{} {}", context.name, context.bytes));
+            println!(
+                "  {board}: flash {}, RAM {} and the job store {}; stack at most {} ({}, {EXCEPTION_BYTES} an exception) of {}",
+                sizes.flash,
+                sizes.ram,
+                sizes.store,
+                stack.stack_bytes(),
+                contexts.collect::<Vec<_>>().join(", "),
+                sizes.stack_room
+            );
+        }
+    }
+}
+
+fn json(figures: &[Figure], images: &Images) -> Value {
     let rows = figures.iter().map(|figure| {
         json!({
             "surface": figure.surface,
@@ -91,9 +152,15 @@ fn json(figures: &[Figure], sizes: Sizes) -> Value {
             "cycles_mean": figure.mean,
             "cycles_max": figure.max,
             "period_share_pct": figure.period_share_pct(),
+            "histogram": { "width": figure.histogram.width, "bins": figure.histogram.bins },
             "stack_bytes": figure.stack_bytes,
-            "flash_bytes": sizes.flash,
-            "ram_bytes": sizes.ram,
+            "stack_static_bytes": images.qemu_stack.stack_bytes(),
+            "flash_bytes": images.qemu.flash,
+            "ram_bytes": images.qemu.ram,
+            "store_bytes": images.qemu.store,
+            "chip_flash_bytes": images.chip.flash,
+            "chip_ram_bytes": images.chip.ram,
+            "chip_stack_static_bytes": images.chip_stack.stack_bytes(),
         })
     });
     rows.collect()
@@ -106,7 +173,7 @@ fn print(name: &str, ticks: &Ticks, figures: &[Figure]) {
         ticks.stack_bytes
     );
     println!(
-        "  {:<25} {:>6} |{:^29} |{:^29}",
+        "  {:<25} {:>6} |{:^29} |{:^29}  min to max",
         "cycles", "ticks", "nominal: min, mean, max, %", "pessimistic: min, mean, max, %"
     );
     let of = |model| figures.iter().filter(move |figure| figure.model == model);
@@ -121,7 +188,7 @@ fn print(name: &str, ticks: &Ticks, figures: &[Figure]) {
                 figure.period_share_pct()
             );
         }
-        println!();
+        println!("  {}", pessimistic.histogram.sparkline());
     }
 }
 
@@ -134,17 +201,24 @@ fn print_histogram(histogram: &Histogram) {
     }
 }
 
+/// The worst tick of each job named.
+fn print_worst(arguments: &Arguments, bench: &Bench) -> Result<()> {
+    for path in &arguments.jobs {
+        let (_, prepared) = load(path)?;
+        let mut lab = Lab::new(bench)?;
+        let run = lab.run(&prepared, arguments.ticks)?;
+        print!("\n{}: {}", path.display(), worst::describe(&lab.worst(&run)?));
+    }
+    Ok(())
+}
+
 fn report(arguments: &Arguments, counted: &[Counted]) -> Result<()> {
     let Some(folder) = &arguments.report else {
         return Ok(());
     };
     let path = folder.join("budget.svg");
-    let histograms: Vec<_> = counted
-        .iter()
-        .map(|(name, ticks)| (name.clone(), histogram(ticks, Model::Pessimistic, BIN_CYCLES)))
-        .collect();
     std::fs::create_dir_all(folder)
-        .and_then(|()| chart::write(&path, &histograms))
+        .and_then(|()| chart::write(&path, counted))
         .map_err(|error| cannot_write(&path, &error))?;
     if !arguments.json {
         println!("\nchart: {}", path.display());
@@ -174,22 +248,30 @@ fn hold(arguments: &Arguments, figures: &[Figure]) -> Result<()> {
 
 pub(super) fn command(arguments: &Arguments) -> Result<()> {
     let image = qemu::firmware()?;
-    let (plan, sizes) = image::read(&image)?;
+    let (plan, _) = image::read(&image)?;
     let bench = Bench::new(&image, &plan)?;
+    if let Some(jobs) = arguments.search {
+        return worst::command(&bench, jobs, arguments.seed, &arguments.out, arguments.json);
+    }
     let counted = count(arguments, &bench)?;
     let figures: Vec<Vec<Figure>> = counted.iter().map(|(name, ticks)| figures(name, ticks)).collect();
+    let images = Images::read(&image)?;
     if arguments.json {
-        println!("{}", json(&figures.concat(), sizes));
+        println!("{}", json(&figures.concat(), &images));
     } else {
-        println!(
-            "Cortex-M4F, {PERIOD_CYCLES} cycles a period; flash {} bytes, RAM {} bytes, room for the stack {} bytes",
-            sizes.flash, sizes.ram, sizes.stack_room
-        );
+        images.print();
         for ((name, ticks), figures) in counted.iter().zip(&figures) {
             print(name, ticks, figures);
             print_histogram(&histogram(ticks, Model::Pessimistic, BIN_CYCLES));
         }
     }
+    if !arguments.json {
+        print_worst(arguments, &bench)?;
+    }
     report(arguments, &counted)?;
-    hold(arguments, &figures.concat())
+    let mut held = figures.concat();
+    if arguments.check || arguments.bless {
+        held.extend(golden::worst(&bench)?);
+    }
+    hold(arguments, &held)
 }

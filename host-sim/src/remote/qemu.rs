@@ -56,20 +56,28 @@ pub fn workspace() -> PathBuf {
 /// # Errors
 /// Cargo is missing or fails; its own words are passed on.
 pub fn firmware() -> Result<PathBuf, QemuError> {
+    cargo(
+        &["fw-qemu", "--quiet"],
+        "target/qemu/thumbv7em-none-eabihf/release/firmware",
+    )
+    .map_err(QemuError::Firmware)
+}
+
+/// Runs cargo in the workspace, and returns the file in it that this builds; what cargo says where it fails.
+fn cargo(arguments: &[&str], built: &str) -> Result<PathBuf, String> {
     let workspace = workspace();
     let cargo = std::env::var_os("CARGO").unwrap_or_else(|| "cargo".into());
     let output = Command::new(cargo)
-        .args(["fw-qemu", "--quiet"])
+        .args(arguments)
         .current_dir(&workspace)
         .stdin(Stdio::null())
         .output()
-        .map_err(|error| QemuError::Firmware(error.to_string()))?;
-    if !output.status.success() {
-        return Err(QemuError::Firmware(
-            String::from_utf8_lossy(&output.stderr).into_owned(),
-        ));
+        .map_err(|error| error.to_string())?;
+    if output.status.success() {
+        Ok(workspace.join(built))
+    } else {
+        Err(String::from_utf8_lossy(&output.stderr).into_owned())
     }
-    Ok(workspace.join("target/qemu/thumbv7em-none-eabihf/release/firmware"))
 }
 
 /// The program, on one processor and as a batch process where the system can do that (util-linux): QEMU hands each tick from one of its
@@ -122,21 +130,16 @@ fn processors() -> Vec<usize> {
 /// # Errors
 /// Cargo is missing or fails; its own words are passed on.
 pub fn cycle_plugin() -> Result<PathBuf, QemuError> {
-    let workspace = workspace();
-    let cargo = std::env::var_os("CARGO").unwrap_or_else(|| "cargo".into());
-    let output = Command::new(cargo)
-        .args(["build", "--release", "--quiet", "-p", "cycle-plugin"])
-        .args(["--target-dir", "target/plugin"])
-        .current_dir(&workspace)
-        .stdin(Stdio::null())
-        .output()
-        .map_err(|error| QemuError::Plugin(error.to_string()))?;
-    if !output.status.success() {
-        return Err(QemuError::Plugin(
-            String::from_utf8_lossy(&output.stderr).into_owned(),
-        ));
-    }
-    Ok(workspace.join("target/plugin/release/libcycle_plugin.so"))
+    const BUILD: [&str; 7] = [
+        "build",
+        "--release",
+        "--quiet",
+        "-p",
+        "cycle-plugin",
+        "--target-dir",
+        "target/plugin",
+    ];
+    cargo(&BUILD, "target/plugin/release/libcycle_plugin.so").map_err(QemuError::Plugin)
 }
 
 impl Qemu {

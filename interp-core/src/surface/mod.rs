@@ -15,6 +15,7 @@
 //! with scalars a (fixed on a pass) and b (linear along it) that carry the zero. The normal comes from `Ã x B̃`, as exact
 //! at the pole as anywhere, and nothing is divided by a or b unless it is known not to vanish.
 
+mod grid;
 mod lines;
 mod pole;
 mod polynomial;
@@ -27,8 +28,9 @@ pub use range::{Edges, SHIFT_MAX};
 pub use rational::{RATIONAL_WORDS, RationalRecord};
 pub use revolved::{REVOLVED_WORDS, RevolvedRecord};
 
+pub(crate) use grid::{GridKind, GridPass};
 pub(crate) use pole::PolePass;
-pub(crate) use polynomial::PolynomialPass;
+pub(crate) use polynomial::{ExtrudedPass, PolynomialPass, RuledPass};
 pub(crate) use rational::RationalPass;
 pub(crate) use revolved::{CirclePass, ProfilePass};
 
@@ -88,6 +90,31 @@ pub(crate) struct PathSpeed {
     pub(crate) stretch: f32,
 }
 
+impl PathSpeed {
+    /// From g Ã, half of its derivative, the excess of its stretch, and g/a.
+    #[inline(always)]
+    fn new(path: &[i32; 3], path2: &[i32; 3], excess: f32, gauge: f32) -> Self {
+        let speed = Vec3::of(*path);
+        let inverse = inverse_sqrt(speed.dot(speed));
+        Self {
+            inverse: inverse * gauge,
+            stretch: stretch(path, path2, inverse * inverse, excess),
+        }
+    }
+
+    /// The same where there is a speed.
+    ///
+    /// # Errors
+    /// [`FaultKind::DegenerateSurface`] where it vanishes.
+    pub(crate) fn checked(self) -> Result<Self> {
+        if self.inverse > 0.0 && self.inverse < f32::INFINITY {
+            Ok(self)
+        } else {
+            Err(Fault::new(FaultKind::DegenerateSurface, 0.0))
+        }
+    }
+}
+
 /// The factors of A = a Ã and B = b B̃.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Factors {
@@ -141,8 +168,14 @@ fn stretch(path: &[i32; 3], path2: &[i32; 3], inverse_e: f32, excess: f32) -> f3
 impl Local {
     /// The contact's differential geometry (Lo 1998, eqns 9 to 11). With E, F, G, L, M, N the fundamental forms, W^2 = EG -
     /// F^2 and d = B - (F/E) A: lateral speed^2 = |d|^2 = W^2/E, II(d, d) = N - 2 M F/E + L (F/E)^2, II(t, d) = (M - L F/E)/sqrt E.
+    ///
+    /// Where the mixed or the second side derivative is known to vanish, `MIXED` and `SIDE2` leave their products out.
     #[inline(always)]
-    pub(crate) fn contact(&self, ball: &Ball, factors: &Factors) -> Result<Contact> {
+    pub(crate) fn contact<const MIXED: bool, const SIDE2: bool>(
+        &self,
+        ball: &Ball,
+        factors: &Factors,
+    ) -> Result<Contact> {
         let Factors {
             path: a,
             inverse_path: inverse_a,
@@ -165,10 +198,16 @@ impl Local {
         let product = ball.product() * self.g;
         let slant = b * f * inverse_e;
         let l = to_f32(dot_hi(&offset, &self.path2)) * product;
-        let m = to_f32(dot_hi(&offset, &self.mixed)) * (0.5 * product);
-        let n = b * (to_f32(dot_hi(&offset, &self.side2)) * product);
-        let shear = m - slant * l;
+        let (shear, shear_sum) = if MIXED {
+            let m = to_f32(dot_hi(&offset, &self.mixed)) * (0.5 * product);
+            let shear = m - slant * l;
+            (shear, m + shear)
+        } else {
+            let shear = -slant * l;
+            (shear, shear)
+        };
         let twist = shear * inverse * inverse_a;
+        let sheared = shear_sum * slant * inverse_a;
         // On a pole every side line leaves in its own direction, and its own speed counts.
         let lateral_squared = if a > 0.0 {
             b * b * (area_squared * inverse_e)
@@ -184,22 +223,16 @@ impl Local {
             },
             along: 1.0 - l * inverse_e * inverse_a,
             lateral_squared,
-            across: lateral_squared - (n - (m + shear) * slant * inverse_a),
+            across: if SIDE2 {
+                let n = b * (to_f32(dot_hi(&offset, &self.side2)) * product);
+                lateral_squared - (n - sheared)
+            } else {
+                lateral_squared + sheared
+            },
             twist_squared: twist * twist,
             speed_squared: a * a * e,
             gauge: self.inverse_g * self.inverse_g,
         })
-    }
-
-    /// The parametrisation alone.
-    #[inline(always)]
-    pub(crate) fn path_speed(&self, inverse_a: f32) -> PathSpeed {
-        let path = Vec3::of(self.path);
-        let inverse = inverse_sqrt(path.dot(path));
-        PathSpeed {
-            inverse: inverse * inverse_a * self.g,
-            stretch: stretch(&self.path, &self.path2, inverse * inverse, self.excess),
-        }
     }
 }
 
@@ -211,18 +244,27 @@ fn degenerate(area_squared: f32, f: f32) -> Fault {
     Fault::new(FaultKind::DegenerateSurface, sine)
 }
 
-/// A surface on one pass. The variant is a job's, but for patches with a pole.
+/// A surface on one pass. The variant is a job's.
 #[derive(Clone, Copy, Debug)]
 #[allow(
     clippy::large_enum_variant,
-    reason = "one lives in the interpolator for ever; nothing is allocated"
+    reason = "two live in the interpolator for ever; nothing is allocated"
 )]
 pub(crate) enum Surface {
-    Polynomial(PolynomialPass),
-    Rational(RationalPass),
-    Pole(PolePass),
+    Grid(GridPass),
     Profile(ProfilePass),
     Circle(CirclePass),
+}
+
+/// A surface on one pass by what evaluates it.
+pub(crate) enum AnyPass<'a> {
+    Polynomial(PolynomialPass<'a>),
+    Ruled(RuledPass<'a>),
+    Extruded(ExtrudedPass<'a>),
+    Rational(RationalPass<'a>),
+    Pole(PolePass<'a>),
+    Profile(&'a ProfilePass),
+    Circle(&'a CirclePass),
 }
 
 /// What the sample path asks of a surface on a pass.
@@ -235,32 +277,58 @@ pub(crate) trait Pass {
 }
 
 impl Surface {
+    /// What evaluates it.
+    #[inline(always)]
+    pub(crate) const fn pass(&self) -> AnyPass<'_> {
+        match self {
+            Self::Grid(pass) => match pass.kind {
+                GridKind::Free => AnyPass::Polynomial(PolynomialPass(pass)),
+                GridKind::Ruled => AnyPass::Ruled(RuledPass(pass)),
+                GridKind::Extruded => AnyPass::Extruded(ExtrudedPass(pass)),
+                GridKind::Rational => AnyPass::Rational(RationalPass(pass)),
+                GridKind::Pole => AnyPass::Pole(PolePass(pass)),
+            },
+            Self::Profile(pass) => AnyPass::Profile(pass),
+            Self::Circle(pass) => AnyPass::Circle(pass),
+        }
+    }
+
     /// The pass is a single point.
     pub(crate) fn is_point(&self) -> bool {
-        match self {
-            Self::Polynomial(_) | Self::Rational(_) | Self::Profile(_) => false,
-            Self::Pole(pass) => pass.is_point(),
-            Self::Circle(pass) => pass.is_point(),
+        match self.pass() {
+            AnyPass::Pole(pass) => pass.is_point(),
+            AnyPass::Circle(pass) => pass.is_point(),
+            _ => false,
         }
     }
 
     /// The parametrisation at a fraction of the patch, in the direction of travel.
+    #[inline(never)]
+    pub(crate) fn path_at(&self, fraction: u64) -> PathSpeed {
+        match self.pass() {
+            AnyPass::Polynomial(PolynomialPass(pass))
+            | AnyPass::Ruled(RuledPass(pass))
+            | AnyPass::Extruded(ExtrudedPass(pass)) => PolynomialPass(pass).path_at(fraction),
+            AnyPass::Rational(pass) => pass.path_at(fraction),
+            AnyPass::Pole(pass) => pass.path_at(fraction),
+            AnyPass::Profile(pass) => pass.path_at(fraction),
+            AnyPass::Circle(pass) => pass.path(),
+        }
+    }
+
+    /// The contact at a fraction of the patch: for a caller that has the time to find out what evaluates it.
     ///
     /// # Errors
-    /// [`FaultKind::DegenerateSurface`] where the speed vanishes.
-    #[inline(never)]
-    pub(crate) fn path_at(&self, fraction: u64) -> Result<PathSpeed> {
-        let speed = match self {
-            Self::Polynomial(pass) => pass.path_at(fraction),
-            Self::Rational(pass) => pass.path_at(fraction),
-            Self::Pole(pass) => pass.path_at(fraction),
-            Self::Profile(pass) => pass.path_at(fraction),
-            Self::Circle(pass) => pass.path(),
-        };
-        if speed.inverse > 0.0 && speed.inverse < f32::INFINITY {
-            Ok(speed)
-        } else {
-            Err(Fault::new(FaultKind::DegenerateSurface, 0.0))
+    /// Those of [`Pass::contact`].
+    pub(crate) fn contact(&self, fraction: u64, ball: &Ball) -> Result<Contact> {
+        match self.pass() {
+            AnyPass::Polynomial(pass) => pass.contact(fraction, ball),
+            AnyPass::Ruled(pass) => pass.contact(fraction, ball),
+            AnyPass::Extruded(pass) => pass.contact(fraction, ball),
+            AnyPass::Rational(pass) => pass.contact(fraction, ball),
+            AnyPass::Pole(pass) => pass.contact(fraction, ball),
+            AnyPass::Profile(pass) => pass.contact(fraction, ball),
+            AnyPass::Circle(pass) => pass.contact(fraction, ball),
         }
     }
 }

@@ -5,9 +5,10 @@
 //! of the pass, B vanishes there, and so does its second side derivative; they are divided by the root along the pass, and the
 //! quotient rule takes the reduced point.
 
+use super::grid::GridPass;
 use super::lines::{Line, quotient_across, quotient_along};
 use super::range::{Edges, Root};
-use super::rational::{WEIGHT_ONE, Weight, quarter};
+use super::rational::{Weight, quarter};
 use super::{Contact, Factors, Local, Pass, PassLine, PathSpeed, path_factor};
 use crate::arith::{centred, centred_to_f32, cubic, jet, mul_hi};
 use crate::fault::Result;
@@ -23,109 +24,136 @@ enum Pole {
     AtEnd(Root),
 }
 
-/// One coordinate: its cubics, and the reduced numerator.
+/// One coordinate divided by the root.
 #[derive(Clone, Copy, Debug, Default)]
-struct PoleLine {
-    line: Line,
-    /// P divided by the root; 0 for a polynomial patch with its pole at an end, where it is not needed.
-    reduced: [i32; 4],
-    /// P_side and half of P_side,side, divided by the root where that is at an end.
+struct ReducedLine {
+    /// P.
+    value: [i32; 4],
+    /// P_side and half of P_side,side where the root is at an end, and not divided where it is beside.
     side: [i32; 4],
     side2: [i32; 4],
 }
 
-/// The patch on one pass.
+/// What a pole adds to a patch on a pass.
 #[derive(Clone, Copy, Debug, Default)]
-pub(crate) struct PolePass {
-    axes: [PoleLine; 3],
-    weight: Line,
+pub(crate) struct Reduced {
+    axes: [ReducedLine; 3],
     pole: Pole,
     path_factor: f32,
     inverse_path_factor: f32,
 }
 
-impl PolePass {
-    /// Collapses a patch with a pole; `blocks` are three coordinates, and the weight if it is rational.
-    pub(crate) fn collapse(&mut self, blocks: &[[i32; 16]], edges: Edges, at: &PassLine) {
+/// A patch with a pole on one pass.
+pub(crate) struct PolePass<'a>(pub(super) &'a GridPass);
+
+impl Reduced {
+    /// Of no pole.
+    pub(super) const NONE: Self = Self {
+        axes: [ReducedLine {
+            value: [0; 4],
+            side: [0; 4],
+            side2: [0; 4],
+        }; 3],
+        pole: Pole::Beside,
+        path_factor: 1.0,
+        inverse_path_factor: 1.0,
+    };
+
+    /// Divides the coordinates of a patch by the root of its flagged boundary.
+    pub(super) fn collapse(&mut self, lines: &[Line; 3], blocks: &[[i32; 16]], edges: Edges, at: &PassLine) {
         self.pole = match edges.path_root(at.reversed) {
             Some(root) if edges.side_root().is_none() => Pole::AtEnd(root),
             _ => Pole::Beside,
         };
         (self.path_factor, self.inverse_path_factor) = path_factor(edges, at);
-        let mut rest = blocks.iter();
-        for (axis, block) in self.axes.iter_mut().zip(&mut rest) {
-            axis.line.collapse(block, at);
-            axis.side = axis.line.side;
-            axis.side2 = axis.line.side2;
-            match (self.pole, edges.side_root()) {
-                (Pole::AtEnd(root), _) => {
-                    axis.reduced = quotient_along(&axis.line.value, root);
-                    axis.side = quotient_along(&axis.line.side, root);
-                    axis.side2 = quotient_along(&axis.line.side2, root);
+        for ((axis, line), block) in self.axes.iter_mut().zip(lines).zip(blocks) {
+            if let Pole::AtEnd(root) = self.pole {
+                axis.value = quotient_along(&line.value, root);
+                axis.side = quotient_along(&line.side, root);
+                axis.side2 = quotient_along(&line.side2, root);
+            } else {
+                if let Some(root) = edges.side_root() {
+                    axis.value = quotient_across(block, root, at);
                 }
-                (Pole::Beside, Some(root)) => axis.reduced = quotient_across(block, root, at),
-                (Pole::Beside, None) => {}
+                axis.side = line.side;
+                axis.side2 = line.side2;
             }
-        }
-        match rest.next() {
-            Some(block) => self.weight.collapse(block, at),
-            None => {
-                self.weight = Line {
-                    value: [WEIGHT_ONE, 0, 0, 0],
-                    ..Line::default()
-                };
-            }
-        }
-    }
-
-    /// The whole pass is one point: the side boundary that it lies on collapses.
-    pub(crate) fn is_point(&self) -> bool {
-        self.path_factor <= 0.0
-    }
-
-    /// The parametrisation at a fraction of the patch.
-    pub(crate) fn path_at(&self, fraction: u64) -> PathSpeed {
-        self.local(centred(fraction)).path_speed(self.inverse_path_factor)
-    }
-
-    fn local(&self, w: i32) -> Local {
-        let weight = Weight::at(&self.weight, w);
-        let axes = self.axes.each_ref().map(|axis| axis.at(self.pole, &weight, w));
-        let [x, y, z] = axes;
-        let [x0, x1, x2, xs, xm, xx] = x;
-        let [y0, y1, y2, ys, ym, yy] = y;
-        let [z0, z1, z2, zs, zm, zz] = z;
-        Local {
-            position: [x0, y0, z0],
-            path: [x1, y1, z1],
-            side: [xs, ys, zs],
-            path2: [x2, y2, z2],
-            mixed: [xm, ym, zm],
-            side2: [xx, yy, zz],
-            g: weight.g,
-            inverse_g: weight.inverse_g,
-            excess: weight.excess,
         }
     }
 }
 
-impl PoleLine {
+impl PolePass<'_> {
+    /// The whole pass is one point: the side boundary that it lies on collapses.
+    pub(crate) fn is_point(&self) -> bool {
+        self.0.reduced.path_factor <= 0.0
+    }
+
+    /// The parametrisation at a fraction of the patch.
+    pub(crate) fn path_at(&self, fraction: u64) -> PathSpeed {
+        let w = centred(fraction);
+        let weight = Weight::at(&self.0.weight, w);
+        let [x, y, z] = self.axes();
+        let along = |axis: &PoleLine<'_>| axis.along(&weight, w);
+        let ([x1, x2], [y1, y2], [z1, z2]) = (along(&x), along(&y), along(&z));
+        let gauge = weight.g * self.0.reduced.inverse_path_factor;
+        PathSpeed::new(&[x1, y1, z1], &[x2, y2, z2], weight.excess, gauge)
+    }
+
+    #[inline(always)]
+    fn axes(&self) -> [PoleLine<'_>; 3] {
+        let ([x, y, z], [rx, ry, rz]) = (&self.0.axes, &self.0.reduced.axes);
+        let pole = self.0.reduced.pole;
+        [(x, rx), (y, ry), (z, rz)].map(|(line, reduced)| PoleLine { line, reduced, pole })
+    }
+
+    #[inline(always)]
+    fn local(&self, w: i32) -> Local {
+        let weight = Weight::at(&self.0.weight, w);
+        let [x, y, z] = self.axes();
+        weight.local(x.at(&weight, w), y.at(&weight, w), z.at(&weight, w))
+    }
+}
+
+/// One coordinate.
+struct PoleLine<'a> {
+    line: &'a Line,
+    reduced: &'a ReducedLine,
+    pole: Pole,
+}
+
+impl PoleLine<'_> {
+    /// Along the path: the first derivative and half the second, as [`Self::at`] has them.
+    #[inline(always)]
+    fn along(&self, weight: &Weight, w: i32) -> [i32; 2] {
+        match self.pole {
+            Pole::Beside => {
+                let [reduced, path, path2] = jet(&self.reduced.value, w);
+                let part = Part::new(reduced, weight);
+                [part.rule(path, weight.path), part.rule(path2, weight.path2)]
+            }
+            Pole::AtEnd(_) => {
+                let [value, path, path2] = jet(&self.line.value, w);
+                let s = weight.divide(value);
+                [quarter(path, s, weight.path), quarter(path2, s, weight.path2)]
+            }
+        }
+    }
+
     /// One coordinate of a [`Local`]: position, path, path2, side, mixed, side2.
-    fn at(&self, pole: Pole, weight: &Weight, w: i32) -> [i32; 6] {
+    #[inline(always)]
+    fn at(&self, weight: &Weight, w: i32) -> [i32; 6] {
         let [value, path, path2] = jet(&self.line.value, w);
-        let [reduced, reduced_path, reduced_path2] = jet(&self.reduced, w);
+        let [reduced, reduced_path, reduced_path2] = jet(&self.reduced.value, w);
         let [_, mixed, _] = jet(&self.line.side, w);
-        let (side, side2) = (cubic(&self.side, w), cubic(&self.side2, w));
+        let (side, side2) = (cubic(&self.reduced.side, w), cubic(&self.reduced.side2, w));
         let s = weight.divide(value);
-        // A quarter of the reduced point: whole it may be beyond i32.
-        let part = weight.divide(reduced >> 2);
-        let by_part = |numerator: i32, weight: i32| (numerator >> 2).wrapping_sub(mul_hi(part, weight) << 2);
+        let part = Part::new(reduced, weight);
         let mixed = quarter(mixed, s, weight.mixed);
-        match pole {
+        match self.pole {
             Pole::Beside => [
                 s,
-                by_part(reduced_path, weight.path),
-                by_part(reduced_path2, weight.path2),
+                part.rule(reduced_path, weight.path),
+                part.rule(reduced_path2, weight.path2),
                 quarter(side, s, weight.side),
                 mixed,
                 quarter(side2, s, weight.side2),
@@ -134,19 +162,35 @@ impl PoleLine {
                 s,
                 quarter(path, s, weight.path),
                 quarter(path2, s, weight.path2),
-                by_part(side, weight.side),
+                part.rule(side, weight.side),
                 mixed,
-                by_part(side2, weight.side2),
+                part.rule(side2, weight.side2),
             ],
         }
     }
 }
 
-impl Pass for PolePass {
+/// A quarter of a coordinate of the reduced point: whole it may be beyond i32.
+struct Part(i32);
+
+impl Part {
+    #[inline(always)]
+    const fn new(reduced: i32, weight: &Weight) -> Self {
+        Self(weight.divide(reduced >> 2))
+    }
+
+    /// [`quarter`] with the reduced point.
+    #[inline(always)]
+    const fn rule(&self, numerator: i32, weight: i32) -> i32 {
+        (numerator >> 2).wrapping_sub(mul_hi(self.0, weight) << 2)
+    }
+}
+
+impl Pass for PolePass<'_> {
     #[inline(never)]
     fn contact(&self, fraction: u64, ball: &Ball) -> Result<Contact> {
         let w = centred(fraction);
-        let side = match self.pole {
+        let side = match self.0.reduced.pole {
             Pole::Beside => 1.0,
             Pole::AtEnd(root) => {
                 let [offset, slope] = root.linear();
@@ -154,10 +198,10 @@ impl Pass for PolePass {
             }
         };
         let factors = Factors {
-            path: self.path_factor,
-            inverse_path: self.inverse_path_factor,
+            path: self.0.reduced.path_factor,
+            inverse_path: self.0.reduced.inverse_path_factor,
             side,
         };
-        self.local(w).contact(ball, &factors)
+        self.local(w).contact::<true, true>(ball, &factors)
     }
 }

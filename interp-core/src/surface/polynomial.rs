@@ -4,9 +4,10 @@
 //! of x, y, z the 16 coefficients `c[i][j]` of `path^i side^j`, j fastest, in units of 2^-shift nm, both parameters centred
 //! (-1/2 to 1/2).
 
+use super::grid::GridPass;
 use super::lines::{Line, coefficients, collapses, record_words, split};
 use super::range::{BAD_PATCH, Edges, HeadWord, fits};
-use super::{Contact, Factors, Local, Pass, PassLine, PathSpeed};
+use super::{Contact, Factors, Local, Pass, PathSpeed};
 use crate::arith::{centred, cubic, jet};
 use crate::fault::Result;
 use crate::offset::Ball;
@@ -66,54 +67,116 @@ impl PolynomialRecord {
     }
 }
 
-/// The polynomial patch on one pass: cubics of the path parameter.
-#[derive(Clone, Copy, Debug, Default)]
-pub(crate) struct PolynomialPass {
-    axes: [Line; 3],
+/// A polynomial patch on one pass.
+pub(crate) struct PolynomialPass<'a>(pub(super) &'a GridPass);
+
+/// A ruled patch on one pass.
+pub(crate) struct RuledPass<'a>(pub(super) &'a GridPass);
+
+/// An extruded patch on one pass.
+pub(crate) struct ExtrudedPass<'a>(pub(super) &'a GridPass);
+
+/// `MIXED` and `SIDE2`: whether those derivatives are wanted; without the former the side derivative is constant.
+#[inline(always)]
+fn local<const MIXED: bool, const SIDE2: bool>(pass: &GridPass, fraction: u64) -> Local {
+    let w = centred(fraction);
+    let [x, y, z] = &pass.axes;
+    let side = |line: &Line| {
+        if MIXED {
+            jet(&line.side, w)
+        } else {
+            let [constant, ..] = line.side;
+            [constant, 0, 0]
+        }
+    };
+    let side2 = |line: &Line| if SIDE2 { cubic(&line.side2, w) } else { 0 };
+    let ([x0, x1, x2], [y0, y1, y2], [z0, z1, z2]) = (jet(&x.value, w), jet(&y.value, w), jet(&z.value, w));
+    let ([xs, xm, _], [ys, ym, _], [zs, zm, _]) = (side(x), side(y), side(z));
+    Local {
+        position: [x0, y0, z0],
+        path: [x1, y1, z1],
+        side: [xs, ys, zs],
+        path2: [x2, y2, z2],
+        mixed: [xm, ym, zm],
+        side2: [side2(x), side2(y), side2(z)],
+        g: 1.0,
+        inverse_g: 1.0,
+        excess: 0.0,
+    }
 }
 
-impl PolynomialPass {
-    /// Of no patch yet.
-    pub(crate) const NONE: Self = Self {
-        axes: [Line::NONE; 3],
-    };
-
-    /// Collapses a patch without a pole.
-    pub(crate) fn collapse(&mut self, blocks: &[[i32; 16]], at: &PassLine) {
-        for (line, block) in self.axes.iter_mut().zip(blocks) {
-            line.collapse(block, at);
-        }
-    }
-
+impl PolynomialPass<'_> {
     /// The parametrisation at a fraction of the patch.
     pub(crate) fn path_at(&self, fraction: u64) -> PathSpeed {
-        self.local(fraction).path_speed(1.0)
-    }
-
-    #[inline(always)]
-    fn local(&self, fraction: u64) -> Local {
-        let w = centred(fraction);
-        let [x, y, z] = &self.axes;
-        let ([x0, x1, x2], [y0, y1, y2], [z0, z1, z2]) =
-            (jet(&x.value, w), jet(&y.value, w), jet(&z.value, w));
-        let ([xs, xm, _], [ys, ym, _], [zs, zm, _]) = (jet(&x.side, w), jet(&y.side, w), jet(&z.side, w));
-        Local {
-            position: [x0, y0, z0],
-            path: [x1, y1, z1],
-            side: [xs, ys, zs],
-            path2: [x2, y2, z2],
-            mixed: [xm, ym, zm],
-            side2: [cubic(&x.side2, w), cubic(&y.side2, w), cubic(&z.side2, w)],
-            g: 1.0,
-            inverse_g: 1.0,
-            excess: 0.0,
-        }
+        let local = local::<false, false>(self.0, fraction);
+        PathSpeed::new(&local.path, &local.path2, 0.0, 1.0)
     }
 }
 
-impl Pass for PolynomialPass {
+impl Pass for PolynomialPass<'_> {
     #[inline(always)]
     fn contact(&self, fraction: u64, ball: &Ball) -> Result<Contact> {
-        self.local(fraction).contact(ball, &Factors::ONE)
+        let local = local::<true, true>(self.0, fraction);
+        local.contact::<true, true>(ball, &Factors::ONE)
+    }
+}
+
+impl Pass for RuledPass<'_> {
+    #[inline(always)]
+    fn contact(&self, fraction: u64, ball: &Ball) -> Result<Contact> {
+        let local = local::<true, false>(self.0, fraction);
+        local.contact::<true, false>(ball, &Factors::ONE)
+    }
+}
+
+impl Pass for ExtrudedPass<'_> {
+    #[inline(always)]
+    fn contact(&self, fraction: u64, ball: &Ball) -> Result<Contact> {
+        let local = local::<false, false>(self.0, fraction);
+        local.contact::<false, false>(ball, &Factors::ONE)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::surface::PassLine;
+    use crate::surface::grid::GridKind;
+
+    /// What a shape leaves out is nothing: each agrees with the free one to the last bit.
+    #[test]
+    fn shapes_are_the_free_patch_to_the_bit() {
+        let path = [
+            [0, 90_000_000, 7_000_000, -3_000_000],
+            [0, 5_000_000, -20_000_000, 1_000_000],
+        ];
+        for (twist, want) in [(0, GridKind::Extruded), (9_000_000, GridKind::Ruled)] {
+            let mut block = [[0_i32; 16]; 3];
+            for (axis, [c0, c1, c2, c3]) in block.iter_mut().zip([path[0], path[1], [0; 4]]) {
+                (axis[0], axis[4], axis[8], axis[12]) = (c0, c1, c2, c3);
+                axis[5] = twist;
+            }
+            block[2][1] = 70_000_000;
+            for (side, reversed) in [(0, false), (1 << 30, true), (i32::MIN, false)] {
+                let at = PassLine {
+                    fraction: 0,
+                    side,
+                    reversed,
+                };
+                let mut pass = GridPass::NONE;
+                pass.collapse(&block, Edges::default(), &at);
+                assert_eq!(pass.kind, want);
+                let ball = Ball::new(5.0, 3, 1.0);
+                for part in 0..16_u64 {
+                    let fraction = part << 60;
+                    let free = PolynomialPass(&pass).contact(fraction, &ball).unwrap();
+                    let shaped = match want {
+                        GridKind::Extruded => ExtrudedPass(&pass).contact(fraction, &ball),
+                        _ => RuledPass(&pass).contact(fraction, &ball),
+                    };
+                    assert_eq!(std::format!("{:?}", shaped.unwrap()), std::format!("{free:?}"));
+                }
+            }
+        }
     }
 }

@@ -5,9 +5,10 @@
 //! [1/2, 2) on the patch (a host scales it, and splits a patch whose weights vary more). Where a boundary collapses, the
 //! origin is that point, so that the numerators vanish there; at most one boundary of a patch may collapse.
 
+use super::grid::GridPass;
 use super::lines::{Line, coefficients, collapses, record_words, split};
 use super::range::{BAD_PATCH, Edges, HeadWord, Root, fits, patch_bound};
-use super::{Contact, Factors, Local, Pass, PassLine, PathSpeed};
+use super::{Contact, Factors, Local, Pass, PathSpeed};
 use crate::arith::{centred, cubic, jet, mul_hi, mul_q29, reciprocal_q29, to_f32};
 use crate::fault::Result;
 use crate::offset::Ball;
@@ -152,6 +153,23 @@ impl Weight {
         }
     }
 
+    /// A [`Local`] of three coordinates: of each position, path, path2, side, mixed, side2.
+    #[inline(always)]
+    pub(super) const fn local(&self, x: [i32; 6], y: [i32; 6], z: [i32; 6]) -> Local {
+        let ([x0, x1, x2, xs, xm, xx], [y0, y1, y2, ys, ym, yy], [z0, z1, z2, zs, zm, zz]) = (x, y, z);
+        Local {
+            position: [x0, y0, z0],
+            path: [x1, y1, z1],
+            side: [xs, ys, zs],
+            path2: [x2, y2, z2],
+            mixed: [xm, ym, zm],
+            side2: [xx, yy, zz],
+            g: self.g,
+            inverse_g: self.inverse_g,
+            excess: self.excess,
+        }
+    }
+
     /// A numerator over the weight.
     #[inline(always)]
     pub(super) const fn divide(&self, numerator: i32) -> i32 {
@@ -165,12 +183,8 @@ pub(super) const fn quarter(numerator: i32, quotient: i32, weight: i32) -> i32 {
     (numerator >> 2).wrapping_sub(mul_hi(quotient, weight))
 }
 
-/// A rational patch on one pass: cubics of the path parameter.
-#[derive(Clone, Copy, Debug, Default)]
-pub(crate) struct RationalPass {
-    axes: [Line; 3],
-    weight: Line,
-}
+/// A rational patch on one pass.
+pub(crate) struct RationalPass<'a>(pub(super) &'a GridPass);
 
 /// One coordinate of a [`Local`]: position, path, path2, side, mixed, side2.
 #[inline(always)]
@@ -188,18 +202,11 @@ fn axis(line: &Line, weight: &Weight, w: i32) -> [i32; 6] {
     ]
 }
 
-impl RationalPass {
-    /// Collapses a patch without a pole.
-    pub(crate) fn collapse(&mut self, blocks: &[[i32; 16]], at: &PassLine) {
-        let lines = self.axes.iter_mut().chain([&mut self.weight]);
-        for (line, block) in lines.zip(blocks) {
-            line.collapse(block, at);
-        }
-    }
-
+impl RationalPass<'_> {
     /// The parametrisation at a fraction of the patch.
     pub(crate) fn path_at(&self, fraction: u64) -> PathSpeed {
-        self.local(fraction).path_speed(1.0)
+        let local = self.local(fraction);
+        PathSpeed::new(&local.path, &local.path2, local.excess, local.g)
     }
 
     /// The quotient rule with the numerators' derivatives relative to the point: `w S_path = P_path - S w_path`, and
@@ -207,28 +214,15 @@ impl RationalPass {
     #[inline(always)]
     fn local(&self, fraction: u64) -> Local {
         let w = centred(fraction);
-        let weight = Weight::at(&self.weight, w);
-        let [x, y, z] = &self.axes;
-        let [x0, x1, x2, xs, xm, xx] = axis(x, &weight, w);
-        let [y0, y1, y2, ys, ym, yy] = axis(y, &weight, w);
-        let [z0, z1, z2, zs, zm, zz] = axis(z, &weight, w);
-        Local {
-            position: [x0, y0, z0],
-            path: [x1, y1, z1],
-            side: [xs, ys, zs],
-            path2: [x2, y2, z2],
-            mixed: [xm, ym, zm],
-            side2: [xx, yy, zz],
-            g: weight.g,
-            inverse_g: weight.inverse_g,
-            excess: weight.excess,
-        }
+        let weight = Weight::at(&self.0.weight, w);
+        let [x, y, z] = &self.0.axes;
+        weight.local(axis(x, &weight, w), axis(y, &weight, w), axis(z, &weight, w))
     }
 }
 
-impl Pass for RationalPass {
+impl Pass for RationalPass<'_> {
     #[inline(always)]
     fn contact(&self, fraction: u64, ball: &Ball) -> Result<Contact> {
-        self.local(fraction).contact(ball, &Factors::ONE)
+        self.local(fraction).contact::<true, true>(ball, &Factors::ONE)
     }
 }

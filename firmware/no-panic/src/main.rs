@@ -1,0 +1,105 @@
+//! The proof that no panic can be reached from the sample task, made by the linker.
+//!
+//! This image has the firmware's task (`sample_task.rs`, the same file) under the same RTIC handler, at the other
+//! ends of its queues as little as there can be, and a panic handler that calls a function which does not exist. Were a
+//! panic reachable, the handler would stay in the image, and the linker would miss that function by its name. Flags,
+//! profile and target are the firmware's; `tests/no_panic.rs` links it, and sees the linking fail with the feature
+//! `with-a-panic`. The image is never run.
+//!
+//! What the proof rests on: the compiler removes what it can show to be unreachable, so a check that can never fail but
+//! is not seen through counts as a panic here. It says nothing of faults of the processor, nor of the other tasks.
+#![no_std]
+#![no_main]
+
+use defmt as _;
+
+mod drivers;
+#[path = "../../src/sample_task.rs"]
+mod sample_task;
+
+#[rtic::app(device = stm32f4xx_hal::pac, peripherals = true)]
+mod app {
+    use core::hint::black_box;
+
+    use controller::{
+        machine::{Command, Event},
+        realtime::RealTime,
+    };
+    use heapless::spsc::{Consumer, Producer, Queue};
+    use interp_core::job::STORE_WORDS;
+
+    use crate::{
+        drivers::{cycle_counter::CycleCounter, sample_timer::SampleTimer},
+        sample_task::SampleTask,
+    };
+
+    /// One period in counts of the timers, as on the chip.
+    const PERIOD_COUNTS: u32 = 84_000;
+
+    #[shared]
+    struct Shared {
+        real_time: RealTime<&'static mut [i32; STORE_WORDS]>,
+    }
+
+    #[local]
+    struct Local {
+        task: SampleTask,
+        commands_in: Producer<'static, Command>,
+        events_out: Consumer<'static, Event>,
+    }
+
+    #[init(local = [
+        store: [i32; STORE_WORDS] = [0; STORE_WORDS],
+        commands: Queue<Command, 8> = Queue::new(),
+        events: Queue<Event, 64> = Queue::new(),
+    ])]
+    fn init(context: init::Context) -> (Shared, Local) {
+        let counter = CycleCounter::new(context.core.DCB, context.core.DWT);
+        let device = context.device;
+        let timer = SampleTimer::new(device.TIM2, device.TIM5, PERIOD_COUNTS - 1, PERIOD_COUNTS);
+        let (commands_in, commands_out) = context.local.commands.split();
+        let (events_in, events_out) = context.local.events.split();
+        (
+            Shared {
+                real_time: RealTime::with_store(context.local.store),
+            },
+            Local {
+                task: SampleTask::new(timer, counter, commands_out, events_in),
+                commands_in,
+                events_out,
+            },
+        )
+    }
+
+    /// The firmware's task. What state the machine is in is hidden from the compiler there: it may be any.
+    #[task(binds = TIM2, priority = 3, shared = [real_time], local = [task])]
+    fn sample(mut context: sample::Context) {
+        let task = context.local.task;
+        context.shared.real_time.lock(|real_time| task.tick(real_time));
+        #[cfg(feature = "with-a-panic")]
+        assert!(black_box(true), "the control");
+    }
+
+    /// The other ends: any command may come, and each event is looked at.
+    #[idle(shared = [real_time], local = [commands_in, events_out])]
+    fn idle(mut context: idle::Context) -> ! {
+        loop {
+            let command = black_box(Command::Run { ticks: 0 });
+            let _ = context.local.commands_in.enqueue(command);
+            black_box(context.local.events_out.dequeue());
+            context.shared.real_time.lock(|real_time| {
+                black_box(real_time);
+            });
+        }
+    }
+}
+
+#[panic_handler]
+fn panic(_info: &core::panic::PanicInfo<'_>) -> ! {
+    // SAFETY: the function does not exist; an image that could call it does not link.
+    #[allow(unsafe_code, reason = "a name for the linker to miss")]
+    unsafe extern "C" {
+        safe fn a_panic_can_be_reached_from_the_sample_task() -> !;
+    }
+    a_panic_can_be_reached_from_the_sample_task()
+}

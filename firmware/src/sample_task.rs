@@ -1,0 +1,77 @@
+//! All that the sample task does in a tick, apart from RTIC, so that it can be linked by itself: `no-panic`
+//! proves of this file and of what it calls that no panic can be reached.
+
+use core::hint::black_box;
+
+use controller::{
+    machine::{Command, Event, Events},
+    realtime::{RealTime, TickInput},
+};
+use heapless::spsc::{Consumer, Producer};
+
+use crate::drivers::{cycle_counter::CycleCounter, sample_timer::SampleTimer};
+
+/// What the task has for itself.
+pub(crate) struct SampleTask {
+    timer: SampleTimer,
+    counter: CycleCounter,
+    commands: Consumer<'static, Command>,
+    events: EventQueue,
+    /// Periods missed at the end of the last tick.
+    missed: u32,
+    /// Cycles of the last tick.
+    cycles: u32,
+}
+
+impl SampleTask {
+    /// The task before its first tick.
+    pub(crate) const fn new(
+        timer: SampleTimer,
+        counter: CycleCounter,
+        commands: Consumer<'static, Command>,
+        events: Producer<'static, Event>,
+    ) -> Self {
+        Self {
+            timer,
+            counter,
+            commands,
+            events: EventQueue(events),
+            missed: 0,
+            cycles: 0,
+        }
+    }
+
+    /// One tick.
+    #[inline]
+    pub(crate) fn tick<S: AsRef<[i32]> + AsMut<[i32]>>(&mut self, real_time: &mut RealTime<S>) {
+        // Where it lies is known when the image is linked, and each access to a field would make an address of its
+        // own, two instructions long. Hidden, it is a register, and the fields are offsets from it.
+        let real_time = black_box(real_time);
+        let begun = self.counter.now();
+        self.timer.begin();
+        if let Some(command) = self.commands.dequeue() {
+            real_time.obey(command, &mut self.events);
+        }
+        let input = TickInput {
+            missed: self.missed,
+            cycles: self.cycles,
+        };
+        real_time.tick(input, &mut self.events);
+        self.cycles = self.counter.since(begun);
+        self.missed = self.timer.end();
+    }
+}
+
+/// The way to the link.
+pub(crate) struct EventQueue(Producer<'static, Event>);
+
+impl Events for EventQueue {
+    #[inline]
+    fn has_room(&self) -> bool {
+        self.0.capacity() - self.0.len() >= Self::TICK_MAX
+    }
+
+    fn put(&mut self, event: Event) -> bool {
+        self.0.enqueue(event).is_ok()
+    }
+}

@@ -1,0 +1,61 @@
+//! The bound of every loop of the sample task: a loop that is not listed fails `tests/cycles.rs`, until its bound is
+//! written down here. By function, because lines move: who adds a loop to a function of this table looks at its bound too.
+
+/// Place of a loop, the rounds that it makes at most, and why.
+const BOUNDS: &[(&str, u32, &str)] = &[
+    ("compiler_builtins::arm::__aeabi_memcpy4", 512, COPIED),
+    ("compiler_builtins::arm::__aeabi_memset4", 512, COPIED),
+    (
+        "compiler_builtins::mem::impls::copy_forward::copy_forward_aligned_words",
+        512,
+        COPIED,
+    ),
+    (
+        "compiler_builtins::mem::impls::copy_forward::copy_forward_bytes",
+        15,
+        "less than is copied by words",
+    ),
+    (
+        "compiler_builtins::mem::impls::copy_forward::copy_forward_misaligned_words",
+        512,
+        COPIED,
+    ),
+    (
+        "compiler_builtins::mem::impls::set_bytes::set_bytes_bytes",
+        15,
+        "less than is filled by words",
+    ),
+    ("interp_core::schedule::next_side", 1024, "side spans: SPANS_MAX"),
+    (
+        "interp_core::surface::lines::Line::collapse",
+        4,
+        "rows of a block",
+    ),
+    ("interp_core::surface::pole::PoleLine::at", 3, "axes"),
+    ("interp_core::surface::pole::PolePass::collapse", 3, "axes"),
+    (
+        "interp_core::surface::rational::RationalPass::collapse",
+        4,
+        "three axes and the weight",
+    ),
+];
+
+/// Copies and fills are of values whose size the compiler knows.
+const COPIED: &str = "words of the largest value that is copied, below 2 KiB";
+
+/// Listed places that are none of these.
+pub fn stale<'a>(places: impl Fn(&str) -> bool + 'a) -> impl Iterator<Item = &'static str> + 'a {
+    BOUNDS
+        .iter()
+        .map(|(place, _, _)| *place)
+        .filter(move |place| !places(place))
+}
+
+/// Bound of the loops at a place: rounds at most, and why.
+#[must_use]
+pub fn of(place: &str) -> Option<(u32, &'static str)> {
+    BOUNDS
+        .iter()
+        .find(|(listed, _, _)| *listed == place)
+        .map(|(_, rounds, why)| (*rounds, *why))
+}

@@ -1,0 +1,184 @@
+//! What can be said of the image without running it: its deepest stack, the functions of the sample task, their loops.
+//!
+//! ```text
+//!  image ─code─► functions ─flow─► instructions, and where they go on ─┬─frame─► stack at each ─┐
+//!                                                                     ├─calls─► who calls whom ─┴─► deepest stack
+//!                                                                     └─loops─► loops, each with its place
+//! ```
+//!
+//! More than can happen is counted, never less: an indirect call reaches every function whose address is kept in the image
+//! (those of `core::fmt`'s traits from `core::fmt` alone), each interrupt preempts at the deepest place of the one below.
+//! Left out: a panic's and a hard fault's own report, after which nothing runs any more.
+
+pub mod bounds;
+pub mod calls;
+pub mod code;
+pub mod flow;
+pub mod frame;
+pub mod loops;
+
+use std::collections::{BTreeMap, BTreeSet};
+use std::path::Path;
+
+use addr2line::Loader;
+use object::File;
+
+use self::calls::Calls;
+use self::code::Code;
+use super::{BudgetError, image, stages};
+
+/// What an exception leaves on the stack at most: 8 words, S0 to S15, FPSCR, a word for the alignment of the
+/// whole, and another to align what was there before.
+pub const EXCEPTION_BYTES: i32 = 4 * (8 + 16 + 1 + 1) + 4;
+
+/// The first exception number of an interrupt.
+const INTERRUPTS: u32 = 16;
+
+/// The function that a panic ends in.
+const PANIC: &str = "rust_begin_unwind";
+
+/// A place on the stack: the thread, or an interrupt.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Context {
+    /// Name of the function that it begins with.
+    pub name: String,
+    /// Deepest stack, bytes, without the exception's frame.
+    pub bytes: i32,
+    /// The calls that lead there, the caller first.
+    pub chain: Vec<String>,
+}
+
+/// What follows from the image.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct Analysis {
+    /// The thread first, then the interrupts.
+    pub contexts: Vec<Context>,
+    /// Functions that the sample task may reach.
+    pub task: Vec<String>,
+    /// Places of the sample task's loops, and how many there are in the image.
+    pub loops: BTreeMap<String, u32>,
+    /// What could not be followed: then the figures are too small.
+    pub lost: Vec<String>,
+}
+
+impl Analysis {
+    /// The deepest stack: thread, and every interrupt on top of another.
+    #[must_use]
+    pub fn stack_bytes(&self) -> u32 {
+        let interrupts = self.contexts.iter().skip(1);
+        let bytes: i32 = interrupts.map(|context| context.bytes + EXCEPTION_BYTES).sum();
+        let thread = self.contexts.first().map_or(0, |context| context.bytes);
+        u32::try_from(bytes + thread).unwrap_or(0)
+    }
+
+    /// Functions of the sample task that panic.
+    #[must_use]
+    pub fn panics(&self) -> Vec<&str> {
+        let panics = |name: &&str| {
+            name.contains("panicking") || name.contains(PANIC) || name.contains("unwrap_failed")
+        };
+        self.task.iter().map(String::as_str).filter(panics).collect()
+    }
+
+    /// Loops of the sample task that no bound is written down for.
+    #[must_use]
+    pub fn unbounded(&self) -> Vec<&str> {
+        let places = self.loops.keys().map(String::as_str);
+        places.filter(|place| bounds::of(place).is_none()).collect()
+    }
+
+    /// Places that a bound is written down for, and that have no loop.
+    #[must_use]
+    pub fn stale(&self) -> Vec<&str> {
+        bounds::stale(|place| self.loops.contains_key(place)).collect()
+    }
+}
+
+/// Follows the code of an image.
+///
+/// # Errors
+/// It cannot be read, has no sample task, or functions that call one another in a circle.
+pub fn analyse(path: &Path) -> Result<Analysis, BudgetError> {
+    let bad = |error: &dyn std::fmt::Display| BudgetError::Image(error.to_string());
+    let bytes = std::fs::read(path).map_err(|error| BudgetError::File(path.into(), error.to_string()))?;
+    let file = File::parse(bytes.as_slice()).map_err(|error| bad(&error))?;
+    let lines = Loader::new(path).map_err(|error| bad(&error))?;
+    let code = Code::new(&file, image::bare_plan(&file)?);
+    let calls = Calls::new(&code, &lines);
+    let thread = code
+        .function_named("Reset")
+        .ok_or_else(|| bad(&"it has no function Reset"))?;
+    let task = code.sample_task().ok_or_else(|| bad(&"it has no sample task"))?;
+    let panics = |index: &usize| code.functions[*index].name.contains(PANIC);
+    let without: BTreeSet<usize> = (0..code.functions.len()).filter(panics).collect();
+    let name = |index: usize| code.functions[index].name.clone();
+    let mut analysis = Analysis::default();
+    let handlers = code.handlers();
+    let interrupts = handlers.iter().filter(|(exception, _)| *exception >= INTERRUPTS);
+    for begin in [thread]
+        .into_iter()
+        .chain(interrupts.map(|(_, function)| *function))
+    {
+        let deepest = calls.deepest(begin, &without).map_err(|circle| {
+            let names: Vec<_> = circle.into_iter().map(name).collect();
+            bad(&format!(
+                "a function calls itself, by way of {}",
+                names.join(", ")
+            ))
+        })?;
+        analysis.contexts.push(Context {
+            name: name(begin),
+            bytes: deepest.bytes,
+            chain: deepest.chain.into_iter().map(name).collect(),
+        });
+        for index in calls.reachable(begin) {
+            let lost = calls.nodes[index].lost.iter();
+            analysis
+                .lost
+                .extend(lost.map(|address| format!("{address:#x} in {}", name(index))));
+        }
+    }
+    for index in calls.reachable(task) {
+        analysis.task.push(name(index));
+        let flow = &calls.nodes[index].flow;
+        for found in loops::loops(flow) {
+            let addresses = found.steps.iter().map(|step| flow.steps[*step].address);
+            let place = place(&lines, addresses).unwrap_or_else(|| name(index));
+            *analysis.loops.entry(place).or_insert(0) += 1;
+        }
+    }
+    Ok(analysis)
+}
+
+/// Share of a loop's instructions that have to be of a function for the loop to be in it: the rest is what the compiler
+/// shared with other code, or moved.
+const SHARE: f64 = 0.8;
+
+/// The function that a loop is in: the innermost that most of its instructions are of, those of `core` left out.
+fn place(lines: &Loader, addresses: impl Iterator<Item = u32>) -> Option<String> {
+    let chains: Vec<Vec<String>> = addresses
+        .map(|address| {
+            let chain = stages::chain(lines, address);
+            let own = chain.iter().filter(|name| !stages::is_of_core(name));
+            own.rev().map(|name| stages::plain(name)).collect()
+        })
+        .collect();
+    let mut place: Vec<String> = Vec::new();
+    loop {
+        let mut counts: BTreeMap<&str, u32> = BTreeMap::new();
+        let inside = chains.iter().filter(|chain| chain.starts_with(&place));
+        for next in inside.filter_map(|chain| chain.get(place.len())) {
+            *counts.entry(next).or_insert(0) += 1;
+        }
+        let most = counts.into_iter().max_by_key(|(_, count)| *count);
+        #[allow(
+            clippy::cast_precision_loss,
+            reason = "a function has not that many instructions"
+        )]
+        let all = chains.len() as f64;
+        match most {
+            Some((next, count)) if f64::from(count) >= SHARE * all => place.push(next.to_owned()),
+            _ => return place.pop(),
+        }
+    }
+}

@@ -1,0 +1,118 @@
+//! `budget --search`: the worst tick that can be found, and the job that causes it.
+
+use std::path::{Path, PathBuf};
+
+use cycle_plugin::plan::Stage;
+use serde_json::{Value, json};
+
+use super::super::{Failure, Result, cannot_write, progress};
+use crate::budget::PERIOD_CYCLES;
+use crate::budget::figures::{Model, whole};
+use crate::budget::lab::{Lab, Worst};
+use crate::budget::measure::Bench;
+use crate::budget::search::{Campaign, search, text};
+
+/// Share of the period that a tick takes.
+fn share_pct(cycles: u32) -> f64 {
+    100.0 * f64::from(cycles) / f64::from(PERIOD_CYCLES)
+}
+
+/// What the worst tick took, as text.
+pub(super) fn describe(worst: &Worst) -> String {
+    let total = |model| whole(&worst.record, model);
+    let (nominal, pessimistic) = (total(Model::Nominal), total(Model::Pessimistic));
+    let mut text = format!(
+        "worst tick: {pessimistic} cycles pessimistic ({:.2} % of the period), {nominal} nominal; tick {} of the run\n  in it: {}\n",
+        share_pct(pessimistic),
+        worst.tick,
+        worst.events.join(", ")
+    );
+    for stage in Stage::ALL {
+        let cycles = worst.record.stages[stage as usize];
+        text.push_str(&format!(
+            "  {:<25} {:>6} nominal {:>6} pessimistic\n",
+            stage.name(),
+            cycles.nominal,
+            cycles.pessimistic
+        ));
+    }
+    text
+}
+
+/// The worst tick as JSON.
+fn json(worst: &Worst) -> Value {
+    let stages = Stage::ALL.map(|stage| {
+        let cycles = worst.record.stages[stage as usize];
+        json!({
+            "stage": stage.name(),
+            "cycles_nominal": cycles.nominal,
+            "cycles_pessimistic": cycles.pessimistic,
+        })
+    });
+    let pessimistic = whole(&worst.record, Model::Pessimistic);
+    json!({
+        "tick": worst.tick,
+        "events": worst.events,
+        "cycles_nominal": whole(&worst.record, Model::Nominal),
+        "cycles_pessimistic": pessimistic,
+        "period_share_pct": share_pct(pessimistic),
+        "stages": stages,
+    })
+}
+
+fn print(campaign: &Campaign, lab: &Lab, seed: u64, out: &Path) {
+    let faults: Vec<&str> = campaign.faults.iter().copied().collect();
+    println!(
+        "seed {seed}: {} jobs ran, {} faulted at once, {} were refused, {} samples, stack {} bytes; faults met: {}",
+        campaign.ran,
+        campaign.skipped,
+        campaign.refused,
+        campaign.samples,
+        lab.stack_bytes(),
+        if faults.is_empty() {
+            "none".to_owned()
+        } else {
+            faults.join(", ")
+        }
+    );
+    if let Some(found) = campaign.elite.first() {
+        print!("{}", describe(&found.worst));
+        println!("  job: {}", out.display());
+        println!("  again: cargo sim budget {}", out.display());
+    }
+}
+
+/// Searches, prints the worst tick, and writes the job that causes it.
+pub(super) fn command(bench: &Bench, jobs: u32, seed: u64, out: &PathBuf, as_json: bool) -> Result<()> {
+    let mut lab = Lab::new(bench)?;
+    let bar = progress(u64::from(jobs), "searching");
+    let campaign = search(&mut lab, jobs, seed, || bar.inc(1))?;
+    bar.finish_and_clear();
+    let Some(found) = campaign.elite.first() else {
+        return Err(Failure::Failed(Some(format!(
+            "none of {jobs} jobs ran; try more"
+        ))));
+    };
+    let comment = format!(
+        "The worst job that `cargo sim budget --search {jobs} --seed {seed}` found.\n{}",
+        describe(&found.worst)
+    );
+    std::fs::write(out, text::text(&found.job, &comment)).map_err(|error| cannot_write(out, &error))?;
+    if as_json {
+        let report = json!({
+            "seed": seed,
+            "jobs": campaign.ran,
+            "faulted_at_once": campaign.skipped,
+            "refused": campaign.refused,
+            "samples": campaign.samples,
+            "faults": campaign.faults,
+            "stack_bytes": lab.stack_bytes(),
+            "job": out,
+            "worst": json(&found.worst),
+        });
+        println!("{report}");
+    } else {
+        print(&campaign, &lab, seed, out);
+    }
+    Ok(())
+}
