@@ -1,7 +1,7 @@
 //! Existing practice: the tool centre's path at constant speed of the centre. The contact's speed varies by eqn 4.
 
-use super::linear::{Chord, even_chords, write_blocks};
-use super::{Approach, ApproachError, PassPath, Program};
+use super::linear::{Chain, Chord, Pace, even_chords};
+use super::{Approach, ApproachError, Each, PassPath, Program};
 use crate::job_file::JobFile;
 use crate::oracle::vector::length;
 
@@ -40,62 +40,40 @@ impl ConstantCl {
 
 impl Approach for ConstantCl {
     fn plan(&self, pass: &PassPath<'_>) -> Result<Box<dyn Program>, ApproachError> {
-        Ok(Box::new(Path {
+        Ok(Box::new(Chain {
             chords: self.chords(pass)?,
-            feed_mm_s: self.feed_mm_s,
+            pace: Pace::Constant(self.feed_mm_s),
         }))
     }
 }
 
-/// The centre's path of one pass. A CNC is fed its chords; it is followed as if it were exact, so that what is seen is the
-/// effect of the constant speed alone.
-struct Path {
-    chords: Vec<Chord>,
+/// Follows the centre's path of a pass at a constant speed. A CNC is fed its chords; it is followed as if it were exact, so
+/// that what is seen is the effect of the constant speed alone.
+pub(super) fn follow(
     feed_mm_s: f64,
-}
-
-impl Program for Path {
-    fn segments(&self) -> usize {
-        self.chords.len()
-    }
-
-    fn write(&self, out: &mut String) {
-        write_blocks(&self.chords, out);
-    }
-
-    fn speed_step_mm_s(&self) -> f64 {
-        0.0
-    }
-
-    fn follow(
-        &self,
-        pass: &PassPath<'_>,
-        period_s: f64,
-        each: &mut dyn FnMut([f64; 3], f64) -> Result<(), ApproachError>,
-    ) -> Result<(), ApproachError> {
-        if self.chords.is_empty() {
-            return Ok(());
+    pass: &PassPath<'_>,
+    period_s: f64,
+    each: &mut Each<'_>,
+) -> Result<(), ApproachError> {
+    let way = feed_mm_s * period_s;
+    let rate = |path: f64| -> Result<f64, ApproachError> {
+        let speed = length(pass.at(pass.kept(path))?.cl_velocity);
+        Ok(pass.sense() / speed.max(1e-9))
+    };
+    let mut path = pass.ends[0];
+    // Bounded by the length over the way of a period.
+    loop {
+        // Runge and Kutta's rule, with the length as the independent variable.
+        let first = rate(path)?;
+        let second = rate(path + 0.5 * way * first)?;
+        let third = rate(path + 0.5 * way * second)?;
+        let fourth = rate(path + way * third)?;
+        let step = way * (first + 2.0 * (second + third) + fourth) / 6.0;
+        if step.abs() * (1.0 + END_SHARE) >= pass.left(path) {
+            let end = pass.at(pass.ends[1])?;
+            return each(end.contact.cl_mm, end.path);
         }
-        let way = self.feed_mm_s * period_s;
-        let rate = |path: f64| -> Result<f64, ApproachError> {
-            let speed = length(pass.at(pass.kept(path))?.cl_velocity);
-            Ok(pass.sense() / speed.max(1e-9))
-        };
-        let mut path = pass.ends[0];
-        // Bounded by the length over the way of a period.
-        loop {
-            // Runge and Kutta's rule, with the length as the independent variable.
-            let first = rate(path)?;
-            let second = rate(path + 0.5 * way * first)?;
-            let third = rate(path + 0.5 * way * second)?;
-            let fourth = rate(path + way * third)?;
-            let step = way * (first + 2.0 * (second + third) + fourth) / 6.0;
-            if step.abs() * (1.0 + END_SHARE) >= pass.left(path) {
-                let end = pass.at(pass.ends[1])?;
-                return each(end.contact.cl_mm, end.path);
-            }
-            path += step;
-            each(pass.at(path)?.contact.cl_mm, path)?;
-        }
+        path += step;
+        each(pass.at(path)?.contact.cl_mm, path)?;
     }
 }

@@ -5,7 +5,7 @@ use std::fmt::Write;
 
 use super::cubic::{Cubic, Errors, fit};
 use super::nodes::Nodes;
-use super::{Approach, ApproachError, PassPath, Program};
+use super::{Approach, ApproachError, Each, PassPath, Program};
 use crate::job_file::JobFile;
 use crate::oracle::vector::length;
 
@@ -168,12 +168,7 @@ impl Program for Spline {
         })
     }
 
-    fn follow(
-        &self,
-        pass: &PassPath<'_>,
-        period_s: f64,
-        each: &mut dyn FnMut([f64; 3], f64) -> Result<(), ApproachError>,
-    ) -> Result<(), ApproachError> {
+    fn follow(&self, pass: &PassPath<'_>, period_s: f64, each: &mut Each<'_>) -> Result<(), ApproachError> {
         let Some(mut cubic) = self.cubics.first() else {
             return Ok(());
         };

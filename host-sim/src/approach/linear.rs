@@ -2,7 +2,7 @@
 //! the contact at the feed (Lo eqns 6, 7), followed by a linear interpolator that cuts a segment into whole periods.
 
 use super::pass::from_segment;
-use super::{Approach, ApproachError, PassPath, Program};
+use super::{Approach, ApproachError, Each, PassPath, Program};
 use crate::gcode::{Blocks, Cut, FeedMode};
 use crate::job_file::JobFile;
 use crate::oracle::vector::{add, cross, dot, length, scale, subtract};
@@ -220,21 +220,26 @@ impl Approach for Linear {
             Chords::Held => even_chords(pass, self.chord_mm, self.feed_mm_s)?,
             equation => chords(pass, equation, self.chord_mm, self.feed_mm_s)?,
         };
-        Ok(Box::new(Chain { chords }))
+        Ok(Box::new(Chain {
+            chords,
+            pace: Pace::WholePeriods,
+        }))
     }
+}
+
+/// How chords are followed.
+#[derive(Clone, Copy, Debug)]
+pub(super) enum Pace {
+    /// Each in whole sampling periods, as a traditional linear interpolator does.
+    WholePeriods,
+    /// As if they were the exact path, at this speed of the centre, mm/s.
+    Constant(f64),
 }
 
 /// The chords of one pass.
-struct Chain {
-    chords: Vec<Chord>,
-}
-
-/// Appends the blocks of chords.
-pub(super) fn write_blocks(chords: &[Chord], out: &mut String) {
-    let mut blocks = Blocks::new(out, FeedMode::G94);
-    for chord in chords {
-        blocks.cut(&chord.cut());
-    }
+pub(super) struct Chain {
+    pub(super) chords: Vec<Chord>,
+    pub(super) pace: Pace,
 }
 
 impl Program for Chain {
@@ -243,7 +248,10 @@ impl Program for Chain {
     }
 
     fn write(&self, out: &mut String) {
-        write_blocks(&self.chords, out);
+        let mut blocks = Blocks::new(out, FeedMode::G94);
+        for chord in &self.chords {
+            blocks.cut(&chord.cut());
+        }
     }
 
     fn speed_step_mm_s(&self) -> f64 {
@@ -252,12 +260,12 @@ impl Program for Chain {
         })
     }
 
-    fn follow(
-        &self,
-        pass: &PassPath<'_>,
-        period_s: f64,
-        each: &mut dyn FnMut([f64; 3], f64) -> Result<(), ApproachError>,
-    ) -> Result<(), ApproachError> {
+    fn follow(&self, pass: &PassPath<'_>, period_s: f64, each: &mut Each<'_>) -> Result<(), ApproachError> {
+        match self.pace {
+            Pace::Constant(_) if self.chords.is_empty() => return Ok(()),
+            Pace::Constant(feed_mm_s) => return super::constant_cl::follow(feed_mm_s, pass, period_s, each),
+            Pace::WholePeriods => {}
+        }
         let mut begin = pass.ends[0];
         for chord in &self.chords {
             let apart = subtract(chord.to_mm, chord.from_mm);

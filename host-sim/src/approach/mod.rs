@@ -143,6 +143,9 @@ pub trait Approach {
     fn plan(&self, pass: &PassPath<'_>) -> Result<Box<dyn Program>, ApproachError>;
 }
 
+/// What takes the tool's centre after each period, mm, with a guess of its contact's path parameter.
+pub type Each<'a> = dyn FnMut([f64; 3], f64) -> Result<(), ApproachError> + 'a;
+
 /// A pass as an approach feeds it to a CNC.
 pub trait Program {
     /// Segments.
@@ -159,10 +162,5 @@ pub trait Program {
     ///
     /// # Errors
     /// As [`Approach::plan`].
-    fn follow(
-        &self,
-        pass: &PassPath<'_>,
-        period_s: f64,
-        each: &mut dyn FnMut([f64; 3], f64) -> Result<(), ApproachError>,
-    ) -> Result<(), ApproachError>;
+    fn follow(&self, pass: &PassPath<'_>, period_s: f64, each: &mut Each<'_>) -> Result<(), ApproachError>;
 }
