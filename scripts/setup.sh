@@ -36,6 +36,41 @@ need_program() {
     command -v "$1" > /dev/null || die "$2 was installed, but there is no $1"
 }
 
+# LinuxCNC's stand-alone interpreter, unpacked into target/: installed, the package would bring a desktop along.
+need_rs274() {
+    local place=target/rs274
+    if command -v rs274 > /dev/null || [ -x $place/rs274 ]; then return; fi
+    command -v apt-get > /dev/null || die "rs274 is missing; install it (Debian and Ubuntu have it in the package linuxcnc-uspace)"
+    say "unpacking linuxcnc-uspace into $place, for rs274"
+    if ! apt-cache show linuxcnc-uspace > /dev/null 2>&1; then as_root apt-get update -qq; fi
+    rm -rf $place
+    mkdir -p $place/packages $place/root
+    local packages
+    # The libraries that the interpreter itself needs, with theirs; the C library is the machine's own.
+    packages=$(apt-cache depends linuxcnc-uspace | awk '$1 == "Depends:" && /libboost-python|libedit|libpython3|libtirpc/ { print $2 }' |
+        grep -v '<' | xargs apt-cache depends --recurse --no-recommends --no-suggests --no-conflicts --no-breaks \
+            --no-replaces --no-enhances | grep '^[a-z]' | grep -vE '^(libc6|libgcc-s1|gcc-.*|libcrypt1|debconf.*)(:|$)' | sort -u)
+    # shellcheck disable=SC2086
+    (cd $place/packages && apt-get download -qq linuxcnc-uspace $packages 2> /dev/null) || die "linuxcnc-uspace cannot be downloaded"
+    local package
+    for package in "$place"/packages/*.deb; do dpkg -x "$package" $place/root; done
+    rm -rf $place/packages $place/root/usr/share $place/root/usr/include
+    cat > $place/rs274 << 'END'
+#!/bin/sh
+root=$(cd "$(dirname "$0")/root" && pwd)
+for folder in "$root"/usr/lib "$root"/usr/lib/*-linux-gnu* "$root"/lib/*-linux-gnu*; do
+    if [ -d "$folder" ]; then LD_LIBRARY_PATH="$folder${LD_LIBRARY_PATH:+:$LD_LIBRARY_PATH}"; fi
+done
+export LD_LIBRARY_PATH PYTHONHOME="$root/usr" PYTHONPATH="$root/usr/lib/python3/dist-packages"
+exec "$root/usr/bin/rs274" "$@"
+END
+    chmod +x $place/rs274
+    # A program of one block proves the unpacked one; it writes its parameters into the folder that it is started in.
+    (cd $place && : > empty.tbl && : > empty.var && printf 'G1X1F1\nM2\n' > probe.ngc &&
+        ./rs274 -t empty.tbl -v empty.var -g probe.ngc < /dev/null 2> /dev/null | grep -q STRAIGHT_FEED) ||
+        die "linuxcnc-uspace was unpacked into $place, but its rs274 does not run"
+}
+
 # need_tool CRATE VERSION
 need_tool() {
     if command -v "$1" > /dev/null; then return; fi
@@ -69,4 +104,5 @@ setup() {
 setup_check() {
     need_program arm-none-eabi-objdump binutils-arm-none-eabi
     need_tool cargo-deny "$CARGO_DENY_VERSION"
+    need_rs274
 }

@@ -16,14 +16,19 @@
     )
 )]
 
+pub mod approach;
 pub mod budget;
 pub mod commands;
 pub mod explain;
+pub mod export;
+pub mod gcode;
 pub mod job_file;
 pub mod machine;
 pub mod oracle;
+pub mod paper;
 pub mod prepare;
 pub mod remote;
 pub mod report;
+pub mod speeds;
 pub mod survey;
 pub mod trace;

@@ -4,7 +4,10 @@ use interp_core::Sample;
 
 use crate::oracle::{Emitted, Oracle, Report, Verifier};
 use crate::prepare::Prepared;
+use crate::speeds::{SpeedFigures, Speeds};
 use crate::trace::Trace;
+
+const MM_PER_NM: f64 = 1e-6;
 
 /// What a run came to.
 #[derive(Clone, Debug)]
@@ -13,8 +16,8 @@ pub struct Findings {
     pub samples: u64,
     /// Passes.
     pub passes: u32,
-    /// Length of the tool centre's path within the passes, mm.
-    pub cl_length_mm: f64,
+    /// Speeds of contact and centre, and the centre's length.
+    pub speeds: SpeedFigures,
     /// Least candidate of the path interval, in units of the side parameter; infinite where there was none.
     pub interval_min: f64,
     /// What the oracle found.
@@ -28,6 +31,23 @@ struct Pending {
     first: bool,
 }
 
+/// A sample of the core in plain numbers.
+pub(crate) fn emitted(prepared: &Prepared, sample: &Sample, first: bool, last: bool) -> Emitted {
+    let [u, v] = prepared.parameters(sample.path, sample.side);
+    Emitted {
+        tick: sample.tick.into(),
+        pass: sample.pass,
+        u,
+        v,
+        cc_nm: sample.cc_nm,
+        cl_nm: sample.cl_nm,
+        feed_mm_s: sample.feed_mm_s.into(),
+        interval: sample.interval().into(),
+        first_of_pass: first,
+        last_of_pass: last,
+    }
+}
+
 /// The follower of one run.
 pub struct Survey<'a> {
     prepared: &'a Prepared,
@@ -36,7 +56,10 @@ pub struct Survey<'a> {
     each: Option<&'a mut dyn FnMut(&Emitted)>,
     pending: Option<Pending>,
     samples: u64,
-    cl_length_nm: f64,
+    oracle: Oracle,
+    speeds: Speeds,
+    ratio_step: f64,
+    feed_mm_s: f64,
     interval_min: f64,
 }
 
@@ -56,7 +79,10 @@ impl<'a> Survey<'a> {
             each,
             pending: None,
             samples: 0,
-            cl_length_nm: 0.0,
+            oracle: oracle.clone(),
+            speeds: Speeds::new(oracle.period_s),
+            ratio_step: 0.0,
+            feed_mm_s: 0.0,
             interval_min: f64::INFINITY,
         }
     }
@@ -70,11 +96,6 @@ impl<'a> Survey<'a> {
             Some(before) => {
                 let over = before.sample.pass != sample.pass;
                 self.emit(before, over);
-                if !over {
-                    let square =
-                        |k: usize| (f64::from(sample.cl_nm[k]) - f64::from(before.sample.cl_nm[k])).powi(2);
-                    self.cl_length_nm += (square(0) + square(1) + square(2)).sqrt();
-                }
                 over
             }
             None => true,
@@ -92,20 +113,16 @@ impl<'a> Survey<'a> {
     }
 
     fn emit(&mut self, Pending { sample, first }: Pending, last: bool) {
-        let [u, v] = self.prepared.parameters(sample.path, sample.side);
-        let emitted = Emitted {
-            tick: sample.tick.into(),
-            pass: sample.pass,
-            u,
-            v,
-            cc_nm: sample.cc_nm,
-            cl_nm: sample.cl_nm,
-            feed_mm_s: sample.feed_mm_s.into(),
-            interval: sample.interval().into(),
-            first_of_pass: first,
-            last_of_pass: last,
-        };
-        self.verifier.add(&emitted);
+        let emitted = emitted(self.prepared, &sample, first, last);
+        let arc_mm = self.verifier.add(&emitted);
+        self.speeds
+            .add(&emitted, arc_mm, sample.cl_nm.map(|nm| f64::from(nm) * MM_PER_NM));
+        if first {
+            // A place without a normal is the verifier's to report.
+            let (_, side) = self.oracle.swapped(emitted.u, emitted.v);
+            self.ratio_step = self.ratio_step.max(self.oracle.ratio_step(side).unwrap_or(0.0));
+            self.feed_mm_s = self.feed_mm_s.max(emitted.feed_mm_s);
+        }
         if let Some(each) = &mut self.each {
             each(&emitted);
         }
@@ -126,7 +143,7 @@ impl<'a> Survey<'a> {
         Ok(Findings {
             samples: self.samples,
             passes: self.pending.map_or(0, |pending| pending.sample.pass + 1),
-            cl_length_mm: self.cl_length_nm * 1e-6,
+            speeds: self.speeds.finish(self.ratio_step * self.feed_mm_s),
             interval_min: self.interval_min,
             report,
         })

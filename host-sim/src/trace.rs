@@ -4,7 +4,9 @@ use std::fs::File;
 use std::io::{self, BufWriter};
 use std::path::Path;
 
-use interp_core::Sample;
+use interp_core::{Sample, State};
+
+use crate::oracle::Emitted;
 
 /// Columns of a trace.
 pub const COLUMNS: [&str; 14] = [
@@ -23,6 +25,18 @@ pub const COLUMNS: [&str; 14] = [
     "cl_z_nm",
     "interval",
 ];
+
+/// What a row says.
+struct Row {
+    tick: u64,
+    state: &'static str,
+    pass: u32,
+    parameters: [f64; 2],
+    feed_mm_s: String,
+    cc_nm: [i32; 3],
+    cl_nm: [i32; 3],
+    interval: Option<String>,
+}
 
 /// A trace that is being written.
 pub struct Trace {
@@ -45,30 +59,57 @@ impl Trace {
     ///
     /// # Errors
     /// The file cannot be written.
-    pub fn write(&mut self, sample: &Sample, [u, v]: [f64; 2]) -> io::Result<()> {
-        let [cc_x, cc_y, cc_z] = sample.cc_nm.map(millimetres);
-        let [cl_x, cl_y, cl_z] = sample.cl_nm;
-        let interval = sample.interval();
-        let interval = if interval.is_finite() {
-            interval.to_string()
-        } else {
-            String::new()
-        };
+    pub fn write(&mut self, sample: &Sample, parameters: [f64; 2]) -> io::Result<()> {
+        self.row(&Row {
+            tick: sample.tick.into(),
+            state: sample.state.name(),
+            pass: sample.pass,
+            parameters,
+            feed_mm_s: sample.feed_mm_s.to_string(),
+            cc_nm: sample.cc_nm,
+            cl_nm: sample.cl_nm,
+            interval: finite(sample.interval()),
+        })
+    }
+
+    /// Writes the row of a sample that another approach than the core emitted.
+    ///
+    /// # Errors
+    /// The file cannot be written.
+    pub fn write_emitted(&mut self, emitted: &Emitted) -> io::Result<()> {
+        self.row(&Row {
+            tick: emitted.tick,
+            state: State::Running.name(),
+            pass: emitted.pass,
+            parameters: [emitted.u, emitted.v],
+            feed_mm_s: emitted.feed_mm_s.to_string(),
+            cc_nm: emitted.cc_nm,
+            cl_nm: emitted.cl_nm,
+            interval: finite(emitted.interval),
+        })
+    }
+
+    fn row(&mut self, row: &Row) -> io::Result<()> {
+        let [cc_x, cc_y, cc_z] = row.cc_nm.map(millimetres);
+        let [cl_x, cl_y, cl_z] = row.cl_nm;
+        let [u, v] = row.parameters;
+        #[allow(clippy::cast_precision_loss, reason = "below 2^53")]
+        let time_s = row.tick as f64 * self.period_us * 1e-6;
         let fields = [
-            sample.tick.to_string(),
-            format!("{:.6}", f64::from(sample.tick) * self.period_us * 1e-6),
-            sample.state.name().to_owned(),
-            sample.pass.to_string(),
+            row.tick.to_string(),
+            format!("{time_s:.6}"),
+            row.state.to_owned(),
+            row.pass.to_string(),
             digits(u),
             digits(v),
-            sample.feed_mm_s.to_string(),
+            row.feed_mm_s.clone(),
             cc_x,
             cc_y,
             cc_z,
             cl_x.to_string(),
             cl_y.to_string(),
             cl_z.to_string(),
-            interval,
+            row.interval.clone().unwrap_or_default(),
         ];
         self.writer.write_record(fields)?;
         Ok(())
@@ -86,6 +127,11 @@ impl Trace {
 /// 17 significant digits: every f64 exactly.
 fn digits(value: f64) -> String {
     format!("{value:.16e}")
+}
+
+/// An interval's digits, where there is one.
+fn finite(interval: impl Into<f64> + Copy + ToString) -> Option<String> {
+    interval.into().is_finite().then(|| interval.to_string())
 }
 
 /// Nanometres as millimetres, exactly.

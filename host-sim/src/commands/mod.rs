@@ -1,7 +1,10 @@
 //! The commands, one file each; this one reads the arguments and turns results into exit codes.
 
+mod approach;
 mod budget;
+mod export;
 mod outcome;
+mod paper;
 mod run;
 mod simulate;
 mod verify;
@@ -11,9 +14,10 @@ pub use verify::BOUNDS;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
-use clap::{Parser, Subcommand, ValueEnum};
+use clap::{Parser, Subcommand};
 use indicatif::{ProgressBar, ProgressStyle};
 
+use crate::approach::ApproachError;
 use crate::job_file::JobFile;
 use crate::prepare::{Prepared, prepare};
 
@@ -29,6 +33,16 @@ pub enum Failure {
 impl From<crate::job_file::JobFileError> for Failure {
     fn from(error: crate::job_file::JobFileError) -> Self {
         Self::Input(error.into())
+    }
+}
+
+impl From<ApproachError> for Failure {
+    /// A surface that an approach cannot cut is a failed run; the job may be as good as any.
+    fn from(error: ApproachError) -> Self {
+        Self::Failed(Some(match error {
+            ApproachError::Fault(sentence) => sentence,
+            other => format!("{other}\n  help: {}", other.remedy()),
+        }))
     }
 }
 
@@ -55,14 +69,9 @@ enum Command {
     Simulate(simulate::Arguments),
     Run(run::Arguments),
     Verify(verify::Arguments),
+    Export(export::Arguments),
+    Paper(paper::Arguments),
     Budget(budget::Arguments),
-}
-
-/// How the tool path is made.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
-enum Approach {
-    /// The surface interpolator: the surface itself, sampled each period.
-    Surface,
 }
 
 /// Reads the arguments, runs the command, and returns its exit code: 0 done, 1 failed, 2 bad usage or bad input.
@@ -72,6 +81,8 @@ pub fn main() -> ExitCode {
         Command::Simulate(arguments) => simulate::command(&arguments),
         Command::Run(arguments) => run::command(&arguments),
         Command::Verify(arguments) => verify::command(&arguments),
+        Command::Export(arguments) => export::command(&arguments),
+        Command::Paper(arguments) => paper::command(&arguments),
         Command::Budget(arguments) => budget::command(&arguments),
     };
     match result {

@@ -5,9 +5,12 @@ use std::path::Path;
 use interp_core::Fault;
 use serde_json::{Map, Value, json};
 
+use crate::approach::Kind;
 use crate::explain;
+use crate::job_file::JobFile;
 use crate::machine::Machine;
 use crate::prepare::Prepared;
+use crate::speeds::Span;
 use crate::survey::Findings;
 
 /// A fault with its place.
@@ -58,77 +61,122 @@ impl FaultAt {
     }
 }
 
-/// The outcome of a run.
+/// The outcome of a run, by any approach.
 #[derive(Debug)]
 pub(super) struct Outcome<'a> {
-    pub(super) prepared: &'a Prepared,
+    pub(super) kind: Kind,
+    pub(super) job: &'a JobFile,
+    /// Segments of the program; for the product the patches of its surface.
+    pub(super) segments: usize,
+    /// Bytes of the program; for the product those of its header and surface.
+    pub(super) bytes: usize,
     pub(super) findings: &'a Findings,
-    pub(super) period_s: f64,
     pub(super) digest: u64,
     pub(super) samples_per_second: f64,
     pub(super) fault: Option<FaultAt>,
+}
+
+fn finite(value: f64) -> Value {
+    if value.is_finite() {
+        json!(value)
+    } else {
+        Value::Null
+    }
+}
+
+fn span(span: &Span) -> Value {
+    json!({ "min": finite(span.min), "mean": span.mean(), "max": span.max })
 }
 
 impl Outcome<'_> {
     fn machining_time_s(&self) -> f64 {
         #[allow(clippy::cast_precision_loss, reason = "below 2^53")]
         let ticks = self.findings.samples as f64;
-        ticks * self.period_s
+        ticks * self.job.machine.period_s()
     }
 
-    /// The keys of `simulate`.
+    /// The keys of `simulate`, the same for all approaches.
     pub(super) fn json(&self) -> Map<String, Value> {
-        let report = &self.findings.report;
-        let finite = |value: f64| {
-            if value.is_finite() {
-                json!(value)
-            } else {
-                Value::Null
-            }
-        };
+        let (report, speeds) = (&self.findings.report, &self.findings.speeds);
         let value = json!({
-            "approach": "surface",
+            "approach": self.kind.name(),
             "passes": self.findings.passes,
             "samples": self.findings.samples,
             "ticks": self.findings.samples,
+            "segments": self.segments,
+            "program_bytes": self.bytes,
             "cc_length_mm": report.cc_length_mm,
-            "cl_length_mm": self.findings.cl_length_mm,
+            "cl_length_mm": speeds.cl_length_mm,
             "machining_time_s": self.machining_time_s(),
             "interval_min": finite(self.findings.interval_min),
             "ripple_max_pct": report.ripple_pct.max.abs(),
             "ripple_rms_pct": report.ripple_pct.rms(),
+            "cc_speed_mm_s": span(&speeds.cc),
+            "cl_speed_mm_s": span(&speeds.cl),
+            "cl_step_mm_s": speeds.cl_step_mm_s,
+            "cl_change_mm_s": speeds.cl_change_mm_s,
+            "position_error_max_nm": report.position_nm.max,
             "digest": format!("{:016x}", self.digest),
             "samples_per_second": self.samples_per_second,
-            "patches": self.prepared.patches(),
             "fault": self.fault.as_ref().map_or(Value::Null, FaultAt::json),
         });
-        match value {
+        let mut keys = match value {
             Value::Object(map) => map,
             _ => Map::new(),
+        };
+        if self.kind == Kind::Surface {
+            keys.insert("patches".to_owned(), json!(self.segments));
+        }
+        keys
+    }
+
+    /// One JSON object, or the same for a person.
+    pub(super) fn tell(&self, as_json: bool, page: Option<&Path>) {
+        if as_json {
+            println!("{}", Value::Object(self.json()));
+        } else {
+            println!("{}", self.job.origin.name());
+            self.print(page);
         }
     }
 
     /// The same for a person, with the page if there is one.
     pub(super) fn print(&self, page: Option<&Path>) {
-        let (findings, report) = (self.findings, &self.findings.report);
-        let time = self.machining_time_s();
-        println!(
-            "  surface      {} patches, {:?}",
-            self.prepared.patches(),
-            self.prepared.header.kind
-        );
+        let (findings, report, speeds) = (self.findings, &self.findings.report, &self.findings.speeds);
+        let parts = match self.kind {
+            Kind::Surface => "patches",
+            _ => "segments",
+        };
+        println!("  approach     {}", self.kind.name());
+        println!("  program      {} {parts}, {} bytes", self.segments, self.bytes);
         println!("  passes       {}", findings.passes);
         println!(
             "  samples      {} (one each {} us)",
-            findings.samples,
-            self.period_s * 1e6
+            findings.samples, self.job.machine.period_us
         );
         println!(
             "  machining    {:.1} min, {:.1} mm of cutter contact, {:.1} mm of tool centre",
-            time / 60.0,
+            self.machining_time_s() / 60.0,
             report.cc_length_mm,
-            findings.cl_length_mm
+            speeds.cl_length_mm
         );
+        let feed = self.job.feed_mm_s();
+        for (name, of, span) in [
+            ("CC", format!(", of {feed:.3}"), &speeds.cc),
+            ("CL", String::new(), &speeds.cl),
+        ] {
+            println!(
+                "  {name} speed     {:.3} to {:.3} mm/s, mean {:.3}{of}",
+                span.min,
+                span.max,
+                span.mean()
+            );
+        }
+        println!(
+            "  CL steps     {:.3} mm/s at most between {parts}, {:.3} from period to period",
+            speeds.cl_step_mm_s, speeds.cl_change_mm_s
+        );
+        println!("  CL off path  {:.3} um at most", report.position_nm.max * 1e-3);
         println!("  interval     {:.7} at least", findings.interval_min);
         println!(
             "  feed ripple  {:.1e} % at most, {:.1e} % rms",

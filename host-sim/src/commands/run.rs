@@ -12,6 +12,7 @@ use serde_json::{Value, json};
 use super::outcome::{FaultAt, Outcome};
 use super::simulate::{Timed, machine, surveyed, timed};
 use super::{Failure, Result, cannot_write, load, progress, trace, unheld_limits, warn_of_limits};
+use crate::approach::Kind;
 use crate::job_file::JobFile;
 use crate::prepare::Prepared;
 use crate::remote::qemu::{self, Qemu, QemuError};
@@ -294,9 +295,11 @@ pub(super) fn command(arguments: &Arguments) -> Result<()> {
     };
     let (findings, page) = surveyed(&job, &prepared, &here, None, arguments.report.as_deref())?;
     let outcome = Outcome {
-        prepared: &prepared,
+        kind: Kind::Surface,
+        job: &job,
+        segments: prepared.patches(),
+        bytes: prepared.bytes(),
         findings: &findings,
-        period_s: job.machine.period_s(),
         digest: ran.status.digest,
         samples_per_second: here.samples_per_second,
         fault: here.fault,

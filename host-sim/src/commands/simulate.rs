@@ -8,7 +8,8 @@ use interp_core::Fault;
 use protocol::digest::Digest;
 
 use super::outcome::{FaultAt, Outcome};
-use super::{Approach, Failure, Result, cannot_write, load, progress, trace, warn_of_limits};
+use super::{Failure, Result, approach, cannot_write, load, progress, trace, warn_of_limits};
+use crate::approach::Kind;
 use crate::explain;
 use crate::job_file::JobFile;
 use crate::machine::Machine;
@@ -17,9 +18,10 @@ use crate::prepare::Prepared;
 use crate::report::Sketch;
 use crate::survey::{Findings, Survey};
 
-/// Runs a job on this machine: the same core, the same bits as on the board.
+/// Runs a job on this machine: the same core, the same bits as on the board; or one of the paper's other approaches.
 ///
 /// Example: cargo sim simulate jobs/freeform.toml --trace out.csv
+/// Example: cargo sim simulate jobs/revolved.toml --approach linear --report out
 #[derive(Debug, Args)]
 #[command(verbatim_doc_comment)]
 pub(super) struct Arguments {
@@ -36,7 +38,7 @@ pub(super) struct Arguments {
     json: bool,
     /// How the tool path is made.
     #[arg(long, value_enum, default_value = "surface")]
-    approach: Approach,
+    approach: Kind,
 }
 
 /// A run of the core alone, timed: digests of the run and of each pass.
@@ -146,9 +148,14 @@ pub(super) fn oracle(job: &JobFile) -> Result<Oracle> {
 }
 
 pub(super) fn command(arguments: &Arguments) -> Result<()> {
-    let Approach::Surface = arguments.approach;
     let (job, prepared) = load(&arguments.job)?;
     warn_of_limits(&job);
+    if arguments.approach != Kind::Surface {
+        let Arguments {
+            trace, report, json, ..
+        } = arguments;
+        return approach::command(arguments.approach, &job, trace.as_ref(), report.as_deref(), *json);
+    }
     let timed = timed(&job, &prepared)?;
     let (findings, page) = surveyed(
         &job,
@@ -158,19 +165,16 @@ pub(super) fn command(arguments: &Arguments) -> Result<()> {
         arguments.report.as_deref(),
     )?;
     let outcome = Outcome {
-        prepared: &prepared,
+        kind: Kind::Surface,
+        job: &job,
+        segments: prepared.patches(),
+        bytes: prepared.bytes(),
         findings: &findings,
-        period_s: job.machine.period_s(),
         digest: timed.digest,
         samples_per_second: timed.samples_per_second,
         fault: timed.fault,
     };
-    if arguments.json {
-        println!("{}", serde_json::Value::Object(outcome.json()));
-    } else {
-        println!("{}", arguments.job.display());
-        outcome.print(page.as_deref());
-    }
+    outcome.tell(arguments.json, page.as_deref());
     match outcome.fault {
         None => Ok(()),
         Some(fault) => Err(Failure::Failed(Some(fault.sentence()))),

@@ -183,19 +183,23 @@ impl Oracle {
     /// # Errors
     /// [`OracleError::Degenerate`] where there is no normal.
     pub fn contact(&self, u: f64, v: f64) -> Result<Contact, OracleError> {
-        let at = self.surface.at(u, v);
+        self.contact_of(&self.surface.at(u, v), u, v)
+    }
+
+    /// As [`Oracle::contact`], with the surface's derivatives at hand.
+    pub(super) fn contact_of(&self, at: &Derivatives, u: f64, v: f64) -> Result<Contact, OracleError> {
         let [[u0, u1], [v0, v1]] = self.surface.domain();
         let (speed_u, speed_v) = (length(at.u), length(at.v));
         let reach = (speed_u * (u1 - u0), speed_v * (v1 - v0));
         if reach.0.min(reach.1) <= POLE_SHARE * reach.0.max(reach.1) {
-            return self.contact_at_pole(u, v, &at, reach.0 < reach.1);
+            return self.contact_at_pole(u, v, at, reach.0 < reach.1);
         }
         let product = cross(at.u, at.v);
         let area = length(product);
         if area <= SINE_MIN * speed_u * speed_v {
             return Err(OracleError::Degenerate { u, v });
         }
-        Ok(self.regular_contact(&at, scale(product, self.normal_sign / area)))
+        Ok(self.regular_contact(at, scale(product, self.normal_sign / area)))
     }
 
     /// Steps 3 and 4 where both derivatives are sound.

@@ -8,6 +8,7 @@
 //! SurfaceSpec -> surface.rs, nurbs.rs   S and its derivatives up to the second order
 //!             -> contact.rs             normal, curvatures, step-over, interval (steps 2 to 4 of the interpolator)
 //!             -> arc.rs                 arc length along a pass
+//!             -> offset.rs              the tool centre's path: its velocity, and the contact under a given centre
 //!             -> schedule.rs            passes by a dense scan
 //! samples     -> verify.rs, report.rs   errors of what a machine emitted
 //! ```
@@ -21,6 +22,7 @@
 mod arc;
 mod contact;
 mod nurbs;
+mod offset;
 mod report;
 mod schedule;
 mod surface;
@@ -30,6 +32,7 @@ pub(crate) mod vector;
 mod verify;
 
 pub use contact::{Contact, Oracle, OracleError};
+pub use offset::Offset;
 pub use report::{Bounds, Figure, Report, Spot};
 pub use schedule::Pass;
 pub use surface::{Derivatives, Surface};

@@ -360,7 +360,9 @@ fn ideal_samples(oracle: &Oracle, feed_mm_s: f64) -> Vec<Emitted> {
 
 fn report_of(oracle: &Oracle, samples: &[Emitted]) -> Report {
     let mut verifier = Verifier::new(oracle);
-    samples.iter().for_each(|sample| verifier.add(sample));
+    for sample in samples {
+        verifier.add(sample);
+    }
     verifier.finish()
 }
 
@@ -478,4 +480,23 @@ fn a_pass_on_the_pole_is_a_point() {
         report_of(&oracle, &samples).failures(&Bounds::default()),
         Vec::<String>::new()
     );
+}
+
+/// A plane that goes over into a parabola, z = (t - 1)^2 at x = 10 t: level there, with a curvature of 0.02 from then on.
+#[test]
+fn centre_changes_its_speed_where_the_curvature_does() {
+    let heights = [0.0, 0.0, 0.0, 1.0];
+    let row = |(x, z): (f64, f64)| [0.0, 10.0].map(|y| [x, y, z, 1.0]).to_vec();
+    let spec = NurbsSpec {
+        degree: [2, 1],
+        knots_u: vec![0.0, 0.0, 0.0, 1.0, 2.0, 2.0, 2.0],
+        knots_v: vec![0.0, 0.0, 1.0, 1.0],
+        poles_mm: [0.0, 5.0, 15.0, 20.0].into_iter().zip(heights).map(row).collect(),
+        rational: false,
+    };
+    let along = oracle(SurfaceSpec::Nurbs(spec.clone()), Along::U, Side::Up);
+    // 1 - r k, with a ball of 5 mm.
+    close(along.ratio_step(0.5).unwrap(), 0.1, 1e-8);
+    let across = oracle(SurfaceSpec::Nurbs(spec), Along::V, Side::Up);
+    assert_eq!(across.ratio_step(1.0).unwrap(), 0.0, "no break on the pass");
 }

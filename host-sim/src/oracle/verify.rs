@@ -72,8 +72,8 @@ impl Verifier {
         }
     }
 
-    /// Checks the next sample.
-    pub fn add(&mut self, sample: &Emitted) {
+    /// Checks the next sample; returns the length of the contact's path since the one before, mm, if that is of the same pass.
+    pub fn add(&mut self, sample: &Emitted) -> Option<f64> {
         let spot = Spot {
             tick: sample.tick,
             pass: sample.pass,
@@ -82,11 +82,12 @@ impl Verifier {
         };
         let (path, side) = self.oracle.swapped(sample.u, sample.v);
         self.report.samples += 1;
-        if sample.first_of_pass {
+        let arc_mm = if sample.first_of_pass {
             self.begin_pass(sample, path, side, spot);
+            None
         } else {
-            self.check_step(sample, path, side, spot);
-        }
+            self.check_step(sample, path, side, spot)
+        };
         self.check_geometry(sample, spot);
         if sample.last_of_pass {
             if path != self.pass_ends(sample.pass)[1] {
@@ -96,6 +97,7 @@ impl Verifier {
                 pass.finished = true;
             }
         }
+        arc_mm.map(f64::abs)
     }
 
     /// The report, after the last sample.
@@ -155,11 +157,11 @@ impl Verifier {
         self.report.scallop_samples += pass.samples;
     }
 
-    /// Arc of the step to this sample against the feed.
-    fn check_step(&mut self, sample: &Emitted, path: f64, side: f64, spot: Spot) {
+    /// Arc of the step to this sample, held against the feed.
+    fn check_step(&mut self, sample: &Emitted, path: f64, side: f64, spot: Spot) -> Option<f64> {
         let Some(pass) = &mut self.current else {
             self.report.astray += 1;
-            return;
+            return None;
         };
         let forwards = if self.oracle.pattern == Pattern::Zigzag && sample.pass % 2 == 1 {
             -1.0
@@ -181,6 +183,7 @@ impl Verifier {
         } else if wanted > 0.0 {
             self.report.ripple_pct.add(100.0 * (arc / wanted - 1.0), spot);
         }
+        Some(arc)
     }
 
     /// Positions, normal, curvature and interval of one sample.

@@ -68,6 +68,12 @@ impl Prepared {
         }
     }
 
+    /// Bytes of the header and of the surface's data, as the machine holds them.
+    #[must_use]
+    pub fn bytes(&self) -> usize {
+        size_of_val(&self.header) + size_of_val(self.words.as_slice())
+    }
+
     /// Number of patches.
     #[must_use]
     pub fn patches(&self) -> usize {

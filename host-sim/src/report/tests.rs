@@ -5,7 +5,7 @@ use std::path::Path;
 use super::furniture::round_below;
 use super::record::{Record, Thinned};
 use super::svg::{escape, polyline, simplified, tenths};
-use super::{Sketch, measure, page};
+use super::{Sketch, measure, number};
 use crate::job_file::JobFile;
 use crate::machine::Machine;
 use crate::oracle::{Emitted, Oracle};
@@ -202,7 +202,7 @@ fn report_is_well_formed_small_and_says_what_was_found() {
         ("Samples", findings.samples as f64),
         ("Machining time", findings.samples as f64 * job.machine.period_s()),
         ("Cutter contact path", report.cc_length_mm),
-        ("Tool centre path", findings.cl_length_mm),
+        ("Tool centre path", findings.speeds.cl_length_mm),
         ("Least path interval", findings.interval_min),
         ("Feed ripple", report.ripple_pct.max),
         ("Feed ripple, rms", report.ripple_pct.rms()),
@@ -289,9 +289,9 @@ fn numbers_are_written_short() {
         [0.03, 1.0, 4.99, 7.0, 150.0].map(round_below),
         [0.02, 1.0, 2.0, 5.0, 100.0]
     );
-    let shown = [0.0, 3.14e-5, 0.001_234_567, 100.0, 123_456.7, f64::INFINITY].map(page::significant);
+    let shown = [0.0, 3.14e-5, 0.001_234_567, 100.0, 123_456.7, f64::INFINITY].map(number::significant);
     assert_eq!(shown, ["0", "3.1·10⁻⁵", "0.0012346", "100", "123457", "none"]);
-    assert_eq!(page::fixed(22_116.549, 1), "22\u{202f}116.5");
+    assert_eq!(number::fixed(22_116.549, 1), "22\u{202f}116.5");
 }
 
 #[test]

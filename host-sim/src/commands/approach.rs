@@ -1,0 +1,65 @@
+//! `simulate --approach`: the paper's other approaches on a job.
+
+use std::path::{Path, PathBuf};
+
+use super::outcome::Outcome;
+use super::{Result, cannot_write, progress, trace};
+use crate::approach::{Kind, measure};
+use crate::job_file::JobFile;
+use crate::report::Sketch;
+
+pub(super) fn command(
+    kind: Kind,
+    job: &JobFile,
+    trace_file: Option<&PathBuf>,
+    directory: Option<&Path>,
+    as_json: bool,
+) -> Result<()> {
+    let passes = super::simulate::oracle(job)?
+        .schedule()
+        .map_err(crate::approach::ApproachError::from)?;
+    let mut sketch = directory.map(|_| Sketch::new(job, passes.len()).by(kind));
+    let mut trace = trace(trace_file, job)?;
+    let mut written = Ok(());
+    let bar = progress(passes.len() as u64, "following");
+    let start = std::time::Instant::now();
+    let measured = measure(kind, job, |motion, _| {
+        let emitted = &motion.emitted;
+        if let Some(sketch) = &mut sketch {
+            sketch.add(emitted);
+        }
+        if let (Some(trace), true) = (&mut trace, written.is_ok()) {
+            written = trace.write_emitted(emitted);
+        }
+        if emitted.last_of_pass {
+            bar.inc(1);
+        }
+    })?;
+    bar.finish_and_clear();
+    #[allow(clippy::cast_precision_loss, reason = "below 2^53")]
+    let samples_per_second = measured.findings.samples as f64 / start.elapsed().as_secs_f64().max(1e-9);
+    let name = trace_file.cloned().unwrap_or_default();
+    written
+        .and_then(|()| trace.map_or(Ok(()), crate::trace::Trace::finish))
+        .map_err(|error| cannot_write(&name, &error))?;
+    let page = directory
+        .zip(sketch.as_ref())
+        .map(|(directory, sketch)| {
+            sketch
+                .write(directory, Path::new(job.origin.name()), &measured.findings)
+                .map_err(|error| cannot_write(directory, &error))
+        })
+        .transpose()?;
+    let outcome = Outcome {
+        kind,
+        job,
+        segments: measured.planned.segments,
+        bytes: measured.planned.bytes,
+        findings: &measured.findings,
+        digest: measured.digest,
+        samples_per_second,
+        fault: None,
+    };
+    outcome.tell(as_json, page.as_deref());
+    Ok(())
+}

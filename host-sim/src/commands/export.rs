@@ -1,0 +1,118 @@
+//! `export`: a job as a program for a machine with a controller of its own.
+
+use std::path::PathBuf;
+
+use clap::Args;
+use serde_json::json;
+
+use super::{Failure, Result, cannot_write, load, progress};
+use crate::approach::{Kind, passes};
+use crate::export::{Dialect, ExportError, Options, export};
+use crate::gcode::FeedMode;
+
+/// Writes a job as a G-code program for LinuxCNC or Grbl: straight cuts, or arcs.
+///
+/// Example: cargo sim export jobs/freeform.toml --format linuxcnc -o freeform.ngc
+/// Example: cargo sim export jobs/revolved_v.toml --format grbl --approach curve -o bell.nc
+#[derive(Debug, Args)]
+#[command(verbatim_doc_comment)]
+pub(super) struct Arguments {
+    /// Job file (TOML).
+    job: PathBuf,
+    /// Whose G-code.
+    #[arg(long, value_enum)]
+    format: Dialect,
+    /// Writes the program into this file.
+    #[arg(short, long, value_name = "FILE")]
+    output: PathBuf,
+    /// How the tool path is made: `curve` is written as arcs, `surface` cannot be written.
+    #[arg(long, value_enum, default_value = "linear")]
+    approach: Kind,
+    /// What the F words mean.
+    #[arg(long, value_enum, default_value = "g94")]
+    feed_mode: FeedMode,
+    /// Millimetres that the tool is lifted above the highest cut between passes, and above a cut before it plunges.
+    #[arg(long, value_name = "MM", default_value_t = 5.0)]
+    clearance: f64,
+    /// Switches the spindle on, at so many revolutions a minute.
+    #[arg(long, value_name = "RPM")]
+    spindle: Option<f64>,
+    /// Prints one JSON object instead of text.
+    #[arg(long)]
+    json: bool,
+}
+
+impl From<ExportError> for Failure {
+    fn from(error: ExportError) -> Self {
+        match error {
+            ExportError::Approach(error) => error.into(),
+            ExportError::SurfaceNeedsTheCore => Self::input(
+                "no other machine interpolates surfaces",
+                "export it with --approach linear or curve; the firmware runs it as a surface: cargo sim run",
+            ),
+            ExportError::FacesDown { u, v } => Self::Failed(Some(format!(
+                "the surface faces down at u = {u:.6}, v = {v:.6}: the tool cannot be lifted off it\n  \
+                 help: turn the part, or machine this region in another set-up"
+            ))),
+        }
+    }
+}
+
+fn positive(value: f64, option: &str) -> Result<()> {
+    if value > 0.0 && value.is_finite() {
+        return Ok(());
+    }
+    Err(Failure::input(
+        format!("{option} {value} is not above 0"),
+        format!("give {option} a number above 0"),
+    ))
+}
+
+pub(super) fn command(arguments: &Arguments) -> Result<()> {
+    positive(arguments.clearance, "--clearance")?;
+    arguments
+        .spindle
+        .map_or(Ok(()), |rpm| positive(rpm, "--spindle"))?;
+    let (job, _) = load(&arguments.job)?;
+    let options = Options {
+        dialect: arguments.format,
+        kind: arguments.approach,
+        feed_mode: arguments.feed_mode,
+        clearance_mm: arguments.clearance,
+        spindle_rpm: arguments.spindle,
+    };
+    let oracle = super::simulate::oracle(&job)?;
+    let count = passes(&oracle).map_err(ExportError::from)?.len();
+    let bar = progress(count as u64, "planning");
+    let exported = export(&job, &options, &|| bar.inc(1))?;
+    bar.finish_and_clear();
+    std::fs::write(&arguments.output, &exported.text)
+        .map_err(|error| cannot_write(&arguments.output, &error))?;
+    let (bytes, blocks) = (exported.text.len(), exported.text.lines().count());
+    if arguments.json {
+        let value = json!({
+            "approach": options.kind.name(),
+            "feed_mode": options.feed_mode.word(),
+            "passes": exported.passes,
+            "segments": exported.cuts,
+            "blocks": blocks,
+            "program_bytes": bytes,
+            "cutting_time_s": exported.cutting_time_s,
+            "safe_z_mm": exported.safe_z_mm,
+        });
+        println!("{value}");
+        return Ok(());
+    }
+    println!("{}", arguments.output.display());
+    println!("  passes       {}", exported.passes);
+    println!(
+        "  program      {} cuts, {blocks} blocks, {bytes} bytes",
+        exported.cuts
+    );
+    println!(
+        "  cutting      {:.1} min, without links",
+        exported.cutting_time_s / 60.0
+    );
+    println!("  safe height  {:.4} mm", exported.safe_z_mm);
+    Ok(())
+}

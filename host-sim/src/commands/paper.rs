@@ -1,0 +1,171 @@
+//! `paper`: Lo's paper, every example, table and figure, against ours.
+
+use std::path::PathBuf;
+
+use clap::Args;
+use serde_json::{Value, json};
+
+use super::{Result, cannot_write, progress};
+use crate::paper::{Comparison, Item, Row, STEPS, study};
+use crate::report::paper as page;
+use crate::speeds::Span;
+
+/// Reproduces Lo's paper (1998): every example, table and figure, printed against ours; four approaches side by side.
+///
+/// Example: cargo sim paper --report out
+#[derive(Debug, Args)]
+#[command(verbatim_doc_comment)]
+pub(super) struct Arguments {
+    /// Writes the page with the figures, and their data as JSON, into this folder.
+    #[arg(long, value_name = "DIR")]
+    report: Option<PathBuf>,
+    /// Prints JSON instead of tables.
+    #[arg(long)]
+    json: bool,
+}
+
+/// Significant digits enough for every figure of the paper, without the noise of the last bits.
+fn json(items: &[Item]) -> Value {
+    let rows = items.iter().map(|item| {
+        json!({
+            "item": item.name(),
+            "printed": item.printed,
+            "ours": item.ours,
+            "difference_pct": item.difference_pct(),
+            "note": item.note,
+        })
+    });
+    rows.collect()
+}
+
+/// The comparisons as items of the same kind, with nothing printed.
+fn compared(comparisons: &[Comparison]) -> Vec<Item> {
+    let mut items = Vec::new();
+    for comparison in comparisons {
+        for row in &comparison.rows {
+            let Row { measured, .. } = row;
+            let figures = [
+                ("machining time", "min", 3, measured.time_s / 60.0),
+                ("segments", "", 0, measured.planned.segments as f64),
+                ("program", "bytes", 0, measured.planned.bytes as f64),
+                ("ripple at most", "%", 5, measured.findings.report.ripple_pct.max),
+                ("ripple rms", "%", 5, measured.findings.report.ripple_pct.rms()),
+                ("slowest contact", "mm/s", 4, measured.findings.speeds.cc.min),
+                ("fastest contact", "mm/s", 4, measured.findings.speeds.cc.max),
+                ("slowest centre", "mm/s", 4, measured.findings.speeds.cl.min),
+                ("fastest centre", "mm/s", 4, measured.findings.speeds.cl.max),
+                (
+                    "step of the centre's speed",
+                    "mm/s",
+                    4,
+                    measured.findings.speeds.cl_step_mm_s,
+                ),
+                (
+                    "centre off its path",
+                    "mm",
+                    6,
+                    measured.findings.report.position_nm.max * 1e-6,
+                ),
+            ];
+            items.extend(figures.map(|(what, unit, decimals, ours)| Item {
+                part: "Comparison",
+                what: format!("{}: {}: {what}", comparison.name, row.name()),
+                unit,
+                decimals,
+                printed: None,
+                ours: Some(ours),
+                note: String::new(),
+            }));
+        }
+    }
+    items
+}
+
+fn print(items: &[Item]) {
+    let mut part = "";
+    for item in items {
+        if item.part != part {
+            part = item.part;
+            println!("\n{part:<58} {:>12} {:>14} {:>9}", "printed", "ours", "diff %");
+        }
+        let unit = if item.unit.is_empty() {
+            String::new()
+        } else {
+            format!(", {}", item.unit)
+        };
+        let shown = |value: Option<f64>, none: &str| {
+            value.map_or(none.to_owned(), |value| page::number(value, item.decimals))
+        };
+        let difference = item
+            .difference_pct()
+            .map_or(String::new(), |difference| format!("{difference:.1}"));
+        println!(
+            "  {:<56} {:>12} {:>14} {difference:>9}",
+            format!("{}{unit}", item.what),
+            shown(item.printed, ""),
+            shown(item.ours, "not yet"),
+        );
+        if !item.note.is_empty() {
+            println!("      {}", item.note);
+        }
+    }
+}
+
+fn print_comparison(comparison: &Comparison) {
+    println!(
+        "\n{} ({}): feed {} mm/s, scallop {} mm, tolerance {} mm",
+        comparison.title, comparison.name, comparison.feed_mm_s, comparison.scallop_mm, comparison.chord_mm
+    );
+    println!(
+        "  {:<14} {:>9} {:>9} {:>10} {:>10} {:>10} {:>17} {:>17} {:>10}",
+        "", "time, min", "segments", "bytes", "ripple, %", "rms, %", "CC, mm/s", "CL, mm/s", "step, mm/s"
+    );
+    for row in &comparison.rows {
+        let Row { measured, .. } = row;
+        let range = |span: &Span| format!("{:.3}..{:.3}", span.min, span.max);
+        println!(
+            "  {:<14} {:>9.2} {:>9} {:>10} {:>10} {:>10} {:>17} {:>17} {:>10.3}",
+            row.name(),
+            measured.time_s / 60.0,
+            measured.planned.segments,
+            measured.planned.bytes,
+            page::percent(measured.findings.report.ripple_pct.max),
+            page::percent(measured.findings.report.ripple_pct.rms()),
+            range(&measured.findings.speeds.cc),
+            range(&measured.findings.speeds.cl),
+            measured.findings.speeds.cl_step_mm_s,
+        );
+    }
+}
+
+pub(super) fn command(arguments: &Arguments) -> Result<()> {
+    if let Some(folder) = &arguments.report {
+        // Before the work, not after it.
+        std::fs::create_dir_all(folder).map_err(|error| cannot_write(folder, &error))?;
+    }
+    let bar = progress(STEPS, "reproducing");
+    let study = study(&|| bar.inc(1))?;
+    bar.finish_and_clear();
+    let mut items = study.items.clone();
+    items.extend(compared(&study.comparisons));
+    let written = arguments
+        .report
+        .as_ref()
+        .map(|folder| page::write(folder, &study).map_err(|error| cannot_write(folder, &error)))
+        .transpose()?;
+    if arguments.json {
+        println!("{}", json(&items));
+        return Ok(());
+    }
+    println!(
+        "C.-C. Lo, A new approach to CNC tool path generation, Computer-Aided Design 30 (1998): printed against ours"
+    );
+    print(&study.items);
+    for comparison in &study.comparisons {
+        print_comparison(comparison);
+    }
+    if let Some(page) = written {
+        println!("\nreport: {}", page.display());
+    }
+    Ok(())
+}

@@ -1,0 +1,435 @@
+//! Exported programs, read by LinuxCNC's own interpreter (`rs274`), against the exact path of the tool centre.
+#![allow(clippy::unwrap_used, reason = "a test may fail by panic")]
+
+use std::path::PathBuf;
+use std::process::{Command, Stdio};
+
+use host_sim::approach::{Kind, PassPath, passes};
+use host_sim::export::{Dialect, ExportError, Exported, Options, export};
+use host_sim::gcode::FeedMode;
+use host_sim::job_file::{JobFile, Pattern};
+use host_sim::oracle::Oracle;
+use host_sim::remote::qemu::workspace;
+
+/// The interpreter prints four decimals, and the program has four: a place is within half of each on every axis.
+const ROUNDED_MM: f64 = 1.8e-4;
+/// Places within a cut that are looked at.
+const PLACES: u32 = 8;
+const CLEARANCE_MM: f64 = 3.0;
+
+/// What the interpreter tells a machine to do.
+#[derive(Clone, Copy, Debug)]
+struct Move {
+    rapid: bool,
+    from: [f64; 3],
+    to: [f64; 3],
+    /// Axes in the plane and across, centre in the plane, sense.
+    arc: Option<([usize; 3], [f64; 2], f64)>,
+    feed_mm_s: f64,
+}
+
+impl Move {
+    /// Angle that an arc turns, rad, with its radius; the arc is less than half a turn.
+    fn turn(&self) -> Option<(f64, f64)> {
+        let ([x, y, _], centre, sense) = self.arc?;
+        let arm = |at: [f64; 3]| [at[x] - centre[0], at[y] - centre[1]];
+        let (a, b) = (arm(self.from), arm(self.to));
+        let angle = sense * (a[0] * b[1] - a[1] * b[0]).atan2(a[0] * b[0] + a[1] * b[1]);
+        assert!(angle > 0.0, "more than half a turn: {self:?}");
+        // Grbl refuses above 0.005 mm, LinuxCNC above 0.0013.
+        assert!((a[0].hypot(a[1]) - b[0].hypot(b[1])).abs() < 1e-3, "{self:?}");
+        Some((angle, a[0].hypot(a[1])))
+    }
+
+    fn length(&self) -> f64 {
+        let apart = |k: usize| self.to[k] - self.from[k];
+        match (self.arc, self.turn()) {
+            (Some(([.., across], ..)), Some((angle, radius))) => (angle * radius).hypot(apart(across)),
+            _ => distance(self.from, self.to),
+        }
+    }
+
+    /// The place at a share of the way.
+    fn at(&self, share: f64) -> [f64; 3] {
+        let mut place = [0, 1, 2].map(|k| self.from[k] + share * (self.to[k] - self.from[k]));
+        if let (Some(([x, y, _], centre, sense)), Some((angle, radius))) = (self.arc, self.turn()) {
+            let begin = (self.from[y] - centre[1]).atan2(self.from[x] - centre[0]);
+            let (sine, cosine) = (begin + sense * share * angle).sin_cos();
+            (place[x], place[y]) = (centre[0] + radius * cosine, centre[1] + radius * sine);
+        }
+        place
+    }
+}
+
+fn distance(a: [f64; 3], b: [f64; 3]) -> f64 {
+    (a[0] - b[0]).hypot(a[1] - b[1]).hypot(a[2] - b[2])
+}
+
+/// The interpreter: installed, or where `scripts/setup.sh` unpacks it.
+fn interpreter() -> PathBuf {
+    let unpacked = workspace().join("target/rs274/rs274");
+    if unpacked.exists() {
+        unpacked
+    } else {
+        PathBuf::from("rs274")
+    }
+}
+
+/// What the interpreter makes of a program.
+fn interpret(program: &str) -> Vec<Move> {
+    let folder = tempfile::tempdir().unwrap();
+    for (name, text) in [("program.ngc", program), ("tool.tbl", ""), ("parameters.var", "")] {
+        std::fs::write(folder.path().join(name), text).unwrap();
+    }
+    let output = Command::new(interpreter())
+        .args(["-t", "tool.tbl", "-v", "parameters.var", "-g", "program.ngc"])
+        .current_dir(folder.path())
+        .stdin(Stdio::null())
+        .output()
+        .expect("LinuxCNC's rs274 is needed: ./check brings it in, or install the package linuxcnc-uspace");
+    let canonical = String::from_utf8(output.stdout).unwrap();
+    let errors = String::from_utf8_lossy(&output.stderr);
+    assert!(
+        output.status.success() && canonical.contains("PROGRAM_END()"),
+        "{errors}"
+    );
+    moves(&canonical)
+}
+
+fn moves(canonical: &str) -> Vec<Move> {
+    let mut moves = Vec::new();
+    let (mut at, mut feed_mm_s, mut plane) = ([0.0; 3], 0.0, [0, 1, 2]);
+    for line in canonical.lines() {
+        let call = line.split_whitespace().skip(2).collect::<Vec<_>>().join(" ");
+        let (name, arguments) = call.trim_end_matches(')').split_once('(').unwrap();
+        let values: Vec<f64> = arguments
+            .split(", ")
+            .filter_map(|value| value.parse().ok())
+            .collect();
+        let mut to = at;
+        let mut arc = None;
+        match name {
+            "SET_FEED_RATE" => feed_mm_s = values[0] / 60.0,
+            "SELECT_PLANE" => {
+                plane = match arguments {
+                    "CANON_PLANE_XY" => [0, 1, 2],
+                    "CANON_PLANE_XZ" => [2, 0, 1],
+                    "CANON_PLANE_YZ" => [1, 2, 0],
+                    other => panic!("plane {other}"),
+                }
+            }
+            "STRAIGHT_TRAVERSE" | "STRAIGHT_FEED" => to.copy_from_slice(&values[..3]),
+            "ARC_FEED" => {
+                for (axis, value) in plane.into_iter().zip([values[0], values[1], values[5]]) {
+                    to[axis] = value;
+                }
+                assert_eq!(values[4].abs(), 1.0, "one turn at most");
+                arc = Some((plane, [values[2], values[3]], values[4]));
+            }
+            _ => {}
+        }
+        if name.starts_with("STRAIGHT") || name == "ARC_FEED" {
+            moves.push(Move {
+                rapid: name == "STRAIGHT_TRAVERSE",
+                from: at,
+                to,
+                arc,
+                feed_mm_s,
+            });
+            at = to;
+        }
+    }
+    moves
+}
+
+/// What is allowed of an approach: distance of a cut's ends and of its inner places from the exact path, mm; deviation of
+/// the contact's speed from the feed, mean of a cut and mean of an eighth of it, shares.
+struct Bounds {
+    ends_mm: f64,
+    places_mm: f64,
+    mean: f64,
+    eighth: f64,
+}
+
+/// Follows one pass; returns the moves that it took and their time.
+fn follow(job: &JobFile, pass: &PassPath<'_>, moves: &[Move], bounds: &Bounds) -> (usize, f64) {
+    let end = pass.at(pass.ends[1]).unwrap().contact.cl_mm;
+    let mut path = pass.ends[0];
+    let mut time_s = 0.0;
+    for (count, cut) in moves.iter().enumerate() {
+        // Both: a pass may end where it began.
+        let left_mm = || pass.oracle.arc_length(path, pass.ends[1], pass.side).abs();
+        if distance(cut.from, end) < ROUNDED_MM && left_mm() < 2.0 * ROUNDED_MM {
+            return (count, time_s);
+        }
+        assert!(!cut.rapid, "pass {} is left", pass.pass);
+        let (begin, takes) = (path, cut.length() / cut.feed_mm_s);
+        for k in 1..=PLACES {
+            let place = cut.at(f64::from(k) / f64::from(PLACES));
+            let foot = pass.oracle.foot(place, path, pass.side).unwrap();
+            let off = distance(place, foot.contact.cl_mm);
+            let most = if k == PLACES {
+                bounds.ends_mm
+            } else {
+                bounds.places_mm
+            };
+            assert!(
+                off <= most + ROUNDED_MM,
+                "pass {}, {cut:?}: {off} mm off",
+                pass.pass
+            );
+            let arc = pass.oracle.arc_length(path, foot.path, pass.side).abs();
+            check_speed(job, arc, takes / f64::from(PLACES), bounds.eighth, cut);
+            path = foot.path;
+        }
+        let arc = pass.oracle.arc_length(begin, path, pass.side).abs();
+        check_speed(job, arc, takes, bounds.mean, cut);
+        time_s += takes;
+    }
+    panic!("pass {} does not end", pass.pass);
+}
+
+fn check_speed(job: &JobFile, arc_mm: f64, time_s: f64, share: f64, cut: &Move) {
+    let wanted = job.feed_mm_s() * time_s;
+    // Places are rounded at both ends.
+    let off = (arc_mm - wanted).abs() - 2.0 * ROUNDED_MM;
+    assert!(
+        off <= share * wanted,
+        "{cut:?}: contact at {} of its feed",
+        arc_mm / wanted
+    );
+}
+
+/// Exports a job, and holds what the interpreter makes of it against the exact path.
+fn check(job: &JobFile, options: &Options, bounds: &Bounds) -> Exported {
+    let exported = export(job, options, &|| ()).unwrap();
+    if options.dialect == Dialect::Grbl {
+        check_grbl(&exported.text);
+    }
+    let moves = interpret(&exported.text);
+    let oracle = Oracle::new(job).unwrap();
+    let passes = passes(&oracle).unwrap();
+    assert_eq!(exported.passes, passes.len());
+    let mut highest = f64::NEG_INFINITY;
+    let (mut next, mut time_s) = (0, 0.0);
+    for pass in &passes {
+        let begin = pass.at(pass.ends[0]).unwrap().contact.cl_mm;
+        let link = moves[next..]
+            .iter()
+            .position(|link| distance(link.to, begin) < ROUNDED_MM)
+            .unwrap();
+        let link = &moves[next..=next + link];
+        next += link.len();
+        match job.pattern {
+            Pattern::Zigzag if pass.pass > 0 => check_step_over(job, pass, link),
+            _ => check_plunge(link, exported.safe_z_mm),
+        }
+        let (count, took) = follow(job, pass, &moves[next..], bounds);
+        for cut in &moves[next..next + count] {
+            highest = highest.max(cut.to[2]).max(cut.from[2]);
+        }
+        next += count;
+        time_s += took;
+    }
+    let [retract] = moves[next..] else {
+        panic!("moves after the last pass: {:?}", &moves[next..]);
+    };
+    assert!(retract.rapid && exported.safe_z_mm >= highest + CLEARANCE_MM - ROUNDED_MM);
+    assert!(
+        (time_s / exported.cutting_time_s - 1.0).abs() < 1e-4,
+        "{time_s} s"
+    );
+    exported
+}
+
+/// Up, across, down, and the last bit at the feed.
+fn check_plunge(link: &[Move], safe_z_mm: f64) {
+    let (plunge, rapids) = link.split_last().unwrap();
+    assert!(!plunge.rapid && plunge.from[..2] == plunge.to[..2], "{plunge:?}");
+    assert!(plunge.from[2] >= plunge.to[2] + CLEARANCE_MM - ROUNDED_MM);
+    for rapid in rapids {
+        assert!(rapid.rapid);
+        let crosses = rapid.from[..2] != rapid.to[..2];
+        assert!(
+            !crosses || (rapid.from[2] - safe_z_mm).abs() < ROUNDED_MM,
+            "{rapid:?}"
+        );
+        assert!(!crosses || rapid.from[2] == rapid.to[2], "{rapid:?}");
+    }
+}
+
+/// Along the boundary: each place is one radius off the surface at the boundary's path parameter.
+fn check_step_over(job: &JobFile, pass: &PassPath<'_>, link: &[Move]) {
+    let mut across = pass.oracle.clone();
+    across.along = pass.oracle.across();
+    let mut side = pass.side;
+    for cut in link.iter().rev() {
+        assert!(!cut.rapid, "{cut:?}");
+        for k in (0..PLACES).rev() {
+            let place = cut.at(f64::from(k) / f64::from(PLACES));
+            let foot = across.foot(place, side, pass.ends[0]).unwrap();
+            let off = distance(place, foot.contact.cl_mm);
+            assert!(off <= 1.02 * job.chord_mm + ROUNDED_MM, "{cut:?}: {off} mm off");
+            side = foot.path;
+        }
+    }
+}
+
+/// What Grbl 1.1 takes: its line buffer, its words.
+fn check_grbl(program: &str) {
+    const WORDS: [&str; 14] = [
+        "G0", "G1", "G2", "G3", "G17", "G18", "G19", "G21", "G40", "G90", "G93", "G94", "M2", "M3",
+    ];
+    for line in program.lines() {
+        assert!(line.len() <= 80 && line.is_ascii(), "{line}");
+        if line.starts_with('(') {
+            continue;
+        }
+        let starts: Vec<usize> = line
+            .match_indices(|c: char| c.is_ascii_uppercase())
+            .map(|(at, _)| at)
+            .collect();
+        assert_eq!(starts.first(), Some(&0), "{line}");
+        for (index, start) in starts.iter().enumerate() {
+            let word = &line[*start..starts.get(index + 1).copied().unwrap_or(line.len())];
+            let number = word[1..].parse::<f32>();
+            let known = match &word[..1] {
+                "G" | "M" => WORDS.contains(&word) || word == "M5",
+                letter => "XYZIJKFS".contains(letter),
+            };
+            assert!(known && number.is_ok(), "{word} in {line}");
+        }
+    }
+}
+
+fn options(dialect: Dialect, kind: Kind, feed_mode: FeedMode) -> Options {
+    Options {
+        dialect,
+        kind,
+        feed_mode,
+        clearance_mm: CLEARANCE_MM,
+        spindle_rpm: None,
+    }
+}
+
+/// A sample job with a larger scallop, so fewer passes.
+fn job(name: &str, scallop_mm: f64) -> JobFile {
+    let path = workspace().join(format!("jobs/{name}.toml"));
+    let mut job = JobFile::load(&path).unwrap();
+    job.scallop_mm = scallop_mm;
+    job
+}
+
+/// Chords end on the exact path; eqn 7 makes the contact's mean speed on each the feed.
+fn of_linear(job: &JobFile) -> Bounds {
+    Bounds {
+        ends_mm: 0.0,
+        places_mm: 1.02 * job.chord_mm,
+        mean: 1e-3,
+        eighth: 0.2,
+    }
+}
+
+/// Arcs hold the path's tolerance everywhere and the speed within 1 % of the feed.
+fn of_curve(job: &JobFile) -> Bounds {
+    Bounds {
+        ends_mm: 1.02 * job.chord_mm,
+        places_mm: 1.02 * job.chord_mm,
+        mean: 2e-3,
+        eighth: 0.015,
+    }
+}
+
+#[test]
+fn lines_are_the_exact_path_at_the_feed() {
+    for (name, scallop_mm, feed_mode) in [
+        ("freeform", 0.05, FeedMode::G94),
+        ("freeform", 0.05, FeedMode::G93),
+        ("torus", 0.005, FeedMode::G93),
+        ("sphere_cap", 0.05, FeedMode::G94),
+    ] {
+        let job = job(name, scallop_mm);
+        for dialect in [Dialect::Linuxcnc, Dialect::Grbl] {
+            check(&job, &options(dialect, Kind::Linear, feed_mode), &of_linear(&job));
+        }
+    }
+}
+
+#[test]
+fn arcs_hold_the_tolerances_in_every_plane() {
+    for (name, scallop_mm) in [
+        ("revolved", 0.5),
+        ("revolved_v", 0.5),
+        ("freeform", 0.05),
+        ("torus", 0.005),
+    ] {
+        let job = job(name, scallop_mm);
+        for (dialect, feed_mode) in [(Dialect::Linuxcnc, FeedMode::G94), (Dialect::Grbl, FeedMode::G93)] {
+            let exported = check(&job, &options(dialect, Kind::Curve, feed_mode), &of_curve(&job));
+            if name == "revolved" {
+                // Passes at every angle to the axes: arcs that stand in two planes, and come back to them.
+                assert!(
+                    ["G18", "G19", "G2", "G3"]
+                        .iter()
+                        .all(|word| exported.text.contains(word))
+                );
+            }
+            if name.ends_with("_v") {
+                // Circles of 144 degrees: two pairs of arcs, whatever their size.
+                assert_eq!(exported.cuts, 4 * exported.passes);
+            }
+        }
+    }
+}
+
+#[test]
+fn the_centre_runs_at_the_feed_where_that_is_asked() {
+    let job = job("ruled_printed", 0.5);
+    let exported = export(
+        &job,
+        &options(Dialect::Grbl, Kind::ConstantCl, FeedMode::G94),
+        &|| (),
+    )
+    .unwrap();
+    let moves = interpret(&exported.text);
+    let cuts: Vec<_> = moves.iter().filter(|cut| !cut.rapid).collect();
+    assert!(cuts.len() > exported.passes);
+    assert!(cuts.iter().all(|cut| cut.feed_mm_s == job.feed_mm_s()));
+}
+
+#[test]
+fn what_no_machine_could_follow_is_refused() {
+    let plain = options(Dialect::Linuxcnc, Kind::Linear, FeedMode::G94);
+    let mut plate = job("plate", 0.05);
+    let surface = Options {
+        kind: Kind::Surface,
+        ..plain
+    };
+    assert_eq!(
+        export(&plate, &surface, &|| ()).unwrap_err(),
+        ExportError::SurfaceNeedsTheCore
+    );
+    let sides = [host_sim::job_file::Side::Plus, host_sim::job_file::Side::Minus];
+    let faces_down = sides.map(|side| {
+        plate.side = side;
+        matches!(export(&plate, &plain, &|| ()), Err(ExportError::FacesDown { .. }))
+    });
+    assert!(
+        faces_down[0] != faces_down[1],
+        "one of the sides is the upper: {faces_down:?}"
+    );
+}
+
+#[test]
+fn a_spindle_is_switched_on_and_off() {
+    let job = job("torus", 0.05);
+    let spinning = Options {
+        spindle_rpm: Some(12_000.0),
+        ..options(Dialect::Grbl, Kind::Linear, FeedMode::G94)
+    };
+    let text = export(&job, &spinning, &|| ()).unwrap().text;
+    let place = |what: &str| text.lines().position(|line| line == what).unwrap();
+    assert!(place("S12000M3") < place("M5") && place("M5") + 1 == place("M2"));
+    let silent = export(&job, &options(Dialect::Grbl, Kind::Linear, FeedMode::G94), &|| ()).unwrap();
+    assert!(!silent.text.contains("M3") && !silent.text.contains("M5"));
+}
