@@ -9,6 +9,7 @@
 
 use crate::arith::{fraction_from_f32, fraction_to_f32, small_step};
 use crate::fault::{Fault, FaultKind, Result};
+use crate::scalar::{Real, float};
 use crate::surface::{PathSpeed, Surface};
 
 /// Largest correction of the first-order step, relative, for which a series is trusted as a first guess. At 1/2 the
@@ -35,7 +36,7 @@ const LONG_STEP: f32 = 0.25;
 /// Increment of the path fraction for an arc, units of 2^-64, from the parametrisation at its start and the stretch one
 /// sample earlier (NaN where there is none); none where the series is not enough.
 #[inline(always)]
-pub(crate) fn step(from: &PathSpeed, stretch_before: f32, arc: f32) -> Option<u64> {
+pub(crate) fn step(from: &PathSpeed, stretch_before: Real, arc: Real) -> Option<u64> {
     const THIRD: f32 = 1.0 / 3.0;
     const SIXTH: f32 = 1.0 / 6.0;
     let PathSpeed { inverse, stretch } = *from;
@@ -56,7 +57,7 @@ const ROUGH: f32 = 1.0 / 16384.0;
 
 /// Arc from a fraction of the patch over `length` more, where the parametrisation is `end`: Hermite's rule of two points (error
 /// `length^5 s^(4) / 720` for a speed s), or of three (`length^7 s^(6) / 604800`).
-fn arc_over(surface: &Surface, from: u64, start: &PathSpeed, end: &PathSpeed, length: f32) -> f32 {
+fn arc_over(surface: &Surface, from: u64, start: &PathSpeed, end: &PathSpeed, length: Real) -> Real {
     let (first, last) = (1.0 / start.inverse, 1.0 / end.inverse);
     let (rise, fall) = (first * start.stretch * length, last * end.stretch * length);
     let (sum, bow) = (first + last, rise - fall);
@@ -68,7 +69,7 @@ fn arc_over(surface: &Surface, from: u64, start: &PathSpeed, end: &PathSpeed, le
 }
 
 /// The path fraction of an arc within another, both from the same place: Hermite's cubic of the path over the arc.
-fn inverse_cubic(arc: f32, start: &PathSpeed, end: &PathSpeed, covered: f32, length: f32) -> f32 {
+fn inverse_cubic(arc: Real, start: &PathSpeed, end: &PathSpeed, covered: Real, length: Real) -> Real {
     let part = arc / covered;
     let rest = 1.0 - part;
     let (first, last) = (covered * start.inverse, covered * end.inverse);
@@ -81,7 +82,7 @@ pub(crate) enum Reach {
     /// On the patch, at this fraction.
     Within(u64),
     /// Beyond the patch, up to whose end there was this arc.
-    Beyond(f32),
+    Beyond(Real),
 }
 
 /// Where an arc from a place ends, by quadrature. `patch_end` is the parametrisation at the patch's end, asked for where it may matter.
@@ -95,7 +96,7 @@ pub(crate) fn solve(
     from: u64,
     start: &PathSpeed,
     patch_end: impl FnOnce() -> PathSpeed,
-    arc: f32,
+    arc: Real,
 ) -> Result<Reach> {
     let room = fraction_to_f32(!from);
     let first = arc * start.inverse;
@@ -115,7 +116,7 @@ pub(crate) fn solve(
     };
     // Not `>`: a NaN must not pass.
     if !(correction.abs() <= CORRECTION_MAX) {
-        return Err(Fault::new(FaultKind::ParameterBackwards, correction));
+        return Err(Fault::new(FaultKind::ParameterBackwards, float(correction)));
     }
     if let Some((end, covered)) = end {
         guess = inverse_cubic(arc, start, &end, covered, room);
@@ -131,7 +132,7 @@ pub(crate) fn solve(
         if !(correction.abs() <= CORRECTED_MAX * guess) {
             return Err(Fault::new(
                 FaultKind::ParameterBackwards,
-                (guess + correction) / first - 1.0,
+                float((guess + correction) / first - 1.0),
             ));
         }
         guess += correction;
