@@ -21,6 +21,7 @@ pub mod commands;
 pub mod explain;
 pub mod job_file;
 pub mod machine;
+pub mod operations;
 pub mod oracle;
 pub mod prepare;
 pub mod remote;
