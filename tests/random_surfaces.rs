@@ -32,7 +32,7 @@ fn run(job: &JobFile, most: u64) -> Ran {
     let mut survey = Survey::new(&prepared, &oracle, None, None);
     let mut machine = Machine::load(&prepared).unwrap();
     let mut samples = 0;
-    let (mut first, mut last) = (None, None);
+    let (mut first, mut last, mut cut) = (None, None, false);
     let result = machine.run(|sample| {
         let here = (sample.pass, prepared.parameters(sample.path, sample.side));
         let begins = last.is_none_or(|(pass, _)| pass != sample.pass);
@@ -41,19 +41,20 @@ fn run(job: &JobFile, most: u64) -> Ran {
         }
         last = Some(here);
         samples += 1;
-        survey.add(sample).is_ok() && (samples < most || !begins)
+        cut = samples >= most && begins;
+        survey.add(sample).is_ok() && !cut
     });
     let (pass, path, side) = machine.place();
     let across = last.is_some_and(|(last, _)| last != pass) && job.pattern == Pattern::Zig;
     let neighbour = if across { first } else { last }.map(|(_, parameters)| parameters);
-    let report = survey.finish(result.is_ok() && samples < most).unwrap().report;
+    let report = survey.finish(result.is_ok() && !cut).unwrap().report;
     Ran {
         fault: result.err(),
         position_nm: report.position_nm.max,
         ripple_pct: report.ripple_pct.max,
         interval: report.interval.max,
         // Of a run that was cut short, the last pass has no end.
-        off_boundary: if result.is_ok() && samples < most {
+        off_boundary: if result.is_ok() && !cut {
             report.off_boundary
         } else {
             0

@@ -24,6 +24,7 @@ pub mod export;
 pub mod gcode;
 pub mod job_file;
 pub mod machine;
+pub mod operations;
 pub mod oracle;
 pub mod paper;
 pub mod prepare;

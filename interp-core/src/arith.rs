@@ -14,70 +14,122 @@
     reason = "the conversions that lose bits are gathered here, each with its range"
 )]
 
+use crate::scalar::Operation::{Add, Convert, InverseRoot, Multiply, Shift, Sine, SquareRoot};
+use crate::scalar::{Real, float, note, real};
+
 /// 2^-32: turns a centred fixed-point parameter into a float.
 const UNIT_32: f32 = 1.0 / 4_294_967_296.0;
 
 /// The product's upper word: `a b / 2^32`, rounded to nearest, ties up.
 #[inline(always)]
 #[must_use]
-pub(crate) const fn mul_hi(a: i32, b: i32) -> i32 {
+pub(crate) fn mul_hi(a: i32, b: i32) -> i32 {
+    note([Multiply]);
     ((a as i64 * b as i64 + (1 << 31)) >> 32) as i32
+}
+
+/// `a b / 2^31`, even, within 2 units.
+#[inline(always)]
+#[must_use]
+pub(crate) fn mul_q31(a: i32, b: i32) -> i32 {
+    note([Shift]);
+    mul_hi(a, b) << 1
+}
+
+/// `a b / 2^30`, a multiple of 4, within 4 units.
+#[inline(always)]
+#[must_use]
+pub(crate) fn mul_q30(a: i32, b: i32) -> i32 {
+    note([Shift]);
+    mul_hi(a, b) << 2
+}
+
+/// `a + b`, known to fit.
+#[inline(always)]
+#[must_use]
+pub(crate) fn add(a: i32, b: i32) -> i32 {
+    note([Add]);
+    a.wrapping_add(b)
+}
+
+/// `a - b`, known to fit.
+#[inline(always)]
+#[must_use]
+pub(crate) fn subtract(a: i32, b: i32) -> i32 {
+    note([Add]);
+    a.wrapping_sub(b)
+}
+
+/// A quarter, rounded down.
+#[inline(always)]
+#[must_use]
+pub(crate) fn quarter_of(value: i32) -> i32 {
+    note([Shift]);
+    value >> 2
 }
 
 /// `c0 + c1 w + c2 w^2`, within 1 unit when no partial sum overflows.
 #[inline(always)]
 #[must_use]
-pub(crate) const fn quadratic(c: &[i32; 3], w: i32) -> i32 {
+pub(crate) fn quadratic(c: &[i32; 3], w: i32) -> i32 {
     let [c0, c1, c2] = *c;
-    c0.wrapping_add(mul_hi(c1.wrapping_add(mul_hi(c2, w)), w))
+    add(c0, mul_hi(add(c1, mul_hi(c2, w)), w))
 }
 
 /// `c0 + c1 w + c2 w^2 + c3 w^3`, within 1 unit when no partial sum overflows.
 #[inline(always)]
 #[must_use]
-pub(crate) const fn cubic(c: &[i32; 4], w: i32) -> i32 {
+pub(crate) fn cubic(c: &[i32; 4], w: i32) -> i32 {
     let [c0, c1, c2, c3] = *c;
-    c0.wrapping_add(mul_hi(quadratic(&[c1, c2, c3], w), w))
+    add(c0, mul_hi(quadratic(&[c1, c2, c3], w), w))
 }
 
 /// A cubic's value, first derivative and half its second derivative, from one set of coefficients: the partial sums are shared.
 /// Within 3 units when no partial sum overflows.
 #[inline(always)]
 #[must_use]
-pub(crate) const fn jet(c: &[i32; 4], w: i32) -> [i32; 3] {
+pub(crate) fn jet(c: &[i32; 4], w: i32) -> [i32; 3] {
     let [c0, c1, c2, c3] = *c;
     let t3 = mul_hi(c3, w);
-    let t2 = c2.wrapping_add(t3);
-    let t1 = c1.wrapping_add(mul_hi(t2, w));
-    let d2 = t2.wrapping_add(t3);
-    [
-        c0.wrapping_add(mul_hi(t1, w)),
-        t1.wrapping_add(mul_hi(d2, w)),
-        d2.wrapping_add(t3),
-    ]
+    let t2 = add(c2, t3);
+    let t1 = add(c1, mul_hi(t2, w));
+    let d2 = add(t2, t3);
+    [add(c0, mul_hi(t1, w)), add(t1, mul_hi(d2, w)), add(d2, t3)]
+}
+
+/// A cubic's value and first derivative: a [`jet`] without its last.
+#[inline(always)]
+#[must_use]
+pub(crate) fn tangent(c: &[i32; 4], w: i32) -> [i32; 2] {
+    let [c0, c1, c2, c3] = *c;
+    let t3 = mul_hi(c3, w);
+    let t2 = add(c2, t3);
+    let t1 = add(c1, mul_hi(t2, w));
+    let d2 = add(t2, t3);
+    [add(c0, mul_hi(t1, w)), add(t1, mul_hi(d2, w))]
 }
 
 /// The upper word of a scalar product, `a . b / 2^32`, within 2 units.
 #[inline(always)]
 #[must_use]
-pub(crate) const fn dot_hi(a: &[i32; 3], b: &[i32; 3]) -> i32 {
+pub(crate) fn dot_hi(a: &[i32; 3], b: &[i32; 3]) -> i32 {
     let ([a0, a1, a2], [b0, b1, b2]) = (*a, *b);
-    mul_hi(a0, b0)
-        .wrapping_add(mul_hi(a1, b1))
-        .wrapping_add(mul_hi(a2, b2))
+    add(add(mul_hi(a0, b0), mul_hi(a1, b1)), mul_hi(a2, b2))
 }
 
-/// The whole product. Added to a sum, it is one `SMLAL` (1 cycle).
+/// `sum + a b`, whole, known to fit: one `SMLAL` (1 cycle).
 #[inline(always)]
 #[must_use]
-pub(crate) const fn product(a: i32, b: i32) -> i64 {
-    a as i64 * b as i64
+pub(crate) fn add_product(sum: i64, a: i32, b: i32) -> i64 {
+    note([Multiply, Add]);
+    sum.wrapping_add(a as i64 * b as i64)
 }
 
 /// A value in units of 2^-30, rounded down, and whether that fits: the two upper bits of the second are zero then.
 #[inline(always)]
 #[must_use]
-pub(crate) const fn whole_q30(value: i64) -> (i32, u32) {
+pub(crate) fn whole_q30(value: i64) -> (i32, u32) {
+    note([Shift]);
     let high = (value >> 32) as u32;
     ((value >> 30) as i32, high ^ high << 1)
 }
@@ -91,15 +143,16 @@ pub(crate) const fn q30_to_f32(value: i64) -> f32 {
 /// A centred parameter as a float in [-1/2, 1/2].
 #[inline(always)]
 #[must_use]
-pub(crate) const fn centred_to_f32(w: i32) -> f32 {
-    w as f32 * UNIT_32
+pub(crate) fn centred_to_f32(w: i32) -> Real {
+    to_f32(w) * UNIT_32
 }
 
 /// An integer as the nearest float.
 #[inline(always)]
 #[must_use]
-pub(crate) const fn to_f32(value: i32) -> f32 {
-    value as f32
+pub(crate) fn to_f32(value: i32) -> Real {
+    note([Convert]);
+    real(value as f32)
 }
 
 /// A count below 2^24 as a float, exactly; larger ones rounded.
@@ -119,8 +172,9 @@ pub(crate) const fn fraction_32(value: u32) -> f32 {
 /// The integer towards zero; saturates, NaN is 0. One instruction, where rounding to nearest would take four.
 #[inline(always)]
 #[must_use]
-pub(crate) const fn truncated(value: f32) -> i32 {
-    value as i32
+pub(crate) fn truncated(value: Real) -> i32 {
+    note([Convert]);
+    float(value) as i32
 }
 
 /// A value from 1 to 2^30 times the power of two that brings it to 2^29 or more, but below 2^30, and that power's exponent.
@@ -144,12 +198,21 @@ pub(crate) const fn centred(fraction: u64) -> i32 {
     ((fraction >> 32) as u32 ^ 0x8000_0000) as i32
 }
 
+/// A place on a patch a step further; none past its end.
+#[inline(always)]
+#[must_use]
+pub(crate) fn advanced(fraction: u64, step: u64) -> Option<u64> {
+    note([Add]);
+    fraction.checked_add(step)
+}
+
 /// A step of a fraction in units of 2^-64, exactly; none unless 2^-32 <= `step` < 2^-8 (or for a NaN). Seven cycles and a branch.
 #[inline(always)]
 #[must_use]
-pub(crate) const fn small_step(step: f32) -> Option<u64> {
+pub(crate) fn small_step(step: Real) -> Option<u64> {
     const LEAST: u32 = 0x2f80_0000;
     const BEYOND: u32 = 0x3b80_0000;
+    note([Convert]);
     let bits = step.to_bits();
     if bits.wrapping_sub(LEAST) >= BEYOND - LEAST {
         return None;
@@ -163,7 +226,8 @@ pub(crate) const fn small_step(step: f32) -> Option<u64> {
 
 /// A step of a fraction in units of 2^-64, rounded down; saturates at 0 and at 1 (NaN: 1).
 #[must_use]
-pub(crate) fn fraction_from_f32(step: f32) -> u64 {
+pub(crate) fn fraction_from_f32(step: Real) -> u64 {
+    note([Convert]);
     if step <= 0.0 {
         return 0;
     }
@@ -184,31 +248,41 @@ pub(crate) fn fraction_from_f32(step: f32) -> u64 {
 /// A fraction (units of 2^-64) as the nearest float.
 #[inline]
 #[must_use]
-pub(crate) const fn fraction_to_f32(fraction: u64) -> f32 {
-    fraction as f32 * (UNIT_32 * UNIT_32)
+pub(crate) fn fraction_to_f32(fraction: u64) -> Real {
+    note([Convert]);
+    real(fraction as f32) * (UNIT_32 * UNIT_32)
+}
+
+/// `a b / 2^BITS`, rounded to nearest, ties up.
+#[inline(always)]
+fn rounded<const BITS: u32>(a: i32, b: i32) -> i32 {
+    note([Multiply, Shift]);
+    ((a as i64 * b as i64 + (1 << (BITS - 1))) >> BITS) as i32
 }
 
 /// `1 / w` in units of 2^-29 for a weight `w` in units of 2^-30 within [1/2, 2), from its float reciprocal; one Newton
 /// step brings the 24 bits to 28, relative error below 2^-28.
 #[inline(always)]
 #[must_use]
-pub(crate) const fn reciprocal_q29(weight_q30: i32, reciprocal: f32) -> i32 {
-    let first = (reciprocal * 536_870_912.0) as i32;
+pub(crate) fn reciprocal_q29(weight_q30: i32, reciprocal: Real) -> i32 {
+    let first = truncated(reciprocal * 536_870_912.0);
+    note([Multiply, Add, Shift]);
     let error_q31 = (((1_i64 << 59) - first as i64 * weight_q30 as i64) >> 28) as i32;
-    first.wrapping_add(((first as i64 * error_q31 as i64 + (1 << 30)) >> 31) as i32)
+    add(first, rounded::<31>(first, error_q31))
 }
 
 /// `a b / 2^29`, rounded to nearest: a numerator times a reciprocal of [`reciprocal_q29`].
 #[inline(always)]
 #[must_use]
-pub(crate) const fn mul_q29(a: i32, b: i32) -> i32 {
-    ((a as i64 * b as i64 + (1 << 28)) >> 29) as i32
+pub(crate) fn mul_q29(a: i32, b: i32) -> i32 {
+    rounded::<29>(a, b)
 }
 
 /// An angle within a range: `start + extent fraction`, turns in units of 2^-32 (wrapping), the extent in units of 2^-31.
 #[inline(always)]
 #[must_use]
-pub(crate) const fn angle(start: u32, extent_q31: u32, fraction: u64) -> u32 {
+pub(crate) fn angle(start: u32, extent_q31: u32, fraction: u64) -> u32 {
+    note([Multiply, Shift, Add]);
     start.wrapping_add((((fraction >> 32) * extent_q31 as u64 + (1 << 30)) >> 31) as u32)
 }
 
@@ -217,7 +291,8 @@ pub(crate) const fn angle(start: u32, extent_q31: u32, fraction: u64) -> u32 {
 #[must_use]
 #[cfg(target_arch = "arm")]
 #[allow(unsafe_code, reason = "the hardware square root has no stable intrinsic")]
-pub(crate) fn sqrt(value: f32) -> f32 {
+pub(crate) fn sqrt(value: Real) -> Real {
+    note([SquareRoot]);
     let mut bits = value.to_bits();
     // SAFETY: vsqrt.f32 reads and writes s0 alone, which is declared clobbered; no memory and no flags are touched.
     // FPSCR's sticky exception bits may change, which nothing reads.
@@ -238,8 +313,9 @@ pub(crate) fn sqrt(value: f32) -> f32 {
 #[inline(always)]
 #[must_use]
 #[cfg(not(target_arch = "arm"))]
-pub(crate) fn sqrt(value: f32) -> f32 {
-    libm::sqrtf(value)
+pub(crate) fn sqrt(value: Real) -> Real {
+    note([SquareRoot]);
+    real(libm::sqrtf(float(value)))
 }
 
 /// `1 / sqrt(value)` for values from 2^-125 on, within 1.5 units in the last place: an estimate from the bits (3.4 %), two Newton
@@ -252,9 +328,10 @@ pub(crate) fn sqrt(value: f32) -> f32 {
 /// 1.22 units. Below 2^-125 `half` loses its last bit (2.2 units).
 #[inline(always)]
 #[must_use]
-pub(crate) fn inverse_sqrt(value: f32) -> f32 {
+pub(crate) fn inverse_sqrt(value: Real) -> Real {
+    note([InverseRoot, Shift, Add]);
     let half = 0.5 * value;
-    let estimate = f32::from_bits(0x5f37_59df - (value.to_bits() >> 1));
+    let estimate = Real::from_bits(0x5f37_59df - (value.to_bits() >> 1));
     let first = estimate * (1.5 - half * estimate * estimate);
     let second = first * (1.5 - half * first * first);
     second + second * (0.5 - half * second * second)
@@ -281,7 +358,7 @@ const COSINE: [i32; 6] = [
 
 /// Horner steps of a polynomial of degree 5.
 #[inline(always)]
-const fn quintic(c: &[i32; 6], z: i32) -> i32 {
+fn quintic(c: &[i32; 6], z: i32) -> i32 {
     let [c0, c1, c2, c3, c4, c5] = *c;
     let low = cubic(&[c2, c3, c4, c5], z);
     quadratic(&[c0, c1, low], z)
@@ -291,7 +368,8 @@ const fn quintic(c: &[i32; 6], z: i32) -> i32 {
 /// a correctly rounded f32: at 100 mm from the axis 0.3 nm.
 #[inline]
 #[must_use]
-pub(crate) const fn sin_cos(turns: u32) -> (i32, i32) {
+pub(crate) fn sin_cos(turns: u32) -> (i32, i32) {
+    note([Sine, Sine, Add, Add, Multiply, Shift, Shift, Shift]);
     let quarter = turns.wrapping_add(1 << 29) >> 30;
     // t in [-1, 1): eighths of a turn, units of 2^-31.
     let t = (turns.wrapping_sub(quarter << 30) << 2) as i32;
@@ -306,7 +384,7 @@ pub(crate) const fn sin_cos(turns: u32) -> (i32, i32) {
     }
 }
 
-#[cfg(test)]
+#[cfg(all(test, not(feature = "count")))]
 mod tests {
     use super::*;
     use core::f64::consts::{FRAC_PI_4, TAU};

@@ -9,6 +9,7 @@
 
 use crate::arith::{fraction_from_f32, fraction_to_f32, small_step};
 use crate::fault::{Fault, FaultKind, Result};
+use crate::scalar::{Real, float};
 use crate::surface::{PathSpeed, Surface};
 
 /// Largest correction of the first-order step, relative, for which a series is trusted as a first guess. At 1/2 the
@@ -39,7 +40,7 @@ const LONG_STEP: f32 = 0.25;
 /// Increment of the path fraction for an arc, units of 2^-64, from the parametrisation at its start and the stretch one
 /// sample earlier (NaN where there is none); none where the series is not enough.
 #[inline(always)]
-pub(crate) fn step(from: &PathSpeed, stretch_before: f32, arc: f32) -> Option<u64> {
+pub(crate) fn step(from: &PathSpeed, stretch_before: Real, arc: Real) -> Option<u64> {
     const THIRD: f32 = 1.0 / 3.0;
     const SIXTH: f32 = 1.0 / 6.0;
     let PathSpeed { inverse, stretch } = *from;
@@ -60,7 +61,7 @@ const SMOOTH: f32 = 1.0 / 256.0;
 
 /// Arc from a fraction of the patch over `length` more, where the parametrisation is `end`: Hermite's rule of two points (error
 /// `length^5 s^(4) / 720` for a speed s), or of three (`length^7 s^(6) / 604800`).
-fn arc_over(surface: &Surface, from: u64, start: &PathSpeed, end: &PathSpeed, length: f32) -> f32 {
+fn arc_over(surface: &Surface, from: u64, start: &PathSpeed, end: &PathSpeed, length: Real) -> Real {
     let (first, last) = (1.0 / start.inverse, 1.0 / end.inverse);
     let (rise, fall) = (first * start.stretch * length, last * end.stretch * length);
     let (sum, bow) = (first + last, rise - fall);
@@ -73,7 +74,7 @@ fn arc_over(surface: &Surface, from: u64, start: &PathSpeed, end: &PathSpeed, le
 }
 
 /// The path fraction of an arc within another, both from the same place: Hermite's cubic of the path over the arc.
-fn inverse_cubic(arc: f32, start: &PathSpeed, end: &PathSpeed, covered: f32, length: f32) -> f32 {
+fn inverse_cubic(arc: Real, start: &PathSpeed, end: &PathSpeed, covered: Real, length: Real) -> Real {
     let part = arc / covered;
     let rest = 1.0 - part;
     let (first, last) = (covered * start.inverse, covered * end.inverse);
@@ -86,7 +87,7 @@ pub(crate) enum Reach {
     /// On the patch, at this fraction.
     Within(u64),
     /// Beyond the patch, up to whose end there was this arc.
-    Beyond(f32),
+    Beyond(Real),
 }
 
 /// Where an arc from a place ends, by quadrature. `patch_end` is the parametrisation at the patch's end, asked for where it may matter.
@@ -100,7 +101,7 @@ pub(crate) fn solve(
     from: u64,
     start: &PathSpeed,
     patch_end: impl Fn() -> PathSpeed,
-    arc: f32,
+    arc: Real,
 ) -> Result<Reach> {
     let room = fraction_to_f32(!from);
     let first = arc * start.inverse;
@@ -108,7 +109,7 @@ pub(crate) fn solve(
     let correction = bend * (bend * 0.5 - 0.5);
     let mut guess = first + first * correction;
     // The series is about a small part of the patch: where the arc may be all of it, the end is looked at first.
-    let to_end = || -> Result<(PathSpeed, f32)> {
+    let to_end = || -> Result<(PathSpeed, Real)> {
         let end = patch_end().checked()?;
         let covered = arc_over(surface, from, start, &end, room);
         Ok((end, covered))
@@ -124,7 +125,7 @@ pub(crate) fn solve(
     };
     // Not `>`: a NaN must not pass.
     if !(correction.abs() <= CORRECTION_MAX) {
-        return Err(Fault::new(FaultKind::ParameterBackwards, correction));
+        return Err(Fault::new(FaultKind::ParameterBackwards, float(correction)));
     }
     if let Some((end, covered)) = end {
         guess = inverse_cubic(arc, start, &end, covered, room);
@@ -139,7 +140,7 @@ pub(crate) fn solve(
         if !(correction.abs() <= CORRECTED_MAX * guess) {
             return Err(Fault::new(
                 FaultKind::ParameterBackwards,
-                (guess + correction) / first - 1.0,
+                float((guess + correction) / first - 1.0),
             ));
         }
         guess += correction;
@@ -158,7 +159,7 @@ pub(crate) fn solve(
 }
 
 /// The path of a short arc, to second order, from where the parametrisation is `end`.
-fn path_of(arc: f32, end: &PathSpeed) -> f32 {
+fn path_of(arc: Real, end: &PathSpeed) -> Real {
     let more = arc * end.inverse;
     more - 0.5 * end.stretch * more * more
 }

@@ -359,11 +359,10 @@ impl Motion {
         let contact = patch.surface.contact(path.fraction, &patch.ball)?;
         patch.ball.check_fit(&contact)?;
         let located = patch.ball.locate(&contact, &patch.origin)?;
-        let normal = patch.ball.normal(contact.offset);
         Ok(Probe {
             cc_nm: located.cc_nm,
             cl_nm: located.cl_nm,
-            normal: [normal.x, normal.y, normal.z],
+            normal: patch.ball.normal(contact.offset),
             interval: interval(patch.interval.density(&contact)),
         })
     }

@@ -48,7 +48,7 @@
     )
 )]
 
-#[cfg(test)]
+#[cfg(any(test, feature = "count"))]
 extern crate std;
 
 mod arith;
@@ -64,6 +64,11 @@ mod patch;
 mod program;
 mod run;
 pub mod sample;
+#[cfg(not(feature = "count"))]
+mod scalar;
+#[cfg(feature = "count")]
+#[path = "../../host-sim/counted-core/scalar.rs"]
+pub mod scalar;
 mod schedule;
 pub mod surface;
 mod vec3;

@@ -1,7 +1,8 @@
 //! Step 3: from cutter contact to cutter location, `CL = CC + r N` (Lo 1998, eqns 2 and 3), and whether the ball fits.
 
-use crate::arith::{power_of_two, product, q30_to_f32, sqrt, to_f32, to_top, truncated, whole_q30};
+use crate::arith::{add_product, power_of_two, q30_to_f32, sqrt, to_f32, to_top, truncated, whole_q30};
 use crate::fault::{Fault, FaultKind, Result};
+use crate::scalar::{Real, float, real};
 use crate::surface::{Contact, SHIFT_MAX};
 use crate::vec3::Vec3;
 
@@ -23,9 +24,9 @@ const FOLD_COSINE: f32 = -0.5;
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct Ball {
     /// r in the offsets' units, with the sign that turns `path x side` towards the tool.
-    signed_radius: f32,
+    signed_radius: Real,
     /// What one count of the upper word of (offset . half second derivative) means for r k |.|^2, units^2.
-    product: f32,
+    product: Real,
     /// Least upper word of the product of two neighbours' offsets.
     fold_min: i32,
     /// The patch's unit and the offsets', in units of 2^-30 nm.
@@ -43,8 +44,8 @@ pub(crate) struct Located {
 impl Ball {
     /// No ball yet.
     pub(crate) const NONE: Self = Self {
-        signed_radius: 0.0,
-        product: 0.0,
+        signed_radius: real(0.0),
+        product: real(0.0),
         fold_min: 0,
         unit: 0,
         offset_unit: 0,
@@ -56,9 +57,9 @@ impl Ball {
         let (radius, fine) = to_top(radius_mm * 1e6);
         let change = i32::from(shift) - i32::from(fine);
         Self {
-            signed_radius: sign * radius,
-            product: power_of_two(33 + change),
-            fold_min: truncated(radius * power_of_two(-32) * radius * FOLD_COSINE),
+            signed_radius: real(sign * radius),
+            product: real(power_of_two(33 + change)),
+            fold_min: truncated(real(radius * power_of_two(-32) * radius * FOLD_COSINE)),
             unit: 1 << (30 - shift),
             offset_unit: 1 << (30 - fine),
         }
@@ -66,21 +67,21 @@ impl Ball {
 
     /// `r N` from a vector along the normal: `vector` times `inverse` is a unit vector. Within a unit.
     #[inline(always)]
-    pub(crate) fn offset(&self, vector: Vec3, inverse: f32) -> [i32; 3] {
+    pub(crate) fn offset(&self, vector: Vec3, inverse: Real) -> [i32; 3] {
         let Vec3 { x, y, z } = vector * (self.signed_radius * inverse);
         [truncated(x), truncated(y), truncated(z)]
     }
 
     /// What one count of the upper word of (offset . half a second derivative) is of `r` times a second fundamental form, units^2.
     #[inline(always)]
-    pub(crate) const fn product(&self) -> f32 {
+    pub(crate) const fn product(&self) -> Real {
         self.product
     }
 
     /// The unit normal of an offset.
-    pub(crate) fn normal(&self, offset: [i32; 3]) -> Vec3 {
+    pub(crate) fn normal(&self, offset: [i32; 3]) -> [f32; 3] {
         let inverse = 1.0 / self.signed_radius.abs();
-        Vec3::each(&offset, |x| to_f32(*x) * inverse)
+        offset.map(|x| float(to_f32(x) * inverse))
     }
 
     /// Whether the product of two neighbours' offsets says that the surface has folded over between them.
@@ -120,10 +121,10 @@ impl Ball {
         let [x0, y0, z0] = *origin;
         // Neither sum reaches 2^63: they are of the origin, 2^61, the position, 2^61, and the offset, 2^60.
         let axis = |origin: i64, position: i32, offset: i32| {
-            let contact = origin.wrapping_add(product(position, self.unit));
+            let contact = add_product(origin, position, self.unit);
             let ((cc, cc_excess), (cl, cl_excess)) = (
                 whole_q30(contact),
-                whole_q30(contact.wrapping_add(product(offset, self.offset_unit))),
+                whole_q30(add_product(contact, offset, self.offset_unit)),
             );
             (cc, cl, cc_excess | cl_excess)
         };
@@ -142,8 +143,8 @@ impl Ball {
     fn explain_range(&self, position: [i32; 3], offset: [i32; 3], origin: &[i64; 3]) -> Fault {
         let mut worst = 0.0_f32;
         for ((position, offset), origin) in position.into_iter().zip(offset).zip(*origin) {
-            let contact = origin.wrapping_add(product(position, self.unit));
-            for value in [contact, contact.wrapping_add(product(offset, self.offset_unit))] {
+            let contact = add_product(origin, position, self.unit);
+            for value in [contact, add_product(contact, offset, self.offset_unit)] {
                 let metres = q30_to_f32(value) * 1e-9;
                 if metres.abs() > worst.abs() {
                     worst = metres;
@@ -162,17 +163,23 @@ pub(crate) fn origin_q30(origin_nm: [i32; 3]) -> [i64; 3] {
 /// The uncommon end of [`Ball::check_fit`]: a pole, or the fault with its value.
 #[cold]
 #[inline(never)]
-fn explain_fit(along: f32, across: f32, twist_squared: f32, lateral: f32, speed_squared: f32) -> Result<()> {
+fn explain_fit(
+    along: Real,
+    across: Real,
+    twist_squared: Real,
+    lateral: Real,
+    speed_squared: Real,
+) -> Result<()> {
     if !(lateral > POLE_MIN * speed_squared) {
         return if along > ROOM_MIN {
             Ok(())
         } else {
-            Err(Fault::new(FaultKind::BallDoesNotFit, 1.0 - along))
+            Err(Fault::new(FaultKind::BallDoesNotFit, float(1.0 - along)))
         };
     }
     // Least eigenvalue of [[along, t], [t, across]] with the lateral speed scaled out; 1 minus it is r k.
     let (p, q, t_squared) = (along, across / lateral, twist_squared / lateral);
     let half = 0.5 * (p - q);
     let least = 0.5 * (p + q) - sqrt(half * half + t_squared);
-    Err(Fault::new(FaultKind::BallDoesNotFit, 1.0 - least))
+    Err(Fault::new(FaultKind::BallDoesNotFit, float(1.0 - least)))
 }

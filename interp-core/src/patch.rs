@@ -7,6 +7,7 @@ use crate::job::{SurfaceKind, ToolSide};
 use crate::lane::Line;
 use crate::offset::{Ball, origin_q30};
 use crate::program::Job;
+use crate::scalar::{Real, real};
 use crate::surface::{
     CirclePass, GridPass, POLYNOMIAL_WORDS, PassLine, PathSpeed, ProfilePass, RATIONAL_WORDS, REVOLVED_WORDS,
     Surface, split_patch, split_revolved,
@@ -21,9 +22,9 @@ pub(crate) struct Patch {
     /// Units of 2^-30 nm, see [`origin_q30`].
     pub(crate) origin: [i64; 3],
     /// One period's arc, units.
-    pub(crate) arc: f32,
+    pub(crate) arc: Real,
     /// Units a mm.
-    pub(crate) per_mm: f32,
+    pub(crate) per_mm: Real,
     /// The pass is a single point here.
     pub(crate) point: bool,
     /// The parametrisation at start and end, once [`Self::find_ends`] has it.
@@ -37,8 +38,8 @@ impl Patch {
         ball: Ball::NONE,
         interval: Interval::NONE,
         origin: [0; 3],
-        arc: 0.0,
-        per_mm: 1.0,
+        arc: real(0.0),
+        per_mm: real(1.0),
         point: false,
         ends: None,
     };
@@ -139,7 +140,7 @@ impl Patch {
     /// Ball, feed and scallop limit in the patch's units.
     fn measure(&mut self, job: &Job<'_>, shift: u8, side_span: u16, sign: f32) {
         let header = job.header;
-        self.per_mm = 1e6 * power_of_two(shift.into());
+        self.per_mm = real(1e6 * power_of_two(shift.into()));
         self.ball = Ball::new(header.ball_radius_mm, shift, sign);
         self.arc = header.feed_mm_s * header.period_s * self.per_mm;
         let width = job.side_width(side_span);

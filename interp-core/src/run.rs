@@ -1,6 +1,6 @@
 //! A run of a job, sample by sample: the one file that chains the stages.
 
-use crate::arith::dot_hi;
+use crate::arith::{advanced, dot_hi};
 use crate::contact::{self, Reach};
 use crate::fault::{Fault, FaultKind, Result};
 use crate::interval::interval;
@@ -9,6 +9,7 @@ use crate::lane::{Lane, Line};
 use crate::patch::Patch;
 use crate::program::Job;
 use crate::sample::{Place, Sample};
+use crate::scalar::{Real, float, real};
 use crate::schedule;
 use crate::surface::{AnyPass, Pass, PathSpeed};
 
@@ -44,7 +45,7 @@ struct Travel {
     fraction: u64,
     /// The parametrisation at the last sample, and its stretch at the one before; NaN where that is on another patch.
     path: PathSpeed,
-    stretch_before: f32,
+    stretch_before: Real,
     /// r N at the last sample, in the ball's units.
     offset: [i32; 3],
     /// Greatest density of the pass.
@@ -73,10 +74,10 @@ impl Travel {
         span: 0,
         fraction: 0,
         path: PathSpeed {
-            inverse: 0.0,
-            stretch: 0.0,
+            inverse: real(0.0),
+            stretch: real(0.0),
         },
-        stretch_before: f32::NAN,
+        stretch_before: Real::NAN,
         offset: [0; 3],
         most: 0.0,
         ticks: 0,
@@ -179,7 +180,7 @@ impl Run {
         let travel = &mut self.travel;
         if travel.next == Next::Along {
             let step = contact::step(&travel.path, travel.stretch_before, self.lane.patch().arc);
-            if let Some(fraction) = step.and_then(|step| travel.fraction.checked_add(step)) {
+            if let Some(fraction) = step.and_then(|step| advanced(travel.fraction, step)) {
                 travel.fraction = fraction;
                 self.sample(last)?;
                 if self.lane.has_work() {
@@ -245,7 +246,7 @@ impl Run {
 
     /// A share of a period's arc along the pass, by quadrature, over as many patches as it takes.
     fn step_far(&mut self, job: &Job<'_>, share: f32) -> Result<()> {
-        let mut rest = share * job.header.feed_mm_s * job.header.period_s;
+        let mut rest = real(share * job.header.feed_mm_s * job.header.period_s);
         for crossings in 0..=CROSSINGS_MAX {
             let Self { travel, lane, .. } = self;
             let patch = lane.patch();
@@ -268,7 +269,7 @@ impl Run {
             }
             self.travel.path = self.lane.patch().start().checked()?;
         }
-        Err(Fault::new(FaultKind::PatchTooShort, rest))
+        Err(Fault::new(FaultKind::PatchTooShort, float(rest)))
     }
 
     /// On a pole, the next of its places: the tool stands, but the interval that the pass allows differs from place to place.
@@ -289,7 +290,7 @@ impl Run {
         };
         travel.span = line.span;
         travel.fraction = 0;
-        travel.path.stretch = f32::NAN;
+        travel.path.stretch = Real::NAN;
         self.lane.go_on(job, &line)?;
         Ok(true)
     }
@@ -307,7 +308,7 @@ impl Run {
         travel.fraction = 0;
         travel.most = 0.0;
         travel.next = Next::Along;
-        travel.path.stretch = f32::NAN;
+        travel.path.stretch = Real::NAN;
         self.lane.begin(job, &travel.line())
     }
 

@@ -4,6 +4,7 @@
 use crate::arith::{fraction_32, fraction_from_f32};
 use crate::fault::{Fault, FaultKind, Result};
 use crate::sample::Place;
+use crate::scalar::real;
 
 /// Boundaries between side spans that an interval reaches over at most, so that the walk is bounded; one that reaches further
 /// ends on the last of them: nearer than the scallop asks for, where patches are that much narrower than it.
@@ -27,7 +28,7 @@ pub(crate) fn next_side(from: Place, interval: f32, spans: u16, width: impl Fn(u
             width(span) * fraction_32(u32::try_from(SPAN - at).unwrap_or(u32::MAX))
         };
         if rest < room {
-            let step = fraction_from_f32(rest / width(span)) >> 32;
+            let step = fraction_from_f32(real(rest / width(span))) >> 32;
             if step == 0 && span == from.span {
                 return Err(Fault::new(FaultKind::IntervalTooSmall, interval / width(span)));
             }

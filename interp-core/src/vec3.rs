@@ -1,24 +1,25 @@
-//! Three floats, and the products the geometry needs.
+//! Three scalars, and the products the geometry needs.
 
 use crate::arith::to_f32;
+use crate::scalar::Real;
 use core::ops::{Add, Mul, Sub};
 
 /// A vector or a derivative, mm or per mm as its name says.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(crate) struct Vec3 {
     /// Along x.
-    pub(crate) x: f32,
+    pub(crate) x: Real,
     /// Along y.
-    pub(crate) y: f32,
+    pub(crate) y: Real,
     /// Along z.
-    pub(crate) z: f32,
+    pub(crate) z: Real,
 }
 
 impl Vec3 {
     /// A vector from its components.
     #[inline(always)]
     #[must_use]
-    pub(crate) const fn new(x: f32, y: f32, z: f32) -> Self {
+    pub(crate) const fn new(x: Real, y: Real, z: Real) -> Self {
         Self { x, y, z }
     }
 
@@ -29,16 +30,10 @@ impl Vec3 {
         Self::new(to_f32(x), to_f32(y), to_f32(z))
     }
 
-    /// Applies a function to each of three things.
-    #[inline(always)]
-    pub(crate) fn each<T>([x, y, z]: &[T; 3], f: impl Fn(&T) -> f32) -> Self {
-        Self::new(f(x), f(y), f(z))
-    }
-
     /// Scalar product.
     #[inline(always)]
     #[must_use]
-    pub(crate) fn dot(self, other: Self) -> f32 {
+    pub(crate) fn dot(self, other: Self) -> Real {
         self.x * other.x + self.y * other.y + self.z * other.z
     }
 
@@ -70,10 +65,10 @@ impl Sub for Vec3 {
     }
 }
 
-impl Mul<f32> for Vec3 {
+impl Mul<Real> for Vec3 {
     type Output = Self;
     #[inline(always)]
-    fn mul(self, factor: f32) -> Self {
+    fn mul(self, factor: Real) -> Self {
         Self::new(self.x * factor, self.y * factor, self.z * factor)
     }
 }

@@ -2,18 +2,20 @@
 
 mod worst;
 
+use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 use clap::Args;
 use serde_json::{Value, json};
 
 use super::{Failure, Result, cannot_write, load, progress};
-use crate::budget::figures::{Figure, Histogram, Model, figures, histogram};
+use crate::budget::figures::{Figure, Histogram, Model, STEPS_2_TO_4, figures, histogram};
 use crate::budget::graph::{self, Analysis, EXCEPTION_BYTES};
 use crate::budget::image::{self, Sizes};
 use crate::budget::lab::Lab;
 use crate::budget::measure::{Bench, Ticks};
 use crate::budget::{BudgetError, PERIOD_CYCLES, SURFACES, TICKS, chart, golden};
+use crate::operations::{self, Count, Operations};
 use crate::remote::qemu;
 
 /// Cycles of a bin of the printed histogram.
@@ -71,8 +73,9 @@ impl From<BudgetError> for Failure {
 /// A job's name and ticks.
 type Counted = (String, Ticks);
 
-fn count(arguments: &Arguments, bench: &Bench) -> Result<Vec<Counted>> {
-    let jobs: Vec<(String, PathBuf)> = if arguments.jobs.is_empty() {
+/// The jobs to count, with their names.
+fn jobs(arguments: &Arguments) -> Vec<(String, PathBuf)> {
+    if arguments.jobs.is_empty() {
         let folder = qemu::workspace().join("jobs");
         let path = |job: &str| folder.join(format!("{job}.toml"));
         SURFACES
@@ -86,7 +89,11 @@ fn count(arguments: &Arguments, bench: &Bench) -> Result<Vec<Counted>> {
             .iter()
             .map(|path| (name(path), path.clone()))
             .collect()
-    };
+    }
+}
+
+fn count(arguments: &Arguments, bench: &Bench) -> Result<Vec<Counted>> {
+    let jobs = jobs(arguments);
     let bar = progress(jobs.len() as u64, "counting");
     let mut counted = Vec::new();
     for (name, path) in jobs {
@@ -96,6 +103,75 @@ fn count(arguments: &Arguments, bench: &Bench) -> Result<Vec<Counted>> {
     }
     bar.finish_and_clear();
     Ok(counted)
+}
+
+/// Operations of a sample of each job; none where no sample is far from the ends of passes and patches.
+fn count_operations(arguments: &Arguments) -> Result<BTreeMap<String, Count>> {
+    let mut counts = BTreeMap::new();
+    for (name, path) in jobs(arguments) {
+        let (_, prepared) = load(&path)?;
+        let counted = operations::count(&prepared, arguments.ticks)
+            .map_err(|fault| Failure::Failed(Some(format!("{}: {fault}", path.display()))))?;
+        if counted.samples > 0 {
+            counts.insert(name, counted.sample);
+        }
+    }
+    Ok(counts)
+}
+
+fn print_operations(arguments: &Arguments, counts: &BTreeMap<String, Count>) {
+    let row = |name: &str, operations: Operations, more: &str| {
+        let Operations {
+            add,
+            multiply,
+            divide,
+            root,
+            sine,
+        } = operations;
+        println!("  {name:<25} {add:>5} {multiply:>5} {divide:>5} {root:>5} {sine:>7}{more}");
+    };
+    println!(
+        "\noperations a sample, {STEPS_2_TO_4}\n  {:<25} {:>5} {:>5} {:>5} {:>5} {:>7}  1/sqrt, conversions, shifts",
+        "", "+ -", "x", "/", "sqrt", "sin cos"
+    );
+    for (name, _) in jobs(arguments) {
+        if let Some(count) = counts.get(&name) {
+            let more = format!(
+                "  {:>6} {:>12} {:>7}",
+                count.inverse_root, count.convert, count.shift
+            );
+            row(&name, count.operations, &more);
+        }
+        if let Some(paper) = operations::of_paper(&name) {
+            row("  the paper's Table 1", paper, "");
+        }
+    }
+    println!(
+        "  1/sqrt and sin cos are made of + - x, which are counted with the others; comparisons and signs are not counted.\n  \
+         Once a pass, and not in here: the patch at its side parameter, and the interval's root and quotient."
+    );
+}
+
+fn operations_json(operations: Operations) -> Value {
+    json!({
+        "add": operations.add,
+        "multiply": operations.multiply,
+        "divide": operations.divide,
+        "square_root": operations.root,
+        "sine": operations.sine,
+    })
+}
+
+fn count_json(count: &Count) -> Value {
+    let mut value = operations_json(count.operations);
+    for (key, more) in [
+        ("inverse_square_root", count.inverse_root),
+        ("convert", count.convert),
+        ("shift", count.shift),
+    ] {
+        value[key] = more.into();
+    }
+    value
 }
 
 /// What the images say without being run.
@@ -141,8 +217,11 @@ impl Images {
     }
 }
 
-fn json(figures: &[Figure], images: &Images) -> Value {
+fn json(figures: &[Figure], images: &Images, counts: &BTreeMap<String, Count>) -> Value {
     let rows = figures.iter().map(|figure| {
+        let whole = figure.stage == STEPS_2_TO_4;
+        let count = counts.get(&figure.surface).filter(|_| whole);
+        let paper = operations::of_paper(&figure.surface).filter(|_| whole);
         json!({
             "surface": figure.surface,
             "stage": figure.stage,
@@ -152,6 +231,8 @@ fn json(figures: &[Figure], images: &Images) -> Value {
             "cycles_mean": figure.mean,
             "cycles_max": figure.max,
             "period_share_pct": figure.period_share_pct(),
+            "operations": count.map(count_json),
+            "operations_paper": paper.map(operations_json),
             "histogram": { "width": figure.histogram.width, "bins": figure.histogram.bins },
             "stack_bytes": figure.stack_bytes,
             "stack_static_bytes": images.qemu_stack.stack_bytes(),
@@ -255,15 +336,17 @@ pub(super) fn command(arguments: &Arguments) -> Result<()> {
     }
     let counted = count(arguments, &bench)?;
     let figures: Vec<Vec<Figure>> = counted.iter().map(|(name, ticks)| figures(name, ticks)).collect();
+    let counts = count_operations(arguments)?;
     let images = Images::read(&image)?;
     if arguments.json {
-        println!("{}", json(&figures.concat(), &images));
+        println!("{}", json(&figures.concat(), &images, &counts));
     } else {
         images.print();
         for ((name, ticks), figures) in counted.iter().zip(&figures) {
             print(name, ticks, figures);
             print_histogram(&histogram(ticks, Model::Pessimistic, BIN_CYCLES));
         }
+        print_operations(arguments, &counts);
     }
     if !arguments.json {
         print_worst(arguments, &bench)?;

@@ -21,6 +21,7 @@ pub mod table_1;
 
 use crate::approach::ApproachError;
 use crate::job_file::JobFile;
+use crate::operations;
 use crate::oracle::Oracle;
 
 pub use compare::{Comparison, Row};
@@ -157,7 +158,11 @@ pub fn study(step: &(dyn Fn() + Sync)) -> Result<Study, ApproachError> {
     let figures = Figures::new(&cases)?;
     step();
     let mut items = examples::items(&cases, &comparisons)?;
-    items.extend(table_1::items(None, table_1::golden_cycles().as_ref()));
+    let operations = operations::table_1();
+    items.extend(table_1::items(
+        operations.as_ref(),
+        table_1::golden_cycles().as_ref(),
+    ));
     step();
     Ok(Study {
         cases,

@@ -37,6 +37,7 @@ pub(crate) use revolved::{CirclePass, ProfilePass};
 use crate::arith::{dot_hi, fraction_32, inverse_sqrt, power_of_two, sqrt, to_f32};
 use crate::fault::{Fault, FaultKind, Result};
 use crate::offset::Ball;
+use crate::scalar::{ONE, Real, float, real};
 use crate::vec3::Vec3;
 
 /// Least sine between the two first derivatives (after any flagged zero is divided out) at which a normal is taken.
@@ -68,32 +69,32 @@ pub(crate) struct Contact {
     /// The parametrisation along the path.
     pub(crate) path: PathSpeed,
     /// 1 - r k, k the normal curvature along the path towards the tool.
-    pub(crate) along: f32,
+    pub(crate) along: Real,
     /// 1 - r k across the path, times `lateral_squared`.
-    pub(crate) across: f32,
+    pub(crate) across: Real,
     /// Square of the lateral speed |(N x t) . S_side|, (g units)^2 per side^2.
-    pub(crate) lateral_squared: f32,
+    pub(crate) lateral_squared: Real,
     /// Square of r times geodesic torsion times lateral speed, (g units)^2 per side^2.
-    pub(crate) twist_squared: f32,
+    pub(crate) twist_squared: Real,
     /// |A|^2, (g units)^2.
-    pub(crate) speed_squared: f32,
+    pub(crate) speed_squared: Real,
     /// 1/g^2.
-    pub(crate) gauge: f32,
+    pub(crate) gauge: Real,
 }
 
 /// The path parametrisation at a place: what a step along the path needs.
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct PathSpeed {
     /// 1/|A|, path per unit.
-    pub(crate) inverse: f32,
+    pub(crate) inverse: Real,
     /// A . A' / |A|^2: relative change of the speed, per path.
-    pub(crate) stretch: f32,
+    pub(crate) stretch: Real,
 }
 
 impl PathSpeed {
     /// From g Ã, half of its derivative, the excess of its stretch, and g/a.
     #[inline(always)]
-    fn new(path: &[i32; 3], path2: &[i32; 3], excess: f32, gauge: f32) -> Self {
+    fn new(path: &[i32; 3], path2: &[i32; 3], excess: Real, gauge: Real) -> Self {
         let speed = Vec3::of(*path);
         let inverse = inverse_sqrt(speed.dot(speed));
         Self {
@@ -119,18 +120,18 @@ impl PathSpeed {
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Factors {
     /// a and 1/a: fixed on a pass; both 0 where the whole pass is a pole.
-    pub(crate) path: f32,
-    pub(crate) inverse_path: f32,
+    pub(crate) path: Real,
+    pub(crate) inverse_path: Real,
     /// b: 0 at a pole at the pass's end.
-    pub(crate) side: f32,
+    pub(crate) side: Real,
 }
 
 impl Factors {
     /// Away from poles.
     pub(crate) const ONE: Self = Self {
-        path: 1.0,
-        inverse_path: 1.0,
-        side: 1.0,
+        path: ONE,
+        inverse_path: ONE,
+        side: ONE,
     };
 }
 
@@ -151,16 +152,16 @@ pub(crate) struct Local {
     /// Half the second side derivative of S over b.
     pub(crate) side2: [i32; 3],
     /// g.
-    pub(crate) g: f32,
+    pub(crate) g: Real,
     /// 1/g.
-    pub(crate) inverse_g: f32,
+    pub(crate) inverse_g: Real,
     /// What the stretch of Ã has more than that of S, because g varies.
-    pub(crate) excess: f32,
+    pub(crate) excess: Real,
 }
 
 /// `A . A' / |A|^2` from g A, half of g A' and 1/|g A|^2.
 #[inline(always)]
-fn stretch(path: &[i32; 3], path2: &[i32; 3], inverse_e: f32, excess: f32) -> f32 {
+fn stretch(path: &[i32; 3], path2: &[i32; 3], inverse_e: Real, excess: Real) -> Real {
     const PRODUCT: f32 = power_of_two(33);
     to_f32(dot_hi(path, path2)) * (inverse_e * PRODUCT) - excess
 }
@@ -238,10 +239,14 @@ impl Local {
 
 #[cold]
 #[inline(never)]
-fn degenerate(area_squared: f32, f: f32) -> Fault {
+fn degenerate(area_squared: Real, f: Real) -> Fault {
     let eg = area_squared + f * f;
-    let sine = if eg > 0.0 { sqrt(area_squared / eg) } else { 0.0 };
-    Fault::new(FaultKind::DegenerateSurface, sine)
+    let sine = if eg > 0.0 {
+        sqrt(area_squared / eg)
+    } else {
+        real(0.0)
+    };
+    Fault::new(FaultKind::DegenerateSurface, float(sine))
 }
 
 /// A surface on one pass. The variant is a job's.
@@ -347,12 +352,13 @@ pub(crate) fn split_revolved(words: &[i32; REVOLVED_WORDS]) -> (u8, i32) {
 }
 
 /// Factors of a patch with these collapsed boundaries, fixed on this pass: a and 1/a.
-pub(crate) fn path_factor(edges: Edges, at: &PassLine) -> (f32, f32) {
+pub(crate) fn path_factor(edges: Edges, at: &PassLine) -> (Real, Real) {
     match edges.side_root() {
-        None => (1.0, 1.0),
+        None => (real(1.0), real(1.0)),
         Some(root) => {
             let factor = fraction_32(root.factor(at.side));
-            (factor, if factor > 0.0 { 1.0 / factor } else { 0.0 })
+            let inverse = if factor > 0.0 { 1.0 / factor } else { 0.0 };
+            (real(factor), real(inverse))
         }
     }
 }

@@ -10,9 +10,10 @@ use super::lines::{Line, quotient_across, quotient_along};
 use super::range::{Edges, Root};
 use super::rational::{Weight, quarter};
 use super::{Contact, Factors, Local, Pass, PassLine, PathSpeed, path_factor};
-use crate::arith::{centred, centred_to_f32, cubic, jet, mul_hi};
+use crate::arith::{centred, centred_to_f32, cubic, jet, mul_q30, quarter_of, subtract, tangent};
 use crate::fault::Result;
 use crate::offset::Ball;
+use crate::scalar::{Real, real};
 
 /// Which derivative of the pass is reduced by a root.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -39,8 +40,8 @@ struct ReducedLine {
 pub(crate) struct Reduced {
     axes: [ReducedLine; 3],
     pole: Pole,
-    path_factor: f32,
-    inverse_path_factor: f32,
+    path_factor: Real,
+    inverse_path_factor: Real,
 }
 
 /// A patch with a pole on one pass.
@@ -55,8 +56,8 @@ impl Reduced {
             side2: [0; 4],
         }; 3],
         pole: Pole::Beside,
-        path_factor: 1.0,
-        inverse_path_factor: 1.0,
+        path_factor: real(1.0),
+        inverse_path_factor: real(1.0),
     };
 
     /// Divides the coordinates of a patch by the root of its flagged boundary.
@@ -144,7 +145,7 @@ impl PoleLine<'_> {
     fn at(&self, weight: &Weight, w: i32) -> [i32; 6] {
         let [value, path, path2] = jet(&self.line.value, w);
         let [reduced, reduced_path, reduced_path2] = jet(&self.reduced.value, w);
-        let [_, mixed, _] = jet(&self.line.side, w);
+        let [_, mixed] = tangent(&self.line.side, w);
         let (side, side2) = (cubic(&self.reduced.side, w), cubic(&self.reduced.side2, w));
         let s = weight.divide(value);
         let part = Part::new(reduced, weight);
@@ -175,14 +176,14 @@ struct Part(i32);
 
 impl Part {
     #[inline(always)]
-    const fn new(reduced: i32, weight: &Weight) -> Self {
-        Self(weight.divide(reduced >> 2))
+    fn new(reduced: i32, weight: &Weight) -> Self {
+        Self(weight.divide(quarter_of(reduced)))
     }
 
     /// [`quarter`] with the reduced point.
     #[inline(always)]
-    const fn rule(&self, numerator: i32, weight: i32) -> i32 {
-        (numerator >> 2).wrapping_sub(mul_hi(self.0, weight) << 2)
+    fn rule(&self, numerator: i32, weight: i32) -> i32 {
+        subtract(quarter_of(numerator), mul_q30(self.0, weight))
     }
 }
 
@@ -191,7 +192,7 @@ impl Pass for PolePass<'_> {
     fn contact(&self, fraction: u64, ball: &Ball) -> Result<Contact> {
         let w = centred(fraction);
         let side = match self.0.reduced.pole {
-            Pole::Beside => 1.0,
+            Pole::Beside => real(1.0),
             Pole::AtEnd(root) => {
                 let [offset, slope] = root.linear();
                 offset + slope * centred_to_f32(w)

@@ -8,9 +8,10 @@ use super::grid::GridPass;
 use super::lines::{Line, coefficients, collapses, record_words, split};
 use super::range::{BAD_PATCH, Edges, HeadWord, fits};
 use super::{Contact, Factors, Local, Pass, PathSpeed};
-use crate::arith::{centred, cubic, jet};
+use crate::arith::{centred, cubic, jet, tangent};
 use crate::fault::Result;
 use crate::offset::Ball;
+use crate::scalar::{ONE, ZERO};
 
 /// Words of a polynomial patch.
 pub const POLYNOMIAL_WORDS: usize = 52;
@@ -83,15 +84,15 @@ fn local<const MIXED: bool, const SIDE2: bool>(pass: &GridPass, fraction: u64) -
     let [x, y, z] = &pass.axes;
     let side = |line: &Line| {
         if MIXED {
-            jet(&line.side, w)
+            tangent(&line.side, w)
         } else {
             let [constant, ..] = line.side;
-            [constant, 0, 0]
+            [constant, 0]
         }
     };
     let side2 = |line: &Line| if SIDE2 { cubic(&line.side2, w) } else { 0 };
     let ([x0, x1, x2], [y0, y1, y2], [z0, z1, z2]) = (jet(&x.value, w), jet(&y.value, w), jet(&z.value, w));
-    let ([xs, xm, _], [ys, ym, _], [zs, zm, _]) = (side(x), side(y), side(z));
+    let ([xs, xm], [ys, ym], [zs, zm]) = (side(x), side(y), side(z));
     Local {
         position: [x0, y0, z0],
         path: [x1, y1, z1],
@@ -99,9 +100,9 @@ fn local<const MIXED: bool, const SIDE2: bool>(pass: &GridPass, fraction: u64) -
         path2: [x2, y2, z2],
         mixed: [xm, ym, zm],
         side2: [side2(x), side2(y), side2(z)],
-        g: 1.0,
-        inverse_g: 1.0,
-        excess: 0.0,
+        g: ONE,
+        inverse_g: ONE,
+        excess: ZERO,
     }
 }
 
@@ -109,7 +110,7 @@ impl PolynomialPass<'_> {
     /// The parametrisation at a fraction of the patch.
     pub(crate) fn path_at(&self, fraction: u64) -> PathSpeed {
         let local = local::<false, false>(self.0, fraction);
-        PathSpeed::new(&local.path, &local.path2, 0.0, 1.0)
+        PathSpeed::new(&local.path, &local.path2, ZERO, ONE)
     }
 }
 

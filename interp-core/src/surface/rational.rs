@@ -9,9 +9,12 @@ use super::grid::GridPass;
 use super::lines::{Line, coefficients, collapses, record_words, split};
 use super::range::{BAD_PATCH, Edges, HeadWord, Root, fits, patch_bound};
 use super::{Contact, Factors, Local, Pass, PathSpeed};
-use crate::arith::{centred, cubic, jet, mul_hi, mul_q29, reciprocal_q29, to_f32};
+use crate::arith::{
+    centred, cubic, jet, mul_hi, mul_q29, quarter_of, reciprocal_q29, subtract, tangent, to_f32,
+};
 use crate::fault::Result;
 use crate::offset::Ball;
+use crate::scalar::Real;
 
 /// Words of a rational patch.
 pub const RATIONAL_WORDS: usize = 68;
@@ -120,11 +123,11 @@ pub(super) struct Weight {
     /// 1/w in units of 2^-29.
     reciprocal: i32,
     /// w/4.
-    pub(super) g: f32,
+    pub(super) g: Real,
     /// 4/w.
-    pub(super) inverse_g: f32,
+    pub(super) inverse_g: Real,
     /// 2 w'/w.
-    pub(super) excess: f32,
+    pub(super) excess: Real,
     /// Derivatives in units of 2^-30: path, half of path,path; side, mixed, half of side,side.
     pub(super) path: i32,
     pub(super) path2: i32,
@@ -137,7 +140,7 @@ impl Weight {
     #[inline(always)]
     pub(super) fn at(line: &Line, w: i32) -> Self {
         let [value, path, path2] = jet(&line.value, w);
-        let [side, mixed, _] = jet(&line.side, w);
+        let [side, mixed] = tangent(&line.side, w);
         let float = to_f32(value) * WEIGHT_UNIT;
         let inverse = 1.0 / float;
         Self {
@@ -172,15 +175,15 @@ impl Weight {
 
     /// A numerator over the weight.
     #[inline(always)]
-    pub(super) const fn divide(&self, numerator: i32) -> i32 {
+    pub(super) fn divide(&self, numerator: i32) -> i32 {
         mul_q29(numerator, self.reciprocal)
     }
 }
 
 /// A quarter of `numerator' - quotient w'`: w/4 times the quotient's derivative, up to tangential parts.
 #[inline(always)]
-pub(super) const fn quarter(numerator: i32, quotient: i32, weight: i32) -> i32 {
-    (numerator >> 2).wrapping_sub(mul_hi(quotient, weight))
+pub(super) fn quarter(numerator: i32, quotient: i32, weight: i32) -> i32 {
+    subtract(quarter_of(numerator), mul_hi(quotient, weight))
 }
 
 /// A rational patch on one pass.
@@ -190,7 +193,7 @@ pub(crate) struct RationalPass<'a>(pub(super) &'a GridPass);
 #[inline(always)]
 fn axis(line: &Line, weight: &Weight, w: i32) -> [i32; 6] {
     let [value, path, path2] = jet(&line.value, w);
-    let [side, mixed, _] = jet(&line.side, w);
+    let [side, mixed] = tangent(&line.side, w);
     let s = weight.divide(value);
     [
         s,

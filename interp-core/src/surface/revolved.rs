@@ -7,9 +7,11 @@
 use super::lines::turn_cubic;
 use super::range::{BAD_PATCH, SHIFT_MAX, bound, fits_range};
 use super::{Contact, Pass, PassLine, PathSpeed};
-use crate::arith::{angle, centred, count_to_f32, inverse_sqrt, jet, mul_hi, sin_cos, to_f32};
+use crate::arith::{angle, centred, count_to_f32, inverse_sqrt, jet, mul_q31, sin_cos, to_f32};
 use crate::fault::{Fault, FaultKind, Result};
 use crate::offset::Ball;
+use crate::scalar::Operation::Add;
+use crate::scalar::{ONE, Real, ZERO, note, real};
 use crate::vec3::Vec3;
 
 /// Words of a revolved surface.
@@ -112,15 +114,10 @@ const AXIS_UNITS: i32 = 4;
 
 /// Sine and cosine of an angle in turns (units of 2^-32), in units of 2^-31; 1 is a unit less.
 #[inline(always)]
-const fn sin_cos_q31(turns: u32) -> [i32; 2] {
+fn sin_cos_q31(turns: u32) -> [i32; 2] {
+    note([Add, Add]);
     let (sin, cos) = sin_cos(turns);
     [sin.saturating_add(sin), cos.saturating_add(cos)]
-}
-
-/// A length turned by an angle: `length` times a sine in units of 2^-31, within 2 units.
-#[inline(always)]
-const fn turned(length: i32, sine: i32) -> i32 {
-    mul_hi(length, sine) << 1
 }
 
 /// The profile at one parameter: radius and height, with their first derivative and half the second, per unit of the
@@ -160,7 +157,7 @@ impl Profile {
 impl ProfilePoint {
     /// First derivatives of radius and height, and the square of their length.
     #[inline(always)]
-    fn tangent(&self) -> ([f32; 2], f32) {
+    fn tangent(&self) -> ([Real; 2], Real) {
         let ([_, radius1, _], [_, height1, _]) = (self.radius, self.height);
         let tangent = [to_f32(radius1), to_f32(height1)];
         (tangent, plane_dot(tangent, tangent))
@@ -168,14 +165,14 @@ impl ProfilePoint {
 
     /// Second derivatives.
     #[inline(always)]
-    fn bend(&self) -> [f32; 2] {
+    fn bend(&self) -> [Real; 2] {
         let ([_, _, radius2], [_, _, height2]) = (self.radius, self.height);
         [2.0 * to_f32(radius2), 2.0 * to_f32(height2)]
     }
 }
 
 #[inline(always)]
-fn plane_dot([a0, a1]: [f32; 2], [b0, b1]: [f32; 2]) -> f32 {
+fn plane_dot([a0, a1]: [Real; 2], [b0, b1]: [Real; 2]) -> Real {
     a0 * b0 + a1 * b1
 }
 
@@ -191,17 +188,17 @@ pub(crate) struct ProfilePass {
     profile: Profile,
     sin: i32,
     cos: i32,
-    sin_float: f32,
-    cos_float: f32,
+    sin_float: Real,
+    cos_float: Real,
     /// Extent of the angle, rad per side.
-    extent_rad: f32,
+    extent_rad: Real,
     /// Ball radius in units, with the sign of the side that the tool is on.
-    radius: f32,
+    radius: Real,
 }
 
 impl ProfilePass {
     /// The profile at the pass's angle, for a ball of this radius in units.
-    pub(crate) fn collapse(&mut self, words: &[i32; REVOLVED_WORDS], at: &PassLine, radius: f32) {
+    pub(crate) fn collapse(&mut self, words: &[i32; REVOLVED_WORDS], at: &PassLine, radius: Real) {
         let record = RevolvedRecord::from_words(words);
         let [sin, cos] = sin_cos_q31(angle(record.start, record.extent, at.fraction));
         *self = Self {
@@ -210,7 +207,7 @@ impl ProfilePass {
             cos,
             sin_float: to_f32(sin) * SINE_UNIT,
             cos_float: to_f32(cos) * SINE_UNIT,
-            extent_rad: count_to_f32(record.extent) * RADIANS_PER_EXTENT,
+            extent_rad: real(count_to_f32(record.extent) * RADIANS_PER_EXTENT),
             radius,
         };
     }
@@ -246,7 +243,7 @@ impl Pass for ProfilePass {
         let length = self.radius * inverse;
         let (out, up) = (-height1 * length, radius1 * length);
         Ok(Contact {
-            position: [turned(radius, self.cos), turned(radius, self.sin), height],
+            position: [mul_q31(radius, self.cos), mul_q31(radius, self.sin), height],
             offset: ball.offset(
                 Vec3::new(-height1 * self.cos_float, -height1 * self.sin_float, radius1),
                 inverse,
@@ -258,9 +255,9 @@ impl Pass for ProfilePass {
             along: 1.0 - plane_dot([out, up], bend) * inverse_e,
             lateral_squared: lateral * lateral,
             across: lateral * (lateral + self.extent_rad * out),
-            twist_squared: 0.0,
+            twist_squared: ZERO,
             speed_squared: e,
-            gauge: 1.0,
+            gauge: ONE,
         })
     }
 }
@@ -274,8 +271,8 @@ pub(crate) struct CirclePass {
     radius: i32,
     height: i32,
     /// Normal, away from the axis and up.
-    out: f32,
-    up: f32,
+    out: Real,
+    up: Real,
     /// The contact without position and offset, which is the same all around.
     shape: Contact,
 }
@@ -290,7 +287,7 @@ impl CirclePass {
         &mut self,
         words: &[i32; REVOLVED_WORDS],
         at: &PassLine,
-        radius: f32,
+        radius: Real,
     ) -> Result<()> {
         let record = RevolvedRecord::from_words(words);
         let point = Profile::new(&record, false).at(at.side);
@@ -307,7 +304,7 @@ impl CirclePass {
         let (inverse_speed, bend) = if speed > 0.0 {
             (1.0 / speed, -out * radius / circle_float)
         } else {
-            (0.0, 0.0)
+            (real(0.0), real(0.0))
         };
         *self = Self {
             start: record.start,
@@ -320,13 +317,13 @@ impl CirclePass {
             shape: Contact {
                 path: PathSpeed {
                     inverse: inverse_speed,
-                    stretch: 0.0,
+                    stretch: real(0.0),
                 },
                 along: 1.0 - bend,
                 lateral_squared: e,
                 across: e - radius * plane_dot([out, up], point.bend()),
                 speed_squared: speed * speed,
-                gauge: 1.0,
+                gauge: real(1.0),
                 ..Contact::default()
             },
         };
@@ -351,8 +348,8 @@ impl Pass for CirclePass {
         let [sin, cos] = sin_cos_q31(angle(self.start, self.extent, travelled));
         let out = self.out * SINE_UNIT;
         Ok(Contact {
-            position: [turned(self.radius, cos), turned(self.radius, sin), self.height],
-            offset: ball.offset(Vec3::new(out * to_f32(cos), out * to_f32(sin), self.up), 1.0),
+            position: [mul_q31(self.radius, cos), mul_q31(self.radius, sin), self.height],
+            offset: ball.offset(Vec3::new(out * to_f32(cos), out * to_f32(sin), self.up), ONE),
             ..self.shape
         })
     }
