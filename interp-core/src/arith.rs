@@ -384,7 +384,8 @@ pub(crate) fn sin_cos(turns: u32) -> (i32, i32) {
     }
 }
 
-#[cfg(all(test, not(feature = "count")))]
+#[cfg(not(feature = "count"))]
+#[cfg(test)]
 mod tests {
     use super::*;
     use core::f64::consts::{FRAC_PI_4, TAU};

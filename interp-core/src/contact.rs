@@ -164,6 +164,7 @@ fn path_of(arc: Real, end: &PathSpeed) -> Real {
     more - 0.5 * end.stretch * more * more
 }
 
+#[cfg(not(feature = "count"))]
 #[cfg(test)]
 mod tests {
     use super::*;

@@ -47,7 +47,8 @@ pub(crate) fn interval(density: f32) -> f32 {
     }
 }
 
-#[cfg(all(test, not(feature = "count")))]
+#[cfg(not(feature = "count"))]
+#[cfg(test)]
 mod tests {
     use super::*;
 
