@@ -531,3 +531,31 @@ fn ridge_on_which_the_path_all_but_stands() {
         assert!(ran.ripple_pct <= 0.001, "{breadth}: ripple {} %", ran.ripple_pct);
     }
 }
+
+/// Two patches of a straight line, the first at an even speed, the second at 30 + 900 w^2: the second sample on it has no neighbour that
+/// tells how the speed's slope changes.
+#[test]
+fn steps_after_a_boundary_between_speeds() {
+    let x = [0.0, 3.333, 6.666, 9.999, 19.999, 29.999, 339.999];
+    let nurbs = host_sim::job_file::NurbsSpec {
+        degree: [3, 1],
+        knots_u: vec![0.0, 0.0, 0.0, 0.0, 0.5, 0.5, 0.5, 1.0, 1.0, 1.0, 1.0],
+        knots_v: vec![0.0, 0.0, 1.0, 1.0],
+        poles_mm: x
+            .iter()
+            .map(|x| vec![[*x, 0.0, 0.0, 1.0], [*x, 5.0, 0.0, 1.0]])
+            .collect(),
+        rational: false,
+    };
+    let mut job = job(SurfaceSpec::Nurbs(nurbs), Along::U, Pattern::Zig);
+    for feed_mm_s in [99.0, 100.0, 103.0] {
+        job.feed_mm_min = 60.0 * feed_mm_s;
+        let ran = run(&job, u64::MAX);
+        assert_eq!(ran.fault, None);
+        assert!(
+            ran.ripple_pct <= 0.001,
+            "{feed_mm_s}: ripple {} %",
+            ran.ripple_pct
+        );
+    }
+}

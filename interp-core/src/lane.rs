@@ -83,7 +83,7 @@ impl Lane {
     /// Whether there is something to be made ahead.
     #[inline(always)]
     pub(crate) fn has_work(&self) -> bool {
-        self.task != Task::Done
+        !matches!(self.task, Task::Done | Task::Faulty)
     }
 
     /// Goes to the first patch of a pass.

@@ -247,12 +247,13 @@ impl Run {
     /// A share of a period's arc along the pass, by quadrature, over as many patches as it takes.
     fn step_far(&mut self, job: &Job<'_>, share: f32) -> Result<()> {
         let mut rest = real(share * job.header.feed_mm_s * job.header.period_s);
+        let mut start = self.travel.path;
         for crossings in 0..=CROSSINGS_MAX {
             let Self { travel, lane, .. } = self;
             let patch = lane.patch();
             let arc = rest * patch.per_mm;
             let end = || patch.end();
-            let covered = match contact::solve(&patch.surface, travel.fraction, &travel.path, end, arc)? {
+            let covered = match contact::solve(&patch.surface, travel.fraction, &start, end, arc)? {
                 Reach::Within(fraction) => {
                     travel.fraction = fraction;
                     return Ok(());
@@ -267,7 +268,7 @@ impl Run {
                 self.end_pass(job);
                 return Ok(());
             }
-            self.travel.path = self.lane.patch().start().checked()?;
+            start = self.lane.patch().start().checked()?;
         }
         Err(Fault::new(FaultKind::PatchTooShort, float(rest)))
     }

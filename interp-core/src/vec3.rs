@@ -4,7 +4,7 @@ use crate::arith::to_f32;
 use crate::scalar::Real;
 use core::ops::{Add, Mul, Sub};
 
-/// A vector or a derivative, mm or per mm as its name says.
+/// A vector in a patch's units, or a derivative.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(crate) struct Vec3 {
     /// Along x.

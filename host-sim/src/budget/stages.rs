@@ -69,7 +69,6 @@ impl Entry {
         }
         let module = parts.next().unwrap_or_default();
         let names: Vec<&str> = parts.collect();
-        // `collapse_axis` works for `collapse`, which it is inlined into or called by.
         let fits = |name: &str| name.is_empty() || names.iter().any(|part| is_name(part, name));
         STAGES
             .iter()

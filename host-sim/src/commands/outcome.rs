@@ -179,7 +179,7 @@ impl Outcome<'_> {
         println!("  CL off path  {:.3} um at most", report.position_nm.max * 1e-3);
         println!("  interval     {:.7} at least", findings.interval_min);
         println!(
-            "  feed ripple  {:.1e} % at most, {:.1e} % rms",
+            "  feed ripple  {:.6} % at most, {:.6} % rms",
             report.ripple_pct.max.abs(),
             report.ripple_pct.rms()
         );

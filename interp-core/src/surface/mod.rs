@@ -1,6 +1,6 @@
 //! Surfaces: from stored words to what the stages need at one point of a pass, a `Contact`.
 //!
-//! On a pass the side parameter is fixed. A surface kind therefore has two parts, both in one file:
+//! On a pass the side parameter is fixed. A surface kind therefore has two parts:
 //!
 //! * `collapse`, once a pass and patch: the patch at this side parameter becomes a handful of cubics in the path parameter;
 //! * `local`, once a sample: the cubics at a path parameter become a `Local`, whose `contact` is the same for all kinds.

@@ -1,4 +1,4 @@
-//! A bicubic polynomial patch, and its collapse to cubics on a pass.
+//! A bicubic polynomial patch, and its evaluation on a pass.
 //!
 //! Record, [`POLYNOMIAL_WORDS`] words: origin x, y, z in nm; the head word (shift, collapsed boundaries); then for each
 //! of x, y, z the 16 coefficients `c[i][j]` of `path^i side^j`, j fastest, in units of 2^-shift nm, both parameters centred

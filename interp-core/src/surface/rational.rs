@@ -1,4 +1,4 @@
-//! A rational bicubic patch `S = P / w`, and its collapse to cubics on a pass.
+//! A rational bicubic patch `S = P / w`, and its evaluation on a pass.
 //!
 //! Record, [`RATIONAL_WORDS`] words: as a polynomial patch's, with 16 more coefficients for the weight. The first three
 //! coordinates are the numerators `w (S - origin)` in units of 2^-shift nm; the weight is in units of 2^-30 and lies within
