@@ -10,6 +10,8 @@ use crate::oracle::{Offset, OracleError};
 
 /// Places within a chord at which its error is taken.
 const PROBES: u32 = 12;
+/// Share of the tolerance that they may take: of a parabola, the greatest of them is at least so much of its peak.
+const PEAK: f64 = 1.0 - 1.0 / (PROBES * PROBES) as f64;
 /// Halvings of a step that may be tried before a pass is given up.
 const HALVINGS: u32 = 40;
 /// Steps that narrow a chord's length to what the error allows: the length is within 2^-9, the error within 2^-8.
@@ -207,7 +209,7 @@ fn chord_holds(pass: &PassPath<'_>, at: &Offset, step: f64, chord_mm: f64) -> Re
         let between = place(f64::from(k) / f64::from(PROBES))?;
         let contact = from_segment(between.contact.cc_mm, at.contact.cc_mm, end.contact.cc_mm);
         let centre = from_segment(between.contact.cl_mm, at.contact.cl_mm, end.contact.cl_mm);
-        if contact.max(centre) > chord_mm {
+        if contact.max(centre) > PEAK * chord_mm {
             return Ok(false);
         }
     }

@@ -84,8 +84,12 @@ fn finite(value: f64) -> Value {
     }
 }
 
+/// Null where there is no sample.
 fn span(span: &Span) -> Value {
-    json!({ "min": finite(span.min), "mean": span.mean(), "max": span.max })
+    if !span.min.is_finite() {
+        return json!({ "min": null, "mean": null, "max": null });
+    }
+    json!({ "min": span.min, "mean": span.mean(), "max": span.max })
 }
 
 impl Outcome<'_> {
@@ -160,6 +164,9 @@ impl Outcome<'_> {
             report.cc_length_mm,
             speeds.cl_length_mm
         );
+        if self.findings.samples == 0 {
+            return;
+        }
         let feed = self.job.feed_mm_s();
         for (name, of, span) in [
             ("CC", format!(", of {feed:.3}"), &speeds.cc),

@@ -19,7 +19,6 @@ const BOUNDS: &[(&str, u32, &str)] = &[
         512,
         COPIED,
     ),
-    ("interp_core::contact::solve", 2, "NEWTON_STEPS"),
     (
         "interp_core::run::Run::step_far",
         2,

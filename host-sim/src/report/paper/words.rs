@@ -51,7 +51,7 @@ pub(super) fn opening(out: &mut String, study: &Study) {
     }
     let _ = writeln!(
         out,
-        "</p>\n<p class=\"lead\">Of the paper's numbers, those of Examples 1, 3, 4 and 5 come out to the last digit. Those of \
+        "</p>\n<p class=\"lead\">Of the paper's numbers, those of Examples 1, 4 and 5 come out to the last digit. Those of \
          Example 2 do not belong to the surface that it prints, but to a simpler one. Its rule for the length of straight \
          segments breaks its own tolerance {:.0} times over where the profile turns from convex to concave.</p>",
         of("Example 3", "chord error that eqn 6 leaves") / study.cases.revolved.job.chord_mm
