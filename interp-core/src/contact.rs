@@ -63,20 +63,30 @@ const SMOOTH: f32 = 1.0 / 256.0;
 const APART: f32 = 1.0 / 128.0;
 
 /// Arc from a fraction of the patch over `length` more, where the parametrisation is `end`: Hermite's rule of two points (error
-/// `length^5 s^(4) / 720` for a speed s), or of three (`length^7 s^(6) / 604800`). None where both are too far apart to be trusted.
-fn arc_over(surface: &Surface, from: u64, start: &PathSpeed, end: &PathSpeed, length: Real) -> Option<Real> {
+/// `length^5 s^(4) / 720` for a speed s), or of three (`length^7 s^(6) / 604800`). An error where both are too far apart to be trusted.
+fn arc_over(
+    surface: &Surface,
+    from: u64,
+    start: &PathSpeed,
+    end: &PathSpeed,
+    length: Real,
+) -> core::result::Result<Real, Real> {
     let (first, last) = (1.0 / start.inverse, 1.0 / end.inverse);
     let (rise, fall) = (first * start.stretch * length, last * end.stretch * length);
     let (sum, bow) = (first + last, rise - fall);
     let jerk = last - first - 0.5 * (rise + fall);
     let two = 0.5 * sum + bow * (1.0 / 12.0);
     if bow.abs() + 64.0 * jerk.abs() <= SMOOTH * sum {
-        return Some(length * two);
+        return Ok(length * two);
     }
     let middle = surface.path_at(from.saturating_add(fraction_from_f32(0.5 * length)));
     let three = sum * (7.0 / 30.0) + bow * (1.0 / 60.0) + 16.0 / 30.0 / middle.inverse;
     // A NaN is not to be trusted either.
-    ((two - three).abs() <= APART * three).then_some(length * three)
+    if (two - three).abs() <= APART * three {
+        Ok(length * three)
+    } else {
+        Err(length * three)
+    }
 }
 
 /// The path fraction of an arc within another, both from the same place: Hermite's cubic of the path over the arc.
@@ -118,7 +128,8 @@ pub(crate) fn solve(
     // The series is about a small part of the patch: where the arc may be all of it, the end is looked at first.
     let to_end = || -> Result<Option<(PathSpeed, Real)>> {
         let end = patch_end().checked()?;
-        Ok(arc_over(surface, from, start, &end, room).map(|covered| (end, covered)))
+        let covered = arc_over(surface, from, start, &end, room);
+        Ok(covered.ok().map(|covered| (end, covered)))
     };
     let mut end = None;
     if first > LONG_STEP || guess >= room {
@@ -140,10 +151,10 @@ pub(crate) fn solve(
         let end = surface
             .path_at(from.saturating_add(fraction_from_f32(guess)))
             .checked()?;
-        let covered = arc_over(surface, from, start, &end, guess).ok_or_else(|| refused(guess))?;
-        let correction = path_of(arc - covered, &end);
+        let covered = arc_over(surface, from, start, &end, guess);
+        let correction = path_of(arc - covered.unwrap_or_else(|untrusted| untrusted), &end);
         // Not `>`: a NaN must not pass.
-        if !(correction.abs() <= CORRECTED_MAX * guess) {
+        if covered.is_err() || !(correction.abs() <= CORRECTED_MAX * guess) {
             return Err(refused(guess + correction));
         }
         guess += correction;
