@@ -269,7 +269,7 @@ fn check_step_over(job: &JobFile, pass: &PassPath<'_>, link: &[Move]) {
             let place = cut.at(f64::from(k) / f64::from(PLACES));
             let foot = across.foot(place, side, pass.ends[0]).unwrap();
             let off = distance(place, foot.contact.cl_mm);
-            assert!(off <= 1.02 * job.chord_mm + ROUNDED_MM, "{cut:?}: {off} mm off");
+            assert!(off <= job.chord_mm + ROUNDED_MM, "{cut:?}: {off} mm off");
             side = foot.path;
         }
     }
@@ -324,7 +324,7 @@ fn job(name: &str, scallop_mm: f64) -> JobFile {
 fn of_linear(job: &JobFile) -> Bounds {
     Bounds {
         ends_mm: 0.0,
-        places_mm: 1.02 * job.chord_mm,
+        places_mm: job.chord_mm,
         mean: 1e-3,
         eighth: 0.2,
     }
@@ -333,10 +333,10 @@ fn of_linear(job: &JobFile) -> Bounds {
 /// Arcs hold the path's tolerance everywhere and the speed within 1 % of the feed.
 fn of_curve(job: &JobFile) -> Bounds {
     Bounds {
-        ends_mm: 1.02 * job.chord_mm,
-        places_mm: 1.02 * job.chord_mm,
-        mean: 2e-3,
-        eighth: 0.015,
+        ends_mm: job.chord_mm,
+        places_mm: job.chord_mm,
+        mean: 1e-3,
+        eighth: 0.01,
     }
 }
 

@@ -185,8 +185,10 @@ impl Arcs {
             nodes.iter().all(|node| {
                 let (off, share) = pieces[k].distance(place(node));
                 let beside = heights[k] + share * (heights[k + 1] - heights[k]) - node.cl_mm()[across];
-                let slow = cuts[k].speed_mm_s - self.feed_mm_s * node.at.ratio();
-                off.hypot(beside) <= self.path_mm && slow.abs() <= SPEED_SHARE * self.feed_mm_s
+                // The contact is off its feed by the same share as the centre is off its speed.
+                let wanted = self.feed_mm_s * node.at.ratio();
+                let slow = cuts[k].speed_mm_s - wanted;
+                off.hypot(beside) <= self.path_mm && slow.abs() <= SPEED_SHARE * wanted
             })
         };
         (holds(0, &nodes[..split]) && holds(1, &nodes[split..])).then_some(cuts)
