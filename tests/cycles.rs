@@ -390,9 +390,9 @@ fn no_stage_has_grown() {
     );
 }
 
-/// Jobs of a short search: none has a tick that takes more than half the period.
+/// Jobs of a short search: none has a tick that the firmware would stop for, a tenth of the period (`TICK_BUDGET_CYCLES`).
 #[test]
-fn a_short_search_finds_no_tick_beyond_half_the_period() {
+fn a_short_search_finds_no_tick_over_its_budget() {
     let path = qemu::firmware().unwrap();
     let (plan, _) = image::read(&path).unwrap();
     let mut lab = Lab::new(&Bench::new(&path, &plan).unwrap()).unwrap();
@@ -400,7 +400,7 @@ fn a_short_search_finds_no_tick_beyond_half_the_period() {
     assert!(campaign.ran >= 6, "{} jobs ran", campaign.ran);
     let found = &campaign.elite[0];
     let cycles = figures::whole(&found.worst.record, figures::Model::Pessimistic);
-    assert!(cycles < PERIOD_CYCLES / 2, "{cycles} cycles: {found:?}");
+    assert!(cycles < PERIOD_CYCLES / 10, "{cycles} cycles: {found:?}");
     let analysis = graph::analyse(&path).unwrap();
     assert!(
         lab.stack_bytes() <= analysis.stack_bytes(),

@@ -86,6 +86,13 @@ impl Lane {
         !matches!(self.task, Task::Done | Task::Faulty)
     }
 
+    /// Makes nothing more ahead on this patch.
+    #[cfg(not(feature = "count"))]
+    #[cfg(test)]
+    pub(crate) fn rest(&mut self) {
+        self.task = Task::Faulty;
+    }
+
     /// Goes to the first patch of a pass.
     ///
     /// # Errors

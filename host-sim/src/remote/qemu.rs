@@ -17,8 +17,8 @@ const MACHINE: &str = "netduinoplus2";
 /// Deterministic time: 8 ns an instruction, and sleeping costs none.
 const CLOCK: &str = "shift=3,sleep=off";
 
-/// Time in which QEMU has to open its socket.
-const START_TIMEOUT: Duration = Duration::from_secs(20);
+/// Time in which QEMU has to open its socket: at once, but a machine may be busy or slow to read the program.
+const START_TIMEOUT: Duration = Duration::from_secs(120);
 
 /// Why QEMU does not run.
 #[derive(Debug, thiserror::Error)]
@@ -204,9 +204,15 @@ impl Qemu {
             if let Ok(stream) = UnixStream::connect(socket) {
                 return Ok(stream);
             }
-            let ended = self.child.try_wait().ok().flatten().is_some();
-            if ended || Instant::now() > deadline {
-                return Err(QemuError::Start(self.last_words()));
+            if let Some(status) = self.child.try_wait().ok().flatten() {
+                return Err(QemuError::Start(format!("{status} {}", self.last_words())));
+            }
+            if Instant::now() > deadline {
+                let words = self.last_words();
+                return Err(QemuError::Start(format!(
+                    "it did not open its serial line within {} s; is the machine very busy? {words}",
+                    START_TIMEOUT.as_secs()
+                )));
             }
             std::thread::sleep(Duration::from_millis(5));
         }
