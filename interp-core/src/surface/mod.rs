@@ -167,23 +167,6 @@ fn stretch(path: &[i32; 3], path2: &[i32; 3], inverse_e: Real, excess: Real) -> 
 }
 
 impl Local {
-    /// Of three coordinates, each as position, path, path2, side, mixed, side2; and g, 1/g and the excess.
-    #[inline(always)]
-    const fn of([x, y, z]: [[i32; 6]; 3], [g, inverse_g, excess]: [Real; 3]) -> Self {
-        let ([x0, x1, x2, xs, xm, xx], [y0, y1, y2, ys, ym, yy], [z0, z1, z2, zs, zm, zz]) = (x, y, z);
-        Self {
-            position: [x0, y0, z0],
-            path: [x1, y1, z1],
-            side: [xs, ys, zs],
-            path2: [x2, y2, z2],
-            mixed: [xm, ym, zm],
-            side2: [xx, yy, zz],
-            g,
-            inverse_g,
-            excess,
-        }
-    }
-
     /// The contact's differential geometry (Lo 1998, eqns 9 to 11). With E, F, G, L, M, N the fundamental forms, W^2 = EG -
     /// F^2 and d = B - (F/E) A: lateral speed^2 = |d|^2 = W^2/E, II(d, d) = N - 2 M F/E + L (F/E)^2, II(t, d) = (M - L F/E)/sqrt E.
     ///

@@ -110,7 +110,8 @@ impl PolePass<'_> {
     #[inline(always)]
     fn local(&self, w: i32) -> Local {
         let weight = Weight::at(&self.0.weight, w);
-        weight.local(self.axes().map(|axis| axis.at(&weight, w)))
+        let [x, y, z] = self.axes();
+        weight.local(x.at(&weight, w), y.at(&weight, w), z.at(&weight, w))
     }
 }
 

@@ -81,19 +81,29 @@ pub(crate) struct ExtrudedPass<'a>(pub(super) &'a GridPass);
 #[inline(always)]
 fn local<const MIXED: bool, const SIDE2: bool>(pass: &GridPass, fraction: u64) -> Local {
     let w = centred(fraction);
-    let axis = |line: &Line| {
-        let [value, path, path2] = jet(&line.value, w);
-        let [side, mixed] = if MIXED {
+    let [x, y, z] = &pass.axes;
+    let side = |line: &Line| {
+        if MIXED {
             tangent(&line.side, w)
         } else {
             let [constant, ..] = line.side;
             [constant, 0]
-        };
-        let side2 = if SIDE2 { cubic(&line.side2, w) } else { 0 };
-        [value, path, path2, side, mixed, side2]
+        }
     };
-    let [x, y, z] = &pass.axes;
-    Local::of([axis(x), axis(y), axis(z)], [ONE, ONE, ZERO])
+    let side2 = |line: &Line| if SIDE2 { cubic(&line.side2, w) } else { 0 };
+    let ([x0, x1, x2], [y0, y1, y2], [z0, z1, z2]) = (jet(&x.value, w), jet(&y.value, w), jet(&z.value, w));
+    let ([xs, xm], [ys, ym], [zs, zm]) = (side(x), side(y), side(z));
+    Local {
+        position: [x0, y0, z0],
+        path: [x1, y1, z1],
+        side: [xs, ys, zs],
+        path2: [x2, y2, z2],
+        mixed: [xm, ym, zm],
+        side2: [side2(x), side2(y), side2(z)],
+        g: ONE,
+        inverse_g: ONE,
+        excess: ZERO,
+    }
 }
 
 impl PolynomialPass<'_> {

@@ -156,10 +156,21 @@ impl Weight {
         }
     }
 
-    /// [`Local::of`] three coordinates with this weight.
+    /// A [`Local`] of three coordinates: of each position, path, path2, side, mixed, side2.
     #[inline(always)]
-    pub(super) const fn local(&self, axes: [[i32; 6]; 3]) -> Local {
-        Local::of(axes, [self.g, self.inverse_g, self.excess])
+    pub(super) const fn local(&self, x: [i32; 6], y: [i32; 6], z: [i32; 6]) -> Local {
+        let ([x0, x1, x2, xs, xm, xx], [y0, y1, y2, ys, ym, yy], [z0, z1, z2, zs, zm, zz]) = (x, y, z);
+        Local {
+            position: [x0, y0, z0],
+            path: [x1, y1, z1],
+            side: [xs, ys, zs],
+            path2: [x2, y2, z2],
+            mixed: [xm, ym, zm],
+            side2: [xx, yy, zz],
+            g: self.g,
+            inverse_g: self.inverse_g,
+            excess: self.excess,
+        }
     }
 
     /// A numerator over the weight.
@@ -208,7 +219,7 @@ impl RationalPass<'_> {
         let w = centred(fraction);
         let weight = Weight::at(&self.0.weight, w);
         let [x, y, z] = &self.0.axes;
-        weight.local([x, y, z].map(|line| axis(line, &weight, w)))
+        weight.local(axis(x, &weight, w), axis(y, &weight, w), axis(z, &weight, w))
     }
 }
 
