@@ -1,7 +1,7 @@
 //! Messages of any content, for properties.
 
 use interp_core::{
-    job::{Header, Pattern, SurfaceKind, ToolSide},
+    job::{Header, Pattern, Spacing, SurfaceKind, ToolSide},
     sample::{Place, Sample, State},
 };
 use proptest::prelude::*;
@@ -22,11 +22,12 @@ fn real() -> impl Strategy<Value = f32> {
 }
 
 prop_compose! {
-    fn any_header()(codes in (0_u8..4, any::<bool>(), any::<bool>()), spans in any::<[u16; 2]>(),
+    fn any_header()(codes in (0_u8..4, any::<bool>(), any::<bool>(), any::<bool>()), spans in any::<[u16; 2]>(),
                     values in [real(), real(), real(), real()]) -> Header {
         Header {
             kind: SurfaceKind::from_code(codes.0).unwrap(),
             pattern: if codes.1 { Pattern::Zigzag } else { Pattern::Zig },
+            spacing: if codes.3 { Spacing::FirstOrder } else { Spacing::Exact },
             tool_side: if codes.2 { ToolSide::Minus } else { ToolSide::Plus },
             path_spans: spans[0],
             side_spans: spans[1],

@@ -1,7 +1,7 @@
 //! Faults are states: each kind that a surface can cause, with its code, value and place; the position is kept.
 #![allow(clippy::unwrap_used, reason = "a test may fail by panic")]
 
-use host_sim::job_file::{Along, JobFile, Pattern, Side, SurfaceSpec};
+use host_sim::job_file::{Along, JobFile, Pattern, Side, Spacing, SurfaceSpec};
 use host_sim::prepare::{Prepared, prepare};
 use interp_core::interpolator::STOP_PERIODS;
 use interp_core::{Fault, FaultKind, Interpolator, Place, Request, Sample, State};
@@ -15,6 +15,7 @@ fn job(surface: SurfaceSpec, radius_mm: f64) -> JobFile {
         along: Along::U,
         side: Side::Plus,
         pattern: Pattern::Zig,
+        spacing: Spacing::Exact,
         chord_mm: 0.005,
         machine: Default::default(),
         origin: Default::default(),

@@ -21,6 +21,8 @@ fn job(case: &Case) -> JobFile {
     job.along = if case.along == "u" { Along::U } else { Along::V };
     job.radius_mm = case.radius_mm;
     job.scallop_mm = case.scallop_mm;
+    // The table's schedules are the paper's.
+    job.spacing = host_sim::job_file::Spacing::FirstOrder;
     job.side = if case.tool_side > 0.0 {
         host_sim::job_file::Side::Plus
     } else {

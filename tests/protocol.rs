@@ -11,7 +11,7 @@ use any_message::{any_reply, any_request};
 use controller::link::Link;
 use integration_tests::{HELLO, Mock, frame, is_bad_frame};
 use interp_core::{
-    job::{Header, Pattern, SurfaceKind, ToolSide},
+    job::{Header, Pattern, Spacing, SurfaceKind, ToolSide},
     sample::{Place, Sample, State},
 };
 use proptest::prelude::*;
@@ -27,6 +27,7 @@ fn header() -> Header {
     Header {
         kind: SurfaceKind::Rational,
         pattern: Pattern::Zigzag,
+        spacing: Spacing::FirstOrder,
         tool_side: ToolSide::Minus,
         path_spans: 3,
         side_spans: 200,

@@ -1,7 +1,7 @@
 //! Random surfaces, also nearly degenerate ones: every sample is right, or the fault that stopped the run is.
 #![allow(clippy::unwrap_used, reason = "a test may fail by panic")]
 
-use host_sim::job_file::{Along, JobFile, Pattern, Side, SurfaceSpec};
+use host_sim::job_file::{Along, JobFile, Pattern, Side, Spacing, SurfaceSpec};
 use host_sim::machine::Machine;
 use host_sim::oracle::Oracle;
 use host_sim::prepare::prepare;
@@ -75,6 +75,7 @@ fn job(surface: SurfaceSpec, along: Along, pattern: Pattern) -> JobFile {
         along,
         side: Side::Plus,
         pattern,
+        spacing: Spacing::Exact,
         chord_mm: 0.005,
         machine: Default::default(),
         origin: Default::default(),

@@ -6,7 +6,9 @@
 //! parameter, and the root and quotient that make an interval of the greatest density.
 
 use counted_core::scalar::{Tally, tally};
-use counted_core::{Fault, Header, Interpolator, Pattern, Request, Sample, State, SurfaceKind, ToolSide};
+use counted_core::{
+    Fault, Header, Interpolator, Pattern, Request, Sample, Spacing, State, SurfaceKind, ToolSide,
+};
 
 use crate::budget::{SURFACES, TICKS};
 use crate::job_file::JobFile;
@@ -122,6 +124,10 @@ fn header(header: &interp_core::Header) -> Header {
         pattern: match header.pattern {
             interp_core::Pattern::Zig => Pattern::Zig,
             interp_core::Pattern::Zigzag => Pattern::Zigzag,
+        },
+        spacing: match header.spacing {
+            interp_core::Spacing::Exact => Spacing::Exact,
+            interp_core::Spacing::FirstOrder => Spacing::FirstOrder,
         },
         tool_side: match header.tool_side {
             interp_core::ToolSide::Plus => ToolSide::Plus,

@@ -71,6 +71,18 @@ pub enum Pattern {
     Zigzag = 1,
 }
 
+/// How far apart passes lie for the scallop height.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[repr(u8)]
+pub enum Spacing {
+    /// As far as the height allows over the gap to the next pass: lengths and curvatures are looked at there, and the ball is round.
+    #[default]
+    Exact = 0,
+    /// By the paper's interval at the pass alone (eqns 10 and 11). The height may be exceeded, by a percent or two where the surface
+    /// changes from pass to pass, by more at the ends of skew passes.
+    FirstOrder = 1,
+}
+
 /// Side of the surface that the tool is on.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[repr(u8)]
@@ -89,6 +101,8 @@ pub struct Header {
     pub kind: SurfaceKind,
     /// Order of the passes.
     pub pattern: Pattern,
+    /// How far apart the passes lie.
+    pub spacing: Spacing,
     /// Side of the surface that the tool is on.
     pub tool_side: ToolSide,
     /// Spans along the path parameter, 1 to [`SPANS_MAX`] (1 for a revolved surface).

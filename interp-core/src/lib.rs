@@ -51,6 +51,7 @@
 #[cfg(any(test, feature = "count"))]
 extern crate std;
 
+mod across;
 mod arith;
 mod contact;
 pub mod encode;
@@ -75,5 +76,5 @@ mod vec3;
 
 pub use fault::{Fault, FaultKind};
 pub use interpolator::{Interpolator, Probe, Request};
-pub use job::{Header, Pattern, STORE_WORDS, SurfaceKind, ToolSide};
+pub use job::{Header, Pattern, STORE_WORDS, Spacing, SurfaceKind, ToolSide};
 pub use sample::{Place, Sample, State};

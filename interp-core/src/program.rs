@@ -79,6 +79,7 @@ impl Program {
         const HEADER: Header = Header {
             kind: SurfaceKind::Polynomial,
             pattern: crate::job::Pattern::Zig,
+            spacing: crate::job::Spacing::Exact,
             tool_side: crate::job::ToolSide::Plus,
             path_spans: 0,
             side_spans: 0,

@@ -1,10 +1,11 @@
 //! A run of a job, sample by sample: the one file that chains the stages.
 
+use crate::across::{self, Across, Densities};
 use crate::arith::{advanced, dot_hi};
 use crate::contact::{self, Reach};
 use crate::fault::{Fault, FaultKind, Result};
 use crate::interval::interval;
-use crate::job::Pattern;
+use crate::job::{Pattern, Spacing};
 use crate::lane::{Lane, Line};
 use crate::patch::Patch;
 use crate::program::Job;
@@ -48,8 +49,9 @@ struct Travel {
     stretch_before: Real,
     /// r N at the last sample, in the ball's units.
     offset: [i32; 3],
-    /// Greatest density of the pass.
+    /// Greatest density of the pass, and what it would be on a flat surface.
     most: f32,
+    level: f32,
     /// Samples so far.
     ticks: u32,
     pass: u32,
@@ -61,10 +63,13 @@ struct Travel {
 pub(crate) struct Run {
     travel: Travel,
     lane: Lane,
+    across: Across,
     /// r N at the pass's first sample.
     first_offset: [i32; 3],
     /// Least interval of the pass that was finished last, in units of the side parameter.
     last_interval: f32,
+    /// How far from it the next pass lies.
+    step_over: f32,
 }
 
 impl Travel {
@@ -80,6 +85,7 @@ impl Travel {
         stretch_before: Real::NAN,
         offset: [0; 3],
         most: 0.0,
+        level: 0.0,
         ticks: 0,
         pass: 0,
         side: Place { span: 0, fraction: 0 },
@@ -116,6 +122,7 @@ impl Travel {
         let density = patch.interval.density(&contact);
         if density > self.most {
             self.most = density;
+            self.level = patch.interval.level(&contact);
         }
         self.offset = contact.offset;
         self.stretch_before = self.path.stretch;
@@ -141,13 +148,16 @@ impl Run {
     pub(crate) const START: Self = Self {
         travel: Travel::START,
         lane: Lane::START,
+        across: Across::START,
         first_offset: [0; 3],
         last_interval: f32::INFINITY,
+        step_over: f32::INFINITY,
     };
 
     /// Back to the start.
     pub(crate) fn restart(&mut self) {
         self.travel = Travel::START;
+        self.across.restart();
         self.last_interval = f32::INFINITY;
     }
 
@@ -185,6 +195,8 @@ impl Run {
                 self.sample(last)?;
                 if self.lane.has_work() {
                     self.lane.work(job, &self.travel.line());
+                } else if self.travel.ticks % across::EVERY == 1 {
+                    self.look_across(job);
                 }
                 return Ok(true);
             }
@@ -207,16 +219,17 @@ impl Run {
                 self.step_over(job)?;
                 self.begin_pass(job)?;
             }
-            Next::End => {
-                self.note_interval();
-                return Ok(false);
-            }
+            Next::End => return Ok(false),
         }
         self.sample(last)?;
         let travel = &self.travel;
         if begins {
             self.first_offset = travel.offset;
         }
+        if travel.next != Next::Along {
+            self.close_pass(job);
+        }
+        let travel = &self.travel;
         last.pass = travel.pass;
         last.path.span = travel.span;
         last.side = travel.side;
@@ -310,21 +323,35 @@ impl Run {
         travel.most = 0.0;
         travel.next = Next::Along;
         travel.path.stretch = Real::NAN;
+        self.across.begin();
         self.lane.begin(job, &travel.line())
     }
 
-    /// Least interval of the pass that is over, in units of the side parameter.
-    fn note_interval(&mut self) {
-        self.last_interval = interval(self.travel.most);
+    /// One look at the line a step-over further.
+    #[inline(never)]
+    fn look_across(&mut self, job: &Job<'_>) {
+        let Self {
+            travel, lane, across, ..
+        } = self;
+        across.work(job, &travel.line(), lane.patch(), travel.fraction, travel.most);
+    }
+
+    /// The pass is over: its least interval, and the step to the next one.
+    fn close_pass(&mut self, job: &Job<'_>) {
+        let Travel { most, level, .. } = self.travel;
+        self.last_interval = interval(most);
+        self.step_over = match job.header.spacing {
+            Spacing::Exact => self.across.step(job.header, Densities { most, level }),
+            Spacing::FirstOrder => self.last_interval,
+        };
     }
 
     /// The side place of the next pass; its first sample is a neighbour of the last pass's first, or of its last where the
     /// passes run to and fro.
     fn step_over(&mut self, job: &Job<'_>) -> Result<()> {
-        self.note_interval();
         let travel = &mut self.travel;
         let width = |span| job.side_width(span);
-        travel.side = schedule::next_side(travel.side, self.last_interval, job.header.side_spans, width)?;
+        travel.side = schedule::next_side(travel.side, self.step_over, job.header.side_spans, width)?;
         travel.pass = travel.pass.wrapping_add(1);
         if job.header.pattern == Pattern::Zig {
             travel.offset = self.first_offset;
@@ -405,6 +432,9 @@ mod tests {
             let mut patches = 0;
             loop {
                 late.lane.rest();
+                // What lies across is looked at in ticks that have nothing to make ahead; which they are is not the same.
+                ahead.across.rest();
+                late.across.rest();
                 let more = ahead.advance(&job, &mut here).unwrap();
                 assert_eq!(late.advance(&job, &mut there).unwrap(), more);
                 if !more {

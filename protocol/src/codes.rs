@@ -2,7 +2,7 @@
 //! bytes, low byte first. Each submodule is a serde `with`.
 
 use interp_core::{
-    job::{Pattern, SurfaceKind, ToolSide},
+    job::{Pattern, Spacing, SurfaceKind, ToolSide},
     sample::State,
 };
 
@@ -31,6 +31,11 @@ code_byte!(pattern, Pattern, |code| {
     [Pattern::Zig, Pattern::Zigzag]
         .into_iter()
         .find(|pattern| *pattern as u8 == code)
+});
+code_byte!(spacing, Spacing, |code| {
+    [Spacing::Exact, Spacing::FirstOrder]
+        .into_iter()
+        .find(|spacing| *spacing as u8 == code)
 });
 code_byte!(tool_side, ToolSide, |code| {
     [ToolSide::Plus, ToolSide::Minus]

@@ -6,7 +6,7 @@
 use heapless::{String, Vec};
 use interp_core::{
     fault::{Fault, FaultKind},
-    job::{Header, Pattern, SurfaceKind, ToolSide},
+    job::{Header, Pattern, Spacing, SurfaceKind, ToolSide},
     sample::{Place, Sample, State},
 };
 use serde::{Deserialize, Deserializer, Serialize, Serializer, de, ser::SerializeSeq};
@@ -201,6 +201,8 @@ pub(crate) struct HeaderFields {
     kind: SurfaceKind,
     #[serde(with = "codes::pattern")]
     pattern: Pattern,
+    #[serde(with = "codes::spacing")]
+    spacing: Spacing,
     #[serde(with = "codes::tool_side")]
     tool_side: ToolSide,
     path_spans: u16,

@@ -15,7 +15,7 @@ use cycle_plugin::plan::Stage;
 
 /// A module of `interp_core` (a function in it, or all of it) and its stage; the first that fits counts. What is renamed there
 /// is renamed here: a name that occurs nowhere in the image is an error.
-const STAGES: [(&str, &str, Stage); 16] = [
+const STAGES: [(&str, &str, Stage); 18] = [
     ("contact", "", Stage::Step),
     ("surface", "collapse", Stage::PatchChange),
     ("surface", "", Stage::Surface),
@@ -23,12 +23,14 @@ const STAGES: [(&str, &str, Stage); 16] = [
     ("interval", "", Stage::Interval),
     ("patch", "", Stage::PatchChange),
     ("schedule", "", Stage::PassChange),
+    ("across", "", Stage::PassChange),
     ("run", "step_far", Stage::Step),
     ("lane", "", Stage::PatchChange),
     ("run", "next_span", Stage::PatchChange),
     ("run", "begin_pass", Stage::PassChange),
     ("run", "step_over", Stage::PassChange),
-    ("run", "note_interval", Stage::PassChange),
+    ("run", "look_across", Stage::PassChange),
+    ("run", "close_pass", Stage::PassChange),
     ("run", "end_pass", Stage::PassChange),
     ("run", "", Stage::Rest),
     ("interpolator", "", Stage::Rest),

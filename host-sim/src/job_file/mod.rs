@@ -65,6 +65,15 @@ pub enum Pattern {
     Zigzag,
 }
 
+/// How far apart passes lie for the scallop height.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Spacing {
+    /// As far as the height allows over the gap to the next pass.
+    Exact,
+    /// By the paper's interval at the pass alone, which may exceed the height.
+    FirstOrder,
+}
+
 /// The machine that is to run the job. Where a limit is `None`, the file gave none.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Machine {
@@ -120,6 +129,8 @@ pub struct JobFile {
     pub side: Side,
     /// Order of the passes.
     pub pattern: Pattern,
+    /// How far apart the passes lie.
+    pub spacing: Spacing,
     /// Chord error limit delta, mm, above 0, below the ball radius; for the approaches that cut chords.
     pub chord_mm: f64,
     /// The machine.
@@ -159,6 +170,7 @@ impl JobFile {
                 "along",
                 "side",
                 "pattern",
+                "spacing",
                 "chord_mm",
             ],
             &[],
@@ -187,6 +199,13 @@ impl JobFile {
             pattern: match cut.has("pattern") {
                 true => cut.choice("pattern", &[("zig", Pattern::Zig), ("zigzag", Pattern::Zigzag)])?,
                 false => Pattern::Zig,
+            },
+            spacing: match cut.has("spacing") {
+                true => cut.choice(
+                    "spacing",
+                    &[("exact", Spacing::Exact), ("first-order", Spacing::FirstOrder)],
+                )?,
+                false => Spacing::Exact,
             },
             chord_mm: match cut.has("chord_mm") {
                 true => below_radius("chord_mm", "give the chord error limit in mm, e.g. 0.005")?,

@@ -4,7 +4,7 @@ use std::fmt;
 
 use super::surface::{Derivatives, Surface};
 use super::vector::{Vector, add, cross, dot, length, scale};
-use crate::job_file::{Along, JobFile, Pattern, Side};
+use crate::job_file::{Along, JobFile, Pattern, Side, Spacing};
 
 /// A first derivative shorter than this share of the other one (each times its range) marks a pole, where the patch's
 /// edge collapses to a point. Rounding leaves some 1e-15 there; a proper surface keeps above 1e-4.
@@ -120,6 +120,8 @@ pub struct Oracle {
     pub radius_mm: f64,
     /// Scallop height limit h, mm.
     pub scallop_mm: f64,
+    /// How far apart the passes lie.
+    pub spacing: Spacing,
     /// Sampling period T, s.
     pub period_s: f64,
 }
@@ -143,6 +145,7 @@ impl Oracle {
             normal_sign,
             radius_mm: job.radius_mm,
             scallop_mm: job.scallop_mm,
+            spacing: job.spacing,
             period_s: job.machine.period_s(),
         })
     }

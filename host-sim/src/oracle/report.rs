@@ -73,7 +73,7 @@ pub struct Report {
     /// Emitted interval candidate / oracle's - 1, where either is shorter than the side range.
     pub interval: Figure,
     /// (side parameter of a pass - (that of the pass before + its least interval)) / that interval. The sum is cut at
-    /// the boundary; the least is taken over the emitted samples.
+    /// the boundary; the least is taken over the emitted samples. Of passes that are spaced by the first order only.
     pub side_step: Figure,
     /// Largest scallop height after each pass by Lo's formula (eqn 11), mm: h times (actual / candidate interval)^2.
     pub scallop_mm: Figure,

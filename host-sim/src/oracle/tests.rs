@@ -3,7 +3,7 @@
 use std::f64::consts::{FRAC_PI_2, FRAC_PI_3, PI};
 
 use super::*;
-use crate::job_file::{Along, JobFile, Machine, NurbsSpec, Origin, Pattern, Side, SurfaceSpec};
+use crate::job_file::{Along, JobFile, Machine, NurbsSpec, Origin, Pattern, Side, Spacing, SurfaceSpec};
 
 /// A job on a surface with a ball of 5 mm and a scallop of 0.005 mm.
 fn job(surface: SurfaceSpec, along: Along, side: Side) -> JobFile {
@@ -15,6 +15,7 @@ fn job(surface: SurfaceSpec, along: Along, side: Side) -> JobFile {
         along,
         side,
         pattern: Pattern::Zig,
+        spacing: Spacing::Exact,
         chord_mm: 0.005,
         machine: Machine::default(),
         origin: Origin::default(),
@@ -371,6 +372,7 @@ fn short_job(name: &str, pattern: Pattern) -> (Oracle, Vec<Emitted>) {
     let job = JobFile {
         scallop_mm: 0.2,
         pattern,
+        spacing: Spacing::FirstOrder,
         ..sample_job(name)
     };
     let oracle = Oracle::new(&job).unwrap();

@@ -3,7 +3,7 @@
 use super::contact::Oracle;
 use super::report::{Report, Spot};
 use super::vector::{angle, length, scale, subtract};
-use crate::job_file::Pattern;
+use crate::job_file::{Pattern, Spacing};
 
 /// Nanometres in a millimetre.
 const NM_PER_MM: f64 = 1e6;
@@ -124,9 +124,11 @@ impl Verifier {
             None => self.report.first_on_boundary = side == first && sample.pass == 0,
             Some(before) => {
                 let interval = before.least_interval.min(last - before.side);
-                self.report
-                    .side_step
-                    .add((side - (before.side + interval)) / interval, spot);
+                if self.oracle.spacing == Spacing::FirstOrder {
+                    self.report
+                        .side_step
+                        .add((side - (before.side + interval)) / interval, spot);
+                }
                 self.close_scallop(&before, side - before.side);
                 if !before.finished || sample.pass != self.report.passes {
                     self.report.off_boundary += 1;

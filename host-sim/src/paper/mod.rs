@@ -20,7 +20,7 @@ pub mod geometry;
 pub mod table_1;
 
 use crate::approach::ApproachError;
-use crate::job_file::JobFile;
+use crate::job_file::{JobFile, Spacing};
 use crate::operations;
 use crate::oracle::Oracle;
 
@@ -81,9 +81,11 @@ pub struct Case {
 }
 
 impl Case {
-    fn new(name: &'static str, text: &str) -> Result<Self, ApproachError> {
+    /// `spacing`: the paper's own examples have the paper's.
+    fn new(name: &'static str, text: &str, spacing: Spacing) -> Result<Self, ApproachError> {
         let file = format!("jobs/{name}.toml");
-        let job = JobFile::parse(&file, text).map_err(|error| ApproachError::Fault(error.to_string()))?;
+        let mut job = JobFile::parse(&file, text).map_err(|error| ApproachError::Fault(error.to_string()))?;
+        job.spacing = spacing;
         let oracle = Oracle::new(&job)?;
         Ok(Self { name, job, oracle })
     }
@@ -119,15 +121,25 @@ impl Cases {
     /// # Errors
     /// None that these jobs cause.
     pub fn new() -> Result<Self, ApproachError> {
+        let paper = Spacing::FirstOrder;
         Ok(Self {
-            revolved: Case::new("revolved", include_str!("../../../jobs/revolved.toml"))?,
-            revolved_v: Case::new("revolved_v", include_str!("../../../jobs/revolved_v.toml"))?,
-            printed: Case::new("ruled_printed", include_str!("../../../jobs/ruled_printed.toml"))?,
+            revolved: Case::new("revolved", include_str!("../../../jobs/revolved.toml"), paper)?,
+            revolved_v: Case::new("revolved_v", include_str!("../../../jobs/revolved_v.toml"), paper)?,
+            printed: Case::new(
+                "ruled_printed",
+                include_str!("../../../jobs/ruled_printed.toml"),
+                paper,
+            )?,
             reconstructed: Case::new(
                 "ruled_reconstructed",
                 include_str!("../../../jobs/ruled_reconstructed.toml"),
+                paper,
             )?,
-            freeform: Case::new("freeform", include_str!("../../../jobs/freeform.toml"))?,
+            freeform: Case::new(
+                "freeform",
+                include_str!("../../../jobs/freeform.toml"),
+                Spacing::Exact,
+            )?,
         })
     }
 }

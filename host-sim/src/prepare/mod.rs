@@ -9,7 +9,7 @@ mod grid;
 mod patches;
 
 use interp_core::sample::Place;
-use interp_core::{Header, Pattern, SurfaceKind, ToolSide, encode};
+use interp_core::{Header, Pattern, Spacing, SurfaceKind, ToolSide, encode};
 
 use crate::job_file::{self, Along, JobFile, JobFileError, SurfaceSpec};
 use crate::oracle::Oracle;
@@ -104,6 +104,10 @@ pub fn prepare(job: &JobFile) -> Result<Prepared, JobFileError> {
         pattern: match job.pattern {
             job_file::Pattern::Zig => Pattern::Zig,
             job_file::Pattern::Zigzag => Pattern::Zigzag,
+        },
+        spacing: match job.spacing {
+            job_file::Spacing::Exact => Spacing::Exact,
+            job_file::Spacing::FirstOrder => Spacing::FirstOrder,
         },
         tool_side: if along_path > 0.0 {
             ToolSide::Plus

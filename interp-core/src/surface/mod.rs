@@ -74,6 +74,8 @@ pub(crate) struct Contact {
     pub(crate) across: Real,
     /// Square of the lateral speed |(N x t) . S_side|, (g units)^2 per side^2.
     pub(crate) lateral_squared: Real,
+    /// 1 - r k along the side line, times the square of the side derivative's length, likewise.
+    pub(crate) outwards: Real,
     /// Square of r times geodesic torsion times lateral speed, (g units)^2 per side^2.
     pub(crate) twist_squared: Real,
     /// |A|^2, (g units)^2.
@@ -215,6 +217,13 @@ impl Local {
         } else {
             b * b * side.dot(side)
         };
+        let side_squared = b * b * side.dot(side);
+        let (across, outwards) = if SIDE2 {
+            let n = b * (to_f32(dot_hi(&offset, &self.side2)) * product);
+            (lateral_squared - (n - sheared), side_squared - n)
+        } else {
+            (lateral_squared + sheared, side_squared)
+        };
         Ok(Contact {
             position: self.position,
             offset,
@@ -224,12 +233,8 @@ impl Local {
             },
             along: 1.0 - l * inverse_e * inverse_a,
             lateral_squared,
-            across: if SIDE2 {
-                let n = b * (to_f32(dot_hi(&offset, &self.side2)) * product);
-                lateral_squared - (n - sheared)
-            } else {
-                lateral_squared + sheared
-            },
+            across,
+            outwards,
             twist_squared: twist * twist,
             speed_squared: a * a * e,
             gauge: self.inverse_g * self.inverse_g,
@@ -325,11 +330,13 @@ impl Surface {
     ///
     /// # Errors
     /// Those of [`Pass::contact`].
+    #[inline(never)]
     pub(crate) fn contact(&self, fraction: u64, ball: &Ball) -> Result<Contact> {
         match self.pass() {
-            AnyPass::Polynomial(pass) => pass.contact(fraction, ball),
-            AnyPass::Ruled(pass) => pass.contact(fraction, ball),
-            AnyPass::Extruded(pass) => pass.contact(fraction, ball),
+            // To the bit the same, see there.
+            AnyPass::Polynomial(PolynomialPass(pass))
+            | AnyPass::Ruled(RuledPass(pass))
+            | AnyPass::Extruded(ExtrudedPass(pass)) => PolynomialPass(pass).contact(fraction, ball),
             AnyPass::Rational(pass) => pass.contact(fraction, ball),
             AnyPass::Pole(pass) => pass.contact(fraction, ball),
             AnyPass::Profile(pass) => pass.contact(fraction, ball),

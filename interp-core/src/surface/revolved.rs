@@ -255,6 +255,7 @@ impl Pass for ProfilePass {
             along: 1.0 - plane_dot([out, up], bend) * inverse_e,
             lateral_squared: lateral * lateral,
             across: lateral * (lateral + self.extent_rad * out),
+            outwards: lateral * (lateral + self.extent_rad * out),
             twist_squared: ZERO,
             speed_squared: e,
             gauge: ONE,
@@ -322,6 +323,7 @@ impl CirclePass {
                 along: 1.0 - bend,
                 lateral_squared: e,
                 across: e - radius * plane_dot([out, up], point.bend()),
+                outwards: e - radius * plane_dot([out, up], point.bend()),
                 speed_squared: speed * speed,
                 gauge: real(1.0),
                 ..Contact::default()

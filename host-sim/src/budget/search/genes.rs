@@ -2,7 +2,7 @@
 
 use fastrand::Rng;
 
-use crate::job_file::{Along, JobFile, Machine, NurbsSpec, Pattern, Side, SurfaceSpec};
+use crate::job_file::{Along, JobFile, Machine, NurbsSpec, Pattern, Side, Spacing, SurfaceSpec};
 
 /// Numbers of a job.
 const GENES: usize = 18;
@@ -166,6 +166,7 @@ impl Genes {
             } else {
                 Pattern::Zigzag
             },
+            spacing: Spacing::Exact,
             chord_mm: 0.5 * radius_mm,
             machine: Machine::default(),
             origin: crate::job_file::Origin::default(),

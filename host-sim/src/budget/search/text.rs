@@ -2,7 +2,7 @@
 
 use std::fmt::Write;
 
-use crate::job_file::{Along, JobFile, Pattern, Side, SurfaceSpec};
+use crate::job_file::{Along, JobFile, Pattern, Side, Spacing, SurfaceSpec};
 
 /// Text of a number: the shortest that reads back as the same.
 fn number(value: f64) -> String {
@@ -103,6 +103,9 @@ pub fn text(job: &JobFile, comment: &str) -> String {
         number(job.feed_mm_min),
         number(job.scallop_mm)
     );
+    if job.spacing == Spacing::FirstOrder {
+        text.push_str("spacing = \"first-order\"\n");
+    }
     let _ = writeln!(
         text,
         "chord_mm = {}\n\n[machine]\nperiod_us = {}",
