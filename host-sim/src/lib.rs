@@ -27,6 +27,7 @@ pub mod machine;
 pub mod operations;
 pub mod oracle;
 pub mod paper;
+pub mod placement;
 pub mod prepare;
 pub mod remote;
 pub mod report;

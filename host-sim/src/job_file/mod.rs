@@ -9,6 +9,7 @@
 //! finite and in its documented range, but whether the ball fits the surface is not known here.
 
 mod error;
+mod placement;
 mod section;
 mod surface;
 #[cfg(test)]
@@ -106,7 +107,7 @@ impl Machine {
 /// A job as its file states it.
 #[derive(Clone, Debug, PartialEq)]
 pub struct JobFile {
-    /// The surface to be cut.
+    /// The surface to be cut, placed where the file's `[placement]` wants it.
     pub surface: SurfaceSpec,
     /// Ball radius r, mm, above 0, at most [`RADIUS_MAX_MM`].
     pub radius_mm: f64,
@@ -148,8 +149,12 @@ impl JobFile {
     pub fn parse(name: &str, text: &str) -> Result<Self, JobFileError> {
         let reader = Reader::new(name, text);
         let document = reader.document()?;
-        document.only(&["surface", "tool", "cut", "machine"], &[])?;
+        document.only(&["surface", "placement", "tool", "cut", "machine"], &[])?;
         let surface = surface::read(&document.section("surface")?)?;
+        let surface = match document.optional_section("placement")? {
+            Some(section) => placement::place(&section, &surface)?,
+            None => surface,
+        };
         let radius_mm = read_tool(&document.section("tool")?)?;
         let cut = document.section("cut")?;
         cut.only(

@@ -356,10 +356,22 @@ fn kind_of(value: &DeValue<'_>) -> &'static str {
     }
 }
 
-/// The known name with the fewest edits from `key`, if they are few enough.
+/// The known name that is `key` and its unit (`feed` for `feed_mm_min`), or else the one with the fewest edits, among those that have
+/// few enough.
 fn nearest<'k>(key: &str, known: &[&'k str]) -> Option<&'k str> {
-    let (edits, name) = known.iter().map(|name| (edit_distance(key, name), *name)).min()?;
-    (edits * SUGGESTION_SHARE <= key.chars().count().max(name.len())).then_some(name)
+    let lower = key.to_lowercase();
+    let with_unit = |name: &str| {
+        name.strip_prefix(&lower)
+            .is_some_and(|rest| rest.starts_with('_'))
+    };
+    let few = |edits: usize, name: &str| edits * SUGGESTION_SHARE <= lower.chars().count().max(name.len());
+    known.iter().copied().find(|name| with_unit(name)).or_else(|| {
+        let edits = known.iter().map(|name| (edit_distance(&lower, name), *name));
+        edits
+            .filter(|(edits, name)| few(*edits, name))
+            .min()
+            .map(|(_, name)| name)
+    })
 }
 
 /// Levenshtein distance: fewest characters inserted, deleted or replaced that turn one text into the other.

@@ -14,6 +14,8 @@ use interp_core::{Header, Pattern, SurfaceKind, ToolSide, encode};
 use crate::job_file::{self, Along, JobFile, JobFileError, SurfaceSpec};
 use crate::oracle::Oracle;
 
+pub(crate) use patches::Source;
+
 /// One parameter of the prepared surface: its spans, in the parameter's own units.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Axis {
