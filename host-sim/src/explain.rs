@@ -3,6 +3,13 @@
 use interp_core::job::patches_max;
 use interp_core::{Fault, FaultKind, STORE_WORDS, SurfaceKind};
 
+/// A fault with its place in one line: code, name, where, and what it says to a person.
+#[must_use]
+pub fn fault_at(of: Fault, tick: u64, pass: u32, [u, v]: [f64; 2]) -> String {
+    let (code, name, what) = (of.kind.code(), of.kind.name(), fault(of).0);
+    format!("fault {code} ({name}) at tick {tick}, pass {pass}, u = {u:.9}, v = {v:.9}: {what}")
+}
+
 /// What a fault says to a person, and the remedy.
 #[must_use]
 pub fn fault(fault: Fault) -> (String, &'static str) {

@@ -19,6 +19,7 @@
 pub mod approach;
 pub mod budget;
 pub mod commands;
+pub mod direction;
 pub mod explain;
 pub mod export;
 pub mod gcode;

@@ -5,7 +5,8 @@ use std::path::PathBuf;
 use clap::Args;
 use serde_json::json;
 
-use super::{Failure, Result, cannot_write, load, progress};
+use super::out::say;
+use super::{Failure, Result, along, cannot_write, load, progress, spinner};
 use crate::approach::{Kind, passes};
 use crate::export::{Dialect, ExportError, Options, export};
 use crate::gcode::FeedMode;
@@ -39,7 +40,7 @@ pub(super) struct Arguments {
     spindle: Option<f64>,
     /// Prints one JSON object instead of text.
     #[arg(long)]
-    json: bool,
+    pub(super) json: bool,
 }
 
 impl From<ExportError> for Failure {
@@ -82,7 +83,9 @@ pub(super) fn command(arguments: &Arguments) -> Result<()> {
         spindle_rpm: arguments.spindle,
     };
     let oracle = super::simulate::oracle(&job)?;
+    let bar = spinner("finding the passes");
     let count = passes(&oracle).map_err(ExportError::from)?.len();
+    bar.finish_and_clear();
     let bar = progress(count as u64, "planning");
     let exported = export(&job, &options, &|| bar.inc(1))?;
     bar.finish_and_clear();
@@ -90,7 +93,7 @@ pub(super) fn command(arguments: &Arguments) -> Result<()> {
         .map_err(|error| cannot_write(&arguments.output, &error))?;
     let (bytes, blocks) = (exported.text.len(), exported.text.lines().count());
     if arguments.json {
-        let value = json!({
+        let mut value = json!({
             "approach": options.kind.name(),
             "feed_mode": options.feed_mode.word(),
             "passes": exported.passes,
@@ -100,19 +103,23 @@ pub(super) fn command(arguments: &Arguments) -> Result<()> {
             "cutting_time_s": exported.cutting_time_s,
             "safe_z_mm": exported.safe_z_mm,
         });
-        println!("{value}");
+        if let Some(keys) = value.as_object_mut() {
+            keys.extend(along::json(&job));
+        }
+        say!("{value}");
         return Ok(());
     }
-    println!("{}", arguments.output.display());
-    println!("  passes       {}", exported.passes);
-    println!(
+    say!("{}", arguments.output.display());
+    say!("  along        {}", along::sentence(&job));
+    say!("  passes       {}", exported.passes);
+    say!(
         "  program      {} cuts, {blocks} blocks, {bytes} bytes",
         exported.cuts
     );
-    println!(
+    say!(
         "  cutting      {:.1} min, without links",
         exported.cutting_time_s / 60.0
     );
-    println!("  safe height  {:.4} mm", exported.safe_z_mm);
+    say!("  safe height  {:.4} mm", exported.safe_z_mm);
     Ok(())
 }

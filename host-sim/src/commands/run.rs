@@ -9,9 +9,10 @@ use protocol::digest::Digest;
 use protocol::message::Status;
 use serde_json::{Value, json};
 
+use super::out::say;
 use super::outcome::{FaultAt, Outcome};
 use super::simulate::{Timed, machine, surveyed, timed};
-use super::{Failure, Result, cannot_write, load, progress, trace, unheld_limits, warn_of_limits};
+use super::{Failure, Result, cannot_write, load, progress, spinner, trace, unheld_limits, warn_of_limits};
 use crate::approach::Kind;
 use crate::job_file::JobFile;
 use crate::prepare::Prepared;
@@ -42,7 +43,7 @@ pub(super) struct Arguments {
     ignore_limits: bool,
     /// Prints one JSON object instead of text.
     #[arg(long)]
-    json: bool,
+    pub(super) json: bool,
 }
 
 #[derive(Debug, Args)]
@@ -106,7 +107,12 @@ fn connect(arguments: &Arguments) -> Result<(Option<Qemu>, Session)> {
             ));
         }
         Some(image) => image.clone(),
-        None => qemu::firmware()?,
+        None => {
+            let bar = spinner("building the firmware");
+            let image = qemu::firmware();
+            bar.finish_and_clear();
+            image?
+        }
     };
     let (qemu, stream) = Qemu::start(&image)?;
     Ok((Some(qemu), Session::open(stream, number)?))
@@ -287,7 +293,9 @@ pub(super) fn command(arguments: &Arguments) -> Result<()> {
     let here = timed(&job, &prepared)?;
     let (_qemu, mut session) = connect(arguments)?;
     check_period(&job, &session)?;
-    drive::upload(&mut session, &prepared, |_| {})?;
+    let bar = progress(prepared.words.len() as u64, "uploading");
+    drive::upload(&mut session, &prepared, |words| bar.set_position(words as u64))?;
+    bar.finish_and_clear();
     let ran = if arguments.trace.is_some() {
         by_sample(arguments, &job, &prepared, &here, &mut session)?
     } else {
@@ -307,18 +315,18 @@ pub(super) fn command(arguments: &Arguments) -> Result<()> {
     let complaint = complaint(&ran, &here);
     let board = session.capabilities().description.board.as_str();
     if arguments.json {
-        println!("{}", json_of(&outcome, &ran, board));
+        say!("{}", json_of(&outcome, &ran, board));
     } else {
-        println!("{} on {board}", arguments.job.display());
+        say!("{} on {board}", arguments.job.display());
         outcome.print(page.as_deref());
         let (speed, missed) = (ran.ticks_per_second.round(), ran.status.deadline_misses);
-        println!("  board        {speed} ticks a second, {missed} missed");
+        say!("  board        {speed} ticks a second, {missed} missed");
         let verdict = if ran.first_difference.is_none() {
             "bit for bit the same"
         } else {
             "NOT the same"
         };
-        println!(
+        say!(
             "  compared     {} samples with this machine's: {verdict}",
             ran.compared
         );

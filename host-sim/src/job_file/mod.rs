@@ -46,6 +46,40 @@ pub enum Along {
     V,
 }
 
+impl Along {
+    /// The parameter's name.
+    #[must_use]
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::U => "u",
+            Self::V => "v",
+        }
+    }
+}
+
+/// One direction of the passes, run on the core to see what it takes.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Trial {
+    /// The direction.
+    pub along: Along,
+    /// Periods of the whole job; up to the fault where there is one.
+    pub ticks: u64,
+    /// Why it cannot be machined this way.
+    pub against: Option<String>,
+}
+
+/// How a job came by the direction of its passes.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub enum AlongChoice {
+    /// The job file names it.
+    #[default]
+    Given,
+    /// The job file leaves it to [`direction::settle`](crate::direction::settle); until then the job cannot be prepared.
+    Auto,
+    /// It was settled so: u and v, in this order.
+    Chosen([Trial; 2]),
+}
+
 /// The side of the surface that the tool is on.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Side {
@@ -115,7 +149,7 @@ pub struct JobFile {
     pub feed_mm_min: f64,
     /// Scallop height limit h, mm, above 0, below the ball radius.
     pub scallop_mm: f64,
-    /// The path parameter.
+    /// The path parameter. With `along = "auto"` it says nothing before [`direction::settle`](crate::direction::settle) was asked.
     pub along: Along,
     /// The side of the tool.
     pub side: Side,
@@ -177,6 +211,12 @@ impl JobFile {
                 format!("`{key}` must be above 0 and below the ball radius of {radius_mm} mm, not {value}");
             Err(cut.error(key, what, remedy))
         };
+        let directions = [("u", Some(Along::U)), ("v", Some(Along::V)), ("auto", None)];
+        let along = cut.choice("along", &directions)?;
+        let mut origin = reader.origin(&document);
+        if along.is_none() {
+            origin.set_along_choice(AlongChoice::Auto);
+        }
         Ok(Self {
             surface,
             radius_mm,
@@ -187,7 +227,7 @@ impl JobFile {
                 "the feed in mm/min, e.g. 600",
             )?,
             scallop_mm: below_radius("scallop_mm", "give the scallop height limit in mm, e.g. 0.005")?,
-            along: cut.choice("along", &[("u", Along::U), ("v", Along::V)])?,
+            along: along.unwrap_or(Along::U),
             side: cut.choice("side", &[("up", Side::Up), ("+", Side::Plus), ("-", Side::Minus)])?,
             pattern: match cut.has("pattern") {
                 true => cut.choice("pattern", &[("zig", Pattern::Zig), ("zigzag", Pattern::Zigzag)])?,
@@ -200,7 +240,7 @@ impl JobFile {
             machine: document
                 .optional_section("machine")?
                 .map_or(Ok(Machine::default()), |s| read_machine(&s))?,
-            origin: reader.origin(&document),
+            origin,
         })
     }
 
@@ -270,12 +310,13 @@ fn read_machine(machine: &Section<'_>) -> Result<Machine, JobFileError> {
     Ok(read)
 }
 
-/// The file that a job came from: what an error found later needs to point at the line.
+/// Where a job came from: the file, which an error found later needs to point at the line, and who chose its direction.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Origin {
     name: Arc<str>,
     text: Arc<str>,
     keys: BTreeMap<String, Range<usize>>,
+    along_choice: AlongChoice,
 }
 
 impl Origin {
@@ -283,6 +324,16 @@ impl Origin {
     #[must_use]
     pub fn name(&self) -> &str {
         &self.name
+    }
+
+    /// How the job came by the direction of its passes.
+    #[must_use]
+    pub fn along_choice(&self) -> &AlongChoice {
+        &self.along_choice
+    }
+
+    pub(crate) fn set_along_choice(&mut self, choice: AlongChoice) {
+        self.along_choice = choice;
     }
 
     /// An error that points at the value of `section.key` (or at the section, or at the file, where there is none).

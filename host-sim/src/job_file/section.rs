@@ -6,7 +6,7 @@ use std::ops::Range;
 use toml::Spanned;
 use toml::de::{DeTable, DeValue};
 
-use super::{JobFileError, Origin};
+use super::{AlongChoice, JobFileError, Origin};
 
 /// Edits (insert, delete, replace) between an unknown key and the known one that is suggested for it, as a share of
 /// its length: half, beyond which a suggestion misleads more than it helps.
@@ -56,6 +56,7 @@ impl<'t> Reader<'t> {
             name: self.name.into(),
             text: self.text.into(),
             keys,
+            along_choice: AlongChoice::Given,
         }
     }
 

@@ -225,7 +225,7 @@ fn placements() {
         (REVOLVED, TOOL, "[placement]\nrotate_deg = 90\n[tool]", 9, 14, "`rotate_deg` must be a list, not a number"),
         (REVOLVED, TOOL, "[placement]\nrotate_deg = [0, 361, 0]\n[tool]", 9, 14, "must be -360 to 360, not 361"),
         (REVOLVED, TOOL, "[placement]\nplace = \"center\"\n[tool]", 9, 9, "did you mean \"centre\"?"),
-        (REVOLVED, TOOL, "[placement]\ntranslate_mm = [0, 2200, 0]\n[tool]", 9, 16, "the placed surface reaches from y = 2120.000 to 2188.244 mm"),
+        (REVOLVED, TOOL, "[placement]\ntranslate_mm = [0, 2200, 0]\n[tool]", 9, 16, "the placed surface reaches from y = 2120.000 to 2200.000 mm"),
         (REVOLVED, TOOL, "[placement]\ntranslate_mm = [0, 1, 0]\nscale = 100\n[tool]", 10, 9, "the machine reaches ±2147.483 mm"),
     ]);
 }

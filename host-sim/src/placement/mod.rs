@@ -22,7 +22,7 @@ pub use extent::{EXTENT_TOLERANCE_MM, extent_mm};
 pub use rotation::Rotation;
 
 /// Positions that the machine can hold, mm either way: nanometres in an i32.
-pub const POSITION_MAX_MM: f64 = 2147.483_647;
+pub const POSITION_MAX_MM: f64 = 2_147.483_647;
 /// Names of the axes, in order.
 const AXES: [&str; 3] = ["x", "y", "z"];
 
@@ -127,7 +127,7 @@ impl Placement {
             };
             let reach_mm = [least + shift[axis], most + shift[axis]];
             if !(reach_mm[0] >= -POSITION_MAX_MM && reach_mm[1] <= POSITION_MAX_MM) {
-                let too_large = !(most - least <= 2.0 * POSITION_MAX_MM);
+                let too_large = most - least > 2.0 * POSITION_MAX_MM;
                 return Err(Outside {
                     axis,
                     reach_mm,
