@@ -34,4 +34,5 @@ pub mod remote;
 pub mod report;
 pub mod speeds;
 pub mod survey;
+pub mod template;
 pub mod trace;

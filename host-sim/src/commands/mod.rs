@@ -3,7 +3,9 @@
 mod along;
 mod approach;
 mod budget;
+mod explain;
 mod export;
+mod new;
 mod out;
 mod outcome;
 mod paper;
@@ -87,6 +89,8 @@ enum Command {
     Export(export::Arguments),
     Paper(paper::Arguments),
     Budget(budget::Arguments),
+    New(new::Arguments),
+    Explain(explain::Arguments),
 }
 
 impl Command {
@@ -99,6 +103,8 @@ impl Command {
             Self::Export(arguments) => arguments.json,
             Self::Paper(arguments) => arguments.json,
             Self::Budget(arguments) => arguments.json,
+            Self::New(arguments) => arguments.json,
+            Self::Explain(arguments) => arguments.json,
         }
     }
 
@@ -110,6 +116,8 @@ impl Command {
             Self::Export(arguments) => export::command(arguments),
             Self::Paper(arguments) => paper::command(arguments),
             Self::Budget(arguments) => budget::command(arguments),
+            Self::New(arguments) => new::command(arguments),
+            Self::Explain(arguments) => explain::command(arguments),
         }
     }
 }

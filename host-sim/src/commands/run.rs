@@ -6,7 +6,7 @@ use std::time::Instant;
 use clap::Args;
 use interp_core::{Sample, State};
 use protocol::digest::Digest;
-use protocol::message::Status;
+use protocol::message::{Reason, Status};
 use serde_json::{Value, json};
 
 use super::out::say;
@@ -67,7 +67,16 @@ struct Ran {
 
 impl From<RemoteError> for Failure {
     fn from(error: RemoteError) -> Self {
-        Self::Failed(Some(error.to_string()))
+        let code = match &error {
+            RemoteError::Refused {
+                reason: Reason::Job { fault, .. },
+                ..
+            } => fault.code.to_string(),
+            RemoteError::Refused { reason, .. } => format!("R{}", reason.code()),
+            RemoteError::Version(_) => "R3".to_owned(),
+            _ => return Self::Failed(Some(error.to_string())),
+        };
+        Self::Failed(Some(format!("{error}\n  help: cargo sim explain {code}")))
     }
 }
 

@@ -59,6 +59,7 @@ pub(super) fn machine(job: &JobFile, prepared: &Prepared) -> Result<Machine> {
 
 fn refused(job: &JobFile, fault: Fault) -> Failure {
     let (what, remedy) = explain::fault(fault);
+    let remedy = format!("{remedy}; more: cargo sim explain {}", fault.kind.code());
     job.origin.error("surface", what, remedy).into()
 }
 
