@@ -3,6 +3,7 @@
 mod along;
 mod approach;
 mod budget;
+mod completions;
 mod explain;
 mod export;
 mod new;
@@ -91,6 +92,7 @@ enum Command {
     Budget(budget::Arguments),
     New(new::Arguments),
     Explain(explain::Arguments),
+    Completions(completions::Arguments),
 }
 
 impl Command {
@@ -105,6 +107,7 @@ impl Command {
             Self::Budget(arguments) => arguments.json,
             Self::New(arguments) => arguments.json,
             Self::Explain(arguments) => arguments.json,
+            Self::Completions(_) => false,
         }
     }
 
@@ -118,6 +121,7 @@ impl Command {
             Self::Budget(arguments) => budget::command(arguments),
             Self::New(arguments) => new::command(arguments),
             Self::Explain(arguments) => explain::command(arguments),
+            Self::Completions(arguments) => completions::command(arguments),
         }
     }
 }
