@@ -31,13 +31,13 @@ pub(super) struct Arguments {
     /// Job files to count instead of the six kinds of surface.
     jobs: Vec<PathBuf>,
     /// Ticks of each job.
-    #[arg(long, default_value_t = TICKS)]
+    #[arg(long, default_value_t = TICKS, value_parser = clap::value_parser!(u32).range(1..), allow_negative_numbers = true)]
     ticks: u32,
     /// Writes a chart (SVG) into this folder.
     #[arg(long, value_name = "DIR")]
     report: Option<PathBuf>,
     /// Tries so many jobs, at random and made to be bad, for the worst tick, and writes the job that causes it.
-    #[arg(long, value_name = "JOBS", conflicts_with_all = ["jobs", "ticks", "report", "check", "bless"])]
+    #[arg(long, value_name = "JOBS", value_parser = clap::value_parser!(u32).range(1..), allow_negative_numbers = true, conflicts_with_all = ["jobs", "ticks", "report", "check", "bless"])]
     search: Option<u32>,
     /// Seed of the search: the same finds the same.
     #[arg(long, default_value_t = 1, requires = "search")]

@@ -2,7 +2,8 @@
 
 use std::path::PathBuf;
 
-use clap::Args;
+use clap::builder::{PossibleValuesParser, TypedValueParser};
+use clap::{Args, ValueEnum};
 use serde_json::json;
 
 use super::out::say;
@@ -26,21 +27,30 @@ pub(super) struct Arguments {
     /// Writes the program into this file.
     #[arg(short, long, value_name = "FILE")]
     output: PathBuf,
-    /// How the tool path is made: `curve` is written as arcs, `surface` cannot be written.
-    #[arg(long, value_enum, default_value = "linear")]
+    /// How the tool path is made: `curve` is written as arcs.
+    #[arg(long, value_parser = written(), default_value = "linear")]
     approach: Kind,
     /// What the F words mean.
     #[arg(long, value_enum, default_value = "g94")]
     feed_mode: FeedMode,
     /// Millimetres that the tool is lifted above the highest cut between passes, and above a cut before it plunges.
-    #[arg(long, value_name = "MM", default_value_t = 5.0)]
+    #[arg(long, value_name = "MM", default_value_t = 5.0, allow_negative_numbers = true)]
     clearance: f64,
     /// Switches the spindle on, at so many revolutions a minute.
-    #[arg(long, value_name = "RPM")]
+    #[arg(long, value_name = "RPM", allow_negative_numbers = true)]
     spindle: Option<f64>,
     /// Prints one JSON object instead of text.
     #[arg(long)]
     pub(super) json: bool,
+}
+
+/// The approaches that G-code can say. `surface` is understood, so that it gets a remedy, but not offered.
+fn written() -> impl TypedValueParser<Value = Kind> {
+    let values = Kind::ALL.into_iter().filter_map(|kind| {
+        let value = kind.to_possible_value()?;
+        Some(value.hide(kind == Kind::Surface))
+    });
+    PossibleValuesParser::new(values).try_map(|name| Kind::from_str(&name, false))
 }
 
 impl From<ExportError> for Failure {

@@ -14,6 +14,7 @@ mod section;
 mod surface;
 #[cfg(test)]
 mod tests;
+mod text;
 
 use std::collections::BTreeMap;
 use std::ops::Range;
@@ -170,10 +171,8 @@ impl JobFile {
     /// The file cannot be read, is not TOML, or a value in it is missing, unknown, of the wrong shape or out of range.
     pub fn load(path: &Path) -> Result<Self, JobFileError> {
         let name = path.display().to_string();
-        match std::fs::read_to_string(path) {
-            Ok(text) => Self::parse(&name, &text),
-            Err(cause) => Err(JobFileError::unreadable(&name, &cause)),
-        }
+        let text = text::read(path)?;
+        Self::parse(&name, &text)
     }
 
     /// Reads a job from text; `name` stands for the file in errors.

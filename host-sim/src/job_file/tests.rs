@@ -286,7 +286,7 @@ fn a_file_that_is_not_there() {
     assert!(
         error
             .to_string()
-            .starts_with("no/such/job.toml: cannot read the job file: "),
+            .starts_with("no/such/job.toml: there is no such file"),
         "{error}"
     );
     assert_eq!(error.line_and_column(), None);
