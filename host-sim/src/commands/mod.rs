@@ -207,3 +207,49 @@ fn cannot_write(path: &Path, error: &std::io::Error) -> Failure {
         "name a file in a folder that exists",
     )
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use clap::CommandFactory;
+
+    /// Every command has an example that the command line understands; the jobs in it exist.
+    #[test]
+    fn every_command_has_an_example_that_parses() {
+        let jobs = Path::new(env!("CARGO_MANIFEST_DIR")).join("..");
+        for command in Cli::command().get_subcommands() {
+            let about = command
+                .get_long_about()
+                .or(command.get_about())
+                .unwrap()
+                .to_string();
+            let examples: Vec<_> = about
+                .lines()
+                .filter_map(|line| line.trim().strip_prefix("Example: "))
+                .collect();
+            assert!(!examples.is_empty(), "{} has no example", command.get_name());
+            for example in examples {
+                // What follows is the shell's.
+                let words = example
+                    .split(['>', '#'])
+                    .next()
+                    .unwrap()
+                    .split_whitespace()
+                    .skip(1);
+                let words: Vec<_> = words.collect();
+                assert_eq!(words[..2], ["sim", command.get_name()], "{example}");
+                if let Err(error) = Cli::try_parse_from(&words) {
+                    panic!("{example}: {error}");
+                }
+                for job in words.iter().filter(|word| word.starts_with("jobs/")) {
+                    assert!(jobs.join(job).exists(), "{example}");
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn the_arguments_are_consistent() {
+        Cli::command().debug_assert();
+    }
+}
