@@ -146,6 +146,8 @@ fn nonsense_gets_a_remedy() {
         ("export job.toml --format heidenhain -o x", &["linuxcnc, grbl"]),
         ("budget --ticks 0", &["0 is not in 1.."]),
         ("explain ball-dos-not-fit", &["ball-does-not-fit"]),
+        ("new -o .", &["that is a folder: name a file in it"]),
+        ("new -o no/job.toml", &["make the folder first"]),
         ("completions tcsh", &["bash, zsh, fish"]),
         ("run job.toml", &["--qemu|--port"]),
     ] {
@@ -224,6 +226,10 @@ fn faults_come_as_explained() {
         ),
     ] {
         let folder = folder_with(job, edits);
+        // The line that has to do with it: the ball's radius, or the feed.
+        let text = std::fs::read_to_string(folder.path().join("job.toml")).unwrap();
+        let line = |key: &str| text.lines().position(|line| line.starts_with(key)).unwrap() + 1;
+        let lines = [line("radius_mm"), line("feed_mm_min")];
         let output = run(folder.path(), "simulate job.toml --json");
         assert_eq!(output.status.code(), Some(1), "{job}: {}", err(&output));
         let told: Value = serde_json::from_slice(&output.stdout).unwrap();
@@ -234,6 +240,11 @@ fn faults_come_as_explained() {
         );
         let hint = format!("cargo sim explain {code}");
         assert!(err(&output).contains(&hint), "{}", err(&output));
+        assert!(
+            err(&output).contains(&format!("job.toml:{}: ", lines[usize::from(code != 1)])),
+            "{}",
+            err(&output)
+        );
         let explained = json(folder.path(), &format!("explain {code} --json"));
         assert_eq!(explained["name"], name);
         if code == 1 {

@@ -202,10 +202,16 @@ fn trace(path: Option<&PathBuf>, job: &JobFile) -> Result<Option<crate::trace::T
 }
 
 fn cannot_write(path: &Path, error: &std::io::Error) -> Failure {
-    Failure::input(
-        format!("cannot write {}: {error}", path.display()),
-        "name a file in a folder that exists",
-    )
+    use std::io::ErrorKind;
+    let remedy = match error.kind() {
+        ErrorKind::IsADirectory => "that is a folder: name a file in it",
+        ErrorKind::AlreadyExists | ErrorKind::NotADirectory => "that is a file: name a folder",
+        ErrorKind::NotFound => "make the folder first, or name a file in one that exists",
+        ErrorKind::PermissionDenied | ErrorKind::ReadOnlyFilesystem => "name a place where you may write",
+        ErrorKind::StorageFull => "make room on the disk",
+        _ => "name a file in a folder that exists",
+    };
+    Failure::input(format!("cannot write {}: {error}", path.display()), remedy)
 }
 
 #[cfg(test)]

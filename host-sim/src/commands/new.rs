@@ -46,10 +46,11 @@ pub(super) fn command(arguments: &Arguments) -> Result<()> {
         .open(path)
         .and_then(|mut file| file.write_all(text.as_bytes()));
     written.map_err(|error| match error.kind() {
-        ErrorKind::AlreadyExists => Failure::input(
+        ErrorKind::AlreadyExists if !path.is_dir() => Failure::input(
             format!("{} is there already", path.display()),
             "name another file with -o, or say --force to write over it",
         ),
+        ErrorKind::AlreadyExists => cannot_write(path, &ErrorKind::IsADirectory.into()),
         _ => cannot_write(path, &error),
     })?;
     if arguments.json {

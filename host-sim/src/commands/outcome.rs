@@ -43,6 +43,15 @@ impl FaultAt {
         format!("{place}\n  help: {remedy}; more: cargo sim explain {code}")
     }
 
+    /// The same, with the line of the job file that has to do with it.
+    pub(super) fn sentence_of(&self, job: &JobFile) -> String {
+        let line = job.origin.quote(explain::key(self.fault.kind));
+        line.map_or_else(
+            || self.sentence(),
+            |line| format!("{}\n  at {line}", self.sentence()),
+        )
+    }
+
     fn json(&self) -> Value {
         let (message, remedy) = explain::fault(self.fault);
         let [u, v] = self.parameters;

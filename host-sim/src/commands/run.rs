@@ -10,7 +10,7 @@ use protocol::message::{Reason, Status};
 use serde_json::{Value, json};
 
 use super::out::say;
-use super::outcome::{FaultAt, Outcome};
+use super::outcome::Outcome;
 use super::simulate::{Timed, machine, surveyed, timed};
 use super::{Failure, Result, cannot_write, load, progress, spinner, trace, unheld_limits, warn_of_limits};
 use crate::approach::Kind;
@@ -101,8 +101,12 @@ fn connect(arguments: &Arguments) -> Result<(Option<Qemu>, Session)> {
         .map_or(1, |now| now.subsec_nanos() ^ std::process::id().rotate_left(16));
     if let Some(name) = &arguments.place.port {
         let stream = port::open(name).map_err(|error| {
+            let why = match error {
+                RemoteError::Line(cause) => format!("cannot open it as a serial port: {cause}"),
+                other => other.to_string(),
+            };
             Failure::input(
-                format!("{name}: {error}"),
+                format!("{name}: {why}"),
                 "name the board's serial port, such as /dev/ttyUSB0",
             )
         })?;
@@ -256,7 +260,7 @@ fn by_sample(
 }
 
 /// What is wrong with the board's run, if anything is.
-fn complaint(ran: &Ran, here: &Timed) -> Option<String> {
+fn complaint(ran: &Ran, here: &Timed, job: &JobFile) -> Option<String> {
     let status = &ran.status;
     if status.deadline_misses > 0 {
         return Some(format!(
@@ -285,7 +289,7 @@ fn complaint(ran: &Ran, here: &Timed) -> Option<String> {
             expected.name()
         ));
     }
-    here.fault.as_ref().map(FaultAt::sentence)
+    here.fault.as_ref().map(|fault| fault.sentence_of(job))
 }
 
 pub(super) fn command(arguments: &Arguments) -> Result<()> {
@@ -321,7 +325,7 @@ pub(super) fn command(arguments: &Arguments) -> Result<()> {
         samples_per_second: here.samples_per_second,
         fault: here.fault,
     };
-    let complaint = complaint(&ran, &here);
+    let complaint = complaint(&ran, &here, &job);
     let board = session.capabilities().description.board.as_str();
     if arguments.json {
         say!("{}", json_of(&outcome, &ran, board));

@@ -197,6 +197,6 @@ pub(super) fn command(arguments: &Arguments) -> Result<()> {
     outcome.tell(arguments.json, page.as_deref());
     match outcome.fault {
         None => Ok(()),
-        Some(fault) => Err(Failure::Failed(Some(fault.sentence()))),
+        Some(fault) => Err(Failure::Failed(Some(fault.sentence_of(&job)))),
     }
 }

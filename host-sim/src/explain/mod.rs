@@ -71,6 +71,18 @@ pub fn fault_at(of: Fault, tick: u64, pass: u32, [u, v]: [f64; 2]) -> String {
     format!("fault {code} ({name}) at tick {tick}, pass {pass}, u = {u:.9}, v = {v:.9}: {what}")
 }
 
+/// The key of the job file, `section.key`, that has most to do with a fault.
+#[must_use]
+pub fn key(kind: FaultKind) -> &'static str {
+    match kind {
+        FaultKind::BallDoesNotFit => "tool.radius_mm",
+        FaultKind::ParameterBackwards | FaultKind::PatchTooShort => "cut.feed_mm_min",
+        FaultKind::IntervalTooSmall => "cut.scallop_mm",
+        FaultKind::OutOfRange => "placement.translate_mm",
+        _ => "surface",
+    }
+}
+
 /// What a fault says to a person, and the remedy.
 #[must_use]
 pub fn fault(fault: Fault) -> (String, &'static str) {

@@ -325,6 +325,17 @@ impl Origin {
         &self.name
     }
 
+    /// Where the value of `section.key` (or the section) stands, and its line: `job.toml:10: radius_mm = 10`.
+    #[must_use]
+    pub fn quote(&self, key: &str) -> Option<String> {
+        let section = key.split('.').next().unwrap_or(key);
+        let span = self.keys.get(key).or_else(|| self.keys.get(section))?;
+        let before = self.text.get(..span.start)?.matches('\n').count();
+        let line = self.text.lines().nth(before)?;
+        let line = line.split('#').next().unwrap_or(line).trim();
+        Some(format!("{}:{}: {line}", self.name, before + 1))
+    }
+
     /// How the job came by the direction of its passes.
     #[must_use]
     pub fn along_choice(&self) -> &AlongChoice {
