@@ -91,6 +91,27 @@ pub enum Reason {
 }
 
 impl Reason {
+    /// The code on the wire, as in the variants' documentation.
+    #[must_use]
+    pub const fn code(self) -> u8 {
+        match self {
+            Self::BadFrame { .. } => 0,
+            Self::Unreadable => 1,
+            Self::SayHello => 2,
+            Self::Version { .. } => 3,
+            Self::OutOfOrder { .. } => 4,
+            Self::WrongState { .. } => 5,
+            Self::WrongClock { .. } => 6,
+            Self::Busy => 7,
+            Self::Job { .. } => 8,
+            Self::TooLong { .. } => 9,
+            Self::NoUpload => 10,
+            Self::WrongOffset { .. } => 11,
+            Self::Incomplete { .. } => 12,
+            Self::WrongDigest { .. } => 13,
+        }
+    }
+
     /// Whether the request counts as answered, so that the next one needs the next number. Otherwise the board forgets
     /// that it ever came.
     #[must_use]

@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use super::outcome::Outcome;
-use super::{Result, cannot_write, progress, trace};
+use super::{Result, cannot_write, progress, spinner, trace};
 use crate::approach::{Kind, measure};
 use crate::job_file::JobFile;
 use crate::report::Sketch;
@@ -15,9 +15,11 @@ pub(super) fn command(
     directory: Option<&Path>,
     as_json: bool,
 ) -> Result<()> {
+    let bar = spinner("finding the passes");
     let passes = super::simulate::oracle(job)?
         .schedule()
         .map_err(crate::approach::ApproachError::from)?;
+    bar.finish_and_clear();
     let mut sketch = directory.map(|_| Sketch::new(job, passes.len()).by(kind));
     let mut trace = trace(trace_file, job)?;
     let mut written = Ok(());

@@ -6,9 +6,10 @@ use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 use clap::Args;
-use serde_json::{Value, json};
+use serde_json::{Map, Value, json};
 
-use super::{Failure, Result, cannot_write, load, progress};
+use super::out::{say, say_part};
+use super::{Failure, Result, along, cannot_write, load, progress, spinner};
 use crate::budget::figures::{Figure, Histogram, Model, STEPS_2_TO_4, figures, histogram};
 use crate::budget::graph::{self, Analysis, EXCEPTION_BYTES};
 use crate::budget::image::{self, Sizes};
@@ -30,13 +31,13 @@ pub(super) struct Arguments {
     /// Job files to count instead of the six kinds of surface.
     jobs: Vec<PathBuf>,
     /// Ticks of each job.
-    #[arg(long, default_value_t = TICKS)]
+    #[arg(long, default_value_t = TICKS, value_parser = clap::value_parser!(u32).range(1..), allow_negative_numbers = true)]
     ticks: u32,
     /// Writes a chart (SVG) into this folder.
     #[arg(long, value_name = "DIR")]
     report: Option<PathBuf>,
     /// Tries so many jobs, at random and made to be bad, for the worst tick, and writes the job that causes it.
-    #[arg(long, value_name = "JOBS", conflicts_with_all = ["jobs", "ticks", "report", "check", "bless"])]
+    #[arg(long, value_name = "JOBS", value_parser = clap::value_parser!(u32).range(1..), allow_negative_numbers = true, conflicts_with_all = ["jobs", "ticks", "report", "check", "bless"])]
     search: Option<u32>,
     /// Seed of the search: the same finds the same.
     #[arg(long, default_value_t = 1, requires = "search")]
@@ -51,7 +52,7 @@ pub(super) struct Arguments {
     out: PathBuf,
     /// Prints JSON instead of tables.
     #[arg(long)]
-    json: bool,
+    pub(super) json: bool,
     /// Fails where a stage has grown by more than 2 % against the golden table.
     #[arg(long, conflicts_with_all = ["jobs", "ticks"])]
     check: bool,
@@ -72,6 +73,8 @@ impl From<BudgetError> for Failure {
 
 /// A job's name and ticks.
 type Counted = (String, Ticks);
+/// By a job's name: its direction in words and as JSON.
+type Directions = BTreeMap<String, (String, Map<String, Value>)>;
 
 /// The jobs to count, with their names.
 fn jobs(arguments: &Arguments) -> Vec<(String, PathBuf)> {
@@ -92,17 +95,19 @@ fn jobs(arguments: &Arguments) -> Vec<(String, PathBuf)> {
     }
 }
 
-fn count(arguments: &Arguments, bench: &Bench) -> Result<Vec<Counted>> {
+fn count(arguments: &Arguments, bench: &Bench) -> Result<(Vec<Counted>, Directions)> {
     let jobs = jobs(arguments);
     let bar = progress(jobs.len() as u64, "counting");
     let mut counted = Vec::new();
+    let mut directions = Directions::new();
     for (name, path) in jobs {
-        let (_, prepared) = load(&path)?;
+        let (job, prepared) = load(&path)?;
+        directions.insert(name.clone(), (along::sentence(&job), along::json(&job)));
         counted.push((name, bench.run(&prepared, arguments.ticks)?));
         bar.inc(1);
     }
     bar.finish_and_clear();
-    Ok(counted)
+    Ok((counted, directions))
 }
 
 /// Operations of a sample of each job; none where no sample is far from the ends of passes and patches.
@@ -128,11 +133,16 @@ fn print_operations(arguments: &Arguments, counts: &BTreeMap<String, Count>) {
             root,
             sine,
         } = operations;
-        println!("  {name:<25} {add:>5} {multiply:>5} {divide:>5} {root:>5} {sine:>7}{more}");
+        say!("  {name:<25} {add:>5} {multiply:>5} {divide:>5} {root:>5} {sine:>7}{more}");
     };
-    println!(
+    say!(
         "\noperations a sample, {STEPS_2_TO_4}\n  {:<25} {:>5} {:>5} {:>5} {:>5} {:>7}  1/sqrt, conversions, shifts",
-        "", "+ -", "x", "/", "sqrt", "sin cos"
+        "",
+        "+ -",
+        "x",
+        "/",
+        "sqrt",
+        "sin cos"
     );
     for (name, _) in jobs(arguments) {
         if let Some(count) = counts.get(&name) {
@@ -146,7 +156,7 @@ fn print_operations(arguments: &Arguments, counts: &BTreeMap<String, Count>) {
             row("  the paper's Table 1", paper, "");
         }
     }
-    println!(
+    say!(
         "  1/sqrt and sin cos are made of + - x, which are counted with the others; comparisons and signs are not counted.\n  \
          Once a pass, and not in here: the patch at its side parameter, and the interval's root and quotient."
     );
@@ -195,7 +205,7 @@ impl Images {
     }
 
     fn print(&self) {
-        println!("Cortex-M4F, {PERIOD_CYCLES} cycles a period; bytes:");
+        say!("Cortex-M4F, {PERIOD_CYCLES} cycles a period; bytes:");
         for (board, sizes, stack) in [
             ("chip", self.chip, &self.chip_stack),
             ("QEMU", self.qemu, &self.qemu_stack),
@@ -204,7 +214,7 @@ impl Images {
                 .contexts
                 .iter()
                 .map(|context| format!("{} {}", context.name, context.bytes));
-            println!(
+            say!(
                 "  {board}: flash {}, RAM {} and the job store {}; stack at most {} ({}, {EXCEPTION_BYTES} an exception) of {}",
                 sizes.flash,
                 sizes.ram,
@@ -217,12 +227,17 @@ impl Images {
     }
 }
 
-fn json(figures: &[Figure], images: &Images, counts: &BTreeMap<String, Count>) -> Value {
+fn json(
+    figures: &[Figure],
+    images: &Images,
+    counts: &BTreeMap<String, Count>,
+    directions: &Directions,
+) -> Value {
     let rows = figures.iter().map(|figure| {
         let whole = figure.stage == STEPS_2_TO_4;
         let count = counts.get(&figure.surface).filter(|_| whole);
         let paper = operations::of_paper(&figure.surface).filter(|_| whole);
-        json!({
+        let mut row = json!({
             "surface": figure.surface,
             "stage": figure.stage,
             "model": figure.model.name(),
@@ -242,26 +257,33 @@ fn json(figures: &[Figure], images: &Images, counts: &BTreeMap<String, Count>) -
             "chip_flash_bytes": images.chip.flash,
             "chip_ram_bytes": images.chip.ram,
             "chip_stack_static_bytes": images.chip_stack.stack_bytes(),
-        })
+        });
+        if let (Some(row), Some((_, keys))) = (row.as_object_mut(), directions.get(&figure.surface)) {
+            row.extend(keys.clone());
+        }
+        row
     });
     rows.collect()
 }
 
 fn print(name: &str, ticks: &Ticks, figures: &[Figure]) {
-    println!(
+    say!(
         "\n{name}: {} ticks, stack {} bytes",
         ticks.records.len(),
         ticks.stack_bytes
     );
-    println!(
+    say!(
         "  {:<25} {:>6} |{:^29} |{:^29}  min to max",
-        "cycles", "ticks", "nominal: min, mean, max, %", "pessimistic: min, mean, max, %"
+        "cycles",
+        "ticks",
+        "nominal: min, mean, max, %",
+        "pessimistic: min, mean, max, %"
     );
     let of = |model| figures.iter().filter(move |figure| figure.model == model);
     for (nominal, pessimistic) in of(Model::Nominal).zip(of(Model::Pessimistic)) {
-        print!("  {:<25} {:>6}", nominal.stage, nominal.ticks);
+        say_part!("  {:<25} {:>6}", nominal.stage, nominal.ticks);
         for figure in [nominal, pessimistic] {
-            print!(
+            say_part!(
                 " | {:>6} {:>8.1} {:>6} {:>5.2}",
                 figure.min,
                 figure.mean,
@@ -269,16 +291,16 @@ fn print(name: &str, ticks: &Ticks, figures: &[Figure]) {
                 figure.period_share_pct()
             );
         }
-        println!("  {}", pessimistic.histogram.sparkline());
+        say!("  {}", pessimistic.histogram.sparkline());
     }
 }
 
 fn print_histogram(histogram: &Histogram) {
     let most = histogram.bins.iter().map(|bin| bin.1).max().unwrap_or(1).max(1);
-    println!("  whole tick, pessimistic:");
+    say!("  whole tick, pessimistic:");
     for (begin, count) in &histogram.bins {
         let bar = "#".repeat((count * 40).div_ceil(most) as usize);
-        println!("  {begin:>6}.. {count:>7} {bar}");
+        say!("  {begin:>6}.. {count:>7} {bar}");
     }
 }
 
@@ -286,9 +308,11 @@ fn print_histogram(histogram: &Histogram) {
 fn print_worst(arguments: &Arguments, bench: &Bench) -> Result<()> {
     for path in &arguments.jobs {
         let (_, prepared) = load(path)?;
+        let bar = spinner("looking for the worst tick");
         let mut lab = Lab::new(bench)?;
         let run = lab.run(&prepared, arguments.ticks)?;
-        print!("\n{}: {}", path.display(), worst::describe(&lab.worst(&run)?));
+        bar.finish_and_clear();
+        say_part!("\n{}: {}", path.display(), worst::describe(&lab.worst(&run)?));
     }
     Ok(())
 }
@@ -302,7 +326,7 @@ fn report(arguments: &Arguments, counted: &[Counted]) -> Result<()> {
         .and_then(|()| chart::write(&path, counted))
         .map_err(|error| cannot_write(&path, &error))?;
     if !arguments.json {
-        println!("\nchart: {}", path.display());
+        say!("\nchart: {}", path.display());
     }
     Ok(())
 }
@@ -328,22 +352,27 @@ fn hold(arguments: &Arguments, figures: &[Figure]) -> Result<()> {
 }
 
 pub(super) fn command(arguments: &Arguments) -> Result<()> {
+    let bar = spinner("building the firmware");
     let image = qemu::firmware()?;
+    bar.finish_and_clear();
     let (plan, _) = image::read(&image)?;
     let bench = Bench::new(&image, &plan)?;
     if let Some(jobs) = arguments.search {
         return worst::command(&bench, jobs, arguments.seed, &arguments.out, arguments.json);
     }
-    let counted = count(arguments, &bench)?;
+    let (counted, directions) = count(arguments, &bench)?;
     let figures: Vec<Vec<Figure>> = counted.iter().map(|(name, ticks)| figures(name, ticks)).collect();
+    let bar = spinner("counting operations, reading the images");
     let counts = count_operations(arguments)?;
     let images = Images::read(&image)?;
+    bar.finish_and_clear();
     if arguments.json {
-        println!("{}", json(&figures.concat(), &images, &counts));
+        say!("{}", json(&figures.concat(), &images, &counts, &directions));
     } else {
         images.print();
         for ((name, ticks), figures) in counted.iter().zip(&figures) {
             print(name, ticks, figures);
+            say!("  along {}", directions[name].0);
             print_histogram(&histogram(ticks, Model::Pessimistic, BIN_CYCLES));
         }
         print_operations(arguments, &counts);
@@ -354,7 +383,9 @@ pub(super) fn command(arguments: &Arguments) -> Result<()> {
     report(arguments, &counted)?;
     let mut held = figures.concat();
     if arguments.check || arguments.bless {
+        let bar = spinner("counting the worst job");
         held.extend(golden::worst(&bench)?);
+        bar.finish_and_clear();
     }
     hold(arguments, &held)
 }

@@ -2,10 +2,12 @@
 
 use std::path::PathBuf;
 
-use clap::Args;
+use clap::builder::{PossibleValuesParser, TypedValueParser};
+use clap::{Args, ValueEnum};
 use serde_json::json;
 
-use super::{Failure, Result, cannot_write, load, progress};
+use super::out::say;
+use super::{Failure, Result, along, cannot_write, load, progress, spinner};
 use crate::approach::{Kind, passes};
 use crate::export::{Dialect, ExportError, Options, export};
 use crate::gcode::FeedMode;
@@ -25,21 +27,30 @@ pub(super) struct Arguments {
     /// Writes the program into this file.
     #[arg(short, long, value_name = "FILE")]
     output: PathBuf,
-    /// How the tool path is made: `curve` is written as arcs, `surface` cannot be written.
-    #[arg(long, value_enum, default_value = "linear")]
+    /// How the tool path is made: `curve` is written as arcs.
+    #[arg(long, value_parser = written(), default_value = "linear")]
     approach: Kind,
     /// What the F words mean.
     #[arg(long, value_enum, default_value = "g94")]
     feed_mode: FeedMode,
     /// Millimetres that the tool is lifted above the highest cut between passes, and above a cut before it plunges.
-    #[arg(long, value_name = "MM", default_value_t = 5.0)]
+    #[arg(long, value_name = "MM", default_value_t = 5.0, allow_negative_numbers = true)]
     clearance: f64,
     /// Switches the spindle on, at so many revolutions a minute.
-    #[arg(long, value_name = "RPM")]
+    #[arg(long, value_name = "RPM", allow_negative_numbers = true)]
     spindle: Option<f64>,
     /// Prints one JSON object instead of text.
     #[arg(long)]
-    json: bool,
+    pub(super) json: bool,
+}
+
+/// The approaches that G-code can say. `surface` is understood, so that it gets a remedy, but not offered.
+fn written() -> impl TypedValueParser<Value = Kind> {
+    let values = Kind::ALL.into_iter().filter_map(|kind| {
+        let value = kind.to_possible_value()?;
+        Some(value.hide(kind == Kind::Surface))
+    });
+    PossibleValuesParser::new(values).try_map(|name| Kind::from_str(&name, false))
 }
 
 impl From<ExportError> for Failure {
@@ -82,7 +93,9 @@ pub(super) fn command(arguments: &Arguments) -> Result<()> {
         spindle_rpm: arguments.spindle,
     };
     let oracle = super::simulate::oracle(&job)?;
+    let bar = spinner("finding the passes");
     let count = passes(&oracle).map_err(ExportError::from)?.len();
+    bar.finish_and_clear();
     let bar = progress(count as u64, "planning");
     let exported = export(&job, &options, &|| bar.inc(1))?;
     bar.finish_and_clear();
@@ -90,7 +103,7 @@ pub(super) fn command(arguments: &Arguments) -> Result<()> {
         .map_err(|error| cannot_write(&arguments.output, &error))?;
     let (bytes, blocks) = (exported.text.len(), exported.text.lines().count());
     if arguments.json {
-        let value = json!({
+        let mut value = json!({
             "approach": options.kind.name(),
             "feed_mode": options.feed_mode.word(),
             "passes": exported.passes,
@@ -100,19 +113,23 @@ pub(super) fn command(arguments: &Arguments) -> Result<()> {
             "cutting_time_s": exported.cutting_time_s,
             "safe_z_mm": exported.safe_z_mm,
         });
-        println!("{value}");
+        if let Some(keys) = value.as_object_mut() {
+            keys.extend(along::json(&job));
+        }
+        say!("{value}");
         return Ok(());
     }
-    println!("{}", arguments.output.display());
-    println!("  passes       {}", exported.passes);
-    println!(
+    say!("{}", arguments.output.display());
+    say!("  along        {}", along::sentence(&job));
+    say!("  passes       {}", exported.passes);
+    say!(
         "  program      {} cuts, {blocks} blocks, {bytes} bytes",
         exported.cuts
     );
-    println!(
+    say!(
         "  cutting      {:.1} min, without links",
         exported.cutting_time_s / 60.0
     );
-    println!("  safe height  {:.4} mm", exported.safe_z_mm);
+    say!("  safe height  {:.4} mm", exported.safe_z_mm);
     Ok(())
 }

@@ -1,25 +1,34 @@
 //! The commands, one file each; this one reads the arguments and turns results into exit codes.
 
+mod along;
 mod approach;
 mod budget;
+mod completions;
+mod explain;
 mod export;
+mod new;
+mod out;
 mod outcome;
 mod paper;
+mod progress;
 mod run;
 mod simulate;
 mod verify;
 
 pub use verify::BOUNDS;
 
+use out::complain;
+use progress::{progress, spinner};
+
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
 use clap::{Parser, Subcommand};
-use indicatif::{ProgressBar, ProgressStyle};
 
 use crate::approach::ApproachError;
-use crate::job_file::JobFile;
-use crate::prepare::{Prepared, prepare};
+use crate::direction::{self, NoDirection};
+use crate::job_file::{AlongChoice, JobFile};
+use crate::prepare::Prepared;
 
 /// Why a command did not do what it was asked.
 #[derive(Debug)]
@@ -33,6 +42,15 @@ pub enum Failure {
 impl From<crate::job_file::JobFileError> for Failure {
     fn from(error: crate::job_file::JobFileError) -> Self {
         Self::Input(error.into())
+    }
+}
+
+impl From<NoDirection> for Failure {
+    fn from(error: NoDirection) -> Self {
+        match error {
+            NoDirection::Refused(error) => error.into(),
+            NoDirection::Faults(sentence) => Self::Failed(Some(sentence)),
+        }
     }
 }
 
@@ -72,39 +90,80 @@ enum Command {
     Export(export::Arguments),
     Paper(paper::Arguments),
     Budget(budget::Arguments),
+    New(new::Arguments),
+    Explain(explain::Arguments),
+    Completions(completions::Arguments),
+}
+
+impl Command {
+    /// Whether a program is to read what it prints.
+    fn as_json(&self) -> bool {
+        match self {
+            Self::Simulate(arguments) => arguments.json,
+            Self::Run(arguments) => arguments.json,
+            Self::Verify(arguments) => arguments.json,
+            Self::Export(arguments) => arguments.json,
+            Self::Paper(arguments) => arguments.json,
+            Self::Budget(arguments) => arguments.json,
+            Self::New(arguments) => arguments.json,
+            Self::Explain(arguments) => arguments.json,
+            Self::Completions(_) => false,
+        }
+    }
+
+    fn execute(&self) -> Result<()> {
+        match self {
+            Self::Simulate(arguments) => simulate::command(arguments),
+            Self::Run(arguments) => run::command(arguments),
+            Self::Verify(arguments) => verify::command(arguments),
+            Self::Export(arguments) => export::command(arguments),
+            Self::Paper(arguments) => paper::command(arguments),
+            Self::Budget(arguments) => budget::command(arguments),
+            Self::New(arguments) => new::command(arguments),
+            Self::Explain(arguments) => explain::command(arguments),
+            Self::Completions(arguments) => completions::command(arguments),
+        }
+    }
 }
 
 /// Reads the arguments, runs the command, and returns its exit code: 0 done, 1 failed, 2 bad usage or bad input.
 #[must_use]
 pub fn main() -> ExitCode {
-    let result = match Cli::parse().command {
-        Command::Simulate(arguments) => simulate::command(&arguments),
-        Command::Run(arguments) => run::command(&arguments),
-        Command::Verify(arguments) => verify::command(&arguments),
-        Command::Export(arguments) => export::command(&arguments),
-        Command::Paper(arguments) => paper::command(&arguments),
-        Command::Budget(arguments) => budget::command(&arguments),
-    };
+    let command = Cli::parse().command;
+    if command.as_json() {
+        progress::silence();
+    }
+    let result = command.execute();
+    let unwritten = out::finish();
+    if let Some(error) = &unwritten {
+        complain!("error: cannot write to standard output: {error}");
+    }
     match result {
-        Ok(()) => ExitCode::SUCCESS,
+        Ok(()) if unwritten.is_none() => ExitCode::SUCCESS,
+        Ok(()) => ExitCode::from(1),
         Err(Failure::Failed(message)) => {
             if let Some(message) = message {
-                eprintln!("error: {message}");
+                complain!("error: {message}");
             }
             ExitCode::from(1)
         }
         Err(Failure::Input(report)) => {
-            eprintln!("{report:?}");
+            complain!("{report:?}");
             ExitCode::from(2)
         }
     }
 }
 
-/// Reads and prepares a job, and says what of it this version does not do yet.
+/// Reads a job, settles its direction where that is `"auto"`, prepares it, and says what of it this version does not do yet.
 fn load(path: &Path) -> Result<(JobFile, Prepared)> {
     let job = JobFile::load(path)?;
-    let prepared = prepare(&job)?;
-    Ok((job, prepared))
+    if job.origin.along_choice() != &AlongChoice::Auto {
+        return Ok(direction::settle(job)?);
+    }
+    let bar = spinner("running along u and along v");
+    let settled = direction::settle(job);
+    bar.finish_and_clear();
+    Ok(settled?)
 }
 
 /// The axis limits that a job asks for and that nothing holds yet.
@@ -130,18 +189,8 @@ fn unheld_limits(job: &JobFile) -> Option<String> {
 
 fn warn_of_limits(job: &JobFile) {
     if let Some(limits) = unheld_limits(job) {
-        eprintln!("warning: {limits}");
+        complain!("warning: {limits}");
     }
-}
-
-/// A bar on stderr, where that is a terminal.
-fn progress(length: u64, what: &'static str) -> ProgressBar {
-    let bar = ProgressBar::new(length);
-    if let Ok(style) = ProgressStyle::with_template("{msg} {wide_bar} {percent:>3} % {eta}") {
-        bar.set_style(style);
-    }
-    bar.set_message(what);
-    bar
 }
 
 /// A trace file, if one is wanted.
@@ -153,8 +202,60 @@ fn trace(path: Option<&PathBuf>, job: &JobFile) -> Result<Option<crate::trace::T
 }
 
 fn cannot_write(path: &Path, error: &std::io::Error) -> Failure {
-    Failure::input(
-        format!("cannot write {}: {error}", path.display()),
-        "name a file in a folder that exists",
-    )
+    use std::io::ErrorKind;
+    let remedy = match error.kind() {
+        ErrorKind::IsADirectory => "that is a folder: name a file in it",
+        ErrorKind::AlreadyExists | ErrorKind::NotADirectory => "that is a file: name a folder",
+        ErrorKind::NotFound => "make the folder first, or name a file in one that exists",
+        ErrorKind::PermissionDenied | ErrorKind::ReadOnlyFilesystem => "name a place where you may write",
+        ErrorKind::StorageFull => "make room on the disk",
+        _ => "name a file in a folder that exists",
+    };
+    Failure::input(format!("cannot write {}: {error}", path.display()), remedy)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use clap::CommandFactory;
+
+    /// Every command has an example that the command line understands; the jobs in it exist.
+    #[test]
+    fn every_command_has_an_example_that_parses() {
+        let jobs = Path::new(env!("CARGO_MANIFEST_DIR")).join("..");
+        for command in Cli::command().get_subcommands() {
+            let about = command
+                .get_long_about()
+                .or(command.get_about())
+                .unwrap()
+                .to_string();
+            let examples: Vec<_> = about
+                .lines()
+                .filter_map(|line| line.trim().strip_prefix("Example: "))
+                .collect();
+            assert!(!examples.is_empty(), "{} has no example", command.get_name());
+            for example in examples {
+                // What follows is the shell's.
+                let words = example
+                    .split(['>', '#'])
+                    .next()
+                    .unwrap()
+                    .split_whitespace()
+                    .skip(1);
+                let words: Vec<_> = words.collect();
+                assert_eq!(words[..2], ["sim", command.get_name()], "{example}");
+                if let Err(error) = Cli::try_parse_from(&words) {
+                    panic!("{example}: {error}");
+                }
+                for job in words.iter().filter(|word| word.starts_with("jobs/")) {
+                    assert!(jobs.join(job).exists(), "{example}");
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn the_arguments_are_consistent() {
+        Cli::command().debug_assert();
+    }
 }

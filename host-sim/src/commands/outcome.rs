@@ -5,6 +5,8 @@ use std::path::Path;
 use interp_core::Fault;
 use serde_json::{Map, Value, json};
 
+use super::along;
+use super::out::say;
 use crate::approach::Kind;
 use crate::explain;
 use crate::job_file::JobFile;
@@ -35,12 +37,18 @@ impl FaultAt {
     }
 
     pub(super) fn sentence(&self) -> String {
-        let (what, remedy) = explain::fault(self.fault);
-        let [u, v] = self.parameters;
-        let (code, name) = (self.fault.kind.code(), self.fault.kind.name());
-        format!(
-            "fault {code} ({name}) at tick {}, pass {}, u = {u:.9}, v = {v:.9}: {what}\n  help: {remedy}",
-            self.tick, self.pass
+        let remedy = explain::fault(self.fault).1;
+        let place = explain::fault_at(self.fault, self.tick, self.pass, self.parameters);
+        let code = self.fault.kind.code();
+        format!("{place}\n  help: {remedy}; more: cargo sim explain {code}")
+    }
+
+    /// The same, with the line of the job file that has to do with it.
+    pub(super) fn sentence_of(&self, job: &JobFile) -> String {
+        let line = job.origin.quote(explain::key(self.fault.kind));
+        line.map_or_else(
+            || self.sentence(),
+            |line| format!("{}\n  at {line}", self.sentence()),
         )
     }
 
@@ -128,6 +136,7 @@ impl Outcome<'_> {
             Value::Object(map) => map,
             _ => Map::new(),
         };
+        keys.extend(along::json(self.job));
         if self.kind == Kind::Surface {
             keys.insert("patches".to_owned(), json!(self.segments));
         }
@@ -137,9 +146,9 @@ impl Outcome<'_> {
     /// One JSON object, or the same for a person.
     pub(super) fn tell(&self, as_json: bool, page: Option<&Path>) {
         if as_json {
-            println!("{}", Value::Object(self.json()));
+            say!("{}", Value::Object(self.json()));
         } else {
-            println!("{}", self.job.origin.name());
+            say!("{}", self.job.origin.name());
             self.print(page);
         }
     }
@@ -151,14 +160,16 @@ impl Outcome<'_> {
             Kind::Surface => "patches",
             _ => "segments",
         };
-        println!("  approach     {}", self.kind.name());
-        println!("  program      {} {parts}, {} bytes", self.segments, self.bytes);
-        println!("  passes       {}", findings.passes);
-        println!(
+        say!("  approach     {}", self.kind.name());
+        say!("  along        {}", along::sentence(self.job));
+        say!("  program      {} {parts}, {} bytes", self.segments, self.bytes);
+        say!("  passes       {}", findings.passes);
+        say!(
             "  samples      {} (one each {} us)",
-            findings.samples, self.job.machine.period_us
+            findings.samples,
+            self.job.machine.period_us
         );
-        println!(
+        say!(
             "  machining    {:.1} min, {:.1} mm of cutter contact, {:.1} mm of tool centre",
             self.machining_time_s() / 60.0,
             report.cc_length_mm,
@@ -172,31 +183,32 @@ impl Outcome<'_> {
             ("CC", format!(", of {feed:.3}"), &speeds.cc),
             ("CL", String::new(), &speeds.cl),
         ] {
-            println!(
+            say!(
                 "  {name} speed     {:.3} to {:.3} mm/s, mean {:.3}{of}",
                 span.min,
                 span.max,
                 span.mean()
             );
         }
-        println!(
+        say!(
             "  CL steps     {:.3} mm/s at most between {parts}, {:.3} from period to period",
-            speeds.cl_step_mm_s, speeds.cl_change_mm_s
+            speeds.cl_step_mm_s,
+            speeds.cl_change_mm_s
         );
-        println!("  CL off path  {:.3} um at most", report.position_nm.max * 1e-3);
-        println!("  interval     {:.7} at least", findings.interval_min);
-        println!(
+        say!("  CL off path  {:.3} um at most", report.position_nm.max * 1e-3);
+        say!("  interval     {:.7} at least", findings.interval_min);
+        say!(
             "  feed ripple  {:.6} % at most, {:.6} % rms",
             report.ripple_pct.max.abs(),
             report.ripple_pct.rms()
         );
-        println!("  digest       {:016x}", self.digest);
-        println!(
+        say!("  digest       {:016x}", self.digest);
+        say!(
             "  speed        {:.2} million samples a second",
             self.samples_per_second / 1e6
         );
         if let Some(page) = page {
-            println!("  report       {}", page.display());
+            say!("  report       {}", page.display());
         }
     }
 }

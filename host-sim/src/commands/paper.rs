@@ -5,6 +5,7 @@ use std::path::PathBuf;
 use clap::Args;
 use serde_json::{Value, json};
 
+use super::out::say;
 use super::{Result, cannot_write, progress};
 use crate::paper::{Comparison, Item, Row, STEPS, study};
 use crate::report::paper as page;
@@ -21,7 +22,7 @@ pub(super) struct Arguments {
     report: Option<PathBuf>,
     /// Prints JSON instead of tables.
     #[arg(long)]
-    json: bool,
+    pub(super) json: bool,
 }
 
 /// Significant digits enough for every figure of the paper, without the noise of the last bits.
@@ -86,7 +87,7 @@ fn print(items: &[Item]) {
     for item in items {
         if item.part != part {
             part = item.part;
-            println!("\n{part:<58} {:>12} {:>14} {:>9}", "printed", "ours", "diff %");
+            say!("\n{part:<58} {:>12} {:>14} {:>9}", "printed", "ours", "diff %");
         }
         let unit = if item.unit.is_empty() {
             String::new()
@@ -99,31 +100,43 @@ fn print(items: &[Item]) {
         let difference = item
             .difference_pct()
             .map_or(String::new(), |difference| format!("{difference:.1}"));
-        println!(
+        say!(
             "  {:<56} {:>12} {:>14} {difference:>9}",
             format!("{}{unit}", item.what),
             shown(item.printed, ""),
             shown(item.ours, "not yet"),
         );
         if !item.note.is_empty() {
-            println!("      {}", item.note);
+            say!("      {}", item.note);
         }
     }
 }
 
 fn print_comparison(comparison: &Comparison) {
-    println!(
+    say!(
         "\n{} ({}): feed {} mm/s, scallop {} mm, tolerance {} mm",
-        comparison.title, comparison.name, comparison.feed_mm_s, comparison.scallop_mm, comparison.chord_mm
+        comparison.title,
+        comparison.name,
+        comparison.feed_mm_s,
+        comparison.scallop_mm,
+        comparison.chord_mm
     );
-    println!(
+    say!(
         "  {:<14} {:>9} {:>9} {:>10} {:>10} {:>10} {:>17} {:>17} {:>10}",
-        "", "time, min", "segments", "bytes", "ripple, %", "rms, %", "CC, mm/s", "CL, mm/s", "step, mm/s"
+        "",
+        "time, min",
+        "segments",
+        "bytes",
+        "ripple, %",
+        "rms, %",
+        "CC, mm/s",
+        "CL, mm/s",
+        "step, mm/s"
     );
     for row in &comparison.rows {
         let Row { measured, .. } = row;
         let range = |span: &Span| format!("{:.3}..{:.3}", span.min, span.max);
-        println!(
+        say!(
             "  {:<14} {:>9.2} {:>9} {:>10} {:>10} {:>10} {:>17} {:>17} {:>10.3}",
             row.name(),
             measured.time_s / 60.0,
@@ -154,10 +167,10 @@ pub(super) fn command(arguments: &Arguments) -> Result<()> {
         .map(|folder| page::write(folder, &study).map_err(|error| cannot_write(folder, &error)))
         .transpose()?;
     if arguments.json {
-        println!("{}", json(&items));
+        say!("{}", json(&items));
         return Ok(());
     }
-    println!(
+    say!(
         "C.-C. Lo, A new approach to CNC tool path generation, Computer-Aided Design 30 (1998): printed against ours"
     );
     print(&study.items);
@@ -165,7 +178,7 @@ pub(super) fn command(arguments: &Arguments) -> Result<()> {
         print_comparison(comparison);
     }
     if let Some(page) = written {
-        println!("\nreport: {}", page.display());
+        say!("\nreport: {}", page.display());
     }
     Ok(())
 }

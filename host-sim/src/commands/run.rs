@@ -6,12 +6,13 @@ use std::time::Instant;
 use clap::Args;
 use interp_core::{Sample, State};
 use protocol::digest::Digest;
-use protocol::message::Status;
+use protocol::message::{Reason, Status};
 use serde_json::{Value, json};
 
-use super::outcome::{FaultAt, Outcome};
+use super::out::say;
+use super::outcome::Outcome;
 use super::simulate::{Timed, machine, surveyed, timed};
-use super::{Failure, Result, cannot_write, load, progress, trace, unheld_limits, warn_of_limits};
+use super::{Failure, Result, cannot_write, load, progress, spinner, trace, unheld_limits, warn_of_limits};
 use crate::approach::Kind;
 use crate::job_file::JobFile;
 use crate::prepare::Prepared;
@@ -42,7 +43,7 @@ pub(super) struct Arguments {
     ignore_limits: bool,
     /// Prints one JSON object instead of text.
     #[arg(long)]
-    json: bool,
+    pub(super) json: bool,
 }
 
 #[derive(Debug, Args)]
@@ -66,7 +67,16 @@ struct Ran {
 
 impl From<RemoteError> for Failure {
     fn from(error: RemoteError) -> Self {
-        Self::Failed(Some(error.to_string()))
+        let code = match &error {
+            RemoteError::Refused {
+                reason: Reason::Job { fault, .. },
+                ..
+            } => fault.code.to_string(),
+            RemoteError::Refused { reason, .. } => format!("R{}", reason.code()),
+            RemoteError::Version(_) => "R3".to_owned(),
+            _ => return Self::Failed(Some(error.to_string())),
+        };
+        Self::Failed(Some(format!("{error}\n  help: cargo sim explain {code}")))
     }
 }
 
@@ -91,8 +101,12 @@ fn connect(arguments: &Arguments) -> Result<(Option<Qemu>, Session)> {
         .map_or(1, |now| now.subsec_nanos() ^ std::process::id().rotate_left(16));
     if let Some(name) = &arguments.place.port {
         let stream = port::open(name).map_err(|error| {
+            let why = match error {
+                RemoteError::Line(cause) => format!("cannot open it as a serial port: {cause}"),
+                other => other.to_string(),
+            };
             Failure::input(
-                format!("{name}: {error}"),
+                format!("{name}: {why}"),
                 "name the board's serial port, such as /dev/ttyUSB0",
             )
         })?;
@@ -106,7 +120,12 @@ fn connect(arguments: &Arguments) -> Result<(Option<Qemu>, Session)> {
             ));
         }
         Some(image) => image.clone(),
-        None => qemu::firmware()?,
+        None => {
+            let bar = spinner("building the firmware");
+            let image = qemu::firmware();
+            bar.finish_and_clear();
+            image?
+        }
     };
     let (qemu, stream) = Qemu::start(&image)?;
     Ok((Some(qemu), Session::open(stream, number)?))
@@ -241,7 +260,7 @@ fn by_sample(
 }
 
 /// What is wrong with the board's run, if anything is.
-fn complaint(ran: &Ran, here: &Timed) -> Option<String> {
+fn complaint(ran: &Ran, here: &Timed, job: &JobFile) -> Option<String> {
     let status = &ran.status;
     if status.deadline_misses > 0 {
         return Some(format!(
@@ -270,7 +289,7 @@ fn complaint(ran: &Ran, here: &Timed) -> Option<String> {
             expected.name()
         ));
     }
-    here.fault.as_ref().map(FaultAt::sentence)
+    here.fault.as_ref().map(|fault| fault.sentence_of(job))
 }
 
 pub(super) fn command(arguments: &Arguments) -> Result<()> {
@@ -287,7 +306,9 @@ pub(super) fn command(arguments: &Arguments) -> Result<()> {
     let here = timed(&job, &prepared)?;
     let (_qemu, mut session) = connect(arguments)?;
     check_period(&job, &session)?;
-    drive::upload(&mut session, &prepared, |_| {})?;
+    let bar = progress(prepared.words.len() as u64, "uploading");
+    drive::upload(&mut session, &prepared, |words| bar.set_position(words as u64))?;
+    bar.finish_and_clear();
     let ran = if arguments.trace.is_some() {
         by_sample(arguments, &job, &prepared, &here, &mut session)?
     } else {
@@ -304,21 +325,21 @@ pub(super) fn command(arguments: &Arguments) -> Result<()> {
         samples_per_second: here.samples_per_second,
         fault: here.fault,
     };
-    let complaint = complaint(&ran, &here);
+    let complaint = complaint(&ran, &here, &job);
     let board = session.capabilities().description.board.as_str();
     if arguments.json {
-        println!("{}", json_of(&outcome, &ran, board));
+        say!("{}", json_of(&outcome, &ran, board));
     } else {
-        println!("{} on {board}", arguments.job.display());
+        say!("{} on {board}", arguments.job.display());
         outcome.print(page.as_deref());
         let (speed, missed) = (ran.ticks_per_second.round(), ran.status.deadline_misses);
-        println!("  board        {speed} ticks a second, {missed} missed");
+        say!("  board        {speed} ticks a second, {missed} missed");
         let verdict = if ran.first_difference.is_none() {
             "bit for bit the same"
         } else {
             "NOT the same"
         };
-        println!(
+        say!(
             "  compared     {} samples with this machine's: {verdict}",
             ran.compared
         );

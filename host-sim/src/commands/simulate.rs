@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 use std::time::Instant;
 
 use clap::Args;
-use interp_core::Fault;
+use interp_core::{Fault, Place};
 use protocol::digest::Digest;
 
 use super::outcome::{FaultAt, Outcome};
@@ -35,7 +35,7 @@ pub(super) struct Arguments {
     report: Option<PathBuf>,
     /// Prints one JSON object instead of text.
     #[arg(long)]
-    json: bool,
+    pub(super) json: bool,
     /// How the tool path is made.
     #[arg(long, value_enum, default_value = "surface")]
     approach: Kind,
@@ -59,7 +59,24 @@ pub(super) fn machine(job: &JobFile, prepared: &Prepared) -> Result<Machine> {
 
 fn refused(job: &JobFile, fault: Fault) -> Failure {
     let (what, remedy) = explain::fault(fault);
+    let remedy = format!("{remedy}; more: cargo sim explain {}", fault.kind.code());
     job.origin.error("surface", what, remedy).into()
+}
+
+/// Parts of the bar of a run, which goes by the side parameter: nobody knows the samples before.
+const PARTS: u64 = 1000;
+
+/// Parts of the surface that lie behind a pass.
+#[allow(
+    clippy::cast_possible_truncation,
+    clippy::cast_precision_loss,
+    clippy::cast_sign_loss,
+    reason = "a share of a bar"
+)]
+fn parts_done(side: Place, prepared: &Prepared) -> u64 {
+    let [start, end] = [0, prepared.side.breaks.len() - 1].map(|end| prepared.side.breaks[end]);
+    let share = (prepared.side.parameter(side) - start) / (end - start);
+    (share * PARTS as f64) as u64
 }
 
 /// Runs the core alone.
@@ -69,6 +86,7 @@ pub(super) fn timed(job: &JobFile, prepared: &Prepared) -> Result<Timed> {
     let mut passes: Vec<(u32, u32, u64)> = Vec::new();
     let mut current = None;
     let mut samples = 0_u64;
+    let bar = progress(PARTS, "running");
     let start = Instant::now();
     let result = machine.run(|sample| {
         if current != Some(sample.pass) {
@@ -77,6 +95,7 @@ pub(super) fn timed(job: &JobFile, prepared: &Prepared) -> Result<Timed> {
             }
             current = Some(sample.pass);
             passes.push((sample.tick, 0, 0));
+            bar.set_position(parts_done(sample.side, prepared));
         }
         run.sample(sample);
         if let Some(last) = passes.last_mut() {
@@ -86,6 +105,7 @@ pub(super) fn timed(job: &JobFile, prepared: &Prepared) -> Result<Timed> {
         true
     });
     let elapsed = start.elapsed().as_secs_f64();
+    bar.finish_and_clear();
     if let Some(last) = passes.last_mut() {
         last.2 = run.value();
     }
@@ -177,6 +197,6 @@ pub(super) fn command(arguments: &Arguments) -> Result<()> {
     outcome.tell(arguments.json, page.as_deref());
     match outcome.fault {
         None => Ok(()),
-        Some(fault) => Err(Failure::Failed(Some(fault.sentence()))),
+        Some(fault) => Err(Failure::Failed(Some(fault.sentence_of(&job)))),
     }
 }

@@ -32,7 +32,7 @@ pub(super) struct Arguments {
     job: PathBuf,
     /// Prints one JSON object instead of text.
     #[arg(long)]
-    json: bool,
+    pub(super) json: bool,
 }
 
 /// Passes that a dense scan of the surface comes to, where the samples only see their own places.

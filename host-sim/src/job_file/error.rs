@@ -15,7 +15,7 @@ struct Inner {
     what: String,
     remedy: String,
     name: String,
-    /// `None` where the file could not even be read.
+    /// `None` where the file as a whole is wrong.
     place: Option<Place>,
 }
 
@@ -48,10 +48,8 @@ impl JobFileError {
         }))
     }
 
-    /// The file could not be read.
-    pub(super) fn unreadable(name: &str, cause: &std::io::Error) -> Self {
-        let what = format!("cannot read the job file: {cause}");
-        let remedy = "give the path of a job file; samples are in jobs/".to_owned();
+    /// An error of the file as a whole.
+    pub(super) fn whole(name: &str, what: String, remedy: String) -> Self {
         Self(Box::new(Inner {
             what,
             remedy,
@@ -72,7 +70,7 @@ impl JobFileError {
         &self.0.remedy
     }
 
-    /// Line and column, both from 1; `None` where the file could not be read.
+    /// Line and column, both from 1; `None` where the file as a whole is wrong.
     #[must_use]
     pub fn line_and_column(&self) -> Option<(usize, usize)> {
         self.0.place.as_ref().map(|place| (place.line, place.column))

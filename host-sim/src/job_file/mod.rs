@@ -9,10 +9,12 @@
 //! finite and in its documented range, but whether the ball fits the surface is not known here.
 
 mod error;
+mod placement;
 mod section;
 mod surface;
 #[cfg(test)]
 mod tests;
+mod text;
 
 use std::collections::BTreeMap;
 use std::ops::Range;
@@ -43,6 +45,40 @@ pub enum Along {
     U,
     /// Passes run along v; u is fixed on a pass.
     V,
+}
+
+impl Along {
+    /// The parameter's name.
+    #[must_use]
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::U => "u",
+            Self::V => "v",
+        }
+    }
+}
+
+/// One direction of the passes, run on the core to see what it takes.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Trial {
+    /// The direction.
+    pub along: Along,
+    /// Periods of the whole job; up to the fault where there is one.
+    pub ticks: u64,
+    /// Why it cannot be machined this way.
+    pub against: Option<String>,
+}
+
+/// How a job came by the direction of its passes.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub enum AlongChoice {
+    /// The job file names it.
+    #[default]
+    Given,
+    /// The job file leaves it to [`direction::settle`](crate::direction::settle); until then the job cannot be prepared.
+    Auto,
+    /// It was settled so: u and v, in this order.
+    Chosen([Trial; 2]),
 }
 
 /// The side of the surface that the tool is on.
@@ -115,7 +151,7 @@ impl Machine {
 /// A job as its file states it.
 #[derive(Clone, Debug, PartialEq)]
 pub struct JobFile {
-    /// The surface to be cut.
+    /// The surface to be cut, placed where the file's `[placement]` wants it.
     pub surface: SurfaceSpec,
     /// Ball radius r, mm, above 0, at most [`RADIUS_MAX_MM`].
     pub radius_mm: f64,
@@ -123,7 +159,7 @@ pub struct JobFile {
     pub feed_mm_min: f64,
     /// Scallop height limit h, mm, above 0, below the ball radius.
     pub scallop_mm: f64,
-    /// The path parameter.
+    /// The path parameter. With `along = "auto"` it says nothing before [`direction::settle`](crate::direction::settle) was asked.
     pub along: Along,
     /// The side of the tool.
     pub side: Side,
@@ -146,10 +182,8 @@ impl JobFile {
     /// The file cannot be read, is not TOML, or a value in it is missing, unknown, of the wrong shape or out of range.
     pub fn load(path: &Path) -> Result<Self, JobFileError> {
         let name = path.display().to_string();
-        match std::fs::read_to_string(path) {
-            Ok(text) => Self::parse(&name, &text),
-            Err(cause) => Err(JobFileError::unreadable(&name, &cause)),
-        }
+        let text = text::read(path)?;
+        Self::parse(&name, &text)
     }
 
     /// Reads a job from text; `name` stands for the file in errors.
@@ -159,8 +193,12 @@ impl JobFile {
     pub fn parse(name: &str, text: &str) -> Result<Self, JobFileError> {
         let reader = Reader::new(name, text);
         let document = reader.document()?;
-        document.only(&["surface", "tool", "cut", "machine"], &[])?;
+        document.only(&["surface", "placement", "tool", "cut", "machine"], &[])?;
         let surface = surface::read(&document.section("surface")?)?;
+        let surface = match document.optional_section("placement")? {
+            Some(section) => placement::place(&section, &surface)?,
+            None => surface,
+        };
         let radius_mm = read_tool(&document.section("tool")?)?;
         let cut = document.section("cut")?;
         cut.only(
@@ -184,6 +222,12 @@ impl JobFile {
                 format!("`{key}` must be above 0 and below the ball radius of {radius_mm} mm, not {value}");
             Err(cut.error(key, what, remedy))
         };
+        let directions = [("u", Some(Along::U)), ("v", Some(Along::V)), ("auto", None)];
+        let along = cut.choice("along", &directions)?;
+        let mut origin = reader.origin(&document);
+        if along.is_none() {
+            origin.set_along_choice(AlongChoice::Auto);
+        }
         Ok(Self {
             surface,
             radius_mm,
@@ -194,7 +238,7 @@ impl JobFile {
                 "the feed in mm/min, e.g. 600",
             )?,
             scallop_mm: below_radius("scallop_mm", "give the scallop height limit in mm, e.g. 0.005")?,
-            along: cut.choice("along", &[("u", Along::U), ("v", Along::V)])?,
+            along: along.unwrap_or(Along::U),
             side: cut.choice("side", &[("up", Side::Up), ("+", Side::Plus), ("-", Side::Minus)])?,
             pattern: match cut.has("pattern") {
                 true => cut.choice("pattern", &[("zig", Pattern::Zig), ("zigzag", Pattern::Zigzag)])?,
@@ -214,7 +258,7 @@ impl JobFile {
             machine: document
                 .optional_section("machine")?
                 .map_or(Ok(Machine::default()), |s| read_machine(&s))?,
-            origin: reader.origin(&document),
+            origin,
         })
     }
 
@@ -284,12 +328,13 @@ fn read_machine(machine: &Section<'_>) -> Result<Machine, JobFileError> {
     Ok(read)
 }
 
-/// The file that a job came from: what an error found later needs to point at the line.
+/// Where a job came from: the file, which an error found later needs to point at the line, and who chose its direction.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Origin {
     name: Arc<str>,
     text: Arc<str>,
     keys: BTreeMap<String, Range<usize>>,
+    along_choice: AlongChoice,
 }
 
 impl Origin {
@@ -297,6 +342,27 @@ impl Origin {
     #[must_use]
     pub fn name(&self) -> &str {
         &self.name
+    }
+
+    /// Where the value of `section.key` (or the section) stands, and its line: `job.toml:10: radius_mm = 10`.
+    #[must_use]
+    pub fn quote(&self, key: &str) -> Option<String> {
+        let section = key.split('.').next().unwrap_or(key);
+        let span = self.keys.get(key).or_else(|| self.keys.get(section))?;
+        let before = self.text.get(..span.start)?.matches('\n').count();
+        let line = self.text.lines().nth(before)?;
+        let line = line.split('#').next().unwrap_or(line).trim();
+        Some(format!("{}:{}: {line}", self.name, before + 1))
+    }
+
+    /// How the job came by the direction of its passes.
+    #[must_use]
+    pub fn along_choice(&self) -> &AlongChoice {
+        &self.along_choice
+    }
+
+    pub(crate) fn set_along_choice(&mut self, choice: AlongChoice) {
+        self.along_choice = choice;
     }
 
     /// An error that points at the value of `section.key` (or at the section, or at the file, where there is none).

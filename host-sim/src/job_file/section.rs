@@ -6,7 +6,7 @@ use std::ops::Range;
 use toml::Spanned;
 use toml::de::{DeTable, DeValue};
 
-use super::{JobFileError, Origin};
+use super::{AlongChoice, JobFileError, Origin};
 
 /// Edits (insert, delete, replace) between an unknown key and the known one that is suggested for it, as a share of
 /// its length: half, beyond which a suggestion misleads more than it helps.
@@ -56,6 +56,7 @@ impl<'t> Reader<'t> {
             name: self.name.into(),
             text: self.text.into(),
             keys,
+            along_choice: AlongChoice::Given,
         }
     }
 
@@ -356,10 +357,22 @@ fn kind_of(value: &DeValue<'_>) -> &'static str {
     }
 }
 
-/// The known name with the fewest edits from `key`, if they are few enough.
+/// The known name that is `key` and its unit (`feed` for `feed_mm_min`), or else the one with the fewest edits, among those that have
+/// few enough.
 fn nearest<'k>(key: &str, known: &[&'k str]) -> Option<&'k str> {
-    let (edits, name) = known.iter().map(|name| (edit_distance(key, name), *name)).min()?;
-    (edits * SUGGESTION_SHARE <= key.chars().count().max(name.len())).then_some(name)
+    let lower = key.to_lowercase();
+    let with_unit = |name: &str| {
+        name.strip_prefix(&lower)
+            .is_some_and(|rest| rest.starts_with('_'))
+    };
+    let few = |edits: usize, name: &str| edits * SUGGESTION_SHARE <= lower.chars().count().max(name.len());
+    known.iter().copied().find(|name| with_unit(name)).or_else(|| {
+        let edits = known.iter().map(|name| (edit_distance(&lower, name), *name));
+        edits
+            .filter(|(edits, name)| few(*edits, name))
+            .min()
+            .map(|(_, name)| name)
+    })
 }
 
 /// Levenshtein distance: fewest characters inserted, deleted or replaced that turn one text into the other.

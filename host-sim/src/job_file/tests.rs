@@ -150,6 +150,8 @@ fn check(rows: &[Bad]) {
 fn keys_and_kinds() {
     check(&[
         (REVOLVED, "feed_mm_min", "feed_mm_mn", 13, 1, "unknown key `feed_mm_mn`; did you mean `feed_mm_min`?"),
+        (REVOLVED, "feed_mm_min", "feed", 13, 1, "unknown key `feed`; did you mean `feed_mm_min`?"),
+        (REVOLVED, "scallop_mm", "SCALLOP_MM", 14, 1, "did you mean `scallop_mm`?"),
         (REVOLVED, "[tool]", "[tol]", 8, 2, "unknown section `tol`; did you mean `tool`?"),
         (REVOLVED, "[tool]", "[spindle]", 8, 2, "unknown section `spindle`"),
         (REVOLVED, "feed_mm_min = 600\n", "", 12, 2, "`feed_mm_min` is missing in [cut]"),
@@ -211,6 +213,24 @@ fn ranges() {
 }
 
 #[test]
+#[rustfmt::skip] // a table: a row a line
+fn placements() {
+    const TOOL: &str = "[tool]";
+    check(&[
+        (REVOLVED, TOOL, "[placment]\n[tool]", 8, 2, "unknown section `placment`; did you mean `placement`?"),
+        (REVOLVED, TOOL, "[placement]\nrotate = [0, 0, 1]\n[tool]", 9, 1, "unknown key `rotate`; did you mean `rotate_deg`?"),
+        (REVOLVED, TOOL, "[placement]\nscale = 0\n[tool]", 9, 9, "`scale` must be above 0 and at most 1000000, not 0"),
+        (REVOLVED, TOOL, "[placement]\nscale = nan\n[tool]", 9, 9, "must be a finite number"),
+        (REVOLVED, TOOL, "[placement]\nscale = [1, 1, 1]\n[tool]", 9, 9, "`scale` must be a number, not a list"),
+        (REVOLVED, TOOL, "[placement]\nrotate_deg = 90\n[tool]", 9, 14, "`rotate_deg` must be a list, not a number"),
+        (REVOLVED, TOOL, "[placement]\nrotate_deg = [0, 361, 0]\n[tool]", 9, 14, "must be -360 to 360, not 361"),
+        (REVOLVED, TOOL, "[placement]\nplace = \"center\"\n[tool]", 9, 9, "did you mean \"centre\"?"),
+        (REVOLVED, TOOL, "[placement]\ntranslate_mm = [0, 2200, 0]\n[tool]", 9, 16, "the placed surface reaches from y = 2120.000 to 2200.000 mm"),
+        (REVOLVED, TOOL, "[placement]\ntranslate_mm = [0, 1, 0]\nscale = 100\n[tool]", 10, 9, "the machine reaches ±2147.483 mm"),
+    ]);
+}
+
+#[test]
 fn an_inner_knot_may_not_tear_the_surface() {
     let text = NURBS.replace("[0, 0, 0, 0.5, 1, 1, 1]", "[0, 0, 0, 0.5, 0.5, 0.5, 1, 1, 1]");
     let rows = "    [[14, 0, 1], [14, 9, 1]],\n";
@@ -266,7 +286,7 @@ fn a_file_that_is_not_there() {
     assert!(
         error
             .to_string()
-            .starts_with("no/such/job.toml: cannot read the job file: "),
+            .starts_with("no/such/job.toml: there is no such file"),
         "{error}"
     );
     assert_eq!(error.line_and_column(), None);

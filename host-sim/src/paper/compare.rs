@@ -76,18 +76,29 @@ const ROWS: [(Kind, f64); 5] = [
 const JOBS: usize = 3;
 /// Runs of all comparisons.
 pub const RUNS: u64 = (JOBS * ROWS.len()) as u64;
+/// Parts of a run, of which each is a step.
+pub const PARTS: u64 = 50;
 
-/// Runs one.
-fn row(case: &Case, kind: Kind) -> Result<Row, ApproachError> {
-    let mut sketch = match kind {
-        Kind::Surface => Some(Sketch::new(&case.job, case.oracle.schedule()?.len())),
-        _ => None,
+/// Runs one, and calls `step` [`PARTS`] times over its `passes`.
+fn row(case: &Case, kind: Kind, passes: usize, step: &dyn Fn()) -> Result<Row, ApproachError> {
+    let mut sketch = (kind == Kind::Surface).then(|| Sketch::new(&case.job, passes));
+    let (mut passed, mut steps) = (0, 0);
+    let mut reach = |wanted: u64| {
+        while steps < wanted.min(PARTS) {
+            steps += 1;
+            step();
+        }
     };
     let measured = measure(kind, &case.job, |motion, _| {
         if let Some(sketch) = &mut sketch {
             sketch.add(&motion.emitted);
         }
+        if motion.emitted.last_of_pass {
+            passed += 1;
+            reach(PARTS * passed / passes.max(1) as u64);
+        }
     })?;
+    reach(PARTS);
     Ok(Row {
         kind,
         period_us: case.job.machine.period_us,
@@ -96,7 +107,7 @@ fn row(case: &Case, kind: Kind) -> Result<Row, ApproachError> {
     })
 }
 
-/// All comparisons; `step` is called after each run.
+/// All comparisons; `step` is called [`PARTS`] times a run.
 ///
 /// # Errors
 /// As [`measure`].
@@ -109,6 +120,10 @@ pub fn comparisons(cases: &Cases, step: &(dyn Fn() + Sync)) -> Result<Vec<Compar
     let tasks: Vec<(usize, Kind, f64)> = (0..JOBS)
         .flat_map(|job| ROWS.map(|(kind, period_us)| (job, kind, period_us)))
         .collect();
+    let mut passes = [0; JOBS];
+    for (count, (case, _)) in passes.iter_mut().zip(&jobs) {
+        *count = case.oracle.schedule()?.len();
+    }
     let next = AtomicUsize::new(0);
     let done = Mutex::new(Vec::new());
     std::thread::scope(|scope| {
@@ -116,11 +131,10 @@ pub fn comparisons(cases: &Cases, step: &(dyn Fn() + Sync)) -> Result<Vec<Compar
             scope.spawn(|| {
                 while let Some((job, kind, period_us)) = tasks.get(next.fetch_add(1, Ordering::Relaxed)) {
                     let case = jobs[*job].0.with_period_us(*period_us);
-                    let row = row(&case, *kind);
+                    let row = row(&case, *kind, passes[*job], step);
                     done.lock()
                         .unwrap_or_else(std::sync::PoisonError::into_inner)
                         .push((*job, *kind, *period_us, row));
-                    step();
                 }
             });
         }

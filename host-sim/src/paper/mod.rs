@@ -158,7 +158,7 @@ pub struct Study {
 }
 
 /// Steps of the study, for a progress bar.
-pub const STEPS: u64 = 2 + compare::RUNS;
+pub const STEPS: u64 = 2 + compare::RUNS * compare::PARTS;
 
 /// Computes all of it. `step` is called after each of [`STEPS`] steps, from any thread.
 ///

@@ -11,8 +11,10 @@ mod patches;
 use interp_core::sample::Place;
 use interp_core::{Header, Pattern, Spacing, SurfaceKind, ToolSide, encode};
 
-use crate::job_file::{self, Along, JobFile, JobFileError, SurfaceSpec};
+use crate::job_file::{self, Along, AlongChoice, JobFile, JobFileError, SurfaceSpec};
 use crate::oracle::Oracle;
+
+pub(crate) use patches::Source;
 
 /// One parameter of the prepared surface: its spans, in the parameter's own units.
 #[derive(Clone, Debug, PartialEq)]
@@ -85,8 +87,15 @@ impl Prepared {
 ///
 /// # Errors
 /// What cannot become patches: coordinates out of the machine's range, weights that vary too much, a surface without an
-/// upper side where `side = "up"`; with the place in the job file.
+/// upper side where `side = "up"`, `along = "auto"` that was not settled; with the place in the job file.
 pub fn prepare(job: &JobFile) -> Result<Prepared, JobFileError> {
+    if job.origin.along_choice() == &AlongChoice::Auto {
+        return Err(job.origin.error(
+            "cut.along",
+            "the direction of the passes has not been settled",
+            "say along = \"u\" or \"v\", or have `direction::settle` choose",
+        ));
+    }
     let oracle = Oracle::new(job).map_err(|error| {
         job.origin.error(
             "cut.side",

@@ -5,12 +5,12 @@ use interp_core::encode::{Bicubic, substitute};
 use crate::job_file::{NurbsSpec, SurfaceSpec};
 
 /// A piece: wx, wy, wz, w as cubics of parameters from -1/2 to 1/2, `[i][j]` of `u^i v^j`.
-pub(super) type Piece = [Bicubic; 4];
+pub(crate) type Piece = [Bicubic; 4];
 
 /// A surface that has such pieces.
 #[derive(Clone, Debug)]
 #[allow(clippy::large_enum_variant, reason = "there is one a job")]
-pub(super) enum Source {
+pub(crate) enum Source {
     /// Polynomial in powers, lowest first, `[i][j]` of `u^i v^j`.
     Powers {
         coefficients: [Bicubic; 3],
@@ -22,7 +22,7 @@ pub(super) enum Source {
 
 impl Source {
     /// Of any surface but a revolved one.
-    pub(super) fn new(surface: &SurfaceSpec) -> Self {
+    pub(crate) fn new(surface: &SurfaceSpec) -> Self {
         match surface {
             SurfaceSpec::Ruled {
                 rail0_mm,
@@ -70,7 +70,7 @@ impl Source {
     }
 
     /// Where pieces have to end, in u and in v.
-    pub(super) fn breaks(&self) -> [Vec<f64>; 2] {
+    pub(crate) fn breaks(&self) -> [Vec<f64>; 2] {
         match self {
             Self::Powers { ranges, .. } => ranges.map(Vec::from),
             Self::Spline(nurbs) => {
@@ -81,7 +81,7 @@ impl Source {
     }
 
     /// The piece over a rectangle that no break divides.
-    pub(super) fn piece(&self, u: [f64; 2], v: [f64; 2]) -> Piece {
+    pub(crate) fn piece(&self, u: [f64; 2], v: [f64; 2]) -> Piece {
         match self {
             Self::Powers { coefficients, .. } => {
                 let [x, y, z] = coefficients.each_ref().map(|axis| substitute(axis, u, v));

@@ -5,6 +5,7 @@ use std::path::{Path, PathBuf};
 use cycle_plugin::plan::Stage;
 use serde_json::{Value, json};
 
+use super::super::out::{say, say_part};
 use super::super::{Failure, Result, cannot_write, progress};
 use crate::budget::PERIOD_CYCLES;
 use crate::budget::figures::{Model, whole};
@@ -62,7 +63,7 @@ fn json(worst: &Worst) -> Value {
 
 fn print(campaign: &Campaign, lab: &Lab, seed: u64, out: &Path) {
     let faults: Vec<&str> = campaign.faults.iter().copied().collect();
-    println!(
+    say!(
         "seed {seed}: {} jobs ran, {} faulted at once, {} were refused, {} samples, stack {} bytes; faults met: {}",
         campaign.ran,
         campaign.skipped,
@@ -76,9 +77,9 @@ fn print(campaign: &Campaign, lab: &Lab, seed: u64, out: &Path) {
         }
     );
     if let Some(found) = campaign.elite.first() {
-        print!("{}", describe(&found.worst));
-        println!("  job: {}", out.display());
-        println!("  again: cargo sim budget {}", out.display());
+        say_part!("{}", describe(&found.worst));
+        say!("  job: {}", out.display());
+        say!("  again: cargo sim budget {}", out.display());
     }
 }
 
@@ -110,7 +111,7 @@ pub(super) fn command(bench: &Bench, jobs: u32, seed: u64, out: &PathBuf, as_jso
             "job": out,
             "worst": json(&found.worst),
         });
-        println!("{report}");
+        say!("{report}");
     } else {
         print(&campaign, &lab, seed, out);
     }

@@ -1,0 +1,49 @@
+//! The direction of the passes, and who chose it: in words and as JSON, the same for every command.
+
+use serde_json::{Map, Value, json};
+
+use crate::job_file::{AlongChoice, JobFile, Trial};
+
+/// The keys `along` and `along_auto`: null where the job file names the direction.
+pub(super) fn json(job: &JobFile) -> Map<String, Value> {
+    let trial = |trial: &Trial| {
+        #[allow(clippy::cast_precision_loss, reason = "below 2^53")]
+        let time_s = trial.ticks as f64 * job.machine.period_s();
+        json!({
+            "ticks": trial.ticks,
+            "machining_time_s": trial.against.is_none().then_some(time_s),
+            "against": trial.against,
+        })
+    };
+    let auto = match job.origin.along_choice() {
+        AlongChoice::Chosen([u, v]) => json!({ "u": trial(u), "v": trial(v) }),
+        _ => Value::Null,
+    };
+    let mut keys = Map::new();
+    keys.insert("along".to_owned(), json!(job.along.name()));
+    keys.insert("along_auto".to_owned(), auto);
+    keys
+}
+
+/// The direction, and by how much it won where it was chosen.
+pub(super) fn sentence(job: &JobFile) -> String {
+    let chosen = job.along.name();
+    let AlongChoice::Chosen(trials) = job.origin.along_choice() else {
+        return chosen.to_owned();
+    };
+    let (mine, other) = match trials {
+        [u, v] if u.along == job.along => (u, v),
+        [u, v] => (v, u),
+    };
+    if let Some(against) = &other.against {
+        return format!("{chosen}, chosen; along {}: {against}", other.along.name());
+    }
+    #[allow(clippy::cast_precision_loss, reason = "below 2^53")]
+    let minutes = |trial: &Trial| trial.ticks as f64 * job.machine.period_s() / 60.0;
+    let (least, most) = (minutes(mine), minutes(other));
+    let less = 100.0 * (1.0 - least / most.max(f64::MIN_POSITIVE));
+    format!(
+        "{chosen}, chosen: {least:.2} min, {less:.1} % less than the {most:.2} min along {}",
+        other.along.name()
+    )
+}

@@ -1,0 +1,69 @@
+//! `new`: a commented job file to begin with.
+
+use std::fs::OpenOptions;
+use std::io::{ErrorKind, Write};
+use std::path::PathBuf;
+
+use clap::Args;
+use serde_json::json;
+
+use super::out::say;
+use super::{Failure, Result, cannot_write};
+use crate::template::{self, Kind};
+
+/// Writes a commented job file that runs at once, with every key, its unit, range and default.
+///
+/// Example: cargo sim new
+/// Example: cargo sim new -o dome.toml --kind revolved
+#[derive(Debug, Args)]
+#[command(verbatim_doc_comment)]
+pub(super) struct Arguments {
+    /// The file; one that is there stays as it is.
+    #[arg(short, long, value_name = "JOB", default_value = "job.toml")]
+    output: PathBuf,
+    /// Kind of its surface.
+    #[arg(long, value_enum, default_value = "bicubic")]
+    kind: Kind,
+    /// Writes over a file that is there.
+    #[arg(long)]
+    force: bool,
+    /// Prints one JSON object instead of text.
+    #[arg(long)]
+    pub(super) json: bool,
+}
+
+pub(super) fn command(arguments: &Arguments) -> Result<()> {
+    let path = &arguments.output;
+    let text = template::job(arguments.kind, &path.display().to_string());
+    let mut options = OpenOptions::new();
+    options.write(true);
+    if arguments.force {
+        options.create(true).truncate(true);
+    } else {
+        options.create_new(true);
+    }
+    let written = options
+        .open(path)
+        .and_then(|mut file| file.write_all(text.as_bytes()));
+    written.map_err(|error| match error.kind() {
+        ErrorKind::AlreadyExists if !path.is_dir() => Failure::input(
+            format!("{} is there already", path.display()),
+            "name another file with -o, or say --force to write over it",
+        ),
+        ErrorKind::AlreadyExists => cannot_write(path, &ErrorKind::IsADirectory.into()),
+        _ => cannot_write(path, &error),
+    })?;
+    if arguments.json {
+        say!("{}", json!({ "job": path }));
+        return Ok(());
+    }
+    say!("{}", path.display());
+    match arguments.kind {
+        Kind::File => say!(
+            "  next: name your CAD file and its face in [surface], then cargo sim simulate {}",
+            path.display()
+        ),
+        _ => say!("  next: cargo sim simulate {}", path.display()),
+    }
+    Ok(())
+}

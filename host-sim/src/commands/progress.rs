@@ -1,0 +1,39 @@
+//! How far the work is: bars on stderr, where that is a terminal and nobody asked for JSON.
+
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::Duration;
+
+use indicatif::{ProgressBar, ProgressStyle};
+
+/// How often what moves on a terminal is drawn anew.
+const TICK: Duration = Duration::from_millis(100);
+/// With `--json` there are no bars, wherever stderr goes: the caller is a program.
+static QUIET: AtomicBool = AtomicBool::new(false);
+
+/// No bars from now on.
+pub(super) fn silence() {
+    QUIET.store(true, Ordering::Relaxed);
+}
+
+fn drawn(bar: ProgressBar, template: &str, what: &'static str) -> ProgressBar {
+    if QUIET.load(Ordering::Relaxed) || bar.is_hidden() {
+        return ProgressBar::hidden();
+    }
+    if let Ok(style) = ProgressStyle::with_template(template) {
+        bar.set_style(style);
+    }
+    bar.set_message(what);
+    bar.enable_steady_tick(TICK);
+    bar
+}
+
+/// A bar that fills.
+pub(super) fn progress(length: u64, what: &'static str) -> ProgressBar {
+    let template = "{msg} {wide_bar} {percent:>3} % {elapsed} of {duration}";
+    drawn(ProgressBar::new(length), template, what)
+}
+
+/// Something that moves while there is no telling how far the work is.
+pub(super) fn spinner(what: &'static str) -> ProgressBar {
+    drawn(ProgressBar::new_spinner(), "{msg} {spinner} {elapsed}", what)
+}

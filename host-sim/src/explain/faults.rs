@@ -1,0 +1,117 @@
+//! Every fault of the core, explained.
+
+use interp_core::FaultKind;
+
+use super::{Entry, Family};
+
+/// The explanation of a fault. The compiler sees to it that there is one.
+pub(super) fn entry(kind: FaultKind) -> Entry {
+    let [meaning, value, why, remedy, example] = words(kind);
+    Entry {
+        family: Family::Fault,
+        code: kind.code(),
+        name: kind.name(),
+        meaning,
+        value,
+        why,
+        remedy,
+        example,
+    }
+}
+
+/// Meaning, value, why, remedy, example.
+fn words(kind: FaultKind) -> [&'static str; 5] {
+    match kind {
+        FaultKind::BallDoesNotFit => [
+            "The ball does not fit the surface here: it would cut into it (local gouge).",
+            "The ball's radius times the surface's principal curvature towards the tool. It must stay below 1.",
+            "The surface is hollow towards the tool, and somewhere its radius of curvature is not larger than the ball's. It need not lie along the pass: both principal directions count.",
+            "Take a smaller ball, or machine this region with another tool. If the tool is on the wrong side of the surface, change `side`.",
+            "jobs/torus.toml is a groove of 8 mm radius. With `radius_mm = 9` in [tool] the fault comes at its first sample, with the value 1.125 = 9/8.",
+        ],
+        FaultKind::DegenerateSurface => [
+            "The surface has no normal here, or folds over, so that the tool would change sides.",
+            "The sine of the angle between the surface's two parameter directions, |S_u x S_v| / (|S_u| |S_v|); 0 where it folds between two samples.",
+            "The two parameter lines touch each other, or one of them stands still where the surface is not exactly one point; or the normal turned by more than 120 degrees from one sample to the next.",
+            "End the surface before this place, or parametrise it anew. A boundary that is exactly one point, like the pole of a sphere, is allowed.",
+            "A bicubic patch whose corner lies on the line between its neighbours' tangents: there S_u and S_v are parallel.",
+        ],
+        FaultKind::ParameterBackwards => [
+            "The step of the path parameter for one period cannot be trusted, or would not run forwards.",
+            "The higher-order terms of the step over its first-order term. At -1 and below the step would run backwards.",
+            "The speed of the parametrisation changes much within one period's arc: the feed is very high for the size of the surface's features.",
+            "Lower the feed or the sampling period, or parametrise the surface more evenly.",
+            "jobs/sphere_cap.toml with `along = \"v\"` and `feed_mm_min = 500000`: 8 mm a period on circles around the pole.",
+        ],
+        FaultKind::OutOfRange => [
+            "A tool centre lies outside of what the machine can express.",
+            "The coordinate in metres. Positions are nanometres in 32 bits: from -2.147 m to 2.147 m.",
+            "The surface itself fits, but the ball's centre, offset by its radius, does not.",
+            "Move the part nearer to the origin, for example with `[placement]` and `place = \"centre\"`.",
+            "A plane at z = 2145 mm, with a ball of 5 mm above it: its centre would be at 2.150 m.",
+        ],
+        FaultKind::TooManyPatches => [
+            "The job has more surface data than the machine stores.",
+            "The 32-bit words that the job asks for.",
+            "Each span between knots, in u and in v, becomes a patch of 52 words, or 68 if it is rational.",
+            "Use fewer knots, or cut the part into several jobs.",
+            "A surface of 20 x 20 bicubic patches: 400 patches, where 309 fit.",
+        ],
+        FaultKind::PatchTooShort => [
+            "One period's arc reaches past a whole patch.",
+            "The millimetres of the arc that were left over behind the patch.",
+            "Knots lie closer together than the tool moves in one period: 0.01 mm at 600 mm/min and 1 ms.",
+            "Lower the feed, or remove knots that lie so close together.",
+            "jobs/freeform.toml at `feed_mm_min = 600000`: 10 mm a period, and its patches are 9 to 14 mm long.",
+        ],
+        FaultKind::IntervalTooSmall => [
+            "The path interval is so small that the next pass would lie on this one.",
+            "The interval as a fraction of a patch.",
+            "The scallop height limit or the ball is tiny against the surface, or the side parameter runs extremely fast at some place of the pass.",
+            "Take a larger scallop height or a larger ball, or parametrise the surface more evenly across the passes.",
+            "A patch of 1 m across the passes with a ball of 1 nm.",
+        ],
+        FaultKind::BadHeader => [
+            "A value in the job's header is not finite or out of its range.",
+            "The value.",
+            "The host checks the same ranges, with the line of the job file; so a header that the core refuses came from other software, or was damaged.",
+            "See the ranges in the comments of `cargo sim new`: ball radius up to 1000 mm, feed up to 600000 mm/min, scallop height below the ball's radius, period 10 to 100000 us.",
+            "An upload with a feed of 0 by a host of your own.",
+        ],
+        FaultKind::BadPatch => [
+            "A patch's coefficients are outside the range in which its polynomials cannot overflow, its weights vary more than 4 : 1, or a boundary that is flagged as a point is none.",
+            "The index of the patch.",
+            "The host chooses the unit of every patch so that it passes the same check; so a patch that the core refuses came from other software, or is a defect of the host tool.",
+            "If the job came from `cargo sim`, please report it.",
+            "An upload by a host of your own, with coefficients above 2^30.",
+        ],
+        FaultKind::BadLength => [
+            "The job's data are not complete, or do not have the length that the header asks for.",
+            "The number of words, or the offset, that does not belong.",
+            "The upload was cut short, or the header names other spans than the data have.",
+            "Load the job again.",
+            "A header of 2 x 3 patches with the words of five.",
+        ],
+        FaultKind::WrongState => [
+            "The machine's state does not allow what it was asked.",
+            "The code of the state: see `State` in the documentation of `interp-core`.",
+            "A job was loaded while another one runs, or a run started without a job.",
+            "Abort the run first, or wait for its end.",
+            "A second host that uploads while the first one's job runs.",
+        ],
+        FaultKind::DeadlineMissed => [
+            "The sample timer ticked, and the tick before was not done yet. The tool slows down along its path and stands.",
+            "The ticks that were missed.",
+            "Something held the processor for a whole period: a debugger's breakpoint, or a defect of the firmware. Ticks take 6 % of the period at worst.",
+            "Run without a debugger. If it comes again, please report the job with the firmware's log (`cargo sim run` names the tick).",
+            "A breakpoint in the firmware while a job runs on the board's own clock.",
+        ],
+        FaultKind::TickOverBudget => [
+            "A tick took more than a tenth of the period. The tool slows down along its path and stands.",
+            "The processor cycles that it took.",
+            "The worst tick that was found takes 5.4 % of the period, so this one is a case that was not: or interrupts of your own took the rest.",
+            "Please report the job; a lower feed makes the dearest ticks rarer. `cargo sim budget JOB` counts what each stage takes.",
+            "An interrupt handler of 20000 cycles with a higher priority than the sample task.",
+        ],
+    }
+}

@@ -1,0 +1,400 @@
+//! The program as people and scripts meet it: exit codes, streams, files, JSON.
+#![allow(clippy::unwrap_used, reason = "a test may fail by panic")]
+
+use std::path::{Path, PathBuf};
+use std::process::{Command, Output, Stdio};
+
+use serde_json::Value;
+use tempfile::TempDir;
+
+/// The program in a folder, with its arguments as one would type them (without quotes).
+fn program(folder: &Path, arguments: &str) -> Command {
+    let mut command = Command::new(env!("CARGO_BIN_EXE_host-sim"));
+    command
+        .current_dir(folder)
+        .args(arguments.split_whitespace())
+        .stdin(Stdio::null());
+    command
+}
+
+fn run(folder: &Path, arguments: &str) -> Output {
+    program(folder, arguments).output().unwrap()
+}
+
+fn out(output: &Output) -> String {
+    String::from_utf8(output.stdout.clone()).unwrap()
+}
+
+fn err(output: &Output) -> String {
+    String::from_utf8(output.stderr.clone()).unwrap()
+}
+
+fn sample(name: &str) -> String {
+    let path = PathBuf::from(env!("CARGO_MANIFEST_DIR")).join(format!("../jobs/{name}.toml"));
+    std::fs::read_to_string(path).unwrap()
+}
+
+/// A folder with a job in it: a sample with these replacements.
+fn folder_with(name: &str, edits: &[(&str, &str)]) -> TempDir {
+    let mut text = sample(name);
+    for (from, to) in edits {
+        assert!(text.contains(from), "nothing to replace: {from}");
+        text = text.replacen(from, to, 1);
+    }
+    let folder = tempfile::tempdir().unwrap();
+    std::fs::write(folder.path().join("job.toml"), text).unwrap();
+    folder
+}
+
+fn json(folder: &Path, arguments: &str) -> Value {
+    let output = run(folder, arguments);
+    assert_eq!(output.status.code(), Some(0), "{arguments}: {}", err(&output));
+    serde_json::from_slice(&output.stdout).unwrap_or_else(|error| panic!("{arguments}: {error}"))
+}
+
+/// What `--help` offers as examples, of the commands that need neither QEMU nor a minute.
+#[test]
+fn examples_of_the_help_work() {
+    let folder = tempfile::tempdir().unwrap();
+    std::fs::create_dir(folder.path().join("jobs")).unwrap();
+    for job in ["freeform", "revolved", "revolved_v", "torus", "plate"] {
+        std::fs::write(folder.path().join(format!("jobs/{job}.toml")), sample(job)).unwrap();
+    }
+    for command in ["simulate", "export", "new", "explain", "completions"] {
+        let help = out(&run(folder.path(), &format!("{command} --help")));
+        let examples: Vec<_> = help
+            .lines()
+            .filter_map(|line| line.trim().strip_prefix("Example: cargo sim "))
+            .collect();
+        assert!(!examples.is_empty(), "{command}");
+        for example in examples {
+            let arguments = example.split(" > ").next().unwrap();
+            let output = run(folder.path(), arguments);
+            assert_eq!(output.status.code(), Some(0), "{example}: {}", err(&output));
+            assert!(!output.stdout.is_empty(), "{example}");
+        }
+    }
+}
+
+/// `| head`: the reader goes away. No panic, and the exit code is that of the work.
+#[test]
+fn a_reader_that_goes_away_is_no_error() {
+    let good = folder_with("torus", &[]);
+    let bad = folder_with("torus", &[("radius_mm = 5", "radius_mm = 9")]);
+    for (folder, arguments, code) in [
+        (&good, "simulate job.toml", 0),
+        (&good, "simulate job.toml --json", 0),
+        (&good, "explain", 0),
+        (&good, "completions bash", 0),
+        (&bad, "simulate job.toml", 1),
+    ] {
+        let mut child = program(folder.path(), arguments)
+            .stdout(Stdio::piped())
+            .stderr(Stdio::piped())
+            .spawn()
+            .unwrap();
+        drop(child.stdout.take());
+        let output = child.wait_with_output().unwrap();
+        assert_eq!(output.status.code(), Some(code), "{arguments}: {}", err(&output));
+        assert!(
+            !err(&output).contains("panicked"),
+            "{arguments}: {}",
+            err(&output)
+        );
+    }
+}
+
+#[cfg(target_os = "linux")]
+#[test]
+fn a_full_disk_is_an_error() {
+    let folder = folder_with("torus", &[]);
+    let full = std::fs::OpenOptions::new().write(true).open("/dev/full").unwrap();
+    let output = program(folder.path(), "explain").stdout(full).output().unwrap();
+    assert_eq!(output.status.code(), Some(1));
+    assert!(
+        err(&output).contains("cannot write to standard output"),
+        "{}",
+        err(&output)
+    );
+}
+
+/// Every kind of nonsense ends with code 2, says what is wrong, and what to do.
+#[test]
+fn nonsense_gets_a_remedy() {
+    let folder = folder_with("torus", &[("scallop_mm", "scalop_mm")]);
+    std::fs::write(folder.path().join("empty.toml"), "").unwrap();
+    std::fs::write(folder.path().join("part.step"), "ISO-10303-21;\n").unwrap();
+    for (arguments, says) in [
+        ("simulate", &["<JOB>", "--help"][..]),
+        ("simulat job.toml", &["simulate"]),
+        ("simulate job.toml --trase x", &["--trace"]),
+        (
+            "simulate nope.toml",
+            &["nope.toml: there is no such file", "help:"],
+        ),
+        ("simulate .", &["is a folder", "help:"]),
+        ("simulate empty.toml", &["the file is empty", "cargo sim new"]),
+        ("simulate part.step", &["is a STEP file", "cargo sim import"]),
+        (
+            "simulate job.toml",
+            &["did you mean `scallop_mm`?", "job.toml:43:1", "help:"],
+        ),
+        (
+            "export job.toml --format linuxcnc --clearance -3 -o x",
+            &["--clearance -3 is not above 0", "help:"],
+        ),
+        ("export job.toml --format heidenhain -o x", &["linuxcnc, grbl"]),
+        ("budget --ticks 0", &["0 is not in 1.."]),
+        ("explain ball-dos-not-fit", &["ball-does-not-fit"]),
+        ("new -o .", &["that is a folder: name a file in it"]),
+        ("new -o no/job.toml", &["make the folder first"]),
+        ("completions tcsh", &["bash, zsh, fish"]),
+        ("run job.toml", &["--qemu|--port"]),
+    ] {
+        let output = run(folder.path(), arguments);
+        assert_eq!(output.status.code(), Some(2), "{arguments}: {}", err(&output));
+        assert!(output.stdout.is_empty(), "{arguments}");
+        for part in says {
+            assert!(
+                err(&output).contains(part),
+                "{arguments}: {part} is not in {}",
+                err(&output)
+            );
+        }
+    }
+    let help = out(&run(folder.path(), "export --help"));
+    assert!(
+        help.contains("- curve:") && !help.contains("- surface:"),
+        "{help}"
+    );
+}
+
+#[test]
+fn new_jobs_run_and_are_never_lost() {
+    let folder = tempfile::tempdir().unwrap();
+    for kind in ["bicubic", "ruled", "revolved", "nurbs"] {
+        let output = run(folder.path(), &format!("new -o {kind}.toml --kind {kind}"));
+        assert_eq!(output.status.code(), Some(0), "{}", err(&output));
+        let told = json(folder.path(), &format!("simulate {kind}.toml --json"));
+        assert!(
+            told["fault"].is_null() && told["samples"].as_u64().unwrap() > 10_000,
+            "{told}"
+        );
+        let auto = &told["along_auto"];
+        let time = |along: &str| auto[along]["machining_time_s"].as_f64().unwrap();
+        let least = time("u").min(time("v"));
+        assert_eq!(told["machining_time_s"].as_f64(), Some(least), "{kind}: {auto}");
+    }
+    let mine = folder.path().join("job.toml");
+    std::fs::write(&mine, "# mine").unwrap();
+    let output = run(folder.path(), "new");
+    assert_eq!(output.status.code(), Some(2));
+    assert!(err(&output).contains("--force"), "{}", err(&output));
+    assert_eq!(std::fs::read_to_string(&mine).unwrap(), "# mine");
+    assert_eq!(run(folder.path(), "new --force").status.code(), Some(0));
+    assert!(
+        std::fs::read_to_string(&mine)
+            .unwrap()
+            .contains("coefficients_mm")
+    );
+}
+
+/// The examples that `explain` gives for faults, where a sample job shows them: the fault comes, and points to its explanation.
+#[test]
+fn faults_come_as_explained() {
+    for (job, edits, code, name) in [
+        (
+            "torus",
+            &[("radius_mm = 5", "radius_mm = 9")][..],
+            1,
+            "ball-does-not-fit",
+        ),
+        (
+            "sphere_cap",
+            &[
+                ("along = \"u\"", "along = \"v\""),
+                ("feed_mm_min = 600 ", "feed_mm_min = 500000 "),
+            ],
+            3,
+            "parameter-backwards",
+        ),
+        (
+            "freeform",
+            &[("feed_mm_min = 1800", "feed_mm_min = 600000")],
+            6,
+            "patch-too-short",
+        ),
+    ] {
+        let folder = folder_with(job, edits);
+        // The line that has to do with it: the ball's radius, or the feed.
+        let text = std::fs::read_to_string(folder.path().join("job.toml")).unwrap();
+        let line = |key: &str| text.lines().position(|line| line.starts_with(key)).unwrap() + 1;
+        let lines = [line("radius_mm"), line("feed_mm_min")];
+        let output = run(folder.path(), "simulate job.toml --json");
+        assert_eq!(output.status.code(), Some(1), "{job}: {}", err(&output));
+        let told: Value = serde_json::from_slice(&output.stdout).unwrap();
+        assert_eq!(
+            (&told["fault"]["code"], &told["fault"]["name"]),
+            (&code.into(), &name.into()),
+            "{told}"
+        );
+        let hint = format!("cargo sim explain {code}");
+        assert!(err(&output).contains(&hint), "{}", err(&output));
+        assert!(
+            err(&output).contains(&format!("job.toml:{}: ", lines[usize::from(code != 1)])),
+            "{}",
+            err(&output)
+        );
+        let explained = json(folder.path(), &format!("explain {code} --json"));
+        assert_eq!(explained["name"], name);
+        if code == 1 {
+            assert_eq!(told["fault"]["tick"], 0);
+            assert!(
+                (told["fault"]["value"].as_f64().unwrap() - 1.125).abs() < 1e-4,
+                "{told}"
+            );
+        }
+    }
+}
+
+/// In a real bash: the script in front of a completion of cargo's that was there before.
+#[test]
+fn bash_completes_cargo_sim() {
+    let folder = tempfile::tempdir().unwrap();
+    let script = run(folder.path(), "completions bash");
+    std::fs::write(folder.path().join("isofeed.bash"), script.stdout).unwrap();
+    std::fs::write(folder.path().join("part.toml"), "").unwrap();
+    let ask = r#"
+        _before() { COMPREPLY=("before:$1:$2:$3"); }
+        complete -F _before cargo
+        source isofeed.bash
+        source isofeed.bash
+        hook=$(complete -p cargo | sed -n 's/.* -F \([^ ]*\).*/\1/p')
+        ask() {
+            COMP_WORDS=("$@") COMP_CWORD=$(($# - 1)) COMPREPLY=()
+            "$hook" "$1" "${!#}" "${COMP_WORDS[COMP_CWORD - 1]}" 2>/dev/null
+            echo "${COMPREPLY[*]}"
+        }
+        ask cargo sim ver
+        ask cargo +stable sim bud
+        ask cargo sim simulate job.toml --app
+        ask cargo sim simulate job.toml --approach c
+        ask cargo sim simulate job.toml --trace par
+        ask cargo sim explain ball
+        ask cargo sim new --kind n
+        ask cargo sim simulate --tr
+        ask cargo si
+        ask cargo build --rel
+    "#;
+    let output = Command::new("bash")
+        .args(["--norc", "-c", ask])
+        .current_dir(folder.path())
+        .output()
+        .unwrap();
+    let told = out(&output);
+    let wanted = [
+        "verify",
+        "budget",
+        "--approach",
+        "constant-cl curve",
+        "part.toml",
+        "ball-does-not-fit",
+        "nurbs",
+        "--trace",
+        "before:cargo:si:cargo",
+        "before:cargo:--rel:build",
+    ];
+    assert_eq!(told.lines().collect::<Vec<_>>(), wanted, "{}", err(&output));
+}
+
+#[test]
+fn a_placed_job_runs_and_its_errors_point_at_the_line() {
+    let placed = "[placement]\nscale = 0.5\nrotate_deg = [0, 0, 90]\nplace = \"top\"\ntranslate_mm = [100, 50, -3]\n\n[tool]";
+    let folder = folder_with("plate", &[("[tool]", placed)]);
+    let told = json(folder.path(), "verify job.toml --json");
+    assert_eq!(told["passed"], true, "{told}");
+    let far = placed.replace("100,", "2200,");
+    let folder = folder_with("plate", &[("[tool]", &far)]);
+    let output = run(folder.path(), "simulate job.toml");
+    assert_eq!(output.status.code(), Some(2));
+    for part in [
+        "the placed surface reaches",
+        "translate_mm = [2200",
+        "help: move it nearer",
+    ] {
+        assert!(err(&output).contains(part), "{}", err(&output));
+    }
+}
+
+/// Names and types that scripts rely on: `n` number, `n?` number or null (no interval before the first sample), `s` text, `o?` object or null, `o` object, `b` true or false.
+fn has(told: &Value, names: &str, of: &str) {
+    for name in names.split_whitespace() {
+        let (key, kind) = name.split_once(':').unwrap();
+        let value = told
+            .get(key)
+            .unwrap_or_else(|| panic!("{of}: no {key} in {told}"));
+        let fits = match kind {
+            "n" => value.is_number(),
+            "n?" => value.is_number() || value.is_null(),
+            "s" => value.is_string(),
+            "o" => value.is_object(),
+            "o?" => value.is_object() || value.is_null(),
+            "b" => value.is_boolean(),
+            other => panic!("no kind {other}"),
+        };
+        assert!(fits, "{of}: {key} is {value}");
+    }
+}
+
+#[test]
+fn json_has_the_names_that_scripts_rely_on() {
+    const SIMULATE: &str = "approach:s along:s along_auto:o? passes:n samples:n ticks:n segments:n program_bytes:n cc_length_mm:n \
+        cl_length_mm:n machining_time_s:n interval_min:n? ripple_max_pct:n ripple_rms_pct:n digest:s samples_per_second:n fault:o?";
+    const FAULT: &str = "code:n name:s message:s tick:n pass:n u:n v:n";
+    const VERIFY: &str = "position_error_max_nm:n normal_error_max_rad:n ripple_max_pct:n scallop_max_mm:n? scallop_mean_mm:n? \
+        gouge_max_mm:n? limits:o? passed:b";
+    const EXPORT: &str = "approach:s along:s along_auto:o? feed_mode:s passes:n segments:n blocks:n program_bytes:n cutting_time_s:n safe_z_mm:n";
+    const EXPLAIN: &str = "family:s code:n label:s name:s meaning:s value:s why:s remedy:s example:s";
+    let folder = folder_with("torus", &[("along = \"u\"", "along = \"auto\"")]);
+    for approach in ["constant-cl", "linear", "curve", "surface"] {
+        let told = json(
+            folder.path(),
+            &format!("simulate job.toml --approach {approach} --json"),
+        );
+        has(&told, SIMULATE, approach);
+        assert_eq!(told["approach"], approach);
+        has(
+            &told["along_auto"]["u"],
+            "ticks:n machining_time_s:n",
+            "along_auto",
+        );
+    }
+    has(&json(folder.path(), "verify job.toml --json"), VERIFY, "verify");
+    let told = json(folder.path(), "export job.toml --format grbl -o x.nc --json");
+    has(&told, EXPORT, "export");
+    has(&json(folder.path(), "explain R1 --json"), EXPLAIN, "explain");
+    assert_eq!(
+        json(folder.path(), "explain --json").as_array().unwrap().len(),
+        27
+    );
+    has(&json(folder.path(), "new -o n.toml --json"), "job:s", "new");
+    let bad = folder_with("torus", &[("radius_mm = 5", "radius_mm = 9")]);
+    let output = run(bad.path(), "simulate job.toml --json");
+    let told: Value = serde_json::from_slice(&output.stdout).unwrap();
+    has(&told, SIMULATE, "a fault");
+    has(&told["fault"], FAULT, "fault");
+}
+
+/// No bar, and nothing else on stderr, where that is no terminal.
+#[test]
+fn no_bars_without_a_terminal() {
+    let folder = folder_with("torus", &[("along = \"u\"", "along = \"auto\"")]);
+    for arguments in [
+        "simulate job.toml",
+        "simulate job.toml --json",
+        "export job.toml --format grbl -o x.nc",
+    ] {
+        let output = run(folder.path(), arguments);
+        assert_eq!(err(&output), "", "{arguments}");
+    }
+}
