@@ -3,6 +3,7 @@
 mod approach;
 mod budget;
 mod export;
+mod import;
 mod outcome;
 mod paper;
 mod run;
@@ -70,6 +71,7 @@ enum Command {
     Run(run::Arguments),
     Verify(verify::Arguments),
     Export(export::Arguments),
+    Import(import::Arguments),
     Paper(paper::Arguments),
     Budget(budget::Arguments),
 }
@@ -82,6 +84,7 @@ pub fn main() -> ExitCode {
         Command::Run(arguments) => run::command(&arguments),
         Command::Verify(arguments) => verify::command(&arguments),
         Command::Export(arguments) => export::command(&arguments),
+        Command::Import(arguments) => import::command(&arguments),
         Command::Paper(arguments) => paper::command(&arguments),
         Command::Budget(arguments) => budget::command(&arguments),
     };
