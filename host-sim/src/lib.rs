@@ -18,6 +18,7 @@
 
 pub mod approach;
 pub mod budget;
+pub mod cad;
 pub mod commands;
 pub mod direction;
 pub mod explain;

@@ -6,6 +6,7 @@ mod budget;
 mod completions;
 mod explain;
 mod export;
+mod import;
 mod new;
 mod out;
 mod outcome;
@@ -88,6 +89,7 @@ enum Command {
     Run(run::Arguments),
     Verify(verify::Arguments),
     Export(export::Arguments),
+    Import(import::Arguments),
     Paper(paper::Arguments),
     Budget(budget::Arguments),
     New(new::Arguments),
@@ -103,6 +105,7 @@ impl Command {
             Self::Run(arguments) => arguments.json,
             Self::Verify(arguments) => arguments.json,
             Self::Export(arguments) => arguments.json,
+            Self::Import(arguments) => arguments.json,
             Self::Paper(arguments) => arguments.json,
             Self::Budget(arguments) => arguments.json,
             Self::New(arguments) => arguments.json,
@@ -117,6 +120,7 @@ impl Command {
             Self::Run(arguments) => run::command(arguments),
             Self::Verify(arguments) => verify::command(arguments),
             Self::Export(arguments) => export::command(arguments),
+            Self::Import(arguments) => import::command(arguments),
             Self::Paper(arguments) => paper::command(arguments),
             Self::Budget(arguments) => budget::command(arguments),
             Self::New(arguments) => new::command(arguments),

@@ -9,6 +9,7 @@
 //! finite and in its documented range, but whether the ball fits the surface is not known here.
 
 mod error;
+mod file;
 mod placement;
 mod section;
 mod surface;

@@ -222,6 +222,38 @@ impl<'t> Section<'t> {
         }
     }
 
+    /// The job file's name.
+    pub(super) fn file(&self) -> &str {
+        self.reader.name
+    }
+
+    /// A text.
+    pub(super) fn text(&self, key: &str) -> Result<String, JobFileError> {
+        match self.value(key)?.value.get_ref() {
+            DeValue::String(text) => Ok(text.to_string()),
+            other => Err(self.error(
+                key,
+                format!("`{key}` must be a text in quotes, not {}", kind_of(other)),
+                format!("write {key} = \"...\""),
+            )),
+        }
+    }
+
+    /// A switch, off where it is left out.
+    pub(super) fn switch(&self, key: &str) -> Result<bool, JobFileError> {
+        if !self.has(key) {
+            return Ok(false);
+        }
+        match self.value(key)?.value.get_ref() {
+            DeValue::Boolean(on) => Ok(*on),
+            other => Err(self.error(
+                key,
+                format!("`{key}` must be true or false, not {}", kind_of(other)),
+                format!("write {key} = true, or leave it out"),
+            )),
+        }
+    }
+
     /// `N` numbers.
     pub(super) fn numbers<const N: usize>(&self, key: &str) -> Result<[f64; N], JobFileError> {
         self.value(key)?.numbers()

@@ -13,7 +13,7 @@ const TURN_SLACK_RAD: f64 = 1e-9;
 const RADIUS_SLACK_MM: f64 = 1e-9;
 
 /// Every key that some kind of surface has, and the kinds that have it.
-const KEYS: [(&str, &str); 12] = [
+const KEYS: [(&str, &str); 14] = [
     ("radius_mm", "only a revolved surface has it"),
     ("height_mm", "only a revolved surface has it"),
     ("v_rad", "only a revolved surface has it; here the range is `v`"),
@@ -26,6 +26,8 @@ const KEYS: [(&str, &str); 12] = [
     ("poles_mm", "only a nurbs surface has it"),
     ("path", "only a surface of kind \"file\" has it"),
     ("face", "only a surface of kind \"file\" has it"),
+    ("tolerance_mm", "only a surface of kind \"file\" has it"),
+    ("untrimmed", "only a surface of kind \"file\" has it"),
 ];
 
 /// A surface as the job file gives it. Lengths in mm.
@@ -143,11 +145,7 @@ pub(super) fn read(section: &Section<'_>) -> Result<SurfaceSpec, JobFileError> {
         Kind::Ruled => ruled(section),
         Kind::Bicubic => bicubic(section),
         Kind::Nurbs => nurbs(section),
-        Kind::File => Err(section.error(
-            "kind",
-            "a surface of kind \"file\" is not supported yet",
-            "write the surface itself into the job: \"revolved\", \"bicubic\", \"ruled\" or \"nurbs\"",
-        )),
+        Kind::File => super::file::read(section, &KEYS),
     }
 }
 

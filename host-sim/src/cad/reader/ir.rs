@@ -1,0 +1,502 @@
+//! From the reader's own model (`cadmpeg`) to faces: the only file that knows it.
+
+use std::collections::{BTreeMap, HashMap};
+use std::io::Cursor;
+
+use cadmpeg_core::decode::{DecodeDepth, DecodePolicy, ResourceLimits};
+use cadmpeg_ir::document::{CadIr, Model as Source};
+use cadmpeg_ir::geometry::{
+    CurveGeometry, ProceduralSurfaceDefinition as Made, SolvedSurfaceGeometry, SurfaceGeometry,
+};
+use cadmpeg_ir::math::{Point3, Vector3};
+use cadmpeg_ir::products::{OccurrenceParent, PrototypeReference};
+use cadmpeg_ir::report::Severity;
+use cadmpeg_ir::topology::{BodyKind, Sense};
+use cadmpeg_ir::transform::Transform;
+use cadmpeg_ir::units::OrthonormalFrame3;
+use cadmpeg_ir::{Codec, DecodeOptions};
+
+use super::Model;
+use super::ir_boundary::placed;
+use super::ir_geometry::{solved_curve, solved_surface};
+use crate::cad::{Boundary, CadError, Curve, Face, Placement, Surface};
+use crate::oracle::vector::Vector;
+
+/// What a file may hold: many times what the largest sound part does.
+const LIMITS: ResourceLimits = ResourceLimits {
+    max_input_bytes: 64 << 20,
+    max_decompressed_bytes_total: 256 << 20,
+    max_decompressed_bytes_per_expand: 128 << 20,
+    max_retained_bytes: 1 << 30,
+    max_entities: 4_000_000,
+    max_recursion_depth: 96,
+};
+/// Assemblies within assemblies.
+const ASSEMBLY_DEPTH_MAX: usize = 64;
+/// Surfaces made from surfaces (offsets of offsets).
+pub(super) const SURFACE_DEPTH_MAX: usize = 8;
+/// Copies of all faces that an assembly may place.
+const FACES_MAX: usize = 200_000;
+/// What is said of a surface that the reader could not make out.
+const NOT_READ: &str = " is of a kind that is not read";
+/// Warnings that are passed on.
+const WARNINGS_MAX: usize = 12;
+
+/// Reads a file with one of the codecs.
+pub(super) fn decode(file: &str, codec: &dyn Codec, bytes: Vec<u8>) -> Result<Model, CadError> {
+    let options = DecodeOptions {
+        depth: DecodeDepth::Geometry,
+        policy: DecodePolicy {
+            limits: LIMITS,
+            ..DecodePolicy::desktop()
+        },
+    };
+    let decoded = codec.decode(&mut Cursor::new(bytes), &options).map_err(|error| {
+        let what = format!("the file is broken: {}", shortened(&error.to_string()));
+        CadError::new(
+            file,
+            what,
+            "export the part again, or in another format (STEP is read best)",
+        )
+    })?;
+    let mut model = Translation::new(decoded.ir()).model(file)?;
+    for warning in &mut model.warnings {
+        explain(
+            warning,
+            decoded.report().losses.iter().map(|loss| loss.message.as_str()),
+        );
+    }
+    let losses = decoded
+        .report()
+        .losses
+        .iter()
+        .filter(|loss| loss.severity >= Severity::Warning);
+    let telling = losses.filter(|loss| {
+        let text = loss.message.to_lowercase();
+        // What is about surfaces and lost; not what is about names, colours, or curves in parameters.
+        let lost = [
+            "not projected",
+            "invalid",
+            "omitted",
+            "not a surface",
+            "quarantined",
+            "unsupported",
+        ];
+        let on = [
+            "surface",
+            "geometry",
+            "face",
+            "instance #",
+            "record",
+            "parameter data",
+        ];
+        lost.iter().any(|word| text.contains(word)) && on.iter().any(|word| text.contains(word))
+    });
+    let room = WARNINGS_MAX.saturating_sub(model.warnings.len());
+    model
+        .warnings
+        .extend(telling.take(room).map(|loss| shortened(&loss.message)));
+    Ok(model)
+}
+
+/// What the reader said of the surface that a warning names.
+fn explain<'l>(warning: &mut String, mut said: impl Iterator<Item = &'l str>) {
+    let Some((named, _)) = warning.split_once(NOT_READ) else {
+        return;
+    };
+    let Some(number) = named.rsplit('#').next() else {
+        return;
+    };
+    let name = format!("#{number} ");
+    if let Some(why) = said.find(|message| message.contains(&name)) {
+        *warning = format!("{named}{NOT_READ}: {}", shortened(why));
+    }
+}
+
+/// The first of a long text.
+fn shortened(text: &str) -> String {
+    const LENGTH: usize = 240;
+    if text.chars().count() <= LENGTH {
+        return text.to_owned();
+    }
+    let start: String = text.chars().take(LENGTH).collect();
+    format!("{start} ...")
+}
+
+pub(super) fn point(p: Point3) -> Vector {
+    [p.x, p.y, p.z]
+}
+
+pub(super) fn vector(p: &Vector3) -> Vector {
+    [p.x, p.y, p.z]
+}
+
+/// Directions of a frame: reference, the one across, axis.
+pub(super) fn frame(frame: &OrthonormalFrame3) -> [Vector; 3] {
+    [frame.reference(), &frame.binormal(), frame.axis()].map(|unit| vector(unit.as_raw()))
+}
+
+pub(super) fn placement(transform: &Transform) -> Placement {
+    Placement {
+        rows: transform.affine_rows(),
+    }
+}
+
+/// An entity's name in its file, out of the reader's: what stands after `#`, up to where it tells the context.
+pub(super) fn entity(id: &str) -> String {
+    let key = id.rsplit('#').next().unwrap_or(id);
+    match key.split('-').next() {
+        Some(first) if first.bytes().all(|byte| byte.is_ascii_digit()) && !first.is_empty() => {
+            format!("#{first}")
+        }
+        _ => key.to_owned(),
+    }
+}
+
+/// Sorts names as people count: 2 before 10.
+fn natural(id: &str) -> Vec<(u64, String)> {
+    let mut key: Vec<(u64, String)> = Vec::new();
+    let mut digits = String::new();
+    let mut text = String::new();
+    for character in id.chars() {
+        if character.is_ascii_digit() {
+            digits.push(character);
+            continue;
+        }
+        if !digits.is_empty() {
+            key.push((digits.parse().unwrap_or(u64::MAX), std::mem::take(&mut text)));
+            digits.clear();
+        }
+        text.push(character);
+    }
+    key.push((digits.parse().unwrap_or(0), text));
+    key
+}
+
+/// The model under translation, by name.
+pub(super) struct Translation<'m> {
+    pub(super) source: &'m Source,
+    surfaces: HashMap<&'m str, usize>,
+    curves: HashMap<&'m str, usize>,
+    constructions: HashMap<&'m str, usize>,
+    pub(super) loops: HashMap<&'m str, usize>,
+    pub(super) coedges: HashMap<&'m str, usize>,
+    pub(super) edges: HashMap<&'m str, usize>,
+    pub(super) vertices: HashMap<&'m str, Vector>,
+}
+
+impl<'m> Translation<'m> {
+    fn new(ir: &'m CadIr) -> Self {
+        let source = &ir.model;
+        macro_rules! index {
+            ($list:expr) => {
+                $list
+                    .iter()
+                    .enumerate()
+                    .map(|(index, item)| (item.id.as_str(), index))
+                    .collect()
+            };
+        }
+        let points: HashMap<&str, Vector> = source
+            .points
+            .iter()
+            .map(|item| (item.id.as_str(), point(item.position().get())))
+            .collect();
+        let vertices = source
+            .vertices
+            .iter()
+            .filter_map(|item| Some((item.id.as_str(), *points.get(item.point.as_str())?)))
+            .collect();
+        Self {
+            source,
+            surfaces: index!(source.surfaces),
+            curves: index!(source.curves),
+            constructions: index!(source.procedural_surfaces),
+            loops: index!(source.loops),
+            coedges: index!(source.coedges),
+            edges: index!(source.edges),
+            vertices,
+        }
+    }
+
+    /// All faces of all bodies, each where every occurrence of its part places it; then surfaces that no face uses.
+    fn model(&self, file: &str) -> Result<Model, CadError> {
+        let mut model = Model::default();
+        let homes = self.placements();
+        let shell_body = self.bodies_of_shells();
+        let mut order: Vec<_> = self.source.faces.iter().collect();
+        order.sort_by_cached_key(|face| natural(face.id.as_str()));
+        let identity = vec![Placement::IDENTITY];
+        for face in order {
+            let body = shell_body.get(face.shell.as_str());
+            let solid = body.is_some_and(|body| body.kind == BodyKind::Solid);
+            let own = body
+                .and_then(|body| body.transform.as_ref())
+                .map_or(Placement::IDENTITY, placement);
+            let homes = body
+                .and_then(|body| homes.get(body.id.as_str()))
+                .unwrap_or(&identity);
+            let name = entity(face.id.as_str());
+            let surface = match self.surface(face.surface.as_str(), 0) {
+                Ok(surface) => surface,
+                Err(why) => {
+                    model.warnings.push(format!("face {name} is left out: {why}"));
+                    continue;
+                }
+            };
+            let boundary = self.boundary(face.loops.iter().map(|id| id.as_str()));
+            let sense = if (face.sense == Sense::Forward) != self.turned_over(face.surface.as_str()) {
+                1.0
+            } else {
+                -1.0
+            };
+            for home in homes {
+                if model.faces.len() >= FACES_MAX {
+                    let what = format!("the file's assembly places more than {FACES_MAX} faces");
+                    return Err(CadError::new(file, what, "export the part alone"));
+                }
+                let home = home.after(&own);
+                let Some(surface) = surface.placed(&home) else {
+                    model
+                        .warnings
+                        .push(format!("face {name} is left out: its placement distorts it"));
+                    continue;
+                };
+                let turn = if home.mirrors() { -1.0 } else { 1.0 };
+                model.faces.push(Face {
+                    number: 0,
+                    entity: name.clone(),
+                    // A mirrored surface keeps its parameters, so that its S_u x S_v turns over.
+                    sense: sense * turn,
+                    surface,
+                    boundary: placed(&boundary, &home),
+                    solid,
+                });
+            }
+        }
+        self.lone_surfaces(&mut model);
+        model.warnings.truncate(WARNINGS_MAX);
+        Ok(model)
+    }
+
+    /// Surfaces that stand in the file by themselves, as IGES files often have them.
+    fn lone_surfaces(&self, model: &mut Model) {
+        let mut used: Vec<&str> = self
+            .source
+            .faces
+            .iter()
+            .map(|face| face.surface.as_str())
+            .collect();
+        for made in &self.source.procedural_surfaces {
+            match made.definition() {
+                Made::ParallelOffset(offset) => used.push(offset.support().as_str()),
+                Made::Offset(offset) => used.push(offset.support().as_str()),
+                Made::Subset(subset) => used.push(subset.support().as_str()),
+                Made::SubSurface(subset) => used.push(subset.support().as_str()),
+                Made::Replica { source, .. } => used.push(source.as_str()),
+                Made::CurveBounded { support, .. } => used.push(support.as_str()),
+                _ => {}
+            }
+        }
+        used.sort_unstable();
+        let mut order: Vec<_> = self
+            .source
+            .surfaces
+            .iter()
+            .filter(|surface| used.binary_search(&surface.id.as_str()).is_err())
+            .collect();
+        order.sort_by_cached_key(|surface| natural(surface.id.as_str()));
+        for item in order {
+            let name = entity(item.id.as_str());
+            match self.surface(item.id.as_str(), 0) {
+                Ok(surface) if surface.domain().iter().all(Option::is_some) => model.faces.push(Face {
+                    number: 0,
+                    entity: name,
+                    surface,
+                    boundary: Boundary::Natural,
+                    sense: 1.0,
+                    solid: false,
+                }),
+                Ok(_) => {}
+                Err(why) => model.warnings.push(format!("surface {name} is left out: {why}")),
+            }
+        }
+    }
+
+    fn bodies_of_shells(&self) -> HashMap<&'m str, &'m cadmpeg_ir::topology::Body> {
+        let bodies: HashMap<&str, _> = self
+            .source
+            .bodies
+            .iter()
+            .map(|body| (body.id.as_str(), body))
+            .collect();
+        let regions: HashMap<&str, &str> = self
+            .source
+            .regions
+            .iter()
+            .map(|region| (region.id.as_str(), region.body.as_str()))
+            .collect();
+        self.source
+            .shells
+            .iter()
+            .filter_map(|shell| {
+                let body = regions.get(shell.region.as_str())?;
+                Some((shell.id.as_str(), *bodies.get(body)?))
+            })
+            .collect()
+    }
+
+    /// Where each body stands: once for each occurrence of a part that has it.
+    fn placements(&self) -> BTreeMap<&'m str, Vec<Placement>> {
+        let occurrences: HashMap<&str, _> = self
+            .source
+            .occurrences
+            .iter()
+            .map(|occurrence| (occurrence.id.as_str(), occurrence))
+            .collect();
+        let mut of_part: BTreeMap<&str, Vec<Placement>> = BTreeMap::new();
+        for occurrence in &self.source.occurrences {
+            let PrototypeReference::Local { definition } = &occurrence.prototype else {
+                continue;
+            };
+            let mut whole = Placement::IDENTITY;
+            let mut next = Some(occurrence);
+            // A file whose assemblies contain each other has no top: such an occurrence is left out.
+            let mut depth = 0;
+            while let Some(inner) = next.filter(|_| depth < ASSEMBLY_DEPTH_MAX) {
+                let Ok(transform) = inner.effective_transform() else {
+                    break;
+                };
+                whole = placement(&transform).after(&whole);
+                next = match &inner.parent {
+                    OccurrenceParent::Root {} => None,
+                    OccurrenceParent::Occurrence { occurrence } => {
+                        occurrences.get(occurrence.as_str()).copied()
+                    }
+                };
+                depth += 1;
+            }
+            if next.is_none() {
+                of_part.entry(definition.as_str()).or_default().push(whole);
+            }
+        }
+        let mut of_body: BTreeMap<&str, Vec<Placement>> = BTreeMap::new();
+        for part in &self.source.product_definitions {
+            for body in &part.bodies {
+                if let Some(places) = of_part.get(part.id.as_str()) {
+                    of_body.entry(body.as_str()).or_default().extend(places);
+                }
+            }
+        }
+        of_body
+    }
+
+    /// A surface by its name.
+    fn surface(&self, id: &str, depth: usize) -> Result<Surface, String> {
+        if depth > SURFACE_DEPTH_MAX {
+            return Err("its surface is made from itself".to_owned());
+        }
+        let item = self
+            .surfaces
+            .get(id)
+            .and_then(|index| self.source.surfaces.get(*index))
+            .ok_or("its surface is missing")?;
+        match &item.geometry {
+            SurfaceGeometry::Solved(SolvedSurfaceGeometry::Unknown { .. }) => {
+                Err(format!("surface {}{NOT_READ}", entity(id)))
+            }
+            SurfaceGeometry::Solved(solved) => solved_surface(solved, 0),
+            SurfaceGeometry::Procedural { construction, cache } => match cache {
+                Some(solved) if !matches!(solved, SolvedSurfaceGeometry::Unknown { .. }) => {
+                    solved_surface(solved, 0)
+                }
+                _ => self.made(construction.as_str(), depth),
+            },
+        }
+    }
+
+    /// Whether the surface's own normal is `- S_u x S_v`.
+    fn turned_over(&self, id: &str) -> bool {
+        let item = self
+            .surfaces
+            .get(id)
+            .and_then(|index| self.source.surfaces.get(*index));
+        let solved = item.and_then(|item| item.geometry.solved());
+        matches!(solved, Some(SolvedSurfaceGeometry::Nurbs(nurbs)) if nurbs.normal_reversed())
+    }
+
+    /// A surface that is made from curves or from another surface.
+    fn made(&self, id: &str, depth: usize) -> Result<Surface, String> {
+        let item = self
+            .constructions
+            .get(id)
+            .and_then(|index| self.source.procedural_surfaces.get(*index))
+            .ok_or("its construction is missing")?;
+        match item.definition() {
+            Made::LinearSweep(sweep) => {
+                let profile = self.curve(sweep.directrix().as_str())?;
+                Ok(Surface::Extrusion {
+                    range: profile.domain(),
+                    profile,
+                    direction: vector(sweep.direction().finite().as_raw()),
+                })
+            }
+            Made::Extrusion(sweep) => {
+                let profile = self.curve(sweep.directrix().as_str())?;
+                Ok(Surface::Extrusion {
+                    range: sweep
+                        .parameter_interval()
+                        .map(|range| range.get())
+                        .or(profile.domain()),
+                    profile,
+                    direction: vector(sweep.direction().as_raw()),
+                })
+            }
+            Made::AxisRevolution(turn) => {
+                let profile = self.curve(turn.directrix().as_str())?;
+                let range = profile.domain().unwrap_or([-1e3, 1e3]);
+                Ok(Surface::Revolution {
+                    profile,
+                    range,
+                    origin: point(turn.axis_origin().get()),
+                    axis: vector(turn.axis_direction().as_raw()),
+                })
+            }
+            Made::ParallelOffset(offset) => Ok(Surface::Offset {
+                base: Box::new(self.surface(offset.support().as_str(), depth + 1)?),
+                distance: offset.distance().get(),
+            }),
+            Made::Offset(offset) => Ok(Surface::Offset {
+                base: Box::new(self.surface(offset.support().as_str(), depth + 1)?),
+                distance: offset.distance().get(),
+            }),
+            Made::Replica { source, transform } => self
+                .surface(source.as_str(), depth + 1)?
+                .placed(&placement(transform))
+                .ok_or_else(|| "a copy of a surface is distorted".to_owned()),
+            Made::CurveBounded { support, .. } => self.surface(support.as_str(), depth + 1),
+            Made::Subset(subset) => self.surface(subset.support().as_str(), depth + 1),
+            Made::SubSurface(subset) => self.surface(subset.support().as_str(), depth + 1),
+            Made::DegenerateTorus { .. } => Err("it is a torus that goes through itself".to_owned()),
+            _ => Err(format!(
+                "surface {} is made in a way that is not read",
+                entity(id)
+            )),
+        }
+    }
+
+    pub(super) fn curve(&self, id: &str) -> Result<Curve, String> {
+        let item = self
+            .curves
+            .get(id)
+            .and_then(|index| self.source.curves.get(*index))
+            .ok_or("a curve is missing")?;
+        let solved = match &item.geometry {
+            CurveGeometry::Solved(solved) => Some(solved),
+            CurveGeometry::Procedural { cache, .. } => cache.as_ref(),
+        };
+        solved
+            .and_then(solved_curve)
+            .ok_or_else(|| format!("curve {} is of a kind that is not read", entity(id)))
+    }
+}

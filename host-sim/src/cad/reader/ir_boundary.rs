@@ -1,0 +1,153 @@
+//! Boundaries of the reader's own model (`cadmpeg`) as points along smooth edges.
+
+use cadmpeg_ir::topology::{Coedge, Edge as SourceEdge, LoopBoundary, Sense};
+
+use super::ir::{Translation, entity};
+use crate::cad::{Boundary, Curve, Edge, Placement};
+use crate::oracle::vector::{Vector, add, dot, length, scale, subtract};
+
+/// Points along a boundary edge, its ends included.
+const EDGE_POINTS: usize = 17;
+/// How far an edge's curve may miss its vertices, mm, before it counts as not understood.
+const VERTEX_MM: f64 = 0.05;
+
+impl Translation<'_> {
+    /// A face's boundary.
+    pub(super) fn boundary<'i>(&self, loops: impl Iterator<Item = &'i str>) -> Boundary {
+        let mut all = Vec::new();
+        for id in loops {
+            let Some(item) = self.loops.get(id).and_then(|index| self.source.loops.get(*index)) else {
+                return Boundary::Unknown("a loop is missing".to_owned());
+            };
+            // One vertex alone bounds nothing: it is a pole.
+            let LoopBoundary::Ring(ring) = &item.boundary else {
+                continue;
+            };
+            let mut edges = Vec::new();
+            for id in ring.coedges() {
+                let found = self
+                    .coedges
+                    .get(id.as_str())
+                    .and_then(|index| self.source.coedges.get(*index));
+                match found
+                    .ok_or_else(|| "an edge is missing".to_owned())
+                    .and_then(|use_| self.edge(use_))
+                {
+                    Ok(smooth) => edges.extend(smooth),
+                    Err(why) => return Boundary::Unknown(why),
+                }
+            }
+            if !edges.is_empty() {
+                all.push(edges);
+            }
+        }
+        if all.is_empty() {
+            Boundary::Natural
+        } else {
+            Boundary::Loops(all)
+        }
+    }
+
+    /// The smooth parts of an edge, as points along them in the direction of its use; none for one that is a point.
+    fn edge(&self, coedge: &Coedge) -> Result<Vec<Edge>, String> {
+        let edge = self
+            .edges
+            .get(coedge.edge.as_str())
+            .and_then(|index| self.source.edges.get(*index))
+            .ok_or("an edge is missing")?;
+        let Some(curve) = edge.carrier.curve() else {
+            return if edge.start == edge.end {
+                Ok(Vec::new())
+            } else {
+                Err(format!("edge {} has no curve in space", entity(edge.id.as_str())))
+            };
+        };
+        let curve = match self.curve(curve.as_str()) {
+            Ok(curve) => curve,
+            Err(_) if edge.start == edge.end => return Ok(Vec::new()),
+            Err(why) => return Err(why),
+        };
+        let mut parts = self.along(edge, &curve)?;
+        if coedge.sense == Sense::Reversed {
+            parts.reverse();
+            parts.iter_mut().for_each(|points| points.reverse());
+        }
+        Ok(parts)
+    }
+
+    fn along(&self, edge: &SourceEdge, curve: &Curve) -> Result<Vec<Edge>, String> {
+        let ends = [&edge.start, &edge.end].map(|id| self.vertices.get(id.as_str()).copied());
+        let [Some(start), Some(end)] = ends else {
+            return Err(format!("edge {} has no ends", entity(edge.id.as_str())));
+        };
+        let share = |k: usize| k as f64 / (EDGE_POINTS - 1) as f64;
+        if let Curve::Line { .. } = curve {
+            // A line is known by its ends, whatever its parameter.
+            let points = (0..EDGE_POINTS).map(|k| add(start, scale(subtract(end, start), share(k))));
+            return Ok(vec![points.collect()]);
+        }
+        let given = edge.carrier.param_range().map(|range| range.get());
+        let closed = edge.start == edge.end || length(subtract(start, end)) < 1e-9;
+        let range = match (given, curve) {
+            (Some(range), _) => range,
+            (None, Curve::Ellipse { center, x, y }) => {
+                let angle = |p: Vector| {
+                    let from = subtract(p, *center);
+                    (dot(from, *y) / dot(*y, *y)).atan2(dot(from, *x) / dot(*x, *x))
+                };
+                let first = angle(start);
+                let turn = (angle(end) - first).rem_euclid(std::f64::consts::TAU);
+                let turn = if closed || turn == 0.0 {
+                    std::f64::consts::TAU
+                } else {
+                    turn
+                };
+                [first, first + turn]
+            }
+            (None, _) => curve.domain().ok_or("an edge has no range")?,
+        };
+        let mut ends = vec![range[0]];
+        if let Curve::Spline(spline) = curve {
+            // Some writers make one curve of a whole boundary: its corners are ends of edges.
+            let corner = |knot: &f64| spline.axis.multiplicity(*knot) >= spline.axis.degree;
+            let inside = |knot: &f64| *knot > range[0] && *knot < range[1];
+            ends.extend(
+                spline
+                    .axis
+                    .breaks()
+                    .into_iter()
+                    .filter(|knot| inside(knot) && corner(knot)),
+            );
+        }
+        ends.push(range[1]);
+        let parts: Vec<Edge> = ends
+            .windows(2)
+            .map(|part| {
+                let place = |k: usize| part[0] + (part[1] - part[0]) * share(k);
+                (0..EDGE_POINTS).map(|k| curve.at(place(k))[0]).collect()
+            })
+            .collect();
+        let [first, last] = [curve.at(range[0])[0], curve.at(range[1])[0]];
+        let missed = length(subtract(first, start)).max(length(subtract(last, end)));
+        if missed.is_nan() || missed > VERTEX_MM {
+            return Err(format!("edge {} misses its ends", entity(edge.id.as_str())));
+        }
+        Ok(parts)
+    }
+}
+
+/// A boundary, placed.
+pub(super) fn placed(boundary: &Boundary, by: &Placement) -> Boundary {
+    match boundary {
+        Boundary::Loops(loops) => Boundary::Loops(
+            loops
+                .iter()
+                .map(|edges| {
+                    let place = |edge: &Edge| edge.iter().map(|p| by.point(*p)).collect();
+                    edges.iter().map(place).collect()
+                })
+                .collect(),
+        ),
+        other => other.clone(),
+    }
+}

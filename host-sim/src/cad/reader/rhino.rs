@@ -1,0 +1,36 @@
+//! 3DM (openNURBS archives, as Rhino writes them).
+
+use super::{Model, Reader, ir};
+use crate::cad::CadError;
+
+/// The reader of 3DM files.
+pub(super) struct Rhino;
+
+/// Shortest archive: its head and the first chunk.
+const HEAD_BYTES: usize = 32;
+
+impl Reader for Rhino {
+    fn format(&self) -> &'static str {
+        "3DM"
+    }
+
+    fn endings(&self) -> &'static [&'static str] {
+        &["3dm"]
+    }
+
+    fn recognises(&self, head: &[u8]) -> bool {
+        head.starts_with(b"3D Geometry File Format ")
+    }
+
+    fn check(&self, file: &str, bytes: &[u8]) -> Result<(), CadError> {
+        if bytes.len() > HEAD_BYTES {
+            return Ok(());
+        }
+        let what = format!("the archive ends after {} bytes", bytes.len());
+        Err(CadError::new(file, what, "the file was cut short; save it again"))
+    }
+
+    fn read(&self, file: &str, bytes: Vec<u8>) -> Result<Model, CadError> {
+        ir::decode(file, &cadmpeg_codec_rhino::RhinoCodec, bytes)
+    }
+}

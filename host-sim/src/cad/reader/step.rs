@@ -1,0 +1,169 @@
+//! STEP (ISO 10303-21): AP203, AP214, AP242.
+
+use super::{Model, Reader, ir, line_of};
+use crate::cad::CadError;
+
+/// The reader of STEP files.
+pub(super) struct Step;
+
+/// Deepest nesting of parentheses that a file may have: sound ones stay below 10.
+const NESTING_MAX: usize = 64;
+/// Longest entity, bytes: a B-spline surface of a hundred thousand poles takes less.
+const ENTITY_MAX: usize = 16 << 20;
+
+impl Reader for Step {
+    fn format(&self) -> &'static str {
+        "STEP"
+    }
+
+    fn endings(&self) -> &'static [&'static str] {
+        &["step", "stp", "p21"]
+    }
+
+    fn recognises(&self, head: &[u8]) -> bool {
+        let text = head.trim_ascii_start();
+        let text = text
+            .strip_prefix(b"\xef\xbb\xbf")
+            .unwrap_or(text)
+            .trim_ascii_start();
+        text.starts_with(b"ISO-10303-21;")
+    }
+
+    fn check(&self, file: &str, bytes: &[u8]) -> Result<(), CadError> {
+        scan(file, bytes)
+    }
+
+    fn read(&self, file: &str, bytes: Vec<u8>) -> Result<Model, CadError> {
+        ir::decode(file, &cadmpeg_codec_step::StepCodec::default(), bytes)
+    }
+}
+
+/// Where a scan through the text is.
+struct Place {
+    /// Byte at which the entity began.
+    entity: usize,
+    /// Parentheses open.
+    open: usize,
+    /// In a section.
+    section: bool,
+}
+
+/// Goes through the text once: strings and comments end, parentheses match, entities end, the file ends.
+fn scan(file: &str, bytes: &[u8]) -> Result<(), CadError> {
+    let fault = |at: usize, what: &str, remedy: &str| {
+        Err(CadError::new(file, what, remedy).at_line(line_of(bytes, at)))
+    };
+    let again = "the file was cut short or changed by hand; export it again";
+    let mut place = Place {
+        entity: 0,
+        open: 0,
+        section: false,
+    };
+    let mut at = 0;
+    while at < bytes.len() {
+        match bytes[at] {
+            b'\'' => {
+                let Some(end) = bytes[at + 1..].iter().position(|byte| *byte == b'\'') else {
+                    return fault(at, "a text has no end", again);
+                };
+                at += end + 1;
+            }
+            b'/' if bytes.get(at + 1) == Some(&b'*') => {
+                let Some(end) = bytes[at + 2..].windows(2).position(|pair| pair == b"*/") else {
+                    return fault(at, "a comment has no end", again);
+                };
+                at += end + 3;
+            }
+            b'(' => {
+                place.open += 1;
+                if place.open > NESTING_MAX {
+                    return fault(at, "parentheses are nested too deep", again);
+                }
+            }
+            b')' => {
+                if place.open == 0 {
+                    return fault(at, "a parenthesis is closed that was not opened", again);
+                }
+                place.open -= 1;
+            }
+            b';' => {
+                if place.open > 0 {
+                    return fault(place.entity, "an entity's parentheses are not closed", again);
+                }
+                let entity = bytes[place.entity..at].trim_ascii();
+                if entity == b"DATA" || entity == b"HEADER" {
+                    place.section = true;
+                } else if entity == b"ENDSEC" {
+                    place.section = false;
+                } else if entity == b"END-ISO-10303-21" {
+                    return Ok(());
+                } else if place.section && entity.starts_with(b"#") {
+                    entity_numbers(file, bytes, place.entity, at)?;
+                }
+                place.entity = at + 1;
+            }
+            _ => {}
+        }
+        if at.saturating_sub(place.entity) > ENTITY_MAX {
+            return fault(place.entity, "an entity is longer than any surface", again);
+        }
+        at += 1;
+    }
+    fault(bytes.len(), "the file ends before its END-ISO-10303-21", again)
+}
+
+/// The numbers of one entity are numbers, and none is beyond what a float holds.
+fn entity_numbers(file: &str, bytes: &[u8], start: usize, end: usize) -> Result<(), CadError> {
+    let text = &bytes[start..end];
+    let mut at = 0;
+    while at < text.len() {
+        let byte = text[at];
+        if byte == b'\'' {
+            at += text[at + 1..]
+                .iter()
+                .position(|byte| *byte == b'\'')
+                .map_or(text.len(), |end| end + 2);
+            continue;
+        }
+        let begins = byte.is_ascii_digit() || byte == b'-' || byte == b'+';
+        let before = at.checked_sub(1).map_or(b',', |before| text[before]);
+        if begins && matches!(before, b'(' | b',' | b' ' | b'\n' | b'\r' | b'\t' | b'=') {
+            let length = text[at..]
+                .iter()
+                .position(|byte| matches!(byte, b',' | b')' | b' ' | b'\n' | b'\r' | b'\t' | b'('))
+                .unwrap_or(text.len() - at);
+            let word = std::str::from_utf8(&text[at..at + length]).unwrap_or("?");
+            let value: Result<f64, _> = word.parse();
+            if !value.as_ref().is_ok_and(|value| value.is_finite()) {
+                let what = format!(
+                    "`{}` is no finite number",
+                    word.chars().take(40).collect::<String>()
+                );
+                let error = CadError::new(file, what, "export the part again, or mend this entity");
+                return Err(error.at_line(line_of(bytes, start + at)));
+            }
+            at += length;
+            continue;
+        }
+        // NaN and infinity, which some programs write where a number belongs.
+        if byte.is_ascii_alphabetic() && matches!(before, b'(' | b',' | b' ' | b'\n') {
+            let length = text[at..]
+                .iter()
+                .position(|byte| !byte.is_ascii_alphanumeric() && *byte != b'_');
+            let length = length.unwrap_or(text.len() - at);
+            let word = text[at..at + length].to_ascii_lowercase();
+            if matches!(word.as_slice(), b"nan" | b"inf" | b"infinity" | b"ind") {
+                let what = format!(
+                    "`{}` stands where a number belongs",
+                    String::from_utf8_lossy(&word)
+                );
+                let error = CadError::new(file, what, "export the part again, or mend this entity");
+                return Err(error.at_line(line_of(bytes, start + at)));
+            }
+            at += length;
+            continue;
+        }
+        at += 1;
+    }
+    Ok(())
+}

@@ -1,0 +1,343 @@
+//! `import`: a face of a CAD file as a job.
+
+use std::num::NonZeroUsize;
+use std::path::{Path, PathBuf};
+use std::sync::Mutex;
+use std::sync::atomic::{AtomicUsize, Ordering};
+
+use clap::Args;
+use serde_json::{Value, json};
+
+use super::{Failure, Result, cannot_write, progress};
+use crate::cad::{
+    CadError, Face, Form, JobOptions, Machinable, Measures, Model, Options, TOLERANCE_DEFAULT_MM, Written,
+    degrees, machinable, measure, read, write_job,
+};
+
+/// Makes a job of a face of a STEP, IGES or 3DM file, or lists the faces.
+///
+/// Planes, cylinders, cones, spheres, tori, surfaces of revolution, extrusions and B-splines of degree up to 3 are taken exactly,
+/// others are approximated within the tolerance, and the deviation is measured.
+///
+/// Example: cargo sim import jobs/cad/blade.step --list
+/// Example: cargo sim import jobs/cad/blade.step --face 2 -o blade.toml --radius-mm 4
+#[derive(Debug, Args)]
+#[command(verbatim_doc_comment)]
+pub(super) struct Arguments {
+    /// STEP, IGES or 3DM file.
+    file: PathBuf,
+    /// Lists the faces; writes nothing.
+    #[arg(long, conflicts_with_all = ["face", "output"])]
+    list: bool,
+    /// The face, by its number in the list. May be left out where the file has one face.
+    #[arg(long, value_name = "N")]
+    face: Option<usize>,
+    /// Writes the job into this file.
+    #[arg(short, long, value_name = "JOB")]
+    output: Option<PathBuf>,
+    /// Overwrites the job file if there is one.
+    #[arg(long)]
+    force: bool,
+    /// How far an approximation may be from the surface, mm.
+    #[arg(long, value_name = "MM", default_value_t = TOLERANCE_DEFAULT_MM)]
+    tolerance: f64,
+    /// Of a trimmed face, takes the whole rectangle of the surface around its boundary.
+    #[arg(long)]
+    untrimmed: bool,
+    /// Ball radius, mm; without it the largest usual one that fits the hollows.
+    #[arg(long, value_name = "MM")]
+    radius_mm: Option<f64>,
+    /// Feed along the surface, mm/min.
+    #[arg(long, value_name = "F")]
+    feed_mm_min: Option<f64>,
+    /// Scallop height limit, mm.
+    #[arg(long, value_name = "MM")]
+    scallop_mm: Option<f64>,
+    /// The path parameter: "u" or "v", or what else the job file takes.
+    #[arg(long, value_name = "U|V")]
+    along: Option<String>,
+    /// Side of the tool: "up", "+" or "-"; without it up, or out of the solid.
+    #[arg(long, value_name = "SIDE", allow_hyphen_values = true)]
+    side: Option<String>,
+    /// Order of the passes: "zig" or "zigzag".
+    #[arg(long, value_name = "PATTERN")]
+    pattern: Option<String>,
+    /// Prints one JSON object instead of text.
+    #[arg(long)]
+    json: bool,
+}
+
+impl From<CadError> for Failure {
+    fn from(error: CadError) -> Self {
+        Self::input(error.to_string(), error.remedy)
+    }
+}
+
+/// A line of the list.
+struct Row<'f> {
+    face: &'f Face,
+    trimmed: Option<String>,
+    becomes: std::result::Result<(Machinable, Measures), CadError>,
+}
+
+/// Looks at all faces, on all cores, in their order.
+fn rows<'f>(file: &str, faces: &'f [Face], options: &Options) -> Vec<Row<'f>> {
+    let bar = progress(faces.len() as u64, "measuring");
+    let next = AtomicUsize::new(0);
+    let done = Mutex::new(Vec::with_capacity(faces.len()));
+    // A trimmed face is listed as what it would be, so that its size can be told.
+    let options = Options {
+        untrimmed: true,
+        ..*options
+    };
+    let threads = std::thread::available_parallelism().map_or(1, NonZeroUsize::get);
+    std::thread::scope(|scope| {
+        for _ in 0..threads.min(faces.len()) {
+            scope.spawn(|| {
+                while let Some(face) = faces.get(next.fetch_add(1, Ordering::Relaxed)) {
+                    let becomes = machinable(file, face, &options).map(|made| {
+                        let measures = measure(&made.spec());
+                        (made, measures)
+                    });
+                    let trimmed = becomes
+                        .as_ref()
+                        .ok()
+                        .and_then(|(made, _)| made.outline.trimmed.clone());
+                    bar.inc(1);
+                    if let Ok(mut done) = done.lock() {
+                        done.push(Row {
+                            face,
+                            trimmed,
+                            becomes,
+                        });
+                    }
+                }
+            });
+        }
+    });
+    bar.finish_and_clear();
+    let mut rows = done.into_inner().unwrap_or_default();
+    rows.sort_by_key(|row| row.face.number);
+    rows
+}
+
+fn row_json(row: &Row<'_>) -> Value {
+    let face = row.face;
+    let mut value = json!({
+        "face": face.number,
+        "entity": face.entity,
+        "kind": face.surface.kind(),
+        "degree": degrees(&face.surface),
+        "solid": face.solid,
+        "trimmed": row.trimmed.is_some(),
+        "trimmed_why": row.trimmed,
+    });
+    let more = match &row.becomes {
+        Ok((made, measures)) => json!({
+            "poles": [made.nurbs.poles_mm.len(), made.nurbs.poles_mm[0].len()],
+            "patches": made.patches,
+            "rational": made.nurbs.rational,
+            "size_mm": measures.size_mm(),
+            "corners_mm": measures.corners_mm,
+            "least_concave_radius_mm": { "plus": measures.concave_mm[0], "minus": measures.concave_mm[1] },
+            "becomes": if made.form == Form::Exact { "exact" } else { "approximated" },
+            "deviation": deviation_json(&made.form),
+            "error": Value::Null,
+        }),
+        Err(error) => json!({ "becomes": Value::Null, "error": error.what }),
+    };
+    if let (Value::Object(value), Value::Object(more)) = (&mut value, more) {
+        value.extend(more);
+    }
+    value
+}
+
+fn deviation_json(form: &Form) -> Value {
+    match form {
+        Form::Exact => Value::Null,
+        Form::Fitted { why, deviation } => json!({
+            "why": why,
+            "max_mm": deviation.max_mm,
+            "normal_max_rad": deviation.normal_rad,
+            "places": deviation.places,
+        }),
+    }
+}
+
+fn print_rows(rows: &[Row<'_>]) {
+    println!(
+        "{:>5} {:<18} {:<6} {:>8} {:>26} {:>11} {:>11} {:<8} becomes",
+        "face", "kind", "degree", "patches", "size mm", "hollow +", "hollow -", "trimmed"
+    );
+    for row in rows {
+        let face = row.face;
+        let degree = degrees(&face.surface).map_or("-".to_owned(), |[p, q]| format!("{p} x {q}"));
+        let (kind, number) = (face.surface.kind(), face.number);
+        let trimmed = if row.trimmed.is_some() { "yes" } else { "no" };
+        match &row.becomes {
+            Ok((made, measures)) => {
+                let [x, y, z] = measures.size_mm();
+                let size = format!("{x:.2} x {y:.2} x {z:.2}");
+                let [plus, minus] = measures
+                    .concave_mm
+                    .map(|radius| radius.map_or("-".to_owned(), |radius| format!("{radius:.3}")));
+                let becomes = match &made.form {
+                    Form::Exact => "exact".to_owned(),
+                    Form::Fitted { deviation, .. } => {
+                        format!("approximated, within {:.1e} mm", deviation.max_mm)
+                    }
+                };
+                let patches = made.patches;
+                println!(
+                    "{number:>5} {kind:<18} {degree:<6} {patches:>8} {size:>26} {plus:>11} {minus:>11} {trimmed:<8} {becomes}"
+                );
+            }
+            Err(error) => println!("{number:>5} {kind:<18} {degree:<6} {:>8} {}", "-", error.what),
+        }
+    }
+}
+
+fn list(arguments: &Arguments, file: &str, model: &Model, options: &Options) {
+    let rows = rows(file, &model.faces, options);
+    if arguments.json {
+        let value = json!({
+            "file": file,
+            "faces": rows.iter().map(row_json).collect::<Vec<_>>(),
+            "warnings": model.warnings,
+        });
+        println!("{value}");
+        return;
+    }
+    print_rows(&rows);
+    println!(
+        "hollow: least concave radius, mm, seen from the side of + or - S_u x S_v. Size and hollows of a trimmed face are of \
+         the rectangle around it."
+    );
+}
+
+/// The face that is asked for.
+pub(crate) fn chosen<'m>(
+    file: &str,
+    model: &'m Model,
+    number: Option<usize>,
+) -> std::result::Result<&'m Face, CadError> {
+    let count = model.faces.len();
+    match number {
+        None if count == 1 => Ok(&model.faces[0]),
+        None => Err(CadError::new(
+            file,
+            format!("the file has {count} faces"),
+            "say which with --face N; import --list shows them",
+        )),
+        Some(number) => number
+            .checked_sub(1)
+            .and_then(|index| model.faces.get(index))
+            .ok_or_else(|| {
+                CadError::face(
+                    file,
+                    format!("there is no face {number}: the file has {count}"),
+                    format!("give a face from 1 to {count}; import --list shows them"),
+                )
+            }),
+    }
+}
+
+fn write(path: &Path, text: &str, force: bool) -> Result<()> {
+    if path.exists() && !force {
+        return Err(Failure::input(
+            format!("{} exists already", path.display()),
+            "name another file, or overwrite it with --force",
+        ));
+    }
+    std::fs::write(path, text).map_err(|error| cannot_write(path, &error))
+}
+
+fn report(arguments: &Arguments, path: &Path, face: &Face, made: &Machinable, written: &Written) {
+    let size = written.measures.size_mm();
+    if arguments.json {
+        let value = json!({
+            "job": path.display().to_string(),
+            "face": face.number,
+            "entity": face.entity,
+            "kind": face.surface.kind(),
+            "patches": made.patches,
+            "rational": made.nurbs.rational,
+            "size_mm": size,
+            "least_concave_radius_mm": { "plus": written.measures.concave_mm[0], "minus": written.measures.concave_mm[1] },
+            "becomes": if made.form == Form::Exact { "exact" } else { "approximated" },
+            "deviation": deviation_json(&made.form),
+            "untrimmed": made.outline.trimmed.is_some(),
+            "radius_mm": written.radius_mm,
+            "side": written.side,
+            "warnings": written.warnings,
+        });
+        println!("{value}");
+        return;
+    }
+    println!("{}", path.display());
+    println!(
+        "  face         {} ({}, {})",
+        face.number,
+        face.entity,
+        face.surface.kind()
+    );
+    println!(
+        "  size         {:.3} x {:.3} x {:.3} mm",
+        size[0], size[1], size[2]
+    );
+    let exact = if made.form == Form::Exact {
+        "exact"
+    } else {
+        "approximated"
+    };
+    println!("  surface      {} patches, {exact}", made.patches);
+    println!(
+        "  tool         ball of {} mm, side \"{}\"",
+        written.radius_mm, written.side
+    );
+    for warning in &written.warnings {
+        println!("  note         {warning}");
+    }
+}
+
+pub(super) fn command(arguments: &Arguments) -> Result<()> {
+    let file = arguments.file.display().to_string();
+    let options = Options {
+        tolerance_mm: arguments.tolerance,
+        untrimmed: arguments.untrimmed,
+    };
+    if !arguments.list && arguments.output.is_none() {
+        return Err(Failure::input(
+            "neither --list nor a job file to write",
+            "show the faces with --list, or write a job with -o JOB.toml",
+        ));
+    }
+    let model = read(&arguments.file)?;
+    for warning in &model.warnings {
+        eprintln!("warning: {warning}");
+    }
+    let Some(path) = arguments.output.as_ref().filter(|_| !arguments.list) else {
+        list(arguments, &file, &model, &options);
+        return Ok(());
+    };
+    let face = chosen(&file, &model, arguments.face)?;
+    let made = machinable(&file, face, &options)?;
+    let written = write_job(
+        &file,
+        face,
+        &made,
+        &JobOptions {
+            radius_mm: arguments.radius_mm,
+            feed_mm_min: arguments.feed_mm_min,
+            scallop_mm: arguments.scallop_mm,
+            along: arguments.along.clone(),
+            side: arguments.side.clone(),
+            pattern: arguments.pattern.clone(),
+        },
+    );
+    // What the options ask for is judged by the same rules as a job written by hand, before anything is written.
+    crate::job_file::JobFile::parse(&path.display().to_string(), &written.text)?;
+    write(path, &written.text, arguments.force)?;
+    report(arguments, path, face, &made, &written);
+    Ok(())
+}

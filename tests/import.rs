@@ -1,0 +1,599 @@
+//! CAD files against the kernel that wrote them: every face of every file, the samples of a job on each, hostile files.
+#![allow(clippy::unwrap_used, reason = "a test may fail by panic")]
+
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+use std::time::{Duration, Instant};
+
+use host_sim::cad::{
+    Axis, Face, Form, JobOptions, Machinable, Model, Options, SplineSurface, Surface, machinable, read,
+    write_job,
+};
+use host_sim::commands::BOUNDS;
+use host_sim::job_file::{JobFile, NurbsSpec};
+use host_sim::machine::Machine;
+use host_sim::oracle::Oracle;
+use host_sim::prepare::prepare;
+use host_sim::survey::Survey;
+
+/// Distance of an exactly imported surface from the kernel's points, mm. Files are written to 9 (IGES) and 12 digits (STEP).
+const EXACT_MM: f64 = 1e-6;
+/// Angle of its normal, rad, likewise.
+const NORMAL_RAD: f64 = 1e-6;
+/// All CAD files with their number of faces, how many the kernel wrote that cannot be read, and how many are no faces of its.
+const FILES: [(&str, usize, usize, usize); 9] = [
+    ("blade.step", 13, 0, 0),
+    ("hood.igs", 2, 0, 0),
+    ("hood.step", 2, 0, 0),
+    ("lens_mould.step", 7, 0, 0),
+    ("mouse.3dm", 2, 0, 0),
+    ("mouse.igs", 1, 0, 0),
+    ("mouse.step", 1, 0, 0),
+    // The offset surface: its entity 140 is written with an indicator that is no unit vector, and is left out with a warning.
+    // The surface that it is an offset of then stands alone.
+    ("swept.igs", 4, 1, 1),
+    ("swept.step", 4, 0, 0),
+];
+
+fn workspace() -> PathBuf {
+    PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("..")
+}
+
+fn cad(name: &str) -> PathBuf {
+    workspace().join("jobs/cad").join(name)
+}
+
+fn whole() -> Options {
+    Options {
+        untrimmed: true,
+        ..Options::default()
+    }
+}
+
+/// A point and a normal as the kernel evaluates them.
+type Reference = ([f64; 3], [f64; 3]);
+
+/// Reference points of each face of a file, by the kernel's own numbers.
+fn references() -> BTreeMap<String, BTreeMap<usize, Vec<Reference>>> {
+    let text = std::fs::read_to_string(workspace().join("tests/golden/cad_points.txt")).unwrap();
+    let mut files: BTreeMap<String, BTreeMap<usize, Vec<Reference>>> = BTreeMap::new();
+    for line in text.lines().filter(|line| !line.starts_with('#')) {
+        let words: Vec<&str> = line.split(' ').collect();
+        let x = |k: usize| words[k].parse::<f64>().unwrap();
+        let faces = files.entry(words[0].to_owned()).or_default();
+        faces
+            .entry(words[1].parse().unwrap())
+            .or_default()
+            .push(([x(2), x(3), x(4)], [x(5), x(6), x(7)]));
+    }
+    files
+}
+
+/// The job's surface for the inverse: parameters of a point.
+fn inverse(nurbs: &NurbsSpec) -> Surface {
+    let axis = |degree: usize, knots: &[f64]| Axis {
+        degree,
+        knots: knots.to_vec(),
+    };
+    let pole = |[x, y, z, w]: &[f64; 4]| [x * w, y * w, z * w, *w];
+    Surface::Spline(SplineSurface {
+        axes: [
+            axis(nurbs.degree[0], &nurbs.knots_u),
+            axis(nurbs.degree[1], &nurbs.knots_v),
+        ],
+        poles: nurbs
+            .poles_mm
+            .iter()
+            .map(|row| row.iter().map(pole).collect())
+            .collect(),
+    })
+}
+
+fn cross(a: [f64; 3], b: [f64; 3]) -> [f64; 3] {
+    [
+        a[1] * b[2] - a[2] * b[1],
+        a[2] * b[0] - a[0] * b[2],
+        a[0] * b[1] - a[1] * b[0],
+    ]
+}
+
+fn dot(a: [f64; 3], b: [f64; 3]) -> f64 {
+    a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+}
+
+fn angle(a: [f64; 3], b: [f64; 3]) -> f64 {
+    let c = cross(a, b);
+    dot(c, c).sqrt().atan2(dot(a, b))
+}
+
+/// Farthest of the points from the surface, mm, and the largest angle between normals, rad.
+fn compared(surface: &Surface, sense: f64, points: &[Reference]) -> (f64, f64) {
+    let mut worst = (0.0_f64, 0.0_f64);
+    for (point, normal) in points {
+        let ([u, v], distance) = surface.invert(*point, None);
+        let at = surface.at(u, v);
+        worst.0 = worst.0.max(distance);
+        worst.1 = worst.1.max(angle(cross(at.u, at.v).map(|x| sense * x), *normal));
+    }
+    worst
+}
+
+/// The face, trimmed or not; at a coarser tolerance where a fit at the default one takes more patches than the board has.
+fn taken(name: &str, face: &Face) -> Machinable {
+    machinable(name, face, &whole()).unwrap_or_else(|error| {
+        assert!(error.what.contains("more than the board holds"), "{error}");
+        let coarser = Options {
+            tolerance_mm: 0.02,
+            ..whole()
+        };
+        machinable(name, face, &coarser).unwrap()
+    })
+}
+
+fn made(name: &str, model: &Model) -> Vec<Machinable> {
+    model.faces.iter().map(|face| taken(name, face)).collect()
+}
+
+/// Each face that the kernel wrote is found again, once, with its points, normals and sides.
+#[test]
+fn every_face_of_every_file() {
+    let references = references();
+    for (name, count, lost, more) in FILES {
+        let model = read(&cad(name)).unwrap();
+        assert_eq!(model.faces.len(), count, "{name}: {:?}", model.warnings);
+        let kernel = &references[name];
+        assert_eq!(kernel.len(), count + lost - more, "{name}");
+        let surfaces: Vec<_> = made(name, &model)
+            .into_iter()
+            .map(|made| (inverse(&made.nurbs), made))
+            .collect();
+        let mut taken = vec![0; count];
+        let mut missed = 0;
+        for (number, points) in kernel {
+            let mut found = false;
+            for (index, (surface, made)) in surfaces.iter().enumerate() {
+                let near = match &made.form {
+                    Form::Exact => EXACT_MM,
+                    Form::Fitted { deviation, .. } => deviation.max_mm + EXACT_MM,
+                };
+                // One point tells most faces apart.
+                let first = surface.invert(points[0].0, None).1;
+                if first > near {
+                    continue;
+                }
+                let (distance, turned) = compared(surface, model.faces[index].sense, points);
+                if distance > near {
+                    continue;
+                }
+                found = true;
+                taken[index] += 1;
+                let most = match &made.form {
+                    Form::Exact => NORMAL_RAD,
+                    Form::Fitted { deviation, .. } => deviation.normal_rad + NORMAL_RAD,
+                };
+                // A surface that stands alone in its file has no side.
+                let sided = !name.ends_with("3dm") && !name.ends_with("igs");
+                let turned = if sided {
+                    turned
+                } else {
+                    turned.min(std::f64::consts::PI - turned)
+                };
+                assert!(
+                    turned <= most,
+                    "{name}, face {number}: normals differ by {turned} rad"
+                );
+                println!(
+                    "{name:<16} kernel's face {number:>2} is {:>2} ({}): {distance:.1e} mm, {turned:.1e} rad, {} patches",
+                    index + 1,
+                    model.faces[index].surface.kind(),
+                    made.patches
+                );
+            }
+            if !found {
+                let nearest = surfaces
+                    .iter()
+                    .map(|(surface, made)| (compared(surface, 1.0, points), &made.form));
+                println!(
+                    "{name}, kernel's face {number} is not found: {:?}",
+                    nearest.collect::<Vec<_>>()
+                );
+            }
+            missed += usize::from(!found);
+        }
+        assert_eq!(missed, lost, "{name}: faces that were not found again");
+        assert!(taken.iter().all(|times| *times <= 1), "{name}: {taken:?}");
+        let not_taken = taken.iter().filter(|times| **times == 0).count();
+        assert_eq!(not_taken, more, "{name}: {taken:?}");
+    }
+}
+
+/// What is of degree 3 or less, or elementary, is exact; the others keep the tolerance, and a tighter one too.
+#[test]
+fn fits_keep_the_tolerance() {
+    let degree_5 = &read(&cad("hood.step")).unwrap().faces;
+    let swept = read(&cad("swept.step")).unwrap();
+    let offset = swept
+        .faces
+        .iter()
+        .find(|face| face.surface.kind() == "offset")
+        .unwrap();
+    for face in degree_5.iter().chain([offset]) {
+        let mut patches = 0;
+        for tolerance_mm in [0.3, 0.1, 0.02] {
+            let options = Options {
+                tolerance_mm,
+                untrimmed: true,
+            };
+            let made = machinable("", face, &options).unwrap();
+            let Form::Fitted { deviation, .. } = &made.form else {
+                panic!("{} cannot be exact", face.entity)
+            };
+            assert!(deviation.max_mm <= tolerance_mm, "{deviation:?}");
+            // The job's own surface, at places of an irregular grid, against the face's own surface.
+            let [[u0, u1], [v0, v1]] = made.outline.rectangle;
+            let surface = inverse(&made.nurbs);
+            for i in 0..101 {
+                for j in 0..97 {
+                    let u = u0 + (u1 - u0) * f64::from(i) / 100.0;
+                    let v = v0 + (v1 - v0) * f64::from(j) / 96.0;
+                    let (a, b) = (surface.at(u, v).point, face.surface.at(u, v).point);
+                    let gap = [a[0] - b[0], a[1] - b[1], a[2] - b[2]];
+                    assert!(
+                        dot(gap, gap).sqrt() <= 1.02 * tolerance_mm,
+                        "{} at {u}, {v}",
+                        face.entity
+                    );
+                }
+            }
+            assert!(
+                made.patches >= patches,
+                "a tighter tolerance takes no fewer patches"
+            );
+            patches = made.patches;
+        }
+    }
+}
+
+/// The mouse, written by three writers in two units, is one surface; the placed one is where its assembly puts it.
+#[test]
+fn formats_units_and_placements_agree() {
+    let poles = |name: &str, number: usize| {
+        let model = read(&cad(name)).unwrap();
+        let made = machinable(name, &model.faces[number], &whole()).unwrap();
+        assert_eq!(made.form, Form::Exact, "{name}");
+        made.nurbs
+    };
+    let mouse_3dm = read(&cad("mouse.3dm")).unwrap();
+    let in_3dm = mouse_3dm
+        .faces
+        .iter()
+        .position(|face| face.surface.kind() == "B-spline")
+        .unwrap();
+    let step = poles("mouse.step", 0);
+    for other in [poles("mouse.igs", 0), poles("mouse.3dm", in_3dm)] {
+        assert_eq!([&step.knots_u, &step.knots_v], [&other.knots_u, &other.knots_v]);
+        for (a, b) in step
+            .poles_mm
+            .iter()
+            .flatten()
+            .zip(other.poles_mm.iter().flatten())
+        {
+            for (a, b) in a.iter().zip(b) {
+                assert!((a - b).abs() <= 1e-9, "{a} is not {b}");
+            }
+        }
+    }
+    let job = JobFile::load(&workspace().join("jobs/freeform.toml")).unwrap();
+    let host_sim::job_file::SurfaceSpec::Nurbs(freeform) = job.surface else {
+        panic!("the mouse is a B-spline")
+    };
+    for (a, b) in step
+        .poles_mm
+        .iter()
+        .flatten()
+        .zip(freeform.poles_mm.iter().flatten())
+    {
+        assert!(
+            (0..3).all(|k| (a[k] - b[k]).abs() <= 1e-9),
+            "inches: {a:?} is not {b:?}"
+        );
+    }
+}
+
+/// Runs so many samples of a job, and on to the end of the pass.
+fn worst_nm(job: &JobFile, most: u64) -> (f64, f64, u64, Option<String>) {
+    let oracle = Oracle::new(job).unwrap();
+    let prepared = prepare(job).unwrap();
+    let mut survey = Survey::new(&prepared, &oracle, None, None);
+    let mut machine = Machine::load(&prepared).unwrap();
+    let (mut samples, mut last, mut cut) = (0, None, false);
+    let result = machine.run(|sample| {
+        let begins = last != Some(sample.pass);
+        last = Some(sample.pass);
+        samples += 1;
+        cut = samples >= most && begins;
+        survey.add(sample).is_ok() && !cut
+    });
+    let fault = result.as_ref().err().map(|fault| format!("{fault:?}"));
+    let report = survey.finish(result.is_ok() && !cut).unwrap().report;
+    (
+        report.position_nm.max.abs(),
+        report.ripple_pct.max.abs(),
+        samples,
+        fault,
+    )
+}
+
+/// A job on every face: the ball that import chooses fits, and every sample is where the oracle wants it.
+#[test]
+fn samples_on_every_face() {
+    for (name, ..) in FILES {
+        let model = read(&cad(name)).unwrap();
+        for face in &model.faces {
+            let made = taken(name, face);
+            let written = write_job(name, face, &made, &JobOptions::default());
+            let mut job = JobFile::parse("job", &written.text)
+                .unwrap_or_else(|error| panic!("{name}, face {}: {error}", face.number));
+            // Fast, and with passes far apart: a few thousand samples on each part of the face.
+            job.feed_mm_min = 6000.0;
+            job.scallop_mm = 0.1 * job.radius_mm;
+            let mut run = worst_nm(&job, 60_000);
+            // A kernel's own spans may be shorter than one period's arc: slower, then.
+            while run
+                .3
+                .as_ref()
+                .is_some_and(|fault| fault.contains("PatchTooShort"))
+                && job.feed_mm_min > 100.0
+            {
+                job.feed_mm_min *= 0.25;
+                run = worst_nm(&job, 60_000);
+            }
+            let (position_nm, ripple_pct, samples, fault) = run;
+            println!(
+                "{name:<16} {:>2} {:<18} ball {:>5} mm: {position_nm:.2} nm, ripple {ripple_pct:.6} %, {samples} samples {fault:?}",
+                face.number,
+                face.surface.kind(),
+                job.radius_mm
+            );
+            assert_eq!(fault, None, "{name}, face {}", face.number);
+            assert!(
+                position_nm <= BOUNDS.position_nm,
+                "{name}, face {}: {position_nm} nm",
+                face.number
+            );
+            assert!(samples > 100, "{name}, face {}", face.number);
+        }
+    }
+}
+
+/// A face that is trimmed is refused, and taken whole only if asked; the job file says so.
+#[test]
+fn trimmed_faces_are_said() {
+    for name in ["hood.step", "hood.igs"] {
+        let model = read(&cad(name)).unwrap();
+        let trimmed: Vec<&Face> = model
+            .faces
+            .iter()
+            .filter(|face| {
+                let refused = machinable(name, face, &Options::default()).err();
+                refused.is_some_and(|error| error.what.contains("is trimmed"))
+            })
+            .collect();
+        let [face] = trimmed.as_slice() else {
+            panic!("{name}: one of two faces is trimmed, not {}", trimmed.len())
+        };
+        let error = machinable(name, face, &Options::default()).unwrap_err();
+        assert!(error.what.contains("trimmed"), "{error}");
+        assert!(error.remedy.contains("--untrimmed"), "{}", error.remedy);
+        let made = taken(name, face);
+        let written = write_job(name, face, &made, &JobOptions::default());
+        assert!(
+            written.text.contains("# Note: the face is trimmed"),
+            "{}",
+            &written.text[..400]
+        );
+        assert!(written.warnings.iter().any(|warning| warning.contains("trimmed")));
+    }
+    // The others of analytic solids: a block with a ball and a bore cut out has trimmed planes, its sphere is whole.
+    let model = read(&cad("blade.step")).unwrap();
+    let kinds = |trimmed: bool| {
+        let mut kinds: Vec<_> = model
+            .faces
+            .iter()
+            .filter(|face| machinable("", face, &Options::default()).is_err() == trimmed)
+            .map(|face| face.surface.kind())
+            .collect();
+        kinds.sort_unstable();
+        kinds
+    };
+    assert!(
+        kinds(false).contains(&"cylinder"),
+        "the bore is whole: {:?}",
+        kinds(false)
+    );
+    assert_eq!(
+        kinds(false).iter().filter(|kind| **kind == "sphere").count(),
+        2,
+        "{:?}",
+        kinds(false)
+    );
+    assert!(
+        kinds(true).iter().all(|kind| *kind == "plane"),
+        "{:?}",
+        kinds(true)
+    );
+}
+
+/// The sample jobs that name a file: they load, prepare, and their samples are where the oracle wants them.
+#[test]
+fn sample_jobs_out_of_files() {
+    for (name, patches) in [("blade", 12), ("hood", 247)] {
+        let job = JobFile::load(&workspace().join(format!("jobs/cad/{name}.toml"))).unwrap();
+        assert_eq!(prepare(&job).unwrap().patches(), patches, "{name}");
+        let (position_nm, ripple_pct, samples, fault) = worst_nm(&job, u64::MAX);
+        println!("{name}: {position_nm:.2} nm, ripple {ripple_pct:.6} %, {samples} samples");
+        assert_eq!(fault, None, "{name}");
+        assert!(
+            position_nm <= BOUNDS.position_nm && ripple_pct <= BOUNDS.ripple_pct,
+            "{name}"
+        );
+        assert!(
+            (200_000..3_000_000).contains(&samples),
+            "{name}: {samples} samples"
+        );
+    }
+}
+
+/// A job that names a file is the same as one that holds the face, and its errors point to the line.
+#[test]
+fn jobs_that_name_a_file() {
+    let folder = workspace().join("jobs/cad");
+    let text = |surface: &str| {
+        format!(
+            "[surface]\nkind = \"file\"\n{surface}\n[tool]\nkind = \"ball\"\nradius_mm = 3\n[cut]\nfeed_mm_min = 600\n\
+             scallop_mm = 0.01\nalong = \"u\"\nside = \"up\"\n"
+        )
+    };
+    let name = folder.join("job.toml").display().to_string();
+    let job = JobFile::parse(&name, &text("path = \"mouse.step\"\nface = 1")).unwrap();
+    let model = read(&cad("mouse.step")).unwrap();
+    let made = machinable("", &model.faces[0], &Options::default()).unwrap();
+    assert_eq!(job.surface, made.spec());
+    for (surface, line, words) in [
+        ("path = \"missing.step\"", 3, "cannot read"),
+        ("path = \"mouse.step\"\nface = 2", 4, "has no face 2"),
+        ("path = \"mouse.step\"\nface = 1.5", 4, "whole number"),
+        ("path = \"hood.step\"\nface = 1", 4, "trimmed"),
+        ("path = \"mouse.step\"\nuntrimmed = 3", 4, "true or false"),
+        ("path = \"mouse.step\"\ntolerance_mm = 0", 4, "must be above 0"),
+        ("path = 5", 3, "text in quotes"),
+        (
+            "path = \"mouse.step\"\ndegree = [3, 3]",
+            4,
+            "does not belong here",
+        ),
+    ] {
+        let error = JobFile::parse(&name, &text(surface)).unwrap_err();
+        assert!(error.what().contains(words), "{surface}: {error}");
+        assert_eq!(error.line_and_column().unwrap().0, line, "{surface}: {error}");
+    }
+}
+
+/// Files that are broken, cut short, mislabelled or made to harm: each is refused in a moment, with a word on what is wrong.
+#[test]
+fn hostile_files() {
+    let folder = workspace().join("tests/hostile_cad");
+    let expected: BTreeMap<&str, (&str, Option<usize>)> = [
+        ("degree.step", ("#30", None)),
+        ("deep.step", ("nested too deep", Some(30))),
+        ("empty.step", ("empty", None)),
+        ("far.step", ("kilometre", None)),
+        ("huge_count.igs", ("entity type 144", None)),
+        ("knots_descend.step", ("#30", None)),
+        ("missing_entity.step", ("#33", None)),
+        ("multiplicity.step", ("#30", None)),
+        ("nan.step", ("nan", Some(34))),
+        ("no_end.step", ("ends before", Some(47))),
+        ("overflow.step", ("1.E999", Some(34))),
+        ("picture.3dm", ("does not begin like one", None)),
+        ("text.step", ("does not begin like one", None)),
+        ("text_without_end.step", ("not closed", Some(2))),
+        ("truncated.3dm", ("broken", None)),
+        ("truncated.igs", ("terminate section", Some(26))),
+        ("truncated.step", ("ends before", Some(40))),
+        ("zero_weight.step", ("weight 0", None)),
+    ]
+    .into();
+    // What is sound in these is read: an assembly that contains itself has no place of its own, so its part is where it is; of
+    // an offset of itself, only the surface beside it is left, and the face is named.
+    let sound = ["assembly_of_itself.step", "offset_of_itself.step", "sound.step"];
+    for entry in std::fs::read_dir(&folder).unwrap() {
+        let path = entry.unwrap().path();
+        let name = path.file_name().unwrap().to_str().unwrap().to_owned();
+        let begun = Instant::now();
+        let result = read(&path);
+        let taken = begun.elapsed();
+        assert!(taken < Duration::from_secs(20), "{name} took {taken:?}");
+        if sound.contains(&name.as_str()) {
+            let model = result.unwrap();
+            assert_eq!(model.faces.len(), 1, "{name}");
+            let left_out = model
+                .warnings
+                .iter()
+                .any(|warning| warning.contains("#22 is left out"));
+            assert_eq!(
+                left_out,
+                name.starts_with("offset"),
+                "{name}: {:?}",
+                model.warnings
+            );
+            continue;
+        }
+        let (words, line) = expected[name.as_str()];
+        let error = result.expect_err(&name);
+        println!("{error}\n  help: {}", error.remedy);
+        assert!(error.file.ends_with(&name), "{name}: {error}");
+        assert!(error.what.contains(words), "{name}: {error}");
+        assert!(line.is_none() || error.line == line, "{name}: {error}");
+        assert!(!error.remedy.is_empty());
+    }
+    let missing = read(Path::new("no/such/file.step")).unwrap_err();
+    assert!(missing.what.contains("cannot read"), "{missing}");
+}
+
+/// A file under a wrong ending is read as what it is, and that is said.
+#[test]
+fn wrong_ending() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("mouse.step");
+    std::fs::copy(cad("mouse.igs"), &path).unwrap();
+    let model = read(&path).unwrap();
+    assert_eq!(model.faces.len(), 1);
+    assert!(model.warnings[0].contains("IGES"), "{:?}", model.warnings);
+}
+
+/// The same text with every entity's number raised.
+fn renumbered(text: &str, by: usize) -> String {
+    let mut out = String::with_capacity(text.len() + text.len() / 8);
+    let mut parts = text.split('#');
+    out.push_str(parts.next().unwrap_or(""));
+    for part in parts {
+        let digits = part.bytes().take_while(u8::is_ascii_digit).count();
+        let number: usize = part[..digits].parse().unwrap();
+        out.push_str(&format!("#{}{}", number + by, &part[digits..]));
+    }
+    out
+}
+
+/// Ten megabytes of STEP, made of the mouse over and over: the time is printed; the README's figure is of a release build.
+#[test]
+fn ten_megabytes() {
+    let text = std::fs::read_to_string(cad("mouse.step")).unwrap();
+    let (head, rest) = text.split_once("DATA;\n").unwrap();
+    let (data, tail) = rest.split_once("ENDSEC;").unwrap();
+    let entities = data.matches("\n#").count() + 2;
+    let copies = 10_000_000 / data.len() + 1;
+    let mut large = format!("{head}DATA;\n");
+    for copy in 0..copies {
+        large.push_str(&renumbered(data, copy * entities));
+    }
+    large.push_str(&format!("ENDSEC;{tail}"));
+    assert!(large.len() >= 10_000_000);
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("large.step");
+    std::fs::write(&path, &large).unwrap();
+    let begun = Instant::now();
+    let model = read(&path).unwrap();
+    let made = machinable("", &model.faces[copies / 2], &Options::default()).unwrap();
+    let taken = begun.elapsed();
+    println!(
+        "{} bytes, {} faces: {:.2} s",
+        large.len(),
+        model.faces.len(),
+        taken.as_secs_f64()
+    );
+    assert_eq!(model.faces.len(), copies);
+    assert_eq!(made.patches, 64);
+    // Far above what it takes, so that a slow machine does not fail; a reader of quadratic time does.
+    assert!(taken < Duration::from_secs(120), "{taken:?}");
+}
