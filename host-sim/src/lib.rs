@@ -32,4 +32,5 @@ pub mod remote;
 pub mod report;
 pub mod speeds;
 pub mod survey;
+pub mod swept;
 pub mod trace;
