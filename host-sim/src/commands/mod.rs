@@ -7,6 +7,7 @@ mod outcome;
 mod paper;
 mod run;
 mod simulate;
+mod swept_words;
 mod verify;
 
 pub use verify::BOUNDS;
