@@ -6,7 +6,7 @@ use serde_json::{Map, Value, json};
 use crate::job_file::JobFile;
 use crate::prepare::Prepared;
 use crate::survey;
-use crate::swept::{Findings, Peak};
+use crate::swept::{Findings, Hollow, Peak};
 
 /// Bytes of surface data that the board holds.
 const STORE_BYTES: usize = STORE_WORDS * size_of::<i32>();
@@ -105,49 +105,17 @@ fn limits(job: &JobFile, found: &Findings) -> Value {
     })
 }
 
+fn row(name: &str, text: &str) {
+    println!("       {name:<22} {text}");
+}
+
+fn um(mm: f64) -> f64 {
+    1e3 * mm
+}
+
 /// The same for a person.
 pub(super) fn print(job: &JobFile, prepared: &Prepared, survey: &survey::Findings, found: &Findings) {
-    let row = |name: &str, text: String| println!("       {name:<22} {text}");
-    let verdict = |good: bool| if good { "ok  " } else { "FAIL" };
-    let um = |mm: f64| 1e3 * mm;
-    if found.ridges.is_empty() {
-        row(
-            "scallop height",
-            "not measured: fewer than two whole passes".to_owned(),
-        );
-    } else {
-        let (most, error) = (&found.scallop_max, &found.measuring_error);
-        println!(
-            "  {} {:<22} {:.4} um +- {:.4}, limit {} (max / limit {:.4}), between passes {} and {}, u = {:.6}, v = {:.6}",
-            verdict(most.height_mm <= job.scallop_mm + found.measuring_error_mm),
-            "scallop height",
-            um(most.height_mm),
-            um(found.measuring_error_mm),
-            um(job.scallop_mm),
-            most.height_mm / job.scallop_mm,
-            most.gap,
-            most.gap + 1,
-            most.u,
-            most.v
-        );
-        row(
-            "",
-            format!(
-                "mean crest {:.4} um by area ({:.1} % of the limit); {} stations; error: path {:.4}, rounding {:.4}, stations {:.4}, search {:.4} um",
-                um(found.scallop_mean_mm),
-                100.0 * found.scallop_mean_mm / job.scallop_mm,
-                found.stations,
-                um(error.path_mm),
-                um(error.rounding_mm),
-                um(error.stations_mm),
-                um(error.search_mm)
-            ),
-        );
-        row(
-            "",
-            "first and last pass lie on the boundaries: nothing is left outside".to_owned(),
-        );
-    }
+    scallop(job, found);
     match &found.gouge {
         None => println!(
             "  ok   {:<22} none deeper than {:.4} um ({} cells)",
@@ -167,36 +135,73 @@ pub(super) fn print(job: &JobFile, prepared: &Prepared, survey: &survey::Finding
     }
     axes(job, found);
     let shape = &found.shape;
-    row(
-        "least concave radius",
-        shape.hollow.map_or_else(
-            || "none: nowhere hollow".to_owned(),
-            |hollow| {
-                format!(
-                    "{:.4} mm at u = {:.6}, v = {:.6}",
-                    hollow.radius_mm, hollow.u, hollow.v
-                )
-            },
-        ),
+    let hollow = shape.hollow.map_or_else(
+        || "none: nowhere hollow".to_owned(),
+        |hollow| {
+            let Hollow { radius_mm, u, v, .. } = hollow;
+            format!("{radius_mm:.4} mm at u = {u:.6}, v = {v:.6}")
+        },
     );
+    row("least concave radius", &hollow);
     if !shape.poles.is_empty() {
         row(
             "poles",
-            format!("boundary {} is one point", shape.poles.join(", ")),
+            &format!("boundary {} is one point", shape.poles.join(", ")),
         );
     }
     row(
         "machining time",
-        format!("{:.2} min", time_s(job, survey.samples) / 60.0),
+        &format!("{:.2} min", time_s(job, survey.samples) / 60.0),
     );
     let bytes = data_bytes(prepared);
     row(
         "surface data",
-        format!(
+        &format!(
             "{} patches, {bytes} of the board's {STORE_BYTES} bytes ({:.1} %)",
             prepared.patches(),
             100.0 * ratio(bytes, STORE_BYTES)
         ),
+    );
+}
+
+fn scallop(job: &JobFile, found: &Findings) {
+    if found.ridges.is_empty() {
+        row("scallop height", "not measured: fewer than two whole passes");
+        return;
+    }
+    let (most, error) = (&found.scallop_max, &found.measuring_error);
+    let good = most.height_mm <= job.scallop_mm + found.measuring_error_mm;
+    println!(
+        "  {} {:<22} {:.4} um +- {:.4}, limit {} (max / limit {:.4}), between passes {} and {}, u = {:.6}, v = {:.6}",
+        if good { "ok  " } else { "FAIL" },
+        "scallop height",
+        um(most.height_mm),
+        um(found.measuring_error_mm),
+        um(job.scallop_mm),
+        most.height_mm / job.scallop_mm,
+        most.gap,
+        most.gap + 1,
+        most.u,
+        most.v
+    );
+    let mean = format!(
+        "mean crest {:.4} um by area, {:.1} % of the limit; {} stations",
+        um(found.scallop_mean_mm),
+        100.0 * found.scallop_mean_mm / job.scallop_mm,
+        found.stations
+    );
+    row("", &mean);
+    let parts = format!(
+        "the +- in um: way between samples {:.4}, rounding {:.4}, stations {:.4}, search {:.4}",
+        um(error.path_mm),
+        um(error.rounding_mm),
+        um(error.stations_mm),
+        um(error.search_mm)
+    );
+    row("", &parts);
+    row(
+        "",
+        "first and last pass lie on the boundaries: nothing is left outside",
     );
 }
 

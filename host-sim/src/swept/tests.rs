@@ -192,6 +192,24 @@ fn sphere_by_meridians() {
     assert_eq!((found.gouge, found.shape.degenerate), (None, None));
 }
 
+/// A plane whose lines across lie slanted to its passes: at the passes' ends the ridge is higher than between them, because the foot of
+/// a place near one end lies beyond it. There one ball's way and the other's end are equally far: d / (1 + cos) from a pass.
+#[test]
+fn slanted_ends_leave_more() {
+    let slant = 60.0_f64.to_radians();
+    let rail = |x: f64, y: f64| [[0.0, 0.0, 30.0, x], [0.0, 0.0, 0.0, y], [0.0; 4]];
+    let surface = SurfaceSpec::Ruled {
+        rail0_mm: rail(0.0, 0.0),
+        rail1_mm: rail(20.0 * slant.tan(), 20.0),
+        u: [0.0, 1.0],
+        v: [0.0, 1.0],
+    };
+    let found = measured(&job(surface, Along::U, Side::Up, 0.02), &[0.0, 0.03, 0.06], 1000);
+    agrees(&found, flat(2.0 * 0.6 / (1.0 + slant.cos())));
+    assert!(found.scallop_max.u == 0.0 || found.scallop_max.u == 1.0);
+    assert!(found.scallop_max.height_mm > 1.7 * flat(0.6));
+}
+
 /// A profile in x and z, drawn out along y by 40 mm; u along the profile.
 fn extruded(degree: usize, profile: &[[f64; 2]]) -> SurfaceSpec {
     let spans = profile.len() - degree;
