@@ -36,4 +36,5 @@ pub mod report;
 pub mod speeds;
 pub mod survey;
 pub mod template;
+pub mod swept;
 pub mod trace;

@@ -165,7 +165,7 @@ fn deviation_json(form: &Form) -> Value {
 }
 
 fn print_rows(rows: &[Row<'_>]) {
-    println!(
+    say!(
         "{:>5} {:<18} {:<6} {:>8} {:>26} {:>11} {:>11} {:<8} becomes",
         "face", "kind", "degree", "patches", "size mm", "hollow +", "hollow -", "trimmed"
     );
@@ -188,11 +188,11 @@ fn print_rows(rows: &[Row<'_>]) {
                     }
                 };
                 let patches = made.patches;
-                println!(
+                say!(
                     "{number:>5} {kind:<18} {degree:<6} {patches:>8} {size:>26} {plus:>11} {minus:>11} {trimmed:<8} {becomes}"
                 );
             }
-            Err(error) => println!("{number:>5} {kind:<18} {degree:<6} {:>8} {}", "-", error.what),
+            Err(error) => say!("{number:>5} {kind:<18} {degree:<6} {:>8} {}", "-", error.what),
         }
     }
 }
@@ -205,11 +205,11 @@ fn list(arguments: &Arguments, file: &str, model: &Model, options: &Options) {
             "faces": rows.iter().map(row_json).collect::<Vec<_>>(),
             "warnings": model.warnings,
         });
-        println!("{value}");
+        say!("{value}");
         return;
     }
     print_rows(&rows);
-    println!(
+    say!(
         "hollow: least concave radius, mm, seen from the side of + or - S_u x S_v. Size and hollows of a trimmed face are of \
          the rectangle around it."
     );
@@ -271,17 +271,17 @@ fn report(arguments: &Arguments, path: &Path, face: &Face, made: &Machinable, wr
             "side": written.side,
             "warnings": written.warnings,
         });
-        println!("{value}");
+        say!("{value}");
         return;
     }
-    println!("{}", path.display());
-    println!(
+    say!("{}", path.display());
+    say!(
         "  face         {} ({}, {})",
         face.number,
         face.entity,
         face.surface.kind()
     );
-    println!(
+    say!(
         "  size         {:.3} x {:.3} x {:.3} mm",
         size[0], size[1], size[2]
     );
@@ -290,13 +290,13 @@ fn report(arguments: &Arguments, path: &Path, face: &Face, made: &Machinable, wr
     } else {
         "approximated"
     };
-    println!("  surface      {} patches, {exact}", made.patches);
-    println!(
+    say!("  surface      {} patches, {exact}", made.patches);
+    say!(
         "  tool         ball of {} mm, side \"{}\"",
         written.radius_mm, written.side
     );
     for warning in &written.warnings {
-        println!("  note         {warning}");
+        say!("  note         {warning}");
     }
 }
 
@@ -314,7 +314,7 @@ pub(super) fn command(arguments: &Arguments) -> Result<()> {
     }
     let model = read(&arguments.file)?;
     for warning in &model.warnings {
-        eprintln!("warning: {warning}");
+        complain!("warning: {warning}");
     }
     let Some(path) = arguments.output.as_ref().filter(|_| !arguments.list) else {
         list(arguments, &file, &model, &options);

@@ -14,6 +14,7 @@ mod paper;
 mod progress;
 mod run;
 mod simulate;
+mod swept_words;
 mod verify;
 
 pub use verify::BOUNDS;

@@ -3,12 +3,16 @@
 use std::path::PathBuf;
 
 use clap::Args;
-use serde_json::{Value, json};
+use indicatif::ProgressBar;
+use serde_json::Value;
 
-use super::simulate::{oracle, surveyed, timed};
-use super::{Failure, Result, load, warn_of_limits};
-use crate::oracle::{Bounds, Figure};
-use crate::survey::Findings;
+use super::simulate::{Timed, machine, oracle, timed};
+use super::{Failure, Result, load, progress, swept_words, warn_of_limits};
+use crate::job_file::JobFile;
+use crate::oracle::{Bounds, Emitted, Figure};
+use crate::prepare::Prepared;
+use crate::survey::{Findings, Survey};
+use crate::swept::{self, Track};
 
 /// What every sample has to hold to: the figures of the README.
 pub const BOUNDS: Bounds = Bounds {
@@ -21,8 +25,9 @@ pub const BOUNDS: Bounds = Bounds {
     fit: 1.0,
 };
 
-/// Checks every sample of a job against an independent f64 oracle: positions, normals, feed ripple, path intervals,
-/// schedule, and whether the ball fits.
+/// Checks a job before anything moves. Every sample against an independent f64 oracle: positions, normals, feed ripple, path
+/// intervals, schedule. The ball's swept envelope against the surface: scallop height everywhere, gouges, local or by another
+/// part of the path. Travel and limits of the axes, the tightest hollow, machining time, size of the data.
 ///
 /// Example: cargo sim verify jobs/plate.toml
 #[derive(Debug, Args)]
@@ -43,7 +48,7 @@ fn scanned_passes(job: &crate::job_file::JobFile) -> Result<Option<usize>> {
 fn line(name: &str, figure: &Figure, bound: f64, unit: &str) {
     let verdict = if figure.max.abs() <= bound { "ok  " } else { "FAIL" };
     let at = figure.at;
-    println!(
+    say!(
         "  {verdict} {name:<22} {:>10.3e} {unit:<4} (at most {bound:.0e}) at tick {}, pass {}, u = {:.6}, v = {:.6}",
         figure.max.abs(),
         at.tick,
@@ -53,7 +58,7 @@ fn line(name: &str, figure: &Figure, bound: f64, unit: &str) {
     );
 }
 
-fn print(findings: &Findings, scanned: Option<usize>, failures: &[String]) {
+fn print(findings: &Findings, scanned: Option<usize>) {
     let report = &findings.report;
     line("cutter location", &report.position_nm, BOUNDS.position_nm, "nm");
     line("cutter contact", &report.contact_nm, BOUNDS.contact_nm, "nm");
@@ -68,12 +73,51 @@ fn print(findings: &Findings, scanned: Option<usize>, failures: &[String]) {
     );
     line("ball fits (r k)", &report.fit, BOUNDS.fit, "");
     let scan = scanned.map_or_else(|| "no count".to_owned(), |passes| passes.to_string());
-    println!(
+    say!(
         "  passes {} (dense scan of the surface: {scan}), samples {}",
         findings.passes, findings.samples
     );
-    for failure in failures {
-        println!("  FAIL {failure}");
+}
+
+/// Runs the core again, measures every sample, then the swept ball against the surface.
+pub(super) fn measured(
+    job: &JobFile,
+    prepared: &Prepared,
+    timed: &Timed,
+) -> Result<(Findings, swept::Findings)> {
+    let oracle = oracle(job)?;
+    let bar = progress(timed.samples, "measuring");
+    let mut track = Track::default();
+    let mut keep = |emitted: &Emitted| track.add(emitted, job.along);
+    let mut survey = Survey::new(prepared, &oracle, None, Some(&mut keep));
+    let mut written = Ok(());
+    let ran = machine(job, prepared)?.run(|sample| {
+        written = survey.add(sample);
+        if sample.tick % 65_536 == 0 {
+            bar.set_position(sample.tick.into());
+        }
+        written.is_ok()
+    });
+    let findings = written
+        .and_then(|()| survey.finish(ran.is_ok()))
+        .map_err(|error| Failure::Failed(Some(error.to_string())))?;
+    let swept = swept::measure(job, &oracle, &track, ran.is_ok(), &Bar(&bar));
+    bar.finish_and_clear();
+    Ok((findings, swept))
+}
+
+/// One bar for all parts of the measuring.
+struct Bar<'a>(&'a ProgressBar);
+
+impl swept::Progress for Bar<'_> {
+    fn begin(&self, what: &'static str, steps: u64) {
+        self.0.reset();
+        self.0.set_length(steps);
+        self.0.set_message(what);
+    }
+
+    fn done(&self, steps: u64) {
+        self.0.inc(steps);
     }
 }
 
@@ -81,7 +125,7 @@ pub(super) fn command(arguments: &Arguments) -> Result<()> {
     let (job, prepared) = load(&arguments.job)?;
     warn_of_limits(&job);
     let timed = timed(&job, &prepared)?;
-    let (findings, _) = surveyed(&job, &prepared, &timed, None, None)?;
+    let (findings, swept) = measured(&job, &prepared, &timed)?;
     let report = &findings.report;
     let scanned = scanned_passes(&job)?;
     let mut failures = report.failures(&BOUNDS);
@@ -96,31 +140,29 @@ pub(super) fn command(arguments: &Arguments) -> Result<()> {
     if let Some(fault) = &timed.fault {
         failures.insert(0, fault.sentence());
     }
+    failures.extend(swept.failures.iter().cloned());
     let passed = failures.is_empty();
     if arguments.json {
-        let value = json!({
-            "position_error_max_nm": report.position_nm.max.abs(),
-            "position_error_rms_nm": report.position_nm.rms(),
-            "normal_error_max_rad": report.normal_rad.max.abs(),
-            "ripple_max_pct": report.ripple_pct.max.abs(),
-            "interval_error_max": report.interval.max.abs(),
-            "passes": findings.passes,
-            "passes_scanned": scanned,
-            "samples": findings.samples,
-            "fit_max": report.fit.max,
-            // Not measured yet: these take the swept envelope of the ball, and limits take a machine that has some.
-            "scallop_max_mm": Value::Null,
-            "scallop_mean_mm": Value::Null,
-            "gouge_max_mm": Value::Null,
-            "limits": Value::Null,
-            "failures": failures,
-            "passed": passed,
-        });
-        println!("{value}");
+        let mut value = swept_words::json(&job, &prepared, &findings, &swept);
+        value.insert("passes_scanned".to_owned(), scanned.into());
+        value.insert("failures".to_owned(), failures.into());
+        value.insert("passed".to_owned(), passed.into());
+        say!("{}", Value::Object(value));
     } else {
-        println!("{}", arguments.job.display());
-        print(&findings, scanned, &failures);
-        println!("  {}", if passed { "passed" } else { "FAILED" });
+        say!("{}", arguments.job.display());
+        print(&findings, scanned);
+        swept_words::print(&job, &prepared, &findings, &swept);
+        for failure in &failures {
+            say!("  FAIL {failure}");
+        }
+        for warning in swept
+            .warnings
+            .iter()
+            .filter(|warning| !failures.contains(warning))
+        {
+            say!("  warning: {warning}");
+        }
+        say!("  {}", if passed { "passed" } else { "FAILED" });
     }
     if passed {
         Ok(())

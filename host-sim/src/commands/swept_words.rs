@@ -1,0 +1,243 @@
+//! What the measured tool path came to, as text and as JSON.
+
+use interp_core::STORE_WORDS;
+use serde_json::{Map, Value, json};
+
+use crate::job_file::JobFile;
+use crate::prepare::Prepared;
+use crate::survey;
+use crate::swept::{Findings, Hollow, Peak};
+
+/// Bytes of surface data that the board holds.
+const STORE_BYTES: usize = STORE_WORDS * size_of::<i32>();
+
+fn data_bytes(prepared: &Prepared) -> usize {
+    size_of_val(prepared.words.as_slice())
+}
+
+fn time_s(job: &JobFile, samples: u64) -> f64 {
+    #[allow(clippy::cast_precision_loss, reason = "below 2^53")]
+    let ticks = samples as f64;
+    ticks * job.machine.period_s()
+}
+
+/// The keys of `verify`.
+pub(super) fn json(
+    job: &JobFile,
+    prepared: &Prepared,
+    survey: &survey::Findings,
+    found: &Findings,
+) -> Map<String, Value> {
+    let report = &survey.report;
+    let measured = !found.ridges.is_empty();
+    let null_unless = |known: bool, value: Value| if known { value } else { Value::Null };
+    let (most, error) = (&found.scallop_max, &found.measuring_error);
+    let gouge = found.gouge.map(|gouge| {
+        json!({
+            "depth_mm": gouge.depth_mm, "u": gouge.u, "v": gouge.v, "place_mm": gouge.place_mm, "tick": gouge.tick,
+            "pass": gouge.pass, "contact_u": gouge.contact[0], "contact_v": gouge.contact[1],
+            "kind": if gouge.local { "local" } else { "global" },
+        })
+    });
+    let hollow = found.shape.hollow.map(|hollow| {
+        json!({ "radius_mm": hollow.radius_mm, "u": hollow.u, "v": hollow.v, "place_mm": hollow.place_mm })
+    });
+    let value = json!({
+        "position_error_max_nm": report.position_nm.max.abs(),
+        "position_error_rms_nm": report.position_nm.rms(),
+        "normal_error_max_rad": report.normal_rad.max.abs(),
+        "ripple_max_pct": report.ripple_pct.max.abs(),
+        "interval_error_max": report.interval.max.abs(),
+        "passes": survey.passes,
+        "samples": survey.samples,
+        "fit_max": report.fit.max,
+        "scallop_limit_mm": job.scallop_mm,
+        "scallop_max_mm": null_unless(measured, json!(most.height_mm)),
+        "scallop_mean_mm": null_unless(measured, json!(found.scallop_mean_mm)),
+        "scallop_error_mm": found.measuring_error_mm,
+        "scallop_error": {
+            "path_mm": error.path_mm, "rounding_mm": error.rounding_mm, "stations_mm": error.stations_mm, "search_mm": error.search_mm,
+        },
+        "scallop_at": null_unless(measured, json!({ "u": most.u, "v": most.v, "gap": most.gap, "place_mm": most.place_mm })),
+        "scallop_area_by_tenth": found.scallop_histogram,
+        "gouge_max_mm": found.gouge_max_mm(),
+        "gouge_floor_mm": found.gouge_floor_mm,
+        "gouge_bound_mm": found.gouge_bound_mm,
+        "gouge": gouge,
+        "limits": limits(job, found),
+        "axes": {
+            "extent_mm": found.axes.extent_mm, "travel_mm": job.machine.travel_mm, "beyond_mm": found.axes.beyond_mm,
+            "velocity_mm_s": found.axes.velocity.axes, "acceleration_mm_s2": found.axes.acceleration.axes,
+            "jerk_mm_s3": found.axes.jerk.axes,
+        },
+        "least_concave_radius": hollow,
+        "poles": found.shape.poles,
+        "degenerate_places": found.shape.degenerate.map_or(0, |(count, _)| count),
+        "machining_time_s": time_s(job, survey.samples),
+        "patches": prepared.patches(),
+        "data_bytes": data_bytes(prepared),
+        "data_bytes_max": STORE_BYTES,
+        "stations": found.stations,
+        "warnings": found.warnings,
+    });
+    match value {
+        Value::Object(map) => map,
+        _ => Map::new(),
+    }
+}
+
+/// Null where the machine has no limits.
+fn limits(job: &JobFile, found: &Findings) -> Value {
+    let machine = &job.machine;
+    let given = machine.velocity_max_mm_s.is_some()
+        || machine.acceleration_max_mm_s2.is_some()
+        || machine.jerk_max_mm_s3.is_some();
+    if !given {
+        return Value::Null;
+    }
+    let axes = &found.axes;
+    json!({
+        "velocity": axes.velocity.share, "acceleration": axes.acceleration.share, "jerk": axes.jerk.share,
+        "rounding": {
+            "velocity": axes.velocity.rounding_share, "acceleration": axes.acceleration.rounding_share,
+            "jerk": axes.jerk.rounding_share,
+        },
+    })
+}
+
+fn row(name: &str, text: &str) {
+    say!("       {name:<22} {text}");
+}
+
+fn um(mm: f64) -> f64 {
+    1e3 * mm
+}
+
+/// The same for a person.
+pub(super) fn print(job: &JobFile, prepared: &Prepared, survey: &survey::Findings, found: &Findings) {
+    scallop(job, found);
+    match &found.gouge {
+        None => say!(
+            "  ok   {:<22} none deeper than {:.4} um ({} cells)",
+            "gouge",
+            um(found.gouge_bound_mm),
+            found.cells
+        ),
+        Some(gouge) => say!(
+            "  FAIL {:<22} {:.4} um at u = {:.6}, v = {:.6}, by tick {}, pass {}",
+            "gouge",
+            um(gouge.depth_mm),
+            gouge.u,
+            gouge.v,
+            gouge.tick,
+            gouge.pass
+        ),
+    }
+    axes(job, found);
+    let shape = &found.shape;
+    let hollow = shape.hollow.map_or_else(
+        || "none: nowhere hollow".to_owned(),
+        |hollow| {
+            let Hollow { radius_mm, u, v, .. } = hollow;
+            format!("{radius_mm:.4} mm at u = {u:.6}, v = {v:.6}")
+        },
+    );
+    row("least concave radius", &hollow);
+    if !shape.poles.is_empty() {
+        row(
+            "poles",
+            &format!("boundary {} is one point", shape.poles.join(", ")),
+        );
+    }
+    row(
+        "machining time",
+        &format!("{:.2} min", time_s(job, survey.samples) / 60.0),
+    );
+    let bytes = data_bytes(prepared);
+    row(
+        "surface data",
+        &format!(
+            "{} patches, {bytes} of the board's {STORE_BYTES} bytes ({:.1} %)",
+            prepared.patches(),
+            100.0 * ratio(bytes, STORE_BYTES)
+        ),
+    );
+}
+
+fn scallop(job: &JobFile, found: &Findings) {
+    if found.ridges.is_empty() {
+        row("scallop height", "not measured: fewer than two whole passes");
+        return;
+    }
+    let (most, error) = (&found.scallop_max, &found.measuring_error);
+    let good = most.height_mm <= job.scallop_mm + found.measuring_error_mm;
+    say!(
+        "  {} {:<22} {:.4} um +- {:.4}, limit {} (max / limit {:.4}), between passes {} and {}, u = {:.6}, v = {:.6}",
+        if good { "ok  " } else { "FAIL" },
+        "scallop height",
+        um(most.height_mm),
+        um(found.measuring_error_mm),
+        um(job.scallop_mm),
+        most.height_mm / job.scallop_mm,
+        most.gap,
+        most.gap + 1,
+        most.u,
+        most.v
+    );
+    let mean = format!(
+        "mean crest {:.4} um by area, {:.1} % of the limit; {} stations",
+        um(found.scallop_mean_mm),
+        100.0 * found.scallop_mean_mm / job.scallop_mm,
+        found.stations
+    );
+    row("", &mean);
+    let parts = format!(
+        "the +- in um: way between samples {:.4}, rounding {:.4}, stations {:.4}, search {:.4}",
+        um(error.path_mm),
+        um(error.rounding_mm),
+        um(error.stations_mm),
+        um(error.search_mm)
+    );
+    row("", &parts);
+    row(
+        "",
+        "first and last pass lie on the boundaries: nothing is left outside",
+    );
+}
+
+#[allow(clippy::cast_precision_loss, reason = "sizes of memories")]
+fn ratio(part: usize, whole: usize) -> f64 {
+    part as f64 / whole as f64
+}
+
+fn axes(job: &JobFile, found: &Findings) {
+    let axes = &found.axes;
+    if let Some([x, y, z]) = axes.extent_mm {
+        let given = match (job.machine.travel_mm, axes.within_travel()) {
+            (None, _) => "     ",
+            (Some(_), true) => "ok   ",
+            (Some(_), false) => "FAIL ",
+        };
+        say!(
+            "  {given}{:<22} x {:.3} to {:.3}, y {:.3} to {:.3}, z {:.3} to {:.3} mm",
+            "axis travel", x[0], x[1], y[0], y[1], z[0], z[1]
+        );
+    }
+    let peak = |name: &str, unit: &str, peak: &Peak| {
+        let [x, y, z] = peak.axes;
+        let share = peak.share.map_or_else(
+            || "no limit given".to_owned(),
+            |share| {
+                format!(
+                    "{:.1} % of its limit at most (rounding: {:.1} %)",
+                    100.0 * share,
+                    100.0 * peak.rounding_share
+                )
+            },
+        );
+        say!("       {name:<22} {x:.1}, {y:.1}, {z:.1} {unit} within passes; {share}");
+    };
+    peak("axis velocity", "mm/s", &axes.velocity);
+    peak("axis acceleration", "mm/s2", &axes.acceleration);
+    peak("axis jerk", "mm/s3", &axes.jerk);
+}

@@ -1,0 +1,188 @@
+//! Scallop height and gouge of whole jobs, as the core runs them, from the swept ball.
+#![allow(clippy::unwrap_used, reason = "a test may fail by panic")]
+
+use std::fmt::Write;
+use std::path::PathBuf;
+
+use host_sim::job_file::JobFile;
+use host_sim::machine::Machine;
+use host_sim::oracle::{Emitted, Oracle};
+use host_sim::prepare::prepare;
+use host_sim::survey::Survey;
+use host_sim::swept::{Findings, Track, measure};
+
+fn findings(job: &JobFile) -> Findings {
+    let oracle = Oracle::new(job).unwrap();
+    let prepared = prepare(job).unwrap();
+    let mut track = Track::default();
+    let mut keep = |emitted: &Emitted| track.add(emitted, job.along);
+    let mut survey = Survey::new(&prepared, &oracle, None, Some(&mut keep));
+    Machine::load(&prepared)
+        .unwrap()
+        .run(|sample| survey.add(sample).is_ok())
+        .unwrap();
+    let samples = survey.finish(true).unwrap().samples;
+    assert_eq!(track.samples() as u64, samples);
+    measure(job, &oracle, &track, true, &())
+}
+
+fn sample_jobs() -> Vec<PathBuf> {
+    let jobs = PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("../jobs");
+    let mut paths: Vec<_> = std::fs::read_dir(jobs)
+        .unwrap()
+        .map(|entry| entry.unwrap().path())
+        .filter(|path| path.extension().is_some_and(|extension| extension == "toml"))
+        .collect();
+    paths.sort();
+    assert!(paths.len() >= 10);
+    paths
+}
+
+/// The limit is used, and held: the largest ridge is between half of it and all of it. And nothing is cut that should stand.
+#[test]
+fn every_sample_job_holds_its_limit() {
+    let mut off = String::new();
+    for path in sample_jobs() {
+        let job = JobFile::load(&path).unwrap();
+        let found = findings(&job);
+        let (limit, most) = (job.scallop_mm, found.scallop_max.height_mm);
+        if most < 0.5 * limit || most > limit + found.measuring_error_mm {
+            writeln!(
+                off,
+                "{}: {most} mm of {limit}, within {}",
+                path.display(),
+                found.measuring_error_mm
+            )
+            .unwrap();
+        }
+        // The measuring is no worse than a thousandth of the limit, or what the samples' own distance brings.
+        assert!(
+            found.measuring_error_mm <= 1e-3 * limit + found.measuring_error.path_mm + 1e-6,
+            "{}: {:?}",
+            path.display(),
+            found.measuring_error
+        );
+        assert!(found.scallop_mean_mm > 0.0 && found.scallop_mean_mm < most);
+        assert_eq!(found.gouge, None, "{}", path.display());
+        assert!(
+            found.gouge_bound_mm < 3e-5,
+            "{}: {}",
+            path.display(),
+            found.gouge_bound_mm
+        );
+        let other: Vec<_> = found
+            .failures
+            .iter()
+            .filter(|line| !line.contains("scallop"))
+            .collect();
+        assert!(
+            other.is_empty() && found.warnings.len() == found.failures.len(),
+            "{:?}",
+            found.warnings
+        );
+        let spots: usize = found.ridges.iter().map(|ridge| ridge.spots.len()).sum();
+        assert!(spots <= 100_000 && found.ridges.iter().all(|ridge| ridge.spots.len() >= 3));
+    }
+    assert!(off.is_empty(), "{off}");
+}
+
+/// A profile of poles (x, z), cubic between even knots, drawn out along y by 20 mm; passes along y.
+fn groove(profile: &[[f64; 2]], cut: &str) -> JobFile {
+    let mut text = String::from("[surface]\nkind = \"nurbs\"\ndegree = [3, 1]\nknots_u = [0, 0, 0, 0");
+    let spans = profile.len() - 3;
+    for k in 1..spans {
+        write!(text, ", {}", k as f64 / spans as f64).unwrap();
+    }
+    text += ", 1, 1, 1, 1]\nknots_v = [0, 0, 1, 1]\npoles_mm = [\n";
+    for [x, z] in profile {
+        writeln!(text, "    [[{x}, 0, {z}], [{x}, 20, {z}]],").unwrap();
+    }
+    text += "]\n\n[tool]\nkind = \"ball\"\nradius_mm = 5\n\n[cut]\nfeed_mm_min = 600\nalong = \"v\"\n";
+    JobFile::parse("groove", &(text + cut)).unwrap()
+}
+
+/// A keyhole: a round floor wider than the ball, under lips 4 mm apart. The ball fits every curvature; on one lip it stands in the
+/// other.
+#[test]
+fn ball_between_two_lips() {
+    let half = [
+        [-20.0, 17.0],
+        [-12.0, 17.0],
+        [-5.0, 16.5],
+        [-1.5, 14.0],
+        [-2.5, 10.0],
+        [-7.0, 8.5],
+        [-11.0, 5.0],
+        [-12.0, -1.0],
+        [-9.5, -7.0],
+        [-4.0, -10.5],
+    ];
+    let other = half.iter().rev().map(|[x, z]| [-x, *z]);
+    let profile: Vec<[f64; 2]> = half.into_iter().chain(other).collect();
+    let job = groove(&profile, "scallop_mm = 0.05\nside = \"up\"\n");
+    let found = findings(&job);
+    let hollow = found.shape.hollow.unwrap();
+    assert!(hollow.radius_mm > job.radius_mm, "{hollow:?}");
+    let gouge = found.gouge.unwrap();
+    assert!(!gouge.local && gouge.depth_mm > 1.0, "{gouge:?}");
+    // The place and the contact that cuts it face each other across the slot.
+    let oracle = Oracle::new(&job).unwrap();
+    let contact = oracle.contact(gouge.contact[0], gouge.contact[1]).unwrap();
+    let place = oracle.contact(gouge.u, gouge.v).unwrap();
+    assert!(contact.cc_mm[0] * place.cc_mm[0] < 0.0);
+    let reach = (0..3)
+        .map(|k| (contact.cl_mm[k] - place.cc_mm[k]).powi(2))
+        .sum::<f64>()
+        .sqrt();
+    // Along the pass the sample may be a step off.
+    assert!(
+        (job.radius_mm - reach - gouge.depth_mm).abs() < 0.01,
+        "{reach} {gouge:?}"
+    );
+    assert!(found.failures.iter().any(|line| line.contains("another part")));
+}
+
+/// A flat 40 mm wide with a groove 0.8 mm wide between the first two passes, which are 2 mm apart.
+#[test]
+fn groove_that_no_sample_lies_in() {
+    let flat = |depth: f64| {
+        // Poles at the knots' averages: x is even in u, 0.2 mm a span.
+        let average = |k: i32| f64::from((k - 2..=k).map(|knot| knot.clamp(0, 98)).sum::<i32>()) / 3.0;
+        let mut profile: Vec<[f64; 2]> = (0..=100).map(|k| [0.2 * average(k), 0.0]).collect();
+        profile[6][1] = -depth;
+        groove(&profile, "scallop_mm = 0.1\nside = \"up\"\n")
+    };
+    let plain = findings(&flat(0.0));
+    assert!(
+        plain.failures.is_empty() || plain.scallop_max.height_mm < 0.1 * 1.02,
+        "{:?}",
+        plain.failures
+    );
+    let cut = findings(&flat(0.1));
+    assert_eq!(cut.scallop_max.gap, 0);
+    assert!(cut.scallop_max.height_mm > 0.15, "{:?}", cut.scallop_max);
+    assert!(cut.failures.iter().any(|line| line.contains("above the limit")));
+    assert!(cut.shape.hollow.unwrap().radius_mm < 1.0);
+    assert!(cut.warnings.iter().any(|line| line.contains("hollow")));
+}
+
+/// A part that does not fit the machine's travel fails before anything moves.
+#[test]
+fn travel() {
+    let flat: Vec<[f64; 2]> = (0..10).map(|k| [2.0 * f64::from(k), 0.0]).collect();
+    let cut = "scallop_mm = 0.1\nside = \"up\"\n[machine]\ntravel_mm = ";
+    let fits = findings(&groove(&flat, &format!("{cut}[[0, 18], [-1, 20], [4, 6]]\n")));
+    assert!(fits.axes.within_travel() && fits.failures.iter().all(|line| !line.contains("travel")));
+    let beyond = findings(&groove(&flat, &format!("{cut}[[0, 18], [-1, 19.5], [5.5, 6]]\n")));
+    assert_eq!(
+        beyond
+            .failures
+            .iter()
+            .filter(|line| line.contains("travel_mm"))
+            .count(),
+        2
+    );
+    assert!(
+        (beyond.axes.beyond_mm[1][1] - 0.5).abs() < 1e-6 && (beyond.axes.beyond_mm[2][0] - 0.5).abs() < 1e-6
+    );
+}
