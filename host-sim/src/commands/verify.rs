@@ -5,9 +5,10 @@ use std::path::PathBuf;
 use clap::Args;
 use serde_json::{Value, json};
 
-use super::simulate::{oracle, surveyed, timed};
+use super::simulate::{oracle, remarks, report, surveyed, timed};
 use super::{Failure, Result, load, warn_of_limits};
 use crate::oracle::{Bounds, Figure};
+use crate::report::Remarks;
 use crate::survey::Findings;
 
 /// What every sample has to hold to: the figures of the README.
@@ -30,6 +31,9 @@ pub const BOUNDS: Bounds = Bounds {
 pub(super) struct Arguments {
     /// Job file (TOML).
     job: PathBuf,
+    /// Writes a page with a view that turns, charts and figures into this folder.
+    #[arg(long, value_name = "DIR")]
+    report: Option<PathBuf>,
     /// Prints one JSON object instead of text.
     #[arg(long)]
     json: bool,
@@ -81,10 +85,11 @@ pub(super) fn command(arguments: &Arguments) -> Result<()> {
     let (job, prepared) = load(&arguments.job)?;
     warn_of_limits(&job);
     let timed = timed(&job, &prepared)?;
-    let (findings, _) = surveyed(&job, &prepared, &timed, None, None)?;
-    let report = &findings.report;
+    let directory = arguments.report.as_deref();
+    let (findings, sketch) = surveyed(&job, &prepared, &timed, None, directory.is_some())?;
+    let figures = &findings.report;
     let scanned = scanned_passes(&job)?;
-    let mut failures = report.failures(&BOUNDS);
+    let mut failures = figures.failures(&BOUNDS);
     if let Some(scanned) =
         scanned.filter(|scanned| *scanned != findings.passes as usize && timed.fault.is_none())
     {
@@ -97,17 +102,23 @@ pub(super) fn command(arguments: &Arguments) -> Result<()> {
         failures.insert(0, fault.sentence());
     }
     let passed = failures.is_empty();
+    let remarks = Remarks {
+        failures: failures.clone(),
+        verified: true,
+        ..remarks(&job, &timed, &findings)
+    };
+    let page = report(&job, directory, sketch.as_ref(), &findings, &remarks)?;
     if arguments.json {
         let value = json!({
-            "position_error_max_nm": report.position_nm.max.abs(),
-            "position_error_rms_nm": report.position_nm.rms(),
-            "normal_error_max_rad": report.normal_rad.max.abs(),
-            "ripple_max_pct": report.ripple_pct.max.abs(),
-            "interval_error_max": report.interval.max.abs(),
+            "position_error_max_nm": figures.position_nm.max.abs(),
+            "position_error_rms_nm": figures.position_nm.rms(),
+            "normal_error_max_rad": figures.normal_rad.max.abs(),
+            "ripple_max_pct": figures.ripple_pct.max.abs(),
+            "interval_error_max": figures.interval.max.abs(),
             "passes": findings.passes,
             "passes_scanned": scanned,
             "samples": findings.samples,
-            "fit_max": report.fit.max,
+            "fit_max": figures.fit.max,
             // Not measured yet: these take the swept envelope of the ball, and limits take a machine that has some.
             "scallop_max_mm": Value::Null,
             "scallop_mean_mm": Value::Null,
@@ -121,6 +132,9 @@ pub(super) fn command(arguments: &Arguments) -> Result<()> {
         println!("{}", arguments.job.display());
         print(&findings, scanned, &failures);
         println!("  {}", if passed { "passed" } else { "FAILED" });
+        if let Some(page) = page {
+            println!("  report {}", page.display());
+        }
     }
     if passed {
         Ok(())

@@ -83,9 +83,9 @@ fn row(case: &Case, kind: Kind) -> Result<Row, ApproachError> {
         Kind::Surface => Some(Sketch::new(&case.job, case.oracle.schedule()?.len())),
         _ => None,
     };
-    let measured = measure(kind, &case.job, |motion, _| {
+    let measured = measure(kind, &case.job, |motion, _, checked| {
         if let Some(sketch) = &mut sketch {
-            sketch.add(&motion.emitted);
+            sketch.add(&motion.emitted, checked);
         }
     })?;
     Ok(Row {
