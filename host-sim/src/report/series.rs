@@ -61,8 +61,8 @@ const EMPTY: Span = [[f32::NAN; 2]; CHANNELS];
 pub(super) struct Spans {
     most: usize,
     first_tick: Option<u64>,
-    /// Ticks a span.
-    ticks: u64,
+    /// A span is two to this power ticks long.
+    doublings: u32,
     spans: Vec<Span>,
 }
 
@@ -71,7 +71,7 @@ impl Spans {
         Self {
             most,
             first_tick: None,
-            ticks: 1,
+            doublings: 0,
             spans: Vec::new(),
         }
     }
@@ -80,10 +80,10 @@ impl Spans {
     pub(super) fn put(&mut self, tick: u64, channel: usize, value: f64) {
         let first = *self.first_tick.get_or_insert(tick);
         let since = tick.saturating_sub(first);
-        while since / self.ticks >= self.most as u64 {
+        while since >> self.doublings >= self.most as u64 {
             self.halve();
         }
-        let index = (since / self.ticks) as usize;
+        let index = (since >> self.doublings) as usize;
         if index >= self.spans.len() {
             self.spans.resize(index + 1, EMPTY);
         }
@@ -102,7 +102,7 @@ impl Spans {
             span
         });
         self.spans = halved.collect();
-        self.ticks *= 2;
+        self.doublings += 1;
     }
 
     /// Largest value of a channel; no number if there is none.
@@ -113,9 +113,9 @@ impl Spans {
             .fold(f32::NAN, f32::max)
     }
 
-    /// Samples behind a drawn point.
+    /// Ticks a span.
     pub(super) fn ticks(&self) -> u64 {
-        self.ticks
+        1 << self.doublings
     }
 
     fn json(&self) -> Value {
@@ -136,7 +136,7 @@ impl Spans {
             .collect();
         json!({
             "first_tick": self.first_tick.unwrap_or(0),
-            "ticks": self.ticks,
+            "ticks": self.ticks(),
             "count": self.spans.len(),
             "channels": channels,
         })

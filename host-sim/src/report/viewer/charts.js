@@ -5,12 +5,12 @@ const HEIGHT = 230;
 const COLUMNS_MAX = 1400;
 const LEAST_TICKS = 12; // no window shows less
 
-// Quantities over time: [name of the series, what it is called, colour].
+// Quantities over time: [name of the series, what it is called, colour, width of its line].
 const OVER_TIME = [
     {
         title: "Speed of contact and tool centre",
         unit: "mm/s",
-        rows: [["cl_speed", "tool centre (CL)", "violet"], ["cc_speed", "cutter contact (CC)", "warm"]],
+        rows: [["cl_speed", "tool centre (CL)", "violet"], ["cc_speed", "cutter contact (CC)", "warm", 2.5]],
     },
     {
         title: "Velocity of the axes",
@@ -24,7 +24,7 @@ const OVER_TIME = [
         limits: "acceleration",
         rows: ["x", "y", "z"].map((axis, k) => [`acceleration_${axis}`, axis, ["axis-x", "axis-y", "axis-z"][k]]),
     },
-    { title: "Error of the tool centre", unit: "nm", fromZero: true, rows: [["cl_error", "against the oracle", "blue"]] },
+    { title: "Error of the tool centre", unit: "nm", fromZero: true, isMagnitude: true, rows: [["cl_error", "against the oracle", "blue"]] },
     { title: "Error of the feed", unit: "%", rows: [["feed_error", "against the wanted feed", "blue"]] },
 ];
 
@@ -130,7 +130,7 @@ class TimeCharts {
     chart(each) {
         const L = IsoLibraries.uPlot;
         const colours = each.rows.map(([, , name]) => variable(name));
-        const line = (colour) => ({ stroke: colour, width: 1, points: { show: false }, spanGaps: false });
+        const line = (k) => ({ stroke: colours[k], width: each.rows[k][3] ?? 1, pxAlign: 0, points: { show: false }, spanGaps: false });
         const options = frame(this.width(), each.unit, {
             across: "time, s",
             cursor: { sync: { key: "time" } },
@@ -139,7 +139,7 @@ class TimeCharts {
                     x: { time: false, auto: false, range: () => this.window.map((tick) => tick * this.payload.period) },
                     y: { range: (_, low, high) => airy(low, high, each.fromZero) },
                 },
-                series: [{}, ...colours.flatMap((colour) => [line(colour), line(colour)])],
+                series: [{}, ...colours.flatMap((_, k) => [line(k), line(k)])],
                 bands: colours.map((colour, k) => ({ series: [2 * k + 2, 2 * k + 1], fill: withAlpha(colour, 0.35) })),
                 hooks: {
                     setCursor: [(chart) => this.read(each, chart)],
@@ -252,7 +252,7 @@ class TimeCharts {
         const entries = each.rows.map(([, name, colour], k) => {
             if (!rows) return [colour, name, ""];
             const [low, high] = isOver ? [rows[2 * k][index], rows[2 * k + 1][index]] : extremes(rows[2 * k], rows[2 * k + 1]);
-            return [colour, name, between(low, high)];
+            return [colour, name, each.isMagnitude ? `at most ${shown(high, 4)}` : between(low, high)];
         });
         const { period } = this.payload;
         const when = isOver ? `at ${fixed(times[index] * period, 3)} s` : "in this window";
@@ -366,6 +366,7 @@ class PassCharts {
                     ...each.rows.map(([, colour]) => ({
                         stroke: variable(colour),
                         width: 1.6,
+                        pxAlign: 0,
                         points: { show: few, size: 5, fill: variable(colour) },
                     })),
                 ],

@@ -30,6 +30,8 @@ function start() {
 // The view, or the picture and a word why where the browser cannot draw it.
 function openView(payload, report) {
     try {
+        // Asked for first: three.js would write errors of its own.
+        if (!document.createElement("canvas").getContext("webgl2")) throw new Error("no WebGL 2");
         report.view = new View(payload, byId("view"));
     } catch (error) {
         byId("stage").hidden = true;

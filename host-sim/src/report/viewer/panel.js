@@ -32,10 +32,10 @@ function colouringsOf(payload, track) {
             unit: "mm",
             on: "surface",
             values,
-            range: [0, Math.max(roundRange(0, extentOf(values)[1])[1], scallops.limit)],
+            range: [0, scallops.limit],
             limit: scallops.limit + scallops.error,
-            mark: scallops.limit,
-            note: `limit ${shown(scallops.limit)} mm, measured to ±${shown(scallops.error, 2)} mm`,
+            largest: extentOf(values)[1],
+            note: `limit ${scallops.limit} mm, measured to ±${shown(scallops.error, 2)} mm`,
         });
     }
     return colourings.filter(({ values }) => !values || values.some((value) => !Number.isNaN(value)));
@@ -49,16 +49,18 @@ function spread(values, feed) {
     return high - low < 0.01 * feed ? roundRange(low - 0.05 * feed, high + 0.05 * feed) : roundRange(low, high);
 }
 
-function legend({ name, unit, range, limit, mark, note }) {
-    const [low, high] = range;
+function legend({ name, unit, range, limit, largest, note }) {
+    const low = range[0];
+    // Beyond the limit the scale goes on to what was found, in the colour of what is above.
+    const isOver = limit !== undefined && largest > limit;
+    const high = isOver ? Math.max(roundRange(low, largest)[1], range[1] * 1.1) : range[1];
+    const share = (range[1] - low) / (high - low);
     const stops = 24;
-    const colours = Array.from({ length: stops + 1 }, (_, k) => cssColour(colourAt(k / stops)));
+    const colours = Array.from({ length: stops + 1 }, (_, k) => `${cssColour(colourAt(k / stops))} ${(100 * share * k) / stops}%`);
+    if (isOver) colours.push(`${cssColour(OVER)} ${100 * share}%`);
     const bar = element("div", { class: "ramp", style: `background:linear-gradient(90deg,${colours.join(",")})` });
     const at = (value) => `left:${(100 * (value - low)) / (high - low)}%`;
-    if (limit !== undefined && limit < high) {
-        bar.append(element("i", { class: "over", style: `${at(limit)};background:${cssColour(OVER)}` }));
-    }
-    if (mark !== undefined && mark <= high) bar.append(element("i", { class: "mark", style: at(mark) }));
+    if (limit !== undefined) bar.append(element("i", { class: "mark", style: at(range[1]) }));
     const { ticks, label } = ticksIn(low, high, 4);
     const scale = element("div", { class: "ticks" }, ...ticks.map((tick) => element("span", { style: at(tick) }, label(tick))));
     const title = name[0].toUpperCase() + name.slice(1);
@@ -290,6 +292,7 @@ class Panel {
     furniture() {
         const { view } = this;
         const arm = 30;
+        const taken = [];
         const lines = view
             .axes()
             .map(([right, up, toward], k) => ({ right, up, toward, name: "xyz"[k] }))
@@ -297,7 +300,11 @@ class Panel {
             .map(({ right, up, name }) => {
                 const [x, y] = [arm * right, -arm * up];
                 const far = Math.hypot(x, y) < 6 ? 0 : 1 + 11 / Math.hypot(x, y);
-                const text = far ? `<text x="${x * far}" y="${y * far + 4.5}">${name}</text>` : "";
+                const place = [x * far, y * far];
+                // Two names never stand on each other.
+                if (taken.some(([a, b]) => Math.hypot(place[0] - a, place[1] - b) < 13)) place[0] += x < 0 ? -11 : 11;
+                taken.push(place);
+                const text = far ? `<text x="${place[0]}" y="${place[1] + 4.5}">${name}</text>` : "";
                 return `<line class="${name}" x2="${x}" y2="${y}"/>${text}`;
             });
         byId("triad").innerHTML = `${lines.join("")}<circle r="2.5"/>`;

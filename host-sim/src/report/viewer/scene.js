@@ -224,7 +224,7 @@ class View {
             return;
         }
         material.linewidth = WIDTH.pass;
-        const share = this.colouring ? 0.7 : 1;
+        const share = this.colouring ? 0.6 : 1;
         material.opacity = this.centres.material.opacity = this.opacity() * share;
     }
 
@@ -333,7 +333,7 @@ class View {
         [this.width, this.height] = [width, height];
         this.renderer.setSize(width, height, false);
         // A margin for what stands at the edges: triad, scale, legend.
-        const margin = Math.min(70, 0.12 * Math.min(width, height) + 20);
+        const margin = Math.min(70, 0.08 * Math.min(width, height) + 6);
         this.scale = Math.min((width / 2 - margin) / this.fit[0], (height / 2 - margin) / this.fit[1]);
         Object.assign(this.camera, {
             left: -width / 2 / this.scale,
