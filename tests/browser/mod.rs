@@ -41,23 +41,23 @@ fn program() -> PathBuf {
 static ONE: Mutex<()> = Mutex::new(());
 
 /// A browser with one page.
-pub struct Browser {
+pub(crate) struct Browser {
     child: Child,
     to: Option<ChildStdin>,
     from: Receiver<Value>,
     session: Option<String>,
     last: u64,
     /// Everything that the page did wrong or asked for, in words.
-    pub complaints: Vec<String>,
+    pub(crate) complaints: Vec<String>,
     /// Addresses that were requested.
-    pub requests: Vec<String>,
+    pub(crate) requests: Vec<String>,
     profile: tempfile::TempDir,
     _one: MutexGuard<'static, ()>,
 }
 
 impl Browser {
     /// Starts one, with a page of this size in pixels; `flags` besides the usual.
-    pub fn start(size: [u32; 2], theme: &str, flags: &[&str]) -> Self {
+    pub(crate) fn start(size: [u32; 2], theme: &str, flags: &[&str]) -> Self {
         let one = ONE.lock().unwrap_or_else(PoisonError::into_inner);
         let profile = tempfile::tempdir().unwrap();
         let log = std::fs::File::create(profile.path().join("log")).unwrap();
@@ -135,7 +135,7 @@ impl Browser {
     }
 
     /// A call of the protocol, and its result.
-    pub fn call(&mut self, method: &str, parameters: Value) -> Value {
+    pub(crate) fn call(&mut self, method: &str, parameters: Value) -> Value {
         self.last += 1;
         let mut message = json!({ "id": self.last, "method": method, "params": parameters });
         if let Some(session) = &self.session {
@@ -182,7 +182,7 @@ impl Browser {
     }
 
     /// Opens a file, and waits until the report's scripts have done their work.
-    pub fn open(&mut self, page: &Path) {
+    pub(crate) fn open(&mut self, page: &Path) {
         let url = format!("file://{}", page.display());
         self.call("Page.navigate", json!({ "url": url }));
         let ready = "new Promise((done) => { const look = () => window.isofeedReport?.ready ? done(true) : setTimeout(look, 20); look(); })";
@@ -197,7 +197,7 @@ impl Browser {
     }
 
     /// The value of an expression, or of what it promises.
-    pub fn value(&mut self, expression: &str) -> Value {
+    pub(crate) fn value(&mut self, expression: &str) -> Value {
         let parameters = json!({ "expression": expression, "awaitPromise": true, "returnByValue": true });
         let answer = self.call("Runtime.evaluate", parameters);
         assert!(answer.get("exceptionDetails").is_none(), "{expression}: {answer}");
@@ -205,13 +205,13 @@ impl Browser {
     }
 
     /// A number.
-    pub fn number(&mut self, expression: &str) -> f64 {
+    pub(crate) fn number(&mut self, expression: &str) -> f64 {
         let value = self.value(expression);
         value.as_f64().unwrap_or_else(|| panic!("{expression}: {value}"))
     }
 
     /// A text.
-    pub fn text(&mut self, expression: &str) -> String {
+    pub(crate) fn text(&mut self, expression: &str) -> String {
         let value = self.value(expression);
         value
             .as_str()
@@ -220,7 +220,7 @@ impl Browser {
     }
 
     /// Moves the mouse from a place of an element to another, both as shares of its size, with the left button pressed.
-    pub fn drag(&mut self, element: &str, from: [f64; 2], to: [f64; 2]) {
+    pub(crate) fn drag(&mut self, element: &str, from: [f64; 2], to: [f64; 2]) {
         let [from, to] = [self.place(element, from), self.place(element, to)];
         self.mouse("mouseMoved", from, 0);
         self.mouse("mousePressed", from, 1);
@@ -236,20 +236,20 @@ impl Browser {
     }
 
     /// Moves the mouse onto a place of an element.
-    pub fn point(&mut self, element: &str, at: [f64; 2]) {
+    pub(crate) fn point(&mut self, element: &str, at: [f64; 2]) {
         let at = self.place(element, at);
         self.mouse("mouseMoved", at, 0);
     }
 
     /// Turns the wheel over the middle of an element.
-    pub fn wheel(&mut self, element: &str, by: f64) {
+    pub(crate) fn wheel(&mut self, element: &str, by: f64) {
         let [x, y] = self.place(element, [0.5, 0.5]);
         let event = json!({ "type": "mouseWheel", "x": x, "y": y, "deltaX": 0, "deltaY": by });
         self.call("Input.dispatchMouseEvent", event);
     }
 
     /// Presses a key.
-    pub fn key(&mut self, key: &str) {
+    pub(crate) fn key(&mut self, key: &str) {
         for event in ["rawKeyDown", "keyUp"] {
             self.call(
                 "Input.dispatchKeyEvent",
