@@ -16,6 +16,7 @@ function colouringsOf(payload, track) {
             unit: "mm/s",
             on: "lines",
             values: cc_speed,
+            worse: (a, b) => Math.abs(a - feed) > Math.abs(b - feed),
             range: isHeld ? [0.95 * feed, 1.05 * feed] : roundRange(...held),
             note: isHeld ? `held at ${shown(feed)} mm/s, within ${shown(Math.max(...held.map((x) => Math.abs(x / feed - 1))) * 100, 2)} %` : each,
         },
@@ -302,7 +303,8 @@ class Panel {
                 const far = Math.hypot(x, y) < 6 ? 0 : 1 + 11 / Math.hypot(x, y);
                 const place = [x * far, y * far];
                 // Two names never stand on each other.
-                if (taken.some(([a, b]) => Math.hypot(place[0] - a, place[1] - b) < 13)) place[0] += x < 0 ? -11 : 11;
+                const other = taken.find(([a, b]) => Math.hypot(place[0] - a, place[1] - b) < 13);
+                if (other) place[0] = other[0] + (place[0] < other[0] ? -11 : 11);
                 taken.push(place);
                 const text = far ? `<text x="${place[0]}" y="${place[1] + 4.5}">${name}</text>` : "";
                 return `<line class="${name}" x2="${x}" y2="${y}"/>${text}`;

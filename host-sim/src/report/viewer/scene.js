@@ -3,6 +3,7 @@
 const LIFT = 0.0007; // of the box's diagonal: lines lie this much over the surface, so that it does not cut them
 const WIDTH = { pass: 1.2, centre: 1.2, one: 3.2 }; // pixels
 const DOT = 4.5; // pixels
+const SEGMENT = 8; // pixels: about the length of a line's pieces, so that zooming shows finer ones
 const LIGHT = [-0.5, 0.75, 1]; // to the light: right, up, towards the viewer
 
 class View {
@@ -90,37 +91,77 @@ class View {
 
     // Line segments between the points of passes; those of the contact lifted off the surface towards the centre.
     segments(passes, places, times = 1) {
-        const total = passes.reduce((sum, pass) => sum + Math.max(pass.count - 1, 0), 0);
-        const positions = new Float32Array(6 * total);
+        const positions = [];
         const { cc, cl } = this.track;
         const lift = places === cc ? (times * LIFT * this.diagonal) / this.payload.radius : 0;
-        let at = 0;
-        const put = (point) => {
-            for (let k = 3 * point; k < 3 * point + 3; k++) {
-                positions[at++] = places[k] + lift * (cl[k] - cc[k]);
+        this.eachPiece(passes, (...ends) => {
+            for (const point of ends) {
+                for (let k = 3 * point; k < 3 * point + 3; k++) {
+                    positions.push(places[k] + lift * (cl[k] - cc[k]));
+                }
             }
-        };
+        });
+        return positions.length ? new Float32Array(positions) : new Float32Array(6);
+    }
+
+    // The pieces of passes, from point to point, as long as the zoom asks for.
+    eachPiece(passes, each) {
         for (const { begin, count } of passes) {
-            for (let point = begin; point + 1 < begin + count; point++) {
-                put(point);
-                put(point + 1);
+            const last = begin + count - 1;
+            for (let point = begin; point < last; point += this.stride) {
+                each(point, Math.min(point + this.stride, last));
             }
         }
-        return positions;
+    }
+
+    // How many points a piece spans: a power of two.
+    wantedStride() {
+        if (this.step === undefined) {
+            let [sum, count] = [0, 0];
+            const { passes, cc } = this.track;
+            for (const pass of passes) {
+                for (let at = 3 * pass.begin + 3; at < 3 * (pass.begin + pass.count); at += 3) {
+                    sum += Math.hypot(cc[at] - cc[at - 3], cc[at + 1] - cc[at - 2], cc[at + 2] - cc[at - 1]);
+                    count++;
+                }
+            }
+            this.step = count ? sum / count : 0;
+        }
+        const pixels = this.step * this.pixels();
+        return pixels > 0 ? 2 ** Math.min(Math.max(Math.round(Math.log2(SEGMENT / pixels)), 0), 10) : 1;
+    }
+
+    // Coarser or finer lines, when the zoom has changed enough.
+    refine() {
+        const stride = this.wantedStride();
+        if (stride === this.stride) return;
+        this.stride = stride;
+        const { passes, cc, cl } = this.track;
+        for (const [line, places] of [[this.passes, cc], [this.centres, cl]]) {
+            line.geometry.dispose();
+            line.geometry = this.geometry(this.segments(passes, places));
+            if (this.colouring?.on === "lines") line.geometry.setColors(this.lineColours(this.colouring));
+        }
+        this.one?.forEach((line, k) => {
+            line.geometry.dispose();
+            line.geometry = this.geometry(this.segments([passes[this.one.pass]], k === 0 ? cc : cl, 3));
+        });
+    }
+
+    geometry(positions) {
+        return new this.L.LineSegmentsGeometry().setPositions(positions);
     }
 
     line(positions, width, more = {}) {
-        const { LineMaterial, LineSegments2, LineSegmentsGeometry } = this.L;
-        const geometry = new LineSegmentsGeometry();
-        // No line at all is not allowed: one that is a point.
-        geometry.setPositions(positions.length ? positions : new Float32Array(6));
-        const line = new LineSegments2(geometry, new LineMaterial({ linewidth: width, ...more }));
+        const { LineMaterial, LineSegments2 } = this.L;
+        const line = new LineSegments2(this.geometry(positions), new LineMaterial({ linewidth: width, ...more }));
         line.frustumCulled = false;
         return line;
     }
 
     addLines() {
         const { passes, cc, cl } = this.track;
+        this.stride = 1024;
         this.passes = this.line(this.segments(passes, cc), WIDTH.pass, { transparent: true });
         this.centres = this.line(this.segments(passes, cl), WIDTH.centre, { transparent: true });
         this.scene.add(this.passes, this.centres);
@@ -238,23 +279,24 @@ class View {
         }
     }
 
-    lineColours({ values, range, limit }) {
+    // Colours of the pieces: each end has that of the worst point up to it.
+    lineColours({ values, range, limit, worse = (a, b) => a > b }) {
         const points = new Float32Array(3 * values.length);
         // A point without a value, the first of a pass, looks like the next.
         const filled = Float64Array.from(values);
         for (let k = filled.length - 2; k >= 0; k--) if (Number.isNaN(filled[k])) filled[k] = filled[k + 1];
         for (let k = 1; k < filled.length; k++) if (Number.isNaN(filled[k])) filled[k] = filled[k - 1];
-        this.fill(points, { values: filled, range, limit });
-        const total = this.track.passes.reduce((sum, pass) => sum + Math.max(pass.count - 1, 0), 0);
-        const colours = new Float32Array(6 * total);
-        let at = 0;
-        for (const { begin, count } of this.track.passes) {
-            for (let point = begin; point + 1 < begin + count; point++) {
-                colours.set(points.subarray(3 * point, 3 * point + 6), at);
-                at += 6;
+        this.eachPiece(this.track.passes, (from, to) => {
+            for (let point = from + 1; point < to; point++) {
+                if (worse(filled[point], filled[to])) filled[to] = filled[point];
             }
-        }
-        return colours.length ? colours : new Float32Array(6);
+        });
+        this.fill(points, { values: filled, range, limit });
+        const colours = [];
+        this.eachPiece(this.track.passes, (from, to) => {
+            for (const point of [from, to]) colours.push(points[3 * point], points[3 * point + 1], points[3 * point + 2]);
+        });
+        return colours.length ? new Float32Array(colours) : new Float32Array(6);
     }
 
     show({ surface, passes, centres, ball }) {
@@ -394,6 +436,7 @@ class View {
         if (this.requested) cancelAnimationFrame(this.requested);
         this.requested = undefined;
         if (!this.width) return;
+        this.refine();
         this.fade();
         const size = DOT / this.pixels();
         this.dots.cc.scale.setScalar(size);
