@@ -11,15 +11,15 @@ use host_sim::machine::Machine;
 use host_sim::oracle::{Checked, Emitted, Oracle};
 use host_sim::prepare::prepare;
 use host_sim::report::{Remarks, RidgePlace, Scallops, Sketch};
-use host_sim::survey::Survey;
+use host_sim::survey::{Findings, Survey};
 
 /// WebGL on the processor, whatever graphics card there is: the same everywhere.
 const SOFTWARE: [&str; 2] = ["--use-angle=swiftshader", "--enable-unsafe-swiftshader"];
 const DESK: [u32; 2] = [1280, 900];
 const PHONE: [u32; 2] = [390, 800];
 
-/// Runs a job and writes its report.
-fn report(name: &str, folder: &Path, remarks: &Remarks) -> PathBuf {
+/// Runs a job and writes its report; with what the oracle found.
+fn report(name: &str, folder: &Path, remarks: &Remarks) -> (PathBuf, Findings) {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../jobs").join(name);
     let job = JobFile::load(&path).unwrap();
     let prepared = prepare(&job).unwrap();
@@ -33,7 +33,7 @@ fn report(name: &str, folder: &Path, remarks: &Remarks) -> PathBuf {
         .unwrap();
     let findings = survey.finish(true).unwrap();
     let page = sketch.write(folder, Path::new(name), &findings, remarks).unwrap();
-    page.canonicalize().unwrap()
+    (page.canonicalize().unwrap(), findings)
 }
 
 /// Heights that rise along u from nothing to above the limit at u = 1.
@@ -111,7 +111,7 @@ fn view_and_charts_are_drawn_in_every_colouring() {
         scallops: Some(rising([[0.0, 1.0]; 2], 40)),
         ..Remarks::default()
     };
-    let page = report("freeform.toml", folder.path(), &remarks);
+    let (page, _) = report("freeform.toml", folder.path(), &remarks);
     let mut browser = Browser::start(DESK, "light", &SOFTWARE);
     browser.open(&page);
     let said = browser.text("document.querySelector('main').innerText");
@@ -163,7 +163,7 @@ fn view_and_charts_are_drawn_in_every_colouring() {
 #[test]
 fn mouse_keys_and_buttons_do_what_they_say() {
     let folder = tempfile::tempdir().unwrap();
-    let page = report("torus.toml", folder.path(), &Remarks::default());
+    let (page, _) = report("torus.toml", folder.path(), &Remarks::default());
     let mut browser = Browser::start(DESK, "dark", &SOFTWARE);
     browser.open(&page);
     let options = browser.text("[...document.getElementById('colour').options].map((o) => o.value).join()");
@@ -242,7 +242,7 @@ fn mouse_keys_and_buttons_do_what_they_say() {
 #[test]
 fn a_run_of_two_million_samples_opens_on_a_phone() {
     let folder = tempfile::tempdir().unwrap();
-    let page = report("revolved.toml", folder.path(), &Remarks::default());
+    let (page, findings) = report("revolved.toml", folder.path(), &Remarks::default());
     let bytes = std::fs::metadata(&page).unwrap().len();
     assert!(bytes < 6_000_000, "{bytes} bytes");
     let mut browser = Browser::start(PHONE, "dark", &SOFTWARE);
@@ -264,6 +264,20 @@ fn a_run_of_two_million_samples_opens_on_a_phone() {
     let behind = browser
         .number("isofeedReport.view.track.passes.reduce((sum, pass) => sum + pass.last - pass.first + 1, 0)");
     assert_eq!(behind, 2_212_265.0);
+    // The worst sample of them all is in the charts, and in the view.
+    let worst = findings.report.position_nm.max;
+    for values in [
+        "charts[0].series.whole.channel('cl_error')[1]",
+        "view.track.values.cl_error",
+    ] {
+        let shown = browser.number(&format!(
+            "isofeedReport.{values}.reduce((a, b) => b > a ? b : a, 0)"
+        ));
+        assert!(
+            (shown - worst).abs() < 1e-3,
+            "{values}: {shown}, the oracle {worst}"
+        );
+    }
     let [colours, painted, _] = pixels(&mut browser, [0, 0, 0]);
     assert!(colours > 100.0 && painted > 0.1, "{colours} colours on {painted}");
     assert_quiet(&mut browser, &page);
@@ -272,7 +286,7 @@ fn a_run_of_two_million_samples_opens_on_a_phone() {
 #[test]
 fn without_webgl_the_picture_stands_in() {
     let folder = tempfile::tempdir().unwrap();
-    let page = report("torus.toml", folder.path(), &Remarks::default());
+    let (page, _) = report("torus.toml", folder.path(), &Remarks::default());
     let mut browser = Browser::start(DESK, "light", &["--disable-3d-apis"]);
     browser.open(&page);
     let shown = "['stage', 'picture', 'no-view'].map((id) => document.getElementById(id).getBoundingClientRect().height > 10).join()";

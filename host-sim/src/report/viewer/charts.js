@@ -4,6 +4,7 @@
 const HEIGHT = 230;
 const COLUMNS_MAX = 1400;
 const LEAST_TICKS = 12; // no window shows less
+const PASSES_MAX = 60; // in a window with more, a column holds a pass: to and fro they would be a smear
 
 // Quantities over time: [name of the series, what it is called, colour, width of its line].
 const OVER_TIME = [
@@ -103,6 +104,8 @@ class TimeCharts {
         const { whole } = this.series;
         this.range = [whole.first, Math.max(whole.end - 1, whole.first + LEAST_TICKS)];
         this.window = [...this.range];
+        const last = payload.track.passes.at(-1);
+        this.passTicks = last ? last[2] / (last[0] + 1) : Infinity;
         this.cards = OVER_TIME.map((chart) => ({ ...chart, ...card(byId("charts"), `${chart.title}, ${chart.unit}`) }));
         this.buttons();
     }
@@ -140,7 +143,7 @@ class TimeCharts {
                     y: { range: (_, low, high) => airy(low, high, each.fromZero) },
                 },
                 series: [{}, ...colours.flatMap((_, k) => [line(k), line(k)])],
-                bands: colours.map((colour, k) => ({ series: [2 * k + 2, 2 * k + 1], fill: withAlpha(colour, 0.35) })),
+                bands: colours.map((colour, k) => ({ series: [2 * k + 2, 2 * k + 1], fill: withAlpha(colour, 0.3) })),
                 hooks: {
                     setCursor: [(chart) => this.read(each, chart)],
                     setSelect: [(chart) => this.select(chart)],
@@ -155,7 +158,9 @@ class TimeCharts {
     // New data for the window.
     refill() {
         const { period } = this.payload;
-        const most = Math.min(Math.round(this.width() * 1.2), COLUMNS_MAX);
+        const passes = (this.window[1] - this.window[0]) / this.passTicks;
+        const fits = Math.min(Math.round(this.width() * 1.2), COLUMNS_MAX);
+        const most = passes > PASSES_MAX ? Math.min(fits, Math.floor(passes)) : fits;
         let shownColumns;
         for (const each of this.cards) {
             const names = each.rows.map(([name]) => name);

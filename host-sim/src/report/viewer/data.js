@@ -132,18 +132,21 @@ function seriesOf(json) {
             const group = Math.max(Math.ceil((last - first) / most), 1);
             // Columns keep their places while the window moves.
             const begin = Math.floor(first / group) * group;
-            const times = [];
-            for (let k = begin; k < last; k += group) {
-                const end = Math.min(k + group, spans.count);
-                times.push(spans.first + (0.5 * (k + end) - 0.5) * spans.ticks + 0.5 * (spans.ticks - 1));
+            const ends = [];
+            for (let k = begin; k < last; k += group) ends.push([k, Math.min(k + group, spans.count)]);
+            // What is left over at the run's end goes with the column before: alone it would look like a fall.
+            const [start, stop] = ends.at(-1) ?? [0, 0];
+            if (ends.length > 1 && stop - start < group) {
+                ends.pop();
+                ends.at(-1)[1] = stop;
             }
+            const times = ends.map(([k, end]) => spans.first + 0.5 * ((k + end) * spans.ticks - 1));
             const rows = names.flatMap((name) => {
                 const [least, largest] = spans.channel(name);
                 const low = [];
                 const high = [];
-                for (let k = begin; k < last; k += group) {
+                for (const [k, end] of ends) {
                     let [a, b] = [NaN, NaN];
-                    const end = Math.min(k + group, spans.count);
                     for (let i = k; i < end; i++) {
                         if (!(least[i] >= a)) a = Number.isNaN(least[i]) ? a : least[i];
                         if (!(largest[i] <= b)) b = Number.isNaN(largest[i]) ? b : largest[i];
