@@ -262,6 +262,14 @@ fn scallops_lie_over_the_surface_where_they_were_measured() {
     }
     let largest = column(&value["largest"]);
     assert_eq!(largest.len(), 10);
+    // Where no ball reaches, the height is no measure of the others.
+    let mut missed = scallops.clone();
+    missed.ridges[3].1[20].height_mm = 40.0;
+    let value = missed.json(&mesh, domain, Along::U);
+    let shown = column(&value["mesh"]);
+    assert!((extent(&shown)[1] - 4.0 * 0.05).abs() < 1e-5 && value["highest"] == 40.0);
+    let near = |(a, b): (&f64, &f64)| a.is_nan() || *b > 0.19 || (a - b).abs() < 1e-5;
+    assert!(heights.iter().zip(&shown).all(near));
     assert!((largest[9] - (0.03 + 0.01 * 9.5 / 20.0)).abs() < 1e-5);
     assert!((f64::from(scallops.largest_mm()) - largest[9]).abs() < 1e-5);
 }

@@ -6,6 +6,10 @@ use super::embed::{Scale, column, words};
 use super::mesh::Mesh;
 use crate::job_file::Along;
 
+/// Heights of more limits than this look alike on the surface: where no ball reaches, they would take all the steps of the
+/// scale.
+const LIMITS_MAX: f64 = 4.0;
+
 /// A place on the ridge between two passes.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct RidgePlace {
@@ -37,7 +41,12 @@ impl Scallops {
 
     /// As the page reads it: heights at the mesh's points, and the largest and mean height of each gap.
     pub(super) fn json(&self, mesh: &Mesh, domain: [[f64; 2]; 2], along: Along) -> Value {
-        let heights = self.over(mesh.cells(), domain, along);
+        let mut heights = self.over(mesh.cells(), domain, along);
+        for height in &mut heights {
+            if *height > LIMITS_MAX * self.limit_mm {
+                *height = LIMITS_MAX * self.limit_mm;
+            }
+        }
         // From 0, so that the colours of two reports compare.
         let scale = Scale::of(heights.iter().copied().chain([0.0]));
         let finite = |places: &'_ [RidgePlace]| -> Vec<f64> {
@@ -59,6 +68,7 @@ impl Scallops {
         json!({
             "limit": self.limit_mm,
             "error": self.measuring_error_mm,
+            "highest": self.largest_mm(),
             "mesh": scale.json(words(heights.iter().map(|height| scale.above(*height)))),
             "gaps": gaps.iter().map(|(gap, _)| *gap).collect::<Vec<_>>(),
             "largest": column(largest),

@@ -364,7 +364,8 @@ class PassCharts {
             options: {
                 scales: {
                     x: { time: false },
-                    y: { range: (_, low, high) => airy(low, Math.max(high, each.limit ?? high), true) },
+                    // Where no ball reaches, a height would flatten all others.
+                    y: { range: (_, low, high) => airy(low, each.limit ? Math.min(Math.max(high, each.limit), 4 * each.limit) : high, true) },
                 },
                 series: [
                     {},

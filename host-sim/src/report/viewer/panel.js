@@ -35,8 +35,8 @@ function colouringsOf(payload, track) {
             values,
             range: [0, scallops.limit],
             limit: scallops.limit + scallops.error,
-            largest: extentOf(values)[1],
-            note: `limit ${scallops.limit} mm, measured to ±${shown(scallops.error, 2)} mm`,
+            largest: scallops.highest,
+            note: `limit ${scallops.limit} mm; at most ${shown(scallops.highest)} ± ${shown(scallops.error, 2)} mm`,
         });
     }
     return colourings.filter(({ values }) => !values || values.some((value) => !Number.isNaN(value)));
@@ -54,7 +54,7 @@ function legend({ name, unit, range, limit, largest, note }) {
     const low = range[0];
     // Beyond the limit the scale goes on to what was found, in the colour of what is above.
     const isOver = limit !== undefined && largest > limit;
-    const high = isOver ? Math.max(roundRange(low, largest)[1], range[1] * 1.1) : range[1];
+    const high = isOver ? Math.min(Math.max(roundRange(low, largest)[1], 1.1 * range[1]), 1.5 * range[1]) : range[1];
     const share = (range[1] - low) / (high - low);
     const stops = 24;
     const colours = Array.from({ length: stops + 1 }, (_, k) => `${cssColour(colourAt(k / stops))} ${(100 * share * k) / stops}%`);
