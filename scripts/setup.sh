@@ -71,6 +71,25 @@ END
         die "linuxcnc-uspace was unpacked into $place, but its rs274 does not run"
 }
 
+# A Chromium for the report's test: the first of the names that tests/browser/mod.rs tries, if it runs.
+need_browser() {
+    local program version
+    for program in ${CHROMIUM:+"$CHROMIUM"} chromium google-chrome google-chrome-stable chromium-browser; do
+        # A stub that stands for a snap is there, but does not run; a snap runs, but does not see files in /tmp.
+        if version=$("$program" --version 2> /dev/null) && [ "${version%snap*}" = "$version" ]; then return; fi
+        if [ "$program" = "${CHROMIUM:-}" ]; then die "CHROMIUM=$CHROMIUM is no Chromium that runs"; fi
+    done
+    command -v apt-get > /dev/null || die "Chromium is missing; install it, or name it in the variable CHROMIUM"
+    if ! apt-cache show chromium > /dev/null 2>&1; then as_root apt-get update -qq; fi
+    case $(apt-cache policy chromium 2> /dev/null | awk '$1 == "Candidate:" { print $2 }') in
+        '' | '(none)' | *snap*)
+            die "Chromium is missing, and apt has it only as a snap here, which cannot read the tests' pages; install Google Chrome's \
+package for this system, or name another Chromium in the variable CHROMIUM"
+            ;;
+    esac
+    need_program chromium chromium
+}
+
 # need_tool CRATE VERSION
 need_tool() {
     if command -v "$1" > /dev/null; then return; fi
@@ -105,4 +124,5 @@ setup_check() {
     need_program arm-none-eabi-objdump binutils-arm-none-eabi
     need_tool cargo-deny "$CARGO_DENY_VERSION"
     need_rs274
+    need_browser
 }

@@ -35,6 +35,6 @@ pub mod remote;
 pub mod report;
 pub mod speeds;
 pub mod survey;
-pub mod template;
 pub mod swept;
+pub mod template;
 pub mod trace;

@@ -2,7 +2,7 @@
 
 use interp_core::Sample;
 
-use crate::oracle::{Emitted, Oracle, Report, Verifier};
+use crate::oracle::{Checked, Emitted, Oracle, Report, Verifier};
 use crate::prepare::Prepared;
 use crate::speeds::{SpeedFigures, Speeds};
 use crate::trace::Trace;
@@ -48,12 +48,15 @@ pub(crate) fn emitted(prepared: &Prepared, sample: &Sample, first: bool, last: b
     }
 }
 
+/// What wants every sample of a run, with what its check found.
+pub type Each<'a> = dyn FnMut(&Emitted, &Checked) + 'a;
+
 /// The follower of one run.
 pub struct Survey<'a> {
     prepared: &'a Prepared,
     verifier: Verifier,
     trace: Option<Trace>,
-    each: Option<&'a mut dyn FnMut(&Emitted)>,
+    each: Option<&'a mut Each<'a>>,
     pending: Option<Pending>,
     samples: u64,
     oracle: Oracle,
@@ -64,13 +67,14 @@ pub struct Survey<'a> {
 }
 
 impl<'a> Survey<'a> {
-    /// A follower of a run of this job; it writes the trace, if there is one, and hands every sample on to `each`.
+    /// A follower of a run of this job; it writes the trace, if there is one, and hands every sample on to `each`, with
+    /// what its check found.
     #[must_use]
     pub fn new(
         prepared: &'a Prepared,
         oracle: &Oracle,
         trace: Option<Trace>,
-        each: Option<&'a mut dyn FnMut(&Emitted)>,
+        each: Option<&'a mut Each<'a>>,
     ) -> Self {
         Self {
             prepared,
@@ -114,9 +118,12 @@ impl<'a> Survey<'a> {
 
     fn emit(&mut self, Pending { sample, first }: Pending, last: bool) {
         let emitted = emitted(self.prepared, &sample, first, last);
-        let arc_mm = self.verifier.add(&emitted);
-        self.speeds
-            .add(&emitted, arc_mm, sample.cl_nm.map(|nm| f64::from(nm) * MM_PER_NM));
+        let checked = self.verifier.add(&emitted);
+        self.speeds.add(
+            &emitted,
+            checked.arc_mm,
+            sample.cl_nm.map(|nm| f64::from(nm) * MM_PER_NM),
+        );
         if first {
             // A place without a normal is the verifier's to report.
             let (_, side) = self.oracle.swapped(emitted.u, emitted.v);
@@ -124,7 +131,7 @@ impl<'a> Survey<'a> {
             self.feed_mm_s = self.feed_mm_s.max(emitted.feed_mm_s);
         }
         if let Some(each) = &mut self.each {
-            each(&emitted);
+            each(&emitted, &checked);
         }
     }
 

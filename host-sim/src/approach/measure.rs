@@ -4,7 +4,7 @@ use protocol::digest::Digest;
 
 use super::{ApproachError, Kind, Motion, Planned, run};
 use crate::job_file::JobFile;
-use crate::oracle::{Oracle, Verifier};
+use crate::oracle::{Checked, Oracle, Verifier};
 use crate::speeds::{Speed, Speeds};
 use crate::survey::Findings;
 
@@ -21,14 +21,15 @@ pub struct Measured {
     pub digest: u64,
 }
 
-/// Runs a job by an approach and measures it; hands every motion on, with the speeds over its period if it ends one.
+/// Runs a job by an approach and measures it; hands every motion on, with the speeds over its period if it ends one, and
+/// with what its check found.
 ///
 /// # Errors
 /// As [`run`].
 pub fn measure(
     kind: Kind,
     job: &JobFile,
-    mut each: impl FnMut(&Motion, Option<Speed>),
+    mut each: impl FnMut(&Motion, Option<Speed>, &Checked),
 ) -> Result<Measured, ApproachError> {
     measure_run(job, &mut each, |each| run(kind, job, each))
 }
@@ -39,7 +40,7 @@ pub fn measure(
 /// Those of the run.
 pub fn measure_run(
     job: &JobFile,
-    each: &mut dyn FnMut(&Motion, Option<Speed>),
+    each: &mut dyn FnMut(&Motion, Option<Speed>, &Checked),
     run: impl FnOnce(&mut dyn FnMut(&Motion)) -> Result<Planned, ApproachError>,
 ) -> Result<Measured, ApproachError> {
     let oracle = Oracle::new(job)?;
@@ -48,14 +49,14 @@ pub fn measure_run(
     let mut digest = Digest::new();
     let mut interval = f64::INFINITY;
     let planned = run(&mut |motion| {
-        let arc_mm = verifier.add(&motion.emitted);
+        let checked = verifier.add(&motion.emitted);
         interval = interval.min(motion.emitted.interval);
         digest.word(motion.emitted.tick as u32);
         digest.word(motion.emitted.pass);
         digest.words(&motion.emitted.cc_nm);
         digest.words(&motion.emitted.cl_nm);
-        let speed = speeds.add(&motion.emitted, arc_mm, motion.cl_mm);
-        each(motion, speed);
+        let speed = speeds.add(&motion.emitted, checked.arc_mm, motion.cl_mm);
+        each(motion, speed, &checked);
     })?;
     let report = verifier.finish();
     Ok(Measured {

@@ -6,7 +6,7 @@ use super::exact::exact;
 use super::fit::{Deviation, FitError, deviation, fit};
 use super::spline::SplineSurface;
 use super::{CadError, Face, Outline, Surface, outline};
-use crate::job_file::{Along, JobFile, Machine, NurbsSpec, Origin, Pattern, Side, SurfaceSpec};
+use crate::job_file::{Along, JobFile, Machine, NurbsSpec, Origin, Pattern, Side, Spacing, SurfaceSpec};
 use crate::prepare::prepare;
 
 /// Highest degree of a job's surface.
@@ -104,6 +104,7 @@ fn patches(nurbs: &NurbsSpec) -> Result<usize, String> {
         along: Along::U,
         side: Side::Plus,
         pattern: Pattern::Zig,
+        spacing: Spacing::Exact,
         chord_mm: 0.005,
         machine: Machine::default(),
         origin: Origin::default(),

@@ -3,10 +3,10 @@
 use std::path::{Path, PathBuf};
 
 use super::outcome::Outcome;
-use super::{Result, cannot_write, progress, spinner, trace};
+use super::{Result, cannot_write, progress, spinner, trace, unheld_limits};
 use crate::approach::{Kind, measure};
 use crate::job_file::JobFile;
-use crate::report::Sketch;
+use crate::report::{Remarks, Sketch};
 
 pub(super) fn command(
     kind: Kind,
@@ -25,10 +25,10 @@ pub(super) fn command(
     let mut written = Ok(());
     let bar = progress(passes.len() as u64, "following");
     let start = std::time::Instant::now();
-    let measured = measure(kind, job, |motion, _| {
+    let measured = measure(kind, job, |motion, _, checked| {
         let emitted = &motion.emitted;
         if let Some(sketch) = &mut sketch {
-            sketch.add(emitted);
+            sketch.add(emitted, checked);
         }
         if let (Some(trace), true) = (&mut trace, written.is_ok()) {
             written = trace.write_emitted(emitted);
@@ -44,14 +44,11 @@ pub(super) fn command(
     written
         .and_then(|()| trace.map_or(Ok(()), crate::trace::Trace::finish))
         .map_err(|error| cannot_write(&name, &error))?;
-    let page = directory
-        .zip(sketch.as_ref())
-        .map(|(directory, sketch)| {
-            sketch
-                .write(directory, Path::new(job.origin.name()), &measured.findings)
-                .map_err(|error| cannot_write(directory, &error))
-        })
-        .transpose()?;
+    let remarks = Remarks {
+        warnings: unheld_limits(job).into_iter().collect(),
+        ..Remarks::default()
+    };
+    let page = super::simulate::report(job, directory, sketch.as_ref(), &measured.findings, &remarks)?;
     let outcome = Outcome {
         kind,
         job,

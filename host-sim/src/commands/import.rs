@@ -1,5 +1,6 @@
 //! `import`: a face of a CAD file as a job.
 
+use super::out::{complain, say};
 use std::num::NonZeroUsize;
 use std::path::{Path, PathBuf};
 use std::sync::Mutex;
@@ -64,7 +65,7 @@ pub(super) struct Arguments {
     pattern: Option<String>,
     /// Prints one JSON object instead of text.
     #[arg(long)]
-    json: bool,
+    pub(super) json: bool,
 }
 
 impl From<CadError> for Failure {
@@ -167,7 +168,14 @@ fn deviation_json(form: &Form) -> Value {
 fn print_rows(rows: &[Row<'_>]) {
     say!(
         "{:>5} {:<18} {:<6} {:>8} {:>26} {:>11} {:>11} {:<8} becomes",
-        "face", "kind", "degree", "patches", "size mm", "hollow +", "hollow -", "trimmed"
+        "face",
+        "kind",
+        "degree",
+        "patches",
+        "size mm",
+        "hollow +",
+        "hollow -",
+        "trimmed"
     );
     for row in rows {
         let face = row.face;
@@ -283,7 +291,9 @@ fn report(arguments: &Arguments, path: &Path, face: &Face, made: &Machinable, wr
     );
     say!(
         "  size         {:.3} x {:.3} x {:.3} mm",
-        size[0], size[1], size[2]
+        size[0],
+        size[1],
+        size[2]
     );
     let exact = if made.form == Form::Exact {
         "exact"
@@ -293,7 +303,8 @@ fn report(arguments: &Arguments, path: &Path, face: &Face, made: &Machinable, wr
     say!("  surface      {} patches, {exact}", made.patches);
     say!(
         "  tool         ball of {} mm, side \"{}\"",
-        written.radius_mm, written.side
+        written.radius_mm,
+        written.side
     );
     for warning in &written.warnings {
         say!("  note         {warning}");

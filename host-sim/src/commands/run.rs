@@ -11,7 +11,7 @@ use serde_json::{Value, json};
 
 use super::out::say;
 use super::outcome::Outcome;
-use super::simulate::{Timed, machine, surveyed, timed};
+use super::simulate::{Timed, machine, remarks, report, surveyed, timed};
 use super::{Failure, Result, cannot_write, load, progress, spinner, trace, unheld_limits, warn_of_limits};
 use crate::approach::Kind;
 use crate::job_file::JobFile;
@@ -35,7 +35,7 @@ pub(super) struct Arguments {
     /// Writes every sample that the board sent as a row of this CSV file.
     #[arg(long, value_name = "FILE")]
     trace: Option<PathBuf>,
-    /// Writes a page with pictures into this folder.
+    /// Writes a page with a view that turns, charts and figures into this folder.
     #[arg(long, value_name = "DIR")]
     report: Option<PathBuf>,
     /// Runs a job on a board although the axis limits that it asks for are not held yet.
@@ -314,7 +314,14 @@ pub(super) fn command(arguments: &Arguments) -> Result<()> {
     } else {
         by_digest(arguments, &job, &prepared, &here, &mut session)?
     };
-    let (findings, page) = surveyed(&job, &prepared, &here, None, arguments.report.as_deref())?;
+    let directory = arguments.report.as_deref();
+    let (findings, sketch) = surveyed(&job, &prepared, &here, None, directory.is_some())?;
+    let complaint = complaint(&ran, &here, &job);
+    let mut remarks = remarks(&job, &here, &findings);
+    if let Some(complaint) = complaint.as_ref().filter(|_| here.fault.is_none()) {
+        remarks.failures.insert(0, complaint.clone());
+    }
+    let page = report(&job, directory, sketch.as_ref(), &findings, &remarks)?;
     let outcome = Outcome {
         kind: Kind::Surface,
         job: &job,
@@ -325,7 +332,6 @@ pub(super) fn command(arguments: &Arguments) -> Result<()> {
         samples_per_second: here.samples_per_second,
         fault: here.fault,
     };
-    let complaint = complaint(&ran, &here, &job);
     let board = session.capabilities().description.board.as_str();
     if arguments.json {
         say!("{}", json_of(&outcome, &ran, board));

@@ -8,15 +8,17 @@ use interp_core::{Fault, Place};
 use protocol::digest::Digest;
 
 use super::outcome::{FaultAt, Outcome};
-use super::{Failure, Result, approach, cannot_write, load, progress, trace, warn_of_limits};
+use super::{
+    BOUNDS, Failure, Result, approach, cannot_write, load, progress, trace, unheld_limits, warn_of_limits,
+};
 use crate::approach::Kind;
 use crate::explain;
 use crate::job_file::JobFile;
 use crate::machine::Machine;
-use crate::oracle::{Emitted, Oracle};
+use crate::oracle::{Checked, Emitted, Oracle};
 use crate::prepare::Prepared;
-use crate::report::Sketch;
-use crate::survey::{Findings, Survey};
+use crate::report::{Remarks, Sketch};
+use crate::survey::{Each, Findings, Survey};
 
 /// Runs a job on this machine: the same core, the same bits as on the board; or one of the paper's other approaches.
 ///
@@ -30,7 +32,7 @@ pub(super) struct Arguments {
     /// Writes every sample as a row of this CSV file.
     #[arg(long, value_name = "FILE")]
     trace: Option<PathBuf>,
-    /// Writes a page with pictures into this folder.
+    /// Writes a page with a view that turns, charts and figures into this folder.
     #[arg(long, value_name = "DIR")]
     report: Option<PathBuf>,
     /// Prints one JSON object instead of text.
@@ -123,20 +125,21 @@ pub(super) fn timed(job: &JobFile, prepared: &Prepared) -> Result<Timed> {
     })
 }
 
-/// Runs the core again, measures every sample, and writes trace and page where they are wanted; returns the page's path too.
+/// Runs the core again, measures every sample, and writes the trace if it is wanted; with what a report needs if one is
+/// `sketched`.
 pub(super) fn surveyed(
     job: &JobFile,
     prepared: &Prepared,
     timed: &Timed,
     trace_file: Option<&PathBuf>,
-    directory: Option<&Path>,
-) -> Result<(Findings, Option<PathBuf>)> {
+    sketched: bool,
+) -> Result<(Findings, Option<Sketch>)> {
     let oracle = oracle(job)?;
-    let mut sketch = directory.map(|_| Sketch::new(job, timed.passes.len()));
+    let mut sketch = sketched.then(|| Sketch::new(job, timed.passes.len()));
     let mut draw = sketch
         .as_mut()
-        .map(|sketch| |emitted: &Emitted| sketch.add(emitted));
-    let each = draw.as_mut().map(|draw| draw as &mut dyn FnMut(&Emitted));
+        .map(|sketch| |emitted: &Emitted, checked: &Checked| sketch.add(emitted, checked));
+    let each = draw.as_mut().map(|draw| draw as &mut Each<'_>);
     let mut survey = Survey::new(prepared, &oracle, trace(trace_file, job)?, each);
     let bar = progress(timed.samples, "measuring");
     let mut written = Ok(());
@@ -153,13 +156,36 @@ pub(super) fn surveyed(
     let findings = written
         .and_then(|()| survey.finish(ran.is_ok()))
         .map_err(|error| cannot_write(&name, &error))?;
+    Ok((findings, sketch))
+}
+
+/// What a report says besides the samples: the fault, figures out of their bounds, limits that are not held.
+pub(super) fn remarks(job: &JobFile, timed: &Timed, findings: &Findings) -> Remarks {
+    let failures = match &timed.fault {
+        Some(fault) => vec![fault.sentence()],
+        None => findings.report.failures(&BOUNDS),
+    };
+    Remarks {
+        failures,
+        warnings: unheld_limits(job).into_iter().collect(),
+        ..Remarks::default()
+    }
+}
+
+/// Writes the report if one is wanted, and returns the page's path.
+pub(super) fn report(
+    job: &JobFile,
+    directory: Option<&Path>,
+    sketch: Option<&Sketch>,
+    findings: &Findings,
+    remarks: &Remarks,
+) -> Result<Option<PathBuf>> {
     let write = |(directory, sketch): (&Path, &Sketch)| {
         sketch
-            .write(directory, Path::new(job.origin.name()), &findings)
+            .write(directory, Path::new(job.origin.name()), findings, remarks)
             .map_err(|error| cannot_write(directory, &error))
     };
-    let page = directory.zip(sketch.as_ref()).map(write).transpose()?;
-    Ok((findings, page))
+    directory.zip(sketch).map(write).transpose()
 }
 
 /// The oracle of a job that was prepared, hence has one.
@@ -177,13 +203,16 @@ pub(super) fn command(arguments: &Arguments) -> Result<()> {
         return approach::command(arguments.approach, &job, trace.as_ref(), report.as_deref(), *json);
     }
     let timed = timed(&job, &prepared)?;
-    let (findings, page) = surveyed(
+    let directory = arguments.report.as_deref();
+    let (findings, sketch) = surveyed(
         &job,
         &prepared,
         &timed,
         arguments.trace.as_ref(),
-        arguments.report.as_deref(),
+        directory.is_some(),
     )?;
+    let remarks = remarks(&job, &timed, &findings);
+    let page = report(&job, directory, sketch.as_ref(), &findings, &remarks)?;
     let outcome = Outcome {
         kind: Kind::Surface,
         job: &job,

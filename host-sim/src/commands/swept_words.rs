@@ -1,5 +1,6 @@
 //! What the measured tool path came to, as text and as JSON.
 
+use super::out::say;
 use interp_core::STORE_WORDS;
 use serde_json::{Map, Value, json};
 
@@ -220,7 +221,13 @@ fn axes(job: &JobFile, found: &Findings) {
         };
         say!(
             "  {given}{:<22} x {:.3} to {:.3}, y {:.3} to {:.3}, z {:.3} to {:.3} mm",
-            "axis travel", x[0], x[1], y[0], y[1], z[0], z[1]
+            "axis travel",
+            x[0],
+            x[1],
+            y[0],
+            y[1],
+            z[0],
+            z[1]
         );
     }
     let peak = |name: &str, unit: &str, peak: &Peak| {

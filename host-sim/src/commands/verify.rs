@@ -1,16 +1,18 @@
 //! `verify`: every sample of a job against the independent oracle.
 
+use super::out::say;
 use std::path::PathBuf;
 
 use clap::Args;
 use indicatif::ProgressBar;
 use serde_json::Value;
 
-use super::simulate::{Timed, machine, oracle, timed};
+use super::simulate::{Timed, machine, oracle, remarks, report, timed};
 use super::{Failure, Result, load, progress, swept_words, warn_of_limits};
 use crate::job_file::JobFile;
-use crate::oracle::{Bounds, Emitted, Figure};
+use crate::oracle::{Bounds, Checked, Emitted, Figure};
 use crate::prepare::Prepared;
+use crate::report::{Remarks, RidgePlace, Scallops, Sketch};
 use crate::survey::{Findings, Survey};
 use crate::swept::{self, Track};
 
@@ -35,6 +37,9 @@ pub const BOUNDS: Bounds = Bounds {
 pub(super) struct Arguments {
     /// Job file (TOML).
     job: PathBuf,
+    /// Writes a page with a view that turns, charts and figures into this folder.
+    #[arg(long, value_name = "DIR")]
+    report: Option<PathBuf>,
     /// Prints one JSON object instead of text.
     #[arg(long)]
     pub(super) json: bool,
@@ -75,7 +80,8 @@ fn print(findings: &Findings, scanned: Option<usize>) {
     let scan = scanned.map_or_else(|| "no count".to_owned(), |passes| passes.to_string());
     say!(
         "  passes {} (dense scan of the surface: {scan}), samples {}",
-        findings.passes, findings.samples
+        findings.passes,
+        findings.samples
     );
 }
 
@@ -84,11 +90,17 @@ pub(super) fn measured(
     job: &JobFile,
     prepared: &Prepared,
     timed: &Timed,
+    mut sketch: Option<&mut Sketch>,
 ) -> Result<(Findings, swept::Findings)> {
     let oracle = oracle(job)?;
     let bar = progress(timed.samples, "measuring");
     let mut track = Track::default();
-    let mut keep = |emitted: &Emitted| track.add(emitted, job.along);
+    let mut keep = |emitted: &Emitted, checked: &Checked| {
+        track.add(emitted, job.along);
+        if let Some(sketch) = &mut sketch {
+            sketch.add(emitted, checked);
+        }
+    };
     let mut survey = Survey::new(prepared, &oracle, None, Some(&mut keep));
     let mut written = Ok(());
     let ran = machine(job, prepared)?.run(|sample| {
@@ -104,6 +116,21 @@ pub(super) fn measured(
     let swept = swept::measure(job, &oracle, &track, ran.is_ok(), &Bar(&bar));
     bar.finish_and_clear();
     Ok((findings, swept))
+}
+
+/// The measured heights as the report shows them.
+fn scallops(job: &JobFile, swept: &swept::Findings) -> Scallops {
+    let place = |spot: &swept::RidgeSpot| RidgePlace {
+        u: spot.u,
+        v: spot.v,
+        height_mm: spot.height_mm,
+    };
+    let ridge = |ridge: &swept::Ridge| (ridge.gap, ridge.spots.iter().map(place).collect());
+    Scallops {
+        limit_mm: job.scallop_mm,
+        measuring_error_mm: swept.measuring_error_mm,
+        ridges: swept.ridges.iter().map(ridge).collect(),
+    }
 }
 
 /// One bar for all parts of the measuring.
@@ -125,10 +152,12 @@ pub(super) fn command(arguments: &Arguments) -> Result<()> {
     let (job, prepared) = load(&arguments.job)?;
     warn_of_limits(&job);
     let timed = timed(&job, &prepared)?;
-    let (findings, swept) = measured(&job, &prepared, &timed)?;
-    let report = &findings.report;
+    let directory = arguments.report.as_deref();
+    let mut sketch = directory.map(|_| Sketch::new(&job, timed.passes.len()));
+    let (findings, swept) = measured(&job, &prepared, &timed, sketch.as_mut())?;
+    let figures = &findings.report;
     let scanned = scanned_passes(&job)?;
-    let mut failures = report.failures(&BOUNDS);
+    let mut failures = figures.failures(&BOUNDS);
     if let Some(scanned) =
         scanned.filter(|scanned| *scanned != findings.passes as usize && timed.fault.is_none())
     {
@@ -142,6 +171,17 @@ pub(super) fn command(arguments: &Arguments) -> Result<()> {
     }
     failures.extend(swept.failures.iter().cloned());
     let passed = failures.is_empty();
+    let mut remarks = Remarks {
+        failures: failures.clone(),
+        verified: true,
+        scallops: Some(scallops(&job, &swept)),
+        ..remarks(&job, &timed, &findings)
+    };
+    let known = |warning: &&String| !failures.contains(warning);
+    remarks
+        .warnings
+        .extend(swept.warnings.iter().filter(known).cloned());
+    let page = report(&job, directory, sketch.as_ref(), &findings, &remarks)?;
     if arguments.json {
         let mut value = swept_words::json(&job, &prepared, &findings, &swept);
         value.insert("passes_scanned".to_owned(), scanned.into());
@@ -163,6 +203,9 @@ pub(super) fn command(arguments: &Arguments) -> Result<()> {
             say!("  warning: {warning}");
         }
         say!("  {}", if passed { "passed" } else { "FAILED" });
+        if let Some(page) = page {
+            say!("  report {}", page.display());
+        }
     }
     if passed {
         Ok(())

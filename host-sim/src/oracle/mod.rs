@@ -36,4 +36,4 @@ pub use offset::Offset;
 pub use report::{Bounds, Figure, Report, Spot};
 pub use schedule::Pass;
 pub use surface::{Derivatives, Surface};
-pub use verify::{Emitted, Verifier};
+pub use verify::{Checked, Emitted, Verifier};

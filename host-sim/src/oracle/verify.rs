@@ -33,6 +33,17 @@ pub struct Emitted {
     pub last_of_pass: bool,
 }
 
+/// What the check of one sample found.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Checked {
+    /// Length of the contact's path since the sample before, mm, if that is of the same pass.
+    pub arc_mm: Option<f64>,
+    /// 100 (arc / (f T) - 1), %, where the step is held against the feed: not the first and the last of a pass.
+    pub ripple_pct: Option<f64>,
+    /// |CL emitted - CL|, nm, where the surface has a normal.
+    pub position_nm: Option<f64>,
+}
+
 /// Gathers a [`Report`] from a stream of samples.
 #[derive(Clone, Debug)]
 pub struct Verifier {
@@ -72,8 +83,8 @@ impl Verifier {
         }
     }
 
-    /// Checks the next sample; returns the length of the contact's path since the one before, mm, if that is of the same pass.
-    pub fn add(&mut self, sample: &Emitted) -> Option<f64> {
+    /// Checks the next sample, and returns what the check found.
+    pub fn add(&mut self, sample: &Emitted) -> Checked {
         let spot = Spot {
             tick: sample.tick,
             pass: sample.pass,
@@ -82,13 +93,13 @@ impl Verifier {
         };
         let (path, side) = self.oracle.swapped(sample.u, sample.v);
         self.report.samples += 1;
-        let arc_mm = if sample.first_of_pass {
+        let (arc_mm, ripple_pct) = if sample.first_of_pass {
             self.begin_pass(sample, path, side, spot);
-            None
+            (None, None)
         } else {
             self.check_step(sample, path, side, spot)
         };
-        self.check_geometry(sample, spot);
+        let position_nm = self.check_geometry(sample, spot);
         if sample.last_of_pass {
             if path != self.pass_ends(sample.pass)[1] {
                 self.report.off_boundary += 1;
@@ -97,7 +108,11 @@ impl Verifier {
                 pass.finished = true;
             }
         }
-        arc_mm.map(f64::abs)
+        Checked {
+            arc_mm: arc_mm.map(f64::abs),
+            ripple_pct,
+            position_nm,
+        }
     }
 
     /// The report, after the last sample.
@@ -159,11 +174,17 @@ impl Verifier {
         self.report.scallop_samples += pass.samples;
     }
 
-    /// Arc of the step to this sample, held against the feed.
-    fn check_step(&mut self, sample: &Emitted, path: f64, side: f64, spot: Spot) -> Option<f64> {
+    /// Arc of the step to this sample, mm, and what it is off the feed, %.
+    fn check_step(
+        &mut self,
+        sample: &Emitted,
+        path: f64,
+        side: f64,
+        spot: Spot,
+    ) -> (Option<f64>, Option<f64>) {
         let Some(pass) = &mut self.current else {
             self.report.astray += 1;
-            return None;
+            return (None, None);
         };
         let forwards = if self.oracle.pattern == Pattern::Zigzag && sample.pass % 2 == 1 {
             -1.0
@@ -182,23 +203,25 @@ impl Verifier {
             self.report
                 .last_step
                 .add(if wanted > 0.0 { arc / wanted } else { 0.0 }, spot);
-        } else if wanted > 0.0 {
-            self.report.ripple_pct.add(100.0 * (arc / wanted - 1.0), spot);
+            return (Some(arc), None);
         }
-        Some(arc)
+        let ripple_pct = (wanted > 0.0).then(|| 100.0 * (arc / wanted - 1.0));
+        if let Some(ripple_pct) = ripple_pct {
+            self.report.ripple_pct.add(ripple_pct, spot);
+        }
+        (Some(arc), ripple_pct)
     }
 
-    /// Positions, normal, curvature and interval of one sample.
-    fn check_geometry(&mut self, sample: &Emitted, spot: Spot) {
+    /// Positions, normal, curvature and interval of one sample; returns the centre's error, nm.
+    fn check_geometry(&mut self, sample: &Emitted, spot: Spot) -> Option<f64> {
         let Ok(contact) = self.oracle.contact(sample.u, sample.v) else {
             self.report.degenerate += 1;
-            return;
+            return None;
         };
         let [cc_nm, cl_nm] = [sample.cc_nm, sample.cl_nm].map(|nm| nm.map(f64::from));
         let report = &mut self.report;
-        report
-            .position_nm
-            .add(length(subtract(cl_nm, scale(contact.cl_mm, NM_PER_MM))), spot);
+        let position_nm = length(subtract(cl_nm, scale(contact.cl_mm, NM_PER_MM)));
+        report.position_nm.add(position_nm, spot);
         report
             .contact_nm
             .add(length(subtract(cc_nm, scale(contact.cc_mm, NM_PER_MM))), spot);
@@ -219,5 +242,6 @@ impl Verifier {
                 pass.least_at = spot;
             }
         }
+        Some(position_nm)
     }
 }

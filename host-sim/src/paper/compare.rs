@@ -89,9 +89,9 @@ fn row(case: &Case, kind: Kind, passes: usize, step: &dyn Fn()) -> Result<Row, A
             step();
         }
     };
-    let measured = measure(kind, &case.job, |motion, _| {
+    let measured = measure(kind, &case.job, |motion, _, checked| {
         if let Some(sketch) = &mut sketch {
-            sketch.add(&motion.emitted);
+            sketch.add(&motion.emitted, checked);
         }
         if motion.emitted.last_of_pass {
             passed += 1;

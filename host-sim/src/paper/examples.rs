@@ -244,7 +244,7 @@ fn example_2(cases: &Cases) -> Result<Vec<Item>, ApproachError> {
 /// A run over one pass by eqn 6 as printed.
 fn by_equation(case: &Case, pass: &PassPath<'_>) -> Result<Measured, ApproachError> {
     let linear = Linear::new(&case.job, Chords::Equation);
-    measure_run(&case.job, &mut |_, _| {}, |each| {
+    measure_run(&case.job, &mut |_, _, _| {}, |each| {
         planned(&linear, &case.job, &[*pass], each)
     })
 }

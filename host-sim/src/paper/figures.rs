@@ -64,7 +64,7 @@ fn track(
     let mut speeds = Vec::new();
     let measured = measure_run(
         &case.job,
-        &mut |motion, speed| {
+        &mut |motion, speed, _| {
             if !motion.emitted.last_of_pass {
                 speeds.extend(speed);
             }
@@ -161,7 +161,7 @@ fn section(nodes: &[Node]) -> Section {
 /// The product's first pass.
 fn first_pass_of_core(case: &Case) -> Result<Track, ApproachError> {
     let mut speeds = Vec::new();
-    let measured = crate::approach::measure(Kind::Surface, &case.job, |motion, speed| {
+    let measured = crate::approach::measure(Kind::Surface, &case.job, |motion, speed, _| {
         if motion.emitted.pass == 0 && !motion.emitted.last_of_pass {
             speeds.extend(speed);
         }

@@ -1,21 +1,10 @@
 //! What the charts show, out of the record and the oracle.
 
-use super::record::{PassInterval, Record};
+use super::record::PassInterval;
 use crate::oracle::Oracle;
 
 /// Places along a pass at which the distance to the next one is taken.
 const PLACES: u32 = 48;
-
-/// Mean speeds over a few periods of the middle pass.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) struct Speed {
-    /// Arc from the beginning of the pass to the middle of these periods, mm.
-    pub(super) arc_mm: f64,
-    /// Of the cutter contact, along the surface, mm/s.
-    pub(super) cc_mm_s: f64,
-    /// Of the tool centre, mm/s.
-    pub(super) cl_mm_s: f64,
-}
 
 /// Distance between a pass and the next, along the surface across the pass.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -23,31 +12,6 @@ pub(super) struct Gap {
     pub(super) pass: u32,
     pub(super) widest_mm: f64,
     pub(super) narrowest_mm: f64,
-}
-
-/// Speeds along the middle pass, from the emitted parameters and tool centres; the last step, which is cut short, is
-/// left out.
-pub(super) fn speeds(oracle: &Oracle, record: &Record) -> Vec<Speed> {
-    let details = record.middle.items();
-    let whole = details.iter().filter(|detail| !detail.last);
-    let mut arc_mm = 0.0;
-    whole
-        .clone()
-        .zip(whole.skip(1))
-        .map(|(from, to)| {
-            let time_s = f64::from(to.step - from.step) * oracle.period_s;
-            let (start, side) = oracle.swapped(from.u, from.v);
-            let (end, _) = oracle.swapped(to.u, to.v);
-            let arc = oracle.arc_length(start, end, side).abs();
-            let middle = arc_mm + 0.5 * arc;
-            arc_mm += arc;
-            Speed {
-                arc_mm: middle,
-                cc_mm_s: arc / time_s,
-                cl_mm_s: (to.cl_length_mm - from.cl_length_mm) / time_s,
-            }
-        })
-        .collect()
 }
 
 /// A step shorter than its interval by more than this share was cut at the boundary.

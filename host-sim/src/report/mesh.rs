@@ -58,6 +58,21 @@ impl Mesh {
         }
     }
 
+    /// Cells in u and in v.
+    pub(super) fn cells(&self) -> [usize; 2] {
+        self.cells
+    }
+
+    /// Sign of the tool side on the product of a cell's sides along u and v.
+    pub(super) fn sign(&self) -> f64 {
+        self.sign
+    }
+
+    /// All points: u ascending, within it v, one more each way than there are cells.
+    pub(super) fn points(&self) -> &[Vector] {
+        &self.points
+    }
+
     fn point(&self, i: usize, j: usize) -> Vector {
         self.points[i * (self.cells[1] + 1) + j]
     }

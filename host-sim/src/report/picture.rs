@@ -48,8 +48,15 @@ pub(super) struct Words {
     pub(super) description: String,
 }
 
+/// The picture, and where it looks from.
+pub(super) struct Picture {
+    pub(super) svg: String,
+    /// Direction towards the viewer.
+    pub(super) toward: Vector,
+}
+
 /// The whole picture.
-pub(super) fn picture(mesh: &Mesh, record: &Record, radius_mm: f64, words: &Words) -> String {
+pub(super) fn picture(mesh: &Mesh, record: &Record, radius_mm: f64, words: &Words) -> Picture {
     let scene = Scene::new(mesh, record, radius_mm, FRAME);
     let mut out = String::new();
     furniture::open(&mut out, SIZE, words);
@@ -79,7 +86,10 @@ pub(super) fn picture(mesh: &Mesh, record: &Record, radius_mm: f64, words: &Word
     furniture::scale_bar(&mut out, scene.camera.scale, [SIZE[0] - 44.0, SIZE[1] - 44.0]);
     furniture::key(&mut out, words, scene.ball.is_some(), [150.0, SIZE[1] - 62.0]);
     out.push_str("</svg>\n");
-    out
+    Picture {
+        svg: out,
+        toward: scene.camera.view.toward,
+    }
 }
 
 /// Shaded quads. Each is stroked in its own colour, so that no seam shows between neighbours.

@@ -7,8 +7,6 @@ use crate::oracle::Emitted;
 const DRAWN_MAX: usize = 60;
 /// Points kept of a drawn pass at most: one every two to five pixels.
 const POINTS_MAX: usize = 300;
-/// Points kept of the middle pass at most: finer than a chart's pixels.
-const DETAIL_MAX: usize = 1200;
 /// Passes whose interval is kept at most: two to a chart's pixel.
 const INTERVALS_MAX: usize = 2048;
 
@@ -81,19 +79,6 @@ pub(super) struct Drawn {
     pub(super) places: Thinned<Place>,
 }
 
-/// One sample of the middle pass.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct Detail {
-    /// Samples since the pass began.
-    pub(super) step: u32,
-    pub(super) u: f64,
-    pub(super) v: f64,
-    /// Length of the tool centre's path since the pass began, mm.
-    pub(super) cl_length_mm: f64,
-    /// Last sample of its pass: its step is shorter than a period's.
-    pub(super) last: bool,
-}
-
 /// Where a pass lies, and the least interval on it.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct PassInterval {
@@ -114,15 +99,11 @@ pub(super) struct Record {
     stride: u32,
     /// The pass that is expected to be the last.
     final_pass: u32,
-    /// The pass that is kept in detail.
+    /// The pass that is set off from the others.
     pub(super) middle_pass: u32,
     pub(super) drawn: Vec<Drawn>,
-    pub(super) middle: Thinned<Detail>,
     pub(super) intervals: Thinned<PassInterval>,
     current: Option<PassInterval>,
-    last_cl_nm: [i32; 3],
-    cl_length_mm: f64,
-    step: u32,
     is_drawn: bool,
 }
 
@@ -140,12 +121,8 @@ impl Record {
             final_pass: passes - 1,
             middle_pass: passes / 2 / stride * stride,
             drawn: Vec::new(),
-            middle: Thinned::new(DETAIL_MAX),
             intervals: Thinned::new(INTERVALS_MAX),
             current: None,
-            last_cl_nm: [0; 3],
-            cl_length_mm: 0.0,
-            step: 0,
             is_drawn: false,
         }
     }
@@ -166,9 +143,6 @@ impl Record {
         };
         if let Some(drawn) = self.drawn.last_mut() {
             drawn.places.push(place);
-        }
-        if sample.pass == self.middle_pass {
-            self.add_detail(sample);
         }
     }
 
@@ -198,25 +172,6 @@ impl Record {
                 places: Thinned::new(POINTS_MAX),
             });
         }
-        self.step = 0;
-        self.cl_length_mm = 0.0;
-    }
-
-    fn add_detail(&mut self, sample: &Emitted) {
-        if !sample.first_of_pass {
-            let apart = |k: usize| f64::from(sample.cl_nm[k]) - f64::from(self.last_cl_nm[k]);
-            let squares = apart(0).powi(2) + apart(1).powi(2) + apart(2).powi(2);
-            self.cl_length_mm += squares.sqrt() * MM_PER_NM;
-            self.step += 1;
-        }
-        self.last_cl_nm = sample.cl_nm;
-        self.middle.push(Detail {
-            step: self.step,
-            u: sample.u,
-            v: sample.v,
-            cl_length_mm: self.cl_length_mm,
-            last: sample.last_of_pass,
-        });
     }
 }
 

@@ -5,15 +5,15 @@ use std::path::Path;
 use super::furniture::round_below;
 use super::record::{Record, Thinned};
 use super::svg::{escape, polyline, simplified, tenths};
-use super::{Sketch, measure, number};
+use super::{Figure, Remarks, Sketch, measure, number};
 use crate::job_file::JobFile;
 use crate::machine::Machine;
-use crate::oracle::{Emitted, Oracle};
+use crate::oracle::{Checked, Emitted, Oracle};
 use crate::prepare::prepare;
 use crate::survey::{Findings, Survey};
 
 /// A small bell: 20 passes or so, in a fraction of a second.
-const BELL: &str = r#"
+pub(super) const BELL: &str = r#"
 [surface]
 kind = "revolved"
 radius_mm = [60, -90, 90, 20]
@@ -32,13 +32,13 @@ pattern = "zigzag"
 "#;
 
 /// Runs a job as the command does.
-fn run(text: &str) -> (JobFile, Sketch, Findings) {
+pub(super) fn run(text: &str) -> (JobFile, Sketch, Findings) {
     let job = JobFile::parse("bell.toml", text).unwrap();
     let prepared = prepare(&job).unwrap();
     let oracle = Oracle::new(&job).unwrap();
     let passes = oracle.schedule().unwrap().len();
     let mut sketch = Sketch::new(&job, passes);
-    let mut draw = |sample: &Emitted| sketch.add(sample);
+    let mut draw = |sample: &Emitted, checked: &Checked| sketch.add(sample, checked);
     let mut survey = Survey::new(&prepared, &oracle, None, Some(&mut draw));
     Machine::load(&prepared)
         .unwrap()
@@ -74,6 +74,12 @@ fn assert_well_formed(text: &str) {
             .unwrap();
         match () {
             () if tag.starts_with('!') || tag.ends_with('/') => {}
+            // What is in a script is the browser's to read, up to its end tag.
+            () if name == "script" => {
+                let script = &from[end + 1..];
+                rest = &script[script.find("</script>").expect("a script ends") + 9..];
+                continue;
+            }
             () if tag.starts_with('/') => assert_eq!(open.pop(), Some(name)),
             () => open.push(name),
         }
@@ -131,7 +137,7 @@ fn record_is_bounded_whatever_the_job() {
         }
         assert!(record.drawn.len() <= 61, "{} passes drawn", record.drawn.len());
         assert!(record.drawn.iter().all(|drawn| drawn.places.items().len() <= 301));
-        assert!(record.middle.items().len() <= 1201 && record.intervals.items().len() <= 2049);
+        assert!(record.intervals.items().len() <= 2049);
         assert!(
             record
                 .intervals
@@ -162,7 +168,7 @@ fn zigzag_passes_are_drawn_to_and_fro() {
     assert!(drawn.contains(&record.middle_pass));
 }
 
-const BLANK: Emitted = Emitted {
+pub(super) const BLANK: Emitted = Emitted {
     tick: 0,
     pass: 0,
     u: 0.0,
@@ -181,21 +187,37 @@ fn report_is_well_formed_small_and_says_what_was_found() {
     let folder = tempfile::tempdir().unwrap();
     let directory = folder.path().join("a/b");
     let name = Path::new("/somewhere/private/bell <1> & \"2\".toml");
-    let path = sketch.write(&directory, name, &findings).unwrap();
+    let remarks = Remarks {
+        failures: vec!["gouge <3> at u = 0.5\n  help: a smaller ball".to_owned()],
+        warnings: vec!["velocity_max_mm_s not held".to_owned()],
+        figures: vec![Figure {
+            what: "Gouge".to_owned(),
+            value: "0.2 mm".to_owned(),
+        }],
+        ..Remarks::default()
+    };
+    let path = sketch.write(&directory, name, &findings, &remarks).unwrap();
     assert_eq!(path, directory.join("index.html"));
     let page = std::fs::read_to_string(path).unwrap();
     let picture = std::fs::read_to_string(directory.join("path.svg")).unwrap();
     for text in [&page, &picture] {
         assert_well_formed(text);
         assert!(text.contains("bell &lt;1&gt; &amp; &quot;2&quot;"));
-        assert!(!text.contains("somewhere") && !text.contains("NaN") && !text.contains("inf "));
-        assert!(
-            !text.replace("http://www.w3.org/2000/svg", "").contains("://"),
-            "asks for the network"
-        );
+        let said = text.split("<script").next().unwrap();
+        assert!(!text.contains("somewhere") && !said.contains("NaN") && !said.contains("inf "));
     }
     assert!(picture.len() < 400_000, "{} bytes", picture.len());
-    assert_eq!(page.matches("<figure class=\"chart\">").count(), 3);
+    // Names of namespaces and the licences' word of where a library comes from are no requests; the policy forbids all.
+    assert!(!picture.replace("http://www.w3.org/2000/svg", "").contains("://"));
+    assert!(page.contains("content=\"default-src 'none';"));
+    for text in [
+        "gouge &lt;3&gt; at u = 0.5",
+        "help: a smaller ball",
+        "velocity_max_mm_s not held",
+        "<td>0.2 mm</td>",
+    ] {
+        assert!(page.contains(text), "{text}");
+    }
     let report = &findings.report;
     for (what, value) in [
         ("Passes", f64::from(findings.passes)),
@@ -211,24 +233,6 @@ fn report_is_well_formed_small_and_says_what_was_found() {
     ] {
         assert_eq!(value_of(&page, what), value, "{what}");
     }
-}
-
-#[test]
-fn speeds_are_those_of_the_paper() {
-    let (job, sketch, _) = run(BELL);
-    let speeds = measure::speeds(&Oracle::new(&job).unwrap(), &sketch.record);
-    assert!(
-        speeds.iter().all(|at| (at.cc_mm_s / 100.0 - 1.0).abs() < 1e-4),
-        "feed held at the contact"
-    );
-    let [slowest, fastest] = speeds.iter().fold([f64::INFINITY, 0.0_f64], |[a, b], at| {
-        [a.min(at.cl_mm_s), b.max(at.cl_mm_s)]
-    });
-    // Lo's Example 1, at ten times his feed: 6.802 to 13.198 mm/s.
-    assert!(
-        (slowest - 68.02).abs() < 0.05 && (fastest - 131.98).abs() < 0.05,
-        "{slowest} {fastest}"
-    );
 }
 
 #[test]
@@ -257,21 +261,28 @@ fn a_run_that_ended_at_once_is_reported_all_the_same() {
         ..findings
     };
     let path = Sketch::new(&job, 0)
-        .write(folder.path(), Path::new("bell.toml"), &nothing)
+        .write(
+            folder.path(),
+            Path::new("bell.toml"),
+            &nothing,
+            &Remarks::default(),
+        )
         .unwrap();
     let page = std::fs::read_to_string(path).unwrap();
     assert_well_formed(&page);
     assert!(page.contains("ended before its last pass was complete"));
     let mut sketch = Sketch::new(&job, 9);
-    sketch.add(&Emitted {
+    let sample = Emitted {
         first_of_pass: true,
         u: 0.5,
         v: -0.9,
         ..BLANK
-    });
-    assert_well_formed(
-        &std::fs::read_to_string(sketch.write(folder.path(), Path::new(""), &nothing).unwrap()).unwrap(),
-    );
+    };
+    sketch.add(&sample, &Checked::default());
+    let path = sketch
+        .write(folder.path(), Path::new(""), &nothing, &Remarks::default())
+        .unwrap();
+    assert_well_formed(&std::fs::read_to_string(path).unwrap());
 }
 
 #[test]

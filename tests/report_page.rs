@@ -1,0 +1,296 @@
+//! The report's page in a headless Chromium: what is drawn, what it says, what the mouse does, and that it asks for nothing.
+#![allow(clippy::unwrap_used, reason = "a test may fail by panic")]
+
+mod browser;
+
+use std::path::{Path, PathBuf};
+
+use browser::Browser;
+use host_sim::job_file::JobFile;
+use host_sim::machine::Machine;
+use host_sim::oracle::{Checked, Emitted, Oracle};
+use host_sim::prepare::prepare;
+use host_sim::report::{Remarks, RidgePlace, Scallops, Sketch};
+use host_sim::survey::{Findings, Survey};
+
+/// WebGL on the processor, whatever graphics card there is: the same everywhere.
+const SOFTWARE: [&str; 2] = ["--use-angle=swiftshader", "--enable-unsafe-swiftshader"];
+const DESK: [u32; 2] = [1280, 900];
+const PHONE: [u32; 2] = [390, 800];
+
+/// Runs a job and writes its report; with what the oracle found.
+fn report(name: &str, folder: &Path, remarks: &Remarks) -> (PathBuf, Findings) {
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../jobs").join(name);
+    let job = JobFile::load(&path).unwrap();
+    let prepared = prepare(&job).unwrap();
+    let oracle = Oracle::new(&job).unwrap();
+    let mut sketch = Sketch::new(&job, oracle.schedule().unwrap().len());
+    let mut draw = |sample: &Emitted, checked: &Checked| sketch.add(sample, checked);
+    let mut survey = Survey::new(&prepared, &oracle, None, Some(&mut draw));
+    Machine::load(&prepared)
+        .unwrap()
+        .run(|sample| survey.add(sample).is_ok())
+        .unwrap();
+    let findings = survey.finish(true).unwrap();
+    let page = sketch.write(folder, Path::new(name), &findings, remarks).unwrap();
+    (page.canonicalize().unwrap(), findings)
+}
+
+/// Heights that rise along u from nothing to above the limit at u = 1.
+fn rising(domain: [[f64; 2]; 2], ridges: u32) -> Scallops {
+    let [[u0, u1], [v0, v1]] = domain;
+    let ridge = |gap: u32| {
+        let v = v0 + (v1 - v0) * (f64::from(gap) + 0.5) / f64::from(ridges);
+        let place = |k: u32| {
+            let share = f64::from(k) / 60.0;
+            RidgePlace {
+                u: u0 + (u1 - u0) * share,
+                v,
+                height_mm: (0.012 * share) as f32,
+            }
+        };
+        (gap, (0..=60).map(place).collect())
+    };
+    Scallops {
+        limit_mm: 0.01,
+        measuring_error_mm: 1e-4,
+        ridges: (0..ridges).map(ridge).collect(),
+    }
+}
+
+/// Draws the view and counts: different colours, share of the canvas that is painted, and pixels near a colour.
+fn pixels(browser: &mut Browser, near: [u8; 3]) -> [f64; 3] {
+    let [r, g, b] = near;
+    let value = browser.value(&format!(
+        "(() => {{ const {{ view }} = isofeedReport; view.draw(); const c = document.createElement('canvas'); \
+         [c.width, c.height] = [view.canvas.width, view.canvas.height]; const x = c.getContext('2d'); \
+         x.drawImage(view.canvas, 0, 0); const d = x.getImageData(0, 0, c.width, c.height).data; \
+         const colours = new Set(); let [painted, near] = [0, 0]; \
+         for (let k = 0; k < d.length; k += 4) {{ if (d[k + 3] < 255) continue; painted++; \
+         colours.add((d[k] << 16) | (d[k + 1] << 8) | d[k + 2]); \
+         if (Math.hypot(d[k] - {r}, d[k + 1] - {g}, d[k + 2] - {b}) < 40) near++; }} \
+         return [colours.size, painted / (d.length / 4), near]; }})()"
+    ));
+    [0, 1, 2].map(|k| value[k].as_f64().unwrap())
+}
+
+fn choose(browser: &mut Browser, select: &str, option: &str) {
+    browser.value(&format!(
+        "(() => {{ const s = document.getElementById('{select}'); s.value = '{option}'; \
+         s.dispatchEvent(new Event('change')); return s.value; }})()"
+    ));
+}
+
+fn assert_quiet(browser: &mut Browser, page: &Path) {
+    assert!(browser.complaints.is_empty(), "{:#?}", browser.complaints);
+    let own = format!("file://{}", page.display());
+    let others: Vec<_> = browser.requests.iter().filter(|url| **url != own).collect();
+    assert!(others.is_empty(), "requested: {others:?}");
+}
+
+/// Different colours in each chart's canvas.
+fn chart_colours(browser: &mut Browser) -> Vec<f64> {
+    let value = browser.value(
+        "[...document.querySelectorAll('.chart.live canvas')].map((c) => { const d = c.getContext('2d').getImageData(0, 0, c.width, c.height).data; \
+         const s = new Set(); for (let k = 0; k < d.length; k += 4) if (d[k + 3]) s.add((d[k] << 16) | (d[k + 1] << 8) | d[k + 2]); return s.size; })",
+    );
+    value
+        .as_array()
+        .unwrap()
+        .iter()
+        .map(|size| size.as_f64().unwrap())
+        .collect()
+}
+
+#[test]
+fn view_and_charts_are_drawn_in_every_colouring() {
+    let folder = tempfile::tempdir().unwrap();
+    let remarks = Remarks {
+        failures: vec!["gouge of 0.2 mm at u = 0.5".to_owned()],
+        warnings: vec!["the velocity is <not> held".to_owned()],
+        scallops: Some(rising([[0.0, 1.0]; 2], 40)),
+        ..Remarks::default()
+    };
+    let (page, _) = report("freeform.toml", folder.path(), &remarks);
+    let mut browser = Browser::start(DESK, "light", &SOFTWARE);
+    browser.open(&page);
+    let said = browser.text("document.querySelector('main').innerText");
+    for text in [
+        "gouge of 0.2 mm at u = 0.5",
+        "the velocity is <not> held",
+        "134 passes",
+        "385\u{202f}126",
+        "one stands for 8 samples",
+        "6.4 min",
+    ] {
+        assert!(said.contains(text), "{text} in {said}");
+    }
+    // Scallops are shown first: from dark violet to yellow, and what is above the limit in red.
+    assert_eq!(browser.text("document.getElementById('colour').value"), "scallop");
+    assert!(
+        browser
+            .text("document.getElementById('legend').innerText")
+            .contains("Scallop height, mm")
+    );
+    let [colours, painted, over] = pixels(&mut browser, [230, 0, 90]);
+    assert!(
+        colours > 500.0 && painted > 0.15,
+        "{colours} colours on {painted}"
+    );
+    assert!(over > 300.0, "{over} pixels above the limit");
+    // The held feed is in the middle of its scale, and lines are not shaded.
+    for (option, unit, near, least) in [
+        ("feed", "mm/s", [35, 144, 139], 20_000.0),
+        ("centre", "mm/s", [35, 144, 139], 500.0),
+        ("error", "nm", [35, 144, 139], 500.0),
+        ("feed-error", "%", [35, 144, 139], 500.0),
+    ] {
+        choose(&mut browser, "colour", option);
+        let legend = browser.text("document.getElementById('legend').innerText");
+        assert!(legend.contains(&format!(", {unit}")), "{option}: {legend}");
+        let [colours, painted, found] = pixels(&mut browser, near);
+        assert!(
+            colours > 50.0 && painted > 0.15 && found > least,
+            "{option}: {colours} colours, {painted} painted, {found} near"
+        );
+    }
+    let charts = chart_colours(&mut browser);
+    assert_eq!(charts.len(), 8, "five over time, three from pass to pass");
+    assert!(charts.iter().all(|colours| *colours > 20.0), "{charts:?}");
+    assert_quiet(&mut browser, &page);
+}
+
+#[test]
+fn mouse_keys_and_buttons_do_what_they_say() {
+    let folder = tempfile::tempdir().unwrap();
+    let (page, _) = report("torus.toml", folder.path(), &Remarks::default());
+    let mut browser = Browser::start(DESK, "dark", &SOFTWARE);
+    browser.open(&page);
+    let options = browser.text("[...document.getElementById('colour').options].map((o) => o.value).join()");
+    assert_eq!(
+        options, "plain,feed,centre,error,feed-error",
+        "no scallops, no such colouring"
+    );
+    let place =
+        "JSON.stringify(isofeedReport.view.camera.position.toArray().map((x) => Math.round(x * 100)))";
+    let home = browser.text(place);
+    browser.drag("#view", [0.3, 0.8], [0.6, 0.7]);
+    let turned = browser.text(place);
+    assert_ne!(home, turned, "dragging turns");
+    browser.wheel("#view", -300.0);
+    assert!(
+        browser.number("isofeedReport.view.camera.zoom") > 1.1,
+        "the wheel zooms"
+    );
+    browser.value("document.getElementById('view').focus()");
+    browser.key("ArrowLeft");
+    assert_ne!(browser.text(place), turned, "arrows turn");
+    browser.key("Home");
+    assert_eq!(browser.text(place), home, "Home resets");
+    assert_eq!(browser.number("isofeedReport.view.camera.zoom"), 1.0);
+    // Top: x to the right, y up.
+    browser.value("document.querySelector('[data-view=top]').click()");
+    let axes =
+        "isofeedReport.view.axes().map((a) => a.map((x) => Math.round(x * 100) / 100 + 0).join(' ')).join()";
+    assert_eq!(browser.text(axes), "1 0 0,0 1 0,0 0 1");
+    // Time: the ball stands where the core was, a quarter into the run.
+    browser.value("(() => { const t = document.getElementById('time'); t.value = 100000; t.dispatchEvent(new Event('input')); })()");
+    let read = browser.text("document.getElementById('readout').innerText");
+    assert!(
+        read.contains("100.000 s") && read.contains("10.000 mm/s"),
+        "{read}"
+    );
+    let radius = browser.number(
+        "(() => { const { cc, cl } = isofeedReport.panel.at; return Math.hypot(cc[0] - cl[0], cc[1] - cl[1], cc[2] - cl[2]); })()",
+    );
+    assert!(
+        (radius - 5.0).abs() < 0.01,
+        "contact and centre are {radius} mm apart"
+    );
+    // Charts: a dragged range is the window; in a pass that is kept in detail every sample comes into sight.
+    let window = "isofeedReport.charts[0].window[1] - isofeedReport.charts[0].window[0]";
+    let whole = browser.number(window);
+    browser.drag("#charts .u-over", [0.25, 0.5], [0.5, 0.5]);
+    let part = browser.number(window) / whole;
+    assert!((part - 0.25).abs() < 0.01, "a quarter is {part}");
+    browser.point("#charts .u-over", [0.5, 0.5]);
+    let read = browser.text("document.querySelector('#charts .values').innerText");
+    assert!(
+        read.contains("at ") && read.contains("cutter contact (CC) "),
+        "{read}"
+    );
+    browser.value("document.querySelector('#windows button:last-child').click()");
+    for _ in 0..2 {
+        browser.value("document.querySelector('[data-window=in]').click()");
+    }
+    assert!(
+        browser
+            .text("document.getElementById('window').innerText")
+            .contains("every sample is drawn")
+    );
+    assert!(chart_colours(&mut browser).iter().all(|colours| *colours > 20.0));
+    browser.value("document.querySelector('[data-window=whole]').click()");
+    assert_eq!(browser.number(window), whole);
+    assert!(
+        browser
+            .text("document.getElementById('window').innerText")
+            .contains("least and the largest")
+    );
+    assert_quiet(&mut browser, &page);
+}
+
+#[test]
+fn a_run_of_two_million_samples_opens_on_a_phone() {
+    let folder = tempfile::tempdir().unwrap();
+    let (page, findings) = report("revolved.toml", folder.path(), &Remarks::default());
+    let bytes = std::fs::metadata(&page).unwrap().len();
+    assert!(bytes < 6_000_000, "{bytes} bytes");
+    let mut browser = Browser::start(PHONE, "dark", &SOFTWARE);
+    browser.open(&page);
+    let said = browser.text("document.querySelector('main').innerText");
+    for text in [
+        "all 319 passes",
+        "2\u{202f}212\u{202f}265 samples",
+        "spans of 128 samples",
+    ] {
+        assert!(said.contains(text), "{text} in {said}");
+    }
+    assert_eq!(
+        browser.number("document.documentElement.scrollWidth"),
+        390.0,
+        "nothing sticks out"
+    );
+    // Every sample is behind a drawn point: points times the samples that they stand for.
+    let behind = browser
+        .number("isofeedReport.view.track.passes.reduce((sum, pass) => sum + pass.last - pass.first + 1, 0)");
+    assert_eq!(behind, 2_212_265.0);
+    // The worst sample of them all is in the charts, and in the view.
+    let worst = findings.report.position_nm.max;
+    for values in [
+        "charts[0].series.whole.channel('cl_error')[1]",
+        "view.track.values.cl_error",
+    ] {
+        let shown = browser.number(&format!(
+            "isofeedReport.{values}.reduce((a, b) => b > a ? b : a, 0)"
+        ));
+        assert!(
+            (shown - worst).abs() < 1e-3,
+            "{values}: {shown}, the oracle {worst}"
+        );
+    }
+    let [colours, painted, _] = pixels(&mut browser, [0, 0, 0]);
+    assert!(colours > 100.0 && painted > 0.1, "{colours} colours on {painted}");
+    assert_quiet(&mut browser, &page);
+}
+
+#[test]
+fn without_webgl_the_picture_stands_in() {
+    let folder = tempfile::tempdir().unwrap();
+    let (page, _) = report("torus.toml", folder.path(), &Remarks::default());
+    let mut browser = Browser::start(DESK, "light", &["--disable-3d-apis"]);
+    browser.open(&page);
+    let shown = "['stage', 'picture', 'no-view'].map((id) => document.getElementById(id).getBoundingClientRect().height > 10).join()";
+    assert_eq!(browser.text(shown), "false,true,true");
+    assert!(chart_colours(&mut browser).iter().all(|colours| *colours > 20.0));
+    assert_quiet(&mut browser, &page);
+}
