@@ -257,6 +257,37 @@ fn faults_come_as_explained() {
     }
 }
 
+/// The same for the job of `cargo sim new`.
+#[test]
+fn faults_of_a_new_job_come_as_explained() {
+    let folder = tempfile::tempdir().unwrap();
+    run(folder.path(), "new");
+    let job = folder.path().join("job.toml");
+    let plain = std::fs::read_to_string(&job).unwrap();
+    let level = "[placement]\nplace = \"top\"\ntranslate_mm = [0, 0, 2145]\n[tool]";
+    for (edits, code) in [
+        (&[("\n[tool]", level)][..], 4),
+        (
+            &[
+                ("radius_mm = 5 ", "radius_mm = 0.000001 "),
+                ("scallop_mm = 0.01 ", "scallop_mm = 1e-12 "),
+            ],
+            7,
+        ),
+    ] {
+        let mut text = plain.replace("along = \"auto\"", "along = \"u\"");
+        for (from, to) in edits {
+            assert!(text.contains(from), "nothing to replace: {from}");
+            text = text.replacen(from, to, 1);
+        }
+        std::fs::write(&job, text).unwrap();
+        let output = run(folder.path(), "simulate job.toml --json");
+        assert_eq!(output.status.code(), Some(1), "{}", err(&output));
+        let told: Value = serde_json::from_slice(&output.stdout).unwrap();
+        assert_eq!(told["fault"]["code"], code, "{told}");
+    }
+}
+
 /// In a real bash: the script in front of a completion of cargo's that was there before.
 #[test]
 fn bash_completes_cargo_sim() {

@@ -3,7 +3,7 @@
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
 
-use indicatif::{ProgressBar, ProgressStyle};
+use indicatif::{ProgressBar, ProgressFinish, ProgressStyle};
 
 /// How often what moves on a terminal is drawn anew.
 const TICK: Duration = Duration::from_millis(100);
@@ -24,7 +24,8 @@ fn drawn(bar: ProgressBar, template: &str, what: &'static str) -> ProgressBar {
     }
     bar.set_message(what);
     bar.enable_steady_tick(TICK);
-    bar
+    // An error on the way drops the bar: nothing of it is to stand above the message.
+    bar.with_finish(ProgressFinish::AndClear)
 }
 
 /// A bar that fills.

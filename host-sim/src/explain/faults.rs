@@ -48,7 +48,7 @@ fn words(kind: FaultKind) -> [&'static str; 5] {
             "The coordinate in metres. Positions are nanometres in 32 bits: from -2.147 m to 2.147 m.",
             "The surface itself fits, but the ball's centre, offset by its radius, does not.",
             "Move the part nearer to the origin, for example with `[placement]` and `place = \"centre\"`.",
-            "A plane at z = 2145 mm, with a ball of 5 mm above it: its centre would be at 2.150 m.",
+            "A level surface at z = 2145 mm, with a ball of 5 mm above it: its centre would be at 2.150 m.",
         ],
         FaultKind::TooManyPatches => [
             "The job has more surface data than the machine stores.",
@@ -62,14 +62,14 @@ fn words(kind: FaultKind) -> [&'static str; 5] {
             "The millimetres of the arc that were left over behind the patch.",
             "Knots lie closer together than the tool moves in one period: 0.01 mm at 600 mm/min and 1 ms.",
             "Lower the feed, or remove knots that lie so close together.",
-            "jobs/freeform.toml at `feed_mm_min = 600000`: 10 mm a period, and its patches are 9 to 14 mm long.",
+            "jobs/freeform.toml at `feed_mm_min = 600000`: 10 mm a period, more than its shortest patches are long.",
         ],
         FaultKind::IntervalTooSmall => [
             "The path interval is so small that the next pass would lie on this one.",
             "The interval as a fraction of a patch.",
             "The scallop height limit or the ball is tiny against the surface, or the side parameter runs extremely fast at some place of the pass.",
             "Take a larger scallop height or a larger ball, or parametrise the surface more evenly across the passes.",
-            "A patch of 1 m across the passes with a ball of 1 nm.",
+            "The job of `cargo sim new`, 60 mm wide, with `along = \"u\"`, `radius_mm = 0.000001` and `scallop_mm = 1e-12`: an interval of 4e-11 of the patch.",
         ],
         FaultKind::BadHeader => [
             "A value in the job's header is not finite or out of its range.",
@@ -83,7 +83,7 @@ fn words(kind: FaultKind) -> [&'static str; 5] {
             "The index of the patch.",
             "The host chooses the unit of every patch so that it passes the same check; so a patch that the core refuses came from other software, or is a defect of the host tool.",
             "If the job came from `cargo sim`, please report it.",
-            "An upload by a host of your own, with coefficients above 2^30.",
+            "An upload by a host of your own, with coefficients near 2^31.",
         ],
         FaultKind::BadLength => [
             "The job's data are not complete, or do not have the length that the header asks for.",
