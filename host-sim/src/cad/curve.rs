@@ -1,5 +1,6 @@
 //! Curves in space as CAD files give them, and as rational B-splines of their exact form.
 
+use serde::{Deserialize, Serialize};
 use std::f64::consts::{FRAC_PI_2, TAU};
 
 use super::placement::Placement;
@@ -14,7 +15,7 @@ const STEPS: usize = 30;
 const ANGLE_SLACK_RAD: f64 = 1e-9;
 
 /// A curve, its parameter as in STEP (ISO 10303-42). Lengths in mm.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub enum Curve {
     /// `origin + t direction`.
     Line {

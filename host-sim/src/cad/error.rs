@@ -1,9 +1,10 @@
 //! What can go wrong with a CAD file: what, where, and what to do.
 
+use serde::{Deserialize, Serialize};
 use std::fmt;
 
 /// A fault in a CAD file, or in what is asked of it.
-#[derive(Clone, Debug, PartialEq, Eq)]
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct CadError {
     /// The file.
     pub file: String,

@@ -1,7 +1,7 @@
 //! Surfaces out of CAD files: from a STEP, IGES or 3DM file to the `[surface]` of a job.
 //!
 //! ```text
-//! file ──reader/──► Face: Surface (exact, mm, placed) + boundary        one reader a format, behind `Reader`
+//! file ──reader.rs──► Face: Surface (exact, mm, placed) + boundary      a program of its own, `host-sim/cad-reader`
 //!                     │ outline.rs     boundary -> a rectangle of (u, v), and whether the boundary is that rectangle
 //!                     ▼
 //!                   Surface over a rectangle
@@ -39,17 +39,18 @@ pub use machinable::{
 pub use measure::{Measures, measure};
 pub use outline::{Outline, outline};
 pub use placement::Placement;
-pub use reader::{Model, Reader, read};
+pub use reader::{Model, read};
 pub use spline::{Axis, DEGREE_MAX, Pole, SplineCurve, SplineSurface};
 pub use surface::Surface;
 
 use crate::oracle::vector::Vector;
+use serde::{Deserialize, Serialize};
 
 /// One smooth boundary edge as points along it, mm, in the order of the loop.
 pub type Edge = Vec<Vector>;
 
 /// How a face is bounded.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub enum Boundary {
     /// By the surface's own ends.
     Natural,
@@ -60,7 +61,7 @@ pub enum Boundary {
 }
 
 /// A face as its file gives it, in mm, where its assembly places it.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Face {
     /// Number for people, from 1, in the order of the file.
     pub number: usize,

@@ -2,12 +2,13 @@
 
 use super::spline::Pole;
 use crate::oracle::vector::{Vector, cross, dot, length};
+use serde::{Deserialize, Serialize};
 
 /// How far a placement's matrix may be from a rotation times a scale, relative: the rounding of files.
 const SIMILARITY_SLACK: f64 = 1e-6;
 
 /// `rows` times a point, the last column added. mm.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Placement {
     /// Three rows of the matrix and the translation, mm.
     pub rows: [[f64; 4]; 3],

@@ -2,6 +2,7 @@
 //! (Piegl and Tiller, "The NURBS Book", 2nd ed., A2.1 to A2.3, A4.4, A5.1; here "P&T").
 
 use crate::oracle::Derivatives;
+use serde::{Deserialize, Serialize};
 
 /// A homogeneous point `(w x, w y, w z, w)`, mm and a weight.
 pub type Pole = [f64; 4];
@@ -25,7 +26,7 @@ pub enum Side {
 }
 
 /// Knots of one direction. The domain is `[knots[degree], knots[knots.len() - 1 - degree]]`.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Axis {
     /// Degree, 1 to [`DEGREE_MAX`].
     pub degree: usize,
@@ -176,7 +177,7 @@ fn cut<P: Blend>(axis: &Axis, poles: &[P], range: [f64; 2]) -> (Axis, Vec<P>) {
 }
 
 /// A B-spline curve in space.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct SplineCurve {
     /// Degree and knots.
     pub axis: Axis,
@@ -219,7 +220,7 @@ impl SplineCurve {
 }
 
 /// A B-spline surface.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct SplineSurface {
     /// Degrees and knots in u and in v.
     pub axes: [Axis; 2],

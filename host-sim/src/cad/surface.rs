@@ -1,5 +1,6 @@
 //! Surfaces as CAD files give them, evaluated straight from their own numbers.
 
+use serde::{Deserialize, Serialize};
 use std::f64::consts::{FRAC_PI_2, TAU};
 
 use super::curve::Curve;
@@ -12,7 +13,7 @@ use crate::oracle::vector::{Vector, add, cross, dot, length, scale, subtract};
 const DIFFERENCE: f64 = 1e-5;
 
 /// A surface, its parameters as in STEP (ISO 10303-42). Lengths in mm. The frames' vectors are orthogonal.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub enum Surface {
     /// `origin + u x + v y`.
     Plane {

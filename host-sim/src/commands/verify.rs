@@ -8,7 +8,7 @@ use indicatif::ProgressBar;
 use serde_json::Value;
 
 use super::simulate::{Timed, machine, oracle, remarks, report, timed};
-use super::{Failure, Result, load, progress, swept_words, warn_of_limits};
+use super::{Failure, Result, along, load, progress, swept_words, warn_of_limits};
 use crate::job_file::JobFile;
 use crate::oracle::{Bounds, Checked, Emitted, Figure};
 use crate::prepare::Prepared;
@@ -184,12 +184,14 @@ pub(super) fn command(arguments: &Arguments) -> Result<()> {
     let page = report(&job, directory, sketch.as_ref(), &findings, &remarks)?;
     if arguments.json {
         let mut value = swept_words::json(&job, &prepared, &findings, &swept);
+        value.extend(along::json(&job));
         value.insert("passes_scanned".to_owned(), scanned.into());
         value.insert("failures".to_owned(), failures.into());
         value.insert("passed".to_owned(), passed.into());
         say!("{}", Value::Object(value));
     } else {
         say!("{}", arguments.job.display());
+        say!("  along        {}", along::sentence(&job));
         print(&findings, scanned);
         swept_words::print(&job, &prepared, &findings, &swept);
         for failure in &failures {

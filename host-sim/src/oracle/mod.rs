@@ -28,7 +28,7 @@ mod schedule;
 mod surface;
 #[cfg(test)]
 mod tests;
-pub(crate) mod vector;
+pub mod vector;
 mod verify;
 
 pub use contact::{Contact, Oracle, OracleError};

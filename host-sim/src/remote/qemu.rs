@@ -64,7 +64,7 @@ pub fn firmware() -> Result<PathBuf, QemuError> {
 }
 
 /// Runs cargo in the workspace, and returns the file in it that this builds; what cargo says where it fails.
-fn cargo(arguments: &[&str], built: &str) -> Result<PathBuf, String> {
+pub(crate) fn cargo(arguments: &[&str], built: &str) -> Result<PathBuf, String> {
     let workspace = workspace();
     let cargo = std::env::var_os("CARGO").unwrap_or_else(|| "cargo".into());
     let output = Command::new(cargo)

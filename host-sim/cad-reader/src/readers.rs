@@ -1,38 +1,16 @@
-//! Readers of CAD files, one a format, and the guard around them: whatever is in a file, there is an answer in bounded time and
-//! memory.
+//! Readers of CAD files, one a format, and the guard around them: whatever is in a file, there is an answer.
 
-mod iges;
-mod ir;
-mod ir_boundary;
-mod ir_geometry;
-mod rhino;
-mod step;
-
-use std::io::Read;
 use std::path::Path;
-use std::sync::mpsc;
-use std::time::Duration;
 
-use super::{CadError, Face};
+use host_sim::cad::{CadError, Model};
 
-/// Largest file that is read, bytes: a file takes some 30 times its size in memory.
-const BYTES_MAX: u64 = 64 << 20;
-/// Time that a reader may take: ten times what the largest sound file takes.
-const TIME_MAX: Duration = Duration::from_secs(120);
+use crate::{iges, rhino, step};
+
 /// Stack of a reader's thread: files nest, and what is nested is read by recursion.
 const STACK_BYTES: usize = 64 << 20;
 
-/// What a file holds.
-#[derive(Clone, Debug, Default)]
-pub struct Model {
-    /// Its faces, numbered from 1 in the order of the file.
-    pub faces: Vec<Face>,
-    /// What of it could not be read, for people.
-    pub warnings: Vec<String>,
-}
-
 /// Reads one format.
-pub trait Reader: Send {
+pub(crate) trait Reader: Send {
     /// The format's name for people.
     fn format(&self) -> &'static str;
 
@@ -63,9 +41,15 @@ fn readers() -> [Box<dyn Reader>; 3] {
 ///
 /// # Errors
 /// The file cannot be read, is none of the formats, is broken, or holds no faces; with its name and, where there is one, the line.
-pub fn read(path: &Path) -> Result<Model, CadError> {
+pub(crate) fn read(path: &Path) -> Result<Model, CadError> {
     let file = path.display().to_string();
-    let bytes = load(&file, path)?;
+    let bytes = std::fs::read(path).map_err(|cause| {
+        CadError::new(
+            &file,
+            format!("cannot read the CAD file: {cause}"),
+            "give the path of a STEP, IGES or 3DM file; samples are in jobs/cad/",
+        )
+    })?;
     let ending = path
         .extension()
         .map(|ending| ending.to_string_lossy().to_lowercase())
@@ -123,46 +107,9 @@ pub fn read(path: &Path) -> Result<Model, CadError> {
     Ok(model)
 }
 
-fn load(file: &str, path: &Path) -> Result<Vec<u8>, CadError> {
-    let unreadable = |cause: std::io::Error| {
-        CadError::new(
-            file,
-            format!("cannot read the CAD file: {cause}"),
-            "give the path of a STEP, IGES or 3DM file; samples are in jobs/cad/",
-        )
-    };
-    let handle = std::fs::File::open(path).map_err(unreadable)?;
-    let mut bytes = Vec::new();
-    // One byte more tells a file that is too large, also one whose size is not known before.
-    handle
-        .take(BYTES_MAX + 1)
-        .read_to_end(&mut bytes)
-        .map_err(unreadable)?;
-    if bytes.len() as u64 > BYTES_MAX {
-        let what = format!("the file is larger than {} MB", BYTES_MAX >> 20);
-        return Err(CadError::new(
-            file,
-            what,
-            "export the part alone, without the rest of its assembly",
-        ));
-    }
-    if bytes.is_empty() {
-        return Err(CadError::new(file, "the file is empty", "export the part again"));
-    }
-    Ok(bytes)
-}
-
-/// Runs a reader on a thread of its own: a panic of it becomes an error, and it is waited for only so long.
+/// Runs a reader on a thread of its own, whose stack is large: a panic of it becomes an error. Time is the caller's to limit.
 fn guarded(file: &str, reader: Box<dyn Reader>, bytes: Vec<u8>) -> Result<Model, CadError> {
     let (format, name) = (reader.format(), file.to_owned());
-    let (send, receive) = mpsc::channel();
-    let thread = std::thread::Builder::new()
-        .stack_size(STACK_BYTES)
-        .spawn(move || {
-            let result = std::panic::catch_unwind(std::panic::AssertUnwindSafe(|| reader.read(&name, bytes)));
-            // Nobody may be waiting any more.
-            let _ = send.send(result);
-        });
     let broken = |what: String| {
         CadError::new(
             file,
@@ -170,19 +117,17 @@ fn guarded(file: &str, reader: Box<dyn Reader>, bytes: Vec<u8>) -> Result<Model,
             "export the part again, alone, or in another format (STEP is read best)",
         )
     };
-    thread.map_err(|cause| broken(format!("cannot start the reader: {cause}")))?;
-    match receive.recv_timeout(TIME_MAX) {
-        Ok(Ok(result)) => result,
-        Ok(Err(_)) => Err(broken(format!("the {format} reader failed on this file"))),
-        Err(_) => Err(broken(format!(
-            "the {format} reader took longer than {} s",
-            TIME_MAX.as_secs()
-        ))),
-    }
+    let thread = std::thread::Builder::new()
+        .stack_size(STACK_BYTES)
+        .spawn(move || reader.read(&name, bytes))
+        .map_err(|cause| broken(format!("cannot start the reader: {cause}")))?;
+    thread
+        .join()
+        .unwrap_or_else(|_| Err(broken(format!("the {format} reader failed on this file"))))
 }
 
 /// The line that a byte is on, from 1.
-pub(super) fn line_of(bytes: &[u8], at: usize) -> usize {
+pub(crate) fn line_of(bytes: &[u8], at: usize) -> usize {
     bytes[..at.min(bytes.len())]
         .iter()
         .filter(|byte| **byte == b'\n')

@@ -2,9 +2,9 @@
 
 use cadmpeg_ir::topology::{Coedge, Edge as SourceEdge, LoopBoundary, Sense};
 
-use super::ir::{Translation, entity};
-use crate::cad::{Boundary, Curve, Edge, Placement};
-use crate::oracle::vector::{Vector, add, dot, length, scale, subtract};
+use crate::ir::{Translation, entity};
+use host_sim::cad::{Boundary, Curve, Edge, Placement};
+use host_sim::oracle::vector::{Vector, add, dot, length, scale, subtract};
 
 /// Points along a boundary edge, its ends included.
 const EDGE_POINTS: usize = 17;
@@ -13,7 +13,7 @@ const VERTEX_MM: f64 = 0.05;
 
 impl Translation<'_> {
     /// A face's boundary.
-    pub(super) fn boundary<'i>(&self, loops: impl Iterator<Item = &'i str>) -> Boundary {
+    pub(crate) fn boundary<'i>(&self, loops: impl Iterator<Item = &'i str>) -> Boundary {
         let mut all = Vec::new();
         for id in loops {
             let Some(item) = self.loops.get(id).and_then(|index| self.source.loops.get(*index)) else {
@@ -137,7 +137,7 @@ impl Translation<'_> {
 }
 
 /// A boundary, placed.
-pub(super) fn placed(boundary: &Boundary, by: &Placement) -> Boundary {
+pub(crate) fn placed(boundary: &Boundary, by: &Placement) -> Boundary {
     match boundary {
         Boundary::Loops(loops) => Boundary::Loops(
             loops

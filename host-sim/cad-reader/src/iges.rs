@@ -3,11 +3,13 @@
 use std::collections::BTreeSet;
 use std::ops::Range;
 
-use super::{Model, Reader, ir};
-use crate::cad::CadError;
+use crate::ir;
+use crate::readers::Reader;
+use host_sim::cad::CadError;
+use host_sim::cad::Model;
 
 /// The reader of IGES files.
-pub(super) struct Iges;
+pub(crate) struct Iges;
 
 /// Columns of a line, without its end.
 const COLUMNS: usize = 80;

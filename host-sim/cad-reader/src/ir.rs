@@ -16,11 +16,11 @@ use cadmpeg_ir::transform::Transform;
 use cadmpeg_ir::units::OrthonormalFrame3;
 use cadmpeg_ir::{Codec, DecodeOptions};
 
-use super::Model;
-use super::ir_boundary::placed;
-use super::ir_geometry::{solved_curve, solved_surface};
-use crate::cad::{Boundary, CadError, Curve, Face, Placement, Surface};
-use crate::oracle::vector::Vector;
+use crate::ir_boundary::placed;
+use crate::ir_geometry::{solved_curve, solved_surface};
+use host_sim::cad::Model;
+use host_sim::cad::{Boundary, CadError, Curve, Face, Placement, Surface};
+use host_sim::oracle::vector::Vector;
 
 /// What a file may hold: many times what the largest sound part does.
 const LIMITS: ResourceLimits = ResourceLimits {
@@ -34,7 +34,7 @@ const LIMITS: ResourceLimits = ResourceLimits {
 /// Assemblies within assemblies.
 const ASSEMBLY_DEPTH_MAX: usize = 64;
 /// Surfaces made from surfaces (offsets of offsets).
-pub(super) const SURFACE_DEPTH_MAX: usize = 8;
+pub(crate) const SURFACE_DEPTH_MAX: usize = 8;
 /// Copies of all faces that an assembly may place.
 const FACES_MAX: usize = 200_000;
 /// What is said of a surface that the reader could not make out.
@@ -43,7 +43,7 @@ const NOT_READ: &str = " is of a kind that is not read";
 const WARNINGS_MAX: usize = 12;
 
 /// Reads a file with one of the codecs.
-pub(super) fn decode(file: &str, codec: &dyn Codec, bytes: Vec<u8>) -> Result<Model, CadError> {
+pub(crate) fn decode(file: &str, codec: &dyn Codec, bytes: Vec<u8>) -> Result<Model, CadError> {
     let options = DecodeOptions {
         depth: DecodeDepth::Geometry,
         policy: DecodePolicy {
@@ -123,27 +123,27 @@ fn shortened(text: &str) -> String {
     format!("{start} ...")
 }
 
-pub(super) fn point(p: Point3) -> Vector {
+pub(crate) fn point(p: Point3) -> Vector {
     [p.x, p.y, p.z]
 }
 
-pub(super) fn vector(p: &Vector3) -> Vector {
+pub(crate) fn vector(p: &Vector3) -> Vector {
     [p.x, p.y, p.z]
 }
 
 /// Directions of a frame: reference, the one across, axis.
-pub(super) fn frame(frame: &OrthonormalFrame3) -> [Vector; 3] {
+pub(crate) fn frame(frame: &OrthonormalFrame3) -> [Vector; 3] {
     [frame.reference(), &frame.binormal(), frame.axis()].map(|unit| vector(unit.as_raw()))
 }
 
-pub(super) fn placement(transform: &Transform) -> Placement {
+pub(crate) fn placement(transform: &Transform) -> Placement {
     Placement {
         rows: transform.affine_rows(),
     }
 }
 
 /// An entity's name in its file, out of the reader's: what stands after `#`, up to where it tells the context.
-pub(super) fn entity(id: &str) -> String {
+pub(crate) fn entity(id: &str) -> String {
     let key = id.rsplit('#').next().unwrap_or(id);
     match key.split('-').next() {
         Some(first) if first.bytes().all(|byte| byte.is_ascii_digit()) && !first.is_empty() => {
@@ -174,15 +174,15 @@ fn natural(id: &str) -> Vec<(u64, String)> {
 }
 
 /// The model under translation, by name.
-pub(super) struct Translation<'m> {
-    pub(super) source: &'m Source,
+pub(crate) struct Translation<'m> {
+    pub(crate) source: &'m Source,
     surfaces: HashMap<&'m str, usize>,
     curves: HashMap<&'m str, usize>,
     constructions: HashMap<&'m str, usize>,
-    pub(super) loops: HashMap<&'m str, usize>,
-    pub(super) coedges: HashMap<&'m str, usize>,
-    pub(super) edges: HashMap<&'m str, usize>,
-    pub(super) vertices: HashMap<&'m str, Vector>,
+    pub(crate) loops: HashMap<&'m str, usize>,
+    pub(crate) coedges: HashMap<&'m str, usize>,
+    pub(crate) edges: HashMap<&'m str, usize>,
+    pub(crate) vertices: HashMap<&'m str, Vector>,
 }
 
 impl<'m> Translation<'m> {
@@ -485,7 +485,7 @@ impl<'m> Translation<'m> {
         }
     }
 
-    pub(super) fn curve(&self, id: &str) -> Result<Curve, String> {
+    pub(crate) fn curve(&self, id: &str) -> Result<Curve, String> {
         let item = self
             .curves
             .get(id)

@@ -1,10 +1,12 @@
 //! STEP (ISO 10303-21): AP203, AP214, AP242.
 
-use super::{Model, Reader, ir, line_of};
-use crate::cad::CadError;
+use crate::ir;
+use crate::readers::{Reader, line_of};
+use host_sim::cad::CadError;
+use host_sim::cad::Model;
 
 /// The reader of STEP files.
-pub(super) struct Step;
+pub(crate) struct Step;
 
 /// Deepest nesting of parentheses that a file may have: sound ones stay below 10.
 const NESTING_MAX: usize = 64;

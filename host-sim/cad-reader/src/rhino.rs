@@ -1,10 +1,12 @@
 //! 3DM (openNURBS archives, as Rhino writes them).
 
-use super::{Model, Reader, ir};
-use crate::cad::CadError;
+use crate::ir;
+use crate::readers::Reader;
+use host_sim::cad::CadError;
+use host_sim::cad::Model;
 
 /// The reader of 3DM files.
-pub(super) struct Rhino;
+pub(crate) struct Rhino;
 
 /// Shortest archive: its head and the first chunk.
 const HEAD_BYTES: usize = 32;

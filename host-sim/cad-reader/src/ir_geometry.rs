@@ -3,15 +3,15 @@
 use cadmpeg_ir::geometry::nurbs::{NurbsCurve, NurbsPoleGrid, NurbsPoles3, NurbsSurface, WeightedPole3};
 use cadmpeg_ir::geometry::{SolvedCurveGeometry, SolvedSurfaceGeometry};
 
-use super::ir::{SURFACE_DEPTH_MAX, frame, placement, point, vector};
-use crate::cad::spline::{Axis, DEGREE_MAX, Pole, SplineCurve, SplineSurface};
-use crate::cad::{Curve, Surface};
-use crate::oracle::vector::{Vector, scale};
+use crate::ir::{SURFACE_DEPTH_MAX, frame, placement, point, vector};
+use host_sim::cad::{Axis, DEGREE_MAX, Pole, SplineCurve, SplineSurface};
+use host_sim::cad::{Curve, Surface};
+use host_sim::oracle::vector::{Vector, scale};
 
 /// Coordinates beyond this are no part's, mm: a kilometre.
 const FAR_MM: f64 = 1e6;
 
-pub(super) fn solved_surface(solved: &SolvedSurfaceGeometry, depth: usize) -> Result<Surface, String> {
+pub(crate) fn solved_surface(solved: &SolvedSurfaceGeometry, depth: usize) -> Result<Surface, String> {
     if depth > SURFACE_DEPTH_MAX {
         return Err("its placement is nested too deep".to_owned());
     }
@@ -174,7 +174,7 @@ fn spline_curve(nurbs: &NurbsCurve) -> Option<SplineCurve> {
     })
 }
 
-pub(super) fn solved_curve(solved: &SolvedCurveGeometry) -> Option<Curve> {
+pub(crate) fn solved_curve(solved: &SolvedCurveGeometry) -> Option<Curve> {
     Some(match solved {
         SolvedCurveGeometry::Line(line) => Curve::Line {
             origin: point(line.origin().get()),

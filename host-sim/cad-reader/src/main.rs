@@ -1,0 +1,41 @@
+//! Reads a CAD file for `cargo sim import`, in a process of its own: `cad-reader FILE` writes `Result<Model, CadError>` as JSON to its
+//! standard output.
+//!
+//! Apart from `host-sim` because the library that knows the formats (`cadmpeg`) is twenty times as large as the rest of the tool together: it is built when
+//! the first CAD file is read, and a file that hangs a reader, or eats memory, does so here.
+//!
+//! ```text
+//! main.rs ─► readers.rs   by the file's first bytes ─► step.rs, iges.rs, rhino.rs   what can be told before reading it all
+//!                                                       └─► ir.rs, ir_geometry.rs, ir_boundary.rs   cadmpeg's model -> host_sim::cad::Face
+//! ```
+
+mod iges;
+mod ir;
+mod ir_boundary;
+mod ir_geometry;
+mod readers;
+mod rhino;
+mod step;
+
+use std::io::{BufWriter, Write, stdout};
+use std::path::Path;
+use std::process::ExitCode;
+
+fn main() -> ExitCode {
+    let Some(file) = std::env::args_os().nth(1) else {
+        eprintln!("usage: cad-reader FILE (`cargo sim import` is what you want)");
+        return ExitCode::from(2);
+    };
+    let read = readers::read(Path::new(&file));
+    let mut out = BufWriter::new(stdout().lock());
+    match serde_json::to_writer(&mut out, &read)
+        .map_err(std::io::Error::from)
+        .and_then(|()| out.flush())
+    {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(error) => {
+            eprintln!("cannot write the faces: {error}");
+            ExitCode::FAILURE
+        }
+    }
+}
