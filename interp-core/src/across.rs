@@ -29,8 +29,8 @@ const STEP_MIN: f32 = 0.25;
 const NEWTON_STEPS: u8 = 4;
 const NEWTON_LAST: f32 = 1e-3;
 /// The first pass has no step before it by which to choose the lines. They are chosen anew when the greatest density has grown by so
-/// much since: to half the interval.
-const AIM_AGAIN: f32 = 4.0;
+/// much since.
+const AIM_AGAIN: f32 = 1.25;
 
 /// What is to be done next for a line.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

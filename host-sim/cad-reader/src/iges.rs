@@ -104,7 +104,7 @@ impl Reader for Iges {
                 "the file ends before its terminate section".to_owned(),
             );
         }
-        if lines.of(b'D').len() % 2 != 0 {
+        if !lines.of(b'D').len().is_multiple_of(2) {
             return fault(1, "a directory entry has one line instead of two".to_owned());
         }
         Ok(())

@@ -14,6 +14,9 @@ const STEPS: usize = 30;
 /// An arc's angle above a multiple of 90 degrees by so little, rad, takes no further arc: the rounding of files.
 const ANGLE_SLACK_RAD: f64 = 1e-9;
 
+/// Distance squared of a curve's point (given with its derivatives), and the halves of its first two derivatives.
+type Gap<'g> = dyn Fn(&[Vector; 3]) -> (f64, f64, f64) + 'g;
+
 /// A curve, its parameter as in STEP (ISO 10303-42). Lengths in mm.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub enum Curve {
@@ -177,7 +180,7 @@ impl Curve {
 
     /// Parameter of the point nearest by `gap`, a function of the curve's point and its derivative: the distance squared and
     /// half its slope, in the parameter.
-    fn least(&self, range: [f64; 2], pieces: &[f64], gap: &dyn Fn(&[Vector; 3]) -> (f64, f64, f64)) -> f64 {
+    fn least(&self, range: [f64; 2], pieces: &[f64], gap: &Gap<'_>) -> f64 {
         let mut best = (f64::INFINITY, range[0]);
         for piece in pieces.windows(2) {
             for k in 0..=SEEDS {

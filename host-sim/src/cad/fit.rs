@@ -96,9 +96,7 @@ impl Collocation {
                     x[i][k] -= factor * known[k];
                 }
             }
-            for k in 0..3 {
-                x[i][k] /= self.factors[i][i];
-            }
+            x[i] = x[i].map(|known| known / self.factors[i][i]);
         }
         x
     }

@@ -80,10 +80,11 @@ pub fn measure(spec: &SurfaceSpec) -> Measures {
     for &u in &us {
         for &v in &vs {
             let at = surface.at(u, v);
-            for k in 0..3 {
-                corners_mm[0][k] = at.point[k].min(corners_mm[0][k]);
-                corners_mm[1][k] = at.point[k].max(corners_mm[1][k]);
-            }
+            let [least, most] = corners_mm;
+            corners_mm = [
+                std::array::from_fn(|k| at.point[k].min(least[k])),
+                std::array::from_fn(|k| at.point[k].max(most[k])),
+            ];
             let area = cross(at.u, at.v);
             for k in 0..3 {
                 facing[k] += area[k];

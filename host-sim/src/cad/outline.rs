@@ -173,9 +173,9 @@ pub fn outline(face: &Face) -> Result<Outline, String> {
         _ => Some("its boundary winds around the surface both ways".to_owned()),
     };
     if trimmed.is_some() {
-        for k in 0..2 {
+        for (k, range) in rectangle.iter_mut().enumerate() {
             let sag = paths.iter().map(|path| path.sag(k)).fold(0.0, f64::max);
-            rectangle[k] = [rectangle[k][0] - sag, rectangle[k][1] + sag];
+            *range = [range[0] - sag, range[1] + sag];
         }
     }
     let rectangle = settled(surface, rectangle);
@@ -203,8 +203,8 @@ fn around(paths: &[Path]) -> [[f64; 2]; 2] {
 /// A face whose loops go around nothing: a rectangle if there is one loop that follows four parameter lines. Returns why not.
 fn single(surface: &Surface, paths: &[Path], rectangle: &mut [[f64; 2]; 2]) -> Option<String> {
     let mut whole_turn = false;
-    for k in 0..2 {
-        let [low, high] = rectangle[k];
+    for (k, range) in rectangle.iter_mut().enumerate() {
+        let [low, high] = *range;
         let widest = paths
             .iter()
             .flat_map(|path| path.edges.iter().flatten())
@@ -212,7 +212,7 @@ fn single(surface: &Surface, paths: &[Path], rectangle: &mut [[f64; 2]; 2]) -> O
             .fold(0.0, f64::max);
         if let Some(period) = surface.periods()[k].filter(|_| (high - low) * widest <= FOLLOWS_MM) {
             // All of the boundary is the seam: the face goes all the way round.
-            rectangle[k] = [low, low + period];
+            *range = [low, low + period];
             whole_turn = true;
         }
     }

@@ -9,7 +9,7 @@ use serde_json::Value;
 
 use super::simulate::{Timed, machine, oracle, remarks, report, timed};
 use super::{Failure, Result, along, load, progress, swept_words, warn_of_limits};
-use crate::job_file::JobFile;
+use crate::job_file::{JobFile, Spacing};
 use crate::oracle::{Bounds, Checked, Emitted, Figure};
 use crate::prepare::Prepared;
 use crate::report::{Remarks, RidgePlace, Scallops, Sketch};
@@ -63,19 +63,22 @@ fn line(name: &str, figure: &Figure, bound: f64, unit: &str) {
     );
 }
 
-fn print(findings: &Findings, scanned: Option<usize>) {
+fn print(findings: &Findings, scanned: Option<usize>, first_order: bool) {
     let report = &findings.report;
     line("cutter location", &report.position_nm, BOUNDS.position_nm, "nm");
     line("cutter contact", &report.contact_nm, BOUNDS.contact_nm, "nm");
     line("tool normal", &report.normal_rad, BOUNDS.normal_rad, "rad");
     line("feed ripple", &report.ripple_pct, BOUNDS.ripple_pct, "%");
     line("interval candidates", &report.interval, BOUNDS.interval, "rel");
-    line(
-        "step to the next pass",
-        &report.side_step,
-        BOUNDS.side_step,
-        "rel",
-    );
+    // Exact spacing has no closed form to be held against: the scallop height tells.
+    if first_order {
+        line(
+            "step to the next pass",
+            &report.side_step,
+            BOUNDS.side_step,
+            "rel",
+        );
+    }
     line("ball fits (r k)", &report.fit, BOUNDS.fit, "");
     let scan = scanned.map_or_else(|| "no count".to_owned(), |passes| passes.to_string());
     say!(
@@ -192,7 +195,7 @@ pub(super) fn command(arguments: &Arguments) -> Result<()> {
     } else {
         say!("{}", arguments.job.display());
         say!("  along        {}", along::sentence(&job));
-        print(&findings, scanned);
+        print(&findings, scanned, job.spacing == Spacing::FirstOrder);
         swept_words::print(&job, &prepared, &findings, &swept);
         for failure in &failures {
             say!("  FAIL {failure}");
