@@ -6,7 +6,7 @@ use std::path::PathBuf;
 
 use host_sim::job_file::JobFile;
 use host_sim::machine::Machine;
-use host_sim::oracle::{Emitted, Oracle};
+use host_sim::oracle::{Checked, Emitted, Oracle};
 use host_sim::prepare::prepare;
 use host_sim::survey::Survey;
 use host_sim::swept::{Findings, Track, measure};
@@ -15,7 +15,7 @@ fn findings(job: &JobFile) -> Findings {
     let oracle = Oracle::new(job).unwrap();
     let prepared = prepare(job).unwrap();
     let mut track = Track::default();
-    let mut keep = |emitted: &Emitted| track.add(emitted, job.along);
+    let mut keep = |emitted: &Emitted, _: &Checked| track.add(emitted, job.along);
     let mut survey = Survey::new(&prepared, &oracle, None, Some(&mut keep));
     Machine::load(&prepared)
         .unwrap()

@@ -18,6 +18,7 @@ fn job(surface: SurfaceSpec, along: Along, side: Side, scallop_mm: f64) -> JobFi
         along,
         side,
         pattern: Pattern::Zig,
+        spacing: crate::job_file::Spacing::Exact,
         chord_mm: 0.005,
         machine: Machine::default(),
         origin: Origin::default(),
