@@ -386,7 +386,8 @@ fn interval_beside_a_pole() {
                 second.is_none()
             })
             .unwrap();
-        let want = (8.0_f64 * 2.0 * 0.01).sqrt() / 20.0_f64.hypot(20.0);
+        // On a plane two balls of radius r leave the height h at a distance of 2 sqrt(h (2 r - h)).
+        let want = 2.0 * (0.01_f64 * (2.0 * 2.0 - 0.01)).sqrt() / 20.0_f64.hypot(20.0);
         assert!(
             (second.unwrap() / want - 1.0).abs() < 1e-5,
             "{second:?} for {want}"

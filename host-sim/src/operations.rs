@@ -3,7 +3,7 @@
 //!
 //! Counted is what a sample in the middle of a pass executes, checks included: the ball's fit, folds, the cubics of the surface in
 //! fixed point. Comparisons, changes of sign and moves are not counted, nor is what is done once a pass: the patch at its side
-//! parameter, and the root and quotient that make an interval of the greatest density.
+//! parameter, the root and quotient that make an interval of the greatest density, and the looks at the gap to the next pass.
 
 use counted_core::scalar::{Tally, tally};
 use counted_core::{
@@ -172,10 +172,13 @@ pub fn run(job: &Prepared, mut each: impl FnMut(&Sample, Count) -> bool) -> Resu
 /// # Errors
 /// As [`run`].
 pub fn count(job: &Prepared, ticks: u32) -> Result<Counted, Fault> {
+    // Spaced like this no tick looks across the gap; the samples of a pass are the same.
+    let mut job = job.clone();
+    job.header.spacing = interp_core::Spacing::FirstOrder;
     let mut counts: Vec<(Count, u64)> = Vec::new();
     let mut place = None;
     let mut settled = 0;
-    run(job, |sample, count| {
+    run(&job, |sample, count| {
         let here = Some((sample.pass, sample.path.span));
         settled = if here == place { settled + 1 } else { 0 };
         place = here;

@@ -13,7 +13,7 @@ use crate::lane::Line;
 use crate::patch::Patch;
 use crate::program::Job;
 use crate::sample::Place;
-use crate::scalar::{float, real};
+use crate::scalar::{Real, float, real};
 use crate::schedule;
 use crate::surface::Contact;
 
@@ -69,11 +69,11 @@ struct Beside {
     most: f32,
 }
 
-/// The greatest density of the samples of a pass, and what it would be if the surface were flat across the pass there.
+/// The greatest density of the samples of a pass, and of the surface there `across` and `lateral_squared` of the [`Contact`].
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Densities {
     pub(crate) most: f32,
-    pub(crate) level: f32,
+    pub(crate) shape: [Real; 2],
 }
 
 /// What is known of a pass's ends and the lines beside it.
@@ -142,12 +142,12 @@ impl Across {
     /// The step to the next pass, in units of the side parameter, after the last sample of this one; infinite where nothing sets
     /// a limit.
     pub(crate) fn step(&mut self, header: &Header, densities: Densities) -> f32 {
-        let Densities { most, level } = densities;
+        let Densities { most, shape } = densities;
         if !(most > 0.0) {
             self.before = None;
             return f32::INFINITY;
         }
-        let here = self.edge.max(exact(header, most, level));
+        let here = self.edge.max(exact(header, most, shape));
         let [half, whole] = self.lines.each_ref().map(|line| line.found(header, here));
         let mean = match (half, whole) {
             (Some(half), Some(whole)) => mean(here, half, whole),
@@ -282,18 +282,19 @@ fn at_end(job: &Job<'_>, patch: &Patch, fraction: u64) -> f32 {
 }
 
 fn exact_at(job: &Job<'_>, patch: &Patch, contact: &Contact) -> f32 {
-    exact(
-        job.header,
-        patch.interval.density(contact),
-        patch.interval.level(contact),
-    )
+    let shape = [contact.across, contact.lateral_squared];
+    exact(job.header, patch.interval.density(contact), shape)
 }
 
 /// The density without the first order's approximations in h/r. The ball's circle instead of its parabola makes it 1/(1 - h/(2r)) of itself, and
-/// the scallop's own height above a surface of curvature c, for which `density` over `level` is 1 + r c, another 1 + h c.
-fn exact(header: &Header, density: f32, level: f32) -> f32 {
+/// the scallop's own height above a surface of curvature c another 1 + h c; `across` over `lateral_squared` is 1 + r c.
+fn exact(header: &Header, density: f32, [across, lateral_squared]: [Real; 2]) -> f32 {
     let height = header.scallop_mm / header.ball_radius_mm;
-    let bend = if level > 0.0 { density / level - 1.0 } else { 0.0 };
+    let bend = if lateral_squared > 0.0 {
+        float(across / lateral_squared) - 1.0
+    } else {
+        0.0
+    };
     density * (1.0 + height * bend) / (1.0 - 0.5 * height)
 }
 
@@ -368,8 +369,8 @@ mod tests {
                 scallop_mm: h as f32,
                 ..Header::default()
             };
-            let level = 1.0 / (8.0 * r * h);
-            let density = exact(&header, ((1.0 + r * curvature) * level) as f32, level as f32);
+            let (level, bend) = (1.0 / (8.0 * r * h), 1.0 + r * curvature);
+            let density = exact(&header, (bend * level) as f32, [bend as f32, 1.0]);
             let step = 1.0 / f64::from(density).sqrt();
             let height = if curvature == 0.0 {
                 r - (r * r - 0.25 * step * step).sqrt()

@@ -29,12 +29,6 @@ impl Interval {
         }
     }
 
-    /// What the [`Self::density`] would be if the surface were flat across the pass.
-    #[inline(always)]
-    pub(crate) fn level(&self, contact: &Contact) -> f32 {
-        float(contact.lateral_squared * contact.gauge * self.factor)
-    }
-
     /// Density at a contact that the ball fits, in the side parameter's units; 0 at a pole, where the side direction moves
     /// nothing.
     #[inline(always)]

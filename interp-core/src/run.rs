@@ -49,9 +49,9 @@ struct Travel {
     stretch_before: Real,
     /// r N at the last sample, in the ball's units.
     offset: [i32; 3],
-    /// Greatest density of the pass, and what it would be on a flat surface.
+    /// Greatest density of the pass, and the surface's shape there, see [`Densities`].
     most: f32,
-    level: f32,
+    shape: [Real; 2],
     /// Samples so far.
     ticks: u32,
     pass: u32,
@@ -85,7 +85,7 @@ impl Travel {
         stretch_before: Real::NAN,
         offset: [0; 3],
         most: 0.0,
-        level: 0.0,
+        shape: [real(0.0); 2],
         ticks: 0,
         pass: 0,
         side: Place { span: 0, fraction: 0 },
@@ -122,7 +122,7 @@ impl Travel {
         let density = patch.interval.density(&contact);
         if density > self.most {
             self.most = density;
-            self.level = patch.interval.level(&contact);
+            self.shape = [contact.across, contact.lateral_squared];
         }
         self.offset = contact.offset;
         self.stretch_before = self.path.stretch;
@@ -330,6 +330,9 @@ impl Run {
     /// One look at the line a step-over further.
     #[inline(never)]
     fn look_across(&mut self, job: &Job<'_>) {
+        if job.header.spacing == Spacing::FirstOrder {
+            return;
+        }
         let Self {
             travel, lane, across, ..
         } = self;
@@ -338,10 +341,10 @@ impl Run {
 
     /// The pass is over: its least interval, and the step to the next one.
     fn close_pass(&mut self, job: &Job<'_>) {
-        let Travel { most, level, .. } = self.travel;
+        let Travel { most, shape, .. } = self.travel;
         self.last_interval = interval(most);
         self.step_over = match job.header.spacing {
-            Spacing::Exact => self.across.step(job.header, Densities { most, level }),
+            Spacing::Exact => self.across.step(job.header, Densities { most, shape }),
             Spacing::FirstOrder => self.last_interval,
         };
     }

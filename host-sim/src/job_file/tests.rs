@@ -158,7 +158,7 @@ fn keys_and_kinds() {
         (REVOLVED, "u = [0, 1]", "v = [0, 1]", 5, 1, "the range of a revolved surface is `v_rad`"),
         (REVOLVED, "height_mm", "knots_u", 4, 1, "only a nurbs surface has it"),
         (NURBS, "degree = [2, 1]", "u = [0, 1]", 3, 1, "the range of a nurbs surface is that of its knots"),
-        (REVOLVED, "\"revolved\"", "\"file\"", 2, 8, "not supported yet"),
+        (REVOLVED, "\"revolved\"", "\"file\"", 3, 1, "only a revolved surface has it"),
         (REVOLVED, "\"revolved\"", "\"revolve\"", 2, 8, "did you mean \"revolved\"?"),
         (REVOLVED, "\"ball\"", "\"flat\"", 9, 8, "`kind` cannot be \"flat\""),
         (REVOLVED, "\"u\"", "u", 15, 9, "not valid TOML"),

@@ -14,8 +14,8 @@ pub(super) struct Gap {
     pub(super) narrowest_mm: f64,
 }
 
-/// A step shorter than its interval by more than this share was cut at the boundary.
-const CUT_SHARE: f64 = 1e-3;
+/// A last step shorter than its interval by more than this share was cut at the boundary.
+const CUT_SHARE: f64 = 0.02;
 
 /// Distances from every pass to the next, but to a last pass that the boundary brought nearer.
 pub(super) fn gaps(oracle: &Oracle, passes: &[PassInterval]) -> Vec<Gap> {
@@ -38,6 +38,9 @@ pub(super) fn gaps(oracle: &Oracle, passes: &[PassInterval]) -> Vec<Gap> {
             narrowest_mm: narrowest.min(widest),
         }
     };
-    let is_whole = |pass: &&PassInterval| pass.step >= (1.0 - CUT_SHARE) * pass.least;
-    passes.iter().filter(is_whole).map(gap).collect()
+    let whole = match passes.split_last() {
+        Some((last, others)) if last.step < (1.0 - CUT_SHARE) * last.least => others,
+        _ => passes,
+    };
+    whole.iter().map(gap).collect()
 }

@@ -280,8 +280,8 @@ fn interval_words(content: &Content<'_>) -> String {
         stride => format!(" One pass in {stride} is shown."),
     };
     format!(
-        "The next pass lies where the scallop between the two stays, to first order, within {} mm everywhere: the least interval \
-         that any sample of a pass allowed, in the side parameter {side}. In millimetres across the passes that is a range: \
+        "The next pass lies where the scallop between the two stays within {} mm everywhere: the chart shows the least interval \
+         that any sample of a pass allows to first order, in the side parameter {side}. In millimetres across the passes that is a range: \
          where it is broad, passes of constant {side} crowd. The last distance, which the boundary cuts short, is left \
          out.{thinned}",
         content.job.scallop_mm

@@ -240,11 +240,11 @@ fn gaps_are_the_step_over_at_the_widest_place() {
     let (job, sketch, _) = run(BELL);
     let oracle = Oracle::new(&job).unwrap();
     let gaps = measure::gaps(&oracle, &sketch.record.intervals.items());
-    // The rim is flat: l = sqrt(8 r h) = 2 mm. At the neck the passes are four times closer.
+    // The rim is flat: l = 2 sqrt(h (2 r - h)), which is 1.9975 mm. At the neck the passes are four times closer.
     assert!(!gaps.is_empty());
     for gap in gaps {
         assert!(
-            (gap.widest_mm - 2.0).abs() < 1e-3 && (gap.narrowest_mm - 0.5).abs() < 1e-3,
+            (gap.widest_mm - 1.997_498).abs() < 1e-5 && (gap.narrowest_mm - 0.25 * 1.997_498).abs() < 1e-5,
             "{gap:?}"
         );
     }
