@@ -217,13 +217,15 @@ impl Local {
         } else {
             b * b * side.dot(side)
         };
-        let side_squared = b * b * side.dot(side);
-        let (across, outwards) = if SIDE2 {
+        let (across, n) = if SIDE2 {
             let n = b * (to_f32(dot_hi(&offset, &self.side2)) * product);
-            (lateral_squared - (n - sheared), side_squared - n)
+            (lateral_squared - (n - sheared), float(n))
         } else {
-            (lateral_squared + sheared, side_squared)
+            (lateral_squared + sheared, 0.0)
         };
+        // Wanted at the ends of passes only. In plain f32: nothing of it is left in the sample path, nor is it counted.
+        let [x, y, z] = [side.x, side.y, side.z].map(float);
+        let outwards = real(float(b) * float(b) * (x * x + y * y + z * z) - n);
         Ok(Contact {
             position: self.position,
             offset,

@@ -242,6 +242,7 @@ impl Pass for ProfilePass {
         // r times the unit normal, away from the axis and up.
         let length = self.radius * inverse;
         let (out, up) = (-height1 * length, radius1 * length);
+        let across = lateral * (lateral + self.extent_rad * out);
         Ok(Contact {
             position: [mul_q31(radius, self.cos), mul_q31(radius, self.sin), height],
             offset: ball.offset(
@@ -254,8 +255,8 @@ impl Pass for ProfilePass {
             },
             along: 1.0 - plane_dot([out, up], bend) * inverse_e,
             lateral_squared: lateral * lateral,
-            across: lateral * (lateral + self.extent_rad * out),
-            outwards: lateral * (lateral + self.extent_rad * out),
+            across,
+            outwards: across,
             twist_squared: ZERO,
             speed_squared: e,
             gauge: ONE,
@@ -307,6 +308,7 @@ impl CirclePass {
         } else {
             (real(0.0), real(0.0))
         };
+        let across = e - radius * plane_dot([out, up], point.bend());
         *self = Self {
             start: record.start,
             extent: record.extent,
@@ -322,8 +324,8 @@ impl CirclePass {
                 },
                 along: 1.0 - bend,
                 lateral_squared: e,
-                across: e - radius * plane_dot([out, up], point.bend()),
-                outwards: e - radius * plane_dot([out, up], point.bend()),
+                across,
+                outwards: across,
                 speed_squared: speed * speed,
                 gauge: real(1.0),
                 ..Contact::default()
