@@ -102,6 +102,7 @@ impl Across {
     /// Back to before the first pass. What else there is, each pass begins anew.
     pub(crate) const fn restart(&mut self) {
         self.before = None;
+        self.second = false;
     }
 
     /// A pass begins.
