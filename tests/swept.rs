@@ -86,6 +86,63 @@ fn every_sample_job_holds_its_limit() {
     assert!(off.is_empty(), "{off}");
 }
 
+/// A patch of these corners, z = 0 but for a bulge of so many mm in the middle; ball 5 mm, scallop 0.02 mm.
+fn corners(corners: [[f64; 2]; 4], bulge: f64, spacing: &str) -> JobFile {
+    let [a, b, c, d] = corners;
+    let mut text = String::from(
+        "[surface]\nkind = \"nurbs\"\ndegree = [2, 2]\nknots_u = [0, 0, 0, 1, 1, 1]\nknots_v = [0, 0, 0, 1, 1, 1]\npoles_mm = [\n",
+    );
+    for u in [0.0, 0.5, 1.0] {
+        text += "    [";
+        for v in [0.0, 0.5, 1.0] {
+            let [x, y] =
+                [0, 1].map(|k| (1.0 - u) * ((1.0 - v) * a[k] + v * b[k]) + u * ((1.0 - v) * c[k] + v * d[k]));
+            let z = if u == 0.5 && v == 0.5 { bulge } else { 0.0 };
+            write!(text, "[{x}, {y}, {z}], ").unwrap();
+        }
+        text += "],\n";
+    }
+    text += "]\n[tool]\nkind = \"ball\"\nradius_mm = 5\n[cut]\nfeed_mm_min = 3000\nscallop_mm = 0.02\nalong = \"u\"\nside = \"up\"\n";
+    JobFile::parse("corners", &format!("{text}spacing = \"{spacing}\"\n")).unwrap()
+}
+
+/// Passes whose side lines are skew, and passes that spread: the paper's interval leaves more than the limit, the core's own does not.
+#[test]
+fn skew_and_spreading_passes_hold_the_limit() {
+    let skew = |tangent: f64| {
+        [
+            [0.0, 0.0],
+            [30.0 * tangent, 30.0],
+            [40.0, 0.0],
+            [40.0 + 30.0 * tangent, 30.0],
+        ]
+    };
+    let fan = [[0.0, 0.0], [0.0, 6.0], [40.0, 0.0], [60.0, 40.0]];
+    for (name, place, bulge, excess, over) in [
+        // 4/(1 + cos p)^2 at the ends: 1.37 at 45 degrees, 1.78 at 60.
+        ("45 degrees", skew(1.0), 0.0, 1.3, 0.0),
+        ("60 degrees", skew(3.0_f64.sqrt()), 0.0, 1.7, 0.0),
+        // The crest beyond a skew end is taken to be as on a surface that bends evenly. This one does not, and 1.0011 is left: a
+        // shortfall, told in the README.
+        ("45 degrees, bulging", skew(1.0), 4.0, 1.2, 0.0015),
+        ("fan", fan, 3.0, 1.01, 0.0),
+    ] {
+        let share = |spacing: &str| {
+            let job = corners(place, bulge, spacing);
+            let found = findings(&job);
+            let share = found.scallop_max.height_mm / job.scallop_mm;
+            (share, found.measuring_error_mm / job.scallop_mm)
+        };
+        let (paper, _) = share("first-order");
+        assert!(paper > excess, "{name}: {paper} of the limit by the first order");
+        let (exact, error) = share("exact");
+        assert!(
+            exact > 0.5 && exact <= 1.0 + over + error,
+            "{name}: {exact} of the limit, within {error}"
+        );
+    }
+}
+
 /// A profile of poles (x, z), cubic between even knots, drawn out along y by 20 mm; passes along y.
 fn groove(profile: &[[f64; 2]], cut: &str) -> JobFile {
     let mut text = String::from("[surface]\nkind = \"nurbs\"\ndegree = [3, 1]\nknots_u = [0, 0, 0, 0");

@@ -449,4 +449,24 @@ mod tests {
             assert!(here.pass > 10 && patches > 1000, "{here:?}");
         }
     }
+
+    /// What a run leaves behind does not get into the next one: a run that was stopped anywhere, and begun again, is the first once more.
+    #[test]
+    fn a_run_that_is_begun_again_is_the_same() {
+        let (program, store) = wave(Pattern::Zig);
+        let job = program.job(&store).unwrap();
+        for stopped in [5, 6, 7, 8, 9, 10, 11, 12, 1234, 4321] {
+            let (mut first, mut again) = (Run::START, Run::START);
+            let (mut here, mut there) = (Sample::START, Sample::START);
+            for _ in 0..stopped {
+                assert!(again.advance(&job, &mut there).unwrap());
+            }
+            again.restart();
+            while first.advance(&job, &mut here).unwrap() && here.pass < 4 {
+                assert!(again.advance(&job, &mut there).unwrap());
+                assert_eq!(here, there, "after {stopped} samples");
+            }
+            assert_eq!(here.pass, 4);
+        }
+    }
 }
