@@ -35,6 +35,7 @@ prop_compose! {
             feed_mm_s: values[1],
             scallop_mm: values[2],
             period_s: values[3],
+            axes: None,
         }
     }
 }

@@ -139,6 +139,7 @@ fn header(header: &interp_core::Header) -> Header {
         feed_mm_s: header.feed_mm_s,
         scallop_mm: header.scallop_mm,
         period_s: header.period_s,
+        axes: None,
     }
 }
 

@@ -76,6 +76,14 @@ pub(crate) struct Densities {
     pub(crate) shape: [Real; 2],
 }
 
+impl Densities {
+    /// Of nothing.
+    pub(crate) const NONE: Self = Self {
+        most: 0.0,
+        shape: [real(0.0); 2],
+    };
+}
+
 /// What is known of a pass's ends and the lines beside it.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Across {

@@ -34,11 +34,16 @@ pub enum FaultKind {
     DeadlineMissed = 12,
     /// A tick took more of its period than the board allows it. Value: processor cycles.
     TickOverBudget = 13,
+    /// An axis would leave its travel. Value: mm outside.
+    SoftLimit = 14,
+    /// The tool cannot go from pass to pass in the open: the surface does not face up where a pass begins or ends, or it rises above the safe
+    /// height. Value: mm above it, or 0.
+    LinkBlocked = 15,
 }
 
 impl FaultKind {
     /// Every kind, in order of its code.
-    pub const ALL: [Self; 13] = [
+    pub const ALL: [Self; 15] = [
         Self::BallDoesNotFit,
         Self::DegenerateSurface,
         Self::ParameterBackwards,
@@ -52,6 +57,8 @@ impl FaultKind {
         Self::WrongState,
         Self::DeadlineMissed,
         Self::TickOverBudget,
+        Self::SoftLimit,
+        Self::LinkBlocked,
     ];
 
     /// The stable code.
@@ -83,6 +90,8 @@ impl FaultKind {
             Self::WrongState => "wrong-state",
             Self::DeadlineMissed => "deadline-missed",
             Self::TickOverBudget => "tick-over-budget",
+            Self::SoftLimit => "soft-limit",
+            Self::LinkBlocked => "link-blocked",
         }
     }
 }

@@ -1,5 +1,6 @@
 //! The machine: load, tick, hold, resume, abort.
 
+use crate::course::{Course, Outcome};
 use crate::fault::{Fault, FaultKind, Result};
 use crate::interval::interval;
 use crate::job::{Header, STORE_WORDS};
@@ -25,8 +26,51 @@ pub enum Request {
     Hold = 2,
     /// Held: go on.
     Resume = 3,
-    /// Running or held: give the run up; faulted: acknowledge the fault. The position is kept, the job stays loaded (ready).
+    /// Running or held: give the run up; faulted: acknowledge the fault. The position is kept, the job stays loaded (ready). On a machine with
+    /// limits the tool slows down along its path first.
     Abort = 4,
+    /// Running or held: give the run up, and leave the surface: with limits, the tool slows down along its path and goes up to the safe
+    /// height; without, as an abort.
+    Stop = 5,
+}
+
+/// What the operator wants in one period.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Inputs {
+    /// What is new.
+    pub request: Request,
+    /// Feed override, percent, 0 to [`Self::OVERRIDE_MAX`]; more counts as that. Only on a machine with limits.
+    pub feed_override: u8,
+}
+
+impl Inputs {
+    /// Greatest feed override, percent.
+    pub const OVERRIDE_MAX: u8 = 200;
+
+    /// Override as a share.
+    fn share(self) -> f32 {
+        f32::from(self.feed_override.min(Self::OVERRIDE_MAX)) * 0.01
+    }
+}
+
+impl Default for Inputs {
+    /// Nothing new, at the programmed feed.
+    fn default() -> Self {
+        Self {
+            request: Request::None,
+            feed_override: 100,
+        }
+    }
+}
+
+impl From<Request> for Inputs {
+    /// At the programmed feed.
+    fn from(request: Request) -> Self {
+        Self {
+            request,
+            ..Self::default()
+        }
+    }
 }
 
 impl Request {
@@ -36,9 +80,15 @@ impl Request {
         match self {
             Self::None => true,
             Self::Start => matches!(state, State::Ready | State::Finished),
-            Self::Hold => matches!(state, State::Running),
-            Self::Resume => matches!(state, State::Held),
-            Self::Abort => matches!(state, State::Running | State::Held | State::Faulted),
+            Self::Hold => matches!(state, State::Running | State::Linking),
+            Self::Resume => matches!(state, State::Held | State::Holding),
+            Self::Abort => {
+                matches!(state, State::Faulted) || Self::Stop.is_allowed(state)
+            }
+            Self::Stop => matches!(
+                state,
+                State::Running | State::Linking | State::Holding | State::Held
+            ),
         }
     }
 }
@@ -158,8 +208,8 @@ impl<S: AsRef<[i32]> + AsMut<[i32]>> Interpolator<S> {
 
     /// Where the run is: pass, path and side place. After a fault, where that is, which is past the last sample.
     #[must_use]
-    pub const fn place(&self) -> (u32, Place, Place) {
-        self.motion.run.place()
+    pub fn place(&self) -> (u32, Place, Place) {
+        self.motion.course.place().unwrap_or_else(|| self.motion.run.place())
     }
 
     /// The last sample: its position is kept after a fault.
@@ -197,8 +247,8 @@ impl<S: AsRef<[i32]> + AsMut<[i32]>> Interpolator<S> {
     /// While the job runs, each call yields a sample with [`State::Running`] or [`State::Stopping`], counted by its `tick` from 0;
     /// the one after the last has [`State::Finished`]. In every state that does not move, the sample repeats the last position.
     #[inline(always)]
-    pub fn tick(&mut self, request: Request) -> &Sample {
-        self.motion.tick(self.store.as_ref(), request);
+    pub fn tick(&mut self, inputs: impl Into<Inputs>) -> &Sample {
+        self.motion.tick(self.store.as_ref(), inputs.into());
         &self.motion.last
     }
 }
@@ -211,8 +261,22 @@ struct Motion {
     /// Periods until a stop is over.
     slow: u8,
     last: Sample,
+    /// What comes of a stop that no fault asked for.
+    ending: Ending,
     run: Run,
     program: Program,
+    course: Course,
+}
+
+/// What a run that is given up still has to do.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Ending {
+    /// Stand where it stops.
+    Stand,
+    /// Leave the surface then.
+    Leave,
+    /// It is on its way up.
+    Leaving,
 }
 
 impl Motion {
@@ -221,8 +285,10 @@ impl Motion {
         fault: None,
         slow: 0,
         last: Sample::START,
+        ending: Ending::Stand,
         run: Run::START,
         program: Program::new(),
+        course: Course::START,
     };
 
     fn may_load(&self) -> Result<()> {
@@ -268,7 +334,12 @@ impl Motion {
                 self.slow = STOP_PERIODS;
                 self.fault = Some(fault);
             }
-            State::Held | State::Holding => self.fail(fault),
+            State::Linking | State::Holding | State::Stopping => {
+                self.state = State::Stopping;
+                self.ending = Ending::Stand;
+                self.fault.get_or_insert(fault);
+            }
+            State::Held => self.fail(fault),
             _ => {}
         }
     }
@@ -280,16 +351,68 @@ impl Motion {
     }
 
     #[inline(never)]
-    fn tick(&mut self, store: &[i32], request: Request) {
-        if request != Request::None {
-            self.take_up(request);
+    fn tick(&mut self, store: &[i32], inputs: Inputs) {
+        if inputs.request != Request::None {
+            self.take_up(store, inputs.request);
         }
-        match self.state {
-            State::Running => self.advance(store),
-            State::Stopping => self.stop(store),
-            _ => {}
+        if self.program.header().axes.is_some() {
+            self.tick_within_limits(store, inputs.share());
+        } else {
+            match self.state {
+                State::Running => self.advance(store),
+                State::Stopping => self.stop(store),
+                _ => {}
+            }
         }
         self.last.state = self.state;
+    }
+
+    /// One period of a machine that has limits.
+    #[inline(never)]
+    fn tick_within_limits(&mut self, store: &[i32], share: f32) {
+        let share = match (self.state, self.ending) {
+            (State::Running | State::Linking, _) => share,
+            (State::Stopping, Ending::Leaving) => 1.0,
+            (State::Holding | State::Stopping, _) => 0.0,
+            _ => return,
+        };
+        if share == 0.0 && self.course.is_at_rest() && self.stand() {
+            return;
+        }
+        let Self {
+            program,
+            course,
+            run,
+            last,
+            ..
+        } = self;
+        let outcome = program.job(store).and_then(|job| match &job.header.axes {
+            Some(axes) => course.tick(&job, axes, run, share, last),
+            None => Ok(Outcome::Finished),
+        });
+        match (outcome, self.state) {
+            (Ok(Outcome::Pass), State::Linking) => self.state = State::Running,
+            (Ok(Outcome::Link), State::Running) => self.state = State::Linking,
+            (Ok(Outcome::Finished), State::Stopping) => self.state = State::Ready,
+            (Ok(Outcome::Finished), _) => self.state = State::Finished,
+            (Ok(_), _) => {}
+            (Err(fault), _) => self.fail(fault),
+        }
+    }
+
+    /// The tool stands, and is to: what becomes of the run. Whether the period is over with that.
+    fn stand(&mut self) -> bool {
+        match self.state {
+            State::Holding => self.state = State::Held,
+            State::Stopping if self.fault.is_some() => self.state = State::Faulted,
+            State::Stopping if self.ending == Ending::Leave => {
+                self.ending = Ending::Leaving;
+                self.course.leave(&self.run);
+            }
+            State::Stopping => self.state = State::Ready,
+            _ => return false,
+        }
+        true
     }
 
     #[inline(always)]
@@ -322,19 +445,39 @@ impl Motion {
 
     #[cold]
     #[inline(never)]
-    fn take_up(&mut self, request: Request) {
+    fn take_up(&mut self, store: &[i32], request: Request) {
         if !request.is_allowed(self.state) {
             return;
         }
+        let has_limits = self.program.header().axes.is_some();
         self.state = match request {
             Request::None => return,
             Request::Start => {
                 self.restart();
-                State::Running
+                let Self { program, course, .. } = self;
+                match program.job(store) {
+                    Ok(job) if has_limits => {
+                        if let Some(axes) = &job.header.axes {
+                            course.restart(&job, axes);
+                        }
+                        State::Linking
+                    }
+                    _ => State::Running,
+                }
             }
+            Request::Hold if has_limits => State::Holding,
             Request::Hold => State::Held,
+            Request::Resume if has_limits && self.course.is_link() => State::Linking,
             Request::Resume => State::Running,
-            Request::Abort => {
+            Request::Abort | Request::Stop if has_limits && self.state != State::Faulted => {
+                self.ending = if request == Request::Stop {
+                    Ending::Leave
+                } else {
+                    Ending::Stand
+                };
+                State::Stopping
+            }
+            Request::Abort | Request::Stop => {
                 self.fault = None;
                 State::Ready
             }

@@ -94,6 +94,28 @@ pub enum ToolSide {
     Minus = 1,
 }
 
+/// What the machine's axes x, y, z can do, and where they may go. A job that says so is run from standstill to standstill, its passes linked;
+/// without it the feed is constant from the first sample to the last, as in the paper.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Axes {
+    /// Greatest velocity of each axis, mm/s, 1e-3 to 1e5.
+    pub velocity_mm_s: [f32; 3],
+    /// Greatest acceleration of each axis, mm/s^2, 1e-2 to 1e7.
+    pub acceleration_mm_s2: [f32; 3],
+    /// Greatest jerk of each axis, mm/s^3, 1e-1 to 1e9.
+    pub jerk_mm_s3: [f32; 3],
+    /// Greatest distance between the path and the chord of a period, mm, 1e-6 to 1e3.
+    pub chord_mm: f32,
+    /// Travel of each axis, nm, least and most.
+    pub travel_nm: [[i32; 2]; 3],
+    /// Where the tool centre stands before the first run, nm; within the travel.
+    pub home_nm: [i32; 3],
+    /// The last part of the way down to the surface, mm, 0 to 1000, that is gone no faster than at the feed.
+    pub plunge_mm: f32,
+    /// Height (z of the tool centre) at which the tool is clear of the surface everywhere, nm; within the travel.
+    pub safe_z_nm: i32,
+}
+
 /// What a job asks for, besides its surface data. Ranges are checked when it is loaded.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Header {
@@ -117,4 +139,6 @@ pub struct Header {
     pub scallop_mm: f32,
     /// Sampling period T, s, 1e-5 to 0.1.
     pub period_s: f32,
+    /// What the axes can do; none for a constant feed.
+    pub axes: Option<Axes>,
 }

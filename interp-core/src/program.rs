@@ -1,7 +1,7 @@
 //! A job in the machine: raw words go in, and only a complete, checked job comes out.
 
 use crate::fault::{Fault, FaultKind, Result};
-use crate::job::{Header, SPANS_MAX, SurfaceKind};
+use crate::job::{Axes, Header, SPANS_MAX, SurfaceKind};
 use crate::schedule::width_words;
 use crate::surface::{
     POLYNOMIAL_WORDS, PolynomialRecord, RATIONAL_WORDS, REVOLVED_WORDS, RationalRecord, RevolvedRecord,
@@ -71,6 +71,43 @@ fn check_header(header: &Header) -> Result<()> {
             return Err(Fault::new(FaultKind::BadHeader, value));
         }
     }
+    header.axes.as_ref().map_or(Ok(()), |axes| check_axes(header, axes))
+}
+
+/// Ranges of what the axes can do: such that a step of a period fits its integer, and none of the planner's products overflows.
+fn check_axes(header: &Header, axes: &Axes) -> Result<()> {
+    let bad = |value| Err(Fault::new(FaultKind::BadHeader, value));
+    let all = [
+        (axes.velocity_mm_s, 1e-3, 1e5),
+        (axes.acceleration_mm_s2, 1e-2, 1e7),
+        (axes.jerk_mm_s3, 1e-1, 1e9),
+        ([axes.chord_mm; 3], 1e-6, 1e3),
+    ];
+    for (values, least, most) in all {
+        for value in values {
+            if !(value >= least && value <= most) {
+                return bad(value);
+            }
+        }
+    }
+    if !(axes.plunge_mm >= 0.0 && axes.plunge_mm <= 1e3) {
+        return bad(axes.plunge_mm);
+    }
+    // Twice the feed, which an override may ask for, has to fit a step.
+    if 2.0 * header.feed_mm_s * header.period_s > crate::feed::STEP_MAX_MM {
+        return bad(header.feed_mm_s);
+    }
+    if usize::from(header.path_spans) > crate::feed::CELLS_MAX {
+        return bad(f32::from(header.path_spans));
+    }
+    let [x, y, z] = axes.home_nm;
+    for (place, [least, most]) in [x, y, z, axes.safe_z_nm].into_iter().zip(
+        axes.travel_nm.into_iter().chain([axes.travel_nm[2]]),
+    ) {
+        if !(least..=most).contains(&place) {
+            return bad(crate::feed::nm_to_mm(place));
+        }
+    }
     Ok(())
 }
 
@@ -87,6 +124,7 @@ impl Program {
             feed_mm_s: 0.0,
             scallop_mm: 0.0,
             period_s: 0.0,
+            axes: None,
         };
         Self {
             stage: Stage::Empty,

@@ -1,12 +1,13 @@
 //! A run of a job, sample by sample: the one file that chains the stages.
 
 use crate::across::{self, Across, Densities};
-use crate::arith::{advanced, dot_hi};
+use crate::arith::{advanced, dot_hi, fraction_to_f32};
 use crate::contact::{self, Reach};
 use crate::fault::{Fault, FaultKind, Result};
 use crate::interval::interval;
 use crate::job::{Pattern, Spacing};
 use crate::lane::{Lane, Line};
+use crate::lookahead::UP_MIN;
 use crate::patch::Patch;
 use crate::program::Job;
 use crate::sample::{Place, Sample};
@@ -70,6 +71,8 @@ pub(crate) struct Run {
     last_interval: f32,
     /// How far from it the next pass lies.
     step_over: f32,
+    /// Share of the feed of the last step along the pass.
+    pace: f32,
 }
 
 impl Travel {
@@ -152,6 +155,7 @@ impl Run {
         first_offset: [0; 3],
         last_interval: f32::INFINITY,
         step_over: f32::INFINITY,
+        pace: 0.0,
     };
 
     /// Back to the start.
@@ -239,6 +243,129 @@ impl Run {
             job.header.feed_mm_s * share
         };
         Ok(true)
+    }
+
+    /// Begins this pass, which lies here, and whose least interval is known: its first sample.
+    ///
+    /// # Errors
+    /// As [`Self::advance`].
+    pub(crate) fn begin_at(
+        &mut self,
+        job: &Job<'_>,
+        pass: u32,
+        side: Place,
+        interval: f32,
+        last: &mut Sample,
+    ) -> Result<()> {
+        if pass > 0 && job.header.pattern == Pattern::Zig {
+            self.travel.offset = self.first_offset;
+        }
+        (self.travel.pass, self.travel.side) = (pass, side);
+        self.begin_pass(job)?;
+        self.sample(last)?;
+        self.first_offset = self.travel.offset;
+        self.last_interval = interval;
+        self.pace = 0.0;
+        self.describe(0.0, last);
+        Ok(())
+    }
+
+    /// A share of a period's arc along the pass; whether that was little work.
+    ///
+    /// # Errors
+    /// As [`Self::advance`].
+    pub(crate) fn move_by(&mut self, job: &Job<'_>, share: f32, last: &mut Sample) -> Result<bool> {
+        let travel = &mut self.travel;
+        // The series' third term is for steps of one length: the change of the last one is scaled to this.
+        let change = (travel.path.stretch - travel.stretch_before) * (share / self.pace);
+        let before = travel.path.stretch - change;
+        self.pace = share;
+        let step = contact::step(&travel.path, before, share * self.lane.patch().arc);
+        if let Some(fraction) = step.and_then(|step| advanced(travel.fraction, step)) {
+            travel.fraction = fraction;
+            self.sample(last)?;
+            last.feed_mm_s = job.header.feed_mm_s * share;
+            if !self.lane.has_work() {
+                return Ok(true);
+            }
+            self.lane.work(job, &self.travel.line());
+            return Ok(false);
+        }
+        let interval = self.last_interval;
+        self.step_far(job, share)?;
+        self.sample(last)?;
+        self.last_interval = interval;
+        self.describe(job.header.feed_mm_s * share, last);
+        Ok(false)
+    }
+
+    /// To the end of the pass, which is here up to rounding.
+    ///
+    /// # Errors
+    /// As [`Self::advance`]; [`FaultKind::PatchTooShort`] where a whole patch is still ahead.
+    pub(crate) fn finish_pass(&mut self, job: &Job<'_>, last: &mut Sample) -> Result<()> {
+        if self.is_along() {
+            if self.travel.line().next(job.header.path_spans).is_some() && !self.next_span(job)? {
+                return Err(Fault::new(FaultKind::PatchTooShort, 0.0));
+            }
+            self.end_pass(job);
+            self.sample(last)?;
+            self.describe(0.0, last);
+        } else {
+            self.stand(last);
+        }
+        Ok(())
+    }
+
+    /// A period in which the tool stands.
+    pub(crate) const fn stand(&mut self, last: &mut Sample) {
+        last.tick = self.travel.ticks;
+        last.feed_mm_s = 0.0;
+        self.travel.ticks = self.travel.ticks.wrapping_add(1);
+    }
+
+    /// A period off the passes.
+    pub(crate) const fn off_surface(&mut self, at_nm: [i32; 3], speed_mm_s: f32, last: &mut Sample) {
+        self.stand(last);
+        last.feed_mm_s = speed_mm_s;
+        (last.path, last.side) = (Place::NONE, Place::NONE);
+        (last.cc_nm, last.cl_nm) = (at_nm, at_nm);
+        last.density = 0.0;
+    }
+
+    /// Cell of the pass, of so many to a patch, and arc since its start, mm; none where the pass is over.
+    pub(crate) fn since_station(&self, job: &Job<'_>, parts: u16) -> Option<(u16, f32)> {
+        if !self.is_along() {
+            return None;
+        }
+        let travel = &self.travel;
+        let part = (u64::MAX / u64::from(parts)).max(1);
+        let high = (travel.fraction >> 32) * u64::from(parts);
+        let within = u16::try_from(high >> 32).unwrap_or(0);
+        let over = travel.fraction.checked_sub(u64::from(within) * part)?;
+        let span = if travel.reversed {
+            job.header.path_spans.saturating_sub(1).saturating_sub(travel.span)
+        } else {
+            travel.span
+        };
+        let length = fraction_to_f32(over);
+        let mean = 1.0 - 0.5 * travel.path.stretch * length;
+        let arc = length * mean / (travel.path.inverse * self.lane.patch().per_mm);
+        Some((span.saturating_mul(parts).saturating_add(within), float(arc)))
+    }
+
+    /// Whether the surface faces up where the tool is, so that the tool can leave it upwards.
+    pub(crate) fn faces_up(&self) -> bool {
+        let [_, _, z] = self.lane.patch().ball.normal(self.travel.offset);
+        z > UP_MIN
+    }
+
+    /// What of a sample changes seldom.
+    const fn describe(&self, feed_mm_s: f32, last: &mut Sample) {
+        last.pass = self.travel.pass;
+        last.path.span = self.travel.span;
+        last.side = self.travel.side;
+        last.feed_mm_s = feed_mm_s;
     }
 
     /// The sample where the run is.

@@ -21,11 +21,13 @@ pub enum State {
     Finished = 6,
     /// Stopped by a fault; the position is kept.
     Faulted = 7,
+    /// The tool moves between passes, to the first or from the last, or waits there; only on a machine with limits.
+    Linking = 8,
 }
 
 impl State {
     /// Every state, in order of its code.
-    pub const ALL: [Self; 8] = [
+    pub const ALL: [Self; 9] = [
         Self::Idle,
         Self::Ready,
         Self::Running,
@@ -34,6 +36,7 @@ impl State {
         Self::Stopping,
         Self::Finished,
         Self::Faulted,
+        Self::Linking,
     ];
 
     /// The state with this code.
@@ -45,7 +48,7 @@ impl State {
     /// Whether a run is under way: moving, or standing on its path to be resumed.
     #[must_use]
     pub const fn is_under_way(self) -> bool {
-        matches!(self, Self::Running | Self::Holding | Self::Held | Self::Stopping)
+        matches!(self, Self::Running | Self::Linking | Self::Holding | Self::Held | Self::Stopping)
     }
 
     /// The state's name in traces and JSON.
@@ -60,6 +63,7 @@ impl State {
             Self::Stopping => "stopping",
             Self::Finished => "finished",
             Self::Faulted => "faulted",
+            Self::Linking => "link",
         }
     }
 }
@@ -71,6 +75,14 @@ pub struct Place {
     pub span: u16,
     /// Fraction of the span in units of 2^-64; `u64::MAX` stands for its end exactly.
     pub fraction: u64,
+}
+
+impl Place {
+    /// No place: the tool is off the passes.
+    pub const NONE: Self = Self {
+        span: u16::MAX,
+        fraction: 0,
+    };
 }
 
 /// One period's result. Positions are exact integers; what host and board compute is the same to the last bit.

@@ -1,10 +1,10 @@
 //! Steps 5 and 6: from pass to pass, `v_next = v + min(dv over the pass)`, until the side parameter reaches its other
 //! boundary; the last pass lies exactly on it.
 
-use crate::arith::{fraction_32, fraction_from_f32};
+use crate::arith::{fraction_32, fraction_from_f32, fraction_to_f32};
 use crate::fault::{Fault, FaultKind, Result};
 use crate::sample::Place;
-use crate::scalar::real;
+use crate::scalar::{float, real};
 
 /// Boundaries between side spans that an interval reaches over at most, so that the walk is bounded; one that reaches further
 /// ends on the last of them: nearer than the scallop asks for, where patches are that much narrower than it.
@@ -49,6 +49,21 @@ pub(crate) fn next_side(from: Place, interval: f32, spans: u16, width: impl Fn(u
             fraction: u64::MAX,
         }
     })
+}
+
+/// How far a place is from one before it, in units of the side parameter.
+pub(crate) fn apart(from: Place, to: Place, width: impl Fn(u16) -> f32) -> f32 {
+    let fraction = |place: Place| fraction_32(u32::try_from(place.fraction >> 32).unwrap_or(u32::MAX));
+    if from.span == to.span {
+        let between = to.fraction.saturating_sub(from.fraction);
+        return width(from.span) * float(fraction_to_f32(between));
+    }
+    let mut sum = width(from.span) * (1.0 - fraction(from)) + width(to.span) * fraction(to);
+    let between = from.span.saturating_add(1)..to.span.min(from.span.saturating_add(WALK_MAX + 1));
+    for span in between {
+        sum += width(span);
+    }
+    sum
 }
 
 /// Whether a pass there is the last.

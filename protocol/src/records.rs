@@ -6,7 +6,7 @@
 use heapless::{String, Vec};
 use interp_core::{
     fault::{Fault, FaultKind},
-    job::{Header, Pattern, Spacing, SurfaceKind, ToolSide},
+    job::{Axes, Header, Pattern, Spacing, SurfaceKind, ToolSide},
     sample::{Place, Sample, State},
 };
 use serde::{Deserialize, Deserializer, Serialize, Serializer, de, ser::SerializeSeq};
@@ -211,6 +211,39 @@ pub(crate) struct HeaderFields {
     feed_mm_s: f32,
     scallop_mm: f32,
     period_s: f32,
+    #[serde(with = "axes")]
+    axes: Option<Axes>,
+}
+
+/// The wire's view of [`Axes`]; it stops compiling when the core's grows a field.
+#[derive(Serialize, Deserialize)]
+#[serde(remote = "Axes")]
+struct AxesFields {
+    velocity_mm_s: [f32; 3],
+    acceleration_mm_s2: [f32; 3],
+    jerk_mm_s3: [f32; 3],
+    chord_mm: f32,
+    travel_nm: [[i32; 2]; 3],
+    home_nm: [i32; 3],
+    plunge_mm: f32,
+    safe_z_nm: i32,
+}
+
+/// An option of what the axes can do: 0, or 1 and the fields.
+mod axes {
+    use super::{Axes, AxesFields, Deserialize, Deserializer, Serialize, Serializer};
+
+    #[derive(Serialize, Deserialize)]
+    struct Record(#[serde(with = "AxesFields")] Axes);
+
+    pub(super) fn serialize<S: Serializer>(axes: &Option<Axes>, serializer: S) -> Result<S::Ok, S::Error> {
+        axes.map(Record).serialize(serializer)
+    }
+
+    pub(super) fn deserialize<'de, D: Deserializer<'de>>(deserializer: D) -> Result<Option<Axes>, D::Error> {
+        let record = Option::<Record>::deserialize(deserializer)?;
+        Ok(record.map(|Record(axes)| axes))
+    }
 }
 
 /// Up to [`CHUNK_WORDS_MAX`] data words: their number, then four bytes each, low byte first.

@@ -103,6 +103,7 @@ pub fn dome() -> (Header, Vec<i32>) {
         feed_mm_s: 1000.0,
         scallop_mm: 1.0,
         period_s: 0.001,
+        axes: None,
         ..Header::default()
     };
     let one = encode::width(1.0).unwrap();

@@ -113,5 +113,19 @@ fn words(kind: FaultKind) -> [&'static str; 5] {
             "Please report the job; a lower feed makes the dearest ticks rarer. `cargo sim budget JOB` counts what each stage takes.",
             "An interrupt handler of 20000 cycles with a higher priority than the sample task.",
         ],
+        FaultKind::SoftLimit => [
+            "An axis would leave its travel. The tool has not gone there: each pass is looked over before it begins, and each leg before it is gone.",
+            "How far outside the travel the tool centre would be, mm.",
+            "The part lies too near the end of an axis, or `travel_mm` in [machine] is not the machine's.",
+            "Move the part with `[placement]`, or correct `travel_mm`.",
+            "jobs/plate.toml with `travel_mm = [[0, 50], [0, 100], [0, 100]]`: the plate is 80 mm long.",
+        ],
+        FaultKind::LinkBlocked => [
+            "The tool cannot get from pass to pass in the open.",
+            "How far the tool centre would be above the safe height, mm; 0 where the surface does not face up.",
+            "With the pattern `zig`, and at start and end of every job, the tool leaves the surface straight up. It can do so only where the surface faces up, and only if the safe height is above all of it.",
+            "Turn the part so that it faces up (`[placement]`), or raise `safe_z_mm` in [machine].",
+            "A cylinder that is machined around its axis by more than half a turn: a pass ends on its underside.",
+        ],
     }
 }

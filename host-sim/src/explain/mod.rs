@@ -151,6 +151,18 @@ pub fn fault(fault: Fault) -> (String, &'static str) {
             format!("a tick took {value} cycles, more than the board allows it"),
             "this is a defect of the firmware: please report the job",
         ),
+        FaultKind::SoftLimit => (
+            format!("an axis would be {value:.3} mm outside its travel"),
+            "move the part with [placement], or correct `travel_mm` in [machine]",
+        ),
+        FaultKind::LinkBlocked if value > 0.0 => (
+            format!("the tool centre would be {value:.3} mm above the safe height"),
+            "raise `safe_z_mm` in [machine]",
+        ),
+        FaultKind::LinkBlocked => (
+            "the surface does not face up where the tool has to leave it or come to it".to_owned(),
+            "turn the part so that it faces up ([placement]), or take the pattern \"zigzag\" where only the ends of passes are in the way",
+        ),
     }
 }
 

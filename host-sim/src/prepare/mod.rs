@@ -129,6 +129,7 @@ pub fn prepare(job: &JobFile) -> Result<Prepared, JobFileError> {
         feed_mm_s: job.feed_mm_s() as f32,
         scallop_mm: job.scallop_mm as f32,
         period_s: job.machine.period_s() as f32,
+        axes: None,
     };
     match &job.surface {
         SurfaceSpec::Revolved {

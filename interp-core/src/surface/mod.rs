@@ -94,6 +94,12 @@ pub(crate) struct PathSpeed {
 }
 
 impl PathSpeed {
+    /// Of no place.
+    pub(crate) const STILL: Self = Self {
+        inverse: real(0.0),
+        stretch: real(0.0),
+    };
+
     /// From g Ã, half of its derivative, the excess of its stretch, and g/a.
     #[inline(always)]
     fn new(path: &[i32; 3], path2: &[i32; 3], excess: Real, gauge: Real) -> Self {

@@ -1,0 +1,381 @@
+//! The bounds of the feed along one path, from standstill to standstill; see [`super`].
+//!
+//! A path is cut into cells by stations. [`Plan::begin`], [`Plan::add`] with each station in turn, [`Plan::settle`] once, then [`Plan::work`]
+//! until it says that it is done: each of these is a fixed portion of work.
+
+use super::demand::{Room, cube_root, root, squared};
+use super::profile::{WINDOW_MAX, braked, landing};
+use super::{QUANTA_BITS, QUANTA_PER_MM, STEP_MAX};
+
+/// Cells that a path may have.
+pub(crate) const CELLS_MAX: usize = 256;
+
+/// Cells to each side that a bound may reach into, and that are looked through ahead of an acceleration.
+const REACH: usize = 16;
+
+/// Cells that are worked on at a time.
+const PORTION: usize = 2;
+
+/// Cells that a period may pass.
+const CELLS_A_PERIOD: u8 = 4;
+
+/// What the path is to be followed with.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Top {
+    /// Greatest speed that may be wanted, mm/s.
+    pub(crate) speed: f32,
+    /// Speed that is wanted as a rule, mm/s.
+    pub(crate) usual: f32,
+    /// s.
+    pub(crate) period_s: f32,
+}
+
+/// A cell of a path, and the station at its end. Speeds are quanta a period, accelerations quanta a period^2.
+#[derive(Clone, Copy, Debug)]
+struct Cell {
+    /// Arc from the path's start to the cell's end, nm.
+    end_nm: u32,
+    /// Square of the greatest speed, and acceleration, by the cell alone.
+    square: f32,
+    accel: f32,
+    /// The same with what neighbours ask.
+    square_all: f32,
+    accel_all: f32,
+    /// Greatest speed at the cell's end, where the path jumps: within so many periods of it.
+    gate: f32,
+    /// Square of the greatest speed at the cell's start from which all that follows can be kept.
+    enter: f32,
+}
+
+impl Cell {
+    const NONE: Self = Self {
+        end_nm: 0,
+        square: 0.0,
+        accel: 0.0,
+        square_all: 0.0,
+        accel_all: 0.0,
+        gate: f32::MAX,
+        enter: 0.0,
+    };
+}
+
+/// Bounds of the feed along a path.
+#[derive(Clone, Debug)]
+pub(crate) struct Plan {
+    cells: [Cell; CELLS_MAX],
+    count: u16,
+    /// Cells that are still to be worked on.
+    left: u16,
+    /// From this cell on, all braking is for the end.
+    tail: u16,
+    /// Least jerk along the path, mm/s^3; greatest acceleration, mm/s^2, and square of the speed.
+    least: f32,
+    accel: f32,
+    square: f32,
+    /// Length, quanta.
+    pub(crate) end: i64,
+    /// Greatest change of the acceleration within the mean, quanta a period^2.
+    pub(crate) swing: f32,
+    /// Periods of the mean.
+    pub(crate) window: u8,
+}
+
+impl Plan {
+    /// Of no path.
+    pub(crate) const NONE: Self = Self {
+        cells: [Cell::NONE; CELLS_MAX],
+        count: 0,
+        left: 0,
+        tail: 0,
+        least: f32::MAX,
+        accel: 0.0,
+        square: 0.0,
+        end: 0,
+        swing: 0.0,
+        window: 1,
+    };
+
+    /// A new path.
+    pub(crate) const fn begin(&mut self) {
+        self.count = 0;
+        self.left = 0;
+        self.least = f32::MAX;
+        self.accel = 0.0;
+        self.square = 0.0;
+        self.end = 0;
+    }
+
+    /// Cells so far.
+    pub(crate) const fn count(&self) -> u16 {
+        self.count
+    }
+
+    /// Arc up to the start of a cell, quanta.
+    pub(crate) fn start_of(&self, cell: u16) -> i64 {
+        i64::from(self.start_nm(cell)) << QUANTA_BITS
+    }
+
+    fn start_nm(&self, cell: u16) -> u32 {
+        let before = cell.checked_sub(1).and_then(|before| self.cell(before));
+        before.map_or(0, |before| before.end_nm)
+    }
+
+    fn cell(&self, cell: u16) -> Option<&Cell> {
+        self.cells.get(usize::from(cell))
+    }
+
+    /// One more cell, of this length, mm. What its end leaves goes for the `back` cells before, too.
+    pub(crate) fn add(&mut self, length: f32, room: &Room, back: usize, top: &Top) {
+        self.end += quanta(length);
+        self.least = self.least.min(room.jerk);
+        self.accel = self.accel.max(room.accel);
+        self.square = self.square.max(room.square);
+        let scale = top.period_s * QUANTA_PER_MM;
+        let square = squared((root(room.square) * scale).min(STEP_MAX));
+        let accel = room.accel * top.period_s * scale;
+        let index = usize::from(self.count);
+        let Some(cell) = self.cells.get_mut(index) else {
+            return;
+        };
+        *cell = Cell {
+            end_nm: u32::try_from((self.end + (1 << (QUANTA_BITS - 1))) >> QUANTA_BITS).unwrap_or(u32::MAX),
+            square,
+            accel,
+            ..Cell::NONE
+        };
+        self.count += 1;
+        for cell in self.cells.get_mut(index.saturating_sub(back)..index).into_iter().flatten() {
+            cell.square = cell.square.min(square);
+            cell.accel = cell.accel.min(accel);
+        }
+    }
+
+    /// A bound of the square of the speed, (mm/s)^2, at the end of a cell, where the path jumps. It takes this much of the jerk that is
+    /// left, of 1.
+    pub(crate) fn gate(&mut self, cell: u16, square: f32, top: &Top) {
+        if square >= squared(top.speed) {
+            return;
+        }
+        if let Some(cell) = self.cells.get_mut(usize::from(cell)) {
+            cell.gate = cell.gate.min(root(square) * top.period_s * QUANTA_PER_MM);
+        }
+    }
+
+    /// Less jerk for the feed along the whole path: no more than this, mm/s^3.
+    pub(crate) const fn keep_jerk(&mut self, rest: f32) {
+        self.least = self.least.min(rest);
+    }
+
+    /// The path is complete: chooses the mean. Its length is that of the fastest way from rest to rest over the whole path
+    /// (acceleration, speed and arc as they are): `A/J`, `sqrt(v/J)` or `cbrt(s/(2 J))`, whichever is least.
+    pub(crate) fn settle(&mut self, top: &Top) {
+        let jerk = self.least;
+        let speed = root(self.square).min(top.usual);
+        let arc = mm(self.end);
+        let time = (self.accel / jerk).min(root(speed / jerk)).min(cube_root(0.5 * arc / jerk));
+        self.window = upwards(time / top.period_s);
+        let periods = f32::from(self.window);
+        self.swing = jerk * periods * squared(top.period_s) * top.period_s * QUANTA_PER_MM;
+        self.left = self.count;
+        self.tail = self.count;
+    }
+
+    /// One portion; whether there is nothing left to do.
+    pub(crate) fn work(&mut self) -> bool {
+        for _ in 0..PORTION {
+            let Some(cell) = self.left.checked_sub(1) else {
+                return true;
+            };
+            self.left = cell;
+            self.bound(usize::from(cell));
+        }
+        self.left == 0
+    }
+
+    /// Bounds of a cell, those of all after it known.
+    ///
+    /// The tool is where the mean of the last n places is: it keeps a speed c somewhere if the places do within n c of there. So what a
+    /// cell asks goes for all cells as near as that. A cell that was not looked at, at a distance d, can only ask so of speeds
+    /// above d/n.
+    fn bound(&mut self, index: usize) {
+        let Some(&cell) = self.cells.get(index) else {
+            return;
+        };
+        let periods = f32::from(self.window);
+        let start_nm = index.checked_sub(1).and_then(|i| self.cells.get(i)).map_or(0, |cell| cell.end_nm);
+        let (mut square, mut accel) = (cell.square, cell.accel.min(self.swing));
+        let mut ask = |cell: &Cell, distance: f32| {
+            if squared(periods) * cell.square >= squared(distance) {
+                square = square.min(cell.square);
+                accel = accel.min(cell.accel);
+            }
+        };
+        let (mut after, mut before) = (f32::MAX, f32::MAX);
+        let mut from = cell.end_nm;
+        let later = self.cells.get(index + 1..usize::from(self.count)).into_iter().flatten();
+        for (seen, other) in later.take(REACH + 1).enumerate() {
+            if seen == REACH {
+                after = between(cell.end_nm, from);
+            } else {
+                ask(other, between(cell.end_nm, from));
+                from = other.end_nm;
+            }
+        }
+        let earlier = self.cells.get(..index).into_iter().flatten().rev();
+        for (seen, other) in earlier.take(REACH + 1).enumerate() {
+            let distance = between(other.end_nm, start_nm);
+            if seen == REACH {
+                before = distance;
+            } else {
+                ask(other, distance);
+            }
+        }
+        square = square.min(squared(after.min(before) / periods));
+        let length = between(start_nm, cell.end_nm);
+        let mut gate = cell.gate;
+        if gate < f32::MAX {
+            // Within n c to each side, which the cells have room for.
+            let next = self.cells.get(index + 1).map_or(length, |next| between(cell.end_nm, next.end_nm));
+            gate = gate.min(length.min(next) / periods);
+        }
+        let next = self.cells.get(index + 1).filter(|_| index + 1 < usize::from(self.count));
+        let ends = usize::from(self.tail) == index + 1;
+        let mut enter = if ends {
+            // No later cell brakes less, so that what is planned for the end from here on is kept.
+            accel = accel.min(next.map_or(f32::MAX, |next| next.accel_all));
+            squared(landing(accel, as_f32(self.end - (i64::from(start_nm) << QUANTA_BITS))))
+        } else {
+            squared(braked(next.map_or(0.0, |next| next.enter), accel, length))
+        };
+        if gate < f32::MAX {
+            enter = enter.min(squared(braked(squared(gate), accel, length - periods * gate)));
+        } else if ends && enter < square {
+            self.tail -= 1;
+        }
+        enter = enter.min(square);
+        if let Some(cell) = self.cells.get_mut(index) {
+            (cell.square_all, cell.accel_all, cell.gate, cell.enter) = (square, accel, gate, enter);
+        }
+    }
+
+    /// The cell that a place is in, from this one on.
+    pub(crate) fn cell_at(&self, mut cell: u16, place: i64) -> u16 {
+        for _ in 0..CELLS_A_PERIOD {
+            let end = self.cell(cell).map_or(i64::MAX, |cell| i64::from(cell.end_nm) << QUANTA_BITS);
+            if cell + 1 >= self.count || place < end {
+                break;
+            }
+            cell += 1;
+        }
+        cell
+    }
+
+    /// Acceleration in a cell, quanta a period^2.
+    pub(crate) fn accel(&self, cell: u16) -> f32 {
+        self.cell(cell).map_or(0.0, |cell| cell.accel_all)
+    }
+
+    /// Greatest speed at a place, quanta a period: the cell's own, and such that what follows is kept.
+    pub(crate) fn ceiling(&self, index: u16, place: i64) -> f32 {
+        let Some(cell) = self.cell(index) else {
+            return 0.0;
+        };
+        let end = if index + 1 == self.count {
+            self.end
+        } else {
+            i64::from(cell.end_nm) << QUANTA_BITS
+        };
+        let room = as_f32(end - place);
+        let accel = cell.accel_all;
+        let brake = if index + 1 >= self.tail {
+            landing(accel, as_f32(self.end - place))
+        } else {
+            braked(self.leave(index), accel, room)
+        };
+        let mut speed = root(cell.square_all).min(brake);
+        let periods = f32::from(self.window);
+        if cell.gate < f32::MAX {
+            let zone = periods * cell.gate;
+            speed = speed.min(if room <= zone {
+                cell.gate
+            } else {
+                braked(squared(cell.gate), accel, room - zone)
+            });
+        }
+        let before = index.checked_sub(1).and_then(|before| self.cell(before));
+        match before {
+            Some(Cell { gate, end_nm, .. })
+                if *gate < f32::MAX && as_f32(place - (i64::from(*end_nm) << QUANTA_BITS)) <= periods * gate =>
+            {
+                speed.min(*gate)
+            }
+            _ => speed,
+        }
+    }
+
+    /// Square of the speed that a cell may be left with.
+    fn leave(&self, index: u16) -> f32 {
+        if index + 1 < self.count {
+            self.cell(index + 1).map_or(0.0, |after| after.enter)
+        } else {
+            0.0
+        }
+    }
+
+    /// Whether a speed can be kept from a place over so many quanta, and braking still is in time.
+    pub(crate) fn is_clear(&self, index: u16, place: i64, over: f32, speed: f32) -> bool {
+        let last = place + whole(over);
+        let square = squared(speed);
+        let mut at = index;
+        for _ in 0..REACH {
+            let Some(cell) = self.cell(at) else {
+                return false;
+            };
+            if at + 1 >= self.count || last < i64::from(cell.end_nm) << QUANTA_BITS {
+                return last < self.end && speed <= self.ceiling(at, last);
+            }
+            if square > self.leave(at) || speed > cell.gate {
+                return false;
+            }
+            at += 1;
+        }
+        false
+    }
+}
+
+#[allow(clippy::cast_precision_loss, reason = "within a cell; 24 bits are enough for a bound")]
+fn as_f32(quanta: i64) -> f32 {
+    quanta as f32
+}
+
+/// Arc between two stations, quanta.
+#[allow(clippy::cast_precision_loss, reason = "24 bits are enough for a bound")]
+fn between(from_nm: u32, to_nm: u32) -> f32 {
+    to_nm.saturating_sub(from_nm) as f32 * 1024.0
+}
+
+fn mm(quanta: i64) -> f32 {
+    as_f32(quanta) * (1.0 / QUANTA_PER_MM)
+}
+
+/// Quanta of a length in mm, in two parts so that none of its 24 bits is lost.
+pub(crate) fn quanta(mm: f32) -> i64 {
+    whole(mm * QUANTA_PER_MM)
+}
+
+#[allow(clippy::cast_possible_truncation, reason = "the cast saturates, and a NaN becomes 0")]
+fn whole(value: f32) -> i64 {
+    value as i64
+}
+
+/// The next whole number of periods, at least 1.
+#[allow(
+    clippy::cast_possible_truncation,
+    clippy::cast_sign_loss,
+    reason = "the cast saturates, and a NaN becomes 0"
+)]
+fn upwards(periods: f32) -> u8 {
+    let whole = periods as u8;
+    let more = if f32::from(whole) < periods { 1 } else { 0 };
+    whole.saturating_add(more).clamp(1, WINDOW_MAX)
+}

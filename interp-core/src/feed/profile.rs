@@ -1,0 +1,175 @@
+//! The jerk-limited feed, a step a period; see [`super`].
+
+use super::STEP_MAX;
+use super::plan::Plan;
+use crate::arith::sqrt;
+use crate::scalar::{float, real};
+
+/// Longest mean, periods: the ring's length less what the difference of accelerations needs.
+pub(crate) const WINDOW_MAX: u8 = 250;
+
+/// Progress along one path.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Profile {
+    /// Steps of the last periods, quanta, acceleration-limited; the next goes to `at`.
+    steps: [i32; 256],
+    at: u8,
+    /// Periods of the mean.
+    window: u8,
+    /// Cell of the plan that `lead` is in.
+    cell: u16,
+    /// Sum of the last steps, and the place that they led to, quanta.
+    sum: i64,
+    lead: i64,
+    /// The mean of the last places, and what its division left over.
+    place: i64,
+    rest: u32,
+}
+
+impl Profile {
+    /// At the start of nothing.
+    pub(crate) const START: Self = Self {
+        steps: [0; 256],
+        at: 0,
+        window: 1,
+        cell: 0,
+        sum: 0,
+        lead: 0,
+        place: 0,
+        rest: 0,
+    };
+
+    /// To the start of a path with this mean, from rest.
+    pub(crate) fn begin(&mut self, window: u8) {
+        *self = Self::START;
+        self.window = window.clamp(1, WINDOW_MAX);
+    }
+
+    /// Arc that the tool has come, quanta.
+    pub(crate) const fn place(&self) -> i64 {
+        self.place
+    }
+
+    /// Whether the tool stands, and will until a speed is wanted.
+    pub(crate) const fn is_at_rest(&self) -> bool {
+        self.sum == 0
+    }
+
+    /// Whether the path's end is reached, and the tool stands there.
+    pub(crate) const fn is_done(&self, plan: &Plan) -> bool {
+        self.lead >= plan.end && self.is_at_rest()
+    }
+
+    /// What is known better now of where the tool is: by so many quanta further along than it was taken to be.
+    pub(crate) const fn shift(&mut self, by: i64) {
+        self.lead += by;
+        self.place += by;
+    }
+
+    /// One period at this wanted speed, quanta a period; the quanta that the tool moves.
+    #[inline(never)]
+    pub(crate) fn tick(&mut self, plan: &Plan, wanted: f32) -> i32 {
+        let step = self.next(plan, wanted);
+        self.push(step)
+    }
+
+    /// The next acceleration-limited step.
+    fn next(&mut self, plan: &Plan, wanted: f32) -> i32 {
+        self.cell = plan.cell_at(self.cell, self.lead);
+        let at = |back: u8| as_f32(self.steps[usize::from(self.at.wrapping_sub(back))]);
+        let speed = at(1);
+        // The acceleration that leaves the mean with this step.
+        let leaves = at(self.window) - at(self.window.wrapping_add(1));
+        let accel = plan.accel(self.cell);
+        let least = (-accel).max(leaves - plan.swing);
+        let most = accel.min(leaves + plan.swing);
+        let goal = wanted.min(plan.ceiling(self.cell, self.lead)).min(STEP_MAX);
+        let mut change = goal - speed;
+        if change > 0.0 {
+            let faster = speed + change.min(most);
+            // Braking can begin only once the acceleration has left the mean: until then the speed stays.
+            let coast = faster * count(self.window);
+            if !plan.is_clear(self.cell, self.lead, coast + faster, faster) {
+                change = 0.0;
+            }
+        }
+        let change = change.min(most).max(least);
+        let step = rounded((speed + change).max(0.0));
+        let room = plan.end - self.lead;
+        if i64::from(step) >= room {
+            i32::try_from(room).unwrap_or(0).max(0)
+        } else {
+            step
+        }
+    }
+
+    /// Takes a step into the mean.
+    fn push(&mut self, step: i32) -> i32 {
+        let oldest = self.steps[usize::from(self.at.wrapping_sub(self.window))];
+        self.steps[usize::from(self.at)] = step;
+        self.at = self.at.wrapping_add(1);
+        self.lead += i64::from(step);
+        self.sum += i64::from(step) - i64::from(oldest);
+        let moved = self.divide();
+        self.place += i64::from(moved);
+        moved
+    }
+
+    /// The sum over the window, with what the last division left over. In two halves, because the chip divides 32 bits.
+    fn divide(&mut self) -> i32 {
+        let window = u32::from(self.window).max(1);
+        let sum = u64::try_from(self.sum).unwrap_or(0) + u64::from(self.rest);
+        let high = u32::try_from(sum >> 16).unwrap_or(u32::MAX);
+        let low = u32::try_from(sum & 0xffff).unwrap_or(0);
+        let (top, left) = (high / window, high % window);
+        let bottom = left << 16 | low;
+        self.rest = bottom % window;
+        i32::try_from(u64::from(top) << 16 | u64::from(bottom / window)).unwrap_or(0)
+    }
+}
+
+/// Greatest speed a period before a place where it has to have this square, at this many quanta from it: braking by `accel` each
+/// period, `v (v + accel) = square + 2 accel distance`.
+pub(crate) fn braked(square: f32, accel: f32, distance: f32) -> f32 {
+    let reach = square + 2.0 * accel * distance.max(0.0);
+    let half = 0.5 * accel;
+    let root = half + float(sqrt(real(half * half + reach)));
+    if root > 0.0 { reach / root } else { 0.0 }
+}
+
+/// Greatest step at this many quanta from a standstill, so that a whole number of periods follows, each slower by the same: N with
+/// `distance <= accel N (N + 1)/2`, and the first of steps that fall evenly to nothing in the period after the last.
+pub(crate) fn landing(accel: f32, distance: f32) -> f32 {
+    let distance = distance.max(0.0);
+    let periods = 0.5 * (float(sqrt(real(1.0 + 8.0 * distance / accel))) - 1.0);
+    2.0 * distance / (ceil(periods).max(1.0) + 1.0)
+}
+
+/// The next whole number; of a number that is whole within its last places, that one.
+#[allow(
+    clippy::cast_possible_truncation,
+    clippy::cast_precision_loss,
+    reason = "the cast saturates, a NaN becomes 0, and beyond 2^24 every number is whole"
+)]
+fn ceil(value: f32) -> f32 {
+    let whole = value as i32 as f32;
+    if value > whole + 1e-3 { whole + 1.0 } else { whole }
+}
+
+#[allow(clippy::cast_precision_loss, reason = "a step beyond 2^24 quanta, 16 um, needs no last digit")]
+const fn as_f32(step: i32) -> f32 {
+    step as f32
+}
+
+fn count(number: u8) -> f32 {
+    f32::from(number)
+}
+
+#[allow(clippy::cast_possible_truncation, reason = "the cast saturates, and a NaN becomes 0")]
+const fn rounded(step: f32) -> i32 {
+    (step + 0.5) as i32
+}
+
+#[cfg(not(feature = "count"))]
+#[cfg(test)]
+mod tests;
