@@ -55,8 +55,8 @@ impl Use {
 
 #[test]
 fn look() {
-    for name in ["plate", "plate_v", "freeform", "revolved_v", "ruled_reconstructed", "sphere_cap", "torus", "far_plate"] {
-        for feed in [1.0_f32, 10.0] {
+    for name in ["freeform","sphere_cap","plate","plate_v","ruled_reconstructed"] {
+        for feed in [1.0_f32, 4.0, 10.0] {
         let job = qemu::workspace().join(format!("jobs/{name}.toml"));
         let mut prepared = prepare(&JobFile::load(&job).unwrap()).unwrap();
         let mut core: Box<Interpolator> = Box::new(Interpolator::new());
@@ -87,7 +87,7 @@ fn look() {
         let (mut links, mut ticks) = (0, 0);
         let mut last_pass = 0;
         let mut sample = *core.tick(Request::Start);
-        while sample.state.is_under_way() && ticks < 20_000_000 {
+        while sample.state.is_under_way() && ticks < 2_000_000 {
             used.add(&sample, header.axes.as_ref().unwrap());
             ticks += 1;
             links += u32::from(sample.state == State::Linking);

@@ -48,7 +48,6 @@
     )
 )]
 
-#[cfg(any(test, feature = "count"))]
 extern crate std;
 
 mod across;

@@ -5,7 +5,7 @@
 
 use crate::across::{Across, Densities};
 use crate::fault::{Fault, FaultKind, Result};
-use crate::feed::demand::{JUMP_SHARE, Room, Stencil, over_jump, root, squared};
+use crate::feed::demand::{Jump, Room, Stencil, over_jump, root};
 use crate::feed::plan::{Plan, Top};
 use crate::feed::nm_to_mm;
 use crate::interval::interval;
@@ -26,12 +26,10 @@ const PARTS_MAX: u16 = 64;
 const NO_JUMP: f32 = 4e-6;
 /// Cells before a station that its differences say something about.
 const STENCIL_CELLS: usize = 2;
-/// Least z of the normal towards the tool where a surface counts as facing up: a ball that leaves it upwards goes away from it.
-pub(crate) const UP_MIN: f32 = 1e-3;
+/// Least z of the normal towards the tool where a surface counts as facing up, or sideways at most: 0, but for the noise of a normal.
+pub(crate) const UP_MIN: f32 = -2e-6;
 /// Greatest feed override, of 1.
 pub(crate) const OVERRIDE_MAX: f32 = 2.0;
-/// Least share of the jerk that the feed is left, whatever jumps.
-const JERK_LEFT: f32 = 0.1;
 
 /// One pass: its bounds, its ends, and what follows from it.
 #[derive(Clone, Debug)]
@@ -333,7 +331,8 @@ impl Lookahead {
             self.trail.slopes = (out.parts >= 2).then(|| self.trail.slopes(true));
             self.trail.values = [value; 3];
             if out.plan.count() > 0 {
-                hold(out, out.plan.count() - 1, [first, 0.0], &value, axes, top, &self.room);
+                let jump = Jump { first, second: [0.0; 2] };
+                self.hold(1, &jump, axes, top, out);
             }
             return;
         }
@@ -345,13 +344,21 @@ impl Lookahead {
             let here = self.trail.slopes(false);
             let shortest = self.trail.lengths[0].min(self.trail.lengths[1]).max(1e-9);
             let second = changed(&slopes, &here, 4.0 * NO_JUMP / shortest);
-            hold(out, out.plan.count() - 3, [0.0, second], &value, axes, top, &self.room);
+            let jump = Jump { first: [0.0; 2], second };
+            self.hold(3, &jump, axes, top, out);
         }
+    }
+
+    /// Holds the feed back at the end of a cell, so many back, where the path jumps.
+    fn hold(&self, back: u16, jump: &Jump, axes: &Axes, top: &Top, out: &mut PassPlan) {
+        let square = over_jump(jump, &self.stencil.cosines(), self.room.taken, axes, top.period_s);
+        out.plan.gate(out.plan.count().saturating_sub(back), square, top);
     }
 
     /// The pass is complete: the mean of its feed, its interval, and the next pass.
     fn close(&mut self, job: &Job<'_>, out: &mut PassPlan) -> Result<()> {
         out.plan.settle(&top(job));
+        if out.pass < 2 { std::eprintln!("{:?}", (out.plan.window, out.plan.swing, out.plan.end, out.plan.jerk_dbg())); }
         let header = job.header;
         out.interval = interval(self.densities.most);
         let step = match header.spacing {
@@ -399,20 +406,9 @@ fn check_height(axes: &Axes, [_, _, z]: &[i32; 3]) -> Result<()> {
     Ok(())
 }
 
-/// How far two pairs are apart, in all, beyond the noise of each.
-fn changed(from: &[f32; 2], to: &[f32; 2], noise: f32) -> f32 {
-    let apart = |(from, to): (&f32, &f32)| ((to - from).abs() - noise).max(0.0);
-    from.iter().zip(to).map(apart).sum()
-}
-
-/// Holds the feed back at the end of a cell, where q' and q'' jump by so much; what is left of the jerk there is the whole pass's.
-fn hold(out: &mut PassPlan, cell: u16, jump: [f32; 2], slope: &[f32; 2], axes: &Axes, top: &Top, room: &Room) {
-    let [first, second] = jump;
-    let square = over_jump(first, second, axes, top.period_s);
-    out.plan.gate(cell, square, top);
-    let [x, y, z] = axes.jerk_mm_s3;
-    let [along, twist] = *slope;
-    let taken = JUMP_SHARE * (squared(top.speed) / square).min(1.0) * x.min(y).min(z);
-    let rest = room.jerk - taken / (along.abs() + twist).max(0.1);
-    out.plan.keep_jerk(rest.max(JERK_LEFT * room.jerk));
+/// How far the parts of two pairs are apart, beyond the noise of each.
+fn changed(from: &[f32; 2], to: &[f32; 2], noise: f32) -> [f32; 2] {
+    let ([from0, from1], [to0, to1]) = (from, to);
+    let apart = |from: &f32, to: &f32| ((to - from).abs() - noise).max(0.0);
+    [apart(from0, to0), apart(from1, to1)]
 }

@@ -14,11 +14,13 @@ const BEND_SHARE: f32 = 0.8;
 /// Shares of an axis's jerk that bends may take: at a steady feed, and by a feed that changes in a bend.
 const STEADY_SHARE: f32 = 0.35;
 const CHANGE_SHARE: f32 = 0.15;
-/// Share of acceleration and jerk that a jump of the curvature may take, within one period.
-pub(crate) const JUMP_SHARE: f32 = 0.45;
+/// Share of the jerk that the feed may take where the path jumps.
+pub(crate) const ZONE_JERK: f32 = 0.1;
 /// What is not used of acceleration and jerk: the differences of a period are not the derivatives, nor the stations the path.
 const ACCEL_MARGIN: f32 = 0.995;
-const JERK_MARGIN: f32 = 0.97;
+const JERK_MARGIN: f32 = 0.99;
+/// Where the path bends: cutter locations are good to a nanometre or two, which a third difference makes eight times.
+const BEND_MARGIN: f32 = 0.93;
 /// A part of a path that no axis sees counts as so long, to be divided by.
 const SLOPE_MIN: f32 = 1e-6;
 /// Half a nanometre, mm: what a station may be off by.
@@ -33,6 +35,8 @@ pub(crate) struct Room {
     pub(crate) accel: f32,
     /// mm/s^3.
     pub(crate) jerk: f32,
+    /// Share of an axis's jerk that is taken at that speed and acceleration.
+    pub(crate) taken: f32,
 }
 
 impl Room {
@@ -41,6 +45,7 @@ impl Room {
         square: f32::MAX,
         accel: f32::MAX,
         jerk: f32::MAX,
+        taken: 0.0,
     };
 
     /// The lesser of each.
@@ -49,6 +54,7 @@ impl Room {
             square: self.square.min(other.square),
             accel: self.accel.min(other.accel),
             jerk: self.jerk.min(other.jerk),
+            taken: self.taken.max(other.taken),
         }
     }
 
@@ -84,6 +90,13 @@ impl Stencil {
         first: [0.0; 3],
         second: [0.0; 3],
     };
+
+    /// Direction of the last cell.
+    pub(crate) fn cosines(&self) -> [f32; 3] {
+        let [x, y, z] = self.first;
+        let inverse = 1.0 / root(x * x + y * y + z * z).max(SLOPE_MIN);
+        self.first.map(|d| d * inverse)
+    }
 
     /// The first station of a path.
     pub(crate) const fn begin(&mut self, centre_nm: [i32; 3]) {
@@ -142,37 +155,50 @@ fn room(bends: &[[f32; 3]; 3], axes: &Axes, top: &Top) -> Room {
         // The chord of a period: curvature (v T)^2 / 8.
         square = square.min(8.0 * axes.chord_mm / (root(curvature) * squared(top.period_s)));
     }
+    let margin = if curvature > 0.0 { BEND_MARGIN } else { JERK_MARGIN };
     let speed = root(square);
     let (mut accel, mut jerk) = (f32::MAX, f32::MAX);
     for (((_, a), j), [d1, d2, d3]) in limits().zip(bends) {
         let slope = 1.0 / d1.max(SLOPE_MIN);
         accel = accel.min((ACCEL_MARGIN * a - d2 * square) * slope);
         accel = accel.min(CHANGE_SHARE * j / (3.0 * d2 * speed).max(1e-9));
-        jerk = jerk.min((JERK_MARGIN * j - d3 * square * speed) * slope);
+        jerk = jerk.min((margin * j - d3 * square * speed) * slope);
     }
     // Once more, now that the acceleration is known.
+    let mut most = 0.0_f32;
     for (((_, _), j), [d1, d2, d3]) in limits().zip(bends) {
         let taken = d3 * square * speed + 3.0 * d2 * speed * accel;
-        jerk = jerk.min((JERK_MARGIN * j - taken) / d1.max(SLOPE_MIN));
+        jerk = jerk.min((margin * j - taken) / d1.max(SLOPE_MIN));
+        most = most.max(taken / j);
     }
-    Room { square, accel, jerk }
+    Room { square, accel, jerk, taken: most }
 }
 
-/// Greatest square of the speed at a place where q' jumps by `first` (a jump of the curvature times the ball's radius) and q'' by `second`
-/// (1/mm), which an axis sees as a jump of the velocity and of the acceleration from one period to the next.
-pub(crate) fn over_jump(first: f32, second: f32, axes: &Axes, period_s: f32) -> f32 {
-    let least = |limits: &[f32; 3]| {
-        let [x, y, z] = *limits;
-        x.min(y).min(z)
-    };
-    let (accel, jerk) = (least(&axes.acceleration_mm_s2), least(&axes.jerk_mm_s3));
+/// A jump of the path from one patch to the next: of the derivatives of 1 - r k and of r times the twist, along the path and across it.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Jump {
+    /// Of q' itself, 1.
+    pub(crate) first: [f32; 2],
+    /// Of q'', 1/mm.
+    pub(crate) second: [f32; 2],
+}
+
+/// Greatest square of the speed over a jump, which an axis sees as one of its velocity and its acceleration from one period to the next.
+/// `cosines`: the path's direction. `taken`: share of the jerk that the bend takes.
+pub(crate) fn over_jump(jump: &Jump, cosines: &[f32; 3], taken: f32, axes: &Axes, period_s: f32) -> f32 {
+    let share = (BEND_MARGIN - ZONE_JERK - taken).max(0.0);
     let mut square = f32::MAX;
-    if first > 0.0 {
-        let speed = (accel.min(jerk * period_s) * period_s * JUMP_SHARE) / first;
-        square = squared(speed);
-    }
-    if second > 0.0 {
-        square = square.min(JUMP_SHARE * jerk * period_s / second);
+    for ((a, j), cosine) in axes.acceleration_mm_s2.iter().zip(&axes.jerk_mm_s3).zip(cosines) {
+        let along = cosine.abs();
+        let across = root(1.0 - squared(along));
+        let on_axis = |[on, off]: [f32; 2]| along * on + across * off;
+        let (first, second) = (on_axis(jump.first), on_axis(jump.second));
+        if first > 0.0 {
+            square = square.min(squared(share * a.min(j * period_s) * period_s / first));
+        }
+        if second > 0.0 {
+            square = square.min(share * j * period_s / second);
+        }
     }
     square
 }

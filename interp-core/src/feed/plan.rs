@@ -3,7 +3,7 @@
 //! A path is cut into cells by stations. [`Plan::begin`], [`Plan::add`] with each station in turn, [`Plan::settle`] once, then [`Plan::work`]
 //! until it says that it is done: each of these is a fixed portion of work.
 
-use super::demand::{Room, cube_root, root, squared};
+use super::demand::{Room, ZONE_JERK, cube_root, root, squared};
 use super::profile::{WINDOW_MAX, braked, landing};
 use super::{QUANTA_BITS, QUANTA_PER_MM, STEP_MAX};
 
@@ -15,6 +15,10 @@ const REACH: usize = 16;
 
 /// Cells that are worked on at a time.
 const PORTION: usize = 2;
+
+/// Share of the greatest change of the acceleration that the feed is left near a jump: it comes twice, when it begins and when it leaves
+/// the mean.
+const ZONE_SHARE: f32 = 0.5 * ZONE_JERK;
 
 /// Cells that a period may pass.
 const CELLS_A_PERIOD: u8 = 4;
@@ -105,6 +109,8 @@ impl Plan {
         self.end = 0;
     }
 
+    pub(crate) fn jerk_dbg(&self) -> (f32, f32, f32) { (self.least, self.accel, self.square) }
+    pub(crate) fn cell_dbg(&self, i: u16) -> [f32; 8] { let c = self.cell(i).unwrap(); [c.end_nm as f32, c.square, c.accel, c.square_all, c.accel_all, c.gate, c.enter, f32::from(self.tail)] }
     /// Cells so far.
     pub(crate) const fn count(&self) -> u16 {
         self.count
@@ -150,8 +156,7 @@ impl Plan {
         }
     }
 
-    /// A bound of the square of the speed, (mm/s)^2, at the end of a cell, where the path jumps. It takes this much of the jerk that is
-    /// left, of 1.
+    /// A bound of the square of the speed, (mm/s)^2, at the end of a cell, where the path jumps.
     pub(crate) fn gate(&mut self, cell: u16, square: f32, top: &Top) {
         if square >= squared(top.speed) {
             return;
@@ -159,11 +164,6 @@ impl Plan {
         if let Some(cell) = self.cells.get_mut(usize::from(cell)) {
             cell.gate = cell.gate.min(root(square) * top.period_s * QUANTA_PER_MM);
         }
-    }
-
-    /// Less jerk for the feed along the whole path: no more than this, mm/s^3.
-    pub(crate) const fn keep_jerk(&mut self, rest: f32) {
-        self.least = self.least.min(rest);
     }
 
     /// The path is complete: chooses the mean. Its length is that of the fastest way from rest to rest over the whole path
@@ -234,9 +234,13 @@ impl Plan {
         let length = between(start_nm, cell.end_nm);
         let mut gate = cell.gate;
         if gate < f32::MAX {
-            // Within n c to each side, which the cells have room for.
-            let next = self.cells.get(index + 1).map_or(length, |next| between(cell.end_nm, next.end_nm));
-            gate = gate.min(length.min(next) / periods);
+            // Within n c to each side, which the cells have room for; and the feed hardly changes there, so that what follows has to be
+            // kept from its end on.
+            if let Some(next) = self.cells.get(index + 1) {
+                let beyond = between(cell.end_nm, next.end_nm);
+                gate = gate.min(length.min(beyond) / periods);
+                gate = gate.min(self.brake_in(index + 1, beyond - periods * gate));
+            }
         }
         let next = self.cells.get(index + 1).filter(|_| index + 1 < usize::from(self.count));
         let ends = usize::from(self.tail) == index + 1;
@@ -258,6 +262,20 @@ impl Plan {
         }
     }
 
+    /// Greatest speed in a cell, so many quanta before its end, for what follows it.
+    fn brake_in(&self, index: usize, room: f32) -> f32 {
+        let Some(cell) = self.cells.get(index) else {
+            return 0.0;
+        };
+        let leave = self.cells.get(index + 1).filter(|_| index + 1 < usize::from(self.count));
+        let mut speed = braked(leave.map_or(0.0, |leave| leave.enter), cell.accel_all, room);
+        if cell.gate < f32::MAX {
+            let before = room - f32::from(self.window) * cell.gate;
+            speed = speed.min(braked(squared(cell.gate), cell.accel_all, before));
+        }
+        speed
+    }
+
     /// The cell that a place is in, from this one on.
     pub(crate) fn cell_at(&self, mut cell: u16, place: i64) -> u16 {
         for _ in 0..CELLS_A_PERIOD {
@@ -270,9 +288,28 @@ impl Plan {
         cell
     }
 
-    /// Acceleration in a cell, quanta a period^2.
-    pub(crate) fn accel(&self, cell: u16) -> f32 {
-        self.cell(cell).map_or(0.0, |cell| cell.accel_all)
+    /// Acceleration at a place, quanta a period^2: the cell's; near a jump little, so that the jerk is left to the jump.
+    pub(crate) fn accel(&self, index: u16, place: i64) -> f32 {
+        let Some(cell) = self.cell(index) else {
+            return 0.0;
+        };
+        if self.is_in_zone(index, place) {
+            cell.accel_all.min(ZONE_SHARE * self.swing)
+        } else {
+            cell.accel_all
+        }
+    }
+
+    /// Whether a place is within the window's reach of a jump at one of its cell's ends.
+    fn is_in_zone(&self, index: u16, place: i64) -> bool {
+        let periods = f32::from(self.window);
+        let near = |cell: Option<&Cell>| {
+            cell.is_some_and(|cell| {
+                let apart = as_f32((i64::from(cell.end_nm) << QUANTA_BITS) - place);
+                cell.gate < f32::MAX && apart.abs() <= periods * cell.gate
+            })
+        };
+        near(self.cell(index)) || near(index.checked_sub(1).and_then(|before| self.cell(before)))
     }
 
     /// Greatest speed at a place, quanta a period: the cell's own, and such that what follows is kept.

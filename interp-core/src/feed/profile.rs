@@ -8,6 +8,15 @@ use crate::scalar::{float, real};
 /// Longest mean, periods: the ring's length less what the difference of accelerations needs.
 pub(crate) const WINDOW_MAX: u8 = 250;
 
+/// Share of the greatest change of the acceleration that is little.
+const CREEP_SHARE: f32 = 1.0 / 16.0;
+
+/// Periods of the greatest acceleration up to which a speed is slow, and that are looked ahead then.
+const CREEP_PERIODS: f32 = 2.0;
+
+/// Step that is always taken, quanta: what corrections of a nanometre leave at the end has to be gone, too.
+const STEP_LEAST: f32 = 2048.0;
+
 /// Progress along one path.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Profile {
@@ -55,6 +64,7 @@ impl Profile {
         self.sum == 0
     }
 
+    pub(crate) fn dbg(&self, plan: &Plan) -> (i64, i64, i64, i64, u16, f32, f32, [f32;8]) { (self.lead, self.place, plan.end, self.sum, self.cell, plan.accel(self.cell, self.lead), plan.ceiling(self.cell, self.lead), plan.cell_dbg(self.cell)) }
     /// Whether the path's end is reached, and the tool stands there.
     pub(crate) const fn is_done(&self, plan: &Plan) -> bool {
         self.lead >= plan.end && self.is_at_rest()
@@ -80,7 +90,7 @@ impl Profile {
         let speed = at(1);
         // The acceleration that leaves the mean with this step.
         let leaves = at(self.window) - at(self.window.wrapping_add(1));
-        let accel = plan.accel(self.cell);
+        let accel = plan.accel(self.cell, self.lead);
         let least = (-accel).max(leaves - plan.swing);
         let most = accel.min(leaves + plan.swing);
         let goal = wanted.min(plan.ceiling(self.cell, self.lead)).min(STEP_MAX);
@@ -90,16 +100,32 @@ impl Profile {
             // Braking can begin only once the acceleration has left the mean: until then the speed stays.
             let coast = faster * count(self.window);
             if !plan.is_clear(self.cell, self.lead, coast + faster, faster) {
-                change = 0.0;
+                change = self.creep(plan, speed, change);
             }
         }
         let change = change.min(most).max(least);
-        let step = rounded((speed + change).max(0.0));
+        let mut step = rounded((speed + change).max(0.0));
+        if step == 0 && wanted > 0.0 {
+            step = rounded(STEP_LEAST.min(wanted));
+        }
         let room = plan.end - self.lead;
         if i64::from(step) >= room {
             i32::try_from(room).unwrap_or(0).max(0)
         } else {
             step
+        }
+    }
+
+    /// A small acceleration where a whole one would have to be waited for, so that the tool never stands before a narrow place: what it
+    /// takes of the braking is small, too.
+    fn creep(&self, plan: &Plan, speed: f32, change: f32) -> f32 {
+        let little = change.min(plan.swing * CREEP_SHARE);
+        let faster = speed + little;
+        let is_slow = speed <= CREEP_PERIODS * plan.accel(self.cell, self.lead);
+        if is_slow && plan.is_clear(self.cell, self.lead, CREEP_PERIODS * faster, faster) {
+            little
+        } else {
+            0.0
         }
     }
 

@@ -88,7 +88,7 @@ fn look() {
     let plan = plan(&[(0.01, room)], 1.0);
     let mut profile = Profile::START;
     profile.begin(plan.window);
-    std::println!("window {} swing {} accel {}", plan.window, plan.swing, plan.accel(0));
+    std::println!("window {} swing {} accel {}", plan.window, plan.swing, plan.accel(0, 0));
     for _ in 0..60 {
         let c = plan.ceiling(0, profile.lead);
         let m = profile.tick(&plan, T as f32 * QUANTA_PER_MM);
