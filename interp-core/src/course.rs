@@ -253,7 +253,6 @@ impl Course {
             !run.is_along()
         } else {
             let moved = self.profile.tick(&now.plan, share * period);
-            if last.tick > 90_000 && last.tick < 90_005 { std::eprintln!("{moved} {:?}", self.profile.dbg(&now.plan)); }
             if self.profile.is_done(&now.plan) {
                 run.finish_pass(job, last)?;
                 true

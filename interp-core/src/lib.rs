@@ -48,6 +48,7 @@
     )
 )]
 
+#[cfg(any(test, feature = "count"))]
 extern crate std;
 
 mod across;

@@ -358,7 +358,6 @@ impl Lookahead {
     /// The pass is complete: the mean of its feed, its interval, and the next pass.
     fn close(&mut self, job: &Job<'_>, out: &mut PassPlan) -> Result<()> {
         out.plan.settle(&top(job));
-        if out.pass < 2 { std::eprintln!("{:?}", (out.plan.window, out.plan.swing, out.plan.end, out.plan.jerk_dbg())); }
         let header = job.header;
         out.interval = interval(self.densities.most);
         let step = match header.spacing {

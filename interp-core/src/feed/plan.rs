@@ -20,6 +20,9 @@ const PORTION: usize = 2;
 /// the mean.
 const ZONE_SHARE: f32 = 0.5 * ZONE_JERK;
 
+/// Speed that a cell counts with at least, mm/s.
+const SPEED_MIN: f32 = 1e-3;
+
 /// Cells that a period may pass.
 const CELLS_A_PERIOD: u8 = 4;
 
@@ -72,10 +75,10 @@ pub(crate) struct Plan {
     left: u16,
     /// From this cell on, all braking is for the end.
     tail: u16,
-    /// Least jerk along the path, mm/s^3; greatest acceleration, mm/s^2, and square of the speed.
+    /// Least jerk along the path, mm/s^3; greatest acceleration, mm/s^2; time at the cells' own speeds, s.
     least: f32,
     accel: f32,
-    square: f32,
+    time: f32,
     /// Length, quanta.
     pub(crate) end: i64,
     /// Greatest change of the acceleration within the mean, quanta a period^2.
@@ -93,7 +96,7 @@ impl Plan {
         tail: 0,
         least: f32::MAX,
         accel: 0.0,
-        square: 0.0,
+        time: 0.0,
         end: 0,
         swing: 0.0,
         window: 1,
@@ -105,12 +108,10 @@ impl Plan {
         self.left = 0;
         self.least = f32::MAX;
         self.accel = 0.0;
-        self.square = 0.0;
+        self.time = 0.0;
         self.end = 0;
     }
 
-    pub(crate) fn jerk_dbg(&self) -> (f32, f32, f32) { (self.least, self.accel, self.square) }
-    pub(crate) fn cell_dbg(&self, i: u16) -> [f32; 8] { let c = self.cell(i).unwrap(); [c.end_nm as f32, c.square, c.accel, c.square_all, c.accel_all, c.gate, c.enter, f32::from(self.tail)] }
     /// Cells so far.
     pub(crate) const fn count(&self) -> u16 {
         self.count
@@ -135,7 +136,7 @@ impl Plan {
         self.end += quanta(length);
         self.least = self.least.min(room.jerk);
         self.accel = self.accel.max(room.accel);
-        self.square = self.square.max(room.square);
+        self.time += length / root(room.square).min(top.usual).max(SPEED_MIN);
         let scale = top.period_s * QUANTA_PER_MM;
         let square = squared((root(room.square) * scale).min(STEP_MAX));
         let accel = room.accel * top.period_s * scale;
@@ -167,11 +168,12 @@ impl Plan {
     }
 
     /// The path is complete: chooses the mean. Its length is that of the fastest way from rest to rest over the whole path
-    /// (acceleration, speed and arc as they are): `A/J`, `sqrt(v/J)` or `cbrt(s/(2 J))`, whichever is least.
+    /// (acceleration, speed and arc as they are): `A/J`, `sqrt(v/J)` or `cbrt(s/(2 J))`, whichever is least. Where the speed varies, its
+    /// mean over time counts.
     pub(crate) fn settle(&mut self, top: &Top) {
         let jerk = self.least;
-        let speed = root(self.square).min(top.usual);
         let arc = mm(self.end);
+        let speed = arc / self.time.max(top.period_s);
         let time = (self.accel / jerk).min(root(speed / jerk)).min(cube_root(0.5 * arc / jerk));
         self.window = upwards(time / top.period_s);
         let periods = f32::from(self.window);

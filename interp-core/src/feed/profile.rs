@@ -64,7 +64,6 @@ impl Profile {
         self.sum == 0
     }
 
-    pub(crate) fn dbg(&self, plan: &Plan) -> (i64, i64, i64, i64, u16, f32, f32, [f32;8]) { (self.lead, self.place, plan.end, self.sum, self.cell, plan.accel(self.cell, self.lead), plan.ceiling(self.cell, self.lead), plan.cell_dbg(self.cell)) }
     /// Whether the path's end is reached, and the tool stands there.
     pub(crate) const fn is_done(&self, plan: &Plan) -> bool {
         self.lead >= plan.end && self.is_at_rest()

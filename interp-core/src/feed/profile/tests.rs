@@ -81,17 +81,3 @@ fn straight_paths_take_the_optimal_time() {
     }
     std::println!("worst {worst}");
 }
-
-#[test]
-fn look() {
-    let room = Room { square: 1.0, accel: 200.0, jerk: 5e3 };
-    let plan = plan(&[(0.01, room)], 1.0);
-    let mut profile = Profile::START;
-    profile.begin(plan.window);
-    std::println!("window {} swing {} accel {}", plan.window, plan.swing, plan.accel(0, 0));
-    for _ in 0..60 {
-        let c = plan.ceiling(0, profile.lead);
-        let m = profile.tick(&plan, T as f32 * QUANTA_PER_MM);
-        std::println!("{} step {} moved {} ceiling {c} left {}", profile.at, profile.steps[usize::from(profile.at - 1)], m, plan.end - profile.lead);
-    }
-}
