@@ -55,8 +55,8 @@ impl Use {
 
 #[test]
 fn look() {
-    for name in ["freeform","revolved","torus"] {
-        for feed in [1.0_f32, 4.0] {
+    for name in ["freeform"] {
+        for feed in [1.0_f32, 2.0, 4.0] {
         let job = qemu::workspace().join(format!("jobs/{name}.toml"));
         let mut prepared = prepare(&JobFile::load(&job).unwrap()).unwrap();
         let mut core: Box<Interpolator> = Box::new(Interpolator::new());

@@ -20,6 +20,9 @@ const PORTION: usize = 2;
 /// the mean.
 const ZONE_SHARE: f32 = 0.5 * ZONE_JERK;
 
+/// Lengths of the mean that are tried.
+const TRIES: u8 = 5;
+
 /// Speed that a cell counts with at least, mm/s.
 const SPEED_MIN: f32 = 1e-3;
 
@@ -48,7 +51,8 @@ struct Cell {
     /// The same with what neighbours ask.
     square_all: f32,
     accel_all: f32,
-    /// Greatest speed at the cell's end, where the path jumps: within so many periods of it.
+    /// Greatest speed at the cell's end, where the path jumps, and what of it is used: within the periods of the mean.
+    jump: f32,
     gate: f32,
     /// Square of the greatest speed at the cell's start from which all that follows can be kept.
     enter: f32,
@@ -61,9 +65,20 @@ impl Cell {
         accel: 0.0,
         square_all: 0.0,
         accel_all: 0.0,
+        jump: f32::MAX,
         gate: f32::MAX,
         enter: 0.0,
     };
+}
+
+/// What is being worked on.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Stage {
+    /// Bounds, from the end backwards.
+    Bounds,
+    /// The time that they allow, forwards.
+    Time,
+    Done,
 }
 
 /// Bounds of the feed along a path.
@@ -71,8 +86,17 @@ impl Cell {
 pub(crate) struct Plan {
     cells: [Cell; CELLS_MAX],
     count: u16,
+    stage: Stage,
     /// Cells that are still to be worked on.
     left: u16,
+    /// Lengths of the mean that are still to be tried, and the best of those that were, with its time.
+    tries: u8,
+    longest: u8,
+    best: (f32, u8),
+    /// Speed at the start of the cell whose time is taken next, quanta a period; whether it was rising; periods so far.
+    speed: f32,
+    rises: bool,
+    elapsed: f32,
     /// From this cell on, all braking is for the end.
     tail: u16,
     /// Least jerk along the path, mm/s^3; greatest acceleration, mm/s^2; time at the cells' own speeds, s.
@@ -81,7 +105,8 @@ pub(crate) struct Plan {
     time: f32,
     /// Length, quanta.
     pub(crate) end: i64,
-    /// Greatest change of the acceleration within the mean, quanta a period^2.
+    /// Greatest change of the acceleration in a period, and within the mean, quanta a period^2.
+    change: f32,
     pub(crate) swing: f32,
     /// Periods of the mean.
     pub(crate) window: u8,
@@ -92,12 +117,20 @@ impl Plan {
     pub(crate) const NONE: Self = Self {
         cells: [Cell::NONE; CELLS_MAX],
         count: 0,
+        stage: Stage::Done,
         left: 0,
+        tries: 0,
+        longest: 1,
+        best: (f32::MAX, 1),
+        speed: 0.0,
+        rises: false,
+        elapsed: 0.0,
         tail: 0,
         least: f32::MAX,
         accel: 0.0,
         time: 0.0,
         end: 0,
+        change: 0.0,
         swing: 0.0,
         window: 1,
     };
@@ -106,6 +139,7 @@ impl Plan {
     pub(crate) const fn begin(&mut self) {
         self.count = 0;
         self.left = 0;
+        self.stage = Stage::Done;
         self.least = f32::MAX;
         self.accel = 0.0;
         self.time = 0.0;
@@ -163,7 +197,7 @@ impl Plan {
             return;
         }
         if let Some(cell) = self.cells.get_mut(usize::from(cell)) {
-            cell.gate = cell.gate.min(root(square) * top.period_s * QUANTA_PER_MM);
+            cell.jump = cell.jump.min(root(square) * top.period_s * QUANTA_PER_MM);
         }
     }
 
@@ -175,23 +209,96 @@ impl Plan {
         let arc = mm(self.end);
         let speed = arc / self.time.max(top.period_s);
         let time = (self.accel / jerk).min(root(speed / jerk)).min(cube_root(0.5 * arc / jerk));
-        self.window = upwards(time / top.period_s);
-        let periods = f32::from(self.window);
-        self.swing = jerk * periods * squared(top.period_s) * top.period_s * QUANTA_PER_MM;
+        self.longest = upwards(time / top.period_s);
+        self.change = jerk * squared(top.period_s) * top.period_s * QUANTA_PER_MM;
+        self.best = (f32::MAX, self.longest);
+        // With a single cell nothing is to be traded.
+        self.tries = if self.count > 1 { TRIES } else { 0 };
+        self.take(self.longest);
+    }
+
+    /// Begins anew with a mean of so many periods.
+    fn take(&mut self, window: u8) {
+        self.window = window;
+        self.swing = self.change * f32::from(window);
+        self.stage = Stage::Bounds;
         self.left = self.count;
         self.tail = self.count;
     }
 
     /// One portion; whether there is nothing left to do.
+    ///
+    /// A long mean allows a high acceleration, and a short one rides closer to what is narrow: which is faster is tried.
     pub(crate) fn work(&mut self) -> bool {
         for _ in 0..PORTION {
-            let Some(cell) = self.left.checked_sub(1) else {
-                return true;
-            };
-            self.left = cell;
-            self.bound(usize::from(cell));
+            match self.stage {
+                Stage::Done => return true,
+                Stage::Bounds => match self.left.checked_sub(1) {
+                    Some(cell) => {
+                        self.left = cell;
+                        self.bound(usize::from(cell));
+                    }
+                    None if self.tries > 0 => {
+                        self.stage = Stage::Time;
+                        (self.speed, self.rises, self.elapsed) = (0.0, false, f32::from(self.window));
+                    }
+                    None => self.stage = Stage::Done,
+                },
+                Stage::Time if self.left < self.count => {
+                    self.pass_cell(self.left);
+                    self.left += 1;
+                }
+                Stage::Time => self.judge(),
+            }
         }
-        self.left == 0
+        self.stage == Stage::Done
+    }
+
+    /// The time of a try is known: the next one, or the best.
+    fn judge(&mut self) {
+        let (least, _) = self.best;
+        if self.elapsed < least {
+            self.best = (self.elapsed, self.window);
+        }
+        self.tries -= 1;
+        let (_, best) = self.best;
+        if self.tries > 0 {
+            // 3/4, 1/2, 3/8, 1/4 of the longest.
+            let parts = [2_u16, 3, 4, 6].get(usize::from(self.tries) - 1).copied().unwrap_or(8);
+            let window = u16::from(self.longest) * parts / 8;
+            self.take(u8::try_from(window.max(1)).unwrap_or(1));
+        } else if best == self.window {
+            self.stage = Stage::Done;
+        } else {
+            self.take(best);
+        }
+    }
+
+    /// Periods that a cell takes, near enough to compare: faster as it may, slower as it must; the speed that it is left with.
+    fn pass_cell(&mut self, index: u16) {
+        let Some(&cell) = self.cell(index) else {
+            return;
+        };
+        let periods = f32::from(self.window);
+        let length = between(self.start_nm(index), cell.end_nm);
+        let accel = cell.accel_all.max(1.0);
+        let enter = squared(self.speed).min(cell.enter);
+        let leave = self.leave(index).min(squared(cell.gate)).min(enter + 2.0 * accel * length);
+        let peak = cell.square_all.min(0.5 * (enter + leave) + accel * length);
+        let [enter, leave, peak] = [enter, leave, peak].map(root);
+        let ramps = (2.0 * squared(peak) - squared(enter) - squared(leave)) / (2.0 * accel);
+        self.elapsed += (2.0 * peak - enter - leave) / accel + (length - ramps).max(0.0) / peak.max(1.0);
+        if cell.gate < f32::MAX {
+            // The way through its zone, instead of at the cell's speed.
+            self.elapsed += 2.0 * periods * (1.0 - cell.gate / peak.max(cell.gate));
+        }
+        let rises = leave > enter;
+        if self.rises && !rises {
+            // From faster to slower there is a wait for the mean.
+            self.elapsed += 0.5 * periods;
+        }
+        self.rises = rises;
+        self.speed = leave;
     }
 
     /// Bounds of a cell, those of all after it known.
@@ -234,7 +341,7 @@ impl Plan {
         }
         square = square.min(squared(after.min(before) / periods));
         let length = between(start_nm, cell.end_nm);
-        let mut gate = cell.gate;
+        let mut gate = cell.jump;
         if gate < f32::MAX {
             // Within n c to each side, which the cells have room for; and the feed hardly changes there, so that what follows has to be
             // kept from its end on.

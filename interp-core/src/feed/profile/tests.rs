@@ -57,7 +57,7 @@ fn straight_paths_take_the_optimal_time() {
         for v in [1.0, 10.0, 50.0, 150.0] {
             for a in [200.0, 1000.0, 5000.0] {
                 for j in [5e3, 2e4, 2e5] {
-                    let room = Room { square: (v * v) as f32, accel: a as f32, jerk: j as f32 };
+                    let room = Room { square: (v * v) as f32, accel: a as f32, jerk: j as f32, taken: 0.0 };
                     let plan = plan(&[(s as f32, room)], v as f32);
                     let mut steps = Vec::new();
                     let ticks = run(&plan, v as f32, |_, step| steps.push(step));
