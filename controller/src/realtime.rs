@@ -170,7 +170,10 @@ impl Control {
 
 /// Whether the tool moves, so that each sample is one of the run.
 const fn moves(state: State) -> bool {
-    matches!(state, State::Running | State::Linking | State::Holding | State::Stopping)
+    matches!(
+        state,
+        State::Running | State::Linking | State::Holding | State::Stopping
+    )
 }
 
 /// The real-time half of the board. `S`: the job store, see [`Interpolator`].

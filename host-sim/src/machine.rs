@@ -39,7 +39,7 @@ impl Machine {
         loop {
             let sample = self.core.tick(request);
             request = Request::None;
-            if sample.state != State::Running {
+            if !matches!(sample.state, State::Running | State::Linking) {
                 break;
             }
             if !each(sample) {

@@ -1,6 +1,6 @@
 //! Follows a stream of samples: counts, measures against the oracle, writes the trace.
 
-use interp_core::Sample;
+use interp_core::{Place, Sample, State};
 
 use crate::oracle::{Checked, Emitted, Oracle, Report, Verifier};
 use crate::prepare::Prepared;
@@ -66,6 +66,12 @@ pub struct Survey<'a> {
     interval_min: f64,
 }
 
+/// Whether a sample is one of a pass, and not of the way between two.
+#[must_use]
+pub fn is_on_pass(sample: &Sample) -> bool {
+    sample.state != State::Linking && sample.path != Place::NONE
+}
+
 impl<'a> Survey<'a> {
     /// A follower of a run of this job; it writes the trace, if there is one, and hands every sample on to `each`, with
     /// what its check found.
@@ -96,6 +102,17 @@ impl<'a> Survey<'a> {
     /// # Errors
     /// The trace cannot be written.
     pub fn add(&mut self, sample: &Sample) -> std::io::Result<()> {
+        self.samples += 1;
+        let on_pass = is_on_pass(sample);
+        if let Some(trace) = &mut self.trace {
+            let parameters = on_pass.then(|| self.prepared.parameters(sample.path, sample.side));
+            trace.write(sample, parameters)?;
+        }
+        let stands =
+            |before: &Pending| before.sample.pass == sample.pass && before.sample.path == sample.path;
+        if !on_pass || self.pending.as_ref().is_some_and(stands) {
+            return Ok(());
+        }
         let first = match self.pending {
             Some(before) => {
                 let over = before.sample.pass != sample.pass;
@@ -104,11 +121,7 @@ impl<'a> Survey<'a> {
             }
             None => true,
         };
-        self.samples += 1;
         self.interval_min = self.interval_min.min(sample.interval().into());
-        if let Some(trace) = &mut self.trace {
-            trace.write(sample, self.prepared.parameters(sample.path, sample.side))?;
-        }
         self.pending = Some(Pending {
             sample: *sample,
             first,

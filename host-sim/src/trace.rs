@@ -31,7 +31,8 @@ struct Row {
     tick: u64,
     state: &'static str,
     pass: u32,
-    parameters: [f64; 2],
+    /// None between passes, where there is no contact either.
+    parameters: Option<[f64; 2]>,
     feed_mm_s: String,
     cc_nm: [i32; 3],
     cl_nm: [i32; 3],
@@ -55,11 +56,11 @@ impl Trace {
         Ok(Self { writer, period_us })
     }
 
-    /// Writes a sample's row.
+    /// Writes a sample's row; `parameters` of a sample on a pass.
     ///
     /// # Errors
     /// The file cannot be written.
-    pub fn write(&mut self, sample: &Sample, parameters: [f64; 2]) -> io::Result<()> {
+    pub fn write(&mut self, sample: &Sample, parameters: Option<[f64; 2]>) -> io::Result<()> {
         self.row(&Row {
             tick: sample.tick.into(),
             state: sample.state.name(),
@@ -68,7 +69,7 @@ impl Trace {
             feed_mm_s: sample.feed_mm_s.to_string(),
             cc_nm: sample.cc_nm,
             cl_nm: sample.cl_nm,
-            interval: finite(sample.interval()),
+            interval: parameters.and_then(|_| finite(sample.interval())),
         })
     }
 
@@ -81,7 +82,7 @@ impl Trace {
             tick: emitted.tick,
             state: State::Running.name(),
             pass: emitted.pass,
-            parameters: [emitted.u, emitted.v],
+            parameters: Some([emitted.u, emitted.v]),
             feed_mm_s: emitted.feed_mm_s.to_string(),
             cc_nm: emitted.cc_nm,
             cl_nm: emitted.cl_nm,
@@ -90,9 +91,14 @@ impl Trace {
     }
 
     fn row(&mut self, row: &Row) -> io::Result<()> {
-        let [cc_x, cc_y, cc_z] = row.cc_nm.map(millimetres);
+        let on_pass = row.parameters.is_some();
+        let [cc_x, cc_y, cc_z] = row
+            .cc_nm
+            .map(|nm| if on_pass { millimetres(nm) } else { String::new() });
         let [cl_x, cl_y, cl_z] = row.cl_nm;
-        let [u, v] = row.parameters;
+        let [u, v] = row
+            .parameters
+            .map_or([const { String::new() }; 2], |pair| pair.map(digits));
         #[allow(clippy::cast_precision_loss, reason = "below 2^53")]
         let time_s = row.tick as f64 * self.period_us * 1e-6;
         let fields = [
@@ -100,8 +106,8 @@ impl Trace {
             format!("{time_s:.6}"),
             row.state.to_owned(),
             row.pass.to_string(),
-            digits(u),
-            digits(v),
+            u,
+            v,
             row.feed_mm_s.clone(),
             cc_x,
             cc_y,

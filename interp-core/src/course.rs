@@ -149,7 +149,11 @@ impl Course {
     pub(crate) fn leave(&mut self, run: &Run) {
         let is_free = self.is_link() || run.faces_up();
         self.goal = Goal::Clear;
-        self.phase = if is_free { Phase::LegPlan(Way::Up) } else { Phase::End };
+        self.phase = if is_free {
+            Phase::LegPlan(Way::Up)
+        } else {
+            Phase::End
+        };
     }
 
     /// One period at this share of the feed, 0 to 2, into `last`.
@@ -165,6 +169,7 @@ impl Course {
         share: f32,
         last: &mut Sample,
     ) -> Result<Outcome> {
+        let was_link = self.is_link();
         match self.phase {
             Phase::Pass => self.on_pass(job, axes, run, share, last)?,
             Phase::Leg(way) => self.on_leg(way, job, run, share, last)?,
@@ -183,7 +188,12 @@ impl Course {
             Phase::End => return Ok(Outcome::Finished),
         }
         self.at = Some(last.cl_nm);
-        Ok(if self.is_link() { Outcome::Link } else { Outcome::Pass })
+        // The last sample of a pass is one of it, and so is the first.
+        Ok(if was_link && self.is_link() {
+            Outcome::Link
+        } else {
+            Outcome::Pass
+        })
     }
 
     /// Some portions of the look ahead, and on when it is done.
@@ -324,7 +334,9 @@ impl Course {
             0.0
         };
         let feed = job.header.feed_mm_s;
-        if let Some((leg, usual)) = Leg::new(from, to, slow_mm, feed, axes, job.header.period_s, &mut now.plan) {
+        if let Some((leg, usual)) =
+            Leg::new(from, to, slow_mm, feed, axes, job.header.period_s, &mut now.plan)
+        {
             (self.leg, self.usual) = (leg, usual);
             self.profile.begin(now.plan.window);
             self.phase = Phase::Leg(way);
@@ -346,7 +358,14 @@ impl Course {
         Ok(())
     }
 
-    fn on_leg(&mut self, way: Way, job: &Job<'_>, run: &mut Run, share: f32, last: &mut Sample) -> Result<()> {
+    fn on_leg(
+        &mut self,
+        way: Way,
+        job: &Job<'_>,
+        run: &mut Run,
+        share: f32,
+        last: &mut Sample,
+    ) -> Result<()> {
         let (now, _) = both(&mut self.plans, self.second);
         if self.profile.is_done(&now.plan) {
             return self.after_leg(way, job, run, last);
@@ -396,11 +415,18 @@ fn run_end(job: &Job<'_>, pass: &PassPlan) -> Line {
     Line {
         side: pass.side,
         reversed,
-        span: if reversed { 0 } else { job.header.path_spans.saturating_sub(1) },
+        span: if reversed {
+            0
+        } else {
+            job.header.path_spans.saturating_sub(1)
+        },
     }
 }
 
-#[allow(clippy::cast_precision_loss, reason = "a step beyond 2^24 quanta, 16 um, needs no last digit")]
+#[allow(
+    clippy::cast_precision_loss,
+    reason = "a step beyond 2^24 quanta, 16 um, needs no last digit"
+)]
 const fn as_f32(moved: i32) -> f32 {
     moved as f32
 }

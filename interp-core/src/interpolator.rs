@@ -82,9 +82,7 @@ impl Request {
             Self::Start => matches!(state, State::Ready | State::Finished),
             Self::Hold => matches!(state, State::Running | State::Linking),
             Self::Resume => matches!(state, State::Held | State::Holding),
-            Self::Abort => {
-                matches!(state, State::Faulted) || Self::Stop.is_allowed(state)
-            }
+            Self::Abort => matches!(state, State::Faulted) || Self::Stop.is_allowed(state),
             Self::Stop => matches!(
                 state,
                 State::Running | State::Linking | State::Holding | State::Held
@@ -209,7 +207,10 @@ impl<S: AsRef<[i32]> + AsMut<[i32]>> Interpolator<S> {
     /// Where the run is: pass, path and side place. After a fault, where that is, which is past the last sample.
     #[must_use]
     pub fn place(&self) -> (u32, Place, Place) {
-        self.motion.course.place().unwrap_or_else(|| self.motion.run.place())
+        self.motion
+            .course
+            .place()
+            .unwrap_or_else(|| self.motion.run.place())
     }
 
     /// The last sample: its position is kept after a fault.

@@ -3,9 +3,9 @@
 
 use crate::arith::sqrt;
 use crate::fault::{Fault, FaultKind, Result};
+use crate::feed::QUANTA_PER_MM;
 use crate::feed::demand::{Room, Stencil, squared};
 use crate::feed::plan::{Plan, Top};
-use crate::feed::QUANTA_PER_MM;
 use crate::job::Axes;
 use crate::lane::Line;
 use crate::offset::Located;
@@ -58,7 +58,11 @@ impl Leg {
         let cosines = mm.map(|mm| mm / length);
         let room = Room::straight(axes, &cosines);
         let speed = crate::feed::demand::root(room.square);
-        let top = Top { speed, usual: speed, period_s };
+        let top = Top {
+            speed,
+            usual: speed,
+            period_s,
+        };
         plan.begin();
         let slow = slow_mm.min(length);
         let fast = length - slow;
@@ -202,7 +206,11 @@ impl Step {
     /// # Errors
     /// What is wrong with the surface there.
     pub(crate) fn at(&self, job: &Job<'_>, patch: &mut Patch, place: i64, plan: &Plan) -> Result<Located> {
-        let part = if place >= plan.end { 1.0 } else { ratio(place, plan.end) };
+        let part = if place >= plan.end {
+            1.0
+        } else {
+            ratio(place, plan.end)
+        };
         self.locate(job, patch, part)
     }
 
@@ -232,12 +240,18 @@ fn distance(from: &[i32; 3], to: &[i32; 3]) -> f32 {
     float(sqrt(real(sum)))
 }
 
-#[allow(clippy::cast_precision_loss, reason = "a length; 24 bits are enough for a bound")]
+#[allow(
+    clippy::cast_precision_loss,
+    reason = "a length; 24 bits are enough for a bound"
+)]
 fn to_mm(nm: i64) -> f32 {
     nm as f32 * 1e-6
 }
 
-#[allow(clippy::cast_precision_loss, reason = "a step is short: 24 bits of it are below a nanometre")]
+#[allow(
+    clippy::cast_precision_loss,
+    reason = "a step is short: 24 bits of it are below a nanometre"
+)]
 fn ratio(part: i64, whole: i64) -> f32 {
     part as f32 / whole as f32
 }

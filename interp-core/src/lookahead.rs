@@ -6,8 +6,8 @@
 use crate::across::{Across, Densities};
 use crate::fault::{Fault, FaultKind, Result};
 use crate::feed::demand::{Jump, Room, Stencil, over_jump, root};
-use crate::feed::plan::{Plan, Top};
 use crate::feed::nm_to_mm;
+use crate::feed::plan::{Plan, Top};
 use crate::interval::interval;
 use crate::job::{Axes, Pattern, Spacing};
 use crate::lane::Line;
@@ -108,7 +108,11 @@ impl Trail {
         let slope = |c: f32, b: f32, a: f32| {
             let (late, early) = ((c - b) / h1, (b - a) / h2);
             let bend = (late - early) / (h1 + h2);
-            if at_newest { late + bend * h1 } else { early - bend * h2 }
+            if at_newest {
+                late + bend * h1
+            } else {
+                early - bend * h2
+            }
         };
         let ([c0, c1], [b0, b1], [a0, a1]) = (newest, middle, oldest);
         [slope(c0, b0, a0), slope(c1, b1, a1)]
@@ -222,7 +226,10 @@ impl Lookahead {
     pub(crate) fn place(&self, out: &PassPlan) -> (u32, Place, Place) {
         let fraction = self.fraction(out);
         let own = if self.line.reversed { !fraction } else { fraction };
-        let path = Place { span: self.line.span, fraction: own };
+        let path = Place {
+            span: self.line.span,
+            fraction: own,
+        };
         (out.pass, path, out.side)
     }
 
@@ -331,7 +338,10 @@ impl Lookahead {
             self.trail.slopes = (out.parts >= 2).then(|| self.trail.slopes(true));
             self.trail.values = [value; 3];
             if out.plan.count() > 0 {
-                let jump = Jump { first, second: [0.0; 2] };
+                let jump = Jump {
+                    first,
+                    second: [0.0; 2],
+                };
                 self.hold(1, &jump, axes, top, out);
             }
             return;
@@ -344,7 +354,10 @@ impl Lookahead {
             let here = self.trail.slopes(false);
             let shortest = self.trail.lengths[0].min(self.trail.lengths[1]).max(1e-9);
             let second = changed(&slopes, &here, 4.0 * NO_JUMP / shortest);
-            let jump = Jump { first: [0.0; 2], second };
+            let jump = Jump {
+                first: [0.0; 2],
+                second,
+            };
             self.hold(3, &jump, axes, top, out);
         }
     }
@@ -400,7 +413,10 @@ pub(crate) fn check_travel(axes: &Axes, place_nm: &[i32; 3]) -> Result<()> {
 /// [`FaultKind::LinkBlocked`] with how far a place is above the safe height, mm.
 fn check_height(axes: &Axes, [_, _, z]: &[i32; 3]) -> Result<()> {
     if *z > axes.safe_z_nm {
-        return Err(Fault::new(FaultKind::LinkBlocked, nm_to_mm(z.saturating_sub(axes.safe_z_nm))));
+        return Err(Fault::new(
+            FaultKind::LinkBlocked,
+            nm_to_mm(z.saturating_sub(axes.safe_z_nm)),
+        ));
     }
     Ok(())
 }

@@ -71,7 +71,10 @@ fn check_header(header: &Header) -> Result<()> {
             return Err(Fault::new(FaultKind::BadHeader, value));
         }
     }
-    header.axes.as_ref().map_or(Ok(()), |axes| check_axes(header, axes))
+    header
+        .axes
+        .as_ref()
+        .map_or(Ok(()), |axes| check_axes(header, axes))
 }
 
 /// Ranges of what the axes can do: such that a step of a period fits its integer, and none of the planner's products overflows.
@@ -101,9 +104,10 @@ fn check_axes(header: &Header, axes: &Axes) -> Result<()> {
         return bad(f32::from(header.path_spans));
     }
     let [x, y, z] = axes.home_nm;
-    for (place, [least, most]) in [x, y, z, axes.safe_z_nm].into_iter().zip(
-        axes.travel_nm.into_iter().chain([axes.travel_nm[2]]),
-    ) {
+    for (place, [least, most]) in [x, y, z, axes.safe_z_nm]
+        .into_iter()
+        .zip(axes.travel_nm.into_iter().chain([axes.travel_nm[2]]))
+    {
         if !(least..=most).contains(&place) {
             return bad(crate::feed::nm_to_mm(place));
         }

@@ -344,7 +344,10 @@ impl Run {
         let within = u16::try_from(high >> 32).unwrap_or(0);
         let over = travel.fraction.checked_sub(u64::from(within) * part)?;
         let span = if travel.reversed {
-            job.header.path_spans.saturating_sub(1).saturating_sub(travel.span)
+            job.header
+                .path_spans
+                .saturating_sub(1)
+                .saturating_sub(travel.span)
         } else {
             travel.span
         };

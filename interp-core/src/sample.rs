@@ -48,7 +48,10 @@ impl State {
     /// Whether a run is under way: moving, or standing on its path to be resumed.
     #[must_use]
     pub const fn is_under_way(self) -> bool {
-        matches!(self, Self::Running | Self::Linking | Self::Holding | Self::Held | Self::Stopping)
+        matches!(
+            self,
+            Self::Running | Self::Linking | Self::Holding | Self::Held | Self::Stopping
+        )
     }
 
     /// The state's name in traces and JSON.

@@ -169,7 +169,9 @@ fn of_sample(prepared: &Prepared, sample: &Sample, first: bool) -> Motion {
 
 /// The product.
 fn on_the_core(job: &JobFile, each: &mut dyn FnMut(&Motion)) -> Result<Planned, ApproachError> {
-    let prepared = prepare(job).map_err(|error| ApproachError::Fault(error.to_string()))?;
+    let mut prepared = prepare(job).map_err(|error| ApproachError::Fault(error.to_string()))?;
+    // The approaches are compared at their feeds, as in the paper: without a machine's limits.
+    prepared.header.axes = None;
     let sentence = |fault| {
         let (what, remedy) = explain::fault(fault);
         ApproachError::Fault(format!("{what}\n  help: {remedy}"))

@@ -171,7 +171,7 @@ fn load(path: &Path) -> Result<(JobFile, Prepared)> {
     Ok(settled?)
 }
 
-/// The axis limits that a job asks for and that nothing holds yet.
+/// The axis limits that a job asks for and that the other approaches do not hold.
 fn unheld_limits(job: &JobFile) -> Option<String> {
     let machine = &job.machine;
     let keys = [
@@ -186,7 +186,7 @@ fn unheld_limits(job: &JobFile) -> Option<String> {
         .collect();
     (!given.is_empty()).then(|| {
         format!(
-            "{} not held yet: the feed is constant from the first sample to the last",
+            "{} not held by this approach: its feed is the paper's from the first sample to the last",
             given.join(", ")
         )
     })

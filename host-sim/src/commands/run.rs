@@ -12,12 +12,13 @@ use serde_json::{Value, json};
 use super::out::say;
 use super::outcome::Outcome;
 use super::simulate::{Timed, machine, remarks, report, surveyed, timed};
-use super::{Failure, Result, cannot_write, load, progress, spinner, trace, unheld_limits, warn_of_limits};
+use super::{Failure, Result, cannot_write, load, progress, spinner, trace};
 use crate::approach::Kind;
 use crate::job_file::JobFile;
 use crate::prepare::Prepared;
 use crate::remote::qemu::{self, Qemu, QemuError};
 use crate::remote::{RemoteError, Session, drive, port};
+use crate::survey::is_on_pass;
 
 /// Runs a job in the firmware, in QEMU or on a board, and compares every sample with this machine's.
 ///
@@ -38,9 +39,6 @@ pub(super) struct Arguments {
     /// Writes a page with a view that turns, charts and figures into this folder.
     #[arg(long, value_name = "DIR")]
     report: Option<PathBuf>,
-    /// Runs a job on a board although the axis limits that it asks for are not held yet.
-    #[arg(long)]
-    ignore_limits: bool,
     /// Prints one JSON object instead of text.
     #[arg(long)]
     pub(super) json: bool,
@@ -234,7 +232,8 @@ fn by_sample(
     let status = drive::run_samples(session, arguments.place.qemu, |sample| {
         digest.sample(sample);
         if let (Some(file), Ok(())) = (&mut file, &written) {
-            written = file.write(sample, prepared.parameters(sample.path, sample.side));
+            let parameters = is_on_pass(sample).then(|| prepared.parameters(sample.path, sample.side));
+            written = file.write(sample, parameters);
         }
         theirs.push(*sample);
         if sample.tick % 4096 == 0 {
@@ -294,15 +293,6 @@ fn complaint(ran: &Ran, here: &Timed, job: &JobFile) -> Option<String> {
 
 pub(super) fn command(arguments: &Arguments) -> Result<()> {
     let (job, prepared) = load(&arguments.job)?;
-    if let Some(limits) =
-        unheld_limits(&job).filter(|_| arguments.place.port.is_some() && !arguments.ignore_limits)
-    {
-        return Err(Failure::input(
-            limits,
-            "leave the limits out of the job, or say --ignore-limits",
-        ));
-    }
-    warn_of_limits(&job);
     let here = timed(&job, &prepared)?;
     let (_qemu, mut session) = connect(arguments)?;
     check_period(&job, &session)?;
@@ -317,7 +307,7 @@ pub(super) fn command(arguments: &Arguments) -> Result<()> {
     let directory = arguments.report.as_deref();
     let (findings, sketch) = surveyed(&job, &prepared, &here, None, directory.is_some())?;
     let complaint = complaint(&ran, &here, &job);
-    let mut remarks = remarks(&job, &here, &findings);
+    let mut remarks = remarks(&here, &findings);
     if let Some(complaint) = complaint.as_ref().filter(|_| here.fault.is_none()) {
         remarks.failures.insert(0, complaint.clone());
     }

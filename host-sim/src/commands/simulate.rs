@@ -8,9 +8,7 @@ use interp_core::{Fault, Place};
 use protocol::digest::Digest;
 
 use super::outcome::{FaultAt, Outcome};
-use super::{
-    BOUNDS, Failure, Result, approach, cannot_write, load, progress, trace, unheld_limits, warn_of_limits,
-};
+use super::{BOUNDS, Failure, Result, approach, cannot_write, load, progress, trace, warn_of_limits};
 use crate::approach::Kind;
 use crate::explain;
 use crate::job_file::JobFile;
@@ -18,7 +16,7 @@ use crate::machine::Machine;
 use crate::oracle::{Checked, Emitted, Oracle};
 use crate::prepare::Prepared;
 use crate::report::{Remarks, Sketch};
-use crate::survey::{Each, Findings, Survey};
+use crate::survey::{Each, Findings, Survey, is_on_pass};
 
 /// Runs a job on this machine: the same core, the same bits as on the board; or one of the paper's other approaches.
 ///
@@ -97,7 +95,9 @@ pub(super) fn timed(job: &JobFile, prepared: &Prepared) -> Result<Timed> {
             }
             current = Some(sample.pass);
             passes.push((sample.tick, 0, 0));
-            bar.set_position(parts_done(sample.side, prepared));
+            if is_on_pass(sample) {
+                bar.set_position(parts_done(sample.side, prepared));
+            }
         }
         run.sample(sample);
         if let Some(last) = passes.last_mut() {
@@ -160,14 +160,13 @@ pub(super) fn surveyed(
 }
 
 /// What a report says besides the samples: the fault, figures out of their bounds, limits that are not held.
-pub(super) fn remarks(job: &JobFile, timed: &Timed, findings: &Findings) -> Remarks {
+pub(super) fn remarks(timed: &Timed, findings: &Findings) -> Remarks {
     let failures = match &timed.fault {
         Some(fault) => vec![fault.sentence()],
         None => findings.report.failures(&BOUNDS),
     };
     Remarks {
         failures,
-        warnings: unheld_limits(job).into_iter().collect(),
         ..Remarks::default()
     }
 }
@@ -195,8 +194,8 @@ pub(super) fn oracle(job: &JobFile) -> Result<Oracle> {
 
 pub(super) fn command(arguments: &Arguments) -> Result<()> {
     let (job, prepared) = load(&arguments.job)?;
-    warn_of_limits(&job);
     if arguments.approach != Kind::Surface {
+        warn_of_limits(&job);
         let Arguments {
             trace, report, json, ..
         } = arguments;
@@ -211,7 +210,7 @@ pub(super) fn command(arguments: &Arguments) -> Result<()> {
         arguments.trace.as_ref(),
         directory.is_some(),
     )?;
-    let remarks = remarks(&job, &timed, &findings);
+    let remarks = remarks(&timed, &findings);
     let page = report(&job, directory, sketch.as_ref(), &findings, &remarks)?;
     let outcome = Outcome {
         kind: Kind::Surface,

@@ -8,7 +8,7 @@ use indicatif::ProgressBar;
 use serde_json::Value;
 
 use super::simulate::{Timed, machine, oracle, remarks, report, timed};
-use super::{Failure, Result, along, load, progress, swept_words, warn_of_limits};
+use super::{Failure, Result, along, load, progress, swept_words};
 use crate::job_file::{JobFile, Spacing};
 use crate::oracle::{Bounds, Checked, Emitted, Figure};
 use crate::prepare::Prepared;
@@ -153,7 +153,6 @@ impl swept::Progress for Bar<'_> {
 
 pub(super) fn command(arguments: &Arguments) -> Result<()> {
     let (job, prepared) = load(&arguments.job)?;
-    warn_of_limits(&job);
     let timed = timed(&job, &prepared)?;
     let directory = arguments.report.as_deref();
     let mut sketch = directory.map(|_| Sketch::new(&job, timed.passes.len()));
@@ -178,7 +177,7 @@ pub(super) fn command(arguments: &Arguments) -> Result<()> {
         failures: failures.clone(),
         verified: true,
         scallops: Some(scallops(&job, &swept)),
-        ..remarks(&job, &timed, &findings)
+        ..remarks(&timed, &findings)
     };
     let known = |warning: &&String| !failures.contains(warning);
     remarks

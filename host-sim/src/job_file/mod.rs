@@ -28,6 +28,8 @@ pub use surface::{NurbsSpec, SurfaceSpec};
 
 /// Largest ball radius, mm: ten times any ball-end mill; what the core accepts.
 pub const RADIUS_MAX_MM: f64 = 1000.0;
+/// Largest height of [machine], mm.
+const HEIGHT_MAX_MM: f64 = 1000.0;
 /// Least feed, mm/min (1 um/s): below it the core's parameter step loses digits; a feed is above it.
 pub const FEED_MIN_MM_MIN: f64 = 0.06;
 /// Largest feed, mm/min (10 m/s): what the core accepts.
@@ -126,6 +128,14 @@ pub struct Machine {
     pub travel_mm: Option<[[f64; 2]; 3]>,
     /// Motor steps a millimetre of the axes, above 0.
     pub steps_per_mm: Option<[f64; 3]>,
+    /// Where the tool's centre stands before the run, mm.
+    pub home_mm: Option<[f64; 3]>,
+    /// Height (z of the tool's centre) at which the tool is clear of everything, mm.
+    pub safe_z_mm: Option<f64>,
+    /// How far above the surface's highest place that is, mm, where `safe_z_mm` is not given.
+    pub clearance_mm: Option<f64>,
+    /// The last part of the way down that is gone at the feed, mm.
+    pub plunge_mm: Option<f64>,
 }
 
 impl Default for Machine {
@@ -137,6 +147,10 @@ impl Default for Machine {
             jerk_max_mm_s3: None,
             travel_mm: None,
             steps_per_mm: None,
+            home_mm: None,
+            safe_z_mm: None,
+            clearance_mm: None,
+            plunge_mm: None,
         }
     }
 }
@@ -293,6 +307,10 @@ fn read_machine(machine: &Section<'_>) -> Result<Machine, JobFileError> {
             "jerk_max_mm_s3",
             "travel_mm",
             "steps_per_mm",
+            "home_mm",
+            "safe_z_mm",
+            "clearance_mm",
+            "plunge_mm",
         ],
         &[],
     )?;
@@ -325,6 +343,20 @@ fn read_machine(machine: &Section<'_>) -> Result<Machine, JobFileError> {
             }
         }
         read.travel_mm = Some(travel);
+    }
+    if machine.has("home_mm") {
+        read.home_mm = Some(machine.numbers("home_mm")?);
+    }
+    if machine.has("safe_z_mm") {
+        read.safe_z_mm = Some(machine.number("safe_z_mm")?);
+    }
+    for (key, value) in [
+        ("clearance_mm", &mut read.clearance_mm),
+        ("plunge_mm", &mut read.plunge_mm),
+    ] {
+        if machine.has(key) {
+            *value = Some(machine.number_within(key, 0.0, HEIGHT_MAX_MM, "a height in mm, e.g. 2")?);
+        }
     }
     Ok(read)
 }

@@ -124,6 +124,8 @@ pub struct Oracle {
     pub spacing: Spacing,
     /// Sampling period T, s.
     pub period_s: f64,
+    /// Programmed feed, mm/s.
+    pub feed_mm_s: f64,
 }
 
 impl Oracle {
@@ -147,6 +149,7 @@ impl Oracle {
             scallop_mm: job.scallop_mm,
             spacing: job.spacing,
             period_s: job.machine.period_s(),
+            feed_mm_s: job.feed_mm_s(),
         })
     }
 

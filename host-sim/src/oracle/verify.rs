@@ -205,7 +205,9 @@ impl Verifier {
                 .add(if wanted > 0.0 { arc / wanted } else { 0.0 }, spot);
             return (Some(arc), None);
         }
-        let ripple_pct = (wanted > 0.0).then(|| 100.0 * (arc / wanted - 1.0));
+        // Where the feed is lower than the programmed one, that is what the step is held against.
+        let whole = wanted.max(self.oracle.feed_mm_s * self.oracle.period_s);
+        let ripple_pct = (wanted > 0.0).then(|| 100.0 * (arc - wanted) / whole);
         if let Some(ripple_pct) = ripple_pct {
             self.report.ripple_pct.add(ripple_pct, spot);
         }

@@ -5,8 +5,11 @@
 //! SurfaceSpec ──patches.rs──► bicubic pieces over any rectangle ──grid.rs──► records of the core ──► Prepared
 //! ```
 
+mod axes;
 mod grid;
 mod patches;
+
+pub use axes::has_limits;
 
 use interp_core::sample::Place;
 use interp_core::{Header, Pattern, Spacing, SurfaceKind, ToolSide, encode};
@@ -129,7 +132,7 @@ pub fn prepare(job: &JobFile) -> Result<Prepared, JobFileError> {
         feed_mm_s: job.feed_mm_s() as f32,
         scallop_mm: job.scallop_mm as f32,
         period_s: job.machine.period_s() as f32,
-        axes: None,
+        axes: axes::axes(job, &oracle)?,
     };
     match &job.surface {
         SurfaceSpec::Revolved {

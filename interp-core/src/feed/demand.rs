@@ -61,7 +61,11 @@ impl Room {
     /// Along a straight line with these direction cosines.
     pub(crate) fn straight(axes: &Axes, cosines: &[f32; 3]) -> Self {
         let mut room = Self::WIDE;
-        let limits = axes.velocity_mm_s.iter().zip(&axes.acceleration_mm_s2).zip(&axes.jerk_mm_s3);
+        let limits = axes
+            .velocity_mm_s
+            .iter()
+            .zip(&axes.acceleration_mm_s2)
+            .zip(&axes.jerk_mm_s3);
         for (((v, a), j), cosine) in limits.zip(cosines) {
             let slope = 1.0 / cosine.abs().max(SLOPE_MIN);
             room.square = room.square.min(squared(v * slope));
@@ -112,7 +116,10 @@ impl Stencil {
         let inverse = 1.0 / length.max(1e-6);
         let mut bends = [[0.0; 3]; 3];
         let last = core::mem::replace(&mut self.last, centre_nm);
-        let axis = centre_nm.iter().zip(&last).zip(self.first.iter_mut().zip(&mut self.second));
+        let axis = centre_nm
+            .iter()
+            .zip(&last)
+            .zip(self.first.iter_mut().zip(&mut self.second));
         for (((to, from), (first, second)), out) in axis.zip(&mut bends) {
             let d1 = nm_to_mm(to.wrapping_sub(*from)) * inverse;
             let (mut d2, mut d3) = (0.0, 0.0);
@@ -140,7 +147,12 @@ impl Stencil {
 fn room(bends: &[[f32; 3]; 3], axes: &Axes, top: &Top) -> Room {
     let mut square = squared(top.speed);
     let mut curvature = 0.0;
-    let limits = || axes.velocity_mm_s.iter().zip(&axes.acceleration_mm_s2).zip(&axes.jerk_mm_s3);
+    let limits = || {
+        axes.velocity_mm_s
+            .iter()
+            .zip(&axes.acceleration_mm_s2)
+            .zip(&axes.jerk_mm_s3)
+    };
     for (((v, a), j), [d1, d2, d3]) in limits().zip(bends) {
         square = square.min(squared(v / d1.max(SLOPE_MIN)));
         if *d2 > 0.0 {
@@ -171,7 +183,12 @@ fn room(bends: &[[f32; 3]; 3], axes: &Axes, top: &Top) -> Room {
         jerk = jerk.min((margin * j - taken) / d1.max(SLOPE_MIN));
         most = most.max(taken / j);
     }
-    Room { square, accel, jerk, taken: most }
+    Room {
+        square,
+        accel,
+        jerk,
+        taken: most,
+    }
 }
 
 /// A jump of the path from one patch to the next: of the derivatives of 1 - r k and of r times the twist, along the path and across it.
@@ -224,7 +241,10 @@ pub(crate) fn cube_root(value: f32) -> f32 {
     x
 }
 
-#[allow(clippy::cast_precision_loss, reason = "a difference of neighbours; its last digits count below 2^24 nm only")]
+#[allow(
+    clippy::cast_precision_loss,
+    reason = "a difference of neighbours; its last digits count below 2^24 nm only"
+)]
 pub(crate) fn nm_to_mm(nm: i32) -> f32 {
     nm as f32 * 1e-6
 }

@@ -185,7 +185,12 @@ impl Plan {
             ..Cell::NONE
         };
         self.count += 1;
-        for cell in self.cells.get_mut(index.saturating_sub(back)..index).into_iter().flatten() {
+        for cell in self
+            .cells
+            .get_mut(index.saturating_sub(back)..index)
+            .into_iter()
+            .flatten()
+        {
             cell.square = cell.square.min(square);
             cell.accel = cell.accel.min(accel);
         }
@@ -208,7 +213,9 @@ impl Plan {
         let jerk = self.least;
         let arc = mm(self.end);
         let speed = arc / self.time.max(top.period_s);
-        let time = (self.accel / jerk).min(root(speed / jerk)).min(cube_root(0.5 * arc / jerk));
+        let time = (self.accel / jerk)
+            .min(root(speed / jerk))
+            .min(cube_root(0.5 * arc / jerk));
         self.longest = upwards(time / top.period_s);
         self.change = jerk * squared(top.period_s) * top.period_s * QUANTA_PER_MM;
         self.best = (f32::MAX, self.longest);
@@ -264,7 +271,10 @@ impl Plan {
         let (_, best) = self.best;
         if self.tries > 0 {
             // 3/4, 1/2, 3/8, 1/4 of the longest.
-            let parts = [2_u16, 3, 4, 6].get(usize::from(self.tries) - 1).copied().unwrap_or(8);
+            let parts = [2_u16, 3, 4, 6]
+                .get(usize::from(self.tries) - 1)
+                .copied()
+                .unwrap_or(8);
             let window = u16::from(self.longest) * parts / 8;
             self.take(u8::try_from(window.max(1)).unwrap_or(1));
         } else if best == self.window {
@@ -283,7 +293,10 @@ impl Plan {
         let length = between(self.start_nm(index), cell.end_nm);
         let accel = cell.accel_all.max(1.0);
         let enter = squared(self.speed).min(cell.enter);
-        let leave = self.leave(index).min(squared(cell.gate)).min(enter + 2.0 * accel * length);
+        let leave = self
+            .leave(index)
+            .min(squared(cell.gate))
+            .min(enter + 2.0 * accel * length);
         let peak = cell.square_all.min(0.5 * (enter + leave) + accel * length);
         let [enter, leave, peak] = [enter, leave, peak].map(root);
         let ramps = (2.0 * squared(peak) - squared(enter) - squared(leave)) / (2.0 * accel);
@@ -311,7 +324,10 @@ impl Plan {
             return;
         };
         let periods = f32::from(self.window);
-        let start_nm = index.checked_sub(1).and_then(|i| self.cells.get(i)).map_or(0, |cell| cell.end_nm);
+        let start_nm = index
+            .checked_sub(1)
+            .and_then(|i| self.cells.get(i))
+            .map_or(0, |cell| cell.end_nm);
         let (mut square, mut accel) = (cell.square, cell.accel.min(self.swing));
         let mut ask = |cell: &Cell, distance: f32| {
             if squared(periods) * cell.square >= squared(distance) {
@@ -321,7 +337,11 @@ impl Plan {
         };
         let (mut after, mut before) = (f32::MAX, f32::MAX);
         let mut from = cell.end_nm;
-        let later = self.cells.get(index + 1..usize::from(self.count)).into_iter().flatten();
+        let later = self
+            .cells
+            .get(index + 1..usize::from(self.count))
+            .into_iter()
+            .flatten();
         for (seen, other) in later.take(REACH + 1).enumerate() {
             if seen == REACH {
                 after = between(cell.end_nm, from);
@@ -351,12 +371,18 @@ impl Plan {
                 gate = gate.min(self.brake_in(index + 1, beyond - periods * gate));
             }
         }
-        let next = self.cells.get(index + 1).filter(|_| index + 1 < usize::from(self.count));
+        let next = self
+            .cells
+            .get(index + 1)
+            .filter(|_| index + 1 < usize::from(self.count));
         let ends = usize::from(self.tail) == index + 1;
         let mut enter = if ends {
             // No later cell brakes less, so that what is planned for the end from here on is kept.
             accel = accel.min(next.map_or(f32::MAX, |next| next.accel_all));
-            squared(landing(accel, as_f32(self.end - (i64::from(start_nm) << QUANTA_BITS))))
+            squared(landing(
+                accel,
+                as_f32(self.end - (i64::from(start_nm) << QUANTA_BITS)),
+            ))
         } else {
             squared(braked(next.map_or(0.0, |next| next.enter), accel, length))
         };
@@ -376,7 +402,10 @@ impl Plan {
         let Some(cell) = self.cells.get(index) else {
             return 0.0;
         };
-        let leave = self.cells.get(index + 1).filter(|_| index + 1 < usize::from(self.count));
+        let leave = self
+            .cells
+            .get(index + 1)
+            .filter(|_| index + 1 < usize::from(self.count));
         let mut speed = braked(leave.map_or(0.0, |leave| leave.enter), cell.accel_all, room);
         if cell.gate < f32::MAX {
             let before = room - f32::from(self.window) * cell.gate;
@@ -388,7 +417,9 @@ impl Plan {
     /// The cell that a place is in, from this one on.
     pub(crate) fn cell_at(&self, mut cell: u16, place: i64) -> u16 {
         for _ in 0..CELLS_A_PERIOD {
-            let end = self.cell(cell).map_or(i64::MAX, |cell| i64::from(cell.end_nm) << QUANTA_BITS);
+            let end = self
+                .cell(cell)
+                .map_or(i64::MAX, |cell| i64::from(cell.end_nm) << QUANTA_BITS);
             if cell + 1 >= self.count || place < end {
                 break;
             }
@@ -451,7 +482,8 @@ impl Plan {
         let before = index.checked_sub(1).and_then(|before| self.cell(before));
         match before {
             Some(Cell { gate, end_nm, .. })
-                if *gate < f32::MAX && as_f32(place - (i64::from(*end_nm) << QUANTA_BITS)) <= periods * gate =>
+                if *gate < f32::MAX
+                    && as_f32(place - (i64::from(*end_nm) << QUANTA_BITS)) <= periods * gate =>
             {
                 speed.min(*gate)
             }
@@ -489,7 +521,10 @@ impl Plan {
     }
 }
 
-#[allow(clippy::cast_precision_loss, reason = "within a cell; 24 bits are enough for a bound")]
+#[allow(
+    clippy::cast_precision_loss,
+    reason = "within a cell; 24 bits are enough for a bound"
+)]
 fn as_f32(quanta: i64) -> f32 {
     quanta as f32
 }
@@ -509,7 +544,10 @@ pub(crate) fn quanta(mm: f32) -> i64 {
     whole(mm * QUANTA_PER_MM)
 }
 
-#[allow(clippy::cast_possible_truncation, reason = "the cast saturates, and a NaN becomes 0")]
+#[allow(
+    clippy::cast_possible_truncation,
+    reason = "the cast saturates, and a NaN becomes 0"
+)]
 fn whole(value: f32) -> i64 {
     value as i64
 }

@@ -181,7 +181,10 @@ fn ceil(value: f32) -> f32 {
     if value > whole + 1e-3 { whole + 1.0 } else { whole }
 }
 
-#[allow(clippy::cast_precision_loss, reason = "a step beyond 2^24 quanta, 16 um, needs no last digit")]
+#[allow(
+    clippy::cast_precision_loss,
+    reason = "a step beyond 2^24 quanta, 16 um, needs no last digit"
+)]
 const fn as_f32(step: i32) -> f32 {
     step as f32
 }
@@ -190,7 +193,10 @@ fn count(number: u8) -> f32 {
     f32::from(number)
 }
 
-#[allow(clippy::cast_possible_truncation, reason = "the cast saturates, and a NaN becomes 0")]
+#[allow(
+    clippy::cast_possible_truncation,
+    reason = "the cast saturates, and a NaN becomes 0"
+)]
 const fn rounded(step: f32) -> i32 {
     (step + 0.5) as i32
 }
