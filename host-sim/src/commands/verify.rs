@@ -97,7 +97,12 @@ pub(super) fn measured(
 ) -> Result<(Findings, swept::Findings)> {
     let oracle = oracle(job)?;
     let bar = progress(timed.samples, "measuring");
-    let mut track = Track::default();
+    // On a machine with limits the feed is low at the ends of passes.
+    let spacing_nm = match prepared.header.axes {
+        Some(_) => 0.5e6 * job.feed_mm_s() * job.machine.period_s(),
+        None => 0.0,
+    };
+    let mut track = Track::with_spacing(spacing_nm);
     let mut keep = |emitted: &Emitted, checked: &Checked| {
         track.add(emitted, job.along);
         if let Some(sketch) = &mut sketch {

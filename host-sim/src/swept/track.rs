@@ -72,9 +72,31 @@ impl PassTrack {
 pub struct Track {
     /// The passes, in order.
     pub passes: Vec<PassTrack>,
+    /// Samples that are nearer than this to the last one that was kept, nm, are left out, but for the last of a pass: where the feed is low
+    /// there are more than the path needs.
+    spacing_nm: f64,
 }
 
 impl Track {
+    /// A track whose samples are at least so far apart, nm.
+    #[must_use]
+    pub fn with_spacing(spacing_nm: f64) -> Self {
+        Self {
+            passes: Vec::new(),
+            spacing_nm,
+        }
+    }
+
+    /// Whether a sample is so near to the last one that it says nothing new.
+    fn is_near(&self, sample: &Emitted) -> bool {
+        let last = self.passes.last().and_then(|pass| pass.cl_nm.last());
+        !sample.last_of_pass
+            && last.is_some_and(|last| {
+                let apart = last.iter().zip(sample.cl_nm).map(|(a, b)| f64::from(*a) - f64::from(b));
+                apart.map(|d| d * d).sum::<f64>() < self.spacing_nm * self.spacing_nm
+            })
+    }
+
     /// Keeps the next sample.
     pub fn add(&mut self, sample: &Emitted, along: Along) {
         let (path, side) = match along {
@@ -93,6 +115,9 @@ impl Track {
                 path: Vec::with_capacity(room),
                 cl_nm: Vec::with_capacity(room),
             });
+        }
+        if !sample.first_of_pass && self.is_near(sample) {
+            return;
         }
         if let Some(pass) = self.passes.last_mut() {
             pass.path.push(path);
