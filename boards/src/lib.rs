@@ -59,6 +59,12 @@ pub struct Chip {
     pub package: Package,
 }
 
+/// Name of the symbol in an image of the firmware under which its board is found: [`Board::mark`], [`MARK_BYTES`] long.
+pub const MARK_SYMBOL: &str = "isofeed_board";
+
+/// Room for a board's name in an image.
+pub const MARK_BYTES: usize = 24;
+
 /// Where flash begins.
 pub const FLASH_BEGIN: u32 = 0x0800_0000;
 
@@ -302,6 +308,20 @@ pub struct AxisLines {
 }
 
 impl Board {
+    /// The board's name as it lies in an image of the firmware: filled up with zeros.
+    #[must_use]
+    pub const fn mark(&self) -> [u8; MARK_BYTES] {
+        let id = self.id.as_bytes();
+        assert!(id.len() <= MARK_BYTES, "the name is too long");
+        let mut mark = [0; MARK_BYTES];
+        let mut index = 0;
+        while index < id.len() {
+            mark[index] = id[index];
+            index += 1;
+        }
+        mark
+    }
+
     /// The line of this role. To be used in constants, where a missing one is an error of the build.
     ///
     /// # Panics

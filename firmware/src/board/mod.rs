@@ -51,6 +51,12 @@ pub(crate) use skr_pro::BOARD;
 
 use stm32f4xx_hal::pac;
 
+/// Which board the image is for: `cargo sim flash` finds it by this name, and refuses another board's image.
+// SAFETY: nothing else has this name; `boards::MARK_SYMBOL` says the same.
+#[allow(unsafe_code, reason = "a name that is not the compiler's")]
+#[unsafe(export_name = "isofeed_board")]
+pub(crate) static MARK: [u8; boards::MARK_BYTES] = BOARD.mark();
+
 /// What remains of the chip once clocks and pins are set up: the parts that the drivers take.
 pub(crate) struct Board {
     /// The sample timer.
