@@ -11,7 +11,7 @@ use protocol::message::{Description, Status};
 use rtic::Mutex;
 
 use crate::{
-    board,
+    board::BOARD,
     design_parameters::{FIRMWARE_VERSION, JOB_WORDS, PERIOD_US},
 };
 
@@ -29,7 +29,7 @@ pub(crate) struct GuardedMachine<'a, M> {
 
 impl<M: Mutex<T = BoardRealTime>> Machine for GuardedMachine<'_, M> {
     fn description(&mut self) -> Description {
-        describe(FIRMWARE_VERSION, board::NAME, JOB_WORDS, PERIOD_US)
+        describe(FIRMWARE_VERSION, BOARD.id, JOB_WORDS, PERIOD_US)
     }
 
     fn status(&mut self) -> Status {

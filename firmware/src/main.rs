@@ -28,6 +28,7 @@ defmt::timestamp!("{=u64:us}", u64::from(uptime_periods()) * u64::from(PERIOD_US
 
 #[rtic::app(device = stm32f4xx_hal::pac, peripherals = true)]
 mod app {
+    use boards::{Line, Role};
     use controller::{
         link::Link,
         machine::{Command, Event},
@@ -36,13 +37,14 @@ mod app {
     use heapless::spsc::{Consumer, Producer, Queue};
 
     use crate::{
-        board::{self, StatusPin},
+        board::{self, BOARD},
         design_parameters::{
             COMMAND_PLACES, EVENT_PLACES, FLUSH_PERIODS, JOB_WORDS, PERIOD_COUNTS, RECEIVE_PLACES,
             TICK_BUDGET_CYCLES,
         },
         drivers::{
             cycle_counter::CycleCounter,
+            gpio::Output,
             sample_timer::{SampleTimer, uptime_periods},
             serial::{self, Receiver, Transmitter},
             status_led::StatusLed,
@@ -51,6 +53,9 @@ mod app {
         sample_task::SampleTask,
         watch::Watch,
     };
+
+    /// The status LED.
+    const LED: Line = BOARD.line(Role::StatusLed);
 
     #[shared]
     struct Shared {
@@ -64,7 +69,7 @@ mod app {
         task: SampleTask,
         receiver: Receiver,
         transmitter: Transmitter,
-        led: StatusLed<StatusPin>,
+        led: StatusLed<Output>,
         bytes_in: Producer<'static, u8>,
         bytes_out: Consumer<'static, u8>,
         commands_in: Producer<'static, Command>,
@@ -82,6 +87,8 @@ mod app {
     ])]
     fn init(context: init::Context) -> (Shared, Local) {
         let board = board::init(context.device);
+        // What nobody reads would not be in the image.
+        core::hint::black_box(&board::MARK);
         let counter = CycleCounter::new(context.core.DCB, context.core.DWT);
         let (transmitter, receiver) = serial::open(board.usart1, board::SERIAL_DIVIDER);
         let (bytes_in, bytes_out) = context.local.bytes.split();
@@ -91,7 +98,7 @@ mod app {
         defmt::info!(
             "isofeed {=str} on {=str}, room for {=usize} words",
             env!("CARGO_PKG_VERSION"),
-            board::NAME,
+            BOARD.id,
             JOB_WORDS
         );
         let mut real_time = RealTime::with_store(context.local.store);
@@ -105,7 +112,7 @@ mod app {
                 task: SampleTask::new(timer, counter, commands_out, events_in),
                 receiver,
                 transmitter,
-                led: StatusLed::new(board.status_pin),
+                led: StatusLed::new(Output::new(LED.pin), LED.active),
                 bytes_in,
                 bytes_out,
                 commands_in,

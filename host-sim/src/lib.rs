@@ -31,6 +31,7 @@ pub mod oracle;
 pub mod paper;
 pub mod placement;
 pub mod prepare;
+pub mod probe;
 pub mod remote;
 pub mod report;
 pub mod speeds;

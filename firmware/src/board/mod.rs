@@ -5,33 +5,57 @@
 //!
 //! | item | what |
 //! |---|---|
-//! | `NAME` | the board's name, for the log and for the host |
+//! | `BOARD` | its table: name, crystal, pins (crate `boards`) |
 //! | `TIMER_HZ` | what TIM2 and TIM5 count |
 //! | `TIMER_RELOAD` | auto-reload value of TIM2 for one period |
 //! | `SERIAL_DIVIDER` | `BRR` of USART1 |
-//! | `StatusPin` | the pin of the status LED |
 //! | `init` | clocks and pins; hands back what the drivers do not take |
 //! | `stop_for_good` | what follows a fault of the processor |
 //!
-//! The panic handler and the transport of the log come with the board's file, too. To add a board, add its
-//! file, its feature in `Cargo.toml`, and its lines here.
+//! All but the first are `chip.rs`'s for boards with a chip; QEMU has its own. So have the panic handler and the transport of the
+//! log. Drivers take their pins from `BOARD`, whatever the board. To add a board, add its table in `boards`, its file here, its
+//! feature in `Cargo.toml`, and its lines below.
 
-#[cfg(all(feature = "board-qemu", feature = "board-stm32f405"))]
-compile_error!("choose one board: `cargo fw-qemu` or `cargo fw-chip`");
-#[cfg(not(any(feature = "board-qemu", feature = "board-stm32f405")))]
-compile_error!("choose a board: `cargo fw-qemu` or `cargo fw-chip`");
+#[cfg(not(any(
+    feature = "board-qemu",
+    feature = "board-stm32f405",
+    feature = "board-skr-pro"
+)))]
+compile_error!("choose a board: `cargo fw-qemu`, `cargo fw-chip` or `cargo fw-skr-pro`");
+#[cfg(any(
+    all(feature = "board-qemu", feature = "board-stm32f405"),
+    all(feature = "board-qemu", feature = "board-skr-pro"),
+    all(feature = "board-stm32f405", feature = "board-skr-pro")
+))]
+compile_error!("choose one board: `cargo fw-qemu`, `cargo fw-chip` or `cargo fw-skr-pro`");
 
 #[cfg(feature = "board-qemu")]
 mod qemu;
 #[cfg(feature = "board-qemu")]
-pub(crate) use qemu::{NAME, SERIAL_DIVIDER, StatusPin, TIMER_HZ, TIMER_RELOAD, init, stop_for_good};
+pub(crate) use qemu::{BOARD, SERIAL_DIVIDER, TIMER_HZ, TIMER_RELOAD, init, stop_for_good};
+
+#[cfg(not(feature = "board-qemu"))]
+mod chip;
+#[cfg(not(feature = "board-qemu"))]
+pub(crate) use chip::{SERIAL_DIVIDER, TIMER_HZ, TIMER_RELOAD, init, stop_for_good};
 
 #[cfg(feature = "board-stm32f405")]
 mod stm32f405;
 #[cfg(feature = "board-stm32f405")]
-pub(crate) use stm32f405::{NAME, SERIAL_DIVIDER, StatusPin, TIMER_HZ, TIMER_RELOAD, init, stop_for_good};
+pub(crate) use stm32f405::BOARD;
+
+#[cfg(feature = "board-skr-pro")]
+mod skr_pro;
+#[cfg(feature = "board-skr-pro")]
+pub(crate) use skr_pro::BOARD;
 
 use stm32f4xx_hal::pac;
+
+/// Which board the image is for: `cargo sim flash` finds it by this name, and refuses another board's image.
+// SAFETY: nothing else has this name; `boards::MARK_SYMBOL` says the same.
+#[allow(unsafe_code, reason = "a name that is not the compiler's")]
+#[unsafe(export_name = "isofeed_board")]
+pub(crate) static MARK: [u8; boards::MARK_BYTES] = BOARD.mark();
 
 /// What remains of the chip once clocks and pins are set up: the parts that the drivers take.
 pub(crate) struct Board {
@@ -41,8 +65,6 @@ pub(crate) struct Board {
     pub(crate) tim5: pac::TIM5,
     /// The link to the host.
     pub(crate) usart1: pac::USART1,
-    /// The status LED.
-    pub(crate) status_pin: StatusPin,
 }
 
 /// Where a panic happened, and its message where that is a plain text: `core`'s machinery for any other is 4 KB.

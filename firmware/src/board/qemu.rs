@@ -1,25 +1,24 @@
 //! QEMU's `netduinoplus2`: the same chip without clocks, pins, flash timing or a debugger.
 //!
-//! Clock and pin registers read as zero there (on newer versions they are plain storage), so nothing is set
+//! Clock and pin registers read as zero there (on newer versions clocks are plain storage), so no clock is set
 //! up and nothing is waited for. The log goes through semihosting to QEMU's standard output; a panic ends
 //! QEMU with exit code 101.
 
-use core::{
-    convert::Infallible,
-    sync::atomic::{AtomicBool, Ordering},
-};
+use core::sync::atomic::{AtomicBool, Ordering};
 
-use embedded_hal::digital::{ErrorType, OutputPin};
 use stm32f4xx_hal::pac;
 
 use super::Board;
-use crate::design_parameters::PERIOD_US;
+use crate::{design_parameters::PERIOD_US, drivers::gpio};
 
 // The log: this crate is linked for its `defmt` logger.
 use defmt_semihosting as _;
 
-/// Name of the board.
-pub(crate) const NAME: &str = "qemu-netduinoplus2";
+/// The bare chip's table: registers of pins are not there, writes to them are lost, and they read as zero (no input is active).
+pub(crate) const BOARD: &boards::Board = &boards::Board {
+    id: "qemu-netduinoplus2",
+    ..boards::STM32F405
+};
 
 /// QEMU feeds every timer with 1 GHz, whatever the clock registers say.
 pub(crate) const TIMER_HZ: u32 = 1_000_000_000;
@@ -36,35 +35,19 @@ const EXIT_PANIC: i32 = 101;
 /// Exit code of QEMU after a fault of the processor.
 const EXIT_FAULT: i32 = 102;
 
-/// There is no LED.
-pub(crate) struct StatusPin;
-
-impl ErrorType for StatusPin {
-    type Error = Infallible;
-}
-
-impl OutputPin for StatusPin {
-    fn set_low(&mut self) -> Result<(), Infallible> {
-        Ok(())
-    }
-
-    fn set_high(&mut self) -> Result<(), Infallible> {
-        Ok(())
-    }
-}
-
-/// Sorts out the peripherals; there is nothing to set up.
+/// Sorts out the peripherals. The pins are set up as on the chip, in vain.
 pub(crate) fn init(device: pac::Peripherals) -> Board {
+    gpio::set_up(&device.RCC, BOARD.lines);
     Board {
         tim2: device.TIM2,
         tim5: device.TIM5,
         usart1: device.USART1,
-        status_pin: StatusPin,
     }
 }
 
 /// Ends QEMU, so that whoever waits for it learns of the fault.
 pub(crate) fn stop_for_good() -> ! {
+    gpio::rest(BOARD.lines);
     semihosting::process::exit(EXIT_FAULT)
 }
 

@@ -1,6 +1,7 @@
 //! What touches the chip's registers, one file a device. They know no board and no feature.
 
 pub(crate) mod cycle_counter;
+pub(crate) mod gpio;
 mod hard_fault;
 pub(crate) mod sample_timer;
 pub(crate) mod serial;

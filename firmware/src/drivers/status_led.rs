@@ -1,22 +1,28 @@
 //! The status LED: off without a run, on while the tool moves, blinking after a fault. Any output pin that
 //! `embedded-hal` knows.
 
+use boards::Level;
 use embedded_hal::digital::{OutputPin, PinState};
 use interp_core::sample::State;
 
 /// Half a blink, in periods, as a power of two: 256 ms at 1 ms.
 const BLINK_BIT: u32 = 8;
 
-/// An LED that shines when its pin is low.
+/// The LED.
 pub(crate) struct StatusLed<P> {
     pin: P,
+    shines_at: Level,
     lit: bool,
 }
 
 impl<P: OutputPin> StatusLed<P> {
-    /// The LED on this pin, dark.
-    pub(crate) fn new(pin: P) -> Self {
-        let mut led = Self { pin, lit: true };
+    /// The LED on this pin, dark. It shines when the pin has this level.
+    pub(crate) fn new(pin: P, shines_at: Level) -> Self {
+        let mut led = Self {
+            pin,
+            shines_at,
+            lit: true,
+        };
         led.set(false);
         led
     }
@@ -33,8 +39,9 @@ impl<P: OutputPin> StatusLed<P> {
     fn set(&mut self, lit: bool) {
         if lit != self.lit {
             self.lit = lit;
+            let high = lit == (self.shines_at == Level::High);
             // A status light that cannot be switched is no reason to stop anything.
-            let _ = self.pin.set_state(PinState::from(!lit));
+            let _ = self.pin.set_state(PinState::from(high));
         }
     }
 }

@@ -6,7 +6,9 @@ mod budget;
 mod completions;
 mod explain;
 mod export;
+mod flash;
 mod import;
+mod log;
 mod new;
 mod out;
 mod outcome;
@@ -93,6 +95,8 @@ enum Command {
     Import(import::Arguments),
     Paper(paper::Arguments),
     Budget(budget::Arguments),
+    Flash(flash::Arguments),
+    Log(log::Arguments),
     New(new::Arguments),
     Explain(explain::Arguments),
     Completions(completions::Arguments),
@@ -109,6 +113,8 @@ impl Command {
             Self::Import(arguments) => arguments.json,
             Self::Paper(arguments) => arguments.json,
             Self::Budget(arguments) => arguments.json,
+            Self::Flash(arguments) => arguments.json,
+            Self::Log(arguments) => arguments.json,
             Self::New(arguments) => arguments.json,
             Self::Explain(arguments) => arguments.json,
             Self::Completions(_) => false,
@@ -124,6 +130,8 @@ impl Command {
             Self::Import(arguments) => import::command(arguments),
             Self::Paper(arguments) => paper::command(arguments),
             Self::Budget(arguments) => budget::command(arguments),
+            Self::Flash(arguments) => flash::command(arguments),
+            Self::Log(arguments) => log::command(arguments),
             Self::New(arguments) => new::command(arguments),
             Self::Explain(arguments) => explain::command(arguments),
             Self::Completions(arguments) => completions::command(arguments),

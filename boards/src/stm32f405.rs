@@ -1,0 +1,52 @@
+//! A bare STM32F405RG (or any F405, F407 in a larger housing) with an 8 MHz crystal, and drives and switches wired to its pins.
+//!
+//! The pins are all in the smallest housing, and so on any board that leads them out; the LED is the Olimex STM32-H405's. What
+//! the choice rests on: step pins on one port, for DMA into one set/reset register; inputs on eight different lines of the
+//! interrupt controller; nothing on the pins of debugger, crystals, boot and USB, nor on PC13 to PC15, which drive next to nothing.
+
+use crate::{
+    Axis::{X, Y, Z},
+    Board, Chip,
+    Level::{High, Low},
+    Line, Package,
+    Port::{A, B, C},
+    Role::{
+        Direction, DriveFault, EmergencyStop, Enable, LimitMax, LimitMin, SerialRx, SerialTx, StatusLed, Step,
+    },
+};
+
+/// The bare chip.
+pub const STM32F405: Board = Board {
+    id: "stm32f405",
+    name: "bare STM32F405 or F407",
+    chip: Chip {
+        name: "STM32F405RGTx",
+        device_id: 0x413,
+        flash_bytes: 1024 * 1024,
+        package: Package::Lqfp64,
+    },
+    crystal_mhz: 8,
+    build: ("fw-chip", "chip"),
+    lines: &[
+        Line::new(Step(X), C, 6, High, "the pin"),
+        Line::new(Direction(X), B, 12, High, "the pin"),
+        Line::new(Enable(X), B, 5, Low, "the pin"),
+        Line::new(Step(Y), C, 7, High, "the pin"),
+        Line::new(Direction(Y), B, 13, High, "the pin"),
+        Line::new(Enable(Y), B, 6, Low, "the pin"),
+        Line::new(Step(Z), C, 8, High, "the pin"),
+        Line::new(Direction(Z), B, 14, High, "the pin"),
+        Line::new(Enable(Z), B, 7, Low, "the pin"),
+        Line::new(LimitMin(X), C, 0, High, "the pin"),
+        Line::new(LimitMax(X), C, 1, High, "the pin"),
+        Line::new(LimitMin(Y), C, 2, High, "the pin"),
+        Line::new(LimitMax(Y), C, 3, High, "the pin"),
+        Line::new(LimitMin(Z), B, 8, High, "the pin"),
+        Line::new(LimitMax(Z), B, 9, High, "the pin"),
+        Line::new(EmergencyStop, B, 10, High, "the pin"),
+        Line::new(DriveFault, B, 11, High, "the pin"),
+        Line::new(StatusLed, C, 12, Low, "LED of the STM32-H405"),
+        Line::new(SerialTx, A, 9, High, "the pin"),
+        Line::new(SerialRx, A, 10, High, "the pin"),
+    ],
+};

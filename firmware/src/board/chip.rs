@@ -1,0 +1,98 @@
+//! What all boards with an STM32F405 or F407 have in common: clocks at 168 MHz from the crystal, pins by the board's table, USART1,
+//! the log by the debug probe (RTT), and so a panic.
+
+use defmt_rtt as _;
+use stm32f4xx_hal::{
+    pac,
+    prelude::*,
+    rcc::{self, Enable},
+};
+
+use super::{BOARD, Board};
+use crate::{
+    design_parameters::{PERIOD_US, SERIAL_BAUD},
+    drivers::gpio,
+};
+
+/// The processor's clock, MHz: the most that the chip is made for.
+const CORE_MHZ: u32 = 168;
+
+/// APB1, MHz: a quarter of the core clock, its limit being 42 MHz.
+const APB1_MHZ: u32 = CORE_MHZ / 4;
+
+/// APB2, MHz: half the core clock, its limit being 84 MHz.
+const APB2_MHZ: u32 = CORE_MHZ / 2;
+
+/// Timers on a divided APB1 count at twice its clock (RM0090, 7.2).
+pub(crate) const TIMER_HZ: u32 = 2 * APB1_MHZ * 1_000_000;
+
+/// The timer counts from 0 to the reload value inclusive.
+pub(crate) const TIMER_RELOAD: u32 = TIMER_HZ / 1_000_000 * PERIOD_US - 1;
+
+/// USART1 hangs on APB2; 16 samples a bit make the divider the plain quotient, here rounded.
+pub(crate) const SERIAL_DIVIDER: u16 = {
+    let apb2_hz = APB2_MHZ * 1_000_000;
+    let divider = (apb2_hz + SERIAL_BAUD / 2) / SERIAL_BAUD;
+    // Both ends together may differ by about 3 % before the stop bit is missed; a third of it is ours.
+    let real_baud = apb2_hz / divider;
+    assert!(
+        real_baud.abs_diff(SERIAL_BAUD) < SERIAL_BAUD / 100,
+        "the baud rate cannot be met"
+    );
+    assert!(
+        divider >= 16 && divider <= u16::MAX as u32,
+        "the baud rate is out of USART1's range"
+    );
+    divider as u16
+};
+
+/// Sets up pins and clocks: the pins first, on the clock that the chip starts with, so that drives, heaters and fans are off from
+/// the first microseconds on. Waits for crystal and PLL: without a crystal the board stays here.
+pub(crate) fn init(device: pac::Peripherals) -> Board {
+    gpio::set_up(&device.RCC, BOARD.lines);
+    let mut rcc = device.RCC.freeze(
+        rcc::Config::hse(BOARD.crystal_mhz.MHz())
+            .sysclk(CORE_MHZ.MHz())
+            .hclk(CORE_MHZ.MHz())
+            .pclk1(APB1_MHZ.MHz())
+            .pclk2(APB2_MHZ.MHz()),
+    );
+    // The constants above are what the timers and the link rely on.
+    defmt::assert_eq!(rcc.clocks.sysclk().raw(), CORE_MHZ * 1_000_000);
+    defmt::assert_eq!(rcc.clocks.timclk1().raw(), TIMER_HZ);
+    defmt::assert_eq!(rcc.clocks.pclk2().raw(), APB2_MHZ * 1_000_000);
+
+    pac::TIM2::enable(&mut rcc);
+    pac::TIM5::enable(&mut rcc);
+    pac::USART1::enable(&mut rcc);
+    // The probe reads the log while the processor sleeps.
+    device.DBGMCU.cr().modify(|_, w| w.dbg_sleep().set_bit());
+    // Halted by a debugger, both timers stand still, so that a breakpoint is not a missed period.
+    device
+        .DBGMCU
+        .apb1_fz()
+        .modify(|_, w| w.dbg_tim2_stop().set_bit().dbg_tim5_stop().set_bit());
+
+    Board {
+        tim2: device.TIM2,
+        tim5: device.TIM5,
+        usart1: device.USART1,
+    }
+}
+
+/// Stays here, with every output at rest: what may still be under way to the step pins moves nothing.
+pub(crate) fn stop_for_good() -> ! {
+    gpio::rest(BOARD.lines);
+    loop {
+        cortex_m::asm::nop();
+    }
+}
+
+#[panic_handler]
+fn panic(info: &core::panic::PanicInfo<'_>) -> ! {
+    // Nothing is to move meanwhile, nor to panic in between.
+    cortex_m::interrupt::disable();
+    gpio::rest(BOARD.lines);
+    super::log_panic(info);
+    stop_for_good()
+}

@@ -1,0 +1,250 @@
+//! `flash`: the firmware into a board's chip, by a debug probe.
+
+use std::path::{Path, PathBuf};
+use std::time::Instant;
+
+use boards::{BOARDS, Board};
+use clap::Args;
+use indicatif::ProgressBar;
+use serde_json::json;
+
+use super::out::{complain, say};
+use super::{Failure, Result, progress, spinner};
+use crate::probe::{self, Event, Image, NotRun, Problem, Program, Request, Target, Work};
+use crate::remote::qemu::cargo;
+
+/// Writes the firmware into a board's flash by a debug probe, compares what was written, and starts it.
+///
+/// Builds the firmware first where it has changed. Switch the drives' power off before: the pins of a chip that is being written do
+/// as they like. docs/bring-up.md has the wiring.
+///
+/// Example: cargo sim flash --board skr-pro
+/// Example: cargo sim flash --board stm32f405 --chip STM32F407VETx --probe 0483:3748
+#[derive(Debug, Args)]
+#[command(verbatim_doc_comment)]
+pub(super) struct Arguments {
+    #[command(flatten)]
+    pub(super) place: Place,
+    /// Compares only: writes nothing, and what runs goes on running.
+    #[arg(long)]
+    verify: bool,
+    /// Prints one JSON object instead of text.
+    #[arg(long)]
+    pub(super) json: bool,
+}
+
+/// Which board, by which probe.
+#[derive(Debug, Args)]
+pub(super) struct Place {
+    /// The board.
+    #[arg(long, value_name = "BOARD", value_parser = board_parser(), default_value = "stm32f405")]
+    board: String,
+    /// The chip, where it is another than the board's usual one: probe-rs's name.
+    #[arg(long, value_name = "NAME")]
+    chip: Option<String>,
+    /// The debug probe, where there are several: VID:PID or VID:PID:SERIAL, hexadecimal.
+    #[arg(long, value_name = "SELECTOR")]
+    probe: Option<String>,
+    /// An ELF file of the firmware, instead of building it.
+    #[arg(long, value_name = "ELF")]
+    pub(super) image: Option<PathBuf>,
+}
+
+fn board_parser() -> clap::builder::PossibleValuesParser {
+    BOARDS
+        .map(|board| clap::builder::PossibleValue::new(board.id).help(board.name))
+        .into()
+}
+
+impl From<NotRun> for Failure {
+    fn from(error: NotRun) -> Self {
+        match error {
+            // These are of the command line's making.
+            NotRun::Problem(
+                problem @ (Problem::BadSelector(_)
+                | Problem::UnknownChip(_)
+                | Problem::BadImage(_)
+                | Problem::SeveralProbes(_)),
+            ) => Self::input(probe::sentence(&problem), probe::remedy(&problem)),
+            NotRun::Problem(problem) => Self::Failed(Some(format!(
+                "{}\n  help: {}",
+                probe::sentence(&problem),
+                probe::remedy(&problem)
+            ))),
+            error @ NotRun::Program(_) => Self::Failed(Some(format!(
+                "{error}\n  help: run it in a checkout of the project, with its toolchain (./demo sets it up)"
+            ))),
+        }
+    }
+}
+
+impl Place {
+    pub(super) fn board(&self) -> &'static Board {
+        BOARDS
+            .into_iter()
+            .find(|board| board.id == self.board)
+            .unwrap_or(BOARDS[0])
+    }
+
+    /// Is there a probe? Asked before minutes are spent on the firmware.
+    pub(super) fn find(&self, program: &Program) -> Result<String> {
+        let mut found = String::new();
+        let request = Request::Find {
+            probe: self.probe.clone(),
+        };
+        program.run(&request, None, |event| {
+            if let Event::Probe { name } = event {
+                found.clone_from(name);
+            }
+        })?;
+        Ok(found)
+    }
+
+    /// The image: the one that is named, or the board's own, built.
+    pub(super) fn image(&self) -> Result<PathBuf> {
+        let board = self.board();
+        let (alias, folder) = board.build;
+        let Some(image) = &self.image else {
+            let built = format!("target/{folder}/thumbv7em-none-eabihf/release/firmware");
+            let bar = spinner("building the firmware");
+            let image = cargo(&[alias, "--quiet"], &built);
+            bar.finish_and_clear();
+            return image
+                .map_err(|words| Failure::Failed(Some(format!("the firmware could not be built: {words}"))));
+        };
+        if !image.is_file() {
+            return Err(Failure::input(
+                format!("there is no image {}", image.display()),
+                format!("build it with `cargo {alias}`, or leave --image out"),
+            ));
+        }
+        Ok(image.clone())
+    }
+
+    pub(super) fn target(&self, image: &Path) -> Target {
+        let chip = self.board().chip;
+        Target {
+            probe: self.probe.clone(),
+            chip: self.chip.clone().unwrap_or_else(|| chip.name.to_owned()),
+            device_id: chip.device_id,
+            image: image.to_owned(),
+        }
+    }
+}
+
+/// The program that talks to probes.
+pub(super) fn program() -> Result<Program> {
+    if !Program::is_built() {
+        complain!("building the program that talks to debug probes (once, some minutes)");
+    }
+    Ok(Program::build()?)
+}
+
+/// Reads an image, and makes sure that it is one for this board and fits its flash.
+pub(super) fn load(path: &Path, board: &Board) -> Result<Image> {
+    let refused = |why: String| {
+        Failure::input(
+            format!("{}: {why}", path.display()),
+            format!(
+                "`cargo {}` builds the image for the board {}",
+                board.build.0, board.id
+            ),
+        )
+    };
+    let image = Image::load(path).map_err(refused)?;
+    image.check_for(board).map_err(refused)?;
+    Ok(image)
+}
+
+/// A bar for each kind of work.
+pub(super) struct Bars(Option<(Work, ProgressBar)>);
+
+impl Bars {
+    pub(super) fn new() -> Self {
+        Self(None)
+    }
+
+    pub(super) fn show(&mut self, work: Work, done: u64, total: u64) {
+        let bar = match &self.0 {
+            Some((shown, bar)) if *shown == work => bar,
+            _ => {
+                self.end();
+                let what = match work {
+                    Work::Erase => "erasing",
+                    Work::Write => "writing",
+                    Work::Compare => "comparing",
+                };
+                &self.0.insert((work, progress(total, what))).1
+            }
+        };
+        bar.set_position(done);
+    }
+
+    pub(super) fn end(&mut self) {
+        if let Some((_, bar)) = self.0.take() {
+            bar.finish_and_clear();
+        }
+    }
+}
+
+pub(super) fn command(arguments: &Arguments) -> Result<()> {
+    let place = &arguments.place;
+    let board = place.board();
+    // What can be told without a probe comes first, then what can without the firmware.
+    if place.image.is_some() {
+        load(&place.image()?, board)?;
+    }
+    let program = program()?;
+    let found = place.find(&program)?;
+    let path = place.image()?;
+    let image = load(&path, board)?;
+    let target = place.target(&path);
+    let chip = target.chip.clone();
+    let request = if arguments.verify {
+        Request::Compare(target)
+    } else {
+        Request::Flash(target)
+    };
+    let begun = Instant::now();
+    let mut bars = Bars::new();
+    let ran = program.run(&request, None, |event| {
+        if let Event::Progress { work, done, total } = event {
+            bars.show(*work, *done, *total);
+        }
+    });
+    bars.end();
+    ran?;
+    let seconds = begun.elapsed().as_secs_f64();
+    if arguments.json {
+        say!(
+            "{}",
+            json!({
+                "board": board.id,
+                "chip": chip,
+                "probe": found,
+                "image": path,
+                "bytes": image.bytes(),
+                "written": !arguments.verify,
+                "same": true,
+                "seconds": seconds,
+            })
+        );
+        return Ok(());
+    }
+    let done = if arguments.verify {
+        "the chip holds this image"
+    } else {
+        "written, compared, started"
+    };
+    say!(
+        "{}: {done}: {} bytes in {seconds:.1} s",
+        board.name,
+        image.bytes()
+    );
+    say!("  chip:  {chip}");
+    say!("  probe: {found}");
+    if !arguments.verify {
+        say!("  next:  cargo sim log --board {}", board.id);
+    }
+    Ok(())
+}

@@ -1,0 +1,160 @@
+//! An image of the firmware as a debug probe sees it: what goes where in flash, and which board it is for. The program that talks to
+//! probes (`host-sim/debug-probe`) compiles this very file.
+
+use std::path::Path;
+
+use boards::{Board, FLASH_BEGIN, MARK_BYTES, MARK_SYMBOL};
+use object::elf::PT_LOAD;
+use object::read::elf::{ElfFile32, ProgramHeader};
+use object::{Architecture, LittleEndian, Object, ObjectSection, ObjectSymbol};
+
+/// RAM that a stack may begin in: 128 KiB (RM0090, 2.3.1).
+const RAM: std::ops::RangeInclusive<u32> = 0x2000_0000..=0x2002_0000;
+/// Name of the control block of the log.
+const RTT_SYMBOL: &str = "_SEGGER_RTT";
+
+/// An image.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Image {
+    /// What goes to flash: address and bytes, ascending, none empty, none overlapping.
+    pub segments: Vec<(u32, Vec<u8>)>,
+    /// The board that it says it is for; an image of something else says none.
+    pub board: Option<String>,
+    /// Address of the control block of the log; QEMU's image has none.
+    pub rtt: Option<u32>,
+}
+
+type Elf<'a> = ElfFile32<'a, LittleEndian>;
+
+impl Image {
+    /// Reads an ELF file.
+    ///
+    /// # Errors
+    /// It cannot be read, is no ELF file for ARM, has nothing for flash, or parts that overlap: in words.
+    pub fn load(path: &Path) -> Result<Self, String> {
+        let bytes = std::fs::read(path).map_err(|error| format!("cannot read it: {error}"))?;
+        Self::parse(&bytes)
+    }
+
+    /// The same from bytes.
+    ///
+    /// # Errors
+    /// Likewise.
+    pub fn parse(bytes: &[u8]) -> Result<Self, String> {
+        let elf =
+            Elf::parse(bytes).map_err(|error| format!("it is no ELF file of a 32-bit chip: {error}"))?;
+        if elf.architecture() != Architecture::Arm {
+            return Err("it is for another processor than ARM".to_owned());
+        }
+        let mut segments = Vec::new();
+        for header in elf.elf_program_headers() {
+            if header.p_type(LittleEndian) != PT_LOAD || header.p_filesz(LittleEndian) == 0 {
+                continue;
+            }
+            let data = header
+                .data(LittleEndian, bytes)
+                .map_err(|()| "a segment reaches beyond the file's end".to_owned())?;
+            segments.push((header.p_paddr(LittleEndian), data.to_vec()));
+        }
+        segments.sort_unstable_by_key(|(address, _)| *address);
+        let ends = |(address, data): &(u32, Vec<u8>)| u64::from(*address) + data.len() as u64;
+        if segments.is_empty() {
+            return Err("it has nothing to write to flash".to_owned());
+        }
+        if segments.windows(2).any(|two| ends(&two[0]) > u64::from(two[1].0)) {
+            return Err("its parts overlap".to_owned());
+        }
+        Ok(Self {
+            segments,
+            board: mark(&elf),
+            rtt: symbol(&elf, RTT_SYMBOL),
+        })
+    }
+
+    /// Bytes to be written.
+    #[must_use]
+    pub fn bytes(&self) -> u64 {
+        self.segments.iter().map(|(_, data)| data.len() as u64).sum()
+    }
+
+    /// How much flash it needs from [`FLASH_BEGIN`] on, bytes.
+    ///
+    /// # Errors
+    /// A part of it lies before flash, or beyond what addresses can name: in words.
+    pub fn reach_bytes(&self) -> Result<u32, String> {
+        let mut reach = 0;
+        for (address, data) in &self.segments {
+            let end = u32::try_from(data.len()).ok().and_then(|length| {
+                let offset = address.checked_sub(FLASH_BEGIN)?;
+                offset.checked_add(length)
+            });
+            let Some(end) = end else {
+                return Err(format!(
+                    "{} bytes of it belong to {address:#010x}, which is no flash",
+                    data.len()
+                ));
+            };
+            reach = reach.max(end);
+        }
+        Ok(reach)
+    }
+
+    /// Whether it is this board's, fits its flash, and starts there.
+    ///
+    /// # Errors
+    /// It is not, or does not: in words.
+    pub fn check_for(&self, board: &Board) -> Result<(), String> {
+        match self.board.as_deref() {
+            Some(id) if id == board.id => {}
+            Some(id) => return Err(format!("the image is for the board {id}, not for {}", board.id)),
+            None => return Err("it is no image of this firmware".to_owned()),
+        }
+        let (reach, room) = (self.reach_bytes()?, board.chip.flash_bytes);
+        if reach > room {
+            return Err(format!(
+                "it needs {reach} bytes of flash, and the chip has {room}"
+            ));
+        }
+        self.check_start()
+    }
+
+    /// Whether a chip that begins with it finds a program: the stack in RAM, the first instruction in flash.
+    fn check_start(&self) -> Result<(), String> {
+        let reach = self.reach_bytes()?;
+        let start = match self.segments.first() {
+            Some((FLASH_BEGIN, data)) if data.len() >= 8 => data,
+            _ => {
+                return Err(format!(
+                    "it has no vector table at {FLASH_BEGIN:#010x}, where the chip begins: is it for a loader?"
+                ));
+            }
+        };
+        let word = |at: usize| u32::from_le_bytes([start[at], start[at + 1], start[at + 2], start[at + 3]]);
+        let (stack, reset) = (word(0), word(4));
+        let in_flash = reset
+            .checked_sub(FLASH_BEGIN)
+            .is_some_and(|offset| offset < reach);
+        if !RAM.contains(&stack) || !in_flash || reset & 1 == 0 {
+            return Err(format!(
+                "its vector table is none: stack at {stack:#010x}, start at {reset:#010x}"
+            ));
+        }
+        Ok(())
+    }
+}
+
+fn symbol(elf: &Elf<'_>, name: &str) -> Option<u32> {
+    let found = elf.symbols().find(|symbol| symbol.name() == Ok(name))?;
+    u32::try_from(found.address()).ok()
+}
+
+/// The board's name behind its symbol.
+fn mark(elf: &Elf<'_>) -> Option<String> {
+    let address = symbol(elf, MARK_SYMBOL)?;
+    let bytes = elf.sections().find_map(|section| {
+        let data = section.data_range(u64::from(address), MARK_BYTES as u64);
+        data.ok().flatten()
+    })?;
+    let name = std::str::from_utf8(bytes).ok()?;
+    Some(name.trim_end_matches('\0').to_owned())
+}

@@ -1,0 +1,210 @@
+//! Flashing and the log as far as they go without a probe: images, the log's decoding, what is said where no probe is. Builds the
+//! program that talks to probes, which takes minutes the first time.
+#![allow(clippy::unwrap_used, reason = "a test may fail by panic")]
+
+use std::fs::File;
+use std::io::Write;
+use std::path::{Path, PathBuf};
+use std::process::Command;
+use std::sync::OnceLock;
+use std::time::{Duration, Instant};
+
+use boards::{SKR_PRO, STM32F405};
+use host_sim::budget::image::chip;
+use host_sim::probe::{Event, Image, Line, NotRun, Problem, Program, Request, Target};
+use host_sim::remote::Session;
+use host_sim::remote::qemu::{self, Qemu};
+use integration_tests::{dome, upload};
+
+/// A selector of no probe: whatever is connected where the tests run is left alone.
+const NOWHERE: &str = "0000:0000:nowhere";
+
+fn program() -> &'static Program {
+    static PROGRAM: OnceLock<Program> = OnceLock::new();
+    PROGRAM.get_or_init(|| Program::build().unwrap())
+}
+
+fn chip_image() -> PathBuf {
+    chip().unwrap()
+}
+
+/// The image as another tool flattens it, from the first byte of flash on.
+fn flat(image: &Path) -> Vec<u8> {
+    let folder = tempfile::tempdir().unwrap();
+    let binary = folder.path().join("image.bin");
+    let made = Command::new("arm-none-eabi-objcopy")
+        .args(["-O", "binary"])
+        .args([image, &binary])
+        .status()
+        .unwrap();
+    assert!(made.success());
+    std::fs::read(binary).unwrap()
+}
+
+#[test]
+fn the_image_for_the_chip_is_what_binutils_makes_of_it() {
+    let path = chip_image();
+    let image = Image::load(&path).unwrap();
+    assert_eq!(image.board.as_deref(), Some(STM32F405.id));
+    assert!(
+        image
+            .rtt
+            .is_some_and(|at| (0x2000_0000..0x2002_0000).contains(&at))
+    );
+    image.check_for(&STM32F405).unwrap();
+    assert!(image.check_for(&SKR_PRO).unwrap_err().contains("stm32f405"));
+    let flat = flat(&path);
+    assert_eq!(image.reach_bytes(), Ok(u32::try_from(flat.len()).unwrap()));
+    let mut ours = vec![0; flat.len()];
+    for (address, data) in &image.segments {
+        let from = (*address - boards::FLASH_BEGIN) as usize;
+        ours[from..from + data.len()].copy_from_slice(data);
+    }
+    assert!(ours == flat, "the bytes differ");
+}
+
+#[test]
+fn the_image_for_qemu_is_for_no_chip() {
+    let image = Image::load(&qemu::firmware().unwrap()).unwrap();
+    assert_eq!(
+        (image.board.as_deref(), image.rtt),
+        (Some("qemu-netduinoplus2"), None)
+    );
+    for board in boards::BOARDS {
+        let why = image.check_for(board).unwrap_err();
+        assert!(why.contains("qemu-netduinoplus2"), "{why}");
+    }
+}
+
+/// Waits until the log's last line tells of this state; the firmware looks every 64 periods.
+fn wait_for(qemu: &Qemu, state: &str) -> Vec<u8> {
+    let begun = Instant::now();
+    loop {
+        let log = std::fs::read(qemu.log()).unwrap();
+        let (lines, _) = decoded(&log);
+        if lines.last().is_some_and(|line| line.message.starts_with(state)) {
+            return log;
+        }
+        assert!(begun.elapsed().as_secs() < 60, "no {state}: {lines:?}");
+        std::thread::sleep(Duration::from_millis(20));
+    }
+}
+
+/// QEMU's log of a job that is loaded, dropped, and loaded again: frames of the same encoding as the chip's, which only another way
+/// brings here.
+fn recorded() -> Vec<u8> {
+    let (qemu, stream) = Qemu::start(&qemu::firmware().unwrap()).unwrap();
+    let mut session = Session::open(stream, 1).unwrap();
+    let (header, words) = dome();
+    let requests = upload(header, &words);
+    let mut log = Vec::new();
+    for state in ["ready", "idle", "ready"] {
+        let count = if state == "idle" { 1 } else { requests.len() };
+        for request in &requests[..count] {
+            session.command(request).unwrap();
+        }
+        log = wait_for(&qemu, state);
+    }
+    log
+}
+
+/// Lines, and how many frames were lost.
+fn decoded(log: &[u8]) -> (Vec<Line>, usize) {
+    let mut file = tempfile::NamedTempFile::new().unwrap();
+    file.write_all(log).unwrap();
+    let request = Request::Decode {
+        image: qemu::firmware().unwrap(),
+    };
+    let (mut lines, mut lost) = (Vec::new(), 0);
+    program()
+        .run(
+            &request,
+            Some(File::open(file.path()).unwrap()),
+            |event| match event {
+                Event::Line(line) => lines.push(line.clone()),
+                Event::Lost => lost += 1,
+                other => panic!("{other:?}"),
+            },
+        )
+        .unwrap();
+    (lines, lost)
+}
+
+#[test]
+fn a_recorded_log_is_decoded_and_damage_costs_a_line() {
+    let log = recorded();
+    let (lines, lost) = decoded(&log);
+    assert_eq!(lost, 0);
+    let greeting = format!("isofeed {} on qemu-netduinoplus2", env!("CARGO_PKG_VERSION"));
+    assert!(lines[0].message.starts_with(&greeting), "{:?}", lines[0]);
+    assert!(lines.iter().all(|line| line.level.as_deref() == Some("info")));
+    let states: Vec<_> = lines[1..]
+        .iter()
+        .map(|line| line.message.split(':').next().unwrap())
+        .collect();
+    assert_eq!(states, ["ready", "idle", "ready"]);
+    // Time stamps are the board's own, s, and never go back.
+    let times: Vec<f64> = lines
+        .iter()
+        .map(|line| line.time.as_ref().unwrap().parse().unwrap())
+        .collect();
+    assert!(
+        times.is_sorted() && times[0] < 0.1 && times[1] < times[2] && times[2] < times[3],
+        "{times:?}"
+    );
+
+    // A byte of the second frame is damaged: that line is lost, or another, and the rest is as it was.
+    let second = log.iter().skip(1).position(|byte| *byte == 0).unwrap() + 3;
+    assert!(log[second] != 0, "a byte of a frame");
+    let mut damaged = log.clone();
+    damaged[second] ^= 0x55;
+    let (after, _) = decoded(&damaged);
+    assert!(after.ends_with(&lines[2..]) && after[0] == lines[0], "{after:?}");
+    // A reader that comes late begins within a frame.
+    let (late, lost) = decoded(&log[second + 2..]);
+    assert!(
+        late.ends_with(&lines[2..]) && late.len() + lost <= lines.len(),
+        "{late:?}"
+    );
+}
+
+/// What is said where no probe is, for each request that wants one; and of selectors that are none.
+#[test]
+fn without_a_probe_that_is_what_is_said() {
+    let image = chip_image();
+    let target = |probe: &str| Target {
+        probe: Some(probe.to_owned()),
+        chip: STM32F405.chip.name.to_owned(),
+        device_id: STM32F405.chip.device_id,
+        image: image.clone(),
+    };
+    let problem = |request: &Request| match program().run(request, None, |event| panic!("{event:?}")) {
+        Err(NotRun::Problem(problem)) => problem,
+        other => panic!("{other:?}"),
+    };
+    let find = |probe: &str| Request::Find {
+        probe: Some(probe.to_owned()),
+    };
+    for request in [
+        find(NOWHERE),
+        Request::Flash(target(NOWHERE)),
+        Request::Compare(target(NOWHERE)),
+        Request::Log(target(NOWHERE)),
+    ] {
+        assert_eq!(problem(&request), Problem::NoProbe, "{request:?}");
+    }
+    for selector in ["st-link", "0483", "xyz:1234", ""] {
+        assert_eq!(
+            problem(&find(selector)),
+            Problem::BadSelector(selector.to_owned())
+        );
+    }
+    // An image without a log for probes, or none at all, is refused before a probe is looked for.
+    for image in [qemu::firmware().unwrap(), "Cargo.toml".into()] {
+        let request = Request::Log(Target {
+            image,
+            ..target(NOWHERE)
+        });
+        assert!(matches!(problem(&request), Problem::BadImage(_)), "{request:?}");
+    }
+}
