@@ -34,11 +34,21 @@ pub enum FaultKind {
     DeadlineMissed = 12,
     /// A tick took more of its period than the board allows it. Value: processor cycles.
     TickOverBudget = 13,
+    /// The emergency stop was pressed: the drives are off, the home is lost. Value: the inputs asserted, as bits.
+    EmergencyStop = 16,
+    /// A limit switch was reached. Value: the limit switches asserted, as bits.
+    LimitSwitch = 17,
+    /// A drive reports a fault: the drives are off, the home is lost. Value: the drive faults asserted, as bits.
+    DriveFault = 18,
+    /// No word of the host for longer than it said. Value: that time in periods.
+    HostGone = 19,
+    /// A start while the machine does not know where its axes stand. Value: 0.
+    NotHomed = 20,
 }
 
 impl FaultKind {
     /// Every kind, in order of its code.
-    pub const ALL: [Self; 13] = [
+    pub const ALL: [Self; 18] = [
         Self::BallDoesNotFit,
         Self::DegenerateSurface,
         Self::ParameterBackwards,
@@ -52,6 +62,11 @@ impl FaultKind {
         Self::WrongState,
         Self::DeadlineMissed,
         Self::TickOverBudget,
+        Self::EmergencyStop,
+        Self::LimitSwitch,
+        Self::DriveFault,
+        Self::HostGone,
+        Self::NotHomed,
     ];
 
     /// The stable code.
@@ -83,6 +98,11 @@ impl FaultKind {
             Self::WrongState => "wrong-state",
             Self::DeadlineMissed => "deadline-missed",
             Self::TickOverBudget => "tick-over-budget",
+            Self::EmergencyStop => "emergency-stop",
+            Self::LimitSwitch => "limit-switch",
+            Self::DriveFault => "drive-fault",
+            Self::HostGone => "host-gone",
+            Self::NotHomed => "not-homed",
         }
     }
 }

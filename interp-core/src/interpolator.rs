@@ -27,6 +27,8 @@ pub enum Request {
     Resume = 3,
     /// Running or held: give the run up; faulted: acknowledge the fault. The position is kept, the job stays loaded (ready).
     Abort = 4,
+    /// Running or held: stop, then give the run up. The position is kept, the job stays loaded (ready).
+    Stop = 5,
 }
 
 impl Request {
@@ -39,6 +41,7 @@ impl Request {
             Self::Hold => matches!(state, State::Running),
             Self::Resume => matches!(state, State::Held),
             Self::Abort => matches!(state, State::Running | State::Held | State::Faulted),
+            Self::Stop => matches!(state, State::Running | State::Held),
         }
     }
 }
@@ -191,6 +194,14 @@ impl<S: AsRef<[i32]> + AsMut<[i32]>> Interpolator<S> {
         self.motion.trip(fault);
     }
 
+    /// Ends a run with a fault from outside in this very period, because the drives are off and nothing follows the path any
+    /// more. The first fault is kept. Ignored where no run is under way.
+    pub fn cut(&mut self, fault: Fault) {
+        if self.motion.state.is_under_way() {
+            self.motion.fail(fault);
+        }
+    }
+
     /// One period. Never blocks, never panics; bounded by the collapse of a patch and its evaluation at a few
     /// places, and at the start of a pass by a walk over 16 side spans.
     ///
@@ -334,7 +345,7 @@ impl Motion {
             }
             Request::Hold => State::Held,
             Request::Resume => State::Running,
-            Request::Abort => {
+            Request::Abort | Request::Stop => {
                 self.fault = None;
                 State::Ready
             }
