@@ -6,8 +6,9 @@ use interp_core::{
 };
 use proptest::prelude::*;
 use protocol::message::{
-    CHUNK_WORDS_MAX, Capabilities, Clock, Description, FaultReport, PassDigest, Reason, Reply, Report,
-    Request, SAMPLES_MAX, SampleRecord, Status, Words,
+    CHUNK_WORDS_MAX, Capabilities, Clock, Configuration, Description, FaultReport, HostGone, InputLines,
+    PassDigest, Reason, Reply, Report, Request, ResetCause, SAMPLES_MAX, SafetyStatus, SampleRecord, Status,
+    Words,
 };
 
 use super::{reasons, requests};
@@ -48,6 +49,27 @@ fn any_report() -> impl Strategy<Value = Report> {
     prop_oneof![Just(Report::Digests), Just(Report::Samples)]
 }
 
+prop_compose! {
+    fn any_configuration()(homing_required: bool, hold: bool, host_gone_ticks: u32) -> Configuration {
+        let host_gone = if hold { HostGone::Hold } else { HostGone::Finish };
+        Configuration { homing_required, host_gone, host_gone_ticks }
+    }
+}
+
+fn any_lines() -> impl Strategy<Value = InputLines> {
+    any::<u16>().prop_map(InputLines)
+}
+
+prop_compose! {
+    fn any_safety()(lines in any_lines(), latched in any_lines(), flags in any::<[bool; 3]>(), feed_override: u8,
+                    configuration in any_configuration(),
+                    reset in prop::sample::select(&[ResetCause::Unknown, ResetCause::Pin, ResetCause::LowPower]))
+        -> SafetyStatus {
+        let [homed, drives_on, host_gone] = flags;
+        SafetyStatus { lines, latched, homed, drives_on, host_gone, feed_override, configuration, reset }
+    }
+}
+
 pub(crate) fn any_request() -> impl Strategy<Value = Request> {
     let words = prop::collection::vec(any::<i32>(), 0..=CHUNK_WORDS_MAX);
     prop_oneof![
@@ -65,6 +87,11 @@ pub(crate) fn any_request() -> impl Strategy<Value = Request> {
         any_clock().prop_map(Request::Clock),
         any::<u32>().prop_map(|ticks| Request::Run { ticks }),
         any_report().prop_map(Request::Report),
+        any_configuration().prop_map(Request::Configure),
+        any::<bool>().prop_map(|on| Request::Drives { on }),
+        any::<[i32; 3]>().prop_map(|home_nm| Request::SetHome { home_nm }),
+        any::<u8>().prop_map(|percent| Request::Override { percent }),
+        any_lines().prop_map(|lines| Request::Simulate { lines }),
     ]
 }
 
@@ -79,7 +106,8 @@ prop_compose! {
 
 prop_compose! {
     fn any_status()(at in any_sample(), fault in prop::option::of((any::<u8>(), real())), clock in any_clock(),
-                    report in any_report(), counts in any::<[u32; 6]>(), digest in any::<u64>()) -> Status {
+                    report in any_report(), counts in any::<[u32; 6]>(), digest in any::<u64>(),
+                    safety in any_safety()) -> Status {
         let [credit, samples, deadline_misses, tick_cycles_max, samples_lost, frames_bad] = counts;
         Status {
             state: at.state,
@@ -98,6 +126,7 @@ prop_compose! {
             tick_cycles_max,
             samples_lost,
             frames_bad,
+            safety,
         }
     }
 }
@@ -126,6 +155,10 @@ fn any_reason() -> impl Strategy<Value = Reason> {
         any::<(u16, u16)>().prop_map(|(host, board)| Reason::Version { host, board }),
         any::<u16>().prop_map(|expected| Reason::OutOfOrder { expected }),
         prop::sample::select(&State::ALL[..]).prop_map(|state| Reason::WrongState { state }),
+        (any::<u8>(), real()).prop_map(|(code, value)| Reason::Unsafe {
+            fault: FaultReport { code, value }
+        }),
+        (any::<u32>(), any::<u32>()).prop_map(|(most, wanted)| Reason::OutOfRange { most, wanted }),
         (any::<u8>(), real(), any::<Option<u32>>()).prop_map(|(code, value, record)| Reason::Job {
             fault: FaultReport { code, value },
             record

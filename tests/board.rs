@@ -6,8 +6,9 @@ use controller::{
     in_process::Board,
     machine::{Command, Event, Events},
     realtime::{RealTime, TickInput},
+    safety::Order,
 };
-use integration_tests::{HELLO, Host, dome, upload};
+use integration_tests::{HELLO, Host, MAKE_READY, dome, upload};
 use interp_core::{
     fault::{Fault, FaultKind},
     interpolator::{self, Interpolator},
@@ -76,6 +77,9 @@ impl Desk {
         }
         desk.accepted(&Request::Clock(clock));
         desk.accepted(&Request::Report(report));
+        for request in MAKE_READY {
+            desk.accepted(&request);
+        }
         desk.ticks(3);
         desk
     }
@@ -349,6 +353,8 @@ fn a_full_output_stops_time_in_lockstep_only() {
     half.load_words(0, &words).unwrap();
     half.load_check(0).unwrap();
     half.load_finish().unwrap();
+    half.order(Order::Drives { on: true }).unwrap();
+    half.order(Order::SetHome { home_nm: [0; 3] }).unwrap();
     let mut way = Way::default();
     let start = Command::Request(interpolator::Request::Start);
     half.obey(Command::Report(Report::Samples), &mut way);

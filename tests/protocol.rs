@@ -18,8 +18,9 @@ use proptest::prelude::*;
 use protocol::{
     frame::{Decoder, FRAME_MAX, FrameError, write_reply},
     message::{
-        Batch, Capabilities, Clock, Description, FaultReport, PassDigest, Reason, Reply, Report, Request,
-        SampleRecord, Status, Words, read_reply, read_request,
+        Batch, Capabilities, Clock, Configuration, Description, FaultReport, HostGone, InputLines,
+        PassDigest, Reason, Reply, Report, Request, ResetCause, SafetyStatus, SampleRecord, Status, Words,
+        read_reply, read_request,
     },
 };
 
@@ -61,8 +62,26 @@ fn requests() -> Vec<Request> {
         Request::Clock(Clock::Lockstep),
         Request::Run { ticks: 1000 },
         Request::Report(Report::Samples),
+        Request::Reserved,
+        Request::Configure(CONFIGURATION),
+        Request::Drives { on: true },
+        Request::SetHome {
+            home_nm: [1, -2, i32::MAX],
+        },
+        Request::Acknowledge,
+        Request::Override { percent: 150 },
+        Request::Stop,
+        Request::Simulate {
+            lines: InputLines(0x102),
+        },
     ]
 }
+
+const CONFIGURATION: Configuration = Configuration {
+    homing_required: false,
+    host_gone: HostGone::Hold,
+    host_gone_ticks: 500,
+};
 
 const PATH: Place = Place {
     span: 1,
@@ -105,6 +124,16 @@ fn status() -> Status {
         tick_cycles_max: 20_000,
         samples_lost: 2,
         frames_bad: 3,
+        safety: SafetyStatus {
+            lines: InputLines(1),
+            latched: InputLines(0x201),
+            homed: false,
+            drives_on: true,
+            host_gone: true,
+            feed_override: 150,
+            configuration: CONFIGURATION,
+            reset: ResetCause::Watchdog,
+        },
     }
 }
 
@@ -140,6 +169,18 @@ fn reasons() -> Vec<Reason> {
             wanted: 1,
             received: 2,
         },
+        Reason::Unsafe {
+            fault: FaultReport {
+                code: 17,
+                value: 10.0,
+            },
+        },
+        Reason::DrivesOff,
+        Reason::OutOfRange {
+            most: 200,
+            wanted: 201,
+        },
+        Reason::Unsupported,
     ]
 }
 
@@ -270,6 +311,11 @@ fn every_reason_is_a_sentence_with_its_values() {
         "the board refuses the job: bad-patch (code 9), value 1.5, record 7"
     );
     assert_eq!(texts[12], "128 of 300 words arrived");
+    assert_eq!(
+        texts[14],
+        "not safe: limit-switch (code 17), limit switch x-, limit switch y-"
+    );
+    assert_eq!(texts[16], "201 is more than 200");
 }
 
 /// A link in session, waiting for request 2, and the machine behind it.
@@ -381,7 +427,7 @@ proptest! {
 
     /// What the frame's payload is, whole: an error, or bytes that mean something again.
     #[test]
-    fn a_payload_with_any_bytes_is_a_message_or_none(bytes in prop::collection::vec(any::<u8>(), 0..60), code in 0_u8..16) {
+    fn a_payload_with_any_bytes_is_a_message_or_none(bytes in prop::collection::vec(any::<u8>(), 0..60), code in 0_u8..24) {
         let mut bytes = bytes;
         bytes.splice(0..0, [2, code]);
         if let Ok((number, request)) = read_request(&bytes) {

@@ -9,11 +9,13 @@ use host_sim::job_file::JobFile;
 use host_sim::machine::Machine;
 use host_sim::prepare::{Prepared, prepare};
 use host_sim::remote::drive::{self, Expected};
+use host_sim::remote::operate::{self, Setup};
 use host_sim::remote::qemu::{self, Qemu};
+use host_sim::remote::session::Event;
 use host_sim::remote::{RemoteError, Session};
 use interp_core::{FaultKind, Sample, State};
 use protocol::digest::Digest;
-use protocol::message::{Clock, Reason, Report, Request};
+use protocol::message::{Clock, Configuration, HostGone, InputLines, Reason, Report, Request, Status};
 
 fn image() -> &'static Path {
     static IMAGE: OnceLock<PathBuf> = OnceLock::new();
@@ -22,7 +24,8 @@ fn image() -> &'static Path {
 
 fn board() -> (Qemu, Session) {
     let (qemu, stream) = Qemu::start(image()).unwrap();
-    let session = Session::open(stream, 1).unwrap();
+    let mut session = Session::open(stream, 1).unwrap();
+    operate::make_ready(&mut session, &Setup::simulated(Configuration::DEFAULT)).unwrap();
     (qemu, session)
 }
 
@@ -229,4 +232,101 @@ fn refusals_change_nothing() {
         std::thread::sleep(std::time::Duration::from_millis(50));
     };
     assert_eq!((status.samples, status.digest), (samples, digest));
+}
+
+/// What the board says next that it has halted with.
+fn halted(session: &mut Session) -> Status {
+    loop {
+        if let Event::Halted(status) = session.event().unwrap() {
+            return status;
+        }
+    }
+}
+
+/// The emergency stop, on pins that the host sets: through the firmware's drivers, in the tick that comes next, and undone in order.
+#[test]
+fn an_emergency_stop_ends_the_run_on_the_board() {
+    let job = job("sphere_cap");
+    let (_qemu, mut session) = board();
+    drive::upload(&mut session, &job, |_| {}).unwrap();
+    session.command(&Request::Clock(Clock::Lockstep)).unwrap();
+    session.command(&Request::Start).unwrap();
+    session.command(&Request::Run { ticks: 500 }).unwrap();
+    assert_eq!(halted(&mut session).samples, 500);
+    let lines = InputLines::EMERGENCY_STOP;
+    session.command(&Request::Simulate { lines }).unwrap();
+    let stopped = halted(&mut session);
+    assert_eq!((stopped.state, stopped.samples), (State::Faulted, 500));
+    let fault = stopped.fault.unwrap();
+    assert_eq!(
+        (fault.kind(), fault.lines()),
+        (Some(FaultKind::EmergencyStop), lines)
+    );
+    assert!(!stopped.safety.drives_on && !stopped.safety.homed);
+    let refused = |done| {
+        matches!(
+            done,
+            Err(RemoteError::Refused {
+                reason: Reason::Unsafe { .. },
+                ..
+            })
+        )
+    };
+    assert!(refused(session.command(&Request::Acknowledge)));
+    let lines = InputLines::NONE;
+    session.command(&Request::Simulate { lines }).unwrap();
+    // Released for some periods, it can be acknowledged; the drives do not come on before.
+    let setup = Setup::simulated(Configuration::DEFAULT);
+    while !session.status().unwrap().safety.lines.is_none() {}
+    assert!(refused(operate::make_ready(&mut session, &setup)));
+    session.command(&Request::Acknowledge).unwrap();
+    operate::make_ready(&mut session, &setup).unwrap();
+    session.command(&Request::Abort).unwrap();
+    session.command(&Request::Run { ticks: 1 }).unwrap();
+    assert_eq!(halted(&mut session).state, State::Ready);
+    session.command(&Request::Start).unwrap();
+    session.command(&Request::Run { ticks: 500 }).unwrap();
+    let again = halted(&mut session);
+    assert_eq!((again.samples, again.digest), (500, stopped.digest));
+}
+
+/// On the board's own clock: nobody asks for two seconds of its time, and the run is held; asked again it goes on. That it
+/// goes on exactly is seen in `tests/safety.rs`; here each stand is compared with this machine's run so far.
+#[test]
+fn a_run_whose_host_is_gone_is_held_on_the_board() {
+    let job = job("sphere_cap");
+    let (_qemu, mut session) = board();
+    let configuration = Configuration {
+        host_gone: HostGone::Hold,
+        host_gone_ticks: 2000,
+        ..Configuration::DEFAULT
+    };
+    operate::make_ready(&mut session, &Setup::simulated(configuration)).unwrap();
+    drive::upload(&mut session, &job, |_| {}).unwrap();
+    session.command(&Request::Clock(Clock::Free)).unwrap();
+    session.command(&Request::Start).unwrap();
+    let mut before = 0;
+    for _ in 0..2 {
+        // The board's two seconds take 40 ms or so, unless this machine has other things to do.
+        let status = loop {
+            std::thread::sleep(std::time::Duration::from_millis(500));
+            let status = session.status().unwrap();
+            if status.state != State::Running {
+                break status;
+            }
+        };
+        assert_eq!((status.state, status.fault), (State::Held, None));
+        assert!(status.safety.host_gone && status.samples > before);
+        let mut digest = Digest::new();
+        Machine::load(&job)
+            .unwrap()
+            .run(|sample| {
+                digest.sample(sample);
+                sample.tick + 1 < status.samples
+            })
+            .unwrap();
+        assert_eq!(status.digest, digest.value(), "after {}", status.samples);
+        before = status.samples;
+        session.command(&Request::Resume).unwrap();
+    }
 }

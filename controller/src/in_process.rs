@@ -7,12 +7,13 @@ use interp_core::{
     fault::Fault,
     job::{Header, STORE_WORDS},
 };
-use protocol::message::{Description, Status};
+use protocol::message::{Description, InputLines, Reason, Status};
 
 use crate::{
     link::Link,
     machine::{Busy, Command, Event, Events, Machine, describe},
     realtime::{RealTime, TickInput},
+    safety::Order,
 };
 
 /// Commands that may wait for the next tick, as in the firmware.
@@ -35,6 +36,7 @@ impl Events for Vec<Event> {
 struct Half<const WORDS: usize> {
     real_time: RealTime<[i32; WORDS]>,
     commands: VecDeque<Command>,
+    lines: InputLines,
 }
 
 impl<const WORDS: usize> Machine for Half<WORDS> {
@@ -72,6 +74,19 @@ impl<const WORDS: usize> Machine for Half<WORDS> {
         }
         self.commands.push_back(command);
         Ok(())
+    }
+
+    fn order(&mut self, order: Order) -> Result<(), Reason> {
+        self.real_time.order(order)
+    }
+
+    fn heard(&mut self) {
+        self.real_time.heard();
+    }
+
+    fn simulate(&mut self, lines: InputLines) -> bool {
+        self.lines = lines;
+        true
     }
 
     fn commands_wait(&mut self) -> bool {
@@ -115,14 +130,22 @@ impl<const WORDS: usize> Board<WORDS> {
         if let Some(command) = self.half.commands.pop_front() {
             self.half.real_time.obey(command, &mut events);
         }
-        self.half
-            .real_time
-            .tick(TickInput { missed, cycles }, &mut events);
+        let input = TickInput {
+            missed,
+            cycles,
+            lines: self.half.lines,
+        };
+        self.half.real_time.tick(input, &mut events);
         let sent = &mut self.sent;
         for event in events {
             self.link
                 .event(&event, &mut |bytes| sent.extend_from_slice(bytes));
         }
+    }
+
+    /// Gives the board these inputs, beside the line.
+    pub const fn simulate(&mut self, lines: InputLines) {
+        self.half.lines = lines;
     }
 
     /// The bytes that the board has sent since the last call.

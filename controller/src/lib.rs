@@ -32,5 +32,6 @@ pub mod in_process;
 pub mod link;
 pub mod machine;
 pub mod realtime;
+pub mod safety;
 mod session;
 mod upload;

@@ -51,6 +51,9 @@ impl Link {
                     send(&Reply::Samples(core::mem::take(&mut self.batch)), out);
                 }
                 self.session.frame(frame, machine, out);
+                if self.is_open() {
+                    machine.heard();
+                }
             }
             Some(Err(error)) => self.damaged(error, out),
         }

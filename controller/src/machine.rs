@@ -5,12 +5,16 @@ use interp_core::{
     interpolator,
     job::{Header, SurfaceKind, patches_max},
 };
-use protocol::message::{CHUNK_WORDS_MAX, Clock, Description, PassDigest, Report, Status};
+use protocol::message::{
+    CHUNK_WORDS_MAX, Clock, Description, InputLines, PassDigest, Reason, Report, Status,
+};
+
+use crate::safety::Order;
 
 /// What the link asks of the real-time half; taken up with the next tick of the sample timer, in order.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Command {
-    /// Start, hold, resume or abort; goes to the interpolator with the next period that passes.
+    /// Start, hold, resume, stop or abort; goes to the interpolator with the next period that passes.
     Request(interpolator::Request),
     /// What drives time.
     Clock(Clock),
@@ -21,6 +25,11 @@ pub enum Command {
     },
     /// What a run tells the host.
     Report(Report),
+    /// Feed override, percent.
+    Override {
+        /// At most [`protocol::message::OVERRIDE_MAX_PERCENT`].
+        percent: u8,
+    },
 }
 
 /// What the real-time half tells the link, in order.
@@ -109,6 +118,21 @@ pub trait Machine {
     /// # Errors
     /// [`Busy`] where the queue is full.
     fn send(&mut self, command: Command) -> Result<(), Busy>;
+
+    /// Does what the host asks of drives and home, at once.
+    ///
+    /// # Errors
+    /// Why not; nothing has changed then.
+    fn order(&mut self, order: Order) -> Result<(), Reason>;
+
+    /// A frame of the host arrived, whole.
+    fn heard(&mut self);
+
+    /// Gives the board these inputs; false where it reads its own.
+    fn simulate(&mut self, lines: InputLines) -> bool {
+        let _ = lines;
+        false
+    }
 
     /// Whether commands sent before still wait in the queue: a start that waits there is not to meet another job than
     /// was loaded when it was sent.

@@ -8,6 +8,7 @@
 //! along the path ([`Interpolator::trip`]).
 //! **Tick over budget.** Its cycles are known to the next tick, which trips the run with [`FaultKind::TickOverBudget`] on the
 //! same terms: before ticks are missed.
+//! **Inputs.** Looked at in every tick of the timer, whether time passes or not; what they do is in [`crate::safety`].
 
 use interp_core::{
     fault::{Fault, FaultKind, Result},
@@ -17,18 +18,23 @@ use interp_core::{
 };
 use protocol::{
     digest::Digest,
-    message::{Clock, FaultReport, PassDigest, Report, Status},
+    message::{Clock, FaultReport, InputLines, PassDigest, Reason, Report, ResetCause, Status},
 };
 
-use crate::machine::{Command, Event, Events};
+use crate::{
+    machine::{Command, Event, Events},
+    safety::{Order, Safety, Stop, may_start},
+};
 
-/// What a tick of the sample timer learns of the one before.
+/// What a tick of the sample timer learns of the one before, and of the board.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct TickInput {
     /// Ticks of the sample timer that were missed since the last call.
     pub missed: u32,
     /// CPU cycles of the last tick; 0 where the board cannot measure.
     pub cycles: u32,
+    /// The safety inputs, as they are read now.
+    pub lines: InputLines,
 }
 
 /// What is kept of a run: counters and digests.
@@ -103,6 +109,7 @@ struct Control {
     report: Report,
     /// Waits for a period to pass.
     request: Request,
+    safety: Safety,
 }
 
 impl Control {
@@ -114,6 +121,7 @@ impl Control {
             clock: Clock::Free,
             report: Report::Digests,
             request: Request::None,
+            safety: Safety::NEW,
         }
     }
 
@@ -127,8 +135,9 @@ impl Control {
     /// Takes a command up; false for a `Run` that leaves no time, which halts at once.
     fn obey(&mut self, command: Command) -> bool {
         match command {
-            // An abort that waits for its period is not to be undone by what comes behind it.
+            // An abort or stop that waits for its period is not to be undone by what comes behind it.
             Command::Request(_) if self.request == Request::Abort => {}
+            Command::Request(request) if self.request == Request::Stop && request != Request::Abort => {}
             Command::Request(request) => self.request = request,
             Command::Clock(clock) => {
                 self.clock = clock;
@@ -141,6 +150,7 @@ impl Control {
                 return self.credit > 0;
             }
             Command::Report(report) => self.report = report,
+            Command::Override { percent } => self.safety.set_override(percent),
         }
         true
     }
@@ -149,6 +159,19 @@ impl Control {
     #[inline]
     const fn is_in_time(&self, input: TickInput) -> bool {
         input.missed == 0 && input.cycles <= self.run.tick_cycles_max && input.cycles <= self.tick_budget
+    }
+
+    /// What becomes of a start whose period passes: a run that is counted from nothing, or no run where it is not safe, which
+    /// the link did not know yet.
+    #[cold]
+    #[inline(never)]
+    fn begin(&mut self) -> Request {
+        if may_start(&self.safety.status()).is_err() {
+            return Request::None;
+        }
+        self.run = Run::NEW;
+        self.safety.begin_run();
+        Request::Start
     }
 
     /// Notes misses and cycles; the fault that they are to a tool that moves on a free clock.
@@ -214,6 +237,11 @@ impl<S: AsRef<[i32]> + AsMut<[i32]>> RealTime<S> {
         self.control.tick_budget = cycles;
     }
 
+    /// Tells why the board started.
+    pub const fn set_reset_cause(&mut self, cause: ResetCause) {
+        self.control.safety.set_reset_cause(cause);
+    }
+
     /// Takes a command up, before the tick.
     #[cold]
     #[inline(never)]
@@ -226,6 +254,9 @@ impl<S: AsRef<[i32]> + AsMut<[i32]>> RealTime<S> {
     /// One tick of the sample timer. In lockstep time stands still while there is no room for events, so that none is lost.
     #[inline]
     pub fn tick(&mut self, input: TickInput, events: &mut impl Events) {
+        if !self.control.safety.is_calm(input.lines) {
+            self.guard(input.lines, events);
+        }
         let was_under_way = self.interpolator.state().is_under_way();
         if !self.control.is_in_time(input)
             && let Some(fault) = self.control.note_time(input)
@@ -242,13 +273,43 @@ impl<S: AsRef<[i32]> + AsMut<[i32]>> RealTime<S> {
         self.step(was_under_way, events);
     }
 
+    /// A tick with other inputs than the last, or in which the host is missed.
+    #[cold]
+    #[inline(never)]
+    fn guard(&mut self, lines: InputLines, events: &mut impl Events) {
+        let under_way = self.interpolator.state().is_under_way();
+        match self.control.safety.watch(lines, under_way) {
+            Some(Stop::Cut(fault)) => self.interpolator.cut(fault),
+            Some(Stop::Trip(fault)) => self.interpolator.trip(fault),
+            None => {}
+        }
+        // Told here, because in lockstep no period may come that would tell it.
+        if under_way && !self.interpolator.state().is_under_way() {
+            self.control.safety.ending = true;
+            // It meant the run that is over: an abort is not to acknowledge a fault that nobody has seen.
+            self.control.request = Request::None;
+        }
+        if self.control.safety.ending {
+            if self.control.clock == Clock::Free || events.has_room() {
+                self.control.safety.ending = false;
+                self.end_run(events);
+            }
+            self.control.safety.look_again();
+        }
+        let state = self.interpolator.state();
+        let holds = self.control.request == Request::None && Request::Hold.is_allowed(state);
+        if self.control.safety.mind_silence(self.control.clock, state, holds) {
+            self.control.request = Request::Hold;
+        }
+    }
+
     /// Lets one period pass.
     #[inline]
     fn step(&mut self, was_under_way: bool, events: &mut impl Events) {
-        let request = core::mem::take(&mut self.control.request);
+        let mut request = core::mem::take(&mut self.control.request);
         let starts = request == Request::Start;
         if starts && request.is_allowed(self.interpolator.state()) {
-            self.control.run = Run::NEW;
+            request = self.control.begin();
         }
         let state = self.interpolator.tick(request).state;
         if moves(state) {
@@ -335,7 +396,42 @@ impl<S: AsRef<[i32]> + AsMut<[i32]>> RealTime<S> {
             tick_cycles_max: run.tick_cycles_max,
             samples_lost: run.events_lost,
             frames_bad: 0,
+            safety: self.control.safety.status(),
         }
+    }
+
+    /// Does what the host asks of drives and home.
+    ///
+    /// # Errors
+    /// Why not; nothing has changed then.
+    pub fn order(&mut self, order: Order) -> core::result::Result<(), Reason> {
+        let state = self.interpolator.state();
+        self.control.safety.obey(order, state)
+    }
+
+    /// A frame of the host arrived.
+    pub const fn heard(&mut self) {
+        self.control.safety.heard();
+    }
+
+    /// Whether the drives are to be enabled. Set after each tick, so that they are off in the tick that finds the reason.
+    #[must_use]
+    #[inline]
+    pub const fn drives_on(&self) -> bool {
+        self.control.safety.drives_on()
+    }
+
+    /// Where the axes stood when the host declared it, nm; none where the machine is not homed.
+    #[must_use]
+    pub const fn home_nm(&self) -> Option<[i32; 3]> {
+        self.control.safety.home_nm()
+    }
+
+    /// Whether a tick feeds the watchdog: it was over before the next one, and within its budget.
+    #[must_use]
+    #[inline]
+    pub const fn feeds_watchdog(&self, missed: u32, cycles: u32) -> bool {
+        missed == 0 && cycles <= self.control.tick_budget
     }
 
     /// The sample that the axes stand on.

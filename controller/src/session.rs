@@ -4,17 +4,21 @@ use heapless::Vec;
 use interp_core::{interpolator, job::Header};
 use protocol::{
     frame::{DELIMITER, FRAME_MAX, Frame, write_reply},
-    message::{Capabilities, Clock, NO_NUMBER, Reason, Reply, Request, Status, next_number, read_request},
+    message::{
+        Capabilities, Clock, NO_NUMBER, OVERRIDE_MAX_PERCENT, Reason, Reply, Request, Status, next_number,
+        read_request,
+    },
     version::PROTOCOL_VERSION,
 };
 
 use crate::{
     machine::{Busy, Command, Machine},
+    safety::{Order, may_start},
     upload::Upload,
 };
 
 /// Longest answer kept for a retransmission, bytes: a frame of `Status` with every varint at its longest.
-const ANSWER_MAX: usize = 93;
+const ANSWER_MAX: usize = 111;
 
 /// Who is at the other end.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -77,7 +81,7 @@ pub(crate) struct Session {
     upload: Option<Upload>,
     /// What the commands sent so far make of the clock; the status shows it a tick later.
     clock: Clock,
-    /// A start, hold, resume or abort was sent, and may still wait.
+    /// A start, hold, resume, stop or abort was sent, and may still wait.
     wished: bool,
     frames_bad: u32,
 }
@@ -207,6 +211,14 @@ impl Session {
             Request::Hold => self.wish(machine, Wish::Hold),
             Request::Resume => self.wish(machine, Wish::Resume),
             Request::Abort => self.wish(machine, Wish::Abort),
+            Request::Stop => self.wish(machine, Wish::Stop),
+            Request::Override { percent } => set_override(machine, percent),
+            Request::Configure(configuration) => machine.order(Order::Configure(configuration)),
+            Request::Drives { on } => machine.order(Order::Drives { on }),
+            Request::SetHome { home_nm } => machine.order(Order::SetHome { home_nm }),
+            Request::Acknowledge => machine.order(Order::Acknowledge),
+            Request::Simulate { lines } if machine.simulate(lines) => Ok(()),
+            Request::Simulate { .. } | Request::Reserved => Err(Reason::Unsupported),
             Request::Clock(clock) => self.set_clock(machine, clock),
             Request::Run { .. } if self.clock != Clock::Lockstep => {
                 Err(Reason::WrongClock { clock: self.clock })
@@ -247,9 +259,13 @@ impl Session {
 
     /// Queues what the state allows.
     fn wish(&mut self, machine: &mut impl Machine, wish: interpolator::Request) -> Result<(), Reason> {
-        let state = machine.status().state;
+        let status = machine.status();
+        let state = status.state;
         if !wish.is_allowed(state) {
             return Err(Reason::WrongState { state });
+        }
+        if wish == interpolator::Request::Start {
+            may_start(&status.safety)?;
         }
         command(machine, Command::Request(wish))?;
         self.wished = true;
@@ -268,6 +284,16 @@ impl Session {
     }
 }
 
+fn set_override(machine: &mut impl Machine, percent: u8) -> Result<(), Reason> {
+    if percent > OVERRIDE_MAX_PERCENT {
+        return Err(Reason::OutOfRange {
+            most: OVERRIDE_MAX_PERCENT.into(),
+            wanted: percent.into(),
+        });
+    }
+    command(machine, Command::Override { percent })
+}
+
 fn command(machine: &mut impl Machine, command: Command) -> Result<(), Reason> {
     machine.send(command).map_err(|Busy| Reason::Busy)
 }
@@ -284,7 +310,7 @@ pub(crate) fn send(reply: &Reply, out: &mut impl FnMut(&[u8])) {
 mod tests {
     use super::*;
     use interp_core::sample::{Place, State};
-    use protocol::message::{FaultReport, Report};
+    use protocol::message::{Configuration, FaultReport, InputLines, Report, SafetyStatus};
 
     #[test]
     fn the_longest_status_is_kept() {
@@ -312,6 +338,15 @@ mod tests {
             tick_cycles_max: u32::MAX,
             samples_lost: u32::MAX,
             frames_bad: u32::MAX,
+            safety: SafetyStatus {
+                lines: InputLines(u16::MAX),
+                latched: InputLines(u16::MAX),
+                configuration: Configuration {
+                    host_gone_ticks: u32::MAX,
+                    ..Configuration::DEFAULT
+                },
+                ..SafetyStatus::DEFAULT
+            },
         };
         let mut last = Last::new();
         last.set(

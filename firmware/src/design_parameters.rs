@@ -9,7 +9,7 @@ use controller::machine::{Command, Event, Events};
 use interp_core::job::{STORE_WORDS, SurfaceKind, patches_max};
 use protocol::{frame::FRAME_MAX, message::SAMPLES_MAX};
 
-use crate::{board, sample_task::EventQueue};
+use crate::{board, drivers::watchdog, sample_task::EventQueue};
 
 /// Version that the host is told and the log begins with.
 pub(crate) const FIRMWARE_VERSION: [u16; 3] = [
@@ -33,6 +33,13 @@ pub(crate) const TICK_BUDGET_CYCLES: u32 = CORE_HZ / 1_000_000 * PERIOD_US / 10;
 
 /// Baud rate of the link: the first usual rate at which every sample of a run can be reported.
 pub(crate) const SERIAL_BAUD: u32 = 921_600;
+
+/// Periods without one that met its deadline after which the watchdog resets the chip, at least; 2.8 times as many at most,
+/// as its clock is coarse. One late tick is a fault of the run, which stops along its path; it takes a processor that hangs to get here.
+const WATCHDOG_PERIODS: u32 = 8;
+
+/// The watchdog's reload value for that.
+pub(crate) const WATCHDOG_RELOAD: u16 = watchdog::reload(WATCHDOG_PERIODS * PERIOD_US);
 
 /// Words of surface data that fit: the core's own figure, 64 KiB of the chip's 128.
 pub(crate) const JOB_WORDS: usize = STORE_WORDS;

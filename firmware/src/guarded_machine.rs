@@ -4,14 +4,15 @@
 use controller::{
     machine::{Busy, Command, Machine, describe},
     realtime::RealTime,
+    safety::Order,
 };
 use heapless::spsc::Producer;
 use interp_core::{fault::Fault, job::Header};
-use protocol::message::{Description, Status};
+use protocol::message::{Description, InputLines, Reason, Status};
 use rtic::Mutex;
 
 use crate::{
-    board::BOARD,
+    board::{self, BOARD},
     design_parameters::{FIRMWARE_VERSION, JOB_WORDS, PERIOD_US},
 };
 
@@ -60,6 +61,18 @@ impl<M: Mutex<T = BoardRealTime>> Machine for GuardedMachine<'_, M> {
 
     fn send(&mut self, command: Command) -> Result<(), Busy> {
         self.commands.enqueue(command).map_err(|_| Busy)
+    }
+
+    fn order(&mut self, order: Order) -> Result<(), Reason> {
+        self.real_time.lock(|real_time| real_time.order(order))
+    }
+
+    fn heard(&mut self) {
+        self.real_time.lock(|real_time| real_time.heard());
+    }
+
+    fn simulate(&mut self, lines: InputLines) -> bool {
+        board::simulate(lines)
     }
 
     fn commands_wait(&mut self) -> bool {

@@ -35,27 +35,38 @@ mod app {
         realtime::RealTime,
     };
     use heapless::spsc::{Consumer, Producer, Queue};
+    use protocol::message::ResetCause;
+    use stm32f4xx_hal::pac;
 
     use crate::{
         board::{self, BOARD},
         design_parameters::{
             COMMAND_PLACES, EVENT_PLACES, FLUSH_PERIODS, JOB_WORDS, PERIOD_COUNTS, RECEIVE_PLACES,
-            TICK_BUDGET_CYCLES,
+            TICK_BUDGET_CYCLES, WATCHDOG_RELOAD,
         },
         drivers::{
             cycle_counter::CycleCounter,
-            gpio::Output,
+            drive_enable::DriveEnable,
+            gpio::{self, Output},
+            safety_inputs::SafetyInputs,
             sample_timer::{SampleTimer, uptime_periods},
             serial::{self, Receiver, Transmitter},
             status_led::StatusLed,
+            watchdog::Watchdog,
         },
         guarded_machine::{BoardRealTime, GuardedMachine},
-        sample_task::SampleTask,
+        sample_task::{Guards, SampleTask},
         watch::Watch,
     };
 
     /// The status LED.
     const LED: Line = BOARD.line(Role::StatusLed);
+
+    /// The safety inputs, as the board has them.
+    const INPUTS: SafetyInputs<board::InputPorts> = SafetyInputs::new(board::InputPorts, BOARD.lines);
+
+    /// The drives, off.
+    const DRIVES: DriveEnable<gpio::Ports> = DriveEnable::new(gpio::Ports, BOARD);
 
     #[shared]
     struct Shared {
@@ -67,6 +78,7 @@ mod app {
     #[local]
     struct Local {
         task: SampleTask,
+        guards: Guards<board::InputPorts, gpio::Ports, pac::IWDG>,
         receiver: Receiver,
         transmitter: Transmitter,
         led: StatusLed<Output>,
@@ -103,6 +115,21 @@ mod app {
         );
         let mut real_time = RealTime::with_store(context.local.store);
         real_time.set_tick_budget(TICK_BUDGET_CYCLES);
+        real_time.set_reset_cause(board.reset);
+        match board.reset {
+            ResetCause::Watchdog => defmt::error!("the watchdog has reset the board"),
+            cause => defmt::info!("last reset: {=str}", cause.name()),
+        }
+        // Last: from here on the first tick is less than a period away.
+        let watchdog = Watchdog::start(board.iwdg, WATCHDOG_RELOAD);
+        if !watchdog.is_settled() {
+            defmt::warn!("the watchdog has not taken its time over");
+        }
+        let guards = Guards {
+            inputs: INPUTS,
+            drives: DRIVES,
+            watchdog,
+        };
         (
             Shared {
                 real_time,
@@ -110,6 +137,7 @@ mod app {
             },
             Local {
                 task: SampleTask::new(timer, counter, commands_out, events_in),
+                guards,
                 receiver,
                 transmitter,
                 led: StatusLed::new(Output::new(LED.pin), LED.active),
@@ -130,11 +158,15 @@ mod app {
     /// | worst case | see `cargo sim budget`; the board measures each tick and reports the most (`tick_cycles_max`) |
     /// | over a tenth of the period | a fault of the run (`tick-over-budget`), which stops along the path |
     /// | a miss | counted, reported, and a fault of the run (`deadline-missed`), which stops along the path |
+    /// | either | does not feed the watchdog, which resets the board when no tick does for some periods |
     /// | a panic | cannot be reached: `firmware/no-panic` does not link otherwise |
-    #[task(binds = TIM2, priority = 3, shared = [real_time], local = [task])]
+    #[task(binds = TIM2, priority = 3, shared = [real_time], local = [task, guards])]
     fn sample(mut context: sample::Context) {
-        let task = context.local.task;
-        context.shared.real_time.lock(|real_time| task.tick(real_time));
+        let sample::LocalResources { task, guards, .. } = context.local;
+        context
+            .shared
+            .real_time
+            .lock(|real_time| task.tick(real_time, guards));
     }
 
     /// Takes a byte off the port.

@@ -9,7 +9,24 @@ use controller::{
 };
 use heapless::spsc::{Consumer, Producer};
 
-use crate::drivers::{cycle_counter::CycleCounter, sample_timer::SampleTimer};
+use crate::drivers::{
+    cycle_counter::CycleCounter,
+    drive_enable::{DriveEnable, WritePorts},
+    safety_inputs::{ReadPorts, SafetyInputs},
+    sample_timer::SampleTimer,
+    watchdog::{Registers, Watchdog},
+};
+
+/// What stands between the machine and harm: the inputs that stop it, the drives, the watchdog. Apart from the task, whose queues'
+/// lengths the compiler would lose sight of in one structure with this.
+pub(crate) struct Guards<I, O, W> {
+    /// The safety inputs.
+    pub(crate) inputs: SafetyInputs<I>,
+    /// The drives.
+    pub(crate) drives: DriveEnable<O>,
+    /// The watchdog, started.
+    pub(crate) watchdog: Watchdog<W>,
+}
 
 /// What the task has for itself.
 pub(crate) struct SampleTask {
@@ -43,7 +60,13 @@ impl SampleTask {
 
     /// One tick.
     #[inline]
-    pub(crate) fn tick<S: AsRef<[i32]> + AsMut<[i32]>>(&mut self, real_time: &mut RealTime<S>) {
+    pub(crate) fn tick<S, I, O, W>(&mut self, real_time: &mut RealTime<S>, guards: &mut Guards<I, O, W>)
+    where
+        S: AsRef<[i32]> + AsMut<[i32]>,
+        I: ReadPorts,
+        O: WritePorts,
+        W: Registers,
+    {
         // Where it lies is known when the image is linked, and each access to a field would make an address of its
         // own, two instructions long. Hidden, it is a register, and the fields are offsets from it.
         let real_time = black_box(real_time);
@@ -55,10 +78,15 @@ impl SampleTask {
         let input = TickInput {
             missed: self.missed,
             cycles: self.cycles,
+            lines: guards.inputs.read(),
         };
         real_time.tick(input, &mut self.events);
+        guards.drives.set(real_time.drives_on());
         self.cycles = self.counter.since(begun);
         self.missed = self.timer.end();
+        if real_time.feeds_watchdog(self.missed, self.cycles) {
+            guards.watchdog.feed();
+        }
     }
 }
 

@@ -2,7 +2,7 @@
 
 use controller::machine::Machine;
 use interp_core::{fault::FaultKind, sample::State};
-use protocol::message::Status;
+use protocol::message::{InputLines, SafetyStatus, Status};
 
 use crate::design_parameters::LOOK_PERIODS;
 
@@ -14,6 +14,7 @@ pub(crate) struct Watch {
     looked: u32,
     deadline_misses: u32,
     bytes_lost: u32,
+    safety: SafetyStatus,
 }
 
 impl Watch {
@@ -29,6 +30,10 @@ impl Watch {
         if status.state != self.state {
             self.state = status.state;
             log_state(&status);
+        }
+        if status.safety != self.safety {
+            log_safety(&status.safety, &self.safety);
+            self.safety = status.safety;
         }
         if status.deadline_misses > self.deadline_misses {
             defmt::warn!("{=u32} ticks missed in this run", status.deadline_misses);
@@ -56,5 +61,26 @@ fn log_state(status: &Status) {
             fault.kind().map_or("unknown", FaultKind::name),
             fault.value
         ),
+    }
+}
+
+fn log_safety(now: &SafetyStatus, before: &SafetyStatus) {
+    for input in now.lines.without(before.lines).names() {
+        defmt::warn!("{=str} asserted", input);
+    }
+    for input in before.lines.without(now.lines).names() {
+        defmt::info!("{=str} released", input);
+    }
+    if now.latched == InputLines::NONE && before.latched != InputLines::NONE {
+        defmt::info!("acknowledged");
+    }
+    if now.drives_on != before.drives_on {
+        defmt::info!("drives {=str}", if now.drives_on { "on" } else { "off" });
+    }
+    if now.homed != before.homed {
+        defmt::info!("{=str}", if now.homed { "homed" } else { "home lost" });
+    }
+    if now.host_gone && !before.host_gone {
+        defmt::warn!("the host is gone");
     }
 }

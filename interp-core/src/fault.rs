@@ -39,11 +39,21 @@ pub enum FaultKind {
     /// The tool cannot go from pass to pass in the open: the surface does not face up where a pass begins or ends, or it rises above the safe
     /// height. Value: mm above it, or 0.
     LinkBlocked = 15,
+    /// The emergency stop was pressed: the drives are off, the home is lost. Value: the inputs asserted, as bits.
+    EmergencyStop = 16,
+    /// A limit switch was reached. Value: the limit switches asserted, as bits.
+    LimitSwitch = 17,
+    /// A drive reports a fault: the drives are off, the home is lost. Value: the drive faults asserted, as bits.
+    DriveFault = 18,
+    /// No word of the host for longer than it said. Value: that time in periods.
+    HostGone = 19,
+    /// A start while the machine does not know where its axes stand. Value: 0.
+    NotHomed = 20,
 }
 
 impl FaultKind {
     /// Every kind, in order of its code.
-    pub const ALL: [Self; 15] = [
+    pub const ALL: [Self; 20] = [
         Self::BallDoesNotFit,
         Self::DegenerateSurface,
         Self::ParameterBackwards,
@@ -59,6 +69,11 @@ impl FaultKind {
         Self::TickOverBudget,
         Self::SoftLimit,
         Self::LinkBlocked,
+        Self::EmergencyStop,
+        Self::LimitSwitch,
+        Self::DriveFault,
+        Self::HostGone,
+        Self::NotHomed,
     ];
 
     /// The stable code.
@@ -92,6 +107,11 @@ impl FaultKind {
             Self::TickOverBudget => "tick-over-budget",
             Self::SoftLimit => "soft-limit",
             Self::LinkBlocked => "link-blocked",
+            Self::EmergencyStop => "emergency-stop",
+            Self::LimitSwitch => "limit-switch",
+            Self::DriveFault => "drive-fault",
+            Self::HostGone => "host-gone",
+            Self::NotHomed => "not-homed",
         }
     }
 }

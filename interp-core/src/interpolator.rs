@@ -242,6 +242,14 @@ impl<S: AsRef<[i32]> + AsMut<[i32]>> Interpolator<S> {
         self.motion.trip(fault);
     }
 
+    /// Ends a run with a fault from outside in this very period, because the drives are off and nothing follows the path any
+    /// more. The first fault is kept. Ignored where no run is under way.
+    pub fn cut(&mut self, fault: Fault) {
+        if self.motion.state.is_under_way() {
+            self.motion.fail(fault);
+        }
+    }
+
     /// One period. Never blocks, never panics; bounded by the collapse of a patch and its evaluation at a few
     /// places, and at the start of a pass by a walk over 16 side spans.
     ///

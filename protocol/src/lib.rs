@@ -17,7 +17,8 @@
 //! | `Hello` | → ← | `Capabilities` |
 //! | `JobBegin`, `JobChunk` .., `JobEnd` | → ← | `Ack` or `Nak` each |
 //! | `Clock`, `Report` | → ← | `Ack` or `Nak` |
-//! | `Start`, `Hold`, `Resume`, `Abort` | → ← | `Ack` or `Nak` |
+//! | `Start`, `Hold`, `Resume`, `Stop`, `Abort`, `Override` | → ← | `Ack` or `Nak` |
+//! | `Configure`, `Drives`, `SetHome`, `Acknowledge` | → ← | `Ack` or `Nak` |
 //! | `Run` | → ← | `Ack` or `Nak`, later `Halted` |
 //! | `Status` | → ← | `Status` |
 //! | | ← | `Samples`, `PassDigest`, `Halted` while a run goes on |
@@ -42,6 +43,9 @@
 //! | `JobEnd` with other words than announced | `Nak`, `WrongDigest` | the upload is over, no job is loaded |
 //! | `JobEnd` of a job that the core refuses | `Nak`, `Job` with fault, value, record | the upload is over, no job is loaded |
 //! | a command that the state does not allow | `Nak`, `WrongState` | |
+//! | a start, or drives on, that inputs, latch or homing forbid | `Nak`, `Unsafe` with the fault | |
+//! | a start, or a home, while the drives are off | `Nak`, `DrivesOff` | |
+//! | a value beyond its range | `Nak`, `OutOfRange` with the range | |
 //!
 //! Where the last column is empty, nothing has changed. An event that the line damages is lost: the host sees it by a
 //! tick or pass that is missing, and by `Status`, whose digest covers the whole run.
@@ -71,6 +75,7 @@ pub mod frame;
 pub mod message;
 mod reason;
 mod records;
+pub mod safety;
 pub mod version;
 
 pub use version::{PROTOCOL_VERSION, VersionMismatch};

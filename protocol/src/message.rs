@@ -35,6 +35,13 @@
 //! | 9 | `Clock` | 0 free, 1 lockstep | `Ack` |
 //! | 10 | `Run` | ticks `u32` | `Ack`, and `Halted` when the ticks are used up |
 //! | 11 | `Report` | 0 digests, 1 samples | `Ack` |
+//! | 13 | `Configure` | the fields of [`Configuration`] | `Ack`, and it holds |
+//! | 14 | `Drives` | 0 off, 1 on | as `Configure` |
+//! | 15 | `SetHome` | three places in nm, `i32` each | as `Configure` |
+//! | 16 | `Acknowledge` | | as `Configure` |
+//! | 17 | `Override` | percent `u8` | as `Start` |
+//! | 18 | `Stop` | | as `Start` |
+//! | 19 | `Simulate` | inputs `u16` | `Ack`, by a board without pins only |
 //!
 //! Header: kind, pattern, tool side (a byte each), spans along path and side (`u16`), ball radius (mm), feed (mm/s),
 //! scallop height (mm), period (s) (`f32`).
@@ -74,6 +81,10 @@ pub use crate::reason::Reason;
 pub use crate::records::{
     BOARD_NAME_MAX, Batch, CHUNK_WORDS_MAX, Clock, Description, FaultReport, PassDigest, Report, SAMPLES_MAX,
     SampleRecord, Status, Words,
+};
+pub use crate::safety::{
+    Configuration, HostGone, InputLines, OVERRIDE_MAX_PERCENT, OVERRIDE_NORMAL_PERCENT, ResetCause,
+    SafetyStatus,
 };
 use crate::{
     records::HeaderFields,
@@ -142,6 +153,36 @@ pub enum Request {
     },
     /// What a run tells the host.
     Report(Report),
+    /// 12: of no use in this version.
+    Reserved,
+    /// What the machine around the board is like. Refused while a run is under way.
+    Configure(Configuration),
+    /// Drives on or off. On is refused while emergency stop or drive fault are asserted or latched; off while a run is
+    /// under way, and loses the home.
+    Drives {
+        /// Whether they are to be on.
+        on: bool,
+    },
+    /// The axes stand here. Refused while a run is under way, or the drives are off: they would move when switched on.
+    SetHome {
+        /// Where they stand, nm.
+        home_nm: [i32; 3],
+    },
+    /// Clears the latch of emergency stop and drive fault. Refused while one of them is asserted. Neither the drives nor the
+    /// home come back by it.
+    Acknowledge,
+    /// The feed, as a share of the programmed one; holds from the next period until the next `Override`.
+    Override {
+        /// Percent, at most [`OVERRIDE_MAX_PERCENT`].
+        percent: u8,
+    },
+    /// Stop along the path, and give the run up; the job stays loaded.
+    Stop,
+    /// The inputs of a board that has no pins for them, as in QEMU; refused by others.
+    Simulate {
+        /// Inputs that are asserted from the next period on.
+        lines: InputLines,
+    },
 }
 
 /// What opens a session: who the board is.
@@ -297,7 +338,7 @@ mod tests {
         assert_eq!(read_request(&[]), Err(Unreadable { number: NO_NUMBER }));
         assert_eq!(read_request(&[9]), Err(Unreadable { number: 9 }));
         // an unknown code, a missing field, a byte left over, an unknown clock
-        for payload in [&[9, 12][..], &[9, 10], &[9, 4, 0], &[9, 9, 2]] {
+        for payload in [&[9, 20][..], &[9, 10], &[9, 4, 0], &[9, 9, 2]] {
             assert_eq!(
                 read_request(payload),
                 Err(Unreadable { number: 9 }),

@@ -2,7 +2,7 @@
 
 use core::fmt;
 
-use interp_core::sample::State;
+use interp_core::{fault::FaultKind, sample::State};
 use serde::{Deserialize, Serialize};
 
 use crate::{
@@ -88,6 +88,23 @@ pub enum Reason {
         #[serde(with = "postcard::fixint::le")]
         received: u64,
     },
+    /// 14: inputs, latch or homing forbid it.
+    Unsafe {
+        /// What would stop a run that went on, or keeps it from being begun: `emergency-stop`, `limit-switch`,
+        /// `drive-fault` with the inputs, `not-homed`.
+        fault: FaultReport,
+    },
+    /// 15: the drives are off.
+    DrivesOff,
+    /// 16: a value beyond its range.
+    OutOfRange {
+        /// The largest that there is.
+        most: u32,
+        /// The one asked for.
+        wanted: u32,
+    },
+    /// 17: this board does not do that.
+    Unsupported,
 }
 
 impl Reason {
@@ -109,6 +126,10 @@ impl Reason {
             Self::WrongOffset { .. } => 11,
             Self::Incomplete { .. } => 12,
             Self::WrongDigest { .. } => 13,
+            Self::Unsafe { .. } => 14,
+            Self::DrivesOff => 15,
+            Self::OutOfRange { .. } => 16,
+            Self::Unsupported => 17,
         }
     }
 
@@ -125,6 +146,16 @@ impl Reason {
                 | Self::OutOfOrder { .. }
         )
     }
+}
+
+/// The fault that forbids it, and the inputs that are its value.
+fn unsafe_because(fault: FaultReport, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
+    let name = fault.kind().map_or("unknown fault", FaultKind::name);
+    write!(formatter, "not safe: {name} (code {})", fault.code)?;
+    for input in fault.lines().names() {
+        write!(formatter, ", {input}")?;
+    }
+    Ok(())
 }
 
 impl fmt::Display for Reason {
@@ -165,6 +196,10 @@ impl fmt::Display for Reason {
                     "the words' digest is {received:016x}, announced was {wanted:016x}"
                 )
             }
+            Self::Unsafe { fault } => unsafe_because(fault, formatter),
+            Self::DrivesOff => write!(formatter, "the drives are off"),
+            Self::OutOfRange { most, wanted } => write!(formatter, "{wanted} is more than {most}"),
+            Self::Unsupported => write!(formatter, "this board cannot do that"),
         }
     }
 }

@@ -11,7 +11,10 @@ use interp_core::{
 };
 use serde::{Deserialize, Deserializer, Serialize, Serializer, de, ser::SerializeSeq};
 
-use crate::codes;
+use crate::{
+    codes,
+    safety::{InputLines, SafetyStatus},
+};
 
 /// Words a `JobChunk` may carry: 256 bytes, so that storing one holds up the sample timer for microseconds only.
 pub const CHUNK_WORDS_MAX: usize = 64;
@@ -76,6 +79,24 @@ impl FaultReport {
     pub fn kind(self) -> Option<FaultKind> {
         FaultKind::from_code(self.code)
     }
+
+    /// The inputs that the value stands for, where it is the fault of one.
+    #[must_use]
+    pub fn lines(self) -> InputLines {
+        match self.kind() {
+            Some(FaultKind::EmergencyStop | FaultKind::LimitSwitch | FaultKind::DriveFault) => {
+                // Saturates, so that no value is none.
+                #[allow(
+                    clippy::cast_possible_truncation,
+                    clippy::cast_sign_loss,
+                    reason = "a set of bits, exact as f32"
+                )]
+                let bits = self.value as u16;
+                InputLines(bits).and(InputLines::ALL)
+            }
+            _ => InputLines::NONE,
+        }
+    }
 }
 
 impl From<Fault> for FaultReport {
@@ -126,6 +147,8 @@ pub struct Status {
     pub samples_lost: u32,
     /// Frames from the host that could not be read since power-up.
     pub frames_bad: u32,
+    /// Inputs, drives, home.
+    pub safety: SafetyStatus,
 }
 
 impl Default for Status {
@@ -147,6 +170,7 @@ impl Default for Status {
             tick_cycles_max: 0,
             samples_lost: 0,
             frames_bad: 0,
+            safety: SafetyStatus::DEFAULT,
         }
     }
 }

@@ -4,7 +4,10 @@
 
 pub mod golden;
 
-use controller::machine::{Busy, Command, Machine, describe};
+use controller::{
+    machine::{Busy, Command, Machine, describe},
+    safety::Order,
+};
 use interp_core::{
     encode,
     fault::{Fault, FaultKind},
@@ -14,7 +17,10 @@ use protocol::{
     PROTOCOL_VERSION,
     digest::job_digest,
     frame::{Decoder, FRAME_MAX, write_request},
-    message::{Description, NO_NUMBER, Reply, Request, Status, Words, next_number, read_reply},
+    message::{
+        Description, InputLines, NO_NUMBER, Reason, Reply, Request, SafetyStatus, Status, Words, next_number,
+        read_reply,
+    },
 };
 
 /// One frame of a request with this number.
@@ -55,6 +61,16 @@ impl Host {
 pub const HELLO: Request = Request::Hello {
     version: PROTOCOL_VERSION,
     session: 1,
+};
+
+/// The requests after which a board without anything asserted may start.
+pub const MAKE_READY: [Request; 2] = [Request::Drives { on: true }, Request::SetHome { home_nm: [0; 3] }];
+
+/// The safety state after them.
+pub const SAFE: SafetyStatus = SafetyStatus {
+    drives_on: true,
+    homed: true,
+    ..SafetyStatus::DEFAULT
 };
 
 /// A `Nak` without a number: what a damaged frame is answered with.
@@ -125,6 +141,10 @@ pub enum Call {
     Finish,
     /// `send`.
     Send(Command),
+    /// `order`.
+    Order(Order),
+    /// `simulate`.
+    Simulate(InputLines),
 }
 
 /// A machine that does nothing but write down what it is told.
@@ -140,6 +160,10 @@ pub struct Mock {
     pub records: u32,
     /// The record that it finds bad.
     pub bad: Option<u32>,
+    /// Why it does not do what it is ordered.
+    pub unsafe_because: Option<Reason>,
+    /// It has no pins for its inputs.
+    pub simulated: bool,
 }
 
 impl Machine for Mock {
@@ -185,6 +209,23 @@ impl Machine for Mock {
         }
         self.calls.push(Call::Send(command));
         Ok(())
+    }
+
+    fn order(&mut self, order: Order) -> Result<(), Reason> {
+        if let Some(reason) = self.unsafe_because {
+            return Err(reason);
+        }
+        self.calls.push(Call::Order(order));
+        Ok(())
+    }
+
+    fn heard(&mut self) {}
+
+    fn simulate(&mut self, lines: InputLines) -> bool {
+        if self.simulated {
+            self.calls.push(Call::Simulate(lines));
+        }
+        self.simulated
     }
 
     /// Commands are taken up at once.

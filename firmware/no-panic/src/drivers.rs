@@ -3,5 +3,15 @@
 
 #[path = "../../src/drivers/cycle_counter.rs"]
 pub(crate) mod cycle_counter;
+#[path = "../../src/drivers/drive_enable.rs"]
+pub(crate) mod drive_enable;
+#[path = "../../src/drivers/gpio.rs"]
+pub(crate) mod gpio;
+#[path = "../../src/drivers/iwdg.rs"]
+mod iwdg;
+#[path = "../../src/drivers/safety_inputs.rs"]
+pub(crate) mod safety_inputs;
 #[path = "../../src/drivers/sample_timer.rs"]
 pub(crate) mod sample_timer;
+#[path = "../../src/drivers/watchdog.rs"]
+pub(crate) mod watchdog;

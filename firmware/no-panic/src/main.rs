@@ -27,14 +27,24 @@ mod app {
     };
     use heapless::spsc::{Consumer, Producer, Queue};
     use interp_core::job::STORE_WORDS;
+    use stm32f4xx_hal::pac;
 
     use crate::{
-        drivers::{cycle_counter::CycleCounter, sample_timer::SampleTimer},
-        sample_task::SampleTask,
+        drivers::{
+            cycle_counter::CycleCounter, drive_enable::DriveEnable, gpio::Ports, safety_inputs::SafetyInputs,
+            sample_timer::SampleTimer, watchdog::Watchdog,
+        },
+        sample_task::{Guards, SampleTask},
     };
 
     /// One period in counts of the timers, as on the chip.
     const PERIOD_COUNTS: u32 = 84_000;
+
+    /// A board with inputs on four ports.
+    const BOARD: &boards::Board = &boards::SKR_PRO;
+
+    const INPUTS: SafetyInputs<Ports> = SafetyInputs::new(Ports, BOARD.lines);
+    const DRIVES: DriveEnable<Ports> = DriveEnable::new(Ports, BOARD);
 
     #[shared]
     struct Shared {
@@ -44,6 +54,7 @@ mod app {
     #[local]
     struct Local {
         task: SampleTask,
+        guards: Guards<Ports, Ports, pac::IWDG>,
         commands_in: Producer<'static, Command>,
         events_out: Consumer<'static, Event>,
     }
@@ -57,6 +68,11 @@ mod app {
         let counter = CycleCounter::new(context.core.DCB, context.core.DWT);
         let device = context.device;
         let timer = SampleTimer::new(device.TIM2, device.TIM5, PERIOD_COUNTS - 1, PERIOD_COUNTS);
+        let guards = Guards {
+            inputs: INPUTS,
+            drives: DRIVES,
+            watchdog: Watchdog::start(device.IWDG, 93),
+        };
         let (commands_in, commands_out) = context.local.commands.split();
         let (events_in, events_out) = context.local.events.split();
         (
@@ -65,6 +81,7 @@ mod app {
             },
             Local {
                 task: SampleTask::new(timer, counter, commands_out, events_in),
+                guards,
                 commands_in,
                 events_out,
             },
@@ -72,10 +89,13 @@ mod app {
     }
 
     /// The firmware's task. What state the machine is in is hidden from the compiler there: it may be any.
-    #[task(binds = TIM2, priority = 3, shared = [real_time], local = [task])]
+    #[task(binds = TIM2, priority = 3, shared = [real_time], local = [task, guards])]
     fn sample(mut context: sample::Context) {
-        let task = context.local.task;
-        context.shared.real_time.lock(|real_time| task.tick(real_time));
+        let sample::LocalResources { task, guards, .. } = context.local;
+        context
+            .shared
+            .real_time
+            .lock(|real_time| task.tick(real_time, guards));
         #[cfg(feature = "with-a-panic")]
         assert!(black_box(true), "the control");
     }

@@ -2,13 +2,14 @@
 //! the log by the debug probe (RTT), and so a panic.
 
 use defmt_rtt as _;
+use protocol::message::InputLines;
 use stm32f4xx_hal::{
     pac,
     prelude::*,
     rcc::{self, Enable},
 };
 
-use super::{BOARD, Board};
+use super::{BOARD, Board, take_reset_cause};
 use crate::{
     design_parameters::{PERIOD_US, SERIAL_BAUD},
     drivers::gpio,
@@ -50,6 +51,7 @@ pub(crate) const SERIAL_DIVIDER: u16 = {
 /// the first microseconds on. Waits for crystal and PLL: without a crystal the board stays here.
 pub(crate) fn init(device: pac::Peripherals) -> Board {
     gpio::set_up(&device.RCC, BOARD.lines);
+    let reset = take_reset_cause(&device.RCC);
     let mut rcc = device.RCC.freeze(
         rcc::Config::hse(BOARD.crystal_mhz.MHz())
             .sysclk(CORE_MHZ.MHz())
@@ -67,20 +69,35 @@ pub(crate) fn init(device: pac::Peripherals) -> Board {
     pac::USART1::enable(&mut rcc);
     // The probe reads the log while the processor sleeps.
     device.DBGMCU.cr().modify(|_, w| w.dbg_sleep().set_bit());
-    // Halted by a debugger, both timers stand still, so that a breakpoint is not a missed period.
-    device
-        .DBGMCU
-        .apb1_fz()
-        .modify(|_, w| w.dbg_tim2_stop().set_bit().dbg_tim5_stop().set_bit());
+    // Halted by a debugger, timers and watchdog stand still, so that a breakpoint is neither a missed period nor a reset.
+    device.DBGMCU.apb1_fz().modify(|_, w| {
+        w.dbg_tim2_stop()
+            .set_bit()
+            .dbg_tim5_stop()
+            .set_bit()
+            .dbg_iwdg_stop()
+            .set_bit()
+    });
 
     Board {
         tim2: device.TIM2,
         tim5: device.TIM5,
         usart1: device.USART1,
+        iwdg: device.IWDG,
+        reset,
     }
 }
 
-/// Stays here, with every output at rest: what may still be under way to the step pins moves nothing.
+/// The safety inputs are pins.
+pub(crate) use crate::drivers::gpio::Ports as InputPorts;
+
+/// This board has pins of its own.
+pub(crate) fn simulate(_lines: InputLines) -> bool {
+    false
+}
+
+/// Stays here, with every output at rest: what may still be under way to the step pins moves nothing. Nobody feeds the watchdog any
+/// more, which resets the chip after some periods; the log then tells why.
 pub(crate) fn stop_for_good() -> ! {
     gpio::rest(BOARD.lines);
     loop {

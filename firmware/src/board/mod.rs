@@ -10,6 +10,8 @@
 //! | `TIMER_RELOAD` | auto-reload value of TIM2 for one period |
 //! | `SERIAL_DIVIDER` | `BRR` of USART1 |
 //! | `init` | clocks and pins; hands back what the drivers do not take |
+//! | `InputPorts` | where the safety inputs are read: the chip's ports, or what stands for them |
+//! | `simulate` | gives a board without pins its inputs |
 //! | `stop_for_good` | what follows a fault of the processor |
 //!
 //! All but the first are `chip.rs`'s for boards with a chip; QEMU has its own. So have the panic handler and the transport of the
@@ -32,12 +34,14 @@ compile_error!("choose one board: `cargo fw-qemu`, `cargo fw-chip` or `cargo fw-
 #[cfg(feature = "board-qemu")]
 mod qemu;
 #[cfg(feature = "board-qemu")]
-pub(crate) use qemu::{BOARD, SERIAL_DIVIDER, TIMER_HZ, TIMER_RELOAD, init, stop_for_good};
+pub(crate) use qemu::{
+    BOARD, InputPorts, SERIAL_DIVIDER, TIMER_HZ, TIMER_RELOAD, init, simulate, stop_for_good,
+};
 
 #[cfg(not(feature = "board-qemu"))]
 mod chip;
 #[cfg(not(feature = "board-qemu"))]
-pub(crate) use chip::{SERIAL_DIVIDER, TIMER_HZ, TIMER_RELOAD, init, stop_for_good};
+pub(crate) use chip::{InputPorts, SERIAL_DIVIDER, TIMER_HZ, TIMER_RELOAD, init, simulate, stop_for_good};
 
 #[cfg(feature = "board-stm32f405")]
 mod stm32f405;
@@ -49,6 +53,7 @@ mod skr_pro;
 #[cfg(feature = "board-skr-pro")]
 pub(crate) use skr_pro::BOARD;
 
+use protocol::message::ResetCause;
 use stm32f4xx_hal::pac;
 
 /// Which board the image is for: `cargo sim flash` finds it by this name, and refuses another board's image.
@@ -56,6 +61,7 @@ use stm32f4xx_hal::pac;
 #[allow(unsafe_code, reason = "a name that is not the compiler's")]
 #[unsafe(export_name = "isofeed_board")]
 pub(crate) static MARK: [u8; boards::MARK_BYTES] = BOARD.mark();
+use crate::drivers::reset_cause::{TAKE_BACK, cause};
 
 /// What remains of the chip once clocks and pins are set up: the parts that the drivers take.
 pub(crate) struct Board {
@@ -65,6 +71,19 @@ pub(crate) struct Board {
     pub(crate) tim5: pac::TIM5,
     /// The link to the host.
     pub(crate) usart1: pac::USART1,
+    /// The watchdog, not started.
+    pub(crate) iwdg: pac::IWDG,
+    /// Why the chip started.
+    pub(crate) reset: ResetCause,
+}
+
+/// Why the chip started; asked once, because the flags are taken back.
+#[allow(unsafe_code, reason = "a whole register is written")]
+fn take_reset_cause(rcc: &pac::rcc::RegisterBlock) -> ResetCause {
+    let flags = rcc.csr().read().bits();
+    // SAFETY: the flags are taken back; the LSI, the other thing in this register, stays as it is.
+    rcc.csr().write(|w| unsafe { w.bits(flags | TAKE_BACK) });
+    cause(flags)
 }
 
 /// Where a panic happened, and its message where that is a plain text: `core`'s machinery for any other is 4 KB.

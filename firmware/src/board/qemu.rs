@@ -4,12 +4,20 @@
 //! up and nothing is waited for. The log goes through semihosting to QEMU's standard output; a panic ends
 //! QEMU with exit code 101.
 
-use core::sync::atomic::{AtomicBool, Ordering};
+use core::sync::atomic::{AtomicBool, AtomicU32, Ordering};
 
+use boards::Port;
+use protocol::message::InputLines;
 use stm32f4xx_hal::pac;
 
-use super::Board;
-use crate::{design_parameters::PERIOD_US, drivers::gpio};
+use super::{Board, take_reset_cause};
+use crate::{
+    design_parameters::PERIOD_US,
+    drivers::{
+        gpio,
+        safety_inputs::{ReadPorts, pins_of},
+    },
+};
 
 // The log: this crate is linked for its `defmt` logger.
 use defmt_semihosting as _;
@@ -42,7 +50,32 @@ pub(crate) fn init(device: pac::Peripherals) -> Board {
         tim2: device.TIM2,
         tim5: device.TIM5,
         usart1: device.USART1,
+        iwdg: device.IWDG,
+        reset: take_reset_cause(&device.RCC),
     }
+}
+
+/// Stands for the input registers of the ports: what the host has set, and nothing before.
+static INPUTS: [AtomicU32; Port::ALL.len()] = [const { AtomicU32::new(0) }; Port::ALL.len()];
+
+/// The ports of which [`INPUTS`] are the inputs.
+pub(crate) struct InputPorts;
+
+impl ReadPorts for InputPorts {
+    #[inline]
+    fn input(&self, port: Port) -> u32 {
+        INPUTS
+            .get(port.index())
+            .map_or(0, |input| input.load(Ordering::Relaxed))
+    }
+}
+
+/// Sets the pins as these inputs would.
+pub(crate) fn simulate(lines: InputLines) -> bool {
+    for (port, input) in Port::ALL.into_iter().zip(&INPUTS) {
+        input.store(pins_of(BOARD.lines, port, lines), Ordering::Relaxed);
+    }
+    true
 }
 
 /// Ends QEMU, so that whoever waits for it learns of the fault.

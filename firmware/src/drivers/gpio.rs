@@ -12,6 +12,8 @@ use boards::{
 use embedded_hal::digital::{ErrorType, OutputPin};
 use stm32f4xx_hal::pac;
 
+use super::{drive_enable::WritePorts, safety_inputs::ReadPorts};
+
 /// Distance of one port's registers from the next one's (RM0090, 2.3).
 const PORT_BYTES: usize = 0x400;
 
@@ -77,6 +79,25 @@ pub(crate) fn rest(lines: &[Line]) {
         registers(port)
             .bsrr()
             .write(|w| unsafe { w.bits(setup.set_reset) });
+    }
+}
+
+/// All ports of the chip.
+#[derive(Clone, Copy)]
+pub(crate) struct Ports;
+
+impl ReadPorts for Ports {
+    #[inline]
+    fn input(&self, port: Port) -> u32 {
+        registers(port).idr().read().bits()
+    }
+}
+
+impl WritePorts for Ports {
+    fn set_reset(&mut self, port: Port, bits: u32) {
+        // SAFETY: any bits may be written here; the caller's are its own pins'.
+        #[allow(unsafe_code, reason = "a whole register is written")]
+        registers(port).bsrr().write(|w| unsafe { w.bits(bits) });
     }
 }
 

@@ -1,8 +1,13 @@
 //! What touches the chip's registers, one file a device. They know no board and no feature.
 
 pub(crate) mod cycle_counter;
+pub(crate) mod drive_enable;
 pub(crate) mod gpio;
 mod hard_fault;
+mod iwdg;
+pub(crate) mod reset_cause;
+pub(crate) mod safety_inputs;
 pub(crate) mod sample_timer;
 pub(crate) mod serial;
 pub(crate) mod status_led;
+pub(crate) mod watchdog;

@@ -7,12 +7,13 @@ use std::path::Path;
 use cycle_plugin::plan::Stage;
 use cycle_plugin::record::{RECORD_BYTES, Record};
 use interp_core::{FaultKind, State};
-use protocol::message::{Clock, FaultReport, Report, Request, Status};
+use protocol::message::{Clock, Configuration, FaultReport, Report, Request, Status};
 
 use super::BudgetError;
 use super::figures::{Model, whole};
 use super::measure::Bench;
 use crate::prepare::Prepared;
+use crate::remote::operate::{self, Setup};
 use crate::remote::qemu::Qemu;
 use crate::remote::session::Event;
 use crate::remote::{Session, drive};
@@ -103,7 +104,8 @@ impl Lab {
         let folder = tempfile::tempdir().map_err(|error| file_error(here, &error))?;
         let (arguments, records) = bench.plugin(folder.path())?;
         let (qemu, stream) = Qemu::start_with(bench.image(), &arguments)?;
-        let session = Session::open(stream, 1)?;
+        let mut session = Session::open(stream, 1)?;
+        operate::make_ready(&mut session, &Setup::simulated(Configuration::DEFAULT))?;
         Ok(Self {
             session,
             records: File::open(&records).map_err(|error| file_error(&records, &error))?,

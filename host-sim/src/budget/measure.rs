@@ -4,10 +4,11 @@ use std::path::{Path, PathBuf};
 
 use cycle_plugin::plan::{Plan, Stage};
 use cycle_plugin::record::Record;
-use protocol::message::{Clock, Report, Request};
+use protocol::message::{Clock, Configuration, Report, Request};
 
 use super::BudgetError;
 use crate::prepare::Prepared;
+use crate::remote::operate::{self, Setup};
 use crate::remote::qemu::{self, Qemu};
 use crate::remote::session::Event;
 use crate::remote::{Session, drive};
@@ -82,6 +83,7 @@ impl Bench {
         let samples = {
             let (_qemu, stream) = Qemu::start_with(&self.image, &arguments)?;
             let mut session = Session::open(stream, 1)?;
+            operate::make_ready(&mut session, &Setup::simulated(Configuration::DEFAULT))?;
             drive::upload(&mut session, job, |_| {})?;
             run_ticks(&mut session, ticks)?
         };

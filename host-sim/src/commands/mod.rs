@@ -10,6 +10,7 @@ mod flash;
 mod import;
 mod log;
 mod new;
+mod operate;
 mod out;
 mod outcome;
 mod paper;
@@ -90,6 +91,7 @@ struct Cli {
 enum Command {
     Simulate(simulate::Arguments),
     Run(run::Arguments),
+    Operate(operate::Arguments),
     Verify(verify::Arguments),
     Export(export::Arguments),
     Import(import::Arguments),
@@ -108,6 +110,7 @@ impl Command {
         match self {
             Self::Simulate(arguments) => arguments.json,
             Self::Run(arguments) => arguments.json,
+            Self::Operate(arguments) => arguments.json,
             Self::Verify(arguments) => arguments.json,
             Self::Export(arguments) => arguments.json,
             Self::Import(arguments) => arguments.json,
@@ -125,6 +128,7 @@ impl Command {
         match self {
             Self::Simulate(arguments) => simulate::command(arguments),
             Self::Run(arguments) => run::command(arguments),
+            Self::Operate(arguments) => operate::command(arguments),
             Self::Verify(arguments) => verify::command(arguments),
             Self::Export(arguments) => export::command(arguments),
             Self::Import(arguments) => import::command(arguments),

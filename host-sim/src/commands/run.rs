@@ -4,7 +4,7 @@ use std::path::PathBuf;
 use std::time::Instant;
 
 use clap::Args;
-use interp_core::{Sample, State};
+use interp_core::{Fault, FaultKind, Sample, State};
 use protocol::digest::Digest;
 use protocol::message::{Reason, Status};
 use serde_json::{Value, json};
@@ -14,8 +14,10 @@ use super::outcome::Outcome;
 use super::simulate::{Timed, machine, remarks, report, surveyed, timed};
 use super::{Failure, Result, cannot_write, load, progress, spinner, trace};
 use crate::approach::Kind;
+use crate::explain;
 use crate::job_file::JobFile;
 use crate::prepare::Prepared;
+use crate::remote::operate::{self, Setup};
 use crate::remote::qemu::{self, Qemu, QemuError};
 use crate::remote::{RemoteError, Session, drive, port};
 use crate::survey::is_on_pass;
@@ -39,9 +41,31 @@ pub(super) struct Arguments {
     /// Writes a page with a view that turns, charts and figures into this folder.
     #[arg(long, value_name = "DIR")]
     report: Option<PathBuf>,
+    /// The axes stand here, mm: declared as home before the run. In QEMU, where there are no axes, it is declared anyway.
+    #[arg(long, value_name = "X,Y,Z", value_parser = place, allow_hyphen_values = true)]
+    home: Option<PlaceNm>,
     /// Prints one JSON object instead of text.
     #[arg(long)]
     pub(super) json: bool,
+}
+
+/// A place of the axes, nm.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) struct PlaceNm(pub(super) [i32; 3]);
+
+/// Reads a place in mm, `X,Y,Z`.
+pub(super) fn place(text: &str) -> std::result::Result<PlaceNm, String> {
+    let mut axes = text.split(',').map(|axis| {
+        let mm: f64 = axis.trim().parse().ok()?;
+        let nm = (mm * 1e6).round();
+        #[expect(clippy::cast_possible_truncation, reason = "within the range of an i32")]
+        (nm.abs() <= f64::from(i32::MAX)).then_some(nm as i32)
+    });
+    let mut next = || axes.next().flatten();
+    match (next(), next(), next()) {
+        (Some(x), Some(y), Some(z)) if axes.next().is_none() => Ok(PlaceNm([x, y, z])),
+        _ => Err("three numbers in mm are wanted, each within 2147, such as 0,0,50".to_owned()),
+    }
 }
 
 #[derive(Debug, Args)]
@@ -65,6 +89,9 @@ struct Ran {
 
 impl From<RemoteError> for Failure {
     fn from(error: RemoteError) -> Self {
+        if let Some(refusal) = unsafe_to(&error) {
+            return Self::Failed(Some(refusal));
+        }
         let code = match &error {
             RemoteError::Refused {
                 reason: Reason::Job { fault, .. },
@@ -76,6 +103,22 @@ impl From<RemoteError> for Failure {
         };
         Self::Failed(Some(format!("{error}\n  help: cargo sim explain {code}")))
     }
+}
+
+/// A refusal for the sake of safety, with what it means and what to do.
+fn unsafe_to(error: &RemoteError) -> Option<String> {
+    let RemoteError::Refused {
+        request,
+        reason: Reason::Unsafe { fault },
+    } = error
+    else {
+        return None;
+    };
+    let (what, remedy) = explain::fault(Fault::new(fault.kind()?, fault.value));
+    let code = fault.code;
+    Some(format!(
+        "the board refused {request}: {what}\n  help: {remedy}\n        cargo sim explain {code}"
+    ))
 }
 
 impl From<QemuError> for Failure {
@@ -91,24 +134,32 @@ impl From<QemuError> for Failure {
     }
 }
 
+/// A number for a session: they have to differ, no more than that.
+fn session_number() -> u32 {
+    std::time::SystemTime::now()
+        .duration_since(std::time::UNIX_EPOCH)
+        .map_or(1, |now| now.subsec_nanos() ^ std::process::id().rotate_left(16))
+}
+
+/// Opens a session with the board behind this serial port.
+pub(super) fn open_port(name: &str) -> Result<Session> {
+    let stream = port::open(name).map_err(|error| {
+        let why = match error {
+            RemoteError::Line(cause) => format!("cannot open it as a serial port: {cause}"),
+            other => other.to_string(),
+        };
+        Failure::input(
+            format!("{name}: {why}"),
+            "name the board's serial port, such as /dev/ttyUSB0",
+        )
+    })?;
+    Ok(Session::open(stream, session_number())?)
+}
+
 /// Opens the line, and keeps QEMU alive with it.
 fn connect(arguments: &Arguments) -> Result<(Option<Qemu>, Session)> {
-    // Sessions need different numbers, no more than that.
-    let number = std::time::SystemTime::now()
-        .duration_since(std::time::UNIX_EPOCH)
-        .map_or(1, |now| now.subsec_nanos() ^ std::process::id().rotate_left(16));
     if let Some(name) = &arguments.place.port {
-        let stream = port::open(name).map_err(|error| {
-            let why = match error {
-                RemoteError::Line(cause) => format!("cannot open it as a serial port: {cause}"),
-                other => other.to_string(),
-            };
-            Failure::input(
-                format!("{name}: {why}"),
-                "name the board's serial port, such as /dev/ttyUSB0",
-            )
-        })?;
-        return Ok((None, Session::open(stream, number)?));
+        return Ok((None, open_port(name)?));
     }
     let image = match &arguments.firmware {
         Some(image) if !image.exists() => {
@@ -126,7 +177,22 @@ fn connect(arguments: &Arguments) -> Result<(Option<Qemu>, Session)> {
         }
     };
     let (qemu, stream) = Qemu::start(&image)?;
-    Ok((Some(qemu), Session::open(stream, number)?))
+    Ok((Some(qemu), Session::open(stream, session_number())?))
+}
+
+/// Configures the board, switches its drives on, and declares home where there is none to be lost, or where it was given.
+fn make_ready(arguments: &Arguments, job: &JobFile, session: &mut Session) -> Result<()> {
+    let configuration = job.machine.configuration();
+    let given = arguments.home.map(|place| place.0);
+    let setup = if arguments.place.qemu && given.is_none() {
+        Setup::simulated(configuration)
+    } else {
+        Setup {
+            configuration,
+            home_nm: given,
+        }
+    };
+    Ok(operate::make_ready(session, &setup)?)
 }
 
 /// The board's timer has to tick as the job wants it.
@@ -258,9 +324,29 @@ fn by_sample(
     })
 }
 
+/// The inputs that stopped the run, or kept it from beginning, in a sentence.
+fn stopped_from_outside(status: &Status) -> Option<String> {
+    let fault = status.fault?;
+    let kind = fault.kind()?;
+    if !matches!(
+        kind,
+        FaultKind::EmergencyStop | FaultKind::LimitSwitch | FaultKind::DriveFault
+    ) {
+        return None;
+    }
+    let (what, remedy) = explain::fault(Fault::new(kind, fault.value));
+    let Status { tick, pass, .. } = status;
+    Some(format!(
+        "the board stopped the run at tick {tick}, pass {pass}: {what}\n  help: {remedy}"
+    ))
+}
+
 /// What is wrong with the board's run, if anything is.
 fn complaint(ran: &Ran, here: &Timed, job: &JobFile) -> Option<String> {
     let status = &ran.status;
+    if let Some(stopped) = stopped_from_outside(status) {
+        return Some(stopped);
+    }
     if status.deadline_misses > 0 {
         return Some(format!(
             "{} ticks of the sample timer were missed",
@@ -296,6 +382,7 @@ pub(super) fn command(arguments: &Arguments) -> Result<()> {
     let here = timed(&job, &prepared)?;
     let (_qemu, mut session) = connect(arguments)?;
     check_period(&job, &session)?;
+    make_ready(arguments, &job, &mut session)?;
     let bar = progress(prepared.words.len() as u64, "uploading");
     drive::upload(&mut session, &prepared, |words| bar.set_position(words as u64))?;
     bar.finish_and_clear();
@@ -330,6 +417,12 @@ pub(super) fn command(arguments: &Arguments) -> Result<()> {
         outcome.print(page.as_deref());
         let (speed, missed) = (ran.ticks_per_second.round(), ran.status.deadline_misses);
         say!("  board        {speed} ticks a second, {missed} missed");
+        if arguments.place.qemu && arguments.home.is_none() {
+            say!("  home         declared at 0, 0, 0: a simulated board has no axes");
+        }
+        if ran.status.safety.host_gone {
+            say!("  host         was gone during the run: see cargo sim explain host-gone");
+        }
         let verdict = if ran.first_difference.is_none() {
             "bit for bit the same"
         } else {

@@ -127,5 +127,40 @@ fn words(kind: FaultKind) -> [&'static str; 5] {
             "Turn the part so that it faces up (`[placement]`), or raise `safe_z_mm` in [machine].",
             "A cylinder that is machined around its axis by more than half a turn: a pass ends on its underside.",
         ],
+        FaultKind::EmergencyStop => [
+            "The emergency stop is pressed, or was and has not been acknowledged. The drives went off in that tick, so the tool stopped where its momentum left it, and the home is lost.",
+            "1, the input's bit.",
+            "Somebody pressed it, or its wire is broken: boards read an open circuit as pressed.",
+            "Make the machine safe and release the button. Then `cargo sim operate --port DEV acknowledge`, place the axes, and `home X,Y,Z`.",
+            "The button, pressed while a job runs.",
+        ],
+        FaultKind::LimitSwitch => [
+            "An axis reached the end of its travel. The tool slowed down along its path; the position stays good.",
+            "The limit switches, as bits: x- 2, x+ 4, y- 8, y+ 16, z- 32, z+ 64.",
+            "The job does not fit the travel from where home was declared, or a switch or its wire is at fault.",
+            "Switch the drives off (`cargo sim operate --port DEV off`), move the axis off its switch by hand, switch on, declare home anew. Compare `machine.travel_mm` with the machine.",
+            "Home declared at the wrong end of x.",
+        ],
+        FaultKind::DriveFault => [
+            "A drive reports a fault, or did and that has not been acknowledged. All drives went off in that tick, and the home is lost.",
+            "The drive faults, as bits: x 128, y 256, z 512, one for all 1024.",
+            "Overload, overheating, supply too low, a motor's wire; see what the drive itself shows.",
+            "Find the cause at the drive. Then `cargo sim operate --port DEV acknowledge`, place the axes, and `home X,Y,Z`.",
+            "A servo drive whose following error is too large.",
+        ],
+        FaultKind::HostGone => [
+            "The host was silent in a run for longer than it had said. The run went on to its end, or was held along its path, as `machine.host_gone` says.",
+            "The time in periods.",
+            "The cable came off, or the host's computer sleeps, has stopped, or is busy.",
+            "Connect again: `cargo sim operate --port DEV status` says where the run is; `resume` goes on exactly there, `stop` gives it up.",
+            "The USB cable pulled out while a job with `host_gone = \"hold\"` runs.",
+        ],
+        FaultKind::NotHomed => [
+            "The machine does not know where its axes stand, so no run starts.",
+            "0.",
+            "Nobody has declared home since power came on, the drives were off, or an emergency stop or a drive fault.",
+            "Place the axes and say where they stand, in mm: `cargo sim run JOB --port DEV --home X,Y,Z`. For a board without axes: `homing_required = false` in [machine].",
+            "`cargo sim run JOB --port DEV` right after power-up.",
+        ],
     }
 }

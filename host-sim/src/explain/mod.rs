@@ -8,6 +8,7 @@ mod reasons;
 
 use interp_core::job::patches_max;
 use interp_core::{Fault, FaultKind, STORE_WORDS, SurfaceKind};
+use protocol::message::FaultReport;
 
 /// Where a code comes from.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -163,14 +164,40 @@ pub fn fault(fault: Fault) -> (String, &'static str) {
             "the surface does not face up where the tool has to leave it or come to it".to_owned(),
             "turn the part so that it faces up ([placement]), or take the pattern \"zigzag\" where only the ends of passes are in the way",
         ),
+        FaultKind::EmergencyStop => (
+            "the emergency stop was pressed: the drives are off, the home is lost".to_owned(),
+            "release it, acknowledge, and declare home anew (`cargo sim operate`)",
+        ),
+        FaultKind::LimitSwitch => (
+            inputs("an axis is at the end of its travel", fault),
+            "move it off its switch by hand with the drives off, and declare home anew (`cargo sim operate`)",
+        ),
+        FaultKind::DriveFault => (
+            inputs("the drives are off and the home is lost because of", fault),
+            "find the cause at the drive, acknowledge, and declare home anew (`cargo sim operate`)",
+        ),
+        FaultKind::HostGone => (
+            format!("no word of the host for {value} periods"),
+            "connect again, and resume or stop the run (`cargo sim operate`)",
+        ),
+        FaultKind::NotHomed => (
+            "the machine is not homed: nobody has said where its axes stand".to_owned(),
+            "place the axes, and say where they stand: `run --home X,Y,Z`; or homing_required = false in [machine]",
+        ),
     }
+}
+
+/// A sentence with the inputs that a fault names.
+fn inputs(what: &str, fault: Fault) -> String {
+    let names: Vec<_> = FaultReport::from(fault).lines().names().collect();
+    format!("{what}: {}", names.join(", "))
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
     use protocol::frame::FrameError;
-    use protocol::message::{Clock, FaultReport, Reason};
+    use protocol::message::{Clock, Reason};
 
     #[test]
     fn every_fault_is_explained_by_number_and_name() {
@@ -212,6 +239,15 @@ mod tests {
                 wanted: 1,
                 received: 2,
             },
+            Reason::Unsafe {
+                fault: FaultReport { code: 20, value: 0.0 },
+            },
+            Reason::DrivesOff,
+            Reason::OutOfRange {
+                most: 200,
+                wanted: 201,
+            },
+            Reason::Unsupported,
         ]
     }
 

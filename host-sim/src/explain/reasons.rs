@@ -3,7 +3,7 @@
 use super::{Entry, Family};
 
 /// By code.
-pub(super) const ENTRIES: [Entry; 14] = [
+pub(super) const ENTRIES: [Entry; 18] = [
     reason(
         0,
         "bad-frame",
@@ -129,6 +129,42 @@ pub(super) const ENTRIES: [Entry; 14] = [
         "The job changed while it was sent, or a host computes the digest otherwise.",
         "Load the job again. Frames have checksums of their own, so this is seldom the line.",
         "A host of your own with another byte order in its digest.",
+    ),
+    reason(
+        14,
+        "not-safe",
+        "The safety inputs, what they latched, or a missing home forbid this request.",
+        "The fault's code and value: 16 emergency-stop, 17 limit-switch, 18 drive-fault, 20 not-homed.",
+        "That of the fault.",
+        "That of the fault: `cargo sim explain` with its code.",
+        "A start while the emergency stop is pressed.",
+    ),
+    reason(
+        15,
+        "drives-off",
+        "The drives are off.",
+        "None.",
+        "They are off after power-up, after an emergency stop or a drive fault, and when somebody switched them off.",
+        "`cargo sim operate --port DEV on`, then declare home. `cargo sim run` does the first by itself.",
+        "A host of your own that starts a job right after power-up.",
+    ),
+    reason(
+        16,
+        "value-out-of-range",
+        "A value beyond its range.",
+        "The largest that there is, and the one asked for.",
+        "A feed override is 0 to 200 percent.",
+        "Ask for a value within the range.",
+        "An override of 250 percent.",
+    ),
+    reason(
+        17,
+        "unsupported",
+        "This board does not do what it was asked.",
+        "None.",
+        "Inputs can be simulated only where there are no pins for them, as in QEMU.",
+        "Use the board's own inputs.",
+        "A test for QEMU, run against a board.",
     ),
 ];
 

@@ -23,6 +23,7 @@ use std::path::Path;
 use std::sync::Arc;
 
 pub use error::JobFileError;
+use protocol::message::{Configuration, HostGone};
 use section::{Reader, Section};
 pub use surface::{NurbsSpec, SurfaceSpec};
 
@@ -38,6 +39,11 @@ pub const FEED_MAX_MM_MIN: f64 = 600_000.0;
 pub const PERIOD_RANGE_US: [f64; 2] = [10.0, 100_000.0];
 /// Sampling period of a job that names none, µs: the paper's.
 pub const PERIOD_DEFAULT_US: f64 = 1000.0;
+/// Silence of the host after which it counts as gone, ms: shortest, so that a host that shares its processor is not taken for
+/// one that is gone, and longest.
+pub const HOST_GONE_RANGE_MS: [f64; 2] = [100.0, 60_000.0];
+/// The same for a job that does not say.
+pub const HOST_GONE_DEFAULT_MS: f64 = 1000.0;
 /// Chord error limit of a job that names none, mm: the paper's.
 pub const CHORD_DEFAULT_MM: f64 = 0.005;
 
@@ -136,6 +142,12 @@ pub struct Machine {
     pub clearance_mm: Option<f64>,
     /// The last part of the way down that is gone at the feed, mm.
     pub plunge_mm: Option<f64>,
+    /// A run on a board starts only where its axes are homed.
+    pub homing_required: bool,
+    /// What a run on a board does when the host is gone.
+    pub host_gone: HostGone,
+    /// Silence after which the host is gone, ms, in [`HOST_GONE_RANGE_MS`].
+    pub host_gone_ms: f64,
 }
 
 impl Default for Machine {
@@ -151,6 +163,9 @@ impl Default for Machine {
             safe_z_mm: None,
             clearance_mm: None,
             plunge_mm: None,
+            homing_required: true,
+            host_gone: HostGone::Finish,
+            host_gone_ms: HOST_GONE_DEFAULT_MS,
         }
     }
 }
@@ -160,6 +175,22 @@ impl Machine {
     #[must_use]
     pub fn period_s(&self) -> f64 {
         self.period_us * 1e-6
+    }
+
+    /// What a board is told of the machine.
+    #[must_use]
+    pub fn configuration(&self) -> Configuration {
+        #[expect(
+            clippy::cast_possible_truncation,
+            clippy::cast_sign_loss,
+            reason = "1 to 6e6 by the ranges of both"
+        )]
+        let host_gone_ticks = (self.host_gone_ms * 1e3 / self.period_us).ceil() as u32;
+        Configuration {
+            homing_required: self.homing_required,
+            host_gone: self.host_gone,
+            host_gone_ticks,
+        }
     }
 }
 
@@ -311,6 +342,9 @@ fn read_machine(machine: &Section<'_>) -> Result<Machine, JobFileError> {
             "safe_z_mm",
             "clearance_mm",
             "plunge_mm",
+            "homing_required",
+            "host_gone",
+            "host_gone_ms",
         ],
         &[],
     )?;
@@ -358,7 +392,32 @@ fn read_machine(machine: &Section<'_>) -> Result<Machine, JobFileError> {
             *value = Some(machine.number_within(key, 0.0, HEIGHT_MAX_MM, "a height in mm, e.g. 2")?);
         }
     }
+    read_care(machine, &mut read)?;
     Ok(read)
+}
+
+/// The keys of `[machine]` for what may start a run, and what may interrupt it.
+fn read_care(machine: &Section<'_>, read: &mut Machine) -> Result<(), JobFileError> {
+    if machine.has("homing_required") {
+        read.homing_required = machine.switch("homing_required")?;
+    }
+    if machine.has("host_gone") {
+        let choices = [("finish", HostGone::Finish), ("hold", HostGone::Hold)];
+        read.host_gone = machine.choice("host_gone", &choices)?;
+    }
+    if machine.has("host_gone_ms") {
+        let [least, most] = HOST_GONE_RANGE_MS;
+        read.host_gone_ms = machine.number("host_gone_ms")?;
+        if !(least..=most).contains(&read.host_gone_ms) {
+            let what = format!(
+                "`host_gone_ms` must be {least} to {most}, not {}",
+                read.host_gone_ms
+            );
+            let remedy = "give the silence in milliseconds after which the host is gone, e.g. 1000";
+            return Err(machine.error("host_gone_ms", what, remedy));
+        }
+    }
+    Ok(())
 }
 
 /// Where a job came from: the file, which an error found later needs to point at the line, and who chose its direction.

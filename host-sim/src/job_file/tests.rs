@@ -111,6 +111,25 @@ fn what_may_be_left_out_has_its_default() {
 }
 
 #[test]
+fn what_a_board_is_told_of_the_machine() {
+    let told = |keys: &str| {
+        edited(REVOLVED, "period_us = 1000", keys)
+            .unwrap()
+            .machine
+            .configuration()
+    };
+    let strict = told("period_us = 1000");
+    assert!(strict.homing_required);
+    assert_eq!(
+        (strict.host_gone, strict.host_gone_ticks),
+        (HostGone::Finish, 1000)
+    );
+    let other = told("period_us = 400\nhoming_required = false\nhost_gone = \"hold\"\nhost_gone_ms = 500.1");
+    assert!(!other.homing_required);
+    assert_eq!((other.host_gone, other.host_gone_ticks), (HostGone::Hold, 1251));
+}
+
+#[test]
 fn unclamped_knots_are_allowed() {
     let job = edited(NURBS, "[0, 0, 0, 0.5, 1, 1, 1]", "[0, 1, 2, 3, 4, 5, 6]").unwrap();
     assert_eq!(job.surface.domain()[0], [2.0, 4.0]);
@@ -203,6 +222,9 @@ fn ranges() {
         (REVOLVED, "1000", "1", 21, 13, "`period_us` must be 10 to 100000, not 1"),
         (REVOLVED, "[100, 100, 50]", "[100, 0, 50]", 22, 21, "`velocity_max_mm_s` must be above 0, not 0"),
         (REVOLVED, "[-500, 500]", "[500, -500]", 25, 13, "the travel of x must ascend"),
+        (REVOLVED, "period_us = 1000", "host_gone = \"stop\"", 21, 13, "`host_gone` cannot be \"stop\""),
+        (REVOLVED, "period_us = 1000", "host_gone_ms = 99", 21, 16, "`host_gone_ms` must be 100 to 60000, not 99"),
+        (REVOLVED, "period_us = 1000", "homing_required = 0", 21, 19, "`homing_required` must be true or false, not a number"),
         (NURBS, "degree = [2, 1]", "degree = [4, 1]", 3, 11, "`degree`, number 1 must be a whole number from 1 to 3"),
         (NURBS, "degree = [2, 1]", "degree = [2, 1.5]", 3, 14, "must be a whole number from 1 to 3, not 1.5"),
         (NURBS, "[0, 0, 0, 0.5,", "[0, 0, 0, -0.5,", 4, 21, "`knots_u`, knot 4 is -0.5, below the one before it (0)"),

@@ -4,6 +4,7 @@ use interp_core::{Sample, State};
 use protocol::digest::job_digest;
 use protocol::message::{CHUNK_WORDS_MAX, Clock, PassDigest, Report, Request, Status, Words};
 
+use super::operate;
 use super::session::{Event, RemoteError, Session};
 use crate::prepare::Prepared;
 
@@ -65,6 +66,10 @@ fn start(session: &mut Session, report: Report, lockstep: Option<u32>) -> Result
     };
     session.command(&Request::Clock(clock))?;
     session.command(&Request::Report(report))?;
+    match lockstep {
+        None => operate::keep_alive(session)?,
+        Some(_) => session.set_keep_alive(None),
+    }
     session.command(&Request::Start)?;
     lockstep.map_or(Ok(()), |ticks| session.command(&Request::Run { ticks }))
 }

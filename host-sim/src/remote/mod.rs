@@ -2,11 +2,13 @@
 //!
 //! ```text
 //! drive.rs    loads and runs a job there, compares with what was computed here
+//! operate.rs  drives, home, hold and resume: what an operator asks
 //! session.rs  requests, answers, events; retransmission
 //! qemu.rs     starts and ends QEMU with the firmware   |   port.rs  a serial port
 //! ```
 
 pub mod drive;
+pub mod operate;
 pub mod port;
 pub mod qemu;
 pub mod session;

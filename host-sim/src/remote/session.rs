@@ -8,7 +8,7 @@ use protocol::frame::{DELIMITER, Decoder, FRAME_MAX, write_request};
 use protocol::message::{Capabilities, PassDigest, Reason, Reply, Request, Status, next_number, read_reply};
 use protocol::version::{PROTOCOL_VERSION, VersionMismatch};
 
-use interp_core::Sample;
+use interp_core::{Sample, State};
 
 /// Time after which a request is sent again. An answer takes 0.2 ms in QEMU and a few ms over a serial line; a board that
 /// checks a job, or a QEMU that shares its processor, may take longer.
@@ -42,6 +42,11 @@ pub enum RemoteError {
     /// The two ends speak different versions.
     #[error("{0}")]
     Version(VersionMismatch),
+    /// The run that is waited for stands.
+    #[error(
+        "the run is held: the board took this host for gone, or another one held it\n  help: cargo sim operate resume, or stop"
+    )]
+    Held,
     /// The board refused a request.
     #[error("the board refused {request}: {reason}")]
     Refused {
@@ -71,6 +76,8 @@ pub struct Session {
     events: VecDeque<Event>,
     input: Vec<u8>,
     capabilities: Capabilities,
+    keep_alive: Option<Duration>,
+    asked: Instant,
 }
 
 fn name(request: &Request) -> &'static str {
@@ -87,6 +94,15 @@ fn name(request: &Request) -> &'static str {
         Request::Clock(_) => "the clock",
         Request::Run { .. } => "to run",
         Request::Report(_) => "the kind of report",
+        Request::Configure(_) => "its configuration",
+        Request::Drives { on: true } => "to switch the drives on",
+        Request::Drives { on: false } => "to switch the drives off",
+        Request::SetHome { .. } => "the home",
+        Request::Acknowledge => "to acknowledge",
+        Request::Override { .. } => "the feed override",
+        Request::Stop => "to stop",
+        Request::Simulate { .. } => "simulated inputs",
+        Request::Reserved => "a request of another version",
     }
 }
 
@@ -103,6 +119,8 @@ impl Session {
             events: VecDeque::new(),
             input: Vec::new(),
             capabilities: Capabilities::default(),
+            keep_alive: None,
+            asked: Instant::now(),
         };
         // Ends what noise, or a host that went away, may have left half-sent.
         session.stream.write_all(&[DELIMITER])?;
@@ -127,6 +145,11 @@ impl Session {
     #[must_use]
     pub fn capabilities(&self) -> &Capabilities {
         &self.capabilities
+    }
+
+    /// While [`Self::event`] waits, asks for the status at least this often.
+    pub fn set_keep_alive(&mut self, every: Option<Duration>) {
+        self.keep_alive = every;
     }
 
     /// Sends a request that is answered by an acknowledgement.
@@ -175,6 +198,10 @@ impl Session {
             if let Some(event) = self.events.pop_front() {
                 return Ok(event);
             }
+            if self.keep_alive.is_some_and(|every| self.asked.elapsed() >= every) {
+                since = self.look_after(since)?;
+                continue;
+            }
             std::thread::sleep(GATHER);
             let before = self.input.len();
             // An answer that comes now belongs to a request that was answered before.
@@ -189,6 +216,16 @@ impl Session {
         }
     }
 
+    /// Asks how the run is; as long as it goes on, a board that has nothing to tell is not silent.
+    fn look_after(&mut self, since: Instant) -> Result<Instant, RemoteError> {
+        let state = self.status()?.state;
+        match state {
+            State::Held => Err(RemoteError::Held),
+            _ if state.is_under_way() => Ok(Instant::now()),
+            _ => Ok(since),
+        }
+    }
+
     /// Sends a request, again if need be, and waits for the answer that carries its number.
     fn ask(&mut self, request: &Request) -> Result<Reply, RemoteError> {
         let number = next_number(self.number);
@@ -199,6 +236,7 @@ impl Session {
                 "the request does not fit into a frame",
             )
         })?;
+        self.asked = Instant::now();
         for _ in 0..TRIES {
             self.stream.write_all(frame)?;
             self.stream.flush()?;

@@ -19,6 +19,17 @@ const BOUNDS: &[(&str, u32, &str)] = &[
         512,
         COPIED,
     ),
+    ("firmware::drivers::drive_enable::DriveEnable::switch", 3, "axes"),
+    (
+        "firmware::drivers::safety_inputs::SafetyInputs::gather",
+        40,
+        "lines of a board's table, each on one of PORTS_MAX ports",
+    ),
+    (
+        "firmware::drivers::safety_inputs::SafetyInputs::read",
+        4,
+        "ports: PORTS_MAX",
+    ),
     (
         "interp_core::run::Run::step_far",
         2,

@@ -1,0 +1,133 @@
+//! The safety inputs: emergency stop, limit switches, drive fault, by the board's table.
+//!
+//! A tick reads the input register of each port that has one of them, and compares; which input is which is worked out only
+//! when a pin has changed. There is no interrupt: between two ticks nothing is decided anyway.
+
+use boards::{Axis, Level, Line, Port, Role};
+use protocol::message::InputLines;
+
+/// Most ports that a board's safety inputs are on.
+const PORTS_MAX: usize = 4;
+
+/// The input registers of the chip's ports.
+pub(crate) trait ReadPorts {
+    /// `IDR` of this port.
+    fn input(&self, port: Port) -> u32;
+}
+
+/// The pins of one port that are looked at.
+#[derive(Clone, Copy)]
+struct Watched {
+    port: Port,
+    mask: u32,
+    /// What they were when they were looked at last.
+    seen: u32,
+}
+
+/// The board's safety inputs.
+pub(crate) struct SafetyInputs<P> {
+    ports: P,
+    board: &'static [Line],
+    watched: [Watched; PORTS_MAX],
+    lines: InputLines,
+}
+
+/// The input that a line of the board is.
+const fn input_of(role: Role) -> InputLines {
+    let number = match role {
+        Role::EmergencyStop => 0,
+        Role::LimitMin(axis) => 1 + 2 * axis as u8,
+        Role::LimitMax(axis) => 2 + 2 * axis as u8,
+        Role::DriveFault => 10,
+        _ => return InputLines::NONE,
+    };
+    InputLines(1 << number)
+}
+
+const _: () = assert!(
+    input_of(Role::LimitMax(Axis::Z)).0 == 1 << 6 && InputLines::ALL.0 == (1 << 11) - 1,
+    "the inputs' bits are those of the protocol"
+);
+
+impl<P: ReadPorts> SafetyInputs<P> {
+    /// The safety inputs among these lines, whose pins have been set up.
+    ///
+    /// # Panics
+    /// They are on more ports than there is room for. For constants and for the start of a board.
+    pub(crate) const fn new(ports: P, board: &'static [Line]) -> Self {
+        let nothing = Watched {
+            port: Port::A,
+            mask: 0,
+            // No pins look like this: the first tick works them out.
+            seen: u32::MAX,
+        };
+        let mut watched = [nothing; PORTS_MAX];
+        let mut index = 0;
+        while index < board.len() {
+            let line = &board[index];
+            if !input_of(line.role).is_none() {
+                let place = place_of(&watched, line.pin.port);
+                watched[place].port = line.pin.port;
+                watched[place].mask |= line.pin.bit();
+            }
+            index += 1;
+        }
+        Self {
+            ports,
+            board,
+            watched,
+            lines: InputLines::NONE,
+        }
+    }
+
+    /// The inputs that are asserted now.
+    #[inline]
+    pub(crate) fn read(&mut self) -> InputLines {
+        let mut changed = false;
+        for watched in &mut self.watched {
+            let pins = self.ports.input(watched.port) & watched.mask;
+            changed |= pins != watched.seen;
+            watched.seen = pins;
+        }
+        if changed {
+            self.gather();
+        }
+        self.lines
+    }
+
+    /// Works out what the pins mean.
+    #[cold]
+    #[inline(never)]
+    fn gather(&mut self) {
+        let mut lines = InputLines::NONE;
+        for line in self.board {
+            let of_port = |watched: &&Watched| watched.port as u8 == line.pin.port as u8;
+            if let Some(watched) = self.watched.iter().find(of_port)
+                && line.is_active(watched.seen)
+            {
+                lines = lines.or(input_of(line.role));
+            }
+        }
+        self.lines = lines;
+    }
+}
+
+/// The pins of a port as these inputs would set them: where there is nothing to be read, in their stead.
+#[allow(dead_code, reason = "boards with pins need it not")]
+pub(crate) fn pins_of(board: &[Line], port: Port, lines: InputLines) -> u32 {
+    let own = board.iter().filter(|line| line.pin.port as u8 == port as u8);
+    own.filter(|line| {
+        let input = input_of(line.role);
+        !input.is_none() && lines.has(input) == matches!(line.active, Level::High)
+    })
+    .fold(0, |pins, line| pins | line.pin.bit())
+}
+
+/// The place of a port among those that are watched, or the first that is free.
+const fn place_of(watched: &[Watched; PORTS_MAX], port: Port) -> usize {
+    let mut place = 0;
+    while watched[place].mask != 0 && watched[place].port as u8 != port as u8 {
+        place += 1;
+    }
+    place
+}

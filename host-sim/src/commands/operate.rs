@@ -1,0 +1,116 @@
+//! `operate`: what an operator asks of a board between runs, or of a run whose host went away.
+
+use clap::{Args, Subcommand};
+use protocol::message::{OVERRIDE_MAX_PERCENT, Status};
+use serde_json::json;
+
+use super::out::say;
+use super::{Failure, Result, run};
+use crate::remote::operate::{Action, act, sentences};
+
+/// Switches a board's drives, declares its home, holds, resumes or stops its run, and says how it is.
+///
+/// Example: cargo sim operate --port /dev/ttyUSB0 status
+/// Example: cargo sim operate --port /dev/ttyUSB0 home 0,0,50
+#[derive(Debug, Args)]
+#[command(verbatim_doc_comment)]
+pub(super) struct Arguments {
+    /// The board's serial port.
+    #[arg(long, value_name = "DEV")]
+    port: String,
+    /// Prints one JSON object instead of text.
+    #[arg(long)]
+    pub(super) json: bool,
+    #[command(subcommand)]
+    wanted: Wanted,
+}
+
+#[derive(Clone, Debug, Subcommand)]
+enum Wanted {
+    /// How the board is; nothing changes.
+    Status,
+    /// The run stands on its path.
+    Hold,
+    /// The run goes on.
+    Resume,
+    /// The run stops and is given up; the job stays loaded.
+    Stop,
+    /// The run is given up; or its fault is acknowledged.
+    Abort,
+    /// The feed as a share of the programmed one.
+    Override {
+        /// 0 to 200 percent.
+        #[arg(value_parser = clap::value_parser!(u8).range(0..=i64::from(OVERRIDE_MAX_PERCENT)))]
+        percent: u8,
+    },
+    /// The drives on.
+    On,
+    /// The drives off: the axes can be moved by hand, and the home is lost.
+    Off,
+    /// The axes stand here, with the drives on.
+    Home {
+        /// Their places, mm: X,Y,Z.
+        #[arg(value_parser = run::place, allow_hyphen_values = true)]
+        place_mm: run::PlaceNm,
+    },
+    /// Emergency stop and drive fault are acknowledged, once they are released.
+    Acknowledge,
+}
+
+impl Wanted {
+    fn action(&self) -> Action {
+        match self {
+            Self::Status => Action::Status,
+            Self::Hold => Action::Hold,
+            Self::Resume => Action::Resume,
+            Self::Stop => Action::Stop,
+            Self::Abort => Action::Abort,
+            Self::Override { percent } => Action::Override(*percent),
+            Self::On => Action::Drives(true),
+            Self::Off => Action::Drives(false),
+            Self::Home { place_mm } => Action::Home(place_mm.0),
+            Self::Acknowledge => Action::Acknowledge,
+        }
+    }
+}
+
+pub(super) fn command(arguments: &Arguments) -> Result<()> {
+    let mut session = run::open_port(&arguments.port)?;
+    let status = act(&mut session, arguments.wanted.action()).map_err(Failure::from)?;
+    let board = session.capabilities().description.board.as_str();
+    if arguments.json {
+        say!("{}", json_of(&status, board));
+        return Ok(());
+    }
+    let Status {
+        state, pass, tick, ..
+    } = status;
+    say!("{board}: {}, pass {pass}, tick {tick}", state.name());
+    if let Some(kind) = status.fault.and_then(|fault| fault.kind()) {
+        say!("  fault {} ({})", kind.code(), kind.name());
+    }
+    for sentence in sentences(&status.safety) {
+        say!("  {sentence}");
+    }
+    Ok(())
+}
+
+fn json_of(status: &Status, board: &str) -> serde_json::Value {
+    let safety = &status.safety;
+    json!({
+        "board": board,
+        "state": status.state.name(),
+        "pass": status.pass,
+        "tick": status.tick,
+        "fault": status.fault.map(|fault| fault.code),
+        "inputs": safety.lines.names().collect::<Vec<_>>(),
+        "latched": safety.latched.names().collect::<Vec<_>>(),
+        "drives_on": safety.drives_on,
+        "homed": safety.homed,
+        "homing_required": safety.configuration.homing_required,
+        "host_gone": safety.host_gone,
+        "feed_override_pct": safety.feed_override,
+        "last_reset": safety.reset.name(),
+        "deadline_misses": status.deadline_misses,
+    })
+}

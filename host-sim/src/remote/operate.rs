@@ -1,0 +1,130 @@
+//! What an operator asks of a board: drives, home, hold and resume, override.
+
+use std::time::Duration;
+
+use protocol::message::{Configuration, Request, SafetyStatus, Status};
+
+use super::session::{RemoteError, Session};
+
+/// Frames of the host within the time after which it would count as gone.
+const KEEP_ALIVES: u32 = 4;
+
+/// How a board is made ready for a run.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Setup {
+    /// What it is told of the machine.
+    pub configuration: Configuration,
+    /// Where its axes stand, nm, if that is to be declared.
+    pub home_nm: Option<[i32; 3]>,
+}
+
+impl Setup {
+    /// A board without axes: they stand wherever they are wanted.
+    #[must_use]
+    pub const fn simulated(configuration: Configuration) -> Self {
+        Self {
+            configuration,
+            home_nm: Some([0; 3]),
+        }
+    }
+}
+
+/// Configures a board, switches its drives on, and declares home where that is wanted.
+///
+/// # Errors
+/// The line breaks, or the board refuses: an input is asserted or latched, or a run is under way.
+pub fn make_ready(session: &mut Session, setup: &Setup) -> Result<(), RemoteError> {
+    session.command(&Request::Configure(setup.configuration))?;
+    session.command(&Request::Drives { on: true })?;
+    if let Some(home_nm) = setup.home_nm {
+        session.command(&Request::SetHome { home_nm })?;
+    }
+    Ok(())
+}
+
+/// Lets the session keep a board from taking this host for gone, while it waits for events on the board's own clock.
+pub(super) fn keep_alive(session: &mut Session) -> Result<(), RemoteError> {
+    let ticks = session.status()?.safety.configuration.host_gone_ticks;
+    let period_us = session.capabilities().description.period_us;
+    let patience = Duration::from_micros(u64::from(ticks) * u64::from(period_us));
+    session.set_keep_alive((ticks > 0).then(|| patience / KEEP_ALIVES));
+    Ok(())
+}
+
+/// What an operator wants.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Action {
+    /// To know how it is going.
+    Status,
+    /// The run to stand on its path.
+    Hold,
+    /// The run to go on.
+    Resume,
+    /// The run to stop, and be given up.
+    Stop,
+    /// The run to be given up; a fault of a run to be acknowledged.
+    Abort,
+    /// The feed as this share of the programmed one, percent.
+    Override(u8),
+    /// The drives on or off.
+    Drives(bool),
+    /// The axes to count as standing here, nm.
+    Home([i32; 3]),
+    /// Emergency stop and drive fault to be acknowledged.
+    Acknowledge,
+}
+
+impl Action {
+    fn request(self) -> Option<Request> {
+        Some(match self {
+            Self::Status => return None,
+            Self::Hold => Request::Hold,
+            Self::Resume => Request::Resume,
+            Self::Stop => Request::Stop,
+            Self::Abort => Request::Abort,
+            Self::Override(percent) => Request::Override { percent },
+            Self::Drives(on) => Request::Drives { on },
+            Self::Home(home_nm) => Request::SetHome { home_nm },
+            Self::Acknowledge => Request::Acknowledge,
+        })
+    }
+}
+
+/// Does it, and says how it is going then.
+///
+/// # Errors
+/// The line breaks, or the board refuses.
+pub fn act(session: &mut Session, action: Action) -> Result<Status, RemoteError> {
+    if let Some(request) = action.request() {
+        session.command(&request)?;
+        // Taken up with the next period; a serial line is no faster than that, QEMU's socket may be.
+        std::thread::sleep(Duration::from_millis(2));
+    }
+    session.status()
+}
+
+/// The safety state in sentences, what is asserted first.
+#[must_use]
+pub fn sentences(safety: &SafetyStatus) -> Vec<String> {
+    let names = |lines: protocol::message::InputLines| lines.names().collect::<Vec<_>>().join(", ");
+    let mut said = Vec::new();
+    if !safety.lines.is_none() {
+        said.push(format!("asserted: {}", names(safety.lines)));
+    }
+    if !safety.latched.is_none() {
+        said.push(format!("to be acknowledged: {}", names(safety.latched)));
+    }
+    let drives = if safety.drives_on { "on" } else { "off" };
+    let home = match (safety.homed, safety.configuration.homing_required) {
+        (true, _) => "homed",
+        (false, true) => "not homed",
+        (false, false) => "not homed, and need not be",
+    };
+    said.push(format!("drives {drives}, {home}"));
+    said.push(format!("feed override {} %", safety.feed_override));
+    if safety.host_gone {
+        said.push("the host was gone during the run".to_owned());
+    }
+    said.push(format!("last reset: {}", safety.reset.name()));
+    said
+}

@@ -1,0 +1,334 @@
+//! Inputs, drives, home and a host that is gone, on a whole board with a real job; and any order of all of it.
+#![allow(clippy::unwrap_used, reason = "a test may fail by panic")]
+
+mod safety_rules;
+
+use std::collections::VecDeque;
+use std::io::{self, Read, Write};
+use std::sync::{Arc, Mutex};
+
+use controller::{in_process::Board, safety::DEBOUNCE_TICKS};
+use host_sim::remote::operate::{Action, Setup, act, make_ready};
+use host_sim::remote::session::Event as Told;
+use host_sim::remote::{RemoteError, Session, drive};
+use integration_tests::{dome, upload};
+use interp_core::{
+    fault::{Fault, FaultKind},
+    sample::State,
+};
+use protocol::message::{Clock, Configuration, HostGone, InputLines, Reason, Request, Status};
+
+const WORDS: usize = 64;
+const ESTOP: InputLines = InputLines::EMERGENCY_STOP;
+const X_PLUS: InputLines = InputLines(1 << 2);
+const FAULT: InputLines = InputLines(1 << 10);
+
+/// A line to a board in this process. Each read lets some periods pass.
+struct Wire {
+    board: Arc<Mutex<Board<WORDS>>>,
+    sent: VecDeque<u8>,
+}
+
+/// Periods that pass with each read, of which there is about one a millisecond.
+const TICKS_A_READ: usize = 2;
+
+impl Read for Wire {
+    fn read(&mut self, bytes: &mut [u8]) -> io::Result<usize> {
+        let mut board = self.board.lock().unwrap();
+        (0..TICKS_A_READ).for_each(|_| board.tick());
+        self.sent.extend(board.take_sent());
+        if self.sent.is_empty() {
+            return Err(io::ErrorKind::WouldBlock.into());
+        }
+        self.sent.read(bytes)
+    }
+}
+
+impl Write for Wire {
+    fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
+        self.board.lock().unwrap().receive(bytes);
+        Ok(bytes.len())
+    }
+
+    fn flush(&mut self) -> io::Result<()> {
+        Ok(())
+    }
+}
+
+/// Host and board.
+struct Desk {
+    board: Arc<Mutex<Board<WORDS>>>,
+    session: Session,
+}
+
+impl Desk {
+    /// In session, with the dome loaded, told this.
+    fn loaded(setup: &Setup) -> Self {
+        let board = Arc::new(Mutex::new(Board::new()));
+        let mut desk = Self {
+            session: Session::open(wire(&board), 1).unwrap(),
+            board,
+        };
+        make_ready(&mut desk.session, setup).unwrap();
+        let (header, words) = dome();
+        for request in upload(header, &words) {
+            desk.session.command(&request).unwrap();
+        }
+        desk
+    }
+
+    fn ready() -> Self {
+        Self::loaded(&Setup::simulated(Configuration::DEFAULT))
+    }
+
+    fn tick(&self, ticks: u32) -> Status {
+        let mut board = self.board.lock().unwrap();
+        (0..ticks).for_each(|_| board.tick());
+        board.status()
+    }
+
+    fn ask(&mut self, request: Request) -> Result<(), Reason> {
+        match self.session.command(&request) {
+            Err(RemoteError::Refused { reason, .. }) => Err(reason),
+            done => {
+                done.unwrap();
+                Ok(())
+            }
+        }
+    }
+
+    /// Starts, and stops asking after some periods.
+    fn running(&mut self) -> Status {
+        self.ask(Request::Start).unwrap();
+        let status = self.tick(50);
+        assert_eq!(status.state, State::Running);
+        status
+    }
+
+    /// From the next period on. Beside the line, whose answer would let periods pass.
+    fn assert_inputs(&self, lines: InputLines) {
+        self.board.lock().unwrap().simulate(lines);
+    }
+
+    /// The status that the board says the run ended with.
+    fn halted(&mut self) -> Status {
+        loop {
+            if let Told::Halted(status) = self.session.event().unwrap() {
+                return status;
+            }
+        }
+    }
+}
+
+fn wire(board: &Arc<Mutex<Board<WORDS>>>) -> Box<Wire> {
+    Box::new(Wire {
+        board: board.clone(),
+        sent: VecDeque::new(),
+    })
+}
+
+fn because(kind: FaultKind, lines: InputLines) -> Reason {
+    let fault = Fault::new(kind, lines.0.into());
+    Reason::Unsafe { fault: fault.into() }
+}
+
+/// Digest and number of the samples of an undisturbed run.
+fn undisturbed() -> (u64, u32) {
+    let mut desk = Desk::ready();
+    desk.ask(Request::Start).unwrap();
+    let status = desk.halted();
+    assert_eq!(status.state, State::Finished);
+    (status.digest, status.samples)
+}
+
+#[test]
+fn an_emergency_stop_ends_the_run_in_its_tick_and_is_undone_step_by_step() {
+    let mut desk = Desk::ready();
+    let running = desk.running();
+    desk.assert_inputs(ESTOP);
+    let stopped = desk.tick(1);
+    // No sample more: nothing follows the path.
+    assert_eq!(
+        (stopped.state, stopped.samples, stopped.digest),
+        (State::Faulted, running.samples, running.digest)
+    );
+    let fault = stopped.fault.unwrap();
+    assert_eq!(
+        (fault.kind(), fault.lines()),
+        (Some(FaultKind::EmergencyStop), ESTOP)
+    );
+    assert!(!stopped.safety.drives_on && !stopped.safety.homed);
+    assert!(!desk.board.lock().unwrap().real_time().drives_on());
+    assert_eq!(desk.halted().fault, Some(fault));
+
+    let pressed = because(FaultKind::EmergencyStop, ESTOP);
+    assert_eq!(desk.ask(Request::Acknowledge), Err(pressed));
+    desk.ask(Request::Abort).unwrap();
+    desk.tick(1);
+    assert_eq!(desk.ask(Request::Start), Err(pressed));
+    desk.assert_inputs(InputLines::NONE);
+    desk.tick(DEBOUNCE_TICKS);
+    assert_eq!(desk.ask(Request::Drives { on: true }), Err(pressed));
+    assert_eq!(desk.ask(Request::Start), Err(pressed));
+    desk.ask(Request::Acknowledge).unwrap();
+    assert_eq!(desk.ask(Request::Start), Err(Reason::DrivesOff));
+    let home = Request::SetHome { home_nm: [0; 3] };
+    assert_eq!(desk.ask(home.clone()), Err(Reason::DrivesOff));
+    desk.ask(Request::Drives { on: true }).unwrap();
+    assert_eq!(
+        desk.ask(Request::Start),
+        Err(because(FaultKind::NotHomed, InputLines::NONE))
+    );
+    desk.ask(home).unwrap();
+    desk.ask(Request::Start).unwrap();
+    let whole = desk.halted();
+    assert_eq!((whole.digest, whole.samples), undisturbed());
+}
+
+#[test]
+fn a_drive_fault_cuts_and_a_limit_switch_stops_along_the_path() {
+    for (lines, kind, samples, homed) in [
+        (FAULT, FaultKind::DriveFault, 0, false),
+        (X_PLUS, FaultKind::LimitSwitch, 31, true),
+    ] {
+        let mut desk = Desk::ready();
+        let running = desk.running();
+        desk.assert_inputs(lines);
+        let steady = desk.tick(DEBOUNCE_TICKS - 1);
+        assert_eq!(steady.state, State::Running);
+        desk.tick(1);
+        let halted = desk.halted();
+        assert_eq!(halted.samples - running.samples, DEBOUNCE_TICKS - 1 + samples);
+        let fault = halted.fault.unwrap();
+        assert_eq!((fault.kind(), fault.lines()), (Some(kind), lines));
+        assert_eq!((halted.safety.homed, halted.safety.drives_on), (homed, homed));
+        desk.ask(Request::Abort).unwrap();
+        desk.tick(1);
+        assert_eq!(desk.ask(Request::Start), Err(because(kind, lines)));
+        desk.assert_inputs(InputLines::NONE);
+        desk.tick(DEBOUNCE_TICKS);
+        assert_eq!(desk.ask(Request::Start).is_ok(), homed);
+    }
+}
+
+/// Time stands still in lockstep; the inputs do not.
+#[test]
+fn an_emergency_stop_is_told_in_lockstep_without_a_period() {
+    for held in [false, true] {
+        let mut desk = Desk::ready();
+        desk.ask(Request::Clock(Clock::Lockstep)).unwrap();
+        desk.ask(Request::Start).unwrap();
+        desk.ask(Request::Run { ticks: 40 }).unwrap();
+        let mut before = desk.halted();
+        if held {
+            desk.ask(Request::Hold).unwrap();
+            desk.ask(Request::Run { ticks: 1 }).unwrap();
+            before = desk.halted();
+        }
+        let state = if held { State::Held } else { State::Running };
+        assert_eq!(before.state, state);
+        desk.assert_inputs(ESTOP);
+        let halted = desk.halted();
+        assert_eq!((halted.state, halted.samples), (State::Faulted, before.samples));
+        assert_eq!(halted.fault.unwrap().kind(), Some(FaultKind::EmergencyStop));
+    }
+}
+
+#[test]
+fn a_host_that_is_gone_finds_its_run_held_and_goes_on_exactly() {
+    let configuration = |host_gone| Configuration {
+        homing_required: true,
+        host_gone,
+        host_gone_ticks: 100,
+    };
+    let mut desk = Desk::loaded(&Setup::simulated(configuration(HostGone::Hold)));
+    desk.running();
+    let gone = desk.tick(100);
+    assert_eq!(gone.state, State::Held);
+    assert!(gone.safety.host_gone && gone.fault.is_none() && gone.samples <= 100);
+    assert_eq!(desk.tick(1000).samples, gone.samples);
+    // Another session, as after a restart of the host.
+    desk.session = Session::open(wire(&desk.board), 2).unwrap();
+    assert!(act(&mut desk.session, Action::Status).unwrap().safety.host_gone);
+    assert_eq!(
+        act(&mut desk.session, Action::Resume).unwrap().state,
+        State::Running
+    );
+    while desk.tick(10).state == State::Running {
+        desk.session.status().unwrap();
+    }
+    let over = desk.tick(0);
+    assert_eq!(over.state, State::Finished);
+    assert_eq!((over.digest, over.samples), undisturbed());
+
+    let mut desk = Desk::loaded(&Setup::simulated(configuration(HostGone::Finish)));
+    desk.running();
+    let over = desk.tick(2000);
+    assert_eq!((over.state, over.safety.host_gone), (State::Finished, true));
+    assert_eq!((over.digest, over.samples), undisturbed());
+    // The next run begins with a host.
+    assert!(!desk.running().safety.host_gone);
+
+    // In lockstep there is nobody to miss.
+    let mut desk = Desk::loaded(&Setup::simulated(configuration(HostGone::Hold)));
+    desk.ask(Request::Clock(Clock::Lockstep)).unwrap();
+    desk.ask(Request::Start).unwrap();
+    desk.ask(Request::Run { ticks: 500 }).unwrap();
+    let status = desk.tick(500);
+    assert_eq!((status.state, status.safety.host_gone), (State::Running, false));
+}
+
+#[test]
+fn without_homing_a_run_starts_unhomed() {
+    let mut setup = Setup::default();
+    let not_homed = because(FaultKind::NotHomed, InputLines::NONE);
+    assert_eq!(Desk::loaded(&setup).ask(Request::Start), Err(not_homed));
+    setup.configuration.homing_required = false;
+    assert_eq!(Desk::loaded(&setup).ask(Request::Start), Ok(()));
+}
+
+#[test]
+fn an_operator_is_told_what_he_did() {
+    let mut desk = Desk::ready();
+    let mut done = |action| act(&mut desk.session, action).unwrap();
+    assert_eq!(done(Action::Override(150)).safety.feed_override, 150);
+    assert_eq!(done(Action::Override(0)).safety.feed_override, 0);
+    let off = done(Action::Drives(false)).safety;
+    assert!(!off.drives_on && !off.homed);
+    assert!(done(Action::Drives(true)).safety.drives_on);
+    assert!(done(Action::Home([1, -2, 3])).safety.homed);
+    assert_eq!(desk.board.lock().unwrap().real_time().home_nm(), Some([1, -2, 3]));
+    desk.running();
+    assert_eq!(act(&mut desk.session, Action::Hold).unwrap().state, State::Held);
+    let off = act(&mut desk.session, Action::Drives(false));
+    assert!(matches!(
+        off,
+        Err(RemoteError::Refused {
+            reason: Reason::WrongState { .. },
+            ..
+        })
+    ));
+    assert_eq!(act(&mut desk.session, Action::Stop).unwrap().state, State::Ready);
+}
+
+/// A host that waits for a long pass on the board's own clock says so often enough, and learns that the run is held.
+#[test]
+fn a_host_that_waits_is_not_gone() {
+    let mut setup = Setup::simulated(Configuration::DEFAULT);
+    (setup.configuration.host_gone, setup.configuration.host_gone_ticks) = (HostGone::Hold, 400);
+    let mut desk = Desk::loaded(&setup);
+    let (digest, samples) = undisturbed();
+    let compared = drive::run_digests(&mut desk.session, &[], false, |_| {}).unwrap();
+    assert_eq!(
+        (
+            compared.status.digest,
+            compared.status.samples,
+            compared.status.safety.host_gone
+        ),
+        (digest, samples, false)
+    );
+    desk.running();
+    desk.tick(1000);
+    desk.session.set_keep_alive(Some(std::time::Duration::ZERO));
+    assert!(matches!(desk.session.event(), Err(RemoteError::Held)));
+}

@@ -1,0 +1,248 @@
+//! Any order of inputs, orders, requests and late ticks, against the rules in their simplest form.
+
+use controller::{
+    machine::{Command, Event},
+    realtime::{RealTime, TickInput},
+    safety::{DEBOUNCE_TICKS, Order},
+};
+use integration_tests::dome;
+use interp_core::{fault::FaultKind, interpolator, sample::State};
+use proptest::prelude::*;
+use protocol::message::{Clock, Configuration, FaultReport, HostGone, InputLines, Report, Status};
+
+use super::WORDS;
+
+/// What may happen to the real-time half.
+#[derive(Clone, Copy, Debug)]
+enum Deed {
+    /// These inputs for so many ticks.
+    Inputs(u16, u8),
+    Order(Order),
+    Command(Command),
+    Heard,
+    /// A tick after so many were missed, and so many cycles.
+    Late(u32, u32),
+}
+
+const BUDGET: u32 = 16_800;
+
+fn any_deed() -> impl Strategy<Value = Deed> {
+    use interpolator::Request as Wish;
+    let line = prop_oneof![
+        4 => Just(0_u16),
+        1 => (0_u16..11).prop_map(|bit| 1 << bit),
+        1 => any::<u16>(),
+    ];
+    let configuration =
+        (any::<bool>(), any::<bool>(), 0_u32..60).prop_map(|(required, hold, ticks)| Configuration {
+            homing_required: required,
+            host_gone: if hold { HostGone::Hold } else { HostGone::Finish },
+            host_gone_ticks: ticks,
+        });
+    let wishes = [
+        Wish::Start,
+        Wish::Start,
+        Wish::Start,
+        Wish::Hold,
+        Wish::Resume,
+        Wish::Stop,
+        Wish::Abort,
+    ];
+    prop_oneof![
+        4 => (line, 0_u8..40).prop_map(|(lines, ticks)| Deed::Inputs(lines, ticks)),
+        3 => any::<bool>().prop_map(|on| Deed::Order(Order::Drives { on })),
+        2 => Just(Deed::Order(Order::SetHome { home_nm: [1, 2, 3] })),
+        2 => Just(Deed::Order(Order::Acknowledge)),
+        1 => configuration.prop_map(|configuration| Deed::Order(Order::Configure(configuration))),
+        6 => prop::sample::select(wishes.to_vec()).prop_map(|wish| Deed::Command(Command::Request(wish))),
+        1 => prop::sample::select(&[Clock::Free, Clock::Lockstep][..]).prop_map(|clock| Deed::Command(Command::Clock(clock))),
+        1 => (0_u32..50).prop_map(|ticks| Deed::Command(Command::Run { ticks })),
+        1 => (0_u8..=200).prop_map(|percent| Deed::Command(Command::Override { percent })),
+        1 => Just(Deed::Heard),
+        1 => (0_u32..3, 0_u32..2 * BUDGET).prop_map(|(missed, cycles)| Deed::Late(missed, cycles)),
+    ]
+}
+
+/// What the rules say, by the simplest means: a count for each input.
+#[derive(Default)]
+struct Rules {
+    counts: [u32; 16],
+    steady: u16,
+    latched: u16,
+    homed: bool,
+    drives: bool,
+}
+
+impl Rules {
+    fn tick(&mut self, raw: u16) {
+        for bit in 0..11 {
+            let (mask, set) = (1 << bit, raw >> bit & 1 != 0);
+            let differs = set != (self.steady & mask != 0);
+            self.counts[bit] = if differs { self.counts[bit] + 1 } else { 0 };
+            if self.counts[bit] >= DEBOUNCE_TICKS || (bit == 0 && set) {
+                self.steady = if set {
+                    self.steady | mask
+                } else {
+                    self.steady & !mask
+                };
+                self.counts[bit] = 0;
+            }
+        }
+        let stops = self.steady & 0x781;
+        self.latched |= stops;
+        if stops != 0 {
+            (self.homed, self.drives) = (false, false);
+        }
+    }
+
+    fn may_start(&self, homing_required: bool) -> bool {
+        self.steady | self.latched == 0 && self.drives && (self.homed || !homing_required)
+    }
+}
+
+struct Bench {
+    half: RealTime<[i32; WORDS]>,
+    rules: Rules,
+    raw: u16,
+    events: Vec<Event>,
+}
+
+impl Bench {
+    fn new() -> Self {
+        let (header, words) = dome();
+        let mut half = RealTime::new();
+        half.set_tick_budget(BUDGET);
+        half.load_begin(&header, 54).unwrap();
+        half.load_words(0, &words).unwrap();
+        half.load_check(0).unwrap();
+        half.load_finish().unwrap();
+        Self {
+            half,
+            rules: Rules::default(),
+            raw: 0,
+            events: Vec::new(),
+        }
+    }
+
+    fn tick(&mut self, missed: u32, cycles: u32) -> Result<(), TestCaseError> {
+        let before = self.half.status();
+        let input = TickInput {
+            missed,
+            cycles,
+            lines: InputLines(self.raw),
+        };
+        self.half.tick(input, &mut self.events);
+        self.rules.tick(self.raw);
+        let after = self.half.status();
+        self.follows_the_rules(&after)?;
+        if after.state.is_under_way() && !before.state.is_under_way() {
+            prop_assert!(self.rules.may_start(before.safety.configuration.homing_required));
+        }
+        let cut = self.rules.steady & 0x781 != 0;
+        if cut && before.state.is_under_way() {
+            prop_assert_eq!((after.state, after.samples), (State::Faulted, before.samples));
+            let kind = after.fault.and_then(FaultReport::kind);
+            prop_assert!(
+                before.fault.is_some()
+                    || matches!(kind, Some(FaultKind::EmergencyStop | FaultKind::DriveFault))
+            );
+        }
+        if self.rules.steady & 0x7e != 0 && after.state.is_under_way() {
+            prop_assert_eq!(after.state, State::Stopping);
+        }
+        // What was not under way ends with a word of it.
+        if before.state.is_under_way() && !after.state.is_under_way() {
+            let told = self
+                .events
+                .iter()
+                .filter(|event| matches!(event, Event::Halted(_)));
+            prop_assert!(told.count() == 1, "{:?}", after.state);
+        }
+        self.events.clear();
+        prop_assert_eq!(
+            self.half.feeds_watchdog(missed, cycles),
+            missed == 0 && cycles <= BUDGET
+        );
+        Ok(())
+    }
+
+    fn follows_the_rules(&self, status: &Status) -> Result<(), TestCaseError> {
+        let safety = status.safety;
+        let Rules {
+            steady,
+            latched,
+            homed,
+            drives,
+            ..
+        } = self.rules;
+        prop_assert_eq!(
+            (safety.lines.0, safety.latched.0, safety.homed, safety.drives_on),
+            (steady, latched, homed, drives)
+        );
+        prop_assert_eq!(self.half.drives_on(), drives);
+        prop_assert_eq!(self.half.home_nm(), homed.then_some([1, 2, 3]));
+        prop_assert!(!drives || latched == 0);
+        prop_assert!(!status.state.is_under_way() || drives);
+        Ok(())
+    }
+
+    fn order(&mut self, order: Order) -> Result<(), TestCaseError> {
+        let status = self.half.status();
+        let (under_way, stops) = (status.state.is_under_way(), self.rules.steady & 0x781);
+        let rules = &mut self.rules;
+        let allowed = match order {
+            Order::Acknowledge => stops == 0,
+            Order::Configure(_) | Order::Drives { on: false } => !under_way,
+            Order::Drives { on: true } => !under_way && stops | rules.latched == 0,
+            Order::SetHome { .. } => !under_way && rules.drives,
+        };
+        prop_assert_eq!(self.half.order(order).is_ok(), allowed, "{:?}", order);
+        if allowed {
+            match order {
+                Order::Acknowledge => rules.latched = 0,
+                Order::Configure(_) => {}
+                Order::Drives { on } => (rules.drives, rules.homed) = (on, on && rules.homed),
+                Order::SetHome { .. } => rules.homed = true,
+            }
+        }
+        self.follows_the_rules(&self.half.status())
+    }
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(600))]
+
+    /// The latch never clears while it is asserted, drives are never on while it is latched, no run starts that is not safe, none goes on
+    /// without drives, no late tick feeds the watchdog.
+    #[test]
+    fn any_order_of_anything_keeps_the_rules(deeds in prop::collection::vec(any_deed(), 0..80), begun: bool) {
+        let mut bench = Bench::new();
+        if begun {
+            bench.order(Order::Drives { on: true })?;
+            bench.order(Order::SetHome { home_nm: [1, 2, 3] })?;
+            bench.half.obey(Command::Report(Report::Digests), &mut bench.events);
+            bench.half.obey(Command::Request(interpolator::Request::Start), &mut bench.events);
+        }
+        for deed in deeds {
+            match deed {
+                Deed::Inputs(raw, ticks) => {
+                    bench.raw = raw;
+                    for _ in 0..ticks {
+                        bench.tick(0, 0)?;
+                    }
+                }
+                Deed::Order(order) => bench.order(order)?,
+                Deed::Command(command) => {
+                    // A clock is not changed under a run: the link sees to that.
+                    let under_way = bench.half.status().state.is_under_way();
+                    if !(under_way && matches!(command, Command::Clock(_))) {
+                        bench.half.obey(command, &mut bench.events);
+                        bench.events.clear();
+                    }
+                }
+                Deed::Heard => bench.half.heard(),
+                Deed::Late(missed, cycles) => bench.tick(missed, cycles)?,
+            }
+        }
+    }
+}
