@@ -26,6 +26,7 @@ pub mod export;
 pub mod gcode;
 pub mod job_file;
 pub mod machine;
+pub mod motion;
 pub mod operations;
 pub mod oracle;
 pub mod paper;
