@@ -7,6 +7,7 @@ mod completions;
 mod explain;
 mod export;
 mod import;
+mod motion_words;
 mod new;
 mod out;
 mod outcome;

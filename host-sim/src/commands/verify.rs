@@ -2,14 +2,17 @@
 
 use super::out::say;
 use std::cell::RefCell;
+use std::collections::BTreeMap;
 use std::path::PathBuf;
 
 use clap::Args;
 use indicatif::ProgressBar;
+use interp_core::State;
 use serde_json::Value;
 
+use super::motion_words::{self, Judged};
 use super::simulate::{Timed, machine, oracle, remarks, report, timed};
-use super::{Failure, Result, along, load, progress, swept_words, warn_of_limits};
+use super::{Failure, Result, along, load, progress, spinner, swept_words, warn_of_limits};
 use crate::job_file::{JobFile, Spacing};
 use crate::motion::{Gauge, Peaks, limits};
 use crate::oracle::{Bounds, Checked, Emitted, Figure};
@@ -42,6 +45,9 @@ pub(super) struct Arguments {
     /// Writes a page with a view that turns, charts and figures into this folder.
     #[arg(long, value_name = "DIR")]
     report: Option<PathBuf>,
+    /// Times the first, the middle and the last pass by the best motion within usual axis limits, where the job sets none.
+    #[arg(long)]
+    optimum: bool,
     /// Prints one JSON object instead of text.
     #[arg(long)]
     pub(super) json: bool,
@@ -145,6 +151,7 @@ pub(super) struct Measured {
     pub(super) findings: Findings,
     pub(super) swept: swept::Findings,
     pub(super) axes: Peaks,
+    pub(super) motion: Vec<Judged>,
 }
 
 /// Runs the core again, measures every sample, then the swept ball against the surface.
@@ -153,6 +160,7 @@ pub(super) fn measured(
     prepared: &Prepared,
     timed: &Timed,
     mut sketch: Option<&mut Sketch>,
+    with_optimum: bool,
 ) -> Result<Measured> {
     let oracle = oracle(job)?;
     let bar = progress(timed.samples, "measuring");
@@ -167,8 +175,12 @@ pub(super) fn measured(
     };
     let mut survey = Survey::new(prepared, &oracle, None, Some(&mut keep));
     let mut written = Ok(());
+    let mut running = BTreeMap::<u32, u64>::new();
     let ran = machine(job, prepared)?.run(|sample| {
         axes.borrow_mut().emitted(sample.tick, sample.cl_nm);
+        if sample.state == State::Running {
+            *running.entry(sample.pass).or_default() += 1;
+        }
         written = survey.add(sample);
         if sample.tick % 65_536 == 0 {
             bar.set_position(sample.tick.into());
@@ -180,10 +192,19 @@ pub(super) fn measured(
         .map_err(|error| Failure::Failed(Some(error.to_string())))?;
     let swept = swept::measure(job, &oracle, &track, ran.is_ok(), &Bar(&bar));
     bar.finish_and_clear();
+    let motion = if with_optimum {
+        let bar = spinner("the best motion");
+        let judged = motion_words::judged(job, &oracle, &track, &running);
+        bar.finish_and_clear();
+        judged
+    } else {
+        Vec::new()
+    };
     Ok(Measured {
         findings,
         swept,
         axes: axes.into_inner().finish(),
+        motion,
     })
 }
 
@@ -221,13 +242,15 @@ pub(super) fn command(arguments: &Arguments) -> Result<()> {
     let (job, prepared) = load(&arguments.job)?;
     warn_of_limits(&job);
     let timed = timed(&job, &prepared)?;
+    let with_optimum = arguments.optimum || motion_words::limits(&job).is_some();
     let directory = arguments.report.as_deref();
     let mut sketch = directory.map(|_| Sketch::new(&job, timed.passes.len()));
     let Measured {
         findings,
         swept,
         axes,
-    } = measured(&job, &prepared, &timed, sketch.as_mut())?;
+        motion,
+    } = measured(&job, &prepared, &timed, sketch.as_mut(), with_optimum)?;
     let figures = &findings.report;
     let scanned = scanned_passes(&job)?;
     let mut failures = figures.failures(&BOUNDS);
@@ -258,6 +281,7 @@ pub(super) fn command(arguments: &Arguments) -> Result<()> {
     let page = report(&job, directory, sketch.as_ref(), &findings, &remarks)?;
     if arguments.json {
         let mut value = swept_words::json(&job, &prepared, &findings, &swept, &axes);
+        value.insert("motion".to_owned(), motion_words::json(&motion));
         value.extend(along::json(&job));
         value.insert("passes_scanned".to_owned(), scanned.into());
         value.insert("failures".to_owned(), failures.into());
@@ -268,6 +292,7 @@ pub(super) fn command(arguments: &Arguments) -> Result<()> {
         say!("  along        {}", along::sentence(&job));
         print(&findings, scanned, job.spacing == Spacing::FirstOrder);
         swept_words::print(&job, &prepared, &findings, &swept, &axes);
+        motion_words::print(&motion);
         for failure in &failures {
             say!("  FAIL {failure}");
         }
