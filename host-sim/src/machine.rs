@@ -50,6 +50,23 @@ impl Machine {
         self.core.fault().map_or(Ok(()), Err)
     }
 
+    /// Lets one period pass.
+    pub fn tick(&mut self, request: Request) -> &Sample {
+        self.core.tick(request)
+    }
+
+    /// State after the last period.
+    #[must_use]
+    pub fn state(&self) -> State {
+        self.core.state()
+    }
+
+    /// The fault that the machine is in.
+    #[must_use]
+    pub fn fault(&self) -> Option<Fault> {
+        self.core.fault()
+    }
+
     /// The surface at a place, outside of any run.
     ///
     /// # Errors

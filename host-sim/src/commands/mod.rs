@@ -14,6 +14,7 @@ mod outcome;
 mod paper;
 mod progress;
 mod run;
+mod scripted;
 mod simulate;
 mod swept_words;
 mod verify;

@@ -12,12 +12,15 @@ use serde_json::{Value, json};
 use super::out::say;
 use super::outcome::Outcome;
 use super::simulate::{Timed, machine, remarks, report, surveyed, timed};
-use super::{Failure, Result, cannot_write, load, progress, spinner, trace, unheld_limits, warn_of_limits};
+use super::{
+    Failure, Result, cannot_write, load, progress, scripted, spinner, trace, unheld_limits, warn_of_limits,
+};
 use crate::approach::Kind;
 use crate::job_file::JobFile;
 use crate::prepare::Prepared;
 use crate::remote::qemu::{self, Qemu, QemuError};
 use crate::remote::{RemoteError, Session, drive, port};
+use crate::travel;
 
 /// Runs a job in the firmware, in QEMU or on a board, and compares every sample with this machine's.
 ///
@@ -41,6 +44,9 @@ pub(super) struct Arguments {
     /// Runs a job on a board although the axis limits that it asks for are not held yet.
     #[arg(long)]
     ignore_limits: bool,
+    /// Does what this file says an operator does, in lockstep: lines `tick N: hold`, or resume, stop, abort, start, override P.
+    #[arg(long, value_name = "FILE", requires = "qemu", conflicts_with_all = ["report", "trace"])]
+    script: Option<PathBuf>,
     /// Prints one JSON object instead of text.
     #[arg(long)]
     pub(super) json: bool,
@@ -303,6 +309,14 @@ pub(super) fn command(arguments: &Arguments) -> Result<()> {
         ));
     }
     warn_of_limits(&job);
+    travel::check(&job)?;
+    if let Some(script) = &arguments.script {
+        let scripted = scripted::play(&job, &prepared, script, None)?;
+        let (_qemu, mut session) = connect(arguments)?;
+        check_period(&job, &session)?;
+        drive::upload(&mut session, &prepared, |_| {})?;
+        return scripted.run(&job, &mut session, arguments.json);
+    }
     let here = timed(&job, &prepared)?;
     let (_qemu, mut session) = connect(arguments)?;
     check_period(&job, &session)?;

@@ -20,6 +20,7 @@ use crate::prepare::Prepared;
 use crate::report::{Remarks, RidgePlace, Scallops, Sketch};
 use crate::survey::{Findings, Survey};
 use crate::swept::{self, Track};
+use crate::travel;
 
 /// What every sample has to hold to: the figures of the README.
 pub const BOUNDS: Bounds = Bounds {
@@ -266,6 +267,9 @@ pub(super) fn command(arguments: &Arguments) -> Result<()> {
         failures.insert(0, fault.sentence());
     }
     failures.extend(swept.failures.iter().cloned());
+    if let Err(error) = travel::check(&job) {
+        failures.push(format!("{}: {}", error.what(), error.remedy()));
+    }
     failures.extend(limits::failures(&axes));
     let passed = failures.is_empty();
     let mut remarks = Remarks {

@@ -3,12 +3,14 @@
 //! ```text
 //! drive.rs    loads and runs a job there, compares with what was computed here
 //! session.rs  requests, answers, events; retransmission
+//! script.rs   plays what an operator does, period by period
 //! qemu.rs     starts and ends QEMU with the firmware   |   port.rs  a serial port
 //! ```
 
 pub mod drive;
 pub mod port;
 pub mod qemu;
+pub mod script;
 pub mod session;
 
 pub use session::{RemoteError, Session, Stream};
