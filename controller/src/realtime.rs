@@ -12,7 +12,7 @@
 
 use interp_core::{
     fault::{Fault, FaultKind, Result},
-    interpolator::{Interpolator, Request},
+    interpolator::{Inputs, Interpolator, Request},
     job::{Header, STORE_WORDS},
     sample::{Sample, State},
 };
@@ -311,7 +311,11 @@ impl<S: AsRef<[i32]> + AsMut<[i32]>> RealTime<S> {
         if starts && request.is_allowed(self.interpolator.state()) {
             request = self.control.begin();
         }
-        let state = self.interpolator.tick(request).state;
+        let inputs = Inputs {
+            request,
+            feed_override: self.control.safety.status().feed_override,
+        };
+        let state = self.interpolator.tick(inputs).state;
         if moves(state) {
             self.count_sample(events);
         }

@@ -1,6 +1,6 @@
 //! The machine in this process: the core with a job loaded, one call a period.
 
-use interp_core::{Fault, Interpolator, Place, Probe, Request, Sample, State};
+use interp_core::{Fault, Inputs, Interpolator, Place, Probe, Request, Sample, State};
 
 use crate::prepare::Prepared;
 
@@ -48,6 +48,23 @@ impl Machine {
             }
         }
         self.core.fault().map_or(Ok(()), Err)
+    }
+
+    /// Lets one period pass.
+    pub fn tick(&mut self, inputs: impl Into<Inputs>) -> &Sample {
+        self.core.tick(inputs)
+    }
+
+    /// State after the last period.
+    #[must_use]
+    pub fn state(&self) -> State {
+        self.core.state()
+    }
+
+    /// The fault that the machine is in.
+    #[must_use]
+    pub fn fault(&self) -> Option<Fault> {
+        self.core.fault()
     }
 
     /// The surface at a place, outside of any run.

@@ -12,7 +12,7 @@ use serde_json::{Value, json};
 use super::out::say;
 use super::outcome::Outcome;
 use super::simulate::{Timed, machine, remarks, report, surveyed, timed};
-use super::{Failure, Result, cannot_write, load, progress, spinner, trace};
+use super::{Failure, Result, cannot_write, load, progress, scripted, spinner, trace};
 use crate::approach::Kind;
 use crate::explain;
 use crate::job_file::JobFile;
@@ -21,6 +21,7 @@ use crate::remote::operate::{self, Setup};
 use crate::remote::qemu::{self, Qemu, QemuError};
 use crate::remote::{RemoteError, Session, drive, port};
 use crate::survey::is_on_pass;
+use crate::travel;
 
 /// Runs a job in the firmware, in QEMU or on a board, and compares every sample with this machine's.
 ///
@@ -44,6 +45,9 @@ pub(super) struct Arguments {
     /// The axes stand here, mm: declared as home before the run. In QEMU, where there are no axes, it is declared anyway.
     #[arg(long, value_name = "X,Y,Z", value_parser = place, allow_hyphen_values = true)]
     home: Option<PlaceNm>,
+    /// Does what this file says an operator does, in lockstep: lines `tick N: hold`, or resume, stop, abort, start, override P.
+    #[arg(long, value_name = "FILE", requires = "qemu", conflicts_with_all = ["report", "trace"])]
+    script: Option<PathBuf>,
     /// Prints one JSON object instead of text.
     #[arg(long)]
     pub(super) json: bool,
@@ -379,6 +383,14 @@ fn complaint(ran: &Ran, here: &Timed, job: &JobFile) -> Option<String> {
 
 pub(super) fn command(arguments: &Arguments) -> Result<()> {
     let (job, prepared) = load(&arguments.job)?;
+    travel::check(&job)?;
+    if let Some(script) = &arguments.script {
+        let scripted = scripted::play(&job, &prepared, script, None)?;
+        let (_qemu, mut session) = connect(arguments)?;
+        check_period(&job, &session)?;
+        drive::upload(&mut session, &prepared, |_| {})?;
+        return scripted.run(&job, &mut session, arguments.json);
+    }
     let here = timed(&job, &prepared)?;
     let (_qemu, mut session) = connect(arguments)?;
     check_period(&job, &session)?;

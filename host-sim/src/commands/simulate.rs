@@ -8,7 +8,9 @@ use interp_core::{Fault, Place};
 use protocol::digest::Digest;
 
 use super::outcome::{FaultAt, Outcome};
-use super::{BOUNDS, Failure, Result, approach, cannot_write, load, progress, trace, warn_of_limits};
+use super::{
+    BOUNDS, Failure, Result, approach, cannot_write, load, progress, scripted, trace, warn_of_limits,
+};
 use crate::approach::Kind;
 use crate::explain;
 use crate::job_file::JobFile;
@@ -17,6 +19,7 @@ use crate::oracle::{Checked, Emitted, Oracle};
 use crate::prepare::Prepared;
 use crate::report::{Remarks, Sketch};
 use crate::survey::{Each, Findings, Survey, is_on_pass};
+use crate::travel;
 
 /// Runs a job on this machine: the same core, the same bits as on the board; or one of the paper's other approaches.
 ///
@@ -33,6 +36,9 @@ pub(super) struct Arguments {
     /// Writes a page with a view that turns, charts and figures into this folder.
     #[arg(long, value_name = "DIR")]
     report: Option<PathBuf>,
+    /// Does what this file says an operator does: lines `tick N: hold`, or resume, stop, abort, start, override P.
+    #[arg(long, value_name = "FILE", conflicts_with_all = ["report", "approach"])]
+    script: Option<PathBuf>,
     /// Prints one JSON object instead of text.
     #[arg(long)]
     pub(super) json: bool,
@@ -200,6 +206,11 @@ pub(super) fn command(arguments: &Arguments) -> Result<()> {
             trace, report, json, ..
         } = arguments;
         return approach::command(arguments.approach, &job, trace.as_ref(), report.as_deref(), *json);
+    }
+    travel::check(&job)?;
+    if let Some(script) = &arguments.script {
+        let scripted = scripted::play(&job, &prepared, script, arguments.trace.as_ref())?;
+        return scripted.tell(&job, arguments.json);
     }
     let timed = timed(&job, &prepared)?;
     let directory = arguments.report.as_deref();

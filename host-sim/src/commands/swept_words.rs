@@ -5,9 +5,10 @@ use interp_core::STORE_WORDS;
 use serde_json::{Map, Value, json};
 
 use crate::job_file::JobFile;
+use crate::motion::limits::{ORDERS, Peaks, TOLERANCES};
 use crate::prepare::Prepared;
 use crate::survey;
-use crate::swept::{Findings, Hollow, Peak};
+use crate::swept::{Findings, Hollow};
 
 /// Bytes of surface data that the board holds.
 const STORE_BYTES: usize = STORE_WORDS * size_of::<i32>();
@@ -28,6 +29,7 @@ pub(super) fn json(
     prepared: &Prepared,
     survey: &survey::Findings,
     found: &Findings,
+    axes: &Peaks,
 ) -> Map<String, Value> {
     let report = &survey.report;
     let measured = !found.ridges.is_empty();
@@ -65,11 +67,10 @@ pub(super) fn json(
         "gouge_floor_mm": found.gouge_floor_mm,
         "gouge_bound_mm": found.gouge_bound_mm,
         "gouge": gouge,
-        "limits": limits(job, found),
+        "limits": limits(job, axes),
         "axes": {
             "extent_mm": found.axes.extent_mm, "travel_mm": job.machine.travel_mm, "beyond_mm": found.axes.beyond_mm,
-            "velocity_mm_s": found.axes.velocity.axes, "acceleration_mm_s2": found.axes.acceleration.axes,
-            "jerk_mm_s3": found.axes.jerk.axes,
+            "velocity_mm_s": axes[0].axes, "acceleration_mm_s2": axes[1].axes, "jerk_mm_s3": axes[2].axes,
         },
         "least_concave_radius": hollow,
         "poles": found.shape.poles,
@@ -87,8 +88,8 @@ pub(super) fn json(
     }
 }
 
-/// Null where the machine has no limits.
-fn limits(job: &JobFile, found: &Findings) -> Value {
+/// Null where the machine has no limits. `rounding`: what was taken off.
+fn limits(job: &JobFile, [velocity, acceleration, jerk]: &Peaks) -> Value {
     let machine = &job.machine;
     let given = machine.velocity_max_mm_s.is_some()
         || machine.acceleration_max_mm_s2.is_some()
@@ -96,12 +97,10 @@ fn limits(job: &JobFile, found: &Findings) -> Value {
     if !given {
         return Value::Null;
     }
-    let axes = &found.axes;
     json!({
-        "velocity": axes.velocity.share, "acceleration": axes.acceleration.share, "jerk": axes.jerk.share,
+        "velocity": velocity.share, "acceleration": acceleration.share, "jerk": jerk.share,
         "rounding": {
-            "velocity": axes.velocity.rounding_share, "acceleration": axes.acceleration.rounding_share,
-            "jerk": axes.jerk.rounding_share,
+            "velocity": velocity.rounding_share, "acceleration": acceleration.rounding_share, "jerk": jerk.rounding_share,
         },
     })
 }
@@ -115,7 +114,13 @@ fn um(mm: f64) -> f64 {
 }
 
 /// The same for a person.
-pub(super) fn print(job: &JobFile, prepared: &Prepared, survey: &survey::Findings, found: &Findings) {
+pub(super) fn print(
+    job: &JobFile,
+    prepared: &Prepared,
+    survey: &survey::Findings,
+    found: &Findings,
+    axes: &Peaks,
+) {
     scallop(job, found);
     match &found.gouge {
         None => say!(
@@ -134,7 +139,8 @@ pub(super) fn print(job: &JobFile, prepared: &Prepared, survey: &survey::Finding
             gouge.pass
         ),
     }
-    axes(job, found);
+    travel(job, found);
+    peaks(axes);
     let shape = &found.shape;
     let hollow = shape.hollow.map_or_else(
         || "none: nowhere hollow".to_owned(),
@@ -211,7 +217,7 @@ fn ratio(part: usize, whole: usize) -> f64 {
     part as f64 / whole as f64
 }
 
-fn axes(job: &JobFile, found: &Findings) {
+fn travel(job: &JobFile, found: &Findings) {
     let axes = &found.axes;
     if let Some([x, y, z]) = axes.extent_mm {
         let given = match (job.machine.travel_mm, axes.within_travel()) {
@@ -230,21 +236,25 @@ fn axes(job: &JobFile, found: &Findings) {
             z[1]
         );
     }
-    let peak = |name: &str, unit: &str, peak: &Peak| {
+}
+
+fn peaks(axes: &Peaks) {
+    for ((peak, (name, unit)), tolerance) in axes.iter().zip(ORDERS).zip(TOLERANCES) {
         let [x, y, z] = peak.axes;
-        let share = peak.share.map_or_else(
-            || "no limit given".to_owned(),
-            |share| {
+        let (verdict, share) = match peak.share {
+            None => ("    ", "within passes; no limit given".to_owned()),
+            Some(share) => (
+                if share <= 1.0 + tolerance { "ok  " } else { "FAIL" },
                 format!(
-                    "{:.1} % of its limit at most (rounding: {:.1} %)",
+                    "{:.1} % of its limit at most (and {:.1} % for rounding)",
                     100.0 * share,
                     100.0 * peak.rounding_share
-                )
-            },
+                ),
+            ),
+        };
+        say!(
+            "  {verdict} {:<22} {x:.1}, {y:.1}, {z:.1} {unit}; {share}",
+            format!("axis {name}")
         );
-        say!("       {name:<22} {x:.1}, {y:.1}, {z:.1} {unit} within passes; {share}");
-    };
-    peak("axis velocity", "mm/s", &axes.velocity);
-    peak("axis acceleration", "mm/s2", &axes.acceleration);
-    peak("axis jerk", "mm/s3", &axes.jerk);
+    }
 }

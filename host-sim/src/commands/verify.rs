@@ -1,20 +1,26 @@
 //! `verify`: every sample of a job against the independent oracle.
 
 use super::out::say;
+use std::cell::RefCell;
+use std::collections::BTreeMap;
 use std::path::PathBuf;
 
 use clap::Args;
 use indicatif::ProgressBar;
+use interp_core::State;
 use serde_json::Value;
 
+use super::motion_words::{self, Judged};
 use super::simulate::{Timed, machine, oracle, remarks, report, timed};
-use super::{Failure, Result, along, load, progress, swept_words};
+use super::{Failure, Result, along, load, progress, spinner, swept_words};
 use crate::job_file::{JobFile, Spacing};
+use crate::motion::{Gauge, Peaks, limits};
 use crate::oracle::{Bounds, Checked, Emitted, Figure};
 use crate::prepare::Prepared;
 use crate::report::{Remarks, RidgePlace, Scallops, Sketch};
 use crate::survey::{Findings, Survey};
 use crate::swept::{self, Track};
+use crate::travel;
 
 /// What every sample has to hold to: the figures of the README.
 pub const BOUNDS: Bounds = Bounds {
@@ -40,6 +46,9 @@ pub(super) struct Arguments {
     /// Writes a page with a view that turns, charts and figures into this folder.
     #[arg(long, value_name = "DIR")]
     report: Option<PathBuf>,
+    /// Times the first, the middle and the last pass by the best motion within usual axis limits, where the job sets none.
+    #[arg(long)]
+    optimum: bool,
     /// Prints one JSON object instead of text.
     #[arg(long)]
     pub(super) json: bool,
@@ -88,13 +97,72 @@ fn print(findings: &Findings, scanned: Option<usize>, first_order: bool) {
     );
 }
 
+/// What the axes do, sample by sample. Where the job sets limits, from standstill to standstill with all that lies between;
+/// without, within passes: there the feed jumps between them, and a pass's last step is cut short by its end.
+struct Axes {
+    gauge: Gauge,
+    limited: bool,
+    begun: bool,
+}
+
+impl Axes {
+    fn new(job: &JobFile) -> Self {
+        let machine = &job.machine;
+        let limited = machine.velocity_max_mm_s.is_some()
+            || machine.acceleration_max_mm_s2.is_some()
+            || machine.jerk_max_mm_s3.is_some();
+        Self {
+            gauge: Gauge::new(machine),
+            limited,
+            begun: false,
+        }
+    }
+
+    /// A sample as the machine emitted it.
+    fn emitted(&mut self, tick: u32, cl_nm: [i32; 3]) {
+        if self.limited {
+            if !std::mem::replace(&mut self.begun, true) {
+                self.gauge.stand(cl_nm);
+            }
+            self.gauge.add(tick.into(), cl_nm);
+        }
+    }
+
+    /// A sample on a pass.
+    fn on_pass(&mut self, sample: &Emitted) {
+        if self.limited || sample.last_of_pass {
+            return;
+        }
+        if sample.first_of_pass {
+            self.gauge.gap();
+        }
+        self.gauge.add(sample.tick, sample.cl_nm);
+    }
+
+    fn finish(mut self) -> Peaks {
+        if self.limited {
+            self.gauge.come_to_stand();
+        }
+        self.gauge.peaks()
+    }
+}
+
+/// What a verified run came to.
+pub(super) struct Measured {
+    pub(super) findings: Findings,
+    pub(super) swept: swept::Findings,
+    pub(super) axes: Peaks,
+    pub(super) motion: Vec<Judged>,
+}
+
 /// Runs the core again, measures every sample, then the swept ball against the surface.
 pub(super) fn measured(
     job: &JobFile,
     prepared: &Prepared,
     timed: &Timed,
     mut sketch: Option<&mut Sketch>,
-) -> Result<(Findings, swept::Findings)> {
+    with_optimum: bool,
+) -> Result<Measured> {
     let oracle = oracle(job)?;
     let bar = progress(timed.samples, "measuring");
     // On a machine with limits the feed is low at the ends of passes.
@@ -103,15 +171,22 @@ pub(super) fn measured(
         None => 0.0,
     };
     let mut track = Track::with_spacing(spacing_nm);
+    let axes = RefCell::new(Axes::new(job));
     let mut keep = |emitted: &Emitted, checked: &Checked| {
         track.add(emitted, job.along);
+        axes.borrow_mut().on_pass(emitted);
         if let Some(sketch) = &mut sketch {
             sketch.add(emitted, checked);
         }
     };
     let mut survey = Survey::new(prepared, &oracle, None, Some(&mut keep));
     let mut written = Ok(());
+    let mut running = BTreeMap::<u32, u64>::new();
     let ran = machine(job, prepared)?.run(|sample| {
+        axes.borrow_mut().emitted(sample.tick, sample.cl_nm);
+        if sample.state == State::Running {
+            *running.entry(sample.pass).or_default() += 1;
+        }
         written = survey.add(sample);
         if sample.tick % 65_536 == 0 {
             bar.set_position(sample.tick.into());
@@ -123,7 +198,20 @@ pub(super) fn measured(
         .map_err(|error| Failure::Failed(Some(error.to_string())))?;
     let swept = swept::measure(job, &oracle, &track, ran.is_ok(), &Bar(&bar));
     bar.finish_and_clear();
-    Ok((findings, swept))
+    let motion = if with_optimum {
+        let bar = spinner("the best motion");
+        let judged = motion_words::judged(job, &oracle, &track, &running);
+        bar.finish_and_clear();
+        judged
+    } else {
+        Vec::new()
+    };
+    Ok(Measured {
+        findings,
+        swept,
+        axes: axes.into_inner().finish(),
+        motion,
+    })
 }
 
 /// The measured heights as the report shows them.
@@ -159,9 +247,15 @@ impl swept::Progress for Bar<'_> {
 pub(super) fn command(arguments: &Arguments) -> Result<()> {
     let (job, prepared) = load(&arguments.job)?;
     let timed = timed(&job, &prepared)?;
+    let with_optimum = arguments.optimum || motion_words::limits(&job).is_some();
     let directory = arguments.report.as_deref();
     let mut sketch = directory.map(|_| Sketch::new(&job, timed.passes.len()));
-    let (findings, swept) = measured(&job, &prepared, &timed, sketch.as_mut())?;
+    let Measured {
+        findings,
+        swept,
+        axes,
+        motion,
+    } = measured(&job, &prepared, &timed, sketch.as_mut(), with_optimum)?;
     let figures = &findings.report;
     let scanned = scanned_passes(&job)?;
     let mut failures = figures.failures(&BOUNDS);
@@ -177,6 +271,10 @@ pub(super) fn command(arguments: &Arguments) -> Result<()> {
         failures.insert(0, fault.sentence());
     }
     failures.extend(swept.failures.iter().cloned());
+    if let Err(error) = travel::check(&job) {
+        failures.push(format!("{}: {}", error.what(), error.remedy()));
+    }
+    failures.extend(limits::failures(&axes));
     let passed = failures.is_empty();
     let mut remarks = Remarks {
         failures: failures.clone(),
@@ -190,7 +288,8 @@ pub(super) fn command(arguments: &Arguments) -> Result<()> {
         .extend(swept.warnings.iter().filter(known).cloned());
     let page = report(&job, directory, sketch.as_ref(), &findings, &remarks)?;
     if arguments.json {
-        let mut value = swept_words::json(&job, &prepared, &findings, &swept);
+        let mut value = swept_words::json(&job, &prepared, &findings, &swept, &axes);
+        value.insert("motion".to_owned(), motion_words::json(&motion));
         value.extend(along::json(&job));
         value.insert("passes_scanned".to_owned(), scanned.into());
         value.insert("failures".to_owned(), failures.into());
@@ -200,7 +299,8 @@ pub(super) fn command(arguments: &Arguments) -> Result<()> {
         say!("{}", arguments.job.display());
         say!("  along        {}", along::sentence(&job));
         print(&findings, scanned, job.spacing == Spacing::FirstOrder);
-        swept_words::print(&job, &prepared, &findings, &swept);
+        swept_words::print(&job, &prepared, &findings, &swept, &axes);
+        motion_words::print(&motion);
         for failure in &failures {
             say!("  FAIL {failure}");
         }

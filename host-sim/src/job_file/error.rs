@@ -29,7 +29,7 @@ struct Place {
 
 impl JobFileError {
     /// An error at a byte range of the text.
-    pub(super) fn at(name: &str, text: &str, span: Range<usize>, what: String, remedy: String) -> Self {
+    pub(crate) fn at(name: &str, text: &str, span: Range<usize>, what: String, remedy: String) -> Self {
         let span = clipped(text, span);
         let before = text.get(..span.start).unwrap_or(text);
         let line = before.matches('\n').count() + 1;
@@ -46,6 +46,11 @@ impl JobFileError {
                 column,
             }),
         }))
+    }
+
+    /// An error of a file as a whole that is no job file.
+    pub(crate) fn of_file(name: &str, what: impl Into<String>, remedy: impl Into<String>) -> Self {
+        Self::whole(name, what.into(), remedy.into())
     }
 
     /// An error of the file as a whole.

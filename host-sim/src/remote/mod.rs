@@ -4,6 +4,7 @@
 //! drive.rs    loads and runs a job there, compares with what was computed here
 //! operate.rs  drives, home, hold and resume: what an operator asks
 //! session.rs  requests, answers, events; retransmission
+//! script.rs   plays what an operator does, period by period
 //! qemu.rs     starts and ends QEMU with the firmware   |   port.rs  a serial port
 //! ```
 
@@ -11,6 +12,7 @@ pub mod drive;
 pub mod operate;
 pub mod port;
 pub mod qemu;
+pub mod script;
 pub mod session;
 
 pub use session::{RemoteError, Session, Stream};

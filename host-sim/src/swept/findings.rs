@@ -1,6 +1,6 @@
 //! What the measuring came to, in figures and in sentences.
 
-use super::axes::{AXES, Axes};
+use super::axes::Axes;
 use super::gouge::Search;
 use super::ridge::{Crest, Gap, GapRidge, MISSED_RADII};
 use super::shape::Shape;
@@ -125,7 +125,7 @@ pub struct Findings {
     pub stations: usize,
     /// Cells that were asked about for the gouge.
     pub cells: usize,
-    /// What the axes have to do.
+    /// How far the axes travel.
     pub axes: Axes,
     /// What the surface may trouble a ball with.
     pub shape: Shape,
@@ -272,20 +272,6 @@ impl Findings {
                 "gouges are searched down to {:.6} mm only: the ball hardly fits in too many places",
                 self.gouge_bound_mm
             ));
-        }
-        for (name, peak) in [
-            ("velocity", &self.axes.velocity),
-            ("acceleration", &self.axes.acceleration),
-            ("jerk", &self.axes.jerk),
-        ] {
-            if let Some(share) = peak.share
-                && share > 1.0 + peak.rounding_share
-            {
-                warnings.push(format!(
-                    "{} takes {share:.2} of its {name} limit at tick {}, within a pass",
-                    AXES[peak.axis], peak.ticks[peak.axis]
-                ));
-            }
         }
         warnings
     }

@@ -6,7 +6,7 @@
 //!                         │        │
 //!                         │        ├──ridge.rs──► the ridge in each gap between two passes: maximum, mean, spots
 //!                         │        └──gouge.rs──► the deepest cut below the surface (cells of grid.rs, split where it matters)
-//!                         └──axes.rs──► travel; velocity, acceleration, jerk        shape.rs: tightest hollow, degenerate places
+//!                         └──axes.rs──► travel        shape.rs: tightest hollow, degenerate places
 //! ```
 //!
 //! Nothing here knows the formula that the path intervals come from, nor anything of the core: what counts is the tool path as
@@ -33,7 +33,7 @@ mod tests;
 mod track;
 mod tree;
 
-pub use axes::{Axes, Peak};
+pub use axes::Axes;
 pub use findings::{Extreme, Findings, Gouge, MeasuringError, Ridge, RidgeSpot};
 pub use shape::{Hollow, Shape};
 pub use track::{PassTrack, Track};

@@ -1,4 +1,4 @@
-//! Heights, gouges, travel and limits against closed forms, on tool paths made for the purpose: the core has no part in them.
+//! Heights, gouges and travel against closed forms, on tool paths made for the purpose: the core has no part in them.
 
 use std::f64::consts::FRAC_1_SQRT_2;
 
@@ -367,41 +367,6 @@ fn travel_is_held_against_the_machine() {
         assert_eq!(sentences, beyond.iter().filter(|ends| **ends != [0.0; 2]).count());
         assert_eq!(found.axes.within_travel(), sentences == 0);
     }
-}
-
-/// A circle of 25 mm at 25 mm/s: velocity 25, acceleration 25, jerk 25 on each axis that it reaches.
-#[test]
-fn limits_are_those_of_a_circle() {
-    let mut job = job(cylinder(20.0), Along::V, Side::Minus, 0.5);
-    job.machine.velocity_max_mm_s = Some([50.0, 100.0, 1.0]);
-    job.machine.acceleration_max_mm_s2 = Some([100.0, 20.0, 1000.0]);
-    let found = measured(&job, &[0.0, 0.1], 1000);
-    let axes = found.axes;
-    // Over 0 to 1 rad x moves at 25 sin v, y at 25 cos v.
-    let near = |ours: f64, exact: f64, by: f64| assert!((ours - exact).abs() <= by, "{ours} for {exact}");
-    near(axes.velocity.axes[0], 25.0 * 1.0_f64.sin(), 0.03);
-    near(axes.velocity.axes[1], 25.0, 0.02);
-    near(axes.acceleration.axes[0], 25.0, 2.1);
-    near(axes.acceleration.axes[1], 25.0 * 1.0_f64.sin(), 2.1);
-    near(axes.velocity.share.unwrap(), 25.0 * 1.0_f64.sin() / 50.0, 1e-3);
-    assert_eq!((axes.velocity.axis, axes.acceleration.axis), (0, 1));
-    near(
-        axes.acceleration.share.unwrap(),
-        25.0 * 1.0_f64.sin() / 20.0,
-        0.11,
-    );
-    near(axes.acceleration.rounding_share, 2.0 / 20.0, 1e-12);
-    assert_eq!(axes.jerk.share, None);
-    // 1.05 may be rounding; more is said. It is no failure.
-    assert!(found.warnings.is_empty() && found.failures.is_empty());
-    job.machine.acceleration_max_mm_s2 = Some([100.0, 15.0, 1000.0]);
-    let found = measured(&job, &[0.0, 0.1], 1000);
-    assert!(
-        found.warnings.iter().any(|line| line.contains("y takes")),
-        "{:?}",
-        found.warnings
-    );
-    assert!(found.failures.is_empty());
 }
 
 #[test]

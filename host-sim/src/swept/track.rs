@@ -92,7 +92,10 @@ impl Track {
         let last = self.passes.last().and_then(|pass| pass.cl_nm.last());
         !sample.last_of_pass
             && last.is_some_and(|last| {
-                let apart = last.iter().zip(sample.cl_nm).map(|(a, b)| f64::from(*a) - f64::from(b));
+                let apart = last
+                    .iter()
+                    .zip(sample.cl_nm)
+                    .map(|(a, b)| f64::from(*a) - f64::from(b));
                 apart.map(|d| d * d).sum::<f64>() < self.spacing_nm * self.spacing_nm
             })
     }
