@@ -18,6 +18,10 @@ use crate::schedule;
 /// Cells of a step along the boundary.
 const STEP_CELLS: u16 = 8;
 
+/// Share of the jerk that is used on them: a step is some tenths of a millimetre, jerk all the way, and a cutter location is good to a
+/// nanometre or two, which a third difference makes eight times.
+const JERK_SHARE: f32 = 0.7;
+
 /// A link shorter than this, nm, is none: a place and itself, rounded twice.
 const NOTHING_NM: i64 = 2;
 
@@ -190,6 +194,10 @@ impl Step {
             plan.begin();
         } else {
             let room = self.stencil.add(here.cl_nm, self.cell, axes, top);
+            let room = Room {
+                jerk: JERK_SHARE * room.jerk,
+                ..room
+            };
             self.stretch = self.stretch.max(distance(&self.contact, &here.cc_nm) / self.cell);
             plan.add(self.cell, &room, 2, top);
         }

@@ -48,16 +48,6 @@ impl Room {
         taken: 0.0,
     };
 
-    /// The lesser of each.
-    pub(crate) const fn and(&self, other: &Self) -> Self {
-        Self {
-            square: self.square.min(other.square),
-            accel: self.accel.min(other.accel),
-            jerk: self.jerk.min(other.jerk),
-            taken: self.taken.max(other.taken),
-        }
-    }
-
     /// Along a straight line with these direction cosines.
     pub(crate) fn straight(axes: &Axes, cosines: &[f32; 3]) -> Self {
         let mut room = Self::WIDE;

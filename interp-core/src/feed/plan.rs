@@ -504,8 +504,7 @@ impl Plan {
     pub(crate) fn is_clear(&self, index: u16, place: i64, over: f32, speed: f32) -> bool {
         let last = place + whole(over);
         let square = squared(speed);
-        let mut at = index;
-        for _ in 0..REACH {
+        for at in (index..).take(REACH) {
             let Some(cell) = self.cell(at) else {
                 return false;
             };
@@ -515,7 +514,6 @@ impl Plan {
             if square > self.leave(at) || speed > cell.gate {
                 return false;
             }
-            at += 1;
         }
         false
     }

@@ -85,7 +85,7 @@ impl Profile {
     /// The next acceleration-limited step.
     fn next(&mut self, plan: &Plan, wanted: f32) -> i32 {
         self.cell = plan.cell_at(self.cell, self.lead);
-        let at = |back: u8| as_f32(self.steps[usize::from(self.at.wrapping_sub(back))]);
+        let at = |back: u8| as_f32(self.step(back));
         let speed = at(1);
         // The acceleration that leaves the mean with this step.
         let leaves = at(self.window) - at(self.window.wrapping_add(1));
@@ -115,6 +115,13 @@ impl Profile {
         }
     }
 
+    /// The step so many periods back.
+    fn step(&self, back: u8) -> i32 {
+        let index = usize::from(self.at.wrapping_sub(back));
+        // Each index of 8 bits is there.
+        self.steps.get(index).copied().unwrap_or(0)
+    }
+
     /// A small acceleration where a whole one would have to be waited for, so that the tool never stands before a narrow place: what it
     /// takes of the braking is small, too.
     fn creep(&self, plan: &Plan, speed: f32, change: f32) -> f32 {
@@ -130,8 +137,10 @@ impl Profile {
 
     /// Takes a step into the mean.
     fn push(&mut self, step: i32) -> i32 {
-        let oldest = self.steps[usize::from(self.at.wrapping_sub(self.window))];
-        self.steps[usize::from(self.at)] = step;
+        let oldest = self.step(self.window);
+        if let Some(newest) = self.steps.get_mut(usize::from(self.at)) {
+            *newest = step;
+        }
         self.at = self.at.wrapping_add(1);
         self.lead += i64::from(step);
         self.sum += i64::from(step) - i64::from(oldest);
