@@ -31,7 +31,7 @@ impl<P: OutputPin> StatusLed<P> {
     pub(crate) fn show(&mut self, state: State, periods: u32) {
         self.set(match state {
             State::Idle | State::Ready | State::Held | State::Finished => false,
-            State::Running | State::Holding | State::Stopping => true,
+            State::Running | State::Linking | State::Holding | State::Stopping => true,
             State::Faulted => (periods >> BLINK_BIT) & 1 == 0,
         });
     }
