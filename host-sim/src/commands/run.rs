@@ -388,6 +388,7 @@ pub(super) fn command(arguments: &Arguments) -> Result<()> {
         let scripted = scripted::play(&job, &prepared, script, None)?;
         let (_qemu, mut session) = connect(arguments)?;
         check_period(&job, &session)?;
+        make_ready(arguments, &job, &mut session)?;
         drive::upload(&mut session, &prepared, |_| {})?;
         return scripted.run(&job, &mut session, arguments.json);
     }
