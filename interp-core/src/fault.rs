@@ -34,11 +34,16 @@ pub enum FaultKind {
     DeadlineMissed = 12,
     /// A tick took more of its period than the board allows it. Value: processor cycles.
     TickOverBudget = 13,
+    /// An axis was asked for more steps in a period than a period has room for. Value: the steps asked for.
+    StepRate = 21,
+    /// The board's pulses were not handed out in time, or the hardware that does so has stopped.
+    /// Value: slots of the period that had passed when the direction was set, where that was too late; otherwise 0.
+    StepOutput = 22,
 }
 
 impl FaultKind {
     /// Every kind, in order of its code.
-    pub const ALL: [Self; 13] = [
+    pub const ALL: [Self; 15] = [
         Self::BallDoesNotFit,
         Self::DegenerateSurface,
         Self::ParameterBackwards,
@@ -52,6 +57,8 @@ impl FaultKind {
         Self::WrongState,
         Self::DeadlineMissed,
         Self::TickOverBudget,
+        Self::StepRate,
+        Self::StepOutput,
     ];
 
     /// The stable code.
@@ -83,6 +90,8 @@ impl FaultKind {
             Self::WrongState => "wrong-state",
             Self::DeadlineMissed => "deadline-missed",
             Self::TickOverBudget => "tick-over-budget",
+            Self::StepRate => "step-rate",
+            Self::StepOutput => "step-output",
         }
     }
 }

@@ -71,6 +71,7 @@ mod scalar;
 #[path = "../../host-sim/counted-core/scalar.rs"]
 pub mod scalar;
 mod schedule;
+pub mod steps;
 pub mod surface;
 mod vec3;
 
@@ -78,3 +79,4 @@ pub use fault::{Fault, FaultKind};
 pub use interpolator::{Interpolator, Probe, Request};
 pub use job::{Header, Pattern, STORE_WORDS, Spacing, SurfaceKind, ToolSide};
 pub use sample::{Place, Sample, State};
+pub use steps::{AxisSteps, StepConfig, Steps};
