@@ -3,6 +3,7 @@
 use interp_core::{
     job::{Header, Pattern, Spacing, SurfaceKind, ToolSide},
     sample::{Place, Sample, State},
+    steps::{AxisSteps, StepConfig},
 };
 use proptest::prelude::*;
 use protocol::message::{
@@ -47,6 +48,13 @@ fn any_report() -> impl Strategy<Value = Report> {
     prop_oneof![Just(Report::Digests), Just(Report::Samples)]
 }
 
+prop_compose! {
+    fn any_steps()(axes in any::<[(u32, u32, bool); 3]>(), pulse_slots in any::<u8>(), setup_slots in any::<u16>()) -> StepConfig {
+        let axes = axes.map(|(steps, mm, inverted)| AxisSteps { steps, mm, inverted });
+        StepConfig { axes, pulse_slots, setup_slots }
+    }
+}
+
 pub(crate) fn any_request() -> impl Strategy<Value = Request> {
     let words = prop::collection::vec(any::<i32>(), 0..=CHUNK_WORDS_MAX);
     prop_oneof![
@@ -64,6 +72,7 @@ pub(crate) fn any_request() -> impl Strategy<Value = Request> {
         any_clock().prop_map(Request::Clock),
         any::<u32>().prop_map(|ticks| Request::Run { ticks }),
         any_report().prop_map(Request::Report),
+        any_steps().prop_map(|config| Request::StepConfig(config.into())),
     ]
 }
 

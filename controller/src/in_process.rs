@@ -6,6 +6,7 @@ use std::vec::Vec;
 use interp_core::{
     fault::Fault,
     job::{Header, STORE_WORDS},
+    steps::CheckedSteps,
 };
 use protocol::message::{Description, Status};
 
@@ -64,6 +65,10 @@ impl<const WORDS: usize> Machine for Half<WORDS> {
 
     fn load_finish(&mut self) -> Result<(), Fault> {
         self.real_time.load_finish()
+    }
+
+    fn set_steps(&mut self, checked: &CheckedSteps) -> Result<(), Fault> {
+        self.real_time.set_steps(checked)
     }
 
     fn send(&mut self, command: Command) -> Result<(), Busy> {

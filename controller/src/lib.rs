@@ -33,4 +33,5 @@ pub mod link;
 pub mod machine;
 pub mod realtime;
 mod session;
+pub mod step_output;
 mod upload;

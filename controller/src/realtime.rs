@@ -14,6 +14,7 @@ use interp_core::{
     interpolator::{Interpolator, Request},
     job::{Header, STORE_WORDS},
     sample::{Sample, State},
+    steps::{BUFFER_WORDS, CheckedSteps, Steps},
 };
 use protocol::{
     digest::Digest,
@@ -177,6 +178,8 @@ const fn moves(state: State) -> bool {
 #[derive(Debug)]
 pub struct RealTime<S = [i32; STORE_WORDS]> {
     control: Control,
+    /// None on a machine without step outputs.
+    steps: Option<Steps>,
     interpolator: Interpolator<S>,
 }
 
@@ -200,6 +203,7 @@ impl<S> RealTime<S> {
     pub const fn with_store(store: S) -> Self {
         Self {
             control: Control::new(),
+            steps: None,
             interpolator: Interpolator::with_store(store),
         }
     }
@@ -209,6 +213,70 @@ impl<S: AsRef<[i32]> + AsMut<[i32]>> RealTime<S> {
     /// Sets the most CPU cycles that a tick may take while the tool moves on a free clock.
     pub const fn set_tick_budget(&mut self, cycles: u32) {
         self.control.tick_budget = cycles;
+    }
+
+    /// Gives the machine step outputs, on these pins of a port; the axes stand at the origin.
+    pub fn set_step_pins(&mut self, checked: CheckedSteps, pins: [u8; 3]) {
+        self.steps = Some(Steps::new(checked, pins));
+    }
+
+    /// Other settings of the drives; without step outputs, nothing.
+    ///
+    /// # Errors
+    /// [`FaultKind::WrongState`] while a run is under way.
+    pub fn set_steps(&mut self, checked: &CheckedSteps) -> Result<()> {
+        let state = self.interpolator.state();
+        if state.is_under_way() {
+            return Err(Fault::new(FaultKind::WrongState, f32::from(state as u8)));
+        }
+        if let Some(steps) = &mut self.steps {
+            steps.configure(*checked);
+        }
+        Ok(())
+    }
+
+    /// The axes' steps, where there are step outputs.
+    #[must_use]
+    pub const fn steps(&self) -> Option<&Steps> {
+        self.steps.as_ref()
+    }
+
+    /// Levels of the direction pins for the period that begins, a bit an axis.
+    #[must_use]
+    #[inline]
+    pub fn directions(&self) -> u8 {
+        self.steps.as_ref().map_or(0, Steps::directions)
+    }
+
+    /// After the tick: makes the pulses that bring the axes to its sample in the next period; see [`Steps::step`]. Too many steps
+    /// trip the run.
+    ///
+    /// A job without limits knows no way to its beginning: the axes count as standing at its first sample, wherever
+    /// the machine was brought by hand.
+    #[inline]
+    pub fn pulses(&mut self, slots: &mut [u32; BUFFER_WORDS]) {
+        let Some(steps) = &mut self.steps else { return };
+        let sample = self.interpolator.last();
+        if sample.state == State::Running && sample.tick == 0 {
+            steps.place(sample.cl_nm);
+        }
+        let to = if moves(sample.state) {
+            sample.cl_nm
+        } else {
+            steps.told()
+        };
+        if let Err(fault) = steps.step(to, slots) {
+            self.trip(fault);
+        }
+    }
+
+    /// Stops a run with a fault from outside, along its path.
+    #[cold]
+    #[inline(never)]
+    pub fn trip(&mut self, fault: Fault) {
+        if moves(self.interpolator.state()) {
+            self.interpolator.trip(fault);
+        }
     }
 
     /// Takes a command up, before the tick.
@@ -264,6 +332,7 @@ impl<S: AsRef<[i32]> + AsMut<[i32]>> RealTime<S> {
         let Self {
             control,
             interpolator,
+            ..
         } = self;
         let sample = interpolator.last();
         if control.run.begins_pass(sample)

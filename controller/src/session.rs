@@ -1,7 +1,12 @@
 //! A session with the host: who speaks, which request is next, and what is answered to it.
 
 use heapless::Vec;
-use interp_core::{interpolator, job::Header};
+use interp_core::{
+    fault::{Fault, FaultKind},
+    interpolator,
+    job::Header,
+    steps::{StepConfig, StepConfigError},
+};
 use protocol::{
     frame::{DELIMITER, FRAME_MAX, Frame, write_reply},
     message::{Capabilities, Clock, NO_NUMBER, Reason, Reply, Request, Status, next_number, read_request},
@@ -213,6 +218,7 @@ impl Session {
             }
             Request::Run { ticks } => command(machine, Command::Run { ticks }),
             Request::Report(report) => command(machine, Command::Report(report)),
+            Request::StepConfig(settings) => set_steps(machine, settings.into()),
             // Answered before it comes here.
             Request::Hello { .. } => Err(Reason::Unreadable),
         };
@@ -266,6 +272,29 @@ impl Session {
         self.clock = clock;
         Ok(())
     }
+}
+
+/// Checked here, where there is time; taken over between two ticks.
+fn set_steps(machine: &mut impl Machine, config: StepConfig) -> Result<(), Reason> {
+    let state = machine.status().state;
+    if state.is_under_way() {
+        return Err(Reason::WrongState { state });
+    }
+    let refused = |value: f32, record| Reason::Job {
+        fault: Fault::new(FaultKind::BadHeader, value).into(),
+        record,
+    };
+    let checked = config.check().map_err(|error| match error {
+        #[allow(clippy::cast_precision_loss, reason = "a value to be read by a person")]
+        StepConfigError::StepsPerMm { axis, steps, mm } => {
+            refused(steps as f32 / mm as f32, Some(axis.into()))
+        }
+        StepConfigError::PulseSlots(slots) => refused(slots.into(), None),
+        StepConfigError::SetupSlots(slots) => refused(slots.into(), None),
+    })?;
+    machine
+        .set_steps(&checked)
+        .map_err(|fault| refused(fault.value, None))
 }
 
 fn command(machine: &mut impl Machine, command: Command) -> Result<(), Reason> {

@@ -6,7 +6,7 @@ use controller::{
     realtime::RealTime,
 };
 use heapless::spsc::Producer;
-use interp_core::{fault::Fault, job::Header};
+use interp_core::{fault::Fault, job::Header, steps::CheckedSteps};
 use protocol::message::{Description, Status};
 use rtic::Mutex;
 
@@ -56,6 +56,10 @@ impl<M: Mutex<T = BoardRealTime>> Machine for GuardedMachine<'_, M> {
 
     fn load_finish(&mut self) -> Result<(), Fault> {
         self.real_time.lock(|real_time| real_time.load_finish())
+    }
+
+    fn set_steps(&mut self, checked: &CheckedSteps) -> Result<(), Fault> {
+        self.real_time.lock(|real_time| real_time.set_steps(checked))
     }
 
     fn send(&mut self, command: Command) -> Result<(), Busy> {

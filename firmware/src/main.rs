@@ -32,20 +32,23 @@ mod app {
         link::Link,
         machine::{Command, Event},
         realtime::RealTime,
+        step_output::Buffers,
     };
     use heapless::spsc::{Consumer, Producer, Queue};
+    use interp_core::steps::BUFFER_WORDS;
 
     use crate::{
         board::{self, StatusPin},
         design_parameters::{
             COMMAND_PLACES, EVENT_PLACES, FLUSH_PERIODS, JOB_WORDS, PERIOD_COUNTS, RECEIVE_PLACES,
-            TICK_BUDGET_CYCLES,
+            SLOT_COUNTS, TICK_BUDGET_CYCLES,
         },
         drivers::{
             cycle_counter::CycleCounter,
             sample_timer::{SampleTimer, uptime_periods},
             serial::{self, Receiver, Transmitter},
             status_led::StatusLed,
+            step_output::StepDriver,
         },
         guarded_machine::{BoardRealTime, GuardedMachine},
         sample_task::SampleTask,
@@ -76,6 +79,8 @@ mod app {
     /// The store is a static of its own: all zeros, it takes no flash, and the 64 KiB never pass over the stack.
     #[init(local = [
         store: [i32; JOB_WORDS] = [0; JOB_WORDS],
+        slots: Buffers = [[0; BUFFER_WORDS]; 2],
+        rest: u32 = 0,
         bytes: Queue<u8, RECEIVE_PLACES> = Queue::new(),
         commands: Queue<Command, COMMAND_PLACES> = Queue::new(),
         events: Queue<Event, EVENT_PLACES> = Queue::new(),
@@ -87,6 +92,18 @@ mod app {
         let (bytes_in, bytes_out) = context.local.bytes.split();
         let (commands_in, commands_out) = context.local.commands.split();
         let (events_in, events_out) = context.local.events.split();
+        // Before the sample timer, whose first update starts it.
+        let output = StepDriver::new(
+            board.tim1,
+            board.dma2,
+            board::WIRING,
+            SLOT_COUNTS,
+            context.local.slots,
+            context.local.rest,
+        );
+        if !output.is_present() {
+            defmt::warn!("this board puts no steps out");
+        }
         let timer = SampleTimer::new(board.tim2, board.tim5, board::TIMER_RELOAD, PERIOD_COUNTS);
         defmt::info!(
             "isofeed {=str} on {=str}, room for {=usize} words",
@@ -96,13 +113,16 @@ mod app {
         );
         let mut real_time = RealTime::with_store(context.local.store);
         real_time.set_tick_budget(TICK_BUDGET_CYCLES);
+        if let Ok(steps) = board::STEPS.check() {
+            real_time.set_step_pins(steps, board::WIRING.step);
+        }
         (
             Shared {
                 real_time,
                 bytes_lost: 0,
             },
             Local {
-                task: SampleTask::new(timer, counter, commands_out, events_in),
+                task: SampleTask::new(timer, counter, output, commands_out, events_in),
                 receiver,
                 transmitter,
                 led: StatusLed::new(board.status_pin),
@@ -121,7 +141,7 @@ mod app {
     /// | priority | 3, the highest |
     /// | period | 1 ms, by TIM2 |
     /// | worst case | see `cargo sim budget`; the board measures each tick and reports the most (`tick_cycles_max`) |
-    /// | over a tenth of the period | a fault of the run (`tick-over-budget`), which stops along the path |
+    /// | over a fifth of the period | a fault of the run (`tick-over-budget`), which stops along the path |
     /// | a miss | counted, reported, and a fault of the run (`deadline-missed`), which stops along the path |
     /// | a panic | cannot be reached: `firmware/no-panic` does not link otherwise |
     #[task(binds = TIM2, priority = 3, shared = [real_time], local = [task])]

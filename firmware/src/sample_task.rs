@@ -9,12 +9,13 @@ use controller::{
 };
 use heapless::spsc::{Consumer, Producer};
 
-use crate::drivers::{cycle_counter::CycleCounter, sample_timer::SampleTimer};
+use crate::drivers::{cycle_counter::CycleCounter, sample_timer::SampleTimer, step_output::StepDriver};
 
 /// What the task has for itself.
 pub(crate) struct SampleTask {
     timer: SampleTimer,
     counter: CycleCounter,
+    output: StepDriver,
     commands: Consumer<'static, Command>,
     events: EventQueue,
     /// Periods missed at the end of the last tick.
@@ -28,12 +29,14 @@ impl SampleTask {
     pub(crate) const fn new(
         timer: SampleTimer,
         counter: CycleCounter,
+        output: StepDriver,
         commands: Consumer<'static, Command>,
         events: Producer<'static, Event>,
     ) -> Self {
         Self {
             timer,
             counter,
+            output,
             commands,
             events: EventQueue(events),
             missed: 0,
@@ -49,6 +52,10 @@ impl SampleTask {
         let real_time = black_box(real_time);
         let begun = self.counter.now();
         self.timer.begin();
+        // First of all: the pulses of an axis that turns wait for it.
+        if let Err(fault) = self.output.begin(real_time.directions()) {
+            real_time.trip(fault);
+        }
         if let Some(command) = self.commands.dequeue() {
             real_time.obey(command, &mut self.events);
         }
@@ -57,6 +64,9 @@ impl SampleTask {
             cycles: self.cycles,
         };
         real_time.tick(input, &mut self.events);
+        if let Some(slots) = self.output.slots() {
+            real_time.pulses(slots);
+        }
         self.cycles = self.counter.since(begun);
         self.missed = self.timer.end();
     }

@@ -1,6 +1,7 @@
 //! The machine in this process: the core with a job loaded, one call a period.
 
-use interp_core::{Fault, Interpolator, Place, Probe, Request, Sample, State};
+use interp_core::steps::BUFFER_WORDS;
+use interp_core::{Fault, Interpolator, Place, Probe, Request, Sample, State, Steps};
 
 use crate::prepare::Prepared;
 
@@ -8,10 +9,11 @@ use crate::prepare::Prepared;
 #[derive(Debug)]
 pub struct Machine {
     core: Box<Interpolator>,
+    steps: Option<(Steps, Box<[u32; BUFFER_WORDS]>)>,
 }
 
 impl Machine {
-    /// A machine that is ready to run this job.
+    /// A machine that is ready to run this job. Where it names steps, a run that asks too many of a period faults.
     ///
     /// # Errors
     /// What the core says against the job: too many patches, a header value out of range, a bad patch.
@@ -24,7 +26,10 @@ impl Machine {
             core.load_check(record)?;
         }
         core.load_finish()?;
-        Ok(Self { core })
+        // A configuration that cannot be used is refused by the board, too, and by the reader of the job file before.
+        let checked = job.steps.and_then(|config| config.check().ok());
+        let steps = checked.map(|checked| (Steps::new(checked, [0, 1, 2]), Box::new([0; BUFFER_WORDS])));
+        Ok(Self { core, steps })
     }
 
     /// Runs the job from its beginning, and hands every sample on, until its end or a fault. Stops early, and returns
@@ -41,6 +46,15 @@ impl Machine {
             request = Request::None;
             if sample.state != State::Running {
                 break;
+            }
+            if let Some((steps, slots)) = &mut self.steps {
+                if sample.tick == 0 {
+                    steps.place(sample.cl_nm);
+                }
+                if let Err(fault) = steps.step(sample.cl_nm, slots) {
+                    self.core.tick(Request::Abort);
+                    return Err(fault);
+                }
             }
             if !each(sample) {
                 self.core.tick(Request::Abort);

@@ -35,6 +35,7 @@
 //! | 9 | `Clock` | 0 free, 1 lockstep | `Ack` |
 //! | 10 | `Run` | ticks `u32` | `Ack`, and `Halted` when the ticks are used up |
 //! | 11 | `Report` | 0 digests, 1 samples | `Ack` |
+//! | 12 | `StepConfig` | the fields of [`StepSettings`] | `Ack`; refused while a run is under way |
 //!
 //! Header: kind, pattern, tool side (a byte each), spans along path and side (`u16`), ball radius (mm), feed (mm/s),
 //! scallop height (mm), period (s) (`f32`).
@@ -73,7 +74,7 @@ use serde::{Deserialize, Serialize};
 pub use crate::reason::Reason;
 pub use crate::records::{
     BOARD_NAME_MAX, Batch, CHUNK_WORDS_MAX, Clock, Description, FaultReport, PassDigest, Report, SAMPLES_MAX,
-    SampleRecord, Status, Words,
+    SampleRecord, Status, StepSettings, Words,
 };
 use crate::{
     records::HeaderFields,
@@ -142,6 +143,8 @@ pub enum Request {
     },
     /// What a run tells the host.
     Report(Report),
+    /// What the axes' drives want. Refused while a run is under way.
+    StepConfig(StepSettings),
 }
 
 /// What opens a session: who the board is.

@@ -4,7 +4,7 @@ use core::fmt;
 
 /// Version of the messages in [`crate::message`]. It counts up with every change that the other end would notice; the
 /// frame, `Hello` and `Capabilities` never change.
-pub const PROTOCOL_VERSION: u16 = 3;
+pub const PROTOCOL_VERSION: u16 = 4;
 
 /// Host and board speak different versions; no other message is understood.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

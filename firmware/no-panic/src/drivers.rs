@@ -5,3 +5,5 @@
 pub(crate) mod cycle_counter;
 #[path = "../../src/drivers/sample_timer.rs"]
 pub(crate) mod sample_timer;
+#[path = "../../src/drivers/step_output.rs"]
+pub(crate) mod step_output;

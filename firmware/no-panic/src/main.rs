@@ -24,12 +24,13 @@ mod app {
     use controller::{
         machine::{Command, Event},
         realtime::RealTime,
+        step_output::{Buffers, Pin, Port, Wiring},
     };
     use heapless::spsc::{Consumer, Producer, Queue};
-    use interp_core::job::STORE_WORDS;
+    use interp_core::{StepConfig, job::STORE_WORDS, steps::BUFFER_WORDS};
 
     use crate::{
-        drivers::{cycle_counter::CycleCounter, sample_timer::SampleTimer},
+        drivers::{cycle_counter::CycleCounter, sample_timer::SampleTimer, step_output::StepDriver},
         sample_task::SampleTask,
     };
 
@@ -50,21 +51,32 @@ mod app {
 
     #[init(local = [
         store: [i32; STORE_WORDS] = [0; STORE_WORDS],
+        slots: Buffers = [[0; BUFFER_WORDS]; 2],
+        rest: u32 = 0,
         commands: Queue<Command, 8> = Queue::new(),
         events: Queue<Event, 64> = Queue::new(),
     ])]
     fn init(context: init::Context) -> (Shared, Local) {
         let counter = CycleCounter::new(context.core.DCB, context.core.DWT);
         let device = context.device;
+        let wiring = Wiring {
+            step_port: Port::B,
+            step: [12, 13, 14],
+            direction: [Pin(Port::C, 6), Pin(Port::C, 7), Pin(Port::C, 8)],
+        };
+        let (slots, rest) = (context.local.slots, context.local.rest);
+        let output = StepDriver::new(device.TIM1, device.DMA2, wiring, 168, slots, rest);
+        let mut real_time = RealTime::with_store(context.local.store);
+        if let Ok(steps) = StepConfig::DEFAULT.check() {
+            real_time.set_step_pins(steps, wiring.step);
+        }
         let timer = SampleTimer::new(device.TIM2, device.TIM5, PERIOD_COUNTS - 1, PERIOD_COUNTS);
         let (commands_in, commands_out) = context.local.commands.split();
         let (events_in, events_out) = context.local.events.split();
         (
-            Shared {
-                real_time: RealTime::with_store(context.local.store),
-            },
+            Shared { real_time },
             Local {
-                task: SampleTask::new(timer, counter, commands_out, events_in),
+                task: SampleTask::new(timer, counter, output, commands_out, events_in),
                 commands_in,
                 events_out,
             },

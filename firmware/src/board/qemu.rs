@@ -9,7 +9,9 @@ use core::{
     sync::atomic::{AtomicBool, Ordering},
 };
 
+use controller::step_output::{Pin, Port, Wiring};
 use embedded_hal::digital::{ErrorType, OutputPin};
+use interp_core::StepConfig;
 use stm32f4xx_hal::pac;
 
 use super::Board;
@@ -26,6 +28,19 @@ pub(crate) const TIMER_HZ: u32 = 1_000_000_000;
 
 /// QEMU's period is the reload value itself, not one more as on the chip.
 pub(crate) const TIMER_RELOAD: u32 = TIMER_HZ / 1_000_000 * PERIOD_US;
+
+/// What TIM1 would count, as on the chip: there is none.
+pub(crate) const STEP_TIMER_HZ: u32 = 168_000_000;
+
+/// Step and direction pins, as on the chip: there are none.
+pub(crate) const WIRING: Wiring = Wiring {
+    step_port: Port::B,
+    step: [12, 13, 14],
+    direction: [Pin(Port::C, 6), Pin(Port::C, 7), Pin(Port::C, 8)],
+};
+
+/// What the drives want until a host says otherwise.
+pub(crate) const STEPS: StepConfig = StepConfig::DEFAULT;
 
 /// QEMU has no baud rate; any value other than zero will do.
 pub(crate) const SERIAL_DIVIDER: u16 = 91;
@@ -56,8 +71,10 @@ impl OutputPin for StatusPin {
 /// Sorts out the peripherals; there is nothing to set up.
 pub(crate) fn init(device: pac::Peripherals) -> Board {
     Board {
+        tim1: device.TIM1,
         tim2: device.TIM2,
         tim5: device.TIM5,
+        dma2: device.DMA2,
         usart1: device.USART1,
         status_pin: StatusPin,
     }

@@ -3,7 +3,9 @@
 //! The pins are those of the Olimex STM32-H405. The log goes to the debug probe (RTT), and so does a panic.
 //! An STM32F4DISCOVERY runs it too, with its LED elsewhere (PD12) and the capacitor on PA9 removed.
 
+use controller::step_output::{Pin, Port, Wiring};
 use defmt_rtt as _;
+use interp_core::StepConfig;
 use stm32f4xx_hal::{
     gpio::{Output, PC12},
     pac,
@@ -31,6 +33,19 @@ const APB2_MHZ: u32 = CORE_MHZ / 2;
 
 /// Timers on a divided APB1 count at twice its clock (RM0090, 7.2).
 pub(crate) const TIMER_HZ: u32 = 2 * APB1_MHZ * 1_000_000;
+
+/// Timers on a divided APB2, TIM1 among them, count at twice its clock.
+pub(crate) const STEP_TIMER_HZ: u32 = 2 * APB2_MHZ * 1_000_000;
+
+/// Step and direction pins.
+pub(crate) const WIRING: Wiring = Wiring {
+    step_port: Port::B,
+    step: [12, 13, 14],
+    direction: [Pin(Port::C, 6), Pin(Port::C, 7), Pin(Port::C, 8)],
+};
+
+/// What the drives want until a host says otherwise.
+pub(crate) const STEPS: StepConfig = StepConfig::DEFAULT;
 
 /// The timer counts from 0 to the reload value inclusive.
 pub(crate) const TIMER_RELOAD: u32 = TIMER_HZ / 1_000_000 * PERIOD_US - 1;
@@ -67,6 +82,7 @@ pub(crate) fn init(device: pac::Peripherals) -> Board {
     // The constants above are what the timers and the link rely on.
     defmt::assert_eq!(rcc.clocks.sysclk().raw(), CORE_MHZ * 1_000_000);
     defmt::assert_eq!(rcc.clocks.timclk1().raw(), TIMER_HZ);
+    defmt::assert_eq!(rcc.clocks.timclk2().raw(), STEP_TIMER_HZ);
     defmt::assert_eq!(rcc.clocks.pclk2().raw(), APB2_MHZ * 1_000_000);
 
     let gpioa = device.GPIOA.split(&mut rcc);
@@ -83,15 +99,18 @@ pub(crate) fn init(device: pac::Peripherals) -> Board {
     pac::USART1::enable(&mut rcc);
     // The probe reads the log while the processor sleeps.
     device.DBGMCU.cr().modify(|_, w| w.dbg_sleep().set_bit());
-    // Halted by a debugger, both timers stand still, so that a breakpoint is not a missed period.
+    // Halted by a debugger, all timers stand still, so that a breakpoint is not a missed period, and no pulse goes out.
     device
         .DBGMCU
         .apb1_fz()
         .modify(|_, w| w.dbg_tim2_stop().set_bit().dbg_tim5_stop().set_bit());
+    device.DBGMCU.apb2_fz().modify(|_, w| w.dbg_tim1_stop().set_bit());
 
     Board {
+        tim1: device.TIM1,
         tim2: device.TIM2,
         tim5: device.TIM5,
+        dma2: device.DMA2,
         usart1: device.USART1,
         status_pin,
     }

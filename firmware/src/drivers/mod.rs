@@ -5,3 +5,4 @@ mod hard_fault;
 pub(crate) mod sample_timer;
 pub(crate) mod serial;
 pub(crate) mod status_led;
+pub(crate) mod step_output;

@@ -4,7 +4,7 @@ use std::path::PathBuf;
 use std::time::Instant;
 
 use clap::Args;
-use interp_core::{Sample, State};
+use interp_core::{FaultKind, Sample, State};
 use protocol::digest::Digest;
 use protocol::message::{Reason, Status};
 use serde_json::{Value, json};
@@ -304,6 +304,13 @@ pub(super) fn command(arguments: &Arguments) -> Result<()> {
     }
     warn_of_limits(&job);
     let here = timed(&job, &prepared)?;
+    if let Some(fault) = here
+        .fault
+        .as_ref()
+        .filter(|at| at.fault.kind == FaultKind::StepRate)
+    {
+        return Err(Failure::Failed(Some(fault.sentence_of(&job))));
+    }
     let (_qemu, mut session) = connect(arguments)?;
     check_period(&job, &session)?;
     let bar = progress(prepared.words.len() as u64, "uploading");

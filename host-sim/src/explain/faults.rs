@@ -107,11 +107,11 @@ fn words(kind: FaultKind) -> [&'static str; 5] {
             "A breakpoint in the firmware while a job runs on the board's own clock.",
         ],
         FaultKind::TickOverBudget => [
-            "A tick took more than a tenth of the period. The tool slows down along its path and stands.",
+            "A tick took more than a fifth of the period. The tool slows down along its path and stands.",
             "The processor cycles that it took.",
-            "The worst tick that was found takes 5.4 % of the period, so this one is a case that was not: or interrupts of your own took the rest.",
+            "The worst tick that was found takes 5.4 % of the period, and pulses at the highest rate less than 8 % more, so this one is a case that was not: or interrupts of your own took the rest.",
             "Please report the job; a lower feed makes the dearest ticks rarer. `cargo sim budget JOB` counts what each stage takes.",
-            "An interrupt handler of 20000 cycles with a higher priority than the sample task.",
+            "An interrupt handler of 40000 cycles with a higher priority than the sample task.",
         ],
         FaultKind::StepRate => [
             "An axis was asked for more steps in a period than a period has room for. The tool slows down along its path and stands; the steps that did not fit follow, and none is lost.",

@@ -12,6 +12,7 @@ mod error;
 mod file;
 mod placement;
 mod section;
+mod steps;
 mod surface;
 #[cfg(test)]
 mod tests;
@@ -23,6 +24,7 @@ use std::path::Path;
 use std::sync::Arc;
 
 pub use error::JobFileError;
+use interp_core::StepConfig;
 use section::{Reader, Section};
 pub use surface::{NurbsSpec, SurfaceSpec};
 
@@ -124,8 +126,8 @@ pub struct Machine {
     pub jerk_max_mm_s3: Option<[f64; 3]>,
     /// Travel of the axes, mm, `[least, most]`.
     pub travel_mm: Option<[[f64; 2]; 3]>,
-    /// Motor steps a millimetre of the axes, above 0.
-    pub steps_per_mm: Option<[f64; 3]>,
+    /// What the axes' drives want: exact steps a millimetre, pulses, directions.
+    pub steps: Option<StepConfig>,
 }
 
 impl Default for Machine {
@@ -136,7 +138,7 @@ impl Default for Machine {
             acceleration_max_mm_s2: None,
             jerk_max_mm_s3: None,
             travel_mm: None,
-            steps_per_mm: None,
+            steps: None,
         }
     }
 }
@@ -292,7 +294,10 @@ fn read_machine(machine: &Section<'_>) -> Result<Machine, JobFileError> {
             "acceleration_max_mm_s2",
             "jerk_max_mm_s3",
             "travel_mm",
-            "steps_per_mm",
+            steps::KEYS[0],
+            steps::KEYS[1],
+            steps::KEYS[2],
+            steps::KEYS[3],
         ],
         &[],
     )?;
@@ -312,7 +317,7 @@ fn read_machine(machine: &Section<'_>) -> Result<Machine, JobFileError> {
     read.velocity_max_mm_s = machine.positive_axes("velocity_max_mm_s", AXES)?;
     read.acceleration_max_mm_s2 = machine.positive_axes("acceleration_max_mm_s2", AXES)?;
     read.jerk_max_mm_s3 = machine.positive_axes("jerk_max_mm_s3", AXES)?;
-    read.steps_per_mm = machine.positive_axes("steps_per_mm", AXES)?;
+    read.steps = steps::read(machine, read.period_us)?;
     if machine.has("travel_mm") {
         let travel: [[f64; 2]; 3] = machine.matrix("travel_mm")?;
         for (range, axis) in travel.iter().zip(["x", "y", "z"]) {

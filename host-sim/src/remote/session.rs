@@ -87,6 +87,7 @@ fn name(request: &Request) -> &'static str {
         Request::Clock(_) => "the clock",
         Request::Run { .. } => "to run",
         Request::Report(_) => "the kind of report",
+        Request::StepConfig(_) => "the steps of the axes",
     }
 }
 

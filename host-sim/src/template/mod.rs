@@ -99,7 +99,7 @@ mod tests {
                 (&plain.surface, plain.pattern, plain.chord_mm)
             );
             assert_eq!(full.machine.period_us, plain.machine.period_us);
-            assert!(full.machine.travel_mm.is_some() && full.machine.steps_per_mm.is_some());
+            assert!(full.machine.travel_mm.is_some() && full.machine.steps.is_some());
             assert!(full.machine.jerk_max_mm_s3.is_some() && full.machine.velocity_max_mm_s.is_some());
         }
     }

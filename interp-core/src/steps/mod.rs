@@ -85,6 +85,10 @@ pub enum StepConfigError {
     StepsPerMm {
         /// The axis, from 0.
         axis: u8,
+        /// Steps.
+        steps: u32,
+        /// Millimetres.
+        mm: u32,
     },
     /// The pulse's length.
     PulseSlots(u8),
@@ -95,10 +99,10 @@ pub enum StepConfigError {
 impl core::fmt::Display for StepConfigError {
     fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
         match self {
-            Self::StepsPerMm { axis } => {
+            Self::StepsPerMm { axis, steps, mm } => {
                 write!(
                     f,
-                    "the steps per mm of axis {axis} are not within 1/1000 to 500000"
+                    "{steps}/{mm} steps per mm of axis {axis} are not within 1/1000 to 500000"
                 )
             }
             Self::PulseSlots(slots) => {
@@ -147,8 +151,13 @@ impl StepConfig {
             return Err(StepConfigError::SetupSlots(self.setup_slots));
         }
         let [x, y, z] = self.axes;
-        let scale =
-            |axis, of: AxisSteps| Scale::new(of.steps, of.mm).ok_or(StepConfigError::StepsPerMm { axis });
+        let scale = |axis, of: AxisSteps| {
+            Scale::new(of.steps, of.mm).ok_or(StepConfigError::StepsPerMm {
+                axis,
+                steps: of.steps,
+                mm: of.mm,
+            })
+        };
         Ok(CheckedSteps {
             scales: [scale(0, x)?, scale(1, y)?, scale(2, z)?],
             inverted: u8::from(x.inverted) | u8::from(y.inverted) << 1 | u8::from(z.inverted) << 2,
@@ -205,6 +214,12 @@ impl Steps {
         for ((axis, scale), nm) in self.axes.iter_mut().zip(&self.checked.scales).zip(cl_nm) {
             axis.place(scale, nm);
         }
+    }
+
+    /// The position that the axes were told last, nm.
+    #[must_use]
+    pub const fn told(&self) -> [i32; 3] {
+        self.cl_nm
     }
 
     /// The settings in force.

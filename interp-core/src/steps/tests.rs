@@ -458,7 +458,10 @@ fn settings_out_of_range_are_refused() {
         (u32::MAX, 1),
         (1, u32::MAX),
     ] {
-        assert_eq!(with(steps, mm), Err(StepConfigError::StepsPerMm { axis: 1 }));
+        assert_eq!(
+            with(steps, mm),
+            Err(StepConfigError::StepsPerMm { axis: 1, steps, mm })
+        );
     }
     for pulse_slots in [0, 25, 255] {
         let config = StepConfig { pulse_slots, ..good };
