@@ -125,6 +125,12 @@ impl Control {
         }
     }
 
+    /// Whether this is the first sample of a pass, which nothing led to.
+    #[inline]
+    const fn jumps(&self, sample: &Sample) -> bool {
+        moves(sample.state) && self.run.pass.first_tick == sample.tick
+    }
+
     /// Takes a command up; false for a `Run` that leaves no time, which halts at once.
     fn obey(&mut self, command: Command) -> bool {
         match command {
@@ -251,13 +257,13 @@ impl<S: AsRef<[i32]> + AsMut<[i32]>> RealTime<S> {
     /// After the tick: makes the pulses that bring the axes to its sample in the next period; see [`Steps::step`]. Too many steps
     /// trip the run.
     ///
-    /// A job without limits knows no way to its beginning: the axes count as standing at its first sample, wherever
-    /// the machine was brought by hand.
+    /// A job without limits knows no way to its passes: the axes count as standing at the first sample of each, as if
+    /// they had been brought there. Such a job is for looking at, not for a machine.
     #[inline]
     pub fn pulses(&mut self, slots: &mut [u32; BUFFER_WORDS]) {
         let Some(steps) = &mut self.steps else { return };
         let sample = self.interpolator.last();
-        if sample.state == State::Running && sample.tick == 0 {
+        if self.control.jumps(sample) {
             steps.place(sample.cl_nm);
         }
         let to = if moves(sample.state) {

@@ -338,17 +338,18 @@ impl<R: Registers> StepOutput<R> {
     /// [`Failure`]; the pins are set all the same.
     #[inline]
     pub fn begin(&mut self, directions: u8) -> Result<(), Failure> {
-        let control = self.registers.read(r::PLAY + r::CR);
-        let idle = usize::from(control & r::CT == 0);
-        // The same one twice: a whole period went by unheard, and its direction with it.
-        let unheard = core::mem::replace(&mut self.idle, idle) == idle;
         let turned = core::mem::replace(&mut self.directions, directions) ^ directions;
         if turned != 0 {
             self.turn(turned);
         }
         if !self.present {
-            self.idle = 0;
-        } else if control & r::EN == 0 {
+            return Ok(());
+        }
+        let control = self.registers.read(r::PLAY + r::CR);
+        let idle = usize::from(control & r::CT == 0);
+        // The same one twice: a whole period went by unheard, and its direction with it.
+        let unheard = core::mem::replace(&mut self.idle, idle) == idle;
+        if control & r::EN == 0 {
             return Err(Failure::Stopped);
         } else if turned != 0 {
             let left = self.registers.read(r::PLAY + r::NDTR);

@@ -41,6 +41,7 @@ impl Machine {
         // A fault of the run before is acknowledged by an abort; otherwise it is ignored.
         self.core.tick(Request::Abort);
         let mut request = Request::Start;
+        let mut pass = None;
         loop {
             let sample = self.core.tick(request);
             request = Request::None;
@@ -48,7 +49,8 @@ impl Machine {
                 break;
             }
             if let Some((steps, slots)) = &mut self.steps {
-                if sample.tick == 0 {
+                // Nothing led to the first sample of a pass; the board takes it the same way.
+                if pass.replace(sample.pass) != Some(sample.pass) {
                     steps.place(sample.cl_nm);
                 }
                 if let Err(fault) = steps.step(sample.cl_nm, slots) {
