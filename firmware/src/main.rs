@@ -65,6 +65,7 @@ mod app {
     #[local]
     struct Local {
         task: SampleTask,
+        output: StepDriver,
         receiver: Receiver,
         transmitter: Transmitter,
         led: StatusLed<StatusPin>,
@@ -122,7 +123,8 @@ mod app {
                 bytes_lost: 0,
             },
             Local {
-                task: SampleTask::new(timer, counter, output, commands_out, events_in),
+                task: SampleTask::new(timer, counter, commands_out, events_in),
+                output,
                 receiver,
                 transmitter,
                 led: StatusLed::new(board.status_pin),
@@ -144,10 +146,14 @@ mod app {
     /// | over a fifth of the period | a fault of the run (`tick-over-budget`), which stops along the path |
     /// | a miss | counted, reported, and a fault of the run (`deadline-missed`), which stops along the path |
     /// | a panic | cannot be reached: `firmware/no-panic` does not link otherwise |
-    #[task(binds = TIM2, priority = 3, shared = [real_time], local = [task])]
+    #[task(binds = TIM2, priority = 3, shared = [real_time], local = [task, output])]
     fn sample(mut context: sample::Context) {
         let task = context.local.task;
-        context.shared.real_time.lock(|real_time| task.tick(real_time));
+        let output = context.local.output;
+        context
+            .shared
+            .real_time
+            .lock(|real_time| task.tick(real_time, output));
     }
 
     /// Takes a byte off the port.

@@ -15,7 +15,6 @@ use crate::drivers::{cycle_counter::CycleCounter, sample_timer::SampleTimer, ste
 pub(crate) struct SampleTask {
     timer: SampleTimer,
     counter: CycleCounter,
-    output: StepDriver,
     commands: Consumer<'static, Command>,
     events: EventQueue,
     /// Periods missed at the end of the last tick.
@@ -29,14 +28,12 @@ impl SampleTask {
     pub(crate) const fn new(
         timer: SampleTimer,
         counter: CycleCounter,
-        output: StepDriver,
         commands: Consumer<'static, Command>,
         events: Producer<'static, Event>,
     ) -> Self {
         Self {
             timer,
             counter,
-            output,
             commands,
             events: EventQueue(events),
             missed: 0,
@@ -44,16 +41,21 @@ impl SampleTask {
         }
     }
 
-    /// One tick.
+    /// One tick. The output is no part of the task: the compiler knows the queues' capacities only as long as no part of the
+    /// task is handed on by reference, and divides by them.
     #[inline]
-    pub(crate) fn tick<S: AsRef<[i32]> + AsMut<[i32]>>(&mut self, real_time: &mut RealTime<S>) {
+    pub(crate) fn tick<S: AsRef<[i32]> + AsMut<[i32]>>(
+        &mut self,
+        real_time: &mut RealTime<S>,
+        output: &mut StepDriver,
+    ) {
         // Where it lies is known when the image is linked, and each access to a field would make an address of its
         // own, two instructions long. Hidden, it is a register, and the fields are offsets from it.
         let real_time = black_box(real_time);
         let begun = self.counter.now();
         self.timer.begin();
         // First of all: the pulses of an axis that turns wait for it.
-        if let Err(fault) = self.output.begin(real_time.directions()) {
+        if let Err(fault) = output.begin(real_time.directions()) {
             real_time.trip(fault);
         }
         if let Some(command) = self.commands.dequeue() {
@@ -64,7 +66,7 @@ impl SampleTask {
             cycles: self.cycles,
         };
         real_time.tick(input, &mut self.events);
-        if let Some(slots) = self.output.slots() {
+        if let Some(slots) = output.slots() {
             real_time.pulses(slots);
         }
         self.cycles = self.counter.since(begun);

@@ -45,6 +45,7 @@ mod app {
     #[local]
     struct Local {
         task: SampleTask,
+        output: StepDriver,
         commands_in: Producer<'static, Command>,
         events_out: Consumer<'static, Event>,
     }
@@ -76,7 +77,8 @@ mod app {
         (
             Shared { real_time },
             Local {
-                task: SampleTask::new(timer, counter, output, commands_out, events_in),
+                task: SampleTask::new(timer, counter, commands_out, events_in),
+                output,
                 commands_in,
                 events_out,
             },
@@ -84,10 +86,14 @@ mod app {
     }
 
     /// The firmware's task. What state the machine is in is hidden from the compiler there: it may be any.
-    #[task(binds = TIM2, priority = 3, shared = [real_time], local = [task])]
+    #[task(binds = TIM2, priority = 3, shared = [real_time], local = [task, output])]
     fn sample(mut context: sample::Context) {
         let task = context.local.task;
-        context.shared.real_time.lock(|real_time| task.tick(real_time));
+        let output = context.local.output;
+        context
+            .shared
+            .real_time
+            .lock(|real_time| task.tick(real_time, output));
         #[cfg(feature = "with-a-panic")]
         assert!(black_box(true), "the control");
     }
