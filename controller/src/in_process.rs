@@ -6,7 +6,7 @@ use std::vec::Vec;
 use interp_core::{
     fault::Fault,
     job::{Header, STORE_WORDS},
-    steps::CheckedSteps,
+    steps::{BUFFER_WORDS, CheckedSteps},
 };
 use protocol::message::{Description, Status};
 
@@ -123,6 +123,9 @@ impl<const WORDS: usize> Board<WORDS> {
         self.half
             .real_time
             .tick(TickInput { missed, cycles }, &mut events);
+        if self.half.real_time.steps().is_some() {
+            self.half.real_time.pulses(&mut [0; BUFFER_WORDS]);
+        }
         let sent = &mut self.sent;
         for event in events {
             self.link
