@@ -36,7 +36,7 @@ use interp_core::{
     steps::{BUFFER_WORDS, SLOTS, TURN_SLOTS},
 };
 
-/// Slots that the pulses of three axes may take to be written, four times what was measured.
+/// Slots that the pulses of three axes may take to be written: 90 were counted at 400 kHz in the pessimistic model, so 112 at 500 kHz.
 pub const WRITE_SLOTS: u32 = 200;
 
 /// A chip's registers, by address.

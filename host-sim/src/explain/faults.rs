@@ -109,7 +109,7 @@ fn words(kind: FaultKind) -> [&'static str; 5] {
         FaultKind::TickOverBudget => [
             "A tick took more than a fifth of the period. The tool slows down along its path and stands.",
             "The processor cycles that it took.",
-            "The worst tick that was found takes 5.4 % of the period, and pulses at the highest rate less than 8 % more, so this one is a case that was not: or interrupts of your own took the rest.",
+            "The worst tick that was found takes 5.4 % of the period, and the pulses of three axes at 400 kHz 9 % more, so this one is a case that was not: or interrupts of your own took the rest.",
             "Please report the job; a lower feed makes the dearest ticks rarer. `cargo sim budget JOB` counts what each stage takes.",
             "An interrupt handler of 40000 cycles with a higher priority than the sample task.",
         ],
