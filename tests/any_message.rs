@@ -3,6 +3,7 @@
 use interp_core::{
     job::{Header, Pattern, Spacing, SurfaceKind, ToolSide},
     sample::{Place, Sample, State},
+    steps::{AxisSteps, StepConfig},
 };
 use proptest::prelude::*;
 use protocol::message::{
@@ -70,6 +71,13 @@ prop_compose! {
     }
 }
 
+prop_compose! {
+    fn any_steps()(axes in any::<[(u32, u32, bool); 3]>(), pulse_slots in any::<u8>(), setup_slots in any::<u16>()) -> StepConfig {
+        let axes = axes.map(|(steps, mm, inverted)| AxisSteps { steps, mm, inverted });
+        StepConfig { axes, pulse_slots, setup_slots }
+    }
+}
+
 pub(crate) fn any_request() -> impl Strategy<Value = Request> {
     let words = prop::collection::vec(any::<i32>(), 0..=CHUNK_WORDS_MAX);
     prop_oneof![
@@ -92,6 +100,7 @@ pub(crate) fn any_request() -> impl Strategy<Value = Request> {
         any::<[i32; 3]>().prop_map(|home_nm| Request::SetHome { home_nm }),
         any::<u8>().prop_map(|percent| Request::Override { percent }),
         any_lines().prop_map(|lines| Request::Simulate { lines }),
+        any_steps().prop_map(|config| Request::StepConfig(config.into())),
     ]
 }
 

@@ -380,6 +380,19 @@ fn no_stage_has_grown() {
         let prepared = prepare(&JobFile::load(&job).unwrap()).unwrap();
         all.extend(figures::figures(name, &bench.run(&prepared, TICKS).unwrap()));
     }
+    let job = JobFile::load(&golden::pulses_job()).unwrap();
+    let pulses = bench.run(&prepare(&job).unwrap(), TICKS).unwrap();
+    let pulses = figures::figures(golden::PULSES, &pulses);
+    let dearest = pulses
+        .iter()
+        .filter(|row| row.stage == "pulses")
+        .map(|row| row.max)
+        .max();
+    assert!(
+        dearest.is_some_and(|most| most < PERIOD_CYCLES / 10),
+        "{dearest:?}"
+    );
+    all.extend(pulses);
     all.extend(golden::worst(&bench).unwrap());
     let table = std::fs::read_to_string(golden::path()).unwrap();
     let complaints = golden::complaints(&table, &all);

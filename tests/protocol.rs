@@ -13,6 +13,7 @@ use integration_tests::{HELLO, Mock, frame, is_bad_frame};
 use interp_core::{
     job::{Header, Pattern, Spacing, SurfaceKind, ToolSide},
     sample::{Place, Sample, State},
+    steps::{AxisSteps, StepConfig},
 };
 use proptest::prelude::*;
 use protocol::{
@@ -40,6 +41,15 @@ fn header() -> Header {
     }
 }
 
+fn steps() -> StepConfig {
+    let axis = |steps, mm, inverted| AxisSteps { steps, mm, inverted };
+    StepConfig {
+        axes: [axis(400, 1, false), axis(3200, 5, true), axis(16_000, 127, false)],
+        pulse_slots: 3,
+        setup_slots: 480,
+    }
+}
+
 /// One of each, in order of the codes.
 fn requests() -> Vec<Request> {
     vec![
@@ -62,7 +72,7 @@ fn requests() -> Vec<Request> {
         Request::Clock(Clock::Lockstep),
         Request::Run { ticks: 1000 },
         Request::Report(Report::Samples),
-        Request::Reserved,
+        Request::StepConfig(steps().into()),
         Request::Configure(CONFIGURATION),
         Request::Drives { on: true },
         Request::SetHome {

@@ -563,7 +563,6 @@ fn an_override_has_its_range_and_inputs_are_simulated_only_without_pins() {
         }
         let lines = InputLines(3);
         assert_eq!(line.refused(&Request::Simulate { lines }), Reason::Unsupported);
-        assert_eq!(line.refused(&Request::Reserved), Reason::Unsupported);
         line.mock.simulated = true;
         line.accepted(&Request::Simulate { lines });
         assert_eq!(line.mock.calls.last(), Some(&Call::Simulate(lines)));

@@ -6,6 +6,7 @@ use std::vec::Vec;
 use interp_core::{
     fault::Fault,
     job::{Header, STORE_WORDS},
+    steps::{BUFFER_WORDS, CheckedSteps},
 };
 use protocol::message::{Description, InputLines, Reason, Status};
 
@@ -66,6 +67,10 @@ impl<const WORDS: usize> Machine for Half<WORDS> {
 
     fn load_finish(&mut self) -> Result<(), Fault> {
         self.real_time.load_finish()
+    }
+
+    fn set_steps(&mut self, checked: &CheckedSteps) -> Result<(), Fault> {
+        self.real_time.set_steps(checked)
     }
 
     fn send(&mut self, command: Command) -> Result<(), Busy> {
@@ -136,6 +141,9 @@ impl<const WORDS: usize> Board<WORDS> {
             lines: self.half.lines,
         };
         self.half.real_time.tick(input, &mut events);
+        if self.half.real_time.steps().is_some() {
+            self.half.real_time.pulses(&mut [0; BUFFER_WORDS]);
+        }
         let sent = &mut self.sent;
         for event in events {
             self.link

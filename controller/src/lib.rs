@@ -34,4 +34,5 @@ pub mod machine;
 pub mod realtime;
 pub mod safety;
 mod session;
+pub mod step_output;
 mod upload;

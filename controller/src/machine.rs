@@ -4,6 +4,7 @@ use interp_core::{
     fault::Fault,
     interpolator,
     job::{Header, SurfaceKind, patches_max},
+    steps::CheckedSteps,
 };
 use protocol::message::{
     CHUNK_WORDS_MAX, Clock, Description, InputLines, PassDigest, Reason, Report, Status,
@@ -112,6 +113,12 @@ pub trait Machine {
     /// # Errors
     /// The core's.
     fn load_finish(&mut self) -> Result<(), Fault>;
+
+    /// [`crate::realtime::RealTime::set_steps`].
+    ///
+    /// # Errors
+    /// Refused while a run is under way.
+    fn set_steps(&mut self, checked: &CheckedSteps) -> Result<(), Fault>;
 
     /// Queues a command for the next tick of the sample timer.
     ///

@@ -15,6 +15,7 @@ use interp_core::{
     interpolator::{Inputs, Interpolator, Request},
     job::{Header, STORE_WORDS},
     sample::{Sample, State},
+    steps::{BUFFER_WORDS, CheckedSteps, Steps},
 };
 use protocol::{
     digest::Digest,
@@ -132,6 +133,13 @@ impl Control {
         }
     }
 
+    /// Whether nothing led to this sample: the first of a run, and without limits that of each pass.
+    #[inline]
+    const fn jumps(&self, sample: &Sample, has_limits: bool) -> bool {
+        let first = if has_limits { 0 } else { self.run.pass.first_tick };
+        moves(sample.state) && sample.tick == first
+    }
+
     /// Takes a command up; false for a `Run` that leaves no time, which halts at once.
     fn obey(&mut self, command: Command) -> bool {
         match command {
@@ -203,6 +211,8 @@ const fn moves(state: State) -> bool {
 #[derive(Debug)]
 pub struct RealTime<S = [i32; STORE_WORDS]> {
     control: Control,
+    /// None on a machine without step outputs.
+    steps: Option<Steps>,
     interpolator: Interpolator<S>,
 }
 
@@ -226,6 +236,7 @@ impl<S> RealTime<S> {
     pub const fn with_store(store: S) -> Self {
         Self {
             control: Control::new(),
+            steps: None,
             interpolator: Interpolator::with_store(store),
         }
     }
@@ -240,6 +251,70 @@ impl<S: AsRef<[i32]> + AsMut<[i32]>> RealTime<S> {
     /// Tells why the board started.
     pub const fn set_reset_cause(&mut self, cause: ResetCause) {
         self.control.safety.set_reset_cause(cause);
+    }
+
+    /// Gives the machine step outputs, on these pins of a port; the axes stand at the origin.
+    pub fn set_step_pins(&mut self, checked: CheckedSteps, pins: [u8; 3]) {
+        self.steps = Some(Steps::new(checked, pins));
+    }
+
+    /// Other settings of the drives; without step outputs, nothing.
+    ///
+    /// # Errors
+    /// [`FaultKind::WrongState`] while a run is under way.
+    pub fn set_steps(&mut self, checked: &CheckedSteps) -> Result<()> {
+        let state = self.interpolator.state();
+        if state.is_under_way() {
+            return Err(Fault::new(FaultKind::WrongState, f32::from(state as u8)));
+        }
+        if let Some(steps) = &mut self.steps {
+            steps.configure(*checked);
+        }
+        Ok(())
+    }
+
+    /// The axes' steps, where there are step outputs.
+    #[must_use]
+    pub const fn steps(&self) -> Option<&Steps> {
+        self.steps.as_ref()
+    }
+
+    /// Levels of the direction pins for the period that begins, a bit an axis.
+    #[must_use]
+    #[inline]
+    pub fn directions(&self) -> u8 {
+        self.steps.as_ref().map_or(0, Steps::directions)
+    }
+
+    /// After the tick: makes the pulses that bring the axes to its sample in the next period; see [`Steps::step`]. Too many steps
+    /// trip the run.
+    ///
+    /// A job without limits knows no way to its passes: the axes count as standing at the first sample of each, as if
+    /// they had been brought there. Such a job is for looking at, not for a machine.
+    #[inline]
+    pub fn pulses(&mut self, slots: &mut [u32; BUFFER_WORDS]) {
+        let Some(steps) = &mut self.steps else { return };
+        let sample = self.interpolator.last();
+        if self.control.jumps(sample, self.interpolator.has_limits()) {
+            steps.place(sample.cl_nm);
+        }
+        let to = if moves(sample.state) {
+            sample.cl_nm
+        } else {
+            steps.told()
+        };
+        if let Err(fault) = steps.step(to, slots) {
+            self.trip(fault);
+        }
+    }
+
+    /// Stops a run with a fault from outside, along its path.
+    #[cold]
+    #[inline(never)]
+    pub fn trip(&mut self, fault: Fault) {
+        if moves(self.interpolator.state()) {
+            self.interpolator.trip(fault);
+        }
     }
 
     /// Takes a command up, before the tick.
@@ -332,6 +407,7 @@ impl<S: AsRef<[i32]> + AsMut<[i32]>> RealTime<S> {
         let Self {
             control,
             interpolator,
+            ..
         } = self;
         let sample = interpolator.last();
         if control.run.begins_pass(sample)

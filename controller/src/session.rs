@@ -1,7 +1,12 @@
 //! A session with the host: who speaks, which request is next, and what is answered to it.
 
 use heapless::Vec;
-use interp_core::{interpolator, job::Header};
+use interp_core::{
+    fault::{Fault, FaultKind},
+    interpolator,
+    job::Header,
+    steps::{StepConfig, StepConfigError},
+};
 use protocol::{
     frame::{DELIMITER, FRAME_MAX, Frame, write_reply},
     message::{
@@ -218,13 +223,14 @@ impl Session {
             Request::SetHome { home_nm } => machine.order(Order::SetHome { home_nm }),
             Request::Acknowledge => machine.order(Order::Acknowledge),
             Request::Simulate { lines } if machine.simulate(lines) => Ok(()),
-            Request::Simulate { .. } | Request::Reserved => Err(Reason::Unsupported),
+            Request::Simulate { .. } => Err(Reason::Unsupported),
             Request::Clock(clock) => self.set_clock(machine, clock),
             Request::Run { .. } if self.clock != Clock::Lockstep => {
                 Err(Reason::WrongClock { clock: self.clock })
             }
             Request::Run { ticks } => command(machine, Command::Run { ticks }),
             Request::Report(report) => command(machine, Command::Report(report)),
+            Request::StepConfig(settings) => set_steps(machine, settings.into()),
             // Answered before it comes here.
             Request::Hello { .. } => Err(Reason::Unreadable),
         };
@@ -292,6 +298,29 @@ fn set_override(machine: &mut impl Machine, percent: u8) -> Result<(), Reason> {
         });
     }
     command(machine, Command::Override { percent })
+}
+
+/// Checked here, where there is time; taken over between two ticks.
+fn set_steps(machine: &mut impl Machine, config: StepConfig) -> Result<(), Reason> {
+    let state = machine.status().state;
+    if state.is_under_way() {
+        return Err(Reason::WrongState { state });
+    }
+    let refused = |value: f32, record| Reason::Job {
+        fault: Fault::new(FaultKind::BadHeader, value).into(),
+        record,
+    };
+    let checked = config.check().map_err(|error| match error {
+        #[allow(clippy::cast_precision_loss, reason = "a value to be read by a person")]
+        StepConfigError::StepsPerMm { axis, steps, mm } => {
+            refused(steps as f32 / mm as f32, Some(axis.into()))
+        }
+        StepConfigError::PulseSlots(slots) => refused(slots.into(), None),
+        StepConfigError::SetupSlots(slots) => refused(slots.into(), None),
+    })?;
+    machine
+        .set_steps(&checked)
+        .map_err(|fault| refused(fault.value, None))
 }
 
 fn command(machine: &mut impl Machine, command: Command) -> Result<(), Reason> {

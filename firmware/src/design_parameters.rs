@@ -5,7 +5,10 @@
 use core::mem::size_of;
 
 use crate::guarded_machine::BoardRealTime;
-use controller::machine::{Command, Event, Events};
+use controller::{
+    machine::{Command, Event, Events},
+    step_output::{Buffers, slot_counts},
+};
 use interp_core::job::{STORE_WORDS, SurfaceKind, patches_max};
 use protocol::{frame::FRAME_MAX, message::SAMPLES_MAX};
 
@@ -27,9 +30,15 @@ pub(crate) const PERIOD_COUNTS: u32 = board::TIMER_HZ / 1_000_000 * PERIOD_US;
 /// The chip's fastest clock, Hz, which the figures in cycles are for.
 const CORE_HZ: u32 = 168_000_000;
 
-/// Cycles that a tick may take while the tool moves: a tenth of the period. What `cargo sim budget` shows of the
-/// worst tick is well below, so more is a defect; nine tenths are left to the link.
-pub(crate) const TICK_BUDGET_CYCLES: u32 = CORE_HZ / 1_000_000 * PERIOD_US / 10;
+/// Cycles that a tick may take while the tool moves: a fifth of the period, half of it for the pulses. What `cargo sim budget` shows of the
+/// worst tick is well below, so more is a defect; four fifths are left to the link.
+pub(crate) const TICK_BUDGET_CYCLES: u32 = CORE_HZ / 1_000_000 * PERIOD_US / 5;
+
+/// Clocks of TIM1 a slot of the step output: 168, a whole number.
+pub(crate) const SLOT_COUNTS: u16 = match slot_counts(board::STEP_TIMER_HZ, PERIOD_US) {
+    Some(counts) => counts,
+    None => panic!("a slot has to be a whole number of clocks"),
+};
 
 /// Baud rate of the link: the first usual rate at which every sample of a run can be reported.
 pub(crate) const SERIAL_BAUD: u32 = 921_600;
@@ -106,7 +115,7 @@ const _: () = {
     );
 
     // Memory.
-    let machine = size_of::<BoardRealTime>() + 4 * JOB_WORDS;
+    let machine = size_of::<BoardRealTime>() + 4 * JOB_WORDS + size_of::<Buffers>();
     let queues = RECEIVE_PLACES + COMMAND_PLACES * size_of::<Command>() + EVENT_PLACES * size_of::<Event>();
     assert!(
         machine + queues + STACK_BYTES <= RAM_BYTES,

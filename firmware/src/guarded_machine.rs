@@ -9,6 +9,8 @@ use controller::{
 use heapless::spsc::Producer;
 use interp_core::{fault::Fault, job::Header};
 use protocol::message::{Description, InputLines, Reason, Status};
+use interp_core::{fault::Fault, job::Header, steps::CheckedSteps};
+use protocol::message::{Description, Status};
 use rtic::Mutex;
 
 use crate::{
@@ -57,6 +59,10 @@ impl<M: Mutex<T = BoardRealTime>> Machine for GuardedMachine<'_, M> {
 
     fn load_finish(&mut self) -> Result<(), Fault> {
         self.real_time.lock(|real_time| real_time.load_finish())
+    }
+
+    fn set_steps(&mut self, checked: &CheckedSteps) -> Result<(), Fault> {
+        self.real_time.lock(|real_time| real_time.set_steps(checked))
     }
 
     fn send(&mut self, command: Command) -> Result<(), Busy> {

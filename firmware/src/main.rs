@@ -33,16 +33,19 @@ mod app {
         link::Link,
         machine::{Command, Event},
         realtime::RealTime,
+        step_output::Buffers,
     };
     use heapless::spsc::{Consumer, Producer, Queue};
     use protocol::message::ResetCause;
     use stm32f4xx_hal::pac;
+    use interp_core::steps::BUFFER_WORDS;
 
     use crate::{
         board::{self, BOARD},
         design_parameters::{
             COMMAND_PLACES, EVENT_PLACES, FLUSH_PERIODS, JOB_WORDS, PERIOD_COUNTS, RECEIVE_PLACES,
             TICK_BUDGET_CYCLES, WATCHDOG_RELOAD,
+            SLOT_COUNTS, TICK_BUDGET_CYCLES,
         },
         drivers::{
             cycle_counter::CycleCounter,
@@ -53,6 +56,7 @@ mod app {
             serial::{self, Receiver, Transmitter},
             status_led::StatusLed,
             watchdog::Watchdog,
+            step_output::StepDriver,
         },
         guarded_machine::{BoardRealTime, GuardedMachine},
         sample_task::{Guards, SampleTask},
@@ -79,6 +83,7 @@ mod app {
     struct Local {
         task: SampleTask,
         guards: Guards<board::InputPorts, gpio::Ports, pac::IWDG>,
+        output: StepDriver,
         receiver: Receiver,
         transmitter: Transmitter,
         led: StatusLed<Output>,
@@ -93,6 +98,8 @@ mod app {
     /// The store is a static of its own: all zeros, it takes no flash, and the 64 KiB never pass over the stack.
     #[init(local = [
         store: [i32; JOB_WORDS] = [0; JOB_WORDS],
+        slots: Buffers = [[0; BUFFER_WORDS]; 2],
+        rest: u32 = 0,
         bytes: Queue<u8, RECEIVE_PLACES> = Queue::new(),
         commands: Queue<Command, COMMAND_PLACES> = Queue::new(),
         events: Queue<Event, EVENT_PLACES> = Queue::new(),
@@ -106,6 +113,18 @@ mod app {
         let (bytes_in, bytes_out) = context.local.bytes.split();
         let (commands_in, commands_out) = context.local.commands.split();
         let (events_in, events_out) = context.local.events.split();
+        // Before the sample timer, whose first update starts it.
+        let output = StepDriver::new(
+            board.tim1,
+            board.dma2,
+            board::WIRING,
+            SLOT_COUNTS,
+            context.local.slots,
+            context.local.rest,
+        );
+        if !output.is_present() {
+            defmt::warn!("this board puts no steps out");
+        }
         let timer = SampleTimer::new(board.tim2, board.tim5, board::TIMER_RELOAD, PERIOD_COUNTS);
         defmt::info!(
             "isofeed {=str} on {=str}, room for {=usize} words",
@@ -130,6 +149,9 @@ mod app {
             drives: DRIVES,
             watchdog,
         };
+        if let Ok(steps) = board::STEPS.check() {
+            real_time.set_step_pins(steps, board::WIRING.step);
+        }
         (
             Shared {
                 real_time,
@@ -138,6 +160,7 @@ mod app {
             Local {
                 task: SampleTask::new(timer, counter, commands_out, events_in),
                 guards,
+                output,
                 receiver,
                 transmitter,
                 led: StatusLed::new(Output::new(LED.pin), LED.active),
@@ -156,7 +179,7 @@ mod app {
     /// | priority | 3, the highest |
     /// | period | 1 ms, by TIM2 |
     /// | worst case | see `cargo sim budget`; the board measures each tick and reports the most (`tick_cycles_max`) |
-    /// | over a tenth of the period | a fault of the run (`tick-over-budget`), which stops along the path |
+    /// | over a fifth of the period | a fault of the run (`tick-over-budget`), which stops along the path |
     /// | a miss | counted, reported, and a fault of the run (`deadline-missed`), which stops along the path |
     /// | either | does not feed the watchdog, which resets the board when no tick does for some periods |
     /// | a panic | cannot be reached: `firmware/no-panic` does not link otherwise |
@@ -167,6 +190,14 @@ mod app {
             .shared
             .real_time
             .lock(|real_time| task.tick(real_time, guards));
+    #[task(binds = TIM2, priority = 3, shared = [real_time], local = [task, output])]
+    fn sample(mut context: sample::Context) {
+        let task = context.local.task;
+        let output = context.local.output;
+        context
+            .shared
+            .real_time
+            .lock(|real_time| task.tick(real_time, output));
     }
 
     /// Takes a byte off the port.

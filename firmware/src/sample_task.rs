@@ -27,6 +27,7 @@ pub(crate) struct Guards<I, O, W> {
     /// The watchdog, started.
     pub(crate) watchdog: Watchdog<W>,
 }
+use crate::drivers::{cycle_counter::CycleCounter, sample_timer::SampleTimer, step_output::StepDriver};
 
 /// What the task has for itself.
 pub(crate) struct SampleTask {
@@ -58,7 +59,8 @@ impl SampleTask {
         }
     }
 
-    /// One tick.
+    /// One tick. The output is no part of the task: the compiler knows the queues' capacities only as long as no part of the
+    /// task is handed on by reference, and divides by them.
     #[inline]
     pub(crate) fn tick<S, I, O, W>(&mut self, real_time: &mut RealTime<S>, guards: &mut Guards<I, O, W>)
     where
@@ -67,11 +69,20 @@ impl SampleTask {
         O: WritePorts,
         W: Registers,
     {
+    pub(crate) fn tick<S: AsRef<[i32]> + AsMut<[i32]>>(
+        &mut self,
+        real_time: &mut RealTime<S>,
+        output: &mut StepDriver,
+    ) {
         // Where it lies is known when the image is linked, and each access to a field would make an address of its
         // own, two instructions long. Hidden, it is a register, and the fields are offsets from it.
         let real_time = black_box(real_time);
         let begun = self.counter.now();
         self.timer.begin();
+        // First of all: the pulses of an axis that turns wait for it.
+        if let Err(fault) = output.begin(real_time.directions()) {
+            real_time.trip(fault);
+        }
         if let Some(command) = self.commands.dequeue() {
             real_time.obey(command, &mut self.events);
         }
@@ -82,6 +93,9 @@ impl SampleTask {
         };
         real_time.tick(input, &mut self.events);
         guards.drives.set(real_time.drives_on());
+        if let Some(slots) = output.slots() {
+            real_time.pulses(slots);
+        }
         self.cycles = self.counter.since(begun);
         self.missed = self.timer.end();
         if real_time.feeds_watchdog(self.missed, self.cycles) {

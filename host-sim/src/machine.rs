@@ -1,6 +1,7 @@
 //! The machine in this process: the core with a job loaded, one call a period.
 
-use interp_core::{Fault, Inputs, Interpolator, Place, Probe, Request, Sample, State};
+use interp_core::steps::BUFFER_WORDS;
+use interp_core::{Fault, Inputs, Interpolator, Place, Probe, Request, Sample, State, Steps};
 
 use crate::prepare::Prepared;
 
@@ -8,10 +9,11 @@ use crate::prepare::Prepared;
 #[derive(Debug)]
 pub struct Machine {
     core: Box<Interpolator>,
+    steps: Option<(Steps, Box<[u32; BUFFER_WORDS]>)>,
 }
 
 impl Machine {
-    /// A machine that is ready to run this job.
+    /// A machine that is ready to run this job. Where it names steps, a run that asks too many of a period faults.
     ///
     /// # Errors
     /// What the core says against the job: too many patches, a header value out of range, a bad patch.
@@ -24,7 +26,10 @@ impl Machine {
             core.load_check(record)?;
         }
         core.load_finish()?;
-        Ok(Self { core })
+        // A configuration that cannot be used is refused by the board, too, and by the reader of the job file before.
+        let checked = job.steps.and_then(|config| config.check().ok());
+        let steps = checked.map(|checked| (Steps::new(checked, [0, 1, 2]), Box::new([0; BUFFER_WORDS])));
+        Ok(Self { core, steps })
     }
 
     /// Runs the job from its beginning, and hands every sample on, until its end or a fault. Stops early, and returns
@@ -36,11 +41,26 @@ impl Machine {
         // A fault of the run before is acknowledged by an abort; otherwise it is ignored.
         self.core.tick(Request::Abort);
         let mut request = Request::Start;
+        let mut pass = None;
+        let has_limits = self.core.has_limits();
         loop {
             let sample = self.core.tick(request);
             request = Request::None;
             if !matches!(sample.state, State::Running | State::Linking) {
                 break;
+            }
+            if let Some((steps, slots)) = &mut self.steps {
+                // Nothing led to the first sample of a run, nor of a pass without limits; the board takes it the same way.
+                if pass
+                    .replace(sample.pass)
+                    .is_none_or(|pass| pass != sample.pass && !has_limits)
+                {
+                    steps.place(sample.cl_nm);
+                }
+                if let Err(fault) = steps.step(sample.cl_nm, slots) {
+                    self.core.tick(Request::Abort);
+                    return Err(fault);
+                }
             }
             if !each(sample) {
                 self.core.tick(Request::Abort);

@@ -49,11 +49,16 @@ pub enum FaultKind {
     HostGone = 19,
     /// A start while the machine does not know where its axes stand. Value: 0.
     NotHomed = 20,
+    /// An axis was asked for more steps in a period than a period has room for. Value: the steps asked for.
+    StepRate = 21,
+    /// The board's pulses were not handed out in time, or the hardware that does so has stopped.
+    /// Value: slots of the period that had passed when the direction was set, where that was too late; otherwise 0.
+    StepOutput = 22,
 }
 
 impl FaultKind {
     /// Every kind, in order of its code.
-    pub const ALL: [Self; 20] = [
+    pub const ALL: [Self; 22] = [
         Self::BallDoesNotFit,
         Self::DegenerateSurface,
         Self::ParameterBackwards,
@@ -74,6 +79,8 @@ impl FaultKind {
         Self::DriveFault,
         Self::HostGone,
         Self::NotHomed,
+        Self::StepRate,
+        Self::StepOutput,
     ];
 
     /// The stable code.
@@ -112,6 +119,8 @@ impl FaultKind {
             Self::DriveFault => "drive-fault",
             Self::HostGone => "host-gone",
             Self::NotHomed => "not-homed",
+            Self::StepRate => "step-rate",
+            Self::StepOutput => "step-output",
         }
     }
 }

@@ -213,6 +213,12 @@ impl<S: AsRef<[i32]> + AsMut<[i32]>> Interpolator<S> {
             .unwrap_or_else(|| self.motion.run.place())
     }
 
+    /// Whether the loaded job is run within the axes' limits, from standstill to standstill, so that a way leads to each of its samples.
+    #[must_use]
+    pub const fn has_limits(&self) -> bool {
+        self.motion.program.header().axes.is_some()
+    }
+
     /// The last sample: its position is kept after a fault.
     #[must_use]
     pub const fn last(&self) -> &Sample {

@@ -75,6 +75,7 @@ mod scalar;
 #[path = "../../host-sim/counted-core/scalar.rs"]
 pub mod scalar;
 mod schedule;
+pub mod steps;
 pub mod surface;
 mod vec3;
 
@@ -82,3 +83,4 @@ pub use fault::{Fault, FaultKind};
 pub use interpolator::{Inputs, Interpolator, Probe, Request};
 pub use job::{Axes, Header, Pattern, STORE_WORDS, Spacing, SurfaceKind, ToolSide};
 pub use sample::{Place, Sample, State};
+pub use steps::{AxisSteps, StepConfig, Steps};

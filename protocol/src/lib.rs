@@ -16,7 +16,7 @@
 //! |---|---|---|
 //! | `Hello` | → ← | `Capabilities` |
 //! | `JobBegin`, `JobChunk` .., `JobEnd` | → ← | `Ack` or `Nak` each |
-//! | `Clock`, `Report` | → ← | `Ack` or `Nak` |
+//! | `Clock`, `Report`, `StepConfig` | → ← | `Ack` or `Nak` |
 //! | `Start`, `Hold`, `Resume`, `Stop`, `Abort`, `Override` | → ← | `Ack` or `Nak` |
 //! | `Configure`, `Drives`, `SetHome`, `Acknowledge` | → ← | `Ack` or `Nak` |
 //! | `Run` | → ← | `Ack` or `Nak`, later `Halted` |
@@ -37,11 +37,12 @@
 //! | `Hello` of the same session again | `Capabilities` | |
 //! | the last request again, byte for byte | the same answer again, byte for byte | |
 //! | a number that is not the next | `Nak`, `OutOfOrder` with the one expected | |
-//! | a job, or another clock, while a run is under way | `Nak`, `WrongState` with the state | |
+//! | a job, another clock or other steps while a run is under way | `Nak`, `WrongState` with the state | |
 //! | a chunk that is not the next, or too many words | `Nak`, `WrongOffset`, `TooLong` | |
 //! | `JobEnd` too early | `Nak`, `Incomplete` | the upload may go on |
 //! | `JobEnd` with other words than announced | `Nak`, `WrongDigest` | the upload is over, no job is loaded |
 //! | `JobEnd` of a job that the core refuses | `Nak`, `Job` with fault, value, record | the upload is over, no job is loaded |
+//! | steps that the core refuses | `Nak`, `Job` with fault, value, axis | |
 //! | a command that the state does not allow | `Nak`, `WrongState` | |
 //! | a start, or drives on, that inputs, latch or homing forbid | `Nak`, `Unsafe` with the fault | |
 //! | a start, or a home, while the drives are off | `Nak`, `DrivesOff` | |

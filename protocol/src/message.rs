@@ -35,6 +35,7 @@
 //! | 9 | `Clock` | 0 free, 1 lockstep | `Ack` |
 //! | 10 | `Run` | ticks `u32` | `Ack`, and `Halted` when the ticks are used up |
 //! | 11 | `Report` | 0 digests, 1 samples | `Ack` |
+//! | 12 | `StepConfig` | the fields of [`StepSettings`] | `Ack`; refused while a run is under way |
 //! | 13 | `Configure` | the fields of [`Configuration`] | `Ack`, and it holds |
 //! | 14 | `Drives` | 0 off, 1 on | as `Configure` |
 //! | 15 | `SetHome` | three places in nm, `i32` each | as `Configure` |
@@ -80,7 +81,7 @@ use serde::{Deserialize, Serialize};
 pub use crate::reason::Reason;
 pub use crate::records::{
     BOARD_NAME_MAX, Batch, CHUNK_WORDS_MAX, Clock, Description, FaultReport, PassDigest, Report, SAMPLES_MAX,
-    SampleRecord, Status, Words,
+    SampleRecord, Status, StepSettings, Words,
 };
 pub use crate::safety::{
     Configuration, HostGone, InputLines, OVERRIDE_MAX_PERCENT, OVERRIDE_NORMAL_PERCENT, ResetCause,
@@ -153,8 +154,8 @@ pub enum Request {
     },
     /// What a run tells the host.
     Report(Report),
-    /// 12: of no use in this version.
-    Reserved,
+    /// What the axes' drives want. Refused while a run is under way.
+    StepConfig(StepSettings),
     /// What the machine around the board is like. Refused while a run is under way.
     Configure(Configuration),
     /// Drives on or off. On is refused while emergency stop or drive fault are asserted or latched; off while a run is

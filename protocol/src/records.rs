@@ -8,6 +8,7 @@ use interp_core::{
     fault::{Fault, FaultKind},
     job::{Axes, Header, Pattern, Spacing, SurfaceKind, ToolSide},
     sample::{Place, Sample, State},
+    steps::{AxisSteps, StepConfig},
 };
 use serde::{Deserialize, Deserializer, Serialize, Serializer, de, ser::SerializeSeq};
 
@@ -267,6 +268,37 @@ mod axes {
     pub(super) fn deserialize<'de, D: Deserializer<'de>>(deserializer: D) -> Result<Option<Axes>, D::Error> {
         let record = Option::<Record>::deserialize(deserializer)?;
         Ok(record.map(|Record(axes)| axes))
+    }
+}
+
+/// What the axes' drives want: of each axis steps (`u32`), the millimetres that these are (`u32`), whether its direction is inverted
+/// (a byte, 0 or 1); then slots of a pulse (`u8`) and of the directions' set-up (`u16`).
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct StepSettings {
+    axes: [(u32, u32, bool); 3],
+    pulse_slots: u8,
+    setup_slots: u16,
+}
+
+impl From<StepConfig> for StepSettings {
+    fn from(config: StepConfig) -> Self {
+        Self {
+            axes: config.axes.map(|axis| (axis.steps, axis.mm, axis.inverted)),
+            pulse_slots: config.pulse_slots,
+            setup_slots: config.setup_slots,
+        }
+    }
+}
+
+impl From<StepSettings> for StepConfig {
+    fn from(settings: StepSettings) -> Self {
+        Self {
+            axes: settings
+                .axes
+                .map(|(steps, mm, inverted)| AxisSteps { steps, mm, inverted }),
+            pulse_slots: settings.pulse_slots,
+            setup_slots: settings.setup_slots,
+        }
     }
 }
 

@@ -12,6 +12,7 @@ use interp_core::{
     encode,
     fault::{Fault, FaultKind},
     job::Header,
+    steps::CheckedSteps,
 };
 use protocol::{
     PROTOCOL_VERSION,
@@ -139,6 +140,8 @@ pub enum Call {
     Check(u32),
     /// `load_finish`.
     Finish,
+    /// `set_steps`.
+    Steps(CheckedSteps),
     /// `send`.
     Send(Command),
     /// `order`.
@@ -200,6 +203,11 @@ impl Machine for Mock {
 
     fn load_finish(&mut self) -> Result<(), Fault> {
         self.calls.push(Call::Finish);
+        Ok(())
+    }
+
+    fn set_steps(&mut self, checked: &CheckedSteps) -> Result<(), Fault> {
+        self.calls.push(Call::Steps(*checked));
         Ok(())
     }
 

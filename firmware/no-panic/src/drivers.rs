@@ -15,3 +15,5 @@ pub(crate) mod safety_inputs;
 pub(crate) mod sample_timer;
 #[path = "../../src/drivers/watchdog.rs"]
 pub(crate) mod watchdog;
+#[path = "../../src/drivers/step_output.rs"]
+pub(crate) mod step_output;

@@ -24,6 +24,7 @@ mod app {
     use controller::{
         machine::{Command, Event},
         realtime::RealTime,
+        step_output::{Buffers, Pin, Port, Wiring},
     };
     use heapless::spsc::{Consumer, Producer, Queue};
     use interp_core::job::STORE_WORDS;
@@ -35,6 +36,11 @@ mod app {
             sample_timer::SampleTimer, watchdog::Watchdog,
         },
         sample_task::{Guards, SampleTask},
+    use interp_core::{StepConfig, job::STORE_WORDS, steps::BUFFER_WORDS};
+
+    use crate::{
+        drivers::{cycle_counter::CycleCounter, sample_timer::SampleTimer, step_output::StepDriver},
+        sample_task::SampleTask,
     };
 
     /// One period in counts of the timers, as on the chip.
@@ -55,18 +61,32 @@ mod app {
     struct Local {
         task: SampleTask,
         guards: Guards<Ports, Ports, pac::IWDG>,
+        output: StepDriver,
         commands_in: Producer<'static, Command>,
         events_out: Consumer<'static, Event>,
     }
 
     #[init(local = [
         store: [i32; STORE_WORDS] = [0; STORE_WORDS],
+        slots: Buffers = [[0; BUFFER_WORDS]; 2],
+        rest: u32 = 0,
         commands: Queue<Command, 8> = Queue::new(),
         events: Queue<Event, 64> = Queue::new(),
     ])]
     fn init(context: init::Context) -> (Shared, Local) {
         let counter = CycleCounter::new(context.core.DCB, context.core.DWT);
         let device = context.device;
+        let wiring = Wiring {
+            step_port: Port::B,
+            step: [12, 13, 14],
+            direction: [Pin(Port::C, 6), Pin(Port::C, 7), Pin(Port::C, 8)],
+        };
+        let (slots, rest) = (context.local.slots, context.local.rest);
+        let output = StepDriver::new(device.TIM1, device.DMA2, wiring, 168, slots, rest);
+        let mut real_time = RealTime::with_store(context.local.store);
+        if let Ok(steps) = StepConfig::DEFAULT.check() {
+            real_time.set_step_pins(steps, wiring.step);
+        }
         let timer = SampleTimer::new(device.TIM2, device.TIM5, PERIOD_COUNTS - 1, PERIOD_COUNTS);
         let guards = Guards {
             inputs: INPUTS,
@@ -76,12 +96,11 @@ mod app {
         let (commands_in, commands_out) = context.local.commands.split();
         let (events_in, events_out) = context.local.events.split();
         (
-            Shared {
-                real_time: RealTime::with_store(context.local.store),
-            },
+            Shared { real_time },
             Local {
                 task: SampleTask::new(timer, counter, commands_out, events_in),
                 guards,
+                output,
                 commands_in,
                 events_out,
             },
@@ -96,6 +115,14 @@ mod app {
             .shared
             .real_time
             .lock(|real_time| task.tick(real_time, guards));
+    #[task(binds = TIM2, priority = 3, shared = [real_time], local = [task, output])]
+    fn sample(mut context: sample::Context) {
+        let task = context.local.task;
+        let output = context.local.output;
+        context
+            .shared
+            .real_time
+            .lock(|real_time| task.tick(real_time, output));
         #[cfg(feature = "with-a-panic")]
         assert!(black_box(true), "the control");
     }

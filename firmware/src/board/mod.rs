@@ -8,6 +8,9 @@
 //! | `BOARD` | its table: name, crystal, pins (crate `boards`) |
 //! | `TIMER_HZ` | what TIM2 and TIM5 count |
 //! | `TIMER_RELOAD` | auto-reload value of TIM2 for one period |
+//! | `STEP_TIMER_HZ` | what TIM1 counts |
+//! | `WIRING` | step and direction pins |
+//! | `STEPS` | what the drives want, until a host says otherwise |
 //! | `SERIAL_DIVIDER` | `BRR` of USART1 |
 //! | `init` | clocks and pins; hands back what the drivers do not take |
 //! | `InputPorts` | where the safety inputs are read: the chip's ports, or what stands for them |
@@ -65,10 +68,14 @@ use crate::drivers::reset_cause::{TAKE_BACK, cause};
 
 /// What remains of the chip once clocks and pins are set up: the parts that the drivers take.
 pub(crate) struct Board {
+    /// The timer of the step output.
+    pub(crate) tim1: pac::TIM1,
     /// The sample timer.
     pub(crate) tim2: pac::TIM2,
     /// The reference clock that missed periods are counted by.
     pub(crate) tim5: pac::TIM5,
+    /// The DMA of the step output.
+    pub(crate) dma2: pac::DMA2,
     /// The link to the host.
     pub(crate) usart1: pac::USART1,
     /// The watchdog, not started.

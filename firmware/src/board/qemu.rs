@@ -34,6 +34,19 @@ pub(crate) const TIMER_HZ: u32 = 1_000_000_000;
 /// QEMU's period is the reload value itself, not one more as on the chip.
 pub(crate) const TIMER_RELOAD: u32 = TIMER_HZ / 1_000_000 * PERIOD_US;
 
+/// What TIM1 would count, as on the chip: there is none.
+pub(crate) const STEP_TIMER_HZ: u32 = 168_000_000;
+
+/// Step and direction pins, as on the chip: there are none.
+pub(crate) const WIRING: Wiring = Wiring {
+    step_port: Port::B,
+    step: [12, 13, 14],
+    direction: [Pin(Port::C, 6), Pin(Port::C, 7), Pin(Port::C, 8)],
+};
+
+/// What the drives want until a host says otherwise.
+pub(crate) const STEPS: StepConfig = StepConfig::DEFAULT;
+
 /// QEMU has no baud rate; any value other than zero will do.
 pub(crate) const SERIAL_DIVIDER: u16 = 91;
 
@@ -47,8 +60,10 @@ const EXIT_FAULT: i32 = 102;
 pub(crate) fn init(device: pac::Peripherals) -> Board {
     gpio::set_up(&device.RCC, BOARD.lines);
     Board {
+        tim1: device.TIM1,
         tim2: device.TIM2,
         tim5: device.TIM5,
+        dma2: device.DMA2,
         usart1: device.USART1,
         iwdg: device.IWDG,
         reset: take_reset_cause(&device.RCC),

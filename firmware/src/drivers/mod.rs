@@ -11,3 +11,4 @@ pub(crate) mod sample_timer;
 pub(crate) mod serial;
 pub(crate) mod status_led;
 pub(crate) mod watchdog;
+pub(crate) mod step_output;

@@ -3,13 +3,13 @@
 //! The code comes with the plan, because the function that would read it from QEMU has changed between versions.
 
 /// First word of the file: `ISOP` and a version.
-const MAGIC: u32 = 0x4953_4f03;
+const MAGIC: u32 = 0x4953_4f04;
 
 /// Words before the code.
 const HEAD_WORDS: usize = 5;
 
 /// Stages that cycles are charged to.
-pub const STAGES: usize = 8;
+pub const STAGES: usize = 9;
 
 /// A stage of the sample task.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
@@ -31,6 +31,8 @@ pub enum Stage {
     Rest = 6,
     /// Exception entry and exit.
     Exception = 7,
+    /// Pulses of the axes in the next period.
+    Pulses = 8,
 }
 
 impl Stage {
@@ -44,6 +46,7 @@ impl Stage {
         Self::PassChange,
         Self::Rest,
         Self::Exception,
+        Self::Pulses,
     ];
 
     /// Name in tables and JSON.
@@ -58,6 +61,7 @@ impl Stage {
             Self::PassChange => "pass change",
             Self::Rest => "everything else",
             Self::Exception => "exception entry and exit",
+            Self::Pulses => "pulses",
         }
     }
 

@@ -28,7 +28,7 @@ impl Record {
     /// Whether nothing but the task's surroundings ran.
     #[must_use]
     pub fn is_idle(&self) -> bool {
-        let surroundings = [Stage::Rest, Stage::Exception];
+        let surroundings = [Stage::Rest, Stage::Exception, Stage::Pulses];
         Stage::ALL
             .into_iter()
             .filter(|stage| !surroundings.contains(stage))

@@ -38,7 +38,7 @@ impl Model {
 }
 
 /// What is reported: a name, and the stages whose cycles are added up.
-const ROWS: [(&str, &[Stage]); 10] = [
+const ROWS: [(&str, &[Stage]); 11] = [
     ("contact: step", &[Stage::Step]),
     ("contact: surface", &[Stage::Surface]),
     ("contact", &[Stage::Step, Stage::Surface]),
@@ -52,13 +52,17 @@ const ROWS: [(&str, &[Stage]); 10] = [
     ("pass change", &[Stage::PassChange]),
     ("everything else", &[Stage::Rest]),
     ("exception entry and exit", &[Stage::Exception]),
+    ("pulses", &[Stage::Pulses]),
 ];
 
 /// The row of the paper's steps 2 to 4.
 pub const STEPS_2_TO_4: &str = "steps 2-4";
 
-/// The row of the whole task.
+/// The row of the task but for the pulses, which have a budget of their own.
 pub const TICK: &str = "tick";
+
+/// The row of the whole task.
+pub const TICK_AND_PULSES: &str = "tick and pulses";
 
 /// Cycles of a stage in those ticks of a job in which it took any.
 #[derive(Clone, Debug, PartialEq)]
@@ -139,9 +143,14 @@ impl Figure {
 /// Bins of a stage's histogram, from its least to its most.
 const BINS: u32 = 16;
 
-/// Cycles of the whole task in a tick.
+/// Cycles of the task in a tick, but for the pulses.
 #[must_use]
 pub fn whole(record: &Record, model: Model) -> u32 {
+    with_pulses(record, model) - model.of(record.stages[Stage::Pulses as usize])
+}
+
+/// Cycles of the task in a tick, all of them.
+fn with_pulses(record: &Record, model: Model) -> u32 {
     record.stages.iter().map(|cycles| model.of(*cycles)).sum()
 }
 
@@ -158,6 +167,9 @@ pub fn figures(surface: &str, ticks: &Ticks) -> Vec<Figure> {
         }
         figures.push(Figure::of(surface, TICK, model, ticks, |record| {
             whole(record, model)
+        }));
+        figures.push(Figure::of(surface, TICK_AND_PULSES, model, ticks, |record| {
+            with_pulses(record, model)
         }));
     }
     figures

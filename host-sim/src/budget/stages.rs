@@ -15,7 +15,7 @@ use cycle_plugin::plan::Stage;
 
 /// A module of `interp_core` (a function in it, or all of it) and its stage; the first that fits counts. What is renamed there
 /// is renamed here: a name that occurs nowhere in the image is an error.
-const STAGES: [(&str, &str, Stage); 18] = [
+const STAGES: [(&str, &str, Stage); 19] = [
     ("contact", "", Stage::Step),
     ("surface", "collapse", Stage::PatchChange),
     ("surface", "", Stage::Surface),
@@ -34,6 +34,7 @@ const STAGES: [(&str, &str, Stage); 18] = [
     ("run", "end_pass", Stage::PassChange),
     ("run", "", Stage::Rest),
     ("interpolator", "", Stage::Rest),
+    ("steps", "", Stage::Pulses),
 ];
 
 /// Crates of which every function is everything else.

@@ -84,6 +84,7 @@ fn jobs(arguments: &Arguments) -> Vec<(String, PathBuf)> {
         SURFACES
             .iter()
             .map(|(name, job)| ((*name).to_owned(), path(job)))
+            .chain([(golden::PULSES.to_owned(), golden::pulses_job())])
             .collect()
     } else {
         let name = |path: &PathBuf| path.display().to_string();

@@ -393,6 +393,13 @@ pub(super) fn command(arguments: &Arguments) -> Result<()> {
         return scripted.run(&job, &mut session, arguments.json);
     }
     let here = timed(&job, &prepared)?;
+    if let Some(fault) = here
+        .fault
+        .as_ref()
+        .filter(|at| at.fault.kind == FaultKind::StepRate)
+    {
+        return Err(Failure::Failed(Some(fault.sentence_of(&job))));
+    }
     let (_qemu, mut session) = connect(arguments)?;
     check_period(&job, &session)?;
     make_ready(arguments, &job, &mut session)?;

@@ -107,11 +107,25 @@ fn words(kind: FaultKind) -> [&'static str; 5] {
             "A breakpoint in the firmware while a job runs on the board's own clock.",
         ],
         FaultKind::TickOverBudget => [
-            "A tick took more than a tenth of the period. The tool slows down along its path and stands.",
+            "A tick took more than a fifth of the period. The tool slows down along its path and stands.",
             "The processor cycles that it took.",
-            "The worst tick that was found takes 5.4 % of the period, so this one is a case that was not: or interrupts of your own took the rest.",
+            "The worst tick that was found takes 5.4 % of the period, and the pulses of three axes at 400 kHz 9 % more, so this one is a case that was not: or interrupts of your own took the rest.",
             "Please report the job; a lower feed makes the dearest ticks rarer. `cargo sim budget JOB` counts what each stage takes.",
-            "An interrupt handler of 20000 cycles with a higher priority than the sample task.",
+            "An interrupt handler of 40000 cycles with a higher priority than the sample task.",
+        ],
+        FaultKind::StepRate => [
+            "An axis was asked for more steps in a period than a period has room for. The tool slows down along its path and stands; the steps that did not fit follow, and none is lost.",
+            "The steps asked for in the period.",
+            "The axis is too fast for its steps per mm: a period of 1000 slots holds 500 steps with pulses of one slot, 500 / n with pulses of n slots.",
+            "Lower the feed or the axis's velocity limit, set the drive to coarser microsteps (and `steps_per_mm` with it), or take a shorter `pulse_us`.",
+            "`steps_per_mm = [40000, 40000, 40000]` in [machine] with a feed of 900 mm/min: 600 steps in a millisecond.",
+        ],
+        FaultKind::StepOutput => [
+            "The board could not hand its step pulses out as it should. The tool slows down along its path and stands; take its position for lost, and home the machine.",
+            "The slots (us at a period of 1000) that had passed when the direction pins were set, where that was too late; 0 where the DMA has stopped.",
+            "Something held the processor for 16 us and more at the beginning of a period in which an axis turns, or the DMA met an error on the bus: a defect of the firmware, or a debugger.",
+            "Run without a debugger. If it comes again, please report the job with the firmware's log.",
+            "An interrupt handler of 20 us with a higher priority than the sample task.",
         ],
         FaultKind::SoftLimit => [
             "An axis would leave its travel. The tool has not gone there: each pass is looked over before it begins, and each leg before it is gone.",

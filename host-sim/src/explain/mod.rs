@@ -80,6 +80,7 @@ pub fn key(kind: FaultKind) -> &'static str {
         FaultKind::ParameterBackwards | FaultKind::PatchTooShort => "cut.feed_mm_min",
         FaultKind::IntervalTooSmall => "cut.scallop_mm",
         FaultKind::OutOfRange => "placement.translate_mm",
+        FaultKind::StepRate => "machine.steps_per_mm",
         _ => "surface",
     }
 }
@@ -183,6 +184,20 @@ pub fn fault(fault: Fault) -> (String, &'static str) {
         FaultKind::NotHomed => (
             "the machine is not homed: nobody has said where its axes stand".to_owned(),
             "place the axes, and say where they stand: `run --home X,Y,Z`; or homing_required = false in [machine]",
+        ),
+        FaultKind::StepRate => (
+            format!("an axis was asked for {value} steps in one period, more than the pulses of a period"),
+            "lower the feed, or set coarser microsteps and steps_per_mm with them",
+        ),
+        FaultKind::StepOutput => (
+            if value > 0.0 {
+                format!(
+                    "the direction pins were set {value} slots late, within the pulses of an axis that turns"
+                )
+            } else {
+                "the DMA that hands the step pulses out has stopped".to_owned()
+            },
+            "home the machine; this is a defect of the firmware, or a debugger held the chip",
         ),
     }
 }

@@ -12,6 +12,7 @@ mod error;
 mod file;
 mod placement;
 mod section;
+mod steps;
 mod surface;
 #[cfg(test)]
 mod tests;
@@ -23,6 +24,7 @@ use std::path::Path;
 use std::sync::Arc;
 
 pub use error::JobFileError;
+use interp_core::StepConfig;
 use protocol::message::{Configuration, HostGone};
 use section::{Reader, Section};
 pub use surface::{NurbsSpec, SurfaceSpec};
@@ -132,8 +134,6 @@ pub struct Machine {
     pub jerk_max_mm_s3: Option<[f64; 3]>,
     /// Travel of the axes, mm, `[least, most]`.
     pub travel_mm: Option<[[f64; 2]; 3]>,
-    /// Motor steps a millimetre of the axes, above 0.
-    pub steps_per_mm: Option<[f64; 3]>,
     /// Where the tool's centre stands before the run, mm.
     pub home_mm: Option<[f64; 3]>,
     /// Height (z of the tool's centre) at which the tool is clear of everything, mm.
@@ -148,6 +148,8 @@ pub struct Machine {
     pub host_gone: HostGone,
     /// Silence after which the host is gone, ms, in [`HOST_GONE_RANGE_MS`].
     pub host_gone_ms: f64,
+    /// What the axes' drives want: exact steps a millimetre, pulses, directions.
+    pub steps: Option<StepConfig>,
 }
 
 impl Default for Machine {
@@ -158,7 +160,6 @@ impl Default for Machine {
             acceleration_max_mm_s2: None,
             jerk_max_mm_s3: None,
             travel_mm: None,
-            steps_per_mm: None,
             home_mm: None,
             safe_z_mm: None,
             clearance_mm: None,
@@ -166,6 +167,7 @@ impl Default for Machine {
             homing_required: true,
             host_gone: HostGone::Finish,
             host_gone_ms: HOST_GONE_DEFAULT_MS,
+            steps: None,
         }
     }
 }
@@ -337,7 +339,6 @@ fn read_machine(machine: &Section<'_>) -> Result<Machine, JobFileError> {
             "acceleration_max_mm_s2",
             "jerk_max_mm_s3",
             "travel_mm",
-            "steps_per_mm",
             "home_mm",
             "safe_z_mm",
             "clearance_mm",
@@ -345,6 +346,10 @@ fn read_machine(machine: &Section<'_>) -> Result<Machine, JobFileError> {
             "homing_required",
             "host_gone",
             "host_gone_ms",
+            steps::KEYS[0],
+            steps::KEYS[1],
+            steps::KEYS[2],
+            steps::KEYS[3],
         ],
         &[],
     )?;
@@ -364,7 +369,7 @@ fn read_machine(machine: &Section<'_>) -> Result<Machine, JobFileError> {
     read.velocity_max_mm_s = machine.positive_axes("velocity_max_mm_s", AXES)?;
     read.acceleration_max_mm_s2 = machine.positive_axes("acceleration_max_mm_s2", AXES)?;
     read.jerk_max_mm_s3 = machine.positive_axes("jerk_max_mm_s3", AXES)?;
-    read.steps_per_mm = machine.positive_axes("steps_per_mm", AXES)?;
+    read.steps = steps::read(machine, read.period_us)?;
     if machine.has("travel_mm") {
         let travel: [[f64; 2]; 3] = machine.matrix("travel_mm")?;
         for (range, axis) in travel.iter().zip(["x", "y", "z"]) {

@@ -299,6 +299,11 @@ impl<'v, 't> Value<'v, 't> {
             .error(self.value.span(), format!("{} {what}", self.path), remedy)
     }
 
+    /// The value as it stands.
+    pub(super) fn get(&self) -> &DeValue<'t> {
+        self.value.get_ref()
+    }
+
     /// A finite number, written as an integer or with a point.
     pub(super) fn number(&self) -> Result<f64, JobFileError> {
         let number = match self.value.get_ref() {

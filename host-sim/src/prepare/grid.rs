@@ -227,5 +227,6 @@ fn finish(
         path,
         side,
         along: job.along,
+        steps: job.machine.steps,
     })
 }

@@ -12,7 +12,7 @@ mod patches;
 pub use axes::has_limits;
 
 use interp_core::sample::Place;
-use interp_core::{Header, Pattern, Spacing, SurfaceKind, ToolSide, encode};
+use interp_core::{Header, Pattern, Spacing, StepConfig, SurfaceKind, ToolSide, encode};
 
 use crate::job_file::{self, Along, AlongChoice, JobFile, JobFileError, SurfaceSpec};
 use crate::oracle::Oracle;
@@ -60,6 +60,8 @@ pub struct Prepared {
     pub side: Axis,
     /// Which of u and v is the path parameter.
     pub along: Along,
+    /// What the axes' drives want, where the job says so.
+    pub steps: Option<StepConfig>,
 }
 
 impl Prepared {
@@ -187,5 +189,6 @@ fn revolved(
         path,
         side,
         along: job.along,
+        steps: job.machine.steps,
     })
 }

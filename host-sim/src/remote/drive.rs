@@ -30,7 +30,7 @@ pub struct Compared {
     pub first_bad_pass: Option<u32>,
 }
 
-/// Uploads a job. `progress` is told the words that arrived.
+/// Uploads a job, and what the axes' drives want where it says so. `progress` is told the words that arrived.
 ///
 /// # Errors
 /// The line breaks, or the board refuses the job.
@@ -39,6 +39,9 @@ pub fn upload(
     job: &Prepared,
     mut progress: impl FnMut(usize),
 ) -> Result<(), RemoteError> {
+    if let Some(steps) = job.steps {
+        session.command(&Request::StepConfig(steps.into()))?;
+    }
     let words = u32::try_from(job.words.len()).unwrap_or(u32::MAX);
     let digest = job_digest(&job.words);
     session.command(&Request::JobBegin {

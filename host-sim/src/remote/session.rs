@@ -102,7 +102,7 @@ fn name(request: &Request) -> &'static str {
         Request::Override { .. } => "the feed override",
         Request::Stop => "to stop",
         Request::Simulate { .. } => "simulated inputs",
-        Request::Reserved => "a request of another version",
+        Request::StepConfig(_) => "the steps of the axes",
     }
 }
 

@@ -100,7 +100,7 @@ mod tests {
             );
             assert_eq!(full.machine.period_us, plain.machine.period_us);
             assert_eq!(full.machine.configuration(), plain.machine.configuration());
-            assert!(full.machine.travel_mm.is_some() && full.machine.steps_per_mm.is_some());
+            assert!(full.machine.travel_mm.is_some() && full.machine.steps.is_some());
             assert!(full.machine.jerk_max_mm_s3.is_some() && full.machine.velocity_max_mm_s.is_some());
         }
     }

@@ -30,6 +30,7 @@ const BOUNDS: &[(&str, u32, &str)] = &[
         4,
         "ports: PORTS_MAX",
     ),
+    ("controller::step_output::StepOutput::turn", 3, "axes"),
     (
         "interp_core::run::Run::step_far",
         2,
@@ -39,6 +40,16 @@ const BOUNDS: &[(&str, u32, &str)] = &[
         "interp_core::schedule::next_side",
         16,
         "boundaries between side spans: WALK_MAX",
+    ),
+    (
+        "interp_core::steps::axis::Axis::step",
+        24,
+        "slots of a pulse: PULSE_SLOTS_MAX",
+    ),
+    (
+        "interp_core::steps::axis::add",
+        500,
+        "pulses of a period: SLOTS over the shortest spacing, 2",
     ),
     (
         "interp_core::surface::lines::Line::collapse",
