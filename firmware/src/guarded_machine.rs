@@ -7,10 +7,8 @@ use controller::{
     safety::Order,
 };
 use heapless::spsc::Producer;
-use interp_core::{fault::Fault, job::Header};
-use protocol::message::{Description, InputLines, Reason, Status};
 use interp_core::{fault::Fault, job::Header, steps::CheckedSteps};
-use protocol::message::{Description, Status};
+use protocol::message::{Description, InputLines, Reason, Status};
 use rtic::Mutex;
 
 use crate::{

@@ -36,16 +36,15 @@ mod app {
         step_output::Buffers,
     };
     use heapless::spsc::{Consumer, Producer, Queue};
+    use interp_core::steps::BUFFER_WORDS;
     use protocol::message::ResetCause;
     use stm32f4xx_hal::pac;
-    use interp_core::steps::BUFFER_WORDS;
 
     use crate::{
         board::{self, BOARD},
         design_parameters::{
             COMMAND_PLACES, EVENT_PLACES, FLUSH_PERIODS, JOB_WORDS, PERIOD_COUNTS, RECEIVE_PLACES,
-            TICK_BUDGET_CYCLES, WATCHDOG_RELOAD,
-            SLOT_COUNTS, TICK_BUDGET_CYCLES,
+            SLOT_COUNTS, TICK_BUDGET_CYCLES, WATCHDOG_RELOAD,
         },
         drivers::{
             cycle_counter::CycleCounter,
@@ -55,8 +54,8 @@ mod app {
             sample_timer::{SampleTimer, uptime_periods},
             serial::{self, Receiver, Transmitter},
             status_led::StatusLed,
-            watchdog::Watchdog,
             step_output::StepDriver,
+            watchdog::Watchdog,
         },
         guarded_machine::{BoardRealTime, GuardedMachine},
         sample_task::{Guards, SampleTask},
@@ -183,21 +182,15 @@ mod app {
     /// | a miss | counted, reported, and a fault of the run (`deadline-missed`), which stops along the path |
     /// | either | does not feed the watchdog, which resets the board when no tick does for some periods |
     /// | a panic | cannot be reached: `firmware/no-panic` does not link otherwise |
-    #[task(binds = TIM2, priority = 3, shared = [real_time], local = [task, guards])]
+    #[task(binds = TIM2, priority = 3, shared = [real_time], local = [task, guards, output])]
     fn sample(mut context: sample::Context) {
-        let sample::LocalResources { task, guards, .. } = context.local;
+        let sample::LocalResources {
+            task, guards, output, ..
+        } = context.local;
         context
             .shared
             .real_time
-            .lock(|real_time| task.tick(real_time, guards));
-    #[task(binds = TIM2, priority = 3, shared = [real_time], local = [task, output])]
-    fn sample(mut context: sample::Context) {
-        let task = context.local.task;
-        let output = context.local.output;
-        context
-            .shared
-            .real_time
-            .lock(|real_time| task.tick(real_time, output));
+            .lock(|real_time| task.tick(real_time, guards, output));
     }
 
     /// Takes a byte off the port.

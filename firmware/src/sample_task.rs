@@ -14,6 +14,7 @@ use crate::drivers::{
     drive_enable::{DriveEnable, WritePorts},
     safety_inputs::{ReadPorts, SafetyInputs},
     sample_timer::SampleTimer,
+    step_output::StepDriver,
     watchdog::{Registers, Watchdog},
 };
 
@@ -27,7 +28,6 @@ pub(crate) struct Guards<I, O, W> {
     /// The watchdog, started.
     pub(crate) watchdog: Watchdog<W>,
 }
-use crate::drivers::{cycle_counter::CycleCounter, sample_timer::SampleTimer, step_output::StepDriver};
 
 /// What the task has for itself.
 pub(crate) struct SampleTask {
@@ -62,18 +62,17 @@ impl SampleTask {
     /// One tick. The output is no part of the task: the compiler knows the queues' capacities only as long as no part of the
     /// task is handed on by reference, and divides by them.
     #[inline]
-    pub(crate) fn tick<S, I, O, W>(&mut self, real_time: &mut RealTime<S>, guards: &mut Guards<I, O, W>)
-    where
+    pub(crate) fn tick<S, I, O, W>(
+        &mut self,
+        real_time: &mut RealTime<S>,
+        guards: &mut Guards<I, O, W>,
+        output: &mut StepDriver,
+    ) where
         S: AsRef<[i32]> + AsMut<[i32]>,
         I: ReadPorts,
         O: WritePorts,
         W: Registers,
     {
-    pub(crate) fn tick<S: AsRef<[i32]> + AsMut<[i32]>>(
-        &mut self,
-        real_time: &mut RealTime<S>,
-        output: &mut StepDriver,
-    ) {
         // Where it lies is known when the image is linked, and each access to a field would make an address of its
         // own, two instructions long. Hidden, it is a register, and the fields are offsets from it.
         let real_time = black_box(real_time);

@@ -13,7 +13,7 @@ mod iwdg;
 pub(crate) mod safety_inputs;
 #[path = "../../src/drivers/sample_timer.rs"]
 pub(crate) mod sample_timer;
-#[path = "../../src/drivers/watchdog.rs"]
-pub(crate) mod watchdog;
 #[path = "../../src/drivers/step_output.rs"]
 pub(crate) mod step_output;
+#[path = "../../src/drivers/watchdog.rs"]
+pub(crate) mod watchdog;

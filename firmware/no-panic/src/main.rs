@@ -27,20 +27,15 @@ mod app {
         step_output::{Buffers, Pin, Port, Wiring},
     };
     use heapless::spsc::{Consumer, Producer, Queue};
-    use interp_core::job::STORE_WORDS;
+    use interp_core::{StepConfig, job::STORE_WORDS, steps::BUFFER_WORDS};
     use stm32f4xx_hal::pac;
 
     use crate::{
         drivers::{
             cycle_counter::CycleCounter, drive_enable::DriveEnable, gpio::Ports, safety_inputs::SafetyInputs,
-            sample_timer::SampleTimer, watchdog::Watchdog,
+            sample_timer::SampleTimer, step_output::StepDriver, watchdog::Watchdog,
         },
         sample_task::{Guards, SampleTask},
-    use interp_core::{StepConfig, job::STORE_WORDS, steps::BUFFER_WORDS};
-
-    use crate::{
-        drivers::{cycle_counter::CycleCounter, sample_timer::SampleTimer, step_output::StepDriver},
-        sample_task::SampleTask,
     };
 
     /// One period in counts of the timers, as on the chip.
@@ -108,21 +103,15 @@ mod app {
     }
 
     /// The firmware's task. What state the machine is in is hidden from the compiler there: it may be any.
-    #[task(binds = TIM2, priority = 3, shared = [real_time], local = [task, guards])]
+    #[task(binds = TIM2, priority = 3, shared = [real_time], local = [task, guards, output])]
     fn sample(mut context: sample::Context) {
-        let sample::LocalResources { task, guards, .. } = context.local;
+        let sample::LocalResources {
+            task, guards, output, ..
+        } = context.local;
         context
             .shared
             .real_time
-            .lock(|real_time| task.tick(real_time, guards));
-    #[task(binds = TIM2, priority = 3, shared = [real_time], local = [task, output])]
-    fn sample(mut context: sample::Context) {
-        let task = context.local.task;
-        let output = context.local.output;
-        context
-            .shared
-            .real_time
-            .lock(|real_time| task.tick(real_time, output));
+            .lock(|real_time| task.tick(real_time, guards, output));
         #[cfg(feature = "with-a-panic")]
         assert!(black_box(true), "the control");
     }

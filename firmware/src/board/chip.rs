@@ -27,6 +27,9 @@ const APB2_MHZ: u32 = CORE_MHZ / 2;
 /// Timers on a divided APB1 count at twice its clock (RM0090, 7.2).
 pub(crate) const TIMER_HZ: u32 = 2 * APB1_MHZ * 1_000_000;
 
+/// Timers on a divided APB2, TIM1 among them, count at twice its clock.
+pub(crate) const STEP_TIMER_HZ: u32 = 2 * APB2_MHZ * 1_000_000;
+
 /// The timer counts from 0 to the reload value inclusive.
 pub(crate) const TIMER_RELOAD: u32 = TIMER_HZ / 1_000_000 * PERIOD_US - 1;
 
@@ -79,9 +82,13 @@ pub(crate) fn init(device: pac::Peripherals) -> Board {
             .set_bit()
     });
 
+    device.DBGMCU.apb2_fz().modify(|_, w| w.dbg_tim1_stop().set_bit());
+
     Board {
+        tim1: device.TIM1,
         tim2: device.TIM2,
         tim5: device.TIM5,
+        dma2: device.DMA2,
         usart1: device.USART1,
         iwdg: device.IWDG,
         reset,

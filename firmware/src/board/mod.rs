@@ -38,13 +38,15 @@ compile_error!("choose one board: `cargo fw-qemu`, `cargo fw-chip` or `cargo fw-
 mod qemu;
 #[cfg(feature = "board-qemu")]
 pub(crate) use qemu::{
-    BOARD, InputPorts, SERIAL_DIVIDER, TIMER_HZ, TIMER_RELOAD, init, simulate, stop_for_good,
+    BOARD, InputPorts, SERIAL_DIVIDER, STEP_TIMER_HZ, TIMER_HZ, TIMER_RELOAD, init, simulate, stop_for_good,
 };
 
 #[cfg(not(feature = "board-qemu"))]
 mod chip;
 #[cfg(not(feature = "board-qemu"))]
-pub(crate) use chip::{InputPorts, SERIAL_DIVIDER, TIMER_HZ, TIMER_RELOAD, init, simulate, stop_for_good};
+pub(crate) use chip::{
+    InputPorts, SERIAL_DIVIDER, STEP_TIMER_HZ, TIMER_HZ, TIMER_RELOAD, init, simulate, stop_for_good,
+};
 
 #[cfg(feature = "board-stm32f405")]
 mod stm32f405;
@@ -56,6 +58,9 @@ mod skr_pro;
 #[cfg(feature = "board-skr-pro")]
 pub(crate) use skr_pro::BOARD;
 
+use boards::{Axis, Line};
+use controller::step_output::{Pin, Port, Wiring};
+use interp_core::StepConfig;
 use protocol::message::ResetCause;
 use stm32f4xx_hal::pac;
 
@@ -65,6 +70,36 @@ use stm32f4xx_hal::pac;
 #[unsafe(export_name = "isofeed_board")]
 pub(crate) static MARK: [u8; boards::MARK_BYTES] = BOARD.mark();
 use crate::drivers::reset_cause::{TAKE_BACK, cause};
+
+/// Step and direction pins, by the board's table.
+pub(crate) const WIRING: Wiring = {
+    let [x, y, z] = [BOARD.axis(Axis::X), BOARD.axis(Axis::Y), BOARD.axis(Axis::Z)];
+    Wiring {
+        step_port: port(BOARD.step_port()),
+        step: [x.step.pin.number, y.step.pin.number, z.step.pin.number],
+        direction: [pin(x.direction), pin(y.direction), pin(z.direction)],
+    }
+};
+
+const fn pin(line: Line) -> Pin {
+    Pin(port(line.pin.port), line.pin.number)
+}
+
+const fn port(port: boards::Port) -> Port {
+    match port {
+        boards::Port::A => Port::A,
+        boards::Port::B => Port::B,
+        boards::Port::C => Port::C,
+        boards::Port::D => Port::D,
+        boards::Port::E => Port::E,
+        boards::Port::F => Port::F,
+        boards::Port::G => Port::G,
+        boards::Port::H => Port::H,
+    }
+}
+
+/// What the drives want until a host says otherwise.
+pub(crate) const STEPS: StepConfig = StepConfig::DEFAULT;
 
 /// What remains of the chip once clocks and pins are set up: the parts that the drivers take.
 pub(crate) struct Board {

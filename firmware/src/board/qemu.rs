@@ -37,16 +37,6 @@ pub(crate) const TIMER_RELOAD: u32 = TIMER_HZ / 1_000_000 * PERIOD_US;
 /// What TIM1 would count, as on the chip: there is none.
 pub(crate) const STEP_TIMER_HZ: u32 = 168_000_000;
 
-/// Step and direction pins, as on the chip: there are none.
-pub(crate) const WIRING: Wiring = Wiring {
-    step_port: Port::B,
-    step: [12, 13, 14],
-    direction: [Pin(Port::C, 6), Pin(Port::C, 7), Pin(Port::C, 8)],
-};
-
-/// What the drives want until a host says otherwise.
-pub(crate) const STEPS: StepConfig = StepConfig::DEFAULT;
-
 /// QEMU has no baud rate; any value other than zero will do.
 pub(crate) const SERIAL_DIVIDER: u16 = 91;
 

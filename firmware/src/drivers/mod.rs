@@ -10,5 +10,5 @@ pub(crate) mod safety_inputs;
 pub(crate) mod sample_timer;
 pub(crate) mod serial;
 pub(crate) mod status_led;
-pub(crate) mod watchdog;
 pub(crate) mod step_output;
+pub(crate) mod watchdog;
