@@ -9,7 +9,7 @@ const MAGIC: u32 = 0x4953_4f04;
 const HEAD_WORDS: usize = 5;
 
 /// Stages that cycles are charged to.
-pub const STAGES: usize = 9;
+pub const STAGES: usize = 10;
 
 /// A stage of the sample task.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
@@ -33,6 +33,8 @@ pub enum Stage {
     Exception = 7,
     /// Pulses of the axes in the next period.
     Pulses = 8,
+    /// The feed within the axes' limits, the look ahead at the next pass, links.
+    Feed = 9,
 }
 
 impl Stage {
@@ -47,6 +49,7 @@ impl Stage {
         Self::Rest,
         Self::Exception,
         Self::Pulses,
+        Self::Feed,
     ];
 
     /// Name in tables and JSON.
@@ -62,6 +65,7 @@ impl Stage {
             Self::Rest => "everything else",
             Self::Exception => "exception entry and exit",
             Self::Pulses => "pulses",
+            Self::Feed => "feed",
         }
     }
 

@@ -38,7 +38,7 @@ impl Model {
 }
 
 /// What is reported: a name, and the stages whose cycles are added up.
-const ROWS: [(&str, &[Stage]); 11] = [
+const ROWS: [(&str, &[Stage]); 12] = [
     ("contact: step", &[Stage::Step]),
     ("contact: surface", &[Stage::Surface]),
     ("contact", &[Stage::Step, Stage::Surface]),
@@ -50,6 +50,7 @@ const ROWS: [(&str, &[Stage]); 11] = [
     ),
     ("patch change", &[Stage::PatchChange]),
     ("pass change", &[Stage::PassChange]),
+    ("feed", &[Stage::Feed]),
     ("everything else", &[Stage::Rest]),
     ("exception entry and exit", &[Stage::Exception]),
     ("pulses", &[Stage::Pulses]),

@@ -82,7 +82,9 @@ impl Run {
 
 /// Whether a tick came as far as the cutter location; one that faults there does not count.
 fn yields_sample(record: &Record) -> bool {
-    record.stages[Stage::Interval as usize].nominal > 0
+    [Stage::Interval, Stage::Feed]
+        .iter()
+        .any(|stage| record.stages[*stage as usize].nominal > 0)
 }
 
 /// Name of a fault; the board's may be of another version.

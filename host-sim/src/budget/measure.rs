@@ -98,7 +98,12 @@ impl Bench {
             let what = format!("{} instructions are unknown to the decoder", last.unknown);
             return Err(BudgetError::Figures(what));
         }
-        records.retain(|record| record.stages[Stage::Offset as usize].nominal > 0);
+        let is_moving = |record: &Record| {
+            [Stage::Offset, Stage::Feed]
+                .iter()
+                .any(|stage| record.stages[*stage as usize].nominal > 0)
+        };
+        records.retain(is_moving);
         if records.len() != samples as usize {
             let what = format!("{} ticks with a sample, the board made {samples}", records.len());
             return Err(BudgetError::Figures(what));

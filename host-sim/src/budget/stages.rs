@@ -15,7 +15,7 @@ use cycle_plugin::plan::Stage;
 
 /// A module of `interp_core` (a function in it, or all of it) and its stage; the first that fits counts. What is renamed there
 /// is renamed here: a name that occurs nowhere in the image is an error.
-const STAGES: [(&str, &str, Stage); 19] = [
+const STAGES: [(&str, &str, Stage); 23] = [
     ("contact", "", Stage::Step),
     ("surface", "collapse", Stage::PatchChange),
     ("surface", "", Stage::Surface),
@@ -35,6 +35,10 @@ const STAGES: [(&str, &str, Stage); 19] = [
     ("run", "", Stage::Rest),
     ("interpolator", "", Stage::Rest),
     ("steps", "", Stage::Pulses),
+    ("feed", "", Stage::Feed),
+    ("course", "", Stage::Feed),
+    ("lookahead", "", Stage::Feed),
+    ("link", "", Stage::Feed),
 ];
 
 /// Crates of which every function is everything else.
