@@ -16,7 +16,7 @@ use crate::run::Run;
 use crate::sample::{Place, Sample};
 
 /// Portions of the look ahead in a tick in which the tool waits for it.
-const PORTIONS_WAITING: u8 = 2;
+const PORTIONS_WAITING: u8 = 1;
 
 /// Where the course is.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -28,6 +28,7 @@ enum Phase {
     Step,
     /// Plans a leg; goes it.
     LegPlan(Way),
+    LegBounds(Way),
     Leg(Way),
     Pass,
     /// Behind all.
@@ -129,7 +130,7 @@ impl Course {
     pub(crate) const fn is_at_rest(&self) -> bool {
         match self.phase {
             Phase::Step | Phase::Leg(_) | Phase::Pass => self.profile.is_at_rest(),
-            Phase::Wait | Phase::StepPlan | Phase::LegPlan(_) | Phase::End => true,
+            Phase::Wait | Phase::StepPlan | Phase::LegPlan(_) | Phase::LegBounds(_) | Phase::End => true,
         }
     }
 
@@ -185,6 +186,14 @@ impl Course {
                 self.plan_step(job, axes, run, last)?;
             }
             Phase::LegPlan(way) => self.plan_leg(way, job, axes, run, last)?,
+            Phase::LegBounds(way) => {
+                let (now, _) = both(&mut self.plans, self.second);
+                if now.plan.work() {
+                    self.profile.begin(now.plan.window);
+                    self.phase = Phase::Leg(way);
+                }
+                run.stand(last);
+            }
             Phase::End => return Ok(Outcome::Finished),
         }
         self.at = Some(last.cl_nm);
@@ -338,8 +347,7 @@ impl Course {
             Leg::new(from, to, slow_mm, feed, axes, job.header.period_s, &mut now.plan)
         {
             (self.leg, self.usual) = (leg, usual);
-            self.profile.begin(now.plan.window);
-            self.phase = Phase::Leg(way);
+            self.phase = Phase::LegBounds(way);
             run.stand(last);
             return Ok(());
         }

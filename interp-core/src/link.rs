@@ -39,7 +39,8 @@ impl Leg {
         to: [0; 3],
     };
 
-    /// From place to place, the last `slow_mm` of it no faster than `feed_mm_s`; none where it is too short to be one.
+    /// From place to place, the last `slow_mm` of it no faster than `feed_mm_s`; none where it is too short to be one. The plan is settled, and
+    /// still to be worked on.
     pub(crate) fn new(
         from: [i32; 3],
         to: [i32; 3],
@@ -78,7 +79,6 @@ impl Leg {
             plan.add(slow, &Room { square, ..room }, 0, &top);
         }
         plan.settle(&top);
-        while !plan.work() {}
         Some((Self { from, to }, speed * period_s * QUANTA_PER_MM))
     }
 
@@ -193,7 +193,8 @@ impl Step {
             self.stencil.begin(here.cl_nm);
             plan.begin();
         } else {
-            let room = self.stencil.add(here.cl_nm, self.cell, axes, top);
+            self.stencil.add(here.cl_nm, self.cell);
+            let room = self.stencil.room(axes, top);
             let room = Room {
                 jerk: JERK_SHARE * room.jerk,
                 ..room

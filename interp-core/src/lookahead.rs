@@ -70,6 +70,9 @@ impl PassPlan {
 enum Task {
     Patch,
     Station,
+    /// The differences that end at the station, and the cell that does.
+    Cell,
+    Room,
     /// So many looks across are due at the station.
     Look(u8),
     Close,
@@ -131,6 +134,10 @@ pub(crate) struct Lookahead {
     speed: PathSpeed,
     stencil: Stencil,
     trail: Trail,
+    /// The station whose cell is to be closed: contact, and centre in nm.
+    here: Option<(Contact, [i32; 3])>,
+    /// Length of that cell, mm.
+    length: f32,
     /// What the last station left.
     room: Room,
     densities: Densities,
@@ -151,6 +158,8 @@ impl Lookahead {
         speed: PathSpeed::STILL,
         stencil: Stencil::START,
         trail: Trail::START,
+        here: None,
+        length: 0.0,
         room: Room::WIDE,
         densities: Densities::NONE,
     };
@@ -202,7 +211,15 @@ impl Lookahead {
                 Task::Station
             }
             Task::Station => {
-                self.visit(job, axes, out)?;
+                self.visit(axes, out)?;
+                Task::Cell
+            }
+            Task::Cell => {
+                self.differences(out);
+                Task::Room
+            }
+            Task::Room => {
+                self.close_cell(job, axes, out);
                 self.looks(job, out)
             }
             Task::Look(looks) => {
@@ -276,7 +293,7 @@ impl Lookahead {
     }
 
     /// The station: whether the ball fits and the axes can go there, its density, and the cell that it ends.
-    fn visit(&mut self, job: &Job<'_>, axes: &Axes, out: &mut PassPlan) -> Result<()> {
+    fn visit(&mut self, axes: &Axes, out: &mut PassPlan) -> Result<()> {
         let fraction = self.fraction(out);
         let patch = &self.patch;
         let contact = patch.surface.contact(fraction, &patch.ball)?;
@@ -298,21 +315,36 @@ impl Lookahead {
             (out.ends, out.up) = ([located.cl_nm; 2], [is_up; 2]);
         }
         (out.ends[1], out.up[1]) = (located.cl_nm, is_up);
-        if out.point {
-            return Ok(());
-        }
-        let top = top(job);
-        let length = self.cell_length(out, &contact);
+        self.here = Some((contact, located.cl_nm));
+        Ok(())
+    }
+
+    /// The differences up to the station.
+    fn differences(&mut self, out: &PassPlan) {
+        let Some((contact, centre_nm)) = self.here.filter(|_| !out.point) else {
+            return;
+        };
+        self.length = self.cell_length(out, &contact);
         self.speed = contact.path;
         if self.station > 0 {
-            let room = self.stencil.add(located.cl_nm, length, axes, &top);
-            self.room = room;
-            out.plan.add(length, &room, STENCIL_CELLS, &top);
-        } else if begins {
-            self.stencil.begin(located.cl_nm);
+            self.stencil.add(centre_nm, self.length);
+        } else if out.plan.count() == 0 {
+            self.stencil.begin(centre_nm);
         }
-        self.watch_jumps(axes, &contact, length, &top, out);
-        Ok(())
+    }
+
+    /// The cell up to the station.
+    fn close_cell(&mut self, job: &Job<'_>, axes: &Axes, out: &mut PassPlan) {
+        let Some((contact, _)) = self.here.take().filter(|_| !out.point) else {
+            return;
+        };
+        let top = top(job);
+        if self.station > 0 {
+            let room = self.stencil.room(axes, &top);
+            self.room = room;
+            out.plan.add(self.length, &room, STENCIL_CELLS, &top);
+        }
+        self.watch_jumps(axes, &contact, self.length, &top, out);
     }
 
     /// Arc from the last station, mm: Hermite's rule of two points.

@@ -74,6 +74,8 @@ pub(crate) struct Stencil {
     lengths: [f32; 3],
     first: [f32; 3],
     second: [f32; 3],
+    /// Bounds of the first three derivatives of each axis at the last station.
+    bends: [[f32; 3]; 3],
 }
 
 impl Stencil {
@@ -83,6 +85,7 @@ impl Stencil {
         lengths: [0.0; 3],
         first: [0.0; 3],
         second: [0.0; 3],
+        bends: [[0.0; 3]; 3],
     };
 
     /// Direction of the last cell.
@@ -98,8 +101,13 @@ impl Stencil {
         self.last = centre_nm;
     }
 
-    /// The next station, so many mm further: what the path leaves there and over the cells before, as far as three of them reach.
-    pub(crate) fn add(&mut self, centre_nm: [i32; 3], length: f32, axes: &Axes, top: &Top) -> Room {
+    /// What the path leaves at the last station and over the cells before, as far as three of them reach.
+    pub(crate) fn room(&self, axes: &Axes, top: &Top) -> Room {
+        room(&self.bends, axes, top)
+    }
+
+    /// The next station, so many mm further.
+    pub(crate) fn add(&mut self, centre_nm: [i32; 3], length: f32) {
         let [h1, h2, _] = self.lengths;
         self.lengths = [length, h1, h2];
         let (two, three) = (length + h1, length + h1 + h2);
@@ -129,7 +137,7 @@ impl Stencil {
                 (d3.abs() - off3).max(0.0),
             ];
         }
-        room(&bends, axes, top)
+        self.bends = bends;
     }
 }
 

@@ -11,10 +11,10 @@ use super::{QUANTA_BITS, QUANTA_PER_MM, STEP_MAX};
 pub(crate) const CELLS_MAX: usize = 256;
 
 /// Cells to each side that a bound may reach into, and that are looked through ahead of an acceleration.
-const REACH: usize = 16;
+const REACH: usize = 8;
 
 /// Cells that are worked on at a time.
-const PORTION: usize = 2;
+const PORTION: usize = 1;
 
 /// Share of the greatest change of the acceleration that the feed is left near a jump: it comes twice, when it begins and when it leaves
 /// the mean.
@@ -219,8 +219,8 @@ impl Plan {
         self.longest = upwards(time / top.period_s);
         self.change = jerk * squared(top.period_s) * top.period_s * QUANTA_PER_MM;
         self.best = (f32::MAX, self.longest);
-        // With a single cell nothing is to be traded.
-        self.tries = if self.count > 1 { TRIES } else { 0 };
+        // On a leg nothing is to be traded.
+        self.tries = if self.count > 2 { TRIES } else { 0 };
         self.take(self.longest);
     }
 
