@@ -6,6 +6,8 @@
 
 use crate::fault::{Fault, Result};
 use crate::feed::QUANTA_PER_MM;
+use crate::feed::number::Bounded;
+use crate::feed::plan::CELLS_STANDING;
 use crate::feed::profile::Profile;
 use crate::job::{Axes, Pattern};
 use crate::lane::Line;
@@ -16,7 +18,7 @@ use crate::run::Run;
 use crate::sample::{Place, Sample};
 
 /// Portions of the look ahead in a tick in which the tool waits for it.
-const PORTIONS_WAITING: u8 = 1;
+const PORTIONS_WAITING: u8 = 2;
 
 /// Where the course is.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -188,7 +190,7 @@ impl Course {
             Phase::LegPlan(way) => self.plan_leg(way, job, axes, run, last)?,
             Phase::LegBounds(way) => {
                 let (now, _) = both(&mut self.plans, self.second);
-                if now.plan.work() {
+                if now.plan.work(CELLS_STANDING) {
                     self.profile.begin(now.plan.window);
                     self.phase = Phase::Leg(way);
                 }
@@ -304,12 +306,12 @@ impl Course {
     /// The arc up to a station is known from the plan: what adds up between stations does not go on.
     fn settle_place(&mut self, job: &Job<'_>, run: &Run) {
         let (now, _) = both(&mut self.plans, self.second);
-        let Some((cell, arc_mm)) = run.since_station(job, now.parts) else {
+        let Some(cell) = run.cell(job, now.parts).filter(|cell| *cell != self.cell) else {
             return;
         };
-        if cell == self.cell {
+        let Some(arc_mm) = run.since_station(now.parts, now.part) else {
             return;
-        }
+        };
         self.cell = cell;
         let place = now.plan.start_of(cell) + crate::feed::plan::quanta(arc_mm);
         self.profile.shift(place - self.profile.place());
@@ -378,7 +380,7 @@ impl Course {
         if self.profile.is_done(&now.plan) {
             return self.after_leg(way, job, run, last);
         }
-        let moved = self.profile.tick(&now.plan, self.usual * share.min(1.0));
+        let moved = self.profile.tick(&now.plan, self.usual * share.at_most(1.0));
         let at = self.leg.at(self.profile.place(), &now.plan);
         let speed = as_f32(moved) / (QUANTA_PER_MM * job.header.period_s);
         run.off_surface(at, speed, last);

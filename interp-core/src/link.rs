@@ -5,7 +5,8 @@ use crate::arith::sqrt;
 use crate::fault::{Fault, FaultKind, Result};
 use crate::feed::QUANTA_PER_MM;
 use crate::feed::demand::{Room, Stencil, squared};
-use crate::feed::plan::{Plan, Top};
+use crate::feed::number::{Bounded, to_f32};
+use crate::feed::plan::{CELLS_STANDING, Plan, Top};
 use crate::job::Axes;
 use crate::lane::Line;
 use crate::offset::Located;
@@ -69,13 +70,13 @@ impl Leg {
             period_s,
         };
         plan.begin();
-        let slow = slow_mm.min(length);
+        let slow = slow_mm.at_most(length);
         let fast = length - slow;
         if fast > 0.0 {
             plan.add(fast, &room, 0, &top);
         }
         if slow > 0.0 {
-            let square = room.square.min(squared(feed_mm_s));
+            let square = room.square.at_most(squared(feed_mm_s));
             plan.add(slow, &Room { square, ..room }, 0, &top);
         }
         plan.settle(&top);
@@ -110,6 +111,7 @@ pub(crate) struct Step {
     line: Line,
     /// Station that is planned next, and what is known of those before.
     station: u16,
+    here: Option<Located>,
     stencil: Stencil,
     contact: [i32; 3],
     cell: f32,
@@ -129,6 +131,7 @@ impl Step {
             span: 0,
         },
         station: 0,
+        here: None,
         stencil: Stencil::START,
         contact: [0; 3],
         cell: 0.0,
@@ -165,7 +168,7 @@ impl Step {
         patch.ball.locate(&contact, &patch.origin)
     }
 
-    /// Plans one station; whether the step can be gone, or is too short to be one (`None`).
+    /// Plans, in portions: where a station is, or what its cell leaves; whether the step can be gone, or is too short to be one (`None`).
     ///
     /// # Errors
     /// What is wrong with the surface there.
@@ -178,14 +181,18 @@ impl Step {
         plan: &mut Plan,
     ) -> Result<Option<bool>> {
         if self.station > STEP_CELLS {
-            return Ok(Some(plan.work()));
+            return Ok(Some(plan.work(CELLS_STANDING)));
         }
-        let part = f32::from(self.station) / f32::from(STEP_CELLS);
-        let here = self.locate(job, patch, part)?;
-        crate::lookahead::check_travel(axes, &here.cl_nm)?;
+        let Some(here) = self.here.take() else {
+            let part = f32::from(self.station) / f32::from(STEP_CELLS);
+            let here = self.locate(job, patch, part)?;
+            crate::lookahead::check_travel(axes, &here.cl_nm)?;
+            self.here = Some(here);
+            return Ok(Some(false));
+        };
         if self.station == 0 {
             let there = self.locate(job, patch, 1.0)?;
-            let length = distance(&here.cc_nm, &there.cc_nm).max(distance(&here.cl_nm, &there.cl_nm));
+            let length = distance(&here.cc_nm, &there.cc_nm).at_least(distance(&here.cl_nm, &there.cl_nm));
             if !(length > to_mm(NOTHING_NM)) {
                 return Ok(None);
             }
@@ -199,7 +206,9 @@ impl Step {
                 jerk: JERK_SHARE * room.jerk,
                 ..room
             };
-            self.stretch = self.stretch.max(distance(&self.contact, &here.cc_nm) / self.cell);
+            self.stretch = self
+                .stretch
+                .at_least(distance(&self.contact, &here.cc_nm) / self.cell);
             plan.add(self.cell, &room, 2, top);
         }
         self.contact = here.cc_nm;
@@ -249,20 +258,13 @@ fn distance(from: &[i32; 3], to: &[i32; 3]) -> f32 {
     float(sqrt(real(sum)))
 }
 
-#[allow(
-    clippy::cast_precision_loss,
-    reason = "a length; 24 bits are enough for a bound"
-)]
 fn to_mm(nm: i64) -> f32 {
-    nm as f32 * 1e-6
+    to_f32(nm) * 1e-6
 }
 
-#[allow(
-    clippy::cast_precision_loss,
-    reason = "a step is short: 24 bits of it are below a nanometre"
-)]
+/// A step is short: 24 bits of it are below a nanometre.
 fn ratio(part: i64, whole: i64) -> f32 {
-    part as f32 / whole as f32
+    to_f32(part) / to_f32(whole)
 }
 
 /// A part of a whole, units of 2^-30: good to 2^-30 of it, a tenth of a nanometre in 100 mm.

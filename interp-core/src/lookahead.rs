@@ -7,7 +7,8 @@ use crate::across::{Across, Densities};
 use crate::fault::{Fault, FaultKind, Result};
 use crate::feed::demand::{Jump, Room, Stencil, over_jump, root};
 use crate::feed::nm_to_mm;
-use crate::feed::plan::{Plan, Top};
+use crate::feed::number::Bounded;
+use crate::feed::plan::{CELLS_MOVING, Plan, Top};
 use crate::interval::interval;
 use crate::job::{Axes, Pattern, Spacing};
 use crate::lane::Line;
@@ -39,6 +40,8 @@ pub(crate) struct PassPlan {
     pub(crate) side: Place,
     /// Cells of a patch.
     pub(crate) parts: u16,
+    /// Fraction of the patch that each of them is.
+    pub(crate) part: u64,
     /// The pass is a single point.
     pub(crate) point: bool,
     /// Cutter location at start and end, nm, and whether the surface faces up there.
@@ -57,6 +60,7 @@ impl PassPlan {
         pass: 0,
         side: Place { span: 0, fraction: 0 },
         parts: 1,
+        part: u64::MAX,
         point: false,
         ends: [[0; 3]; 2],
         up: [false; 2],
@@ -70,9 +74,12 @@ impl PassPlan {
 enum Task {
     Patch,
     Station,
-    /// The differences that end at the station, and the cell that does.
+    /// The differences that end at the station.
     Cell,
+    /// What they leave.
     Room,
+    /// The cell that ends there.
+    Add,
     /// So many looks across are due at the station.
     Look(u8),
     Close,
@@ -107,7 +114,7 @@ impl Trail {
     /// Slopes at the newest (`forwards`) or the oldest of three stations, by their parabola.
     fn slopes(&self, at_newest: bool) -> [f32; 2] {
         let [newest, middle, oldest] = self.values;
-        let [h1, h2] = self.lengths.map(|length| length.max(1e-9));
+        let [h1, h2] = self.lengths.map(|length| length.at_least(1e-9));
         let slope = |c: f32, b: f32, a: f32| {
             let (late, early) = ((c - b) / h1, (b - a) / h2);
             let bend = (late - early) / (h1 + h2);
@@ -194,6 +201,7 @@ impl Lookahead {
         out.pass = pass;
         out.side = side;
         out.parts = (CELLS_WANTED / spans.max(1)).clamp(1, PARTS_MAX);
+        out.part = u64::MAX / u64::from(out.parts);
         out.point = false;
         out.next = None;
     }
@@ -219,6 +227,12 @@ impl Lookahead {
                 Task::Room
             }
             Task::Room => {
+                if self.station > 0 && !out.point {
+                    self.room = self.stencil.room(axes, &top(job));
+                }
+                Task::Add
+            }
+            Task::Add => {
                 self.close_cell(job, axes, out);
                 self.looks(job, out)
             }
@@ -233,7 +247,7 @@ impl Lookahead {
                 self.close(job, out)?;
                 Task::Bound
             }
-            Task::Bound if out.point || out.plan.work() => Task::Done,
+            Task::Bound if out.point || out.plan.work(CELLS_MOVING) => Task::Done,
             task => task,
         };
         Ok(())
@@ -254,8 +268,7 @@ impl Lookahead {
         if self.station >= out.parts {
             return u64::MAX;
         }
-        let part = u64::MAX / u64::from(out.parts).max(1);
-        u64::from(self.station) * part
+        u64::from(self.station) * out.part
     }
 
     /// How often to look across from a station: once at each line, twice where their patches have to be made, and more where the lines
@@ -340,9 +353,7 @@ impl Lookahead {
         };
         let top = top(job);
         if self.station > 0 {
-            let room = self.stencil.room(axes, &top);
-            self.room = room;
-            out.plan.add(self.length, &room, STENCIL_CELLS, &top);
+            out.plan.add(self.length, &self.room, STENCIL_CELLS, &top);
         }
         self.watch_jumps(axes, &contact, self.length, &top, out);
     }
@@ -384,7 +395,9 @@ impl Lookahead {
             && let Some(slopes) = self.trail.slopes
         {
             let here = self.trail.slopes(false);
-            let shortest = self.trail.lengths[0].min(self.trail.lengths[1]).max(1e-9);
+            let shortest = self.trail.lengths[0]
+                .at_most(self.trail.lengths[1])
+                .at_least(1e-9);
             let second = changed(&slopes, &here, 4.0 * NO_JUMP / shortest);
             let jump = Jump {
                 first: [0.0; 2],
@@ -456,6 +469,6 @@ fn check_height(axes: &Axes, [_, _, z]: &[i32; 3]) -> Result<()> {
 /// How far the parts of two pairs are apart, beyond the noise of each.
 fn changed(from: &[f32; 2], to: &[f32; 2], noise: f32) -> [f32; 2] {
     let ([from0, from1], [to0, to1]) = (from, to);
-    let apart = |from: &f32, to: &f32| ((to - from).abs() - noise).max(0.0);
+    let apart = |from: &f32, to: &f32| ((to - from).abs() - noise).at_least(0.0);
     [apart(from0, to0), apart(from1, to1)]
 }

@@ -333,16 +333,13 @@ impl Run {
         last.density = 0.0;
     }
 
-    /// Cell of the pass, of so many to a patch, and arc since its start, mm; none where the pass is over.
-    pub(crate) fn since_station(&self, job: &Job<'_>, parts: u16) -> Option<(u16, f32)> {
+    /// Cell of the pass, of so many to a patch; none where the pass is over.
+    pub(crate) fn cell(&self, job: &Job<'_>, parts: u16) -> Option<u16> {
         if !self.is_along() {
             return None;
         }
         let travel = &self.travel;
-        let part = (u64::MAX / u64::from(parts)).max(1);
-        let high = (travel.fraction >> 32) * u64::from(parts);
-        let within = u16::try_from(high >> 32).unwrap_or(0);
-        let over = travel.fraction.checked_sub(u64::from(within) * part)?;
+        let within = self.cell_of_patch(parts);
         let span = if travel.reversed {
             job.header
                 .path_spans
@@ -351,10 +348,23 @@ impl Run {
         } else {
             travel.span
         };
-        let length = fraction_to_f32(over);
+        Some(span.saturating_mul(parts).saturating_add(within))
+    }
+
+    fn cell_of_patch(&self, parts: u16) -> u16 {
+        let high = (self.travel.fraction >> 32) * u64::from(parts);
+        u16::try_from(high >> 32).unwrap_or(0)
+    }
+
+    /// Arc since the start of the cell, mm, where a patch has so many, each of which is this fraction of it; none in the rounding before it.
+    pub(crate) fn since_station(&self, parts: u16, part: u64) -> Option<f32> {
+        let travel = &self.travel;
+        let start = u64::from(self.cell_of_patch(parts)) * part;
+        let length = fraction_to_f32(travel.fraction.checked_sub(start)?);
         let mean = 1.0 - 0.5 * travel.path.stretch * length;
-        let arc = length * mean / (travel.path.inverse * self.lane.patch().per_mm);
-        Some((span.saturating_mul(parts).saturating_add(within), float(arc)))
+        Some(float(
+            length * mean / (travel.path.inverse * self.lane.patch().per_mm),
+        ))
     }
 
     /// Whether the surface faces up where the tool is, so that the tool can leave it upwards.

@@ -4,6 +4,7 @@
 //! With q(s) the centre over the arc of the contact, q' v is an axis's velocity, q'' v^2 + q' a its acceleration and q''' v^3 + 3 q'' v a +
 //! q' j its jerk. Derivatives are divided differences of the stations, less what rounding to nanometres can make of them.
 
+use super::number::Bounded;
 use super::plan::Top;
 use crate::arith::sqrt;
 use crate::job::Axes;
@@ -57,10 +58,10 @@ impl Room {
             .zip(&axes.acceleration_mm_s2)
             .zip(&axes.jerk_mm_s3);
         for (((v, a), j), cosine) in limits.zip(cosines) {
-            let slope = 1.0 / cosine.abs().max(SLOPE_MIN);
-            room.square = room.square.min(squared(v * slope));
-            room.accel = room.accel.min(ACCEL_MARGIN * a * slope);
-            room.jerk = room.jerk.min(JERK_MARGIN * j * slope);
+            let slope = 1.0 / cosine.abs().at_least(SLOPE_MIN);
+            room.square = room.square.at_most(squared(v * slope));
+            room.accel = room.accel.at_most(ACCEL_MARGIN * a * slope);
+            room.jerk = room.jerk.at_most(JERK_MARGIN * j * slope);
         }
         room
     }
@@ -91,7 +92,7 @@ impl Stencil {
     /// Direction of the last cell.
     pub(crate) fn cosines(&self) -> [f32; 3] {
         let [x, y, z] = self.first;
-        let inverse = 1.0 / root(x * x + y * y + z * z).max(SLOPE_MIN);
+        let inverse = 1.0 / root(x * x + y * y + z * z).at_least(SLOPE_MIN);
         self.first.map(|d| d * inverse)
     }
 
@@ -111,7 +112,7 @@ impl Stencil {
         let [h1, h2, _] = self.lengths;
         self.lengths = [length, h1, h2];
         let (two, three) = (length + h1, length + h1 + h2);
-        let inverse = 1.0 / length.max(1e-6);
+        let inverse = 1.0 / length.at_least(1e-6);
         let mut bends = [[0.0; 3]; 3];
         let last = core::mem::replace(&mut self.last, centre_nm);
         let axis = centre_nm
@@ -133,8 +134,8 @@ impl Stencil {
             (*first, *second) = (d1, d2);
             *out = [
                 d1.abs() + 0.5 * d2.abs() * length,
-                (d2.abs() - off2).max(0.0),
-                (d3.abs() - off3).max(0.0),
+                (d2.abs() - off2).at_least(0.0),
+                (d3.abs() - off3).at_least(0.0),
             ];
         }
         self.bends = bends;
@@ -152,34 +153,34 @@ fn room(bends: &[[f32; 3]; 3], axes: &Axes, top: &Top) -> Room {
             .zip(&axes.jerk_mm_s3)
     };
     for (((v, a), j), [d1, d2, d3]) in limits().zip(bends) {
-        square = square.min(squared(v / d1.max(SLOPE_MIN)));
+        square = square.at_most(squared(v / d1.at_least(SLOPE_MIN)));
         if *d2 > 0.0 {
-            square = square.min(BEND_SHARE * a / d2);
+            square = square.at_most(BEND_SHARE * a / d2);
             curvature += d2 * d2;
         }
         if *d3 > 0.0 {
-            square = square.min(squared(cube_root(STEADY_SHARE * j / d3)));
+            square = square.at_most(squared(cube_root(STEADY_SHARE * j / d3)));
         }
     }
     if curvature > 0.0 {
         // The chord of a period: curvature (v T)^2 / 8.
-        square = square.min(8.0 * axes.chord_mm / (root(curvature) * squared(top.period_s)));
+        square = square.at_most(8.0 * axes.chord_mm / (root(curvature) * squared(top.period_s)));
     }
     let margin = if curvature > 0.0 { BEND_MARGIN } else { JERK_MARGIN };
     let speed = root(square);
     let (mut accel, mut jerk) = (f32::MAX, f32::MAX);
     for (((_, a), j), [d1, d2, d3]) in limits().zip(bends) {
-        let slope = 1.0 / d1.max(SLOPE_MIN);
-        accel = accel.min((ACCEL_MARGIN * a - d2 * square) * slope);
-        accel = accel.min(CHANGE_SHARE * j / (3.0 * d2 * speed).max(1e-9));
-        jerk = jerk.min((margin * j - d3 * square * speed) * slope);
+        let slope = 1.0 / d1.at_least(SLOPE_MIN);
+        accel = accel.at_most((ACCEL_MARGIN * a - d2 * square) * slope);
+        accel = accel.at_most(CHANGE_SHARE * j / (3.0 * d2 * speed).at_least(1e-9));
+        jerk = jerk.at_most((margin * j - d3 * square * speed) * slope);
     }
     // Once more, now that the acceleration is known.
     let mut most = 0.0_f32;
     for (((_, _), j), [d1, d2, d3]) in limits().zip(bends) {
         let taken = d3 * square * speed + 3.0 * d2 * speed * accel;
-        jerk = jerk.min((margin * j - taken) / d1.max(SLOPE_MIN));
-        most = most.max(taken / j);
+        jerk = jerk.at_most((margin * j - taken) / d1.at_least(SLOPE_MIN));
+        most = most.at_least(taken / j);
     }
     Room {
         square,
@@ -201,7 +202,7 @@ pub(crate) struct Jump {
 /// Greatest square of the speed over a jump, which an axis sees as one of its velocity and its acceleration from one period to the next.
 /// `cosines`: the path's direction. `taken`: share of the jerk that the bend takes.
 pub(crate) fn over_jump(jump: &Jump, cosines: &[f32; 3], taken: f32, axes: &Axes, period_s: f32) -> f32 {
-    let share = (BEND_MARGIN - ZONE_JERK - taken).max(0.0);
+    let share = (BEND_MARGIN - ZONE_JERK - taken).at_least(0.0);
     let mut square = f32::MAX;
     for ((a, j), cosine) in axes.acceleration_mm_s2.iter().zip(&axes.jerk_mm_s3).zip(cosines) {
         let along = cosine.abs();
@@ -209,10 +210,10 @@ pub(crate) fn over_jump(jump: &Jump, cosines: &[f32; 3], taken: f32, axes: &Axes
         let on_axis = |[on, off]: [f32; 2]| along * on + across * off;
         let (first, second) = (on_axis(jump.first), on_axis(jump.second));
         if first > 0.0 {
-            square = square.min(squared(share * a.min(j * period_s) * period_s / first));
+            square = square.at_most(squared(share * a.at_most(j * period_s) * period_s / first));
         }
         if second > 0.0 {
-            square = square.min(share * j * period_s / second);
+            square = square.at_most(share * j * period_s / second);
         }
     }
     square
@@ -223,7 +224,7 @@ pub(crate) fn squared(value: f32) -> f32 {
 }
 
 pub(crate) fn root(value: f32) -> f32 {
-    float(sqrt(real(value.max(0.0))))
+    float(sqrt(real(value.at_least(0.0))))
 }
 
 /// The cube root of a positive number, within 1e-5 of itself: a guess out of the exponent, and two of Halley's steps.

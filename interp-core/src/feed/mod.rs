@@ -15,6 +15,7 @@
 //! Speeds are in quanta (2^-10 nm) a period, so sums are exact integers.
 
 pub(crate) mod demand;
+pub(crate) mod number;
 pub(crate) mod plan;
 pub(crate) mod profile;
 

@@ -4,6 +4,7 @@
 //! until it says that it is done: each of these is a fixed portion of work.
 
 use super::demand::{Room, ZONE_JERK, cube_root, root, squared};
+use super::number::{Bounded, to_f32, to_quanta};
 use super::profile::{WINDOW_MAX, braked, landing};
 use super::{QUANTA_BITS, QUANTA_PER_MM, STEP_MAX};
 
@@ -13,8 +14,9 @@ pub(crate) const CELLS_MAX: usize = 256;
 /// Cells to each side that a bound may reach into, and that are looked through ahead of an acceleration.
 const REACH: usize = 8;
 
-/// Cells that are worked on at a time.
-const PORTION: usize = 1;
+/// Cells that are worked on in a tick in which the tool moves, and in one in which it stands and waits for the plan.
+pub(crate) const CELLS_MOVING: u8 = 2;
+pub(crate) const CELLS_STANDING: u8 = 4;
 
 /// Share of the greatest change of the acceleration that the feed is left near a jump: it comes twice, when it begins and when it leaves
 /// the mean.
@@ -168,11 +170,11 @@ impl Plan {
     /// One more cell, of this length, mm. What its end leaves goes for the `back` cells before, too.
     pub(crate) fn add(&mut self, length: f32, room: &Room, back: usize, top: &Top) {
         self.end += quanta(length);
-        self.least = self.least.min(room.jerk);
-        self.accel = self.accel.max(room.accel);
-        self.time += length / root(room.square).min(top.usual).max(SPEED_MIN);
+        self.least = self.least.at_most(room.jerk);
+        self.accel = self.accel.at_least(room.accel);
+        self.time += length / root(room.square).at_most(top.usual).at_least(SPEED_MIN);
         let scale = top.period_s * QUANTA_PER_MM;
-        let square = squared((root(room.square) * scale).min(STEP_MAX));
+        let square = squared((root(room.square) * scale).at_most(STEP_MAX));
         let accel = room.accel * top.period_s * scale;
         let index = usize::from(self.count);
         let Some(cell) = self.cells.get_mut(index) else {
@@ -191,8 +193,8 @@ impl Plan {
             .into_iter()
             .flatten()
         {
-            cell.square = cell.square.min(square);
-            cell.accel = cell.accel.min(accel);
+            cell.square = cell.square.at_most(square);
+            cell.accel = cell.accel.at_most(accel);
         }
     }
 
@@ -202,7 +204,7 @@ impl Plan {
             return;
         }
         if let Some(cell) = self.cells.get_mut(usize::from(cell)) {
-            cell.jump = cell.jump.min(root(square) * top.period_s * QUANTA_PER_MM);
+            cell.jump = cell.jump.at_most(root(square) * top.period_s * QUANTA_PER_MM);
         }
     }
 
@@ -212,10 +214,10 @@ impl Plan {
     pub(crate) fn settle(&mut self, top: &Top) {
         let jerk = self.least;
         let arc = mm(self.end);
-        let speed = arc / self.time.max(top.period_s);
+        let speed = arc / self.time.at_least(top.period_s);
         let time = (self.accel / jerk)
-            .min(root(speed / jerk))
-            .min(cube_root(0.5 * arc / jerk));
+            .at_most(root(speed / jerk))
+            .at_most(cube_root(0.5 * arc / jerk));
         self.longest = upwards(time / top.period_s);
         self.change = jerk * squared(top.period_s) * top.period_s * QUANTA_PER_MM;
         self.best = (f32::MAX, self.longest);
@@ -233,11 +235,11 @@ impl Plan {
         self.tail = self.count;
     }
 
-    /// One portion; whether there is nothing left to do.
+    /// So many cells, one at a time; whether there is nothing left to do.
     ///
     /// A long mean allows a high acceleration, and a short one rides closer to what is narrow: which is faster is tried.
-    pub(crate) fn work(&mut self) -> bool {
-        for _ in 0..PORTION {
+    pub(crate) fn work(&mut self, cells: u8) -> bool {
+        for _ in 0..cells {
             match self.stage {
                 Stage::Done => return true,
                 Stage::Bounds => match self.left.checked_sub(1) {
@@ -291,19 +293,20 @@ impl Plan {
         };
         let periods = f32::from(self.window);
         let length = between(self.start_nm(index), cell.end_nm);
-        let accel = cell.accel_all.max(1.0);
-        let enter = squared(self.speed).min(cell.enter);
+        let accel = cell.accel_all.at_least(1.0);
+        let enter = squared(self.speed).at_most(cell.enter);
         let leave = self
             .leave(index)
-            .min(squared(cell.gate))
-            .min(enter + 2.0 * accel * length);
-        let peak = cell.square_all.min(0.5 * (enter + leave) + accel * length);
+            .at_most(squared(cell.gate))
+            .at_most(enter + 2.0 * accel * length);
+        let peak = cell.square_all.at_most(0.5 * (enter + leave) + accel * length);
         let [enter, leave, peak] = [enter, leave, peak].map(root);
         let ramps = (2.0 * squared(peak) - squared(enter) - squared(leave)) / (2.0 * accel);
-        self.elapsed += (2.0 * peak - enter - leave) / accel + (length - ramps).max(0.0) / peak.max(1.0);
+        self.elapsed +=
+            (2.0 * peak - enter - leave) / accel + (length - ramps).at_least(0.0) / peak.at_least(1.0);
         if cell.gate < f32::MAX {
             // The way through its zone, instead of at the cell's speed.
-            self.elapsed += 2.0 * periods * (1.0 - cell.gate / peak.max(cell.gate));
+            self.elapsed += 2.0 * periods * (1.0 - cell.gate / peak.at_least(cell.gate));
         }
         let rises = leave > enter;
         if self.rises && !rises {
@@ -323,43 +326,39 @@ impl Plan {
         let Some(&cell) = self.cells.get(index) else {
             return;
         };
+        let count = usize::from(self.count);
         let periods = f32::from(self.window);
+        let squared_periods = squared(periods);
         let start_nm = index
             .checked_sub(1)
             .and_then(|i| self.cells.get(i))
             .map_or(0, |cell| cell.end_nm);
-        let (mut square, mut accel) = (cell.square, cell.accel.min(self.swing));
+        let (mut square, mut accel) = (cell.square, cell.accel.at_most(self.swing));
         let mut ask = |cell: &Cell, distance: f32| {
-            if squared(periods) * cell.square >= squared(distance) {
-                square = square.min(cell.square);
-                accel = accel.min(cell.accel);
+            if squared_periods * cell.square >= squared(distance) {
+                square = square.at_most(cell.square);
+                accel = accel.at_most(cell.accel);
             }
         };
-        let (mut after, mut before) = (f32::MAX, f32::MAX);
+        let (first, last) = (index.saturating_sub(REACH), (index + 1 + REACH).min(count));
         let mut from = cell.end_nm;
-        let later = self
-            .cells
-            .get(index + 1..usize::from(self.count))
-            .into_iter()
-            .flatten();
-        for (seen, other) in later.take(REACH + 1).enumerate() {
-            if seen == REACH {
-                after = between(cell.end_nm, from);
-            } else {
-                ask(other, between(cell.end_nm, from));
-                from = other.end_nm;
-            }
+        for other in self.cells.get(index + 1..last).unwrap_or_default() {
+            ask(other, between(cell.end_nm, from));
+            from = other.end_nm;
         }
-        let earlier = self.cells.get(..index).into_iter().flatten().rev();
-        for (seen, other) in earlier.take(REACH + 1).enumerate() {
-            let distance = between(other.end_nm, start_nm);
-            if seen == REACH {
-                before = distance;
-            } else {
-                ask(other, distance);
-            }
+        let after = if last < count {
+            between(cell.end_nm, from)
+        } else {
+            f32::MAX
+        };
+        for other in self.cells.get(first..index).unwrap_or_default() {
+            ask(other, between(other.end_nm, start_nm));
         }
-        square = square.min(squared(after.min(before) / periods));
+        let before = match first.checked_sub(1).and_then(|i| self.cells.get(i)) {
+            Some(unseen) => between(unseen.end_nm, start_nm),
+            None => f32::MAX,
+        };
+        square = square.at_most(squared(after.at_most(before) / periods));
         let length = between(start_nm, cell.end_nm);
         let mut gate = cell.jump;
         if gate < f32::MAX {
@@ -367,8 +366,8 @@ impl Plan {
             // kept from its end on.
             if let Some(next) = self.cells.get(index + 1) {
                 let beyond = between(cell.end_nm, next.end_nm);
-                gate = gate.min(length.min(beyond) / periods);
-                gate = gate.min(self.brake_in(index + 1, beyond - periods * gate));
+                gate = gate.at_most(length.at_most(beyond) / periods);
+                gate = gate.at_most(self.brake_in(index + 1, beyond - periods * gate));
             }
         }
         let next = self
@@ -378,20 +377,20 @@ impl Plan {
         let ends = usize::from(self.tail) == index + 1;
         let mut enter = if ends {
             // No later cell brakes less, so that what is planned for the end from here on is kept.
-            accel = accel.min(next.map_or(f32::MAX, |next| next.accel_all));
+            accel = accel.at_most(next.map_or(f32::MAX, |next| next.accel_all));
             squared(landing(
                 accel,
-                as_f32(self.end - (i64::from(start_nm) << QUANTA_BITS)),
+                to_f32(self.end - (i64::from(start_nm) << QUANTA_BITS)),
             ))
         } else {
             squared(braked(next.map_or(0.0, |next| next.enter), accel, length))
         };
         if gate < f32::MAX {
-            enter = enter.min(squared(braked(squared(gate), accel, length - periods * gate)));
+            enter = enter.at_most(squared(braked(squared(gate), accel, length - periods * gate)));
         } else if ends && enter < square {
             self.tail -= 1;
         }
-        enter = enter.min(square);
+        enter = enter.at_most(square);
         if let Some(cell) = self.cells.get_mut(index) {
             (cell.square_all, cell.accel_all, cell.gate, cell.enter) = (square, accel, gate, enter);
         }
@@ -409,18 +408,17 @@ impl Plan {
         let mut speed = braked(leave.map_or(0.0, |leave| leave.enter), cell.accel_all, room);
         if cell.gate < f32::MAX {
             let before = room - f32::from(self.window) * cell.gate;
-            speed = speed.min(braked(squared(cell.gate), cell.accel_all, before));
+            speed = speed.at_most(braked(squared(cell.gate), cell.accel_all, before));
         }
         speed
     }
 
     /// The cell that a place is in, from this one on.
     pub(crate) fn cell_at(&self, mut cell: u16, place: i64) -> u16 {
+        let place_nm = whole_nm(place);
         for _ in 0..CELLS_A_PERIOD {
-            let end = self
-                .cell(cell)
-                .map_or(i64::MAX, |cell| i64::from(cell.end_nm) << QUANTA_BITS);
-            if cell + 1 >= self.count || place < end {
+            let end_nm = self.cell(cell).map_or(u32::MAX, |cell| cell.end_nm);
+            if cell + 1 >= self.count || place_nm < end_nm {
                 break;
             }
             cell += 1;
@@ -434,7 +432,7 @@ impl Plan {
             return 0.0;
         };
         if self.is_in_zone(index, place) {
-            cell.accel_all.min(ZONE_SHARE * self.swing)
+            cell.accel_all.at_most(ZONE_SHARE * self.swing)
         } else {
             cell.accel_all
         }
@@ -445,7 +443,7 @@ impl Plan {
         let periods = f32::from(self.window);
         let near = |cell: Option<&Cell>| {
             cell.is_some_and(|cell| {
-                let apart = as_f32((i64::from(cell.end_nm) << QUANTA_BITS) - place);
+                let apart = to_f32((i64::from(cell.end_nm) << QUANTA_BITS) - place);
                 cell.gate < f32::MAX && apart.abs() <= periods * cell.gate
             })
         };
@@ -462,18 +460,18 @@ impl Plan {
         } else {
             i64::from(cell.end_nm) << QUANTA_BITS
         };
-        let room = as_f32(end - place);
+        let room = to_f32(end - place);
         let accel = cell.accel_all;
         let brake = if index + 1 >= self.tail {
-            landing(accel, as_f32(self.end - place))
+            landing(accel, to_f32(self.end - place))
         } else {
             braked(self.leave(index), accel, room)
         };
-        let mut speed = root(cell.square_all).min(brake);
+        let mut speed = root(cell.square_all).at_most(brake);
         let periods = f32::from(self.window);
         if cell.gate < f32::MAX {
             let zone = periods * cell.gate;
-            speed = speed.min(if room <= zone {
+            speed = speed.at_most(if room <= zone {
                 cell.gate
             } else {
                 braked(squared(cell.gate), accel, room - zone)
@@ -483,9 +481,9 @@ impl Plan {
         match before {
             Some(Cell { gate, end_nm, .. })
                 if *gate < f32::MAX
-                    && as_f32(place - (i64::from(*end_nm) << QUANTA_BITS)) <= periods * gate =>
+                    && to_f32(place - (i64::from(*end_nm) << QUANTA_BITS)) <= periods * gate =>
             {
-                speed.min(*gate)
+                speed.at_most(*gate)
             }
             _ => speed,
         }
@@ -502,29 +500,31 @@ impl Plan {
 
     /// Whether a speed can be kept from a place over so many quanta, and braking still is in time.
     pub(crate) fn is_clear(&self, index: u16, place: i64, over: f32, speed: f32) -> bool {
-        let last = place + whole(over);
+        let last = place + to_quanta(over);
+        let last_nm = whole_nm(last);
         let square = squared(speed);
-        for at in (index..).take(REACH) {
-            let Some(cell) = self.cell(at) else {
-                return false;
-            };
-            if at + 1 >= self.count || last < i64::from(cell.end_nm) << QUANTA_BITS {
+        let (first, count) = (usize::from(index), usize::from(self.count));
+        let cells = self.cells.get(first..(first + REACH).min(count));
+        let mut at = index;
+        let mut ahead = cells.unwrap_or_default().iter().peekable();
+        while let Some(cell) = ahead.next() {
+            if at + 1 >= self.count || last_nm < cell.end_nm {
                 return last < self.end && speed <= self.ceiling(at, last);
             }
-            if square > self.leave(at) || speed > cell.gate {
+            let leave = ahead.peek().map_or(0.0, |after| after.enter);
+            if square > leave || speed > cell.gate {
                 return false;
             }
+            at += 1;
         }
         false
     }
 }
 
-#[allow(
-    clippy::cast_precision_loss,
-    reason = "within a cell; 24 bits are enough for a bound"
-)]
-fn as_f32(quanta: i64) -> f32 {
-    quanta as f32
+/// Nanometres that a place is past: it is before a station where they are less than the station's.
+#[inline(always)]
+fn whole_nm(place: i64) -> u32 {
+    u32::try_from(place >> QUANTA_BITS).unwrap_or(u32::MAX)
 }
 
 /// Arc between two stations, quanta.
@@ -534,20 +534,12 @@ fn between(from_nm: u32, to_nm: u32) -> f32 {
 }
 
 fn mm(quanta: i64) -> f32 {
-    as_f32(quanta) * (1.0 / QUANTA_PER_MM)
+    to_f32(quanta) * (1.0 / QUANTA_PER_MM)
 }
 
 /// Quanta of a length in mm, in two parts so that none of its 24 bits is lost.
 pub(crate) fn quanta(mm: f32) -> i64 {
-    whole(mm * QUANTA_PER_MM)
-}
-
-#[allow(
-    clippy::cast_possible_truncation,
-    reason = "the cast saturates, and a NaN becomes 0"
-)]
-fn whole(value: f32) -> i64 {
-    value as i64
+    to_quanta(mm * QUANTA_PER_MM)
 }
 
 /// The next whole number of periods, at least 1.

@@ -1,6 +1,7 @@
 //! The jerk-limited feed, a step a period; see [`super`].
 
 use super::STEP_MAX;
+use super::number::Bounded;
 use super::plan::Plan;
 use crate::arith::sqrt;
 use crate::scalar::{float, real};
@@ -20,9 +21,12 @@ const STEP_LEAST: f32 = 2048.0;
 /// Progress along one path.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Profile {
-    /// Steps of the last periods, quanta, acceleration-limited; the next goes to `at`.
+    /// Steps of the last periods, quanta, acceleration-limited; the next goes to `at`. Those before the path's start count as 0, whatever
+    /// is there: to wipe them all would be half the work of a tick.
     steps: [i32; 256],
     at: u8,
+    /// Steps since the path's start, as far as they fit.
+    taken: u8,
     /// Periods of the mean.
     window: u8,
     /// Cell of the plan that `lead` is in.
@@ -40,6 +44,7 @@ impl Profile {
     pub(crate) const START: Self = Self {
         steps: [0; 256],
         at: 0,
+        taken: 0,
         window: 1,
         cell: 0,
         sum: 0,
@@ -50,8 +55,10 @@ impl Profile {
 
     /// To the start of a path with this mean, from rest.
     pub(crate) fn begin(&mut self, window: u8) {
-        *self = Self::START;
+        self.taken = 0;
         self.window = window.clamp(1, WINDOW_MAX);
+        self.cell = 0;
+        (self.sum, self.lead, self.place, self.rest) = (0, 0, 0, 0);
     }
 
     /// Arc that the tool has come, quanta.
@@ -90,22 +97,24 @@ impl Profile {
         // The acceleration that leaves the mean with this step.
         let leaves = at(self.window) - at(self.window.wrapping_add(1));
         let accel = plan.accel(self.cell, self.lead);
-        let least = (-accel).max(leaves - plan.swing);
-        let most = accel.min(leaves + plan.swing);
-        let goal = wanted.min(plan.ceiling(self.cell, self.lead)).min(STEP_MAX);
+        let least = (-accel).at_least(leaves - plan.swing);
+        let most = accel.at_most(leaves + plan.swing);
+        let goal = wanted
+            .at_most(plan.ceiling(self.cell, self.lead))
+            .at_most(STEP_MAX);
         let mut change = goal - speed;
         if change > 0.0 {
-            let faster = speed + change.min(most);
+            let faster = speed + change.at_most(most);
             // Braking can begin only once the acceleration has left the mean: until then the speed stays.
             let coast = faster * count(self.window);
             if !plan.is_clear(self.cell, self.lead, coast + faster, faster) {
                 change = self.creep(plan, speed, change);
             }
         }
-        let change = change.min(most).max(least);
-        let mut step = rounded((speed + change).max(0.0));
+        let change = change.at_most(most).at_least(least);
+        let mut step = rounded((speed + change).at_least(0.0));
         if step == 0 && wanted > 0.0 {
-            step = rounded(STEP_LEAST.min(wanted));
+            step = rounded(STEP_LEAST.at_most(wanted));
         }
         let room = plan.end - self.lead;
         if i64::from(step) >= room {
@@ -117,6 +126,9 @@ impl Profile {
 
     /// The step so many periods back.
     fn step(&self, back: u8) -> i32 {
+        if back > self.taken {
+            return 0;
+        }
         let index = usize::from(self.at.wrapping_sub(back));
         // Each index of 8 bits is there.
         self.steps.get(index).copied().unwrap_or(0)
@@ -125,7 +137,7 @@ impl Profile {
     /// A small acceleration where a whole one would have to be waited for, so that the tool never stands before a narrow place: what it
     /// takes of the braking is small, too.
     fn creep(&self, plan: &Plan, speed: f32, change: f32) -> f32 {
-        let little = change.min(plan.swing * CREEP_SHARE);
+        let little = change.at_most(plan.swing * CREEP_SHARE);
         let faster = speed + little;
         let is_slow = speed <= CREEP_PERIODS * plan.accel(self.cell, self.lead);
         if is_slow && plan.is_clear(self.cell, self.lead, CREEP_PERIODS * faster, faster) {
@@ -142,6 +154,7 @@ impl Profile {
             *newest = step;
         }
         self.at = self.at.wrapping_add(1);
+        self.taken = self.taken.saturating_add(1);
         self.lead += i64::from(step);
         self.sum += i64::from(step) - i64::from(oldest);
         let moved = self.divide();
@@ -165,7 +178,7 @@ impl Profile {
 /// Greatest speed a period before a place where it has to have this square, at this many quanta from it: braking by `accel` each
 /// period, `v (v + accel) = square + 2 accel distance`.
 pub(crate) fn braked(square: f32, accel: f32, distance: f32) -> f32 {
-    let reach = square + 2.0 * accel * distance.max(0.0);
+    let reach = square + 2.0 * accel * distance.at_least(0.0);
     let half = 0.5 * accel;
     let root = half + float(sqrt(real(half * half + reach)));
     if root > 0.0 { reach / root } else { 0.0 }
@@ -174,9 +187,9 @@ pub(crate) fn braked(square: f32, accel: f32, distance: f32) -> f32 {
 /// Greatest step at this many quanta from a standstill, so that a whole number of periods follows, each slower by the same: N with
 /// `distance <= accel N (N + 1)/2`, and the first of steps that fall evenly to nothing in the period after the last.
 pub(crate) fn landing(accel: f32, distance: f32) -> f32 {
-    let distance = distance.max(0.0);
+    let distance = distance.at_least(0.0);
     let periods = 0.5 * (float(sqrt(real(1.0 + 8.0 * distance / accel))) - 1.0);
-    2.0 * distance / (ceil(periods).max(1.0) + 1.0)
+    2.0 * distance / (ceil(periods).at_least(1.0) + 1.0)
 }
 
 /// The next whole number; of a number that is whole within its last places, that one.

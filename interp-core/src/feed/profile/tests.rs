@@ -19,7 +19,7 @@ fn plan(lengths: &[(f32, Room)], feed: f32) -> Box<Plan> {
         plan.add(*length, room, 0, &top);
     }
     plan.settle(&top);
-    while !plan.work() {}
+    while !plan.work(1) {}
     plan
 }
 
