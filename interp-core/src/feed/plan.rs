@@ -3,6 +3,10 @@
 //! A path is cut into cells by stations. [`Plan::begin`], [`Plan::add`] with each station in turn, [`Plan::settle`] once, then [`Plan::work`]
 //! until it says that it is done: each of these is a fixed portion of work.
 
+mod bounds;
+mod cell;
+
+use self::cell::{Cell, Most, between, whole_nm};
 use super::demand::{Room, ZONE_JERK, cube_root, root, squared};
 use super::number::{Bounded, to_f32, to_quanta};
 use super::profile::{WINDOW_MAX, braked, landing};
@@ -15,8 +19,12 @@ pub(crate) const CELLS_MAX: usize = 256;
 const REACH: usize = 8;
 
 /// Cells that are worked on in a tick in which the tool moves, and in one in which it stands and waits for the plan.
-pub(crate) const CELLS_MOVING: u8 = 2;
-pub(crate) const CELLS_STANDING: u8 = 4;
+pub(crate) const CELLS_MOVING: u8 = 1;
+pub(crate) const CELLS_STANDING: u8 = 3;
+
+/// Cells that are merged, and whose time is taken, for one that is bounded: that is as much work.
+const MERGED: u16 = 4;
+const TIMED: u16 = 2;
 
 /// Share of the greatest change of the acceleration that the feed is left near a jump: it comes twice, when it begins and when it leaves
 /// the mean.
@@ -42,40 +50,11 @@ pub(crate) struct Top {
     pub(crate) period_s: f32,
 }
 
-/// A cell of a path, and the station at its end. Speeds are quanta a period, accelerations quanta a period^2.
-#[derive(Clone, Copy, Debug)]
-struct Cell {
-    /// Arc from the path's start to the cell's end, nm.
-    end_nm: u32,
-    /// Square of the greatest speed, and acceleration, by the cell alone.
-    square: f32,
-    accel: f32,
-    /// The same with what neighbours ask.
-    square_all: f32,
-    accel_all: f32,
-    /// Greatest speed at the cell's end, where the path jumps, and what of it is used: within the periods of the mean.
-    jump: f32,
-    gate: f32,
-    /// Square of the greatest speed at the cell's start from which all that follows can be kept.
-    enter: f32,
-}
-
-impl Cell {
-    const NONE: Self = Self {
-        end_nm: 0,
-        square: 0.0,
-        accel: 0.0,
-        square_all: 0.0,
-        accel_all: 0.0,
-        jump: f32::MAX,
-        gate: f32::MAX,
-        enter: 0.0,
-    };
-}
-
 /// What is being worked on.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Stage {
+    /// Makes one cell of neighbours that are alike.
+    Merge,
     /// Bounds, from the end backwards.
     Bounds,
     /// The time that they allow, forwards.
@@ -88,6 +67,11 @@ enum Stage {
 pub(crate) struct Plan {
     cells: [Cell; CELLS_MAX],
     count: u16,
+    /// Arc up to each station, nm, however cells are merged.
+    stations: [u32; CELLS_MAX],
+    /// Cells that are left of those merged so far, and the most of the last of them.
+    kept: u16,
+    most: Most,
     stage: Stage,
     /// Cells that are still to be worked on.
     left: u16,
@@ -119,6 +103,9 @@ impl Plan {
     pub(crate) const NONE: Self = Self {
         cells: [Cell::NONE; CELLS_MAX],
         count: 0,
+        stations: [0; CELLS_MAX],
+        kept: 0,
+        most: Most::NONE,
         stage: Stage::Done,
         left: 0,
         tries: 0,
@@ -153,9 +140,11 @@ impl Plan {
         self.count
     }
 
-    /// Arc up to the start of a cell, quanta.
+    /// Arc up to the station at which the so manieth cell began, before any were merged, quanta.
     pub(crate) fn start_of(&self, cell: u16) -> i64 {
-        i64::from(self.start_nm(cell)) << QUANTA_BITS
+        let before = cell.checked_sub(1);
+        let end_nm = before.and_then(|before| self.stations.get(usize::from(before)));
+        i64::from(end_nm.copied().unwrap_or(0)) << QUANTA_BITS
     }
 
     fn start_nm(&self, cell: u16) -> u32 {
@@ -180,8 +169,12 @@ impl Plan {
         let Some(cell) = self.cells.get_mut(index) else {
             return;
         };
+        let end_nm = whole_nm(self.end + (1 << (QUANTA_BITS - 1)));
+        if let Some(station) = self.stations.get_mut(index) {
+            *station = end_nm;
+        }
         *cell = Cell {
-            end_nm: u32::try_from((self.end + (1 << (QUANTA_BITS - 1))) >> QUANTA_BITS).unwrap_or(u32::MAX),
+            end_nm,
             square,
             accel,
             ..Cell::NONE
@@ -221,9 +214,8 @@ impl Plan {
         self.longest = upwards(time / top.period_s);
         self.change = jerk * squared(top.period_s) * top.period_s * QUANTA_PER_MM;
         self.best = (f32::MAX, self.longest);
-        // On a leg nothing is to be traded.
-        self.tries = if self.count > 2 { TRIES } else { 0 };
-        self.take(self.longest);
+        self.stage = Stage::Merge;
+        (self.left, self.kept) = (0, 0);
     }
 
     /// Begins anew with a mean of so many periods.
@@ -242,6 +234,17 @@ impl Plan {
         for _ in 0..cells {
             match self.stage {
                 Stage::Done => return true,
+                Stage::Merge if self.left < self.count => {
+                    for index in self.left..(self.left + MERGED).min(self.count) {
+                        self.merge(index);
+                    }
+                }
+                Stage::Merge => {
+                    self.count = self.kept;
+                    // On a leg nothing is to be traded.
+                    self.tries = if self.count > 2 { TRIES } else { 0 };
+                    self.take(self.longest);
+                }
                 Stage::Bounds => match self.left.checked_sub(1) {
                     Some(cell) => {
                         self.left = cell;
@@ -254,13 +257,33 @@ impl Plan {
                     None => self.stage = Stage::Done,
                 },
                 Stage::Time if self.left < self.count => {
-                    self.pass_cell(self.left);
-                    self.left += 1;
+                    for index in self.left..(self.left + TIMED).min(self.count) {
+                        self.pass_cell(index);
+                        self.left += 1;
+                    }
                 }
                 Stage::Time => self.judge(),
             }
         }
         self.stage == Stage::Done
+    }
+
+    /// Puts a cell behind those that are kept, or into the last of them.
+    fn merge(&mut self, index: u16) {
+        self.left += 1;
+        let Some(&next) = self.cell(index) else {
+            return;
+        };
+        let last = self.kept.checked_sub(1);
+        let last = last.and_then(|last| self.cells.get_mut(usize::from(last)));
+        if last.is_some_and(|last| last.absorb(&next, &mut self.most)) {
+            return;
+        }
+        if let Some(place) = self.cells.get_mut(usize::from(self.kept)) {
+            *place = next;
+        }
+        self.most = Most::of(&next);
+        self.kept += 1;
     }
 
     /// The time of a try is known: the next one, or the best.
@@ -315,102 +338,6 @@ impl Plan {
         }
         self.rises = rises;
         self.speed = leave;
-    }
-
-    /// Bounds of a cell, those of all after it known.
-    ///
-    /// The tool is where the mean of the last n places is: it keeps a speed c somewhere if the places do within n c of there. So what a
-    /// cell asks goes for all cells as near as that. A cell that was not looked at, at a distance d, can only ask so of speeds
-    /// above d/n.
-    fn bound(&mut self, index: usize) {
-        let Some(&cell) = self.cells.get(index) else {
-            return;
-        };
-        let count = usize::from(self.count);
-        let periods = f32::from(self.window);
-        let squared_periods = squared(periods);
-        let start_nm = index
-            .checked_sub(1)
-            .and_then(|i| self.cells.get(i))
-            .map_or(0, |cell| cell.end_nm);
-        let (mut square, mut accel) = (cell.square, cell.accel.at_most(self.swing));
-        let mut ask = |cell: &Cell, distance: f32| {
-            if squared_periods * cell.square >= squared(distance) {
-                square = square.at_most(cell.square);
-                accel = accel.at_most(cell.accel);
-            }
-        };
-        let (first, last) = (index.saturating_sub(REACH), (index + 1 + REACH).min(count));
-        let mut from = cell.end_nm;
-        for other in self.cells.get(index + 1..last).unwrap_or_default() {
-            ask(other, between(cell.end_nm, from));
-            from = other.end_nm;
-        }
-        let after = if last < count {
-            between(cell.end_nm, from)
-        } else {
-            f32::MAX
-        };
-        for other in self.cells.get(first..index).unwrap_or_default() {
-            ask(other, between(other.end_nm, start_nm));
-        }
-        let before = match first.checked_sub(1).and_then(|i| self.cells.get(i)) {
-            Some(unseen) => between(unseen.end_nm, start_nm),
-            None => f32::MAX,
-        };
-        square = square.at_most(squared(after.at_most(before) / periods));
-        let length = between(start_nm, cell.end_nm);
-        let mut gate = cell.jump;
-        if gate < f32::MAX {
-            // Within n c to each side, which the cells have room for; and the feed hardly changes there, so that what follows has to be
-            // kept from its end on.
-            if let Some(next) = self.cells.get(index + 1) {
-                let beyond = between(cell.end_nm, next.end_nm);
-                gate = gate.at_most(length.at_most(beyond) / periods);
-                gate = gate.at_most(self.brake_in(index + 1, beyond - periods * gate));
-            }
-        }
-        let next = self
-            .cells
-            .get(index + 1)
-            .filter(|_| index + 1 < usize::from(self.count));
-        let ends = usize::from(self.tail) == index + 1;
-        let mut enter = if ends {
-            // No later cell brakes less, so that what is planned for the end from here on is kept.
-            accel = accel.at_most(next.map_or(f32::MAX, |next| next.accel_all));
-            squared(landing(
-                accel,
-                to_f32(self.end - (i64::from(start_nm) << QUANTA_BITS)),
-            ))
-        } else {
-            squared(braked(next.map_or(0.0, |next| next.enter), accel, length))
-        };
-        if gate < f32::MAX {
-            enter = enter.at_most(squared(braked(squared(gate), accel, length - periods * gate)));
-        } else if ends && enter < square {
-            self.tail -= 1;
-        }
-        enter = enter.at_most(square);
-        if let Some(cell) = self.cells.get_mut(index) {
-            (cell.square_all, cell.accel_all, cell.gate, cell.enter) = (square, accel, gate, enter);
-        }
-    }
-
-    /// Greatest speed in a cell, so many quanta before its end, for what follows it.
-    fn brake_in(&self, index: usize, room: f32) -> f32 {
-        let Some(cell) = self.cells.get(index) else {
-            return 0.0;
-        };
-        let leave = self
-            .cells
-            .get(index + 1)
-            .filter(|_| index + 1 < usize::from(self.count));
-        let mut speed = braked(leave.map_or(0.0, |leave| leave.enter), cell.accel_all, room);
-        if cell.gate < f32::MAX {
-            let before = room - f32::from(self.window) * cell.gate;
-            speed = speed.at_most(braked(squared(cell.gate), cell.accel_all, before));
-        }
-        speed
     }
 
     /// The cell that a place is in, from this one on.
@@ -519,18 +446,6 @@ impl Plan {
         }
         false
     }
-}
-
-/// Nanometres that a place is past: it is before a station where they are less than the station's.
-#[inline(always)]
-fn whole_nm(place: i64) -> u32 {
-    u32::try_from(place >> QUANTA_BITS).unwrap_or(u32::MAX)
-}
-
-/// Arc between two stations, quanta.
-#[allow(clippy::cast_precision_loss, reason = "24 bits are enough for a bound")]
-fn between(from_nm: u32, to_nm: u32) -> f32 {
-    to_nm.saturating_sub(from_nm) as f32 * 1024.0
 }
 
 fn mm(quanta: i64) -> f32 {
