@@ -57,9 +57,11 @@ fn json(folder: &Path, arguments: &str) -> Value {
 fn examples_of_the_help_work() {
     let folder = tempfile::tempdir().unwrap();
     std::fs::create_dir(folder.path().join("jobs")).unwrap();
-    for job in ["freeform", "revolved", "revolved_v", "torus", "plate"] {
+    for job in ["freeform", "revolved", "revolved_v", "torus", "plate", "plate_machine"] {
         std::fs::write(folder.path().join(format!("jobs/{job}.toml")), sample(job)).unwrap();
     }
+    let script = include_str!("../../jobs/operator.txt");
+    std::fs::write(folder.path().join("jobs/operator.txt"), script).unwrap();
     for command in ["simulate", "export", "new", "explain", "completions"] {
         let help = out(&run(folder.path(), &format!("{command} --help")));
         let examples: Vec<_> = help
