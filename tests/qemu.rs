@@ -100,6 +100,7 @@ fn other_jobs() {
         "far_plate",
         "freeform",
         "plate",
+        "plate_machine",
         "plate_v",
         "revolved_v",
         "sphere_cap",

@@ -11,10 +11,11 @@ use host_sim::prepare::prepare;
 use host_sim::survey::{Findings, Survey};
 
 /// Jobs with their number of passes: the paper's, the golden table's, and for the others the oracle's dense scan.
-const PASSES: [(&str, u32); 10] = [
+const PASSES: [(&str, u32); 11] = [
     ("far_plate", 18),
     ("freeform", 135),
     ("plate", 164),
+    ("plate_machine", 53),
     ("plate_v", 146),
     ("revolved", 319),
     ("revolved_v", 110),
@@ -48,8 +49,8 @@ fn every_job_is_listed() {
     let mut names: Vec<_> = std::fs::read_dir(jobs())
         .unwrap()
         .map(|entry| entry.unwrap().path())
-        // Beside the jobs there is a folder of CAD files.
-        .filter(|path| path.is_file())
+        // Beside the jobs there are a folder of CAD files and what an operator does.
+        .filter(|path| path.extension().is_some_and(|extension| extension == "toml"))
         .map(|path| path.file_stem().unwrap().to_str().unwrap().to_owned())
         .collect();
     names.sort();

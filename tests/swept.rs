@@ -14,7 +14,11 @@ use host_sim::swept::{Findings, Track, measure};
 fn findings(job: &JobFile) -> Findings {
     let oracle = Oracle::new(job).unwrap();
     let prepared = prepare(job).unwrap();
-    let mut track = Track::default();
+    // As `verify` does it: on a machine with limits the feed is low at the ends of passes.
+    let mut track = Track::with_spacing(match prepared.header.axes {
+        Some(_) => 0.5e6 * job.feed_mm_s() * job.machine.period_s(),
+        None => 0.0,
+    });
     let mut keep = |emitted: &Emitted, _: &Checked| track.add(emitted, job.along);
     let mut survey = Survey::new(&prepared, &oracle, None, Some(&mut keep));
     Machine::load(&prepared)
@@ -22,7 +26,10 @@ fn findings(job: &JobFile) -> Findings {
         .run(|sample| survey.add(sample).is_ok())
         .unwrap();
     let samples = survey.finish(true).unwrap().samples;
-    assert_eq!(track.samples() as u64, samples);
+    // Links are no part of it.
+    if prepared.header.axes.is_none() {
+        assert_eq!(track.samples() as u64, samples);
+    }
     measure(job, &oracle, &track, true, &())
 }
 

@@ -57,8 +57,11 @@ fn json(folder: &Path, arguments: &str) -> Value {
 fn examples_of_the_help_work() {
     let folder = tempfile::tempdir().unwrap();
     std::fs::create_dir(folder.path().join("jobs")).unwrap();
-    for job in ["freeform", "revolved", "revolved_v", "torus", "plate"] {
-        std::fs::write(folder.path().join(format!("jobs/{job}.toml")), sample(job)).unwrap();
+    let jobs = Path::new(env!("CARGO_MANIFEST_DIR")).join("../jobs");
+    for entry in std::fs::read_dir(jobs).unwrap().map(Result::unwrap) {
+        if entry.path().is_file() {
+            std::fs::copy(entry.path(), folder.path().join("jobs").join(entry.file_name())).unwrap();
+        }
     }
     for command in ["simulate", "export", "new", "explain", "completions"] {
         let help = out(&run(folder.path(), &format!("{command} --help")));

@@ -26,6 +26,8 @@ use crate::travel;
 /// Runs a job in the firmware, in QEMU or on a board, and compares every sample with this machine's.
 ///
 /// Example: cargo sim run jobs/freeform.toml --qemu
+/// Example: cargo sim run jobs/plate_machine.toml --qemu --script jobs/operator.txt
+/// Example: cargo sim run jobs/plate_machine.toml --port /dev/ttyUSB0 --home 40,30,40
 #[derive(Debug, Args)]
 #[command(verbatim_doc_comment)]
 pub(super) struct Arguments {

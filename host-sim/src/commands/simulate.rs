@@ -25,6 +25,7 @@ use crate::travel;
 ///
 /// Example: cargo sim simulate jobs/freeform.toml --trace out.csv
 /// Example: cargo sim simulate jobs/revolved.toml --approach linear --report out
+/// Example: cargo sim simulate jobs/plate_machine.toml --script jobs/operator.txt
 #[derive(Debug, Args)]
 #[command(verbatim_doc_comment)]
 pub(super) struct Arguments {

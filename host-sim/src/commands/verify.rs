@@ -35,9 +35,11 @@ pub const BOUNDS: Bounds = Bounds {
 
 /// Checks a job before anything moves. Every sample against an independent f64 oracle: positions, normals, feed ripple, path
 /// intervals, schedule. The ball's swept envelope against the surface: scallop height everywhere, gouges, local or by another
-/// part of the path. Travel and limits of the axes, the tightest hollow, machining time, size of the data.
+/// part of the path. Travel of the axes; what all samples use of the axes' limits, and what the first, the middle and the last pass
+/// take against the best motion within them, where the job sets limits. The tightest hollow, machining time, size of the data.
 ///
 /// Example: cargo sim verify jobs/plate.toml
+/// Example: cargo sim verify jobs/plate_machine.toml --report out
 #[derive(Debug, Args)]
 #[command(verbatim_doc_comment)]
 pub(super) struct Arguments {

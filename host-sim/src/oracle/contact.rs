@@ -9,6 +9,9 @@ use crate::job_file::{Along, JobFile, Pattern, Side, Spacing};
 /// A first derivative shorter than this share of the other one (each times its range) marks a pole, where the patch's
 /// edge collapses to a point. Rounding leaves some 1e-15 there; a proper surface keeps above 1e-4.
 const POLE_SHARE: f64 = 1e-9;
+/// Below this share curvatures come from beside the pole, too. They are quotients of what vanishes with the share's square, so of the
+/// 1e-16 of f64 nearer places make more than 1e-6 (at 1e-9, nothing but noise). A tool that starts from standstill gets there.
+const NEAR_POLE_SHARE: f64 = 1e-5;
 /// `|S_u x S_v|` below this share of `|S_u| |S_v|` leaves no trustworthy normal.
 const SINE_MIN: f64 = 1e-9;
 /// Step away from a pole for its curvatures, as a share of the range: three such steps, extrapolated, leave a relative
@@ -128,6 +131,13 @@ pub struct Oracle {
     pub feed_mm_s: f64,
 }
 
+/// Curvatures of a contact, 1/mm; see [`Contact`].
+struct Curvatures {
+    curvature_path: f64,
+    curvature_side: f64,
+    principal: [f64; 2],
+}
+
 impl Oracle {
     /// The oracle of a job.
     ///
@@ -197,15 +207,29 @@ impl Oracle {
         let [[u0, u1], [v0, v1]] = self.surface.domain();
         let (speed_u, speed_v) = (length(at.u), length(at.v));
         let reach = (speed_u * (u1 - u0), speed_v * (v1 - v0));
-        if reach.0.min(reach.1) <= POLE_SHARE * reach.0.max(reach.1) {
-            return self.contact_at_pole(u, v, at, reach.0 < reach.1);
+        let u_vanishes = reach.0 < reach.1;
+        let (least, most) = (reach.0.min(reach.1), reach.0.max(reach.1));
+        if least <= POLE_SHARE * most {
+            return self.contact_at_pole(u, v, at, u_vanishes);
         }
         let product = cross(at.u, at.v);
         let area = length(product);
         if area <= SINE_MIN * speed_u * speed_v {
             return Err(OracleError::Degenerate { u, v });
         }
-        Ok(self.regular_contact(at, scale(product, self.normal_sign / area)))
+        let contact = self.regular_contact(at, scale(product, self.normal_sign / area));
+        if least > NEAR_POLE_SHARE * most {
+            return Ok(contact);
+        }
+        let beside = self.beside_pole(u, v, u_vanishes)?;
+        Ok(self.with_curvatures(
+            contact.cc_mm,
+            contact.normal,
+            contact.path_speed,
+            contact.lateral_speed,
+            [beside.curvature_path, beside.curvature_side],
+            beside.principal,
+        ))
     }
 
     /// Steps 3 and 4 where both derivatives are sound.
@@ -275,9 +299,7 @@ impl Oracle {
         u_vanishes: bool,
     ) -> Result<Contact, OracleError> {
         // Beside the pole the vanishing derivative is the mixed one times the (signed) step into the surface.
-        let [range_u, range_v] = self.surface.domain();
-        let (range, t) = if u_vanishes { (range_v, v) } else { (range_u, u) };
-        let inwards = if t - range[0] <= range[1] - t { 1.0 } else { -1.0 };
+        let inwards = self.inwards(u, v, u_vanishes);
         let (limit_u, limit_v) = if u_vanishes {
             (scale(at.uv, inwards), at.v)
         } else {
@@ -289,10 +311,46 @@ impl Oracle {
             return Err(OracleError::Degenerate { u, v });
         }
         let normal = scale(product, self.normal_sign / area);
-        let step = POLE_STEP * inwards * (range[1] - range[0]);
+        let beside = self.beside_pole(u, v, u_vanishes)?;
+        let pass_collapses = u_vanishes == (self.along == Along::U);
+        let path_speed = if pass_collapses {
+            0.0
+        } else {
+            length(if u_vanishes { at.v } else { at.u })
+        };
+        // On a pole every side line leaves in its own direction: its own speed and curvature count.
+        let (side, side2) = if u_vanishes { (at.v, at.vv) } else { (at.u, at.uu) };
+        let (lateral_speed, curvature_side) = if pass_collapses {
+            (length(side), dot(side2, normal) / dot(side, side))
+        } else {
+            (0.0, beside.curvature_side)
+        };
+        let curvatures = [beside.curvature_path, curvature_side];
+        Ok(self.with_curvatures(
+            at.point,
+            normal,
+            path_speed,
+            lateral_speed,
+            curvatures,
+            beside.principal,
+        ))
+    }
+
+    /// 1 where the parameter that leads away from the pole (v, if it is S_u that vanishes) grows into the surface, else -1.
+    fn inwards(&self, u: f64, v: f64, u_vanishes: bool) -> f64 {
+        let [range_u, range_v] = self.surface.domain();
+        let ([from, to], t) = if u_vanishes { (range_v, v) } else { (range_u, u) };
+        if t - from <= to - t { 1.0 } else { -1.0 }
+    }
+
+    /// Curvatures at a place on a pole or near it, extrapolated from three places further away from it.
+    fn beside_pole(&self, u: f64, v: f64, u_vanishes: bool) -> Result<Curvatures, OracleError> {
+        let [[u0, u1], [v0, v1]] = self.surface.domain();
+        let range = if u_vanishes { v1 - v0 } else { u1 - u0 };
+        let step = POLE_STEP * self.inwards(u, v, u_vanishes) * range;
         let beside: [Result<Contact, OracleError>; 3] = std::array::from_fn(|k| {
-            let moved = t + step * (k as f64 + 1.0);
-            let (u, v) = if u_vanishes { (u, moved) } else { (moved, v) };
+            let by = step * (k as f64 + 1.0);
+            let (u, v) = if u_vanishes { (u, v + by) } else { (u + by, v) };
             let at = self.surface.at(u, v);
             let product = cross(at.u, at.v);
             let area = length(product);
@@ -305,22 +363,11 @@ impl Oracle {
         let [one, two, three] = beside;
         let (one, two, three) = (one?, two?, three?);
         let limit = |of: fn(&Contact) -> f64| 3.0 * (of(&one) - of(&two)) + of(&three);
-        let pass_collapses = u_vanishes == (self.along == Along::U);
-        let path_speed = if pass_collapses {
-            0.0
-        } else {
-            length(if u_vanishes { at.v } else { at.u })
-        };
-        // On a pole every side line leaves in its own direction: its own speed and curvature count.
-        let (side, side2) = if u_vanishes { (at.v, at.vv) } else { (at.u, at.uu) };
-        let (lateral_speed, curvature_side) = if pass_collapses {
-            (length(side), dot(side2, normal) / dot(side, side))
-        } else {
-            (0.0, limit(|c| c.curvature_side))
-        };
-        let curvatures = [limit(|c| c.curvature_path), curvature_side];
-        let principal = [limit(|c| c.principal[0]), limit(|c| c.principal[1])];
-        Ok(self.with_curvatures(at.point, normal, path_speed, lateral_speed, curvatures, principal))
+        Ok(Curvatures {
+            curvature_path: limit(|c| c.curvature_path),
+            curvature_side: limit(|c| c.curvature_side),
+            principal: [limit(|c| c.principal[0]), limit(|c| c.principal[1])],
+        })
     }
 }
 
@@ -345,5 +392,33 @@ fn upper_side(surface: &Surface) -> Result<f64, OracleError> {
         Ok(sum.signum())
     } else {
         Err(OracleError::NoUpperSide)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A tool that starts at the pole from standstill is as near to it as it likes: f64 leaves no curvature there, its neighbours do.
+    #[test]
+    fn a_sphere_is_a_sphere_however_near_its_pole() {
+        let job = JobFile::parse("sphere_cap", include_str!("../../../jobs/sphere_cap.toml")).unwrap();
+        for along in [Along::U, Along::V] {
+            let oracle = Oracle::new(&JobFile { along, ..job.clone() }).unwrap();
+            for u in [1e-12, 1e-10, 1.1e-9, 1e-8, 1e-7, 1e-6, 1e-5, 1e-4, 1e-3] {
+                for v in [0.0, 0.3, 0.446_874_612_011_015_4, 1.0] {
+                    let contact = oracle.contact(u, v).unwrap();
+                    for (normal, place) in contact.normal.iter().zip(contact.cc_mm) {
+                        assert!((normal - place / 25.0).abs() < 1e-6, "u = {u}, v = {v}");
+                    }
+                    for curvature in contact.principal {
+                        assert!(
+                            (curvature + 1.0 / 25.0).abs() < 1e-6,
+                            "u = {u}, v = {v}: {curvature}"
+                        );
+                    }
+                }
+            }
+        }
     }
 }

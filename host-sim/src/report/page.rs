@@ -15,6 +15,7 @@ use super::track::Track;
 use crate::approach::Kind;
 use crate::job_file::{Along, JobFile, Pattern};
 use crate::oracle::Oracle;
+use crate::prepare::has_limits;
 use crate::survey::Findings;
 
 pub(super) const STYLE: &str = include_str!("page.css");
@@ -242,8 +243,13 @@ fn series_words(content: &Content<'_>) -> String {
     } else {
         String::new()
     };
+    let ends = if has_limits(&content.job.machine) {
+        "Each pass runs from standstill to standstill; the ways between passes are left out."
+    } else {
+        "The last period of a pass, which is cut short, has no speed."
+    };
     format!(
-        "{}{bends} {kept} The last period of a pass, which is cut short, has no speed. Accelerations are taken over 8 periods before and after, as \
+        "{}{bends} {kept} {ends} Accelerations are taken over 8 periods before and after, as \
          positions are whole nanometres, but where those over single periods differ by more than 8 nm per period²: there they are as \
          emitted.",
         feed_words(content)

@@ -104,4 +104,55 @@ mod tests {
             assert!(full.machine.jerk_max_mm_s3.is_some() && full.machine.velocity_max_mm_s.is_some());
         }
     }
+
+    /// The reference in docs/ knows every key that a template shows.
+    #[test]
+    fn the_reference_has_every_key() {
+        let reference = include_str!("../../../docs/job-file.md");
+        let mut keys = 0;
+        for line in Kind::ALL
+            .iter()
+            .flat_map(|kind| kind.surface().lines())
+            .chain(include_str!("tail.toml").lines())
+        {
+            let Some((key, _)) = line.trim_start_matches("# ").split_once(" = ") else {
+                continue;
+            };
+            if key
+                .chars()
+                .all(|c| c.is_ascii_lowercase() || c.is_ascii_digit() || c == '_')
+            {
+                assert!(
+                    reference.contains(&format!("`{key}`")),
+                    "{key} is not in docs/job-file.md"
+                );
+                keys += 1;
+            }
+        }
+        assert!(keys >= 40, "{keys}");
+    }
+
+    /// The job that the bring-up guide has people run in the air is within its limits and ends where it says.
+    #[test]
+    fn the_guides_job_runs() {
+        let guide = include_str!("../../../docs/bring-up.md");
+        let text = guide
+            .split("```toml\n")
+            .nth(1)
+            .unwrap()
+            .split("```")
+            .next()
+            .unwrap();
+        let (job, prepared) = settle(JobFile::parse("axes.toml", text).unwrap()).unwrap();
+        let mut last = [0; 3];
+        Machine::load(&prepared)
+            .unwrap()
+            .run(|sample| {
+                last = sample.cl_nm;
+                true
+            })
+            .unwrap();
+        assert_eq!(job.machine.home_mm, Some([0.0, 0.0, 60.0]));
+        assert_eq!(last, [0, 0, 60_000_000]);
+    }
 }

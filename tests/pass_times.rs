@@ -1,0 +1,203 @@
+//! How long passes take on a machine with limits, against the best motion that a solver on this machine finds within the same limits, and
+//! straight ones against the closed form that is held to Ruckig.
+#![allow(clippy::unwrap_used, reason = "a test may fail by panic")]
+
+use std::collections::BTreeMap;
+use std::path::Path;
+
+use host_sim::job_file::{Along, JobFile, Pattern};
+use host_sim::machine::Machine;
+use host_sim::motion::point::LineLimits;
+use host_sim::motion::{AxisLimits, PassPath, optimum};
+use host_sim::oracle::Oracle;
+use host_sim::prepare::prepare;
+use interp_core::{Place, State};
+
+/// A machine with the same limits on all axes but a slower z: the one of the README's figures.
+const LIMITS: AxisLimits = AxisLimits {
+    velocity: [100.0, 100.0, 50.0],
+    acceleration: [1000.0; 3],
+    jerk: [20_000.0; 3],
+};
+/// What a pass may take, over the best that is known: asked is a tenth more.
+const ABOVE: f64 = 1.10;
+/// The same of a straight pass, over the exact time, and periods for its parts, each of which takes whole ones.
+const ABOVE_STRAIGHT: f64 = 1.02;
+const WHOLE_PERIODS: f64 = 3.0;
+
+fn on_machine(name: &str, times: f64) -> JobFile {
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join(format!("../jobs/{name}.toml"));
+    let job = JobFile::load(&path).unwrap();
+    let feed_mm_s = times * job.feed_mm_s();
+    limited(job, feed_mm_s)
+}
+
+fn limited(mut job: JobFile, feed_mm_s: f64) -> JobFile {
+    job.feed_mm_min = 60.0 * feed_mm_s;
+    job.machine.velocity_max_mm_s = Some(LIMITS.velocity);
+    job.machine.acceleration_max_mm_s2 = Some(LIMITS.acceleration);
+    job.machine.jerk_max_mm_s3 = Some(LIMITS.jerk);
+    job
+}
+
+/// A pass as the core ran it.
+#[derive(Clone, Copy)]
+struct Ran {
+    side: f64,
+    /// From its first sample to its last, s.
+    time_s: f64,
+}
+
+/// Runs a job until the end of its pass `last`.
+fn run(job: &JobFile, last: u32) -> BTreeMap<u32, Ran> {
+    let prepared = prepare(job).unwrap();
+    let mut passes = BTreeMap::<u32, (Place, u32)>::new();
+    let mut machine = Machine::load(&prepared).unwrap();
+    machine
+        .run(|sample| {
+            if sample.state == State::Running {
+                passes.entry(sample.pass).or_insert((sample.side, 0)).1 += 1;
+            }
+            sample.pass <= last
+        })
+        .unwrap();
+    let ran = |(pass, (side, samples)): (u32, (Place, u32))| {
+        let [u, v] = prepared.parameters(Place::default(), side);
+        let ran = Ran {
+            side: if job.along == Along::U { v } else { u },
+            time_s: f64::from(samples - 1) * job.machine.period_s(),
+        };
+        (pass, ran)
+    };
+    passes
+        .into_iter()
+        .filter(|(pass, _)| *pass <= last)
+        .map(ran)
+        .collect()
+}
+
+/// Time of a pass over that of the best motion known, and over the bound that no motion is below.
+fn compared(job: &JobFile, oracle: &Oracle, ran: &Ran) -> [f64; 2] {
+    let path = PassPath::of_pass(oracle, ran.side).unwrap();
+    let best = optimum(&path, job.feed_mm_s(), &LIMITS, job.machine.period_s()).unwrap();
+    // What it is held against keeps the limits, and is no faster than can be.
+    assert!(best.uses.iter().all(|used| *used <= 1.0 + 1e-9), "{best:?}");
+    assert!(best.lower_bound_s <= best.feasible_s, "{best:?}");
+    [best.feasible_s, best.lower_bound_s].map(|best| ran.time_s / best)
+}
+
+/// First passes of some sample jobs, at their own feed and at some that the axes cannot hold everywhere.
+#[test]
+fn passes_take_a_tenth_more_than_the_best_at_most() {
+    let mut off = String::new();
+    for (name, times) in [
+        ("plate", 1.0),
+        ("plate", 3.0),
+        ("plate_v", 1.0),
+        ("freeform", 1.0),
+        ("sphere_cap", 3.0),
+        ("torus", 6.0),
+    ] {
+        let job = on_machine(name, times);
+        let oracle = Oracle::new(&job).unwrap();
+        let [over_best, over_bound] = compared(&job, &oracle, &run(&job, 0)[&0]);
+        println!("{name}, {times} x feed: {over_best:.4} of the best, {over_bound:.4} of the bound");
+        if over_best > ABOVE {
+            off += &format!("{name}, {times} x feed: {over_best}\n");
+        }
+        assert!(
+            over_bound >= 1.0 - 1e-3,
+            "{name}: faster than can be, {over_bound}"
+        );
+    }
+    assert!(off.is_empty(), "{off}");
+}
+
+/// A straight pass of this length, along x and y, on the machine above; time of the core's over the exact one, both in s.
+fn straight(length_mm: f64, feed_mm_s: f64) -> [f64; 2] {
+    let scale = length_mm / 80.0_f64.hypot(20.0);
+    let text = include_str!("../jobs/ruled_reconstructed.toml").replace("along = \"u\"", "along = \"v\"");
+    let text = format!("{text}\n[placement]\nscale = {scale}\n");
+    let job = limited(JobFile::parse("straight", &text).unwrap(), feed_mm_s);
+    // From (20, y, z) to (100, y - 20, z), times the scale.
+    let slope = 80.0 / 80.0_f64.hypot(20.0);
+    let exact = LineLimits {
+        velocity: (LIMITS.velocity[0] / slope).min(feed_mm_s),
+        acceleration: LIMITS.acceleration[0] / slope,
+        jerk: LIMITS.jerk[0] / slope,
+    };
+    [run(&job, 0)[&0].time_s, exact.rest_to_rest_s(length_mm)]
+}
+
+/// Passes along the straight lines of a ruled surface, long and short, slow and fast. Not here: faster ones on shorter passes, which take up to
+/// 1.31 of it, because the feed looks eight cells ahead and a pass of one patch has 64, however short (the README says so).
+#[test]
+fn straight_passes_take_the_time_of_the_exact_solution() {
+    const CASES: [(f64, &[f64]); 6] = [
+        (1.0, &[1.0, 3.0]),
+        (3.0, &[1.0, 10.0]),
+        (10.0, &[1.0, 10.0, 30.0]),
+        (30.0, &[1.0, 10.0, 30.0, 60.0]),
+        (82.0, &[1.0, 10.0, 30.0, 60.0, 100.0, 200.0]),
+        (300.0, &[1.0, 10.0, 30.0, 60.0, 100.0, 200.0]),
+    ];
+    let mut off = String::new();
+    for (length_mm, feeds_mm_s) in CASES {
+        for feed_mm_s in feeds_mm_s {
+            let [took, exact] = straight(length_mm, *feed_mm_s);
+            let over = (took - WHOLE_PERIODS * 1e-3) / exact;
+            println!("{length_mm} mm, {feed_mm_s} mm/s: {took:.4} s, exactly {exact:.4} s, {over:.4}");
+            if over > ABOVE_STRAIGHT || took < exact - 1e-3 {
+                off += &format!("{length_mm} mm, {feed_mm_s} mm/s: {took} s, exactly {exact} s\n");
+            }
+        }
+    }
+    assert!(off.is_empty(), "{off}");
+}
+
+/// All sample jobs, seven passes of each; at their own feed, which is what is asked, and at three times that, where knots that lie near to each
+/// other cost more (the README says how much). The table of the README's figure:
+/// `cargo test --release -p integration-tests --test pass_times -- --ignored --nocapture`, some minutes.
+#[test]
+#[ignore = "a campaign of minutes"]
+fn seven_passes_of_every_job() {
+    let mut worst = 0.0_f64;
+    println!(
+        "{:<22}{:>6}{:>9}{:>14}{:>14}{:>14}",
+        "job", "feed", "passes", "best, most", "best, mean", "bound, most"
+    );
+    for name in [
+        "plate",
+        "plate_v",
+        "freeform",
+        "torus",
+        "sphere_cap",
+        "ruled_printed",
+        "ruled_reconstructed",
+        "revolved_v",
+        "revolved",
+        "far_plate",
+    ] {
+        for times in [1.0, 3.0] {
+            let mut job = on_machine(name, times);
+            job.pattern = Pattern::Zigzag;
+            let oracle = Oracle::new(&job).unwrap();
+            let passes = run(&job, u32::MAX);
+            let last = passes.len() - 1;
+            let chosen = (0..7).map(|k| &passes[&u32::try_from(last * k / 6).unwrap()]);
+            let all: Vec<[f64; 2]> = chosen.map(|ran| compared(&job, &oracle, ran)).collect();
+            let most = |k: usize| all.iter().map(|over| over[k]).fold(0.0, f64::max);
+            #[allow(clippy::cast_precision_loss, reason = "small counts")]
+            let mean = all.iter().map(|over| over[0]).sum::<f64>() / all.len() as f64;
+            let [best, bound] = [most(0), most(1)];
+            println!(
+                "{name:<22}{times:>6}{:>9}{best:>14.4}{mean:>14.4}{bound:>14.4}",
+                passes.len()
+            );
+            if times == 1.0 {
+                worst = worst.max(best);
+            }
+        }
+    }
+    assert!(worst <= ABOVE, "{worst}");
+}
