@@ -21,6 +21,10 @@ use crate::remote::{Session, drive};
 /// Ticks of a run that are tried with all that can come together.
 const TRIED: usize = 2;
 
+/// Ticks that a stop is waited for at a time, and how often: ten minutes of it.
+const STOP_TICKS: u32 = 10_000;
+const SETTLE_ROUNDS: u32 = 60;
+
 /// QEMU, the line to the board in it, and what the plugin writes.
 pub struct Lab {
     session: Session,
@@ -161,14 +165,24 @@ impl Lab {
         }
     }
 
-    /// Gives up what runs.
+    /// Gives up what runs. On a machine with limits the tool slows down along its path first, and where a fault is behind that, the
+    /// fault is left to be acknowledged.
     fn settle(&mut self) -> Result<(), BudgetError> {
-        let state = self.session.status()?.state;
-        if !matches!(state, State::Idle | State::Ready | State::Finished) {
-            self.session.command(&Request::Abort)?;
-            self.pass(1)?;
+        let mut state = self.session.status()?.state;
+        for _ in 0..SETTLE_ROUNDS {
+            if matches!(state, State::Idle | State::Ready | State::Finished) {
+                return self.commands(&[Request::Clock(Clock::Lockstep)]);
+            }
+            let ticks = if state == State::Stopping {
+                STOP_TICKS
+            } else {
+                self.session.command(&Request::Abort)?;
+                1
+            };
+            state = self.pass(ticks)?.state;
         }
-        self.commands(&[Request::Clock(Clock::Lockstep)])
+        let what = format!("a run does not end: {}", state.name());
+        Err(BudgetError::Figures(what))
     }
 
     /// Loads a job, and runs its first ticks.
