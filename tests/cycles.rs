@@ -357,13 +357,13 @@ fn the_image_is_bounded() {
     let analysis = graph::analyse(&path).unwrap();
     assert!(analysis.task.len() > 5, "{:?}", analysis.task);
     assert_eq!(analysis.lost, [""; 0], "not followed");
-    assert_eq!(analysis.panics(), [""; 0], "in the sample task");
-    assert_eq!(
-        analysis.unbounded(),
-        [""; 0],
-        "loops without a bound in host-sim/src/budget/graph/bounds.rs"
+    let unbounded = analysis.unbounded();
+    assert!(
+        unbounded.is_empty(),
+        "loops without a bound in host-sim/src/budget/graph/bounds.rs: {unbounded:#?}"
     );
     assert_eq!(analysis.stale(), [""; 0], "bounds without a loop");
+    assert_eq!(analysis.panics(), [""; 0], "in the sample task");
     let sizes = image::sizes(&path).unwrap();
     assert!(u64::from(analysis.stack_bytes()) < sizes.stack_room);
 }
