@@ -11,7 +11,7 @@ use protocol::message::{Clock, Configuration, FaultReport, Report, Request, Stat
 
 use super::BudgetError;
 use super::figures::{Model, whole};
-use super::measure::Bench;
+use super::measure::{Bench, yields_sample};
 use crate::prepare::Prepared;
 use crate::remote::operate::{self, Setup};
 use crate::remote::qemu::Qemu;
@@ -82,13 +82,6 @@ impl Run {
             })
             .collect()
     }
-}
-
-/// Whether a tick came as far as the cutter location; one that faults there does not count.
-fn yields_sample(record: &Record) -> bool {
-    [Stage::Interval, Stage::Feed]
-        .iter()
-        .any(|stage| record.stages[*stage as usize].nominal > 0)
 }
 
 /// Name of a fault; the board's may be of another version.

@@ -34,12 +34,7 @@ const BOUNDS: &[(&str, u32, &str)] = &[
     (
         "firmware::drivers::safety_inputs::SafetyInputs::gather",
         40,
-        "lines of a board's table, each on one of PORTS_MAX ports",
-    ),
-    (
-        "firmware::drivers::safety_inputs::SafetyInputs::read",
-        4,
-        "ports: PORTS_MAX",
+        "lines of a board's table, and for each of them PORTS_MAX ports",
     ),
     ("controller::step_output::StepOutput::turn", 3, "axes"),
     (
