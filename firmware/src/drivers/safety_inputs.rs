@@ -24,6 +24,14 @@ struct Watched {
     seen: u32,
 }
 
+impl Watched {
+    /// The pins as they are now.
+    #[inline(always)]
+    fn pins(&self, ports: &impl ReadPorts) -> u32 {
+        ports.input(self.port) & self.mask
+    }
+}
+
 /// The board's safety inputs.
 pub(crate) struct SafetyInputs<P> {
     ports: P,
@@ -83,14 +91,14 @@ impl<P: ReadPorts> SafetyInputs<P> {
     /// The inputs that are asserted now.
     #[inline]
     pub(crate) fn read(&mut self) -> InputLines {
-        let mut changed = false;
-        for watched in &mut self.watched {
-            let pins = self.ports.input(watched.port) & watched.mask;
-            changed |= pins != watched.seen;
-            watched.seen = pins;
-        }
-        if changed {
-            self.gather();
+        let [first, second, third, fourth] = &self.watched;
+        // Written out: this runs in every tick, and a loop in a crate that is compiled for size stays one.
+        let ports = &self.ports;
+        let (a, b) = (first.pins(ports), second.pins(ports));
+        let (c, d) = (third.pins(ports), fourth.pins(ports));
+        let changed = (a ^ first.seen) | (b ^ second.seen) | (c ^ third.seen) | (d ^ fourth.seen);
+        if changed != 0 {
+            self.gather([a, b, c, d]);
         }
         self.lines
     }
@@ -98,7 +106,10 @@ impl<P: ReadPorts> SafetyInputs<P> {
     /// Works out what the pins mean.
     #[cold]
     #[inline(never)]
-    fn gather(&mut self) {
+    fn gather(&mut self, pins: [u32; PORTS_MAX]) {
+        for (watched, pins) in self.watched.iter_mut().zip(pins) {
+            watched.seen = pins;
+        }
         let mut lines = InputLines::NONE;
         for line in self.board {
             let of_port = |watched: &&Watched| watched.port as u8 == line.pin.port as u8;

@@ -3,13 +3,13 @@
 //! The code comes with the plan, because the function that would read it from QEMU has changed between versions.
 
 /// First word of the file: `ISOP` and a version.
-const MAGIC: u32 = 0x4953_4f04;
+const MAGIC: u32 = 0x4953_4f05;
 
 /// Words before the code.
 const HEAD_WORDS: usize = 5;
 
 /// Stages that cycles are charged to.
-pub const STAGES: usize = 10;
+pub const STAGES: usize = 11;
 
 /// A stage of the sample task.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
@@ -35,6 +35,8 @@ pub enum Stage {
     Pulses = 8,
     /// The feed within the axes' limits, the look ahead at the next pass, links.
     Feed = 9,
+    /// A sample is counted into the run's digest: takes cycles in those ticks that yield a sample, and in no other.
+    Count = 10,
 }
 
 impl Stage {
@@ -50,6 +52,7 @@ impl Stage {
         Self::Exception,
         Self::Pulses,
         Self::Feed,
+        Self::Count,
     ];
 
     /// Name in tables and JSON.
@@ -66,6 +69,7 @@ impl Stage {
             Self::Exception => "exception entry and exit",
             Self::Pulses => "pulses",
             Self::Feed => "feed",
+            Self::Count => "digest",
         }
     }
 

@@ -38,7 +38,7 @@ impl Model {
 }
 
 /// What is reported: a name, and the stages whose cycles are added up.
-const ROWS: [(&str, &[Stage]); 12] = [
+const ROWS: [(&str, &[Stage]); 13] = [
     ("contact: step", &[Stage::Step]),
     ("contact: surface", &[Stage::Surface]),
     ("contact", &[Stage::Step, Stage::Surface]),
@@ -51,6 +51,7 @@ const ROWS: [(&str, &[Stage]); 12] = [
     ("patch change", &[Stage::PatchChange]),
     ("pass change", &[Stage::PassChange]),
     ("feed", &[Stage::Feed]),
+    ("digest", &[Stage::Count]),
     ("everything else", &[Stage::Rest]),
     ("exception entry and exit", &[Stage::Exception]),
     ("pulses", &[Stage::Pulses]),

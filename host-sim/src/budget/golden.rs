@@ -32,15 +32,6 @@ pub fn worst_job() -> PathBuf {
     workspace().join("tests/golden/worst_tick.toml")
 }
 
-/// Name of the job that asks 400 kHz of three axes.
-pub const PULSES: &str = "three axes at 400 kHz";
-
-/// That job.
-#[must_use]
-pub fn pulses_job() -> PathBuf {
-    workspace().join("tests/golden/pulses.toml")
-}
-
 /// Rows of the worst tick of [`worst_job`].
 ///
 /// # Errors

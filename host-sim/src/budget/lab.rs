@@ -11,7 +11,7 @@ use protocol::message::{Clock, Configuration, FaultReport, Report, Request, Stat
 
 use super::BudgetError;
 use super::figures::{Model, whole};
-use super::measure::Bench;
+use super::measure::{Bench, yields_sample};
 use crate::prepare::Prepared;
 use crate::remote::operate::{self, Setup};
 use crate::remote::qemu::Qemu;
@@ -20,6 +20,10 @@ use crate::remote::{Session, drive};
 
 /// Ticks of a run that are tried with all that can come together.
 const TRIED: usize = 2;
+
+/// Ticks that a stop is waited for at a time, and how often: ten minutes of it.
+const STOP_TICKS: u32 = 10_000;
+const SETTLE_ROUNDS: u32 = 60;
 
 /// QEMU, the line to the board in it, and what the plugin writes.
 pub struct Lab {
@@ -78,13 +82,6 @@ impl Run {
             })
             .collect()
     }
-}
-
-/// Whether a tick came as far as the cutter location; one that faults there does not count.
-fn yields_sample(record: &Record) -> bool {
-    [Stage::Interval, Stage::Feed]
-        .iter()
-        .any(|stage| record.stages[*stage as usize].nominal > 0)
 }
 
 /// Name of a fault; the board's may be of another version.
@@ -161,14 +158,24 @@ impl Lab {
         }
     }
 
-    /// Gives up what runs.
+    /// Gives up what runs. On a machine with limits the tool slows down along its path first, and where a fault is behind that, the
+    /// fault is left to be acknowledged.
     fn settle(&mut self) -> Result<(), BudgetError> {
-        let state = self.session.status()?.state;
-        if !matches!(state, State::Idle | State::Ready | State::Finished) {
-            self.session.command(&Request::Abort)?;
-            self.pass(1)?;
+        let mut state = self.session.status()?.state;
+        for _ in 0..SETTLE_ROUNDS {
+            if matches!(state, State::Idle | State::Ready | State::Finished) {
+                return self.commands(&[Request::Clock(Clock::Lockstep)]);
+            }
+            let ticks = if state == State::Stopping {
+                STOP_TICKS
+            } else {
+                self.session.command(&Request::Abort)?;
+                1
+            };
+            state = self.pass(ticks)?.state;
         }
-        self.commands(&[Request::Clock(Clock::Lockstep)])
+        let what = format!("a run does not end: {}", state.name());
+        Err(BudgetError::Figures(what))
     }
 
     /// Loads a job, and runs its first ticks.

@@ -31,6 +31,11 @@ pub struct Ticks {
     pub stack_bytes: u32,
 }
 
+/// Whether the board made a sample in a tick.
+pub(super) fn yields_sample(record: &Record) -> bool {
+    record.stages[Stage::Count as usize].nominal > 0
+}
+
 fn file_error(path: &Path, error: &std::io::Error) -> BudgetError {
     BudgetError::File(path.into(), error.to_string())
 }
@@ -98,12 +103,7 @@ impl Bench {
             let what = format!("{} instructions are unknown to the decoder", last.unknown);
             return Err(BudgetError::Figures(what));
         }
-        let is_moving = |record: &Record| {
-            [Stage::Offset, Stage::Feed]
-                .iter()
-                .any(|stage| record.stages[*stage as usize].nominal > 0)
-        };
-        records.retain(is_moving);
+        records.retain(yields_sample);
         if records.len() != samples as usize {
             let what = format!("{} ticks with a sample, the board made {samples}", records.len());
             return Err(BudgetError::Figures(what));

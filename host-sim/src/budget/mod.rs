@@ -21,7 +21,7 @@ pub mod stages;
 use std::path::PathBuf;
 
 use crate::remote::RemoteError;
-use crate::remote::qemu::QemuError;
+use crate::remote::qemu::{QemuError, workspace};
 
 /// Cycles of a period: 1 ms at 168 MHz.
 pub const PERIOD_CYCLES: u32 = 168_000;
@@ -38,6 +38,26 @@ pub const SURFACES: [(&str, &str); 6] = [
     ("NURBS non-rational", "freeform"),
     ("NURBS rational", "torus"),
 ];
+
+/// Jobs of `tests/golden` that are counted besides: those that ask pulses or limits, which no kind of surface has to do with.
+pub const FURTHER: [(&str, &str); 4] = [
+    ("three axes at 400 kHz", "pulses"),
+    ("limits, zig", "limits_zig"),
+    ("limits, zigzag", "limits_zigzag"),
+    ("limits, three axes at 400 kHz", "limits_pulses"),
+];
+
+/// All jobs of the table: their names and files.
+#[must_use]
+pub fn jobs() -> Vec<(&'static str, PathBuf)> {
+    let of = |folder: &str, list: &[(&'static str, &str)]| -> Vec<_> {
+        let folder = workspace().join(folder);
+        list.iter()
+            .map(|(name, job)| (*name, folder.join(format!("{job}.toml"))))
+            .collect()
+    };
+    [of("jobs", &SURFACES), of("tests/golden", &FURTHER)].concat()
+}
 
 /// Why there is no figure.
 #[derive(Debug, thiserror::Error)]

@@ -41,7 +41,13 @@ const STAGES: [(&str, &str, Stage); 23] = [
     ("link", "", Stage::Feed),
 ];
 
-/// Crates of which every function is everything else.
+/// The function that counts a sample in.
+const COUNT: &str = "controller::realtime::Run::add";
+
+/// What it calls: a helper.
+const DIGEST: &str = "protocol::digest";
+
+/// Crates of which every other function is everything else.
 const REST: [&str; 6] = [
     "controller",
     "protocol",
@@ -56,6 +62,8 @@ const REST: [&str; 6] = [
 enum Entry {
     /// A line of [`STAGES`].
     Line(usize),
+    /// [`COUNT`].
+    Count,
     /// A crate of [`REST`].
     Rest,
     /// Charged to its caller.
@@ -71,6 +79,8 @@ impl Entry {
             .map(|part| part.split('<').next().unwrap_or(part));
         match parts.next() {
             Some("interp_core") => {}
+            Some(_) if path == COUNT => return Self::Count,
+            Some("protocol") if path.starts_with(DIGEST) => return Self::Helper,
             Some(root) if REST.contains(&root) => return Self::Rest,
             _ => return Self::Helper,
         }
@@ -86,6 +96,7 @@ impl Entry {
     const fn stage(self) -> Option<Stage> {
         match self {
             Self::Line(line) => Some(STAGES[line].2),
+            Self::Count => Some(Stage::Count),
             Self::Rest => Some(Stage::Rest),
             Self::Helper => None,
         }
@@ -176,6 +187,7 @@ pub fn map(lines: &Loader, base: u32, code: &[u8]) -> Result<Vec<Option<Stage>>,
     let missing: Vec<String> = (0..STAGES.len())
         .filter(|line| !found.contains(&Entry::Line(*line)))
         .map(|line| format!("{}::{}", STAGES[line].0, STAGES[line].1))
+        .chain((!found.contains(&Entry::Count)).then(|| COUNT.to_owned()))
         .collect();
     if missing.is_empty() { Ok(map) } else { Err(missing) }
 }
@@ -201,7 +213,9 @@ mod tests {
             None
         );
         assert_eq!(stage("core::num::<impl u32>::wrapping_add"), None);
-        assert_eq!(stage("controller::realtime::Run::add"), Some(Stage::Rest));
+        assert_eq!(stage("controller::realtime::Run::add"), Some(Stage::Count));
+        assert_eq!(stage("controller::realtime::Run::end_pass"), Some(Stage::Rest));
+        assert_eq!(stage("protocol::digest::Digest::sample"), None);
     }
 
     #[test]

@@ -15,7 +15,7 @@ use crate::budget::graph::{self, Analysis, EXCEPTION_BYTES};
 use crate::budget::image::{self, Sizes};
 use crate::budget::lab::Lab;
 use crate::budget::measure::{Bench, Ticks};
-use crate::budget::{BudgetError, PERIOD_CYCLES, SURFACES, TICKS, chart, golden};
+use crate::budget::{self, BudgetError, PERIOD_CYCLES, TICKS, chart, golden};
 use crate::operations::{self, Count, Operations};
 use crate::remote::qemu;
 
@@ -28,7 +28,7 @@ const BIN_CYCLES: u32 = 50;
 #[derive(Debug, Args)]
 #[command(verbatim_doc_comment)]
 pub(super) struct Arguments {
-    /// Job files to count instead of the six kinds of surface.
+    /// Job files to count instead of the golden table's.
     jobs: Vec<PathBuf>,
     /// Ticks of each job.
     #[arg(long, default_value_t = TICKS, value_parser = clap::value_parser!(u32).range(1..), allow_negative_numbers = true)]
@@ -79,12 +79,9 @@ type Directions = BTreeMap<String, (String, Map<String, Value>)>;
 /// The jobs to count, with their names.
 fn jobs(arguments: &Arguments) -> Vec<(String, PathBuf)> {
     if arguments.jobs.is_empty() {
-        let folder = qemu::workspace().join("jobs");
-        let path = |job: &str| folder.join(format!("{job}.toml"));
-        SURFACES
-            .iter()
-            .map(|(name, job)| ((*name).to_owned(), path(job)))
-            .chain([(golden::PULSES.to_owned(), golden::pulses_job())])
+        budget::jobs()
+            .into_iter()
+            .map(|(name, path)| (name.to_owned(), path))
             .collect()
     } else {
         let name = |path: &PathBuf| path.display().to_string();

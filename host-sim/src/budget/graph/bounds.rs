@@ -4,6 +4,12 @@
 /// Place of a loop, the rounds that it makes at most, and why.
 const BOUNDS: &[(&str, u32, &str)] = &[
     ("compiler_builtins::arm::__aeabi_memcpy4", 512, COPIED),
+    ("compiler_builtins::arm::__aeabi_memset4", 512, COPIED),
+    (
+        "compiler_builtins::int::specialized_div_rem::u64_div_rem",
+        8,
+        "the quotient's 32 bits that the chip's own division leaves, four a round",
+    ),
     (
         "compiler_builtins::mem::impls::copy_forward::copy_forward_aligned_words",
         512,
@@ -19,22 +25,32 @@ const BOUNDS: &[(&str, u32, &str)] = &[
         512,
         COPIED,
     ),
+    (
+        "compiler_builtins::mem::impls::set_bytes::set_bytes_bytes",
+        15,
+        "less than is filled by words",
+    ),
     ("firmware::drivers::drive_enable::DriveEnable::switch", 3, "axes"),
     (
         "firmware::drivers::safety_inputs::SafetyInputs::gather",
         40,
-        "lines of a board's table, each on one of PORTS_MAX ports",
-    ),
-    (
-        "firmware::drivers::safety_inputs::SafetyInputs::read",
-        4,
-        "ports: PORTS_MAX",
+        "lines of a board's table, and for each of them PORTS_MAX ports",
     ),
     ("controller::step_output::StepOutput::turn", 3, "axes"),
     (
         "interp_core::run::Run::step_far",
         2,
         "patches of an arc: CROSSINGS_MAX + 1",
+    ),
+    (
+        "interp_core::feed::plan::Plan::add",
+        2,
+        "cells before a station that its differences say something about: STENCIL_CELLS",
+    ),
+    (
+        "interp_core::schedule::apart",
+        16,
+        "spans between two passes: WALK_MAX",
     ),
     (
         "interp_core::schedule::next_side",
