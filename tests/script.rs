@@ -93,10 +93,8 @@ fn same(session: &mut Session, job: &Prepared, text: &str, state: State) {
     let (played, schedule, path) = here(job, &script);
     assert_eq!(played.state, state);
     assert!(path.len() > 20);
-    let setup = Setup {
-        home_nm: Some(job.header.axes.map_or([0; 3], |axes| axes.home_nm)),
-        ..Setup::simulated(Configuration::DEFAULT)
-    };
+    let home_nm = job.header.axes.map_or([0; 3], |axes| axes.home_nm);
+    let setup = Setup::homed(Configuration::DEFAULT, home_nm);
     operate::make_ready(session, &setup).unwrap();
     drive::upload(session, job, |_| {}).unwrap();
     let status = play_there(session, &script, &schedule).unwrap();
