@@ -1,7 +1,7 @@
 //! Messages of any content, for properties.
 
 use interp_core::{
-    job::{Header, Pattern, Spacing, SurfaceKind, ToolSide},
+    job::{Axes, Header, Pattern, Spacing, SurfaceKind, ToolSide},
     sample::{Place, Sample, State},
     steps::{AxisSteps, StepConfig},
 };
@@ -24,8 +24,25 @@ fn real() -> impl Strategy<Value = f32> {
 }
 
 prop_compose! {
+    fn any_axes()(reals in prop::array::uniform11(real()), travel_nm in any::<[[i32; 2]; 3]>(), home_nm in any::<[i32; 3]>(),
+                  safe_z_nm: i32) -> Axes {
+        let [vx, vy, vz, ax, ay, az, jx, jy, jz, chord_mm, plunge_mm] = reals;
+        Axes {
+            velocity_mm_s: [vx, vy, vz],
+            acceleration_mm_s2: [ax, ay, az],
+            jerk_mm_s3: [jx, jy, jz],
+            chord_mm,
+            travel_nm,
+            home_nm,
+            plunge_mm,
+            safe_z_nm,
+        }
+    }
+}
+
+prop_compose! {
     fn any_header()(codes in (0_u8..4, any::<bool>(), any::<bool>(), any::<bool>()), spans in any::<[u16; 2]>(),
-                    values in [real(), real(), real(), real()]) -> Header {
+                    values in [real(), real(), real(), real()], axes in prop::option::of(any_axes())) -> Header {
         Header {
             kind: SurfaceKind::from_code(codes.0).unwrap(),
             pattern: if codes.1 { Pattern::Zigzag } else { Pattern::Zig },
@@ -37,7 +54,7 @@ prop_compose! {
             feed_mm_s: values[1],
             scallop_mm: values[2],
             period_s: values[3],
-            axes: None,
+            axes,
         }
     }
 }
@@ -168,6 +185,8 @@ fn any_reason() -> impl Strategy<Value = Reason> {
             fault: FaultReport { code, value }
         }),
         (any::<u32>(), any::<u32>()).prop_map(|(most, wanted)| Reason::OutOfRange { most, wanted }),
+        (any::<[i32; 3]>(), any::<Option<[i32; 3]>>())
+            .prop_map(|(home_nm, stands_nm)| Reason::NotAtHome { home_nm, stands_nm }),
         (any::<u8>(), real(), any::<Option<u32>>()).prop_map(|(code, value, record)| Reason::Job {
             fault: FaultReport { code, value },
             record

@@ -1,6 +1,8 @@
 //! Feed within the axes' limits, links, and what an operator does, on the core itself.
 #![allow(clippy::unwrap_used, reason = "a test may fail by panic")]
 
+use std::sync::OnceLock;
+
 use host_sim::job_file::JobFile;
 use host_sim::prepare::prepare;
 use integration_tests::dome;
@@ -267,6 +269,56 @@ fn undisturbed(pattern: Pattern) -> (Header, Vec<i32>, Vec<Place>) {
     (header, words, whole)
 }
 
+/// Both patterns, worked out once.
+fn undisturbed_once(zigzag: bool) -> &'static (Header, Vec<i32>, Vec<Place>) {
+    static BOTH: OnceLock<[(Header, Vec<i32>, Vec<Place>); 2]> = OnceLock::new();
+    &BOTH.get_or_init(|| [Pattern::Zig, Pattern::Zigzag].map(undisturbed))[usize::from(zigzag)]
+}
+
+/// A million sequences take hours: as many as `SEQUENCES` says, or so many as take a minute.
+#[test]
+#[ignore = "a minute or more; run it after a change of the feed, with SEQUENCES=1000000 for a night"]
+fn no_sequence_of_commands_breaks_a_limit_long() {
+    let cases = std::env::var("SEQUENCES").map_or(4000, |count| count.parse().unwrap());
+    let config = ProptestConfig {
+        cases,
+        failure_persistence: None,
+        ..ProptestConfig::default()
+    };
+    let sequence = (any::<bool>(), proptest::collection::vec(command(), 0..30));
+    proptest::test_runner::TestRunner::new(config)
+        .run(&sequence, |(zigzag, commands)| {
+            let (header, words, whole) = undisturbed_once(zigzag);
+            check_commands(header, words, whole, &commands);
+            Ok(())
+        })
+        .unwrap();
+}
+
+/// Held, slowed down and sped up in all kinds of places, and resumed each time: every pass of the undisturbed run, and home.
+#[test]
+fn a_job_interrupted_and_resumed_takes_the_same_path() {
+    for zigzag in [false, true] {
+        let (header, words, whole) = undisturbed_once(zigzag);
+        let interruptions: Vec<(u32, Request, u8)> = (0..60)
+            .flat_map(|turn| {
+                let percent = [100, 0, 200, 35][turn as usize % 4];
+                [
+                    (97 * (turn % 7), Request::Hold, percent),
+                    (turn, Request::Resume, 100),
+                ]
+            })
+            .collect();
+        let (samples, core) = scripted(header, words, &interruptions);
+        assert_eq!((core.state(), core.fault()), (State::Finished, None));
+        assert_eq!(sides(&samples), *whole);
+        let home_nm = header.axes.unwrap().home_nm;
+        assert_eq!(samples.last().map(|sample| sample.cl_nm), Some(home_nm));
+        assert!(samples.iter().any(|sample| sample.state == State::Held));
+        check_commands(header, words, whole, &interruptions);
+    }
+}
+
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(if cfg!(debug_assertions) { 150 } else { 2000 }))]
 
@@ -275,9 +327,8 @@ proptest! {
         zigzag in any::<bool>(),
         commands in proptest::collection::vec(command(), 0..14),
     ) {
-        let pattern = if zigzag { Pattern::Zigzag } else { Pattern::Zig };
-        let (header, words, whole) = undisturbed(pattern);
-        check_commands(&header, &words, &whole, &commands);
+        let (header, words, whole) = undisturbed_once(zigzag);
+        check_commands(header, words, whole, &commands);
     }
 }
 

@@ -11,7 +11,7 @@ use any_message::{any_reply, any_request};
 use controller::link::Link;
 use integration_tests::{HELLO, Mock, frame, is_bad_frame};
 use interp_core::{
-    job::{Header, Pattern, Spacing, SurfaceKind, ToolSide},
+    job::{Axes, Header, Pattern, Spacing, SurfaceKind, ToolSide},
     sample::{Place, Sample, State},
     steps::{AxisSteps, StepConfig},
 };
@@ -50,7 +50,21 @@ fn steps() -> StepConfig {
     }
 }
 
-/// One of each, in order of the codes.
+/// What the axes of a machine with limits can do.
+fn axes() -> Axes {
+    Axes {
+        velocity_mm_s: [100.0, 80.0, 50.0],
+        acceleration_mm_s2: [1000.0, 800.0, 500.0],
+        jerk_mm_s3: [20_000.0, 16_000.0, 10_000.0],
+        chord_mm: 0.005,
+        travel_nm: [[-1, 1], [i32::MIN, i32::MAX], [0, 64]],
+        home_nm: [1, -2, i32::MAX],
+        plunge_mm: 2.0,
+        safe_z_nm: 50_000_000,
+    }
+}
+
+/// One of each, in order of the codes; last, a job for a machine with limits.
 fn requests() -> Vec<Request> {
     vec![
         HELLO,
@@ -83,6 +97,14 @@ fn requests() -> Vec<Request> {
         Request::Stop,
         Request::Simulate {
             lines: InputLines(0x102),
+        },
+        Request::JobBegin {
+            header: Header {
+                axes: Some(axes()),
+                ..header()
+            },
+            words: 1,
+            digest: u64::MAX,
         },
     ]
 }
@@ -191,6 +213,14 @@ fn reasons() -> Vec<Reason> {
             wanted: 201,
         },
         Reason::Unsupported,
+        Reason::NotAtHome {
+            home_nm: [1, -2, i32::MIN],
+            stands_nm: Some([i32::MAX, 0, -64]),
+        },
+        Reason::NotAtHome {
+            home_nm: [0; 3],
+            stands_nm: None,
+        },
     ]
 }
 

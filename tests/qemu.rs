@@ -249,6 +249,8 @@ fn halted(session: &mut Session) -> Status {
 fn an_emergency_stop_ends_the_run_on_the_board() {
     let job = job("sphere_cap");
     let (_qemu, mut session) = board();
+    let setup = Setup::homed(Configuration::DEFAULT, [0; 3]);
+    operate::make_ready(&mut session, &setup).unwrap();
     drive::upload(&mut session, &job, |_| {}).unwrap();
     session.command(&Request::Clock(Clock::Lockstep)).unwrap();
     session.command(&Request::Start).unwrap();
@@ -277,7 +279,6 @@ fn an_emergency_stop_ends_the_run_on_the_board() {
     let lines = InputLines::NONE;
     session.command(&Request::Simulate { lines }).unwrap();
     // Released for some periods, it can be acknowledged; the drives do not come on before.
-    let setup = Setup::simulated(Configuration::DEFAULT);
     while !session.status().unwrap().safety.lines.is_none() {}
     assert!(refused(operate::make_ready(&mut session, &setup)));
     session.command(&Request::Acknowledge).unwrap();

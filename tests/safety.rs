@@ -78,7 +78,7 @@ impl Desk {
     }
 
     fn ready() -> Self {
-        Self::loaded(&Setup::simulated(Configuration::DEFAULT))
+        Self::loaded(&Setup::homed(Configuration::DEFAULT, [0; 3]))
     }
 
     fn tick(&self, ticks: u32) -> Status {
@@ -241,7 +241,7 @@ fn a_host_that_is_gone_finds_its_run_held_and_goes_on_exactly() {
         host_gone,
         host_gone_ticks: 100,
     };
-    let mut desk = Desk::loaded(&Setup::simulated(configuration(HostGone::Hold)));
+    let mut desk = Desk::loaded(&Setup::homed(configuration(HostGone::Hold), [0; 3]));
     desk.running();
     let gone = desk.tick(100);
     assert_eq!(gone.state, State::Held);
@@ -261,7 +261,7 @@ fn a_host_that_is_gone_finds_its_run_held_and_goes_on_exactly() {
     assert_eq!(over.state, State::Finished);
     assert_eq!((over.digest, over.samples), undisturbed());
 
-    let mut desk = Desk::loaded(&Setup::simulated(configuration(HostGone::Finish)));
+    let mut desk = Desk::loaded(&Setup::homed(configuration(HostGone::Finish), [0; 3]));
     desk.running();
     let over = desk.tick(2000);
     assert_eq!((over.state, over.safety.host_gone), (State::Finished, true));
@@ -270,7 +270,7 @@ fn a_host_that_is_gone_finds_its_run_held_and_goes_on_exactly() {
     assert!(!desk.running().safety.host_gone);
 
     // In lockstep there is nobody to miss.
-    let mut desk = Desk::loaded(&Setup::simulated(configuration(HostGone::Hold)));
+    let mut desk = Desk::loaded(&Setup::homed(configuration(HostGone::Hold), [0; 3]));
     desk.ask(Request::Clock(Clock::Lockstep)).unwrap();
     desk.ask(Request::Start).unwrap();
     desk.ask(Request::Run { ticks: 500 }).unwrap();
@@ -314,7 +314,7 @@ fn an_operator_is_told_what_he_did() {
 /// A host that waits for a long pass on the board's own clock says so often enough, and learns that the run is held.
 #[test]
 fn a_host_that_waits_is_not_gone() {
-    let mut setup = Setup::simulated(Configuration::DEFAULT);
+    let mut setup = Setup::homed(Configuration::DEFAULT, [0; 3]);
     (setup.configuration.host_gone, setup.configuration.host_gone_ticks) = (HostGone::Hold, 400);
     let mut desk = Desk::loaded(&setup);
     let (digest, samples) = undisturbed();

@@ -8,11 +8,13 @@ use controller::in_process::Board;
 use host_sim::job_file::JobFile;
 use host_sim::machine::Machine;
 use host_sim::prepare::{Prepared, prepare};
+use host_sim::remote::operate::{self, Setup};
 use host_sim::remote::qemu::{self, Qemu};
 use host_sim::remote::script::{Schedule, play as play_there};
 use host_sim::remote::{Session, drive};
 use host_sim::script::{Played, Script, play};
 use interp_core::State;
+use protocol::message::Configuration;
 
 /// A hold and a resume on the path, requests that the state does not allow, an abort, another run, and an abort while held.
 const SCRIPT: &str = "tick 300: hold\ntick 301: hold\ntick 340: resume\ntick 700: resume\ntick 2500: abort\ntick 2510: hold\ntick 2600: start\n\
@@ -20,9 +22,25 @@ const SCRIPT: &str = "tick 300: hold\ntick 301: hold\ntick 340: resume\ntick 700
 /// Left held, one period after the resume.
 const HELD: &str = "tick 20: hold\ntick 50: resume\ntick 51: hold\n";
 
-fn torus() -> Prepared {
+/// On a machine with limits: all that an operator can do, in every state: on the way there, on passes, between them, while it slows down; to
+/// 200 % and to nothing; given up on the surface and begun again from there; left by a stop.
+const WITHIN_LIMITS: &str = "tick 40: hold\ntick 200: resume\ntick 900: override 200\ntick 1300: hold\ntick 1310: override 35\n\
+    tick 1500: resume\ntick 2200: override 0\ntick 2600: override 120\ntick 3000: hold\ntick 3003: resume\ntick 3400: abort\n\
+    tick 3600: start\ntick 3700: override 100\ntick 6000: hold\ntick 6400: stop\n";
+
+fn torus_file() -> JobFile {
     let path = format!("{}/../jobs/torus.toml", env!("CARGO_MANIFEST_DIR"));
-    prepare(&JobFile::load(path.as_ref()).unwrap()).unwrap()
+    JobFile::load(path.as_ref()).unwrap()
+}
+
+fn torus() -> Prepared {
+    prepare(&torus_file()).unwrap()
+}
+
+fn torus_within_limits() -> Prepared {
+    let mut job = torus_file();
+    job.machine.velocity_max_mm_s = Some([60.0, 60.0, 40.0]);
+    prepare(&job).unwrap()
 }
 
 fn here(job: &Prepared, script: &Script) -> (Played, Schedule, Vec<[i32; 3]>) {
@@ -70,11 +88,15 @@ impl Write for Line {
     }
 }
 
-fn same(session: &mut Session, text: &str, state: State) {
-    let (job, script) = (torus(), Script::parse("script", text).unwrap());
-    let (played, schedule, _) = here(&job, &script);
+fn same(session: &mut Session, job: &Prepared, text: &str, state: State) {
+    let script = Script::parse("script", text).unwrap();
+    let (played, schedule, path) = here(job, &script);
     assert_eq!(played.state, state);
-    drive::upload(session, &job, |_| {}).unwrap();
+    assert!(path.len() > 20);
+    let home_nm = job.header.axes.map_or([0; 3], |axes| axes.home_nm);
+    let setup = Setup::homed(Configuration::DEFAULT, home_nm);
+    operate::make_ready(session, &setup).unwrap();
+    drive::upload(session, job, |_| {}).unwrap();
     let status = play_there(session, &script, &schedule).unwrap();
     assert_eq!(
         (status.digest, status.samples, status.state),
@@ -100,22 +122,25 @@ fn a_run_held_and_resumed_is_the_run_without() {
     assert_eq!(schedule.ends, [2500, 9100]);
 }
 
+/// The scripts, one after the other on one board.
+fn all_the_same(session: &mut Session) {
+    same(session, &torus(), SCRIPT, State::Ready);
+    same(session, &torus_within_limits(), WITHIN_LIMITS, State::Ready);
+    same(session, &torus_within_limits(), "", State::Finished);
+    same(session, &torus(), HELD, State::Held);
+}
+
 #[test]
 fn a_script_does_the_same_behind_a_line() {
     let board = Line {
         board: Box::new(Board::new()),
         waiting: Vec::new(),
     };
-    let mut session = Session::open(Box::new(board), 1).unwrap();
-    same(&mut session, SCRIPT, State::Ready);
-    // What is held is given up before the next job is loaded.
-    same(&mut session, HELD, State::Held);
+    all_the_same(&mut Session::open(Box::new(board), 1).unwrap());
 }
 
 #[test]
 fn a_script_does_the_same_in_qemu() {
     let (_qemu, stream) = Qemu::start(&qemu::firmware().unwrap()).unwrap();
-    let mut session = Session::open(stream, 1).unwrap();
-    same(&mut session, SCRIPT, State::Ready);
-    same(&mut session, HELD, State::Held);
+    all_the_same(&mut Session::open(stream, 1).unwrap());
 }

@@ -85,6 +85,10 @@ impl<const WORDS: usize> Machine for Half<WORDS> {
         self.real_time.order(order)
     }
 
+    fn may_start(&mut self) -> Result<(), Reason> {
+        self.real_time.may_start()
+    }
+
     fn heard(&mut self) {
         self.real_time.heard();
     }

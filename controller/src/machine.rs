@@ -132,6 +132,12 @@ pub trait Machine {
     /// Why not; nothing has changed then.
     fn order(&mut self, order: Order) -> Result<(), Reason>;
 
+    /// [`crate::realtime::RealTime::may_start`].
+    ///
+    /// # Errors
+    /// Why no run may start.
+    fn may_start(&mut self) -> Result<(), Reason>;
+
     /// A frame of the host arrived, whole.
     fn heard(&mut self);
 

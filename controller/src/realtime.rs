@@ -10,6 +10,10 @@
 //! same terms: before ticks are missed.
 //! **Inputs.** Looked at in every tick of the timer, whether time passes or not; what they do is in [`crate::safety`].
 
+mod control;
+mod run;
+mod start;
+
 use interp_core::{
     fault::{Fault, FaultKind, Result},
     interpolator::{Inputs, Interpolator, Request},
@@ -17,14 +21,12 @@ use interp_core::{
     sample::{Sample, State},
     steps::{BUFFER_WORDS, CheckedSteps, Steps},
 };
-use protocol::{
-    digest::Digest,
-    message::{Clock, FaultReport, InputLines, PassDigest, Reason, Report, ResetCause, Status},
-};
+use protocol::message::{Clock, FaultReport, InputLines, Report, ResetCause, Status};
 
+use self::{control::Control, run::Run};
 use crate::{
     machine::{Command, Event, Events},
-    safety::{Order, Safety, Stop, may_start},
+    safety::Stop,
 };
 
 /// What a tick of the sample timer learns of the one before, and of the board.
@@ -36,167 +38,6 @@ pub struct TickInput {
     pub cycles: u32,
     /// The safety inputs, as they are read now.
     pub lines: InputLines,
-}
-
-/// What is kept of a run: counters and digests.
-#[derive(Clone, Copy, Debug)]
-struct Run {
-    samples: u32,
-    digest: Digest,
-    pass: PassDigest,
-    deadline_misses: u32,
-    tick_cycles_max: u32,
-    events_lost: u32,
-}
-
-impl Run {
-    const NEW: Self = Self {
-        samples: 0,
-        digest: Digest::new(),
-        pass: PassDigest {
-            pass: 0,
-            first_tick: 0,
-            samples: 0,
-            digest: Digest::EMPTY,
-            interval: 0.0,
-        },
-        deadline_misses: 0,
-        tick_cycles_max: 0,
-        events_lost: 0,
-    };
-
-    /// Whether the sample is the first of a pass.
-    const fn begins_pass(&self, sample: &Sample) -> bool {
-        self.pass.samples == 0 || sample.pass != self.pass.pass
-    }
-
-    /// Begins the pass of this sample; yields the one before.
-    #[cold]
-    fn begin_pass(&mut self, sample: &Sample, interval: f32) -> Option<PassDigest> {
-        let over = self.end_pass(interval);
-        self.pass.pass = sample.pass;
-        self.pass.first_tick = sample.tick;
-        over
-    }
-
-    /// Counts a sample in. Not generic and not inlined: compiled here for speed, whatever its callers are compiled for.
-    #[inline(never)]
-    fn add(&mut self, sample: &Sample) {
-        self.pass.samples = self.pass.samples.saturating_add(1);
-        self.samples = self.samples.saturating_add(1);
-        self.digest.sample(sample);
-    }
-
-    /// The pass so far, if it has samples; the next sample begins another.
-    fn end_pass(&mut self, interval: f32) -> Option<PassDigest> {
-        let digest = self.digest.value();
-        let samples = core::mem::take(&mut self.pass.samples);
-        (samples > 0).then_some(PassDigest {
-            samples,
-            digest,
-            interval,
-            ..self.pass
-        })
-    }
-}
-
-/// All of the real-time half but the interpolator.
-#[derive(Debug)]
-struct Control {
-    run: Run,
-    credit: u32,
-    tick_budget: u32,
-    clock: Clock,
-    report: Report,
-    /// Waits for a period to pass.
-    request: Request,
-    safety: Safety,
-}
-
-impl Control {
-    const fn new() -> Self {
-        Self {
-            run: Run::NEW,
-            credit: 0,
-            tick_budget: u32::MAX,
-            clock: Clock::Free,
-            report: Report::Digests,
-            request: Request::None,
-            safety: Safety::NEW,
-        }
-    }
-
-    /// Puts an event in its queue, or counts it as lost.
-    fn put(&mut self, event: Event, events: &mut impl Events) {
-        if !events.put(event) {
-            self.run.events_lost = self.run.events_lost.saturating_add(1);
-        }
-    }
-
-    /// Whether nothing led to this sample: the first of a run, and without limits that of each pass.
-    #[inline]
-    const fn jumps(&self, sample: &Sample, has_limits: bool) -> bool {
-        let first = if has_limits { 0 } else { self.run.pass.first_tick };
-        moves(sample.state) && sample.tick == first
-    }
-
-    /// Takes a command up; false for a `Run` that leaves no time, which halts at once.
-    fn obey(&mut self, command: Command) -> bool {
-        match command {
-            // An abort or stop that waits for its period is not to be undone by what comes behind it.
-            Command::Request(_) if self.request == Request::Abort => {}
-            Command::Request(request) if self.request == Request::Stop && request != Request::Abort => {}
-            Command::Request(request) => self.request = request,
-            Command::Clock(clock) => {
-                self.clock = clock;
-                self.credit = 0;
-            }
-            Command::Run { ticks } => {
-                if self.clock == Clock::Lockstep {
-                    self.credit = self.credit.saturating_add(ticks);
-                }
-                return self.credit > 0;
-            }
-            Command::Report(report) => self.report = report,
-            Command::Override { percent } => self.safety.set_override(percent),
-        }
-        true
-    }
-
-    /// Whether the last tick left nothing to note: none was missed, and it took no longer than others and than allowed.
-    #[inline]
-    const fn is_in_time(&self, input: TickInput) -> bool {
-        input.missed == 0 && input.cycles <= self.run.tick_cycles_max && input.cycles <= self.tick_budget
-    }
-
-    /// What becomes of a start whose period passes: a run that is counted from nothing, or no run where it is not safe, which
-    /// the link did not know yet.
-    #[cold]
-    #[inline(never)]
-    fn begin(&mut self) -> Request {
-        if may_start(&self.safety.status()).is_err() {
-            return Request::None;
-        }
-        self.run = Run::NEW;
-        self.safety.begin_run();
-        Request::Start
-    }
-
-    /// Notes misses and cycles; the fault that they are to a tool that moves on a free clock.
-    #[cold]
-    fn note_time(&mut self, input: TickInput) -> Option<Fault> {
-        self.run.deadline_misses = self.run.deadline_misses.saturating_add(input.missed);
-        self.run.tick_cycles_max = self.run.tick_cycles_max.max(input.cycles);
-        if self.clock != Clock::Free {
-            None
-        } else if input.missed > 0 {
-            Some(Fault::new(FaultKind::DeadlineMissed, count(input.missed)))
-        } else if input.cycles > self.tick_budget {
-            Some(Fault::new(FaultKind::TickOverBudget, count(input.cycles)))
-        } else {
-            None
-        }
-    }
 }
 
 /// Whether the tool moves, so that each sample is one of the run.
@@ -358,6 +199,9 @@ impl<S: AsRef<[i32]> + AsMut<[i32]>> RealTime<S> {
             Some(Stop::Trip(fault)) => self.interpolator.trip(fault),
             None => {}
         }
+        if !self.control.safety.drives_on() {
+            self.lose_place();
+        }
         // Told here, because in lockstep no period may come that would tell it.
         if under_way && !self.interpolator.state().is_under_way() {
             self.control.safety.ending = true;
@@ -384,7 +228,7 @@ impl<S: AsRef<[i32]> + AsMut<[i32]>> RealTime<S> {
         let mut request = core::mem::take(&mut self.control.request);
         let starts = request == Request::Start;
         if starts && request.is_allowed(self.interpolator.state()) {
-            request = self.control.begin();
+            request = self.begin();
         }
         let inputs = Inputs {
             request,
@@ -480,15 +324,6 @@ impl<S: AsRef<[i32]> + AsMut<[i32]>> RealTime<S> {
         }
     }
 
-    /// Does what the host asks of drives and home.
-    ///
-    /// # Errors
-    /// Why not; nothing has changed then.
-    pub fn order(&mut self, order: Order) -> core::result::Result<(), Reason> {
-        let state = self.interpolator.state();
-        self.control.safety.obey(order, state)
-    }
-
     /// A frame of the host arrived.
     pub const fn heard(&mut self) {
         self.control.safety.heard();
@@ -499,12 +334,6 @@ impl<S: AsRef<[i32]> + AsMut<[i32]>> RealTime<S> {
     #[inline]
     pub const fn drives_on(&self) -> bool {
         self.control.safety.drives_on()
-    }
-
-    /// Where the axes stood when the host declared it, nm; none where the machine is not homed.
-    #[must_use]
-    pub const fn home_nm(&self) -> Option<[i32; 3]> {
-        self.control.safety.home_nm()
     }
 
     /// Whether a tick feeds the watchdog: it was over before the next one, and within its budget.
@@ -560,15 +389,7 @@ impl<S: AsRef<[i32]> + AsMut<[i32]>> RealTime<S> {
         self.interpolator.load_finish()?;
         self.control.request = Request::None;
         self.control.run = Run::NEW;
+        self.control.from_home = true;
         Ok(())
     }
-}
-
-/// A count as the value of a fault: exact to 2^24, which is hours of missed ticks and a tenth of a second of cycles.
-#[allow(
-    clippy::cast_precision_loss,
-    reason = "a count beyond 2^24 needs no last digit"
-)]
-const fn count(number: u32) -> f32 {
-    number as f32
 }

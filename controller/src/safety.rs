@@ -279,7 +279,7 @@ fn may_drive(status: &SafetyStatus) -> Result<(), Reason> {
     no_hindrance(status.latched.or(status.lines).and(stops))
 }
 
-/// Whether a run may start.
+/// Whether inputs, drives and home let a run start.
 ///
 /// # Errors
 /// Why not: an input asserted or latched, the drives off, the machine not homed.

@@ -18,7 +18,7 @@ use protocol::{
 
 use crate::{
     machine::{Busy, Command, Machine},
-    safety::{Order, may_start},
+    safety::Order,
     upload::Upload,
 };
 
@@ -265,13 +265,12 @@ impl Session {
 
     /// Queues what the state allows.
     fn wish(&mut self, machine: &mut impl Machine, wish: interpolator::Request) -> Result<(), Reason> {
-        let status = machine.status();
-        let state = status.state;
+        let state = machine.status().state;
         if !wish.is_allowed(state) {
             return Err(Reason::WrongState { state });
         }
         if wish == interpolator::Request::Start {
-            may_start(&status.safety)?;
+            machine.may_start()?;
         }
         command(machine, Command::Request(wish))?;
         self.wished = true;

@@ -71,6 +71,10 @@ impl<M: Mutex<T = BoardRealTime>> Machine for GuardedMachine<'_, M> {
         self.real_time.lock(|real_time| real_time.order(order))
     }
 
+    fn may_start(&mut self) -> Result<(), Reason> {
+        self.real_time.lock(|real_time| real_time.may_start())
+    }
+
     fn heard(&mut self) {
         self.real_time.lock(|real_time| real_time.heard());
     }

@@ -128,6 +128,16 @@ impl Course {
         self.lookahead.begin(job, 0, Place::default(), next);
     }
 
+    /// Where the tool is, nm, once that is known.
+    pub(crate) const fn stands_nm(&self) -> Option<[i32; 3]> {
+        self.at
+    }
+
+    /// The tool was brought here, nm, or nobody knows where it is. Not within a run.
+    pub(crate) const fn stand_at(&mut self, at_nm: Option<[i32; 3]>) {
+        self.at = at_nm;
+    }
+
     /// Whether the tool stands, and will while no speed is wanted.
     pub(crate) const fn is_at_rest(&self) -> bool {
         match self.phase {

@@ -219,6 +219,26 @@ impl<S: AsRef<[i32]> + AsMut<[i32]>> Interpolator<S> {
         self.motion.program.header().axes.is_some()
     }
 
+    /// The loaded job's home, nm: where its run begins unless the tool is known to stand elsewhere. None for a job without limits.
+    #[must_use]
+    pub fn home_nm(&self) -> Option<[i32; 3]> {
+        self.motion.program.header().axes.map(|axes| axes.home_nm)
+    }
+
+    /// Where the tool stands, nm, as far as is known: where the last run within limits left it, or where it was said to stand.
+    #[must_use]
+    pub const fn stands_nm(&self) -> Option<[i32; 3]> {
+        self.motion.course.stands_nm()
+    }
+
+    /// Says where the tool stands, nm, and so where the next run within limits begins; none where nobody knows: then that run
+    /// begins at its job's home. Ignored while a run is under way.
+    pub const fn stand_at(&mut self, at_nm: Option<[i32; 3]>) {
+        if !self.motion.state.is_under_way() {
+            self.motion.course.stand_at(at_nm);
+        }
+    }
+
     /// The last sample: its position is kept after a fault.
     #[must_use]
     pub const fn last(&self) -> &Sample {

@@ -46,6 +46,7 @@
 //! | a command that the state does not allow | `Nak`, `WrongState` | |
 //! | a start, or drives on, that inputs, latch or homing forbid | `Nak`, `Unsafe` with the fault | |
 //! | a start, or a home, while the drives are off | `Nak`, `DrivesOff` | |
+//! | a start while the axes do not stand at the job's home | `Nak`, `NotAtHome` with both places | |
 //! | a value beyond its range | `Nak`, `OutOfRange` with the range | |
 //!
 //! Where the last column is empty, nothing has changed. An event that the line damages is lost: the host sees it by a

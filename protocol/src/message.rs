@@ -44,8 +44,10 @@
 //! | 18 | `Stop` | | as `Start` |
 //! | 19 | `Simulate` | inputs `u16` | `Ack`, by a board without pins only |
 //!
-//! Header: kind, pattern, tool side (a byte each), spans along path and side (`u16`), ball radius (mm), feed (mm/s),
-//! scallop height (mm), period (s) (`f32`).
+//! Header: kind, pattern, spacing, tool side (a byte each), spans along path and side (`u16`), ball radius (mm), feed (mm/s),
+//! scallop height (mm), period (s) (`f32`); then 0, or 1 and what the axes can do: velocity (mm/s), acceleration (mm/s^2), jerk (mm/s^3)
+//! (three `f32` each), chord error (mm, `f32`), travel (least and most of each axis), home (nm, `i32`), plunge (mm, `f32`), safe height
+//! (nm, `i32`).
 //!
 //! # Board to host
 //!

@@ -105,6 +105,13 @@ pub enum Reason {
     },
     /// 17: this board does not do that.
     Unsupported,
+    /// 18: a start, and the axes do not stand where the job begins.
+    NotAtHome {
+        /// The job's home, nm.
+        home_nm: [i32; 3],
+        /// Where the axes stand, nm; none after a run that knew no way to its passes.
+        stands_nm: Option<[i32; 3]>,
+    },
 }
 
 impl Reason {
@@ -130,6 +137,7 @@ impl Reason {
             Self::DrivesOff => 15,
             Self::OutOfRange { .. } => 16,
             Self::Unsupported => 17,
+            Self::NotAtHome { .. } => 18,
         }
     }
 
@@ -156,6 +164,37 @@ fn unsafe_because(fault: FaultReport, formatter: &mut fmt::Formatter<'_>) -> fmt
         write!(formatter, ", {input}")?;
     }
     Ok(())
+}
+
+/// A place of the axes in millimetres, with every nanometre.
+struct Mm([i32; 3]);
+
+impl fmt::Display for Mm {
+    fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
+        for (axis, nm) in self.0.into_iter().enumerate() {
+            let separator = if axis == 0 { "" } else { ", " };
+            let sign = if nm < 0 { "-" } else { "" };
+            let (mm, rest) = (nm.unsigned_abs() / 1_000_000, nm.unsigned_abs() % 1_000_000);
+            write!(formatter, "{separator}{sign}{mm}.{rest:06}")?;
+        }
+        Ok(())
+    }
+}
+
+/// Where the axes should stand, and where they do.
+fn not_at_home(
+    home_nm: [i32; 3],
+    stands_nm: Option<[i32; 3]>,
+    formatter: &mut fmt::Formatter<'_>,
+) -> fmt::Result {
+    write!(formatter, "the job begins at {} mm, ", Mm(home_nm))?;
+    match stands_nm {
+        Some(at_nm) => write!(formatter, "the axes stand at {} mm", Mm(at_nm)),
+        None => write!(
+            formatter,
+            "and nobody knows where the axes stand since a run without limits"
+        ),
+    }
 }
 
 impl fmt::Display for Reason {
@@ -200,6 +239,7 @@ impl fmt::Display for Reason {
             Self::DrivesOff => write!(formatter, "the drives are off"),
             Self::OutOfRange { most, wanted } => write!(formatter, "{wanted} is more than {most}"),
             Self::Unsupported => write!(formatter, "this board cannot do that"),
+            Self::NotAtHome { home_nm, stands_nm } => not_at_home(home_nm, stands_nm, formatter),
         }
     }
 }

@@ -6,7 +6,7 @@ pub mod golden;
 
 use controller::{
     machine::{Busy, Command, Machine, describe},
-    safety::Order,
+    safety::{Order, may_start},
 };
 use interp_core::{
     encode,
@@ -225,6 +225,10 @@ impl Machine for Mock {
         }
         self.calls.push(Call::Order(order));
         Ok(())
+    }
+
+    fn may_start(&mut self) -> Result<(), Reason> {
+        may_start(&self.status.safety)
     }
 
     fn heard(&mut self) {}

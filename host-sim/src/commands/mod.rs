@@ -7,6 +7,7 @@ mod completions;
 mod explain;
 mod export;
 mod flash;
+mod home;
 mod import;
 mod log;
 mod motion_words;
@@ -175,7 +176,11 @@ pub fn main() -> ExitCode {
 
 /// Reads a job, settles its direction where that is `"auto"`, prepares it, and says what of it this version does not do yet.
 fn load(path: &Path) -> Result<(JobFile, Prepared)> {
-    let job = JobFile::load(path)?;
+    settled(JobFile::load(path)?)
+}
+
+/// Settles the direction of a job where that is `"auto"`, and prepares it.
+fn settled(job: JobFile) -> Result<(JobFile, Prepared)> {
     if job.origin.along_choice() != &AlongChoice::Auto {
         return Ok(direction::settle(job)?);
     }

@@ -5,7 +5,7 @@ use protocol::message::{OVERRIDE_MAX_PERCENT, Status};
 use serde_json::json;
 
 use super::out::say;
-use super::{Failure, Result, run};
+use super::{Failure, Result, home, run};
 use crate::remote::operate::{Action, act, sentences};
 
 /// Switches a board's drives, declares its home, holds, resumes or stops its run, and says how it is.
@@ -50,8 +50,8 @@ enum Wanted {
     /// The axes stand here, with the drives on.
     Home {
         /// Their places, mm: X,Y,Z.
-        #[arg(value_parser = run::place, allow_hyphen_values = true)]
-        place_mm: run::PlaceNm,
+        #[arg(value_parser = home::place, allow_hyphen_values = true)]
+        place_mm: home::PlaceNm,
     },
     /// Emergency stop and drive fault are acknowledged, once they are released.
     Acknowledge,

@@ -9,10 +9,11 @@ use protocol::digest::Digest;
 use protocol::message::{Reason, Status};
 use serde_json::{Value, json};
 
+use super::home::{self, PlaceNm};
 use super::out::say;
 use super::outcome::Outcome;
 use super::simulate::{Timed, machine, remarks, report, surveyed, timed};
-use super::{Failure, Result, cannot_write, load, progress, scripted, spinner, trace};
+use super::{Failure, Result, cannot_write, progress, scripted, spinner, trace};
 use crate::approach::Kind;
 use crate::explain;
 use crate::job_file::JobFile;
@@ -44,8 +45,9 @@ pub(super) struct Arguments {
     /// Writes a page with a view that turns, charts and figures into this folder.
     #[arg(long, value_name = "DIR")]
     report: Option<PathBuf>,
-    /// The axes stand here, mm: declared as home before the run. In QEMU, where there are no axes, it is declared anyway.
-    #[arg(long, value_name = "X,Y,Z", value_parser = place, allow_hyphen_values = true)]
+    /// The axes stand here, mm: declared as home before the run, and the job's home where it has no `home_mm`. In QEMU, where there
+    /// are no axes, the job's home is declared.
+    #[arg(long, value_name = "X,Y,Z", value_parser = home::place, allow_hyphen_values = true)]
     home: Option<PlaceNm>,
     /// Does what this file says an operator does, in lockstep: lines `tick N: hold`, or resume, stop, abort, start, override P.
     #[arg(long, value_name = "FILE", requires = "qemu", conflicts_with_all = ["report", "trace"])]
@@ -53,25 +55,6 @@ pub(super) struct Arguments {
     /// Prints one JSON object instead of text.
     #[arg(long)]
     pub(super) json: bool,
-}
-
-/// A place of the axes, nm.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) struct PlaceNm(pub(super) [i32; 3]);
-
-/// Reads a place in mm, `X,Y,Z`.
-pub(super) fn place(text: &str) -> std::result::Result<PlaceNm, String> {
-    let mut axes = text.split(',').map(|axis| {
-        let mm: f64 = axis.trim().parse().ok()?;
-        let nm = (mm * 1e6).round();
-        #[expect(clippy::cast_possible_truncation, reason = "within the range of an i32")]
-        (nm.abs() <= f64::from(i32::MAX)).then_some(nm as i32)
-    });
-    let mut next = || axes.next().flatten();
-    match (next(), next(), next()) {
-        (Some(x), Some(y), Some(z)) if axes.next().is_none() => Ok(PlaceNm([x, y, z])),
-        _ => Err("three numbers in mm are wanted, each within 2147, such as 0,0,50".to_owned()),
-    }
 }
 
 #[derive(Debug, Args)]
@@ -95,7 +78,7 @@ struct Ran {
 
 impl From<RemoteError> for Failure {
     fn from(error: RemoteError) -> Self {
-        if let Some(refusal) = unsafe_to(&error) {
+        if let Some(refusal) = unsafe_to(&error).or_else(|| home::elsewhere(&error)) {
             return Self::Failed(Some(refusal));
         }
         let code = match &error {
@@ -186,17 +169,22 @@ fn connect(arguments: &Arguments) -> Result<(Option<Qemu>, Session)> {
     Ok((Some(qemu), Session::open(stream, session_number())?))
 }
 
-/// Configures the board, switches its drives on, and declares home where there is none to be lost, or where it was given.
-fn make_ready(arguments: &Arguments, job: &JobFile, session: &mut Session) -> Result<()> {
-    let configuration = job.machine.configuration();
-    let given = arguments.home.map(|place| place.0);
-    let setup = if arguments.place.qemu && given.is_none() {
-        Setup::simulated(configuration)
-    } else {
-        Setup {
-            configuration,
-            home_nm: given,
-        }
+/// Where the axes are declared to stand: where they were said to, or in QEMU, which has none, where the job begins.
+fn declared(arguments: &Arguments, prepared: &Prepared) -> Option<PlaceNm> {
+    let simulated = arguments.place.qemu.then(|| home::of(prepared));
+    arguments.home.or(simulated)
+}
+
+/// Configures the board, switches its drives on, and declares home where that is known here.
+fn make_ready(
+    arguments: &Arguments,
+    job: &JobFile,
+    prepared: &Prepared,
+    session: &mut Session,
+) -> Result<()> {
+    let setup = Setup {
+        configuration: job.machine.configuration(),
+        home_nm: declared(arguments, prepared).map(|place| place.0),
     };
     Ok(operate::make_ready(session, &setup)?)
 }
@@ -384,13 +372,13 @@ fn complaint(ran: &Ran, here: &Timed, job: &JobFile) -> Option<String> {
 }
 
 pub(super) fn command(arguments: &Arguments) -> Result<()> {
-    let (job, prepared) = load(&arguments.job)?;
+    let (job, prepared) = home::load(&arguments.job, arguments.home)?;
     travel::check(&job)?;
     if let Some(script) = &arguments.script {
         let scripted = scripted::play(&job, &prepared, script, None)?;
         let (_qemu, mut session) = connect(arguments)?;
         check_period(&job, &session)?;
-        make_ready(arguments, &job, &mut session)?;
+        make_ready(arguments, &job, &prepared, &mut session)?;
         drive::upload(&mut session, &prepared, |_| {})?;
         return scripted.run(&job, &mut session, arguments.json);
     }
@@ -404,7 +392,7 @@ pub(super) fn command(arguments: &Arguments) -> Result<()> {
     }
     let (_qemu, mut session) = connect(arguments)?;
     check_period(&job, &session)?;
-    make_ready(arguments, &job, &mut session)?;
+    make_ready(arguments, &job, &prepared, &mut session)?;
     let bar = progress(prepared.words.len() as u64, "uploading");
     drive::upload(&mut session, &prepared, |words| bar.set_position(words as u64))?;
     bar.finish_and_clear();
@@ -440,7 +428,8 @@ pub(super) fn command(arguments: &Arguments) -> Result<()> {
         let (speed, missed) = (ran.ticks_per_second.round(), ran.status.deadline_misses);
         say!("  board        {speed} ticks a second, {missed} missed");
         if arguments.place.qemu && arguments.home.is_none() {
-            say!("  home         declared at 0, 0, 0: a simulated board has no axes");
+            let place = home::of(&prepared).words();
+            say!("  home         declared at {place} mm: a simulated board has no axes");
         }
         if ran.status.safety.host_gone {
             say!("  host         was gone during the run: see cargo sim explain host-gone");

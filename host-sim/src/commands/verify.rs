@@ -246,21 +246,11 @@ impl swept::Progress for Bar<'_> {
     }
 }
 
-pub(super) fn command(arguments: &Arguments) -> Result<()> {
-    let (job, prepared) = load(&arguments.job)?;
-    let timed = timed(&job, &prepared)?;
-    let with_optimum = arguments.optimum || motion_words::limits(&job).is_some();
-    let directory = arguments.report.as_deref();
-    let mut sketch = directory.map(|_| Sketch::new(&job, timed.passes.len()));
-    let Measured {
-        findings,
-        swept,
-        axes,
-        motion,
-    } = measured(&job, &prepared, &timed, sketch.as_mut(), with_optimum)?;
-    let figures = &findings.report;
-    let scanned = scanned_passes(&job)?;
-    let mut failures = figures.failures(&BOUNDS);
+/// All that speaks against the job, the gravest first.
+fn failures(job: &JobFile, timed: &Timed, measured: &Measured, scanned: Option<usize>) -> Vec<String> {
+    let findings = &measured.findings;
+    let mut failures: Vec<String> = timed.fault.iter().map(|fault| fault.sentence()).collect();
+    failures.extend(findings.report.failures(&BOUNDS));
     if let Some(scanned) =
         scanned.filter(|scanned| *scanned != findings.passes as usize && timed.fault.is_none())
     {
@@ -269,56 +259,104 @@ pub(super) fn command(arguments: &Arguments) -> Result<()> {
             findings.passes
         ));
     }
-    if let Some(fault) = &timed.fault {
-        failures.insert(0, fault.sentence());
-    }
-    failures.extend(swept.failures.iter().cloned());
-    if let Err(error) = travel::check(&job) {
+    failures.extend(measured.swept.failures.iter().cloned());
+    if let Err(error) = travel::check(job) {
         failures.push(format!("{}: {}", error.what(), error.remedy()));
     }
-    failures.extend(limits::failures(&axes));
-    let passed = failures.is_empty();
+    failures.extend(limits::failures(&measured.axes));
+    failures
+}
+
+/// What is told of a verified job.
+struct Told<'a> {
+    job: &'a JobFile,
+    prepared: &'a Prepared,
+    measured: &'a Measured,
+    scanned: Option<usize>,
+    failures: &'a [String],
+    warnings: Vec<&'a String>,
+}
+
+impl Told<'_> {
+    fn json(&self) -> Value {
+        let Measured {
+            findings,
+            swept,
+            axes,
+            motion,
+        } = self.measured;
+        let mut value = swept_words::json(self.job, self.prepared, findings, swept, axes);
+        value.insert("motion".to_owned(), motion_words::json(motion));
+        value.extend(along::json(self.job));
+        value.insert("passes_scanned".to_owned(), self.scanned.into());
+        value.insert("failures".to_owned(), self.failures.into());
+        value.insert("passed".to_owned(), self.failures.is_empty().into());
+        Value::Object(value)
+    }
+
+    fn print(&self) {
+        let Measured {
+            findings,
+            swept,
+            axes,
+            motion,
+        } = self.measured;
+        say!("  along        {}", along::sentence(self.job));
+        print(findings, self.scanned, self.job.spacing == Spacing::FirstOrder);
+        swept_words::print(self.job, self.prepared, findings, swept, axes);
+        motion_words::print(motion);
+        for failure in self.failures {
+            say!("  FAIL {failure}");
+        }
+        for warning in &self.warnings {
+            say!("  warning: {warning}");
+        }
+        let passed = self.failures.is_empty();
+        say!("  {}", if passed { "passed" } else { "FAILED" });
+    }
+}
+
+pub(super) fn command(arguments: &Arguments) -> Result<()> {
+    let (job, prepared) = load(&arguments.job)?;
+    let timed = timed(&job, &prepared)?;
+    let with_optimum = arguments.optimum || motion_words::limits(&job).is_some();
+    let directory = arguments.report.as_deref();
+    let mut sketch = directory.map(|_| Sketch::new(&job, timed.passes.len()));
+    let measured = measured(&job, &prepared, &timed, sketch.as_mut(), with_optimum)?;
+    let scanned = scanned_passes(&job)?;
+    let failures = failures(&job, &timed, &measured, scanned);
+    let Measured { findings, swept, .. } = &measured;
+    let warnings: Vec<&String> = swept
+        .warnings
+        .iter()
+        .filter(|warning| !failures.contains(warning))
+        .collect();
     let mut remarks = Remarks {
         failures: failures.clone(),
         verified: true,
-        scallops: Some(scallops(&job, &swept)),
-        ..remarks(&timed, &findings)
+        scallops: Some(scallops(&job, swept)),
+        ..remarks(&timed, findings)
     };
-    let known = |warning: &&String| !failures.contains(warning);
-    remarks
-        .warnings
-        .extend(swept.warnings.iter().filter(known).cloned());
-    let page = report(&job, directory, sketch.as_ref(), &findings, &remarks)?;
+    remarks.warnings.extend(warnings.iter().copied().cloned());
+    let page = report(&job, directory, sketch.as_ref(), findings, &remarks)?;
+    let told = Told {
+        job: &job,
+        prepared: &prepared,
+        measured: &measured,
+        scanned,
+        failures: &failures,
+        warnings,
+    };
     if arguments.json {
-        let mut value = swept_words::json(&job, &prepared, &findings, &swept, &axes);
-        value.insert("motion".to_owned(), motion_words::json(&motion));
-        value.extend(along::json(&job));
-        value.insert("passes_scanned".to_owned(), scanned.into());
-        value.insert("failures".to_owned(), failures.into());
-        value.insert("passed".to_owned(), passed.into());
-        say!("{}", Value::Object(value));
+        say!("{}", told.json());
     } else {
         say!("{}", arguments.job.display());
-        say!("  along        {}", along::sentence(&job));
-        print(&findings, scanned, job.spacing == Spacing::FirstOrder);
-        swept_words::print(&job, &prepared, &findings, &swept, &axes);
-        motion_words::print(&motion);
-        for failure in &failures {
-            say!("  FAIL {failure}");
-        }
-        for warning in swept
-            .warnings
-            .iter()
-            .filter(|warning| !failures.contains(warning))
-        {
-            say!("  warning: {warning}");
-        }
-        say!("  {}", if passed { "passed" } else { "FAILED" });
+        told.print();
         if let Some(page) = page {
             say!("  report {}", page.display());
         }
     }
-    if passed {
+    if failures.is_empty() {
         Ok(())
     } else {
         Err(Failure::Failed(None))

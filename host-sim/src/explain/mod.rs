@@ -263,6 +263,10 @@ mod tests {
                 wanted: 201,
             },
             Reason::Unsupported,
+            Reason::NotAtHome {
+                home_nm: [1, -2, 3],
+                stands_nm: Some([4, 5, 6]),
+            },
         ]
     }
 

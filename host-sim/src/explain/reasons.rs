@@ -3,7 +3,7 @@
 use super::{Entry, Family};
 
 /// By code.
-pub(super) const ENTRIES: [Entry; 18] = [
+pub(super) const ENTRIES: [Entry; 19] = [
     reason(
         0,
         "bad-frame",
@@ -165,6 +165,15 @@ pub(super) const ENTRIES: [Entry; 18] = [
         "Inputs can be simulated only where there are no pins for them, as in QEMU.",
         "Use the board's own inputs.",
         "A test for QEMU, run against a board.",
+    ),
+    reason(
+        18,
+        "not-at-home",
+        "The axes do not stand where the job begins, so its first sample would be a jump.",
+        "The job's home, and where the axes stand; or that nobody knows where, since a job without limits has run.",
+        "Home was declared elsewhere than the job's `home_mm`, or another job or an aborted run has left the axes elsewhere.",
+        "Say in [machine] that the job begins where the axes stand: `home_mm = [X, Y, Z]`. Or switch the drives off, bring the axes to the job's home, and declare that: `cargo sim run JOB --port DEV --home X,Y,Z`.",
+        "Home declared at 0, 0, 0 for a job with `home_mm = [0, 0, 50]`.",
     ),
 ];
 

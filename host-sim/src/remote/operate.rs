@@ -19,12 +19,24 @@ pub struct Setup {
 }
 
 impl Setup {
-    /// A board without axes: they stand wherever they are wanted.
+    /// A board without axes: whatever job it gets, they stand at its home.
     #[must_use]
     pub const fn simulated(configuration: Configuration) -> Self {
         Self {
+            configuration: Configuration {
+                homing_required: false,
+                ..configuration
+            },
+            home_nm: None,
+        }
+    }
+
+    /// A board whose axes stand here, nm.
+    #[must_use]
+    pub const fn homed(configuration: Configuration, home_nm: [i32; 3]) -> Self {
+        Self {
             configuration,
-            home_nm: Some([0; 3]),
+            home_nm: Some(home_nm),
         }
     }
 }

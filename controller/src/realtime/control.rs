@@ -1,0 +1,111 @@
+//! What the real-time half keeps beside the interpolator.
+
+use interp_core::{
+    fault::{Fault, FaultKind},
+    interpolator::Request,
+    sample::Sample,
+};
+use protocol::message::{Clock, Report};
+
+use super::{TickInput, moves, run::Run};
+use crate::{
+    machine::{Command, Event, Events},
+    safety::Safety,
+};
+
+/// All of the real-time half but the interpolator.
+#[derive(Debug)]
+pub(super) struct Control {
+    pub(super) run: Run,
+    pub(super) credit: u32,
+    pub(super) tick_budget: u32,
+    pub(super) clock: Clock,
+    pub(super) report: Report,
+    /// Waits for a period to pass.
+    pub(super) request: Request,
+    pub(super) safety: Safety,
+    /// The next run within limits has to begin at its job's home.
+    pub(super) from_home: bool,
+}
+
+impl Control {
+    pub(super) const fn new() -> Self {
+        Self {
+            run: Run::NEW,
+            credit: 0,
+            tick_budget: u32::MAX,
+            clock: Clock::Free,
+            report: Report::Digests,
+            request: Request::None,
+            safety: Safety::NEW,
+            from_home: true,
+        }
+    }
+
+    /// Puts an event in its queue, or counts it as lost.
+    pub(super) fn put(&mut self, event: Event, events: &mut impl Events) {
+        if !events.put(event) {
+            self.run.events_lost = self.run.events_lost.saturating_add(1);
+        }
+    }
+
+    /// Whether nothing led to this sample: without limits, the first of each pass.
+    #[inline]
+    pub(super) const fn jumps(&self, sample: &Sample, has_limits: bool) -> bool {
+        !has_limits && moves(sample.state) && sample.tick == self.run.pass.first_tick
+    }
+
+    /// Takes a command up; false for a `Run` that leaves no time, which halts at once.
+    pub(super) fn obey(&mut self, command: Command) -> bool {
+        match command {
+            // An abort or stop that waits for its period is not to be undone by what comes behind it.
+            Command::Request(_) if self.request == Request::Abort => {}
+            Command::Request(request) if self.request == Request::Stop && request != Request::Abort => {}
+            Command::Request(request) => self.request = request,
+            Command::Clock(clock) => {
+                self.clock = clock;
+                self.credit = 0;
+            }
+            Command::Run { ticks } => {
+                if self.clock == Clock::Lockstep {
+                    self.credit = self.credit.saturating_add(ticks);
+                }
+                return self.credit > 0;
+            }
+            Command::Report(report) => self.report = report,
+            Command::Override { percent } => self.safety.set_override(percent),
+        }
+        true
+    }
+
+    /// Whether the last tick left nothing to note: none was missed, and it took no longer than others and than allowed.
+    #[inline]
+    pub(super) const fn is_in_time(&self, input: TickInput) -> bool {
+        input.missed == 0 && input.cycles <= self.run.tick_cycles_max && input.cycles <= self.tick_budget
+    }
+
+    /// Notes misses and cycles; the fault that they are to a tool that moves on a free clock.
+    #[cold]
+    pub(super) fn note_time(&mut self, input: TickInput) -> Option<Fault> {
+        self.run.deadline_misses = self.run.deadline_misses.saturating_add(input.missed);
+        self.run.tick_cycles_max = self.run.tick_cycles_max.max(input.cycles);
+        if self.clock != Clock::Free {
+            None
+        } else if input.missed > 0 {
+            Some(Fault::new(FaultKind::DeadlineMissed, count(input.missed)))
+        } else if input.cycles > self.tick_budget {
+            Some(Fault::new(FaultKind::TickOverBudget, count(input.cycles)))
+        } else {
+            None
+        }
+    }
+}
+
+/// A count as the value of a fault: exact to 2^24, which is hours of missed ticks and a tenth of a second of cycles.
+#[allow(
+    clippy::cast_precision_loss,
+    reason = "a count beyond 2^24 needs no last digit"
+)]
+const fn count(number: u32) -> f32 {
+    number as f32
+}

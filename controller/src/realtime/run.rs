@@ -1,0 +1,66 @@
+//! What is kept of a run.
+
+use interp_core::sample::Sample;
+use protocol::{digest::Digest, message::PassDigest};
+
+/// What is kept of a run: counters and digests.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Run {
+    pub(super) samples: u32,
+    pub(super) digest: Digest,
+    pub(super) pass: PassDigest,
+    pub(super) deadline_misses: u32,
+    pub(super) tick_cycles_max: u32,
+    pub(super) events_lost: u32,
+}
+
+impl Run {
+    pub(super) const NEW: Self = Self {
+        samples: 0,
+        digest: Digest::new(),
+        pass: PassDigest {
+            pass: 0,
+            first_tick: 0,
+            samples: 0,
+            digest: Digest::EMPTY,
+            interval: 0.0,
+        },
+        deadline_misses: 0,
+        tick_cycles_max: 0,
+        events_lost: 0,
+    };
+
+    /// Whether the sample is the first of a pass.
+    pub(super) const fn begins_pass(&self, sample: &Sample) -> bool {
+        self.pass.samples == 0 || sample.pass != self.pass.pass
+    }
+
+    /// Begins the pass of this sample; yields the one before.
+    #[cold]
+    pub(super) fn begin_pass(&mut self, sample: &Sample, interval: f32) -> Option<PassDigest> {
+        let over = self.end_pass(interval);
+        self.pass.pass = sample.pass;
+        self.pass.first_tick = sample.tick;
+        over
+    }
+
+    /// Counts a sample in. Not generic and not inlined: compiled here for speed, whatever its callers are compiled for.
+    #[inline(never)]
+    pub(super) fn add(&mut self, sample: &Sample) {
+        self.pass.samples = self.pass.samples.saturating_add(1);
+        self.samples = self.samples.saturating_add(1);
+        self.digest.sample(sample);
+    }
+
+    /// The pass so far, if it has samples; the next sample begins another.
+    pub(super) fn end_pass(&mut self, interval: f32) -> Option<PassDigest> {
+        let digest = self.digest.value();
+        let samples = core::mem::take(&mut self.pass.samples);
+        (samples > 0).then_some(PassDigest {
+            samples,
+            digest,
+            interval,
+            ..self.pass
+        })
+    }
+}

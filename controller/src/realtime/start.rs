@@ -1,0 +1,198 @@
+//! What comes before a run: drives, home, and whether it may begin.
+//!
+//! **Where a run begins.** A job within limits says where: at its home. Its run is refused where the axes stand elsewhere, because
+//! nothing would lead to its first sample. Run again, home not having been declared since, it begins where it ended: at its home, or
+//! where it was given up, and the way to the surface is found from there.
+//! **Without a home.** Where none is required and none was declared, the axes count as standing at the job's home.
+//! **After a job without limits** nobody knows where the axes stand: nothing led from pass to pass.
+
+use interp_core::interpolator::Request;
+use protocol::message::Reason;
+
+use super::{RealTime, run::Run};
+use crate::safety::{Order, may_start};
+
+impl<S: AsRef<[i32]> + AsMut<[i32]>> RealTime<S> {
+    /// Does what the host asks of drives and home.
+    ///
+    /// # Errors
+    /// Why not; nothing has changed then.
+    pub fn order(&mut self, order: Order) -> Result<(), Reason> {
+        let state = self.interpolator.state();
+        self.control.safety.obey(order, state)?;
+        match order {
+            Order::SetHome { home_nm } => self.place(home_nm),
+            Order::Drives { on: false } => self.lose_place(),
+            Order::Drives { on: true } | Order::Configure(_) | Order::Acknowledge => {}
+        }
+        Ok(())
+    }
+
+    /// Where the axes stood when the host declared it, nm; none where the machine is not homed.
+    #[must_use]
+    pub const fn home_nm(&self) -> Option<[i32; 3]> {
+        self.control.safety.home_nm()
+    }
+
+    /// Whether a run may start.
+    ///
+    /// # Errors
+    /// Why not: an input asserted or latched, the drives off, the machine not homed, or not where the job begins.
+    pub fn may_start(&self) -> Result<(), Reason> {
+        let status = self.control.safety.status();
+        may_start(&status)?;
+        let stands_nm = self.interpolator.stands_nm();
+        match self.interpolator.home_nm() {
+            Some(home_nm) if status.homed && self.control.from_home && stands_nm != Some(home_nm) => {
+                Err(Reason::NotAtHome { home_nm, stands_nm })
+            }
+            _ => Ok(()),
+        }
+    }
+
+    /// What becomes of a start whose period passes: a run that is counted from nothing, or no run where it may not start, which
+    /// the link did not know yet.
+    #[cold]
+    #[inline(never)]
+    pub(super) fn begin(&mut self) -> Request {
+        if self.may_start().is_err() {
+            return Request::None;
+        }
+        match self.interpolator.home_nm() {
+            Some(home_nm) => {
+                let unknown = self.control.from_home || self.interpolator.stands_nm().is_none();
+                if unknown && !self.control.safety.status().homed {
+                    self.place(home_nm);
+                }
+            }
+            None => self.lose_place(),
+        }
+        self.control.from_home = false;
+        self.control.run = Run::NEW;
+        self.control.safety.begin_run();
+        Request::Start
+    }
+
+    /// The axes stand here: steps and runs count from there.
+    fn place(&mut self, at_nm: [i32; 3]) {
+        self.interpolator.stand_at(Some(at_nm));
+        if let Some(steps) = &mut self.steps {
+            steps.place(at_nm);
+        }
+        self.control.from_home = true;
+    }
+
+    /// Nobody knows any more where the axes stand.
+    pub(super) fn lose_place(&mut self) {
+        self.interpolator.stand_at(None);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use interp_core::{
+        encode,
+        job::{Axes, Header},
+        steps::StepConfig,
+    };
+    use protocol::message::Configuration;
+
+    const HOME_NM: [i32; 3] = [-2_500, 5_000, 20_000_000];
+    const DRIVES_ON: Order = Order::Drives { on: true };
+
+    /// A plate of 10 mm x 10 mm, level at the origin; with limits, from this home.
+    fn with_plate(home_nm: Option<[i32; 3]>) -> RealTime<[i32; 64]> {
+        let mut c = [[[0.0; 4]; 4]; 3];
+        (c[0][1][0], c[1][0][1]) = (10.0, 10.0);
+        let c = c.map(|axis| encode::substitute(&axis, [0.0, 1.0], [0.0, 1.0]));
+        let one = encode::width(1.0).unwrap();
+        let patch = encode::polynomial(&c, Default::default()).unwrap();
+        let axes = home_nm.map(|home_nm| Axes {
+            velocity_mm_s: [100.0; 3],
+            acceleration_mm_s2: [1000.0; 3],
+            jerk_mm_s3: [20_000.0; 3],
+            chord_mm: 0.005,
+            travel_nm: [[i32::MIN, i32::MAX]; 3],
+            home_nm,
+            plunge_mm: 1.0,
+            safe_z_nm: 20_000_000,
+        });
+        let header = Header {
+            path_spans: 1,
+            side_spans: 1,
+            ball_radius_mm: 5.0,
+            feed_mm_s: 10.0,
+            scallop_mm: 0.1,
+            period_s: 0.001,
+            axes,
+            ..Header::default()
+        };
+        let mut half = RealTime::new();
+        let words: std::vec::Vec<i32> = [one, one].into_iter().chain(patch.to_words()).collect();
+        half.load_begin(&header, u32::try_from(words.len()).unwrap())
+            .unwrap();
+        half.load_words(0, &words).unwrap();
+        half.load_check(0).unwrap();
+        half.load_finish().unwrap();
+        half.set_step_pins(StepConfig::DEFAULT.check().unwrap(), [0, 1, 2]);
+        half
+    }
+
+    fn order(half: &mut RealTime<[i32; 64]>, order: Order) {
+        half.order(order).unwrap();
+    }
+
+    #[test]
+    fn a_home_places_steps_and_tool() {
+        let mut half = with_plate(None);
+        order(&mut half, DRIVES_ON);
+        order(&mut half, Order::SetHome { home_nm: HOME_NM });
+        assert_eq!(half.steps().unwrap().position(), [-1, 2, 8000]);
+        assert_eq!(half.steps().unwrap().told(), HOME_NM);
+        assert_eq!(half.interpolator.stands_nm(), Some(HOME_NM));
+        // A home that is refused places nothing.
+        half.order(Order::Drives { on: false }).unwrap();
+        let home = Order::SetHome { home_nm: [0; 3] };
+        assert_eq!(half.order(home), Err(Reason::DrivesOff));
+        assert_eq!(half.steps().unwrap().told(), HOME_NM);
+        assert_eq!(half.interpolator.stands_nm(), None);
+    }
+
+    #[test]
+    fn a_run_begins_at_the_jobs_home_only() {
+        let mut half = with_plate(Some(HOME_NM));
+        order(&mut half, DRIVES_ON);
+        let near = [HOME_NM[0] - 1, HOME_NM[1], HOME_NM[2]];
+        for (stands_nm, begun) in [(near, Request::None), (HOME_NM, Request::Start)] {
+            order(&mut half, Order::SetHome { home_nm: stands_nm });
+            let refused = Err(Reason::NotAtHome {
+                home_nm: HOME_NM,
+                stands_nm: Some(stands_nm),
+            });
+            let may = if begun == Request::Start { Ok(()) } else { refused };
+            assert_eq!(half.may_start(), may);
+            assert_eq!(half.begin(), begun);
+        }
+        // Without limits it begins wherever it is.
+        let mut half = with_plate(None);
+        order(&mut half, DRIVES_ON);
+        order(&mut half, Order::SetHome { home_nm: near });
+        assert_eq!(half.begin(), Request::Start);
+        assert_eq!(half.interpolator.stands_nm(), None);
+    }
+
+    #[test]
+    fn without_a_home_the_axes_count_as_standing_at_the_jobs() {
+        let mut half = with_plate(Some(HOME_NM));
+        let free = Configuration {
+            homing_required: false,
+            ..Configuration::DEFAULT
+        };
+        order(&mut half, Order::Configure(free));
+        order(&mut half, DRIVES_ON);
+        assert_eq!(half.begin(), Request::Start);
+        assert_eq!(half.steps().unwrap().told(), HOME_NM);
+        assert_eq!(half.interpolator.stands_nm(), Some(HOME_NM));
+    }
+}
