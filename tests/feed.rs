@@ -260,7 +260,10 @@ fn check_commands(header: &Header, words: &[i32], whole: &[Place], commands: &[(
     }
 }
 
-fn undisturbed(pattern: Pattern) -> (Header, Vec<i32>, Vec<Place>) {
+/// A job, and the side places of its passes.
+type Undisturbed = (Header, Vec<i32>, Vec<Place>);
+
+fn undisturbed(pattern: Pattern) -> Undisturbed {
     let (header, words) = dome_within_limits(pattern);
     let (samples, core) = scripted(&header, &words, &[]);
     assert_eq!((core.state(), core.fault()), (State::Finished, None));
@@ -270,8 +273,8 @@ fn undisturbed(pattern: Pattern) -> (Header, Vec<i32>, Vec<Place>) {
 }
 
 /// Both patterns, worked out once.
-fn undisturbed_once(zigzag: bool) -> &'static (Header, Vec<i32>, Vec<Place>) {
-    static BOTH: OnceLock<[(Header, Vec<i32>, Vec<Place>); 2]> = OnceLock::new();
+fn undisturbed_once(zigzag: bool) -> &'static Undisturbed {
+    static BOTH: OnceLock<[Undisturbed; 2]> = OnceLock::new();
     &BOTH.get_or_init(|| [Pattern::Zig, Pattern::Zigzag].map(undisturbed))[usize::from(zigzag)]
 }
 
