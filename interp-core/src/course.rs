@@ -324,7 +324,7 @@ impl Course {
         };
         self.cell = cell;
         let place = now.plan.start_of(cell) + crate::feed::plan::quanta(arc_mm);
-        self.profile.shift(place - self.profile.place());
+        self.profile.shift(place - self.profile.place(), &now.plan);
     }
 
     fn plan_leg(

@@ -1,8 +1,8 @@
 //! The jerk-limited feed, a step a period; see [`super`].
 
-use super::STEP_MAX;
 use super::number::Bounded;
 use super::plan::Plan;
+use super::{QUANTA_BITS, STEP_MAX};
 use crate::arith::sqrt;
 use crate::scalar::{float, real};
 
@@ -14,6 +14,9 @@ const CREEP_SHARE: f32 = 1.0 / 16.0;
 
 /// Periods of the greatest acceleration up to which a speed is slow, and that are looked ahead then.
 const CREEP_PERIODS: f32 = 2.0;
+
+/// Quanta.
+const NANOMETRE: u64 = 1 << QUANTA_BITS;
 
 /// Step that is always taken, quanta: what corrections of a nanometre leave at the end has to be gone, too.
 const STEP_LEAST: f32 = 2048.0;
@@ -76,10 +79,13 @@ impl Profile {
         self.lead >= plan.end && self.is_at_rest()
     }
 
-    /// What is known better now of where the tool is: by so many quanta further along than it was taken to be.
-    pub(crate) const fn shift(&mut self, by: i64) {
-        self.lead += by;
+    /// What is known better now of where the tool is: by so many quanta further along than it was taken to be. Once the last step to the
+    /// path's end has been taken, less than a nanometre is left as it is: one more step would take the whole mean.
+    pub(crate) const fn shift(&mut self, by: i64, plan: &Plan) {
         self.place += by;
+        if self.lead < plan.end || by.unsigned_abs() > NANOMETRE {
+            self.lead += by;
+        }
     }
 
     /// One period at this wanted speed, quanta a period; the quanta that the tool moves.
