@@ -392,17 +392,19 @@ fn no_stage_has_grown() {
     );
 }
 
-/// Jobs of a short search: none has a tick that the firmware would stop for, a tenth of the period (`TICK_BUDGET_CYCLES`).
+/// Jobs of two short searches, without limits and with them: none has a tick that the firmware would stop for, a tenth of the period (`TICK_BUDGET_CYCLES`).
 #[test]
 fn a_short_search_finds_no_tick_over_its_budget() {
     let path = qemu::firmware().unwrap();
     let (plan, _) = image::read(&path).unwrap();
     let mut lab = Lab::new(&Bench::new(&path, &plan).unwrap()).unwrap();
-    let campaign = search(&mut lab, 16, 3, || {}).unwrap();
-    assert!(campaign.ran >= 6, "{} jobs ran", campaign.ran);
-    let found = &campaign.elite[0];
-    let cycles = figures::whole(&found.worst.record, figures::Model::Pessimistic);
-    assert!(cycles < PERIOD_CYCLES / 10, "{cycles} cycles: {found:?}");
+    for (jobs, limits) in [(16, false), (3, true)] {
+        let campaign = search(&mut lab, jobs, 3, limits, || {}).unwrap();
+        assert!(campaign.ran >= jobs / 3, "{} jobs ran", campaign.ran);
+        let found = &campaign.elite[0];
+        let cycles = figures::whole(&found.worst.record, figures::Model::Pessimistic);
+        assert!(cycles < PERIOD_CYCLES / 10, "{cycles} cycles: {found:?}");
+    }
     let analysis = graph::analyse(&path).unwrap();
     assert!(
         lab.stack_bytes() <= analysis.stack_bytes(),

@@ -43,7 +43,7 @@ pub fn worst(bench: &Bench) -> Result<Vec<Figure>, BudgetError> {
     let prepared = prepare(&job).map_err(|error| unusable(&error))?;
     let mut lab = Lab::new(bench)?;
     let run = lab.run(&prepared, WORST_TICKS)?;
-    let worst = lab.worst(&run)?;
+    let worst = lab.worst(&prepared, &run)?;
     Ok(Model::ALL
         .map(|model| Figure::of_tick("worst job found", model, &worst.record))
         .to_vec())

@@ -6,6 +6,7 @@ use std::path::Path;
 
 use cycle_plugin::plan::Stage;
 use cycle_plugin::record::{RECORD_BYTES, Record};
+use fastrand::Rng;
 use interp_core::{FaultKind, State};
 use protocol::message::{Clock, Configuration, FaultReport, Report, Request, Status};
 
@@ -16,7 +17,7 @@ use crate::prepare::Prepared;
 use crate::remote::operate::{self, Setup};
 use crate::remote::qemu::Qemu;
 use crate::remote::session::Event;
-use crate::remote::{Session, drive};
+use crate::remote::{RemoteError, Session, drive};
 
 /// Ticks of a run that are tried with all that can come together.
 const TRIED: usize = 2;
@@ -25,8 +26,17 @@ const TRIED: usize = 2;
 const STOP_TICKS: u32 = 10_000;
 const SETTLE_ROUNDS: u32 = 60;
 
+/// Periods in which an operator disturbs a run, those between two commands at most, and the seed of what comes when.
+const DISTURBED_TICKS: u32 = 1500;
+const PAUSE_MAX: u32 = 24;
+const DISTURBED_SEED: u64 = 7;
+
+/// Periods after a start that are left alone: the first pass is looked over.
+const WAIT_TICKS: u32 = 3000;
+
 /// QEMU, the line to the board in it, and what the plugin writes.
 pub struct Lab {
+    bench: Bench,
     session: Session,
     records: File,
     /// A record that has been written in part.
@@ -89,6 +99,29 @@ fn fault_name(fault: &FaultReport) -> &'static str {
     fault.kind().map_or("a fault", FaultKind::name)
 }
 
+fn has_limits(job: &Prepared) -> bool {
+    job.header.axes.is_some()
+}
+
+/// What an operator may do next.
+fn operators(random: &mut Rng, state: State) -> Request {
+    if !state.is_under_way() {
+        return match state {
+            State::Faulted => Request::Abort,
+            _ => Request::Start,
+        };
+    }
+    match random.u8(..64) {
+        0..16 => Request::Hold,
+        16..38 => Request::Resume,
+        38..62 => Request::Override {
+            percent: random.u8(..=200),
+        },
+        62 => Request::Stop,
+        _ => Request::Abort,
+    }
+}
+
 fn file_error(path: &Path, error: &std::io::Error) -> BudgetError {
     BudgetError::File(path.into(), error.to_string())
 }
@@ -106,6 +139,7 @@ impl Lab {
         let mut session = Session::open(stream, 1)?;
         operate::make_ready(&mut session, &Setup::simulated(Configuration::DEFAULT))?;
         Ok(Self {
+            bench: bench.clone(),
             session,
             records: File::open(&records).map_err(|error| file_error(&records, &error))?,
             rest: Vec::new(),
@@ -114,6 +148,14 @@ impl Lab {
             _qemu: qemu,
             _folder: folder,
         })
+    }
+
+    /// Another QEMU: with limits a run begins where the last one ended, so that only the first of each is the same again.
+    fn renew(&mut self) -> Result<(), BudgetError> {
+        let stack_low = self.stack_low;
+        *self = Self::new(&self.bench)?;
+        self.stack_low = stack_low;
+        Ok(())
     }
 
     /// High-water mark of the stack since the beginning, bytes.
@@ -132,7 +174,7 @@ impl Lab {
         let records = Record::read_all(&self.rest[..whole]);
         self.rest.drain(..whole);
         if let Some(last) = records.last() {
-            self.stack_low = last.stack_low;
+            self.stack_low = self.stack_low.min(last.stack_low);
             if last.unknown > 0 {
                 let what = format!("{} instructions are unknown to the decoder", last.unknown);
                 return Err(BudgetError::Figures(what));
@@ -183,9 +225,16 @@ impl Lab {
     /// # Errors
     /// The board refuses the job, the line breaks, or the records are not whole.
     pub fn run(&mut self, job: &Prepared, ticks: u32) -> Result<Run, BudgetError> {
-        self.settle()?;
-        drive::upload(&mut self.session, job, |_| {})?;
+        if has_limits(job) {
+            self.renew()?;
+        }
+        self.load(job)?;
         self.again(Report::Digests, ticks)
+    }
+
+    fn load(&mut self, job: &Prepared) -> Result<(), BudgetError> {
+        self.settle()?;
+        Ok(drive::upload(&mut self.session, job, |_| {})?)
     }
 
     /// Runs the first ticks of the loaded job.
@@ -209,12 +258,12 @@ impl Lab {
         Ok(run)
     }
 
-    /// The worst tick of the loaded job, of which this was a run: as it was in the run, or with all that can come
-    /// together with it.
+    /// The worst tick of this job, of which this was a run and which is loaded: as it was in the run, with all that can come
+    /// together with it, or, with limits, while an operator does this and that.
     ///
     /// # Errors
     /// As [`Self::run`].
-    pub fn worst(&mut self, run: &Run) -> Result<Worst, BudgetError> {
+    pub fn worst(&mut self, job: &Prepared, run: &Run) -> Result<Worst, BudgetError> {
         let mut ticks = run.numbered();
         let cycles = |record: &Record| whole(record, Model::Pessimistic);
         ticks.sort_by_key(|(_, record)| std::cmp::Reverse(cycles(record)));
@@ -225,30 +274,86 @@ impl Lab {
                 tick: *tick,
                 events: events(record, run, *tick),
             };
-            let crowded = self.crowded(*tick)?;
+            let crowded = self.crowded(job, *tick)?;
             for found in [plain, crowded] {
                 if cycles(&found.record) > cycles(&worst.record) {
                     worst = found;
                 }
             }
         }
+        if has_limits(job) {
+            let found = self.disturbed()?;
+            if cycles(&found.record) > cycles(&worst.record) {
+                worst = found;
+            }
+        }
         Ok(worst)
     }
 
-    /// Runs up to a tick, holds, and lets the tick come with a resume, a command and the end of the credit.
-    fn crowded(&mut self, tick: u32) -> Result<Worst, BudgetError> {
+    /// Runs the loaded job, which has limits, with an operator who holds, resumes, overrides, stops and aborts it at any moment; the
+    /// worst tick of that.
+    fn disturbed(&mut self) -> Result<Worst, BudgetError> {
+        let mut random = Rng::with_seed(DISTURBED_SEED);
+        self.settle()?;
+        self.commands(&[Request::Report(Report::Samples)])?;
+        self.take()?;
+        let mut worst = Worst::default();
+        let (mut ticks, mut state) = (0, State::Ready);
+        while ticks < DISTURBED_TICKS {
+            let request = operators(&mut random, state);
+            let starts = request == Request::Start;
+            match self.session.command(&request) {
+                // It was refused in this state, or was about a state that is over.
+                Ok(()) | Err(RemoteError::Refused { .. }) => {}
+                Err(error) => return Err(error.into()),
+            }
+            let pause = random.u32(1..=PAUSE_MAX);
+            state = self.pass(pause)?.state;
+            if starts {
+                // Its samples are of no use: what is reported takes as long as what is run.
+                self.commands(&[Request::Report(Report::Digests)])?;
+                state = self.pass(WAIT_TICKS)?.state;
+                self.commands(&[Request::Report(Report::Samples)])?;
+            }
+            for (passed, record) in (0..).zip(self.take()?) {
+                let cycles = |record: &Record| whole(record, Model::Pessimistic);
+                if cycles(&record) > cycles(&worst.record) {
+                    let mut happened = events(&record, &Run::default(), 0);
+                    happened.push("an operator's doing");
+                    worst = Worst {
+                        record,
+                        tick: ticks + passed,
+                        events: happened,
+                    };
+                }
+            }
+            ticks += pause;
+        }
+        Ok(worst)
+    }
+
+    /// Runs up to a tick, holds, and lets the tick come with a resume, a command and the end of the credit. With limits a hold takes its
+    /// time: there the tick comes with the hold.
+    fn crowded(&mut self, job: &Prepared, tick: u32) -> Result<Worst, BudgetError> {
+        let limited = has_limits(job);
+        if limited {
+            self.renew()?;
+            self.load(job)?;
+        }
         if tick == 0 {
             self.settle()?;
         } else {
-            self.again(Report::Samples, tick)?;
-            self.commands(&[Request::Hold])?;
-            self.pass(1)?;
+            self.again(Report::Digests, tick)?;
+            if !limited {
+                self.commands(&[Request::Report(Report::Samples), Request::Hold])?;
+                self.pass(1)?;
+            }
         }
         self.take()?;
-        let begin = if tick == 0 {
-            Request::Start
-        } else {
-            Request::Resume
+        let (begin, name) = match tick {
+            0 => (Request::Start, "the start"),
+            _ if limited => (Request::Hold, "a hold"),
+            _ => (Request::Resume, "a resume from a hold"),
         };
         self.commands(&[Request::Report(Report::Samples), begin])?;
         let status = self.pass(1)?;
@@ -265,15 +370,7 @@ impl Lab {
             .copied()
             .unwrap_or_default();
         let mut events = events(&worst, &run, 0);
-        events.extend([
-            if tick == 0 {
-                "the start"
-            } else {
-                "a resume from a hold"
-            },
-            "a command",
-            "the end of the run's ticks",
-        ]);
+        events.extend([name, "a command", "the end of the run's ticks"]);
         Ok(Worst {
             record: worst,
             tick,

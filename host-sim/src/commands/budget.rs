@@ -42,6 +42,9 @@ pub(super) struct Arguments {
     /// Seed of the search: the same finds the same.
     #[arg(long, default_value_t = 1, requires = "search")]
     seed: u64,
+    /// The search's jobs run within limits of the axes, from standstill to standstill.
+    #[arg(long, requires = "search")]
+    limits: bool,
     /// Job file that the search writes.
     #[arg(
         long,
@@ -310,7 +313,11 @@ fn print_worst(arguments: &Arguments, bench: &Bench) -> Result<()> {
         let mut lab = Lab::new(bench)?;
         let run = lab.run(&prepared, arguments.ticks)?;
         bar.finish_and_clear();
-        say_part!("\n{}: {}", path.display(), worst::describe(&lab.worst(&run)?));
+        say_part!(
+            "\n{}: {}",
+            path.display(),
+            worst::describe(&lab.worst(&prepared, &run)?)
+        );
     }
     Ok(())
 }
@@ -356,7 +363,7 @@ pub(super) fn command(arguments: &Arguments) -> Result<()> {
     let (plan, _) = image::read(&image)?;
     let bench = Bench::new(&image, &plan)?;
     if let Some(jobs) = arguments.search {
-        return worst::command(&bench, jobs, arguments.seed, &arguments.out, arguments.json);
+        return worst::command(&bench, jobs, arguments);
     }
     let (counted, directions) = count(arguments, &bench)?;
     let figures: Vec<Vec<Figure>> = counted.iter().map(|(name, ticks)| figures(name, ticks)).collect();

@@ -5,7 +5,7 @@ use fastrand::Rng;
 use crate::job_file::{Along, JobFile, Machine, NurbsSpec, Pattern, Side, Spacing, SurfaceSpec};
 
 /// Numbers of a job.
-const GENES: usize = 18;
+const GENES: usize = 21;
 
 /// Patches that surely fit the board's store, rational or not.
 const PATCHES_MAX: [usize; 2] = [230, 300];
@@ -31,6 +31,9 @@ enum Gene {
     Pattern,
     Stretch,
     Origin,
+    Velocity,
+    Acceleration,
+    Jerk,
 }
 
 /// A job as numbers from 0 to 1, and the seed of what is random in it.
@@ -141,9 +144,9 @@ impl Genes {
         1 + (2.999 * self.gene(gene)) as usize
     }
 
-    /// The job.
+    /// The job, with limits of the axes or without.
     #[must_use]
-    pub fn job(&self) -> JobFile {
+    pub fn job(&self, limits: bool) -> JobFile {
         let mut random = Rng::with_seed(self.seed);
         let surface = match self.gene(Gene::Kind) {
             kind if kind < 0.1 => self.revolved(&mut random),
@@ -160,7 +163,12 @@ impl Genes {
             feed_mm_min: self.log(Gene::Arc, 60.0, 600_000.0),
             scallop_mm: radius_mm * self.log(Gene::Scallop, 1e-4, 0.95),
             along: self.along(),
-            side: if random.bool() { Side::Plus } else { Side::Minus },
+            side: match random.bool() {
+                // Between its passes the tool leaves the surface upwards.
+                _ if limits => Side::Up,
+                true => Side::Plus,
+                false => Side::Minus,
+            },
             pattern: if self.gene(Gene::Pattern) < 0.5 {
                 Pattern::Zig
             } else {
@@ -168,8 +176,23 @@ impl Genes {
             },
             spacing: Spacing::Exact,
             chord_mm: 0.5 * radius_mm,
-            machine: Machine::default(),
+            machine: if limits {
+                self.machine()
+            } else {
+                Machine::default()
+            },
             origin: crate::job_file::Origin::default(),
+        }
+    }
+
+    /// A machine with limits: those of the fastest reach their velocity within some periods, those of the slowest never.
+    fn machine(&self) -> Machine {
+        let axes = |most: f64| Some([most, most, 0.5 * most]);
+        Machine {
+            velocity_max_mm_s: axes(self.log(Gene::Velocity, 10.0, 1000.0)),
+            acceleration_max_mm_s2: axes(self.log(Gene::Acceleration, 100.0, 20_000.0)),
+            jerk_max_mm_s3: axes(self.log(Gene::Jerk, 1e3, 1e6)),
+            ..Machine::default()
         }
     }
 

@@ -5,7 +5,8 @@
 //! ```
 //!
 //! Of each job's run every tick counts, also one that yields no sample. The worst are run again so that all that can come together
-//! with them does: a command in the same tick, a resume from a hold, samples reported, the run's ticks used up.
+//! with them does: a command in the same tick, a resume from a hold, samples reported, the run's ticks used up. Jobs with limits also
+//! run with an operator who holds, resumes, overrides, stops and aborts at any moment.
 
 pub mod genes;
 pub mod text;
@@ -13,6 +14,7 @@ pub mod text;
 use std::collections::BTreeSet;
 
 use fastrand::Rng;
+use interp_core::State;
 
 use super::BudgetError;
 use super::figures::{Model, whole};
@@ -23,8 +25,9 @@ use crate::prepare::{Prepared, prepare};
 use crate::remote::RemoteError;
 use genes::Genes;
 
-/// Ticks of each job.
+/// Ticks of each job, and of one with limits: before its first pass it is looked over, which takes some thousand.
 const TICKS: u32 = 600;
+const TICKS_WITHIN_LIMITS: u32 = 6000;
 
 /// Jobs that hill climbing starts from.
 const ELITE: usize = 8;
@@ -73,16 +76,17 @@ pub struct Campaign {
 fn prepared(job: &JobFile) -> Option<(Prepared, bool)> {
     let prepared = prepare(job).ok()?;
     let mut machine = Machine::load(&prepared).ok()?;
-    let mut samples = 0;
+    let (mut samples, mut ticks) = (0, 0);
     // How it ends is the board's to say.
-    let _ = machine.run(|_| {
-        samples += 1;
-        samples < SAMPLES_MIN
+    let _ = machine.run(|sample| {
+        ticks += 1;
+        samples += u32::from(sample.state == State::Running);
+        samples < SAMPLES_MIN && ticks < TICKS_WITHIN_LIMITS
     });
     Some((prepared, samples >= SAMPLES_MIN))
 }
 
-/// Tries so many jobs; the same seed tries the same. `progress` is called after each.
+/// Tries so many jobs, with `limits` or without; the same seed tries the same. `progress` is called after each.
 ///
 /// # Errors
 /// QEMU or the line to it breaks.
@@ -90,13 +94,14 @@ pub fn search(
     lab: &mut Lab,
     jobs: u32,
     seed: u64,
+    limits: bool,
     mut progress: impl FnMut(),
 ) -> Result<Campaign, BudgetError> {
     let mut random = Rng::with_seed(seed);
     let mut campaign = Campaign::default();
     for _ in 0..jobs {
         let genes = draw(&mut random, &campaign.elite);
-        let job = genes.job();
+        let job = genes.job(limits);
         match prepared(&job) {
             Some((prepared, runs)) if runs || random.u8(..SHORT) == 0 => {
                 try_job(lab, &mut campaign, genes, job, &prepared)?;
@@ -129,7 +134,12 @@ fn try_job(
     job: JobFile,
     prepared: &Prepared,
 ) -> Result<(), BudgetError> {
-    let run = match lab.run(prepared, TICKS) {
+    let ticks = if prepared.header.axes.is_some() {
+        TICKS_WITHIN_LIMITS
+    } else {
+        TICKS
+    };
+    let run = match lab.run(prepared, ticks) {
         Err(BudgetError::Remote(RemoteError::Refused { .. })) => {
             campaign.refused += 1;
             return Ok(());
@@ -144,7 +154,7 @@ fn try_job(
     if campaign.elite.len() == ELITE && run.most() + ALONGSIDE < least {
         return Ok(());
     }
-    let worst = lab.worst(&run)?;
+    let worst = lab.worst(prepared, &run)?;
     campaign.elite.push(Found { job, worst, genes });
     campaign
         .elite

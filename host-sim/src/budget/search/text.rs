@@ -67,7 +67,7 @@ fn surface(surface: &SurfaceSpec) -> Vec<(&'static str, String)> {
     }
 }
 
-/// The text. Limits of the machine's axes are left out.
+/// The text. Of the machine, its period and the limits of its axes.
 #[must_use]
 pub fn text(job: &JobFile, comment: &str) -> String {
     let mut text = String::new();
@@ -112,6 +112,15 @@ pub fn text(job: &JobFile, comment: &str) -> String {
         number(job.chord_mm),
         number(job.machine.period_us)
     );
+    for (key, limit) in [
+        ("velocity_max_mm_s", job.machine.velocity_max_mm_s),
+        ("acceleration_max_mm_s2", job.machine.acceleration_max_mm_s2),
+        ("jerk_max_mm_s3", job.machine.jerk_max_mm_s3),
+    ] {
+        if let Some(limit) = limit {
+            let _ = writeln!(text, "{key} = {}", numbers(&limit));
+        }
+    }
     text
 }
 
@@ -124,8 +133,8 @@ mod tests {
     #[test]
     fn reads_back_as_the_same_job() {
         let mut random = fastrand::Rng::with_seed(1);
-        for _ in 0..200 {
-            let job = Genes::random(&mut random).job();
+        for count in 0..200 {
+            let job = Genes::random(&mut random).job(count % 2 == 1);
             let mut read =
                 JobFile::parse("a job", &text(&job, "one\ntwo")).unwrap_or_else(|error| panic!("{error:?}"));
             read.origin = Origin::default();

@@ -1,12 +1,13 @@
 //! `budget --search`: the worst tick that can be found, and the job that causes it.
 
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 use cycle_plugin::plan::Stage;
 use serde_json::{Value, json};
 
 use super::super::out::{say, say_part};
 use super::super::{Failure, Result, cannot_write, progress};
+use super::Arguments;
 use crate::budget::PERIOD_CYCLES;
 use crate::budget::figures::{Model, whole};
 use crate::budget::lab::{Lab, Worst};
@@ -84,10 +85,17 @@ fn print(campaign: &Campaign, lab: &Lab, seed: u64, out: &Path) {
 }
 
 /// Searches, prints the worst tick, and writes the job that causes it.
-pub(super) fn command(bench: &Bench, jobs: u32, seed: u64, out: &PathBuf, as_json: bool) -> Result<()> {
+pub(super) fn command(bench: &Bench, jobs: u32, arguments: &Arguments) -> Result<()> {
+    let Arguments {
+        seed,
+        limits,
+        ref out,
+        json: as_json,
+        ..
+    } = *arguments;
     let mut lab = Lab::new(bench)?;
     let bar = progress(u64::from(jobs), "searching");
-    let campaign = search(&mut lab, jobs, seed, || bar.inc(1))?;
+    let campaign = search(&mut lab, jobs, seed, limits, || bar.inc(1))?;
     bar.finish_and_clear();
     let Some(found) = campaign.elite.first() else {
         return Err(Failure::Failed(Some(format!(
@@ -95,7 +103,8 @@ pub(super) fn command(bench: &Bench, jobs: u32, seed: u64, out: &PathBuf, as_jso
         ))));
     };
     let comment = format!(
-        "The worst job that `cargo sim budget --search {jobs} --seed {seed}` found.\n{}",
+        "The worst job that `cargo sim budget --search {jobs} --seed {seed}{}` found.\n{}",
+        if limits { " --limits" } else { "" },
         describe(&found.worst)
     );
     std::fs::write(out, text::text(&found.job, &comment)).map_err(|error| cannot_write(out, &error))?;
