@@ -214,7 +214,10 @@ mod tests {
         );
         assert_eq!(stage("core::num::<impl u32>::wrapping_add"), None);
         assert_eq!(stage("controller::realtime::run::Run::add"), Some(Stage::Count));
-        assert_eq!(stage("controller::realtime::run::Run::end_pass"), Some(Stage::Rest));
+        assert_eq!(
+            stage("controller::realtime::run::Run::end_pass"),
+            Some(Stage::Rest)
+        );
         assert_eq!(stage("protocol::digest::Digest::sample"), None);
     }
 
