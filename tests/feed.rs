@@ -298,6 +298,25 @@ fn no_sequence_of_commands_breaks_a_limit_long() {
         .unwrap();
 }
 
+/// Set going again just before the end of a leg, when a little acceleration follows a whole one: the end comes before that has left the mean.
+#[test]
+fn a_leg_resumed_before_its_end_keeps_the_jerk() {
+    let (header, words, whole) = undisturbed_once(false);
+    // A period more or less, and it is not that close to the end.
+    for first in 740..840 {
+        let commands = [
+            (first, Request::None, 200),
+            (37, Request::Resume, 100),
+            (46, Request::None, 0),
+            (150, Request::Resume, 100),
+            (24, Request::None, 0),
+            (1, Request::Resume, 100),
+            (8, Request::Hold, 100),
+        ];
+        check_commands(header, words, whole, &commands);
+    }
+}
+
 /// Held, slowed down and sped up in all kinds of places, and resumed each time: every pass of the undisturbed run, and home.
 #[test]
 fn a_job_interrupted_and_resumed_takes_the_same_path() {

@@ -9,8 +9,8 @@ use crate::scalar::{float, real};
 /// Longest mean, periods: the ring's length less what the difference of accelerations needs.
 pub(crate) const WINDOW_MAX: u8 = 250;
 
-/// Share of the greatest change of the acceleration that is little.
-const CREEP_SHARE: f32 = 1.0 / 16.0;
+/// Share of the greatest change of the acceleration that is little: by so much a braking at the path's end may be above it.
+const CREEP_SHARE: f32 = 1.0 / 20.0;
 
 /// Periods of the greatest acceleration up to which a speed is slow, and that are looked ahead then.
 const CREEP_PERIODS: f32 = 2.0;
@@ -32,6 +32,8 @@ pub(crate) struct Profile {
     taken: u8,
     /// Periods of the mean.
     window: u8,
+    /// Periods until the last acceleration that was not little leaves the mean. Nothing can be braked in the period in which it does.
+    until_left: u8,
     /// Cell of the plan that `lead` is in.
     cell: u16,
     /// Sum of the last steps, and the place that they led to, quanta.
@@ -49,6 +51,7 @@ impl Profile {
         at: 0,
         taken: 0,
         window: 1,
+        until_left: 0,
         cell: 0,
         sum: 0,
         lead: 0,
@@ -60,6 +63,7 @@ impl Profile {
     pub(crate) fn begin(&mut self, window: u8) {
         self.taken = 0;
         self.window = window.clamp(1, WINDOW_MAX);
+        self.until_left = 0;
         self.cell = 0;
         (self.sum, self.lead, self.place, self.rest) = (0, 0, 0, 0);
     }
@@ -118,6 +122,11 @@ impl Profile {
             }
         }
         let change = change.at_most(most).at_least(least);
+        self.until_left = if change > plan.swing * CREEP_SHARE {
+            self.window
+        } else {
+            self.until_left.saturating_sub(1)
+        };
         let mut step = rounded((speed + change).at_least(0.0));
         if step == 0 && wanted > 0.0 {
             step = rounded(STEP_LEAST.at_most(wanted));
@@ -141,12 +150,13 @@ impl Profile {
     }
 
     /// A small acceleration where a whole one would have to be waited for, so that the tool never stands before a narrow place: what it
-    /// takes of the braking is small, too.
+    /// takes of the braking is small, too. Where a whole one still has to leave the mean, there is to be room until then at this speed.
     fn creep(&self, plan: &Plan, speed: f32, change: f32) -> f32 {
         let little = change.at_most(plan.swing * CREEP_SHARE);
         let faster = speed + little;
         let is_slow = speed <= CREEP_PERIODS * plan.accel(self.cell, self.lead);
-        if is_slow && plan.is_clear(self.cell, self.lead, CREEP_PERIODS * faster, faster) {
+        let periods = (count(self.until_left) + 1.0).at_least(CREEP_PERIODS);
+        if is_slow && plan.is_clear(self.cell, self.lead, periods * faster, faster) {
             little
         } else {
             0.0

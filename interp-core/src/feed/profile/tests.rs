@@ -104,3 +104,70 @@ fn straight_paths_take_the_optimal_time() {
     }
     std::println!("worst {worst}");
 }
+
+/// Speeds wanted on and off at any time, on legs whose last part is slow, too: the jerk of the mean is kept in each period, but for what
+/// creeping may take and the least step.
+#[test]
+fn no_wanted_speed_breaks_the_jerk() {
+    let room = |v: f32, a: f32, j: f32| Room {
+        square: v * v,
+        accel: a,
+        jerk: j,
+        taken: 0.0,
+    };
+    let plans = [
+        plan(
+            &[(30.0, room(100.0, 1000.0, 20e3)), (2.0, room(40.0, 1000.0, 20e3))],
+            100.0,
+        ),
+        plan(
+            &[(12.0, room(50.0, 500.0, 10e3)), (2.0, room(10.0, 500.0, 10e3))],
+            50.0,
+        ),
+        plan(
+            &[(3.0, room(50.0, 500.0, 10e3)), (0.5, room(10.0, 500.0, 10e3))],
+            50.0,
+        ),
+        plan(&[(5.0, room(50.0, 900.0, 10e3))], 50.0),
+    ];
+    let mut seed = 1_u64;
+    let mut random = |below: u64| {
+        seed = seed
+            .wrapping_mul(6_364_136_223_846_793_005)
+            .wrapping_add(1_442_695_040_888_963_407);
+        (seed >> 33) % below
+    };
+    for turn in 0..4000 {
+        let plan = &plans[turn % 4];
+        let limit = f64::from(plan.swing) / f64::from(plan.window);
+        let most =
+            limit * f64::from(1.0 + CREEP_SHARE) + f64::from(STEP_LEAST) / f64::from(plan.window) + 4.0;
+        let mut profile = Profile::START;
+        profile.begin(plan.window);
+        let (mut left, mut share) = (0, 0.0);
+        let (mut last, mut before) = (0, 0);
+        for tick in 0..20_000 {
+            if left == 0 {
+                left = 1 + [random(4), random(60), random(300)][random(3) as usize];
+                let shares = [0.0, 0.0, 0.1, 0.4, 1.0, 0.02 * random(50) as f32];
+                share = shares[random(6) as usize];
+                if tick > 3000 {
+                    share = 1.0;
+                }
+            }
+            left -= 1;
+            let moved = i64::from(profile.tick(plan, share * 50.0 * T as f32 * QUANTA_PER_MM));
+            let jerk = (moved - 2 * last + before).abs() as f64;
+            assert!(
+                jerk <= most,
+                "{turn}, period {tick}: {} of the jerk",
+                jerk / limit
+            );
+            (before, last) = (last, moved);
+            if profile.is_done(plan) {
+                break;
+            }
+        }
+        assert!(profile.is_done(plan), "{turn}");
+    }
+}
