@@ -190,6 +190,15 @@ impl Lab {
         Ok(())
     }
 
+    /// Sends a request, and says whether the board took it: some states refuse it.
+    fn is_taken(&mut self, request: &Request) -> Result<bool, BudgetError> {
+        match self.session.command(request) {
+            Ok(()) => Ok(true),
+            Err(RemoteError::Refused { .. }) => Ok(false),
+            Err(error) => Err(error.into()),
+        }
+    }
+
     /// Lets so many periods pass, and waits for them.
     fn pass(&mut self, ticks: u32) -> Result<Status, BudgetError> {
         self.session.command(&Request::Run { ticks })?;
@@ -302,11 +311,8 @@ impl Lab {
         while ticks < DISTURBED_TICKS {
             let request = operators(&mut random, state);
             let starts = request == Request::Start;
-            match self.session.command(&request) {
-                // It was refused in this state, or was about a state that is over.
-                Ok(()) | Err(RemoteError::Refused { .. }) => {}
-                Err(error) => return Err(error.into()),
-            }
+            // Where it is refused, it was about a state that is over.
+            self.is_taken(&request)?;
             let pause = random.u32(1..=PAUSE_MAX);
             state = self.pass(pause)?.state;
             if starts {
@@ -333,7 +339,7 @@ impl Lab {
     }
 
     /// Runs up to a tick, holds, and lets the tick come with a resume, a command and the end of the credit. With limits a hold takes its
-    /// time: there the tick comes with the hold.
+    /// time: there the tick comes with the hold. Nothing where the run is over by then, or is stopping because of a fault.
     fn crowded(&mut self, job: &Prepared, tick: u32) -> Result<Worst, BudgetError> {
         let limited = has_limits(job);
         if limited {
@@ -345,7 +351,10 @@ impl Lab {
         } else {
             self.again(Report::Digests, tick)?;
             if !limited {
-                self.commands(&[Request::Report(Report::Samples), Request::Hold])?;
+                self.commands(&[Request::Report(Report::Samples)])?;
+                if !self.is_taken(&Request::Hold)? {
+                    return Ok(Worst::default());
+                }
                 self.pass(1)?;
             }
         }
@@ -355,7 +364,10 @@ impl Lab {
             _ if limited => (Request::Hold, "a hold"),
             _ => (Request::Resume, "a resume from a hold"),
         };
-        self.commands(&[Request::Report(Report::Samples), begin])?;
+        self.commands(&[Request::Report(Report::Samples)])?;
+        if !self.is_taken(&begin)? {
+            return Ok(Worst::default());
+        }
         let status = self.pass(1)?;
         let records = self.take()?;
         let run = Run {

@@ -42,7 +42,7 @@ const STAGES: [(&str, &str, Stage); 23] = [
 ];
 
 /// The function that counts a sample in.
-const COUNT: &str = "controller::realtime::Run::add";
+const COUNT: &str = "controller::realtime::run::Run::add";
 
 /// What it calls: a helper.
 const DIGEST: &str = "protocol::digest";
@@ -213,8 +213,11 @@ mod tests {
             None
         );
         assert_eq!(stage("core::num::<impl u32>::wrapping_add"), None);
-        assert_eq!(stage("controller::realtime::Run::add"), Some(Stage::Count));
-        assert_eq!(stage("controller::realtime::Run::end_pass"), Some(Stage::Rest));
+        assert_eq!(stage("controller::realtime::run::Run::add"), Some(Stage::Count));
+        assert_eq!(
+            stage("controller::realtime::run::Run::end_pass"),
+            Some(Stage::Rest)
+        );
         assert_eq!(stage("protocol::digest::Digest::sample"), None);
     }
 
