@@ -14,7 +14,7 @@ use cycle_plugin::plan::{Plan, Stage};
 use cycle_plugin::record::{RECORD_BYTES, Record};
 use host_sim::budget::lab::Lab;
 use host_sim::budget::search::search;
-use host_sim::budget::{self, PERIOD_CYCLES, TICKS, figures, golden, graph, image, measure::Bench};
+use host_sim::budget::{self, PERIOD_CYCLES, figures, golden, graph, image, measure::Bench};
 use host_sim::job_file::JobFile;
 use host_sim::prepare::prepare;
 use host_sim::remote::qemu::{self, Qemu};
@@ -375,9 +375,9 @@ fn no_stage_has_grown() {
     let (plan, _) = image::read(&path).unwrap();
     let bench = Bench::new(&path, &plan).unwrap();
     let mut all = Vec::new();
-    for (name, path) in budget::jobs() {
+    for (name, path, ticks) in budget::jobs() {
         let prepared = prepare(&JobFile::load(&path).unwrap()).unwrap();
-        all.extend(figures::figures(name, &bench.run(&prepared, TICKS).unwrap()));
+        all.extend(figures::figures(name, &bench.run(&prepared, ticks).unwrap()));
     }
     for figure in all.iter().filter(|figure| figure.stage == "pulses") {
         assert!(figure.max < PERIOD_CYCLES / 10, "{figure:?}");
@@ -398,7 +398,7 @@ fn a_short_search_finds_no_tick_over_its_budget() {
     let path = qemu::firmware().unwrap();
     let (plan, _) = image::read(&path).unwrap();
     let mut lab = Lab::new(&Bench::new(&path, &plan).unwrap()).unwrap();
-    for (jobs, limits) in [(16, false), (3, true)] {
+    for (jobs, limits) in [(16, false), (2, true)] {
         let campaign = search(&mut lab, jobs, 3, limits, || {}).unwrap();
         assert!(campaign.ran >= jobs / 3, "{} jobs ran", campaign.ran);
         let found = &campaign.elite[0];

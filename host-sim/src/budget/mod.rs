@@ -39,24 +39,29 @@ pub const SURFACES: [(&str, &str); 6] = [
     ("NURBS rational", "torus"),
 ];
 
-/// Jobs of `tests/golden` that are counted besides: those that ask pulses or limits, which no kind of surface has to do with.
-pub const FURTHER: [(&str, &str); 4] = [
-    ("three axes at 400 kHz", "pulses"),
-    ("limits, zig", "limits_zig"),
-    ("limits, zigzag", "limits_zigzag"),
-    ("limits, three axes at 400 kHz", "limits_pulses"),
+/// Ticks of a job with limits: the first pass looked over, the way there, a pass and a link, and the next. They are dear to count.
+pub const TICKS_WITHIN_LIMITS: u32 = 10_000;
+
+/// Jobs of `tests/golden` that are counted besides, and their ticks: those that ask pulses or limits, which no kind of surface has
+/// to do with.
+pub const FURTHER: [(&str, &str, u32); 4] = [
+    ("three axes at 400 kHz", "pulses", TICKS),
+    ("limits, zig", "limits_zig", TICKS_WITHIN_LIMITS),
+    ("limits, zigzag", "limits_zigzag", TICKS_WITHIN_LIMITS),
+    (
+        "limits, three axes at 400 kHz",
+        "limits_pulses",
+        TICKS_WITHIN_LIMITS,
+    ),
 ];
 
-/// All jobs of the table: their names and files.
+/// All jobs of the table: their names, files and ticks.
 #[must_use]
-pub fn jobs() -> Vec<(&'static str, PathBuf)> {
-    let of = |folder: &str, list: &[(&'static str, &str)]| -> Vec<_> {
-        let folder = workspace().join(folder);
-        list.iter()
-            .map(|(name, job)| (*name, folder.join(format!("{job}.toml"))))
-            .collect()
-    };
-    [of("jobs", &SURFACES), of("tests/golden", &FURTHER)].concat()
+pub fn jobs() -> Vec<(&'static str, PathBuf, u32)> {
+    let file = |folder: &str, job: &str| workspace().join(folder).join(format!("{job}.toml"));
+    let surfaces = SURFACES.map(|(name, job)| (name, file("jobs", job), TICKS));
+    let further = FURTHER.map(|(name, job, ticks)| (name, file("tests/golden", job), ticks));
+    surfaces.into_iter().chain(further).collect()
 }
 
 /// Why there is no figure.

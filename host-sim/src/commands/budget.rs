@@ -30,9 +30,9 @@ const BIN_CYCLES: u32 = 50;
 pub(super) struct Arguments {
     /// Job files to count instead of the golden table's.
     jobs: Vec<PathBuf>,
-    /// Ticks of each job.
-    #[arg(long, default_value_t = TICKS, value_parser = clap::value_parser!(u32).range(1..), allow_negative_numbers = true)]
-    ticks: u32,
+    /// Ticks of each job [default: 20000; 10000 of the golden table's jobs with limits].
+    #[arg(long, value_parser = clap::value_parser!(u32).range(1..), allow_negative_numbers = true)]
+    ticks: Option<u32>,
     /// Writes a chart (SVG) into this folder.
     #[arg(long, value_name = "DIR")]
     report: Option<PathBuf>,
@@ -79,19 +79,19 @@ type Counted = (String, Ticks);
 /// By a job's name: its direction in words and as JSON.
 type Directions = BTreeMap<String, (String, Map<String, Value>)>;
 
-/// The jobs to count, with their names.
-fn jobs(arguments: &Arguments) -> Vec<(String, PathBuf)> {
+/// The jobs to count: their names, files and ticks.
+fn jobs(arguments: &Arguments) -> Vec<(String, PathBuf, u32)> {
     if arguments.jobs.is_empty() {
         budget::jobs()
             .into_iter()
-            .map(|(name, path)| (name.to_owned(), path))
+            .map(|(name, path, ticks)| (name.to_owned(), path, arguments.ticks.unwrap_or(ticks)))
             .collect()
     } else {
         let name = |path: &PathBuf| path.display().to_string();
         arguments
             .jobs
             .iter()
-            .map(|path| (name(path), path.clone()))
+            .map(|path| (name(path), path.clone(), arguments.ticks.unwrap_or(TICKS)))
             .collect()
     }
 }
@@ -101,10 +101,10 @@ fn count(arguments: &Arguments, bench: &Bench) -> Result<(Vec<Counted>, Directio
     let bar = progress(jobs.len() as u64, "counting");
     let mut counted = Vec::new();
     let mut directions = Directions::new();
-    for (name, path) in jobs {
+    for (name, path, ticks) in jobs {
         let (job, prepared) = load(&path)?;
         directions.insert(name.clone(), (along::sentence(&job), along::json(&job)));
-        counted.push((name, bench.run(&prepared, arguments.ticks)?));
+        counted.push((name, bench.run(&prepared, ticks)?));
         bar.inc(1);
     }
     bar.finish_and_clear();
@@ -114,9 +114,9 @@ fn count(arguments: &Arguments, bench: &Bench) -> Result<(Vec<Counted>, Directio
 /// Operations of a sample of each job; none where no sample is far from the ends of passes and patches.
 fn count_operations(arguments: &Arguments) -> Result<BTreeMap<String, Count>> {
     let mut counts = BTreeMap::new();
-    for (name, path) in jobs(arguments) {
+    for (name, path, ticks) in jobs(arguments) {
         let (_, prepared) = load(&path)?;
-        let counted = operations::count(&prepared, arguments.ticks)
+        let counted = operations::count(&prepared, ticks)
             .map_err(|fault| Failure::Failed(Some(format!("{}: {fault}", path.display()))))?;
         if counted.samples > 0 {
             counts.insert(name, counted.sample);
@@ -145,7 +145,7 @@ fn print_operations(arguments: &Arguments, counts: &BTreeMap<String, Count>) {
         "sqrt",
         "sin cos"
     );
-    for (name, _) in jobs(arguments) {
+    for (name, _, _) in jobs(arguments) {
         if let Some(count) = counts.get(&name) {
             let more = format!(
                 "  {:>6} {:>12} {:>7}",
@@ -311,7 +311,7 @@ fn print_worst(arguments: &Arguments, bench: &Bench) -> Result<()> {
         let (_, prepared) = load(path)?;
         let bar = spinner("looking for the worst tick");
         let mut lab = Lab::new(bench)?;
-        let run = lab.run(&prepared, arguments.ticks)?;
+        let run = lab.run(&prepared, arguments.ticks.unwrap_or(TICKS))?;
         bar.finish_and_clear();
         say_part!(
             "\n{}: {}",

@@ -11,6 +11,11 @@ const BOUNDS: &[(&str, u32, &str)] = &[
         "the quotient's 32 bits that the chip's own division leaves, four a round",
     ),
     (
+        "compiler_builtins::mem::impls::compare_bytes",
+        12,
+        "bytes of a place of the axes",
+    ),
+    (
         "compiler_builtins::mem::impls::copy_forward::copy_forward_aligned_words",
         512,
         COPIED,
@@ -46,6 +51,31 @@ const BOUNDS: &[(&str, u32, &str)] = &[
         "interp_core::feed::plan::Plan::add",
         2,
         "cells before a station that its differences say something about: STENCIL_CELLS",
+    ),
+    (
+        "interp_core::feed::plan::Plan::is_clear",
+        8,
+        "cells that are looked through ahead: REACH",
+    ),
+    (
+        "interp_core::feed::plan::Plan::merge",
+        4,
+        "cells that are merged for one that is bounded: MERGED",
+    ),
+    (
+        "interp_core::feed::plan::Plan::pass_cell",
+        2,
+        "cells whose time is taken for one that is bounded: TIMED",
+    ),
+    (
+        "interp_core::feed::plan::Plan::work",
+        3,
+        "cells of a portion: CELLS_STANDING",
+    ),
+    (
+        "interp_core::feed::plan::bounds::bound",
+        8,
+        "neighbours to a side that a bound may come from: REACH",
     ),
     (
         "interp_core::schedule::apart",

@@ -27,7 +27,7 @@ use genes::Genes;
 
 /// Ticks of each job, and of one with limits: before its first pass it is looked over, which takes some thousand.
 const TICKS: u32 = 600;
-const TICKS_WITHIN_LIMITS: u32 = 6000;
+const TICKS_WITHIN_LIMITS: u32 = 4500;
 
 /// Jobs that hill climbing starts from.
 const ELITE: usize = 8;
