@@ -27,7 +27,7 @@ const STOP_TICKS: u32 = 10_000;
 const SETTLE_ROUNDS: u32 = 60;
 
 /// Periods in which an operator disturbs a run, those between two commands at most, and the seed of what comes when.
-const DISTURBED_TICKS: u32 = 1500;
+const DISTURBED_TICKS: u32 = 4500;
 const PAUSE_MAX: u32 = 24;
 const DISTURBED_SEED: u64 = 7;
 
@@ -36,7 +36,6 @@ const WAIT_TICKS: u32 = 3000;
 
 /// QEMU, the line to the board in it, and what the plugin writes.
 pub struct Lab {
-    bench: Bench,
     session: Session,
     records: File,
     /// A record that has been written in part.
@@ -140,7 +139,6 @@ impl Lab {
         let mut session = Session::open(stream, 1)?;
         operate::make_ready(&mut session, &Setup::simulated(Configuration::DEFAULT))?;
         Ok(Self {
-            bench: bench.clone(),
             session,
             records: File::open(&records).map_err(|error| file_error(&records, &error))?,
             rest: Vec::new(),
@@ -149,14 +147,6 @@ impl Lab {
             _qemu: qemu,
             _folder: folder,
         })
-    }
-
-    /// Another QEMU: with limits a run begins where the last one ended, so that only the first of each is the same again.
-    fn renew(&mut self) -> Result<(), BudgetError> {
-        let stack_low = self.stack_low;
-        *self = Self::new(&self.bench)?;
-        self.stack_low = stack_low;
-        Ok(())
     }
 
     /// High-water mark of the stack since the beginning, bytes.
@@ -175,7 +165,7 @@ impl Lab {
         let records = Record::read_all(&self.rest[..whole]);
         self.rest.drain(..whole);
         if let Some(last) = records.last() {
-            self.stack_low = self.stack_low.min(last.stack_low);
+            self.stack_low = last.stack_low;
             if last.unknown > 0 {
                 let what = format!("{} instructions are unknown to the decoder", last.unknown);
                 return Err(BudgetError::Figures(what));
@@ -211,12 +201,17 @@ impl Lab {
     }
 
     /// Gives up what runs. On a machine with limits the tool slows down along its path first, and where a fault is behind that, the
-    /// fault is left to be acknowledged.
+    /// fault is left to be acknowledged. Where the tool then is gets lost with the drives: each run begins at its job's home, and is
+    /// the same again.
     fn settle(&mut self) -> Result<(), BudgetError> {
         let mut state = self.session.status()?.state;
         for _ in 0..SETTLE_ROUNDS {
             if matches!(state, State::Idle | State::Ready | State::Finished) {
-                return self.commands(&[Request::Clock(Clock::Lockstep)]);
+                return self.commands(&[
+                    Request::Clock(Clock::Lockstep),
+                    Request::Drives { on: false },
+                    Request::Drives { on: true },
+                ]);
             }
             let ticks = if state == State::Stopping {
                 STOP_TICKS
@@ -235,16 +230,9 @@ impl Lab {
     /// # Errors
     /// The board refuses the job, the line breaks, or the records are not whole.
     pub fn run(&mut self, job: &Prepared, ticks: u32) -> Result<Run, BudgetError> {
-        if has_limits(job) {
-            self.renew()?;
-        }
-        self.load(job)?;
-        self.again(Report::Digests, ticks)
-    }
-
-    fn load(&mut self, job: &Prepared) -> Result<(), BudgetError> {
         self.settle()?;
-        Ok(drive::upload(&mut self.session, job, |_| {})?)
+        drive::upload(&mut self.session, job, |_| {})?;
+        self.again(Report::Digests, ticks)
     }
 
     /// Runs the first ticks of the loaded job.
@@ -322,6 +310,7 @@ impl Lab {
                 // Its samples are of no use: what is reported takes as long as what is run.
                 self.commands(&[Request::Report(Report::Digests)])?;
                 state = self.pass(WAIT_TICKS)?.state;
+                ticks += WAIT_TICKS;
                 self.commands(&[Request::Report(Report::Samples)])?;
             }
             for (passed, record) in (0..).zip(self.take()?) {
@@ -345,10 +334,6 @@ impl Lab {
     /// time: there the tick comes with the hold. Nothing where the run is over by then, or is stopping because of a fault.
     fn crowded(&mut self, job: &Prepared, tick: u32) -> Result<Worst, BudgetError> {
         let limited = has_limits(job);
-        if limited {
-            self.renew()?;
-            self.load(job)?;
-        }
         if tick == 0 {
             self.settle()?;
         } else {

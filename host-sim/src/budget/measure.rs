@@ -14,7 +14,7 @@ use crate::remote::session::Event;
 use crate::remote::{Session, drive};
 
 /// The image, the plan made of it, and the plugin: what every measurement starts from.
-#[derive(Clone, Debug)]
+#[derive(Debug)]
 pub struct Bench {
     image: PathBuf,
     plugin: PathBuf,
