@@ -94,10 +94,10 @@ fn jobs_of_the_paper() {
     compare(&["revolved", "ruled_printed", "ruled_reconstructed"]);
 }
 
-/// A job within limits, on a board that has run nothing before.
+/// A job within limits, before and after one without.
 #[test]
 fn with_limits() {
-    compare(&["plate_machine"]);
+    compare(&["plate_machine", "torus", "plate_machine"]);
 }
 
 #[test]

@@ -328,6 +328,8 @@ impl Run {
     pub(crate) const fn off_surface(&mut self, at_nm: [i32; 3], speed_mm_s: f32, last: &mut Sample) {
         self.stand(last);
         last.feed_mm_s = speed_mm_s;
+        // What is there may be of the job before.
+        last.pass = self.travel.pass;
         (last.path, last.side) = (Place::NONE, Place::NONE);
         (last.cc_nm, last.cl_nm) = (at_nm, at_nm);
         last.density = 0.0;
