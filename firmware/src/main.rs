@@ -107,6 +107,12 @@ mod app {
         let board = board::init(context.device);
         // What nobody reads would not be in the image.
         core::hint::black_box(&board::MARK);
+        defmt::info!(
+            "isofeed {=str} on {=str}, room for {=usize} words",
+            env!("CARGO_PKG_VERSION"),
+            BOARD.id,
+            JOB_WORDS
+        );
         let counter = CycleCounter::new(context.core.DCB, context.core.DWT);
         let (transmitter, receiver) = serial::open(board.usart1, board::SERIAL_DIVIDER);
         let (bytes_in, bytes_out) = context.local.bytes.split();
@@ -125,12 +131,6 @@ mod app {
             defmt::warn!("this board puts no steps out");
         }
         let timer = SampleTimer::new(board.tim2, board.tim5, board::TIMER_RELOAD, PERIOD_COUNTS);
-        defmt::info!(
-            "isofeed {=str} on {=str}, room for {=usize} words",
-            env!("CARGO_PKG_VERSION"),
-            BOARD.id,
-            JOB_WORDS
-        );
         let mut real_time = RealTime::with_store(context.local.store);
         real_time.set_tick_budget(TICK_BUDGET_CYCLES);
         real_time.set_reset_cause(board.reset);
