@@ -347,8 +347,8 @@ impl Events for Way {
     }
 }
 
-#[test]
-fn a_full_output_stops_time_in_lockstep_only() {
+/// A machine with the dome, in lockstep, that reports samples and is to start.
+fn half_in_lockstep() -> RealTime<[i32; WORDS]> {
     let (header, words) = dome();
     let mut half = RealTime::<[i32; WORDS]>::new();
     half.load_begin(&header, 54).unwrap();
@@ -357,11 +357,51 @@ fn a_full_output_stops_time_in_lockstep_only() {
     half.load_finish().unwrap();
     half.order(Order::Drives { on: true }).unwrap();
     half.order(Order::SetHome { home_nm: [0; 3] }).unwrap();
-    let mut way = Way::default();
+    for command in [
+        Command::Report(Report::Samples),
+        Command::Clock(Clock::Lockstep),
+        Command::Request(interpolator::Request::Start),
+    ] {
+        half.obey(command, &mut Way::default());
+    }
+    half
+}
+
+#[test]
+fn in_lockstep_commands_and_halts_come_on_top_of_no_period() {
+    let mut half = half_in_lockstep();
+    let obey = |half: &mut RealTime<[i32; WORDS]>, command| {
+        let mut way = Way::default();
+        half.obey(command, &mut way);
+        half.tick(TickInput::default(), &mut way);
+        way.events
+    };
+    let tick = |half: &mut RealTime<[i32; WORDS]>| {
+        let mut way = Way::default();
+        half.tick(TickInput::default(), &mut way);
+        way.events
+    };
+    assert_eq!(obey(&mut half, Command::Run { ticks: 2 }), []);
+    assert_eq!(tick(&mut half), [Event::Sample(reference()[0])]);
+    assert_eq!(obey(&mut half, Command::Report(Report::Samples)), []);
+    assert_eq!(tick(&mut half), [Event::Sample(reference()[1])]);
+    assert!(matches!(tick(&mut half)[..], [Event::Halted(status)] if status.credit == 0));
+    assert_eq!(tick(&mut half), []);
+    // A halt that is due is told before more credit is used, and before the clock is another.
+    assert_eq!(obey(&mut half, Command::Run { ticks: 1 }), []);
+    assert_eq!(tick(&mut half), [Event::Sample(reference()[2])]);
+    assert_eq!(obey(&mut half, Command::Run { ticks: 1 }), []);
+    assert!(matches!(tick(&mut half)[..], [Event::Halted(status)] if status.credit == 1));
+    assert_eq!(tick(&mut half), [Event::Sample(reference()[3])]);
+    let told = obey(&mut half, Command::Clock(Clock::Free));
+    assert!(matches!(told[..], [Event::Halted(_), Event::Sample(sample)] if sample == reference()[4]));
+}
+
+#[test]
+fn a_full_output_stops_time_in_lockstep_only() {
+    let mut half = half_in_lockstep();
     let start = Command::Request(interpolator::Request::Start);
-    half.obey(Command::Report(Report::Samples), &mut way);
-    half.obey(Command::Clock(Clock::Lockstep), &mut way);
-    half.obey(start, &mut way);
+    let mut way = Way::default();
     half.obey(Command::Run { ticks: 10 }, &mut way);
     let mut tick = |half: &mut RealTime<[i32; WORDS]>, full| {
         way.full = full;

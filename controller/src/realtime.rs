@@ -180,11 +180,8 @@ impl<S: AsRef<[i32]> + AsMut<[i32]>> RealTime<S> {
         {
             self.interpolator.trip(fault);
         }
-        if self.control.clock == Clock::Lockstep {
-            if self.control.credit == 0 || !events.has_room() {
-                return;
-            }
-            self.control.credit -= 1;
+        if self.control.clock == Clock::Lockstep && !self.may_step(events) {
+            return;
         }
         self.step(was_under_way, events);
     }
@@ -222,6 +219,23 @@ impl<S: AsRef<[i32]> + AsMut<[i32]>> RealTime<S> {
         }
     }
 
+    /// In lockstep: whether a period passes in this tick.
+    #[inline]
+    fn may_step(&mut self, events: &mut impl Events) -> bool {
+        if core::mem::take(&mut self.control.obeyed) || !events.has_room() {
+            return false;
+        }
+        if core::mem::take(&mut self.control.spent) {
+            self.halt(events);
+            return false;
+        }
+        let Some(credit) = self.control.credit.checked_sub(1) else {
+            return false;
+        };
+        self.control.credit = credit;
+        true
+    }
+
     /// Lets one period pass.
     #[inline]
     fn step(&mut self, was_under_way: bool, events: &mut impl Events) {
@@ -240,8 +254,8 @@ impl<S: AsRef<[i32]> + AsMut<[i32]>> RealTime<S> {
         }
         if (was_under_way || starts) && !state.is_under_way() {
             self.end_run(events);
-        } else if self.control.clock == Clock::Lockstep && self.control.credit == 0 {
-            self.halt(events);
+        } else if self.control.clock == Clock::Lockstep {
+            self.control.spent = self.control.credit == 0;
         }
     }
 
@@ -274,6 +288,7 @@ impl<S: AsRef<[i32]> + AsMut<[i32]>> RealTime<S> {
             self.control.put(Event::Pass(over), events);
         }
         self.control.credit = 0;
+        self.control.spent = false;
         self.halt(events);
     }
 

@@ -7,6 +7,7 @@
 //! one further, at the same path parameter. The step to the next pass is the one over which the mean density makes the scallop.
 
 use crate::arith::sqrt;
+use crate::feed::number::Bounded;
 use crate::interval::interval;
 use crate::job::Header;
 use crate::lane::Line;
@@ -130,6 +131,17 @@ impl Across {
         self.lines = Self::START.lines;
     }
 
+    /// Whether the next thing to be done at this place is a patch.
+    pub(crate) fn makes_patch(&self, line: &Line) -> bool {
+        let [half, whole] = &self.lines;
+        let beside = if self.second { whole } else { half };
+        match beside.task {
+            Task::Patch => true,
+            Task::Look => beside.span != line.span,
+            _ => false,
+        }
+    }
+
     /// Does one thing, for a run at this fraction of this patch. `most`: greatest density of the pass so far.
     #[inline(never)]
     pub(crate) fn work(&mut self, job: &Job<'_>, line: &Line, patch: &Patch, fraction: u64, most: f32) {
@@ -139,7 +151,7 @@ impl Across {
             self.edge = at_end(job, patch, 0);
         } else if end && line.next(job.header.path_spans).is_none() {
             self.ends = [false; 2];
-            self.edge = self.edge.max(at_end(job, patch, u64::MAX));
+            self.edge = at_end(job, patch, u64::MAX).at_least(self.edge);
         } else {
             let [half, whole] = &mut self.lines;
             let beside = if self.second { whole } else { half };
@@ -156,12 +168,12 @@ impl Across {
             self.before = None;
             return f32::INFINITY;
         }
-        let here = self.edge.max(exact(header, most, shape));
+        let here = exact(header, most, shape).at_least(self.edge);
         let [half, whole] = self.lines.each_ref().map(|line| line.found(header, here));
         let mean = match (half, whole) {
             (Some(half), Some(whole)) => mean(here, half, whole),
             // The surface ends before the second line, or there was no time to look.
-            (Some(half), None) => half.max(here),
+            (Some(half), None) => half.at_least(here),
             _ => here,
         };
         let [_, Beside { step: distance, .. }] = self.lines;
@@ -206,18 +218,18 @@ impl Beside {
             _ if is_first && most > AIM_AGAIN * self.aimed => self.aim(job, line, most, before),
             Task::Patch => self.make_patch(job, line, Task::Start),
             Task::Start => {
-                self.most = self.most.max(at_end(job, &self.patch, 0));
+                self.most = at_end(job, &self.patch, 0).at_least(self.most);
                 Task::Look
             }
             Task::Look if self.span != line.span => self.make_patch(job, line, Task::Look),
             Task::Look if line.next(job.header.path_spans).is_none() => Task::End,
             Task::End => {
-                self.most = self.most.max(at_end(job, &self.patch, u64::MAX));
+                self.most = at_end(job, &self.patch, u64::MAX).at_least(self.most);
                 Task::LookOn
             }
             Task::Look | Task::LookOn => {
                 if let Ok(contact) = self.patch.surface.contact(fraction, &self.patch.ball) {
-                    self.most = self.most.max(exact_at(job, &self.patch, &contact));
+                    self.most = exact_at(job, &self.patch, &contact).at_least(self.most);
                 }
                 self.task
             }
@@ -258,7 +270,7 @@ impl Beside {
     fn found(&self, header: &Header, here: f32) -> Option<f32> {
         match self.task {
             Task::LookOn if self.spans >= header.path_spans => Some(self.most),
-            Task::LookOn | Task::End | Task::Look => Some(self.most.max(here)),
+            Task::LookOn | Task::End | Task::Look => Some(self.most.at_least(here)),
             Task::Aim | Task::Patch | Task::Start | Task::Rest => None,
         }
     }
@@ -269,7 +281,7 @@ impl Beside {
 fn mean(here: f32, half: f32, whole: f32) -> f32 {
     let parabola = (here + 4.0 * half + whole) * (1.0 / 6.0);
     let lines = (here + 2.0 * half + whole) * 0.25;
-    parabola.max(lines)
+    parabola.at_least(lines)
 }
 
 /// The density at an end of a line, 0 where there is no contact. There the crest between two passes is beyond the end of one of them, where
@@ -316,9 +328,9 @@ fn step_over(here: f32, rise: f32) -> f32 {
     for _ in 0..NEWTON_STEPS {
         let slope = step * (2.0 + 3.0 * rise * step);
         // Where the density vanishes within the step there is no root: as far as is allowed.
-        let next = step - (step * step * (1.0 + rise * step) - 1.0) / slope.max(0.5);
-        #[allow(clippy::manual_clamp, reason = "a NaN becomes the shortest step")]
-        let next = next.max(STEP_MIN).min(STEP_MAX);
+        let next = step - (step * step * (1.0 + rise * step) - 1.0) / slope.at_least(0.5);
+        // A NaN becomes the shortest step.
+        let next = next.at_least(STEP_MIN).at_most(STEP_MAX);
         let change = (next - step).abs();
         step = next;
         if change < NEWTON_LAST {

@@ -32,6 +32,8 @@ enum Phase {
     LegPlan(Way),
     LegBounds(Way),
     Leg(Way),
+    /// At the start of the next pass, whose first patch is made: that is a tick's work.
+    Enter,
     Pass,
     /// Behind all.
     End,
@@ -142,7 +144,12 @@ impl Course {
     pub(crate) const fn is_at_rest(&self) -> bool {
         match self.phase {
             Phase::Step | Phase::Leg(_) | Phase::Pass => self.profile.is_at_rest(),
-            Phase::Wait | Phase::StepPlan | Phase::LegPlan(_) | Phase::LegBounds(_) | Phase::End => true,
+            Phase::Wait
+            | Phase::StepPlan
+            | Phase::LegPlan(_)
+            | Phase::LegBounds(_)
+            | Phase::Enter
+            | Phase::End => true,
         }
     }
 
@@ -206,6 +213,7 @@ impl Course {
                 }
                 run.stand(last);
             }
+            Phase::Enter => self.begin_pass(job, run, last)?,
             Phase::End => return Ok(Outcome::Finished),
         }
         self.at = Some(last.cl_nm);
@@ -218,9 +226,15 @@ impl Course {
     }
 
     /// Some portions of the look ahead, and on when it is done.
+    #[inline(never)]
     fn wait(&mut self, job: &Job<'_>, axes: &Axes) -> Result<()> {
         for _ in 0..PORTIONS_WAITING {
+            // A patch is a tick's work.
+            let is_patch = self.lookahead.makes_patch();
             self.look_ahead(job, axes);
+            if is_patch || self.lookahead.makes_patch() {
+                break;
+            }
         }
         if let Some(fault) = self.pending {
             return Err(fault);
@@ -250,9 +264,20 @@ impl Course {
     }
 
     /// On to the next pass, which begins here.
+    #[inline(never)]
+    fn enter_pass(&mut self, job: &Job<'_>, run: &mut Run, last: &mut Sample) -> Result<()> {
+        let (_, next) = both(&mut self.plans, self.second);
+        run.enter(job, next.pass, next.side)?;
+        run.stand(last);
+        self.phase = Phase::Enter;
+        Ok(())
+    }
+
+    /// Its first sample.
+    #[inline(never)]
     fn begin_pass(&mut self, job: &Job<'_>, run: &mut Run, last: &mut Sample) -> Result<()> {
         let (_, next) = both(&mut self.plans, self.second);
-        run.begin_at(job, next.pass, next.side, next.interval, last)?;
+        run.begin(next.interval, last)?;
         self.second = !self.second;
         self.on_surface = true;
         self.phase = Phase::Pass;
@@ -327,6 +352,7 @@ impl Course {
         self.profile.shift(place - self.profile.place(), &now.plan);
     }
 
+    #[inline(never)]
     fn plan_leg(
         &mut self,
         way: Way,
@@ -372,12 +398,13 @@ impl Course {
             (Way::Up, Goal::Clear) | (Way::Down, Goal::Home | Goal::Clear) => Phase::End,
             (Way::Up, _) => Phase::LegPlan(Way::Over),
             (Way::Over, _) => Phase::LegPlan(Way::Down),
-            (Way::Down, Goal::Pass) => return self.begin_pass(job, run, last),
+            (Way::Down, Goal::Pass) => return self.enter_pass(job, run, last),
         };
         run.stand(last);
         Ok(())
     }
 
+    #[inline(never)]
     fn on_leg(
         &mut self,
         way: Way,
@@ -397,11 +424,12 @@ impl Course {
         Ok(())
     }
 
+    #[inline(never)]
     fn plan_step(&mut self, job: &Job<'_>, axes: &Axes, run: &mut Run, last: &mut Sample) -> Result<()> {
         let (now, _) = both(&mut self.plans, self.second);
         let patch = &mut self.lookahead.patch;
         match self.step.work(job, axes, patch, &top(job), &mut now.plan)? {
-            None => return self.begin_pass(job, run, last),
+            None => return self.enter_pass(job, run, last),
             Some(false) => {}
             Some(true) => {
                 self.phase = Phase::Step;
@@ -414,10 +442,11 @@ impl Course {
         Ok(())
     }
 
+    #[inline(never)]
     fn on_step(&mut self, job: &Job<'_>, run: &mut Run, share: f32, last: &mut Sample) -> Result<()> {
         let (now, _) = both(&mut self.plans, self.second);
         if self.profile.is_done(&now.plan) {
-            return self.begin_pass(job, run, last);
+            return self.enter_pass(job, run, last);
         }
         let moved = self.profile.tick(&now.plan, self.usual * share);
         let patch = &mut self.lookahead.patch;

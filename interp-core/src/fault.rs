@@ -2,7 +2,7 @@
 
 /// Why a run stopped or a job was refused. The code of a kind never changes; new kinds get new codes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
-#[repr(u8)]
+#[repr(u32)]
 pub enum FaultKind {
     /// A principal curvature towards the tool leaves no room for the ball (local gouge).
     /// Value: the surface's principal curvature towards the tool times the ball radius (at least 0.99999 where nothing fits).

@@ -182,6 +182,15 @@ impl Lookahead {
         matches!(self.task, Task::Done)
     }
 
+    /// Whether the next portion collapses a patch.
+    pub(crate) fn makes_patch(&self) -> bool {
+        match self.task {
+            Task::Patch => true,
+            Task::Look(_) => self.across.makes_patch(&self.line),
+            _ => false,
+        }
+    }
+
     /// Begins with this pass.
     pub(crate) fn begin(&mut self, job: &Job<'_>, pass: u32, side: Place, out: &mut PassPlan) {
         let spans = job.header.path_spans;

@@ -245,23 +245,23 @@ impl Run {
         Ok(true)
     }
 
-    /// Begins this pass, which lies here, and whose least interval is known: its first sample.
+    /// Goes to this pass, which lies here: its first patch is made, and the tool stays where it is.
     ///
     /// # Errors
     /// As [`Self::advance`].
-    pub(crate) fn begin_at(
-        &mut self,
-        job: &Job<'_>,
-        pass: u32,
-        side: Place,
-        interval: f32,
-        last: &mut Sample,
-    ) -> Result<()> {
+    pub(crate) fn enter(&mut self, job: &Job<'_>, pass: u32, side: Place) -> Result<()> {
         if pass > 0 && job.header.pattern == Pattern::Zig {
             self.travel.offset = self.first_offset;
         }
         (self.travel.pass, self.travel.side) = (pass, side);
-        self.begin_pass(job)?;
+        self.begin_pass(job)
+    }
+
+    /// Begins the pass that was entered, and whose least interval is known: its first sample.
+    ///
+    /// # Errors
+    /// As [`Self::advance`].
+    pub(crate) fn begin(&mut self, interval: f32, last: &mut Sample) -> Result<()> {
         self.sample(last)?;
         self.first_offset = self.travel.offset;
         self.last_interval = interval;

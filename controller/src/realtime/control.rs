@@ -18,6 +18,10 @@ use crate::{
 pub(super) struct Control {
     pub(super) run: Run,
     pub(super) credit: u32,
+    /// In lockstep: a command was obeyed in this tick; the last period that there was credit for is over, and the host is to know. Time
+    /// stands still for a tick then, so that neither is on top of a period's work.
+    pub(super) obeyed: bool,
+    pub(super) spent: bool,
     pub(super) tick_budget: u32,
     pub(super) clock: Clock,
     pub(super) report: Report,
@@ -33,6 +37,8 @@ impl Control {
         Self {
             run: Run::NEW,
             credit: 0,
+            obeyed: false,
+            spent: false,
             tick_budget: u32::MAX,
             clock: Clock::Free,
             report: Report::Digests,
@@ -55,8 +61,10 @@ impl Control {
         !has_limits && moves(sample.state) && sample.tick == self.run.pass.first_tick
     }
 
-    /// Takes a command up; false for a `Run` that leaves no time, which halts at once.
+    /// Takes a command up; false where the host is to be told that time stands still, or stood: for a `Run` that leaves no time, and for
+    /// a change of the clock before it was told.
     pub(super) fn obey(&mut self, command: Command) -> bool {
+        self.obeyed = true;
         match command {
             // An abort or stop that waits for its period is not to be undone by what comes behind it.
             Command::Request(_) if self.request == Request::Abort => {}
@@ -65,6 +73,7 @@ impl Control {
             Command::Clock(clock) => {
                 self.clock = clock;
                 self.credit = 0;
+                return !core::mem::take(&mut self.spent);
             }
             Command::Run { ticks } => {
                 if self.clock == Clock::Lockstep {
