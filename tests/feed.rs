@@ -5,7 +5,7 @@ use std::sync::OnceLock;
 
 use host_sim::job_file::JobFile;
 use host_sim::prepare::prepare;
-use integration_tests::dome;
+use integration_tests::{dome, scaled_dome};
 use interp_core::{Axes, FaultKind, Header, Inputs, Interpolator, Pattern, Place, Request, Sample, State};
 use proptest::prelude::*;
 
@@ -160,7 +160,17 @@ fn sample_jobs_hold_the_limits() {
 
 /// The dome in some nine passes, on a machine with limits.
 fn dome_within_limits(pattern: Pattern) -> (Header, Vec<i32>) {
-    let (mut header, words) = dome();
+    within_limits(dome(), pattern)
+}
+
+/// An eighth of it, in some five passes: so short that the tool is hardly ever at its feed.
+fn small_dome_within_limits(pattern: Pattern) -> (Header, Vec<i32>) {
+    let (mut header, words) = scaled_dome(0.125);
+    (header.ball_radius_mm, header.scallop_mm) = (1.0, 0.3);
+    within_limits((header, words), pattern)
+}
+
+fn within_limits((mut header, words): (Header, Vec<i32>), pattern: Pattern) -> (Header, Vec<i32>) {
     header.feed_mm_s = 40.0;
     header.pattern = pattern;
     let (top, _) = height(&header, &words);
@@ -208,7 +218,7 @@ fn scripted(
     (samples, core)
 }
 
-fn command() -> impl Strategy<Value = (u32, Request, u8)> {
+fn command(wait_max: u32) -> impl Strategy<Value = (u32, Request, u8)> {
     let request = prop_oneof![
         3 => Just(Request::None),
         4 => Just(Request::Hold),
@@ -217,7 +227,7 @@ fn command() -> impl Strategy<Value = (u32, Request, u8)> {
         1 => Just(Request::Stop),
         1 => Just(Request::Abort),
     ];
-    let wait = prop_oneof![0_u32..4, 0_u32..60, 0_u32..3000];
+    let wait = prop_oneof![0_u32..4, 0_u32..60, 0..wait_max];
     let percent = prop_oneof![Just(100_u8), Just(0), Just(200), 0_u8..=200];
     (wait, request, percent)
 }
@@ -263,45 +273,62 @@ fn check_commands(header: &Header, words: &[i32], whole: &[Place], commands: &[(
 /// A job, and the side places of its passes.
 type Undisturbed = (Header, Vec<i32>, Vec<Place>);
 
-fn undisturbed(pattern: Pattern) -> Undisturbed {
-    let (header, words) = dome_within_limits(pattern);
+fn undisturbed((header, words): (Header, Vec<i32>)) -> Undisturbed {
     let (samples, core) = scripted(&header, &words, &[]);
     assert_eq!((core.state(), core.fault()), (State::Finished, None));
     let whole = sides(&samples);
-    assert!(whole.len() > 5, "{}", whole.len());
+    assert!(whole.len() > 3, "{}", whole.len());
     (header, words, whole)
 }
 
-/// Both patterns, worked out once.
-fn undisturbed_once(zigzag: bool) -> &'static Undisturbed {
-    static BOTH: OnceLock<[Undisturbed; 2]> = OnceLock::new();
-    &BOTH.get_or_init(|| [Pattern::Zig, Pattern::Zigzag].map(undisturbed))[usize::from(zigzag)]
+/// Large and small, zig and zigzag, each worked out once.
+fn undisturbed_once(small: bool, zigzag: bool) -> &'static Undisturbed {
+    static ALL: OnceLock<[[Undisturbed; 2]; 2]> = OnceLock::new();
+    let all = ALL.get_or_init(|| {
+        let job = [dome_within_limits, small_dome_within_limits];
+        job.map(|job| [Pattern::Zig, Pattern::Zigzag].map(|pattern| undisturbed(job(pattern))))
+    });
+    &all[usize::from(small)][usize::from(zigzag)]
 }
 
-/// A million sequences take hours: as many as `SEQUENCES` says, or so many as take a minute.
+/// Commands, and the job that they are for, one in eight of which is large. Pauses are some of its time.
+fn sequence(commands_max: usize) -> impl Strategy<Value = (&'static Undisturbed, Vec<(u32, Request, u8)>)> {
+    (prop_oneof![1 => Just(false), 7 => Just(true)], any::<bool>()).prop_flat_map(move |(small, zigzag)| {
+        let pause_max = if small { 400 } else { 3000 };
+        let commands = proptest::collection::vec(command(pause_max), 0..commands_max);
+        (Just(undisturbed_once(small, zigzag)), commands)
+    })
+}
+
+/// A million sequences take half an hour on two cores: as many as `SEQUENCES` says, or so many as take a minute.
 #[test]
-#[ignore = "a minute or more; run it after a change of the feed, with SEQUENCES=1000000 for a night"]
+#[ignore = "a minute or more; run it after a change of the feed, with SEQUENCES=1000000 for the whole"]
 fn no_sequence_of_commands_breaks_a_limit_long() {
-    let cases = std::env::var("SEQUENCES").map_or(4000, |count| count.parse().unwrap());
-    let config = ProptestConfig {
-        cases,
-        failure_persistence: None,
-        ..ProptestConfig::default()
-    };
-    let sequence = (any::<bool>(), proptest::collection::vec(command(), 0..30));
-    proptest::test_runner::TestRunner::new(config)
-        .run(&sequence, |(zigzag, commands)| {
-            let (header, words, whole) = undisturbed_once(zigzag);
-            check_commands(header, words, whole, &commands);
-            Ok(())
-        })
-        .unwrap();
+    let sequences = std::env::var("SEQUENCES").map_or(40_000_u32, |count| count.parse().unwrap());
+    let threads = std::thread::available_parallelism().map_or(1, |count| u32::try_from(count.get()).unwrap());
+    std::thread::scope(|scope| {
+        for _ in 0..threads {
+            scope.spawn(|| {
+                let config = ProptestConfig {
+                    cases: sequences.div_ceil(threads),
+                    failure_persistence: None,
+                    ..ProptestConfig::default()
+                };
+                proptest::test_runner::TestRunner::new(config)
+                    .run(&sequence(30), |((header, words, whole), commands)| {
+                        check_commands(header, words, whole, &commands);
+                        Ok(())
+                    })
+                    .unwrap();
+            });
+        }
+    });
 }
 
 /// Set going again just before the end of a leg, when a little acceleration follows a whole one: the end comes before that has left the mean.
 #[test]
 fn a_leg_resumed_before_its_end_keeps_the_jerk() {
-    let (header, words, whole) = undisturbed_once(false);
+    let (header, words, whole) = undisturbed_once(false, false);
     // A period more or less, and it is not that close to the end.
     for first in 740..840 {
         let commands = [
@@ -321,7 +348,7 @@ fn a_leg_resumed_before_its_end_keeps_the_jerk() {
 #[test]
 fn a_job_interrupted_and_resumed_takes_the_same_path() {
     for zigzag in [false, true] {
-        let (header, words, whole) = undisturbed_once(zigzag);
+        let (header, words, whole) = undisturbed_once(false, zigzag);
         let interruptions: Vec<(u32, Request, u8)> = (0..60)
             .flat_map(|turn| {
                 let percent = [100, 0, 200, 35][turn as usize % 4];
@@ -342,14 +369,10 @@ fn a_job_interrupted_and_resumed_takes_the_same_path() {
 }
 
 proptest! {
-    #![proptest_config(ProptestConfig::with_cases(if cfg!(debug_assertions) { 150 } else { 2000 }))]
+    #![proptest_config(ProptestConfig::with_cases(if cfg!(debug_assertions) { 400 } else { 4000 }))]
 
     #[test]
-    fn no_sequence_of_commands_breaks_a_limit(
-        zigzag in any::<bool>(),
-        commands in proptest::collection::vec(command(), 0..14),
-    ) {
-        let (header, words, whole) = undisturbed_once(zigzag);
+    fn no_sequence_of_commands_breaks_a_limit(((header, words, whole), commands) in sequence(14)) {
         check_commands(header, words, whole, &commands);
     }
 }
@@ -357,7 +380,7 @@ proptest! {
 /// A hold stands on the path within the time that braking takes, and goes on from there.
 #[test]
 fn hold_and_resume() {
-    let (header, words, _) = undisturbed(Pattern::Zig);
+    let (header, words, _) = undisturbed(dome_within_limits(Pattern::Zig));
     let mut core = machine(&header, &words);
     core.tick(Request::Start);
     while core.state() != State::Running {
@@ -383,7 +406,7 @@ fn hold_and_resume() {
 /// A stop leaves the surface, an abort stands on it; the next start begins anew from there.
 #[test]
 fn stop_and_abort() {
-    let (header, words, _) = undisturbed(Pattern::Zigzag);
+    let (header, words, _) = undisturbed(dome_within_limits(Pattern::Zigzag));
     let safe = header.axes.unwrap().safe_z_nm;
     for (request, leaves) in [(Request::Stop, true), (Request::Abort, false)] {
         let mut core = machine(&header, &words);

@@ -108,11 +108,18 @@ pub fn upload(header: Header, words: &[i32]) -> Vec<Request> {
 
 /// A shallow dome of 80 mm x 60 mm in about ten coarse passes: 54 words, some 900 samples.
 pub fn dome() -> (Header, Vec<i32>) {
+    scaled_dome(1.0)
+}
+
+/// The same, so many times as large; not so the ball and the scallops.
+#[must_use]
+pub fn scaled_dome(scale: f64) -> (Header, Vec<i32>) {
     let mut c = [[[0.0; 4]; 4]; 3];
     (c[0][0][0], c[0][1][0]) = (-40.0, 80.0);
     (c[1][0][0], c[1][0][1]) = (-30.0, 60.0);
     (c[2][0][0], c[2][1][0], c[2][2][0], c[2][0][1], c[2][0][2]) = (-5.0, 64.0, -64.0, 36.0, -36.0);
     let c = c.map(|axis| encode::substitute(&axis, [0.0, 1.0], [0.0, 1.0]));
+    let c = c.map(|axis| axis.map(|row| row.map(|value| scale * value)));
     let header = Header {
         path_spans: 1,
         side_spans: 1,
