@@ -66,7 +66,7 @@ fn compare(names: &[&str]) {
         let (passes, digest) = here(&job);
         drive::upload(&mut session, &job, |_| {}).unwrap();
         let start = std::time::Instant::now();
-        let compared = drive::run_digests(&mut session, &passes, true, |_| {}).unwrap();
+        let compared = drive::run_digests(&mut session, &passes, true, None, |_| {}).unwrap();
         let samples: u64 = passes.iter().map(|pass| u64::from(pass.samples)).sum();
         println!(
             "{name}: {:.0} ticks a second",
@@ -140,7 +140,7 @@ fn the_first_difference_is_named() {
     let (passes, _) = here(&ours);
     let (_qemu, mut session) = board();
     drive::upload(&mut session, &theirs, |_| {}).unwrap();
-    let compared = drive::run_digests(&mut session, &passes, true, |_| {}).unwrap();
+    let compared = drive::run_digests(&mut session, &passes, true, None, |_| {}).unwrap();
     let pass = compared.first_bad_pass.unwrap();
     assert_eq!(pass, mine[tick as usize].pass);
     let first = passes[pass as usize].first_tick;
@@ -167,7 +167,8 @@ fn a_fault_is_the_same_fault() {
     assert_eq!((fault.kind, last), (FaultKind::BallDoesNotFit, None));
     let (_qemu, mut session) = board();
     drive::upload(&mut session, &job, |_| {}).unwrap();
-    let status = drive::run_samples(&mut session, true, |_| panic!("no sample before the fault")).unwrap();
+    let (status, _) =
+        drive::run_samples(&mut session, true, None, |_| panic!("no sample before the fault")).unwrap();
     let report = status.fault.unwrap();
     assert_eq!(
         (report.code, report.value.to_bits()),

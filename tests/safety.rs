@@ -8,7 +8,7 @@ use std::io::{self, Read, Write};
 use std::sync::{Arc, Mutex};
 
 use controller::{in_process::Board, safety::DEBOUNCE_TICKS};
-use host_sim::remote::operate::{Action, Setup, act, make_ready};
+use host_sim::remote::operate::{Action, Operator, Setup, act, make_ready};
 use host_sim::remote::session::Event as Told;
 use host_sim::remote::{RemoteError, Session, drive};
 use integration_tests::{dome, upload};
@@ -318,7 +318,7 @@ fn a_host_that_waits_is_not_gone() {
     (setup.configuration.host_gone, setup.configuration.host_gone_ticks) = (HostGone::Hold, 400);
     let mut desk = Desk::loaded(&setup);
     let (digest, samples) = undisturbed();
-    let compared = drive::run_digests(&mut desk.session, &[], false, |_| {}).unwrap();
+    let compared = drive::run_digests(&mut desk.session, &[], false, None, |_| {}).unwrap();
     assert_eq!(
         (
             compared.status.digest,
@@ -331,4 +331,58 @@ fn a_host_that_waits_is_not_gone() {
     desk.tick(1000);
     desk.session.set_keep_alive(Some(std::time::Duration::ZERO));
     assert!(matches!(desk.session.event(), Err(RemoteError::Held)));
+}
+
+/// Wants one thing after the other, and remembers what came of it.
+struct Scripted {
+    wishes: std::vec::IntoIter<Action>,
+    came: Vec<Result<State, String>>,
+}
+
+impl Operator for Scripted {
+    fn wish(&mut self) -> Option<Action> {
+        self.wishes.next()
+    }
+
+    fn told(&mut self, _: Action, came: Result<Status, RemoteError>) {
+        self.came
+            .push(came.map(|status| status.state).map_err(|error| error.to_string()));
+    }
+}
+
+#[test]
+fn an_operator_commands_a_run_that_is_followed() {
+    let run = |wishes: Vec<Action>| {
+        let mut desk = Desk::ready();
+        let mut operator = Scripted {
+            wishes: wishes.into_iter(),
+            came: Vec::new(),
+        };
+        let compared =
+            drive::run_digests(&mut desk.session, &[], false, Some(&mut operator), |_| {}).unwrap();
+        (compared, operator.came)
+    };
+    // Held, the run is waited for; a job without limits goes on with the next sample.
+    let (compared, came) = run(vec![
+        Action::Hold,
+        Action::Status,
+        Action::Drives(false),
+        Action::Resume,
+    ]);
+    let refusal = "the board refused to switch the drives off";
+    assert!(
+        matches!(&came[..], [Ok(State::Held), Ok(State::Held), Err(why), Ok(State::Running)] if why.starts_with(refusal)),
+        "{came:?}"
+    );
+    let status = compared.status;
+    assert_eq!((status.state, compared.commanded), (State::Finished, true));
+    assert_eq!((status.digest, status.samples), undisturbed());
+
+    let (compared, came) = run(vec![Action::Stop]);
+    assert_eq!(came, [Ok(State::Ready)]);
+    assert_eq!((compared.status.state, compared.commanded), (State::Ready, true));
+    assert!(compared.status.samples < undisturbed().1);
+    // Who only looks, commands nothing: the passes are compared, and there are too many.
+    let (compared, _) = run(vec![Action::Status]);
+    assert_eq!((compared.commanded, compared.first_bad_pass), (false, Some(0)));
 }

@@ -182,7 +182,10 @@ impl Lab {
     /// lockstep no period passes in a tick with a command; on the board's own clock one does.
     fn obeying(&mut self, records: &[Record]) -> Cycles {
         let rest = |record: &Record| record.stages[Stage::Rest as usize];
-        let before = records.iter().take_while(|record| !yields_sample(record));
+        let Some(first) = records.iter().position(yields_sample) else {
+            return Cycles::default();
+        };
+        let before = records.iter().take(first);
         let (mut least, mut most) = (self.idle.unwrap_or(Cycles::both(u32::MAX)), Cycles::default());
         for record in before.filter(|record| record.is_idle()) {
             let Cycles { nominal, pessimistic } = rest(record);

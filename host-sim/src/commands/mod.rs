@@ -21,6 +21,7 @@ mod run;
 mod scripted;
 mod simulate;
 mod swept_words;
+mod typed;
 mod verify;
 
 pub use verify::BOUNDS;

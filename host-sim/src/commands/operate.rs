@@ -1,6 +1,6 @@
 //! `operate`: what an operator asks of a board between runs, or of a run whose host went away.
 
-use clap::{Args, Subcommand};
+use clap::{Args, Parser, Subcommand};
 use protocol::message::{OVERRIDE_MAX_PERCENT, Status};
 use serde_json::json;
 
@@ -74,6 +74,37 @@ impl Wanted {
     }
 }
 
+/// A line that an operator types.
+#[derive(Debug, Parser)]
+#[command(no_binary_name = true, disable_help_flag = true)]
+struct Line {
+    #[command(subcommand)]
+    wanted: Wanted,
+}
+
+/// What the typed words of a line ask for; none of an empty line.
+///
+/// # Errors
+/// What is wrong with them.
+pub(super) fn typed(line: &str) -> std::result::Result<Option<Action>, String> {
+    let words: Vec<_> = line.split_whitespace().collect();
+    if words.is_empty() {
+        return Ok(None);
+    }
+    match Line::try_parse_from(words) {
+        Ok(line) => Ok(Some(line.wanted.action())),
+        Err(error) => Err(error.to_string()),
+    }
+}
+
+/// How a board is, in a line.
+pub(super) fn sentence(status: &Status) -> String {
+    let Status {
+        state, pass, tick, ..
+    } = status;
+    format!("{}, pass {pass}, tick {tick}", state.name())
+}
+
 pub(super) fn command(arguments: &Arguments) -> Result<()> {
     let mut session = run::open_port(&arguments.port)?;
     let status = act(&mut session, arguments.wanted.action()).map_err(Failure::from)?;
@@ -82,10 +113,7 @@ pub(super) fn command(arguments: &Arguments) -> Result<()> {
         say!("{}", json_of(&status, board));
         return Ok(());
     }
-    let Status {
-        state, pass, tick, ..
-    } = status;
-    say!("{board}: {}, pass {pass}, tick {tick}", state.name());
+    say!("{board}: {}", sentence(&status));
     if let Some(kind) = status.fault.and_then(|fault| fault.kind()) {
         say!("  fault {} ({})", kind.code(), kind.name());
     }

@@ -4,27 +4,30 @@ use std::path::PathBuf;
 use std::time::Instant;
 
 use clap::Args;
+use indicatif::ProgressBar;
 use interp_core::{Fault, FaultKind, Sample, State};
 use protocol::digest::Digest;
 use protocol::message::{Reason, Status};
 use serde_json::{Value, json};
 
 use super::home::{self, PlaceNm};
-use super::out::say;
+use super::out::{say, to_stderr};
 use super::outcome::Outcome;
 use super::simulate::{Timed, machine, remarks, report, surveyed, timed};
+use super::typed::{Typist, WORDS};
 use super::{Failure, Result, cannot_write, progress, scripted, spinner, trace};
 use crate::approach::Kind;
 use crate::explain;
 use crate::job_file::JobFile;
 use crate::prepare::Prepared;
-use crate::remote::operate::{self, Setup};
+use crate::remote::operate::{self, Operator, Setup};
 use crate::remote::qemu::{self, Qemu, QemuError};
 use crate::remote::{RemoteError, Session, drive, port};
 use crate::survey::is_on_pass;
 use crate::travel;
 
-/// Runs a job in the firmware, in QEMU or on a board, and compares every sample with this machine's.
+/// Runs a job in the firmware, in QEMU or on a board, and compares every sample with this machine's. While a board runs, type what an
+/// operator wants, and Enter: hold, resume, stop, abort, override 50, status. A run that was commanded is not compared.
 ///
 /// Example: cargo sim run jobs/freeform.toml --qemu
 /// Example: cargo sim run jobs/plate_machine.toml --qemu --script jobs/operator.txt
@@ -73,6 +76,8 @@ struct Ran {
     status: Status,
     compared: u64,
     first_difference: Option<u64>,
+    /// An operator commanded it, so that it is no run of this machine's.
+    commanded: bool,
     ticks_per_second: f64,
 }
 
@@ -228,7 +233,9 @@ fn by_digest(
         .collect();
     let bar = progress(here.samples, "running");
     let start = Instant::now();
-    let compared = drive::run_digests(session, &expected, arguments.place.qemu, |samples| {
+    let mut typist = typist(arguments, &bar);
+    let operator = typist.as_mut().map(|typist| typist as &mut dyn Operator);
+    let compared = drive::run_digests(session, &expected, arguments.place.qemu, operator, |samples| {
         bar.set_position(samples)
     })?;
     let seconds = start.elapsed().as_secs_f64();
@@ -249,7 +256,7 @@ fn by_digest(
                 .map(u64::from)
                 .or(first_difference);
         }
-    } else if compared.status.digest != here.digest {
+    } else if !compared.commanded && compared.status.digest != here.digest {
         first_difference = Some(here.samples);
     }
     #[allow(clippy::cast_precision_loss, reason = "below 2^53")]
@@ -258,8 +265,18 @@ fn by_digest(
         status: compared.status,
         compared: compared.samples,
         first_difference,
+        commanded: compared.commanded,
         ticks_per_second,
     })
+}
+
+/// Who can command the run: on a board, whoever types.
+fn typist(arguments: &Arguments, bar: &ProgressBar) -> Option<Typist> {
+    arguments.place.port.as_ref()?;
+    if !arguments.json {
+        bar.suspend(|| to_stderr(format_args!("type, and Enter: {WORDS}")));
+    }
+    Some(Typist::new(bar.clone()))
 }
 
 fn samples_here(job: &JobFile, prepared: &Prepared, from: u32, count: u32) -> Result<Vec<Sample>> {
@@ -289,7 +306,9 @@ fn by_sample(
     let mut digest = Digest::new();
     let bar = progress(here.samples, "running");
     let start = Instant::now();
-    let status = drive::run_samples(session, arguments.place.qemu, |sample| {
+    let mut typist = typist(arguments, &bar);
+    let operator = typist.as_mut().map(|typist| typist as &mut dyn Operator);
+    let (status, commanded) = drive::run_samples(session, arguments.place.qemu, operator, |sample| {
         digest.sample(sample);
         if let (Some(file), Ok(())) = (&mut file, &written) {
             let parameters = is_on_pass(sample).then(|| prepared.parameters(sample.path, sample.side));
@@ -306,7 +325,9 @@ fn by_sample(
     written
         .and_then(|()| file.map_or(Ok(()), crate::trace::Trace::finish))
         .map_err(|error| cannot_write(&name, &error))?;
-    let difference = drive::first_difference(&ours, &theirs).map(u64::from);
+    let difference = drive::first_difference(&ours, &theirs)
+        .filter(|_| !commanded)
+        .map(u64::from);
     #[allow(clippy::cast_precision_loss, reason = "below 2^53")]
     let ticks_per_second = theirs.len() as f64 / seconds.max(1e-9);
     let wrong_digest = (status.digest != digest.value()).then_some(here.samples);
@@ -314,6 +335,7 @@ fn by_sample(
         status,
         compared: theirs.len().min(ours.len()) as u64,
         first_difference: difference.or(wrong_digest),
+        commanded,
         ticks_per_second,
     })
 }
@@ -354,6 +376,10 @@ fn complaint(ran: &Ran, here: &Timed, job: &JobFile) -> Option<String> {
     }
     if status.samples_lost > 0 {
         return Some(format!("{} samples were lost on the line", status.samples_lost));
+    }
+    if ran.commanded {
+        let ends = matches!(status.state, State::Finished | State::Ready);
+        return (!ends).then(|| format!("the board ended {}", status.state.name()));
     }
     let expected = if here.fault.is_some() {
         State::Faulted
@@ -434,25 +460,30 @@ pub(super) fn command(arguments: &Arguments) -> Result<()> {
         if ran.status.safety.host_gone {
             say!("  host         was gone during the run: see cargo sim explain host-gone");
         }
-        let verdict = if ran.first_difference.is_none() {
-            "bit for bit the same"
-        } else {
-            "NOT the same"
-        };
-        say!(
-            "  compared     {} samples with this machine's: {verdict}",
-            ran.compared
-        );
+        match (ran.commanded, ran.first_difference) {
+            (true, _) => say!("  compared     nothing: the run was commanded, or its feed is overridden"),
+            (false, None) => compared(&ran, "bit for bit the same"),
+            (false, Some(_)) => compared(&ran, "NOT the same"),
+        }
     }
     complaint.map_or(Ok(()), |complaint| Err(Failure::Failed(Some(complaint))))
+}
+
+fn compared(ran: &Ran, verdict: &str) {
+    say!(
+        "  compared     {} samples with this machine's: {verdict}",
+        ran.compared
+    );
 }
 
 /// The keys of `simulate`, and those of the board.
 fn json_of(outcome: &Outcome<'_>, ran: &Ran, board: &str) -> Value {
     let mut keys = outcome.json();
     let mut put = |key: &str, value| keys.insert(key.to_owned(), value);
-    put("compared_samples", json!(ran.compared));
+    let compared = if ran.commanded { 0 } else { ran.compared };
+    put("compared_samples", json!(compared));
     put("first_difference", json!(ran.first_difference));
+    put("commanded", json!(ran.commanded));
     put("deadline_misses", json!(ran.status.deadline_misses));
     put("tick_cycles_max", json!(ran.status.tick_cycles_max));
     put("ticks_per_second", json!(ran.ticks_per_second));

@@ -4,7 +4,7 @@ use interp_core::{Sample, State};
 use protocol::digest::job_digest;
 use protocol::message::{CHUNK_WORDS_MAX, Clock, PassDigest, Report, Request, Status, Words};
 
-use super::operate;
+use super::operate::{self, Following, Operator};
 use super::session::{Event, RemoteError, Session};
 use crate::prepare::Prepared;
 
@@ -28,6 +28,8 @@ pub struct Compared {
     pub samples: u64,
     /// Passes that differ, are missing or too many; the first of them.
     pub first_bad_pass: Option<u32>,
+    /// An operator was at work, so that the run is another than the one expected, and nothing was compared.
+    pub commanded: bool,
 }
 
 /// Uploads a job, and what the axes' drives want where it says so. `progress` is told the words that arrived.
@@ -87,7 +89,8 @@ fn agrees(pass: &PassDigest, expected: &[Expected]) -> bool {
     expected.get(pass.pass as usize) == Some(&here)
 }
 
-/// Runs the loaded job to its end, and compares the digest of every pass. `progress` is told the samples so far.
+/// Runs the loaded job to its end, and compares the digest of every pass. `progress` is told the samples so far. With an operator, on the
+/// board's own clock.
 ///
 /// # Errors
 /// The line breaks, or the board refuses to start.
@@ -95,14 +98,16 @@ pub fn run_digests(
     session: &mut Session,
     expected: &[Expected],
     lockstep: bool,
+    operator: Option<&mut dyn Operator>,
     mut progress: impl FnMut(u64),
 ) -> Result<Compared, RemoteError> {
     start(session, Report::Digests, lockstep.then_some(u32::MAX))?;
+    let mut following = Following::new(session, operator)?;
     let mut next = 0_u32;
     let mut samples = 0_u64;
     let mut first_bad_pass = None;
     loop {
-        match session.event()? {
+        match following.event(session)? {
             Event::Pass(pass) => {
                 samples += u64::from(pass.samples);
                 if first_bad_pass.is_none() && (pass.pass != next || !agrees(&pass, expected)) {
@@ -118,7 +123,8 @@ pub fn run_digests(
                 return Ok(Compared {
                     status,
                     samples,
-                    first_bad_pass,
+                    first_bad_pass: first_bad_pass.filter(|_| !following.commanded),
+                    commanded: following.commanded,
                 });
             }
             Event::Sample(_) => {}
@@ -126,20 +132,22 @@ pub fn run_digests(
     }
 }
 
-/// Runs the loaded job to its end, and hands on every sample.
+/// Runs the loaded job to its end, and hands on every sample. The board's last word, and whether an operator was at work.
 ///
 /// # Errors
 /// The line breaks, or the board refuses to start.
 pub fn run_samples(
     session: &mut Session,
     lockstep: bool,
+    operator: Option<&mut dyn Operator>,
     mut each: impl FnMut(&Sample),
-) -> Result<Status, RemoteError> {
+) -> Result<(Status, bool), RemoteError> {
     start(session, Report::Samples, lockstep.then_some(u32::MAX))?;
+    let mut following = Following::new(session, operator)?;
     loop {
-        match session.event()? {
+        match following.event(session)? {
             Event::Sample(sample) => each(&sample),
-            Event::Halted(status) => return Ok(status),
+            Event::Halted(status) => return Ok((status, following.commanded)),
             Event::Pass(_) => {}
         }
     }

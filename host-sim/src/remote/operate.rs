@@ -4,10 +4,13 @@ use std::time::Duration;
 
 use protocol::message::{Configuration, Request, SafetyStatus, Status};
 
-use super::session::{RemoteError, Session};
+use super::session::{Event, RemoteError, Session};
 
 /// Frames of the host within the time after which it would count as gone.
 const KEEP_ALIVES: u32 = 4;
+
+/// How often a run with an operator is asked for its status where no host counts as gone.
+const ASKED: Duration = Duration::from_secs(2);
 
 /// How a board is made ready for a run.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -52,6 +55,60 @@ pub fn make_ready(session: &mut Session, setup: &Setup) -> Result<(), RemoteErro
         session.command(&Request::SetHome { home_nm })?;
     }
     Ok(())
+}
+
+/// Who gives commands while a run on the board's own clock is followed.
+pub trait Operator {
+    /// What is wanted next, if anything is.
+    fn wish(&mut self) -> Option<Action>;
+
+    /// What came of it: how the board was then, or that it refused.
+    fn told(&mut self, action: Action, came: Result<Status, RemoteError>);
+}
+
+/// Follows a run, and hands on what its operator wants.
+pub(super) struct Following<'a> {
+    operator: Option<&'a mut dyn Operator>,
+    /// The board was commanded, so that its samples are not those of a run that nobody touches.
+    pub(super) commanded: bool,
+}
+
+impl<'a> Following<'a> {
+    /// A run that has just been started, on the board's own clock where there is an operator.
+    pub(super) fn new(
+        session: &mut Session,
+        operator: Option<&'a mut dyn Operator>,
+    ) -> Result<Self, RemoteError> {
+        let mut commanded = false;
+        session.set_patient(operator.is_some());
+        if operator.is_some() {
+            commanded = session.status()?.safety.feed_override != 100;
+            let every = session.keep_alive().unwrap_or(ASKED);
+            session.set_keep_alive(Some(every));
+        }
+        Ok(Self { operator, commanded })
+    }
+
+    /// The next event.
+    pub(super) fn event(&mut self, session: &mut Session) -> Result<Event, RemoteError> {
+        let Some(operator) = &mut self.operator else {
+            return session.event();
+        };
+        loop {
+            if let Some(action) = operator.wish() {
+                let came = act(session, action);
+                if let Err(RemoteError::Line(_) | RemoteError::Silent(_)) = came {
+                    came?;
+                } else {
+                    self.commanded |= came.is_ok() && action != Action::Status;
+                    operator.told(action, came);
+                }
+            }
+            if let Some(event) = session.poll()? {
+                return Ok(event);
+            }
+        }
+    }
 }
 
 /// Lets the session keep a board from taking this host for gone, while it waits for events on the board's own clock.

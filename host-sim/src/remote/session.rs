@@ -77,7 +77,11 @@ pub struct Session {
     input: Vec<u8>,
     capabilities: Capabilities,
     keep_alive: Option<Duration>,
+    /// A run that stands is waited for.
+    patient: bool,
     asked: Instant,
+    /// When the board last said something of the run.
+    heard: Instant,
 }
 
 fn name(request: &Request) -> &'static str {
@@ -120,7 +124,9 @@ impl Session {
             input: Vec::new(),
             capabilities: Capabilities::default(),
             keep_alive: None,
+            patient: false,
             asked: Instant::now(),
+            heard: Instant::now(),
         };
         // Ends what noise, or a host that went away, may have left half-sent.
         session.stream.write_all(&[DELIMITER])?;
@@ -150,6 +156,18 @@ impl Session {
     /// While [`Self::event`] waits, asks for the status at least this often.
     pub fn set_keep_alive(&mut self, every: Option<Duration>) {
         self.keep_alive = every;
+        self.heard = Instant::now();
+    }
+
+    /// How often that is.
+    #[must_use]
+    pub fn keep_alive(&self) -> Option<Duration> {
+        self.keep_alive
+    }
+
+    /// Whether [`Self::event`] waits for a run that stands, because there is somebody who can resume it.
+    pub fn set_patient(&mut self, patient: bool) {
+        self.patient = patient;
     }
 
     /// Sends a request that is answered by an acknowledgement.
@@ -193,37 +211,51 @@ impl Session {
     /// # Errors
     /// The line breaks, or nothing comes for a long time.
     pub fn event(&mut self) -> Result<Event, RemoteError> {
-        let mut since = Instant::now();
+        self.heard = Instant::now();
         loop {
-            if let Some(event) = self.events.pop_front() {
+            if let Some(event) = self.poll()? {
                 return Ok(event);
-            }
-            if self.keep_alive.is_some_and(|every| self.asked.elapsed() >= every) {
-                since = self.look_after(since)?;
-                continue;
-            }
-            std::thread::sleep(GATHER);
-            let before = self.input.len();
-            // An answer that comes now belongs to a request that was answered before.
-            self.read_some()?;
-            let grew = self.input.len() != before;
-            while self.next_reply()?.is_some() {}
-            if grew {
-                since = Instant::now();
-            } else if since.elapsed() > SILENCE_TIMEOUT {
-                return Err(RemoteError::Silent("no word of the run for 20 s"));
             }
         }
     }
 
-    /// Asks how the run is; as long as it goes on, a board that has nothing to tell is not silent.
-    fn look_after(&mut self, since: Instant) -> Result<Instant, RemoteError> {
-        let state = self.status()?.state;
-        match state {
-            State::Held => Err(RemoteError::Held),
-            _ if state.is_under_way() => Ok(Instant::now()),
-            _ => Ok(since),
+    /// The next event, if there is one within some milliseconds.
+    ///
+    /// # Errors
+    /// The line breaks, or there was no event for a long time.
+    pub fn poll(&mut self) -> Result<Option<Event>, RemoteError> {
+        if let Some(event) = self.events.pop_front() {
+            self.heard = Instant::now();
+            return Ok(Some(event));
         }
+        if self.keep_alive.is_some_and(|every| self.asked.elapsed() >= every) {
+            self.look_after()?;
+            return Ok(None);
+        }
+        std::thread::sleep(GATHER);
+        let before = self.input.len();
+        // An answer that comes now belongs to a request that was answered before.
+        self.read_some()?;
+        let grew = self.input.len() != before;
+        while self.next_reply()?.is_some() {}
+        if grew {
+            self.heard = Instant::now();
+        } else if self.heard.elapsed() > SILENCE_TIMEOUT {
+            return Err(RemoteError::Silent("no word of the run for 20 s"));
+        }
+        Ok(None)
+    }
+
+    /// Asks how the run is; as long as it goes on, a board that has nothing to tell is not silent.
+    fn look_after(&mut self) -> Result<(), RemoteError> {
+        let state = self.status()?.state;
+        if state == State::Held && !self.patient {
+            return Err(RemoteError::Held);
+        }
+        if state.is_under_way() {
+            self.heard = Instant::now();
+        }
+        Ok(())
     }
 
     /// Sends a request, again if need be, and waits for the answer that carries its number.

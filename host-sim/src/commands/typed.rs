@@ -1,0 +1,64 @@
+//! What an operator types while `run --port` follows a run.
+
+use std::io::{BufRead, stdin};
+use std::sync::mpsc::{Receiver, channel};
+
+use indicatif::ProgressBar;
+use protocol::message::Status;
+
+use super::operate::{sentence, typed};
+use super::out::to_stderr;
+use crate::remote::RemoteError;
+use crate::remote::operate::{Action, Operator};
+
+/// What can be typed.
+pub(super) const WORDS: &str = "hold, resume, stop, abort, override 50, status";
+
+/// The lines of standard input, and where the answers go: above the bar.
+pub(super) struct Typist {
+    lines: Receiver<String>,
+    bar: ProgressBar,
+}
+
+impl Typist {
+    /// Reads from now on.
+    pub(super) fn new(bar: ProgressBar) -> Self {
+        let (sender, lines) = channel();
+        // It ends with standard input, or with the program.
+        std::thread::spawn(move || {
+            for line in stdin().lock().lines().map_while(Result::ok) {
+                if sender.send(line).is_err() {
+                    break;
+                }
+            }
+        });
+        Self { lines, bar }
+    }
+
+    fn say(&self, what: &str) {
+        self.bar.suspend(|| to_stderr(format_args!("{what}")));
+    }
+}
+
+impl Operator for Typist {
+    fn wish(&mut self) -> Option<Action> {
+        let line = self.lines.try_recv().ok()?;
+        match typed(&line) {
+            Ok(action) => action,
+            Err(why) => {
+                self.say(why.trim_end());
+                None
+            }
+        }
+    }
+
+    fn told(&mut self, _: Action, came: Result<Status, RemoteError>) {
+        match came {
+            Ok(status) => {
+                let percent = status.safety.feed_override;
+                self.say(&format!("{}, feed override {percent} %", sentence(&status)));
+            }
+            Err(error) => self.say(&error.to_string()),
+        }
+    }
+}
