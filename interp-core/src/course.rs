@@ -176,7 +176,8 @@ impl Course {
         };
     }
 
-    /// One period at this share of the feed, 0 to 2, into `last`.
+    /// One period at this share of the feed, 0 to 2, into `last`. What the phases but that of a pass do is out of line, so that a pass does not
+    /// save registers for it.
     ///
     /// # Errors
     /// The fault that stops the run; `last` is as it was.

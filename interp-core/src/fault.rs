@@ -1,6 +1,8 @@
 //! What stops the tool, or keeps a job from being loaded: a state with a code, a place and the value at fault.
 
 /// Why a run stopped or a job was refused. The code of a kind never changes; new kinds get new codes.
+///
+/// A word, though a byte would hold it: results with a byte in them are copied byte by byte.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 #[repr(u32)]
 pub enum FaultKind {
