@@ -565,7 +565,8 @@ fn renumbered(text: &str, by: usize) -> String {
     out
 }
 
-/// Ten megabytes of STEP, made of the mouse over and over: the time is printed; the README's figure is of a release build.
+/// Ten megabytes of STEP, made of the mouse over and over: the time is printed; that of use is with the reader as people have it, not as
+/// `./check` builds it.
 #[test]
 fn ten_megabytes() {
     let text = std::fs::read_to_string(cad("mouse.step")).unwrap();

@@ -112,8 +112,6 @@ impl Events for EventQueue {
         self.0.capacity() - self.0.len() >= Self::TICK_MAX
     }
 
-    // In line: an event that is handed on would be copied once more.
-    #[inline(always)]
     fn put(&mut self, event: Event) -> bool {
         self.0.enqueue(event).is_ok()
     }

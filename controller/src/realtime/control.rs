@@ -49,7 +49,6 @@ impl Control {
     }
 
     /// Puts an event in its queue, or counts it as lost.
-    #[inline(always)]
     pub(super) fn put(&mut self, event: Event, events: &mut impl Events) {
         if !events.put(event) {
             self.run.events_lost = self.run.events_lost.saturating_add(1);

@@ -14,13 +14,13 @@ const BUILD: [&str; 9] = [
     "--quiet",
     "--locked",
     "--profile",
-    "probe",
+    "plain",
     "-p",
     "debug-probe",
     "--target-dir",
     "target/debug-probe",
 ];
-const BUILT: &str = "target/debug-probe/probe/debug-probe";
+const BUILT: &str = "target/debug-probe/plain/debug-probe";
 
 /// Why nothing came of a request.
 #[derive(Debug, thiserror::Error)]
