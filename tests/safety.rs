@@ -336,12 +336,18 @@ fn a_host_that_waits_is_not_gone() {
 /// Wants one thing after the other, and remembers what came of it.
 struct Scripted {
     wishes: std::vec::IntoIter<Action>,
+    /// Waits for what comes of it.
+    stays: bool,
     came: Vec<Result<State, String>>,
 }
 
 impl Operator for Scripted {
     fn wish(&mut self) -> Option<Action> {
         self.wishes.next()
+    }
+
+    fn is_there(&self) -> bool {
+        self.stays
     }
 
     fn told(&mut self, _: Action, came: Result<Status, RemoteError>) {
@@ -356,6 +362,7 @@ fn an_operator_commands_a_run_that_is_followed() {
         let mut desk = Desk::ready();
         let mut operator = Scripted {
             wishes: wishes.into_iter(),
+            stays: true,
             came: Vec::new(),
         };
         let compared =
@@ -385,4 +392,14 @@ fn an_operator_commands_a_run_that_is_followed() {
     // Who only looks, commands nothing: the passes are compared, and there are too many.
     let (compared, _) = run(vec![Action::Status]);
     assert_eq!((compared.commanded, compared.first_bad_pass), (false, Some(0)));
+
+    // Who holds the run and goes away leaves nobody to wait for.
+    let mut desk = Desk::ready();
+    let mut operator = Scripted {
+        wishes: vec![Action::Hold].into_iter(),
+        stays: false,
+        came: Vec::new(),
+    };
+    let left = drive::run_digests(&mut desk.session, &[], false, Some(&mut operator), |_| {});
+    assert!(matches!(left, Err(RemoteError::Held)), "{left:?}");
 }

@@ -17,8 +17,8 @@ const BYTES_MAX: u64 = 64 << 20;
 const TIME_MAX: Duration = Duration::from_secs(120);
 /// Where the reader is built: like the firmware, in a folder of its own.
 const FOLDER: &str = "target/cad-reader";
-/// Names the profile that it is built with, if not [`PROFILE`]: `./check` takes `plain`, which is built in a third of the time and reads several
-/// times slower.
+/// Names the profile that it is built with, if not [`PROFILE`]: `./check` takes `plain`, which is built in less than half the time, and reads more
+/// slowly.
 const PROFILE_VARIABLE: &str = "ISOFEED_CAD_PROFILE";
 const PROFILE: &str = "cad";
 

@@ -142,3 +142,21 @@ fn json_of(status: &Status, board: &str) -> serde_json::Value {
         "deadline_misses": status.deadline_misses,
     })
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_line_is_what_the_command_would_be() {
+        assert_eq!(typed("  override 50 "), Ok(Some(Action::Override(50))));
+        assert_eq!(typed("hold"), Ok(Some(Action::Hold)));
+        assert_eq!(typed(" "), Ok(None));
+        for wrong in ["overide 50", "override 201", "hold on", "override"] {
+            assert!(
+                typed(wrong).is_err_and(|why| why.starts_with("error: ")),
+                "{wrong}"
+            );
+        }
+    }
+}

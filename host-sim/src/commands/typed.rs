@@ -1,7 +1,7 @@
 //! What an operator types while `run --port` follows a run.
 
 use std::io::{BufRead, stdin};
-use std::sync::mpsc::{Receiver, channel};
+use std::sync::mpsc::{Receiver, TryRecvError, channel};
 
 use indicatif::ProgressBar;
 use protocol::message::Status;
@@ -17,6 +17,8 @@ pub(super) const WORDS: &str = "hold, resume, stop, abort, override 50, status";
 /// The lines of standard input, and where the answers go: above the bar.
 pub(super) struct Typist {
     lines: Receiver<String>,
+    /// Standard input has not ended.
+    open: bool,
     bar: ProgressBar,
 }
 
@@ -32,7 +34,11 @@ impl Typist {
                 }
             }
         });
-        Self { lines, bar }
+        Self {
+            lines,
+            open: true,
+            bar,
+        }
     }
 
     fn say(&self, what: &str) {
@@ -42,7 +48,13 @@ impl Typist {
 
 impl Operator for Typist {
     fn wish(&mut self) -> Option<Action> {
-        let line = self.lines.try_recv().ok()?;
+        let line = match self.lines.try_recv() {
+            Ok(line) => line,
+            Err(error) => {
+                self.open = error != TryRecvError::Disconnected;
+                return None;
+            }
+        };
         match typed(&line) {
             Ok(action) => action,
             Err(why) => {
@@ -50,6 +62,10 @@ impl Operator for Typist {
                 None
             }
         }
+    }
+
+    fn is_there(&self) -> bool {
+        self.open
     }
 
     fn told(&mut self, _: Action, came: Result<Status, RemoteError>) {

@@ -62,6 +62,9 @@ pub trait Operator {
     /// What is wanted next, if anything is.
     fn wish(&mut self) -> Option<Action>;
 
+    /// Whether there is still somebody, who could resume a run that is held.
+    fn is_there(&self) -> bool;
+
     /// What came of it: how the board was then, or that it refused.
     fn told(&mut self, action: Action, came: Result<Status, RemoteError>);
 }
@@ -80,7 +83,7 @@ impl<'a> Following<'a> {
         operator: Option<&'a mut dyn Operator>,
     ) -> Result<Self, RemoteError> {
         let mut commanded = false;
-        session.set_patient(operator.is_some());
+        session.set_patient(false);
         if operator.is_some() {
             commanded = session.status()?.safety.feed_override != 100;
             let every = session.keep_alive().unwrap_or(ASKED);
@@ -104,6 +107,7 @@ impl<'a> Following<'a> {
                     operator.told(action, came);
                 }
             }
+            session.set_patient(operator.is_there());
             if let Some(event) = session.poll()? {
                 return Ok(event);
             }

@@ -153,7 +153,7 @@ impl Session {
         &self.capabilities
     }
 
-    /// While [`Self::event`] waits, asks for the status at least this often.
+    /// While [`Self::event`] waits, asks for the status at least this often. What counts as silence begins anew.
     pub fn set_keep_alive(&mut self, every: Option<Duration>) {
         self.keep_alive = every;
         self.heard = Instant::now();
