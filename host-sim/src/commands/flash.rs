@@ -11,7 +11,7 @@ use serde_json::json;
 use super::out::{complain, say};
 use super::{Failure, Result, progress, spinner};
 use crate::probe::{self, Event, Image, NotRun, Problem, Program, Request, Target, Work};
-use crate::remote::qemu::cargo;
+use machine::remote::qemu::cargo;
 
 /// Writes the firmware into a board's flash by a debug probe, compares what was written, and starts it.
 ///

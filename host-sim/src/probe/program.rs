@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Stdio};
 
 use super::{Event, Problem, Request};
-use crate::remote::qemu::{cargo, workspace};
+use machine::remote::qemu::{cargo, workspace};
 
 /// How the program is built: like the firmware, in a folder of its own.
 const BUILD: [&str; 9] = [

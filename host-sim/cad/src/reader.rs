@@ -1,0 +1,141 @@
+//! The reader of CAD files: a program of its own (`host-sim/cad-reader`), built when the first file is read, and stopped when it takes too
+//! long. So whatever is in a file, there is an answer in bounded time.
+
+use std::io::Read;
+use std::path::Path;
+use std::process::{Command, Stdio};
+use std::time::{Duration, Instant};
+
+use serde::{Deserialize, Serialize};
+
+use super::{CadError, Face};
+use machine::remote::qemu::cargo;
+
+/// Largest file that is read, bytes: a file takes some 30 times its size in memory.
+const BYTES_MAX: u64 = 64 << 20;
+/// Time that the reader may take: ten times what the largest sound file takes.
+const TIME_MAX: Duration = Duration::from_secs(120);
+/// Where the reader is built: like the firmware, in a folder of its own.
+const FOLDER: &str = "target/cad-reader";
+/// Names the profile that it is built with, if not [`PROFILE`]: `./check` takes `plain`, which is built in less than half the time, and reads more
+/// slowly.
+const PROFILE_VARIABLE: &str = "ISOFEED_CAD_PROFILE";
+const PROFILE: &str = "cad";
+
+/// What a file holds.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct Model {
+    /// Its faces, numbered from 1 in the order of the file.
+    pub faces: Vec<Face>,
+    /// What of it could not be read, for people.
+    pub warnings: Vec<String>,
+}
+
+/// Reads a CAD file: by its contents, whatever its name ends in. The first time, it builds the reader, which takes minutes, and says so.
+///
+/// # Errors
+/// The file cannot be read, is none of the formats, is broken, or holds no faces; with its name and, where there is one, the line.
+pub fn read(path: &Path) -> Result<Model, CadError> {
+    let file = path.display().to_string();
+    check(&file, path)?;
+    let profile = std::env::var(PROFILE_VARIABLE).unwrap_or_else(|_| PROFILE.to_owned());
+    let built = format!("{FOLDER}/{profile}/cad-reader");
+    if !machine::remote::qemu::workspace().join(&built).exists() {
+        eprintln!("building the reader of CAD files (once, some minutes)");
+    }
+    let build = [
+        "build",
+        "--quiet",
+        "--locked",
+        "--profile",
+        &profile,
+        "-p",
+        "cad-reader",
+        "--target-dir",
+        FOLDER,
+    ];
+    let reader = cargo(&build, &built).map_err(|error| {
+        CadError::new(
+            &file,
+            format!("the reader of CAD files cannot be built: {error}"),
+            "run it in a checkout of the project, with its toolchain (./demo sets it up)",
+        )
+    })?;
+    run(&file, path, &reader)
+}
+
+/// What need not be read to be told.
+fn check(file: &str, path: &Path) -> Result<(), CadError> {
+    let unreadable = |cause: String| {
+        CadError::new(
+            file,
+            format!("cannot read the CAD file: {cause}"),
+            "give the path of a STEP, IGES or 3DM file; samples are in jobs/cad/",
+        )
+    };
+    let told = std::fs::File::open(path)
+        .and_then(|file| file.metadata())
+        .map_err(|cause| unreadable(cause.to_string()))?;
+    if !told.is_file() {
+        return Err(unreadable("it is no file".to_owned()));
+    }
+    if told.len() > BYTES_MAX {
+        return Err(CadError::new(
+            file,
+            format!("the file is larger than {} MB", BYTES_MAX >> 20),
+            "export the part alone, without the rest of its assembly",
+        ));
+    }
+    if told.len() == 0 {
+        return Err(CadError::new(file, "the file is empty", "export the part again"));
+    }
+    Ok(())
+}
+
+/// Runs the reader, for so long at most.
+fn run(file: &str, path: &Path, reader: &Path) -> Result<Model, CadError> {
+    let broken = |what: String| {
+        CadError::new(
+            file,
+            what,
+            "export the part again, alone, or in another format (STEP is read best)",
+        )
+    };
+    let failed = |cause: std::io::Error| broken(format!("the reader of CAD files does not run: {cause}"));
+    let mut child = Command::new(reader)
+        .arg(path)
+        .stdin(Stdio::null())
+        .stdout(Stdio::piped())
+        .stderr(Stdio::null())
+        .spawn()
+        .map_err(failed)?;
+    let mut output = child
+        .stdout
+        .take()
+        .ok_or_else(|| broken("the reader says nothing".to_owned()))?;
+    let listener = std::thread::spawn(move || {
+        let mut text = Vec::new();
+        output.read_to_end(&mut text).map(|_| text)
+    });
+    let deadline = Instant::now() + TIME_MAX;
+    while !listener.is_finished() && Instant::now() < deadline {
+        std::thread::sleep(Duration::from_millis(2));
+    }
+    let in_time = listener.is_finished();
+    if !in_time {
+        let _ = child.kill();
+    }
+    let status = child.wait().map_err(failed)?;
+    if !in_time {
+        return Err(broken(format!(
+            "reading it takes longer than {} s",
+            TIME_MAX.as_secs()
+        )));
+    }
+    let text = listener
+        .join()
+        .unwrap_or_else(|_| Err(std::io::ErrorKind::Other.into()))
+        .map_err(failed)?;
+    serde_json::from_slice::<Result<Model, CadError>>(&text)
+        .unwrap_or_else(|_| Err(broken(format!("the reader failed on this file ({status})"))))
+}
