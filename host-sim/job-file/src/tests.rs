@@ -316,7 +316,7 @@ fn a_file_that_is_not_there() {
 
 #[test]
 fn every_sample_job_is_good() {
-    let jobs = Path::new(env!("CARGO_MANIFEST_DIR")).join("../jobs");
+    let jobs = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../jobs");
     let mut read = 0;
     for entry in std::fs::read_dir(jobs).unwrap() {
         let path = entry.unwrap().path();

@@ -48,7 +48,7 @@ pub struct Qemu {
 #[must_use]
 pub fn workspace() -> PathBuf {
     let here = Path::new(env!("CARGO_MANIFEST_DIR"));
-    here.parent().unwrap_or(here).to_owned()
+    here.ancestors().nth(2).unwrap_or(here).to_owned()
 }
 
 /// Builds the firmware for QEMU (`cargo fw-qemu`; at once where nothing changed), and returns the image.
