@@ -199,3 +199,47 @@ fn failures(job: &Job, timed: &TimedRun, measured: &Measured, scanned: Option<us
     failures.extend(limits::failures(&measured.axes));
     failures
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::timed;
+    use job::AxisLimits;
+    use machine::prepare::prepare;
+
+    /// A job that names one limit runs within the defaults of the others, and is judged by them: of velocity, acceleration and jerk each
+    /// has a share of its limit, and the passes are timed by all three.
+    #[test]
+    fn a_job_with_one_limit_is_judged_by_all() {
+        let torus = include_str!("../../../jobs/torus.toml");
+        let text = format!("{torus}\n[machine]\nvelocity_max_mm_s = [60, 60, 30]\n");
+        let mut job = job_file::parse("job.toml", &text).unwrap();
+        // Coarse, so that the test is short.
+        job.scallop_mm = 0.1;
+        let prepared = prepare(&job).unwrap();
+        let timed = timed(&job, &prepared, &()).unwrap();
+        let found = verified(&job, &prepared, &timed, None, true, &()).unwrap();
+        assert_eq!(found.failures, Vec::<String>::new());
+        for peak in &found.measured.axes {
+            let share = peak.share.unwrap();
+            assert!(share > 0.1 && share < 1.06, "{share}");
+        }
+        assert_eq!(found.measured.pass_times.len(), 3);
+        assert!(found.measured.pass_times.iter().all(|time| time.ours_s.is_some()));
+        // The same motion against a default that it does not hold.
+        let limits = job.machine.limits.unwrap();
+        job.machine.limits = Some(AxisLimits {
+            jerk_mm_s3: limits.jerk_mm_s3.map(|jerk| 0.5 * jerk),
+            ..limits
+        });
+        let judged = verified(&job, &prepared, &timed, None, false, &()).unwrap();
+        assert!(
+            judged
+                .failures
+                .iter()
+                .any(|failure| failure.contains("jerk limit")),
+            "{:?}",
+            judged.failures
+        );
+    }
+}
