@@ -255,7 +255,7 @@ fn check_commands(header: &Header, words: &[i32], whole: &[Place], commands: &[(
         .filter(|sample| sample.path != Place::NONE)
         .step_by(97)
     {
-        let probe = core.probe(sample.path, sample.side).unwrap();
+        let probe = core.evaluate(sample.path, sample.side).unwrap();
         for (probe, sample) in probe.cl_nm.iter().zip(sample.cl_nm) {
             assert!((probe - sample).abs() <= 3, "{sample} for {probe}");
         }

@@ -1,7 +1,7 @@
 //! The machine in this process: the core with a job loaded, one call a period.
 
 use interp_core::steps::BUFFER_WORDS;
-use interp_core::{Fault, Inputs, Interpolator, Place, Probe, Request, Sample, State, Steps};
+use interp_core::{Fault, Inputs, Interpolator, Place, Request, Sample, State, Steps, SurfacePoint};
 
 use crate::prepare::Prepared;
 
@@ -90,9 +90,9 @@ impl Machine {
     /// The surface at a place, outside of any run.
     ///
     /// # Errors
-    /// As [`Interpolator::probe`].
-    pub fn probe(&self, path: Place, side: Place) -> Result<Probe, Fault> {
-        self.core.probe(path, side)
+    /// As [`Interpolator::evaluate`].
+    pub fn evaluate(&self, path: Place, side: Place) -> Result<SurfacePoint, Fault> {
+        self.core.evaluate(path, side)
     }
 
     /// Where the run is: pass, path and side place; after a fault, where that is.

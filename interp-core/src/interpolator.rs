@@ -1,14 +1,13 @@
 //! The machine: load, tick, hold, resume, abort.
 
-use crate::course::{Course, Outcome};
 use crate::fault::{Fault, FaultKind, Result};
-use crate::interval::interval;
+use crate::job::program::Program;
 use crate::job::{Header, STORE_WORDS};
-use crate::lane::Line;
-use crate::patch::Patch;
-use crate::program::Program;
-use crate::run::Run;
-use crate::sample::{Place, Sample, State};
+use crate::pass::patch::Patch;
+use crate::pass::position::Line;
+use crate::pass::run::Run;
+use crate::sample::{Place, Sample, State, interval_of};
+use crate::sequence::course::{Course, Outcome};
 
 /// Periods over which the feed falls to nothing when a fault from outside stops the run: 1/32 less each period.
 pub const STOP_PERIODS: u8 = 32;
@@ -93,7 +92,7 @@ impl Request {
 
 /// The loaded surface at one place, outside of any run.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Probe {
+pub struct SurfacePoint {
     /// Cutter contact, nm.
     pub cc_nm: [i32; 3],
     /// Cutter location, nm.
@@ -251,14 +250,14 @@ impl<S: AsRef<[i32]> + AsMut<[i32]>> Interpolator<S> {
         self.motion.run.last_interval()
     }
 
-    /// The loaded surface at a place: what a sample there would say, whatever the machine is doing. Not for the sample path:
+    /// Evaluates the loaded surface at these parameters: what a sample there would say, whatever the machine is doing. Not for the sample path:
     /// it collapses a patch each time. The side fraction counts in steps of 2^-32.
     ///
     /// # Errors
     /// [`FaultKind::WrongState`] without a loaded job or for a span that it does not have; what is wrong with the surface
     /// there.
-    pub fn probe(&self, path: Place, side: Place) -> Result<Probe> {
-        self.motion.probe(self.store.as_ref(), path, side)
+    pub fn evaluate(&self, path: Place, side: Place) -> Result<SurfacePoint> {
+        self.motion.evaluate(self.store.as_ref(), path, side)
     }
 
     /// Stops a run with a fault from outside, such as a missed deadline: along the path, the feed falling to nothing over
@@ -519,7 +518,7 @@ impl Motion {
         };
     }
 
-    fn probe(&self, store: &[i32], path: Place, side: Place) -> Result<Probe> {
+    fn evaluate(&self, store: &[i32], path: Place, side: Place) -> Result<SurfacePoint> {
         let job = self.program.job(store)?;
         let header = self.program.header();
         if path.span >= header.path_spans || side.span >= header.side_spans {
@@ -534,14 +533,12 @@ impl Motion {
                 span: path.span,
             },
         )?;
-        let contact = patch.surface.contact(path.fraction, &patch.ball)?;
-        patch.ball.check_fit(&contact)?;
-        let located = patch.ball.locate(&contact, &patch.origin)?;
-        Ok(Probe {
+        let (contact, located) = patch.evaluate(path.fraction)?;
+        Ok(SurfacePoint {
             cc_nm: located.cc_nm,
             cl_nm: located.cl_nm,
             normal: patch.ball.normal(contact.offset),
-            interval: interval(patch.interval.density(&contact)),
+            interval: interval_of(patch.interval.density(&contact)),
         })
     }
 }

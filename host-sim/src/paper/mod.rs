@@ -21,7 +21,6 @@ pub mod table_1;
 
 use crate::approach::ApproachError;
 use crate::job_file::{JobFile, Spacing};
-use crate::operations;
 use crate::oracle::Oracle;
 
 pub use compare::{Comparison, Row};
@@ -170,11 +169,7 @@ pub fn study(step: &(dyn Fn() + Sync)) -> Result<Study, ApproachError> {
     let figures = Figures::new(&cases)?;
     step();
     let mut items = examples::items(&cases, &comparisons)?;
-    let operations = operations::table_1();
-    items.extend(table_1::items(
-        operations.as_ref(),
-        table_1::golden_cycles().as_ref(),
-    ));
+    items.extend(table_1::items(None, table_1::golden_cycles().as_ref()));
     step();
     Ok(Study {
         cases,
