@@ -51,6 +51,7 @@
 #[cfg(test)]
 extern crate std;
 
+pub mod command;
 pub mod fault;
 mod feed;
 pub mod interpolator;
@@ -62,8 +63,9 @@ mod sequence;
 pub mod steps;
 pub mod surface;
 
+pub use command::{Command, Inputs};
 pub use fault::{Fault, FaultKind};
-pub use interpolator::{Inputs, Interpolator, Request, SurfacePoint};
+pub use interpolator::{Interpolator, SurfacePoint};
 pub use job::encode;
 pub use job::{Axes, Header, Pattern, STORE_WORDS, Spacing, SurfaceKind, ToolSide};
 pub use sample::{Place, Sample, State};

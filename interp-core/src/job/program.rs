@@ -1,5 +1,6 @@
 //! A job in the machine: raw words go in, and only a complete, checked job comes out.
 
+use crate::command::OVERRIDE_MAX;
 use crate::fault::{Fault, FaultKind, Result};
 use crate::job::{Axes, CELLS_MAX, Header, SPANS_MAX, STEP_MAX_MM, SurfaceKind, width_words};
 use crate::math::number::nm_to_mm;
@@ -96,8 +97,8 @@ fn check_axes(header: &Header, axes: &Axes) -> Result<()> {
     if !(axes.plunge_mm >= 0.0 && axes.plunge_mm <= 1e3) {
         return bad(axes.plunge_mm);
     }
-    // Twice the feed, which an override may ask for, has to fit a step.
-    if 2.0 * header.feed_mm_s * header.period_s > STEP_MAX_MM {
+    // The greatest feed that an override may ask for has to fit a step.
+    if OVERRIDE_MAX * header.feed_mm_s * header.period_s > STEP_MAX_MM {
         return bad(header.feed_mm_s);
     }
     if usize::from(header.path_spans) > CELLS_MAX {

@@ -24,7 +24,7 @@ impl Patch {
     ///
     /// # Errors
     /// As [`Self::evaluate_on`].
-    #[inline]
+    #[inline(always)]
     pub(crate) fn evaluate(&self, fraction: u64) -> Result<(Contact, Located)> {
         self.evaluate_on(&self.surface, fraction)
     }

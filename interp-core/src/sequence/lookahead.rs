@@ -3,6 +3,7 @@
 //!
 //! Stations are the surface's, not the samples': however a run is held up, its passes lie in the same places.
 
+use crate::command::OVERRIDE_MAX;
 use crate::fault::{Fault, FaultKind, Result};
 use crate::feed::demand::{Jump, Room, Stencil, over_jump, root};
 use crate::feed::plan::{CELLS_MOVING, Plan, Top};
@@ -24,8 +25,6 @@ const PARTS_MAX: u16 = 64;
 const NO_JUMP: f32 = 4e-6;
 /// Cells before a station that its differences say something about.
 const STENCIL_CELLS: usize = 2;
-/// Greatest feed override, of 1.
-pub(crate) const OVERRIDE_MAX: f32 = 2.0;
 
 /// One pass: its bounds, its ends, and what follows from it.
 #[derive(Clone, Debug)]
