@@ -36,7 +36,7 @@ fn samples_of_dome(missed_after: Option<usize>) -> Vec<Sample> {
     let mut samples = vec![*core.tick(interp_core::Command::Start)];
     while matches!(core.state(), State::Running | State::Stopping) {
         if missed_after == Some(samples.len()) {
-            core.trip(Fault::new(FaultKind::DeadlineMissed, 1.0));
+            core.controlled_stop(Fault::new(FaultKind::DeadlineMissed, 1.0));
         }
         samples.push(*core.tick(None));
     }

@@ -4,7 +4,7 @@
 use host_sim::job_file::{Along, JobFile, Pattern, Side, Spacing, SurfaceSpec};
 use host_sim::prepare::{Prepared, prepare};
 use interp_core::interpolator::STOP_PERIODS;
-use interp_core::{Command, Fault, FaultKind, Interpolator, Place, Sample, State};
+use interp_core::{Command, Fault, FaultKind, Interpolator, Sample, SpanParameter, State};
 
 fn job(surface: SurfaceSpec, radius_mm: f64) -> JobFile {
     JobFile {
@@ -108,8 +108,8 @@ fn ball_in_a_valley_along_the_pass() {
     job.scallop_mm = 0.001;
     let (last, core) = run(&prepare(&job).unwrap());
     assert_eq!(core.fault().unwrap().kind, FaultKind::BallDoesNotFit);
-    let (pass, path, side) = core.place();
-    assert_eq!((pass, path), (last.unwrap().pass + 1, Place::default()));
+    let (pass, path, side) = core.surface_position();
+    assert_eq!((pass, path), (last.unwrap().pass + 1, SpanParameter::default()));
     assert!((0.44..0.56).contains(&(side.fraction as f64 / 2_f64.powi(64))));
 }
 
@@ -323,7 +323,7 @@ fn a_fault_from_outside_stops_along_the_path() {
                 sample.pass == pass && travelled >= from.min(0.95)
             };
             let before = run_until(&mut core, begun);
-            core.trip(MISSED);
+            core.controlled_stop(MISSED);
             assert_eq!((core.state(), core.fault()), (State::Stopping, Some(MISSED)));
             // Nobody can hold it up or make it go on.
             let (samples, standing) = stop(&mut core, Some(Command::Hold));
@@ -369,7 +369,7 @@ fn a_fault_from_outside_stops_along_the_path() {
                     ..last
                 }
             );
-            assert_eq!(core.place(), (last.pass, last.path, last.side));
+            assert_eq!(core.surface_position(), (last.pass, last.path, last.side));
             assert_eq!(*core.tick(Command::Resume), standing);
         }
     }
@@ -386,7 +386,7 @@ fn a_fault_from_outside_stops_at_the_end_of_the_pass() {
         let before = run_until(&mut core, |sample| {
             sample.pass == 1 && length_mm - trough_arc_mm(u(sample)) < left_mm
         });
-        core.trip(MISSED);
+        core.controlled_stop(MISSED);
         let (samples, standing) = stop(&mut core, None);
         let last = *samples.last().unwrap();
         assert!(samples.len() < usize::from(STOP_PERIODS), "{left_mm}");
@@ -410,7 +410,7 @@ fn a_fault_from_outside_stops_at_the_end_of_the_pass() {
     let before = run_until(&mut core, |sample| {
         sample.path.span == 1 && sample.path.fraction == u64::MAX
     });
-    core.trip(MISSED);
+    core.controlled_stop(MISSED);
     let (samples, standing) = stop(&mut core, None);
     assert_eq!(
         (samples, standing),
@@ -430,17 +430,17 @@ fn a_fault_from_outside_stops_at_the_end_of_the_pass() {
 fn a_fault_from_outside_in_every_state() {
     let prepared = prepare(&trough(Pattern::Zig)).unwrap();
     let mut idle = <Interpolator>::new();
-    idle.trip(MISSED);
+    idle.controlled_stop(MISSED);
     assert_eq!((idle.state(), idle.fault()), (State::Idle, None));
 
     let mut core = load(&prepared);
-    core.trip(MISSED);
+    core.controlled_stop(MISSED);
     assert_eq!((core.state(), core.fault()), (State::Ready, None));
     let first = *core.tick(Command::Start);
     core.tick(Command::Hold);
     let held = *core.tick(None);
     assert_eq!(held.state, State::Held);
-    core.trip(MISSED);
+    core.controlled_stop(MISSED);
     assert_eq!((core.state(), core.fault()), (State::Faulted, Some(MISSED)));
     assert_eq!(
         *core.tick(Command::Resume),
@@ -449,17 +449,17 @@ fn a_fault_from_outside_in_every_state() {
             ..held
         }
     );
-    core.trip(OVER_BUDGET);
+    core.controlled_stop(OVER_BUDGET);
     assert_eq!((core.state(), core.fault()), (State::Faulted, Some(MISSED)));
     assert_eq!(core.tick(Command::Abort).state, State::Ready);
     assert_eq!(core.fault(), None);
 
     // A run after it is a whole one, and a second fault of a stop neither begins it anew nor replaces the first.
     assert_eq!(*core.tick(Command::Start), first);
-    core.trip(MISSED);
+    core.controlled_stop(MISSED);
     let mut stopping = 0;
     while core.tick(Command::Abort).state == State::Stopping {
-        core.trip(OVER_BUDGET);
+        core.controlled_stop(OVER_BUDGET);
         stopping += 1;
     }
     assert_eq!(
@@ -474,7 +474,7 @@ fn a_fault_from_outside_in_every_state() {
         sample = *core.tick(None);
     }
     assert_eq!(sample.state, State::Finished);
-    core.trip(MISSED);
+    core.controlled_stop(MISSED);
     assert_eq!((core.state(), core.fault()), (State::Finished, None));
 
     // A valley that is too tight comes within the stop.
@@ -488,7 +488,7 @@ fn a_fault_from_outside_in_every_state() {
     let (last, _) = run(&prepared);
     let mut core = load(&prepared);
     run_until(&mut core, |sample| sample.tick + 5 == last.unwrap().tick);
-    core.trip(MISSED);
+    core.controlled_stop(MISSED);
     let (samples, standing) = stop(&mut core, None);
     assert!((1..10).contains(&samples.len()), "{}", samples.len());
     assert_eq!((standing.state, core.fault()), (State::Faulted, Some(MISSED)));

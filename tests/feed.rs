@@ -6,14 +6,16 @@ use std::sync::OnceLock;
 use host_sim::job_file::JobFile;
 use host_sim::prepare::prepare;
 use integration_tests::{dome, scaled_dome};
-use interp_core::{Axes, Command, FaultKind, Header, Inputs, Interpolator, Pattern, Place, Sample, State};
+use interp_core::{
+    AxisLimits, Command, FaultKind, Header, Inputs, Interpolator, Pattern, Sample, SpanParameter, State,
+};
 use proptest::prelude::*;
 
 /// Velocity and acceleration may be above the limit by so much, and jerk: what the differences of whole nanometres cannot tell is taken off.
 const MORE: [f64; 3] = [1.01, 1.01, 1.05];
 
-fn axes(safe_z_nm: i32) -> Axes {
-    Axes {
+fn axes(safe_z_nm: i32) -> AxisLimits {
+    AxisLimits {
         velocity_mm_s: [100.0, 100.0, 50.0],
         acceleration_mm_s2: [1000.0, 1000.0, 500.0],
         jerk_mm_s3: [20_000.0, 20_000.0, 10_000.0],
@@ -45,7 +47,7 @@ struct Use {
 }
 
 impl Use {
-    fn add(&mut self, sample: &Sample, axes: &Axes) {
+    fn add(&mut self, sample: &Sample, axes: &AxisLimits) {
         let here = sample.cl_nm.map(i64::from);
         let [a, b, c] = self.last;
         for axis in 0..3 {
@@ -86,9 +88,9 @@ impl Use {
 }
 
 /// Side places of the passes.
-fn sides(samples: &[Sample]) -> Vec<Place> {
-    let mut sides: Vec<Place> = Vec::new();
-    for sample in samples.iter().filter(|sample| sample.side != Place::NONE) {
+fn sides(samples: &[Sample]) -> Vec<SpanParameter> {
+    let mut sides: Vec<SpanParameter> = Vec::new();
+    for sample in samples.iter().filter(|sample| sample.side != SpanParameter::NONE) {
         if sides.last() != Some(&sample.side) {
             sides.push(sample.side);
         }
@@ -228,7 +230,12 @@ fn command(wait_max: u32) -> impl Strategy<Value = (u32, Option<Command>, u8)> {
 
 /// Whatever is commanded, whenever: no limit is broken, the tool is on its path, what is held stands, and the passes lie where they lie in
 /// a run that nobody touches.
-fn check_commands(header: &Header, words: &[i32], whole: &[Place], commands: &[(u32, Option<Command>, u8)]) {
+fn check_commands(
+    header: &Header,
+    words: &[i32],
+    whole: &[SpanParameter],
+    commands: &[(u32, Option<Command>, u8)],
+) {
     let (samples, core) = scripted(header, words, commands);
     let axes = header.axes.as_ref().unwrap();
     let mut used = Use::default();
@@ -246,7 +253,7 @@ fn check_commands(header: &Header, words: &[i32], whole: &[Place], commands: &[(
     // On the path: the surface itself says where the centre is.
     for sample in samples
         .iter()
-        .filter(|sample| sample.path != Place::NONE)
+        .filter(|sample| sample.path != SpanParameter::NONE)
         .step_by(97)
     {
         let probe = core.evaluate(sample.path, sample.side).unwrap();
@@ -265,7 +272,7 @@ fn check_commands(header: &Header, words: &[i32], whole: &[Place], commands: &[(
 }
 
 /// A job, and the side places of its passes.
-type Undisturbed = (Header, Vec<i32>, Vec<Place>);
+type Undisturbed = (Header, Vec<i32>, Vec<SpanParameter>);
 
 fn undisturbed((header, words): (Header, Vec<i32>)) -> Undisturbed {
     let (samples, core) = scripted(&header, &words, &[]);

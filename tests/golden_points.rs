@@ -5,7 +5,7 @@ use host_sim::job_file::{Along, JobFile};
 use host_sim::machine::Machine;
 use host_sim::prepare::{Axis, Prepared, prepare};
 use integration_tests::golden::{Case, cases};
-use interp_core::Place;
+use interp_core::SpanParameter;
 
 /// The job file of a golden case, with its along, tool side, ball and scallop limit.
 fn job(case: &Case) -> JobFile {
@@ -32,7 +32,7 @@ fn job(case: &Case) -> JobFile {
 }
 
 /// The place of a parameter, to 2^-53 of its span.
-fn place(axis: &Axis, parameter: f64) -> Place {
+fn place(axis: &Axis, parameter: f64) -> SpanParameter {
     let span = axis.breaks[1..axis.breaks.len() - 1].partition_point(|end| *end <= parameter);
     let (start, end) = (axis.breaks[span], axis.breaks[span + 1]);
     let fraction = (parameter - start) / (end - start);
@@ -41,13 +41,13 @@ fn place(axis: &Axis, parameter: f64) -> Place {
     } else {
         (fraction * 2_f64.powi(64)) as u64
     };
-    Place {
+    SpanParameter {
         span: u16::try_from(span).unwrap(),
         fraction,
     }
 }
 
-fn places(prepared: &Prepared, u: f64, v: f64) -> (Place, Place) {
+fn places(prepared: &Prepared, u: f64, v: f64) -> (SpanParameter, SpanParameter) {
     match prepared.along {
         Along::U => (place(&prepared.path, u), place(&prepared.side, v)),
         Along::V => (place(&prepared.path, v), place(&prepared.side, u)),

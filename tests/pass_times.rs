@@ -11,7 +11,7 @@ use host_sim::motion::point::LineLimits;
 use host_sim::motion::{AxisLimits, PassPath, optimum};
 use host_sim::oracle::Oracle;
 use host_sim::prepare::prepare;
-use interp_core::{Place, State};
+use interp_core::{SpanParameter, State};
 
 /// A machine with the same limits on all axes but a slower z: the one of the README's figures.
 const LIMITS: AxisLimits = AxisLimits {
@@ -51,7 +51,7 @@ struct Ran {
 /// Runs a job until the end of its pass `last`.
 fn run(job: &JobFile, last: u32) -> BTreeMap<u32, Ran> {
     let prepared = prepare(job).unwrap();
-    let mut passes = BTreeMap::<u32, (Place, u32)>::new();
+    let mut passes = BTreeMap::<u32, (SpanParameter, u32)>::new();
     let mut machine = Machine::load(&prepared).unwrap();
     machine
         .run(|sample| {
@@ -61,8 +61,8 @@ fn run(job: &JobFile, last: u32) -> BTreeMap<u32, Ran> {
             sample.pass <= last
         })
         .unwrap();
-    let ran = |(pass, (side, samples)): (u32, (Place, u32))| {
-        let [u, v] = prepared.parameters(Place::default(), side);
+    let ran = |(pass, (side, samples)): (u32, (SpanParameter, u32))| {
+        let [u, v] = prepared.parameters(SpanParameter::default(), side);
         let ran = Ran {
             side: if job.along == Along::U { v } else { u },
             time_s: f64::from(samples - 1) * job.machine.period_s(),

@@ -15,7 +15,9 @@ use host_sim::remote::session::Event;
 use host_sim::remote::{RemoteError, Session};
 use interp_core::{FaultKind, Sample, State};
 use protocol::digest::Digest;
-use protocol::message::{Clock, Configuration, HostGone, InputLines, Reason, Report, Request, Status};
+use protocol::message::{
+    Clock, Configuration, InputLines, LinkTimeoutAction, Reason, Report, Request, Status,
+};
 
 fn image() -> &'static Path {
     static IMAGE: OnceLock<PathBuf> = OnceLock::new();
@@ -305,8 +307,8 @@ fn a_run_whose_host_is_gone_is_held_on_the_board() {
     let job = job("sphere_cap");
     let (_qemu, mut session) = board();
     let configuration = Configuration {
-        host_gone: HostGone::Hold,
-        host_gone_ticks: 2000,
+        on_link_timeout: LinkTimeoutAction::Hold,
+        link_timeout_ticks: 2000,
         ..Configuration::DEFAULT
     };
     operate::make_ready(&mut session, &Setup::simulated(configuration)).unwrap();
@@ -324,7 +326,7 @@ fn a_run_whose_host_is_gone_is_held_on_the_board() {
             }
         };
         assert_eq!((status.state, status.fault), (State::Held, None));
-        assert!(status.safety.host_gone && status.samples > before);
+        assert!(status.safety.link_timed_out && status.samples > before);
         let mut digest = Digest::new();
         Machine::load(&job)
             .unwrap()

@@ -16,7 +16,7 @@ use interp_core::{
     fault::{Fault, FaultKind},
     sample::State,
 };
-use protocol::message::{Clock, Configuration, HostGone, InputLines, Reason, Request, Status};
+use protocol::message::{Clock, Configuration, InputLines, LinkTimeoutAction, Reason, Request, Status};
 
 const WORDS: usize = 64;
 const ESTOP: InputLines = InputLines::EMERGENCY_STOP;
@@ -236,20 +236,25 @@ fn an_emergency_stop_is_told_in_lockstep_without_a_period() {
 
 #[test]
 fn a_host_that_is_gone_finds_its_run_held_and_goes_on_exactly() {
-    let configuration = |host_gone| Configuration {
+    let configuration = |on_link_timeout| Configuration {
         homing_required: true,
-        host_gone,
-        host_gone_ticks: 100,
+        on_link_timeout,
+        link_timeout_ticks: 100,
     };
-    let mut desk = Desk::loaded(&Setup::homed(configuration(HostGone::Hold), [0; 3]));
+    let mut desk = Desk::loaded(&Setup::homed(configuration(LinkTimeoutAction::Hold), [0; 3]));
     desk.running();
     let gone = desk.tick(100);
     assert_eq!(gone.state, State::Held);
-    assert!(gone.safety.host_gone && gone.fault.is_none() && gone.samples <= 100);
+    assert!(gone.safety.link_timed_out && gone.fault.is_none() && gone.samples <= 100);
     assert_eq!(desk.tick(1000).samples, gone.samples);
     // Another session, as after a restart of the host.
     desk.session = Session::open(wire(&desk.board), 2).unwrap();
-    assert!(act(&mut desk.session, &Request::Status).unwrap().safety.host_gone);
+    assert!(
+        act(&mut desk.session, &Request::Status)
+            .unwrap()
+            .safety
+            .link_timed_out
+    );
     assert_eq!(
         act(&mut desk.session, &Request::Resume).unwrap().state,
         State::Running
@@ -261,21 +266,24 @@ fn a_host_that_is_gone_finds_its_run_held_and_goes_on_exactly() {
     assert_eq!(over.state, State::Finished);
     assert_eq!((over.digest, over.samples), undisturbed());
 
-    let mut desk = Desk::loaded(&Setup::homed(configuration(HostGone::Finish), [0; 3]));
+    let mut desk = Desk::loaded(&Setup::homed(configuration(LinkTimeoutAction::Finish), [0; 3]));
     desk.running();
     let over = desk.tick(2000);
-    assert_eq!((over.state, over.safety.host_gone), (State::Finished, true));
+    assert_eq!((over.state, over.safety.link_timed_out), (State::Finished, true));
     assert_eq!((over.digest, over.samples), undisturbed());
     // The next run begins with a host.
-    assert!(!desk.running().safety.host_gone);
+    assert!(!desk.running().safety.link_timed_out);
 
     // In lockstep there is nobody to miss.
-    let mut desk = Desk::loaded(&Setup::homed(configuration(HostGone::Hold), [0; 3]));
+    let mut desk = Desk::loaded(&Setup::homed(configuration(LinkTimeoutAction::Hold), [0; 3]));
     desk.ask(Request::Clock(Clock::Lockstep)).unwrap();
     desk.ask(Request::Start).unwrap();
     desk.ask(Request::Run { ticks: 500 }).unwrap();
     let status = desk.tick(500);
-    assert_eq!((status.state, status.safety.host_gone), (State::Running, false));
+    assert_eq!(
+        (status.state, status.safety.link_timed_out),
+        (State::Running, false)
+    );
 }
 
 #[test]
@@ -318,7 +326,10 @@ fn an_operator_is_told_what_he_did() {
 #[test]
 fn a_host_that_waits_is_not_gone() {
     let mut setup = Setup::homed(Configuration::DEFAULT, [0; 3]);
-    (setup.configuration.host_gone, setup.configuration.host_gone_ticks) = (HostGone::Hold, 400);
+    (
+        setup.configuration.on_link_timeout,
+        setup.configuration.link_timeout_ticks,
+    ) = (LinkTimeoutAction::Hold, 400);
     let mut desk = Desk::loaded(&setup);
     let (digest, samples) = undisturbed();
     let compared = drive::run_digests(&mut desk.session, &[], false, None, |_| {}).unwrap();
@@ -326,7 +337,7 @@ fn a_host_that_waits_is_not_gone() {
         (
             compared.status.digest,
             compared.status.samples,
-            compared.status.safety.host_gone
+            compared.status.safety.link_timed_out
         ),
         (digest, samples, false)
     );

@@ -8,7 +8,7 @@ use controller::{
 use integration_tests::dome;
 use interp_core::{fault::FaultKind, sample::State};
 use proptest::prelude::*;
-use protocol::message::{Clock, Configuration, FaultReport, HostGone, InputLines, Report, Status};
+use protocol::message::{Clock, Configuration, FaultReport, InputLines, LinkTimeoutAction, Report, Status};
 
 use super::WORDS;
 
@@ -36,8 +36,12 @@ fn any_deed() -> impl Strategy<Value = Deed> {
     let configuration =
         (any::<bool>(), any::<bool>(), 0_u32..60).prop_map(|(required, hold, ticks)| Configuration {
             homing_required: required,
-            host_gone: if hold { HostGone::Hold } else { HostGone::Finish },
-            host_gone_ticks: ticks,
+            on_link_timeout: if hold {
+                LinkTimeoutAction::Hold
+            } else {
+                LinkTimeoutAction::Finish
+            },
+            link_timeout_ticks: ticks,
         });
     let wishes = [
         Wish::Start,

@@ -337,12 +337,12 @@ pub(crate) fn send(reply: &Reply, out: &mut impl FnMut(&[u8])) {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use interp_core::sample::{Place, State};
+    use interp_core::sample::{SpanParameter, State};
     use protocol::message::{Configuration, FaultReport, InputLines, Report, SafetyStatus};
 
     #[test]
     fn the_longest_status_is_kept() {
-        let place = Place {
+        let place = SpanParameter {
             span: u16::MAX,
             fraction: u64::MAX,
         };
@@ -370,7 +370,7 @@ mod tests {
                 lines: InputLines(u16::MAX),
                 latched: InputLines(u16::MAX),
                 configuration: Configuration {
-                    host_gone_ticks: u32::MAX,
+                    link_timeout_ticks: u32::MAX,
                     ..Configuration::DEFAULT
                 },
                 ..SafetyStatus::DEFAULT

@@ -80,7 +80,7 @@ impl SampleTask {
         self.timer.begin();
         // First of all: the pulses of an axis that turns wait for it.
         if let Err(fault) = output.begin(real_time.directions()) {
-            real_time.trip(fault);
+            real_time.controlled_stop(fault);
         }
         if let Some(command) = self.commands.dequeue() {
             real_time.obey(command, &mut self.events);

@@ -1,7 +1,7 @@
 //! The machine in this process: the core with a job loaded, one call a period.
 
 use interp_core::steps::BUFFER_WORDS;
-use interp_core::{Command, Fault, Inputs, Interpolator, Place, Sample, State, Steps, SurfacePoint};
+use interp_core::{Command, Fault, Inputs, Interpolator, Sample, SpanParameter, State, Steps, SurfacePoint};
 
 use crate::prepare::Prepared;
 
@@ -91,13 +91,13 @@ impl Machine {
     ///
     /// # Errors
     /// As [`Interpolator::evaluate`].
-    pub fn evaluate(&self, path: Place, side: Place) -> Result<SurfacePoint, Fault> {
+    pub fn evaluate(&self, path: SpanParameter, side: SpanParameter) -> Result<SurfacePoint, Fault> {
         self.core.evaluate(path, side)
     }
 
     /// Where the run is: pass, path and side place; after a fault, where that is.
     #[must_use]
-    pub fn place(&self) -> (u32, Place, Place) {
-        self.core.place()
+    pub fn place(&self) -> (u32, SpanParameter, SpanParameter) {
+        self.core.surface_position()
     }
 }

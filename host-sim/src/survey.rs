@@ -1,6 +1,6 @@
 //! Follows a stream of samples: counts, measures against the oracle, writes the trace.
 
-use interp_core::{Place, Sample, State};
+use interp_core::{Sample, SpanParameter, State};
 
 use crate::oracle::{Checked, Emitted, Oracle, Report, Verifier};
 use crate::prepare::Prepared;
@@ -69,7 +69,7 @@ pub struct Survey<'a> {
 /// Whether a sample is one of a pass, and not of the way between two.
 #[must_use]
 pub fn is_on_pass(sample: &Sample) -> bool {
-    sample.state != State::Linking && sample.path != Place::NONE
+    sample.state != State::Linking && sample.path != SpanParameter::NONE
 }
 
 impl<'a> Survey<'a> {

@@ -67,6 +67,6 @@ pub use command::{Command, Inputs};
 pub use fault::{Fault, FaultKind};
 pub use interpolator::{Interpolator, SurfacePoint};
 pub use job::encode;
-pub use job::{Axes, Header, Pattern, STORE_WORDS, Spacing, SurfaceKind, ToolSide};
-pub use sample::{Place, Sample, State};
+pub use job::{AxisLimits, Header, Pattern, STORE_WORDS, Spacing, SurfaceKind, ToolSide};
+pub use sample::{Sample, SpanParameter, State};
 pub use steps::{AxisSteps, StepConfig, Steps};

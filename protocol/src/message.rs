@@ -86,7 +86,7 @@ pub use crate::records::{
     SampleRecord, Status, StepSettings, Words,
 };
 pub use crate::safety::{
-    Configuration, HostGone, InputLines, OVERRIDE_MAX_PERCENT, OVERRIDE_NORMAL_PERCENT, ResetCause,
+    Configuration, InputLines, LinkTimeoutAction, OVERRIDE_MAX_PERCENT, OVERRIDE_NORMAL_PERCENT, ResetCause,
     SafetyStatus,
 };
 use crate::{

@@ -7,7 +7,7 @@ use interp_core::{
 };
 use protocol::message::{Clock, Report};
 
-use super::{TickInput, moves, run::Run};
+use super::{TickInput, moves, run::RunRecord};
 use crate::{
     machine::{Event, Events, Instruction},
     safety::Safety,
@@ -16,7 +16,7 @@ use crate::{
 /// All of the real-time half but the interpolator.
 #[derive(Debug)]
 pub(super) struct Control {
-    pub(super) run: Run,
+    pub(super) run: RunRecord,
     pub(super) credit: u32,
     /// In lockstep: an instruction was executed in this tick; the last period that there was credit for is over, and the host is to know. Time
     /// stands still for a tick then, so that neither is on top of a period's work.
@@ -35,7 +35,7 @@ pub(super) struct Control {
 impl Control {
     pub(super) const fn new() -> Self {
         Self {
-            run: Run::NEW,
+            run: RunRecord::NEW,
             credit: 0,
             obeyed: false,
             spent: false,

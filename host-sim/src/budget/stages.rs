@@ -30,20 +30,20 @@ const STAGES: [(&str, &str, Stage); 24] = [
     ("pass::run", "next_span", Stage::PatchChange),
     ("pass::run", "begin_pass", Stage::PassChange),
     ("pass::run", "step_over", Stage::PassChange),
-    ("pass::run", "look_across", Stage::PassChange),
+    ("pass::run", "estimate_step_over", Stage::PassChange),
     ("pass::run", "close_pass", Stage::PassChange),
     ("pass::run", "end_pass", Stage::PassChange),
     ("pass::run", "", Stage::Rest),
     ("interpolator", "", Stage::Rest),
     ("steps", "", Stage::Pulses),
     ("feed", "", Stage::Feed),
-    ("sequence::course", "", Stage::Feed),
+    ("sequence::sequencer", "", Stage::Feed),
     ("sequence::lookahead", "", Stage::Feed),
     ("sequence::link", "", Stage::Feed),
 ];
 
 /// The function that counts a sample in.
-const COUNT: &str = "controller::realtime::run::Run::add";
+const COUNT: &str = "controller::realtime::run::RunRecord::add";
 
 /// What it calls: a helper.
 const DIGEST: &str = "protocol::digest";
@@ -217,9 +217,12 @@ mod tests {
             None
         );
         assert_eq!(stage("core::num::<impl u32>::wrapping_add"), None);
-        assert_eq!(stage("controller::realtime::run::Run::add"), Some(Stage::Count));
         assert_eq!(
-            stage("controller::realtime::run::Run::end_pass"),
+            stage("controller::realtime::run::RunRecord::add"),
+            Some(Stage::Count)
+        );
+        assert_eq!(
+            stage("controller::realtime::run::RunRecord::end_pass"),
             Some(Stage::Rest)
         );
         assert_eq!(stage("protocol::digest::Digest::sample"), None);

@@ -137,7 +137,7 @@ fn json_of(status: &Status, board: &str) -> serde_json::Value {
         "drives_on": safety.drives_on,
         "homed": safety.homed,
         "homing_required": safety.configuration.homing_required,
-        "host_gone": safety.host_gone,
+        "host_gone": safety.link_timed_out,
         "feed_override_pct": safety.feed_override,
         "last_reset": safety.reset.name(),
         "deadline_misses": status.deadline_misses,

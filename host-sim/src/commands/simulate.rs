@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 use std::time::Instant;
 
 use clap::Args;
-use interp_core::{Fault, Place};
+use interp_core::{Fault, SpanParameter};
 use protocol::digest::Digest;
 
 use super::outcome::{FaultAt, Outcome};
@@ -80,7 +80,7 @@ const PARTS: u64 = 1000;
     clippy::cast_sign_loss,
     reason = "a share of a bar"
 )]
-fn parts_done(side: Place, prepared: &Prepared) -> u64 {
+fn parts_done(side: SpanParameter, prepared: &Prepared) -> u64 {
     let [start, end] = [0, prepared.side.breaks.len() - 1].map(|end| prepared.side.breaks[end]);
     let share = (prepared.side.parameter(side) - start) / (end - start);
     (share * PARTS as f64) as u64

@@ -25,7 +25,7 @@ use std::sync::Arc;
 
 pub use error::JobFileError;
 use interp_core::StepConfig;
-use protocol::message::{Configuration, HostGone};
+use protocol::message::{Configuration, LinkTimeoutAction};
 use section::{Reader, Section};
 pub use surface::{NurbsSpec, SurfaceSpec};
 
@@ -145,7 +145,7 @@ pub struct Machine {
     /// A run on a board starts only where its axes are homed.
     pub homing_required: bool,
     /// What a run on a board does when the host is gone.
-    pub host_gone: HostGone,
+    pub host_gone: LinkTimeoutAction,
     /// Silence after which the host is gone, ms, in [`HOST_GONE_RANGE_MS`].
     pub host_gone_ms: f64,
     /// What the axes' drives want: exact steps a millimetre, pulses, directions.
@@ -165,7 +165,7 @@ impl Default for Machine {
             clearance_mm: None,
             plunge_mm: None,
             homing_required: true,
-            host_gone: HostGone::Finish,
+            host_gone: LinkTimeoutAction::Finish,
             host_gone_ms: HOST_GONE_DEFAULT_MS,
             steps: None,
         }
@@ -187,11 +187,11 @@ impl Machine {
             clippy::cast_sign_loss,
             reason = "1 to 6e6 by the ranges of both"
         )]
-        let host_gone_ticks = (self.host_gone_ms * 1e3 / self.period_us).ceil() as u32;
+        let link_timeout_ticks = (self.host_gone_ms * 1e3 / self.period_us).ceil() as u32;
         Configuration {
             homing_required: self.homing_required,
-            host_gone: self.host_gone,
-            host_gone_ticks,
+            on_link_timeout: self.host_gone,
+            link_timeout_ticks,
         }
     }
 }
@@ -407,7 +407,10 @@ fn read_care(machine: &Section<'_>, read: &mut Machine) -> Result<(), JobFileErr
         read.homing_required = machine.switch("homing_required")?;
     }
     if machine.has("host_gone") {
-        let choices = [("finish", HostGone::Finish), ("hold", HostGone::Hold)];
+        let choices = [
+            ("finish", LinkTimeoutAction::Finish),
+            ("hold", LinkTimeoutAction::Hold),
+        ];
         read.host_gone = machine.choice("host_gone", &choices)?;
     }
     if machine.has("host_gone_ms") {

@@ -121,12 +121,15 @@ fn what_a_board_is_told_of_the_machine() {
     let strict = told("period_us = 1000");
     assert!(strict.homing_required);
     assert_eq!(
-        (strict.host_gone, strict.host_gone_ticks),
-        (HostGone::Finish, 1000)
+        (strict.on_link_timeout, strict.link_timeout_ticks),
+        (LinkTimeoutAction::Finish, 1000)
     );
     let other = told("period_us = 400\nhoming_required = false\nhost_gone = \"hold\"\nhost_gone_ms = 500.1");
     assert!(!other.homing_required);
-    assert_eq!((other.host_gone, other.host_gone_ticks), (HostGone::Hold, 1251));
+    assert_eq!(
+        (other.on_link_timeout, other.link_timeout_ticks),
+        (LinkTimeoutAction::Hold, 1251)
+    );
 }
 
 #[test]

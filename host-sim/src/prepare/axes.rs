@@ -1,6 +1,6 @@
 //! What a job says of the machine's axes, as the core takes it.
 
-use interp_core::Axes;
+use interp_core::AxisLimits;
 
 use crate::job_file::{JobFile, JobFileError, Machine};
 use crate::oracle::Oracle;
@@ -30,7 +30,7 @@ pub const fn has_limits(machine: &Machine) -> bool {
 ///
 /// # Errors
 /// A place outside the travel, with the key that names it.
-pub(super) fn axes(job: &JobFile, oracle: &Oracle) -> Result<Option<Axes>, JobFileError> {
+pub(super) fn axes(job: &JobFile, oracle: &Oracle) -> Result<Option<AxisLimits>, JobFileError> {
     let machine = &job.machine;
     if !has_limits(machine) {
         return Ok(None);
@@ -85,7 +85,7 @@ pub(super) fn axes(job: &JobFile, oracle: &Oracle) -> Result<Option<Axes>, JobFi
     #[allow(clippy::cast_possible_truncation, reason = "the machine's own precision")]
     let to_f32 = |values: [f64; 3]| values.map(|value| value as f32);
     #[allow(clippy::cast_possible_truncation, reason = "the machine's own precision")]
-    Ok(Some(Axes {
+    Ok(Some(AxisLimits {
         velocity_mm_s: to_f32(machine.velocity_max_mm_s.unwrap_or(VELOCITY_DEFAULT_MM_S)),
         acceleration_mm_s2: to_f32(
             machine

@@ -117,7 +117,7 @@ impl<'a> Following<'a> {
 
 /// Lets the session keep a board from taking this host for gone, while it waits for events on the board's own clock.
 pub(super) fn keep_alive(session: &mut Session) -> Result<(), RemoteError> {
-    let ticks = session.status()?.safety.configuration.host_gone_ticks;
+    let ticks = session.status()?.safety.configuration.link_timeout_ticks;
     let period_us = session.capabilities().description.period_us;
     let patience = Duration::from_micros(u64::from(ticks) * u64::from(period_us));
     session.set_keep_alive((ticks > 0).then(|| patience / KEEP_ALIVES));
@@ -156,7 +156,7 @@ pub fn sentences(safety: &SafetyStatus) -> Vec<String> {
     };
     said.push(format!("drives {drives}, {home}"));
     said.push(format!("feed override {} %", safety.feed_override));
-    if safety.host_gone {
+    if safety.link_timed_out {
         said.push("the host was gone during the run".to_owned());
     }
     said.push(format!("last reset: {}", safety.reset.name()));

@@ -111,7 +111,7 @@ pub enum ToolSide {
 /// What the machine's axes x, y, z can do, and where they may go. A job that says so is run from standstill to standstill, its passes linked;
 /// without it the feed is constant from the first sample to the last, as in the paper.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Axes {
+pub struct AxisLimits {
     /// Greatest velocity of each axis, mm/s, 1e-3 to 1e5.
     pub velocity_mm_s: [f32; 3],
     /// Greatest acceleration of each axis, mm/s^2, 1e-2 to 1e7.
@@ -154,5 +154,5 @@ pub struct Header {
     /// Sampling period T, s, 1e-5 to 0.1.
     pub period_s: f32,
     /// What the axes can do; none for a constant feed.
-    pub axes: Option<Axes>,
+    pub axes: Option<AxisLimits>,
 }

@@ -2,7 +2,7 @@
 
 use crate::command::OVERRIDE_MAX;
 use crate::fault::{Fault, FaultKind, Result};
-use crate::job::{Axes, CELLS_MAX, Header, SPANS_MAX, STEP_MAX_MM, SurfaceKind, width_words};
+use crate::job::{AxisLimits, CELLS_MAX, Header, SPANS_MAX, STEP_MAX_MM, SurfaceKind, width_words};
 use crate::math::number::nm_to_mm;
 use crate::surface::{
     POLYNOMIAL_WORDS, PolynomialRecord, RATIONAL_WORDS, REVOLVED_WORDS, RationalRecord, RevolvedRecord,
@@ -11,7 +11,7 @@ use crate::surface::{
 
 /// Which part of the checks a job has passed.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Stage {
+enum LoadStage {
     Empty,
     /// Words received and records checked so far.
     Loading {
@@ -25,7 +25,7 @@ enum Stage {
 /// once the job is sealed.
 #[derive(Debug)]
 pub(crate) struct Program {
-    stage: Stage,
+    stage: LoadStage,
     header: Header,
     /// Words that the job has.
     length: u32,
@@ -79,7 +79,7 @@ fn check_header(header: &Header) -> Result<()> {
 }
 
 /// Ranges of what the axes can do: such that a step of a period fits its integer, and none of the planner's products overflows.
-fn check_axes(header: &Header, axes: &Axes) -> Result<()> {
+fn check_axes(header: &Header, axes: &AxisLimits) -> Result<()> {
     let bad = |value| Err(Fault::new(FaultKind::BadHeader, value));
     let all = [
         (axes.velocity_mm_s, 1e-3, 1e5),
@@ -132,7 +132,7 @@ impl Program {
             axes: None,
         };
         Self {
-            stage: Stage::Empty,
+            stage: LoadStage::Empty,
             header: HEADER,
             length: 0,
         }
@@ -148,7 +148,7 @@ impl Program {
         if u64::from(words) != needed {
             return Err(bad_length(words));
         }
-        self.stage = Stage::Loading {
+        self.stage = LoadStage::Loading {
             received: 0,
             checked: 0,
         };
@@ -158,11 +158,11 @@ impl Program {
     }
 
     pub(crate) fn clear(&mut self) {
-        self.stage = Stage::Empty;
+        self.stage = LoadStage::Empty;
     }
 
     pub(crate) fn write(&mut self, store: &mut [i32], offset: u32, words: &[i32]) -> Result<()> {
-        let Stage::Loading { received, .. } = self.stage else {
+        let LoadStage::Loading { received, .. } = self.stage else {
             return Err(bad_length(offset));
         };
         let end = u32::try_from(words.len())
@@ -177,7 +177,7 @@ impl Program {
         for (slot, word) in slots.iter_mut().zip(words) {
             *slot = *word;
         }
-        self.stage = Stage::Loading {
+        self.stage = LoadStage::Loading {
             received: received.max(end),
             checked: 0,
         };
@@ -189,7 +189,7 @@ impl Program {
     }
 
     pub(crate) fn check(&mut self, store: &[i32], record: u32) -> Result<()> {
-        let Stage::Loading { received, checked } = self.stage else {
+        let LoadStage::Loading { received, checked } = self.stage else {
             return Err(bad_length(0));
         };
         if received != self.length || record > checked || record >= self.records() {
@@ -213,7 +213,7 @@ impl Program {
         match result {
             Some(Ok(())) if !job.is_alike(index) => Err(bad_patch(record)),
             Some(Ok(())) => {
-                self.stage = Stage::Loading {
+                self.stage = LoadStage::Loading {
                     received,
                     checked: checked.max(record + 1),
                 };
@@ -225,12 +225,14 @@ impl Program {
 
     pub(crate) fn seal(&mut self) -> Result<()> {
         match self.stage {
-            Stage::Loading { received, checked } if received == self.length && checked == self.records() => {
-                self.stage = Stage::Sealed;
+            LoadStage::Loading { received, checked }
+                if received == self.length && checked == self.records() =>
+            {
+                self.stage = LoadStage::Sealed;
                 Ok(())
             }
-            Stage::Loading { received, .. } => Err(bad_length(received)),
-            Stage::Empty | Stage::Sealed => Err(bad_length(0)),
+            LoadStage::Loading { received, .. } => Err(bad_length(received)),
+            LoadStage::Empty | LoadStage::Sealed => Err(bad_length(0)),
         }
     }
 
@@ -243,7 +245,7 @@ impl Program {
     /// # Errors
     /// [`FaultKind::WrongState`] where none is.
     pub(crate) fn job<'a>(&'a self, store: &'a [i32]) -> Result<Job<'a>> {
-        if self.stage == Stage::Sealed {
+        if self.stage == LoadStage::Sealed {
             Ok(Job {
                 header: &self.header,
                 store,

@@ -3,31 +3,31 @@
 //! The interval of eqns 10 and 11 is of first order: it takes lengths and curvatures of the pass for those of the whole gap, and a parabola
 //! for the ball. What that leaves out is a percent or two of the scallop height where lines spread or the surface bends more from pass to
 //! pass, h/(2r) everywhere, and up to four times the height at the end of a pass whose lines are skew. So a pass is also looked at from
-//! outside: in ticks that have little else to do, the density `1/interval^2` is taken on two lines beside it, half a step-over and a whole
-//! one further, at the same path parameter. The step to the next pass is the one over which the mean density makes the scallop.
+//! outside: in ticks that have little else to do, the inv_interval_sq `1/interval^2` is taken on two lines beside it, half a step-over and a whole
+//! one further, at the same path parameter. The step to the next pass is the one over which the mean inv_interval_sq makes the scallop.
 
 use crate::job::Header;
 use crate::job::program::Job;
 use crate::math::arith::sqrt;
 use crate::math::number::Bounded;
 use crate::pass::patch::Patch;
-use crate::pass::position::Line;
+use crate::pass::position::PassPosition;
 use crate::pass::schedule;
-use crate::sample::{Place, interval_of};
+use crate::sample::{SpanParameter, interval_of};
 use crate::surface::{Contact, Pass as _};
 
-/// A slack tick in so many looks across, at one line and the other in turn: the densities of neighbouring samples hardly differ.
+/// A slack tick in so many looks across, at one line and the other in turn: the maximum of neighbouring samples hardly differ.
 pub(crate) const EVERY: u32 = 4;
 
 /// Longest step over the first order's: no further is looked at.
 const STEP_MAX: f32 = 1.25;
-/// Shortest: where densities rise faster than that, no pass is looked at closely enough.
+/// Shortest: where maximum rise faster than that, no pass is looked at closely enough.
 const STEP_MIN: f32 = 0.25;
-/// Newton steps to the root of a cubic, from at most four times the root: four bring it to a few percent there. Where the density changes
+/// Newton steps to the root of a cubic, from at most four times the root: four bring it to a few percent there. Where the inv_interval_sq changes
 /// by a tenth two are enough: a step of [`NEWTON_LAST`] leaves 1e-6.
 const NEWTON_STEPS: u8 = 4;
 const NEWTON_LAST: f32 = 1e-3;
-/// The first pass has no step before it by which to choose the lines. They are chosen anew when the greatest density has grown by so
+/// The first pass has no step before it by which to choose the lines. They are chosen anew when the greatest inv_interval_sq has grown by so
 /// much since.
 const AIM_AGAIN: f32 = 1.25;
 
@@ -38,13 +38,13 @@ enum Task {
     Aim,
     /// Make its patch beside the one that the pass is on.
     Patch,
-    /// The density at its start.
+    /// The inv_interval_sq at its start.
     Start,
-    /// The densities on it, until the last patch of the pass.
+    /// The maximum on it, until the last patch of the pass.
     Look,
-    /// The density at its end.
+    /// The inv_interval_sq at its end.
     End,
-    /// The densities on it, to the end.
+    /// The maximum on it, to the end.
     LookOn,
     /// Nothing: the surface ends before it, or it cannot be had.
     Rest,
@@ -52,7 +52,7 @@ enum Task {
 
 /// A line beside the pass.
 #[derive(Clone, Copy, Debug)]
-struct Beside {
+struct NeighbourLine {
     /// How far out it is, of a step-over.
     share: f32,
     patch: Patch,
@@ -60,34 +60,34 @@ struct Beside {
     /// Path span that `patch` is on, and how many spans it was on.
     span: u16,
     spans: u16,
-    side: Place,
-    /// The step-over, in the side parameter, and the density by which it was chosen.
+    side: SpanParameter,
+    /// The step-over, in the side parameter, and the inv_interval_sq by which it was chosen.
     step: f32,
     aimed: f32,
-    /// Greatest density on the line.
+    /// Greatest inv_interval_sq on the line.
     most: f32,
 }
 
-/// The greatest density of the samples of a pass, and of the surface there `across` and `lateral_squared` of the [`Contact`].
+/// The greatest inv_interval_sq of the samples of a pass, and of the surface there `across` and `lateral_squared` of the [`Contact`].
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Densities {
-    pub(crate) most: f32,
+pub(crate) struct PassMaximum {
+    pub(crate) inv_interval_sq: f32,
     pub(crate) shape: [f32; 2],
 }
 
-impl Densities {
+impl PassMaximum {
     /// Of nothing.
     pub(crate) const NONE: Self = Self {
-        most: 0.0,
+        inv_interval_sq: 0.0,
         shape: [0.0; 2],
     };
 }
 
 /// What is known of a pass's ends and the lines beside it.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Across {
-    lines: [Beside; 2],
-    /// Greatest density at the ends of the pass, and which of them are still to be looked at.
+pub(crate) struct StepOverEstimator {
+    lines: [NeighbourLine; 2],
+    /// Greatest inv_interval_sq at the ends of the pass, and which of them are still to be looked at.
     edge: f32,
     ends: [bool; 2],
     /// Step of the pass before.
@@ -96,10 +96,10 @@ pub(crate) struct Across {
     second: bool,
 }
 
-impl Across {
+impl StepOverEstimator {
     /// Before the first pass.
     pub(crate) const START: Self = Self {
-        lines: [Beside::new(0.5), Beside::new(1.0)],
+        lines: [NeighbourLine::new(0.5), NeighbourLine::new(1.0)],
         edge: 0.0,
         ends: [false; 2],
         before: None,
@@ -123,44 +123,54 @@ impl Across {
 
     /// Looks no more on this pass.
     #[cfg(test)]
-    pub(crate) fn rest(&mut self) {
+    pub(crate) fn disable(&mut self) {
         self.ends = [false; 2];
         self.lines = Self::START.lines;
     }
 
     /// Whether the next thing to be done at this place is a patch.
-    pub(crate) fn makes_patch(&self, line: &Line) -> bool {
+    pub(crate) fn makes_patch(&self, position: &PassPosition) -> bool {
         let [half, whole] = &self.lines;
         let beside = if self.second { whole } else { half };
         match beside.task {
             Task::Patch => true,
-            Task::Look => beside.span != line.span,
+            Task::Look => beside.span != position.span,
             _ => false,
         }
     }
 
-    /// Does one thing, for a run at this fraction of this patch. `most`: greatest density of the pass so far.
+    /// Does one thing, for a run at this fraction of this patch. `most`: greatest inv_interval_sq of the pass so far.
     #[inline(never)]
-    pub(crate) fn work(&mut self, job: &Job<'_>, line: &Line, patch: &Patch, fraction: u64, most: f32) {
+    pub(crate) fn work(
+        &mut self,
+        job: &Job<'_>,
+        position: &PassPosition,
+        patch: &Patch,
+        fraction: u64,
+        most: f32,
+    ) {
         let [start, end] = self.ends;
         if start {
             self.ends = [false, end];
             self.edge = at_end(job, patch, 0);
-        } else if end && line.next(job.header.path_spans).is_none() {
+        } else if end && position.next(job.header.path_spans).is_none() {
             self.ends = [false; 2];
             self.edge = at_end(job, patch, u64::MAX).at_least(self.edge);
         } else {
             let [half, whole] = &mut self.lines;
             let beside = if self.second { whole } else { half };
             self.second = !self.second;
-            beside.work(job, line, fraction, most, self.before);
+            beside.work(job, position, fraction, most, self.before);
         }
     }
 
     /// The step to the next pass, in units of the side parameter, after the last sample of this one; infinite where nothing sets
     /// a limit.
-    pub(crate) fn step(&mut self, header: &Header, densities: Densities) -> f32 {
-        let Densities { most, shape } = densities;
+    pub(crate) fn step(&mut self, header: &Header, maximum: PassMaximum) -> f32 {
+        let PassMaximum {
+            inv_interval_sq: most,
+            shape,
+        } = maximum;
         if !(most > 0.0) {
             self.before = None;
             return f32::INFINITY;
@@ -173,7 +183,7 @@ impl Across {
             (Some(half), None) => half.at_least(here),
             _ => here,
         };
-        let [_, Beside { step: distance, .. }] = self.lines;
+        let [_, NeighbourLine { step: distance, .. }] = self.lines;
         let rise = if mean == here {
             0.0
         } else {
@@ -185,7 +195,7 @@ impl Across {
     }
 }
 
-impl Beside {
+impl NeighbourLine {
     /// No line yet, to be so far out.
     const fn new(share: f32) -> Self {
         Self {
@@ -194,7 +204,7 @@ impl Beside {
             task: Task::Rest,
             span: 0,
             spans: 0,
-            side: Place { span: 0, fraction: 0 },
+            side: SpanParameter { span: 0, fraction: 0 },
             step: 0.0,
             aimed: 0.0,
             most: 0.0,
@@ -208,18 +218,25 @@ impl Beside {
     }
 
     #[inline(never)]
-    fn work(&mut self, job: &Job<'_>, line: &Line, fraction: u64, most: f32, before: Option<f32>) {
+    fn work(
+        &mut self,
+        job: &Job<'_>,
+        position: &PassPosition,
+        fraction: u64,
+        most: f32,
+        before: Option<f32>,
+    ) {
         let is_first = before.is_none();
         self.task = match self.task {
-            Task::Aim => self.aim(job, line, most, before),
-            _ if is_first && most > AIM_AGAIN * self.aimed => self.aim(job, line, most, before),
-            Task::Patch => self.make_patch(job, line, Task::Start),
+            Task::Aim => self.aim(job, position, most, before),
+            _ if is_first && most > AIM_AGAIN * self.aimed => self.aim(job, position, most, before),
+            Task::Patch => self.make_patch(job, position, Task::Start),
             Task::Start => {
                 self.most = at_end(job, &self.patch, 0).at_least(self.most);
                 Task::Look
             }
-            Task::Look if self.span != line.span => self.make_patch(job, line, Task::Look),
-            Task::Look if line.next(job.header.path_spans).is_none() => Task::End,
+            Task::Look if self.span != position.span => self.make_patch(job, position, Task::Look),
+            Task::Look if position.next(job.header.path_spans).is_none() => Task::End,
             Task::End => {
                 self.most = at_end(job, &self.patch, u64::MAX).at_least(self.most);
                 Task::LookOn
@@ -235,12 +252,12 @@ impl Beside {
     }
 
     /// Chooses the line: by the step before, or by what the pass's samples so far would come to.
-    fn aim(&mut self, job: &Job<'_>, line: &Line, most: f32, before: Option<f32>) -> Task {
+    fn aim(&mut self, job: &Job<'_>, position: &PassPosition, most: f32, before: Option<f32>) -> Task {
         self.step = before.unwrap_or_else(|| interval_of(most));
         self.aimed = most;
         let spans = job.header.side_spans;
         let width = |span| job.side_width(span);
-        match schedule::next_side(line.side, self.share * self.step, spans, width) {
+        match schedule::next_side(position.side, self.share * self.step, spans, width) {
             Ok(side) if !schedule::is_last(side, spans) => {
                 self.side = side;
                 self.most = 0.0;
@@ -250,12 +267,12 @@ impl Beside {
         }
     }
 
-    fn make_patch(&mut self, job: &Job<'_>, line: &Line, then: Task) -> Task {
-        let beside = Line {
+    fn make_patch(&mut self, job: &Job<'_>, position: &PassPosition, then: Task) -> Task {
+        let beside = PassPosition {
             side: self.side,
-            ..*line
+            ..*position
         };
-        self.span = line.span;
+        self.span = position.span;
         self.spans = self.spans.saturating_add(1);
         match self.patch.collapse(job, &beside) {
             Ok(()) => then,
@@ -263,7 +280,7 @@ impl Beside {
         }
     }
 
-    /// Greatest density on the line; a line of which a part was not seen is taken to be no flatter than the pass.
+    /// Greatest inv_interval_sq on the line; a line of which a part was not seen is taken to be no flatter than the pass.
     fn found(&self, header: &Header, here: f32) -> Option<f32> {
         match self.task {
             Task::LookOn if self.spans >= header.path_spans => Some(self.most),
@@ -273,15 +290,15 @@ impl Beside {
     }
 }
 
-/// Mean density over a step-over, from the values at its start, middle and end. Where the middle stands out, a parabola's; where the ends
-/// do, that of two straight lines, because a density may have a kink at a knot.
+/// Mean inv_interval_sq over a step-over, from the values at its start, middle and end. Where the middle stands out, a parabola's; where the ends
+/// do, that of two straight lines, because a inv_interval_sq may have a kink at a knot.
 fn mean(here: f32, half: f32, whole: f32) -> f32 {
     let parabola = (here + 4.0 * half + whole) * (1.0 / 6.0);
     let lines = (here + 2.0 * half + whole) * 0.25;
     parabola.at_least(lines)
 }
 
-/// The density at an end of a line, 0 where there is no contact. There the crest between two passes is beyond the end of one of them, where
+/// The inv_interval_sq at an end of a line, 0 where there is no contact. There the crest between two passes is beyond the end of one of them, where
 /// lines are skew: from the last ball of that one it is as far as the side line leads, from the other one at right angles to the pass.
 /// With a and b for |d|^2 (1 + r c) of these two directions, the crest is 4/(1 + sqrt(a/b))^2 as high.
 #[inline(never)]
@@ -289,34 +306,34 @@ fn at_end(job: &Job<'_>, patch: &Patch, fraction: u64) -> f32 {
     let Ok(contact) = patch.surface.contact(fraction, &patch.ball) else {
         return 0.0;
     };
-    let density = exact_at(job, patch, &contact);
+    let inv_interval_sq = exact_at(job, patch, &contact);
     let part = contact.across / contact.outwards;
     // Not so at a pole, where it is a part of nothing, nor where the side line bends that much less that it rises slower.
     if !(part > 0.0 && part < 1.0) {
-        return density;
+        return inv_interval_sq;
     }
     let mean = 0.5 * (1.0 + sqrt(part));
-    density / (mean * mean)
+    inv_interval_sq / (mean * mean)
 }
 
 fn exact_at(job: &Job<'_>, patch: &Patch, contact: &Contact) -> f32 {
     let shape = [contact.across, contact.lateral_squared];
-    exact(job.header, patch.interval.density(contact), shape)
+    exact(job.header, patch.interval.inv_interval_sq(contact), shape)
 }
 
-/// The density without the first order's approximations in h/r. The ball's circle instead of its parabola makes it 1/(1 - h/(2r)) of itself, and
+/// The inv_interval_sq without the first order's approximations in h/r. The ball's circle instead of its parabola makes it 1/(1 - h/(2r)) of itself, and
 /// the scallop's own height above a surface of curvature c another 1 + h c; `across` over `lateral_squared` is 1 + r c.
-fn exact(header: &Header, density: f32, [across, lateral_squared]: [f32; 2]) -> f32 {
+fn exact(header: &Header, inv_interval_sq: f32, [across, lateral_squared]: [f32; 2]) -> f32 {
     let height = header.scallop_mm / header.ball_radius_mm;
     let bend = if lateral_squared > 0.0 {
         across / lateral_squared - 1.0
     } else {
         0.0
     };
-    density * (1.0 + height * bend) / (1.0 - 0.5 * height)
+    inv_interval_sq * (1.0 + height * bend) / (1.0 - 0.5 * height)
 }
 
-/// The step x over which a density that begins as `here` has the mean `here + rise x`, which is 1/x^2.
+/// The step x over which a inv_interval_sq that begins as `here` has the mean `here + rise x`, which is 1/x^2.
 fn step_over(here: f32, rise: f32) -> f32 {
     let first = interval_of(here);
     // In units of the first order's step, where here = 1.
@@ -324,7 +341,7 @@ fn step_over(here: f32, rise: f32) -> f32 {
     let mut step = 1.0_f32;
     for _ in 0..NEWTON_STEPS {
         let slope = step * (2.0 + 3.0 * rise * step);
-        // Where the density vanishes within the step there is no root: as far as is allowed.
+        // Where the inv_interval_sq vanishes within the step there is no root: as far as is allowed.
         let next = step - (step * step * (1.0 + rise * step) - 1.0) / slope.at_least(0.5);
         // A NaN becomes the shortest step.
         let next = next.at_least(STEP_MIN).at_most(STEP_MAX);
@@ -341,7 +358,7 @@ fn step_over(here: f32, rise: f32) -> f32 {
 mod tests {
     use super::*;
 
-    /// Steps over a density that is known everywhere end where the mean of the density is 1/step^2.
+    /// Steps over a inv_interval_sq that is known everywhere end where the mean of the inv_interval_sq is 1/step^2.
     #[test]
     fn the_mean_over_the_step_makes_the_scallop() {
         for rise in [0.0, 0.01, -0.01, 0.3, -0.2, 2.0, 10.0] {
@@ -387,8 +404,8 @@ mod tests {
                 ..Header::default()
             };
             let (level, bend) = (1.0 / (8.0 * r * h), 1.0 + r * curvature);
-            let density = exact(&header, (bend * level) as f32, [bend as f32, 1.0]);
-            let step = 1.0 / f64::from(density).sqrt();
+            let inv_interval_sq = exact(&header, (bend * level) as f32, [bend as f32, 1.0]);
+            let step = 1.0 / f64::from(inv_interval_sq).sqrt();
             let height = if curvature == 0.0 {
                 r - (r * r - 0.25 * step * step).sqrt()
             } else {

@@ -7,7 +7,7 @@
 use crate::fault::Result;
 use crate::job::program::Job;
 use crate::pass::patch::Patch;
-use crate::pass::position::Line;
+use crate::pass::position::PassPosition;
 
 /// What is to be made next. In this order.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -26,14 +26,14 @@ enum Task {
 
 /// Two patches, of which the run is on one.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Lane {
+pub(crate) struct PatchBuffer {
     patches: [Patch; 2],
     /// The run is on the second.
     second: bool,
     task: Task,
 }
 
-impl Lane {
+impl PatchBuffer {
     /// On no patch yet.
     pub(crate) const START: Self = Self {
         patches: [Patch::NONE; 2],
@@ -66,7 +66,7 @@ impl Lane {
 
     /// Makes nothing more ahead on this patch.
     #[cfg(test)]
-    pub(crate) fn rest(&mut self) {
+    pub(crate) fn disable(&mut self) {
         self.task = Task::Faulty;
     }
 
@@ -74,18 +74,18 @@ impl Lane {
     ///
     /// # Errors
     /// Those of [`Patch::collapse`].
-    pub(crate) fn begin(&mut self, job: &Job<'_>, line: &Line) -> Result<()> {
+    pub(crate) fn begin(&mut self, job: &Job<'_>, position: &PassPosition) -> Result<()> {
         self.task = Task::Ends;
-        self.both().0.collapse(job, line)
+        self.both().0.collapse(job, position)
     }
 
     /// Goes to the next patch of the pass, which is this one.
     ///
     /// # Errors
     /// Those of [`Patch::collapse`].
-    pub(crate) fn go_on(&mut self, job: &Job<'_>, line: &Line) -> Result<()> {
+    pub(crate) fn advance(&mut self, job: &Job<'_>, position: &PassPosition) -> Result<()> {
         if !matches!(self.task, Task::AheadEnds | Task::Done) {
-            self.both().1.collapse(job, line)?;
+            self.both().1.collapse(job, position)?;
         }
         self.second = !self.second;
         self.task = if self.patch().has_ends() {
@@ -98,7 +98,7 @@ impl Lane {
 
     /// Makes one thing ahead, for a run on this patch.
     #[inline(never)]
-    pub(crate) fn work(&mut self, job: &Job<'_>, line: &Line) {
+    pub(crate) fn work(&mut self, job: &Job<'_>, position: &PassPosition) {
         let task = self.task;
         let (patch, ahead) = self.both();
         self.task = match task {
@@ -106,7 +106,7 @@ impl Lane {
                 patch.find_ends();
                 Task::Ahead
             }
-            Task::Ahead => match line.next(job.header.path_spans) {
+            Task::Ahead => match position.next(job.header.path_spans) {
                 Some(next) if ahead.collapse(job, &next).is_ok() => Task::AheadEnds,
                 Some(_) => Task::Faulty,
                 None => Task::Done,

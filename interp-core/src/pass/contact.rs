@@ -36,16 +36,19 @@ const NEWTON_STEPS: u8 = 2;
 /// First-order step, as a fraction of the patch, beyond which the patch's end is looked at before the series.
 const LONG_STEP: f32 = 0.25;
 
-/// Increment of the path fraction for an arc, units of 2^-64, from the parametrisation at its start and the stretch one
+/// Increment of the path fraction for an arc, units of 2^-64, from the parametrisation at its start and the log_speed_derivative one
 /// sample earlier (NaN where there is none); none where the series is not enough.
 #[inline(always)]
-pub(crate) fn step(from: &PathSpeed, stretch_before: f32, arc: f32) -> Option<u64> {
+pub(crate) fn step(from: &PathSpeed, log_speed_derivative_before: f32, arc: f32) -> Option<u64> {
     const THIRD: f32 = 1.0 / 3.0;
     const SIXTH: f32 = 1.0 / 6.0;
-    let PathSpeed { inverse, stretch } = *from;
+    let PathSpeed {
+        inv_speed: inverse,
+        log_speed_derivative,
+    } = *from;
     let first = arc * inverse;
-    let bend = first * stretch;
-    let change = first * (stretch - stretch_before);
+    let bend = first * log_speed_derivative;
+    let change = first * (log_speed_derivative - log_speed_derivative_before);
     let correction = bend * (bend * THIRD - 0.5) - change * SIXTH;
     // A NaN makes the step none.
     if correction.abs() + change.abs() * CHANGE > FINE {
@@ -70,8 +73,11 @@ fn arc_over(
     end: &PathSpeed,
     length: f32,
 ) -> core::result::Result<f32, f32> {
-    let (first, last) = (1.0 / start.inverse, 1.0 / end.inverse);
-    let (rise, fall) = (first * start.stretch * length, last * end.stretch * length);
+    let (first, last) = (1.0 / start.inv_speed, 1.0 / end.inv_speed);
+    let (rise, fall) = (
+        first * start.log_speed_derivative * length,
+        last * end.log_speed_derivative * length,
+    );
     let (sum, bow) = (first + last, rise - fall);
     let jerk = last - first - 0.5 * (rise + fall);
     let two = 0.5 * sum + bow * (1.0 / 12.0);
@@ -79,7 +85,7 @@ fn arc_over(
         return Ok(length * two);
     }
     let middle = surface.path_at(from.saturating_add(fraction_from_f32(0.5 * length)));
-    let three = sum * (7.0 / 30.0) + bow * (1.0 / 60.0) + 16.0 / 30.0 / middle.inverse;
+    let three = sum * (7.0 / 30.0) + bow * (1.0 / 60.0) + 16.0 / 30.0 / middle.inv_speed;
     // A NaN is not to be trusted either.
     if (two - three).abs() <= APART * three {
         Ok(length * three)
@@ -92,7 +98,7 @@ fn arc_over(
 fn inverse_cubic(arc: f32, start: &PathSpeed, end: &PathSpeed, covered: f32, length: f32) -> f32 {
     let part = arc / covered;
     let rest = 1.0 - part;
-    let (first, last) = (covered * start.inverse, covered * end.inverse);
+    let (first, last) = (covered * start.inv_speed, covered * end.inv_speed);
     part * (rest * rest * first + part * ((3.0 - 2.0 * part) * length - rest * last))
 }
 
@@ -119,8 +125,8 @@ pub(crate) fn solve(
     arc: f32,
 ) -> Result<Reach> {
     let room = fraction_to_f32(!from);
-    let first = arc * start.inverse;
-    let bend = first * start.stretch;
+    let first = arc * start.inv_speed;
+    let bend = first * start.log_speed_derivative;
     let correction = bend * (bend * 0.5 - 0.5);
     let mut guess = first + first * correction;
     let refused = |guess: f32| Fault::new(FaultKind::ParameterBackwards, guess / first - 1.0);
@@ -177,8 +183,8 @@ pub(crate) fn solve(
 
 /// The path of a short arc, to second order, from where the parametrisation is `end`.
 fn path_of(arc: f32, end: &PathSpeed) -> f32 {
-    let more = arc * end.inverse;
-    more - 0.5 * end.stretch * more * more
+    let more = arc * end.inv_speed;
+    more - 0.5 * end.log_speed_derivative * more * more
 }
 
 #[cfg(test)]

@@ -6,6 +6,9 @@ use crate::pass::offset::{Located, check_fit};
 use crate::pass::patch::Patch;
 use crate::surface::{Contact, Pass};
 
+/// Least z of the unit normal towards the tool at which a surface counts as facing up, or sideways at most: 0 less the noise of a normal.
+const UP_MIN: f32 = -2e-6;
+
 impl Patch {
     /// Contact, fit and cutter location at a fraction of the patch, in the direction of travel, by a pass of this patch's surface. Inlined, so that the
     /// sample path has one copy for each kind of pass.
@@ -27,5 +30,11 @@ impl Patch {
     #[inline(always)]
     pub(crate) fn evaluate(&self, fraction: u64) -> Result<(Contact, Located)> {
         self.evaluate_on(&self.surface, fraction)
+    }
+
+    /// Whether the surface faces up at a contact with this offset, so that the tool can retract from it upwards.
+    pub(crate) fn faces_up(&self, offset: [i32; 3]) -> bool {
+        let [_, _, z] = self.ball.normal(offset);
+        z > UP_MIN
     }
 }

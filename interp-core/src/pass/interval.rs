@@ -3,7 +3,7 @@
 //! With k the normal curvature across the path towards the tool and c = -k, the step-over along the surface is
 //! `l = sqrt(8 r h / (1 + r c))`, and the interval of the side parameter `l / |(N x t) . S_side|`. With the lateral speed inside,
 //! `interval^2 = 8 r h / (lateral^2 - r lateral^2 k)`. A pass wants the least interval of all its samples: a sample yields
-//! the [`Sample::density`](crate::Sample::density), `1 / interval^2`, which is a product, and root and quotient are
+//! the [`Sample::inv_interval_sq`](crate::Sample::inv_interval_sq), `1 / interval^2`, which is a product, and root and quotient are
 //! taken once a pass.
 
 use crate::surface::Contact;
@@ -30,7 +30,7 @@ impl Interval {
     /// Density at a contact that the ball fits, in the side parameter's units; 0 at a pole, where the side direction moves
     /// nothing.
     #[inline(always)]
-    pub(crate) fn density(&self, contact: &Contact) -> f32 {
+    pub(crate) fn inv_interval_sq(&self, contact: &Contact) -> f32 {
         contact.across * contact.gauge * self.factor
     }
 }
@@ -51,8 +51,8 @@ mod tests {
                 gauge: 1.0,
                 ..Contact::default()
             };
-            let density = Interval::new(r as f32, h as f32, 1.0, 1.0).density(&contact);
-            let got = f64::from(interval_of(density));
+            let inv_interval_sq = Interval::new(r as f32, h as f32, 1.0, 1.0).inv_interval_sq(&contact);
+            let got = f64::from(interval_of(inv_interval_sq));
             // Exact: centres at R - side r, cusp at R - side h (side = +1 is the inside), half angle by the cosine law.
             let centre = radius - side * r;
             let cusp = radius - side * h;

@@ -6,9 +6,9 @@ use crate::job::{SurfaceKind, ToolSide};
 use crate::math::arith::{centred, power_of_two};
 use crate::pass::interval::Interval;
 use crate::pass::offset::{Locator, origin_q30};
-use crate::pass::position::Line;
+use crate::pass::position::PassPosition;
 use crate::surface::{
-    Ball, CirclePass, GridPass, OffsetUnits, POLYNOMIAL_WORDS, PassLine, PathSpeed, ProfilePass,
+    Ball, CirclePass, GridPass, IsoLine, OffsetUnits, POLYNOMIAL_WORDS, PathSpeed, ProfilePass,
     RATIONAL_WORDS, REVOLVED_WORDS, Surface, split_patch, split_revolved,
 };
 
@@ -50,9 +50,9 @@ impl Patch {
     /// # Errors
     /// [`crate::FaultKind::WrongState`] where the job has no such patch; what the surface's kind finds wrong.
     #[inline(never)]
-    pub(crate) fn collapse(&mut self, job: &Job<'_>, line: &Line) -> Result<()> {
-        let Line { side, reversed, span } = *line;
-        let at = PassLine {
+    pub(crate) fn collapse(&mut self, job: &Job<'_>, position: &PassPosition) -> Result<()> {
+        let PassPosition { side, reversed, span } = *position;
+        let at = IsoLine {
             fraction: side.fraction,
             side: centred(side.fraction),
             reversed,
@@ -126,7 +126,7 @@ impl Patch {
     }
 
     /// A patch of a grid, with as many blocks as it has coordinates.
-    fn collapse_grid(&mut self, job: &Job<'_>, words: &[i32], side_span: u16, sign: f32, at: &PassLine) {
+    fn collapse_grid(&mut self, job: &Job<'_>, words: &[i32], side_span: u16, sign: f32, at: &IsoLine) {
         let (origin_nm, shift, edges, blocks) = split_patch(words);
         self.origin = origin_q30(origin_nm);
         self.measure(job, shift, side_span, sign);

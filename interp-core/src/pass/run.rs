@@ -4,13 +4,13 @@ use crate::fault::{Fault, FaultKind, Result};
 use crate::job::program::Job;
 use crate::job::{Pattern, Spacing};
 use crate::math::arith::{advanced, dot_hi, fraction_to_f32};
-use crate::pass::across::{self, Across, Densities};
-use crate::pass::buffer::Lane;
+use crate::pass::across::{self, PassMaximum, StepOverEstimator};
+use crate::pass::buffer::PatchBuffer;
 use crate::pass::contact::{self, Reach};
 use crate::pass::patch::Patch;
-use crate::pass::position::Line;
+use crate::pass::position::PassPosition;
 use crate::pass::schedule;
-use crate::sample::{Place, Sample, interval_of};
+use crate::sample::{Sample, SpanParameter, interval_of};
 use crate::surface::{AnyPass, Pass, PathSpeed};
 
 /// Patch boundaries that one period's arc may cross. One lets every patch through that is longer than the arc; the cost of a second,
@@ -43,26 +43,26 @@ struct Travel {
     span: u16,
     /// Fraction of the span, in the direction of travel.
     fraction: u64,
-    /// The parametrisation at the last sample, and its stretch at the one before; NaN where that is on another patch.
+    /// The parametrisation at the last sample, and its log_speed_derivative at the one before; NaN where that is on another patch.
     path: PathSpeed,
-    stretch_before: f32,
+    log_speed_derivative_before: f32,
     /// r N at the last sample, in the ball's units.
     offset: [i32; 3],
-    /// Greatest density of the pass, and the surface's shape there, see [`Densities`].
-    most: f32,
+    /// Greatest inv_interval_sq of the pass, and the surface's shape there, see [`PassMaximum`].
+    max_inv_interval_sq: f32,
     shape: [f32; 2],
     /// Samples so far.
     ticks: u32,
     pass: u32,
-    side: Place,
+    side: SpanParameter,
 }
 
 /// A run: the travel, and the patches that it is on.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Run {
     travel: Travel,
-    lane: Lane,
-    across: Across,
+    buffer: PatchBuffer,
+    step_over_estimator: StepOverEstimator,
     /// r N at the pass's first sample.
     first_offset: [i32; 3],
     /// Least interval of the pass that was finished last, in units of the side parameter.
@@ -70,7 +70,7 @@ pub(crate) struct Run {
     /// How far from it the next pass lies.
     step_over: f32,
     /// Share of the feed of the last step along the pass.
-    pace: f32,
+    last_feed_factor: f32,
 }
 
 impl Travel {
@@ -80,16 +80,16 @@ impl Travel {
         span: 0,
         fraction: 0,
         path: PathSpeed {
-            inverse: 0.0,
-            stretch: 0.0,
+            inv_speed: 0.0,
+            log_speed_derivative: 0.0,
         },
-        stretch_before: f32::NAN,
+        log_speed_derivative_before: f32::NAN,
         offset: [0; 3],
-        most: 0.0,
+        max_inv_interval_sq: 0.0,
         shape: [0.0; 2],
         ticks: 0,
         pass: 0,
-        side: Place { span: 0, fraction: 0 },
+        side: SpanParameter { span: 0, fraction: 0 },
     };
 
     /// Fraction of the span, in the surface's own direction.
@@ -102,8 +102,8 @@ impl Travel {
     }
 
     /// The patch that the run is on.
-    const fn line(&self) -> Line {
-        Line {
+    const fn position(&self) -> PassPosition {
+        PassPosition {
             side: self.side,
             reversed: self.reversed,
             span: self.span,
@@ -118,19 +118,19 @@ impl Travel {
         if patch.locator.folds(dot_hi(&self.offset, &contact.offset)) {
             return Err(folded());
         }
-        let density = patch.interval.density(&contact);
-        if density > self.most {
-            self.most = density;
+        let inv_interval_sq = patch.interval.inv_interval_sq(&contact);
+        if inv_interval_sq > self.max_inv_interval_sq {
+            self.max_inv_interval_sq = inv_interval_sq;
             self.shape = [contact.across, contact.lateral_squared];
         }
         self.offset = contact.offset;
-        self.stretch_before = self.path.stretch;
+        self.log_speed_derivative_before = self.path.log_speed_derivative;
         self.path = contact.path;
         last.tick = self.ticks;
         last.path.fraction = self.own_fraction();
         last.cc_nm = located.cc_nm;
         last.cl_nm = located.cl_nm;
-        last.density = density;
+        last.inv_interval_sq = inv_interval_sq;
         self.ticks = self.ticks.wrapping_add(1);
         Ok(())
     }
@@ -146,25 +146,25 @@ impl Run {
     /// Before the first sample.
     pub(crate) const START: Self = Self {
         travel: Travel::START,
-        lane: Lane::START,
-        across: Across::START,
+        buffer: PatchBuffer::START,
+        step_over_estimator: StepOverEstimator::START,
         first_offset: [0; 3],
         last_interval: f32::INFINITY,
         step_over: f32::INFINITY,
-        pace: 0.0,
+        last_feed_factor: 0.0,
     };
 
     /// Back to the start.
     pub(crate) fn restart(&mut self) {
         self.travel = Travel::START;
-        self.across.restart();
+        self.step_over_estimator.restart();
         self.last_interval = f32::INFINITY;
     }
 
     /// Pass, and where the tool is on the path and the side parameter, in the surface's own direction.
-    pub(crate) const fn place(&self) -> (u32, Place, Place) {
+    pub(crate) const fn surface_position(&self) -> (u32, SpanParameter, SpanParameter) {
         let travel = &self.travel;
-        let path = Place {
+        let path = SpanParameter {
             span: travel.span,
             fraction: travel.own_fraction(),
         };
@@ -189,14 +189,18 @@ impl Run {
     pub(crate) fn advance(&mut self, job: &Job<'_>, last: &mut Sample) -> Result<bool> {
         let travel = &mut self.travel;
         if travel.next == Next::Along {
-            let step = contact::step(&travel.path, travel.stretch_before, self.lane.patch().arc);
+            let step = contact::step(
+                &travel.path,
+                travel.log_speed_derivative_before,
+                self.buffer.patch().arc,
+            );
             if let Some(fraction) = step.and_then(|step| advanced(travel.fraction, step)) {
                 travel.fraction = fraction;
                 self.sample(last)?;
-                if self.lane.has_work() {
-                    self.lane.work(job, &self.travel.line());
+                if self.buffer.has_work() {
+                    self.buffer.work(job, &self.travel.position());
                 } else if self.travel.ticks % across::EVERY == 1 {
-                    self.look_across(job);
+                    self.estimate_step_over(job);
                 }
                 return Ok(true);
             }
@@ -204,16 +208,16 @@ impl Run {
         self.advance_far(job, 1.0, last)
     }
 
-    /// The next sample, when it is not just a small step further: a share of a period's arc along the pass, or the next pass.
+    /// The next sample, when it is not just a small step further: a feed_factor of a period's arc along the pass, or the next pass.
     ///
     /// # Errors
     /// As [`Self::advance`].
     #[inline(never)]
-    pub(crate) fn advance_far(&mut self, job: &Job<'_>, share: f32, last: &mut Sample) -> Result<bool> {
+    pub(crate) fn advance_far(&mut self, job: &Job<'_>, feed_factor: f32, last: &mut Sample) -> Result<bool> {
         let begins = !self.is_along();
         match self.travel.next {
-            Next::Along if self.lane.patch().point => self.step_on_pole(job)?,
-            Next::Along => self.step_far(job, share)?,
+            Next::Along if self.buffer.patch().point => self.step_on_pole(job)?,
+            Next::Along => self.step_far(job, feed_factor)?,
             Next::Pass => self.begin_pass(job)?,
             Next::Over => {
                 self.step_over(job)?;
@@ -233,10 +237,10 @@ impl Run {
         last.pass = travel.pass;
         last.path.span = travel.span;
         last.side = travel.side;
-        last.feed_mm_s = if self.lane.patch().point {
+        last.feed_mm_s = if self.buffer.patch().point {
             0.0
         } else {
-            job.header.feed_mm_s * share
+            job.header.feed_mm_s * feed_factor
         };
         Ok(true)
     }
@@ -245,7 +249,7 @@ impl Run {
     ///
     /// # Errors
     /// As [`Self::advance`].
-    pub(crate) fn enter(&mut self, job: &Job<'_>, pass: u32, side: Place) -> Result<()> {
+    pub(crate) fn enter_pass(&mut self, job: &Job<'_>, pass: u32, side: SpanParameter) -> Result<()> {
         if pass > 0 && job.header.pattern == Pattern::Zig {
             self.travel.offset = self.first_offset;
         }
@@ -261,37 +265,38 @@ impl Run {
         self.sample(last)?;
         self.first_offset = self.travel.offset;
         self.last_interval = interval;
-        self.pace = 0.0;
+        self.last_feed_factor = 0.0;
         self.describe(0.0, last);
         Ok(())
     }
 
-    /// A share of a period's arc along the pass; whether that was little work.
+    /// A feed_factor of a period's arc along the pass; whether that was little work.
     ///
     /// # Errors
     /// As [`Self::advance`].
-    pub(crate) fn move_by(&mut self, job: &Job<'_>, share: f32, last: &mut Sample) -> Result<bool> {
+    pub(crate) fn move_by(&mut self, job: &Job<'_>, feed_factor: f32, last: &mut Sample) -> Result<bool> {
         let travel = &mut self.travel;
         // The series' third term is for steps of one length: the change of the last one is scaled to this.
-        let change = (travel.path.stretch - travel.stretch_before) * (share / self.pace);
-        let before = travel.path.stretch - change;
-        self.pace = share;
-        let step = contact::step(&travel.path, before, share * self.lane.patch().arc);
+        let change = (travel.path.log_speed_derivative - travel.log_speed_derivative_before)
+            * (feed_factor / self.last_feed_factor);
+        let before = travel.path.log_speed_derivative - change;
+        self.last_feed_factor = feed_factor;
+        let step = contact::step(&travel.path, before, feed_factor * self.buffer.patch().arc);
         if let Some(fraction) = step.and_then(|step| advanced(travel.fraction, step)) {
             travel.fraction = fraction;
             self.sample(last)?;
-            last.feed_mm_s = job.header.feed_mm_s * share;
-            if !self.lane.has_work() {
+            last.feed_mm_s = job.header.feed_mm_s * feed_factor;
+            if !self.buffer.has_work() {
                 return Ok(true);
             }
-            self.lane.work(job, &self.travel.line());
+            self.buffer.work(job, &self.travel.position());
             return Ok(false);
         }
         let interval = self.last_interval;
-        self.step_far(job, share)?;
+        self.step_far(job, feed_factor)?;
         self.sample(last)?;
         self.last_interval = interval;
-        self.describe(job.header.feed_mm_s * share, last);
+        self.describe(job.header.feed_mm_s * feed_factor, last);
         Ok(false)
     }
 
@@ -301,7 +306,7 @@ impl Run {
     /// As [`Self::advance`]; [`FaultKind::PatchTooShort`] where a whole patch is still ahead.
     pub(crate) fn finish_pass(&mut self, job: &Job<'_>, last: &mut Sample) -> Result<()> {
         if self.is_along() {
-            if self.travel.line().next(job.header.path_spans).is_some() && !self.next_span(job)? {
+            if self.travel.position().next(job.header.path_spans).is_some() && !self.next_span(job)? {
                 return Err(Fault::new(FaultKind::PatchTooShort, 0.0));
             }
             self.end_pass(job);
@@ -326,18 +331,18 @@ impl Run {
         last.feed_mm_s = speed_mm_s;
         // What is there may be of the job before.
         last.pass = self.travel.pass;
-        (last.path, last.side) = (Place::NONE, Place::NONE);
+        (last.path, last.side) = (SpanParameter::NONE, SpanParameter::NONE);
         (last.cc_nm, last.cl_nm) = (at_nm, at_nm);
-        last.density = 0.0;
+        last.inv_interval_sq = 0.0;
     }
 
     /// Cell of the pass, of so many to a patch; none where the pass is over.
-    pub(crate) fn cell(&self, job: &Job<'_>, parts: u16) -> Option<u16> {
+    pub(crate) fn cell(&self, job: &Job<'_>, cells_per_patch: u16) -> Option<u16> {
         if !self.is_along() {
             return None;
         }
         let travel = &self.travel;
-        let within = self.cell_of_patch(parts);
+        let within = self.cell_of_patch(cells_per_patch);
         let span = if travel.reversed {
             job.header
                 .path_spans
@@ -346,26 +351,26 @@ impl Run {
         } else {
             travel.span
         };
-        Some(span.saturating_mul(parts).saturating_add(within))
+        Some(span.saturating_mul(cells_per_patch).saturating_add(within))
     }
 
-    fn cell_of_patch(&self, parts: u16) -> u16 {
-        let high = (self.travel.fraction >> 32) * u64::from(parts);
+    fn cell_of_patch(&self, cells_per_patch: u16) -> u16 {
+        let high = (self.travel.fraction >> 32) * u64::from(cells_per_patch);
         u16::try_from(high >> 32).unwrap_or(0)
     }
 
     /// Arc since the start of the cell, mm, where a patch has so many, each of which is this fraction of it; none in the rounding before it.
-    pub(crate) fn since_station(&self, parts: u16, part: u64) -> Option<f32> {
+    pub(crate) fn since_station(&self, cells_per_patch: u16, part: u64) -> Option<f32> {
         let travel = &self.travel;
-        let start = u64::from(self.cell_of_patch(parts)) * part;
+        let start = u64::from(self.cell_of_patch(cells_per_patch)) * part;
         let length = fraction_to_f32(travel.fraction.checked_sub(start)?);
-        let mean = 1.0 - 0.5 * travel.path.stretch * length;
-        Some(length * mean / (travel.path.inverse * self.lane.patch().per_mm))
+        let mean = 1.0 - 0.5 * travel.path.log_speed_derivative * length;
+        Some(length * mean / (travel.path.inv_speed * self.buffer.patch().per_mm))
     }
 
     /// Whether the surface faces up where the tool is, so that the tool can leave it upwards.
     pub(crate) fn faces_up(&self) -> bool {
-        self.lane.patch().ball.faces_up(self.travel.offset)
+        self.buffer.patch().faces_up(self.travel.offset)
     }
 
     /// What of a sample changes seldom.
@@ -379,8 +384,8 @@ impl Run {
     /// The sample where the run is.
     #[inline(always)]
     fn sample(&mut self, last: &mut Sample) -> Result<()> {
-        let Self { travel, lane, .. } = self;
-        let patch = lane.patch();
+        let Self { travel, buffer, .. } = self;
+        let patch = buffer.patch();
         match patch.surface.pass() {
             AnyPass::Polynomial(pass) => travel.sample(&pass, patch, last),
             AnyPass::Ruled(pass) => travel.sample(&pass, patch, last),
@@ -392,13 +397,13 @@ impl Run {
         }
     }
 
-    /// A share of a period's arc along the pass, by quadrature, over as many patches as it takes.
-    fn step_far(&mut self, job: &Job<'_>, share: f32) -> Result<()> {
-        let mut rest = share * job.header.feed_mm_s * job.header.period_s;
+    /// A feed_factor of a period's arc along the pass, by quadrature, over as many patches as it takes.
+    fn step_far(&mut self, job: &Job<'_>, feed_factor: f32) -> Result<()> {
+        let mut rest = feed_factor * job.header.feed_mm_s * job.header.period_s;
         let mut start = self.travel.path;
         for crossings in 0..=CROSSINGS_MAX {
-            let Self { travel, lane, .. } = self;
-            let patch = lane.patch();
+            let Self { travel, buffer, .. } = self;
+            let patch = buffer.patch();
             let arc = rest * patch.per_mm;
             let end = || patch.end();
             let covered = match contact::solve(&patch.surface, travel.fraction, &start, end, arc)? {
@@ -416,7 +421,7 @@ impl Run {
                 self.end_pass(job);
                 return Ok(());
             }
-            start = self.lane.patch().start().checked()?;
+            start = self.buffer.patch().start().checked()?;
         }
         Err(Fault::new(FaultKind::PatchTooShort, rest))
     }
@@ -434,13 +439,13 @@ impl Run {
     /// Goes to the start of the next patch along the pass; false at the pass's end.
     fn next_span(&mut self, job: &Job<'_>) -> Result<bool> {
         let travel = &mut self.travel;
-        let Some(line) = travel.line().next(job.header.path_spans) else {
+        let Some(line) = travel.position().next(job.header.path_spans) else {
             return Ok(false);
         };
         travel.span = line.span;
         travel.fraction = 0;
-        travel.path.stretch = f32::NAN;
-        self.lane.go_on(job, &line)?;
+        travel.path.log_speed_derivative = f32::NAN;
+        self.buffer.advance(job, &line)?;
         Ok(true)
     }
 
@@ -455,31 +460,50 @@ impl Run {
             0
         };
         travel.fraction = 0;
-        travel.most = 0.0;
+        travel.max_inv_interval_sq = 0.0;
         travel.next = Next::Along;
-        travel.path.stretch = f32::NAN;
-        self.across.begin();
-        self.lane.begin(job, &travel.line())
+        travel.path.log_speed_derivative = f32::NAN;
+        self.step_over_estimator.begin();
+        self.buffer.begin(job, &travel.position())
     }
 
     /// One look at the line a step-over further.
     #[inline(never)]
-    fn look_across(&mut self, job: &Job<'_>) {
+    fn estimate_step_over(&mut self, job: &Job<'_>) {
         if job.header.spacing == Spacing::FirstOrder {
             return;
         }
         let Self {
-            travel, lane, across, ..
+            travel,
+            buffer,
+            step_over_estimator,
+            ..
         } = self;
-        across.work(job, &travel.line(), lane.patch(), travel.fraction, travel.most);
+        step_over_estimator.work(
+            job,
+            &travel.position(),
+            buffer.patch(),
+            travel.fraction,
+            travel.max_inv_interval_sq,
+        );
     }
 
     /// The pass is over: its least interval, and the step to the next one.
     fn close_pass(&mut self, job: &Job<'_>) {
-        let Travel { most, shape, .. } = self.travel;
-        self.last_interval = interval_of(most);
+        let Travel {
+            max_inv_interval_sq,
+            shape,
+            ..
+        } = self.travel;
+        self.last_interval = interval_of(max_inv_interval_sq);
         self.step_over = match job.header.spacing {
-            Spacing::Exact => self.across.step(job.header, Densities { most, shape }),
+            Spacing::Exact => self.step_over_estimator.step(
+                job.header,
+                PassMaximum {
+                    inv_interval_sq: max_inv_interval_sq,
+                    shape,
+                },
+            ),
             Spacing::FirstOrder => self.last_interval,
         };
     }

@@ -3,7 +3,7 @@
 
 use crate::fault::{Fault, FaultKind, Result};
 use crate::math::arith::{fraction_32, fraction_from_f32, fraction_to_f32};
-use crate::sample::Place;
+use crate::sample::SpanParameter;
 
 /// Boundaries between side spans that an interval reaches over at most, so that the walk is bounded; one that reaches further
 /// ends on the last of them: nearer than the scallop asks for, where patches are that much narrower than it.
@@ -15,7 +15,12 @@ const WALK_MAX: u16 = 16;
 ///
 /// # Errors
 /// [`FaultKind::IntervalTooSmall`] where the interval does not advance the parameter.
-pub(crate) fn next_side(from: Place, interval: f32, spans: u16, width: impl Fn(u16) -> f32) -> Result<Place> {
+pub(crate) fn next_side(
+    from: SpanParameter,
+    interval: f32,
+    spans: u16,
+    width: impl Fn(u16) -> f32,
+) -> Result<SpanParameter> {
     const SPAN: u64 = 1 << 32;
     let mut at = from.fraction >> 32;
     let mut rest = interval;
@@ -32,18 +37,18 @@ pub(crate) fn next_side(from: Place, interval: f32, spans: u16, width: impl Fn(u
                 return Err(Fault::new(FaultKind::IntervalTooSmall, interval / width(span)));
             }
             let fraction = (at + step).min(SPAN - 1) << 32;
-            return Ok(Place { span, fraction });
+            return Ok(SpanParameter { span, fraction });
         }
         rest -= room;
         at = 0;
     }
     Ok(if end < spans {
-        Place {
+        SpanParameter {
             span: end,
             fraction: 0,
         }
     } else {
-        Place {
+        SpanParameter {
             span: spans.saturating_sub(1),
             fraction: u64::MAX,
         }
@@ -51,8 +56,9 @@ pub(crate) fn next_side(from: Place, interval: f32, spans: u16, width: impl Fn(u
 }
 
 /// How far a place is from one before it, in units of the side parameter.
-pub(crate) fn apart(from: Place, to: Place, width: impl Fn(u16) -> f32) -> f32 {
-    let fraction = |place: Place| fraction_32(u32::try_from(place.fraction >> 32).unwrap_or(u32::MAX));
+pub(crate) fn apart(from: SpanParameter, to: SpanParameter, width: impl Fn(u16) -> f32) -> f32 {
+    let fraction =
+        |place: SpanParameter| fraction_32(u32::try_from(place.fraction >> 32).unwrap_or(u32::MAX));
     if from.span == to.span {
         let between = to.fraction.saturating_sub(from.fraction);
         return width(from.span) * fraction_to_f32(between);
@@ -66,7 +72,7 @@ pub(crate) fn apart(from: Place, to: Place, width: impl Fn(u16) -> f32) -> f32 {
 }
 
 /// Whether a pass there is the last.
-pub(crate) fn is_last(side: Place, spans: u16) -> bool {
+pub(crate) fn is_last(side: SpanParameter, spans: u16) -> bool {
     side.span + 1 >= spans && side.fraction == u64::MAX
 }
 
@@ -74,7 +80,7 @@ pub(crate) fn is_last(side: Place, spans: u16) -> bool {
 mod tests {
     use super::*;
 
-    fn fraction(place: Place) -> f64 {
+    fn fraction(place: SpanParameter) -> f64 {
         f64::from(place.span) + place.fraction as f64 / 2_f64.powi(64)
     }
 
@@ -82,7 +88,7 @@ mod tests {
     fn goes_on_in_the_next_spans_measure() {
         let widths = [1.0, 0.5, 0.25, 4.0];
         let width = |span: u16| widths[usize::from(span)];
-        let at = |span, fraction: f64| Place {
+        let at = |span, fraction: f64| SpanParameter {
             span,
             fraction: ((fraction * 4_294_967_296.0) as u64) << 32,
         };
@@ -98,14 +104,14 @@ mod tests {
         near(at(0, 0.5), 0.5 + 0.5 + 0.25 + 2.0, 3.5);
         assert_eq!(
             next_side(at(3, 0.5), 2.0, 4, width).unwrap(),
-            Place {
+            SpanParameter {
                 span: 3,
                 fraction: u64::MAX
             }
         );
         assert_eq!(
             next_side(at(1, 0.5), f32::INFINITY, 4, width).unwrap(),
-            Place {
+            SpanParameter {
                 span: 3,
                 fraction: u64::MAX
             }
@@ -121,7 +127,7 @@ mod tests {
         let last = next_side(at(30, 0.5), f32::INFINITY, 40, even).unwrap();
         assert!(is_last(last, 40));
         assert!(is_last(
-            Place {
+            SpanParameter {
                 span: 3,
                 fraction: u64::MAX
             },

@@ -3,50 +3,50 @@
 
 use crate::fault::{Fault, FaultKind, Result};
 use crate::feed::QUANTA_PER_MM;
-use crate::feed::demand::{Room, Stencil, squared};
-use crate::feed::plan::{CELLS_STANDING, Plan, Top};
-use crate::job::Axes;
+use crate::feed::demand::{PathLimits, Stencil, squared};
+use crate::feed::plan::{CELLS_STANDING, FeedLimits, Plan};
+use crate::job::AxisLimits;
 use crate::job::program::Job;
 use crate::math::arith::sqrt;
 use crate::math::number::{Bounded, MM_PER_NM, to_f32};
 use crate::pass::offset::Located;
 use crate::pass::patch::Patch;
-use crate::pass::position::Line;
+use crate::pass::position::PassPosition;
 use crate::pass::schedule;
-use crate::sample::Place;
+use crate::sample::SpanParameter;
 
 /// Cells of a step along the boundary.
-const STEP_CELLS: u16 = 8;
+const STEP_OVER_CELLS: u16 = 8;
 
 /// Share of the jerk that is used on them: a step is some tenths of a millimetre, jerk all the way, and a cutter location is good to a
 /// nanometre or two, which a third difference makes eight times.
 const JERK_SHARE: f32 = 0.7;
 
-/// A link shorter than this, nm, is none: a place and itself, rounded twice.
+/// A link shorter than this, nm, is none: a progress and itself, rounded twice.
 const NOTHING_NM: i64 = 2;
 
 /// A straight leg.
 #[derive(Clone, Copy, Debug, Default)]
-pub(crate) struct Leg {
+pub(crate) struct StraightMove {
     from: [i32; 3],
     to: [i32; 3],
 }
 
-impl Leg {
+impl StraightMove {
     /// None.
     pub(crate) const NONE: Self = Self {
         from: [0; 3],
         to: [0; 3],
     };
 
-    /// From place to place, the last `slow_mm` of it no faster than `feed_mm_s`; none where it is too short to be one. The plan is settled, and
+    /// From progress to progress, the last `slow_mm` of it no faster than `feed_mm_s`; none where it is too short to be one. The plan is settled, and
     /// still to be worked on.
     pub(crate) fn new(
         from: [i32; 3],
         to: [i32; 3],
         slow_mm: f32,
         feed_mm_s: f32,
-        axes: &Axes,
+        axes: &AxisLimits,
         period_s: f32,
         plan: &mut Plan,
     ) -> Option<(Self, f32)> {
@@ -61,9 +61,9 @@ impl Leg {
         let [x, y, z] = mm;
         let length = sqrt(x * x + y * y + z * z);
         let cosines = mm.map(|mm| mm / length);
-        let room = Room::straight(axes, &cosines);
-        let speed = crate::feed::demand::root(room.square);
-        let top = Top {
+        let limits = PathLimits::straight(axes, &cosines);
+        let speed = crate::feed::demand::root(limits.max_speed_sqr);
+        let top = FeedLimits {
             speed,
             usual: speed,
             period_s,
@@ -72,22 +72,30 @@ impl Leg {
         let slow = slow_mm.at_most(length);
         let fast = length - slow;
         if fast > 0.0 {
-            plan.add(fast, &room, 0, &top);
+            plan.add(fast, &limits, 0, &top);
         }
         if slow > 0.0 {
-            let square = room.square.at_most(squared(feed_mm_s));
-            plan.add(slow, &Room { square, ..room }, 0, &top);
+            let square = limits.max_speed_sqr.at_most(squared(feed_mm_s));
+            plan.add(
+                slow,
+                &PathLimits {
+                    max_speed_sqr: square,
+                    ..limits
+                },
+                0,
+                &top,
+            );
         }
         plan.settle(&top);
         Some((Self { from, to }, speed * period_s * QUANTA_PER_MM))
     }
 
-    /// The place so many quanta along.
-    pub(crate) fn at(&self, place: i64, plan: &Plan) -> [i32; 3] {
-        if place >= plan.end {
+    /// The progress so many quanta along.
+    pub(crate) fn position(&self, progress: i64, plan: &Plan) -> [i32; 3] {
+        if progress >= plan.end {
             return self.to;
         }
-        let part = part_q30(place, plan.end);
+        let part = part_q30(progress, plan.end);
         let mut at = self.from;
         for (at, to) in at.iter_mut().zip(&self.to) {
             // 32 bits times 30.
@@ -101,13 +109,13 @@ impl Leg {
 
 /// A step from the end of a pass to the start of the next, along the boundary.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Step {
-    from: Place,
-    to: Place,
+pub(crate) struct BoundaryStepOver {
+    from: SpanParameter,
+    to: SpanParameter,
     /// How far apart they are in the side parameter.
     reach: f32,
     /// Path span and direction at the end of the pass.
-    line: Line,
+    line: PassPosition,
     /// Station that is planned next, and what is known of those before.
     station: u16,
     here: Option<Located>,
@@ -115,17 +123,17 @@ pub(crate) struct Step {
     contact: [i32; 3],
     cell: f32,
     /// Greatest length of the contact's path over the length that the plan counts.
-    stretch: f32,
+    contact_ratio: f32,
 }
 
-impl Step {
+impl BoundaryStepOver {
     /// None.
     pub(crate) const NONE: Self = Self {
-        from: Place { span: 0, fraction: 0 },
-        to: Place { span: 0, fraction: 0 },
+        from: SpanParameter { span: 0, fraction: 0 },
+        to: SpanParameter { span: 0, fraction: 0 },
         reach: 0.0,
-        line: Line {
-            side: Place { span: 0, fraction: 0 },
+        line: PassPosition {
+            side: SpanParameter { span: 0, fraction: 0 },
             reversed: false,
             span: 0,
         },
@@ -134,11 +142,11 @@ impl Step {
         stencil: Stencil::START,
         contact: [0; 3],
         cell: 0.0,
-        stretch: 1.0,
+        contact_ratio: 1.0,
     };
 
     /// From one pass, which ends on this patch, to another.
-    pub(crate) fn new(job: &Job<'_>, line: &Line, to: Place) -> Self {
+    pub(crate) fn new(job: &Job<'_>, line: &PassPosition, to: SpanParameter) -> Self {
         let width = |span| job.side_width(span);
         Self {
             from: line.side,
@@ -161,7 +169,7 @@ impl Step {
             let side = schedule::next_side(self.from, self.reach * part, job.header.side_spans, width);
             side.unwrap_or(self.from)
         };
-        patch.collapse(job, &Line { side, ..self.line })?;
+        patch.collapse(job, &PassPosition { side, ..self.line })?;
         let (_, located) = patch.evaluate(u64::MAX)?;
         Ok(located)
     }
@@ -173,16 +181,16 @@ impl Step {
     pub(crate) fn work(
         &mut self,
         job: &Job<'_>,
-        axes: &Axes,
+        axes: &AxisLimits,
         patch: &mut Patch,
-        top: &Top,
+        top: &FeedLimits,
         plan: &mut Plan,
     ) -> Result<Option<bool>> {
-        if self.station > STEP_CELLS {
+        if self.station > STEP_OVER_CELLS {
             return Ok(Some(plan.work(CELLS_STANDING)));
         }
         let Some(here) = self.here.take() else {
-            let part = f32::from(self.station) / f32::from(STEP_CELLS);
+            let part = f32::from(self.station) / f32::from(STEP_OVER_CELLS);
             let here = self.locate(job, patch, part)?;
             crate::sequence::lookahead::check_travel(axes, &here.cl_nm)?;
             self.here = Some(here);
@@ -194,23 +202,23 @@ impl Step {
             if !(length > to_mm(NOTHING_NM)) {
                 return Ok(None);
             }
-            self.cell = length / f32::from(STEP_CELLS);
+            self.cell = length / f32::from(STEP_OVER_CELLS);
             self.stencil.begin(here.cl_nm);
             plan.begin();
         } else {
             self.stencil.add(here.cl_nm, self.cell);
-            let room = self.stencil.room(axes, top);
-            let room = Room {
-                jerk: JERK_SHARE * room.jerk,
-                ..room
+            let limits = self.stencil.limits(axes, top);
+            let limits = PathLimits {
+                jerk: JERK_SHARE * limits.jerk,
+                ..limits
             };
-            self.stretch = self
-                .stretch
+            self.contact_ratio = self
+                .contact_ratio
                 .at_least(distance(&self.contact, &here.cc_nm) / self.cell);
-            plan.add(self.cell, &room, 2, top);
+            plan.add(self.cell, &limits, 2, top);
         }
         self.contact = here.cc_nm;
-        if self.station == STEP_CELLS {
+        if self.station == STEP_OVER_CELLS {
             plan.settle(top);
         }
         self.station += 1;
@@ -221,18 +229,24 @@ impl Step {
     ///
     /// # Errors
     /// What is wrong with the surface there.
-    pub(crate) fn at(&self, job: &Job<'_>, patch: &mut Patch, place: i64, plan: &Plan) -> Result<Located> {
-        let part = if place >= plan.end {
+    pub(crate) fn position(
+        &self,
+        job: &Job<'_>,
+        patch: &mut Patch,
+        progress: i64,
+        plan: &Plan,
+    ) -> Result<Located> {
+        let part = if progress >= plan.end {
             1.0
         } else {
-            ratio(place, plan.end)
+            ratio(progress, plan.end)
         };
         self.locate(job, patch, part)
     }
 
     /// What a speed of the contact is of the plan's.
     pub(crate) fn per_contact(&self) -> f32 {
-        1.0 / self.stretch
+        1.0 / self.contact_ratio
     }
 }
 
@@ -240,7 +254,7 @@ impl Step {
 ///
 /// # Errors
 /// [`FaultKind::LinkBlocked`] where the surface does not face up.
-pub(crate) fn check_up(up: bool) -> Result<()> {
+pub(crate) fn check_faces_up(up: bool) -> Result<()> {
     if up {
         Ok(())
     } else {

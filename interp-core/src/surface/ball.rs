@@ -5,9 +5,6 @@ use crate::math::arith::{power_of_two, to_f32, to_top, truncated};
 use crate::math::number::NM_PER_MM;
 use crate::math::vec3::Vec3;
 
-/// Least z of the unit normal towards the tool at which a surface counts as facing up, or sideways at most: 0 less the noise of a normal.
-const UP_MIN: f32 = -2e-6;
-
 /// The ball on one patch, whose units are 2^-shift nm. Its offsets are in units of 2^-fine nm, the finest in which the radius is below
 /// 2^30: the same on every patch of a job.
 #[derive(Clone, Copy, Debug, Default)]
@@ -72,11 +69,5 @@ impl Ball {
     pub(crate) fn normal(&self, offset: [i32; 3]) -> [f32; 3] {
         let inverse = 1.0 / self.signed_radius.abs();
         offset.map(|x| to_f32(x) * inverse)
-    }
-
-    /// Whether the surface faces up, so that the tool can leave it upwards, at a contact with this offset.
-    pub(crate) fn faces_up(&self, offset: [i32; 3]) -> bool {
-        let [_, _, z] = self.normal(offset);
-        z > UP_MIN
     }
 }

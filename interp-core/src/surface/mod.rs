@@ -49,7 +49,7 @@ const TANGENT_MIN_SQUARED: f32 = SINE_MIN * SINE_MIN / (1.0 - SINE_MIN * SINE_MI
 
 /// Where a pass runs: everything `collapse` needs besides the patch.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct PassLine {
+pub(crate) struct IsoLine {
     /// Side parameter within its span, units of 2^-64.
     pub(crate) fraction: u64,
     /// The same, centred fixed point.
@@ -88,26 +88,26 @@ pub(crate) struct Contact {
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct PathSpeed {
     /// 1/|A|, path per unit.
-    pub(crate) inverse: f32,
+    pub(crate) inv_speed: f32,
     /// A . A' / |A|^2: relative change of the speed, per path.
-    pub(crate) stretch: f32,
+    pub(crate) log_speed_derivative: f32,
 }
 
 impl PathSpeed {
     /// Of no place.
     pub(crate) const STILL: Self = Self {
-        inverse: 0.0,
-        stretch: 0.0,
+        inv_speed: 0.0,
+        log_speed_derivative: 0.0,
     };
 
-    /// From g Ã, half of its derivative, the excess of its stretch, and g/a.
+    /// From g Ã, half of its derivative, the excess of its log_speed_derivative, and g/a.
     #[inline(always)]
     fn new(path: &[i32; 3], path2: &[i32; 3], excess: f32, gauge: f32) -> Self {
         let speed = Vec3::of(*path);
         let inverse = inverse_sqrt(speed.dot(speed));
         Self {
-            inverse: inverse * gauge,
-            stretch: stretch(path, path2, inverse * inverse, excess),
+            inv_speed: inverse * gauge,
+            log_speed_derivative: log_speed_derivative(path, path2, inverse * inverse, excess),
         }
     }
 
@@ -116,7 +116,7 @@ impl PathSpeed {
     /// # Errors
     /// [`FaultKind::DegenerateSurface`] where it vanishes.
     pub(crate) fn checked(self) -> Result<Self> {
-        if self.inverse > 0.0 && self.inverse < f32::INFINITY {
+        if self.inv_speed > 0.0 && self.inv_speed < f32::INFINITY {
             Ok(self)
         } else {
             Err(Fault::new(FaultKind::DegenerateSurface, 0.0))
@@ -163,13 +163,13 @@ pub(crate) struct Local {
     pub(crate) g: f32,
     /// 1/g.
     pub(crate) inverse_g: f32,
-    /// What the stretch of Ã has more than that of S, because g varies.
+    /// What the log_speed_derivative of Ã has more than that of S, because g varies.
     pub(crate) excess: f32,
 }
 
 /// `A . A' / |A|^2` from g A, half of g A' and 1/|g A|^2.
 #[inline(always)]
-fn stretch(path: &[i32; 3], path2: &[i32; 3], inverse_e: f32, excess: f32) -> f32 {
+fn log_speed_derivative(path: &[i32; 3], path2: &[i32; 3], inverse_e: f32, excess: f32) -> f32 {
     const PRODUCT: f32 = power_of_two(33);
     to_f32(dot_hi(path, path2)) * (inverse_e * PRODUCT) - excess
 }
@@ -236,8 +236,8 @@ impl Local {
             position: self.position,
             offset,
             path: PathSpeed {
-                inverse: inverse * inverse_a * self.g,
-                stretch: stretch(&self.path, &self.path2, inverse_e, self.excess),
+                inv_speed: inverse * inverse_a * self.g,
+                log_speed_derivative: log_speed_derivative(&self.path, &self.path2, inverse_e, self.excess),
             },
             along: 1.0 - l * inverse_e * inverse_a,
             lateral_squared,
@@ -362,7 +362,7 @@ pub(crate) fn split_revolved(words: &[i32; REVOLVED_WORDS]) -> (u8, i32) {
 }
 
 /// Factors of a patch with these collapsed boundaries, fixed on this pass: a and 1/a.
-pub(crate) fn path_factor(edges: Edges, at: &PassLine) -> (f32, f32) {
+pub(crate) fn path_factor(edges: Edges, at: &IsoLine) -> (f32, f32) {
     match edges.side_root() {
         None => (1.0, 1.0),
         Some(root) => {

@@ -7,10 +7,10 @@
 
 use super::Ball;
 use super::grid::GridPass;
-use super::lines::{Line, quotient_across, quotient_along};
+use super::lines::{CoordinateCubics, quotient_across, quotient_along};
 use super::range::{Edges, Root};
 use super::rational::{Weight, quarter};
-use super::{Contact, Factors, Local, Pass, PassLine, PathSpeed, path_factor};
+use super::{Contact, Factors, IsoLine, Local, Pass, PathSpeed, path_factor};
 use crate::fault::Result;
 use crate::math::arith::{centred, centred_to_f32, cubic, jet, mul_q30, quarter_of, subtract, tangent};
 
@@ -26,7 +26,7 @@ enum Pole {
 
 /// One coordinate divided by the root.
 #[derive(Clone, Copy, Debug, Default)]
-struct ReducedLine {
+struct ReducedCubics {
     /// P.
     value: [i32; 4],
     /// P_side and half of P_side,side where the root is at an end, and not divided where it is beside.
@@ -37,7 +37,7 @@ struct ReducedLine {
 /// What a pole adds to a patch on a pass.
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct Reduced {
-    axes: [ReducedLine; 3],
+    axes: [ReducedCubics; 3],
     pole: Pole,
     path_factor: f32,
     inverse_path_factor: f32,
@@ -49,7 +49,7 @@ pub(crate) struct PolePass<'a>(pub(super) &'a GridPass);
 impl Reduced {
     /// Of no pole.
     pub(super) const NONE: Self = Self {
-        axes: [ReducedLine {
+        axes: [ReducedCubics {
             value: [0; 4],
             side: [0; 4],
             side2: [0; 4],
@@ -60,7 +60,13 @@ impl Reduced {
     };
 
     /// Divides the coordinates of a patch by the root of its flagged boundary.
-    pub(super) fn collapse(&mut self, lines: &[Line; 3], blocks: &[[i32; 16]], edges: Edges, at: &PassLine) {
+    pub(super) fn collapse(
+        &mut self,
+        lines: &[CoordinateCubics; 3],
+        blocks: &[[i32; 16]],
+        edges: Edges,
+        at: &IsoLine,
+    ) {
         self.pole = match edges.path_root(at.reversed) {
             Some(root) if edges.side_root().is_none() => Pole::AtEnd(root),
             _ => Pole::Beside,
@@ -116,8 +122,8 @@ impl PolePass<'_> {
 
 /// One coordinate.
 struct PoleLine<'a> {
-    line: &'a Line,
-    reduced: &'a ReducedLine,
+    line: &'a CoordinateCubics,
+    reduced: &'a ReducedCubics,
     pole: Pole,
 }
 

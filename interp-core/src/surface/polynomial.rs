@@ -6,7 +6,7 @@
 
 use super::Ball;
 use super::grid::GridPass;
-use super::lines::{Line, coefficients, collapses, record_words, split};
+use super::lines::{CoordinateCubics, coefficients, collapses, record_words, split};
 use super::range::{BAD_PATCH, Edges, HeadWord, fits};
 use super::{Contact, Factors, Local, Pass, PathSpeed};
 use crate::fault::Result;
@@ -81,7 +81,7 @@ pub(crate) struct ExtrudedPass<'a>(pub(super) &'a GridPass);
 fn local<const MIXED: bool, const SIDE2: bool>(pass: &GridPass, fraction: u64) -> Local {
     let w = centred(fraction);
     let [x, y, z] = &pass.axes;
-    let side = |line: &Line| {
+    let side = |line: &CoordinateCubics| {
         if MIXED {
             tangent(&line.side, w)
         } else {
@@ -89,7 +89,7 @@ fn local<const MIXED: bool, const SIDE2: bool>(pass: &GridPass, fraction: u64) -
             [constant, 0]
         }
     };
-    let side2 = |line: &Line| if SIDE2 { cubic(&line.side2, w) } else { 0 };
+    let side2 = |line: &CoordinateCubics| if SIDE2 { cubic(&line.side2, w) } else { 0 };
     let ([x0, x1, x2], [y0, y1, y2], [z0, z1, z2]) = (jet(&x.value, w), jet(&y.value, w), jet(&z.value, w));
     let ([xs, xm], [ys, ym], [zs, zm]) = (side(x), side(y), side(z));
     Local {
@@ -141,7 +141,7 @@ impl Pass for ExtrudedPass<'_> {
 mod tests {
     use super::*;
     use crate::surface::grid::GridKind;
-    use crate::surface::{OffsetUnits, PassLine};
+    use crate::surface::{IsoLine, OffsetUnits};
 
     /// What a shape leaves out is nothing: each agrees with the free one to the last bit.
     #[test]
@@ -158,7 +158,7 @@ mod tests {
             }
             block[2][1] = 70_000_000;
             for (side, reversed) in [(0, false), (1 << 30, true), (i32::MIN, false)] {
-                let at = PassLine {
+                let at = IsoLine {
                     fraction: 0,
                     side,
                     reversed,

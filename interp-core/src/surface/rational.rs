@@ -7,7 +7,7 @@
 
 use super::Ball;
 use super::grid::GridPass;
-use super::lines::{Line, coefficients, collapses, record_words, split};
+use super::lines::{CoordinateCubics, coefficients, collapses, record_words, split};
 use super::range::{BAD_PATCH, Edges, HeadWord, Root, fits, patch_bound};
 use super::{Contact, Factors, Local, Pass, PathSpeed};
 use crate::fault::Result;
@@ -137,7 +137,7 @@ pub(super) struct Weight {
 
 impl Weight {
     #[inline(always)]
-    pub(super) fn at(line: &Line, w: i32) -> Self {
+    pub(super) fn at(line: &CoordinateCubics, w: i32) -> Self {
         let [value, path, path2] = jet(&line.value, w);
         let [side, mixed] = tangent(&line.side, w);
         let float = to_f32(value) * WEIGHT_UNIT;
@@ -190,7 +190,7 @@ pub(crate) struct RationalPass<'a>(pub(super) &'a GridPass);
 
 /// One coordinate of a [`Local`]: position, path, path2, side, mixed, side2.
 #[inline(always)]
-fn axis(line: &Line, weight: &Weight, w: i32) -> [i32; 6] {
+fn axis(line: &CoordinateCubics, weight: &Weight, w: i32) -> [i32; 6] {
     let [value, path, path2] = jet(&line.value, w);
     let [side, mixed] = tangent(&line.side, w);
     let s = weight.divide(value);

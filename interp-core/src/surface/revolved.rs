@@ -7,7 +7,7 @@
 use super::Ball;
 use super::lines::turn_cubic;
 use super::range::{BAD_PATCH, SHIFT_MAX, bound, fits_range};
-use super::{Contact, Pass, PassLine, PathSpeed};
+use super::{Contact, IsoLine, Pass, PathSpeed};
 use crate::fault::{Fault, FaultKind, Result};
 use crate::math::arith::{angle, centred, count_to_f32, inverse_sqrt, jet, mul_q31, sin_cos, to_f32};
 use crate::math::vec3::Vec3;
@@ -127,12 +127,12 @@ struct ProfilePoint {
 
 /// A polynomial profile, maybe travelled backwards.
 #[derive(Clone, Copy, Debug, Default)]
-struct Profile {
+struct ProfileCurve {
     radius: [i32; 4],
     height: [i32; 4],
 }
 
-impl Profile {
+impl ProfileCurve {
     fn new(record: &RevolvedRecord, reversed: bool) -> Self {
         Self {
             radius: turn_cubic(record.radius, reversed),
@@ -182,7 +182,7 @@ fn degenerate() -> Fault {
 /// A pass along the profile, at a fixed angle.
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct ProfilePass {
-    profile: Profile,
+    profile: ProfileCurve,
     sin: i32,
     cos: i32,
     sin_float: f32,
@@ -195,11 +195,11 @@ pub(crate) struct ProfilePass {
 
 impl ProfilePass {
     /// The profile at the pass's angle, for a ball of this radius in units.
-    pub(crate) fn collapse(&mut self, words: &[i32; REVOLVED_WORDS], at: &PassLine, radius: f32) {
+    pub(crate) fn collapse(&mut self, words: &[i32; REVOLVED_WORDS], at: &IsoLine, radius: f32) {
         let record = RevolvedRecord::from_words(words);
         let [sin, cos] = sin_cos_q31(angle(record.start, record.extent, at.fraction));
         *self = Self {
-            profile: Profile::new(&record, at.reversed),
+            profile: ProfileCurve::new(&record, at.reversed),
             sin,
             cos,
             sin_float: to_f32(sin) * SINE_UNIT,
@@ -215,8 +215,8 @@ impl ProfilePass {
         let (tangent, e) = point.tangent();
         let inverse = inverse_sqrt(e);
         PathSpeed {
-            inverse,
-            stretch: plane_dot(tangent, point.bend()) * (inverse * inverse),
+            inv_speed: inverse,
+            log_speed_derivative: plane_dot(tangent, point.bend()) * (inverse * inverse),
         }
     }
 }
@@ -247,8 +247,8 @@ impl Pass for ProfilePass {
                 inverse,
             ),
             path: PathSpeed {
-                inverse,
-                stretch: plane_dot(tangent, bend) * inverse_e,
+                inv_speed: inverse,
+                log_speed_derivative: plane_dot(tangent, bend) * inverse_e,
             },
             along: 1.0 - plane_dot([out, up], bend) * inverse_e,
             lateral_squared: lateral * lateral,
@@ -285,11 +285,11 @@ impl CirclePass {
     pub(crate) fn collapse(
         &mut self,
         words: &[i32; REVOLVED_WORDS],
-        at: &PassLine,
+        at: &IsoLine,
         radius: f32,
     ) -> Result<()> {
         let record = RevolvedRecord::from_words(words);
-        let point = Profile::new(&record, false).at(at.side);
+        let point = ProfileCurve::new(&record, false).at(at.side);
         let ([circle, ..], [height, ..]) = (point.radius, point.height);
         let ([radius1, height1], e) = point.tangent();
         if !(e > 0.0) || circle < 0 {
@@ -316,8 +316,8 @@ impl CirclePass {
             up,
             shape: Contact {
                 path: PathSpeed {
-                    inverse: inverse_speed,
-                    stretch: 0.0,
+                    inv_speed: inverse_speed,
+                    log_speed_derivative: 0.0,
                 },
                 along: 1.0 - bend,
                 lateral_squared: e,

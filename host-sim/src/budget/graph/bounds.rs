@@ -98,7 +98,7 @@ const BOUNDS: &[(&str, u32, &str)] = &[
         "pulses of a period: SLOTS over the shortest spacing, 2",
     ),
     (
-        "interp_core::surface::lines::Line::collapse",
+        "interp_core::surface::lines::CoordinateCubics::collapse",
         4,
         "rows of a block",
     ),

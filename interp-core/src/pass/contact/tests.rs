@@ -3,8 +3,8 @@ use crate::job::Header;
 use crate::job::encode;
 use crate::job::program::Program;
 use crate::pass::patch::Patch;
-use crate::pass::position::Line;
-use crate::sample::Place;
+use crate::pass::position::PassPosition;
+use crate::sample::SpanParameter;
 use crate::surface::Edges;
 use std::vec::Vec;
 
@@ -12,8 +12,8 @@ use std::vec::Vec;
 const ROUNDING: f64 = 1.0 / 8_388_608.0;
 
 /// The step that [`step`] takes, as a fraction.
-fn step_of(from: PathSpeed, stretch_before: f64, arc: f32) -> Option<f64> {
-    step(&from, stretch_before as f32, arc).map(|step| step as f64 / 2_f64.powi(64))
+fn step_of(from: PathSpeed, log_speed_derivative_before: f64, arc: f32) -> Option<f64> {
+    step(&from, log_speed_derivative_before as f32, arc).map(|step| step as f64 / 2_f64.powi(64))
 }
 
 /// Evenly spread over [0, 1), the same each time.
@@ -30,19 +30,29 @@ fn random() -> impl FnMut() -> f64 {
 /// A place of this speed, and an arc of so much of the patch over which the speed changes by `bend` of itself.
 fn place_and_arc(bend: f64, speed: f64, part: f64) -> (PathSpeed, f32) {
     let (inverse, arc) = ((1.0 / speed) as f32, (part * speed) as f32);
-    let stretch = (bend / (f64::from(arc) * f64::from(inverse))) as f32;
-    (PathSpeed { inverse, stretch }, arc)
+    let log_speed_derivative = (bend / (f64::from(arc) * f64::from(inverse))) as f32;
+    (
+        PathSpeed {
+            inv_speed: inverse,
+            log_speed_derivative,
+        },
+        arc,
+    )
 }
 
 /// Mean and greatest relative error of the step over many speeds and arcs, for a curve by its inverse arc length: from
-/// speed, stretch and arc, the exact step and the stretch one arc before. The roundings average out in the mean.
+/// speed, log_speed_derivative and arc, the exact step and the log_speed_derivative one arc before. The roundings average out in the mean.
 fn errors(bend: f64, exact: impl Fn(f64, f64, f64) -> (f64, f64)) -> (f64, f64) {
     const COUNT: u32 = 10_000;
     let (mut sum, mut most, mut random) = (0.0, 0_f64, random());
     for _ in 0..COUNT {
         let speed = 10_f64.powf(3.0 + 4.0 * random());
         let (from, arc) = place_and_arc(bend, speed, 1e-3 * (1.0 + random()));
-        let (want, before) = exact(1.0 / f64::from(from.inverse), from.stretch.into(), arc.into());
+        let (want, before) = exact(
+            1.0 / f64::from(from.inv_speed),
+            from.log_speed_derivative.into(),
+            arc.into(),
+        );
         let error = step_of(from, before, arc).unwrap() / want - 1.0;
         (sum, most) = (sum + error, most.max(error.abs()));
     }
@@ -57,7 +67,7 @@ fn linear_speed(a: f64, p: f64, arc: f64) -> (f64, f64) {
     (step, p / (1.0 - 2.0 * x).sqrt())
 }
 
-/// Speed a exp(p u): from s = a (exp(p u) - 1)/p. Its stretch is the same everywhere.
+/// Speed a exp(p u): from s = a (exp(p u) - 1)/p. Its log_speed_derivative is the same everywhere.
 fn exponential_speed(a: f64, p: f64, arc: f64) -> (f64, f64) {
     ((arc * p / a).ln_1p() / p, p)
 }
@@ -95,15 +105,18 @@ fn steps_at_an_even_speed_are_the_arc_over_the_speed() {
 #[test]
 fn no_step_where_the_series_is_not_enough() {
     let (from, arc) = place_and_arc(1.0 / 130.0, 23.7, 1e-3);
-    let before = from.stretch;
+    let before = from.log_speed_derivative;
     assert!(step(&from, before, arc).is_some());
     // The first step of a patch, and what no surface should give.
     let nan = f32::NAN;
-    let with = |inverse, stretch| PathSpeed { inverse, stretch };
+    let with = |inverse, log_speed_derivative| PathSpeed {
+        inv_speed: inverse,
+        log_speed_derivative,
+    };
     assert_eq!(step(&from, nan, arc), None);
     assert_eq!(step(&from, before, nan), None);
-    assert_eq!(step(&with(from.inverse, nan), before, arc), None);
-    assert_eq!(step(&with(nan, from.stretch), before, arc), None);
+    assert_eq!(step(&with(from.inv_speed, nan), before, arc), None);
+    assert_eq!(step(&with(nan, from.log_speed_derivative), before, arc), None);
     assert_eq!(step(&with(f32::INFINITY, 0.0), 0.0, arc), None);
     // Half of the bend is the correction: 1/256 at 1/128 of bend, a little less for the square.
     for (bend, some) in [
@@ -113,14 +126,18 @@ fn no_step_where_the_series_is_not_enough() {
         (-1.0 / 127.0, false),
     ] {
         let (from, arc) = place_and_arc(bend, 23.7, 1e-3);
-        assert_eq!(step(&from, from.stretch, arc).is_some(), some, "{bend}");
+        assert_eq!(
+            step(&from, from.log_speed_derivative, arc).is_some(),
+            some,
+            "{bend}"
+        );
     }
-    // The same by the change of the stretch alone.
+    // The same by the change of the log_speed_derivative alone.
     for (change, some) in [(5.9, true), (6.1, false), (-5.9, true), (-6.1, false)]
         .map(|(change, some)| (change / (6.0 * 8.0 + 1.0), some))
     {
         let (from, arc) = place_and_arc(0.0, 23.7, 1e-3);
-        let first = arc * from.inverse;
+        let first = arc * from.inv_speed;
         assert_eq!(
             step(&from, change / 256.0 / first, arc).is_some(),
             some,
@@ -152,12 +169,12 @@ fn a_step_never_runs_backwards() {
             (sign * value) as f32
         };
         let from = PathSpeed {
-            inverse: value(-9.0, -3.0),
-            stretch: value(-3.0, 5.0),
+            inv_speed: value(-9.0, -3.0),
+            log_speed_derivative: value(-3.0, 5.0),
         };
         let (before, arc) = (value(-3.0, 5.0), value(0.0, 6.0));
         if let Some(step) = step_of(from, before.into(), arc) {
-            let first = f64::from(arc) * f64::from(from.inverse);
+            let first = f64::from(arc) * f64::from(from.inv_speed);
             assert!(
                 step > 0.0 && (step / first - 1.0).abs() < 1.0 / 255.0,
                 "{from:?}, {before}, {arc}"
@@ -178,8 +195,8 @@ fn a_guess_is_corrected_to_second_order() {
             let guess = want * (1.0 + miss);
             let end = a + b * guess;
             let there = PathSpeed {
-                inverse: (1.0 / end) as f32,
-                stretch: (b / end) as f32,
+                inv_speed: (1.0 / end) as f32,
+                log_speed_derivative: (b / end) as f32,
             };
             let more = path_of((arc(want) - arc(guess)) as f32, &there);
             let (error, slope) = ((guess + f64::from(more)) / want - 1.0, b / end);
@@ -197,8 +214,8 @@ fn a_guess_is_corrected_to_second_order() {
     }
     // Nothing missed, nothing added.
     let there = PathSpeed {
-        inverse: 0.5,
-        stretch: 3.0,
+        inv_speed: 0.5,
+        log_speed_derivative: 3.0,
     };
     assert_eq!(path_of(0.0, &there), 0.0);
 }
@@ -232,8 +249,8 @@ fn surface_on(line: &Curve) -> (Surface, f64) {
     program.seal().unwrap();
     let mut patch = Patch::NONE;
     let job = program.job(&store).unwrap();
-    let line = Line {
-        side: Place::default(),
+    let line = PassPosition {
+        side: SpanParameter::default(),
         reversed: false,
         span: 0,
     };
@@ -389,14 +406,14 @@ fn an_arc_beyond_the_patch_says_what_was_left_of_it() {
     }
 }
 
-/// What is added to the first-order step would be x (x - 1)/2, x the arc times the stretch over the speed.
+/// What is added to the first-order step would be x (x - 1)/2, x the arc times the log_speed_derivative over the speed.
 #[test]
 fn an_arc_over_which_the_speed_falls_too_much_is_refused() {
-    // x = 5.05 u - 5 u^2/2 comes almost to a stand: at u = 0.8 its speed is 1.05, its stretch -1/0.21.
+    // x = 5.05 u - 5 u^2/2 comes almost to a stand: at u = 0.8 its speed is 1.05, its log_speed_derivative -1/0.21.
     let line: Curve = [[0.0, 5.05, -2.5, 0.0], [0.0; 4], [0.0; 4]];
-    let (speed, stretch) = (1.05, -5.0 / 1.05);
+    let (speed, log_speed_derivative) = (1.05, -5.0 / 1.05);
     let correction = |arc: f64| {
-        let x = arc / speed * stretch;
+        let x = arc / speed * log_speed_derivative;
         0.5 * x * (x - 1.0)
     };
     // 1/2 at x = -0.618: 0.1363 mm, where the guess is still short of the end.
@@ -427,11 +444,11 @@ fn an_arc_over_which_the_speed_rises_too_much_is_refused() {
 #[test]
 fn a_place_without_a_stretch_is_refused() {
     let (surface, per_mm) = surface_on(&CURVED);
-    for (inverse, stretch) in [(1.0, f32::NAN), (f32::NAN, 1.0)] {
+    for (inverse, log_speed_derivative) in [(1.0, f32::NAN), (f32::NAN, 1.0)] {
         let start = surface.path_at(0);
         let start = PathSpeed {
-            inverse: start.inverse * inverse,
-            stretch: start.stretch * stretch,
+            inv_speed: start.inv_speed * inverse,
+            log_speed_derivative: start.log_speed_derivative * log_speed_derivative,
         };
         let fault = solve(
             &surface,

@@ -61,10 +61,10 @@ fn patches_made_ahead_change_no_bit() {
         let (mut here, mut there) = (Sample::START, Sample::START);
         let mut patches = 0;
         loop {
-            late.lane.rest();
+            late.buffer.disable();
             // What lies across is looked at in ticks that have nothing to make ahead; which they are is not the same.
-            ahead.across.rest();
-            late.across.rest();
+            ahead.step_over_estimator.disable();
+            late.step_over_estimator.disable();
             let more = ahead.advance(&job, &mut here).unwrap();
             assert_eq!(late.advance(&job, &mut there).unwrap(), more);
             if !more {

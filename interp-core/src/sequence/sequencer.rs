@@ -9,12 +9,12 @@ use crate::feed::QUANTA_PER_MM;
 use crate::feed::plan::CELLS_STANDING;
 use crate::feed::profile::Profile;
 use crate::job::program::Job;
-use crate::job::{Axes, Pattern};
+use crate::job::{AxisLimits, Pattern};
 use crate::math::number::Bounded;
-use crate::pass::position::Line;
+use crate::pass::position::PassPosition;
 use crate::pass::run::Run;
-use crate::sample::{Place, Sample};
-use crate::sequence::link::{Leg, Step, check_up};
+use crate::sample::{Sample, SpanParameter};
+use crate::sequence::link::{BoundaryStepOver, StraightMove, check_faces_up};
 use crate::sequence::lookahead::{Lookahead, PassPlan, check_travel, top};
 
 /// Portions of the look ahead in a tick in which the tool waits for it.
@@ -23,28 +23,32 @@ const PORTIONS_WAITING: u8 = 2;
 /// Where the course is.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Phase {
-    /// Waits for the next pass to be looked over, to go there.
-    Wait,
-    /// Plans a step along the boundary; goes it.
-    StepPlan,
-    Step,
-    /// Plans a leg; goes it.
-    LegPlan(Way),
-    LegBounds(Way),
-    Leg(Way),
-    /// At the start of the next pass, whose first patch is made: that is a tick's work.
-    Enter,
-    Pass,
-    /// Behind all.
-    End,
+    /// Waits until the look-ahead has planned the next pass.
+    AwaitPlan,
+    /// Plans a step-over along the boundary.
+    PlanStepOver,
+    /// Follows it.
+    StepOver,
+    /// Plans a leg, a straight move in the open.
+    PlanLeg(Leg),
+    /// Bounds its speed.
+    BoundLeg(Leg),
+    /// Follows it.
+    FollowLeg(Leg),
+    /// At the start of the next pass, whose first patch was collapsed: a tick of its own.
+    EnterPass,
+    /// On a pass.
+    FollowPass,
+    /// The sequence is over.
+    Done,
 }
 
 /// A leg in the open, on the way to the goal.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Way {
-    Up,
-    Over,
-    Down,
+enum Leg {
+    Retract,
+    Traverse,
+    Plunge,
 }
 
 /// What the legs in the open lead to.
@@ -55,7 +59,7 @@ enum Goal {
     /// Where the first run began.
     Home,
     /// The safe height, above where the tool is.
-    Clear,
+    SafeHeight,
 }
 
 /// What a tick came to.
@@ -71,7 +75,7 @@ pub(crate) enum Outcome {
 
 /// The course of a job.
 #[derive(Clone, Debug)]
-pub(crate) struct Course {
+pub(crate) struct Sequencer {
     phase: Phase,
     goal: Goal,
     lookahead: Lookahead,
@@ -83,8 +87,8 @@ pub(crate) struct Course {
     /// What was found wrong with the next pass: for when the tool gets there.
     pending: Option<Fault>,
     profile: Profile,
-    leg: Leg,
-    step: Step,
+    straight: StraightMove,
+    step_over: BoundaryStepOver,
     /// Speed that is wanted of a leg or a step as a rule, quanta a period.
     usual: f32,
     /// Where the tool is, once that is known.
@@ -99,10 +103,10 @@ const fn both(plans: &mut [PassPlan; 2], second: bool) -> (&mut PassPlan, &mut P
     if second { (other, one) } else { (one, other) }
 }
 
-impl Course {
+impl Sequencer {
     /// Before anything.
     pub(crate) const START: Self = Self {
-        phase: Phase::End,
+        phase: Phase::Done,
         goal: Goal::Pass,
         lookahead: Lookahead::START,
         plans: [PassPlan::NONE; 2],
@@ -110,24 +114,24 @@ impl Course {
         on_surface: false,
         pending: None,
         profile: Profile::START,
-        leg: Leg::NONE,
-        step: Step::NONE,
+        straight: StraightMove::NONE,
+        step_over: BoundaryStepOver::NONE,
         usual: 0.0,
         at: None,
         cell: 0,
     };
 
     /// To the beginning of the job, from where the tool is.
-    pub(crate) fn restart(&mut self, job: &Job<'_>, axes: &Axes) {
+    pub(crate) fn restart(&mut self, job: &Job<'_>, axes: &AxisLimits) {
         self.at.get_or_insert(axes.home_nm);
-        self.phase = Phase::Wait;
+        self.phase = Phase::AwaitPlan;
         self.second = false;
         self.on_surface = false;
         self.pending = None;
         self.profile.begin(1);
         self.lookahead.restart();
         let (_, next) = both(&mut self.plans, self.second);
-        self.lookahead.begin(job, 0, Place::default(), next);
+        self.lookahead.begin(job, 0, SpanParameter::default(), next);
     }
 
     /// Where the tool is, nm, once that is known.
@@ -143,36 +147,36 @@ impl Course {
     /// Whether the tool stands, and will while no speed is wanted.
     pub(crate) const fn is_at_rest(&self) -> bool {
         match self.phase {
-            Phase::Step | Phase::Leg(_) | Phase::Pass => self.profile.is_at_rest(),
-            Phase::Wait
-            | Phase::StepPlan
-            | Phase::LegPlan(_)
-            | Phase::LegBounds(_)
-            | Phase::Enter
-            | Phase::End => true,
+            Phase::StepOver | Phase::FollowLeg(_) | Phase::FollowPass => self.profile.is_at_rest(),
+            Phase::AwaitPlan
+            | Phase::PlanStepOver
+            | Phase::PlanLeg(_)
+            | Phase::BoundLeg(_)
+            | Phase::EnterPass
+            | Phase::Done => true,
         }
     }
 
     /// Whether the tool is between passes.
     pub(crate) const fn is_link(&self) -> bool {
-        !matches!(self.phase, Phase::Pass)
+        !matches!(self.phase, Phase::FollowPass)
     }
 
     /// Pass, path and side place of what was found wrong with the next pass, if that is what stopped the run.
-    pub(crate) fn place(&self) -> Option<(u32, Place, Place)> {
+    pub(crate) fn fault_position(&self) -> Option<(u32, SpanParameter, SpanParameter)> {
         let [one, other] = &self.plans;
         let next = if self.second { one } else { other };
-        self.pending.map(|_| self.lookahead.place(next))
+        self.pending.map(|_| self.lookahead.surface_position(next))
     }
 
-    /// From standstill, up to the safe height, and no further. Where the surface does not face up there is no way, and the tool stays.
-    pub(crate) fn leave(&mut self, run: &Run) {
+    /// From standstill, up to the safe height, and no further. Where the surface does not face up there is no leg, and the tool stays.
+    pub(crate) fn retract(&mut self, run: &Run) {
         let is_free = self.is_link() || run.faces_up();
-        self.goal = Goal::Clear;
+        self.goal = Goal::SafeHeight;
         self.phase = if is_free {
-            Phase::LegPlan(Way::Up)
+            Phase::PlanLeg(Leg::Retract)
         } else {
-            Phase::End
+            Phase::Done
         };
     }
 
@@ -185,37 +189,37 @@ impl Course {
     pub(crate) fn tick(
         &mut self,
         job: &Job<'_>,
-        axes: &Axes,
+        axes: &AxisLimits,
         run: &mut Run,
         share: f32,
         last: &mut Sample,
     ) -> Result<Outcome> {
         let was_link = self.is_link();
         match self.phase {
-            Phase::Pass => self.on_pass(job, axes, run, share, last)?,
-            Phase::Leg(way) => self.on_leg(way, job, run, share, last)?,
-            Phase::Step => self.on_step(job, run, share, last)?,
-            Phase::Wait => {
-                self.wait(job, axes)?;
+            Phase::FollowPass => self.follow_pass(job, axes, run, share, last)?,
+            Phase::FollowLeg(leg) => self.follow_leg(leg, job, run, share, last)?,
+            Phase::StepOver => self.follow_step_over(job, run, share, last)?,
+            Phase::AwaitPlan => {
+                self.await_plan(job, axes)?;
                 match self.at {
                     Some(at) if !self.on_surface => run.off_surface(at, 0.0, last),
                     _ => run.stand(last),
                 }
             }
-            Phase::StepPlan => {
-                self.plan_step(job, axes, run, last)?;
+            Phase::PlanStepOver => {
+                self.plan_step_over(job, axes, run, last)?;
             }
-            Phase::LegPlan(way) => self.plan_leg(way, job, axes, run, last)?,
-            Phase::LegBounds(way) => {
+            Phase::PlanLeg(leg) => self.plan_leg(leg, job, axes, run, last)?,
+            Phase::BoundLeg(leg) => {
                 let (now, _) = both(&mut self.plans, self.second);
                 if now.plan.work(CELLS_STANDING) {
                     self.profile.begin(now.plan.window);
-                    self.phase = Phase::Leg(way);
+                    self.phase = Phase::FollowLeg(leg);
                 }
                 run.stand(last);
             }
-            Phase::Enter => self.begin_pass(job, run, last)?,
-            Phase::End => return Ok(Outcome::Finished),
+            Phase::EnterPass => self.begin_pass(job, run, last)?,
+            Phase::Done => return Ok(Outcome::Finished),
         }
         self.at = Some(last.cl_nm);
         // The last sample of a pass is one of it, and so is the first.
@@ -228,7 +232,7 @@ impl Course {
 
     /// Some portions of the look ahead, and on when it is done.
     #[inline(never)]
-    fn wait(&mut self, job: &Job<'_>, axes: &Axes) -> Result<()> {
+    fn await_plan(&mut self, job: &Job<'_>, axes: &AxisLimits) -> Result<()> {
         for _ in 0..PORTIONS_WAITING {
             // A patch is a tick's work.
             let is_patch = self.lookahead.makes_patch();
@@ -245,18 +249,18 @@ impl Course {
         }
         let (now, next) = both(&mut self.plans, self.second);
         self.phase = if self.on_surface && job.header.pattern == Pattern::Zigzag {
-            self.step = Step::new(job, &run_end(job, now), next.side);
-            Phase::StepPlan
+            self.step_over = BoundaryStepOver::new(job, &last_patch(job, now), next.side);
+            Phase::PlanStepOver
         } else {
-            check_up(next.up[0] && (now.up[1] || !self.on_surface))?;
+            check_faces_up(next.faces_up[0] && (now.faces_up[1] || !self.on_surface))?;
             self.goal = Goal::Pass;
-            Phase::LegPlan(Way::Up)
+            Phase::PlanLeg(Leg::Retract)
         };
         Ok(())
     }
 
     /// One portion of the look ahead.
-    fn look_ahead(&mut self, job: &Job<'_>, axes: &Axes) {
+    fn look_ahead(&mut self, job: &Job<'_>, axes: &AxisLimits) {
         if self.pending.is_some() || self.lookahead.is_done() {
             return;
         }
@@ -268,9 +272,9 @@ impl Course {
     #[inline(never)]
     fn enter_pass(&mut self, job: &Job<'_>, run: &mut Run, last: &mut Sample) -> Result<()> {
         let (_, next) = both(&mut self.plans, self.second);
-        run.enter(job, next.pass, next.side)?;
+        run.enter_pass(job, next.pass, next.side)?;
         run.stand(last);
-        self.phase = Phase::Enter;
+        self.phase = Phase::EnterPass;
         Ok(())
     }
 
@@ -281,7 +285,7 @@ impl Course {
         run.begin(next.interval, last)?;
         self.second = !self.second;
         self.on_surface = true;
-        self.phase = Phase::Pass;
+        self.phase = Phase::FollowPass;
         self.cell = 0;
         let (now, next) = both(&mut self.plans, self.second);
         self.profile.begin(now.plan.window);
@@ -291,10 +295,10 @@ impl Course {
         Ok(())
     }
 
-    fn on_pass(
+    fn follow_pass(
         &mut self,
         job: &Job<'_>,
-        axes: &Axes,
+        axes: &AxisLimits,
         run: &mut Run,
         share: f32,
         last: &mut Sample,
@@ -315,7 +319,7 @@ impl Course {
                 true
             } else if moved > 0 && run.is_along() {
                 let is_light = run.move_by(job, as_f32(moved) / period, last)?;
-                self.settle_place(job, run);
+                self.correct_progress(job, run);
                 if is_light {
                     self.look_ahead(job, axes);
                 }
@@ -329,23 +333,26 @@ impl Course {
         if is_over {
             let (now, _) = both(&mut self.plans, self.second);
             self.phase = if now.next.is_some() {
-                Phase::Wait
+                Phase::AwaitPlan
             } else {
-                check_up(now.up[1])?;
+                check_faces_up(now.faces_up[1])?;
                 self.goal = Goal::Home;
-                Phase::LegPlan(Way::Up)
+                Phase::PlanLeg(Leg::Retract)
             };
         }
         Ok(())
     }
 
     /// The arc up to a station is known from the plan: what adds up between stations does not go on.
-    fn settle_place(&mut self, job: &Job<'_>, run: &Run) {
+    fn correct_progress(&mut self, job: &Job<'_>, run: &Run) {
         let (now, _) = both(&mut self.plans, self.second);
-        let Some(cell) = run.cell(job, now.parts).filter(|cell| *cell != self.cell) else {
+        let Some(cell) = run
+            .cell(job, now.cells_per_patch)
+            .filter(|cell| *cell != self.cell)
+        else {
             return;
         };
-        let Some(arc_mm) = run.since_station(now.parts, now.part) else {
+        let Some(arc_mm) = run.since_station(now.cells_per_patch, now.cell_fraction) else {
             return;
         };
         self.cell = cell;
@@ -356,9 +363,9 @@ impl Course {
     #[inline(never)]
     fn plan_leg(
         &mut self,
-        way: Way,
+        leg: Leg,
         job: &Job<'_>,
-        axes: &Axes,
+        axes: &AxisLimits,
         run: &mut Run,
         last: &mut Sample,
     ) -> Result<()> {
@@ -367,48 +374,48 @@ impl Course {
         let [x, y, z] = match self.goal {
             Goal::Pass => next.ends[0],
             Goal::Home => axes.home_nm,
-            Goal::Clear => from,
+            Goal::SafeHeight => from,
         };
         let height = from[2].max(axes.safe_z_nm);
-        let to = match way {
-            Way::Up => [from[0], from[1], height],
-            Way::Over => [x, y, from[2]],
-            Way::Down => [x, y, z],
+        let to = match leg {
+            Leg::Retract => [from[0], from[1], height],
+            Leg::Traverse => [x, y, from[2]],
+            Leg::Plunge => [x, y, z],
         };
         check_travel(axes, &to)?;
-        let slow_mm = if way == Way::Down && self.goal == Goal::Pass {
+        let slow_mm = if leg == Leg::Plunge && self.goal == Goal::Pass {
             axes.plunge_mm
         } else {
             0.0
         };
         let feed = job.header.feed_mm_s;
-        if let Some((leg, usual)) =
-            Leg::new(from, to, slow_mm, feed, axes, job.header.period_s, &mut now.plan)
+        if let Some((straight, usual)) =
+            StraightMove::new(from, to, slow_mm, feed, axes, job.header.period_s, &mut now.plan)
         {
-            (self.leg, self.usual) = (leg, usual);
-            self.phase = Phase::LegBounds(way);
+            (self.straight, self.usual) = (straight, usual);
+            self.phase = Phase::BoundLeg(leg);
             run.stand(last);
             return Ok(());
         }
-        self.after_leg(way, job, run, last)
+        self.after_leg(leg, job, run, last)
     }
 
     /// Behind a leg, the next one; behind the last, what it led to.
-    fn after_leg(&mut self, way: Way, job: &Job<'_>, run: &mut Run, last: &mut Sample) -> Result<()> {
-        self.phase = match (way, self.goal) {
-            (Way::Up, Goal::Clear) | (Way::Down, Goal::Home | Goal::Clear) => Phase::End,
-            (Way::Up, _) => Phase::LegPlan(Way::Over),
-            (Way::Over, _) => Phase::LegPlan(Way::Down),
-            (Way::Down, Goal::Pass) => return self.enter_pass(job, run, last),
+    fn after_leg(&mut self, leg: Leg, job: &Job<'_>, run: &mut Run, last: &mut Sample) -> Result<()> {
+        self.phase = match (leg, self.goal) {
+            (Leg::Retract, Goal::SafeHeight) | (Leg::Plunge, Goal::Home | Goal::SafeHeight) => Phase::Done,
+            (Leg::Retract, _) => Phase::PlanLeg(Leg::Traverse),
+            (Leg::Traverse, _) => Phase::PlanLeg(Leg::Plunge),
+            (Leg::Plunge, Goal::Pass) => return self.enter_pass(job, run, last),
         };
         run.stand(last);
         Ok(())
     }
 
     #[inline(never)]
-    fn on_leg(
+    fn follow_leg(
         &mut self,
-        way: Way,
+        leg: Leg,
         job: &Job<'_>,
         run: &mut Run,
         share: f32,
@@ -416,27 +423,33 @@ impl Course {
     ) -> Result<()> {
         let (now, _) = both(&mut self.plans, self.second);
         if self.profile.is_done(&now.plan) {
-            return self.after_leg(way, job, run, last);
+            return self.after_leg(leg, job, run, last);
         }
         let moved = self.profile.tick(&now.plan, self.usual * share.at_most(1.0));
-        let at = self.leg.at(self.profile.place(), &now.plan);
+        let at = self.straight.position(self.profile.place(), &now.plan);
         let speed = as_f32(moved) / (QUANTA_PER_MM * job.header.period_s);
         run.off_surface(at, speed, last);
         Ok(())
     }
 
     #[inline(never)]
-    fn plan_step(&mut self, job: &Job<'_>, axes: &Axes, run: &mut Run, last: &mut Sample) -> Result<()> {
+    fn plan_step_over(
+        &mut self,
+        job: &Job<'_>,
+        axes: &AxisLimits,
+        run: &mut Run,
+        last: &mut Sample,
+    ) -> Result<()> {
         let (now, _) = both(&mut self.plans, self.second);
         let patch = &mut self.lookahead.patch;
-        match self.step.work(job, axes, patch, &top(job), &mut now.plan)? {
+        match self.step_over.work(job, axes, patch, &top(job), &mut now.plan)? {
             None => return self.enter_pass(job, run, last),
             Some(false) => {}
             Some(true) => {
-                self.phase = Phase::Step;
+                self.phase = Phase::StepOver;
                 self.profile.begin(now.plan.window);
                 self.usual =
-                    self.step.per_contact() * job.header.feed_mm_s * job.header.period_s * QUANTA_PER_MM;
+                    self.step_over.per_contact() * job.header.feed_mm_s * job.header.period_s * QUANTA_PER_MM;
             }
         }
         run.stand(last);
@@ -444,15 +457,23 @@ impl Course {
     }
 
     #[inline(never)]
-    fn on_step(&mut self, job: &Job<'_>, run: &mut Run, share: f32, last: &mut Sample) -> Result<()> {
+    fn follow_step_over(
+        &mut self,
+        job: &Job<'_>,
+        run: &mut Run,
+        share: f32,
+        last: &mut Sample,
+    ) -> Result<()> {
         let (now, _) = both(&mut self.plans, self.second);
         if self.profile.is_done(&now.plan) {
             return self.enter_pass(job, run, last);
         }
         let moved = self.profile.tick(&now.plan, self.usual * share);
         let patch = &mut self.lookahead.patch;
-        let located = self.step.at(job, patch, self.profile.place(), &now.plan)?;
-        let speed = as_f32(moved) / (QUANTA_PER_MM * job.header.period_s * self.step.per_contact());
+        let located = self
+            .step_over
+            .position(job, patch, self.profile.place(), &now.plan)?;
+        let speed = as_f32(moved) / (QUANTA_PER_MM * job.header.period_s * self.step_over.per_contact());
         run.off_surface(located.cl_nm, speed, last);
         last.cc_nm = located.cc_nm;
         Ok(())
@@ -460,9 +481,9 @@ impl Course {
 }
 
 /// The last patch of a pass.
-fn run_end(job: &Job<'_>, pass: &PassPlan) -> Line {
+fn last_patch(job: &Job<'_>, pass: &PassPlan) -> PassPosition {
     let reversed = job.header.pattern == Pattern::Zigzag && pass.pass % 2 == 1;
-    Line {
+    PassPosition {
         side: pass.side,
         reversed,
         span: if reversed {
