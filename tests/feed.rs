@@ -180,12 +180,11 @@ fn within_limits((mut header, words): (Header, Vec<i32>), pattern: Pattern) -> (
     (header, words)
 }
 
+/// A wait in periods, a command, and the override from then on, percent.
+type Step = (u32, Option<Command>, u8);
+
 /// All samples of a run with these commands: what is done in which period, the later ones counted from the one before.
-fn scripted(
-    header: &Header,
-    words: &[i32],
-    commands: &[(u32, Option<Command>, u8)],
-) -> (Vec<Sample>, Box<Interpolator>) {
+fn scripted(header: &Header, words: &[i32], commands: &[Step]) -> (Vec<Sample>, Box<Interpolator>) {
     let mut core = machine(header, words);
     let mut samples = vec![*core.tick(Command::Start)];
     let mut feed_override = 100;
@@ -214,7 +213,7 @@ fn scripted(
     (samples, core)
 }
 
-fn command(wait_max: u32) -> impl Strategy<Value = (u32, Option<Command>, u8)> {
+fn command(wait_max: u32) -> impl Strategy<Value = Step> {
     let request = prop_oneof![
         3 => Just(None),
         4 => Just(Some(Command::Hold)),
@@ -230,12 +229,7 @@ fn command(wait_max: u32) -> impl Strategy<Value = (u32, Option<Command>, u8)> {
 
 /// Whatever is commanded, whenever: no limit is broken, the tool is on its path, what is held stands, and the passes lie where they lie in
 /// a run that nobody touches.
-fn check_commands(
-    header: &Header,
-    words: &[i32],
-    whole: &[SpanParameter],
-    commands: &[(u32, Option<Command>, u8)],
-) {
+fn check_commands(header: &Header, words: &[i32], whole: &[SpanParameter], commands: &[Step]) {
     let (samples, core) = scripted(header, words, commands);
     let axes = header.axes.as_ref().unwrap();
     let mut used = Use::default();
@@ -293,9 +287,7 @@ fn undisturbed_once(small: bool, zigzag: bool) -> &'static Undisturbed {
 }
 
 /// Commands, and the job that they are for, one in eight of which is large. Pauses are some of its time.
-fn sequence(
-    commands_max: usize,
-) -> impl Strategy<Value = (&'static Undisturbed, Vec<(u32, Option<Command>, u8)>)> {
+fn sequence(commands_max: usize) -> impl Strategy<Value = (&'static Undisturbed, Vec<Step>)> {
     (prop_oneof![1 => Just(false), 7 => Just(true)], any::<bool>()).prop_flat_map(move |(small, zigzag)| {
         let pause_max = if small { 400 } else { 3000 };
         let commands = proptest::collection::vec(command(pause_max), 0..commands_max);
@@ -352,7 +344,7 @@ fn a_leg_resumed_before_its_end_keeps_the_jerk() {
 fn a_job_interrupted_and_resumed_takes_the_same_path() {
     for zigzag in [false, true] {
         let (header, words, whole) = undisturbed_once(false, zigzag);
-        let interruptions: Vec<(u32, Option<Command>, u8)> = (0..60)
+        let interruptions: Vec<Step> = (0..60)
             .flat_map(|turn| {
                 let percent = [100, 0, 200, 35][turn as usize % 4];
                 [

@@ -266,10 +266,10 @@ pub(crate) fn angle(start: u32, extent_q31: u32, fraction: u64) -> u32 {
     start.wrapping_add((((fraction >> 32) * extent_q31 as u64 + (1 << 30)) >> 31) as u32)
 }
 
-/// Square root, correctly rounded; NaN below zero.
+/// Square root, correctly rounded; NaN below zero. By the FPU where the target has one for sure (an ABI that passes floats in its registers).
 #[inline(always)]
 #[must_use]
-#[cfg(target_arch = "arm")]
+#[cfg(all(target_arch = "arm", target_abi = "eabihf"))]
 #[allow(unsafe_code, reason = "the hardware square root has no stable intrinsic")]
 pub(crate) fn sqrt(value: f32) -> f32 {
     let mut bits = value.to_bits();
@@ -288,10 +288,11 @@ pub(crate) fn sqrt(value: f32) -> f32 {
     f32::from_bits(bits)
 }
 
-/// Square root, correctly rounded; NaN below zero.
+/// Square root, correctly rounded; NaN below zero. In software or by the target's own instruction: IEEE 754 leaves one result only, so the
+/// bits are those of the FPU.
 #[inline(always)]
 #[must_use]
-#[cfg(not(target_arch = "arm"))]
+#[cfg(not(all(target_arch = "arm", target_abi = "eabihf")))]
 pub(crate) fn sqrt(value: f32) -> f32 {
     libm::sqrtf(value)
 }
@@ -412,6 +413,60 @@ mod tests {
                 (got / exact - 1.0).abs() < 2_f64.powi(-28),
                 "weight {weight}: {got} for {exact}"
             );
+        }
+    }
+
+    /// The portable square root against the FPU of the machine that runs the test, every binade and both ends of the range; the FPU of the
+    /// Cortex-M4F against the same figures: `tests/qemu.rs`, by the bits of every sample.
+    #[test]
+    fn portable_square_root_has_the_bits_of_the_fpu() {
+        let random = (0..4_000_000_u32).map(|n| n.wrapping_mul(2_654_435_769) >> 1);
+        let ends = [
+            0,
+            1,
+            2,
+            0x007f_ffff,
+            0x0080_0000,
+            0x7f7f_ffff,
+            0x7f80_0000,
+            0x8000_0000,
+        ];
+        for bits in random.chain(ends) {
+            let value = f32::from_bits(bits);
+            let (portable, fpu) = (libm::sqrtf(value), std::primitive::f32::sqrt(value));
+            assert!(
+                portable.to_bits() == fpu.to_bits() || portable.is_nan() && fpu.is_nan(),
+                "{value:e}: {portable:e}, {fpu:e}"
+            );
+        }
+    }
+
+    /// The products in plain integers, as a target without DSP instructions has them, in halves of 16 bits: the same bits.
+    #[test]
+    fn products_need_no_dsp_instructions() {
+        let by_halves = |a: i32, b: i32| {
+            let (a1, b1) = (i64::from(a >> 16), i64::from(b >> 16));
+            let (a0, b0) = (i64::from(a & 0xffff), i64::from(b & 0xffff));
+            let middle = a1 * b0 + a0 * b1;
+            let whole = (a1 * b1 << 32) + (middle << 16) + a0 * b0;
+            ((whole + (1 << 31)) >> 32) as i32
+        };
+        let mut state = 1_u32;
+        let mut next = || {
+            state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+            state.cast_signed()
+        };
+        for _ in 0..1_000_000 {
+            let (a, b) = (next(), next());
+            assert_eq!(mul_hi(a, b), by_halves(a, b), "{a} {b}");
+        }
+        for (a, b) in [
+            (i32::MIN, i32::MIN),
+            (i32::MIN, i32::MAX),
+            (i32::MAX, i32::MAX),
+            (-1, 1),
+        ] {
+            assert_eq!(mul_hi(a, b), by_halves(a, b), "{a} {b}");
         }
     }
 
