@@ -448,7 +448,7 @@ mod tests {
             let (a1, b1) = (i64::from(a >> 16), i64::from(b >> 16));
             let (a0, b0) = (i64::from(a & 0xffff), i64::from(b & 0xffff));
             let middle = a1 * b0 + a0 * b1;
-            let whole = (a1 * b1 << 32) + (middle << 16) + a0 * b0;
+            let whole = ((a1 * b1) << 32) + (middle << 16) + a0 * b0;
             ((whole + (1 << 31)) >> 32) as i32
         };
         let mut state = 1_u32;
