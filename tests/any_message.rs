@@ -1,22 +1,22 @@
 //! Messages of any content, for properties.
 
 use interp_core::{
-    job::{Axes, Header, Pattern, Spacing, SurfaceKind, ToolSide},
-    sample::{Place, Sample, State},
+    job::{AxisLimits, Header, Pattern, Spacing, SurfaceKind, ToolSide},
+    sample::{Sample, SpanParameter, State},
     steps::{AxisSteps, StepConfig},
 };
 use proptest::prelude::*;
 use protocol::message::{
-    CHUNK_WORDS_MAX, Capabilities, Clock, Configuration, Description, FaultReport, HostGone, InputLines,
-    PassDigest, Reason, Reply, Report, Request, ResetCause, SAMPLES_MAX, SafetyStatus, SampleRecord, Status,
-    Words,
+    CHUNK_WORDS_MAX, Capabilities, Clock, Configuration, Description, FaultReport, InputLines,
+    LinkTimeoutAction, PassDigest, Reason, Reply, Report, Request, ResetCause, SAMPLES_MAX, SafetyStatus,
+    SampleRecord, Status, Words,
 };
 
 use super::{reasons, requests};
 
-fn place() -> impl Strategy<Value = Place> {
+fn place() -> impl Strategy<Value = SpanParameter> {
     let fraction = prop_oneof![Just(0), Just(u64::MAX), any::<u64>()];
-    (any::<u16>(), fraction).prop_map(|(span, fraction)| Place { span, fraction })
+    (any::<u16>(), fraction).prop_map(|(span, fraction)| SpanParameter { span, fraction })
 }
 
 fn real() -> impl Strategy<Value = f32> {
@@ -25,9 +25,9 @@ fn real() -> impl Strategy<Value = f32> {
 
 prop_compose! {
     fn any_axes()(reals in prop::array::uniform11(real()), travel_nm in any::<[[i32; 2]; 3]>(), home_nm in any::<[i32; 3]>(),
-                  safe_z_nm: i32) -> Axes {
+                  safe_z_nm: i32) -> AxisLimits {
         let [vx, vy, vz, ax, ay, az, jx, jy, jz, chord_mm, plunge_mm] = reals;
-        Axes {
+        AxisLimits {
             velocity_mm_s: [vx, vy, vz],
             acceleration_mm_s2: [ax, ay, az],
             jerk_mm_s3: [jx, jy, jz],
@@ -68,9 +68,9 @@ fn any_report() -> impl Strategy<Value = Report> {
 }
 
 prop_compose! {
-    fn any_configuration()(homing_required: bool, hold: bool, host_gone_ticks: u32) -> Configuration {
-        let host_gone = if hold { HostGone::Hold } else { HostGone::Finish };
-        Configuration { homing_required, host_gone, host_gone_ticks }
+    fn any_configuration()(homing_required: bool, hold: bool, link_timeout_ticks: u32) -> Configuration {
+        let on_link_timeout = if hold { LinkTimeoutAction::Hold } else { LinkTimeoutAction::Finish };
+        Configuration { homing_required, on_link_timeout, link_timeout_ticks }
     }
 }
 
@@ -83,8 +83,8 @@ prop_compose! {
                     configuration in any_configuration(),
                     reset in prop::sample::select(&[ResetCause::Unknown, ResetCause::Pin, ResetCause::LowPower]))
         -> SafetyStatus {
-        let [homed, drives_on, host_gone] = flags;
-        SafetyStatus { lines, latched, homed, drives_on, host_gone, feed_override, configuration, reset }
+        let [homed, drives_on, link_timed_out] = flags;
+        SafetyStatus { lines, latched, homed, drives_on, link_timed_out, feed_override, configuration, reset }
     }
 }
 
@@ -124,9 +124,9 @@ pub(crate) fn any_request() -> impl Strategy<Value = Request> {
 prop_compose! {
     fn any_sample()(state in prop::sample::select(&State::ALL[..]), places in [place(), place()],
                     counts in any::<[u32; 2]>(), cc_nm in any::<[i32; 3]>(), cl_nm in any::<[i32; 3]>(),
-                    feed_mm_s in real(), density in real()) -> Sample {
+                    feed_mm_s in real(), inv_interval_sq in real()) -> Sample {
         let ([tick, pass], [path, side]) = (counts, places);
-        Sample { tick, state, pass, path, side, feed_mm_s, cc_nm, cl_nm, density }
+        Sample { tick, state, pass, path, side, feed_mm_s, cc_nm, cl_nm, inv_interval_sq }
     }
 }
 
@@ -147,7 +147,7 @@ prop_compose! {
             side: at.side,
             samples,
             digest,
-            interval: at.density,
+            interval: at.inv_interval_sq,
             deadline_misses,
             tick_cycles_max,
             samples_lost,

@@ -2,7 +2,7 @@
 #![allow(clippy::unwrap_used, reason = "a test may fail by panic")]
 
 use integration_tests::golden::{Case, cases};
-use interp_core::Place;
+use interp_core::SpanParameter;
 use job::{Along, Job};
 use machine::Machine;
 use machine::prepare::{Axis, Prepared, prepare};
@@ -32,7 +32,7 @@ fn job(case: &Case) -> Job {
 }
 
 /// The place of a parameter, to 2^-53 of its span.
-fn place(axis: &Axis, parameter: f64) -> Place {
+fn place(axis: &Axis, parameter: f64) -> SpanParameter {
     let span = axis.breaks[1..axis.breaks.len() - 1].partition_point(|end| *end <= parameter);
     let (start, end) = (axis.breaks[span], axis.breaks[span + 1]);
     let fraction = (parameter - start) / (end - start);
@@ -41,13 +41,13 @@ fn place(axis: &Axis, parameter: f64) -> Place {
     } else {
         (fraction * 2_f64.powi(64)) as u64
     };
-    Place {
+    SpanParameter {
         span: u16::try_from(span).unwrap(),
         fraction,
     }
 }
 
-fn places(prepared: &Prepared, u: f64, v: f64) -> (Place, Place) {
+fn places(prepared: &Prepared, u: f64, v: f64) -> (SpanParameter, SpanParameter) {
     match prepared.along {
         Along::U => (place(&prepared.path, u), place(&prepared.side, v)),
         Along::V => (place(&prepared.path, v), place(&prepared.side, u)),
@@ -63,7 +63,7 @@ fn every_golden_point() {
         let machine = Machine::load(&prepared).unwrap();
         for point in &case.points {
             let (path, side) = places(&prepared, point.u, point.v);
-            let probe = machine.probe(path, side).unwrap();
+            let probe = machine.evaluate(path, side).unwrap();
             let distance = |nm: [i32; 3], mm: [f64; 3]| {
                 nm.iter()
                     .zip(mm)

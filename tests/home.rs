@@ -3,7 +3,7 @@
 
 use controller::{in_process::Board, safety::DEBOUNCE_TICKS};
 use integration_tests::{HELLO, Host, MAKE_READY, dome, upload};
-use interp_core::{Axes, Header, State, StepConfig};
+use interp_core::{AxisLimits, Header, State, StepConfig};
 use protocol::message::{Configuration, InputLines, Reason, Reply, Report, Request, Status};
 
 const WORDS: usize = 64;
@@ -16,7 +16,7 @@ const ELSEWHERE_NM: [i32; 3] = [1_000_000, 0, SAFE_Z_NM];
 fn within_limits(home_nm: [i32; 3]) -> (Header, Vec<i32>) {
     let (mut header, words) = dome();
     header.feed_mm_s = 60.0;
-    header.axes = Some(Axes {
+    header.axes = Some(AxisLimits {
         velocity_mm_s: [100.0; 3],
         acceleration_mm_s2: [2000.0; 3],
         jerk_mm_s3: [50_000.0; 3],
@@ -177,7 +177,7 @@ fn elsewhere(home_nm: [i32; 3], stands_nm: Option<[i32; 3]>) -> Result<(), Reaso
 fn a_home_is_where_the_pulses_count_from() {
     let mut desk = Desk::homed(HOME_NM);
     assert_eq!(desk.steps(), in_steps(HOME_NM));
-    assert_eq!(desk.board.real_time().steps().unwrap().told(), HOME_NM);
+    assert_eq!(desk.board.real_time().steps().unwrap().target_nm(), HOME_NM);
     // Other steps a millimetre keep the place.
     let mut config = StepConfig::DEFAULT;
     config.axes[2].steps = 200;

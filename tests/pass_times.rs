@@ -5,7 +5,7 @@
 use std::collections::BTreeMap;
 use std::path::Path;
 
-use interp_core::{Place, State};
+use interp_core::{SpanParameter, State};
 use job::AxisLimits;
 use job::{Along, Job, Pattern};
 use machine::Machine;
@@ -50,7 +50,7 @@ struct Ran {
 /// Runs a job until the end of its pass `last`.
 fn run(job: &Job, last: u32) -> BTreeMap<u32, Ran> {
     let prepared = prepare(job).unwrap();
-    let mut passes = BTreeMap::<u32, (Place, u32)>::new();
+    let mut passes = BTreeMap::<u32, (SpanParameter, u32)>::new();
     let mut machine = Machine::load(&prepared).unwrap();
     machine
         .run(|sample| {
@@ -60,8 +60,8 @@ fn run(job: &Job, last: u32) -> BTreeMap<u32, Ran> {
             sample.pass <= last
         })
         .unwrap();
-    let ran = |(pass, (side, samples)): (u32, (Place, u32))| {
-        let [u, v] = prepared.parameters(Place::default(), side);
+    let ran = |(pass, (side, samples)): (u32, (SpanParameter, u32))| {
+        let [u, v] = prepared.parameters(SpanParameter::default(), side);
         let ran = Ran {
             side: if job.along == Along::U { v } else { u },
             time_s: f64::from(samples - 1) * job.machine.period_s(),

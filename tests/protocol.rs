@@ -11,15 +11,15 @@ use any_message::{any_reply, any_request};
 use controller::link::Link;
 use integration_tests::{HELLO, Mock, frame, is_bad_frame};
 use interp_core::{
-    job::{Axes, Header, Pattern, Spacing, SurfaceKind, ToolSide},
-    sample::{Place, Sample, State},
+    job::{AxisLimits, Header, Pattern, Spacing, SurfaceKind, ToolSide},
+    sample::{Sample, SpanParameter, State},
     steps::{AxisSteps, StepConfig},
 };
 use proptest::prelude::*;
 use protocol::{
     frame::{Decoder, FRAME_MAX, FrameError, write_reply},
     message::{
-        Batch, Capabilities, Clock, Configuration, Description, FaultReport, HostGone, InputLines,
+        Batch, Capabilities, Clock, Configuration, Description, FaultReport, InputLines, LinkTimeoutAction,
         PassDigest, Reason, Reply, Report, Request, ResetCause, SafetyStatus, SampleRecord, Status, Words,
         read_reply, read_request,
     },
@@ -51,8 +51,8 @@ fn steps() -> StepConfig {
 }
 
 /// What the axes of a machine with limits can do.
-fn axes() -> Axes {
-    Axes {
+fn axes() -> AxisLimits {
+    AxisLimits {
         velocity_mm_s: [100.0, 80.0, 50.0],
         acceleration_mm_s2: [1000.0, 800.0, 500.0],
         jerk_mm_s3: [20_000.0, 16_000.0, 10_000.0],
@@ -111,15 +111,15 @@ fn requests() -> Vec<Request> {
 
 const CONFIGURATION: Configuration = Configuration {
     homing_required: false,
-    host_gone: HostGone::Hold,
-    host_gone_ticks: 500,
+    on_link_timeout: LinkTimeoutAction::Hold,
+    link_timeout_ticks: 500,
 };
 
-const PATH: Place = Place {
+const PATH: SpanParameter = SpanParameter {
     span: 1,
     fraction: 1 << 63,
 };
-const SIDE: Place = Place {
+const SIDE: SpanParameter = SpanParameter {
     span: 130,
     fraction: u64::MAX,
 };
@@ -134,7 +134,7 @@ fn sample() -> Sample {
         feed_mm_s: 10.0,
         cc_nm: [1, -2, 3_000_000],
         cl_nm: [i32::MAX, i32::MIN, 0],
-        density: f32::INFINITY,
+        inv_interval_sq: f32::INFINITY,
     }
 }
 
@@ -161,7 +161,7 @@ fn status() -> Status {
             latched: InputLines(0x201),
             homed: false,
             drives_on: true,
-            host_gone: true,
+            link_timed_out: true,
             feed_override: 150,
             configuration: CONFIGURATION,
             reset: ResetCause::Watchdog,

@@ -11,7 +11,9 @@ use machine::remote::qemu::{self, Qemu};
 use machine::remote::session::Event;
 use machine::remote::{RemoteError, Session};
 use protocol::digest::Digest;
-use protocol::message::{Clock, Configuration, HostGone, InputLines, Reason, Report, Request, Status};
+use protocol::message::{
+    Clock, Configuration, InputLines, LinkTimeoutAction, Reason, Report, Request, Status,
+};
 use std::path::{Path, PathBuf};
 use std::sync::OnceLock;
 
@@ -303,8 +305,8 @@ fn a_run_whose_host_is_gone_is_held_on_the_board() {
     let job = job("sphere_cap");
     let (_qemu, mut session) = board();
     let configuration = Configuration {
-        host_gone: HostGone::Hold,
-        host_gone_ticks: 2000,
+        on_link_timeout: LinkTimeoutAction::Hold,
+        link_timeout_ticks: 2000,
         ..Configuration::DEFAULT
     };
     operate::make_ready(&mut session, &Setup::simulated(configuration)).unwrap();
@@ -322,7 +324,7 @@ fn a_run_whose_host_is_gone_is_held_on_the_board() {
             }
         };
         assert_eq!((status.state, status.fault), (State::Held, None));
-        assert!(status.safety.host_gone && status.samples > before);
+        assert!(status.safety.link_timed_out && status.samples > before);
         let mut digest = Digest::new();
         Machine::load(&job)
             .unwrap()

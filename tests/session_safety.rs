@@ -1,12 +1,12 @@
 //! Drives, home, inputs and override in a session.
 
-use controller::{machine::Command, safety::Order};
+use controller::{machine::Instruction, safety::Order};
 use integration_tests::{Call, SAFE};
 use interp_core::{
     fault::{Fault, FaultKind},
     sample::State,
 };
-use protocol::message::{Configuration, HostGone, InputLines, Reason, Request, SafetyStatus};
+use protocol::message::{Configuration, InputLines, LinkTimeoutAction, Reason, Request, SafetyStatus};
 
 use super::Line;
 
@@ -71,8 +71,8 @@ fn a_start_that_is_not_safe_is_refused_with_the_reason() {
 fn orders_go_to_the_machine_and_its_reasons_back() {
     let configuration = Configuration {
         homing_required: false,
-        host_gone: HostGone::Hold,
-        host_gone_ticks: 500,
+        on_link_timeout: LinkTimeoutAction::Hold,
+        link_timeout_ticks: 500,
     };
     let home_nm = [1, -2, i32::MAX];
     let table = [
@@ -101,7 +101,7 @@ fn an_override_has_its_range_and_inputs_are_simulated_only_without_pins() {
             line.accepted(&Request::Override { percent });
             assert_eq!(
                 line.mock.calls.last(),
-                Some(&Call::Send(Command::Override { percent }))
+                Some(&Call::Send(Instruction::Override { percent }))
             );
         }
         for percent in [201, 255] {

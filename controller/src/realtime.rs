@@ -5,7 +5,7 @@
 //! pass copies nothing, and builds no event but the sample where the host wants it.
 //! **Missed tick.** Counted; on a free clock while the tool moves it trips the run with
 //! [`FaultKind::DeadlineMissed`], because the tool stood still for a period in which the feed was commanded. The run stops
-//! along the path ([`Interpolator::trip`]).
+//! along the path ([`Interpolator::controlled_stop`]).
 //! **Tick over budget.** Its cycles are known to the next tick, which trips the run with [`FaultKind::TickOverBudget`] on the
 //! same terms: before ticks are missed.
 //! **Inputs.** Looked at in every tick of the timer, whether time passes or not; what they do is in [`crate::safety`].
@@ -15,17 +15,18 @@ mod run;
 mod start;
 
 use interp_core::{
+    command::{Command, Inputs},
     fault::{Fault, FaultKind, Result},
-    interpolator::{Inputs, Interpolator, Request},
+    interpolator::Interpolator,
     job::{Header, STORE_WORDS},
     sample::{Sample, State},
     steps::{BUFFER_WORDS, CheckedSteps, Steps},
 };
 use protocol::message::{Clock, FaultReport, InputLines, Report, ResetCause, Status};
 
-use self::{control::Control, run::Run};
+use self::{control::Control, run::RunRecord};
 use crate::{
-    machine::{Command, Event, Events},
+    machine::{Event, Events, Instruction},
     safety::Stop,
 };
 
@@ -142,27 +143,27 @@ impl<S: AsRef<[i32]> + AsMut<[i32]>> RealTime<S> {
         let to = if moves(sample.state) {
             sample.cl_nm
         } else {
-            steps.told()
+            steps.target_nm()
         };
         if let Err(fault) = steps.step(to, slots) {
-            self.trip(fault);
+            self.controlled_stop(fault);
         }
     }
 
     /// Stops a run with a fault from outside, along its path.
     #[cold]
     #[inline(never)]
-    pub fn trip(&mut self, fault: Fault) {
+    pub fn controlled_stop(&mut self, fault: Fault) {
         if moves(self.interpolator.state()) {
-            self.interpolator.trip(fault);
+            self.interpolator.controlled_stop(fault);
         }
     }
 
-    /// Takes a command up, before the tick.
+    /// Executes an instruction, before the tick.
     #[cold]
     #[inline(never)]
-    pub fn obey(&mut self, command: Command, events: &mut impl Events) {
-        if !self.control.obey(command) {
+    pub fn obey(&mut self, instruction: Instruction, events: &mut impl Events) {
+        if !self.control.obey(instruction) {
             self.halt(events);
         }
     }
@@ -170,7 +171,7 @@ impl<S: AsRef<[i32]> + AsMut<[i32]>> RealTime<S> {
     /// One tick of the sample timer. In lockstep time stands still while there is no room for events, so that none is lost.
     #[inline]
     pub fn tick(&mut self, input: TickInput, events: &mut impl Events) {
-        if !self.control.safety.is_calm(input.lines) {
+        if !self.control.safety.is_unchanged(input.lines) {
             self.guard(input.lines, events);
         }
         let was_under_way = self.interpolator.state().is_under_way();
@@ -178,7 +179,7 @@ impl<S: AsRef<[i32]> + AsMut<[i32]>> RealTime<S> {
             && let Some(fault) = self.control.note_time(input)
             && moves(self.interpolator.state())
         {
-            self.interpolator.trip(fault);
+            self.interpolator.controlled_stop(fault);
         }
         if self.control.clock == Clock::Lockstep && !self.may_step(events) {
             return;
@@ -192,30 +193,34 @@ impl<S: AsRef<[i32]> + AsMut<[i32]>> RealTime<S> {
     fn guard(&mut self, lines: InputLines, events: &mut impl Events) {
         let under_way = self.interpolator.state().is_under_way();
         match self.control.safety.watch(lines, under_way) {
-            Some(Stop::Cut(fault)) => self.interpolator.cut(fault),
-            Some(Stop::Trip(fault)) => self.interpolator.trip(fault),
+            Some(Stop::Uncontrolled(fault)) => self.interpolator.uncontrolled_stop(fault),
+            Some(Stop::Controlled(fault)) => self.interpolator.controlled_stop(fault),
             None => {}
         }
         if !self.control.safety.drives_on() {
-            self.lose_place();
+            self.lose_position();
         }
         // Told here, because in lockstep no period may come that would tell it.
         if under_way && !self.interpolator.state().is_under_way() {
             self.control.safety.ending = true;
             // It meant the run that is over: an abort is not to acknowledge a fault that nobody has seen.
-            self.control.request = Request::None;
+            self.control.command = None;
         }
         if self.control.safety.ending {
             if self.control.clock == Clock::Free || events.has_room() {
                 self.control.safety.ending = false;
                 self.end_run(events);
             }
-            self.control.safety.look_again();
+            self.control.safety.recheck();
         }
         let state = self.interpolator.state();
-        let holds = self.control.request == Request::None && Request::Hold.is_allowed(state);
-        if self.control.safety.mind_silence(self.control.clock, state, holds) {
-            self.control.request = Request::Hold;
+        let holds = self.control.command.is_none() && Command::Hold.is_allowed(state);
+        if self
+            .control
+            .safety
+            .check_link_timeout(self.control.clock, state, holds)
+        {
+            self.control.command = Some(Command::Hold);
         }
     }
 
@@ -239,13 +244,13 @@ impl<S: AsRef<[i32]> + AsMut<[i32]>> RealTime<S> {
     /// Lets one period pass.
     #[inline]
     fn step(&mut self, was_under_way: bool, events: &mut impl Events) {
-        let mut request = core::mem::take(&mut self.control.request);
-        let starts = request == Request::Start;
-        if starts && request.is_allowed(self.interpolator.state()) {
-            request = self.begin();
+        let mut command = self.control.command.take();
+        let starts = command == Some(Command::Start);
+        if starts && Command::Start.is_allowed(self.interpolator.state()) {
+            command = self.begin();
         }
         let inputs = Inputs {
-            request,
+            command,
             feed_override: self.control.safety.status().feed_override,
         };
         let state = self.interpolator.tick(inputs).state;
@@ -314,7 +319,7 @@ impl<S: AsRef<[i32]> + AsMut<[i32]>> RealTime<S> {
         let last = self.interpolator.last();
         let fault = self.interpolator.fault();
         let (pass, path, side) = if fault.is_some() {
-            self.interpolator.place()
+            self.interpolator.surface_position()
         } else {
             (last.pass, last.path, last.side)
         };
@@ -364,13 +369,13 @@ impl<S: AsRef<[i32]> + AsMut<[i32]>> RealTime<S> {
         self.interpolator.last()
     }
 
-    /// Begins to load a job; a request that waits for a period meant the job before, and is dropped.
+    /// Begins to load a job; a command that waits for a period meant the job before, and is dropped.
     ///
     /// # Errors
     /// Those of [`Interpolator::load_begin`]; nothing changes then.
     pub fn load_begin(&mut self, header: &Header, words: u32) -> Result<()> {
         self.interpolator.load_begin(header, words)?;
-        self.control.request = Request::None;
+        self.control.command = None;
         Ok(())
     }
 
@@ -402,8 +407,8 @@ impl<S: AsRef<[i32]> + AsMut<[i32]>> RealTime<S> {
     /// Those of [`Interpolator::load_finish`].
     pub fn load_finish(&mut self) -> Result<()> {
         self.interpolator.load_finish()?;
-        self.control.request = Request::None;
-        self.control.run = Run::NEW;
+        self.control.command = None;
+        self.control.run = RunRecord::NEW;
         self.control.from_home = true;
         Ok(())
     }

@@ -1,8 +1,8 @@
 //! Inputs, drives, home, and a host that has gone: what may happen, and what has to stop.
 //!
 //! ```text
-//!  inputs ──► Debounce ──► Safety::watch ──► Stop::Cut   drives off, the run ends in this tick
-//!                              │         └─► Stop::Trip  the run slows down along its path
+//!  inputs ──► Debounce ──► Safety::watch ──► Stop::Uncontrolled   drives off, the run ends in this tick
+//!                              │         └─► Stop::Controlled  the run slows down along its path
 //!  Order (from the host) ──► Safety::obey
 //! ```
 //!
@@ -15,14 +15,15 @@
 //! Emergency stop and drive fault switch them off, and so does the host, but not under a run.
 //! **Home.** There are no encoders and no homing moves: the operator places the axes, switches the drives on, and
 //! declares where they stand. Without drives the axes may be moved by hand, so whatever switches the drives off loses the home.
-//! **Cost.** A tick in which the inputs are as before is one comparison and one count (`is_calm`).
+//! **Cost.** A tick in which the inputs are as before is one comparison and one count (`is_unchanged`).
 
 use interp_core::{
     fault::{Fault, FaultKind},
     sample::State,
 };
 use protocol::message::{
-    Clock, Configuration, HostGone, InputLines, OVERRIDE_MAX_PERCENT, Reason, ResetCause, SafetyStatus,
+    Clock, Configuration, InputLines, LinkTimeoutAction, OVERRIDE_MAX_PERCENT, Reason, ResetCause,
+    SafetyStatus,
 };
 
 /// Ticks in a row in which an input has to differ before it counts, and the emergency stop before it counts as released:
@@ -56,9 +57,9 @@ pub enum Order {
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) enum Stop {
     /// At once: nothing follows the path any more.
-    Cut(Fault),
+    Uncontrolled(Fault),
     /// Along the path.
-    Trip(Fault),
+    Controlled(Fault),
 }
 
 /// Eleven counters to three, side by side: bit n of both words is the count of input n.
@@ -102,7 +103,7 @@ pub(crate) struct Safety {
     /// The inputs that need nothing done; [`UNSETTLED`] where none do.
     settled: u32,
     /// Ticks until the host counts as gone.
-    patience: u32,
+    ticks_to_timeout: u32,
     status: SafetyStatus,
     debounce: Debounce,
     home_nm: [i32; 3],
@@ -113,7 +114,7 @@ pub(crate) struct Safety {
 impl Safety {
     pub(crate) const NEW: Self = Self {
         settled: 0,
-        patience: u32::MAX,
+        ticks_to_timeout: u32::MAX,
         status: SafetyStatus::DEFAULT,
         debounce: Debounce::NEW,
         home_nm: [0; 3],
@@ -144,12 +145,12 @@ impl Safety {
     /// Whether this tick has nothing to do here: the inputs are those that nothing more follows from, and the host may
     /// stay silent. Counts the tick.
     #[inline(always)]
-    pub(crate) const fn is_calm(&mut self, lines: InputLines) -> bool {
-        self.patience = self.patience.wrapping_sub(1);
-        lines.0 as u32 == self.settled && self.patience != 0
+    pub(crate) const fn is_unchanged(&mut self, lines: InputLines) -> bool {
+        self.ticks_to_timeout = self.ticks_to_timeout.wrapping_sub(1);
+        lines.0 as u32 == self.settled && self.ticks_to_timeout != 0
     }
 
-    /// Takes a tick's inputs in that [`Self::is_calm`] was not content with; what they do to a run that is under way.
+    /// Takes a tick's inputs in that [`Self::is_unchanged`] was not content with; what they do to a run that is under way.
     pub(crate) fn watch(&mut self, lines: InputLines, under_way: bool) -> Option<Stop> {
         let raw = lines.and(InputLines::ALL);
         self.debounce.assert(raw.and(InputLines::EMERGENCY_STOP).0);
@@ -169,21 +170,21 @@ impl Safety {
         }
         hindrance_of(steady).filter(|_| under_way).map(|fault| {
             if stops.is_none() {
-                Stop::Trip(fault)
+                Stop::Controlled(fault)
             } else {
-                Stop::Cut(fault)
+                Stop::Uncontrolled(fault)
             }
         })
     }
 
     /// Has [`Self::watch`] asked in the next tick, whatever the inputs are.
-    pub(crate) const fn look_again(&mut self) {
+    pub(crate) const fn recheck(&mut self) {
         self.settled = UNSETTLED;
     }
 
     /// A frame of the host arrived.
     pub(crate) const fn heard(&mut self) {
-        self.patience = match self.status.configuration.host_gone_ticks {
+        self.ticks_to_timeout = match self.status.configuration.link_timeout_ticks {
             0 => u32::MAX,
             ticks => ticks,
         };
@@ -191,28 +192,29 @@ impl Safety {
 
     /// After a tick that was not calm: whether the run is to be held now, because the host has been silent for too long.
     /// `holds`: whether the state takes a hold up.
-    pub(crate) fn mind_silence(&mut self, clock: Clock, state: State, holds: bool) -> bool {
-        if self.patience != 0 {
+    pub(crate) fn check_link_timeout(&mut self, clock: Clock, state: State, holds: bool) -> bool {
+        if self.ticks_to_timeout != 0 {
             return false;
         }
         self.heard();
-        if clock != Clock::Free || !state.is_under_way() || self.status.configuration.host_gone_ticks == 0 {
+        if clock != Clock::Free || !state.is_under_way() || self.status.configuration.link_timeout_ticks == 0
+        {
             return false;
         }
-        self.status.host_gone = true;
-        if self.status.configuration.host_gone == HostGone::Finish || state == State::Held {
+        self.status.link_timed_out = true;
+        if self.status.configuration.on_link_timeout == LinkTimeoutAction::Finish || state == State::Held {
             return false;
         }
         if !holds {
             // On its way from one state to another: it is asked again in the next tick.
-            self.patience = 1;
+            self.ticks_to_timeout = 1;
         }
         holds
     }
 
     /// A run begins.
     pub(crate) const fn begin_run(&mut self) {
-        self.status.host_gone = false;
+        self.status.link_timed_out = false;
     }
 
     /// The feed, percent.

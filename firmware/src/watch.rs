@@ -80,7 +80,7 @@ fn log_safety(now: &SafetyStatus, before: &SafetyStatus) {
     if now.homed != before.homed {
         defmt::info!("{=str}", if now.homed { "homed" } else { "home lost" });
     }
-    if now.host_gone && !before.host_gone {
+    if now.link_timed_out && !before.link_timed_out {
         defmt::warn!("the host is gone");
     }
 }

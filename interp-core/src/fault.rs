@@ -48,7 +48,7 @@ pub enum FaultKind {
     /// A drive reports a fault: the drives are off, the home is lost. Value: the drive faults asserted, as bits.
     DriveFault = 18,
     /// No word of the host for longer than it said. Value: that time in periods.
-    HostGone = 19,
+    LinkTimeout = 19,
     /// A start while the machine does not know where its axes stand. Value: 0.
     NotHomed = 20,
     /// An axis was asked for more steps in a period than a period has room for. Value: the steps asked for.
@@ -79,7 +79,7 @@ impl FaultKind {
         Self::EmergencyStop,
         Self::LimitSwitch,
         Self::DriveFault,
-        Self::HostGone,
+        Self::LinkTimeout,
         Self::NotHomed,
         Self::StepRate,
         Self::StepOutput,
@@ -119,7 +119,7 @@ impl FaultKind {
             Self::EmergencyStop => "emergency-stop",
             Self::LimitSwitch => "limit-switch",
             Self::DriveFault => "drive-fault",
-            Self::HostGone => "host-gone",
+            Self::LinkTimeout => "host-gone",
             Self::NotHomed => "not-homed",
             Self::StepRate => "step-rate",
             Self::StepOutput => "step-output",

@@ -1,99 +1,21 @@
 //! The machine: load, tick, hold, resume, abort.
 
-use crate::course::{Course, Outcome};
+use crate::command::{Command, Inputs};
 use crate::fault::{Fault, FaultKind, Result};
-use crate::interval::interval;
+use crate::job::program::Program;
 use crate::job::{Header, STORE_WORDS};
-use crate::lane::Line;
-use crate::patch::Patch;
-use crate::program::Program;
-use crate::run::Run;
-use crate::sample::{Place, Sample, State};
+use crate::pass::patch::Patch;
+use crate::pass::position::PassPosition;
+use crate::pass::run::Run;
+use crate::sample::{Sample, SpanParameter, State, interval_of};
+use crate::sequence::sequencer::{Outcome, Sequencer};
 
 /// Periods over which the feed falls to nothing when a fault from outside stops the run: 1/32 less each period.
 pub const STOP_PERIODS: u8 = 32;
 
-/// What the operator or the host wants, taken up with the next tick. A request that the state does not allow is ignored.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-#[repr(u8)]
-pub enum Request {
-    /// Nothing new.
-    #[default]
-    None = 0,
-    /// Ready or finished: run the job from its beginning.
-    Start = 1,
-    /// Running: stand on the path.
-    Hold = 2,
-    /// Held: go on.
-    Resume = 3,
-    /// Running or held: give the run up; faulted: acknowledge the fault. The position is kept, the job stays loaded (ready). On a machine with
-    /// limits the tool slows down along its path first.
-    Abort = 4,
-    /// Running or held: give the run up, and leave the surface: with limits, the tool slows down along its path and goes up to the safe
-    /// height; without, as an abort.
-    Stop = 5,
-}
-
-/// What the operator wants in one period.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Inputs {
-    /// What is new.
-    pub request: Request,
-    /// Feed override, percent, 0 to [`Self::OVERRIDE_MAX`]; more counts as that. Only on a machine with limits.
-    pub feed_override: u8,
-}
-
-impl Inputs {
-    /// Greatest feed override, percent.
-    pub const OVERRIDE_MAX: u8 = 200;
-
-    /// Override as a share.
-    fn share(self) -> f32 {
-        f32::from(self.feed_override.min(Self::OVERRIDE_MAX)) * 0.01
-    }
-}
-
-impl Default for Inputs {
-    /// Nothing new, at the programmed feed.
-    fn default() -> Self {
-        Self {
-            request: Request::None,
-            feed_override: 100,
-        }
-    }
-}
-
-impl From<Request> for Inputs {
-    /// At the programmed feed.
-    fn from(request: Request) -> Self {
-        Self {
-            request,
-            ..Self::default()
-        }
-    }
-}
-
-impl Request {
-    /// Whether a machine in this state takes the request up.
-    #[must_use]
-    pub const fn is_allowed(self, state: State) -> bool {
-        match self {
-            Self::None => true,
-            Self::Start => matches!(state, State::Ready | State::Finished),
-            Self::Hold => matches!(state, State::Running | State::Linking),
-            Self::Resume => matches!(state, State::Held | State::Holding),
-            Self::Abort => matches!(state, State::Faulted) || Self::Stop.is_allowed(state),
-            Self::Stop => matches!(
-                state,
-                State::Running | State::Linking | State::Holding | State::Held
-            ),
-        }
-    }
-}
-
 /// The loaded surface at one place, outside of any run.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Probe {
+pub struct SurfacePoint {
     /// Cutter contact, nm.
     pub cc_nm: [i32; 3],
     /// Cutter location, nm.
@@ -206,11 +128,11 @@ impl<S: AsRef<[i32]> + AsMut<[i32]>> Interpolator<S> {
 
     /// Where the run is: pass, path and side place. After a fault, where that is, which is past the last sample.
     #[must_use]
-    pub fn place(&self) -> (u32, Place, Place) {
+    pub fn surface_position(&self) -> (u32, SpanParameter, SpanParameter) {
         self.motion
-            .course
-            .place()
-            .unwrap_or_else(|| self.motion.run.place())
+            .sequencer
+            .fault_position()
+            .unwrap_or_else(|| self.motion.run.surface_position())
     }
 
     /// Whether the loaded job is run within the axes' limits, from standstill to standstill, so that a way leads to each of its samples.
@@ -228,14 +150,14 @@ impl<S: AsRef<[i32]> + AsMut<[i32]>> Interpolator<S> {
     /// Where the tool stands, nm, as far as is known: where the last run within limits left it, or where it was said to stand.
     #[must_use]
     pub const fn stands_nm(&self) -> Option<[i32; 3]> {
-        self.motion.course.stands_nm()
+        self.motion.sequencer.stands_nm()
     }
 
     /// Says where the tool stands, nm, and so where the next run within limits begins; none where nobody knows: then that run
     /// begins at its job's home. Ignored while a run is under way.
     pub const fn stand_at(&mut self, at_nm: Option<[i32; 3]>) {
         if !self.motion.state.is_under_way() {
-            self.motion.course.stand_at(at_nm);
+            self.motion.sequencer.stand_at(at_nm);
         }
     }
 
@@ -251,26 +173,26 @@ impl<S: AsRef<[i32]> + AsMut<[i32]>> Interpolator<S> {
         self.motion.run.last_interval()
     }
 
-    /// The loaded surface at a place: what a sample there would say, whatever the machine is doing. Not for the sample path:
+    /// Evaluates the loaded surface at these parameters: what a sample there would say, whatever the machine is doing. Not for the sample path:
     /// it collapses a patch each time. The side fraction counts in steps of 2^-32.
     ///
     /// # Errors
     /// [`FaultKind::WrongState`] without a loaded job or for a span that it does not have; what is wrong with the surface
     /// there.
-    pub fn probe(&self, path: Place, side: Place) -> Result<Probe> {
-        self.motion.probe(self.store.as_ref(), path, side)
+    pub fn evaluate(&self, path: SpanParameter, side: SpanParameter) -> Result<SurfacePoint> {
+        self.motion.evaluate(self.store.as_ref(), path, side)
     }
 
     /// Stops a run with a fault from outside, such as a missed deadline: along the path, the feed falling to nothing over
     /// [`STOP_PERIODS`] ([`State::Stopping`]), or at the end of the pass if that is nearer. Where the run is held, it faults at
     /// once. Ignored where nothing runs.
-    pub fn trip(&mut self, fault: Fault) {
-        self.motion.trip(fault);
+    pub fn controlled_stop(&mut self, fault: Fault) {
+        self.motion.controlled_stop(fault);
     }
 
     /// Ends a run with a fault from outside in this very period, because the drives are off and nothing follows the path any
     /// more. The first fault is kept. Ignored where no run is under way.
-    pub fn cut(&mut self, fault: Fault) {
+    pub fn uncontrolled_stop(&mut self, fault: Fault) {
         if self.motion.state.is_under_way() {
             self.motion.fail(fault);
         }
@@ -300,7 +222,7 @@ struct Motion {
     ending: Ending,
     run: Run,
     program: Program,
-    course: Course,
+    sequencer: Sequencer,
 }
 
 /// What a run that is given up still has to do.
@@ -308,10 +230,10 @@ struct Motion {
 enum Ending {
     /// Stand where it stops.
     Stand,
-    /// Leave the surface then.
-    Leave,
-    /// It is on its way up.
-    Leaving,
+    /// Retract from the surface then.
+    Retract,
+    /// The tool retracts.
+    Retracting,
 }
 
 impl Motion {
@@ -323,7 +245,7 @@ impl Motion {
         ending: Ending::Stand,
         run: Run::START,
         program: Program::new(),
-        course: Course::START,
+        sequencer: Sequencer::START,
     };
 
     fn may_load(&self) -> Result<()> {
@@ -362,7 +284,7 @@ impl Motion {
         self.fault = None;
     }
 
-    fn trip(&mut self, fault: Fault) {
+    fn controlled_stop(&mut self, fault: Fault) {
         match self.state {
             State::Running => {
                 self.state = State::Stopping;
@@ -387,11 +309,11 @@ impl Motion {
 
     #[inline(never)]
     fn tick(&mut self, store: &[i32], inputs: Inputs) {
-        if inputs.request != Request::None {
-            self.take_up(store, inputs.request);
+        if let Some(command) = inputs.command {
+            self.execute(store, command);
         }
         if self.program.header().axes.is_some() {
-            self.tick_within_limits(store, inputs.share());
+            self.tick_within_limits(store, inputs.feed_factor());
         } else {
             match self.state {
                 State::Running => self.advance(store),
@@ -404,25 +326,25 @@ impl Motion {
 
     /// One period of a machine that has limits.
     #[inline(never)]
-    fn tick_within_limits(&mut self, store: &[i32], share: f32) {
-        let share = match (self.state, self.ending) {
-            (State::Running | State::Linking, _) => share,
-            (State::Stopping, Ending::Leaving) => 1.0,
+    fn tick_within_limits(&mut self, store: &[i32], feed_factor: f32) {
+        let feed_factor = match (self.state, self.ending) {
+            (State::Running | State::Linking, _) => feed_factor,
+            (State::Stopping, Ending::Retracting) => 1.0,
             (State::Holding | State::Stopping, _) => 0.0,
             _ => return,
         };
-        if share == 0.0 && self.course.is_at_rest() && self.stand() {
+        if feed_factor == 0.0 && self.sequencer.is_at_rest() && self.stand() {
             return;
         }
         let Self {
             program,
-            course,
+            sequencer,
             run,
             last,
             ..
         } = self;
         let outcome = program.job(store).and_then(|job| match &job.header.axes {
-            Some(axes) => course.tick(&job, axes, run, share, last),
+            Some(axes) => sequencer.tick(&job, axes, run, feed_factor, last),
             None => Ok(Outcome::Finished),
         });
         match (outcome, self.state) {
@@ -440,9 +362,9 @@ impl Motion {
         match self.state {
             State::Holding => self.state = State::Held,
             State::Stopping if self.fault.is_some() => self.state = State::Faulted,
-            State::Stopping if self.ending == Ending::Leave => {
-                self.ending = Ending::Leaving;
-                self.course.leave(&self.run);
+            State::Stopping if self.ending == Ending::Retract => {
+                self.ending = Ending::Retracting;
+                self.sequencer.retract(&self.run);
             }
             State::Stopping => self.state = State::Ready,
             _ => return false,
@@ -471,55 +393,56 @@ impl Motion {
             self.state = State::Faulted;
             return;
         }
-        let share = f32::from(self.slow) / f32::from(STOP_PERIODS);
+        let feed_factor = f32::from(self.slow) / f32::from(STOP_PERIODS);
         let job = self.program.job(store);
-        if let Err(fault) = job.and_then(|job| self.run.advance_far(&job, share, &mut self.last)) {
+        if let Err(fault) = job.and_then(|job| self.run.advance_far(&job, feed_factor, &mut self.last)) {
             self.fail(fault);
         }
     }
 
     #[cold]
     #[inline(never)]
-    fn take_up(&mut self, store: &[i32], request: Request) {
-        if !request.is_allowed(self.state) {
+    fn execute(&mut self, store: &[i32], command: Command) {
+        if !command.is_allowed(self.state) {
             return;
         }
         let has_limits = self.program.header().axes.is_some();
-        self.state = match request {
-            Request::None => return,
-            Request::Start => {
+        self.state = match command {
+            Command::Start => {
                 self.restart();
-                let Self { program, course, .. } = self;
+                let Self {
+                    program, sequencer, ..
+                } = self;
                 match program.job(store) {
                     Ok(job) if has_limits => {
                         if let Some(axes) = &job.header.axes {
-                            course.restart(&job, axes);
+                            sequencer.restart(&job, axes);
                         }
                         State::Linking
                     }
                     _ => State::Running,
                 }
             }
-            Request::Hold if has_limits => State::Holding,
-            Request::Hold => State::Held,
-            Request::Resume if has_limits && self.course.is_link() => State::Linking,
-            Request::Resume => State::Running,
-            Request::Abort | Request::Stop if has_limits && self.state != State::Faulted => {
-                self.ending = if request == Request::Stop {
-                    Ending::Leave
+            Command::Hold if has_limits => State::Holding,
+            Command::Hold => State::Held,
+            Command::Resume if has_limits && self.sequencer.is_link() => State::Linking,
+            Command::Resume => State::Running,
+            Command::Abort | Command::Stop if has_limits && self.state != State::Faulted => {
+                self.ending = if command == Command::Stop {
+                    Ending::Retract
                 } else {
                     Ending::Stand
                 };
                 State::Stopping
             }
-            Request::Abort | Request::Stop => {
+            Command::Abort | Command::Stop => {
                 self.fault = None;
                 State::Ready
             }
         };
     }
 
-    fn probe(&self, store: &[i32], path: Place, side: Place) -> Result<Probe> {
+    fn evaluate(&self, store: &[i32], path: SpanParameter, side: SpanParameter) -> Result<SurfacePoint> {
         let job = self.program.job(store)?;
         let header = self.program.header();
         if path.span >= header.path_spans || side.span >= header.side_spans {
@@ -528,20 +451,18 @@ impl Motion {
         let mut patch = Patch::NONE;
         patch.collapse(
             &job,
-            &Line {
+            &PassPosition {
                 side,
                 reversed: false,
                 span: path.span,
             },
         )?;
-        let contact = patch.surface.contact(path.fraction, &patch.ball)?;
-        patch.ball.check_fit(&contact)?;
-        let located = patch.ball.locate(&contact, &patch.origin)?;
-        Ok(Probe {
+        let (contact, located) = patch.evaluate(path.fraction)?;
+        Ok(SurfacePoint {
             cc_nm: located.cc_nm,
             cl_nm: located.cl_nm,
             normal: patch.ball.normal(contact.offset),
-            interval: interval(patch.interval.density(&contact)),
+            interval: interval_of(patch.interval.inv_interval_sq(&contact)),
         })
     }
 }

@@ -1,5 +1,7 @@
 //! What one period yields: the [`Sample`], and the running machine's [`State`].
 
+use crate::math::arith::sqrt;
+
 /// State of the running machine.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[repr(u8)]
@@ -73,14 +75,14 @@ impl State {
 
 /// A place along one parameter of a surface: which span of the grid, and how far through it.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord)]
-pub struct Place {
+pub struct SpanParameter {
     /// Span of the grid, from 0, in the surface's own direction.
     pub span: u16,
     /// Fraction of the span in units of 2^-64; `u64::MAX` stands for its end exactly.
     pub fraction: u64,
 }
 
-impl Place {
+impl SpanParameter {
     /// No place: the tool is off the passes.
     pub const NONE: Self = Self {
         span: u16::MAX,
@@ -98,9 +100,9 @@ pub struct Sample {
     /// Pass, from 0.
     pub pass: u32,
     /// Where on the path parameter.
-    pub path: Place,
+    pub path: SpanParameter,
     /// Where on the side parameter (fixed on a pass).
-    pub side: Place,
+    pub side: SpanParameter,
     /// Commanded feed of the cutter contact along the surface, mm/s.
     pub feed_mm_s: f32,
     /// Cutter contact, nm.
@@ -109,7 +111,7 @@ pub struct Sample {
     pub cl_nm: [i32; 3],
     /// `1 / interval^2`: square of the passes that the scallop limit asks for per unit of the side parameter, by this sample
     /// alone. The greatest of a pass decides; see [`Self::interval`].
-    pub density: f32,
+    pub inv_interval_sq: f32,
 }
 
 impl Sample {
@@ -118,17 +120,27 @@ impl Sample {
         tick: 0,
         state: State::Idle,
         pass: 0,
-        path: Place { span: 0, fraction: 0 },
-        side: Place { span: 0, fraction: 0 },
+        path: SpanParameter { span: 0, fraction: 0 },
+        side: SpanParameter { span: 0, fraction: 0 },
         feed_mm_s: 0.0,
         cc_nm: [0; 3],
         cl_nm: [0; 3],
-        density: 0.0,
+        inv_interval_sq: 0.0,
     };
 
     /// Candidate of the path interval at this sample, in units of the side parameter; infinite where it sets no limit.
     #[must_use]
     pub fn interval(&self) -> f32 {
-        crate::interval::interval(self.density)
+        interval_of(self.inv_interval_sq)
+    }
+}
+
+/// The path interval of an inverse square of it, in units of the side parameter; infinite where nothing sets a limit.
+#[must_use]
+pub(crate) fn interval_of(inv_interval_sq: f32) -> f32 {
+    if inv_interval_sq > 0.0 {
+        1.0 / sqrt(inv_interval_sq)
+    } else {
+        f32::INFINITY
     }
 }

@@ -44,17 +44,17 @@ code_byte!(tool_side, ToolSide, |code| {
 });
 
 /// A place: the span as a varint, the fraction as eight bytes.
-pub(crate) mod place {
-    use interp_core::sample::Place;
+pub(crate) mod span_parameter {
+    use interp_core::sample::SpanParameter;
     use serde::{Deserialize, Deserializer, Serialize, Serializer};
 
-    pub(crate) fn serialize<S: Serializer>(place: &Place, serializer: S) -> Result<S::Ok, S::Error> {
+    pub(crate) fn serialize<S: Serializer>(place: &SpanParameter, serializer: S) -> Result<S::Ok, S::Error> {
         (place.span, place.fraction.to_le_bytes()).serialize(serializer)
     }
 
-    pub(crate) fn deserialize<'de, D: Deserializer<'de>>(deserializer: D) -> Result<Place, D::Error> {
+    pub(crate) fn deserialize<'de, D: Deserializer<'de>>(deserializer: D) -> Result<SpanParameter, D::Error> {
         let (span, fraction) = <(u16, [u8; 8])>::deserialize(deserializer)?;
-        Ok(Place {
+        Ok(SpanParameter {
             span,
             fraction: u64::from_le_bytes(fraction),
         })

@@ -62,7 +62,7 @@ impl Digest {
     }
 
     /// Feeds every field of a sample as 17 words: tick, state code, pass, path span, low and high half of the path
-    /// fraction, the side's span, low and high half, feed (f32 bits), CC x y z (nm), CL x y z (nm), density (f32 bits).
+    /// fraction, the side's span, low and high half, feed (f32 bits), CC x y z (nm), CL x y z (nm), inverse square interval (f32 bits).
     #[inline]
     pub fn sample(&mut self, sample: &Sample) {
         // The low halves do not need the high ones: a compiler that knows so computes all of the former first, and runs out
@@ -84,7 +84,7 @@ impl Digest {
             feed(y.cast_unsigned());
             feed(z.cast_unsigned());
         }
-        feed(sample.density.to_bits());
+        feed(sample.inv_interval_sq.to_bits());
         *self = digest;
     }
 }
@@ -111,7 +111,7 @@ pub fn job_digest(words: &[i32]) -> u64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use interp_core::sample::{Place, State};
+    use interp_core::sample::{SpanParameter, State};
 
     #[test]
     fn follows_its_definition() {
@@ -127,18 +127,18 @@ mod tests {
             tick: 1,
             state: State::Running,
             pass: 3,
-            path: Place {
+            path: SpanParameter {
                 span: 4,
                 fraction: 6 << 32 | 5,
             },
-            side: Place {
+            side: SpanParameter {
                 span: 7,
                 fraction: 9 << 32 | 8,
             },
             feed_mm_s: f32::from_bits(10),
             cc_nm: [11, 12, 13],
             cl_nm: [14, 15, 16],
-            density: f32::from_bits(17),
+            inv_interval_sq: f32::from_bits(17),
         };
         let mut digest = Digest::new();
         digest.sample(&sample);

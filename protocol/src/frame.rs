@@ -154,7 +154,7 @@ impl Default for Decoder {
 mod tests {
     use super::*;
     use crate::message::{Clock, SAMPLES_MAX, SampleRecord, Words};
-    use interp_core::sample::{Place, Sample, State};
+    use interp_core::sample::{Sample, SpanParameter, State};
 
     fn decode<'a>(decoder: &'a mut Decoder, bytes: &[u8]) -> Option<Result<Frame<'a>, FrameError>> {
         let (last, before) = bytes.split_last()?;
@@ -171,7 +171,7 @@ mod tests {
 
     #[test]
     fn the_longest_messages_fit() {
-        let place = Place {
+        let place = SpanParameter {
             span: u16::MAX,
             fraction: u64::MAX,
         };
@@ -184,7 +184,7 @@ mod tests {
             feed_mm_s: f32::MAX,
             cc_nm: [i32::MIN; 3],
             cl_nm: [i32::MIN; 3],
-            density: f32::MAX,
+            inv_interval_sq: f32::MAX,
         };
         let samples = Reply::Samples([SampleRecord(sample); SAMPLES_MAX].into_iter().collect());
         let mut buffer = [0; FRAME_MAX];

@@ -6,8 +6,8 @@
 use heapless::{String, Vec};
 use interp_core::{
     fault::{Fault, FaultKind},
-    job::{Axes, Header, Pattern, Spacing, SurfaceKind, ToolSide},
-    sample::{Place, Sample, State},
+    job::{AxisLimits, Header, Pattern, Spacing, SurfaceKind, ToolSide},
+    sample::{Sample, SpanParameter, State},
     steps::{AxisSteps, StepConfig},
 };
 use serde::{Deserialize, Deserializer, Serialize, Serializer, de, ser::SerializeSeq};
@@ -128,11 +128,11 @@ pub struct Status {
     /// Pass of the last sample; while faulted, of the fault.
     pub pass: u32,
     /// Path place of the last sample; while faulted, of the fault.
-    #[serde(with = "codes::place")]
-    pub path: Place,
+    #[serde(with = "codes::span_parameter")]
+    pub path: SpanParameter,
     /// Side place of the last sample; while faulted, of the fault.
-    #[serde(with = "codes::place")]
-    pub side: Place,
+    #[serde(with = "codes::span_parameter")]
+    pub side: SpanParameter,
     /// Samples of the run so far: those that the digest covers.
     pub samples: u32,
     /// Digest of the whole run so far.
@@ -162,8 +162,8 @@ impl Default for Status {
             report: Report::Digests,
             tick: 0,
             pass: 0,
-            path: Place::default(),
-            side: Place::default(),
+            path: SpanParameter::default(),
+            side: SpanParameter::default(),
             samples: 0,
             digest: crate::digest::Digest::EMPTY,
             interval: 0.0,
@@ -201,14 +201,14 @@ struct SampleFields {
     #[serde(with = "codes::state")]
     state: State,
     pass: u32,
-    #[serde(with = "codes::place")]
-    path: Place,
-    #[serde(with = "codes::place")]
-    side: Place,
+    #[serde(with = "codes::span_parameter")]
+    path: SpanParameter,
+    #[serde(with = "codes::span_parameter")]
+    side: SpanParameter,
     feed_mm_s: f32,
     cc_nm: [i32; 3],
     cl_nm: [i32; 3],
-    density: f32,
+    inv_interval_sq: f32,
 }
 
 /// A [`Sample`] as it travels.
@@ -237,13 +237,13 @@ pub(crate) struct HeaderFields {
     scallop_mm: f32,
     period_s: f32,
     #[serde(with = "axes")]
-    axes: Option<Axes>,
+    axes: Option<AxisLimits>,
 }
 
-/// The wire's view of [`Axes`]; it stops compiling when the core's grows a field.
+/// The wire's view of [`AxisLimits`]; it stops compiling when the core's grows a field.
 #[derive(Serialize, Deserialize)]
-#[serde(remote = "Axes")]
-struct AxesFields {
+#[serde(remote = "AxisLimits")]
+struct AxisLimitsFields {
     velocity_mm_s: [f32; 3],
     acceleration_mm_s2: [f32; 3],
     jerk_mm_s3: [f32; 3],
@@ -256,16 +256,21 @@ struct AxesFields {
 
 /// An option of what the axes can do: 0, or 1 and the fields.
 mod axes {
-    use super::{Axes, AxesFields, Deserialize, Deserializer, Serialize, Serializer};
+    use super::{AxisLimits, AxisLimitsFields, Deserialize, Deserializer, Serialize, Serializer};
 
     #[derive(Serialize, Deserialize)]
-    struct Record(#[serde(with = "AxesFields")] Axes);
+    struct Record(#[serde(with = "AxisLimitsFields")] AxisLimits);
 
-    pub(super) fn serialize<S: Serializer>(axes: &Option<Axes>, serializer: S) -> Result<S::Ok, S::Error> {
+    pub(super) fn serialize<S: Serializer>(
+        axes: &Option<AxisLimits>,
+        serializer: S,
+    ) -> Result<S::Ok, S::Error> {
         axes.map(Record).serialize(serializer)
     }
 
-    pub(super) fn deserialize<'de, D: Deserializer<'de>>(deserializer: D) -> Result<Option<Axes>, D::Error> {
+    pub(super) fn deserialize<'de, D: Deserializer<'de>>(
+        deserializer: D,
+    ) -> Result<Option<AxisLimits>, D::Error> {
         let record = Option::<Record>::deserialize(deserializer)?;
         Ok(record.map(|Record(axes)| axes))
     }

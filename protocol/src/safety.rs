@@ -2,11 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
-/// Largest feed override, percent.
-pub const OVERRIDE_MAX_PERCENT: u8 = 200;
-
-/// The feed as programmed, percent.
-pub const OVERRIDE_NORMAL_PERCENT: u8 = 100;
+pub use interp_core::command::{OVERRIDE_MAX_PERCENT, OVERRIDE_NORMAL_PERCENT};
 
 /// The board's safety inputs, one bit each, set where the input is asserted whatever its level on the wire.
 ///
@@ -90,7 +86,7 @@ impl InputLines {
 
 /// What a run on a free clock does when the host is gone.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
-pub enum HostGone {
+pub enum LinkTimeoutAction {
     /// 0: it goes on to its end.
     #[default]
     Finish,
@@ -104,17 +100,17 @@ pub struct Configuration {
     /// A run starts only where the machine is homed.
     pub homing_required: bool,
     /// What a run does when the host is gone.
-    pub host_gone: HostGone,
+    pub on_link_timeout: LinkTimeoutAction,
     /// Periods without a frame after which the host is gone; 0: never.
-    pub host_gone_ticks: u32,
+    pub link_timeout_ticks: u32,
 }
 
 impl Configuration {
     /// A board that nobody has told anything.
     pub const DEFAULT: Self = Self {
         homing_required: true,
-        host_gone: HostGone::Finish,
-        host_gone_ticks: 0,
+        on_link_timeout: LinkTimeoutAction::Finish,
+        link_timeout_ticks: 0,
     };
 }
 
@@ -172,7 +168,7 @@ pub struct SafetyStatus {
     /// The drives are enabled.
     pub drives_on: bool,
     /// The host was gone during this run, or the last one.
-    pub host_gone: bool,
+    pub link_timed_out: bool,
     /// Feed override, percent.
     pub feed_override: u8,
     /// What the host has told.
@@ -188,7 +184,7 @@ impl SafetyStatus {
         latched: InputLines::NONE,
         homed: false,
         drives_on: false,
-        host_gone: false,
+        link_timed_out: false,
         feed_override: OVERRIDE_NORMAL_PERCENT,
         configuration: Configuration::DEFAULT,
         reset: ResetCause::Unknown,

@@ -5,7 +5,7 @@ use protocol::{digest::Digest, message::PassDigest};
 
 /// What is kept of a run: counters and digests.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Run {
+pub(super) struct RunRecord {
     pub(super) samples: u32,
     pub(super) digest: Digest,
     pub(super) pass: PassDigest,
@@ -14,7 +14,7 @@ pub(super) struct Run {
     pub(super) events_lost: u32,
 }
 
-impl Run {
+impl RunRecord {
     pub(super) const NEW: Self = Self {
         samples: 0,
         digest: Digest::new(),

@@ -6,10 +6,10 @@
 //! **Without a home.** Where none is required and none was declared, the axes count as standing at the job's home.
 //! **After a job without limits** nobody knows where the axes stand: nothing led from pass to pass.
 
-use interp_core::interpolator::Request;
+use interp_core::command::Command;
 use protocol::message::Reason;
 
-use super::{RealTime, run::Run};
+use super::{RealTime, run::RunRecord};
 use crate::safety::{Order, may_start};
 
 impl<S: AsRef<[i32]> + AsMut<[i32]>> RealTime<S> {
@@ -21,8 +21,8 @@ impl<S: AsRef<[i32]> + AsMut<[i32]>> RealTime<S> {
         let state = self.interpolator.state();
         self.control.safety.obey(order, state)?;
         match order {
-            Order::SetHome { home_nm } => self.place(home_nm),
-            Order::Drives { on: false } => self.lose_place(),
+            Order::SetHome { home_nm } => self.set_position(home_nm),
+            Order::Drives { on: false } => self.lose_position(),
             Order::Drives { on: true } | Order::Configure(_) | Order::Acknowledge => {}
         }
         Ok(())
@@ -54,27 +54,27 @@ impl<S: AsRef<[i32]> + AsMut<[i32]>> RealTime<S> {
     /// the link did not know yet.
     #[cold]
     #[inline(never)]
-    pub(super) fn begin(&mut self) -> Request {
+    pub(super) fn begin(&mut self) -> Option<Command> {
         if self.may_start().is_err() {
-            return Request::None;
+            return None;
         }
         match self.interpolator.home_nm() {
             Some(home_nm) => {
                 let unknown = self.control.from_home || self.interpolator.stands_nm().is_none();
                 if unknown && !self.control.safety.status().homed {
-                    self.place(home_nm);
+                    self.set_position(home_nm);
                 }
             }
-            None => self.lose_place(),
+            None => self.lose_position(),
         }
         self.control.from_home = false;
-        self.control.run = Run::NEW;
+        self.control.run = RunRecord::NEW;
         self.control.safety.begin_run();
-        Request::Start
+        Some(Command::Start)
     }
 
     /// The axes stand here: steps and runs count from there.
-    fn place(&mut self, at_nm: [i32; 3]) {
+    fn set_position(&mut self, at_nm: [i32; 3]) {
         self.interpolator.stand_at(Some(at_nm));
         if let Some(steps) = &mut self.steps {
             steps.place(at_nm);
@@ -83,7 +83,7 @@ impl<S: AsRef<[i32]> + AsMut<[i32]>> RealTime<S> {
     }
 
     /// Nobody knows any more where the axes stand.
-    pub(super) fn lose_place(&mut self) {
+    pub(super) fn lose_position(&mut self) {
         self.interpolator.stand_at(None);
     }
 }
@@ -93,7 +93,7 @@ mod tests {
     use super::*;
     use interp_core::{
         encode,
-        job::{Axes, Header},
+        job::{AxisLimits, Header},
         steps::StepConfig,
     };
     use protocol::message::Configuration;
@@ -108,7 +108,7 @@ mod tests {
         let c = c.map(|axis| encode::substitute(&axis, [0.0, 1.0], [0.0, 1.0]));
         let one = encode::width(1.0).unwrap();
         let patch = encode::polynomial(&c, Default::default()).unwrap();
-        let axes = home_nm.map(|home_nm| Axes {
+        let axes = home_nm.map(|home_nm| AxisLimits {
             velocity_mm_s: [100.0; 3],
             acceleration_mm_s2: [1000.0; 3],
             jerk_mm_s3: [20_000.0; 3],
@@ -149,13 +149,13 @@ mod tests {
         order(&mut half, DRIVES_ON);
         order(&mut half, Order::SetHome { home_nm: HOME_NM });
         assert_eq!(half.steps().unwrap().position(), [-1, 2, 8000]);
-        assert_eq!(half.steps().unwrap().told(), HOME_NM);
+        assert_eq!(half.steps().unwrap().target_nm(), HOME_NM);
         assert_eq!(half.interpolator.stands_nm(), Some(HOME_NM));
         // A home that is refused places nothing.
         half.order(Order::Drives { on: false }).unwrap();
         let home = Order::SetHome { home_nm: [0; 3] };
         assert_eq!(half.order(home), Err(Reason::DrivesOff));
-        assert_eq!(half.steps().unwrap().told(), HOME_NM);
+        assert_eq!(half.steps().unwrap().target_nm(), HOME_NM);
         assert_eq!(half.interpolator.stands_nm(), None);
     }
 
@@ -164,13 +164,13 @@ mod tests {
         let mut half = with_plate(Some(HOME_NM));
         order(&mut half, DRIVES_ON);
         let near = [HOME_NM[0] - 1, HOME_NM[1], HOME_NM[2]];
-        for (stands_nm, begun) in [(near, Request::None), (HOME_NM, Request::Start)] {
+        for (stands_nm, begun) in [(near, None), (HOME_NM, Some(Command::Start))] {
             order(&mut half, Order::SetHome { home_nm: stands_nm });
             let refused = Err(Reason::NotAtHome {
                 home_nm: HOME_NM,
                 stands_nm: Some(stands_nm),
             });
-            let may = if begun == Request::Start { Ok(()) } else { refused };
+            let may = if begun.is_some() { Ok(()) } else { refused };
             assert_eq!(half.may_start(), may);
             assert_eq!(half.begin(), begun);
         }
@@ -178,7 +178,7 @@ mod tests {
         let mut half = with_plate(None);
         order(&mut half, DRIVES_ON);
         order(&mut half, Order::SetHome { home_nm: near });
-        assert_eq!(half.begin(), Request::Start);
+        assert_eq!(half.begin(), Some(Command::Start));
         assert_eq!(half.interpolator.stands_nm(), None);
     }
 
@@ -191,8 +191,8 @@ mod tests {
         };
         order(&mut half, Order::Configure(free));
         order(&mut half, DRIVES_ON);
-        assert_eq!(half.begin(), Request::Start);
-        assert_eq!(half.steps().unwrap().told(), HOME_NM);
+        assert_eq!(half.begin(), Some(Command::Start));
+        assert_eq!(half.steps().unwrap().target_nm(), HOME_NM);
         assert_eq!(half.interpolator.stands_nm(), Some(HOME_NM));
     }
 }

@@ -16,7 +16,7 @@ fn ready() -> Safety {
 
 /// One tick as the real-time half makes it.
 fn tick(safety: &mut Safety, lines: InputLines, under_way: bool) -> Option<Stop> {
-    if safety.is_calm(lines) {
+    if safety.is_unchanged(lines) {
         None
     } else {
         safety.watch(lines, under_way)
@@ -58,7 +58,7 @@ fn every_input_is_debounced_by_itself() {
 fn an_emergency_stop_of_one_tick_cuts_and_latches() {
     let mut safety = ready();
     let fault = Fault::new(FaultKind::EmergencyStop, 1.0);
-    assert_eq!(tick(&mut safety, ESTOP, true), Some(Stop::Cut(fault)));
+    assert_eq!(tick(&mut safety, ESTOP, true), Some(Stop::Uncontrolled(fault)));
     assert!(!safety.drives_on() && safety.home_nm().is_none());
     let asserted = unsafe_because(FaultKind::EmergencyStop, ESTOP);
     // Released, it still bounces.
@@ -89,8 +89,8 @@ fn an_emergency_stop_of_one_tick_cuts_and_latches() {
 
 #[test]
 fn a_drive_fault_cuts_and_a_limit_switch_trips_once_they_are_steady() {
-    let cut = Stop::Cut(Fault::new(FaultKind::DriveFault, 256.0));
-    let trip = Stop::Trip(Fault::new(FaultKind::LimitSwitch, 4.0));
+    let cut = Stop::Uncontrolled(Fault::new(FaultKind::DriveFault, 256.0));
+    let trip = Stop::Controlled(Fault::new(FaultKind::LimitSwitch, 4.0));
     for (lines, stop, latched) in [(FAULT_Y, cut, FAULT_Y), (X_PLUS, trip, InputLines::NONE)] {
         let mut safety = ready();
         for _ in 1..DEBOUNCE_TICKS {
@@ -136,7 +136,9 @@ fn drives_off_lose_the_home_and_no_order_is_taken_under_way() {
 /// Ticks until the run is to be held, asked as the real-time half asks; `None` after so many.
 fn ticks_until_hold(safety: &mut Safety, clock: Clock, states: &[State]) -> Option<usize> {
     for (tick, &state) in states.iter().enumerate() {
-        if !safety.is_calm(InputLines::NONE) && safety.mind_silence(clock, state, state == State::Running) {
+        if !safety.is_unchanged(InputLines::NONE)
+            && safety.check_link_timeout(clock, state, state == State::Running)
+        {
             return Some(tick + 1);
         }
     }
@@ -145,12 +147,12 @@ fn ticks_until_hold(safety: &mut Safety, clock: Clock, states: &[State]) -> Opti
 
 #[test]
 fn a_host_that_is_gone_is_noticed_on_time_and_only_in_a_run_on_a_free_clock() {
-    let patient = |host_gone, host_gone_ticks| {
+    let patient = |on_link_timeout, link_timeout_ticks| {
         let mut safety = ready();
         let configuration = Configuration {
             homing_required: true,
-            host_gone,
-            host_gone_ticks,
+            on_link_timeout,
+            link_timeout_ticks,
         };
         safety
             .obey(Order::Configure(configuration), State::Ready)
@@ -158,30 +160,30 @@ fn a_host_that_is_gone_is_noticed_on_time_and_only_in_a_run_on_a_free_clock() {
         safety
     };
     let running = [State::Running; 100];
-    let mut safety = patient(HostGone::Hold, 20);
+    let mut safety = patient(LinkTimeoutAction::Hold, 20);
     assert_eq!(ticks_until_hold(&mut safety, Clock::Free, &running[..19]), None);
     safety.heard();
-    assert!(!safety.status.host_gone);
+    assert!(!safety.status.link_timed_out);
     assert_eq!(ticks_until_hold(&mut safety, Clock::Free, &running), Some(20));
-    assert!(safety.status.host_gone);
+    assert!(safety.status.link_timed_out);
     safety.begin_run();
-    assert!(!safety.status.host_gone);
+    assert!(!safety.status.link_timed_out);
     // On the way into another state it is asked again as soon as that takes a hold.
     let mut way = [State::Holding; 100];
     way[50] = State::Running;
-    let mut safety = patient(HostGone::Hold, 20);
+    let mut safety = patient(LinkTimeoutAction::Hold, 20);
     assert_eq!(ticks_until_hold(&mut safety, Clock::Free, &way), Some(51));
 
-    let mut safety = patient(HostGone::Finish, 20);
+    let mut safety = patient(LinkTimeoutAction::Finish, 20);
     assert_eq!(ticks_until_hold(&mut safety, Clock::Free, &running), None);
-    assert!(safety.status.host_gone);
-    let mut safety = patient(HostGone::Hold, 0);
+    assert!(safety.status.link_timed_out);
+    let mut safety = patient(LinkTimeoutAction::Hold, 0);
     assert_eq!(ticks_until_hold(&mut safety, Clock::Free, &running), None);
-    assert!(!safety.status.host_gone);
-    let mut safety = patient(HostGone::Hold, 20);
+    assert!(!safety.status.link_timed_out);
+    let mut safety = patient(LinkTimeoutAction::Hold, 20);
     assert_eq!(ticks_until_hold(&mut safety, Clock::Lockstep, &running), None);
     for state in [State::Idle, State::Ready, State::Finished, State::Faulted] {
         assert_eq!(ticks_until_hold(&mut safety, Clock::Free, &[state; 100]), None);
     }
-    assert!(!safety.status.host_gone);
+    assert!(!safety.status.link_timed_out);
 }

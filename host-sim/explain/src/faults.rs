@@ -162,7 +162,7 @@ fn words(kind: FaultKind) -> [&'static str; 5] {
             "Find the cause at the drive. Then `cargo sim operate --port DEV acknowledge`, place the axes, and `home X,Y,Z`.",
             "A servo drive whose following error is too large.",
         ],
-        FaultKind::HostGone => [
+        FaultKind::LinkTimeout => [
             "The host was silent in a run for longer than it had said. The run went on to its end, or was held along its path, as `machine.host_gone` says.",
             "The time in periods.",
             "The cable came off, or the host's computer sleeps, has stopped, or is busy.",

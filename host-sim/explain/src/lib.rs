@@ -186,7 +186,7 @@ pub fn fault(fault: Fault) -> (String, &'static str) {
             inputs("the drives are off and the home is lost because of", fault),
             "find the cause at the drive, acknowledge, and declare home anew (`cargo sim operate`)",
         ),
-        FaultKind::HostGone => (
+        FaultKind::LinkTimeout => (
             format!("no word of the host for {value} periods"),
             "connect again, and resume or stop the run (`cargo sim operate`)",
         ),

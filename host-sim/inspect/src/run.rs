@@ -2,7 +2,7 @@
 
 use std::time::Instant;
 
-use interp_core::{Fault, Place};
+use interp_core::{Fault, SpanParameter};
 use job::{Job, JobError};
 use machine::Machine;
 use machine::prepare::Prepared;
@@ -73,7 +73,7 @@ pub fn oracle(job: &Job) -> Result<Oracle, InspectError> {
     clippy::cast_sign_loss,
     reason = "a share of a bar"
 )]
-fn parts_done(side: Place, prepared: &Prepared) -> u64 {
+fn parts_done(side: SpanParameter, prepared: &Prepared) -> u64 {
     let [start, end] = [0, prepared.side.breaks.len() - 1].map(|end| prepared.side.breaks[end]);
     let share = (prepared.side.parameter(side) - start) / (end - start);
     (share * PROGRESS_PARTS as f64) as u64

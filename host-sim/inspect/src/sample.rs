@@ -1,13 +1,13 @@
 //! A sample of the core in the plain numbers that the verifier takes.
 
-use interp_core::{Place, State};
+use interp_core::{SpanParameter, State};
 use machine::prepare::Prepared;
 use verify::Sample;
 
 /// Whether a sample lies on a pass, and not on the way between two.
 #[must_use]
 pub fn is_on_pass(sample: &interp_core::Sample) -> bool {
-    sample.state != State::Linking && sample.path != Place::NONE
+    sample.state != State::Linking && sample.path != SpanParameter::NONE
 }
 
 /// A sample of the core in plain numbers.

@@ -452,7 +452,7 @@ pub(super) fn command(arguments: &Arguments) -> Result<()> {
             let place = home::of(&prepared).words();
             say!("  home         declared at {place} mm: a simulated board has no axes");
         }
-        if ran.status.safety.host_gone {
+        if ran.status.safety.link_timed_out {
             say!("  host         was gone during the run: see cargo sim explain host-gone");
         }
         match (ran.commanded, ran.first_difference) {

@@ -4,11 +4,10 @@
 //! With q(s) the centre over the arc of the contact, q' v is an axis's velocity, q'' v^2 + q' a its acceleration and q''' v^3 + 3 q'' v a +
 //! q' j its jerk. Derivatives are divided differences of the stations, less what rounding to nanometres can make of them.
 
-use super::number::Bounded;
-use super::plan::Top;
-use crate::arith::sqrt;
-use crate::job::Axes;
-use crate::scalar::{float, real};
+use super::plan::FeedLimits;
+use crate::job::AxisLimits;
+use crate::math::arith::sqrt;
+use crate::math::number::{Bounded, nm_to_mm};
 
 /// Share of an axis's acceleration that bends of the path may take; the rest is kept for the feed to change.
 const BEND_SHARE: f32 = 0.8;
@@ -27,11 +26,11 @@ const SLOPE_MIN: f32 = 1e-6;
 /// Half a nanometre, mm: what a station may be off by.
 const ROUNDING: f32 = 0.5e-6;
 
-/// What is left along the path.
+/// Limits along the path that the axes' limits leave.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(crate) struct Room {
+pub(crate) struct PathLimits {
     /// Square of the greatest speed, (mm/s)^2.
-    pub(crate) square: f32,
+    pub(crate) max_speed_sqr: f32,
     /// mm/s^2.
     pub(crate) accel: f32,
     /// mm/s^3.
@@ -40,17 +39,17 @@ pub(crate) struct Room {
     pub(crate) taken: f32,
 }
 
-impl Room {
+impl PathLimits {
     /// Where nothing is asked.
     pub(crate) const WIDE: Self = Self {
-        square: f32::MAX,
+        max_speed_sqr: f32::MAX,
         accel: f32::MAX,
         jerk: f32::MAX,
         taken: 0.0,
     };
 
     /// Along a straight line with these direction cosines.
-    pub(crate) fn straight(axes: &Axes, cosines: &[f32; 3]) -> Self {
+    pub(crate) fn straight(axes: &AxisLimits, cosines: &[f32; 3]) -> Self {
         let mut room = Self::WIDE;
         let limits = axes
             .velocity_mm_s
@@ -59,7 +58,7 @@ impl Room {
             .zip(&axes.jerk_mm_s3);
         for (((v, a), j), cosine) in limits.zip(cosines) {
             let slope = 1.0 / cosine.abs().at_least(SLOPE_MIN);
-            room.square = room.square.at_most(squared(v * slope));
+            room.max_speed_sqr = room.max_speed_sqr.at_most(squared(v * slope));
             room.accel = room.accel.at_most(ACCEL_MARGIN * a * slope);
             room.jerk = room.jerk.at_most(JERK_MARGIN * j * slope);
         }
@@ -103,7 +102,7 @@ impl Stencil {
     }
 
     /// What the path leaves at the last station and over the cells before, as far as three of them reach.
-    pub(crate) fn room(&self, axes: &Axes, top: &Top) -> Room {
+    pub(crate) fn limits(&self, axes: &AxisLimits, top: &FeedLimits) -> PathLimits {
         room(&self.bends, axes, top)
     }
 
@@ -143,7 +142,7 @@ impl Stencil {
 }
 
 /// What first, second and third derivatives of each axis leave.
-fn room(bends: &[[f32; 3]; 3], axes: &Axes, top: &Top) -> Room {
+fn room(bends: &[[f32; 3]; 3], axes: &AxisLimits, top: &FeedLimits) -> PathLimits {
     let mut square = squared(top.speed);
     let mut curvature = 0.0;
     let limits = || {
@@ -182,8 +181,8 @@ fn room(bends: &[[f32; 3]; 3], axes: &Axes, top: &Top) -> Room {
         jerk = jerk.at_most((margin * j - taken) / d1.at_least(SLOPE_MIN));
         most = most.at_least(taken / j);
     }
-    Room {
-        square,
+    PathLimits {
+        max_speed_sqr: square,
         accel,
         jerk,
         taken: most,
@@ -201,7 +200,13 @@ pub(crate) struct Jump {
 
 /// Greatest square of the speed over a jump, which an axis sees as one of its velocity and its acceleration from one period to the next.
 /// `cosines`: the path's direction. `taken`: share of the jerk that the bend takes.
-pub(crate) fn over_jump(jump: &Jump, cosines: &[f32; 3], taken: f32, axes: &Axes, period_s: f32) -> f32 {
+pub(crate) fn over_jump(
+    jump: &Jump,
+    cosines: &[f32; 3],
+    taken: f32,
+    axes: &AxisLimits,
+    period_s: f32,
+) -> f32 {
     let share = (BEND_MARGIN - ZONE_JERK - taken).at_least(0.0);
     let mut square = f32::MAX;
     for ((a, j), cosine) in axes.acceleration_mm_s2.iter().zip(&axes.jerk_mm_s3).zip(cosines) {
@@ -224,7 +229,7 @@ pub(crate) fn squared(value: f32) -> f32 {
 }
 
 pub(crate) fn root(value: f32) -> f32 {
-    float(sqrt(real(value.at_least(0.0))))
+    sqrt(value.at_least(0.0))
 }
 
 /// The cube root of a positive number, within 1e-5 of itself: a guess out of the exponent, and two of Halley's steps.
@@ -238,12 +243,4 @@ pub(crate) fn cube_root(value: f32) -> f32 {
         x *= (cube + 2.0 * value) / (2.0 * cube + value);
     }
     x
-}
-
-#[allow(
-    clippy::cast_precision_loss,
-    reason = "a difference of neighbours; its last digits count below 2^24 nm only"
-)]
-pub(crate) fn nm_to_mm(nm: i32) -> f32 {
-    nm as f32 * 1e-6
 }

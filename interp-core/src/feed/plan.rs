@@ -7,13 +7,11 @@ mod bounds;
 mod cell;
 
 use self::cell::{Cell, Most, between, whole_nm};
-use super::demand::{Room, ZONE_JERK, cube_root, root, squared};
-use super::number::{Bounded, to_f32, to_quanta};
+use super::demand::{PathLimits, ZONE_JERK, cube_root, root, squared};
 use super::profile::{WINDOW_MAX, braked, landing};
 use super::{QUANTA_BITS, QUANTA_PER_MM, STEP_MAX};
-
-/// Cells that a path may have.
-pub(crate) const CELLS_MAX: usize = 256;
+use crate::job::CELLS_MAX;
+use crate::math::number::{Bounded, to_f32, to_quanta};
 
 /// Cells to each side that a bound may reach into, and that are looked through ahead of an acceleration.
 const REACH: usize = 8;
@@ -41,7 +39,7 @@ const CELLS_A_PERIOD: u8 = 4;
 
 /// What the path is to be followed with.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(crate) struct Top {
+pub(crate) struct FeedLimits {
     /// Greatest speed that may be wanted, mm/s.
     pub(crate) speed: f32,
     /// Speed that is wanted as a rule, mm/s.
@@ -157,13 +155,13 @@ impl Plan {
     }
 
     /// One more cell, of this length, mm. What its end leaves goes for the `back` cells before, too.
-    pub(crate) fn add(&mut self, length: f32, room: &Room, back: usize, top: &Top) {
+    pub(crate) fn add(&mut self, length: f32, room: &PathLimits, back: usize, top: &FeedLimits) {
         self.end += quanta(length);
         self.least = self.least.at_most(room.jerk);
         self.accel = self.accel.at_least(room.accel);
-        self.time += length / root(room.square).at_most(top.usual).at_least(SPEED_MIN);
+        self.time += length / root(room.max_speed_sqr).at_most(top.usual).at_least(SPEED_MIN);
         let scale = top.period_s * QUANTA_PER_MM;
-        let square = squared((root(room.square) * scale).at_most(STEP_MAX));
+        let square = squared((root(room.max_speed_sqr) * scale).at_most(STEP_MAX));
         let accel = room.accel * top.period_s * scale;
         let index = usize::from(self.count);
         let Some(cell) = self.cells.get_mut(index) else {
@@ -192,7 +190,7 @@ impl Plan {
     }
 
     /// A bound of the square of the speed, (mm/s)^2, at the end of a cell, where the path jumps.
-    pub(crate) fn gate(&mut self, cell: u16, square: f32, top: &Top) {
+    pub(crate) fn gate(&mut self, cell: u16, square: f32, top: &FeedLimits) {
         if square >= squared(top.speed) {
             return;
         }
@@ -204,7 +202,7 @@ impl Plan {
     /// The path is complete: chooses the mean. Its length is that of the fastest way from rest to rest over the whole path
     /// (acceleration, speed and arc as they are): `A/J`, `sqrt(v/J)` or `cbrt(s/(2 J))`, whichever is least. Where the speed varies, its
     /// mean over time counts.
-    pub(crate) fn settle(&mut self, top: &Top) {
+    pub(crate) fn settle(&mut self, top: &FeedLimits) {
         let jerk = self.least;
         let arc = mm(self.end);
         let speed = arc / self.time.at_least(top.period_s);

@@ -189,7 +189,7 @@ pub struct Steps {
 }
 
 impl Steps {
-    /// Axes at the origin. `pins`: number of each axis's step pin, 0 to 15 (only the low four bits count), all on one port.
+    /// AxisLimits at the origin. `pins`: number of each axis's step pin, 0 to 15 (only the low four bits count), all on one port.
     #[must_use]
     pub fn new(checked: CheckedSteps, pins: [u8; 3]) -> Self {
         let mut steps = Self {
@@ -218,7 +218,7 @@ impl Steps {
 
     /// The position that the axes were told last, nm.
     #[must_use]
-    pub const fn told(&self) -> [i32; 3] {
+    pub const fn target_nm(&self) -> [i32; 3] {
         self.cl_nm
     }
 

@@ -1,10 +1,10 @@
 //! A patch of a grid on one pass: cubics of the path parameter. The same for every kind of patch, so that the next one takes the
 //! place of the last without being copied.
 
-use super::lines::Line;
+use super::lines::CoordinateCubics;
 use super::pole::Reduced;
 use super::rational::WEIGHT_ONE;
-use super::{Edges, PassLine};
+use super::{Edges, IsoLine};
 
 /// What evaluates the cubics.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -26,9 +26,9 @@ pub(crate) enum GridKind {
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct GridPass {
     pub(super) kind: GridKind,
-    pub(super) axes: [Line; 3],
+    pub(super) axes: [CoordinateCubics; 3],
     /// Of a rational patch, or one with a pole.
-    pub(super) weight: Line,
+    pub(super) weight: CoordinateCubics,
     /// Of a patch with a pole.
     pub(super) reduced: Reduced,
 }
@@ -37,13 +37,13 @@ impl GridPass {
     /// Of no patch yet.
     pub(crate) const NONE: Self = Self {
         kind: GridKind::Free,
-        axes: [Line::NONE; 3],
-        weight: Line::NONE,
+        axes: [CoordinateCubics::NONE; 3],
+        weight: CoordinateCubics::NONE,
         reduced: Reduced::NONE,
     };
 
     /// Collapses a patch of three coordinates, and the weight if it is rational.
-    pub(crate) fn collapse(&mut self, blocks: &[[i32; 16]], edges: Edges, at: &PassLine) {
+    pub(crate) fn collapse(&mut self, blocks: &[[i32; 16]], edges: Edges, at: &IsoLine) {
         let mut rest = blocks.iter();
         let (mut side2, mut mixed) = (0, 0);
         for (line, block) in self.axes.iter_mut().zip(&mut rest) {
@@ -69,9 +69,9 @@ impl GridPass {
         }
         if self.kind == GridKind::Pole {
             if weight.is_none() {
-                self.weight = Line {
+                self.weight = CoordinateCubics {
                     value: [WEIGHT_ONE, 0, 0, 0],
-                    ..Line::NONE
+                    ..CoordinateCubics::NONE
                 };
             }
             self.reduced.collapse(&self.axes, blocks, edges, at);

@@ -1,12 +1,12 @@
 //! One coordinate of a patch on a pass, and the records' common parts.
 
 use super::range::{HeadWord, Root};
-use super::{Edges, PassLine};
-use crate::arith::{cubic, jet, quadratic};
+use super::{Edges, IsoLine};
+use crate::math::arith::{cubic, jet, quadratic};
 
 /// One coordinate on a pass: cubics of the path parameter, fixed point.
 #[derive(Clone, Copy, Debug, Default)]
-pub(crate) struct Line {
+pub(crate) struct CoordinateCubics {
     /// S.
     pub(crate) value: [i32; 4],
     /// S_side.
@@ -15,7 +15,7 @@ pub(crate) struct Line {
     pub(crate) side2: [i32; 4],
 }
 
-impl Line {
+impl CoordinateCubics {
     /// Zero.
     pub(crate) const NONE: Self = Self {
         value: [0; 4],
@@ -25,7 +25,7 @@ impl Line {
 
     /// Collapses `c[i][j]` of `path^i side^j`, j fastest, at a side parameter.
     #[inline(always)]
-    pub(crate) fn collapse(&mut self, block: &[i32; 16], at: &PassLine) {
+    pub(crate) fn collapse(&mut self, block: &[i32; 16], at: &IsoLine) {
         let (rows, _) = block.as_chunks::<4>();
         let slots = self.value.iter_mut().zip(&mut self.side).zip(&mut self.side2);
         let mut odd = false;
@@ -106,7 +106,7 @@ pub(super) fn collapses(c: &[[i32; 4]; 4], edges: Edges) -> bool {
 }
 
 /// The quotient of each row by a root, at a side parameter: a cubic of the path.
-pub(super) fn quotient_across(block: &[i32; 16], root: Root, at: &PassLine) -> [i32; 4] {
+pub(super) fn quotient_across(block: &[i32; 16], root: Root, at: &IsoLine) -> [i32; 4] {
     let mut out = [0; 4];
     for (slot, row) in out.iter_mut().zip(block.as_chunks::<4>().0) {
         *slot = quadratic(&root.divide(row), at.side);

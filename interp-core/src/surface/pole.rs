@@ -5,15 +5,14 @@
 //! of the pass, B vanishes there, and so does its second side derivative; they are divided by the root along the pass, and the
 //! quotient rule takes the reduced point.
 
+use super::Ball;
 use super::grid::GridPass;
-use super::lines::{Line, quotient_across, quotient_along};
+use super::lines::{CoordinateCubics, quotient_across, quotient_along};
 use super::range::{Edges, Root};
 use super::rational::{Weight, quarter};
-use super::{Contact, Factors, Local, Pass, PassLine, PathSpeed, path_factor};
-use crate::arith::{centred, centred_to_f32, cubic, jet, mul_q30, quarter_of, subtract, tangent};
+use super::{Contact, Factors, IsoLine, Local, Pass, PathSpeed, path_factor};
 use crate::fault::Result;
-use crate::offset::Ball;
-use crate::scalar::{Real, real};
+use crate::math::arith::{centred, centred_to_f32, cubic, jet, mul_q30, quarter_of, subtract, tangent};
 
 /// Which derivative of the pass is reduced by a root.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -27,7 +26,7 @@ enum Pole {
 
 /// One coordinate divided by the root.
 #[derive(Clone, Copy, Debug, Default)]
-struct ReducedLine {
+struct ReducedCubics {
     /// P.
     value: [i32; 4],
     /// P_side and half of P_side,side where the root is at an end, and not divided where it is beside.
@@ -38,10 +37,10 @@ struct ReducedLine {
 /// What a pole adds to a patch on a pass.
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct Reduced {
-    axes: [ReducedLine; 3],
+    axes: [ReducedCubics; 3],
     pole: Pole,
-    path_factor: Real,
-    inverse_path_factor: Real,
+    path_factor: f32,
+    inverse_path_factor: f32,
 }
 
 /// A patch with a pole on one pass.
@@ -50,18 +49,24 @@ pub(crate) struct PolePass<'a>(pub(super) &'a GridPass);
 impl Reduced {
     /// Of no pole.
     pub(super) const NONE: Self = Self {
-        axes: [ReducedLine {
+        axes: [ReducedCubics {
             value: [0; 4],
             side: [0; 4],
             side2: [0; 4],
         }; 3],
         pole: Pole::Beside,
-        path_factor: real(1.0),
-        inverse_path_factor: real(1.0),
+        path_factor: 1.0,
+        inverse_path_factor: 1.0,
     };
 
     /// Divides the coordinates of a patch by the root of its flagged boundary.
-    pub(super) fn collapse(&mut self, lines: &[Line; 3], blocks: &[[i32; 16]], edges: Edges, at: &PassLine) {
+    pub(super) fn collapse(
+        &mut self,
+        lines: &[CoordinateCubics; 3],
+        blocks: &[[i32; 16]],
+        edges: Edges,
+        at: &IsoLine,
+    ) {
         self.pole = match edges.path_root(at.reversed) {
             Some(root) if edges.side_root().is_none() => Pole::AtEnd(root),
             _ => Pole::Beside,
@@ -117,8 +122,8 @@ impl PolePass<'_> {
 
 /// One coordinate.
 struct PoleLine<'a> {
-    line: &'a Line,
-    reduced: &'a ReducedLine,
+    line: &'a CoordinateCubics,
+    reduced: &'a ReducedCubics,
     pole: Pole,
 }
 
@@ -192,7 +197,7 @@ impl Pass for PolePass<'_> {
     fn contact(&self, fraction: u64, ball: &Ball) -> Result<Contact> {
         let w = centred(fraction);
         let side = match self.0.reduced.pole {
-            Pole::Beside => real(1.0),
+            Pole::Beside => 1.0,
             Pole::AtEnd(root) => {
                 let [offset, slope] = root.linear();
                 offset + slope * centred_to_f32(w)

@@ -1,6 +1,6 @@
 //! What a job says of the machine's axes, as the core takes it.
 
-use interp_core::Axes;
+use interp_core::AxisLimits;
 use job::{Job, JobError};
 use patches::placement::extent_mm;
 
@@ -12,7 +12,7 @@ const NM_PER_MM: f64 = 1e6;
 ///
 /// # Errors
 /// A place outside the travel, with the key that names it.
-pub(super) fn axes(job: &Job, tool_sign: f64) -> Result<Option<Axes>, JobError> {
+pub(super) fn axes(job: &Job, tool_sign: f64) -> Result<Option<AxisLimits>, JobError> {
     let machine = &job.machine;
     let Some(limits) = machine.limits else {
         return Ok(None);
@@ -64,7 +64,7 @@ pub(super) fn axes(job: &Job, tool_sign: f64) -> Result<Option<Axes>, JobError> 
     #[allow(clippy::cast_possible_truncation, reason = "the machine's own precision")]
     let to_f32 = |values: [f64; 3]| values.map(|value| value as f32);
     #[allow(clippy::cast_possible_truncation, reason = "the machine's own precision")]
-    Ok(Some(Axes {
+    Ok(Some(AxisLimits {
         velocity_mm_s: to_f32(limits.velocity_mm_s),
         acceleration_mm_s2: to_f32(limits.acceleration_mm_s2),
         jerk_mm_s3: to_f32(limits.jerk_mm_s3),

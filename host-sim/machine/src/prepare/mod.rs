@@ -10,7 +10,7 @@ mod geometry;
 mod grid;
 mod steps;
 
-use interp_core::sample::Place;
+use interp_core::sample::SpanParameter;
 use interp_core::{Header, Pattern, Spacing, StepConfig, SurfaceKind, ToolSide, encode};
 
 use job::{Along, AlongChoice, Job, JobError, SurfaceSpec};
@@ -29,7 +29,7 @@ pub struct Axis {
 impl Axis {
     /// The parameter at a place, to the last digit of f64; a span's ends exactly.
     #[must_use]
-    pub fn parameter(&self, place: Place) -> f64 {
+    pub fn parameter(&self, place: SpanParameter) -> f64 {
         let span = usize::from(place.span);
         let (start, end) = (self.breaks[span], self.breaks[span + 1]);
         if place.fraction == u64::MAX {
@@ -67,7 +67,7 @@ pub struct Prepared {
 impl Prepared {
     /// (u, v) of a place on the path and one on the side parameter.
     #[must_use]
-    pub fn parameters(&self, path: Place, side: Place) -> [f64; 2] {
+    pub fn parameters(&self, path: SpanParameter, side: SpanParameter) -> [f64; 2] {
         let (path, side) = (self.path.parameter(path), self.side.parameter(side));
         match self.along {
             Along::U => [path, side],

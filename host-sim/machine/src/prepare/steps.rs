@@ -3,7 +3,7 @@
 use interp_core::StepConfig;
 use interp_core::steps::{AxisSteps, PULSE_SLOTS_MAX, SETUP_SLOTS_MAX, SLOTS};
 use job::{HeartbeatAction, Machine};
-use protocol::message::{Configuration, HostGone};
+use protocol::message::{Configuration, LinkTimeoutAction};
 
 /// Share of a slot that a rounding of the period may feign.
 const ROUNDING: f64 = 1e-9;
@@ -43,14 +43,14 @@ pub fn configuration(machine: &Machine) -> Configuration {
         clippy::cast_sign_loss,
         reason = "1 to 6e6 by the ranges of both"
     )]
-    let host_gone_ticks = (machine.heartbeat_timeout_ms * 1e3 / machine.period_us).ceil() as u32;
+    let link_timeout_ticks = (machine.heartbeat_timeout_ms * 1e3 / machine.period_us).ceil() as u32;
     Configuration {
         homing_required: machine.homing_required,
-        host_gone: match machine.heartbeat_action {
-            HeartbeatAction::Finish => HostGone::Finish,
-            HeartbeatAction::Hold => HostGone::Hold,
+        on_link_timeout: match machine.heartbeat_action {
+            HeartbeatAction::Finish => LinkTimeoutAction::Finish,
+            HeartbeatAction::Hold => LinkTimeoutAction::Hold,
         },
-        host_gone_ticks,
+        link_timeout_ticks,
     }
 }
 
@@ -68,9 +68,12 @@ mod tests {
             ..Machine::default()
         };
         let told = configuration(&machine);
-        assert_eq!((told.homing_required, told.host_gone), (false, HostGone::Hold));
-        assert_eq!(told.host_gone_ticks, 1251);
-        assert_eq!(configuration(&Machine::default()).host_gone_ticks, 1000);
+        assert_eq!(
+            (told.homing_required, told.on_link_timeout),
+            (false, LinkTimeoutAction::Hold)
+        );
+        assert_eq!(told.link_timeout_ticks, 1251);
+        assert_eq!(configuration(&Machine::default()).link_timeout_ticks, 1000);
     }
 
     /// The job file bounds times by the same shares of a period as the core.

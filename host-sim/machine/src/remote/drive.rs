@@ -202,7 +202,7 @@ pub fn first_difference(here: &[Sample], there: &[Sample]) -> Option<u32> {
                 s.cc_nm,
                 s.cl_nm,
                 s.feed_mm_s.to_bits(),
-                s.density.to_bits(),
+                s.inv_interval_sq.to_bits(),
             )
         };
         bits(a) == bits(b)

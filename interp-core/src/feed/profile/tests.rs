@@ -1,14 +1,14 @@
 use super::*;
 use crate::feed::QUANTA_PER_MM;
-use crate::feed::demand::Room;
-use crate::feed::plan::Top;
+use crate::feed::demand::PathLimits;
+use crate::feed::plan::FeedLimits;
 use std::boxed::Box;
 use std::vec::Vec;
 
 const T: f64 = 1e-3;
 
-fn plan(lengths: &[(f32, Room)], feed: f32) -> Box<Plan> {
-    let top = Top {
+fn plan(lengths: &[(f32, PathLimits)], feed: f32) -> Box<Plan> {
+    let top = FeedLimits {
         speed: 2.0 * feed,
         usual: feed,
         period_s: T as f32,
@@ -71,8 +71,8 @@ fn straight_paths_take_the_optimal_time() {
         for v in [1.0, 10.0, 50.0, 150.0] {
             for a in [200.0, 1000.0, 5000.0] {
                 for j in [5e3, 2e4, 2e5] {
-                    let room = Room {
-                        square: (v * v) as f32,
+                    let room = PathLimits {
+                        max_speed_sqr: (v * v) as f32,
                         accel: a as f32,
                         jerk: j as f32,
                         taken: 0.0,
@@ -109,8 +109,8 @@ fn straight_paths_take_the_optimal_time() {
 /// creeping may take and the least step.
 #[test]
 fn no_wanted_speed_breaks_the_jerk() {
-    let room = |v: f32, a: f32, j: f32| Room {
-        square: v * v,
+    let room = |v: f32, a: f32, j: f32| PathLimits {
+        max_speed_sqr: v * v,
         accel: a,
         jerk: j,
         taken: 0.0,

@@ -1,0 +1,338 @@
+//! From ordinary coefficients (f64, mm) to the records that a job is made of. For load time: a host, or a board's own
+//! set-up code; nothing in the sample path uses it.
+//!
+//! ```
+//! use interp_core::{Header, Interpolator, Command, State, encode};
+//!
+//! // z = 20 - (x^2 + y^2)/100 on 80 mm x 60 mm, a shallow dome: c[axis][i][j] of u^i v^j, u and v from 0 to 1.
+//! let mut c = [[[0.0; 4]; 4]; 3];
+//! (c[0][0][0], c[0][1][0]) = (-40.0, 80.0);
+//! (c[1][0][0], c[1][0][1]) = (-30.0, 60.0);
+//! (c[2][0][0], c[2][1][0], c[2][2][0], c[2][0][1], c[2][0][2]) = (-5.0, 64.0, -64.0, 36.0, -36.0);
+//! let patch = encode::polynomial(&c.map(|axis| encode::substitute(&axis, [0.0, 1.0], [0.0, 1.0])), Default::default())?;
+//!
+//! let header = Header {
+//!     path_spans: 1,
+//!     side_spans: 1,
+//!     ball_radius_mm: 5.0,
+//!     feed_mm_s: 20.0,
+//!     scallop_mm: 0.01,
+//!     period_s: 0.001,
+//!     ..Header::default()
+//! };
+//! let one = encode::width(1.0)?;
+//! let mut machine = Interpolator::<[i32; 64]>::new();
+//! machine.load_begin(&header, 54)?;
+//! machine.load_words(0, &[one, one])?; // one span each way, as wide as the parameter's range
+//! machine.load_words(2, &patch.to_words())?;
+//! machine.load_check(0)?;
+//! machine.load_finish()?;
+//!
+//! let first = *machine.tick(Command::Start);
+//! assert_eq!(first.cc_nm, [-40_000_000, -30_000_000, -5_000_000]);
+//! let second = machine.tick(None);
+//! assert_eq!(second.state, State::Running);
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
+#![allow(
+    clippy::cast_possible_truncation,
+    clippy::cast_sign_loss,
+    reason = "ranges are checked before each cast"
+)]
+
+use crate::surface::{Edges, PolynomialRecord, RationalRecord, RevolvedRecord, SHIFT_MAX};
+use core::fmt;
+use libm::round;
+
+/// A cubic in two parameters, `c[i][j]` of `path^i side^j`.
+pub type Bicubic = [[f64; 4]; 4];
+
+/// Why coefficients cannot become a record.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum EncodeError {
+    /// A coefficient or range is not a finite number.
+    NotFinite,
+    /// The patch is too large for nanometres in an i32, with room for its derivatives: about 0.5 m. Split it.
+    TooLarge,
+    /// The origin is outside ±2.147 m.
+    TooFar,
+    /// The weights vary more than 4 : 1 over the patch, or are not positive. Split it.
+    Weights,
+    /// A flagged boundary does not collapse into a point, or more boundaries are flagged than a patch may have.
+    NotAPole,
+    /// The extent of the angle is not above 0 and at most a turn.
+    Extent,
+}
+
+impl fmt::Display for EncodeError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            Self::NotFinite => "a coefficient is not a finite number",
+            Self::TooLarge => "a patch is larger than about 0.5 m",
+            Self::TooFar => "a patch is further than 2.147 m from the origin",
+            Self::Weights => "the weights of a patch vary by more than 4 : 1, or are not positive",
+            Self::NotAPole => "a boundary that should be a point is none",
+            Self::Extent => "the angle's extent is not above 0 and at most a turn",
+        })
+    }
+}
+
+impl core::error::Error for EncodeError {}
+
+/// Nanometres per millimetre.
+const NM_PER_MM: f64 = 1e6;
+
+/// Coefficients over `u[0]..u[1]`, `v[0]..v[1]` as coefficients of parameters from -1/2 to 1/2 over those ranges.
+#[must_use]
+pub fn substitute(c: &Bicubic, u: [f64; 2], v: [f64; 2]) -> Bicubic {
+    let rows = c.map(|row| substitute_cubic(&row, v));
+    transpose(&transpose(&rows).map(|column| substitute_cubic(&column, u)))
+}
+
+/// A cubic over `range` (lowest power first) as a cubic of a parameter from -1/2 to 1/2.
+#[must_use]
+pub fn substitute_cubic(c: &[f64; 4], [start, end]: [f64; 2]) -> [f64; 4] {
+    let [c0, c1, c2, c3] = *c;
+    let (m, d) = ((start + end) / 2.0, end - start);
+    [
+        c0 + m * (c1 + m * (c2 + m * c3)),
+        d * (c1 + m * (2.0 * c2 + m * 3.0 * c3)),
+        d * d * (c2 + 3.0 * m * c3),
+        d * d * d * c3,
+    ]
+}
+
+fn transpose(c: &Bicubic) -> Bicubic {
+    let mut t = [[0.0; 4]; 4];
+    for (j, row) in t.iter_mut().enumerate() {
+        for (slot, source) in row.iter_mut().zip(c) {
+            *slot = source.get(j).copied().unwrap_or(0.0);
+        }
+    }
+    t
+}
+
+/// The word of a span's width, in units of the surface's parameter.
+///
+/// # Errors
+/// [`EncodeError::NotFinite`] where the width is not above 0 as an f32.
+pub fn width(width: f64) -> Result<i32, EncodeError> {
+    let width = width as f32;
+    if width > 0.0 && width.is_finite() {
+        Ok(width.to_bits().cast_signed())
+    } else {
+        Err(EncodeError::NotFinite)
+    }
+}
+
+fn quantise(value: f64, unit: f64) -> Option<i32> {
+    let rounded = round(value / unit);
+    (rounded.abs() < 2_147_483_647.0).then_some(rounded as i32)
+}
+
+fn origin(point: [f64; 3]) -> Result<[i32; 3], EncodeError> {
+    let mut origin_nm = [0; 3];
+    for (slot, mm) in origin_nm.iter_mut().zip(point) {
+        *slot = quantise(mm, 1.0 / NM_PER_MM).ok_or(EncodeError::TooFar)?;
+    }
+    Ok(origin_nm)
+}
+
+fn check_finite<'a>(values: impl IntoIterator<Item = &'a f64>) -> Result<(), EncodeError> {
+    if values.into_iter().all(|value| value.is_finite()) {
+        Ok(())
+    } else {
+        Err(EncodeError::NotFinite)
+    }
+}
+
+fn quantise_patch<const N: usize>(c: &[Bicubic; N], units: [f64; N]) -> Option<[[[i32; 4]; 4]; N]> {
+    let mut out = [[[0; 4]; 4]; N];
+    for ((target, source), unit) in out.iter_mut().zip(c).zip(units) {
+        for (slot, value) in target.iter_mut().flatten().zip(source.iter().flatten()) {
+            *slot = quantise(*value, unit)?;
+        }
+    }
+    Some(out)
+}
+
+fn unit_mm(shift: u8) -> f64 {
+    1.0 / (NM_PER_MM * f64::from(1_u32 << shift))
+}
+
+/// A polynomial patch from coefficients in mm of parameters from -1/2 to 1/2, with as fine a unit as fits.
+///
+/// # Errors
+/// [`EncodeError`] as its variants say.
+pub fn polynomial(c: &[Bicubic; 3], edges: Edges) -> Result<PolynomialRecord, EncodeError> {
+    check_finite(c.iter().flatten().flatten())?;
+    let origin_nm = origin(c.map(|[[c00, ..], ..]| c00))?;
+    let mut local = *c;
+    for ([[c00, ..], ..], nm) in local.iter_mut().zip(origin_nm) {
+        *c00 -= f64::from(nm) / NM_PER_MM;
+    }
+    let mut failure = EncodeError::TooLarge;
+    for shift in (0..=SHIFT_MAX).rev() {
+        let Some(coefficients) = quantise_patch(&local, [unit_mm(shift); 3]) else {
+            continue;
+        };
+        let record = PolynomialRecord {
+            origin_nm,
+            shift,
+            edges,
+            coefficients,
+        };
+        if PolynomialRecord::check(&record.to_words()).is_ok() {
+            return Ok(record);
+        }
+        if PolynomialRecord::check(
+            &PolynomialRecord {
+                edges: Edges::default(),
+                ..record
+            }
+            .to_words(),
+        )
+        .is_ok()
+        {
+            failure = EncodeError::NotAPole;
+        }
+    }
+    Err(failure)
+}
+
+/// A rational patch from homogeneous coefficients (w x, w y, w z in mm, then w) of parameters from -1/2 to 1/2.
+/// The weight is scaled so that its extremes over the patch's corners and middle lie evenly about 1.
+///
+/// # Errors
+/// [`EncodeError`] as its variants say.
+pub fn rational(c: &[Bicubic; 4], edges: Edges) -> Result<RationalRecord, EncodeError> {
+    check_finite(c.iter().flatten().flatten())?;
+    let [x, y, z, weight] = c;
+    let (least, most) = extremes(weight);
+    if !(least > 0.0 && most < 4.0 * least) {
+        return Err(EncodeError::Weights);
+    }
+    let scale = 1.0 / libm::sqrt(least * most);
+    let end = |start: bool, end: bool| {
+        if start {
+            -0.5
+        } else if end {
+            0.5
+        } else {
+            0.0
+        }
+    };
+    let (u, v) = (
+        end(edges.path_start, edges.path_end),
+        end(edges.side_start, edges.side_end),
+    );
+    let w = evaluate(weight, u, v);
+    let origin_nm = origin([x, y, z].map(|c| evaluate(c, u, v) / w))?;
+    let mut local = *c;
+    let [.., weight] = local.each_mut();
+    for value in weight.iter_mut().flatten() {
+        *value *= scale;
+    }
+    let weight = *weight;
+    for (axis, nm) in local.iter_mut().zip(origin_nm) {
+        let origin_mm = f64::from(nm) / NM_PER_MM;
+        for (value, w) in axis.iter_mut().flatten().zip(weight.iter().flatten()) {
+            *value = *value * scale - origin_mm * w;
+        }
+    }
+    // The weights' Bernstein coefficients may leave the range although their values do not.
+    let mut failure = EncodeError::Weights;
+    for shift in (0..=SHIFT_MAX).rev() {
+        let unit = unit_mm(shift);
+        let units = [unit, unit, unit, 1.0 / 1_073_741_824.0];
+        let Some(coefficients) = quantise_patch(&local, units) else {
+            continue;
+        };
+        let record = RationalRecord {
+            origin_nm,
+            shift,
+            edges,
+            coefficients,
+        };
+        if RationalRecord::check(&record.to_words()).is_ok() {
+            return Ok(record);
+        }
+        if RationalRecord::check(
+            &RationalRecord {
+                edges: Edges::default(),
+                ..record
+            }
+            .to_words(),
+        )
+        .is_ok()
+        {
+            failure = EncodeError::NotAPole;
+        }
+    }
+    Err(failure)
+}
+
+fn evaluate(c: &Bicubic, u: f64, v: f64) -> f64 {
+    let cubic = |[c0, c1, c2, c3]: [f64; 4], t: f64| c0 + t * (c1 + t * (c2 + t * c3));
+    cubic(c.map(|row| cubic(row, v)), u)
+}
+
+/// Least and largest value over a 9 x 9 grid of the patch.
+fn extremes(c: &Bicubic) -> (f64, f64) {
+    let at = |i: i32| f64::from(i) / 8.0 - 0.5;
+    let values = (0..9)
+        .flat_map(|i| (0..9).map(move |j| (i, j)))
+        .map(|(i, j)| evaluate(c, at(i), at(j)));
+    values.fold((f64::INFINITY, f64::NEG_INFINITY), |(least, most), value| {
+        (least.min(value), most.max(value))
+    })
+}
+
+/// A revolved surface from profile coefficients in mm (lowest power first) of a parameter from -1/2 to 1/2, and the range
+/// of its angle in rad.
+///
+/// # Errors
+/// [`EncodeError`] as its variants say.
+pub fn revolved(
+    radius: &[f64; 4],
+    height: &[f64; 4],
+    [start, end]: [f64; 2],
+) -> Result<RevolvedRecord, EncodeError> {
+    check_finite(radius.iter().chain(height).chain(&[start, end]))?;
+    let turns = |rad: f64| rad / core::f64::consts::TAU;
+    let extent = round(turns(end - start) * 2_147_483_648.0);
+    if !(1.0..=2_147_483_648.0).contains(&extent) {
+        return Err(EncodeError::Extent);
+    }
+    let start = turns(start);
+    let start = round((start - libm::floor(start)) * 4_294_967_296.0);
+    let [h0, ..] = *height;
+    let height_origin_nm = quantise(h0, 1.0 / NM_PER_MM).ok_or(EncodeError::TooFar)?;
+    let mut local = *height;
+    let [h0, ..] = &mut local;
+    *h0 -= f64::from(height_origin_nm) / NM_PER_MM;
+    for shift in (0..=SHIFT_MAX).rev() {
+        let row = |c: &[f64; 4]| -> Option<[i32; 4]> {
+            let mut out = [0; 4];
+            for (slot, value) in out.iter_mut().zip(c) {
+                *slot = quantise(*value, unit_mm(shift))?;
+            }
+            Some(out)
+        };
+        let (Some(radius), Some(height)) = (row(radius), row(&local)) else {
+            continue;
+        };
+        let record = RevolvedRecord {
+            shift,
+            radius,
+            height,
+            height_origin_nm,
+            start: start as u64 as u32,
+            extent: extent as u32,
+        };
+        if RevolvedRecord::check(&record.to_words()).is_ok() {
+            return Ok(record);
+        }
+    }
+    Err(EncodeError::TooLarge)
+}

@@ -1,0 +1,322 @@
+//! A job in the machine: raw words go in, and only a complete, checked job comes out.
+
+use crate::command::OVERRIDE_MAX;
+use crate::fault::{Fault, FaultKind, Result};
+use crate::job::{AxisLimits, CELLS_MAX, Header, SPANS_MAX, STEP_MAX_MM, SurfaceKind, width_words};
+use crate::math::number::nm_to_mm;
+use crate::surface::{
+    POLYNOMIAL_WORDS, PolynomialRecord, RATIONAL_WORDS, REVOLVED_WORDS, RationalRecord, RevolvedRecord,
+    split_patch,
+};
+
+/// Which part of the checks a job has passed.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum LoadStage {
+    Empty,
+    /// Words received and records checked so far.
+    Loading {
+        received: u32,
+        checked: u32,
+    },
+    Sealed,
+}
+
+/// What is known of the job in the store, which is the caller's and handed in with every call. Its surface can be read only
+/// once the job is sealed.
+#[derive(Debug)]
+pub(crate) struct Program {
+    stage: LoadStage,
+    header: Header,
+    /// Words that the job has.
+    length: u32,
+}
+
+/// Words of one record of a kind of surface.
+const fn record_words(kind: SurfaceKind) -> usize {
+    match kind {
+        SurfaceKind::Polynomial => POLYNOMIAL_WORDS,
+        SurfaceKind::Rational => RATIONAL_WORDS,
+        SurfaceKind::RevolvedAlongProfile | SurfaceKind::RevolvedAroundAxis => REVOLVED_WORDS,
+    }
+}
+
+/// Records and words that a header implies.
+pub(crate) fn extent(header: &Header) -> (u32, u64) {
+    let records = u32::from(header.path_spans) * u32::from(header.side_spans);
+    let words = u64::from(records) * record_words(header.kind) as u64;
+    (
+        records,
+        words + u64::from(width_words(header.path_spans, header.side_spans)),
+    )
+}
+
+fn check_header(header: &Header) -> Result<()> {
+    let spans_max = match header.kind {
+        SurfaceKind::Polynomial | SurfaceKind::Rational => SPANS_MAX,
+        SurfaceKind::RevolvedAlongProfile | SurfaceKind::RevolvedAroundAxis => 1,
+    };
+    for spans in [header.path_spans, header.side_spans] {
+        if !(1..=spans_max).contains(&spans) {
+            return Err(Fault::new(FaultKind::BadHeader, f32::from(spans)));
+        }
+    }
+    let ranges = [
+        (header.ball_radius_mm, f32::MIN_POSITIVE, 1000.0),
+        (header.feed_mm_s, 1e-3, 10_000.0),
+        (header.scallop_mm, f32::MIN_POSITIVE, header.ball_radius_mm),
+        (header.period_s, 1e-5, 0.1),
+    ];
+    for (value, least, most) in ranges {
+        // Not the negated comparisons: a NaN must not pass.
+        if !(value >= least && value <= most) {
+            return Err(Fault::new(FaultKind::BadHeader, value));
+        }
+    }
+    header
+        .axes
+        .as_ref()
+        .map_or(Ok(()), |axes| check_axes(header, axes))
+}
+
+/// Ranges of what the axes can do: such that a step of a period fits its integer, and none of the planner's products overflows.
+fn check_axes(header: &Header, axes: &AxisLimits) -> Result<()> {
+    let bad = |value| Err(Fault::new(FaultKind::BadHeader, value));
+    let all = [
+        (axes.velocity_mm_s, 1e-3, 1e5),
+        (axes.acceleration_mm_s2, 1e-2, 1e7),
+        (axes.jerk_mm_s3, 1e-1, 1e9),
+        ([axes.chord_mm; 3], 1e-6, 1e3),
+    ];
+    for (values, least, most) in all {
+        for value in values {
+            if !(value >= least && value <= most) {
+                return bad(value);
+            }
+        }
+    }
+    if !(axes.plunge_mm >= 0.0 && axes.plunge_mm <= 1e3) {
+        return bad(axes.plunge_mm);
+    }
+    // The greatest feed that an override may ask for has to fit a step.
+    if OVERRIDE_MAX * header.feed_mm_s * header.period_s > STEP_MAX_MM {
+        return bad(header.feed_mm_s);
+    }
+    if usize::from(header.path_spans) > CELLS_MAX {
+        return bad(f32::from(header.path_spans));
+    }
+    let [x, y, z] = axes.home_nm;
+    for (place, [least, most]) in [x, y, z, axes.safe_z_nm]
+        .into_iter()
+        .zip(axes.travel_nm.into_iter().chain([axes.travel_nm[2]]))
+    {
+        if !(least..=most).contains(&place) {
+            return bad(nm_to_mm(place));
+        }
+    }
+    Ok(())
+}
+
+impl Program {
+    pub(crate) const fn new() -> Self {
+        const HEADER: Header = Header {
+            kind: SurfaceKind::Polynomial,
+            pattern: crate::job::Pattern::Zig,
+            spacing: crate::job::Spacing::Exact,
+            tool_side: crate::job::ToolSide::Plus,
+            path_spans: 0,
+            side_spans: 0,
+            ball_radius_mm: 0.0,
+            feed_mm_s: 0.0,
+            scallop_mm: 0.0,
+            period_s: 0.0,
+            axes: None,
+        };
+        Self {
+            stage: LoadStage::Empty,
+            header: HEADER,
+            length: 0,
+        }
+    }
+
+    pub(crate) fn begin(&mut self, header: &Header, words: u32, capacity: usize) -> Result<()> {
+        check_header(header)?;
+        let (_, needed) = extent(header);
+        if needed > capacity as u64 {
+            #[allow(clippy::cast_precision_loss, reason = "a report; at most 2^27")]
+            return Err(Fault::new(FaultKind::TooManyPatches, needed as f32));
+        }
+        if u64::from(words) != needed {
+            return Err(bad_length(words));
+        }
+        self.stage = LoadStage::Loading {
+            received: 0,
+            checked: 0,
+        };
+        self.header = *header;
+        self.length = words;
+        Ok(())
+    }
+
+    pub(crate) fn clear(&mut self) {
+        self.stage = LoadStage::Empty;
+    }
+
+    pub(crate) fn write(&mut self, store: &mut [i32], offset: u32, words: &[i32]) -> Result<()> {
+        let LoadStage::Loading { received, .. } = self.stage else {
+            return Err(bad_length(offset));
+        };
+        let end = u32::try_from(words.len())
+            .ok()
+            .and_then(|length| offset.checked_add(length));
+        let Some(end) = end.filter(|end| *end <= self.length && offset <= received) else {
+            return Err(bad_length(offset));
+        };
+        let Some(slots) = store.get_mut(offset as usize..end as usize) else {
+            return Err(bad_length(end));
+        };
+        for (slot, word) in slots.iter_mut().zip(words) {
+            *slot = *word;
+        }
+        self.stage = LoadStage::Loading {
+            received: received.max(end),
+            checked: 0,
+        };
+        Ok(())
+    }
+
+    pub(crate) fn records(&self) -> u32 {
+        extent(&self.header).0
+    }
+
+    pub(crate) fn check(&mut self, store: &[i32], record: u32) -> Result<()> {
+        let LoadStage::Loading { received, checked } = self.stage else {
+            return Err(bad_length(0));
+        };
+        if received != self.length || record > checked || record >= self.records() {
+            return Err(bad_length(received));
+        }
+        let job = Job {
+            header: &self.header,
+            store,
+        };
+        if record == 0 {
+            job.check_widths()?;
+        }
+        let index = record as usize;
+        let result = match self.header.kind {
+            SurfaceKind::Polynomial => job.record(index).map(PolynomialRecord::check),
+            SurfaceKind::Rational => job.record(index).map(RationalRecord::check),
+            SurfaceKind::RevolvedAlongProfile | SurfaceKind::RevolvedAroundAxis => {
+                job.record(index).map(RevolvedRecord::check)
+            }
+        };
+        match result {
+            Some(Ok(())) if !job.is_alike(index) => Err(bad_patch(record)),
+            Some(Ok(())) => {
+                self.stage = LoadStage::Loading {
+                    received,
+                    checked: checked.max(record + 1),
+                };
+                Ok(())
+            }
+            _ => Err(bad_patch(record)),
+        }
+    }
+
+    pub(crate) fn seal(&mut self) -> Result<()> {
+        match self.stage {
+            LoadStage::Loading { received, checked }
+                if received == self.length && checked == self.records() =>
+            {
+                self.stage = LoadStage::Sealed;
+                Ok(())
+            }
+            LoadStage::Loading { received, .. } => Err(bad_length(received)),
+            LoadStage::Empty | LoadStage::Sealed => Err(bad_length(0)),
+        }
+    }
+
+    pub(crate) const fn header(&self) -> &Header {
+        &self.header
+    }
+
+    /// The sealed job.
+    ///
+    /// # Errors
+    /// [`FaultKind::WrongState`] where none is.
+    pub(crate) fn job<'a>(&'a self, store: &'a [i32]) -> Result<Job<'a>> {
+        if self.stage == LoadStage::Sealed {
+            Ok(Job {
+                header: &self.header,
+                store,
+            })
+        } else {
+            Err(Fault::new(FaultKind::WrongState, 0.0))
+        }
+    }
+}
+
+/// A job and its store.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Job<'a> {
+    pub(crate) header: &'a Header,
+    store: &'a [i32],
+}
+
+impl<'a> Job<'a> {
+    /// Width of a side span, in units of the side parameter.
+    pub(crate) fn side_width(&self, span: u16) -> f32 {
+        self.store
+            .get(usize::from(span))
+            .map_or(1.0, |word| f32::from_bits(word.cast_unsigned()))
+    }
+
+    fn record<const N: usize>(&self, index: usize) -> Option<&'a [i32; N]> {
+        let start = width_words(self.header.path_spans, self.header.side_spans) as usize + index * N;
+        self.store.get(start..)?.first_chunk::<N>()
+    }
+
+    /// The record of the patch at these spans; `N` is the number of words of the job's kind.
+    ///
+    /// # Errors
+    /// [`FaultKind::WrongState`] where there is none.
+    pub(crate) fn patch<const N: usize>(&self, path_span: u16, side_span: u16) -> Result<&'a [i32; N]> {
+        let index = usize::from(side_span) * usize::from(self.header.path_spans) + usize::from(path_span);
+        self.record(index)
+            .ok_or(const { Fault::new(FaultKind::WrongState, 0.0) })
+    }
+
+    /// Whether a patch's side boundaries collapse like those of the first patch beside the same pass: a pass is a point as a
+    /// whole or not at all.
+    fn is_alike(&self, index: usize) -> bool {
+        let beside = |index: usize| {
+            let words: &[i32] = match self.header.kind {
+                SurfaceKind::Polynomial => self.record::<POLYNOMIAL_WORDS>(index)?,
+                SurfaceKind::Rational => self.record::<RATIONAL_WORDS>(index)?,
+                SurfaceKind::RevolvedAlongProfile | SurfaceKind::RevolvedAroundAxis => return None,
+            };
+            let (_, _, edges, _) = split_patch(words);
+            Some((edges.side_start, edges.side_end))
+        };
+        beside(index) == beside(index - index % usize::from(self.header.path_spans.max(1)))
+    }
+
+    fn check_widths(&self) -> Result<()> {
+        let count = width_words(self.header.path_spans, self.header.side_spans) as usize;
+        for word in self.store.iter().take(count) {
+            let width = f32::from_bits(word.cast_unsigned());
+            if !(width > 0.0 && width.is_finite()) {
+                return Err(Fault::new(FaultKind::BadHeader, width));
+            }
+        }
+        Ok(())
+    }
+}
+
+fn bad_patch(record: u32) -> Fault {
+    Fault::new(FaultKind::BadPatch, crate::math::arith::count_to_f32(record))
+}
+
+fn bad_length(words: u32) -> Fault {
+    Fault::new(FaultKind::BadLength, crate::math::arith::count_to_f32(words))
+}

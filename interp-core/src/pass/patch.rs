@@ -1,0 +1,152 @@
+//! The patch that a pass is on: the surface at the pass's side parameter, and what ball, feed and scallop limit are in its units.
+
+use crate::fault::Result;
+use crate::job::program::Job;
+use crate::job::{SurfaceKind, ToolSide};
+use crate::math::arith::{centred, power_of_two};
+use crate::pass::interval::Interval;
+use crate::pass::offset::{Locator, origin_q30};
+use crate::pass::position::PassPosition;
+use crate::surface::{
+    Ball, CirclePass, GridPass, IsoLine, OffsetUnits, POLYNOMIAL_WORDS, PathSpeed, ProfilePass,
+    RATIONAL_WORDS, REVOLVED_WORDS, Surface, split_patch, split_revolved,
+};
+
+/// A patch on a pass. Units are 2^-shift nm of the patch.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Patch {
+    pub(crate) surface: Surface,
+    pub(crate) ball: Ball,
+    pub(crate) locator: Locator,
+    pub(crate) interval: Interval,
+    /// Units of 2^-30 nm, see [`origin_q30`].
+    pub(crate) origin: [i64; 3],
+    /// One period's arc, units.
+    pub(crate) arc: f32,
+    /// Units a mm.
+    pub(crate) per_mm: f32,
+    /// The pass is a single point here.
+    pub(crate) point: bool,
+    /// The parametrisation at start and end, once [`Self::find_ends`] has it.
+    ends: Option<[PathSpeed; 2]>,
+}
+
+impl Patch {
+    /// None yet.
+    pub(crate) const NONE: Self = Self {
+        surface: Surface::Grid(GridPass::NONE),
+        ball: Ball::NONE,
+        locator: Locator::NONE,
+        interval: Interval::NONE,
+        origin: [0; 3],
+        arc: 0.0,
+        per_mm: 1.0,
+        point: false,
+        ends: None,
+    };
+
+    /// Collapses the patch of a pass.
+    ///
+    /// # Errors
+    /// [`crate::FaultKind::WrongState`] where the job has no such patch; what the surface's kind finds wrong.
+    #[inline(never)]
+    pub(crate) fn collapse(&mut self, job: &Job<'_>, position: &PassPosition) -> Result<()> {
+        let PassPosition { side, reversed, span } = *position;
+        let at = IsoLine {
+            fraction: side.fraction,
+            side: centred(side.fraction),
+            reversed,
+        };
+        let tool = if job.header.tool_side == ToolSide::Plus {
+            1.0
+        } else {
+            -1.0
+        };
+        // `path x side` turns round with the path, but for a circle, which is the same both ways.
+        let sign = if reversed && job.header.kind != SurfaceKind::RevolvedAroundAxis {
+            -tool
+        } else {
+            tool
+        };
+        match job.header.kind {
+            SurfaceKind::Polynomial => {
+                let words = job.patch::<POLYNOMIAL_WORDS>(span, side.span)?;
+                self.collapse_grid(job, words, side.span, sign, &at);
+            }
+            SurfaceKind::Rational => {
+                let words = job.patch::<RATIONAL_WORDS>(span, side.span)?;
+                self.collapse_grid(job, words, side.span, sign, &at);
+            }
+            kind => {
+                let words = job.patch::<REVOLVED_WORDS>(span, side.span)?;
+                let (shift, height_nm) = split_revolved(words);
+                self.origin = origin_q30([0, 0, height_nm]);
+                self.measure(job, shift, side.span, sign);
+                let radius = sign * job.header.ball_radius_mm * self.per_mm;
+                if kind == SurfaceKind::RevolvedAlongProfile {
+                    let mut pass = ProfilePass::default();
+                    pass.collapse(words, &at, radius);
+                    self.surface = Surface::Profile(pass);
+                } else {
+                    let mut pass = CirclePass::default();
+                    pass.collapse(words, &at, radius)?;
+                    self.surface = Surface::Circle(pass);
+                }
+            }
+        }
+        self.point = self.surface.is_point();
+        self.ends = None;
+        Ok(())
+    }
+
+    /// Finds the parametrisation at both ends, for [`Self::start`] and [`Self::end`] to have it at hand.
+    pub(crate) fn find_ends(&mut self) {
+        self.ends = Some([self.start(), self.end()]);
+    }
+
+    /// Whether [`Self::find_ends`] was here.
+    pub(crate) const fn has_ends(&self) -> bool {
+        self.ends.is_some()
+    }
+
+    /// The parametrisation where the patch begins, in the direction of travel.
+    pub(crate) fn start(&self) -> PathSpeed {
+        match self.ends {
+            Some([start, _]) => start,
+            None => self.surface.path_at(0),
+        }
+    }
+
+    /// The parametrisation where it ends.
+    pub(crate) fn end(&self) -> PathSpeed {
+        match self.ends {
+            Some([_, end]) => end,
+            None => self.surface.path_at(u64::MAX),
+        }
+    }
+
+    /// A patch of a grid, with as many blocks as it has coordinates.
+    fn collapse_grid(&mut self, job: &Job<'_>, words: &[i32], side_span: u16, sign: f32, at: &IsoLine) {
+        let (origin_nm, shift, edges, blocks) = split_patch(words);
+        self.origin = origin_q30(origin_nm);
+        self.measure(job, shift, side_span, sign);
+        if !matches!(self.surface, Surface::Grid(_)) {
+            self.surface = Surface::Grid(GridPass::NONE);
+        }
+        if let Surface::Grid(pass) = &mut self.surface {
+            pass.collapse(blocks, edges, at);
+        }
+    }
+
+    /// Ball, feed and scallop limit in the patch's units.
+    fn measure(&mut self, job: &Job<'_>, shift: u8, side_span: u16, sign: f32) {
+        let header = job.header;
+        self.per_mm = 1e6 * power_of_two(shift.into());
+        let units = OffsetUnits::new(header.ball_radius_mm, shift);
+        self.ball = Ball::new(&units, sign);
+        self.locator = Locator::new(&units);
+        self.arc = header.feed_mm_s * header.period_s * self.per_mm;
+        let width = job.side_width(side_span);
+        self.interval = Interval::new(header.ball_radius_mm, header.scallop_mm, self.per_mm, width);
+    }
+}
