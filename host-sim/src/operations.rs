@@ -13,7 +13,6 @@ use counted_core::{
 use crate::budget::{SURFACES, TICKS};
 use crate::job_file::JobFile;
 use crate::prepare::{Prepared, prepare};
-use crate::remote::qemu::workspace;
 
 /// Operations in the columns of the paper's Table 1.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -203,12 +202,12 @@ pub fn count(job: &Prepared, ticks: u32) -> Result<Counted, Fault> {
     })
 }
 
-/// Our rows of the paper's table, in the order of [`PAPER`]: counted on the sample jobs of this checkout, if they are there.
+/// Our rows of the paper's table, in the order of [`PAPER`]: counted on the sample jobs, if they are there.
 #[must_use]
 pub fn table_1() -> Option<[Operations; 3]> {
     let row = |surface: &str| {
         let (_, job) = SURFACES.iter().find(|(name, _)| *name == surface)?;
-        let job = JobFile::load(&workspace().join(format!("jobs/{job}.toml"))).ok()?;
+        let job = JobFile::load(&programs::sample_job(job)).ok()?;
         let counted = count(&prepare(&job).ok()?, TICKS).ok()?;
         (counted.samples > 0).then_some(counted.sample.operations)
     };

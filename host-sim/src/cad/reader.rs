@@ -9,19 +9,12 @@ use std::time::{Duration, Instant};
 use serde::{Deserialize, Serialize};
 
 use super::{CadError, Face};
-use crate::remote::qemu::cargo;
+use programs::Part;
 
 /// Largest file that is read, bytes: a file takes some 30 times its size in memory.
 const BYTES_MAX: u64 = 64 << 20;
 /// Time that the reader may take: ten times what the largest sound file takes.
 const TIME_MAX: Duration = Duration::from_secs(120);
-/// Where the reader is built: like the firmware, in a folder of its own.
-const FOLDER: &str = "target/cad-reader";
-/// Names the profile that it is built with, if not [`PROFILE`]: `./check` takes `plain`, which is built in less than half the time, and reads more
-/// slowly.
-const PROFILE_VARIABLE: &str = "ISOFEED_CAD_PROFILE";
-const PROFILE: &str = "cad";
-
 /// What a file holds.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Model {
@@ -38,27 +31,14 @@ pub struct Model {
 pub fn read(path: &Path) -> Result<Model, CadError> {
     let file = path.display().to_string();
     check(&file, path)?;
-    let profile = std::env::var(PROFILE_VARIABLE).unwrap_or_else(|_| PROFILE.to_owned());
-    let built = format!("{FOLDER}/{profile}/cad-reader");
-    if !crate::remote::qemu::workspace().join(&built).exists() {
-        eprintln!("building the reader of CAD files (once, some minutes)");
+    if programs::needs_build(Part::CadReader) {
+        eprintln!("building the reader of CAD files (once, one to two minutes)");
     }
-    let build = [
-        "build",
-        "--quiet",
-        "--locked",
-        "--profile",
-        &profile,
-        "-p",
-        "cad-reader",
-        "--target-dir",
-        FOLDER,
-    ];
-    let reader = cargo(&build, &built).map_err(|error| {
+    let reader = programs::find(Part::CadReader).map_err(|error| {
         CadError::new(
             &file,
-            format!("the reader of CAD files cannot be built: {error}"),
-            "run it in a checkout of the project, with its toolchain (./demo sets it up)",
+            format!("there is no reader of CAD files: {error}"),
+            error.remedy(),
         )
     })?;
     run(&file, path, &reader)

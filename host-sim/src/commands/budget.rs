@@ -340,6 +340,12 @@ fn report(arguments: &Arguments, counted: &[Counted]) -> Result<()> {
 fn hold(arguments: &Arguments, figures: &[Figure]) -> Result<()> {
     let path = golden::path();
     if arguments.bless {
+        if programs::checkout().is_none() {
+            return Err(Failure::input(
+                "--bless writes a file of the project",
+                "run it in a checkout",
+            ));
+        }
         return std::fs::write(&path, golden::table(figures)).map_err(|error| cannot_write(&path, &error));
     }
     if !arguments.check {
