@@ -12,12 +12,11 @@ use cycle_plugin::account::Account;
 use cycle_plugin::decode::{Branch, Class, decode};
 use cycle_plugin::plan::{Plan, Stage};
 use cycle_plugin::record::{RECORD_BYTES, Record};
-use host_sim::budget::lab::Lab;
-use host_sim::budget::search::search;
-use host_sim::budget::{self, PERIOD_CYCLES, figures, golden, graph, image, measure::Bench};
-use host_sim::job_file::JobFile;
-use host_sim::prepare::prepare;
-use host_sim::remote::qemu::{self, Qemu};
+use cycles::lab::Lab;
+use cycles::search::search;
+use cycles::{PERIOD_CYCLES, figures, golden, graph, image, measure::Bench};
+use machine::prepare::prepare;
+use machine::remote::qemu::{self, Qemu};
 
 /// A guest of a few instructions. The thread starts TIM5 and pends USART1; USART1's handler pends TIM2, whose priority is
 /// higher, twice; TIM2's handler reads TIM5 before and after its work, and sends the difference, four bytes.
@@ -375,8 +374,8 @@ fn no_stage_has_grown() {
     let (plan, _) = image::read(&path).unwrap();
     let bench = Bench::new(&path, &plan).unwrap();
     let mut all = Vec::new();
-    for (name, path, ticks) in budget::jobs() {
-        let prepared = prepare(&JobFile::load(&path).unwrap()).unwrap();
+    for (name, path, ticks) in cycles::jobs() {
+        let prepared = prepare(&job_file::load(&path).unwrap()).unwrap();
         all.extend(figures::figures(name, &bench.run(&prepared, ticks).unwrap()));
     }
     for figure in all.iter().filter(|figure| figure.stage == "pulses") {

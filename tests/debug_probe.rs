@@ -10,11 +10,11 @@ use std::sync::OnceLock;
 use std::time::{Duration, Instant};
 
 use boards::{SKR_PRO, STM32F405};
-use host_sim::budget::image::chip;
+use cycles::image::chip;
 use host_sim::probe::{Event, Image, Line, NotRun, Problem, Program, Request, Target};
-use host_sim::remote::Session;
-use host_sim::remote::qemu::{self, Qemu};
 use integration_tests::{dome, upload};
+use machine::remote::Session;
+use machine::remote::qemu::{self, Qemu};
 
 /// A selector of no probe: whatever is connected where the tests run is left alone.
 const NOWHERE: &str = "0000:0000:nowhere";

@@ -4,11 +4,11 @@
 use std::path::PathBuf;
 use std::process::{Command, Stdio};
 
-use host_sim::approach::{Kind, PassPath, passes};
-use host_sim::export::{Dialect, ExportError, Exported, Options, export};
-use host_sim::gcode::FeedMode;
-use host_sim::job_file::{JobFile, Pattern};
-use host_sim::oracle::Oracle;
+use approach::export::{Dialect, ExportError, Exported, Options, export};
+use approach::gcode::FeedMode;
+use approach::{Kind, PassPath, passes};
+use job::{Job, Pattern};
+use oracle::Oracle;
 use programs::checkout;
 
 /// The interpreter prints four decimals, and the program has four: a place is within half of each on every axis.
@@ -152,7 +152,7 @@ struct Bounds {
 }
 
 /// Follows one pass; returns the moves that it took and their time.
-fn follow(job: &JobFile, pass: &PassPath<'_>, moves: &[Move], bounds: &Bounds) -> (usize, f64) {
+fn follow(job: &Job, pass: &PassPath<'_>, moves: &[Move], bounds: &Bounds) -> (usize, f64) {
     let end = pass.at(pass.ends[1]).unwrap().contact.cl_mm;
     let mut path = pass.ends[0];
     let mut time_s = 0.0;
@@ -189,7 +189,7 @@ fn follow(job: &JobFile, pass: &PassPath<'_>, moves: &[Move], bounds: &Bounds) -
     panic!("pass {} does not end", pass.pass);
 }
 
-fn check_speed(job: &JobFile, arc_mm: f64, time_s: f64, share: f64, cut: &Move) {
+fn check_speed(job: &Job, arc_mm: f64, time_s: f64, share: f64, cut: &Move) {
     let wanted = job.feed_mm_s() * time_s;
     // Places are rounded at both ends.
     let off = (arc_mm - wanted).abs() - 2.0 * ROUNDED_MM;
@@ -201,7 +201,7 @@ fn check_speed(job: &JobFile, arc_mm: f64, time_s: f64, share: f64, cut: &Move) 
 }
 
 /// Exports a job, and holds what the interpreter makes of it against the exact path.
-fn check(job: &JobFile, options: &Options, bounds: &Bounds) -> Exported {
+fn check(job: &Job, options: &Options, bounds: &Bounds) -> Exported {
     let exported = export(job, options, &|| ()).unwrap();
     if options.dialect == Dialect::Grbl {
         check_grbl(&exported.text);
@@ -259,7 +259,7 @@ fn check_plunge(link: &[Move], safe_z_mm: f64) {
 }
 
 /// Along the boundary: each place is one radius off the surface at the boundary's path parameter.
-fn check_step_over(job: &JobFile, pass: &PassPath<'_>, link: &[Move]) {
+fn check_step_over(job: &Job, pass: &PassPath<'_>, link: &[Move]) {
     let mut across = pass.oracle.clone();
     across.along = pass.oracle.across();
     let mut side = pass.side;
@@ -313,15 +313,15 @@ fn options(dialect: Dialect, kind: Kind, feed_mode: FeedMode) -> Options {
 }
 
 /// A sample job with a larger scallop, so fewer passes.
-fn job(name: &str, scallop_mm: f64) -> JobFile {
+fn job(name: &str, scallop_mm: f64) -> Job {
     let path = checkout().unwrap().join(format!("jobs/{name}.toml"));
-    let mut job = JobFile::load(&path).unwrap();
+    let mut job = job_file::load(&path).unwrap();
     job.scallop_mm = scallop_mm;
     job
 }
 
 /// Chords end on the exact path; eqn 7 makes the contact's mean speed on each the feed.
-fn of_linear(job: &JobFile) -> Bounds {
+fn of_linear(job: &Job) -> Bounds {
     Bounds {
         ends_mm: 0.0,
         places_mm: job.chord_mm,
@@ -331,7 +331,7 @@ fn of_linear(job: &JobFile) -> Bounds {
 }
 
 /// Arcs hold the path's tolerance everywhere and the speed within 1 % of the feed.
-fn of_curve(job: &JobFile) -> Bounds {
+fn of_curve(job: &Job) -> Bounds {
     Bounds {
         ends_mm: job.chord_mm,
         places_mm: job.chord_mm,
@@ -409,7 +409,7 @@ fn what_no_machine_could_follow_is_refused() {
         export(&plate, &surface, &|| ()).unwrap_err(),
         ExportError::SurfaceNeedsTheCore
     );
-    let sides = [host_sim::job_file::Side::Plus, host_sim::job_file::Side::Minus];
+    let sides = [job::Side::Plus, job::Side::Minus];
     let faces_down = sides.map(|side| {
         plate.side = side;
         matches!(export(&plate, &plain, &|| ()), Err(ExportError::FacesDown { .. }))

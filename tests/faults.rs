@@ -1,13 +1,13 @@
 //! Faults are states: each kind that a surface can cause, with its code, value and place; the position is kept.
 #![allow(clippy::unwrap_used, reason = "a test may fail by panic")]
 
-use host_sim::job_file::{Along, JobFile, Pattern, Side, Spacing, SurfaceSpec};
-use host_sim::prepare::{Prepared, prepare};
 use interp_core::interpolator::STOP_PERIODS;
 use interp_core::{Fault, FaultKind, Interpolator, Place, Request, Sample, State};
+use job::{Along, Job, Pattern, Side, Spacing, SurfaceSpec};
+use machine::prepare::{Prepared, prepare};
 
-fn job(surface: SurfaceSpec, radius_mm: f64) -> JobFile {
-    JobFile {
+fn job(surface: SurfaceSpec, radius_mm: f64) -> Job {
+    Job {
         surface,
         radius_mm,
         feed_mm_min: 600.0,
@@ -75,7 +75,7 @@ fn ball_in_a_valley_that_is_too_tight() {
     assert_eq!(fault.kind, FaultKind::BallDoesNotFit);
     assert!(fault.value > 1.0 - 2e-5 && fault.value < 1.01, "{fault:?}");
     // The oracle agrees: it just fits at the last sample, and no more 5 um further.
-    let oracle = host_sim::oracle::Oracle::new(&job).unwrap();
+    let oracle = oracle::Oracle::new(&job).unwrap();
     let [u, v] = prepared.parameters(last.path, last.side);
     assert!(oracle.contact(u, v).unwrap().fit(4.0) < 1.0);
     assert!(oracle.contact(u + 1e-3, v).unwrap().fit(4.0) > 1.0);
@@ -191,7 +191,7 @@ fn too_many_patches() {
             .collect();
         let poles = knots.len() - 4;
         let pole = |i: usize, j: usize| [i as f64, j as f64, 0.0, 1.0];
-        SurfaceSpec::Nurbs(host_sim::job_file::NurbsSpec {
+        SurfaceSpec::Nurbs(job::NurbsSpec {
             degree: [3, 3],
             knots_u: knots.clone(),
             knots_v: knots,
@@ -257,12 +257,12 @@ fn hold_and_resume_change_nothing() {
 }
 
 /// A trough of two patches that meet at u = 0.4: x = 20 u, y = 20 v, z = 8 u^2.
-fn trough(pattern: Pattern) -> JobFile {
+fn trough(pattern: Pattern) -> Job {
     const KNOT: f64 = 0.4;
     // Poles of a quadratic by its polar form: u -> (a + b)/2, u^2 -> a b.
     let pole = |a: f64, b: f64, y: f64| [10.0 * (a + b), y, 8.0 * a * b, 1.0];
     let row = |(a, b)| vec![pole(a, b, 0.0), pole(a, b, 20.0)];
-    let surface = SurfaceSpec::Nurbs(host_sim::job_file::NurbsSpec {
+    let surface = SurfaceSpec::Nurbs(job::NurbsSpec {
         degree: [2, 1],
         knots_u: vec![0.0, 0.0, 0.0, KNOT, 1.0, 1.0, 1.0],
         knots_v: vec![0.0, 0.0, 1.0, 1.0],

@@ -1,13 +1,11 @@
 //! Feed within the axes' limits, links, and what an operator does, on the core itself.
 #![allow(clippy::unwrap_used, reason = "a test may fail by panic")]
 
-use std::sync::OnceLock;
-
-use host_sim::job_file::JobFile;
-use host_sim::prepare::prepare;
 use integration_tests::{dome, scaled_dome};
 use interp_core::{Axes, FaultKind, Header, Inputs, Interpolator, Pattern, Place, Request, Sample, State};
+use machine::prepare::prepare;
 use proptest::prelude::*;
+use std::sync::OnceLock;
 
 /// Velocity and acceleration may be above the limit by so much, and jerk: what the differences of whole nanometres cannot tell is taken off.
 const MORE: [f64; 3] = [1.01, 1.01, 1.05];
@@ -134,7 +132,7 @@ fn sample_jobs_hold_the_limits() {
         ("torus", 1.0, Pattern::Zigzag),
         ("torus", 6.0, Pattern::Zig),
     ] {
-        let prepared = prepare(&JobFile::load(&jobs.join(format!("{name}.toml"))).unwrap()).unwrap();
+        let prepared = prepare(&job_file::load(&jobs.join(format!("{name}.toml"))).unwrap()).unwrap();
         let mut header = prepared.header;
         header.pattern = pattern;
         let (top, passes) = height(&header, &prepared.words);

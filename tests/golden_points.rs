@@ -1,14 +1,14 @@
 //! The core against the golden table, which was computed elsewhere with 40 digits: points, normals, intervals, schedules.
 #![allow(clippy::unwrap_used, reason = "a test may fail by panic")]
 
-use host_sim::job_file::{Along, JobFile};
-use host_sim::machine::Machine;
-use host_sim::prepare::{Axis, Prepared, prepare};
 use integration_tests::golden::{Case, cases};
 use interp_core::Place;
+use job::{Along, Job};
+use machine::Machine;
+use machine::prepare::{Axis, Prepared, prepare};
 
 /// The job file of a golden case, with its along, tool side, ball and scallop limit.
-fn job(case: &Case) -> JobFile {
+fn job(case: &Case) -> Job {
     let name = match case.surface.as_str() {
         "revolved" => "revolved",
         "ruled_as_printed" => "ruled_printed",
@@ -17,16 +17,16 @@ fn job(case: &Case) -> JobFile {
         other => panic!("no job for {other}"),
     };
     let path = format!("{}/../jobs/{name}.toml", env!("CARGO_MANIFEST_DIR"));
-    let mut job = JobFile::load(path.as_ref()).unwrap();
+    let mut job = job_file::load(path.as_ref()).unwrap();
     job.along = if case.along == "u" { Along::U } else { Along::V };
     job.radius_mm = case.radius_mm;
     job.scallop_mm = case.scallop_mm;
     // The table's schedules are the paper's.
-    job.spacing = host_sim::job_file::Spacing::FirstOrder;
+    job.spacing = job::Spacing::FirstOrder;
     job.side = if case.tool_side > 0.0 {
-        host_sim::job_file::Side::Plus
+        job::Side::Plus
     } else {
-        host_sim::job_file::Side::Minus
+        job::Side::Minus
     };
     job
 }

@@ -5,16 +5,16 @@ use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 
-use host_sim::cad::{
+use cad::{
     Axis, Face, Form, JobOptions, Machinable, Model, Options, SplineSurface, Surface, machinable, read,
     write_job,
 };
-use host_sim::commands::BOUNDS;
-use host_sim::job_file::{JobFile, NurbsSpec};
-use host_sim::machine::Machine;
-use host_sim::oracle::Oracle;
-use host_sim::prepare::prepare;
-use host_sim::survey::Survey;
+use inspect::BOUNDS;
+use job::{Job, NurbsSpec};
+use machine::Machine;
+use machine::prepare::prepare;
+use oracle::Oracle;
+use verify::survey::Survey;
 
 /// Distance of an exactly imported surface from the kernel's points, mm. Files are written to 9 (IGES) and 12 digits (STEP).
 const EXACT_MM: f64 = 1e-6;
@@ -283,8 +283,8 @@ fn formats_units_and_placements_agree() {
             }
         }
     }
-    let job = JobFile::load(&workspace().join("jobs/freeform.toml")).unwrap();
-    let host_sim::job_file::SurfaceSpec::Nurbs(freeform) = job.surface else {
+    let job = job_file::load(&workspace().join("jobs/freeform.toml")).unwrap();
+    let job::SurfaceSpec::Nurbs(freeform) = job.surface else {
         panic!("the mouse is a B-spline")
     };
     for (a, b) in step
@@ -301,10 +301,10 @@ fn formats_units_and_placements_agree() {
 }
 
 /// Runs so many samples of a job, and on to the end of the pass.
-fn worst_nm(job: &JobFile, most: u64) -> (f64, f64, u64, Option<String>) {
+fn worst_nm(job: &Job, most: u64) -> (f64, f64, u64, Option<String>) {
     let oracle = Oracle::new(job).unwrap();
     let prepared = prepare(job).unwrap();
-    let mut survey = Survey::new(&prepared, &oracle, None, None);
+    let mut survey = Survey::new(&oracle, None, None);
     let mut machine = Machine::load(&prepared).unwrap();
     let (mut samples, mut last, mut cut) = (0, None, false);
     let result = machine.run(|sample| {
@@ -312,7 +312,7 @@ fn worst_nm(job: &JobFile, most: u64) -> (f64, f64, u64, Option<String>) {
         last = Some(sample.pass);
         samples += 1;
         cut = samples >= most && begins;
-        survey.add(sample).is_ok() && !cut
+        survey.add(&inspect::plain(&prepared, sample)).is_ok() && !cut
     });
     let fault = result.as_ref().err().map(|fault| format!("{fault:?}"));
     let report = survey.finish(result.is_ok() && !cut).unwrap().report;
@@ -332,7 +332,7 @@ fn samples_on_every_face() {
         for face in &model.faces {
             let made = taken(name, face);
             let written = write_job(name, face, &made, &JobOptions::default());
-            let mut job = JobFile::parse("job", &written.text)
+            let mut job = job_file::parse("job", &written.text)
                 .unwrap_or_else(|error| panic!("{name}, face {}: {error}", face.number));
             // Fast, and with passes far apart: a few thousand samples on each part of the face.
             job.feed_mm_min = 6000.0;
@@ -428,7 +428,8 @@ fn trimmed_faces_are_said() {
 #[test]
 fn sample_jobs_out_of_files() {
     for (name, patches) in [("blade", 12), ("hood", 247)] {
-        let job = JobFile::load(&workspace().join(format!("jobs/cad/{name}.toml"))).unwrap();
+        let job =
+            job_file::load_with(&workspace().join(format!("jobs/cad/{name}.toml")), &cad::Faces).unwrap();
         assert_eq!(prepare(&job).unwrap().patches(), patches, "{name}");
         let (position_nm, ripple_pct, samples, fault) = worst_nm(&job, u64::MAX);
         println!("{name}: {position_nm:.2} nm, ripple {ripple_pct:.6} %, {samples} samples");
@@ -455,7 +456,7 @@ fn jobs_that_name_a_file() {
         )
     };
     let name = folder.join("job.toml").display().to_string();
-    let job = JobFile::parse(&name, &text("path = \"mouse.step\"\nface = 1")).unwrap();
+    let job = job_file::parse(&name, &text("path = \"mouse.step\"\nface = 1")).unwrap();
     let model = read(&cad("mouse.step")).unwrap();
     let made = machinable("", &model.faces[0], &Options::default()).unwrap();
     assert_eq!(job.surface, made.spec());
@@ -473,7 +474,7 @@ fn jobs_that_name_a_file() {
             "does not belong here",
         ),
     ] {
-        let error = JobFile::parse(&name, &text(surface)).unwrap_err();
+        let error = job_file::parse(&name, &text(surface)).unwrap_err();
         assert!(error.what().contains(words), "{surface}: {error}");
         assert_eq!(error.line_and_column().unwrap().0, line, "{surface}: {error}");
     }

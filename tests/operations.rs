@@ -3,18 +3,17 @@
 
 use std::path::PathBuf;
 
-use host_sim::budget::SURFACES;
-use host_sim::job_file::JobFile;
-use host_sim::operations::{self, Count, Operations};
-use host_sim::prepare::{Prepared, prepare};
+use cycles::SURFACES;
 use interp_core::{Interpolator, Request, State};
+use machine::prepare::{Prepared, prepare};
+use study::operations::{self, Count, Operations};
 
 fn jobs() -> PathBuf {
     PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("../jobs")
 }
 
 fn prepared(path: &std::path::Path) -> Prepared {
-    prepare(&JobFile::load(path).unwrap()).unwrap()
+    prepare(&job_file::load(path).unwrap()).unwrap()
 }
 
 /// The plain core with a job.

@@ -3,9 +3,9 @@
 
 use std::path::Path;
 
-use host_sim::job_file::{Along, JobFile, Spacing};
-use host_sim::oracle::Oracle;
 use integration_tests::golden::{self, Case, Point};
+use job::{Along, Spacing};
+use oracle::Oracle;
 
 /// What f64 leaves of 16 digits after the longest of these formulas, relative to the size of what is computed.
 const TOLERANCE: f64 = 2e-13;
@@ -29,7 +29,7 @@ fn oracle_of(case: &Case) -> Oracle {
         other => panic!("no job for {other:?}"),
     };
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join(format!("../jobs/{name}.toml"));
-    let mut job = JobFile::load(&path).unwrap();
+    let mut job = job_file::load(&path).unwrap();
     // The table's schedules are the paper's.
     job.spacing = Spacing::FirstOrder;
     assert_eq!(job.surface.domain(), case.range, "{name}");

@@ -3,12 +3,12 @@
 
 use std::sync::OnceLock;
 
-use host_sim::approach::Kind;
-use host_sim::operations::Operations;
-use host_sim::paper::table_1::{PRINTED, cycles_of, items};
-use host_sim::paper::{Study, study};
-use host_sim::report::paper::percent;
-use host_sim::speeds::Speed;
+use approach::Kind;
+use study::operations::Operations;
+use study::paper::table_1::{PRINTED, cycles_of, items};
+use study::paper::{Study, study};
+use study::report::percent;
+use verify::speeds::Speed;
 
 fn shared() -> &'static Study {
     static STUDY: OnceLock<Study> = OnceLock::new();
@@ -220,7 +220,7 @@ fn loads(page: &str) -> Vec<&str> {
 
 #[test]
 fn page_needs_nothing_else_and_shows_every_figure() {
-    let page = host_sim::report::paper::page(shared()).unwrap();
+    let page = study::report::page(shared()).unwrap();
     assert_eq!(loads(&page), [""; 0], "asks for something");
     assert!(!page.contains("NaN") && !page.contains("inf ") && !page.contains(env!("CARGO_MANIFEST_DIR")));
     for figure in [3, 4, 5, 7, 8, 9] {
@@ -249,7 +249,7 @@ fn page_needs_nothing_else_and_shows_every_figure() {
 #[test]
 fn written_data_are_the_figures() {
     let folder = tempfile::tempdir().unwrap();
-    host_sim::report::paper::write(folder.path(), shared()).unwrap();
+    study::report::write(folder.path(), shared()).unwrap();
     let text = std::fs::read_to_string(folder.path().join("figures.json")).unwrap();
     let data: serde_json::Value = serde_json::from_str(&text).unwrap();
     let column = |figure: &serde_json::Value, name: &str| -> Vec<f64> {

@@ -5,19 +5,20 @@
 use std::collections::BTreeMap;
 use std::path::Path;
 
-use host_sim::job_file::{Along, JobFile, Pattern};
-use host_sim::machine::Machine;
-use host_sim::motion::point::LineLimits;
-use host_sim::motion::{AxisLimits, PassPath, optimum};
-use host_sim::oracle::Oracle;
-use host_sim::prepare::prepare;
 use interp_core::{Place, State};
+use job::AxisLimits;
+use job::{Along, Job, Pattern};
+use machine::Machine;
+use machine::prepare::prepare;
+use oracle::Oracle;
+use verify::motion::point::LineLimits;
+use verify::motion::{PassPath, optimum};
 
 /// A machine with the same limits on all axes but a slower z: the one of the README's figures.
 const LIMITS: AxisLimits = AxisLimits {
-    velocity: [100.0, 100.0, 50.0],
-    acceleration: [1000.0; 3],
-    jerk: [20_000.0; 3],
+    velocity_mm_s: [100.0, 100.0, 50.0],
+    acceleration_mm_s2: [1000.0; 3],
+    jerk_mm_s3: [20_000.0; 3],
 };
 /// What a pass may take, over the best that is known: asked is a tenth more.
 const ABOVE: f64 = 1.10;
@@ -25,18 +26,16 @@ const ABOVE: f64 = 1.10;
 const ABOVE_STRAIGHT: f64 = 1.02;
 const WHOLE_PERIODS: f64 = 3.0;
 
-fn on_machine(name: &str, times: f64) -> JobFile {
+fn on_machine(name: &str, times: f64) -> Job {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join(format!("../jobs/{name}.toml"));
-    let job = JobFile::load(&path).unwrap();
+    let job = job_file::load(&path).unwrap();
     let feed_mm_s = times * job.feed_mm_s();
     limited(job, feed_mm_s)
 }
 
-fn limited(mut job: JobFile, feed_mm_s: f64) -> JobFile {
+fn limited(mut job: Job, feed_mm_s: f64) -> Job {
     job.feed_mm_min = 60.0 * feed_mm_s;
-    job.machine.velocity_max_mm_s = Some(LIMITS.velocity);
-    job.machine.acceleration_max_mm_s2 = Some(LIMITS.acceleration);
-    job.machine.jerk_max_mm_s3 = Some(LIMITS.jerk);
+    job.machine.limits = Some(LIMITS);
     job
 }
 
@@ -49,7 +48,7 @@ struct Ran {
 }
 
 /// Runs a job until the end of its pass `last`.
-fn run(job: &JobFile, last: u32) -> BTreeMap<u32, Ran> {
+fn run(job: &Job, last: u32) -> BTreeMap<u32, Ran> {
     let prepared = prepare(job).unwrap();
     let mut passes = BTreeMap::<u32, (Place, u32)>::new();
     let mut machine = Machine::load(&prepared).unwrap();
@@ -77,7 +76,7 @@ fn run(job: &JobFile, last: u32) -> BTreeMap<u32, Ran> {
 }
 
 /// Time of a pass over that of the best motion known, and over the bound that no motion is below.
-fn compared(job: &JobFile, oracle: &Oracle, ran: &Ran) -> [f64; 2] {
+fn compared(job: &Job, oracle: &Oracle, ran: &Ran) -> [f64; 2] {
     let path = PassPath::of_pass(oracle, ran.side).unwrap();
     let best = optimum(&path, job.feed_mm_s(), &LIMITS, job.machine.period_s()).unwrap();
     // What it is held against keeps the limits, and is no faster than can be.
@@ -118,13 +117,13 @@ fn straight(length_mm: f64, feed_mm_s: f64) -> [f64; 2] {
     let scale = length_mm / 80.0_f64.hypot(20.0);
     let text = include_str!("../jobs/ruled_reconstructed.toml").replace("along = \"u\"", "along = \"v\"");
     let text = format!("{text}\n[placement]\nscale = {scale}\n");
-    let job = limited(JobFile::parse("straight", &text).unwrap(), feed_mm_s);
+    let job = limited(job_file::parse("straight", &text).unwrap(), feed_mm_s);
     // From (20, y, z) to (100, y - 20, z), times the scale.
     let slope = 80.0 / 80.0_f64.hypot(20.0);
     let exact = LineLimits {
-        velocity: (LIMITS.velocity[0] / slope).min(feed_mm_s),
-        acceleration: LIMITS.acceleration[0] / slope,
-        jerk: LIMITS.jerk[0] / slope,
+        velocity: (LIMITS.velocity_mm_s[0] / slope).min(feed_mm_s),
+        acceleration: LIMITS.acceleration_mm_s2[0] / slope,
+        jerk: LIMITS.jerk_mm_s3[0] / slope,
     };
     [run(&job, 0)[&0].time_s, exact.rest_to_rest_s(length_mm)]
 }

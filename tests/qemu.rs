@@ -2,20 +2,18 @@
 //! differ. Needs `qemu-system-arm`; builds the firmware.
 #![allow(clippy::unwrap_used, reason = "a test may fail by panic")]
 
-use std::path::{Path, PathBuf};
-use std::sync::OnceLock;
-
-use host_sim::job_file::JobFile;
-use host_sim::machine::Machine;
-use host_sim::prepare::{Prepared, prepare};
-use host_sim::remote::drive::{self, Expected};
-use host_sim::remote::operate::{self, Setup};
-use host_sim::remote::qemu::{self, Qemu};
-use host_sim::remote::session::Event;
-use host_sim::remote::{RemoteError, Session};
 use interp_core::{FaultKind, Sample, State};
+use machine::Machine;
+use machine::prepare::{Prepared, prepare};
+use machine::remote::drive::{self, Expected};
+use machine::remote::operate::{self, Setup};
+use machine::remote::qemu::{self, Qemu};
+use machine::remote::session::Event;
+use machine::remote::{RemoteError, Session};
 use protocol::digest::Digest;
 use protocol::message::{Clock, Configuration, HostGone, InputLines, Reason, Report, Request, Status};
+use std::path::{Path, PathBuf};
+use std::sync::OnceLock;
 
 fn image() -> &'static Path {
     static IMAGE: OnceLock<PathBuf> = OnceLock::new();
@@ -31,7 +29,7 @@ fn board() -> (Qemu, Session) {
 
 fn job(name: &str) -> Prepared {
     let path = format!("{}/../jobs/{name}.toml", env!("CARGO_MANIFEST_DIR"));
-    prepare(&JobFile::load(path.as_ref()).unwrap()).unwrap()
+    prepare(&job_file::load(path.as_ref()).unwrap()).unwrap()
 }
 
 /// Samples and passes as this machine computes them.

@@ -1,14 +1,14 @@
 //! Random surfaces, also nearly degenerate ones: every sample is right, or the fault that stopped the run is.
 #![allow(clippy::unwrap_used, reason = "a test may fail by panic")]
 
-use host_sim::job_file::{Along, JobFile, Pattern, Side, Spacing, SurfaceSpec};
-use host_sim::machine::Machine;
-use host_sim::oracle::Oracle;
-use host_sim::prepare::prepare;
-use host_sim::survey::Survey;
 use interp_core::{Fault, FaultKind};
+use job::{Along, Job, Pattern, Side, Spacing, SurfaceSpec};
+use machine::Machine;
+use machine::prepare::prepare;
+use oracle::Oracle;
 use proptest::prelude::*;
 use proptest::test_runner::RngSeed;
+use verify::survey::Survey;
 
 /// What a job comes to: its fault and where, and the worst figures.
 struct Ran {
@@ -26,10 +26,10 @@ struct Ran {
 }
 
 /// Runs so many samples, and on to the end of the pass: the survey knows a pass's last step by what follows.
-fn run(job: &JobFile, most: u64) -> Ran {
+fn run(job: &Job, most: u64) -> Ran {
     let oracle = Oracle::new(job).unwrap();
     let prepared = prepare(job).unwrap();
-    let mut survey = Survey::new(&prepared, &oracle, None, None);
+    let mut survey = Survey::new(&oracle, None, None);
     let mut machine = Machine::load(&prepared).unwrap();
     let mut samples = 0;
     let (mut first, mut last, mut cut) = (None, None, false);
@@ -42,7 +42,7 @@ fn run(job: &JobFile, most: u64) -> Ran {
         last = Some(here);
         samples += 1;
         cut = samples >= most && begins;
-        survey.add(sample).is_ok() && !cut
+        survey.add(&inspect::plain(&prepared, sample)).is_ok() && !cut
     });
     let (pass, path, side) = machine.place();
     let across = last.is_some_and(|(last, _)| last != pass) && job.pattern == Pattern::Zig;
@@ -66,8 +66,8 @@ fn run(job: &JobFile, most: u64) -> Ran {
     }
 }
 
-fn job(surface: SurfaceSpec, along: Along, pattern: Pattern) -> JobFile {
-    JobFile {
+fn job(surface: SurfaceSpec, along: Along, pattern: Pattern) -> Job {
+    Job {
         surface,
         radius_mm: 3.0,
         feed_mm_min: 600.0,
@@ -98,7 +98,7 @@ fn bumpy(random: &[f64], bump: f64) -> SurfaceSpec {
 }
 
 /// The oracle's worst r k and least sine between S_u and S_v close to a place.
-fn near(job: &JobFile, [u, v]: [f64; 2]) -> (f64, f64) {
+fn near(job: &Job, [u, v]: [f64; 2]) -> (f64, f64) {
     let oracle = Oracle::new(job).unwrap();
     let (mut fit, mut sine) = (f64::NEG_INFINITY, f64::INFINITY);
     for i in -10..=10 {
@@ -120,7 +120,7 @@ fn near(job: &JobFile, [u, v]: [f64; 2]) -> (f64, f64) {
 }
 
 /// Whether the normal turns by 120 degrees (or a little less) between the fault and the sample beside it.
-fn turns(job: &JobFile, ran: &Ran) -> bool {
+fn turns(job: &Job, ran: &Ran) -> bool {
     let oracle = Oracle::new(job).unwrap();
     let normal = |[u, v]: [f64; 2]| oracle.contact(u, v).map(|contact| contact.normal);
     match (normal(ran.place), ran.neighbour.map(normal)) {
@@ -131,7 +131,7 @@ fn turns(job: &JobFile, ran: &Ran) -> bool {
 
 /// How far the series to second order, from the oracle's derivatives, is from one period's arc at the place of the fault: what it
 /// would add to the first-order step, and the relative error of the arc that it covers.
-fn series(job: &JobFile, ran: &Ran) -> (f64, f64) {
+fn series(job: &Job, ran: &Ran) -> (f64, f64) {
     let oracle = Oracle::new(job).unwrap();
     let [u, v] = ran.place;
     let d = oracle.surface.at(u, v);
@@ -151,7 +151,7 @@ fn series(job: &JobFile, ran: &Ran) -> (f64, f64) {
     (added, covered_mm / arc_mm - 1.0)
 }
 
-fn justified(job: &JobFile, ran: &Ran) -> Result<(), TestCaseError> {
+fn justified(job: &Job, ran: &Ran) -> Result<(), TestCaseError> {
     let Some(fault) = ran.fault else { return Ok(()) };
     let place = ran.place;
     let (fit, sine) = near(job, place);
@@ -280,7 +280,7 @@ fn poles() {
                 [x + 50.0, y - 20.0, z, weight(t, s)]
             };
             let knots = vec![0.0, 0.0, 0.0, 0.0, 1.0, 1.0, 1.0, 1.0];
-            let nurbs = host_sim::job_file::NurbsSpec {
+            let nurbs = job::NurbsSpec {
                 degree: [3, 3],
                 knots_u: knots.clone(),
                 knots_v: knots,
@@ -332,7 +332,7 @@ fn turned_fan(pole_on_u: bool, weights: bool) -> SurfaceSpec {
         [x, y, z, w]
     };
     let knots = vec![0.0, 0.0, 0.0, 0.0, 1.0, 1.0, 1.0, 1.0];
-    SurfaceSpec::Nurbs(host_sim::job_file::NurbsSpec {
+    SurfaceSpec::Nurbs(job::NurbsSpec {
         degree: [3, 3],
         knots_u: knots.clone(),
         knots_v: knots,
@@ -457,7 +457,7 @@ fn profiles_that_end_on_the_axis() {
 #[test]
 fn boundary_that_is_a_point_in_part() {
     let pole = |x: f64, y: f64| [x, y, 0.0, 1.0];
-    let nurbs = host_sim::job_file::NurbsSpec {
+    let nurbs = job::NurbsSpec {
         degree: [1, 1],
         knots_u: vec![0.0, 0.0, 1.0, 2.0, 2.0],
         knots_v: vec![0.0, 0.0, 1.0, 1.0],
@@ -539,7 +539,7 @@ fn ridge_on_which_the_path_all_but_stands() {
 #[test]
 fn steps_after_a_boundary_between_speeds() {
     let x = [0.0, 3.333, 6.666, 9.999, 19.999, 29.999, 339.999];
-    let nurbs = host_sim::job_file::NurbsSpec {
+    let nurbs = job::NurbsSpec {
         degree: [3, 1],
         knots_u: vec![0.0, 0.0, 0.0, 0.0, 0.5, 0.5, 0.5, 1.0, 1.0, 1.0, 1.0],
         knots_v: vec![0.0, 0.0, 1.0, 1.0],

@@ -6,12 +6,11 @@ mod browser;
 use std::path::{Path, PathBuf};
 
 use browser::Browser;
-use host_sim::job_file::JobFile;
-use host_sim::machine::Machine;
-use host_sim::oracle::{Checked, Emitted, Oracle};
-use host_sim::prepare::prepare;
-use host_sim::report::{Remarks, RidgePlace, Scallops, Sketch};
-use host_sim::survey::{Findings, Survey};
+use machine::Machine;
+use machine::prepare::prepare;
+use oracle::{Checked, Emitted, Oracle};
+use report::{Remarks, RidgePlace, Scallops, Sketch};
+use verify::survey::{Findings, Survey};
 
 /// WebGL on the processor, whatever graphics card there is: the same everywhere.
 const SOFTWARE: [&str; 2] = ["--use-angle=swiftshader", "--enable-unsafe-swiftshader"];
@@ -21,15 +20,15 @@ const PHONE: [u32; 2] = [390, 800];
 /// Runs a job and writes its report; with what the oracle found.
 fn report(name: &str, folder: &Path, remarks: &Remarks) -> (PathBuf, Findings) {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../jobs").join(name);
-    let job = JobFile::load(&path).unwrap();
+    let job = job_file::load(&path).unwrap();
     let prepared = prepare(&job).unwrap();
     let oracle = Oracle::new(&job).unwrap();
     let mut sketch = Sketch::new(&job, oracle.schedule().unwrap().len());
     let mut draw = |sample: &Emitted, checked: &Checked| sketch.add(sample, checked);
-    let mut survey = Survey::new(&prepared, &oracle, None, Some(&mut draw));
+    let mut survey = Survey::new(&oracle, None, Some(&mut draw));
     Machine::load(&prepared)
         .unwrap()
-        .run(|sample| survey.add(sample).is_ok())
+        .run(|sample| survey.add(&inspect::plain(&prepared, sample)).is_ok())
         .unwrap();
     let findings = survey.finish(true).unwrap();
     let page = sketch.write(folder, Path::new(name), &findings, remarks).unwrap();

@@ -8,14 +8,14 @@ use std::io::{self, Read, Write};
 use std::sync::{Arc, Mutex};
 
 use controller::{in_process::Board, safety::DEBOUNCE_TICKS};
-use host_sim::remote::operate::{Action, Operator, Setup, act, make_ready};
-use host_sim::remote::session::Event as Told;
-use host_sim::remote::{RemoteError, Session, drive};
 use integration_tests::{dome, upload};
 use interp_core::{
     fault::{Fault, FaultKind},
     sample::State,
 };
+use machine::remote::operate::{Action, Operator, Setup, act, make_ready};
+use machine::remote::session::Event as Told;
+use machine::remote::{RemoteError, Session, drive};
 use protocol::message::{Clock, Configuration, HostGone, InputLines, Reason, Request, Status};
 
 const WORDS: usize = 64;

@@ -3,12 +3,12 @@
 
 use std::path::PathBuf;
 
-use host_sim::commands::BOUNDS;
-use host_sim::job_file::JobFile;
-use host_sim::machine::Machine;
-use host_sim::oracle::Oracle;
-use host_sim::prepare::prepare;
-use host_sim::survey::{Findings, Survey};
+use inspect::BOUNDS;
+use job::Job;
+use machine::Machine;
+use machine::prepare::prepare;
+use oracle::Oracle;
+use verify::survey::{Findings, Survey};
 
 /// Jobs with their number of passes: the paper's, the golden table's, and for the others the oracle's dense scan.
 const PASSES: [(&str, u32); 11] = [
@@ -29,17 +29,17 @@ fn jobs() -> PathBuf {
     PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("../jobs")
 }
 
-fn load(name: &str) -> JobFile {
-    JobFile::load(&jobs().join(format!("{name}.toml"))).unwrap()
+fn load(name: &str) -> Job {
+    job_file::load(&jobs().join(format!("{name}.toml"))).unwrap()
 }
 
-fn survey(job: &JobFile) -> Findings {
+fn survey(job: &Job) -> Findings {
     let oracle = Oracle::new(job).unwrap();
     let prepared = prepare(job).unwrap();
-    let mut survey = Survey::new(&prepared, &oracle, None, None);
+    let mut survey = Survey::new(&oracle, None, None);
     Machine::load(&prepared)
         .unwrap()
-        .run(|sample| survey.add(sample).is_ok())
+        .run(|sample| survey.add(&inspect::plain(&prepared, sample)).is_ok())
         .unwrap();
     survey.finish(true).unwrap()
 }

@@ -5,15 +5,15 @@
 use std::io::{self, Read, Write};
 
 use controller::in_process::Board;
-use host_sim::job_file::JobFile;
-use host_sim::machine::Machine;
-use host_sim::prepare::{Prepared, prepare};
-use host_sim::remote::operate::{self, Setup};
-use host_sim::remote::qemu::{self, Qemu};
-use host_sim::remote::script::{Schedule, play as play_there};
-use host_sim::remote::{Session, drive};
-use host_sim::script::{Played, Script, play};
 use interp_core::State;
+use job::{AxisLimits, Job};
+use machine::Machine;
+use machine::prepare::{Prepared, prepare};
+use machine::remote::operate::{self, Setup};
+use machine::remote::qemu::{self, Qemu};
+use machine::remote::script::{Schedule, play as play_there};
+use machine::remote::{Session, drive};
+use machine::script::{Played, Script, play};
 use protocol::message::Configuration;
 
 /// A hold and a resume on the path, requests that the state does not allow, an abort, another run, and an abort while held.
@@ -28,9 +28,9 @@ const WITHIN_LIMITS: &str = "tick 40: hold\ntick 200: resume\ntick 900: override
     tick 1500: resume\ntick 2200: override 0\ntick 2600: override 120\ntick 3000: hold\ntick 3003: resume\ntick 3400: abort\n\
     tick 3600: start\ntick 3700: override 100\ntick 6000: hold\ntick 6400: stop\n";
 
-fn torus_file() -> JobFile {
+fn torus_file() -> Job {
     let path = format!("{}/../jobs/torus.toml", env!("CARGO_MANIFEST_DIR"));
-    JobFile::load(path.as_ref()).unwrap()
+    job_file::load(path.as_ref()).unwrap()
 }
 
 fn torus() -> Prepared {
@@ -39,7 +39,10 @@ fn torus() -> Prepared {
 
 fn torus_within_limits() -> Prepared {
     let mut job = torus_file();
-    job.machine.velocity_max_mm_s = Some([60.0, 60.0, 40.0]);
+    job.machine.limits = Some(AxisLimits {
+        velocity_mm_s: [60.0, 60.0, 40.0],
+        ..AxisLimits::DEFAULT
+    });
     prepare(&job).unwrap()
 }
 

@@ -4,14 +4,14 @@
 use std::fmt::Write;
 use std::path::PathBuf;
 
-use host_sim::job_file::JobFile;
-use host_sim::machine::Machine;
-use host_sim::oracle::{Checked, Emitted, Oracle};
-use host_sim::prepare::prepare;
-use host_sim::survey::Survey;
-use host_sim::swept::{Findings, Track, measure};
+use job::Job;
+use machine::Machine;
+use machine::prepare::prepare;
+use oracle::{Checked, Emitted, Oracle};
+use verify::survey::Survey;
+use verify::swept::{Findings, Track, measure};
 
-fn findings(job: &JobFile) -> Findings {
+fn findings(job: &Job) -> Findings {
     let oracle = Oracle::new(job).unwrap();
     let prepared = prepare(job).unwrap();
     // As `verify` does it: on a machine with limits the feed is low at the ends of passes.
@@ -20,10 +20,10 @@ fn findings(job: &JobFile) -> Findings {
         None => 0.0,
     });
     let mut keep = |emitted: &Emitted, _: &Checked| track.add(emitted, job.along);
-    let mut survey = Survey::new(&prepared, &oracle, None, Some(&mut keep));
+    let mut survey = Survey::new(&oracle, None, Some(&mut keep));
     Machine::load(&prepared)
         .unwrap()
-        .run(|sample| survey.add(sample).is_ok())
+        .run(|sample| survey.add(&inspect::plain(&prepared, sample)).is_ok())
         .unwrap();
     let samples = survey.finish(true).unwrap().samples;
     // Links are no part of it.
@@ -50,7 +50,7 @@ fn sample_jobs() -> Vec<PathBuf> {
 fn every_sample_job_holds_its_limit() {
     let mut off = String::new();
     for path in sample_jobs() {
-        let job = JobFile::load(&path).unwrap();
+        let job = job_file::load(&path).unwrap();
         let found = findings(&job);
         let (limit, most) = (job.scallop_mm, found.scallop_max.height_mm);
         if most < 0.5 * limit || most > limit + found.measuring_error_mm {
@@ -94,7 +94,7 @@ fn every_sample_job_holds_its_limit() {
 }
 
 /// A patch of these corners, z = 0 but for a bulge of so many mm in the middle; ball 5 mm, scallop 0.02 mm.
-fn corners(corners: [[f64; 2]; 4], bulge: f64, spacing: &str) -> JobFile {
+fn corners(corners: [[f64; 2]; 4], bulge: f64, spacing: &str) -> Job {
     let [a, b, c, d] = corners;
     let mut text = String::from(
         "[surface]\nkind = \"nurbs\"\ndegree = [2, 2]\nknots_u = [0, 0, 0, 1, 1, 1]\nknots_v = [0, 0, 0, 1, 1, 1]\npoles_mm = [\n",
@@ -110,7 +110,7 @@ fn corners(corners: [[f64; 2]; 4], bulge: f64, spacing: &str) -> JobFile {
         text += "],\n";
     }
     text += "]\n[tool]\nkind = \"ball\"\nradius_mm = 5\n[cut]\nfeed_mm_min = 3000\nscallop_mm = 0.02\nalong = \"u\"\nside = \"up\"\n";
-    JobFile::parse("corners", &format!("{text}spacing = \"{spacing}\"\n")).unwrap()
+    job_file::parse("corners", &format!("{text}spacing = \"{spacing}\"\n")).unwrap()
 }
 
 /// Passes whose side lines are skew, and passes that spread: the paper's interval leaves more than the limit, the core's own does not.
@@ -151,7 +151,7 @@ fn skew_and_spreading_passes_hold_the_limit() {
 }
 
 /// A profile of poles (x, z), cubic between even knots, drawn out along y by 20 mm; passes along y.
-fn groove(profile: &[[f64; 2]], cut: &str) -> JobFile {
+fn groove(profile: &[[f64; 2]], cut: &str) -> Job {
     let mut text = String::from("[surface]\nkind = \"nurbs\"\ndegree = [3, 1]\nknots_u = [0, 0, 0, 0");
     let spans = profile.len() - 3;
     for k in 1..spans {
@@ -162,7 +162,7 @@ fn groove(profile: &[[f64; 2]], cut: &str) -> JobFile {
         writeln!(text, "    [[{x}, 0, {z}], [{x}, 20, {z}]],").unwrap();
     }
     text += "]\n\n[tool]\nkind = \"ball\"\nradius_mm = 5\n\n[cut]\nfeed_mm_min = 600\nalong = \"v\"\n";
-    JobFile::parse("groove", &(text + cut)).unwrap()
+    job_file::parse("groove", &(text + cut)).unwrap()
 }
 
 /// A keyhole: a round floor wider than the ball, under lips 4 mm apart. The ball fits every curvature; on one lip it stands in the

@@ -1,10 +1,10 @@
-//! The tool on the desk: reads a job, runs the surface interpolator on it here or on a board, and checks what comes out.
+//! The tool on the desk: its commands parse and print; what they do is in the crates beside this one.
 //!
 //! ```text
-//! job file ──job_file──► JobFile ──prepare──► Prepared ──machine──► samples ──survey──► trace, figures, report
-//!                           │                    │                                ▲
-//!                           │                    └──remote──► the same from a board or QEMU, compared
-//!                           └──oracle──► independent f64 geometry ────────────────┘
+//! job file ──job-file──► job ──machine──► Prepared ──► samples ──inspect──► figures ──report──► page
+//!    ▲                    │                  │                     ▲
+//!   cad                   │                  └──► a board, QEMU    │
+//!                         └──oracle──► verify ─────────────────────┘
 //! ```
 #![cfg_attr(
     test,
@@ -16,29 +16,6 @@
     )
 )]
 
-pub mod approach;
-pub mod budget;
-pub mod cad;
 pub mod commands;
-pub mod direction;
-pub mod explain;
-pub mod export;
-pub mod gcode;
-pub mod job_file;
-pub mod machine;
-pub mod motion;
-pub mod operations;
-pub mod oracle;
-pub mod paper;
-pub mod placement;
-pub mod prepare;
 pub mod probe;
-pub mod remote;
-pub mod report;
-pub mod script;
-pub mod speeds;
-pub mod survey;
-pub mod swept;
 pub mod template;
-pub mod trace;
-pub mod travel;

@@ -2,10 +2,10 @@
 
 use serde_json::{Map, Value, json};
 
-use crate::job_file::{AlongChoice, JobFile, Trial};
+use job::{AlongChoice, Job, Trial};
 
 /// The keys `along` and `along_auto`: null where the job file names the direction.
-pub(super) fn json(job: &JobFile) -> Map<String, Value> {
+pub(super) fn json(job: &Job) -> Map<String, Value> {
     let trial = |trial: &Trial| {
         #[allow(clippy::cast_precision_loss, reason = "below 2^53")]
         let time_s = trial.ticks as f64 * job.machine.period_s();
@@ -26,7 +26,7 @@ pub(super) fn json(job: &JobFile) -> Map<String, Value> {
 }
 
 /// The direction, and by how much it won where it was chosen.
-pub(super) fn sentence(job: &JobFile) -> String {
+pub(super) fn sentence(job: &Job) -> String {
     let chosen = job.along.name();
     let AlongChoice::Chosen(trials) = job.origin.along_choice() else {
         return chosen.to_owned();

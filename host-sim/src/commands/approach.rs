@@ -4,21 +4,21 @@ use std::path::{Path, PathBuf};
 
 use super::outcome::Outcome;
 use super::{Result, cannot_write, progress, spinner, trace, unheld_limits};
-use crate::approach::{Kind, measure};
-use crate::job_file::JobFile;
-use crate::report::{Remarks, Sketch};
+use approach::{Kind, measure};
+use job::Job;
+use report::{Remarks, Sketch};
 
 pub(super) fn command(
     kind: Kind,
-    job: &JobFile,
+    job: &Job,
     trace_file: Option<&PathBuf>,
     directory: Option<&Path>,
     as_json: bool,
 ) -> Result<()> {
     let bar = spinner("finding the passes");
-    let passes = super::simulate::oracle(job)?
+    let passes = inspect::oracle(job)?
         .schedule()
-        .map_err(crate::approach::ApproachError::from)?;
+        .map_err(approach::ApproachError::from)?;
     bar.finish_and_clear();
     let mut sketch = directory.map(|_| Sketch::new(job, passes.len()).by(kind));
     let mut trace = trace(trace_file, job)?;
@@ -42,7 +42,7 @@ pub(super) fn command(
     let samples_per_second = measured.findings.samples as f64 / start.elapsed().as_secs_f64().max(1e-9);
     let name = trace_file.cloned().unwrap_or_default();
     written
-        .and_then(|()| trace.map_or(Ok(()), crate::trace::Trace::finish))
+        .and_then(|()| trace.map_or(Ok(()), verify::trace::Trace::finish))
         .map_err(|error| cannot_write(&name, &error))?;
     let remarks = Remarks {
         warnings: unheld_limits(job).into_iter().collect(),

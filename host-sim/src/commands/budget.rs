@@ -10,14 +10,14 @@ use serde_json::{Map, Value, json};
 
 use super::out::{say, say_part};
 use super::{Failure, Result, along, cannot_write, load, progress, spinner};
-use crate::budget::figures::{Figure, Histogram, Model, STEPS_2_TO_4, figures, histogram};
-use crate::budget::graph::{self, Analysis, EXCEPTION_BYTES};
-use crate::budget::image::{self, Sizes};
-use crate::budget::lab::Lab;
-use crate::budget::measure::{Bench, Ticks};
-use crate::budget::{self, BudgetError, PERIOD_CYCLES, TICKS, chart, golden};
-use crate::operations::{self, Count, Operations};
-use crate::remote::qemu;
+use cycles::figures::{Figure, Histogram, Model, STEPS_2_TO_4, figures, histogram};
+use cycles::graph::{self, Analysis, EXCEPTION_BYTES};
+use cycles::image::{self, Sizes};
+use cycles::lab::Lab;
+use cycles::measure::{Bench, Ticks};
+use cycles::{self, BudgetError, PERIOD_CYCLES, TICKS, chart, golden};
+use machine::remote::qemu;
+use study::operations::{self, Count, Operations};
 
 /// Cycles of a bin of the printed histogram.
 const BIN_CYCLES: u32 = 50;
@@ -82,7 +82,7 @@ type Directions = BTreeMap<String, (String, Map<String, Value>)>;
 /// The jobs to count: their names, files and ticks.
 fn jobs(arguments: &Arguments) -> Vec<(String, PathBuf, u32)> {
     if arguments.jobs.is_empty() {
-        budget::jobs()
+        cycles::jobs()
             .into_iter()
             .map(|(name, path, ticks)| (name.to_owned(), path, arguments.ticks.unwrap_or(ticks)))
             .collect()

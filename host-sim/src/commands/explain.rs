@@ -6,7 +6,7 @@ use serde_json::{Value, json};
 
 use super::out::say;
 use super::{Failure, Result};
-use crate::explain::{Entry, Family, entries, entry};
+use explain::{Entry, Family, entries, entry};
 
 /// Columns of the text.
 const WIDTH: usize = 88;

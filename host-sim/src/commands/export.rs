@@ -8,9 +8,9 @@ use serde_json::json;
 
 use super::out::say;
 use super::{Failure, Result, along, cannot_write, load, progress, spinner};
-use crate::approach::{Kind, passes};
-use crate::export::{Dialect, ExportError, Options, export};
-use crate::gcode::FeedMode;
+use approach::export::{Dialect, ExportError, Options, export};
+use approach::gcode::FeedMode;
+use approach::{Kind, passes};
 
 /// Writes a job as a G-code program for LinuxCNC or Grbl: straight cuts, or arcs.
 ///
@@ -92,7 +92,7 @@ pub(super) fn command(arguments: &Arguments) -> Result<()> {
         clearance_mm: arguments.clearance,
         spindle_rpm: arguments.spindle,
     };
-    let oracle = super::simulate::oracle(&job)?;
+    let oracle = inspect::oracle(&job)?;
     let bar = spinner("finding the passes");
     let count = passes(&oracle).map_err(ExportError::from)?.len();
     bar.finish_and_clear();

@@ -3,9 +3,9 @@
 use protocol::message::Reason;
 
 use super::{Result, settled};
-use crate::job_file::JobFile;
-use crate::prepare::Prepared;
-use crate::remote::RemoteError;
+use job::Job;
+use machine::prepare::Prepared;
+use machine::remote::RemoteError;
 
 const MM_PER_NM: f64 = 1e-6;
 
@@ -45,8 +45,8 @@ pub(super) fn place(text: &str) -> std::result::Result<PlaceNm, String> {
 }
 
 /// Reads a job that begins where the axes stand, if that was given and the job does not say where it begins.
-pub(super) fn load(path: &std::path::Path, stands: Option<PlaceNm>) -> Result<(JobFile, Prepared)> {
-    let mut job = JobFile::load(path)?;
+pub(super) fn load(path: &std::path::Path, stands: Option<PlaceNm>) -> Result<(Job, Prepared)> {
+    let mut job = job_file::load_with(path, &cad::Faces)?;
     if let Some(stands) = stands {
         job.machine.home_mm.get_or_insert(stands.mm());
     }

@@ -10,10 +10,11 @@ use clap::Args;
 use serde_json::{Value, json};
 
 use super::{Failure, Result, cannot_write, progress};
-use crate::cad::{
-    CadError, Face, Form, JobOptions, Machinable, Measures, Model, Options, TOLERANCE_DEFAULT_MM, Written,
-    degrees, machinable, measure, read, write_job,
+use cad::{
+    CadError, Face, Form, JobOptions, Machinable, Measures, Model, Options, Written, degrees, machinable,
+    measure, read, write_job,
 };
+use job_file::TOLERANCE_DEFAULT_MM;
 
 /// Makes a job of a face of a STEP, IGES or 3DM file, or lists the faces.
 ///
@@ -347,7 +348,7 @@ pub(super) fn command(arguments: &Arguments) -> Result<()> {
         },
     );
     // What the options ask for is judged by the same rules as a job written by hand, before anything is written.
-    crate::job_file::JobFile::parse(&path.display().to_string(), &written.text)?;
+    job_file::parse_with(&path.display().to_string(), &written.text, &cad::Faces)?;
     write(path, &written.text, arguments.force)?;
     report(arguments, path, face, &made, &written);
     Ok(())

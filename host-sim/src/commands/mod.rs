@@ -2,6 +2,7 @@
 
 mod along;
 mod approach;
+#[cfg(feature = "developer")]
 mod budget;
 mod completions;
 mod explain;
@@ -15,6 +16,7 @@ mod new;
 mod operate;
 mod out;
 mod outcome;
+#[cfg(feature = "developer")]
 mod paper;
 mod progress;
 mod run;
@@ -24,11 +26,9 @@ mod swept_words;
 mod typed;
 mod verify;
 
-pub use verify::BOUNDS;
-
 use out::complain;
 use programs::with_command_name;
-use progress::{progress, spinner};
+use progress::{Bar, progress, spinner};
 
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
@@ -36,10 +36,11 @@ use std::process::ExitCode;
 use clap::builder::{Resettable, StyledStr};
 use clap::{CommandFactory, FromArgMatches, Parser, Subcommand};
 
-use crate::approach::ApproachError;
-use crate::direction::{self, NoDirection};
-use crate::job_file::{AlongChoice, JobFile};
-use crate::prepare::Prepared;
+use ::approach::ApproachError;
+use inspect::InspectError;
+use job::{AlongChoice, Job};
+use machine::direction::{self, NoDirection};
+use machine::prepare::Prepared;
 
 /// Why a command did not do what it was asked.
 #[derive(Debug)]
@@ -50,8 +51,8 @@ pub enum Failure {
     Failed(Option<String>),
 }
 
-impl From<crate::job_file::JobFileError> for Failure {
-    fn from(error: crate::job_file::JobFileError) -> Self {
+impl From<job::JobError> for Failure {
+    fn from(error: job::JobError) -> Self {
         Self::Input(error.into())
     }
 }
@@ -61,6 +62,16 @@ impl From<NoDirection> for Failure {
         match error {
             NoDirection::Refused(error) => error.into(),
             NoDirection::Faults(sentence) => Self::Failed(Some(sentence)),
+        }
+    }
+}
+
+impl From<InspectError> for Failure {
+    fn from(error: InspectError) -> Self {
+        match error {
+            InspectError::Refused(error) => error.into(),
+            InspectError::NoOracle(error) => Self::input(error.to_string(), "say side = \"+\" or \"-\""),
+            InspectError::Trace(error) => Self::Failed(Some(format!("cannot write the trace: {error}"))),
         }
     }
 }
@@ -101,7 +112,9 @@ enum Command {
     Verify(verify::Arguments),
     Export(export::Arguments),
     Import(import::Arguments),
+    #[cfg(feature = "developer")]
     Paper(paper::Arguments),
+    #[cfg(feature = "developer")]
     Budget(budget::Arguments),
     Flash(flash::Arguments),
     Log(log::Arguments),
@@ -120,7 +133,9 @@ impl Command {
             Self::Verify(arguments) => arguments.json,
             Self::Export(arguments) => arguments.json,
             Self::Import(arguments) => arguments.json,
+            #[cfg(feature = "developer")]
             Self::Paper(arguments) => arguments.json,
+            #[cfg(feature = "developer")]
             Self::Budget(arguments) => arguments.json,
             Self::Flash(arguments) => arguments.json,
             Self::Log(arguments) => arguments.json,
@@ -138,7 +153,9 @@ impl Command {
             Self::Verify(arguments) => verify::command(arguments),
             Self::Export(arguments) => export::command(arguments),
             Self::Import(arguments) => import::command(arguments),
+            #[cfg(feature = "developer")]
             Self::Paper(arguments) => paper::command(arguments),
+            #[cfg(feature = "developer")]
             Self::Budget(arguments) => budget::command(arguments),
             Self::Flash(arguments) => flash::command(arguments),
             Self::Log(arguments) => log::command(arguments),
@@ -203,12 +220,12 @@ pub fn main() -> ExitCode {
 }
 
 /// Reads a job, settles its direction where that is `"auto"`, prepares it, and says what of it this version does not do yet.
-fn load(path: &Path) -> Result<(JobFile, Prepared)> {
-    settled(JobFile::load(path)?)
+fn load(path: &Path) -> Result<(Job, Prepared)> {
+    settled(job_file::load_with(path, &cad::Faces)?)
 }
 
 /// Settles the direction of a job where that is `"auto"`, and prepares it.
-fn settled(job: JobFile) -> Result<(JobFile, Prepared)> {
+fn settled(job: Job) -> Result<(Job, Prepared)> {
     if job.origin.along_choice() != &AlongChoice::Auto {
         return Ok(direction::settle(job)?);
     }
@@ -219,12 +236,12 @@ fn settled(job: JobFile) -> Result<(JobFile, Prepared)> {
 }
 
 /// The axis limits that a job asks for and that the other approaches do not hold.
-fn unheld_limits(job: &JobFile) -> Option<String> {
+fn unheld_limits(job: &Job) -> Option<String> {
     let machine = &job.machine;
     let keys = [
-        ("velocity_max_mm_s", machine.velocity_max_mm_s.is_some()),
-        ("acceleration_max_mm_s2", machine.acceleration_max_mm_s2.is_some()),
-        ("jerk_max_mm_s3", machine.jerk_max_mm_s3.is_some()),
+        ("velocity_max_mm_s", machine.has_limits()),
+        ("acceleration_max_mm_s2", machine.has_limits()),
+        ("jerk_max_mm_s3", machine.has_limits()),
         ("travel_mm", machine.travel_mm.is_some()),
     ];
     let given: Vec<_> = keys
@@ -239,16 +256,17 @@ fn unheld_limits(job: &JobFile) -> Option<String> {
     })
 }
 
-fn warn_of_limits(job: &JobFile) {
+fn warn_of_limits(job: &Job) {
     if let Some(limits) = unheld_limits(job) {
         complain!("warning: {limits}");
     }
 }
 
 /// A trace file, if one is wanted.
-fn trace(path: Option<&PathBuf>, job: &JobFile) -> Result<Option<crate::trace::Trace>> {
+fn trace(path: Option<&PathBuf>, job: &Job) -> Result<Option<::verify::trace::Trace>> {
     path.map(|path| {
-        crate::trace::Trace::create(path, job.machine.period_us).map_err(|error| cannot_write(path, &error))
+        ::verify::trace::Trace::create(path, job.machine.period_us)
+            .map_err(|error| cannot_write(path, &error))
     })
     .transpose()
 }

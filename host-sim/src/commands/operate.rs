@@ -6,7 +6,7 @@ use serde_json::json;
 
 use super::out::say;
 use super::{Failure, Result, home, run};
-use crate::remote::operate::{Action, act, sentences};
+use machine::remote::operate::{Action, act, sentences};
 
 /// Switches a board's drives, declares its home, holds, resumes or stops its run, and says how it is.
 ///

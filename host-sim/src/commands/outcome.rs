@@ -2,78 +2,38 @@
 
 use std::path::Path;
 
-use interp_core::Fault;
 use serde_json::{Map, Value, json};
 
 use super::along;
 use super::out::say;
-use crate::approach::Kind;
-use crate::explain;
-use crate::job_file::JobFile;
-use crate::machine::Machine;
-use crate::prepare::Prepared;
-use crate::speeds::Span;
-use crate::survey::Findings;
+use approach::Kind;
+use inspect::FaultAt;
+use job::Job;
+use verify::speeds::Span;
+use verify::survey::Findings;
 
-/// A fault with its place.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct FaultAt {
-    pub(super) fault: Fault,
-    pub(super) tick: u64,
-    pub(super) pass: u32,
-    pub(super) parameters: [f64; 2],
-}
-
-impl FaultAt {
-    /// The fault that stopped this machine after so many samples.
-    pub(super) fn of(fault: Fault, machine: &Machine, samples: u64, prepared: &Prepared) -> Self {
-        let (pass, path, side) = machine.place();
-        Self {
-            fault,
-            tick: samples,
-            pass,
-            parameters: prepared.parameters(path, side),
-        }
-    }
-
-    pub(super) fn sentence(&self) -> String {
-        let remedy = explain::fault(self.fault).1;
-        let place = explain::fault_at(self.fault, self.tick, self.pass, self.parameters);
-        let code = self.fault.kind.code();
-        format!("{place}\n  help: {remedy}; more: cargo sim explain {code}")
-    }
-
-    /// The same, with the line of the job file that has to do with it.
-    pub(super) fn sentence_of(&self, job: &JobFile) -> String {
-        let line = job.origin.quote(explain::key(self.fault.kind));
-        line.map_or_else(
-            || self.sentence(),
-            |line| format!("{}\n  at {line}", self.sentence()),
-        )
-    }
-
-    fn json(&self) -> Value {
-        let (message, remedy) = explain::fault(self.fault);
-        let [u, v] = self.parameters;
-        json!({
-            "code": self.fault.kind.code(),
-            "name": self.fault.kind.name(),
-            "message": message,
-            "remedy": remedy,
-            "value": self.fault.value,
-            "tick": self.tick,
-            "pass": self.pass,
-            "u": u,
-            "v": v,
-        })
-    }
+/// A fault with its place, as JSON.
+fn fault_json(at: &FaultAt) -> Value {
+    let (message, remedy) = explain::fault(at.fault);
+    let [u, v] = at.parameters;
+    json!({
+        "code": at.fault.kind.code(),
+        "name": at.fault.kind.name(),
+        "message": message,
+        "remedy": remedy,
+        "value": at.fault.value,
+        "tick": at.tick,
+        "pass": at.pass,
+        "u": u,
+        "v": v,
+    })
 }
 
 /// The outcome of a run, by any approach.
 #[derive(Debug)]
 pub(super) struct Outcome<'a> {
     pub(super) kind: Kind,
-    pub(super) job: &'a JobFile,
+    pub(super) job: &'a Job,
     /// Segments of the program; for the product the patches of its surface.
     pub(super) segments: usize,
     /// Bytes of the program; for the product those of its header and surface.
@@ -130,7 +90,7 @@ impl Outcome<'_> {
             "position_error_max_nm": report.position_nm.max,
             "digest": format!("{:016x}", self.digest),
             "samples_per_second": self.samples_per_second,
-            "fault": self.fault.as_ref().map_or(Value::Null, FaultAt::json),
+            "fault": self.fault.as_ref().map_or(Value::Null, fault_json),
         });
         let mut keys = match value {
             Value::Object(map) => map,

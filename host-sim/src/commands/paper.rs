@@ -7,9 +7,9 @@ use serde_json::{Value, json};
 
 use super::out::say;
 use super::{Result, cannot_write, progress};
-use crate::paper::{Comparison, Item, Row, STEPS, study};
-use crate::report::paper as page;
-use crate::speeds::Span;
+use study::paper::{Comparison, Item, Row, STEPS, study};
+use study::report as page;
+use verify::speeds::Span;
 
 /// Reproduces Lo's paper (1998): every example, table and figure, printed against ours; four approaches side by side.
 ///

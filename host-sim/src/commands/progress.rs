@@ -38,3 +38,30 @@ pub(super) fn progress(length: u64, what: &'static str) -> ProgressBar {
 pub(super) fn spinner(what: &'static str) -> ProgressBar {
     drawn(ProgressBar::new_spinner(), "{msg} {spinner} {elapsed}", what)
 }
+
+/// One bar for all parts of an inspection.
+pub(super) struct Bar(ProgressBar);
+
+impl Bar {
+    /// A bar that shows nothing before the first part begins.
+    pub(super) fn new() -> Self {
+        Self(progress(0, ""))
+    }
+
+    /// Removes the bar.
+    pub(super) fn clear(&self) {
+        self.0.finish_and_clear();
+    }
+}
+
+impl verify::swept::Progress for Bar {
+    fn begin(&self, what: &'static str, steps: u64) {
+        self.0.reset();
+        self.0.set_length(steps);
+        self.0.set_message(what);
+    }
+
+    fn done(&self, steps: u64) {
+        self.0.inc(steps);
+    }
+}

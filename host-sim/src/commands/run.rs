@@ -13,18 +13,18 @@ use serde_json::{Value, json};
 use super::home::{self, PlaceNm};
 use super::out::{say, to_stderr};
 use super::outcome::Outcome;
-use super::simulate::{Timed, machine, remarks, report, surveyed, timed};
+use super::simulate::{remarks, report, surveyed, timed};
 use super::typed::{Typist, WORDS};
 use super::{Failure, Result, cannot_write, progress, scripted, spinner, trace};
-use crate::approach::Kind;
-use crate::explain;
-use crate::job_file::JobFile;
-use crate::prepare::Prepared;
-use crate::remote::operate::{self, Operator, Setup};
-use crate::remote::qemu::{self, Qemu, QemuError};
-use crate::remote::{RemoteError, Session, drive, port};
-use crate::survey::is_on_pass;
-use crate::travel;
+use approach::Kind;
+use inspect::TimedRun;
+use job::Job;
+use machine::Machine;
+use machine::prepare::{self, Prepared};
+use machine::remote::operate::{self, Operator, Setup};
+use machine::remote::qemu::{self, Qemu, QemuError};
+use machine::remote::{RemoteError, Session, drive, port};
+use machine::travel;
 
 /// Runs a job in the firmware, in QEMU or on a board, and compares every sample with this machine's. While a board runs, type what an
 /// operator wants, and Enter: hold, resume, stop, abort, override 50, status. A run that was commanded is not compared.
@@ -181,21 +181,16 @@ fn declared(arguments: &Arguments, prepared: &Prepared) -> Option<PlaceNm> {
 }
 
 /// Configures the board, switches its drives on, and declares home where that is known here.
-fn make_ready(
-    arguments: &Arguments,
-    job: &JobFile,
-    prepared: &Prepared,
-    session: &mut Session,
-) -> Result<()> {
+fn make_ready(arguments: &Arguments, job: &Job, prepared: &Prepared, session: &mut Session) -> Result<()> {
     let setup = Setup {
-        configuration: job.machine.configuration(),
+        configuration: prepare::configuration(&job.machine),
         home_nm: declared(arguments, prepared).map(|place| place.0),
     };
     Ok(operate::make_ready(session, &setup)?)
 }
 
 /// The board's timer has to tick as the job wants it.
-fn check_period(job: &JobFile, session: &Session) -> Result<()> {
+fn check_period(job: &Job, session: &Session) -> Result<()> {
     let period_us = session.capabilities().description.period_us;
     if f64::from(period_us) == job.machine.period_us {
         return Ok(());
@@ -217,18 +212,18 @@ fn check_period(job: &JobFile, session: &Session) -> Result<()> {
 /// Runs and compares the digest of each pass; where one differs in QEMU, finds the first sample that does.
 fn by_digest(
     arguments: &Arguments,
-    job: &JobFile,
+    job: &Job,
     prepared: &Prepared,
-    here: &Timed,
+    here: &TimedRun,
     session: &mut Session,
 ) -> Result<Ran> {
     let expected: Vec<_> = here
         .passes
         .iter()
-        .map(|&(first_tick, samples, digest)| drive::Expected {
-            first_tick,
-            samples,
-            digest,
+        .map(|pass| drive::Expected {
+            first_tick: pass.first_tick,
+            samples: pass.samples,
+            digest: pass.digest,
         })
         .collect();
     let bar = progress(here.samples, "running");
@@ -279,10 +274,11 @@ fn typist(arguments: &Arguments, bar: &ProgressBar) -> Option<Typist> {
     Some(Typist::new(bar.clone()))
 }
 
-fn samples_here(job: &JobFile, prepared: &Prepared, from: u32, count: u32) -> Result<Vec<Sample>> {
+fn samples_here(job: &Job, prepared: &Prepared, from: u32, count: u32) -> Result<Vec<Sample>> {
     let mut samples = Vec::new();
     // A fault ends the samples, which is what is compared.
-    let _fault = machine(job, prepared)?.run(|sample| {
+    let mut machine = Machine::load(prepared).map_err(|fault| inspect::refused(job, fault))?;
+    let _fault = machine.run(|sample| {
         if sample.tick >= from {
             samples.push(*sample);
         }
@@ -294,9 +290,9 @@ fn samples_here(job: &JobFile, prepared: &Prepared, from: u32, count: u32) -> Re
 /// Runs with every sample on the line, writes them, and compares each.
 fn by_sample(
     arguments: &Arguments,
-    job: &JobFile,
+    job: &Job,
     prepared: &Prepared,
-    here: &Timed,
+    here: &TimedRun,
     session: &mut Session,
 ) -> Result<Ran> {
     let ours = samples_here(job, prepared, 0, u32::MAX)?;
@@ -311,8 +307,7 @@ fn by_sample(
     let (status, commanded) = drive::run_samples(session, arguments.place.qemu, operator, |sample| {
         digest.sample(sample);
         if let (Some(file), Ok(())) = (&mut file, &written) {
-            let parameters = is_on_pass(sample).then(|| prepared.parameters(sample.path, sample.side));
-            written = file.write(sample, parameters);
+            written = file.write(&inspect::plain(prepared, sample));
         }
         theirs.push(*sample);
         if sample.tick % 4096 == 0 {
@@ -323,7 +318,7 @@ fn by_sample(
     bar.finish_and_clear();
     let name = arguments.trace.clone().unwrap_or_default();
     written
-        .and_then(|()| file.map_or(Ok(()), crate::trace::Trace::finish))
+        .and_then(|()| file.map_or(Ok(()), verify::trace::Trace::finish))
         .map_err(|error| cannot_write(&name, &error))?;
     let difference = drive::first_difference(&ours, &theirs)
         .filter(|_| !commanded)
@@ -358,7 +353,7 @@ fn stopped_from_outside(status: &Status) -> Option<String> {
 }
 
 /// What is wrong with the board's run, if anything is.
-fn complaint(ran: &Ran, here: &Timed, job: &JobFile) -> Option<String> {
+fn complaint(ran: &Ran, here: &TimedRun, job: &Job) -> Option<String> {
     let status = &ran.status;
     if let Some(stopped) = stopped_from_outside(status) {
         return Some(stopped);

@@ -6,16 +6,14 @@ use protocol::message::Status;
 use serde_json::{Map, Value, json};
 
 use super::out::say;
-use super::simulate::machine;
 use super::{Failure, Result, cannot_write, trace};
-use crate::explain;
-use crate::job_file::JobFile;
-use crate::motion::{Gauge, Peaks, limits};
-use crate::prepare::Prepared;
-use crate::remote::script::Schedule;
-use crate::remote::{self, Session};
-use crate::script::{self, Played, Script};
-use crate::survey::is_on_pass;
+use job::Job;
+use machine::Machine;
+use machine::prepare::Prepared;
+use machine::remote::script::Schedule;
+use machine::remote::{self, Session};
+use machine::script::{self, Played, Script};
+use verify::motion::{Gauge, Peaks, limits};
 
 /// A script, played on the machine in this process.
 pub(super) struct Scripted {
@@ -42,7 +40,7 @@ fn read(path: &Path, prepared: &Prepared) -> Result<Script> {
 
 /// Plays it here, and writes the samples in which the tool moves.
 pub(super) fn play(
-    job: &JobFile,
+    job: &Job,
     prepared: &Prepared,
     path: &Path,
     trace_file: Option<&PathBuf>,
@@ -50,8 +48,8 @@ pub(super) fn play(
     let script = read(path, prepared)?;
     let mut file = trace(trace_file, job)?;
     let mut written = Ok(());
-    let mut machine = machine(job, prepared)?;
-    let limited = super::motion_words::limits(job).is_some();
+    let mut machine = Machine::load(prepared).map_err(|fault| inspect::refused(job, fault))?;
+    let has_limits = job.machine.has_limits();
     let mut gauge = Gauge::new(&job.machine);
     let (mut ends, mut passes, mut begun) = (Vec::new(), 0, false);
     let played = script::play(
@@ -65,9 +63,7 @@ pub(super) fn play(
             if moves {
                 passes = sample.pass + 1;
                 if let (Some(file), Ok(())) = (&mut file, &written) {
-                    let parameters =
-                        is_on_pass(sample).then(|| prepared.parameters(sample.path, sample.side));
-                    written = file.write(sample, parameters);
+                    written = file.write(&inspect::plain(prepared, sample));
                 }
             }
         },
@@ -76,14 +72,14 @@ pub(super) fn play(
     gauge.come_to_stand();
     let name = trace_file.cloned().unwrap_or_default();
     written
-        .and_then(|()| file.map_or(Ok(()), crate::trace::Trace::finish))
+        .and_then(|()| file.map_or(Ok(()), verify::trace::Trace::finish))
         .map_err(|error| cannot_write(&name, &error))?;
     Ok(Scripted {
         script,
         schedule: Schedule::of(&played, ends),
         played,
         passes,
-        axes: limited.then(|| gauge.peaks()),
+        axes: has_limits.then(|| gauge.peaks()),
     })
 }
 
@@ -137,7 +133,7 @@ impl Scripted {
     }
 
     /// The outcome of `simulate`.
-    pub(super) fn tell(&self, job: &JobFile, as_json: bool) -> Result<()> {
+    pub(super) fn tell(&self, job: &Job, as_json: bool) -> Result<()> {
         if as_json {
             say!("{}", Value::Object(self.json()));
         } else {
@@ -148,7 +144,7 @@ impl Scripted {
     }
 
     /// Plays it on a board with the job loaded, and tells whether that came to the same.
-    pub(super) fn run(&self, job: &JobFile, session: &mut Session, as_json: bool) -> Result<()> {
+    pub(super) fn run(&self, job: &Job, session: &mut Session, as_json: bool) -> Result<()> {
         let status = remote::script::play(session, &self.script, &self.schedule)?;
         let same = self.agrees(&status);
         let board = session.capabilities().description.board.as_str();

@@ -1,25 +1,19 @@
 //! `simulate`: runs the core on this machine.
 
 use std::path::{Path, PathBuf};
-use std::time::Instant;
 
+use ::approach::Kind;
 use clap::Args;
-use interp_core::{Fault, Place};
-use protocol::digest::Digest;
+use inspect::{BOUNDS, InspectError, TimedRun};
+use job::Job;
+use machine::prepare::Prepared;
+use machine::travel;
+use oracle::{Checked, Emitted};
+use report::{Remarks, Sketch};
+use verify::survey::{Each, Findings};
 
-use super::outcome::{FaultAt, Outcome};
-use super::{
-    BOUNDS, Failure, Result, approach, cannot_write, load, progress, scripted, trace, warn_of_limits,
-};
-use crate::approach::Kind;
-use crate::explain;
-use crate::job_file::JobFile;
-use crate::machine::Machine;
-use crate::oracle::{Checked, Emitted, Oracle};
-use crate::prepare::Prepared;
-use crate::report::{Remarks, Sketch};
-use crate::survey::{Each, Findings, Survey, is_on_pass};
-use crate::travel;
+use super::outcome::Outcome;
+use super::{Bar, Failure, Result, approach, cannot_write, load, scripted, trace, warn_of_limits};
 
 /// Runs a job on this machine: the same core, the same bits as on the board; or one of the paper's other approaches.
 ///
@@ -48,126 +42,40 @@ pub(super) struct Arguments {
     approach: Kind,
 }
 
-/// A run of the core alone, timed: digests of the run and of each pass.
-#[derive(Debug)]
-pub(super) struct Timed {
-    pub(super) digest: u64,
-    pub(super) samples: u64,
-    pub(super) samples_per_second: f64,
-    /// Of each pass: first tick, samples, digest of the run up to its end.
-    pub(super) passes: Vec<(u32, u32, u64)>,
-    pub(super) fault: Option<FaultAt>,
-}
-
-/// A machine with the job loaded, or the reason against it as bad input.
-pub(super) fn machine(job: &JobFile, prepared: &Prepared) -> Result<Machine> {
-    Machine::load(prepared).map_err(|fault| refused(job, fault))
-}
-
-fn refused(job: &JobFile, fault: Fault) -> Failure {
-    let (what, remedy) = explain::fault(fault);
-    let remedy = format!("{remedy}; more: cargo sim explain {}", fault.kind.code());
-    job.origin.error("surface", what, remedy).into()
-}
-
-/// Parts of the bar of a run, which goes by the side parameter: nobody knows the samples before.
-const PARTS: u64 = 1000;
-
-/// Parts of the surface that lie behind a pass.
-#[allow(
-    clippy::cast_possible_truncation,
-    clippy::cast_precision_loss,
-    clippy::cast_sign_loss,
-    reason = "a share of a bar"
-)]
-fn parts_done(side: Place, prepared: &Prepared) -> u64 {
-    let [start, end] = [0, prepared.side.breaks.len() - 1].map(|end| prepared.side.breaks[end]);
-    let share = (prepared.side.parameter(side) - start) / (end - start);
-    (share * PARTS as f64) as u64
-}
-
 /// Runs the core alone.
-pub(super) fn timed(job: &JobFile, prepared: &Prepared) -> Result<Timed> {
-    let mut machine = machine(job, prepared)?;
-    let mut run = Digest::new();
-    let mut passes: Vec<(u32, u32, u64)> = Vec::new();
-    let mut current = None;
-    let mut samples = 0_u64;
-    let bar = progress(PARTS, "running");
-    let start = Instant::now();
-    let result = machine.run(|sample| {
-        if current != Some(sample.pass) {
-            if let Some(last) = passes.last_mut() {
-                last.2 = run.value();
-            }
-            current = Some(sample.pass);
-            passes.push((sample.tick, 0, 0));
-            if is_on_pass(sample) {
-                bar.set_position(parts_done(sample.side, prepared));
-            }
-        }
-        run.sample(sample);
-        if let Some(last) = passes.last_mut() {
-            last.1 += 1;
-        }
-        samples += 1;
-        true
-    });
-    let elapsed = start.elapsed().as_secs_f64();
-    bar.finish_and_clear();
-    if let Some(last) = passes.last_mut() {
-        last.2 = run.value();
-    }
-    #[allow(clippy::cast_precision_loss, reason = "below 2^53")]
-    let samples_per_second = samples as f64 / elapsed.max(1e-9);
-    let fault = result
-        .err()
-        .map(|fault| FaultAt::of(fault, &machine, samples, prepared));
-    Ok(Timed {
-        digest: run.value(),
-        samples,
-        samples_per_second,
-        passes,
-        fault,
-    })
+pub(super) fn timed(job: &Job, prepared: &Prepared) -> Result<TimedRun> {
+    let bar = Bar::new();
+    let timed = inspect::timed(job, prepared, &bar);
+    bar.clear();
+    Ok(timed?)
 }
 
 /// Runs the core again, measures every sample, and writes the trace if it is wanted; with what a report needs if one is
 /// `sketched`.
 pub(super) fn surveyed(
-    job: &JobFile,
+    job: &Job,
     prepared: &Prepared,
-    timed: &Timed,
+    timed: &TimedRun,
     trace_file: Option<&PathBuf>,
     sketched: bool,
 ) -> Result<(Findings, Option<Sketch>)> {
-    let oracle = oracle(job)?;
     let mut sketch = sketched.then(|| Sketch::new(job, timed.passes.len()));
     let mut draw = sketch
         .as_mut()
         .map(|sketch| |emitted: &Emitted, checked: &Checked| sketch.add(emitted, checked));
     let each = draw.as_mut().map(|draw| draw as &mut Each<'_>);
-    let mut survey = Survey::new(prepared, &oracle, trace(trace_file, job)?, each);
-    let bar = progress(timed.samples, "measuring");
-    let mut written = Ok(());
-    let mut machine = machine(job, prepared)?;
-    let ran = machine.run(|sample| {
-        written = survey.add(sample);
-        if sample.tick % 65_536 == 0 {
-            bar.set_position(sample.tick.into());
-        }
-        written.is_ok()
-    });
-    bar.finish_and_clear();
-    let name = trace_file.cloned().unwrap_or_default();
-    let findings = written
-        .and_then(|()| survey.finish(ran.is_ok()))
-        .map_err(|error| cannot_write(&name, &error))?;
+    let bar = Bar::new();
+    let findings = inspect::surveyed(job, prepared, timed.samples, trace(trace_file, job)?, each, &bar);
+    bar.clear();
+    let findings = findings.map_err(|error| match (error, trace_file) {
+        (InspectError::Trace(error), Some(path)) => cannot_write(path, &error),
+        (error, _) => error.into(),
+    })?;
     Ok((findings, sketch))
 }
 
 /// What a report says besides the samples: the fault, figures out of their bounds, limits that are not held.
-pub(super) fn remarks(timed: &Timed, findings: &Findings) -> Remarks {
+pub(super) fn remarks(timed: &TimedRun, findings: &Findings) -> Remarks {
     let failures = match &timed.fault {
         Some(fault) => vec![fault.sentence()],
         None => findings.report.failures(&BOUNDS),
@@ -180,7 +88,7 @@ pub(super) fn remarks(timed: &Timed, findings: &Findings) -> Remarks {
 
 /// Writes the report if one is wanted, and returns the page's path.
 pub(super) fn report(
-    job: &JobFile,
+    job: &Job,
     directory: Option<&Path>,
     sketch: Option<&Sketch>,
     findings: &Findings,
@@ -192,11 +100,6 @@ pub(super) fn report(
             .map_err(|error| cannot_write(directory, &error))
     };
     directory.zip(sketch).map(write).transpose()
-}
-
-/// The oracle of a job that was prepared, hence has one.
-pub(super) fn oracle(job: &JobFile) -> Result<Oracle> {
-    Oracle::new(job).map_err(|error| Failure::input(error.to_string(), "say side = \"+\" or \"-\""))
 }
 
 pub(super) fn command(arguments: &Arguments) -> Result<()> {

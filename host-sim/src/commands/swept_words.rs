@@ -4,11 +4,11 @@ use super::out::say;
 use interp_core::STORE_WORDS;
 use serde_json::{Map, Value, json};
 
-use crate::job_file::JobFile;
-use crate::motion::limits::{ORDERS, Peaks, TOLERANCES};
-use crate::prepare::Prepared;
-use crate::survey;
-use crate::swept::{Findings, Hollow};
+use job::Job;
+use machine::prepare::Prepared;
+use verify::motion::limits::{ORDERS, Peaks, TOLERANCES};
+use verify::survey;
+use verify::swept::{Findings, Hollow};
 
 /// Bytes of surface data that the board holds.
 const STORE_BYTES: usize = STORE_WORDS * size_of::<i32>();
@@ -17,7 +17,7 @@ fn data_bytes(prepared: &Prepared) -> usize {
     size_of_val(prepared.words.as_slice())
 }
 
-fn time_s(job: &JobFile, samples: u64) -> f64 {
+fn time_s(job: &Job, samples: u64) -> f64 {
     #[allow(clippy::cast_precision_loss, reason = "below 2^53")]
     let ticks = samples as f64;
     ticks * job.machine.period_s()
@@ -25,7 +25,7 @@ fn time_s(job: &JobFile, samples: u64) -> f64 {
 
 /// The keys of `verify`.
 pub(super) fn json(
-    job: &JobFile,
+    job: &Job,
     prepared: &Prepared,
     survey: &survey::Findings,
     found: &Findings,
@@ -89,12 +89,8 @@ pub(super) fn json(
 }
 
 /// Null where the machine has no limits. `rounding`: what was taken off.
-fn limits(job: &JobFile, [velocity, acceleration, jerk]: &Peaks) -> Value {
-    let machine = &job.machine;
-    let given = machine.velocity_max_mm_s.is_some()
-        || machine.acceleration_max_mm_s2.is_some()
-        || machine.jerk_max_mm_s3.is_some();
-    if !given {
+fn limits(job: &Job, [velocity, acceleration, jerk]: &Peaks) -> Value {
+    if !job.machine.has_limits() {
         return Value::Null;
     }
     json!({
@@ -115,7 +111,7 @@ fn um(mm: f64) -> f64 {
 
 /// The same for a person.
 pub(super) fn print(
-    job: &JobFile,
+    job: &Job,
     prepared: &Prepared,
     survey: &survey::Findings,
     found: &Findings,
@@ -171,7 +167,7 @@ pub(super) fn print(
     );
 }
 
-fn scallop(job: &JobFile, found: &Findings) {
+fn scallop(job: &Job, found: &Findings) {
     if found.ridges.is_empty() {
         row("scallop height", "not measured: fewer than two whole passes");
         return;
@@ -217,7 +213,7 @@ fn ratio(part: usize, whole: usize) -> f64 {
     part as f64 / whole as f64
 }
 
-fn travel(job: &JobFile, found: &Findings) {
+fn travel(job: &Job, found: &Findings) {
     let axes = &found.axes;
     if let Some([x, y, z]) = axes.extent_mm {
         let given = match (job.machine.travel_mm, axes.within_travel()) {

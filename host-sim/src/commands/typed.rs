@@ -8,8 +8,8 @@ use protocol::message::Status;
 
 use super::operate::{sentence, typed};
 use super::out::to_stderr;
-use crate::remote::RemoteError;
-use crate::remote::operate::{Action, Operator};
+use machine::remote::RemoteError;
+use machine::remote::operate::{Action, Operator};
 
 /// What can be typed.
 pub(super) const WORDS: &str = "hold, resume, stop, abort, override 50, status";

@@ -1,37 +1,20 @@
 //! `verify`: every sample of a job against the independent oracle.
 
-use super::out::say;
-use std::cell::RefCell;
-use std::collections::BTreeMap;
 use std::path::PathBuf;
 
 use clap::Args;
-use indicatif::ProgressBar;
-use interp_core::State;
+use inspect::{BOUNDS, Measured, Verification, verified};
+use job::{Job, Spacing};
+use machine::prepare::Prepared;
+use oracle::{Checked, Emitted, Figure};
+use report::{Remarks, RidgePlace, Scallops, Sketch};
 use serde_json::Value;
+use verify::survey::{Each, Findings};
+use verify::swept;
 
-use super::motion_words::{self, Judged};
-use super::simulate::{Timed, machine, oracle, remarks, report, timed};
-use super::{Failure, Result, along, load, progress, spinner, swept_words};
-use crate::job_file::{JobFile, Spacing};
-use crate::motion::{Gauge, Peaks, limits};
-use crate::oracle::{Bounds, Checked, Emitted, Figure};
-use crate::prepare::Prepared;
-use crate::report::{Remarks, RidgePlace, Scallops, Sketch};
-use crate::survey::{Findings, Survey};
-use crate::swept::{self, Track};
-use crate::travel;
-
-/// What every sample has to hold to: the figures of the README.
-pub const BOUNDS: Bounds = Bounds {
-    position_nm: 10.0,
-    contact_nm: 10.0,
-    normal_rad: 1e-6,
-    ripple_pct: 0.001,
-    interval: 1e-5,
-    side_step: 1e-5,
-    fit: 1.0,
-};
+use super::out::say;
+use super::simulate::{remarks, report, timed};
+use super::{Bar, Failure, Result, along, load, motion_words, swept_words};
 
 /// Checks a job before anything moves. Every sample against an independent f64 oracle: positions, normals, feed ripple, path
 /// intervals, schedule. The ball's swept envelope against the surface: scallop height everywhere, gouges, local or by another
@@ -54,11 +37,6 @@ pub(super) struct Arguments {
     /// Prints one JSON object instead of text.
     #[arg(long)]
     pub(super) json: bool,
-}
-
-/// Passes that a dense scan of the surface comes to, where the samples only see their own places.
-fn scanned_passes(job: &crate::job_file::JobFile) -> Result<Option<usize>> {
-    Ok(oracle(job)?.schedule().ok().map(|passes| passes.len()))
 }
 
 fn line(name: &str, figure: &Figure, bound: f64, unit: &str) {
@@ -99,125 +77,8 @@ fn print(findings: &Findings, scanned: Option<usize>, first_order: bool) {
     );
 }
 
-/// What the axes do, sample by sample. Where the job sets limits, from standstill to standstill with all that lies between;
-/// without, within passes: there the feed jumps between them, and a pass's last step is cut short by its end.
-struct Axes {
-    gauge: Gauge,
-    limited: bool,
-    begun: bool,
-}
-
-impl Axes {
-    fn new(job: &JobFile) -> Self {
-        let machine = &job.machine;
-        let limited = machine.velocity_max_mm_s.is_some()
-            || machine.acceleration_max_mm_s2.is_some()
-            || machine.jerk_max_mm_s3.is_some();
-        Self {
-            gauge: Gauge::new(machine),
-            limited,
-            begun: false,
-        }
-    }
-
-    /// A sample as the machine emitted it.
-    fn emitted(&mut self, tick: u32, cl_nm: [i32; 3]) {
-        if self.limited {
-            if !std::mem::replace(&mut self.begun, true) {
-                self.gauge.stand(cl_nm);
-            }
-            self.gauge.add(tick.into(), cl_nm);
-        }
-    }
-
-    /// A sample on a pass.
-    fn on_pass(&mut self, sample: &Emitted) {
-        if self.limited || sample.last_of_pass {
-            return;
-        }
-        if sample.first_of_pass {
-            self.gauge.gap();
-        }
-        self.gauge.add(sample.tick, sample.cl_nm);
-    }
-
-    fn finish(mut self) -> Peaks {
-        if self.limited {
-            self.gauge.come_to_stand();
-        }
-        self.gauge.peaks()
-    }
-}
-
-/// What a verified run came to.
-pub(super) struct Measured {
-    pub(super) findings: Findings,
-    pub(super) swept: swept::Findings,
-    pub(super) axes: Peaks,
-    pub(super) motion: Vec<Judged>,
-}
-
-/// Runs the core again, measures every sample, then the swept ball against the surface.
-pub(super) fn measured(
-    job: &JobFile,
-    prepared: &Prepared,
-    timed: &Timed,
-    mut sketch: Option<&mut Sketch>,
-    with_optimum: bool,
-) -> Result<Measured> {
-    let oracle = oracle(job)?;
-    let bar = progress(timed.samples, "measuring");
-    // On a machine with limits the feed is low at the ends of passes.
-    let spacing_nm = match prepared.header.axes {
-        Some(_) => 0.5e6 * job.feed_mm_s() * job.machine.period_s(),
-        None => 0.0,
-    };
-    let mut track = Track::with_spacing(spacing_nm);
-    let axes = RefCell::new(Axes::new(job));
-    let mut keep = |emitted: &Emitted, checked: &Checked| {
-        track.add(emitted, job.along);
-        axes.borrow_mut().on_pass(emitted);
-        if let Some(sketch) = &mut sketch {
-            sketch.add(emitted, checked);
-        }
-    };
-    let mut survey = Survey::new(prepared, &oracle, None, Some(&mut keep));
-    let mut written = Ok(());
-    let mut running = BTreeMap::<u32, u64>::new();
-    let ran = machine(job, prepared)?.run(|sample| {
-        axes.borrow_mut().emitted(sample.tick, sample.cl_nm);
-        if sample.state == State::Running {
-            *running.entry(sample.pass).or_default() += 1;
-        }
-        written = survey.add(sample);
-        if sample.tick % 65_536 == 0 {
-            bar.set_position(sample.tick.into());
-        }
-        written.is_ok()
-    });
-    let findings = written
-        .and_then(|()| survey.finish(ran.is_ok()))
-        .map_err(|error| Failure::Failed(Some(error.to_string())))?;
-    let swept = swept::measure(job, &oracle, &track, ran.is_ok(), &Bar(&bar));
-    bar.finish_and_clear();
-    let motion = if with_optimum {
-        let bar = spinner("the best motion");
-        let judged = motion_words::judged(job, &oracle, &track, &running);
-        bar.finish_and_clear();
-        judged
-    } else {
-        Vec::new()
-    };
-    Ok(Measured {
-        findings,
-        swept,
-        axes: axes.into_inner().finish(),
-        motion,
-    })
-}
-
 /// The measured heights as the report shows them.
-fn scallops(job: &JobFile, swept: &swept::Findings) -> Scallops {
+fn scallops(job: &Job, swept: &swept::Findings) -> Scallops {
     let place = |spot: &swept::RidgeSpot| RidgePlace {
         u: spot.u,
         v: spot.v,
@@ -231,132 +92,78 @@ fn scallops(job: &JobFile, swept: &swept::Findings) -> Scallops {
     }
 }
 
-/// One bar for all parts of the measuring.
-struct Bar<'a>(&'a ProgressBar);
-
-impl swept::Progress for Bar<'_> {
-    fn begin(&self, what: &'static str, steps: u64) {
-        self.0.reset();
-        self.0.set_length(steps);
-        self.0.set_message(what);
-    }
-
-    fn done(&self, steps: u64) {
-        self.0.inc(steps);
-    }
+/// The keys of `verify`.
+fn json(job: &Job, prepared: &Prepared, found: &Verification) -> Value {
+    let Measured {
+        findings,
+        swept,
+        axes,
+        pass_times,
+    } = &found.measured;
+    let mut value = swept_words::json(job, prepared, findings, swept, axes);
+    value.insert("motion".to_owned(), motion_words::json(pass_times));
+    value.extend(along::json(job));
+    value.insert("passes_scanned".to_owned(), found.scanned.into());
+    value.insert("failures".to_owned(), found.failures.clone().into());
+    value.insert("passed".to_owned(), found.failures.is_empty().into());
+    Value::Object(value)
 }
 
-/// All that speaks against the job, the gravest first.
-fn failures(job: &JobFile, timed: &Timed, measured: &Measured, scanned: Option<usize>) -> Vec<String> {
-    let findings = &measured.findings;
-    let mut failures: Vec<String> = timed.fault.iter().map(|fault| fault.sentence()).collect();
-    failures.extend(findings.report.failures(&BOUNDS));
-    if let Some(scanned) =
-        scanned.filter(|scanned| *scanned != findings.passes as usize && timed.fault.is_none())
-    {
-        failures.push(format!(
-            "{} passes, but a dense scan of the surface needs {scanned}",
-            findings.passes
-        ));
+/// The same for a person.
+fn print_verification(job: &Job, prepared: &Prepared, found: &Verification) {
+    let Measured {
+        findings,
+        swept,
+        axes,
+        pass_times,
+    } = &found.measured;
+    say!("  along        {}", along::sentence(job));
+    print(findings, found.scanned, job.spacing == Spacing::FirstOrder);
+    swept_words::print(job, prepared, findings, swept, axes);
+    motion_words::print(pass_times);
+    for failure in &found.failures {
+        say!("  FAIL {failure}");
     }
-    failures.extend(measured.swept.failures.iter().cloned());
-    if let Err(error) = travel::check(job) {
-        failures.push(format!("{}: {}", error.what(), error.remedy()));
+    for warning in &found.warnings {
+        say!("  warning: {warning}");
     }
-    failures.extend(limits::failures(&measured.axes));
-    failures
-}
-
-/// What is told of a verified job.
-struct Told<'a> {
-    job: &'a JobFile,
-    prepared: &'a Prepared,
-    measured: &'a Measured,
-    scanned: Option<usize>,
-    failures: &'a [String],
-    warnings: Vec<&'a String>,
-}
-
-impl Told<'_> {
-    fn json(&self) -> Value {
-        let Measured {
-            findings,
-            swept,
-            axes,
-            motion,
-        } = self.measured;
-        let mut value = swept_words::json(self.job, self.prepared, findings, swept, axes);
-        value.insert("motion".to_owned(), motion_words::json(motion));
-        value.extend(along::json(self.job));
-        value.insert("passes_scanned".to_owned(), self.scanned.into());
-        value.insert("failures".to_owned(), self.failures.into());
-        value.insert("passed".to_owned(), self.failures.is_empty().into());
-        Value::Object(value)
-    }
-
-    fn print(&self) {
-        let Measured {
-            findings,
-            swept,
-            axes,
-            motion,
-        } = self.measured;
-        say!("  along        {}", along::sentence(self.job));
-        print(findings, self.scanned, self.job.spacing == Spacing::FirstOrder);
-        swept_words::print(self.job, self.prepared, findings, swept, axes);
-        motion_words::print(motion);
-        for failure in self.failures {
-            say!("  FAIL {failure}");
-        }
-        for warning in &self.warnings {
-            say!("  warning: {warning}");
-        }
-        let passed = self.failures.is_empty();
-        say!("  {}", if passed { "passed" } else { "FAILED" });
-    }
+    let passed = found.failures.is_empty();
+    say!("  {}", if passed { "passed" } else { "FAILED" });
 }
 
 pub(super) fn command(arguments: &Arguments) -> Result<()> {
     let (job, prepared) = load(&arguments.job)?;
     let timed = timed(&job, &prepared)?;
-    let with_optimum = arguments.optimum || motion_words::limits(&job).is_some();
+    let with_optimum = arguments.optimum || job.machine.has_limits();
     let directory = arguments.report.as_deref();
     let mut sketch = directory.map(|_| Sketch::new(&job, timed.passes.len()));
-    let measured = measured(&job, &prepared, &timed, sketch.as_mut(), with_optimum)?;
-    let scanned = scanned_passes(&job)?;
-    let failures = failures(&job, &timed, &measured, scanned);
-    let Measured { findings, swept, .. } = &measured;
-    let warnings: Vec<&String> = swept
-        .warnings
-        .iter()
-        .filter(|warning| !failures.contains(warning))
-        .collect();
+    let mut draw = sketch
+        .as_mut()
+        .map(|sketch| |emitted: &Emitted, checked: &Checked| sketch.add(emitted, checked));
+    let each = draw.as_mut().map(|draw| draw as &mut Each<'_>);
+    let bar = Bar::new();
+    let found = verified(&job, &prepared, &timed, each, with_optimum, &bar);
+    bar.clear();
+    let found = found?;
+    let Measured { findings, swept, .. } = &found.measured;
     let mut remarks = Remarks {
-        failures: failures.clone(),
+        failures: found.failures.clone(),
         verified: true,
         scallops: Some(scallops(&job, swept)),
         ..remarks(&timed, findings)
     };
-    remarks.warnings.extend(warnings.iter().copied().cloned());
+    remarks.warnings.extend(found.warnings.iter().cloned());
     let page = report(&job, directory, sketch.as_ref(), findings, &remarks)?;
-    let told = Told {
-        job: &job,
-        prepared: &prepared,
-        measured: &measured,
-        scanned,
-        failures: &failures,
-        warnings,
-    };
     if arguments.json {
-        say!("{}", told.json());
+        say!("{}", json(&job, &prepared, &found));
     } else {
         say!("{}", arguments.job.display());
-        told.print();
+        print_verification(&job, &prepared, &found);
         if let Some(page) = page {
             say!("  report {}", page.display());
         }
     }
-    if failures.is_empty() {
+    if found.failures.is_empty() {
         Ok(())
     } else {
         Err(Failure::Failed(None))

@@ -46,15 +46,15 @@ pub fn job(kind: Kind, name: &str) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::direction::settle;
-    use crate::job_file::JobFile;
-    use crate::machine::Machine;
+    use machine::Machine;
+    use machine::direction::settle;
+    use machine::prepare::configuration;
 
     /// Every job that needs no other file loads and runs to its end.
     #[test]
     fn templates_run_at_once() {
         for kind in Kind::ALL {
-            let job = JobFile::parse("job.toml", &job(kind, "job.toml"));
+            let job = job_file::parse("job.toml", &job(kind, "job.toml"));
             if kind == Kind::File {
                 // The CAD file is still to be named: the error points into the section.
                 let (line, _) = job.unwrap_err().line_and_column().unwrap();
@@ -71,7 +71,7 @@ mod tests {
                 })
                 .unwrap();
             assert!(samples > 10_000, "{kind:?}: {samples} samples");
-            assert_eq!(job.pattern, crate::job_file::Pattern::Zig);
+            assert_eq!(job.pattern, job::Pattern::Zig);
         }
     }
 
@@ -92,16 +92,16 @@ mod tests {
                 _ => line,
             });
             let full = lines.collect::<Vec<_>>().join("\n");
-            let full = JobFile::parse("job.toml", &full).unwrap();
-            let plain = JobFile::parse("job.toml", &plain).unwrap();
+            let full = job_file::parse("job.toml", &full).unwrap();
+            let plain = job_file::parse("job.toml", &plain).unwrap();
             assert_eq!(
                 (&full.surface, full.pattern, full.chord_mm),
                 (&plain.surface, plain.pattern, plain.chord_mm)
             );
             assert_eq!(full.machine.period_us, plain.machine.period_us);
-            assert_eq!(full.machine.configuration(), plain.machine.configuration());
-            assert!(full.machine.travel_mm.is_some() && full.machine.steps.is_some());
-            assert!(full.machine.jerk_max_mm_s3.is_some() && full.machine.velocity_max_mm_s.is_some());
+            assert_eq!(configuration(&full.machine), configuration(&plain.machine));
+            assert!(full.machine.travel_mm.is_some() && full.machine.step_output.is_some());
+            assert!(full.machine.has_limits());
         }
     }
 
@@ -143,7 +143,7 @@ mod tests {
             .split("```")
             .next()
             .unwrap();
-        let (job, prepared) = settle(JobFile::parse("axes.toml", text).unwrap()).unwrap();
+        let (job, prepared) = settle(job_file::parse("axes.toml", text).unwrap()).unwrap();
         let mut last = [0; 3];
         Machine::load(&prepared)
             .unwrap()

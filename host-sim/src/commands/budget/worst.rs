@@ -8,11 +8,11 @@ use serde_json::{Value, json};
 use super::super::out::{say, say_part};
 use super::super::{Failure, Result, cannot_write, progress};
 use super::Arguments;
-use crate::budget::PERIOD_CYCLES;
-use crate::budget::figures::{Model, whole};
-use crate::budget::lab::{Lab, Worst};
-use crate::budget::measure::Bench;
-use crate::budget::search::{Campaign, search, text};
+use cycles::PERIOD_CYCLES;
+use cycles::figures::{Model, whole};
+use cycles::lab::{Lab, Worst};
+use cycles::measure::Bench;
+use cycles::search::{Campaign, search, text};
 
 /// Share of the period that a tick takes.
 fn share_pct(cycles: u32) -> f64 {

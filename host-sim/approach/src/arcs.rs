@@ -1,0 +1,242 @@
+//! The curve approach for machines that know arcs: biarcs through places of the tool centre's path, tangent to it and to
+//! each other in the plane that they turn in, while the third axis moves in proportion; each arc at one speed. Which of the
+//! three planes is taken is a matter of which reaches furthest.
+
+use super::curve::{SPEED_SHARE, longest};
+use super::nodes::{Node, Nodes};
+use super::{ApproachError, PassPath};
+use crate::gcode::{Cut, Plane, Shape};
+use job::Job;
+
+/// Flatter arcs are cut straight: a machine that computes in f32 has no digits left for a longer radius.
+const RADIUS_MAX_MM: f64 = 1e4;
+/// A path that runs across a plane more steeply than this has no direction in it, share of a unit.
+const STEEP: f64 = 1e-3;
+
+type Flat = [f64; 2];
+
+fn minus(a: Flat, b: Flat) -> Flat {
+    [a[0] - b[0], a[1] - b[1]]
+}
+
+/// `a + b t`.
+fn along(a: Flat, b: Flat, t: f64) -> Flat {
+    [a[0] + t * b[0], a[1] + t * b[1]]
+}
+
+fn inner(a: Flat, b: Flat) -> f64 {
+    a[0] * b[0] + a[1] * b[1]
+}
+
+fn outer(a: Flat, b: Flat) -> f64 {
+    a[0] * b[1] - a[1] * b[0]
+}
+
+/// One arc, or a line where it is too flat.
+#[derive(Clone, Copy, Debug)]
+struct Piece {
+    from: Flat,
+    to: Flat,
+    /// Centre, and radius: positive if counterclockwise.
+    turn: Option<(Flat, f64)>,
+}
+
+impl Piece {
+    /// The arc that leaves `from` with the unit tangent and ends at `to`.
+    fn new(from: Flat, tangent: Flat, to: Flat) -> Self {
+        let chord = minus(to, from);
+        let (squared, bend) = (inner(chord, chord), 2.0 * outer(tangent, chord));
+        let turn = (bend.abs() * RADIUS_MAX_MM > squared).then(|| {
+            let radius = squared / bend;
+            (
+                [from[0] - radius * tangent[1], from[1] + radius * tangent[0]],
+                radius,
+            )
+        });
+        Self { from, to, turn }
+    }
+
+    /// Distance of a point from the piece, and how far along it that point lies, as a share.
+    fn distance(&self, point: Flat) -> (f64, f64) {
+        match self.turn {
+            Some((centre, radius)) => {
+                let [arm, begin, end] = [point, self.from, self.to].map(|at| minus(at, centre));
+                let angle = |to: Flat| radius.signum() * outer(begin, to).atan2(inner(begin, to));
+                (
+                    (arm[0].hypot(arm[1]) - radius.abs()).abs(),
+                    angle(arm) / angle(end),
+                )
+            }
+            None => {
+                let (chord, arm) = (minus(self.to, self.from), minus(point, self.from));
+                let squared = inner(chord, chord);
+                (
+                    (outer(chord, arm) / squared.sqrt()).abs(),
+                    inner(chord, arm) / squared,
+                )
+            }
+        }
+    }
+
+    fn length(&self) -> f64 {
+        let [x, y] = minus(self.to, self.from);
+        let chord = x.hypot(y);
+        self.turn.map_or(chord, |(_, radius)| {
+            let half = 0.5 * chord / radius.abs();
+            2.0 * radius.abs() * half.min(1.0).asin()
+        })
+    }
+}
+
+/// Two arcs from one place and direction to another, which meet with one tangent; those whose control polygons have equal
+/// arms. `None` where the path turns by a quarter or more.
+fn biarc([from, to]: [Flat; 2], [begin, end]: [Flat; 2]) -> Option<[Piece; 2]> {
+    let apart = minus(to, from);
+    let (both, squared) = (inner(apart, along(begin, end, 1.0)), inner(apart, apart));
+    if inner(begin, end) <= 0.0 || both <= 0.0 {
+        return None;
+    }
+    let arm = squared / (both + (both * both + 2.0 * (1.0 - inner(begin, end)) * squared).sqrt());
+    let (first, last) = (along(from, begin, arm), along(to, end, -arm));
+    let joint = [0.5 * (first[0] + last[0]), 0.5 * (first[1] + last[1])];
+    let tangent = minus(last, first);
+    let size = tangent[0].hypot(tangent[1]);
+    let tangent = [tangent[0] / size, tangent[1] / size];
+    Some([Piece::new(from, begin, joint), Piece::new(joint, tangent, to)])
+}
+
+/// The curve approach in arcs, for a job.
+#[derive(Clone, Copy, Debug)]
+pub struct Arcs {
+    path_mm: f64,
+    feed_mm_s: f64,
+}
+
+impl Arcs {
+    /// The approach with a job's feed, and its chord error limit as the tolerance of the path.
+    #[must_use]
+    pub fn new(job: &Job) -> Self {
+        Self {
+            path_mm: job.chord_mm,
+            feed_mm_s: job.feed_mm_s(),
+        }
+    }
+
+    /// The cuts of a pass: the longest that hold the tolerances of path and speed, one after another.
+    ///
+    /// # Errors
+    /// Nothing holds the tolerances somewhere.
+    pub fn cuts(&self, pass: &PassPath<'_>) -> Result<Vec<Cut>, ApproachError> {
+        let nodes = Nodes::new(pass)?.0;
+        let fit = |first: usize, last: usize| {
+            let nodes = &nodes[first..=last];
+            Plane::ALL.into_iter().find_map(|plane| self.fit(plane, nodes))
+        };
+        let pairs = longest(nodes.len(), fit).map_err(|first| ApproachError::NoSegment {
+            path: nodes[first].at.path,
+            side: pass.side,
+        })?;
+        Ok(pairs.concat())
+    }
+
+    /// The two cuts over consecutive places that turn in this plane, if they hold the tolerances.
+    fn fit(&self, plane: Plane, nodes: &[Node]) -> Option<[Cut; 2]> {
+        let [x, y, across] = plane.axes();
+        let place = |node: &Node| [node.cl_mm()[x], node.cl_mm()[y]];
+        let (first, last) = (nodes.first()?, nodes.last()?);
+        let tangents = [tangent(first, plane)?, tangent(last, plane)?];
+        let pieces = biarc([place(first), place(last)], tangents)?;
+        let flat = pieces.map(|piece| piece.length());
+        // The joint lies off the path by less than the tolerance: its foot is found across the chord.
+        let chord = minus(place(last), place(first));
+        let ahead = |node: &Node| inner(chord, minus(place(node), pieces[0].to));
+        let split = nodes
+            .partition_point(|node| ahead(node) <= 0.0)
+            .clamp(1, nodes.len() - 1);
+        let (before, after) = (&nodes[split - 1], &nodes[split]);
+        let share = ahead(before) / (ahead(before) - ahead(after));
+        let at_joint = |of: &dyn Fn(&Node) -> f64| of(before) + share * (of(after) - of(before));
+        let heights = [
+            first.cl_mm()[across],
+            at_joint(&|node| node.cl_mm()[across]),
+            last.cl_mm()[across],
+        ];
+        let contact = at_joint(&|node| node.cc_length_mm) - first.cc_length_mm;
+        let contacts = [contact, last.cc_length_mm - first.cc_length_mm - contact];
+        let lift = |[at_x, at_y]: Flat, height: f64| {
+            let mut point = [height; 3];
+            (point[x], point[y]) = (at_x, at_y);
+            point
+        };
+        let cuts = [0, 1].map(|k| {
+            let length_mm = flat[k].hypot(heights[k + 1] - heights[k]);
+            Cut {
+                to_mm: lift(pieces[k].to, heights[k + 1]),
+                length_mm,
+                speed_mm_s: self.feed_mm_s * length_mm / contacts[k],
+                shape: pieces[k].turn.map_or(Shape::Line, |(centre, radius)| Shape::Arc {
+                    plane,
+                    centre_mm: lift(centre, heights[k]),
+                    clockwise: radius < 0.0,
+                }),
+            }
+        });
+        let holds = |k: usize, nodes: &[Node]| {
+            nodes.iter().all(|node| {
+                let (off, share) = pieces[k].distance(place(node));
+                let beside = heights[k] + share * (heights[k + 1] - heights[k]) - node.cl_mm()[across];
+                // The contact is off its feed by the same share as the centre is off its speed.
+                let wanted = self.feed_mm_s * node.at.ratio();
+                let slow = cuts[k].speed_mm_s - wanted;
+                off.hypot(beside) <= self.path_mm && slow.abs() <= SPEED_SHARE * wanted
+            })
+        };
+        (holds(0, &nodes[..split]) && holds(1, &nodes[split..])).then_some(cuts)
+    }
+}
+
+/// Unit tangent in a plane; `None` where the path is steep to it.
+fn tangent(node: &Node, plane: Plane) -> Option<Flat> {
+    let [x, y, _] = plane.axes();
+    let tangent = [node.tangent[x], node.tangent[y]];
+    let size = tangent[0].hypot(tangent[1]);
+    (size > STEEP).then(|| tangent.map(|x| x / size))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn biarcs_are_tangent_where_they_begin_meet_and_end() {
+        let unit = |angle: f64| [angle.cos(), angle.sin()];
+        for (end, angles) in [
+            ([3.0, 1.0], [0.1, 0.9]),
+            ([3.0, -1.0], [-0.7, 0.2]),
+            ([1.0, 1e-9], [0.3, -0.3]),
+        ] {
+            let tangents = angles.map(unit);
+            let [first, last] = biarc([[0.0; 2], end], tangents).unwrap();
+            let leaves = |piece: &Piece, at: Flat, tangent: Flat| {
+                let (centre, radius) = piece.turn.unwrap();
+                let arm = minus(at, centre);
+                assert!((arm[0].hypot(arm[1]) - radius.abs()).abs() < 1e-12);
+                // Counterclockwise, the tangent is the arm turned left.
+                assert!((outer(arm, tangent) - radius).abs() < 1e-12, "{piece:?}");
+            };
+            leaves(&first, [0.0; 2], tangents[0]);
+            leaves(&last, end, tangents[1]);
+            let (centre, radius) = first.turn.unwrap();
+            let arm = minus(first.to, centre);
+            leaves(&last, last.from, [-arm[1] / radius, arm[0] / radius]);
+        }
+        assert!(biarc([[0.0; 2], [1.0, 0.0]], [unit(0.0), unit(1.6)]).is_none());
+    }
+
+    #[test]
+    fn a_straight_path_is_cut_straight() {
+        let [first, last] = biarc([[0.0; 2], [4.0, 3.0]], [[0.8, 0.6]; 2]).unwrap();
+        assert!(first.turn.is_none() && last.turn.is_none());
+        assert!((first.length() + last.length() - 5.0).abs() < 1e-12);
+    }
+}

@@ -1,0 +1,79 @@
+//! Existing practice: the tool centre's path at constant speed of the centre. The contact's speed varies by eqn 4.
+
+use super::linear::{Chain, Chord, Pace, even_chords};
+use super::{Approach, ApproachError, Each, PassPath, Program};
+use job::Job;
+use oracle::vector::length;
+
+/// A step that would leave less than this share of itself to the end is taken to the end.
+const END_SHARE: f64 = 1e-9;
+
+/// The approach for a job.
+#[derive(Clone, Copy, Debug)]
+pub struct ConstantCl {
+    chord_mm: f64,
+    feed_mm_s: f64,
+}
+
+impl ConstantCl {
+    /// The approach with a job's feed, as the speed of the centre, and chord error limit.
+    #[must_use]
+    pub fn new(job: &Job) -> Self {
+        Self {
+            chord_mm: job.chord_mm,
+            feed_mm_s: job.feed_mm_s(),
+        }
+    }
+
+    /// Chords of a pass, all at the feed.
+    ///
+    /// # Errors
+    /// As [`Approach::plan`].
+    pub fn chords(&self, pass: &PassPath<'_>) -> Result<Vec<Chord>, ApproachError> {
+        let mut chords = even_chords(pass, self.chord_mm, self.feed_mm_s)?;
+        for chord in &mut chords {
+            chord.speed_mm_s = self.feed_mm_s;
+        }
+        Ok(chords)
+    }
+}
+
+impl Approach for ConstantCl {
+    fn plan(&self, pass: &PassPath<'_>) -> Result<Box<dyn Program>, ApproachError> {
+        Ok(Box::new(Chain {
+            chords: self.chords(pass)?,
+            pace: Pace::Constant(self.feed_mm_s),
+        }))
+    }
+}
+
+/// Follows the centre's path of a pass at a constant speed. A CNC is fed its chords; it is followed as if it were exact, so
+/// that what is seen is the effect of the constant speed alone.
+pub(super) fn follow(
+    feed_mm_s: f64,
+    pass: &PassPath<'_>,
+    period_s: f64,
+    each: &mut Each<'_>,
+) -> Result<(), ApproachError> {
+    let way = feed_mm_s * period_s;
+    let rate = |path: f64| -> Result<f64, ApproachError> {
+        let speed = length(pass.at(pass.kept(path))?.cl_velocity);
+        Ok(pass.sense() / speed.max(1e-9))
+    };
+    let mut path = pass.ends[0];
+    // Bounded by the length over the way of a period.
+    loop {
+        // Runge and Kutta's rule, with the length as the independent variable.
+        let first = rate(path)?;
+        let second = rate(path + 0.5 * way * first)?;
+        let third = rate(path + 0.5 * way * second)?;
+        let fourth = rate(path + way * third)?;
+        let step = way * (first + 2.0 * (second + third) + fourth) / 6.0;
+        if step.abs() * (1.0 + END_SHARE) >= pass.left(path) {
+            let end = pass.at(pass.ends[1])?;
+            return each(end.contact.cl_mm, end.path);
+        }
+        path += step;
+        each(pass.at(path)?.contact.cl_mm, path)?;
+    }
+}

@@ -1,0 +1,82 @@
+//! What lies between two passes.
+
+use super::Options;
+use crate::gcode::{Blocks, Cut};
+use crate::{ApproachError, from_segment};
+use job::Job;
+use oracle::vector::{length, subtract};
+use oracle::{Oracle, OracleError};
+
+/// Cuts that a step-over may be cut into at most.
+const CUTS_MAX: u32 = 1 << 12;
+
+/// Up to where nothing is in the way.
+pub(super) fn retract(blocks: &mut Blocks<'_>, safe_z_mm: f64) {
+    blocks.rapid([None, None, Some(safe_z_mm)]);
+}
+
+/// Up, across, down near to the place, and down to it at the feed. Over a surface that faces up everywhere, the ball is
+/// free above every place where it touches.
+pub(super) fn approach(
+    blocks: &mut Blocks<'_>,
+    to_mm: [f64; 3],
+    safe_z_mm: f64,
+    job: &Job,
+    options: &Options,
+) {
+    let [x, y, z] = to_mm;
+    let near = (z + options.clearance_mm).min(safe_z_mm);
+    retract(blocks, safe_z_mm);
+    blocks.rapid([Some(x), Some(y), None]);
+    blocks.rapid([None, None, Some(near)]);
+    blocks.cut(&Cut::line([x, y, near], to_mm, job.feed_mm_s()));
+}
+
+/// Along the boundary at a path parameter from one side parameter to another, within the tolerance of chords, at the
+/// speed that keeps the contact at the feed.
+pub(super) fn step_over(
+    oracle: &Oracle,
+    path: f64,
+    [from, to]: [f64; 2],
+    job: &Job,
+) -> Result<Vec<Cut>, ApproachError> {
+    let at = |share: f64| {
+        oracle
+            .offset(path, from + (to - from) * share)
+            .map(|at| at.contact)
+    };
+    let holds = |count: u32| -> Result<bool, OracleError> {
+        let places: Result<Vec<_>, _> = (0..=2 * count)
+            .map(|k| at(f64::from(k) / f64::from(2 * count)).map(|contact| contact.cl_mm))
+            .collect();
+        let places = places?;
+        // A chord of a curve is off by most near its middle.
+        Ok(places
+            .windows(3)
+            .step_by(2)
+            .all(|three| from_segment(three[1], three[0], three[2]) <= job.chord_mm))
+    };
+    let mut count = 1;
+    while !holds(count)? {
+        if count == CUTS_MAX {
+            return Err(ApproachError::NoSegment { path, side: from });
+        }
+        count *= 2;
+    }
+    let mut cuts = Vec::new();
+    let mut begin = at(0.0)?;
+    for k in 1..=count {
+        let end = at(f64::from(k) / f64::from(count))?;
+        let contact = length(subtract(end.cc_mm, begin.cc_mm));
+        let centre = length(subtract(end.cl_mm, begin.cl_mm));
+        if contact > 0.0 && centre > 0.0 {
+            cuts.push(Cut::line(
+                begin.cl_mm,
+                end.cl_mm,
+                job.feed_mm_s() * centre / contact,
+            ));
+        }
+        begin = end;
+    }
+    Ok(cuts)
+}

@@ -1,0 +1,300 @@
+//! Blocks of G-code: moves with modal words left out, coordinates to a tenth of a micrometre, feeds to five digits.
+
+use std::fmt::Write;
+
+use oracle::vector::{length, subtract};
+
+/// Coordinates are written in steps of this, mm.
+pub const RESOLUTION_MM: f64 = 1e-4;
+/// Digits of a feed: it is within 5e-5 of what is meant.
+const FEED_DIGITS: i32 = 5;
+const SECONDS_PER_MINUTE: f64 = 60.0;
+const AXES: [&str; 3] = ["X", "Y", "Z"];
+const OFFSETS: [&str; 3] = ["I", "J", "K"];
+
+/// What an F word means.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
+pub enum FeedMode {
+    /// Millimetres a minute.
+    G94,
+    /// Inverse time: the block takes 1/F minutes.
+    G93,
+}
+
+impl FeedMode {
+    /// The G word.
+    #[must_use]
+    pub fn word(self) -> &'static str {
+        match self {
+            Self::G94 => "G94",
+            Self::G93 => "G93",
+        }
+    }
+}
+
+/// The plane of an arc. Counterclockwise turns its first axis towards its second.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Plane {
+    /// G17.
+    Xy,
+    /// G18.
+    Zx,
+    /// G19.
+    Yz,
+}
+
+impl Plane {
+    /// All of them.
+    pub const ALL: [Self; 3] = [Self::Xy, Self::Zx, Self::Yz];
+
+    /// The two axes in the plane, in the order in which it turns, and the one across: 0, 1, 2 for x, y, z.
+    #[must_use]
+    pub fn axes(self) -> [usize; 3] {
+        match self {
+            Self::Xy => [0, 1, 2],
+            Self::Zx => [2, 0, 1],
+            Self::Yz => [1, 2, 0],
+        }
+    }
+
+    fn word(self) -> &'static str {
+        match self {
+            Self::Xy => "G17",
+            Self::Zx => "G18",
+            Self::Yz => "G19",
+        }
+    }
+}
+
+/// The way from the last point to the next.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Shape {
+    /// Straight.
+    Line,
+    /// An arc of less than half a turn in its plane; the third axis moves in proportion.
+    Arc {
+        /// Its plane.
+        plane: Plane,
+        /// Its centre, mm.
+        centre_mm: [f64; 3],
+        /// Whether it turns clockwise in its plane.
+        clockwise: bool,
+    },
+}
+
+/// A cut of the tool centre.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Cut {
+    /// Where it ends, mm.
+    pub to_mm: [f64; 3],
+    /// Its length, mm.
+    pub length_mm: f64,
+    /// Its speed, mm/s.
+    pub speed_mm_s: f64,
+    /// Its shape.
+    pub shape: Shape,
+}
+
+impl Cut {
+    /// A straight cut.
+    #[must_use]
+    pub fn line(from_mm: [f64; 3], to_mm: [f64; 3], speed_mm_s: f64) -> Self {
+        Self {
+            to_mm,
+            length_mm: length(subtract(to_mm, from_mm)),
+            speed_mm_s,
+            shape: Shape::Line,
+        }
+    }
+
+    /// How long it takes, s.
+    #[must_use]
+    pub fn time_s(&self) -> f64 {
+        self.length_mm / self.speed_mm_s
+    }
+}
+
+/// Appends blocks to a text, and knows which words hold from the block before.
+#[derive(Debug)]
+pub struct Blocks<'a> {
+    out: &'a mut String,
+    feed_mode: FeedMode,
+    motion: &'static str,
+    plane: Plane,
+    /// Where the tool is, in steps of the resolution.
+    at: [Option<i64>; 3],
+    feed: String,
+}
+
+fn steps(mm: f64) -> i64 {
+    (mm / RESOLUTION_MM).round() as i64
+}
+
+/// A word of a number of steps, without needless zeros.
+fn push_steps(out: &mut String, letter: &str, steps: i64) {
+    let (sign, steps) = (if steps < 0 { "-" } else { "" }, steps.unsigned_abs());
+    let (whole, rest) = (steps / 10_000, steps % 10_000);
+    // Writing to a string cannot fail.
+    let _ = write!(out, "{letter}{sign}{whole}");
+    if rest > 0 {
+        out.push('.');
+        out.push_str(format!("{rest:04}").trim_end_matches('0'));
+    }
+}
+
+/// A feed's digits.
+fn feed_digits(feed: f64) -> String {
+    let decimals = (FEED_DIGITS - 1 - feed.log10().floor() as i32).clamp(0, 9) as usize;
+    let text = format!("{feed:.decimals$}");
+    if text.contains('.') {
+        text.trim_end_matches('0').trim_end_matches('.').to_owned()
+    } else {
+        text
+    }
+}
+
+impl<'a> Blocks<'a> {
+    /// Blocks at the end of this text, with nothing known of what came before but plane XY.
+    #[must_use]
+    pub fn new(out: &'a mut String, feed_mode: FeedMode) -> Self {
+        Self {
+            out,
+            feed_mode,
+            motion: "",
+            plane: Plane::Xy,
+            at: [None; 3],
+            feed: String::new(),
+        }
+    }
+
+    /// A line as it is.
+    pub fn line(&mut self, text: &str) {
+        self.out.push_str(text);
+        self.out.push('\n');
+    }
+
+    /// A comment; what a comment cannot hold is replaced.
+    pub fn comment(&mut self, text: &str) {
+        let clean = text.chars().map(|c| match c {
+            '(' | ')' | ';' | '%' | '!' | '?' | '~' => '_',
+            c if c == ' ' || c.is_ascii_graphic() => c,
+            _ => '_',
+        });
+        let clean: String = clean.collect();
+        self.line(&format!("({clean})"));
+    }
+
+    /// Where the machine is, without a block.
+    pub fn start(&mut self, at_mm: [f64; 3]) {
+        self.at = at_mm.map(|mm| Some(steps(mm)));
+    }
+
+    /// A rapid move of some axes.
+    pub fn rapid(&mut self, to_mm: [Option<f64>; 3]) {
+        self.block("G0", to_mm.map(|mm| mm.map(steps)), "", None);
+    }
+
+    /// A cut. One that ends where it begins, to the resolution, leaves no block.
+    pub fn cut(&mut self, cut: &Cut) {
+        let to = cut.to_mm.map(|mm| Some(steps(mm)));
+        if to == self.at {
+            // Before the plane's word.
+            return;
+        }
+        let (motion, offsets) = match cut.shape {
+            Shape::Line => ("G1", String::new()),
+            Shape::Arc {
+                plane,
+                centre_mm,
+                clockwise,
+            } => {
+                if plane != self.plane {
+                    self.out.push_str(plane.word());
+                    self.plane = plane;
+                }
+                let mut words = String::new();
+                let [first, second, _] = plane.axes();
+                for axis in [first.min(second), first.max(second)] {
+                    let from = self.at[axis].unwrap_or_default();
+                    push_steps(&mut words, OFFSETS[axis], steps(centre_mm[axis]) - from);
+                }
+                (if clockwise { "G2" } else { "G3" }, words)
+            }
+        };
+        let feed = match self.feed_mode {
+            FeedMode::G94 => cut.speed_mm_s * SECONDS_PER_MINUTE,
+            FeedMode::G93 => SECONDS_PER_MINUTE / cut.time_s(),
+        };
+        self.block(motion, to, &offsets, Some(feed_digits(feed)));
+    }
+
+    fn block(&mut self, motion: &'static str, to: [Option<i64>; 3], offsets: &str, feed: Option<String>) {
+        if self.at.iter().zip(to).all(|(at, to)| to.is_none() || to == *at) {
+            return;
+        }
+        if motion != self.motion {
+            self.out.push_str(motion);
+            self.motion = motion;
+        }
+        for ((at, to), axis) in self.at.iter_mut().zip(to).zip(AXES) {
+            if let Some(to) = to.filter(|to| *at != Some(*to)) {
+                push_steps(self.out, axis, to);
+                *at = Some(to);
+            }
+        }
+        self.out.push_str(offsets);
+        if let Some(feed) = feed {
+            // Inverse time holds for its block alone.
+            if self.feed_mode == FeedMode::G93 || feed != self.feed {
+                self.out.push('F');
+                self.out.push_str(&feed);
+            }
+            self.feed = feed;
+        }
+        self.out.push('\n');
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn text(feed_mode: FeedMode, cuts: &[Cut]) -> String {
+        let mut out = String::new();
+        let mut blocks = Blocks::new(&mut out, feed_mode);
+        blocks.start([0.0; 3]);
+        cuts.iter().for_each(|cut| blocks.cut(cut));
+        out
+    }
+
+    #[test]
+    fn words_that_hold_are_left_out() {
+        let lines = [
+            Cut::line([0.0; 3], [3.0, -4.0, 0.0], 10.0),
+            Cut::line([3.0, -4.0, 0.0], [3.0, -4.000_04, 0.0], 10.0),
+            Cut::line([3.0, -4.0, 0.0], [3.0, -4.0, 0.12], 10.0),
+            Cut::line([3.0, -4.0, 0.12], [0.0, 0.0, 0.12], 10.123_456),
+        ];
+        assert_eq!(text(FeedMode::G94, &lines), "G1X3Y-4F600\nZ0.12\nX0Y0F607.41\n");
+        assert_eq!(
+            text(FeedMode::G93, &lines),
+            "G1X3Y-4F120\nZ0.12F5000\nX0Y0F121.48\n"
+        );
+    }
+
+    #[test]
+    fn arcs_name_their_plane_once() {
+        let arc = |to_mm| Cut {
+            to_mm,
+            length_mm: 5.0 * std::f64::consts::FRAC_PI_2,
+            speed_mm_s: 1.0,
+            shape: Shape::Arc {
+                plane: Plane::Zx,
+                centre_mm: [5.0, 0.0, 0.0],
+                clockwise: true,
+            },
+        };
+        let cuts = [arc([5.0, 0.0, 5.0]), arc([10.0, 0.0, 0.0])];
+        assert_eq!(text(FeedMode::G94, &cuts), "G18G2X5Z5I5K0F60\nX10Z0I0K-5\n");
+    }
+}

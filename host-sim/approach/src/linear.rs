@@ -1,0 +1,290 @@
+//! Method 1: cutter contacts by chord error, the offset centres joined by straight segments, each at the speed that keeps
+//! the contact at the feed (Lo eqns 6, 7), followed by a linear interpolator that cuts a segment into whole periods.
+
+use super::pass::from_segment;
+use super::{Approach, ApproachError, Each, PassPath, Program};
+use crate::gcode::{Blocks, Cut, FeedMode};
+use job::Job;
+use oracle::vector::{add, cross, dot, length, scale, subtract};
+use oracle::{Offset, OracleError};
+
+/// Places within a chord at which its error is taken.
+const PROBES: u32 = 12;
+/// Share of the tolerance that they may take: of a parabola, the greatest of them is at least so much of its peak.
+const PEAK: f64 = 1.0 - 1.0 / (PROBES * PROBES) as f64;
+/// Halvings of a step that may be tried before a pass is given up.
+const HALVINGS: u32 = 40;
+/// Steps that narrow a chord's length to what the error allows: the length is within 2^-9, the error within 2^-8.
+const BISECTIONS: u32 = 9;
+/// Halvings of the limit's share that evens out the chords' errors.
+const EVENING: u32 = 8;
+/// A segment that takes this much more than whole periods by rounding alone does not take another.
+const PERIOD_SLACK: f64 = 1e-9;
+/// A step that leaves less than this share of itself to the end is the last one.
+const END_SHARE: f64 = 1e-9;
+
+/// How the chords are chosen.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Chords {
+    /// Lo's eqn 6 as printed, with the radius of curvature of the path: the error is estimated where the chord begins.
+    Equation,
+    /// The same with the radius of the surface's normal curvature along the path.
+    EquationNormal,
+    /// The longest chord whose error, measured on the contact's and on the centre's path, holds the limit.
+    Held,
+}
+
+/// The approach for a job.
+#[derive(Clone, Copy, Debug)]
+pub struct Linear {
+    chords: Chords,
+    chord_mm: f64,
+    feed_mm_s: f64,
+}
+
+impl Linear {
+    /// The approach with a job's feed and chord error limit.
+    #[must_use]
+    pub fn new(job: &Job, chords: Chords) -> Self {
+        Self {
+            chords,
+            chord_mm: job.chord_mm,
+            feed_mm_s: job.feed_mm_s(),
+        }
+    }
+}
+
+/// A straight segment of the centre's path.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Chord {
+    /// Path parameter where it ends.
+    pub path: f64,
+    /// Centre where it begins, mm.
+    pub from_mm: [f64; 3],
+    /// Centre where it ends, mm.
+    pub to_mm: [f64; 3],
+    /// Speed of the centre, mm/s.
+    pub speed_mm_s: f64,
+}
+
+impl Chord {
+    /// The chord as a CNC cuts it.
+    #[must_use]
+    pub fn cut(&self) -> Cut {
+        Cut::line(self.from_mm, self.to_mm, self.speed_mm_s)
+    }
+}
+
+/// Chords of a pass by a rule; `chord_mm` is the limit of their error.
+///
+/// # Errors
+/// As [`Approach::plan`].
+pub fn chords(
+    pass: &PassPath<'_>,
+    rule: Chords,
+    chord_mm: f64,
+    feed_mm_s: f64,
+) -> Result<Vec<Chord>, ApproachError> {
+    let mut chords = Vec::new();
+    if pass.is_point() {
+        return Ok(chords);
+    }
+    let mut at = pass.at(pass.ends[0])?;
+    // Bounded: every step is above the range times 2^-HALVINGS, and in practice by the length over sqrt(8 rho delta).
+    while pass.left(at.path) > 0.0 {
+        let step = match rule {
+            Chords::Equation => equation_step(pass, &at, chord_mm, path_curvature(pass, at.path)),
+            Chords::EquationNormal => equation_step(pass, &at, chord_mm, at.contact.curvature_path.abs()),
+            Chords::Held => held_step(pass, &at, chord_mm)?,
+        };
+        let left = pass.left(at.path);
+        let path = if step >= left * (1.0 - END_SHARE) {
+            pass.ends[1]
+        } else {
+            at.path + step * pass.sense()
+        };
+        let next = pass.at(path)?;
+        let cc = length(subtract(next.contact.cc_mm, at.contact.cc_mm));
+        let cl = length(subtract(next.contact.cl_mm, at.contact.cl_mm));
+        chords.push(Chord {
+            path,
+            from_mm: at.contact.cl_mm,
+            to_mm: next.contact.cl_mm,
+            speed_mm_s: feed_mm_s * if cc > 0.0 { cl / cc } else { 1.0 },
+        });
+        at = next;
+    }
+    Ok(chords)
+}
+
+/// As few chords as hold the limit, with their ends so that all err alike: else the last one is what is left over, and a
+/// chord of half a period runs at half the speed.
+///
+/// # Errors
+/// As [`chords`].
+pub fn even_chords(pass: &PassPath<'_>, chord_mm: f64, feed_mm_s: f64) -> Result<Vec<Chord>, ApproachError> {
+    let mut best = chords(pass, Chords::Held, chord_mm, feed_mm_s)?;
+    let (mut low, mut high) = (0.5, 1.0);
+    for _ in 0..EVENING {
+        let share = 0.5 * (low + high);
+        match chords(pass, Chords::Held, share * chord_mm, feed_mm_s) {
+            Ok(found) if found.len() <= best.len() => (best, high) = (found, share),
+            _ => low = share,
+        }
+    }
+    Ok(best)
+}
+
+/// Curvature of the contact's path as a space curve, 1/mm.
+fn path_curvature(pass: &PassPath<'_>, path: f64) -> f64 {
+    use job::Along;
+    let (u, v) = pass.oracle.swapped(path, pass.side);
+    let at = pass.oracle.surface.at(u, v);
+    let (a, aa) = match pass.oracle.along {
+        Along::U => (at.u, at.uu),
+        Along::V => (at.v, at.vv),
+    };
+    length(cross(a, aa)) / dot(a, a).powf(1.5)
+}
+
+/// Eqn 6: `sqrt(8 rho delta) / |A|`, as far as the pass goes.
+fn equation_step(pass: &PassPath<'_>, at: &Offset, chord_mm: f64, curvature: f64) -> f64 {
+    let step = (8.0 * chord_mm / curvature).sqrt() / at.contact.path_speed;
+    if step.is_finite() {
+        step.min(pass.left(at.path))
+    } else {
+        pass.left(at.path)
+    }
+}
+
+/// The longest step whose chord holds the limit.
+fn held_step(pass: &PassPath<'_>, at: &Offset, chord_mm: f64) -> Result<f64, ApproachError> {
+    let left = pass.left(at.path);
+    let holds = |step: f64| chord_holds(pass, at, step, chord_mm);
+    // Eqn 6 for a start; doubled while it holds, halved until it does.
+    let mut good = equation_step(pass, at, chord_mm, path_curvature(pass, at.path));
+    let mut bad = None;
+    for halving in 0.. {
+        if holds(good)? {
+            break;
+        }
+        if halving == HALVINGS {
+            return Err(ApproachError::NoSegment {
+                path: at.path,
+                side: pass.side,
+            });
+        }
+        bad = Some(good);
+        good *= 0.5;
+    }
+    while bad.is_none() && good < left {
+        let further = (2.0 * good).min(left);
+        if holds(further)? {
+            good = further;
+        } else {
+            bad = Some(further);
+        }
+    }
+    let Some(mut bad) = bad else {
+        return Ok(good);
+    };
+    for _ in 0..BISECTIONS {
+        let middle = 0.5 * (good + bad);
+        if holds(middle)? {
+            good = middle;
+        } else {
+            bad = middle;
+        }
+    }
+    Ok(good)
+}
+
+/// Whether the contact's and the centre's path stay within the limit of their chords.
+fn chord_holds(pass: &PassPath<'_>, at: &Offset, step: f64, chord_mm: f64) -> Result<bool, OracleError> {
+    let place = |share: f64| pass.at(pass.kept(at.path + share * step * pass.sense()));
+    let end = place(1.0)?;
+    // From the middle outwards: a chord that does not hold mostly fails there.
+    let outwards = (1..PROBES / 2).rev().flat_map(|k| [k, PROBES - k]);
+    for k in std::iter::once(PROBES / 2).chain(outwards) {
+        let between = place(f64::from(k) / f64::from(PROBES))?;
+        let contact = from_segment(between.contact.cc_mm, at.contact.cc_mm, end.contact.cc_mm);
+        let centre = from_segment(between.contact.cl_mm, at.contact.cl_mm, end.contact.cl_mm);
+        if contact.max(centre) > PEAK * chord_mm {
+            return Ok(false);
+        }
+    }
+    Ok(true)
+}
+
+impl Approach for Linear {
+    fn plan(&self, pass: &PassPath<'_>) -> Result<Box<dyn Program>, ApproachError> {
+        let chords = match self.chords {
+            Chords::Held => even_chords(pass, self.chord_mm, self.feed_mm_s)?,
+            equation => chords(pass, equation, self.chord_mm, self.feed_mm_s)?,
+        };
+        Ok(Box::new(Chain {
+            chords,
+            pace: Pace::WholePeriods,
+        }))
+    }
+}
+
+/// How chords are followed.
+#[derive(Clone, Copy, Debug)]
+pub(super) enum Pace {
+    /// Each in whole sampling periods, as a traditional linear interpolator does.
+    WholePeriods,
+    /// As if they were the exact path, at this speed of the centre, mm/s.
+    Constant(f64),
+}
+
+/// The chords of one pass.
+pub(super) struct Chain {
+    pub(super) chords: Vec<Chord>,
+    pub(super) pace: Pace,
+}
+
+impl Program for Chain {
+    fn segments(&self) -> usize {
+        self.chords.len()
+    }
+
+    fn write(&self, out: &mut String) {
+        let mut blocks = Blocks::new(out, FeedMode::G94);
+        for chord in &self.chords {
+            blocks.cut(&chord.cut());
+        }
+    }
+
+    fn speed_step_mm_s(&self) -> f64 {
+        self.chords.windows(2).fold(0.0, |most: f64, pair| {
+            most.max((pair[1].speed_mm_s - pair[0].speed_mm_s).abs())
+        })
+    }
+
+    fn follow(&self, pass: &PassPath<'_>, period_s: f64, each: &mut Each<'_>) -> Result<(), ApproachError> {
+        match self.pace {
+            Pace::Constant(_) if self.chords.is_empty() => return Ok(()),
+            Pace::Constant(feed_mm_s) => return super::constant_cl::follow(feed_mm_s, pass, period_s, each),
+            Pace::WholePeriods => {}
+        }
+        let mut begin = pass.ends[0];
+        for chord in &self.chords {
+            let apart = subtract(chord.to_mm, chord.from_mm);
+            let periods = (length(apart) / (chord.speed_mm_s * period_s) - PERIOD_SLACK)
+                .ceil()
+                .max(1.0);
+            let mut period = 1.0;
+            while period <= periods {
+                let share = period / periods;
+                each(
+                    add(chord.from_mm, scale(apart, share)),
+                    begin + (chord.path - begin) * share,
+                )?;
+                period += 1.0;
+            }
+            begin = chord.path;
+        }
+        Ok(())
+    }
+}

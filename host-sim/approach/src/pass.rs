@@ -1,0 +1,72 @@
+//! A pass in the direction in which it is cut.
+
+use oracle::vector::{Vector, length, subtract};
+use oracle::{Offset, Oracle, OracleError};
+
+/// One pass of a job.
+#[derive(Clone, Copy, Debug)]
+pub struct PassPath<'a> {
+    /// The job's geometry.
+    pub oracle: &'a Oracle,
+    /// Number of the pass, from 0.
+    pub pass: u32,
+    /// Its side parameter.
+    pub side: f64,
+    /// Path parameters where it begins and ends.
+    pub ends: [f64; 2],
+}
+
+impl PassPath<'_> {
+    /// 1, or -1 on a pass that runs against the parameter.
+    #[must_use]
+    pub fn sense(&self) -> f64 {
+        (self.ends[1] - self.ends[0]).signum()
+    }
+
+    /// Contact and centre at a path parameter.
+    ///
+    /// # Errors
+    /// As [`Oracle::offset`].
+    pub fn at(&self, path: f64) -> Result<Offset, OracleError> {
+        self.oracle.offset(path, self.side)
+    }
+
+    /// How far the path has to go from a parameter to the end, in the parameter; 0 beyond the end.
+    #[must_use]
+    pub fn left(&self, path: f64) -> f64 {
+        ((self.ends[1] - path) * self.sense()).max(0.0)
+    }
+
+    /// The same place, kept on the pass.
+    #[must_use]
+    pub fn kept(&self, path: f64) -> f64 {
+        let [low, high] = self.oracle.path_range();
+        path.clamp(low, high)
+    }
+
+    /// Whether the pass is one point, as on a pole.
+    #[must_use]
+    pub fn is_point(&self) -> bool {
+        const PLACES: u32 = 8;
+        let at = |k: u32| {
+            let path = self.ends[0] + (self.ends[1] - self.ends[0]) * f64::from(k) / f64::from(PLACES);
+            let (u, v) = self.oracle.swapped(path, self.side);
+            self.oracle.surface.at(u, v).point
+        };
+        let first = at(0);
+        (1..=PLACES).all(|k| length(subtract(at(k), first)) < 1e-9)
+    }
+}
+
+/// Distance of a point from a segment, mm.
+pub(crate) fn from_segment(point: Vector, from: Vector, to: Vector) -> f64 {
+    use oracle::vector::{add, dot, scale};
+    let (along, away) = (subtract(to, from), subtract(point, from));
+    let squared = dot(along, along);
+    let share = if squared > 0.0 {
+        (dot(away, along) / squared).clamp(0.0, 1.0)
+    } else {
+        0.0
+    };
+    length(subtract(point, add(from, scale(along, share))))
+}

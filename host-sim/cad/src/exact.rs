@@ -1,0 +1,280 @@
+//! Surfaces over a rectangle as B-splines of their exact form: the elementary ones as rational quadratics, B-splines by
+//! cutting them.
+
+use super::curve::{Curve, arcs};
+use super::spline::{Axis, Pole, SplineCurve, SplineSurface};
+use super::surface::Surface;
+use oracle::vector::{Vector, add, cross, dot, scale, subtract};
+
+/// `w` times a place on the axis, and the turned part beside it.
+fn lifted(on_axis: Vector, beside: Vector, w: f64) -> Pole {
+    [
+        on_axis[0] * w + beside[0],
+        on_axis[1] * w + beside[1],
+        on_axis[2] * w + beside[2],
+        w,
+    ]
+}
+
+/// Degree 1 over a range.
+fn linear(range: [f64; 2]) -> Axis {
+    Axis {
+        degree: 1,
+        knots: vec![range[0], range[0], range[1], range[1]],
+    }
+}
+
+/// The surface over a rectangle of its parameters (which may reach over the seam of a closed one), or `None` where it has no
+/// such form.
+#[must_use]
+pub(super) fn exact(surface: &Surface, [u, v]: [[f64; 2]; 2]) -> Option<SplineSurface> {
+    match surface {
+        Surface::Plane { origin, x, y } => {
+            let pole = |a: f64, b: f64| lifted(add(*origin, add(scale(*x, a), scale(*y, b))), [0.0; 3], 1.0);
+            Some(SplineSurface {
+                axes: [linear(u), linear(v)],
+                poles: u.map(|a| v.map(|b| pole(a, b)).to_vec()).to_vec(),
+            })
+        }
+        Surface::Cylinder { origin, x, y, z } => Some(turned(
+            u,
+            [*x, *y],
+            &linear(v),
+            &v.map(|b| (add(*origin, scale(*z, b)), 1.0, 1.0)),
+        )),
+        Surface::Cone {
+            origin,
+            x,
+            y,
+            z,
+            radius,
+            slope,
+        } => {
+            let at = |b: f64| (add(*origin, scale(*z, b)), radius + slope * b, 1.0);
+            Some(turned(u, [*x, *y], &linear(v), &v.map(at)))
+        }
+        Surface::Sphere { center, x, y, z } => {
+            let (axis, poles) = arcs(v);
+            let profile: Vec<_> = poles
+                .iter()
+                .map(|[cos, sin, w]| (add(*center, scale(*z, sin / w)), cos / w, *w))
+                .collect();
+            Some(turned(u, [*x, *y], &axis, &profile))
+        }
+        Surface::Torus {
+            center,
+            x,
+            y,
+            z,
+            major,
+            minor,
+        } => {
+            let (axis, poles) = arcs(v);
+            let profile: Vec<_> = poles
+                .iter()
+                .map(|[cos, sin, w]| {
+                    (
+                        add(*center, scale(*z, minor * sin / w)),
+                        major + minor * cos / w,
+                        *w,
+                    )
+                })
+                .collect();
+            Some(turned(u, [*x, *y], &axis, &profile))
+        }
+        Surface::Revolution {
+            profile,
+            origin,
+            axis,
+            ..
+        } => Some(revolved(&profile.spline(v), *origin, *axis, u)),
+        Surface::Extrusion {
+            profile, direction, ..
+        } => {
+            let curve = profile.spline(u);
+            let row = |pole: &Pole| {
+                v.map(|b| {
+                    let moved = scale(*direction, b * pole[3]);
+                    [
+                        pole[0] + moved[0],
+                        pole[1] + moved[1],
+                        pole[2] + moved[2],
+                        pole[3],
+                    ]
+                })
+                .to_vec()
+            };
+            Some(SplineSurface {
+                poles: curve.poles.iter().map(row).collect(),
+                axes: [curve.axis, linear(v)],
+            })
+        }
+        Surface::Ruled { first, second } => {
+            let fits = first.axis == second.axis && !first.rational() && !second.rational();
+            fits.then(|| SplineSurface {
+                axes: [first.axis.clone(), linear([0.0, 1.0])],
+                poles: first
+                    .poles
+                    .iter()
+                    .zip(&second.poles)
+                    .map(|(a, b)| vec![unit(*a), unit(*b)])
+                    .collect(),
+            })
+            .map(|whole| whole.cut([u, v]))
+        }
+        Surface::Spline(spline) => Some(part(spline, [u, v])),
+        Surface::Offset { .. } => None,
+    }
+}
+
+/// A pole of a polynomial curve with the weight 1.
+fn unit(p: Pole) -> Pole {
+    [p[0] / p[3], p[1] / p[3], p[2] / p[3], 1.0]
+}
+
+/// A profile (place on the axis, radius, weight: one each pole) turned in the frame `x`, `y`.
+fn turned(u: [f64; 2], [x, y]: [Vector; 2], axis: &Axis, profile: &[(Vector, f64, f64)]) -> SplineSurface {
+    let (around, circle) = arcs(u);
+    let row = |[cos, sin, w]: &[f64; 3]| {
+        let out = add(scale(x, *cos), scale(y, *sin));
+        let pole = |(on_axis, radius, weight): &(Vector, f64, f64)| {
+            lifted(*on_axis, scale(out, radius * weight), w * weight)
+        };
+        profile.iter().map(pole).collect::<Vec<_>>()
+    };
+    SplineSurface {
+        poles: circle.iter().map(row).collect(),
+        axes: [around, axis.clone()],
+    }
+}
+
+/// A curve turned about an axis.
+fn revolved(profile: &SplineCurve, origin: Vector, axis: Vector, u: [f64; 2]) -> SplineSurface {
+    let (around, circle) = arcs(u);
+    let row = |[cos, sin, w]: &[f64; 3]| {
+        profile
+            .poles
+            .iter()
+            .map(|pole| {
+                let point = [pole[0] / pole[3], pole[1] / pole[3], pole[2] / pole[3]];
+                let from = subtract(point, origin);
+                let along = scale(axis, dot(from, axis));
+                let (out, side) = (subtract(from, along), cross(axis, from));
+                let beside = scale(add(scale(out, *cos), scale(side, *sin)), pole[3]);
+                lifted(add(origin, along), beside, w * pole[3])
+            })
+            .collect::<Vec<_>>()
+    };
+    SplineSurface {
+        poles: circle.iter().map(row).collect(),
+        axes: [around, profile.axis.clone()],
+    }
+}
+
+/// A part of a B-spline surface; where it is closed, the part may reach over the seam.
+fn part(spline: &SplineSurface, [u, v]: [[f64; 2]; 2]) -> SplineSurface {
+    let [[u0, u1], [v0, v1]] = spline.domain();
+    let across_u = pieces(u, [u0, u1]);
+    let across_v = pieces(v, [v0, v1]);
+    let mut rows: Option<SplineSurface> = None;
+    for (range_u, shift_u) in &across_u {
+        let mut row: Option<SplineSurface> = None;
+        for (range_v, shift_v) in &across_v {
+            let mut piece = spline.cut([*range_u, *range_v]);
+            for (axis, shift) in piece.axes.iter_mut().zip([shift_u, shift_v]) {
+                axis.knots.iter_mut().for_each(|knot| *knot += shift);
+            }
+            row = Some(match row {
+                Some(before) => transposed(&joined(&transposed(&before), &transposed(&piece))),
+                None => piece,
+            });
+        }
+        if let Some(row) = row {
+            rows = Some(match rows {
+                Some(before) => joined(&before, &row),
+                None => row,
+            });
+        }
+    }
+    rows.unwrap_or_else(|| spline.clone())
+}
+
+/// A range that may reach over the domain's end, in parts within it, and by how much each is moved.
+fn pieces(range: [f64; 2], [start, end]: [f64; 2]) -> Vec<([f64; 2], f64)> {
+    let period = end - start;
+    let mut parts = Vec::new();
+    let turns = ((range[0] - start) / period + 1e-12).floor();
+    for turn in 0..3 {
+        let shift = (turns + f64::from(turn)) * period;
+        let part = [(range[0] - shift).max(start), (range[1] - shift).min(end)];
+        if part[1] - part[0] > 1e-12 * period {
+            parts.push((part, shift));
+        }
+    }
+    parts
+}
+
+fn transposed(spline: &SplineSurface) -> SplineSurface {
+    let [u, v] = spline.axes.clone();
+    SplineSurface {
+        axes: [v, u],
+        poles: super::spline::transposed(&spline.poles),
+    }
+}
+
+/// One clamped surface after another in u; the boundary between them is the same, and stays a crease.
+fn joined(before: &SplineSurface, after: &SplineSurface) -> SplineSurface {
+    let degree = before.axes[0].degree;
+    let mut knots = before.axes[0].knots[..before.axes[0].knots.len() - 1].to_vec();
+    knots.extend_from_slice(&after.axes[0].knots[degree + 1..]);
+    let mut poles = before.poles.clone();
+    poles.extend_from_slice(&after.poles[1..]);
+    SplineSurface {
+        axes: [Axis { degree, knots }, before.axes[1].clone()],
+        poles,
+    }
+}
+
+/// Ranges of the parameter between which a curve is smooth, and how often it can be derived at each: what a fit must keep.
+pub(super) fn joints(surface: &Surface, direction: usize, range: [f64; 2]) -> Vec<(f64, usize)> {
+    let of = |axis: &Axis, shift: f64| -> Vec<(f64, usize)> {
+        let breaks = axis.breaks();
+        breaks
+            .iter()
+            .map(|knot| {
+                (
+                    *knot + shift,
+                    axis.degree.saturating_sub(axis.multiplicity(*knot)),
+                )
+            })
+            .collect()
+    };
+    let of_curve = |curve: &Curve| match curve {
+        Curve::Spline(spline) => of(&spline.axis, 0.0),
+        _ => Vec::new(),
+    };
+    let mut all = match (surface, direction) {
+        (Surface::Spline(spline), _) => {
+            let axis = &spline.axes[direction];
+            let [start, end] = axis.domain();
+            // Over the seam of a closed surface it goes on as it began.
+            let mut all = of(axis, 0.0);
+            all.extend(of(axis, end - start));
+            all.extend(of(axis, start - end));
+            all
+        }
+        (Surface::Extrusion { profile, .. }, 0) | (Surface::Revolution { profile, .. }, 1) => {
+            of_curve(profile)
+        }
+        (Surface::Ruled { first, second }, 0) => [of(&first.axis, 0.0), of(&second.axis, 0.0)].concat(),
+        (Surface::Offset { base, .. }, _) => joints(base, direction, range)
+            .into_iter()
+            .map(|(t, order)| (t, order.saturating_sub(1)))
+            .collect(),
+        _ => Vec::new(),
+    };
+    all.retain(|(t, _)| *t > range[0] && *t < range[1]);
+    all.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
+    all.dedup_by(|b, a| (b.0 - a.0).abs() <= 1e-12 * (range[1] - range[0]));
+    all
+}

@@ -1,0 +1,298 @@
+//! A bicubic B-spline near a surface that has no exact one: interpolated at the Greville abscissae of its knots (C. de Boor, "A
+//! Practical Guide to Splines", revised ed., chapter XIII), the spans divided where it is too far off.
+
+use super::exact::joints;
+use super::spline::{Axis, Pole, Side, SplineSurface};
+use super::surface::Surface;
+use oracle::vector::{Vector, angle, cross, length, subtract};
+
+/// Spans in one direction that a fit may take before it is given up: no job could hold more.
+const SPANS_MAX: usize = 310;
+/// Lines across, along which the spans of one direction are judged.
+const LINES: usize = 17;
+/// Places in a span at which a line is judged, between its ends.
+const PLACES: usize = 6;
+/// Places a side of a patch at which the finished fit is measured.
+const DENSE: usize = 9;
+/// Share of the tolerance that each direction may use; less where both together take more than all.
+const SHARE: f64 = 0.9;
+/// Rounds of that.
+const ROUNDS: usize = 8;
+/// `|S_u x S_v|` below this share of `|S_u| |S_v|`, as at a pole, leaves no normal to compare.
+const SINE_MIN: f64 = 1e-6;
+
+/// How far a fit is from what it was fitted to, measured on a grid of places between its own.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Deviation {
+    /// Largest distance at equal parameters, mm: not less than the distance of the surfaces.
+    pub max_mm: f64,
+    /// Largest angle between the normals, rad.
+    pub normal_rad: f64,
+    /// Places measured.
+    pub places: usize,
+}
+
+/// Why there is no fit.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) enum FitError {
+    /// The tolerance takes more spans than are allowed.
+    TooManySpans,
+    /// The surface has no place at some parameters.
+    NotFinite,
+}
+
+/// Basis functions at their Greville abscissae, decomposed for solving.
+struct Collocation {
+    axis: Axis,
+    places: Vec<f64>,
+    /// Rows of L and U in one, and the order of the rows.
+    factors: Vec<Vec<f64>>,
+    order: Vec<usize>,
+}
+
+impl Collocation {
+    fn new(axis: Axis) -> Self {
+        let n = axis.poles();
+        let degree = axis.degree;
+        let places: Vec<f64> = (0..n)
+            .map(|i| axis.knots[i + 1..=i + degree].iter().sum::<f64>() / degree as f64)
+            .map(|t| t.clamp(axis.domain()[0], axis.domain()[1]))
+            .collect();
+        let mut factors = vec![vec![0.0; n]; n];
+        for (row, &t) in factors.iter_mut().zip(&places) {
+            let (first, basis) = axis.basis(t, Side::Above);
+            row[first..=first + degree].copy_from_slice(&basis[0][..=degree]);
+        }
+        let order = decompose(&mut factors, degree);
+        Self {
+            axis,
+            places,
+            factors,
+            order,
+        }
+    }
+
+    /// Poles of the spline through these points.
+    fn solve(&self, points: &[Vector]) -> Vec<Vector> {
+        let n = points.len();
+        let band = 2 * self.axis.degree;
+        let mut x: Vec<Vector> = self.order.iter().map(|row| points[*row]).collect();
+        for i in 0..n {
+            for j in i.saturating_sub(band)..i {
+                let factor = self.factors[i][j];
+                if factor != 0.0 {
+                    let known = x[j];
+                    for k in 0..3 {
+                        x[i][k] -= factor * known[k];
+                    }
+                }
+            }
+        }
+        for i in (0..n).rev() {
+            for j in i + 1..(i + band + 1).min(n) {
+                let factor = self.factors[i][j];
+                let known = x[j];
+                for k in 0..3 {
+                    x[i][k] -= factor * known[k];
+                }
+            }
+            x[i] = x[i].map(|known| known / self.factors[i][i]);
+        }
+        x
+    }
+}
+
+/// LU decomposition of a band matrix with row exchanges (Golub and Van Loan, "Matrix Computations", 4th ed., 4.3.3).
+fn decompose(a: &mut [Vec<f64>], degree: usize) -> Vec<usize> {
+    let n = a.len();
+    let mut order: Vec<usize> = (0..n).collect();
+    for column in 0..n {
+        let below = (column + degree + 1).min(n);
+        let pivot = (column..below)
+            .max_by(|i, j| a[*i][column].abs().total_cmp(&a[*j][column].abs()))
+            .unwrap_or(column);
+        a.swap(column, pivot);
+        order.swap(column, pivot);
+        let right = (column + 2 * degree + 1).min(n);
+        let (upper, lower) = a.split_at_mut(column + 1);
+        let row = &upper[column];
+        for target in &mut lower[..below - column - 1] {
+            let factor = target[column] / row[column];
+            target[column] = factor;
+            for k in column + 1..right {
+                target[k] -= factor * row[k];
+            }
+        }
+    }
+    order
+}
+
+/// Cubic knots at these breaks; `order` says how often the surface can be derived at each (3 and more: as a spline may).
+fn knots(breaks: &[(f64, usize)]) -> Axis {
+    let mut knots = vec![breaks[0].0; 4];
+    for (t, order) in &breaks[1..breaks.len() - 1] {
+        knots.extend(vec![*t; 3 - (*order).min(2)]);
+    }
+    knots.extend(vec![breaks[breaks.len() - 1].0; 4]);
+    Axis { degree: 3, knots }
+}
+
+/// Knots of one direction with which lines in that direction are held within the tolerance.
+fn direction(
+    surface: &Surface,
+    k: usize,
+    ranges: [[f64; 2]; 2],
+    tolerance_mm: f64,
+) -> Result<Axis, FitError> {
+    let (range, other) = (ranges[k], ranges[1 - k]);
+    let mut breaks = vec![(range[0], 0)];
+    // A joint that a cubic spline has by itself need not be kept where it is.
+    breaks.extend(
+        joints(surface, k, range)
+            .into_iter()
+            .filter(|(_, order)| *order < 2),
+    );
+    breaks.push((range[1], 0));
+    let point = |t: f64, line: f64| {
+        let (u, v) = if k == 0 { (t, line) } else { (line, t) };
+        surface.at(u, v).point
+    };
+    let lines: Vec<f64> = (0..LINES)
+        .map(|i| other[0] + (other[1] - other[0]) * i as f64 / (LINES - 1) as f64)
+        .collect();
+    // Parts of each span between joints, all of one width.
+    let mut parts = vec![1_usize; breaks.len() - 1];
+    loop {
+        if parts.iter().sum::<usize>() > SPANS_MAX {
+            return Err(FitError::TooManySpans);
+        }
+        let collocation = Collocation::new(knots(&divided(&breaks, &parts)));
+        let mut worst = vec![0.0_f64; parts.len()];
+        for &line in &lines {
+            let points: Vec<Vector> = collocation.places.iter().map(|t| point(*t, line)).collect();
+            if points.iter().flatten().any(|x| !x.is_finite()) {
+                return Err(FitError::NotFinite);
+            }
+            let poles = collocation.solve(&points);
+            for ((worst, span), parts) in worst.iter_mut().zip(breaks.windows(2)).zip(&parts) {
+                let places = PLACES * parts;
+                for i in 0..places {
+                    let t = span[0].0 + (span[1].0 - span[0].0) * (i as f64 + 0.5) / places as f64;
+                    let gap = subtract(on_curve(&collocation.axis, &poles, t), point(t, line));
+                    *worst = worst.max(length(gap));
+                }
+            }
+        }
+        if worst.iter().all(|worst| *worst <= tolerance_mm) {
+            return Ok(collocation.axis);
+        }
+        for (parts, worst) in parts.iter_mut().zip(&worst) {
+            if *worst > tolerance_mm {
+                // A cubic spline's error falls with the fourth power of the width; far off that, a step at a time.
+                let wanted = (worst / tolerance_mm).powf(0.25).min(2.0) * *parts as f64;
+                #[allow(
+                    clippy::cast_possible_truncation,
+                    clippy::cast_sign_loss,
+                    reason = "a few hundred"
+                )]
+                let wanted = wanted.floor() as usize;
+                *parts = wanted.max(*parts + 1);
+            }
+        }
+    }
+}
+
+/// The breaks, each span in so many parts; at a new one a spline is as smooth as it can be.
+fn divided(breaks: &[(f64, usize)], parts: &[usize]) -> Vec<(f64, usize)> {
+    let mut all = Vec::new();
+    for (span, parts) in breaks.windows(2).zip(parts) {
+        all.push(span[0]);
+        let inner = (1..*parts).map(|k| k as f64 / *parts as f64);
+        all.extend(inner.map(|share| (span[0].0 + (span[1].0 - span[0].0) * share, 3)));
+    }
+    all.extend(breaks.last());
+    all
+}
+
+fn on_curve(axis: &Axis, poles: &[Vector], t: f64) -> Vector {
+    let (first, basis) = axis.basis(t, Side::Above);
+    std::array::from_fn(|k| {
+        let acting = poles[first..=first + axis.degree].iter().zip(&basis[0]);
+        acting.map(|(pole, share)| share * pole[k]).sum()
+    })
+}
+
+/// The spline on given knots that meets the surface at all pairs of Greville abscissae.
+fn interpolated(surface: &Surface, axes: [Axis; 2]) -> Result<SplineSurface, FitError> {
+    let [in_u, in_v] = axes.map(Collocation::new);
+    let mut rows: Vec<Vec<Vector>> = Vec::with_capacity(in_u.places.len());
+    for &u in &in_u.places {
+        let points: Vec<Vector> = in_v.places.iter().map(|v| surface.at(u, *v).point).collect();
+        if points.iter().flatten().any(|x| !x.is_finite()) {
+            return Err(FitError::NotFinite);
+        }
+        rows.push(in_v.solve(&points));
+    }
+    let mut poles: Vec<Vec<Pole>> = vec![vec![[0.0; 4]; in_v.places.len()]; in_u.places.len()];
+    for j in 0..in_v.places.len() {
+        let column: Vec<Vector> = rows.iter().map(|row| row[j]).collect();
+        for (row, [x, y, z]) in poles.iter_mut().zip(in_u.solve(&column)) {
+            row[j] = [x, y, z, 1.0];
+        }
+    }
+    Ok(SplineSurface {
+        axes: [in_u.axis, in_v.axis],
+        poles,
+    })
+}
+
+/// Largest distance and angle between a surface and its fit, on a grid in each patch of the fit.
+pub(super) fn deviation(surface: &Surface, fit: &SplineSurface) -> Deviation {
+    let places = |k: usize| -> Vec<f64> {
+        let breaks = fit.axes[k].breaks();
+        let spans = breaks.windows(2);
+        let inside = |i: usize| (i as f64 + 0.5) / DENSE as f64;
+        spans
+            .flat_map(|span| (0..DENSE).map(move |i| span[0] + (span[1] - span[0]) * inside(i)))
+            .collect()
+    };
+    let (us, vs) = (places(0), places(1));
+    let mut worst = Deviation {
+        places: us.len() * vs.len(),
+        ..Deviation::default()
+    };
+    for &u in &us {
+        for &v in &vs {
+            let (a, b) = (surface.at(u, v), fit.at(u, v));
+            worst.max_mm = worst.max_mm.max(length(subtract(a.point, b.point)));
+            let (m, n) = (cross(a.u, a.v), cross(b.u, b.v));
+            if length(m) > SINE_MIN * length(a.u) * length(a.v) {
+                worst.normal_rad = worst.normal_rad.max(angle(m, n));
+            }
+        }
+    }
+    worst
+}
+
+/// A bicubic B-spline within the tolerance of the surface over a rectangle, with about as few spans as it takes; C2
+/// except where the surface is not.
+pub(super) fn fit(
+    surface: &Surface,
+    ranges: [[f64; 2]; 2],
+    tolerance_mm: f64,
+) -> Result<(SplineSurface, Deviation), FitError> {
+    let mut share = SHARE;
+    for _ in 0..ROUNDS {
+        let axes = [
+            direction(surface, 0, ranges, share * tolerance_mm)?,
+            direction(surface, 1, ranges, share * tolerance_mm)?,
+        ];
+        let fit = interpolated(surface, axes)?;
+        let measured = deviation(surface, &fit);
+        if measured.max_mm <= tolerance_mm {
+            return Ok((fit, measured));
+        }
+        share *= 0.75;
+    }
+    Err(FitError::TooManySpans)
+}

@@ -1,0 +1,224 @@
+//! Parameters of a point of a surface: in closed form for the elementary ones, by Newton's method for the others.
+
+use std::f64::consts::PI;
+
+use super::curve::Curve;
+use super::surface::Surface;
+use oracle::vector::{Vector, cross, dot, length, scale, subtract};
+
+/// Seeds a side of each patch, where the nearest point on a B-spline surface is sought.
+const SEEDS: usize = 3;
+/// Seeds a side of the whole surface at most: a surface of many patches has several in reach of each seed.
+const SEEDS_MAX: usize = 96;
+/// Newton steps from the best of them.
+const STEPS: usize = 40;
+/// Times that a step is halved until it leads nearer.
+const HALVINGS: i32 = 16;
+
+impl Surface {
+    /// Parameters of the point of the surface that is nearest to `to`, and how far away it is, mm. `near`: where it is likely
+    /// to be; of several the one nearest to that by the surface's periods.
+    #[must_use]
+    pub fn invert(&self, to: Vector, near: Option<[f64; 2]>) -> ([f64; 2], f64) {
+        let mut start = match near {
+            Some(near) if !self.closed_form() => near,
+            _ => self.seed(to),
+        };
+        let mut found = self.refined(start, to);
+        if near.is_some() && !self.closed_form() {
+            // What is on the surface is found from a near place; where that leads astray, everywhere is searched.
+            start = self.seed(to);
+            let afresh = self.refined(start, to);
+            if afresh.1 < 0.5 * found.1 {
+                found = afresh;
+            }
+        }
+        if let Some(near) = near {
+            for (k, period) in self.periods().into_iter().enumerate() {
+                if let Some(period) = period {
+                    found.0[k] += period * ((near[k] - found.0[k]) / period).round();
+                }
+            }
+        }
+        found
+    }
+
+    fn closed_form(&self) -> bool {
+        !matches!(self, Self::Spline(_) | Self::Ruled { .. } | Self::Offset { .. })
+    }
+
+    /// First guess of a point's parameters: right for the elementary surfaces, the best of many for the others.
+    fn seed(&self, to: Vector) -> [f64; 2] {
+        let share = |from: Vector, x: Vector| dot(from, x) / dot(x, x);
+        match self {
+            Self::Plane { origin, x, y } => {
+                let from = subtract(to, *origin);
+                [share(from, *x), share(from, *y)]
+            }
+            Self::Cylinder { origin, x, y, z } => {
+                let from = subtract(to, *origin);
+                [share(from, *y).atan2(share(from, *x)), share(from, *z)]
+            }
+            Self::Cone {
+                origin,
+                x,
+                y,
+                z,
+                radius,
+                slope,
+            } => {
+                let from = subtract(to, *origin);
+                let (a, b, v) = (share(from, *x), share(from, *y), share(from, *z));
+                // Of the two halves of the cone, the one that the point is on.
+                let turn = if radius + slope * v < 0.0 { PI } else { 0.0 };
+                [b.atan2(a) + turn, v]
+            }
+            Self::Sphere { center, x, y, z } => {
+                let from = subtract(to, *center);
+                let (a, b, c) = (share(from, *x), share(from, *y), share(from, *z));
+                [b.atan2(a), c.atan2(a.hypot(b))]
+            }
+            Self::Torus {
+                center,
+                x,
+                y,
+                z,
+                major,
+                ..
+            } => {
+                let from = subtract(to, *center);
+                let (a, b, c) = (share(from, *x), share(from, *y), share(from, *z));
+                [b.atan2(a), c.atan2(a.hypot(b) - major)]
+            }
+            Self::Revolution {
+                profile,
+                range,
+                origin,
+                axis,
+            } => {
+                let v = profile.nearest_meridian(*range, to, *origin, *axis);
+                let across = |p: Vector| {
+                    let from = subtract(p, *origin);
+                    subtract(from, scale(*axis, dot(from, *axis)))
+                };
+                let (from, here) = (across(profile.at(v)[0]), across(to));
+                [dot(cross(from, here), *axis).atan2(dot(from, here)), v]
+            }
+            Self::Extrusion {
+                profile,
+                range,
+                direction,
+            } => {
+                let across = |p: Vector| subtract(p, scale(*direction, share(p, *direction)));
+                let u = match (range, profile) {
+                    (None, Curve::Line { origin, direction: d }) => {
+                        let d = across(*d);
+                        share(across(subtract(to, *origin)), d)
+                    }
+                    _ => profile.nearest(range.unwrap_or([-1e3, 1e3]), to, &across),
+                };
+                [u, share(subtract(to, profile.at(u)[0]), *direction)]
+            }
+            _ => self.best_of_grid(to),
+        }
+    }
+
+    /// The nearest of a grid of places.
+    fn best_of_grid(&self, to: Vector) -> [f64; 2] {
+        let places = |k: usize| -> Vec<f64> {
+            let range = self.domain()[k].unwrap_or([0.0, 1.0]);
+            let breaks = match self {
+                Self::Spline(spline) => spline.axes[k].breaks(),
+                _ => (0..=8)
+                    .map(|i| range[0] + (range[1] - range[0]) * f64::from(i) / 8.0)
+                    .collect(),
+            };
+            let wanted = (SEEDS * (breaks.len() - 1)).min(SEEDS_MAX);
+            let spans = breaks.len() - 1;
+            // In the middle of cells: on a pole, no direction tells where to go.
+            (0..wanted)
+                .map(|i| {
+                    let place = (i as f64 + 0.5) * spans as f64 / wanted as f64;
+                    #[allow(
+                        clippy::cast_possible_truncation,
+                        clippy::cast_sign_loss,
+                        reason = "a small index"
+                    )]
+                    let span = (place as usize).min(spans - 1);
+                    breaks[span] + (breaks[span + 1] - breaks[span]) * (place - span as f64)
+                })
+                .collect()
+        };
+        let (us, vs) = (places(0), places(1));
+        let mut best = (f64::INFINITY, [us[0], vs[0]]);
+        for &u in &us {
+            for &v in &vs {
+                let gap = subtract(self.at(u, v).point, to);
+                let distance = dot(gap, gap);
+                if distance < best.0 {
+                    best = (distance, [u, v]);
+                }
+            }
+        }
+        best.1
+    }
+
+    /// Newton's method on the distance, within the domain; `None` of its steps leads further away.
+    fn refined(&self, start: [f64; 2], to: Vector) -> ([f64; 2], f64) {
+        let (domain, periods) = (self.domain(), self.periods());
+        let held = |place: [f64; 2]| -> [f64; 2] {
+            std::array::from_fn(|k| match (domain[k], periods[k]) {
+                (Some(range), None) => place[k].clamp(range[0], range[1]),
+                // A closed B-spline ends at its seam, though the surface goes on.
+                (Some(range), Some(period)) if matches!(self, Self::Spline(_)) => {
+                    range[0] + (place[k] - range[0]).rem_euclid(period)
+                }
+                _ => place[k],
+            })
+        };
+        let mut place = held(start);
+        let mut gap = subtract(self.at(place[0], place[1]).point, to);
+        for _ in 0..STEPS {
+            let at = self.at(place[0], place[1]);
+            gap = subtract(at.point, to);
+            let slope = [dot(gap, at.u), dot(gap, at.v)];
+            let near = [dot(at.u, at.u), dot(at.u, at.v), dot(at.v, at.v)];
+            let bent = [dot(gap, at.uu), dot(gap, at.uv), dot(gap, at.vv)];
+            let exact = std::array::from_fn(|k| near[k] + bent[k]);
+            // Newton's step, Gauss and Newton's, and each parameter by itself, as on a pole: the first that leads nearer.
+            let steps = [
+                solved(exact, slope),
+                solved(near, slope),
+                Some(apart(near, slope)),
+            ];
+            let moved = steps.into_iter().flatten().find_map(|step| {
+                (0..HALVINGS).find_map(|k| {
+                    let share = 0.5_f64.powi(k);
+                    let next = held([place[0] + share * step[0], place[1] + share * step[1]]);
+                    let new = subtract(self.at(next[0], next[1]).point, to);
+                    (dot(new, new) < dot(gap, gap)).then_some((next, new))
+                })
+            });
+            let Some((next, new)) = moved else { break };
+            (place, gap) = (next, new);
+        }
+        (place, length(gap))
+    }
+}
+
+/// Solution of a symmetric system of two equations `h x = -slope`, if it is positive definite.
+fn solved(h: [f64; 3], slope: [f64; 2]) -> Option<[f64; 2]> {
+    let det = h[0] * h[2] - h[1] * h[1];
+    (h[0] > 0.0 && det > 1e-12 * h[0] * h[2]).then(|| {
+        [
+            (h[1] * slope[1] - h[2] * slope[0]) / det,
+            (h[1] * slope[0] - h[0] * slope[1]) / det,
+        ]
+    })
+}
+
+/// The same, each equation without the other.
+fn apart(h: [f64; 3], slope: [f64; 2]) -> [f64; 2] {
+    let alone = |slope: f64, square: f64| if square > 0.0 { -slope / square } else { 0.0 };
+    [alone(slope[0], h[0]), alone(slope[1], h[2])]
+}

@@ -1,0 +1,236 @@
+//! A job file for a face: complete, with comments, ready to run.
+
+use std::fmt::Write;
+
+use super::machinable::outside;
+use super::{Face, Form, Machinable, Measures, measure};
+use job::NurbsSpec;
+
+/// Radii of balls that are chosen by themselves, mm: the usual ones of ball-end mills.
+const RADII_MM: [f64; 13] = [0.25, 0.5, 0.75, 1.0, 1.5, 2.0, 2.5, 3.0, 4.0, 5.0, 6.0, 8.0, 10.0];
+/// Share of the least concave radius that a chosen ball may have: the step-over in a hollow grows without bound towards 1.
+const FIT: f64 = 0.8;
+/// Feed where none is given, mm/min.
+const FEED_MM_MIN: f64 = 1200.0;
+/// Scallop height where none is given, mm.
+const SCALLOP_MM: f64 = 0.01;
+/// The mean normal's z, of 1, above which a surface counts as facing up.
+const UP: f64 = 0.1;
+/// Digits of a written coordinate: all that f64 has.
+const COLUMN: usize = 100;
+
+/// What the job is to do; what is `None` is chosen.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct JobOptions {
+    /// Ball radius, mm.
+    pub radius_mm: Option<f64>,
+    /// Feed along the surface, mm/min.
+    pub feed_mm_min: Option<f64>,
+    /// Scallop height limit, mm.
+    pub scallop_mm: Option<f64>,
+    /// Path parameter, as in job files.
+    pub along: Option<String>,
+    /// Side of the tool, as in job files.
+    pub side: Option<String>,
+    /// Order of the passes, as in job files.
+    pub pattern: Option<String>,
+}
+
+/// A job file and what was chosen for it.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Written {
+    /// The file's text.
+    pub text: String,
+    /// Ball radius, mm.
+    pub radius_mm: f64,
+    /// Side of the tool, as in job files.
+    pub side: String,
+    /// What the surface is like.
+    pub measures: Measures,
+    /// What to know before this is cut.
+    pub warnings: Vec<String>,
+}
+
+/// The tool's side: up, if the surface faces up and the material is below; else out of the material, if that is known; else
+/// any.
+fn side(face: &Face, measures: &Measures) -> (&'static str, f64) {
+    let up = measures.facing[2];
+    let signed = |sign: f64| if sign > 0.0 { "+" } else { "-" };
+    match outside(face) {
+        Some(sign) if up * sign > UP => ("up", sign),
+        Some(sign) => (signed(sign), sign),
+        None if up.abs() > UP => ("up", up.signum()),
+        None => (signed(face.sense), face.sense),
+    }
+}
+
+/// The largest usual ball that fits the hollows of the tool's side.
+fn ball(concave_mm: Option<f64>, size_mm: f64) -> f64 {
+    let room = concave_mm
+        .map_or(f64::INFINITY, |radius| FIT * radius)
+        .min(0.5 * size_mm);
+    let usual = RADII_MM.iter().rev().find(|radius| **radius <= room);
+    // Tighter than any usual one: whatever fits, to three digits.
+    usual.copied().unwrap_or_else(|| {
+        let digits = 10.0_f64.powf(2.0 - room.log10().floor());
+        (room * digits).floor() / digits
+    })
+}
+
+/// Writes a job for a face. `source` says where it came from, for the comment.
+#[must_use]
+pub fn write_job(source: &str, face: &Face, surface: &Machinable, options: &JobOptions) -> Written {
+    let measures = measure(&surface.spec());
+    let (chosen, sign) = side(face, &measures);
+    let side = options.side.clone().unwrap_or_else(|| chosen.to_owned());
+    let sign = match side.as_str() {
+        "+" => 1.0,
+        "-" => -1.0,
+        "up" => measures.facing[2].signum(),
+        _ => sign,
+    };
+    let concave_mm = measures.concave_mm[usize::from(sign < 0.0)];
+    let size_mm = measures.size_mm().into_iter().fold(0.0, f64::max);
+    let radius_mm = options.radius_mm.unwrap_or_else(|| ball(concave_mm, size_mm));
+    let mut warnings = Vec::new();
+    if let Some(why) = &surface.outline.trimmed {
+        warnings.push(format!(
+            "the face is trimmed ({why}); the whole rectangle of the surface around it is machined"
+        ));
+    }
+    if let Form::Fitted { why, deviation } = &surface.form {
+        warnings.push(format!(
+            "approximated, for {why}: within {:.6} mm of the face and {:.6} rad of its normal, measured at {} places",
+            deviation.max_mm, deviation.normal_rad, deviation.places
+        ));
+    }
+    if let Some(concave_mm) = concave_mm.filter(|concave_mm| *concave_mm <= radius_mm) {
+        warnings.push(format!(
+            "the tightest hollow on the tool's side has a radius of {concave_mm:.4} mm: the ball of {radius_mm} mm does not fit"
+        ));
+    }
+    let text = text(
+        source, face, surface, options, &measures, &warnings, radius_mm, &side,
+    );
+    Written {
+        text,
+        radius_mm,
+        side,
+        measures,
+        warnings,
+    }
+}
+
+#[allow(clippy::too_many_arguments, reason = "all of them are of one file")]
+fn text(
+    source: &str,
+    face: &Face,
+    surface: &Machinable,
+    options: &JobOptions,
+    measures: &Measures,
+    warnings: &[String],
+    radius_mm: f64,
+    side: &str,
+) -> String {
+    let mut out = String::new();
+    let size = measures.size_mm();
+    let _ = writeln!(
+        out,
+        "# Face {} ({}, {}) of {source}: {:.3} x {:.3} x {:.3} mm, {} patches{}.",
+        face.number,
+        face.entity,
+        face.surface.kind(),
+        size[0],
+        size[1],
+        size[2],
+        surface.patches,
+        if surface.form == Form::Exact {
+            ", exact"
+        } else {
+            ""
+        }
+    );
+    for warning in warnings {
+        let _ = writeln!(out, "# Note: {warning}.");
+    }
+    out.push('\n');
+    write_surface(&mut out, &surface.nurbs);
+    let or = |given: &Option<String>, default: &str| given.clone().unwrap_or_else(|| default.to_owned());
+    let hollow = match measures.concave_mm {
+        [None, None] => "the surface is hollow nowhere".to_owned(),
+        [plus, minus] => {
+            let told =
+                |radius: Option<f64>| radius.map_or("none".to_owned(), |radius| format!("{radius:.4} mm"));
+            format!(
+                "least concave radius: {} seen from +, {} from -",
+                told(plus),
+                told(minus)
+            )
+        }
+    };
+    let _ = write!(
+        out,
+        "\n[tool]\nkind = \"ball\"\nradius_mm = {radius_mm}               # {hollow}\n\n\
+         [cut]\n\
+         feed_mm_min = {}           # of the cutter contact along the surface\n\
+         scallop_mm = {}            # height of the ridge that may remain between passes\n\
+         along = \"{}\"                # the parameter that runs along a pass\n\
+         side = \"{side}\"                # where the tool is: \"up\", or the sign on S_u x S_v\n\
+         pattern = \"{}\"              # \"zig\": every pass the same way; \"zigzag\": to and fro\n\
+         chord_mm = 0.005            # only for the approaches that cut chords\n\n\
+         [machine]\n\
+         period_us = 1000            # sampling period\n",
+        options.feed_mm_min.unwrap_or(FEED_MM_MIN),
+        options.scallop_mm.unwrap_or(SCALLOP_MM.min(0.1 * radius_mm)),
+        or(&options.along, "u"),
+        or(&options.pattern, "zig"),
+    );
+    out
+}
+
+fn write_surface(out: &mut String, nurbs: &NurbsSpec) {
+    let list = |name: &str, numbers: &[f64]| {
+        let mut text = format!("{name} = [");
+        let mut column = text.len();
+        for (index, number) in numbers.iter().enumerate() {
+            let word = format!("{number}{}", if index + 1 < numbers.len() { ", " } else { "" });
+            if column + word.len() > COLUMN {
+                text.push_str("\n    ");
+                column = 4;
+            }
+            column += word.len();
+            text.push_str(&word);
+        }
+        text.push_str("]\n");
+        text
+    };
+    let _ = writeln!(
+        out,
+        "[surface]\nkind = \"nurbs\"\ndegree = [{}, {}]",
+        nurbs.degree[0], nurbs.degree[1]
+    );
+    out.push_str(&list("knots_u", &nurbs.knots_u));
+    out.push_str(&list("knots_v", &nurbs.knots_v));
+    let what = if nurbs.rational {
+        "[x, y, z, weight]"
+    } else {
+        "[x, y, z]"
+    };
+    let _ = writeln!(
+        out,
+        "# {what}; one block for each pole along u, in it the poles along v\npoles_mm = ["
+    );
+    for row in &nurbs.poles_mm {
+        out.push_str("    [\n");
+        for [x, y, z, w] in row {
+            let weight = if nurbs.rational {
+                format!(", {w}")
+            } else {
+                String::new()
+            };
+            let _ = writeln!(out, "        [{x}, {y}, {z}{weight}],");
+        }
+        out.push_str("    ],\n");
+    }
+    out.push_str("]\n");
+}

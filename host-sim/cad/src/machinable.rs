@@ -1,0 +1,209 @@
+//! A face as the surface of a job: exact where the core's degree allows, else a fit within a tolerance.
+
+use super::exact::exact;
+use super::fit::{Deviation, FitError, deviation, fit};
+use super::spline::SplineSurface;
+use super::{CadError, Face, Outline, Surface, outline};
+use job::{NurbsSpec, SurfaceSpec};
+use job_file::{TOLERANCE_DEFAULT_MM, TOLERANCE_MAX_MM};
+use machine::prepare::patch_count;
+
+/// Highest degree of a job's surface.
+const DEGREE_EXACT: usize = 3;
+/// What is asked of an import.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Options {
+    /// How far a fit may be from the surface, mm.
+    pub tolerance_mm: f64,
+    /// Take the rectangle around the boundary where a face is trimmed otherwise.
+    pub untrimmed: bool,
+}
+
+impl Default for Options {
+    fn default() -> Self {
+        Self {
+            tolerance_mm: TOLERANCE_DEFAULT_MM,
+            untrimmed: false,
+        }
+    }
+}
+
+/// What became of a surface.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Form {
+    /// The surface itself.
+    Exact,
+    /// A bicubic B-spline near it.
+    Fitted {
+        /// Why.
+        why: String,
+        /// How near, as measured.
+        deviation: Deviation,
+    },
+}
+
+/// A face that a job can cut.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Machinable {
+    /// The surface.
+    pub nurbs: NurbsSpec,
+    /// Exact or not.
+    pub form: Form,
+    /// What of the face's surface it is.
+    pub outline: Outline,
+    /// Patches on the board.
+    pub patches: usize,
+}
+
+impl Machinable {
+    /// The surface of a job.
+    #[must_use]
+    pub fn spec(&self) -> SurfaceSpec {
+        SurfaceSpec::Nurbs(self.nurbs.clone())
+    }
+}
+
+/// The job's surface out of a B-spline of degree up to 3.
+fn nurbs(spline: &SplineSurface) -> NurbsSpec {
+    let rational = spline.rational();
+    let plain = |pole: &[f64; 4]| {
+        let w = pole[3];
+        [
+            pole[0] / w,
+            pole[1] / w,
+            pole[2] / w,
+            if rational { w } else { 1.0 },
+        ]
+    };
+    NurbsSpec {
+        degree: [spline.axes[0].degree, spline.axes[1].degree],
+        knots_u: spline.axes[0].knots.clone(),
+        knots_v: spline.axes[1].knots.clone(),
+        poles_mm: spline
+            .poles
+            .iter()
+            .map(|row| row.iter().map(plain).collect())
+            .collect(),
+        rational,
+    }
+}
+
+/// Patches that the board holds of this surface, or why it does not hold it.
+fn patches(nurbs: &NurbsSpec) -> Result<usize, String> {
+    patch_count(&SurfaceSpec::Nurbs(nurbs.clone()))
+}
+
+/// Makes a face's surface one of a job.
+///
+/// # Errors
+/// The face is trimmed and `untrimmed` was not asked for; it is endless; no fit within the tolerance is small enough for the
+/// board; a tolerance out of range.
+pub fn machinable(file: &str, face: &Face, options: &Options) -> Result<Machinable, CadError> {
+    let name = format!("face {} ({}, {})", face.number, face.entity, face.surface.kind());
+    if !(options.tolerance_mm > 0.0 && options.tolerance_mm <= TOLERANCE_MAX_MM) {
+        let what = format!(
+            "a tolerance of {} mm is not above 0 and at most {TOLERANCE_MAX_MM}",
+            options.tolerance_mm
+        );
+        return Err(CadError::new(file, what, "give a tolerance in mm, e.g. 0.001"));
+    }
+    let outline = outline(face).map_err(|why| {
+        CadError::face(
+            file,
+            format!("{name}: {why}"),
+            "choose another face; import --list shows them",
+        )
+    })?;
+    if let Some(why) = outline.trimmed.as_ref().filter(|_| !options.untrimmed) {
+        return Err(CadError::face(
+            file,
+            format!("{name} is trimmed: {why}"),
+            "import it with --untrimmed (in a job: untrimmed = true) to machine the whole rectangle around it, or split the \
+             face in the CAD system",
+        ));
+    }
+    let mut why_fitted = "it has no exact form".to_owned();
+    if let Some(spline) = exact(&face.surface, outline.rectangle) {
+        let degree = spline.axes.iter().map(|axis| axis.degree).max().unwrap_or(0);
+        if degree <= DEGREE_EXACT {
+            let nurbs = nurbs(&spline);
+            match patches(&nurbs) {
+                Ok(patches) => {
+                    return Ok(Machinable {
+                        nurbs,
+                        form: Form::Exact,
+                        outline,
+                        patches,
+                    });
+                }
+                Err(why) => why_fitted = why,
+            }
+        } else {
+            why_fitted = format!("its degree is {degree}, the core's at most {DEGREE_EXACT}");
+        }
+    }
+    fitted(file, face, options, outline, why_fitted, &name)
+}
+
+fn fitted(
+    file: &str,
+    face: &Face,
+    options: &Options,
+    outline: Outline,
+    why: String,
+    name: &str,
+) -> Result<Machinable, CadError> {
+    let too_fine = |what: String| {
+        CadError::face(
+            file,
+            format!("{name}: {why}, and {what}"),
+            format!(
+                "give a larger --tolerance than {} mm, or split the face in the CAD system",
+                options.tolerance_mm
+            ),
+        )
+    };
+    let made = fit(&face.surface, outline.rectangle, options.tolerance_mm);
+    let (spline, _) = made.map_err(|error| match error {
+        FitError::TooManySpans => too_fine(format!(
+            "no fit within {} mm has few enough spans",
+            options.tolerance_mm
+        )),
+        FitError::NotFinite => CadError::face(
+            file,
+            format!("{name}: it has no point at some of its parameters"),
+            "choose another face; import --list shows them",
+        ),
+    })?;
+    let nurbs = nurbs(&spline);
+    let patches = patches(&nurbs)
+        .map_err(|still| too_fine(format!("of a fit within {} mm {still}", options.tolerance_mm)))?;
+    let deviation = deviation(&face.surface, &spline);
+    Ok(Machinable {
+        nurbs,
+        form: Form::Fitted { why, deviation },
+        outline,
+        patches,
+    })
+}
+
+/// Where the tool goes: the sign on `S_u x S_v` out of the material, if the face tells.
+#[must_use]
+pub(super) fn outside(face: &Face) -> Option<f64> {
+    face.solid.then_some(face.sense)
+}
+
+/// The surface's degrees in u and v, as its file has it.
+#[must_use]
+pub fn degrees(surface: &Surface) -> Option<[usize; 2]> {
+    match surface {
+        Surface::Spline(spline) => Some([spline.axes[0].degree, spline.axes[1].degree]),
+        Surface::Ruled { first, second } => Some([first.axis.degree.max(second.axis.degree), 1]),
+        Surface::Offset { .. } => None,
+        other => {
+            let range = [0.0, 1.0];
+            exact(other, other.domain().map(|domain| domain.unwrap_or(range)))
+                .map(|spline| [spline.axes[0].degree, spline.axes[1].degree])
+        }
+    }
+}

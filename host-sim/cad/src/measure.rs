@@ -1,0 +1,150 @@
+//! What a surface is like: its size, and how tight its hollows are on either side.
+
+use job::Along;
+use job::SurfaceSpec;
+use oracle::vector::{cross, dot, length, scale};
+use oracle::{Derivatives, Surface};
+
+/// Places a side of each patch at which a surface is looked at.
+const PLACES: usize = 8;
+/// Places a side of the whole surface at most.
+const PLACES_MAX: usize = 240;
+/// Rounds of a finer look around the tightest place, each on a grid a third as wide.
+const ROUNDS: usize = 12;
+/// `|S_u x S_v|` below this share of `|S_u| |S_v|` leaves no curvature.
+const SINE_MIN: f64 = 1e-6;
+/// A derivative below this share of the other one, each times its range, is too near a pole: rounding grows as its inverse.
+const POLE_SHARE: f64 = 1e-3;
+/// Curvature below which a side counts as nowhere hollow, 1/mm: a radius of a kilometre.
+const FLAT: f64 = 1e-6;
+
+/// Figures of a surface. "Plus" is the side to which `S_u x S_v` points.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Measures {
+    /// Corners of the box around it, mm.
+    pub corners_mm: [[f64; 3]; 2],
+    /// Least radius of a hollow seen from the plus and from the minus side, mm; `None` where there is none.
+    pub concave_mm: [Option<f64>; 2],
+    /// The normal's mean, `S_u x S_v` over the area, of length 1 for a flat surface.
+    pub facing: [f64; 3],
+}
+
+impl Measures {
+    /// Extent in x, y and z, mm.
+    #[must_use]
+    pub fn size_mm(&self) -> [f64; 3] {
+        std::array::from_fn(|k| self.corners_mm[1][k] - self.corners_mm[0][k])
+    }
+}
+
+/// Principal curvatures on the plus side, least and largest, 1/mm; `ranges` are the lengths of the parameters' ranges.
+fn principal(at: &Derivatives, ranges: [f64; 2]) -> Option<[f64; 2]> {
+    let normal = cross(at.u, at.v);
+    let area = length(normal);
+    let reach = [length(at.u) * ranges[0], length(at.v) * ranges[1]];
+    if reach[0].min(reach[1]) <= POLE_SHARE * reach[0].max(reach[1]) {
+        return None;
+    }
+    if area.is_nan() || area <= SINE_MIN * length(at.u) * length(at.v) {
+        return None;
+    }
+    let normal = scale(normal, 1.0 / area);
+    let (e, f, g) = (dot(at.u, at.u), dot(at.u, at.v), dot(at.v, at.v));
+    let (l, m, n) = (dot(at.uu, normal), dot(at.uv, normal), dot(at.vv, normal));
+    let mean = 0.5 * (e * n - 2.0 * f * m + g * l) / (area * area);
+    let gauss = (l * n - m * m) / (area * area);
+    let spread = (mean * mean - gauss).max(0.0).sqrt();
+    Some([mean - spread, mean + spread])
+}
+
+/// Scans a surface densely.
+#[must_use]
+pub fn measure(spec: &SurfaceSpec) -> Measures {
+    let surface = Surface::new(spec);
+    let places = |along: Along| -> Vec<f64> {
+        let breaks = surface.breaks(along);
+        let spans = breaks.len() - 1;
+        let each = (PLACES_MAX / spans).clamp(1, PLACES);
+        let mut places: Vec<f64> = breaks
+            .windows(2)
+            .flat_map(|span| (0..each).map(move |i| span[0] + (span[1] - span[0]) * i as f64 / each as f64))
+            .collect();
+        places.push(breaks[spans]);
+        places
+    };
+    let (us, vs) = (places(Along::U), places(Along::V));
+    let ranges = surface.domain().map(|range| range[1] - range[0]);
+    let mut corners_mm = [[f64::INFINITY; 3], [f64::NEG_INFINITY; 3]];
+    let mut tightest = [(0.0, [us[0], vs[0]]); 2];
+    let (mut facing, mut whole) = ([0.0; 3], 0.0);
+    for &u in &us {
+        for &v in &vs {
+            let at = surface.at(u, v);
+            let [least, most] = corners_mm;
+            corners_mm = [
+                std::array::from_fn(|k| at.point[k].min(least[k])),
+                std::array::from_fn(|k| at.point[k].max(most[k])),
+            ];
+            let area = cross(at.u, at.v);
+            for k in 0..3 {
+                facing[k] += area[k];
+            }
+            whole += length(area);
+            if let Some([least, most]) = principal(&at, ranges) {
+                for (side, curvature) in [(0, most), (1, -least)] {
+                    if curvature > tightest[side].0 {
+                        tightest[side] = (curvature, [u, v]);
+                    }
+                }
+            }
+        }
+    }
+    let widths = [width(&us), width(&vs)];
+    let concave_mm = [0, 1].map(|side| {
+        let curvature = sharpened(&surface, side, tightest[side], widths);
+        (curvature > FLAT).then(|| 1.0 / curvature)
+    });
+    Measures {
+        corners_mm,
+        concave_mm,
+        facing: if whole > 0.0 {
+            scale(facing, 1.0 / whole)
+        } else {
+            facing
+        },
+    }
+}
+
+/// Widest gap between places.
+fn width(places: &[f64]) -> f64 {
+    places
+        .windows(2)
+        .map(|pair| pair[1] - pair[0])
+        .fold(0.0, f64::max)
+}
+
+/// The largest curvature near the place that a coarser look found.
+fn sharpened(surface: &Surface, side: usize, found: (f64, [f64; 2]), mut widths: [f64; 2]) -> f64 {
+    let (mut best, mut place) = found;
+    let domain = surface.domain();
+    let ranges = domain.map(|range| range[1] - range[0]);
+    for _ in 0..ROUNDS {
+        let center = place;
+        for i in -3..=3_i32 {
+            for j in -3..=3_i32 {
+                let at: [f64; 2] = std::array::from_fn(|k| {
+                    let step = f64::from(if k == 0 { i } else { j }) / 3.0;
+                    (center[k] + step * widths[k]).clamp(domain[k][0], domain[k][1])
+                });
+                if let Some([least, most]) = principal(&surface.at(at[0], at[1]), ranges) {
+                    let curvature = if side == 0 { most } else { -least };
+                    if curvature > best {
+                        (best, place) = (curvature, at);
+                    }
+                }
+            }
+        }
+        widths = widths.map(|width| width / 3.0);
+    }
+    best
+}

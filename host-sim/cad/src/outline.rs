@@ -1,0 +1,339 @@
+//! A face's boundary in its surface's parameters: a rectangle, or something else around which a rectangle lies.
+
+use super::surface::Surface;
+use super::{Boundary, Edge, Face};
+use oracle::vector::length;
+
+/// How far an edge may be from a parameter line to count as lying on it, mm. Files state their edges to 1e-3 to 1e-7 mm.
+const FOLLOWS_MM: f64 = 1e-3;
+/// A derivative shorter than this, times its range, is that of a pole, mm.
+const POLE_MM: f64 = 1e-6;
+/// Shares of the enclosing rectangle's area by which a loop that follows parameter lines may differ from it: an L differs by
+/// much more.
+const AREA_SLACK: f64 = 1e-3;
+
+/// What of a surface a face uses.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Outline {
+    /// Ranges of u and v. Those of a closed surface may reach over the seam.
+    pub rectangle: [[f64; 2]; 2],
+    /// Why the face is not that whole rectangle; `None` where it is.
+    pub trimmed: Option<String>,
+}
+
+/// A loop, in parameters.
+struct Path {
+    edges: Vec<Vec<[f64; 2]>>,
+    /// Turns that it takes around the surface in u and in v.
+    winding: [f64; 2],
+    /// Touches a boundary that is a single point.
+    pole: bool,
+    /// Farthest that a boundary point lies off the surface, mm.
+    off_mm: f64,
+}
+
+impl Path {
+    fn extent(&self, k: usize) -> [f64; 2] {
+        let values = self.edges.iter().flatten().map(|place| place[k]);
+        values.fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], x| {
+            [low.min(x), high.max(x)]
+        })
+    }
+
+    /// How far a curved edge may reach beyond its points: the height of an arc through three of them, doubled.
+    fn sag(&self, k: usize) -> f64 {
+        let triples = self.edges.iter().flat_map(|edge| edge.windows(3));
+        let bend = triples.map(|t| (t[0][k] - 2.0 * t[1][k] + t[2][k]).abs());
+        0.25 * bend.fold(0.0, f64::max)
+    }
+
+    /// Area that the loop encloses in the parameters, by the trapezoid rule.
+    fn area(&self) -> f64 {
+        let places: Vec<[f64; 2]> = self.edges.iter().flatten().copied().collect();
+        let next = places.iter().cycle().skip(1);
+        let pieces = places.iter().zip(next);
+        pieces.map(|(a, b)| 0.5 * (a[0] * b[1] - b[0] * a[1])).sum()
+    }
+}
+
+/// The speed of the parameter k, mm per unit.
+fn speed(surface: &Surface, place: [f64; 2], k: usize) -> f64 {
+    let at = surface.at(place[0], place[1]);
+    length(if k == 0 { at.u } else { at.v })
+}
+
+/// Length of a unit of the parameter that matters: its period, its range, or 1.
+fn reach(surface: &Surface, k: usize) -> f64 {
+    let range = surface.domain()[k].map_or(1.0, |[low, high]| high - low);
+    surface.periods()[k].unwrap_or(range)
+}
+
+fn trace(surface: &Surface, edges: &[Edge]) -> Path {
+    let periods = surface.periods();
+    let mut path = Path {
+        edges: Vec::new(),
+        winding: [0.0; 2],
+        pole: false,
+        off_mm: 0.0,
+    };
+    let mut near = None;
+    for edge in edges {
+        let mut places: Vec<[f64; 2]> = Vec::with_capacity(edge.len());
+        let mut polar = Vec::with_capacity(edge.len());
+        for point in edge {
+            let (mut place, off_mm) = surface.invert(*point, near);
+            path.off_mm = path.off_mm.max(off_mm);
+            let on_pole = [0, 1].map(|k| speed(surface, place, k) * reach(surface, k) < POLE_MM);
+            for k in 0..2 {
+                if let Some(near) = near.filter(|_| on_pole[k]) {
+                    let near: [f64; 2] = near;
+                    place[k] = near[k];
+                }
+            }
+            near = Some(place);
+            polar.push(on_pole);
+            places.push(place);
+        }
+        for k in 0..2 {
+            path.pole |= polar.iter().any(|on_pole| on_pole[k]);
+            off_the_pole(&mut places, &polar, k);
+        }
+        near = places.last().copied().or(near);
+        path.edges.push(places);
+    }
+    let first = path.edges.iter().flatten().next().copied();
+    if let (Some(first), Some(last)) = (first, near) {
+        path.winding =
+            std::array::from_fn(|k| periods[k].map_or(0.0, |period| ((last[k] - first[k]) / period).round()));
+    }
+    path
+}
+
+/// On a pole the parameter k around it is anything: it is that of the edge's nearest place beside the pole.
+fn off_the_pole(places: &mut [[f64; 2]], polar: &[[bool; 2]], k: usize) {
+    let beside: Vec<usize> = (0..places.len()).filter(|index| !polar[*index][k]).collect();
+    for index in (0..places.len()).filter(|index| polar[*index][k]) {
+        if let Some(nearest) = beside.iter().min_by_key(|other| other.abs_diff(index)) {
+            places[index][k] = places[*nearest][k];
+        }
+    }
+}
+
+/// The edge lies on a line of the constant parameter k.
+fn constant(surface: &Surface, edge: &[[f64; 2]], k: usize) -> bool {
+    let [low, high] = edge
+        .iter()
+        .fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], place| {
+            [low.min(place[k]), high.max(place[k])]
+        });
+    let fastest = edge
+        .iter()
+        .map(|place| speed(surface, *place, k))
+        .fold(0.0, f64::max);
+    0.5 * (high - low) * fastest <= FOLLOWS_MM
+}
+
+/// The rectangle that a face's boundary is or that lies around it.
+///
+/// # Errors
+/// A text: the face has no ends, or its boundary does not lie on its surface.
+pub fn outline(face: &Face) -> Result<Outline, String> {
+    let surface = &face.surface;
+    let natural = || {
+        let [u, v] = surface.domain();
+        match (u, v) {
+            (Some(u), Some(v)) => Ok([u, v]),
+            _ => Err(format!("the {} has no boundary: it is endless", surface.kind())),
+        }
+    };
+    let loops = match &face.boundary {
+        Boundary::Natural => {
+            return Ok(Outline {
+                rectangle: natural()?,
+                trimmed: None,
+            });
+        }
+        Boundary::Unknown(why) => {
+            return Ok(Outline {
+                rectangle: natural()?,
+                trimmed: Some(format!("its boundary cannot be read: {why}")),
+            });
+        }
+        Boundary::Loops(loops) => loops,
+    };
+    let paths: Vec<Path> = loops.iter().map(|edges| trace(surface, edges)).collect();
+    let off_mm = paths.iter().map(|path| path.off_mm).fold(0.0, f64::max);
+    let mut rectangle = around(&paths);
+    let winding: Vec<_> = (0..2)
+        .filter(|k| paths.iter().any(|path| path.winding[*k] != 0.0))
+        .collect();
+    let trimmed = match winding.as_slice() {
+        [] => single(surface, &paths, &mut rectangle),
+        [k] => belt(surface, &paths, *k, face.sense, &mut rectangle)?,
+        _ => Some("its boundary winds around the surface both ways".to_owned()),
+    };
+    if trimmed.is_some() {
+        for (k, range) in rectangle.iter_mut().enumerate() {
+            let sag = paths.iter().map(|path| path.sag(k)).fold(0.0, f64::max);
+            *range = [range[0] - sag, range[1] + sag];
+        }
+    }
+    let rectangle = settled(surface, rectangle);
+    let trimmed = trimmed.or_else(|| {
+        (off_mm > 10.0 * FOLLOWS_MM).then(|| format!("its boundary lies {off_mm:.4} mm off its surface"))
+    });
+    if rectangle.iter().flatten().any(|x| !x.is_finite()) || rectangle.iter().any(|r| r[0] >= r[1]) {
+        return Err("its boundary encloses nothing".to_owned());
+    }
+    Ok(Outline { rectangle, trimmed })
+}
+
+/// The rectangle around all loops.
+fn around(paths: &[Path]) -> [[f64; 2]; 2] {
+    std::array::from_fn(|k| {
+        paths
+            .iter()
+            .map(|path| path.extent(k))
+            .fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], [a, b]| {
+                [low.min(a), high.max(b)]
+            })
+    })
+}
+
+/// A face whose loops go around nothing: a rectangle if there is one loop that follows four parameter lines. Returns why not.
+fn single(surface: &Surface, paths: &[Path], rectangle: &mut [[f64; 2]; 2]) -> Option<String> {
+    let mut whole_turn = false;
+    for (k, range) in rectangle.iter_mut().enumerate() {
+        let [low, high] = *range;
+        let widest = paths
+            .iter()
+            .flat_map(|path| path.edges.iter().flatten())
+            .map(|place| speed(surface, *place, k))
+            .fold(0.0, f64::max);
+        if let Some(period) = surface.periods()[k].filter(|_| (high - low) * widest <= FOLLOWS_MM) {
+            // All of the boundary is the seam: the face goes all the way round.
+            *range = [low, low + period];
+            whole_turn = true;
+        }
+    }
+    let [path] = paths else {
+        return Some(format!("it has {} holes", paths.len().saturating_sub(1)));
+    };
+    for (number, edge) in path.edges.iter().enumerate() {
+        if !(0..2).any(|k| constant(surface, edge, k)) {
+            return Some(format!(
+                "its boundary's edge {} follows no parameter line",
+                number + 1
+            ));
+        }
+    }
+    let [u, v] = *rectangle;
+    let whole = (u[1] - u[0]) * (v[1] - v[0]);
+    if !whole_turn && (path.area().abs() - whole).abs() > AREA_SLACK * whole {
+        return Some("its boundary is no rectangle in the surface's parameters".to_owned());
+    }
+    None
+}
+
+/// A face whose loops go around the surface in the parameter k: a belt between two lines, or between a line and a pole.
+fn belt(
+    surface: &Surface,
+    paths: &[Path],
+    k: usize,
+    sense: f64,
+    rectangle: &mut [[f64; 2]; 2],
+) -> Result<Option<String>, String> {
+    let across = 1 - k;
+    let Some(period) = surface.periods()[k] else {
+        return Err("its boundary winds around a surface that is not closed".to_owned());
+    };
+    let start = paths
+        .iter()
+        .find(|path| path.winding[k] != 0.0)
+        .and_then(|path| path.edges.first()?.first())
+        .map_or(rectangle[k][0], |place| place[k]);
+    rectangle[k] = [start, start + period];
+    let mut bounds = Vec::new();
+    let mut trimmed = None;
+    for path in paths {
+        if path.winding[k] == 0.0 {
+            trimmed = Some("it has holes".to_owned());
+            continue;
+        }
+        for edge in &path.edges {
+            if constant(surface, edge, across) {
+                bounds.push(edge[0][across]);
+            } else if !constant(surface, edge, k) {
+                trimmed = Some("its boundary follows no parameter line".to_owned());
+            }
+        }
+    }
+    let turning: Vec<_> = paths.iter().filter(|path| path.winding[k] != 0.0).collect();
+    let [low, high] = rectangle[across];
+    let flat = (high - low)
+        * turning[0]
+            .edges
+            .iter()
+            .flatten()
+            .map(|p| speed(surface, *p, across))
+            .fold(0.0, f64::max)
+        <= FOLLOWS_MM;
+    if turning.len() == 1 && flat {
+        // One line alone: the material lies to its left, as the face's normal sees it.
+        let left = turning[0].winding[k] * sense * if k == 0 { 1.0 } else { -1.0 };
+        let end = surface.domain()[across]
+            .map(|range| if left > 0.0 { range[1] } else { range[0] })
+            .or_else(|| match surface {
+                Surface::Cone { radius, slope, .. } if *slope != 0.0 => Some(-radius / slope),
+                _ => None,
+            });
+        let Some(end) = end else {
+            return Err("its boundary leaves it endless".to_owned());
+        };
+        rectangle[across] = [low.min(end), high.max(end)];
+    }
+    if trimmed.is_none() && turning.len() > 2 {
+        trimmed = Some(format!("it has {} boundaries", turning.len()));
+    }
+    // A belt between a line that is followed and something else in between.
+    let [low, high] = rectangle[across];
+    let ends = |bound: &f64| {
+        let slack = FOLLOWS_MM / speed(surface, [start, *bound], across).max(f64::MIN_POSITIVE);
+        (bound - low).abs() <= slack || (bound - high).abs() <= slack
+    };
+    if trimmed.is_none() && !bounds.iter().all(ends) {
+        trimmed = Some("its boundary is no rectangle in the surface's parameters".to_owned());
+    }
+    Ok(trimmed)
+}
+
+/// The rectangle within the surface's domain, its ends exactly on those of the domain where they are that to rounding.
+fn settled(surface: &Surface, rectangle: [[f64; 2]; 2]) -> [[f64; 2]; 2] {
+    let middle = rectangle.map(|[low, high]| 0.5 * (low + high));
+    std::array::from_fn(|k| {
+        let [mut low, mut high] = rectangle[k];
+        let slack = FOLLOWS_MM / speed(surface, middle, k).max(f64::MIN_POSITIVE);
+        let (domain, period) = (surface.domain()[k], surface.periods()[k]);
+        if let (Some(range), Some(period)) = (domain, period) {
+            // Back by whole turns, so that it begins within the domain.
+            let turns = ((low - range[0] + slack.min(0.25 * period)) / period).floor();
+            (low, high) = (low - turns * period, high - turns * period);
+            if (high - low - period).abs() <= slack || high - low > period {
+                high = low + period;
+            }
+        }
+        if let Some(range) = domain {
+            let snap = |x: f64| {
+                range
+                    .into_iter()
+                    .find(|end| (x - end).abs() <= slack)
+                    .unwrap_or(x)
+            };
+            (low, high) = (snap(low), snap(high));
+            if period.is_none() {
+                (low, high) = (low.max(range[0]), high.min(range[1]));
+            }
+        }
+        [low, high]
+    })
+}

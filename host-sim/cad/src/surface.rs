@@ -1,0 +1,453 @@
+//! Surfaces as CAD files give them, evaluated straight from their own numbers.
+
+use serde::{Deserialize, Serialize};
+use std::f64::consts::{FRAC_PI_2, TAU};
+
+use super::curve::Curve;
+use super::placement::Placement;
+use super::spline::{SplineCurve, SplineSurface};
+use oracle::Derivatives;
+use oracle::vector::{Vector, add, cross, dot, length, scale, subtract};
+
+/// Step of a difference quotient, as a share of the range; used for second derivatives of offset surfaces alone.
+const DIFFERENCE: f64 = 1e-5;
+
+/// A surface, its parameters as in STEP (ISO 10303-42). Lengths in mm. The frames' vectors are orthogonal.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub enum Surface {
+    /// `origin + u x + v y`.
+    Plane {
+        /// Point at (0, 0).
+        origin: Vector,
+        /// S_u.
+        x: Vector,
+        /// S_v.
+        y: Vector,
+    },
+    /// `origin + cos u x + sin u y + v z`; with a slope, both radii grow: `(1 + slope v)`.
+    Cylinder {
+        /// On the axis.
+        origin: Vector,
+        /// Radius vector at u = 0.
+        x: Vector,
+        /// Radius vector at u = 90 degrees.
+        y: Vector,
+        /// Along the axis.
+        z: Vector,
+    },
+    /// `origin + (radius + slope v) (cos u x + sin u y) + v z`.
+    Cone {
+        /// On the axis.
+        origin: Vector,
+        /// Direction at u = 0, of length 1 times the placement's scale.
+        x: Vector,
+        /// Direction at u = 90 degrees.
+        y: Vector,
+        /// Along the axis.
+        z: Vector,
+        /// Radius at v = 0.
+        radius: f64,
+        /// Radius gained with v.
+        slope: f64,
+    },
+    /// `center + cos v (cos u x + sin u y) + sin v z`.
+    Sphere {
+        /// Centre.
+        center: Vector,
+        /// Radius vector at (0, 0).
+        x: Vector,
+        /// Radius vector at (90 degrees, 0).
+        y: Vector,
+        /// Radius vector to the pole.
+        z: Vector,
+    },
+    /// `center + (major + minor cos v) (cos u x + sin u y) + minor sin v z`.
+    Torus {
+        /// Centre.
+        center: Vector,
+        /// Direction at u = 0.
+        x: Vector,
+        /// Direction at u = 90 degrees.
+        y: Vector,
+        /// Along the axis.
+        z: Vector,
+        /// Radius of the ring.
+        major: f64,
+        /// Radius of the tube.
+        minor: f64,
+    },
+    /// A curve (parameter v) turned about an axis by the angle u.
+    Revolution {
+        /// The curve and its range.
+        profile: Curve,
+        /// Range of its parameter.
+        range: [f64; 2],
+        /// On the axis.
+        origin: Vector,
+        /// Along the axis, of length 1.
+        axis: Vector,
+    },
+    /// A curve (parameter u) moved along a vector, v times.
+    Extrusion {
+        /// The curve.
+        profile: Curve,
+        /// Range of its parameter; none where the curve has no ends.
+        range: Option<[f64; 2]>,
+        /// S_v.
+        direction: Vector,
+    },
+    /// `(1 - v) first(u) + v second(u)`, both curves on [0, 1].
+    Ruled {
+        /// At v = 0.
+        first: SplineCurve,
+        /// At v = 1.
+        second: SplineCurve,
+    },
+    /// A B-spline.
+    Spline(SplineSurface),
+    /// A surface at a distance along the normal `S_u x S_v` of another.
+    Offset {
+        /// The other one.
+        base: Box<Surface>,
+        /// Distance, mm; its sign is the side.
+        distance: f64,
+    },
+}
+
+impl Surface {
+    /// The kind's name for people.
+    #[must_use]
+    pub fn kind(&self) -> &'static str {
+        match self {
+            Self::Plane { .. } => "plane",
+            Self::Cylinder { .. } => "cylinder",
+            Self::Cone { .. } => "cone",
+            Self::Sphere { .. } => "sphere",
+            Self::Torus { .. } => "torus",
+            Self::Revolution { .. } => "revolution",
+            Self::Extrusion { .. } => "extrusion",
+            Self::Ruled { .. } => "ruled",
+            Self::Spline(spline) if spline.rational() => "rational B-spline",
+            Self::Spline(_) => "B-spline",
+            Self::Offset { .. } => "offset",
+        }
+    }
+
+    /// The surface, placed; `None` where the placement is no similarity and the surface cannot follow it.
+    #[must_use]
+    pub fn placed(&self, by: &Placement) -> Option<Self> {
+        let (p, d) = (|a: &Vector| by.point(*a), |a: &Vector| by.vector(*a));
+        Some(match self {
+            Self::Plane { origin, x, y } => Self::Plane {
+                origin: p(origin),
+                x: d(x),
+                y: d(y),
+            },
+            Self::Cylinder { origin, x, y, z } => Self::Cylinder {
+                origin: p(origin),
+                x: d(x),
+                y: d(y),
+                z: d(z),
+            },
+            Self::Cone {
+                origin,
+                x,
+                y,
+                z,
+                radius,
+                slope,
+            } => Self::Cone {
+                origin: p(origin),
+                x: d(x),
+                y: d(y),
+                z: d(z),
+                radius: *radius,
+                slope: *slope,
+            },
+            Self::Sphere { center, x, y, z } => Self::Sphere {
+                center: p(center),
+                x: d(x),
+                y: d(y),
+                z: d(z),
+            },
+            Self::Torus {
+                center,
+                x,
+                y,
+                z,
+                major,
+                minor,
+            } => Self::Torus {
+                center: p(center),
+                x: d(x),
+                y: d(y),
+                z: d(z),
+                major: *major,
+                minor: *minor,
+            },
+            Self::Revolution {
+                profile,
+                range,
+                origin,
+                axis,
+            } => {
+                let size = by.similarity()?;
+                // A mirrored turn goes the other way about the mirrored axis.
+                let turn = if by.mirrors() { -1.0 } else { 1.0 };
+                Self::Revolution {
+                    profile: profile.placed(by),
+                    range: *range,
+                    origin: p(origin),
+                    axis: scale(d(axis), turn / size),
+                }
+            }
+            Self::Extrusion {
+                profile,
+                range,
+                direction,
+            } => Self::Extrusion {
+                profile: profile.placed(by),
+                range: *range,
+                direction: d(direction),
+            },
+            Self::Ruled { first, second } => {
+                let placed = |curve: &SplineCurve| SplineCurve {
+                    axis: curve.axis.clone(),
+                    poles: curve.poles.iter().map(|pole| by.pole(*pole)).collect(),
+                };
+                Self::Ruled {
+                    first: placed(first),
+                    second: placed(second),
+                }
+            }
+            Self::Spline(spline) => Self::Spline(SplineSurface {
+                axes: spline.axes.clone(),
+                poles: spline
+                    .poles
+                    .iter()
+                    .map(|row| row.iter().map(|pole| by.pole(*pole)).collect())
+                    .collect(),
+            }),
+            Self::Offset { base, distance } => {
+                let turn = if by.mirrors() { -1.0 } else { 1.0 };
+                Self::Offset {
+                    base: Box::new(base.placed(by)?),
+                    distance: distance * by.similarity()? * turn,
+                }
+            }
+        })
+    }
+
+    /// Ranges of u and v, each if it has ends.
+    #[must_use]
+    pub fn domain(&self) -> [Option<[f64; 2]>; 2] {
+        let turn = Some([0.0, TAU]);
+        match self {
+            Self::Plane { .. } => [None, None],
+            Self::Cylinder { .. } | Self::Cone { .. } => [turn, None],
+            Self::Sphere { .. } => [turn, Some([-FRAC_PI_2, FRAC_PI_2])],
+            Self::Torus { .. } => [turn, turn],
+            Self::Revolution { range, .. } => [turn, Some(*range)],
+            Self::Extrusion { range, .. } => [*range, None],
+            Self::Ruled { .. } => [Some([0.0, 1.0]); 2],
+            Self::Spline(spline) => spline.domain().map(Some),
+            Self::Offset { base, .. } => base.domain(),
+        }
+    }
+
+    /// Period of u and of v, where the surface goes on over the domain's end as it began.
+    #[must_use]
+    pub fn periods(&self) -> [Option<f64>; 2] {
+        match self {
+            Self::Cylinder { .. } | Self::Cone { .. } | Self::Sphere { .. } => [Some(TAU), None],
+            Self::Torus { .. } => [Some(TAU), Some(TAU)],
+            Self::Revolution { profile, .. } => [Some(TAU), profile.period()],
+            Self::Extrusion { profile, .. } => [profile.period(), None],
+            Self::Plane { .. } | Self::Ruled { .. } => [None, None],
+            Self::Spline(spline) => closed(spline),
+            Self::Offset { base, .. } => base.periods(),
+        }
+    }
+
+    /// S and its derivatives.
+    #[must_use]
+    pub fn at(&self, u: f64, v: f64) -> Derivatives {
+        match self {
+            Self::Plane { origin, x, y } => Derivatives {
+                point: add(*origin, add(scale(*x, u), scale(*y, v))),
+                u: *x,
+                v: *y,
+                ..Derivatives::default()
+            },
+            Self::Cylinder { origin, x, y, z } => {
+                turned(*origin, [*x, *y, *z], u, [1.0, 0.0, 0.0], [v, 1.0, 0.0])
+            }
+            Self::Cone {
+                origin,
+                x,
+                y,
+                z,
+                radius,
+                slope,
+            } => turned(
+                *origin,
+                [*x, *y, *z],
+                u,
+                [radius + slope * v, *slope, 0.0],
+                [v, 1.0, 0.0],
+            ),
+            Self::Sphere { center, x, y, z } => {
+                let (sin, cos) = v.sin_cos();
+                turned(*center, [*x, *y, *z], u, [cos, -sin, -cos], [sin, cos, -sin])
+            }
+            Self::Torus {
+                center,
+                x,
+                y,
+                z,
+                major,
+                minor,
+            } => {
+                let (sin, cos) = v.sin_cos();
+                let (sin, cos) = (minor * sin, minor * cos);
+                turned(
+                    *center,
+                    [*x, *y, *z],
+                    u,
+                    [major + cos, -sin, -cos],
+                    [sin, cos, -sin],
+                )
+            }
+            Self::Revolution {
+                profile,
+                origin,
+                axis,
+                ..
+            } => revolved(&profile.at(v), *origin, *axis, u),
+            Self::Extrusion {
+                profile, direction, ..
+            } => {
+                let [point, first, second] = profile.at(u);
+                Derivatives {
+                    point: add(point, scale(*direction, v)),
+                    u: first,
+                    v: *direction,
+                    uu: second,
+                    ..Derivatives::default()
+                }
+            }
+            Self::Ruled { first, second } => {
+                let (a, b) = (first.at(u), second.at(u));
+                let mixed = |k: usize| add(scale(a[k], 1.0 - v), scale(b[k], v));
+                Derivatives {
+                    point: mixed(0),
+                    u: mixed(1),
+                    v: subtract(b[0], a[0]),
+                    uu: mixed(2),
+                    uv: subtract(b[1], a[1]),
+                    vv: [0.0; 3],
+                }
+            }
+            Self::Spline(spline) => spline.at(u, v),
+            Self::Offset { base, distance } => self.offset(base, *distance, u, v),
+        }
+    }
+
+    /// Point and first derivatives of an offset surface from the base's derivatives; its second ones by differences.
+    fn offset(&self, base: &Surface, distance: f64, u: f64, v: f64) -> Derivatives {
+        let moved = |u: f64, v: f64| {
+            let at = base.at(u, v);
+            let normal = cross(at.u, at.v);
+            let area = length(normal);
+            let unit = scale(normal, 1.0 / area);
+            let slope = |a: Vector| scale(subtract(a, scale(unit, dot(a, unit))), distance / area);
+            let along_u = slope(add(cross(at.uu, at.v), cross(at.u, at.uv)));
+            let along_v = slope(add(cross(at.uv, at.v), cross(at.u, at.vv)));
+            [
+                add(at.point, scale(unit, distance)),
+                add(at.u, along_u),
+                add(at.v, along_v),
+            ]
+        };
+        let [point, first_u, first_v] = moved(u, v);
+        let [step_u, step_v] = self
+            .domain()
+            .map(|range| range.map_or(DIFFERENCE, |r| DIFFERENCE * (r[1] - r[0])));
+        let quotient = |a: Vector, b: Vector, step: f64| scale(subtract(a, b), 0.5 / step);
+        let (after_u, before_u) = (moved(u + step_u, v), moved(u - step_u, v));
+        let (after_v, before_v) = (moved(u, v + step_v), moved(u, v - step_v));
+        Derivatives {
+            point,
+            u: first_u,
+            v: first_v,
+            uu: quotient(after_u[1], before_u[1], step_u),
+            uv: quotient(after_v[1], before_v[1], step_v),
+            vv: quotient(after_v[2], before_v[2], step_v),
+        }
+    }
+}
+
+/// A profile `(radius, height)` with derivatives in v, turned by u in a frame.
+fn turned(origin: Vector, [x, y, z]: [Vector; 3], u: f64, radius: [f64; 3], height: [f64; 3]) -> Derivatives {
+    let (sin, cos) = u.sin_cos();
+    let out = add(scale(x, cos), scale(y, sin));
+    let along = add(scale(x, -sin), scale(y, cos));
+    let profile = |k: usize| add(scale(out, radius[k]), scale(z, height[k]));
+    Derivatives {
+        point: add(origin, profile(0)),
+        u: scale(along, radius[0]),
+        v: profile(1),
+        uu: scale(out, -radius[0]),
+        uv: scale(along, radius[1]),
+        vv: profile(2),
+    }
+}
+
+/// A curve's point and derivatives, turned about an axis by u.
+fn revolved(profile: &[Vector; 3], origin: Vector, axis: Vector, u: f64) -> Derivatives {
+    let (sin, cos) = u.sin_cos();
+    // (turned, its derivative in u, its second) of a vector.
+    let turn = |p: Vector| {
+        let along = scale(axis, dot(p, axis));
+        let (out, side) = (subtract(p, along), cross(axis, p));
+        [
+            add(along, add(scale(out, cos), scale(side, sin))),
+            add(scale(out, -sin), scale(side, cos)),
+            add(scale(out, -cos), scale(side, -sin)),
+        ]
+    };
+    let [point, u1, u2] = turn(subtract(profile[0], origin));
+    let [v1, uv, _] = turn(profile[1]);
+    let [v2, _, _] = turn(profile[2]);
+    Derivatives {
+        point: add(origin, point),
+        u: u1,
+        v: v1,
+        uu: u2,
+        uv,
+        vv: v2,
+    }
+}
+
+/// Periods of a B-spline surface whose opposite boundaries are the same.
+fn closed(spline: &SplineSurface) -> [Option<f64>; 2] {
+    let [[u0, u1], [v0, v1]] = spline.domain();
+    let size = {
+        let (a, b) = (
+            spline.at(u0, v0).point,
+            spline.at(0.5 * (u0 + u1), 0.5 * (v0 + v1)).point,
+        );
+        length(subtract(a, b)).max(1.0)
+    };
+    let same = |a: Vector, b: Vector| length(subtract(a, b)) <= 1e-9 * size;
+    let share = |k: usize, range: [f64; 2]| range[0] + (range[1] - range[0]) * k as f64 / 8.0;
+    let in_u = (0..=8).all(|k| {
+        let v = share(k, [v0, v1]);
+        same(spline.at(u0, v).point, spline.at(u1, v).point)
+    });
+    let in_v = (0..=8).all(|k| {
+        let u = share(k, [u0, u1]);
+        same(spline.at(u, v0).point, spline.at(u, v1).point)
+    });
+    [in_u.then_some(u1 - u0), in_v.then_some(v1 - v0)]
+}

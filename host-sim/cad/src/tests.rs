@@ -1,0 +1,453 @@
+//! The geometry by itself: cuts, exact forms, inverses and outlines against closed forms.
+
+use std::f64::consts::{FRAC_PI_2, PI, TAU};
+
+use super::exact::exact;
+use super::*;
+use oracle::vector::{Vector, add, length, scale, subtract};
+
+/// A B-spline surface of any degrees with uneven knots, one of them double, unclamped, and weights.
+fn wavy(p: usize, q: usize) -> SplineSurface {
+    let axis = |degree: usize| {
+        let inner = if degree > 1 {
+            vec![0.0, 0.3, 0.35, 1.0, 1.0, 2.5]
+        } else {
+            vec![0.0, 0.3, 0.35, 1.0, 2.5]
+        };
+        let before = (1..=degree).rev().map(|k| -0.2 * k as f64);
+        let after = (1..=degree).map(|k| 2.5 + 0.7 * k as f64);
+        Axis {
+            degree,
+            knots: before.chain(inner).chain(after).collect(),
+        }
+    };
+    let axes = [axis(p), axis(q)];
+    let pole = |i: usize, j: usize| {
+        let (x, y) = (7.0 * i as f64, 5.0 * j as f64);
+        let w = 1.0 + 0.3 * (x + 2.0 * y).sin();
+        [
+            x + (0.3 * y).sin(),
+            y,
+            4.0 * (0.2 * x).cos() * (0.4 * y).sin(),
+            1.0,
+        ]
+        .map(|c| c * w)
+    };
+    SplineSurface {
+        poles: (0..axes[0].poles())
+            .map(|i| (0..axes[1].poles()).map(|j| pole(i, j)).collect())
+            .collect(),
+        axes,
+    }
+}
+
+fn near(a: Vector, b: Vector, most: f64, what: &str) {
+    let gap = length(subtract(a, b));
+    assert!(gap <= most, "{what}: {gap} mm between {a:?} and {b:?}");
+}
+
+#[test]
+fn a_cut_is_the_same_surface() {
+    for p in 1..=7 {
+        for q in [1, 3, 5] {
+            let whole = wavy(p, q);
+            let part = whole.cut([[0.31, 2.2], [0.0, 1.0]]);
+            assert_eq!(part.domain(), [[0.31, 2.2], [0.0, 1.0]]);
+            for axis in &part.axes {
+                let ends = [axis.domain()[0], axis.domain()[1]];
+                assert!(
+                    ends.iter().all(|end| axis.multiplicity(*end) == axis.degree + 1),
+                    "clamped"
+                );
+            }
+            for (u, v) in [
+                (0.31, 0.0),
+                (0.35, 0.34),
+                (0.9, 0.3),
+                (1.0, 0.7),
+                (1.7, 0.99),
+                (2.2, 1.0),
+            ] {
+                near(whole.at(u, v).point, part.at(u, v).point, 1e-11, "cut");
+            }
+        }
+    }
+}
+
+#[test]
+fn derivatives_are_those_of_the_points() {
+    let surface = wavy(5, 4);
+    let step = 1e-5;
+    for (u, v) in [(0.1, 0.2), (0.5, 0.7), (1.8, 2.1)] {
+        let at = surface.at(u, v);
+        let slope = |a: Vector, b: Vector| scale(subtract(a, b), 0.5 / step);
+        let (right, left) = (surface.at(u + step, v), surface.at(u - step, v));
+        let (above, below) = (surface.at(u, v + step), surface.at(u, v - step));
+        near(at.u, slope(right.point, left.point), 1e-5, "S_u");
+        near(at.v, slope(above.point, below.point), 1e-5, "S_v");
+        near(at.uu, slope(right.u, left.u), 1e-4, "S_uu");
+        near(at.uv, slope(above.u, below.u), 1e-4, "S_uv");
+        near(at.vv, slope(above.v, below.v), 1e-4, "S_vv");
+    }
+}
+
+/// One of each kind, with a rectangle of it. The frames are turned and moved.
+fn kinds() -> Vec<(Surface, [[f64; 2]; 2])> {
+    let (x, y, z) = ([0.6, 0.8, 0.0], [0.0, 0.0, 1.0], [0.8, -0.6, 0.0]);
+    let origin = [100.0, -20.0, 7.0];
+    let profile = Curve::Ellipse {
+        center: [130.0, -20.0, 7.0],
+        x: [5.0, 0.0, 0.0],
+        y: [0.0, 0.0, 3.0],
+    };
+    let up = [0.0, 0.0, 1.0];
+    vec![
+        (Surface::Plane { origin, x, y }, [[-3.0, 9.0], [2.0, 4.0]]),
+        (
+            Surface::Cylinder {
+                origin,
+                x: scale(x, 9.0),
+                y: scale(y, 9.0),
+                z,
+            },
+            [[0.4, 5.9], [-3.0, 8.0]],
+        ),
+        (
+            Surface::Cone {
+                origin,
+                x,
+                y,
+                z,
+                radius: 4.0,
+                slope: 0.5,
+            },
+            [[-1.0, 0.5], [-8.0, 3.0]],
+        ),
+        (
+            Surface::Sphere {
+                center: origin,
+                x: scale(x, 12.0),
+                y: scale(y, 12.0),
+                z: scale(z, 12.0),
+            },
+            [[0.0, TAU], [-FRAC_PI_2, 1.1]],
+        ),
+        (
+            Surface::Torus {
+                center: origin,
+                x,
+                y,
+                z,
+                major: 20.0,
+                minor: 6.0,
+            },
+            [[1.0, 2.2], [0.3, 6.0]],
+        ),
+        (
+            Surface::Revolution {
+                profile: profile.clone(),
+                range: [0.0, TAU],
+                origin,
+                axis: up,
+            },
+            [[0.2, 3.3], [0.5, 4.0]],
+        ),
+        (
+            Surface::Extrusion {
+                profile,
+                range: Some([0.0, TAU]),
+                direction: [1.0, 2.0, 0.5],
+            },
+            [[0.5, 4.0], [-2.0, 6.0]],
+        ),
+        (Surface::Spline(wavy(3, 2)), [[0.31, 2.2], [0.1, 1.9]]),
+    ]
+}
+
+/// The exact form lies on the surface everywhere, and covers the rectangle to its corners.
+#[test]
+fn exact_forms_are_exact() {
+    for (surface, rectangle) in kinds() {
+        let form = exact(&surface, rectangle).unwrap();
+        let [[u0, u1], [v0, v1]] = rectangle;
+        assert_eq!(form.domain(), rectangle);
+        for i in 0..=20 {
+            for j in 0..=20 {
+                let (u, v) = (
+                    u0 + (u1 - u0) * f64::from(i) / 20.0,
+                    v0 + (v1 - v0) * f64::from(j) / 20.0,
+                );
+                let point = form.at(u, v).point;
+                let (place, distance) = surface.invert(point, Some([u, v]));
+                assert!(
+                    distance < 1e-10,
+                    "{}: {distance} mm off at {u}, {v}",
+                    surface.kind()
+                );
+                near(surface.at(place[0], place[1]).point, point, 1e-10, surface.kind());
+            }
+        }
+        for (u, v) in [(u0, v0), (u1, v0), (u0, v1), (u1, v1)] {
+            near(form.at(u, v).point, surface.at(u, v).point, 1e-10, surface.kind());
+        }
+    }
+}
+
+/// A mirrored and scaled copy of a surface has the mirrored and scaled points at the same parameters.
+#[test]
+fn placements_move_points() {
+    let by = Placement {
+        rows: [
+            [0.0, -2.0, 0.0, 5.0],
+            [-2.0, 0.0, 0.0, -7.0],
+            [0.0, 0.0, 2.0, 1.0],
+        ],
+    };
+    assert!(by.mirrors());
+    assert_eq!(by.similarity(), Some(2.0));
+    for (surface, [[u0, u1], [v0, v1]]) in kinds() {
+        let offset = Surface::Offset {
+            base: Box::new(surface.clone()),
+            distance: 0.3,
+        };
+        for surface in [surface, offset] {
+            let placed = surface.placed(&by).unwrap();
+            for share in [0.1, 0.45, 0.8] {
+                let (u, v) = (u0 + share * (u1 - u0), v1 + share * (v0 - v1));
+                near(
+                    placed.at(u, v).point,
+                    by.point(surface.at(u, v).point),
+                    1e-9,
+                    surface.kind(),
+                );
+            }
+        }
+    }
+    let squeezed = Placement {
+        rows: [[1.0, 0.0, 0.0, 0.0], [0.0, 0.5, 0.0, 0.0], [0.0, 0.0, 1.0, 0.0]],
+    };
+    assert_eq!(squeezed.similarity(), None);
+}
+
+fn face(surface: Surface, loops: Vec<Vec<Edge>>, sense: f64) -> Face {
+    Face {
+        number: 1,
+        entity: "#1".to_owned(),
+        surface,
+        boundary: Boundary::Loops(loops),
+        sense,
+        solid: true,
+    }
+}
+
+/// Points between two places of a surface, straight in its parameters.
+fn edge(surface: &Surface, from: [f64; 2], to: [f64; 2]) -> Edge {
+    (0..=16)
+        .map(|k| f64::from(k) / 16.0)
+        .map(|share| {
+            surface
+                .at(
+                    from[0] + share * (to[0] - from[0]),
+                    from[1] + share * (to[1] - from[1]),
+                )
+                .point
+        })
+        .collect()
+}
+
+fn around(surface: &Surface, corners: &[[f64; 2]]) -> Vec<Edge> {
+    let next = corners.iter().cycle().skip(1);
+    corners
+        .iter()
+        .zip(next)
+        .map(|(a, b)| edge(surface, *a, *b))
+        .collect()
+}
+
+fn close(a: [[f64; 2]; 2], b: [[f64; 2]; 2]) -> bool {
+    a.iter()
+        .flatten()
+        .zip(b.iter().flatten())
+        .all(|(a, b)| (a - b).abs() < 1e-9)
+}
+
+#[test]
+fn rectangles_are_found() {
+    for (surface, [u, v]) in kinds() {
+        // Not to the poles here, and less than a turn.
+        let v = [v[0] + 0.2 * (v[1] - v[0]), v[1]];
+        let u = [u[0], u[0] + 0.8 * (u[1] - u[0])];
+        let corners = [[u[0], v[0]], [u[1], v[0]], [u[1], v[1]], [u[0], v[1]]];
+        let found = outline(&face(surface.clone(), vec![around(&surface, &corners)], 1.0)).unwrap();
+        assert_eq!(found.trimmed, None, "{}", surface.kind());
+        let turns = ((found.rectangle[0][0] - u[0]) / TAU).round()
+            * if surface.periods()[0].is_some() { TAU } else { 0.0 };
+        let moved = [u.map(|u| u + turns), v];
+        assert!(
+            close(found.rectangle, moved),
+            "{}: {:?} for {moved:?}",
+            surface.kind(),
+            found.rectangle
+        );
+    }
+}
+
+#[test]
+fn what_is_no_rectangle_is_trimmed() {
+    let plane = || Surface::Plane {
+        origin: [0.0; 3],
+        x: [1.0, 0.0, 0.0],
+        y: [0.0, 1.0, 0.0],
+    };
+    let trimmed = |loops: Vec<Vec<Edge>>| outline(&face(plane(), loops, 1.0)).unwrap();
+    let square = [[0.0, 0.0], [9.0, 0.0], [9.0, 9.0], [0.0, 9.0]];
+    let corner = [
+        [0.0, 0.0],
+        [9.0, 0.0],
+        [9.0, 4.0],
+        [4.0, 4.0],
+        [4.0, 9.0],
+        [0.0, 9.0],
+    ];
+    let slanted = [[0.0, 0.0], [9.0, 0.0], [8.0, 9.0], [0.0, 9.0]];
+    let hole = [[2.0, 2.0], [2.0, 5.0], [5.0, 5.0], [5.0, 2.0]];
+    assert_eq!(trimmed(vec![around(&plane(), &square)]).trimmed, None);
+    for loops in [
+        vec![around(&plane(), &corner)],
+        vec![around(&plane(), &slanted)],
+        vec![around(&plane(), &square), around(&plane(), &hole)],
+    ] {
+        let found = trimmed(loops);
+        assert!(found.trimmed.is_some());
+        assert!(
+            close(found.rectangle, [[0.0, 9.0], [0.0, 9.0]]),
+            "{:?}",
+            found.rectangle
+        );
+    }
+}
+
+/// An eighth of a sphere, whose third corner is the pole, begun there or elsewhere.
+#[test]
+fn a_corner_may_be_a_pole() {
+    let sphere = Surface::Sphere {
+        center: [0.0; 3],
+        x: [10.0, 0.0, 0.0],
+        y: [0.0, 10.0, 0.0],
+        z: [0.0, 0.0, 10.0],
+    };
+    let edges = [
+        edge(&sphere, [0.3, 0.1], [1.2, 0.1]),
+        edge(&sphere, [1.2, 0.1], [1.2, FRAC_PI_2]),
+        edge(&sphere, [0.3, FRAC_PI_2], [0.3, 0.1]),
+    ];
+    for start in 0..3 {
+        let mut edges = edges.to_vec();
+        edges.rotate_left(start);
+        let found = outline(&face(sphere.clone(), vec![edges], 1.0)).unwrap();
+        assert_eq!(found.trimmed, None, "begun with edge {start}");
+        assert!(
+            close(found.rectangle, [[0.3, 1.2], [0.1, FRAC_PI_2]]),
+            "{:?}",
+            found.rectangle
+        );
+    }
+}
+
+/// Belts and caps without a seam, as some kernels write them: circles alone, and the side tells what is meant.
+#[test]
+fn circles_alone_bound_belts_and_caps() {
+    let radius = 10.0;
+    let sphere = || Surface::Sphere {
+        center: [0.0; 3],
+        x: [radius, 0.0, 0.0],
+        y: [0.0, radius, 0.0],
+        z: [0.0, 0.0, radius],
+    };
+    let circle = |v: f64, turn: f64| {
+        vec![
+            edge(&sphere(), [0.0, v], [0.5 * turn * TAU, v]),
+            edge(&sphere(), [0.5 * turn * TAU, v], [turn * TAU, v]),
+        ]
+    };
+    let belt = outline(&face(sphere(), vec![circle(-0.3, 1.0), circle(0.6, -1.0)], 1.0)).unwrap();
+    assert_eq!(belt.trimmed, None);
+    assert!(
+        close(belt.rectangle, [[0.0, TAU], [-0.3, 0.6]]),
+        "{:?}",
+        belt.rectangle
+    );
+    for (turn, sense, v) in [
+        (1.0, 1.0, [0.6, FRAC_PI_2]),
+        (-1.0, 1.0, [-FRAC_PI_2, 0.6]),
+        (1.0, -1.0, [-FRAC_PI_2, 0.6]),
+    ] {
+        let cap = outline(&face(sphere(), vec![circle(0.6, turn)], sense)).unwrap();
+        assert_eq!(cap.trimmed, None);
+        assert!(
+            close([[0.0, 0.0], cap.rectangle[1]], [[0.0, 0.0], v]),
+            "{:?}",
+            cap.rectangle
+        );
+        assert!((cap.rectangle[0][1] - cap.rectangle[0][0] - TAU).abs() < 1e-9);
+    }
+    let cylinder = Surface::Cylinder {
+        origin: [0.0; 3],
+        x: [radius, 0.0, 0.0],
+        y: [0.0, radius, 0.0],
+        z: [0.0, 0.0, 1.0],
+    };
+    let ring = vec![
+        edge(&cylinder, [0.0, 3.0], [PI, 3.0]),
+        edge(&cylinder, [PI, 3.0], [TAU, 3.0]),
+    ];
+    let endless = outline(&face(cylinder, vec![ring], 1.0)).unwrap_err();
+    assert!(endless.contains("endless"), "{endless}");
+}
+
+/// Hollows of a torus and a sphere, both sides, by their closed forms.
+#[test]
+fn hollows_are_measured() {
+    for (surface, rectangle) in kinds() {
+        let want = match surface.kind() {
+            // S_u x S_v points outwards; seen from inside, the cylinder, the sphere and the tube are hollow.
+            "cylinder" => Some([None, Some(9.0)]),
+            "sphere" => Some([None, Some(12.0)]),
+            // From outside the torus is hollow round its hole, tightest on its inner equator.
+            "torus" => Some([Some(14.0), Some(6.0)]),
+            "plane" => Some([None, None]),
+            _ => None,
+        };
+        let Some(want) = want else { continue };
+        let made = machinable(
+            "",
+            &Face {
+                boundary: Boundary::Natural,
+                ..rectangular(&surface, rectangle)
+            },
+            &Options::default(),
+        );
+        let made = made.unwrap_or_else(|error| panic!("{}: {error}", surface.kind()));
+        let measures = measure(&made.spec());
+        for (side, (got, want)) in measures.concave_mm.iter().zip(want).enumerate() {
+            match (got, want) {
+                (None, None) => {}
+                (Some(got), Some(want)) => {
+                    assert!(
+                        (got / want - 1.0).abs() < 1e-3,
+                        "{}, side {side}: {got}",
+                        surface.kind()
+                    );
+                }
+                other => panic!("{}, side {side}: {other:?}", surface.kind()),
+            }
+        }
+    }
+}
+
+/// A face whose surface is the part of another one over a rectangle.
+fn rectangular(surface: &Surface, rectangle: [[f64; 2]; 2]) -> Face {
+    let part = exact(surface, rectangle).unwrap();
+    assert!(add(part.at(rectangle[0][0], rectangle[1][0]).point, [0.0; 3])[0].is_finite());
+    face(Surface::Spline(part), Vec::new(), 1.0)
+}

@@ -1,0 +1,151 @@
+//! Loops of a function: the strongly connected parts of its control flow, then those within each part without its head.
+//!
+//! By connection rather than by backward branches: a compiler puts blocks out of order. Two loops that share their head
+//! count as one. A part with more than one way in is a loop too, with its lowest entry as head.
+
+use super::flow::Flow;
+
+/// A loop of a function.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Loop {
+    /// Index of the instruction where it is entered.
+    pub head: usize,
+    /// Indices of its instructions, in order.
+    pub steps: Vec<usize>,
+}
+
+/// All loops of a function, the outer before the inner.
+#[must_use]
+pub fn loops(flow: &Flow) -> Vec<Loop> {
+    let mut found = Vec::new();
+    let all: Vec<usize> = (0..flow.steps.len()).collect();
+    let mut waiting = vec![(all, None)];
+    while let Some((steps, without)) = waiting.pop() {
+        for part in connected(flow, &steps, without) {
+            let head = head(flow, &part);
+            found.push(Loop {
+                head,
+                steps: part.clone(),
+            });
+            waiting.push((part, Some(head)));
+        }
+    }
+    found
+}
+
+/// Where a part is entered from outside.
+fn head(flow: &Flow, part: &[usize]) -> usize {
+    let entries = (0..flow.steps.len())
+        .filter(|index| part.binary_search(index).is_err())
+        .flat_map(|index| &flow.steps[index].next)
+        .filter(|next| part.binary_search(next).is_ok());
+    let first = entries.min().copied();
+    if part.binary_search(&flow.entry).is_ok() {
+        return flow.entry;
+    }
+    first.unwrap_or(part[0])
+}
+
+/// What is known of an instruction on the way through (Tarjan 1972).
+#[derive(Clone, Copy, Default)]
+struct Mark {
+    inside: bool,
+    number: usize,
+    low: usize,
+    open: bool,
+}
+
+/// Strongly connected parts with a cycle, among these instructions without one of them.
+fn connected(flow: &Flow, steps: &[usize], without: Option<usize>) -> Vec<Vec<usize>> {
+    let mut marks = vec![Mark::default(); flow.steps.len()];
+    for step in steps.iter().filter(|step| Some(**step) != without) {
+        marks[*step].inside = true;
+    }
+    let mut parts = Vec::new();
+    let (mut count, mut open) = (0, Vec::new());
+    for root in steps {
+        if !marks[*root].inside || marks[*root].number > 0 {
+            continue;
+        }
+        // An instruction, and which of its successors is next: no recursion, a function is long.
+        let mut path = vec![(*root, 0)];
+        while let Some((at, turn)) = path.pop() {
+            if turn == 0 {
+                count += 1;
+                marks[at].number = count;
+                marks[at].low = count;
+                marks[at].open = true;
+                open.push(at);
+            }
+            if let Some(next) = flow.steps[at].next.get(turn) {
+                path.push((at, turn + 1));
+                if marks[*next].inside && marks[*next].number == 0 {
+                    path.push((*next, 0));
+                } else if marks[*next].inside && marks[*next].open {
+                    marks[at].low = marks[at].low.min(marks[*next].number);
+                }
+                continue;
+            }
+            if let Some((caller, _)) = path.last() {
+                marks[*caller].low = marks[*caller].low.min(marks[at].low);
+            }
+            if marks[at].low == marks[at].number {
+                let from = open.iter().rposition(|index| *index == at).unwrap_or(0);
+                let mut part = open.split_off(from);
+                part.iter().for_each(|index| marks[*index].open = false);
+                part.sort_unstable();
+                if part.len() > 1 || flow.steps[at].next.contains(&at) {
+                    parts.push(part);
+                }
+            }
+        }
+    }
+    parts
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::graph::flow::Step;
+    use cycle_plugin::decode::decode;
+
+    fn flow(edges: &[&[usize]]) -> Flow {
+        let steps = edges.iter().map(|next| Step {
+            address: 0,
+            instruction: decode(0, 0xbf00, 0),
+            predicated: false,
+            next: next.to_vec(),
+            call: None,
+            lost: false,
+        });
+        Flow {
+            steps: steps.collect(),
+            entry: 0,
+        }
+    }
+
+    fn steps(flow: &Flow) -> Vec<Vec<usize>> {
+        loops(flow).into_iter().map(|found| found.steps).collect()
+    }
+
+    #[test]
+    fn a_branch_backwards_is_no_loop() {
+        // 0 -> 2 -> 1 -> 3: a block out of order.
+        assert!(steps(&flow(&[&[2], &[3], &[1], &[]])).is_empty());
+    }
+
+    #[test]
+    fn nested_and_twofold() {
+        // 1..=4 around 2..=3, then 5 by itself.
+        let flow = flow(&[&[1], &[2], &[3], &[2, 4], &[1, 5], &[5, 6], &[]]);
+        let mut found = steps(&flow);
+        found.sort();
+        assert_eq!(found, [vec![1, 2, 3, 4], vec![2, 3], vec![5]]);
+    }
+
+    #[test]
+    fn two_ways_in() {
+        // 0 enters 1 and 2, which go round.
+        assert_eq!(steps(&flow(&[&[1, 2], &[2], &[1, 3], &[]])), [vec![1, 2]]);
+    }
+}

@@ -1,0 +1,363 @@
+//! Jobs made of a few numbers, so that a bad one can be changed a little into a worse one.
+
+use fastrand::Rng;
+
+use job::{Along, AxisLimits, Job, Machine, NurbsSpec, Pattern, Side, Spacing, SurfaceSpec};
+
+/// Numbers of a job.
+const GENES: usize = 21;
+
+/// Patches that surely fit the board's store, rational or not.
+const PATCHES_MAX: [usize; 2] = [230, 300];
+
+/// What a gene decides: its index.
+#[derive(Clone, Copy)]
+enum Gene {
+    Kind,
+    PathSpans,
+    SideSpans,
+    DegreeU,
+    DegreeV,
+    LengthPath,
+    LengthSide,
+    Arc,
+    Radius,
+    Scallop,
+    Bump,
+    Weights,
+    Uneven,
+    Pole,
+    Along,
+    Pattern,
+    Stretch,
+    Origin,
+    Velocity,
+    Acceleration,
+    Jerk,
+}
+
+/// A job as numbers from 0 to 1, and the seed of what is random in it.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Genes {
+    numbers: [f64; GENES],
+    seed: u64,
+}
+
+impl Genes {
+    /// Any job.
+    pub fn random(random: &mut Rng) -> Self {
+        Self {
+            numbers: std::array::from_fn(|_| random.f64()),
+            seed: random.u64(..),
+        }
+    }
+
+    /// A job made to be bad in one way.
+    pub fn adversarial(random: &mut Rng) -> Self {
+        let mut genes = Self::random(random);
+        let way = random.u8(..5);
+        let mut set = |gene: Gene, from: f64, to: f64| {
+            genes.numbers[gene as usize] = from + (to - from) * random.f64();
+        };
+        set(Gene::Kind, 0.2, 0.75);
+        // Many patches take seconds to load: mostly few.
+        set(Gene::PathSpans, 0.0, 0.5);
+        set(Gene::SideSpans, 0.0, 0.3);
+        match way {
+            // Side spans by the hundred, all within one interval: the schedule walks over them.
+            0 => {
+                set(Gene::SideSpans, 0.9, 1.0);
+                set(Gene::PathSpans, 0.0, 0.05);
+                set(Gene::LengthPath, 0.2, 0.4);
+                set(Gene::LengthSide, 0.0, 0.4);
+                set(Gene::Arc, 0.2, 0.6);
+                set(Gene::Radius, 0.5, 0.8);
+                set(Gene::Scallop, 0.7, 1.0);
+                set(Gene::Bump, 0.0, 0.1);
+                set(Gene::Pole, 0.0, 0.3);
+                set(Gene::Uneven, 0.0, 0.3);
+                set(Gene::Stretch, 0.0, 0.5);
+            }
+            // Patches shorter than a period's arc.
+            1 => {
+                set(Gene::PathSpans, 0.3, 0.7);
+                set(Gene::SideSpans, 0.0, 0.1);
+                set(Gene::Arc, 0.5, 1.0);
+                set(Gene::Bump, 0.0, 0.3);
+            }
+            // Short passes, weights at their limit, an uneven parametrisation.
+            2 => {
+                set(Gene::Weights, 0.9, 1.0);
+                set(Gene::Stretch, 0.5, 1.0);
+                set(Gene::LengthPath, 0.0, 0.4);
+            }
+            // Poles.
+            3 => {
+                set(Gene::Pole, 0.4, 1.0);
+                set(Gene::Bump, 0.0, 0.3);
+            }
+            _ => set(Gene::Kind, 0.0, 1.0),
+        }
+        genes
+    }
+
+    /// The same with a few numbers changed, by little or altogether.
+    #[must_use]
+    pub fn mutated(&self, random: &mut Rng) -> Self {
+        let mut genes = self.clone();
+        for _ in 0..random.u8(1..4) {
+            let number = &mut genes.numbers[random.usize(..GENES)];
+            *number = if random.u8(..4) == 0 {
+                random.f64()
+            } else {
+                // About normal, a twentieth wide.
+                let sum: f64 = (0..4).map(|_| random.f64() - 0.5).sum();
+                (*number + 0.1 * sum).clamp(0.0, 1.0)
+            };
+        }
+        if random.u8(..5) == 0 {
+            genes.seed = random.u64(..);
+        }
+        genes
+    }
+
+    fn gene(&self, gene: Gene) -> f64 {
+        self.numbers[gene as usize]
+    }
+
+    /// Between two positive numbers, evenly by their logarithm.
+    fn log(&self, gene: Gene, from: f64, to: f64) -> f64 {
+        from * (to / from).powf(self.gene(gene))
+    }
+
+    #[allow(
+        clippy::cast_possible_truncation,
+        clippy::cast_sign_loss,
+        reason = "small and positive"
+    )]
+    fn count(&self, gene: Gene, most: f64) -> usize {
+        self.log(gene, 1.0, most).round() as usize
+    }
+
+    #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "1 to 3")]
+    fn degree(&self, gene: Gene) -> usize {
+        1 + (2.999 * self.gene(gene)) as usize
+    }
+
+    /// The job, with limits of the axes or without.
+    #[must_use]
+    pub fn job(&self, limits: bool) -> Job {
+        let mut random = Rng::with_seed(self.seed);
+        let surface = match self.gene(Gene::Kind) {
+            kind if kind < 0.1 => self.revolved(&mut random),
+            kind if kind < 0.2 => self.bicubic(&mut random),
+            kind if kind < 0.45 => self.nurbs(&mut random, false),
+            kind if kind < 0.9 => self.nurbs(&mut random, true),
+            _ => self.ruled(&mut random),
+        };
+        let radius_mm = self.log(Gene::Radius, 0.05, 500.0);
+        Job {
+            surface,
+            radius_mm,
+            // Up to 10 mm in a period of a millisecond, which is the limit.
+            feed_mm_min: self.log(Gene::Arc, 60.0, 600_000.0),
+            scallop_mm: radius_mm * self.log(Gene::Scallop, 1e-4, 0.95),
+            along: self.along(),
+            side: match random.bool() {
+                // Between its passes the tool leaves the surface upwards.
+                _ if limits => Side::Up,
+                true => Side::Plus,
+                false => Side::Minus,
+            },
+            pattern: if self.gene(Gene::Pattern) < 0.5 {
+                Pattern::Zig
+            } else {
+                Pattern::Zigzag
+            },
+            spacing: Spacing::Exact,
+            chord_mm: 0.5 * radius_mm,
+            machine: if limits {
+                self.machine()
+            } else {
+                Machine::default()
+            },
+            origin: job::Origin::default(),
+        }
+    }
+
+    /// A machine with limits: those of the fastest reach their velocity within some periods, those of the slowest never.
+    fn machine(&self) -> Machine {
+        let axes = |most: f64| [most, most, 0.5 * most];
+        Machine {
+            limits: Some(AxisLimits {
+                velocity_mm_s: axes(self.log(Gene::Velocity, 10.0, 1000.0)),
+                acceleration_mm_s2: axes(self.log(Gene::Acceleration, 100.0, 20_000.0)),
+                jerk_mm_s3: axes(self.log(Gene::Jerk, 1e3, 1e6)),
+            }),
+            ..Machine::default()
+        }
+    }
+
+    fn along(&self) -> Along {
+        if self.gene(Gene::Along) < 0.5 {
+            Along::U
+        } else {
+            Along::V
+        }
+    }
+
+    /// What the path and the side parameter are, as u and v.
+    fn by_parameter<T>(&self, path: T, side: T) -> [T; 2] {
+        match self.along() {
+            Along::U => [path, side],
+            Along::V => [side, path],
+        }
+    }
+
+    /// Lengths of the part along u and v, mm.
+    fn lengths(&self) -> [f64; 2] {
+        self.by_parameter(
+            self.log(Gene::LengthPath, 0.05, 200.0),
+            self.log(Gene::LengthSide, 0.05, 200.0),
+        )
+    }
+
+    fn bump(&self) -> f64 {
+        let [u, v] = self.lengths();
+        u.min(v) * self.log(Gene::Bump, 1e-4, 1.0)
+    }
+
+    /// Far from the origin, the unit of the machine is coarser.
+    fn origin(&self) -> f64 {
+        1000.0 * (self.gene(Gene::Origin) - 0.5).max(0.0)
+    }
+
+    fn revolved(&self, random: &mut Rng) -> SurfaceSpec {
+        let [u, v] = self.lengths();
+        let bump = self.bump();
+        let mut cubic =
+            |last: f64, constant: f64| [bump * random.f64(), -bump * random.f64(), last, constant];
+        SurfaceSpec::Revolved {
+            radius_mm: cubic(0.3 * u, 2.0 * bump + v),
+            height_mm: cubic(u, 0.0),
+            u: [0.0, 1.0],
+            v_rad: [0.0, 0.1 + 6.0 * self.gene(Gene::Uneven)],
+        }
+    }
+
+    fn bicubic(&self, random: &mut Rng) -> SurfaceSpec {
+        let bump = self.bump();
+        let [u, v] = self.lengths();
+        let mut coefficients_mm = [[[0.0; 4]; 4]; 3];
+        for value in coefficients_mm.iter_mut().flatten().flatten() {
+            *value = bump * (random.f64() - 0.5);
+        }
+        coefficients_mm[0][2][3] += u;
+        coefficients_mm[1][3][2] += v;
+        coefficients_mm[0][3][3] += self.origin();
+        SurfaceSpec::Bicubic {
+            coefficients_mm,
+            u: [0.0, 1.0],
+            v: [0.0, 1.0],
+        }
+    }
+
+    fn ruled(&self, random: &mut Rng) -> SurfaceSpec {
+        let bump = self.bump();
+        let [u, v] = self.lengths();
+        let mut rail = |y: f64| {
+            let mut cubics = [[0.0; 4]; 3];
+            for value in cubics.iter_mut().flatten() {
+                *value = bump * (random.f64() - 0.5);
+            }
+            cubics[0][2] += u;
+            cubics[1][3] += y;
+            cubics
+        };
+        SurfaceSpec::Ruled {
+            rail0_mm: rail(0.0),
+            rail1_mm: rail(v),
+            u: [0.0, 1.0],
+            v: [0.0, 1.0],
+        }
+    }
+
+    /// Knots of so many spans, clamped; widths differ by a factor.
+    fn knots(&self, random: &mut Rng, spans: usize, degree: usize) -> Vec<f64> {
+        let factor = 1000_f64.powf(self.gene(Gene::Uneven));
+        let mut at = 0.0;
+        let mut knots = vec![0.0; degree + 1];
+        for _ in 0..spans {
+            at += factor.powf(random.f64() - 0.5);
+            knots.push(at);
+        }
+        knots.extend(std::iter::repeat_n(at, degree));
+        knots
+    }
+
+    fn nurbs(&self, random: &mut Rng, rational: bool) -> SurfaceSpec {
+        let path = self.count(Gene::PathSpans, 150.0);
+        let most = PATCHES_MAX[usize::from(!rational)];
+        let side = self.count(Gene::SideSpans, 300.0).min(most / path).max(1);
+        let spans = self.by_parameter(path, side);
+        let degree = [self.degree(Gene::DegreeU), self.degree(Gene::DegreeV)];
+        let [knots_u, knots_v] = [0, 1].map(|k| self.knots(random, spans[k], degree[k]));
+        let places = |knots: &[f64], degree: usize| -> Vec<f64> {
+            let end = knots[knots.len() - 1];
+            // Where poles make the parametrisation even (Greville), bent by a power to make it uneven.
+            let even = knots[1..knots.len() - 1].windows(degree);
+            #[allow(clippy::cast_precision_loss, reason = "at most 3")]
+            let even = even.map(|window| window.iter().sum::<f64>() / degree as f64 / end);
+            let power = 4_f64.powf(2.0 * (self.gene(Gene::Stretch) - 0.5).max(0.0));
+            even.map(|place| place.powf(power)).collect()
+        };
+        let [u, v] = [places(&knots_u, degree[0]), places(&knots_v, degree[1])];
+        let [length_u, length_v] = self.lengths();
+        let ratio = 4_f64.powf(self.gene(Gene::Weights));
+        let bump = self.bump();
+        let mut poles_mm: Vec<Vec<[f64; 4]>> = Vec::new();
+        for x in &u {
+            let row = v.iter().map(|y| {
+                let weight = if rational { ratio.powf(random.f64()) } else { 1.0 };
+                let z = bump * (random.f64() - 0.5);
+                [length_u * x + self.origin(), length_v * y, z, weight]
+            });
+            poles_mm.push(row.collect());
+        }
+        self.collapse(&mut poles_mm);
+        let first = poles_mm[0][0][3];
+        let rational = poles_mm
+            .iter()
+            .flatten()
+            .any(|pole| pole[3].to_bits() != first.to_bits());
+        if !rational {
+            poles_mm.iter_mut().flatten().for_each(|pole| pole[3] = 1.0);
+        }
+        SurfaceSpec::Nurbs(NurbsSpec {
+            degree,
+            knots_u,
+            knots_v,
+            poles_mm,
+            rational,
+        })
+    }
+
+    /// Makes a boundary one point.
+    fn collapse(&self, poles_mm: &mut [Vec<[f64; 4]>]) {
+        let pole = self.gene(Gene::Pole);
+        let last = poles_mm.len() - 1;
+        if (0.4..0.55).contains(&pole) || pole >= 0.85 {
+            let row = if pole < 0.5 { 0 } else { last };
+            let point = poles_mm[row][0];
+            for other in &mut poles_mm[row] {
+                other[..3].copy_from_slice(&point[..3]);
+            }
+        } else if (0.55..0.85).contains(&pole) {
+            let column = if pole < 0.7 { 0 } else { poles_mm[0].len() - 1 };
+            let point = poles_mm[0][column];
+            for row in poles_mm {
+                row[column][..3].copy_from_slice(&point[..3]);
+            }
+        }
+    }
+}

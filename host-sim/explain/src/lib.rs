@@ -1,0 +1,317 @@
+//! Faults in sentences: what happened, and what to do about it.
+//!
+//! `fault` makes a sentence of a fault that happened, with its value; [`entries`](entry) explain every code there is, for
+//! `cargo sim explain`.
+#![cfg_attr(
+    test,
+    allow(
+        clippy::unwrap_used,
+        clippy::cast_precision_loss,
+        clippy::cast_possible_truncation,
+        reason = "tests convert freely"
+    )
+)]
+
+mod faults;
+mod reasons;
+
+use interp_core::job::patches_max;
+use interp_core::{Fault, FaultKind, STORE_WORDS, SurfaceKind};
+use protocol::message::FaultReport;
+
+/// Where a code comes from.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Family {
+    /// A fault of the core: it stops a run, or refuses a job. Known by its number.
+    Fault,
+    /// A board's reason to refuse a request. Known by `R` and its number.
+    Reason,
+}
+
+/// An explanation of one code.
+#[derive(Clone, Copy, Debug)]
+pub struct Entry {
+    /// Where the code comes from.
+    pub family: Family,
+    /// The stable code.
+    pub code: u8,
+    /// The stable name.
+    pub name: &'static str,
+    /// What it means.
+    pub meaning: &'static str,
+    /// What the value says that comes with it.
+    pub value: &'static str,
+    /// Why it happens.
+    pub why: &'static str,
+    /// What to do.
+    pub remedy: &'static str,
+    /// A case that shows it.
+    pub example: &'static str,
+}
+
+impl Entry {
+    /// What `cargo sim explain` knows it by: `1`, `R1`.
+    #[must_use]
+    pub fn label(&self) -> String {
+        match self.family {
+            Family::Fault => self.code.to_string(),
+            Family::Reason => format!("R{}", self.code),
+        }
+    }
+}
+
+/// Every explanation: faults, then reasons, each in order of their codes.
+#[must_use]
+pub fn entries() -> Vec<Entry> {
+    let faults = interp_core::FaultKind::ALL.into_iter().map(faults::entry);
+    faults.chain(reasons::ENTRIES).collect()
+}
+
+/// The explanation of a code, by its label or its name.
+#[must_use]
+pub fn entry(wanted: &str) -> Option<Entry> {
+    let mut all = entries().into_iter();
+    all.find(|entry| entry.label().eq_ignore_ascii_case(wanted) || entry.name.eq_ignore_ascii_case(wanted))
+}
+
+/// A fault with its place in one line: code, name, where, and what it says to a person.
+#[must_use]
+pub fn fault_at(of: Fault, tick: u64, pass: u32, [u, v]: [f64; 2]) -> String {
+    let (code, name, what) = (of.kind.code(), of.kind.name(), fault(of).0);
+    format!("fault {code} ({name}) at tick {tick}, pass {pass}, u = {u:.9}, v = {v:.9}: {what}")
+}
+
+/// The key of the job file, `section.key`, that has most to do with a fault.
+#[must_use]
+pub fn key(kind: FaultKind) -> &'static str {
+    match kind {
+        FaultKind::BallDoesNotFit => "tool.radius_mm",
+        FaultKind::ParameterBackwards | FaultKind::PatchTooShort => "cut.feed_mm_min",
+        FaultKind::IntervalTooSmall => "cut.scallop_mm",
+        FaultKind::OutOfRange => "placement.translate_mm",
+        FaultKind::StepRate => "machine.steps_per_mm",
+        _ => "surface",
+    }
+}
+
+/// What a fault says to a person, and the remedy.
+#[must_use]
+pub fn fault(fault: Fault) -> (String, &'static str) {
+    let value = fault.value;
+    match fault.kind {
+        FaultKind::BallDoesNotFit => (
+            format!(
+                "the ball does not fit: its radius times the surface's curvature towards it is {value:.4}, which must stay below 1"
+            ),
+            "take a smaller ball, or machine this region with another tool",
+        ),
+        FaultKind::DegenerateSurface => (
+            format!(
+                "the surface has no normal, or folds over: the sine between S_u and S_v is {value:.2e}, below {:.0e}",
+                interp_core::surface::SINE_MIN
+            ),
+            "end the surface before this place, or parametrise it anew; a boundary that is exactly one point is allowed",
+        ),
+        FaultKind::ParameterBackwards => (
+            format!(
+                "the parametrisation changes its speed too fast for one period: the correction of the step is {value:.2} of it"
+            ),
+            "lower the feed, or parametrise the surface more evenly",
+        ),
+        FaultKind::OutOfRange => (
+            format!("a cutter location lies at {value:.3} m, outside ±2.147 m"),
+            "move the part nearer to the origin",
+        ),
+        FaultKind::TooManyPatches => (
+            format!(
+                "the job has {value} words of surface data; the machine stores {STORE_WORDS}: at most {} polynomial or {} rational patches",
+                patches_max(SurfaceKind::Polynomial, STORE_WORDS),
+                patches_max(SurfaceKind::Rational, STORE_WORDS)
+            ),
+            "use fewer knots, or cut the part into several jobs",
+        ),
+        FaultKind::PatchTooShort => (
+            format!("one period's arc reaches past a whole patch; {value:.4} mm of it were left over"),
+            "lower the feed, or remove knots that lie closer together than one period's arc",
+        ),
+        FaultKind::IntervalTooSmall => (
+            format!("the path interval, {value:.1e} of a patch, does not advance the side parameter"),
+            "take a larger scallop height or a larger ball",
+        ),
+        FaultKind::BadHeader => (
+            format!("the job's header has a value out of its range: {value}"),
+            "see the ranges of the job file",
+        ),
+        FaultKind::BadPatch => (
+            format!("patch {value} is outside the range in which its polynomials cannot overflow"),
+            "this is a defect of the host tool: please report the job",
+        ),
+        FaultKind::BadLength => (
+            format!("the job's data have the wrong length; {value} words arrived"),
+            "load the job again",
+        ),
+        FaultKind::WrongState => (
+            "the machine's state does not allow this".to_owned(),
+            "abort the run first",
+        ),
+        FaultKind::DeadlineMissed => (
+            format!("{value} ticks of the sample timer were missed"),
+            "this is a defect of the firmware, or a debugger held the chip",
+        ),
+        FaultKind::TickOverBudget => (
+            format!("a tick took {value} cycles, more than the board allows it"),
+            "this is a defect of the firmware: please report the job",
+        ),
+        FaultKind::SoftLimit => (
+            format!("an axis would be {value:.3} mm outside its travel"),
+            "move the part with [placement], or correct `travel_mm` in [machine]",
+        ),
+        FaultKind::LinkBlocked if value > 0.0 => (
+            format!("the tool centre would be {value:.3} mm above the safe height"),
+            "raise `safe_z_mm` in [machine]",
+        ),
+        FaultKind::LinkBlocked => (
+            "the surface does not face up where the tool has to leave it or come to it".to_owned(),
+            "turn the part so that it faces up ([placement]), or take the pattern \"zigzag\" where only the ends of passes are in the way",
+        ),
+        FaultKind::EmergencyStop => (
+            "the emergency stop was pressed: the drives are off, the home is lost".to_owned(),
+            "release it, acknowledge, and declare home anew (`cargo sim operate`)",
+        ),
+        FaultKind::LimitSwitch => (
+            inputs("an axis is at the end of its travel", fault),
+            "move it off its switch by hand with the drives off, and declare home anew (`cargo sim operate`)",
+        ),
+        FaultKind::DriveFault => (
+            inputs("the drives are off and the home is lost because of", fault),
+            "find the cause at the drive, acknowledge, and declare home anew (`cargo sim operate`)",
+        ),
+        FaultKind::HostGone => (
+            format!("no word of the host for {value} periods"),
+            "connect again, and resume or stop the run (`cargo sim operate`)",
+        ),
+        FaultKind::NotHomed => (
+            "the machine is not homed: nobody has said where its axes stand".to_owned(),
+            "place the axes, and say where they stand: `run --home X,Y,Z`; or homing_required = false in [machine]",
+        ),
+        FaultKind::StepRate => (
+            format!("an axis was asked for {value} steps in one period, more than the pulses of a period"),
+            "lower the feed, or set coarser microsteps and steps_per_mm with them",
+        ),
+        FaultKind::StepOutput => (
+            if value > 0.0 {
+                format!(
+                    "the direction pins were set {value} slots late, within the pulses of an axis that turns"
+                )
+            } else {
+                "the DMA that hands the step pulses out has stopped".to_owned()
+            },
+            "home the machine; this is a defect of the firmware, or a debugger held the chip",
+        ),
+    }
+}
+
+/// A sentence with the inputs that a fault names.
+fn inputs(what: &str, fault: Fault) -> String {
+    let names: Vec<_> = FaultReport::from(fault).lines().names().collect();
+    format!("{what}: {}", names.join(", "))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use protocol::frame::FrameError;
+    use protocol::message::{Clock, Reason};
+
+    #[test]
+    fn every_fault_is_explained_by_number_and_name() {
+        for kind in FaultKind::ALL {
+            let by_number = entry(&kind.code().to_string()).unwrap();
+            let by_name = entry(kind.name()).unwrap();
+            assert_eq!((by_number.code, by_name.code), (kind.code(), kind.code()));
+            assert_eq!(by_number.family, Family::Fault);
+        }
+    }
+
+    /// One of each.
+    fn reasons() -> Vec<Reason> {
+        vec![
+            Reason::BadFrame {
+                error: FrameError::TooLong,
+            },
+            Reason::Unreadable,
+            Reason::SayHello,
+            Reason::Version { host: 1, board: 2 },
+            Reason::OutOfOrder { expected: 7 },
+            Reason::WrongState {
+                state: interp_core::State::Running,
+            },
+            Reason::WrongClock { clock: Clock::Free },
+            Reason::Busy,
+            Reason::Job {
+                fault: FaultReport { code: 1, value: 0.5 },
+                record: None,
+            },
+            Reason::TooLong { limit: 1, wanted: 2 },
+            Reason::NoUpload,
+            Reason::WrongOffset { expected: 3 },
+            Reason::Incomplete {
+                wanted: 2,
+                received: 1,
+            },
+            Reason::WrongDigest {
+                wanted: 1,
+                received: 2,
+            },
+            Reason::Unsafe {
+                fault: FaultReport { code: 20, value: 0.0 },
+            },
+            Reason::DrivesOff,
+            Reason::OutOfRange {
+                most: 200,
+                wanted: 201,
+            },
+            Reason::Unsupported,
+            Reason::NotAtHome {
+                home_nm: [1, -2, 3],
+                stands_nm: Some([4, 5, 6]),
+            },
+        ]
+    }
+
+    /// The codes are those that the wire has, none is left out, and the wire knows no other.
+    #[test]
+    fn every_reason_is_explained() {
+        let reasons = reasons();
+        for (index, reason) in reasons.iter().enumerate() {
+            let mut buffer = [0; 64];
+            let bytes = postcard::to_slice(reason, &mut buffer).unwrap();
+            assert_eq!((bytes[0], usize::from(reason.code())), (reason.code(), index));
+            let entry = entry(&format!("R{index}")).unwrap();
+            assert_eq!((entry.family, entry.code), (Family::Reason, reason.code()));
+        }
+        let mut beyond = [0; 32];
+        beyond[0] = u8::try_from(reasons.len()).unwrap();
+        assert!(postcard::from_bytes::<Reason>(&beyond).is_err());
+        assert_eq!(reasons::ENTRIES.len(), reasons.len());
+    }
+
+    #[test]
+    fn names_are_unique_and_texts_are_whole() {
+        let mut names: Vec<_> = entries().iter().map(|entry| entry.name).collect();
+        names.sort_unstable();
+        let count = names.len();
+        names.dedup();
+        assert_eq!(names.len(), count);
+        for entry in entries() {
+            for text in [entry.meaning, entry.value, entry.why, entry.remedy, entry.example] {
+                assert!(
+                    text.ends_with('.')
+                        && text.starts_with(|c: char| !c.is_lowercase() || text.starts_with("jobs/")),
+                    "{}: {text}",
+                    entry.name
+                );
+            }
+        }
+    }
+}

@@ -1,0 +1,26 @@
+//! A sample of the core in the plain numbers that the verifier takes.
+
+use interp_core::{Place, State};
+use machine::prepare::Prepared;
+use verify::Sample;
+
+/// Whether a sample lies on a pass, and not on the way between two.
+#[must_use]
+pub fn is_on_pass(sample: &interp_core::Sample) -> bool {
+    sample.state != State::Linking && sample.path != Place::NONE
+}
+
+/// A sample of the core in plain numbers.
+#[must_use]
+pub fn plain(prepared: &Prepared, sample: &interp_core::Sample) -> Sample {
+    Sample {
+        tick: sample.tick.into(),
+        state: sample.state.name(),
+        pass: sample.pass,
+        parameters: is_on_pass(sample).then(|| prepared.parameters(sample.path, sample.side)),
+        cc_nm: sample.cc_nm,
+        cl_nm: sample.cl_nm,
+        feed_mm_s: sample.feed_mm_s,
+        interval: sample.interval(),
+    }
+}

@@ -1,0 +1,201 @@
+//! The whole judgement of a job: every sample, the swept ball, travel, limits, the optimum.
+
+use std::cell::RefCell;
+use std::collections::BTreeMap;
+
+use interp_core::State;
+use job::Job;
+use machine::prepare::Prepared;
+use machine::travel;
+use oracle::{Bounds, Checked, Emitted};
+use verify::motion::{Gauge, Peaks, limits};
+use verify::survey::{Each, Findings, Survey};
+use verify::swept::{self, Progress, Track};
+
+use crate::run::{PROGRESS_SAMPLES, machine, oracle};
+use crate::{InspectError, PassTime, TimedRun, pass_times, plain};
+
+/// Bounds of every sample: the figures of the README.
+pub const BOUNDS: Bounds = Bounds {
+    position_nm: 10.0,
+    contact_nm: 10.0,
+    normal_rad: 1e-6,
+    ripple_pct: 0.001,
+    interval: 1e-5,
+    side_step: 1e-5,
+    fit: 1.0,
+};
+
+/// Use of the axes, sample by sample. With limits: from standstill to standstill, links included. Without: within passes, because the
+/// feed jumps between them, and a pass's last step is cut short by its end.
+struct AxesUse {
+    gauge: Gauge,
+    has_limits: bool,
+    begun: bool,
+}
+
+impl AxesUse {
+    fn new(job: &Job) -> Self {
+        Self {
+            gauge: Gauge::new(&job.machine),
+            has_limits: job.machine.has_limits(),
+            begun: false,
+        }
+    }
+
+    /// A sample as the machine emitted it.
+    fn emitted(&mut self, tick: u32, cl_nm: [i32; 3]) {
+        if self.has_limits {
+            if !std::mem::replace(&mut self.begun, true) {
+                self.gauge.stand(cl_nm);
+            }
+            self.gauge.add(tick.into(), cl_nm);
+        }
+    }
+
+    /// A sample on a pass.
+    fn on_pass(&mut self, sample: &Emitted) {
+        if self.has_limits || sample.last_of_pass {
+            return;
+        }
+        if sample.first_of_pass {
+            self.gauge.gap();
+        }
+        self.gauge.add(sample.tick, sample.cl_nm);
+    }
+
+    fn finish(mut self) -> Peaks {
+        if self.has_limits {
+            self.gauge.come_to_stand();
+        }
+        self.gauge.peaks()
+    }
+}
+
+/// The figures of a verified run.
+pub struct Measured {
+    /// Every sample against the oracle.
+    pub findings: Findings,
+    /// The swept ball against the surface.
+    pub swept: swept::Findings,
+    /// Use of the axes.
+    pub axes: Peaks,
+    /// Passes against the optimum; empty where it was not asked for.
+    pub pass_times: Vec<PassTime>,
+}
+
+/// A verified job.
+pub struct Verification {
+    /// The figures.
+    pub measured: Measured,
+    /// Passes that a dense scan of the surface needs, where the oracle has an answer.
+    pub scanned: Option<usize>,
+    /// What speaks against the job, the gravest first. Empty: passed.
+    pub failures: Vec<String>,
+    /// What does not speak against the job, but has to be known.
+    pub warnings: Vec<String>,
+}
+
+/// Verifies a job whose run by the core alone is known. `each` takes every sample on a pass; `with_optimum` times the first, the middle
+/// and the last pass, too.
+///
+/// # Errors
+/// The core refuses the job, or the oracle has no answer for it.
+pub fn verified<'a>(
+    job: &Job,
+    prepared: &Prepared,
+    timed: &TimedRun,
+    each: Option<&'a mut Each<'a>>,
+    with_optimum: bool,
+    progress: &dyn Progress,
+) -> Result<Verification, InspectError> {
+    let measured = measured(job, prepared, timed, each, with_optimum, progress)?;
+    let scanned = oracle(job)?.schedule().ok().map(|passes| passes.len());
+    let failures = failures(job, timed, &measured, scanned);
+    let own = |warning: &&String| !failures.contains(warning);
+    let warnings = measured.swept.warnings.iter().filter(own).cloned().collect();
+    Ok(Verification {
+        measured,
+        scanned,
+        failures,
+        warnings,
+    })
+}
+
+/// Runs the core again and measures every sample, then the swept ball against the surface.
+fn measured<'a>(
+    job: &Job,
+    prepared: &Prepared,
+    timed: &TimedRun,
+    mut each: Option<&'a mut Each<'a>>,
+    with_optimum: bool,
+    progress: &dyn Progress,
+) -> Result<Measured, InspectError> {
+    let oracle = oracle(job)?;
+    // With limits the feed is low at the ends of passes: samples that lie closer than half a period's step are not kept.
+    let spacing_nm = if job.machine.has_limits() {
+        0.5e6 * job.feed_mm_s() * job.machine.period_s()
+    } else {
+        0.0
+    };
+    let mut track = Track::with_spacing(spacing_nm);
+    let axes = RefCell::new(AxesUse::new(job));
+    let mut keep = |emitted: &Emitted, checked: &Checked| {
+        track.add(emitted, job.along);
+        axes.borrow_mut().on_pass(emitted);
+        if let Some(each) = &mut each {
+            each(emitted, checked);
+        }
+    };
+    let mut survey = Survey::new(&oracle, None, Some(&mut keep));
+    let mut written = Ok(());
+    let mut running = BTreeMap::<u32, u64>::new();
+    progress.begin("measuring", timed.samples);
+    let ran = machine(job, prepared)?.run(|sample| {
+        axes.borrow_mut().emitted(sample.tick, sample.cl_nm);
+        if sample.state == State::Running {
+            *running.entry(sample.pass).or_default() += 1;
+        }
+        written = survey.add(&plain(prepared, sample));
+        if u64::from(sample.tick) % PROGRESS_SAMPLES == PROGRESS_SAMPLES - 1 {
+            progress.done(PROGRESS_SAMPLES);
+        }
+        written.is_ok()
+    });
+    written?;
+    let findings = survey.finish(ran.is_ok())?;
+    let swept = swept::measure(job, &oracle, &track, ran.is_ok(), progress);
+    let pass_times = if with_optimum {
+        progress.begin("the optimum", 1);
+        pass_times(job, &oracle, &track, &running)
+    } else {
+        Vec::new()
+    };
+    Ok(Measured {
+        findings,
+        swept,
+        axes: axes.into_inner().finish(),
+        pass_times,
+    })
+}
+
+/// What speaks against the job, the gravest first.
+fn failures(job: &Job, timed: &TimedRun, measured: &Measured, scanned: Option<usize>) -> Vec<String> {
+    let findings = &measured.findings;
+    let mut failures: Vec<String> = timed.fault.iter().map(|fault| fault.sentence()).collect();
+    failures.extend(findings.report.failures(&BOUNDS));
+    if let Some(scanned) =
+        scanned.filter(|scanned| *scanned != findings.passes as usize && timed.fault.is_none())
+    {
+        failures.push(format!(
+            "{} passes, but a dense scan of the surface needs {scanned}",
+            findings.passes
+        ));
+    }
+    failures.extend(measured.swept.failures.iter().cloned());
+    if let Err(error) = travel::check(job) {
+        failures.push(format!("{}: {}", error.what(), error.remedy()));
+    }
+    failures.extend(limits::failures(&measured.axes));
+    failures
+}

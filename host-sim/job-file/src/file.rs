@@ -1,0 +1,117 @@
+//! A surface of `kind = "file"`: a face of a CAD file, resolved by the caller's [`FaceReader`].
+
+use std::fmt;
+use std::path::{Path, PathBuf};
+
+use job::{JobError, SurfaceSpec};
+
+use crate::section::Section;
+
+/// Largest number of a face that a job may ask for: far more than any file has.
+const FACE_MAX: f64 = 1e6;
+/// Tolerance of an approximated face that names none, mm.
+pub const TOLERANCE_DEFAULT_MM: f64 = 0.001;
+/// Largest tolerance of an approximated face, mm.
+pub const TOLERANCE_MAX_MM: f64 = 1.0;
+
+/// The face that a job asks for.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Face {
+    /// The CAD file, relative to the working directory.
+    pub path: PathBuf,
+    /// Number of the face in the file, from 1.
+    pub number: usize,
+    /// Tolerance of an approximation, mm, above 0, at most [`TOLERANCE_MAX_MM`].
+    pub tolerance_mm: f64,
+    /// A trimmed face is machined over the rectangle around it.
+    pub untrimmed: bool,
+}
+
+/// Why a face cannot be had.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct FaceError {
+    /// What is wrong.
+    pub what: String,
+    /// What to do about it.
+    pub remedy: String,
+    /// The face is wrong, not the file: the error points at `face`.
+    pub of_face: bool,
+}
+
+impl fmt::Display for FaceError {
+    fn fmt(&self, out: &mut fmt::Formatter<'_>) -> fmt::Result {
+        out.write_str(&self.what)
+    }
+}
+
+/// Reads faces of CAD files.
+pub trait FaceReader {
+    /// The surface of a face.
+    ///
+    /// # Errors
+    /// The file cannot be read, has no such face, or the face cannot be machined.
+    fn surface(&self, face: &Face) -> Result<SurfaceSpec, FaceError>;
+}
+
+/// Reads no CAD files.
+pub(crate) struct NoFaces;
+
+impl FaceReader for NoFaces {
+    fn surface(&self, face: &Face) -> Result<SurfaceSpec, FaceError> {
+        Err(FaceError {
+            what: format!("{} is a CAD file, which cannot be read here", face.path.display()),
+            remedy: "make a job of the face with `cargo sim import`".to_owned(),
+            of_face: false,
+        })
+    }
+}
+
+/// The surface of kind "file".
+pub(crate) fn read(
+    section: &Section<'_>,
+    elsewhere: &[(&str, &str)],
+    faces: &dyn FaceReader,
+) -> Result<SurfaceSpec, JobError> {
+    section.only(&["kind", "path", "face", "tolerance_mm", "untrimmed"], elsewhere)?;
+    let path = section.text("path")?;
+    let number = read_number(section)?;
+    let untrimmed = section.switch("untrimmed")?;
+    let tolerance_mm = if section.has("tolerance_mm") {
+        let want = "the tolerance of an approximation in mm, e.g. 0.001";
+        section.number_within("tolerance_mm", 0.0, TOLERANCE_MAX_MM, want)?
+    } else {
+        TOLERANCE_DEFAULT_MM
+    };
+    let folder = Path::new(section.file()).parent().unwrap_or(Path::new(""));
+    let face = Face {
+        path: folder.join(path),
+        number,
+        tolerance_mm,
+        untrimmed,
+    };
+    faces.surface(&face).map_err(|error| {
+        let key = if error.of_face { "face" } else { "path" };
+        section.error(key, error.what, error.remedy)
+    })
+}
+
+/// The face's number, from 1.
+fn read_number(section: &Section<'_>) -> Result<usize, JobError> {
+    if !section.has("face") {
+        return Ok(1);
+    }
+    let number = section.number("face")?;
+    if number.fract() == 0.0 && (1.0..=FACE_MAX).contains(&number) {
+        #[allow(
+            clippy::cast_possible_truncation,
+            clippy::cast_sign_loss,
+            reason = "a whole number within the range"
+        )]
+        return Ok(number as usize);
+    }
+    Err(section.error(
+        "face",
+        format!("`face` must be a whole number from 1, not {number}"),
+        "give the face's number, as `cargo sim import FILE --list` shows it",
+    ))
+}

@@ -1,0 +1,152 @@
+//! The job file: TOML to a [`Job`], checked for shape and range.
+//!
+//! ```text
+//! text --toml--> spanned tables --section.rs--> typed values --surface.rs, machine.rs, steps.rs--> Job
+//!                                  any step --JobError--> file, line, caret, remedy
+//! ```
+//!
+//! Reading a job file starts no process: a surface of `kind = "file"` is resolved by the [`FaceReader`] that the caller passes.
+#![cfg_attr(
+    test,
+    allow(
+        clippy::unwrap_used,
+        clippy::cast_precision_loss,
+        clippy::cast_possible_truncation,
+        reason = "tests convert freely"
+    )
+)]
+
+mod file;
+mod machine;
+mod placement;
+mod section;
+mod steps;
+mod surface;
+#[cfg(test)]
+mod tests;
+mod text;
+
+use std::path::Path;
+
+use job::{
+    Along, AlongChoice, CHORD_DEFAULT_MM, FEED_MAX_MM_MIN, FEED_MIN_MM_MIN, Job, JobError, Machine, Pattern,
+    RADIUS_MAX_MM, Side, Spacing,
+};
+use section::{Reader, Section};
+
+pub use file::{Face, FaceError, FaceReader, TOLERANCE_DEFAULT_MM, TOLERANCE_MAX_MM};
+pub use steps::slots_max_us;
+
+/// Reads a job without a surface of `kind = "file"` from a file.
+///
+/// # Errors
+/// As [`load_with`].
+pub fn load(path: &Path) -> Result<Job, JobError> {
+    load_with(path, &file::NoFaces)
+}
+
+/// Reads a job from a file; `faces` resolves a surface of `kind = "file"`.
+///
+/// # Errors
+/// The file cannot be read, is not TOML, or a value in it is missing, unknown, of the wrong shape or out of range; what `faces` reports.
+pub fn load_with(path: &Path, faces: &dyn FaceReader) -> Result<Job, JobError> {
+    let name = path.display().to_string();
+    let text = text::read(path)?;
+    parse_with(&name, &text, faces)
+}
+
+/// Reads a job without a surface of `kind = "file"` from text; errors name the file `name`.
+///
+/// # Errors
+/// As [`load_with`].
+pub fn parse(name: &str, text: &str) -> Result<Job, JobError> {
+    parse_with(name, text, &file::NoFaces)
+}
+
+/// Reads a job from text; errors name the file `name`, `faces` resolves a surface of `kind = "file"`.
+///
+/// # Errors
+/// As [`load_with`].
+pub fn parse_with(name: &str, text: &str, faces: &dyn FaceReader) -> Result<Job, JobError> {
+    let reader = Reader::new(name, text);
+    let document = reader.document()?;
+    document.only(&["surface", "placement", "tool", "cut", "machine"], &[])?;
+    let surface = surface::read(&document.section("surface")?, faces)?;
+    let surface = match document.optional_section("placement")? {
+        Some(section) => placement::place(&section, &surface)?,
+        None => surface,
+    };
+    let radius_mm = read_tool(&document.section("tool")?)?;
+    let cut = document.section("cut")?;
+    cut.only(
+        &[
+            "feed_mm_min",
+            "scallop_mm",
+            "along",
+            "side",
+            "pattern",
+            "spacing",
+            "chord_mm",
+        ],
+        &[],
+    )?;
+    let below_radius = |key: &str, remedy: &str| {
+        let value = cut.number(key)?;
+        if value > 0.0 && value < radius_mm {
+            return Ok(value);
+        }
+        let what =
+            format!("`{key}` must be above 0 and below the ball radius of {radius_mm} mm, not {value}");
+        Err(cut.error(key, what, remedy))
+    };
+    let directions = [("u", Some(Along::U)), ("v", Some(Along::V)), ("auto", None)];
+    let along = cut.choice("along", &directions)?;
+    let mut origin = reader.origin(&document);
+    if along.is_none() {
+        origin.set_along_choice(AlongChoice::Auto);
+    }
+    Ok(Job {
+        surface,
+        radius_mm,
+        feed_mm_min: cut.number_within(
+            "feed_mm_min",
+            FEED_MIN_MM_MIN,
+            FEED_MAX_MM_MIN,
+            "the feed in mm/min, e.g. 600",
+        )?,
+        scallop_mm: below_radius("scallop_mm", "give the scallop height limit in mm, e.g. 0.005")?,
+        along: along.unwrap_or(Along::U),
+        side: cut.choice("side", &[("up", Side::Up), ("+", Side::Plus), ("-", Side::Minus)])?,
+        pattern: match cut.has("pattern") {
+            true => cut.choice("pattern", &[("zig", Pattern::Zig), ("zigzag", Pattern::Zigzag)])?,
+            false => Pattern::Zig,
+        },
+        spacing: match cut.has("spacing") {
+            true => cut.choice(
+                "spacing",
+                &[("exact", Spacing::Exact), ("first-order", Spacing::FirstOrder)],
+            )?,
+            false => Spacing::Exact,
+        },
+        chord_mm: match cut.has("chord_mm") {
+            true => below_radius("chord_mm", "give the chord error limit in mm, e.g. 0.005")?,
+            false => CHORD_DEFAULT_MM.min(0.5 * radius_mm),
+        },
+        machine: document
+            .optional_section("machine")?
+            .map_or(Ok(Machine::default()), |section| machine::read(&section))?,
+        origin,
+    })
+}
+
+/// The tool's radius, mm.
+fn read_tool(tool: &Section<'_>) -> Result<f64, JobError> {
+    tool.only(&["kind", "radius_mm"], &[])?;
+    tool.choice("kind", &[("ball", ())])?;
+    tool.number_within(
+        "radius_mm",
+        0.0,
+        RADIUS_MAX_MM,
+        "the ball's radius in mm (half its diameter), e.g. 10",
+    )
+}

@@ -1,0 +1,364 @@
+//! Every kind of bad input gets its line, what is wrong and what to do; the sample jobs are all good.
+
+use job::{AxisLimits, HeartbeatAction, Job, JobError, NurbsSpec, SurfaceSpec};
+
+use super::*;
+
+const REVOLVED: &str = r#"[surface]
+kind = "revolved"
+radius_mm = [60, -90, 90, 20]
+height_mm = [60, -90, 0, 50.0]
+u = [0, 1]
+v_rad = [-3.141592653589793, -0.6283185307179586]
+
+[tool]
+kind = "ball"
+radius_mm = 10
+
+[cut]
+feed_mm_min = 600
+scallop_mm = 0.005
+along = "u"
+side = "up"
+pattern = "zig"
+chord_mm = 0.005
+
+[machine]
+period_us = 1000
+velocity_max_mm_s = [100, 100, 50]
+acceleration_max_mm_s2 = [1000, 1000, 500]
+jerk_max_mm_s3 = [20000, 20000, 10000]
+travel_mm = [[-500, 500], [-500, 500], [-300, 300]]
+steps_per_mm = [400, 400, 400]
+"#;
+
+const NURBS: &str = r#"[surface]
+kind = "nurbs"
+degree = [2, 1]
+knots_u = [0, 0, 0, 0.5, 1, 1, 1]
+knots_v = [0, 0, 1, 1]
+poles_mm = [
+    [[0, 0, 1], [0, 9, 1]],
+    [[5, 0, 2], [5, 9, 2, 0.5]],
+    [[9, 0, 2], [9, 9, 2]],
+    [[14, 0, 1], [14, 9, 1]],
+]
+
+[tool]
+kind = "ball"
+radius_mm = 4
+
+[cut]
+feed_mm_min = 600
+scallop_mm = 0.005
+along = "v"
+side = "-"
+"#;
+
+/// Reads `text` with its first `from` replaced by `to`.
+fn edited(text: &str, from: &str, to: &str) -> Result<Job, JobError> {
+    assert!(text.contains(from), "nothing to replace: {from}");
+    parse("job.toml", &text.replacen(from, to, 1))
+}
+
+#[test]
+fn the_documented_job_is_read() {
+    let job = parse("job.toml", REVOLVED).unwrap();
+    assert_eq!(
+        job.surface,
+        SurfaceSpec::Revolved {
+            radius_mm: [60.0, -90.0, 90.0, 20.0],
+            height_mm: [60.0, -90.0, 0.0, 50.0],
+            u: [0.0, 1.0],
+            v_rad: [-std::f64::consts::PI, -0.628_318_530_717_958_6],
+        }
+    );
+    assert_eq!(
+        (job.radius_mm, job.feed_mm_s(), job.scallop_mm, job.chord_mm),
+        (10.0, 10.0, 0.005, 0.005)
+    );
+    assert_eq!(
+        (job.along, job.side, job.pattern),
+        (Along::U, Side::Up, Pattern::Zig)
+    );
+    assert_eq!(job.machine.period_s(), 0.001);
+    assert_eq!(job.machine.limits, Some(AxisLimits::DEFAULT));
+    assert_eq!(
+        job.machine.travel_mm,
+        Some([[-500.0, 500.0], [-500.0, 500.0], [-300.0, 300.0]])
+    );
+}
+
+#[test]
+fn what_may_be_left_out_has_its_default() {
+    let job = parse("job.toml", NURBS).unwrap();
+    assert_eq!(job.machine, Machine::default());
+    assert_eq!(
+        (job.pattern, job.chord_mm, job.side),
+        (Pattern::Zig, CHORD_DEFAULT_MM, Side::Minus)
+    );
+    let SurfaceSpec::Nurbs(nurbs) = &job.surface else {
+        panic!("not a nurbs surface")
+    };
+    assert_eq!(nurbs.domain(), [[0.0, 1.0], [0.0, 1.0]]);
+    assert!(nurbs.rational);
+    assert_eq!(nurbs.poles_mm[1], [[5.0, 0.0, 2.0, 1.0], [5.0, 9.0, 2.0, 0.5]]);
+    let job = edited(NURBS, "2, 0.5]", "2, 1]").unwrap();
+    assert!(matches!(
+        job.surface,
+        SurfaceSpec::Nurbs(NurbsSpec { rational: false, .. })
+    ));
+    let job = edited(REVOLVED, "u = [0, 1]\n", "").unwrap();
+    assert_eq!(job.surface.domain()[0], [0.0, 1.0]);
+}
+
+#[test]
+fn supervision_is_read() {
+    let read = |keys: &str| edited(REVOLVED, "period_us = 1000", keys).unwrap().machine;
+    let strict = read("period_us = 1000");
+    assert!(strict.homing_required);
+    assert_eq!(
+        (strict.heartbeat_action, strict.heartbeat_timeout_ms),
+        (HeartbeatAction::Finish, 1000.0)
+    );
+    let other = read("homing_required = false\nhost_gone = \"hold\"\nhost_gone_ms = 500.1");
+    assert!(!other.homing_required);
+    assert_eq!(
+        (other.heartbeat_action, other.heartbeat_timeout_ms),
+        (HeartbeatAction::Hold, 500.1)
+    );
+}
+
+#[test]
+fn unclamped_knots_are_allowed() {
+    let job = edited(NURBS, "[0, 0, 0, 0.5, 1, 1, 1]", "[0, 1, 2, 3, 4, 5, 6]").unwrap();
+    assert_eq!(job.surface.domain()[0], [2.0, 4.0]);
+}
+
+/// Each row: text, what to replace, by what, line and column of the error, a part of what it says.
+type Bad = (
+    &'static str,
+    &'static str,
+    &'static str,
+    usize,
+    usize,
+    &'static str,
+);
+
+fn check(rows: &[Bad]) {
+    for (text, from, to, line, column, what) in rows {
+        let error = edited(text, from, to).expect_err(&format!("{from} -> {to} was accepted"));
+        assert!(error.what().contains(what), "{from} -> {to}: {error}");
+        assert_eq!(
+            error.line_and_column(),
+            Some((*line, *column)),
+            "{from} -> {to}: {error}"
+        );
+        assert!(
+            error
+                .to_string()
+                .starts_with(&format!("job.toml:{line}:{column}: ")),
+            "{error}"
+        );
+        assert!(!error.remedy().is_empty(), "{error}");
+    }
+}
+
+#[test]
+#[rustfmt::skip] // a table: a row a line
+fn keys_and_kinds() {
+    check(&[
+        (REVOLVED, "feed_mm_min", "feed_mm_mn", 13, 1, "unknown key `feed_mm_mn`; did you mean `feed_mm_min`?"),
+        (REVOLVED, "feed_mm_min", "feed", 13, 1, "unknown key `feed`; did you mean `feed_mm_min`?"),
+        (REVOLVED, "scallop_mm", "SCALLOP_MM", 14, 1, "did you mean `scallop_mm`?"),
+        (REVOLVED, "[tool]", "[tol]", 8, 2, "unknown section `tol`; did you mean `tool`?"),
+        (REVOLVED, "[tool]", "[spindle]", 8, 2, "unknown section `spindle`"),
+        (REVOLVED, "feed_mm_min = 600\n", "", 12, 2, "`feed_mm_min` is missing in [cut]"),
+        (REVOLVED, "u = [0, 1]", "v = [0, 1]", 5, 1, "the range of a revolved surface is `v_rad`"),
+        (REVOLVED, "height_mm", "knots_u", 4, 1, "only a nurbs surface has it"),
+        (NURBS, "degree = [2, 1]", "u = [0, 1]", 3, 1, "the range of a nurbs surface is that of its knots"),
+        (REVOLVED, "\"revolved\"", "\"file\"", 3, 1, "only a revolved surface has it"),
+        (REVOLVED, "\"revolved\"", "\"revolve\"", 2, 8, "did you mean \"revolved\"?"),
+        (REVOLVED, "\"ball\"", "\"flat\"", 9, 8, "`kind` cannot be \"flat\""),
+        (REVOLVED, "\"u\"", "u", 15, 9, "not valid TOML"),
+        (REVOLVED, "feed_mm_min = 600", "feed_mm_min = ", 13, 15, "not valid TOML"),
+        (REVOLVED, "scallop_mm = 0.005", "feed_mm_min = 1", 14, 1, "duplicate key"),
+        ("surface = 3", "3", "4", 1, 11, "`surface` must be a section, not a number"),
+        ("", "", "[cut]", 1, 6, "the section `[surface]` is missing"),
+    ]);
+}
+
+#[test]
+#[rustfmt::skip] // a table: a row a line
+fn types_and_shapes() {
+    check(&[
+        (REVOLVED, "600", "\"600\"", 13, 15, "`feed_mm_min` must be a number, not a text"),
+        (REVOLVED, "\"up\"", "1", 16, 8, "`side` must be a text in quotes, not a number"),
+        (REVOLVED, "90, 20]", "90]", 3, 13, "`radius_mm` must have 4 numbers, not 3"),
+        (REVOLVED, "90, 20]", "90, [20]]", 3, 27, "`radius_mm`, number 4 must be a number, not a list"),
+        (REVOLVED, "[-300, 300]]", "[-300]]", 25, 40, "`travel_mm`, row 3 must have 2 numbers, not 1"),
+        (NURBS, "    [[9, 0, 2], [9, 9, 2]],", "    [[9, 0, 2]],", 9, 5, "`poles_mm`, row 3 has 1 poles, but row 1 has 2"),
+        (NURBS, "[5, 9, 2, 0.5]", "[5, 9]", 8, 17, "`poles_mm`, row 2, pole 2 must have 3 or 4 numbers, not 2"),
+        (NURBS, "0.5, 1, 1, 1]", "1, 1, 1]", 4, 11, "6 knots, but 4 rows of degree 2 take 4 + 2 + 1 = 7"),
+        (NURBS, "[0, 0, 1, 1]", "[0, 0, 1]", 5, 11, "3 knots, but 2 poles a row of degree 1 take 2 + 1 + 1 = 4"),
+        (NURBS, "degree = [2, 1]", "degree = [2, 3]", 6, 12, "has 2 poles a row, too few for degree 3"),
+    ]);
+}
+
+#[test]
+#[rustfmt::skip] // a table: a row a line
+fn ranges() {
+    check(&[
+        (REVOLVED, "600", "0", 13, 15, "must be above 0.06 and at most 600000, not 0"),
+        (REVOLVED, "600", "nan", 13, 15, "must be a finite number"),
+        (REVOLVED, "600", "1e999", 13, 15, "must be a finite number"),
+        (REVOLVED, "radius_mm = 10", "radius_mm = -inf", 10, 13, "must be a finite number"),
+        (REVOLVED, "radius_mm = 10", "radius_mm = -1", 10, 13, "`radius_mm` must be above 0"),
+        (REVOLVED, "scallop_mm = 0.005", "scallop_mm = 10", 14, 14, "below the ball radius of 10 mm, not 10"),
+        (REVOLVED, "chord_mm = 0.005", "chord_mm = 0", 18, 12, "`chord_mm` must be above 0"),
+        (REVOLVED, "u = [0, 1]", "u = [1, 0]", 5, 5, "`u` must ascend, not run from 1 to 0"),
+        (REVOLVED, "-3.141592653589793", "-9", 6, 9, "more than a full turn"),
+        (REVOLVED, "90, 20]", "90, -20]", 3, 13, "the profile's radius is negative: -20 mm at u = 0"),
+        (REVOLVED, "1000", "1", 21, 13, "`period_us` must be 10 to 100000, not 1"),
+        (REVOLVED, "[100, 100, 50]", "[100, 0, 50]", 22, 21, "`velocity_max_mm_s` must be above 0, not 0"),
+        (REVOLVED, "[-500, 500]", "[500, -500]", 25, 13, "the travel of x must ascend"),
+        (REVOLVED, "period_us = 1000", "host_gone = \"stop\"", 21, 13, "`host_gone` cannot be \"stop\""),
+        (REVOLVED, "period_us = 1000", "host_gone_ms = 99", 21, 16, "`host_gone_ms` must be 100 to 60000, not 99"),
+        (REVOLVED, "period_us = 1000", "homing_required = 0", 21, 19, "`homing_required` must be true or false, not a number"),
+        (NURBS, "degree = [2, 1]", "degree = [4, 1]", 3, 11, "`degree`, number 1 must be a whole number from 1 to 3"),
+        (NURBS, "degree = [2, 1]", "degree = [2, 1.5]", 3, 14, "must be a whole number from 1 to 3, not 1.5"),
+        (NURBS, "[0, 0, 0, 0.5,", "[0, 0, 0, -0.5,", 4, 21, "`knots_u`, knot 4 is -0.5, below the one before it (0)"),
+        (NURBS, "[0, 0, 0, 0.5,", "[0, 0, 0, 0,", 4, 21, "makes 0 stand 4 times; at an end"),
+        (NURBS, "[0, 0, 0, 0.5, 1, 1, 1]", "[0, 1, 1, 1, 1, 1, 3]", 4, 11, "leaves an empty range"),
+        (NURBS, "2, 0.5]", "2, 0]", 8, 17, "has the weight 0, which must be above 0"),
+    ]);
+}
+
+#[test]
+#[rustfmt::skip] // a table: a row a line
+fn placements() {
+    const TOOL: &str = "[tool]";
+    check(&[
+        (REVOLVED, TOOL, "[placment]\n[tool]", 8, 2, "unknown section `placment`; did you mean `placement`?"),
+        (REVOLVED, TOOL, "[placement]\nrotate = [0, 0, 1]\n[tool]", 9, 1, "unknown key `rotate`; did you mean `rotate_deg`?"),
+        (REVOLVED, TOOL, "[placement]\nscale = 0\n[tool]", 9, 9, "`scale` must be above 0 and at most 1000000, not 0"),
+        (REVOLVED, TOOL, "[placement]\nscale = nan\n[tool]", 9, 9, "must be a finite number"),
+        (REVOLVED, TOOL, "[placement]\nscale = [1, 1, 1]\n[tool]", 9, 9, "`scale` must be a number, not a list"),
+        (REVOLVED, TOOL, "[placement]\nrotate_deg = 90\n[tool]", 9, 14, "`rotate_deg` must be a list, not a number"),
+        (REVOLVED, TOOL, "[placement]\nrotate_deg = [0, 361, 0]\n[tool]", 9, 14, "must be -360 to 360, not 361"),
+        (REVOLVED, TOOL, "[placement]\nplace = \"center\"\n[tool]", 9, 9, "did you mean \"centre\"?"),
+        (REVOLVED, TOOL, "[placement]\ntranslate_mm = [0, 2200, 0]\n[tool]", 9, 16, "the placed surface reaches from y = 2120.000 to 2200.000 mm"),
+        (REVOLVED, TOOL, "[placement]\ntranslate_mm = [0, 1, 0]\nscale = 100\n[tool]", 10, 9, "the machine reaches ±2147.483 mm"),
+    ]);
+}
+
+#[test]
+fn an_inner_knot_may_not_tear_the_surface() {
+    let text = NURBS.replace("[0, 0, 0, 0.5, 1, 1, 1]", "[0, 0, 0, 0.5, 0.5, 0.5, 1, 1, 1]");
+    let rows = "    [[14, 0, 1], [14, 9, 1]],\n";
+    let error = edited(&text, rows, &rows.repeat(3)).unwrap_err();
+    assert_eq!(error.line_and_column(), Some((4, 31)), "{error}");
+    assert!(
+        error
+            .what()
+            .contains("makes 0.5 stand 3 times; inside the range a knot may stand at most 2 times"),
+        "{error}"
+    );
+}
+
+#[test]
+fn a_profile_may_touch_the_axis() {
+    // R(u) = 20 u (2 - u) is 0 at u = 0; R(u) = (u - 0.5)^2 touches 0 inside.
+    assert!(edited(REVOLVED, "[60, -90, 90, 20]", "[0, -20, 40, 0]").is_ok());
+    assert!(edited(REVOLVED, "[60, -90, 90, 20]", "[0, 1, -1, 0.25]").is_ok());
+    assert!(edited(REVOLVED, "[60, -90, 90, 20]", "[0, 1, -1, 0.24]").is_err());
+}
+
+#[test]
+fn a_later_stage_can_point_at_a_line() {
+    let job = parse("job.toml", REVOLVED).unwrap();
+    let error = job
+        .origin
+        .error("tool.radius_mm", "the ball does not fit", "take a smaller one");
+    assert_eq!(error.to_string(), "job.toml:10:13: the ball does not fit");
+    let error = job.origin.error("cut.nothing", "no such key", "none");
+    assert_eq!(error.line_and_column(), Some((12, 2)));
+}
+
+#[test]
+fn the_report_shows_the_line_with_a_caret() {
+    let error = edited(REVOLVED, "feed_mm_min", "feed_mm_mn").unwrap_err();
+    let mut shown = String::new();
+    let handler = miette::GraphicalReportHandler::new_themed(miette::GraphicalTheme::none());
+    handler.render_report(&mut shown, &error).unwrap();
+    for part in [
+        "did you mean `feed_mm_min`?",
+        "job.toml:13:1",
+        "feed_mm_mn = 600",
+        "^^^^",
+        "help: the keys of [cut] are",
+    ] {
+        assert!(shown.contains(part), "{part} is not in\n{shown}");
+    }
+}
+
+#[test]
+fn a_file_that_is_not_there() {
+    let error = load(Path::new("no/such/job.toml")).unwrap_err();
+    assert!(
+        error
+            .to_string()
+            .starts_with("no/such/job.toml: there is no such file"),
+        "{error}"
+    );
+    assert_eq!(error.line_and_column(), None);
+}
+
+#[test]
+fn every_sample_job_is_good() {
+    let jobs = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../jobs");
+    let mut read = 0;
+    for entry in std::fs::read_dir(jobs).unwrap() {
+        let path = entry.unwrap().path();
+        if path.extension().is_some_and(|extension| extension == "toml") {
+            load(&path).unwrap();
+            read += 1;
+        }
+    }
+    assert!(read >= 10, "only {read} jobs found");
+}
+
+/// A job that names one limit is a job with limits: the others are the defaults, for whoever reads the job.
+#[test]
+fn one_limit_brings_the_defaults_of_the_others() {
+    let bare = REVOLVED.split("velocity_max_mm_s").next().unwrap();
+    assert_eq!(parse("job.toml", bare).unwrap().machine.limits, None);
+    let default = AxisLimits::DEFAULT;
+    for (key, limits) in [
+        (
+            "velocity_max_mm_s = [7, 8, 9]",
+            AxisLimits {
+                velocity_mm_s: [7.0, 8.0, 9.0],
+                ..default
+            },
+        ),
+        (
+            "acceleration_max_mm_s2 = [70, 80, 90]",
+            AxisLimits {
+                acceleration_mm_s2: [70.0, 80.0, 90.0],
+                ..default
+            },
+        ),
+        (
+            "jerk_max_mm_s3 = [700, 800, 900]",
+            AxisLimits {
+                jerk_mm_s3: [700.0, 800.0, 900.0],
+                ..default
+            },
+        ),
+    ] {
+        let job = parse("job.toml", &format!("{bare}{key}\n")).unwrap();
+        assert_eq!(job.machine.limits, Some(limits), "{key}");
+        assert!(job.machine.has_limits());
+    }
+}

@@ -1,0 +1,151 @@
+//! The machine that runs a job, with every default applied.
+
+/// Names of the axes.
+pub const AXES: [&str; 3] = ["x", "y", "z"];
+/// Shortest and longest sampling period, µs: what the core accepts.
+pub const PERIOD_RANGE_US: [f64; 2] = [10.0, 100_000.0];
+/// Sampling period of a job that names none, µs: the paper's.
+pub const PERIOD_DEFAULT_US: f64 = 1000.0;
+/// Shortest and longest heartbeat timeout, ms. The shortest leaves room for a host that shares its processor.
+pub const HEARTBEAT_TIMEOUT_RANGE_MS: [f64; 2] = [100.0, 60_000.0];
+/// Heartbeat timeout of a job that names none, ms.
+pub const HEARTBEAT_TIMEOUT_DEFAULT_MS: f64 = 1000.0;
+/// Distance from the surface's highest place to the ball at the safe height, mm, of a job that names none.
+const CLEARANCE_DEFAULT_MM: f64 = 5.0;
+/// Length of the plunge at the feed, mm, of a job that names none.
+const PLUNGE_DEFAULT_MM: f64 = 2.0;
+
+/// Limits of the axes x, y and z. All are above 0.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct AxisLimits {
+    /// Velocity, mm/s.
+    pub velocity_mm_s: [f64; 3],
+    /// Acceleration, mm/s².
+    pub acceleration_mm_s2: [f64; 3],
+    /// Jerk, mm/s³.
+    pub jerk_mm_s3: [f64; 3],
+}
+
+impl AxisLimits {
+    /// A small stiff mill with stepper motors. A job that names one or two kinds of limit gets the others from here.
+    pub const DEFAULT: Self = Self {
+        velocity_mm_s: [100.0, 100.0, 50.0],
+        acceleration_mm_s2: [1000.0, 1000.0, 500.0],
+        jerk_mm_s3: [20_000.0, 20_000.0, 10_000.0],
+    };
+
+    /// The limits of a job that names `velocity_mm_s`, `acceleration_mm_s2` and `jerk_mm_s3`, or some of them; `None` where it names none:
+    /// such a job runs at constant feed from its first sample to its last.
+    #[must_use]
+    pub fn of_given(
+        velocity_mm_s: Option<[f64; 3]>,
+        acceleration_mm_s2: Option<[f64; 3]>,
+        jerk_mm_s3: Option<[f64; 3]>,
+    ) -> Option<Self> {
+        if velocity_mm_s.is_none() && acceleration_mm_s2.is_none() && jerk_mm_s3.is_none() {
+            return None;
+        }
+        Some(Self {
+            velocity_mm_s: velocity_mm_s.unwrap_or(Self::DEFAULT.velocity_mm_s),
+            acceleration_mm_s2: acceleration_mm_s2.unwrap_or(Self::DEFAULT.acceleration_mm_s2),
+            jerk_mm_s3: jerk_mm_s3.unwrap_or(Self::DEFAULT.jerk_mm_s3),
+        })
+    }
+
+    /// Velocity, acceleration and jerk, in this order.
+    #[must_use]
+    pub const fn by_order(&self) -> [[f64; 3]; 3] {
+        [self.velocity_mm_s, self.acceleration_mm_s2, self.jerk_mm_s3]
+    }
+}
+
+/// A positive ratio of two whole numbers, kept exact.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Ratio {
+    /// Above the line.
+    pub numerator: u32,
+    /// Below the line, above 0.
+    pub denominator: u32,
+}
+
+/// What the drives of the axes x, y and z require.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct StepOutput {
+    /// Motor steps a millimetre, 1/1000 to 500000.
+    pub steps_per_mm: [Ratio; 3],
+    /// Whether the direction output is inverted.
+    pub direction_inverted: [bool; 3],
+    /// Length of a step pulse, and least pause after it, µs.
+    pub pulse_us: f64,
+    /// Least time from a change of direction to the next pulse, µs.
+    pub direction_setup_us: f64,
+}
+
+/// What a board does with a run when the heartbeat of the host stops.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum HeartbeatAction {
+    /// Finishes the run.
+    #[default]
+    Finish,
+    /// Holds the run along its path.
+    Hold,
+}
+
+/// The machine that runs the job.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Machine {
+    /// Sampling period T, µs, in [`PERIOD_RANGE_US`].
+    pub period_us: f64,
+    /// Limits of the axes. `None`: the feed is constant from the first sample to the last, as in the paper.
+    pub limits: Option<AxisLimits>,
+    /// Travel of the axes (soft limits), mm, `[least, most]`.
+    pub travel_mm: Option<[[f64; 2]; 3]>,
+    /// Position of the tool centre before the run, mm. `None`: at the safe height above the first contact.
+    pub home_mm: Option<[f64; 3]>,
+    /// z of the tool centre at which the tool is clear of everything, mm. `None`: by [`Self::clearance_mm`].
+    pub safe_z_mm: Option<f64>,
+    /// Distance from the surface's highest place to the ball at the safe height, mm, where `safe_z_mm` is `None`.
+    pub clearance_mm: f64,
+    /// Last part of the plunge, traversed at the feed, mm.
+    pub plunge_mm: f64,
+    /// A run on a board starts only where its axes are homed.
+    pub homing_required: bool,
+    /// What a board does when the heartbeat of the host stops.
+    pub heartbeat_action: HeartbeatAction,
+    /// Silence after which the heartbeat counts as stopped, ms, in [`HEARTBEAT_TIMEOUT_RANGE_MS`].
+    pub heartbeat_timeout_ms: f64,
+    /// What the drives require. `None`: the board's own setting.
+    pub step_output: Option<StepOutput>,
+}
+
+impl Default for Machine {
+    fn default() -> Self {
+        Self {
+            period_us: PERIOD_DEFAULT_US,
+            limits: None,
+            travel_mm: None,
+            home_mm: None,
+            safe_z_mm: None,
+            clearance_mm: CLEARANCE_DEFAULT_MM,
+            plunge_mm: PLUNGE_DEFAULT_MM,
+            homing_required: true,
+            heartbeat_action: HeartbeatAction::Finish,
+            heartbeat_timeout_ms: HEARTBEAT_TIMEOUT_DEFAULT_MS,
+            step_output: None,
+        }
+    }
+}
+
+impl Machine {
+    /// Sampling period T, s.
+    #[must_use]
+    pub fn period_s(&self) -> f64 {
+        self.period_us * 1e-6
+    }
+
+    /// Whether the job runs within limits of the axes, from standstill to standstill.
+    #[must_use]
+    pub const fn has_limits(&self) -> bool {
+        self.limits.is_some()
+    }
+}

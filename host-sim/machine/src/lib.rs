@@ -1,0 +1,24 @@
+//! Runs jobs: prepares them for the core, runs the core in this process, drives boards and QEMU.
+//!
+//! ```text
+//! Job ──prepare──► Prepared ──in_process──► samples
+//!                     └──────remote───────► the same from a board or QEMU
+//! ```
+#![cfg_attr(
+    test,
+    allow(
+        clippy::unwrap_used,
+        clippy::cast_precision_loss,
+        clippy::cast_possible_truncation,
+        reason = "tests convert freely"
+    )
+)]
+
+pub mod direction;
+mod in_process;
+pub mod prepare;
+pub mod remote;
+pub mod script;
+pub mod travel;
+
+pub use in_process::Machine;

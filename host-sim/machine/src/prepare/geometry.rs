@@ -1,0 +1,201 @@
+//! Geometry that the preparation needs of a surface: the sign of its upper side, and the tool centre over the first contact. Evaluated from
+//! the pieces that become the core's patches, apart from the oracle, which decides both for itself.
+
+use job::{Along, Job, JobError, Side, SurfaceSpec};
+use patches::pieces::{Piece, Source};
+
+type Vector = [f64; 3];
+
+/// Cells a parameter over which the surface's normal is averaged.
+const GRID: u32 = 48;
+/// Share of the area's upright part by which one side must outweigh the other, to count as the upper one.
+const BALANCE_MIN: f64 = 0.1;
+/// Least upright part of the area: below it the surface stands upright everywhere.
+const UPRIGHT_MIN: f64 = 1e-3;
+/// Distance of the first place beside a pole, as a share of the range: near enough for a parabola, far enough for a normal.
+const POLE_STEP: f64 = 1e-4;
+/// Length of one derivative over that of the other, each times its range, below which it counts as vanished.
+const POLE_SHARE: f64 = 1e-9;
+
+/// A point and its first derivatives.
+struct Frame {
+    point: Vector,
+    u: Vector,
+    v: Vector,
+}
+
+/// A surface that can be evaluated.
+enum Surface {
+    Pieces { source: Source, breaks: [Vec<f64>; 2] },
+    Profile { radius: [f64; 4], height: [f64; 4] },
+}
+
+fn cross(a: Vector, b: Vector) -> Vector {
+    [
+        a[1] * b[2] - a[2] * b[1],
+        a[2] * b[0] - a[0] * b[2],
+        a[0] * b[1] - a[1] * b[0],
+    ]
+}
+
+fn length(a: Vector) -> f64 {
+    a.iter().map(|x| x * x).sum::<f64>().sqrt()
+}
+
+/// Value and derivative of a cubic, highest power first.
+fn cubic([c3, c2, c1, c0]: [f64; 4], t: f64) -> [f64; 2] {
+    [
+        ((c3 * t + c2) * t + c1) * t + c0,
+        (3.0 * c3 * t + 2.0 * c2) * t + c1,
+    ]
+}
+
+/// Value, derivative along the first and along the second parameter of a bicubic, lowest power first.
+fn bicubic(c: &[[f64; 4]; 4], s: f64, t: f64) -> [f64; 3] {
+    let rows = c.map(|[c0, c1, c2, c3]| cubic([c3, c2, c1, c0], t));
+    let [value, along] = cubic([rows[3][0], rows[2][0], rows[1][0], rows[0][0]], s);
+    let [across, _] = cubic([rows[3][1], rows[2][1], rows[1][1], rows[0][1]], s);
+    [value, along, across]
+}
+
+/// The span that holds a parameter.
+fn span(breaks: &[f64], at: f64) -> [f64; 2] {
+    let index = breaks
+        .partition_point(|start| *start <= at)
+        .clamp(1, breaks.len() - 1);
+    [breaks[index - 1], breaks[index]]
+}
+
+impl Surface {
+    fn new(spec: &SurfaceSpec) -> Self {
+        match spec {
+            SurfaceSpec::Revolved {
+                radius_mm, height_mm, ..
+            } => Self::Profile {
+                radius: *radius_mm,
+                height: *height_mm,
+            },
+            other => {
+                let source = Source::new(other);
+                let breaks = source.breaks();
+                Self::Pieces { source, breaks }
+            }
+        }
+    }
+
+    fn at(&self, u: f64, v: f64) -> Frame {
+        match self {
+            Self::Profile { radius, height } => {
+                let ([r, dr], [z, dz]) = (cubic(*radius, u), cubic(*height, u));
+                let (sin, cos) = v.sin_cos();
+                Frame {
+                    point: [r * cos, r * sin, z],
+                    u: [dr * cos, dr * sin, dz],
+                    v: [-r * sin, r * cos, 0.0],
+                }
+            }
+            Self::Pieces { source, breaks } => {
+                let (us, vs) = (span(&breaks[0], u), span(&breaks[1], v));
+                in_piece(&source.piece(us, vs), us, vs, [u, v])
+            }
+        }
+    }
+}
+
+/// A frame within a piece over a rectangle: its parameters run from -1/2 to 1/2.
+fn in_piece(piece: &Piece, us: [f64; 2], vs: [f64; 2], [u, v]: [f64; 2]) -> Frame {
+    let centred = |[start, end]: [f64; 2], at: f64| (at - start) / (end - start) - 0.5;
+    let (s, t) = (centred(us, u), centred(vs, v));
+    let [weight, weight_u, weight_v] = bicubic(&piece[3], s, t);
+    let mut frame = Frame {
+        point: [0.0; 3],
+        u: [0.0; 3],
+        v: [0.0; 3],
+    };
+    for (axis, numerator) in piece.iter().take(3).enumerate() {
+        let [value, along, across] = bicubic(numerator, s, t);
+        let point = value / weight;
+        frame.point[axis] = point;
+        frame.u[axis] = (along - weight_u * point) / weight / (us[1] - us[0]);
+        frame.v[axis] = (across - weight_v * point) / weight / (vs[1] - vs[0]);
+    }
+    frame
+}
+
+/// The sign on `S_u x S_v` that points to the tool.
+///
+/// # Errors
+/// `side = "up"` for a surface that faces up as much as down, or stands upright.
+pub(super) fn tool_sign(job: &Job) -> Result<f64, JobError> {
+    match job.side {
+        Side::Plus => return Ok(1.0),
+        Side::Minus => return Ok(-1.0),
+        Side::Up => {}
+    }
+    let surface = Surface::new(&job.surface);
+    let [us, vs] = job.surface.domain();
+    let middle = |[start, end]: [f64; 2], index: u32| {
+        start + (end - start) * (f64::from(index) + 0.5) / f64::from(GRID)
+    };
+    let (mut upright, mut upright_magnitude, mut area) = (0.0, 0.0, 0.0);
+    for i in 0..GRID {
+        for j in 0..GRID {
+            let frame = surface.at(middle(us, i), middle(vs, j));
+            let normal = cross(frame.u, frame.v);
+            upright += normal[2];
+            upright_magnitude += normal[2].abs();
+            area += length(normal);
+        }
+    }
+    if upright.abs() > BALANCE_MIN * upright_magnitude && upright_magnitude > UPRIGHT_MIN * area {
+        return Ok(upright.signum());
+    }
+    Err(job.origin.error(
+        "cut.side",
+        "the surface faces up as much as down, so side = \"up\" is ambiguous; write \"+\" or \"-\"",
+        "give side = \"+\" or \"-\": the sign on S_u x S_v",
+    ))
+}
+
+/// The tool centre over the first contact of the first pass, mm; `None` where the surface has no normal there.
+pub(super) fn first_centre_mm(job: &Job, sign: f64) -> Option<Vector> {
+    let surface = Surface::new(&job.surface);
+    let [us, vs] = job.surface.domain();
+    let frame = surface.at(us[0], vs[0]);
+    let (reach_u, reach_v) = (
+        length(frame.u) * (us[1] - us[0]),
+        length(frame.v) * (vs[1] - vs[0]),
+    );
+    let normal = if reach_u.min(reach_v) > POLE_SHARE * reach_u.max(reach_v) {
+        unit(cross(frame.u, frame.v))?
+    } else {
+        // The normal beside the pole, continued to it by a parabola.
+        let beside = |k: f64| {
+            let step = |[start, end]: [f64; 2]| start + k * POLE_STEP * (end - start);
+            let place = if reach_u < reach_v {
+                surface.at(us[0], step(vs))
+            } else {
+                surface.at(step(us), vs[0])
+            };
+            unit(cross(place.u, place.v))
+        };
+        let (one, two, three) = (beside(1.0)?, beside(2.0)?, beside(3.0)?);
+        unit(std::array::from_fn(|k| 3.0 * (one[k] - two[k]) + three[k]))?
+    };
+    Some(std::array::from_fn(|k| {
+        frame.point[k] + sign * job.radius_mm * normal[k]
+    }))
+}
+
+fn unit(a: Vector) -> Option<Vector> {
+    let size = length(a);
+    (size > 0.0 && size.is_finite()).then(|| a.map(|x| x / size))
+}
+
+/// The sign on `S_path x S_side`.
+pub(super) const fn along_path(sign: f64, along: Along) -> f64 {
+    match along {
+        Along::U => sign,
+        Along::V => -sign,
+    }
+}

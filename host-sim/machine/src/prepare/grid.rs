@@ -1,0 +1,270 @@
+//! The grid of records: pieces in the pass's orientation, split further where a record cannot hold one.
+
+use std::collections::BTreeSet;
+
+use interp_core::encode::{self, Bicubic, EncodeError};
+use interp_core::job::SPANS_MAX;
+use interp_core::surface::Edges;
+use interp_core::{Header, STORE_WORDS, SurfaceKind};
+
+use job::{Along, Job, JobError, SurfaceSpec};
+use patches::pieces::{Piece, Source};
+
+use super::{Axis, Prepared, steps, widths};
+
+pub(super) const REMEDY: &str = "move the part nearer to the origin (±2 m), or cut it into smaller surfaces";
+
+/// Distance within which the poles of a boundary count as one point, mm: 1/1000 of the machine's nanometre.
+const POINT_MM: f64 = 1e-9;
+
+/// Rounds of splitting before it is given up; each halves every patch that a record cannot hold.
+const ROUNDS_MAX: usize = 8;
+
+/// Which way a piece has to be split.
+struct Split {
+    path: bool,
+    side: bool,
+    why: EncodeError,
+}
+
+/// What the patches of a grid come to.
+struct Grid {
+    /// The records, path index fastest.
+    words: Vec<i32>,
+    /// Path and side spans that have to be halved.
+    halve: [BTreeSet<usize>; 2],
+    /// Side spans beside which a part of the boundary is a point, but not all of it.
+    mixed: Option<usize>,
+}
+
+/// Records of a surface, and the breaks of the path and of the side parameter.
+struct Records {
+    words: Vec<i32>,
+    path: Vec<f64>,
+    side: Vec<f64>,
+}
+
+/// Why a surface does not become records.
+struct NoRecords {
+    what: String,
+    remedy: &'static str,
+}
+
+/// Splits the surface until each piece fits a record.
+fn records(source: &Source, along: Along) -> Result<Records, NoRecords> {
+    let no = |what: String, remedy: &'static str| NoRecords { what, remedy };
+    let [u, v] = source.breaks();
+    let (mut path, mut side) = match along {
+        Along::U => (u, v),
+        Along::V => (v, u),
+    };
+    for _ in 0..ROUNDS_MAX {
+        let grid = grid(source, along, &path, &side)
+            .map_err(|why| no(format!("the machine cannot hold this surface: {why}"), REMEDY))?;
+        let [path_spans, side_spans] = &grid.halve;
+        if path_spans.is_empty() && side_spans.is_empty() {
+            if let Some(span) = grid.mixed {
+                return Err(no(
+                    format!(
+                        "beside side span {span} a part of the boundary is a single point, but not all of it"
+                    ),
+                    "end the surface where the boundary becomes a point, and make two jobs of it",
+                ));
+            }
+            return Ok(Records {
+                words: grid.words,
+                path,
+                side,
+            });
+        }
+        halve(&mut path, path_spans);
+        halve(&mut side, side_spans);
+        if path.len().max(side.len()) > usize::from(SPANS_MAX) {
+            break;
+        }
+    }
+    let what = "the surface does not become patches that the machine can hold";
+    Err(no(what.to_owned(), REMEDY))
+}
+
+/// Prepares a grid of patches.
+pub(super) fn prepare(job: &Job, header: Header, source: &Source) -> Result<Prepared, JobError> {
+    let Records { words, path, side } =
+        records(source, job.along).map_err(|no| job.origin.error("surface", no.what, no.remedy))?;
+    finish(job, header, source.rational(), path, side, words)
+}
+
+/// Patches that the machine makes of a surface that is not a turned profile, with passes along u.
+///
+/// # Errors
+/// Why it cannot hold the surface, in a sentence.
+pub fn patch_count(surface: &SurfaceSpec) -> Result<usize, String> {
+    let source = Source::new(surface);
+    let Records { words, path, side } = records(&source, Along::U).map_err(|no| no.what)?;
+    let (path_spans, side_spans) = (path.len() - 1, side.len() - 1);
+    let patches = path_spans * side_spans;
+    // Each span's width is a word, too.
+    if words.len() + path_spans + side_spans > STORE_WORDS {
+        return Err(format!("it takes {patches} patches, more than the board holds"));
+    }
+    Ok(patches)
+}
+
+fn halve(breaks: &mut Vec<f64>, spans: &BTreeSet<usize>) {
+    for &span in spans.iter().rev() {
+        breaks.insert(span + 1, 0.5 * (breaks[span] + breaks[span + 1]));
+    }
+}
+
+/// The records of all patches, and which spans have to be halved instead.
+fn grid(source: &Source, along: Along, path: &[f64], side: &[f64]) -> Result<Grid, EncodeError> {
+    let mut grid = Grid {
+        words: Vec::new(),
+        halve: [BTreeSet::new(), BTreeSet::new()],
+        mixed: None,
+    };
+    for (j, side) in side.windows(2).enumerate() {
+        let mut first = None;
+        for (i, path) in path.windows(2).enumerate() {
+            let (path, side) = ([path[0], path[1]], [side[0], side[1]]);
+            let piece = match along {
+                Along::U => source.piece(path, side),
+                Along::V => source.piece(side, path).map(|axis| transpose(&axis)),
+            };
+            let edges = collapsed(&piece);
+            let beside = [edges.side_start, edges.side_end];
+            if *first.get_or_insert(beside) != beside {
+                grid.mixed = Some(j);
+            }
+            match record(&piece, edges, source.rational(), &mut grid.words) {
+                Ok(()) => {}
+                Err(split) if matches!(split.why, EncodeError::NotFinite | EncodeError::TooFar) => {
+                    return Err(split.why);
+                }
+                Err(split) => {
+                    let [path_spans, side_spans] = &mut grid.halve;
+                    path_spans.extend(split.path.then_some(i));
+                    side_spans.extend(split.side.then_some(j));
+                }
+            }
+        }
+    }
+    Ok(grid)
+}
+
+fn transpose(c: &Bicubic) -> Bicubic {
+    std::array::from_fn(|i| std::array::from_fn(|j| c[j][i]))
+}
+
+fn record(piece: &Piece, edges: Edges, rational: bool, words: &mut Vec<i32>) -> Result<(), Split> {
+    if edges.count() > 1 {
+        // Opposite boundaries are parted by a cut between them.
+        let path = edges.path_start && edges.path_end;
+        let side = edges.side_start && edges.side_end;
+        let neither = !path && !side;
+        return Err(Split {
+            path: path || neither,
+            side: side || neither,
+            why: EncodeError::NotAPole,
+        });
+    }
+    let both = |why| Split {
+        path: true,
+        side: true,
+        why,
+    };
+    let words_of = if rational {
+        let one_way = |why| match why {
+            EncodeError::Weights => weight_split(piece),
+            why => both(why),
+        };
+        encode::rational(piece, edges)
+            .map_err(one_way)?
+            .to_words()
+            .to_vec()
+    } else {
+        let [x, y, z, _] = *piece;
+        encode::polynomial(&[x, y, z], edges)
+            .map_err(both)?
+            .to_words()
+            .to_vec()
+    };
+    words.extend(words_of);
+    Ok(())
+}
+
+/// Splits the way in which the weights vary more.
+fn weight_split(piece: &Piece) -> Split {
+    let [.., weight] = piece;
+    let cubic = |[c0, c1, c2, c3]: [f64; 4], t: f64| c0 + t * (c1 + t * (c2 + t * c3));
+    let ratio = |at: &dyn Fn(f64) -> f64| {
+        let values = (0..9).map(|k| at(f64::from(k) / 8.0 - 0.5));
+        let (least, most) = values.fold((f64::INFINITY, 0.0_f64), |(a, b), value| {
+            (a.min(value), b.max(value))
+        });
+        most / least
+    };
+    let along = ratio(&|t| cubic(weight.map(|row| cubic(row, 0.0)), t));
+    let across = ratio(&|t| cubic(weight.map(|row| cubic(row, t)), 0.0));
+    Split {
+        path: along >= across,
+        side: across >= along,
+        why: EncodeError::Weights,
+    }
+}
+
+/// Which boundaries of a piece are single points.
+fn collapsed(piece: &Piece) -> Edges {
+    let cubic = |[c0, c1, c2, c3]: [f64; 4], t: f64| c0 + t * (c1 + t * (c2 + t * c3));
+    let point = |path: f64, side: f64| -> [f64; 3] {
+        let [x, y, z, w] = piece.map(|c| cubic(c.map(|row| cubic(row, side)), path));
+        [x / w, y / w, z / w]
+    };
+    let one = |at: &dyn Fn(f64) -> [f64; 3]| {
+        let first = at(-0.5);
+        // Seven more points: a rational cubic cannot return to its start that often.
+        (1..8).all(|k| {
+            let other = at(f64::from(k) / 7.0 - 0.5);
+            first.iter().zip(other).all(|(a, b)| (a - b).abs() < POINT_MM)
+        })
+    };
+    Edges {
+        path_start: one(&|t| point(-0.5, t)),
+        path_end: one(&|t| point(0.5, t)),
+        side_start: one(&|t| point(t, -0.5)),
+        side_end: one(&|t| point(t, 0.5)),
+    }
+}
+
+fn finish(
+    job: &Job,
+    header: Header,
+    rational: bool,
+    path: Vec<f64>,
+    side: Vec<f64>,
+    records: Vec<i32>,
+) -> Result<Prepared, JobError> {
+    let spans = |breaks: &[f64]| u16::try_from(breaks.len() - 1).unwrap_or(u16::MAX);
+    let header = Header {
+        kind: if rational {
+            SurfaceKind::Rational
+        } else {
+            SurfaceKind::Polynomial
+        },
+        path_spans: spans(&path),
+        side_spans: spans(&side),
+        ..header
+    };
+    let (path, side) = (Axis { breaks: path }, Axis { breaks: side });
+    let mut words = widths(job, &side)?;
+    words.extend(widths(job, &path)?);
+    words.extend(records);
+    Ok(Prepared {
+        header,
+        words,
+        path,
+        side,
+        along: job.along,
+        steps: steps::config(&job.machine),
+    })
+}

@@ -1,0 +1,184 @@
+//! From a job file to what the machine loads: header and words. Knots are split and degrees raised exactly, so that every
+//! piece is one bicubic patch (rational where the surface is); ranges become patches with centred parameters.
+//!
+//! ```text
+//! SurfaceSpec ──patches.rs──► bicubic pieces over any rectangle ──grid.rs──► records of the core ──► Prepared
+//! ```
+
+mod axes;
+mod geometry;
+mod grid;
+mod steps;
+
+use interp_core::sample::Place;
+use interp_core::{Header, Pattern, Spacing, StepConfig, SurfaceKind, ToolSide, encode};
+
+use job::{Along, AlongChoice, Job, JobError, SurfaceSpec};
+use patches::pieces::Source;
+
+pub use grid::patch_count;
+pub use steps::configuration;
+
+/// One parameter of the prepared surface: its spans, in the parameter's own units.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Axis {
+    /// Ends of the spans, ascending, one more than there are spans.
+    pub breaks: Vec<f64>,
+}
+
+impl Axis {
+    /// The parameter at a place, to the last digit of f64; a span's ends exactly.
+    #[must_use]
+    pub fn parameter(&self, place: Place) -> f64 {
+        let span = usize::from(place.span);
+        let (start, end) = (self.breaks[span], self.breaks[span + 1]);
+        if place.fraction == u64::MAX {
+            return end;
+        }
+        #[allow(clippy::cast_precision_loss, reason = "the nearest f64 is wanted")]
+        let fraction = place.fraction as f64 / 18_446_744_073_709_551_616.0;
+        start + (end - start) * fraction
+    }
+
+    /// Spans of the grid.
+    #[must_use]
+    pub fn spans(&self) -> usize {
+        self.breaks.len() - 1
+    }
+}
+
+/// A job as the machine loads it.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Prepared {
+    /// What is asked.
+    pub header: Header,
+    /// The surface's data.
+    pub words: Vec<i32>,
+    /// The path parameter.
+    pub path: Axis,
+    /// The side parameter.
+    pub side: Axis,
+    /// Which of u and v is the path parameter.
+    pub along: Along,
+    /// What the axes' drives want, where the job says so.
+    pub steps: Option<StepConfig>,
+}
+
+impl Prepared {
+    /// (u, v) of a place on the path and one on the side parameter.
+    #[must_use]
+    pub fn parameters(&self, path: Place, side: Place) -> [f64; 2] {
+        let (path, side) = (self.path.parameter(path), self.side.parameter(side));
+        match self.along {
+            Along::U => [path, side],
+            Along::V => [side, path],
+        }
+    }
+
+    /// Bytes of the header and of the surface's data, as the machine holds them.
+    #[must_use]
+    pub fn bytes(&self) -> usize {
+        size_of_val(&self.header) + size_of_val(self.words.as_slice())
+    }
+
+    /// Number of patches.
+    #[must_use]
+    pub fn patches(&self) -> usize {
+        self.path.spans() * self.side.spans()
+    }
+}
+
+/// Prepares a job.
+///
+/// # Errors
+/// What cannot become patches: coordinates out of the machine's range, weights that vary too much, a surface without an
+/// upper side where `side = "up"`, `along = "auto"` that was not settled; with the place in the job file.
+pub fn prepare(job: &Job) -> Result<Prepared, JobError> {
+    if job.origin.along_choice() == &AlongChoice::Auto {
+        return Err(job.origin.error(
+            "cut.along",
+            "the direction of the passes has not been settled",
+            "say along = \"u\" or \"v\", or have `direction::settle` choose",
+        ));
+    }
+    let sign = geometry::tool_sign(job)?;
+    #[allow(clippy::cast_possible_truncation, reason = "the machine's own precision")]
+    let header = Header {
+        kind: SurfaceKind::Polynomial,
+        pattern: match job.pattern {
+            job::Pattern::Zig => Pattern::Zig,
+            job::Pattern::Zigzag => Pattern::Zigzag,
+        },
+        spacing: match job.spacing {
+            job::Spacing::Exact => Spacing::Exact,
+            job::Spacing::FirstOrder => Spacing::FirstOrder,
+        },
+        tool_side: if geometry::along_path(sign, job.along) > 0.0 {
+            ToolSide::Plus
+        } else {
+            ToolSide::Minus
+        },
+        path_spans: 1,
+        side_spans: 1,
+        ball_radius_mm: job.radius_mm as f32,
+        feed_mm_s: job.feed_mm_s() as f32,
+        scallop_mm: job.scallop_mm as f32,
+        period_s: job.machine.period_s() as f32,
+        axes: axes::axes(job, sign)?,
+    };
+    match &job.surface {
+        SurfaceSpec::Revolved {
+            radius_mm,
+            height_mm,
+            u,
+            v_rad,
+        } => revolved(job, header, [*radius_mm, *height_mm], *u, *v_rad),
+        surface => grid::prepare(job, header, &Source::new(surface)),
+    }
+}
+
+/// Words of the widths of spans.
+fn widths(job: &Job, axis: &Axis) -> Result<Vec<i32>, JobError> {
+    let spans = axis.breaks.windows(2).map(|ends| ends[1] - ends[0]);
+    spans
+        .map(|width| {
+            encode::width(width)
+                .map_err(|error| job.origin.error("surface", error.to_string(), "widen its range"))
+        })
+        .collect()
+}
+
+fn revolved(
+    job: &Job,
+    header: Header,
+    profile: [[f64; 4]; 2],
+    u: [f64; 2],
+    v_rad: [f64; 2],
+) -> Result<Prepared, JobError> {
+    let [radius, height] = profile.map(|[c3, c2, c1, c0]| encode::substitute_cubic(&[c0, c1, c2, c3], u));
+    let record = encode::revolved(&radius, &height, v_rad).map_err(|error| {
+        job.origin.error(
+            "surface",
+            format!("the machine cannot hold this surface: {error}"),
+            grid::REMEDY,
+        )
+    })?;
+    let [profile, angle] = [u, v_rad].map(|range| Axis {
+        breaks: range.to_vec(),
+    });
+    let (kind, path, side) = match job.along {
+        Along::U => (SurfaceKind::RevolvedAlongProfile, profile, angle),
+        Along::V => (SurfaceKind::RevolvedAroundAxis, angle, profile),
+    };
+    let mut words = widths(job, &side)?;
+    words.extend(widths(job, &path)?);
+    words.extend(record.to_words());
+    Ok(Prepared {
+        header: Header { kind, ..header },
+        words,
+        path,
+        side,
+        along: job.along,
+        steps: steps::config(&job.machine),
+    })
+}

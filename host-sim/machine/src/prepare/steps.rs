@@ -1,0 +1,88 @@
+//! Step output and supervision of a board, out of the job's machine.
+
+use interp_core::StepConfig;
+use interp_core::steps::{AxisSteps, PULSE_SLOTS_MAX, SETUP_SLOTS_MAX, SLOTS};
+use job::{HeartbeatAction, Machine};
+use protocol::message::{Configuration, HostGone};
+
+/// Share of a slot that a rounding of the period may feign.
+const ROUNDING: f64 = 1e-9;
+
+/// A time in slots of the period, rounded up.
+fn slots(time_us: f64, period_us: f64, most: u16) -> u16 {
+    let slots = (time_us * f64::from(SLOTS) / period_us - ROUNDING).ceil();
+    #[expect(
+        clippy::cast_possible_truncation,
+        clippy::cast_sign_loss,
+        reason = "clamped to the range"
+    )]
+    let slots = slots.clamp(0.0, f64::from(most)) as u16;
+    slots
+}
+
+/// The core's step configuration; `None` where the job leaves the board's own.
+pub(super) fn config(machine: &Machine) -> Option<StepConfig> {
+    let output = machine.step_output?;
+    let pulse_slots = slots(output.pulse_us, machine.period_us, PULSE_SLOTS_MAX.into()).max(1);
+    Some(StepConfig {
+        axes: std::array::from_fn(|axis| AxisSteps {
+            steps: output.steps_per_mm[axis].numerator,
+            mm: output.steps_per_mm[axis].denominator,
+            inverted: output.direction_inverted[axis],
+        }),
+        pulse_slots: u8::try_from(pulse_slots).unwrap_or(PULSE_SLOTS_MAX),
+        setup_slots: slots(output.direction_setup_us, machine.period_us, SETUP_SLOTS_MAX),
+    })
+}
+
+/// When a run may start on a board, and what a lost heartbeat does to it.
+#[must_use]
+pub fn configuration(machine: &Machine) -> Configuration {
+    #[expect(
+        clippy::cast_possible_truncation,
+        clippy::cast_sign_loss,
+        reason = "1 to 6e6 by the ranges of both"
+    )]
+    let host_gone_ticks = (machine.heartbeat_timeout_ms * 1e3 / machine.period_us).ceil() as u32;
+    Configuration {
+        homing_required: machine.homing_required,
+        host_gone: match machine.heartbeat_action {
+            HeartbeatAction::Finish => HostGone::Finish,
+            HeartbeatAction::Hold => HostGone::Hold,
+        },
+        host_gone_ticks,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_heartbeat_timeout_is_whole_periods_and_never_shorter() {
+        let machine = Machine {
+            period_us: 400.0,
+            homing_required: false,
+            heartbeat_action: HeartbeatAction::Hold,
+            heartbeat_timeout_ms: 500.1,
+            ..Machine::default()
+        };
+        let told = configuration(&machine);
+        assert_eq!((told.homing_required, told.host_gone), (false, HostGone::Hold));
+        assert_eq!(told.host_gone_ticks, 1251);
+        assert_eq!(configuration(&Machine::default()).host_gone_ticks, 1000);
+    }
+
+    /// The job file bounds times by the same shares of a period as the core.
+    #[test]
+    fn times_are_slots_and_never_shorter() {
+        for period_us in [10.0, 500.0, 1000.0, 100_000.0] {
+            let [pulse_us, setup_us] = job_file::slots_max_us(period_us);
+            assert_eq!(slots(pulse_us, period_us, u16::MAX), PULSE_SLOTS_MAX.into());
+            assert_eq!(slots(setup_us, period_us, u16::MAX), SETUP_SLOTS_MAX);
+        }
+        assert_eq!(slots(2.5, 1000.0, 24), 3);
+        assert_eq!(slots(2.5, 500.0, 24), 5);
+        assert_eq!(slots(0.0, 500.0, 24), 0);
+    }
+}

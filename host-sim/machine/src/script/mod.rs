@@ -1,0 +1,281 @@
+//! What an operator does in a run, period by period, as a text: the same on the machine in this process and behind a line.
+//!
+//! ```text
+//! # half speed, a pause, on
+//! tick 500: override 50
+//! tick 1200: hold
+//! tick 1500: resume
+//! tick 1500: override 100
+//! ```
+//!
+//! A line is `tick N: ACTION`, ACTION one of `hold`, `resume`, `stop`, `abort`, `start`, `override P` (percent, 0 to 200); `#` begins a
+//! comment. N counts periods from the one that begins the first run, which is 0 and has `start` by itself; it never falls. A period takes one
+//! request, and beside it one override. What the state does not allow is ignored, as on the machine.
+
+mod play;
+
+use std::path::Path;
+
+use interp_core::Request;
+
+use job::JobError;
+
+pub use play::{Played, play};
+
+/// Greatest feed override, percent.
+pub const OVERRIDE_MAX_PERCENT: u8 = 200;
+/// The programmed feed.
+pub const OVERRIDE_NORMAL_PERCENT: u8 = 100;
+/// What a line looks like.
+const FORM: &str = "write a line as `tick N: hold`, with hold, resume, stop, abort, start or `override P`";
+
+/// A request of the operator.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Action {
+    /// Stand on the path.
+    Hold,
+    /// Go on.
+    Resume,
+    /// Give the run up, and leave the surface.
+    Stop,
+    /// Give the run up where it stands.
+    Abort,
+    /// Begin the job, once more.
+    Start,
+}
+
+impl Action {
+    const ALL: [(&'static str, Self); 5] = [
+        ("hold", Self::Hold),
+        ("resume", Self::Resume),
+        ("stop", Self::Stop),
+        ("abort", Self::Abort),
+        ("start", Self::Start),
+    ];
+
+    /// The core's request; `None` where this core knows none.
+    #[must_use]
+    pub const fn request(self) -> Request {
+        match self {
+            Self::Hold => Request::Hold,
+            Self::Resume => Request::Resume,
+            Self::Abort => Request::Abort,
+            Self::Start => Request::Start,
+            Self::Stop => Request::Stop,
+        }
+    }
+}
+
+/// What the operator does in one period.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Inputs {
+    /// A request.
+    pub action: Option<Action>,
+    /// A new feed override, percent, which holds until the next.
+    pub override_percent: Option<u8>,
+}
+
+/// What the operator does, period by period, ascending.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct Script {
+    steps: Vec<(u32, Inputs)>,
+}
+
+impl Script {
+    /// Reads a script from a file.
+    ///
+    /// # Errors
+    /// The file cannot be read, or a line is no step, with the line and what to write.
+    pub fn load(path: &Path) -> Result<Self, JobError> {
+        let name = path.display().to_string();
+        let text = std::fs::read_to_string(path).map_err(|cause| {
+            JobError::of_file(
+                &name,
+                format!("cannot read the script: {cause}"),
+                "give the path of a text file",
+            )
+        })?;
+        Self::parse(&name, &text)
+    }
+
+    /// Reads a script from text; `name` stands for the file in errors.
+    ///
+    /// # Errors
+    /// As [`Script::load`].
+    pub fn parse(name: &str, text: &str) -> Result<Self, JobError> {
+        let mut script = Self::default();
+        let mut start = 0;
+        for whole in text.split_inclusive('\n') {
+            let line = whole.split('#').next().unwrap_or("");
+            let words = line.trim();
+            if !words.is_empty() {
+                let at = start + (line.len() - line.trim_start().len());
+                script
+                    .add(words)
+                    .map_err(|(what, remedy)| JobError::at(name, text, at..at + words.len(), what, remedy))?;
+            }
+            start += whole.len();
+        }
+        Ok(script)
+    }
+
+    /// The steps: period, and what is done in it; each period once.
+    #[must_use]
+    pub fn steps(&self) -> &[(u32, Inputs)] {
+        &self.steps
+    }
+
+    /// What is done in a period.
+    #[must_use]
+    pub fn at(&self, period: u32) -> Inputs {
+        self.steps
+            .binary_search_by_key(&period, |step| step.0)
+            .map_or_else(|_| Inputs::default(), |place| self.steps[place].1)
+    }
+
+    /// Whether it asks for another feed than the programmed one.
+    #[must_use]
+    pub fn overrides(&self) -> bool {
+        let other = |(_, inputs): &(u32, Inputs)| {
+            inputs
+                .override_percent
+                .is_some_and(|percent| percent != OVERRIDE_NORMAL_PERCENT)
+        };
+        self.steps.iter().any(other)
+    }
+
+    fn add(&mut self, line: &str) -> Result<(), (String, String)> {
+        let wrong = |what: String| (what, FORM.to_owned());
+        let (tick, action) = line
+            .split_once(':')
+            .ok_or_else(|| wrong(format!("`{line}` has no colon")))?;
+        let number = tick
+            .trim()
+            .strip_prefix("tick")
+            .filter(|rest| rest.starts_with(char::is_whitespace))
+            .ok_or_else(|| wrong(format!("`{}` is no tick", tick.trim())))?
+            .trim();
+        let period: u32 = number
+            .parse()
+            .map_err(|_| wrong(format!("`{number}` is no number of a tick, 0 to {}", u32::MAX)))?;
+        let inputs = read_action(action.trim())?;
+        if period == 0 && inputs.action.is_some_and(|action| action != Action::Start) {
+            return Err((
+                format!(
+                    "tick 0 begins the run, which leaves no room for `{}`",
+                    action.trim()
+                ),
+                "put it at tick 1, or later".to_owned(),
+            ));
+        }
+        let last = self.steps.last_mut().filter(|last| last.0 >= period);
+        let Some((before, known)) = last else {
+            self.steps.push((period, inputs));
+            return Ok(());
+        };
+        if *before > period {
+            return Err((
+                format!("tick {period} comes after tick {before}"),
+                "put the lines in the order of their ticks".to_owned(),
+            ));
+        }
+        let twice = (known.action.is_some() && inputs.action.is_some())
+            || (known.override_percent.is_some() && inputs.override_percent.is_some());
+        if twice {
+            return Err((
+                format!("tick {period} has one of these already"),
+                "a tick takes one request and one override: put this one at the next tick".to_owned(),
+            ));
+        }
+        known.action = known.action.or(inputs.action);
+        known.override_percent = known.override_percent.or(inputs.override_percent);
+        Ok(())
+    }
+}
+
+fn read_action(text: &str) -> Result<Inputs, (String, String)> {
+    let mut words = text.split_whitespace();
+    let (name, value, more) = (words.next().unwrap_or(""), words.next(), words.next());
+    if name == "override" {
+        let percent = value
+            .filter(|_| more.is_none())
+            .and_then(|value| value.trim_end_matches('%').parse().ok())
+            .filter(|percent| *percent <= OVERRIDE_MAX_PERCENT);
+        return match percent {
+            Some(percent) => Ok(Inputs {
+                action: None,
+                override_percent: Some(percent),
+            }),
+            None => Err((
+                format!("`{text}` is no feed override"),
+                format!("write `override P` with P from 0 to {OVERRIDE_MAX_PERCENT} percent"),
+            )),
+        };
+    }
+    let action = Action::ALL
+        .iter()
+        .find(|(known, _)| *known == name && value.is_none());
+    action.map_or_else(
+        || Err((format!("`{text}` is nothing an operator can do"), FORM.to_owned())),
+        |(_, action)| {
+            Ok(Inputs {
+                action: Some(*action),
+                override_percent: None,
+            })
+        },
+    )
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn lines_become_steps() {
+        let text = "# an operator\ntick 0: override 50\r\n\n  tick 12 : hold   # a pause\ntick 40: resume\ntick 40: override 150%\ntick 99:abort\ntick 120: start\n";
+        let script = Script::parse("s", text).unwrap();
+        let inputs = |action, override_percent| Inputs {
+            action,
+            override_percent,
+        };
+        assert_eq!(
+            script.steps(),
+            [
+                (0, inputs(None, Some(50))),
+                (12, inputs(Some(Action::Hold), None)),
+                (40, inputs(Some(Action::Resume), Some(150))),
+                (99, inputs(Some(Action::Abort), None)),
+                (120, inputs(Some(Action::Start), None)),
+            ]
+        );
+        assert_eq!(script.at(40).override_percent, Some(150));
+        assert_eq!(script.at(41), Inputs::default());
+        assert_eq!(Script::parse("s", "\n# nothing\n").unwrap(), Script::default());
+    }
+
+    #[test]
+    fn mistakes_are_told_with_their_line() {
+        for (text, line, what) in [
+            ("tick 5: hold\ntick 4: resume\n", 2, "tick 4 comes after tick 5"),
+            (
+                "tick 5: hold\n\ntick 5: resume\n",
+                3,
+                "tick 5 has one of these already",
+            ),
+            ("tick 5 hold\n", 1, "`tick 5 hold` has no colon"),
+            ("# a\ntock 5: hold\n", 2, "`tock 5` is no tick"),
+            ("tick5: hold\n", 1, "`tick5` is no tick"),
+            ("tick -5: hold\n", 1, "`-5` is no number"),
+            ("tick 5: pause\n", 1, "`pause` is nothing an operator can do"),
+            ("tick 5: hold on\n", 1, "`hold on` is nothing"),
+            ("tick 5: override\n", 1, "`override` is no feed override"),
+            ("tick 0: hold\n", 1, "tick 0 begins the run"),
+            ("tick 5: override 201\n", 1, "`override 201` is no feed override"),
+        ] {
+            let error = Script::parse("s", text).unwrap_err();
+            assert!(error.what().starts_with(what), "{text}: {}", error.what());
+            assert_eq!(error.line_and_column().unwrap().0, line, "{text}");
+            assert!(!error.remedy().is_empty());
+        }
+    }
+}

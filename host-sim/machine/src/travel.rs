@@ -1,0 +1,153 @@
+//! Soft limits before anything moves: does every centre of the job lie within the travel of the axes?
+//!
+//! The surface's box, widened by the ball's radius, holds every centre: where that fits, all is well. Otherwise the passes are run here,
+//! at constant feed, and the centres themselves are looked at.
+
+use interp_core::Sample;
+
+use crate::Machine;
+use crate::prepare::{Prepared, prepare};
+use job::{AXES, Job, JobError, Machine as MachineSpec};
+use patches::placement::extent_mm;
+
+const MM_PER_NM: f64 = 1e-6;
+/// Key of the job that an error points at.
+const KEY: &str = "machine.travel_mm";
+
+/// The farthest sample one way along an axis.
+#[derive(Clone, Copy)]
+struct Far {
+    mm: f64,
+    sample: Sample,
+}
+
+/// Checks a job whose direction is settled.
+///
+/// # Errors
+/// Where the centres leave the travel, how far and where, and what brings them in; what the machine says against the job. Samples behind a
+/// fault are not looked at: the run would not get there either.
+pub fn check(job: &Job) -> Result<(), JobError> {
+    let Some(travel) = job.machine.travel_mm else {
+        return Ok(());
+    };
+    let fits = extent_mm(&job.surface)
+        .iter()
+        .zip(travel)
+        .all(|(reach, ends)| reach[0] - job.radius_mm >= ends[0] && reach[1] + job.radius_mm <= ends[1]);
+    if fits {
+        return Ok(());
+    }
+    // The passes lie where they lie whatever the axes can do.
+    let mut bare = job.clone();
+    bare.machine = MachineSpec {
+        period_us: job.machine.period_us,
+        ..MachineSpec::default()
+    };
+    let prepared = prepare(&bare)?;
+    let Some(farthest) = farthest(&prepared) else {
+        return Ok(());
+    };
+    let (mut what, mut remedies) = (Vec::new(), Vec::new());
+    for axis in 0..3 {
+        let ([least, most], [low, high]) = (farthest[axis], travel[axis]);
+        for (far, beyond) in [(least, low - least.mm), (most, most.mm - high)] {
+            if beyond > 0.0 {
+                let [u, v] = prepared.parameters(far.sample.path, far.sample.side);
+                what.push(format!(
+                    "{} comes to {:.3} mm on pass {}, u = {u:.6}, v = {v:.6}: {beyond:.3} mm beyond its travel of {low} to {high} mm",
+                    AXES[axis], far.mm, far.sample.pass
+                ));
+                remedies.push(remedy(axis, [least.mm, most.mm], [low, high]));
+            }
+        }
+    }
+    if what.is_empty() {
+        return Ok(());
+    }
+    remedies.dedup();
+    Err(job.origin.error(
+        KEY,
+        format!("the tool centre leaves the travel: {}", what.join("; ")),
+        remedies.join("; "),
+    ))
+}
+
+/// What brings an axis into its travel.
+fn remedy(axis: usize, [least, most]: [f64; 2], [low, high]: [f64; 2]) -> String {
+    let name = AXES[axis];
+    if most - least > high - low {
+        return format!(
+            "the job takes {:.3} mm along {name}, more than its travel: turn or scale it in [placement]",
+            most - least
+        );
+    }
+    format!(
+        "move the part along {name} by {:.3} to {:.3} mm: add that to translate_mm in [placement]",
+        low - least,
+        high - most
+    )
+}
+
+/// Samples with the least and the greatest centre of each axis; `None` where there are none.
+fn farthest(prepared: &Prepared) -> Option<[[Far; 2]; 3]> {
+    let mut machine = Machine::load(prepared).ok()?;
+    let mut farthest: Option<[[Far; 2]; 3]> = None;
+    // A fault ends what there is to look at.
+    let _fault = machine.run(|sample| {
+        let at = |axis: usize| Far {
+            mm: f64::from(sample.cl_nm[axis]) * MM_PER_NM,
+            sample: *sample,
+        };
+        let ends = farthest.get_or_insert_with(|| std::array::from_fn(|axis| [at(axis); 2]));
+        for (axis, [least, most]) in ends.iter_mut().enumerate() {
+            let here = f64::from(sample.cl_nm[axis]) * MM_PER_NM;
+            if here < least.mm {
+                *least = at(axis);
+            }
+            if here > most.mm {
+                *most = at(axis);
+            }
+        }
+        true
+    });
+    farthest
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const TORUS: &str = include_str!("../../../jobs/torus.toml");
+
+    fn said(travel: &str) -> Result<(), (String, String)> {
+        let text = format!("{TORUS}\n[machine]\ntravel_mm = {travel}\n");
+        let job = job_file::parse("job.toml", &text).unwrap();
+        check(&job).map_err(|error| {
+            let lines = text.lines().count();
+            assert_eq!(error.line_and_column().unwrap().0, lines);
+            (error.what().to_owned(), error.remedy().to_owned())
+        })
+    }
+
+    /// Centres of the torus: x and y 0 to 42.598, z -2.997 to -1.500; its surface 5 mm below.
+    #[test]
+    fn a_job_that_leaves_the_travel_is_refused_with_place_and_remedy() {
+        // Held by the box alone, then by the samples alone.
+        assert_eq!(said("[[-50, 50], [-50, 60], [-20, 20]]"), Ok(()));
+        assert_eq!(said("[[-0.001, 43], [-0.001, 43], [-3, -1.499]]"), Ok(()));
+        let (what, remedy) = said("[[0, 43], [-1, 43], [-10, -2]]").unwrap_err();
+        assert!(what.contains("z comes to -1.500 mm on pass"), "{what}");
+        assert!(
+            what.contains("0.500 mm beyond its travel of -10 to -2 mm"),
+            "{what}"
+        );
+        assert!(!what.contains("x comes"), "{what}");
+        assert!(remedy.contains("along z by -7.003 to -0.500 mm"), "{remedy}");
+        let (what, remedy) = said("[[1, 40], [-1, 43], [-10, 2]]").unwrap_err();
+        assert_eq!(what.matches("x comes to").count(), 2);
+        assert!(
+            remedy.starts_with("the job takes 42.598 mm along x, more than") && !remedy.contains(';'),
+            "{remedy}"
+        );
+    }
+}

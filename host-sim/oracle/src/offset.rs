@@ -1,0 +1,140 @@
+//! The tool centre's path over a pass: its derivative (Lo eqn 4 in its general form), and the contact that belongs to a
+//! commanded centre.
+
+use super::contact::{Contact, Oracle, OracleError};
+use super::surface::Derivatives;
+use super::vector::{Vector, add, cross, dot, length, scale, subtract};
+use job::Along;
+
+/// Step into the surface, as a share of the range, that derivatives at a pole are taken at.
+const INWARDS: f64 = 1e-6;
+/// Distance from a break, as a share of the range, at which its two sides are compared: a ratio that is continuous
+/// changes by less than 1e-9 of itself between them.
+const BESIDE: f64 = 1e-10;
+/// Iterations of [`Oracle::foot`]. Each leaves (distance from the path) x (its curvature) of the error, 1e-3 at most for
+/// what any approach here commands; six bring a hundredth of a millimetre to the rounding.
+const FOOT_STEPS: usize = 6;
+/// A correction below this share of the range ends them: what it leaves is a thousandth of it.
+const FOOT_ENOUGH: f64 = 1e-11;
+
+/// A place on a pass with the tool centre's motion there.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Offset {
+    /// Path parameter.
+    pub path: f64,
+    /// The contact.
+    pub contact: Contact,
+    /// dCL / d(path parameter), mm per unit.
+    pub cl_velocity: [f64; 3],
+}
+
+impl Offset {
+    /// Speed of the centre for a unit speed of the contact: `|A + r N_u| / |A|`; 1 on a pass that is one point.
+    #[must_use]
+    pub fn ratio(&self) -> f64 {
+        if self.contact.path_speed > 0.0 {
+            length(self.cl_velocity) / self.contact.path_speed
+        } else {
+            1.0
+        }
+    }
+}
+
+impl Oracle {
+    /// Contact and motion of the tool centre at a place of a pass.
+    ///
+    /// # Errors
+    /// [`OracleError::Degenerate`] where there is no normal.
+    pub fn offset(&self, path: f64, side: f64) -> Result<Offset, OracleError> {
+        let (u, v) = self.swapped(path, side);
+        let at = self.surface.at(u, v);
+        let contact = self.contact_of(&at, u, v)?;
+        let cl_velocity = match self.cl_velocity(&at, contact.normal) {
+            Some(velocity) => velocity,
+            None => self.velocity_beside(path, side).unwrap_or_default(),
+        };
+        Ok(Offset {
+            path,
+            contact,
+            cl_velocity,
+        })
+    }
+
+    /// `A + r N_A` by the Weingarten equations; `None` where the tangent plane is not spanned.
+    fn cl_velocity(&self, at: &Derivatives, normal: Vector) -> Option<Vector> {
+        let (a, b, aa) = match self.along {
+            Along::U => (at.u, at.v, at.uu),
+            Along::V => (at.v, at.u, at.vv),
+        };
+        let (e, f, g) = (dot(a, a), dot(a, b), dot(b, b));
+        let product = cross(a, b);
+        let determinant = dot(product, product);
+        if determinant.is_nan() || determinant <= 1e-18 * e * g {
+            return None;
+        }
+        let (l, m) = (dot(aa, normal), dot(at.uv, normal));
+        let turned = add(scale(a, g * l - f * m), scale(b, e * m - f * l));
+        Some(add(a, scale(turned, -self.radius_mm / determinant)))
+    }
+
+    /// The velocity a little way into the surface from a pole.
+    fn velocity_beside(&self, path: f64, side: f64) -> Option<Vector> {
+        let inwards = |t: f64, [low, high]: [f64; 2]| {
+            let step = INWARDS * (high - low);
+            if t - low <= high - t { t + step } else { t - step }
+        };
+        for (path, side) in [
+            (inwards(path, self.path_range()), side),
+            (path, inwards(side, self.side_range())),
+        ] {
+            let (u, v) = self.swapped(path, side);
+            let velocity = self
+                .contact(u, v)
+                .ok()
+                .and_then(|contact| self.cl_velocity(&self.surface.at(u, v), contact.normal));
+            if velocity.is_some() {
+                return velocity;
+            }
+        }
+        None
+    }
+
+    /// Largest step of the centre's speed, for a unit speed of the contact, where the surface's patches meet on a pass:
+    /// 0, but for rounding, where they meet with equal curvature.
+    ///
+    /// # Errors
+    /// As [`Oracle::offset`].
+    pub fn ratio_step(&self, side: f64) -> Result<f64, OracleError> {
+        let breaks = self.surface.breaks(self.along);
+        let mut most = 0.0_f64;
+        for at in &breaks[1..breaks.len() - 1] {
+            let beside = |by: f64| self.offset(at + by * (breaks[breaks.len() - 1] - breaks[0]), side);
+            most = most.max((beside(BESIDE)?.ratio() - beside(-BESIDE)?.ratio()).abs());
+        }
+        Ok(most)
+    }
+
+    /// Path parameter at which the offset path comes nearest to a centre that was commanded near it; `guess`: a
+    /// parameter not far off.
+    ///
+    /// # Errors
+    /// As [`Oracle::offset`].
+    pub fn foot(&self, cl_mm: [f64; 3], guess: f64, side: f64) -> Result<Offset, OracleError> {
+        let [low, high] = self.path_range();
+        let mut at = self.offset(guess.clamp(low, high), side)?;
+        for _ in 0..FOOT_STEPS {
+            let squared = dot(at.cl_velocity, at.cl_velocity);
+            if squared <= 0.0 {
+                break;
+            }
+            let by = dot(subtract(cl_mm, at.contact.cl_mm), at.cl_velocity) / squared;
+            let next = (at.path + by).clamp(low, high);
+            let moved = (next - at.path).abs();
+            at = self.offset(next, side)?;
+            if moved <= FOOT_ENOUGH * (high - low) {
+                break;
+            }
+        }
+        Ok(at)
+    }
+}

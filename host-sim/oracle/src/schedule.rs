@@ -1,0 +1,216 @@
+//! The passes of a job, found without running it: the least interval of each pass by a dense scan.
+//!
+//! The paper's interval is of the pass itself (first order). How far the next pass may really lie depends on the gap: there the
+//! density 1/interval^2 is scanned on two more lines, with the exact heights of round balls, and at the ends of skew passes with those of the
+//! crest beyond the end. The rule is the core's (`interp-core`, `across.rs`), the geometry is this oracle's; that the heights then hold
+//! is measured from the swept ball.
+
+use super::contact::{Oracle, OracleError};
+use super::vector::dot;
+use job::{Along, Spacing};
+
+/// Places a span that are scanned for the least interval, and at least so many a pass.
+const SCAN_PER_SPAN: usize = 64;
+const SCAN_MIN: usize = 512;
+/// Golden-section steps: each shortens the bracket to 0.618, so 48 bring it to 1e-10 of itself, where the interval,
+/// flat at its least, is exact.
+const GOLDEN_STEPS: usize = 48;
+/// Minima of the scan that are refined: those within this share of the least one.
+const REFINE_SHARE: f64 = 1e-2;
+/// A pass that ends closer than this share of its interval to the boundary lies on it.
+const BOUNDARY_SHARE: f64 = 1e-9;
+/// Shortest and longest step of a pass over its first order's; the core's.
+const STEP_RANGE: [f64; 2] = [0.25, 1.25];
+/// Newton steps to the root of a cubic: more than it takes.
+const NEWTON_STEPS: u8 = 12;
+/// Passes after which a schedule is given up.
+const PASSES_MAX: usize = 1_000_000;
+
+/// A pass: where it lies, and how far the next one may be.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Pass {
+    /// Side parameter.
+    pub side: f64,
+    /// How far the next pass may be, in the side parameter; for passes spaced by the first order the least interval on the pass.
+    pub interval: f64,
+}
+
+impl Oracle {
+    /// All passes from one boundary of the side parameter to the other (steps 5 and 6).
+    ///
+    /// # Errors
+    /// [`OracleError::BallDoesNotFit`] and [`OracleError::Degenerate`] at the first such place,
+    /// [`OracleError::TooManyPasses`] if the intervals shrink towards nothing.
+    pub fn schedule(&self) -> Result<Vec<Pass>, OracleError> {
+        let [start, end] = self.side_range();
+        let mut passes = Vec::new();
+        let mut side = start;
+        while passes.len() < PASSES_MAX {
+            let before = passes.last().map(|pass: &Pass| pass.interval);
+            let interval = match self.spacing {
+                Spacing::FirstOrder => self.least_interval(side)?,
+                Spacing::Exact => self.exact_interval(side, before)?,
+            };
+            passes.push(Pass { side, interval });
+            if side >= end {
+                return Ok(passes);
+            }
+            let next = side + interval;
+            if next <= side {
+                return Err(OracleError::TooManyPasses);
+            }
+            side = if end - next <= BOUNDARY_SHARE * interval {
+                end
+            } else {
+                next
+            };
+        }
+        Err(OracleError::TooManyPasses)
+    }
+
+    /// How far the pass after the one at `side` may be; `before`: how far this one is from the one before.
+    ///
+    /// # Errors
+    /// As [`Oracle::schedule`].
+    pub fn exact_interval(&self, side: f64, before: Option<f64>) -> Result<f64, OracleError> {
+        let [_, end] = self.side_range();
+        let here = self.greatest_density(side)?;
+        if here <= 0.0 {
+            return Ok(f64::INFINITY);
+        }
+        let first = 1.0 / here.sqrt();
+        let distance = before.unwrap_or(first);
+        let beside = |share: f64| {
+            let line = side + share * distance;
+            (line < end).then(|| self.greatest_density(line)).transpose()
+        };
+        let mean = match (beside(0.5)?, beside(1.0)?) {
+            (Some(half), Some(whole)) => {
+                let parabola = (here + 4.0 * half + whole) / 6.0;
+                let lines = (here + 2.0 * half + whole) / 4.0;
+                parabola.max(lines)
+            }
+            (Some(half), None) => half.max(here),
+            _ => here,
+        };
+        // x^2 (1 + rise x) = 1, in units of the first order's step.
+        let rise = (mean / here - 1.0) * first / distance;
+        let mut step = 1.0_f64;
+        for _ in 0..NEWTON_STEPS {
+            let slope = step * (2.0 + 3.0 * rise * step);
+            let next = step - (step * step * (1.0 + rise * step) - 1.0) / slope.max(0.5);
+            step = next.clamp(STEP_RANGE[0], STEP_RANGE[1]);
+        }
+        Ok(step * first)
+    }
+
+    /// Greatest exact density on the line at `side`, the skew ends among them.
+    fn greatest_density(&self, side: f64) -> Result<f64, OracleError> {
+        let places = self.scan_places();
+        let mut most = 0.0_f64;
+        for (index, place) in places.iter().enumerate() {
+            let is_end = index == 0 || index + 1 == places.len();
+            most = most.max(self.exact_density(*place, side, is_end)?);
+        }
+        Ok(most)
+    }
+
+    /// 1/interval^2 at a place, to all orders of h/r on a surface of constant curvature.
+    fn exact_density(&self, path: f64, side: f64, is_end: bool) -> Result<f64, OracleError> {
+        self.interval_at(path, side)?;
+        let (u, v) = self.swapped(path, side);
+        let contact = self.contact(u, v)?;
+        let room = 1.0 - self.radius_mm * contact.curvature_side;
+        let across = contact.lateral_speed * contact.lateral_speed * room;
+        let height = self.scallop_mm / self.radius_mm;
+        let exact = (1.0 + height * (room - 1.0)) / (1.0 - 0.5 * height);
+        let density = across * exact / (8.0 * self.radius_mm * self.scallop_mm);
+        if !is_end {
+            return Ok(density);
+        }
+        // The last ball of a skew pass is as far away as the side line leads: on it the height rises with |B|^2 (1 + r c_B).
+        let at = self.surface.at(u, v);
+        let (b, bb) = match self.along {
+            Along::U => (at.v, at.vv),
+            Along::V => (at.u, at.uu),
+        };
+        let outwards = dot(b, b) - self.radius_mm * dot(bb, contact.normal);
+        let part = across / outwards;
+        if part > 0.0 && part < 1.0 {
+            Ok(density * 4.0 / (1.0 + part.sqrt()).powi(2))
+        } else {
+            Ok(density)
+        }
+    }
+
+    /// Least interval of the pass at `side`; infinite if the pass has none.
+    ///
+    /// # Errors
+    /// As [`Oracle::schedule`].
+    pub fn least_interval(&self, side: f64) -> Result<f64, OracleError> {
+        let places = self.scan_places();
+        let mut intervals = Vec::with_capacity(places.len());
+        for place in &places {
+            intervals.push(self.interval_at(*place, side)?);
+        }
+        let least = intervals.iter().copied().fold(f64::INFINITY, f64::min);
+        let mut refined = least;
+        for (index, interval) in intervals.iter().enumerate() {
+            let (before, after) = (index.saturating_sub(1), (index + 1).min(places.len() - 1));
+            let is_low = *interval <= intervals[before] && *interval <= intervals[after];
+            if is_low && *interval <= least * (1.0 + REFINE_SHARE) {
+                refined = refined.min(self.refine(places[before], places[after], side)?);
+            }
+        }
+        Ok(refined)
+    }
+
+    /// Path parameters of the scan, ends and knots included.
+    fn scan_places(&self) -> Vec<f64> {
+        let breaks = self.surface.breaks(self.along);
+        let spans = breaks.len() - 1;
+        let steps = SCAN_PER_SPAN.max(SCAN_MIN.div_ceil(spans));
+        let inside = |pair: &[f64]| {
+            let (low, high) = (pair[0], pair[1]);
+            (0..steps)
+                .map(move |k| low + (high - low) * (k as f64) / (steps as f64))
+                .collect::<Vec<_>>()
+        };
+        breaks
+            .windows(2)
+            .flat_map(inside)
+            .chain(breaks.last().copied())
+            .collect()
+    }
+
+    /// Least interval in a bracket by golden section.
+    fn refine(&self, low: f64, high: f64, side: f64) -> Result<f64, OracleError> {
+        let share = 0.5 * (5.0_f64.sqrt() - 1.0);
+        let (mut low, mut high) = (low, high);
+        let (mut left, mut right) = (high - share * (high - low), low + share * (high - low));
+        let (mut at_left, mut at_right) = (self.interval_at(left, side)?, self.interval_at(right, side)?);
+        for _ in 0..GOLDEN_STEPS {
+            if at_left <= at_right {
+                (high, right, at_right) = (right, left, at_left);
+                left = high - share * (high - low);
+                at_left = self.interval_at(left, side)?;
+            } else {
+                (low, left, at_left) = (left, right, at_right);
+                right = low + share * (high - low);
+                at_right = self.interval_at(right, side)?;
+            }
+        }
+        Ok(at_left.min(at_right))
+    }
+
+    /// The interval at a place where the ball must fit.
+    fn interval_at(&self, path: f64, side: f64) -> Result<f64, OracleError> {
+        let (u, v) = self.swapped(path, side);
+        let contact = self.contact(u, v)?;
+        let fit = contact.fit(self.radius_mm);
+        if fit >= 1.0 {
+            return Err(OracleError::BallDoesNotFit { u, v, fit });
+        }
+        Ok(contact.interval)
+    }
+}

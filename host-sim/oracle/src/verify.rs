@@ -1,0 +1,249 @@
+//! Checks emitted samples one by one, in the order of their ticks. Nothing is allocated per sample.
+
+use super::contact::Oracle;
+use super::report::{Report, Spot};
+use super::vector::{angle, length, scale, subtract};
+use job::{Pattern, Spacing};
+
+/// Nanometres in a millimetre.
+const NM_PER_MM: f64 = 1e6;
+
+/// A sample on a pass as a machine emitted it, in plain numbers.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Emitted {
+    /// Tick, from 0.
+    pub tick: u64,
+    /// Pass, from 0.
+    pub pass: u32,
+    /// Parameter u.
+    pub u: f64,
+    /// Parameter v.
+    pub v: f64,
+    /// Cutter contact, nm.
+    pub cc_nm: [i32; 3],
+    /// Cutter location, nm.
+    pub cl_nm: [i32; 3],
+    /// Commanded feed along the surface in the period before this sample, mm/s; 0 where none is meant to be checked.
+    pub feed_mm_s: f64,
+    /// Candidate of the path interval, in the side parameter; infinite where it sets no limit.
+    pub interval: f64,
+    /// First sample of its pass.
+    pub first_of_pass: bool,
+    /// Last sample of its pass.
+    pub last_of_pass: bool,
+}
+
+/// What the check of one sample found.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Checked {
+    /// Length of the contact's path since the sample before, mm, if that is of the same pass.
+    pub arc_mm: Option<f64>,
+    /// 100 (arc / (f T) - 1), %, where the step is held against the feed: not the first and the last of a pass.
+    pub ripple_pct: Option<f64>,
+    /// |CL emitted - CL|, nm, where the surface has a normal.
+    pub position_nm: Option<f64>,
+}
+
+/// Gathers a [`Report`] from a stream of samples.
+#[derive(Clone, Debug)]
+pub struct Verifier {
+    oracle: Oracle,
+    breaks: Vec<f64>,
+    report: Report,
+    current: Option<PassState>,
+}
+
+/// What is remembered of the pass under way.
+#[derive(Clone, Copy, Debug)]
+struct PassState {
+    side: f64,
+    /// Path parameter of the last sample.
+    path: f64,
+    least_interval: f64,
+    least_at: Spot,
+    /// Sum over samples of (1 / interval)^2, and their number: the scallop's mean once the next pass is known.
+    inverse_squares: f64,
+    samples: u64,
+    finished: bool,
+}
+
+impl Verifier {
+    /// A verifier of a job's samples.
+    #[must_use]
+    pub fn new(oracle: &Oracle) -> Self {
+        let report = Report {
+            normal_floor_rad: 3.0_f64.sqrt() / (oracle.radius_mm * NM_PER_MM),
+            ..Report::default()
+        };
+        Self {
+            breaks: oracle.surface.breaks(oracle.along),
+            oracle: oracle.clone(),
+            report,
+            current: None,
+        }
+    }
+
+    /// Checks the next sample, and returns what the check found.
+    pub fn add(&mut self, sample: &Emitted) -> Checked {
+        let spot = Spot {
+            tick: sample.tick,
+            pass: sample.pass,
+            u: sample.u,
+            v: sample.v,
+        };
+        let (path, side) = self.oracle.swapped(sample.u, sample.v);
+        self.report.samples += 1;
+        let (arc_mm, ripple_pct) = if sample.first_of_pass {
+            self.begin_pass(sample, path, side, spot);
+            (None, None)
+        } else {
+            self.check_step(sample, path, side, spot)
+        };
+        let position_nm = self.check_geometry(sample, spot);
+        if sample.last_of_pass {
+            if path != self.pass_ends(sample.pass)[1] {
+                self.report.off_boundary += 1;
+            }
+            if let Some(pass) = &mut self.current {
+                pass.finished = true;
+            }
+        }
+        Checked {
+            arc_mm: arc_mm.map(f64::abs),
+            ripple_pct,
+            position_nm,
+        }
+    }
+
+    /// The report, after the last sample.
+    #[must_use]
+    pub fn finish(mut self) -> Report {
+        if let Some(pass) = self.current {
+            self.report.complete = pass.finished;
+            self.report.last_on_boundary = pass.side == self.oracle.side_range()[1];
+        }
+        self.report
+    }
+
+    /// Path parameters where a pass starts and ends.
+    fn pass_ends(&self, pass: u32) -> [f64; 2] {
+        let [low, high] = self.oracle.path_range();
+        let backwards = self.oracle.pattern == Pattern::Zigzag && pass % 2 == 1;
+        if backwards { [high, low] } else { [low, high] }
+    }
+
+    /// A new pass: is it where the last one's least interval puts it?
+    fn begin_pass(&mut self, sample: &Emitted, path: f64, side: f64, spot: Spot) {
+        let [first, last] = self.oracle.side_range();
+        match self.current {
+            None => self.report.first_on_boundary = side == first && sample.pass == 0,
+            Some(before) => {
+                let interval = before.least_interval.min(last - before.side);
+                if self.oracle.spacing == Spacing::FirstOrder {
+                    self.report
+                        .side_step
+                        .add((side - (before.side + interval)) / interval, spot);
+                }
+                self.close_scallop(&before, side - before.side);
+                if !before.finished || sample.pass != self.report.passes {
+                    self.report.off_boundary += 1;
+                }
+            }
+        }
+        if path != self.pass_ends(sample.pass)[0] {
+            self.report.off_boundary += 1;
+        }
+        self.report.passes += 1;
+        self.current = Some(PassState {
+            side,
+            path,
+            least_interval: f64::INFINITY,
+            least_at: spot,
+            inverse_squares: 0.0,
+            samples: 0,
+            finished: false,
+        });
+    }
+
+    /// The scallop that the gap to the next pass leaves: its largest height where the interval was least.
+    fn close_scallop(&mut self, pass: &PassState, gap: f64) {
+        let height = |inverse_square: f64| self.oracle.scallop_mm * gap * gap * inverse_square;
+        let most = height(1.0 / (pass.least_interval * pass.least_interval));
+        self.report.scallop_sum_mm += height(pass.inverse_squares);
+        self.report.scallop_mm.add(most, pass.least_at);
+        self.report.scallop_samples += pass.samples;
+    }
+
+    /// Arc of the step to this sample, mm, and what it is off the feed, %.
+    fn check_step(
+        &mut self,
+        sample: &Emitted,
+        path: f64,
+        side: f64,
+        spot: Spot,
+    ) -> (Option<f64>, Option<f64>) {
+        let Some(pass) = &mut self.current else {
+            self.report.astray += 1;
+            return (None, None);
+        };
+        let forwards = if self.oracle.pattern == Pattern::Zigzag && sample.pass % 2 == 1 {
+            -1.0
+        } else {
+            1.0
+        };
+        let from = pass.path;
+        pass.path = path;
+        if side != pass.side || (path - from) * forwards < 0.0 || pass.finished {
+            self.report.astray += 1;
+        }
+        let arc = forwards * self.oracle.arc_between(&self.breaks, from, path, side);
+        self.report.cc_length_mm += arc;
+        let wanted = sample.feed_mm_s * self.oracle.period_s;
+        if sample.last_of_pass {
+            self.report
+                .last_step
+                .add(if wanted > 0.0 { arc / wanted } else { 0.0 }, spot);
+            return (Some(arc), None);
+        }
+        // Where the feed is lower than the programmed one, that is what the step is held against.
+        let whole = wanted.max(self.oracle.feed_mm_s * self.oracle.period_s);
+        let ripple_pct = (wanted > 0.0).then(|| 100.0 * (arc - wanted) / whole);
+        if let Some(ripple_pct) = ripple_pct {
+            self.report.ripple_pct.add(ripple_pct, spot);
+        }
+        (Some(arc), ripple_pct)
+    }
+
+    /// Positions, normal, curvature and interval of one sample; returns the centre's error, nm.
+    fn check_geometry(&mut self, sample: &Emitted, spot: Spot) -> Option<f64> {
+        let Ok(contact) = self.oracle.contact(sample.u, sample.v) else {
+            self.report.degenerate += 1;
+            return None;
+        };
+        let [cc_nm, cl_nm] = [sample.cc_nm, sample.cl_nm].map(|nm| nm.map(f64::from));
+        let report = &mut self.report;
+        let position_nm = length(subtract(cl_nm, scale(contact.cl_mm, NM_PER_MM)));
+        report.position_nm.add(position_nm, spot);
+        report
+            .contact_nm
+            .add(length(subtract(cc_nm, scale(contact.cc_mm, NM_PER_MM))), spot);
+        report
+            .normal_rad
+            .add(angle(subtract(cl_nm, cc_nm), contact.normal), spot);
+        report.fit.add(contact.fit(self.oracle.radius_mm).max(0.0), spot);
+        let [first, last] = self.oracle.side_range();
+        let interval = contact.interval;
+        if sample.interval < last - first || interval < last - first {
+            report.interval.add(sample.interval / interval - 1.0, spot);
+        }
+        if let Some(pass) = &mut self.current {
+            pass.inverse_squares += 1.0 / (interval * interval);
+            pass.samples += 1;
+            if interval < pass.least_interval {
+                pass.least_interval = interval;
+                pass.least_at = spot;
+            }
+        }
+        Some(position_nm)
+    }
+}

@@ -1,0 +1,13 @@
+//! A surface as exact bicubic pieces, the box around it, and where it lies on the machine.
+#![cfg_attr(
+    test,
+    allow(
+        clippy::unwrap_used,
+        clippy::cast_precision_loss,
+        clippy::cast_possible_truncation,
+        reason = "tests convert freely"
+    )
+)]
+
+pub mod pieces;
+pub mod placement;

@@ -1,0 +1,267 @@
+//! Where the surface lies on the machine: scaled, turned and moved, before anything else sees it.
+//!
+//! ```text
+//! [placement] ─job_file/placement.rs─► Placement ─place─► SurfaceSpec of the placed surface ─► oracle, preparation
+//!                                                  extent.rs  its box, for `place` and the machine's range
+//!                                                  arcs.rs    a turned profile as a rational B-spline
+//! ```
+//!
+//! A placement is a similarity: `p -> scale R p + t` with a proper rotation R, so lengths all change by one factor, and the sign
+//! of `S_u x S_v` keeps its side. Polynomial and spline surfaces are placed by their coefficients and poles, exactly up to the
+//! rounding of f64. A surface of revolution stays one as long as its axis stays the z axis, upwards.
+
+mod arcs;
+mod extent;
+mod rotation;
+
+use std::fmt;
+
+use job::{AXES, NurbsSpec, SurfaceSpec};
+
+pub use extent::{EXTENT_TOLERANCE_MM, extent_mm};
+pub use rotation::Rotation;
+
+/// Positions that the machine can hold, mm either way: nanometres in an i32.
+pub const POSITION_MAX_MM: f64 = 2_147.483_647;
+/// Names of the axes, in order.
+
+/// The point of the scaled and turned surface that comes to lie at `translate_mm`.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Anchor {
+    /// The origin of the surface's own coordinates.
+    #[default]
+    Origin,
+    /// The centre of its box along x, y and z.
+    Centre,
+    /// The corner of its box with the least x, y and z.
+    Corner,
+    /// The middle of its box in x and y, the highest z: how stock is often set up.
+    Top,
+}
+
+/// What is done to a surface, in this order: scale, turn, move.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Placement {
+    /// Factor on all lengths, about the origin; above 0.
+    pub scale: f64,
+    /// Turns about x, then y, then z (axes that stay fixed), degrees, right-handed.
+    pub rotate_deg: [f64; 3],
+    /// The point that comes to lie at `translate_mm`.
+    pub anchor: Anchor,
+    /// Where that point comes to lie, mm.
+    pub translate_mm: [f64; 3],
+}
+
+impl Default for Placement {
+    fn default() -> Self {
+        Self {
+            scale: 1.0,
+            rotate_deg: [0.0; 3],
+            anchor: Anchor::Origin,
+            translate_mm: [0.0; 3],
+        }
+    }
+}
+
+/// The placed surface reaches out of the machine's range.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Outside {
+    /// The axis: 0 to 2.
+    pub axis: usize,
+    /// What it reaches from and to along it, mm.
+    pub reach_mm: [f64; 2],
+    /// No translation would bring it in: it is too large.
+    pub too_large: bool,
+}
+
+impl fmt::Display for Outside {
+    fn fmt(&self, out: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let [least, most] = self.reach_mm;
+        let axis = AXES.get(self.axis).copied().unwrap_or("?");
+        write!(
+            out,
+            "the placed surface reaches from {axis} = {least:.3} to {most:.3} mm; the machine reaches ±2147.483 mm"
+        )
+    }
+}
+
+impl std::error::Error for Outside {}
+
+/// `p -> linear p + shift`.
+#[derive(Clone, Copy)]
+struct Affine {
+    linear: [[f64; 3]; 3],
+    shift: [f64; 3],
+}
+
+impl Affine {
+    fn vector(&self, p: [f64; 3]) -> [f64; 3] {
+        self.linear
+            .map(|row| row.iter().zip(p).map(|(entry, value)| entry * value).sum())
+    }
+
+    fn point(&self, p: [f64; 3]) -> [f64; 3] {
+        let turned = self.vector(p);
+        std::array::from_fn(|k| turned[k] + self.shift[k])
+    }
+}
+
+impl Placement {
+    /// The placed surface.
+    ///
+    /// # Errors
+    /// [`Outside`] where it leaves what the machine can hold.
+    pub fn place(&self, surface: &SurfaceSpec) -> Result<SurfaceSpec, Outside> {
+        let rotation = Rotation::of_degrees(self.rotate_deg);
+        let turned = self.turned(surface, rotation);
+        let extent = extent_mm(&turned);
+        let mut shift = self.translate_mm;
+        for (axis, [least, most]) in extent.into_iter().enumerate() {
+            shift[axis] += match self.anchor {
+                Anchor::Origin => 0.0,
+                Anchor::Centre => centring(least, most),
+                Anchor::Corner => -least,
+                Anchor::Top if axis == 2 => -most,
+                Anchor::Top => centring(least, most),
+            };
+            let reach_mm = [least + shift[axis], most + shift[axis]];
+            if !(reach_mm[0] >= -POSITION_MAX_MM && reach_mm[1] <= POSITION_MAX_MM) {
+                let too_large = most - least > 2.0 * POSITION_MAX_MM;
+                return Err(Outside {
+                    axis,
+                    reach_mm,
+                    too_large,
+                });
+            }
+        }
+        let linear = Rotation::IDENTITY.0;
+        Ok(moved(&turned, &Affine { linear, shift }))
+    }
+
+    /// Scaled and turned, not yet moved.
+    fn turned(&self, surface: &SurfaceSpec, rotation: Rotation) -> SurfaceSpec {
+        let linear = rotation.0.map(|row| row.map(|entry| self.scale * entry));
+        let affine = Affine {
+            linear,
+            shift: [0.0; 3],
+        };
+        match (surface, rotation.about_z_rad()) {
+            (
+                SurfaceSpec::Revolved {
+                    radius_mm,
+                    height_mm,
+                    u,
+                    v_rad,
+                },
+                Some(angle),
+            ) => SurfaceSpec::Revolved {
+                radius_mm: radius_mm.map(|c| self.scale * c),
+                height_mm: height_mm.map(|c| self.scale * c),
+                u: *u,
+                v_rad: v_rad.map(|v| v + angle),
+            },
+            _ => moved(surface, &affine),
+        }
+    }
+}
+
+/// What brings the middle of a range to 0; nothing where it lies there already as far as it is known, so that a surface of
+/// revolution stays on its axis.
+fn centring(least: f64, most: f64) -> f64 {
+    let middle = 0.5 * (least + most);
+    if middle.abs() <= EXTENT_TOLERANCE_MM {
+        0.0
+    } else {
+        -middle
+    }
+}
+
+/// A surface under an affine map; one of revolution stays such where the map only moves it along z.
+fn moved(surface: &SurfaceSpec, map: &Affine) -> SurfaceSpec {
+    match surface {
+        SurfaceSpec::Revolved {
+            radius_mm,
+            height_mm,
+            u,
+            v_rad,
+        } => {
+            let [x, y, z] = map.shift;
+            if map.linear == Rotation::IDENTITY.0 && x == 0.0 && y == 0.0 {
+                let [c3, c2, c1, c0] = *height_mm;
+                return SurfaceSpec::Revolved {
+                    radius_mm: *radius_mm,
+                    height_mm: [c3, c2, c1, c0 + z],
+                    u: *u,
+                    v_rad: *v_rad,
+                };
+            }
+            SurfaceSpec::Nurbs(moved_nurbs(arcs::revolved(radius_mm, height_mm, *u, *v_rad), map))
+        }
+        SurfaceSpec::Ruled {
+            rail0_mm,
+            rail1_mm,
+            u,
+            v,
+        } => SurfaceSpec::Ruled {
+            rail0_mm: moved_cubic(rail0_mm, map),
+            rail1_mm: moved_cubic(rail1_mm, map),
+            u: *u,
+            v: *v,
+        },
+        SurfaceSpec::Bicubic {
+            coefficients_mm,
+            u,
+            v,
+        } => {
+            let mut placed = *coefficients_mm;
+            for i in 0..4 {
+                let row = moved_cubic(
+                    &coefficients_mm.map(|axis| axis[i]),
+                    &Affine {
+                        linear: map.linear,
+                        shift: if i == 3 { map.shift } else { [0.0; 3] },
+                    },
+                );
+                for (axis, cubic) in placed.iter_mut().zip(row) {
+                    axis[i] = cubic;
+                }
+            }
+            SurfaceSpec::Bicubic {
+                coefficients_mm: placed,
+                u: *u,
+                v: *v,
+            }
+        }
+        SurfaceSpec::Nurbs(nurbs) => SurfaceSpec::Nurbs(moved_nurbs(nurbs.clone(), map)),
+    }
+}
+
+/// A space cubic, `[k]` highest power first: every coefficient is a vector, the last one a point.
+fn moved_cubic(cubic: &[[f64; 4]; 3], map: &Affine) -> [[f64; 4]; 3] {
+    let [x, y, z] = cubic;
+    let mut placed = *cubic;
+    for power in 0..4 {
+        let coefficient = [x[power], y[power], z[power]];
+        let turned = if power == 3 {
+            map.point(coefficient)
+        } else {
+            map.vector(coefficient)
+        };
+        for (axis, value) in placed.iter_mut().zip(turned) {
+            axis[power] = value;
+        }
+    }
+    placed
+}
+
+fn moved_nurbs(mut nurbs: NurbsSpec, map: &Affine) -> NurbsSpec {
+    for pole in nurbs.poles_mm.iter_mut().flatten() {
+        let [x, y, z, w] = *pole;
+        let [x, y, z] = map.point([x, y, z]);
+        *pole = [x, y, z, w];
+    }
+    nurbs
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,46 @@
+//! What the charts show, out of the record and the oracle.
+
+use super::record::PassInterval;
+use oracle::Oracle;
+
+/// Places along a pass at which the distance to the next one is taken.
+const PLACES: u32 = 48;
+
+/// Distance between a pass and the next, along the surface across the pass.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Gap {
+    pub(super) pass: u32,
+    pub(super) widest_mm: f64,
+    pub(super) narrowest_mm: f64,
+}
+
+/// A last step shorter than its interval by more than this share was cut at the boundary.
+const CUT_SHARE: f64 = 0.02;
+
+/// Distances from every pass to the next, but to a last pass that the boundary brought nearer.
+pub(super) fn gaps(oracle: &Oracle, passes: &[PassInterval]) -> Vec<Gap> {
+    let [start, end] = oracle.path_range();
+    let gap = |pass: &PassInterval| {
+        let lateral = (0..=PLACES).filter_map(|k| {
+            let path = start + (end - start) * f64::from(k) / f64::from(PLACES);
+            let (u, v) = oracle.swapped(path, pass.side);
+            oracle
+                .contact(u, v)
+                .ok()
+                .map(|contact| contact.lateral_speed * pass.step.abs())
+        });
+        let [narrowest, widest] = lateral.fold([f64::INFINITY, 0.0], |[low, high], gap: f64| {
+            [low.min(gap), high.max(gap)]
+        });
+        Gap {
+            pass: pass.pass,
+            widest_mm: widest,
+            narrowest_mm: narrowest.min(widest),
+        }
+    };
+    let whole = match passes.split_last() {
+        Some((last, others)) if last.step < (1.0 - CUT_SHARE) * last.least => others,
+        _ => passes,
+    };
+    whole.iter().map(gap).collect()
+}

@@ -1,0 +1,422 @@
+//! `index.html`: view, charts, figures and warnings on one page that needs nothing else.
+
+use std::fmt::Write;
+use std::path::Path;
+
+use super::Remarks;
+use super::mesh::Mesh;
+use super::number::{duration, fixed, grouped, significant};
+use super::payload::payload;
+use super::picture::{Picture, Words};
+use super::record::Record;
+use super::series::Series;
+use super::svg::escape;
+use super::track::Track;
+use approach::Kind;
+use job::{Along, Job, Pattern};
+use oracle::Oracle;
+use verify::survey::Findings;
+
+/// Style sheet of the pages.
+pub const STYLE: &str = include_str!("page.css");
+const REPORT_STYLE: &str = concat!(
+    include_str!("viewer/uplot.min.css"),
+    include_str!("viewer/view.css")
+);
+/// Nothing may be loaded: a browser holds the page to that.
+const POLICY: &str =
+    "default-src 'none'; script-src 'unsafe-inline'; style-src 'unsafe-inline'; img-src data:";
+/// The view's and the charts' libraries, by `scripts/viewer`, and our own scripts, which share one scope.
+const LIBRARIES: &str = include_str!("viewer/three-bundle.min.js");
+const SCRIPTS: [&str; 6] = [
+    include_str!("viewer/data.js"),
+    include_str!("viewer/words.js"),
+    include_str!("viewer/scene.js"),
+    include_str!("viewer/panel.js"),
+    include_str!("viewer/charts.js"),
+    include_str!("viewer/main.js"),
+];
+const VIEW: &str = include_str!("viewer/view.html");
+const CHARTS: &str = include_str!("viewer/charts.html");
+const LICENCES: &str = include_str!("viewer/three-bundle.licence.txt");
+
+/// What the page is made of.
+pub(super) struct Content<'a> {
+    pub(super) job: &'a Job,
+    pub(super) approach: Kind,
+    pub(super) oracle: &'a Oracle,
+    pub(super) mesh: &'a Mesh,
+    pub(super) record: &'a Record,
+    pub(super) track: &'a Track,
+    /// Finished.
+    pub(super) series: &'a Series,
+    pub(super) findings: &'a Findings,
+    pub(super) remarks: &'a Remarks,
+    pub(super) words: &'a Words,
+    pub(super) picture: &'a Picture,
+}
+
+/// What picture and page say about the job.
+pub(super) fn words(job: &Job, record: &Record, job_name: &Path, findings: &Findings) -> Words {
+    let title = job_name
+        .file_stem()
+        .map_or_else(|| "job".to_owned(), |name| name.to_string_lossy().into_owned());
+    let along = parameter(job.along);
+    let passes = findings.passes;
+    let plural = if passes == 1 { "pass" } else { "passes" };
+    let order = match job.pattern {
+        Pattern::Zig => "one way",
+        Pattern::Zigzag => "to and fro",
+    };
+    let subtitle = format!(
+        "{} surface · {passes} {plural} along {along}, {order} · {} mm/min at the cutter contact · scallop {} mm",
+        job.surface.kind(),
+        job.feed_mm_min,
+        job.scallop_mm
+    );
+    let drawn = record.drawn.len();
+    let drawn_of = if drawn == passes as usize {
+        String::new()
+    } else {
+        format!("{drawn} of ")
+    };
+    Words {
+        subtitle,
+        passes: format!("cutter contact, {drawn_of}{passes} {plural}"),
+        ball: format!("ball, radius {} mm, to scale", job.radius_mm),
+        description: format!(
+            "The {} surface of job {title} in parallel projection, with {drawn} of its {passes} {plural} along {along}. \
+             One pass is emphasised; the path of the tool's centre runs above it, and a ball of {} mm radius touches \
+             the surface on it.",
+            job.surface.kind(),
+            job.radius_mm
+        ),
+        title,
+    }
+}
+
+fn parameter(along: Along) -> &'static str {
+    match along {
+        Along::U => "u",
+        Along::V => "v",
+    }
+}
+
+/// The whole page.
+pub(super) fn page(content: &Content<'_>) -> String {
+    let title = escape(&content.words.title);
+    let mut out = format!(
+        "<!DOCTYPE html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\"/>\n\
+         <meta http-equiv=\"Content-Security-Policy\" content=\"{POLICY}\"/>\n\
+         <meta name=\"viewport\" content=\"width=device-width, initial-scale=1\"/>\n\
+         <meta name=\"color-scheme\" content=\"light dark\"/>\n<title>{title}: tool path</title>\n\
+         <style>\n{STYLE}{REPORT_STYLE}</style>\n</head>\n<body>\n<main class=\"report\">\n"
+    );
+    let _ = writeln!(
+        out,
+        "<header><h1>{title}</h1>\n<p class=\"sub\">{}</p></header>",
+        escape(&content.words.subtitle)
+    );
+    remarks(&mut out, content);
+    tiles(&mut out, content);
+    out.push_str(VIEW);
+    let _ = writeln!(
+        out,
+        "<figure class=\"picture\" id=\"picture\">\n{}</figure>\n\
+         <p class=\"note\" id=\"no-view\" hidden=\"\">This browser draws no WebGL; the picture stands in for the view that turns.</p>\n\
+         <noscript><p class=\"note\">View and charts need JavaScript, which is off; the picture and the figures do not.</p></noscript>\n\
+         <p hidden=\"\" id=\"picture-words\">{}</p>\n<p class=\"note\">{}</p>",
+        content.picture.svg,
+        escape(&content.words.description),
+        drawn_words(content)
+    );
+    out.push_str(
+        &CHARTS
+            .replace("@series", &series_words(content))
+            .replace("@intervals", &interval_words(content)),
+    );
+    tables(&mut out, content);
+    footer(&mut out, content);
+    scripts(&mut out, content);
+    out.push_str("</main>\n</body>\n</html>\n");
+    out
+}
+
+/// What is wrong, and what has to be known.
+fn remarks(out: &mut String, content: &Content<'_>) {
+    let remarks = content.remarks;
+    let mut failures = remarks.failures.clone();
+    if !content.findings.report.complete && failures.is_empty() {
+        failures.push("The run ended before its last pass was complete.".to_owned());
+    }
+    if remarks.verified && failures.is_empty() {
+        out.push_str("<p class=\"verdict good\"><b>Passed.</b> Every check of this job holds.</p>\n");
+    }
+    for (class, word, texts) in [
+        ("bad", "Failed", &failures),
+        ("warning", "Warning", &remarks.warnings),
+    ] {
+        for text in texts {
+            let (first, help) = text.split_once('\n').unwrap_or((text, ""));
+            let _ = write!(
+                out,
+                "<p class=\"verdict {class}\"><b>{word}.</b> {}",
+                escape(first)
+            );
+            if !help.is_empty() {
+                let help = help.split_whitespace().collect::<Vec<_>>().join(" ");
+                let _ = write!(out, "<br/><span>{}</span>", escape(&help));
+            }
+            out.push_str("</p>\n");
+        }
+    }
+}
+
+/// The figures that come first.
+fn tiles(out: &mut String, content: &Content<'_>) {
+    let (job, findings) = (content.job, content.findings);
+    let report = &findings.report;
+    let time_s = findings.samples as f64 * job.machine.period_s();
+    let scallops = content.remarks.scallops.as_ref().map(super::Scallops::largest_mm);
+    let scallop = match scallops.filter(|height| height.is_finite()) {
+        Some(height) => ("Scallop height, max", fixed(height.into(), 5), "mm"),
+        None => ("Scallop, by formula", fixed(report.scallop_mm.max, 5), "mm"),
+    };
+    let tiles = [
+        ("Machining time", duration(time_s), ""),
+        ("Passes", grouped(findings.passes.into()), ""),
+        ("Path of the contact", fixed(report.cc_length_mm * 1e-3, 2), "m"),
+        scallop,
+        ("Feed error, max", significant(report.ripple_pct.max), "%"),
+        ("Tool centre error, max", fixed(report.position_nm.max, 1), "nm"),
+    ];
+    out.push_str("<dl class=\"tiles\">\n");
+    for (what, value, unit) in tiles {
+        let _ = writeln!(
+            out,
+            "<div><dt>{what}</dt><dd>{value} <small>{unit}</small></dd></div>"
+        );
+    }
+    out.push_str("</dl>\n");
+}
+
+/// What stands behind the view's points.
+fn drawn_words(content: &Content<'_>) -> String {
+    let track = content.track;
+    let (passes, drawn) = (content.findings.passes as usize, track.drawn());
+    let which = match (drawn == passes, track.every) {
+        (true, _) => format!("all {} passes", grouped(passes as u64)),
+        (_, every) => format!(
+            "{} of {} passes, one in {every}",
+            grouped(drawn as u64),
+            grouped(passes as u64)
+        ),
+    };
+    let stands = match track.strides() {
+        [_, 1] => "every sample is one of them".to_owned(),
+        [least, most] if least >= most => {
+            format!("one stands for {most} samples and has the colour of the worst")
+        }
+        [least, most] => format!("one stands for {least} to {most} samples and has the colour of the worst"),
+    };
+    format!(
+        "The view draws {which} with {} points: {stands}.",
+        grouped(track.points() as u64)
+    )
+}
+
+/// What stands behind the charts' points.
+fn series_words(content: &Content<'_>) -> String {
+    let ticks = content.series.ticks();
+    let samples = grouped(content.findings.samples);
+    let kept = if ticks == 1 {
+        format!("All {samples} samples are in the charts.")
+    } else {
+        format!(
+            "{samples} samples are in the charts as spans of {ticks} samples, each with its least and largest value, so that \
+             no peak is lost; one pass in the middle and the one with the largest error are kept finer."
+        )
+    };
+    let [low, high] = [content.findings.speeds.cl.min, content.findings.speeds.cl.max];
+    let bends = if low.is_finite() && high - low > 0.01 * high {
+        format!(" The tool's centre has to run at {low:.2} to {high:.2} mm/s, as the surface bends under it.")
+    } else {
+        String::new()
+    };
+    let ends = if content.job.machine.has_limits() {
+        "Each pass runs from standstill to standstill; the ways between passes are left out."
+    } else {
+        "The last period of a pass, which is cut short, has no speed."
+    };
+    format!(
+        "{}{bends} {kept} {ends} Accelerations are taken over 8 periods before and after, as \
+         positions are whole nanometres, but where those over single periods differ by more than 8 nm per period²: there they are as \
+         emitted.",
+        feed_words(content)
+    )
+}
+
+/// Whether the feed is held.
+fn feed_words(content: &Content<'_>) -> String {
+    /// A speed that keeps within this share of the feed is called held.
+    const HELD_SHARE: f64 = 0.01;
+    let feed = content.job.feed_mm_s();
+    let [low, high] = [content.findings.speeds.cc.min, content.findings.speeds.cc.max];
+    if !low.is_finite() {
+        return String::new();
+    }
+    let shown = significant(feed);
+    if [low, high]
+        .iter()
+        .all(|speed| (speed - feed).abs() < HELD_SHARE * feed)
+    {
+        format!("The feed of {shown} mm/s is held where the cutter touches the surface.")
+    } else {
+        format!("Of the feed of {shown} mm/s the cutter contact runs at {low:.2} to {high:.2} mm/s.")
+    }
+}
+
+fn interval_words(content: &Content<'_>) -> String {
+    let side = match content.job.along {
+        Along::U => "v",
+        Along::V => "u",
+    };
+    let thinned = match content.record.intervals.stride() {
+        1 => String::new(),
+        stride => format!(" One pass in {stride} is shown."),
+    };
+    format!(
+        "The next pass lies where the scallop between the two stays within {} mm everywhere: the chart shows the least interval \
+         that any sample of a pass allows to first order, in the side parameter {side}. In millimetres across the passes that is a range: \
+         where it is broad, passes of constant {side} crowd. The last distance, which the boundary cuts short, is left \
+         out.{thinned}",
+        content.job.scallop_mm
+    )
+}
+
+fn footer(out: &mut String, content: &Content<'_>) {
+    let emitter = match content.approach {
+        Kind::Surface => "those that the core emitted".to_owned(),
+        other => format!("those of the approach <code>{}</code>, in f64", other.name()),
+    };
+    let _ = writeln!(
+        out,
+        "<footer><p>Written by Isofeed. Positions and speeds are {emitter}; surface, arc lengths and errors are by the \
+         independent f64 oracle. The page needs no network.</p>\n<details><summary>Libraries in this page, and their \
+         licences</summary><pre>{}</pre></details></footer>",
+        escape_lines(LICENCES)
+    );
+}
+
+/// As [`escape`], line by line.
+fn escape_lines(text: &str) -> String {
+    text.lines().map(escape).collect::<Vec<_>>().join("\n")
+}
+
+/// Data and scripts, after all that they work on.
+fn scripts(out: &mut String, content: &Content<'_>) {
+    // `<` cannot end the script then, whatever a text holds.
+    let data = payload(content).to_string().replace('<', "\\u003c");
+    let _ = writeln!(
+        out,
+        "<script type=\"application/json\" id=\"iso-data\">{data}</script>"
+    );
+    let _ = writeln!(out, "<script>\n{LIBRARIES}</script>");
+    let _ = writeln!(
+        out,
+        "<script>\n\"use strict\";\n(() => {{\n{}}})();\n</script>",
+        SCRIPTS.join("\n")
+    );
+}
+
+/// A row of a table: what, raw value, value for people, unit.
+struct Row(&'static str, f64, String, &'static str);
+
+fn tables(out: &mut String, content: &Content<'_>) {
+    out.push_str("<div class=\"tables\">\n");
+    table(out, "Run", &run_rows(content.job, content.findings));
+    table(out, "Against the oracle, at most", &oracle_rows(content.findings));
+    table(out, "Job", &job_rows(content.job));
+    let figures = &content.remarks.figures;
+    if !figures.is_empty() {
+        out.push_str("<table><caption>Verified</caption><tbody>\n");
+        for figure in figures {
+            let _ = writeln!(
+                out,
+                "<tr><th scope=\"row\">{}</th><td>{}</td></tr>",
+                escape(&figure.what),
+                escape(&figure.value)
+            );
+        }
+        out.push_str("</tbody></table>\n");
+    }
+    out.push_str("</div>\n");
+}
+
+fn run_rows(job: &Job, findings: &Findings) -> [Row; 6] {
+    let side = match job.along {
+        Along::U => "of v",
+        Along::V => "of u",
+    };
+    let samples = findings.samples as f64;
+    let time_s = samples * job.machine.period_s();
+    let [cc_mm, cl_mm] = [findings.report.cc_length_mm, findings.speeds.cl_length_mm];
+    let interval = findings.interval_min;
+    [
+        Row(
+            "Passes",
+            findings.passes.into(),
+            grouped(findings.passes.into()),
+            "",
+        ),
+        Row("Samples", samples, grouped(findings.samples), ""),
+        Row("Machining time", time_s, duration(time_s), ""),
+        Row("Cutter contact path", cc_mm, fixed(cc_mm, 1), "mm"),
+        Row("Tool centre path", cl_mm, fixed(cl_mm, 1), "mm"),
+        Row("Least path interval", interval, significant(interval), side),
+    ]
+}
+
+fn oracle_rows(findings: &Findings) -> [Row; 7] {
+    let report = &findings.report;
+    let (ripple, ripple_rms) = (report.ripple_pct.max, report.ripple_pct.rms());
+    let [cl, cc, normal] =
+        [report.position_nm, report.contact_nm, report.normal_rad].map(|figure| figure.max);
+    let (scallop, scallop_mean) = (report.scallop_mm.max, report.scallop_mean_mm());
+    [
+        Row("Feed ripple", ripple, significant(ripple), "%"),
+        Row("Feed ripple, rms", ripple_rms, significant(ripple_rms), "%"),
+        Row("Tool centre error", cl, fixed(cl, 2), "nm"),
+        Row("Cutter contact error", cc, fixed(cc, 2), "nm"),
+        Row("Normal error", normal, significant(normal), "rad"),
+        Row("Scallop by formula", scallop, fixed(scallop, 6), "mm"),
+        Row(
+            "Scallop by formula, mean",
+            scallop_mean,
+            fixed(scallop_mean, 6),
+            "mm",
+        ),
+    ]
+}
+
+fn job_rows(job: &Job) -> [Row; 4] {
+    let row = |what, value: f64, unit| Row(what, value, value.to_string(), unit);
+    [
+        row("Ball radius", job.radius_mm, "mm"),
+        row("Feed of the contact", job.feed_mm_min, "mm/min"),
+        row("Scallop height limit", job.scallop_mm, "mm"),
+        row("Sampling period", job.machine.period_us, "µs"),
+    ]
+}
+
+fn table(out: &mut String, caption: &str, rows: &[Row]) {
+    let _ = writeln!(out, "<table><caption>{caption}</caption><tbody>");
+    for Row(what, value, shown, unit) in rows {
+        let space = if unit.is_empty() { "" } else { " " };
+        let _ = writeln!(
+            out,
+            "<tr><th scope=\"row\">{what}</th><td><data value=\"{value}\">{shown}</data>{space}{unit}</td></tr>"
+        );
+    }
+    out.push_str("</tbody></table>\n");
+}

@@ -1,0 +1,105 @@
+//! The data of the page's view and charts, as one JSON object.
+
+use serde_json::{Value, json};
+
+use super::embed::{Scale, words};
+use super::measure::{self, Gap};
+use super::page::Content;
+use super::record::PassInterval;
+use job::Along;
+
+const MM_PER_NM: f64 = 1e-6;
+
+/// The box around surface and path, in steps that are the same for all axes.
+struct Box3 {
+    scales: [Scale; 3],
+}
+
+impl Box3 {
+    fn around(points: impl Iterator<Item = [f64; 3]>) -> Self {
+        let [low, high] = points.fold(
+            [[f64::INFINITY; 3], [f64::NEG_INFINITY; 3]],
+            |[low, high], point| {
+                [
+                    std::array::from_fn(|k| low[k].min(point[k])),
+                    std::array::from_fn(|k| high[k].max(point[k])),
+                ]
+            },
+        );
+        let longest = (0..3).map(|k| high[k] - low[k]).fold(0.0, f64::max);
+        let whole = Scale::of([0.0, longest].into_iter());
+        Self {
+            scales: low.map(|low| Scale { low, ..whole }),
+        }
+    }
+
+    fn place(&self, mm: [f64; 3]) -> [u16; 3] {
+        std::array::from_fn(|k| self.scales[k].nearest(mm[k]))
+    }
+}
+
+fn millimetres(nm: [i32; 3]) -> [f64; 3] {
+    nm.map(|nm| f64::from(nm) * MM_PER_NM)
+}
+
+/// All that the page's scripts read.
+pub(super) fn payload(content: &Content<'_>) -> Value {
+    let (job, mesh) = (content.job, content.mesh);
+    let places = content.track.places().map(millimetres);
+    let around = Box3::around(mesh.points().iter().copied().chain(places));
+    let side = match job.along {
+        Along::U => "v",
+        Along::V => "u",
+    };
+    let scallops = content
+        .remarks
+        .scallops
+        .as_ref()
+        .filter(|scallops| scallops.largest_mm().is_finite())
+        .map(|scallops| scallops.json(mesh, content.oracle.surface.domain(), job.along));
+    json!({
+        "radius": job.radius_mm,
+        "feed": job.feed_mm_s(),
+        "period": job.machine.period_s(),
+        "samples": content.findings.samples,
+        "side": side,
+        "toward": content.picture.toward,
+        "limits": {
+            "velocity": job.machine.limits.map(|limits| limits.velocity_mm_s),
+            "acceleration": job.machine.limits.map(|limits| limits.acceleration_mm_s2),
+        },
+        "box": {
+            "low": around.scales.map(|scale| scale.low),
+            "step": around.scales[0].step,
+        },
+        "mesh": {
+            "cells": mesh.cells(),
+            "sign": mesh.sign(),
+            "points": words(mesh.points().iter().flat_map(|point| around.place(*point))),
+        },
+        "track": content.track.json(|nm| around.place(millimetres(nm))),
+        "series": content.series.json(),
+        "intervals": intervals(content),
+        "scallops": scallops,
+    })
+}
+
+/// Intervals and distances, pass by pass.
+fn intervals(content: &Content<'_>) -> Value {
+    let passes = content.record.intervals.items();
+    let gaps = measure::gaps(content.oracle, &passes);
+    let column = |of: fn(&Gap) -> f64| gaps.iter().map(of).collect::<Vec<_>>();
+    let passes: Vec<&PassInterval> = passes.iter().filter(|pass| pass.least.is_finite()).collect();
+    json!({
+        "every": content.record.intervals.stride(),
+        "least": {
+            "pass": passes.iter().map(|pass| pass.pass).collect::<Vec<_>>(),
+            "interval": passes.iter().map(|pass| pass.least).collect::<Vec<_>>(),
+        },
+        "gaps": {
+            "pass": gaps.iter().map(|gap| gap.pass).collect::<Vec<_>>(),
+            "widest": column(|gap| gap.widest_mm),
+            "narrowest": column(|gap| gap.narrowest_mm),
+        },
+    })
+}

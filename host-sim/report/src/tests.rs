@@ -1,0 +1,324 @@
+//! Tests of the report: what is kept is bounded, what is written is well formed and says what was found.
+
+use std::path::Path;
+
+use super::furniture::round_below;
+use super::record::{Record, Thinned};
+use super::svg::{escape, polyline, simplified, tenths};
+use super::{Figure, Remarks, Sketch, measure, number};
+use job::Job;
+use machine::Machine;
+use machine::prepare::prepare;
+use oracle::{Checked, Emitted, Oracle};
+use verify::survey::{Findings, Survey};
+
+/// A small bell: 20 passes or so, in a fraction of a second.
+pub(super) const BELL: &str = r#"
+[surface]
+kind = "revolved"
+radius_mm = [60, -90, 90, 20]
+height_mm = [60, -90, 0, 50]
+u = [0, 1]
+v_rad = [-1.2, -0.6]
+[tool]
+kind = "ball"
+radius_mm = 10
+[cut]
+feed_mm_min = 6000
+scallop_mm = 0.05
+along = "u"
+side = "up"
+pattern = "zigzag"
+"#;
+
+/// Runs a job as the command does.
+pub(super) fn run(text: &str) -> (Job, Sketch, Findings) {
+    let job = job_file::parse("bell.toml", text).unwrap();
+    let prepared = prepare(&job).unwrap();
+    let oracle = Oracle::new(&job).unwrap();
+    let passes = oracle.schedule().unwrap().len();
+    let mut sketch = Sketch::new(&job, passes);
+    let mut draw = |sample: &Emitted, checked: &Checked| sketch.add(sample, checked);
+    let mut survey = Survey::new(&oracle, None, Some(&mut draw));
+    Machine::load(&prepared)
+        .unwrap()
+        .run(|sample| survey.add(&inspect::plain(&prepared, sample)).is_ok())
+        .unwrap();
+    let findings = survey.finish(true).unwrap();
+    (job, sketch, findings)
+}
+
+/// Panics unless every tag is closed in its turn, attributes are quoted, and no stray `&` or `<` stands in the text.
+fn assert_well_formed(text: &str) {
+    let mut open: Vec<&str> = Vec::new();
+    let mut rest = text;
+    while let Some(start) = rest.find('<') {
+        let (before, from) = rest.split_at(start);
+        assert!(
+            !before.contains('>') || open.last() == Some(&"style"),
+            "stray > in {before:?}"
+        );
+        for entity in before.split('&').skip(1) {
+            assert!(
+                entity.split(';').next().is_some_and(|name| name.len() < 6),
+                "stray & in {before:?}"
+            );
+        }
+        let end = from.find('>').expect("a tag is closed");
+        let tag = &from[1..end];
+        assert_eq!(tag.matches('"').count() % 2, 0, "quotes in {tag:?}");
+        let name = tag
+            .trim_start_matches('/')
+            .split([' ', '/', '\n'])
+            .next()
+            .unwrap();
+        match () {
+            () if tag.starts_with('!') || tag.ends_with('/') => {}
+            // What is in a script is the browser's to read, up to its end tag.
+            () if name == "script" => {
+                let script = &from[end + 1..];
+                rest = &script[script.find("</script>").expect("a script ends") + 9..];
+                continue;
+            }
+            () if tag.starts_with('/') => assert_eq!(open.pop(), Some(name)),
+            () => open.push(name),
+        }
+        rest = &from[end + 1..];
+    }
+    assert!(open.is_empty(), "never closed: {open:?}");
+}
+
+/// The raw value that the page gives for a row.
+fn value_of(page: &str, what: &str) -> f64 {
+    let row = page
+        .split_once(&format!("<th scope=\"row\">{what}</th><td><data value=\""))
+        .expect(what)
+        .1;
+    row.split('"').next().unwrap().parse().unwrap()
+}
+
+#[test]
+fn thinning_is_bounded_and_keeps_both_ends() {
+    for count in [1_u32, 2, 9, 10, 11, 20, 21, 999, 100_000] {
+        let mut thinned = Thinned::new(10);
+        (0..count).for_each(|item| thinned.push(item));
+        let items = thinned.items();
+        assert!(
+            items.len() <= 11 && items.len() >= count.min(6) as usize,
+            "{count}: {items:?}"
+        );
+        assert_eq!((items.first(), items.last()), (Some(&0), Some(&(count - 1))));
+        assert!(items.windows(2).all(|pair| pair[0] < pair[1]));
+    }
+    assert!(Thinned::<u8>::new(10).items().is_empty());
+}
+
+#[test]
+fn record_is_bounded_whatever_the_job() {
+    let job = job_file::parse("bell.toml", BELL).unwrap();
+    // More passes than expected, each longer than what is kept of it.
+    for (expected, passes, samples) in [(5000, 6000, 3), (3, 500, 700), (0, 2, 5000)] {
+        let mut record = Record::new(&job, expected);
+        for pass in 0..passes {
+            for step in 0..samples {
+                record.add(&Emitted {
+                    tick: 0,
+                    pass,
+                    u: f64::from(step),
+                    v: f64::from(pass),
+                    cc_nm: [0; 3],
+                    cl_nm: [step, 0, 0],
+                    feed_mm_s: 1.0,
+                    interval: 1.0 + f64::from(step),
+                    first_of_pass: step == 0,
+                    last_of_pass: step + 1 == samples,
+                });
+            }
+        }
+        assert!(record.drawn.len() <= 61, "{} passes drawn", record.drawn.len());
+        assert!(record.drawn.iter().all(|drawn| drawn.places.items().len() <= 301));
+        assert!(record.intervals.items().len() <= 2049);
+        assert!(
+            record
+                .intervals
+                .items()
+                .iter()
+                .all(|pass| pass.least == 1.0 && pass.step == 1.0)
+        );
+    }
+}
+
+#[test]
+fn zigzag_passes_are_drawn_to_and_fro() {
+    let job = job_file::parse("bell.toml", BELL).unwrap();
+    let (sketch, mut drawn) = (Sketch::new(&job, 164), Vec::new());
+    let mut record = sketch.record;
+    for pass in 0..164 {
+        let sample = Emitted {
+            pass,
+            first_of_pass: true,
+            last_of_pass: true,
+            ..BLANK
+        };
+        record.add(&sample);
+    }
+    drawn.extend(record.drawn.iter().map(|drawn| drawn.pass));
+    assert_eq!(drawn[..3], [0, 3, 6]);
+    assert_eq!(drawn.last(), Some(&163));
+    assert!(drawn.contains(&record.middle_pass));
+}
+
+pub(super) const BLANK: Emitted = Emitted {
+    tick: 0,
+    pass: 0,
+    u: 0.0,
+    v: 0.0,
+    cc_nm: [0; 3],
+    cl_nm: [0; 3],
+    feed_mm_s: 0.0,
+    interval: f64::INFINITY,
+    first_of_pass: false,
+    last_of_pass: false,
+};
+
+#[test]
+fn report_is_well_formed_small_and_says_what_was_found() {
+    let (job, sketch, findings) = run(BELL);
+    let folder = tempfile::tempdir().unwrap();
+    let directory = folder.path().join("a/b");
+    let name = Path::new("/somewhere/private/bell <1> & \"2\".toml");
+    let remarks = Remarks {
+        failures: vec!["gouge <3> at u = 0.5\n  help: a smaller ball".to_owned()],
+        warnings: vec!["velocity_max_mm_s not held".to_owned()],
+        figures: vec![Figure {
+            what: "Gouge".to_owned(),
+            value: "0.2 mm".to_owned(),
+        }],
+        ..Remarks::default()
+    };
+    let path = sketch.write(&directory, name, &findings, &remarks).unwrap();
+    assert_eq!(path, directory.join("index.html"));
+    let page = std::fs::read_to_string(path).unwrap();
+    let picture = std::fs::read_to_string(directory.join("path.svg")).unwrap();
+    for text in [&page, &picture] {
+        assert_well_formed(text);
+        assert!(text.contains("bell &lt;1&gt; &amp; &quot;2&quot;"));
+        let said = text.split("<script").next().unwrap();
+        assert!(!text.contains("somewhere") && !said.contains("NaN") && !said.contains("inf "));
+    }
+    assert!(picture.len() < 400_000, "{} bytes", picture.len());
+    // Names of namespaces and the licences' word of where a library comes from are no requests; the policy forbids all.
+    assert!(!picture.replace("http://www.w3.org/2000/svg", "").contains("://"));
+    assert!(page.contains("content=\"default-src 'none';"));
+    for text in [
+        "gouge &lt;3&gt; at u = 0.5",
+        "help: a smaller ball",
+        "velocity_max_mm_s not held",
+        "<td>0.2 mm</td>",
+    ] {
+        assert!(page.contains(text), "{text}");
+    }
+    let report = &findings.report;
+    for (what, value) in [
+        ("Passes", f64::from(findings.passes)),
+        ("Samples", findings.samples as f64),
+        ("Machining time", findings.samples as f64 * job.machine.period_s()),
+        ("Cutter contact path", report.cc_length_mm),
+        ("Tool centre path", findings.speeds.cl_length_mm),
+        ("Least path interval", findings.interval_min),
+        ("Feed ripple", report.ripple_pct.max),
+        ("Feed ripple, rms", report.ripple_pct.rms()),
+        ("Tool centre error", report.position_nm.max),
+        ("Scallop by formula", report.scallop_mm.max),
+    ] {
+        assert_eq!(value_of(&page, what), value, "{what}");
+    }
+}
+
+#[test]
+fn gaps_are_the_step_over_at_the_widest_place() {
+    let (job, sketch, _) = run(BELL);
+    let oracle = Oracle::new(&job).unwrap();
+    let gaps = measure::gaps(&oracle, &sketch.record.intervals.items());
+    // The rim is flat: l = 2 sqrt(h (2 r - h)), which is 1.9975 mm. At the neck the passes are four times closer.
+    assert!(!gaps.is_empty());
+    for gap in gaps {
+        assert!(
+            (gap.widest_mm - 1.997_498).abs() < 1e-5 && (gap.narrowest_mm - 0.25 * 1.997_498).abs() < 1e-5,
+            "{gap:?}"
+        );
+    }
+}
+
+#[test]
+fn a_run_that_ended_at_once_is_reported_all_the_same() {
+    let (job, _, findings) = run(BELL);
+    let folder = tempfile::tempdir().unwrap();
+    let nothing = Findings {
+        samples: 0,
+        passes: 0,
+        report: oracle::Report::default(),
+        ..findings
+    };
+    let path = Sketch::new(&job, 0)
+        .write(
+            folder.path(),
+            Path::new("bell.toml"),
+            &nothing,
+            &Remarks::default(),
+        )
+        .unwrap();
+    let page = std::fs::read_to_string(path).unwrap();
+    assert_well_formed(&page);
+    assert!(page.contains("ended before its last pass was complete"));
+    let mut sketch = Sketch::new(&job, 9);
+    let sample = Emitted {
+        first_of_pass: true,
+        u: 0.5,
+        v: -0.9,
+        ..BLANK
+    };
+    sketch.add(&sample, &Checked::default());
+    let path = sketch
+        .write(folder.path(), Path::new(""), &nothing, &Remarks::default())
+        .unwrap();
+    assert_well_formed(&std::fs::read_to_string(path).unwrap());
+}
+
+#[test]
+fn numbers_are_written_short() {
+    assert_eq!(
+        [0.04, -0.05, 12.0, -3.25, 0.3].map(tenths),
+        ["0", "-.1", "12", "-3.3", ".3"]
+    );
+    assert_eq!(
+        polyline(&[[1.0, 2.0], [1.5, 1.96], [0.96, 3.0]]),
+        "M1 2l.5 0-.5 1"
+    );
+    assert_eq!(escape("a<b>&'\"\u{1}"), "a&lt;b&gt;&amp;&#39;&quot;\u{fffd}");
+    assert_eq!(
+        [0.03, 1.0, 4.99, 7.0, 150.0].map(round_below),
+        [0.02, 1.0, 2.0, 5.0, 100.0]
+    );
+    let shown = [0.0, 3.14e-5, 0.001_234_567, 100.0, 123_456.7, f64::INFINITY].map(number::significant);
+    assert_eq!(shown, ["0", "3.1·10⁻⁵", "0.0012346", "100", "123457", "none"]);
+    assert_eq!(number::fixed(22_116.549, 1), "22\u{202f}116.5");
+}
+
+#[test]
+fn simplified_lines_stay_close() {
+    let wave: Vec<_> = (0..400)
+        .map(f64::from)
+        .map(|x| [x, 20.0 * (x / 40.0).sin()])
+        .collect();
+    let short = simplified(&wave, 0.1);
+    assert!(short.len() < 80 && short.first() == wave.first() && short.last() == wave.last());
+    for [x, y] in wave {
+        let pair = short
+            .windows(2)
+            .find(|pair| pair[0][0] <= x && x <= pair[1][0])
+            .unwrap();
+        let share = (x - pair[0][0]) / (pair[1][0] - pair[0][0]);
+        assert!((pair[0][1] + share * (pair[1][1] - pair[0][1]) - y).abs() < 0.15);
+    }
+}

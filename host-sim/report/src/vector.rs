@@ -1,0 +1,13 @@
+//! Vectors in space as plain arrays: the oracle's, and what a picture needs besides.
+
+pub(super) use oracle::vector::{Vector, cross, dot, length, subtract};
+
+pub(super) fn add_scaled(a: Vector, b: Vector, factor: f64) -> Vector {
+    [a[0] + b[0] * factor, a[1] + b[1] * factor, a[2] + b[2] * factor]
+}
+
+/// The unit vector; zero stays zero.
+pub(super) fn unit(a: Vector) -> Vector {
+    let length = length(a);
+    if length > 0.0 { a.map(|x| x / length) } else { a }
+}

@@ -1,0 +1,121 @@
+//! The page of `cargo sim paper`: a replication report that needs nothing but itself.
+
+mod chart;
+mod figures;
+mod scatter;
+mod tables;
+mod words;
+
+use std::fmt::Write;
+use std::io;
+use std::path::{Path, PathBuf};
+
+use serde_json::{Value, json};
+
+use crate::paper::figures::Track;
+use crate::paper::{Figures, Study};
+use ::report::number::fixed;
+use ::report::page::STYLE;
+
+const PAPER_STYLE: &str = include_str!("paper.css");
+
+/// A number as tables show it.
+#[must_use]
+pub fn number(value: f64, decimals: usize) -> String {
+    if decimals == 0 && (value - value.round()).abs() > 1e-9 {
+        format!("{value:.2}")
+    } else {
+        format!("{value:.decimals$}")
+    }
+}
+
+/// A ripple, from tens of per cent to millionths.
+#[must_use]
+pub fn percent(value: f64) -> String {
+    let decimals = if value >= 0.1 {
+        2
+    } else if value >= 0.001 {
+        4
+    } else {
+        6
+    };
+    format!("{value:.decimals$}")
+}
+
+/// A number in a page, its thousands apart.
+fn shown(value: f64, decimals: usize) -> String {
+    if decimals == 0 && (value - value.round()).abs() > 1e-9 {
+        fixed(value, 2)
+    } else {
+        fixed(value, decimals)
+    }
+}
+
+/// Writes `index.html` and `figures.json` into a folder that is there, and returns the page's path.
+///
+/// # Errors
+/// The files cannot be written.
+pub fn write(folder: &Path, study: &Study) -> io::Result<PathBuf> {
+    std::fs::write(folder.join("figures.json"), data(&study.figures).to_string())?;
+    let path = folder.join("index.html");
+    std::fs::write(&path, programs::with_command_name(&page(study)?).as_ref())?;
+    Ok(path)
+}
+
+/// The whole page.
+///
+/// # Errors
+/// The chart library's, which writing into memory does not cause.
+pub fn page(study: &Study) -> io::Result<String> {
+    let mut out = format!(
+        "<!DOCTYPE html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\"/>\n\
+         <meta name=\"viewport\" content=\"width=device-width, initial-scale=1\"/>\n\
+         <meta name=\"color-scheme\" content=\"light dark\"/>\n<title>Lo (1998), reproduced</title>\n\
+         <style>\n{STYLE}{PAPER_STYLE}</style>\n</head>\n<body>\n<main>\n"
+    );
+    words::opening(&mut out, study);
+    tables::comparisons(&mut out, study);
+    words::disagreements(&mut out, study);
+    figures::figures(&mut out, study)?;
+    scatter::section(&mut out, study)?;
+    tables::items(&mut out, study);
+    words::closing(&mut out);
+    let _ = writeln!(out, "</main>\n</body>\n</html>");
+    Ok(out)
+}
+
+/// The figures' data.
+fn data(figures: &Figures) -> Value {
+    let track = |track: &Track| {
+        let column = |of: fn(&verify::speeds::Speed) -> f64| track.speeds.iter().map(of).collect::<Vec<_>>();
+        json!({
+            "approach": track.kind.name(),
+            "period_us": track.period_us,
+            "time_s": column(|speed| speed.time_s),
+            "arc_mm": column(|speed| speed.arc_mm),
+            "cc_mm_s": column(|speed| speed.cc_mm_s),
+            "cl_mm_s": column(|speed| speed.cl_mm_s),
+        })
+    };
+    json!({
+        "figure_3": { "cc_radius_height_mm": figures.section.cc_mm, "cl_radius_height_mm": figures.section.cl_mm },
+        "figure_4": track(&figures.constant_cl),
+        "figure_5": { "arc_mm_cl_mm_s": figures.wanted },
+        "figure_7": {
+            "equation_6": track(&figures.linear_printed),
+            "tolerance_held": track(&figures.linear_held),
+            "tolerance_held_1_ms": track(&figures.linear_1_ms),
+        },
+        "figure_8": { "cubics": track(&figures.curve), "ends_arc_mm_cl_mm_s": figures.curve_ends },
+        "figure_9": track(&figures.surface),
+    })
+}
+
+/// The key of a figure: a class of the style sheet and what it stands for.
+fn legend(out: &mut String, entries: &[(&str, &str)]) {
+    out.push_str("<p class=\"legend\">");
+    for (class, what) in entries {
+        let _ = write!(out, "<span><i class=\"{class}\"></i>{what}</span>");
+    }
+    out.push_str("</p>\n");
+}

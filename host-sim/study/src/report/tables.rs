@@ -1,0 +1,112 @@
+//! The tables of the page.
+
+use std::fmt::Write;
+
+use super::{percent, shown};
+use crate::paper::{Comparison, Item, Row, Study};
+use ::report::number::fixed;
+use ::report::svg::escape;
+use approach::Kind;
+use verify::speeds::Span;
+
+/// The four approaches on whole jobs.
+pub(super) fn comparisons(out: &mut String, study: &Study) {
+    out.push_str(
+        "<section><h2>Four approaches on whole jobs</h2>\n\
+         <p>Each job at the same scallop height, tolerance and feed for all. A period is 1 ms where none is named. The times leave out \
+         links between passes.</p>\n",
+    );
+    for comparison in &study.comparisons {
+        table(out, comparison);
+    }
+    out.push_str("</section>\n");
+}
+
+fn table(out: &mut String, comparison: &Comparison) {
+    let _ = writeln!(
+        out,
+        "<div class=\"scroll\"><table class=\"wide\"><caption>{} <span class=\"sub\">(feed {} mm/s, scallop {} mm, tolerance {} mm)</span>\
+         </caption>\n<thead><tr><th>approach</th><th>time<br/>min</th><th>segments</th><th>program<br/>bytes</th><th>ripple<br/>%, most</th>\
+         <th>ripple<br/>%, rms</th><th>CC speed<br/>mm/s</th><th>CL speed<br/>mm/s</th><th>CL steps<br/>mm/s</th></tr></thead><tbody>",
+        escape(comparison.title),
+        comparison.feed_mm_s,
+        comparison.scallop_mm,
+        comparison.chord_mm
+    );
+    for row in &comparison.rows {
+        let Row { measured, .. } = row;
+        let range = |span: &Span| format!("{:.2} to {:.2}", span.min, span.max);
+        let segments = shown(measured.planned.segments as f64, 0);
+        let segments = match (row.kind, measured.planned.segments) {
+            (Kind::Surface, 1) => "1 patch".to_owned(),
+            (Kind::Surface, _) => format!("{segments} patches"),
+            _ => segments,
+        };
+        let _ = writeln!(
+            out,
+            "<tr{}><th scope=\"row\">{}</th><td>{:.2}</td><td>{segments}</td><td>{}</td><td>{}</td><td>{}</td><td>{}</td><td>{}</td>\
+             <td>{:.2}</td></tr>",
+            if row.kind == Kind::Surface {
+                " class=\"best\""
+            } else {
+                ""
+            },
+            row.name(),
+            measured.time_s / 60.0,
+            shown(measured.planned.bytes as f64, 0),
+            percent(measured.findings.report.ripple_pct.max),
+            percent(measured.findings.report.ripple_pct.rms()),
+            range(&measured.findings.speeds.cc),
+            range(&measured.findings.speeds.cl),
+            measured.findings.speeds.cl_step_mm_s
+        );
+    }
+    out.push_str("</tbody></table></div>\n");
+}
+
+/// Every number of the paper, part by part.
+pub(super) fn items(out: &mut String, study: &Study) {
+    out.push_str(
+        "<section><h2>Every number</h2>\n<p>Printed in the paper, and ours; no difference where the paper prints none.</p>\n",
+    );
+    let parts = study.items.chunk_by(|a, b| a.part == b.part);
+    for items in parts {
+        let _ = writeln!(
+            out,
+            "<div class=\"scroll\"><table class=\"wide\"><caption>{}</caption>\n<thead><tr><th></th><th>printed</th><th>ours</th>\
+             <th>difference</th><th class=\"left\"></th></tr></thead><tbody>",
+            items.first().map_or("", |item| item.part)
+        );
+        for item in items {
+            row(out, item);
+        }
+        out.push_str("</tbody></table></div>\n");
+    }
+    out.push_str("</section>\n");
+}
+
+fn row(out: &mut String, item: &Item) {
+    let unit = if item.unit.is_empty() {
+        String::new()
+    } else {
+        format!(", {}", item.unit)
+    };
+    let value =
+        |value: Option<f64>, none: &str| value.map_or(none.to_owned(), |value| shown(value, item.decimals));
+    let difference = item.difference_pct().map_or(String::new(), |difference| {
+        let magnitude = fixed(difference.abs(), 1);
+        match difference {
+            _ if magnitude == "0.0" => "0.0 %".to_owned(),
+            d if d < 0.0 => format!("−{magnitude} %"),
+            _ => format!("+{magnitude} %"),
+        }
+    });
+    let _ = writeln!(
+        out,
+        "<tr><th scope=\"row\">{}{unit}</th><td>{}</td><td>{}</td><td>{difference}</td><td class=\"note\">{}</td></tr>",
+        escape(&item.what),
+        value(item.printed, ""),
+        value(item.ours, "not yet"),
+        escape(&item.note)
+    );
+}

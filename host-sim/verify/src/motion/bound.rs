@@ -1,0 +1,236 @@
+//! A lower bound of the time that a pass takes from standstill to standstill.
+//!
+//! Two relaxations are joined. Within the pass jerk is left out: velocity and acceleration alone give the largest speed that any motion
+//! can have at each place, by a backward and a forward sweep over `v^2` (Q.-C. Pham, H. Pham, "A New Approach to Time-Optimal Path
+//! Parameterization Based on Reachability Analysis", IEEE Trans. Robotics 34, 2018). At each end the path is left out but for how far the
+//! centre gets along its first (last) direction: from standstill that takes a time that jerk limits as well. The better of this and of the
+//! jerk-limited move over the chord counts. Steps of the path's derivatives, which cost time too, are left out.
+
+use super::path::PassPath;
+use super::point::LineLimits;
+use job::AxisLimits;
+use oracle::vector::{Vector, dot, length, scale, subtract};
+
+/// What a path may do within limits of the axes.
+pub(super) trait PathCaps {
+    /// The largest velocity, acceleration and jerk that a motion within the limits can have along a unit direction, whatever it does across.
+    fn along(&self, direction: Vector) -> LineLimits;
+    /// Largest speed of the contact at a place by its feed and the axes' velocities.
+    fn speed_cap(&self, first: Vector, feed_mm_s: f64) -> f64;
+    /// Range of path accelerations (second derivative of the contact's arc by time) that the axes allow, mm/s^2, where the centre's first and
+    /// second derivative by that arc are `first` and `second`, and the square of the speed is `b`. Empty (descending) where there is none.
+    fn accelerations(&self, first: Vector, second: Vector, b: f64) -> [f64; 2];
+}
+
+impl PathCaps for AxisLimits {
+    fn along(&self, direction: Vector) -> LineLimits {
+        let reach = |limit: &[f64; 3]| (0..3).map(|axis| direction[axis].abs() * limit[axis]).sum();
+        LineLimits {
+            velocity: reach(&self.velocity_mm_s),
+            acceleration: reach(&self.acceleration_mm_s2),
+            jerk: reach(&self.jerk_mm_s3),
+        }
+    }
+
+    fn speed_cap(&self, first: Vector, feed_mm_s: f64) -> f64 {
+        (0..3).fold(feed_mm_s, |cap, axis| {
+            cap.min(self.velocity_mm_s[axis] / first[axis].abs())
+        })
+    }
+
+    fn accelerations(&self, first: Vector, second: Vector, b: f64) -> [f64; 2] {
+        let mut range = [f64::NEG_INFINITY, f64::INFINITY];
+        for axis in 0..3 {
+            let (gain, drift, limit) = (first[axis], second[axis] * b, self.acceleration_mm_s2[axis]);
+            if gain.abs() > NO_GAIN {
+                let ends = [(-limit - drift) / gain, (limit - drift) / gain];
+                range[0] = range[0].max(ends[0].min(ends[1]));
+                range[1] = range[1].min(ends[0].max(ends[1]));
+            } else if drift.abs() > limit * (1.0 + NO_GAIN) {
+                return [f64::INFINITY, f64::NEG_INFINITY];
+            }
+        }
+        range
+    }
+}
+
+/// An axis that the path acceleration moves less than this is left out of its range: where it turns round, the ranges would be those of
+/// rounding.
+const NO_GAIN: f64 = 1e-6;
+/// Steps of the sweep over a pass.
+const STEPS: usize = 4000;
+/// Bisections of a squared speed: to the last digits.
+const BISECTIONS: usize = 60;
+
+/// The largest speeds without regard to jerk.
+pub(super) struct Fastest {
+    /// Arc lengths, evenly spaced within each smooth span.
+    pub(super) arcs: Vec<f64>,
+    /// Square of the largest speed there.
+    pub(super) squares: Vec<f64>,
+    firsts: Vec<Vector>,
+    seconds: Vec<Vector>,
+}
+
+impl Fastest {
+    pub(super) fn new(path: &PassPath<'_>, feed_mm_s: f64, limits: &AxisLimits) -> Self {
+        let (mut arcs, mut firsts, mut seconds) = (Vec::new(), Vec::new(), Vec::new());
+        for (span, ends) in path.breaks().windows(2).enumerate() {
+            let share = (ends[1] - ends[0]) / path.length_mm();
+            #[allow(
+                clippy::cast_possible_truncation,
+                clippy::cast_sign_loss,
+                clippy::cast_precision_loss,
+                reason = "a count of steps"
+            )]
+            let (steps, from) = (
+                (share * STEPS as f64).ceil().max(16.0) as usize,
+                usize::from(span > 0),
+            );
+            for k in from..=steps {
+                #[allow(clippy::cast_precision_loss, reason = "a count of steps")]
+                let arc = ends[0] + (ends[1] - ends[0]) * k as f64 / steps as f64;
+                let at = path.at(span, arc);
+                arcs.push(arc);
+                firsts.push(at.first);
+                seconds.push(at.second);
+            }
+        }
+        let count = arcs.len();
+        let mut squares: Vec<f64> = firsts
+            .iter()
+            .map(|first| limits.speed_cap(*first, feed_mm_s).powi(2))
+            .collect();
+        (squares[0], squares[count - 1]) = (0.0, 0.0);
+        let mut fastest = Self {
+            arcs,
+            squares,
+            firsts,
+            seconds,
+        };
+        for k in (0..count - 1).rev() {
+            fastest.squares[k] = fastest.controllable(k, limits);
+        }
+        for k in 0..count - 1 {
+            let [least, most] =
+                limits.accelerations(fastest.firsts[k], fastest.seconds[k], fastest.squares[k]);
+            // At the very speed that leaves no choice rounding may leave none at all.
+            if least <= most {
+                let reached = fastest.squares[k] + 2.0 * fastest.step(k) * most;
+                fastest.squares[k + 1] = fastest.squares[k + 1].min(reached.max(0.0));
+            }
+        }
+        fastest
+    }
+
+    fn step(&self, k: usize) -> f64 {
+        self.arcs[k + 1] - self.arcs[k]
+    }
+
+    /// The largest square from which the next place's can be met.
+    fn controllable(&self, k: usize, limits: &AxisLimits) -> f64 {
+        let (step, next) = (self.step(k), self.squares[k + 1]);
+        let can = |b: f64| {
+            let [least, most] = limits.accelerations(self.firsts[k], self.seconds[k], b);
+            least <= most && b + 2.0 * step * least <= next && b + 2.0 * step * most >= 0.0
+        };
+        let (mut low, mut high) = (0.0, self.squares[k]);
+        if can(high) {
+            return high;
+        }
+        for _ in 0..BISECTIONS {
+            let middle = 0.5 * (low + high);
+            if can(middle) {
+                low = middle;
+            } else {
+                high = middle;
+            }
+        }
+        // From here there is a way on, whatever rounding does: a last digit less than the largest.
+        low
+    }
+
+    /// Time from the beginning to each place, s: every step at the larger speed of its ends, as this is to be a bound.
+    fn times(&self) -> Vec<f64> {
+        let mut time = 0.0;
+        let mut times = vec![0.0];
+        for k in 0..self.arcs.len() - 1 {
+            time += self.step(k) / self.squares[k].max(self.squares[k + 1]).sqrt();
+            times.push(time);
+        }
+        times
+    }
+}
+
+/// Least times from standstill at one end to each place, by the direction in which the path leaves it; in the order of `places`.
+fn leaving(places: &[(Vector, Vector)], feed_mm_s: f64, limits: &AxisLimits) -> Vec<f64> {
+    let Some((from, first)) = places.first() else {
+        return Vec::new();
+    };
+    let direction = scale(*first, 1.0 / length(*first));
+    let along = limits.along(direction);
+    let mut gain = 0.0_f64;
+    let mut best = 0.0_f64;
+    places
+        .iter()
+        .map(|(at, first)| {
+            gain = gain.max(dot(*first, direction).abs());
+            let line = LineLimits {
+                velocity: along.velocity.min(feed_mm_s * gain),
+                ..along
+            };
+            best = best.max(line.reach_s(dot(subtract(*at, *from), direction)));
+            best
+        })
+        .collect()
+}
+
+/// The lower bound, s. 0 for a pass without length.
+#[must_use]
+pub fn lower_bound_s(path: &PassPath<'_>, feed_mm_s: f64, limits: &AxisLimits) -> f64 {
+    if path.length_mm() <= 0.0 {
+        return 0.0;
+    }
+    bound_of(&Fastest::new(path, feed_mm_s, limits), path, feed_mm_s, limits)
+}
+
+pub(super) fn bound_of(fastest: &Fastest, path: &PassPath<'_>, feed_mm_s: f64, limits: &AxisLimits) -> f64 {
+    let times = fastest.times();
+    let whole = times[times.len() - 1];
+    let mut places: Vec<(Vector, Vector)> = fastest
+        .arcs
+        .iter()
+        .zip(&fastest.firsts)
+        .map(|(arc, first)| (path.position(*arc), *first))
+        .collect();
+    let forwards = leaving(&places, feed_mm_s, limits);
+    places.reverse();
+    let mut backwards = leaving(&places, feed_mm_s, limits);
+    backwards.reverse();
+    places.reverse();
+    // What leaving and arriving take more than the sweep has it, at the best place for each, the one before the other.
+    let mut before = 0.0_f64;
+    let mut most = 0.0_f64;
+    for k in 0..times.len() {
+        before = before.max(forwards[k] - times[k]);
+        most = most.max(before + backwards[k] - (whole - times[k]));
+    }
+    let chord = subtract(places[places.len() - 1].0, places[0].0);
+    let distance = length(chord);
+    let mut straight = 0.0;
+    if distance > 0.0 {
+        let direction = scale(chord, 1.0 / distance);
+        let along = limits.along(direction);
+        let gain = fastest
+            .firsts
+            .iter()
+            .map(|first| dot(*first, direction).abs())
+            .fold(0.0, f64::max);
+        let line = LineLimits {
+            velocity: along.velocity.min(feed_mm_s * gain),
+            ..along
+        };
+        straight = line.rest_to_rest_s(distance);
+    }
+    (whole + most).max(straight)
+}

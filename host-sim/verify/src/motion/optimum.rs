@@ -1,0 +1,402 @@
+//! The least time that a pass can be run in, from standstill to standstill: a bound from below, and a motion that holds all limits.
+//!
+//! ```text
+//! PassPath ──bound.rs──► lower bound; largest speeds ──► grid ──programme.rs──► motion, faster each time ──timing.rs──► one
+//!                                                                  ▲  sample a period, differences held against the limits  │
+//!                                                                  └──────────────────── shares of the limits ◄─────────────┘
+//! ```
+//!
+//! The motion is good, not proved to be the best: what is certain is that the least time lies between the two.
+
+use super::bound::{Fastest, PathCaps as _, bound_of};
+use super::path::PassPath;
+use super::programme::{Interval, Profile, Programme};
+use super::timing::Timing;
+use job::AxisLimits;
+
+/// Programmes one after another at most, and the gain below which they end.
+const PROGRAMMES: usize = 30;
+const ENOUGH: f64 = 1e-4;
+/// Times that the limits are shared out anew by what the samples use, and what they may be above.
+const ROUNDS: usize = 5;
+const ABOVE: f64 = 3e-4;
+/// Share of the jerk limit that the motion begins and ends with, before the first node and behind the last; and the share of a whole rise to
+/// the feed, in time, that this takes.
+const END_JERK: f64 = 0.999;
+const END_SHARE: f64 = 0.02;
+/// Intervals: of a whole pass at least, of the way in which the speed changes at its ends and its breaks; and their growth away from these.
+const WHOLE: f64 = 120.0;
+const RAMP: f64 = 40.0;
+const GROWTH: f64 = 0.15;
+/// Change of speed over an interval, as a share of the largest, once a motion is known.
+const CHANGE: f64 = 0.04;
+/// Squared speeds a programme looks from are at least this share of the largest.
+const LEAST: f64 = 1e-9;
+/// Steps of a derivative count as none below this share of a jerk limit.
+const NO_STEP: f64 = 1e-3;
+
+/// What a pass can take at best.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Optimum {
+    /// No motion within the limits is faster, s.
+    pub lower_bound_s: f64,
+    /// A motion within the limits takes this long, s.
+    pub feasible_s: f64,
+    /// Largest use of the limits by that motion's samples: velocity, acceleration, jerk.
+    pub uses: [f64; 3],
+}
+
+/// The solver found no motion.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
+#[error("no motion within the limits was found")]
+pub struct NoMotion;
+
+/// The least time of a pass at this feed of the contact (above 0), with one sample a period: bound and motion. A pass without length
+/// takes no time.
+///
+/// # Errors
+/// [`NoMotion`] where the solver fails.
+pub fn optimum(
+    path: &PassPath<'_>,
+    feed_mm_s: f64,
+    limits: &AxisLimits,
+    period_s: f64,
+) -> Result<Optimum, NoMotion> {
+    if path.length_mm() <= 0.0 {
+        return Ok(Optimum {
+            lower_bound_s: 0.0,
+            feasible_s: 0.0,
+            uses: [0.0; 3],
+        });
+    }
+    let fastest = Fastest::new(path, feed_mm_s, limits);
+    let lower_bound_s = bound_of(&fastest, path, feed_mm_s, limits);
+    let search = Search::new(path, feed_mm_s, limits, period_s, &fastest);
+    let (feasible_s, uses) = search.motion()?;
+    Ok(Optimum {
+        lower_bound_s,
+        feasible_s,
+        uses,
+    })
+}
+
+/// A place where the motion slows down: an end, or a break where the path's derivatives step.
+struct Slow {
+    arc: f64,
+    /// Speed there, mm/s.
+    speed: f64,
+    /// Path jerk there, mm/s^3.
+    jerk: f64,
+}
+
+impl Slow {
+    /// The speed that a rise by jerk alone has at an arc length.
+    fn speed_at(&self, arc: f64) -> f64 {
+        let way = (arc - self.arc).abs();
+        self.speed + 0.5 * self.jerk * (6.0 * way / self.jerk).powf(2.0 / 3.0)
+    }
+}
+
+/// A step of the derivatives at a break.
+struct Step {
+    arc: f64,
+    steps: [[f64; 3]; 2],
+}
+
+struct Search<'a> {
+    path: &'a PassPath<'a>,
+    feed_mm_s: f64,
+    limits: &'a AxisLimits,
+    period_s: f64,
+    fastest: &'a Fastest,
+    slow: Vec<Slow>,
+    steps: Vec<Step>,
+}
+
+/// The nodes of a programme.
+struct Grid {
+    arcs: Vec<f64>,
+    intervals: Vec<Interval>,
+    caps: Vec<f64>,
+}
+
+/// Path jerk that the axes leave at a place.
+fn path_jerk(first: [f64; 3], limits: &AxisLimits) -> f64 {
+    (0..3).fold(f64::INFINITY, |least, axis| {
+        least.min(limits.jerk_mm_s3[axis] / first[axis].abs())
+    })
+}
+
+impl<'a> Search<'a> {
+    fn new(
+        path: &'a PassPath<'a>,
+        feed_mm_s: f64,
+        limits: &'a AxisLimits,
+        period_s: f64,
+        fastest: &'a Fastest,
+    ) -> Self {
+        let length = path.length_mm();
+        let breaks = path.breaks();
+        let end = |span: usize, arc: f64| Slow {
+            arc,
+            speed: 0.0,
+            jerk: END_JERK * path_jerk(path.at(span, arc).first, limits),
+        };
+        let mut slow = vec![end(0, 0.0), end(breaks.len() - 2, length)];
+        let mut steps = Vec::new();
+        for (span, arc) in breaks.iter().enumerate().take(breaks.len() - 1).skip(1) {
+            let (before, after) = (path.at(span - 1, *arc), path.at(span, *arc));
+            let of = |a: [f64; 3], b: [f64; 3]| std::array::from_fn(|axis| (a[axis] - b[axis]).abs());
+            let step = Step {
+                arc: *arc,
+                steps: [of(before.first, after.first), of(before.second, after.second)],
+            };
+            // Half of the jerk limit is left to the steps: the rest is for the ramps beside them.
+            let speed = (0..3).fold(f64::INFINITY, |least, axis| {
+                let [first, second] = [step.steps[0][axis], step.steps[1][axis]];
+                let half = 0.5 * limits.jerk_mm_s3[axis] * period_s;
+                least
+                    .min(half * period_s / first)
+                    .min((half / (0.75 * second)).sqrt())
+            });
+            let counts = (0..3).any(|axis| {
+                let jerk = step.steps[0][axis] * feed_mm_s / period_s.powi(2)
+                    + step.steps[1][axis] * feed_mm_s * feed_mm_s / period_s;
+                jerk > NO_STEP * limits.jerk_mm_s3[axis]
+            });
+            if speed < feed_mm_s {
+                let jerk = path_jerk(before.first, limits).min(path_jerk(after.first, limits));
+                slow.push(Slow {
+                    arc: *arc,
+                    speed,
+                    jerk,
+                });
+            }
+            if counts {
+                steps.push(step);
+            }
+        }
+        Self {
+            path,
+            feed_mm_s,
+            limits,
+            period_s,
+            fastest,
+            slow,
+            steps,
+        }
+    }
+
+    /// A speed that is near to what can be reached: the fastest one without regard to jerk, and rises from the slow places.
+    fn guess(&self, arc: f64) -> f64 {
+        let arcs = &self.fastest.arcs;
+        let after = arcs.partition_point(|at| *at <= arc).clamp(1, arcs.len() - 1);
+        let share = (arc - arcs[after - 1]) / (arcs[after] - arcs[after - 1]);
+        let squares = &self.fastest.squares;
+        let square = squares[after - 1] + share * (squares[after] - squares[after - 1]);
+        self.slow.iter().fold(square.max(0.0).sqrt(), |speed, slow| {
+            speed.min(slow.speed_at(arc))
+        })
+    }
+
+    /// Time that the motion takes before the first node, and behind the last: a rise by the jerk limit.
+    fn end_time_s(&self, end: usize) -> f64 {
+        let jerk = self.slow[end].jerk;
+        // A short pass is not half over by then.
+        let rise = (self.feed_mm_s / jerk).sqrt();
+        let whole = (6.0 * self.path.length_mm() / jerk).cbrt();
+        END_SHARE * rise.min(0.5 * whole)
+    }
+
+    fn end_arc(&self, end: usize) -> f64 {
+        self.slow[end].jerk * self.end_time_s(end).powi(3) / 6.0
+    }
+
+    /// Squared speed and acceleration at the first node, and at the last.
+    fn ends(&self) -> [[f64; 2]; 2] {
+        [0, 1].map(|end| {
+            let (jerk, time) = (self.slow[end].jerk, self.end_time_s(end));
+            let acceleration = if end == 0 { jerk * time } else { -jerk * time };
+            [(0.5 * jerk * time * time).powi(2), acceleration]
+        })
+    }
+
+    /// Length of the interval that begins at an arc length; `known`: a motion there, whose speed changes little in it.
+    fn interval_length(&self, arc: f64, known: Option<(&Grid, &Profile)>) -> f64 {
+        let mut most = self.path.length_mm() / WHOLE;
+        let reach = |slow: &Slow| {
+            // The way in which a rise by jerk alone reaches the feed, twice: as far as speeds change.
+            let time = (2.0 * self.feed_mm_s / slow.jerk).sqrt();
+            (slow.jerk * time.powi(3) / 3.0).min(self.path.length_mm())
+        };
+        for slow in &self.slow {
+            let (way, reach) = ((arc - slow.arc).abs(), reach(slow));
+            if way < 3.0 * reach {
+                let least = (slow.speed * self.period_s).max(0.5 * self.end_arc(0));
+                most = most.min((reach / RAMP).min((GROWTH * way).max(least)));
+            }
+        }
+        for step in &self.steps {
+            let near = 1.5 * self.period_s * self.guess(step.arc);
+            most = most.min((0.5 * (arc - step.arc).abs()).max(near));
+        }
+        if let Some((grid, profile)) = known {
+            let k = grid
+                .arcs
+                .partition_point(|at| *at <= arc)
+                .clamp(1, grid.intervals.len())
+                - 1;
+            // dv/ds = a / v
+            for node in [k, k + 1] {
+                let slope = profile.accelerations[node].abs() / profile.squares[node].sqrt();
+                let largest = self.feed_mm_s;
+                let floor = self.path.length_mm() * 1e-4;
+                if slope > 0.0 {
+                    most = most.min((CHANGE * largest / slope).max(floor.min(most)));
+                }
+            }
+        }
+        most
+    }
+
+    fn grid(&self, known: Option<(&Grid, &Profile)>) -> Grid {
+        let length = self.path.length_mm();
+        let (from, to) = (self.end_arc(0), length - self.end_arc(1));
+        let mut grid = Grid {
+            arcs: vec![from],
+            intervals: Vec::new(),
+            caps: Vec::new(),
+        };
+        for (span, ends) in self.path.breaks().windows(2).enumerate() {
+            let (low, high) = (ends[0].max(from), ends[1].min(to));
+            let mut arc = low;
+            while arc < high {
+                let by = self.interval_length(arc, known);
+                // As small as the next one will be, where they get smaller, and no crumb left over.
+                let by = by.min(self.interval_length((arc + by).min(high), known).max(0.5 * by));
+                let next = if arc + 1.3 * by >= high { high } else { arc + by };
+                let points = [arc, 0.5 * (arc + next), next].map(|at| self.path.at(span, at));
+                grid.intervals.push(Interval {
+                    length: next - arc,
+                    points,
+                    steps: self.steps_near(arc, next),
+                    ease: [1.0; 2],
+                });
+                grid.arcs.push(next);
+                arc = next;
+            }
+        }
+        let cap = |first| self.limits.speed_cap(first, self.feed_mm_s).powi(2);
+        grid.caps = vec![f64::INFINITY; grid.arcs.len()];
+        for (k, interval) in grid.intervals.iter().enumerate() {
+            grid.caps[k] = grid.caps[k].min(cap(interval.points[0].first));
+            grid.caps[k + 1] = grid.caps[k + 1].min(cap(interval.points[2].first));
+        }
+        grid
+    }
+
+    /// The largest steps of the derivatives that a period can see from between two arc lengths.
+    fn steps_near(&self, low: f64, high: f64) -> [[f64; 3]; 2] {
+        let mut most = [[0.0_f64; 3]; 2];
+        for step in &self.steps {
+            let near = 1.5 * self.period_s * self.guess(step.arc) + 1e-12;
+            if low <= step.arc + near && high >= step.arc - near {
+                for (most, step) in most.iter_mut().flatten().zip(step.steps.iter().flatten()) {
+                    *most = most.max(*step);
+                }
+            }
+        }
+        most
+    }
+
+    /// The fastest motion found: its duration, and what its samples use of the limits.
+    fn motion(&self) -> Result<(f64, [f64; 3]), NoMotion> {
+        let coarse = self.grid(None);
+        let floor = LEAST * self.feed_mm_s.powi(2);
+        let guess: Vec<f64> = coarse
+            .arcs
+            .iter()
+            .map(|arc| self.guess(*arc).powi(2).max(floor))
+            .collect();
+        let profile = self.improved(&coarse, guess)?;
+        let mut grid = self.grid(Some((&coarse, &profile)));
+        let mut guess: Vec<f64> = grid
+            .arcs
+            .iter()
+            .map(|arc| interpolated(&coarse, &profile, *arc).max(floor))
+            .collect();
+        let mut best: Option<(f64, [f64; 3])> = None;
+        for _ in 0..ROUNDS {
+            let profile = self.improved(&grid, guess)?;
+            let timing = self.timing(&grid, &profile);
+            let (uses, most) = timing.uses(self.path, self.limits, self.period_s);
+            // Slower by one factor until the samples hold every limit.
+            let slower = uses[0].max(uses[1].sqrt()).max(uses[2].cbrt()).max(1.0);
+            let time = timing.duration_s() * slower;
+            if best.is_none_or(|(least, _)| time < least) {
+                let powers = [slower, slower.powi(2), slower.powi(3)];
+                best = Some((time, std::array::from_fn(|k| uses[k] / powers[k])));
+            }
+            if slower <= 1.0 + ABOVE {
+                break;
+            }
+            for (interval, most) in grid.intervals.iter_mut().zip(most) {
+                for (ease, most) in interval.ease.iter_mut().zip(most) {
+                    *ease /= most.max(1.0);
+                }
+            }
+            guess = profile.squares.iter().map(|square| square.max(floor)).collect();
+        }
+        best.ok_or(NoMotion)
+    }
+
+    /// Programme after programme, each around the motion of the one before.
+    fn improved(&self, grid: &Grid, mut around: Vec<f64>) -> Result<Profile, NoMotion> {
+        let floor = LEAST * self.feed_mm_s.powi(2);
+        let mut best: Option<(f64, Profile)> = None;
+        for _ in 0..PROGRAMMES {
+            let programme = Programme {
+                intervals: &grid.intervals,
+                limits: self.limits,
+                caps: &grid.caps,
+                period_s: self.period_s,
+                ends: self.ends(),
+            };
+            let Some(profile) = programme.solve(&around) else {
+                break;
+            };
+            around = profile.squares.iter().map(|square| square.max(floor)).collect();
+            let time = self.timing(grid, &profile).duration_s();
+            let gain = best
+                .as_ref()
+                .map_or(f64::INFINITY, |(least, _)| 1.0 - time / least);
+            if gain > 0.0 {
+                best = Some((time, profile));
+            }
+            if gain < ENOUGH {
+                break;
+            }
+        }
+        best.map(|(_, profile)| profile).ok_or(NoMotion)
+    }
+
+    fn timing(&self, grid: &Grid, profile: &Profile) -> Timing {
+        Timing::new(
+            &grid.arcs,
+            profile,
+            [0, 1].map(|end| (self.slow[end].jerk, self.end_time_s(end))),
+            self.path.length_mm(),
+        )
+    }
+}
+
+/// Squared speed of a motion between its nodes.
+fn interpolated(grid: &Grid, profile: &Profile, arc: f64) -> f64 {
+    let k = grid
+        .arcs
+        .partition_point(|at| *at <= arc)
+        .clamp(1, grid.intervals.len())
+        - 1;
+    let share = ((arc - grid.arcs[k]) / grid.intervals[k].length).clamp(0.0, 1.0);
+    profile.squares[k] + share * (profile.squares[k + 1] - profile.squares[k])
+}

@@ -1,0 +1,170 @@
+//! Bound and motion against closed forms.
+
+use super::point::LineLimits;
+use super::*;
+use job::AxisLimits;
+
+const PERIOD_S: f64 = 1e-3;
+
+/// A straight pass along a direction.
+fn line(length: f64, direction: [f64; 3]) -> PassPath<'static> {
+    PassPath::new(&[0.0, 1.0], move |t| CurvePoint {
+        cl_mm: direction.map(|d| d * length * t),
+        cl_velocity: direction.map(|d| d * length),
+        cc_speed: length,
+    })
+}
+
+/// The contact runs along a circle of this radius, the centre along one of `ratio` times it.
+fn circle(radius: f64, ratio: f64, turns: f64) -> PassPath<'static> {
+    let angle = turns * std::f64::consts::TAU;
+    PassPath::new(&[0.0, angle], move |t| {
+        let (sin, cos) = t.sin_cos();
+        let centre = ratio * radius;
+        CurvePoint {
+            cl_mm: [centre * cos, centre * sin, 0.0],
+            cl_velocity: [-centre * sin, centre * cos, 0.0],
+            cc_speed: radius,
+        }
+    })
+}
+
+fn found(path: &PassPath<'_>, feed: f64, limits: &AxisLimits) -> Optimum {
+    let found = optimum(path, feed, limits, PERIOD_S).unwrap();
+    assert!(found.uses.iter().all(|use_| *use_ <= 1.0 + 1e-9), "{found:?}");
+    assert!(found.lower_bound_s <= found.feasible_s, "{found:?}");
+    found
+}
+
+#[test]
+fn straight_passes_take_what_the_closed_form_says() {
+    let usual = AxisLimits::DEFAULT;
+    let mut worst = 0.0_f64;
+    let (along_x, slanted) = ([1.0, 0.0, 0.0], [0.6, 0.0, 0.8]);
+    for (length, feed, direction) in [
+        (1.0, 10.0, along_x),
+        (10.0, 30.0, slanted),
+        (60.0, 200.0, along_x),
+        (200.0, 50.0, slanted),
+        (0.2, 50.0, slanted),
+    ] {
+        let found = found(&line(length, direction), feed, &usual);
+        let gain = |limit: [f64; 3]| {
+            (0..3).fold(f64::INFINITY, |least, k| {
+                least.min(limit[k] / f64::abs(direction[k]))
+            })
+        };
+        let exact = LineLimits {
+            velocity: gain(usual.velocity_mm_s).min(feed),
+            acceleration: gain(usual.acceleration_mm_s2),
+            jerk: gain(usual.jerk_mm_s3),
+        }
+        .rest_to_rest_s(length);
+        worst = worst.max((found.feasible_s / exact - 1.0).abs());
+        assert!(found.lower_bound_s <= exact * (1.0 + 1e-9));
+        if direction[2] == 0.0 {
+            assert!(found.lower_bound_s >= 0.995 * exact, "{found:?} {exact}");
+        }
+    }
+    assert!(worst <= 0.005, "{worst}");
+}
+
+/// Around a circle the speed is the least of the feed, sqrt(A R) and cbrt(J R^2).
+#[test]
+fn circles_run_at_the_speed_that_their_limits_allow() {
+    for (radius, ratio, feed, limits) in [
+        (
+            20.0,
+            1.0,
+            200.0,
+            AxisLimits {
+                velocity_mm_s: [500.0; 3],
+                acceleration_mm_s2: [500.0; 3],
+                jerk_mm_s3: [1e6; 3],
+            },
+        ),
+        (
+            20.0,
+            0.5,
+            200.0,
+            AxisLimits {
+                velocity_mm_s: [500.0; 3],
+                acceleration_mm_s2: [5000.0; 3],
+                jerk_mm_s3: [20_000.0; 3],
+            },
+        ),
+    ] {
+        let [one, two] = [1.0, 2.0].map(|turns| found(&circle(radius, ratio, turns), feed, &limits));
+        let centre: f64 = ratio * radius;
+        let cap = (500.0_f64)
+            .min((limits.acceleration_mm_s2[0] * centre).sqrt())
+            .min((limits.jerk_mm_s3[0] * centre * centre).cbrt());
+        let exact = std::f64::consts::TAU * radius / (cap / ratio).min(feed);
+        // One turn more, at constant speed. The axes of a square of limits allow a little more between their directions.
+        let turn = two.feasible_s - one.feasible_s;
+        assert!(turn <= 1.002 * exact && turn >= 0.85 * exact, "{turn} {exact}");
+    }
+}
+/// A bend of a quarter turn with a small radius between two straight lines: the tool slows down for it.
+#[test]
+fn a_corner_is_taken_slower_than_what_leads_to_it() {
+    let (side, radius) = (20.0, 0.5);
+    let angle = std::f64::consts::FRAC_PI_2;
+    let ends = [0.0, side, side + radius * angle, 2.0 * side + radius * angle];
+    let bend = PassPath::new(&ends, move |s| {
+        let (cl_mm, cl_velocity) = if s < ends[1] {
+            ([s, 0.0, 0.0], [1.0, 0.0, 0.0])
+        } else if s < ends[2] {
+            let (sin, cos) = ((s - ends[1]) / radius).sin_cos();
+            ([side + radius * sin, radius * (1.0 - cos), 0.0], [cos, sin, 0.0])
+        } else {
+            ([side + radius, radius + s - ends[2], 0.0], [0.0, 1.0, 0.0])
+        };
+        CurvePoint {
+            cl_mm,
+            cl_velocity,
+            cc_speed: 1.0,
+        }
+    });
+    let whole = found(&bend, 50.0, &AxisLimits::DEFAULT);
+    let straight = LineLimits {
+        velocity: 50.0,
+        acceleration: 1000.0,
+        jerk: 20_000.0,
+    };
+    // Between running through at the feed and stopping on both sides of the bend.
+    let through = straight.rest_to_rest_s(2.0 * side + radius * angle);
+    let stopping = 2.0 * straight.rest_to_rest_s(side)
+        + found(&circle(radius, 1.0, 0.25), 50.0, &AxisLimits::DEFAULT).feasible_s;
+    assert!(whole.feasible_s > through * 1.05, "{through} {whole:?}");
+    assert!(whole.feasible_s < stopping, "{stopping} {whole:?}");
+    assert!(whole.lower_bound_s >= through);
+}
+
+/// Where the centre's speed steps at a knot, one period sees a jerk of the step over T^2: the tool nearly stops there.
+#[test]
+fn a_step_of_the_speed_is_crossed_slowly() {
+    let ratio = 1.2;
+    let kink = PassPath::new(&[0.0, 10.0, 20.0], move |s| {
+        let gain = if s < 10.0 { 1.0 } else { ratio };
+        CurvePoint {
+            cl_mm: [if s < 10.0 { s } else { 10.0 + ratio * (s - 10.0) }, 0.0, 0.0],
+            cl_velocity: [gain, 0.0, 0.0],
+            cc_speed: 1.0,
+        }
+    });
+    let stepped = found(&kink, 20.0, &AxisLimits::DEFAULT);
+    let straight = LineLimits {
+        velocity: 20.0,
+        acceleration: 1000.0,
+        jerk: 20_000.0,
+    };
+    assert!(
+        stepped.feasible_s > straight.rest_to_rest_s(20.0) + 0.02,
+        "{stepped:?}"
+    );
+    assert!(
+        stepped.feasible_s < 2.02 * straight.rest_to_rest_s(10.0),
+        "{stepped:?}"
+    );
+}

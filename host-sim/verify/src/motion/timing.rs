@@ -1,0 +1,165 @@
+//! When a motion along a pass is where, and what its samples use of the limits.
+
+use super::path::PassPath;
+use super::programme::Profile;
+use job::AxisLimits;
+
+/// Newton steps to the time that an interval takes: they double the digits from a good beginning.
+const NEWTON_STEPS: usize = 20;
+/// Below this `c t^2` the motion is a polynomial to the last digit.
+const SERIES: f64 = 1e-3;
+
+/// Between two nodes: arc, speed, acceleration at the first; rate of the acceleration with the arc, 1/s^2.
+struct Piece {
+    time: f64,
+    arc: f64,
+    speed: f64,
+    acceleration: f64,
+    rate: f64,
+}
+
+impl Piece {
+    /// Way and speed after a time: `x'' = a + c x`.
+    fn after(&self, t: f64) -> [f64; 2] {
+        let (a, c, v) = (self.acceleration, self.rate, self.speed);
+        let z = c * t * t;
+        // (cosh - 1) / z and sinh / sqrt z, continued to z below 0.
+        let (even, odd, cosh) = if z.abs() < SERIES {
+            (
+                0.5 + z / 24.0 * (1.0 + z / 30.0 * (1.0 + z / 56.0)),
+                1.0 + z / 6.0 * (1.0 + z / 20.0 * (1.0 + z / 42.0)),
+                1.0 + z / 2.0 * (1.0 + z / 12.0 * (1.0 + z / 30.0)),
+            )
+        } else if z > 0.0 {
+            let root = z.sqrt();
+            ((root.cosh() - 1.0) / z, root.sinh() / root, root.cosh())
+        } else {
+            let root = (-z).sqrt();
+            ((root.cos() - 1.0) / z, root.sin() / root, root.cos())
+        };
+        [a * t * t * even + v * t * odd, a * t * odd + v * cosh]
+    }
+
+    /// Time to the end of the interval.
+    fn duration(&self, length: f64, next_speed: f64) -> f64 {
+        let mut t = 2.0 * length / (self.speed + next_speed);
+        for _ in 0..NEWTON_STEPS {
+            let [way, speed] = self.after(t);
+            let by = (length - way) / speed.max(1e-12);
+            t = (t + by).max(0.0);
+            if by.abs() <= 1e-15 * t {
+                break;
+            }
+        }
+        t
+    }
+}
+
+/// A motion by time.
+pub(super) struct Timing {
+    pieces: Vec<Piece>,
+    /// Jerk and duration of the rise before the first piece and of the fall behind the last.
+    ends: [(f64, f64); 2],
+    /// When the fall begins.
+    fall: f64,
+    length: f64,
+}
+
+impl Timing {
+    pub(super) fn new(arcs: &[f64], profile: &Profile, ends: [(f64, f64); 2], length: f64) -> Self {
+        let mut time = ends[0].1;
+        let mut pieces = Vec::with_capacity(arcs.len());
+        let speed = |node: usize| profile.squares[node].max(0.0).sqrt();
+        for k in 0..arcs.len() - 1 {
+            let way = arcs[k + 1] - arcs[k];
+            let [a, next] = [profile.accelerations[k], profile.accelerations[k + 1]];
+            let piece = Piece {
+                time,
+                arc: arcs[k],
+                speed: speed(k),
+                acceleration: a,
+                rate: (next - a) / way,
+            };
+            time += piece.duration(way, speed(k + 1));
+            pieces.push(piece);
+        }
+        Self {
+            pieces,
+            ends,
+            fall: time,
+            length,
+        }
+    }
+
+    pub(super) fn duration_s(&self) -> f64 {
+        self.fall + self.ends[1].1
+    }
+
+    /// Arc length at a time, and the interval that it lies in.
+    fn at(&self, time: f64) -> (f64, usize) {
+        let [(rise, _), (fall, last)] = self.ends;
+        let piece = self
+            .pieces
+            .partition_point(|piece| piece.time <= time)
+            .clamp(1, self.pieces.len())
+            - 1;
+        let arc = if time < self.ends[0].1 {
+            rise * time.max(0.0).powi(3) / 6.0
+        } else if time >= self.fall {
+            self.length - fall * (self.fall + last - time).max(0.0).powi(3) / 6.0
+        } else {
+            let from = &self.pieces[piece];
+            from.arc + from.after(time - from.time)[0]
+        };
+        (arc.clamp(0.0, self.length), piece)
+    }
+
+    /// Largest uses of the limits by samples one a period: of all, and of acceleration and jerk in each interval.
+    pub(super) fn uses(
+        &self,
+        path: &PassPath<'_>,
+        limits: &AxisLimits,
+        period_s: f64,
+    ) -> ([f64; 3], Vec<[f64; 2]>) {
+        let mut uses = [0.0_f64; 3];
+        let mut most = vec![[0.0_f64; 2]; self.pieces.len()];
+        let mut last = [[0.0; 3]; 3];
+        last[0] = path.position(0.0);
+        let mut intervals = [0_usize; 4];
+        #[allow(
+            clippy::cast_possible_truncation,
+            clippy::cast_sign_loss,
+            reason = "a count of periods"
+        )]
+        let periods = (self.duration_s() / period_s).ceil() as u32 + 3;
+        let unit = [
+            (limits.velocity_mm_s, period_s),
+            (limits.acceleration_mm_s2, period_s.powi(2)),
+            (limits.jerk_mm_s3, period_s.powi(3)),
+        ];
+        for tick in 1..=periods {
+            let (arc, interval) = self.at(f64::from(tick) * period_s);
+            intervals.rotate_right(1);
+            intervals[0] = interval;
+            let mut value = path.position(arc);
+            let mut here = [0.0_f64; 3];
+            for (order, last) in last.iter_mut().enumerate() {
+                let before = std::mem::replace(last, value);
+                let (limit, per) = unit[order];
+                for axis in 0..3 {
+                    value[axis] -= before[axis];
+                    here[order] = here[order].max(value[axis].abs() / per / limit[axis]);
+                }
+            }
+            for (most, use_) in uses.iter_mut().zip(here) {
+                *most = most.max(use_);
+            }
+            let [newest, .., oldest] = intervals;
+            for interval in &mut most[oldest..=newest.max(oldest)] {
+                interval[0] = interval[0].max(here[1]);
+                interval[1] = interval[1].max(here[2]);
+            }
+        }
+        (uses, most)
+    }
+}

@@ -1,0 +1,140 @@
+//! Follows a stream of samples: counts, measures against the oracle, writes the trace.
+
+use crate::Sample;
+use crate::speeds::{SpeedFigures, Speeds};
+use crate::trace::Trace;
+use oracle::{Checked, Emitted, Oracle, Report, Verifier};
+
+const MM_PER_NM: f64 = 1e-6;
+
+/// What a run came to.
+#[derive(Clone, Debug)]
+pub struct Findings {
+    /// Samples, which is also the periods that the run took.
+    pub samples: u64,
+    /// Passes.
+    pub passes: u32,
+    /// Speeds of contact and centre, and the centre's length.
+    pub speeds: SpeedFigures,
+    /// Least candidate of the path interval, in units of the side parameter; infinite where there was none.
+    pub interval_min: f64,
+    /// What the oracle found.
+    pub report: Report,
+}
+
+/// A sample that waits for the next one, which tells whether it is the last of its pass.
+#[derive(Clone, Copy)]
+struct Pending {
+    sample: Sample,
+    first: bool,
+}
+
+/// What wants every sample of a run, with what its check found.
+pub type Each<'a> = dyn FnMut(&Emitted, &Checked) + 'a;
+
+/// The follower of one run.
+pub struct Survey<'a> {
+    verifier: Verifier,
+    trace: Option<Trace>,
+    each: Option<&'a mut Each<'a>>,
+    pending: Option<Pending>,
+    samples: u64,
+    oracle: Oracle,
+    speeds: Speeds,
+    ratio_step: f64,
+    feed_mm_s: f64,
+    interval_min: f64,
+}
+
+impl<'a> Survey<'a> {
+    /// A follower of a run of this job; it writes the trace, if there is one, and hands every sample on to `each`, with
+    /// what its check found.
+    #[must_use]
+    pub fn new(oracle: &Oracle, trace: Option<Trace>, each: Option<&'a mut Each<'a>>) -> Self {
+        Self {
+            verifier: Verifier::new(oracle),
+            trace,
+            each,
+            pending: None,
+            samples: 0,
+            oracle: oracle.clone(),
+            speeds: Speeds::new(oracle.period_s),
+            ratio_step: 0.0,
+            feed_mm_s: 0.0,
+            interval_min: f64::INFINITY,
+        }
+    }
+
+    /// The next sample of the run.
+    ///
+    /// # Errors
+    /// The trace cannot be written.
+    pub fn add(&mut self, sample: &Sample) -> std::io::Result<()> {
+        self.samples += 1;
+        if let Some(trace) = &mut self.trace {
+            trace.write(sample)?;
+        }
+        let stands = |before: &Pending| {
+            before.sample.pass == sample.pass && before.sample.parameters == sample.parameters
+        };
+        if sample.parameters.is_none() || self.pending.as_ref().is_some_and(stands) {
+            return Ok(());
+        }
+        let first = match self.pending {
+            Some(before) => {
+                let over = before.sample.pass != sample.pass;
+                self.emit(before, over);
+                over
+            }
+            None => true,
+        };
+        self.interval_min = self.interval_min.min(sample.interval.into());
+        self.pending = Some(Pending {
+            sample: *sample,
+            first,
+        });
+        Ok(())
+    }
+
+    fn emit(&mut self, Pending { sample, first }: Pending, last: bool) {
+        let Some(emitted) = sample.emitted(first, last) else {
+            return;
+        };
+        let checked = self.verifier.add(&emitted);
+        self.speeds.add(
+            &emitted,
+            checked.arc_mm,
+            sample.cl_nm.map(|nm| f64::from(nm) * MM_PER_NM),
+        );
+        if first {
+            // A place without a normal is the verifier's to report.
+            let (_, side) = self.oracle.swapped(emitted.u, emitted.v);
+            self.ratio_step = self.ratio_step.max(self.oracle.ratio_step(side).unwrap_or(0.0));
+            self.feed_mm_s = self.feed_mm_s.max(emitted.feed_mm_s);
+        }
+        if let Some(each) = &mut self.each {
+            each(&emitted, &checked);
+        }
+    }
+
+    /// The findings, after the run's last sample; `complete` if the run came to its end.
+    ///
+    /// # Errors
+    /// The trace cannot be written.
+    pub fn finish(mut self, complete: bool) -> std::io::Result<Findings> {
+        if let Some(pending) = self.pending {
+            self.emit(pending, complete);
+        }
+        if let Some(trace) = self.trace {
+            trace.finish()?;
+        }
+        let report = self.verifier.finish();
+        Ok(Findings {
+            samples: self.samples,
+            passes: self.pending.map_or(0, |pending| pending.sample.pass + 1),
+            speeds: self.speeds.finish(self.ratio_step * self.feed_mm_s),
+            interval_min: self.interval_min,
+            report,
+        })
+    }
+}

@@ -1,0 +1,55 @@
+//! How far the axes travel for a tool path.
+
+use super::track::Track;
+use job::AXES;
+use job::Machine;
+
+/// How far the axes travel.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Axes {
+    /// Least and largest position of each axis, mm; `None` without samples.
+    pub extent_mm: Option<[[f64; 2]; 3]>,
+    /// By how much the path leaves the travel of each axis, below and above, mm: 0 where it does not, or no travel is given.
+    pub beyond_mm: [[f64; 2]; 3],
+}
+
+impl Axes {
+    /// Measures a tool path.
+    #[must_use]
+    pub fn new(track: &Track, machine: &Machine) -> Self {
+        let extent_mm = track.extent_mm();
+        let mut beyond_mm = [[0.0; 2]; 3];
+        if let (Some(extent), Some(travel)) = (extent_mm, machine.travel_mm) {
+            for axis in 0..3 {
+                beyond_mm[axis] = [
+                    (travel[axis][0] - extent[axis][0]).max(0.0),
+                    (extent[axis][1] - travel[axis][1]).max(0.0),
+                ];
+            }
+        }
+        Self { extent_mm, beyond_mm }
+    }
+
+    /// Whether the path stays within the travel of every axis.
+    #[must_use]
+    pub fn within_travel(&self) -> bool {
+        self.beyond_mm.iter().flatten().all(|beyond| *beyond <= 0.0)
+    }
+
+    /// A sentence for each axis that the path leaves.
+    pub(super) fn failures(&self, machine: &Machine) -> Vec<String> {
+        let (Some(extent), Some(travel)) = (self.extent_mm, machine.travel_mm) else {
+            return Vec::new();
+        };
+        (0..3)
+            .filter(|axis| self.beyond_mm[*axis].iter().any(|beyond| *beyond > 0.0))
+            .map(|axis| {
+                let ([low, high], [least, most]) = (extent[axis], travel[axis]);
+                format!(
+                    "{} runs from {low:.3} to {high:.3} mm, but machine.travel_mm ends at {least} and {most} mm: move the part or the travel",
+                    AXES[axis]
+                )
+            })
+            .collect()
+    }
+}

@@ -1,0 +1,209 @@
+//! A grid of cells over the surface, fine enough for what a surface of degree three can do between two knots.
+
+use rayon::prelude::*;
+
+use job::Along;
+use oracle::vector::{cross, dot, length, scale, subtract};
+use oracle::{Derivatives, Oracle};
+
+/// Cells a side of a span at least: a cubic has no feature narrower than a twelfth of its span.
+const SPAN_CELLS: usize = 12;
+/// A cell's side, as a share of the ball's radius, at most.
+const CELL_SHARE: f64 = 1.0 / 24.0;
+/// Lines along which a span's length is taken.
+const LENGTH_LINES: usize = 5;
+/// Cells of the grid at most: coarser ones are split where it matters.
+const CELLS_MAX: usize = 400_000;
+/// `|S_u x S_v|` below this share of `|S_u| |S_v|` counts as degenerate: as for the core.
+const SINE_MIN: f64 = 1e-3;
+/// A first derivative shorter than this share of the other one (each times its range) is too close to a pole: the curvature would
+/// be a quotient of roundings.
+const POLE_SHARE: f64 = 1e-5;
+
+/// Curvature at a place.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Bend {
+    /// Least and largest principal curvature towards the tool, 1/mm.
+    pub(super) principal: [f64; 2],
+    /// Change of u, and of v, within a millimetre on the surface, at most.
+    pub(super) per_mm: [f64; 2],
+}
+
+/// Tool normal and curvature; `None` where the derivatives do not span a plane, and close to a pole.
+pub(super) fn bend(at: &Derivatives, oracle: &Oracle) -> Option<([f64; 3], Bend)> {
+    let (speed_u, speed_v) = (length(at.u), length(at.v));
+    let [[u0, u1], [v0, v1]] = oracle.surface.domain();
+    let reach = (speed_u * (u1 - u0), speed_v * (v1 - v0));
+    if reach.0.min(reach.1) <= POLE_SHARE * reach.0.max(reach.1) {
+        return None;
+    }
+    let product = cross(at.u, at.v);
+    let area = length(product);
+    if area.is_nan() || area <= SINE_MIN * speed_u * speed_v || area <= 0.0 {
+        return None;
+    }
+    let normal = scale(product, oracle.normal_sign / area);
+    let (e, f, g) = (dot(at.u, at.u), dot(at.u, at.v), dot(at.v, at.v));
+    let (l, m, n) = (dot(at.uu, normal), dot(at.uv, normal), dot(at.vv, normal));
+    let mean = 0.5 * (e * n - 2.0 * f * m + g * l) / (area * area);
+    let gauss = (l * n - m * m) / (area * area);
+    let spread = (mean * mean - gauss).max(0.0).sqrt();
+    let bend = Bend {
+        principal: [mean - spread, mean + spread],
+        per_mm: [speed_v / area, speed_u / area],
+    };
+    Some((normal, bend))
+}
+
+/// The grid: edges of the cells along u and v, and the curvature in each cell's middle.
+#[derive(Debug)]
+pub(super) struct Grid {
+    pub(super) edges: [Vec<f64>; 2],
+    /// v fastest; `None` in degenerate cells.
+    pub(super) bends: Vec<Option<Bend>>,
+}
+
+/// Part of the surface between two parameters of each kind.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Cell {
+    pub(super) u: [f64; 2],
+    pub(super) v: [f64; 2],
+}
+
+impl Cell {
+    pub(super) fn middle(&self) -> (f64, f64) {
+        (0.5 * (self.u[0] + self.u[1]), 0.5 * (self.v[0] + self.v[1]))
+    }
+
+    /// Its quarters.
+    pub(super) fn quarters(&self) -> [Self; 4] {
+        let (u, v) = self.middle();
+        let (us, vs) = ([[self.u[0], u], [u, self.u[1]]], [[self.v[0], v], [v, self.v[1]]]);
+        std::array::from_fn(|k| Self {
+            u: us[k / 2],
+            v: vs[k % 2],
+        })
+    }
+}
+
+impl Grid {
+    pub(super) fn new(oracle: &Oracle) -> Self {
+        let spans = [Along::U, Along::V].map(|along| span_lengths(oracle, along));
+        let cells = |share: f64| {
+            spans.each_ref().map(|lengths| {
+                let count =
+                    |length: &f64| ((length / (share * oracle.radius_mm)).ceil() as usize).max(SPAN_CELLS);
+                lengths.iter().map(count).collect::<Vec<usize>>()
+            })
+        };
+        let mut share = CELL_SHARE;
+        let mut counts = cells(share);
+        // Twice as large cells are a quarter as many: ends where every span has its least.
+        for _ in 0..32 {
+            let total: usize = counts.iter().map(|counts| counts.iter().sum::<usize>()).product();
+            if total <= CELLS_MAX {
+                break;
+            }
+            share *= 1.5;
+            counts = cells(share);
+        }
+        let edges = [(Along::U, &counts[0]), (Along::V, &counts[1])].map(|(along, counts)| {
+            let breaks = oracle.surface.breaks(along);
+            let mut edges = vec![breaks[0]];
+            for (span, count) in breaks.windows(2).zip(counts) {
+                edges.extend((1..*count).map(|k| {
+                    #[allow(clippy::cast_precision_loss, reason = "small")]
+                    let share = k as f64 / *count as f64;
+                    span[0] + (span[1] - span[0]) * share
+                }));
+                edges.push(span[1]);
+            }
+            edges
+        });
+        let mut grid = Self {
+            edges,
+            bends: Vec::new(),
+        };
+        grid.bends = (0..grid.count())
+            .into_par_iter()
+            .map(|index| {
+                let (u, v) = grid.cell(index).middle();
+                bend(&oracle.surface.at(u, v), oracle).map(|(_, bend)| bend)
+            })
+            .collect();
+        grid
+    }
+
+    /// Cells along u and along v.
+    pub(super) fn shape(&self) -> [usize; 2] {
+        self.edges.each_ref().map(|edges| edges.len() - 1)
+    }
+
+    pub(super) fn count(&self) -> usize {
+        let [rows, columns] = self.shape();
+        rows * columns
+    }
+
+    pub(super) fn cell(&self, index: usize) -> Cell {
+        let columns = self.shape()[1];
+        let (i, j) = (index / columns, index % columns);
+        Cell {
+            u: [self.edges[0][i], self.edges[0][i + 1]],
+            v: [self.edges[1][j], self.edges[1][j + 1]],
+        }
+    }
+
+    /// Least and largest principal curvature in the cells that a range of parameters touches; at most so many of them a side are
+    /// looked at, evenly spread.
+    pub(super) fn principal(&self, ranges: [[f64; 2]; 2], looks: usize) -> [f64; 2] {
+        let columns = self.shape()[1];
+        let [(i0, i1, i_step), (j0, j1, j_step)] = [0, 1].map(|axis: usize| {
+            let edges = &self.edges[axis];
+            let last = edges.len() - 2;
+            let index = |at: f64| edges.partition_point(|edge| *edge <= at).clamp(1, last + 1) - 1;
+            let (first, end) = (index(ranges[axis][0]), index(ranges[axis][1]));
+            (first, end, ((end - first) / looks).max(1))
+        });
+        let mut found = [f64::INFINITY, f64::NEG_INFINITY];
+        for i in (i0..=i1).step_by(i_step) {
+            for j in (j0..=j1).step_by(j_step) {
+                if let Some(bend) = &self.bends[i * columns + j] {
+                    found = [found[0].min(bend.principal[0]), found[1].max(bend.principal[1])];
+                }
+            }
+        }
+        found
+    }
+}
+
+/// Length of each span along one parameter, mm: the longest of a few lines.
+fn span_lengths(oracle: &Oracle, along: Along) -> Vec<f64> {
+    let breaks = oracle.surface.breaks(along);
+    let [[u0, u1], [v0, v1]] = oracle.surface.domain();
+    let across = match along {
+        Along::U => [v0, v1],
+        Along::V => [u0, u1],
+    };
+    #[allow(clippy::cast_precision_loss, reason = "small")]
+    let part = |[low, high]: [f64; 2], k: usize, of: usize| low + (high - low) * k as f64 / of as f64;
+    let length_on = |span: [f64; 2], line: f64| -> f64 {
+        let point = |t: f64| match along {
+            Along::U => oracle.surface.at(t, line).point,
+            Along::V => oracle.surface.at(line, t).point,
+        };
+        (0..SPAN_CELLS)
+            .map(|k| {
+                let ends = [k, k + 1].map(|k| point(part(span, k, SPAN_CELLS)));
+                length(subtract(ends[1], ends[0]))
+            })
+            .sum()
+    };
+    breaks
+        .windows(2)
+        .map(|span| {
+            (0..=LENGTH_LINES)
+                .map(|k| length_on([span[0], span[1]], part(across, k, LENGTH_LINES)))
+                .fold(0.0, f64::max)
+        })
+        .collect()
+}

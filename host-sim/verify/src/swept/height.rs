@@ -1,0 +1,218 @@
+//! Where a ray from the surface enters the swept ball.
+//!
+//! From the surface point P the ray `P + t N` goes along the tool normal. A ball of radius r about C is entered at
+//! `t = m.N - sqrt((m.N)^2 - |m|^2 + r^2)`, m = C - P. Between two samples the centre runs along a straight line, so the ball
+//! sweeps a capsule: a cylinder between two balls, entered where the nearer of the two equations says.
+
+use super::track::{PassTrack, across};
+use oracle::vector::{Vector, add, dot, scale, subtract};
+
+/// Newton steps towards the nearest sample: each squares the error; the walk after it makes up for what is left.
+const NEWTON_STEPS: usize = 12;
+/// Samples are compared at this share of the ball's radius, where the distance has changed by 1/8000 of the radius: far more
+/// than by the rounding to nanometres.
+const STRIDE_SHARE: f64 = 1.0 / 64.0;
+/// Rounds of: nearest sample to the point on the ray, then the ray's entry there. The first entry's error is of second
+/// order in the nearest sample's; three rounds leave nothing but rounding.
+const ROUNDS: usize = 3;
+/// A further round is not worth its time when the entry has moved by less, mm.
+const ROUND_ENOUGH_MM: f64 = 1e-9;
+
+/// A ray: point of the surface and tool normal there.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Ray {
+    pub(super) from: Vector,
+    pub(super) along: Vector,
+}
+
+impl Ray {
+    pub(super) fn at(&self, t: f64) -> Vector {
+        add(self.from, scale(self.along, t))
+    }
+
+    /// Where the ray enters a ball, and where it leaves it.
+    pub(super) fn through_ball(&self, centre: Vector, radius: f64) -> Option<[f64; 2]> {
+        let m = subtract(centre, self.from);
+        let along = dot(m, self.along);
+        // |m - (m.N) N|^2 without the cancellation of |m|^2 - (m.N)^2.
+        let off = across(m, self.along);
+        let inside = radius * radius - dot(off, off);
+        (inside >= 0.0).then(|| {
+            let half = inside.sqrt();
+            [along - half, along + half]
+        })
+    }
+
+    /// Where the ray enters the ball that moves from one centre to the other; infinite where it does not, or where it leaves it
+    /// before the surface.
+    pub(super) fn entry(&self, [from, to]: [Vector; 2], radius: f64) -> f64 {
+        let mut first = f64::INFINITY;
+        for centre in [from, to] {
+            if let Some([enters, leaves]) = self.through_ball(centre, radius)
+                && leaves >= 0.0
+            {
+                first = first.min(enters);
+            }
+        }
+        let axis = subtract(to, from);
+        let squared = dot(axis, axis);
+        if squared <= 0.0 {
+            return first;
+        }
+        let axis = scale(axis, 1.0 / squared.sqrt());
+        let m = subtract(from, self.from);
+        let (m_off, n_off) = (across(m, axis), across(self.along, axis));
+        let (a, b) = (dot(n_off, n_off), dot(m_off, n_off));
+        if a <= 0.0 {
+            return first;
+        }
+        // |m_off|^2 - b^2 / a: the squared distance of the two lines.
+        let apart = subtract(m_off, scale(n_off, b / a));
+        let inside = (radius * radius - dot(apart, apart)) / a;
+        if inside < 0.0 {
+            return first;
+        }
+        let half = inside.sqrt();
+        let on_cylinder = |t: f64| {
+            let s = dot(subtract(self.at(t), from), axis);
+            s >= 0.0 && s * s <= squared
+        };
+        let (enters, leaves) = (b / a - half, b / a + half);
+        if leaves >= 0.0 && enters < first && on_cylinder(enters) {
+            first = enters;
+        }
+        first
+    }
+}
+
+/// The heights that one pass leaves.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct PassHeight<'a> {
+    pass: &'a PassTrack,
+    radius: f64,
+    stride: usize,
+}
+
+impl<'a> PassHeight<'a> {
+    pub(super) fn new(pass: &'a PassTrack, radius: f64) -> Self {
+        let samples = pass.cl_nm.len();
+        let spacing = pass.spacing_mm();
+        let stride = STRIDE_SHARE * radius / spacing.max(1e-9);
+        #[allow(
+            clippy::cast_possible_truncation,
+            clippy::cast_sign_loss,
+            reason = "positive, and clamped"
+        )]
+        let stride = (stride as usize).clamp(1, (samples / 4).max(1));
+        Self { pass, radius, stride }
+    }
+
+    pub(super) fn pass(&self) -> &'a PassTrack {
+        self.pass
+    }
+
+    /// Height at which the ray enters this pass's swept ball, and the sample nearest to that; infinite where it misses it.
+    /// `hint`: a sample near it; the nearest minimum from there is found.
+    pub(super) fn of(&self, ray: &Ray, hint: usize) -> (f64, usize) {
+        self.in_rounds(ray, hint, ROUNDS)
+    }
+
+    /// The same in one round: too high, if anything, by the square of what the nearest sample is off.
+    pub(super) fn about(&self, ray: &Ray, hint: usize) -> (f64, usize) {
+        self.in_rounds(ray, hint, 1)
+    }
+
+    fn in_rounds(&self, ray: &Ray, hint: usize, rounds: usize) -> (f64, usize) {
+        let mut index = hint;
+        let mut height = f64::INFINITY;
+        for _ in 0..rounds {
+            let target = if height.is_finite() {
+                ray.at(height)
+            } else {
+                ray.from
+            };
+            index = self.nearest(target, index);
+            let before = height;
+            (height, index) = self.entry_near(ray, index);
+            if (height - before).abs() <= ROUND_ENOUGH_MM {
+                break;
+            }
+        }
+        (height, index)
+    }
+
+    fn squared(&self, index: usize, target: Vector) -> f64 {
+        let off = subtract(self.pass.centre(index), target);
+        dot(off, off)
+    }
+
+    /// The sample nearest to a point, by Newton's method over strides and then downhill.
+    #[allow(
+        clippy::cast_possible_truncation,
+        clippy::cast_possible_wrap,
+        clippy::cast_sign_loss,
+        clippy::cast_precision_loss,
+        reason = "indices of samples, clamped to the pass"
+    )]
+    fn nearest(&self, target: Vector, hint: usize) -> usize {
+        let last = self.pass.cl_nm.len() - 1;
+        let mut index = hint.min(last);
+        let mut least = self.squared(index, target);
+        if last >= 2 * self.stride {
+            for _ in 0..NEWTON_STEPS {
+                let middle = index.clamp(self.stride, last - self.stride);
+                let [low, mid, high] =
+                    [middle - self.stride, middle, middle + self.stride].map(|k| self.squared(k, target));
+                let (slope, bend) = (0.5 * (high - low), high - 2.0 * mid + low);
+                let by = if bend > 0.0 {
+                    (-slope / bend).clamp(-64.0, 64.0)
+                } else {
+                    -4.0 * slope.signum()
+                };
+                let next = (middle as f64 + by * self.stride as f64)
+                    .clamp(0.0, last as f64)
+                    .round() as usize;
+                let there = self.squared(next, target);
+                if there >= least {
+                    break;
+                }
+                (index, least) = (next, there);
+            }
+        }
+        loop {
+            let mut moved = false;
+            for next in [index.wrapping_sub(1), index + 1] {
+                if next <= last {
+                    let there = self.squared(next, target);
+                    if there < least {
+                        (index, least, moved) = (next, there, true);
+                    }
+                }
+            }
+            if !moved {
+                return index;
+            }
+        }
+    }
+
+    /// The ray's entry over the samples around one.
+    fn entry_near(&self, ray: &Ray, index: usize) -> (f64, usize) {
+        let last = self.pass.cl_nm.len() - 1;
+        let (from, to) = (index.saturating_sub(2), (index + 2).min(last));
+        if from == to {
+            let centre = self.pass.centre(index);
+            return (ray.entry([centre; 2], self.radius), index);
+        }
+        let mut best = (f64::INFINITY, index);
+        let mut centre = self.pass.centre(from);
+        for k in from..to {
+            let next = self.pass.centre(k + 1);
+            let entry = ray.entry([centre, next], self.radius);
+            if entry < best.0 {
+                best = (entry, k);
+            }
+            centre = next;
+        }
+        best
+    }
+}

@@ -1,0 +1,122 @@
+//! Scallop height and gouge, measured from the ball's swept envelope, and what else there is to know before a job runs.
+//!
+//! ```text
+//! samples ──track.rs──► Track ──height.rs──► where a ray from the surface enters one pass's swept ball
+//!                         │   ──tree.rs────► the same, and the nearest ball, over the whole path
+//!                         │        │
+//!                         │        ├──ridge.rs──► the ridge in each gap between two passes: maximum, mean, spots
+//!                         │        └──gouge.rs──► the deepest cut below the surface (cells of grid.rs, split where it matters)
+//!                         └──axes.rs──► travel        shape.rs: tightest hollow, degenerate places
+//! ```
+//!
+//! Nothing here knows the formula that the path intervals come from, nor anything of the core: what counts is the tool path as
+//! it was emitted, and the surface as the job file states it (`oracle`, f64).
+//!
+//! **Scallop height** at a surface point P is the way along the tool normal from P to the swept ball: what is left standing
+//! there. Between samples the centre runs straight. On a line across the gap between two passes it is highest where both
+//! passes leave the same (the crest), unless the surface has a feature there: each part of the line between knots is looked
+//! at in eight places as well. Any other part of the path may lower a crest. Where one lowers it below the surface, the height is
+//! negative and the crest is not searched elsewhere: the gouge is reported. First and last pass lie on the surface's boundaries, so nothing is left outside of them.
+//!
+//! **What the measuring may be wrong by** is stated with the result, [`MeasuringError`]. Results don't depend on the number of
+//! threads.
+
+mod axes;
+mod findings;
+mod gouge;
+mod grid;
+mod height;
+mod ridge;
+mod shape;
+#[cfg(test)]
+mod tests;
+mod track;
+mod tree;
+
+pub use axes::Axes;
+pub use findings::{Extreme, Findings, Gouge, MeasuringError, Ridge, RidgeSpot};
+pub use shape::{Hollow, Shape};
+pub use track::{PassTrack, Track};
+
+use gouge::{Search, Searcher};
+use grid::Grid;
+use height::PassHeight;
+use rayon::prelude::*;
+use ridge::{Gap, GapRidge};
+use tree::Tree;
+
+use job::Job;
+use oracle::Oracle;
+
+/// What a sample's position may be off by and still pass `verify`, mm (see `commands::BOUNDS`): cuts no deeper than this are no
+/// gouge.
+const POSITION_MM: f64 = 10e-6;
+
+/// Who is told how far the measuring has come.
+pub trait Progress: Sync {
+    /// A part begins, of so many steps.
+    fn begin(&self, what: &'static str, steps: u64);
+    /// So many steps are done.
+    fn done(&self, steps: u64);
+}
+
+/// Nobody is told.
+impl Progress for () {
+    fn begin(&self, _: &'static str, _: u64) {}
+    fn done(&self, _: u64) {}
+}
+
+/// Measures a tool path against the job's surface, on all cores. `complete`: the run came to its end; otherwise its last pass
+/// leaves no ridge.
+#[must_use]
+pub fn measure(
+    job: &Job,
+    oracle: &Oracle,
+    track: &Track,
+    complete: bool,
+    progress: &dyn Progress,
+) -> Findings {
+    let tree = Tree::new(track, oracle.radius_mm);
+    let whole = track.passes.len() - usize::from(!complete && !track.passes.is_empty());
+    let heights: Vec<PassHeight<'_>> = track.passes[..whole]
+        .par_iter()
+        .map(|pass| PassHeight::new(pass, oracle.radius_mm))
+        .collect();
+    let gaps: Vec<Gap<'_>> = heights
+        .windows(2)
+        .map(|pair| Gap::new(oracle, [pair[0], pair[1]], &tree))
+        .collect();
+    progress.begin("scallop", gaps.len() as u64);
+    let ridges: Vec<GapRidge> = gaps
+        .par_iter()
+        .map(|gap| {
+            let ridge = gap.ridge();
+            progress.done(1);
+            ridge
+        })
+        .collect();
+    let grid = Grid::new(oracle);
+    let sagitta_mm = track
+        .passes
+        .par_iter()
+        .map(PassTrack::sagitta_mm)
+        .reduce(|| 0.0, f64::max);
+    progress.begin("gouge", grid.count() as u64);
+    let search: Search = Searcher {
+        oracle,
+        tree: &tree,
+        grid: &grid,
+        floor_mm: POSITION_MM + sagitta_mm,
+    }
+    .search(&|steps| progress.done(steps));
+    let parts = findings::Parts {
+        gaps: &gaps,
+        ridges: &ridges,
+        search,
+        sagitta_mm,
+        axes: Axes::new(track, &job.machine),
+        shape: Shape::new(oracle, &grid),
+        complete,
+    };
+    Findings::new(job, oracle, track, &parts)
+}

@@ -1,0 +1,355 @@
+//! The ridge between two neighbouring passes: at stations along the gap, the highest place between the two.
+
+use super::height::{PassHeight, Ray};
+use super::tree::Tree;
+use oracle::vector::{cross, length, scale};
+use oracle::{Oracle, OracleError};
+
+/// Places across a gap, and across each part of it between knots, at which the height is looked at besides the crest.
+const ACROSS: usize = 8;
+/// Stations along a gap to begin with.
+const STATIONS: usize = 96;
+/// Rounds of halving intervals between stations.
+const HALVINGS: usize = 10;
+/// Heights are alike within this share of the gap's largest, or within this, mm: the rounding of centres to nanometres.
+const ALIKE_SHARE: f64 = 1e-4;
+const ALIKE_MM: f64 = 2e-6;
+/// A crest that another part of the path lowers to less than this below the surface, mm, is gone.
+const GOUGED_MM: f64 = 1e-4;
+/// Steps of the search for the crest; three or four are usual.
+const CREST_STEPS: usize = 60;
+/// The two heights at the crest agree within this, mm.
+const CREST_MM: f64 = 1e-8;
+/// Golden-section steps for a crest that is not where the two heights agree.
+const GOLDEN_STEPS: usize = 40;
+const GOLDEN: f64 = 0.618_033_988_749_894_8;
+/// What a ray that misses both swept balls counts as, in radii: no height, but more than any.
+pub(super) const MISSED_RADII: f64 = 4.0;
+
+/// The highest place across a gap at one station.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Crest {
+    /// Path parameter.
+    pub(super) path: f64,
+    /// Share of the gap, from the first pass.
+    pub(super) share: f64,
+    /// Height, mm.
+    pub(super) height_mm: f64,
+    /// Place on the surface, mm.
+    pub(super) place_mm: [f64; 3],
+    /// |S_u x S_v| there.
+    pub(super) area: f64,
+}
+
+/// What one gap comes to.
+#[derive(Clone, Debug)]
+pub(super) struct GapRidge {
+    pub(super) crests: Vec<Crest>,
+    /// Between stations a crest may be higher than the highest found by this, mm.
+    pub(super) unseen_mm: f64,
+    /// Stations without a surface normal: left out.
+    pub(super) skipped: u32,
+}
+
+/// The gap between two passes.
+pub(super) struct Gap<'a> {
+    oracle: &'a Oracle,
+    passes: [PassHeight<'a>; 2],
+    tree: &'a Tree<'a>,
+    sides: [f64; 2],
+    /// Shares of the gap that are looked at, 0 and 1 among them.
+    across: Vec<f64>,
+    missed: f64,
+}
+
+impl<'a> Gap<'a> {
+    pub(super) fn new(oracle: &'a Oracle, passes: [PassHeight<'a>; 2], tree: &'a Tree<'a>) -> Self {
+        let sides = passes.map(|pass| pass.pass().side);
+        let width = sides[1] - sides[0];
+        let mut ends = vec![0.0];
+        for at in oracle.surface.breaks(oracle.across()) {
+            let share = (at - sides[0]) / width;
+            if share > 1e-9 && share < 1.0 - 1e-9 {
+                ends.push(share);
+            }
+        }
+        ends.push(1.0);
+        let mut across = vec![0.0];
+        #[allow(clippy::cast_precision_loss, reason = "small")]
+        for part in ends.windows(2) {
+            across.extend((1..=ACROSS).map(|k| part[0] + (part[1] - part[0]) * k as f64 / ACROSS as f64));
+        }
+        Self {
+            oracle,
+            passes,
+            tree,
+            sides,
+            across,
+            missed: MISSED_RADII * oracle.radius_mm,
+        }
+    }
+
+    /// The ray from a place of the gap, and |S_u x S_v| there.
+    fn ray(&self, path: f64, share: f64) -> Result<(Ray, f64), OracleError> {
+        let (u, v) = self.oracle.swapped(path, self.side(share));
+        let at = self.oracle.surface.at(u, v);
+        let product = cross(at.u, at.v);
+        let area = length(product);
+        let along = if area > 1e-6 * length(at.u) * length(at.v) && area > 0.0 {
+            scale(product, self.oracle.normal_sign / area)
+        } else {
+            self.oracle.contact(u, v)?.normal
+        };
+        let ray = Ray {
+            from: at.point,
+            along,
+        };
+        Ok((ray, area))
+    }
+
+    pub(super) fn side(&self, share: f64) -> f64 {
+        // Exact at both ends.
+        self.sides[0] * (1.0 - share) + self.sides[1] * share
+    }
+
+    /// Heights of both passes at a place.
+    fn both(&self, path: f64, share: f64, near: &mut [usize; 2]) -> Result<[f64; 2], OracleError> {
+        let (ray, _) = self.ray(path, share)?;
+        let mut heights = [0.0; 2];
+        for (k, pass) in self.passes.iter().enumerate() {
+            let (height, index) = pass.of(&ray, near[k]);
+            near[k] = index;
+            heights[k] = height.min(self.missed);
+        }
+        Ok(heights)
+    }
+
+    /// Height at a place: of the two passes, or of the whole path.
+    fn least(&self, path: f64, share: f64, near: &mut [usize; 2], whole: bool) -> Result<f64, OracleError> {
+        let [one, other] = self.both(path, share, near)?;
+        let least = one.min(other);
+        if !whole {
+            return Ok(least);
+        }
+        Ok(self.tree.entry(&self.ray(path, share)?.0, least))
+    }
+
+    /// The crest at a station; `guess`: its share of the gap at a station near by.
+    pub(super) fn crest(&self, path: f64, guess: f64) -> Result<Crest, OracleError> {
+        let mut near = self.passes.map(|pass| pass.pass().index_at(path));
+        let met = self.meeting(path, guess, &mut near)?;
+        let (mut share, mut height) = self.highest(path, met, &mut near, false)?;
+        let whole = self.tree.entry(&self.ray(path, share)?.0, height);
+        if whole < -GOUGED_MM {
+            // Nothing is left of this crest, and worse: that is the gouge's to tell.
+            height = whole;
+        } else if whole < height - ALIKE_MM {
+            // Another part of the path lowers this crest: the highest place that remains is elsewhere.
+            (share, height) = self.highest(path, (share, whole), &mut near, true)?;
+        }
+        let (ray, area) = self.ray(path, share)?;
+        Ok(Crest {
+            path,
+            share,
+            height_mm: height,
+            place_mm: ray.from,
+            area,
+        })
+    }
+
+    /// The highest place across the gap, if it is above the one found already.
+    fn highest(
+        &self,
+        path: f64,
+        found: (f64, f64),
+        near: &mut [usize; 2],
+        whole: bool,
+    ) -> Result<(f64, f64), OracleError> {
+        let mut highest = (0, f64::NEG_INFINITY);
+        for (k, at) in self.across.iter().enumerate() {
+            let (ray, _) = self.ray(path, *at)?;
+            let mut least = self.missed;
+            for (pass, near) in self.passes.iter().zip(near.iter_mut()) {
+                let (height, index) = pass.about(&ray, *near);
+                *near = index;
+                least = least.min(height);
+            }
+            // Looked at closely where it may matter.
+            if least > found.1.max(highest.1) {
+                least = self.least(path, *at, near, whole)?;
+            }
+            if least > highest.1 {
+                highest = (k, least);
+            }
+        }
+        if highest.1 <= found.1 {
+            return Ok(found);
+        }
+        let low = self.across[highest.0.saturating_sub(1)];
+        let high = self.across[(highest.0 + 1).min(self.across.len() - 1)];
+        self.summit(
+            path,
+            [low, high],
+            (self.across[highest.0], highest.1),
+            near,
+            whole,
+        )
+    }
+
+    /// Where both heights agree (regula falsi, Illinois; halving where a ray misses).
+    fn meeting(&self, path: f64, guess: f64, near: &mut [usize; 2]) -> Result<(f64, f64), OracleError> {
+        let mut ends = [0.0, 1.0];
+        let mut values = [0.0; 2];
+        let mut best = (0.0, f64::NEG_INFINITY);
+        for k in 0..2 {
+            let [one, other] = self.both(path, ends[k], near)?;
+            values[k] = one - other;
+            if one.min(other) > best.1 {
+                best = (ends[k], one.min(other));
+            }
+        }
+        if values[0] >= 0.0 || values[1] <= 0.0 {
+            return Ok(best);
+        }
+        let mut share = guess.clamp(0.01, 0.99);
+        for _ in 0..CREST_STEPS {
+            let [one, other] = self.both(path, share, near)?;
+            let apart = one - other;
+            if one.min(other) > best.1 {
+                best = (share, one.min(other));
+            }
+            if apart.abs() <= CREST_MM {
+                break;
+            }
+            let k = usize::from(apart > 0.0);
+            (ends[k], values[k]) = (share, apart);
+            let missed = values.iter().any(|value| value.abs() >= 0.5 * self.missed);
+            let width = ends[1] - ends[0];
+            if width < 1e-14 {
+                break;
+            }
+            share = if missed {
+                0.5 * (ends[0] + ends[1])
+            } else {
+                ends[0] - values[0] * width / (values[1] - values[0])
+            };
+            // The end that stays counts half the next time.
+            values[1 - k] *= 0.5;
+        }
+        Ok(best)
+    }
+
+    /// The highest place in a bracket, by golden section.
+    fn summit(
+        &self,
+        path: f64,
+        [mut low, mut high]: [f64; 2],
+        found: (f64, f64),
+        near: &mut [usize; 2],
+        whole: bool,
+    ) -> Result<(f64, f64), OracleError> {
+        let mut best = found;
+        let mut value = |share: f64| self.least(path, share, near, whole);
+        let (mut left, mut right) = (high - GOLDEN * (high - low), low + GOLDEN * (high - low));
+        let (mut at_left, mut at_right) = (value(left)?, value(right)?);
+        for _ in 0..GOLDEN_STEPS {
+            for (share, height) in [(left, at_left), (right, at_right)] {
+                if height > best.1 {
+                    best = (share, height);
+                }
+            }
+            if at_left > at_right {
+                (high, right, at_right) = (right, left, at_left);
+                left = high - GOLDEN * (high - low);
+                at_left = value(left)?;
+            } else {
+                (low, left, at_left) = (left, right, at_right);
+                right = low + GOLDEN * (high - low);
+                at_right = value(right)?;
+            }
+            if (at_left - at_right).abs() <= CREST_MM && high - low < 1e-3 {
+                break;
+            }
+        }
+        Ok(best)
+    }
+
+    /// The stations to begin with: knots, shares of the parameter and of the second pass's length.
+    fn stations(&self) -> Vec<f64> {
+        let [low, high] = self.oracle.path_range();
+        let mut stations = self.oracle.surface.breaks(self.oracle.along);
+        let samples = &self.passes[1].pass().path;
+        #[allow(clippy::cast_precision_loss, reason = "small")]
+        for k in 0..=STATIONS {
+            stations.push(low + (high - low) * k as f64 / STATIONS as f64);
+            stations.push(samples[k * (samples.len() - 1) / STATIONS]);
+        }
+        stations.sort_by(f64::total_cmp);
+        let nearest = 1e-5 * (high - low);
+        stations.dedup_by(|b, a| *b - *a < nearest && *b < high);
+        stations
+    }
+
+    /// The whole ridge.
+    pub(super) fn ridge(&self) -> GapRidge {
+        let mut crests: Vec<Crest> = Vec::new();
+        let mut skipped = 0;
+        for path in self.stations() {
+            let guess = crests.last().map_or(0.5, |crest| crest.share);
+            match self.crest(path, guess) {
+                Ok(crest) => crests.push(crest),
+                Err(_) => skipped += 1,
+            }
+        }
+        let intervals = |crests: &[Crest]| crests.len().saturating_sub(1);
+        for _ in 0..HALVINGS {
+            let best = highest(&crests);
+            let enough = best + (ALIKE_SHARE * best).max(ALIKE_MM);
+            let mut refined = Vec::with_capacity(crests.len() + 16);
+            for k in 0..intervals(&crests) {
+                refined.push(crests[k]);
+                if bound(&crests, k) > enough {
+                    let path = 0.5 * (crests[k].path + crests[k + 1].path);
+                    refined.extend(self.crest(path, crests[k].share));
+                }
+            }
+            refined.extend(crests.last());
+            if refined.len() == crests.len() {
+                break;
+            }
+            crests = refined;
+        }
+        let best = highest(&crests);
+        let most = (0..intervals(&crests))
+            .map(|k| bound(&crests, k))
+            .fold(best, f64::max);
+        GapRidge {
+            unseen_mm: if crests.is_empty() { 0.0 } else { most - best },
+            crests,
+            skipped,
+        }
+    }
+}
+
+fn highest(crests: &[Crest]) -> f64 {
+    crests
+        .iter()
+        .map(|crest| crest.height_mm)
+        .fold(f64::NEG_INFINITY, f64::max)
+}
+
+/// What the crest may reach between a station and the next: a function whose second derivative is at most `b` exceeds its
+/// values at the ends of an interval `d` by `b d^2 / 8` at most. `b` is taken as twice the larger of the two second
+/// differences around.
+fn bound(crests: &[Crest], k: usize) -> f64 {
+    let (a, b) = (&crests[k], &crests[k + 1]);
+    let second = |k: usize| {
+        let (a, b, c) = (&crests[k - 1], &crests[k], &crests[k + 1]);
+        let slope = |a: &Crest, b: &Crest| (b.height_mm - a.height_mm) / (b.path - a.path);
+        (2.0 * (slope(b, c) - slope(a, b)) / (c.path - a.path)).abs()
+    };
+    let before = if k >= 1 { second(k) } else { 0.0 };
+    let after = if k + 2 < crests.len() { second(k + 1) } else { 0.0 };
+    let width = b.path - a.path;
+    a.height_mm.max(b.height_mm) + 2.0 * before.max(after) * width * width / 8.0
+}

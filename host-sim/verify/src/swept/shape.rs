@@ -1,0 +1,151 @@
+//! What the surface itself may trouble a ball with: the tightest hollow, and places without a normal.
+
+use rayon::prelude::*;
+
+use super::grid::{Grid, bend};
+use oracle::Oracle;
+use oracle::vector::{length, subtract};
+
+/// Halvings of the step around the tightest cell.
+const REFINEMENTS: usize = 40;
+/// Curvatures below this count as flat, 1/mm: hollows of more than a kilometre.
+const FLAT: f64 = 1e-6;
+/// Places looked at along each boundary.
+const BOUNDARY_LOOKS: usize = 64;
+/// A boundary whose places all lie within this of one another is a point, mm: as for the core's data.
+const POINT_MM: f64 = 1e-9;
+
+/// The tightest hollow of a surface.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Hollow {
+    /// Radius of curvature towards the tool, mm: the least of all directions.
+    pub radius_mm: f64,
+    /// Parameter u.
+    pub u: f64,
+    /// Parameter v.
+    pub v: f64,
+    /// Place, mm.
+    pub place_mm: [f64; 3],
+}
+
+/// What the surface may trouble a ball with.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Shape {
+    /// The tightest hollow; `None` where the surface bends towards the tool nowhere.
+    pub hollow: Option<Hollow>,
+    /// Boundaries that are one point, e.g. `u = 0`.
+    pub poles: Vec<String>,
+    /// Other places (u, v) where S_u and S_v span no plane: how many of those looked at, and the first.
+    pub degenerate: Option<(usize, [f64; 2])>,
+}
+
+impl Shape {
+    pub(super) fn new(oracle: &Oracle, grid: &Grid) -> Self {
+        let mut degenerate: Vec<[f64; 2]> = (0..grid.count())
+            .filter(|index| grid.bends[*index].is_none())
+            .map(|index| grid.cell(index).middle().into())
+            .collect();
+        let mut poles = Vec::new();
+        for (name, line) in boundaries(oracle) {
+            let places: Vec<[f64; 3]> = line
+                .iter()
+                .map(|[u, v]| oracle.surface.at(*u, *v).point)
+                .collect();
+            if places
+                .iter()
+                .all(|place| length(subtract(*place, places[0])) <= POINT_MM)
+            {
+                poles.push(name);
+            } else {
+                // The ends may lie on a pole of another boundary.
+                let inside = &line[1..line.len() - 1];
+                let spans = |[u, v]: &&[f64; 2]| bend(&oracle.surface.at(*u, *v), oracle).is_none();
+                degenerate.extend(inside.iter().filter(spans));
+            }
+        }
+        Self {
+            hollow: hollow(oracle, grid),
+            poles,
+            degenerate: degenerate.first().map(|first| (degenerate.len(), *first)),
+        }
+    }
+}
+
+/// The four boundaries: name, and places on each.
+fn boundaries(oracle: &Oracle) -> Vec<(String, Vec<[f64; 2]>)> {
+    let [[u0, u1], [v0, v1]] = oracle.surface.domain();
+    #[allow(clippy::cast_precision_loss, reason = "small")]
+    let part = |low: f64, high: f64, k: usize| low + (high - low) * k as f64 / BOUNDARY_LOOKS as f64;
+    let looks = 0..=BOUNDARY_LOOKS;
+    let of_u = |u: f64| {
+        (
+            format!("u = {u}"),
+            looks.clone().map(|k| [u, part(v0, v1, k)]).collect(),
+        )
+    };
+    let of_v = |v: f64| {
+        (
+            format!("v = {v}"),
+            looks.clone().map(|k| [part(u0, u1, k), v]).collect(),
+        )
+    };
+    vec![of_u(u0), of_u(u1), of_v(v0), of_v(v1)]
+}
+
+/// The tightest hollow: the tightest cell, then steps that halve.
+fn hollow(oracle: &Oracle, grid: &Grid) -> Option<Hollow> {
+    let curvature = |u: f64, v: f64| {
+        bend(&oracle.surface.at(u, v), oracle).map_or(f64::NEG_INFINITY, |(_, bend)| bend.principal[1])
+    };
+    // Corners as well as middles: hollows are often tightest on a boundary.
+    let (index, _) = (0..grid.count())
+        .into_par_iter()
+        .map(|index| {
+            let cell = grid.cell(index);
+            let corners = cell.u.into_iter().flat_map(|u| cell.v.map(|v| curvature(u, v)));
+            let middle = grid.bends[index].map_or(f64::NEG_INFINITY, |bend| bend.principal[1]);
+            (index, corners.fold(middle, f64::max))
+        })
+        .reduce(
+            || (usize::MAX, f64::NEG_INFINITY),
+            |a, b| {
+                if b.1 > a.1 || (b.1 == a.1 && b.0 < a.0) {
+                    b
+                } else {
+                    a
+                }
+            },
+        );
+    if index >= grid.count() {
+        return None;
+    }
+    let cell = grid.cell(index);
+    let [[u0, u1], [v0, v1]] = oracle.surface.domain();
+    let (mut u, mut v) = cell.middle();
+    let (mut step_u, mut step_v) = (0.5 * (cell.u[1] - cell.u[0]), 0.5 * (cell.v[1] - cell.v[0]));
+    let mut most = curvature(u, v);
+    for _ in 0..REFINEMENTS {
+        let around = [-1.0, 0.0, 1.0].map(|i| [-1.0, 0.0, 1.0].map(|j| (i, j)));
+        let (at_u, at_v) = (u, v);
+        for (i, j) in around.into_iter().flatten() {
+            let (next_u, next_v) = (
+                (at_u + i * step_u).clamp(u0, u1),
+                (at_v + j * step_v).clamp(v0, v1),
+            );
+            let there = curvature(next_u, next_v);
+            if there > most {
+                (u, v, most) = (next_u, next_v, there);
+            }
+        }
+        if (u, v) == (at_u, at_v) {
+            step_u *= 0.5;
+            step_v *= 0.5;
+        }
+    }
+    (most > FLAT).then(|| Hollow {
+        radius_mm: 1.0 / most,
+        u,
+        v,
+        place_mm: oracle.surface.at(u, v).point,
+    })
+}

@@ -1,0 +1,403 @@
+//! Heights, gouges and travel against closed forms, on tool paths made for the purpose: the core has no part in them.
+
+use std::f64::consts::FRAC_1_SQRT_2;
+
+use super::*;
+use job::{Along, Machine, NurbsSpec, Origin, Pattern, Side, SurfaceSpec};
+use oracle::Emitted;
+use oracle::vector::{length, subtract};
+
+const RADIUS: f64 = 5.0;
+
+fn job(surface: SurfaceSpec, along: Along, side: Side, scallop_mm: f64) -> Job {
+    Job {
+        surface,
+        radius_mm: RADIUS,
+        feed_mm_min: 600.0,
+        scallop_mm,
+        along,
+        side,
+        pattern: Pattern::Zig,
+        spacing: job::Spacing::Exact,
+        chord_mm: 0.005,
+        machine: Machine::default(),
+        origin: Origin::default(),
+    }
+}
+
+/// A tool path on these passes, with so many steps on each, evenly spread over the parameter.
+fn track(oracle: &Oracle, sides: &[f64], steps: u32) -> Track {
+    let mut track = Track::default();
+    let [low, high] = oracle.path_range();
+    let mut tick = 0;
+    for (pass, side) in (0_u32..).zip(sides) {
+        for k in 0..=steps {
+            let path = low + (high - low) * f64::from(k) / f64::from(steps);
+            let (u, v) = oracle.swapped(path, *side);
+            let contact = oracle.contact(u, v).unwrap();
+            let nm = |mm: [f64; 3]| mm.map(|mm| (mm * 1e6).round() as i32);
+            let sample = Emitted {
+                tick,
+                pass,
+                u,
+                v,
+                cc_nm: nm(contact.cc_mm),
+                cl_nm: nm(contact.cl_mm),
+                feed_mm_s: 10.0,
+                interval: 0.0,
+                first_of_pass: k == 0,
+                last_of_pass: k == steps,
+            };
+            track.add(&sample, oracle.along);
+            tick += 1;
+        }
+    }
+    track
+}
+
+fn measured(job: &Job, sides: &[f64], steps: u32) -> Findings {
+    let oracle = Oracle::new(job).unwrap();
+    measure(job, &oracle, &track(&oracle, sides, steps), true, &())
+}
+
+/// Within the error that the measuring states of itself.
+fn agrees(found: &Findings, exact: f64) {
+    let off = (found.scallop_max.height_mm - exact).abs();
+    assert!(
+        off <= found.measuring_error_mm,
+        "{} for {exact}: off by {off:e}, stated {:e}",
+        found.scallop_max.height_mm,
+        found.measuring_error_mm
+    );
+}
+
+fn plane() -> SurfaceSpec {
+    let rail = |y: f64| [[0.0, 0.0, 30.0, 5.0], [0.0, 0.0, 0.0, y], [0.0, 0.0, 0.0, 2.0]];
+    SurfaceSpec::Ruled {
+        rail0_mm: rail(0.0),
+        rail1_mm: rail(20.0),
+        u: [0.0, 1.0],
+        v: [0.0, 1.0],
+    }
+}
+
+fn cylinder(radius: f64) -> SurfaceSpec {
+    SurfaceSpec::Revolved {
+        radius_mm: [0.0, 0.0, 0.0, radius],
+        height_mm: [0.0, 0.0, 30.0, 0.0],
+        u: [0.0, 1.0],
+        v_rad: [0.0, 1.0],
+    }
+}
+
+/// Two balls on a plane at distance d.
+fn flat(d: f64) -> f64 {
+    RADIUS - (RADIUS * RADIUS - 0.25 * d * d).sqrt()
+}
+
+#[test]
+fn plane_leaves_the_ridge_of_two_circles() {
+    let sides = [0.0, 0.01, 0.04, 0.1, 0.12, 1.0 / 6.0, 0.2, 0.21];
+    for steps in [50, 3000] {
+        let found = measured(&job(plane(), Along::U, Side::Up, 0.01), &sides, steps);
+        agrees(&found, flat(0.06 * 20.0));
+        assert_eq!(found.scallop_max.gap, 2);
+        assert!((found.scallop_max.v - 0.07).abs() < 1e-5);
+        assert!(found.measuring_error_mm < 4e-6, "{:?}", found.measuring_error);
+        let gaps = sides.windows(2).map(|ends| 20.0 * (ends[1] - ends[0]));
+        let mean = gaps.map(|d| d * flat(d)).sum::<f64>() / (20.0 * 0.21);
+        assert!((found.scallop_mean_mm - mean).abs() < 4e-6);
+        assert_eq!(found.gouge, None);
+    }
+}
+
+#[test]
+fn steep_ridges_are_exact_too() {
+    // A step-over of 1.9 radii: the far pass's ball does not even reach over the near pass.
+    let found = measured(&job(plane(), Along::U, Side::Up, 3.0), &[0.0, 0.475, 0.5], 500);
+    agrees(&found, flat(9.5));
+}
+
+#[test]
+fn what_no_pass_reaches_is_said_to_be_uncut() {
+    let found = measured(&job(plane(), Along::U, Side::Up, 3.0), &[0.0, 0.6, 0.9], 100);
+    assert!(
+        found.failures.iter().any(|line| line.contains("reaches")),
+        "{:?}",
+        found.failures
+    );
+}
+
+#[test]
+fn cylinder_along_its_axis() {
+    for radius in [12.0_f64, 20.0, 200.0] {
+        let sides = [0.0, 0.6, 1.6, 2.0].map(|mm| mm / radius);
+        for (side, sign) in [(Side::Plus, -1.0), (Side::Minus, 1.0)] {
+            let found = measured(&job(cylinder(radius), Along::U, side, 0.01), &sides, 400);
+            // Law of cosines: centres on the circle of R + sign r, half a millimetre's angle from the crest.
+            let centre = radius + sign * RADIUS;
+            let (sin, cos) = (0.5 / radius).sin_cos();
+            let crest = centre * cos - sign * (RADIUS * RADIUS - (centre * sin).powi(2)).sqrt();
+            agrees(&found, sign * (crest - radius));
+            assert!(found.measuring_error_mm < 1e-4 * found.scallop_max.height_mm + 4e-6);
+            assert_eq!((found.scallop_max.gap, found.gouge), (1, None));
+        }
+    }
+}
+
+#[test]
+fn cylinder_around_its_axis() {
+    for (side, sign) in [(Side::Plus, -1.0), (Side::Minus, 1.0)] {
+        for steps in [20_u32, 100, 2000] {
+            let found = measured(
+                &job(cylinder(20.0), Along::V, side, 0.01),
+                &[0.0, 0.02, 0.05, 0.06],
+                steps,
+            );
+            agrees(&found, flat(0.9));
+            // What is stated for the way between samples is what an arc of that length really has between it and its chord.
+            let half = 0.5 / f64::from(steps);
+            let sagitta = (20.0 + sign * RADIUS) * (1.0 - half.cos());
+            let stated = found.measuring_error.path_mm;
+            assert!(
+                stated >= 0.99 * sagitta - 1e-6 && stated <= 1.05 * sagitta + 2e-6,
+                "{stated:e} for {sagitta:e}"
+            );
+        }
+    }
+}
+
+/// The sample job's cap of 25 mm: meridians from its pole down to 60 degrees.
+#[test]
+fn sphere_by_meridians() {
+    let text = include_str!("../../../../jobs/sphere_cap.toml");
+    let job = job_file::parse("sphere_cap", text).unwrap();
+    let oracle = Oracle::new(&job).unwrap();
+    let sides: Vec<f64> = (0..=60).map(|k| f64::from(k) / 60.0).collect();
+    let found = measure(&job, &oracle, &track(&oracle, &sides, 2000), true, &());
+    let azimuth = |v: f64| {
+        let [x, y, _] = oracle.surface.at(1.0, v).point;
+        y.atan2(x)
+    };
+    // Ball centres on great circles of R + r: the crest is `g` off both, sin g = sin 60 sin(half of the azimuths' difference).
+    let height = |ends: &[f64]| {
+        let half = 0.5 * (azimuth(ends[1]) - azimuth(ends[0]));
+        let sin = 60.0_f64.to_radians().sin() * half.sin();
+        let centre = 25.0 + job.radius_mm;
+        centre * (1.0 - sin * sin).sqrt() - (job.radius_mm.powi(2) - (centre * sin).powi(2)).sqrt() - 25.0
+    };
+    agrees(&found, sides.windows(2).map(height).fold(0.0, f64::max));
+    assert!((found.scallop_max.u - 1.0).abs() < 1e-9);
+    assert!(found.scallop_max.height_mm > 0.005 && found.measuring_error_mm < 1e-5);
+    assert_eq!(found.shape.poles, ["u = 0"]);
+    assert_eq!((found.gouge, found.shape.degenerate), (None, None));
+}
+
+/// A plane whose lines across lie slanted to its passes: at the passes' ends the ridge is higher than between them, because the foot of
+/// a place near one end lies beyond it. There one ball's way and the other's end are equally far: d / (1 + cos) from a pass.
+#[test]
+fn slanted_ends_leave_more() {
+    let slant = 60.0_f64.to_radians();
+    let rail = |x: f64, y: f64| [[0.0, 0.0, 30.0, x], [0.0, 0.0, 0.0, y], [0.0; 4]];
+    let surface = SurfaceSpec::Ruled {
+        rail0_mm: rail(0.0, 0.0),
+        rail1_mm: rail(20.0 * slant.tan(), 20.0),
+        u: [0.0, 1.0],
+        v: [0.0, 1.0],
+    };
+    let found = measured(&job(surface, Along::U, Side::Up, 0.02), &[0.0, 0.03, 0.06], 1000);
+    agrees(&found, flat(2.0 * 0.6 / (1.0 + slant.cos())));
+    assert!(found.scallop_max.u == 0.0 || found.scallop_max.u == 1.0);
+    assert!(found.scallop_max.height_mm > 1.7 * flat(0.6));
+}
+
+/// A profile in x and z, drawn out along y by 40 mm; u along the profile.
+fn extruded(degree: usize, profile: &[[f64; 2]]) -> SurfaceSpec {
+    let spans = profile.len() - degree;
+    let mut knots_u = vec![0.0; degree];
+    knots_u.extend((0..=spans).map(|k| k as f64 / spans as f64));
+    knots_u.extend(vec![1.0; degree]);
+    SurfaceSpec::Nurbs(NurbsSpec {
+        degree: [degree, 1],
+        knots_u,
+        knots_v: vec![0.0, 0.0, 1.0, 1.0],
+        poles_mm: profile
+            .iter()
+            .map(|[x, z]| vec![[*x, 0.0, *z, 1.0], [*x, 40.0, *z, 1.0]])
+            .collect(),
+        rational: false,
+    })
+}
+
+/// Flanks at 45 degrees, 28.28 mm long: a ball on one flank, s from the bottom, goes r - s into the other one.
+#[test]
+fn ball_on_one_flank_cuts_the_other() {
+    let valley = extruded(1, &[[-20.0, 20.0], [0.0, 0.0], [20.0, 20.0]]);
+    let job = job(valley, Along::V, Side::Up, 0.01);
+    let flank = 800.0_f64.sqrt();
+    // Passes at 8, 6, 1.3 mm from the bottom, and at 2, 7 on the other side.
+    let sides = [-8.0, -6.0, -1.3, 2.0, 7.0].map(|s| 0.5 + 0.5 * s / flank);
+    let oracle = Oracle::new(&job).unwrap();
+    let found = measure(&job, &oracle, &track(&oracle, &sides, 800), true, &());
+    let gouge = found.gouge.unwrap();
+    let exact = RADIUS - 1.3;
+    assert!((gouge.depth_mm / exact - 1.0).abs() < 1e-3, "{gouge:?}");
+    // Under the centre, r along the other flank.
+    let foot = RADIUS * FRAC_1_SQRT_2;
+    assert!(
+        length(subtract(gouge.place_mm, [foot, gouge.place_mm[1], foot])) < 0.3,
+        "{gouge:?}"
+    );
+    assert_eq!((gouge.pass, gouge.local), (2, false));
+    let samples = &oracle_sample(&found, &oracle, &sides);
+    assert!(length(subtract(*samples, gouge.place_mm)) < RADIUS);
+    assert_eq!(
+        found.failures.iter().filter(|line| line.contains("cuts")).count(),
+        1
+    );
+}
+
+/// The ball's centre at the tick that cuts: the path made anew.
+fn oracle_sample(found: &Findings, oracle: &Oracle, sides: &[f64]) -> [f64; 3] {
+    let track = track(oracle, sides, 800);
+    let tick = found.gouge.unwrap().tick;
+    let pass = track.passes.iter().rfind(|pass| pass.first_tick <= tick).unwrap();
+    pass.centre((tick - pass.first_tick) as usize)
+}
+
+/// A hollow cylinder that is tighter than the ball: from every contact the ball reaches farthest into the other edge.
+#[test]
+fn ball_in_a_tight_hollow_is_a_local_gouge() {
+    let job = job(cylinder(4.0), Along::U, Side::Plus, 0.01);
+    let found = measured(&job, &[0.0, 0.2, 0.4, 0.6, 0.8, 1.0], 300);
+    let gouge = found.gouge.unwrap();
+    // From the axis the centre lies 1 mm opposite of the contact; the other edge is 1 rad away.
+    let distance = (16.0 + 1.0 + 8.0 * 1.0_f64.cos()).sqrt();
+    assert!(
+        (gouge.depth_mm / (RADIUS - distance) - 1.0).abs() < 2e-3,
+        "{gouge:?}"
+    );
+    assert!(gouge.local && (gouge.v < 0.02 || gouge.v > 0.98));
+    let hollow = found.shape.hollow.unwrap();
+    assert!((hollow.radius_mm - 4.0).abs() < 1e-9);
+    assert!(found.warnings.iter().any(|line| line.contains("does not fit")));
+}
+
+/// A groove 0.8 mm wide between two passes 2 mm apart: no sample lies in it, and the ball stands over it.
+#[test]
+fn groove_between_passes_stays_uncut() {
+    let mut profile: Vec<[f64; 2]> = (0..=100).map(|k| [0.2 * f64::from(k), 0.0]).collect();
+    profile[50][1] = -0.02;
+    let mut job = job(extruded(3, &profile), Along::V, Side::Up, 0.055);
+    job.radius_mm = 10.0;
+    let oracle = Oracle::new(&job).unwrap();
+    let bottom = oracle.surface.at(0.5, 0.0).point;
+    assert!((bottom[0] - 10.0).abs() < 1e-9 && bottom[2] < -0.01);
+    // Parameters of x = 1, 3, .. 19 by bisection; away from the ends x is linear in u.
+    let at_x = |x: f64| {
+        let (mut low, mut high) = (0.0, 1.0);
+        for _ in 0..60 {
+            let middle = 0.5 * (low + high);
+            if oracle.surface.at(middle, 0.0).point[0] < x {
+                low = middle;
+            } else {
+                high = middle;
+            }
+        }
+        low
+    };
+    let mut sides = vec![0.0];
+    sides.extend((0..10).map(|k| at_x(1.0 + 2.0 * f64::from(k))));
+    sides.push(1.0);
+    let found = measure(&job, &oracle, &track(&oracle, &sides, 200), true, &());
+    let exact = -bottom[2] + 10.0 - (100.0_f64 - 1.0).sqrt();
+    agrees(&found, exact);
+    assert_eq!(found.scallop_max.gap, 5);
+    assert_eq!(found.gouge, None);
+    assert!(
+        found.failures.iter().any(|line| line.contains("scallop")),
+        "{:?}",
+        found.failures
+    );
+    assert!(found.shape.hollow.unwrap().radius_mm < 10.0);
+}
+
+/// Where a third pass comes nearer than the two of the gap, it counts.
+#[test]
+fn other_passes_lower_a_ridge() {
+    let job = job(plane(), Along::U, Side::Up, 0.5);
+    let oracle = Oracle::new(&job).unwrap();
+    let mut path = track(&oracle, &[0.0, 0.2, 0.4], 500);
+    let before = measure(&job, &oracle, &path, true, &());
+    agrees(&before, flat(4.0));
+    // Pass 2 is moved in between the first two, whatever parameters it claims.
+    for centre in &mut path.passes[2].cl_nm {
+        centre[1] = 2_000_000;
+    }
+    let after = measure(&job, &oracle, &path, true, &());
+    let gap_0 = |found: &Findings| {
+        let heights = found.ridges[0].spots.iter().map(|spot| f64::from(spot.height_mm));
+        heights.fold(0.0, f64::max)
+    };
+    assert!((gap_0(&before) - flat(4.0)).abs() < 1e-5);
+    assert!((gap_0(&after) - flat(2.0)).abs() < 1e-4, "{}", gap_0(&after));
+}
+
+#[test]
+fn travel_is_held_against_the_machine() {
+    let mut job = job(plane(), Along::U, Side::Up, 0.5);
+    // Centres: x 5 to 35, y 0 to 8, z 7.
+    for (travel, beyond) in [
+        ([[5.0, 35.0], [0.0, 8.0], [7.0, 8.0]], [[0.0; 2]; 3]),
+        (
+            [[6.0, 40.0], [0.0, 8.0], [0.0, 6.5]],
+            [[1.0, 0.0], [0.0; 2], [0.0, 0.5]],
+        ),
+    ] {
+        job.machine.travel_mm = Some(travel);
+        let found = measured(&job, &[0.0, 0.2, 0.4], 300);
+        for (ours, exact) in found.axes.beyond_mm.iter().flatten().zip(beyond.iter().flatten()) {
+            assert!((ours - exact).abs() < 1e-9);
+        }
+        let sentences = found
+            .failures
+            .iter()
+            .filter(|line| line.contains("travel_mm"))
+            .count();
+        assert_eq!(sentences, beyond.iter().filter(|ends| **ends != [0.0; 2]).count());
+        assert_eq!(found.axes.within_travel(), sentences == 0);
+    }
+}
+
+#[test]
+fn threads_change_nothing() {
+    let text = include_str!("../../../../jobs/torus.toml");
+    let job = job_file::parse("torus", text).unwrap();
+    let oracle = Oracle::new(&job).unwrap();
+    let sides: Vec<f64> = (0..=12).map(|k| f64::from(k) / 12.0).collect();
+    let track = track(&oracle, &sides, 1500);
+    let with = |threads: usize| {
+        let pool = rayon::ThreadPoolBuilder::new()
+            .num_threads(threads)
+            .build()
+            .unwrap();
+        pool.install(|| measure(&job, &oracle, &track, true, &()))
+    };
+    let one = with(1);
+    assert_eq!(one, with(2));
+    assert_eq!(one, with(5));
+    assert_eq!(one.ridges.len(), 12);
+}
+
+/// A run that stopped leaves no ridge at its last pass; a run without two passes none at all.
+#[test]
+fn incomplete_runs_are_said_to_be() {
+    let job = job(plane(), Along::U, Side::Up, 0.01);
+    let oracle = Oracle::new(&job).unwrap();
+    for (passes, gaps) in [(3, 1), (2, 0), (1, 0), (0, 0)] {
+        let track = track(&oracle, &[0.0, 0.02, 0.04][..passes], 100);
+        let found = measure(&job, &oracle, &track, false, &());
+        assert_eq!(found.ridges.len(), gaps);
+        assert!(found.warnings.iter().any(|line| line.contains("not complete")));
+    }
+}

@@ -1,0 +1,154 @@
+//! The tool path of a run, kept compactly: 20 bytes a sample.
+
+use job::Along;
+use oracle::Emitted;
+use oracle::vector::{Vector, angle, dot, length, scale, subtract};
+
+const MM_PER_NM: f64 = 1e-6;
+
+/// One pass as it was emitted.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct PassTrack {
+    /// Side parameter.
+    pub side: f64,
+    /// Tick of the first sample; the others follow, one a tick.
+    pub first_tick: u64,
+    /// Path parameter of each sample: ascending, or descending where the pass runs backwards. Some may be equal.
+    pub path: Vec<f64>,
+    /// Ball centre of each sample, nm.
+    pub cl_nm: Vec<[i32; 3]>,
+}
+
+impl PassTrack {
+    /// Ball centre of a sample, mm.
+    #[must_use]
+    pub fn centre(&self, index: usize) -> [f64; 3] {
+        self.cl_nm[index].map(|nm| f64::from(nm) * MM_PER_NM)
+    }
+
+    /// The sample whose path parameter is nearest above this one, in the order of the pass.
+    pub(super) fn index_at(&self, path: f64) -> usize {
+        let backwards = self.path.first() > self.path.last();
+        let before = |at: &f64| if backwards { *at > path } else { *at < path };
+        self.path
+            .partition_point(before)
+            .min(self.path.len().saturating_sub(1))
+    }
+
+    /// Mean distance between samples, mm.
+    pub(super) fn spacing_mm(&self) -> f64 {
+        let count = self.cl_nm.len().saturating_sub(1);
+        let sum: f64 = (0..count)
+            .map(|k| length(subtract(self.centre(k + 1), self.centre(k))))
+            .sum();
+        #[allow(clippy::cast_precision_loss, reason = "far below 2^53")]
+        let count = count.max(1) as f64;
+        sum / count
+    }
+
+    /// Largest distance between the straight lines from sample to sample and a smooth curve through the samples, mm: that of an
+    /// arc through three neighbours from its chord.
+    pub(super) fn sagitta_mm(&self) -> f64 {
+        let mut most = 0.0_f64;
+        for k in 2..self.cl_nm.len() {
+            let [a, b, c] = [k - 2, k - 1, k].map(|k| self.centre(k));
+            let (one, other) = (subtract(b, a), subtract(c, b));
+            let (short, long) = {
+                let lengths = [length(one), length(other)];
+                (lengths[0].min(lengths[1]), lengths[0].max(lengths[1]))
+            };
+            // A short last step tells its direction badly; its arc is flatter than its neighbours' anyway.
+            if short >= 0.5 * long && short > 0.0 {
+                let turned = angle(one, other);
+                most = most.max(turned / (short + long) * long * long / 4.0);
+            }
+        }
+        most
+    }
+}
+
+/// The tool path of a run: gathered sample by sample, read afterwards.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Track {
+    /// The passes, in order.
+    pub passes: Vec<PassTrack>,
+    /// Samples that are nearer than this to the last one that was kept, nm, are left out, but for the last of a pass: where the feed is low
+    /// there are more than the path needs.
+    spacing_nm: f64,
+}
+
+impl Track {
+    /// A track whose samples are at least so far apart, nm.
+    #[must_use]
+    pub fn with_spacing(spacing_nm: f64) -> Self {
+        Self {
+            passes: Vec::new(),
+            spacing_nm,
+        }
+    }
+
+    /// Whether a sample is so near to the last one that it says nothing new.
+    fn is_near(&self, sample: &Emitted) -> bool {
+        let last = self.passes.last().and_then(|pass| pass.cl_nm.last());
+        !sample.last_of_pass
+            && last.is_some_and(|last| {
+                let apart = last
+                    .iter()
+                    .zip(sample.cl_nm)
+                    .map(|(a, b)| f64::from(*a) - f64::from(b));
+                apart.map(|d| d * d).sum::<f64>() < self.spacing_nm * self.spacing_nm
+            })
+    }
+
+    /// Keeps the next sample.
+    pub fn add(&mut self, sample: &Emitted, along: Along) {
+        let (path, side) = match along {
+            Along::U => (sample.u, sample.v),
+            Along::V => (sample.v, sample.u),
+        };
+        if sample.first_of_pass || self.passes.is_empty() {
+            // Neighbours are about as long.
+            let room = self
+                .passes
+                .last()
+                .map_or(0, |pass| pass.path.len() + pass.path.len() / 64);
+            self.passes.push(PassTrack {
+                side,
+                first_tick: sample.tick,
+                path: Vec::with_capacity(room),
+                cl_nm: Vec::with_capacity(room),
+            });
+        }
+        if !sample.first_of_pass && self.is_near(sample) {
+            return;
+        }
+        if let Some(pass) = self.passes.last_mut() {
+            pass.path.push(path);
+            pass.cl_nm.push(sample.cl_nm);
+        }
+    }
+
+    /// Samples.
+    #[must_use]
+    pub fn samples(&self) -> usize {
+        self.passes.iter().map(|pass| pass.path.len()).sum()
+    }
+
+    /// Least and largest position of each axis, mm; `None` without samples.
+    #[must_use]
+    pub fn extent_mm(&self) -> Option<[[f64; 2]; 3]> {
+        let mut extent: Option<[[i32; 2]; 3]> = None;
+        for centre in self.passes.iter().flat_map(|pass| &pass.cl_nm) {
+            let extent = extent.get_or_insert(centre.map(|nm| [nm; 2]));
+            for (range, nm) in extent.iter_mut().zip(centre) {
+                *range = [range[0].min(*nm), range[1].max(*nm)];
+            }
+        }
+        extent.map(|extent| extent.map(|range| range.map(|nm| f64::from(nm) * MM_PER_NM)))
+    }
+}
+
+/// The part of a vector across a unit direction.
+pub(super) fn across(m: Vector, direction: Vector) -> Vector {
+    subtract(m, scale(direction, dot(m, direction)))
+}
