@@ -35,7 +35,7 @@ try() {
     elif grep -q -e 'cargo sim' -e "$checkout" <<< "$printed"; then
         fail "isofeed $*: speaks of Cargo or of the checkout"
     else
-        return
+        return 0
     fi
     printf '%s\n' "$printed" | head -20 >&2
 }
@@ -49,7 +49,7 @@ try 0 'scallop' verify part.toml
 try 0 'isofeed simulate' new -o first.toml
 grep -q 'isofeed verify' "$folder/work/first.toml" || fail "a new job does not name the tool isofeed"
 try 0 'digest' simulate "$jobs/torus.toml"
-try 0 'equal' run "$jobs/torus.toml" --qemu
+try 0 'bit for bit the same' run "$jobs/torus.toml" --qemu
 try 0 'min' budget "$jobs/plate.toml" --ticks 2000
 
 # Bad input, a failed run, a missing program.
@@ -63,8 +63,8 @@ mv "$prefix/libexec/isofeed/cad-reader" "$folder/cad-reader"
 try 2 'unpack the whole archive' import "$jobs/cad/mouse.step" --list
 mv "$folder/cad-reader" "$prefix/libexec/isofeed/cad-reader"
 
-# No probe is connected; a program and an image that lack would be said instead.
-try 1 'probe' flash --board skr-pro
+# No probe is connected; a missing program would be reported instead.
+try 1 'no debug probe was found' flash --board skr-pro
 try 0 'Usage: isofeed' --help
 try 0 'Example: isofeed import' import --help
 for shell in bash zsh fish; do try 0 'isofeed' completions "$shell"; done

@@ -340,12 +340,6 @@ fn report(arguments: &Arguments, counted: &[Counted]) -> Result<()> {
 fn hold(arguments: &Arguments, figures: &[Figure]) -> Result<()> {
     let path = golden::path();
     if arguments.bless {
-        if programs::checkout().is_none() {
-            return Err(Failure::input(
-                "--bless writes a file of the project",
-                "run it in a checkout",
-            ));
-        }
         return std::fs::write(&path, golden::table(figures)).map_err(|error| cannot_write(&path, &error));
     }
     if !arguments.check {
@@ -363,6 +357,12 @@ fn hold(arguments: &Arguments, figures: &[Figure]) -> Result<()> {
 }
 
 pub(super) fn command(arguments: &Arguments) -> Result<()> {
+    if arguments.bless && programs::checkout().is_none() {
+        return Err(Failure::input(
+            "--bless writes a file of the project",
+            "run it in a checkout",
+        ));
+    }
     let bar = spinner("building the firmware");
     let image = qemu::firmware()?;
     bar.finish_and_clear();
