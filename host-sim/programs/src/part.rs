@@ -10,8 +10,10 @@ const BOARD_TARGET: &str = "thumbv7em-none-eabihf";
 /// A program or an image that is built apart from the tool.
 #[derive(Clone, Copy, Debug)]
 pub enum Part {
-    /// Reads CAD files.
+    /// Reads CAD files; not optimised.
     CadReader,
+    /// The same, optimised: takes longer to build, and reads large files sooner. The one that is installed.
+    FastCadReader,
     /// Talks to debug probes.
     DebugProbe,
     /// QEMU's plugin that counts cycles.
@@ -23,19 +25,14 @@ pub enum Part {
 }
 
 impl Part {
-    /// All of them.
+    /// What an installation has, with this reader of CAD files.
     #[must_use]
-    pub fn all() -> Vec<Self> {
+    pub fn installation(reader: Self) -> Vec<Self> {
         let images = boards::BOARDS.into_iter().map(Self::BoardImage);
-        [
-            Self::CadReader,
-            Self::DebugProbe,
-            Self::CyclePlugin,
-            Self::QemuImage,
-        ]
-        .into_iter()
-        .chain(images)
-        .collect()
+        [reader, Self::DebugProbe, Self::CyclePlugin, Self::QemuImage]
+            .into_iter()
+            .chain(images)
+            .collect()
     }
 
     /// For an image: Cargo's alias that builds it, and the folder in `target/`.
@@ -43,7 +40,7 @@ impl Part {
         match self {
             Self::QemuImage => Some(("fw-qemu", "qemu")),
             Self::BoardImage(board) => Some(board.build),
-            Self::CadReader | Self::DebugProbe | Self::CyclePlugin => None,
+            Self::CadReader | Self::FastCadReader | Self::DebugProbe | Self::CyclePlugin => None,
         }
     }
 
@@ -51,6 +48,7 @@ impl Part {
     fn program(self) -> Option<(&'static str, &'static str, &'static str)> {
         match self {
             Self::CadReader => Some(("cad-reader", "plain", "cad-reader")),
+            Self::FastCadReader => Some(("cad-reader", "cad", "cad-reader")),
             Self::DebugProbe => Some(("debug-probe", "plain", "debug-probe")),
             Self::CyclePlugin => Some(("cycle-plugin", "release", "libcycle_plugin.so")),
             Self::QemuImage | Self::BoardImage(_) => None,
@@ -90,7 +88,7 @@ impl Part {
     /// The folder of a checkout that it is built in: one each, so that no build overwrites another's file.
     fn folder(self) -> String {
         let name = match self {
-            Self::CadReader => "cad-reader",
+            Self::CadReader | Self::FastCadReader => "cad-reader",
             Self::DebugProbe => "debug-probe",
             Self::CyclePlugin => "plugin",
             Self::QemuImage | Self::BoardImage(_) => self.image().unwrap_or_default().1,
@@ -114,7 +112,7 @@ impl Part {
         match self {
             Self::QemuImage => format!("{SHARE}/images/qemu.elf"),
             Self::BoardImage(board) => format!("{SHARE}/images/{}.elf", board.id),
-            Self::CadReader | Self::DebugProbe | Self::CyclePlugin => {
+            Self::CadReader | Self::FastCadReader | Self::DebugProbe | Self::CyclePlugin => {
                 let file = self.program().map_or("", |(_, _, file)| file);
                 format!("{LIBEXEC}/{file}")
             }

@@ -1,4 +1,4 @@
-//! Lays out an installation: `stage PREFIX TOOL` copies the tool, its programs, the images, jobs and documents below PREFIX.
+//! Lays out an installation: `stage PREFIX TOOL [--as-tested]` copies the tool, its programs, the images, jobs and documents below PREFIX.
 //! `./dist` runs it, and makes the archive of what it leaves.
 
 use std::error::Error;
@@ -26,11 +26,15 @@ type Outcome<T> = Result<T, Box<dyn Error>>;
 
 fn main() -> ExitCode {
     let arguments: Vec<PathBuf> = std::env::args_os().skip(1).map(PathBuf::from).collect();
-    let [prefix, tool] = arguments.as_slice() else {
-        eprintln!("usage: stage PREFIX TOOL (`./dist` is what you want)");
-        return ExitCode::from(2);
+    let (prefix, tool, reader) = match arguments.as_slice() {
+        [prefix, tool] => (prefix, tool, Part::FastCadReader),
+        [prefix, tool, option] if option == Path::new("--as-tested") => (prefix, tool, Part::CadReader),
+        _ => {
+            eprintln!("usage: stage PREFIX TOOL [--as-tested] (`./dist` is what you want)");
+            return ExitCode::from(2);
+        }
     };
-    match stage(prefix, tool) {
+    match stage(prefix, tool, reader) {
         Ok(()) => ExitCode::SUCCESS,
         Err(error) => {
             eprintln!("error: {error}");
@@ -39,10 +43,10 @@ fn main() -> ExitCode {
     }
 }
 
-fn stage(prefix: &Path, tool: &Path) -> Outcome<()> {
+fn stage(prefix: &Path, tool: &Path, reader: Part) -> Outcome<()> {
     let root = checkout().ok_or("stage runs in a checkout only")?;
     copy(tool, &prefix.join("bin/isofeed"))?;
-    for part in Part::all() {
+    for part in Part::installation(reader) {
         copy(&find(part)?, &prefix.join(part.installed()))?;
     }
     let share = share(prefix);
