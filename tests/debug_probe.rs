@@ -21,7 +21,7 @@ const NOWHERE: &str = "0000:0000:nowhere";
 
 fn program() -> &'static Program {
     static PROGRAM: OnceLock<Program> = OnceLock::new();
-    PROGRAM.get_or_init(|| Program::build().unwrap())
+    PROGRAM.get_or_init(|| Program::find().unwrap())
 }
 
 fn chip_image() -> PathBuf {

@@ -8,8 +8,8 @@ use approach::export::{Dialect, ExportError, Exported, Options, export};
 use approach::gcode::FeedMode;
 use approach::{Kind, PassPath, passes};
 use job::{Job, Pattern};
-use machine::remote::qemu::workspace;
 use oracle::Oracle;
+use programs::checkout;
 
 /// The interpreter prints four decimals, and the program has four: a place is within half of each on every axis.
 const ROUNDED_MM: f64 = 1.8e-4;
@@ -67,7 +67,7 @@ fn distance(a: [f64; 3], b: [f64; 3]) -> f64 {
 
 /// The interpreter: installed, or where `scripts/setup.sh` unpacks it.
 fn interpreter() -> PathBuf {
-    let unpacked = workspace().join("target/rs274/rs274");
+    let unpacked = checkout().unwrap().join("target/rs274/rs274");
     if unpacked.exists() {
         unpacked
     } else {
@@ -314,7 +314,7 @@ fn options(dialect: Dialect, kind: Kind, feed_mode: FeedMode) -> Options {
 
 /// A sample job with a larger scallop, so fewer passes.
 fn job(name: &str, scallop_mm: f64) -> Job {
-    let path = workspace().join(format!("jobs/{name}.toml"));
+    let path = checkout().unwrap().join(format!("jobs/{name}.toml"));
     let mut job = job_file::load(&path).unwrap();
     job.scallop_mm = scallop_mm;
     job

@@ -287,7 +287,7 @@ fn written_data_are_the_figures() {
 /// The table of the README is that of the freeform job.
 #[test]
 fn readme_says_what_a_user_gains() {
-    let readme = std::fs::read_to_string(machine::remote::qemu::workspace().join("README.md")).unwrap();
+    let readme = std::fs::read_to_string(programs::checkout().unwrap().join("README.md")).unwrap();
     let freeform = shared()
         .comparisons
         .iter()

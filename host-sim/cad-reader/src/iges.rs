@@ -5,8 +5,8 @@ use std::ops::Range;
 
 use crate::ir;
 use crate::readers::Reader;
-use host_sim::cad::CadError;
-use host_sim::cad::Model;
+use cad::CadError;
+use cad::Model;
 
 /// The reader of IGES files.
 pub(crate) struct Iges;

@@ -18,9 +18,9 @@ use cadmpeg_ir::{Codec, DecodeOptions};
 
 use crate::ir_boundary::placed;
 use crate::ir_geometry::{solved_curve, solved_surface};
-use host_sim::cad::Model;
-use host_sim::cad::{Boundary, CadError, Curve, Face, Placement, Surface};
-use host_sim::oracle::vector::Vector;
+use cad::Model;
+use cad::{Boundary, CadError, Curve, Face, Placement, Surface};
+use oracle::vector::Vector;
 
 /// What a file may hold: many times what the largest sound part does.
 const LIMITS: ResourceLimits = ResourceLimits {

@@ -3,8 +3,8 @@
 use cadmpeg_ir::topology::{Coedge, Edge as SourceEdge, LoopBoundary, Sense};
 
 use crate::ir::{Translation, entity};
-use host_sim::cad::{Boundary, Curve, Edge, Placement};
-use host_sim::oracle::vector::{Vector, add, dot, length, scale, subtract};
+use cad::{Boundary, Curve, Edge, Placement};
+use oracle::vector::{Vector, add, dot, length, scale, subtract};
 
 /// Points along a boundary edge, its ends included.
 const EDGE_POINTS: usize = 17;

@@ -4,9 +4,9 @@ use cadmpeg_ir::geometry::nurbs::{NurbsCurve, NurbsPoleGrid, NurbsPoles3, NurbsS
 use cadmpeg_ir::geometry::{SolvedCurveGeometry, SolvedSurfaceGeometry};
 
 use crate::ir::{SURFACE_DEPTH_MAX, frame, placement, point, vector};
-use host_sim::cad::{Axis, DEGREE_MAX, Pole, SplineCurve, SplineSurface};
-use host_sim::cad::{Curve, Surface};
-use host_sim::oracle::vector::{Vector, scale};
+use cad::{Axis, DEGREE_MAX, Pole, SplineCurve, SplineSurface};
+use cad::{Curve, Surface};
+use oracle::vector::{Vector, scale};
 
 /// Coordinates beyond this are no part's, mm: a kilometre.
 const FAR_MM: f64 = 1e6;

@@ -1,12 +1,12 @@
 //! Reads a CAD file for `cargo sim import`, in a process of its own: `cad-reader FILE` writes `Result<Model, CadError>` as JSON to its
 //! standard output.
 //!
-//! Apart from `host-sim` because the library that knows the formats (`cadmpeg`) is twenty times as large as the rest of the tool together: it is built when
+//! Apart from `cad` because the library that knows the formats (`cadmpeg`) is twenty times as large as the rest of the tool together: it is built when
 //! the first CAD file is read, and a file that hangs a reader, or eats memory, does so here.
 //!
 //! ```text
 //! main.rs ─► readers.rs   by the file's first bytes ─► step.rs, iges.rs, rhino.rs   what can be told before reading it all
-//!                                                       └─► ir.rs, ir_geometry.rs, ir_boundary.rs   cadmpeg's model -> host_sim::cad::Face
+//!                                                       └─► ir.rs, ir_geometry.rs, ir_boundary.rs   cadmpeg's model -> cad::Face
 //! ```
 
 mod iges;

@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use host_sim::cad::{CadError, Model};
+use cad::{CadError, Model};
 
 use crate::{iges, rhino, step};
 

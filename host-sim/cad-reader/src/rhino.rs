@@ -2,8 +2,8 @@
 
 use crate::ir;
 use crate::readers::Reader;
-use host_sim::cad::CadError;
-use host_sim::cad::Model;
+use cad::CadError;
+use cad::Model;
 
 /// The reader of 3DM files.
 pub(crate) struct Rhino;

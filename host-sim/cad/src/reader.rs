@@ -9,19 +9,15 @@ use std::time::{Duration, Instant};
 use serde::{Deserialize, Serialize};
 
 use super::{CadError, Face};
-use machine::remote::qemu::cargo;
+use programs::Part;
 
 /// Largest file that is read, bytes: a file takes some 30 times its size in memory.
 const BYTES_MAX: u64 = 64 << 20;
+/// From this size on, bytes, a checkout builds and takes the optimised reader. The other takes 2 s of processor time for each MB of STEP,
+/// and would not read the largest files in [`TIME_MAX`].
+const BYTES_LARGE: u64 = 2 << 20;
 /// Time that the reader may take: ten times what the largest sound file takes.
 const TIME_MAX: Duration = Duration::from_secs(120);
-/// Where the reader is built: like the firmware, in a folder of its own.
-const FOLDER: &str = "target/cad-reader";
-/// Names the profile that it is built with, if not [`PROFILE`]: `./check` takes `plain`, which is built in less than half the time, and reads more
-/// slowly.
-const PROFILE_VARIABLE: &str = "ISOFEED_CAD_PROFILE";
-const PROFILE: &str = "cad";
-
 /// What a file holds.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Model {
@@ -37,35 +33,26 @@ pub struct Model {
 /// The file cannot be read, is none of the formats, is broken, or holds no faces; with its name and, where there is one, the line.
 pub fn read(path: &Path) -> Result<Model, CadError> {
     let file = path.display().to_string();
-    check(&file, path)?;
-    let profile = std::env::var(PROFILE_VARIABLE).unwrap_or_else(|_| PROFILE.to_owned());
-    let built = format!("{FOLDER}/{profile}/cad-reader");
-    if !machine::remote::qemu::workspace().join(&built).exists() {
+    let part = if check(&file, path)? < BYTES_LARGE {
+        Part::CadReader
+    } else {
+        Part::FastCadReader
+    };
+    if programs::needs_build(part) {
         eprintln!("building the reader of CAD files (once, some minutes)");
     }
-    let build = [
-        "build",
-        "--quiet",
-        "--locked",
-        "--profile",
-        &profile,
-        "-p",
-        "cad-reader",
-        "--target-dir",
-        FOLDER,
-    ];
-    let reader = cargo(&build, &built).map_err(|error| {
+    let reader = programs::find(part).map_err(|error| {
         CadError::new(
             &file,
-            format!("the reader of CAD files cannot be built: {error}"),
-            "run it in a checkout of the project, with its toolchain (./demo sets it up)",
+            format!("there is no reader of CAD files: {error}"),
+            error.remedy(),
         )
     })?;
     run(&file, path, &reader)
 }
 
-/// What need not be read to be told.
-fn check(file: &str, path: &Path) -> Result<(), CadError> {
+/// Checks that need no parsing; the file's size, bytes.
+fn check(file: &str, path: &Path) -> Result<u64, CadError> {
     let unreadable = |cause: String| {
         CadError::new(
             file,
@@ -89,7 +76,7 @@ fn check(file: &str, path: &Path) -> Result<(), CadError> {
     if told.len() == 0 {
         return Err(CadError::new(file, "the file is empty", "export the part again"));
     }
-    Ok(())
+    Ok(told.len())
 }
 
 /// Runs the reader, for so long at most.

@@ -8,7 +8,6 @@ use super::figures::{Figure, Model};
 use super::lab::Lab;
 use super::measure::Bench;
 use machine::prepare::prepare;
-use machine::remote::qemu::workspace;
 
 /// Growth that passes.
 pub const GROWTH_MAX: f64 = 0.02;
@@ -22,13 +21,13 @@ const HEADER: &str = "\
 /// Where the table stands.
 #[must_use]
 pub fn path() -> PathBuf {
-    workspace().join("tests/golden/cycles.txt")
+    programs::golden("cycles.txt")
 }
 
 /// The worst job that a search has found; its worst tick is part of the table.
 #[must_use]
 pub fn worst_job() -> PathBuf {
-    workspace().join("tests/golden/worst_tick.toml")
+    programs::golden("worst_tick.toml")
 }
 
 /// Rows of the worst tick of [`worst_job`].

@@ -1,15 +1,16 @@
 //! What the budget needs to know of the firmware's image: its code, its sizes, and the plan for the plugin.
 
 use std::path::{Path, PathBuf};
-use std::process::Command;
 
 use addr2line::Loader;
+use boards::STM32F405;
 use cycle_plugin::plan::Plan;
 use interp_core::STORE_WORDS;
 use object::{File, Object, ObjectSection, ObjectSymbol, SectionFlags, SectionKind, SymbolKind};
+use programs::Part;
 
 use super::{BudgetError, stages};
-use machine::remote::qemu::{self, QemuError};
+use machine::remote::qemu::QemuError;
 
 /// Flash begins here.
 const FLASH: u64 = 0x0800_0000;
@@ -37,22 +38,13 @@ fn bad(error: &dyn std::fmt::Display) -> BudgetError {
     BudgetError::Image(error.to_string())
 }
 
-/// Builds the firmware for the chip (`cargo fw-chip`), and returns the image: what counts for flash and RAM.
+/// The firmware for the chip, whose flash and RAM count; in a checkout built first where it has changed.
 ///
 /// # Errors
-/// Cargo is missing or fails; its own words are passed on.
+/// It is not there, or cannot be built: Cargo's own message.
 pub fn chip() -> Result<PathBuf, BudgetError> {
-    let workspace = qemu::workspace();
-    let failed = |words: String| BudgetError::Qemu(QemuError::Firmware(words));
-    let output = Command::new(std::env::var_os("CARGO").unwrap_or_else(|| "cargo".into()))
-        .args(["fw-chip", "--quiet"])
-        .current_dir(&workspace)
-        .output()
-        .map_err(|error| failed(error.to_string()))?;
-    if !output.status.success() {
-        return Err(failed(String::from_utf8_lossy(&output.stderr).into_owned()));
-    }
-    Ok(workspace.join("target/chip/thumbv7em-none-eabihf/release/firmware"))
+    let image = programs::find(Part::BoardImage(&STM32F405));
+    image.map_err(|error| BudgetError::Qemu(QemuError::Firmware(error)))
 }
 
 /// Whether a section is in the board's memory.

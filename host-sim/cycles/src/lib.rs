@@ -30,7 +30,7 @@ pub mod stages;
 use std::path::PathBuf;
 
 use machine::remote::RemoteError;
-use machine::remote::qemu::{QemuError, workspace};
+use machine::remote::qemu::QemuError;
 
 /// Cycles of a period: 1 ms at 168 MHz.
 pub const PERIOD_CYCLES: u32 = 168_000;
@@ -67,9 +67,8 @@ pub const FURTHER: [(&str, &str, u32); 4] = [
 /// All jobs of the table: their names, files and ticks.
 #[must_use]
 pub fn jobs() -> Vec<(&'static str, PathBuf, u32)> {
-    let file = |folder: &str, job: &str| workspace().join(folder).join(format!("{job}.toml"));
-    let surfaces = SURFACES.map(|(name, job)| (name, file("jobs", job), TICKS));
-    let further = FURTHER.map(|(name, job, ticks)| (name, file("tests/golden", job), ticks));
+    let surfaces = SURFACES.map(|(name, job)| (name, programs::sample_job(job), TICKS));
+    let further = FURTHER.map(|(name, job, ticks)| (name, programs::golden(&format!("{job}.toml")), ticks));
     surfaces.into_iter().chain(further).collect()
 }
 

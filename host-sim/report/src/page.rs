@@ -301,7 +301,7 @@ fn footer(out: &mut String, content: &Content<'_>) {
     };
     let _ = writeln!(
         out,
-        "<footer><p>Written by <code>cargo sim</code>. Positions and speeds are {emitter}; surface, arc lengths and errors are by the \
+        "<footer><p>Written by Isofeed. Positions and speeds are {emitter}; surface, arc lengths and errors are by the \
          independent f64 oracle. The page needs no network.</p>\n<details><summary>Libraries in this page, and their \
          licences</summary><pre>{}</pre></details></footer>",
         escape_lines(LICENCES)

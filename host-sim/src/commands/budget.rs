@@ -286,6 +286,12 @@ fn hold(arguments: &Arguments, figures: &[Figure]) -> Result<()> {
 }
 
 pub(super) fn command(arguments: &Arguments) -> Result<()> {
+    if arguments.bless && programs::checkout().is_none() {
+        return Err(Failure::input(
+            "--bless writes a file of the project",
+            "run it in a checkout",
+        ));
+    }
     let bar = spinner("building the firmware");
     let image = qemu::firmware()?;
     bar.finish_and_clear();

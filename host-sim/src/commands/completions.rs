@@ -1,14 +1,15 @@
-//! `completions`: what makes a shell complete `cargo sim`.
+//! `completions`: what makes a shell complete `cargo sim`, or `isofeed` where that is installed.
 //!
 //! `cargo sim` is an alias of cargo's, so the shell asks cargo's completion about it, which knows nothing of our commands. The script
 //! therefore defines completions for a command of the name `cargo_sim`, which need not exist, and puts itself in front of cargo's own:
 //! behind `cargo sim` it asks the former, everywhere else what was there before.
 
-use clap::{Args, CommandFactory, ValueEnum};
+use clap::{Args, ValueEnum};
 use clap_complete::Shell;
+use programs::Place;
 
+use super::Result;
 use super::out::say_part;
-use super::{Cli, Result};
 
 /// The name that the completions are made for; with a hyphen, clap_complete 4.6 writes names for bash that do not fit each other.
 const NAME: &str = "cargo_sim";
@@ -21,7 +22,7 @@ enum Hooked {
     Fish,
 }
 
-/// Writes a script that makes your shell complete `cargo sim`; cargo's own completion stays.
+/// Writes a script that makes your shell complete `cargo sim`; other completions stay.
 ///
 /// Example: cargo sim completions bash > ~/.isofeed.bash   # then in ~/.bashrc: source ~/.isofeed.bash
 /// Example: cargo sim completions zsh > ~/.isofeed.zsh     # then in ~/.zshrc, after compinit: source ~/.isofeed.zsh
@@ -41,8 +42,13 @@ pub(super) fn command(arguments: &Arguments) -> Result<()> {
         Hooked::Fish => (Shell::Fish, include_str!("completions/hook.fish")),
     };
     let mut script = Vec::new();
-    let mut command = Cli::command().name(NAME).bin_name(NAME);
-    clap_complete::generate(shell, &mut command, NAME, &mut script);
+    // An installed tool is a program: it needs no hook.
+    let (name, hook) = match programs::place() {
+        Place::Installed(_) => (programs::command_name(), ""),
+        Place::Checkout(_) | Place::Nowhere => (NAME, hook),
+    };
+    let mut command = super::arguments().name(name).bin_name(name);
+    clap_complete::generate(shell, &mut command, name, &mut script);
     say_part!("{}\n{hook}", String::from_utf8_lossy(&script));
     Ok(())
 }

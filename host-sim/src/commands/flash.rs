@@ -11,7 +11,7 @@ use serde_json::json;
 use super::out::{complain, say};
 use super::{Failure, Result, progress, spinner};
 use crate::probe::{self, Event, Image, NotRun, Problem, Program, Request, Target, Work};
-use machine::remote::qemu::cargo;
+use programs::{Part, image_remedy};
 
 /// Writes the firmware into a board's flash by a debug probe, compares what was written, and starts it.
 ///
@@ -71,9 +71,11 @@ impl From<NotRun> for Failure {
                 probe::sentence(&problem),
                 probe::remedy(&problem)
             ))),
-            error @ NotRun::Program(_) => Self::Failed(Some(format!(
-                "{error}\n  help: run it in a checkout of the project, with its toolchain (./demo sets it up)"
+            NotRun::Unavailable(cause) => Self::Failed(Some(format!(
+                "there is no program that talks to debug probes: {cause}\n  help: {}",
+                cause.remedy()
             ))),
+            error @ NotRun::Program(_) => Self::Failed(Some(format!("{error}\n  help: please report it"))),
         }
     }
 }
@@ -103,19 +105,20 @@ impl Place {
     /// The image: the one that is named, or the board's own, built.
     pub(super) fn image(&self) -> Result<PathBuf> {
         let board = self.board();
-        let (alias, folder) = board.build;
+        let part = Part::BoardImage(board);
         let Some(image) = &self.image else {
-            let built = format!("target/{folder}/thumbv7em-none-eabihf/release/firmware");
             let bar = spinner("building the firmware");
-            let image = cargo(&[alias, "--quiet"], &built);
+            let image = programs::find(part);
             bar.finish_and_clear();
-            return image
-                .map_err(|words| Failure::Failed(Some(format!("the firmware could not be built: {words}"))));
+            return image.map_err(|error| {
+                let remedy = error.remedy();
+                Failure::Failed(Some(format!("there is no firmware: {error}\n  help: {remedy}")))
+            });
         };
         if !image.is_file() {
             return Err(Failure::input(
                 format!("there is no image {}", image.display()),
-                format!("build it with `cargo {alias}`, or leave --image out"),
+                image_remedy(part),
             ));
         }
         Ok(image.clone())
@@ -134,21 +137,18 @@ impl Place {
 
 /// The program that talks to probes.
 pub(super) fn program() -> Result<Program> {
-    if !Program::is_built() {
+    if Program::needs_build() {
         complain!("building the program that talks to debug probes (once, some minutes)");
     }
-    Ok(Program::build()?)
+    Ok(Program::find()?)
 }
 
 /// Reads an image, and makes sure that it is one for this board and fits its flash.
-pub(super) fn load(path: &Path, board: &Board) -> Result<Image> {
+pub(super) fn load(path: &Path, board: &'static Board) -> Result<Image> {
     let refused = |why: String| {
         Failure::input(
             format!("{}: {why}", path.display()),
-            format!(
-                "`cargo {}` builds the image for the board {}",
-                board.build.0, board.id
-            ),
+            image_remedy(Part::BoardImage(board)),
         )
     };
     let image = Image::load(path).map_err(refused)?;

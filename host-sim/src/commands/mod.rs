@@ -27,12 +27,14 @@ mod typed;
 mod verify;
 
 use out::complain;
+use programs::with_command_name;
 use progress::{Bar, progress, spinner};
 
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
-use clap::{Parser, Subcommand};
+use clap::builder::{Resettable, StyledStr};
+use clap::{CommandFactory, FromArgMatches, Parser, Subcommand};
 
 use ::approach::ApproachError;
 use inspect::InspectError;
@@ -164,10 +166,35 @@ impl Command {
     }
 }
 
+/// The command line, with the name that the tool has here.
+fn arguments() -> clap::Command {
+    let name = programs::command_name();
+    with_name(Cli::command().name(name).bin_name(name))
+}
+
+/// The same command with the tool's name in its help, that of its arguments and of its subcommands.
+fn with_name(command: clap::Command) -> clap::Command {
+    let text = |text: Option<&StyledStr>| {
+        Resettable::<StyledStr>::from(
+            text.map(|text| with_command_name(&text.to_string()).into_owned().into()),
+        )
+    };
+    let (about, long_about) = (text(command.get_about()), text(command.get_long_about()));
+    command
+        .about(about)
+        .long_about(long_about)
+        .mut_args(move |argument| {
+            let (help, long_help) = (text(argument.get_help()), text(argument.get_long_help()));
+            argument.help(help).long_help(long_help)
+        })
+        .mut_subcommands(with_name)
+}
+
 /// Reads the arguments, runs the command, and returns its exit code: 0 done, 1 failed, 2 bad usage or bad input.
 #[must_use]
 pub fn main() -> ExitCode {
-    let command = Cli::parse().command;
+    let parsed = Cli::from_arg_matches(&arguments().get_matches());
+    let command = parsed.unwrap_or_else(|error| error.exit()).command;
     if command.as_json() {
         progress::silence();
     }

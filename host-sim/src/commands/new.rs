@@ -44,7 +44,7 @@ pub(super) fn command(arguments: &Arguments) -> Result<()> {
     }
     let written = options
         .open(path)
-        .and_then(|mut file| file.write_all(text.as_bytes()));
+        .and_then(|mut file| file.write_all(programs::with_command_name(&text).as_bytes()));
     written.map_err(|error| match error.kind() {
         ErrorKind::AlreadyExists if !path.is_dir() => Failure::input(
             format!("{} is there already", path.display()),

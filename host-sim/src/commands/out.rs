@@ -7,6 +7,8 @@ use std::fmt::Arguments;
 use std::io::{self, ErrorKind, Write, stderr, stdout};
 use std::sync::{Mutex, PoisonError};
 
+use programs::with_command_name;
+
 /// What came of writing to standard output.
 #[derive(Debug)]
 enum Output {
@@ -32,12 +34,12 @@ fn attempt(write: impl FnOnce() -> io::Result<()>) {
 
 /// Prints to standard output.
 pub(super) fn to_stdout(text: Arguments<'_>) {
-    attempt(|| stdout().write_fmt(text));
+    attempt(|| stdout().write_all(with_command_name(&text.to_string()).as_bytes()));
 }
 
 /// Prints a line to standard error; nothing can be said about it if that fails.
 pub(super) fn to_stderr(text: Arguments<'_>) {
-    let _ = writeln!(stderr(), "{text}");
+    let _ = writeln!(stderr(), "{}", with_command_name(&text.to_string()));
 }
 
 /// Ends the output; tells why it did not all arrive, unless its reader had seen enough.

@@ -159,7 +159,7 @@ fn connect(arguments: &Arguments) -> Result<(Option<Qemu>, Session)> {
         Some(image) if !image.exists() => {
             return Err(Failure::input(
                 format!("there is no {}", image.display()),
-                "build it with `cargo fw-qemu`",
+                programs::image_remedy(programs::Part::QemuImage),
             ));
         }
         Some(image) => image.clone(),

@@ -6,21 +6,7 @@ use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Stdio};
 
 use super::{Event, Problem, Request};
-use machine::remote::qemu::{cargo, workspace};
-
-/// How the program is built: like the firmware, in a folder of its own.
-const BUILD: [&str; 9] = [
-    "build",
-    "--quiet",
-    "--locked",
-    "--profile",
-    "plain",
-    "-p",
-    "debug-probe",
-    "--target-dir",
-    "target/debug-probe",
-];
-const BUILT: &str = "target/debug-probe/plain/debug-probe";
+use programs::{Part, Unavailable};
 
 /// Why nothing came of a request.
 #[derive(Debug, thiserror::Error)]
@@ -28,9 +14,12 @@ pub enum NotRun {
     /// The program says why.
     #[error("{}", super::sentence(.0))]
     Problem(Problem),
-    /// The program cannot be built, or run: a checkout without its toolchain, or an error of ours.
+    /// The program does not run, or not as it should: an error of ours.
     #[error("the program that talks to debug probes {0}")]
     Program(String),
+    /// The program is not there.
+    #[error("there is no program that talks to debug probes: {0}")]
+    Unavailable(Unavailable),
 }
 
 /// The program.
@@ -38,20 +27,20 @@ pub enum NotRun {
 pub struct Program(PathBuf);
 
 impl Program {
-    /// Whether it was built before; the first time takes some minutes.
+    /// Whether [`Self::find`] builds it from nothing, which takes some minutes.
     #[must_use]
-    pub fn is_built() -> bool {
-        workspace().join(BUILT).exists()
+    pub fn needs_build() -> bool {
+        programs::needs_build(Part::DebugProbe)
     }
 
-    /// Builds it; at once where nothing changed.
+    /// Finds it; in a checkout it is built first where it has changed.
     ///
     /// # Errors
-    /// Cargo is missing or fails; its own words are passed on.
-    pub fn build() -> Result<Self, NotRun> {
-        cargo(&BUILD, BUILT)
+    /// It is not there, or cannot be built: Cargo's own message.
+    pub fn find() -> Result<Self, NotRun> {
+        programs::find(Part::DebugProbe)
             .map(Self)
-            .map_err(|words| NotRun::Program(format!("cannot be built: {words}")))
+            .map_err(NotRun::Unavailable)
     }
 
     /// Another program in its place, for tests of what is made of its answers.

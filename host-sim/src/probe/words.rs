@@ -66,7 +66,7 @@ pub fn remedy(problem: &Problem) -> &'static str {
         Problem::Differs(_) => {
             "write it with `cargo sim flash`, or name the image that is in the chip with --image"
         }
-        Problem::BadImage(_) => "build it with `cargo fw-chip` or `cargo fw-skr-pro`",
+        Problem::BadImage(_) => "name an image of the firmware, or leave --image out",
         Problem::NoLog(_) => {
             "reset the board; if it stays silent, the crystal may not run, and the firmware waits for it"
         }

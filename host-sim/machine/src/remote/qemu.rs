@@ -9,6 +9,7 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 use std::time::{Duration, Instant};
 
 use super::Stream;
+use programs::{Part, Unavailable};
 
 /// Program and machine: the STM32F405 as QEMU has it.
 const PROGRAM: &str = "qemu-system-arm";
@@ -26,12 +27,12 @@ pub enum QemuError {
     /// The program is not there.
     #[error("{PROGRAM} is not installed; on Debian and Ubuntu: sudo apt-get install qemu-system-arm")]
     Missing,
-    /// The firmware could not be built.
-    #[error("the firmware for QEMU could not be built: {0}")]
-    Firmware(String),
-    /// The plugin that counts cycles could not be built.
-    #[error("the plugin that counts cycles could not be built: {0}")]
-    Plugin(String),
+    /// There is no firmware.
+    #[error("there is no firmware: {0}\n  help: {remedy}", remedy = .0.remedy())]
+    Firmware(Unavailable),
+    /// There is no plugin that counts cycles.
+    #[error("there is no plugin that counts cycles: {0}\n  help: {remedy}", remedy = .0.remedy())]
+    Plugin(Unavailable),
     /// It did not start, or ended.
     #[error("QEMU did not start: {0}")]
     Start(String),
@@ -44,40 +45,12 @@ pub struct Qemu {
     folder: tempfile::TempDir,
 }
 
-/// The workspace that this tool was built in.
-#[must_use]
-pub fn workspace() -> PathBuf {
-    let here = Path::new(env!("CARGO_MANIFEST_DIR"));
-    here.ancestors().nth(2).unwrap_or(here).to_owned()
-}
-
-/// Builds the firmware for QEMU (`cargo fw-qemu`; at once where nothing changed), and returns the image.
+/// The firmware for QEMU; in a checkout built first where it has changed.
 ///
 /// # Errors
-/// Cargo is missing or fails; its own words are passed on.
+/// It is not there, or cannot be built: Cargo's own message.
 pub fn firmware() -> Result<PathBuf, QemuError> {
-    cargo(
-        &["fw-qemu", "--quiet"],
-        "target/qemu/thumbv7em-none-eabihf/release/firmware",
-    )
-    .map_err(QemuError::Firmware)
-}
-
-/// Runs cargo in the workspace, and returns the file in it that this builds; what cargo says where it fails.
-pub fn cargo(arguments: &[&str], built: &str) -> Result<PathBuf, String> {
-    let workspace = workspace();
-    let cargo = std::env::var_os("CARGO").unwrap_or_else(|| "cargo".into());
-    let output = Command::new(cargo)
-        .args(arguments)
-        .current_dir(&workspace)
-        .stdin(Stdio::null())
-        .output()
-        .map_err(|error| error.to_string())?;
-    if output.status.success() {
-        Ok(workspace.join(built))
-    } else {
-        Err(String::from_utf8_lossy(&output.stderr).into_owned())
-    }
+    programs::find(Part::QemuImage).map_err(QemuError::Firmware)
 }
 
 /// The program, on one processor and as a batch process where the system can do that (util-linux): QEMU hands each tick from one of its
@@ -125,21 +98,12 @@ fn processors() -> Vec<usize> {
     list.trim().split(',').filter_map(range).flatten().collect()
 }
 
-/// Builds the plugin that counts cycles, and returns the library.
+/// The plugin that counts cycles: a library for QEMU; in a checkout built first where it has changed.
 ///
 /// # Errors
-/// Cargo is missing or fails; its own words are passed on.
+/// It is not there, or cannot be built: Cargo's own message.
 pub fn cycle_plugin() -> Result<PathBuf, QemuError> {
-    const BUILD: [&str; 7] = [
-        "build",
-        "--release",
-        "--quiet",
-        "-p",
-        "cycle-plugin",
-        "--target-dir",
-        "target/plugin",
-    ];
-    cargo(&BUILD, "target/plugin/release/libcycle_plugin.so").map_err(QemuError::Plugin)
+    programs::find(Part::CyclePlugin).map_err(QemuError::Plugin)
 }
 
 impl Qemu {

@@ -107,7 +107,11 @@ pub(super) fn command(bench: &Bench, jobs: u32, arguments: &Arguments) -> Result
         if limits { " --limits" } else { "" },
         describe(&found.worst)
     );
-    std::fs::write(out, text::text(&found.job, &comment)).map_err(|error| cannot_write(out, &error))?;
+    std::fs::write(
+        out,
+        text::text(&found.job, &programs::with_command_name(&comment)),
+    )
+    .map_err(|error| cannot_write(out, &error))?;
     if as_json {
         let report = json!({
             "seed": seed,

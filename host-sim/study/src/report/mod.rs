@@ -58,7 +58,7 @@ fn shown(value: f64, decimals: usize) -> String {
 pub fn write(folder: &Path, study: &Study) -> io::Result<PathBuf> {
     std::fs::write(folder.join("figures.json"), data(&study.figures).to_string())?;
     let path = folder.join("index.html");
-    std::fs::write(&path, page(study)?)?;
+    std::fs::write(&path, programs::with_command_name(&page(study)?).as_ref())?;
     Ok(path)
 }
 

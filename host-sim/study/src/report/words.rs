@@ -111,6 +111,6 @@ pub(super) fn closing(out: &mut String) {
          <li>Bytes are those of the program: G-code or polynomial blocks with four decimals; for <code>surface</code> the header and the surface.</li>\n\
          <li>The paper's pictures are not at hand. Figures 3, 4, 5, 7, 8 and 9 are our reconstructions of that kind of figure, by the \
          examples that they go with.</li>\n</ul></section>\n\
-         <footer>Written by <code>cargo sim paper</code>. The figures' data are beside this page, in <code>figures.json</code>.</footer>\n",
+         <footer>Written by Isofeed's command <code>paper</code>. The figures' data are beside this page, in <code>figures.json</code>.</footer>\n",
     );
 }

@@ -1,0 +1,121 @@
+//! The programs and images: how Cargo builds each, where it then is, and where an installation has it.
+
+use boards::Board;
+
+use crate::place::{LIBEXEC, SHARE};
+
+/// Target of the firmware.
+const BOARD_TARGET: &str = "thumbv7em-none-eabihf";
+
+/// A program or an image that is built apart from the tool.
+#[derive(Clone, Copy, Debug)]
+pub enum Part {
+    /// Reads CAD files; not optimised.
+    CadReader,
+    /// The same, optimised: takes longer to build, and reads large files sooner. The one that is installed.
+    FastCadReader,
+    /// Talks to debug probes.
+    DebugProbe,
+    /// QEMU's plugin that counts cycles.
+    CyclePlugin,
+    /// The firmware for QEMU.
+    QemuImage,
+    /// The firmware for a board.
+    BoardImage(&'static Board),
+}
+
+impl Part {
+    /// What an installation has, with this reader of CAD files.
+    #[must_use]
+    pub fn installation(reader: Self) -> Vec<Self> {
+        let images = boards::BOARDS.into_iter().map(Self::BoardImage);
+        [reader, Self::DebugProbe, Self::CyclePlugin, Self::QemuImage]
+            .into_iter()
+            .chain(images)
+            .collect()
+    }
+
+    /// For an image: Cargo's alias that builds it, and the folder in `target/`.
+    fn image(self) -> Option<(&'static str, &'static str)> {
+        match self {
+            Self::QemuImage => Some(("fw-qemu", "qemu")),
+            Self::BoardImage(board) => Some(board.build),
+            Self::CadReader | Self::FastCadReader | Self::DebugProbe | Self::CyclePlugin => None,
+        }
+    }
+
+    /// For a program: its package, Cargo's profile, and the file that is built.
+    fn program(self) -> Option<(&'static str, &'static str, &'static str)> {
+        match self {
+            Self::CadReader => Some(("cad-reader", "plain", "cad-reader")),
+            Self::FastCadReader => Some(("cad-reader", "cad", "cad-reader")),
+            Self::DebugProbe => Some(("debug-probe", "plain", "debug-probe")),
+            Self::CyclePlugin => Some(("cycle-plugin", "release", "libcycle_plugin.so")),
+            Self::QemuImage | Self::BoardImage(_) => None,
+        }
+    }
+
+    /// Cargo's alias that builds it; none for a program.
+    pub(crate) fn alias(self) -> Option<&'static str> {
+        self.image().map(|(alias, _)| alias)
+    }
+
+    /// Cargo's arguments that build it.
+    pub(crate) fn build(self) -> Vec<String> {
+        let words: Vec<&str> = match (self.image(), self.program()) {
+            (Some((alias, _)), _) => vec![alias, "--quiet", "--locked"],
+            (None, Some((package, profile, _))) => {
+                vec![
+                    "build",
+                    "--quiet",
+                    "--locked",
+                    "--profile",
+                    profile,
+                    "-p",
+                    package,
+                ]
+            }
+            (None, None) => Vec::new(),
+        };
+        let folder = self.program().map(|_| ["--target-dir".to_owned(), self.folder()]);
+        words
+            .into_iter()
+            .map(str::to_owned)
+            .chain(folder.into_iter().flatten())
+            .collect()
+    }
+
+    /// The folder of a checkout that it is built in: one each, so that no build overwrites another's file.
+    fn folder(self) -> String {
+        let name = match self {
+            Self::CadReader | Self::FastCadReader => "cad-reader",
+            Self::DebugProbe => "debug-probe",
+            Self::CyclePlugin => "plugin",
+            Self::QemuImage | Self::BoardImage(_) => self.image().unwrap_or_default().1,
+        };
+        format!("target/{name}")
+    }
+
+    /// The file in a checkout.
+    #[must_use]
+    pub fn built(self) -> String {
+        let folder = self.folder();
+        match self.program() {
+            Some((_, profile, file)) => format!("{folder}/{profile}/{file}"),
+            None => format!("{folder}/{BOARD_TARGET}/release/firmware"),
+        }
+    }
+
+    /// The file in an installation, from its prefix.
+    #[must_use]
+    pub fn installed(self) -> String {
+        match self {
+            Self::QemuImage => format!("{SHARE}/images/qemu.elf"),
+            Self::BoardImage(board) => format!("{SHARE}/images/{}.elf", board.id),
+            Self::CadReader | Self::FastCadReader | Self::DebugProbe | Self::CyclePlugin => {
+                let file = self.program().map_or("", |(_, _, file)| file);
+                format!("{LIBEXEC}/{file}")
+            }
+        }
+    }
+}
