@@ -121,6 +121,7 @@ mod app {
             board.tim1,
             board.dma2,
             board::WIRING,
+            board::PLUS_IS_HIGH,
             SLOT_COUNTS,
             context.local.slots,
             context.local.rest,
