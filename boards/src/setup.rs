@@ -6,8 +6,8 @@ use crate::{Line, Port, Role};
 const OUTPUT: u32 = 0b01;
 /// `MODER`: left to a peripheral.
 const ALTERNATE: u32 = 0b10;
-/// `OSPEEDR` of step and direction: edges of a few nanoseconds, for pulses of a microsecond.
-const FAST: u32 = 0b10;
+/// `OSPEEDR` of step and direction, medium speed (25 MHz): edges of 10 ns, short beside pulses of 1 us, that a cable bears.
+const MEDIUM: u32 = 0b01;
 /// `PUPDR`: pulled up.
 const PULL_UP: u32 = 0b01;
 /// `AFR`: USART1.
@@ -91,7 +91,7 @@ impl PortSetup {
             self.pull = self.pull.with(number, 2, PULL_UP);
         }
         if matches!(line.role, Role::Step(_) | Role::Direction(_)) {
-            self.speed = self.speed.with(number, 2, FAST);
+            self.speed = self.speed.with(number, 2, MEDIUM);
         }
         self
     }
@@ -108,4 +108,100 @@ pub const fn ports(lines: &[Line]) -> [PortSetup; Port::ALL.len()] {
         index += 1;
     }
     ports
+}
+
+/// `RCC_AHB1ENR`, whose lowest bits are the ports' clocks (RM0090, 7.3.10).
+const PORT_CLOCKS: u32 = 0x4002_3830;
+/// The registers of port A; those of the next lie [`PORT_BYTES`] further (RM0090, 2.3).
+const PORTS_BEGIN: u32 = 0x4002_0000;
+const PORT_BYTES: u32 = 0x400;
+
+/// A register is read, some bits are cleared, some are set, and it is written: three words, as the code right after a reset reads them.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Write {
+    /// The register.
+    pub address: u32,
+    /// Bits that are cleared first.
+    pub clear: u32,
+    /// Bits that are set then.
+    pub set: u32,
+}
+
+/// Registers that are written for a port: `BSRR`, `OSPEEDR`, `PUPDR`, `AFRL`, `AFRH`, `MODER`.
+const PORT_WRITES: usize = 6;
+
+/// How many [`writes`] these lines need.
+#[must_use]
+pub const fn writes_count(lines: &[Line]) -> usize {
+    let ports = ports(lines);
+    let mut count = 2;
+    let mut index = 0;
+    while index < ports.len() {
+        if ports[index].is_used() {
+            count += PORT_WRITES;
+        }
+        index += 1;
+    }
+    count
+}
+
+/// All that sets the pins up, in order: the ports' clocks; the same once more, whose read waits for them (ES0182, 2.1.13); then each port, its
+/// outputs inactive before they are outputs.
+///
+/// # Panics
+/// `N` is not [`writes_count`]. For constants.
+#[must_use]
+pub const fn writes<const N: usize>(lines: &[Line]) -> [Write; N] {
+    let ports = ports(lines);
+    let nothing = Write {
+        address: 0,
+        clear: 0,
+        set: 0,
+    };
+    let mut writes = [nothing; N];
+    let (mut clocks, mut next, mut index) = (0, 2, 0);
+    while index < ports.len() {
+        if ports[index].is_used() {
+            clocks |= 1 << index;
+            let of_port = port_writes(&ports[index], PORTS_BEGIN + PORT_BYTES * index as u32);
+            let mut place = 0;
+            while place < PORT_WRITES {
+                writes[next] = of_port[place];
+                next += 1;
+                place += 1;
+            }
+        }
+        index += 1;
+    }
+    assert!(next == N, "as many writes as the lines need");
+    let clocks = Write {
+        address: PORT_CLOCKS,
+        clear: 0,
+        set: clocks,
+    };
+    (writes[0], writes[1]) = (clocks, clocks);
+    writes
+}
+
+const fn port_writes(setup: &PortSetup, base: u32) -> [Write; PORT_WRITES] {
+    const fn change(address: u32, field: Field) -> Write {
+        Write {
+            address,
+            clear: field.mask,
+            set: field.value,
+        }
+    }
+    [
+        Write {
+            address: base + 0x18,
+            clear: u32::MAX,
+            set: setup.set_reset,
+        },
+        change(base + 0x08, setup.speed),
+        change(base + 0x0c, setup.pull),
+        change(base + 0x20, setup.alternate[0]),
+        change(base + 0x24, setup.alternate[1]),
+        change(base, setup.mode),
+    ]
 }

@@ -5,7 +5,7 @@ extern crate std;
 use std::collections::BTreeSet;
 use std::vec::Vec;
 
-use crate::setup::{PortSetup, ports};
+use crate::setup::{PortSetup, ports, writes, writes_count};
 use crate::{Axis, BOARDS, Board, Level, Line, Pin, Port, Role, SKR_PRO, STM32F405};
 
 /// Pins that are never to be used: SWD, the crystal, BOOT1, the clock crystal's and PC13 (which drive next to nothing), USB.
@@ -149,7 +149,7 @@ fn registers_say_what_the_table_says() {
                 let wanted = if line.role.is_input() { 0b01 } else { 0b00 };
                 assert_eq!(two(setup.pull.apply(pull)), wanted, "{pin}: pull");
                 let fast = matches!(line.role, Role::Step(_) | Role::Direction(_));
-                let wanted = if fast { 0b10 } else { two(speed) };
+                let wanted = if fast { 0b01 } else { two(speed) };
                 assert_eq!(two(setup.speed.apply(speed)), wanted, "{pin}: speed");
                 let set = setup.set_reset & pin.bit() != 0;
                 let reset = setup.set_reset & pin.bit() << 16 != 0;
@@ -174,7 +174,7 @@ fn registers_say_what_the_table_says() {
     }
 }
 
-/// Hand-made values of one port, from the manual's figures: PE9, PE11, PE13 step and PE8 direction, fast outputs, low;
+/// Hand-made values of one port, from the manual's figures: PE9, PE11, PE13 step and PE8 direction, outputs of medium speed, low;
 /// PE5, PE6 low; PE10, PE12, PE15 inputs with pull-ups.
 #[test]
 fn port_e_of_the_skr_pro_is_as_worked_out_by_hand() {
@@ -187,8 +187,43 @@ fn port_e_of_the_skr_pro_is_as_worked_out_by_hand() {
     // Two bits a pin, from 15 down:  15 14 13 12  11 10  9  8   7  6  5  4   3 2 1 0
     assert_eq!(e.mode.value, 0b00_00_01_00_01_00_01_01_00_01_01_00_00_00_00_00);
     assert_eq!(e.mode.mask, 0b11_00_11_11_11_11_11_11_00_11_11_00_00_00_00_00);
-    assert_eq!(e.speed.value, 0b00_00_10_00_10_00_10_10_00_00_00_00_00_00_00_00);
+    assert_eq!(e.speed.value, 0b00_00_01_00_01_00_01_01_00_00_00_00_00_00_00_00);
     assert_eq!(e.pull.value, 0b01_00_00_01_00_01_00_00_00_00_00_00_00_00_00_00);
+}
+
+/// Written one after the other to the registers after reset, the writes leave what the fields say, and no output before its level.
+#[test]
+fn the_writes_of_a_reset_are_the_fields() {
+    fn check<const N: usize>(board: &Board) {
+        let mut registers =
+            std::collections::BTreeMap::from([(0x4002_0000, 0xA800_0000_u32), (0x4002_0400, 0x280)]);
+        let order: Vec<_> = writes::<N>(board.lines).into_iter().collect();
+        for write in &order {
+            let register = registers.entry(write.address).or_default();
+            *register = *register & !write.clear | write.set;
+        }
+        assert_eq!(order[0], order[1], "read back");
+        for (port, setup) in Port::ALL.into_iter().zip(ports(board.lines)) {
+            let base = 0x4002_0000 + 0x400 * port as u32;
+            let clock = registers[&0x4002_3830] >> port.index() & 1;
+            assert_eq!(clock == 1, setup.is_used());
+            if setup.is_used() {
+                assert_eq!(registers[&(base + 0x18)], setup.set_reset);
+                assert_eq!(registers[&(base + 0x08)], setup.speed.value);
+                assert_eq!(registers[&(base + 0x0c)], setup.pull.value);
+                assert_eq!(
+                    [0x20, 0x24].map(|at| registers[&(base + at)]),
+                    setup.alternate.map(|field| field.value)
+                );
+                let reset = [0xA800_0000, 0x280].get(port.index()).copied().unwrap_or(0);
+                assert_eq!(registers[&base], setup.mode.apply(reset));
+                let place = |address| order.iter().position(|write| write.address == address);
+                assert!(place(base + 0x18) < place(base));
+            }
+        }
+    }
+    check::<{ writes_count(STM32F405.lines) }>(&STM32F405);
+    check::<{ writes_count(SKR_PRO.lines) }>(&SKR_PRO);
 }
 
 /// What the drivers write for a level, both ways round.

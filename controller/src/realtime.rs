@@ -121,7 +121,7 @@ impl<S: AsRef<[i32]> + AsMut<[i32]>> RealTime<S> {
         self.steps.as_ref()
     }
 
-    /// Levels of the direction pins for the period that begins, a bit an axis.
+    /// Axes whose direction pin says minus in the period that begins, a bit each; see [`Steps::directions`].
     #[must_use]
     #[inline]
     pub fn directions(&self) -> u8 {

@@ -26,8 +26,8 @@ use protocol::message::{
     SafetyStatus,
 };
 
-/// Ticks in a row in which an input has to differ before it counts, and the emergency stop before it counts as released:
-/// 3 ms at 1 ms. Contacts bounce for less, and at 100 mm/s an axis goes 0.3 mm meanwhile.
+/// Ticks in a row in which an input has to differ before it counts, and the emergency stop before it counts as released: at 1 ms, the
+/// third comes 2 to 3 ms after the change. Contacts bounce for less, and at 100 mm/s an axis goes at most 0.3 mm meanwhile.
 pub const DEBOUNCE_TICKS: u32 = 3;
 
 /// What no inputs look like: there is something to do although they have not changed.

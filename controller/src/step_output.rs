@@ -49,7 +49,7 @@ pub trait Registers {
 
 /// Register addresses (RM0090, 2.3) and values.
 pub mod register {
-    /// Clocks of ports and DMA2.
+    /// Clock of DMA2, among others.
     pub const RCC_AHB1ENR: u32 = 0x4002_3830;
     /// Clock of TIM1.
     pub const RCC_APB2ENR: u32 = 0x4002_3844;
@@ -91,12 +91,6 @@ pub mod register {
     pub const M1AR: u32 = 0x10;
     /// Of a stream: its FIFO.
     pub const FCR: u32 = 0x14;
-    /// Of a port: kind of each pin, two bits.
-    pub const MODER: u32 = 0x00;
-    /// Of a port: push-pull or open drain, a bit.
-    pub const OTYPER: u32 = 0x04;
-    /// Of a port: speed of each pin, two bits.
-    pub const OSPEEDR: u32 = 0x08;
     /// Of a port: set and reset bits.
     pub const BSRR: u32 = 0x18;
 
@@ -154,12 +148,6 @@ impl Port {
     #[must_use]
     pub const fn register(self, offset: u32) -> u32 {
         0x4002_0000 + 0x400 * self as u32 + offset
-    }
-
-    /// Its bit in [`register::RCC_AHB1ENR`].
-    #[must_use]
-    pub const fn clock(self) -> u32 {
-        1 << self as u32
     }
 }
 
@@ -234,8 +222,8 @@ pub struct StepOutput<R> {
 }
 
 impl<R: Registers> StepOutput<R> {
-    /// Sets pins, DMA and TIM1 up; the first slot is played with TIM2's next update. `slot_counts`: of TIM1; see
-    /// [`slot_counts`]. The buffers hold the word of rest already. TIM2 is not started here.
+    /// Sets DMA and TIM1 up; the first slot is played with TIM2's next update. `slot_counts`: of TIM1; see [`slot_counts`]. The pins are
+    /// set up, and low; the buffers hold the word of rest already. TIM2 is not started here.
     pub fn start(registers: R, wiring: Wiring, memory: Memory, slot_counts: u16) -> Self {
         let mut output = Self {
             registers,
@@ -244,7 +232,6 @@ impl<R: Registers> StepOutput<R> {
             idle: 0,
             present: false,
         };
-        output.start_pins();
         output.start_stream(r::PLAY, wiring.step_port.register(r::BSRR), memory, r::PLAYS);
         output.start_stream(r::WIPE, memory.rest, memory, r::WIPES);
         output.start_timer(slot_counts.into());
@@ -258,39 +245,17 @@ impl<R: Registers> StepOutput<R> {
         self.present
     }
 
-    fn set_bits(&mut self, address: u32, bits: u32) {
+    /// Switches clocks on. The read afterwards waits until they have arrived (ES0182, 2.1.13).
+    fn enable(&mut self, address: u32, bits: u32) {
         let value = self.registers.read(address);
         self.registers.write(address, value | bits);
-    }
-
-    /// Low before it is an output.
-    fn start_pin(&mut self, Pin(port, number): Pin) {
-        let number = u32::from(number & 15);
-        self.set_bits(r::RCC_AHB1ENR, port.clock());
-        self.registers.write(port.register(r::BSRR), 1 << (16 + number));
-        // Medium speed (25 MHz): edges that a cable bears.
-        for (offset, value) in [(r::OSPEEDR, 1), (r::MODER, 1)] {
-            let address = port.register(offset);
-            let kept = self.registers.read(address) & !(3 << (2 * number));
-            self.registers.write(address, kept | value << (2 * number));
-        }
-        let kept = self.registers.read(port.register(r::OTYPER)) & !(1 << number);
-        self.registers.write(port.register(r::OTYPER), kept);
-    }
-
-    fn start_pins(&mut self) {
-        for number in self.wiring.step {
-            self.start_pin(Pin(self.wiring.step_port, number));
-        }
-        for pin in self.wiring.direction {
-            self.start_pin(pin);
-        }
+        let _ = self.registers.read(address);
     }
 
     /// A stream is set up while it stands, its flags cleared before it starts (RM0090, 10.3.17).
     fn start_stream(&mut self, stream: u32, peripheral: u32, memory: Memory, control: u32) {
         let [first, second] = memory.buffers;
-        self.set_bits(r::RCC_AHB1ENR, r::DMA2EN);
+        self.enable(r::RCC_AHB1ENR, r::DMA2EN);
         let flags = if stream == r::PLAY {
             r::DMA2_HIFCR
         } else {
@@ -314,7 +279,7 @@ impl<R: Registers> StepOutput<R> {
 
     /// TIM1 stands until TIM2 starts it. Its registers take effect at once: nothing is preloaded, the prescaler is 1.
     fn start_timer(&mut self, slot: u32) {
-        self.set_bits(r::RCC_APB2ENR, r::TIM1EN);
+        self.enable(r::RCC_APB2ENR, r::TIM1EN);
         for (address, value) in [
             (r::TIM1_CR1, 0),
             (r::TIM1_CR2, 0),

@@ -1,14 +1,14 @@
 //! The firmware: three tasks around the machine.
 //!
 //! ```text
-//!  priority 3   sample    TIM2, every period      commands ──► RealTime::tick ──► events
-//!  priority 2   receive   USART1, every byte      port ──► bytes
+//!  priority 3   receive   USART1, every byte      port ──► bytes
+//!  priority 2   sample    TIM2, every period      commands ──► RealTime::tick ──► events
 //!  priority 0   idle      when nothing else is    bytes ──► Link ──► commands;   events ──► Link ──► port
 //! ```
 //!
 //! What crosses between two tasks does so by a queue of fixed capacity with one writer and one reader. The
 //! machine itself is shared by `sample`, which gets it without a lock, and `idle`, which locks it for one
-//! short call at a time ([`guarded_machine`]). Everything that decides where the tool goes is in
+//! short call at a time ([`guarded_machine`]). No lock holds `receive` up: it shares nothing. Everything that decides where the tool goes is in
 //! `interp-core`; what is done with a request is in `controller`; what differs between boards is in
 //! [`board`].
 #![no_std]
@@ -52,7 +52,7 @@ mod app {
             gpio::{self, Output},
             safety_inputs::SafetyInputs,
             sample_timer::{SampleTimer, uptime_periods},
-            serial::{self, Receiver, Transmitter},
+            serial::{self, Receiver, Transmitter, bytes_lost},
             status_led::StatusLed,
             step_output::StepDriver,
             watchdog::Watchdog,
@@ -74,8 +74,6 @@ mod app {
     #[shared]
     struct Shared {
         real_time: BoardRealTime,
-        /// Bytes from the host that were lost.
-        bytes_lost: u32,
     }
 
     #[local]
@@ -123,6 +121,7 @@ mod app {
             board.tim1,
             board.dma2,
             board::WIRING,
+            board::PLUS_IS_HIGH,
             SLOT_COUNTS,
             context.local.slots,
             context.local.rest,
@@ -152,10 +151,7 @@ mod app {
             real_time.set_step_pins(steps, board::WIRING.step);
         }
         (
-            Shared {
-                real_time,
-                bytes_lost: 0,
-            },
+            Shared { real_time },
             Local {
                 task: SampleTask::new(timer, counter, commands_out, events_in),
                 guards,
@@ -175,14 +171,14 @@ mod app {
     ///
     /// | | |
     /// |---|---|
-    /// | priority | 3, the highest |
+    /// | priority | 2: only `receive` interrupts it |
     /// | period | 1 ms, by TIM2 |
     /// | worst case | see `cargo sim budget`; the board measures each tick and reports the most (`tick_cycles_max`) |
     /// | over a fifth of the period | a fault of the run (`tick-over-budget`), which stops along the path |
     /// | a miss | counted, reported, and a fault of the run (`deadline-missed`), which stops along the path |
     /// | either | does not feed the watchdog, which resets the board when no tick does for some periods |
     /// | a panic | cannot be reached: `firmware/no-panic` does not link otherwise |
-    #[task(binds = TIM2, priority = 3, shared = [real_time], local = [task, guards, output])]
+    #[task(binds = TIM2, priority = 2, shared = [real_time], local = [task, guards, output])]
     fn sample(mut context: sample::Context) {
         let sample::LocalResources {
             task, guards, output, ..
@@ -197,21 +193,18 @@ mod app {
     ///
     /// | | |
     /// |---|---|
-    /// | priority | 2 |
+    /// | priority | 3, the highest: the port holds one byte, and a tick may take 18 of them |
     /// | period | 11 us at 921 600 baud, while the host sends |
-    /// | worst case | a few dozen cycles, and `sample` before it |
+    /// | worst case | a few dozen cycles, and what holds all interrupts off: a line of the log |
     /// | a miss | the byte is lost and counted; its frame fails its check, and the host repeats it |
-    #[task(binds = USART1, priority = 2, shared = [bytes_lost], local = [receiver, bytes_in])]
-    fn receive(mut context: receive::Context) {
+    #[task(binds = USART1, priority = 3, local = [receiver, bytes_in])]
+    fn receive(context: receive::Context) {
         let received = context.local.receiver.read();
         let full = received
             .byte
             .is_some_and(|byte| context.local.bytes_in.enqueue(byte).is_err());
         if received.error || full {
-            context
-                .shared
-                .bytes_lost
-                .lock(|lost| *lost = lost.saturating_add(1));
+            serial::count_lost();
         }
     }
 
@@ -224,7 +217,7 @@ mod app {
     /// | worst case | one frame's answer and its time on the line, 3.3 ms; a finished upload checks every record before its answer |
     /// | a miss | in lockstep time waits for it; on a free clock events are lost once their queue is full, and counted (`samples_lost`) |
     #[idle(
-        shared = [real_time, bytes_lost],
+        shared = [real_time],
         local = [transmitter, led, bytes_out, commands_in, events_out]
     )]
     fn idle(context: idle::Context) -> ! {
@@ -236,11 +229,7 @@ mod app {
             events_out,
             ..
         } = context.local;
-        let idle::SharedResources {
-            real_time,
-            mut bytes_lost,
-            ..
-        } = context.shared;
+        let idle::SharedResources { real_time, .. } = context.shared;
         let mut machine = GuardedMachine {
             real_time,
             commands: commands_in,
@@ -263,8 +252,7 @@ mod app {
                 last_event = None;
             }
             if watch.is_due(now) {
-                let lost = bytes_lost.lock(|lost| *lost);
-                watch.look(now, &mut machine, lost);
+                watch.look(now, &mut machine, bytes_lost());
                 led.show(watch.state, now);
             }
             // With interrupts held back none can slip in between the question and the sleep; it still ends

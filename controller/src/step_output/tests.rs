@@ -241,14 +241,13 @@ fn the_set_up_is_that_of_the_manual() {
         (0x4000_0004, 0x0020),
     ];
     assert_eq!(chip.written[chip.written.len() - expected.len()..], expected);
-    // Clocks of ports C, E, F and DMA2; pins low before they are outputs, push-pull, medium speed.
-    assert_eq!(chip.word(0x4002_3830), 1 << 22 | 1 << 5 | 1 << 4 | 1 << 2);
-    let order = |write| chip.written.iter().position(|at| *at == write).unwrap();
-    assert!(order((0x4002_1418, 1 << 17)) < order((0x4002_1400, 1 << 2)));
-    assert_eq!(chip.word(0x4002_1000), 1 << 18 | 1 << 22 | 1 << 26 | 1 << 16);
-    assert_eq!(chip.word(0x4002_1008), 1 << 18 | 1 << 22 | 1 << 26 | 1 << 16);
-    assert_eq!(chip.word(0x4002_0800), 1 << 4);
-    assert_eq!(chip.word(0x4002_1004) | chip.word(0x4002_1404), 0);
+    // The clock of DMA2; pins and their ports are the board's.
+    assert_eq!(chip.word(0x4002_3830), 1 << 22);
+    assert!(
+        chip.written
+            .iter()
+            .all(|(address, _)| !(0x4002_0000..0x4002_3000).contains(address))
+    );
     // Nothing that another driver has set is undone.
     let kept = Hand::default();
     kept.0
@@ -291,7 +290,7 @@ fn every_step_comes_to_the_port_once() {
         .iter()
         .filter(|(address, _)| *address == 0x4002_1418)
         .count();
-    assert_eq!(turns, 1 + 7, "low at first, then a turn each 50 periods");
+    assert_eq!(turns, 7, "a turn each 50 periods");
     // Both buffers are wiped but for what plays next.
     assert!(chip.port.iter().all(|word| word & REST_WORD == REST_WORD));
 }

@@ -1,5 +1,5 @@
-//! What all boards with an STM32F405 or F407 have in common: clocks at 168 MHz from the crystal, pins by the board's table, USART1,
-//! the log by the debug probe (RTT), and so a panic.
+//! What all boards with an STM32F405 or F407 have in common: clocks at 168 MHz from the crystal, USART1, the log by the debug probe (RTT), and
+//! so a panic.
 
 use defmt_rtt as _;
 use protocol::message::InputLines;
@@ -50,10 +50,8 @@ pub(crate) const SERIAL_DIVIDER: u16 = {
     divider as u16
 };
 
-/// Sets up pins and clocks: the pins first, on the clock that the chip starts with, so that drives, heaters and fans are off from
-/// the first microseconds on. Waits for crystal and PLL: without a crystal the board stays here.
+/// Sets up the clocks; the pins are at rest since the reset. Waits for crystal and PLL: without a crystal the board stays here.
 pub(crate) fn init(device: pac::Peripherals) -> Board {
-    gpio::set_up(&device.RCC, BOARD.lines);
     let reset = take_reset_cause(&device.RCC);
     let mut rcc = device.RCC.freeze(
         rcc::Config::hse(BOARD.crystal_mhz.MHz())

@@ -12,12 +12,12 @@
 //! | `WIRING` | step and direction pins |
 //! | `STEPS` | what the drives want, until a host says otherwise |
 //! | `SERIAL_DIVIDER` | `BRR` of USART1 |
-//! | `init` | clocks and pins; hands back what the drivers do not take |
+//! | `init` | clocks; hands back what the drivers take |
 //! | `InputPorts` | where the safety inputs are read: the chip's ports, or what stands for them |
 //! | `simulate` | gives a board without pins its inputs |
 //! | `stop_for_good` | what follows a fault of the processor |
 //!
-//! All but the first are `chip.rs`'s for boards with a chip; QEMU has its own. So have the panic handler and the transport of the
+//! Pins are set up before all of that, right after a reset (`reset_pins.rs`). All but the first are `chip.rs`'s for boards with a chip; QEMU has its own. So have the panic handler and the transport of the
 //! log. Drivers take their pins from `BOARD`, whatever the board. To add a board, add its table in `boards`, its file here, its
 //! feature in `Cargo.toml`, and its lines below.
 
@@ -58,7 +58,9 @@ mod skr_pro;
 #[cfg(feature = "board-skr-pro")]
 pub(crate) use skr_pro::BOARD;
 
-use boards::{Axis, Line};
+mod reset_pins;
+
+use boards::{Axis, Level, Line};
 use controller::step_output::{Pin, Port, Wiring};
 use interp_core::StepConfig;
 use protocol::message::ResetCause;
@@ -98,10 +100,18 @@ const fn port(port: boards::Port) -> Port {
     }
 }
 
+/// Axes whose direction pin is high towards plus, a bit each: where the board's table calls that level active.
+pub(crate) const PLUS_IS_HIGH: u8 =
+    plus_is_high(Axis::X) | plus_is_high(Axis::Y) << 1 | plus_is_high(Axis::Z) << 2;
+
+const fn plus_is_high(axis: Axis) -> u8 {
+    matches!(BOARD.axis(axis).direction.active, Level::High) as u8
+}
+
 /// What the drives want until a host says otherwise.
 pub(crate) const STEPS: StepConfig = StepConfig::DEFAULT;
 
-/// What remains of the chip once clocks and pins are set up: the parts that the drivers take.
+/// What remains of the chip once clocks are set up: the parts that the drivers take.
 pub(crate) struct Board {
     /// The timer of the step output.
     pub(crate) tim1: pac::TIM1,

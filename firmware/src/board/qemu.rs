@@ -46,9 +46,8 @@ const EXIT_PANIC: i32 = 101;
 /// Exit code of QEMU after a fault of the processor.
 const EXIT_FAULT: i32 = 102;
 
-/// Sorts out the peripherals. The pins are set up as on the chip, in vain.
+/// Sorts out the peripherals.
 pub(crate) fn init(device: pac::Peripherals) -> Board {
-    gpio::set_up(&device.RCC, BOARD.lines);
     Board {
         tim1: device.TIM1,
         tim2: device.TIM2,

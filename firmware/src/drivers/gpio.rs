@@ -1,14 +1,11 @@
-//! Pins by the board's table: set up together, then each written or read by itself.
+//! Pins by the board's table, which [`crate::board`] has set up right after the reset: each written or read by itself.
 //!
 //! An output is switched by the port's set/reset register: one write, which touches no other pin, so that drivers with pins on
 //! the same port need not know of each other.
 
 use core::convert::Infallible;
 
-use boards::{
-    Line, Pin, Port,
-    setup::{self, PortSetup},
-};
+use boards::{Line, Pin, Port, setup};
 use embedded_hal::digital::{ErrorType, OutputPin};
 use stm32f4xx_hal::pac;
 
@@ -26,49 +23,6 @@ fn registers(port: Port) -> &'static pac::gpioi::RegisterBlock {
     unsafe {
         &*first.add(port.index() * PORT_BYTES).cast()
     }
-}
-
-/// Sets up every pin of the table: outputs are inactive from the first moment on.
-pub(crate) fn set_up(rcc: &pac::rcc::RegisterBlock, lines: &[Line]) {
-    for (port, setup) in Port::ALL.into_iter().zip(setup::ports(lines)) {
-        if setup.is_used() {
-            set_up_port(rcc, port, &setup);
-        }
-    }
-}
-
-#[allow(unsafe_code, reason = "whole registers are written")]
-fn set_up_port(rcc: &pac::rcc::RegisterBlock, port: Port, setup: &PortSetup) {
-    let port_registers = registers(port);
-    // SAFETY: sets the port's clock bit (RM0090, 7.3.10: bit 0 is port A's), and leaves the others.
-    rcc.ahb1enr()
-        .modify(|r, w| unsafe { w.bits(r.bits() | 1 << port.index()) });
-    // The clock is there two cycles later (7.3.10); the read waits for that.
-    let _ = rcc.ahb1enr().read();
-    // SAFETY: any bits may be written here; zeros do nothing.
-    port_registers
-        .bsrr()
-        .write(|w| unsafe { w.bits(setup.set_reset) });
-    // SAFETY: fields of two bits, each value of which is defined; those of other pins stay.
-    port_registers
-        .ospeedr()
-        .modify(|r, w| unsafe { w.bits(setup.speed.apply(r.bits())) });
-    // SAFETY: likewise; 0b11, which is reserved, is not among the table's.
-    port_registers
-        .pupdr()
-        .modify(|r, w| unsafe { w.bits(setup.pull.apply(r.bits())) });
-    // SAFETY: fields of four bits, each value of which is defined.
-    port_registers
-        .afrl()
-        .modify(|r, w| unsafe { w.bits(setup.alternate[0].apply(r.bits())) });
-    // SAFETY: likewise.
-    port_registers
-        .afrh()
-        .modify(|r, w| unsafe { w.bits(setup.alternate[1].apply(r.bits())) });
-    // SAFETY: fields of two bits, each value of which is defined.
-    port_registers
-        .moder()
-        .modify(|r, w| unsafe { w.bits(setup.mode.apply(r.bits())) });
 }
 
 /// Makes every output inactive: drives let go, heaters and fans are off.

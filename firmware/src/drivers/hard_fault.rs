@@ -1,14 +1,19 @@
-//! Says what the processor stumbled over before the board stops for good.
+//! Puts the outputs to rest, says what the processor stumbled over, and stops for good.
 
 use cortex_m_rt::{ExceptionFrame, exception};
 
-use crate::board;
+use crate::{
+    board::{self, BOARD},
+    drivers::gpio,
+};
 
 // SAFETY: an exception handler has to be declared `unsafe`; this one only reads the frame that it is given
 // and never returns.
 #[allow(unsafe_code, reason = "the exception's declaration")]
 #[exception]
 unsafe fn HardFault(frame: &ExceptionFrame) -> ! {
+    // The log takes its time, and may itself be what is broken.
+    gpio::rest(BOARD.lines);
     defmt::error!(
         "hard fault at {=u32:#010x}, called from {=u32:#010x}",
         frame.pc(),

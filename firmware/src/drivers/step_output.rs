@@ -37,15 +37,19 @@ impl Registers for Chip {
 /// The output with its memory.
 pub(crate) struct StepDriver {
     output: StepOutput<Chip>,
+    /// Axes whose direction pin is high towards plus, a bit each.
+    plus_is_high: u8,
     buffers: &'static mut Buffers,
 }
 
 impl StepDriver {
-    /// Starts the output; see [`StepOutput::start`]. `rest`: [`interp_core::Steps::rest`].
+    /// Starts the output; see [`StepOutput::start`]. `rest`: [`interp_core::Steps::rest`]. `plus_is_high`: axes whose direction pin is high
+    /// towards plus, a bit each.
     pub(crate) fn new(
         timer: pac::TIM1,
         dma: pac::DMA2,
         wiring: Wiring,
+        plus_is_high: u8,
         slot_counts: u16,
         buffers: &'static mut Buffers,
         rest: &'static mut u32,
@@ -69,6 +73,7 @@ impl StepDriver {
         };
         Self {
             output: StepOutput::start(chip, wiring, memory, slot_counts),
+            plus_is_high,
             buffers,
         }
     }
@@ -78,13 +83,16 @@ impl StepDriver {
         self.output.is_present()
     }
 
-    /// At the beginning of a tick: sets the direction pins.
+    /// At the beginning of a tick: sets the direction pins. `directions`: axes that move towards minus, exchanged where the host has inverted
+    /// one, a bit each ([`interp_core::Steps::directions`]).
     ///
     /// # Errors
     /// The fault that it is to a run where pulses are not as they should be.
     #[inline]
     pub(crate) fn begin(&mut self, directions: u8) -> Result<(), Fault> {
-        self.output.begin(directions).map_err(Fault::from)
+        self.output
+            .begin(directions ^ self.plus_is_high)
+            .map_err(Fault::from)
     }
 
     /// At the end of a tick: the slots to be filled, if there is time for it.

@@ -10,7 +10,7 @@ pub(super) const ENTRIES: [Entry; 19] = [
         "A frame arrived damaged.",
         "What was wrong with it: its length, its coding or its checksum.",
         "Noise on the line, a wrong baud rate, or bytes lost by the USB adapter.",
-        "Nothing: the host sends it again, four times at most. If that is not enough, look at cable, ground and baud rate (921600 8N1).",
+        "Nothing: the host sends it again, for 6 s at most. If that is not enough, look at cable, ground and baud rate (921600 8N1).",
         "Text typed into the serial port by hand.",
     ),
     reason(

@@ -18,6 +18,8 @@ pub enum Part {
     DebugProbe,
     /// QEMU's plugin that counts cycles.
     CyclePlugin,
+    /// Executes a board's image on models of its chip. For developers: an installation does not have it.
+    ChipEmulator,
     /// The firmware for QEMU.
     QemuImage,
     /// The firmware for a board.
@@ -40,7 +42,11 @@ impl Part {
         match self {
             Self::QemuImage => Some(("fw-qemu", "qemu")),
             Self::BoardImage(board) => Some(board.build),
-            Self::CadReader | Self::FastCadReader | Self::DebugProbe | Self::CyclePlugin => None,
+            Self::CadReader
+            | Self::FastCadReader
+            | Self::DebugProbe
+            | Self::CyclePlugin
+            | Self::ChipEmulator => None,
         }
     }
 
@@ -51,6 +57,7 @@ impl Part {
             Self::FastCadReader => Some(("cad-reader", "cad", "cad-reader")),
             Self::DebugProbe => Some(("debug-probe", "plain", "debug-probe")),
             Self::CyclePlugin => Some(("cycle-plugin", "release", "libcycle_plugin.so")),
+            Self::ChipEmulator => Some(("chip", "dev", "chip")),
             Self::QemuImage | Self::BoardImage(_) => None,
         }
     }
@@ -91,6 +98,8 @@ impl Part {
             Self::CadReader | Self::FastCadReader => "cad-reader",
             Self::DebugProbe => "debug-probe",
             Self::CyclePlugin => "plugin",
+            // Beside the tests, which share its dependencies.
+            Self::ChipEmulator => return "target".to_owned(),
             Self::QemuImage | Self::BoardImage(_) => self.image().unwrap_or_default().1,
         };
         format!("target/{name}")
@@ -101,6 +110,7 @@ impl Part {
     pub fn built(self) -> String {
         let folder = self.folder();
         match self.program() {
+            Some((_, "dev", file)) => format!("{folder}/debug/{file}"),
             Some((_, profile, file)) => format!("{folder}/{profile}/{file}"),
             None => format!("{folder}/{BOARD_TARGET}/release/firmware"),
         }
@@ -112,7 +122,11 @@ impl Part {
         match self {
             Self::QemuImage => format!("{SHARE}/images/qemu.elf"),
             Self::BoardImage(board) => format!("{SHARE}/images/{}.elf", board.id),
-            Self::CadReader | Self::FastCadReader | Self::DebugProbe | Self::CyclePlugin => {
+            Self::CadReader
+            | Self::FastCadReader
+            | Self::DebugProbe
+            | Self::CyclePlugin
+            | Self::ChipEmulator => {
                 let file = self.program().map_or("", |(_, _, file)| file);
                 format!("{LIBEXEC}/{file}")
             }

@@ -50,7 +50,7 @@ pub(super) struct Place {
     pub(super) image: Option<PathBuf>,
 }
 
-fn board_parser() -> clap::builder::PossibleValuesParser {
+pub(super) fn board_parser() -> clap::builder::PossibleValuesParser {
     BOARDS
         .map(|board| clap::builder::PossibleValue::new(board.id).help(board.name))
         .into()
@@ -80,12 +80,17 @@ impl From<NotRun> for Failure {
     }
 }
 
+/// The board of this name, which the command line has checked.
+pub(super) fn board_of(id: &str) -> &'static Board {
+    BOARDS
+        .into_iter()
+        .find(|board| board.id == id)
+        .unwrap_or(BOARDS[0])
+}
+
 impl Place {
     pub(super) fn board(&self) -> &'static Board {
-        BOARDS
-            .into_iter()
-            .find(|board| board.id == self.board)
-            .unwrap_or(BOARDS[0])
+        board_of(&self.board)
     }
 
     /// Is there a probe? Asked before minutes are spent on the firmware.

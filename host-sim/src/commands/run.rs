@@ -10,6 +10,7 @@ use protocol::digest::Digest;
 use protocol::message::{Reason, Status};
 use serde_json::{Value, json};
 
+use super::flash::{board_of, board_parser};
 use super::home::{self, PlaceNm};
 use super::out::{say, to_stderr};
 use super::outcome::Outcome;
@@ -21,17 +22,19 @@ use inspect::TimedRun;
 use job::Job;
 use machine::Machine;
 use machine::prepare::{self, Prepared};
+use machine::remote::chip::{self, Chip, ChipError};
 use machine::remote::operate::{self, Operator, Setup};
 use machine::remote::qemu::{self, Qemu, QemuError};
 use machine::remote::{RemoteError, Session, drive, port};
 use machine::travel;
 
-/// Runs a job in the firmware, in QEMU or on a board, and compares every sample with this machine's. While a board runs, type what an
+/// Runs a job in the firmware, in QEMU, on a board, or a board's image on models of its chip, and compares every sample with this machine's. While a board runs, type what an
 /// operator wants, and Enter: hold, resume, stop, abort, override 50, status. A run that was commanded is not compared.
 ///
 /// Example: cargo sim run jobs/freeform.toml --qemu
 /// Example: cargo sim run jobs/plate_machine.toml --qemu --script jobs/operator.txt
 /// Example: cargo sim run jobs/plate_machine.toml --port /dev/ttyUSB0 --home 40,30,40
+/// Example: cargo sim run jobs/plate_machine.toml --chip skr-pro
 #[derive(Debug, Args)]
 #[command(verbatim_doc_comment)]
 pub(super) struct Arguments {
@@ -48,12 +51,12 @@ pub(super) struct Arguments {
     /// Writes a page with a view that turns, charts and figures into this folder.
     #[arg(long, value_name = "DIR")]
     report: Option<PathBuf>,
-    /// The axes stand here, mm: declared as home before the run, and the job's home where it has no `home_mm`. In QEMU, where there
-    /// are no axes, the job's home is declared.
+    /// The axes stand here, mm: declared as home before the run, and the job's home where it has no `home_mm`. In QEMU and on models of
+    /// a chip, where there are no axes, the job's home is declared.
     #[arg(long, value_name = "X,Y,Z", value_parser = home::place, allow_hyphen_values = true)]
     home: Option<PlaceNm>,
     /// Does what this file says an operator does, in lockstep: lines `tick N: hold`, or resume, stop, abort, start, override P.
-    #[arg(long, value_name = "FILE", requires = "qemu", conflicts_with_all = ["report", "trace"])]
+    #[arg(long, value_name = "FILE", conflicts_with_all = ["port", "report", "trace"])]
     script: Option<PathBuf>,
     /// Prints one JSON object instead of text.
     #[arg(long)]
@@ -66,6 +69,9 @@ struct Place {
     /// In QEMU, which this command starts and ends.
     #[arg(long)]
     qemu: bool,
+    /// The image for this board, unchanged, on models of its chip, in real time (wants Debian's libunicorn2).
+    #[arg(long, value_name = "BOARD", value_parser = board_parser())]
+    chip: Option<String>,
     /// On a board behind this serial port.
     #[arg(long, value_name = "DEV")]
     port: Option<String>,
@@ -128,6 +134,12 @@ impl From<QemuError> for Failure {
     }
 }
 
+impl From<ChipError> for Failure {
+    fn from(error: ChipError) -> Self {
+        Self::Failed(Some(error.to_string()))
+    }
+}
+
 /// A number for a session: they have to differ, no more than that.
 fn session_number() -> u32 {
     std::time::SystemTime::now()
@@ -150,10 +162,48 @@ pub(super) fn open_port(name: &str) -> Result<Session> {
     Ok(Session::open(stream, session_number())?)
 }
 
-/// Opens the line, and keeps QEMU alive with it.
-fn connect(arguments: &Arguments) -> Result<(Option<Qemu>, Session)> {
+/// What is behind the line, if this command has started it, and ends it.
+enum Behind {
+    Board,
+    Qemu(#[expect(dead_code, reason = "ended when it is dropped")] Qemu),
+    Chip(Chip),
+}
+
+/// Starts a board's image on models of its chip.
+fn connect_chip(name: &str) -> Result<(Behind, Session)> {
+    let bar = spinner("building the firmware, and what executes it");
+    let built = chip::image(board_of(name)).and_then(|image| Ok((chip::program()?, image)));
+    bar.finish_and_clear();
+    let (program, image) = built?;
+    let (chip, stream) = Chip::start(&program, &image)?;
+    Ok((Behind::Chip(chip), Session::open(stream, session_number())?))
+}
+
+/// What the models of a chip complained about, or lost.
+fn models_complaint(behind: &mut Behind) -> Option<String> {
+    let Behind::Chip(chip) = behind else { return None };
+    let Some(said) = chip.end() else {
+        return Some("the models of the chip ended without a word".to_owned());
+    };
+    say!(
+        "  models       {} complaints, {} bytes lost, a byte waited {} cycles at most",
+        said.complaints.len(),
+        said.bytes_lost,
+        said.byte_wait_max_cycles
+    );
+    if let Some(first) = said.complaints.first() {
+        return Some(format!("the models of the chip complain: {first}"));
+    }
+    (said.bytes_lost > 0).then(|| format!("{} bytes were lost on their way into the chip", said.bytes_lost))
+}
+
+/// Opens the line, and keeps what is behind it alive.
+fn connect(arguments: &Arguments) -> Result<(Behind, Session)> {
     if let Some(name) = &arguments.place.port {
-        return Ok((None, open_port(name)?));
+        return Ok((Behind::Board, open_port(name)?));
+    }
+    if let Some(name) = &arguments.place.chip {
+        return connect_chip(name);
     }
     let image = match &arguments.firmware {
         Some(image) if !image.exists() => {
@@ -171,12 +221,12 @@ fn connect(arguments: &Arguments) -> Result<(Option<Qemu>, Session)> {
         }
     };
     let (qemu, stream) = Qemu::start(&image)?;
-    Ok((Some(qemu), Session::open(stream, session_number())?))
+    Ok((Behind::Qemu(qemu), Session::open(stream, session_number())?))
 }
 
 /// Where the axes are declared to stand: where they were said to, or in QEMU, which has none, where the job begins.
 fn declared(arguments: &Arguments, prepared: &Prepared) -> Option<PlaceNm> {
-    let simulated = arguments.place.qemu.then(|| home::of(prepared));
+    let simulated = arguments.place.port.is_none().then(|| home::of(prepared));
     arguments.home.or(simulated)
 }
 
@@ -267,7 +317,9 @@ fn by_digest(
 
 /// Who can command the run: on a board, whoever types.
 fn typist(arguments: &Arguments, bar: &ProgressBar) -> Option<Typist> {
-    arguments.place.port.as_ref()?;
+    if arguments.place.qemu {
+        return None;
+    }
     if !arguments.json {
         bar.suspend(|| to_stderr(format_args!("type, and Enter: {WORDS}")));
     }
@@ -397,7 +449,7 @@ pub(super) fn command(arguments: &Arguments) -> Result<()> {
     travel::check(&job)?;
     if let Some(script) = &arguments.script {
         let scripted = scripted::play(&job, &prepared, script, None)?;
-        let (_qemu, mut session) = connect(arguments)?;
+        let (_behind, mut session) = connect(arguments)?;
         check_period(&job, &session)?;
         make_ready(arguments, &job, &prepared, &mut session)?;
         drive::upload(&mut session, &prepared, |_| {})?;
@@ -411,7 +463,7 @@ pub(super) fn command(arguments: &Arguments) -> Result<()> {
     {
         return Err(Failure::Failed(Some(fault.sentence_of(&job))));
     }
-    let (_qemu, mut session) = connect(arguments)?;
+    let (mut behind, mut session) = connect(arguments)?;
     check_period(&job, &session)?;
     make_ready(arguments, &job, &prepared, &mut session)?;
     let bar = progress(prepared.words.len() as u64, "uploading");
@@ -448,7 +500,7 @@ pub(super) fn command(arguments: &Arguments) -> Result<()> {
         outcome.print(page.as_deref());
         let (speed, missed) = (ran.ticks_per_second.round(), ran.status.deadline_misses);
         say!("  board        {speed} ticks a second, {missed} missed");
-        if arguments.place.qemu && arguments.home.is_none() {
+        if arguments.place.port.is_none() && arguments.home.is_none() {
             let place = home::of(&prepared).words();
             say!("  home         declared at {place} mm: a simulated board has no axes");
         }
@@ -461,6 +513,7 @@ pub(super) fn command(arguments: &Arguments) -> Result<()> {
             (false, Some(_)) => compared(&ran, "NOT the same"),
         }
     }
+    let complaint = complaint.or_else(|| models_complaint(&mut behind));
     complaint.map_or(Ok(()), |complaint| Err(Failure::Failed(Some(complaint))))
 }
 

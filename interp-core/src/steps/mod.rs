@@ -62,7 +62,7 @@ pub struct AxisSteps {
     pub steps: u32,
     /// Denominator: the millimetres that so many steps are.
     pub mm: u32,
-    /// Level of the direction pin for the positive direction: low if false, high if true.
+    /// Whether the direction pin has the level towards plus that the board's table does not name: the opposite one.
     pub inverted: bool,
 }
 
@@ -241,8 +241,8 @@ impl Steps {
         self.axes.each_ref().map(Axis::position)
     }
 
-    /// Levels of the direction pins for the next period, a bit an axis; to be on the pins before slot
-    /// [`TURN_SLOTS`] of it, and not before it begins.
+    /// Axes whose direction pin says minus in the next period, a bit each: those that move towards minus, exchanged where inverted. To be on the
+    /// pins before slot [`TURN_SLOTS`] of it, and not before it begins; which level says minus is the board's.
     #[must_use]
     pub fn directions(&self) -> u8 {
         let [x, y, z] = self.axes.each_ref().map(|axis| u8::from(axis.is_negative()));

@@ -81,7 +81,7 @@ mod tests {
     fn times_are_slots_and_never_shorter() {
         for period_us in [10.0, 500.0, 1000.0, 100_000.0] {
             let [pulse_us, setup_us] = job_file::slots_max_us(period_us);
-            assert_eq!(slots(pulse_us, period_us, u16::MAX), PULSE_SLOTS_MAX.into());
+            assert_eq!(slots(pulse_us, period_us, u16::MAX), u16::from(PULSE_SLOTS_MAX));
             assert_eq!(slots(setup_us, period_us, u16::MAX), SETUP_SLOTS_MAX);
         }
         assert_eq!(slots(2.5, 1000.0, 24), 3);

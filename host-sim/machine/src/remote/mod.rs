@@ -1,13 +1,14 @@
-//! The same machine behind a serial line: on a board, or in QEMU.
+//! The same machine behind a serial line: on a board, in QEMU, or a board's image on models of its chip.
 //!
 //! ```text
 //! drive.rs    loads and runs a job there, compares with what was computed here
 //! operate.rs  drives, home, hold and resume: what an operator asks
 //! session.rs  requests, answers, events; retransmission
 //! script.rs   plays what an operator does, period by period
-//! qemu.rs     starts and ends QEMU with the firmware   |   port.rs  a serial port
+//! qemu.rs     starts and ends QEMU with the firmware   |   port.rs  a serial port   |   chip.rs  a board's image without the board
 //! ```
 
+pub mod chip;
 pub mod drive;
 pub mod operate;
 pub mod port;

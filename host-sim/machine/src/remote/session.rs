@@ -14,8 +14,13 @@ use interp_core::{Sample, State};
 /// checks a job, or a QEMU that shares its processor, may take longer.
 const ANSWER_TIMEOUT: Duration = Duration::from_millis(1500);
 
-/// Times a request is sent before it is given up.
-const TRIES: u32 = 4;
+/// The same while a board's patience runs: a share of the time between two frames that it wants to hear, so that one lost frame leaves it well
+/// within its patience. Not below what a USB-serial adapter may keep a frame back.
+const KEEP_ALIVE_SHARE: u32 = 4;
+const ANSWER_TIMEOUT_MIN: Duration = Duration::from_millis(40);
+
+/// Time after which a request is given up.
+const GIVE_UP: Duration = Duration::from_secs(6);
 
 /// Time without any event of a run after which the board counts as gone.
 const SILENCE_TIMEOUT: Duration = Duration::from_secs(20);
@@ -269,10 +274,10 @@ impl Session {
             )
         })?;
         self.asked = Instant::now();
-        for _ in 0..TRIES {
+        while self.asked.elapsed() < GIVE_UP {
             self.stream.write_all(frame)?;
             self.stream.flush()?;
-            let deadline = Instant::now() + ANSWER_TIMEOUT;
+            let deadline = Instant::now() + self.answer_timeout();
             while Instant::now() < deadline {
                 match self.next_reply()? {
                     Some(reply) => match answered(&reply) {
@@ -291,7 +296,14 @@ impl Session {
             }
             self.stream.write_all(&[DELIMITER])?;
         }
-        Err(RemoteError::Silent("a request was sent four times"))
+        Err(RemoteError::Silent("a request was sent again and again for 6 s"))
+    }
+
+    /// How long an answer may take before the request is sent again.
+    fn answer_timeout(&self) -> Duration {
+        self.keep_alive.map_or(ANSWER_TIMEOUT, |every| {
+            (every / KEEP_ALIVE_SHARE).clamp(ANSWER_TIMEOUT_MIN, ANSWER_TIMEOUT)
+        })
     }
 
     /// Reads what has arrived, or waits a moment.

@@ -1,0 +1,379 @@
+//! The chip without its processor: the parts, and the order of what happens to them.
+
+use std::fs::File;
+use std::io::{BufWriter, Write};
+use std::time::{Duration, Instant};
+
+use boards::{Axis, Board, Level};
+
+use crate::{
+    code::{Block, Code},
+    line::Line,
+    memory::Memory,
+    options::Options,
+    part::{
+        debug::Debug,
+        dma::{self, Dma},
+        gpio::{Change, Port},
+        nvic::{self, Nvic},
+        rcc::{Rcc, cause},
+        timer::{self, Timer},
+        usart::Usart,
+        watchdog::Watchdog,
+    },
+    script::{self, Entry, Event, When},
+    world::{NEVER, World},
+};
+
+/// Channel of TIM1's requests, and their streams (RM0090, table 43).
+const TIM1_CHANNEL: u32 = 6;
+const TIM1_UPDATE_STREAM: usize = 5;
+const TIM1_COMPARE_STREAM: usize = 1;
+
+/// Between two looks for bytes of the host, seconds: at random, so that they come in any phase of a period.
+const LOOK_S: (f64, f64) = (0.1e-3, 0.3e-3);
+
+/// A program that is this far behind real time gives the lag up, seconds.
+const LAG_S: f64 = 0.05;
+
+pub(crate) struct Chip {
+    pub(crate) world: World,
+    pub(crate) board: &'static Board,
+    options: Options,
+    pub(crate) code: Code,
+    /// The block in work, and where it begins.
+    pub(crate) block: Block,
+    pub(crate) at: u32,
+    pub(crate) sram: Memory,
+    pub(crate) rcc: Rcc,
+    pub(crate) nvic: Nvic,
+    pub(crate) ports: [Port; 9],
+    pub(crate) tim1: Timer,
+    pub(crate) tim2: Timer,
+    pub(crate) tim5: Timer,
+    pub(crate) dma: Dma,
+    pub(crate) usart: Usart,
+    pub(crate) watchdog: Watchdog,
+    pub(crate) debug: Debug,
+    line: Option<Line>,
+    script: Vec<Entry>,
+    record: Option<BufWriter<File>>,
+    random: fastrand::Rng,
+    next_look: u64,
+    /// When something happens next that TIM1 has no part in, and with it.
+    pub(crate) next: u64,
+    next_slot: u64,
+    /// The first step pulse, seconds.
+    pub(crate) moved: Option<f64>,
+    step_port: usize,
+    step_pins: u32,
+    /// Flags of the reset that is due.
+    pub(crate) reset: Option<u32>,
+    pub(crate) hangs: bool,
+    pub(crate) fault: bool,
+    pub(crate) over: bool,
+    /// Updates of TIM2, and what starts the slots: the cycle at which TIM1 was started.
+    pub(crate) periods: u64,
+    pub(crate) slots_from: Option<u64>,
+    /// Bytes that were lost before the last reset.
+    pub(crate) overruns: u64,
+    pub(crate) resets: u32,
+    wall: Instant,
+    wall_offset: f64,
+}
+
+impl Chip {
+    pub(crate) fn new(
+        board: &'static Board,
+        options: Options,
+        flash: Memory,
+        sram: Memory,
+        line: Option<Line>,
+    ) -> Result<Self, String> {
+        let script = options
+            .at
+            .iter()
+            .map(|text| script::entry(text, board))
+            .collect::<Result<_, _>>()?;
+        let record = options
+            .edges
+            .as_ref()
+            .map(File::create)
+            .transpose()
+            .map_err(|error| format!("the record: {error}"))?;
+        let mut ports = [0, 1, 2, 3, 4, 5, 6, 7, 8].map(|index| Port::new(index, 0, 0));
+        for input in script::inputs(board) {
+            let port = &mut ports[input.pin.port.index()];
+            port.driven |= input.pin.bit();
+            // Switches are closed: the level that is not active.
+            if input.active == Level::Low {
+                port.outside |= input.pin.bit();
+            }
+        }
+        let steps = Axis::ALL.map(|axis| board.axis(axis).step.pin.bit());
+        Ok(Self {
+            world: World::new(Rcc::RESET_HZ, options.verbose),
+            board,
+            code: Code::new(flash),
+            block: Block::default(),
+            at: 0,
+            sram,
+            rcc: Rcc::new(
+                options.hse_mhz * 1e6,
+                !options.no_crystal,
+                cause::POWER_ON | cause::PIN | cause::BROWN_OUT,
+            ),
+            nvic: Nvic::new(),
+            ports,
+            tim1: Timer::new("TIM1", 2, 0xffff),
+            tim2: Timer::new("TIM2", 1, u32::MAX),
+            tim5: Timer::new("TIM5", 1, u32::MAX),
+            dma: Dma::default(),
+            usart: Usart::new(),
+            watchdog: Watchdog::new(options.lsi_hz),
+            debug: Debug::default(),
+            line,
+            script,
+            record: record.map(BufWriter::new),
+            random: fastrand::Rng::with_seed(options.seed),
+            next_look: 0,
+            next: 0,
+            next_slot: NEVER,
+            moved: None,
+            step_port: board.step_port().index(),
+            step_pins: steps.iter().fold(0, |bits, bit| bits | bit),
+            reset: None,
+            hangs: false,
+            fault: false,
+            over: false,
+            periods: 0,
+            slots_from: None,
+            overruns: 0,
+            resets: 0,
+            wall: Instant::now(),
+            wall_offset: 0.0,
+            options,
+        })
+    }
+
+    /// A reset: all parts as after power-on, memory and what is outside as they were.
+    pub(crate) fn restart(&mut self, flags: u32) {
+        self.world.set_hclk(Rcc::RESET_HZ);
+        self.overruns += self.usart.overruns;
+        self.resets += 1;
+        let from_host = std::mem::take(&mut self.usart.from_host);
+        self.rcc = Rcc::new(self.options.hse_mhz * 1e6, !self.options.no_crystal, flags);
+        self.nvic = Nvic::new();
+        (self.tim1, self.tim2, self.tim5) = (
+            Timer::new("TIM1", 2, 0xffff),
+            Timer::new("TIM2", 1, u32::MAX),
+            Timer::new("TIM5", 1, u32::MAX),
+        );
+        self.dma = Dma::default();
+        self.usart = Usart::new();
+        self.usart.from_host = from_host;
+        self.watchdog = Watchdog::new(self.options.lsi_hz);
+        self.debug = Debug::default();
+        for index in 0..self.ports.len() {
+            let Port { driven, outside, .. } = self.ports[index];
+            self.ports[index] = Port::new(index as u8, driven, outside);
+            let change = self.ports[index].change(self.world.now, false);
+            self.keep(change);
+        }
+        (self.hangs, self.fault, self.reset) = (false, false, None);
+        self.usart.begin(self.world.now, 1);
+        self.plan();
+    }
+
+    /// Writes a change of a port to the record.
+    pub(crate) fn keep(&mut self, change: Change) {
+        if self.moved.is_none()
+            && usize::from(change.port) == self.step_port
+            && u32::from(change.levels) & self.step_pins != 0
+        {
+            self.moved = Some(self.world.seconds(change.at));
+            self.world.note("the first step pulse");
+            self.plan();
+        }
+        if let Some(record) = &mut self.record {
+            let mut bytes = [0; 16];
+            bytes[..8].copy_from_slice(&change.at.to_le_bytes());
+            bytes[8] = change.port;
+            bytes[9] = change.by_dma.into();
+            bytes[10..12].copy_from_slice(&change.levels.to_le_bytes());
+            bytes[12..14].copy_from_slice(&change.outputs.to_le_bytes());
+            // A record that cannot be written is missed by whoever reads it.
+            let _ = record.write_all(&bytes);
+        }
+    }
+
+    pub(crate) fn finish_record(&mut self) {
+        if let Some(record) = &mut self.record {
+            let _ = record.flush();
+        }
+    }
+
+    fn time_of(&self, when: When) -> u64 {
+        match when {
+            When::Start(seconds) => self.world.cycles(seconds),
+            When::Motion(after) => self.moved.map_or(NEVER, |moved| self.world.cycles(moved + after)),
+        }
+    }
+
+    /// Finds out what happens next.
+    pub(crate) fn plan(&mut self) {
+        let scripted = self
+            .script
+            .iter()
+            .map(|entry| self.time_of(entry.when))
+            .min()
+            .unwrap_or(NEVER);
+        self.next = [
+            self.tim2.update_at(),
+            self.tim5.update_at(),
+            self.usart.sent_at,
+            self.usart.received_at,
+            self.watchdog.deadline,
+            self.next_look,
+            scripted,
+        ]
+        .into_iter()
+        .fold(NEVER, u64::min);
+        self.plan_slot();
+    }
+
+    fn plan_slot(&mut self) {
+        self.next_slot = self.tim1.update_at().min(self.tim1.compare_at);
+    }
+
+    /// When something happens next.
+    pub(crate) fn next_event(&self) -> u64 {
+        self.next.min(self.next_slot)
+    }
+
+    /// Lets everything happen up to now.
+    #[inline]
+    pub(crate) fn catch_up(&mut self) {
+        if self.world.now >= self.next_event() {
+            self.catch_up_slowly();
+        }
+    }
+
+    fn catch_up_slowly(&mut self) {
+        loop {
+            // At one instant TIM2 comes before TIM1, which it starts.
+            self.play(self.world.now.min(self.next.saturating_sub(1)));
+            if self.next > self.world.now {
+                return;
+            }
+            self.happen(self.next);
+            self.plan();
+        }
+    }
+
+    /// TIM1's events up to a time, and the transfers that they ask for.
+    fn play(&mut self, until: u64) {
+        while self.next_slot <= until {
+            let at = self.next_slot;
+            let (stream, asks) = if self.tim1.compare_at <= at {
+                (TIM1_COMPARE_STREAM, self.tim1.compared())
+            } else {
+                (TIM1_UPDATE_STREAM, self.tim1.update(at).1)
+            };
+            self.plan_slot();
+            if !asks {
+                continue;
+            }
+            let write = self.dma.request(stream, TIM1_CHANNEL, self.sram, &mut self.world);
+            if let Some(port) = write.and_then(|write| dma::apply(&write, &mut self.ports)) {
+                let change = self.ports[port].change(at, true);
+                self.keep(change);
+            }
+        }
+    }
+
+    fn happen(&mut self, at: u64) {
+        let apb2 = self.rcc.apb2_cycles();
+        if self.tim2.update_at() == at {
+            self.periods += 1;
+            let (interrupts, _) = self.tim2.update(at);
+            if interrupts {
+                self.nvic.raise(nvic::TIM2, at);
+            }
+            if self.tim2.tells_update() && self.tim1.waits() {
+                self.tim1.trigger(at, &mut self.world);
+                self.slots_from = Some(at);
+            }
+        } else if self.tim5.update_at() == at {
+            self.tim5.update(at);
+        } else if self.usart.sent_at == at {
+            if let (Some(byte), Some(line)) = (self.usart.send(at, apb2), &self.line) {
+                line.write(byte);
+            }
+        } else if self.usart.received_at == at {
+            self.usart.receive(at, apb2, &mut self.world);
+            self.serial_line();
+        } else if self.watchdog.deadline == at {
+            self.world.note("the watchdog resets the chip");
+            self.watchdog.deadline = NEVER;
+            self.reset = Some(cause::WATCHDOG | cause::PIN);
+        } else if self.next_look == at {
+            self.look(at);
+        } else if let Some(index) = self
+            .script
+            .iter()
+            .position(|entry| self.time_of(entry.when) == at)
+        {
+            let entry = self.script.remove(index);
+            self.scripted(entry.what);
+        }
+    }
+
+    /// Raises USART1's interrupt where it asks for it.
+    pub(crate) fn serial_line(&mut self) {
+        if self.usart.interrupts() {
+            self.nvic.raise(nvic::USART1, self.world.now);
+        }
+    }
+
+    /// Raises TIM2's interrupt where its flag is still there.
+    pub(crate) fn timer_line(&mut self) {
+        if self.tim2.status & self.tim2.dier & timer::UPDATE != 0 {
+            self.nvic.raise(nvic::TIM2, self.world.now);
+        }
+    }
+
+    fn scripted(&mut self, event: Event) {
+        self.world.note(format!("{event:?}"));
+        match event {
+            Event::Input { port, pin, high } => {
+                let bit = 1 << pin;
+                let port = &mut self.ports[port];
+                port.outside = port.outside & !bit | if high { bit } else { 0 };
+            }
+            Event::Hang => self.hangs = true,
+            Event::Fault => self.fault = true,
+            Event::BrownOut => self.reset = Some(cause::BROWN_OUT | cause::PIN),
+        }
+    }
+
+    /// Looks for bytes of the host, and keeps pace with the clock on the wall.
+    fn look(&mut self, at: u64) {
+        let wait = LOOK_S.0 + (LOOK_S.1 - LOOK_S.0) * self.random.f64();
+        self.next_look = at + self.world.lasting(wait).max(1);
+        if let Some(line) = &self.line {
+            line.read(&mut self.usart.from_host);
+            self.usart.begin(at, self.rcc.apb2_cycles());
+        }
+        let seconds = self.world.seconds(at);
+        self.over |= self.options.is_over() || self.options.ms.is_some_and(|ms| seconds * 1e3 >= ms);
+        if !self.options.fast {
+            let ahead = seconds - self.wall_offset - self.wall.elapsed().as_secs_f64();
+            if ahead > 1e-3 {
+                std::thread::sleep(Duration::from_secs_f64(ahead));
+            } else if ahead < -LAG_S {
+                self.wall_offset += ahead;
+            }
+        }
+    }
+}

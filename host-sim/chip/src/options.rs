@@ -1,0 +1,76 @@
+//! The command line.
+
+use std::io::Read;
+use std::path::PathBuf;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+
+use clap::Parser;
+
+/// Executes the image that would be flashed to an STM32F405/407, unchanged, on models of the chip. Ends with --ms, or with its standard input.
+///
+/// Inputs of the board's table are closed to ground unless an event opens them.
+#[derive(Clone, Debug, Parser)]
+#[command(version)]
+pub(crate) struct Options {
+    /// The image: an ELF file of the firmware.
+    pub(crate) image: PathBuf,
+    /// The serial line: a link to a pseudo-terminal is made here, to be opened like a serial port.
+    #[arg(long, value_name = "LINK")]
+    pub(crate) pty: Option<PathBuf>,
+    /// As fast as it goes, instead of in real time: what waits for a host should then wait for ever.
+    #[arg(long)]
+    pub(crate) fast: bool,
+    /// Ends after so many milliseconds of the chip's time.
+    #[arg(long, value_name = "MS")]
+    pub(crate) ms: Option<f64>,
+    /// Phase of the host's bytes.
+    #[arg(long, default_value_t = 1)]
+    pub(crate) seed: u64,
+    /// An event: MS:WHAT after power-on, or motion+MS:WHAT after the first step pulse. WHAT is an input that opens (emergency-stop, drive-fault,
+    /// x-min to z-max), an input that closes (x-min=closed), hang, fault or brown-out.
+    #[arg(long, value_name = "EVENT")]
+    pub(crate) at: Vec<String>,
+    /// Every change of a port's outputs goes to this file: 16 bytes each, little end first: cycle (8), port, by DMA, levels (2), outputs (2), 0 (2).
+    #[arg(long, value_name = "FILE")]
+    pub(crate) edges: Option<PathBuf>,
+    /// What happened, as JSON, goes to this file in the end.
+    #[arg(long, value_name = "FILE")]
+    pub(crate) report: Option<PathBuf>,
+    /// The crystal does not swing.
+    #[arg(long)]
+    pub(crate) no_crystal: bool,
+    /// The crystal, MHz.
+    #[arg(long, default_value_t = 8.0)]
+    pub(crate) hse_mhz: f64,
+    /// The watchdog's clock, Hz: 17 000 to 47 000.
+    #[arg(long, default_value_t = 32_000.0)]
+    pub(crate) lsi_hz: f64,
+    /// Says what happens as it does.
+    #[arg(short, long)]
+    pub(crate) verbose: bool,
+    #[arg(skip)]
+    end: End,
+}
+
+/// Set when standard input has ended.
+#[derive(Clone, Debug, Default)]
+struct End(Arc<AtomicBool>);
+
+impl Options {
+    /// Begins to watch standard input, whose end is this program's.
+    pub(crate) fn watch_input(&self) {
+        let end = self.end.0.clone();
+        std::thread::spawn(move || {
+            let mut rest = [0; 64];
+            let mut input = std::io::stdin();
+            while input.read(&mut rest).is_ok_and(|count| count > 0) {}
+            end.store(true, Ordering::Relaxed);
+        });
+    }
+
+    /// Whether standard input has ended.
+    pub(crate) fn is_over(&self) -> bool {
+        self.end.0.load(Ordering::Relaxed)
+    }
+}

@@ -1,0 +1,291 @@
+//! DMA2 (RM0090, 10): direct mode, words or less, single or double buffer, circular or not, no interrupts.
+//!
+//! In direct mode from memory, the next word is read as soon as the last has gone out (10.3.12), so that a word written later is not the one
+//! that goes out. Arbitration takes no time: two streams never ask for the bus within the few cycles of a transfer here, which `chip.rs` sees to
+//! by the order of events.
+
+use super::gpio::Port;
+use crate::{memory::Memory, world::World};
+
+const ENABLE: u32 = 1;
+const CIRCULAR: u32 = 1 << 8;
+const PERIPHERAL_COUNTS: u32 = 1 << 9;
+const MEMORY_COUNTS: u32 = 1 << 10;
+const DOUBLE: u32 = 1 << 18;
+const SECOND: u32 = 1 << 19;
+const INTERRUPTS: u32 = 0x1e;
+/// What may not change while a stream runs (10.5.5: protected by EN).
+const PROTECTED: u32 = 0x0fe7_ffc0 & !SECOND;
+const COMPLETE: u32 = 1 << 5;
+const FLAGS: u32 = 0x3d;
+
+#[derive(Clone, Copy, Debug, Default)]
+struct Stream {
+    control: u32,
+    left: u32,
+    reload: u32,
+    peripheral: u32,
+    memory: [u32; 2],
+    fifo: u32,
+    /// The word that goes out next.
+    loaded: u32,
+}
+
+impl Stream {
+    const fn field(&self, low: u32, bits: u32) -> u32 {
+        self.control >> low & ((1 << bits) - 1)
+    }
+
+    /// Address of the word in work.
+    fn address(&self) -> u32 {
+        let base = self.memory[usize::from(self.control & SECOND != 0)];
+        base + 4 * (self.reload - self.left)
+    }
+}
+
+/// Where a transfer goes that is not to memory.
+pub(crate) struct Write {
+    pub(crate) port: usize,
+    pub(crate) value: u32,
+}
+
+#[derive(Default)]
+pub(crate) struct Dma {
+    streams: [Stream; 8],
+    flags: [u32; 2],
+    /// Transfers to a port, and to memory.
+    pub(crate) played: u64,
+    pub(crate) stored: u64,
+}
+
+/// Where the flags of a stream are: which register, and the lowest bit.
+const fn flags_of(stream: usize) -> (usize, u32) {
+    (stream / 4, [0, 6, 16, 22][stream % 4])
+}
+
+impl Dma {
+    fn load(&mut self, number: usize, sram: Memory, world: &mut World) {
+        let stream = &mut self.streams[number];
+        match sram.word(stream.address()) {
+            Some(word) => stream.loaded = word,
+            None => {
+                world.wrong(format!(
+                    "DMA2 stream {number} reads {:#x}, where there is no memory for it",
+                    stream.address()
+                ));
+                stream.control &= !ENABLE;
+            }
+        }
+    }
+
+    fn enable(&mut self, number: usize, sram: Memory, world: &mut World) {
+        let (register, low) = flags_of(number);
+        if self.flags[register] >> low & FLAGS != 0 {
+            world.wrong(format!("DMA2 stream {number} is enabled with its flags set"));
+        }
+        let stream = &mut self.streams[number];
+        stream.reload = stream.left;
+        let Stream {
+            control,
+            memory: [first, second],
+            peripheral,
+            ..
+        } = *stream;
+        world.note(format!(
+            "DMA2 stream {number} on: channel {}, direction {}, {}{}, priority {}, {} items",
+            stream.field(25, 3),
+            stream.field(6, 2),
+            if control & CIRCULAR != 0 { "circular, " } else { "" },
+            if control & DOUBLE != 0 {
+                "two buffers"
+            } else {
+                "one buffer"
+            },
+            stream.field(16, 2),
+            stream.left
+        ));
+        let expected = [
+            (stream.left == 0, "nothing to transfer"),
+            (
+                (first | second | peripheral) & 3 != 0,
+                "an address is not that of a word",
+            ),
+            (
+                stream.field(11, 2) != 2 || stream.field(13, 2) != 2,
+                "only words are modelled",
+            ),
+            (stream.fifo & 4 != 0, "only the direct mode is modelled"),
+            (
+                control & PERIPHERAL_COUNTS != 0 || control & MEMORY_COUNTS == 0,
+                "only an address in memory that counts is modelled",
+            ),
+            (control & INTERRUPTS != 0, "its interrupts are not modelled"),
+            (stream.field(6, 2) > 1, "memory to memory is not modelled"),
+        ];
+        for (_, why) in expected.iter().filter(|(is, _)| *is) {
+            world.wrong(format!("DMA2 stream {number}: {why}"));
+        }
+        if self.streams[number].field(6, 2) == 1 {
+            self.load(number, sram, world);
+        }
+    }
+
+    /// A peripheral asks for a transfer. What it writes, if that is not memory.
+    #[inline]
+    pub(crate) fn request(
+        &mut self,
+        number: usize,
+        channel: u32,
+        sram: Memory,
+        world: &mut World,
+    ) -> Option<Write> {
+        let stream = &self.streams[number];
+        if stream.control & ENABLE == 0 {
+            return None;
+        }
+        if stream.field(25, 3) != channel {
+            world.wrong_once(format!(
+                "DMA2 stream {number} is asked by channel {channel}, and set to {}",
+                stream.field(25, 3)
+            ));
+            return None;
+        }
+        let to_peripheral = stream.field(6, 2) == 1;
+        let mut write = None;
+        if to_peripheral {
+            self.played += 1;
+            write = Some(Write {
+                port: 0,
+                value: stream.loaded,
+            });
+            match stream.peripheral.checked_sub(0x4002_0018) {
+                Some(offset) if offset % 0x400 == 0 && offset / 0x400 < 9 => {
+                    if let Some(write) = &mut write {
+                        write.port = offset as usize / 0x400;
+                    }
+                }
+                _ => world.wrong_once(format!(
+                    "DMA2 stream {number} writes {:#x}: not modelled",
+                    stream.peripheral
+                )),
+            }
+        } else {
+            self.stored += 1;
+            let stored = sram
+                .word(stream.peripheral)
+                .is_some_and(|word| sram.set_word(stream.address(), word));
+            if !stored {
+                world.wrong_once(format!(
+                    "DMA2 stream {number} copies {:#x} to {:#x}: not modelled",
+                    stream.peripheral,
+                    stream.address()
+                ));
+            }
+        }
+        let stream = &mut self.streams[number];
+        stream.left -= 1;
+        if stream.left == 0 {
+            self.complete(number);
+        }
+        if to_peripheral && self.streams[number].control & ENABLE != 0 {
+            self.load(number, sram, world);
+        }
+        write
+    }
+
+    fn complete(&mut self, number: usize) {
+        let (register, low) = flags_of(number);
+        self.flags[register] |= COMPLETE << low;
+        let stream = &mut self.streams[number];
+        stream.left = stream.reload;
+        if stream.control & DOUBLE != 0 {
+            stream.control ^= SECOND;
+        } else if stream.control & CIRCULAR == 0 {
+            stream.control &= !ENABLE;
+        }
+    }
+
+    pub(crate) fn read(&self, offset: u32) -> u32 {
+        match offset {
+            0x00 | 0x04 => self.flags[offset as usize / 4],
+            0x10..0xd0 => {
+                let stream = &self.streams[(offset as usize - 0x10) / 0x18];
+                match (offset - 0x10) % 0x18 {
+                    0x00 => stream.control,
+                    0x04 => stream.left,
+                    0x08 => stream.peripheral,
+                    0x0c => stream.memory[0],
+                    0x10 => stream.memory[1],
+                    _ => stream.fifo,
+                }
+            }
+            _ => 0,
+        }
+    }
+
+    pub(crate) fn write(&mut self, offset: u32, value: u32, sram: Memory, world: &mut World) {
+        match offset {
+            0x08 | 0x0c => self.flags[offset as usize / 4 - 2] &= !value,
+            0x10..0xd0 => self.write_stream(
+                (offset as usize - 0x10) / 0x18,
+                (offset - 0x10) % 0x18,
+                value,
+                sram,
+                world,
+            ),
+            _ => world.wrong_once(format!("write of DMA2 + {offset:#x}")),
+        }
+    }
+
+    fn write_stream(&mut self, number: usize, register: u32, value: u32, sram: Memory, world: &mut World) {
+        let stream = &mut self.streams[number];
+        let runs = stream.control & ENABLE != 0;
+        // The buffer that is not in work may be changed (10.3.10).
+        let idle_buffer = if stream.control & SECOND != 0 { 0x0c } else { 0x10 };
+        if runs && register != 0 && !(stream.control & DOUBLE != 0 && register == idle_buffer) {
+            world.wrong(format!(
+                "register {register:#x} of DMA2 stream {number} is written while it runs"
+            ));
+        }
+        match register {
+            0x00 => {
+                if runs && value & ENABLE != 0 && (stream.control ^ value) & PROTECTED != 0 {
+                    world.wrong(format!("DMA2 stream {number} is changed while it runs"));
+                }
+                stream.control = value;
+                if !runs && value & ENABLE != 0 {
+                    self.enable(number, sram, world);
+                }
+            }
+            0x04 => stream.left = value & 0xffff,
+            0x08 => stream.peripheral = value,
+            0x0c => stream.memory[0] = value,
+            0x10 => stream.memory[1] = value,
+            _ => stream.fifo = value,
+        }
+    }
+
+    /// Without addresses in memory, which change with the image.
+    pub(crate) fn snapshot(&self) -> Vec<(String, u32)> {
+        let mut lines = Vec::new();
+        for (number, stream) in self
+            .streams
+            .iter()
+            .enumerate()
+            .filter(|(_, stream)| stream.control != 0)
+        {
+            lines.push((format!("DMA2 S{number}CR without CT"), stream.control & !SECOND));
+            lines.push((format!("DMA2 S{number}NDTR at start"), stream.reload));
+            lines.push((format!("DMA2 S{number}FCR"), stream.fifo));
+            if stream.peripheral >= 0x4000_0000 {
+                lines.push((format!("DMA2 S{number}PAR"), stream.peripheral));
+            }
+        }
+        lines
+    }
+}
+
+/// Applies a transfer to the ports; the port whose level changed.
+pub(crate) fn apply(write: &Write, ports: &mut [Port; 9]) -> Option<usize> {
+    ports[write.port].set_reset(write.value).then_some(write.port)
+}

@@ -1,0 +1,88 @@
+//! What happens to the board: inputs that open and close, a processor that hangs or faults, a supply that sags.
+
+use boards::{Axis, Board, Level, Line, Role};
+
+/// What happens.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) enum Event {
+    /// A pin gets this level from outside.
+    Input { port: usize, pin: u8, high: bool },
+    /// The processor executes nothing any more.
+    Hang,
+    /// A hard fault, wherever the program is.
+    Fault,
+    /// The supply falls below the brown-out threshold, and is back at once.
+    BrownOut,
+}
+
+/// When, in seconds.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) enum When {
+    /// After power-on.
+    Start(f64),
+    /// After the first step pulse.
+    Motion(f64),
+}
+
+/// An event and its time, as on the command line: `500:x-max`, `motion+20:emergency-stop`, `motion+40:hang`, `900:drive-fault=closed`.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Entry {
+    pub(crate) when: When,
+    pub(crate) what: Event,
+}
+
+/// The name of an input on the command line.
+fn name(role: Role) -> Option<&'static str> {
+    Some(match role {
+        Role::EmergencyStop => "emergency-stop",
+        Role::DriveFault => "drive-fault",
+        Role::LimitMin(Axis::X) => "x-min",
+        Role::LimitMin(Axis::Y) => "y-min",
+        Role::LimitMin(Axis::Z) => "z-min",
+        Role::LimitMax(Axis::X) => "x-max",
+        Role::LimitMax(Axis::Y) => "y-max",
+        Role::LimitMax(Axis::Z) => "z-max",
+        _ => return None,
+    })
+}
+
+/// The safety inputs of a board.
+pub(crate) fn inputs(board: &Board) -> impl Iterator<Item = &Line> {
+    board.lines.iter().filter(|line| name(line.role).is_some())
+}
+
+/// Reads an entry for this board.
+pub(crate) fn entry(text: &str, board: &Board) -> Result<Entry, String> {
+    let (when, what) = text
+        .split_once(':')
+        .ok_or("an event is TIME:WHAT, such as motion+20:emergency-stop")?;
+    let ms = |text: &str| {
+        text.parse::<f64>()
+            .map_err(|_| format!("{text}: not a time in ms"))
+    };
+    let when = match when.strip_prefix("motion+") {
+        Some(after) => When::Motion(ms(after)? / 1e3),
+        None => When::Start(ms(when)? / 1e3),
+    };
+    let (what, closed) = what
+        .strip_suffix("=closed")
+        .map_or((what, false), |name| (name, true));
+    let what = match what {
+        "hang" => Event::Hang,
+        "fault" => Event::Fault,
+        "brown-out" => Event::BrownOut,
+        input => {
+            let line = inputs(board)
+                .find(|line| name(line.role) == Some(input))
+                .ok_or_else(|| {
+                    format!("{input}: neither an input of the board nor hang, fault, brown-out")
+                })?;
+            Event::Input {
+                port: line.pin.port.index(),
+                pin: line.pin.number,
+                high: (line.active == Level::High) != closed,
+            }
+        }
+    };
+    Ok(Entry { when, what })
+}

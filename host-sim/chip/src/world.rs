@@ -1,0 +1,98 @@
+//! Time, and what there is to say: what every model is handed.
+
+use std::collections::BTreeSet;
+
+/// No time: an event that does not come.
+pub(crate) const NEVER: u64 = u64::MAX;
+
+/// Complaints that are kept; all are counted.
+const KEPT: usize = 200;
+
+/// Cycles of the bus clock (HCLK) since the first start, what they are in seconds, and the log of the models.
+pub(crate) struct World {
+    /// Now, in cycles.
+    pub(crate) now: u64,
+    hclk_hz: f64,
+    /// Where the present frequency began, cycles and seconds.
+    since: (u64, f64),
+    /// What a correct program does not do.
+    pub(crate) complaints: Vec<String>,
+    /// How many there were.
+    pub(crate) complained: u64,
+    /// What happened.
+    pub(crate) notes: Vec<String>,
+    /// Notes go to standard error as they come.
+    verbose: bool,
+    once: BTreeSet<String>,
+}
+
+impl World {
+    pub(crate) fn new(hclk_hz: f64, verbose: bool) -> Self {
+        Self {
+            now: 0,
+            hclk_hz,
+            since: (0, 0.0),
+            complaints: Vec::new(),
+            complained: 0,
+            notes: Vec::new(),
+            verbose,
+            once: BTreeSet::new(),
+        }
+    }
+
+    /// The present frequency, Hz.
+    pub(crate) const fn hclk_hz(&self) -> f64 {
+        self.hclk_hz
+    }
+
+    /// Changes it.
+    pub(crate) fn set_hclk(&mut self, hz: f64) {
+        self.since = (self.now, self.seconds(self.now));
+        self.hclk_hz = hz;
+    }
+
+    /// A time in seconds.
+    pub(crate) fn seconds(&self, at: u64) -> f64 {
+        self.since.1 + (at as f64 - self.since.0 as f64) / self.hclk_hz
+    }
+
+    /// A time in cycles, if the frequency stays.
+    pub(crate) fn cycles(&self, seconds: f64) -> u64 {
+        self.since.0 + ((seconds - self.since.1).max(0.0) * self.hclk_hz) as u64
+    }
+
+    /// A duration in cycles.
+    pub(crate) fn lasting(&self, seconds: f64) -> u64 {
+        (seconds * self.hclk_hz) as u64
+    }
+
+    fn stamped(&self, text: &str) -> String {
+        format!("{:.6} ms: {text}", self.seconds(self.now) * 1e3)
+    }
+
+    /// Complains.
+    pub(crate) fn wrong(&mut self, text: impl AsRef<str>) {
+        self.complained += 1;
+        if self.complaints.len() < KEPT {
+            let line = self.stamped(text.as_ref());
+            eprintln!("WRONG {line}");
+            self.complaints.push(line);
+        }
+    }
+
+    /// Complains, unless it has complained with the same words.
+    pub(crate) fn wrong_once(&mut self, text: String) {
+        if self.once.insert(text.clone()) {
+            self.wrong(text);
+        }
+    }
+
+    /// Notes what happened.
+    pub(crate) fn note(&mut self, text: impl AsRef<str>) {
+        let line = self.stamped(text.as_ref());
+        if self.verbose {
+            eprintln!("{line}");
+        }
+        self.notes.push(line);
+    }
+}
