@@ -14,11 +14,18 @@ use interp_core::{Sample, State};
 /// checks a job, or a QEMU that shares its processor, may take longer.
 const ANSWER_TIMEOUT: Duration = Duration::from_millis(1500);
 
-/// Times a request is sent before it is given up.
+/// Times a request is sent over a line of unknown end before it is given up.
 const TRIES: u32 = 4;
+
+/// The same to a process, which is seen to end: [`ANSWER_TIMEOUT`] doubles with each, so the last ends after 13 minutes. A busy machine may
+/// leave the process without processor time for long.
+const PROCESS_TRIES: u32 = 9;
 
 /// Time without any event of a run after which the board counts as gone.
 const SILENCE_TIMEOUT: Duration = Duration::from_secs(20);
+
+/// The same of a process.
+const PROCESS_SILENCE_TIMEOUT: Duration = Duration::from_secs(780);
 
 /// Pause before each read of events: QEMU hands its serial line's bytes over one by one, and a reader that is woken by each
 /// takes the processor from it.
@@ -26,9 +33,12 @@ const GATHER: Duration = Duration::from_millis(1);
 
 /// A line to a board. Reading returns [`io::ErrorKind::TimedOut`] or [`io::ErrorKind::WouldBlock`] after some
 /// milliseconds without a byte.
-pub trait Stream: Read + Write + Send {}
-
-impl<T: Read + Write + Send> Stream for T {}
+pub trait Stream: Read + Write + Send {
+    /// Whether the other end is a process of this machine: its end ends the line, so that it is waited for as long as it lives.
+    fn is_process(&self) -> bool {
+        false
+    }
+}
 
 /// What can go wrong between here and the board.
 #[derive(Debug, thiserror::Error)]
@@ -238,10 +248,15 @@ impl Session {
         self.read_some()?;
         let grew = self.input.len() != before;
         while self.next_reply()?.is_some() {}
+        let (timeout, silent) = if self.stream.is_process() {
+            (PROCESS_SILENCE_TIMEOUT, "no word of the run for 13 minutes")
+        } else {
+            (SILENCE_TIMEOUT, "no word of the run for 20 s")
+        };
         if grew {
             self.heard = Instant::now();
-        } else if self.heard.elapsed() > SILENCE_TIMEOUT {
-            return Err(RemoteError::Silent("no word of the run for 20 s"));
+        } else if self.heard.elapsed() > timeout {
+            return Err(RemoteError::Silent(silent));
         }
         Ok(None)
     }
@@ -269,10 +284,17 @@ impl Session {
             )
         })?;
         self.asked = Instant::now();
-        for _ in 0..TRIES {
+        let (tries, growth, silent) = if self.stream.is_process() {
+            (PROCESS_TRIES, 2, "a request was repeated for 13 minutes")
+        } else {
+            (TRIES, 1, "a request was sent four times")
+        };
+        let mut timeout = ANSWER_TIMEOUT;
+        for _ in 0..tries {
             self.stream.write_all(frame)?;
             self.stream.flush()?;
-            let deadline = Instant::now() + ANSWER_TIMEOUT;
+            let deadline = Instant::now() + timeout;
+            timeout *= growth;
             while Instant::now() < deadline {
                 match self.next_reply()? {
                     Some(reply) => match answered(&reply) {
@@ -291,7 +313,7 @@ impl Session {
             }
             self.stream.write_all(&[DELIMITER])?;
         }
-        Err(RemoteError::Silent("a request was sent four times"))
+        Err(RemoteError::Silent(silent))
     }
 
     /// Reads what has arrived, or waits a moment.
