@@ -1,5 +1,4 @@
 //! Faults are states: each kind that a surface can cause, with its code, value and place; the position is kept.
-#![allow(clippy::unwrap_used, reason = "a test may fail by panic")]
 
 use host_sim::job_file::{Along, JobFile, Pattern, Side, Spacing, SurfaceSpec};
 use host_sim::prepare::{Prepared, prepare};

@@ -1,5 +1,4 @@
 //! Operations of a sample: the core that counts is the core, and what it counts.
-#![allow(clippy::unwrap_used, reason = "a test may fail by panic")]
 
 use std::path::PathBuf;
 

@@ -1,7 +1,6 @@
 //! Inputs, drives, home and a host that is gone, on a whole board with a real job; and any order of all of it.
-#![allow(clippy::unwrap_used, reason = "a test may fail by panic")]
 
-mod safety_rules;
+mod rules;
 
 use std::collections::VecDeque;
 use std::io::{self, Read, Write};
@@ -9,7 +8,7 @@ use std::sync::{Arc, Mutex};
 
 use controller::{in_process::Board, safety::DEBOUNCE_TICKS};
 use host_sim::remote::operate::{Action, Operator, Setup, act, make_ready};
-use host_sim::remote::session::Event as Told;
+use host_sim::remote::session::{Event as Told, Stream};
 use host_sim::remote::{RemoteError, Session, drive};
 use integration_tests::{dome, upload};
 use interp_core::{
@@ -31,6 +30,8 @@ struct Wire {
 
 /// Periods that pass with each read, of which there is about one a millisecond.
 const TICKS_A_READ: usize = 2;
+
+impl Stream for Wire {}
 
 impl Read for Wire {
     fn read(&mut self, bytes: &mut [u8]) -> io::Result<usize> {
