@@ -71,7 +71,7 @@ END
         die "linuxcnc-uspace was unpacked into $place, but its rs274 does not run"
 }
 
-# A Chromium for the report's test: the first of the names that tests/browser/mod.rs tries, if it runs.
+# A Chromium for the report's test: the first of the names that tests/report_page/browser.rs tries, if it runs.
 need_browser() {
     local program version
     for program in ${CHROMIUM:+"$CHROMIUM"} chromium google-chrome google-chrome-stable chromium-browser; do

@@ -1,9 +1,8 @@
 //! A whole board in this process, with a real job: what comes over the line is what the interpolator did, and nothing
 //! that the line does can make it otherwise.
-#![allow(clippy::unwrap_used, reason = "a test may fail by panic")]
 
-mod board_disorder;
-mod board_steps;
+mod disorder;
+mod steps;
 
 use controller::{
     in_process::Board,

@@ -1,6 +1,5 @@
 //! Flashing and the log as far as they go without a probe: images, the log's decoding, what is said where no probe is. Builds the
 //! program that talks to probes, which takes minutes the first time.
-#![allow(clippy::unwrap_used, reason = "a test may fail by panic")]
 
 use std::fs::File;
 use std::io::Write;
@@ -14,7 +13,9 @@ use cycles::image::chip;
 use host_sim::probe::{Event, Image, Line, NotRun, Problem, Program, Request, Target};
 use integration_tests::{dome, upload};
 use machine::remote::Session;
-use machine::remote::qemu::{self, Qemu};
+use machine::remote::qemu::Qemu;
+
+use crate::images;
 
 /// A selector of no probe: whatever is connected where the tests run is left alone.
 const NOWHERE: &str = "0000:0000:nowhere";
@@ -24,8 +25,9 @@ fn program() -> &'static Program {
     PROGRAM.get_or_init(|| Program::find().unwrap())
 }
 
-fn chip_image() -> PathBuf {
-    chip().unwrap()
+fn chip_image() -> &'static Path {
+    static IMAGE: OnceLock<PathBuf> = OnceLock::new();
+    IMAGE.get_or_init(|| chip().unwrap())
 }
 
 /// The image as another tool flattens it, from the first byte of flash on.
@@ -44,7 +46,7 @@ fn flat(image: &Path) -> Vec<u8> {
 #[test]
 fn the_image_for_the_chip_is_what_binutils_makes_of_it() {
     let path = chip_image();
-    let image = Image::load(&path).unwrap();
+    let image = Image::load(path).unwrap();
     assert_eq!(image.board.as_deref(), Some(STM32F405.id));
     assert!(
         image
@@ -53,7 +55,7 @@ fn the_image_for_the_chip_is_what_binutils_makes_of_it() {
     );
     image.check_for(&STM32F405).unwrap();
     assert!(image.check_for(&SKR_PRO).unwrap_err().contains("stm32f405"));
-    let flat = flat(&path);
+    let flat = flat(path);
     assert_eq!(image.reach_bytes(), Ok(u32::try_from(flat.len()).unwrap()));
     let mut ours = vec![0; flat.len()];
     for (address, data) in &image.segments {
@@ -65,7 +67,7 @@ fn the_image_for_the_chip_is_what_binutils_makes_of_it() {
 
 #[test]
 fn the_image_for_qemu_is_for_no_chip() {
-    let image = Image::load(&qemu::firmware().unwrap()).unwrap();
+    let image = Image::load(images::for_qemu()).unwrap();
     assert_eq!(
         (image.board.as_deref(), image.rtt),
         (Some("qemu-netduinoplus2"), None)
@@ -85,7 +87,7 @@ fn wait_for(qemu: &Qemu, state: &str) -> Vec<u8> {
         if lines.last().is_some_and(|line| line.message.starts_with(state)) {
             return log;
         }
-        assert!(begun.elapsed().as_secs() < 60, "no {state}: {lines:?}");
+        assert!(begun.elapsed().as_secs() < 600, "no {state}: {lines:?}");
         std::thread::sleep(Duration::from_millis(20));
     }
 }
@@ -93,7 +95,7 @@ fn wait_for(qemu: &Qemu, state: &str) -> Vec<u8> {
 /// QEMU's log of a job that is loaded, dropped, and loaded again: frames of the same encoding as the chip's, which only another way
 /// brings here.
 fn recorded() -> Vec<u8> {
-    let (qemu, stream) = Qemu::start(&qemu::firmware().unwrap()).unwrap();
+    let (qemu, stream) = Qemu::start(images::for_qemu()).unwrap();
     let mut session = Session::open(stream, 1).unwrap();
     let (header, words) = dome();
     let requests = upload(header, &words);
@@ -113,7 +115,7 @@ fn decoded(log: &[u8]) -> (Vec<Line>, usize) {
     let mut file = tempfile::NamedTempFile::new().unwrap();
     file.write_all(log).unwrap();
     let request = Request::Decode {
-        image: qemu::firmware().unwrap(),
+        image: images::for_qemu().into(),
     };
     let (mut lines, mut lost) = (Vec::new(), 0);
     program()
@@ -192,7 +194,7 @@ fn without_a_probe_that_is_what_is_said() {
         probe: Some(probe.to_owned()),
         chip: STM32F405.chip.name.to_owned(),
         device_id: STM32F405.chip.device_id,
-        image: image.clone(),
+        image: image.into(),
     };
     let problem = |request: &Request| match program().run(request, None, |event| panic!("{event:?}")) {
         Err(NotRun::Problem(problem)) => problem,
@@ -216,7 +218,7 @@ fn without_a_probe_that_is_what_is_said() {
         );
     }
     // An image without a log for probes, or none at all, is refused before a probe is looked for.
-    for image in [qemu::firmware().unwrap(), "Cargo.toml".into()] {
+    for image in [images::for_qemu().into(), "Cargo.toml".into()] {
         let request = Request::Log(Target {
             image,
             ..target(NOWHERE)

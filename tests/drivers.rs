@@ -1,5 +1,4 @@
 //! Drivers of the firmware against recorded registers: the same files, without the chip.
-#![allow(clippy::unwrap_used, reason = "a test may fail by panic")]
 
 #[path = "../firmware/src/drivers/drive_enable.rs"]
 mod drive_enable;

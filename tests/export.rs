@@ -1,5 +1,4 @@
 //! Exported programs, read by LinuxCNC's own interpreter (`rs274`), against the exact path of the tool centre.
-#![allow(clippy::unwrap_used, reason = "a test may fail by panic")]
 
 use std::path::PathBuf;
 use std::process::{Command, Stdio};

@@ -1,5 +1,4 @@
 //! Faults are states: each kind that a surface can cause, with its code, value and place; the position is kept.
-#![allow(clippy::unwrap_used, reason = "a test may fail by panic")]
 
 use interp_core::interpolator::STOP_PERIODS;
 use interp_core::{Command, Fault, FaultKind, Interpolator, Sample, SpanParameter, State};

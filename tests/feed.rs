@@ -1,5 +1,4 @@
 //! Feed within the axes' limits, links, and what an operator does, on the core itself.
-#![allow(clippy::unwrap_used, reason = "a test may fail by panic")]
 
 use integration_tests::{dome, scaled_dome};
 use interp_core::{
@@ -116,11 +115,40 @@ fn height(header: &Header, words: &[i32]) -> (i32, u32) {
     (top, passes)
 }
 
-/// Every job, and slow and fast ones, to and fro and one way: limits hold in every sample, links and standstills too; the passes are as many
-/// as at constant feed.
+/// Runs a sample job with these limits, at so many times its feed: limits hold in every sample, links and standstills too; the passes are as
+/// many as at constant feed.
+fn check_sample_job(name: &str, times: f32, pattern: Pattern, machine_of: fn(i32) -> AxisLimits) {
+    let jobs = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("../jobs");
+    let prepared = prepare(&job_file::load(&jobs.join(format!("{name}.toml"))).unwrap()).unwrap();
+    let mut header = prepared.header;
+    header.pattern = pattern;
+    let (top, passes) = height(&header, &prepared.words);
+    header.feed_mm_s *= times;
+    header.axes = Some(machine_of(top + 5_000_000));
+    let axes = header.axes.as_ref().unwrap();
+    let mut core = machine(&header, &prepared.words);
+    let mut used = Use::default();
+    let mut sample = *core.tick(Command::Start);
+    let mut last_pass = 0;
+    while sample.state.is_under_way() {
+        used.add(&sample, axes);
+        last_pass = sample.pass;
+        sample = *core.tick(Inputs::default());
+    }
+    let what = format!("{name} {times} {pattern:?}");
+    println!(
+        "{what}: velocity, acceleration, jerk {:?} of their limits",
+        used.worst
+    );
+    assert_eq!((sample.state, core.fault()), (State::Finished, None), "{what}");
+    assert_eq!(last_pass + 1, passes, "{what}");
+    used.check(&what);
+    assert_eq!(sample.cl_nm, axes.home_nm, "{what}: back where it began");
+}
+
+/// Some jobs, slow and fast, on a machine whose z is weaker.
 #[test]
 fn sample_jobs_hold_the_limits() {
-    let jobs = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("../jobs");
     for (name, times, pattern) in [
         ("plate", 1.0, Pattern::Zig),
         ("plate", 8.0, Pattern::Zigzag),
@@ -134,28 +162,37 @@ fn sample_jobs_hold_the_limits() {
         ("torus", 1.0, Pattern::Zigzag),
         ("torus", 6.0, Pattern::Zig),
     ] {
-        let prepared = prepare(&job_file::load(&jobs.join(format!("{name}.toml"))).unwrap()).unwrap();
-        let mut header = prepared.header;
-        header.pattern = pattern;
-        let (top, passes) = height(&header, &prepared.words);
-        header.feed_mm_s *= times;
-        header.axes = Some(axes(top + 5_000_000));
-        let axes = header.axes.as_ref().unwrap();
-        let mut core = machine(&header, &prepared.words);
-        let mut used = Use::default();
-        let mut sample = *core.tick(Command::Start);
-        let mut last_pass = 0;
-        while sample.state.is_under_way() {
-            used.add(&sample, axes);
-            last_pass = sample.pass;
-            sample = *core.tick(Inputs::default());
-        }
-        let what = format!("{name} {times} {pattern:?}");
-        assert_eq!((sample.state, core.fault()), (State::Finished, None), "{what}");
-        assert_eq!(last_pass + 1, passes, "{what}");
-        used.check(&what);
-        assert_eq!(sample.cl_nm, axes.home_nm, "{what}: back where it began");
+        check_sample_job(name, times, pattern, axes);
     }
+}
+
+/// The machine of the README's figures.
+fn axes_of_the_readme(safe_z_nm: i32) -> AxisLimits {
+    AxisLimits {
+        acceleration_mm_s2: [1000.0; 3],
+        jerk_mm_s3: [20_000.0; 3],
+        ..axes(safe_z_nm)
+    }
+}
+
+/// The ten jobs without limits of their own, one way and to and fro, at their own feed.
+mod both_ways {
+    use super::{Pattern, axes_of_the_readme, check_sample_job};
+
+    macro_rules! jobs {
+        ($($name:ident)*) => {
+            $(
+                #[test]
+                fn $name() {
+                    for pattern in [Pattern::Zig, Pattern::Zigzag] {
+                        check_sample_job(stringify!($name), 1.0, pattern, axes_of_the_readme);
+                    }
+                }
+            )*
+        };
+    }
+
+    jobs!(far_plate freeform plate plate_v revolved revolved_v ruled_printed ruled_reconstructed sphere_cap torus);
 }
 
 /// The dome in some nine passes, on a machine with limits.

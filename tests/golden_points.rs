@@ -1,5 +1,4 @@
 //! The core against the golden table, which was computed elsewhere with 40 digits: points, normals, intervals, schedules.
-#![allow(clippy::unwrap_used, reason = "a test may fail by panic")]
 
 use integration_tests::golden::{Case, cases};
 use interp_core::SpanParameter;

@@ -1,5 +1,4 @@
 //! Where a run begins: at the job's home and where the axes stand, which have to be one place. On a whole board with step outputs.
-#![allow(clippy::unwrap_used, reason = "a test may fail by panic")]
 
 use controller::{in_process::Board, safety::DEBOUNCE_TICKS};
 use integration_tests::{HELLO, Host, MAKE_READY, dome, upload};

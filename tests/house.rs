@@ -11,12 +11,28 @@ fn root() -> PathBuf {
 /// Crates of the workspace that a crate depends on, directly or not, when it is built with these flags.
 fn dependencies(of: &str, flags: &[&str]) -> BTreeSet<String> {
     let output = Command::new(env!("CARGO"))
-        .args(["tree", "--offline", "--locked", "--edges", "normal", "--prefix", "none", "--format", "{p}", "-p", of])
+        .args([
+            "tree",
+            "--offline",
+            "--locked",
+            "--edges",
+            "normal",
+            "--prefix",
+            "none",
+            "--format",
+            "{p}",
+            "-p",
+            of,
+        ])
         .args(flags)
         .current_dir(root())
         .output()
         .unwrap();
-    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+    assert!(
+        output.status.success(),
+        "{}",
+        String::from_utf8_lossy(&output.stderr)
+    );
     let lines = String::from_utf8(output.stdout).unwrap();
     lines
         .lines()
@@ -82,10 +98,18 @@ fn imports(source: &Path) -> BTreeMap<String, BTreeSet<String>> {
             if !within.ends_with(".rs") || within == "lib.rs" || within == "main.rs" || is_test {
                 continue;
             }
-            let part = within.split('/').next().unwrap().trim_end_matches(".rs").to_owned();
+            let part = within
+                .split('/')
+                .next()
+                .unwrap()
+                .trim_end_matches(".rs")
+                .to_owned();
             let text = std::fs::read_to_string(&path).unwrap();
             let code = text.split("#[cfg(test)]\nmod tests {").next().unwrap();
-            let code: Vec<&str> = code.lines().filter(|line| !line.trim_start().starts_with("//")).collect();
+            let code: Vec<&str> = code
+                .lines()
+                .filter(|line| !line.trim_start().starts_with("//"))
+                .collect();
             // From a file beside lib.rs, and from a folder's own file, `super` is the crate.
             let depth = within.matches('/').count();
             let code = match (depth, within.ends_with("/mod.rs")) {
@@ -100,8 +124,11 @@ fn imports(source: &Path) -> BTreeMap<String, BTreeSet<String>> {
                     None => vec![after],
                 };
                 for name in names {
-                    let name: String =
-                        name.trim_start().chars().take_while(|c| c.is_alphanumeric() || *c == '_').collect();
+                    let name: String = name
+                        .trim_start()
+                        .chars()
+                        .take_while(|c| c.is_alphanumeric() || *c == '_')
+                        .collect();
                     if name != part {
                         seen.insert(name);
                     }

@@ -1,5 +1,4 @@
 //! CAD files against the kernel that wrote them: every face of every file, the samples of a job on each, hostile files.
-#![allow(clippy::unwrap_used, reason = "a test may fail by panic")]
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};

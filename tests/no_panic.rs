@@ -1,6 +1,5 @@
 //! No panic can be reached from the sample task: `firmware/no-panic` says how the linker proves it. Here the image is
 //! linked, and once more with a panic in the task, which has to fail by the name of the function that is missing.
-#![allow(clippy::unwrap_used, reason = "a test may fail by panic")]
 
 use std::path::Path;
 use std::process::{Command, Output};

@@ -1,5 +1,4 @@
 //! The oracle against the golden table: every value of every place, and the schedules.
-#![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
 
 use std::path::Path;
 

@@ -1,5 +1,4 @@
 //! The numbers of `cargo sim paper`, against the notes on the paper (computed elsewhere) and closed forms.
-#![allow(clippy::unwrap_used, reason = "a test may fail by panic")]
 
 use std::sync::OnceLock;
 

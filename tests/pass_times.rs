@@ -1,6 +1,5 @@
 //! How long passes take on a machine with limits, against the best motion that a solver on this machine finds within the same limits, and
 //! straight ones against the closed form that is held to Ruckig.
-#![allow(clippy::unwrap_used, reason = "a test may fail by panic")]
 
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -149,7 +148,7 @@ fn straight_passes_take_the_time_of_the_exact_solution() {
 
 /// All sample jobs, seven passes of each; at their own feed, which is what is asked, and at three times that, where knots that lie near to each
 /// other cost more (the README says how much). The table of the README's figure:
-/// `cargo test --release -p integration-tests --test pass_times -- --ignored --nocapture`, some minutes.
+/// `cargo test --release -p integration-tests pass_times -- --ignored --nocapture`, some minutes.
 #[test]
 #[ignore = "a campaign of minutes"]
 fn seven_passes_of_every_job() {

@@ -1,6 +1,5 @@
 //! The messages and their frames: every message there and back, the bytes that never change unnoticed, and a line that
 //! damages what it carries.
-#![allow(clippy::unwrap_used, reason = "a test may fail by panic")]
 
 mod any_message;
 

@@ -1,5 +1,4 @@
 //! Random surfaces, also nearly degenerate ones: every sample is right, or the fault that stopped the run is.
-#![allow(clippy::unwrap_used, reason = "a test may fail by panic")]
 
 use interp_core::{Fault, FaultKind};
 use job::{Along, Job, Pattern, Side, Spacing, SurfaceSpec};

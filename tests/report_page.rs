@@ -1,5 +1,4 @@
 //! The report's page in a headless Chromium: what is drawn, what it says, what the mouse does, and that it asks for nothing.
-#![allow(clippy::unwrap_used, reason = "a test may fail by panic")]
 
 mod browser;
 

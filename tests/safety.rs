@@ -1,7 +1,6 @@
 //! Inputs, drives, home and a host that is gone, on a whole board with a real job; and any order of all of it.
-#![allow(clippy::unwrap_used, reason = "a test may fail by panic")]
 
-mod safety_rules;
+mod rules;
 
 use std::collections::VecDeque;
 use std::io::{self, Read, Write};
@@ -14,7 +13,7 @@ use interp_core::{
     sample::State,
 };
 use machine::remote::operate::{Operator, Setup, act, make_ready};
-use machine::remote::session::Event as Told;
+use machine::remote::session::{Event as Told, Stream};
 use machine::remote::{RemoteError, Session, drive};
 use protocol::message::{Clock, Configuration, InputLines, LinkTimeoutAction, Reason, Request, Status};
 
@@ -31,6 +30,8 @@ struct Wire {
 
 /// Periods that pass with each read, of which there is about one a millisecond.
 const TICKS_A_READ: usize = 2;
+
+impl Stream for Wire {}
 
 impl Read for Wire {
     fn read(&mut self, bytes: &mut [u8]) -> io::Result<usize> {

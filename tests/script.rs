@@ -1,20 +1,22 @@
 //! What an operator does in a run, from one script: on the machine in this process, on the board's logic behind a line, and on the firmware
 //! in QEMU, with the same samples. Needs `qemu-system-arm`; builds the firmware.
-#![allow(clippy::unwrap_used, reason = "a test may fail by panic")]
 
 use std::io::{self, Read, Write};
 
 use controller::in_process::Board;
 use interp_core::State;
-use job::{AxisLimits, Job};
+use job::AxisLimits;
+use job::Job;
 use machine::Machine;
 use machine::prepare::{Prepared, prepare};
 use machine::remote::operate::{self, Setup};
-use machine::remote::qemu::{self, Qemu};
+use machine::remote::qemu::Qemu;
 use machine::remote::script::{Schedule, play as play_there};
-use machine::remote::{Session, drive};
+use machine::remote::{Session, Stream, drive};
 use machine::script::{Played, Script, play};
 use protocol::message::Configuration;
+
+use crate::images;
 
 /// A hold and a resume on the path, requests that the state does not allow, an abort, another run, and an abort while held.
 const SCRIPT: &str = "tick 300: hold\ntick 301: hold\ntick 340: resume\ntick 700: resume\ntick 2500: abort\ntick 2510: hold\ntick 2600: start\n\
@@ -63,6 +65,8 @@ struct Line {
     board: Box<Board>,
     waiting: Vec<u8>,
 }
+
+impl Stream for Line {}
 
 impl Read for Line {
     fn read(&mut self, buffer: &mut [u8]) -> io::Result<usize> {
@@ -144,6 +148,6 @@ fn a_script_does_the_same_behind_a_line() {
 
 #[test]
 fn a_script_does_the_same_in_qemu() {
-    let (_qemu, stream) = Qemu::start(&qemu::firmware().unwrap()).unwrap();
+    let (_qemu, stream) = Qemu::start(images::for_qemu()).unwrap();
     all_the_same(&mut Session::open(stream, 1).unwrap());
 }

@@ -1,8 +1,7 @@
 //! A session between host and board, step by step, against a machine that writes down what it is told: each thing that
 //! can go wrong has its answer, and changes nothing.
-#![allow(clippy::unwrap_used, reason = "a test may fail by panic")]
 
-mod session_safety;
+mod safety;
 
 use controller::{link::Link, machine::Instruction};
 use integration_tests::{Call, HELLO, Host, MAKE_READY, Mock, SAFE, frame, upload};

@@ -1,17 +1,23 @@
-//! Scallop height and gouge of whole jobs, as the core runs them, from the swept ball.
-#![allow(clippy::unwrap_used, reason = "a test may fail by panic")]
+//! Scallop height and gouge of whole jobs, as the core runs them, from the swept ball: jobs made for it; those of `jobs/` are in
+//! `sample_jobs`.
 
 use std::fmt::Write;
-use std::path::PathBuf;
 
 use job::Job;
 use machine::Machine;
 use machine::prepare::prepare;
 use oracle::{Checked, Emitted, Oracle};
-use verify::survey::Survey;
+use verify::survey::{self, Survey};
 use verify::swept::{Findings, Track, measure};
 
-fn findings(job: &Job) -> Findings {
+/// A job, run once with the oracle beside it.
+pub(crate) struct Followed {
+    pub(crate) oracle: Oracle,
+    pub(crate) findings: survey::Findings,
+    pub(crate) track: Track,
+}
+
+pub(crate) fn follow(job: &Job) -> Followed {
     let oracle = Oracle::new(job).unwrap();
     let prepared = prepare(job).unwrap();
     // As `verify` does it: on a machine with limits the feed is low at the ends of passes.
@@ -25,72 +31,52 @@ fn findings(job: &Job) -> Findings {
         .unwrap()
         .run(|sample| survey.add(&inspect::plain(&prepared, sample)).is_ok())
         .unwrap();
-    let samples = survey.finish(true).unwrap().samples;
+    let findings = survey.finish(true).unwrap();
     // Links are no part of it.
     if prepared.header.axes.is_none() {
-        assert_eq!(track.samples() as u64, samples);
+        assert_eq!(track.samples() as u64, findings.samples);
     }
-    measure(job, &oracle, &track, true, &())
+    Followed {
+        oracle,
+        findings,
+        track,
+    }
 }
 
-fn sample_jobs() -> Vec<PathBuf> {
-    let jobs = PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("../jobs");
-    let mut paths: Vec<_> = std::fs::read_dir(jobs)
-        .unwrap()
-        .map(|entry| entry.unwrap().path())
-        .filter(|path| path.extension().is_some_and(|extension| extension == "toml"))
-        .collect();
-    paths.sort();
-    assert!(paths.len() >= 10);
-    paths
+fn findings(job: &Job) -> Findings {
+    let followed = follow(job);
+    measure(job, &followed.oracle, &followed.track, true, &())
 }
 
 /// The limit is used, and held: the largest ridge is between half of it and all of it. And nothing is cut that should stand.
-#[test]
-fn every_sample_job_holds_its_limit() {
-    let mut off = String::new();
-    for path in sample_jobs() {
-        let job = job_file::load(&path).unwrap();
-        let found = findings(&job);
-        let (limit, most) = (job.scallop_mm, found.scallop_max.height_mm);
-        if most < 0.5 * limit || most > limit + found.measuring_error_mm {
-            writeln!(
-                off,
-                "{}: {most} mm of {limit}, within {}",
-                path.display(),
-                found.measuring_error_mm
-            )
-            .unwrap();
-        }
-        // The measuring is no worse than a thousandth of the limit, or what the samples' own distance brings.
-        assert!(
-            found.measuring_error_mm <= 1e-3 * limit + found.measuring_error.path_mm + 1e-6,
-            "{}: {:?}",
-            path.display(),
-            found.measuring_error
-        );
-        assert!(found.scallop_mean_mm > 0.0 && found.scallop_mean_mm < most);
-        assert_eq!(found.gouge, None, "{}", path.display());
-        assert!(
-            found.gouge_bound_mm < 3e-5,
-            "{}: {}",
-            path.display(),
-            found.gouge_bound_mm
-        );
-        let other: Vec<_> = found
-            .failures
-            .iter()
-            .filter(|line| !line.contains("scallop"))
-            .collect();
-        assert!(
-            other.is_empty() && found.warnings.len() == found.failures.len(),
-            "{:?}",
-            found.warnings
-        );
-        let spots: usize = found.ridges.iter().map(|ridge| ridge.spots.len()).sum();
-        assert!(spots <= 100_000 && found.ridges.iter().all(|ridge| ridge.spots.len() >= 3));
-    }
-    assert!(off.is_empty(), "{off}");
+pub(crate) fn check_limit(name: &str, job: &Job, found: &Findings) {
+    let (limit, most) = (job.scallop_mm, found.scallop_max.height_mm);
+    assert!(
+        most >= 0.5 * limit && most <= limit + found.measuring_error_mm,
+        "{name}: {most} mm of {limit}, within {}",
+        found.measuring_error_mm
+    );
+    // The measuring is no worse than a thousandth of the limit, or what the samples' own distance brings.
+    assert!(
+        found.measuring_error_mm <= 1e-3 * limit + found.measuring_error.path_mm + 1e-6,
+        "{name}: {:?}",
+        found.measuring_error
+    );
+    assert!(found.scallop_mean_mm > 0.0 && found.scallop_mean_mm < most);
+    assert_eq!(found.gouge, None, "{name}");
+    assert!(found.gouge_bound_mm < 3e-5, "{name}: {}", found.gouge_bound_mm);
+    let other: Vec<_> = found
+        .failures
+        .iter()
+        .filter(|line| !line.contains("scallop"))
+        .collect();
+    assert!(
+        other.is_empty() && found.warnings.len() == found.failures.len(),
+        "{name}: {:?}",
+        found.warnings
+    );
+    let spots: usize = found.ridges.iter().map(|ridge| ridge.spots.len()).sum();
+    assert!(spots <= 100_000 && found.ridges.iter().all(|ridge| ridge.spots.len() >= 3));
 }
 
 /// A patch of these corners, z = 0 but for a bulge of so many mm in the middle; ball 5 mm, scallop 0.02 mm.

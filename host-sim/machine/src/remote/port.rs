@@ -7,6 +7,9 @@ use super::{RemoteError, Stream};
 /// Baud rate of the firmware's link (USART1, 8N1).
 pub const BAUD: u32 = 921_600;
 
+/// An open port: whoever is behind it may be gone unseen.
+impl Stream for Box<dyn serialport::SerialPort> {}
+
 /// Opens the port.
 ///
 /// # Errors

@@ -5,7 +5,7 @@ use std::io::{self, Read};
 use std::os::unix::net::UnixStream;
 use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Stdio};
-use std::sync::atomic::{AtomicUsize, Ordering};
+use std::sync::{Mutex, OnceLock, PoisonError};
 use std::time::{Duration, Instant};
 
 use super::Stream;
@@ -19,7 +19,7 @@ const MACHINE: &str = "netduinoplus2";
 const CLOCK: &str = "shift=3,sleep=off";
 
 /// Time in which QEMU has to open its socket: at once, but a machine may be busy or slow to read the program.
-const START_TIMEOUT: Duration = Duration::from_secs(120);
+const START_TIMEOUT: Duration = Duration::from_secs(780);
 
 /// Why QEMU does not run.
 #[derive(Debug, thiserror::Error)]
@@ -43,6 +43,7 @@ pub enum QemuError {
 pub struct Qemu {
     child: Child,
     folder: tempfile::TempDir,
+    _place: Option<Place>,
 }
 
 /// The firmware for QEMU; in a checkout built first where it has changed.
@@ -53,35 +54,65 @@ pub fn firmware() -> Result<PathBuf, QemuError> {
     programs::find(Part::QemuImage).map_err(QemuError::Firmware)
 }
 
+/// Processors that QEMUs of this process run on, one entry a QEMU.
+static IN_USE: Mutex<Vec<usize>> = Mutex::new(Vec::new());
+
+/// The place of a QEMU on a processor, free again when it is dropped.
+#[derive(Debug)]
+struct Place(usize);
+
+impl Place {
+    /// On the processor with the fewest QEMUs, the last of those: several at a time, as in the tests, are to have one each.
+    fn take() -> Option<Self> {
+        let mut in_use = IN_USE.lock().unwrap_or_else(PoisonError::into_inner);
+        let load = |processor: &usize| in_use.iter().filter(|used| *used == processor).count();
+        let processor = processors().into_iter().rev().min_by_key(load)?;
+        in_use.push(processor);
+        Some(Self(processor))
+    }
+}
+
+impl Drop for Place {
+    fn drop(&mut self) {
+        let mut in_use = IN_USE.lock().unwrap_or_else(PoisonError::into_inner);
+        if let Some(at) = in_use.iter().position(|used| *used == self.0) {
+            in_use.swap_remove(at);
+        }
+    }
+}
+
+/// Whether a program is there.
+fn is_there(name: &str) -> bool {
+    let found = Command::new(name)
+        .arg("--version")
+        .stdout(Stdio::null())
+        .stderr(Stdio::null())
+        .status();
+    found.is_ok_and(|status| status.success())
+}
+
 /// The program, on one processor and as a batch process where the system can do that (util-linux): QEMU hands each tick from one of its
 /// threads to another, which takes up to three times as long from processor to processor.
-fn program() -> Command {
-    static STARTED: AtomicUsize = AtomicUsize::new(0);
-    let there = |name: &str| {
-        let found = Command::new(name)
-            .arg("--version")
-            .stdout(Stdio::null())
-            .stderr(Stdio::null())
-            .status();
-        found.is_ok_and(|status| status.success())
+fn program() -> (Command, Option<Place>) {
+    static CAN_BE_PLACED: OnceLock<bool> = OnceLock::new();
+    let can_be_placed = || [PROGRAM, "taskset", "chrt"].into_iter().all(is_there);
+    let place = CAN_BE_PLACED
+        .get_or_init(can_be_placed)
+        .then(Place::take)
+        .flatten();
+    let Some(place) = place else {
+        return (Command::new(PROGRAM), None);
     };
-    let processors = processors();
-    if processors.is_empty() || !there(PROGRAM) || !there("taskset") || !there("chrt") {
-        return Command::new(PROGRAM);
-    }
-    // Two at a time, as in the tests, are to have one each.
-    let next = STARTED.fetch_add(1, Ordering::Relaxed);
-    let processor = processors[(processors.len() - 1).wrapping_sub(next % processors.len())];
     let mut command = Command::new("taskset");
     command.args([
         "--cpu-list",
-        &processor.to_string(),
+        &place.0.to_string(),
         "chrt",
         "--batch",
         "0",
         PROGRAM,
     ]);
-    command
+    (command, Some(place))
 }
 
 /// The processors that this process may use; none where the system does not say.
@@ -106,6 +137,13 @@ pub fn cycle_plugin() -> Result<PathBuf, QemuError> {
     programs::find(Part::CyclePlugin).map_err(QemuError::Plugin)
 }
 
+/// QEMU's serial line, which QEMU's end closes.
+impl Stream for UnixStream {
+    fn is_process(&self) -> bool {
+        true
+    }
+}
+
 impl Qemu {
     /// Starts QEMU with a firmware image, and connects to its serial line.
     ///
@@ -125,7 +163,8 @@ impl Qemu {
         let socket = folder.path().join("serial");
         // The log (defmt frames) comes on stdout, QEMU's own words on stderr.
         let log = File::create(folder.path().join("log")).map_err(failed)?;
-        let child = program()
+        let (mut program, place) = program();
+        let child = program
             .args([
                 "-machine",
                 MACHINE,
@@ -154,7 +193,11 @@ impl Qemu {
                 io::ErrorKind::NotFound => QemuError::Missing,
                 _ => failed(error),
             })?;
-        let mut qemu = Self { child, folder };
+        let mut qemu = Self {
+            child,
+            folder,
+            _place: place,
+        };
         let stream = qemu.connect(&socket)?;
         stream
             .set_read_timeout(Some(Duration::from_millis(20)))
@@ -180,6 +223,12 @@ impl Qemu {
             }
             std::thread::sleep(Duration::from_millis(5));
         }
+    }
+
+    /// Number of the process.
+    #[must_use]
+    pub fn process_id(&self) -> u32 {
+        self.child.id()
     }
 
     /// What QEMU said on stderr; ends it.

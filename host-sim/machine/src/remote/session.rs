@@ -25,15 +25,21 @@ const GIVE_UP: Duration = Duration::from_secs(6);
 /// Time without any event of a run after which the board counts as gone.
 const SILENCE_TIMEOUT: Duration = Duration::from_secs(20);
 
+/// The same of a process.
+const PROCESS_SILENCE_TIMEOUT: Duration = Duration::from_secs(780);
+
 /// Pause before each read of events: QEMU hands its serial line's bytes over one by one, and a reader that is woken by each
 /// takes the processor from it.
 const GATHER: Duration = Duration::from_millis(1);
 
 /// A line to a board. Reading returns [`io::ErrorKind::TimedOut`] or [`io::ErrorKind::WouldBlock`] after some
 /// milliseconds without a byte.
-pub trait Stream: Read + Write + Send {}
-
-impl<T: Read + Write + Send> Stream for T {}
+pub trait Stream: Read + Write + Send {
+    /// Whether the other end is a process of this machine: its end ends the line, so that it is waited for as long as it lives.
+    fn is_process(&self) -> bool {
+        false
+    }
+}
 
 /// What can go wrong between here and the board.
 #[derive(Debug, thiserror::Error)]
@@ -243,10 +249,15 @@ impl Session {
         self.read_some()?;
         let grew = self.input.len() != before;
         while self.next_reply()?.is_some() {}
+        let (timeout, silent) = if self.stream.is_process() {
+            (PROCESS_SILENCE_TIMEOUT, "no word of the run for 13 minutes")
+        } else {
+            (SILENCE_TIMEOUT, "no word of the run for 20 s")
+        };
         if grew {
             self.heard = Instant::now();
-        } else if self.heard.elapsed() > SILENCE_TIMEOUT {
-            return Err(RemoteError::Silent("no word of the run for 20 s"));
+        } else if self.heard.elapsed() > timeout {
+            return Err(RemoteError::Silent(silent));
         }
         Ok(None)
     }
@@ -274,10 +285,20 @@ impl Session {
             )
         })?;
         self.asked = Instant::now();
-        while self.asked.elapsed() < GIVE_UP {
+        let is_process = self.stream.is_process();
+        let (give_up, silent) = if is_process {
+            (PROCESS_SILENCE_TIMEOUT, "a request was repeated for 13 minutes")
+        } else {
+            (GIVE_UP, "a request was repeated for 6 s")
+        };
+        let mut timeout = self.answer_timeout();
+        while self.asked.elapsed() < give_up {
             self.stream.write_all(frame)?;
             self.stream.flush()?;
-            let deadline = Instant::now() + self.answer_timeout();
+            let deadline = Instant::now() + timeout;
+            if is_process {
+                timeout *= 2;
+            }
             while Instant::now() < deadline {
                 match self.next_reply()? {
                     Some(reply) => match answered(&reply) {
@@ -296,7 +317,7 @@ impl Session {
             }
             self.stream.write_all(&[DELIMITER])?;
         }
-        Err(RemoteError::Silent("a request was sent again and again for 6 s"))
+        Err(RemoteError::Silent(silent))
     }
 
     /// How long an answer may take before the request is sent again.

@@ -18,7 +18,7 @@ const NAMES: [&str; 4] = [
     "chromium-browser",
 ];
 /// The longest that an answer may take: the first drawing without a graphics card takes seconds, on a busy machine more.
-const PATIENCE: Duration = Duration::from_secs(120);
+const PATIENCE: Duration = Duration::from_secs(600);
 
 /// The browser's program.
 fn program() -> PathBuf {

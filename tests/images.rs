@@ -1,0 +1,23 @@
+//! The firmware's image and the bench that counts its cycles, built once for all tests.
+
+use std::path::{Path, PathBuf};
+use std::sync::OnceLock;
+
+use cycles::image;
+use cycles::measure::Bench;
+use machine::remote::qemu;
+
+/// The image for QEMU.
+pub(crate) fn for_qemu() -> &'static Path {
+    static IMAGE: OnceLock<PathBuf> = OnceLock::new();
+    IMAGE.get_or_init(|| qemu::firmware().unwrap())
+}
+
+/// The image for QEMU with the plugin that counts.
+pub(crate) fn bench() -> &'static Bench {
+    static BENCH: OnceLock<Bench> = OnceLock::new();
+    BENCH.get_or_init(|| {
+        let (plan, _) = image::read(for_qemu()).unwrap();
+        Bench::new(for_qemu(), &plan).unwrap()
+    })
+}
