@@ -1,10 +1,10 @@
-//! Every fault of the core, explained.
+//! Explanations of all faults of the core.
 
 use interp_core::FaultKind;
 
 use super::{Entry, Family};
 
-/// The explanation of a fault. The compiler sees to it that there is one.
+/// The explanation of a fault. The exhaustive match guarantees that every fault has one.
 pub(super) fn entry(kind: FaultKind) -> Entry {
     let [meaning, value, why, remedy, example] = words(kind);
     Entry {
@@ -19,7 +19,7 @@ pub(super) fn entry(kind: FaultKind) -> Entry {
     }
 }
 
-/// Meaning, value, why, remedy, example.
+/// Meaning, value, cause, remedy, example.
 fn words(kind: FaultKind) -> [&'static str; 5] {
     match kind {
         FaultKind::BallDoesNotFit => [

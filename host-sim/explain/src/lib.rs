@@ -1,6 +1,6 @@
-//! Faults in sentences: what happened, and what to do about it.
+//! Faults in sentences: cause and remedy.
 //!
-//! `fault` makes a sentence of a fault that happened, with its value; [`entries`](entry) explain every code there is, for
+//! `fault` describes a fault that occurred, with its value; [`entries`](entry) explain every code, for
 //! `cargo sim explain`.
 #![cfg_attr(
     test,
@@ -19,38 +19,38 @@ use interp_core::job::patches_max;
 use interp_core::{Fault, FaultKind, STORE_WORDS, SurfaceKind};
 use protocol::message::FaultReport;
 
-/// Where a code comes from.
+/// Origin of a code.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Family {
-    /// A fault of the core: it stops a run, or refuses a job. Known by its number.
+    /// A fault of the core: it stops a run, or refuses a job. Identified by its number.
     Fault,
-    /// A board's reason to refuse a request. Known by `R` and its number.
+    /// A board's reason to refuse a request. Identified by `R` and its number.
     Reason,
 }
 
 /// An explanation of one code.
 #[derive(Clone, Copy, Debug)]
 pub struct Entry {
-    /// Where the code comes from.
+    /// Origin of the code.
     pub family: Family,
     /// The stable code.
     pub code: u8,
     /// The stable name.
     pub name: &'static str,
-    /// What it means.
+    /// Meaning.
     pub meaning: &'static str,
-    /// What the value says that comes with it.
+    /// Meaning of the value that accompanies the code.
     pub value: &'static str,
-    /// Why it happens.
+    /// Cause.
     pub why: &'static str,
-    /// What to do.
+    /// Remedy.
     pub remedy: &'static str,
-    /// A case that shows it.
+    /// An example.
     pub example: &'static str,
 }
 
 impl Entry {
-    /// What `cargo sim explain` knows it by: `1`, `R1`.
+    /// The label that `cargo sim explain` accepts: `1`, `R1`.
     #[must_use]
     pub fn label(&self) -> String {
         match self.family {
@@ -60,7 +60,7 @@ impl Entry {
     }
 }
 
-/// Every explanation: faults, then reasons, each in order of their codes.
+/// All explanations: faults, then reasons, each in the order of codes.
 #[must_use]
 pub fn entries() -> Vec<Entry> {
     let faults = interp_core::FaultKind::ALL.into_iter().map(faults::entry);
@@ -74,14 +74,14 @@ pub fn entry(wanted: &str) -> Option<Entry> {
     all.find(|entry| entry.label().eq_ignore_ascii_case(wanted) || entry.name.eq_ignore_ascii_case(wanted))
 }
 
-/// A fault with its place in one line: code, name, where, and what it says to a person.
+/// A fault with its location in one line: code, name, location, description.
 #[must_use]
 pub fn fault_at(of: Fault, tick: u64, pass: u32, [u, v]: [f64; 2]) -> String {
     let (code, name, what) = (of.kind.code(), of.kind.name(), fault(of).0);
     format!("fault {code} ({name}) at tick {tick}, pass {pass}, u = {u:.9}, v = {v:.9}: {what}")
 }
 
-/// The key of the job file, `section.key`, that has most to do with a fault.
+/// The key of the job file, `section.key`, most relevant to a fault.
 #[must_use]
 pub fn key(kind: FaultKind) -> &'static str {
     match kind {
@@ -94,7 +94,7 @@ pub fn key(kind: FaultKind) -> &'static str {
     }
 }
 
-/// What a fault says to a person, and the remedy.
+/// Description of a fault, and its remedy.
 #[must_use]
 pub fn fault(fault: Fault) -> (String, &'static str) {
     let value = fault.value;
@@ -233,7 +233,7 @@ mod tests {
         }
     }
 
-    /// One of each.
+    /// One of each kind.
     fn reasons() -> Vec<Reason> {
         vec![
             Reason::BadFrame {
@@ -279,7 +279,7 @@ mod tests {
         ]
     }
 
-    /// The codes are those that the wire has, none is left out, and the wire knows no other.
+    /// Every code of the wire has an entry, and every entry a code of the wire.
     #[test]
     fn every_reason_is_explained() {
         let reasons = reasons();

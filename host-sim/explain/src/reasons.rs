@@ -1,8 +1,8 @@
-//! Every reason of a board to refuse a request, explained.
+//! Explanations of all reasons of a board to refuse a request.
 
 use super::{Entry, Family};
 
-/// By code.
+/// In the order of codes.
 pub(super) const ENTRIES: [Entry; 19] = [
     reason(
         0,

@@ -1,9 +1,9 @@
-//! Runs a job on the core and judges the run: the one pipeline that the commands and the tests use.
+//! Runs a job on the core and verifies the run: the one pipeline for commands and tests.
 //!
 //! ```text
 //! Job ──timed──► digests, fault        the core alone
 //!     ──surveyed──► errors, speeds     every sample against the oracle
-//!     ──verified──► scallop, gouges, limits, optimum, and the verdict
+//!     ──verified──► scallop, gouges, limits, optimum, and pass or fail
 //! ```
 #![cfg_attr(
     test,

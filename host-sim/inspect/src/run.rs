@@ -14,9 +14,9 @@ use verify::trace::Trace;
 
 use crate::{FaultAt, InspectError, is_on_pass, plain};
 
-/// Samples between two steps of a progress bar.
+/// Samples per step of a progress bar.
 pub(crate) const PROGRESS_SAMPLES: u64 = 65_536;
-/// Steps of the progress bar of a run whose number of samples is not known before: it follows the side parameter.
+/// Steps of the progress bar of a run with an unknown number of samples: the bar follows the side parameter.
 const PROGRESS_PARTS: u64 = 1000;
 
 /// A pass of a timed run.
@@ -24,9 +24,9 @@ const PROGRESS_PARTS: u64 = 1000;
 pub struct PassDigest {
     /// Tick of its first sample.
     pub first_tick: u32,
-    /// Samples, with the way to the next pass.
+    /// Number of samples, with the link to the next pass.
     pub samples: u32,
-    /// Digest of the run up to its end.
+    /// Digest of the run up to the end of the pass.
     pub digest: u64,
 }
 
@@ -35,9 +35,9 @@ pub struct PassDigest {
 pub struct TimedRun {
     /// Digest of all samples.
     pub digest: u64,
-    /// Samples.
+    /// Number of samples.
     pub samples: u64,
-    /// Samples a second of wall time.
+    /// Samples per second of wall time.
     pub samples_per_second: f64,
     /// The passes, in order.
     pub passes: Vec<PassDigest>,
@@ -61,12 +61,12 @@ pub(crate) fn machine(job: &Job, prepared: &Prepared) -> Result<Machine, JobErro
 /// The oracle of a job.
 ///
 /// # Errors
-/// The job asks for an upper side that the surface does not have.
+/// The job requests an upper side, and the surface has none.
 pub fn oracle(job: &Job) -> Result<Oracle, InspectError> {
     Ok(Oracle::new(job)?)
 }
 
-/// Parts of the surface that lie behind a pass, of [`PROGRESS_PARTS`].
+/// Completed share of the surface, in units of 1/[`PROGRESS_PARTS`].
 #[allow(
     clippy::cast_possible_truncation,
     clippy::cast_precision_loss,
@@ -132,11 +132,11 @@ pub fn timed(job: &Job, prepared: &Prepared, progress: &dyn Progress) -> Result<
     })
 }
 
-/// Runs the core, measures every sample, and writes the trace if one is given. `samples`: how many are expected; `each`: takes every
-/// sample on a pass with what its check found.
+/// Runs the core, measures every sample, and writes the trace if one is given. `samples`: expected number; `each`: called for every
+/// sample on a pass, with its errors.
 ///
 /// # Errors
-/// The core refuses the job, the oracle has no answer for it, or the trace cannot be written.
+/// The core refuses the job, the oracle has no result for it, or the trace cannot be written.
 pub fn surveyed<'a>(
     job: &Job,
     prepared: &Prepared,

@@ -1,4 +1,4 @@
-//! The whole judgement of a job: every sample, the swept ball, travel, limits, the optimum.
+//! The verification of a job: every sample, the swept ball, travel, limits, the optimum.
 
 use std::cell::RefCell;
 use std::collections::BTreeMap;
@@ -15,7 +15,7 @@ use verify::swept::{self, Progress, Track};
 use crate::run::{PROGRESS_SAMPLES, machine, oracle};
 use crate::{InspectError, PassTime, TimedRun, pass_times, plain};
 
-/// Bounds of every sample: the figures of the README.
+/// Bounds of every sample, as in the README.
 pub const BOUNDS: Bounds = Bounds {
     position_nm: 10.0,
     contact_nm: 10.0,
@@ -26,8 +26,8 @@ pub const BOUNDS: Bounds = Bounds {
     fit: 1.0,
 };
 
-/// Use of the axes, sample by sample. With limits: from standstill to standstill, links included. Without: within passes, because the
-/// feed jumps between them, and a pass's last step is cut short by its end.
+/// Use of the axis limits, sample by sample. With limits: from standstill to standstill, links included. Without limits: within passes only,
+/// because the feed steps between them, and without the last step of a pass, which is shorter than the others.
 struct AxesUse {
     gauge: Gauge,
     has_limits: bool,
@@ -43,7 +43,7 @@ impl AxesUse {
         }
     }
 
-    /// A sample as the machine emitted it.
+    /// A sample as emitted by the machine.
     fn emitted(&mut self, tick: u32, cl_nm: [i32; 3]) {
         if self.has_limits {
             if !std::mem::replace(&mut self.begun, true) {
@@ -78,9 +78,9 @@ pub struct Measured {
     pub findings: Findings,
     /// The swept ball against the surface.
     pub swept: swept::Findings,
-    /// Use of the axes.
+    /// Use of the axis limits.
     pub axes: Peaks,
-    /// Passes against the optimum; empty where it was not asked for.
+    /// Passes against the optimum; empty if not requested.
     pub pass_times: Vec<PassTime>,
 }
 
@@ -88,19 +88,19 @@ pub struct Measured {
 pub struct Verification {
     /// The figures.
     pub measured: Measured,
-    /// Passes that a dense scan of the surface needs, where the oracle has an answer.
+    /// Number of passes by a dense scan of the surface; `None` if the oracle has no result.
     pub scanned: Option<usize>,
-    /// What speaks against the job, the gravest first. Empty: passed.
+    /// Reasons against the job, most severe first. Empty: passed.
     pub failures: Vec<String>,
-    /// What does not speak against the job, but has to be known.
+    /// Conditions to know that are not failures.
     pub warnings: Vec<String>,
 }
 
-/// Verifies a job whose run by the core alone is known. `each` takes every sample on a pass; `with_optimum` times the first, the middle
-/// and the last pass, too.
+/// Verifies a job after its timed run. `each` is called for every sample on a pass; `with_optimum` also computes the optimum of the first,
+/// the middle and the last pass.
 ///
 /// # Errors
-/// The core refuses the job, or the oracle has no answer for it.
+/// The core refuses the job, or the oracle has no result for it.
 pub fn verified<'a>(
     job: &Job,
     prepared: &Prepared,
@@ -132,7 +132,7 @@ fn measured<'a>(
     progress: &dyn Progress,
 ) -> Result<Measured, InspectError> {
     let oracle = oracle(job)?;
-    // With limits the feed is low at the ends of passes: samples that lie closer than half a period's step are not kept.
+    // With limits the feed is low at the ends of passes: samples closer than half the full step of a period are not stored.
     let spacing_nm = if job.machine.has_limits() {
         0.5e6 * job.feed_mm_s() * job.machine.period_s()
     } else {
@@ -179,7 +179,7 @@ fn measured<'a>(
     })
 }
 
-/// What speaks against the job, the gravest first.
+/// Reasons against the job, most severe first.
 fn failures(job: &Job, timed: &TimedRun, measured: &Measured, scanned: Option<usize>) -> Vec<String> {
     let findings = &measured.findings;
     let mut failures: Vec<String> = timed.fault.iter().map(|fault| fault.sentence()).collect();

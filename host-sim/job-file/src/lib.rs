@@ -48,7 +48,7 @@ pub fn load(path: &Path) -> Result<Job, JobError> {
 /// Reads a job from a file; `faces` resolves a surface of `kind = "file"`.
 ///
 /// # Errors
-/// The file cannot be read, is not TOML, or a value in it is missing, unknown, of the wrong shape or out of range; what `faces` reports.
+/// The file cannot be read, is not TOML, or a value in it is missing, unknown, of the wrong shape or out of range; the errors of `faces`.
 pub fn load_with(path: &Path, faces: &dyn FaceReader) -> Result<Job, JobError> {
     let name = path.display().to_string();
     let text = text::read(path)?;

@@ -82,7 +82,7 @@ pub(super) fn read(machine: &Section<'_>) -> Result<Machine, JobError> {
     Ok(read)
 }
 
-/// The keys that say when a run may start, and what the loss of the host does to it.
+/// The keys for homing and for the heartbeat timeout.
 fn read_supervision(machine: &Section<'_>, read: &mut Machine) -> Result<(), JobError> {
     if machine.has("homing_required") {
         read.homing_required = machine.switch("homing_required")?;

@@ -5,9 +5,9 @@ use patches::placement::{Anchor, Placement};
 
 use crate::section::Section;
 
-/// Largest factor: from nanometres to metres is 1e9, and nothing is drawn so.
+/// Largest scale factor: nanometres to metres, 1e9.
 const SCALE_MAX: f64 = 1e6;
-/// Largest turn either way, degrees.
+/// Largest rotation in either direction, degrees.
 const TURN_MAX_DEG: f64 = 360.0;
 
 /// Reads the section.
@@ -41,7 +41,7 @@ fn read(section: &Section<'_>) -> Result<Placement, JobError> {
     Ok(read)
 }
 
-/// The surface where the section wants it.
+/// The surface after the placement of the section.
 pub(super) fn place(section: &Section<'_>, surface: &SurfaceSpec) -> Result<SurfaceSpec, JobError> {
     read(section)?.place(surface).map_err(|outside| {
         let (keys, remedy) = if outside.too_large {

@@ -1,4 +1,4 @@
-//! The section `[surface]`: one reader a kind.
+//! The section `[surface]`: one reader per kind.
 
 use std::f64::consts::TAU;
 
@@ -9,12 +9,12 @@ use crate::section::{Section, Value};
 
 /// Highest degree of a NURBS surface: the core's patches are bicubic.
 const DEGREE_MAX: usize = 3;
-/// How far beyond a full turn `v_rad` may reach, rad: the rounding of a written 2 pi.
+/// Excess over a full turn allowed for `v_rad`, rad: rounding of a 2 pi written in decimals.
 const TURN_SLACK_RAD: f64 = 1e-9;
-/// How far below 0 a profile's radius may dip, mm: the rounding of a profile that ends on the axis.
+/// Negative radius allowed for a profile, mm: rounding of a profile that ends on the axis.
 const RADIUS_SLACK_MM: f64 = 1e-9;
 
-/// Every key that some kind of surface has, and the kinds that have it.
+/// Every key of any kind of surface, and the kinds that have the key.
 const KEYS: [(&str, &str); 14] = [
     ("radius_mm", "only a revolved surface has it"),
     ("height_mm", "only a revolved surface has it"),
@@ -32,7 +32,7 @@ const KEYS: [(&str, &str); 14] = [
     ("untrimmed", "only a surface of kind \"file\" has it"),
 ];
 
-/// Which kind a job asks for.
+/// The kind of surface.
 #[derive(Clone, Copy)]
 enum Kind {
     Revolved,
@@ -160,7 +160,7 @@ fn read_degree(section: &Section<'_>, direction: usize) -> Result<usize, JobErro
     })
 }
 
-/// Poles with their weights, every row as long as the first.
+/// Poles with their weights; all rows have the length of the first.
 fn read_poles(section: &Section<'_>) -> Result<Vec<Vec<[f64; 4]>>, JobError> {
     let rows = section.value("poles_mm")?.list("row")?;
     let mut poles: Vec<Vec<[f64; 4]>> = Vec::with_capacity(rows.len());
@@ -242,8 +242,8 @@ fn read_knots(section: &Section<'_>, key: &str, degree: usize, poles: usize) -> 
     Ok(knots)
 }
 
-/// No knot inside the domain more than `degree` times: there the surface would tear. No end knot more than
-/// `degree + 1` times: that pole would have no influence.
+/// No knot inside the domain has a multiplicity above `degree`: the surface would be discontinuous there. No end knot has one above
+/// `degree + 1`: its pole would have no influence.
 fn check_multiplicity(knots: &[f64], entries: &[Value<'_, '_>], degree: usize) -> Result<(), JobError> {
     let (start, end) = (knots[degree], knots[knots.len() - 1 - degree]);
     for (at, knot) in knots.iter().enumerate() {
@@ -269,7 +269,7 @@ fn check_multiplicity(knots: &[f64], entries: &[Value<'_, '_>], degree: usize) -
     Ok(())
 }
 
-/// A range that may be left out for `[0, 1]`.
+/// A range; `[0, 1]` by default.
 fn range_or_unit(section: &Section<'_>, key: &str) -> Result<[f64; 2], JobError> {
     if section.has(key) {
         range(section, key)
@@ -288,7 +288,7 @@ fn range(section: &Section<'_>, key: &str) -> Result<[f64; 2], JobError> {
     Err(section.error(key, what, "give [least, most]"))
 }
 
-/// Least value of a cubic (highest power first) on a range, and where: at an end or where the derivative vanishes.
+/// Minimum of a cubic (highest power first) on a range and its location: at an end or at a zero of the derivative.
 fn least_of_cubic(c: &[f64; 4], range: [f64; 2]) -> (f64, f64) {
     let (a, b, d) = (3.0 * c[0], 2.0 * c[1], c[2]);
     let root = (b * b - 4.0 * a * d).max(0.0).sqrt();

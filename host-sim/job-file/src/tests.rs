@@ -1,4 +1,4 @@
-//! Every kind of bad input gets its line, what is wrong and what to do; the sample jobs are all good.
+//! Every kind of bad input yields its line, a message and a remedy; the sample jobs are valid.
 
 use job::{AxisLimits, HeartbeatAction, Job, JobError, NurbsSpec, SurfaceSpec};
 
@@ -135,7 +135,7 @@ fn unclamped_knots_are_allowed() {
     assert_eq!(job.surface.domain()[0], [2.0, 4.0]);
 }
 
-/// Each row: text, what to replace, by what, line and column of the error, a part of what it says.
+/// Each row: text, old part, new part, line and column of the error, a part of the message.
 type Bad = (
     &'static str,
     &'static str,
@@ -328,7 +328,7 @@ fn every_sample_job_is_good() {
     assert!(read >= 10, "only {read} jobs found");
 }
 
-/// A job that names one limit is a job with limits: the others are the defaults, for whoever reads the job.
+/// A job that gives one limit is a job with limits: the others take their defaults, for every reader of the job.
 #[test]
 fn one_limit_brings_the_defaults_of_the_others() {
     let bare = REVOLVED.split("velocity_max_mm_s").next().unwrap();

@@ -1,11 +1,11 @@
-//! The text of a job file, or what else the path leads to: said so that a newcomer knows what to do.
+//! The text of a job file. A path that leads to another kind of file yields an error that names the kind and the remedy.
 
 use std::io::ErrorKind;
 use std::path::Path;
 
 use job::JobError;
 
-/// First bytes of what people give instead of a job file, what that is, and what to do with it.
+/// Magic bytes of files often given instead of a job file: bytes, message, remedy.
 const OTHERS: [(&[u8], &str, &str); 6] = [
     (
         b"ISO-10303-21",
@@ -39,7 +39,7 @@ const OTHERS: [(&[u8], &str, &str); 6] = [
     ),
 ];
 
-/// Reads it.
+/// Reads the text of a job file.
 pub(super) fn read(path: &Path) -> Result<String, JobError> {
     let name = path.display().to_string();
     let error = |what: String, remedy: &str| JobError::of_file(&name, what, remedy);
@@ -72,7 +72,7 @@ pub(super) fn read(path: &Path) -> Result<String, JobError> {
         let what = format!("the byte 0x{:02x} is not UTF-8 text", bytes[at]);
         let remedy = "save the file as UTF-8, or write this character without its accent";
         let text = String::from_utf8_lossy(bytes);
-        // What stands in for the byte is three bytes long.
+        // The replacement character takes three bytes.
         JobError::at(&name, &text, at..at + 3, what, remedy.to_owned())
     })?;
     if text.trim_start_matches('\u{feff}').trim().is_empty() {
@@ -90,7 +90,7 @@ mod tests {
 
     const TORUS: &str = include_str!("../../../jobs/torus.toml");
 
-    /// What loading a file with these bytes says.
+    /// Result of loading a file with these bytes.
     fn loaded(bytes: &[u8]) -> Result<Job, String> {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("a job.toml");
@@ -113,7 +113,7 @@ mod tests {
                 (&plain.surface, plain.feed_mm_min)
             );
         }
-        // The line is counted right behind a mark and with two characters a line's end.
+        // Lines and columns are counted correctly after a byte order mark and with CR LF line ends.
         let wrong = format!("\u{feff}{}", dos.replace("\"zigzag\"", "\"zag\""));
         let line = TORUS
             .lines()

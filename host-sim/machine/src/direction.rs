@@ -1,7 +1,7 @@
-//! `along = "auto"`: the direction of the passes that machines the job in the least time.
+//! `along = "auto"`: the direction of the passes with the least machining time.
 //!
-//! The core runs the whole job both ways, side by side on two threads, and the periods are counted: exact, as the machine's own time is, and
-//! the same on every computer. That costs one more run than the job itself, some tenths of a second per million samples.
+//! The core runs the whole job in both directions, on two threads, and counts the periods: the machine's exact time, identical
+//! on every computer. The cost is one more run than the job itself, some tenths of a second per million samples.
 
 use std::fmt;
 
@@ -10,15 +10,15 @@ use crate::prepare::{Prepared, prepare};
 use explain;
 use job::{Along, AlongChoice, Job, JobError, Trial};
 
-/// A job whose direction is settled, ready for the machine.
+/// A job with a chosen direction, ready for the machine.
 type Ready = (Job, Prepared);
 
 /// Neither direction can be machined.
 #[derive(Debug)]
 pub enum NoDirection {
-    /// Neither can even be prepared or loaded: the job file is at fault.
+    /// Neither can be prepared or loaded: the error is in the job file.
     Refused(JobError),
-    /// At least one starts, and ends in a fault.
+    /// At least one starts; both fail.
     Faults(String),
 }
 
@@ -33,18 +33,18 @@ impl fmt::Display for NoDirection {
 
 impl std::error::Error for NoDirection {}
 
-/// One direction, tried.
+/// Result of a trial of one direction.
 struct Tried {
     trial: Trial,
     ready: Option<Ready>,
-    /// The machine took the job.
+    /// The machine accepted the job.
     started: bool,
 }
 
-/// Settles the direction of a job: as its file says, or the faster of the two; u where both take the same time.
+/// Chooses the direction of a job: as given in its file, or the faster of the two; u if both take the same time.
 ///
 /// # Errors
-/// The direction that the file gives cannot be prepared, or, with `"auto"`, neither direction can be machined.
+/// The given direction cannot be prepared, or, with `"auto"`, neither direction can be machined.
 pub fn settle(job: Job) -> Result<Ready, NoDirection> {
     if job.origin.along_choice() != &AlongChoice::Auto {
         let prepared = prepare(&job).map_err(NoDirection::Refused)?;
@@ -57,7 +57,7 @@ pub fn settle(job: Job) -> Result<Ready, NoDirection> {
     let second = second.unwrap_or_else(|panic| std::panic::resume_unwind(panic));
     let trials = [first.trial.clone(), second.trial.clone()];
     let started = first.started || second.started;
-    // `None` where a direction cannot be machined; the first of equals is the least.
+    // `None` where a direction cannot be machined; the first of equal times is the minimum.
     let best = [first, second]
         .into_iter()
         .filter(|tried| tried.trial.against.is_none())
@@ -88,7 +88,7 @@ fn neither(job: &Job, trials: &[Trial; 2], started: bool) -> NoDirection {
     }
 }
 
-/// Runs one direction to its end.
+/// Runs the job in one direction to its end.
 fn tried(job: &Job, along: Along) -> Tried {
     let mut job = job.clone();
     job.along = along;
@@ -134,7 +134,7 @@ mod tests {
     const TORUS: &str = include_str!("../../../jobs/torus.toml");
     const CAP: &str = include_str!("../../../jobs/sphere_cap.toml");
 
-    /// A sample job with these lines in place of others.
+    /// A sample job with these lines replaced.
     fn job(text: &str, edits: &[(&str, &str)]) -> Job {
         let mut text = text.to_owned();
         for (key, line) in edits {
@@ -154,7 +154,7 @@ mod tests {
         }
     }
 
-    /// Periods of a job whose file names its direction.
+    /// Periods of a job whose file gives its direction.
     fn ticks(job: &Job) -> u64 {
         let mut ticks = 0;
         Machine::load(&prepare(job).unwrap())
@@ -183,14 +183,14 @@ mod tests {
             }
             let least = trials.iter().min_by_key(|trial| trial.ticks).unwrap();
             assert_eq!(least.along, faster);
-            // The same job again comes to the same.
+            // A repeated choice has the same result.
             assert_eq!(settle(job(text, &[AUTO])).unwrap(), (settled.clone(), prepared));
         }
     }
 
     #[test]
     fn a_direction_that_faults_loses() {
-        // At 500 m/min the passes around the pole turn too fast for one period; those through it do not.
+        // At 500 m/min the passes around the pole turn too fast for one period; those through it run.
         let fast = ("feed_mm_min", "feed_mm_min = 500000");
         let (settled, _) = settle(job(CAP, &[AUTO, fast])).unwrap();
         assert_eq!(settled.along, Along::U);
@@ -201,7 +201,7 @@ mod tests {
             against.starts_with("fault 3 (parameter-backwards) at tick "),
             "{against}"
         );
-        // Slower, the other direction is the faster one: the fault decided.
+        // At the lower feed the other direction is the faster one: the fault decided.
         assert_eq!(settle(job(CAP, &[AUTO])).unwrap().0.along, Along::V);
     }
 

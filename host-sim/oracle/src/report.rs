@@ -1,6 +1,6 @@
-//! What a verification found, and whether it is good enough.
+//! Errors found by a verification, and their bounds.
 
-/// Where and when something was worst.
+/// Location and tick of an extreme value.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Spot {
     /// Tick of the sample.
@@ -13,14 +13,14 @@ pub struct Spot {
     pub v: f64,
 }
 
-/// A figure gathered over many samples: its largest magnitude with the place, and its root mean square.
+/// Statistics of a quantity over many samples: largest magnitude with its location, and root mean square.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Figure {
-    /// Largest magnitude; infinite if any value was not a number.
+    /// Largest magnitude; infinite if any value was NaN.
     pub max: f64,
-    /// Place of the largest magnitude.
+    /// Location of the largest magnitude.
     pub at: Spot,
-    /// Values gathered.
+    /// Number of values.
     pub count: u64,
     sum_of_squares: f64,
 }
@@ -51,12 +51,12 @@ impl Figure {
     }
 }
 
-/// Result of a verification. Every figure is emitted against oracle.
+/// Result of a verification. Every error is emitted against oracle.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Report {
-    /// Samples seen.
+    /// Number of samples.
     pub samples: u64,
-    /// Passes seen.
+    /// Number of passes.
     pub passes: u32,
     /// |CL emitted - CL|, nm. Rounding to whole nanometres alone gives up to 0.87.
     pub position_nm: Figure,
@@ -64,7 +64,7 @@ pub struct Report {
     pub contact_nm: Figure,
     /// Angle between (CL - CC) as emitted and N, rad. Rounding alone gives up to 1.7 nm / r: see `normal_floor_rad`.
     pub normal_rad: Figure,
-    /// What rounding to whole nanometres can add to `normal_rad`: sqrt(3) nm / r.
+    /// Largest contribution of rounding to whole nanometres to `normal_rad`: sqrt(3) nm / r.
     pub normal_floor_rad: f64,
     /// 100 (arc / (f T) - 1), %, of every step within a pass but the last; f is the feed of the step's second sample.
     pub ripple_pct: Figure,
@@ -72,23 +72,23 @@ pub struct Report {
     pub last_step: Figure,
     /// Emitted interval candidate / oracle's - 1, where either is shorter than the side range.
     pub interval: Figure,
-    /// (side parameter of a pass - (that of the pass before + its least interval)) / that interval. The sum is cut at
-    /// the boundary; the least is taken over the emitted samples. Of passes that are spaced by the first order only.
+    /// (side parameter of a pass - (that of the previous pass + its least interval)) / that interval. The sum is limited to
+    /// the boundary; the minimum is over the emitted samples. Only for passes spaced by the first order.
     pub side_step: Figure,
     /// Largest scallop height after each pass by Lo's formula (eqn 11), mm: h times (actual / candidate interval)^2.
     pub scallop_mm: Figure,
-    /// Sum of that height over all samples of all passes but the last, and their number.
+    /// Sum of that height over all samples of all passes except the last, and the number of these samples.
     pub(super) scallop_sum_mm: f64,
     pub(super) scallop_samples: u64,
-    /// Ball radius times the largest principal curvature towards the tool: local gouge from 1 on.
+    /// Ball radius times the largest principal curvature towards the tool: a local gouge at 1 or more.
     pub fit: Figure,
     /// Length of all passes, mm.
     pub cc_length_mm: f64,
-    /// Samples where the oracle has no normal.
+    /// Samples where the surface has no normal.
     pub degenerate: u64,
     /// Passes that do not start or end exactly on the path parameter's boundaries.
     pub off_boundary: u32,
-    /// Samples whose side parameter is not the one of their pass, or that run against the pass.
+    /// Samples whose side parameter differs from that of their pass, or that run against the pass direction.
     pub astray: u64,
     /// The first pass lies exactly on the first boundary of the side parameter.
     pub first_on_boundary: bool,
@@ -109,13 +109,13 @@ impl Report {
         }
     }
 
-    /// Whether every figure is within its bound and every pass where it belongs.
+    /// Whether every error is within its bound and every pass is where the schedule puts it.
     #[must_use]
     pub fn passed(&self, bounds: &Bounds) -> bool {
         self.failures(bounds).is_empty()
     }
 
-    /// A sentence for everything that is out of its bound.
+    /// One sentence per error that exceeds its bound.
     #[must_use]
     pub fn failures(&self, bounds: &Bounds) -> Vec<String> {
         let figures = [
@@ -188,27 +188,27 @@ impl Report {
     }
 }
 
-/// What a verification accepts. Each bound is for the largest magnitude.
+/// Bounds of a verification, each on the largest magnitude.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Bounds {
     /// Cutter location, nm.
     pub position_nm: f64,
     /// Cutter contact, nm.
     pub contact_nm: f64,
-    /// Normal, rad, on top of the rounding of the emitted positions.
+    /// Normal, rad, in addition to the rounding of the emitted positions.
     pub normal_rad: f64,
     /// Feed ripple, %.
     pub ripple_pct: f64,
     /// Interval candidate, relative.
     pub interval: f64,
-    /// Place of a pass, as a share of its interval.
+    /// Side parameter of a pass, as a share of its interval.
     pub side_step: f64,
     /// Ball radius times curvature towards the tool.
     pub fit: f64,
 }
 
 impl Default for Bounds {
-    /// A tenth of a micrometre is a good machine's resolution; the core, in 32-bit floats, is to stay a decade below.
+    /// A tenth of a micrometre is the resolution of a good machine; the 32-bit core has to stay a decade below it.
     fn default() -> Self {
         Self {
             position_nm: 10.0,

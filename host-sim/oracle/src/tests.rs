@@ -50,7 +50,7 @@ fn all_close(ours: [f64; 3], exact: [f64; 3], tolerance: f64) {
         .for_each(|(ours, exact)| close(*ours, exact, tolerance));
 }
 
-/// Places of a grid over the domain, ends included.
+/// Points of a grid over the domain, ends included.
 fn grid(surface: &Surface, steps: u32) -> Vec<(f64, f64)> {
     let [[u0, u1], [v0, v1]] = surface.domain();
     let at = |low: f64, high: f64, k: u32| low + (high - low) * f64::from(k) / f64::from(steps);
@@ -59,7 +59,7 @@ fn grid(surface: &Surface, steps: u32) -> Vec<(f64, f64)> {
         .collect()
 }
 
-/// A rational surface with uneven knots, unclamped in v, and poles out of a fixed pseudo-random row.
+/// A rational surface with non-uniform knots, unclamped in v, and pseudo-random poles of a fixed seed.
 fn rough_nurbs(degree: [usize; 2]) -> SurfaceSpec {
     let mut state = 12_345_u32;
     let mut random = || {
@@ -125,7 +125,7 @@ fn cylinder_curves_one_way() {
     for (side, sign) in [(Side::Plus, -1.0), (Side::Minus, 1.0)] {
         let oracle = oracle(surface.clone(), Along::V, side);
         let contact = oracle.contact(0.4, 1.2).unwrap();
-        // S_u x S_v points to the axis.
+        // S_u x S_v points towards the axis.
         all_close(
             contact.normal,
             [sign * 1.2_f64.cos(), sign * 1.2_f64.sin(), 0.0],
@@ -161,7 +161,7 @@ fn sphere_is_a_sphere_up_to_its_pole() {
             let radial = contact.cc_mm.map(|x| x / 25.0);
             all_close(contact.normal, radial, 1e-14);
             all_close(contact.cl_mm, radial.map(|x| x * 30.0), 1e-13);
-            // Beside the pole what f64 leaves of S_v, at the pole the extrapolation.
+            // Near the pole the f64 value of S_v, at the pole the extrapolation.
             let tolerance = if u == 0.0 { 1e-8 } else { 1e-12 };
             for curvature in [contact.curvature_path, contact.curvature_side]
                 .into_iter()
@@ -185,7 +185,7 @@ fn sphere_is_a_sphere_up_to_its_pole() {
         1e-12,
     );
     close(across.arc_length(0.0, 1.0, 0.0), 0.0, 1e-13);
-    // On the pole itself a pass is a point; the next one is a step-over away, at |S_u| mm a unit.
+    // At the pole itself a pass is a point; the next one is a step-over away, at |S_u| mm per unit.
     let at_pole = across.contact(0.0, 0.3).unwrap();
     close(
         at_pole.interval * (0.2_f64 / 1.2).sqrt().recip() * oracle.contact(0.0, 0.3).unwrap().path_speed,
@@ -227,7 +227,7 @@ fn torus_is_a_torus() {
 
 #[test]
 fn derivatives_agree_with_differences() {
-    // Central differences with step h err by h^2 f''' / 6 and by rounding over h: least near 1e-5 of a span.
+    // Central differences with step h have an error of h^2 f''' / 6 plus rounding / h: least near 1e-5 of a span.
     const STEP: f64 = 1e-5;
     let plate = sample_job("plate").surface;
     let nurbs = [[1, 1], [2, 1], [2, 3], [3, 2], [3, 3]].map(rough_nurbs);
@@ -272,7 +272,7 @@ fn principal_curvatures_do_not_depend_on_the_pass() {
         let (one, other) = (along.contact(u, v).unwrap(), across.contact(u, v).unwrap());
         close(one.principal[0], other.principal[0], 1e-14);
         close(one.principal[1], other.principal[1], 1e-14);
-        // Euler: the mean of any two orthogonal directions is the mean curvature.
+        // Euler: the mean over any two orthogonal directions is the mean curvature.
         close(
             one.curvature_path + one.curvature_side,
             one.principal[0] + one.principal[1],
@@ -462,7 +462,7 @@ fn a_pass_in_the_wrong_place_is_found() {
         .for_each(|sample| sample.v += 1e-5);
     let report = report_of(&oracle, &samples);
     assert!(report.side_step.max > 1e-4, "{:?}", report.side_step);
-    // Nor do the positions agree with where the pass says it is.
+    // The positions do not agree with the side parameter of the pass either.
     assert_eq!(report.side_step.at.pass, 5);
     assert!(report.position_nm.max > 100.0);
 }
@@ -484,7 +484,7 @@ fn a_pass_on_the_pole_is_a_point() {
     );
 }
 
-/// A plane that goes over into a parabola, z = (t - 1)^2 at x = 10 t: level there, with a curvature of 0.02 from then on.
+/// A plane joined to a parabola, z = (t - 1)^2 at x = 10 t: level at the joint, with a curvature of 0.02 beyond.
 #[test]
 fn centre_changes_its_speed_where_the_curvature_does() {
     let heights = [0.0, 0.0, 0.0, 1.0];

@@ -1,4 +1,4 @@
-//! Follows a stream of samples: counts, measures against the oracle, writes the trace.
+//! Processes a stream of samples: counts, errors against the oracle, the trace.
 
 use crate::Sample;
 use crate::speeds::{SpeedFigures, Speeds};
@@ -7,32 +7,32 @@ use oracle::{Checked, Emitted, Oracle, Report, Verifier};
 
 const MM_PER_NM: f64 = 1e-6;
 
-/// What a run came to.
+/// Result of the survey of a run.
 #[derive(Clone, Debug)]
 pub struct Findings {
-    /// Samples, which is also the periods that the run took.
+    /// Number of samples, and of periods of the run.
     pub samples: u64,
-    /// Passes.
+    /// Number of passes.
     pub passes: u32,
-    /// Speeds of contact and centre, and the centre's length.
+    /// Speeds of contact and centre, and the length of the centre's path.
     pub speeds: SpeedFigures,
-    /// Least candidate of the path interval, in units of the side parameter; infinite where there was none.
+    /// Least candidate of the path interval, in units of the side parameter; infinite without candidates.
     pub interval_min: f64,
-    /// What the oracle found.
+    /// Errors against the oracle.
     pub report: Report,
 }
 
-/// A sample that waits for the next one, which tells whether it is the last of its pass.
+/// A sample held back until the next one shows whether it is the last of its pass.
 #[derive(Clone, Copy)]
 struct Pending {
     sample: Sample,
     first: bool,
 }
 
-/// What wants every sample of a run, with what its check found.
+/// Callback for every sample on a pass, with its errors.
 pub type Each<'a> = dyn FnMut(&Emitted, &Checked) + 'a;
 
-/// The follower of one run.
+/// The survey of one run.
 pub struct Survey<'a> {
     verifier: Verifier,
     trace: Option<Trace>,
@@ -47,8 +47,8 @@ pub struct Survey<'a> {
 }
 
 impl<'a> Survey<'a> {
-    /// A follower of a run of this job; it writes the trace, if there is one, and hands every sample on to `each`, with
-    /// what its check found.
+    /// A survey of a run of this job. It writes the trace, if there is one, and calls `each` for every sample on a pass, with
+    /// its errors.
     #[must_use]
     pub fn new(oracle: &Oracle, trace: Option<Trace>, each: Option<&'a mut Each<'a>>) -> Self {
         Self {
@@ -65,7 +65,7 @@ impl<'a> Survey<'a> {
         }
     }
 
-    /// The next sample of the run.
+    /// Adds the next sample of the run.
     ///
     /// # Errors
     /// The trace cannot be written.
@@ -107,7 +107,7 @@ impl<'a> Survey<'a> {
             sample.cl_nm.map(|nm| f64::from(nm) * MM_PER_NM),
         );
         if first {
-            // A place without a normal is the verifier's to report.
+            // A point without a normal is reported by the verifier.
             let (_, side) = self.oracle.swapped(emitted.u, emitted.v);
             self.ratio_step = self.ratio_step.max(self.oracle.ratio_step(side).unwrap_or(0.0));
             self.feed_mm_s = self.feed_mm_s.max(emitted.feed_mm_s);
@@ -117,7 +117,7 @@ impl<'a> Survey<'a> {
         }
     }
 
-    /// The findings, after the run's last sample; `complete` if the run came to its end.
+    /// The result, after the run's last sample; `complete`: the run reached its end.
     ///
     /// # Errors
     /// The trace cannot be written.

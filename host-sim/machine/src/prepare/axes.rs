@@ -1,4 +1,4 @@
-//! What a job says of the machine's axes, as the core takes it.
+//! The axis limits of a job, in the core's form.
 
 use interp_core::Axes;
 use job::{Job, JobError};
@@ -8,10 +8,10 @@ use super::geometry;
 
 const NM_PER_MM: f64 = 1e6;
 
-/// What the axes can do, of a job that names a limit.
+/// Limits, travel and home of the axes; `None` for a job without limits.
 ///
 /// # Errors
-/// A place outside the travel, with the key that names it.
+/// A position outside the travel, with the key that gives it.
 pub(super) fn axes(job: &Job, tool_sign: f64) -> Result<Option<Axes>, JobError> {
     let machine = &job.machine;
     let Some(limits) = machine.limits else {
@@ -23,7 +23,7 @@ pub(super) fn axes(job: &Job, tool_sign: f64) -> Result<Option<Axes>, JobError> 
         .unwrap_or(top + job.radius_mm + machine.clearance_mm);
     let home_mm = match machine.home_mm {
         Some(home_mm) => home_mm,
-        // Above the start, where there is one.
+        // Above the start of the first pass, where the surface has a normal.
         None => {
             let [x, y, _] = geometry::first_centre_mm(job, tool_sign).unwrap_or_default();
             [x, y, safe_z_mm]
@@ -76,7 +76,7 @@ pub(super) fn axes(job: &Job, tool_sign: f64) -> Result<Option<Axes>, JobError> 
     }))
 }
 
-/// The nearest whole nanometre that the machine can express.
+/// The nearest nanometre in the core's range.
 #[allow(clippy::cast_possible_truncation, reason = "the cast saturates")]
 fn nanometres(mm: f64) -> i32 {
     (mm * NM_PER_MM).round() as i32

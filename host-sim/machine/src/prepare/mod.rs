@@ -1,4 +1,4 @@
-//! From a job file to what the machine loads: header and words. Knots are split and degrees raised exactly, so that every
+//! Converts a job to the data that the machine loads: header and words. Knots are split and degrees elevated exactly, so every
 //! piece is one bicubic patch (rational where the surface is); ranges become patches with centred parameters.
 //!
 //! ```text
@@ -27,7 +27,7 @@ pub struct Axis {
 }
 
 impl Axis {
-    /// The parameter at a place, to the last digit of f64; a span's ends exactly.
+    /// The parameter at a place, to f64 precision; exact at a span's ends.
     #[must_use]
     pub fn parameter(&self, place: Place) -> f64 {
         let span = usize::from(place.span);
@@ -47,10 +47,10 @@ impl Axis {
     }
 }
 
-/// A job as the machine loads it.
+/// A job in the form that the machine loads.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Prepared {
-    /// What is asked.
+    /// The header.
     pub header: Header,
     /// The surface's data.
     pub words: Vec<i32>,
@@ -60,7 +60,7 @@ pub struct Prepared {
     pub side: Axis,
     /// Which of u and v is the path parameter.
     pub along: Along,
-    /// What the axes' drives want, where the job says so.
+    /// Step output, if the job gives one.
     pub steps: Option<StepConfig>,
 }
 
@@ -75,7 +75,7 @@ impl Prepared {
         }
     }
 
-    /// Bytes of the header and of the surface's data, as the machine holds them.
+    /// Size of the header and of the surface's data in the machine's memory, bytes.
     #[must_use]
     pub fn bytes(&self) -> usize {
         size_of_val(&self.header) + size_of_val(self.words.as_slice())
@@ -91,8 +91,8 @@ impl Prepared {
 /// Prepares a job.
 ///
 /// # Errors
-/// What cannot become patches: coordinates out of the machine's range, weights that vary too much, a surface without an
-/// upper side where `side = "up"`, `along = "auto"` that was not settled; with the place in the job file.
+/// The surface cannot be encoded: coordinates out of the core's range, weights that vary too much, a surface without an
+/// upper side where `side = "up"`, `along = "auto"` without a trial; with the location in the job file.
 pub fn prepare(job: &Job) -> Result<Prepared, JobError> {
     if job.origin.along_choice() == &AlongChoice::Auto {
         return Err(job.origin.error(

@@ -1,10 +1,10 @@
 //! The same machine behind a serial line: on a board, or in QEMU.
 //!
 //! ```text
-//! drive.rs    loads and runs a job there, compares with what was computed here
-//! operate.rs  drives, home, hold and resume: what an operator asks
-//! session.rs  requests, answers, events; retransmission
-//! script.rs   plays what an operator does, period by period
+//! drive.rs    loads and runs a job there, compares with the result of this process
+//! operate.rs  drives, home, hold and resume: commands of an operator
+//! session.rs  requests, replies, events; retransmission
+//! script.rs   executes the commands of an operator, period by period
 //! qemu.rs     starts and ends QEMU with the firmware   |   port.rs  a serial port
 //! ```
 

@@ -10,7 +10,7 @@ pub const BAUD: u32 = 921_600;
 /// Opens the port.
 ///
 /// # Errors
-/// There is no such port, or it may not be opened.
+/// The port does not exist, or may not be opened.
 pub fn open(name: &str) -> Result<Box<dyn Stream>, RemoteError> {
     let port = serialport::new(name, BAUD)
         .timeout(Duration::from_millis(20))

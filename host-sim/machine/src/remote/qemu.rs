@@ -10,20 +10,20 @@ use std::time::{Duration, Instant};
 
 use super::Stream;
 
-/// Program and machine: the STM32F405 as QEMU has it.
+/// Program and machine: QEMU's model of the STM32F405.
 const PROGRAM: &str = "qemu-system-arm";
 const MACHINE: &str = "netduinoplus2";
 
-/// Deterministic time: 8 ns an instruction, and sleeping costs none.
+/// Deterministic time: 8 ns per instruction, none while sleeping.
 const CLOCK: &str = "shift=3,sleep=off";
 
-/// Time in which QEMU has to open its socket: at once, but a machine may be busy or slow to read the program.
+/// Time-out for QEMU to open its socket, which is immediate on an idle computer.
 const START_TIMEOUT: Duration = Duration::from_secs(120);
 
-/// Why QEMU does not run.
+/// Reason for which QEMU does not run.
 #[derive(Debug, thiserror::Error)]
 pub enum QemuError {
-    /// The program is not there.
+    /// The program is missing.
     #[error("{PROGRAM} is not installed; on Debian and Ubuntu: sudo apt-get install qemu-system-arm")]
     Missing,
     /// The firmware could not be built.
@@ -32,7 +32,7 @@ pub enum QemuError {
     /// The plugin that counts cycles could not be built.
     #[error("the plugin that counts cycles could not be built: {0}")]
     Plugin(String),
-    /// It did not start, or ended.
+    /// QEMU did not start, or ended.
     #[error("QEMU did not start: {0}")]
     Start(String),
 }
@@ -54,7 +54,7 @@ pub fn workspace() -> PathBuf {
 /// Builds the firmware for QEMU (`cargo fw-qemu`; at once where nothing changed), and returns the image.
 ///
 /// # Errors
-/// Cargo is missing or fails; its own words are passed on.
+/// Cargo is missing or fails; the error contains its output.
 pub fn firmware() -> Result<PathBuf, QemuError> {
     cargo(
         &["fw-qemu", "--quiet"],
@@ -63,7 +63,7 @@ pub fn firmware() -> Result<PathBuf, QemuError> {
     .map_err(QemuError::Firmware)
 }
 
-/// Runs cargo in the workspace, and returns the file in it that this builds; what cargo says where it fails.
+/// Runs cargo in the workspace, and returns the path of the file that it builds; cargo's output where it fails.
 pub fn cargo(arguments: &[&str], built: &str) -> Result<PathBuf, String> {
     let workspace = workspace();
     let cargo = std::env::var_os("CARGO").unwrap_or_else(|| "cargo".into());
@@ -80,8 +80,8 @@ pub fn cargo(arguments: &[&str], built: &str) -> Result<PathBuf, String> {
     }
 }
 
-/// The program, on one processor and as a batch process where the system can do that (util-linux): QEMU hands each tick from one of its
-/// threads to another, which takes up to three times as long from processor to processor.
+/// The QEMU program, pinned to one processor and as a batch process where the system supports it (util-linux): QEMU passes each tick from one
+/// thread to another, which takes up to three times as long between processors.
 fn program() -> Command {
     static STARTED: AtomicUsize = AtomicUsize::new(0);
     let there = |name: &str| {
@@ -96,7 +96,7 @@ fn program() -> Command {
     if processors.is_empty() || !there(PROGRAM) || !there("taskset") || !there("chrt") {
         return Command::new(PROGRAM);
     }
-    // Two at a time, as in the tests, are to have one each.
+    // Two concurrent processes, as in the tests, get one processor each.
     let next = STARTED.fetch_add(1, Ordering::Relaxed);
     let processor = processors[(processors.len() - 1).wrapping_sub(next % processors.len())];
     let mut command = Command::new("taskset");
@@ -111,7 +111,7 @@ fn program() -> Command {
     command
 }
 
-/// The processors that this process may use; none where the system does not say.
+/// The processors available to this process; empty where the system does not report them.
 fn processors() -> Vec<usize> {
     let status = std::fs::read_to_string("/proc/self/status").unwrap_or_default();
     let list = status
@@ -128,7 +128,7 @@ fn processors() -> Vec<usize> {
 /// Builds the plugin that counts cycles, and returns the library.
 ///
 /// # Errors
-/// Cargo is missing or fails; its own words are passed on.
+/// Cargo is missing or fails; the error contains its output.
 pub fn cycle_plugin() -> Result<PathBuf, QemuError> {
     const BUILD: [&str; 7] = [
         "build",
@@ -159,7 +159,7 @@ impl Qemu {
         let failed = |error: io::Error| QemuError::Start(error.to_string());
         let folder = tempfile::tempdir().map_err(failed)?;
         let socket = folder.path().join("serial");
-        // The log (defmt frames) comes on stdout, QEMU's own words on stderr.
+        // The log (defmt frames) is on stdout, QEMU's own messages on stderr.
         let log = File::create(folder.path().join("log")).map_err(failed)?;
         let child = program()
             .args([
@@ -218,13 +218,13 @@ impl Qemu {
         }
     }
 
-    /// What QEMU said on stderr; ends it.
+    /// Ends QEMU, and returns its stderr.
     #[must_use]
     pub fn last_words(&mut self) -> String {
         self.end();
         let mut words = String::new();
         if let Some(mut stderr) = self.child.stderr.take() {
-            // What cannot be read is not worth an error of its own.
+            // A read error here is not reported separately.
             let _ = stderr.read_to_string(&mut words);
         }
         words.trim().to_owned()
@@ -237,7 +237,7 @@ impl Qemu {
     }
 
     fn end(&mut self) {
-        // Either it is gone already, or it goes now.
+        // QEMU may have ended already.
         let _ = self.child.kill();
         let _ = self.child.wait();
     }

@@ -1,4 +1,4 @@
-//! The least time that a pass can be run in, from standstill to standstill: a bound from below, and a motion that holds all limits.
+//! The least time of a pass from standstill to standstill: a lower bound, and a motion that holds all limits.
 //!
 //! ```text
 //! PassPath ──bound.rs──► lower bound; largest speeds ──► grid ──programme.rs──► motion, faster each time ──timing.rs──► one
@@ -6,7 +6,7 @@
 //!                                                                  └──────────────────── shares of the limits ◄─────────────┘
 //! ```
 //!
-//! The motion is good, not proved to be the best: what is certain is that the least time lies between the two.
+//! The motion is not proved to be optimal: the least time is between the two.
 
 use super::bound::{Fastest, PathCaps as _, bound_of};
 use super::path::PassPath;
@@ -14,33 +14,33 @@ use super::programme::{Interval, Profile, Programme};
 use super::timing::Timing;
 use job::AxisLimits;
 
-/// Programmes one after another at most, and the gain below which they end.
+/// Largest number of successive programmes, and the relative gain below which they end.
 const PROGRAMMES: usize = 30;
 const ENOUGH: f64 = 1e-4;
-/// Times that the limits are shared out anew by what the samples use, and what they may be above.
+/// Largest number of redistributions of the limits by the use of the samples, and the tolerance of the use.
 const ROUNDS: usize = 5;
 const ABOVE: f64 = 3e-4;
-/// Share of the jerk limit that the motion begins and ends with, before the first node and behind the last; and the share of a whole rise to
-/// the feed, in time, that this takes.
+/// Share of the jerk limit in the ramps before the first node and after the last one; and the duration of these ramps as a share of
+/// a ramp to the feed.
 const END_JERK: f64 = 0.999;
 const END_SHARE: f64 = 0.02;
-/// Intervals: of a whole pass at least, of the way in which the speed changes at its ends and its breaks; and their growth away from these.
+/// Intervals: least number over a pass; number over the distance in which the speed changes at ends and breaks; growth away from these.
 const WHOLE: f64 = 120.0;
 const RAMP: f64 = 40.0;
 const GROWTH: f64 = 0.15;
 /// Change of speed over an interval, as a share of the largest, once a motion is known.
 const CHANGE: f64 = 0.04;
-/// Squared speeds a programme looks from are at least this share of the largest.
+/// Least squared speed used for linearisation, as a share of the largest.
 const LEAST: f64 = 1e-9;
-/// Steps of a derivative count as none below this share of a jerk limit.
+/// Steps of a derivative below this share of a jerk limit are ignored.
 const NO_STEP: f64 = 1e-3;
 
-/// What a pass can take at best.
+/// Bounds of the least time of a pass.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Optimum {
-    /// No motion within the limits is faster, s.
+    /// Lower bound of the time of any motion within the limits, s.
     pub lower_bound_s: f64,
-    /// A motion within the limits takes this long, s.
+    /// Time of the motion found within the limits, s.
     pub feasible_s: f64,
     /// Largest use of the limits by that motion's samples: velocity, acceleration, jerk.
     pub uses: [f64; 3],
@@ -51,8 +51,8 @@ pub struct Optimum {
 #[error("no motion within the limits was found")]
 pub struct NoMotion;
 
-/// The least time of a pass at this feed of the contact (above 0), with one sample a period: bound and motion. A pass without length
-/// takes no time.
+/// The least time of a pass at this feed of the contact (above 0), with one sample per period: bound and motion. Both are 0 for a pass of
+/// zero length.
 ///
 /// # Errors
 /// [`NoMotion`] where the solver fails.
@@ -80,7 +80,7 @@ pub fn optimum(
     })
 }
 
-/// A place where the motion slows down: an end, or a break where the path's derivatives step.
+/// A point where the motion slows down: an end, or a break where the path's derivatives step.
 struct Slow {
     arc: f64,
     /// Speed there, mm/s.
@@ -90,7 +90,7 @@ struct Slow {
 }
 
 impl Slow {
-    /// The speed that a rise by jerk alone has at an arc length.
+    /// The speed of a ramp at constant jerk, at an arc length.
     fn speed_at(&self, arc: f64) -> f64 {
         let way = (arc - self.arc).abs();
         self.speed + 0.5 * self.jerk * (6.0 * way / self.jerk).powf(2.0 / 3.0)
@@ -120,7 +120,7 @@ struct Grid {
     caps: Vec<f64>,
 }
 
-/// Path jerk that the axes leave at a place.
+/// Largest path jerk within the axis limits at a point.
 fn path_jerk(first: [f64; 3], limits: &AxisLimits) -> f64 {
     (0..3).fold(f64::INFINITY, |least, axis| {
         least.min(limits.jerk_mm_s3[axis] / first[axis].abs())
@@ -151,7 +151,7 @@ impl<'a> Search<'a> {
                 arc: *arc,
                 steps: [of(before.first, after.first), of(before.second, after.second)],
             };
-            // Half of the jerk limit is left to the steps: the rest is for the ramps beside them.
+            // Half of the jerk limit is reserved for the steps, the other half for the ramps at them.
             let speed = (0..3).fold(f64::INFINITY, |least, axis| {
                 let [first, second] = [step.steps[0][axis], step.steps[1][axis]];
                 let half = 0.5 * limits.jerk_mm_s3[axis] * period_s;
@@ -187,7 +187,7 @@ impl<'a> Search<'a> {
         }
     }
 
-    /// A speed that is near to what can be reached: the fastest one without regard to jerk, and rises from the slow places.
+    /// A speed close to the achievable one: the profile without jerk limits, cut by jerk ramps from the slow points.
     fn guess(&self, arc: f64) -> f64 {
         let arcs = &self.fastest.arcs;
         let after = arcs.partition_point(|at| *at <= arc).clamp(1, arcs.len() - 1);
@@ -199,10 +199,10 @@ impl<'a> Search<'a> {
         })
     }
 
-    /// Time that the motion takes before the first node, and behind the last: a rise by the jerk limit.
+    /// Duration of the motion before the first node, and after the last one: a ramp at the jerk limit.
     fn end_time_s(&self, end: usize) -> f64 {
         let jerk = self.slow[end].jerk;
-        // A short pass is not half over by then.
+        // Limits the ramp to less than half of a short pass.
         let rise = (self.feed_mm_s / jerk).sqrt();
         let whole = (6.0 * self.path.length_mm() / jerk).cbrt();
         END_SHARE * rise.min(0.5 * whole)
@@ -221,11 +221,11 @@ impl<'a> Search<'a> {
         })
     }
 
-    /// Length of the interval that begins at an arc length; `known`: a motion there, whose speed changes little in it.
+    /// Length of the interval that begins at an arc length; `known`: a motion, whose speed changes little in the interval.
     fn interval_length(&self, arc: f64, known: Option<(&Grid, &Profile)>) -> f64 {
         let mut most = self.path.length_mm() / WHOLE;
         let reach = |slow: &Slow| {
-            // The way in which a rise by jerk alone reaches the feed, twice: as far as speeds change.
+            // Twice the distance in which a ramp at constant jerk reaches the feed: the extent of speed changes.
             let time = (2.0 * self.feed_mm_s / slow.jerk).sqrt();
             (slow.jerk * time.powi(3) / 3.0).min(self.path.length_mm())
         };
@@ -272,7 +272,7 @@ impl<'a> Search<'a> {
             let mut arc = low;
             while arc < high {
                 let by = self.interval_length(arc, known);
-                // As small as the next one will be, where they get smaller, and no crumb left over.
+                // Not longer than the next one where they become shorter, and without a short remainder.
                 let by = by.min(self.interval_length((arc + by).min(high), known).max(0.5 * by));
                 let next = if arc + 1.3 * by >= high { high } else { arc + by };
                 let points = [arc, 0.5 * (arc + next), next].map(|at| self.path.at(span, at));
@@ -295,7 +295,7 @@ impl<'a> Search<'a> {
         grid
     }
 
-    /// The largest steps of the derivatives that a period can see from between two arc lengths.
+    /// The largest steps of the derivatives that one period can contain between two arc lengths.
     fn steps_near(&self, low: f64, high: f64) -> [[f64; 3]; 2] {
         let mut most = [[0.0_f64; 3]; 2];
         for step in &self.steps {
@@ -309,7 +309,7 @@ impl<'a> Search<'a> {
         most
     }
 
-    /// The fastest motion found: its duration, and what its samples use of the limits.
+    /// The fastest motion found: its duration, and the use of the limits by its samples.
     fn motion(&self) -> Result<(f64, [f64; 3]), NoMotion> {
         let coarse = self.grid(None);
         let floor = LEAST * self.feed_mm_s.powi(2);
@@ -330,7 +330,7 @@ impl<'a> Search<'a> {
             let profile = self.improved(&grid, guess)?;
             let timing = self.timing(&grid, &profile);
             let (uses, most) = timing.uses(self.path, self.limits, self.period_s);
-            // Slower by one factor until the samples hold every limit.
+            // Slowed down by one factor until the samples hold every limit.
             let slower = uses[0].max(uses[1].sqrt()).max(uses[2].cbrt()).max(1.0);
             let time = timing.duration_s() * slower;
             if best.is_none_or(|(least, _)| time < least) {
@@ -350,7 +350,7 @@ impl<'a> Search<'a> {
         best.ok_or(NoMotion)
     }
 
-    /// Programme after programme, each around the motion of the one before.
+    /// Solves programme after programme, each linearised at the previous motion.
     fn improved(&self, grid: &Grid, mut around: Vec<f64>) -> Result<Profile, NoMotion> {
         let floor = LEAST * self.feed_mm_s.powi(2);
         let mut best: Option<(f64, Profile)> = None;

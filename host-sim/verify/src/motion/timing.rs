@@ -1,12 +1,12 @@
-//! When a motion along a pass is where, and what its samples use of the limits.
+//! A motion along a pass as a function of time, and the use of the limits by its samples.
 
 use super::path::PassPath;
 use super::programme::Profile;
 use job::AxisLimits;
 
-/// Newton steps to the time that an interval takes: they double the digits from a good beginning.
+/// Newton steps for the duration of an interval: each doubles the digits.
 const NEWTON_STEPS: usize = 20;
-/// Below this `c t^2` the motion is a polynomial to the last digit.
+/// Below this `c t^2` the series of the motion is exact to f64 precision.
 const SERIES: f64 = 1e-3;
 
 /// Between two nodes: arc, speed, acceleration at the first; rate of the acceleration with the arc, 1/s^2.
@@ -19,11 +19,11 @@ struct Piece {
 }
 
 impl Piece {
-    /// Way and speed after a time: `x'' = a + c x`.
+    /// Distance and speed after a time: `x'' = a + c x`.
     fn after(&self, t: f64) -> [f64; 2] {
         let (a, c, v) = (self.acceleration, self.rate, self.speed);
         let z = c * t * t;
-        // (cosh - 1) / z and sinh / sqrt z, continued to z below 0.
+        // (cosh - 1) / z and sinh / sqrt z, continued to negative z.
         let (even, odd, cosh) = if z.abs() < SERIES {
             (
                 0.5 + z / 24.0 * (1.0 + z / 30.0 * (1.0 + z / 56.0)),
@@ -55,12 +55,12 @@ impl Piece {
     }
 }
 
-/// A motion by time.
+/// A motion as a function of time.
 pub(super) struct Timing {
     pieces: Vec<Piece>,
-    /// Jerk and duration of the rise before the first piece and of the fall behind the last.
+    /// Jerk and duration of the ramp before the first segment and of the ramp after the last.
     ends: [(f64, f64); 2],
-    /// When the fall begins.
+    /// Beginning of the final ramp.
     fall: f64,
     length: f64,
 }
@@ -95,7 +95,7 @@ impl Timing {
         self.fall + self.ends[1].1
     }
 
-    /// Arc length at a time, and the interval that it lies in.
+    /// Arc length at a time, and its interval.
     fn at(&self, time: f64) -> (f64, usize) {
         let [(rise, _), (fall, last)] = self.ends;
         let piece = self
@@ -114,7 +114,7 @@ impl Timing {
         (arc.clamp(0.0, self.length), piece)
     }
 
-    /// Largest uses of the limits by samples one a period: of all, and of acceleration and jerk in each interval.
+    /// Largest use of the limits by samples at one per period: overall, and of acceleration and jerk in each interval.
     pub(super) fn uses(
         &self,
         path: &PassPath<'_>,

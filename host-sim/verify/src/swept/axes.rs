@@ -1,20 +1,20 @@
-//! How far the axes travel for a tool path.
+//! Axis travel of a tool path.
 
 use super::track::Track;
 use job::AXES;
 use job::Machine;
 
-/// How far the axes travel.
+/// Axis travel of a tool path.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Axes {
     /// Least and largest position of each axis, mm; `None` without samples.
     pub extent_mm: Option<[[f64; 2]; 3]>,
-    /// By how much the path leaves the travel of each axis, below and above, mm: 0 where it does not, or no travel is given.
+    /// Excess over the travel limits of each axis, below and above, mm: 0 within the travel, or without travel limits.
     pub beyond_mm: [[f64; 2]; 3],
 }
 
 impl Axes {
-    /// Measures a tool path.
+    /// Measures the travel of a tool path.
     #[must_use]
     pub fn new(track: &Track, machine: &Machine) -> Self {
         let extent_mm = track.extent_mm();
@@ -36,7 +36,7 @@ impl Axes {
         self.beyond_mm.iter().flatten().all(|beyond| *beyond <= 0.0)
     }
 
-    /// A sentence for each axis that the path leaves.
+    /// One sentence per axis whose travel is exceeded.
     pub(super) fn failures(&self, machine: &Machine) -> Vec<String> {
         let (Some(extent), Some(travel)) = (self.extent_mm, machine.travel_mm) else {
             return Vec::new();

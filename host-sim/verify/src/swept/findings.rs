@@ -1,4 +1,4 @@
-//! What the measuring came to, in figures and in sentences.
+//! Result of the measurement, in figures and in sentences.
 
 use super::axes::Axes;
 use super::gouge::Search;
@@ -8,22 +8,22 @@ use super::track::Track;
 use job::Job;
 use oracle::Oracle;
 
-/// Spots that are kept of all ridges together.
+/// Largest number of points stored for all ridges together.
 const SPOTS_MAX: usize = 100_000;
-/// Parts of the scallop limit that the histogram counts by, and how many of them; what is higher is in the last.
+/// Bins of the histogram per scallop limit, and their number; greater heights are in the last bin.
 const BINS_A_LIMIT: f64 = 10.0;
 const BINS: usize = 13;
-/// Rounding of a centre to whole nanometres, mm: half the diagonal of a cube of 1 nm.
+/// Rounding of a centre to whole nanometres, mm: half the diagonal of a 1 nm cube.
 const ROUNDING_MM: f64 = 0.866_025_403_784_438_6e-6;
-/// What the search for a crest leaves, mm: the two heights agree better than this.
+/// Tolerance of the search for a crest, mm: the two heights agree within it.
 const CREST_MM: f64 = 1e-8;
-/// Rounding in f64, as a share of the coordinates: some tens of operations of 1.1e-16 each.
+/// Rounding in f64, as a share of the coordinates: tens of operations of 1.1e-16 each.
 const ARITHMETIC: f64 = 1e-14;
 
 /// The highest ridge.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Extreme {
-    /// Height, mm; four ball radii where no ball reaches the place.
+    /// Height, mm; four ball radii where no ball reaches the point.
     pub height_mm: f64,
     /// Parameter u.
     pub u: f64,
@@ -31,42 +31,42 @@ pub struct Extreme {
     pub v: f64,
     /// Gap between passes, from 0: between pass `gap` and the next.
     pub gap: u32,
-    /// Place on the surface, mm.
+    /// Point on the surface, mm.
     pub place_mm: [f64; 3],
 }
 
-/// The deepest cut below the surface.
+/// The deepest gouge.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Gouge {
-    /// Ball radius less the distance of the centre's path, mm.
+    /// Ball radius minus the distance of the point from the centre's path, mm.
     pub depth_mm: f64,
-    /// Parameter u of the place that is cut.
+    /// Parameter u of the gouged point.
     pub u: f64,
-    /// Parameter v of that place.
+    /// Parameter v of the gouged point.
     pub v: f64,
-    /// The place, mm.
+    /// The point, mm.
     pub place_mm: [f64; 3],
-    /// Tick of the sample that cuts it (it, or the way to the next one).
+    /// Tick of the sample that gouges (at the sample, or between it and the next one).
     pub tick: u64,
     /// Pass of that sample.
     pub pass: u32,
     /// (u, v) of that sample's own contact.
     pub contact: [f64; 2],
-    /// Whether the surface's curvature at the place, or at the contact, is too tight for the ball; otherwise the ball cuts another
-    /// part of the surface than it touches.
+    /// Whether the concave radius at the point, or at the contact, is smaller than the ball's; otherwise the ball interferes with
+    /// another part of the surface than its contact.
     pub local: bool,
 }
 
-/// What the measured scallop heights may be off by, mm, part by part; all of it is [`MeasuringError::total_mm`].
+/// Error bound of the measured scallop heights, mm, by contribution; the sum is [`MeasurementError::total_mm`].
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct MeasuringError {
-    /// The way between samples: how far an arc through three of them leaves the straight lines that are taken.
+    /// Interpolation between samples: sagitta of an arc through three samples over the straight lines used.
     pub path_mm: f64,
-    /// Positions are whole nanometres.
+    /// Rounding of positions to whole nanometres.
     pub rounding_mm: f64,
-    /// Stations along the gaps: how much higher than the highest station a ridge may be between two (by second differences).
+    /// Spacing of stations along the gaps: possible excess of a ridge between two stations over the highest station (second differences).
     pub stations_mm: f64,
-    /// Search for the crest, and f64.
+    /// Tolerance of the crest search, and f64 rounding.
     pub search_mm: f64,
 }
 
@@ -78,14 +78,14 @@ impl MeasuringError {
     }
 }
 
-/// A place on a ridge.
+/// A point of a ridge.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct RidgeSpot {
     /// Parameter u.
     pub u: f64,
     /// Parameter v.
     pub v: f64,
-    /// Place on the surface, under the crest, mm.
+    /// Point on the surface, under the crest, mm.
     pub place_mm: [f64; 3],
     /// Height of the crest above it, mm.
     pub height_mm: f32,
@@ -96,42 +96,42 @@ pub struct RidgeSpot {
 pub struct Ridge {
     /// Gap between passes, from 0.
     pub gap: u32,
-    /// Spots along it, the highest among them.
+    /// Points along the ridge, the highest among them.
     pub spots: Vec<RidgeSpot>,
 }
 
-/// All of it.
+/// Result of the measurement of a run.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Findings {
-    /// The highest ridge. Zero with less than two whole passes: see `ridges`.
+    /// The highest ridge. Zero with fewer than two complete passes: `ridges` is empty then.
     pub scallop_max: Extreme,
-    /// Mean of the crest's height, weighted by the surface's area (each gap's strip has its crest's height all across), mm.
+    /// Mean of the crest's height, weighted by the surface's area (each gap's strip counts with its crest's height), mm.
     pub scallop_mean_mm: f64,
     /// Shares of that area by crest height: 0 to 0.1 h, 0.1 to 0.2 h, ..., 1.1 to 1.2 h, more.
     pub scallop_histogram: [f64; BINS],
-    /// What the heights may be off by, mm.
+    /// Error bound of the heights, mm.
     pub measuring_error_mm: f64,
-    /// Its parts.
+    /// Contributions to the error bound.
     pub measuring_error: MeasuringError,
-    /// The deepest cut, if one is deeper than `gouge_floor_mm`.
+    /// The deepest gouge; `None` if none is deeper than `gouge_floor_mm`.
     pub gouge: Option<Gouge>,
-    /// What counts as a gouge, mm: more than the accuracy of positions that `verify` accepts, and the way between samples.
+    /// Least depth that counts as a gouge, mm: the position tolerance of `verify`, plus the interpolation error between samples.
     pub gouge_floor_mm: f64,
-    /// No place is cut deeper than this, mm; where contacts are near, as far as they are where they belong.
+    /// Upper bound of the depth at every point of the surface, mm; near contacts it assumes that the contacts are correct.
     pub gouge_bound_mm: f64,
-    /// Ridges, one a gap, thinned to 100 000 spots together.
+    /// Ridges, one per gap, thinned to 100 000 points in total.
     pub ridges: Vec<Ridge>,
-    /// Stations that were measured.
+    /// Number of stations measured.
     pub stations: usize,
-    /// Cells that were asked about for the gouge.
+    /// Number of cells evaluated in the gouge search.
     pub cells: usize,
-    /// How far the axes travel.
+    /// Axis travel.
     pub axes: Axes,
-    /// What the surface may trouble a ball with.
+    /// Concave radius, poles and degenerate points of the surface.
     pub shape: Shape,
-    /// Sentences: what is not as asked. Empty if all is.
+    /// One sentence per violated requirement; empty if all are met.
     pub failures: Vec<String>,
-    /// Sentences: what a person should know before the run, the failures among them.
+    /// One sentence per condition to know before the run, failures included.
     pub warnings: Vec<String>,
 }
 
@@ -277,13 +277,13 @@ impl Findings {
     }
 }
 
-/// How much a shift of the centre changes a height, at most: one over the cosine between ray and ball, which is
-/// `1 - height / r` on a plane, with room for curved surfaces.
+/// Upper bound of the change of a height per shift of the centre: the reciprocal of the cosine between ray and ball, which is
+/// `1 - height / r` on a plane, with a margin for curved surfaces.
 fn slant(height_mm: f64, radius_mm: f64) -> f64 {
     1.0 / (1.0 - 2.0 * height_mm / radius_mm).max(0.1)
 }
 
-/// The highest crest, and what a crest may reach between stations.
+/// The highest crest, and the upper bound of a crest between stations.
 fn extreme(oracle: &Oracle, parts: &Parts<'_>) -> (Extreme, f64) {
     let mut most: Option<(f64, &Crest, usize)> = None;
     let mut possible = 0.0_f64;
@@ -316,7 +316,7 @@ fn number(gap: usize) -> u32 {
     gap as u32
 }
 
-/// Mean crest height by area, and the histogram (trapezoids along each gap).
+/// Mean crest height by area, and the histogram (trapezoidal rule along each gap).
 fn mean(oracle: &Oracle, parts: &Parts<'_>) -> (f64, [f64; BINS]) {
     let (mut sum, mut area, mut histogram) = (0.0, 0.0, [0.0; BINS]);
     for (gap, ridge) in parts.gaps.iter().zip(parts.ridges) {
@@ -325,7 +325,7 @@ fn mean(oracle: &Oracle, parts: &Parts<'_>) -> (f64, [f64; BINS]) {
             let step = 0.5 * width * (pair[1].path - pair[0].path);
             for crest in pair {
                 let part = crest.area * step;
-                // Where a ball has gouged, nothing is left.
+                // Where a ball has gouged, no scallop remains.
                 sum += crest.height_mm.max(0.0) * part;
                 area += part;
                 #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "clamped")]
@@ -361,7 +361,7 @@ fn gouge(oracle: &Oracle, track: &Track, search: &Search) -> Option<Gouge> {
     })
 }
 
-/// The ridges with a bounded number of spots.
+/// The ridges with a limited number of points.
 fn thinned(oracle: &Oracle, parts: &Parts<'_>) -> Vec<Ridge> {
     let each = (SPOTS_MAX / parts.ridges.len().max(1)).max(3);
     let mut ridges = Vec::with_capacity(parts.ridges.len());

@@ -1,12 +1,12 @@
-//! Gouge: where a ball, wherever on its path, goes below the surface.
+//! Gouge: where a ball at any position of its path is below the surface.
 //!
-//! A surface point P is cut by r - d, d its distance from the path of the centre. The largest of that is found by splitting cells:
-//! a cell whose bound (see `Tree::depth`) stays below what has been found, or below what counts as a gouge at all, is done.
+//! The depth at a surface point P is r - d, with d the distance of P from the path of the centre. The largest depth is found by branch and
+//! bound: a cell is closed when its bound (see `PathTree::depth`) is below the largest depth found, or below the least depth of a gouge.
 //!
-//! Beside its own contact a ball touches the surface, so its depth is 0 there, and no bound falls below it. Contacts near
-//! a cell are therefore left out of its bound, as far as the ball fits the curvature all around: with a = 1 - r k, k the largest
-//! curvature there, a ball whose contact is x away stays `a x^2 / (2 r)` above a point. (That they are where they belong
-//! is checked sample by sample: `oracle/verify.rs`.) Their depth in the cells' middles counts nevertheless.
+//! At its own contact a ball touches the surface, so its depth is 0 there, and no bound falls below 0. Contacts near
+//! a cell are therefore excluded from its bound where the ball fits the curvature in the neighbourhood: with a = 1 - r k, k the largest
+//! curvature there, a ball with its contact at distance x stays `a x^2 / (2 r)` above the point. (The contacts themselves are
+//! checked sample by sample: `oracle/verify.rs`.) The depth at the cells' centres includes these balls.
 
 use rayon::prelude::*;
 
@@ -17,24 +17,24 @@ use job::Along;
 use oracle::vector::{length, subtract};
 use oracle::{Oracle, OracleError};
 
-/// Times that a cell is split at most.
+/// Largest number of splits of a cell.
 const SPLITS_MAX: usize = 14;
-/// Cells that are asked about at most.
+/// Largest number of cells evaluated.
 const CELLS_MAX: usize = 1_500_000;
-/// A gouge is deep enough known within this share of itself.
+/// Relative tolerance of the deepest gouge.
 const DEPTH_SHARE: f64 = 1e-3;
-/// Room left over what the curvature asks for (see `reach`).
+/// Margin on the window that the curvature requires (see `reach`).
 const BESIDE: f64 = 1.15;
-/// Where a is below this no contact is left out: the ball hardly fits, or not at all.
+/// For a below this no contact is excluded: the ball hardly fits, or not at all.
 const FITS_MIN: f64 = 0.02;
-/// Times that such a window is widened at most.
+/// Largest number of enlargements of such a window.
 const WINDOWS: usize = 8;
-/// Ranges that hold nothing.
+/// Empty ranges.
 const NOWHERE: [[f64; 2]; 2] = [[f64::INFINITY, f64::NEG_INFINITY]; 2];
-/// Cells a side that are looked at for the curvature around a cell.
+/// Cells per side evaluated for the curvature around a cell.
 const LOOKS: usize = 12;
 
-/// The deepest place found.
+/// The deepest point found.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Deepest {
     pub(super) depth_mm: f64,
@@ -44,11 +44,11 @@ pub(super) struct Deepest {
     pub(super) by: Cut,
 }
 
-/// What the search came to.
+/// Result of the search.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Search {
     pub(super) deepest: Option<Deepest>,
-    /// No place is cut deeper than this, mm.
+    /// Upper bound of the depth at every point, mm.
     pub(super) bound_mm: f64,
     pub(super) cells: usize,
 }
@@ -57,7 +57,7 @@ pub(super) struct Searcher<'a> {
     pub(super) oracle: &'a Oracle,
     pub(super) tree: &'a Tree<'a>,
     pub(super) grid: &'a Grid,
-    /// What counts as a gouge, mm.
+    /// Least depth that counts as a gouge, mm.
     pub(super) floor_mm: f64,
 }
 
@@ -69,7 +69,7 @@ struct Looked {
 }
 
 impl Searcher<'_> {
-    /// The deepest gouge; `done` is called with the number of cells that were asked about.
+    /// Searches the deepest gouge; `done` is called with the number of cells evaluated.
     pub(super) fn search(&self, done: &(dyn Fn(u64) + Sync)) -> Search {
         let mut deepest: Option<Deepest> = None;
         let mut cells: Vec<Cell> = (0..self.grid.count()).map(|k| self.grid.cell(k)).collect();
@@ -109,7 +109,7 @@ impl Searcher<'_> {
             if open.is_empty() || round == SPLITS_MAX {
                 break;
             }
-            // With no room for all, the worst go on; what the others may hide is said.
+            // If the budget does not suffice for all cells, those with the largest bounds are split; the bound of the others is reported.
             let room = (CELLS_MAX.saturating_sub(asked)) / 4;
             if open.len() > room {
                 open.sort_by(|a, b| b.depth.bound_mm.total_cmp(&a.depth.bound_mm));
@@ -128,7 +128,7 @@ impl Searcher<'_> {
         }
     }
 
-    /// A bound that is not worth a split.
+    /// Bound below which a cell is not split.
     fn enough(&self, found_mm: f64) -> f64 {
         self.floor_mm.max(found_mm * (1.0 + DEPTH_SHARE))
     }
@@ -177,16 +177,16 @@ impl Searcher<'_> {
         })
     }
 
-    /// What a cell's bound has to cover, and which contacts it may leave out.
+    /// The radius that a cell's bound must cover, and the contacts that it may exclude.
     ///
-    /// With b the largest curvature either way and R the cell's half-diagonal, the bound of a contact x away is
+    /// With b the largest curvature magnitude and R the cell's half-diagonal, the bound of a contact at distance x is
     /// `-a x^2 / (2 r) + R a x / r + R^2 b / 2`: not above 0 from `x = R (1 + sqrt(1 + r b / a))` on.
     fn reach(&self, cell: Cell, around_mm: f64, own: &Bend, floor_mm: f64) -> Reach {
         let radius = self.oracle.radius_mm;
         let (u, v) = cell.middle();
         let mut principal = own.principal;
         let mut but = NOWHERE;
-        // The window depends on the curvature in it: both grow until they agree, or nothing is left out.
+        // The window depends on the curvature inside it: both are enlarged until they are consistent, or no contact is excluded.
         for round in 0..WINDOWS {
             let fits = 1.0 - radius * principal[1];
             if fits < FITS_MIN || round + 1 == WINDOWS {

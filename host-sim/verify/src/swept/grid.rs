@@ -1,4 +1,4 @@
-//! A grid of cells over the surface, fine enough for what a surface of degree three can do between two knots.
+//! A grid of cells over the surface that resolves the features of a cubic surface between two knots.
 
 use rayon::prelude::*;
 
@@ -6,26 +6,26 @@ use job::Along;
 use oracle::vector::{cross, dot, length, scale, subtract};
 use oracle::{Derivatives, Oracle};
 
-/// Cells a side of a span at least: a cubic has no feature narrower than a twelfth of its span.
+/// Least number of cells per side of a span: a cubic has no feature narrower than a twelfth of its span.
 const SPAN_CELLS: usize = 12;
-/// A cell's side, as a share of the ball's radius, at most.
+/// Largest side of a cell, as a share of the ball's radius.
 const CELL_SHARE: f64 = 1.0 / 24.0;
-/// Lines along which a span's length is taken.
+/// Number of lines on which a span's length is measured.
 const LENGTH_LINES: usize = 5;
-/// Cells of the grid at most: coarser ones are split where it matters.
+/// Largest number of cells of the grid: larger cells are split later where needed.
 const CELLS_MAX: usize = 400_000;
-/// `|S_u x S_v|` below this share of `|S_u| |S_v|` counts as degenerate: as for the core.
+/// `|S_u x S_v|` below this share of `|S_u| |S_v|` counts as degenerate: the core's threshold.
 const SINE_MIN: f64 = 1e-3;
 /// A first derivative shorter than this share of the other one (each times its range) is too close to a pole: the curvature would
-/// be a quotient of roundings.
+/// be a quotient of rounding errors.
 const POLE_SHARE: f64 = 1e-5;
 
-/// Curvature at a place.
+/// Curvature at a point.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Bend {
     /// Least and largest principal curvature towards the tool, 1/mm.
     pub(super) principal: [f64; 2],
-    /// Change of u, and of v, within a millimetre on the surface, at most.
+    /// Upper bound of the change of u, and of v, per millimetre on the surface.
     pub(super) per_mm: [f64; 2],
 }
 
@@ -55,7 +55,7 @@ pub(super) fn bend(at: &Derivatives, oracle: &Oracle) -> Option<([f64; 3], Bend)
     Some((normal, bend))
 }
 
-/// The grid: edges of the cells along u and v, and the curvature in each cell's middle.
+/// The grid: cell edges along u and v, and the curvature at each cell's centre.
 #[derive(Debug)]
 pub(super) struct Grid {
     pub(super) edges: [Vec<f64>; 2],
@@ -63,7 +63,7 @@ pub(super) struct Grid {
     pub(super) bends: Vec<Option<Bend>>,
 }
 
-/// Part of the surface between two parameters of each kind.
+/// Part of the surface between two values of each parameter.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Cell {
     pub(super) u: [f64; 2],
@@ -75,7 +75,7 @@ impl Cell {
         (0.5 * (self.u[0] + self.u[1]), 0.5 * (self.v[0] + self.v[1]))
     }
 
-    /// Its quarters.
+    /// The four quarters of the cell.
     pub(super) fn quarters(&self) -> [Self; 4] {
         let (u, v) = self.middle();
         let (us, vs) = ([[self.u[0], u], [u, self.u[1]]], [[self.v[0], v], [v, self.v[1]]]);
@@ -98,7 +98,7 @@ impl Grid {
         };
         let mut share = CELL_SHARE;
         let mut counts = cells(share);
-        // Twice as large cells are a quarter as many: ends where every span has its least.
+        // Doubling the cells divides their number by four; ends at the least number of cells per span.
         for _ in 0..32 {
             let total: usize = counts.iter().map(|counts| counts.iter().sum::<usize>()).product();
             if total <= CELLS_MAX {
@@ -153,8 +153,8 @@ impl Grid {
         }
     }
 
-    /// Least and largest principal curvature in the cells that a range of parameters touches; at most so many of them a side are
-    /// looked at, evenly spread.
+    /// Least and largest principal curvature in the cells that intersect a range of parameters; evaluates at most `LOOKS` cells per side,
+    /// evenly spread.
     pub(super) fn principal(&self, ranges: [[f64; 2]; 2], looks: usize) -> [f64; 2] {
         let columns = self.shape()[1];
         let [(i0, i1, i_step), (j0, j1, j_step)] = [0, 1].map(|axis: usize| {
@@ -176,7 +176,7 @@ impl Grid {
     }
 }
 
-/// Length of each span along one parameter, mm: the longest of a few lines.
+/// Length of each span along one parameter, mm: the longest of several lines.
 fn span_lengths(oracle: &Oracle, along: Along) -> Vec<f64> {
     let breaks = oracle.surface.breaks(along);
     let [[u0, u1], [v0, v1]] = oracle.surface.domain();

@@ -1,4 +1,4 @@
-//! What the surface itself may trouble a ball with: the tightest hollow, and places without a normal.
+//! Checks of the surface itself: tightest concave radius, poles and points without a normal.
 
 use rayon::prelude::*;
 
@@ -6,16 +6,16 @@ use super::grid::{Grid, bend};
 use oracle::Oracle;
 use oracle::vector::{length, subtract};
 
-/// Halvings of the step around the tightest cell.
+/// Bisections of the step around the cell with the largest curvature.
 const REFINEMENTS: usize = 40;
-/// Curvatures below this count as flat, 1/mm: hollows of more than a kilometre.
+/// Curvatures below this count as flat, 1/mm: concave radii above one kilometre.
 const FLAT: f64 = 1e-6;
-/// Places looked at along each boundary.
+/// Points evaluated on each boundary.
 const BOUNDARY_LOOKS: usize = 64;
-/// A boundary whose places all lie within this of one another is a point, mm: as for the core's data.
+/// A boundary whose points all coincide within this distance is a pole, mm: the threshold of the core's data.
 const POINT_MM: f64 = 1e-9;
 
-/// The tightest hollow of a surface.
+/// The tightest concave radius of a surface.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Hollow {
     /// Radius of curvature towards the tool, mm: the least of all directions.
@@ -24,18 +24,18 @@ pub struct Hollow {
     pub u: f64,
     /// Parameter v.
     pub v: f64,
-    /// Place, mm.
+    /// Point, mm.
     pub place_mm: [f64; 3],
 }
 
-/// What the surface may trouble a ball with.
+/// Properties of the surface that limit the ball.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Shape {
-    /// The tightest hollow; `None` where the surface bends towards the tool nowhere.
+    /// The tightest concave radius; `None` where the surface is nowhere concave towards the tool.
     pub hollow: Option<Hollow>,
-    /// Boundaries that are one point, e.g. `u = 0`.
+    /// Boundaries that degenerate to a point, e.g. `u = 0`.
     pub poles: Vec<String>,
-    /// Other places (u, v) where S_u and S_v span no plane: how many of those looked at, and the first.
+    /// Other points (u, v) where S_u and S_v span no plane: their number among those evaluated, and the first.
     pub degenerate: Option<(usize, [f64; 2])>,
 }
 
@@ -57,7 +57,7 @@ impl Shape {
             {
                 poles.push(name);
             } else {
-                // The ends may lie on a pole of another boundary.
+                // The ends may be at a pole of another boundary.
                 let inside = &line[1..line.len() - 1];
                 let spans = |[u, v]: &&[f64; 2]| bend(&oracle.surface.at(*u, *v), oracle).is_none();
                 degenerate.extend(inside.iter().filter(spans));
@@ -71,7 +71,7 @@ impl Shape {
     }
 }
 
-/// The four boundaries: name, and places on each.
+/// The four boundaries: name, and points on each.
 fn boundaries(oracle: &Oracle) -> Vec<(String, Vec<[f64; 2]>)> {
     let [[u0, u1], [v0, v1]] = oracle.surface.domain();
     #[allow(clippy::cast_precision_loss, reason = "small")]
@@ -92,12 +92,12 @@ fn boundaries(oracle: &Oracle) -> Vec<(String, Vec<[f64; 2]>)> {
     vec![of_u(u0), of_u(u1), of_v(v0), of_v(v1)]
 }
 
-/// The tightest hollow: the tightest cell, then steps that halve.
+/// The tightest concave radius: the cell with the largest curvature, then a pattern search with bisected steps.
 fn hollow(oracle: &Oracle, grid: &Grid) -> Option<Hollow> {
     let curvature = |u: f64, v: f64| {
         bend(&oracle.surface.at(u, v), oracle).map_or(f64::NEG_INFINITY, |(_, bend)| bend.principal[1])
     };
-    // Corners as well as middles: hollows are often tightest on a boundary.
+    // Corners as well as cell centres: the largest curvature is often on a boundary.
     let (index, _) = (0..grid.count())
         .into_par_iter()
         .map(|index| {

@@ -1,4 +1,4 @@
-//! Heights, gouges and travel against closed forms, on tool paths made for the purpose: the core has no part in them.
+//! Heights, gouges and travel against closed forms, on synthetic tool paths, without the core.
 
 use std::f64::consts::FRAC_1_SQRT_2;
 
@@ -25,7 +25,7 @@ fn job(surface: SurfaceSpec, along: Along, side: Side, scallop_mm: f64) -> Job {
     }
 }
 
-/// A tool path on these passes, with so many steps on each, evenly spread over the parameter.
+/// A tool path on these passes, with `steps` samples on each, evenly spread over the parameter.
 fn track(oracle: &Oracle, sides: &[f64], steps: u32) -> Track {
     let mut track = Track::default();
     let [low, high] = oracle.path_range();
@@ -60,7 +60,7 @@ fn measured(job: &Job, sides: &[f64], steps: u32) -> Findings {
     measure(job, &oracle, &track(&oracle, sides, steps), true, &())
 }
 
-/// Within the error that the measuring states of itself.
+/// Asserts agreement within the error bound that the measurement states.
 fn agrees(found: &Findings, exact: f64) {
     let off = (found.scallop_max.height_mm - exact).abs();
     assert!(
@@ -113,7 +113,7 @@ fn plane_leaves_the_ridge_of_two_circles() {
 
 #[test]
 fn steep_ridges_are_exact_too() {
-    // A step-over of 1.9 radii: the far pass's ball does not even reach over the near pass.
+    // A step-over of 1.9 radii: the far pass's ball does not reach the near pass.
     let found = measured(&job(plane(), Along::U, Side::Up, 3.0), &[0.0, 0.475, 0.5], 500);
     agrees(&found, flat(9.5));
 }
@@ -134,7 +134,7 @@ fn cylinder_along_its_axis() {
         let sides = [0.0, 0.6, 1.6, 2.0].map(|mm| mm / radius);
         for (side, sign) in [(Side::Plus, -1.0), (Side::Minus, 1.0)] {
             let found = measured(&job(cylinder(radius), Along::U, side, 0.01), &sides, 400);
-            // Law of cosines: centres on the circle of R + sign r, half a millimetre's angle from the crest.
+            // Law of cosines: centres on the circle of R + sign r, at the angle of half a millimetre from the crest.
             let centre = radius + sign * RADIUS;
             let (sin, cos) = (0.5 / radius).sin_cos();
             let crest = centre * cos - sign * (RADIUS * RADIUS - (centre * sin).powi(2)).sqrt();
@@ -155,7 +155,7 @@ fn cylinder_around_its_axis() {
                 steps,
             );
             agrees(&found, flat(0.9));
-            // What is stated for the way between samples is what an arc of that length really has between it and its chord.
+            // The stated interpolation error equals the sagitta of an arc of that length.
             let half = 0.5 / f64::from(steps);
             let sagitta = (20.0 + sign * RADIUS) * (1.0 - half.cos());
             let stated = found.measuring_error.path_mm;
@@ -179,7 +179,7 @@ fn sphere_by_meridians() {
         let [x, y, _] = oracle.surface.at(1.0, v).point;
         y.atan2(x)
     };
-    // Ball centres on great circles of R + r: the crest is `g` off both, sin g = sin 60 sin(half of the azimuths' difference).
+    // Ball centres on great circles of R + r: the crest is at the angle `g` from both, sin g = sin 60 sin(half the azimuth difference).
     let height = |ends: &[f64]| {
         let half = 0.5 * (azimuth(ends[1]) - azimuth(ends[0]));
         let sin = 60.0_f64.to_radians().sin() * half.sin();
@@ -193,8 +193,8 @@ fn sphere_by_meridians() {
     assert_eq!((found.gouge, found.shape.degenerate), (None, None));
 }
 
-/// A plane whose lines across lie slanted to its passes: at the passes' ends the ridge is higher than between them, because the foot of
-/// a place near one end lies beyond it. There one ball's way and the other's end are equally far: d / (1 + cos) from a pass.
+/// A plane whose side lines are oblique to its passes: at the passes' ends the ridge is higher than in the middle, because the foot of
+/// a point near one end is beyond the pass. There one ball's path and the other's end are at the same distance: d / (1 + cos) from a pass.
 #[test]
 fn slanted_ends_leave_more() {
     let slant = 60.0_f64.to_radians();
@@ -211,7 +211,7 @@ fn slanted_ends_leave_more() {
     assert!(found.scallop_max.height_mm > 1.7 * flat(0.6));
 }
 
-/// A profile in x and z, drawn out along y by 40 mm; u along the profile.
+/// A profile in x and z, extruded along y by 40 mm; u along the profile.
 fn extruded(degree: usize, profile: &[[f64; 2]]) -> SurfaceSpec {
     let spans = profile.len() - degree;
     let mut knots_u = vec![0.0; degree];
@@ -229,7 +229,7 @@ fn extruded(degree: usize, profile: &[[f64; 2]]) -> SurfaceSpec {
     })
 }
 
-/// Flanks at 45 degrees, 28.28 mm long: a ball on one flank, s from the bottom, goes r - s into the other one.
+/// Flanks at 45 degrees, 28.28 mm long: a ball on one flank, at s from the bottom, enters the other one by r - s.
 #[test]
 fn ball_on_one_flank_cuts_the_other() {
     let valley = extruded(1, &[[-20.0, 20.0], [0.0, 0.0], [20.0, 20.0]]);
@@ -242,7 +242,7 @@ fn ball_on_one_flank_cuts_the_other() {
     let gouge = found.gouge.unwrap();
     let exact = RADIUS - 1.3;
     assert!((gouge.depth_mm / exact - 1.0).abs() < 1e-3, "{gouge:?}");
-    // Under the centre, r along the other flank.
+    // Under the centre, at r along the other flank.
     let foot = RADIUS * FRAC_1_SQRT_2;
     assert!(
         length(subtract(gouge.place_mm, [foot, gouge.place_mm[1], foot])) < 0.3,
@@ -257,7 +257,7 @@ fn ball_on_one_flank_cuts_the_other() {
     );
 }
 
-/// The ball's centre at the tick that cuts: the path made anew.
+/// The ball's centre at the gouging tick, recomputed.
 fn oracle_sample(found: &Findings, oracle: &Oracle, sides: &[f64]) -> [f64; 3] {
     let track = track(oracle, sides, 800);
     let tick = found.gouge.unwrap().tick;
@@ -265,13 +265,13 @@ fn oracle_sample(found: &Findings, oracle: &Oracle, sides: &[f64]) -> [f64; 3] {
     pass.centre((tick - pass.first_tick) as usize)
 }
 
-/// A hollow cylinder that is tighter than the ball: from every contact the ball reaches farthest into the other edge.
+/// A concave cylinder of smaller radius than the ball: from every contact the ball interferes most with the far edge.
 #[test]
 fn ball_in_a_tight_hollow_is_a_local_gouge() {
     let job = job(cylinder(4.0), Along::U, Side::Plus, 0.01);
     let found = measured(&job, &[0.0, 0.2, 0.4, 0.6, 0.8, 1.0], 300);
     let gouge = found.gouge.unwrap();
-    // From the axis the centre lies 1 mm opposite of the contact; the other edge is 1 rad away.
+    // Seen from the axis, the centre is 1 mm opposite to the contact; the other edge is 1 rad away.
     let distance = (16.0 + 1.0 + 8.0 * 1.0_f64.cos()).sqrt();
     assert!(
         (gouge.depth_mm / (RADIUS - distance) - 1.0).abs() < 2e-3,
@@ -283,7 +283,7 @@ fn ball_in_a_tight_hollow_is_a_local_gouge() {
     assert!(found.warnings.iter().any(|line| line.contains("does not fit")));
 }
 
-/// A groove 0.8 mm wide between two passes 2 mm apart: no sample lies in it, and the ball stands over it.
+/// A groove 0.8 mm wide between two passes 2 mm apart: no sample is in it, and the ball bridges it.
 #[test]
 fn groove_between_passes_stays_uncut() {
     let mut profile: Vec<[f64; 2]> = (0..=100).map(|k| [0.2 * f64::from(k), 0.0]).collect();
@@ -322,7 +322,7 @@ fn groove_between_passes_stays_uncut() {
     assert!(found.shape.hollow.unwrap().radius_mm < 10.0);
 }
 
-/// Where a third pass comes nearer than the two of the gap, it counts.
+/// A third pass that is nearer than the two of the gap determines the height.
 #[test]
 fn other_passes_lower_a_ridge() {
     let job = job(plane(), Along::U, Side::Up, 0.5);
@@ -330,7 +330,7 @@ fn other_passes_lower_a_ridge() {
     let mut path = track(&oracle, &[0.0, 0.2, 0.4], 500);
     let before = measure(&job, &oracle, &path, true, &());
     agrees(&before, flat(4.0));
-    // Pass 2 is moved in between the first two, whatever parameters it claims.
+    // Pass 2 is moved between the first two, regardless of its parameters.
     for centre in &mut path.passes[2].cl_nm {
         centre[1] = 2_000_000;
     }
@@ -389,7 +389,7 @@ fn threads_change_nothing() {
     assert_eq!(one.ridges.len(), 12);
 }
 
-/// A run that stopped leaves no ridge at its last pass; a run without two passes none at all.
+/// A stopped run leaves no ridge at its last pass; a run without two passes leaves none.
 #[test]
 fn incomplete_runs_are_said_to_be() {
     let job = job(plane(), Along::U, Side::Up, 0.01);

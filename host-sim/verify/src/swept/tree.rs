@@ -1,15 +1,15 @@
-//! All pieces of the tool path in a tree of boxes, so that any part of it can be asked about, not only the passes next door.
+//! Bounding volume hierarchy over all segments of the tool path: queries reach any part of it, not only the neighbouring passes.
 
 use super::height::Ray;
 use super::track::{Track, across};
 use oracle::vector::{Vector, add, dot, length, scale, subtract};
 
-/// Steps between samples in a leaf: few enough for tight boxes, enough to keep the tree small.
+/// Steps between samples per leaf: few enough for tight boxes, enough for a small tree.
 const PIECE_STEPS: usize = 16;
-/// Depth of a tree over 2^31 pieces, and one more: the bound of the walk's stack.
+/// Depth of a tree over 2^31 segments, plus one: bounds the traversal stack.
 const DEPTH_MAX: usize = 33;
 
-/// A run of samples of one pass, ends included.
+/// Consecutive samples of one pass, ends included.
 #[derive(Clone, Copy, Debug)]
 struct Piece {
     pass: u32,
@@ -17,7 +17,7 @@ struct Piece {
     to: u32,
     /// Centres at its ends, mm.
     ends: [Vector; 2],
-    /// No sample is farther than this from the straight line between them, mm.
+    /// Upper bound of the distance of the samples from the straight line between the ends, mm.
     off_mm: f64,
 }
 
@@ -45,7 +45,7 @@ impl Boxed {
         scale(add(self.low, self.high), 0.5)
     }
 
-    /// Least of the products of its points with a vector.
+    /// Least scalar product of the box's points with a vector.
     fn least_along(&self, along: Vector) -> f64 {
         (0..3)
             .map(|k| (self.low[k] * along[k]).min(self.high[k] * along[k]))
@@ -66,12 +66,12 @@ impl Boxed {
 #[derive(Clone, Copy, Debug)]
 struct Node {
     bounds: Boxed,
-    /// A leaf's piece, or the second child; the first one follows its parent.
+    /// A leaf's segment, or the second child; the first child follows its parent.
     next: u32,
     leaf: bool,
 }
 
-/// The tool path of a run, to be asked where it comes near something.
+/// The tool path of a run, for queries by location.
 #[derive(Debug)]
 pub(super) struct Tree<'a> {
     track: &'a Track,
@@ -80,32 +80,32 @@ pub(super) struct Tree<'a> {
     nodes: Vec<Node>,
 }
 
-/// A sample: pass and index in it.
+/// Index of a sample: pass, and index in the pass.
 pub(super) type Cut = (u32, u32);
 
-/// Which balls a place is asked about, and what about them.
+/// Parameters of a depth query at a point.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Reach {
-    /// How far around the place the answer is to hold, mm.
+    /// Radius around the point for which the bound must hold, mm.
     pub(super) around_mm: f64,
-    /// Largest normal curvature around the place, either way, 1/mm.
+    /// Largest magnitude of the normal curvature around the point, 1/mm.
     pub(super) bend: f64,
-    /// Depths below this do not matter, mm.
+    /// Depths below this are irrelevant, mm.
     pub(super) floor_mm: f64,
-    /// What counts as a gouge, mm: no ball that goes deeper is left out.
+    /// Least depth that counts as a gouge, mm: deeper balls are never excluded.
     pub(super) gouge_mm: f64,
-    /// Path and side parameters of the contacts that are left out of the bound.
+    /// Path and side parameters of the contacts that are excluded from the bound.
     pub(super) but: [[f64; 2]; 2],
 }
 
-/// How deep the balls go into a place.
+/// Depth of the balls at a point.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Depth {
-    /// Radius less distance of the nearest centre, mm, if above 0; else 0.
+    /// Radius minus the distance of the nearest centre, mm; at least 0.
     pub(super) depth_mm: f64,
-    /// The sample at whose centre, or between which and the next, that is.
+    /// The sample at the nearest centre, or before it; `None` where the depth is 0.
     pub(super) by: Option<Cut>,
-    /// What the depth may reach around the place, mm, at least the floor; balls that are left out do not count.
+    /// Upper bound of the depth around the point, mm, at least the floor; excluded balls do not count.
     pub(super) bound_mm: f64,
 }
 
@@ -163,7 +163,7 @@ impl<'a> Tree<'a> {
         self.track.passes[pass as usize].centre(index as usize)
     }
 
-    /// Walks all leaves whose boxes pass `wanted`, those nearer to a point first.
+    /// Visits all leaves whose boxes satisfy `wanted`, in the order of their distance from a point.
     fn walk(&self, from: Vector, mut wanted: impl FnMut(&Boxed) -> bool, mut leaf: impl FnMut(&Piece)) {
         let mut stack = [0_u32; DEPTH_MAX];
         let mut depth = 1;
@@ -189,17 +189,17 @@ impl<'a> Tree<'a> {
         }
     }
 
-    /// Where the ray enters any ball, if that is below `height`; else `height`.
+    /// Least height at which the ray enters a ball, if below `height`; else `height`.
     pub(super) fn entry(&self, ray: &Ray, height: f64) -> f64 {
         use std::cell::Cell;
         let best = Cell::new(height);
         self.walk(
             ray.from,
             |bounds| {
-                // A ball that is entered below `best`, and left above the surface, holds a point of the ray between.
+                // A ball entered below `best` and left above the surface contains a point of the ray between.
                 let half = 0.5 * best.get().max(0.0);
                 let reach = self.radius + half;
-                // And it is entered a radius below its centre at the lowest.
+                // The entry is at most one radius below the ball's centre.
                 let lowest = bounds.least_along(ray.along) - dot(ray.from, ray.along) - self.radius;
                 lowest < best.get() && bounds.squared(ray.at(half)) <= reach * reach
             },
@@ -222,12 +222,12 @@ impl<'a> Tree<'a> {
         best.get()
     }
 
-    /// How deep the balls go into a place, and what that may come to around it.
+    /// Depth of the balls at a point, and its upper bound around the point.
     ///
-    /// The distance d from a straight piece of path is a convex function in space, so the depth f = r - d stays below its
-    /// tangent plane: it grows by at most sin(a) along the tangent plane of the surface (a: the angle of the way to the nearest
-    /// centre and the normal), and by 1 along the normal, by which the surface leaves that plane as its curvature says. So
-    /// around P it stays below `f + around sin(a) + around^2 bend / 2`.
+    /// The distance d from a straight segment of the path is a convex function in space, so the depth f = r - d stays below its
+    /// tangent plane: it grows by at most sin(a) along the tangent plane of the surface (a: angle between the vector to the nearest
+    /// centre and the normal), and by 1 along the normal, along which the surface leaves that plane with its curvature. Around P
+    /// it is therefore at most `f + around sin(a) + around^2 curvature / 2`.
     pub(super) fn depth(&self, ray: &Ray, reach: &Reach) -> Depth {
         use std::cell::Cell;
         let second = 0.5 * reach.around_mm * reach.around_mm * reach.bend;
@@ -252,7 +252,7 @@ impl<'a> Tree<'a> {
                 let [path, side] = reach.but;
                 let inside = |range: [f64; 2], at: f64| (range[0]..=range[1]).contains(&at);
                 let beside = inside(side, samples.side);
-                // The same bound for the straight line from end to end first, which no piece leaves by more than so much.
+                // First the same bound for the chord between the ends, with the segment's largest deviation from it.
                 let (off, distance) = nearest(ray.from, piece.ends);
                 let depth = self.radius - distance + piece.off_mm;
                 if depth <= best.get().0.max(reach.gouge_mm) {
@@ -290,7 +290,7 @@ impl<'a> Tree<'a> {
     }
 }
 
-/// From a point to the nearest one of a line between two others: the vector, and its length.
+/// Vector from a point to the nearest point of a line segment, and its length.
 fn nearest(point: Vector, [from, to]: [Vector; 2]) -> (Vector, f64) {
     let (axis, m) = (subtract(to, from), subtract(from, point));
     let squared = dot(axis, axis);
@@ -303,7 +303,7 @@ fn nearest(point: Vector, [from, to]: [Vector; 2]) -> (Vector, f64) {
     (off, length(off))
 }
 
-/// The nodes over these pieces, parents before their children, split at the middle of the longest side.
+/// Builds the nodes over these segments, parents before children, split at the median of the longest side.
 fn build(nodes: &mut Vec<Node>, order: &mut [u32], boxes: &[Boxed]) {
     let mut bounds = Boxed::EMPTY;
     let mut middles = Boxed::EMPTY;
