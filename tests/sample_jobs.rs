@@ -8,7 +8,7 @@ use job::Job;
 use machine::Machine;
 use machine::prepare::prepare;
 use oracle::Oracle;
-use verify::survey::{Findings, Survey};
+use verify::survey::{Survey, SurveyResult};
 
 /// Jobs with their number of passes: the paper's, the golden table's, and for the others the oracle's dense scan.
 const PASSES: [(&str, u32); 11] = [
@@ -33,7 +33,7 @@ fn load(name: &str) -> Job {
     job_file::load(&jobs().join(format!("{name}.toml"))).unwrap()
 }
 
-fn survey(job: &Job) -> Findings {
+fn survey(job: &Job) -> SurveyResult {
     let oracle = Oracle::new(job).unwrap();
     let prepared = prepare(job).unwrap();
     let mut survey = Survey::new(&oracle, None, None);

@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use job::{AxisLimits, Job};
 use oracle::Oracle;
 use verify::motion::{Optimum, PassPath, optimum};
-use verify::swept::Track;
+use verify::swept::ToolPath;
 
 /// The time of a pass, and the least time within the limits.
 #[derive(Debug)]
@@ -23,7 +23,12 @@ pub struct PassTime {
 /// Times of the first, the middle and the last pass, by the job's limits, or by [`AxisLimits::DEFAULT`] where it has none. `samples`:
 /// number of samples per pass. Passes for which the oracle has no result are left out.
 #[must_use]
-pub fn pass_times(job: &Job, oracle: &Oracle, track: &Track, samples: &BTreeMap<u32, u64>) -> Vec<PassTime> {
+pub fn pass_times(
+    job: &Job,
+    oracle: &Oracle,
+    track: &ToolPath,
+    samples: &BTreeMap<u32, u64>,
+) -> Vec<PassTime> {
     let own = job.machine.limits;
     let limits = own.unwrap_or(AxisLimits::DEFAULT);
     let period_s = job.machine.period_s();

@@ -8,7 +8,7 @@ use machine::Machine;
 use machine::prepare::Prepared;
 use oracle::Oracle;
 use protocol::digest::Digest;
-use verify::survey::{Each, Findings, Survey};
+use verify::survey::{SampleObserver, Survey, SurveyResult};
 use verify::swept::Progress;
 use verify::trace::Trace;
 
@@ -47,7 +47,7 @@ pub struct TimedRun {
 
 /// The error of a job that the core refuses, at its line.
 #[must_use]
-pub fn refused(job: &Job, fault: Fault) -> JobError {
+pub fn load_error(job: &Job, fault: Fault) -> JobError {
     let (what, remedy) = explain::fault(fault);
     let remedy = format!("{remedy}; more: cargo sim explain {}", fault.kind.code());
     job.origin.error("surface", what, remedy)
@@ -55,7 +55,7 @@ pub fn refused(job: &Job, fault: Fault) -> JobError {
 
 /// A machine with the job loaded.
 pub(crate) fn machine(job: &Job, prepared: &Prepared) -> Result<Machine, JobError> {
-    Machine::load(prepared).map_err(|fault| refused(job, fault))
+    Machine::load(prepared).map_err(|fault| load_error(job, fault))
 }
 
 /// The oracle of a job.
@@ -83,7 +83,7 @@ fn parts_done(side: Place, prepared: &Prepared) -> u64 {
 ///
 /// # Errors
 /// The core refuses the job.
-pub fn timed(job: &Job, prepared: &Prepared, progress: &dyn Progress) -> Result<TimedRun, JobError> {
+pub fn time_run(job: &Job, prepared: &Prepared, progress: &dyn Progress) -> Result<TimedRun, JobError> {
     let mut machine = machine(job, prepared)?;
     let mut run = Digest::new();
     let mut passes: Vec<PassDigest> = Vec::new();
@@ -137,14 +137,14 @@ pub fn timed(job: &Job, prepared: &Prepared, progress: &dyn Progress) -> Result<
 ///
 /// # Errors
 /// The core refuses the job, the oracle has no result for it, or the trace cannot be written.
-pub fn surveyed<'a>(
+pub fn survey_run<'a>(
     job: &Job,
     prepared: &Prepared,
     samples: u64,
     trace: Option<Trace>,
-    each: Option<&'a mut Each<'a>>,
+    each: Option<&'a mut SampleObserver<'a>>,
     progress: &dyn Progress,
-) -> Result<Findings, InspectError> {
+) -> Result<SurveyResult, InspectError> {
     let oracle = oracle(job)?;
     let mut survey = Survey::new(&oracle, trace, each);
     progress.begin("measuring", samples);

@@ -2,7 +2,7 @@
 
 use interp_core::{Place, State};
 use machine::prepare::Prepared;
-use verify::Sample;
+use verify::EmittedSample;
 
 /// Whether a sample is on a pass, and not on a link.
 #[must_use]
@@ -12,8 +12,8 @@ pub fn is_on_pass(sample: &interp_core::Sample) -> bool {
 
 /// A sample of the core in plain numbers.
 #[must_use]
-pub fn plain(prepared: &Prepared, sample: &interp_core::Sample) -> Sample {
-    Sample {
+pub fn plain(prepared: &Prepared, sample: &interp_core::Sample) -> EmittedSample {
+    EmittedSample {
         tick: sample.tick.into(),
         state: sample.state.name(),
         pass: sample.pass,

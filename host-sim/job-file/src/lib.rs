@@ -29,8 +29,8 @@ mod text;
 use std::path::Path;
 
 use job::{
-    Along, AlongChoice, CHORD_DEFAULT_MM, FEED_MAX_MM_MIN, FEED_MIN_MM_MIN, Job, JobError, Machine, Pattern,
-    RADIUS_MAX_MM, Side, Spacing,
+    Along, AlongChoice, CHORD_DEFAULT_MM, FEED_MAX_MM_MIN, FEED_MIN_MM_MIN, Job, JobError, MachineSpec,
+    Pattern, RADIUS_MAX_MM, Side, Spacing,
 };
 use section::{Reader, Section};
 
@@ -134,7 +134,7 @@ pub fn parse_with(name: &str, text: &str, faces: &dyn FaceReader) -> Result<Job,
         },
         machine: document
             .optional_section("machine")?
-            .map_or(Ok(Machine::default()), |section| machine::read(&section))?,
+            .map_or(Ok(MachineSpec::default()), |section| machine::read(&section))?,
         origin,
     })
 }

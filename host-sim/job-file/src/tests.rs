@@ -92,7 +92,7 @@ fn the_documented_job_is_read() {
 #[test]
 fn what_may_be_left_out_has_its_default() {
     let job = parse("job.toml", NURBS).unwrap();
-    assert_eq!(job.machine, Machine::default());
+    assert_eq!(job.machine, MachineSpec::default());
     assert_eq!(
         (job.pattern, job.chord_mm, job.side),
         (Pattern::Zig, CHORD_DEFAULT_MM, Side::Minus)
@@ -136,7 +136,7 @@ fn unclamped_knots_are_allowed() {
 }
 
 /// Each row: text, old part, new part, line and column of the error, a part of the message.
-type Bad = (
+type BadInput = (
     &'static str,
     &'static str,
     &'static str,
@@ -145,7 +145,7 @@ type Bad = (
     &'static str,
 );
 
-fn check(rows: &[Bad]) {
+fn check(rows: &[BadInput]) {
     for (text, from, to, line, column, what) in rows {
         let error = edited(text, from, to).expect_err(&format!("{from} -> {to} was accepted"));
         assert!(error.what().contains(what), "{from} -> {to}: {error}");

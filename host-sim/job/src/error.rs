@@ -16,11 +16,11 @@ struct Inner {
     remedy: String,
     name: String,
     /// `None` where the file as a whole is wrong.
-    place: Option<Place>,
+    place: Option<Location>,
 }
 
 #[derive(Debug)]
-struct Place {
+struct Location {
     source: NamedSource<String>,
     span: Range<usize>,
     line: usize,
@@ -39,7 +39,7 @@ impl JobError {
             what,
             remedy,
             name: name.to_owned(),
-            place: Some(Place {
+            place: Some(Location {
                 source,
                 span,
                 line,

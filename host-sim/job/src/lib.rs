@@ -1,4 +1,4 @@
-//! A machining job in plain f64: surface, ball, cut and machine. Every default is applied when a [`Job`] is made, and [`Machine::limits`]
+//! A machining job in plain f64: surface, ball, cut and machine. Every default is applied when a [`Job`] is made, and [`MachineSpec::limits`]
 //! alone decides whether the job has limits. The crate depends neither on TOML nor on the core, so the oracle can depend on this crate alone.
 //!
 //! Lengths are mm and angles rad; the feed stays in mm/min, as in the file. All values are finite and within their documented ranges.
@@ -19,10 +19,10 @@ mod surface;
 
 pub use error::JobError;
 pub use machine::{
-    AXES, AxisLimits, HEARTBEAT_TIMEOUT_DEFAULT_MS, HEARTBEAT_TIMEOUT_RANGE_MS, HeartbeatAction, Machine,
+    AXES, AxisLimits, HEARTBEAT_TIMEOUT_DEFAULT_MS, HEARTBEAT_TIMEOUT_RANGE_MS, HeartbeatAction, MachineSpec,
     PERIOD_DEFAULT_US, PERIOD_RANGE_US, Ratio, StepOutput,
 };
-pub use origin::{AlongChoice, Origin, Trial};
+pub use origin::{AlongChoice, DirectionTrial, Origin};
 pub use surface::{NurbsSpec, SurfaceSpec};
 
 /// Largest ball radius, mm: the core's limit, ten times the radius of any ball-end mill.
@@ -105,7 +105,7 @@ pub struct Job {
     /// Chord error limit delta, mm, above 0, below the ball radius; used by the approaches that cut chords.
     pub chord_mm: f64,
     /// The machine.
-    pub machine: Machine,
+    pub machine: MachineSpec,
     /// The file, the line of each key, and the choice of the direction.
     pub origin: Origin,
 }

@@ -93,7 +93,7 @@ pub enum HeartbeatAction {
 
 /// The machine that runs the job.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Machine {
+pub struct MachineSpec {
     /// Sampling period T, µs, in [`PERIOD_RANGE_US`].
     pub period_us: f64,
     /// Limits of the axes. `None`: the feed is constant from the first sample to the last, as in the paper.
@@ -118,7 +118,7 @@ pub struct Machine {
     pub step_output: Option<StepOutput>,
 }
 
-impl Default for Machine {
+impl Default for MachineSpec {
     fn default() -> Self {
         Self {
             period_us: PERIOD_DEFAULT_US,
@@ -136,7 +136,7 @@ impl Default for Machine {
     }
 }
 
-impl Machine {
+impl MachineSpec {
     /// Sampling period T, s.
     #[must_use]
     pub fn period_s(&self) -> f64 {

@@ -8,13 +8,13 @@ use crate::{Along, JobError};
 
 /// Result of a run of the core with the passes in one direction.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Trial {
+pub struct DirectionTrial {
     /// The direction.
     pub along: Along,
     /// Periods of the whole job; up to the fault if there is one.
     pub ticks: u64,
     /// Reason for which the job cannot be machined in this direction.
-    pub against: Option<String>,
+    pub rejection: Option<String>,
 }
 
 /// Origin of the direction of the passes.
@@ -26,7 +26,7 @@ pub enum AlongChoice {
     /// The job file requests a trial of both directions; before the trial the job cannot be prepared.
     Auto,
     /// Chosen by trials along u and v, in this order.
-    Chosen([Trial; 2]),
+    Chosen([DirectionTrial; 2]),
 }
 
 /// Origin of a job: the file and the ranges of its keys, to which later errors refer, and the choice of the direction.

@@ -8,21 +8,21 @@ use std::fmt;
 use crate::Machine;
 use crate::prepare::{Prepared, prepare};
 use explain;
-use job::{Along, AlongChoice, Job, JobError, Trial};
+use job::{Along, AlongChoice, DirectionTrial, Job, JobError};
 
 /// A job with a chosen direction, ready for the machine.
 type Ready = (Job, Prepared);
 
 /// Neither direction can be machined.
 #[derive(Debug)]
-pub enum NoDirection {
+pub enum DirectionError {
     /// Neither can be prepared or loaded: the error is in the job file.
     Refused(JobError),
     /// At least one starts; both fail.
     Faults(String),
 }
 
-impl fmt::Display for NoDirection {
+impl fmt::Display for DirectionError {
     fn fmt(&self, out: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::Refused(error) => error.fmt(out),
@@ -31,11 +31,11 @@ impl fmt::Display for NoDirection {
     }
 }
 
-impl std::error::Error for NoDirection {}
+impl std::error::Error for DirectionError {}
 
 /// Result of a trial of one direction.
-struct Tried {
-    trial: Trial,
+struct TrialResult {
+    trial: DirectionTrial,
     ready: Option<Ready>,
     /// The machine accepted the job.
     started: bool,
@@ -45,14 +45,14 @@ struct Tried {
 ///
 /// # Errors
 /// The given direction cannot be prepared, or, with `"auto"`, neither direction can be machined.
-pub fn settle(job: Job) -> Result<Ready, NoDirection> {
+pub fn choose(job: Job) -> Result<Ready, DirectionError> {
     if job.origin.along_choice() != &AlongChoice::Auto {
-        let prepared = prepare(&job).map_err(NoDirection::Refused)?;
+        let prepared = prepare(&job).map_err(DirectionError::Refused)?;
         return Ok((job, prepared));
     }
     let (first, second) = std::thread::scope(|scope| {
-        let second = scope.spawn(|| tried(&job, Along::V));
-        (tried(&job, Along::U), second.join())
+        let second = scope.spawn(|| run_trial(&job, Along::V));
+        (run_trial(&job, Along::U), second.join())
     });
     let second = second.unwrap_or_else(|panic| std::panic::resume_unwind(panic));
     let trials = [first.trial.clone(), second.trial.clone()];
@@ -60,7 +60,7 @@ pub fn settle(job: Job) -> Result<Ready, NoDirection> {
     // `None` where a direction cannot be machined; the first of equal times is the minimum.
     let best = [first, second]
         .into_iter()
-        .filter(|tried| tried.trial.against.is_none())
+        .filter(|tried| tried.trial.rejection.is_none())
         .min_by_key(|tried| tried.trial.ticks);
     match best.and_then(|tried| tried.ready) {
         Some((mut job, prepared)) => {
@@ -71,10 +71,10 @@ pub fn settle(job: Job) -> Result<Ready, NoDirection> {
     }
 }
 
-fn neither(job: &Job, trials: &[Trial; 2], started: bool) -> NoDirection {
+fn neither(job: &Job, trials: &[DirectionTrial; 2], started: bool) -> DirectionError {
     let each = trials.iter().map(|trial| {
-        let against = trial.against.as_deref().unwrap_or("");
-        format!("along {}: {against}", trial.along.name())
+        let rejection = trial.rejection.as_deref().unwrap_or("");
+        format!("along {}: {rejection}", trial.along.name())
     });
     let what = format!(
         "neither direction of the passes can be machined\n{}",
@@ -82,23 +82,23 @@ fn neither(job: &Job, trials: &[Trial; 2], started: bool) -> NoDirection {
     );
     let remedy = "mend what one of the directions complains of";
     if started {
-        NoDirection::Faults(format!("{what}\n  help: {remedy}"))
+        DirectionError::Faults(format!("{what}\n  help: {remedy}"))
     } else {
-        NoDirection::Refused(job.origin.error("cut.along", what, remedy))
+        DirectionError::Refused(job.origin.error("cut.along", what, remedy))
     }
 }
 
 /// Runs the job in one direction to its end.
-fn tried(job: &Job, along: Along) -> Tried {
+fn run_trial(job: &Job, along: Along) -> TrialResult {
     let mut job = job.clone();
     job.along = along;
     job.origin.set_along_choice(AlongChoice::Given);
-    let trial = |ticks: u64, against: Option<String>| Trial {
+    let trial = |ticks: u64, rejection: Option<String>| DirectionTrial {
         along,
         ticks,
-        against,
+        rejection,
     };
-    let refused = |why: String| Tried {
+    let refused = |why: String| TrialResult {
         trial: trial(0, Some(why)),
         ready: None,
         started: false,
@@ -116,12 +116,12 @@ fn tried(job: &Job, along: Along) -> Tried {
         ticks += 1;
         true
     });
-    let against = ran.err().map(|fault| {
+    let rejection = ran.err().map(|fault| {
         let (pass, path, side) = machine.place();
         explain::fault_at(fault, ticks, pass, prepared.parameters(path, side))
     });
-    Tried {
-        trial: trial(ticks, against),
+    TrialResult {
+        trial: trial(ticks, rejection),
         ready: Some((job, prepared)),
         started: true,
     }
@@ -147,7 +147,7 @@ mod tests {
 
     const AUTO: (&str, &str) = ("along", "along = \"auto\"");
 
-    fn chosen(job: &Job) -> &[Trial; 2] {
+    fn chosen(job: &Job) -> &[DirectionTrial; 2] {
         match job.origin.along_choice() {
             AlongChoice::Chosen(trials) => trials,
             other => panic!("{other:?}"),
@@ -171,20 +171,20 @@ mod tests {
     fn the_faster_direction_wins_and_both_times_are_told() {
         // The torus is faster along u, the cap along v.
         for (text, faster) in [(TORUS, Along::U), (CAP, Along::V)] {
-            let (settled, prepared) = settle(job(text, &[AUTO])).unwrap();
+            let (settled, prepared) = choose(job(text, &[AUTO])).unwrap();
             assert_eq!((settled.along, prepared.along), (faster, faster));
             let trials = chosen(&settled);
             for (trial, (along, line)) in trials
                 .iter()
                 .zip([(Along::U, "along = \"u\""), (Along::V, "along = \"v\"")])
             {
-                assert_eq!((trial.along, &trial.against), (along, &None));
+                assert_eq!((trial.along, &trial.rejection), (along, &None));
                 assert_eq!(trial.ticks, ticks(&job(text, &[("along", line)])), "{line}");
             }
             let least = trials.iter().min_by_key(|trial| trial.ticks).unwrap();
             assert_eq!(least.along, faster);
             // A repeated choice has the same result.
-            assert_eq!(settle(job(text, &[AUTO])).unwrap(), (settled.clone(), prepared));
+            assert_eq!(choose(job(text, &[AUTO])).unwrap(), (settled.clone(), prepared));
         }
     }
 
@@ -192,25 +192,25 @@ mod tests {
     fn a_direction_that_faults_loses() {
         // At 500 m/min the passes around the pole turn too fast for one period; those through it run.
         let fast = ("feed_mm_min", "feed_mm_min = 500000");
-        let (settled, _) = settle(job(CAP, &[AUTO, fast])).unwrap();
+        let (settled, _) = choose(job(CAP, &[AUTO, fast])).unwrap();
         assert_eq!(settled.along, Along::U);
         let [u, v] = chosen(&settled);
-        assert_eq!(u.against, None);
-        let against = v.against.as_deref().unwrap();
+        assert_eq!(u.rejection, None);
+        let rejection = v.rejection.as_deref().unwrap();
         assert!(
-            against.starts_with("fault 3 (parameter-backwards) at tick "),
-            "{against}"
+            rejection.starts_with("fault 3 (parameter-backwards) at tick "),
+            "{rejection}"
         );
         // At the lower feed the other direction is the faster one: the fault decided.
-        assert_eq!(settle(job(CAP, &[AUTO])).unwrap().0.along, Along::V);
+        assert_eq!(choose(job(CAP, &[AUTO])).unwrap().0.along, Along::V);
     }
 
     #[test]
     fn both_faults_are_told() {
         // The groove's radius is 8 mm.
         let large = ("radius_mm", "radius_mm = 9");
-        let error = settle(job(TORUS, &[AUTO, large])).unwrap_err();
-        let NoDirection::Faults(sentence) = &error else {
+        let error = choose(job(TORUS, &[AUTO, large])).unwrap_err();
+        let DirectionError::Faults(sentence) = &error else {
             panic!("{error}")
         };
         for direction in ["along u: fault 1 (ball-does-not-fit)", "along v: fault 1"] {

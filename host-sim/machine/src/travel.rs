@@ -7,7 +7,7 @@ use interp_core::Sample;
 
 use crate::Machine;
 use crate::prepare::{Prepared, prepare};
-use job::{AXES, Job, JobError, Machine as MachineSpec};
+use job::{AXES, Job, JobError, MachineSpec};
 use patches::placement::extent_mm;
 
 const MM_PER_NM: f64 = 1e-6;
@@ -16,7 +16,7 @@ const KEY: &str = "machine.travel_mm";
 
 /// The sample with an extreme position on an axis.
 #[derive(Clone, Copy)]
-struct Far {
+struct ExtremeSample {
     mm: f64,
     sample: Sample,
 }
@@ -89,12 +89,12 @@ fn remedy(axis: usize, [least, most]: [f64; 2], [low, high]: [f64; 2]) -> String
 }
 
 /// Samples with the least and the greatest position of each axis; `None` without samples.
-fn farthest(prepared: &Prepared) -> Option<[[Far; 2]; 3]> {
+fn farthest(prepared: &Prepared) -> Option<[[ExtremeSample; 2]; 3]> {
     let mut machine = Machine::load(prepared).ok()?;
-    let mut farthest: Option<[[Far; 2]; 3]> = None;
+    let mut farthest: Option<[[ExtremeSample; 2]; 3]> = None;
     // Samples up to a fault are used.
     let _fault = machine.run(|sample| {
-        let at = |axis: usize| Far {
+        let at = |axis: usize| ExtremeSample {
             mm: f64::from(sample.cl_nm[axis]) * MM_PER_NM,
             sample: *sample,
         };

@@ -41,8 +41,8 @@ pub mod vector;
 mod verify;
 
 pub use contact::{Contact, Oracle, OracleError};
-pub use offset::Offset;
-pub use report::{Bounds, Figure, Report, Spot};
-pub use schedule::Pass;
+pub use offset::OffsetPoint;
+pub use report::{AccuracyBounds, AccuracyReport, ErrorStatistics, SampleLocation};
+pub use schedule::ScheduledPass;
 pub use surface::{Derivatives, Surface};
-pub use verify::{Checked, Emitted, Verifier};
+pub use verify::{PassSample, SampleCheck, Verifier};

@@ -19,7 +19,7 @@ const FOOT_ENOUGH: f64 = 1e-11;
 
 /// A point of a pass with the derivative of the tool centre.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Offset {
+pub struct OffsetPoint {
     /// Path parameter.
     pub path: f64,
     /// The contact.
@@ -28,7 +28,7 @@ pub struct Offset {
     pub cl_velocity: [f64; 3],
 }
 
-impl Offset {
+impl OffsetPoint {
     /// Speed of the centre per unit speed of the contact: `|A + r N_u| / |A|`; 1 on a pass that is a single point.
     #[must_use]
     pub fn ratio(&self) -> f64 {
@@ -45,7 +45,7 @@ impl Oracle {
     ///
     /// # Errors
     /// [`OracleError::Degenerate`] where there is no normal.
-    pub fn offset(&self, path: f64, side: f64) -> Result<Offset, OracleError> {
+    pub fn offset(&self, path: f64, side: f64) -> Result<OffsetPoint, OracleError> {
         let (u, v) = self.swapped(path, side);
         let at = self.surface.at(u, v);
         let contact = self.contact_of(&at, u, v)?;
@@ -53,7 +53,7 @@ impl Oracle {
             Some(velocity) => velocity,
             None => self.velocity_beside(path, side).unwrap_or_default(),
         };
-        Ok(Offset {
+        Ok(OffsetPoint {
             path,
             contact,
             cl_velocity,
@@ -119,7 +119,7 @@ impl Oracle {
     ///
     /// # Errors
     /// As [`Oracle::offset`].
-    pub fn foot(&self, cl_mm: [f64; 3], guess: f64, side: f64) -> Result<Offset, OracleError> {
+    pub fn foot(&self, cl_mm: [f64; 3], guess: f64, side: f64) -> Result<OffsetPoint, OracleError> {
         let [low, high] = self.path_range();
         let mut at = self.offset(guess.clamp(low, high), side)?;
         for _ in 0..FOOT_STEPS {

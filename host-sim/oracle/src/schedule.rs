@@ -28,7 +28,7 @@ const PASSES_MAX: usize = 1_000_000;
 
 /// A pass: its side parameter, and the largest distance to the next pass.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Pass {
+pub struct ScheduledPass {
     /// Side parameter.
     pub side: f64,
     /// Largest step to the next pass, in the side parameter; for passes spaced by the first order the least interval on the pass.
@@ -41,17 +41,17 @@ impl Oracle {
     /// # Errors
     /// [`OracleError::BallDoesNotFit`] and [`OracleError::Degenerate`] at the first such point,
     /// [`OracleError::TooManyPasses`] if the intervals converge to 0.
-    pub fn schedule(&self) -> Result<Vec<Pass>, OracleError> {
+    pub fn schedule(&self) -> Result<Vec<ScheduledPass>, OracleError> {
         let [start, end] = self.side_range();
         let mut passes = Vec::new();
         let mut side = start;
         while passes.len() < PASSES_MAX {
-            let before = passes.last().map(|pass: &Pass| pass.interval);
+            let before = passes.last().map(|pass: &ScheduledPass| pass.interval);
             let interval = match self.spacing {
                 Spacing::FirstOrder => self.least_interval(side)?,
                 Spacing::Exact => self.exact_interval(side, before)?,
             };
-            passes.push(Pass { side, interval });
+            passes.push(ScheduledPass { side, interval });
             if side >= end {
                 return Ok(passes);
             }

@@ -3,7 +3,7 @@
 use std::f64::consts::{FRAC_PI_2, FRAC_PI_3, PI};
 
 use super::*;
-use job::{Along, Job, Machine, NurbsSpec, Origin, Pattern, Side, Spacing, SurfaceSpec};
+use job::{Along, Job, MachineSpec, NurbsSpec, Origin, Pattern, Side, Spacing, SurfaceSpec};
 
 /// A job on a surface with a ball of 5 mm and a scallop of 0.005 mm.
 fn job(surface: SurfaceSpec, along: Along, side: Side) -> Job {
@@ -17,7 +17,7 @@ fn job(surface: SurfaceSpec, along: Along, side: Side) -> Job {
         pattern: Pattern::Zig,
         spacing: Spacing::Exact,
         chord_mm: 0.005,
-        machine: Machine::default(),
+        machine: MachineSpec::default(),
         origin: Origin::default(),
     }
 }
@@ -312,9 +312,9 @@ fn arcs_add_up_and_small_ones_are_exact() {
 }
 
 /// Ideal samples of a job: steps of f T along the surface by Newton's method, positions rounded to nanometres.
-fn ideal_samples(oracle: &Oracle, feed_mm_s: f64) -> Vec<Emitted> {
+fn ideal_samples(oracle: &Oracle, feed_mm_s: f64) -> Vec<PassSample> {
     let [start, end] = oracle.path_range();
-    let mut samples: Vec<Emitted> = Vec::new();
+    let mut samples: Vec<PassSample> = Vec::new();
     let mut side = oracle.side_range()[0];
     for pass in 0.. {
         let backwards = oracle.pattern == Pattern::Zigzag && pass % 2 == 1;
@@ -325,7 +325,7 @@ fn ideal_samples(oracle: &Oracle, feed_mm_s: f64) -> Vec<Emitted> {
             let (u, v) = oracle.swapped(path, side);
             let contact = oracle.contact(u, v).unwrap();
             least = least.min(contact.interval);
-            samples.push(Emitted {
+            samples.push(PassSample {
                 tick: samples.len() as u64,
                 pass,
                 u,
@@ -359,7 +359,7 @@ fn ideal_samples(oracle: &Oracle, feed_mm_s: f64) -> Vec<Emitted> {
     samples
 }
 
-fn report_of(oracle: &Oracle, samples: &[Emitted]) -> Report {
+fn report_of(oracle: &Oracle, samples: &[PassSample]) -> AccuracyReport {
     let mut verifier = Verifier::new(oracle);
     for sample in samples {
         verifier.add(sample);
@@ -368,7 +368,7 @@ fn report_of(oracle: &Oracle, samples: &[Emitted]) -> Report {
 }
 
 /// A short job: coarse scallop, 40 mm/s.
-fn short_job(name: &str, pattern: Pattern) -> (Oracle, Vec<Emitted>) {
+fn short_job(name: &str, pattern: Pattern) -> (Oracle, Vec<PassSample>) {
     let job = Job {
         scallop_mm: 0.2,
         pattern,
@@ -387,7 +387,7 @@ fn ideal_samples_pass() {
             let (oracle, samples) = short_job(name, pattern);
             let report = report_of(&oracle, &samples);
             assert_eq!(
-                report.failures(&Bounds::default()),
+                report.failures(&AccuracyBounds::default()),
                 Vec::<String>::new(),
                 "{name}"
             );
@@ -420,7 +420,7 @@ fn ideal_samples_pass() {
 
 #[test]
 fn every_fault_is_found() {
-    type Fault = (&'static str, fn(&mut Vec<Emitted>));
+    type Fault = (&'static str, fn(&mut Vec<PassSample>));
     let faults: [Fault; 10] = [
         ("position", |samples| samples[500].cl_nm[1] += 20),
         ("contact", |samples| samples[500].cc_nm[1] += 20),
@@ -444,7 +444,7 @@ fn every_fault_is_found() {
     for (word, inject) in faults {
         let mut samples = ideal.clone();
         inject(&mut samples);
-        let failures = report_of(&oracle, &samples).failures(&Bounds::default());
+        let failures = report_of(&oracle, &samples).failures(&AccuracyBounds::default());
         let word = if word == "astray" { "off their pass" } else { word };
         assert!(
             failures.iter().any(|failure| failure.contains(word)),
@@ -479,7 +479,7 @@ fn a_pass_on_the_pole_is_a_point() {
     assert_eq!(samples[0].cc_nm, samples[1].cc_nm);
     assert!(samples[0].first_of_pass && samples[1].last_of_pass);
     assert_eq!(
-        report_of(&oracle, &samples).failures(&Bounds::default()),
+        report_of(&oracle, &samples).failures(&AccuracyBounds::default()),
         Vec::<String>::new()
     );
 }

@@ -1,7 +1,7 @@
 //! Checks emitted samples one by one, in the order of their ticks. No allocation per sample.
 
 use super::contact::Oracle;
-use super::report::{Report, Spot};
+use super::report::{AccuracyReport, SampleLocation};
 use super::vector::{angle, length, scale, subtract};
 use job::{Pattern, Spacing};
 
@@ -10,7 +10,7 @@ const NM_PER_MM: f64 = 1e6;
 
 /// A sample on a pass as emitted by a machine, in plain numbers.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Emitted {
+pub struct PassSample {
     /// Tick, from 0.
     pub tick: u64,
     /// Pass, from 0.
@@ -35,7 +35,7 @@ pub struct Emitted {
 
 /// Errors of one sample.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Checked {
+pub struct SampleCheck {
     /// Arc length of the contact's path since the previous sample of the same pass, mm; `None` at the first one.
     pub arc_mm: Option<f64>,
     /// 100 (arc / (f T) - 1), %, for all samples of a pass except the first and the last.
@@ -49,7 +49,7 @@ pub struct Checked {
 pub struct Verifier {
     oracle: Oracle,
     breaks: Vec<f64>,
-    report: Report,
+    report: AccuracyReport,
     current: Option<PassState>,
 }
 
@@ -60,7 +60,7 @@ struct PassState {
     /// Path parameter of the last sample.
     path: f64,
     least_interval: f64,
-    least_at: Spot,
+    least_at: SampleLocation,
     /// Sum over samples of (1 / interval)^2, and their number: gives the scallop's mean when the next pass is known.
     inverse_squares: f64,
     samples: u64,
@@ -71,9 +71,9 @@ impl Verifier {
     /// A verifier of a job's samples.
     #[must_use]
     pub fn new(oracle: &Oracle) -> Self {
-        let report = Report {
+        let report = AccuracyReport {
             normal_floor_rad: 3.0_f64.sqrt() / (oracle.radius_mm * NM_PER_MM),
-            ..Report::default()
+            ..AccuracyReport::default()
         };
         Self {
             breaks: oracle.surface.breaks(oracle.along),
@@ -84,8 +84,8 @@ impl Verifier {
     }
 
     /// Checks the next sample and returns its errors.
-    pub fn add(&mut self, sample: &Emitted) -> Checked {
-        let spot = Spot {
+    pub fn add(&mut self, sample: &PassSample) -> SampleCheck {
+        let spot = SampleLocation {
             tick: sample.tick,
             pass: sample.pass,
             u: sample.u,
@@ -108,7 +108,7 @@ impl Verifier {
                 pass.finished = true;
             }
         }
-        Checked {
+        SampleCheck {
             arc_mm: arc_mm.map(f64::abs),
             ripple_pct,
             position_nm,
@@ -117,7 +117,7 @@ impl Verifier {
 
     /// The report, after the last sample.
     #[must_use]
-    pub fn finish(mut self) -> Report {
+    pub fn finish(mut self) -> AccuracyReport {
         if let Some(pass) = self.current {
             self.report.complete = pass.finished;
             self.report.last_on_boundary = pass.side == self.oracle.side_range()[1];
@@ -133,7 +133,7 @@ impl Verifier {
     }
 
     /// Begins a pass and checks its side parameter against the least interval of the previous pass.
-    fn begin_pass(&mut self, sample: &Emitted, path: f64, side: f64, spot: Spot) {
+    fn begin_pass(&mut self, sample: &PassSample, path: f64, side: f64, spot: SampleLocation) {
         let [first, last] = self.oracle.side_range();
         match self.current {
             None => self.report.first_on_boundary = side == first && sample.pass == 0,
@@ -177,13 +177,13 @@ impl Verifier {
     /// Arc length of the step to this sample, mm, and its deviation from the feed, %.
     fn check_step(
         &mut self,
-        sample: &Emitted,
+        sample: &PassSample,
         path: f64,
         side: f64,
-        spot: Spot,
+        spot: SampleLocation,
     ) -> (Option<f64>, Option<f64>) {
         let Some(pass) = &mut self.current else {
-            self.report.astray += 1;
+            self.report.off_pass += 1;
             return (None, None);
         };
         let forwards = if self.oracle.pattern == Pattern::Zigzag && sample.pass % 2 == 1 {
@@ -194,7 +194,7 @@ impl Verifier {
         let from = pass.path;
         pass.path = path;
         if side != pass.side || (path - from) * forwards < 0.0 || pass.finished {
-            self.report.astray += 1;
+            self.report.off_pass += 1;
         }
         let arc = forwards * self.oracle.arc_between(&self.breaks, from, path, side);
         self.report.cc_length_mm += arc;
@@ -215,7 +215,7 @@ impl Verifier {
     }
 
     /// Checks positions, normal, curvature and interval of one sample; returns the centre's error, nm.
-    fn check_geometry(&mut self, sample: &Emitted, spot: Spot) -> Option<f64> {
+    fn check_geometry(&mut self, sample: &PassSample, spot: SampleLocation) -> Option<f64> {
         let Ok(contact) = self.oracle.contact(sample.u, sample.v) else {
             self.report.degenerate += 1;
             return None;

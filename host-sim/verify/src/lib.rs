@@ -23,4 +23,4 @@ pub mod survey;
 pub mod swept;
 pub mod trace;
 
-pub use sample::Sample;
+pub use sample::EmittedSample;

@@ -1,10 +1,10 @@
 //! A sample as emitted by a machine, in plain numbers.
 
-use oracle::Emitted;
+use oracle::PassSample;
 
 /// A sample on a pass or between passes.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Sample {
+pub struct EmittedSample {
     /// Tick, from 0.
     pub tick: u64,
     /// State of the machine, by its name in traces.
@@ -23,12 +23,12 @@ pub struct Sample {
     pub interval: f32,
 }
 
-impl Sample {
+impl EmittedSample {
     /// The sample in the oracle's form; `None` between passes.
     #[must_use]
-    pub fn emitted(&self, first_of_pass: bool, last_of_pass: bool) -> Option<Emitted> {
+    pub fn emitted(&self, first_of_pass: bool, last_of_pass: bool) -> Option<PassSample> {
         let [u, v] = self.parameters?;
-        Some(Emitted {
+        Some(PassSample {
             tick: self.tick,
             pass: self.pass,
             u,

@@ -1,11 +1,11 @@
 //! Speeds of contact and centre, period by period, measured the same way for every approach.
 
-use oracle::Emitted;
+use oracle::PassSample;
 use oracle::vector::{length, subtract};
 
 /// Mean speeds over one period.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Speed {
+pub struct PeriodSpeed {
     /// Time at the period's end since the pass began, s.
     pub time_s: f64,
     /// Length of the contact's path since the pass began, at the period's middle, mm.
@@ -18,7 +18,7 @@ pub struct Speed {
 
 /// Least, mean and largest speed over complete periods, mm/s.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Span {
+pub struct SpeedRange {
     /// Least; infinite without complete periods.
     pub min: f64,
     /// Largest.
@@ -27,7 +27,7 @@ pub struct Span {
     periods: f64,
 }
 
-impl Default for Span {
+impl Default for SpeedRange {
     fn default() -> Self {
         Self {
             min: f64::INFINITY,
@@ -38,7 +38,7 @@ impl Default for Span {
     }
 }
 
-impl Span {
+impl SpeedRange {
     fn add(&mut self, speed: f64) {
         self.min = self.min.min(speed);
         self.max = self.max.max(speed);
@@ -57,9 +57,9 @@ impl Span {
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct SpeedFigures {
     /// Speed of the contact along the surface.
-    pub cc: Span,
+    pub cc: SpeedRange,
     /// Speed of the tool centre.
-    pub cl: Span,
+    pub cl: SpeedRange,
     /// Largest change of the centre's speed from one period to the next, mm/s.
     pub cl_change_mm_s: f64,
     /// Largest step of the commanded speed of the centre, mm/s: from segment to segment; for the core from patch to
@@ -71,7 +71,7 @@ pub struct SpeedFigures {
 
 /// Accumulates the speeds of a run, sample by sample.
 #[derive(Clone, Debug)]
-pub struct Speeds {
+pub struct SpeedRecorder {
     period_s: f64,
     figures: SpeedFigures,
     before_mm: [f64; 3],
@@ -80,7 +80,7 @@ pub struct Speeds {
     last: Option<f64>,
 }
 
-impl Speeds {
+impl SpeedRecorder {
     /// A recorder for a run with this period.
     #[must_use]
     pub fn new(period_s: f64) -> Self {
@@ -96,7 +96,7 @@ impl Speeds {
 
     /// Adds the next sample. `arc_mm`: arc length of the contact since the previous sample of the same pass; `cl_mm`: the centre.
     /// Returns the speeds over the period that ends at this sample.
-    pub fn add(&mut self, sample: &Emitted, arc_mm: Option<f64>, cl_mm: [f64; 3]) -> Option<Speed> {
+    pub fn add(&mut self, sample: &PassSample, arc_mm: Option<f64>, cl_mm: [f64; 3]) -> Option<PeriodSpeed> {
         let way_mm = length(subtract(cl_mm, self.before_mm));
         self.before_mm = cl_mm;
         let Some(arc_mm) = arc_mm else {
@@ -106,7 +106,7 @@ impl Speeds {
         self.figures.cl_length_mm += way_mm;
         self.time_s += self.period_s;
         self.arc_mm += arc_mm;
-        let speed = Speed {
+        let speed = PeriodSpeed {
             time_s: self.time_s,
             arc_mm: self.arc_mm - 0.5 * arc_mm,
             cc_mm_s: arc_mm / self.period_s,

@@ -1,15 +1,15 @@
 //! Processes a stream of samples: counts, errors against the oracle, the trace.
 
-use crate::Sample;
-use crate::speeds::{SpeedFigures, Speeds};
+use crate::EmittedSample;
+use crate::speeds::{SpeedFigures, SpeedRecorder};
 use crate::trace::Trace;
-use oracle::{Checked, Emitted, Oracle, Report, Verifier};
+use oracle::{AccuracyReport, Oracle, PassSample, SampleCheck, Verifier};
 
 const MM_PER_NM: f64 = 1e-6;
 
 /// Result of the survey of a run.
 #[derive(Clone, Debug)]
-pub struct Findings {
+pub struct SurveyResult {
     /// Number of samples, and of periods of the run.
     pub samples: u64,
     /// Number of passes.
@@ -19,28 +19,28 @@ pub struct Findings {
     /// Least candidate of the path interval, in units of the side parameter; infinite without candidates.
     pub interval_min: f64,
     /// Errors against the oracle.
-    pub report: Report,
+    pub report: AccuracyReport,
 }
 
 /// A sample held back until the next one shows whether it is the last of its pass.
 #[derive(Clone, Copy)]
-struct Pending {
-    sample: Sample,
+struct PendingSample {
+    sample: EmittedSample,
     first: bool,
 }
 
 /// Callback for every sample on a pass, with its errors.
-pub type Each<'a> = dyn FnMut(&Emitted, &Checked) + 'a;
+pub type SampleObserver<'a> = dyn FnMut(&PassSample, &SampleCheck) + 'a;
 
 /// The survey of one run.
 pub struct Survey<'a> {
     verifier: Verifier,
     trace: Option<Trace>,
-    each: Option<&'a mut Each<'a>>,
-    pending: Option<Pending>,
+    each: Option<&'a mut SampleObserver<'a>>,
+    pending: Option<PendingSample>,
     samples: u64,
     oracle: Oracle,
-    speeds: Speeds,
+    speeds: SpeedRecorder,
     ratio_step: f64,
     feed_mm_s: f64,
     interval_min: f64,
@@ -50,7 +50,7 @@ impl<'a> Survey<'a> {
     /// A survey of a run of this job. It writes the trace, if there is one, and calls `each` for every sample on a pass, with
     /// its errors.
     #[must_use]
-    pub fn new(oracle: &Oracle, trace: Option<Trace>, each: Option<&'a mut Each<'a>>) -> Self {
+    pub fn new(oracle: &Oracle, trace: Option<Trace>, each: Option<&'a mut SampleObserver<'a>>) -> Self {
         Self {
             verifier: Verifier::new(oracle),
             trace,
@@ -58,7 +58,7 @@ impl<'a> Survey<'a> {
             pending: None,
             samples: 0,
             oracle: oracle.clone(),
-            speeds: Speeds::new(oracle.period_s),
+            speeds: SpeedRecorder::new(oracle.period_s),
             ratio_step: 0.0,
             feed_mm_s: 0.0,
             interval_min: f64::INFINITY,
@@ -69,12 +69,12 @@ impl<'a> Survey<'a> {
     ///
     /// # Errors
     /// The trace cannot be written.
-    pub fn add(&mut self, sample: &Sample) -> std::io::Result<()> {
+    pub fn add(&mut self, sample: &EmittedSample) -> std::io::Result<()> {
         self.samples += 1;
         if let Some(trace) = &mut self.trace {
             trace.write(sample)?;
         }
-        let stands = |before: &Pending| {
+        let stands = |before: &PendingSample| {
             before.sample.pass == sample.pass && before.sample.parameters == sample.parameters
         };
         if sample.parameters.is_none() || self.pending.as_ref().is_some_and(stands) {
@@ -89,14 +89,14 @@ impl<'a> Survey<'a> {
             None => true,
         };
         self.interval_min = self.interval_min.min(sample.interval.into());
-        self.pending = Some(Pending {
+        self.pending = Some(PendingSample {
             sample: *sample,
             first,
         });
         Ok(())
     }
 
-    fn emit(&mut self, Pending { sample, first }: Pending, last: bool) {
+    fn emit(&mut self, PendingSample { sample, first }: PendingSample, last: bool) {
         let Some(emitted) = sample.emitted(first, last) else {
             return;
         };
@@ -121,7 +121,7 @@ impl<'a> Survey<'a> {
     ///
     /// # Errors
     /// The trace cannot be written.
-    pub fn finish(mut self, complete: bool) -> std::io::Result<Findings> {
+    pub fn finish(mut self, complete: bool) -> std::io::Result<SurveyResult> {
         if let Some(pending) = self.pending {
             self.emit(pending, complete);
         }
@@ -129,7 +129,7 @@ impl<'a> Survey<'a> {
             trace.finish()?;
         }
         let report = self.verifier.finish();
-        Ok(Findings {
+        Ok(SurveyResult {
             samples: self.samples,
             passes: self.pending.map_or(0, |pending| pending.sample.pass + 1),
             speeds: self.speeds.finish(self.ratio_step * self.feed_mm_s),

@@ -4,9 +4,9 @@ use std::fs::File;
 use std::io::{self, BufWriter};
 use std::path::Path;
 
-use oracle::Emitted;
+use oracle::PassSample;
 
-use crate::Sample;
+use crate::EmittedSample;
 
 /// Columns of a trace.
 pub const COLUMNS: [&str; 14] = [
@@ -60,7 +60,7 @@ impl Trace {
     ///
     /// # Errors
     /// The file cannot be written.
-    pub fn write(&mut self, sample: &Sample) -> io::Result<()> {
+    pub fn write(&mut self, sample: &EmittedSample) -> io::Result<()> {
         self.row(&Row {
             tick: sample.tick,
             state: sample.state,
@@ -77,7 +77,7 @@ impl Trace {
     ///
     /// # Errors
     /// The file cannot be written.
-    pub fn write_emitted(&mut self, emitted: &Emitted) -> io::Result<()> {
+    pub fn write_emitted(&mut self, emitted: &PassSample) -> io::Result<()> {
         self.row(&Row {
             tick: emitted.tick,
             state: "running",

@@ -25,7 +25,7 @@ struct Frame {
 }
 
 /// A surface in a form for evaluation.
-enum Surface {
+enum SurfaceEvaluator {
     Pieces { source: Source, breaks: [Vec<f64>; 2] },
     Profile { radius: [f64; 4], height: [f64; 4] },
 }
@@ -66,7 +66,7 @@ fn span(breaks: &[f64], at: f64) -> [f64; 2] {
     [breaks[index - 1], breaks[index]]
 }
 
-impl Surface {
+impl SurfaceEvaluator {
     fn new(spec: &SurfaceSpec) -> Self {
         match spec {
             SurfaceSpec::Revolved {
@@ -132,7 +132,7 @@ pub(super) fn tool_sign(job: &Job) -> Result<f64, JobError> {
         Side::Minus => return Ok(-1.0),
         Side::Up => {}
     }
-    let surface = Surface::new(&job.surface);
+    let surface = SurfaceEvaluator::new(&job.surface);
     let [us, vs] = job.surface.domain();
     let middle = |[start, end]: [f64; 2], index: u32| {
         start + (end - start) * (f64::from(index) + 0.5) / f64::from(GRID)
@@ -159,7 +159,7 @@ pub(super) fn tool_sign(job: &Job) -> Result<f64, JobError> {
 
 /// The tool centre over the first contact of the first pass, mm; `None` where the surface has no normal there.
 pub(super) fn first_centre_mm(job: &Job, sign: f64) -> Option<Vector> {
-    let surface = Surface::new(&job.surface);
+    let surface = SurfaceEvaluator::new(&job.surface);
     let [us, vs] = job.surface.domain();
     let frame = surface.at(us[0], vs[0]);
     let (reach_u, reach_v) = (

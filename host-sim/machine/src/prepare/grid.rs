@@ -10,7 +10,7 @@ use interp_core::{Header, STORE_WORDS, SurfaceKind};
 use job::{Along, Job, JobError, SurfaceSpec};
 use patches::pieces::{Piece, Source};
 
-use super::{Axis, Prepared, steps, widths};
+use super::{ParameterSpans, Prepared, steps, widths};
 
 pub(super) const REMEDY: &str = "move the part nearer to the origin (±2 m), or cut it into smaller surfaces";
 
@@ -28,7 +28,7 @@ struct Split {
 }
 
 /// Result of encoding the patches of a grid.
-struct Grid {
+struct RecordGrid {
     /// The records, path index fastest.
     words: Vec<i32>,
     /// Path and side spans that have to be halved.
@@ -117,8 +117,8 @@ fn halve(breaks: &mut Vec<f64>, spans: &BTreeSet<usize>) {
 }
 
 /// The records of all patches, or the spans that have to be halved.
-fn grid(source: &Source, along: Along, path: &[f64], side: &[f64]) -> Result<Grid, EncodeError> {
-    let mut grid = Grid {
+fn grid(source: &Source, along: Along, path: &[f64], side: &[f64]) -> Result<RecordGrid, EncodeError> {
+    let mut grid = RecordGrid {
         words: Vec::new(),
         halve: [BTreeSet::new(), BTreeSet::new()],
         mixed: None,
@@ -255,7 +255,7 @@ fn finish(
         side_spans: spans(&side),
         ..header
     };
-    let (path, side) = (Axis { breaks: path }, Axis { breaks: side });
+    let (path, side) = (ParameterSpans { breaks: path }, ParameterSpans { breaks: side });
     let mut words = widths(job, &side)?;
     words.extend(widths(job, &path)?);
     words.extend(records);

@@ -21,12 +21,12 @@ pub use steps::configuration;
 
 /// One parameter of the prepared surface: its spans, in the parameter's own units.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Axis {
+pub struct ParameterSpans {
     /// Ends of the spans, ascending, one more than there are spans.
     pub breaks: Vec<f64>,
 }
 
-impl Axis {
+impl ParameterSpans {
     /// The parameter at a place, to f64 precision; exact at a span's ends.
     #[must_use]
     pub fn parameter(&self, place: Place) -> f64 {
@@ -55,9 +55,9 @@ pub struct Prepared {
     /// The surface's data.
     pub words: Vec<i32>,
     /// The path parameter.
-    pub path: Axis,
+    pub path: ParameterSpans,
     /// The side parameter.
-    pub side: Axis,
+    pub side: ParameterSpans,
     /// Which of u and v is the path parameter.
     pub along: Along,
     /// Step output, if the job gives one.
@@ -98,7 +98,7 @@ pub fn prepare(job: &Job) -> Result<Prepared, JobError> {
         return Err(job.origin.error(
             "cut.along",
             "the direction of the passes has not been settled",
-            "say along = \"u\" or \"v\", or have `direction::settle` choose",
+            "say along = \"u\" or \"v\", or have `direction::choose` choose",
         ));
     }
     let sign = geometry::tool_sign(job)?;
@@ -138,7 +138,7 @@ pub fn prepare(job: &Job) -> Result<Prepared, JobError> {
 }
 
 /// Words of the widths of spans.
-fn widths(job: &Job, axis: &Axis) -> Result<Vec<i32>, JobError> {
+fn widths(job: &Job, axis: &ParameterSpans) -> Result<Vec<i32>, JobError> {
     let spans = axis.breaks.windows(2).map(|ends| ends[1] - ends[0]);
     spans
         .map(|width| {
@@ -163,7 +163,7 @@ fn revolved(
             grid::REMEDY,
         )
     })?;
-    let [profile, angle] = [u, v_rad].map(|range| Axis {
+    let [profile, angle] = [u, v_rad].map(|range| ParameterSpans {
         breaks: range.to_vec(),
     });
     let (kind, path, side) = match job.along {

@@ -2,7 +2,7 @@
 
 use interp_core::StepConfig;
 use interp_core::steps::{AxisSteps, PULSE_SLOTS_MAX, SETUP_SLOTS_MAX, SLOTS};
-use job::{HeartbeatAction, Machine};
+use job::{HeartbeatAction, MachineSpec};
 use protocol::message::{Configuration, HostGone};
 
 /// Tolerance in slots for the rounding of the period.
@@ -21,7 +21,7 @@ fn slots(time_us: f64, period_us: f64, most: u16) -> u16 {
 }
 
 /// The core's step configuration; `None` where the job keeps the board's own.
-pub(super) fn config(machine: &Machine) -> Option<StepConfig> {
+pub(super) fn config(machine: &MachineSpec) -> Option<StepConfig> {
     let output = machine.step_output?;
     let pulse_slots = slots(output.pulse_us, machine.period_us, PULSE_SLOTS_MAX.into()).max(1);
     Some(StepConfig {
@@ -37,7 +37,7 @@ pub(super) fn config(machine: &Machine) -> Option<StepConfig> {
 
 /// Homing requirement and heartbeat supervision of a board.
 #[must_use]
-pub fn configuration(machine: &Machine) -> Configuration {
+pub fn configuration(machine: &MachineSpec) -> Configuration {
     #[expect(
         clippy::cast_possible_truncation,
         clippy::cast_sign_loss,
@@ -60,17 +60,17 @@ mod tests {
 
     #[test]
     fn the_heartbeat_timeout_is_whole_periods_and_never_shorter() {
-        let machine = Machine {
+        let machine = MachineSpec {
             period_us: 400.0,
             homing_required: false,
             heartbeat_action: HeartbeatAction::Hold,
             heartbeat_timeout_ms: 500.1,
-            ..Machine::default()
+            ..MachineSpec::default()
         };
         let told = configuration(&machine);
         assert_eq!((told.homing_required, told.host_gone), (false, HostGone::Hold));
         assert_eq!(told.host_gone_ticks, 1251);
-        assert_eq!(configuration(&Machine::default()).host_gone_ticks, 1000);
+        assert_eq!(configuration(&MachineSpec::default()).host_gone_ticks, 1000);
     }
 
     /// The job file limits times by the same shares of a period as the core.

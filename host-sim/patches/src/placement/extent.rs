@@ -15,7 +15,7 @@ const CELLS_MAX: usize = 100_000;
 const ROUNDING: f64 = 1e-14;
 
 /// A rational patch of one coordinate, numerator and weight, over parameters from -1/2 to 1/2.
-type Cell = (Bicubic, Bicubic);
+type CoordinatePatch = (Bicubic, Bicubic);
 
 /// Minimum and maximum of x, y and z of a surface, mm, within [`EXTENT_TOLERANCE_MM`].
 #[must_use]
@@ -58,7 +58,7 @@ fn value(c: &Bicubic, u: f64, v: f64) -> f64 {
 }
 
 /// The greatest value at the cell's corners and middle.
-fn probe((numerator, weight): &Cell) -> f64 {
+fn probe((numerator, weight): &CoordinatePatch) -> f64 {
     [(-0.5, -0.5), (-0.5, 0.5), (0.5, -0.5), (0.5, 0.5), (0.0, 0.0)]
         .into_iter()
         .map(|(u, v)| value(numerator, u, v) / value(weight, u, v))
@@ -66,7 +66,7 @@ fn probe((numerator, weight): &Cell) -> f64 {
 }
 
 /// Whether no value in the cell exceeds `bound`: `numerator - bound weight` is at most 0, by its Bernstein coefficients.
-fn below((numerator, weight): &Cell, bound: f64) -> bool {
+fn below((numerator, weight): &CoordinatePatch, bound: f64) -> bool {
     let mut most = 0.0;
     for (i, (row, weights)) in numerator.iter().zip(weight).enumerate() {
         for (j, (c, w)) in row.iter().zip(weights).enumerate() {
@@ -81,7 +81,7 @@ fn below((numerator, weight): &Cell, bound: f64) -> bool {
 }
 
 /// The greatest value over all cells, to [`EXTENT_TOLERANCE_MM`].
-fn most(cells: Vec<Cell>) -> f64 {
+fn most(cells: Vec<CoordinatePatch>) -> f64 {
     let largest = cells
         .iter()
         .flat_map(|(numerator, _)| numerator.iter().flatten())

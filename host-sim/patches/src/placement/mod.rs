@@ -65,7 +65,7 @@ impl Default for Placement {
 
 /// The placed surface exceeds the range of positions.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Outside {
+pub struct OutOfMachineRange {
     /// The axis: 0 to 2.
     pub axis: usize,
     /// Extent of the surface along the axis, mm.
@@ -74,7 +74,7 @@ pub struct Outside {
     pub too_large: bool,
 }
 
-impl fmt::Display for Outside {
+impl fmt::Display for OutOfMachineRange {
     fn fmt(&self, out: &mut fmt::Formatter<'_>) -> fmt::Result {
         let [least, most] = self.reach_mm;
         let axis = AXES.get(self.axis).copied().unwrap_or("?");
@@ -85,7 +85,7 @@ impl fmt::Display for Outside {
     }
 }
 
-impl std::error::Error for Outside {}
+impl std::error::Error for OutOfMachineRange {}
 
 /// `p -> linear p + shift`.
 #[derive(Clone, Copy)]
@@ -109,9 +109,9 @@ impl Affine {
 impl Placement {
     /// The placed surface.
     ///
-    /// [`OutOfRange`] where the surface exceeds the range of positions.
-    /// [`Outside`] where it leaves what the machine can hold.
-    pub fn place(&self, surface: &SurfaceSpec) -> Result<SurfaceSpec, Outside> {
+    /// [`OutOfMachineRange`] where the surface exceeds the range of positions.
+    /// [`OutOfMachineRange`] where it leaves what the machine can hold.
+    pub fn place(&self, surface: &SurfaceSpec) -> Result<SurfaceSpec, OutOfMachineRange> {
         let rotation = Rotation::of_degrees(self.rotate_deg);
         let turned = self.turned(surface, rotation);
         let extent = extent_mm(&turned);
@@ -127,7 +127,7 @@ impl Placement {
             let reach_mm = [least + shift[axis], most + shift[axis]];
             if !(reach_mm[0] >= -POSITION_MAX_MM && reach_mm[1] <= POSITION_MAX_MM) {
                 let too_large = most - least > 2.0 * POSITION_MAX_MM;
-                return Err(Outside {
+                return Err(OutOfMachineRange {
                     axis,
                     reach_mm,
                     too_large,

@@ -12,7 +12,7 @@ use job::AxisLimits;
 use oracle::vector::{Vector, dot, length, scale, subtract};
 
 /// Bounds of the motion along a path, from the axis limits.
-pub(super) trait PathCaps {
+pub(super) trait PathBounds {
     /// The largest velocity, acceleration and jerk along a unit direction of any motion within the limits.
     fn along(&self, direction: Vector) -> LineLimits;
     /// Largest speed of the contact at a point, by its feed and the axis velocities.
@@ -22,7 +22,7 @@ pub(super) trait PathCaps {
     fn accelerations(&self, first: Vector, second: Vector, b: f64) -> [f64; 2];
 }
 
-impl PathCaps for AxisLimits {
+impl PathBounds for AxisLimits {
     fn along(&self, direction: Vector) -> LineLimits {
         let reach = |limit: &[f64; 3]| (0..3).map(|axis| direction[axis].abs() * limit[axis]).sum();
         LineLimits {
@@ -63,7 +63,7 @@ const STEPS: usize = 4000;
 const BISECTIONS: usize = 60;
 
 /// The speed profile without jerk limits.
-pub(super) struct Fastest {
+pub(super) struct MaxSpeedProfile {
     /// Arc lengths, evenly spaced within each smooth span.
     pub(super) arcs: Vec<f64>,
     /// Square of the largest speed at each arc length.
@@ -72,7 +72,7 @@ pub(super) struct Fastest {
     seconds: Vec<Vector>,
 }
 
-impl Fastest {
+impl MaxSpeedProfile {
     pub(super) fn new(path: &PassPath<'_>, feed_mm_s: f64, limits: &AxisLimits) -> Self {
         let (mut arcs, mut firsts, mut seconds) = (Vec::new(), Vec::new(), Vec::new());
         for (span, ends) in path.breaks().windows(2).enumerate() {
@@ -191,10 +191,20 @@ pub fn lower_bound_s(path: &PassPath<'_>, feed_mm_s: f64, limits: &AxisLimits) -
     if path.length_mm() <= 0.0 {
         return 0.0;
     }
-    bound_of(&Fastest::new(path, feed_mm_s, limits), path, feed_mm_s, limits)
+    bound_of(
+        &MaxSpeedProfile::new(path, feed_mm_s, limits),
+        path,
+        feed_mm_s,
+        limits,
+    )
 }
 
-pub(super) fn bound_of(fastest: &Fastest, path: &PassPath<'_>, feed_mm_s: f64, limits: &AxisLimits) -> f64 {
+pub(super) fn bound_of(
+    fastest: &MaxSpeedProfile,
+    path: &PassPath<'_>,
+    feed_mm_s: f64,
+    limits: &AxisLimits,
+) -> f64 {
     let times = fastest.times();
     let whole = times[times.len() - 1];
     let mut places: Vec<(Vector, Vector)> = fastest

@@ -5,7 +5,7 @@
 //! and 4 nm. These are subtracted, so a path within its limits is never reported as exceeding them; at a period of 1 ms and a jerk limit
 //! of 20 000 mm/s^3 the subtraction is a fifth of the limit.
 
-use job::{AXES, Machine};
+use job::{AXES, MachineSpec};
 
 /// Names of the derivatives, and their units.
 pub const ORDERS: [(&str, &str); 3] = [
@@ -39,7 +39,7 @@ pub type Peaks = [Peak; 3];
 
 /// Peaks of the derivatives of positions, one position per period, in the order of ticks. Stores three positions.
 #[derive(Clone, Debug)]
-pub struct Gauge {
+pub struct PeakMeter {
     period_s: f64,
     /// Limits of velocity, acceleration and jerk.
     limits: Option<[[f64; 3]; 3]>,
@@ -50,10 +50,10 @@ pub struct Gauge {
     tick: u64,
 }
 
-impl Gauge {
+impl PeakMeter {
     /// A meter for a machine's limits.
     #[must_use]
-    pub fn new(machine: &Machine) -> Self {
+    pub fn new(machine: &MachineSpec) -> Self {
         Self {
             period_s: machine.period_s(),
             limits: machine.limits.map(|limits| limits.by_order()),
@@ -64,12 +64,12 @@ impl Gauge {
     }
 
     /// The axes are at rest at a position before the next sample.
-    pub fn stand(&mut self, cl_nm: [i32; 3]) {
+    pub fn start_at_rest(&mut self, cl_nm: [i32; 3]) {
         self.last = [Some(cl_nm.map(i64::from)), Some([0; 3]), Some([0; 3])];
     }
 
     /// Discontinuity: no differences are taken across it.
-    pub fn gap(&mut self) {
+    pub fn discontinuity(&mut self) {
         self.last = [None; 3];
     }
 
@@ -92,7 +92,7 @@ impl Gauge {
     }
 
     /// The axes stop at the last position: the differences of the stop count.
-    pub fn come_to_stand(&mut self) {
+    pub fn end_at_rest(&mut self) {
         if let Some(at) = self.last[0] {
             // In range: the position was converted from an i32.
             #[allow(clippy::cast_possible_truncation, reason = "it was an i32 before")]
@@ -153,14 +153,14 @@ mod tests {
     use super::*;
     use job::AxisLimits;
 
-    fn machine(velocity: f64, acceleration: f64, jerk: f64) -> Machine {
-        Machine {
+    fn machine(velocity: f64, acceleration: f64, jerk: f64) -> MachineSpec {
+        MachineSpec {
             limits: Some(AxisLimits {
                 velocity_mm_s: [velocity; 3],
                 acceleration_mm_s2: [acceleration; 3],
                 jerk_mm_s3: [jerk; 3],
             }),
-            ..Machine::default()
+            ..MachineSpec::default()
         }
     }
 
@@ -175,8 +175,8 @@ mod tests {
     /// x = J t^3 / 6: the third difference is J T^3 exactly, the second J T^2 (t - T).
     #[test]
     fn a_cubic_uses_what_it_is_made_of() {
-        let mut gauge = Gauge::new(&machine(100.0, 1000.0, 40_000.0));
-        gauge.stand([nm(-7.0), 0, 0]);
+        let mut gauge = PeakMeter::new(&machine(100.0, 1000.0, 40_000.0));
+        gauge.start_at_rest([nm(-7.0), 0, 0]);
         for tick in 1..=40_u32 {
             let t = f64::from(tick) * 1e-3;
             gauge.add(tick.into(), [nm(-7.0 + 40_000.0 * t.powi(3) / 6.0), 0, 0]);
@@ -195,14 +195,14 @@ mod tests {
 
     #[test]
     fn standing_uses_nothing_and_rounding_is_no_motion() {
-        let mut gauge = Gauge::new(&machine(1.0, 1.0, 1.0));
-        gauge.stand([5, 5, 5]);
+        let mut gauge = PeakMeter::new(&machine(1.0, 1.0, 1.0));
+        gauge.start_at_rest([5, 5, 5]);
         for tick in 0..100_u64 {
             // The worst case of rounding for a machine at rest at a half nanometre.
             let up = i32::from(tick % 2 == 0);
             gauge.add(tick, [5 + up, 5, 5]);
         }
-        gauge.come_to_stand();
+        gauge.end_at_rest();
         for peak in gauge.peaks() {
             assert_eq!(peak.share, Some(0.0));
         }
@@ -213,9 +213,9 @@ mod tests {
     #[test]
     fn a_start_without_a_ramp_is_seen_only_from_standstill() {
         let run = |from_standstill: bool| {
-            let mut gauge = Gauge::new(&machine(20.0, 1000.0, 20_000.0));
+            let mut gauge = PeakMeter::new(&machine(20.0, 1000.0, 20_000.0));
             if from_standstill {
-                gauge.stand([0; 3]);
+                gauge.start_at_rest([0; 3]);
             }
             for tick in 1..50_i32 {
                 gauge.add(tick as u64, [0, 10_000 * tick, 0]);
@@ -226,7 +226,7 @@ mod tests {
         near(gauge.peaks()[0].share.unwrap(), 0.5 * 0.9999, 1e-9);
         assert_eq!(gauge.peaks()[1].share, Some(0.0));
         // A stop from full speed.
-        gauge.come_to_stand();
+        gauge.end_at_rest();
         near(gauge.peaks()[1].axes[1], 1e4 - 2.0, 1e-6);
         near(gauge.peaks()[2].axes[1], 1e7 - 4000.0, 1e-3);
         assert_eq!(failures(&gauge.peaks()).len(), 2);
@@ -234,7 +234,7 @@ mod tests {
         near(gauge.peaks()[2].share.unwrap(), (1e7 - 4000.0) / 2e4, 1e-6);
         assert_eq!((gauge.peaks()[1].axis, gauge.peaks()[1].ticks[1]), (1, 1));
         let mut apart = run(false);
-        apart.gap();
+        apart.discontinuity();
         apart.add(60, [1_000_000, 0, 0]);
         apart.add(61, [1_010_000, 0, 0]);
         near(apart.peaks()[0].share.unwrap(), 0.5 * 0.9999, 1e-9);
@@ -244,7 +244,7 @@ mod tests {
     #[test]
     fn a_circle_uses_its_three_powers() {
         let (radius, speed) = (25.0, 90.0);
-        let mut gauge = Gauge::new(&machine(100.0, 500.0, 4000.0));
+        let mut gauge = PeakMeter::new(&machine(100.0, 500.0, 4000.0));
         for tick in 0..4000_u32 {
             let angle = f64::from(tick) * 1e-3 * speed / radius;
             gauge.add(
@@ -263,7 +263,7 @@ mod tests {
 
     #[test]
     fn without_limits_there_are_magnitudes_and_no_shares() {
-        let mut gauge = Gauge::new(&Machine::default());
+        let mut gauge = PeakMeter::new(&MachineSpec::default());
         for tick in 0..10_i32 {
             gauge.add(tick as u64, [3000 * tick, -8000 * tick, 0]);
         }

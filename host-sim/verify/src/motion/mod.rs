@@ -18,6 +18,6 @@ mod programme;
 mod timing;
 
 pub use bound::lower_bound_s;
-pub use limits::{Gauge, Peak, Peaks};
-pub use optimum::{NoMotion, Optimum, optimum};
+pub use limits::{Peak, PeakMeter, Peaks};
+pub use optimum::{NoFeasibleMotion, Optimum, optimum};
 pub use path::{CurvePoint, PassPath, PathPoint};

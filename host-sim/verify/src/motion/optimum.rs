@@ -8,9 +8,9 @@
 //!
 //! The motion is not proved to be optimal: the least time is between the two.
 
-use super::bound::{Fastest, PathCaps as _, bound_of};
+use super::bound::{MaxSpeedProfile, PathBounds as _, bound_of};
 use super::path::PassPath;
-use super::programme::{Interval, Profile, Programme};
+use super::programme::{Interval, MotionProfile, Programme};
 use super::timing::Timing;
 use job::AxisLimits;
 
@@ -49,19 +49,19 @@ pub struct Optimum {
 /// The solver found no motion.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 #[error("no motion within the limits was found")]
-pub struct NoMotion;
+pub struct NoFeasibleMotion;
 
 /// The least time of a pass at this feed of the contact (above 0), with one sample per period: bound and motion. Both are 0 for a pass of
 /// zero length.
 ///
 /// # Errors
-/// [`NoMotion`] where the solver fails.
+/// [`NoFeasibleMotion`] where the solver fails.
 pub fn optimum(
     path: &PassPath<'_>,
     feed_mm_s: f64,
     limits: &AxisLimits,
     period_s: f64,
-) -> Result<Optimum, NoMotion> {
+) -> Result<Optimum, NoFeasibleMotion> {
     if path.length_mm() <= 0.0 {
         return Ok(Optimum {
             lower_bound_s: 0.0,
@@ -69,9 +69,9 @@ pub fn optimum(
             uses: [0.0; 3],
         });
     }
-    let fastest = Fastest::new(path, feed_mm_s, limits);
+    let fastest = MaxSpeedProfile::new(path, feed_mm_s, limits);
     let lower_bound_s = bound_of(&fastest, path, feed_mm_s, limits);
-    let search = Search::new(path, feed_mm_s, limits, period_s, &fastest);
+    let search = MotionSearch::new(path, feed_mm_s, limits, period_s, &fastest);
     let (feasible_s, uses) = search.motion()?;
     Ok(Optimum {
         lower_bound_s,
@@ -81,7 +81,7 @@ pub fn optimum(
 }
 
 /// A point where the motion slows down: an end, or a break where the path's derivatives step.
-struct Slow {
+struct SlowPoint {
     arc: f64,
     /// Speed there, mm/s.
     speed: f64,
@@ -89,7 +89,7 @@ struct Slow {
     jerk: f64,
 }
 
-impl Slow {
+impl SlowPoint {
     /// The speed of a ramp at constant jerk, at an arc length.
     fn speed_at(&self, arc: f64) -> f64 {
         let way = (arc - self.arc).abs();
@@ -98,23 +98,23 @@ impl Slow {
 }
 
 /// A step of the derivatives at a break.
-struct Step {
+struct DerivativeStep {
     arc: f64,
     steps: [[f64; 3]; 2],
 }
 
-struct Search<'a> {
+struct MotionSearch<'a> {
     path: &'a PassPath<'a>,
     feed_mm_s: f64,
     limits: &'a AxisLimits,
     period_s: f64,
-    fastest: &'a Fastest,
-    slow: Vec<Slow>,
-    steps: Vec<Step>,
+    fastest: &'a MaxSpeedProfile,
+    slow: Vec<SlowPoint>,
+    steps: Vec<DerivativeStep>,
 }
 
 /// The nodes of a programme.
-struct Grid {
+struct NodeGrid {
     arcs: Vec<f64>,
     intervals: Vec<Interval>,
     caps: Vec<f64>,
@@ -127,17 +127,17 @@ fn path_jerk(first: [f64; 3], limits: &AxisLimits) -> f64 {
     })
 }
 
-impl<'a> Search<'a> {
+impl<'a> MotionSearch<'a> {
     fn new(
         path: &'a PassPath<'a>,
         feed_mm_s: f64,
         limits: &'a AxisLimits,
         period_s: f64,
-        fastest: &'a Fastest,
+        fastest: &'a MaxSpeedProfile,
     ) -> Self {
         let length = path.length_mm();
         let breaks = path.breaks();
-        let end = |span: usize, arc: f64| Slow {
+        let end = |span: usize, arc: f64| SlowPoint {
             arc,
             speed: 0.0,
             jerk: END_JERK * path_jerk(path.at(span, arc).first, limits),
@@ -147,7 +147,7 @@ impl<'a> Search<'a> {
         for (span, arc) in breaks.iter().enumerate().take(breaks.len() - 1).skip(1) {
             let (before, after) = (path.at(span - 1, *arc), path.at(span, *arc));
             let of = |a: [f64; 3], b: [f64; 3]| std::array::from_fn(|axis| (a[axis] - b[axis]).abs());
-            let step = Step {
+            let step = DerivativeStep {
                 arc: *arc,
                 steps: [of(before.first, after.first), of(before.second, after.second)],
             };
@@ -166,7 +166,7 @@ impl<'a> Search<'a> {
             });
             if speed < feed_mm_s {
                 let jerk = path_jerk(before.first, limits).min(path_jerk(after.first, limits));
-                slow.push(Slow {
+                slow.push(SlowPoint {
                     arc: *arc,
                     speed,
                     jerk,
@@ -222,9 +222,9 @@ impl<'a> Search<'a> {
     }
 
     /// Length of the interval that begins at an arc length; `known`: a motion, whose speed changes little in the interval.
-    fn interval_length(&self, arc: f64, known: Option<(&Grid, &Profile)>) -> f64 {
+    fn interval_length(&self, arc: f64, known: Option<(&NodeGrid, &MotionProfile)>) -> f64 {
         let mut most = self.path.length_mm() / WHOLE;
-        let reach = |slow: &Slow| {
+        let reach = |slow: &SlowPoint| {
             // Twice the distance in which a ramp at constant jerk reaches the feed: the extent of speed changes.
             let time = (2.0 * self.feed_mm_s / slow.jerk).sqrt();
             (slow.jerk * time.powi(3) / 3.0).min(self.path.length_mm())
@@ -259,10 +259,10 @@ impl<'a> Search<'a> {
         most
     }
 
-    fn grid(&self, known: Option<(&Grid, &Profile)>) -> Grid {
+    fn grid(&self, known: Option<(&NodeGrid, &MotionProfile)>) -> NodeGrid {
         let length = self.path.length_mm();
         let (from, to) = (self.end_arc(0), length - self.end_arc(1));
-        let mut grid = Grid {
+        let mut grid = NodeGrid {
             arcs: vec![from],
             intervals: Vec::new(),
             caps: Vec::new(),
@@ -310,7 +310,7 @@ impl<'a> Search<'a> {
     }
 
     /// The fastest motion found: its duration, and the use of the limits by its samples.
-    fn motion(&self) -> Result<(f64, [f64; 3]), NoMotion> {
+    fn motion(&self) -> Result<(f64, [f64; 3]), NoFeasibleMotion> {
         let coarse = self.grid(None);
         let floor = LEAST * self.feed_mm_s.powi(2);
         let guess: Vec<f64> = coarse
@@ -347,13 +347,13 @@ impl<'a> Search<'a> {
             }
             guess = profile.squares.iter().map(|square| square.max(floor)).collect();
         }
-        best.ok_or(NoMotion)
+        best.ok_or(NoFeasibleMotion)
     }
 
     /// Solves programme after programme, each linearised at the previous motion.
-    fn improved(&self, grid: &Grid, mut around: Vec<f64>) -> Result<Profile, NoMotion> {
+    fn improved(&self, grid: &NodeGrid, mut around: Vec<f64>) -> Result<MotionProfile, NoFeasibleMotion> {
         let floor = LEAST * self.feed_mm_s.powi(2);
-        let mut best: Option<(f64, Profile)> = None;
+        let mut best: Option<(f64, MotionProfile)> = None;
         for _ in 0..PROGRAMMES {
             let programme = Programme {
                 intervals: &grid.intervals,
@@ -377,10 +377,10 @@ impl<'a> Search<'a> {
                 break;
             }
         }
-        best.map(|(_, profile)| profile).ok_or(NoMotion)
+        best.map(|(_, profile)| profile).ok_or(NoFeasibleMotion)
     }
 
-    fn timing(&self, grid: &Grid, profile: &Profile) -> Timing {
+    fn timing(&self, grid: &NodeGrid, profile: &MotionProfile) -> Timing {
         Timing::new(
             &grid.arcs,
             profile,
@@ -391,7 +391,7 @@ impl<'a> Search<'a> {
 }
 
 /// Squared speed of a motion between its nodes.
-fn interpolated(grid: &Grid, profile: &Profile, arc: f64) -> f64 {
+fn interpolated(grid: &NodeGrid, profile: &MotionProfile, arc: f64) -> f64 {
     let k = grid
         .arcs
         .partition_point(|at| *at <= arc)

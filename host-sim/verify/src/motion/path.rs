@@ -45,7 +45,7 @@ pub struct PathPoint {
 type Curve<'a> = Box<dyn Fn(f64) -> CurvePoint + Send + Sync + 'a>;
 
 /// Parameters and arc lengths of the segments of a smooth span.
-struct Span {
+struct SmoothSpan {
     parameters: Vec<f64>,
     arcs: Vec<f64>,
 }
@@ -53,7 +53,7 @@ struct Span {
 /// One pass, smooth between its breaks.
 pub struct PassPath<'a> {
     curve: Curve<'a>,
-    spans: Vec<Span>,
+    spans: Vec<SmoothSpan>,
     breaks: Vec<f64>,
 }
 
@@ -66,7 +66,7 @@ impl<'a> PassPath<'a> {
         let mut spans = Vec::new();
         let mut arc = 0.0;
         for ends in parameters.windows(2) {
-            let mut span = Span {
+            let mut span = SmoothSpan {
                 parameters: vec![ends[0]],
                 arcs: vec![arc],
             };
@@ -171,7 +171,7 @@ impl<'a> PassPath<'a> {
 
     /// Parameter at an arc length: linear in its segment, then two Newton steps.
     fn parameter(&self, span: usize, arc_mm: f64) -> f64 {
-        let Span { parameters, arcs } = &self.spans[span];
+        let SmoothSpan { parameters, arcs } = &self.spans[span];
         let piece = arcs.partition_point(|at| *at <= arc_mm).clamp(1, PIECES) - 1;
         let (low, high) = (parameters[piece], parameters[piece + 1]);
         let whole = arcs[piece + 1] - arcs[piece];

@@ -36,7 +36,7 @@ pub(super) struct Interval {
 
 /// A motion: squared speed and path acceleration at each node.
 #[derive(Clone, Debug, Default)]
-pub(super) struct Profile {
+pub(super) struct MotionProfile {
     pub(super) squares: Vec<f64>,
     pub(super) accelerations: Vec<f64>,
 }
@@ -74,7 +74,7 @@ pub(super) struct Programme<'a> {
 
 impl Programme<'_> {
     /// The fastest motion within the limits as linearised at these squared speeds (all above 0); `None` if the solver fails.
-    pub(super) fn solve(&self, around: &[f64]) -> Option<Profile> {
+    pub(super) fn solve(&self, around: &[f64]) -> Option<MotionProfile> {
         let scales = self.scales(around);
         let nodes = around.len();
         let mut rows = Rows::default();
@@ -118,7 +118,7 @@ impl Programme<'_> {
                 .map(|node| solution[VARIABLES * node + offset] * scale[node])
                 .collect()
         };
-        Some(Profile {
+        Some(MotionProfile {
             squares: of(0, around),
             accelerations: of(1, &scales),
         })

@@ -1,22 +1,22 @@
 //! Axis travel of a tool path.
 
-use super::track::Track;
+use super::track::ToolPath;
 use job::AXES;
-use job::Machine;
+use job::MachineSpec;
 
 /// Axis travel of a tool path.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Axes {
+pub struct AxisTravel {
     /// Least and largest position of each axis, mm; `None` without samples.
     pub extent_mm: Option<[[f64; 2]; 3]>,
     /// Excess over the travel limits of each axis, below and above, mm: 0 within the travel, or without travel limits.
     pub beyond_mm: [[f64; 2]; 3],
 }
 
-impl Axes {
+impl AxisTravel {
     /// Measures the travel of a tool path.
     #[must_use]
-    pub fn new(track: &Track, machine: &Machine) -> Self {
+    pub fn new(track: &ToolPath, machine: &MachineSpec) -> Self {
         let extent_mm = track.extent_mm();
         let mut beyond_mm = [[0.0; 2]; 3];
         if let (Some(extent), Some(travel)) = (extent_mm, machine.travel_mm) {
@@ -37,7 +37,7 @@ impl Axes {
     }
 
     /// One sentence per axis whose travel is exceeded.
-    pub(super) fn failures(&self, machine: &Machine) -> Vec<String> {
+    pub(super) fn failures(&self, machine: &MachineSpec) -> Vec<String> {
         let (Some(extent), Some(travel)) = (self.extent_mm, machine.travel_mm) else {
             return Vec::new();
         };

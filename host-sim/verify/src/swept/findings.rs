@@ -1,10 +1,10 @@
 //! Result of the measurement, in figures and in sentences.
 
-use super::axes::Axes;
-use super::gouge::Search;
+use super::axes::AxisTravel;
+use super::gouge::GougeSearchResult;
 use super::ridge::{Crest, Gap, GapRidge, MISSED_RADII};
-use super::shape::Shape;
-use super::track::Track;
+use super::shape::SurfaceCheck;
+use super::track::ToolPath;
 use job::Job;
 use oracle::Oracle;
 
@@ -22,7 +22,7 @@ const ARITHMETIC: f64 = 1e-14;
 
 /// The highest ridge.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Extreme {
+pub struct HighestScallop {
     /// Height, mm; four ball radii where no ball reaches the point.
     pub height_mm: f64,
     /// Parameter u.
@@ -59,7 +59,7 @@ pub struct Gouge {
 
 /// Error bound of the measured scallop heights, mm, by contribution; the sum is [`MeasurementError::total_mm`].
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct MeasuringError {
+pub struct MeasurementError {
     /// Interpolation between samples: sagitta of an arc through three samples over the straight lines used.
     pub path_mm: f64,
     /// Rounding of positions to whole nanometres.
@@ -70,7 +70,7 @@ pub struct MeasuringError {
     pub search_mm: f64,
 }
 
-impl MeasuringError {
+impl MeasurementError {
     /// The sum.
     #[must_use]
     pub fn total_mm(&self) -> f64 {
@@ -80,7 +80,7 @@ impl MeasuringError {
 
 /// A point of a ridge.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct RidgeSpot {
+pub struct RidgePoint {
     /// Parameter u.
     pub u: f64,
     /// Parameter v.
@@ -97,22 +97,22 @@ pub struct Ridge {
     /// Gap between passes, from 0.
     pub gap: u32,
     /// Points along the ridge, the highest among them.
-    pub spots: Vec<RidgeSpot>,
+    pub spots: Vec<RidgePoint>,
 }
 
 /// Result of the measurement of a run.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Findings {
+pub struct SweptResult {
     /// The highest ridge. Zero with fewer than two complete passes: `ridges` is empty then.
-    pub scallop_max: Extreme,
+    pub scallop_max: HighestScallop,
     /// Mean of the crest's height, weighted by the surface's area (each gap's strip counts with its crest's height), mm.
     pub scallop_mean_mm: f64,
     /// Shares of that area by crest height: 0 to 0.1 h, 0.1 to 0.2 h, ..., 1.1 to 1.2 h, more.
     pub scallop_histogram: [f64; BINS],
     /// Error bound of the heights, mm.
-    pub measuring_error_mm: f64,
+    pub measurement_error_mm: f64,
     /// Contributions to the error bound.
-    pub measuring_error: MeasuringError,
+    pub measurement_error: MeasurementError,
     /// The deepest gouge; `None` if none is deeper than `gouge_floor_mm`.
     pub gouge: Option<Gouge>,
     /// Least depth that counts as a gouge, mm: the position tolerance of `verify`, plus the interpolation error between samples.
@@ -126,27 +126,27 @@ pub struct Findings {
     /// Number of cells evaluated in the gouge search.
     pub cells: usize,
     /// Axis travel.
-    pub axes: Axes,
+    pub axes: AxisTravel,
     /// Concave radius, poles and degenerate points of the surface.
-    pub shape: Shape,
+    pub shape: SurfaceCheck,
     /// One sentence per violated requirement; empty if all are met.
     pub failures: Vec<String>,
     /// One sentence per condition to know before the run, failures included.
     pub warnings: Vec<String>,
 }
 
-pub(super) struct Parts<'a> {
+pub(super) struct Measurements<'a> {
     pub(super) gaps: &'a [Gap<'a>],
     pub(super) ridges: &'a [GapRidge],
-    pub(super) search: Search,
+    pub(super) search: GougeSearchResult,
     pub(super) sagitta_mm: f64,
-    pub(super) axes: Axes,
-    pub(super) shape: Shape,
+    pub(super) axes: AxisTravel,
+    pub(super) shape: SurfaceCheck,
     pub(super) complete: bool,
 }
 
-impl Findings {
-    pub(super) fn new(job: &Job, oracle: &Oracle, track: &Track, parts: &Parts<'_>) -> Self {
+impl SweptResult {
+    pub(super) fn new(job: &Job, oracle: &Oracle, track: &ToolPath, parts: &Measurements<'_>) -> Self {
         let (scallop_max, most_possible) = extreme(oracle, parts);
         let (scallop_mean_mm, scallop_histogram) = mean(oracle, parts);
         let slant = slant(scallop_max.height_mm, oracle.radius_mm);
@@ -156,7 +156,7 @@ impl Findings {
                 .flatten()
                 .fold(0.0_f64, |most, at| most.max(at.abs()))
         });
-        let measuring_error = MeasuringError {
+        let measurement_error = MeasurementError {
             path_mm: parts.sagitta_mm * slant,
             rounding_mm: ROUNDING_MM * slant,
             stations_mm: most_possible - scallop_max.height_mm,
@@ -166,8 +166,8 @@ impl Findings {
             scallop_max,
             scallop_mean_mm,
             scallop_histogram,
-            measuring_error_mm: measuring_error.total_mm(),
-            measuring_error,
+            measurement_error_mm: measurement_error.total_mm(),
+            measurement_error,
             gouge: gouge(oracle, track, &parts.search),
             gouge_floor_mm: super::POSITION_MM + parts.sagitta_mm,
             gouge_bound_mm: parts.search.bound_mm,
@@ -202,7 +202,7 @@ impl Findings {
                 most.u,
                 most.v
             ));
-        } else if most.height_mm > limit + self.measuring_error_mm {
+        } else if most.height_mm > limit + self.measurement_error_mm {
             failures.push(format!(
                 "the scallop is {:.6} mm high, {:.2} % above the limit of {limit} mm, between passes {} and {} at u = {:.6}, v = {:.6} (measured within {:.1e} mm)",
                 most.height_mm,
@@ -211,7 +211,7 @@ impl Findings {
                 most.gap + 1,
                 most.u,
                 most.v,
-                self.measuring_error_mm
+                self.measurement_error_mm
             ));
         }
         if let Some(gouge) = &self.gouge {
@@ -239,11 +239,11 @@ impl Findings {
         failures
     }
 
-    fn other_warnings(&self, job: &Job, parts: &Parts<'_>) -> Vec<String> {
+    fn other_warnings(&self, job: &Job, parts: &Measurements<'_>) -> Vec<String> {
         let mut warnings = Vec::new();
         if let Some(hollow) = self
             .shape
-            .hollow
+            .concave_radius
             .filter(|hollow| hollow.radius_mm < job.radius_mm)
         {
             warnings.push(format!(
@@ -284,7 +284,7 @@ fn slant(height_mm: f64, radius_mm: f64) -> f64 {
 }
 
 /// The highest crest, and the upper bound of a crest between stations.
-fn extreme(oracle: &Oracle, parts: &Parts<'_>) -> (Extreme, f64) {
+fn extreme(oracle: &Oracle, parts: &Measurements<'_>) -> (HighestScallop, f64) {
     let mut most: Option<(f64, &Crest, usize)> = None;
     let mut possible = 0.0_f64;
     for (gap, ridge) in parts.ridges.iter().enumerate() {
@@ -298,10 +298,10 @@ fn extreme(oracle: &Oracle, parts: &Parts<'_>) -> (Extreme, f64) {
         possible = possible.max(own + ridge.unseen_mm);
     }
     let Some((height_mm, crest, index)) = most else {
-        return (Extreme::default(), 0.0);
+        return (HighestScallop::default(), 0.0);
     };
     let (u, v) = oracle.swapped(crest.path, parts.gaps[index].side(crest.share));
-    let extreme = Extreme {
+    let extreme = HighestScallop {
         height_mm,
         u,
         v,
@@ -317,7 +317,7 @@ fn number(gap: usize) -> u32 {
 }
 
 /// Mean crest height by area, and the histogram (trapezoidal rule along each gap).
-fn mean(oracle: &Oracle, parts: &Parts<'_>) -> (f64, [f64; BINS]) {
+fn mean(oracle: &Oracle, parts: &Measurements<'_>) -> (f64, [f64; BINS]) {
     let (mut sum, mut area, mut histogram) = (0.0, 0.0, [0.0; BINS]);
     for (gap, ridge) in parts.gaps.iter().zip(parts.ridges) {
         let width = gap.side(1.0) - gap.side(0.0);
@@ -340,14 +340,14 @@ fn mean(oracle: &Oracle, parts: &Parts<'_>) -> (f64, [f64; BINS]) {
     (sum / area, histogram.map(|part| part / area))
 }
 
-fn gouge(oracle: &Oracle, track: &Track, search: &Search) -> Option<Gouge> {
+fn gouge(oracle: &Oracle, track: &ToolPath, search: &GougeSearchResult) -> Option<Gouge> {
     let deepest = search.deepest?;
     let (pass, index) = deepest.by;
     let samples = &track.passes[pass as usize];
     let (u, v) = oracle.swapped(samples.path[index as usize], samples.side);
     let tight = |u: f64, v: f64| {
-        super::grid::bend(&oracle.surface.at(u, v), oracle)
-            .is_some_and(|(_, bend)| bend.principal[1] * oracle.radius_mm >= 1.0)
+        super::grid::local_curvature(&oracle.surface.at(u, v), oracle)
+            .is_some_and(|(_, curvature)| curvature.principal[1] * oracle.radius_mm >= 1.0)
     };
     Some(Gouge {
         depth_mm: deepest.depth_mm,
@@ -362,7 +362,7 @@ fn gouge(oracle: &Oracle, track: &Track, search: &Search) -> Option<Gouge> {
 }
 
 /// The ridges with a limited number of points.
-fn thinned(oracle: &Oracle, parts: &Parts<'_>) -> Vec<Ridge> {
+fn thinned(oracle: &Oracle, parts: &Measurements<'_>) -> Vec<Ridge> {
     let each = (SPOTS_MAX / parts.ridges.len().max(1)).max(3);
     let mut ridges = Vec::with_capacity(parts.ridges.len());
     for (index, (gap, ridge)) in parts.gaps.iter().zip(parts.ridges).enumerate() {
@@ -383,7 +383,7 @@ fn thinned(oracle: &Oracle, parts: &Parts<'_>) -> Vec<Ridge> {
                 let (u, v) = oracle.swapped(crest.path, gap.side(crest.share));
                 #[allow(clippy::cast_possible_truncation, reason = "for drawing")]
                 let height_mm = crest.height_mm as f32;
-                RidgeSpot {
+                RidgePoint {
                     u,
                     v,
                     place_mm: crest.place_mm,

@@ -10,9 +10,9 @@
 
 use rayon::prelude::*;
 
-use super::grid::{Bend, Cell, Grid, bend};
+use super::grid::{Cell, CellGrid, LocalCurvature, local_curvature};
 use super::height::Ray;
-use super::tree::{Cut, Depth, Reach, Tree};
+use super::tree::{BallDepth, DepthQuery, PathTree, SampleIndex};
 use job::Along;
 use oracle::vector::{length, subtract};
 use oracle::{Oracle, OracleError};
@@ -30,55 +30,55 @@ const FITS_MIN: f64 = 0.02;
 /// Largest number of enlargements of such a window.
 const WINDOWS: usize = 8;
 /// Empty ranges.
-const NOWHERE: [[f64; 2]; 2] = [[f64::INFINITY, f64::NEG_INFINITY]; 2];
+const EMPTY: [[f64; 2]; 2] = [[f64::INFINITY, f64::NEG_INFINITY]; 2];
 /// Cells per side evaluated for the curvature around a cell.
-const LOOKS: usize = 12;
+const CELLS_PER_SIDE: usize = 12;
 
 /// The deepest point found.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Deepest {
+pub(super) struct DeepestPoint {
     pub(super) depth_mm: f64,
     pub(super) u: f64,
     pub(super) v: f64,
     pub(super) place_mm: [f64; 3],
-    pub(super) by: Cut,
+    pub(super) by: SampleIndex,
 }
 
 /// Result of the search.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Search {
-    pub(super) deepest: Option<Deepest>,
+pub(super) struct GougeSearchResult {
+    pub(super) deepest: Option<DeepestPoint>,
     /// Upper bound of the depth at every point, mm.
     pub(super) bound_mm: f64,
     pub(super) cells: usize,
 }
 
-pub(super) struct Searcher<'a> {
+pub(super) struct GougeSearch<'a> {
     pub(super) oracle: &'a Oracle,
-    pub(super) tree: &'a Tree<'a>,
-    pub(super) grid: &'a Grid,
+    pub(super) tree: &'a PathTree<'a>,
+    pub(super) grid: &'a CellGrid,
     /// Least depth that counts as a gouge, mm.
     pub(super) floor_mm: f64,
 }
 
 #[derive(Clone, Copy, Debug)]
-struct Looked {
+struct CellDepth {
     cell: Cell,
-    depth: Depth,
+    depth: BallDepth,
     place_mm: [f64; 3],
 }
 
-impl Searcher<'_> {
+impl GougeSearch<'_> {
     /// Searches the deepest gouge; `done` is called with the number of cells evaluated.
-    pub(super) fn search(&self, done: &(dyn Fn(u64) + Sync)) -> Search {
-        let mut deepest: Option<Deepest> = None;
+    pub(super) fn search(&self, done: &(dyn Fn(u64) + Sync)) -> GougeSearchResult {
+        let mut deepest: Option<DeepestPoint> = None;
         let mut cells: Vec<Cell> = (0..self.grid.count()).map(|k| self.grid.cell(k)).collect();
         let mut asked = 0;
         let mut left = self.floor_mm;
         for round in 0..=SPLITS_MAX {
             asked += cells.len();
             let found = deepest.map_or(0.0, |deepest| deepest.depth_mm);
-            let looked: Vec<Looked> = cells
+            let looked: Vec<CellDepth> = cells
                 .par_iter()
                 .filter_map(|cell| {
                     done(1);
@@ -90,7 +90,7 @@ impl Searcher<'_> {
                 if let Some(by) = look.depth.by
                     && look.depth.depth_mm > deepest.map_or(self.floor_mm, |deepest| deepest.depth_mm)
                 {
-                    deepest = Some(Deepest {
+                    deepest = Some(DeepestPoint {
                         depth_mm: look.depth.depth_mm,
                         u,
                         v,
@@ -100,11 +100,12 @@ impl Searcher<'_> {
                 }
             }
             let enough = self.enough(deepest.map_or(0.0, |deepest| deepest.depth_mm));
-            let mut open: Vec<&Looked> = looked
+            let mut open: Vec<&CellDepth> = looked
                 .iter()
                 .filter(|look| look.depth.bound_mm > enough)
                 .collect();
-            let most = |open: &[&Looked]| open.iter().map(|look| look.depth.bound_mm).fold(enough, f64::max);
+            let most =
+                |open: &[&CellDepth]| open.iter().map(|look| look.depth.bound_mm).fold(enough, f64::max);
             left = most(&open);
             if open.is_empty() || round == SPLITS_MAX {
                 break;
@@ -121,7 +122,7 @@ impl Searcher<'_> {
             }
             cells = open.iter().flat_map(|look| look.cell.quarters()).collect();
         }
-        Search {
+        GougeSearchResult {
             deepest,
             bound_mm: left,
             cells: asked,
@@ -133,7 +134,7 @@ impl Searcher<'_> {
         self.floor_mm.max(found_mm * (1.0 + DEPTH_SHARE))
     }
 
-    fn look(&self, cell: Cell, floor_mm: f64) -> Result<Looked, OracleError> {
+    fn look(&self, cell: Cell, floor_mm: f64) -> Result<CellDepth, OracleError> {
         let oracle = self.oracle;
         let (u, v) = cell.middle();
         let at = oracle.surface.at(u, v);
@@ -145,32 +146,32 @@ impl Searcher<'_> {
                     .map(|v| length(subtract(oracle.surface.at(u, v).point, at.point)))
             })
             .fold(0.0, f64::max);
-        let (ray, reach) = match bend(&at, oracle) {
-            Some((along, bend)) => {
+        let (ray, reach) = match local_curvature(&at, oracle) {
+            Some((along, curvature)) => {
                 let ray = Ray {
                     from: at.point,
                     along,
                 };
-                (ray, self.reach(cell, around_mm, &bend, floor_mm))
+                (ray, self.reach(cell, around_mm, &curvature, floor_mm))
             }
             None => {
                 let ray = Ray {
                     from: at.point,
                     along: oracle.contact(u, v)?.normal,
                 };
-                let [low, high] = self.grid.principal([cell.u, cell.v], LOOKS);
-                let bend = low.abs().max(high.abs());
-                let reach = Reach {
+                let [low, high] = self.grid.principal([cell.u, cell.v], CELLS_PER_SIDE);
+                let curvature = low.abs().max(high.abs());
+                let reach = DepthQuery {
                     around_mm,
-                    bend: if bend.is_finite() { bend } else { 0.0 },
+                    curvature: if curvature.is_finite() { curvature } else { 0.0 },
                     floor_mm,
                     gouge_mm: self.floor_mm,
-                    but: NOWHERE,
+                    excluded: EMPTY,
                 };
                 (ray, reach)
             }
         };
-        Ok(Looked {
+        Ok(CellDepth {
             cell,
             depth: self.tree.depth(&ray, &reach),
             place_mm: at.point,
@@ -181,23 +182,23 @@ impl Searcher<'_> {
     ///
     /// With b the largest curvature magnitude and R the cell's half-diagonal, the bound of a contact at distance x is
     /// `-a x^2 / (2 r) + R a x / r + R^2 b / 2`: not above 0 from `x = R (1 + sqrt(1 + r b / a))` on.
-    fn reach(&self, cell: Cell, around_mm: f64, own: &Bend, floor_mm: f64) -> Reach {
+    fn reach(&self, cell: Cell, around_mm: f64, own: &LocalCurvature, floor_mm: f64) -> DepthQuery {
         let radius = self.oracle.radius_mm;
         let (u, v) = cell.middle();
         let mut principal = own.principal;
-        let mut but = NOWHERE;
+        let mut excluded = EMPTY;
         // The window depends on the curvature inside it: both are enlarged until they are consistent, or no contact is excluded.
         for round in 0..WINDOWS {
             let fits = 1.0 - radius * principal[1];
             if fits < FITS_MIN || round + 1 == WINDOWS {
-                but = NOWHERE;
+                excluded = EMPTY;
                 break;
             }
-            let bend = principal[0].abs().max(principal[1].abs());
-            let beside_mm = BESIDE * around_mm * (1.0 + (1.0 + radius * bend / fits).sqrt());
+            let curvature = principal[0].abs().max(principal[1].abs());
+            let beside_mm = BESIDE * around_mm * (1.0 + (1.0 + radius * curvature / fits).sqrt());
             let window = |at: f64, per_mm: f64| [at - beside_mm * per_mm, at + beside_mm * per_mm];
-            but = [window(u, own.per_mm[0]), window(v, own.per_mm[1])];
-            let around = self.grid.principal(but, LOOKS);
+            excluded = [window(u, own.per_mm[0]), window(v, own.per_mm[1])];
+            let around = self.grid.principal(excluded, CELLS_PER_SIDE);
             let wider = [principal[0].min(around[0]), principal[1].max(around[1])];
             if wider == principal {
                 break;
@@ -205,14 +206,14 @@ impl Searcher<'_> {
             principal = wider;
         }
         if self.oracle.along == Along::V {
-            but.reverse();
+            excluded.reverse();
         }
-        Reach {
+        DepthQuery {
             around_mm,
-            bend: principal[0].abs().max(principal[1].abs()),
+            curvature: principal[0].abs().max(principal[1].abs()),
             floor_mm,
             gouge_mm: self.floor_mm,
-            but,
+            excluded,
         }
     }
 }

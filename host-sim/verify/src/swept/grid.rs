@@ -22,7 +22,7 @@ const POLE_SHARE: f64 = 1e-5;
 
 /// Curvature at a point.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) struct Bend {
+pub(super) struct LocalCurvature {
     /// Least and largest principal curvature towards the tool, 1/mm.
     pub(super) principal: [f64; 2],
     /// Upper bound of the change of u, and of v, per millimetre on the surface.
@@ -30,7 +30,7 @@ pub(super) struct Bend {
 }
 
 /// Tool normal and curvature; `None` where the derivatives do not span a plane, and close to a pole.
-pub(super) fn bend(at: &Derivatives, oracle: &Oracle) -> Option<([f64; 3], Bend)> {
+pub(super) fn local_curvature(at: &Derivatives, oracle: &Oracle) -> Option<([f64; 3], LocalCurvature)> {
     let (speed_u, speed_v) = (length(at.u), length(at.v));
     let [[u0, u1], [v0, v1]] = oracle.surface.domain();
     let reach = (speed_u * (u1 - u0), speed_v * (v1 - v0));
@@ -48,19 +48,19 @@ pub(super) fn bend(at: &Derivatives, oracle: &Oracle) -> Option<([f64; 3], Bend)
     let mean = 0.5 * (e * n - 2.0 * f * m + g * l) / (area * area);
     let gauss = (l * n - m * m) / (area * area);
     let spread = (mean * mean - gauss).max(0.0).sqrt();
-    let bend = Bend {
+    let curvature = LocalCurvature {
         principal: [mean - spread, mean + spread],
         per_mm: [speed_v / area, speed_u / area],
     };
-    Some((normal, bend))
+    Some((normal, curvature))
 }
 
 /// The grid: cell edges along u and v, and the curvature at each cell's centre.
 #[derive(Debug)]
-pub(super) struct Grid {
+pub(super) struct CellGrid {
     pub(super) edges: [Vec<f64>; 2],
     /// v fastest; `None` in degenerate cells.
-    pub(super) bends: Vec<Option<Bend>>,
+    pub(super) curvatures: Vec<Option<LocalCurvature>>,
 }
 
 /// Part of the surface between two values of each parameter.
@@ -86,7 +86,7 @@ impl Cell {
     }
 }
 
-impl Grid {
+impl CellGrid {
     pub(super) fn new(oracle: &Oracle) -> Self {
         let spans = [Along::U, Along::V].map(|along| span_lengths(oracle, along));
         let cells = |share: f64| {
@@ -122,13 +122,13 @@ impl Grid {
         });
         let mut grid = Self {
             edges,
-            bends: Vec::new(),
+            curvatures: Vec::new(),
         };
-        grid.bends = (0..grid.count())
+        grid.curvatures = (0..grid.count())
             .into_par_iter()
             .map(|index| {
                 let (u, v) = grid.cell(index).middle();
-                bend(&oracle.surface.at(u, v), oracle).map(|(_, bend)| bend)
+                local_curvature(&oracle.surface.at(u, v), oracle).map(|(_, curvature)| curvature)
             })
             .collect();
         grid
@@ -153,7 +153,7 @@ impl Grid {
         }
     }
 
-    /// Least and largest principal curvature in the cells that intersect a range of parameters; evaluates at most `LOOKS` cells per side,
+    /// Least and largest principal curvature in the cells that intersect a range of parameters; evaluates at most `looks` cells per side,
     /// evenly spread.
     pub(super) fn principal(&self, ranges: [[f64; 2]; 2], looks: usize) -> [f64; 2] {
         let columns = self.shape()[1];
@@ -167,8 +167,11 @@ impl Grid {
         let mut found = [f64::INFINITY, f64::NEG_INFINITY];
         for i in (i0..=i1).step_by(i_step) {
             for j in (j0..=j1).step_by(j_step) {
-                if let Some(bend) = &self.bends[i * columns + j] {
-                    found = [found[0].min(bend.principal[0]), found[1].max(bend.principal[1])];
+                if let Some(curvature) = &self.curvatures[i * columns + j] {
+                    found = [
+                        found[0].min(curvature.principal[0]),
+                        found[1].max(curvature.principal[1]),
+                    ];
                 }
             }
         }

@@ -4,7 +4,7 @@
 //! `t = m.N - sqrt((m.N)^2 - |m|^2 + r^2)`, m = C - P. Between two samples the centre moves on a straight line, so the ball
 //! sweeps a capsule: a cylinder with a hemisphere at each end; the entry is the least of theirs.
 
-use super::track::{PassTrack, across};
+use super::track::{ToolPathPass, across};
 use oracle::vector::{Vector, add, dot, scale, subtract};
 
 /// Newton steps towards the nearest sample: each squares the error; the search over neighbours afterwards corrects the rest.
@@ -88,13 +88,13 @@ impl Ray {
 /// The heights left by one pass.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct PassHeight<'a> {
-    pass: &'a PassTrack,
+    pass: &'a ToolPathPass,
     radius: f64,
     stride: usize,
 }
 
 impl<'a> PassHeight<'a> {
-    pub(super) fn new(pass: &'a PassTrack, radius: f64) -> Self {
+    pub(super) fn new(pass: &'a ToolPathPass, radius: f64) -> Self {
         let samples = pass.cl_nm.len();
         let spacing = pass.spacing_mm();
         let stride = STRIDE_SHARE * radius / spacing.max(1e-9);
@@ -107,7 +107,7 @@ impl<'a> PassHeight<'a> {
         Self { pass, radius, stride }
     }
 
-    pub(super) fn pass(&self) -> &'a PassTrack {
+    pub(super) fn pass(&self) -> &'a ToolPathPass {
         self.pass
     }
 

@@ -1,11 +1,11 @@
 //! Scallop height and gouge, measured from the ball's swept envelope, with axis travel and concave radii.
 //!
 //! ```text
-//! samples ──track.rs──► Track ──height.rs──► where a ray from the surface enters one pass's swept ball
+//! samples ──track.rs──► ToolPath ──height.rs──► where a ray from the surface enters one pass's swept ball
 //!                         │   ──tree.rs────► the same, and the nearest ball, over the whole path
 //!                         │        │
-//!                         │        ├──ridge.rs──► the ridge in each gap between two passes: maximum, mean, spots
-//!                         │        └──gouge.rs──► the deepest cut below the surface (cells of grid.rs, split where it matters)
+//!                         │        ├──ridge.rs──► the ridge in each gap between two passes: maximum, mean, points
+//!                         │        └──gouge.rs──► the deepest gouge (cells of grid.rs, split where it matters)
 //!                         └──axes.rs──► travel        shape.rs: tightest concave radius, degenerate points
 //! ```
 //!
@@ -33,17 +33,17 @@ mod tests;
 mod track;
 mod tree;
 
-pub use axes::Axes;
-pub use findings::{Extreme, Findings, Gouge, MeasuringError, Ridge, RidgeSpot};
-pub use shape::{Hollow, Shape};
-pub use track::{PassTrack, Track};
+pub use axes::AxisTravel;
+pub use findings::{Gouge, HighestScallop, MeasurementError, Ridge, RidgePoint, SweptResult};
+pub use shape::{ConcaveRadius, SurfaceCheck};
+pub use track::{ToolPath, ToolPathPass};
 
-use gouge::{Search, Searcher};
-use grid::Grid;
+use gouge::{GougeSearch, GougeSearchResult};
+use grid::CellGrid;
 use height::PassHeight;
 use rayon::prelude::*;
 use ridge::{Gap, GapRidge};
-use tree::Tree;
+use tree::PathTree;
 
 use job::Job;
 use oracle::Oracle;
@@ -72,11 +72,11 @@ impl Progress for () {
 pub fn measure(
     job: &Job,
     oracle: &Oracle,
-    track: &Track,
+    track: &ToolPath,
     complete: bool,
     progress: &dyn Progress,
-) -> Findings {
-    let tree = Tree::new(track, oracle.radius_mm);
+) -> SweptResult {
+    let tree = PathTree::new(track, oracle.radius_mm);
     let whole = track.passes.len() - usize::from(!complete && !track.passes.is_empty());
     let heights: Vec<PassHeight<'_>> = track.passes[..whole]
         .par_iter()
@@ -95,28 +95,28 @@ pub fn measure(
             ridge
         })
         .collect();
-    let grid = Grid::new(oracle);
+    let grid = CellGrid::new(oracle);
     let sagitta_mm = track
         .passes
         .par_iter()
-        .map(PassTrack::sagitta_mm)
+        .map(ToolPathPass::sagitta_mm)
         .reduce(|| 0.0, f64::max);
     progress.begin("gouge", grid.count() as u64);
-    let search: Search = Searcher {
+    let search: GougeSearchResult = GougeSearch {
         oracle,
         tree: &tree,
         grid: &grid,
         floor_mm: POSITION_MM + sagitta_mm,
     }
     .search(&|steps| progress.done(steps));
-    let parts = findings::Parts {
+    let parts = findings::Measurements {
         gaps: &gaps,
         ridges: &ridges,
         search,
         sagitta_mm,
-        axes: Axes::new(track, &job.machine),
-        shape: Shape::new(oracle, &grid),
+        axes: AxisTravel::new(track, &job.machine),
+        shape: SurfaceCheck::new(oracle, &grid),
         complete,
     };
-    Findings::new(job, oracle, track, &parts)
+    SweptResult::new(job, oracle, track, &parts)
 }

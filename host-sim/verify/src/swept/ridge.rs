@@ -1,7 +1,7 @@
 //! The ridge between two neighbouring passes: the highest point across the gap, at stations along the gap.
 
 use super::height::{PassHeight, Ray};
-use super::tree::Tree;
+use super::tree::PathTree;
 use oracle::vector::{cross, length, scale};
 use oracle::{Oracle, OracleError};
 
@@ -55,7 +55,7 @@ pub(super) struct GapRidge {
 pub(super) struct Gap<'a> {
     oracle: &'a Oracle,
     passes: [PassHeight<'a>; 2],
-    tree: &'a Tree<'a>,
+    tree: &'a PathTree<'a>,
     sides: [f64; 2],
     /// Shares of the gap that are evaluated, 0 and 1 among them.
     across: Vec<f64>,
@@ -63,7 +63,7 @@ pub(super) struct Gap<'a> {
 }
 
 impl<'a> Gap<'a> {
-    pub(super) fn new(oracle: &'a Oracle, passes: [PassHeight<'a>; 2], tree: &'a Tree<'a>) -> Self {
+    pub(super) fn new(oracle: &'a Oracle, passes: [PassHeight<'a>; 2], tree: &'a PathTree<'a>) -> Self {
         let sides = passes.map(|pass| pass.pass().side);
         let width = sides[1] - sides[0];
         let mut ends = vec![0.0];

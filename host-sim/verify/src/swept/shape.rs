@@ -2,7 +2,7 @@
 
 use rayon::prelude::*;
 
-use super::grid::{Grid, bend};
+use super::grid::{CellGrid, local_curvature};
 use oracle::Oracle;
 use oracle::vector::{length, subtract};
 
@@ -17,7 +17,7 @@ const POINT_MM: f64 = 1e-9;
 
 /// The tightest concave radius of a surface.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Hollow {
+pub struct ConcaveRadius {
     /// Radius of curvature towards the tool, mm: the least of all directions.
     pub radius_mm: f64,
     /// Parameter u.
@@ -30,19 +30,19 @@ pub struct Hollow {
 
 /// Properties of the surface that limit the ball.
 #[derive(Clone, Debug, Default, PartialEq)]
-pub struct Shape {
+pub struct SurfaceCheck {
     /// The tightest concave radius; `None` where the surface is nowhere concave towards the tool.
-    pub hollow: Option<Hollow>,
+    pub concave_radius: Option<ConcaveRadius>,
     /// Boundaries that degenerate to a point, e.g. `u = 0`.
     pub poles: Vec<String>,
     /// Other points (u, v) where S_u and S_v span no plane: their number among those evaluated, and the first.
     pub degenerate: Option<(usize, [f64; 2])>,
 }
 
-impl Shape {
-    pub(super) fn new(oracle: &Oracle, grid: &Grid) -> Self {
+impl SurfaceCheck {
+    pub(super) fn new(oracle: &Oracle, grid: &CellGrid) -> Self {
         let mut degenerate: Vec<[f64; 2]> = (0..grid.count())
-            .filter(|index| grid.bends[*index].is_none())
+            .filter(|index| grid.curvatures[*index].is_none())
             .map(|index| grid.cell(index).middle().into())
             .collect();
         let mut poles = Vec::new();
@@ -59,12 +59,13 @@ impl Shape {
             } else {
                 // The ends may be at a pole of another boundary.
                 let inside = &line[1..line.len() - 1];
-                let spans = |[u, v]: &&[f64; 2]| bend(&oracle.surface.at(*u, *v), oracle).is_none();
+                let spans =
+                    |[u, v]: &&[f64; 2]| local_curvature(&oracle.surface.at(*u, *v), oracle).is_none();
                 degenerate.extend(inside.iter().filter(spans));
             }
         }
         Self {
-            hollow: hollow(oracle, grid),
+            concave_radius: concave_radius(oracle, grid),
             poles,
             degenerate: degenerate.first().map(|first| (degenerate.len(), *first)),
         }
@@ -93,9 +94,10 @@ fn boundaries(oracle: &Oracle) -> Vec<(String, Vec<[f64; 2]>)> {
 }
 
 /// The tightest concave radius: the cell with the largest curvature, then a pattern search with bisected steps.
-fn hollow(oracle: &Oracle, grid: &Grid) -> Option<Hollow> {
+fn concave_radius(oracle: &Oracle, grid: &CellGrid) -> Option<ConcaveRadius> {
     let curvature = |u: f64, v: f64| {
-        bend(&oracle.surface.at(u, v), oracle).map_or(f64::NEG_INFINITY, |(_, bend)| bend.principal[1])
+        local_curvature(&oracle.surface.at(u, v), oracle)
+            .map_or(f64::NEG_INFINITY, |(_, curvature)| curvature.principal[1])
     };
     // Corners as well as cell centres: the largest curvature is often on a boundary.
     let (index, _) = (0..grid.count())
@@ -103,7 +105,7 @@ fn hollow(oracle: &Oracle, grid: &Grid) -> Option<Hollow> {
         .map(|index| {
             let cell = grid.cell(index);
             let corners = cell.u.into_iter().flat_map(|u| cell.v.map(|v| curvature(u, v)));
-            let middle = grid.bends[index].map_or(f64::NEG_INFINITY, |bend| bend.principal[1]);
+            let middle = grid.curvatures[index].map_or(f64::NEG_INFINITY, |curvature| curvature.principal[1]);
             (index, corners.fold(middle, f64::max))
         })
         .reduce(
@@ -142,7 +144,7 @@ fn hollow(oracle: &Oracle, grid: &Grid) -> Option<Hollow> {
             step_v *= 0.5;
         }
     }
-    (most > FLAT).then(|| Hollow {
+    (most > FLAT).then(|| ConcaveRadius {
         radius_mm: 1.0 / most,
         u,
         v,

@@ -3,8 +3,8 @@
 use std::f64::consts::FRAC_1_SQRT_2;
 
 use super::*;
-use job::{Along, Machine, NurbsSpec, Origin, Pattern, Side, SurfaceSpec};
-use oracle::Emitted;
+use job::{Along, MachineSpec, NurbsSpec, Origin, Pattern, Side, SurfaceSpec};
+use oracle::PassSample;
 use oracle::vector::{length, subtract};
 
 const RADIUS: f64 = 5.0;
@@ -20,14 +20,14 @@ fn job(surface: SurfaceSpec, along: Along, side: Side, scallop_mm: f64) -> Job {
         pattern: Pattern::Zig,
         spacing: job::Spacing::Exact,
         chord_mm: 0.005,
-        machine: Machine::default(),
+        machine: MachineSpec::default(),
         origin: Origin::default(),
     }
 }
 
 /// A tool path on these passes, with `steps` samples on each, evenly spread over the parameter.
-fn track(oracle: &Oracle, sides: &[f64], steps: u32) -> Track {
-    let mut track = Track::default();
+fn track(oracle: &Oracle, sides: &[f64], steps: u32) -> ToolPath {
+    let mut track = ToolPath::default();
     let [low, high] = oracle.path_range();
     let mut tick = 0;
     for (pass, side) in (0_u32..).zip(sides) {
@@ -36,7 +36,7 @@ fn track(oracle: &Oracle, sides: &[f64], steps: u32) -> Track {
             let (u, v) = oracle.swapped(path, *side);
             let contact = oracle.contact(u, v).unwrap();
             let nm = |mm: [f64; 3]| mm.map(|mm| (mm * 1e6).round() as i32);
-            let sample = Emitted {
+            let sample = PassSample {
                 tick,
                 pass,
                 u,
@@ -55,19 +55,19 @@ fn track(oracle: &Oracle, sides: &[f64], steps: u32) -> Track {
     track
 }
 
-fn measured(job: &Job, sides: &[f64], steps: u32) -> Findings {
+fn measured(job: &Job, sides: &[f64], steps: u32) -> SweptResult {
     let oracle = Oracle::new(job).unwrap();
     measure(job, &oracle, &track(&oracle, sides, steps), true, &())
 }
 
 /// Asserts agreement within the error bound that the measurement states.
-fn agrees(found: &Findings, exact: f64) {
+fn agrees(found: &SweptResult, exact: f64) {
     let off = (found.scallop_max.height_mm - exact).abs();
     assert!(
-        off <= found.measuring_error_mm,
+        off <= found.measurement_error_mm,
         "{} for {exact}: off by {off:e}, stated {:e}",
         found.scallop_max.height_mm,
-        found.measuring_error_mm
+        found.measurement_error_mm
     );
 }
 
@@ -103,7 +103,7 @@ fn plane_leaves_the_ridge_of_two_circles() {
         agrees(&found, flat(0.06 * 20.0));
         assert_eq!(found.scallop_max.gap, 2);
         assert!((found.scallop_max.v - 0.07).abs() < 1e-5);
-        assert!(found.measuring_error_mm < 4e-6, "{:?}", found.measuring_error);
+        assert!(found.measurement_error_mm < 4e-6, "{:?}", found.measurement_error);
         let gaps = sides.windows(2).map(|ends| 20.0 * (ends[1] - ends[0]));
         let mean = gaps.map(|d| d * flat(d)).sum::<f64>() / (20.0 * 0.21);
         assert!((found.scallop_mean_mm - mean).abs() < 4e-6);
@@ -139,7 +139,7 @@ fn cylinder_along_its_axis() {
             let (sin, cos) = (0.5 / radius).sin_cos();
             let crest = centre * cos - sign * (RADIUS * RADIUS - (centre * sin).powi(2)).sqrt();
             agrees(&found, sign * (crest - radius));
-            assert!(found.measuring_error_mm < 1e-4 * found.scallop_max.height_mm + 4e-6);
+            assert!(found.measurement_error_mm < 1e-4 * found.scallop_max.height_mm + 4e-6);
             assert_eq!((found.scallop_max.gap, found.gouge), (1, None));
         }
     }
@@ -158,7 +158,7 @@ fn cylinder_around_its_axis() {
             // The stated interpolation error equals the sagitta of an arc of that length.
             let half = 0.5 / f64::from(steps);
             let sagitta = (20.0 + sign * RADIUS) * (1.0 - half.cos());
-            let stated = found.measuring_error.path_mm;
+            let stated = found.measurement_error.path_mm;
             assert!(
                 stated >= 0.99 * sagitta - 1e-6 && stated <= 1.05 * sagitta + 2e-6,
                 "{stated:e} for {sagitta:e}"
@@ -188,7 +188,7 @@ fn sphere_by_meridians() {
     };
     agrees(&found, sides.windows(2).map(height).fold(0.0, f64::max));
     assert!((found.scallop_max.u - 1.0).abs() < 1e-9);
-    assert!(found.scallop_max.height_mm > 0.005 && found.measuring_error_mm < 1e-5);
+    assert!(found.scallop_max.height_mm > 0.005 && found.measurement_error_mm < 1e-5);
     assert_eq!(found.shape.poles, ["u = 0"]);
     assert_eq!((found.gouge, found.shape.degenerate), (None, None));
 }
@@ -258,7 +258,7 @@ fn ball_on_one_flank_cuts_the_other() {
 }
 
 /// The ball's centre at the gouging tick, recomputed.
-fn oracle_sample(found: &Findings, oracle: &Oracle, sides: &[f64]) -> [f64; 3] {
+fn oracle_sample(found: &SweptResult, oracle: &Oracle, sides: &[f64]) -> [f64; 3] {
     let track = track(oracle, sides, 800);
     let tick = found.gouge.unwrap().tick;
     let pass = track.passes.iter().rfind(|pass| pass.first_tick <= tick).unwrap();
@@ -278,7 +278,7 @@ fn ball_in_a_tight_hollow_is_a_local_gouge() {
         "{gouge:?}"
     );
     assert!(gouge.local && (gouge.v < 0.02 || gouge.v > 0.98));
-    let hollow = found.shape.hollow.unwrap();
+    let hollow = found.shape.concave_radius.unwrap();
     assert!((hollow.radius_mm - 4.0).abs() < 1e-9);
     assert!(found.warnings.iter().any(|line| line.contains("does not fit")));
 }
@@ -319,7 +319,7 @@ fn groove_between_passes_stays_uncut() {
         "{:?}",
         found.failures
     );
-    assert!(found.shape.hollow.unwrap().radius_mm < 10.0);
+    assert!(found.shape.concave_radius.unwrap().radius_mm < 10.0);
 }
 
 /// A third pass that is nearer than the two of the gap determines the height.
@@ -335,7 +335,7 @@ fn other_passes_lower_a_ridge() {
         centre[1] = 2_000_000;
     }
     let after = measure(&job, &oracle, &path, true, &());
-    let gap_0 = |found: &Findings| {
+    let gap_0 = |found: &SweptResult| {
         let heights = found.ridges[0].spots.iter().map(|spot| f64::from(spot.height_mm));
         heights.fold(0.0, f64::max)
     };

@@ -1,14 +1,14 @@
 //! The tool path of a run in compact form: 20 bytes per sample.
 
 use job::Along;
-use oracle::Emitted;
+use oracle::PassSample;
 use oracle::vector::{Vector, angle, dot, length, scale, subtract};
 
 const MM_PER_NM: f64 = 1e-6;
 
 /// One pass as emitted.
 #[derive(Clone, Debug, Default, PartialEq)]
-pub struct PassTrack {
+pub struct ToolPathPass {
     /// Side parameter.
     pub side: f64,
     /// Tick of the first sample; one sample per tick follows.
@@ -19,7 +19,7 @@ pub struct PassTrack {
     pub cl_nm: Vec<[i32; 3]>,
 }
 
-impl PassTrack {
+impl ToolPathPass {
     /// Ball centre of a sample, mm.
     #[must_use]
     pub fn centre(&self, index: usize) -> [f64; 3] {
@@ -69,15 +69,15 @@ impl PassTrack {
 
 /// The tool path of a run: written sample by sample, then read.
 #[derive(Clone, Debug, Default, PartialEq)]
-pub struct Track {
+pub struct ToolPath {
     /// The passes, in order.
-    pub passes: Vec<PassTrack>,
+    pub passes: Vec<ToolPathPass>,
     /// Minimum distance of stored samples, nm: nearer ones are left out, except the last of a pass. At low feed the samples are
     /// denser than needed.
     spacing_nm: f64,
 }
 
-impl Track {
+impl ToolPath {
     /// An empty path with this minimum distance of samples, nm.
     #[must_use]
     pub fn with_spacing(spacing_nm: f64) -> Self {
@@ -88,7 +88,7 @@ impl Track {
     }
 
     /// Whether a sample is nearer to the last one stored than the minimum distance.
-    fn is_near(&self, sample: &Emitted) -> bool {
+    fn is_near(&self, sample: &PassSample) -> bool {
         let last = self.passes.last().and_then(|pass| pass.cl_nm.last());
         !sample.last_of_pass
             && last.is_some_and(|last| {
@@ -101,7 +101,7 @@ impl Track {
     }
 
     /// Adds the next sample.
-    pub fn add(&mut self, sample: &Emitted, along: Along) {
+    pub fn add(&mut self, sample: &PassSample, along: Along) {
         let (path, side) = match along {
             Along::U => (sample.u, sample.v),
             Along::V => (sample.v, sample.u),
@@ -112,7 +112,7 @@ impl Track {
                 .passes
                 .last()
                 .map_or(0, |pass| pass.path.len() + pass.path.len() / 64);
-            self.passes.push(PassTrack {
+            self.passes.push(ToolPathPass {
                 side,
                 first_tick: sample.tick,
                 path: Vec::with_capacity(room),
