@@ -227,7 +227,7 @@ fn groove_that_no_sample_lies_in() {
     assert!(cut.scallop_max.height_mm > 0.15, "{:?}", cut.scallop_max);
     assert!(cut.failures.iter().any(|line| line.contains("above the limit")));
     assert!(cut.shape.concave_radius.unwrap().radius_mm < 1.0);
-    assert!(cut.warnings.iter().any(|line| line.contains("hollow")));
+    assert!(cut.warnings.iter().any(|line| line.contains("concave radius")));
 }
 
 /// A part that does not fit the machine's travel fails before anything moves.

@@ -110,16 +110,16 @@ pub fn fault(fault: Fault) -> (String, &'static str) {
                 "the surface has no normal, or folds over: the sine between S_u and S_v is {value:.2e}, below {:.0e}",
                 interp_core::surface::SINE_MIN
             ),
-            "end the surface before this place, or parametrise it anew; a boundary that is exactly one point is allowed",
+            "end the surface before this point, or reparametrise the surface; a boundary that is exactly one point is allowed",
         ),
         FaultKind::ParameterBackwards => (
             format!(
-                "the parametrisation changes its speed too fast for one period: the correction of the step is {value:.2} of it"
+                "the speed of the parametrisation changes too much within one period: the step's correction is {value:.2} of the step"
             ),
             "lower the feed, or parametrise the surface more evenly",
         ),
         FaultKind::OutOfRange => (
-            format!("a cutter location lies at {value:.3} m, outside ±2.147 m"),
+            format!("a cutter location is at {value:.3} m, outside ±2.147 m"),
             "move the part nearer to the origin",
         ),
         FaultKind::TooManyPatches => (
@@ -131,8 +131,8 @@ pub fn fault(fault: Fault) -> (String, &'static str) {
             "use fewer knots, or cut the part into several jobs",
         ),
         FaultKind::PatchTooShort => (
-            format!("one period's arc reaches past a whole patch; {value:.4} mm of it were left over"),
-            "lower the feed, or remove knots that lie closer together than one period's arc",
+            format!("the arc of one period is longer than a whole patch; {value:.4} mm of the arc remain"),
+            "lower the feed, or remove knots closer together than the arc of one period",
         ),
         FaultKind::IntervalTooSmall => (
             format!("the path interval, {value:.1e} of a patch, does not advance the side parameter"),
@@ -156,10 +156,10 @@ pub fn fault(fault: Fault) -> (String, &'static str) {
         ),
         FaultKind::DeadlineMissed => (
             format!("{value} ticks of the sample timer were missed"),
-            "this is a defect of the firmware, or a debugger held the chip",
+            "this is a defect of the firmware, or a debugger halted the chip",
         ),
         FaultKind::TickOverBudget => (
-            format!("a tick took {value} cycles, more than the board allows it"),
+            format!("a tick took {value} cycles, more than the board's limit"),
             "this is a defect of the firmware: please report the job",
         ),
         FaultKind::SoftLimit => (
@@ -171,42 +171,45 @@ pub fn fault(fault: Fault) -> (String, &'static str) {
             "raise `safe_z_mm` in [machine]",
         ),
         FaultKind::LinkBlocked => (
-            "the surface does not face up where the tool has to leave it or come to it".to_owned(),
+            "the surface does not face up at a point of retract or plunge".to_owned(),
             "turn the part so that it faces up ([placement]), or take the pattern \"zigzag\" where only the ends of passes are in the way",
         ),
         FaultKind::EmergencyStop => (
-            "the emergency stop was pressed: the drives are off, the home is lost".to_owned(),
-            "release it, acknowledge, and declare home anew (`cargo sim operate`)",
+            "the emergency stop was pressed: the drives are off, the home position is lost".to_owned(),
+            "release the button, acknowledge, and declare home again (`cargo sim operate`)",
         ),
         FaultKind::LimitSwitch => (
             inputs("an axis is at the end of its travel", fault),
-            "move it off its switch by hand with the drives off, and declare home anew (`cargo sim operate`)",
+            "move the axis off its switch by hand with the drives off, and declare home again (`cargo sim operate`)",
         ),
         FaultKind::DriveFault => (
-            inputs("the drives are off and the home is lost because of", fault),
-            "find the cause at the drive, acknowledge, and declare home anew (`cargo sim operate`)",
+            inputs(
+                "the drives are off and the home position is lost because of",
+                fault,
+            ),
+            "find the cause at the drive, acknowledge, and declare home again (`cargo sim operate`)",
         ),
         FaultKind::HostGone => (
-            format!("no word of the host for {value} periods"),
+            format!("no message from the host for {value} periods"),
             "connect again, and resume or stop the run (`cargo sim operate`)",
         ),
         FaultKind::NotHomed => (
-            "the machine is not homed: nobody has said where its axes stand".to_owned(),
-            "place the axes, and say where they stand: `run --home X,Y,Z`; or homing_required = false in [machine]",
+            "the machine is not homed: the position of its axes has not been declared".to_owned(),
+            "position the axes and declare their position: `run --home X,Y,Z`; or homing_required = false in [machine]",
         ),
         FaultKind::StepRate => (
-            format!("an axis was asked for {value} steps in one period, more than the pulses of a period"),
+            format!("an axis demands {value} steps in one period, more than the capacity of a period"),
             "lower the feed, or set coarser microsteps and steps_per_mm with them",
         ),
         FaultKind::StepOutput => (
             if value > 0.0 {
                 format!(
-                    "the direction pins were set {value} slots late, within the pulses of an axis that turns"
+                    "the direction pins were set {value} slots late, within the pulses of an axis that reverses"
                 )
             } else {
-                "the DMA that hands the step pulses out has stopped".to_owned()
+                "the DMA that outputs the step pulses has stopped".to_owned()
             },
-            "home the machine; this is a defect of the firmware, or a debugger held the chip",
+            "home the machine; this is a defect of the firmware, or a debugger halted the chip",
         ),
     }
 }

@@ -59,7 +59,10 @@ pub(crate) struct NoFaces;
 impl FaceReader for NoFaces {
     fn surface(&self, face: &Face) -> Result<SurfaceSpec, FaceError> {
         Err(FaceError {
-            what: format!("{} is a CAD file, which cannot be read here", face.path.display()),
+            what: format!(
+                "{} is a CAD file, which this command cannot read",
+                face.path.display()
+            ),
             remedy: "make a job of the face with `cargo sim import`".to_owned(),
             of_face: false,
         })

@@ -102,7 +102,7 @@ fn read_supervision(machine: &Section<'_>, read: &mut MachineSpec) -> Result<(),
                 "`host_gone_ms` must be {least} to {most}, not {}",
                 read.heartbeat_timeout_ms
             );
-            let remedy = "give the silence in milliseconds after which the host is gone, e.g. 1000";
+            let remedy = "give the heartbeat timeout in milliseconds, e.g. 1000";
             return Err(machine.error("host_gone_ms", what, remedy));
         }
     }

@@ -108,7 +108,7 @@ impl<'t> Section<'t> {
     pub(super) fn section(&self, name: &str) -> Result<Section<'t>, JobError> {
         self.optional_section(name)?.ok_or_else(|| {
             let end = self.reader.text.len();
-            let remedy = format!("add the section `[{name}]`; jobs/revolved.toml shows a whole job");
+            let remedy = format!("add the section `[{name}]`; jobs/revolved.toml is a complete job");
             self.reader
                 .error(end..end, format!("the section `[{name}]` is missing"), remedy)
         })

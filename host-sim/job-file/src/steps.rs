@@ -79,7 +79,7 @@ fn axis(value: &Value<'_, '_>) -> Result<Ratio, JobError> {
     }
     .ok_or_else(|| {
         value.error(
-            "is no number of steps, nor a fraction whose two parts are below 2^32",
+            "is neither a number of steps nor a fraction with both parts below 2^32",
             WANT,
         )
     })?;
@@ -108,7 +108,7 @@ fn time(machine: &Section<'_>, key: &str, default_us: f64, most_us: f64) -> Resu
     Err(machine.error(
         key,
         what,
-        "give the time that the drive's manual asks for, in microseconds",
+        "give the time required by the drive's manual, in microseconds",
     ))
 }
 
@@ -119,7 +119,7 @@ pub(super) fn read(machine: &Section<'_>, period_us: f64) -> Result<Option<StepO
     if !machine.has(steps) {
         let alone = [pulse, setup, inverted].into_iter().find(|key| machine.has(key));
         return alone.map_or(Ok(None), |key| {
-            let what = format!("`{key}` says nothing without `{steps}`");
+            let what = format!("`{key}` has no effect without `{steps}`");
             Err(machine.error(key, what, WANT))
         });
     }
@@ -213,16 +213,16 @@ mod tests {
     }
 
     #[test]
-    fn what_is_no_steps_is_said() {
+    fn invalid_steps_are_refused() {
         for (steps, what) in [
             ("[400, 400]", "3 numbers"),
             ("[400, 0, 400]", "1/1000"),
             ("[400, 500001, 400]", "1/1000"),
-            ("[400, -4.5, 400]", "no number of steps"),
+            ("[400, -4.5, 400]", "a number of steps"),
             (r#"[400, "5/0", 400]"#, "1/1000"),
-            (r#"[400, "a/5", 400]"#, "no number of steps"),
+            (r#"[400, "a/5", 400]"#, "a number of steps"),
             ("[400, true, 400]", "must be a number"),
-            ("[400, 0.12345678912345, 400]", "no number of steps"),
+            ("[400, 0.12345678912345, 400]", "a number of steps"),
         ] {
             let said = read_from(&format!("steps_per_mm = {steps}")).unwrap_err();
             assert!(said.contains(what), "{steps}: {said}");

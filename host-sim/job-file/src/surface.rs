@@ -230,8 +230,8 @@ fn read_knots(section: &Section<'_>, key: &str, degree: usize, poles: usize) -> 
     }
     let knots = entries.iter().map(Value::number).collect::<Result<Vec<_>, _>>()?;
     if let Some(at) = (1..knots.len()).find(|i| knots[*i] < knots[i - 1]) {
-        let what = format!("is {}, below the one before it ({})", knots[at], knots[at - 1]);
-        return Err(entries[at].error(&what, "give knots that never descend"));
+        let what = format!("is {}, below the previous one ({})", knots[at], knots[at - 1]);
+        return Err(entries[at].error(&what, "give knots in ascending order"));
     }
     let (start, end) = (knots[degree], knots[poles]);
     if start >= end {
@@ -258,8 +258,7 @@ fn check_multiplicity(knots: &[f64], entries: &[Value<'_, '_>], degree: usize) -
             (degree + 1, "at an end")
         };
         if times > most {
-            let what =
-                format!("makes {knot} stand {times} times; {place} a knot may stand at most {most} times");
+            let what = format!("gives {knot} a multiplicity of {times}; {place} it may be at most {most}");
             return Err(entries[at].error(
                 &what,
                 "remove the repeated knot and its row of poles, or split the surface there",

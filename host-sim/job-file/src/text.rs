@@ -46,7 +46,7 @@ pub(super) fn read(path: &Path) -> Result<String, JobError> {
     let bytes = std::fs::read(path).map_err(|cause| match cause.kind() {
         ErrorKind::NotFound => error(
             "there is no such file".to_owned(),
-            "give the path of a job file; samples are in jobs/, and `cargo sim new` writes one to begin with",
+            "give the path of a job file; samples are in jobs/, and `cargo sim new` writes a first one",
         ),
         ErrorKind::IsADirectory => error(
             "is a folder, not a job file".to_owned(),
@@ -62,7 +62,7 @@ pub(super) fn read(path: &Path) -> Result<String, JobError> {
     }
     if bytes.contains(&0) {
         return Err(error(
-            "is no text: it has bytes of value 0".to_owned(),
+            "is not text: it contains bytes of value 0".to_owned(),
             "give the path of a job file; samples are in jobs/",
         ));
     }
@@ -78,7 +78,7 @@ pub(super) fn read(path: &Path) -> Result<String, JobError> {
     if text.trim_start_matches('\u{feff}').trim().is_empty() {
         return Err(error(
             "the file is empty".to_owned(),
-            "write a job into it: `cargo sim new --force -o FILE` makes one to begin with",
+            "write a job into it: `cargo sim new --force -o FILE` writes a first one",
         ));
     }
     Ok(text)
@@ -103,7 +103,7 @@ mod tests {
     }
 
     #[test]
-    fn editors_of_other_systems_do_no_harm() {
+    fn byte_order_marks_and_crlf_are_accepted() {
         let plain = crate::parse("x", TORUS).unwrap();
         let dos = TORUS.replace('\n', "\r\n");
         for text in [dos.clone(), format!("\u{feff}{TORUS}"), format!("\u{feff}{dos}")] {
@@ -128,14 +128,14 @@ mod tests {
     }
 
     #[test]
-    fn what_is_no_job_file_is_told_apart() {
+    fn other_kinds_of_files_are_recognised() {
         for (bytes, what) in [
             (&b""[..], "None the file is empty"),
             (b" \r\n\t\n", "None the file is empty"),
             (b"\xef\xbb\xbf\n", "None the file is empty"),
             (b"ISO-10303-21;\nHEADER;\n", "None is a STEP file"),
             (b"\xff\xfe[\0s\0", "None is UTF-16 text"),
-            (b"abc\0def", "None is no text"),
+            (b"abc\0def", "None is not text"),
             (
                 b"[surface]\n# caf\xe9\n",
                 "Some((2, 6)) the byte 0xe9 is not UTF-8 text",

@@ -80,7 +80,7 @@ fn neither(job: &Job, trials: &[DirectionTrial; 2], started: bool) -> DirectionE
         "neither direction of the passes can be machined\n{}",
         each.collect::<Vec<_>>().join("\n")
     );
-    let remedy = "mend what one of the directions complains of";
+    let remedy = "remove the cause given for one of the directions";
     if started {
         DirectionError::Faults(format!("{what}\n  help: {remedy}"))
     } else {
@@ -168,7 +168,7 @@ mod tests {
     }
 
     #[test]
-    fn the_faster_direction_wins_and_both_times_are_told() {
+    fn the_faster_direction_wins_and_both_times_are_reported() {
         // The torus is faster along u, the cap along v.
         for (text, faster) in [(TORUS, Along::U), (CAP, Along::V)] {
             let (settled, prepared) = choose(job(text, &[AUTO])).unwrap();
@@ -206,7 +206,7 @@ mod tests {
     }
 
     #[test]
-    fn both_faults_are_told() {
+    fn both_faults_are_reported() {
         // The groove's radius is 8 mm.
         let large = ("radius_mm", "radius_mm = 9");
         let error = choose(job(TORUS, &[AUTO, large])).unwrap_err();
@@ -219,9 +219,9 @@ mod tests {
     }
 
     #[test]
-    fn an_unsettled_job_is_not_prepared() {
+    fn a_job_without_a_direction_is_not_prepared() {
         let error = prepare(&job(TORUS, &[AUTO])).unwrap_err();
-        assert!(error.what().contains("not been settled"), "{error}");
+        assert!(error.what().contains("not been chosen"), "{error}");
         assert!(error.line_and_column().is_some());
     }
 }

@@ -54,7 +54,7 @@ pub fn check(job: &Job) -> Result<(), JobError> {
             if beyond > 0.0 {
                 let [u, v] = prepared.parameters(far.sample.path, far.sample.side);
                 what.push(format!(
-                    "{} comes to {:.3} mm on pass {}, u = {u:.6}, v = {v:.6}: {beyond:.3} mm beyond its travel of {low} to {high} mm",
+                    "{} reaches {:.3} mm on pass {}, u = {u:.6}, v = {v:.6}: {beyond:.3} mm beyond its travel of {low} to {high} mm",
                     AXES[axis], far.mm, far.sample.pass
                 ));
                 remedies.push(remedy(axis, [least.mm, most.mm], [low, high]));
@@ -77,7 +77,7 @@ fn remedy(axis: usize, [least, most]: [f64; 2], [low, high]: [f64; 2]) -> String
     let name = AXES[axis];
     if most - least > high - low {
         return format!(
-            "the job takes {:.3} mm along {name}, more than its travel: turn or scale it in [placement]",
+            "the job takes {:.3} mm along {name}, more than its travel: rotate or scale the part in [placement]",
             most - least
         );
     }
@@ -131,20 +131,20 @@ mod tests {
 
     /// Centres of the torus: x and y 0 to 42.598, z -2.997 to -1.500; its surface 5 mm below.
     #[test]
-    fn a_job_that_leaves_the_travel_is_refused_with_place_and_remedy() {
+    fn a_job_that_leaves_the_travel_is_refused_with_location_and_remedy() {
         // Within by the box alone, then by the samples alone.
         assert_eq!(said("[[-50, 50], [-50, 60], [-20, 20]]"), Ok(()));
         assert_eq!(said("[[-0.001, 43], [-0.001, 43], [-3, -1.499]]"), Ok(()));
         let (what, remedy) = said("[[0, 43], [-1, 43], [-10, -2]]").unwrap_err();
-        assert!(what.contains("z comes to -1.500 mm on pass"), "{what}");
+        assert!(what.contains("z reaches -1.500 mm on pass"), "{what}");
         assert!(
             what.contains("0.500 mm beyond its travel of -10 to -2 mm"),
             "{what}"
         );
-        assert!(!what.contains("x comes"), "{what}");
+        assert!(!what.contains("x reaches"), "{what}");
         assert!(remedy.contains("along z by -7.003 to -0.500 mm"), "{remedy}");
         let (what, remedy) = said("[[1, 40], [-1, 43], [-10, 2]]").unwrap_err();
-        assert_eq!(what.matches("x comes to").count(), 2);
+        assert_eq!(what.matches("x reaches").count(), 2);
         assert!(
             remedy.starts_with("the job takes 42.598 mm along x, more than") && !remedy.contains(';'),
             "{remedy}"

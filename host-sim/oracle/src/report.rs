@@ -141,7 +141,7 @@ impl AccuracyReport {
                 "(relative)",
             ),
             (
-                "pass off its place by",
+                "error of the pass position",
                 self.side_step,
                 bounds.side_step,
                 "of its interval",
@@ -165,7 +165,7 @@ impl AccuracyReport {
                 u64::from(self.off_boundary),
                 "passes that do not start and end on the boundaries",
             ),
-            (self.off_pass, "samples off their pass or against it"),
+            (self.off_pass, "samples off their pass or against its direction"),
         ];
         failures.extend(
             counts

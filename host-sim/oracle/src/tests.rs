@@ -98,7 +98,7 @@ fn rough_nurbs(degree: [usize; 2]) -> SurfaceSpec {
 }
 
 #[test]
-fn plane_has_no_curvature() {
+fn plane_has_zero_curvature() {
     let rail = |y: f64| [[0.0, 0.0, 30.0, 5.0], [0.0, 0.0, 0.0, y], [0.0, 0.0, 0.0, 2.0]];
     let surface = SurfaceSpec::Ruled {
         rail0_mm: rail(0.0),
@@ -115,7 +115,7 @@ fn plane_has_no_curvature() {
 }
 
 #[test]
-fn cylinder_curves_one_way() {
+fn cylinder_has_one_curvature() {
     let surface = SurfaceSpec::Revolved {
         radius_mm: [0.0, 0.0, 0.0, 20.0],
         height_mm: [0.0, 0.0, 50.0, 0.0],
@@ -454,7 +454,7 @@ fn every_fault_is_found() {
 }
 
 #[test]
-fn a_pass_in_the_wrong_place_is_found() {
+fn a_pass_at_a_wrong_side_parameter_is_found() {
     let (oracle, mut samples) = short_job("plate", Pattern::Zig);
     samples
         .iter_mut()

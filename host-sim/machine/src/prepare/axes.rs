@@ -44,12 +44,12 @@ pub(super) fn axes(job: &Job, tool_sign: f64) -> Result<Option<Axes>, JobError> 
                 "machine.travel_mm"
             },
             what,
-            "move the part down with [placement], or give a lower `safe_z_mm` that is still above all of it",
+            "move the part down with [placement], or give a lower `safe_z_mm` above the whole part",
         ));
     }
     for ((axis, place), [least, most]) in ["x", "y", "z"].iter().zip(home_nm).zip(travel_nm) {
         if !(least..=most).contains(&place) {
-            let what = format!("the run's first place is outside the travel of {axis}");
+            let what = format!("the run's first position is outside the travel of {axis}");
             return Err(job.origin.error(
                 if machine.home_mm.is_some() {
                     "machine.home_mm"

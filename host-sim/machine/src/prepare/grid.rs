@@ -59,16 +59,20 @@ fn records(source: &Source, along: Along) -> Result<Records, NoRecords> {
         Along::V => (v, u),
     };
     for _ in 0..ROUNDS_MAX {
-        let grid = grid(source, along, &path, &side)
-            .map_err(|why| no(format!("the machine cannot hold this surface: {why}"), REMEDY))?;
+        let grid = grid(source, along, &path, &side).map_err(|why| {
+            no(
+                format!("the machine cannot represent this surface: {why}"),
+                REMEDY,
+            )
+        })?;
         let [path_spans, side_spans] = &grid.halve;
         if path_spans.is_empty() && side_spans.is_empty() {
             if let Some(span) = grid.mixed {
                 return Err(no(
                     format!(
-                        "beside side span {span} a part of the boundary is a single point, but not all of it"
+                        "at side span {span} a part of the boundary is a single point, but not all of it"
                     ),
-                    "end the surface where the boundary becomes a point, and make two jobs of it",
+                    "split the surface into two jobs where the boundary becomes a point",
                 ));
             }
             return Ok(Records {
@@ -83,7 +87,7 @@ fn records(source: &Source, along: Along) -> Result<Records, NoRecords> {
             break;
         }
     }
-    let what = "the surface does not become patches that the machine can hold";
+    let what = "the surface cannot be split into patches that the machine can represent";
     Err(no(what.to_owned(), REMEDY))
 }
 
@@ -105,7 +109,9 @@ pub fn patch_count(surface: &SurfaceSpec) -> Result<usize, String> {
     let patches = path_spans * side_spans;
     // The width of each span is a word, too.
     if words.len() + path_spans + side_spans > STORE_WORDS {
-        return Err(format!("it takes {patches} patches, more than the board holds"));
+        return Err(format!(
+            "the surface takes {patches} patches, more than the board's store"
+        ));
     }
     Ok(patches)
 }

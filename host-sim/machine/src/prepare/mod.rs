@@ -97,8 +97,8 @@ pub fn prepare(job: &Job) -> Result<Prepared, JobError> {
     if job.origin.along_choice() == &AlongChoice::Auto {
         return Err(job.origin.error(
             "cut.along",
-            "the direction of the passes has not been settled",
-            "say along = \"u\" or \"v\", or have `direction::choose` choose",
+            "the direction of the passes has not been chosen",
+            "write along = \"u\" or \"v\", or call `direction::choose`",
         ));
     }
     let sign = geometry::tool_sign(job)?;
@@ -159,7 +159,7 @@ fn revolved(
     let record = encode::revolved(&radius, &height, v_rad).map_err(|error| {
         job.origin.error(
             "surface",
-            format!("the machine cannot hold this surface: {error}"),
+            format!("the machine cannot represent this surface: {error}"),
             grid::REMEDY,
         )
     })?;

@@ -80,7 +80,7 @@ impl fmt::Display for OutOfMachineRange {
         let axis = AXES.get(self.axis).copied().unwrap_or("?");
         write!(
             out,
-            "the placed surface reaches from {axis} = {least:.3} to {most:.3} mm; the machine reaches ±2147.483 mm"
+            "the placed surface extends from {axis} = {least:.3} to {most:.3} mm; the machine's range is ±2147.483 mm"
         )
     }
 }

@@ -98,7 +98,7 @@ fn polynomials_and_splines_keep_their_parameters() {
 }
 
 #[test]
-fn a_turned_profile_stays_one_about_its_axis() {
+fn a_revolved_profile_keeps_its_kind_about_its_axis() {
     let spec = bell([-3.0, -0.6]);
     for (rotate_deg, turned_rad) in [
         ([0.0, 0.0, 90.0], FRAC_PI_2),
@@ -170,7 +170,7 @@ fn a_tilted_profile_is_the_same_surface() {
 
 /// The box touches the extremes of a dense grid of points and encloses the surface.
 #[test]
-fn the_box_is_the_surface_s() {
+fn the_box_encloses_the_surface() {
     for spec in [bicubic(), ruled(), nurbs(), bell([0.0, TAU]), bell([-0.5, 2.0])] {
         let extent = extent_mm(&spec);
         let surface = Surface::new(&spec);
@@ -206,7 +206,7 @@ fn the_box_is_the_surface_s() {
 }
 
 #[test]
-fn the_anchor_comes_to_lie_where_it_is_wanted() {
+fn the_anchor_is_at_the_translation() {
     let at = [12.0, -7.0, 30.0];
     for spec in [bicubic(), nurbs(), bell([-0.5, 2.0])] {
         for (anchor, shares) in [
@@ -241,7 +241,7 @@ fn the_anchor_comes_to_lie_where_it_is_wanted() {
 }
 
 #[test]
-fn what_reaches_out_of_the_machine_is_refused() {
+fn a_surface_outside_the_range_is_refused() {
     let far = Placement {
         translate_mm: [0.0, 2147.0, 0.0],
         ..Placement::default()

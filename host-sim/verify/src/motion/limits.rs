@@ -140,7 +140,7 @@ pub fn failures(peaks: &Peaks) -> Vec<String> {
         if let Some(share) = peak.share.filter(|share| *share > 1.0 + tolerance) {
             let axis = peak.axis;
             sentences.push(format!(
-                "{} takes {share:.3} of its {name} limit ({:.1} {unit}) at tick {}",
+                "{} uses {share:.3} of its {name} limit ({:.1} {unit}) at tick {}",
                 AXES[axis], peak.axes[axis], peak.ticks[axis]
             ));
         }
@@ -174,7 +174,7 @@ mod tests {
 
     /// x = J t^3 / 6: the third difference is J T^3 exactly, the second J T^2 (t - T).
     #[test]
-    fn a_cubic_uses_what_it_is_made_of() {
+    fn a_cubic_has_its_exact_peaks() {
         let mut gauge = PeakMeter::new(&machine(100.0, 1000.0, 40_000.0));
         gauge.start_at_rest([nm(-7.0), 0, 0]);
         for tick in 1..=40_u32 {
@@ -194,7 +194,7 @@ mod tests {
     }
 
     #[test]
-    fn standing_uses_nothing_and_rounding_is_no_motion() {
+    fn rest_has_no_peaks_and_rounding_is_subtracted() {
         let mut gauge = PeakMeter::new(&machine(1.0, 1.0, 1.0));
         gauge.start_at_rest([5, 5, 5]);
         for tick in 0..100_u64 {
@@ -211,7 +211,7 @@ mod tests {
 
     /// A step of velocity v is an acceleration of v / T and a jerk of v / T^2 in one period.
     #[test]
-    fn a_start_without_a_ramp_is_seen_only_from_standstill() {
+    fn a_start_without_a_ramp_counts_only_from_standstill() {
         let run = |from_standstill: bool| {
             let mut gauge = PeakMeter::new(&machine(20.0, 1000.0, 20_000.0));
             if from_standstill {
@@ -242,7 +242,7 @@ mod tests {
 
     /// A circle of radius R at speed v: v, v^2 / R, v^3 / R^2 on each of its axes; periods as short as they come.
     #[test]
-    fn a_circle_uses_its_three_powers() {
+    fn a_circle_has_its_exact_peaks() {
         let (radius, speed) = (25.0, 90.0);
         let mut gauge = PeakMeter::new(&machine(100.0, 500.0, 4000.0));
         for tick in 0..4000_u32 {
@@ -262,7 +262,7 @@ mod tests {
     }
 
     #[test]
-    fn without_limits_there_are_magnitudes_and_no_shares() {
+    fn without_limits_peaks_have_no_share() {
         let mut gauge = PeakMeter::new(&MachineSpec::default());
         for tick in 0..10_i32 {
             gauge.add(tick as u64, [3000 * tick, -8000 * tick, 0]);

@@ -37,7 +37,7 @@ fn found(path: &PassPath<'_>, feed: f64, limits: &AxisLimits) -> Optimum {
 }
 
 #[test]
-fn straight_passes_take_what_the_closed_form_says() {
+fn straight_passes_agree_with_the_closed_form() {
     let usual = AxisLimits::DEFAULT;
     let mut worst = 0.0_f64;
     let (along_x, slanted) = ([1.0, 0.0, 0.0], [0.6, 0.0, 0.8]);
@@ -71,7 +71,7 @@ fn straight_passes_take_what_the_closed_form_says() {
 
 /// Around a circle the speed is the least of the feed, sqrt(A R) and cbrt(J R^2).
 #[test]
-fn circles_run_at_the_speed_that_their_limits_allow() {
+fn circles_run_at_their_limit_speed() {
     for (radius, ratio, feed, limits) in [
         (
             20.0,
@@ -107,7 +107,7 @@ fn circles_run_at_the_speed_that_their_limits_allow() {
 }
 /// A quarter turn of small radius between two straight lines: the tool slows down in it.
 #[test]
-fn a_corner_is_taken_slower_than_what_leads_to_it() {
+fn a_bend_is_slower_than_the_straight_lines() {
     let (side, radius) = (20.0, 0.5);
     let angle = std::f64::consts::FRAC_PI_2;
     let ends = [0.0, side, side + radius * angle, 2.0 * side + radius * angle];

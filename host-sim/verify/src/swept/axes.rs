@@ -46,7 +46,7 @@ impl AxisTravel {
             .map(|axis| {
                 let ([low, high], [least, most]) = (extent[axis], travel[axis]);
                 format!(
-                    "{} runs from {low:.3} to {high:.3} mm, but machine.travel_mm ends at {least} and {most} mm: move the part or the travel",
+                    "{} moves from {low:.3} to {high:.3} mm, but machine.travel_mm is {least} to {most} mm: move the part, or correct the travel",
                     AXES[axis]
                 )
             })

@@ -196,7 +196,7 @@ impl SweptResult {
         let (most, limit) = (&self.scallop_max, job.scallop_mm);
         if most.height_mm >= MISSED_RADII * job.radius_mm {
             failures.push(format!(
-                "no ball reaches what is left between passes {} and {} at u = {:.6}, v = {:.6}",
+                "no ball reaches the material between passes {} and {} at u = {:.6}, v = {:.6}",
                 most.gap,
                 most.gap + 1,
                 most.u,
@@ -216,13 +216,13 @@ impl SweptResult {
         }
         if let Some(gouge) = &self.gouge {
             let what = if gouge.local {
-                "the ball is larger than the hollow there"
+                "the ball's radius exceeds the concave radius there"
             } else {
-                "the ball stands on another part of the surface"
+                "the ball's contact is on another part of the surface"
             };
             failures.push(format!(
                 "the ball cuts {:.6} mm below the surface at u = {:.6}, v = {:.6} (x = {:.3}, y = {:.3}, z = {:.3} mm): at tick {}, pass {}, \
-                 with its contact at u = {:.6}, v = {:.6}; {what}: take a smaller ball, or leave this region out",
+                 with its contact at u = {:.6}, v = {:.6}; {what}: take a smaller ball, or exclude this region",
                 gouge.depth_mm,
                 gouge.u,
                 gouge.v,
@@ -247,29 +247,30 @@ impl SweptResult {
             .filter(|hollow| hollow.radius_mm < job.radius_mm)
         {
             warnings.push(format!(
-                "the surface has a hollow of radius {:.4} mm at u = {:.6}, v = {:.6}, where a ball of {} mm does not fit",
+                "the surface has a concave radius of {:.4} mm at u = {:.6}, v = {:.6}, where a ball of {} mm does not fit",
                 hollow.radius_mm, hollow.u, hollow.v, job.radius_mm
             ));
         }
         if let Some((count, [u, v])) = self.shape.degenerate {
             warnings.push(format!(
-                "the surface has no normal at {count} of the places looked at, the first at u = {u:.6}, v = {v:.6}"
+                "the surface has no normal at {count} of the points evaluated, the first at u = {u:.6}, v = {v:.6}"
             ));
         }
         let skipped: u32 = parts.ridges.iter().map(|ridge| ridge.skipped).sum();
         if skipped > 0 {
             warnings.push(format!(
-                "{skipped} stations without a normal were left out of the scallop's measure"
+                "{skipped} stations without a normal were left out of the scallop measurement"
             ));
         }
         if !parts.complete {
-            warnings
-                .push("the run is not complete: what follows its last whole pass is not measured".to_owned());
+            warnings.push(
+                "the run is not complete: the part after its last complete pass is not measured".to_owned(),
+            );
         }
         let unseen = self.gouge_bound_mm - self.gouge_max_mm().max(self.gouge_floor_mm);
         if unseen > 1e-3 * self.gouge_max_mm() + 1e-9 {
             warnings.push(format!(
-                "gouges are searched down to {:.6} mm only: the ball hardly fits in too many places",
+                "gouges are searched only down to {:.6} mm: at too many points the ball hardly fits",
                 self.gouge_bound_mm
             ));
         }

@@ -119,7 +119,7 @@ fn steep_ridges_are_exact_too() {
 }
 
 #[test]
-fn what_no_pass_reaches_is_said_to_be_uncut() {
+fn unreached_points_are_reported_as_uncut() {
     let found = measured(&job(plane(), Along::U, Side::Up, 3.0), &[0.0, 0.6, 0.9], 100);
     assert!(
         found.failures.iter().any(|line| line.contains("reaches")),
@@ -196,7 +196,7 @@ fn sphere_by_meridians() {
 /// A plane whose side lines are oblique to its passes: at the passes' ends the ridge is higher than in the middle, because the foot of
 /// a point near one end is beyond the pass. There one ball's path and the other's end are at the same distance: d / (1 + cos) from a pass.
 #[test]
-fn slanted_ends_leave_more() {
+fn oblique_ends_leave_higher_ridges() {
     let slant = 60.0_f64.to_radians();
     let rail = |x: f64, y: f64| [[0.0, 0.0, 30.0, x], [0.0, 0.0, 0.0, y], [0.0; 4]];
     let surface = SurfaceSpec::Ruled {
@@ -231,7 +231,7 @@ fn extruded(degree: usize, profile: &[[f64; 2]]) -> SurfaceSpec {
 
 /// Flanks at 45 degrees, 28.28 mm long: a ball on one flank, at s from the bottom, enters the other one by r - s.
 #[test]
-fn ball_on_one_flank_cuts_the_other() {
+fn ball_on_one_flank_gouges_the_other() {
     let valley = extruded(1, &[[-20.0, 20.0], [0.0, 0.0], [20.0, 20.0]]);
     let job = job(valley, Along::V, Side::Up, 0.01);
     let flank = 800.0_f64.sqrt();
@@ -267,7 +267,7 @@ fn oracle_sample(found: &SweptResult, oracle: &Oracle, sides: &[f64]) -> [f64; 3
 
 /// A concave cylinder of smaller radius than the ball: from every contact the ball interferes most with the far edge.
 #[test]
-fn ball_in_a_tight_hollow_is_a_local_gouge() {
+fn ball_in_a_small_concave_radius_is_a_local_gouge() {
     let job = job(cylinder(4.0), Along::U, Side::Plus, 0.01);
     let found = measured(&job, &[0.0, 0.2, 0.4, 0.6, 0.8, 1.0], 300);
     let gouge = found.gouge.unwrap();
@@ -344,7 +344,7 @@ fn other_passes_lower_a_ridge() {
 }
 
 #[test]
-fn travel_is_held_against_the_machine() {
+fn travel_is_compared_with_the_machine() {
     let mut job = job(plane(), Along::U, Side::Up, 0.5);
     // Centres: x 5 to 35, y 0 to 8, z 7.
     for (travel, beyond) in [
@@ -370,7 +370,7 @@ fn travel_is_held_against_the_machine() {
 }
 
 #[test]
-fn threads_change_nothing() {
+fn results_do_not_depend_on_threads() {
     let text = include_str!("../../../../jobs/torus.toml");
     let job = job_file::parse("torus", text).unwrap();
     let oracle = Oracle::new(&job).unwrap();
@@ -391,7 +391,7 @@ fn threads_change_nothing() {
 
 /// A stopped run leaves no ridge at its last pass; a run without two passes leaves none.
 #[test]
-fn incomplete_runs_are_said_to_be() {
+fn incomplete_runs_are_reported() {
     let job = job(plane(), Along::U, Side::Up, 0.01);
     let oracle = Oracle::new(&job).unwrap();
     for (passes, gaps) in [(3, 1), (2, 0), (1, 0), (0, 0)] {
