@@ -87,8 +87,8 @@ fn every_sample_job_holds_its_limit() {
             "{:?}",
             found.warnings
         );
-        let spots: usize = found.ridges.iter().map(|ridge| ridge.spots.len()).sum();
-        assert!(spots <= 100_000 && found.ridges.iter().all(|ridge| ridge.spots.len() >= 3));
+        let spots: usize = found.ridges.iter().map(|ridge| ridge.points.len()).sum();
+        assert!(spots <= 100_000 && found.ridges.iter().all(|ridge| ridge.points.len() >= 3));
     }
     assert!(off.is_empty(), "{off}");
 }

@@ -10,9 +10,9 @@ use crate::section::{Section, Value};
 /// Highest degree of a NURBS surface: the core's patches are bicubic.
 const DEGREE_MAX: usize = 3;
 /// Excess over a full turn allowed for `v_rad`, rad: rounding of a 2 pi written in decimals.
-const TURN_SLACK_RAD: f64 = 1e-9;
+const TURN_TOLERANCE_RAD: f64 = 1e-9;
 /// Negative radius allowed for a profile, mm: rounding of a profile that ends on the axis.
-const RADIUS_SLACK_MM: f64 = 1e-9;
+const RADIUS_TOLERANCE_MM: f64 = 1e-9;
 
 /// Every key of any kind of surface, and the kinds that have the key.
 const KEYS: [(&str, &str); 14] = [
@@ -73,12 +73,12 @@ fn revolved(section: &Section<'_>) -> Result<SurfaceSpec, JobError> {
     let height_mm = section.numbers("height_mm")?;
     let u = range_or_unit(section, "u")?;
     let v_rad = range(section, "v_rad")?;
-    if v_rad[1] - v_rad[0] > TAU + TURN_SLACK_RAD {
+    if v_rad[1] - v_rad[0] > TAU + TURN_TOLERANCE_RAD {
         let what = format!("`v_rad` spans {} rad, more than a full turn", v_rad[1] - v_rad[0]);
         return Err(section.error("v_rad", what, "give a range of at most 2 pi = 6.283185307179586"));
     }
     let (least_mm, at) = least_of_cubic(&radius_mm, u);
-    if least_mm < -RADIUS_SLACK_MM {
+    if least_mm < -RADIUS_TOLERANCE_MM {
         let what = format!("the profile's radius is negative: {least_mm} mm at u = {at}");
         return Err(section.error(
             "radius_mm",

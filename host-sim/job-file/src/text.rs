@@ -6,7 +6,7 @@ use std::path::Path;
 use job::JobError;
 
 /// Magic bytes of files often given instead of a job file: bytes, message, remedy.
-const OTHERS: [(&[u8], &str, &str); 6] = [
+const MAGIC_BYTES: [(&[u8], &str, &str); 6] = [
     (
         b"ISO-10303-21",
         "is a STEP file, not a job file",
@@ -57,7 +57,7 @@ pub(super) fn read(path: &Path) -> Result<String, JobError> {
             "give the path of a job file that you may read",
         ),
     })?;
-    if let Some((_, what, remedy)) = OTHERS.iter().find(|(first, _, _)| bytes.starts_with(first)) {
+    if let Some((_, what, remedy)) = MAGIC_BYTES.iter().find(|(first, _, _)| bytes.starts_with(first)) {
         return Err(error((*what).to_owned(), remedy));
     }
     if bytes.contains(&0) {

@@ -15,7 +15,7 @@ const BESIDE: f64 = 1e-10;
 /// every approach here; six reduce a hundredth of a millimetre to rounding.
 const FOOT_STEPS: usize = 6;
 /// A correction below this share of the range ends the iteration: the remaining error is a thousandth of it.
-const FOOT_ENOUGH: f64 = 1e-11;
+const FOOT_TOLERANCE: f64 = 1e-11;
 
 /// A point of a pass with the derivative of the tool centre.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -131,7 +131,7 @@ impl Oracle {
             let next = (at.path + by).clamp(low, high);
             let moved = (next - at.path).abs();
             at = self.offset(next, side)?;
-            if moved <= FOOT_ENOUGH * (high - low) {
+            if moved <= FOOT_TOLERANCE * (high - low) {
                 break;
             }
         }

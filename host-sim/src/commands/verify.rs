@@ -84,7 +84,7 @@ fn scallops(job: &Job, swept: &swept::SweptResult) -> Scallops {
         v: spot.v,
         height_mm: spot.height_mm,
     };
-    let ridge = |ridge: &swept::Ridge| (ridge.gap, ridge.spots.iter().map(place).collect());
+    let ridge = |ridge: &swept::Ridge| (ridge.gap, ridge.points.iter().map(place).collect());
     Scallops {
         limit_mm: job.scallop_mm,
         measurement_error_mm: swept.measurement_error_mm,

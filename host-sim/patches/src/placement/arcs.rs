@@ -5,7 +5,7 @@ use std::f64::consts::FRAC_PI_2;
 use job::NurbsSpec;
 
 /// Rounding allowance before one more arc is added, as a share of a quarter turn.
-const QUARTER_SLACK: f64 = 1e-9;
+const QUARTER_TOLERANCE: f64 = 1e-9;
 
 /// The same point set with the same u. v equals the angle at the ends and in the middle of each arc; in between it is the rational
 /// parameter of the arc, which differs by at most 0.0161 rad (0.92 degrees).
@@ -25,7 +25,7 @@ pub(super) fn revolved(
         clippy::cast_sign_loss,
         reason = "a turn has four quarters"
     )]
-    let arcs = ((extent / FRAC_PI_2 - QUARTER_SLACK).ceil() as usize).max(1);
+    let arcs = ((extent / FRAC_PI_2 - QUARTER_TOLERANCE).ceil() as usize).max(1);
     #[allow(clippy::cast_precision_loss, reason = "a turn has four quarters")]
     let share = |halves: usize| halves as f64 / (2 * arcs) as f64;
     let at = |halves: usize| start * (1.0 - share(halves)) + end * share(halves);

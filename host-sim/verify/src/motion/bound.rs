@@ -42,11 +42,11 @@ impl PathBounds for AxisLimits {
         let mut range = [f64::NEG_INFINITY, f64::INFINITY];
         for axis in 0..3 {
             let (gain, drift, limit) = (first[axis], second[axis] * b, self.acceleration_mm_s2[axis]);
-            if gain.abs() > NO_GAIN {
+            if gain.abs() > GAIN_MIN {
                 let ends = [(-limit - drift) / gain, (limit - drift) / gain];
                 range[0] = range[0].max(ends[0].min(ends[1]));
                 range[1] = range[1].min(ends[0].max(ends[1]));
-            } else if drift.abs() > limit * (1.0 + NO_GAIN) {
+            } else if drift.abs() > limit * (1.0 + GAIN_MIN) {
                 return [f64::INFINITY, f64::NEG_INFINITY];
             }
         }
@@ -56,7 +56,7 @@ impl PathBounds for AxisLimits {
 
 /// An axis whose derivative is below this is left out of the range of path accelerations: at its reversal the range would consist
 /// of rounding errors.
-const NO_GAIN: f64 = 1e-6;
+const GAIN_MIN: f64 = 1e-6;
 /// Steps of the sweep over a pass.
 const STEPS: usize = 4000;
 /// Bisections of a squared speed: to f64 precision.
@@ -163,7 +163,7 @@ impl MaxSpeedProfile {
 }
 
 /// Least times from standstill at one end to each point, along the first direction of the path; in the order of `places`.
-fn leaving(places: &[(Vector, Vector)], feed_mm_s: f64, limits: &AxisLimits) -> Vec<f64> {
+fn least_times_from_rest(places: &[(Vector, Vector)], feed_mm_s: f64, limits: &AxisLimits) -> Vec<f64> {
     let Some((from, first)) = places.first() else {
         return Vec::new();
     };
@@ -213,9 +213,9 @@ pub(super) fn bound_of(
         .zip(&fastest.firsts)
         .map(|(arc, first)| (path.position(*arc), *first))
         .collect();
-    let forwards = leaving(&places, feed_mm_s, limits);
+    let forwards = least_times_from_rest(&places, feed_mm_s, limits);
     places.reverse();
-    let mut backwards = leaving(&places, feed_mm_s, limits);
+    let mut backwards = least_times_from_rest(&places, feed_mm_s, limits);
     backwards.reverse();
     places.reverse();
     // Extra time of the ramps at both ends over the sweep, maximised over the two points where the relaxations change, in order.

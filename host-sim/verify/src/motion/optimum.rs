@@ -16,7 +16,7 @@ use job::AxisLimits;
 
 /// Largest number of successive programmes, and the relative gain below which they end.
 const PROGRAMMES: usize = 30;
-const ENOUGH: f64 = 1e-4;
+const GAIN_MIN: f64 = 1e-4;
 /// Largest number of redistributions of the limits by the use of the samples, and the tolerance of the use.
 const ROUNDS: usize = 5;
 const ABOVE: f64 = 3e-4;
@@ -25,7 +25,7 @@ const ABOVE: f64 = 3e-4;
 const END_JERK: f64 = 0.999;
 const END_SHARE: f64 = 0.02;
 /// Intervals: least number over a pass; number over the distance in which the speed changes at ends and breaks; growth away from these.
-const WHOLE: f64 = 120.0;
+const PASS_INTERVALS: f64 = 120.0;
 const RAMP: f64 = 40.0;
 const GROWTH: f64 = 0.15;
 /// Change of speed over an interval, as a share of the largest, once a motion is known.
@@ -33,7 +33,7 @@ const CHANGE: f64 = 0.04;
 /// Least squared speed used for linearisation, as a share of the largest.
 const LEAST: f64 = 1e-9;
 /// Steps of a derivative below this share of a jerk limit are ignored.
-const NO_STEP: f64 = 1e-3;
+const STEP_JERK_SHARE_MIN: f64 = 1e-3;
 
 /// Bounds of the least time of a pass.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -109,7 +109,7 @@ struct MotionSearch<'a> {
     limits: &'a AxisLimits,
     period_s: f64,
     fastest: &'a MaxSpeedProfile,
-    slow: Vec<SlowPoint>,
+    slow_points: Vec<SlowPoint>,
     steps: Vec<DerivativeStep>,
 }
 
@@ -142,7 +142,7 @@ impl<'a> MotionSearch<'a> {
             speed: 0.0,
             jerk: END_JERK * path_jerk(path.at(span, arc).first, limits),
         };
-        let mut slow = vec![end(0, 0.0), end(breaks.len() - 2, length)];
+        let mut slow_points = vec![end(0, 0.0), end(breaks.len() - 2, length)];
         let mut steps = Vec::new();
         for (span, arc) in breaks.iter().enumerate().take(breaks.len() - 1).skip(1) {
             let (before, after) = (path.at(span - 1, *arc), path.at(span, *arc));
@@ -162,11 +162,11 @@ impl<'a> MotionSearch<'a> {
             let counts = (0..3).any(|axis| {
                 let jerk = step.steps[0][axis] * feed_mm_s / period_s.powi(2)
                     + step.steps[1][axis] * feed_mm_s * feed_mm_s / period_s;
-                jerk > NO_STEP * limits.jerk_mm_s3[axis]
+                jerk > STEP_JERK_SHARE_MIN * limits.jerk_mm_s3[axis]
             });
             if speed < feed_mm_s {
                 let jerk = path_jerk(before.first, limits).min(path_jerk(after.first, limits));
-                slow.push(SlowPoint {
+                slow_points.push(SlowPoint {
                     arc: *arc,
                     speed,
                     jerk,
@@ -182,7 +182,7 @@ impl<'a> MotionSearch<'a> {
             limits,
             period_s,
             fastest,
-            slow,
+            slow_points,
             steps,
         }
     }
@@ -194,14 +194,16 @@ impl<'a> MotionSearch<'a> {
         let share = (arc - arcs[after - 1]) / (arcs[after] - arcs[after - 1]);
         let squares = &self.fastest.squares;
         let square = squares[after - 1] + share * (squares[after] - squares[after - 1]);
-        self.slow.iter().fold(square.max(0.0).sqrt(), |speed, slow| {
-            speed.min(slow.speed_at(arc))
-        })
+        self.slow_points
+            .iter()
+            .fold(square.max(0.0).sqrt(), |speed, slow| {
+                speed.min(slow.speed_at(arc))
+            })
     }
 
     /// Duration of the motion before the first node, and after the last one: a ramp at the jerk limit.
     fn end_time_s(&self, end: usize) -> f64 {
-        let jerk = self.slow[end].jerk;
+        let jerk = self.slow_points[end].jerk;
         // Limits the ramp to less than half of a short pass.
         let rise = (self.feed_mm_s / jerk).sqrt();
         let whole = (6.0 * self.path.length_mm() / jerk).cbrt();
@@ -209,13 +211,13 @@ impl<'a> MotionSearch<'a> {
     }
 
     fn end_arc(&self, end: usize) -> f64 {
-        self.slow[end].jerk * self.end_time_s(end).powi(3) / 6.0
+        self.slow_points[end].jerk * self.end_time_s(end).powi(3) / 6.0
     }
 
     /// Squared speed and acceleration at the first node, and at the last.
     fn ends(&self) -> [[f64; 2]; 2] {
         [0, 1].map(|end| {
-            let (jerk, time) = (self.slow[end].jerk, self.end_time_s(end));
+            let (jerk, time) = (self.slow_points[end].jerk, self.end_time_s(end));
             let acceleration = if end == 0 { jerk * time } else { -jerk * time };
             [(0.5 * jerk * time * time).powi(2), acceleration]
         })
@@ -223,13 +225,13 @@ impl<'a> MotionSearch<'a> {
 
     /// Length of the interval that begins at an arc length; `known`: a motion, whose speed changes little in the interval.
     fn interval_length(&self, arc: f64, known: Option<(&NodeGrid, &MotionProfile)>) -> f64 {
-        let mut most = self.path.length_mm() / WHOLE;
+        let mut most = self.path.length_mm() / PASS_INTERVALS;
         let reach = |slow: &SlowPoint| {
             // Twice the distance in which a ramp at constant jerk reaches the feed: the extent of speed changes.
             let time = (2.0 * self.feed_mm_s / slow.jerk).sqrt();
             (slow.jerk * time.powi(3) / 3.0).min(self.path.length_mm())
         };
-        for slow in &self.slow {
+        for slow in &self.slow_points {
             let (way, reach) = ((arc - slow.arc).abs(), reach(slow));
             if way < 3.0 * reach {
                 let least = (slow.speed * self.period_s).max(0.5 * self.end_arc(0));
@@ -280,7 +282,7 @@ impl<'a> MotionSearch<'a> {
                     length: next - arc,
                     points,
                     steps: self.steps_near(arc, next),
-                    ease: [1.0; 2],
+                    limit_shares: [1.0; 2],
                 });
                 grid.arcs.push(next);
                 arc = next;
@@ -341,8 +343,8 @@ impl<'a> MotionSearch<'a> {
                 break;
             }
             for (interval, most) in grid.intervals.iter_mut().zip(most) {
-                for (ease, most) in interval.ease.iter_mut().zip(most) {
-                    *ease /= most.max(1.0);
+                for (limit_shares, most) in interval.limit_shares.iter_mut().zip(most) {
+                    *limit_shares /= most.max(1.0);
                 }
             }
             guess = profile.squares.iter().map(|square| square.max(floor)).collect();
@@ -373,7 +375,7 @@ impl<'a> MotionSearch<'a> {
             if gain > 0.0 {
                 best = Some((time, profile));
             }
-            if gain < ENOUGH {
+            if gain < GAIN_MIN {
                 break;
             }
         }
@@ -384,7 +386,7 @@ impl<'a> MotionSearch<'a> {
         Timing::new(
             &grid.arcs,
             profile,
-            [0, 1].map(|end| (self.slow[end].jerk, self.end_time_s(end))),
+            [0, 1].map(|end| (self.slow_points[end].jerk, self.end_time_s(end))),
             self.path.length_mm(),
         )
     }

@@ -19,7 +19,7 @@ use job::AxisLimits;
 /// Variables per node: b over its previous value, a over its scale, sqrt(b), 1 / sqrt(b), scaled likewise.
 const VARIABLES: usize = 4;
 /// Coefficients below this share of a limit are omitted.
-const NOTHING: f64 = 1e-9;
+const COEFFICIENT_MIN: f64 = 1e-9;
 
 /// Between two nodes.
 #[derive(Clone, Copy, Debug, Default)]
@@ -31,7 +31,7 @@ pub(super) struct Interval {
     /// Magnitudes of the steps of x' and x'' at a break nearby.
     pub(super) steps: [[f64; 3]; 2],
     /// Shares of the acceleration and jerk limits that are used here.
-    pub(super) ease: [f64; 2],
+    pub(super) limit_shares: [f64; 2],
 }
 
 /// A motion: squared speed and path acceleration at each node.
@@ -162,12 +162,12 @@ impl Programme<'_> {
         let interval = &self.intervals[k];
         for (node, point) in [(k, &interval.points[0]), (k + 1, &interval.points[2])] {
             for axis in 0..3 {
-                let limit = self.limits.acceleration_mm_s2[axis] * interval.ease[0];
+                let limit = self.limits.acceleration_mm_s2[axis] * interval.limit_shares[0];
                 let by_square = point.second[axis] * around[node] / limit;
                 let by_acceleration = point.first[axis] * scales[node] / limit;
                 // sqrt(b) is below its tangent.
                 let step = 0.5 * interval.steps[0][axis] * around[node].sqrt() / (self.period_s * limit);
-                if by_square.abs() + by_acceleration.abs() + step <= NOTHING {
+                if by_square.abs() + by_acceleration.abs() + step <= COEFFICIENT_MIN {
                     continue;
                 }
                 for sign in [1.0, -1.0] {
@@ -200,7 +200,7 @@ impl Programme<'_> {
         let acceleration = [0.0, 0.5 * scales[k], 0.0, 0.5 * scales[k + 1]];
         let change = [0.0, -scales[k] / h, 0.0, scales[k + 1] / h];
         for axis in 0..3 {
-            let unit = speed / (self.limits.jerk_mm_s3[axis] * interval.ease[1]);
+            let unit = speed / (self.limits.jerk_mm_s3[axis] * interval.limit_shares[1]);
             let own: [f64; 4] = std::array::from_fn(|n| {
                 unit * (point.third[axis] * square[n]
                     + 3.0 * point.second[axis] * acceleration[n]
@@ -208,7 +208,8 @@ impl Programme<'_> {
             });
             let first_step = unit * interval.steps[0][axis] / self.period_s.powi(2);
             let second_step = unit * 0.75 * interval.steps[1][axis] * speed / self.period_s;
-            if own.iter().map(|value| value.abs()).sum::<f64>() + first_step + second_step <= NOTHING {
+            if own.iter().map(|value| value.abs()).sum::<f64>() + first_step + second_step <= COEFFICIENT_MIN
+            {
                 continue;
             }
             for sign in [1.0, -1.0] {

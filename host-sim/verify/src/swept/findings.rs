@@ -9,7 +9,7 @@ use job::Job;
 use oracle::Oracle;
 
 /// Largest number of points stored for all ridges together.
-const SPOTS_MAX: usize = 100_000;
+const RIDGE_POINTS_MAX: usize = 100_000;
 /// Bins of the histogram per scallop limit, and their number; greater heights are in the last bin.
 const BINS_A_LIMIT: f64 = 10.0;
 const BINS: usize = 13;
@@ -32,7 +32,7 @@ pub struct HighestScallop {
     /// Gap between passes, from 0: between pass `gap` and the next.
     pub gap: u32,
     /// Point on the surface, mm.
-    pub place_mm: [f64; 3],
+    pub point_mm: [f64; 3],
 }
 
 /// The deepest gouge.
@@ -45,7 +45,7 @@ pub struct Gouge {
     /// Parameter v of the gouged point.
     pub v: f64,
     /// The point, mm.
-    pub place_mm: [f64; 3],
+    pub point_mm: [f64; 3],
     /// Tick of the sample that gouges (at the sample, or between it and the next one).
     pub tick: u64,
     /// Pass of that sample.
@@ -86,7 +86,7 @@ pub struct RidgePoint {
     /// Parameter v.
     pub v: f64,
     /// Point on the surface, under the crest, mm.
-    pub place_mm: [f64; 3],
+    pub point_mm: [f64; 3],
     /// Height of the crest above it, mm.
     pub height_mm: f32,
 }
@@ -97,7 +97,7 @@ pub struct Ridge {
     /// Gap between passes, from 0.
     pub gap: u32,
     /// Points along the ridge, the highest among them.
-    pub spots: Vec<RidgePoint>,
+    pub points: Vec<RidgePoint>,
 }
 
 /// Result of the measurement of a run.
@@ -149,7 +149,7 @@ impl SweptResult {
     pub(super) fn new(job: &Job, oracle: &Oracle, track: &ToolPath, parts: &Measurements<'_>) -> Self {
         let (scallop_max, most_possible) = extreme(oracle, parts);
         let (scallop_mean_mm, scallop_histogram) = mean(oracle, parts);
-        let slant = slant(scallop_max.height_mm, oracle.radius_mm);
+        let sensitivity = sensitivity(scallop_max.height_mm, oracle.radius_mm);
         let coordinates = parts.axes.extent_mm.map_or(0.0, |extent| {
             extent
                 .iter()
@@ -157,10 +157,10 @@ impl SweptResult {
                 .fold(0.0_f64, |most, at| most.max(at.abs()))
         });
         let measurement_error = MeasurementError {
-            path_mm: parts.sagitta_mm * slant,
-            rounding_mm: ROUNDING_MM * slant,
+            path_mm: parts.sagitta_mm * sensitivity,
+            rounding_mm: ROUNDING_MM * sensitivity,
             stations_mm: most_possible - scallop_max.height_mm,
-            search_mm: CREST_MM + ARITHMETIC * (coordinates + oracle.radius_mm) * slant,
+            search_mm: CREST_MM + ARITHMETIC * (coordinates + oracle.radius_mm) * sensitivity,
         };
         let mut findings = Self {
             scallop_max,
@@ -226,9 +226,9 @@ impl SweptResult {
                 gouge.depth_mm,
                 gouge.u,
                 gouge.v,
-                gouge.place_mm[0],
-                gouge.place_mm[1],
-                gouge.place_mm[2],
+                gouge.point_mm[0],
+                gouge.point_mm[1],
+                gouge.point_mm[2],
                 gouge.tick,
                 gouge.pass,
                 gouge.contact[0],
@@ -280,7 +280,7 @@ impl SweptResult {
 
 /// Upper bound of the change of a height per shift of the centre: the reciprocal of the cosine between ray and ball, which is
 /// `1 - height / r` on a plane, with a margin for curved surfaces.
-fn slant(height_mm: f64, radius_mm: f64) -> f64 {
+fn sensitivity(height_mm: f64, radius_mm: f64) -> f64 {
     1.0 / (1.0 - 2.0 * height_mm / radius_mm).max(0.1)
 }
 
@@ -296,7 +296,7 @@ fn extreme(oracle: &Oracle, parts: &Measurements<'_>) -> (HighestScallop, f64) {
                 most = Some((crest.height_mm, crest, gap));
             }
         }
-        possible = possible.max(own + ridge.unseen_mm);
+        possible = possible.max(own + ridge.excess_mm);
     }
     let Some((height_mm, crest, index)) = most else {
         return (HighestScallop::default(), 0.0);
@@ -307,7 +307,7 @@ fn extreme(oracle: &Oracle, parts: &Measurements<'_>) -> (HighestScallop, f64) {
         u,
         v,
         gap: number(index),
-        place_mm: crest.place_mm,
+        point_mm: crest.point_mm,
     };
     (extreme, possible.max(height_mm))
 }
@@ -354,7 +354,7 @@ fn gouge(oracle: &Oracle, track: &ToolPath, search: &GougeSearchResult) -> Optio
         depth_mm: deepest.depth_mm,
         u: deepest.u,
         v: deepest.v,
-        place_mm: deepest.place_mm,
+        point_mm: deepest.point_mm,
         tick: samples.first_tick + u64::from(index),
         pass,
         contact: [u, v],
@@ -364,7 +364,7 @@ fn gouge(oracle: &Oracle, track: &ToolPath, search: &GougeSearchResult) -> Optio
 
 /// The ridges with a limited number of points.
 fn thinned(oracle: &Oracle, parts: &Measurements<'_>) -> Vec<Ridge> {
-    let each = (SPOTS_MAX / parts.ridges.len().max(1)).max(3);
+    let each = (RIDGE_POINTS_MAX / parts.ridges.len().max(1)).max(3);
     let mut ridges = Vec::with_capacity(parts.ridges.len());
     for (index, (gap, ridge)) in parts.gaps.iter().zip(parts.ridges).enumerate() {
         let crests = &ridge.crests;
@@ -378,7 +378,7 @@ fn thinned(oracle: &Oracle, parts: &Measurements<'_>) -> Vec<Ridge> {
         let stride = crests.len().div_ceil(each - 2).max(1);
         let kept =
             (0..crests.len()).filter(|k| k % stride == 0 || Some(*k) == highest || k + 1 == crests.len());
-        let spots = kept
+        let points = kept
             .map(|k| {
                 let crest = &crests[k];
                 let (u, v) = oracle.swapped(crest.path, gap.side(crest.share));
@@ -387,14 +387,14 @@ fn thinned(oracle: &Oracle, parts: &Measurements<'_>) -> Vec<Ridge> {
                 RidgePoint {
                     u,
                     v,
-                    place_mm: crest.place_mm,
+                    point_mm: crest.point_mm,
                     height_mm,
                 }
             })
             .collect();
         ridges.push(Ridge {
             gap: number(index),
-            spots,
+            points,
         });
     }
     ridges

@@ -24,11 +24,11 @@ const CELLS_MAX: usize = 1_500_000;
 /// Relative tolerance of the deepest gouge.
 const DEPTH_SHARE: f64 = 1e-3;
 /// Margin on the window that the curvature requires (see `reach`).
-const BESIDE: f64 = 1.15;
+const WINDOW_MARGIN: f64 = 1.15;
 /// For a below this no contact is excluded: the ball hardly fits, or not at all.
-const FITS_MIN: f64 = 0.02;
+const FIT_MARGIN_MIN: f64 = 0.02;
 /// Largest number of enlargements of such a window.
-const WINDOWS: usize = 8;
+const WINDOW_STEPS_MAX: usize = 8;
 /// Empty ranges.
 const EMPTY: [[f64; 2]; 2] = [[f64::INFINITY, f64::NEG_INFINITY]; 2];
 /// Cells per side evaluated for the curvature around a cell.
@@ -40,7 +40,7 @@ pub(super) struct DeepestPoint {
     pub(super) depth_mm: f64,
     pub(super) u: f64,
     pub(super) v: f64,
-    pub(super) place_mm: [f64; 3],
+    pub(super) point_mm: [f64; 3],
     pub(super) by: SampleIndex,
 }
 
@@ -65,7 +65,7 @@ pub(super) struct GougeSearch<'a> {
 struct CellDepth {
     cell: Cell,
     depth: BallDepth,
-    place_mm: [f64; 3],
+    point_mm: [f64; 3],
 }
 
 impl GougeSearch<'_> {
@@ -73,45 +73,48 @@ impl GougeSearch<'_> {
     pub(super) fn search(&self, done: &(dyn Fn(u64) + Sync)) -> GougeSearchResult {
         let mut deepest: Option<DeepestPoint> = None;
         let mut cells: Vec<Cell> = (0..self.grid.count()).map(|k| self.grid.cell(k)).collect();
-        let mut asked = 0;
+        let mut evaluations = 0;
         let mut left = self.floor_mm;
         for round in 0..=SPLITS_MAX {
-            asked += cells.len();
+            evaluations += cells.len();
             let found = deepest.map_or(0.0, |deepest| deepest.depth_mm);
-            let looked: Vec<CellDepth> = cells
+            let evaluated: Vec<CellDepth> = cells
                 .par_iter()
                 .filter_map(|cell| {
                     done(1);
-                    self.look(*cell, self.enough(found)).ok()
+                    self.evaluate(*cell, self.closing_bound(found)).ok()
                 })
                 .collect();
-            for look in &looked {
-                let (u, v) = look.cell.middle();
-                if let Some(by) = look.depth.by
-                    && look.depth.depth_mm > deepest.map_or(self.floor_mm, |deepest| deepest.depth_mm)
+            for cell_depth in &evaluated {
+                let (u, v) = cell_depth.cell.middle();
+                if let Some(by) = cell_depth.depth.by
+                    && cell_depth.depth.depth_mm > deepest.map_or(self.floor_mm, |deepest| deepest.depth_mm)
                 {
                     deepest = Some(DeepestPoint {
-                        depth_mm: look.depth.depth_mm,
+                        depth_mm: cell_depth.depth.depth_mm,
                         u,
                         v,
-                        place_mm: look.place_mm,
+                        point_mm: cell_depth.point_mm,
                         by,
                     });
                 }
             }
-            let enough = self.enough(deepest.map_or(0.0, |deepest| deepest.depth_mm));
-            let mut open: Vec<&CellDepth> = looked
+            let closing_bound = self.closing_bound(deepest.map_or(0.0, |deepest| deepest.depth_mm));
+            let mut open: Vec<&CellDepth> = evaluated
                 .iter()
-                .filter(|look| look.depth.bound_mm > enough)
+                .filter(|cell_depth| cell_depth.depth.bound_mm > closing_bound)
                 .collect();
-            let most =
-                |open: &[&CellDepth]| open.iter().map(|look| look.depth.bound_mm).fold(enough, f64::max);
+            let most = |open: &[&CellDepth]| {
+                open.iter()
+                    .map(|cell_depth| cell_depth.depth.bound_mm)
+                    .fold(closing_bound, f64::max)
+            };
             left = most(&open);
             if open.is_empty() || round == SPLITS_MAX {
                 break;
             }
             // If the budget does not suffice for all cells, those with the largest bounds are split; the bound of the others is reported.
-            let room = (CELLS_MAX.saturating_sub(asked)) / 4;
+            let room = (CELLS_MAX.saturating_sub(evaluations)) / 4;
             if open.len() > room {
                 open.sort_by(|a, b| b.depth.bound_mm.total_cmp(&a.depth.bound_mm));
                 left = most(&open[room..]);
@@ -120,21 +123,24 @@ impl GougeSearch<'_> {
                     break;
                 }
             }
-            cells = open.iter().flat_map(|look| look.cell.quarters()).collect();
+            cells = open
+                .iter()
+                .flat_map(|cell_depth| cell_depth.cell.quarters())
+                .collect();
         }
         GougeSearchResult {
             deepest,
             bound_mm: left,
-            cells: asked,
+            cells: evaluations,
         }
     }
 
     /// Bound below which a cell is not split.
-    fn enough(&self, found_mm: f64) -> f64 {
+    fn closing_bound(&self, found_mm: f64) -> f64 {
         self.floor_mm.max(found_mm * (1.0 + DEPTH_SHARE))
     }
 
-    fn look(&self, cell: Cell, floor_mm: f64) -> Result<CellDepth, OracleError> {
+    fn evaluate(&self, cell: Cell, floor_mm: f64) -> Result<CellDepth, OracleError> {
         let oracle = self.oracle;
         let (u, v) = cell.middle();
         let at = oracle.surface.at(u, v);
@@ -174,7 +180,7 @@ impl GougeSearch<'_> {
         Ok(CellDepth {
             cell,
             depth: self.tree.depth(&ray, &reach),
-            place_mm: at.point,
+            point_mm: at.point,
         })
     }
 
@@ -188,14 +194,14 @@ impl GougeSearch<'_> {
         let mut principal = own.principal;
         let mut excluded = EMPTY;
         // The window depends on the curvature inside it: both are enlarged until they are consistent, or no contact is excluded.
-        for round in 0..WINDOWS {
+        for round in 0..WINDOW_STEPS_MAX {
             let fits = 1.0 - radius * principal[1];
-            if fits < FITS_MIN || round + 1 == WINDOWS {
+            if fits < FIT_MARGIN_MIN || round + 1 == WINDOW_STEPS_MAX {
                 excluded = EMPTY;
                 break;
             }
             let curvature = principal[0].abs().max(principal[1].abs());
-            let beside_mm = BESIDE * around_mm * (1.0 + (1.0 + radius * curvature / fits).sqrt());
+            let beside_mm = WINDOW_MARGIN * around_mm * (1.0 + (1.0 + radius * curvature / fits).sqrt());
             let window = |at: f64, per_mm: f64| [at - beside_mm * per_mm, at + beside_mm * per_mm];
             excluded = [window(u, own.per_mm[0]), window(v, own.per_mm[1])];
             let around = self.grid.principal(excluded, CELLS_PER_SIDE);

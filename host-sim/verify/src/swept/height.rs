@@ -16,7 +16,7 @@ const STRIDE_SHARE: f64 = 1.0 / 64.0;
 /// order in the nearest sample's; three iterations reduce it to rounding.
 const ROUNDS: usize = 3;
 /// Iteration ends when the entry moves by less than this, mm.
-const ROUND_ENOUGH_MM: f64 = 1e-9;
+const ENTRY_TOLERANCE_MM: f64 = 1e-9;
 
 /// A ray: a point of the surface and the tool normal there.
 #[derive(Clone, Copy, Debug)]
@@ -114,15 +114,15 @@ impl<'a> PassHeight<'a> {
     /// Height at which the ray enters this pass's swept ball, and the nearest sample; infinite if the ray misses the ball.
     /// `hint`: a sample near it; the search finds the nearest local minimum from there.
     pub(super) fn of(&self, ray: &Ray, hint: usize) -> (f64, usize) {
-        self.in_rounds(ray, hint, ROUNDS)
+        self.iterate(ray, hint, ROUNDS)
     }
 
     /// One iteration only: an upper bound, with an error of second order in that of the nearest sample.
     pub(super) fn about(&self, ray: &Ray, hint: usize) -> (f64, usize) {
-        self.in_rounds(ray, hint, 1)
+        self.iterate(ray, hint, 1)
     }
 
-    fn in_rounds(&self, ray: &Ray, hint: usize, rounds: usize) -> (f64, usize) {
+    fn iterate(&self, ray: &Ray, hint: usize, rounds: usize) -> (f64, usize) {
         let mut index = hint;
         let mut height = f64::INFINITY;
         for _ in 0..rounds {
@@ -134,7 +134,7 @@ impl<'a> PassHeight<'a> {
             index = self.nearest(target, index);
             let before = height;
             (height, index) = self.entry_near(ray, index);
-            if (height - before).abs() <= ROUND_ENOUGH_MM {
+            if (height - before).abs() <= ENTRY_TOLERANCE_MM {
                 break;
             }
         }

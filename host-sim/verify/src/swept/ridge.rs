@@ -12,8 +12,8 @@ const STATIONS: usize = 96;
 /// Largest number of bisections of the intervals between stations.
 const HALVINGS: usize = 10;
 /// Heights are equal within this share of the gap's largest, or within this, mm: the rounding of centres to nanometres.
-const ALIKE_SHARE: f64 = 1e-4;
-const ALIKE_MM: f64 = 2e-6;
+const EQUAL_SHARE: f64 = 1e-4;
+const EQUAL_MM: f64 = 2e-6;
 /// A crest lowered by another part of the path to less than this below the surface, mm, is not searched further.
 const GOUGED_MM: f64 = 1e-4;
 /// Largest number of iterations of the crest search; three or four are usual.
@@ -36,7 +36,7 @@ pub(super) struct Crest {
     /// Height, mm.
     pub(super) height_mm: f64,
     /// Point on the surface, mm.
-    pub(super) place_mm: [f64; 3],
+    pub(super) point_mm: [f64; 3],
     /// |S_u x S_v| there.
     pub(super) area: f64,
 }
@@ -46,7 +46,7 @@ pub(super) struct Crest {
 pub(super) struct GapRidge {
     pub(super) crests: Vec<Crest>,
     /// Upper bound of the excess of a crest between stations over the highest one found, mm.
-    pub(super) unseen_mm: f64,
+    pub(super) excess_mm: f64,
     /// Stations left out because the surface has no normal there.
     pub(super) skipped: u32,
 }
@@ -143,7 +143,7 @@ impl<'a> Gap<'a> {
         if whole < -GOUGED_MM {
             // The crest is below the surface: reported by the gouge search.
             height = whole;
-        } else if whole < height - ALIKE_MM {
+        } else if whole < height - EQUAL_MM {
             // Another part of the path lowers this crest: the maximum is elsewhere.
             (share, height) = self.highest(path, (share, whole), &mut near, true)?;
         }
@@ -152,7 +152,7 @@ impl<'a> Gap<'a> {
             path,
             share,
             height_mm: height,
-            place_mm: ray.from,
+            point_mm: ray.from,
             area,
         })
     }
@@ -187,7 +187,7 @@ impl<'a> Gap<'a> {
         }
         let low = self.across[highest.0.saturating_sub(1)];
         let high = self.across[(highest.0 + 1).min(self.across.len() - 1)];
-        self.summit(
+        self.golden_maximum(
             path,
             [low, high],
             (self.across[highest.0], highest.1),
@@ -240,7 +240,7 @@ impl<'a> Gap<'a> {
     }
 
     /// The highest point in a bracket, by golden section.
-    fn summit(
+    fn golden_maximum(
         &self,
         path: f64,
         [mut low, mut high]: [f64; 2],
@@ -304,7 +304,7 @@ impl<'a> Gap<'a> {
         let intervals = |crests: &[Crest]| crests.len().saturating_sub(1);
         for _ in 0..HALVINGS {
             let best = highest(&crests);
-            let enough = best + (ALIKE_SHARE * best).max(ALIKE_MM);
+            let enough = best + (EQUAL_SHARE * best).max(EQUAL_MM);
             let mut refined = Vec::with_capacity(crests.len() + 16);
             for k in 0..intervals(&crests) {
                 refined.push(crests[k]);
@@ -324,7 +324,7 @@ impl<'a> Gap<'a> {
             .map(|k| bound(&crests, k))
             .fold(best, f64::max);
         GapRidge {
-            unseen_mm: if crests.is_empty() { 0.0 } else { most - best },
+            excess_mm: if crests.is_empty() { 0.0 } else { most - best },
             crests,
             skipped,
         }

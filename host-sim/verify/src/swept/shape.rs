@@ -11,7 +11,7 @@ const REFINEMENTS: usize = 40;
 /// Curvatures below this count as flat, 1/mm: concave radii above one kilometre.
 const FLAT: f64 = 1e-6;
 /// Points evaluated on each boundary.
-const BOUNDARY_LOOKS: usize = 64;
+const BOUNDARY_POINTS: usize = 64;
 /// A boundary whose points all coincide within this distance is a pole, mm: the threshold of the core's data.
 const POINT_MM: f64 = 1e-9;
 
@@ -25,7 +25,7 @@ pub struct ConcaveRadius {
     /// Parameter v.
     pub v: f64,
     /// Point, mm.
-    pub place_mm: [f64; 3],
+    pub point_mm: [f64; 3],
 }
 
 /// Properties of the surface that limit the ball.
@@ -76,8 +76,8 @@ impl SurfaceCheck {
 fn boundaries(oracle: &Oracle) -> Vec<(String, Vec<[f64; 2]>)> {
     let [[u0, u1], [v0, v1]] = oracle.surface.domain();
     #[allow(clippy::cast_precision_loss, reason = "small")]
-    let part = |low: f64, high: f64, k: usize| low + (high - low) * k as f64 / BOUNDARY_LOOKS as f64;
-    let looks = 0..=BOUNDARY_LOOKS;
+    let part = |low: f64, high: f64, k: usize| low + (high - low) * k as f64 / BOUNDARY_POINTS as f64;
+    let looks = 0..=BOUNDARY_POINTS;
     let of_u = |u: f64| {
         (
             format!("u = {u}"),
@@ -148,6 +148,6 @@ fn concave_radius(oracle: &Oracle, grid: &CellGrid) -> Option<ConcaveRadius> {
         radius_mm: 1.0 / most,
         u,
         v,
-        place_mm: oracle.surface.at(u, v).point,
+        point_mm: oracle.surface.at(u, v).point,
     })
 }

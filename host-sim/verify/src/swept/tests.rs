@@ -245,12 +245,12 @@ fn ball_on_one_flank_gouges_the_other() {
     // Under the centre, at r along the other flank.
     let foot = RADIUS * FRAC_1_SQRT_2;
     assert!(
-        length(subtract(gouge.place_mm, [foot, gouge.place_mm[1], foot])) < 0.3,
+        length(subtract(gouge.point_mm, [foot, gouge.point_mm[1], foot])) < 0.3,
         "{gouge:?}"
     );
     assert_eq!((gouge.pass, gouge.local), (2, false));
     let samples = &oracle_sample(&found, &oracle, &sides);
-    assert!(length(subtract(*samples, gouge.place_mm)) < RADIUS);
+    assert!(length(subtract(*samples, gouge.point_mm)) < RADIUS);
     assert_eq!(
         found.failures.iter().filter(|line| line.contains("cuts")).count(),
         1
@@ -336,7 +336,10 @@ fn other_passes_lower_a_ridge() {
     }
     let after = measure(&job, &oracle, &path, true, &());
     let gap_0 = |found: &SweptResult| {
-        let heights = found.ridges[0].spots.iter().map(|spot| f64::from(spot.height_mm));
+        let heights = found.ridges[0]
+            .points
+            .iter()
+            .map(|point| f64::from(point.height_mm));
         heights.fold(0.0, f64::max)
     };
     assert!((gap_0(&before) - flat(4.0)).abs() < 1e-5);
