@@ -102,7 +102,7 @@ pub struct MachineSpec {
     pub travel_mm: Option<[[f64; 2]; 3]>,
     /// Position of the tool centre before the run, mm. `None`: at the safe height above the first contact.
     pub home_mm: Option<[f64; 3]>,
-    /// z of the tool centre at which the tool clears the part and its fixture, mm. `None`: from [`Self::clearance_mm`].
+    /// z of the tool centre at which the tool clears every obstacle, mm. `None`: from [`Self::clearance_mm`].
     pub safe_z_mm: Option<f64>,
     /// Distance from the highest point of the surface to the ball at the safe height, mm, where `safe_z_mm` is `None`.
     pub clearance_mm: f64,

@@ -12,7 +12,7 @@ use job::{Along, Spacing};
 /// Points scanned per span for the least interval, and the least number of points per pass.
 const SCAN_PER_SPAN: usize = 64;
 const SCAN_MIN: usize = 512;
-/// Golden-section steps: each shortens the bracket to 0.618, so 48 reduce it by 1e-10; the interval is stationary at its
+/// Golden-section steps: each shortens the bracket to 0.618, so 48 reduce it to 1e-10 of its length; the interval is stationary at its
 /// minimum, hence exact.
 const GOLDEN_STEPS: usize = 48;
 /// Minima of the scan within this share of the least one are refined.

@@ -109,8 +109,8 @@ impl Affine {
 impl Placement {
     /// The placed surface.
     ///
+    /// # Errors
     /// [`OutOfMachineRange`] where the surface exceeds the range of positions.
-    /// [`OutOfMachineRange`] where it leaves what the machine can hold.
     pub fn place(&self, surface: &SurfaceSpec) -> Result<SurfaceSpec, OutOfMachineRange> {
         let rotation = Rotation::of_degrees(self.rotate_deg);
         let turned = self.turned(surface, rotation);

@@ -9,7 +9,7 @@ use oracle::vector::{Vector, add, dot, scale, subtract};
 
 /// Newton steps towards the nearest sample: each squares the error; the search over neighbours afterwards corrects the rest.
 const NEWTON_STEPS: usize = 12;
-/// Height at which samples are compared, as a share of the ball's radius. The distance has changed by 1/8000 of the radius there,
+/// Distance of the samples compared, as a share of the ball's radius. Over it the distance from the ray changes by 1/8000 of the radius,
 /// far more than by rounding to nanometres.
 const STRIDE_SHARE: f64 = 1.0 / 64.0;
 /// Iterations of: nearest sample to the point on the ray, then the ray's entry there. The first entry's error is of second
