@@ -25,6 +25,7 @@ struct Frame {
 }
 
 /// A surface in a form for evaluation.
+#[allow(clippy::large_enum_variant, reason = "one per job")]
 enum SurfaceEvaluator {
     Pieces { source: Source, breaks: [Vec<f64>; 2] },
     Profile { radius: [f64; 4], height: [f64; 4] },

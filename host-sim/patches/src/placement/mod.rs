@@ -23,7 +23,6 @@ pub use rotation::Rotation;
 
 /// Range of positions of the core, mm in either direction: nanometres in an i32.
 pub const POSITION_MAX_MM: f64 = 2_147.483_647;
-/// Names of the axes, in order.
 
 /// The point of the scaled and rotated surface that is placed at `translate_mm`.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
