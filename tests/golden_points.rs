@@ -4,7 +4,7 @@ use integration_tests::golden::{Case, cases};
 use interp_core::SpanParameter;
 use job::{Along, Job};
 use machine::Machine;
-use machine::prepare::{Axis, Prepared, prepare};
+use machine::prepare::{ParameterSpans, Prepared, prepare};
 
 /// The job file of a golden case, with its along, tool side, ball and scallop limit.
 fn job(case: &Case) -> Job {
@@ -31,7 +31,7 @@ fn job(case: &Case) -> Job {
 }
 
 /// The place of a parameter, to 2^-53 of its span.
-fn place(axis: &Axis, parameter: f64) -> SpanParameter {
+fn place(axis: &ParameterSpans, parameter: f64) -> SpanParameter {
     let span = axis.breaks[1..axis.breaks.len() - 1].partition_point(|end| *end <= parameter);
     let (start, end) = (axis.breaks[span], axis.breaks[span + 1]);
     let fraction = (parameter - start) / (end - start);

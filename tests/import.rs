@@ -120,7 +120,7 @@ fn compared(surface: &Surface, sense: f64, points: &[Reference]) -> (f64, f64) {
 /// The face, trimmed or not; at a coarser tolerance where a fit at the default one takes more patches than the board has.
 fn taken(name: &str, face: &Face) -> Machinable {
     machinable(name, face, &whole()).unwrap_or_else(|error| {
-        assert!(error.what.contains("more than the board holds"), "{error}");
+        assert!(error.what.contains("more than the board's store"), "{error}");
         let coarser = Options {
             tolerance_mm: 0.02,
             ..whole()

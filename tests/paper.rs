@@ -7,7 +7,7 @@ use study::operations::Operations;
 use study::paper::table_1::{PRINTED, cycles_of, items};
 use study::paper::{Study, study};
 use study::report::percent;
-use verify::speeds::Speed;
+use verify::speeds::PeriodSpeed;
 
 fn shared() -> &'static Study {
     static STUDY: OnceLock<Study> = OnceLock::new();
@@ -265,7 +265,7 @@ fn written_data_are_the_figures() {
         assert_eq!(figure["approach"], track.kind.name());
         let written = column(figure, "cc_mm_s");
         assert_eq!(written.len(), track.speeds.len());
-        let same = |(written, speed): (&f64, &Speed)| (written - speed.cc_mm_s).abs() < 1e-12;
+        let same = |(written, speed): (&f64, &PeriodSpeed)| (written - speed.cc_mm_s).abs() < 1e-12;
         assert!(written.iter().zip(&track.speeds).all(same));
         assert_eq!(column(figure, "arc_mm").len(), column(figure, "cl_mm_s").len());
         let period_s = figure["period_us"].as_f64().unwrap() * 1e-6;

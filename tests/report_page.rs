@@ -7,9 +7,9 @@ use std::path::{Path, PathBuf};
 use browser::Browser;
 use machine::Machine;
 use machine::prepare::prepare;
-use oracle::{Checked, Emitted, Oracle};
+use oracle::{Oracle, PassSample, SampleCheck};
 use report::{Remarks, RidgePlace, Scallops, Sketch};
-use verify::survey::{Findings, Survey};
+use verify::survey::{Survey, SurveyResult};
 
 /// WebGL on the processor, whatever graphics card there is: the same everywhere.
 const SOFTWARE: [&str; 2] = ["--use-angle=swiftshader", "--enable-unsafe-swiftshader"];
@@ -17,13 +17,13 @@ const DESK: [u32; 2] = [1280, 900];
 const PHONE: [u32; 2] = [390, 800];
 
 /// Runs a job and writes its report; with what the oracle found.
-fn report(name: &str, folder: &Path, remarks: &Remarks) -> (PathBuf, Findings) {
+fn report(name: &str, folder: &Path, remarks: &Remarks) -> (PathBuf, SurveyResult) {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../jobs").join(name);
     let job = job_file::load(&path).unwrap();
     let prepared = prepare(&job).unwrap();
     let oracle = Oracle::new(&job).unwrap();
     let mut sketch = Sketch::new(&job, oracle.schedule().unwrap().len());
-    let mut draw = |sample: &Emitted, checked: &Checked| sketch.add(sample, checked);
+    let mut draw = |sample: &PassSample, checked: &SampleCheck| sketch.add(sample, checked);
     let mut survey = Survey::new(&oracle, None, Some(&mut draw));
     Machine::load(&prepared)
         .unwrap()
@@ -51,7 +51,7 @@ fn rising(domain: [[f64; 2]; 2], ridges: u32) -> Scallops {
     };
     Scallops {
         limit_mm: 0.01,
-        measuring_error_mm: 1e-4,
+        measurement_error_mm: 1e-4,
         ridges: (0..ridges).map(ridge).collect(),
     }
 }

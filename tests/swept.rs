@@ -6,26 +6,26 @@ use std::fmt::Write;
 use job::Job;
 use machine::Machine;
 use machine::prepare::prepare;
-use oracle::{Checked, Emitted, Oracle};
+use oracle::{Oracle, PassSample, SampleCheck};
 use verify::survey::{self, Survey};
-use verify::swept::{Findings, Track, measure};
+use verify::swept::{SweptResult, ToolPath, measure};
 
 /// A job, run once with the oracle beside it.
 pub(crate) struct Followed {
     pub(crate) oracle: Oracle,
-    pub(crate) findings: survey::Findings,
-    pub(crate) track: Track,
+    pub(crate) findings: survey::SurveyResult,
+    pub(crate) track: ToolPath,
 }
 
 pub(crate) fn follow(job: &Job) -> Followed {
     let oracle = Oracle::new(job).unwrap();
     let prepared = prepare(job).unwrap();
     // As `verify` does it: on a machine with limits the feed is low at the ends of passes.
-    let mut track = Track::with_spacing(match prepared.header.axes {
+    let mut track = ToolPath::with_spacing(match prepared.header.axes {
         Some(_) => 0.5e6 * job.feed_mm_s() * job.machine.period_s(),
         None => 0.0,
     });
-    let mut keep = |emitted: &Emitted, _: &Checked| track.add(emitted, job.along);
+    let mut keep = |emitted: &PassSample, _: &SampleCheck| track.add(emitted, job.along);
     let mut survey = Survey::new(&oracle, None, Some(&mut keep));
     Machine::load(&prepared)
         .unwrap()
@@ -43,24 +43,24 @@ pub(crate) fn follow(job: &Job) -> Followed {
     }
 }
 
-fn findings(job: &Job) -> Findings {
+fn findings(job: &Job) -> SweptResult {
     let followed = follow(job);
     measure(job, &followed.oracle, &followed.track, true, &())
 }
 
 /// The limit is used, and held: the largest ridge is between half of it and all of it. And nothing is cut that should stand.
-pub(crate) fn check_limit(name: &str, job: &Job, found: &Findings) {
+pub(crate) fn check_limit(name: &str, job: &Job, found: &SweptResult) {
     let (limit, most) = (job.scallop_mm, found.scallop_max.height_mm);
     assert!(
-        most >= 0.5 * limit && most <= limit + found.measuring_error_mm,
+        most >= 0.5 * limit && most <= limit + found.measurement_error_mm,
         "{name}: {most} mm of {limit}, within {}",
-        found.measuring_error_mm
+        found.measurement_error_mm
     );
     // The measuring is no worse than a thousandth of the limit, or what the samples' own distance brings.
     assert!(
-        found.measuring_error_mm <= 1e-3 * limit + found.measuring_error.path_mm + 1e-6,
+        found.measurement_error_mm <= 1e-3 * limit + found.measurement_error.path_mm + 1e-6,
         "{name}: {:?}",
-        found.measuring_error
+        found.measurement_error
     );
     assert!(found.scallop_mean_mm > 0.0 && found.scallop_mean_mm < most);
     assert_eq!(found.gouge, None, "{name}");
@@ -75,8 +75,8 @@ pub(crate) fn check_limit(name: &str, job: &Job, found: &Findings) {
         "{name}: {:?}",
         found.warnings
     );
-    let spots: usize = found.ridges.iter().map(|ridge| ridge.spots.len()).sum();
-    assert!(spots <= 100_000 && found.ridges.iter().all(|ridge| ridge.spots.len() >= 3));
+    let spots: usize = found.ridges.iter().map(|ridge| ridge.points.len()).sum();
+    assert!(spots <= 100_000 && found.ridges.iter().all(|ridge| ridge.points.len() >= 3));
 }
 
 /// A patch of these corners, z = 0 but for a bulge of so many mm in the middle; ball 5 mm, scallop 0.02 mm.
@@ -124,7 +124,7 @@ fn skew_and_spreading_passes_hold_the_limit() {
             let job = corners(place, bulge, spacing);
             let found = findings(&job);
             let share = found.scallop_max.height_mm / job.scallop_mm;
-            (share, found.measuring_error_mm / job.scallop_mm)
+            (share, found.measurement_error_mm / job.scallop_mm)
         };
         let (paper, _) = share("first-order");
         assert!(paper > excess, "{name}: {paper} of the limit by the first order");
@@ -171,7 +171,7 @@ fn ball_between_two_lips() {
     let profile: Vec<[f64; 2]> = half.into_iter().chain(other).collect();
     let job = groove(&profile, "scallop_mm = 0.05\nside = \"up\"\n");
     let found = findings(&job);
-    let hollow = found.shape.hollow.unwrap();
+    let hollow = found.shape.concave_radius.unwrap();
     assert!(hollow.radius_mm > job.radius_mm, "{hollow:?}");
     let gouge = found.gouge.unwrap();
     assert!(!gouge.local && gouge.depth_mm > 1.0, "{gouge:?}");
@@ -212,8 +212,8 @@ fn groove_that_no_sample_lies_in() {
     assert_eq!(cut.scallop_max.gap, 0);
     assert!(cut.scallop_max.height_mm > 0.15, "{:?}", cut.scallop_max);
     assert!(cut.failures.iter().any(|line| line.contains("above the limit")));
-    assert!(cut.shape.hollow.unwrap().radius_mm < 1.0);
-    assert!(cut.warnings.iter().any(|line| line.contains("hollow")));
+    assert!(cut.shape.concave_radius.unwrap().radius_mm < 1.0);
+    assert!(cut.warnings.iter().any(|line| line.contains("concave radius")));
 }
 
 /// A part that does not fit the machine's travel fails before anything moves.

@@ -414,7 +414,7 @@ fn a_placed_job_runs_and_its_errors_point_at_the_line() {
     let output = run(folder.path(), "simulate job.toml");
     assert_eq!(output.status.code(), Some(2));
     for part in [
-        "the placed surface reaches",
+        "the placed surface extends",
         "translate_mm = [2200",
         "help: move it nearer",
     ] {

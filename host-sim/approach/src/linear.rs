@@ -6,7 +6,7 @@ use super::{Approach, ApproachError, Each, PassPath, Program};
 use crate::gcode::{Blocks, Cut, FeedMode};
 use job::Job;
 use oracle::vector::{add, cross, dot, length, scale, subtract};
-use oracle::{Offset, OracleError};
+use oracle::{OffsetPoint, OracleError};
 
 /// Places within a chord at which its error is taken.
 const PROBES: u32 = 12;
@@ -148,7 +148,7 @@ fn path_curvature(pass: &PassPath<'_>, path: f64) -> f64 {
 }
 
 /// Eqn 6: `sqrt(8 rho delta) / |A|`, as far as the pass goes.
-fn equation_step(pass: &PassPath<'_>, at: &Offset, chord_mm: f64, curvature: f64) -> f64 {
+fn equation_step(pass: &PassPath<'_>, at: &OffsetPoint, chord_mm: f64, curvature: f64) -> f64 {
     let step = (8.0 * chord_mm / curvature).sqrt() / at.contact.path_speed;
     if step.is_finite() {
         step.min(pass.left(at.path))
@@ -158,7 +158,7 @@ fn equation_step(pass: &PassPath<'_>, at: &Offset, chord_mm: f64, curvature: f64
 }
 
 /// The longest step whose chord holds the limit.
-fn held_step(pass: &PassPath<'_>, at: &Offset, chord_mm: f64) -> Result<f64, ApproachError> {
+fn held_step(pass: &PassPath<'_>, at: &OffsetPoint, chord_mm: f64) -> Result<f64, ApproachError> {
     let left = pass.left(at.path);
     let holds = |step: f64| chord_holds(pass, at, step, chord_mm);
     // Eqn 6 for a start; doubled while it holds, halved until it does.
@@ -200,7 +200,7 @@ fn held_step(pass: &PassPath<'_>, at: &Offset, chord_mm: f64) -> Result<f64, App
 }
 
 /// Whether the contact's and the centre's path stay within the limit of their chords.
-fn chord_holds(pass: &PassPath<'_>, at: &Offset, step: f64, chord_mm: f64) -> Result<bool, OracleError> {
+fn chord_holds(pass: &PassPath<'_>, at: &OffsetPoint, step: f64, chord_mm: f64) -> Result<bool, OracleError> {
     let place = |share: f64| pass.at(pass.kept(at.path + share * step * pass.sense()));
     let end = place(1.0)?;
     // From the middle outwards: a chord that does not hold mostly fails there.

@@ -4,9 +4,9 @@ use protocol::digest::Digest;
 
 use super::{ApproachError, Kind, Motion, Planned, run};
 use job::Job;
-use oracle::{Checked, Oracle, Verifier};
-use verify::speeds::{Speed, Speeds};
-use verify::survey::Findings;
+use oracle::{Oracle, SampleCheck, Verifier};
+use verify::speeds::{PeriodSpeed, SpeedRecorder};
+use verify::survey::SurveyResult;
 
 /// Figures of a run.
 #[derive(Clone, Debug)]
@@ -14,7 +14,7 @@ pub struct Measured {
     /// What a CNC has to be fed.
     pub planned: Planned,
     /// What a run of the core reports too.
-    pub findings: Findings,
+    pub findings: SurveyResult,
     /// Machining time, s: samples times the period, as the product counts it.
     pub time_s: f64,
     /// Digest of all samples: tick, pass, CC and CL of each, as words.
@@ -29,7 +29,7 @@ pub struct Measured {
 pub fn measure(
     kind: Kind,
     job: &Job,
-    mut each: impl FnMut(&Motion, Option<Speed>, &Checked),
+    mut each: impl FnMut(&Motion, Option<PeriodSpeed>, &SampleCheck),
 ) -> Result<Measured, ApproachError> {
     measure_run(job, &mut each, |each| run(kind, job, each))
 }
@@ -40,12 +40,12 @@ pub fn measure(
 /// Those of the run.
 pub fn measure_run(
     job: &Job,
-    each: &mut dyn FnMut(&Motion, Option<Speed>, &Checked),
+    each: &mut dyn FnMut(&Motion, Option<PeriodSpeed>, &SampleCheck),
     run: impl FnOnce(&mut dyn FnMut(&Motion)) -> Result<Planned, ApproachError>,
 ) -> Result<Measured, ApproachError> {
     let oracle = Oracle::new(job)?;
     let mut verifier = Verifier::new(&oracle);
-    let mut speeds = Speeds::new(oracle.period_s);
+    let mut speeds = SpeedRecorder::new(oracle.period_s);
     let mut digest = Digest::new();
     let mut interval = f64::INFINITY;
     let planned = run(&mut |motion| {
@@ -62,7 +62,7 @@ pub fn measure_run(
     Ok(Measured {
         planned,
         time_s: report.samples as f64 * oracle.period_s,
-        findings: Findings {
+        findings: SurveyResult {
             samples: report.samples,
             passes: u32::try_from(planned.passes).unwrap_or(u32::MAX),
             speeds: speeds.finish(planned.speed_step_mm_s),

@@ -2,7 +2,7 @@
 
 use super::PassPath;
 use oracle::vector::{Vector, length};
-use oracle::{Offset, OracleError};
+use oracle::{OffsetPoint, OracleError};
 
 /// Places a smooth span of the surface, and at least so many a pass.
 const PER_SPAN: usize = 48;
@@ -14,7 +14,7 @@ const GAUSS: [f64; 2] = [0.211_324_865_405_187_1, 0.788_675_134_594_812_9];
 #[derive(Clone, Copy, Debug)]
 pub struct Node {
     /// Contact and centre.
-    pub at: Offset,
+    pub at: OffsetPoint,
     /// Unit tangent of the centre's path in the direction of the cut.
     pub tangent: [f64; 3],
     /// Length of the contact's path from the beginning, mm.

@@ -1,7 +1,7 @@
 //! A pass in the direction in which it is cut.
 
 use oracle::vector::{Vector, length, subtract};
-use oracle::{Offset, Oracle, OracleError};
+use oracle::{OffsetPoint, Oracle, OracleError};
 
 /// One pass of a job.
 #[derive(Clone, Copy, Debug)]
@@ -27,7 +27,7 @@ impl PassPath<'_> {
     ///
     /// # Errors
     /// As [`Oracle::offset`].
-    pub fn at(&self, path: f64) -> Result<Offset, OracleError> {
+    pub fn at(&self, path: f64) -> Result<OffsetPoint, OracleError> {
         self.oracle.offset(path, self.side)
     }
 

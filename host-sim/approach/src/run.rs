@@ -5,7 +5,7 @@ use inspect::plain;
 use job::{Job, Pattern};
 use machine::Machine;
 use machine::prepare::{Prepared, prepare};
-use oracle::{Emitted, Oracle, OracleError};
+use oracle::{Oracle, OracleError, PassSample};
 
 const NM_PER_MM: f64 = 1e6;
 
@@ -13,7 +13,7 @@ const NM_PER_MM: f64 = 1e6;
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Motion {
     /// As a machine emits it.
-    pub emitted: Emitted,
+    pub emitted: PassSample,
     /// Path parameter of the contact.
     pub path: f64,
     /// Side parameter of the pass.
@@ -132,7 +132,7 @@ fn motion(pass: &PassPath<'_>, cl_mm: [f64; 3], guess: f64, feed_mm_s: f64) -> R
     let foot = pass.oracle.foot(cl_mm, guess, pass.side)?;
     let (u, v) = pass.oracle.swapped(foot.path, pass.side);
     Ok(Motion {
-        emitted: Emitted {
+        emitted: PassSample {
             tick: 0,
             pass: pass.pass,
             u,

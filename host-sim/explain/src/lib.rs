@@ -1,6 +1,6 @@
-//! Faults in sentences: what happened, and what to do about it.
+//! Faults in sentences: cause and remedy.
 //!
-//! `fault` makes a sentence of a fault that happened, with its value; [`entries`](entry) explain every code there is, for
+//! `fault` describes a fault that occurred, with its value; [`entries`](entry) explain every code, for
 //! `cargo sim explain`.
 #![cfg_attr(
     test,
@@ -19,38 +19,38 @@ use interp_core::job::patches_max;
 use interp_core::{Fault, FaultKind, STORE_WORDS, SurfaceKind};
 use protocol::message::FaultReport;
 
-/// Where a code comes from.
+/// Origin of a code.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Family {
-    /// A fault of the core: it stops a run, or refuses a job. Known by its number.
+    /// A fault of the core: it stops a run, or refuses a job. Identified by its number.
     Fault,
-    /// A board's reason to refuse a request. Known by `R` and its number.
+    /// A board's reason to refuse a request. Identified by `R` and its number.
     Reason,
 }
 
 /// An explanation of one code.
 #[derive(Clone, Copy, Debug)]
 pub struct Entry {
-    /// Where the code comes from.
+    /// Origin of the code.
     pub family: Family,
     /// The stable code.
     pub code: u8,
     /// The stable name.
     pub name: &'static str,
-    /// What it means.
+    /// Meaning.
     pub meaning: &'static str,
-    /// What the value says that comes with it.
+    /// Meaning of the value that accompanies the code.
     pub value: &'static str,
-    /// Why it happens.
+    /// Cause.
     pub why: &'static str,
-    /// What to do.
+    /// Remedy.
     pub remedy: &'static str,
-    /// A case that shows it.
+    /// An example.
     pub example: &'static str,
 }
 
 impl Entry {
-    /// What `cargo sim explain` knows it by: `1`, `R1`.
+    /// The label that `cargo sim explain` accepts: `1`, `R1`.
     #[must_use]
     pub fn label(&self) -> String {
         match self.family {
@@ -60,7 +60,7 @@ impl Entry {
     }
 }
 
-/// Every explanation: faults, then reasons, each in order of their codes.
+/// All explanations: faults, then reasons, each in the order of codes.
 #[must_use]
 pub fn entries() -> Vec<Entry> {
     let faults = interp_core::FaultKind::ALL.into_iter().map(faults::entry);
@@ -74,14 +74,14 @@ pub fn entry(wanted: &str) -> Option<Entry> {
     all.find(|entry| entry.label().eq_ignore_ascii_case(wanted) || entry.name.eq_ignore_ascii_case(wanted))
 }
 
-/// A fault with its place in one line: code, name, where, and what it says to a person.
+/// A fault with its location in one line: code, name, location, description.
 #[must_use]
 pub fn fault_at(of: Fault, tick: u64, pass: u32, [u, v]: [f64; 2]) -> String {
     let (code, name, what) = (of.kind.code(), of.kind.name(), fault(of).0);
     format!("fault {code} ({name}) at tick {tick}, pass {pass}, u = {u:.9}, v = {v:.9}: {what}")
 }
 
-/// The key of the job file, `section.key`, that has most to do with a fault.
+/// The key of the job file, `section.key`, most relevant to a fault.
 #[must_use]
 pub fn key(kind: FaultKind) -> &'static str {
     match kind {
@@ -94,7 +94,7 @@ pub fn key(kind: FaultKind) -> &'static str {
     }
 }
 
-/// What a fault says to a person, and the remedy.
+/// Description of a fault, and its remedy.
 #[must_use]
 pub fn fault(fault: Fault) -> (String, &'static str) {
     let value = fault.value;
@@ -110,16 +110,16 @@ pub fn fault(fault: Fault) -> (String, &'static str) {
                 "the surface has no normal, or folds over: the sine between S_u and S_v is {value:.2e}, below {:.0e}",
                 interp_core::surface::SINE_MIN
             ),
-            "end the surface before this place, or parametrise it anew; a boundary that is exactly one point is allowed",
+            "end the surface before this point, or reparametrise the surface; a boundary that is exactly one point is allowed",
         ),
         FaultKind::ParameterBackwards => (
             format!(
-                "the parametrisation changes its speed too fast for one period: the correction of the step is {value:.2} of it"
+                "the speed of the parametrisation changes too much within one period: the step's correction is {value:.2} of the step"
             ),
             "lower the feed, or parametrise the surface more evenly",
         ),
         FaultKind::OutOfRange => (
-            format!("a cutter location lies at {value:.3} m, outside ±2.147 m"),
+            format!("a cutter location is at {value:.3} m, outside ±2.147 m"),
             "move the part nearer to the origin",
         ),
         FaultKind::TooManyPatches => (
@@ -131,8 +131,8 @@ pub fn fault(fault: Fault) -> (String, &'static str) {
             "use fewer knots, or cut the part into several jobs",
         ),
         FaultKind::PatchTooShort => (
-            format!("one period's arc reaches past a whole patch; {value:.4} mm of it were left over"),
-            "lower the feed, or remove knots that lie closer together than one period's arc",
+            format!("the arc of one period is longer than a whole patch; {value:.4} mm of the arc remain"),
+            "lower the feed, or remove knots closer together than the arc of one period",
         ),
         FaultKind::IntervalTooSmall => (
             format!("the path interval, {value:.1e} of a patch, does not advance the side parameter"),
@@ -156,10 +156,10 @@ pub fn fault(fault: Fault) -> (String, &'static str) {
         ),
         FaultKind::DeadlineMissed => (
             format!("{value} ticks of the sample timer were missed"),
-            "this is a defect of the firmware, or a debugger held the chip",
+            "this is a defect of the firmware, or a debugger halted the chip",
         ),
         FaultKind::TickOverBudget => (
-            format!("a tick took {value} cycles, more than the board allows it"),
+            format!("a tick took {value} cycles, more than the board's limit"),
             "this is a defect of the firmware: please report the job",
         ),
         FaultKind::SoftLimit => (
@@ -171,42 +171,45 @@ pub fn fault(fault: Fault) -> (String, &'static str) {
             "raise `safe_z_mm` in [machine]",
         ),
         FaultKind::LinkBlocked => (
-            "the surface does not face up where the tool has to leave it or come to it".to_owned(),
+            "the surface does not face up at a point of retract or plunge".to_owned(),
             "turn the part so that it faces up ([placement]), or take the pattern \"zigzag\" where only the ends of passes are in the way",
         ),
         FaultKind::EmergencyStop => (
-            "the emergency stop was pressed: the drives are off, the home is lost".to_owned(),
-            "release it, acknowledge, and declare home anew (`cargo sim operate`)",
+            "the emergency stop was pressed: the drives are off, the home position is lost".to_owned(),
+            "release the button, acknowledge, and declare home again (`cargo sim operate`)",
         ),
         FaultKind::LimitSwitch => (
             inputs("an axis is at the end of its travel", fault),
-            "move it off its switch by hand with the drives off, and declare home anew (`cargo sim operate`)",
+            "move the axis off its switch by hand with the drives off, and declare home again (`cargo sim operate`)",
         ),
         FaultKind::DriveFault => (
-            inputs("the drives are off and the home is lost because of", fault),
-            "find the cause at the drive, acknowledge, and declare home anew (`cargo sim operate`)",
+            inputs(
+                "the drives are off and the home position is lost because of",
+                fault,
+            ),
+            "find the cause at the drive, acknowledge, and declare home again (`cargo sim operate`)",
         ),
         FaultKind::LinkTimeout => (
             format!("no word of the host for {value} periods"),
             "connect again, and resume or stop the run (`cargo sim operate`)",
         ),
         FaultKind::NotHomed => (
-            "the machine is not homed: nobody has said where its axes stand".to_owned(),
-            "place the axes, and say where they stand: `run --home X,Y,Z`; or homing_required = false in [machine]",
+            "the machine is not homed: the position of its axes has not been declared".to_owned(),
+            "position the axes and declare their position: `run --home X,Y,Z`; or homing_required = false in [machine]",
         ),
         FaultKind::StepRate => (
-            format!("an axis was asked for {value} steps in one period, more than the pulses of a period"),
+            format!("an axis demands {value} steps in one period, more than the capacity of a period"),
             "lower the feed, or set coarser microsteps and steps_per_mm with them",
         ),
         FaultKind::StepOutput => (
             if value > 0.0 {
                 format!(
-                    "the direction pins were set {value} slots late, within the pulses of an axis that turns"
+                    "the direction pins were set {value} slots late, within the pulses of an axis that reverses"
                 )
             } else {
-                "the DMA that hands the step pulses out has stopped".to_owned()
+                "the DMA that outputs the step pulses has stopped".to_owned()
             },
-            "home the machine; this is a defect of the firmware, or a debugger held the chip",
+            "home the machine; this is a defect of the firmware, or a debugger halted the chip",
         ),
     }
 }
@@ -233,7 +236,7 @@ mod tests {
         }
     }
 
-    /// One of each.
+    /// One of each kind.
     fn reasons() -> Vec<Reason> {
         vec![
             Reason::BadFrame {
@@ -279,7 +282,7 @@ mod tests {
         ]
     }
 
-    /// The codes are those that the wire has, none is left out, and the wire knows no other.
+    /// Every code of the wire has an entry, and every entry a code of the wire.
     #[test]
     fn every_reason_is_explained() {
         let reasons = reasons();

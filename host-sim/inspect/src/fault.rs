@@ -1,16 +1,16 @@
-//! A fault with its place on the surface.
+//! A fault with its location on the surface.
 
 use interp_core::Fault;
 use job::Job;
 use machine::Machine;
 use machine::prepare::Prepared;
 
-/// A fault with its place.
+/// A fault with its location.
 #[derive(Clone, Copy, Debug)]
 pub struct FaultAt {
     /// The fault.
     pub fault: Fault,
-    /// Samples before it.
+    /// Number of samples before the fault.
     pub tick: u64,
     /// Pass, from 0.
     pub pass: u32,
@@ -31,7 +31,7 @@ impl FaultAt {
         }
     }
 
-    /// The fault, its place and the remedy, in two lines.
+    /// The fault, its location and the remedy, in two lines.
     #[must_use]
     pub fn sentence(&self) -> String {
         let remedy = explain::fault(self.fault).1;
@@ -40,7 +40,7 @@ impl FaultAt {
         format!("{place}\n  help: {remedy}; more: cargo sim explain {code}")
     }
 
-    /// The same, with the line of the job file that causes it.
+    /// As [`Self::sentence`], with the line of the job file that causes the fault.
     #[must_use]
     pub fn sentence_of(&self, job: &Job) -> String {
         let line = job.origin.quote(explain::key(self.fault.kind));

@@ -1,9 +1,9 @@
-//! Runs a job on the core and judges the run: the one pipeline that the commands and the tests use.
+//! Runs a job on the core and verifies the run: the one pipeline for commands and tests.
 //!
 //! ```text
-//! Job ──timed──► digests, fault        the core alone
-//!     ──surveyed──► errors, speeds     every sample against the oracle
-//!     ──verified──► scallop, gouges, limits, optimum, and the verdict
+//! Job ──time_run───► digests, fault     the core alone
+//!     ──survey_run─► errors, speeds     every sample against the oracle
+//!     ──verify_run─► scallop, gouges, limits, optimum, and pass or fail
 //! ```
 #![cfg_attr(
     test,
@@ -25,6 +25,6 @@ mod verification;
 pub use error::InspectError;
 pub use fault::FaultAt;
 pub use pass_time::{PassTime, pass_times};
-pub use run::{PassDigest, TimedRun, oracle, refused, surveyed, timed};
+pub use run::{PassDigest, TimedRun, load_error, oracle, survey_run, time_run};
 pub use sample::{is_on_pass, plain};
-pub use verification::{BOUNDS, Measured, Verification, verified};
+pub use verification::{BOUNDS, RunMeasurements, Verification, verify_run};

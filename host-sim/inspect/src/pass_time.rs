@@ -1,29 +1,34 @@
-//! The times of passes against the fastest motion that the limits allow.
+//! The times of passes, compared with the fastest motion within the limits.
 
 use std::collections::BTreeMap;
 
 use job::{AxisLimits, Job};
 use oracle::Oracle;
 use verify::motion::{Optimum, PassPath, optimum};
-use verify::swept::Track;
+use verify::swept::ToolPath;
 
-/// The time of a pass, and what the limits allow.
+/// The time of a pass, and the least time within the limits.
 #[derive(Debug)]
 pub struct PassTime {
     /// Pass, from 0.
     pub pass: usize,
     /// Length of the contact's path, mm.
     pub length_mm: f64,
-    /// The fastest motion found offline, and a bound below it.
+    /// The fastest motion found offline, and the lower bound.
     pub best: Optimum,
     /// Time of the job's own samples, s; `None` where the job has no limits.
     pub ours_s: Option<f64>,
 }
 
 /// Times of the first, the middle and the last pass, by the job's limits, or by [`AxisLimits::DEFAULT`] where it has none. `samples`:
-/// how many lie on each pass. Passes that the oracle cannot follow are left out.
+/// number of samples per pass. Passes for which the oracle has no result are left out.
 #[must_use]
-pub fn pass_times(job: &Job, oracle: &Oracle, track: &Track, samples: &BTreeMap<u32, u64>) -> Vec<PassTime> {
+pub fn pass_times(
+    job: &Job,
+    oracle: &Oracle,
+    track: &ToolPath,
+    samples: &BTreeMap<u32, u64>,
+) -> Vec<PassTime> {
     let own = job.machine.limits;
     let limits = own.unwrap_or(AxisLimits::DEFAULT);
     let period_s = job.machine.period_s();

@@ -8,15 +8,15 @@ use machine::Machine;
 use machine::prepare::Prepared;
 use oracle::Oracle;
 use protocol::digest::Digest;
-use verify::survey::{Each, Findings, Survey};
+use verify::survey::{SampleObserver, Survey, SurveyResult};
 use verify::swept::Progress;
 use verify::trace::Trace;
 
 use crate::{FaultAt, InspectError, is_on_pass, plain};
 
-/// Samples between two steps of a progress bar.
+/// Samples per step of a progress bar.
 pub(crate) const PROGRESS_SAMPLES: u64 = 65_536;
-/// Steps of the progress bar of a run whose number of samples is not known before: it follows the side parameter.
+/// Steps of the progress bar of a run with an unknown number of samples: the bar follows the side parameter.
 const PROGRESS_PARTS: u64 = 1000;
 
 /// A pass of a timed run.
@@ -24,9 +24,9 @@ const PROGRESS_PARTS: u64 = 1000;
 pub struct PassDigest {
     /// Tick of its first sample.
     pub first_tick: u32,
-    /// Samples, with the way to the next pass.
+    /// Number of samples, with the link to the next pass.
     pub samples: u32,
-    /// Digest of the run up to its end.
+    /// Digest of the run up to the end of the pass.
     pub digest: u64,
 }
 
@@ -35,9 +35,9 @@ pub struct PassDigest {
 pub struct TimedRun {
     /// Digest of all samples.
     pub digest: u64,
-    /// Samples.
+    /// Number of samples.
     pub samples: u64,
-    /// Samples a second of wall time.
+    /// Samples per second of wall time.
     pub samples_per_second: f64,
     /// The passes, in order.
     pub passes: Vec<PassDigest>,
@@ -47,7 +47,7 @@ pub struct TimedRun {
 
 /// The error of a job that the core refuses, at its line.
 #[must_use]
-pub fn refused(job: &Job, fault: Fault) -> JobError {
+pub fn load_error(job: &Job, fault: Fault) -> JobError {
     let (what, remedy) = explain::fault(fault);
     let remedy = format!("{remedy}; more: cargo sim explain {}", fault.kind.code());
     job.origin.error("surface", what, remedy)
@@ -55,18 +55,18 @@ pub fn refused(job: &Job, fault: Fault) -> JobError {
 
 /// A machine with the job loaded.
 pub(crate) fn machine(job: &Job, prepared: &Prepared) -> Result<Machine, JobError> {
-    Machine::load(prepared).map_err(|fault| refused(job, fault))
+    Machine::load(prepared).map_err(|fault| load_error(job, fault))
 }
 
 /// The oracle of a job.
 ///
 /// # Errors
-/// The job asks for an upper side that the surface does not have.
+/// The job requests an upper side, and the surface has none.
 pub fn oracle(job: &Job) -> Result<Oracle, InspectError> {
     Ok(Oracle::new(job)?)
 }
 
-/// Parts of the surface that lie behind a pass, of [`PROGRESS_PARTS`].
+/// Completed share of the surface, in units of 1/[`PROGRESS_PARTS`].
 #[allow(
     clippy::cast_possible_truncation,
     clippy::cast_precision_loss,
@@ -83,7 +83,7 @@ fn parts_done(side: SpanParameter, prepared: &Prepared) -> u64 {
 ///
 /// # Errors
 /// The core refuses the job.
-pub fn timed(job: &Job, prepared: &Prepared, progress: &dyn Progress) -> Result<TimedRun, JobError> {
+pub fn time_run(job: &Job, prepared: &Prepared, progress: &dyn Progress) -> Result<TimedRun, JobError> {
     let mut machine = machine(job, prepared)?;
     let mut run = Digest::new();
     let mut passes: Vec<PassDigest> = Vec::new();
@@ -132,19 +132,19 @@ pub fn timed(job: &Job, prepared: &Prepared, progress: &dyn Progress) -> Result<
     })
 }
 
-/// Runs the core, measures every sample, and writes the trace if one is given. `samples`: how many are expected; `each`: takes every
-/// sample on a pass with what its check found.
+/// Runs the core, measures every sample, and writes the trace if one is given. `samples`: expected number; `each`: called for every
+/// sample on a pass, with its errors.
 ///
 /// # Errors
-/// The core refuses the job, the oracle has no answer for it, or the trace cannot be written.
-pub fn surveyed<'a>(
+/// The core refuses the job, the oracle has no result for it, or the trace cannot be written.
+pub fn survey_run<'a>(
     job: &Job,
     prepared: &Prepared,
     samples: u64,
     trace: Option<Trace>,
-    each: Option<&'a mut Each<'a>>,
+    each: Option<&'a mut SampleObserver<'a>>,
     progress: &dyn Progress,
-) -> Result<Findings, InspectError> {
+) -> Result<SurveyResult, InspectError> {
     let oracle = oracle(job)?;
     let mut survey = Survey::new(&oracle, trace, each);
     progress.begin("measuring", samples);

@@ -1,10 +1,10 @@
-//! A sample of the core in the plain numbers that the verifier takes.
+//! A sample of the core in plain numbers, for the verifier.
 
 use interp_core::{SpanParameter, State};
 use machine::prepare::Prepared;
-use verify::Sample;
+use verify::EmittedSample;
 
-/// Whether a sample lies on a pass, and not on the way between two.
+/// Whether a sample is on a pass, and not on a link.
 #[must_use]
 pub fn is_on_pass(sample: &interp_core::Sample) -> bool {
     sample.state != State::Linking && sample.path != SpanParameter::NONE
@@ -12,8 +12,8 @@ pub fn is_on_pass(sample: &interp_core::Sample) -> bool {
 
 /// A sample of the core in plain numbers.
 #[must_use]
-pub fn plain(prepared: &Prepared, sample: &interp_core::Sample) -> Sample {
-    Sample {
+pub fn plain(prepared: &Prepared, sample: &interp_core::Sample) -> EmittedSample {
+    EmittedSample {
         tick: sample.tick.into(),
         state: sample.state.name(),
         pass: sample.pass,

@@ -1,4 +1,4 @@
-//! The whole judgement of a job: every sample, the swept ball, travel, limits, the optimum.
+//! The verification of a job: every sample, the swept ball, travel, limits, the optimum.
 
 use std::cell::RefCell;
 use std::collections::BTreeMap;
@@ -7,16 +7,16 @@ use interp_core::State;
 use job::Job;
 use machine::prepare::Prepared;
 use machine::travel;
-use oracle::{Bounds, Checked, Emitted};
-use verify::motion::{Gauge, Peaks, limits};
-use verify::survey::{Each, Findings, Survey};
-use verify::swept::{self, Progress, Track};
+use oracle::{AccuracyBounds, PassSample, SampleCheck};
+use verify::motion::{PeakMeter, Peaks, limits};
+use verify::survey::{SampleObserver, Survey, SurveyResult};
+use verify::swept::{self, Progress, ToolPath};
 
 use crate::run::{PROGRESS_SAMPLES, machine, oracle};
 use crate::{InspectError, PassTime, TimedRun, pass_times, plain};
 
-/// Bounds of every sample: the figures of the README.
-pub const BOUNDS: Bounds = Bounds {
+/// Bounds of every sample, as in the README.
+pub const BOUNDS: AccuracyBounds = AccuracyBounds {
     position_nm: 10.0,
     contact_nm: 10.0,
     normal_rad: 1e-6,
@@ -26,10 +26,10 @@ pub const BOUNDS: Bounds = Bounds {
     fit: 1.0,
 };
 
-/// Use of the axes, sample by sample. With limits: from standstill to standstill, links included. Without: within passes, because the
-/// feed jumps between them, and a pass's last step is cut short by its end.
+/// Use of the axis limits, sample by sample. With limits: from standstill to standstill, links included. Without limits: within passes only,
+/// because the feed steps between them, and without the last step of a pass, which is shorter than the others.
 struct AxesUse {
-    gauge: Gauge,
+    gauge: PeakMeter,
     has_limits: bool,
     begun: bool,
 }
@@ -37,79 +37,79 @@ struct AxesUse {
 impl AxesUse {
     fn new(job: &Job) -> Self {
         Self {
-            gauge: Gauge::new(&job.machine),
+            gauge: PeakMeter::new(&job.machine),
             has_limits: job.machine.has_limits(),
             begun: false,
         }
     }
 
-    /// A sample as the machine emitted it.
+    /// A sample as emitted by the machine.
     fn emitted(&mut self, tick: u32, cl_nm: [i32; 3]) {
         if self.has_limits {
             if !std::mem::replace(&mut self.begun, true) {
-                self.gauge.stand(cl_nm);
+                self.gauge.start_at_rest(cl_nm);
             }
             self.gauge.add(tick.into(), cl_nm);
         }
     }
 
     /// A sample on a pass.
-    fn on_pass(&mut self, sample: &Emitted) {
+    fn on_pass(&mut self, sample: &PassSample) {
         if self.has_limits || sample.last_of_pass {
             return;
         }
         if sample.first_of_pass {
-            self.gauge.gap();
+            self.gauge.discontinuity();
         }
         self.gauge.add(sample.tick, sample.cl_nm);
     }
 
     fn finish(mut self) -> Peaks {
         if self.has_limits {
-            self.gauge.come_to_stand();
+            self.gauge.end_at_rest();
         }
         self.gauge.peaks()
     }
 }
 
 /// The figures of a verified run.
-pub struct Measured {
+pub struct RunMeasurements {
     /// Every sample against the oracle.
-    pub findings: Findings,
+    pub findings: SurveyResult,
     /// The swept ball against the surface.
-    pub swept: swept::Findings,
-    /// Use of the axes.
+    pub swept: swept::SweptResult,
+    /// Use of the axis limits.
     pub axes: Peaks,
-    /// Passes against the optimum; empty where it was not asked for.
+    /// Passes against the optimum; empty if not requested.
     pub pass_times: Vec<PassTime>,
 }
 
 /// A verified job.
 pub struct Verification {
     /// The figures.
-    pub measured: Measured,
-    /// Passes that a dense scan of the surface needs, where the oracle has an answer.
+    pub measured: RunMeasurements,
+    /// Number of passes by a dense scan of the surface; `None` if the oracle has no result.
     pub scanned: Option<usize>,
-    /// What speaks against the job, the gravest first. Empty: passed.
+    /// Reasons against the job, most severe first. Empty: passed.
     pub failures: Vec<String>,
-    /// What does not speak against the job, but has to be known.
+    /// Conditions to know that are not failures.
     pub warnings: Vec<String>,
 }
 
-/// Verifies a job whose run by the core alone is known. `each` takes every sample on a pass; `with_optimum` times the first, the middle
-/// and the last pass, too.
+/// Verifies a job after its timed run. `each` is called for every sample on a pass; `with_optimum` also computes the optimum of the first,
+/// the middle and the last pass.
 ///
 /// # Errors
-/// The core refuses the job, or the oracle has no answer for it.
-pub fn verified<'a>(
+/// The core refuses the job, or the oracle has no result for it.
+pub fn verify_run<'a>(
     job: &Job,
     prepared: &Prepared,
     timed: &TimedRun,
-    each: Option<&'a mut Each<'a>>,
+    each: Option<&'a mut SampleObserver<'a>>,
     with_optimum: bool,
     progress: &dyn Progress,
 ) -> Result<Verification, InspectError> {
-    let measured = measured(job, prepared, timed, each, with_optimum, progress)?;
+    let measured = measure(job, prepared, timed, each, with_optimum, progress)?;
     let scanned = oracle(job)?.schedule().ok().map(|passes| passes.len());
     let failures = failures(job, timed, &measured, scanned);
     let own = |warning: &&String| !failures.contains(warning);
@@ -123,24 +123,24 @@ pub fn verified<'a>(
 }
 
 /// Runs the core again and measures every sample, then the swept ball against the surface.
-fn measured<'a>(
+fn measure<'a>(
     job: &Job,
     prepared: &Prepared,
     timed: &TimedRun,
-    mut each: Option<&'a mut Each<'a>>,
+    mut each: Option<&'a mut SampleObserver<'a>>,
     with_optimum: bool,
     progress: &dyn Progress,
-) -> Result<Measured, InspectError> {
+) -> Result<RunMeasurements, InspectError> {
     let oracle = oracle(job)?;
-    // With limits the feed is low at the ends of passes: samples that lie closer than half a period's step are not kept.
+    // With limits the feed is low at the ends of passes: samples closer than half the full step of a period are not stored.
     let spacing_nm = if job.machine.has_limits() {
         0.5e6 * job.feed_mm_s() * job.machine.period_s()
     } else {
         0.0
     };
-    let mut track = Track::with_spacing(spacing_nm);
+    let mut track = ToolPath::with_spacing(spacing_nm);
     let axes = RefCell::new(AxesUse::new(job));
-    let mut keep = |emitted: &Emitted, checked: &Checked| {
+    let mut keep = |emitted: &PassSample, checked: &SampleCheck| {
         track.add(emitted, job.along);
         axes.borrow_mut().on_pass(emitted);
         if let Some(each) = &mut each {
@@ -171,7 +171,7 @@ fn measured<'a>(
     } else {
         Vec::new()
     };
-    Ok(Measured {
+    Ok(RunMeasurements {
         findings,
         swept,
         axes: axes.into_inner().finish(),
@@ -179,8 +179,8 @@ fn measured<'a>(
     })
 }
 
-/// What speaks against the job, the gravest first.
-fn failures(job: &Job, timed: &TimedRun, measured: &Measured, scanned: Option<usize>) -> Vec<String> {
+/// Reasons against the job, most severe first.
+fn failures(job: &Job, timed: &TimedRun, measured: &RunMeasurements, scanned: Option<usize>) -> Vec<String> {
     let findings = &measured.findings;
     let mut failures: Vec<String> = timed.fault.iter().map(|fault| fault.sentence()).collect();
     failures.extend(findings.report.failures(&BOUNDS));
@@ -203,7 +203,7 @@ fn failures(job: &Job, timed: &TimedRun, measured: &Measured, scanned: Option<us
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::timed;
+    use crate::time_run;
     use job::AxisLimits;
     use machine::prepare::prepare;
 
@@ -217,8 +217,8 @@ mod tests {
         // Coarse, so that the test is short.
         job.scallop_mm = 0.1;
         let prepared = prepare(&job).unwrap();
-        let timed = timed(&job, &prepared, &()).unwrap();
-        let found = verified(&job, &prepared, &timed, None, true, &()).unwrap();
+        let timed = time_run(&job, &prepared, &()).unwrap();
+        let found = verify_run(&job, &prepared, &timed, None, true, &()).unwrap();
         assert_eq!(found.failures, Vec::<String>::new());
         for peak in &found.measured.axes {
             let share = peak.share.unwrap();
@@ -232,7 +232,7 @@ mod tests {
             jerk_mm_s3: limits.jerk_mm_s3.map(|jerk| 0.5 * jerk),
             ..limits
         });
-        let judged = verified(&job, &prepared, &timed, None, false, &()).unwrap();
+        let judged = verify_run(&job, &prepared, &timed, None, false, &()).unwrap();
         assert!(
             judged
                 .failures

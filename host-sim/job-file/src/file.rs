@@ -7,14 +7,14 @@ use job::{JobError, SurfaceSpec};
 
 use crate::section::Section;
 
-/// Largest number of a face that a job may ask for: far more than any file has.
+/// Largest face number that a job may give: far above the number of faces in any file.
 const FACE_MAX: f64 = 1e6;
-/// Tolerance of an approximated face that names none, mm.
+/// Default of the tolerance of an approximated face, mm.
 pub const TOLERANCE_DEFAULT_MM: f64 = 0.001;
 /// Largest tolerance of an approximated face, mm.
 pub const TOLERANCE_MAX_MM: f64 = 1.0;
 
-/// The face that a job asks for.
+/// A face requested by a job.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Face {
     /// The CAD file, relative to the working directory.
@@ -23,18 +23,18 @@ pub struct Face {
     pub number: usize,
     /// Tolerance of an approximation, mm, above 0, at most [`TOLERANCE_MAX_MM`].
     pub tolerance_mm: f64,
-    /// A trimmed face is machined over the rectangle around it.
+    /// A trimmed face is machined over the rectangle that encloses it.
     pub untrimmed: bool,
 }
 
-/// Why a face cannot be had.
+/// Reason for which a face cannot be read.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct FaceError {
-    /// What is wrong.
+    /// The message.
     pub what: String,
-    /// What to do about it.
+    /// The remedy.
     pub remedy: String,
-    /// The face is wrong, not the file: the error points at `face`.
+    /// The error concerns the face, not the file, and points at the key `face`.
     pub of_face: bool,
 }
 
@@ -53,13 +53,16 @@ pub trait FaceReader {
     fn surface(&self, face: &Face) -> Result<SurfaceSpec, FaceError>;
 }
 
-/// Reads no CAD files.
+/// A reader that refuses every CAD file.
 pub(crate) struct NoFaces;
 
 impl FaceReader for NoFaces {
     fn surface(&self, face: &Face) -> Result<SurfaceSpec, FaceError> {
         Err(FaceError {
-            what: format!("{} is a CAD file, which cannot be read here", face.path.display()),
+            what: format!(
+                "{} is a CAD file, which this command cannot read",
+                face.path.display()
+            ),
             remedy: "make a job of the face with `cargo sim import`".to_owned(),
             of_face: false,
         })

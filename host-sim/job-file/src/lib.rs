@@ -29,8 +29,8 @@ mod text;
 use std::path::Path;
 
 use job::{
-    Along, AlongChoice, CHORD_DEFAULT_MM, FEED_MAX_MM_MIN, FEED_MIN_MM_MIN, Job, JobError, Machine, Pattern,
-    RADIUS_MAX_MM, Side, Spacing,
+    Along, AlongChoice, CHORD_DEFAULT_MM, FEED_MAX_MM_MIN, FEED_MIN_MM_MIN, Job, JobError, MachineSpec,
+    Pattern, RADIUS_MAX_MM, Side, Spacing,
 };
 use section::{Reader, Section};
 
@@ -48,7 +48,7 @@ pub fn load(path: &Path) -> Result<Job, JobError> {
 /// Reads a job from a file; `faces` resolves a surface of `kind = "file"`.
 ///
 /// # Errors
-/// The file cannot be read, is not TOML, or a value in it is missing, unknown, of the wrong shape or out of range; what `faces` reports.
+/// The file cannot be read, is not TOML, or a value in it is missing, unknown, of the wrong shape or out of range; the errors of `faces`.
 pub fn load_with(path: &Path, faces: &dyn FaceReader) -> Result<Job, JobError> {
     let name = path.display().to_string();
     let text = text::read(path)?;
@@ -134,7 +134,7 @@ pub fn parse_with(name: &str, text: &str, faces: &dyn FaceReader) -> Result<Job,
         },
         machine: document
             .optional_section("machine")?
-            .map_or(Ok(Machine::default()), |section| machine::read(&section))?,
+            .map_or(Ok(MachineSpec::default()), |section| machine::read(&section))?,
         origin,
     })
 }

@@ -1,6 +1,6 @@
 //! The section `[machine]`: the machine, with every default applied.
 
-use job::{AxisLimits, HEARTBEAT_TIMEOUT_RANGE_MS, HeartbeatAction, JobError, Machine, PERIOD_RANGE_US};
+use job::{AxisLimits, HEARTBEAT_TIMEOUT_RANGE_MS, HeartbeatAction, JobError, MachineSpec, PERIOD_RANGE_US};
 
 use crate::section::Section;
 use crate::steps;
@@ -9,7 +9,7 @@ use crate::steps;
 const HEIGHT_MAX_MM: f64 = 1000.0;
 
 /// The optional section `[machine]`.
-pub(super) fn read(machine: &Section<'_>) -> Result<Machine, JobError> {
+pub(super) fn read(machine: &Section<'_>) -> Result<MachineSpec, JobError> {
     const AXES: &str = "three numbers above 0, one each for x, y and z, e.g. [100, 100, 50]";
     machine.only(
         &[
@@ -32,7 +32,7 @@ pub(super) fn read(machine: &Section<'_>) -> Result<Machine, JobError> {
         ],
         &[],
     )?;
-    let mut read = Machine::default();
+    let mut read = MachineSpec::default();
     if machine.has("period_us") {
         let [least, most] = PERIOD_RANGE_US;
         read.period_us = machine.number("period_us")?;
@@ -82,8 +82,8 @@ pub(super) fn read(machine: &Section<'_>) -> Result<Machine, JobError> {
     Ok(read)
 }
 
-/// The keys that say when a run may start, and what the loss of the host does to it.
-fn read_supervision(machine: &Section<'_>, read: &mut Machine) -> Result<(), JobError> {
+/// The keys for homing and for the heartbeat timeout.
+fn read_supervision(machine: &Section<'_>, read: &mut MachineSpec) -> Result<(), JobError> {
     if machine.has("homing_required") {
         read.homing_required = machine.switch("homing_required")?;
     }
@@ -102,7 +102,7 @@ fn read_supervision(machine: &Section<'_>, read: &mut Machine) -> Result<(), Job
                 "`host_gone_ms` must be {least} to {most}, not {}",
                 read.heartbeat_timeout_ms
             );
-            let remedy = "give the silence in milliseconds after which the host is gone, e.g. 1000";
+            let remedy = "give the heartbeat timeout in milliseconds, e.g. 1000";
             return Err(machine.error("host_gone_ms", what, remedy));
         }
     }

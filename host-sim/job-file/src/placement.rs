@@ -5,9 +5,9 @@ use patches::placement::{Anchor, Placement};
 
 use crate::section::Section;
 
-/// Largest factor: from nanometres to metres is 1e9, and nothing is drawn so.
+/// Largest scale factor: nanometres to metres, 1e9.
 const SCALE_MAX: f64 = 1e6;
-/// Largest turn either way, degrees.
+/// Largest rotation in either direction, degrees.
 const TURN_MAX_DEG: f64 = 360.0;
 
 /// Reads the section.
@@ -15,14 +15,14 @@ fn read(section: &Section<'_>) -> Result<Placement, JobError> {
     section.only(&["scale", "rotate_deg", "place", "translate_mm"], &[])?;
     let mut read = Placement::default();
     if section.has("scale") {
-        let want = "the factor on all lengths, e.g. 25.4 for a surface in inches";
+        let want = "the scale factor, e.g. 25.4 for a surface in inches";
         read.scale = section.number_within("scale", 0.0, SCALE_MAX, want)?;
     }
     if section.has("rotate_deg") {
         read.rotate_deg = section.numbers("rotate_deg")?;
         if let Some(turn) = read.rotate_deg.iter().find(|turn| turn.abs() > TURN_MAX_DEG) {
             let what = format!("`rotate_deg` must be -360 to 360, not {turn}");
-            let remedy = "give the turns about x, y and z in degrees, e.g. [0, 0, 90]";
+            let remedy = "give the rotations about x, y and z in degrees, e.g. [0, 0, 90]";
             return Err(section.error("rotate_deg", what, remedy));
         }
     }
@@ -41,13 +41,13 @@ fn read(section: &Section<'_>) -> Result<Placement, JobError> {
     Ok(read)
 }
 
-/// The surface where the section wants it.
+/// The surface after the placement of the section.
 pub(super) fn place(section: &Section<'_>, surface: &SurfaceSpec) -> Result<SurfaceSpec, JobError> {
     read(section)?.place(surface).map_err(|outside| {
         let (keys, remedy) = if outside.too_large {
             (["scale", "translate_mm"], "scale it down, or cut it into smaller surfaces")
         } else {
-            (["translate_mm", "scale"], "move it nearer to the origin; `place = \"centre\"` with a small `translate_mm` does so whatever the surface's own coordinates")
+            (["translate_mm", "scale"], "move it nearer to the origin; `place = \"centre\"` with a small `translate_mm` does so for any coordinates of the surface")
         };
         let key = keys.into_iter().find(|key| section.has(key)).unwrap_or("place");
         section.error(key, outside.to_string(), remedy)

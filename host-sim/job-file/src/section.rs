@@ -1,4 +1,4 @@
-//! Typed values out of spanned TOML tables. Whatever does not fit becomes an error at its place.
+//! Typed values from spanned TOML tables. A value of the wrong type or range becomes an error at its location.
 
 use std::collections::BTreeMap;
 use std::ops::Range;
@@ -8,8 +8,8 @@ use toml::de::{DeTable, DeValue};
 
 use job::{JobError, Origin};
 
-/// Edits (insert, delete, replace) between an unknown key and the known one that is suggested for it, as a share of
-/// its length: half, beyond which a suggestion misleads more than it helps.
+/// Largest edit distance (insert, delete, replace) between an unknown key and a suggested one, as a share of the length: beyond a half
+/// a suggestion misleads.
 const SUGGESTION_SHARE: usize = 2;
 
 /// The text of a job file.
@@ -24,7 +24,7 @@ impl<'t> Reader<'t> {
         Self { name, text }
     }
 
-    /// The whole document as the nameless top section.
+    /// The whole document as the unnamed top section.
     pub(super) fn document(self) -> Result<Section<'t>, JobError> {
         match DeTable::parse(self.text) {
             Ok(table) => Ok(Section {
@@ -41,7 +41,7 @@ impl<'t> Reader<'t> {
         }
     }
 
-    /// Where each section and each of its keys stands.
+    /// Byte range of each section and of each of its keys.
     pub(super) fn origin(self, document: &Section<'_>) -> Origin {
         let mut keys = BTreeMap::new();
         for (section, value) in &document.table {
@@ -69,8 +69,8 @@ pub(super) struct Section<'t> {
 }
 
 impl<'t> Section<'t> {
-    /// Fails on the first key (in the order of the file) that is not `known`; `elsewhere` explains keys that are known
-    /// but do not belong here.
+    /// Fails on the first key, in the order of the file, that is not in `known`; `elsewhere` gives the message for keys that are valid
+    /// in other sections or kinds.
     pub(super) fn only(&self, known: &[&str], elsewhere: &[(&str, &str)]) -> Result<(), JobError> {
         let stranger = self
             .table
@@ -104,11 +104,11 @@ impl<'t> Section<'t> {
         ))
     }
 
-    /// The section of this name.
+    /// The section of this name; an error if it is missing.
     pub(super) fn section(&self, name: &str) -> Result<Section<'t>, JobError> {
         self.optional_section(name)?.ok_or_else(|| {
             let end = self.reader.text.len();
-            let remedy = format!("add the section `[{name}]`; jobs/revolved.toml shows a whole job");
+            let remedy = format!("add the section `[{name}]`; jobs/revolved.toml is a complete job");
             self.reader
                 .error(end..end, format!("the section `[{name}]` is missing"), remedy)
         })
@@ -136,12 +136,12 @@ impl<'t> Section<'t> {
         }))
     }
 
-    /// Whether the key is there.
+    /// Whether the key is present.
     pub(super) fn has(&self, key: &str) -> bool {
         self.table.contains_key(key)
     }
 
-    /// An error at the key's value, or at the section's head where there is no such key.
+    /// An error at the key's value, or at the section's header if the key is missing.
     pub(super) fn error(&self, key: &str, what: impl Into<String>, remedy: impl Into<String>) -> JobError {
         let span = self
             .table
@@ -150,7 +150,7 @@ impl<'t> Section<'t> {
         self.reader.error(span, what, remedy)
     }
 
-    /// The value of a key that must be there.
+    /// The value of a required key.
     pub(super) fn value(&self, key: &str) -> Result<Value<'_, 't>, JobError> {
         match self.table.get(key) {
             Some(value) => Ok(Value {
@@ -174,7 +174,7 @@ impl<'t> Section<'t> {
         self.value(key)?.number()
     }
 
-    /// A number above `least` and at most `most`.
+    /// A number above `least` and not above `most`.
     pub(super) fn number_within(
         &self,
         key: &str,
@@ -190,7 +190,7 @@ impl<'t> Section<'t> {
         Err(self.error(key, what, format!("give {want}")))
     }
 
-    /// One of the texts, and what it stands for.
+    /// One of the listed texts, as the value paired with it.
     pub(super) fn choice<T: Copy>(&self, key: &str, choices: &[(&str, T)]) -> Result<T, JobError> {
         let value = self.value(key)?;
         let names: Vec<&str> = choices.iter().map(|(name, _)| *name).collect();
@@ -217,7 +217,7 @@ impl<'t> Section<'t> {
         self.reader.name
     }
 
-    /// A text.
+    /// A text value.
     pub(super) fn text(&self, key: &str) -> Result<String, JobError> {
         match self.value(key)?.value.get_ref() {
             DeValue::String(text) => Ok(text.to_string()),
@@ -229,7 +229,7 @@ impl<'t> Section<'t> {
         }
     }
 
-    /// A switch, off where it is left out.
+    /// A Boolean, false by default.
     pub(super) fn switch(&self, key: &str) -> Result<bool, JobError> {
         if !self.has(key) {
             return Ok(false);
@@ -257,7 +257,7 @@ impl<'t> Section<'t> {
         self.value(key)?.matrix()
     }
 
-    /// Three numbers above 0, if the key is there.
+    /// Three numbers above 0, if the key is present.
     pub(super) fn positive_axes(&self, key: &str, want: &str) -> Result<Option<[f64; 3]>, JobError> {
         if !self.has(key) {
             return Ok(None);
@@ -274,7 +274,7 @@ impl<'t> Section<'t> {
     }
 }
 
-/// A value with its place and its name (`` `poles_mm` row 2, column 3 ``).
+/// A value with its location and its name (`` `poles_mm` row 2, column 3 ``).
 #[derive(Clone)]
 pub(super) struct Value<'v, 't> {
     reader: Reader<'t>,
@@ -283,13 +283,13 @@ pub(super) struct Value<'v, 't> {
 }
 
 impl<'v, 't> Value<'v, 't> {
-    /// An error at this value; `what` follows its name.
+    /// An error at this value; `what` follows the value's name in the message.
     pub(super) fn error(&self, what: &str, remedy: impl Into<String>) -> JobError {
         self.reader
             .error(self.value.span(), format!("{} {what}", self.path), remedy)
     }
 
-    /// The value as it stands.
+    /// The value as written in the file.
     pub(super) fn get(&self) -> &DeValue<'t> {
         self.value.get_ref()
     }
@@ -324,7 +324,7 @@ impl<'v, 't> Value<'v, 't> {
         }
     }
 
-    /// The entries of a list; `entry` names one of them in errors.
+    /// The entries of a list; `entry` is their name in errors.
     pub(super) fn list(&self, entry: &str) -> Result<Vec<Self>, JobError> {
         let DeValue::Array(array) = self.value.get_ref() else {
             let what = format!("must be a list, not {}", kind_of(self.value.get_ref()));
@@ -372,7 +372,7 @@ impl<'v, 't> Value<'v, 't> {
     }
 }
 
-/// What a value is, with its article.
+/// The type of a value, with its article.
 fn kind_of(value: &DeValue<'_>) -> &'static str {
     match value {
         DeValue::String(_) => "a text",
@@ -384,8 +384,8 @@ fn kind_of(value: &DeValue<'_>) -> &'static str {
     }
 }
 
-/// The known name that is `key` and its unit (`feed` for `feed_mm_min`), or else the one with the fewest edits, among those that have
-/// few enough.
+/// The known key that consists of `key` and a unit (`feed` for `feed_mm_min`); otherwise the one with the least edit distance, if that
+/// is within the limit.
 fn nearest<'k>(key: &str, known: &[&'k str]) -> Option<&'k str> {
     let lower = key.to_lowercase();
     let with_unit = |name: &str| {
@@ -402,7 +402,7 @@ fn nearest<'k>(key: &str, known: &[&'k str]) -> Option<&'k str> {
     })
 }
 
-/// Levenshtein distance: fewest characters inserted, deleted or replaced that turn one text into the other.
+/// Levenshtein distance: least number of characters inserted, deleted or replaced that turn one text into the other.
 fn edit_distance(from: &str, to: &str) -> usize {
     let to: Vec<char> = to.chars().collect();
     let mut row: Vec<usize> = (0..=to.len()).collect();

@@ -1,15 +1,15 @@
-//! Steps of the axes: numbers as they are written, made fractions without a rounding.
+//! Step output of the axes: decimal numbers as written, converted to fractions without rounding.
 
 use job::{JobError, PERIOD_RANGE_US, Ratio, StepOutput};
 use toml::de::DeValue;
 
 use crate::section::{Section, Value};
 
-/// What is wanted of the steps of an axis.
+/// Remedy of an error in the steps of an axis.
 const WANT: &str =
     "give three numbers from 1/1000 to 500000, or fractions in quotes, such as [400, 78.74, \"3200/5\"]";
 
-/// The keys of `[machine]` that are read here.
+/// The keys of `[machine]` that this module reads.
 pub(super) const KEYS: [&str; 4] = [
     "steps_per_mm",
     "pulse_us",
@@ -17,7 +17,7 @@ pub(super) const KEYS: [&str; 4] = [
     "direction_inverted",
 ];
 
-/// A number in decimal notation as a fraction in lowest terms of tens; none where it does not fit.
+/// A number in decimal notation as a fraction in lowest terms; `None` if it does not fit.
 fn decimal(text: &str) -> Option<(u32, u32)> {
     let text = text.replace('_', "");
     let (mantissa, exponent) = match text.split_once(['e', 'E']) {
@@ -50,13 +50,13 @@ fn fraction(text: &str) -> Option<(u32, u32)> {
     }
 }
 
-/// Longest pulse and longest direction setup time, as shares of the sampling period: the core's step output.
+/// Longest pulse and longest direction setup time, as shares of the sampling period: limits of the core's step output.
 const PULSE_SHARE_MAX: f64 = 0.024;
 const SETUP_SHARE_MAX: f64 = 0.480;
-/// Pulse and direction setup time of a job that names none, µs; cut to the longest that the period allows.
+/// Default of the pulse and of the direction setup time, µs; limited to the longest that the period allows.
 const PULSE_DEFAULT_US: f64 = 1.0;
 const SETUP_DEFAULT_US: f64 = 5.0;
-/// Least and most steps a millimetre.
+/// Least and greatest number of steps per millimetre.
 const STEPS_PER_MM_MIN: f64 = 1e-3;
 const STEPS_PER_MM_MAX: f64 = 500_000.0;
 
@@ -66,7 +66,7 @@ pub fn slots_max_us(period_us: f64) -> [f64; 2] {
     [PULSE_SHARE_MAX, SETUP_SHARE_MAX].map(|share| share * period_us)
 }
 
-/// Steps a millimetre of one axis.
+/// Steps per millimetre of one axis.
 fn axis(value: &Value<'_, '_>) -> Result<Ratio, JobError> {
     let (numerator, denominator) = match value.get() {
         DeValue::Float(float) => decimal(float.as_str()),
@@ -74,12 +74,12 @@ fn axis(value: &Value<'_, '_>) -> Result<Ratio, JobError> {
             .ok()
             .map(|steps| (steps, 1)),
         DeValue::String(text) => fraction(text),
-        // Says what is there instead.
+        // The message names the value found.
         _ => value.number().map(|_| None)?,
     }
     .ok_or_else(|| {
         value.error(
-            "is no number of steps, nor a fraction whose two parts are below 2^32",
+            "is neither a number of steps nor a fraction with both parts below 2^32",
             WANT,
         )
     })?;
@@ -100,7 +100,7 @@ fn time(machine: &Section<'_>, key: &str, default_us: f64, most_us: f64) -> Resu
         return Ok(default_us.min(most_us));
     }
     let value = machine.number(key)?;
-    // A rounding of the period does not count.
+    // Allows for the rounding of the period.
     if (0.0..=most_us * (1.0 + 1e-12)).contains(&value) {
         return Ok(value);
     }
@@ -108,18 +108,18 @@ fn time(machine: &Section<'_>, key: &str, default_us: f64, most_us: f64) -> Resu
     Err(machine.error(
         key,
         what,
-        "give the time that the drive's manual asks for, in microseconds",
+        "give the time required by the drive's manual, in microseconds",
     ))
 }
 
-/// What the drives require; `None` where the job does not say.
+/// Requirements of the drives; `None` where the job gives none.
 pub(super) fn read(machine: &Section<'_>, period_us: f64) -> Result<Option<StepOutput>, JobError> {
     debug_assert!(period_us >= PERIOD_RANGE_US[0]);
     let [steps, pulse, setup, inverted] = KEYS;
     if !machine.has(steps) {
         let alone = [pulse, setup, inverted].into_iter().find(|key| machine.has(key));
         return alone.map_or(Ok(None), |key| {
-            let what = format!("`{key}` says nothing without `{steps}`");
+            let what = format!("`{key}` has no effect without `{steps}`");
             Err(machine.error(key, what, WANT))
         });
     }
@@ -140,7 +140,7 @@ pub(super) fn read(machine: &Section<'_>, period_us: f64) -> Result<Option<StepO
     }))
 }
 
-/// One switch for each axis; all false where the key is missing.
+/// One Boolean per axis; all false where the key is missing.
 fn read_inverted(machine: &Section<'_>, key: &str) -> Result<[bool; 3], JobError> {
     let mut inverted = [false; 3];
     if machine.has(key) {
@@ -202,7 +202,7 @@ mod tests {
         assert_eq!(given.direction_inverted, [false, true, false]);
         let given = config("period_us = 500\npulse_us = 2.5\ndirection_setup_us = 0").unwrap();
         assert_eq!((given.pulse_us, given.direction_setup_us), (2.5, 0.0));
-        // At the shortest period the defaults are cut to what a period holds.
+        // At the shortest period the defaults are limited to the period's shares.
         let given = config("period_us = 10").unwrap();
         assert!(
             given.pulse_us == 0.24 && given.direction_setup_us == 4.8,
@@ -213,16 +213,16 @@ mod tests {
     }
 
     #[test]
-    fn what_is_no_steps_is_said() {
+    fn invalid_steps_are_refused() {
         for (steps, what) in [
             ("[400, 400]", "3 numbers"),
             ("[400, 0, 400]", "1/1000"),
             ("[400, 500001, 400]", "1/1000"),
-            ("[400, -4.5, 400]", "no number of steps"),
+            ("[400, -4.5, 400]", "a number of steps"),
             (r#"[400, "5/0", 400]"#, "1/1000"),
-            (r#"[400, "a/5", 400]"#, "no number of steps"),
+            (r#"[400, "a/5", 400]"#, "a number of steps"),
             ("[400, true, 400]", "must be a number"),
-            ("[400, 0.12345678912345, 400]", "no number of steps"),
+            ("[400, 0.12345678912345, 400]", "a number of steps"),
         ] {
             let said = read_from(&format!("steps_per_mm = {steps}")).unwrap_err();
             assert!(said.contains(what), "{steps}: {said}");

@@ -1,4 +1,4 @@
-//! The section `[surface]`: one reader a kind.
+//! The section `[surface]`: one reader per kind.
 
 use std::f64::consts::TAU;
 
@@ -9,12 +9,12 @@ use crate::section::{Section, Value};
 
 /// Highest degree of a NURBS surface: the core's patches are bicubic.
 const DEGREE_MAX: usize = 3;
-/// How far beyond a full turn `v_rad` may reach, rad: the rounding of a written 2 pi.
-const TURN_SLACK_RAD: f64 = 1e-9;
-/// How far below 0 a profile's radius may dip, mm: the rounding of a profile that ends on the axis.
-const RADIUS_SLACK_MM: f64 = 1e-9;
+/// Excess over a full turn allowed for `v_rad`, rad: rounding of a 2 pi written in decimals.
+const TURN_TOLERANCE_RAD: f64 = 1e-9;
+/// Negative radius allowed for a profile, mm: rounding of a profile that ends on the axis.
+const RADIUS_TOLERANCE_MM: f64 = 1e-9;
 
-/// Every key that some kind of surface has, and the kinds that have it.
+/// Every key of any kind of surface, and the kinds that have the key.
 const KEYS: [(&str, &str); 14] = [
     ("radius_mm", "only a revolved surface has it"),
     ("height_mm", "only a revolved surface has it"),
@@ -32,7 +32,7 @@ const KEYS: [(&str, &str); 14] = [
     ("untrimmed", "only a surface of kind \"file\" has it"),
 ];
 
-/// Which kind a job asks for.
+/// The kind of surface.
 #[derive(Clone, Copy)]
 enum Kind {
     Revolved,
@@ -73,12 +73,12 @@ fn revolved(section: &Section<'_>) -> Result<SurfaceSpec, JobError> {
     let height_mm = section.numbers("height_mm")?;
     let u = range_or_unit(section, "u")?;
     let v_rad = range(section, "v_rad")?;
-    if v_rad[1] - v_rad[0] > TAU + TURN_SLACK_RAD {
+    if v_rad[1] - v_rad[0] > TAU + TURN_TOLERANCE_RAD {
         let what = format!("`v_rad` spans {} rad, more than a full turn", v_rad[1] - v_rad[0]);
         return Err(section.error("v_rad", what, "give a range of at most 2 pi = 6.283185307179586"));
     }
     let (least_mm, at) = least_of_cubic(&radius_mm, u);
-    if least_mm < -RADIUS_SLACK_MM {
+    if least_mm < -RADIUS_TOLERANCE_MM {
         let what = format!("the profile's radius is negative: {least_mm} mm at u = {at}");
         return Err(section.error(
             "radius_mm",
@@ -160,7 +160,7 @@ fn read_degree(section: &Section<'_>, direction: usize) -> Result<usize, JobErro
     })
 }
 
-/// Poles with their weights, every row as long as the first.
+/// Poles with their weights; all rows have the length of the first.
 fn read_poles(section: &Section<'_>) -> Result<Vec<Vec<[f64; 4]>>, JobError> {
     let rows = section.value("poles_mm")?.list("row")?;
     let mut poles: Vec<Vec<[f64; 4]>> = Vec::with_capacity(rows.len());
@@ -230,8 +230,8 @@ fn read_knots(section: &Section<'_>, key: &str, degree: usize, poles: usize) -> 
     }
     let knots = entries.iter().map(Value::number).collect::<Result<Vec<_>, _>>()?;
     if let Some(at) = (1..knots.len()).find(|i| knots[*i] < knots[i - 1]) {
-        let what = format!("is {}, below the one before it ({})", knots[at], knots[at - 1]);
-        return Err(entries[at].error(&what, "give knots that never descend"));
+        let what = format!("is {}, below the previous one ({})", knots[at], knots[at - 1]);
+        return Err(entries[at].error(&what, "give knots in ascending order"));
     }
     let (start, end) = (knots[degree], knots[poles]);
     if start >= end {
@@ -242,8 +242,8 @@ fn read_knots(section: &Section<'_>, key: &str, degree: usize, poles: usize) -> 
     Ok(knots)
 }
 
-/// No knot inside the domain more than `degree` times: there the surface would tear. No end knot more than
-/// `degree + 1` times: that pole would have no influence.
+/// No knot inside the domain has a multiplicity above `degree`: the surface would be discontinuous there. No end knot has one above
+/// `degree + 1`: its pole would have no influence.
 fn check_multiplicity(knots: &[f64], entries: &[Value<'_, '_>], degree: usize) -> Result<(), JobError> {
     let (start, end) = (knots[degree], knots[knots.len() - 1 - degree]);
     for (at, knot) in knots.iter().enumerate() {
@@ -258,8 +258,7 @@ fn check_multiplicity(knots: &[f64], entries: &[Value<'_, '_>], degree: usize) -
             (degree + 1, "at an end")
         };
         if times > most {
-            let what =
-                format!("makes {knot} stand {times} times; {place} a knot may stand at most {most} times");
+            let what = format!("gives {knot} a multiplicity of {times}; {place} it may be at most {most}");
             return Err(entries[at].error(
                 &what,
                 "remove the repeated knot and its row of poles, or split the surface there",
@@ -269,7 +268,7 @@ fn check_multiplicity(knots: &[f64], entries: &[Value<'_, '_>], degree: usize) -
     Ok(())
 }
 
-/// A range that may be left out for `[0, 1]`.
+/// A range; `[0, 1]` by default.
 fn range_or_unit(section: &Section<'_>, key: &str) -> Result<[f64; 2], JobError> {
     if section.has(key) {
         range(section, key)
@@ -288,7 +287,7 @@ fn range(section: &Section<'_>, key: &str) -> Result<[f64; 2], JobError> {
     Err(section.error(key, what, "give [least, most]"))
 }
 
-/// Least value of a cubic (highest power first) on a range, and where: at an end or where the derivative vanishes.
+/// Minimum of a cubic (highest power first) on a range and its location: at an end or at a zero of the derivative.
 fn least_of_cubic(c: &[f64; 4], range: [f64; 2]) -> (f64, f64) {
     let (a, b, d) = (3.0 * c[0], 2.0 * c[1], c[2]);
     let root = (b * b - 4.0 * a * d).max(0.0).sqrt();

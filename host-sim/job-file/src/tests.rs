@@ -1,4 +1,4 @@
-//! Every kind of bad input gets its line, what is wrong and what to do; the sample jobs are all good.
+//! Every kind of bad input yields its line, a message and a remedy; the sample jobs are valid.
 
 use job::{AxisLimits, HeartbeatAction, Job, JobError, NurbsSpec, SurfaceSpec};
 
@@ -90,9 +90,9 @@ fn the_documented_job_is_read() {
 }
 
 #[test]
-fn what_may_be_left_out_has_its_default() {
+fn optional_keys_have_defaults() {
     let job = parse("job.toml", NURBS).unwrap();
-    assert_eq!(job.machine, Machine::default());
+    assert_eq!(job.machine, MachineSpec::default());
     assert_eq!(
         (job.pattern, job.chord_mm, job.side),
         (Pattern::Zig, CHORD_DEFAULT_MM, Side::Minus)
@@ -135,8 +135,8 @@ fn unclamped_knots_are_allowed() {
     assert_eq!(job.surface.domain()[0], [2.0, 4.0]);
 }
 
-/// Each row: text, what to replace, by what, line and column of the error, a part of what it says.
-type Bad = (
+/// Each row: text, old part, new part, line and column of the error, a part of the message.
+type BadInput = (
     &'static str,
     &'static str,
     &'static str,
@@ -145,7 +145,7 @@ type Bad = (
     &'static str,
 );
 
-fn check(rows: &[Bad]) {
+fn check(rows: &[BadInput]) {
     for (text, from, to, line, column, what) in rows {
         let error = edited(text, from, to).expect_err(&format!("{from} -> {to} was accepted"));
         assert!(error.what().contains(what), "{from} -> {to}: {error}");
@@ -227,8 +227,8 @@ fn ranges() {
         (REVOLVED, "period_us = 1000", "homing_required = 0", 21, 19, "`homing_required` must be true or false, not a number"),
         (NURBS, "degree = [2, 1]", "degree = [4, 1]", 3, 11, "`degree`, number 1 must be a whole number from 1 to 3"),
         (NURBS, "degree = [2, 1]", "degree = [2, 1.5]", 3, 14, "must be a whole number from 1 to 3, not 1.5"),
-        (NURBS, "[0, 0, 0, 0.5,", "[0, 0, 0, -0.5,", 4, 21, "`knots_u`, knot 4 is -0.5, below the one before it (0)"),
-        (NURBS, "[0, 0, 0, 0.5,", "[0, 0, 0, 0,", 4, 21, "makes 0 stand 4 times; at an end"),
+        (NURBS, "[0, 0, 0, 0.5,", "[0, 0, 0, -0.5,", 4, 21, "`knots_u`, knot 4 is -0.5, below the previous one (0)"),
+        (NURBS, "[0, 0, 0, 0.5,", "[0, 0, 0, 0,", 4, 21, "gives 0 a multiplicity of 4; at an end"),
         (NURBS, "[0, 0, 0, 0.5, 1, 1, 1]", "[0, 1, 1, 1, 1, 1, 3]", 4, 11, "leaves an empty range"),
         (NURBS, "2, 0.5]", "2, 0]", 8, 17, "has the weight 0, which must be above 0"),
     ]);
@@ -247,13 +247,13 @@ fn placements() {
         (REVOLVED, TOOL, "[placement]\nrotate_deg = 90\n[tool]", 9, 14, "`rotate_deg` must be a list, not a number"),
         (REVOLVED, TOOL, "[placement]\nrotate_deg = [0, 361, 0]\n[tool]", 9, 14, "must be -360 to 360, not 361"),
         (REVOLVED, TOOL, "[placement]\nplace = \"center\"\n[tool]", 9, 9, "did you mean \"centre\"?"),
-        (REVOLVED, TOOL, "[placement]\ntranslate_mm = [0, 2200, 0]\n[tool]", 9, 16, "the placed surface reaches from y = 2120.000 to 2200.000 mm"),
-        (REVOLVED, TOOL, "[placement]\ntranslate_mm = [0, 1, 0]\nscale = 100\n[tool]", 10, 9, "the machine reaches ±2147.483 mm"),
+        (REVOLVED, TOOL, "[placement]\ntranslate_mm = [0, 2200, 0]\n[tool]", 9, 16, "the placed surface extends from y = 2120.000 to 2200.000 mm"),
+        (REVOLVED, TOOL, "[placement]\ntranslate_mm = [0, 1, 0]\nscale = 100\n[tool]", 10, 9, "the machine's range is ±2147.483 mm"),
     ]);
 }
 
 #[test]
-fn an_inner_knot_may_not_tear_the_surface() {
+fn an_inner_knot_of_full_multiplicity_is_refused() {
     let text = NURBS.replace("[0, 0, 0, 0.5, 1, 1, 1]", "[0, 0, 0, 0.5, 0.5, 0.5, 1, 1, 1]");
     let rows = "    [[14, 0, 1], [14, 9, 1]],\n";
     let error = edited(&text, rows, &rows.repeat(3)).unwrap_err();
@@ -261,7 +261,7 @@ fn an_inner_knot_may_not_tear_the_surface() {
     assert!(
         error
             .what()
-            .contains("makes 0.5 stand 3 times; inside the range a knot may stand at most 2 times"),
+            .contains("gives 0.5 a multiplicity of 3; inside the range it may be at most 2"),
         "{error}"
     );
 }
@@ -286,7 +286,7 @@ fn a_later_stage_can_point_at_a_line() {
 }
 
 #[test]
-fn the_report_shows_the_line_with_a_caret() {
+fn the_error_shows_the_line_with_a_caret() {
     let error = edited(REVOLVED, "feed_mm_min", "feed_mm_mn").unwrap_err();
     let mut shown = String::new();
     let handler = miette::GraphicalReportHandler::new_themed(miette::GraphicalTheme::none());
@@ -303,7 +303,7 @@ fn the_report_shows_the_line_with_a_caret() {
 }
 
 #[test]
-fn a_file_that_is_not_there() {
+fn a_missing_file() {
     let error = load(Path::new("no/such/job.toml")).unwrap_err();
     assert!(
         error
@@ -315,7 +315,7 @@ fn a_file_that_is_not_there() {
 }
 
 #[test]
-fn every_sample_job_is_good() {
+fn every_sample_job_is_valid() {
     let jobs = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../jobs");
     let mut read = 0;
     for entry in std::fs::read_dir(jobs).unwrap() {
@@ -328,7 +328,7 @@ fn every_sample_job_is_good() {
     assert!(read >= 10, "only {read} jobs found");
 }
 
-/// A job that names one limit is a job with limits: the others are the defaults, for whoever reads the job.
+/// A job that gives one limit is a job with limits: the others take their defaults, for every reader of the job.
 #[test]
 fn one_limit_brings_the_defaults_of_the_others() {
     let bare = REVOLVED.split("velocity_max_mm_s").next().unwrap();

@@ -1,12 +1,12 @@
-//! The text of a job file, or what else the path leads to: said so that a newcomer knows what to do.
+//! The text of a job file. A path that leads to another kind of file yields an error that names the kind and the remedy.
 
 use std::io::ErrorKind;
 use std::path::Path;
 
 use job::JobError;
 
-/// First bytes of what people give instead of a job file, what that is, and what to do with it.
-const OTHERS: [(&[u8], &str, &str); 6] = [
+/// Magic bytes of files often given instead of a job file: bytes, message, remedy.
+const MAGIC_BYTES: [(&[u8], &str, &str); 6] = [
     (
         b"ISO-10303-21",
         "is a STEP file, not a job file",
@@ -39,14 +39,14 @@ const OTHERS: [(&[u8], &str, &str); 6] = [
     ),
 ];
 
-/// Reads it.
+/// Reads the text of a job file.
 pub(super) fn read(path: &Path) -> Result<String, JobError> {
     let name = path.display().to_string();
     let error = |what: String, remedy: &str| JobError::of_file(&name, what, remedy);
     let bytes = std::fs::read(path).map_err(|cause| match cause.kind() {
         ErrorKind::NotFound => error(
             "there is no such file".to_owned(),
-            "give the path of a job file; samples are in jobs/, and `cargo sim new` writes one to begin with",
+            "give the path of a job file; samples are in jobs/, and `cargo sim new` writes a first one",
         ),
         ErrorKind::IsADirectory => error(
             "is a folder, not a job file".to_owned(),
@@ -57,12 +57,12 @@ pub(super) fn read(path: &Path) -> Result<String, JobError> {
             "give the path of a job file that you may read",
         ),
     })?;
-    if let Some((_, what, remedy)) = OTHERS.iter().find(|(first, _, _)| bytes.starts_with(first)) {
+    if let Some((_, what, remedy)) = MAGIC_BYTES.iter().find(|(first, _, _)| bytes.starts_with(first)) {
         return Err(error((*what).to_owned(), remedy));
     }
     if bytes.contains(&0) {
         return Err(error(
-            "is no text: it has bytes of value 0".to_owned(),
+            "is not text: it contains bytes of value 0".to_owned(),
             "give the path of a job file; samples are in jobs/",
         ));
     }
@@ -72,13 +72,13 @@ pub(super) fn read(path: &Path) -> Result<String, JobError> {
         let what = format!("the byte 0x{:02x} is not UTF-8 text", bytes[at]);
         let remedy = "save the file as UTF-8, or write this character without its accent";
         let text = String::from_utf8_lossy(bytes);
-        // What stands in for the byte is three bytes long.
+        // The replacement character takes three bytes.
         JobError::at(&name, &text, at..at + 3, what, remedy.to_owned())
     })?;
     if text.trim_start_matches('\u{feff}').trim().is_empty() {
         return Err(error(
             "the file is empty".to_owned(),
-            "write a job into it: `cargo sim new --force -o FILE` makes one to begin with",
+            "write a job into it: `cargo sim new --force -o FILE` writes a first one",
         ));
     }
     Ok(text)
@@ -90,7 +90,7 @@ mod tests {
 
     const TORUS: &str = include_str!("../../../jobs/torus.toml");
 
-    /// What loading a file with these bytes says.
+    /// Result of loading a file with these bytes.
     fn loaded(bytes: &[u8]) -> Result<Job, String> {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("a job.toml");
@@ -103,7 +103,7 @@ mod tests {
     }
 
     #[test]
-    fn editors_of_other_systems_do_no_harm() {
+    fn byte_order_marks_and_crlf_are_accepted() {
         let plain = crate::parse("x", TORUS).unwrap();
         let dos = TORUS.replace('\n', "\r\n");
         for text in [dos.clone(), format!("\u{feff}{TORUS}"), format!("\u{feff}{dos}")] {
@@ -113,7 +113,7 @@ mod tests {
                 (&plain.surface, plain.feed_mm_min)
             );
         }
-        // The line is counted right behind a mark and with two characters a line's end.
+        // Lines and columns are counted correctly after a byte order mark and with CR LF line ends.
         let wrong = format!("\u{feff}{}", dos.replace("\"zigzag\"", "\"zag\""));
         let line = TORUS
             .lines()
@@ -128,14 +128,14 @@ mod tests {
     }
 
     #[test]
-    fn what_is_no_job_file_is_told_apart() {
+    fn other_kinds_of_files_are_recognised() {
         for (bytes, what) in [
             (&b""[..], "None the file is empty"),
             (b" \r\n\t\n", "None the file is empty"),
             (b"\xef\xbb\xbf\n", "None the file is empty"),
             (b"ISO-10303-21;\nHEADER;\n", "None is a STEP file"),
             (b"\xff\xfe[\0s\0", "None is UTF-16 text"),
-            (b"abc\0def", "None is no text"),
+            (b"abc\0def", "None is not text"),
             (
                 b"[surface]\n# caf\xe9\n",
                 "Some((2, 6)) the byte 0xe9 is not UTF-8 text",

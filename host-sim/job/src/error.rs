@@ -1,4 +1,4 @@
-//! The one error of a job file: what is wrong, where, and what to do.
+//! The error of a job file: message, location and remedy.
 
 use std::fmt;
 use std::ops::Range;
@@ -6,7 +6,7 @@ use std::ops::Range;
 use miette::{Diagnostic, LabeledSpan, NamedSource, SourceCode};
 
 /// A fault in a job file. As a [`miette::Diagnostic`] it shows the line with a caret; as text it reads
-/// `file:line:column: what is wrong`.
+/// `file:line:column: message`.
 #[derive(Debug)]
 pub struct JobError(Box<Inner>);
 
@@ -16,11 +16,11 @@ struct Inner {
     remedy: String,
     name: String,
     /// `None` where the file as a whole is wrong.
-    place: Option<Place>,
+    place: Option<Location>,
 }
 
 #[derive(Debug)]
-struct Place {
+struct Location {
     source: NamedSource<String>,
     span: Range<usize>,
     line: usize,
@@ -39,7 +39,7 @@ impl JobError {
             what,
             remedy,
             name: name.to_owned(),
-            place: Some(Place {
+            place: Some(Location {
                 source,
                 span,
                 line,
@@ -48,7 +48,7 @@ impl JobError {
         }))
     }
 
-    /// An error of a file as a whole that is no job file.
+    /// An error of a file as a whole, for a file that is not a job file.
     pub fn of_file(name: &str, what: impl Into<String>, remedy: impl Into<String>) -> Self {
         Self::whole(name, what.into(), remedy.into())
     }
@@ -63,13 +63,13 @@ impl JobError {
         }))
     }
 
-    /// What is wrong, without the place.
+    /// The message without the location.
     #[must_use]
     pub fn what(&self) -> &str {
         &self.0.what
     }
 
-    /// What to do about it.
+    /// The remedy.
     #[must_use]
     pub fn remedy(&self) -> &str {
         &self.0.remedy
@@ -82,7 +82,7 @@ impl JobError {
     }
 }
 
-/// The range, within the text and cut at its first line's end: a caret line that spans lines helps nobody.
+/// The range, limited to the text and to its first line: a caret under several lines is unreadable.
 fn clipped(text: &str, span: Range<usize>) -> Range<usize> {
     let start = span.start.min(text.len());
     let end = span.end.clamp(start, text.len());

@@ -1,5 +1,5 @@
-//! A machining job in plain f64: surface, ball, cut and machine. Every default is applied when a [`Job`] is made, and [`Machine::limits`]
-//! alone decides whether the job has limits. The crate knows neither TOML nor the core, so that the oracle can depend on it and on nothing else.
+//! A machining job in plain f64: surface, ball, cut and machine. Every default is applied when a [`Job`] is made, and [`MachineSpec::limits`]
+//! alone decides whether the job has limits. The crate depends neither on TOML nor on the core, so the oracle can depend on this crate alone.
 //!
 //! Lengths are mm and angles rad; the feed stays in mm/min, as in the file. All values are finite and within their documented ranges.
 #![cfg_attr(
@@ -19,19 +19,19 @@ mod surface;
 
 pub use error::JobError;
 pub use machine::{
-    AXES, AxisLimits, HEARTBEAT_TIMEOUT_DEFAULT_MS, HEARTBEAT_TIMEOUT_RANGE_MS, HeartbeatAction, Machine,
+    AXES, AxisLimits, HEARTBEAT_TIMEOUT_DEFAULT_MS, HEARTBEAT_TIMEOUT_RANGE_MS, HeartbeatAction, MachineSpec,
     PERIOD_DEFAULT_US, PERIOD_RANGE_US, Ratio, StepOutput,
 };
-pub use origin::{AlongChoice, Origin, Trial};
+pub use origin::{AlongChoice, DirectionTrial, Origin};
 pub use surface::{NurbsSpec, SurfaceSpec};
 
-/// Largest ball radius, mm: ten times any ball-end mill; what the core accepts.
+/// Largest ball radius, mm: the core's limit, ten times the radius of any ball-end mill.
 pub const RADIUS_MAX_MM: f64 = 1000.0;
-/// Least feed, mm/min (1 um/s): below it the core's parameter step loses digits; a feed is above it.
+/// Lower bound of the feed (exclusive), mm/min (1 um/s): below it the core's parameter step loses digits.
 pub const FEED_MIN_MM_MIN: f64 = 0.06;
-/// Largest feed, mm/min (10 m/s): what the core accepts.
+/// Largest feed, mm/min (10 m/s): the core's limit.
 pub const FEED_MAX_MM_MIN: f64 = 600_000.0;
-/// Chord error limit of a job that names none, mm: the paper's.
+/// Default of the chord error limit, mm: the paper's.
 pub const CHORD_DEFAULT_MM: f64 = 0.005;
 
 /// The surface parameter that runs along a pass.
@@ -54,39 +54,39 @@ impl Along {
     }
 }
 
-/// The side of the surface that the tool is on.
+/// The side of the surface on which the tool is.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Side {
-    /// Towards +z, whichever sign of `S_u x S_v` that is.
+    /// Towards +z, for either sign of `S_u x S_v`.
     Up,
-    /// The tool normal is `+ S_u x S_v`, whatever the pass direction.
+    /// The tool normal is `+ S_u x S_v`, for either pass direction.
     Plus,
-    /// The tool normal is `- S_u x S_v`, whatever the pass direction.
+    /// The tool normal is `- S_u x S_v`, for either pass direction.
     Minus,
 }
 
 /// Order of the passes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Pattern {
-    /// Every pass runs the same way.
+    /// Every pass runs in the same direction.
     Zig,
-    /// Every second pass runs backwards.
+    /// Every second pass runs in the opposite direction.
     Zigzag,
 }
 
-/// How far apart passes lie for the scallop height.
+/// Rule for the distance between passes at the given scallop height.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Spacing {
-    /// As far as the height allows over the gap to the next pass.
+    /// The largest interval for which the scallop height holds across the gap to the next pass.
     Exact,
-    /// By the paper's interval at the pass alone, which may exceed the height.
+    /// The paper's interval, evaluated at the pass alone; the scallop may exceed the height limit.
     FirstOrder,
 }
 
 /// A job as its file states it.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Job {
-    /// The surface to be cut, placed where the file's `[placement]` wants it.
+    /// The surface to be cut, placed as the file's `[placement]` states.
     pub surface: SurfaceSpec,
     /// Ball radius r, mm, above 0, at most [`RADIUS_MAX_MM`].
     pub radius_mm: f64,
@@ -100,13 +100,13 @@ pub struct Job {
     pub side: Side,
     /// Order of the passes.
     pub pattern: Pattern,
-    /// How far apart the passes lie.
+    /// Rule for the distance between passes.
     pub spacing: Spacing,
-    /// Chord error limit delta, mm, above 0, below the ball radius; for the approaches that cut chords.
+    /// Chord error limit delta, mm, above 0, below the ball radius; used by the approaches that cut chords.
     pub chord_mm: f64,
     /// The machine.
-    pub machine: Machine,
-    /// The file, the line of each key, and who chose the direction.
+    pub machine: MachineSpec,
+    /// The file, the line of each key, and the choice of the direction.
     pub origin: Origin,
 }
 

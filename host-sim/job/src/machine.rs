@@ -2,17 +2,17 @@
 
 /// Names of the axes.
 pub const AXES: [&str; 3] = ["x", "y", "z"];
-/// Shortest and longest sampling period, µs: what the core accepts.
+/// Shortest and longest sampling period, µs: the core's limits.
 pub const PERIOD_RANGE_US: [f64; 2] = [10.0, 100_000.0];
-/// Sampling period of a job that names none, µs: the paper's.
+/// Default of the sampling period, µs: the paper's.
 pub const PERIOD_DEFAULT_US: f64 = 1000.0;
-/// Shortest and longest heartbeat timeout, ms. The shortest leaves room for a host that shares its processor.
+/// Shortest and longest heartbeat timeout, ms. The shortest allows for a host that shares its processor.
 pub const HEARTBEAT_TIMEOUT_RANGE_MS: [f64; 2] = [100.0, 60_000.0];
-/// Heartbeat timeout of a job that names none, ms.
+/// Default of the heartbeat timeout, ms.
 pub const HEARTBEAT_TIMEOUT_DEFAULT_MS: f64 = 1000.0;
-/// Distance from the surface's highest place to the ball at the safe height, mm, of a job that names none.
+/// Default of the distance from the highest point of the surface to the ball at the safe height, mm.
 const CLEARANCE_DEFAULT_MM: f64 = 5.0;
-/// Length of the plunge at the feed, mm, of a job that names none.
+/// Default of the length of the plunge at the feed, mm.
 const PLUNGE_DEFAULT_MM: f64 = 2.0;
 
 /// Limits of the axes x, y and z. All are above 0.
@@ -27,15 +27,15 @@ pub struct AxisLimits {
 }
 
 impl AxisLimits {
-    /// A small stiff mill with stepper motors. A job that names one or two kinds of limit gets the others from here.
+    /// Defaults: a small stiff mill with stepper motors. A job that gives only one or two kinds of limit takes the others from here.
     pub const DEFAULT: Self = Self {
         velocity_mm_s: [100.0, 100.0, 50.0],
         acceleration_mm_s2: [1000.0, 1000.0, 500.0],
         jerk_mm_s3: [20_000.0, 20_000.0, 10_000.0],
     };
 
-    /// The limits of a job that names `velocity_mm_s`, `acceleration_mm_s2` and `jerk_mm_s3`, or some of them; `None` where it names none:
-    /// such a job runs at constant feed from its first sample to its last.
+    /// The limits of a job that gives any of `velocity_mm_s`, `acceleration_mm_s2` and `jerk_mm_s3`; `None` where it gives none of them:
+    /// that job runs at constant feed from its first sample to its last.
     #[must_use]
     pub fn of_given(
         velocity_mm_s: Option<[f64; 3]>,
@@ -52,36 +52,36 @@ impl AxisLimits {
         })
     }
 
-    /// Velocity, acceleration and jerk, in this order.
+    /// Velocity, acceleration and jerk limits, in this order.
     #[must_use]
     pub const fn by_order(&self) -> [[f64; 3]; 3] {
         [self.velocity_mm_s, self.acceleration_mm_s2, self.jerk_mm_s3]
     }
 }
 
-/// A positive ratio of two whole numbers, kept exact.
+/// A positive ratio of two integers, stored exactly.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Ratio {
-    /// Above the line.
+    /// Numerator.
     pub numerator: u32,
-    /// Below the line, above 0.
+    /// Denominator, above 0.
     pub denominator: u32,
 }
 
-/// What the drives of the axes x, y and z require.
+/// Requirements of the drives of the axes x, y and z.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct StepOutput {
-    /// Motor steps a millimetre, 1/1000 to 500000.
+    /// Motor steps per millimetre, 1/1000 to 500000.
     pub steps_per_mm: [Ratio; 3],
     /// Whether the direction output is inverted.
     pub direction_inverted: [bool; 3],
-    /// Length of a step pulse, and least pause after it, µs.
+    /// Duration of a step pulse, and least pause after it, µs.
     pub pulse_us: f64,
     /// Least time from a change of direction to the next pulse, µs.
     pub direction_setup_us: f64,
 }
 
-/// What a board does with a run when the heartbeat of the host stops.
+/// Reaction of a board to a heartbeat timeout during a run.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum HeartbeatAction {
     /// Finishes the run.
@@ -93,32 +93,32 @@ pub enum HeartbeatAction {
 
 /// The machine that runs the job.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Machine {
+pub struct MachineSpec {
     /// Sampling period T, µs, in [`PERIOD_RANGE_US`].
     pub period_us: f64,
     /// Limits of the axes. `None`: the feed is constant from the first sample to the last, as in the paper.
     pub limits: Option<AxisLimits>,
-    /// Travel of the axes (soft limits), mm, `[least, most]`.
+    /// Travel of the axes (soft limits), mm, `[min, max]`.
     pub travel_mm: Option<[[f64; 2]; 3]>,
     /// Position of the tool centre before the run, mm. `None`: at the safe height above the first contact.
     pub home_mm: Option<[f64; 3]>,
-    /// z of the tool centre at which the tool is clear of everything, mm. `None`: by [`Self::clearance_mm`].
+    /// z of the tool centre at which the tool clears every obstacle, mm. `None`: from [`Self::clearance_mm`].
     pub safe_z_mm: Option<f64>,
-    /// Distance from the surface's highest place to the ball at the safe height, mm, where `safe_z_mm` is `None`.
+    /// Distance from the highest point of the surface to the ball at the safe height, mm, where `safe_z_mm` is `None`.
     pub clearance_mm: f64,
-    /// Last part of the plunge, traversed at the feed, mm.
+    /// Length of the last part of the plunge, which runs at the feed, mm.
     pub plunge_mm: f64,
-    /// A run on a board starts only where its axes are homed.
+    /// A board starts a run only after homing.
     pub homing_required: bool,
-    /// What a board does when the heartbeat of the host stops.
+    /// Reaction of a board to a heartbeat timeout.
     pub heartbeat_action: HeartbeatAction,
-    /// Silence after which the heartbeat counts as stopped, ms, in [`HEARTBEAT_TIMEOUT_RANGE_MS`].
+    /// Heartbeat timeout, ms, in [`HEARTBEAT_TIMEOUT_RANGE_MS`].
     pub heartbeat_timeout_ms: f64,
-    /// What the drives require. `None`: the board's own setting.
+    /// Requirements of the drives. `None`: the board's own setting.
     pub step_output: Option<StepOutput>,
 }
 
-impl Default for Machine {
+impl Default for MachineSpec {
     fn default() -> Self {
         Self {
             period_us: PERIOD_DEFAULT_US,
@@ -136,7 +136,7 @@ impl Default for Machine {
     }
 }
 
-impl Machine {
+impl MachineSpec {
     /// Sampling period T, s.
     #[must_use]
     pub fn period_s(&self) -> f64 {

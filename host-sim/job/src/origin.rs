@@ -1,4 +1,4 @@
-//! Where a job came from: an error found later points at the line of the key that caused it.
+//! Origin of a job: a later error points at the line of the key that causes it.
 
 use std::collections::BTreeMap;
 use std::ops::Range;
@@ -6,30 +6,30 @@ use std::sync::Arc;
 
 use crate::{Along, JobError};
 
-/// One direction of the passes, run on the core to see what it takes.
+/// Result of a run of the core with the passes in one direction.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Trial {
+pub struct DirectionTrial {
     /// The direction.
     pub along: Along,
-    /// Periods of the whole job; up to the fault where there is one.
+    /// Periods of the whole job; up to the fault if there is one.
     pub ticks: u64,
-    /// Why it cannot be machined this way.
-    pub against: Option<String>,
+    /// Reason for which the job cannot be machined in this direction.
+    pub rejection: Option<String>,
 }
 
-/// How a job came by the direction of its passes.
+/// Origin of the direction of the passes.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub enum AlongChoice {
     /// The job file names it.
     #[default]
     Given,
-    /// The job file leaves it to the trial of both directions; until then the job cannot be prepared.
+    /// The job file requests a trial of both directions; before the trial the job cannot be prepared.
     Auto,
-    /// It was settled so: u and v, in this order.
-    Chosen([Trial; 2]),
+    /// Chosen by trials along u and v, in this order.
+    Chosen([DirectionTrial; 2]),
 }
 
-/// Where a job came from: the file, which an error found later needs to point at the line, and who chose its direction.
+/// Origin of a job: the file and the ranges of its keys, to which later errors refer, and the choice of the direction.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Origin {
     name: Arc<str>,
@@ -39,7 +39,7 @@ pub struct Origin {
 }
 
 impl Origin {
-    /// The origin of a job that names its direction. `keys`: byte range of each section, and of the value of each `section.key`.
+    /// The origin of a job that gives its direction. `keys`: byte range of each section, and of the value of each `section.key`.
     #[must_use]
     pub fn new(name: &str, text: &str, keys: BTreeMap<String, Range<usize>>) -> Self {
         Self {
@@ -50,13 +50,13 @@ impl Origin {
         }
     }
 
-    /// The file's name as it was given, empty for a job that came from no file.
+    /// The file's name as given; empty for a job that does not come from a file.
     #[must_use]
     pub fn name(&self) -> &str {
         &self.name
     }
 
-    /// Where the value of `section.key` (or the section) stands, and its line: `job.toml:10: radius_mm = 10`.
+    /// Location of the value of `section.key` (or of the section), and its line: `job.toml:10: radius_mm = 10`.
     #[must_use]
     pub fn quote(&self, key: &str) -> Option<String> {
         let section = key.split('.').next().unwrap_or(key);
@@ -67,18 +67,18 @@ impl Origin {
         Some(format!("{}:{}: {line}", self.name, before + 1))
     }
 
-    /// How the job came by the direction of its passes.
+    /// Origin of the direction of the passes.
     #[must_use]
     pub fn along_choice(&self) -> &AlongChoice {
         &self.along_choice
     }
 
-    /// Records how the job came by its direction.
+    /// Records the origin of the direction.
     pub fn set_along_choice(&mut self, choice: AlongChoice) {
         self.along_choice = choice;
     }
 
-    /// An error that points at the value of `section.key` (or at the section, or at the file, where there is none).
+    /// An error at the value of `section.key`; at the section, else at the file, where the key is missing.
     #[must_use]
     pub fn error(&self, key: &str, what: impl Into<String>, remedy: impl Into<String>) -> JobError {
         let section = key.split('.').next().unwrap_or(key);

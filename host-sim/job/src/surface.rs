@@ -1,4 +1,4 @@
-/// A surface as the job file gives it. Lengths in mm.
+/// A surface as given in the job file. Lengths in mm.
 #[derive(Clone, Debug, PartialEq)]
 pub enum SurfaceSpec {
     /// A cubic profile turned about z: `(R(u) cos v, R(u) sin v, Z(u))`.
@@ -9,7 +9,7 @@ pub enum SurfaceSpec {
         height_mm: [f64; 4],
         /// Range of u, ascending.
         u: [f64; 2],
-        /// Range of v, rad, ascending, at most a full turn.
+        /// Range of v, rad, ascending, at most one full turn.
         v_rad: [f64; 2],
     },
     /// Straight lines between two cubic space curves: `(1 - v) rail0(u) + v rail1(u)`.
@@ -23,7 +23,7 @@ pub enum SurfaceSpec {
         /// Range of v, ascending.
         v: [f64; 2],
     },
-    /// One bicubic patch in powers.
+    /// One bicubic patch in power form.
     Bicubic {
         /// `[k][i][j]` multiplies `u^(3-i) v^(3-j)` of coordinate k, mm.
         coefficients_mm: [[[f64; 4]; 4]; 3],
@@ -32,7 +32,7 @@ pub enum SurfaceSpec {
         /// Range of v, ascending.
         v: [f64; 2],
     },
-    /// A B-spline surface, rational or not, on its whole domain.
+    /// A B-spline surface, polynomial or rational, over its whole domain.
     Nurbs(NurbsSpec),
 }
 
@@ -41,13 +41,13 @@ pub enum SurfaceSpec {
 pub struct NurbsSpec {
     /// `[p, q]`, each 1 to 3.
     pub degree: [usize; 2],
-    /// Knots in u, not descending, as many as poles + p + 1. The end knots need not be repeated.
+    /// Knots in u, not descending, number of poles + p + 1 of them. The end knots need not be repeated.
     pub knots_u: Vec<f64>,
     /// Knots in v.
     pub knots_v: Vec<f64>,
     /// `[i][j]` = `[x, y, z, w]`, i along u: a point in mm (not multiplied by w) and its weight, above 0.
     pub poles_mm: Vec<Vec<[f64; 4]>>,
-    /// Whether the weights differ. Where they are all the same they are stored as 1.
+    /// Whether the weights differ. Equal weights are stored as 1.
     pub rational: bool,
 }
 

@@ -1,28 +1,28 @@
-//! `along = "auto"`: the direction of the passes that machines the job in the least time.
+//! `along = "auto"`: the direction of the passes with the least machining time.
 //!
-//! The core runs the whole job both ways, side by side on two threads, and the periods are counted: exact, as the machine's own time is, and
-//! the same on every computer. That costs one more run than the job itself, some tenths of a second per million samples.
+//! The core runs the whole job in both directions, on two threads, and counts the periods: the machine's exact time, identical
+//! on every computer. The cost is one more run than the job itself, some tenths of a second per million samples.
 
 use std::fmt;
 
 use crate::Machine;
 use crate::prepare::{Prepared, prepare};
 use explain;
-use job::{Along, AlongChoice, Job, JobError, Trial};
+use job::{Along, AlongChoice, DirectionTrial, Job, JobError};
 
-/// A job whose direction is settled, ready for the machine.
+/// A job with a chosen direction, ready for the machine.
 type Ready = (Job, Prepared);
 
 /// Neither direction can be machined.
 #[derive(Debug)]
-pub enum NoDirection {
-    /// Neither can even be prepared or loaded: the job file is at fault.
+pub enum DirectionError {
+    /// Neither can be prepared or loaded: the error is in the job file.
     Refused(JobError),
-    /// At least one starts, and ends in a fault.
+    /// At least one starts; both fail.
     Faults(String),
 }
 
-impl fmt::Display for NoDirection {
+impl fmt::Display for DirectionError {
     fn fmt(&self, out: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::Refused(error) => error.fmt(out),
@@ -31,36 +31,36 @@ impl fmt::Display for NoDirection {
     }
 }
 
-impl std::error::Error for NoDirection {}
+impl std::error::Error for DirectionError {}
 
-/// One direction, tried.
-struct Tried {
-    trial: Trial,
+/// Result of a trial of one direction.
+struct TrialResult {
+    trial: DirectionTrial,
     ready: Option<Ready>,
-    /// The machine took the job.
+    /// The machine accepted the job.
     started: bool,
 }
 
-/// Settles the direction of a job: as its file says, or the faster of the two; u where both take the same time.
+/// Chooses the direction of a job: as given in its file, or the faster of the two; u if both take the same time.
 ///
 /// # Errors
-/// The direction that the file gives cannot be prepared, or, with `"auto"`, neither direction can be machined.
-pub fn settle(job: Job) -> Result<Ready, NoDirection> {
+/// The given direction cannot be prepared, or, with `"auto"`, neither direction can be machined.
+pub fn choose(job: Job) -> Result<Ready, DirectionError> {
     if job.origin.along_choice() != &AlongChoice::Auto {
-        let prepared = prepare(&job).map_err(NoDirection::Refused)?;
+        let prepared = prepare(&job).map_err(DirectionError::Refused)?;
         return Ok((job, prepared));
     }
     let (first, second) = std::thread::scope(|scope| {
-        let second = scope.spawn(|| tried(&job, Along::V));
-        (tried(&job, Along::U), second.join())
+        let second = scope.spawn(|| run_trial(&job, Along::V));
+        (run_trial(&job, Along::U), second.join())
     });
     let second = second.unwrap_or_else(|panic| std::panic::resume_unwind(panic));
     let trials = [first.trial.clone(), second.trial.clone()];
     let started = first.started || second.started;
-    // `None` where a direction cannot be machined; the first of equals is the least.
+    // `None` where a direction cannot be machined; the first of equal times is the minimum.
     let best = [first, second]
         .into_iter()
-        .filter(|tried| tried.trial.against.is_none())
+        .filter(|tried| tried.trial.rejection.is_none())
         .min_by_key(|tried| tried.trial.ticks);
     match best.and_then(|tried| tried.ready) {
         Some((mut job, prepared)) => {
@@ -71,34 +71,34 @@ pub fn settle(job: Job) -> Result<Ready, NoDirection> {
     }
 }
 
-fn neither(job: &Job, trials: &[Trial; 2], started: bool) -> NoDirection {
+fn neither(job: &Job, trials: &[DirectionTrial; 2], started: bool) -> DirectionError {
     let each = trials.iter().map(|trial| {
-        let against = trial.against.as_deref().unwrap_or("");
-        format!("along {}: {against}", trial.along.name())
+        let rejection = trial.rejection.as_deref().unwrap_or("");
+        format!("along {}: {rejection}", trial.along.name())
     });
     let what = format!(
         "neither direction of the passes can be machined\n{}",
         each.collect::<Vec<_>>().join("\n")
     );
-    let remedy = "mend what one of the directions complains of";
+    let remedy = "remove the cause given for one of the directions";
     if started {
-        NoDirection::Faults(format!("{what}\n  help: {remedy}"))
+        DirectionError::Faults(format!("{what}\n  help: {remedy}"))
     } else {
-        NoDirection::Refused(job.origin.error("cut.along", what, remedy))
+        DirectionError::Refused(job.origin.error("cut.along", what, remedy))
     }
 }
 
-/// Runs one direction to its end.
-fn tried(job: &Job, along: Along) -> Tried {
+/// Runs the job in one direction to its end.
+fn run_trial(job: &Job, along: Along) -> TrialResult {
     let mut job = job.clone();
     job.along = along;
     job.origin.set_along_choice(AlongChoice::Given);
-    let trial = |ticks: u64, against: Option<String>| Trial {
+    let trial = |ticks: u64, rejection: Option<String>| DirectionTrial {
         along,
         ticks,
-        against,
+        rejection,
     };
-    let refused = |why: String| Tried {
+    let refused = |why: String| TrialResult {
         trial: trial(0, Some(why)),
         ready: None,
         started: false,
@@ -116,12 +116,12 @@ fn tried(job: &Job, along: Along) -> Tried {
         ticks += 1;
         true
     });
-    let against = ran.err().map(|fault| {
+    let rejection = ran.err().map(|fault| {
         let (pass, path, side) = machine.place();
         explain::fault_at(fault, ticks, pass, prepared.parameters(path, side))
     });
-    Tried {
-        trial: trial(ticks, against),
+    TrialResult {
+        trial: trial(ticks, rejection),
         ready: Some((job, prepared)),
         started: true,
     }
@@ -134,7 +134,7 @@ mod tests {
     const TORUS: &str = include_str!("../../../jobs/torus.toml");
     const CAP: &str = include_str!("../../../jobs/sphere_cap.toml");
 
-    /// A sample job with these lines in place of others.
+    /// A sample job with these lines replaced.
     fn job(text: &str, edits: &[(&str, &str)]) -> Job {
         let mut text = text.to_owned();
         for (key, line) in edits {
@@ -147,14 +147,14 @@ mod tests {
 
     const AUTO: (&str, &str) = ("along", "along = \"auto\"");
 
-    fn chosen(job: &Job) -> &[Trial; 2] {
+    fn chosen(job: &Job) -> &[DirectionTrial; 2] {
         match job.origin.along_choice() {
             AlongChoice::Chosen(trials) => trials,
             other => panic!("{other:?}"),
         }
     }
 
-    /// Periods of a job whose file names its direction.
+    /// Periods of a job whose file gives its direction.
     fn ticks(job: &Job) -> u64 {
         let mut ticks = 0;
         Machine::load(&prepare(job).unwrap())
@@ -168,49 +168,49 @@ mod tests {
     }
 
     #[test]
-    fn the_faster_direction_wins_and_both_times_are_told() {
+    fn the_faster_direction_wins_and_both_times_are_reported() {
         // The torus is faster along u, the cap along v.
         for (text, faster) in [(TORUS, Along::U), (CAP, Along::V)] {
-            let (settled, prepared) = settle(job(text, &[AUTO])).unwrap();
+            let (settled, prepared) = choose(job(text, &[AUTO])).unwrap();
             assert_eq!((settled.along, prepared.along), (faster, faster));
             let trials = chosen(&settled);
             for (trial, (along, line)) in trials
                 .iter()
                 .zip([(Along::U, "along = \"u\""), (Along::V, "along = \"v\"")])
             {
-                assert_eq!((trial.along, &trial.against), (along, &None));
+                assert_eq!((trial.along, &trial.rejection), (along, &None));
                 assert_eq!(trial.ticks, ticks(&job(text, &[("along", line)])), "{line}");
             }
             let least = trials.iter().min_by_key(|trial| trial.ticks).unwrap();
             assert_eq!(least.along, faster);
-            // The same job again comes to the same.
-            assert_eq!(settle(job(text, &[AUTO])).unwrap(), (settled.clone(), prepared));
+            // A repeated choice has the same result.
+            assert_eq!(choose(job(text, &[AUTO])).unwrap(), (settled.clone(), prepared));
         }
     }
 
     #[test]
     fn a_direction_that_faults_loses() {
-        // At 500 m/min the passes around the pole turn too fast for one period; those through it do not.
+        // At 500 m/min the passes around the pole turn too fast for one period; those through it run.
         let fast = ("feed_mm_min", "feed_mm_min = 500000");
-        let (settled, _) = settle(job(CAP, &[AUTO, fast])).unwrap();
+        let (settled, _) = choose(job(CAP, &[AUTO, fast])).unwrap();
         assert_eq!(settled.along, Along::U);
         let [u, v] = chosen(&settled);
-        assert_eq!(u.against, None);
-        let against = v.against.as_deref().unwrap();
+        assert_eq!(u.rejection, None);
+        let rejection = v.rejection.as_deref().unwrap();
         assert!(
-            against.starts_with("fault 3 (parameter-backwards) at tick "),
-            "{against}"
+            rejection.starts_with("fault 3 (parameter-backwards) at tick "),
+            "{rejection}"
         );
-        // Slower, the other direction is the faster one: the fault decided.
-        assert_eq!(settle(job(CAP, &[AUTO])).unwrap().0.along, Along::V);
+        // At the lower feed the other direction is the faster one: the fault decided.
+        assert_eq!(choose(job(CAP, &[AUTO])).unwrap().0.along, Along::V);
     }
 
     #[test]
-    fn both_faults_are_told() {
+    fn both_faults_are_reported() {
         // The groove's radius is 8 mm.
         let large = ("radius_mm", "radius_mm = 9");
-        let error = settle(job(TORUS, &[AUTO, large])).unwrap_err();
-        let NoDirection::Faults(sentence) = &error else {
+        let error = choose(job(TORUS, &[AUTO, large])).unwrap_err();
+        let DirectionError::Faults(sentence) = &error else {
             panic!("{error}")
         };
         for direction in ["along u: fault 1 (ball-does-not-fit)", "along v: fault 1"] {
@@ -219,9 +219,9 @@ mod tests {
     }
 
     #[test]
-    fn an_unsettled_job_is_not_prepared() {
+    fn a_job_without_a_direction_is_not_prepared() {
         let error = prepare(&job(TORUS, &[AUTO])).unwrap_err();
-        assert!(error.what().contains("not been settled"), "{error}");
+        assert!(error.what().contains("not been chosen"), "{error}");
         assert!(error.line_and_column().is_some());
     }
 }

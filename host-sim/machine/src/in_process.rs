@@ -1,11 +1,11 @@
-//! The machine in this process: the core with a job loaded, one call a period.
+//! The machine in this process: the core with a job loaded, one call per period.
 
 use interp_core::steps::BUFFER_WORDS;
 use interp_core::{Command, Fault, Inputs, Interpolator, Sample, SpanParameter, State, Steps, SurfacePoint};
 
 use crate::prepare::Prepared;
 
-/// The core, with the same store as the board's.
+/// The core, with the job store of the board's capacity.
 #[derive(Debug)]
 pub struct Machine {
     core: Box<Interpolator>,
@@ -13,10 +13,10 @@ pub struct Machine {
 }
 
 impl Machine {
-    /// A machine that is ready to run this job. Where it names steps, a run that asks too many of a period faults.
+    /// A machine with this job loaded. If the job gives a step output, a run faults when a period needs too many steps.
     ///
     /// # Errors
-    /// What the core says against the job: too many patches, a header value out of range, a bad patch.
+    /// The core refuses the job: too many patches, a header value out of range, an invalid patch.
     pub fn load(job: &Prepared) -> Result<Self, Fault> {
         let mut core = Box::new(Interpolator::new());
         let words = u32::try_from(job.words.len()).unwrap_or(u32::MAX);
@@ -26,17 +26,17 @@ impl Machine {
             core.load_check(record)?;
         }
         core.load_finish()?;
-        // A configuration that cannot be used is refused by the board, too, and by the reader of the job file before.
+        // The board and the reader of the job file refuse an invalid configuration before this point.
         let checked = job.steps.and_then(|config| config.check().ok());
         let steps = checked.map(|checked| (Steps::new(checked, [0, 1, 2]), Box::new([0; BUFFER_WORDS])));
         Ok(Self { core, steps })
     }
 
-    /// Runs the job from its beginning, and hands every sample on, until its end or a fault. Stops early, and returns
-    /// `Ok`, when `each` says so by returning `false`.
+    /// Runs the job from its beginning, and calls `each` with every sample, until its end or a fault. Stops early and returns
+    /// `Ok` when `each` returns `false`.
     ///
     /// # Errors
-    /// The fault that stopped the run; [`Self::place`] says where.
+    /// The fault that stopped the run; [`Self::place`] is its location.
     pub fn run(&mut self, mut each: impl FnMut(&Sample) -> bool) -> Result<(), Fault> {
         // A fault of the run before is acknowledged by an abort; otherwise it is ignored.
         self.core.tick(Command::Abort);
@@ -50,7 +50,7 @@ impl Machine {
                 break;
             }
             if let Some((steps, slots)) = &mut self.steps {
-                // Nothing led to the first sample of a run, nor of a pass without limits; the board takes it the same way.
+                // The first sample of a run, and of a pass without limits, has no predecessor: the steps begin there, as on the board.
                 if pass
                     .replace(sample.pass)
                     .is_none_or(|pass| pass != sample.pass && !has_limits)
@@ -70,7 +70,7 @@ impl Machine {
         self.core.fault().map_or(Ok(()), Err)
     }
 
-    /// Lets one period pass.
+    /// Executes one period.
     pub fn tick(&mut self, inputs: impl Into<Inputs>) -> &Sample {
         self.core.tick(inputs)
     }
@@ -81,13 +81,13 @@ impl Machine {
         self.core.state()
     }
 
-    /// The fault that the machine is in.
+    /// The current fault.
     #[must_use]
     pub fn fault(&self) -> Option<Fault> {
         self.core.fault()
     }
 
-    /// The surface at a place, outside of any run.
+    /// The surface at a point, independent of any run.
     ///
     /// # Errors
     /// As [`Interpolator::evaluate`].
@@ -95,7 +95,7 @@ impl Machine {
         self.core.evaluate(path, side)
     }
 
-    /// Where the run is: pass, path and side place; after a fault, where that is.
+    /// Position in the run: pass, path and side place; after a fault, the location of the fault.
     #[must_use]
     pub fn place(&self) -> (u32, SpanParameter, SpanParameter) {
         self.core.surface_position()

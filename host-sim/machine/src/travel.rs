@@ -1,31 +1,31 @@
-//! Soft limits before anything moves: does every centre of the job lie within the travel of the axes?
+//! Soft limits, checked before any motion: every centre of the job must be within the travel of the axes.
 //!
-//! The surface's box, widened by the ball's radius, holds every centre: where that fits, all is well. Otherwise the passes are run here,
-//! at constant feed, and the centres themselves are looked at.
+//! The bounding box of the surface, enlarged by the ball's radius, contains every centre: if the box fits, the job fits. Otherwise the passes
+//! are run here, at constant feed, and the centres are compared.
 
 use interp_core::Sample;
 
 use crate::Machine;
 use crate::prepare::{Prepared, prepare};
-use job::{AXES, Job, JobError, Machine as MachineSpec};
+use job::{AXES, Job, JobError, MachineSpec};
 use patches::placement::extent_mm;
 
 const MM_PER_NM: f64 = 1e-6;
-/// Key of the job that an error points at.
+/// Key of the job at which the error points.
 const KEY: &str = "machine.travel_mm";
 
-/// The farthest sample one way along an axis.
+/// The sample with an extreme position on an axis.
 #[derive(Clone, Copy)]
-struct Far {
+struct ExtremeSample {
     mm: f64,
     sample: Sample,
 }
 
-/// Checks a job whose direction is settled.
+/// Checks a job whose direction is chosen.
 ///
 /// # Errors
-/// Where the centres leave the travel, how far and where, and what brings them in; what the machine says against the job. Samples behind a
-/// fault are not looked at: the run would not get there either.
+/// Centres outside the travel, with distance, location and remedy; the errors of the preparation. Samples after a
+/// fault are not checked: the run would not reach them.
 pub fn check(job: &Job) -> Result<(), JobError> {
     let Some(travel) = job.machine.travel_mm else {
         return Ok(());
@@ -37,7 +37,7 @@ pub fn check(job: &Job) -> Result<(), JobError> {
     if fits {
         return Ok(());
     }
-    // The passes lie where they lie whatever the axes can do.
+    // The passes do not depend on the axis limits.
     let mut bare = job.clone();
     bare.machine = MachineSpec {
         period_us: job.machine.period_us,
@@ -54,7 +54,7 @@ pub fn check(job: &Job) -> Result<(), JobError> {
             if beyond > 0.0 {
                 let [u, v] = prepared.parameters(far.sample.path, far.sample.side);
                 what.push(format!(
-                    "{} comes to {:.3} mm on pass {}, u = {u:.6}, v = {v:.6}: {beyond:.3} mm beyond its travel of {low} to {high} mm",
+                    "{} reaches {:.3} mm on pass {}, u = {u:.6}, v = {v:.6}: {beyond:.3} mm beyond its travel of {low} to {high} mm",
                     AXES[axis], far.mm, far.sample.pass
                 ));
                 remedies.push(remedy(axis, [least.mm, most.mm], [low, high]));
@@ -72,12 +72,12 @@ pub fn check(job: &Job) -> Result<(), JobError> {
     ))
 }
 
-/// What brings an axis into its travel.
+/// Remedy for an axis out of its travel.
 fn remedy(axis: usize, [least, most]: [f64; 2], [low, high]: [f64; 2]) -> String {
     let name = AXES[axis];
     if most - least > high - low {
         return format!(
-            "the job takes {:.3} mm along {name}, more than its travel: turn or scale it in [placement]",
+            "the job takes {:.3} mm along {name}, more than its travel: rotate or scale the part in [placement]",
             most - least
         );
     }
@@ -88,13 +88,13 @@ fn remedy(axis: usize, [least, most]: [f64; 2], [low, high]: [f64; 2]) -> String
     )
 }
 
-/// Samples with the least and the greatest centre of each axis; `None` where there are none.
-fn farthest(prepared: &Prepared) -> Option<[[Far; 2]; 3]> {
+/// Samples with the least and the greatest position of each axis; `None` without samples.
+fn farthest(prepared: &Prepared) -> Option<[[ExtremeSample; 2]; 3]> {
     let mut machine = Machine::load(prepared).ok()?;
-    let mut farthest: Option<[[Far; 2]; 3]> = None;
-    // A fault ends what there is to look at.
+    let mut farthest: Option<[[ExtremeSample; 2]; 3]> = None;
+    // Samples up to a fault are used.
     let _fault = machine.run(|sample| {
-        let at = |axis: usize| Far {
+        let at = |axis: usize| ExtremeSample {
             mm: f64::from(sample.cl_nm[axis]) * MM_PER_NM,
             sample: *sample,
         };
@@ -131,20 +131,20 @@ mod tests {
 
     /// Centres of the torus: x and y 0 to 42.598, z -2.997 to -1.500; its surface 5 mm below.
     #[test]
-    fn a_job_that_leaves_the_travel_is_refused_with_place_and_remedy() {
-        // Held by the box alone, then by the samples alone.
+    fn a_job_that_leaves_the_travel_is_refused_with_location_and_remedy() {
+        // Within by the box alone, then by the samples alone.
         assert_eq!(said("[[-50, 50], [-50, 60], [-20, 20]]"), Ok(()));
         assert_eq!(said("[[-0.001, 43], [-0.001, 43], [-3, -1.499]]"), Ok(()));
         let (what, remedy) = said("[[0, 43], [-1, 43], [-10, -2]]").unwrap_err();
-        assert!(what.contains("z comes to -1.500 mm on pass"), "{what}");
+        assert!(what.contains("z reaches -1.500 mm on pass"), "{what}");
         assert!(
             what.contains("0.500 mm beyond its travel of -10 to -2 mm"),
             "{what}"
         );
-        assert!(!what.contains("x comes"), "{what}");
+        assert!(!what.contains("x reaches"), "{what}");
         assert!(remedy.contains("along z by -7.003 to -0.500 mm"), "{remedy}");
         let (what, remedy) = said("[[1, 40], [-1, 43], [-10, 2]]").unwrap_err();
-        assert_eq!(what.matches("x comes to").count(), 2);
+        assert_eq!(what.matches("x reaches").count(), 2);
         assert!(
             remedy.starts_with("the job takes 42.598 mm along x, more than") && !remedy.contains(';'),
             "{remedy}"

@@ -7,21 +7,21 @@ use super::vector::length;
 const NODE: f64 = 0.774_596_669_241_483_4;
 const WEIGHT_OUTER: f64 = 5.0 / 9.0;
 const WEIGHT_MIDDLE: f64 = 8.0 / 9.0;
-/// A piece of quadrature covers at most this share of a smooth span. The rule's relative error is
-/// `h^6 f'''''' / (2 016 000 f)`: 1e-16 for an |A| whose Taylor series reaches a quarter of the span.
+/// Largest length of a quadrature interval, as a share of a smooth span. The rule's relative error is `h^6 f'''''' / (2 016 000 f)`:
+/// 1e-16 for an |A| whose Taylor series converges over a quarter of the span.
 const PIECE_SHARE: f64 = 1.0 / 64.0;
-/// Pieces a span may be cut into: bounds the loop where the arc is a whole pass.
+/// Largest number of quadrature intervals of a span: bounds the loop for an arc over a whole pass.
 const PIECES_MAX: f64 = 64.0;
 
 impl Oracle {
-    /// Arc length of the pass at `side` between two path parameters, mm: positive if `to` lies above `from`. Relative
+    /// Arc length of the pass at `side` between two path parameters, mm: positive if `to` is above `from`. Relative
     /// error 1e-12 or the rounding of `to - from`, whichever is larger.
     #[must_use]
     pub fn arc_length(&self, from: f64, to: f64, side: f64) -> f64 {
         self.arc_between(&self.surface.breaks(self.along), from, to, side)
     }
 
-    /// As [`Oracle::arc_length`] for a step `by` that is known better than the difference of two parameters is.
+    /// As [`Oracle::arc_length`], for a step `by` given more precisely than the difference of two parameters.
     #[must_use]
     pub fn arc_of_step(&self, from: f64, by: f64, side: f64) -> f64 {
         let to = from + by;
@@ -32,7 +32,7 @@ impl Oracle {
         self.arc_length(from, to, side) * (by / rounded)
     }
 
-    /// As [`Oracle::arc_length`], with the breaks at hand.
+    /// As [`Oracle::arc_length`], with the breaks precomputed.
     pub(super) fn arc_between(&self, breaks: &[f64], from: f64, to: f64, side: f64) -> f64 {
         if from > to {
             return -self.arc_between(breaks, to, from, side);

@@ -1,4 +1,4 @@
-//! Contact geometry: tool normal, curvatures, step-over and interval (Lo eqns 2, 3, 10, 11, as mended).
+//! Contact geometry: tool normal, curvatures, step-over and interval (Lo eqns 2, 3, 10, 11, corrected).
 
 use std::fmt;
 
@@ -7,45 +7,45 @@ use super::vector::{Vector, add, cross, dot, length, scale};
 use job::{Along, Job, Pattern, Side, Spacing};
 
 /// A first derivative shorter than this share of the other one (each times its range) marks a pole, where the patch's
-/// edge collapses to a point. Rounding leaves some 1e-15 there; a proper surface keeps above 1e-4.
+/// edge collapses to a point. Rounding leaves about 1e-15 there; a regular surface stays above 1e-4.
 const POLE_SHARE: f64 = 1e-9;
-/// Below this share curvatures come from beside the pole, too. They are quotients of what vanishes with the share's square, so of the
-/// 1e-16 of f64 nearer places make more than 1e-6 (at 1e-9, nothing but noise). A tool that starts from standstill gets there.
+/// Below this share the curvatures are extrapolated as at the pole. They are quotients of quantities that vanish with the square of the share:
+/// f64 rounding of 1e-16 gives errors above 1e-6 below it (at 1e-9, noise alone). A tool that starts from standstill reaches such points.
 const NEAR_POLE_SHARE: f64 = 1e-5;
-/// `|S_u x S_v|` below this share of `|S_u| |S_v|` leaves no trustworthy normal.
+/// `|S_u x S_v|` below this share of `|S_u| |S_v|` gives no reliable normal.
 const SINE_MIN: f64 = 1e-9;
-/// Step away from a pole for its curvatures, as a share of the range: three such steps, extrapolated, leave a relative
-/// error near 1e-8 of truncation and of rounding alike.
+/// Step away from a pole for its curvatures, as a share of the range: extrapolation from three such steps has a relative error near 1e-8,
+/// from truncation and rounding alike.
 const POLE_STEP: f64 = 1e-3;
-/// Places a side, on a grid over the surface, that decide which side is up.
+/// Grid points per parameter for the decision which side is up.
 const ORIENTATION_GRID: u32 = 48;
-/// The normal's z, summed over the surface, must reach this share of the sum of its magnitudes to tell up from down.
+/// Least |sum of the normal's z| over the surface, as a share of the sum of |z|, for a definite upper side.
 const ORIENTATION_SHARE: f64 = 0.1;
-/// That sum of magnitudes must reach this share of the surface's area: a vertical wall has no upper side.
+/// Least sum of |z|, as a share of the surface's area: a vertical wall has no upper side.
 const UPWARD_SHARE: f64 = 1e-3;
 
-/// Why the oracle has no answer.
+/// Reason for which the oracle has no result.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum OracleError {
-    /// `S_u x S_v` vanishes where it is no mere pole.
+    /// `S_u x S_v` vanishes at a point that is not a pole.
     Degenerate {
-        /// Parameter u of the place.
+        /// Parameter u of the point.
         u: f64,
-        /// Parameter v of the place.
+        /// Parameter v of the point.
         v: f64,
     },
     /// The ball does not fit the surface's curvature.
     BallDoesNotFit {
-        /// Parameter u of the place.
+        /// Parameter u of the point.
         u: f64,
-        /// Parameter v of the place.
+        /// Parameter v of the point.
         v: f64,
         /// Ball radius times curvature towards the tool, 1 or more.
         fit: f64,
     },
-    /// `side = "up"` means nothing here: the normal's z, summed over the surface, nearly cancels.
+    /// `side = "up"` is ambiguous: the normal's z, summed over the surface, nearly cancels.
     NoUpperSide,
-    /// The path interval shrinks so far that the passes never reach the other boundary.
+    /// The path interval converges to 0 before the passes reach the other boundary.
     TooManyPasses,
 }
 
@@ -75,7 +75,7 @@ impl fmt::Display for OracleError {
 
 impl std::error::Error for OracleError {}
 
-/// Geometry where the ball touches the surface.
+/// Contact geometry of the ball and the surface.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Contact {
     /// Cutter contact CC, mm.
@@ -84,7 +84,7 @@ pub struct Contact {
     pub normal: [f64; 3],
     /// Cutter location CL = CC + r N, mm.
     pub cl_mm: [f64; 3],
-    /// Speed of the path parameter |A|, mm per unit; 0 on a pass that lies on a pole.
+    /// Speed of the path parameter |A|, mm per unit of the parameter; 0 on a pass that degenerates to a pole.
     pub path_speed: f64,
     /// Normal curvature along the pass, 1/mm.
     pub curvature_path: f64,
@@ -92,23 +92,23 @@ pub struct Contact {
     pub curvature_side: f64,
     /// Least and largest principal curvature, 1/mm.
     pub principal: [f64; 2],
-    /// |(N x t) . B|: distance across the pass for a unit of the side parameter, mm; 0 on a pole between passes.
+    /// |(N x t) . B|: distance across the pass per unit of the side parameter, mm; 0 at a pole between passes.
     pub lateral_speed: f64,
     /// Step-over l along the surface, mm; NaN where the ball does not fit.
     pub step_over_mm: f64,
-    /// Candidate of the path interval, in the side parameter: infinite on a pole, NaN where the ball does not fit.
+    /// Candidate of the path interval, in units of the side parameter: infinite at a pole, NaN where the ball does not fit.
     pub interval: f64,
 }
 
 impl Contact {
-    /// Ball radius times the largest curvature towards the tool: the ball fits below 1.
+    /// Ball radius times the largest curvature towards the tool: the ball fits where it is below 1.
     #[must_use]
     pub fn fit(&self, radius_mm: f64) -> f64 {
         radius_mm * self.principal[1]
     }
 }
 
-/// A job's geometry: what a machine should do, place by place.
+/// The exact geometry of a job.
 #[derive(Clone, Debug)]
 pub struct Oracle {
     /// The surface.
@@ -123,7 +123,7 @@ pub struct Oracle {
     pub radius_mm: f64,
     /// Scallop height limit h, mm.
     pub scallop_mm: f64,
-    /// How far apart the passes lie.
+    /// Rule for the distance between passes.
     pub spacing: Spacing,
     /// Sampling period T, s.
     pub period_s: f64,
@@ -142,7 +142,7 @@ impl Oracle {
     /// The oracle of a job.
     ///
     /// # Errors
-    /// [`OracleError::NoUpperSide`] if the job asks for the upper side and there is none.
+    /// [`OracleError::NoUpperSide`] if the job requests the upper side and the surface has none.
     pub fn new(job: &Job) -> Result<Self, OracleError> {
         let surface = Surface::new(&job.surface);
         let normal_sign = match job.side {
@@ -184,7 +184,7 @@ impl Oracle {
         self.surface.range(self.across())
     }
 
-    /// (path, side) -> (u, v), and back.
+    /// Converts (path, side) to (u, v), and back.
     #[must_use]
     pub fn swapped(&self, first: f64, second: f64) -> (f64, f64) {
         match self.along {
@@ -194,7 +194,7 @@ impl Oracle {
     }
 
     /// Contact geometry at (u, v). At a pole (one of S_u, S_v vanishes on a boundary) the normal is the limit by the
-    /// mixed derivative, and the curvatures are extrapolated from beside the pole (relative error about 1e-8).
+    /// mixed derivative, and the curvatures are extrapolated from points near the pole (relative error about 1e-8).
     ///
     /// # Errors
     /// [`OracleError::Degenerate`] where there is no normal.
@@ -202,7 +202,7 @@ impl Oracle {
         self.contact_of(&self.surface.at(u, v), u, v)
     }
 
-    /// As [`Oracle::contact`], with the surface's derivatives at hand.
+    /// As [`Oracle::contact`], with the surface's derivatives precomputed.
     pub(super) fn contact_of(&self, at: &Derivatives, u: f64, v: f64) -> Result<Contact, OracleError> {
         let [[u0, u1], [v0, v1]] = self.surface.domain();
         let (speed_u, speed_v) = (length(at.u), length(at.v));
@@ -232,7 +232,7 @@ impl Oracle {
         ))
     }
 
-    /// Steps 3 and 4 where both derivatives are sound.
+    /// Steps 3 and 4 where both derivatives are regular.
     fn regular_contact(&self, at: &Derivatives, normal: Vector) -> Contact {
         let (a, b, aa, bb) = match self.along {
             Along::U => (at.u, at.v, at.uu, at.vv),
@@ -260,7 +260,7 @@ impl Oracle {
         )
     }
 
-    /// What follows from the curvatures: step-over and interval.
+    /// The contact with the step-over and the interval that follow from the curvatures.
     fn with_curvatures(
         &self,
         cc_mm: Vector,
@@ -290,7 +290,7 @@ impl Oracle {
         }
     }
 
-    /// Contact at a pole. `u_vanishes`: it is S_u that vanishes (the boundary of constant v collapses).
+    /// Contact at a pole. `u_vanishes`: S_u vanishes (the boundary of constant v collapses).
     fn contact_at_pole(
         &self,
         u: f64,
@@ -298,7 +298,7 @@ impl Oracle {
         at: &Derivatives,
         u_vanishes: bool,
     ) -> Result<Contact, OracleError> {
-        // Beside the pole the vanishing derivative is the mixed one times the (signed) step into the surface.
+        // Near the pole the vanishing derivative is the mixed one times the signed step into the surface.
         let inwards = self.inwards(u, v, u_vanishes);
         let (limit_u, limit_v) = if u_vanishes {
             (scale(at.uv, inwards), at.v)
@@ -318,7 +318,7 @@ impl Oracle {
         } else {
             length(if u_vanishes { at.v } else { at.u })
         };
-        // On a pole every side line leaves in its own direction: its own speed and curvature count.
+        // At a pole every side line has its own direction: its own speed and curvature apply.
         let (side, side2) = if u_vanishes { (at.v, at.vv) } else { (at.u, at.uu) };
         let (lateral_speed, curvature_side) = if pass_collapses {
             (length(side), dot(side2, normal) / dot(side, side))
@@ -336,14 +336,14 @@ impl Oracle {
         ))
     }
 
-    /// 1 where the parameter that leads away from the pole (v, if it is S_u that vanishes) grows into the surface, else -1.
+    /// 1 where the parameter that leads away from the pole (v, if S_u vanishes) increases into the surface, else -1.
     fn inwards(&self, u: f64, v: f64, u_vanishes: bool) -> f64 {
         let [range_u, range_v] = self.surface.domain();
         let ([from, to], t) = if u_vanishes { (range_v, v) } else { (range_u, u) };
         if t - from <= to - t { 1.0 } else { -1.0 }
     }
 
-    /// Curvatures at a place on a pole or near it, extrapolated from three places further away from it.
+    /// Curvatures at or near a pole, extrapolated from three points farther from the pole.
     fn beside_pole(&self, u: f64, v: f64, u_vanishes: bool) -> Result<Curvatures, OracleError> {
         let [[u0, u1], [v0, v1]] = self.surface.domain();
         let range = if u_vanishes { v1 - v0 } else { u1 - u0 };
@@ -399,7 +399,7 @@ fn upper_side(surface: &Surface) -> Result<f64, OracleError> {
 mod tests {
     use super::*;
 
-    /// A tool that starts at the pole from standstill is as near to it as it likes: f64 leaves no curvature there, its neighbours do.
+    /// A tool that starts at the pole from standstill takes arbitrarily small steps: f64 cannot resolve the curvature there, points farther away can.
     #[test]
     fn a_sphere_is_a_sphere_however_near_its_pole() {
         let job = job_file::parse("sphere_cap", include_str!("../../../jobs/sphere_cap.toml")).unwrap();

@@ -1,20 +1,20 @@
-//! Independent geometry in f64, to check the core against.
+//! Independent f64 geometry, the reference for the core.
 //!
-//! Nothing here comes from `interp-core` or from the preparation of its data: surfaces are evaluated straight from the
-//! job file, parameters and positions are plain numbers. What both could get wrong the same way is caught by the golden
-//! table in `tests/golden`, computed elsewhere with 40 digits.
+//! Nothing here comes from `interp-core` or from the preparation of its data: surfaces are evaluated directly from the
+//! job; parameters and positions are plain numbers. Errors common to both are caught by the golden
+//! table in `tests/golden`, computed by other software with 40 digits.
 //!
 //! ```text
 //! SurfaceSpec -> surface.rs, nurbs.rs   S and its derivatives up to the second order
 //!             -> contact.rs             normal, curvatures, step-over, interval (steps 2 to 4 of the interpolator)
 //!             -> arc.rs                 arc length along a pass
-//!             -> offset.rs              the tool centre's path: its velocity, and the contact under a given centre
+//!             -> offset.rs              the offset path of the tool centre: its derivative, and the foot point of a given centre
 //!             -> schedule.rs            passes by a dense scan
-//! samples     -> verify.rs, report.rs   errors of what a machine emitted
+//! samples     -> verify.rs, report.rs   errors of emitted samples
 //! ```
 //!
-//! Lengths are mm, angles rad, curvatures 1/mm (above 0 where the surface bends towards the tool), unless a name's
-//! suffix says otherwise. The normal's sign refers to `S_u x S_v`, whichever parameter the passes run along.
+//! Lengths are mm, angles rad, curvatures 1/mm (above 0 where the surface is concave towards the tool), unless a name's
+//! suffix states otherwise. The normal's sign refers to `S_u x S_v`, for either path parameter.
 //!
 //! Source: C.-C. Lo, "A new approach to CNC tool path generation", Computer-Aided Design 30 (1998), here "Lo"; and
 //! L. Piegl, W. Tiller, "The NURBS Book" (2nd ed., 1997), here "P&T".
@@ -41,8 +41,8 @@ pub mod vector;
 mod verify;
 
 pub use contact::{Contact, Oracle, OracleError};
-pub use offset::Offset;
-pub use report::{Bounds, Figure, Report, Spot};
-pub use schedule::Pass;
+pub use offset::OffsetPoint;
+pub use report::{AccuracyBounds, AccuracyReport, ErrorStatistics, SampleLocation};
+pub use schedule::ScheduledPass;
 pub use surface::{Derivatives, Surface};
-pub use verify::{Checked, Emitted, Verifier};
+pub use verify::{PassSample, SampleCheck, Verifier};

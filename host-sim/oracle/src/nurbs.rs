@@ -4,7 +4,7 @@ use super::surface::Derivatives;
 use super::vector::Vector;
 use job::{Along, NurbsSpec};
 
-/// Poles that act at a place, in one direction: degree 3 and one more.
+/// Poles with influence at a point, in one direction: degree 3 plus one.
 const ORDER: usize = 4;
 
 /// Basis functions of one span: `[function][derivative]`, 0 beyond the degree.
@@ -13,7 +13,7 @@ type Basis = [[f64; 3]; ORDER];
 /// A homogeneous point `(w x, w y, w z, w)` or a derivative of one.
 type Homogeneous = [f64; 4];
 
-/// A B-spline surface ready for evaluation.
+/// A B-spline surface in the form used for evaluation.
 #[derive(Clone, Debug)]
 pub(super) struct Nurbs {
     directions: [Direction; 2],
@@ -112,7 +112,7 @@ impl Nurbs {
         std::array::from_fn(|k| (derivative[k] - derivative[3] * s[k] / s[3]) / s[3])
     }
 
-    /// The poles that act in a span, row by row.
+    /// The poles with influence in a span, row by row.
     fn rows(&self, first_u: usize, first_v: usize) -> impl Iterator<Item = &[Homogeneous]> {
         let columns = self.directions[1].poles;
         let rows = self
@@ -125,7 +125,7 @@ impl Nurbs {
 }
 
 impl Direction {
-    /// Index of the first pole that acts at `t`, and the basis functions with two derivatives.
+    /// Index of the first pole with influence at `t`, and the basis functions with two derivatives.
     fn basis(&self, t: f64) -> (usize, Basis) {
         let span = self.span(t);
         (
@@ -134,7 +134,7 @@ impl Direction {
         )
     }
 
-    /// The span with `knots[span] <= t < knots[span + 1]`, and the last one that is not empty for the end (P&T A2.1).
+    /// The span with `knots[span] <= t < knots[span + 1]`; at the end of the domain the last span that is not empty (P&T A2.1).
     fn span(&self, t: f64) -> usize {
         let inside = &self.knots[self.degree..=self.poles];
         let end = inside[inside.len() - 1];
@@ -178,7 +178,7 @@ fn basis_derivatives(knots: &[f64], degree: usize, span: usize, t: f64) -> Basis
     std::array::from_fn(|r| [functions[degree][r], first[r], second[r]])
 }
 
-/// Derivatives of the functions of `degree` out of the functions (or their derivatives) of one degree less.
+/// Derivatives of the functions of `degree` from the functions (or their derivatives) of the next lower degree.
 fn differentiated(lower: &[f64; ORDER], supports: &[[f64; ORDER]; ORDER], degree: usize) -> [f64; ORDER] {
     let mut derivatives = [0.0; ORDER];
     for r in 0..degree {

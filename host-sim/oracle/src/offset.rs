@@ -1,4 +1,4 @@
-//! The tool centre's path over a pass: its derivative (Lo eqn 4 in its general form), and the contact that belongs to a
+//! The tool centre's path over a pass: its derivative (Lo eqn 4 in its general form), and the foot point of a
 //! commanded centre.
 
 use super::contact::{Contact, Oracle, OracleError};
@@ -6,20 +6,20 @@ use super::surface::Derivatives;
 use super::vector::{Vector, add, cross, dot, length, scale, subtract};
 use job::Along;
 
-/// Step into the surface, as a share of the range, that derivatives at a pole are taken at.
+/// Step into the surface at which derivatives at a pole are evaluated, as a share of the range.
 const INWARDS: f64 = 1e-6;
-/// Distance from a break, as a share of the range, at which its two sides are compared: a ratio that is continuous
-/// changes by less than 1e-9 of itself between them.
+/// Distance from a break, as a share of the range, at which the two sides are compared: a continuous ratio
+/// changes by less than a relative 1e-9 between them.
 const BESIDE: f64 = 1e-10;
-/// Iterations of [`Oracle::foot`]. Each leaves (distance from the path) x (its curvature) of the error, 1e-3 at most for
-/// what any approach here commands; six bring a hundredth of a millimetre to the rounding.
+/// Iterations of [`Oracle::foot`]. Each multiplies the error by (distance from the path) x (its curvature), at most 1e-3 for
+/// every approach here; six reduce a hundredth of a millimetre to rounding.
 const FOOT_STEPS: usize = 6;
-/// A correction below this share of the range ends them: what it leaves is a thousandth of it.
-const FOOT_ENOUGH: f64 = 1e-11;
+/// A correction below this share of the range ends the iteration: the remaining error is a thousandth of it.
+const FOOT_TOLERANCE: f64 = 1e-11;
 
-/// A place on a pass with the tool centre's motion there.
+/// A point of a pass with the derivative of the tool centre.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Offset {
+pub struct OffsetPoint {
     /// Path parameter.
     pub path: f64,
     /// The contact.
@@ -28,8 +28,8 @@ pub struct Offset {
     pub cl_velocity: [f64; 3],
 }
 
-impl Offset {
-    /// Speed of the centre for a unit speed of the contact: `|A + r N_u| / |A|`; 1 on a pass that is one point.
+impl OffsetPoint {
+    /// Speed of the centre per unit speed of the contact: `|A + r N_u| / |A|`; 1 on a pass that is a single point.
     #[must_use]
     pub fn ratio(&self) -> f64 {
         if self.contact.path_speed > 0.0 {
@@ -41,11 +41,11 @@ impl Offset {
 }
 
 impl Oracle {
-    /// Contact and motion of the tool centre at a place of a pass.
+    /// Contact and derivative of the tool centre at a point of a pass.
     ///
     /// # Errors
     /// [`OracleError::Degenerate`] where there is no normal.
-    pub fn offset(&self, path: f64, side: f64) -> Result<Offset, OracleError> {
+    pub fn offset(&self, path: f64, side: f64) -> Result<OffsetPoint, OracleError> {
         let (u, v) = self.swapped(path, side);
         let at = self.surface.at(u, v);
         let contact = self.contact_of(&at, u, v)?;
@@ -53,14 +53,14 @@ impl Oracle {
             Some(velocity) => velocity,
             None => self.velocity_beside(path, side).unwrap_or_default(),
         };
-        Ok(Offset {
+        Ok(OffsetPoint {
             path,
             contact,
             cl_velocity,
         })
     }
 
-    /// `A + r N_A` by the Weingarten equations; `None` where the tangent plane is not spanned.
+    /// `A + r N_A` by the Weingarten equations; `None` where the derivatives do not span the tangent plane.
     fn cl_velocity(&self, at: &Derivatives, normal: Vector) -> Option<Vector> {
         let (a, b, aa) = match self.along {
             Along::U => (at.u, at.v, at.uu),
@@ -77,7 +77,7 @@ impl Oracle {
         Some(add(a, scale(turned, -self.radius_mm / determinant)))
     }
 
-    /// The velocity a little way into the surface from a pole.
+    /// The derivative at a small step into the surface from a pole.
     fn velocity_beside(&self, path: f64, side: f64) -> Option<Vector> {
         let inwards = |t: f64, [low, high]: [f64; 2]| {
             let step = INWARDS * (high - low);
@@ -99,8 +99,8 @@ impl Oracle {
         None
     }
 
-    /// Largest step of the centre's speed, for a unit speed of the contact, where the surface's patches meet on a pass:
-    /// 0, but for rounding, where they meet with equal curvature.
+    /// Largest step of the centre's speed, per unit speed of the contact, at the patch boundaries on a pass:
+    /// 0, up to rounding, where the patches are curvature continuous.
     ///
     /// # Errors
     /// As [`Oracle::offset`].
@@ -114,12 +114,12 @@ impl Oracle {
         Ok(most)
     }
 
-    /// Path parameter at which the offset path comes nearest to a centre that was commanded near it; `guess`: a
-    /// parameter not far off.
+    /// Path parameter of the point of the offset path nearest to a commanded centre close to the path; `guess`: a
+    /// parameter near it.
     ///
     /// # Errors
     /// As [`Oracle::offset`].
-    pub fn foot(&self, cl_mm: [f64; 3], guess: f64, side: f64) -> Result<Offset, OracleError> {
+    pub fn foot(&self, cl_mm: [f64; 3], guess: f64, side: f64) -> Result<OffsetPoint, OracleError> {
         let [low, high] = self.path_range();
         let mut at = self.offset(guess.clamp(low, high), side)?;
         for _ in 0..FOOT_STEPS {
@@ -131,7 +131,7 @@ impl Oracle {
             let next = (at.path + by).clamp(low, high);
             let moved = (next - at.path).abs();
             at = self.offset(next, side)?;
-            if moved <= FOOT_ENOUGH * (high - low) {
+            if moved <= FOOT_TOLERANCE * (high - low) {
                 break;
             }
         }

@@ -1,8 +1,8 @@
-//! What a verification found, and whether it is good enough.
+//! Errors found by a verification, and their bounds.
 
-/// Where and when something was worst.
+/// Location and tick of an extreme value.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Spot {
+pub struct SampleLocation {
     /// Tick of the sample.
     pub tick: u64,
     /// Pass, from 0.
@@ -13,19 +13,19 @@ pub struct Spot {
     pub v: f64,
 }
 
-/// A figure gathered over many samples: its largest magnitude with the place, and its root mean square.
+/// Statistics of a quantity over many samples: largest magnitude with its location, and root mean square.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Figure {
-    /// Largest magnitude; infinite if any value was not a number.
+pub struct ErrorStatistics {
+    /// Largest magnitude; infinite if any value was NaN.
     pub max: f64,
-    /// Place of the largest magnitude.
-    pub at: Spot,
-    /// Values gathered.
+    /// Location of the largest magnitude.
+    pub at: SampleLocation,
+    /// Number of values.
     pub count: u64,
     sum_of_squares: f64,
 }
 
-impl Figure {
+impl ErrorStatistics {
     /// Root mean square; 0 without values.
     #[must_use]
     pub fn rms(&self) -> f64 {
@@ -36,7 +36,7 @@ impl Figure {
         }
     }
 
-    pub(super) fn add(&mut self, value: f64, at: Spot) {
+    pub(super) fn add(&mut self, value: f64, at: SampleLocation) {
         let magnitude = if value.is_nan() {
             f64::INFINITY
         } else {
@@ -51,45 +51,45 @@ impl Figure {
     }
 }
 
-/// Result of a verification. Every figure is emitted against oracle.
+/// Result of a verification. Every error is emitted against oracle.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Report {
-    /// Samples seen.
+pub struct AccuracyReport {
+    /// Number of samples.
     pub samples: u64,
-    /// Passes seen.
+    /// Number of passes.
     pub passes: u32,
     /// |CL emitted - CL|, nm. Rounding to whole nanometres alone gives up to 0.87.
-    pub position_nm: Figure,
+    pub position_nm: ErrorStatistics,
     /// |CC emitted - CC|, nm. Rounding as above.
-    pub contact_nm: Figure,
+    pub contact_nm: ErrorStatistics,
     /// Angle between (CL - CC) as emitted and N, rad. Rounding alone gives up to 1.7 nm / r: see `normal_floor_rad`.
-    pub normal_rad: Figure,
-    /// What rounding to whole nanometres can add to `normal_rad`: sqrt(3) nm / r.
+    pub normal_rad: ErrorStatistics,
+    /// Largest contribution of rounding to whole nanometres to `normal_rad`: sqrt(3) nm / r.
     pub normal_floor_rad: f64,
     /// 100 (arc / (f T) - 1), %, of every step within a pass but the last; f is the feed of the step's second sample.
-    pub ripple_pct: Figure,
+    pub ripple_pct: ErrorStatistics,
     /// Arc of the last step of a pass as a share of f T: above 0 and at most 1.
-    pub last_step: Figure,
+    pub last_step: ErrorStatistics,
     /// Emitted interval candidate / oracle's - 1, where either is shorter than the side range.
-    pub interval: Figure,
-    /// (side parameter of a pass - (that of the pass before + its least interval)) / that interval. The sum is cut at
-    /// the boundary; the least is taken over the emitted samples. Of passes that are spaced by the first order only.
-    pub side_step: Figure,
+    pub interval: ErrorStatistics,
+    /// (side parameter of a pass - (that of the previous pass + its least interval)) / that interval. The sum is limited to
+    /// the boundary; the minimum is over the emitted samples. Only for passes spaced by the first order.
+    pub side_step: ErrorStatistics,
     /// Largest scallop height after each pass by Lo's formula (eqn 11), mm: h times (actual / candidate interval)^2.
-    pub scallop_mm: Figure,
-    /// Sum of that height over all samples of all passes but the last, and their number.
+    pub scallop_mm: ErrorStatistics,
+    /// Sum of that height over all samples of all passes except the last, and the number of these samples.
     pub(super) scallop_sum_mm: f64,
     pub(super) scallop_samples: u64,
-    /// Ball radius times the largest principal curvature towards the tool: local gouge from 1 on.
-    pub fit: Figure,
+    /// Ball radius times the largest principal curvature towards the tool: a local gouge at 1 or more.
+    pub fit: ErrorStatistics,
     /// Length of all passes, mm.
     pub cc_length_mm: f64,
-    /// Samples where the oracle has no normal.
+    /// Samples where the surface has no normal.
     pub degenerate: u64,
     /// Passes that do not start or end exactly on the path parameter's boundaries.
     pub off_boundary: u32,
-    /// Samples whose side parameter is not the one of their pass, or that run against the pass.
-    pub astray: u64,
+    /// Samples whose side parameter differs from that of their pass, or that run against the pass direction.
+    pub off_pass: u64,
     /// The first pass lies exactly on the first boundary of the side parameter.
     pub first_on_boundary: bool,
     /// The last pass lies exactly on the other boundary.
@@ -98,7 +98,7 @@ pub struct Report {
     pub complete: bool,
 }
 
-impl Report {
+impl AccuracyReport {
     /// Mean of the scallop height over all samples, mm; 0 with a single pass.
     #[must_use]
     pub fn scallop_mean_mm(&self) -> f64 {
@@ -109,15 +109,15 @@ impl Report {
         }
     }
 
-    /// Whether every figure is within its bound and every pass where it belongs.
+    /// Whether every error is within its bound and every pass is where the schedule puts it.
     #[must_use]
-    pub fn passed(&self, bounds: &Bounds) -> bool {
+    pub fn passed(&self, bounds: &AccuracyBounds) -> bool {
         self.failures(bounds).is_empty()
     }
 
-    /// A sentence for everything that is out of its bound.
+    /// One sentence per error that exceeds its bound.
     #[must_use]
-    pub fn failures(&self, bounds: &Bounds) -> Vec<String> {
+    pub fn failures(&self, bounds: &AccuracyBounds) -> Vec<String> {
         let figures = [
             ("position error", self.position_nm, bounds.position_nm, "nm"),
             ("contact error", self.contact_nm, bounds.contact_nm, "nm"),
@@ -141,7 +141,7 @@ impl Report {
                 "(relative)",
             ),
             (
-                "pass off its place by",
+                "error of the pass position",
                 self.side_step,
                 bounds.side_step,
                 "of its interval",
@@ -152,7 +152,7 @@ impl Report {
             .into_iter()
             .filter(|(_, figure, bound, _)| figure.max > *bound)
             .map(|(name, figure, bound, unit)| {
-                let Spot { tick, pass, u, v } = figure.at;
+                let SampleLocation { tick, pass, u, v } = figure.at;
                 format!(
                     "{name} {:.6e} {unit} exceeds {bound:.6e} at tick {tick}, pass {pass}, u = {u}, v = {v}",
                     figure.max
@@ -165,7 +165,7 @@ impl Report {
                 u64::from(self.off_boundary),
                 "passes that do not start and end on the boundaries",
             ),
-            (self.astray, "samples off their pass or against it"),
+            (self.off_pass, "samples off their pass or against its direction"),
         ];
         failures.extend(
             counts
@@ -188,27 +188,27 @@ impl Report {
     }
 }
 
-/// What a verification accepts. Each bound is for the largest magnitude.
+/// Bounds of a verification, each on the largest magnitude.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Bounds {
+pub struct AccuracyBounds {
     /// Cutter location, nm.
     pub position_nm: f64,
     /// Cutter contact, nm.
     pub contact_nm: f64,
-    /// Normal, rad, on top of the rounding of the emitted positions.
+    /// Normal, rad, in addition to the rounding of the emitted positions.
     pub normal_rad: f64,
     /// Feed ripple, %.
     pub ripple_pct: f64,
     /// Interval candidate, relative.
     pub interval: f64,
-    /// Place of a pass, as a share of its interval.
+    /// Side parameter of a pass, as a share of its interval.
     pub side_step: f64,
     /// Ball radius times curvature towards the tool.
     pub fit: f64,
 }
 
-impl Default for Bounds {
-    /// A tenth of a micrometre is a good machine's resolution; the core, in 32-bit floats, is to stay a decade below.
+impl Default for AccuracyBounds {
+    /// A tenth of a micrometre is the resolution of a good machine; the 32-bit core has to stay a decade below it.
     fn default() -> Self {
         Self {
             position_nm: 10.0,

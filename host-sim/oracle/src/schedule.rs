@@ -1,37 +1,37 @@
-//! The passes of a job, found without running it: the least interval of each pass by a dense scan.
+//! The passes of a job without running it: the least interval of each pass by a dense scan.
 //!
-//! The paper's interval is of the pass itself (first order). How far the next pass may really lie depends on the gap: there the
-//! density 1/interval^2 is scanned on two more lines, with the exact heights of round balls, and at the ends of skew passes with those of the
-//! crest beyond the end. The rule is the core's (`interp-core`, `across.rs`), the geometry is this oracle's; that the heights then hold
-//! is measured from the swept ball.
+//! The paper's interval is evaluated at the pass itself (first order). The largest admissible distance of the next pass depends on the gap:
+//! the density 1/interval^2 is scanned on two more lines, with the exact scallop heights of a ball, and at the ends of skew passes with those
+//! of the crest beyond the end. The rule is the core's (`interp-core`, `across.rs`), the geometry is this oracle's; the resulting heights are
+//! measured independently from the swept ball.
 
 use super::contact::{Oracle, OracleError};
 use super::vector::dot;
 use job::{Along, Spacing};
 
-/// Places a span that are scanned for the least interval, and at least so many a pass.
+/// Points scanned per span for the least interval, and the least number of points per pass.
 const SCAN_PER_SPAN: usize = 64;
 const SCAN_MIN: usize = 512;
-/// Golden-section steps: each shortens the bracket to 0.618, so 48 bring it to 1e-10 of itself, where the interval,
-/// flat at its least, is exact.
+/// Golden-section steps: each shortens the bracket to 0.618, so 48 reduce it to 1e-10 of its length; the interval is stationary at its
+/// minimum, hence exact.
 const GOLDEN_STEPS: usize = 48;
-/// Minima of the scan that are refined: those within this share of the least one.
+/// Minima of the scan within this share of the least one are refined.
 const REFINE_SHARE: f64 = 1e-2;
-/// A pass that ends closer than this share of its interval to the boundary lies on it.
+/// A pass that ends closer than this share of its interval to the boundary lies on the boundary.
 const BOUNDARY_SHARE: f64 = 1e-9;
-/// Shortest and longest step of a pass over its first order's; the core's.
+/// Least and greatest ratio of a pass's step to its first-order step; the core's values.
 const STEP_RANGE: [f64; 2] = [0.25, 1.25];
-/// Newton steps to the root of a cubic: more than it takes.
+/// Newton iterations for the root of a cubic: more than needed.
 const NEWTON_STEPS: u8 = 12;
-/// Passes after which a schedule is given up.
+/// Largest number of passes of a schedule.
 const PASSES_MAX: usize = 1_000_000;
 
-/// A pass: where it lies, and how far the next one may be.
+/// A pass: its side parameter, and the largest distance to the next pass.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Pass {
+pub struct ScheduledPass {
     /// Side parameter.
     pub side: f64,
-    /// How far the next pass may be, in the side parameter; for passes spaced by the first order the least interval on the pass.
+    /// Largest step to the next pass, in the side parameter; for passes spaced by the first order the least interval on the pass.
     pub interval: f64,
 }
 
@@ -39,19 +39,19 @@ impl Oracle {
     /// All passes from one boundary of the side parameter to the other (steps 5 and 6).
     ///
     /// # Errors
-    /// [`OracleError::BallDoesNotFit`] and [`OracleError::Degenerate`] at the first such place,
-    /// [`OracleError::TooManyPasses`] if the intervals shrink towards nothing.
-    pub fn schedule(&self) -> Result<Vec<Pass>, OracleError> {
+    /// [`OracleError::BallDoesNotFit`] and [`OracleError::Degenerate`] at the first such point,
+    /// [`OracleError::TooManyPasses`] if the intervals converge to 0.
+    pub fn schedule(&self) -> Result<Vec<ScheduledPass>, OracleError> {
         let [start, end] = self.side_range();
         let mut passes = Vec::new();
         let mut side = start;
         while passes.len() < PASSES_MAX {
-            let before = passes.last().map(|pass: &Pass| pass.interval);
+            let before = passes.last().map(|pass: &ScheduledPass| pass.interval);
             let interval = match self.spacing {
                 Spacing::FirstOrder => self.least_interval(side)?,
                 Spacing::Exact => self.exact_interval(side, before)?,
             };
-            passes.push(Pass { side, interval });
+            passes.push(ScheduledPass { side, interval });
             if side >= end {
                 return Ok(passes);
             }
@@ -68,7 +68,7 @@ impl Oracle {
         Err(OracleError::TooManyPasses)
     }
 
-    /// How far the pass after the one at `side` may be; `before`: how far this one is from the one before.
+    /// Largest step from the pass at `side` to the next; `before`: step from the previous pass to this one.
     ///
     /// # Errors
     /// As [`Oracle::schedule`].
@@ -93,7 +93,7 @@ impl Oracle {
             (Some(half), None) => half.max(here),
             _ => here,
         };
-        // x^2 (1 + rise x) = 1, in units of the first order's step.
+        // x^2 (1 + rise x) = 1, in units of the first-order step.
         let rise = (mean / here - 1.0) * first / distance;
         let mut step = 1.0_f64;
         for _ in 0..NEWTON_STEPS {
@@ -104,7 +104,7 @@ impl Oracle {
         Ok(step * first)
     }
 
-    /// Greatest exact density on the line at `side`, the skew ends among them.
+    /// Greatest exact density on the line at `side`, skew ends included.
     fn greatest_density(&self, side: f64) -> Result<f64, OracleError> {
         let places = self.scan_places();
         let mut most = 0.0_f64;
@@ -115,7 +115,7 @@ impl Oracle {
         Ok(most)
     }
 
-    /// 1/interval^2 at a place, to all orders of h/r on a surface of constant curvature.
+    /// 1/interval^2 at a point, to all orders of h/r on a surface of constant curvature.
     fn exact_density(&self, path: f64, side: f64, is_end: bool) -> Result<f64, OracleError> {
         self.interval_at(path, side)?;
         let (u, v) = self.swapped(path, side);
@@ -128,7 +128,7 @@ impl Oracle {
         if !is_end {
             return Ok(density);
         }
-        // The last ball of a skew pass is as far away as the side line leads: on it the height rises with |B|^2 (1 + r c_B).
+        // The last ball of a skew pass is at the distance along the side line: its height grows with |B|^2 (1 + r c_B).
         let at = self.surface.at(u, v);
         let (b, bb) = match self.along {
             Along::U => (at.v, at.vv),
@@ -203,7 +203,7 @@ impl Oracle {
         Ok(at_left.min(at_right))
     }
 
-    /// The interval at a place where the ball must fit.
+    /// The interval at a point where the ball must fit.
     fn interval_at(&self, path: f64, side: f64) -> Result<f64, OracleError> {
         let (u, v) = self.swapped(path, side);
         let contact = self.contact(u, v)?;

@@ -1,4 +1,4 @@
-//! S(u, v) and its derivatives, straight from the job's numbers.
+//! S(u, v) and its derivatives, directly from the job's numbers.
 
 use super::nurbs::Nurbs;
 use super::vector::{Vector, add, scale, subtract};
@@ -21,7 +21,7 @@ pub struct Derivatives {
     pub vv: [f64; 3],
 }
 
-/// A surface that can be evaluated on its [`domain`](Surface::domain), ends included.
+/// A surface, evaluated on its closed [`domain`](Surface::domain).
 #[derive(Clone, Debug)]
 pub struct Surface {
     shape: Shape,
@@ -69,7 +69,7 @@ impl Surface {
         self.domain
     }
 
-    /// Parameters between which the surface is smooth along u or v: the range's ends and the knots between them,
+    /// Parameters between which the surface is smooth along u or v: the ends of the range and the knots between them,
     /// ascending.
     #[must_use]
     pub fn breaks(&self, along: Along) -> Vec<f64> {
@@ -87,7 +87,7 @@ impl Surface {
         }
     }
 
-    /// S and its derivatives at (u, v). At a knot they are those of the span above it (at the range's end, below it).
+    /// S and its derivatives at (u, v). At a knot: those of the span above it (at the end of the range, below it).
     #[must_use]
     pub fn at(&self, u: f64, v: f64) -> Derivatives {
         match &self.shape {
@@ -98,7 +98,7 @@ impl Surface {
         }
     }
 
-    /// First derivative along one parameter: the same as in [`Surface::at`], for less work.
+    /// First derivative along one parameter: as in [`Surface::at`], at lower cost.
     pub(super) fn tangent(&self, u: f64, v: f64, along: Along) -> Vector {
         if let Shape::Nurbs(nurbs) = &self.shape {
             return nurbs.tangent(u, v, along);

@@ -3,7 +3,7 @@
 use std::f64::consts::{FRAC_PI_2, FRAC_PI_3, PI};
 
 use super::*;
-use job::{Along, Job, Machine, NurbsSpec, Origin, Pattern, Side, Spacing, SurfaceSpec};
+use job::{Along, Job, MachineSpec, NurbsSpec, Origin, Pattern, Side, Spacing, SurfaceSpec};
 
 /// A job on a surface with a ball of 5 mm and a scallop of 0.005 mm.
 fn job(surface: SurfaceSpec, along: Along, side: Side) -> Job {
@@ -17,7 +17,7 @@ fn job(surface: SurfaceSpec, along: Along, side: Side) -> Job {
         pattern: Pattern::Zig,
         spacing: Spacing::Exact,
         chord_mm: 0.005,
-        machine: Machine::default(),
+        machine: MachineSpec::default(),
         origin: Origin::default(),
     }
 }
@@ -50,7 +50,7 @@ fn all_close(ours: [f64; 3], exact: [f64; 3], tolerance: f64) {
         .for_each(|(ours, exact)| close(*ours, exact, tolerance));
 }
 
-/// Places of a grid over the domain, ends included.
+/// Points of a grid over the domain, ends included.
 fn grid(surface: &Surface, steps: u32) -> Vec<(f64, f64)> {
     let [[u0, u1], [v0, v1]] = surface.domain();
     let at = |low: f64, high: f64, k: u32| low + (high - low) * f64::from(k) / f64::from(steps);
@@ -59,7 +59,7 @@ fn grid(surface: &Surface, steps: u32) -> Vec<(f64, f64)> {
         .collect()
 }
 
-/// A rational surface with uneven knots, unclamped in v, and poles out of a fixed pseudo-random row.
+/// A rational surface with non-uniform knots, unclamped in v, and pseudo-random poles of a fixed seed.
 fn rough_nurbs(degree: [usize; 2]) -> SurfaceSpec {
     let mut state = 12_345_u32;
     let mut random = || {
@@ -98,7 +98,7 @@ fn rough_nurbs(degree: [usize; 2]) -> SurfaceSpec {
 }
 
 #[test]
-fn plane_has_no_curvature() {
+fn plane_has_zero_curvature() {
     let rail = |y: f64| [[0.0, 0.0, 30.0, 5.0], [0.0, 0.0, 0.0, y], [0.0, 0.0, 0.0, 2.0]];
     let surface = SurfaceSpec::Ruled {
         rail0_mm: rail(0.0),
@@ -115,7 +115,7 @@ fn plane_has_no_curvature() {
 }
 
 #[test]
-fn cylinder_curves_one_way() {
+fn cylinder_has_one_curvature() {
     let surface = SurfaceSpec::Revolved {
         radius_mm: [0.0, 0.0, 0.0, 20.0],
         height_mm: [0.0, 0.0, 50.0, 0.0],
@@ -125,7 +125,7 @@ fn cylinder_curves_one_way() {
     for (side, sign) in [(Side::Plus, -1.0), (Side::Minus, 1.0)] {
         let oracle = oracle(surface.clone(), Along::V, side);
         let contact = oracle.contact(0.4, 1.2).unwrap();
-        // S_u x S_v points to the axis.
+        // S_u x S_v points towards the axis.
         all_close(
             contact.normal,
             [sign * 1.2_f64.cos(), sign * 1.2_f64.sin(), 0.0],
@@ -161,7 +161,7 @@ fn sphere_is_a_sphere_up_to_its_pole() {
             let radial = contact.cc_mm.map(|x| x / 25.0);
             all_close(contact.normal, radial, 1e-14);
             all_close(contact.cl_mm, radial.map(|x| x * 30.0), 1e-13);
-            // Beside the pole what f64 leaves of S_v, at the pole the extrapolation.
+            // Near the pole the f64 value of S_v, at the pole the extrapolation.
             let tolerance = if u == 0.0 { 1e-8 } else { 1e-12 };
             for curvature in [contact.curvature_path, contact.curvature_side]
                 .into_iter()
@@ -185,7 +185,7 @@ fn sphere_is_a_sphere_up_to_its_pole() {
         1e-12,
     );
     close(across.arc_length(0.0, 1.0, 0.0), 0.0, 1e-13);
-    // On the pole itself a pass is a point; the next one is a step-over away, at |S_u| mm a unit.
+    // At the pole itself a pass is a point; the next one is a step-over away, at |S_u| mm per unit.
     let at_pole = across.contact(0.0, 0.3).unwrap();
     close(
         at_pole.interval * (0.2_f64 / 1.2).sqrt().recip() * oracle.contact(0.0, 0.3).unwrap().path_speed,
@@ -227,7 +227,7 @@ fn torus_is_a_torus() {
 
 #[test]
 fn derivatives_agree_with_differences() {
-    // Central differences with step h err by h^2 f''' / 6 and by rounding over h: least near 1e-5 of a span.
+    // Central differences with step h have an error of h^2 f''' / 6 plus rounding / h: least near 1e-5 of a span.
     const STEP: f64 = 1e-5;
     let plate = sample_job("plate").surface;
     let nurbs = [[1, 1], [2, 1], [2, 3], [3, 2], [3, 3]].map(rough_nurbs);
@@ -272,7 +272,7 @@ fn principal_curvatures_do_not_depend_on_the_pass() {
         let (one, other) = (along.contact(u, v).unwrap(), across.contact(u, v).unwrap());
         close(one.principal[0], other.principal[0], 1e-14);
         close(one.principal[1], other.principal[1], 1e-14);
-        // Euler: the mean of any two orthogonal directions is the mean curvature.
+        // Euler: the mean over any two orthogonal directions is the mean curvature.
         close(
             one.curvature_path + one.curvature_side,
             one.principal[0] + one.principal[1],
@@ -312,9 +312,9 @@ fn arcs_add_up_and_small_ones_are_exact() {
 }
 
 /// Ideal samples of a job: steps of f T along the surface by Newton's method, positions rounded to nanometres.
-fn ideal_samples(oracle: &Oracle, feed_mm_s: f64) -> Vec<Emitted> {
+fn ideal_samples(oracle: &Oracle, feed_mm_s: f64) -> Vec<PassSample> {
     let [start, end] = oracle.path_range();
-    let mut samples: Vec<Emitted> = Vec::new();
+    let mut samples: Vec<PassSample> = Vec::new();
     let mut side = oracle.side_range()[0];
     for pass in 0.. {
         let backwards = oracle.pattern == Pattern::Zigzag && pass % 2 == 1;
@@ -325,7 +325,7 @@ fn ideal_samples(oracle: &Oracle, feed_mm_s: f64) -> Vec<Emitted> {
             let (u, v) = oracle.swapped(path, side);
             let contact = oracle.contact(u, v).unwrap();
             least = least.min(contact.interval);
-            samples.push(Emitted {
+            samples.push(PassSample {
                 tick: samples.len() as u64,
                 pass,
                 u,
@@ -359,7 +359,7 @@ fn ideal_samples(oracle: &Oracle, feed_mm_s: f64) -> Vec<Emitted> {
     samples
 }
 
-fn report_of(oracle: &Oracle, samples: &[Emitted]) -> Report {
+fn report_of(oracle: &Oracle, samples: &[PassSample]) -> AccuracyReport {
     let mut verifier = Verifier::new(oracle);
     for sample in samples {
         verifier.add(sample);
@@ -368,7 +368,7 @@ fn report_of(oracle: &Oracle, samples: &[Emitted]) -> Report {
 }
 
 /// A short job: coarse scallop, 40 mm/s.
-fn short_job(name: &str, pattern: Pattern) -> (Oracle, Vec<Emitted>) {
+fn short_job(name: &str, pattern: Pattern) -> (Oracle, Vec<PassSample>) {
     let job = Job {
         scallop_mm: 0.2,
         pattern,
@@ -387,7 +387,7 @@ fn ideal_samples_pass() {
             let (oracle, samples) = short_job(name, pattern);
             let report = report_of(&oracle, &samples);
             assert_eq!(
-                report.failures(&Bounds::default()),
+                report.failures(&AccuracyBounds::default()),
                 Vec::<String>::new(),
                 "{name}"
             );
@@ -420,7 +420,7 @@ fn ideal_samples_pass() {
 
 #[test]
 fn every_fault_is_found() {
-    type Fault = (&'static str, fn(&mut Vec<Emitted>));
+    type Fault = (&'static str, fn(&mut Vec<PassSample>));
     let faults: [Fault; 10] = [
         ("position", |samples| samples[500].cl_nm[1] += 20),
         ("contact", |samples| samples[500].cc_nm[1] += 20),
@@ -444,7 +444,7 @@ fn every_fault_is_found() {
     for (word, inject) in faults {
         let mut samples = ideal.clone();
         inject(&mut samples);
-        let failures = report_of(&oracle, &samples).failures(&Bounds::default());
+        let failures = report_of(&oracle, &samples).failures(&AccuracyBounds::default());
         let word = if word == "astray" { "off their pass" } else { word };
         assert!(
             failures.iter().any(|failure| failure.contains(word)),
@@ -454,7 +454,7 @@ fn every_fault_is_found() {
 }
 
 #[test]
-fn a_pass_in_the_wrong_place_is_found() {
+fn a_pass_at_a_wrong_side_parameter_is_found() {
     let (oracle, mut samples) = short_job("plate", Pattern::Zig);
     samples
         .iter_mut()
@@ -462,7 +462,7 @@ fn a_pass_in_the_wrong_place_is_found() {
         .for_each(|sample| sample.v += 1e-5);
     let report = report_of(&oracle, &samples);
     assert!(report.side_step.max > 1e-4, "{:?}", report.side_step);
-    // Nor do the positions agree with where the pass says it is.
+    // The positions do not agree with the side parameter of the pass either.
     assert_eq!(report.side_step.at.pass, 5);
     assert!(report.position_nm.max > 100.0);
 }
@@ -479,12 +479,12 @@ fn a_pass_on_the_pole_is_a_point() {
     assert_eq!(samples[0].cc_nm, samples[1].cc_nm);
     assert!(samples[0].first_of_pass && samples[1].last_of_pass);
     assert_eq!(
-        report_of(&oracle, &samples).failures(&Bounds::default()),
+        report_of(&oracle, &samples).failures(&AccuracyBounds::default()),
         Vec::<String>::new()
     );
 }
 
-/// A plane that goes over into a parabola, z = (t - 1)^2 at x = 10 t: level there, with a curvature of 0.02 from then on.
+/// A plane joined to a parabola, z = (t - 1)^2 at x = 10 t: level at the joint, with a curvature of 0.02 beyond.
 #[test]
 fn centre_changes_its_speed_where_the_curvature_does() {
     let heights = [0.0, 0.0, 0.0, 1.0];

@@ -1,16 +1,16 @@
-//! Checks emitted samples one by one, in the order of their ticks. Nothing is allocated per sample.
+//! Checks emitted samples one by one, in the order of their ticks. No allocation per sample.
 
 use super::contact::Oracle;
-use super::report::{Report, Spot};
+use super::report::{AccuracyReport, SampleLocation};
 use super::vector::{angle, length, scale, subtract};
 use job::{Pattern, Spacing};
 
 /// Nanometres in a millimetre.
 const NM_PER_MM: f64 = 1e6;
 
-/// A sample on a pass as a machine emitted it, in plain numbers.
+/// A sample on a pass as emitted by a machine, in plain numbers.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Emitted {
+pub struct PassSample {
     /// Tick, from 0.
     pub tick: u64,
     /// Pass, from 0.
@@ -23,9 +23,9 @@ pub struct Emitted {
     pub cc_nm: [i32; 3],
     /// Cutter location, nm.
     pub cl_nm: [i32; 3],
-    /// Commanded feed along the surface in the period before this sample, mm/s; 0 where none is meant to be checked.
+    /// Commanded feed along the surface in the period before this sample, mm/s; 0 disables the check of the step.
     pub feed_mm_s: f64,
-    /// Candidate of the path interval, in the side parameter; infinite where it sets no limit.
+    /// Candidate of the path interval, in units of the side parameter; infinite where it imposes no limit.
     pub interval: f64,
     /// First sample of its pass.
     pub first_of_pass: bool,
@@ -33,35 +33,35 @@ pub struct Emitted {
     pub last_of_pass: bool,
 }
 
-/// What the check of one sample found.
+/// Errors of one sample.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Checked {
-    /// Length of the contact's path since the sample before, mm, if that is of the same pass.
+pub struct SampleCheck {
+    /// Arc length of the contact's path since the previous sample of the same pass, mm; `None` at the first one.
     pub arc_mm: Option<f64>,
-    /// 100 (arc / (f T) - 1), %, where the step is held against the feed: not the first and the last of a pass.
+    /// 100 (arc / (f T) - 1), %, for all samples of a pass except the first and the last.
     pub ripple_pct: Option<f64>,
-    /// |CL emitted - CL|, nm, where the surface has a normal.
+    /// Distance of the emitted CL from the exact CL, nm; `None` where the surface has no normal.
     pub position_nm: Option<f64>,
 }
 
-/// Gathers a [`Report`] from a stream of samples.
+/// Accumulates a [`AccuracyReport`] from a stream of samples.
 #[derive(Clone, Debug)]
 pub struct Verifier {
     oracle: Oracle,
     breaks: Vec<f64>,
-    report: Report,
+    report: AccuracyReport,
     current: Option<PassState>,
 }
 
-/// What is remembered of the pass under way.
+/// State of the current pass.
 #[derive(Clone, Copy, Debug)]
 struct PassState {
     side: f64,
     /// Path parameter of the last sample.
     path: f64,
     least_interval: f64,
-    least_at: Spot,
-    /// Sum over samples of (1 / interval)^2, and their number: the scallop's mean once the next pass is known.
+    least_at: SampleLocation,
+    /// Sum over samples of (1 / interval)^2, and their number: gives the scallop's mean when the next pass is known.
     inverse_squares: f64,
     samples: u64,
     finished: bool,
@@ -71,9 +71,9 @@ impl Verifier {
     /// A verifier of a job's samples.
     #[must_use]
     pub fn new(oracle: &Oracle) -> Self {
-        let report = Report {
+        let report = AccuracyReport {
             normal_floor_rad: 3.0_f64.sqrt() / (oracle.radius_mm * NM_PER_MM),
-            ..Report::default()
+            ..AccuracyReport::default()
         };
         Self {
             breaks: oracle.surface.breaks(oracle.along),
@@ -83,9 +83,9 @@ impl Verifier {
         }
     }
 
-    /// Checks the next sample, and returns what the check found.
-    pub fn add(&mut self, sample: &Emitted) -> Checked {
-        let spot = Spot {
+    /// Checks the next sample and returns its errors.
+    pub fn add(&mut self, sample: &PassSample) -> SampleCheck {
+        let spot = SampleLocation {
             tick: sample.tick,
             pass: sample.pass,
             u: sample.u,
@@ -108,7 +108,7 @@ impl Verifier {
                 pass.finished = true;
             }
         }
-        Checked {
+        SampleCheck {
             arc_mm: arc_mm.map(f64::abs),
             ripple_pct,
             position_nm,
@@ -117,7 +117,7 @@ impl Verifier {
 
     /// The report, after the last sample.
     #[must_use]
-    pub fn finish(mut self) -> Report {
+    pub fn finish(mut self) -> AccuracyReport {
         if let Some(pass) = self.current {
             self.report.complete = pass.finished;
             self.report.last_on_boundary = pass.side == self.oracle.side_range()[1];
@@ -132,8 +132,8 @@ impl Verifier {
         if backwards { [high, low] } else { [low, high] }
     }
 
-    /// A new pass: is it where the last one's least interval puts it?
-    fn begin_pass(&mut self, sample: &Emitted, path: f64, side: f64, spot: Spot) {
+    /// Begins a pass and checks its side parameter against the least interval of the previous pass.
+    fn begin_pass(&mut self, sample: &PassSample, path: f64, side: f64, spot: SampleLocation) {
         let [first, last] = self.oracle.side_range();
         match self.current {
             None => self.report.first_on_boundary = side == first && sample.pass == 0,
@@ -165,7 +165,7 @@ impl Verifier {
         });
     }
 
-    /// The scallop that the gap to the next pass leaves: its largest height where the interval was least.
+    /// Scallop left in the gap to the next pass: its largest height is at the least interval.
     fn close_scallop(&mut self, pass: &PassState, gap: f64) {
         let height = |inverse_square: f64| self.oracle.scallop_mm * gap * gap * inverse_square;
         let most = height(1.0 / (pass.least_interval * pass.least_interval));
@@ -174,16 +174,16 @@ impl Verifier {
         self.report.scallop_samples += pass.samples;
     }
 
-    /// Arc of the step to this sample, mm, and what it is off the feed, %.
+    /// Arc length of the step to this sample, mm, and its deviation from the feed, %.
     fn check_step(
         &mut self,
-        sample: &Emitted,
+        sample: &PassSample,
         path: f64,
         side: f64,
-        spot: Spot,
+        spot: SampleLocation,
     ) -> (Option<f64>, Option<f64>) {
         let Some(pass) = &mut self.current else {
-            self.report.astray += 1;
+            self.report.off_pass += 1;
             return (None, None);
         };
         let forwards = if self.oracle.pattern == Pattern::Zigzag && sample.pass % 2 == 1 {
@@ -194,7 +194,7 @@ impl Verifier {
         let from = pass.path;
         pass.path = path;
         if side != pass.side || (path - from) * forwards < 0.0 || pass.finished {
-            self.report.astray += 1;
+            self.report.off_pass += 1;
         }
         let arc = forwards * self.oracle.arc_between(&self.breaks, from, path, side);
         self.report.cc_length_mm += arc;
@@ -205,7 +205,7 @@ impl Verifier {
                 .add(if wanted > 0.0 { arc / wanted } else { 0.0 }, spot);
             return (Some(arc), None);
         }
-        // Where the feed is lower than the programmed one, that is what the step is held against.
+        // The deviation refers to the larger of the commanded and the programmed step.
         let whole = wanted.max(self.oracle.feed_mm_s * self.oracle.period_s);
         let ripple_pct = (wanted > 0.0).then(|| 100.0 * (arc - wanted) / whole);
         if let Some(ripple_pct) = ripple_pct {
@@ -214,8 +214,8 @@ impl Verifier {
         (Some(arc), ripple_pct)
     }
 
-    /// Positions, normal, curvature and interval of one sample; returns the centre's error, nm.
-    fn check_geometry(&mut self, sample: &Emitted, spot: Spot) -> Option<f64> {
+    /// Checks positions, normal, curvature and interval of one sample; returns the centre's error, nm.
+    fn check_geometry(&mut self, sample: &PassSample, spot: SampleLocation) -> Option<f64> {
         let Ok(contact) = self.oracle.contact(sample.u, sample.v) else {
             self.report.degenerate += 1;
             return None;

@@ -1,4 +1,4 @@
-//! A surface as exact bicubic pieces, the box around it, and where it lies on the machine.
+//! A surface as exact bicubic pieces, its bounding box, and its placement on the machine.
 #![cfg_attr(
     test,
     allow(

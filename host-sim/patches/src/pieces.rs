@@ -1,4 +1,4 @@
-//! Bicubic pieces of a surface over any rectangle of its parameters, exactly.
+//! Exact bicubic pieces of a surface over any rectangle of its parameters.
 
 use interp_core::encode::{Bicubic, substitute};
 
@@ -7,11 +7,11 @@ use job::{NurbsSpec, SurfaceSpec};
 /// A piece: wx, wy, wz, w as cubics of parameters from -1/2 to 1/2, `[i][j]` of `u^i v^j`.
 pub type Piece = [Bicubic; 4];
 
-/// A surface that has such pieces.
+/// A surface that has bicubic pieces.
 #[derive(Clone, Debug)]
 #[allow(clippy::large_enum_variant, reason = "there is one a job")]
 pub enum Source {
-    /// Polynomial in powers, lowest first, `[i][j]` of `u^i v^j`.
+    /// Polynomial in power form, lowest first, `[i][j]` of `u^i v^j`.
     Powers {
         /// `[i][j]` multiplies `u^i v^j`, mm, of x, y and z.
         coefficients: [Bicubic; 3],
@@ -23,7 +23,7 @@ pub enum Source {
 }
 
 impl Source {
-    /// Of any surface but a revolved one.
+    /// The source of any surface except a revolved one.
     pub fn new(surface: &SurfaceSpec) -> Self {
         match surface {
             SurfaceSpec::Ruled {
@@ -67,13 +67,13 @@ impl Source {
         }
     }
 
-    /// Whether the pieces have weights that differ.
+    /// Whether the weights of the pieces differ.
     #[must_use]
     pub fn rational(&self) -> bool {
         matches!(self, Self::Spline(nurbs) if nurbs.rational)
     }
 
-    /// Where pieces have to end, in u and in v.
+    /// Parameters at which pieces must end, in u and in v.
     pub fn breaks(&self) -> [Vec<f64>; 2] {
         match self {
             Self::Powers { ranges, .. } => ranges.map(Vec::from),
@@ -84,7 +84,7 @@ impl Source {
         }
     }
 
-    /// The piece over a rectangle that no break divides.
+    /// The piece over a rectangle that contains no break in its interior.
     pub fn piece(&self, u: [f64; 2], v: [f64; 2]) -> Piece {
         match self {
             Self::Powers { coefficients, .. } => {
@@ -117,8 +117,8 @@ fn blend(a: Pole, b: Pole, t: f64) -> Pole {
     std::array::from_fn(|k| (1.0 - t) * a[k] + t * b[k])
 }
 
-/// The polar form (blossom) of a B-spline's piece on the knot span that holds `range`, at these arguments: with k of them at
-/// the range's end and the others at its start it is the k-th Bezier pole.
+/// The polar form (blossom) of a B-spline's piece on the knot span that contains `range`, at these arguments. With k arguments at
+/// the range's end and the others at its start, the value is the k-th Bezier pole.
 fn blossom(knots: &[f64], poles: &[Pole], degree: usize, span: usize, arguments: &[f64]) -> Pole {
     let mut d: Vec<Pole> = poles[span - degree..=span].to_vec();
     for (r, &t) in (1..=degree).zip(arguments) {
@@ -130,7 +130,7 @@ fn blossom(knots: &[f64], poles: &[Pole], degree: usize, span: usize, arguments:
     d[degree]
 }
 
-/// Bezier poles of degree 3 over `range`, from B-spline poles of degree 1 to 3: exact, the degree raised where need be.
+/// Bezier poles of degree 3 over `range` from B-spline poles of degree 1 to 3: exact, by degree elevation.
 fn bezier(knots: &[f64], poles: &[Pole], degree: usize, range: [f64; 2]) -> [Pole; 4] {
     let [start, end] = range;
     let middle = 0.5 * (start + end);
@@ -154,7 +154,7 @@ fn bezier(knots: &[f64], poles: &[Pole], degree: usize, range: [f64; 2]) -> [Pol
     }
 }
 
-/// Bernstein coefficients over a span to powers of its parameter from -1/2 to 1/2.
+/// Converts Bernstein coefficients over a span to power form in a parameter from -1/2 to 1/2.
 fn centred_powers([b0, b1, b2, b3]: [f64; 4]) -> [f64; 4] {
     [
         (b0 + 3.0 * (b1 + b2) + b3) / 8.0,
@@ -242,7 +242,7 @@ mod tests {
                 let [us, vs] = source.breaks();
                 for u in us.windows(2) {
                     for v in vs.windows(2) {
-                        // A part of the span, as a split makes it.
+                        // A part of the span, as after a split.
                         let (u, v) = ([u[0], 0.5 * (u[0] + u[1])], [v[0], v[1]]);
                         let piece = source.piece(u, v);
                         for (s, t) in [(-0.5, -0.5), (-0.1, 0.3), (0.5, 0.499), (0.2, -0.4)] {

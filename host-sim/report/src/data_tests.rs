@@ -11,7 +11,7 @@ use super::series::{Channel, Series, Spans};
 use super::tests::{BELL, BLANK, run};
 use super::track::Track;
 use job::Along;
-use oracle::{Checked, Emitted, Oracle};
+use oracle::{Oracle, PassSample, SampleCheck};
 
 /// Numbers as the page decodes them.
 fn decoded(low: &Value, step: &Value, data: &Value) -> Vec<f64> {
@@ -97,7 +97,7 @@ fn series_of(passes: u32, samples: u32, place: impl Fn(u32) -> [f64; 3]) -> Valu
     let mut tick = 0;
     for pass in 0..passes {
         for step in 0..samples {
-            let sample = Emitted {
+            let sample = PassSample {
                 tick,
                 pass,
                 cl_nm: place(step).map(|nm| nm.round() as i32),
@@ -105,9 +105,9 @@ fn series_of(passes: u32, samples: u32, place: impl Fn(u32) -> [f64; 3]) -> Valu
                 last_of_pass: step + 1 == samples,
                 ..BLANK
             };
-            let checked = Checked {
+            let checked = SampleCheck {
                 arc_mm: (step > 0).then_some(0.01),
-                ..Checked::default()
+                ..SampleCheck::default()
             };
             series.add(&sample, &checked);
             tick += 1;
@@ -157,7 +157,7 @@ fn passes_are_drawn_within_bounds_and_with_their_worst() {
         let (bad_pass, bad_step) = (passes / 2 / track.every * track.every, samples * 2 / 3);
         for pass in 0..passes {
             for step in 0..samples {
-                let sample = Emitted {
+                let sample = PassSample {
                     tick: u64::from(pass * samples + step),
                     pass,
                     cc_nm: [step as i32, 0, 0],
@@ -167,7 +167,7 @@ fn passes_are_drawn_within_bounds_and_with_their_worst() {
                     ..BLANK
                 };
                 let is_bad = pass == bad_pass && step == bad_step;
-                let checked = Checked {
+                let checked = SampleCheck {
                     arc_mm: (step > 0).then_some(0.01),
                     ripple_pct: Some(if is_bad { -2.0 } else { 1e-3 }),
                     position_nm: Some(if is_bad { 8.0 } else { 1.0 }),
@@ -239,7 +239,7 @@ fn scallops_lie_over_the_surface_where_they_were_measured() {
     };
     let scallops = Scallops {
         limit_mm: 0.05,
-        measuring_error_mm: 1e-4,
+        measurement_error_mm: 1e-4,
         ridges: (0..10).map(ridge).collect(),
     };
     let value = scallops.json(&mesh, domain, Along::U);

@@ -50,8 +50,8 @@ use std::path::{Path, PathBuf};
 
 use approach::Kind;
 use job::Job;
-use oracle::{Checked, Emitted, Oracle};
-use verify::survey::Findings;
+use oracle::{Oracle, PassSample, SampleCheck};
+use verify::survey::SurveyResult;
 
 pub use scallops::{RidgePlace, Scallops};
 
@@ -112,7 +112,7 @@ impl Sketch {
     }
 
     /// The next sample of the run, in the order of the ticks, with what its check found.
-    pub fn add(&mut self, sample: &Emitted, checked: &Checked) {
+    pub fn add(&mut self, sample: &PassSample, checked: &SampleCheck) {
         self.record.add(sample);
         self.track.add(sample, checked);
         self.series.add(sample, checked);
@@ -122,7 +122,7 @@ impl Sketch {
     ///
     /// # Errors
     /// The job asks for an upper side that the surface does not have.
-    pub fn picture(&self, job_name: &Path, findings: &Findings) -> io::Result<String> {
+    pub fn picture(&self, job_name: &Path, findings: &SurveyResult) -> io::Result<String> {
         let oracle = Oracle::new(&self.job).map_err(io::Error::other)?;
         let words = page::words(&self.job, &self.record, job_name, findings);
         let mesh = mesh::Mesh::new(&oracle);
@@ -138,7 +138,7 @@ impl Sketch {
         &self,
         directory: &Path,
         job_name: &Path,
-        findings: &Findings,
+        findings: &SurveyResult,
         remarks: &Remarks,
     ) -> io::Result<PathBuf> {
         let oracle = Oracle::new(&self.job).map_err(io::Error::other)?;

@@ -15,7 +15,7 @@ use super::track::Track;
 use approach::Kind;
 use job::{Along, Job, Pattern};
 use oracle::Oracle;
-use verify::survey::Findings;
+use verify::survey::SurveyResult;
 
 /// Style sheet of the pages.
 pub const STYLE: &str = include_str!("page.css");
@@ -50,14 +50,14 @@ pub(super) struct Content<'a> {
     pub(super) track: &'a Track,
     /// Finished.
     pub(super) series: &'a Series,
-    pub(super) findings: &'a Findings,
+    pub(super) findings: &'a SurveyResult,
     pub(super) remarks: &'a Remarks,
     pub(super) words: &'a Words,
     pub(super) picture: &'a Picture,
 }
 
 /// What picture and page say about the job.
-pub(super) fn words(job: &Job, record: &Record, job_name: &Path, findings: &Findings) -> Words {
+pub(super) fn words(job: &Job, record: &Record, job_name: &Path, findings: &SurveyResult) -> Words {
     let title = job_name
         .file_stem()
         .map_or_else(|| "job".to_owned(), |name| name.to_string_lossy().into_owned());
@@ -353,7 +353,7 @@ fn tables(out: &mut String, content: &Content<'_>) {
     out.push_str("</div>\n");
 }
 
-fn run_rows(job: &Job, findings: &Findings) -> [Row; 6] {
+fn run_rows(job: &Job, findings: &SurveyResult) -> [Row; 6] {
     let side = match job.along {
         Along::U => "of v",
         Along::V => "of u",
@@ -377,7 +377,7 @@ fn run_rows(job: &Job, findings: &Findings) -> [Row; 6] {
     ]
 }
 
-fn oracle_rows(findings: &Findings) -> [Row; 7] {
+fn oracle_rows(findings: &SurveyResult) -> [Row; 7] {
     let report = &findings.report;
     let (ripple, ripple_rms) = (report.ripple_pct.max, report.ripple_pct.rms());
     let [cl, cc, normal] =

@@ -1,7 +1,7 @@
 //! What is kept of a stream of samples: a bounded amount, whatever the job's length.
 
 use job::{Along, Job, Pattern};
-use oracle::Emitted;
+use oracle::PassSample;
 
 /// Passes that are drawn at most, besides the last one: more would run together in a picture of 900 pixels.
 const DRAWN_MAX: usize = 60;
@@ -127,7 +127,7 @@ impl Record {
         }
     }
 
-    pub(super) fn add(&mut self, sample: &Emitted) {
+    pub(super) fn add(&mut self, sample: &PassSample) {
         if sample.first_of_pass {
             self.begin_pass(sample);
         }
@@ -146,7 +146,7 @@ impl Record {
         }
     }
 
-    fn begin_pass(&mut self, sample: &Emitted) {
+    fn begin_pass(&mut self, sample: &PassSample) {
         let side = match self.along {
             Along::U => sample.v,
             Along::V => sample.u,

@@ -27,7 +27,7 @@ pub struct Scallops {
     /// What the job allows, mm.
     pub limit_mm: f64,
     /// What the measuring may be off, mm.
-    pub measuring_error_mm: f64,
+    pub measurement_error_mm: f64,
     /// One ridge for each gap between neighbouring passes: the gap's number (that of the pass before it), and places along it.
     pub ridges: Vec<(u32, Vec<RidgePlace>)>,
 }
@@ -67,7 +67,7 @@ impl Scallops {
             .map(|(_, heights)| heights.iter().sum::<f64>() / heights.len() as f64);
         json!({
             "limit": self.limit_mm,
-            "error": self.measuring_error_mm,
+            "error": self.measurement_error_mm,
             "highest": self.largest_mm(),
             "mesh": scale.json(words(heights.iter().map(|height| scale.above(*height)))),
             "gaps": gaps.iter().map(|(gap, _)| *gap).collect::<Vec<_>>(),

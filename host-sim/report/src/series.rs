@@ -4,7 +4,7 @@
 use serde_json::{Value, json};
 
 use super::embed::{Scale, words};
-use oracle::{Checked, Emitted};
+use oracle::{PassSample, SampleCheck};
 
 /// A quantity over time.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -250,7 +250,7 @@ impl Series {
         }
     }
 
-    pub(super) fn add(&mut self, sample: &Emitted, checked: &Checked) {
+    pub(super) fn add(&mut self, sample: &PassSample, checked: &SampleCheck) {
         if sample.first_of_pass || self.current.is_none() {
             self.end_pass();
             self.current = Some(Detail {
@@ -275,7 +275,7 @@ impl Series {
         );
     }
 
-    fn add_rates(&mut self, sample: &Emitted, arc_mm: f64) {
+    fn add_rates(&mut self, sample: &PassSample, arc_mm: f64) {
         let before = self.axes.places.back().copied().unwrap_or(sample.cl_nm);
         let step: [f64; 3] =
             std::array::from_fn(|k| (f64::from(sample.cl_nm[k]) - f64::from(before[k])) * MM_PER_NM);

@@ -9,8 +9,8 @@ use super::{Figure, Remarks, Sketch, measure, number};
 use job::Job;
 use machine::Machine;
 use machine::prepare::prepare;
-use oracle::{Checked, Emitted, Oracle};
-use verify::survey::{Findings, Survey};
+use oracle::{Oracle, PassSample, SampleCheck};
+use verify::survey::{Survey, SurveyResult};
 
 /// A small bell: 20 passes or so, in a fraction of a second.
 pub(super) const BELL: &str = r#"
@@ -32,13 +32,13 @@ pattern = "zigzag"
 "#;
 
 /// Runs a job as the command does.
-pub(super) fn run(text: &str) -> (Job, Sketch, Findings) {
+pub(super) fn run(text: &str) -> (Job, Sketch, SurveyResult) {
     let job = job_file::parse("bell.toml", text).unwrap();
     let prepared = prepare(&job).unwrap();
     let oracle = Oracle::new(&job).unwrap();
     let passes = oracle.schedule().unwrap().len();
     let mut sketch = Sketch::new(&job, passes);
-    let mut draw = |sample: &Emitted, checked: &Checked| sketch.add(sample, checked);
+    let mut draw = |sample: &PassSample, checked: &SampleCheck| sketch.add(sample, checked);
     let mut survey = Survey::new(&oracle, None, Some(&mut draw));
     Machine::load(&prepared)
         .unwrap()
@@ -121,7 +121,7 @@ fn record_is_bounded_whatever_the_job() {
         let mut record = Record::new(&job, expected);
         for pass in 0..passes {
             for step in 0..samples {
-                record.add(&Emitted {
+                record.add(&PassSample {
                     tick: 0,
                     pass,
                     u: f64::from(step),
@@ -154,7 +154,7 @@ fn zigzag_passes_are_drawn_to_and_fro() {
     let (sketch, mut drawn) = (Sketch::new(&job, 164), Vec::new());
     let mut record = sketch.record;
     for pass in 0..164 {
-        let sample = Emitted {
+        let sample = PassSample {
             pass,
             first_of_pass: true,
             last_of_pass: true,
@@ -168,7 +168,7 @@ fn zigzag_passes_are_drawn_to_and_fro() {
     assert!(drawn.contains(&record.middle_pass));
 }
 
-pub(super) const BLANK: Emitted = Emitted {
+pub(super) const BLANK: PassSample = PassSample {
     tick: 0,
     pass: 0,
     u: 0.0,
@@ -254,10 +254,10 @@ fn gaps_are_the_step_over_at_the_widest_place() {
 fn a_run_that_ended_at_once_is_reported_all_the_same() {
     let (job, _, findings) = run(BELL);
     let folder = tempfile::tempdir().unwrap();
-    let nothing = Findings {
+    let nothing = SurveyResult {
         samples: 0,
         passes: 0,
-        report: oracle::Report::default(),
+        report: oracle::AccuracyReport::default(),
         ..findings
     };
     let path = Sketch::new(&job, 0)
@@ -272,13 +272,13 @@ fn a_run_that_ended_at_once_is_reported_all_the_same() {
     assert_well_formed(&page);
     assert!(page.contains("ended before its last pass was complete"));
     let mut sketch = Sketch::new(&job, 9);
-    let sample = Emitted {
+    let sample = PassSample {
         first_of_pass: true,
         u: 0.5,
         v: -0.9,
         ..BLANK
     };
-    sketch.add(&sample, &Checked::default());
+    sketch.add(&sample, &SampleCheck::default());
     let path = sketch
         .write(folder.path(), Path::new(""), &nothing, &Remarks::default())
         .unwrap();

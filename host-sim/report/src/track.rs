@@ -3,7 +3,7 @@
 use serde_json::{Value, json};
 
 use super::embed::{column, words};
-use oracle::{Checked, Emitted};
+use oracle::{PassSample, SampleCheck};
 
 /// Points of all passes, about.
 const POINTS: usize = 60_000;
@@ -149,7 +149,7 @@ impl Track {
         }
     }
 
-    pub(super) fn add(&mut self, sample: &Emitted, checked: &Checked) {
+    pub(super) fn add(&mut self, sample: &PassSample, checked: &SampleCheck) {
         if sample.first_of_pass || self.seen == 0 {
             self.begin_pass(sample);
         }
@@ -176,7 +176,7 @@ impl Track {
         pass.add(point, self.most, self.feed_mm_s);
     }
 
-    fn begin_pass(&mut self, sample: &Emitted) {
+    fn begin_pass(&mut self, sample: &PassSample) {
         self.seen += 1;
         if self.is_drawn {
             self.kept += self.passes.last().map_or(0, |pass| pass.points.len() + 1);

@@ -2,17 +2,17 @@
 
 use serde_json::{Map, Value, json};
 
-use job::{AlongChoice, Job, Trial};
+use job::{AlongChoice, DirectionTrial, Job};
 
 /// The keys `along` and `along_auto`: null where the job file names the direction.
 pub(super) fn json(job: &Job) -> Map<String, Value> {
-    let trial = |trial: &Trial| {
+    let trial = |trial: &DirectionTrial| {
         #[allow(clippy::cast_precision_loss, reason = "below 2^53")]
         let time_s = trial.ticks as f64 * job.machine.period_s();
         json!({
             "ticks": trial.ticks,
-            "machining_time_s": trial.against.is_none().then_some(time_s),
-            "against": trial.against,
+            "machining_time_s": trial.rejection.is_none().then_some(time_s),
+            "against": trial.rejection,
         })
     };
     let auto = match job.origin.along_choice() {
@@ -35,11 +35,11 @@ pub(super) fn sentence(job: &Job) -> String {
         [u, v] if u.along == job.along => (u, v),
         [u, v] => (v, u),
     };
-    if let Some(against) = &other.against {
-        return format!("{chosen}, chosen; along {}: {against}", other.along.name());
+    if let Some(rejection) = &other.rejection {
+        return format!("{chosen}, chosen; along {}: {rejection}", other.along.name());
     }
     #[allow(clippy::cast_precision_loss, reason = "below 2^53")]
-    let minutes = |trial: &Trial| trial.ticks as f64 * job.machine.period_s() / 60.0;
+    let minutes = |trial: &DirectionTrial| trial.ticks as f64 * job.machine.period_s() / 60.0;
     let (least, most) = (minutes(mine), minutes(other));
     let less = 100.0 * (1.0 - least / most.max(f64::MIN_POSITIVE));
     format!(

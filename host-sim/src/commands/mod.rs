@@ -39,7 +39,7 @@ use clap::{CommandFactory, FromArgMatches, Parser, Subcommand};
 use ::approach::ApproachError;
 use inspect::InspectError;
 use job::{AlongChoice, Job};
-use machine::direction::{self, NoDirection};
+use machine::direction::{self, DirectionError};
 use machine::prepare::Prepared;
 
 /// Why a command did not do what it was asked.
@@ -57,11 +57,11 @@ impl From<job::JobError> for Failure {
     }
 }
 
-impl From<NoDirection> for Failure {
-    fn from(error: NoDirection) -> Self {
+impl From<DirectionError> for Failure {
+    fn from(error: DirectionError) -> Self {
         match error {
-            NoDirection::Refused(error) => error.into(),
-            NoDirection::Faults(sentence) => Self::Failed(Some(sentence)),
+            DirectionError::Refused(error) => error.into(),
+            DirectionError::Faults(sentence) => Self::Failed(Some(sentence)),
         }
     }
 }
@@ -227,10 +227,10 @@ fn load(path: &Path) -> Result<(Job, Prepared)> {
 /// Settles the direction of a job where that is `"auto"`, and prepares it.
 fn settled(job: Job) -> Result<(Job, Prepared)> {
     if job.origin.along_choice() != &AlongChoice::Auto {
-        return Ok(direction::settle(job)?);
+        return Ok(direction::choose(job)?);
     }
     let bar = spinner("running along u and along v");
-    let settled = direction::settle(job);
+    let settled = direction::choose(job);
     bar.finish_and_clear();
     Ok(settled?)
 }

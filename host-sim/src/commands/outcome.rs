@@ -9,8 +9,8 @@ use super::out::say;
 use approach::Kind;
 use inspect::FaultAt;
 use job::Job;
-use verify::speeds::Span;
-use verify::survey::Findings;
+use verify::speeds::SpeedRange;
+use verify::survey::SurveyResult;
 
 /// A fault with its place, as JSON.
 fn fault_json(at: &FaultAt) -> Value {
@@ -38,7 +38,7 @@ pub(super) struct Outcome<'a> {
     pub(super) segments: usize,
     /// Bytes of the program; for the product those of its header and surface.
     pub(super) bytes: usize,
-    pub(super) findings: &'a Findings,
+    pub(super) findings: &'a SurveyResult,
     pub(super) digest: u64,
     pub(super) samples_per_second: f64,
     pub(super) fault: Option<FaultAt>,
@@ -53,7 +53,7 @@ fn finite(value: f64) -> Value {
 }
 
 /// Null where there is no sample.
-fn span(span: &Span) -> Value {
+fn span(span: &SpeedRange) -> Value {
     if !span.min.is_finite() {
         return json!({ "min": null, "mean": null, "max": null });
     }

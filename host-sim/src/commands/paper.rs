@@ -9,7 +9,7 @@ use super::out::say;
 use super::{Result, cannot_write, progress};
 use study::paper::{Comparison, Item, Row, STEPS, study};
 use study::report as page;
-use verify::speeds::Span;
+use verify::speeds::SpeedRange;
 
 /// Reproduces Lo's paper (1998): every example, table and figure, printed against ours; four approaches side by side.
 ///
@@ -135,7 +135,7 @@ fn print_comparison(comparison: &Comparison) {
     );
     for row in &comparison.rows {
         let Row { measured, .. } = row;
-        let range = |span: &Span| format!("{:.3}..{:.3}", span.min, span.max);
+        let range = |span: &SpeedRange| format!("{:.3}..{:.3}", span.min, span.max);
         say!(
             "  {:<14} {:>9.2} {:>9} {:>10} {:>10} {:>10} {:>17} {:>17} {:>10.3}",
             row.name(),

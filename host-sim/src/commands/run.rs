@@ -329,7 +329,7 @@ fn typist(arguments: &Arguments, bar: &ProgressBar) -> Option<Typist> {
 fn samples_here(job: &Job, prepared: &Prepared, from: u32, count: u32) -> Result<Vec<Sample>> {
     let mut samples = Vec::new();
     // A fault ends the samples, which is what is compared.
-    let mut machine = Machine::load(prepared).map_err(|fault| inspect::refused(job, fault))?;
+    let mut machine = Machine::load(prepared).map_err(|fault| inspect::load_error(job, fault))?;
     let _fault = machine.run(|sample| {
         if sample.tick >= from {
             samples.push(*sample);

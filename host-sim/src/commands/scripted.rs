@@ -13,7 +13,7 @@ use machine::prepare::Prepared;
 use machine::remote::script::Schedule;
 use machine::remote::{self, Session};
 use machine::script::{self, Played, Script};
-use verify::motion::{Gauge, Peaks, limits};
+use verify::motion::{PeakMeter, Peaks, limits};
 
 /// A script, played on the machine in this process.
 pub(super) struct Scripted {
@@ -48,16 +48,16 @@ pub(super) fn play(
     let script = read(path, prepared)?;
     let mut file = trace(trace_file, job)?;
     let mut written = Ok(());
-    let mut machine = Machine::load(prepared).map_err(|fault| inspect::refused(job, fault))?;
+    let mut machine = Machine::load(prepared).map_err(|fault| inspect::load_error(job, fault))?;
     let has_limits = job.machine.has_limits();
-    let mut gauge = Gauge::new(&job.machine);
+    let mut gauge = PeakMeter::new(&job.machine);
     let (mut ends, mut passes, mut begun) = (Vec::new(), 0, false);
     let played = script::play(
         &mut machine,
         &script,
         |sample, period, moves| {
             if !std::mem::replace(&mut begun, true) {
-                gauge.stand(sample.cl_nm);
+                gauge.start_at_rest(sample.cl_nm);
             }
             gauge.add(period.into(), sample.cl_nm);
             if moves {
@@ -69,7 +69,7 @@ pub(super) fn play(
         },
         |period| ends.push(period),
     );
-    gauge.come_to_stand();
+    gauge.end_at_rest();
     let name = trace_file.cloned().unwrap_or_default();
     written
         .and_then(|()| file.map_or(Ok(()), verify::trace::Trace::finish))

@@ -8,9 +8,9 @@ use inspect::{BOUNDS, InspectError, TimedRun};
 use job::Job;
 use machine::prepare::Prepared;
 use machine::travel;
-use oracle::{Checked, Emitted};
+use oracle::{PassSample, SampleCheck};
 use report::{Remarks, Sketch};
-use verify::survey::{Each, Findings};
+use verify::survey::{SampleObserver, SurveyResult};
 
 use super::outcome::Outcome;
 use super::{Bar, Failure, Result, approach, cannot_write, load, scripted, trace, warn_of_limits};
@@ -45,7 +45,7 @@ pub(super) struct Arguments {
 /// Runs the core alone.
 pub(super) fn timed(job: &Job, prepared: &Prepared) -> Result<TimedRun> {
     let bar = Bar::new();
-    let timed = inspect::timed(job, prepared, &bar);
+    let timed = inspect::time_run(job, prepared, &bar);
     bar.clear();
     Ok(timed?)
 }
@@ -58,14 +58,14 @@ pub(super) fn surveyed(
     timed: &TimedRun,
     trace_file: Option<&PathBuf>,
     sketched: bool,
-) -> Result<(Findings, Option<Sketch>)> {
+) -> Result<(SurveyResult, Option<Sketch>)> {
     let mut sketch = sketched.then(|| Sketch::new(job, timed.passes.len()));
     let mut draw = sketch
         .as_mut()
-        .map(|sketch| |emitted: &Emitted, checked: &Checked| sketch.add(emitted, checked));
-    let each = draw.as_mut().map(|draw| draw as &mut Each<'_>);
+        .map(|sketch| |emitted: &PassSample, checked: &SampleCheck| sketch.add(emitted, checked));
+    let each = draw.as_mut().map(|draw| draw as &mut SampleObserver<'_>);
     let bar = Bar::new();
-    let findings = inspect::surveyed(job, prepared, timed.samples, trace(trace_file, job)?, each, &bar);
+    let findings = inspect::survey_run(job, prepared, timed.samples, trace(trace_file, job)?, each, &bar);
     bar.clear();
     let findings = findings.map_err(|error| match (error, trace_file) {
         (InspectError::Trace(error), Some(path)) => cannot_write(path, &error),
@@ -75,7 +75,7 @@ pub(super) fn surveyed(
 }
 
 /// What a report says besides the samples: the fault, figures out of their bounds, limits that are not held.
-pub(super) fn remarks(timed: &TimedRun, findings: &Findings) -> Remarks {
+pub(super) fn remarks(timed: &TimedRun, findings: &SurveyResult) -> Remarks {
     let failures = match &timed.fault {
         Some(fault) => vec![fault.sentence()],
         None => findings.report.failures(&BOUNDS),
@@ -91,7 +91,7 @@ pub(super) fn report(
     job: &Job,
     directory: Option<&Path>,
     sketch: Option<&Sketch>,
-    findings: &Findings,
+    findings: &SurveyResult,
     remarks: &Remarks,
 ) -> Result<Option<PathBuf>> {
     let write = |(directory, sketch): (&Path, &Sketch)| {

@@ -8,7 +8,7 @@ use job::Job;
 use machine::prepare::Prepared;
 use verify::motion::limits::{ORDERS, Peaks, TOLERANCES};
 use verify::survey;
-use verify::swept::{Findings, Hollow};
+use verify::swept::{ConcaveRadius, SweptResult};
 
 /// Bytes of surface data that the board holds.
 const STORE_BYTES: usize = STORE_WORDS * size_of::<i32>();
@@ -27,23 +27,23 @@ fn time_s(job: &Job, samples: u64) -> f64 {
 pub(super) fn json(
     job: &Job,
     prepared: &Prepared,
-    survey: &survey::Findings,
-    found: &Findings,
+    survey: &survey::SurveyResult,
+    found: &SweptResult,
     axes: &Peaks,
 ) -> Map<String, Value> {
     let report = &survey.report;
     let measured = !found.ridges.is_empty();
     let null_unless = |known: bool, value: Value| if known { value } else { Value::Null };
-    let (most, error) = (&found.scallop_max, &found.measuring_error);
+    let (most, error) = (&found.scallop_max, &found.measurement_error);
     let gouge = found.gouge.map(|gouge| {
         json!({
-            "depth_mm": gouge.depth_mm, "u": gouge.u, "v": gouge.v, "place_mm": gouge.place_mm, "tick": gouge.tick,
+            "depth_mm": gouge.depth_mm, "u": gouge.u, "v": gouge.v, "place_mm": gouge.point_mm, "tick": gouge.tick,
             "pass": gouge.pass, "contact_u": gouge.contact[0], "contact_v": gouge.contact[1],
             "kind": if gouge.local { "local" } else { "global" },
         })
     });
-    let hollow = found.shape.hollow.map(|hollow| {
-        json!({ "radius_mm": hollow.radius_mm, "u": hollow.u, "v": hollow.v, "place_mm": hollow.place_mm })
+    let hollow = found.shape.concave_radius.map(|hollow| {
+        json!({ "radius_mm": hollow.radius_mm, "u": hollow.u, "v": hollow.v, "place_mm": hollow.point_mm })
     });
     let value = json!({
         "position_error_max_nm": report.position_nm.max.abs(),
@@ -57,11 +57,11 @@ pub(super) fn json(
         "scallop_limit_mm": job.scallop_mm,
         "scallop_max_mm": null_unless(measured, json!(most.height_mm)),
         "scallop_mean_mm": null_unless(measured, json!(found.scallop_mean_mm)),
-        "scallop_error_mm": found.measuring_error_mm,
+        "scallop_error_mm": found.measurement_error_mm,
         "scallop_error": {
             "path_mm": error.path_mm, "rounding_mm": error.rounding_mm, "stations_mm": error.stations_mm, "search_mm": error.search_mm,
         },
-        "scallop_at": null_unless(measured, json!({ "u": most.u, "v": most.v, "gap": most.gap, "place_mm": most.place_mm })),
+        "scallop_at": null_unless(measured, json!({ "u": most.u, "v": most.v, "gap": most.gap, "place_mm": most.point_mm })),
         "scallop_area_by_tenth": found.scallop_histogram,
         "gouge_max_mm": found.gouge_max_mm(),
         "gouge_floor_mm": found.gouge_floor_mm,
@@ -113,8 +113,8 @@ fn um(mm: f64) -> f64 {
 pub(super) fn print(
     job: &Job,
     prepared: &Prepared,
-    survey: &survey::Findings,
-    found: &Findings,
+    survey: &survey::SurveyResult,
+    found: &SweptResult,
     axes: &Peaks,
 ) {
     scallop(job, found);
@@ -138,10 +138,10 @@ pub(super) fn print(
     travel(job, found);
     peaks(axes);
     let shape = &found.shape;
-    let hollow = shape.hollow.map_or_else(
+    let hollow = shape.concave_radius.map_or_else(
         || "none: nowhere hollow".to_owned(),
         |hollow| {
-            let Hollow { radius_mm, u, v, .. } = hollow;
+            let ConcaveRadius { radius_mm, u, v, .. } = hollow;
             format!("{radius_mm:.4} mm at u = {u:.6}, v = {v:.6}")
         },
     );
@@ -167,19 +167,19 @@ pub(super) fn print(
     );
 }
 
-fn scallop(job: &Job, found: &Findings) {
+fn scallop(job: &Job, found: &SweptResult) {
     if found.ridges.is_empty() {
         row("scallop height", "not measured: fewer than two whole passes");
         return;
     }
-    let (most, error) = (&found.scallop_max, &found.measuring_error);
-    let good = most.height_mm <= job.scallop_mm + found.measuring_error_mm;
+    let (most, error) = (&found.scallop_max, &found.measurement_error);
+    let good = most.height_mm <= job.scallop_mm + found.measurement_error_mm;
     say!(
         "  {} {:<22} {:.4} um +- {:.4}, limit {} (max / limit {:.4}), between passes {} and {}, u = {:.6}, v = {:.6}",
         if good { "ok  " } else { "FAIL" },
         "scallop height",
         um(most.height_mm),
-        um(found.measuring_error_mm),
+        um(found.measurement_error_mm),
         um(job.scallop_mm),
         most.height_mm / job.scallop_mm,
         most.gap,
@@ -213,7 +213,7 @@ fn ratio(part: usize, whole: usize) -> f64 {
     part as f64 / whole as f64
 }
 
-fn travel(job: &Job, found: &Findings) {
+fn travel(job: &Job, found: &SweptResult) {
     let axes = &found.axes;
     if let Some([x, y, z]) = axes.extent_mm {
         let given = match (job.machine.travel_mm, axes.within_travel()) {

@@ -3,13 +3,13 @@
 use std::path::PathBuf;
 
 use clap::Args;
-use inspect::{BOUNDS, Measured, Verification, verified};
+use inspect::{BOUNDS, RunMeasurements, Verification, verify_run};
 use job::{Job, Spacing};
 use machine::prepare::Prepared;
-use oracle::{Checked, Emitted, Figure};
+use oracle::{ErrorStatistics, PassSample, SampleCheck};
 use report::{Remarks, RidgePlace, Scallops, Sketch};
 use serde_json::Value;
-use verify::survey::{Each, Findings};
+use verify::survey::{SampleObserver, SurveyResult};
 use verify::swept;
 
 use super::out::say;
@@ -39,7 +39,7 @@ pub(super) struct Arguments {
     pub(super) json: bool,
 }
 
-fn line(name: &str, figure: &Figure, bound: f64, unit: &str) {
+fn line(name: &str, figure: &ErrorStatistics, bound: f64, unit: &str) {
     let verdict = if figure.max.abs() <= bound { "ok  " } else { "FAIL" };
     let at = figure.at;
     say!(
@@ -52,7 +52,7 @@ fn line(name: &str, figure: &Figure, bound: f64, unit: &str) {
     );
 }
 
-fn print(findings: &Findings, scanned: Option<usize>, first_order: bool) {
+fn print(findings: &SurveyResult, scanned: Option<usize>, first_order: bool) {
     let report = &findings.report;
     line("cutter location", &report.position_nm, BOUNDS.position_nm, "nm");
     line("cutter contact", &report.contact_nm, BOUNDS.contact_nm, "nm");
@@ -78,23 +78,23 @@ fn print(findings: &Findings, scanned: Option<usize>, first_order: bool) {
 }
 
 /// The measured heights as the report shows them.
-fn scallops(job: &Job, swept: &swept::Findings) -> Scallops {
-    let place = |spot: &swept::RidgeSpot| RidgePlace {
+fn scallops(job: &Job, swept: &swept::SweptResult) -> Scallops {
+    let place = |spot: &swept::RidgePoint| RidgePlace {
         u: spot.u,
         v: spot.v,
         height_mm: spot.height_mm,
     };
-    let ridge = |ridge: &swept::Ridge| (ridge.gap, ridge.spots.iter().map(place).collect());
+    let ridge = |ridge: &swept::Ridge| (ridge.gap, ridge.points.iter().map(place).collect());
     Scallops {
         limit_mm: job.scallop_mm,
-        measuring_error_mm: swept.measuring_error_mm,
+        measurement_error_mm: swept.measurement_error_mm,
         ridges: swept.ridges.iter().map(ridge).collect(),
     }
 }
 
 /// The keys of `verify`.
 fn json(job: &Job, prepared: &Prepared, found: &Verification) -> Value {
-    let Measured {
+    let RunMeasurements {
         findings,
         swept,
         axes,
@@ -111,7 +111,7 @@ fn json(job: &Job, prepared: &Prepared, found: &Verification) -> Value {
 
 /// The same for a person.
 fn print_verification(job: &Job, prepared: &Prepared, found: &Verification) {
-    let Measured {
+    let RunMeasurements {
         findings,
         swept,
         axes,
@@ -139,13 +139,13 @@ pub(super) fn command(arguments: &Arguments) -> Result<()> {
     let mut sketch = directory.map(|_| Sketch::new(&job, timed.passes.len()));
     let mut draw = sketch
         .as_mut()
-        .map(|sketch| |emitted: &Emitted, checked: &Checked| sketch.add(emitted, checked));
-    let each = draw.as_mut().map(|draw| draw as &mut Each<'_>);
+        .map(|sketch| |emitted: &PassSample, checked: &SampleCheck| sketch.add(emitted, checked));
+    let each = draw.as_mut().map(|draw| draw as &mut SampleObserver<'_>);
     let bar = Bar::new();
-    let found = verified(&job, &prepared, &timed, each, with_optimum, &bar);
+    let found = verify_run(&job, &prepared, &timed, each, with_optimum, &bar);
     bar.clear();
     let found = found?;
-    let Measured { findings, swept, .. } = &found.measured;
+    let RunMeasurements { findings, swept, .. } = &found.measured;
     let mut remarks = Remarks {
         failures: found.failures.clone(),
         verified: true,

@@ -47,7 +47,7 @@ pub fn job(kind: Kind, name: &str) -> String {
 mod tests {
     use super::*;
     use machine::Machine;
-    use machine::direction::settle;
+    use machine::direction;
     use machine::prepare::configuration;
 
     /// Every job that needs no other file loads and runs to its end.
@@ -61,7 +61,7 @@ mod tests {
                 assert!((8..=10).contains(&line), "line {line}");
                 continue;
             }
-            let (job, prepared) = settle(job.unwrap()).unwrap();
+            let (job, prepared) = direction::choose(job.unwrap()).unwrap();
             let mut samples = 0;
             Machine::load(&prepared)
                 .unwrap()
@@ -143,7 +143,7 @@ mod tests {
             .split("```")
             .next()
             .unwrap();
-        let (job, prepared) = settle(job_file::parse("axes.toml", text).unwrap()).unwrap();
+        let (job, prepared) = direction::choose(job_file::parse("axes.toml", text).unwrap()).unwrap();
         let mut last = [0; 3];
         Machine::load(&prepared)
             .unwrap()

@@ -1,10 +1,10 @@
-//! Measures and judges what a machine emitted, by the oracle alone: nothing here depends on the core or on what was prepared for it.
+//! Measures and checks emitted samples with the oracle alone: no dependency on the core or on the data prepared for it.
 //!
 //! ```text
 //! samples ──survey──► errors, feed ripple, schedule      speeds   contact and centre
 //!    │                                                   trace    every sample as CSV
 //!    ├──────swept───► scallop height, gouges
-//!    └──────motion──► use of the axes' limits, time against the optimum
+//!    └──────motion──► use of the axis limits, time against the optimum
 //! ```
 #![cfg_attr(
     test,
@@ -23,4 +23,4 @@ pub mod survey;
 pub mod swept;
 pub mod trace;
 
-pub use sample::Sample;
+pub use sample::EmittedSample;

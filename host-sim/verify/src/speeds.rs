@@ -1,25 +1,25 @@
-//! Speeds of contact and centre, period by period, of any approach: one yardstick for all.
+//! Speeds of contact and centre, period by period, measured the same way for every approach.
 
-use oracle::Emitted;
+use oracle::PassSample;
 use oracle::vector::{length, subtract};
 
 /// Mean speeds over one period.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Speed {
+pub struct PeriodSpeed {
     /// Time at the period's end since the pass began, s.
     pub time_s: f64,
     /// Length of the contact's path since the pass began, at the period's middle, mm.
     pub arc_mm: f64,
-    /// Of the contact along the surface, mm/s.
+    /// Speed of the contact along the surface, mm/s.
     pub cc_mm_s: f64,
-    /// Of the tool centre, mm/s.
+    /// Speed of the tool centre, mm/s.
     pub cl_mm_s: f64,
 }
 
-/// Least, mean and largest speed over whole periods, mm/s.
+/// Least, mean and largest speed over complete periods, mm/s.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Span {
-    /// Least; infinite where there was no whole period.
+pub struct SpeedRange {
+    /// Least; infinite without complete periods.
     pub min: f64,
     /// Largest.
     pub max: f64,
@@ -27,7 +27,7 @@ pub struct Span {
     periods: f64,
 }
 
-impl Default for Span {
+impl Default for SpeedRange {
     fn default() -> Self {
         Self {
             min: f64::INFINITY,
@@ -38,7 +38,7 @@ impl Default for Span {
     }
 }
 
-impl Span {
+impl SpeedRange {
     fn add(&mut self, speed: f64) {
         self.min = self.min.min(speed);
         self.max = self.max.max(speed);
@@ -46,32 +46,32 @@ impl Span {
         self.periods += 1.0;
     }
 
-    /// Mean over time; 0 where there was no whole period.
+    /// Mean over time; 0 without complete periods.
     #[must_use]
     pub fn mean(&self) -> f64 {
         self.sum / self.periods.max(1.0)
     }
 }
 
-/// What the speeds of a run came to. The last period of each pass, which is cut short, is left out of the speeds.
+/// Speeds of a run. The last period of each pass is incomplete and is left out of the speeds.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct SpeedFigures {
-    /// Of the contact along the surface.
-    pub cc: Span,
-    /// Of the tool centre.
-    pub cl: Span,
+    /// Speed of the contact along the surface.
+    pub cc: SpeedRange,
+    /// Speed of the tool centre.
+    pub cl: SpeedRange,
     /// Largest change of the centre's speed from one period to the next, mm/s.
     pub cl_change_mm_s: f64,
-    /// Largest step of the commanded speed of the centre, mm/s: from segment to segment, for the product from patch to
-    /// patch. Between such places it is continuous.
+    /// Largest step of the commanded speed of the centre, mm/s: from segment to segment; for the core from patch to
+    /// patch. The commanded speed is continuous elsewhere.
     pub cl_step_mm_s: f64,
     /// Length of the tool centre's path within the passes, mm.
     pub cl_length_mm: f64,
 }
 
-/// Follows a run sample by sample.
+/// Accumulates the speeds of a run, sample by sample.
 #[derive(Clone, Debug)]
-pub struct Speeds {
+pub struct SpeedRecorder {
     period_s: f64,
     figures: SpeedFigures,
     before_mm: [f64; 3],
@@ -80,8 +80,8 @@ pub struct Speeds {
     last: Option<f64>,
 }
 
-impl Speeds {
-    /// A follower of a run with this period.
+impl SpeedRecorder {
+    /// A recorder for a run with this period.
     #[must_use]
     pub fn new(period_s: f64) -> Self {
         Self {
@@ -94,9 +94,9 @@ impl Speeds {
         }
     }
 
-    /// The next sample: with the contact's way since the one before, if that is of the same pass, and the centre. The
-    /// speeds over the period that it ends.
-    pub fn add(&mut self, sample: &Emitted, arc_mm: Option<f64>, cl_mm: [f64; 3]) -> Option<Speed> {
+    /// Adds the next sample. `arc_mm`: arc length of the contact since the previous sample of the same pass; `cl_mm`: the centre.
+    /// Returns the speeds over the period that ends at this sample.
+    pub fn add(&mut self, sample: &PassSample, arc_mm: Option<f64>, cl_mm: [f64; 3]) -> Option<PeriodSpeed> {
         let way_mm = length(subtract(cl_mm, self.before_mm));
         self.before_mm = cl_mm;
         let Some(arc_mm) = arc_mm else {
@@ -106,7 +106,7 @@ impl Speeds {
         self.figures.cl_length_mm += way_mm;
         self.time_s += self.period_s;
         self.arc_mm += arc_mm;
-        let speed = Speed {
+        let speed = PeriodSpeed {
             time_s: self.time_s,
             arc_mm: self.arc_mm - 0.5 * arc_mm,
             cc_mm_s: arc_mm / self.period_s,
@@ -124,7 +124,7 @@ impl Speeds {
         Some(speed)
     }
 
-    /// The figures, with the largest step of the commanded speed.
+    /// The speeds, with the largest step of the commanded speed.
     #[must_use]
     pub fn finish(self, cl_step_mm_s: f64) -> SpeedFigures {
         SpeedFigures {

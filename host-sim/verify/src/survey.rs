@@ -1,56 +1,56 @@
-//! Follows a stream of samples: counts, measures against the oracle, writes the trace.
+//! Processes a stream of samples: counts, errors against the oracle, the trace.
 
-use crate::Sample;
-use crate::speeds::{SpeedFigures, Speeds};
+use crate::EmittedSample;
+use crate::speeds::{SpeedFigures, SpeedRecorder};
 use crate::trace::Trace;
-use oracle::{Checked, Emitted, Oracle, Report, Verifier};
+use oracle::{AccuracyReport, Oracle, PassSample, SampleCheck, Verifier};
 
 const MM_PER_NM: f64 = 1e-6;
 
-/// What a run came to.
+/// Result of the survey of a run.
 #[derive(Clone, Debug)]
-pub struct Findings {
-    /// Samples, which is also the periods that the run took.
+pub struct SurveyResult {
+    /// Number of samples, and of periods of the run.
     pub samples: u64,
-    /// Passes.
+    /// Number of passes.
     pub passes: u32,
-    /// Speeds of contact and centre, and the centre's length.
+    /// Speeds of contact and centre, and the length of the centre's path.
     pub speeds: SpeedFigures,
-    /// Least candidate of the path interval, in units of the side parameter; infinite where there was none.
+    /// Least candidate of the path interval, in units of the side parameter; infinite without candidates.
     pub interval_min: f64,
-    /// What the oracle found.
-    pub report: Report,
+    /// Errors against the oracle.
+    pub report: AccuracyReport,
 }
 
-/// A sample that waits for the next one, which tells whether it is the last of its pass.
+/// A sample held back until the next one shows whether it is the last of its pass.
 #[derive(Clone, Copy)]
-struct Pending {
-    sample: Sample,
+struct PendingSample {
+    sample: EmittedSample,
     first: bool,
 }
 
-/// What wants every sample of a run, with what its check found.
-pub type Each<'a> = dyn FnMut(&Emitted, &Checked) + 'a;
+/// Callback for every sample on a pass, with its errors.
+pub type SampleObserver<'a> = dyn FnMut(&PassSample, &SampleCheck) + 'a;
 
-/// The follower of one run.
+/// The survey of one run.
 pub struct Survey<'a> {
     verifier: Verifier,
     trace: Option<Trace>,
-    each: Option<&'a mut Each<'a>>,
-    pending: Option<Pending>,
+    each: Option<&'a mut SampleObserver<'a>>,
+    pending: Option<PendingSample>,
     samples: u64,
     oracle: Oracle,
-    speeds: Speeds,
+    speeds: SpeedRecorder,
     ratio_step: f64,
     feed_mm_s: f64,
     interval_min: f64,
 }
 
 impl<'a> Survey<'a> {
-    /// A follower of a run of this job; it writes the trace, if there is one, and hands every sample on to `each`, with
-    /// what its check found.
+    /// A survey of a run of this job. It writes the trace, if there is one, and calls `each` for every sample on a pass, with
+    /// its errors.
     #[must_use]
-    pub fn new(oracle: &Oracle, trace: Option<Trace>, each: Option<&'a mut Each<'a>>) -> Self {
+    pub fn new(oracle: &Oracle, trace: Option<Trace>, each: Option<&'a mut SampleObserver<'a>>) -> Self {
         Self {
             verifier: Verifier::new(oracle),
             trace,
@@ -58,23 +58,23 @@ impl<'a> Survey<'a> {
             pending: None,
             samples: 0,
             oracle: oracle.clone(),
-            speeds: Speeds::new(oracle.period_s),
+            speeds: SpeedRecorder::new(oracle.period_s),
             ratio_step: 0.0,
             feed_mm_s: 0.0,
             interval_min: f64::INFINITY,
         }
     }
 
-    /// The next sample of the run.
+    /// Adds the next sample of the run.
     ///
     /// # Errors
     /// The trace cannot be written.
-    pub fn add(&mut self, sample: &Sample) -> std::io::Result<()> {
+    pub fn add(&mut self, sample: &EmittedSample) -> std::io::Result<()> {
         self.samples += 1;
         if let Some(trace) = &mut self.trace {
             trace.write(sample)?;
         }
-        let stands = |before: &Pending| {
+        let stands = |before: &PendingSample| {
             before.sample.pass == sample.pass && before.sample.parameters == sample.parameters
         };
         if sample.parameters.is_none() || self.pending.as_ref().is_some_and(stands) {
@@ -89,14 +89,14 @@ impl<'a> Survey<'a> {
             None => true,
         };
         self.interval_min = self.interval_min.min(sample.interval.into());
-        self.pending = Some(Pending {
+        self.pending = Some(PendingSample {
             sample: *sample,
             first,
         });
         Ok(())
     }
 
-    fn emit(&mut self, Pending { sample, first }: Pending, last: bool) {
+    fn emit(&mut self, PendingSample { sample, first }: PendingSample, last: bool) {
         let Some(emitted) = sample.emitted(first, last) else {
             return;
         };
@@ -107,7 +107,7 @@ impl<'a> Survey<'a> {
             sample.cl_nm.map(|nm| f64::from(nm) * MM_PER_NM),
         );
         if first {
-            // A place without a normal is the verifier's to report.
+            // A point without a normal is reported by the verifier.
             let (_, side) = self.oracle.swapped(emitted.u, emitted.v);
             self.ratio_step = self.ratio_step.max(self.oracle.ratio_step(side).unwrap_or(0.0));
             self.feed_mm_s = self.feed_mm_s.max(emitted.feed_mm_s);
@@ -117,11 +117,11 @@ impl<'a> Survey<'a> {
         }
     }
 
-    /// The findings, after the run's last sample; `complete` if the run came to its end.
+    /// The result, after the run's last sample; `complete`: the run reached its end.
     ///
     /// # Errors
     /// The trace cannot be written.
-    pub fn finish(mut self, complete: bool) -> std::io::Result<Findings> {
+    pub fn finish(mut self, complete: bool) -> std::io::Result<SurveyResult> {
         if let Some(pending) = self.pending {
             self.emit(pending, complete);
         }
@@ -129,7 +129,7 @@ impl<'a> Survey<'a> {
             trace.finish()?;
         }
         let report = self.verifier.finish();
-        Ok(Findings {
+        Ok(SurveyResult {
             samples: self.samples,
             passes: self.pending.map_or(0, |pending| pending.sample.pass + 1),
             speeds: self.speeds.finish(self.ratio_step * self.feed_mm_s),

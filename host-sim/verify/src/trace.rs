@@ -1,12 +1,12 @@
-//! The trace of a run: CSV with a header line, a row a sample.
+//! The trace of a run: CSV with a header line, one row per sample.
 
 use std::fs::File;
 use std::io::{self, BufWriter};
 use std::path::Path;
 
-use oracle::Emitted;
+use oracle::PassSample;
 
-use crate::Sample;
+use crate::EmittedSample;
 
 /// Columns of a trace.
 pub const COLUMNS: [&str; 14] = [
@@ -26,12 +26,12 @@ pub const COLUMNS: [&str; 14] = [
     "interval",
 ];
 
-/// What a row says.
+/// Values of a row.
 struct Row {
     tick: u64,
     state: &'static str,
     pass: u32,
-    /// None between passes, where there is no contact either.
+    /// `None` between passes, where there is no contact.
     parameters: Option<[f64; 2]>,
     feed_mm_s: String,
     cc_nm: [i32; 3],
@@ -39,7 +39,7 @@ struct Row {
     interval: Option<String>,
 }
 
-/// A trace that is being written.
+/// A trace file under construction.
 pub struct Trace {
     writer: csv::Writer<BufWriter<File>>,
     period_us: f64,
@@ -60,7 +60,7 @@ impl Trace {
     ///
     /// # Errors
     /// The file cannot be written.
-    pub fn write(&mut self, sample: &Sample) -> io::Result<()> {
+    pub fn write(&mut self, sample: &EmittedSample) -> io::Result<()> {
         self.row(&Row {
             tick: sample.tick,
             state: sample.state,
@@ -73,11 +73,11 @@ impl Trace {
         })
     }
 
-    /// Writes the row of a sample that another approach than the core emitted.
+    /// Writes the row of a sample that an approach other than the core emitted.
     ///
     /// # Errors
     /// The file cannot be written.
-    pub fn write_emitted(&mut self, emitted: &Emitted) -> io::Result<()> {
+    pub fn write_emitted(&mut self, emitted: &PassSample) -> io::Result<()> {
         self.row(&Row {
             tick: emitted.tick,
             state: "running",
@@ -121,7 +121,7 @@ impl Trace {
         Ok(())
     }
 
-    /// Writes what is left.
+    /// Flushes the file.
     ///
     /// # Errors
     /// The file cannot be written.
@@ -135,7 +135,7 @@ fn digits(value: f64) -> String {
     format!("{value:.16e}")
 }
 
-/// An interval's digits, where there is one.
+/// An interval in decimals; `None` if it is infinite.
 fn finite(interval: impl Into<f64> + Copy + ToString) -> Option<String> {
     interval.into().is_finite().then(|| interval.to_string())
 }

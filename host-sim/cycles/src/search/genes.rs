@@ -2,7 +2,7 @@
 
 use fastrand::Rng;
 
-use job::{Along, AxisLimits, Job, Machine, NurbsSpec, Pattern, Side, Spacing, SurfaceSpec};
+use job::{Along, AxisLimits, Job, MachineSpec, NurbsSpec, Pattern, Side, Spacing, SurfaceSpec};
 
 /// Numbers of a job.
 const GENES: usize = 21;
@@ -179,22 +179,22 @@ impl Genes {
             machine: if limits {
                 self.machine()
             } else {
-                Machine::default()
+                MachineSpec::default()
             },
             origin: job::Origin::default(),
         }
     }
 
     /// A machine with limits: those of the fastest reach their velocity within some periods, those of the slowest never.
-    fn machine(&self) -> Machine {
+    fn machine(&self) -> MachineSpec {
         let axes = |most: f64| [most, most, 0.5 * most];
-        Machine {
+        MachineSpec {
             limits: Some(AxisLimits {
                 velocity_mm_s: axes(self.log(Gene::Velocity, 10.0, 1000.0)),
                 acceleration_mm_s2: axes(self.log(Gene::Acceleration, 100.0, 20_000.0)),
                 jerk_mm_s3: axes(self.log(Gene::Jerk, 1e3, 1e6)),
             }),
-            ..Machine::default()
+            ..MachineSpec::default()
         }
     }
 

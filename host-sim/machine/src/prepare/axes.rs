@@ -1,4 +1,4 @@
-//! What a job says of the machine's axes, as the core takes it.
+//! The axis limits of a job, in the core's form.
 
 use interp_core::AxisLimits;
 use job::{Job, JobError};
@@ -8,7 +8,7 @@ use super::geometry;
 
 const NM_PER_MM: f64 = 1e6;
 
-/// What the axes can do, of a job that names a limit.
+/// Limits, travel and home of the axes; `None` for a job without limits.
 ///
 /// # Errors
 /// A place outside the travel, with the key that names it.
@@ -23,7 +23,7 @@ pub(super) fn axes(job: &Job, tool_sign: f64) -> Result<Option<AxisLimits>, JobE
         .unwrap_or(top + job.radius_mm + machine.clearance_mm);
     let home_mm = match machine.home_mm {
         Some(home_mm) => home_mm,
-        // Above the start, where there is one.
+        // Above the start of the first pass, where the surface has a normal.
         None => {
             let [x, y, _] = geometry::first_centre_mm(job, tool_sign).unwrap_or_default();
             [x, y, safe_z_mm]
@@ -44,12 +44,12 @@ pub(super) fn axes(job: &Job, tool_sign: f64) -> Result<Option<AxisLimits>, JobE
                 "machine.travel_mm"
             },
             what,
-            "move the part down with [placement], or give a lower `safe_z_mm` that is still above all of it",
+            "move the part down with [placement], or give a lower `safe_z_mm` above the whole part",
         ));
     }
     for ((axis, place), [least, most]) in ["x", "y", "z"].iter().zip(home_nm).zip(travel_nm) {
         if !(least..=most).contains(&place) {
-            let what = format!("the run's first place is outside the travel of {axis}");
+            let what = format!("the run's first position is outside the travel of {axis}");
             return Err(job.origin.error(
                 if machine.home_mm.is_some() {
                     "machine.home_mm"
@@ -76,7 +76,7 @@ pub(super) fn axes(job: &Job, tool_sign: f64) -> Result<Option<AxisLimits>, JobE
     }))
 }
 
-/// The nearest whole nanometre that the machine can express.
+/// The nearest nanometre in the core's range.
 #[allow(clippy::cast_possible_truncation, reason = "the cast saturates")]
 fn nanometres(mm: f64) -> i32 {
     (mm * NM_PER_MM).round() as i32

@@ -1,20 +1,20 @@
-//! Geometry that the preparation needs of a surface: the sign of its upper side, and the tool centre over the first contact. Evaluated from
-//! the pieces that become the core's patches, apart from the oracle, which decides both for itself.
+//! Geometry of a surface for the preparation: the sign of its upper side, and the tool centre over the first contact. Evaluated from
+//! the pieces that become the core's patches, independently of the oracle, which computes both for itself.
 
 use job::{Along, Job, JobError, Side, SurfaceSpec};
 use patches::pieces::{Piece, Source};
 
 type Vector = [f64; 3];
 
-/// Cells a parameter over which the surface's normal is averaged.
+/// Cells per parameter for the average of the surface's normal.
 const GRID: u32 = 48;
-/// Share of the area's upright part by which one side must outweigh the other, to count as the upper one.
+/// Least |sum of the normal's z|, as a share of the sum of |z|, for a definite upper side.
 const BALANCE_MIN: f64 = 0.1;
-/// Least upright part of the area: below it the surface stands upright everywhere.
+/// Least sum of |z|, as a share of the area: below it the surface is vertical everywhere.
 const UPRIGHT_MIN: f64 = 1e-3;
-/// Distance of the first place beside a pole, as a share of the range: near enough for a parabola, far enough for a normal.
+/// Distance of the first point near a pole, as a share of the range: near enough for a parabola, far enough for a normal.
 const POLE_STEP: f64 = 1e-4;
-/// Length of one derivative over that of the other, each times its range, below which it counts as vanished.
+/// Ratio of the derivatives' lengths, each times its range, below which the shorter one counts as zero.
 const POLE_SHARE: f64 = 1e-9;
 
 /// A point and its first derivatives.
@@ -24,8 +24,9 @@ struct Frame {
     v: Vector,
 }
 
-/// A surface that can be evaluated.
-enum Surface {
+/// A surface in a form for evaluation.
+#[allow(clippy::large_enum_variant, reason = "one per job")]
+enum SurfaceEvaluator {
     Pieces { source: Source, breaks: [Vec<f64>; 2] },
     Profile { radius: [f64; 4], height: [f64; 4] },
 }
@@ -58,7 +59,7 @@ fn bicubic(c: &[[f64; 4]; 4], s: f64, t: f64) -> [f64; 3] {
     [value, along, across]
 }
 
-/// The span that holds a parameter.
+/// The span that contains a parameter.
 fn span(breaks: &[f64], at: f64) -> [f64; 2] {
     let index = breaks
         .partition_point(|start| *start <= at)
@@ -66,7 +67,7 @@ fn span(breaks: &[f64], at: f64) -> [f64; 2] {
     [breaks[index - 1], breaks[index]]
 }
 
-impl Surface {
+impl SurfaceEvaluator {
     fn new(spec: &SurfaceSpec) -> Self {
         match spec {
             SurfaceSpec::Revolved {
@@ -102,7 +103,7 @@ impl Surface {
     }
 }
 
-/// A frame within a piece over a rectangle: its parameters run from -1/2 to 1/2.
+/// A frame within a piece over a rectangle: the piece's parameters are from -1/2 to 1/2.
 fn in_piece(piece: &Piece, us: [f64; 2], vs: [f64; 2], [u, v]: [f64; 2]) -> Frame {
     let centred = |[start, end]: [f64; 2], at: f64| (at - start) / (end - start) - 0.5;
     let (s, t) = (centred(us, u), centred(vs, v));
@@ -125,14 +126,14 @@ fn in_piece(piece: &Piece, us: [f64; 2], vs: [f64; 2], [u, v]: [f64; 2]) -> Fram
 /// The sign on `S_u x S_v` that points to the tool.
 ///
 /// # Errors
-/// `side = "up"` for a surface that faces up as much as down, or stands upright.
+/// `side = "up"` for a surface without a definite upper side, or vertical everywhere.
 pub(super) fn tool_sign(job: &Job) -> Result<f64, JobError> {
     match job.side {
         Side::Plus => return Ok(1.0),
         Side::Minus => return Ok(-1.0),
         Side::Up => {}
     }
-    let surface = Surface::new(&job.surface);
+    let surface = SurfaceEvaluator::new(&job.surface);
     let [us, vs] = job.surface.domain();
     let middle = |[start, end]: [f64; 2], index: u32| {
         start + (end - start) * (f64::from(index) + 0.5) / f64::from(GRID)
@@ -159,7 +160,7 @@ pub(super) fn tool_sign(job: &Job) -> Result<f64, JobError> {
 
 /// The tool centre over the first contact of the first pass, mm; `None` where the surface has no normal there.
 pub(super) fn first_centre_mm(job: &Job, sign: f64) -> Option<Vector> {
-    let surface = Surface::new(&job.surface);
+    let surface = SurfaceEvaluator::new(&job.surface);
     let [us, vs] = job.surface.domain();
     let frame = surface.at(us[0], vs[0]);
     let (reach_u, reach_v) = (
@@ -169,7 +170,7 @@ pub(super) fn first_centre_mm(job: &Job, sign: f64) -> Option<Vector> {
     let normal = if reach_u.min(reach_v) > POLE_SHARE * reach_u.max(reach_v) {
         unit(cross(frame.u, frame.v))?
     } else {
-        // The normal beside the pole, continued to it by a parabola.
+        // The normal near the pole, extrapolated to it by a parabola.
         let beside = |k: f64| {
             let step = |[start, end]: [f64; 2]| start + k * POLE_STEP * (end - start);
             let place = if reach_u < reach_v {

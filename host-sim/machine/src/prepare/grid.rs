@@ -1,4 +1,4 @@
-//! The grid of records: pieces in the pass's orientation, split further where a record cannot hold one.
+//! The grid of records: pieces in the pass's orientation, split further where a record cannot represent one.
 
 use std::collections::BTreeSet;
 
@@ -10,30 +10,30 @@ use interp_core::{Header, STORE_WORDS, SurfaceKind};
 use job::{Along, Job, JobError, SurfaceSpec};
 use patches::pieces::{Piece, Source};
 
-use super::{Axis, Prepared, steps, widths};
+use super::{ParameterSpans, Prepared, steps, widths};
 
 pub(super) const REMEDY: &str = "move the part nearer to the origin (±2 m), or cut it into smaller surfaces";
 
-/// Distance within which the poles of a boundary count as one point, mm: 1/1000 of the machine's nanometre.
+/// Distance within which the poles of a boundary count as one point, mm: 1/1000 of the core's resolution.
 const POINT_MM: f64 = 1e-9;
 
-/// Rounds of splitting before it is given up; each halves every patch that a record cannot hold.
+/// Largest number of rounds of splitting; each halves every patch that a record cannot represent.
 const ROUNDS_MAX: usize = 8;
 
-/// Which way a piece has to be split.
+/// Directions in which a piece has to be split.
 struct Split {
     path: bool,
     side: bool,
     why: EncodeError,
 }
 
-/// What the patches of a grid come to.
-struct Grid {
+/// Result of encoding the patches of a grid.
+struct RecordGrid {
     /// The records, path index fastest.
     words: Vec<i32>,
     /// Path and side spans that have to be halved.
     halve: [BTreeSet<usize>; 2],
-    /// Side spans beside which a part of the boundary is a point, but not all of it.
+    /// Side spans at which a part of the boundary degenerates to a point, but not all of it.
     mixed: Option<usize>,
 }
 
@@ -44,13 +44,13 @@ struct Records {
     side: Vec<f64>,
 }
 
-/// Why a surface does not become records.
+/// Reason for which a surface cannot be encoded as records.
 struct NoRecords {
     what: String,
     remedy: &'static str,
 }
 
-/// Splits the surface until each piece fits a record.
+/// Splits the surface until a record can represent each piece.
 fn records(source: &Source, along: Along) -> Result<Records, NoRecords> {
     let no = |what: String, remedy: &'static str| NoRecords { what, remedy };
     let [u, v] = source.breaks();
@@ -59,16 +59,20 @@ fn records(source: &Source, along: Along) -> Result<Records, NoRecords> {
         Along::V => (v, u),
     };
     for _ in 0..ROUNDS_MAX {
-        let grid = grid(source, along, &path, &side)
-            .map_err(|why| no(format!("the machine cannot hold this surface: {why}"), REMEDY))?;
+        let grid = grid(source, along, &path, &side).map_err(|why| {
+            no(
+                format!("the machine cannot represent this surface: {why}"),
+                REMEDY,
+            )
+        })?;
         let [path_spans, side_spans] = &grid.halve;
         if path_spans.is_empty() && side_spans.is_empty() {
             if let Some(span) = grid.mixed {
                 return Err(no(
                     format!(
-                        "beside side span {span} a part of the boundary is a single point, but not all of it"
+                        "at side span {span} a part of the boundary is a single point, but not all of it"
                     ),
-                    "end the surface where the boundary becomes a point, and make two jobs of it",
+                    "split the surface into two jobs where the boundary becomes a point",
                 ));
             }
             return Ok(Records {
@@ -83,7 +87,7 @@ fn records(source: &Source, along: Along) -> Result<Records, NoRecords> {
             break;
         }
     }
-    let what = "the surface does not become patches that the machine can hold";
+    let what = "the surface cannot be split into patches that the machine can represent";
     Err(no(what.to_owned(), REMEDY))
 }
 
@@ -94,18 +98,20 @@ pub(super) fn prepare(job: &Job, header: Header, source: &Source) -> Result<Prep
     finish(job, header, source.rational(), path, side, words)
 }
 
-/// Patches that the machine makes of a surface that is not a turned profile, with passes along u.
+/// Number of patches of a surface that is not revolved, with passes along u.
 ///
 /// # Errors
-/// Why it cannot hold the surface, in a sentence.
+/// A sentence with the reason for which the surface cannot be encoded.
 pub fn patch_count(surface: &SurfaceSpec) -> Result<usize, String> {
     let source = Source::new(surface);
     let Records { words, path, side } = records(&source, Along::U).map_err(|no| no.what)?;
     let (path_spans, side_spans) = (path.len() - 1, side.len() - 1);
     let patches = path_spans * side_spans;
-    // Each span's width is a word, too.
+    // The width of each span is a word, too.
     if words.len() + path_spans + side_spans > STORE_WORDS {
-        return Err(format!("it takes {patches} patches, more than the board holds"));
+        return Err(format!(
+            "the surface takes {patches} patches, more than the board's store"
+        ));
     }
     Ok(patches)
 }
@@ -116,9 +122,9 @@ fn halve(breaks: &mut Vec<f64>, spans: &BTreeSet<usize>) {
     }
 }
 
-/// The records of all patches, and which spans have to be halved instead.
-fn grid(source: &Source, along: Along, path: &[f64], side: &[f64]) -> Result<Grid, EncodeError> {
-    let mut grid = Grid {
+/// The records of all patches, or the spans that have to be halved.
+fn grid(source: &Source, along: Along, path: &[f64], side: &[f64]) -> Result<RecordGrid, EncodeError> {
+    let mut grid = RecordGrid {
         words: Vec::new(),
         halve: [BTreeSet::new(), BTreeSet::new()],
         mixed: None,
@@ -158,7 +164,7 @@ fn transpose(c: &Bicubic) -> Bicubic {
 
 fn record(piece: &Piece, edges: Edges, rational: bool, words: &mut Vec<i32>) -> Result<(), Split> {
     if edges.count() > 1 {
-        // Opposite boundaries are parted by a cut between them.
+        // Opposite boundaries are separated by a cut between them.
         let path = edges.path_start && edges.path_end;
         let side = edges.side_start && edges.side_end;
         let neither = !path && !side;
@@ -193,7 +199,7 @@ fn record(piece: &Piece, edges: Edges, rational: bool, words: &mut Vec<i32>) -> 
     Ok(())
 }
 
-/// Splits the way in which the weights vary more.
+/// Splits the direction in which the weights vary more.
 fn weight_split(piece: &Piece) -> Split {
     let [.., weight] = piece;
     let cubic = |[c0, c1, c2, c3]: [f64; 4], t: f64| c0 + t * (c1 + t * (c2 + t * c3));
@@ -213,7 +219,7 @@ fn weight_split(piece: &Piece) -> Split {
     }
 }
 
-/// Which boundaries of a piece are single points.
+/// The boundaries of a piece that degenerate to points.
 fn collapsed(piece: &Piece) -> Edges {
     let cubic = |[c0, c1, c2, c3]: [f64; 4], t: f64| c0 + t * (c1 + t * (c2 + t * c3));
     let point = |path: f64, side: f64| -> [f64; 3] {
@@ -255,7 +261,7 @@ fn finish(
         side_spans: spans(&side),
         ..header
     };
-    let (path, side) = (Axis { breaks: path }, Axis { breaks: side });
+    let (path, side) = (ParameterSpans { breaks: path }, ParameterSpans { breaks: side });
     let mut words = widths(job, &side)?;
     words.extend(widths(job, &path)?);
     words.extend(records);

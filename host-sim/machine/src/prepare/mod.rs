@@ -1,4 +1,4 @@
-//! From a job file to what the machine loads: header and words. Knots are split and degrees raised exactly, so that every
+//! Converts a job to the data that the machine loads: header and words. Knots are split and degrees elevated exactly, so every
 //! piece is one bicubic patch (rational where the surface is); ranges become patches with centred parameters.
 //!
 //! ```text
@@ -21,13 +21,13 @@ pub use steps::configuration;
 
 /// One parameter of the prepared surface: its spans, in the parameter's own units.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Axis {
+pub struct ParameterSpans {
     /// Ends of the spans, ascending, one more than there are spans.
     pub breaks: Vec<f64>,
 }
 
-impl Axis {
-    /// The parameter at a place, to the last digit of f64; a span's ends exactly.
+impl ParameterSpans {
+    /// The parameter at a place, to f64 precision; exact at a span's ends.
     #[must_use]
     pub fn parameter(&self, place: SpanParameter) -> f64 {
         let span = usize::from(place.span);
@@ -47,20 +47,20 @@ impl Axis {
     }
 }
 
-/// A job as the machine loads it.
+/// A job in the form that the machine loads.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Prepared {
-    /// What is asked.
+    /// The header.
     pub header: Header,
     /// The surface's data.
     pub words: Vec<i32>,
     /// The path parameter.
-    pub path: Axis,
+    pub path: ParameterSpans,
     /// The side parameter.
-    pub side: Axis,
+    pub side: ParameterSpans,
     /// Which of u and v is the path parameter.
     pub along: Along,
-    /// What the axes' drives want, where the job says so.
+    /// Step output, if the job gives one.
     pub steps: Option<StepConfig>,
 }
 
@@ -75,7 +75,7 @@ impl Prepared {
         }
     }
 
-    /// Bytes of the header and of the surface's data, as the machine holds them.
+    /// Size of the header and of the surface's data in the machine's memory, bytes.
     #[must_use]
     pub fn bytes(&self) -> usize {
         size_of_val(&self.header) + size_of_val(self.words.as_slice())
@@ -91,14 +91,14 @@ impl Prepared {
 /// Prepares a job.
 ///
 /// # Errors
-/// What cannot become patches: coordinates out of the machine's range, weights that vary too much, a surface without an
-/// upper side where `side = "up"`, `along = "auto"` that was not settled; with the place in the job file.
+/// The surface cannot be encoded: coordinates out of the core's range, weights that vary too much, a surface without an
+/// upper side where `side = "up"`, `along = "auto"` without a trial; with the location in the job file.
 pub fn prepare(job: &Job) -> Result<Prepared, JobError> {
     if job.origin.along_choice() == &AlongChoice::Auto {
         return Err(job.origin.error(
             "cut.along",
-            "the direction of the passes has not been settled",
-            "say along = \"u\" or \"v\", or have `direction::settle` choose",
+            "the direction of the passes has not been chosen",
+            "write along = \"u\" or \"v\", or call `direction::choose`",
         ));
     }
     let sign = geometry::tool_sign(job)?;
@@ -138,7 +138,7 @@ pub fn prepare(job: &Job) -> Result<Prepared, JobError> {
 }
 
 /// Words of the widths of spans.
-fn widths(job: &Job, axis: &Axis) -> Result<Vec<i32>, JobError> {
+fn widths(job: &Job, axis: &ParameterSpans) -> Result<Vec<i32>, JobError> {
     let spans = axis.breaks.windows(2).map(|ends| ends[1] - ends[0]);
     spans
         .map(|width| {
@@ -159,11 +159,11 @@ fn revolved(
     let record = encode::revolved(&radius, &height, v_rad).map_err(|error| {
         job.origin.error(
             "surface",
-            format!("the machine cannot hold this surface: {error}"),
+            format!("the machine cannot represent this surface: {error}"),
             grid::REMEDY,
         )
     })?;
-    let [profile, angle] = [u, v_rad].map(|range| Axis {
+    let [profile, angle] = [u, v_rad].map(|range| ParameterSpans {
         breaks: range.to_vec(),
     });
     let (kind, path, side) = match job.along {

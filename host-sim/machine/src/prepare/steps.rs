@@ -1,11 +1,11 @@
-//! Step output and supervision of a board, out of the job's machine.
+//! Step output and supervision of a board, from the job's machine.
 
 use interp_core::StepConfig;
 use interp_core::steps::{AxisSteps, PULSE_SLOTS_MAX, SETUP_SLOTS_MAX, SLOTS};
-use job::{HeartbeatAction, Machine};
+use job::{HeartbeatAction, MachineSpec};
 use protocol::message::{Configuration, LinkTimeoutAction};
 
-/// Share of a slot that a rounding of the period may feign.
+/// Tolerance in slots for the rounding of the period.
 const ROUNDING: f64 = 1e-9;
 
 /// A time in slots of the period, rounded up.
@@ -20,8 +20,8 @@ fn slots(time_us: f64, period_us: f64, most: u16) -> u16 {
     slots
 }
 
-/// The core's step configuration; `None` where the job leaves the board's own.
-pub(super) fn config(machine: &Machine) -> Option<StepConfig> {
+/// The core's step configuration; `None` where the job keeps the board's own.
+pub(super) fn config(machine: &MachineSpec) -> Option<StepConfig> {
     let output = machine.step_output?;
     let pulse_slots = slots(output.pulse_us, machine.period_us, PULSE_SLOTS_MAX.into()).max(1);
     Some(StepConfig {
@@ -35,9 +35,9 @@ pub(super) fn config(machine: &Machine) -> Option<StepConfig> {
     })
 }
 
-/// When a run may start on a board, and what a lost heartbeat does to it.
+/// Homing requirement and heartbeat supervision of a board.
 #[must_use]
-pub fn configuration(machine: &Machine) -> Configuration {
+pub fn configuration(machine: &MachineSpec) -> Configuration {
     #[expect(
         clippy::cast_possible_truncation,
         clippy::cast_sign_loss,
@@ -60,12 +60,12 @@ mod tests {
 
     #[test]
     fn the_heartbeat_timeout_is_whole_periods_and_never_shorter() {
-        let machine = Machine {
+        let machine = MachineSpec {
             period_us: 400.0,
             homing_required: false,
             heartbeat_action: HeartbeatAction::Hold,
             heartbeat_timeout_ms: 500.1,
-            ..Machine::default()
+            ..MachineSpec::default()
         };
         let told = configuration(&machine);
         assert_eq!(
@@ -73,10 +73,10 @@ mod tests {
             (false, LinkTimeoutAction::Hold)
         );
         assert_eq!(told.link_timeout_ticks, 1251);
-        assert_eq!(configuration(&Machine::default()).link_timeout_ticks, 1000);
+        assert_eq!(configuration(&MachineSpec::default()).link_timeout_ticks, 1000);
     }
 
-    /// The job file bounds times by the same shares of a period as the core.
+    /// The job file limits times by the same shares of a period as the core.
     #[test]
     fn times_are_slots_and_never_shorter() {
         for period_us in [10.0, 500.0, 1000.0, 100_000.0] {

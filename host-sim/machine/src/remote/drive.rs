@@ -1,4 +1,4 @@
-//! Loads a job into a board, runs it there, and compares with what the core computed here.
+//! Loads a job into a board, runs it there, and compares with the result of the core in this process.
 
 use interp_core::{Sample, State};
 use protocol::digest::job_digest;
@@ -8,31 +8,31 @@ use super::operate::{self, Following, Operator};
 use super::session::{Event, RemoteError, Session};
 use crate::prepare::Prepared;
 
-/// A pass as it was computed here.
+/// A pass as computed in this process.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Expected {
     /// Tick of its first sample.
     pub first_tick: u32,
-    /// Its samples.
+    /// Number of samples.
     pub samples: u32,
-    /// Digest of the run up to its end.
+    /// Digest of the run up to the end of the pass.
     pub digest: u64,
 }
 
-/// What the comparison came to.
+/// Result of the comparison.
 #[derive(Clone, Debug)]
 pub struct Compared {
-    /// The board's last word of the run.
+    /// The board's final status.
     pub status: Status,
-    /// Samples whose digest (or every bit) was compared.
+    /// Number of samples whose digest (or every bit) was compared.
     pub samples: u64,
-    /// Passes that differ, are missing or too many; the first of them.
+    /// Number of passes that differ, are missing or are surplus; the first of them.
     pub first_bad_pass: Option<u32>,
-    /// An operator was at work, so that the run is another than the one expected, and nothing was compared.
+    /// An operator changed the run, so that nothing was compared.
     pub commanded: bool,
 }
 
-/// Uploads a job, and what the axes' drives want where it says so. `progress` is told the words that arrived.
+/// Uploads a job, and its step output if it gives one. `progress` is called with the number of words transferred.
 ///
 /// # Errors
 /// The line breaks, or the board refuses the job.
@@ -62,7 +62,7 @@ pub fn upload(
     session.command(&Request::JobEnd)
 }
 
-/// Starts the loaded job: in lockstep with so many periods, or on the board's own clock.
+/// Starts the loaded job: in lockstep for a number of periods, or on the board's own clock.
 fn start(session: &mut Session, report: Report, lockstep: Option<u32>) -> Result<(), RemoteError> {
     let clock = if lockstep.is_some() {
         Clock::Lockstep
@@ -79,7 +79,7 @@ fn start(session: &mut Session, report: Report, lockstep: Option<u32>) -> Result
     lockstep.map_or(Ok(()), |ticks| session.command(&Request::Run { ticks }))
 }
 
-/// Whether a pass of the board is the one expected in its place.
+/// Whether a pass of the board equals the expected one.
 fn agrees(pass: &PassDigest, expected: &[Expected]) -> bool {
     let here = Expected {
         first_tick: pass.first_tick,
@@ -89,8 +89,8 @@ fn agrees(pass: &PassDigest, expected: &[Expected]) -> bool {
     expected.get(pass.pass as usize) == Some(&here)
 }
 
-/// Runs the loaded job to its end, and compares the digest of every pass. `progress` is told the samples so far. With an operator, on the
-/// board's own clock.
+/// Runs the loaded job to its end, and compares the digest of every pass. `progress` is called with the number of samples so far. With an
+/// operator, on the board's own clock.
 ///
 /// # Errors
 /// The line breaks, or the board refuses to start.
@@ -132,7 +132,7 @@ pub fn run_digests(
     }
 }
 
-/// Runs the loaded job to its end, and hands on every sample. The board's last word, and whether an operator was at work.
+/// Runs the loaded job to its end, and passes on every sample. Returns the board's final status, and whether an operator changed the run.
 ///
 /// # Errors
 /// The line breaks, or the board refuses to start.
@@ -153,8 +153,8 @@ pub fn run_samples(
     }
 }
 
-/// The board's samples of ticks `from..from + count`, by running the loaded job once more in lockstep. Only for a board
-/// without a machine behind it: it moves.
+/// The board's samples of ticks `from..from + count`, by another run of the loaded job in lockstep. Only for a board
+/// without a machine: the axes move.
 ///
 /// # Errors
 /// The line breaks, or the board refuses.

@@ -1,4 +1,4 @@
-//! What an operator asks of a board: drives, home, hold and resume, override.
+//! Commands of an operator to a board: drives, home, hold and resume, override.
 
 use std::time::Duration;
 
@@ -6,23 +6,23 @@ use protocol::message::{Configuration, Request, SafetyStatus, Status};
 
 use super::session::{Event, RemoteError, Session};
 
-/// Frames of the host within the time after which it would count as gone.
+/// Frames of the host per heartbeat timeout.
 const KEEP_ALIVES: u32 = 4;
 
-/// How often a run with an operator is asked for its status where no host counts as gone.
+/// Interval of status requests during a run with an operator, without a heartbeat timeout.
 const ASKED: Duration = Duration::from_secs(2);
 
-/// How a board is made ready for a run.
+/// Setup of a board before a run.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Setup {
-    /// What it is told of the machine.
+    /// Configuration of the machine.
     pub configuration: Configuration,
-    /// Where its axes stand, nm, if that is to be declared.
+    /// Position of the axes to declare as home, nm; `None`: not declared.
     pub home_nm: Option<[i32; 3]>,
 }
 
 impl Setup {
-    /// A board without axes: whatever job it gets, they stand at its home.
+    /// A board without axes: for any job they are at its home.
     #[must_use]
     pub const fn simulated(configuration: Configuration) -> Self {
         Self {
@@ -34,7 +34,7 @@ impl Setup {
         }
     }
 
-    /// A board whose axes stand here, nm.
+    /// A board with its axes at this position, nm.
     #[must_use]
     pub const fn homed(configuration: Configuration, home_nm: [i32; 3]) -> Self {
         Self {
@@ -44,7 +44,7 @@ impl Setup {
     }
 }
 
-/// Configures a board, switches its drives on, and declares home where that is wanted.
+/// Configures a board, enables its drives, and declares home if requested.
 ///
 /// # Errors
 /// The line breaks, or the board refuses: an input is asserted or latched, or a run is under way.
@@ -57,27 +57,27 @@ pub fn make_ready(session: &mut Session, setup: &Setup) -> Result<(), RemoteErro
     Ok(())
 }
 
-/// Who gives commands while a run on the board's own clock is followed.
+/// Source of commands during a run on the board's own clock.
 pub trait Operator {
     /// What is wanted next, if anything is.
     fn wish(&mut self) -> Option<Request>;
 
-    /// Whether there is still somebody, who could resume a run that is held.
+    /// Whether an operator who could resume a held run is still present.
     fn is_there(&self) -> bool;
 
     /// What came of it: how the board was then, or that it refused.
     fn told(&mut self, request: &Request, came: Result<Status, RemoteError>);
 }
 
-/// Follows a run, and hands on what its operator wants.
+/// Follows a run, and forwards the commands of its operator.
 pub(super) struct Following<'a> {
     operator: Option<&'a mut dyn Operator>,
-    /// The board was commanded, so that its samples are not those of a run that nobody touches.
+    /// A command changed the run: its samples differ from those of an undisturbed run.
     pub(super) commanded: bool,
 }
 
 impl<'a> Following<'a> {
-    /// A run that has just been started, on the board's own clock where there is an operator.
+    /// Follows a run that has just been started, on the board's own clock if there is an operator.
     pub(super) fn new(
         session: &mut Session,
         operator: Option<&'a mut dyn Operator>,
@@ -115,7 +115,7 @@ impl<'a> Following<'a> {
     }
 }
 
-/// Lets the session keep a board from taking this host for gone, while it waits for events on the board's own clock.
+/// Sends heartbeats from the session while it waits for events on the board's own clock.
 pub(super) fn keep_alive(session: &mut Session) -> Result<(), RemoteError> {
     let ticks = session.status()?.safety.configuration.link_timeout_ticks;
     let period_us = session.capabilities().description.period_us;
@@ -137,7 +137,7 @@ pub fn act(session: &mut Session, request: &Request) -> Result<Status, RemoteErr
     session.status()
 }
 
-/// The safety state in sentences, what is asserted first.
+/// The safety state in sentences, asserted inputs first.
 #[must_use]
 pub fn sentences(safety: &SafetyStatus) -> Vec<String> {
     let names = |lines: protocol::message::InputLines| lines.names().collect::<Vec<_>>().join(", ");

@@ -13,7 +13,7 @@ impl Stream for Box<dyn serialport::SerialPort> {}
 /// Opens the port.
 ///
 /// # Errors
-/// There is no such port, or it may not be opened.
+/// The port does not exist, or may not be opened.
 pub fn open(name: &str) -> Result<Box<dyn Stream>, RemoteError> {
     let port = serialport::new(name, BAUD)
         .timeout(Duration::from_millis(20))

@@ -11,20 +11,20 @@ use std::time::{Duration, Instant};
 use super::Stream;
 use programs::{Part, Unavailable};
 
-/// Program and machine: the STM32F405 as QEMU has it.
+/// Program and machine: QEMU's model of the STM32F405.
 const PROGRAM: &str = "qemu-system-arm";
 const MACHINE: &str = "netduinoplus2";
 
-/// Deterministic time: 8 ns an instruction, and sleeping costs none.
+/// Deterministic time: 8 ns per instruction, none while sleeping.
 const CLOCK: &str = "shift=3,sleep=off";
 
 /// Time in which QEMU has to open its socket: at once, but a machine may be busy or slow to read the program.
 const START_TIMEOUT: Duration = Duration::from_secs(780);
 
-/// Why QEMU does not run.
+/// Reason for which QEMU does not run.
 #[derive(Debug, thiserror::Error)]
 pub enum QemuError {
-    /// The program is not there.
+    /// The program is missing.
     #[error("{PROGRAM} is not installed; on Debian and Ubuntu: sudo apt-get install qemu-system-arm")]
     Missing,
     /// There is no firmware.
@@ -115,7 +115,7 @@ fn program() -> (Command, Option<Place>) {
     (command, Some(place))
 }
 
-/// The processors that this process may use; none where the system does not say.
+/// The processors available to this process; empty where the system does not report them.
 fn processors() -> Vec<usize> {
     let status = std::fs::read_to_string("/proc/self/status").unwrap_or_default();
     let list = status
@@ -161,7 +161,7 @@ impl Qemu {
         let failed = |error: io::Error| QemuError::Start(error.to_string());
         let folder = tempfile::tempdir().map_err(failed)?;
         let socket = folder.path().join("serial");
-        // The log (defmt frames) comes on stdout, QEMU's own words on stderr.
+        // The log (defmt frames) is on stdout, QEMU's own messages on stderr.
         let log = File::create(folder.path().join("log")).map_err(failed)?;
         let (mut program, place) = program();
         let child = program
@@ -237,7 +237,7 @@ impl Qemu {
         self.end();
         let mut words = String::new();
         if let Some(mut stderr) = self.child.stderr.take() {
-            // What cannot be read is not worth an error of its own.
+            // A read error here is not reported separately.
             let _ = stderr.read_to_string(&mut words);
         }
         words.trim().to_owned()
@@ -250,7 +250,7 @@ impl Qemu {
     }
 
     fn end(&mut self) {
-        // Either it is gone already, or it goes now.
+        // QEMU may have ended already.
         let _ = self.child.kill();
         let _ = self.child.wait();
     }

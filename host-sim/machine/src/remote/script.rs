@@ -1,4 +1,4 @@
-//! A script on a board in lockstep: its commands in exactly the periods that they have on the machine in this process.
+//! A script on a board in lockstep: its commands take effect in exactly the same periods as on the machine in this process.
 
 use interp_core::Command;
 use protocol::message::{Clock, Reason, Report, Request, Status};
@@ -6,17 +6,17 @@ use protocol::message::{Clock, Reason, Report, Request, Status};
 use super::session::{Event, RemoteError, Session};
 use crate::script::{Inputs, Played, Script};
 
-/// When things happen, as the machine in this process found it.
+/// Periods of the events of a script, as recorded in this process.
 #[derive(Clone, Debug)]
 pub struct Schedule {
-    /// Periods with which a run is over: there the board lets time stand still.
+    /// Periods in which a run ends: there the board stops its time.
     pub ends: Vec<u32>,
-    /// Periods altogether.
+    /// Total number of periods.
     pub periods: u32,
 }
 
 impl Schedule {
-    /// That of a script that was played here; `ends` as it was told.
+    /// The schedule of a script executed in this process; `ends` as reported there.
     #[must_use]
     pub fn of(played: &Played, ends: Vec<u32>) -> Self {
         Self {
@@ -25,7 +25,7 @@ impl Schedule {
         }
     }
 
-    /// Periods before which the board has to stand still, ascending, to the last.
+    /// Periods before which the board has to stop, ascending, including the last.
     fn stops(&self, script: &Script) -> Vec<u32> {
         let mut stops: Vec<u32> = script
             .steps()
@@ -53,10 +53,10 @@ fn sent(inputs: Inputs, begins: bool) -> impl Iterator<Item = Request> {
     percent.into_iter().chain(action)
 }
 
-/// Plays a script on a board with the job loaded, and returns its status at the end.
+/// Executes a script on a board with the job loaded, and returns the final status.
 ///
 /// # Errors
-/// The line breaks, or the board refuses. What the state does not allow is refused too, and ignored, as in this process.
+/// The line breaks, or the board refuses. Commands that the state does not allow are refused and ignored, as in this process.
 pub fn play(session: &mut Session, script: &Script, schedule: &Schedule) -> Result<Status, RemoteError> {
     session.command(&Request::Clock(Clock::Lockstep))?;
     session.command(&Request::Report(Report::Digests))?;

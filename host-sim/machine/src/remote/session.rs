@@ -1,4 +1,4 @@
-//! One session with a board: numbered requests with their answers, and events in between.
+//! One session with a board: numbered requests with their replies, and events in between.
 
 use std::collections::VecDeque;
 use std::io::{self, Read, Write};
@@ -10,7 +10,7 @@ use protocol::version::{PROTOCOL_VERSION, VersionMismatch};
 
 use interp_core::{Sample, State};
 
-/// Time after which a request is sent again. An answer takes 0.2 ms in QEMU and a few ms over a serial line; a board that
+/// Time-out of a reply, after which the request is sent again. A reply takes 0.2 ms in QEMU and a few ms over a serial line; a board that
 /// checks a job, or a QEMU that shares its processor, may take longer.
 const ANSWER_TIMEOUT: Duration = Duration::from_millis(1500);
 
@@ -22,7 +22,7 @@ const ANSWER_TIMEOUT_MIN: Duration = Duration::from_millis(40);
 /// Time after which a request is given up.
 const GIVE_UP: Duration = Duration::from_secs(6);
 
-/// Time without any event of a run after which the board counts as gone.
+/// Time-out of the events of a run.
 const SILENCE_TIMEOUT: Duration = Duration::from_secs(20);
 
 /// The same of a process.
@@ -41,19 +41,19 @@ pub trait Stream: Read + Write + Send {
     }
 }
 
-/// What can go wrong between here and the board.
+/// Errors between the host and the board.
 #[derive(Debug, thiserror::Error)]
 pub enum RemoteError {
     /// The line broke.
     #[error("the line to the board broke: {0}")]
     Line(#[from] io::Error),
-    /// No answer.
+    /// No reply.
     #[error("the board does not answer ({0})")]
     Silent(&'static str),
     /// The two ends speak different versions.
     #[error("{0}")]
     Version(VersionMismatch),
-    /// The run that is waited for stands.
+    /// The run stands still while the host waits for its end.
     #[error(
         "the run is held: the board took this host for gone, or another one held it\n  help: cargo sim operate resume, or stop"
     )]
@@ -68,14 +68,14 @@ pub enum RemoteError {
     },
 }
 
-/// What a board sends by itself.
+/// Events that a board sends without a request.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Event {
     /// The next sample, in order.
     Sample(Sample),
     /// A pass is over.
     Pass(PassDigest),
-    /// The ticks of a `Run` are used up, or the run is over.
+    /// The ticks of a `Run` request are used up, or the run is over.
     Halted(Status),
 }
 
@@ -88,10 +88,10 @@ pub struct Session {
     input: Vec<u8>,
     capabilities: Capabilities,
     keep_alive: Option<Duration>,
-    /// A run that stands is waited for.
+    /// Whether to wait for a run that stands still.
     patient: bool,
     asked: Instant,
-    /// When the board last said something of the run.
+    /// Time of the last event of the run.
     heard: Instant,
 }
 
@@ -122,10 +122,10 @@ fn name(request: &Request) -> &'static str {
 }
 
 impl Session {
-    /// Opens a session: says hello, and checks that both ends speak the same version.
+    /// Opens a session with a hello, and checks that both ends use the same version.
     ///
     /// # Errors
-    /// The line breaks, nobody answers, or the versions differ.
+    /// The line breaks, there is no reply, or the versions differ.
     pub fn open(stream: Box<dyn Stream>, number: u32) -> Result<Self, RemoteError> {
         let mut session = Self {
             stream,
@@ -139,7 +139,7 @@ impl Session {
             asked: Instant::now(),
             heard: Instant::now(),
         };
-        // Ends what noise, or a host that went away, may have left half-sent.
+        // Terminates a partial frame left by noise or by an earlier host.
         session.stream.write_all(&[DELIMITER])?;
         let hello = Request::Hello {
             version: PROTOCOL_VERSION,
@@ -158,33 +158,33 @@ impl Session {
         }
     }
 
-    /// What the board said of itself.
+    /// The board's capabilities.
     #[must_use]
     pub fn capabilities(&self) -> &Capabilities {
         &self.capabilities
     }
 
-    /// While [`Self::event`] waits, asks for the status at least this often. What counts as silence begins anew.
+    /// Requests the status at least this often while [`Self::event`] waits. Restarts the time-out of events.
     pub fn set_keep_alive(&mut self, every: Option<Duration>) {
         self.keep_alive = every;
         self.heard = Instant::now();
     }
 
-    /// How often that is.
+    /// Interval of these requests.
     #[must_use]
     pub fn keep_alive(&self) -> Option<Duration> {
         self.keep_alive
     }
 
-    /// Whether [`Self::event`] waits for a run that stands, because there is somebody who can resume it.
+    /// Whether [`Self::event`] waits for a run that stands still, because an operator can resume it.
     pub fn set_patient(&mut self, patient: bool) {
         self.patient = patient;
     }
 
-    /// Sends a request that is answered by an acknowledgement.
+    /// Sends a request that is acknowledged.
     ///
     /// # Errors
-    /// The line breaks, nobody answers, or the board refuses.
+    /// The line breaks, there is no reply, or the board refuses.
     pub fn command(&mut self, request: &Request) -> Result<(), RemoteError> {
         loop {
             match self.ask(request)? {
@@ -202,7 +202,7 @@ impl Session {
         }
     }
 
-    /// Asks for the status.
+    /// Requests the status.
     ///
     /// # Errors
     /// As [`Self::command`].
@@ -217,10 +217,10 @@ impl Session {
         }
     }
 
-    /// The next event; waits for it.
+    /// Waits for the next event.
     ///
     /// # Errors
-    /// The line breaks, or nothing comes for a long time.
+    /// The line breaks, or no event arrives within the time-out.
     pub fn event(&mut self) -> Result<Event, RemoteError> {
         self.heard = Instant::now();
         loop {
@@ -230,10 +230,10 @@ impl Session {
         }
     }
 
-    /// The next event, if there is one within some milliseconds.
+    /// The next event, if one arrives within some milliseconds.
     ///
     /// # Errors
-    /// The line breaks, or there was no event for a long time.
+    /// The line breaks, or no event arrived within the time-out.
     pub fn poll(&mut self) -> Result<Option<Event>, RemoteError> {
         if let Some(event) = self.events.pop_front() {
             self.heard = Instant::now();
@@ -245,7 +245,7 @@ impl Session {
         }
         std::thread::sleep(GATHER);
         let before = self.input.len();
-        // An answer that comes now belongs to a request that was answered before.
+        // A reply at this point belongs to a request that has been answered already.
         self.read_some()?;
         let grew = self.input.len() != before;
         while self.next_reply()?.is_some() {}
@@ -262,7 +262,7 @@ impl Session {
         Ok(None)
     }
 
-    /// Asks how the run is; as long as it goes on, a board that has nothing to tell is not silent.
+    /// Requests the status of the run; while the run continues, a board without events is not silent.
     fn look_after(&mut self) -> Result<(), RemoteError> {
         let state = self.status()?.state;
         if state == State::Held && !self.patient {
@@ -274,7 +274,7 @@ impl Session {
         Ok(())
     }
 
-    /// Sends a request, again if need be, and waits for the answer that carries its number.
+    /// Sends a request, repeatedly if necessary, and waits for the reply with its number.
     fn ask(&mut self, request: &Request) -> Result<Reply, RemoteError> {
         let number = next_number(self.number);
         let mut buffer = [0; FRAME_MAX];
@@ -308,7 +308,7 @@ impl Session {
                             }
                             return Ok(reply);
                         }
-                        // A frame was damaged on its way: send it again at once.
+                        // A frame was damaged in transmission: repeat at once.
                         Some(0) => break,
                         _ => {}
                     },
@@ -327,7 +327,7 @@ impl Session {
         })
     }
 
-    /// Reads what has arrived, or waits a moment.
+    /// Reads the available bytes, or waits a moment.
     fn read_some(&mut self) -> Result<(), RemoteError> {
         let mut bytes = [0; 16_384];
         match self.stream.read(&mut bytes) {
@@ -343,8 +343,8 @@ impl Session {
         }
     }
 
-    /// The next answer among the bytes that were read; events on the way are kept. Damaged frames are passed over: what they
-    /// answered is asked again.
+    /// The next reply among the bytes read; events before it are queued. Damaged frames are skipped: the request
+    /// is repeated.
     fn next_reply(&mut self) -> Result<Option<Reply>, RemoteError> {
         let input = std::mem::take(&mut self.input);
         for (index, &byte) in input.iter().enumerate() {

@@ -1,4 +1,4 @@
-//! What an operator does in a run, period by period, as a text: the same on the machine in this process and behind a line.
+//! A script of operator commands, period by period: the same on the machine in this process and behind a line.
 //!
 //! ```text
 //! # half speed, a pause, on
@@ -9,8 +9,8 @@
 //! ```
 //!
 //! A line is `tick N: ACTION`, ACTION one of `hold`, `resume`, `stop`, `abort`, `start`, `override P` (percent, 0 to 200); `#` begins a
-//! comment. N counts periods from the one that begins the first run, which is 0 and has `start` by itself; it never falls. A period takes one
-//! request, and beside it one override. What the state does not allow is ignored, as on the machine.
+//! comment. N counts periods from the one that begins the first run, which is 0 and starts implicitly; N never decreases. A period takes one
+//! request and one override. A request that the state does not allow is ignored, as on the machine.
 
 mod play;
 
@@ -35,7 +35,7 @@ pub struct Inputs {
     pub override_percent: Option<u8>,
 }
 
-/// What the operator does, period by period, ascending.
+/// Operator inputs, period by period, ascending.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Script {
     steps: Vec<(u32, Inputs)>,
@@ -45,7 +45,7 @@ impl Script {
     /// Reads a script from a file.
     ///
     /// # Errors
-    /// The file cannot be read, or a line is no step, with the line and what to write.
+    /// The file cannot be read, or a line is not a step: with the line and the remedy.
     pub fn load(path: &Path) -> Result<Self, JobError> {
         let name = path.display().to_string();
         let text = std::fs::read_to_string(path).map_err(|cause| {
@@ -58,7 +58,7 @@ impl Script {
         Self::parse(&name, &text)
     }
 
-    /// Reads a script from text; `name` stands for the file in errors.
+    /// Reads a script from text; `name` is the file's name in errors.
     ///
     /// # Errors
     /// As [`Script::load`].
@@ -79,13 +79,13 @@ impl Script {
         Ok(script)
     }
 
-    /// The steps: period, and what is done in it; each period once.
+    /// The steps: period and inputs; each period once.
     #[must_use]
     pub fn steps(&self) -> &[(u32, Inputs)] {
         &self.steps
     }
 
-    /// What is done in a period.
+    /// The inputs of a period.
     #[must_use]
     pub fn at(&self, period: u32) -> Inputs {
         self.steps
@@ -93,7 +93,7 @@ impl Script {
             .map_or_else(|_| Inputs::default(), |place| self.steps[place].1)
     }
 
-    /// Whether it asks for another feed than the programmed one.
+    /// Whether the script sets an override other than 100 %.
     #[must_use]
     pub fn overrides(&self) -> bool {
         let other = |(_, inputs): &(u32, Inputs)| {

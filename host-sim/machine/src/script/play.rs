@@ -6,23 +6,23 @@ use protocol::digest::Digest;
 use super::Script;
 use crate::Machine;
 
-/// What a scripted run came to. Samples and digest are those of the last run that was begun, as on the board.
+/// Result of a scripted run. Samples and digest are those of the last run started, as on the board.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Played {
     /// Digest of the samples in which the tool moved.
     pub digest: u64,
-    /// Their number.
+    /// Number of these samples.
     pub samples: u32,
-    /// Periods that passed from the first start to the end of it all.
+    /// Periods from the first start to the end of the script and of the run.
     pub periods: u32,
-    /// State at the end: held where the script leaves it so.
+    /// Final state: held where the script leaves a run held.
     pub state: State,
-    /// The fault that the machine is in at the end.
+    /// The fault at the end.
     pub fault: Option<Fault>,
 }
 
-/// Plays a script from the machine's start until nothing is left to do: the run is over, or held, and the script too. `each` gets the
-/// sample of every period, and whether the tool moves in it, which is what counts; `ended` each period with which a run is over.
+/// Executes a script from the machine's start until the script is complete and the run is over or held. `each` is called with the
+/// sample of every period and whether the tool moves in it, which counts; `ended` with each period in which a run ends.
 pub fn play(
     machine: &mut Machine,
     script: &Script,

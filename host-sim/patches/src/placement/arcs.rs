@@ -1,16 +1,16 @@
-//! A cubic profile turned about z, as a rational B-spline: cubic along the profile, circular arcs around.
+//! A cubic profile revolved about z, as a rational B-spline: cubic along the profile, circular arcs around the axis.
 
 use std::f64::consts::FRAC_PI_2;
 
 use job::NurbsSpec;
 
-/// How far an angle may exceed whole quarter turns before one more arc is made, as a share of a quarter turn: rounding.
-const QUARTER_SLACK: f64 = 1e-9;
+/// Rounding allowance before one more arc is added, as a share of a quarter turn.
+const QUARTER_TOLERANCE: f64 = 1e-9;
 
-/// The same surface, point set for point set; u is the same parameter. v is the same angle at the ends and in the middle of each arc, and
-/// in between the arc's own parameter, which is off by at most 0.0161 rad (0.92 degrees).
+/// The same point set with the same u. v equals the angle at the ends and in the middle of each arc; in between it is the rational
+/// parameter of the arc, which differs by at most 0.0161 rad (0.92 degrees).
 ///
-/// An arc covers a quarter turn at most (weights 1, cos(half its angle), 1; P&T section 7.3), so that its weights vary by no more than 1.42.
+/// An arc covers at most a quarter turn (weights 1, cos(half its angle), 1; P&T section 7.3), so its weights vary by at most a factor of 1.42.
 pub(super) fn revolved(
     radius_mm: &[f64; 4],
     height_mm: &[f64; 4],
@@ -25,12 +25,12 @@ pub(super) fn revolved(
         clippy::cast_sign_loss,
         reason = "a turn has four quarters"
     )]
-    let arcs = ((extent / FRAC_PI_2 - QUARTER_SLACK).ceil() as usize).max(1);
+    let arcs = ((extent / FRAC_PI_2 - QUARTER_TOLERANCE).ceil() as usize).max(1);
     #[allow(clippy::cast_precision_loss, reason = "a turn has four quarters")]
     let share = |halves: usize| halves as f64 / (2 * arcs) as f64;
     let at = |halves: usize| start * (1.0 - share(halves)) + end * share(halves);
     let weight = (0.5 * (at(2) - at(0))).cos();
-    // Poles around, at every half of an arc: on the circle, or where its tangents meet.
+    // Poles at every half arc: on the circle, or at the intersection of the tangents.
     let around: Vec<(f64, f64, f64)> = (0..=2 * arcs)
         .map(|half| {
             let (sine, cosine) = at(half).sin_cos();
@@ -62,7 +62,7 @@ pub(super) fn revolved(
     }
 }
 
-/// Bezier points over a range of a cubic (highest power first): its polar form at the range's ends.
+/// Bezier poles of a cubic (highest power first) over a range: its polar form at the range's ends.
 fn bezier([c3, c2, c1, c0]: &[f64; 4], [start, end]: [f64; 2]) -> [f64; 4] {
     std::array::from_fn(|k| {
         let at = |i: usize| if i < 3 - k { start } else { end };

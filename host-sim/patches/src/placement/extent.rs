@@ -1,4 +1,4 @@
-//! The box of a surface along x, y and z, by branch and bound.
+//! The bounding box of a surface along x, y and z, by branch and bound.
 
 use interp_core::encode::{Bicubic, substitute};
 
@@ -6,18 +6,18 @@ use job::SurfaceSpec;
 
 use crate::pieces::Source;
 
-/// How closely the box encloses the surface, mm: the machine's nanometre.
+/// Tolerance of the bounding box, mm: 1 nm, the core's resolution.
 pub const EXTENT_TOLERANCE_MM: f64 = 1e-6;
-/// Cells that are looked at for one side of the box before it is left as good as it is. An edge that runs along a whole ridge takes
-/// some ten thousand.
+/// Largest number of cells evaluated for one side of the box; the box is then used as it is. A side that touches along a whole
+/// ridge takes about ten thousand.
 const CELLS_MAX: usize = 100_000;
-/// Rounding of a coordinate, as a share of the largest coefficient: below it nothing is looked for.
+/// Rounding of a coordinate, as a share of the largest coefficient: the search stops below it.
 const ROUNDING: f64 = 1e-14;
 
 /// A rational patch of one coordinate, numerator and weight, over parameters from -1/2 to 1/2.
-type Cell = (Bicubic, Bicubic);
+type CoordinatePatch = (Bicubic, Bicubic);
 
-/// Least and greatest x, y and z of a surface, mm, to [`EXTENT_TOLERANCE_MM`].
+/// Minimum and maximum of x, y and z of a surface, mm, within [`EXTENT_TOLERANCE_MM`].
 #[must_use]
 pub fn extent_mm(surface: &SurfaceSpec) -> [[f64; 2]; 3] {
     let spline;
@@ -58,15 +58,15 @@ fn value(c: &Bicubic, u: f64, v: f64) -> f64 {
 }
 
 /// The greatest value at the cell's corners and middle.
-fn probe((numerator, weight): &Cell) -> f64 {
+fn probe((numerator, weight): &CoordinatePatch) -> f64 {
     [(-0.5, -0.5), (-0.5, 0.5), (0.5, -0.5), (0.5, 0.5), (0.0, 0.0)]
         .into_iter()
         .map(|(u, v)| value(numerator, u, v) / value(weight, u, v))
         .fold(f64::NEG_INFINITY, f64::max)
 }
 
-/// Whether nothing in the cell exceeds `bound`: `numerator - bound weight` stays at or below 0, which its coefficients bound.
-fn below((numerator, weight): &Cell, bound: f64) -> bool {
+/// Whether no value in the cell exceeds `bound`: `numerator - bound weight` is at most 0, by its Bernstein coefficients.
+fn below((numerator, weight): &CoordinatePatch, bound: f64) -> bool {
     let mut most = 0.0;
     for (i, (row, weights)) in numerator.iter().zip(weight).enumerate() {
         for (j, (c, w)) in row.iter().zip(weights).enumerate() {
@@ -81,7 +81,7 @@ fn below((numerator, weight): &Cell, bound: f64) -> bool {
 }
 
 /// The greatest value over all cells, to [`EXTENT_TOLERANCE_MM`].
-fn most(cells: Vec<Cell>) -> f64 {
+fn most(cells: Vec<CoordinatePatch>) -> f64 {
     let largest = cells
         .iter()
         .flat_map(|(numerator, _)| numerator.iter().flatten())

@@ -1,14 +1,14 @@
-//! Where the surface lies on the machine: scaled, turned and moved, before anything else sees it.
+//! Placement of the surface on the machine: scale, rotation and translation, applied before all other processing.
 //!
 //! ```text
 //! [placement] ─job_file/placement.rs─► Placement ─place─► SurfaceSpec of the placed surface ─► oracle, preparation
-//!                                                  extent.rs  its box, for `place` and the machine's range
-//!                                                  arcs.rs    a turned profile as a rational B-spline
+//!                                                  extent.rs  its bounding box, for `place` and the range check
+//!                                                  arcs.rs    a revolved profile as a rational B-spline
 //! ```
 //!
-//! A placement is a similarity: `p -> scale R p + t` with a proper rotation R, so lengths all change by one factor, and the sign
-//! of `S_u x S_v` keeps its side. Polynomial and spline surfaces are placed by their coefficients and poles, exactly up to the
-//! rounding of f64. A surface of revolution stays one as long as its axis stays the z axis, upwards.
+//! A placement is a similarity: `p -> scale R p + t` with a proper rotation R: all lengths change by one factor, and the sign of
+//! `S_u x S_v` refers to the same side. Polynomial and spline surfaces are placed by their coefficients and poles, exact to f64
+//! rounding. A surface of revolution keeps its kind while its axis remains the z axis, upwards.
 
 mod arcs;
 mod extent;
@@ -21,11 +21,10 @@ use job::{AXES, NurbsSpec, SurfaceSpec};
 pub use extent::{EXTENT_TOLERANCE_MM, extent_mm};
 pub use rotation::Rotation;
 
-/// Positions that the machine can hold, mm either way: nanometres in an i32.
+/// Range of positions of the core, mm in either direction: nanometres in an i32.
 pub const POSITION_MAX_MM: f64 = 2_147.483_647;
-/// Names of the axes, in order.
 
-/// The point of the scaled and turned surface that comes to lie at `translate_mm`.
+/// The point of the scaled and rotated surface that is placed at `translate_mm`.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Anchor {
     /// The origin of the surface's own coordinates.
@@ -35,20 +34,20 @@ pub enum Anchor {
     Centre,
     /// The corner of its box with the least x, y and z.
     Corner,
-    /// The middle of its box in x and y, the highest z: how stock is often set up.
+    /// The middle of its box in x and y, at the highest z: the usual workpiece zero of stock.
     Top,
 }
 
-/// What is done to a surface, in this order: scale, turn, move.
+/// The operations on a surface, in this order: scale, rotate, translate.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Placement {
-    /// Factor on all lengths, about the origin; above 0.
+    /// Scale factor about the origin; above 0.
     pub scale: f64,
-    /// Turns about x, then y, then z (axes that stay fixed), degrees, right-handed.
+    /// Rotations about x, then y, then z (fixed axes), degrees, right-handed.
     pub rotate_deg: [f64; 3],
-    /// The point that comes to lie at `translate_mm`.
+    /// The point that is placed at `translate_mm`.
     pub anchor: Anchor,
-    /// Where that point comes to lie, mm.
+    /// Position of the anchor, mm.
     pub translate_mm: [f64; 3],
 }
 
@@ -63,29 +62,29 @@ impl Default for Placement {
     }
 }
 
-/// The placed surface reaches out of the machine's range.
+/// The placed surface exceeds the range of positions.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Outside {
+pub struct OutOfMachineRange {
     /// The axis: 0 to 2.
     pub axis: usize,
-    /// What it reaches from and to along it, mm.
+    /// Extent of the surface along the axis, mm.
     pub reach_mm: [f64; 2],
-    /// No translation would bring it in: it is too large.
+    /// The surface is larger than the range: no translation helps.
     pub too_large: bool,
 }
 
-impl fmt::Display for Outside {
+impl fmt::Display for OutOfMachineRange {
     fn fmt(&self, out: &mut fmt::Formatter<'_>) -> fmt::Result {
         let [least, most] = self.reach_mm;
         let axis = AXES.get(self.axis).copied().unwrap_or("?");
         write!(
             out,
-            "the placed surface reaches from {axis} = {least:.3} to {most:.3} mm; the machine reaches ±2147.483 mm"
+            "the placed surface extends from {axis} = {least:.3} to {most:.3} mm; the machine's range is ±2147.483 mm"
         )
     }
 }
 
-impl std::error::Error for Outside {}
+impl std::error::Error for OutOfMachineRange {}
 
 /// `p -> linear p + shift`.
 #[derive(Clone, Copy)]
@@ -110,8 +109,8 @@ impl Placement {
     /// The placed surface.
     ///
     /// # Errors
-    /// [`Outside`] where it leaves what the machine can hold.
-    pub fn place(&self, surface: &SurfaceSpec) -> Result<SurfaceSpec, Outside> {
+    /// [`OutOfMachineRange`] where the surface exceeds the range of positions.
+    pub fn place(&self, surface: &SurfaceSpec) -> Result<SurfaceSpec, OutOfMachineRange> {
         let rotation = Rotation::of_degrees(self.rotate_deg);
         let turned = self.turned(surface, rotation);
         let extent = extent_mm(&turned);
@@ -127,7 +126,7 @@ impl Placement {
             let reach_mm = [least + shift[axis], most + shift[axis]];
             if !(reach_mm[0] >= -POSITION_MAX_MM && reach_mm[1] <= POSITION_MAX_MM) {
                 let too_large = most - least > 2.0 * POSITION_MAX_MM;
-                return Err(Outside {
+                return Err(OutOfMachineRange {
                     axis,
                     reach_mm,
                     too_large,
@@ -138,7 +137,7 @@ impl Placement {
         Ok(moved(&turned, &Affine { linear, shift }))
     }
 
-    /// Scaled and turned, not yet moved.
+    /// Scale and rotation, without the translation.
     fn turned(&self, surface: &SurfaceSpec, rotation: Rotation) -> SurfaceSpec {
         let linear = rotation.0.map(|row| row.map(|entry| self.scale * entry));
         let affine = Affine {
@@ -165,8 +164,8 @@ impl Placement {
     }
 }
 
-/// What brings the middle of a range to 0; nothing where it lies there already as far as it is known, so that a surface of
-/// revolution stays on its axis.
+/// The shift that centres a range at 0; 0 where the range is centred within the tolerance, so that a surface of revolution stays on
+/// its axis.
 fn centring(least: f64, most: f64) -> f64 {
     let middle = 0.5 * (least + most);
     if middle.abs() <= EXTENT_TOLERANCE_MM {
@@ -176,7 +175,7 @@ fn centring(least: f64, most: f64) -> f64 {
     }
 }
 
-/// A surface under an affine map; one of revolution stays such where the map only moves it along z.
+/// A surface under an affine map; a surface of revolution keeps its kind under a translation along z alone.
 fn moved(surface: &SurfaceSpec, map: &Affine) -> SurfaceSpec {
     match surface {
         SurfaceSpec::Revolved {
@@ -236,7 +235,7 @@ fn moved(surface: &SurfaceSpec, map: &Affine) -> SurfaceSpec {
     }
 }
 
-/// A space cubic, `[k]` highest power first: every coefficient is a vector, the last one a point.
+/// A space cubic, `[k]` highest power first: the constant term is mapped as a point, the others as vectors.
 fn moved_cubic(cubic: &[[f64; 4]; 3], map: &Affine) -> [[f64; 4]; 3] {
     let [x, y, z] = cubic;
     let mut placed = *cubic;

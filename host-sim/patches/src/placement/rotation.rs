@@ -1,14 +1,14 @@
-//! Turns about the fixed axes.
+//! Rotations about the fixed axes.
 
 /// A rotation matrix, by rows.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Rotation(pub [[f64; 3]; 3]);
 
 impl Rotation {
-    /// No turn.
+    /// The identity.
     pub const IDENTITY: Self = Self([[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]]);
 
-    /// Turns about x, then y, then z; the axes stay fixed, and a positive angle turns anticlockwise for one who looks against the axis.
+    /// Rotates about x, then y, then z; the axes are fixed, and a positive angle is anticlockwise seen from the positive end of the axis.
     /// Multiples of 90 degrees are exact.
     #[must_use]
     pub fn of_degrees([x, y, z]: [f64; 3]) -> Self {
@@ -19,7 +19,7 @@ impl Rotation {
         about_z.after(about_y).after(about_x)
     }
 
-    /// This one, after another.
+    /// The rotation `first`, followed by this one.
     fn after(self, first: Self) -> Self {
         Self(
             self.0
@@ -27,14 +27,14 @@ impl Rotation {
         )
     }
 
-    /// The angle, rad, of a turn about z; `None` where the z axis does not stay itself.
+    /// The angle of a rotation about z, rad; `None` for a rotation that moves the z axis.
     pub(super) fn about_z_rad(self) -> Option<f64> {
         let [[cosine, _, xz], [sine, _, yz], last] = self.0;
         (last == [0.0, 0.0, 1.0] && xz == 0.0 && yz == 0.0).then(|| sine.atan2(cosine))
     }
 }
 
-/// Sine and cosine of an angle in degrees: by the nearest quarter turn, which is exact, and what remains.
+/// Sine and cosine of an angle in degrees: the nearest quarter turn, which is exact, plus the remainder.
 fn sine_cosine(degrees: f64) -> (f64, f64) {
     let turned = degrees.rem_euclid(360.0);
     let quarter = (turned / 90.0).round();

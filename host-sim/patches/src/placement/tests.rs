@@ -1,11 +1,11 @@
-//! Placed surfaces against their originals moved by plain matrices, through the oracle's evaluation.
+//! Placed surfaces against their originals under plain matrices, through the oracle's evaluation.
 
 use std::f64::consts::{FRAC_PI_2, PI, TAU};
 
 use super::*;
 use oracle::Surface;
 
-/// The placement as the job file's documentation tells it, one turn after the other, by sine and cosine.
+/// The placement as documented for the job file, one rotation after the other, by sine and cosine.
 fn by_hand(placement: &Placement, p: [f64; 3]) -> [f64; 3] {
     let [x, y, z] = p.map(|c| c * placement.scale);
     let [a, b, c] = placement.rotate_deg.map(|degrees| degrees * PI / 180.0);
@@ -98,7 +98,7 @@ fn polynomials_and_splines_keep_their_parameters() {
 }
 
 #[test]
-fn a_turned_profile_stays_one_about_its_axis() {
+fn a_revolved_profile_keeps_its_kind_about_its_axis() {
     let spec = bell([-3.0, -0.6]);
     for (rotate_deg, turned_rad) in [
         ([0.0, 0.0, 90.0], FRAC_PI_2),
@@ -121,8 +121,8 @@ fn a_turned_profile_stays_one_about_its_axis() {
     }
 }
 
-/// Turned back, a point of the placed bell has the bell's radius and height at its own u; at the arcs' ends and middles it has its
-/// angle too, and elsewhere to the 0.0161 rad that are promised.
+/// After the inverse rotation, a point of the placed bell has the bell's radius and height at the same u; at the ends and middles of the
+/// arcs it also has the bell's angle, elsewhere within the documented 0.0161 rad.
 #[test]
 fn a_tilted_profile_is_the_same_surface() {
     for v_rad in [[-3.0, -0.6], [0.2, 0.2 + TAU], [-0.7, 0.9]] {
@@ -145,7 +145,7 @@ fn a_tilted_profile_is_the_same_surface() {
             if (halves - halves.round()).abs() < 1e-9 {
                 assert!(apart < 1e-10, "off by {apart:e} mm at {u}, {v}");
             }
-            // Turned back: the transposed turns, in the other order.
+            // Inverse rotation: the transposed rotations in reverse order.
             let moved: [f64; 3] = std::array::from_fn(|k| (point[k] - TILTED.translate_mm[k]) / 2.54);
             let back = |degrees: [f64; 3], p| {
                 by_hand(
@@ -168,9 +168,9 @@ fn a_tilted_profile_is_the_same_surface() {
     }
 }
 
-/// The box touches what a dense grid of points reaches, and nothing of the surface lies outside.
+/// The box touches the extremes of a dense grid of points and encloses the surface.
 #[test]
-fn the_box_is_the_surface_s() {
+fn the_box_encloses_the_surface() {
     for spec in [bicubic(), ruled(), nurbs(), bell([0.0, TAU]), bell([-0.5, 2.0])] {
         let extent = extent_mm(&spec);
         let surface = Surface::new(&spec);
@@ -206,7 +206,7 @@ fn the_box_is_the_surface_s() {
 }
 
 #[test]
-fn the_anchor_comes_to_lie_where_it_is_wanted() {
+fn the_anchor_is_at_the_translation() {
     let at = [12.0, -7.0, 30.0];
     for spec in [bicubic(), nurbs(), bell([-0.5, 2.0])] {
         for (anchor, shares) in [
@@ -229,7 +229,7 @@ fn the_anchor_comes_to_lie_where_it_is_wanted() {
             }
         }
     }
-    // A whole bell is centred on its axis already: it stays a revolved surface.
+    // A full bell is centred on its axis already: it remains a revolved surface.
     let placement = Placement {
         anchor: Anchor::Top,
         ..Placement::default()
@@ -241,7 +241,7 @@ fn the_anchor_comes_to_lie_where_it_is_wanted() {
 }
 
 #[test]
-fn what_reaches_out_of_the_machine_is_refused() {
+fn a_surface_outside_the_range_is_refused() {
     let far = Placement {
         translate_mm: [0.0, 2147.0, 0.0],
         ..Placement::default()
@@ -254,7 +254,7 @@ fn what_reaches_out_of_the_machine_is_refused() {
     };
     let outside = huge.place(&bell([0.0, 1.0])).unwrap_err();
     assert!(outside.axis == 0 && outside.too_large, "{outside}");
-    // A surface that is far away by itself can be brought near.
+    // A surface far from the origin can be translated into the range.
     let away = Placement {
         anchor: Anchor::Centre,
         ..Placement::default()

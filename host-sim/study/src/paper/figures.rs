@@ -6,7 +6,7 @@ use approach::{
     Planned, measure_run, passes, planned,
 };
 use job::{Along, Job, SurfaceSpec};
-use verify::speeds::Speed;
+use verify::speeds::PeriodSpeed;
 
 /// Speeds along one pass.
 #[derive(Clone, Debug)]
@@ -16,7 +16,7 @@ pub struct Track {
     /// Sampling period, µs.
     pub period_us: f64,
     /// Speeds, period by period; the last, which is cut short, left out.
-    pub speeds: Vec<Speed>,
+    pub speeds: Vec<PeriodSpeed>,
     /// What the pass came to.
     pub measured: Measured,
 }

@@ -9,7 +9,7 @@ use super::legend;
 use crate::paper::figures::Track;
 use crate::paper::{Comparison, Study};
 use approach::Kind;
-use verify::speeds::Speed;
+use verify::speeds::PeriodSpeed;
 
 /// Ranges of the section: millimetres, the same scale both ways in a chart of this height.
 const SECTION: [[f64; 2]; 2] = [[10.0, 97.0], [15.0, 65.0]];
@@ -81,7 +81,7 @@ fn figure_3(out: &mut String, study: &Study) -> io::Result<()> {
 
 /// Speeds of contact and centre of a track.
 fn of_track(track: &Track) -> Vec<Series> {
-    let pick = |of: fn(&Speed) -> f64| track.speeds.iter().map(|at| [at.arc_mm, of(at)]).collect();
+    let pick = |of: fn(&PeriodSpeed) -> f64| track.speeds.iter().map(|at| [at.arc_mm, of(at)]).collect();
     vec![
         Series {
             colour: WARM,

@@ -87,7 +87,8 @@ pub fn page(study: &Study) -> io::Result<String> {
 /// The figures' data.
 fn data(figures: &Figures) -> Value {
     let track = |track: &Track| {
-        let column = |of: fn(&verify::speeds::Speed) -> f64| track.speeds.iter().map(of).collect::<Vec<_>>();
+        let column =
+            |of: fn(&verify::speeds::PeriodSpeed) -> f64| track.speeds.iter().map(of).collect::<Vec<_>>();
         json!({
             "approach": track.kind.name(),
             "period_us": track.period_us,

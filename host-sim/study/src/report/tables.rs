@@ -7,7 +7,7 @@ use crate::paper::{Comparison, Item, Row, Study};
 use ::report::number::fixed;
 use ::report::svg::escape;
 use approach::Kind;
-use verify::speeds::Span;
+use verify::speeds::SpeedRange;
 
 /// The four approaches on whole jobs.
 pub(super) fn comparisons(out: &mut String, study: &Study) {
@@ -35,7 +35,7 @@ fn table(out: &mut String, comparison: &Comparison) {
     );
     for row in &comparison.rows {
         let Row { measured, .. } = row;
-        let range = |span: &Span| format!("{:.2} to {:.2}", span.min, span.max);
+        let range = |span: &SpeedRange| format!("{:.2} to {:.2}", span.min, span.max);
         let segments = shown(measured.planned.segments as f64, 0);
         let segments = match (row.kind, measured.planned.segments) {
             (Kind::Surface, 1) => "1 patch".to_owned(),

@@ -1,28 +1,28 @@
-//! A lower bound of the time that a pass takes from standstill to standstill.
+//! Lower bound of the time of a pass from standstill to standstill.
 //!
-//! Two relaxations are joined. Within the pass jerk is left out: velocity and acceleration alone give the largest speed that any motion
-//! can have at each place, by a backward and a forward sweep over `v^2` (Q.-C. Pham, H. Pham, "A New Approach to Time-Optimal Path
-//! Parameterization Based on Reachability Analysis", IEEE Trans. Robotics 34, 2018). At each end the path is left out but for how far the
-//! centre gets along its first (last) direction: from standstill that takes a time that jerk limits as well. The better of this and of the
-//! jerk-limited move over the chord counts. Steps of the path's derivatives, which cost time too, are left out.
+//! Two relaxations are combined. Within the pass jerk is ignored: velocity and acceleration alone give the largest speed of any motion
+//! at each point, by a backward and a forward sweep over `v^2` (Q.-C. Pham, H. Pham, "A New Approach to Time-Optimal Path
+//! Parameterization Based on Reachability Analysis", IEEE Trans. Robotics 34, 2018). At each end the path is replaced by the distance of the
+//! centre along its first (last) direction, whose least time from standstill includes the jerk limit. The bound is the larger of this and of the
+//! time of the jerk-limited move over the chord. The extra time for steps of the path's derivatives is ignored.
 
 use super::path::PassPath;
 use super::point::LineLimits;
 use job::AxisLimits;
 use oracle::vector::{Vector, dot, length, scale, subtract};
 
-/// What a path may do within limits of the axes.
-pub(super) trait PathCaps {
-    /// The largest velocity, acceleration and jerk that a motion within the limits can have along a unit direction, whatever it does across.
+/// Bounds of the motion along a path, from the axis limits.
+pub(super) trait PathBounds {
+    /// The largest velocity, acceleration and jerk along a unit direction of any motion within the limits.
     fn along(&self, direction: Vector) -> LineLimits;
-    /// Largest speed of the contact at a place by its feed and the axes' velocities.
+    /// Largest speed of the contact at a point, by its feed and the axis velocities.
     fn speed_cap(&self, first: Vector, feed_mm_s: f64) -> f64;
-    /// Range of path accelerations (second derivative of the contact's arc by time) that the axes allow, mm/s^2, where the centre's first and
-    /// second derivative by that arc are `first` and `second`, and the square of the speed is `b`. Empty (descending) where there is none.
+    /// Range of path accelerations (second time derivative of the contact's arc length) that the axes allow, mm/s^2. `first`, `second`: derivatives
+    /// of the centre by that arc length; `b`: square of the speed. Descending ends mean an empty range.
     fn accelerations(&self, first: Vector, second: Vector, b: f64) -> [f64; 2];
 }
 
-impl PathCaps for AxisLimits {
+impl PathBounds for AxisLimits {
     fn along(&self, direction: Vector) -> LineLimits {
         let reach = |limit: &[f64; 3]| (0..3).map(|axis| direction[axis].abs() * limit[axis]).sum();
         LineLimits {
@@ -42,11 +42,11 @@ impl PathCaps for AxisLimits {
         let mut range = [f64::NEG_INFINITY, f64::INFINITY];
         for axis in 0..3 {
             let (gain, drift, limit) = (first[axis], second[axis] * b, self.acceleration_mm_s2[axis]);
-            if gain.abs() > NO_GAIN {
+            if gain.abs() > GAIN_MIN {
                 let ends = [(-limit - drift) / gain, (limit - drift) / gain];
                 range[0] = range[0].max(ends[0].min(ends[1]));
                 range[1] = range[1].min(ends[0].max(ends[1]));
-            } else if drift.abs() > limit * (1.0 + NO_GAIN) {
+            } else if drift.abs() > limit * (1.0 + GAIN_MIN) {
                 return [f64::INFINITY, f64::NEG_INFINITY];
             }
         }
@@ -54,25 +54,25 @@ impl PathCaps for AxisLimits {
     }
 }
 
-/// An axis that the path acceleration moves less than this is left out of its range: where it turns round, the ranges would be those of
-/// rounding.
-const NO_GAIN: f64 = 1e-6;
+/// An axis whose derivative is below this is left out of the range of path accelerations: at its reversal the range would consist
+/// of rounding errors.
+const GAIN_MIN: f64 = 1e-6;
 /// Steps of the sweep over a pass.
 const STEPS: usize = 4000;
-/// Bisections of a squared speed: to the last digits.
+/// Bisections of a squared speed: to f64 precision.
 const BISECTIONS: usize = 60;
 
-/// The largest speeds without regard to jerk.
-pub(super) struct Fastest {
+/// The speed profile without jerk limits.
+pub(super) struct MaxSpeedProfile {
     /// Arc lengths, evenly spaced within each smooth span.
     pub(super) arcs: Vec<f64>,
-    /// Square of the largest speed there.
+    /// Square of the largest speed at each arc length.
     pub(super) squares: Vec<f64>,
     firsts: Vec<Vector>,
     seconds: Vec<Vector>,
 }
 
-impl Fastest {
+impl MaxSpeedProfile {
     pub(super) fn new(path: &PassPath<'_>, feed_mm_s: f64, limits: &AxisLimits) -> Self {
         let (mut arcs, mut firsts, mut seconds) = (Vec::new(), Vec::new(), Vec::new());
         for (span, ends) in path.breaks().windows(2).enumerate() {
@@ -114,7 +114,7 @@ impl Fastest {
         for k in 0..count - 1 {
             let [least, most] =
                 limits.accelerations(fastest.firsts[k], fastest.seconds[k], fastest.squares[k]);
-            // At the very speed that leaves no choice rounding may leave none at all.
+            // At the limit speed the range has one value, and rounding may make it empty.
             if least <= most {
                 let reached = fastest.squares[k] + 2.0 * fastest.step(k) * most;
                 fastest.squares[k + 1] = fastest.squares[k + 1].min(reached.max(0.0));
@@ -127,7 +127,7 @@ impl Fastest {
         self.arcs[k + 1] - self.arcs[k]
     }
 
-    /// The largest square from which the next place's can be met.
+    /// The largest squared speed from which the next point's can be reached.
     fn controllable(&self, k: usize, limits: &AxisLimits) -> f64 {
         let (step, next) = (self.step(k), self.squares[k + 1]);
         let can = |b: f64| {
@@ -146,11 +146,11 @@ impl Fastest {
                 high = middle;
             }
         }
-        // From here there is a way on, whatever rounding does: a last digit less than the largest.
+        // The lower end is feasible in spite of rounding: one unit in the last place below the supremum.
         low
     }
 
-    /// Time from the beginning to each place, s: every step at the larger speed of its ends, as this is to be a bound.
+    /// Time from the beginning to each point, s: every step at the larger speed of its ends, which gives a lower bound.
     fn times(&self) -> Vec<f64> {
         let mut time = 0.0;
         let mut times = vec![0.0];
@@ -162,8 +162,8 @@ impl Fastest {
     }
 }
 
-/// Least times from standstill at one end to each place, by the direction in which the path leaves it; in the order of `places`.
-fn leaving(places: &[(Vector, Vector)], feed_mm_s: f64, limits: &AxisLimits) -> Vec<f64> {
+/// Least times from standstill at one end to each point, along the first direction of the path; in the order of `places`.
+fn least_times_from_rest(places: &[(Vector, Vector)], feed_mm_s: f64, limits: &AxisLimits) -> Vec<f64> {
     let Some((from, first)) = places.first() else {
         return Vec::new();
     };
@@ -185,16 +185,26 @@ fn leaving(places: &[(Vector, Vector)], feed_mm_s: f64, limits: &AxisLimits) -> 
         .collect()
 }
 
-/// The lower bound, s. 0 for a pass without length.
+/// The lower bound, s. 0 for a pass of zero length.
 #[must_use]
 pub fn lower_bound_s(path: &PassPath<'_>, feed_mm_s: f64, limits: &AxisLimits) -> f64 {
     if path.length_mm() <= 0.0 {
         return 0.0;
     }
-    bound_of(&Fastest::new(path, feed_mm_s, limits), path, feed_mm_s, limits)
+    bound_of(
+        &MaxSpeedProfile::new(path, feed_mm_s, limits),
+        path,
+        feed_mm_s,
+        limits,
+    )
 }
 
-pub(super) fn bound_of(fastest: &Fastest, path: &PassPath<'_>, feed_mm_s: f64, limits: &AxisLimits) -> f64 {
+pub(super) fn bound_of(
+    fastest: &MaxSpeedProfile,
+    path: &PassPath<'_>,
+    feed_mm_s: f64,
+    limits: &AxisLimits,
+) -> f64 {
     let times = fastest.times();
     let whole = times[times.len() - 1];
     let mut places: Vec<(Vector, Vector)> = fastest
@@ -203,12 +213,12 @@ pub(super) fn bound_of(fastest: &Fastest, path: &PassPath<'_>, feed_mm_s: f64, l
         .zip(&fastest.firsts)
         .map(|(arc, first)| (path.position(*arc), *first))
         .collect();
-    let forwards = leaving(&places, feed_mm_s, limits);
+    let forwards = least_times_from_rest(&places, feed_mm_s, limits);
     places.reverse();
-    let mut backwards = leaving(&places, feed_mm_s, limits);
+    let mut backwards = least_times_from_rest(&places, feed_mm_s, limits);
     backwards.reverse();
     places.reverse();
-    // What leaving and arriving take more than the sweep has it, at the best place for each, the one before the other.
+    // Extra time of the ramps at both ends over the sweep, maximised over the two points where the relaxations change, in order.
     let mut before = 0.0_f64;
     let mut most = 0.0_f64;
     for k in 0..times.len() {

@@ -1,59 +1,59 @@
-//! How much of each axis's velocity, acceleration and jerk limit an emitted tool path uses, by finite differences of its positions.
+//! Use of each axis's velocity, acceleration and jerk limit by an emitted tool path, from finite differences of its positions.
 //!
-//! A position is rounded to whole nanometres, so each is off by at most half of one. A difference of the first, second and third
-//! order, `x1 - x0`, `x2 - 2 x1 + x0`, `x3 - 3 x2 + 3 x1 - x0`, is off by at most half of the sum of its coefficients: 1, 2
-//! and 4 nm. That much is taken off each, so that no path within its limits is told to exceed them; at a period of 1 ms and a jerk limit
-//! of 20 000 mm/s^3 it is a fifth of the limit.
+//! A position is rounded to whole nanometres: its error is at most half a nanometre. A difference of the first, second and third
+//! order, `x1 - x0`, `x2 - 2 x1 + x0`, `x3 - 3 x2 + 3 x1 - x0`, has an error of at most half the sum of its coefficients: 1, 2
+//! and 4 nm. These are subtracted, so a path within its limits is never reported as exceeding them; at a period of 1 ms and a jerk limit
+//! of 20 000 mm/s^3 the subtraction is a fifth of the limit.
 
-use job::{AXES, Machine};
+use job::{AXES, MachineSpec};
 
-/// Names of the orders, and their units.
+/// Names of the derivatives, and their units.
 pub const ORDERS: [(&str, &str); 3] = [
     ("velocity", "mm/s"),
     ("acceleration", "mm/s^2"),
     ("jerk", "mm/s^3"),
 ];
-/// What the uses may be above 1: velocity and acceleration 1 %, jerk 5 %.
+/// Tolerances of the uses above 1: velocity and acceleration 1 %, jerk 5 %.
 pub const TOLERANCES: [f64; 3] = [0.01, 0.01, 0.05];
-/// What rounding leaves in a difference of each order at most, nm.
+/// Largest rounding error in a difference of each order, nm.
 const ROUNDING_NM: [i64; 3] = [1, 2, 4];
 const MM_PER_NM: f64 = 1e-6;
 
 /// Largest magnitude of a derivative of the positions.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Peak {
-    /// Largest magnitude on each axis, less what rounding may have feigned; mm/s, mm/s^2 or mm/s^3.
+    /// Largest magnitude on each axis, minus the largest rounding error; mm/s, mm/s^2 or mm/s^3.
     pub axes: [f64; 3],
-    /// Tick of each axis' largest one: the last of the samples that it is the difference of.
+    /// Tick of each axis' largest magnitude: the last sample of the difference.
     pub ticks: [u64; 3],
-    /// The axis that uses most of its limit (without limits: where the magnitude is largest), 0 to 2.
+    /// The axis with the largest use of its limit (without limits: with the largest magnitude), 0 to 2.
     pub axis: usize,
-    /// Share of the limit that this axis uses, 1 = at the limit; `None` without a limit.
+    /// Use of this axis's limit, 1 = at the limit; `None` without a limit.
     pub share: Option<f64>,
-    /// Share of the limit that was taken off for rounding, on this axis; 0 without a limit.
+    /// Share of the limit subtracted for rounding, on this axis; 0 without a limit.
     pub rounding_share: f64,
 }
 
 /// Largest velocity, acceleration and jerk of a tool path.
 pub type Peaks = [Peak; 3];
 
-/// Measures positions, one a period, in the order of their ticks. Keeps three of them.
+/// Peaks of the derivatives of positions, one position per period, in the order of ticks. Stores three positions.
 #[derive(Clone, Debug)]
-pub struct Gauge {
+pub struct PeakMeter {
     period_s: f64,
-    /// Of velocity, acceleration and jerk.
+    /// Limits of velocity, acceleration and jerk.
     limits: Option<[[f64; 3]; 3]>,
-    /// The last position and its differences of first and second order, nm; `None` until there are enough positions.
+    /// The last position and its differences of first and second order, nm; `None` until enough positions are known.
     last: [Option<[i64; 3]>; 3],
-    /// Largest magnitude, nm per period^k, and its tick, of each order and axis.
+    /// Largest magnitude, nm per period^k, and its tick, for each order and axis.
     largest: [[(i64, u64); 3]; 3],
     tick: u64,
 }
 
-impl Gauge {
-    /// A gauge of a machine's limits.
+impl PeakMeter {
+    /// A meter for a machine's limits.
     #[must_use]
-    pub fn new(machine: &Machine) -> Self {
+    pub fn new(machine: &MachineSpec) -> Self {
         Self {
             period_s: machine.period_s(),
             limits: machine.limits.map(|limits| limits.by_order()),
@@ -63,13 +63,13 @@ impl Gauge {
         }
     }
 
-    /// The axes stand at a position before the next sample.
-    pub fn stand(&mut self, cl_nm: [i32; 3]) {
+    /// The axes are at rest at a position before the next sample.
+    pub fn start_at_rest(&mut self, cl_nm: [i32; 3]) {
         self.last = [Some(cl_nm.map(i64::from)), Some([0; 3]), Some([0; 3])];
     }
 
-    /// What comes next has nothing to do with what came before: no differences are taken between them.
-    pub fn gap(&mut self) {
+    /// Discontinuity: no differences are taken across it.
+    pub fn discontinuity(&mut self) {
         self.last = [None; 3];
     }
 
@@ -91,10 +91,10 @@ impl Gauge {
         }
     }
 
-    /// The axes come to stand where the last sample left them: what that takes is counted in too.
-    pub fn come_to_stand(&mut self) {
+    /// The axes stop at the last position: the differences of the stop count.
+    pub fn end_at_rest(&mut self) {
         if let Some(at) = self.last[0] {
-            // In range: the position came as an i32.
+            // In range: the position was converted from an i32.
             #[allow(clippy::cast_possible_truncation, reason = "it was an i32 before")]
             let at = at.map(|nm| nm as i32);
             for _ in 0..3 {
@@ -103,7 +103,7 @@ impl Gauge {
         }
     }
 
-    /// The largest so far.
+    /// The peaks so far.
     #[must_use]
     pub fn peaks(&self) -> Peaks {
         std::array::from_fn(|order| self.peak(order))
@@ -132,7 +132,7 @@ impl Gauge {
     }
 }
 
-/// A sentence for each limit that is exceeded by more than its tolerance.
+/// One sentence per limit that is exceeded by more than its tolerance.
 #[must_use]
 pub fn failures(peaks: &Peaks) -> Vec<String> {
     let mut sentences = Vec::new();
@@ -140,7 +140,7 @@ pub fn failures(peaks: &Peaks) -> Vec<String> {
         if let Some(share) = peak.share.filter(|share| *share > 1.0 + tolerance) {
             let axis = peak.axis;
             sentences.push(format!(
-                "{} takes {share:.3} of its {name} limit ({:.1} {unit}) at tick {}",
+                "{} uses {share:.3} of its {name} limit ({:.1} {unit}) at tick {}",
                 AXES[axis], peak.axes[axis], peak.ticks[axis]
             ));
         }
@@ -153,14 +153,14 @@ mod tests {
     use super::*;
     use job::AxisLimits;
 
-    fn machine(velocity: f64, acceleration: f64, jerk: f64) -> Machine {
-        Machine {
+    fn machine(velocity: f64, acceleration: f64, jerk: f64) -> MachineSpec {
+        MachineSpec {
             limits: Some(AxisLimits {
                 velocity_mm_s: [velocity; 3],
                 acceleration_mm_s2: [acceleration; 3],
                 jerk_mm_s3: [jerk; 3],
             }),
-            ..Machine::default()
+            ..MachineSpec::default()
         }
     }
 
@@ -174,9 +174,9 @@ mod tests {
 
     /// x = J t^3 / 6: the third difference is J T^3 exactly, the second J T^2 (t - T).
     #[test]
-    fn a_cubic_uses_what_it_is_made_of() {
-        let mut gauge = Gauge::new(&machine(100.0, 1000.0, 40_000.0));
-        gauge.stand([nm(-7.0), 0, 0]);
+    fn a_cubic_has_its_exact_peaks() {
+        let mut gauge = PeakMeter::new(&machine(100.0, 1000.0, 40_000.0));
+        gauge.start_at_rest([nm(-7.0), 0, 0]);
         for tick in 1..=40_u32 {
             let t = f64::from(tick) * 1e-3;
             gauge.add(tick.into(), [nm(-7.0 + 40_000.0 * t.powi(3) / 6.0), 0, 0]);
@@ -186,7 +186,7 @@ mod tests {
         near(velocity.axes[0], 0.04 * (64_000.0 - 59_319.0) / 6.0, 0.0021);
         near(acceleration.axes[0], 40_000.0 * 0.039, 4.1);
         assert!(acceleration.share.unwrap() <= 1.56 && acceleration.ticks[0] == 40);
-        // Rounding feigns up to 4 nm of 40, and that much is taken off.
+        // Rounding adds up to 4 nm to 40, which are subtracted.
         let share = jerk.share.unwrap();
         assert!((0.8..=1.0).contains(&share), "{share}");
         near(jerk.rounding_share, 0.1, 1e-12);
@@ -194,15 +194,15 @@ mod tests {
     }
 
     #[test]
-    fn standing_uses_nothing_and_rounding_is_no_motion() {
-        let mut gauge = Gauge::new(&machine(1.0, 1.0, 1.0));
-        gauge.stand([5, 5, 5]);
+    fn rest_has_no_peaks_and_rounding_is_subtracted() {
+        let mut gauge = PeakMeter::new(&machine(1.0, 1.0, 1.0));
+        gauge.start_at_rest([5, 5, 5]);
         for tick in 0..100_u64 {
-            // The worst that rounding can do to a machine that stands at a half nanometre.
+            // The worst case of rounding for a machine at rest at a half nanometre.
             let up = i32::from(tick % 2 == 0);
             gauge.add(tick, [5 + up, 5, 5]);
         }
-        gauge.come_to_stand();
+        gauge.end_at_rest();
         for peak in gauge.peaks() {
             assert_eq!(peak.share, Some(0.0));
         }
@@ -211,11 +211,11 @@ mod tests {
 
     /// A step of velocity v is an acceleration of v / T and a jerk of v / T^2 in one period.
     #[test]
-    fn a_start_without_a_ramp_is_seen_only_from_standstill() {
+    fn a_start_without_a_ramp_counts_only_from_standstill() {
         let run = |from_standstill: bool| {
-            let mut gauge = Gauge::new(&machine(20.0, 1000.0, 20_000.0));
+            let mut gauge = PeakMeter::new(&machine(20.0, 1000.0, 20_000.0));
             if from_standstill {
-                gauge.stand([0; 3]);
+                gauge.start_at_rest([0; 3]);
             }
             for tick in 1..50_i32 {
                 gauge.add(tick as u64, [0, 10_000 * tick, 0]);
@@ -225,8 +225,8 @@ mod tests {
         let mut gauge = run(false);
         near(gauge.peaks()[0].share.unwrap(), 0.5 * 0.9999, 1e-9);
         assert_eq!(gauge.peaks()[1].share, Some(0.0));
-        // And from full speed to a stop.
-        gauge.come_to_stand();
+        // A stop from full speed.
+        gauge.end_at_rest();
         near(gauge.peaks()[1].axes[1], 1e4 - 2.0, 1e-6);
         near(gauge.peaks()[2].axes[1], 1e7 - 4000.0, 1e-3);
         assert_eq!(failures(&gauge.peaks()).len(), 2);
@@ -234,7 +234,7 @@ mod tests {
         near(gauge.peaks()[2].share.unwrap(), (1e7 - 4000.0) / 2e4, 1e-6);
         assert_eq!((gauge.peaks()[1].axis, gauge.peaks()[1].ticks[1]), (1, 1));
         let mut apart = run(false);
-        apart.gap();
+        apart.discontinuity();
         apart.add(60, [1_000_000, 0, 0]);
         apart.add(61, [1_010_000, 0, 0]);
         near(apart.peaks()[0].share.unwrap(), 0.5 * 0.9999, 1e-9);
@@ -242,9 +242,9 @@ mod tests {
 
     /// A circle of radius R at speed v: v, v^2 / R, v^3 / R^2 on each of its axes; periods as short as they come.
     #[test]
-    fn a_circle_uses_its_three_powers() {
+    fn a_circle_has_its_exact_peaks() {
         let (radius, speed) = (25.0, 90.0);
-        let mut gauge = Gauge::new(&machine(100.0, 500.0, 4000.0));
+        let mut gauge = PeakMeter::new(&machine(100.0, 500.0, 4000.0));
         for tick in 0..4000_u32 {
             let angle = f64::from(tick) * 1e-3 * speed / radius;
             gauge.add(
@@ -262,8 +262,8 @@ mod tests {
     }
 
     #[test]
-    fn without_limits_there_are_magnitudes_and_no_shares() {
-        let mut gauge = Gauge::new(&Machine::default());
+    fn without_limits_peaks_have_no_share() {
+        let mut gauge = PeakMeter::new(&MachineSpec::default());
         for tick in 0..10_i32 {
             gauge.add(tick as u64, [3000 * tick, -8000 * tick, 0]);
         }

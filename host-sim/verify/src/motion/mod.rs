@@ -1,9 +1,9 @@
-//! What a run's motion is judged by: nothing here comes from `interp-core`.
+//! Reference for a run's motion: nothing here comes from `interp-core`.
 //!
 //! ```text
 //! samples ──limits.rs──► use of each axis's velocity, acceleration and jerk limit
 //!           point.rs     rest to rest along a line: the time-optimal jerk-limited duration
-//! Oracle ───path.rs────► PassPath ──optimum.rs──► the least time of a pass: a bound from below, a motion that holds the limits
+//! Oracle ───path.rs────► PassPath ──optimum.rs──► the least time of a pass: a lower bound, and a motion within the limits
 //! ```
 
 pub mod limits;
@@ -18,6 +18,6 @@ mod programme;
 mod timing;
 
 pub use bound::lower_bound_s;
-pub use limits::{Gauge, Peak, Peaks};
-pub use optimum::{NoMotion, Optimum, optimum};
+pub use limits::{Peak, PeakMeter, Peaks};
+pub use optimum::{NoFeasibleMotion, Optimum, optimum};
 pub use path::{CurvePoint, PassPath, PathPoint};

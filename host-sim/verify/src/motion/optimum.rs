@@ -1,4 +1,4 @@
-//! The least time that a pass can be run in, from standstill to standstill: a bound from below, and a motion that holds all limits.
+//! The least time of a pass from standstill to standstill: a lower bound, and a motion that holds all limits.
 //!
 //! ```text
 //! PassPath ──bound.rs──► lower bound; largest speeds ──► grid ──programme.rs──► motion, faster each time ──timing.rs──► one
@@ -6,41 +6,41 @@
 //!                                                                  └──────────────────── shares of the limits ◄─────────────┘
 //! ```
 //!
-//! The motion is good, not proved to be the best: what is certain is that the least time lies between the two.
+//! The motion is not proved to be optimal: the least time is between the two.
 
-use super::bound::{Fastest, PathCaps as _, bound_of};
+use super::bound::{MaxSpeedProfile, PathBounds as _, bound_of};
 use super::path::PassPath;
-use super::programme::{Interval, Profile, Programme};
+use super::programme::{Interval, MotionProfile, Programme};
 use super::timing::Timing;
 use job::AxisLimits;
 
-/// Programmes one after another at most, and the gain below which they end.
+/// Largest number of successive programmes, and the relative gain below which they end.
 const PROGRAMMES: usize = 30;
-const ENOUGH: f64 = 1e-4;
-/// Times that the limits are shared out anew by what the samples use, and what they may be above.
+const GAIN_MIN: f64 = 1e-4;
+/// Largest number of redistributions of the limits by the use of the samples, and the tolerance of the use.
 const ROUNDS: usize = 5;
 const ABOVE: f64 = 3e-4;
-/// Share of the jerk limit that the motion begins and ends with, before the first node and behind the last; and the share of a whole rise to
-/// the feed, in time, that this takes.
+/// Share of the jerk limit in the ramps before the first node and after the last one; and the duration of these ramps as a share of
+/// a ramp to the feed.
 const END_JERK: f64 = 0.999;
 const END_SHARE: f64 = 0.02;
-/// Intervals: of a whole pass at least, of the way in which the speed changes at its ends and its breaks; and their growth away from these.
-const WHOLE: f64 = 120.0;
+/// Intervals: least number over a pass; number over the distance in which the speed changes at ends and breaks; growth away from these.
+const PASS_INTERVALS: f64 = 120.0;
 const RAMP: f64 = 40.0;
 const GROWTH: f64 = 0.15;
 /// Change of speed over an interval, as a share of the largest, once a motion is known.
 const CHANGE: f64 = 0.04;
-/// Squared speeds a programme looks from are at least this share of the largest.
+/// Least squared speed used for linearisation, as a share of the largest.
 const LEAST: f64 = 1e-9;
-/// Steps of a derivative count as none below this share of a jerk limit.
-const NO_STEP: f64 = 1e-3;
+/// Steps of a derivative below this share of a jerk limit are ignored.
+const STEP_JERK_SHARE_MIN: f64 = 1e-3;
 
-/// What a pass can take at best.
+/// Bounds of the least time of a pass.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Optimum {
-    /// No motion within the limits is faster, s.
+    /// Lower bound of the time of any motion within the limits, s.
     pub lower_bound_s: f64,
-    /// A motion within the limits takes this long, s.
+    /// Time of the motion found within the limits, s.
     pub feasible_s: f64,
     /// Largest use of the limits by that motion's samples: velocity, acceleration, jerk.
     pub uses: [f64; 3],
@@ -49,19 +49,19 @@ pub struct Optimum {
 /// The solver found no motion.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 #[error("no motion within the limits was found")]
-pub struct NoMotion;
+pub struct NoFeasibleMotion;
 
-/// The least time of a pass at this feed of the contact (above 0), with one sample a period: bound and motion. A pass without length
-/// takes no time.
+/// The least time of a pass at this feed of the contact (above 0), with one sample per period: bound and motion. Both are 0 for a pass of
+/// zero length.
 ///
 /// # Errors
-/// [`NoMotion`] where the solver fails.
+/// [`NoFeasibleMotion`] where the solver fails.
 pub fn optimum(
     path: &PassPath<'_>,
     feed_mm_s: f64,
     limits: &AxisLimits,
     period_s: f64,
-) -> Result<Optimum, NoMotion> {
+) -> Result<Optimum, NoFeasibleMotion> {
     if path.length_mm() <= 0.0 {
         return Ok(Optimum {
             lower_bound_s: 0.0,
@@ -69,9 +69,9 @@ pub fn optimum(
             uses: [0.0; 3],
         });
     }
-    let fastest = Fastest::new(path, feed_mm_s, limits);
+    let fastest = MaxSpeedProfile::new(path, feed_mm_s, limits);
     let lower_bound_s = bound_of(&fastest, path, feed_mm_s, limits);
-    let search = Search::new(path, feed_mm_s, limits, period_s, &fastest);
+    let search = MotionSearch::new(path, feed_mm_s, limits, period_s, &fastest);
     let (feasible_s, uses) = search.motion()?;
     Ok(Optimum {
         lower_bound_s,
@@ -80,8 +80,8 @@ pub fn optimum(
     })
 }
 
-/// A place where the motion slows down: an end, or a break where the path's derivatives step.
-struct Slow {
+/// A point where the motion slows down: an end, or a break where the path's derivatives step.
+struct SlowPoint {
     arc: f64,
     /// Speed there, mm/s.
     speed: f64,
@@ -89,8 +89,8 @@ struct Slow {
     jerk: f64,
 }
 
-impl Slow {
-    /// The speed that a rise by jerk alone has at an arc length.
+impl SlowPoint {
+    /// The speed of a ramp at constant jerk, at an arc length.
     fn speed_at(&self, arc: f64) -> f64 {
         let way = (arc - self.arc).abs();
         self.speed + 0.5 * self.jerk * (6.0 * way / self.jerk).powf(2.0 / 3.0)
@@ -98,60 +98,60 @@ impl Slow {
 }
 
 /// A step of the derivatives at a break.
-struct Step {
+struct DerivativeStep {
     arc: f64,
     steps: [[f64; 3]; 2],
 }
 
-struct Search<'a> {
+struct MotionSearch<'a> {
     path: &'a PassPath<'a>,
     feed_mm_s: f64,
     limits: &'a AxisLimits,
     period_s: f64,
-    fastest: &'a Fastest,
-    slow: Vec<Slow>,
-    steps: Vec<Step>,
+    fastest: &'a MaxSpeedProfile,
+    slow_points: Vec<SlowPoint>,
+    steps: Vec<DerivativeStep>,
 }
 
 /// The nodes of a programme.
-struct Grid {
+struct NodeGrid {
     arcs: Vec<f64>,
     intervals: Vec<Interval>,
     caps: Vec<f64>,
 }
 
-/// Path jerk that the axes leave at a place.
+/// Largest path jerk within the axis limits at a point.
 fn path_jerk(first: [f64; 3], limits: &AxisLimits) -> f64 {
     (0..3).fold(f64::INFINITY, |least, axis| {
         least.min(limits.jerk_mm_s3[axis] / first[axis].abs())
     })
 }
 
-impl<'a> Search<'a> {
+impl<'a> MotionSearch<'a> {
     fn new(
         path: &'a PassPath<'a>,
         feed_mm_s: f64,
         limits: &'a AxisLimits,
         period_s: f64,
-        fastest: &'a Fastest,
+        fastest: &'a MaxSpeedProfile,
     ) -> Self {
         let length = path.length_mm();
         let breaks = path.breaks();
-        let end = |span: usize, arc: f64| Slow {
+        let end = |span: usize, arc: f64| SlowPoint {
             arc,
             speed: 0.0,
             jerk: END_JERK * path_jerk(path.at(span, arc).first, limits),
         };
-        let mut slow = vec![end(0, 0.0), end(breaks.len() - 2, length)];
+        let mut slow_points = vec![end(0, 0.0), end(breaks.len() - 2, length)];
         let mut steps = Vec::new();
         for (span, arc) in breaks.iter().enumerate().take(breaks.len() - 1).skip(1) {
             let (before, after) = (path.at(span - 1, *arc), path.at(span, *arc));
             let of = |a: [f64; 3], b: [f64; 3]| std::array::from_fn(|axis| (a[axis] - b[axis]).abs());
-            let step = Step {
+            let step = DerivativeStep {
                 arc: *arc,
                 steps: [of(before.first, after.first), of(before.second, after.second)],
             };
-            // Half of the jerk limit is left to the steps: the rest is for the ramps beside them.
+            // Half of the jerk limit is reserved for the steps, the other half for the ramps at them.
             let speed = (0..3).fold(f64::INFINITY, |least, axis| {
                 let [first, second] = [step.steps[0][axis], step.steps[1][axis]];
                 let half = 0.5 * limits.jerk_mm_s3[axis] * period_s;
@@ -162,11 +162,11 @@ impl<'a> Search<'a> {
             let counts = (0..3).any(|axis| {
                 let jerk = step.steps[0][axis] * feed_mm_s / period_s.powi(2)
                     + step.steps[1][axis] * feed_mm_s * feed_mm_s / period_s;
-                jerk > NO_STEP * limits.jerk_mm_s3[axis]
+                jerk > STEP_JERK_SHARE_MIN * limits.jerk_mm_s3[axis]
             });
             if speed < feed_mm_s {
                 let jerk = path_jerk(before.first, limits).min(path_jerk(after.first, limits));
-                slow.push(Slow {
+                slow_points.push(SlowPoint {
                     arc: *arc,
                     speed,
                     jerk,
@@ -182,54 +182,56 @@ impl<'a> Search<'a> {
             limits,
             period_s,
             fastest,
-            slow,
+            slow_points,
             steps,
         }
     }
 
-    /// A speed that is near to what can be reached: the fastest one without regard to jerk, and rises from the slow places.
+    /// A speed close to the achievable one: the profile without jerk limits, cut by jerk ramps from the slow points.
     fn guess(&self, arc: f64) -> f64 {
         let arcs = &self.fastest.arcs;
         let after = arcs.partition_point(|at| *at <= arc).clamp(1, arcs.len() - 1);
         let share = (arc - arcs[after - 1]) / (arcs[after] - arcs[after - 1]);
         let squares = &self.fastest.squares;
         let square = squares[after - 1] + share * (squares[after] - squares[after - 1]);
-        self.slow.iter().fold(square.max(0.0).sqrt(), |speed, slow| {
-            speed.min(slow.speed_at(arc))
-        })
+        self.slow_points
+            .iter()
+            .fold(square.max(0.0).sqrt(), |speed, slow| {
+                speed.min(slow.speed_at(arc))
+            })
     }
 
-    /// Time that the motion takes before the first node, and behind the last: a rise by the jerk limit.
+    /// Duration of the motion before the first node, and after the last one: a ramp at the jerk limit.
     fn end_time_s(&self, end: usize) -> f64 {
-        let jerk = self.slow[end].jerk;
-        // A short pass is not half over by then.
+        let jerk = self.slow_points[end].jerk;
+        // Limits the ramp to less than half of a short pass.
         let rise = (self.feed_mm_s / jerk).sqrt();
         let whole = (6.0 * self.path.length_mm() / jerk).cbrt();
         END_SHARE * rise.min(0.5 * whole)
     }
 
     fn end_arc(&self, end: usize) -> f64 {
-        self.slow[end].jerk * self.end_time_s(end).powi(3) / 6.0
+        self.slow_points[end].jerk * self.end_time_s(end).powi(3) / 6.0
     }
 
     /// Squared speed and acceleration at the first node, and at the last.
     fn ends(&self) -> [[f64; 2]; 2] {
         [0, 1].map(|end| {
-            let (jerk, time) = (self.slow[end].jerk, self.end_time_s(end));
+            let (jerk, time) = (self.slow_points[end].jerk, self.end_time_s(end));
             let acceleration = if end == 0 { jerk * time } else { -jerk * time };
             [(0.5 * jerk * time * time).powi(2), acceleration]
         })
     }
 
-    /// Length of the interval that begins at an arc length; `known`: a motion there, whose speed changes little in it.
-    fn interval_length(&self, arc: f64, known: Option<(&Grid, &Profile)>) -> f64 {
-        let mut most = self.path.length_mm() / WHOLE;
-        let reach = |slow: &Slow| {
-            // The way in which a rise by jerk alone reaches the feed, twice: as far as speeds change.
+    /// Length of the interval that begins at an arc length; `known`: a motion, whose speed changes little in the interval.
+    fn interval_length(&self, arc: f64, known: Option<(&NodeGrid, &MotionProfile)>) -> f64 {
+        let mut most = self.path.length_mm() / PASS_INTERVALS;
+        let reach = |slow: &SlowPoint| {
+            // Twice the distance in which a ramp at constant jerk reaches the feed: the extent of speed changes.
             let time = (2.0 * self.feed_mm_s / slow.jerk).sqrt();
             (slow.jerk * time.powi(3) / 3.0).min(self.path.length_mm())
         };
-        for slow in &self.slow {
+        for slow in &self.slow_points {
             let (way, reach) = ((arc - slow.arc).abs(), reach(slow));
             if way < 3.0 * reach {
                 let least = (slow.speed * self.period_s).max(0.5 * self.end_arc(0));
@@ -259,10 +261,10 @@ impl<'a> Search<'a> {
         most
     }
 
-    fn grid(&self, known: Option<(&Grid, &Profile)>) -> Grid {
+    fn grid(&self, known: Option<(&NodeGrid, &MotionProfile)>) -> NodeGrid {
         let length = self.path.length_mm();
         let (from, to) = (self.end_arc(0), length - self.end_arc(1));
-        let mut grid = Grid {
+        let mut grid = NodeGrid {
             arcs: vec![from],
             intervals: Vec::new(),
             caps: Vec::new(),
@@ -272,7 +274,7 @@ impl<'a> Search<'a> {
             let mut arc = low;
             while arc < high {
                 let by = self.interval_length(arc, known);
-                // As small as the next one will be, where they get smaller, and no crumb left over.
+                // Not longer than the next one where they become shorter, and without a short remainder.
                 let by = by.min(self.interval_length((arc + by).min(high), known).max(0.5 * by));
                 let next = if arc + 1.3 * by >= high { high } else { arc + by };
                 let points = [arc, 0.5 * (arc + next), next].map(|at| self.path.at(span, at));
@@ -280,7 +282,7 @@ impl<'a> Search<'a> {
                     length: next - arc,
                     points,
                     steps: self.steps_near(arc, next),
-                    ease: [1.0; 2],
+                    limit_shares: [1.0; 2],
                 });
                 grid.arcs.push(next);
                 arc = next;
@@ -295,7 +297,7 @@ impl<'a> Search<'a> {
         grid
     }
 
-    /// The largest steps of the derivatives that a period can see from between two arc lengths.
+    /// The largest steps of the derivatives that one period can contain between two arc lengths.
     fn steps_near(&self, low: f64, high: f64) -> [[f64; 3]; 2] {
         let mut most = [[0.0_f64; 3]; 2];
         for step in &self.steps {
@@ -309,8 +311,8 @@ impl<'a> Search<'a> {
         most
     }
 
-    /// The fastest motion found: its duration, and what its samples use of the limits.
-    fn motion(&self) -> Result<(f64, [f64; 3]), NoMotion> {
+    /// The fastest motion found: its duration, and the use of the limits by its samples.
+    fn motion(&self) -> Result<(f64, [f64; 3]), NoFeasibleMotion> {
         let coarse = self.grid(None);
         let floor = LEAST * self.feed_mm_s.powi(2);
         let guess: Vec<f64> = coarse
@@ -330,7 +332,7 @@ impl<'a> Search<'a> {
             let profile = self.improved(&grid, guess)?;
             let timing = self.timing(&grid, &profile);
             let (uses, most) = timing.uses(self.path, self.limits, self.period_s);
-            // Slower by one factor until the samples hold every limit.
+            // Slowed down by one factor until the samples hold every limit.
             let slower = uses[0].max(uses[1].sqrt()).max(uses[2].cbrt()).max(1.0);
             let time = timing.duration_s() * slower;
             if best.is_none_or(|(least, _)| time < least) {
@@ -341,19 +343,19 @@ impl<'a> Search<'a> {
                 break;
             }
             for (interval, most) in grid.intervals.iter_mut().zip(most) {
-                for (ease, most) in interval.ease.iter_mut().zip(most) {
-                    *ease /= most.max(1.0);
+                for (limit_shares, most) in interval.limit_shares.iter_mut().zip(most) {
+                    *limit_shares /= most.max(1.0);
                 }
             }
             guess = profile.squares.iter().map(|square| square.max(floor)).collect();
         }
-        best.ok_or(NoMotion)
+        best.ok_or(NoFeasibleMotion)
     }
 
-    /// Programme after programme, each around the motion of the one before.
-    fn improved(&self, grid: &Grid, mut around: Vec<f64>) -> Result<Profile, NoMotion> {
+    /// Solves programme after programme, each linearised at the previous motion.
+    fn improved(&self, grid: &NodeGrid, mut around: Vec<f64>) -> Result<MotionProfile, NoFeasibleMotion> {
         let floor = LEAST * self.feed_mm_s.powi(2);
-        let mut best: Option<(f64, Profile)> = None;
+        let mut best: Option<(f64, MotionProfile)> = None;
         for _ in 0..PROGRAMMES {
             let programme = Programme {
                 intervals: &grid.intervals,
@@ -373,25 +375,25 @@ impl<'a> Search<'a> {
             if gain > 0.0 {
                 best = Some((time, profile));
             }
-            if gain < ENOUGH {
+            if gain < GAIN_MIN {
                 break;
             }
         }
-        best.map(|(_, profile)| profile).ok_or(NoMotion)
+        best.map(|(_, profile)| profile).ok_or(NoFeasibleMotion)
     }
 
-    fn timing(&self, grid: &Grid, profile: &Profile) -> Timing {
+    fn timing(&self, grid: &NodeGrid, profile: &MotionProfile) -> Timing {
         Timing::new(
             &grid.arcs,
             profile,
-            [0, 1].map(|end| (self.slow[end].jerk, self.end_time_s(end))),
+            [0, 1].map(|end| (self.slow_points[end].jerk, self.end_time_s(end))),
             self.path.length_mm(),
         )
     }
 }
 
 /// Squared speed of a motion between its nodes.
-fn interpolated(grid: &Grid, profile: &Profile, arc: f64) -> f64 {
+fn interpolated(grid: &NodeGrid, profile: &MotionProfile, arc: f64) -> f64 {
     let k = grid
         .arcs
         .partition_point(|at| *at <= arc)

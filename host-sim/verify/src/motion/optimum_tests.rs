@@ -1,4 +1,4 @@
-//! Bound and motion against closed forms.
+//! Lower bound and motion against closed forms.
 
 use super::point::LineLimits;
 use super::*;
@@ -15,7 +15,7 @@ fn line(length: f64, direction: [f64; 3]) -> PassPath<'static> {
     })
 }
 
-/// The contact runs along a circle of this radius, the centre along one of `ratio` times it.
+/// The contact moves on a circle of this radius, the centre on one of `ratio` times the radius.
 fn circle(radius: f64, ratio: f64, turns: f64) -> PassPath<'static> {
     let angle = turns * std::f64::consts::TAU;
     PassPath::new(&[0.0, angle], move |t| {
@@ -37,7 +37,7 @@ fn found(path: &PassPath<'_>, feed: f64, limits: &AxisLimits) -> Optimum {
 }
 
 #[test]
-fn straight_passes_take_what_the_closed_form_says() {
+fn straight_passes_agree_with_the_closed_form() {
     let usual = AxisLimits::DEFAULT;
     let mut worst = 0.0_f64;
     let (along_x, slanted) = ([1.0, 0.0, 0.0], [0.6, 0.0, 0.8]);
@@ -71,7 +71,7 @@ fn straight_passes_take_what_the_closed_form_says() {
 
 /// Around a circle the speed is the least of the feed, sqrt(A R) and cbrt(J R^2).
 #[test]
-fn circles_run_at_the_speed_that_their_limits_allow() {
+fn circles_run_at_their_limit_speed() {
     for (radius, ratio, feed, limits) in [
         (
             20.0,
@@ -100,14 +100,14 @@ fn circles_run_at_the_speed_that_their_limits_allow() {
             .min((limits.acceleration_mm_s2[0] * centre).sqrt())
             .min((limits.jerk_mm_s3[0] * centre * centre).cbrt());
         let exact = std::f64::consts::TAU * radius / (cap / ratio).min(feed);
-        // One turn more, at constant speed. The axes of a square of limits allow a little more between their directions.
+        // One more turn, at constant speed. The corners of the axis limits allow slightly more than the axes.
         let turn = two.feasible_s - one.feasible_s;
         assert!(turn <= 1.002 * exact && turn >= 0.85 * exact, "{turn} {exact}");
     }
 }
-/// A bend of a quarter turn with a small radius between two straight lines: the tool slows down for it.
+/// A quarter turn of small radius between two straight lines: the tool slows down in it.
 #[test]
-fn a_corner_is_taken_slower_than_what_leads_to_it() {
+fn a_bend_is_slower_than_the_straight_lines() {
     let (side, radius) = (20.0, 0.5);
     let angle = std::f64::consts::FRAC_PI_2;
     let ends = [0.0, side, side + radius * angle, 2.0 * side + radius * angle];
@@ -132,7 +132,7 @@ fn a_corner_is_taken_slower_than_what_leads_to_it() {
         acceleration: 1000.0,
         jerk: 20_000.0,
     };
-    // Between running through at the feed and stopping on both sides of the bend.
+    // Between passing the bend at the feed and stopping on both sides of it.
     let through = straight.rest_to_rest_s(2.0 * side + radius * angle);
     let stopping = 2.0 * straight.rest_to_rest_s(side)
         + found(&circle(radius, 1.0, 0.25), 50.0, &AxisLimits::DEFAULT).feasible_s;
@@ -141,7 +141,7 @@ fn a_corner_is_taken_slower_than_what_leads_to_it() {
     assert!(whole.lower_bound_s >= through);
 }
 
-/// Where the centre's speed steps at a knot, one period sees a jerk of the step over T^2: the tool nearly stops there.
+/// Where the centre's speed steps at a knot, one period has a jerk of the step over T^2: the tool nearly stops there.
 #[test]
 fn a_step_of_the_speed_is_crossed_slowly() {
     let ratio = 1.2;

@@ -3,7 +3,7 @@
 use oracle::vector::{Vector, scale, subtract};
 use oracle::{Oracle, OracleError};
 
-/// Pieces of a smooth span between which arc lengths are known. On each, three Gauss points integrate the contact's speed.
+/// Segments of a smooth span with tabulated arc lengths. On each, three Gauss points integrate the contact's speed.
 const PIECES: usize = 256;
 /// Nodes and weights of the three-point Gauss-Legendre rule on [-1, 1].
 const GAUSS: [(f64, f64); 3] = [
@@ -11,14 +11,14 @@ const GAUSS: [(f64, f64); 3] = [
     (0.0, 8.0 / 9.0),
     (0.774_596_669_241_483_4, 5.0 / 9.0),
 ];
-/// Step of the differences that derivatives come from, as a share of a smooth span: some 1e-5 of truncation on what changes over a
-/// tenth of the span, 1e-9 of rounding.
+/// Step of the finite differences, as a share of a smooth span: truncation of about 1e-5 for features of a
+/// tenth of the span, rounding of 1e-9.
 const STEP_SHARE: f64 = 1e-3;
-/// How far from a span's end derivatives are taken, as a share of it, and carried on from there: beyond the end another span's begin, and
-/// beside a pole a normal is known to 1e-16 over this only.
+/// Least distance from a span's end at which derivatives are evaluated, as a share of the span; nearer points are extrapolated. Beyond the end
+/// the derivatives belong to another span, and near a pole the normal has a precision of 1e-16 only at this distance.
 const INSIDE: f64 = 1e-5;
 
-/// A curve at one parameter.
+/// A curve at one parameter value.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct CurvePoint {
     /// The tool centre CL, mm.
@@ -44,8 +44,8 @@ pub struct PathPoint {
 
 type Curve<'a> = Box<dyn Fn(f64) -> CurvePoint + Send + Sync + 'a>;
 
-/// Parameters and arc lengths of a smooth span's pieces.
-struct Span {
+/// Parameters and arc lengths of the segments of a smooth span.
+struct SmoothSpan {
     parameters: Vec<f64>,
     arcs: Vec<f64>,
 }
@@ -53,12 +53,12 @@ struct Span {
 /// One pass, smooth between its breaks.
 pub struct PassPath<'a> {
     curve: Curve<'a>,
-    spans: Vec<Span>,
+    spans: Vec<SmoothSpan>,
     breaks: Vec<f64>,
 }
 
 impl<'a> PassPath<'a> {
-    /// A path given by its parameter; `parameters`: its ends and the breaks between them, ascending.
+    /// A path as a function of a parameter; `parameters`: its ends and the breaks between them, ascending.
     #[must_use]
     pub fn new(parameters: &[f64], curve: impl Fn(f64) -> CurvePoint + Send + Sync + 'a) -> Self {
         let curve: Curve<'a> = Box::new(curve);
@@ -66,7 +66,7 @@ impl<'a> PassPath<'a> {
         let mut spans = Vec::new();
         let mut arc = 0.0;
         for ends in parameters.windows(2) {
-            let mut span = Span {
+            let mut span = SmoothSpan {
                 parameters: vec![ends[0]],
                 arcs: vec![arc],
             };
@@ -118,21 +118,21 @@ impl<'a> PassPath<'a> {
         &self.breaks
     }
 
-    /// The span that an arc length lies in; at a break, the one behind it.
+    /// The span that contains an arc length; at a break, the one after it.
     #[must_use]
     pub fn span_of(&self, arc_mm: f64) -> usize {
         let last = self.spans.len();
         self.breaks.partition_point(|at| *at <= arc_mm).clamp(1, last) - 1
     }
 
-    /// Position alone, mm.
+    /// Position only, mm.
     #[must_use]
     pub fn position(&self, arc_mm: f64) -> [f64; 3] {
         let span = self.span_of(arc_mm);
         (self.curve)(self.parameter(span, arc_mm)).cl_mm
     }
 
-    /// Position and derivatives, as this span has them, its ends included.
+    /// Position and derivatives within this span, ends included.
     #[must_use]
     pub fn at(&self, span: usize, arc_mm: f64) -> PathPoint {
         let parameters = &self.spans[span].parameters;
@@ -162,16 +162,16 @@ impl<'a> PassPath<'a> {
         for axis in 0..3 {
             let third = 2.0 * (rising[axis] - falling[axis]) / (left + right);
             point.third[axis] = third;
-            // Newton's form through the three places, differentiated here.
+            // Newton's interpolation through the three points, differentiated.
             point.second[axis] = falling[axis] + 0.5 * third * (left + 2.0 * off);
             point.first[axis] += outside * point.second[axis];
         }
         point
     }
 
-    /// Parameter at an arc length: linear in its piece, then two steps of Newton's.
+    /// Parameter at an arc length: linear in its segment, then two Newton steps.
     fn parameter(&self, span: usize, arc_mm: f64) -> f64 {
-        let Span { parameters, arcs } = &self.spans[span];
+        let SmoothSpan { parameters, arcs } = &self.spans[span];
         let piece = arcs.partition_point(|at| *at <= arc_mm).clamp(1, PIECES) - 1;
         let (low, high) = (parameters[piece], parameters[piece + 1]);
         let whole = arcs[piece + 1] - arcs[piece];
@@ -190,7 +190,7 @@ impl<'a> PassPath<'a> {
     }
 }
 
-/// Arc of the contact between two parameters of a piece.
+/// Arc length of the contact between two parameters of a segment.
 fn gauss(curve: &Curve<'_>, from: f64, to: f64) -> f64 {
     let half = 0.5 * (to - from);
     GAUSS
@@ -204,7 +204,7 @@ fn gauss(curve: &Curve<'_>, from: f64, to: f64) -> f64 {
 mod tests {
     use super::*;
 
-    /// A circle of radius 8 that the contact follows at 3/4 of the centre's radius, its parameter stretched.
+    /// A circle of radius 8 for the centre, the contact at 3/4 of it, with a non-uniform parameter.
     fn circle() -> PassPath<'static> {
         let (centre, contact) = (8.0, 6.0);
         PassPath::new(&[0.0, 0.4, 1.0], move |t| {

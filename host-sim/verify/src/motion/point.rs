@@ -1,7 +1,7 @@
-//! From standstill to standstill along a line in the least time, with velocity, acceleration and jerk limited.
+//! Time-optimal move from standstill to standstill along a line, with velocity, acceleration and jerk limits.
 //!
-//! The profile is symmetric: speed up with jerk J up to an acceleration a <= A, to a velocity v <= V, the same backwards. Speeding up to v
-//! takes `v / a + a / J` and covers `v / 2` of that time; which of the limits are reached tells the four cases apart
+//! The profile is symmetric: acceleration with jerk J up to an acceleration a <= A and a velocity v <= V, then the mirror image. Accelerating to v
+//! takes `v / a + a / J` and covers `v / 2` times that time; the four cases differ by the limits reached
 //! (L. Biagiotti, C. Melchiorri, "Trajectory Planning for Automatic Machines and Robots", 2008, section 3.4).
 
 /// Limits along a line, all above 0: mm/s, mm/s^2, mm/s^3.
@@ -16,7 +16,7 @@ pub struct LineLimits {
 }
 
 impl LineLimits {
-    /// Time from standstill to a velocity v, without overshoot and with no acceleration left, s.
+    /// Time from standstill to a velocity v with zero final acceleration and without overshoot, s.
     #[must_use]
     pub fn ramp_s(&self, v: f64) -> f64 {
         if v * self.jerk >= self.acceleration * self.acceleration {
@@ -34,7 +34,7 @@ impl LineLimits {
             acceleration: a,
             jerk,
         } = *self;
-        // Distance of both ramps: v times the time of one. v (v / a + a / J) = d, or v 2 sqrt(v / J) = d.
+        // Distance of both ramps: v times the duration of one. v (v / a + a / J) = d, or v 2 sqrt(v / J) = d.
         let lag = a * a / jerk;
         let reached = 0.5 * ((lag * lag + 4.0 * a * distance).sqrt() - lag);
         let reached = if reached >= lag {
@@ -54,7 +54,7 @@ impl LineLimits {
         let peak = self.peak_velocity(distance);
         let ramp = self.ramp_s(peak);
         let cruise = (distance - peak * ramp).max(0.0);
-        // Below its velocity limit a move is two ramps: the difference is rounding.
+        // Below the velocity limit a move is two ramps: the rest is rounding.
         if peak < self.velocity {
             2.0 * ramp
         } else {
@@ -62,7 +62,7 @@ impl LineLimits {
         }
     }
 
-    /// The farthest that a machine comes from standstill in a time, however fast it is then, mm: jerk, then acceleration, then
+    /// Upper bound of the distance from standstill in a time, at any final speed, mm: jerk, then acceleration, then
     /// velocity at their limits.
     #[must_use]
     pub fn reach_mm(&self, time_s: f64) -> f64 {
@@ -71,7 +71,7 @@ impl LineLimits {
             acceleration,
             jerk,
         } = *self;
-        // Velocity rises with J until A, then with A; when it meets V it would have to stop rising at once, which is a bound from above.
+        // Velocity rises with J up to A, then with A; a real motion would reduce the acceleration before V, so this is an upper bound.
         let bend = acceleration / jerk;
         let until = if 0.5 * jerk * bend * bend >= velocity {
             (2.0 * velocity / jerk).sqrt()
@@ -86,7 +86,7 @@ impl LineLimits {
         rising(time_s.min(until)) + velocity * (time_s - until).max(0.0)
     }
 
-    /// Least time in which a machine can be a distance away from where it stood: the inverse of [`Self::reach_mm`].
+    /// Least time to a distance from standstill, s: the inverse of [`Self::reach_mm`].
     #[must_use]
     pub fn reach_s(&self, distance: f64) -> f64 {
         if distance <= 0.0 {
@@ -96,7 +96,7 @@ impl LineLimits {
         while self.reach_mm(high) < distance {
             high *= 2.0;
         }
-        // Bisection to the last digit.
+        // Bisection to f64 precision.
         for _ in 0..80 {
             let middle = 0.5 * (low + high);
             if self.reach_mm(middle) < distance {
@@ -115,7 +115,7 @@ mod tests {
 
     const GOLDEN: &str = include_str!("../../../../tests/golden/ruckig.txt");
 
-    /// Every case of the table that Ruckig computed, among them moves that reach neither velocity nor acceleration.
+    /// Every case of the table computed with Ruckig, including moves that reach neither the velocity nor the acceleration limit.
     #[test]
     fn durations_are_ruckigs() {
         let mut cases = 0;
@@ -145,11 +145,11 @@ mod tests {
             cases += 1;
         }
         assert!(cases >= 200, "{cases}");
-        // Each of the four kinds of profile is there.
+        // All four profile types occur.
         assert!(kinds.iter().all(|count| *count >= 15), "{kinds:?}");
     }
 
-    /// Reach in small steps of time, by its own definition.
+    /// Reach by numerical integration in small time steps.
     #[test]
     fn reach_is_the_integral_of_the_fastest_rise() {
         for (velocity, acceleration, jerk) in [
@@ -174,7 +174,7 @@ mod tests {
                     let t = f64::from(k) * step;
                     assert!((limits.reach_mm(t) / x - 1.0).abs() < 1e-4, "{t}");
                     assert!((limits.reach_s(limits.reach_mm(t)) - t).abs() < 1e-9);
-                    // Never later than a move that also stops there.
+                    // Never later than a move that also stops at the distance.
                     assert!(limits.reach_s(x) <= limits.rest_to_rest_s(x));
                 }
             }

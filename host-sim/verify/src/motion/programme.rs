@@ -2,13 +2,13 @@
 //! linear between them.
 //!
 //! Velocity and acceleration of an axis, `x' v` and `x'' b + x' a`, bound b and a linearly. Its jerk is `v (x''' b + 3 x'' a + x' da/ds)`, so
-//! the bracket must stay below `J / sqrt(b)`. That is convex in b where concave is wanted; its tangent at the speeds of the programme before lies
-//! below it everywhere, so what solves the programme holds the limit, and programme after programme gets faster (F. Debrouwere et al.,
+//! the bracket must stay below `J / sqrt(b)`. This bound is convex in b where a concave one is required; its tangent at the previous programme's
+//! speeds is below it everywhere, so a solution holds the limit, and successive programmes become faster (F. Debrouwere et al.,
 //! "Time-Optimal Path Following for Robots With Convex-Concave Constraints Using Sequential Convex Programming", IEEE Trans. Robotics 29, 2013).
 //! Time is the sum of `ds / sqrt(b)`, as second-order cones.
 //!
-//! Where x' or x'' steps by d1, d2 from one smooth span to the next, differences over a period T see a jerk of up to `d1 v / T^2 +
-//! 3/4 d2 v^2 / T`, and an acceleration of up to `d1 v / T`, beside that of the spans themselves.
+//! Where x' or x'' steps by d1, d2 from one smooth span to the next, differences over a period T contain a jerk of up to `d1 v / T^2 +
+//! 3/4 d2 v^2 / T`, and an acceleration of up to `d1 v / T`, in addition to those of the spans.
 
 use clarabel::algebra::CscMatrix;
 use clarabel::solver::{DefaultSettingsBuilder, DefaultSolver, IPSolver, SolverStatus, SupportedConeT};
@@ -16,10 +16,10 @@ use clarabel::solver::{DefaultSettingsBuilder, DefaultSolver, IPSolver, SolverSt
 use super::path::PathPoint;
 use job::AxisLimits;
 
-/// Variables a node: b over its last value, a over its scale, sqrt(b), 1 / sqrt(b), likewise scaled.
+/// Variables per node: b over its previous value, a over its scale, sqrt(b), 1 / sqrt(b), scaled likewise.
 const VARIABLES: usize = 4;
-/// Coefficients below this share of a limit are left out.
-const NOTHING: f64 = 1e-9;
+/// Coefficients below this share of a limit are omitted.
+const COEFFICIENT_MIN: f64 = 1e-9;
 
 /// Between two nodes.
 #[derive(Clone, Copy, Debug, Default)]
@@ -28,15 +28,15 @@ pub(super) struct Interval {
     pub(super) length: f64,
     /// The path at its beginning, middle and end.
     pub(super) points: [PathPoint; 3],
-    /// Steps of x' and x'' at a break nearby, magnitudes.
+    /// Magnitudes of the steps of x' and x'' at a break nearby.
     pub(super) steps: [[f64; 3]; 2],
-    /// Shares of the limits of acceleration and jerk that are used here.
-    pub(super) ease: [f64; 2],
+    /// Shares of the acceleration and jerk limits that are used here.
+    pub(super) limit_shares: [f64; 2],
 }
 
 /// A motion: squared speed and path acceleration at each node.
 #[derive(Clone, Debug, Default)]
-pub(super) struct Profile {
+pub(super) struct MotionProfile {
     pub(super) squares: Vec<f64>,
     pub(super) accelerations: Vec<f64>,
 }
@@ -61,7 +61,7 @@ impl Rows {
     }
 }
 
-/// The programme around a profile.
+/// The programme linearised at a profile.
 pub(super) struct Programme<'a> {
     pub(super) intervals: &'a [Interval],
     pub(super) limits: &'a AxisLimits,
@@ -73,8 +73,8 @@ pub(super) struct Programme<'a> {
 }
 
 impl Programme<'_> {
-    /// The fastest motion that holds the limits as they look from these squared speeds (all above 0); `None` where the solver finds none.
-    pub(super) fn solve(&self, around: &[f64]) -> Option<Profile> {
+    /// The fastest motion within the limits as linearised at these squared speeds (all above 0); `None` if the solver fails.
+    pub(super) fn solve(&self, around: &[f64]) -> Option<MotionProfile> {
         let scales = self.scales(around);
         let nodes = around.len();
         let mut rows = Rows::default();
@@ -118,13 +118,13 @@ impl Programme<'_> {
                 .map(|node| solution[VARIABLES * node + offset] * scale[node])
                 .collect()
         };
-        Some(Profile {
+        Some(MotionProfile {
             squares: of(0, around),
             accelerations: of(1, &scales),
         })
     }
 
-    /// Accelerations that go with the speeds: what a rise from standstill by the jerk limit has there.
+    /// Accelerations consistent with the speeds: those of a ramp from standstill at the jerk limit.
     fn scales(&self, around: &[f64]) -> Vec<f64> {
         let jerk = self
             .limits
@@ -135,7 +135,7 @@ impl Programme<'_> {
         around.iter().map(|b| (2.0 * jerk * b.sqrt()).sqrt()).collect()
     }
 
-    /// The ends as they are given; `b1 - b0 = (a0 + a1) ds`.
+    /// The given ends; `b1 - b0 = (a0 + a1) ds`.
     fn equalities(&self, around: &[f64], scales: &[f64], rows: &mut Rows) {
         let last = around.len() - 1;
         for (node, [square, acceleration]) in [(0, self.ends[0]), (last, self.ends[1])] {
@@ -162,12 +162,12 @@ impl Programme<'_> {
         let interval = &self.intervals[k];
         for (node, point) in [(k, &interval.points[0]), (k + 1, &interval.points[2])] {
             for axis in 0..3 {
-                let limit = self.limits.acceleration_mm_s2[axis] * interval.ease[0];
+                let limit = self.limits.acceleration_mm_s2[axis] * interval.limit_shares[0];
                 let by_square = point.second[axis] * around[node] / limit;
                 let by_acceleration = point.first[axis] * scales[node] / limit;
-                // sqrt(b) lies below its tangent.
+                // sqrt(b) is below its tangent.
                 let step = 0.5 * interval.steps[0][axis] * around[node].sqrt() / (self.period_s * limit);
-                if by_square.abs() + by_acceleration.abs() + step <= NOTHING {
+                if by_square.abs() + by_acceleration.abs() + step <= COEFFICIENT_MIN {
                     continue;
                 }
                 for sign in [1.0, -1.0] {
@@ -190,7 +190,7 @@ impl Programme<'_> {
         let middle = 0.5 * (around[k] + around[k + 1]);
         let speed = middle.sqrt();
         let columns: [usize; 4] = [0, 1, VARIABLES, VARIABLES + 1].map(|offset| VARIABLES * k + offset);
-        // In the middle b is the mean of its ends less an eighth of h^2 b'', and b'' = 2 da/ds.
+        // In the middle b is the mean of the ends minus h^2 b'' / 8, and b'' = 2 da/ds.
         let square = [
             0.5 * around[k],
             0.25 * h * scales[k],
@@ -200,7 +200,7 @@ impl Programme<'_> {
         let acceleration = [0.0, 0.5 * scales[k], 0.0, 0.5 * scales[k + 1]];
         let change = [0.0, -scales[k] / h, 0.0, scales[k + 1] / h];
         for axis in 0..3 {
-            let unit = speed / (self.limits.jerk_mm_s3[axis] * interval.ease[1]);
+            let unit = speed / (self.limits.jerk_mm_s3[axis] * interval.limit_shares[1]);
             let own: [f64; 4] = std::array::from_fn(|n| {
                 unit * (point.third[axis] * square[n]
                     + 3.0 * point.second[axis] * acceleration[n]
@@ -208,7 +208,8 @@ impl Programme<'_> {
             });
             let first_step = unit * interval.steps[0][axis] / self.period_s.powi(2);
             let second_step = unit * 0.75 * interval.steps[1][axis] * speed / self.period_s;
-            if own.iter().map(|value| value.abs()).sum::<f64>() + first_step + second_step <= NOTHING {
+            if own.iter().map(|value| value.abs()).sum::<f64>() + first_step + second_step <= COEFFICIENT_MIN
+            {
                 continue;
             }
             for sign in [1.0, -1.0] {
@@ -222,7 +223,7 @@ impl Programme<'_> {
     }
 }
 
-/// The solution, where there is one.
+/// The solution; `None` if the solver fails.
 fn solved(rows: &Rows, cost: &[f64], cones: &[SupportedConeT<f64>]) -> Option<Vec<f64>> {
     let columns = cost.len();
     let part = |of: fn(&(usize, usize, f64)) -> usize| rows.places.iter().map(of).collect::<Vec<_>>();

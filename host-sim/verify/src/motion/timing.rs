@@ -1,16 +1,16 @@
-//! When a motion along a pass is where, and what its samples use of the limits.
+//! A motion along a pass as a function of time, and the use of the limits by its samples.
 
 use super::path::PassPath;
-use super::programme::Profile;
+use super::programme::MotionProfile;
 use job::AxisLimits;
 
-/// Newton steps to the time that an interval takes: they double the digits from a good beginning.
+/// Newton steps for the duration of an interval: each doubles the digits.
 const NEWTON_STEPS: usize = 20;
-/// Below this `c t^2` the motion is a polynomial to the last digit.
+/// Below this `c t^2` the series of the motion is exact to f64 precision.
 const SERIES: f64 = 1e-3;
 
 /// Between two nodes: arc, speed, acceleration at the first; rate of the acceleration with the arc, 1/s^2.
-struct Piece {
+struct MotionSegment {
     time: f64,
     arc: f64,
     speed: f64,
@@ -18,12 +18,12 @@ struct Piece {
     rate: f64,
 }
 
-impl Piece {
-    /// Way and speed after a time: `x'' = a + c x`.
+impl MotionSegment {
+    /// Distance and speed after a time: `x'' = a + c x`.
     fn after(&self, t: f64) -> [f64; 2] {
         let (a, c, v) = (self.acceleration, self.rate, self.speed);
         let z = c * t * t;
-        // (cosh - 1) / z and sinh / sqrt z, continued to z below 0.
+        // (cosh - 1) / z and sinh / sqrt z, continued to negative z.
         let (even, odd, cosh) = if z.abs() < SERIES {
             (
                 0.5 + z / 24.0 * (1.0 + z / 30.0 * (1.0 + z / 56.0)),
@@ -55,36 +55,36 @@ impl Piece {
     }
 }
 
-/// A motion by time.
+/// A motion as a function of time.
 pub(super) struct Timing {
-    pieces: Vec<Piece>,
-    /// Jerk and duration of the rise before the first piece and of the fall behind the last.
+    segments: Vec<MotionSegment>,
+    /// Jerk and duration of the ramp before the first segment and of the ramp after the last.
     ends: [(f64, f64); 2],
-    /// When the fall begins.
+    /// Beginning of the final ramp.
     fall: f64,
     length: f64,
 }
 
 impl Timing {
-    pub(super) fn new(arcs: &[f64], profile: &Profile, ends: [(f64, f64); 2], length: f64) -> Self {
+    pub(super) fn new(arcs: &[f64], profile: &MotionProfile, ends: [(f64, f64); 2], length: f64) -> Self {
         let mut time = ends[0].1;
-        let mut pieces = Vec::with_capacity(arcs.len());
+        let mut segments = Vec::with_capacity(arcs.len());
         let speed = |node: usize| profile.squares[node].max(0.0).sqrt();
         for k in 0..arcs.len() - 1 {
             let way = arcs[k + 1] - arcs[k];
             let [a, next] = [profile.accelerations[k], profile.accelerations[k + 1]];
-            let piece = Piece {
+            let segment = MotionSegment {
                 time,
                 arc: arcs[k],
                 speed: speed(k),
                 acceleration: a,
                 rate: (next - a) / way,
             };
-            time += piece.duration(way, speed(k + 1));
-            pieces.push(piece);
+            time += segment.duration(way, speed(k + 1));
+            segments.push(segment);
         }
         Self {
-            pieces,
+            segments,
             ends,
             fall: time,
             length,
@@ -95,26 +95,26 @@ impl Timing {
         self.fall + self.ends[1].1
     }
 
-    /// Arc length at a time, and the interval that it lies in.
+    /// Arc length at a time, and its interval.
     fn at(&self, time: f64) -> (f64, usize) {
         let [(rise, _), (fall, last)] = self.ends;
-        let piece = self
-            .pieces
-            .partition_point(|piece| piece.time <= time)
-            .clamp(1, self.pieces.len())
+        let segment = self
+            .segments
+            .partition_point(|segment| segment.time <= time)
+            .clamp(1, self.segments.len())
             - 1;
         let arc = if time < self.ends[0].1 {
             rise * time.max(0.0).powi(3) / 6.0
         } else if time >= self.fall {
             self.length - fall * (self.fall + last - time).max(0.0).powi(3) / 6.0
         } else {
-            let from = &self.pieces[piece];
+            let from = &self.segments[segment];
             from.arc + from.after(time - from.time)[0]
         };
-        (arc.clamp(0.0, self.length), piece)
+        (arc.clamp(0.0, self.length), segment)
     }
 
-    /// Largest uses of the limits by samples one a period: of all, and of acceleration and jerk in each interval.
+    /// Largest use of the limits by samples at one per period: overall, and of acceleration and jerk in each interval.
     pub(super) fn uses(
         &self,
         path: &PassPath<'_>,
@@ -122,7 +122,7 @@ impl Timing {
         period_s: f64,
     ) -> ([f64; 3], Vec<[f64; 2]>) {
         let mut uses = [0.0_f64; 3];
-        let mut most = vec![[0.0_f64; 2]; self.pieces.len()];
+        let mut most = vec![[0.0_f64; 2]; self.segments.len()];
         let mut last = [[0.0; 3]; 3];
         last[0] = path.position(0.0);
         let mut intervals = [0_usize; 4];

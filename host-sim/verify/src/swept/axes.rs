@@ -1,22 +1,22 @@
-//! How far the axes travel for a tool path.
+//! Axis travel of a tool path.
 
-use super::track::Track;
+use super::track::ToolPath;
 use job::AXES;
-use job::Machine;
+use job::MachineSpec;
 
-/// How far the axes travel.
+/// Axis travel of a tool path.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Axes {
+pub struct AxisTravel {
     /// Least and largest position of each axis, mm; `None` without samples.
     pub extent_mm: Option<[[f64; 2]; 3]>,
-    /// By how much the path leaves the travel of each axis, below and above, mm: 0 where it does not, or no travel is given.
+    /// Excess over the travel limits of each axis, below and above, mm: 0 within the travel, or without travel limits.
     pub beyond_mm: [[f64; 2]; 3],
 }
 
-impl Axes {
-    /// Measures a tool path.
+impl AxisTravel {
+    /// Measures the travel of a tool path.
     #[must_use]
-    pub fn new(track: &Track, machine: &Machine) -> Self {
+    pub fn new(track: &ToolPath, machine: &MachineSpec) -> Self {
         let extent_mm = track.extent_mm();
         let mut beyond_mm = [[0.0; 2]; 3];
         if let (Some(extent), Some(travel)) = (extent_mm, machine.travel_mm) {
@@ -36,8 +36,8 @@ impl Axes {
         self.beyond_mm.iter().flatten().all(|beyond| *beyond <= 0.0)
     }
 
-    /// A sentence for each axis that the path leaves.
-    pub(super) fn failures(&self, machine: &Machine) -> Vec<String> {
+    /// One sentence per axis whose travel is exceeded.
+    pub(super) fn failures(&self, machine: &MachineSpec) -> Vec<String> {
         let (Some(extent), Some(travel)) = (self.extent_mm, machine.travel_mm) else {
             return Vec::new();
         };
@@ -46,7 +46,7 @@ impl Axes {
             .map(|axis| {
                 let ([low, high], [least, most]) = (extent[axis], travel[axis]);
                 format!(
-                    "{} runs from {low:.3} to {high:.3} mm, but machine.travel_mm ends at {least} and {most} mm: move the part or the travel",
+                    "{} moves from {low:.3} to {high:.3} mm, but machine.travel_mm is {least} to {most} mm: move the part, or correct the travel",
                     AXES[axis]
                 )
             })

@@ -1,29 +1,29 @@
-//! What the measuring came to, in figures and in sentences.
+//! Result of the measurement, in figures and in sentences.
 
-use super::axes::Axes;
-use super::gouge::Search;
+use super::axes::AxisTravel;
+use super::gouge::GougeSearchResult;
 use super::ridge::{Crest, Gap, GapRidge, MISSED_RADII};
-use super::shape::Shape;
-use super::track::Track;
+use super::shape::SurfaceCheck;
+use super::track::ToolPath;
 use job::Job;
 use oracle::Oracle;
 
-/// Spots that are kept of all ridges together.
-const SPOTS_MAX: usize = 100_000;
-/// Parts of the scallop limit that the histogram counts by, and how many of them; what is higher is in the last.
+/// Largest number of points stored for all ridges together.
+const RIDGE_POINTS_MAX: usize = 100_000;
+/// Bins of the histogram per scallop limit, and their number; greater heights are in the last bin.
 const BINS_A_LIMIT: f64 = 10.0;
 const BINS: usize = 13;
-/// Rounding of a centre to whole nanometres, mm: half the diagonal of a cube of 1 nm.
+/// Rounding of a centre to whole nanometres, mm: half the diagonal of a 1 nm cube.
 const ROUNDING_MM: f64 = 0.866_025_403_784_438_6e-6;
-/// What the search for a crest leaves, mm: the two heights agree better than this.
+/// Tolerance of the search for a crest, mm: the two heights agree within it.
 const CREST_MM: f64 = 1e-8;
-/// Rounding in f64, as a share of the coordinates: some tens of operations of 1.1e-16 each.
+/// Rounding in f64, as a share of the coordinates: tens of operations of 1.1e-16 each.
 const ARITHMETIC: f64 = 1e-14;
 
 /// The highest ridge.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Extreme {
-    /// Height, mm; four ball radii where no ball reaches the place.
+pub struct HighestScallop {
+    /// Height, mm; four ball radii where no ball reaches the point.
     pub height_mm: f64,
     /// Parameter u.
     pub u: f64,
@@ -31,46 +31,46 @@ pub struct Extreme {
     pub v: f64,
     /// Gap between passes, from 0: between pass `gap` and the next.
     pub gap: u32,
-    /// Place on the surface, mm.
-    pub place_mm: [f64; 3],
+    /// Point on the surface, mm.
+    pub point_mm: [f64; 3],
 }
 
-/// The deepest cut below the surface.
+/// The deepest gouge.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Gouge {
-    /// Ball radius less the distance of the centre's path, mm.
+    /// Ball radius minus the distance of the point from the centre's path, mm.
     pub depth_mm: f64,
-    /// Parameter u of the place that is cut.
+    /// Parameter u of the gouged point.
     pub u: f64,
-    /// Parameter v of that place.
+    /// Parameter v of the gouged point.
     pub v: f64,
-    /// The place, mm.
-    pub place_mm: [f64; 3],
-    /// Tick of the sample that cuts it (it, or the way to the next one).
+    /// The point, mm.
+    pub point_mm: [f64; 3],
+    /// Tick of the sample that gouges (at the sample, or between it and the next one).
     pub tick: u64,
     /// Pass of that sample.
     pub pass: u32,
     /// (u, v) of that sample's own contact.
     pub contact: [f64; 2],
-    /// Whether the surface's curvature at the place, or at the contact, is too tight for the ball; otherwise the ball cuts another
-    /// part of the surface than it touches.
+    /// Whether the concave radius at the point, or at the contact, is smaller than the ball's; otherwise the ball interferes with
+    /// another part of the surface than its contact.
     pub local: bool,
 }
 
-/// What the measured scallop heights may be off by, mm, part by part; all of it is [`MeasuringError::total_mm`].
+/// Error bound of the measured scallop heights, mm, by contribution; the sum is [`MeasurementError::total_mm`].
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct MeasuringError {
-    /// The way between samples: how far an arc through three of them leaves the straight lines that are taken.
+pub struct MeasurementError {
+    /// Interpolation between samples: sagitta of an arc through three samples over the straight lines used.
     pub path_mm: f64,
-    /// Positions are whole nanometres.
+    /// Rounding of positions to whole nanometres.
     pub rounding_mm: f64,
-    /// Stations along the gaps: how much higher than the highest station a ridge may be between two (by second differences).
+    /// Spacing of stations along the gaps: possible excess of a ridge between two stations over the highest station (second differences).
     pub stations_mm: f64,
-    /// Search for the crest, and f64.
+    /// Tolerance of the crest search, and f64 rounding.
     pub search_mm: f64,
 }
 
-impl MeasuringError {
+impl MeasurementError {
     /// The sum.
     #[must_use]
     pub fn total_mm(&self) -> f64 {
@@ -78,15 +78,15 @@ impl MeasuringError {
     }
 }
 
-/// A place on a ridge.
+/// A point of a ridge.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct RidgeSpot {
+pub struct RidgePoint {
     /// Parameter u.
     pub u: f64,
     /// Parameter v.
     pub v: f64,
-    /// Place on the surface, under the crest, mm.
-    pub place_mm: [f64; 3],
+    /// Point on the surface, under the crest, mm.
+    pub point_mm: [f64; 3],
     /// Height of the crest above it, mm.
     pub height_mm: f32,
 }
@@ -96,78 +96,78 @@ pub struct RidgeSpot {
 pub struct Ridge {
     /// Gap between passes, from 0.
     pub gap: u32,
-    /// Spots along it, the highest among them.
-    pub spots: Vec<RidgeSpot>,
+    /// Points along the ridge, the highest among them.
+    pub points: Vec<RidgePoint>,
 }
 
-/// All of it.
+/// Result of the measurement of a run.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Findings {
-    /// The highest ridge. Zero with less than two whole passes: see `ridges`.
-    pub scallop_max: Extreme,
-    /// Mean of the crest's height, weighted by the surface's area (each gap's strip has its crest's height all across), mm.
+pub struct SweptResult {
+    /// The highest ridge. Zero with fewer than two complete passes: `ridges` is empty then.
+    pub scallop_max: HighestScallop,
+    /// Mean of the crest's height, weighted by the surface's area (each gap's strip counts with its crest's height), mm.
     pub scallop_mean_mm: f64,
     /// Shares of that area by crest height: 0 to 0.1 h, 0.1 to 0.2 h, ..., 1.1 to 1.2 h, more.
     pub scallop_histogram: [f64; BINS],
-    /// What the heights may be off by, mm.
-    pub measuring_error_mm: f64,
-    /// Its parts.
-    pub measuring_error: MeasuringError,
-    /// The deepest cut, if one is deeper than `gouge_floor_mm`.
+    /// Error bound of the heights, mm.
+    pub measurement_error_mm: f64,
+    /// Contributions to the error bound.
+    pub measurement_error: MeasurementError,
+    /// The deepest gouge; `None` if none is deeper than `gouge_floor_mm`.
     pub gouge: Option<Gouge>,
-    /// What counts as a gouge, mm: more than the accuracy of positions that `verify` accepts, and the way between samples.
+    /// Least depth that counts as a gouge, mm: the position tolerance of `verify`, plus the interpolation error between samples.
     pub gouge_floor_mm: f64,
-    /// No place is cut deeper than this, mm; where contacts are near, as far as they are where they belong.
+    /// Upper bound of the depth at every point of the surface, mm; near contacts it assumes that the contacts are correct.
     pub gouge_bound_mm: f64,
-    /// Ridges, one a gap, thinned to 100 000 spots together.
+    /// Ridges, one per gap, thinned to 100 000 points in total.
     pub ridges: Vec<Ridge>,
-    /// Stations that were measured.
+    /// Number of stations measured.
     pub stations: usize,
-    /// Cells that were asked about for the gouge.
+    /// Number of cells evaluated in the gouge search.
     pub cells: usize,
-    /// How far the axes travel.
-    pub axes: Axes,
-    /// What the surface may trouble a ball with.
-    pub shape: Shape,
-    /// Sentences: what is not as asked. Empty if all is.
+    /// Axis travel.
+    pub axes: AxisTravel,
+    /// Concave radius, poles and degenerate points of the surface.
+    pub shape: SurfaceCheck,
+    /// One sentence per violated requirement; empty if all are met.
     pub failures: Vec<String>,
-    /// Sentences: what a person should know before the run, the failures among them.
+    /// One sentence per condition to know before the run, failures included.
     pub warnings: Vec<String>,
 }
 
-pub(super) struct Parts<'a> {
+pub(super) struct Measurements<'a> {
     pub(super) gaps: &'a [Gap<'a>],
     pub(super) ridges: &'a [GapRidge],
-    pub(super) search: Search,
+    pub(super) search: GougeSearchResult,
     pub(super) sagitta_mm: f64,
-    pub(super) axes: Axes,
-    pub(super) shape: Shape,
+    pub(super) axes: AxisTravel,
+    pub(super) shape: SurfaceCheck,
     pub(super) complete: bool,
 }
 
-impl Findings {
-    pub(super) fn new(job: &Job, oracle: &Oracle, track: &Track, parts: &Parts<'_>) -> Self {
+impl SweptResult {
+    pub(super) fn new(job: &Job, oracle: &Oracle, track: &ToolPath, parts: &Measurements<'_>) -> Self {
         let (scallop_max, most_possible) = extreme(oracle, parts);
         let (scallop_mean_mm, scallop_histogram) = mean(oracle, parts);
-        let slant = slant(scallop_max.height_mm, oracle.radius_mm);
+        let sensitivity = sensitivity(scallop_max.height_mm, oracle.radius_mm);
         let coordinates = parts.axes.extent_mm.map_or(0.0, |extent| {
             extent
                 .iter()
                 .flatten()
                 .fold(0.0_f64, |most, at| most.max(at.abs()))
         });
-        let measuring_error = MeasuringError {
-            path_mm: parts.sagitta_mm * slant,
-            rounding_mm: ROUNDING_MM * slant,
+        let measurement_error = MeasurementError {
+            path_mm: parts.sagitta_mm * sensitivity,
+            rounding_mm: ROUNDING_MM * sensitivity,
             stations_mm: most_possible - scallop_max.height_mm,
-            search_mm: CREST_MM + ARITHMETIC * (coordinates + oracle.radius_mm) * slant,
+            search_mm: CREST_MM + ARITHMETIC * (coordinates + oracle.radius_mm) * sensitivity,
         };
         let mut findings = Self {
             scallop_max,
             scallop_mean_mm,
             scallop_histogram,
-            measuring_error_mm: measuring_error.total_mm(),
-            measuring_error,
+            measurement_error_mm: measurement_error.total_mm(),
+            measurement_error,
             gouge: gouge(oracle, track, &parts.search),
             gouge_floor_mm: super::POSITION_MM + parts.sagitta_mm,
             gouge_bound_mm: parts.search.bound_mm,
@@ -196,13 +196,13 @@ impl Findings {
         let (most, limit) = (&self.scallop_max, job.scallop_mm);
         if most.height_mm >= MISSED_RADII * job.radius_mm {
             failures.push(format!(
-                "no ball reaches what is left between passes {} and {} at u = {:.6}, v = {:.6}",
+                "no ball reaches the material between passes {} and {} at u = {:.6}, v = {:.6}",
                 most.gap,
                 most.gap + 1,
                 most.u,
                 most.v
             ));
-        } else if most.height_mm > limit + self.measuring_error_mm {
+        } else if most.height_mm > limit + self.measurement_error_mm {
             failures.push(format!(
                 "the scallop is {:.6} mm high, {:.2} % above the limit of {limit} mm, between passes {} and {} at u = {:.6}, v = {:.6} (measured within {:.1e} mm)",
                 most.height_mm,
@@ -211,24 +211,24 @@ impl Findings {
                 most.gap + 1,
                 most.u,
                 most.v,
-                self.measuring_error_mm
+                self.measurement_error_mm
             ));
         }
         if let Some(gouge) = &self.gouge {
             let what = if gouge.local {
-                "the ball is larger than the hollow there"
+                "the ball's radius exceeds the concave radius there"
             } else {
-                "the ball stands on another part of the surface"
+                "the ball's contact is on another part of the surface"
             };
             failures.push(format!(
                 "the ball cuts {:.6} mm below the surface at u = {:.6}, v = {:.6} (x = {:.3}, y = {:.3}, z = {:.3} mm): at tick {}, pass {}, \
-                 with its contact at u = {:.6}, v = {:.6}; {what}: take a smaller ball, or leave this region out",
+                 with its contact at u = {:.6}, v = {:.6}; {what}: take a smaller ball, or exclude this region",
                 gouge.depth_mm,
                 gouge.u,
                 gouge.v,
-                gouge.place_mm[0],
-                gouge.place_mm[1],
-                gouge.place_mm[2],
+                gouge.point_mm[0],
+                gouge.point_mm[1],
+                gouge.point_mm[2],
                 gouge.tick,
                 gouge.pass,
                 gouge.contact[0],
@@ -239,37 +239,38 @@ impl Findings {
         failures
     }
 
-    fn other_warnings(&self, job: &Job, parts: &Parts<'_>) -> Vec<String> {
+    fn other_warnings(&self, job: &Job, parts: &Measurements<'_>) -> Vec<String> {
         let mut warnings = Vec::new();
         if let Some(hollow) = self
             .shape
-            .hollow
+            .concave_radius
             .filter(|hollow| hollow.radius_mm < job.radius_mm)
         {
             warnings.push(format!(
-                "the surface has a hollow of radius {:.4} mm at u = {:.6}, v = {:.6}, where a ball of {} mm does not fit",
+                "the surface has a concave radius of {:.4} mm at u = {:.6}, v = {:.6}, where a ball of {} mm does not fit",
                 hollow.radius_mm, hollow.u, hollow.v, job.radius_mm
             ));
         }
         if let Some((count, [u, v])) = self.shape.degenerate {
             warnings.push(format!(
-                "the surface has no normal at {count} of the places looked at, the first at u = {u:.6}, v = {v:.6}"
+                "the surface has no normal at {count} of the points evaluated, the first at u = {u:.6}, v = {v:.6}"
             ));
         }
         let skipped: u32 = parts.ridges.iter().map(|ridge| ridge.skipped).sum();
         if skipped > 0 {
             warnings.push(format!(
-                "{skipped} stations without a normal were left out of the scallop's measure"
+                "{skipped} stations without a normal were left out of the scallop measurement"
             ));
         }
         if !parts.complete {
-            warnings
-                .push("the run is not complete: what follows its last whole pass is not measured".to_owned());
+            warnings.push(
+                "the run is not complete: the part after its last complete pass is not measured".to_owned(),
+            );
         }
         let unseen = self.gouge_bound_mm - self.gouge_max_mm().max(self.gouge_floor_mm);
         if unseen > 1e-3 * self.gouge_max_mm() + 1e-9 {
             warnings.push(format!(
-                "gouges are searched down to {:.6} mm only: the ball hardly fits in too many places",
+                "gouges are searched only down to {:.6} mm: at too many points the ball hardly fits",
                 self.gouge_bound_mm
             ));
         }
@@ -277,14 +278,14 @@ impl Findings {
     }
 }
 
-/// How much a shift of the centre changes a height, at most: one over the cosine between ray and ball, which is
-/// `1 - height / r` on a plane, with room for curved surfaces.
-fn slant(height_mm: f64, radius_mm: f64) -> f64 {
+/// Upper bound of the change of a height per shift of the centre: the reciprocal of the cosine between ray and ball, which is
+/// `1 - height / r` on a plane, with a margin for curved surfaces.
+fn sensitivity(height_mm: f64, radius_mm: f64) -> f64 {
     1.0 / (1.0 - 2.0 * height_mm / radius_mm).max(0.1)
 }
 
-/// The highest crest, and what a crest may reach between stations.
-fn extreme(oracle: &Oracle, parts: &Parts<'_>) -> (Extreme, f64) {
+/// The highest crest, and the upper bound of a crest between stations.
+fn extreme(oracle: &Oracle, parts: &Measurements<'_>) -> (HighestScallop, f64) {
     let mut most: Option<(f64, &Crest, usize)> = None;
     let mut possible = 0.0_f64;
     for (gap, ridge) in parts.ridges.iter().enumerate() {
@@ -295,18 +296,18 @@ fn extreme(oracle: &Oracle, parts: &Parts<'_>) -> (Extreme, f64) {
                 most = Some((crest.height_mm, crest, gap));
             }
         }
-        possible = possible.max(own + ridge.unseen_mm);
+        possible = possible.max(own + ridge.excess_mm);
     }
     let Some((height_mm, crest, index)) = most else {
-        return (Extreme::default(), 0.0);
+        return (HighestScallop::default(), 0.0);
     };
     let (u, v) = oracle.swapped(crest.path, parts.gaps[index].side(crest.share));
-    let extreme = Extreme {
+    let extreme = HighestScallop {
         height_mm,
         u,
         v,
         gap: number(index),
-        place_mm: crest.place_mm,
+        point_mm: crest.point_mm,
     };
     (extreme, possible.max(height_mm))
 }
@@ -316,8 +317,8 @@ fn number(gap: usize) -> u32 {
     gap as u32
 }
 
-/// Mean crest height by area, and the histogram (trapezoids along each gap).
-fn mean(oracle: &Oracle, parts: &Parts<'_>) -> (f64, [f64; BINS]) {
+/// Mean crest height by area, and the histogram (trapezoidal rule along each gap).
+fn mean(oracle: &Oracle, parts: &Measurements<'_>) -> (f64, [f64; BINS]) {
     let (mut sum, mut area, mut histogram) = (0.0, 0.0, [0.0; BINS]);
     for (gap, ridge) in parts.gaps.iter().zip(parts.ridges) {
         let width = gap.side(1.0) - gap.side(0.0);
@@ -325,7 +326,7 @@ fn mean(oracle: &Oracle, parts: &Parts<'_>) -> (f64, [f64; BINS]) {
             let step = 0.5 * width * (pair[1].path - pair[0].path);
             for crest in pair {
                 let part = crest.area * step;
-                // Where a ball has gouged, nothing is left.
+                // Where a ball has gouged, no scallop remains.
                 sum += crest.height_mm.max(0.0) * part;
                 area += part;
                 #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "clamped")]
@@ -340,20 +341,20 @@ fn mean(oracle: &Oracle, parts: &Parts<'_>) -> (f64, [f64; BINS]) {
     (sum / area, histogram.map(|part| part / area))
 }
 
-fn gouge(oracle: &Oracle, track: &Track, search: &Search) -> Option<Gouge> {
+fn gouge(oracle: &Oracle, track: &ToolPath, search: &GougeSearchResult) -> Option<Gouge> {
     let deepest = search.deepest?;
     let (pass, index) = deepest.by;
     let samples = &track.passes[pass as usize];
     let (u, v) = oracle.swapped(samples.path[index as usize], samples.side);
     let tight = |u: f64, v: f64| {
-        super::grid::bend(&oracle.surface.at(u, v), oracle)
-            .is_some_and(|(_, bend)| bend.principal[1] * oracle.radius_mm >= 1.0)
+        super::grid::local_curvature(&oracle.surface.at(u, v), oracle)
+            .is_some_and(|(_, curvature)| curvature.principal[1] * oracle.radius_mm >= 1.0)
     };
     Some(Gouge {
         depth_mm: deepest.depth_mm,
         u: deepest.u,
         v: deepest.v,
-        place_mm: deepest.place_mm,
+        point_mm: deepest.point_mm,
         tick: samples.first_tick + u64::from(index),
         pass,
         contact: [u, v],
@@ -361,9 +362,9 @@ fn gouge(oracle: &Oracle, track: &Track, search: &Search) -> Option<Gouge> {
     })
 }
 
-/// The ridges with a bounded number of spots.
-fn thinned(oracle: &Oracle, parts: &Parts<'_>) -> Vec<Ridge> {
-    let each = (SPOTS_MAX / parts.ridges.len().max(1)).max(3);
+/// The ridges with a limited number of points.
+fn thinned(oracle: &Oracle, parts: &Measurements<'_>) -> Vec<Ridge> {
+    let each = (RIDGE_POINTS_MAX / parts.ridges.len().max(1)).max(3);
     let mut ridges = Vec::with_capacity(parts.ridges.len());
     for (index, (gap, ridge)) in parts.gaps.iter().zip(parts.ridges).enumerate() {
         let crests = &ridge.crests;
@@ -377,23 +378,23 @@ fn thinned(oracle: &Oracle, parts: &Parts<'_>) -> Vec<Ridge> {
         let stride = crests.len().div_ceil(each - 2).max(1);
         let kept =
             (0..crests.len()).filter(|k| k % stride == 0 || Some(*k) == highest || k + 1 == crests.len());
-        let spots = kept
+        let points = kept
             .map(|k| {
                 let crest = &crests[k];
                 let (u, v) = oracle.swapped(crest.path, gap.side(crest.share));
                 #[allow(clippy::cast_possible_truncation, reason = "for drawing")]
                 let height_mm = crest.height_mm as f32;
-                RidgeSpot {
+                RidgePoint {
                     u,
                     v,
-                    place_mm: crest.place_mm,
+                    point_mm: crest.point_mm,
                     height_mm,
                 }
             })
             .collect();
         ridges.push(Ridge {
             gap: number(index),
-            spots,
+            points,
         });
     }
     ridges

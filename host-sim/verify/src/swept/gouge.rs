@@ -1,116 +1,120 @@
-//! Gouge: where a ball, wherever on its path, goes below the surface.
+//! Gouge: where a ball at any position of its path is below the surface.
 //!
-//! A surface point P is cut by r - d, d its distance from the path of the centre. The largest of that is found by splitting cells:
-//! a cell whose bound (see `Tree::depth`) stays below what has been found, or below what counts as a gouge at all, is done.
+//! The depth at a surface point P is r - d, with d the distance of P from the path of the centre. The largest depth is found by branch and
+//! bound: a cell is closed when its bound (see `PathTree::depth`) is below the largest depth found, or below the least depth of a gouge.
 //!
-//! Beside its own contact a ball touches the surface, so its depth is 0 there, and no bound falls below it. Contacts near
-//! a cell are therefore left out of its bound, as far as the ball fits the curvature all around: with a = 1 - r k, k the largest
-//! curvature there, a ball whose contact is x away stays `a x^2 / (2 r)` above a point. (That they are where they belong
-//! is checked sample by sample: `oracle/verify.rs`.) Their depth in the cells' middles counts nevertheless.
+//! At its own contact a ball touches the surface, so its depth is 0 there, and no bound falls below 0. Contacts near
+//! a cell are therefore excluded from its bound where the ball fits the curvature in the neighbourhood: with a = 1 - r k, k the largest
+//! curvature there, a ball with its contact at distance x stays `a x^2 / (2 r)` above the point. (The contacts themselves are
+//! checked sample by sample: `oracle/verify.rs`.) The depth at the cells' centres includes these balls.
 
 use rayon::prelude::*;
 
-use super::grid::{Bend, Cell, Grid, bend};
+use super::grid::{Cell, CellGrid, LocalCurvature, local_curvature};
 use super::height::Ray;
-use super::tree::{Cut, Depth, Reach, Tree};
+use super::tree::{BallDepth, DepthQuery, PathTree, SampleIndex};
 use job::Along;
 use oracle::vector::{length, subtract};
 use oracle::{Oracle, OracleError};
 
-/// Times that a cell is split at most.
+/// Largest number of splits of a cell.
 const SPLITS_MAX: usize = 14;
-/// Cells that are asked about at most.
+/// Largest number of cells evaluated.
 const CELLS_MAX: usize = 1_500_000;
-/// A gouge is deep enough known within this share of itself.
+/// Relative tolerance of the deepest gouge.
 const DEPTH_SHARE: f64 = 1e-3;
-/// Room left over what the curvature asks for (see `reach`).
-const BESIDE: f64 = 1.15;
-/// Where a is below this no contact is left out: the ball hardly fits, or not at all.
-const FITS_MIN: f64 = 0.02;
-/// Times that such a window is widened at most.
-const WINDOWS: usize = 8;
-/// Ranges that hold nothing.
-const NOWHERE: [[f64; 2]; 2] = [[f64::INFINITY, f64::NEG_INFINITY]; 2];
-/// Cells a side that are looked at for the curvature around a cell.
-const LOOKS: usize = 12;
+/// Margin on the window that the curvature requires (see `reach`).
+const WINDOW_MARGIN: f64 = 1.15;
+/// For a below this no contact is excluded: the ball hardly fits, or not at all.
+const FIT_MARGIN_MIN: f64 = 0.02;
+/// Largest number of enlargements of such a window.
+const WINDOW_STEPS_MAX: usize = 8;
+/// Empty ranges.
+const EMPTY: [[f64; 2]; 2] = [[f64::INFINITY, f64::NEG_INFINITY]; 2];
+/// Cells per side evaluated for the curvature around a cell.
+const CELLS_PER_SIDE: usize = 12;
 
-/// The deepest place found.
+/// The deepest point found.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Deepest {
+pub(super) struct DeepestPoint {
     pub(super) depth_mm: f64,
     pub(super) u: f64,
     pub(super) v: f64,
-    pub(super) place_mm: [f64; 3],
-    pub(super) by: Cut,
+    pub(super) point_mm: [f64; 3],
+    pub(super) by: SampleIndex,
 }
 
-/// What the search came to.
+/// Result of the search.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Search {
-    pub(super) deepest: Option<Deepest>,
-    /// No place is cut deeper than this, mm.
+pub(super) struct GougeSearchResult {
+    pub(super) deepest: Option<DeepestPoint>,
+    /// Upper bound of the depth at every point, mm.
     pub(super) bound_mm: f64,
     pub(super) cells: usize,
 }
 
-pub(super) struct Searcher<'a> {
+pub(super) struct GougeSearch<'a> {
     pub(super) oracle: &'a Oracle,
-    pub(super) tree: &'a Tree<'a>,
-    pub(super) grid: &'a Grid,
-    /// What counts as a gouge, mm.
+    pub(super) tree: &'a PathTree<'a>,
+    pub(super) grid: &'a CellGrid,
+    /// Least depth that counts as a gouge, mm.
     pub(super) floor_mm: f64,
 }
 
 #[derive(Clone, Copy, Debug)]
-struct Looked {
+struct CellDepth {
     cell: Cell,
-    depth: Depth,
-    place_mm: [f64; 3],
+    depth: BallDepth,
+    point_mm: [f64; 3],
 }
 
-impl Searcher<'_> {
-    /// The deepest gouge; `done` is called with the number of cells that were asked about.
-    pub(super) fn search(&self, done: &(dyn Fn(u64) + Sync)) -> Search {
-        let mut deepest: Option<Deepest> = None;
+impl GougeSearch<'_> {
+    /// Searches the deepest gouge; `done` is called with the number of cells evaluated.
+    pub(super) fn search(&self, done: &(dyn Fn(u64) + Sync)) -> GougeSearchResult {
+        let mut deepest: Option<DeepestPoint> = None;
         let mut cells: Vec<Cell> = (0..self.grid.count()).map(|k| self.grid.cell(k)).collect();
-        let mut asked = 0;
+        let mut evaluations = 0;
         let mut left = self.floor_mm;
         for round in 0..=SPLITS_MAX {
-            asked += cells.len();
+            evaluations += cells.len();
             let found = deepest.map_or(0.0, |deepest| deepest.depth_mm);
-            let looked: Vec<Looked> = cells
+            let evaluated: Vec<CellDepth> = cells
                 .par_iter()
                 .filter_map(|cell| {
                     done(1);
-                    self.look(*cell, self.enough(found)).ok()
+                    self.evaluate(*cell, self.closing_bound(found)).ok()
                 })
                 .collect();
-            for look in &looked {
-                let (u, v) = look.cell.middle();
-                if let Some(by) = look.depth.by
-                    && look.depth.depth_mm > deepest.map_or(self.floor_mm, |deepest| deepest.depth_mm)
+            for cell_depth in &evaluated {
+                let (u, v) = cell_depth.cell.middle();
+                if let Some(by) = cell_depth.depth.by
+                    && cell_depth.depth.depth_mm > deepest.map_or(self.floor_mm, |deepest| deepest.depth_mm)
                 {
-                    deepest = Some(Deepest {
-                        depth_mm: look.depth.depth_mm,
+                    deepest = Some(DeepestPoint {
+                        depth_mm: cell_depth.depth.depth_mm,
                         u,
                         v,
-                        place_mm: look.place_mm,
+                        point_mm: cell_depth.point_mm,
                         by,
                     });
                 }
             }
-            let enough = self.enough(deepest.map_or(0.0, |deepest| deepest.depth_mm));
-            let mut open: Vec<&Looked> = looked
+            let closing_bound = self.closing_bound(deepest.map_or(0.0, |deepest| deepest.depth_mm));
+            let mut open: Vec<&CellDepth> = evaluated
                 .iter()
-                .filter(|look| look.depth.bound_mm > enough)
+                .filter(|cell_depth| cell_depth.depth.bound_mm > closing_bound)
                 .collect();
-            let most = |open: &[&Looked]| open.iter().map(|look| look.depth.bound_mm).fold(enough, f64::max);
+            let most = |open: &[&CellDepth]| {
+                open.iter()
+                    .map(|cell_depth| cell_depth.depth.bound_mm)
+                    .fold(closing_bound, f64::max)
+            };
             left = most(&open);
             if open.is_empty() || round == SPLITS_MAX {
                 break;
             }
-            // With no room for all, the worst go on; what the others may hide is said.
-            let room = (CELLS_MAX.saturating_sub(asked)) / 4;
+            // If the budget does not suffice for all cells, those with the largest bounds are split; the bound of the others is reported.
+            let room = (CELLS_MAX.saturating_sub(evaluations)) / 4;
             if open.len() > room {
                 open.sort_by(|a, b| b.depth.bound_mm.total_cmp(&a.depth.bound_mm));
                 left = most(&open[room..]);
@@ -119,21 +123,24 @@ impl Searcher<'_> {
                     break;
                 }
             }
-            cells = open.iter().flat_map(|look| look.cell.quarters()).collect();
+            cells = open
+                .iter()
+                .flat_map(|cell_depth| cell_depth.cell.quarters())
+                .collect();
         }
-        Search {
+        GougeSearchResult {
             deepest,
             bound_mm: left,
-            cells: asked,
+            cells: evaluations,
         }
     }
 
-    /// A bound that is not worth a split.
-    fn enough(&self, found_mm: f64) -> f64 {
+    /// Bound below which a cell is not split.
+    fn closing_bound(&self, found_mm: f64) -> f64 {
         self.floor_mm.max(found_mm * (1.0 + DEPTH_SHARE))
     }
 
-    fn look(&self, cell: Cell, floor_mm: f64) -> Result<Looked, OracleError> {
+    fn evaluate(&self, cell: Cell, floor_mm: f64) -> Result<CellDepth, OracleError> {
         let oracle = self.oracle;
         let (u, v) = cell.middle();
         let at = oracle.surface.at(u, v);
@@ -145,59 +152,59 @@ impl Searcher<'_> {
                     .map(|v| length(subtract(oracle.surface.at(u, v).point, at.point)))
             })
             .fold(0.0, f64::max);
-        let (ray, reach) = match bend(&at, oracle) {
-            Some((along, bend)) => {
+        let (ray, reach) = match local_curvature(&at, oracle) {
+            Some((along, curvature)) => {
                 let ray = Ray {
                     from: at.point,
                     along,
                 };
-                (ray, self.reach(cell, around_mm, &bend, floor_mm))
+                (ray, self.reach(cell, around_mm, &curvature, floor_mm))
             }
             None => {
                 let ray = Ray {
                     from: at.point,
                     along: oracle.contact(u, v)?.normal,
                 };
-                let [low, high] = self.grid.principal([cell.u, cell.v], LOOKS);
-                let bend = low.abs().max(high.abs());
-                let reach = Reach {
+                let [low, high] = self.grid.principal([cell.u, cell.v], CELLS_PER_SIDE);
+                let curvature = low.abs().max(high.abs());
+                let reach = DepthQuery {
                     around_mm,
-                    bend: if bend.is_finite() { bend } else { 0.0 },
+                    curvature: if curvature.is_finite() { curvature } else { 0.0 },
                     floor_mm,
                     gouge_mm: self.floor_mm,
-                    but: NOWHERE,
+                    excluded: EMPTY,
                 };
                 (ray, reach)
             }
         };
-        Ok(Looked {
+        Ok(CellDepth {
             cell,
             depth: self.tree.depth(&ray, &reach),
-            place_mm: at.point,
+            point_mm: at.point,
         })
     }
 
-    /// What a cell's bound has to cover, and which contacts it may leave out.
+    /// The radius that a cell's bound must cover, and the contacts that it may exclude.
     ///
-    /// With b the largest curvature either way and R the cell's half-diagonal, the bound of a contact x away is
+    /// With b the largest curvature magnitude and R the cell's half-diagonal, the bound of a contact at distance x is
     /// `-a x^2 / (2 r) + R a x / r + R^2 b / 2`: not above 0 from `x = R (1 + sqrt(1 + r b / a))` on.
-    fn reach(&self, cell: Cell, around_mm: f64, own: &Bend, floor_mm: f64) -> Reach {
+    fn reach(&self, cell: Cell, around_mm: f64, own: &LocalCurvature, floor_mm: f64) -> DepthQuery {
         let radius = self.oracle.radius_mm;
         let (u, v) = cell.middle();
         let mut principal = own.principal;
-        let mut but = NOWHERE;
-        // The window depends on the curvature in it: both grow until they agree, or nothing is left out.
-        for round in 0..WINDOWS {
+        let mut excluded = EMPTY;
+        // The window depends on the curvature inside it: both are enlarged until they are consistent, or no contact is excluded.
+        for round in 0..WINDOW_STEPS_MAX {
             let fits = 1.0 - radius * principal[1];
-            if fits < FITS_MIN || round + 1 == WINDOWS {
-                but = NOWHERE;
+            if fits < FIT_MARGIN_MIN || round + 1 == WINDOW_STEPS_MAX {
+                excluded = EMPTY;
                 break;
             }
-            let bend = principal[0].abs().max(principal[1].abs());
-            let beside_mm = BESIDE * around_mm * (1.0 + (1.0 + radius * bend / fits).sqrt());
+            let curvature = principal[0].abs().max(principal[1].abs());
+            let beside_mm = WINDOW_MARGIN * around_mm * (1.0 + (1.0 + radius * curvature / fits).sqrt());
             let window = |at: f64, per_mm: f64| [at - beside_mm * per_mm, at + beside_mm * per_mm];
-            but = [window(u, own.per_mm[0]), window(v, own.per_mm[1])];
-            let around = self.grid.principal(but, LOOKS);
+            excluded = [window(u, own.per_mm[0]), window(v, own.per_mm[1])];
+            let around = self.grid.principal(excluded, CELLS_PER_SIDE);
             let wider = [principal[0].min(around[0]), principal[1].max(around[1])];
             if wider == principal {
                 break;
@@ -205,14 +212,14 @@ impl Searcher<'_> {
             principal = wider;
         }
         if self.oracle.along == Along::V {
-            but.reverse();
+            excluded.reverse();
         }
-        Reach {
+        DepthQuery {
             around_mm,
-            bend: principal[0].abs().max(principal[1].abs()),
+            curvature: principal[0].abs().max(principal[1].abs()),
             floor_mm,
             gouge_mm: self.floor_mm,
-            but,
+            excluded,
         }
     }
 }

@@ -1,4 +1,4 @@
-//! A grid of cells over the surface, fine enough for what a surface of degree three can do between two knots.
+//! A grid of cells over the surface that resolves the features of a cubic surface between two knots.
 
 use rayon::prelude::*;
 
@@ -6,31 +6,31 @@ use job::Along;
 use oracle::vector::{cross, dot, length, scale, subtract};
 use oracle::{Derivatives, Oracle};
 
-/// Cells a side of a span at least: a cubic has no feature narrower than a twelfth of its span.
+/// Least number of cells per side of a span: a cubic has no feature narrower than a twelfth of its span.
 const SPAN_CELLS: usize = 12;
-/// A cell's side, as a share of the ball's radius, at most.
+/// Largest side of a cell, as a share of the ball's radius.
 const CELL_SHARE: f64 = 1.0 / 24.0;
-/// Lines along which a span's length is taken.
+/// Number of lines on which a span's length is measured.
 const LENGTH_LINES: usize = 5;
-/// Cells of the grid at most: coarser ones are split where it matters.
+/// Largest number of cells of the grid: larger cells are split later where needed.
 const CELLS_MAX: usize = 400_000;
-/// `|S_u x S_v|` below this share of `|S_u| |S_v|` counts as degenerate: as for the core.
+/// `|S_u x S_v|` below this share of `|S_u| |S_v|` counts as degenerate: the core's threshold.
 const SINE_MIN: f64 = 1e-3;
 /// A first derivative shorter than this share of the other one (each times its range) is too close to a pole: the curvature would
-/// be a quotient of roundings.
+/// be a quotient of rounding errors.
 const POLE_SHARE: f64 = 1e-5;
 
-/// Curvature at a place.
+/// Curvature at a point.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) struct Bend {
+pub(super) struct LocalCurvature {
     /// Least and largest principal curvature towards the tool, 1/mm.
     pub(super) principal: [f64; 2],
-    /// Change of u, and of v, within a millimetre on the surface, at most.
+    /// Upper bound of the change of u, and of v, per millimetre on the surface.
     pub(super) per_mm: [f64; 2],
 }
 
 /// Tool normal and curvature; `None` where the derivatives do not span a plane, and close to a pole.
-pub(super) fn bend(at: &Derivatives, oracle: &Oracle) -> Option<([f64; 3], Bend)> {
+pub(super) fn local_curvature(at: &Derivatives, oracle: &Oracle) -> Option<([f64; 3], LocalCurvature)> {
     let (speed_u, speed_v) = (length(at.u), length(at.v));
     let [[u0, u1], [v0, v1]] = oracle.surface.domain();
     let reach = (speed_u * (u1 - u0), speed_v * (v1 - v0));
@@ -48,22 +48,22 @@ pub(super) fn bend(at: &Derivatives, oracle: &Oracle) -> Option<([f64; 3], Bend)
     let mean = 0.5 * (e * n - 2.0 * f * m + g * l) / (area * area);
     let gauss = (l * n - m * m) / (area * area);
     let spread = (mean * mean - gauss).max(0.0).sqrt();
-    let bend = Bend {
+    let curvature = LocalCurvature {
         principal: [mean - spread, mean + spread],
         per_mm: [speed_v / area, speed_u / area],
     };
-    Some((normal, bend))
+    Some((normal, curvature))
 }
 
-/// The grid: edges of the cells along u and v, and the curvature in each cell's middle.
+/// The grid: cell edges along u and v, and the curvature at each cell's centre.
 #[derive(Debug)]
-pub(super) struct Grid {
+pub(super) struct CellGrid {
     pub(super) edges: [Vec<f64>; 2],
     /// v fastest; `None` in degenerate cells.
-    pub(super) bends: Vec<Option<Bend>>,
+    pub(super) curvatures: Vec<Option<LocalCurvature>>,
 }
 
-/// Part of the surface between two parameters of each kind.
+/// Part of the surface between two values of each parameter.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Cell {
     pub(super) u: [f64; 2],
@@ -75,7 +75,7 @@ impl Cell {
         (0.5 * (self.u[0] + self.u[1]), 0.5 * (self.v[0] + self.v[1]))
     }
 
-    /// Its quarters.
+    /// The four quarters of the cell.
     pub(super) fn quarters(&self) -> [Self; 4] {
         let (u, v) = self.middle();
         let (us, vs) = ([[self.u[0], u], [u, self.u[1]]], [[self.v[0], v], [v, self.v[1]]]);
@@ -86,7 +86,7 @@ impl Cell {
     }
 }
 
-impl Grid {
+impl CellGrid {
     pub(super) fn new(oracle: &Oracle) -> Self {
         let spans = [Along::U, Along::V].map(|along| span_lengths(oracle, along));
         let cells = |share: f64| {
@@ -98,7 +98,7 @@ impl Grid {
         };
         let mut share = CELL_SHARE;
         let mut counts = cells(share);
-        // Twice as large cells are a quarter as many: ends where every span has its least.
+        // Doubling the cells divides their number by four; ends at the least number of cells per span.
         for _ in 0..32 {
             let total: usize = counts.iter().map(|counts| counts.iter().sum::<usize>()).product();
             if total <= CELLS_MAX {
@@ -122,13 +122,13 @@ impl Grid {
         });
         let mut grid = Self {
             edges,
-            bends: Vec::new(),
+            curvatures: Vec::new(),
         };
-        grid.bends = (0..grid.count())
+        grid.curvatures = (0..grid.count())
             .into_par_iter()
             .map(|index| {
                 let (u, v) = grid.cell(index).middle();
-                bend(&oracle.surface.at(u, v), oracle).map(|(_, bend)| bend)
+                local_curvature(&oracle.surface.at(u, v), oracle).map(|(_, curvature)| curvature)
             })
             .collect();
         grid
@@ -153,8 +153,8 @@ impl Grid {
         }
     }
 
-    /// Least and largest principal curvature in the cells that a range of parameters touches; at most so many of them a side are
-    /// looked at, evenly spread.
+    /// Least and largest principal curvature in the cells that intersect a range of parameters; evaluates at most `looks` cells per side,
+    /// evenly spread.
     pub(super) fn principal(&self, ranges: [[f64; 2]; 2], looks: usize) -> [f64; 2] {
         let columns = self.shape()[1];
         let [(i0, i1, i_step), (j0, j1, j_step)] = [0, 1].map(|axis: usize| {
@@ -167,8 +167,11 @@ impl Grid {
         let mut found = [f64::INFINITY, f64::NEG_INFINITY];
         for i in (i0..=i1).step_by(i_step) {
             for j in (j0..=j1).step_by(j_step) {
-                if let Some(bend) = &self.bends[i * columns + j] {
-                    found = [found[0].min(bend.principal[0]), found[1].max(bend.principal[1])];
+                if let Some(curvature) = &self.curvatures[i * columns + j] {
+                    found = [
+                        found[0].min(curvature.principal[0]),
+                        found[1].max(curvature.principal[1]),
+                    ];
                 }
             }
         }
@@ -176,7 +179,7 @@ impl Grid {
     }
 }
 
-/// Length of each span along one parameter, mm: the longest of a few lines.
+/// Length of each span along one parameter, mm: the longest of several lines.
 fn span_lengths(oracle: &Oracle, along: Along) -> Vec<f64> {
     let breaks = oracle.surface.breaks(along);
     let [[u0, u1], [v0, v1]] = oracle.surface.domain();

@@ -1,24 +1,24 @@
-//! Where a ray from the surface enters the swept ball.
+//! Entry of a ray from the surface into the swept ball.
 //!
-//! From the surface point P the ray `P + t N` goes along the tool normal. A ball of radius r about C is entered at
-//! `t = m.N - sqrt((m.N)^2 - |m|^2 + r^2)`, m = C - P. Between two samples the centre runs along a straight line, so the ball
-//! sweeps a capsule: a cylinder between two balls, entered where the nearer of the two equations says.
+//! From the surface point P the ray `P + t N` follows the tool normal. It enters a ball of radius r about C at
+//! `t = m.N - sqrt((m.N)^2 - |m|^2 + r^2)`, m = C - P. Between two samples the centre moves on a straight line, so the ball
+//! sweeps a capsule: a cylinder with a hemisphere at each end; the entry is the least of theirs.
 
-use super::track::{PassTrack, across};
+use super::track::{ToolPathPass, across};
 use oracle::vector::{Vector, add, dot, scale, subtract};
 
-/// Newton steps towards the nearest sample: each squares the error; the walk after it makes up for what is left.
+/// Newton steps towards the nearest sample: each squares the error; the search over neighbours afterwards corrects the rest.
 const NEWTON_STEPS: usize = 12;
-/// Samples are compared at this share of the ball's radius, where the distance has changed by 1/8000 of the radius: far more
-/// than by the rounding to nanometres.
+/// Distance of the samples compared, as a share of the ball's radius. Over it the distance from the ray changes by 1/8000 of the radius,
+/// far more than by rounding to nanometres.
 const STRIDE_SHARE: f64 = 1.0 / 64.0;
-/// Rounds of: nearest sample to the point on the ray, then the ray's entry there. The first entry's error is of second
-/// order in the nearest sample's; three rounds leave nothing but rounding.
+/// Iterations of: nearest sample to the point on the ray, then the ray's entry there. The first entry's error is of second
+/// order in the nearest sample's; three iterations reduce it to rounding.
 const ROUNDS: usize = 3;
-/// A further round is not worth its time when the entry has moved by less, mm.
-const ROUND_ENOUGH_MM: f64 = 1e-9;
+/// Iteration ends when the entry moves by less than this, mm.
+const ENTRY_TOLERANCE_MM: f64 = 1e-9;
 
-/// A ray: point of the surface and tool normal there.
+/// A ray: a point of the surface and the tool normal there.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Ray {
     pub(super) from: Vector,
@@ -30,7 +30,7 @@ impl Ray {
         add(self.from, scale(self.along, t))
     }
 
-    /// Where the ray enters a ball, and where it leaves it.
+    /// Parameters at which the ray enters and leaves a ball.
     pub(super) fn through_ball(&self, centre: Vector, radius: f64) -> Option<[f64; 2]> {
         let m = subtract(centre, self.from);
         let along = dot(m, self.along);
@@ -43,8 +43,8 @@ impl Ray {
         })
     }
 
-    /// Where the ray enters the ball that moves from one centre to the other; infinite where it does not, or where it leaves it
-    /// before the surface.
+    /// Entry of the ray into the capsule between two centres; infinite if the ray misses the capsule, or leaves it below
+    /// the surface.
     pub(super) fn entry(&self, [from, to]: [Vector; 2], radius: f64) -> f64 {
         let mut first = f64::INFINITY;
         for centre in [from, to] {
@@ -66,7 +66,7 @@ impl Ray {
         if a <= 0.0 {
             return first;
         }
-        // |m_off|^2 - b^2 / a: the squared distance of the two lines.
+        // |m_off|^2 - b^2 / a: squared distance of the two lines.
         let apart = subtract(m_off, scale(n_off, b / a));
         let inside = (radius * radius - dot(apart, apart)) / a;
         if inside < 0.0 {
@@ -85,16 +85,16 @@ impl Ray {
     }
 }
 
-/// The heights that one pass leaves.
+/// The heights left by one pass.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct PassHeight<'a> {
-    pass: &'a PassTrack,
+    pass: &'a ToolPathPass,
     radius: f64,
     stride: usize,
 }
 
 impl<'a> PassHeight<'a> {
-    pub(super) fn new(pass: &'a PassTrack, radius: f64) -> Self {
+    pub(super) fn new(pass: &'a ToolPathPass, radius: f64) -> Self {
         let samples = pass.cl_nm.len();
         let spacing = pass.spacing_mm();
         let stride = STRIDE_SHARE * radius / spacing.max(1e-9);
@@ -107,22 +107,22 @@ impl<'a> PassHeight<'a> {
         Self { pass, radius, stride }
     }
 
-    pub(super) fn pass(&self) -> &'a PassTrack {
+    pub(super) fn pass(&self) -> &'a ToolPathPass {
         self.pass
     }
 
-    /// Height at which the ray enters this pass's swept ball, and the sample nearest to that; infinite where it misses it.
-    /// `hint`: a sample near it; the nearest minimum from there is found.
+    /// Height at which the ray enters this pass's swept ball, and the nearest sample; infinite if the ray misses the ball.
+    /// `hint`: a sample near it; the search finds the nearest local minimum from there.
     pub(super) fn of(&self, ray: &Ray, hint: usize) -> (f64, usize) {
-        self.in_rounds(ray, hint, ROUNDS)
+        self.iterate(ray, hint, ROUNDS)
     }
 
-    /// The same in one round: too high, if anything, by the square of what the nearest sample is off.
+    /// One iteration only: an upper bound, with an error of second order in that of the nearest sample.
     pub(super) fn about(&self, ray: &Ray, hint: usize) -> (f64, usize) {
-        self.in_rounds(ray, hint, 1)
+        self.iterate(ray, hint, 1)
     }
 
-    fn in_rounds(&self, ray: &Ray, hint: usize, rounds: usize) -> (f64, usize) {
+    fn iterate(&self, ray: &Ray, hint: usize, rounds: usize) -> (f64, usize) {
         let mut index = hint;
         let mut height = f64::INFINITY;
         for _ in 0..rounds {
@@ -134,7 +134,7 @@ impl<'a> PassHeight<'a> {
             index = self.nearest(target, index);
             let before = height;
             (height, index) = self.entry_near(ray, index);
-            if (height - before).abs() <= ROUND_ENOUGH_MM {
+            if (height - before).abs() <= ENTRY_TOLERANCE_MM {
                 break;
             }
         }
@@ -146,7 +146,7 @@ impl<'a> PassHeight<'a> {
         dot(off, off)
     }
 
-    /// The sample nearest to a point, by Newton's method over strides and then downhill.
+    /// The sample nearest to a point, by Newton's method in strides, then by descent over neighbours.
     #[allow(
         clippy::cast_possible_truncation,
         clippy::cast_possible_wrap,
@@ -195,7 +195,7 @@ impl<'a> PassHeight<'a> {
         }
     }
 
-    /// The ray's entry over the samples around one.
+    /// The ray's entry over the samples next to one.
     fn entry_near(&self, ray: &Ray, index: usize) -> (f64, usize) {
         let last = self.pass.cl_nm.len() - 1;
         let (from, to) = (index.saturating_sub(2), (index + 2).min(last));

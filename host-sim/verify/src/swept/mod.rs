@@ -1,24 +1,24 @@
-//! Scallop height and gouge, measured from the ball's swept envelope, and what else there is to know before a job runs.
+//! Scallop height and gouge, measured from the ball's swept envelope, with axis travel and concave radii.
 //!
 //! ```text
-//! samples ──track.rs──► Track ──height.rs──► where a ray from the surface enters one pass's swept ball
+//! samples ──track.rs──► ToolPath ──height.rs──► where a ray from the surface enters one pass's swept ball
 //!                         │   ──tree.rs────► the same, and the nearest ball, over the whole path
 //!                         │        │
-//!                         │        ├──ridge.rs──► the ridge in each gap between two passes: maximum, mean, spots
-//!                         │        └──gouge.rs──► the deepest cut below the surface (cells of grid.rs, split where it matters)
-//!                         └──axes.rs──► travel        shape.rs: tightest hollow, degenerate places
+//!                         │        ├──ridge.rs──► the ridge in each gap between two passes: maximum, mean, points
+//!                         │        └──gouge.rs──► the deepest gouge (cells of grid.rs, split where it matters)
+//!                         └──axes.rs──► travel        shape.rs: tightest concave radius, degenerate points
 //! ```
 //!
-//! Nothing here knows the formula that the path intervals come from, nor anything of the core: what counts is the tool path as
-//! it was emitted, and the surface as the job file states it (`oracle`, f64).
+//! Neither the formula of the path intervals nor anything of the core is used: the input is the tool path as
+//! emitted, and the surface as given in the job file (`oracle`, f64).
 //!
-//! **Scallop height** at a surface point P is the way along the tool normal from P to the swept ball: what is left standing
-//! there. Between samples the centre runs straight. On a line across the gap between two passes it is highest where both
-//! passes leave the same (the crest), unless the surface has a feature there: each part of the line between knots is looked
-//! at in eight places as well. Any other part of the path may lower a crest. Where one lowers it below the surface, the height is
-//! negative and the crest is not searched elsewhere: the gouge is reported. First and last pass lie on the surface's boundaries, so nothing is left outside of them.
+//! **Scallop height** at a surface point P is the distance along the tool normal from P to the swept ball: the material
+//! left there. Between samples the centre moves on a straight line. On a line across the gap between two passes the maximum is at the point
+//! where both passes leave the same height (the crest), unless the surface has a feature in the gap: each part of the line between knots is
+//! therefore also evaluated at eight points. Any other part of the path may lower a crest. If it lowers the crest below the surface, the height is
+//! negative and the crest is not searched elsewhere: the gouge is reported. First and last pass are on the surface's boundaries.
 //!
-//! **What the measuring may be wrong by** is stated with the result, [`MeasuringError`]. Results don't depend on the number of
+//! **Error bound**: stated with the result, [`MeasurementError`]. Results do not depend on the number of
 //! threads.
 
 mod axes;
@@ -33,50 +33,50 @@ mod tests;
 mod track;
 mod tree;
 
-pub use axes::Axes;
-pub use findings::{Extreme, Findings, Gouge, MeasuringError, Ridge, RidgeSpot};
-pub use shape::{Hollow, Shape};
-pub use track::{PassTrack, Track};
+pub use axes::AxisTravel;
+pub use findings::{Gouge, HighestScallop, MeasurementError, Ridge, RidgePoint, SweptResult};
+pub use shape::{ConcaveRadius, SurfaceCheck};
+pub use track::{ToolPath, ToolPathPass};
 
-use gouge::{Search, Searcher};
-use grid::Grid;
+use gouge::{GougeSearch, GougeSearchResult};
+use grid::CellGrid;
 use height::PassHeight;
 use rayon::prelude::*;
 use ridge::{Gap, GapRidge};
-use tree::Tree;
+use tree::PathTree;
 
 use job::Job;
 use oracle::Oracle;
 
-/// What a sample's position may be off by and still pass `verify`, mm (see `commands::BOUNDS`): cuts no deeper than this are no
+/// Position tolerance of `verify`, mm (see `inspect::BOUNDS`): depths up to this are no
 /// gouge.
 const POSITION_MM: f64 = 10e-6;
 
-/// Who is told how far the measuring has come.
+/// Receives the progress of a measurement.
 pub trait Progress: Sync {
-    /// A part begins, of so many steps.
+    /// A part begins, with this number of steps.
     fn begin(&self, what: &'static str, steps: u64);
-    /// So many steps are done.
+    /// This number of steps is complete.
     fn done(&self, steps: u64);
 }
 
-/// Nobody is told.
+/// Ignores the progress.
 impl Progress for () {
     fn begin(&self, _: &'static str, _: u64) {}
     fn done(&self, _: u64) {}
 }
 
-/// Measures a tool path against the job's surface, on all cores. `complete`: the run came to its end; otherwise its last pass
-/// leaves no ridge.
+/// Measures a tool path against the job's surface, on all cores. `complete`: the run reached its end; otherwise its last pass
+/// is left out of the ridges.
 #[must_use]
 pub fn measure(
     job: &Job,
     oracle: &Oracle,
-    track: &Track,
+    track: &ToolPath,
     complete: bool,
     progress: &dyn Progress,
-) -> Findings {
-    let tree = Tree::new(track, oracle.radius_mm);
+) -> SweptResult {
+    let tree = PathTree::new(track, oracle.radius_mm);
     let whole = track.passes.len() - usize::from(!complete && !track.passes.is_empty());
     let heights: Vec<PassHeight<'_>> = track.passes[..whole]
         .par_iter()
@@ -95,28 +95,28 @@ pub fn measure(
             ridge
         })
         .collect();
-    let grid = Grid::new(oracle);
+    let grid = CellGrid::new(oracle);
     let sagitta_mm = track
         .passes
         .par_iter()
-        .map(PassTrack::sagitta_mm)
+        .map(ToolPathPass::sagitta_mm)
         .reduce(|| 0.0, f64::max);
     progress.begin("gouge", grid.count() as u64);
-    let search: Search = Searcher {
+    let search: GougeSearchResult = GougeSearch {
         oracle,
         tree: &tree,
         grid: &grid,
         floor_mm: POSITION_MM + sagitta_mm,
     }
     .search(&|steps| progress.done(steps));
-    let parts = findings::Parts {
+    let parts = findings::Measurements {
         gaps: &gaps,
         ridges: &ridges,
         search,
         sagitta_mm,
-        axes: Axes::new(track, &job.machine),
-        shape: Shape::new(oracle, &grid),
+        axes: AxisTravel::new(track, &job.machine),
+        shape: SurfaceCheck::new(oracle, &grid),
         complete,
     };
-    Findings::new(job, oracle, track, &parts)
+    SweptResult::new(job, oracle, track, &parts)
 }

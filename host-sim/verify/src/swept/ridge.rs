@@ -1,32 +1,32 @@
-//! The ridge between two neighbouring passes: at stations along the gap, the highest place between the two.
+//! The ridge between two neighbouring passes: the highest point across the gap, at stations along the gap.
 
 use super::height::{PassHeight, Ray};
-use super::tree::Tree;
+use super::tree::PathTree;
 use oracle::vector::{cross, length, scale};
 use oracle::{Oracle, OracleError};
 
-/// Places across a gap, and across each part of it between knots, at which the height is looked at besides the crest.
+/// Points across a gap, and across each part of it between knots, at which the height is evaluated besides the crest.
 const ACROSS: usize = 8;
-/// Stations along a gap to begin with.
+/// Initial number of stations along a gap.
 const STATIONS: usize = 96;
-/// Rounds of halving intervals between stations.
+/// Largest number of bisections of the intervals between stations.
 const HALVINGS: usize = 10;
-/// Heights are alike within this share of the gap's largest, or within this, mm: the rounding of centres to nanometres.
-const ALIKE_SHARE: f64 = 1e-4;
-const ALIKE_MM: f64 = 2e-6;
-/// A crest that another part of the path lowers to less than this below the surface, mm, is gone.
+/// Heights are equal within this share of the gap's largest, or within this, mm: the rounding of centres to nanometres.
+const EQUAL_SHARE: f64 = 1e-4;
+const EQUAL_MM: f64 = 2e-6;
+/// A crest lowered by another part of the path to less than this below the surface, mm, is not searched further.
 const GOUGED_MM: f64 = 1e-4;
-/// Steps of the search for the crest; three or four are usual.
+/// Largest number of iterations of the crest search; three or four are usual.
 const CREST_STEPS: usize = 60;
 /// The two heights at the crest agree within this, mm.
 const CREST_MM: f64 = 1e-8;
-/// Golden-section steps for a crest that is not where the two heights agree.
+/// Golden-section steps for a maximum where the two heights differ.
 const GOLDEN_STEPS: usize = 40;
 const GOLDEN: f64 = 0.618_033_988_749_894_8;
-/// What a ray that misses both swept balls counts as, in radii: no height, but more than any.
+/// Height of a point whose ray misses both swept balls, in radii: above every measured height.
 pub(super) const MISSED_RADII: f64 = 4.0;
 
-/// The highest place across a gap at one station.
+/// The highest point across a gap at one station.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Crest {
     /// Path parameter.
@@ -35,19 +35,19 @@ pub(super) struct Crest {
     pub(super) share: f64,
     /// Height, mm.
     pub(super) height_mm: f64,
-    /// Place on the surface, mm.
-    pub(super) place_mm: [f64; 3],
+    /// Point on the surface, mm.
+    pub(super) point_mm: [f64; 3],
     /// |S_u x S_v| there.
     pub(super) area: f64,
 }
 
-/// What one gap comes to.
+/// Result of one gap.
 #[derive(Clone, Debug)]
 pub(super) struct GapRidge {
     pub(super) crests: Vec<Crest>,
-    /// Between stations a crest may be higher than the highest found by this, mm.
-    pub(super) unseen_mm: f64,
-    /// Stations without a surface normal: left out.
+    /// Upper bound of the excess of a crest between stations over the highest one found, mm.
+    pub(super) excess_mm: f64,
+    /// Stations left out because the surface has no normal there.
     pub(super) skipped: u32,
 }
 
@@ -55,15 +55,15 @@ pub(super) struct GapRidge {
 pub(super) struct Gap<'a> {
     oracle: &'a Oracle,
     passes: [PassHeight<'a>; 2],
-    tree: &'a Tree<'a>,
+    tree: &'a PathTree<'a>,
     sides: [f64; 2],
-    /// Shares of the gap that are looked at, 0 and 1 among them.
+    /// Shares of the gap that are evaluated, 0 and 1 among them.
     across: Vec<f64>,
     missed: f64,
 }
 
 impl<'a> Gap<'a> {
-    pub(super) fn new(oracle: &'a Oracle, passes: [PassHeight<'a>; 2], tree: &'a Tree<'a>) -> Self {
+    pub(super) fn new(oracle: &'a Oracle, passes: [PassHeight<'a>; 2], tree: &'a PathTree<'a>) -> Self {
         let sides = passes.map(|pass| pass.pass().side);
         let width = sides[1] - sides[0];
         let mut ends = vec![0.0];
@@ -89,7 +89,7 @@ impl<'a> Gap<'a> {
         }
     }
 
-    /// The ray from a place of the gap, and |S_u x S_v| there.
+    /// The ray from a point of the gap, and |S_u x S_v| there.
     fn ray(&self, path: f64, share: f64) -> Result<(Ray, f64), OracleError> {
         let (u, v) = self.oracle.swapped(path, self.side(share));
         let at = self.oracle.surface.at(u, v);
@@ -112,7 +112,7 @@ impl<'a> Gap<'a> {
         self.sides[0] * (1.0 - share) + self.sides[1] * share
     }
 
-    /// Heights of both passes at a place.
+    /// Heights of both passes at a point.
     fn both(&self, path: f64, share: f64, near: &mut [usize; 2]) -> Result<[f64; 2], OracleError> {
         let (ray, _) = self.ray(path, share)?;
         let mut heights = [0.0; 2];
@@ -124,7 +124,7 @@ impl<'a> Gap<'a> {
         Ok(heights)
     }
 
-    /// Height at a place: of the two passes, or of the whole path.
+    /// Height at a point: of the two passes, or of the whole path.
     fn least(&self, path: f64, share: f64, near: &mut [usize; 2], whole: bool) -> Result<f64, OracleError> {
         let [one, other] = self.both(path, share, near)?;
         let least = one.min(other);
@@ -134,17 +134,17 @@ impl<'a> Gap<'a> {
         Ok(self.tree.entry(&self.ray(path, share)?.0, least))
     }
 
-    /// The crest at a station; `guess`: its share of the gap at a station near by.
+    /// The crest at a station; `guess`: its share of the gap at a neighbouring station.
     pub(super) fn crest(&self, path: f64, guess: f64) -> Result<Crest, OracleError> {
         let mut near = self.passes.map(|pass| pass.pass().index_at(path));
         let met = self.meeting(path, guess, &mut near)?;
         let (mut share, mut height) = self.highest(path, met, &mut near, false)?;
         let whole = self.tree.entry(&self.ray(path, share)?.0, height);
         if whole < -GOUGED_MM {
-            // Nothing is left of this crest, and worse: that is the gouge's to tell.
+            // The crest is below the surface: reported by the gouge search.
             height = whole;
-        } else if whole < height - ALIKE_MM {
-            // Another part of the path lowers this crest: the highest place that remains is elsewhere.
+        } else if whole < height - EQUAL_MM {
+            // Another part of the path lowers this crest: the maximum is elsewhere.
             (share, height) = self.highest(path, (share, whole), &mut near, true)?;
         }
         let (ray, area) = self.ray(path, share)?;
@@ -152,12 +152,12 @@ impl<'a> Gap<'a> {
             path,
             share,
             height_mm: height,
-            place_mm: ray.from,
+            point_mm: ray.from,
             area,
         })
     }
 
-    /// The highest place across the gap, if it is above the one found already.
+    /// The highest point across the gap, if it is above the one found already.
     fn highest(
         &self,
         path: f64,
@@ -174,7 +174,7 @@ impl<'a> Gap<'a> {
                 *near = index;
                 least = least.min(height);
             }
-            // Looked at closely where it may matter.
+            // A close search only where it can raise the maximum.
             if least > found.1.max(highest.1) {
                 least = self.least(path, *at, near, whole)?;
             }
@@ -187,7 +187,7 @@ impl<'a> Gap<'a> {
         }
         let low = self.across[highest.0.saturating_sub(1)];
         let high = self.across[(highest.0 + 1).min(self.across.len() - 1)];
-        self.summit(
+        self.golden_maximum(
             path,
             [low, high],
             (self.across[highest.0], highest.1),
@@ -196,7 +196,7 @@ impl<'a> Gap<'a> {
         )
     }
 
-    /// Where both heights agree (regula falsi, Illinois; halving where a ray misses).
+    /// The point where both heights agree (regula falsi, Illinois variant; bisection where a ray misses).
     fn meeting(&self, path: f64, guess: f64, near: &mut [usize; 2]) -> Result<(f64, f64), OracleError> {
         let mut ends = [0.0, 1.0];
         let mut values = [0.0; 2];
@@ -233,14 +233,14 @@ impl<'a> Gap<'a> {
             } else {
                 ends[0] - values[0] * width / (values[1] - values[0])
             };
-            // The end that stays counts half the next time.
+            // Illinois: the retained end counts half in the next step.
             values[1 - k] *= 0.5;
         }
         Ok(best)
     }
 
-    /// The highest place in a bracket, by golden section.
-    fn summit(
+    /// The highest point in a bracket, by golden section.
+    fn golden_maximum(
         &self,
         path: f64,
         [mut low, mut high]: [f64; 2],
@@ -274,7 +274,7 @@ impl<'a> Gap<'a> {
         Ok(best)
     }
 
-    /// The stations to begin with: knots, shares of the parameter and of the second pass's length.
+    /// The initial stations: knots, and equal shares of the parameter and of the second pass's length.
     fn stations(&self) -> Vec<f64> {
         let [low, high] = self.oracle.path_range();
         let mut stations = self.oracle.surface.breaks(self.oracle.along);
@@ -304,7 +304,7 @@ impl<'a> Gap<'a> {
         let intervals = |crests: &[Crest]| crests.len().saturating_sub(1);
         for _ in 0..HALVINGS {
             let best = highest(&crests);
-            let enough = best + (ALIKE_SHARE * best).max(ALIKE_MM);
+            let enough = best + (EQUAL_SHARE * best).max(EQUAL_MM);
             let mut refined = Vec::with_capacity(crests.len() + 16);
             for k in 0..intervals(&crests) {
                 refined.push(crests[k]);
@@ -324,7 +324,7 @@ impl<'a> Gap<'a> {
             .map(|k| bound(&crests, k))
             .fold(best, f64::max);
         GapRidge {
-            unseen_mm: if crests.is_empty() { 0.0 } else { most - best },
+            excess_mm: if crests.is_empty() { 0.0 } else { most - best },
             crests,
             skipped,
         }
@@ -338,9 +338,9 @@ fn highest(crests: &[Crest]) -> f64 {
         .fold(f64::NEG_INFINITY, f64::max)
 }
 
-/// What the crest may reach between a station and the next: a function whose second derivative is at most `b` exceeds its
-/// values at the ends of an interval `d` by `b d^2 / 8` at most. `b` is taken as twice the larger of the two second
-/// differences around.
+/// Upper bound of the crest between a station and the next: a function with a second derivative of at most `b` exceeds its
+/// values at the ends of an interval `d` by at most `b d^2 / 8`. `b` is taken as twice the larger of the two adjacent second
+/// differences.
 fn bound(crests: &[Crest], k: usize) -> f64 {
     let (a, b) = (&crests[k], &crests[k + 1]);
     let second = |k: usize| {

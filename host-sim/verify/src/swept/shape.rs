@@ -1,48 +1,48 @@
-//! What the surface itself may trouble a ball with: the tightest hollow, and places without a normal.
+//! Checks of the surface itself: tightest concave radius, poles and points without a normal.
 
 use rayon::prelude::*;
 
-use super::grid::{Grid, bend};
+use super::grid::{CellGrid, local_curvature};
 use oracle::Oracle;
 use oracle::vector::{length, subtract};
 
-/// Halvings of the step around the tightest cell.
+/// Bisections of the step around the cell with the largest curvature.
 const REFINEMENTS: usize = 40;
-/// Curvatures below this count as flat, 1/mm: hollows of more than a kilometre.
+/// Curvatures below this count as flat, 1/mm: concave radii above one kilometre.
 const FLAT: f64 = 1e-6;
-/// Places looked at along each boundary.
-const BOUNDARY_LOOKS: usize = 64;
-/// A boundary whose places all lie within this of one another is a point, mm: as for the core's data.
+/// Points evaluated on each boundary.
+const BOUNDARY_POINTS: usize = 64;
+/// A boundary whose points all coincide within this distance is a pole, mm: the threshold of the core's data.
 const POINT_MM: f64 = 1e-9;
 
-/// The tightest hollow of a surface.
+/// The tightest concave radius of a surface.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Hollow {
+pub struct ConcaveRadius {
     /// Radius of curvature towards the tool, mm: the least of all directions.
     pub radius_mm: f64,
     /// Parameter u.
     pub u: f64,
     /// Parameter v.
     pub v: f64,
-    /// Place, mm.
-    pub place_mm: [f64; 3],
+    /// Point, mm.
+    pub point_mm: [f64; 3],
 }
 
-/// What the surface may trouble a ball with.
+/// Properties of the surface that limit the ball.
 #[derive(Clone, Debug, Default, PartialEq)]
-pub struct Shape {
-    /// The tightest hollow; `None` where the surface bends towards the tool nowhere.
-    pub hollow: Option<Hollow>,
-    /// Boundaries that are one point, e.g. `u = 0`.
+pub struct SurfaceCheck {
+    /// The tightest concave radius; `None` where the surface is nowhere concave towards the tool.
+    pub concave_radius: Option<ConcaveRadius>,
+    /// Boundaries that degenerate to a point, e.g. `u = 0`.
     pub poles: Vec<String>,
-    /// Other places (u, v) where S_u and S_v span no plane: how many of those looked at, and the first.
+    /// Other points (u, v) where S_u and S_v span no plane: their number among those evaluated, and the first.
     pub degenerate: Option<(usize, [f64; 2])>,
 }
 
-impl Shape {
-    pub(super) fn new(oracle: &Oracle, grid: &Grid) -> Self {
+impl SurfaceCheck {
+    pub(super) fn new(oracle: &Oracle, grid: &CellGrid) -> Self {
         let mut degenerate: Vec<[f64; 2]> = (0..grid.count())
-            .filter(|index| grid.bends[*index].is_none())
+            .filter(|index| grid.curvatures[*index].is_none())
             .map(|index| grid.cell(index).middle().into())
             .collect();
         let mut poles = Vec::new();
@@ -57,26 +57,27 @@ impl Shape {
             {
                 poles.push(name);
             } else {
-                // The ends may lie on a pole of another boundary.
+                // The ends may be at a pole of another boundary.
                 let inside = &line[1..line.len() - 1];
-                let spans = |[u, v]: &&[f64; 2]| bend(&oracle.surface.at(*u, *v), oracle).is_none();
+                let spans =
+                    |[u, v]: &&[f64; 2]| local_curvature(&oracle.surface.at(*u, *v), oracle).is_none();
                 degenerate.extend(inside.iter().filter(spans));
             }
         }
         Self {
-            hollow: hollow(oracle, grid),
+            concave_radius: concave_radius(oracle, grid),
             poles,
             degenerate: degenerate.first().map(|first| (degenerate.len(), *first)),
         }
     }
 }
 
-/// The four boundaries: name, and places on each.
+/// The four boundaries: name, and points on each.
 fn boundaries(oracle: &Oracle) -> Vec<(String, Vec<[f64; 2]>)> {
     let [[u0, u1], [v0, v1]] = oracle.surface.domain();
     #[allow(clippy::cast_precision_loss, reason = "small")]
-    let part = |low: f64, high: f64, k: usize| low + (high - low) * k as f64 / BOUNDARY_LOOKS as f64;
-    let looks = 0..=BOUNDARY_LOOKS;
+    let part = |low: f64, high: f64, k: usize| low + (high - low) * k as f64 / BOUNDARY_POINTS as f64;
+    let looks = 0..=BOUNDARY_POINTS;
     let of_u = |u: f64| {
         (
             format!("u = {u}"),
@@ -92,18 +93,19 @@ fn boundaries(oracle: &Oracle) -> Vec<(String, Vec<[f64; 2]>)> {
     vec![of_u(u0), of_u(u1), of_v(v0), of_v(v1)]
 }
 
-/// The tightest hollow: the tightest cell, then steps that halve.
-fn hollow(oracle: &Oracle, grid: &Grid) -> Option<Hollow> {
+/// The tightest concave radius: the cell with the largest curvature, then a pattern search with bisected steps.
+fn concave_radius(oracle: &Oracle, grid: &CellGrid) -> Option<ConcaveRadius> {
     let curvature = |u: f64, v: f64| {
-        bend(&oracle.surface.at(u, v), oracle).map_or(f64::NEG_INFINITY, |(_, bend)| bend.principal[1])
+        local_curvature(&oracle.surface.at(u, v), oracle)
+            .map_or(f64::NEG_INFINITY, |(_, curvature)| curvature.principal[1])
     };
-    // Corners as well as middles: hollows are often tightest on a boundary.
+    // Corners as well as cell centres: the largest curvature is often on a boundary.
     let (index, _) = (0..grid.count())
         .into_par_iter()
         .map(|index| {
             let cell = grid.cell(index);
             let corners = cell.u.into_iter().flat_map(|u| cell.v.map(|v| curvature(u, v)));
-            let middle = grid.bends[index].map_or(f64::NEG_INFINITY, |bend| bend.principal[1]);
+            let middle = grid.curvatures[index].map_or(f64::NEG_INFINITY, |curvature| curvature.principal[1]);
             (index, corners.fold(middle, f64::max))
         })
         .reduce(
@@ -142,10 +144,10 @@ fn hollow(oracle: &Oracle, grid: &Grid) -> Option<Hollow> {
             step_v *= 0.5;
         }
     }
-    (most > FLAT).then(|| Hollow {
+    (most > FLAT).then(|| ConcaveRadius {
         radius_mm: 1.0 / most,
         u,
         v,
-        place_mm: oracle.surface.at(u, v).point,
+        point_mm: oracle.surface.at(u, v).point,
     })
 }

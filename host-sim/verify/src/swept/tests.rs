@@ -1,10 +1,10 @@
-//! Heights, gouges and travel against closed forms, on tool paths made for the purpose: the core has no part in them.
+//! Heights, gouges and travel against closed forms, on synthetic tool paths, without the core.
 
 use std::f64::consts::FRAC_1_SQRT_2;
 
 use super::*;
-use job::{Along, Machine, NurbsSpec, Origin, Pattern, Side, SurfaceSpec};
-use oracle::Emitted;
+use job::{Along, MachineSpec, NurbsSpec, Origin, Pattern, Side, SurfaceSpec};
+use oracle::PassSample;
 use oracle::vector::{length, subtract};
 
 const RADIUS: f64 = 5.0;
@@ -20,14 +20,14 @@ fn job(surface: SurfaceSpec, along: Along, side: Side, scallop_mm: f64) -> Job {
         pattern: Pattern::Zig,
         spacing: job::Spacing::Exact,
         chord_mm: 0.005,
-        machine: Machine::default(),
+        machine: MachineSpec::default(),
         origin: Origin::default(),
     }
 }
 
-/// A tool path on these passes, with so many steps on each, evenly spread over the parameter.
-fn track(oracle: &Oracle, sides: &[f64], steps: u32) -> Track {
-    let mut track = Track::default();
+/// A tool path on these passes, with `steps` samples on each, evenly spread over the parameter.
+fn track(oracle: &Oracle, sides: &[f64], steps: u32) -> ToolPath {
+    let mut track = ToolPath::default();
     let [low, high] = oracle.path_range();
     let mut tick = 0;
     for (pass, side) in (0_u32..).zip(sides) {
@@ -36,7 +36,7 @@ fn track(oracle: &Oracle, sides: &[f64], steps: u32) -> Track {
             let (u, v) = oracle.swapped(path, *side);
             let contact = oracle.contact(u, v).unwrap();
             let nm = |mm: [f64; 3]| mm.map(|mm| (mm * 1e6).round() as i32);
-            let sample = Emitted {
+            let sample = PassSample {
                 tick,
                 pass,
                 u,
@@ -55,19 +55,19 @@ fn track(oracle: &Oracle, sides: &[f64], steps: u32) -> Track {
     track
 }
 
-fn measured(job: &Job, sides: &[f64], steps: u32) -> Findings {
+fn measured(job: &Job, sides: &[f64], steps: u32) -> SweptResult {
     let oracle = Oracle::new(job).unwrap();
     measure(job, &oracle, &track(&oracle, sides, steps), true, &())
 }
 
-/// Within the error that the measuring states of itself.
-fn agrees(found: &Findings, exact: f64) {
+/// Asserts agreement within the error bound that the measurement states.
+fn agrees(found: &SweptResult, exact: f64) {
     let off = (found.scallop_max.height_mm - exact).abs();
     assert!(
-        off <= found.measuring_error_mm,
+        off <= found.measurement_error_mm,
         "{} for {exact}: off by {off:e}, stated {:e}",
         found.scallop_max.height_mm,
-        found.measuring_error_mm
+        found.measurement_error_mm
     );
 }
 
@@ -103,7 +103,7 @@ fn plane_leaves_the_ridge_of_two_circles() {
         agrees(&found, flat(0.06 * 20.0));
         assert_eq!(found.scallop_max.gap, 2);
         assert!((found.scallop_max.v - 0.07).abs() < 1e-5);
-        assert!(found.measuring_error_mm < 4e-6, "{:?}", found.measuring_error);
+        assert!(found.measurement_error_mm < 4e-6, "{:?}", found.measurement_error);
         let gaps = sides.windows(2).map(|ends| 20.0 * (ends[1] - ends[0]));
         let mean = gaps.map(|d| d * flat(d)).sum::<f64>() / (20.0 * 0.21);
         assert!((found.scallop_mean_mm - mean).abs() < 4e-6);
@@ -113,13 +113,13 @@ fn plane_leaves_the_ridge_of_two_circles() {
 
 #[test]
 fn steep_ridges_are_exact_too() {
-    // A step-over of 1.9 radii: the far pass's ball does not even reach over the near pass.
+    // A step-over of 1.9 radii: the far pass's ball does not reach the near pass.
     let found = measured(&job(plane(), Along::U, Side::Up, 3.0), &[0.0, 0.475, 0.5], 500);
     agrees(&found, flat(9.5));
 }
 
 #[test]
-fn what_no_pass_reaches_is_said_to_be_uncut() {
+fn unreached_points_are_reported_as_uncut() {
     let found = measured(&job(plane(), Along::U, Side::Up, 3.0), &[0.0, 0.6, 0.9], 100);
     assert!(
         found.failures.iter().any(|line| line.contains("reaches")),
@@ -134,12 +134,12 @@ fn cylinder_along_its_axis() {
         let sides = [0.0, 0.6, 1.6, 2.0].map(|mm| mm / radius);
         for (side, sign) in [(Side::Plus, -1.0), (Side::Minus, 1.0)] {
             let found = measured(&job(cylinder(radius), Along::U, side, 0.01), &sides, 400);
-            // Law of cosines: centres on the circle of R + sign r, half a millimetre's angle from the crest.
+            // Law of cosines: centres on the circle of R + sign r, at the angle of half a millimetre from the crest.
             let centre = radius + sign * RADIUS;
             let (sin, cos) = (0.5 / radius).sin_cos();
             let crest = centre * cos - sign * (RADIUS * RADIUS - (centre * sin).powi(2)).sqrt();
             agrees(&found, sign * (crest - radius));
-            assert!(found.measuring_error_mm < 1e-4 * found.scallop_max.height_mm + 4e-6);
+            assert!(found.measurement_error_mm < 1e-4 * found.scallop_max.height_mm + 4e-6);
             assert_eq!((found.scallop_max.gap, found.gouge), (1, None));
         }
     }
@@ -155,10 +155,10 @@ fn cylinder_around_its_axis() {
                 steps,
             );
             agrees(&found, flat(0.9));
-            // What is stated for the way between samples is what an arc of that length really has between it and its chord.
+            // The stated interpolation error equals the sagitta of an arc of that length.
             let half = 0.5 / f64::from(steps);
             let sagitta = (20.0 + sign * RADIUS) * (1.0 - half.cos());
-            let stated = found.measuring_error.path_mm;
+            let stated = found.measurement_error.path_mm;
             assert!(
                 stated >= 0.99 * sagitta - 1e-6 && stated <= 1.05 * sagitta + 2e-6,
                 "{stated:e} for {sagitta:e}"
@@ -179,7 +179,7 @@ fn sphere_by_meridians() {
         let [x, y, _] = oracle.surface.at(1.0, v).point;
         y.atan2(x)
     };
-    // Ball centres on great circles of R + r: the crest is `g` off both, sin g = sin 60 sin(half of the azimuths' difference).
+    // Ball centres on great circles of R + r: the crest is at the angle `g` from both, sin g = sin 60 sin(half the azimuth difference).
     let height = |ends: &[f64]| {
         let half = 0.5 * (azimuth(ends[1]) - azimuth(ends[0]));
         let sin = 60.0_f64.to_radians().sin() * half.sin();
@@ -188,15 +188,15 @@ fn sphere_by_meridians() {
     };
     agrees(&found, sides.windows(2).map(height).fold(0.0, f64::max));
     assert!((found.scallop_max.u - 1.0).abs() < 1e-9);
-    assert!(found.scallop_max.height_mm > 0.005 && found.measuring_error_mm < 1e-5);
+    assert!(found.scallop_max.height_mm > 0.005 && found.measurement_error_mm < 1e-5);
     assert_eq!(found.shape.poles, ["u = 0"]);
     assert_eq!((found.gouge, found.shape.degenerate), (None, None));
 }
 
-/// A plane whose lines across lie slanted to its passes: at the passes' ends the ridge is higher than between them, because the foot of
-/// a place near one end lies beyond it. There one ball's way and the other's end are equally far: d / (1 + cos) from a pass.
+/// A plane whose side lines are oblique to its passes: at the passes' ends the ridge is higher than in the middle, because the foot of
+/// a point near one end is beyond the pass. There one ball's path and the other's end are at the same distance: d / (1 + cos) from a pass.
 #[test]
-fn slanted_ends_leave_more() {
+fn oblique_ends_leave_higher_ridges() {
     let slant = 60.0_f64.to_radians();
     let rail = |x: f64, y: f64| [[0.0, 0.0, 30.0, x], [0.0, 0.0, 0.0, y], [0.0; 4]];
     let surface = SurfaceSpec::Ruled {
@@ -211,7 +211,7 @@ fn slanted_ends_leave_more() {
     assert!(found.scallop_max.height_mm > 1.7 * flat(0.6));
 }
 
-/// A profile in x and z, drawn out along y by 40 mm; u along the profile.
+/// A profile in x and z, extruded along y by 40 mm; u along the profile.
 fn extruded(degree: usize, profile: &[[f64; 2]]) -> SurfaceSpec {
     let spans = profile.len() - degree;
     let mut knots_u = vec![0.0; degree];
@@ -229,9 +229,9 @@ fn extruded(degree: usize, profile: &[[f64; 2]]) -> SurfaceSpec {
     })
 }
 
-/// Flanks at 45 degrees, 28.28 mm long: a ball on one flank, s from the bottom, goes r - s into the other one.
+/// Flanks at 45 degrees, 28.28 mm long: a ball on one flank, at s from the bottom, enters the other one by r - s.
 #[test]
-fn ball_on_one_flank_cuts_the_other() {
+fn ball_on_one_flank_gouges_the_other() {
     let valley = extruded(1, &[[-20.0, 20.0], [0.0, 0.0], [20.0, 20.0]]);
     let job = job(valley, Along::V, Side::Up, 0.01);
     let flank = 800.0_f64.sqrt();
@@ -242,48 +242,48 @@ fn ball_on_one_flank_cuts_the_other() {
     let gouge = found.gouge.unwrap();
     let exact = RADIUS - 1.3;
     assert!((gouge.depth_mm / exact - 1.0).abs() < 1e-3, "{gouge:?}");
-    // Under the centre, r along the other flank.
+    // Under the centre, at r along the other flank.
     let foot = RADIUS * FRAC_1_SQRT_2;
     assert!(
-        length(subtract(gouge.place_mm, [foot, gouge.place_mm[1], foot])) < 0.3,
+        length(subtract(gouge.point_mm, [foot, gouge.point_mm[1], foot])) < 0.3,
         "{gouge:?}"
     );
     assert_eq!((gouge.pass, gouge.local), (2, false));
     let samples = &oracle_sample(&found, &oracle, &sides);
-    assert!(length(subtract(*samples, gouge.place_mm)) < RADIUS);
+    assert!(length(subtract(*samples, gouge.point_mm)) < RADIUS);
     assert_eq!(
         found.failures.iter().filter(|line| line.contains("cuts")).count(),
         1
     );
 }
 
-/// The ball's centre at the tick that cuts: the path made anew.
-fn oracle_sample(found: &Findings, oracle: &Oracle, sides: &[f64]) -> [f64; 3] {
+/// The ball's centre at the gouging tick, recomputed.
+fn oracle_sample(found: &SweptResult, oracle: &Oracle, sides: &[f64]) -> [f64; 3] {
     let track = track(oracle, sides, 800);
     let tick = found.gouge.unwrap().tick;
     let pass = track.passes.iter().rfind(|pass| pass.first_tick <= tick).unwrap();
     pass.centre((tick - pass.first_tick) as usize)
 }
 
-/// A hollow cylinder that is tighter than the ball: from every contact the ball reaches farthest into the other edge.
+/// A concave cylinder of smaller radius than the ball: from every contact the ball interferes most with the far edge.
 #[test]
-fn ball_in_a_tight_hollow_is_a_local_gouge() {
+fn ball_in_a_small_concave_radius_is_a_local_gouge() {
     let job = job(cylinder(4.0), Along::U, Side::Plus, 0.01);
     let found = measured(&job, &[0.0, 0.2, 0.4, 0.6, 0.8, 1.0], 300);
     let gouge = found.gouge.unwrap();
-    // From the axis the centre lies 1 mm opposite of the contact; the other edge is 1 rad away.
+    // Seen from the axis, the centre is 1 mm opposite to the contact; the other edge is 1 rad away.
     let distance = (16.0 + 1.0 + 8.0 * 1.0_f64.cos()).sqrt();
     assert!(
         (gouge.depth_mm / (RADIUS - distance) - 1.0).abs() < 2e-3,
         "{gouge:?}"
     );
     assert!(gouge.local && (gouge.v < 0.02 || gouge.v > 0.98));
-    let hollow = found.shape.hollow.unwrap();
+    let hollow = found.shape.concave_radius.unwrap();
     assert!((hollow.radius_mm - 4.0).abs() < 1e-9);
     assert!(found.warnings.iter().any(|line| line.contains("does not fit")));
 }
 
-/// A groove 0.8 mm wide between two passes 2 mm apart: no sample lies in it, and the ball stands over it.
+/// A groove 0.8 mm wide between two passes 2 mm apart: no sample is in it, and the ball bridges it.
 #[test]
 fn groove_between_passes_stays_uncut() {
     let mut profile: Vec<[f64; 2]> = (0..=100).map(|k| [0.2 * f64::from(k), 0.0]).collect();
@@ -319,10 +319,10 @@ fn groove_between_passes_stays_uncut() {
         "{:?}",
         found.failures
     );
-    assert!(found.shape.hollow.unwrap().radius_mm < 10.0);
+    assert!(found.shape.concave_radius.unwrap().radius_mm < 10.0);
 }
 
-/// Where a third pass comes nearer than the two of the gap, it counts.
+/// A third pass that is nearer than the two of the gap determines the height.
 #[test]
 fn other_passes_lower_a_ridge() {
     let job = job(plane(), Along::U, Side::Up, 0.5);
@@ -330,13 +330,16 @@ fn other_passes_lower_a_ridge() {
     let mut path = track(&oracle, &[0.0, 0.2, 0.4], 500);
     let before = measure(&job, &oracle, &path, true, &());
     agrees(&before, flat(4.0));
-    // Pass 2 is moved in between the first two, whatever parameters it claims.
+    // Pass 2 is moved between the first two, regardless of its parameters.
     for centre in &mut path.passes[2].cl_nm {
         centre[1] = 2_000_000;
     }
     let after = measure(&job, &oracle, &path, true, &());
-    let gap_0 = |found: &Findings| {
-        let heights = found.ridges[0].spots.iter().map(|spot| f64::from(spot.height_mm));
+    let gap_0 = |found: &SweptResult| {
+        let heights = found.ridges[0]
+            .points
+            .iter()
+            .map(|point| f64::from(point.height_mm));
         heights.fold(0.0, f64::max)
     };
     assert!((gap_0(&before) - flat(4.0)).abs() < 1e-5);
@@ -344,7 +347,7 @@ fn other_passes_lower_a_ridge() {
 }
 
 #[test]
-fn travel_is_held_against_the_machine() {
+fn travel_is_compared_with_the_machine() {
     let mut job = job(plane(), Along::U, Side::Up, 0.5);
     // Centres: x 5 to 35, y 0 to 8, z 7.
     for (travel, beyond) in [
@@ -370,7 +373,7 @@ fn travel_is_held_against_the_machine() {
 }
 
 #[test]
-fn threads_change_nothing() {
+fn results_do_not_depend_on_threads() {
     let text = include_str!("../../../../jobs/torus.toml");
     let job = job_file::parse("torus", text).unwrap();
     let oracle = Oracle::new(&job).unwrap();
@@ -389,9 +392,9 @@ fn threads_change_nothing() {
     assert_eq!(one.ridges.len(), 12);
 }
 
-/// A run that stopped leaves no ridge at its last pass; a run without two passes none at all.
+/// A stopped run leaves no ridge at its last pass; a run without two passes leaves none.
 #[test]
-fn incomplete_runs_are_said_to_be() {
+fn incomplete_runs_are_reported() {
     let job = job(plane(), Along::U, Side::Up, 0.01);
     let oracle = Oracle::new(&job).unwrap();
     for (passes, gaps) in [(3, 1), (2, 0), (1, 0), (0, 0)] {

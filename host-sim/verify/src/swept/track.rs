@@ -1,32 +1,32 @@
-//! The tool path of a run, kept compactly: 20 bytes a sample.
+//! The tool path of a run in compact form: 20 bytes per sample.
 
 use job::Along;
-use oracle::Emitted;
+use oracle::PassSample;
 use oracle::vector::{Vector, angle, dot, length, scale, subtract};
 
 const MM_PER_NM: f64 = 1e-6;
 
-/// One pass as it was emitted.
+/// One pass as emitted.
 #[derive(Clone, Debug, Default, PartialEq)]
-pub struct PassTrack {
+pub struct ToolPathPass {
     /// Side parameter.
     pub side: f64,
-    /// Tick of the first sample; the others follow, one a tick.
+    /// Tick of the first sample; one sample per tick follows.
     pub first_tick: u64,
-    /// Path parameter of each sample: ascending, or descending where the pass runs backwards. Some may be equal.
+    /// Path parameter of each sample: not descending, or not ascending on a pass in the opposite direction.
     pub path: Vec<f64>,
     /// Ball centre of each sample, nm.
     pub cl_nm: Vec<[i32; 3]>,
 }
 
-impl PassTrack {
+impl ToolPathPass {
     /// Ball centre of a sample, mm.
     #[must_use]
     pub fn centre(&self, index: usize) -> [f64; 3] {
         self.cl_nm[index].map(|nm| f64::from(nm) * MM_PER_NM)
     }
 
-    /// The sample whose path parameter is nearest above this one, in the order of the pass.
+    /// The first sample, in the order of the pass, whose path parameter reaches this one.
     pub(super) fn index_at(&self, path: f64) -> usize {
         let backwards = self.path.first() > self.path.last();
         let before = |at: &f64| if backwards { *at > path } else { *at < path };
@@ -46,8 +46,8 @@ impl PassTrack {
         sum / count
     }
 
-    /// Largest distance between the straight lines from sample to sample and a smooth curve through the samples, mm: that of an
-    /// arc through three neighbours from its chord.
+    /// Largest distance between the polyline through the samples and a smooth curve through them, mm: the sagitta of an
+    /// arc through three neighbouring samples.
     pub(super) fn sagitta_mm(&self) -> f64 {
         let mut most = 0.0_f64;
         for k in 2..self.cl_nm.len() {
@@ -57,7 +57,7 @@ impl PassTrack {
                 let lengths = [length(one), length(other)];
                 (lengths[0].min(lengths[1]), lengths[0].max(lengths[1]))
             };
-            // A short last step tells its direction badly; its arc is flatter than its neighbours' anyway.
+            // A short last step has an inaccurate direction; its sagitta is below its neighbours' in any case.
             if short >= 0.5 * long && short > 0.0 {
                 let turned = angle(one, other);
                 most = most.max(turned / (short + long) * long * long / 4.0);
@@ -67,18 +67,18 @@ impl PassTrack {
     }
 }
 
-/// The tool path of a run: gathered sample by sample, read afterwards.
+/// The tool path of a run: written sample by sample, then read.
 #[derive(Clone, Debug, Default, PartialEq)]
-pub struct Track {
+pub struct ToolPath {
     /// The passes, in order.
-    pub passes: Vec<PassTrack>,
-    /// Samples that are nearer than this to the last one that was kept, nm, are left out, but for the last of a pass: where the feed is low
-    /// there are more than the path needs.
+    pub passes: Vec<ToolPathPass>,
+    /// Minimum distance of stored samples, nm: nearer ones are left out, except the last of a pass. At low feed the samples are
+    /// denser than needed.
     spacing_nm: f64,
 }
 
-impl Track {
-    /// A track whose samples are at least so far apart, nm.
+impl ToolPath {
+    /// An empty path with this minimum distance of samples, nm.
     #[must_use]
     pub fn with_spacing(spacing_nm: f64) -> Self {
         Self {
@@ -87,8 +87,8 @@ impl Track {
         }
     }
 
-    /// Whether a sample is so near to the last one that it says nothing new.
-    fn is_near(&self, sample: &Emitted) -> bool {
+    /// Whether a sample is nearer to the last one stored than the minimum distance.
+    fn is_near(&self, sample: &PassSample) -> bool {
         let last = self.passes.last().and_then(|pass| pass.cl_nm.last());
         !sample.last_of_pass
             && last.is_some_and(|last| {
@@ -100,19 +100,19 @@ impl Track {
             })
     }
 
-    /// Keeps the next sample.
-    pub fn add(&mut self, sample: &Emitted, along: Along) {
+    /// Adds the next sample.
+    pub fn add(&mut self, sample: &PassSample, along: Along) {
         let (path, side) = match along {
             Along::U => (sample.u, sample.v),
             Along::V => (sample.v, sample.u),
         };
         if sample.first_of_pass || self.passes.is_empty() {
-            // Neighbours are about as long.
+            // Neighbouring passes have similar lengths.
             let room = self
                 .passes
                 .last()
                 .map_or(0, |pass| pass.path.len() + pass.path.len() / 64);
-            self.passes.push(PassTrack {
+            self.passes.push(ToolPathPass {
                 side,
                 first_tick: sample.tick,
                 path: Vec::with_capacity(room),
@@ -128,7 +128,7 @@ impl Track {
         }
     }
 
-    /// Samples.
+    /// Number of samples.
     #[must_use]
     pub fn samples(&self) -> usize {
         self.passes.iter().map(|pass| pass.path.len()).sum()
@@ -148,7 +148,7 @@ impl Track {
     }
 }
 
-/// The part of a vector across a unit direction.
+/// The component of a vector normal to a unit direction.
 pub(super) fn across(m: Vector, direction: Vector) -> Vector {
     subtract(m, scale(direction, dot(m, direction)))
 }

@@ -1,33 +1,33 @@
-//! All pieces of the tool path in a tree of boxes, so that any part of it can be asked about, not only the passes next door.
+//! Bounding volume hierarchy over all segments of the tool path: queries reach any part of it, not only the neighbouring passes.
 
 use super::height::Ray;
-use super::track::{Track, across};
+use super::track::{ToolPath, across};
 use oracle::vector::{Vector, add, dot, length, scale, subtract};
 
-/// Steps between samples in a leaf: few enough for tight boxes, enough to keep the tree small.
-const PIECE_STEPS: usize = 16;
-/// Depth of a tree over 2^31 pieces, and one more: the bound of the walk's stack.
+/// Steps between samples per leaf: few enough for tight boxes, enough for a small tree.
+const SEGMENT_STEPS: usize = 16;
+/// Depth of a tree over 2^31 segments, plus one: bounds the traversal stack.
 const DEPTH_MAX: usize = 33;
 
-/// A run of samples of one pass, ends included.
+/// Consecutive samples of one pass, ends included.
 #[derive(Clone, Copy, Debug)]
-struct Piece {
+struct Segment {
     pass: u32,
     from: u32,
     to: u32,
     /// Centres at its ends, mm.
     ends: [Vector; 2],
-    /// No sample is farther than this from the straight line between them, mm.
+    /// Upper bound of the distance of the samples from the straight line between the ends, mm.
     off_mm: f64,
 }
 
 #[derive(Clone, Copy, Debug)]
-struct Boxed {
+struct BoundingBox {
     low: Vector,
     high: Vector,
 }
 
-impl Boxed {
+impl BoundingBox {
     const EMPTY: Self = Self {
         low: [f64::INFINITY; 3],
         high: [f64::NEG_INFINITY; 3],
@@ -45,7 +45,7 @@ impl Boxed {
         scale(add(self.low, self.high), 0.5)
     }
 
-    /// Least of the products of its points with a vector.
+    /// Least scalar product of the box's points with a vector.
     fn least_along(&self, along: Vector) -> f64 {
         (0..3)
             .map(|k| (self.low[k] * along[k]).min(self.high[k] * along[k]))
@@ -65,64 +65,64 @@ impl Boxed {
 
 #[derive(Clone, Copy, Debug)]
 struct Node {
-    bounds: Boxed,
-    /// A leaf's piece, or the second child; the first one follows its parent.
+    bounds: BoundingBox,
+    /// A leaf's segment, or the second child; the first child follows its parent.
     next: u32,
     leaf: bool,
 }
 
-/// The tool path of a run, to be asked where it comes near something.
+/// The tool path of a run, for queries by location.
 #[derive(Debug)]
-pub(super) struct Tree<'a> {
-    track: &'a Track,
+pub(super) struct PathTree<'a> {
+    track: &'a ToolPath,
     radius: f64,
-    pieces: Vec<Piece>,
+    segments: Vec<Segment>,
     nodes: Vec<Node>,
 }
 
-/// A sample: pass and index in it.
-pub(super) type Cut = (u32, u32);
+/// Index of a sample: pass, and index in the pass.
+pub(super) type SampleIndex = (u32, u32);
 
-/// Which balls a place is asked about, and what about them.
+/// Parameters of a depth query at a point.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Reach {
-    /// How far around the place the answer is to hold, mm.
+pub(super) struct DepthQuery {
+    /// Radius around the point for which the bound must hold, mm.
     pub(super) around_mm: f64,
-    /// Largest normal curvature around the place, either way, 1/mm.
-    pub(super) bend: f64,
-    /// Depths below this do not matter, mm.
+    /// Largest magnitude of the normal curvature around the point, 1/mm.
+    pub(super) curvature: f64,
+    /// Depths below this are irrelevant, mm.
     pub(super) floor_mm: f64,
-    /// What counts as a gouge, mm: no ball that goes deeper is left out.
+    /// Least depth that counts as a gouge, mm: deeper balls are never excluded.
     pub(super) gouge_mm: f64,
-    /// Path and side parameters of the contacts that are left out of the bound.
-    pub(super) but: [[f64; 2]; 2],
+    /// Path and side parameters of the contacts that are excluded from the bound.
+    pub(super) excluded: [[f64; 2]; 2],
 }
 
-/// How deep the balls go into a place.
+/// Depth of the balls at a point.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Depth {
-    /// Radius less distance of the nearest centre, mm, if above 0; else 0.
+pub(super) struct BallDepth {
+    /// Radius minus the distance of the nearest centre, mm; at least 0.
     pub(super) depth_mm: f64,
-    /// The sample at whose centre, or between which and the next, that is.
-    pub(super) by: Option<Cut>,
-    /// What the depth may reach around the place, mm, at least the floor; balls that are left out do not count.
+    /// The sample at the nearest centre, or before it; `None` where the depth is 0.
+    pub(super) by: Option<SampleIndex>,
+    /// Upper bound of the depth around the point, mm, at least the floor; excluded balls do not count.
     pub(super) bound_mm: f64,
 }
 
-impl<'a> Tree<'a> {
-    pub(super) fn new(track: &'a Track, radius: f64) -> Self {
-        let mut pieces = Vec::new();
+impl<'a> PathTree<'a> {
+    pub(super) fn new(track: &'a ToolPath, radius: f64) -> Self {
+        let mut segments = Vec::new();
         for (pass, samples) in (0_u32..).zip(&track.passes) {
             let last = samples.cl_nm.len() - 1;
             let mut from = 0;
             loop {
-                let to = (from + PIECE_STEPS).min(last);
+                let to = (from + SEGMENT_STEPS).min(last);
                 let ends = [from, to].map(|k| samples.centre(k));
                 let off_mm = (from..=to)
                     .map(|k| nearest(samples.centre(k), ends).1)
                     .fold(0.0, f64::max);
                 #[allow(clippy::cast_possible_truncation, reason = "a tick is 32 bits")]
-                pieces.push(Piece {
+                segments.push(Segment {
                     pass,
                     from: from as u32,
                     to: to as u32,
@@ -138,15 +138,15 @@ impl<'a> Tree<'a> {
         let mut tree = Self {
             track,
             radius,
-            pieces,
+            segments,
             nodes: Vec::new(),
         };
-        let boxes: Vec<Boxed> = tree.pieces.iter().map(|piece| tree.bounds(piece)).collect();
+        let boxes: Vec<BoundingBox> = tree.segments.iter().map(|segment| tree.bounds(segment)).collect();
         #[allow(
             clippy::cast_possible_truncation,
             reason = "fewer than ticks, which are 32 bits"
         )]
-        let mut order: Vec<u32> = (0..tree.pieces.len() as u32).collect();
+        let mut order: Vec<u32> = (0..tree.segments.len() as u32).collect();
         let mut nodes = Vec::with_capacity(2 * order.len());
         if !order.is_empty() {
             build(&mut nodes, &mut order, &boxes);
@@ -155,16 +155,23 @@ impl<'a> Tree<'a> {
         tree
     }
 
-    fn bounds(&self, piece: &Piece) -> Boxed {
-        (piece.from..=piece.to).fold(Boxed::EMPTY, |bounds, k| bounds.with(self.centre(piece.pass, k)))
+    fn bounds(&self, segment: &Segment) -> BoundingBox {
+        (segment.from..=segment.to).fold(BoundingBox::EMPTY, |bounds, k| {
+            bounds.with(self.centre(segment.pass, k))
+        })
     }
 
     fn centre(&self, pass: u32, index: u32) -> Vector {
         self.track.passes[pass as usize].centre(index as usize)
     }
 
-    /// Walks all leaves whose boxes pass `wanted`, those nearer to a point first.
-    fn walk(&self, from: Vector, mut wanted: impl FnMut(&Boxed) -> bool, mut leaf: impl FnMut(&Piece)) {
+    /// Visits all leaves whose boxes satisfy `wanted`, in the order of their distance from a point.
+    fn walk(
+        &self,
+        from: Vector,
+        mut wanted: impl FnMut(&BoundingBox) -> bool,
+        mut leaf: impl FnMut(&Segment),
+    ) {
         let mut stack = [0_u32; DEPTH_MAX];
         let mut depth = 1;
         if self.nodes.is_empty() {
@@ -178,7 +185,7 @@ impl<'a> Tree<'a> {
                 continue;
             }
             if node.leaf {
-                leaf(&self.pieces[node.next as usize]);
+                leaf(&self.segments[node.next as usize]);
             } else {
                 let [near, far] = [index + 1, node.next];
                 let squared = |index: u32| self.nodes[index as usize].bounds.squared(from);
@@ -189,31 +196,31 @@ impl<'a> Tree<'a> {
         }
     }
 
-    /// Where the ray enters any ball, if that is below `height`; else `height`.
+    /// Least height at which the ray enters a ball, if below `height`; else `height`.
     pub(super) fn entry(&self, ray: &Ray, height: f64) -> f64 {
         use std::cell::Cell;
         let best = Cell::new(height);
         self.walk(
             ray.from,
             |bounds| {
-                // A ball that is entered below `best`, and left above the surface, holds a point of the ray between.
+                // A ball entered below `best` and left above the surface contains a point of the ray between.
                 let half = 0.5 * best.get().max(0.0);
                 let reach = self.radius + half;
-                // And it is entered a radius below its centre at the lowest.
+                // The entry is at most one radius below the ball's centre.
                 let lowest = bounds.least_along(ray.along) - dot(ray.from, ray.along) - self.radius;
                 lowest < best.get() && bounds.squared(ray.at(half)) <= reach * reach
             },
-            |piece| {
+            |segment| {
                 let half = 0.5 * best.get().max(0.0);
-                if nearest(ray.at(half), piece.ends).1 > self.radius + half + piece.off_mm {
+                if nearest(ray.at(half), segment.ends).1 > self.radius + half + segment.off_mm {
                     return;
                 }
-                let mut from = piece.ends[0];
-                if piece.from == piece.to {
+                let mut from = segment.ends[0];
+                if segment.from == segment.to {
                     best.set(best.get().min(ray.entry([from; 2], self.radius)));
                 }
-                for k in piece.from..piece.to {
-                    let to = self.centre(piece.pass, k + 1);
+                for k in segment.from..segment.to {
+                    let to = self.centre(segment.pass, k + 1);
                     best.set(best.get().min(ray.entry([from, to], self.radius)));
                     from = to;
                 }
@@ -222,16 +229,16 @@ impl<'a> Tree<'a> {
         best.get()
     }
 
-    /// How deep the balls go into a place, and what that may come to around it.
+    /// Depth of the balls at a point, and its upper bound around the point.
     ///
-    /// The distance d from a straight piece of path is a convex function in space, so the depth f = r - d stays below its
-    /// tangent plane: it grows by at most sin(a) along the tangent plane of the surface (a: the angle of the way to the nearest
-    /// centre and the normal), and by 1 along the normal, by which the surface leaves that plane as its curvature says. So
-    /// around P it stays below `f + around sin(a) + around^2 bend / 2`.
-    pub(super) fn depth(&self, ray: &Ray, reach: &Reach) -> Depth {
+    /// The distance d from a straight segment of the path is a convex function in space, so the depth f = r - d stays below its
+    /// tangent plane: it grows by at most sin(a) along the tangent plane of the surface (a: angle between the vector to the nearest
+    /// centre and the normal), and by 1 along the normal, along which the surface leaves that plane with its curvature. Around P
+    /// it is therefore at most `f + around sin(a) + around^2 curvature / 2`.
+    pub(super) fn depth(&self, ray: &Ray, reach: &DepthQuery) -> BallDepth {
         use std::cell::Cell;
-        let second = 0.5 * reach.around_mm * reach.around_mm * reach.bend;
-        let best: Cell<(f64, Option<Cut>)> = Cell::new((0.0, None));
+        let second = 0.5 * reach.around_mm * reach.around_mm * reach.curvature;
+        let best: Cell<(f64, Option<SampleIndex>)> = Cell::new((0.0, None));
         let bound = Cell::new(reach.floor_mm);
         self.walk(
             ray.from,
@@ -247,30 +254,30 @@ impl<'a> Tree<'a> {
                 let sine = if off < near { off / near } else { 1.0 };
                 depth + reach.around_mm * sine + second > bound.get()
             },
-            |piece| {
-                let samples = &self.track.passes[piece.pass as usize];
-                let [path, side] = reach.but;
+            |segment| {
+                let samples = &self.track.passes[segment.pass as usize];
+                let [path, side] = reach.excluded;
                 let inside = |range: [f64; 2], at: f64| (range[0]..=range[1]).contains(&at);
                 let beside = inside(side, samples.side);
-                // The same bound for the straight line from end to end first, which no piece leaves by more than so much.
-                let (off, distance) = nearest(ray.from, piece.ends);
-                let depth = self.radius - distance + piece.off_mm;
+                // First the same bound for the chord between the ends, with the segment's largest deviation from it.
+                let (off, distance) = nearest(ray.from, segment.ends);
+                let depth = self.radius - distance + segment.off_mm;
                 if depth <= best.get().0.max(reach.gouge_mm) {
                     let sine = (length(across(off, ray.along)) / distance).min(1.0);
-                    let ends = [piece.from, piece.to];
+                    let ends = [segment.from, segment.to];
                     let left_out = beside && ends.into_iter().all(|k| inside(path, samples.path[k as usize]));
                     if left_out || depth + reach.around_mm * sine + second <= bound.get() {
                         return;
                     }
                 }
-                let mut from = piece.ends[0];
-                for k in piece.from..piece.to.max(piece.from + 1) {
-                    let to = self.centre(piece.pass, (k + 1).min(piece.to));
+                let mut from = segment.ends[0];
+                for k in segment.from..segment.to.max(segment.from + 1) {
+                    let to = self.centre(segment.pass, (k + 1).min(segment.to));
                     let (off, distance) = nearest(ray.from, [from, to]);
                     from = to;
                     let depth = self.radius - distance;
                     if depth > best.get().0 {
-                        best.set((depth, Some((piece.pass, k))));
+                        best.set((depth, Some((segment.pass, k))));
                     }
                     if beside && depth <= reach.gouge_mm && inside(path, samples.path[k as usize]) {
                         continue;
@@ -282,7 +289,7 @@ impl<'a> Tree<'a> {
             },
         );
         let (depth_mm, by) = best.get();
-        Depth {
+        BallDepth {
             depth_mm,
             by,
             bound_mm: bound.get(),
@@ -290,7 +297,7 @@ impl<'a> Tree<'a> {
     }
 }
 
-/// From a point to the nearest one of a line between two others: the vector, and its length.
+/// Vector from a point to the nearest point of a line segment, and its length.
 fn nearest(point: Vector, [from, to]: [Vector; 2]) -> (Vector, f64) {
     let (axis, m) = (subtract(to, from), subtract(from, point));
     let squared = dot(axis, axis);
@@ -303,14 +310,14 @@ fn nearest(point: Vector, [from, to]: [Vector; 2]) -> (Vector, f64) {
     (off, length(off))
 }
 
-/// The nodes over these pieces, parents before their children, split at the middle of the longest side.
-fn build(nodes: &mut Vec<Node>, order: &mut [u32], boxes: &[Boxed]) {
-    let mut bounds = Boxed::EMPTY;
-    let mut middles = Boxed::EMPTY;
-    for piece in order.iter() {
-        let piece = &boxes[*piece as usize];
-        bounds = bounds.with(piece.low).with(piece.high);
-        middles = middles.with(piece.middle());
+/// Builds the nodes over these segments, parents before children, split at the median of the longest side.
+fn build(nodes: &mut Vec<Node>, order: &mut [u32], boxes: &[BoundingBox]) {
+    let mut bounds = BoundingBox::EMPTY;
+    let mut middles = BoundingBox::EMPTY;
+    for segment in order.iter() {
+        let segment = &boxes[*segment as usize];
+        bounds = bounds.with(segment.low).with(segment.high);
+        middles = middles.with(segment.middle());
     }
     let index = nodes.len();
     nodes.push(Node {
@@ -324,11 +331,11 @@ fn build(nodes: &mut Vec<Node>, order: &mut [u32], boxes: &[Boxed]) {
     let sizes = subtract(middles.high, middles.low);
     let axis = (0..3).fold(0, |axis, k| if sizes[k] > sizes[axis] { k } else { axis });
     let half = order.len() / 2;
-    let key = |piece: &u32| boxes[*piece as usize].middle()[axis];
+    let key = |segment: &u32| boxes[*segment as usize].middle()[axis];
     order.select_nth_unstable_by(half, |a, b| key(a).total_cmp(&key(b)).then(a.cmp(b)));
     let (low, high) = order.split_at_mut(half);
     build(nodes, low, boxes);
-    #[allow(clippy::cast_possible_truncation, reason = "twice the pieces at most")]
+    #[allow(clippy::cast_possible_truncation, reason = "twice the segments at most")]
     let second = nodes.len() as u32;
     build(nodes, high, boxes);
     nodes[index].next = second;
