@@ -1,4 +1,4 @@
-//! The patch that a pass is on: the surface at the pass's side parameter, and what ball, feed and scallop limit are in its units.
+//! The patch that a pass is on: the surface at the pass's side parameter, with ball, feed and scallop limit in its units.
 
 use crate::fault::Result;
 use crate::job::program::Job;
@@ -32,7 +32,7 @@ pub(crate) struct Patch {
 }
 
 impl Patch {
-    /// None yet.
+    /// No patch yet.
     pub(crate) const NONE: Self = Self {
         surface: Surface::Grid(GridPass::NONE),
         ball: Ball::NONE,
@@ -48,7 +48,7 @@ impl Patch {
     /// Collapses the patch of a pass.
     ///
     /// # Errors
-    /// [`crate::FaultKind::WrongState`] where the job has no such patch; what the surface's kind finds wrong.
+    /// [`crate::FaultKind::WrongState`] where the job has no such patch; the faults of the surface's kind.
     #[inline(never)]
     pub(crate) fn collapse(&mut self, job: &Job<'_>, position: &PassPosition) -> Result<()> {
         let PassPosition { side, reversed, span } = *position;
@@ -99,12 +99,12 @@ impl Patch {
         Ok(())
     }
 
-    /// Finds the parametrisation at both ends, for [`Self::start`] and [`Self::end`] to have it at hand.
+    /// Finds the parametrisation at both ends, and keeps it for [`Self::start`] and [`Self::end`].
     pub(crate) fn find_ends(&mut self) {
         self.ends = Some([self.start(), self.end()]);
     }
 
-    /// Whether [`Self::find_ends`] was here.
+    /// Whether [`Self::find_ends`] was called.
     pub(crate) const fn has_ends(&self) -> bool {
         self.ends.is_some()
     }
