@@ -84,5 +84,6 @@ pub use fault::{Fault, FaultKind};
 pub use interpolator::{Interpolator, SurfacePoint};
 pub use job::encode;
 pub use job::{AxisLimits, Header, Pattern, STORE_WORDS, Spacing, SurfaceKind, ToolSide};
+pub use math::number::NM_PER_MM;
 pub use sample::{Sample, SpanParameter, State};
 pub use steps::{AxisSteps, StepConfig, Steps};

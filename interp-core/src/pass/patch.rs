@@ -4,6 +4,7 @@ use crate::fault::Result;
 use crate::job::program::Job;
 use crate::job::{SurfaceKind, ToolSide};
 use crate::math::arith::{centred, power_of_two};
+use crate::math::number::NM_PER_MM_F32;
 use crate::pass::interval::Interval;
 use crate::pass::offset::{Locator, origin_q30};
 use crate::pass::position::PassPosition;
@@ -141,7 +142,7 @@ impl Patch {
     /// Ball, feed and scallop limit in the patch's units.
     fn measure(&mut self, job: &Job<'_>, shift: u8, side_span: u16, sign: f32) {
         let header = job.header;
-        self.per_mm = 1e6 * power_of_two(shift.into());
+        self.per_mm = NM_PER_MM_F32 * power_of_two(shift.into());
         let units = OffsetUnits::new(header.ball_radius_mm, shift);
         self.ball = Ball::new(&units, sign);
         self.locator = Locator::new(&units);

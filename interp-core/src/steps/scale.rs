@@ -7,7 +7,7 @@
 use super::HOLD_NM;
 
 /// Nanometres per millimetre.
-const NM_PER_MM: u64 = 1_000_000;
+const NM_PER_MM: u64 = crate::math::number::NM_PER_MM as u64;
 
 /// Fewest steps a millimetre, as the greatest number of nanometres a step.
 const STEP_NM_MAX: u64 = 1_000_000_000;
