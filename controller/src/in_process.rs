@@ -20,7 +20,7 @@ use crate::{
 /// Instructions that may wait for the next tick, as in the firmware.
 pub const COMMANDS_MAX: usize = 4;
 
-/// Events without end, as the desk has room.
+/// An unbounded queue of events.
 impl Events for Vec<Event> {
     fn has_room(&self) -> bool {
         true
@@ -133,7 +133,7 @@ impl<const WORDS: usize> Board<WORDS> {
         self.tick_with(0, 0);
     }
 
-    /// One tick of the sample timer before which so many were missed, the last one having taken so many cycles.
+    /// One tick of the sample timer with the number missed before it and the cycles of the last one.
     pub fn tick_with(&mut self, missed: u32, cycles: u32) {
         let mut events = Vec::new();
         if let Some(command) = self.half.commands.pop_front() {
@@ -155,7 +155,7 @@ impl<const WORDS: usize> Board<WORDS> {
         }
     }
 
-    /// Gives the board these inputs, beside the line.
+    /// Sets the board's inputs directly, not over the line.
     pub const fn simulate(&mut self, lines: InputLines) {
         self.half.lines = lines;
     }
@@ -165,13 +165,13 @@ impl<const WORDS: usize> Board<WORDS> {
         core::mem::take(&mut self.sent)
     }
 
-    /// The status, beside the line.
+    /// The status, not over the line.
     #[must_use]
     pub fn status(&mut self) -> Status {
         self.half.status()
     }
 
-    /// The real-time half, beside the line.
+    /// The real-time half.
     pub const fn real_time(&mut self) -> &mut RealTime<[i32; WORDS]> {
         &mut self.half.real_time
     }

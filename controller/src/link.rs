@@ -92,7 +92,7 @@ impl Link {
         if !self.is_open() {
             return;
         }
-        // There is room: a full batch does not stay.
+        // It fits: a full batch is flushed at once.
         let _ = self.batch.push(SampleRecord(*sample));
         if self.batch.is_full() {
             self.flush(out);

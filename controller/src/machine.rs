@@ -1,4 +1,4 @@
-//! What the link needs of the machine: the seam between the two halves of the board.
+//! The interface between the link and the real-time half of the board.
 
 use interp_core::{
     command::Command,
@@ -12,19 +12,19 @@ use protocol::message::{
 
 use crate::safety::Order;
 
-/// What the link asks of the real-time half; taken up with the next tick of the sample timer, in order.
+/// Instructions from the link to the real-time half; executed with the next tick of the sample timer, in order.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Instruction {
     /// The operator's command; goes to the interpolator with the next period that passes.
     Command(Command),
     /// What drives time.
     Clock(Clock),
-    /// Lockstep: so many more periods.
+    /// Lockstep: this number of further periods.
     Run {
         /// Periods, added to those that are left.
         ticks: u32,
     },
-    /// What a run tells the host.
+    /// Reports of a run to the host.
     Report(Report),
     /// Feed override, percent.
     Override {
@@ -33,11 +33,11 @@ pub enum Instruction {
     },
 }
 
-/// What the real-time half tells the link, in order.
+/// Events from the real-time half to the link, in order.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[allow(
     clippy::large_enum_variant,
-    reason = "an item of a queue of fixed places; there is no allocator to box with"
+    reason = "an item of a queue of fixed size; there is no allocator to box with"
 )]
 pub enum Event {
     /// A sample of the run.
@@ -53,14 +53,14 @@ pub trait Events {
     /// Most events that one tick puts in.
     const TICK_MAX: usize = 3;
 
-    /// Whether so many find room.
+    /// Whether [`Self::TICK_MAX`] events fit.
     fn has_room(&self) -> bool;
 
-    /// Puts an event in; false where it found no room, and is lost.
+    /// Puts an event in; false where the queue is full and it is lost.
     fn put(&mut self, event: Event) -> bool;
 }
 
-/// No room in the queue of instructions.
+/// The queue of instructions is full.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Busy;
 

@@ -3,12 +3,12 @@
 //! **Bound.** One [`Interpolator::tick`], a digest of 17 words (about 125 cycles on a Cortex-M4), no loop.
 //! **Cost.** What happens seldom (commands, misses, ends of passes and runs) is out of line: a tick in the middle of a
 //! pass copies nothing, and builds no event but the sample where the host wants it.
-//! **Missed tick.** Counted; on a free clock while the tool moves it trips the run with
+//! **Missed tick.** Counted; on a free clock while the tool moves it stops the run with
 //! [`FaultKind::DeadlineMissed`], because the tool stood still for a period in which the feed was commanded. The run stops
 //! along the path ([`Interpolator::controlled_stop`]).
-//! **Tick over budget.** Its cycles are known to the next tick, which trips the run with [`FaultKind::TickOverBudget`] on the
-//! same terms: before ticks are missed.
-//! **Inputs.** Looked at in every tick of the timer, whether time passes or not; what they do is in [`crate::safety`].
+//! **Tick over budget.** Its cycles are known to the next tick, which stops the run with [`FaultKind::TickOverBudget`] in the
+//! same way: before ticks are missed.
+//! **Inputs.** Evaluated in every tick of the timer, whether time passes or not; what they do is in [`crate::safety`].
 
 mod control;
 mod run;
@@ -30,7 +30,7 @@ use crate::{
     safety::Stop,
 };
 
-/// What a tick of the sample timer learns of the one before, and of the board.
+/// Inputs of a tick of the sample timer: timing of the one before, and the board's inputs.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct TickInput {
     /// Ticks of the sample timer that were missed since the last call.
@@ -129,7 +129,7 @@ impl<S: AsRef<[i32]> + AsMut<[i32]>> RealTime<S> {
     }
 
     /// After the tick: makes the pulses that bring the axes to its sample in the next period; see [`Steps::step`]. Too many steps
-    /// trip the run.
+    /// stop the run.
     ///
     /// A job without limits knows no way to its passes: the axes count as standing at the first sample of each, as if
     /// they had been brought there. Such a job is for looking at, not for a machine.
@@ -150,7 +150,7 @@ impl<S: AsRef<[i32]> + AsMut<[i32]>> RealTime<S> {
         }
     }
 
-    /// Stops a run with a fault from outside, along its path.
+    /// Controlled stop (category 1) with a fault from outside, along the path.
     #[cold]
     #[inline(never)]
     pub fn controlled_stop(&mut self, fault: Fault) {
@@ -168,7 +168,7 @@ impl<S: AsRef<[i32]> + AsMut<[i32]>> RealTime<S> {
         }
     }
 
-    /// One tick of the sample timer. In lockstep time stands still while there is no room for events, so that none is lost.
+    /// One tick of the sample timer. In lockstep time stands still while the queue of events is full, so that none is lost.
     #[inline]
     pub fn tick(&mut self, input: TickInput, events: &mut impl Events) {
         if !self.control.safety.is_unchanged(input.lines) {
@@ -187,7 +187,7 @@ impl<S: AsRef<[i32]> + AsMut<[i32]>> RealTime<S> {
         self.step(was_under_way, events);
     }
 
-    /// A tick with other inputs than the last, or in which the host is missed.
+    /// A tick with other inputs than the last, or with a link timeout.
     #[cold]
     #[inline(never)]
     fn guard(&mut self, lines: InputLines, events: &mut impl Events) {
@@ -200,7 +200,7 @@ impl<S: AsRef<[i32]> + AsMut<[i32]>> RealTime<S> {
         if !self.control.safety.drives_on() {
             self.lose_position();
         }
-        // Told here, because in lockstep no period may come that would tell it.
+        // Reported here, because in lockstep no further period may come that would report it.
         if under_way && !self.interpolator.state().is_under_way() {
             self.control.safety.ending = true;
             // It meant the run that is over: an abort is not to acknowledge a fault that nobody has seen.
@@ -264,7 +264,7 @@ impl<S: AsRef<[i32]> + AsMut<[i32]>> RealTime<S> {
         }
     }
 
-    /// Counts the last sample in, and tells the host what it wants of it.
+    /// Counts the last sample in, and reports it as the host has asked.
     #[inline]
     fn count_sample(&mut self, events: &mut impl Events) {
         let Self {
@@ -312,7 +312,7 @@ impl<S: AsRef<[i32]> + AsMut<[i32]>> RealTime<S> {
         self.status_now()
     }
 
-    /// The status, made where it is wanted.
+    /// The status, inlined into its callers.
     #[inline(always)]
     fn status_now(&self) -> Status {
         let run = &self.control.run;

@@ -1,12 +1,12 @@
-//! Inputs, drives, home, and a host that has gone: what may happen, and what has to stop.
+//! Inputs, drives, home and link timeout: what may start, and what has to stop.
 //!
 //! ```text
-//!  inputs ──► Debounce ──► Safety::watch ──► Stop::Uncontrolled   drives off, the run ends in this tick
-//!                              │         └─► Stop::Controlled  the run slows down along its path
+//!  inputs ──► Debounce ──► Safety::watch ──► Stop::Uncontrolled  category 0: drives off, the run ends in this tick
+//!                              │         └─► Stop::Controlled    category 1: the run slows down along its path
 //!  Order (from the host) ──► Safety::obey
 //! ```
 //!
-//! **Emergency stop.** Taken at its first tick. Drives off, home lost, a run under way is cut; latched until the host
+//! **Emergency stop.** Taken at its first tick. Drives off, home lost, a run under way ends at once; latched until the host
 //! acknowledges it, which it may only once the input was released for [`DEBOUNCE_TICKS`].
 //! **Drive fault.** The same, once it is steady.
 //! **Limit switch.** Steady: a run under way slows down along its path. The position stays good, and nothing is latched, but no
@@ -30,11 +30,11 @@ use protocol::message::{
 /// third comes 2 to 3 ms after the change. Contacts bounce for less, and at 100 mm/s an axis goes at most 0.3 mm meanwhile.
 pub const DEBOUNCE_TICKS: u32 = 3;
 
-/// What no inputs look like: there is something to do although they have not changed.
+/// A value that no inputs have: the next tick is evaluated although they have not changed.
 const UNSETTLED: u32 = u32::MAX;
 
-/// What the host asks of drives and home. Done at once, under the lock of the real-time half, so that no tick comes between the
-/// check and the deed.
+/// The host's orders for drives and home. Executed at once, under the lock of the real-time half, so that no tick comes between
+/// check and execution.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Order {
     /// What the machine is like.
@@ -53,12 +53,12 @@ pub enum Order {
     Acknowledge,
 }
 
-/// How an input stops a run.
+/// How an input stops a run, by the categories of IEC 60204-1.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) enum Stop {
-    /// At once: nothing follows the path any more.
+    /// Category 0, at once: the drives are off.
     Uncontrolled(Fault),
-    /// Along the path.
+    /// Category 1, along the path.
     Controlled(Fault),
 }
 
@@ -102,12 +102,12 @@ impl Debounce {
 pub(crate) struct Safety {
     /// The inputs that need nothing done; [`UNSETTLED`] where none do.
     settled: u32,
-    /// Ticks until the host counts as gone.
+    /// Ticks until the link times out.
     ticks_to_timeout: u32,
     status: SafetyStatus,
     debounce: Debounce,
     home_nm: [i32; 3],
-    /// The end of a run has still to be told.
+    /// The end of a run has still to be reported.
     pub(crate) ending: bool,
 }
 
@@ -150,7 +150,7 @@ impl Safety {
         lines.0 as u32 == self.settled && self.ticks_to_timeout != 0
     }
 
-    /// Takes a tick's inputs in that [`Self::is_unchanged`] was not content with; what they do to a run that is under way.
+    /// Takes the inputs of a tick for which [`Self::is_unchanged`] was false; how they stop a run that is under way.
     pub(crate) fn watch(&mut self, lines: InputLines, under_way: bool) -> Option<Stop> {
         let raw = lines.and(InputLines::ALL);
         self.debounce.assert(raw.and(InputLines::EMERGENCY_STOP).0);

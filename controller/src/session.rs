@@ -1,4 +1,4 @@
-//! A session with the host: who speaks, which request is next, and what is answered to it.
+//! A session with the host: its version, the numbers of its requests, and their answers.
 
 use heapless::Vec;
 use interp_core::{

@@ -1,4 +1,4 @@
-//! What stops the tool, or keeps a job from being loaded: a state with a code, a place and the value at fault.
+//! Faults: what stops the tool or refuses a job, each with a stable code and a value.
 
 /// Why a run stopped or a job was refused. The code of a kind never changes; new kinds get new codes.
 ///
@@ -6,10 +6,10 @@
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 #[repr(u32)]
 pub enum FaultKind {
-    /// A principal curvature towards the tool leaves no room for the ball (local gouge).
+    /// A principal curvature towards the tool is too large for the ball (local gouge).
     /// Value: the surface's principal curvature towards the tool times the ball radius (at least 0.99999 where nothing fits).
     BallDoesNotFit = 1,
-    /// `S_u x S_v` is too near zero for a normal, or went through zero between two samples so that the tool would change
+    /// `S_u x S_v` is too near zero for a normal, or changed its sign between two samples, so that the tool would change
     /// sides. Value: `|S_u x S_v| / (|S_u| |S_v|)`, the sine between them; 0 where it went through zero.
     DegenerateSurface = 2,
     /// The step of the path parameter for one period would not run forwards.
@@ -47,11 +47,11 @@ pub enum FaultKind {
     LimitSwitch = 17,
     /// A drive reports a fault: the drives are off, the home is lost. Value: the drive faults asserted, as bits.
     DriveFault = 18,
-    /// No word of the host for longer than it said. Value: that time in periods.
+    /// Link timeout: no frame of the host for longer than configured. Value: that time in periods.
     LinkTimeout = 19,
     /// A start while the machine does not know where its axes stand. Value: 0.
     NotHomed = 20,
-    /// An axis was asked for more steps in a period than a period has room for. Value: the steps asked for.
+    /// More steps of an axis in a period than fit. Value: the commanded steps.
     StepRate = 21,
     /// The board's pulses were not handed out in time, or the hardware that does so has stopped.
     /// Value: slots of the period that had passed when the direction was set, where that was too late; otherwise 0.
@@ -127,7 +127,7 @@ impl FaultKind {
     }
 }
 
-/// A fault: what, and the value that shows how far off it is (meaning per [`FaultKind`]).
+/// A fault: its kind, and a value that quantifies it (meaning per [`FaultKind`]).
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Fault {
     /// What went wrong.

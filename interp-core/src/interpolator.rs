@@ -13,7 +13,7 @@ use crate::sequence::sequencer::{Outcome, Sequencer};
 /// Periods over which the feed falls to nothing when a fault from outside stops the run: 1/32 less each period.
 pub const STOP_PERIODS: u8 = 32;
 
-/// The loaded surface at one place, outside of any run.
+/// The loaded surface at one pair of parameters, outside of any run.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct SurfacePoint {
     /// Cutter contact, nm.
@@ -26,7 +26,7 @@ pub struct SurfacePoint {
     pub interval: f32,
 }
 
-/// Everything that decides where the tool goes, behind one [`Interpolator::tick`] a period.
+/// The interpolator: one [`Interpolator::tick`] a period gives the next cutter location.
 ///
 /// The job's data lie in a store of 32-bit words, owned (an array) or lent (a board's static one, which then need not pass
 /// over the stack). The sample path does not depend on which: it is compiled once, in this crate.
@@ -62,7 +62,7 @@ impl<S> Interpolator<S> {
 }
 
 impl<S: AsRef<[i32]> + AsMut<[i32]>> Interpolator<S> {
-    /// Begins to load a job of so many data words; what was loaded before is gone, and the machine is idle.
+    /// Begins to load a job of this number of data words; the job before is dropped, and the machine is idle.
     ///
     /// # Errors
     /// Refused, and nothing changes: [`FaultKind::WrongState`] while a job runs or is held, [`FaultKind::BadHeader`],
@@ -126,7 +126,7 @@ impl<S: AsRef<[i32]> + AsMut<[i32]>> Interpolator<S> {
         self.motion.fault
     }
 
-    /// Where the run is: pass, path and side place. After a fault, where that is, which is past the last sample.
+    /// Pass, path and side parameter of the run. After a fault, those of the fault, which is past the last sample.
     #[must_use]
     pub fn surface_position(&self) -> (u32, SpanParameter, SpanParameter) {
         self.motion
@@ -135,7 +135,7 @@ impl<S: AsRef<[i32]> + AsMut<[i32]>> Interpolator<S> {
             .unwrap_or_else(|| self.motion.run.surface_position())
     }
 
-    /// Whether the loaded job is run within the axes' limits, from standstill to standstill, so that a way leads to each of its samples.
+    /// Whether the loaded job has limits of the axes, so that it is run from standstill to standstill with links between its passes.
     #[must_use]
     pub const fn has_limits(&self) -> bool {
         self.motion.program.header().axes.is_some()
@@ -147,13 +147,13 @@ impl<S: AsRef<[i32]> + AsMut<[i32]>> Interpolator<S> {
         self.motion.program.header().axes.map(|axes| axes.home_nm)
     }
 
-    /// Where the tool stands, nm, as far as is known: where the last run within limits left it, or where it was said to stand.
+    /// The tool's position, nm, where it is known: the end of the last run within limits, or the position set by [`Self::stand_at`].
     #[must_use]
     pub const fn stands_nm(&self) -> Option<[i32; 3]> {
         self.motion.sequencer.stands_nm()
     }
 
-    /// Says where the tool stands, nm, and so where the next run within limits begins; none where nobody knows: then that run
+    /// Sets the tool's position, nm, where the next run within limits begins; none where it is unknown: then that run
     /// begins at its job's home. Ignored while a run is under way.
     pub const fn stand_at(&mut self, at_nm: Option<[i32; 3]>) {
         if !self.motion.state.is_under_way() {
@@ -173,7 +173,7 @@ impl<S: AsRef<[i32]> + AsMut<[i32]>> Interpolator<S> {
         self.motion.run.last_interval()
     }
 
-    /// Evaluates the loaded surface at these parameters: what a sample there would say, whatever the machine is doing. Not for the sample path:
+    /// Evaluates the loaded surface at these parameters, in any state of the machine. Not for the sample path:
     /// it collapses a patch each time. The side fraction counts in steps of 2^-32.
     ///
     /// # Errors
@@ -183,15 +183,15 @@ impl<S: AsRef<[i32]> + AsMut<[i32]>> Interpolator<S> {
         self.motion.evaluate(self.store.as_ref(), path, side)
     }
 
-    /// Stops a run with a fault from outside, such as a missed deadline: along the path, the feed falling to nothing over
+    /// Controlled stop (IEC 60204-1 category 1) with a fault from outside, such as a missed deadline: along the path, the feed falling to nothing over
     /// [`STOP_PERIODS`] ([`State::Stopping`]), or at the end of the pass if that is nearer. Where the run is held, it faults at
     /// once. Ignored where nothing runs.
     pub fn controlled_stop(&mut self, fault: Fault) {
         self.motion.controlled_stop(fault);
     }
 
-    /// Ends a run with a fault from outside in this very period, because the drives are off and nothing follows the path any
-    /// more. The first fault is kept. Ignored where no run is under way.
+    /// Uncontrolled stop (category 0) with a fault from outside: ends the run in this period, because the drives are off and the axes no longer
+    /// follow the path. The first fault is kept. Ignored where no run is under way.
     pub fn uncontrolled_stop(&mut self, fault: Fault) {
         if self.motion.state.is_under_way() {
             self.motion.fail(fault);
@@ -199,7 +199,7 @@ impl<S: AsRef<[i32]> + AsMut<[i32]>> Interpolator<S> {
     }
 
     /// One period. Never blocks, never panics; bounded by the collapse of a patch and its evaluation at a few
-    /// places, and at the start of a pass by a walk over 16 side spans.
+    /// points, and at the start of a pass by a walk over 16 side spans.
     ///
     /// While the job runs, each call yields a sample with [`State::Running`] or [`State::Stopping`], counted by its `tick` from 0;
     /// the one after the last has [`State::Finished`]. In every state that does not move, the sample repeats the last position.
@@ -218,14 +218,14 @@ struct Motion {
     /// Periods until a stop is over.
     slow: u8,
     last: Sample,
-    /// What comes of a stop that no fault asked for.
+    /// The end of a stop that no fault caused.
     ending: Ending,
     run: Run,
     program: Program,
     sequencer: Sequencer,
 }
 
-/// What a run that is given up still has to do.
+/// The rest of a run that was given up.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Ending {
     /// Stand where it stops.
@@ -357,7 +357,7 @@ impl Motion {
         }
     }
 
-    /// The tool stands, and is to: what becomes of the run. Whether the period is over with that.
+    /// The tool stands, as commanded: the run's next state. Whether that ends the period.
     fn stand(&mut self) -> bool {
         match self.state {
             State::Holding => self.state = State::Held,

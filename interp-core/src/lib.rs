@@ -2,19 +2,35 @@
 //! a parametric surface, a ball-end tool, a feed and a scallop limit in; each period the next cutter location out.
 //!
 //! ```text
-//!  Header + words ── program ──► sealed job
-//!                                   │ collapse: once a pass and patch
-//!                                   ▼
-//!            ┌──────────────────► surface ──► Contact (point, normal, speed, curvatures)
-//!            │                                  │
-//!   contact: next parameter            ┌────────┼─────────────┐
-//!   at one period's arc  ◄─────────────┘        ▼             ▼
-//!            ▲                               offset        interval
-//!            │                              CL = CC + rN   candidate of the pass
-//!         interpolator::tick                    │             │
-//!            ▲                                  ▼             ▼
-//!       one call a period                    Sample       schedule: next pass
+//!  Header + words ── job::program ──► sealed job
+//!                                        │ pass::patch: collapse, once a pass and patch
+//!                                        ▼
+//!                 ┌────────────────► surface ──► Contact (point, normal, speed, curvatures)
+//!                 │                                 │ pass::evaluation
+//!   pass::contact: next parameter          ┌────────┴────────┐
+//!     at one period's arc                  ▼                 ▼
+//!                 ▲                   pass::offset      pass::interval
+//!                 │                   CL = CC + rN      candidate of the pass
+//!             pass::run                    │                 │
+//!                 ▲                        ▼                 ▼
+//!   with limits: sequence, feed         Sample      pass::across, schedule: next pass
+//!                 ▲                        │
+//!         Interpolator::tick               ▼
+//!                 ▲                     steps: pulses
+//!         one call a period
 //! ```
+//!
+//! | folder | holds |
+//! |---|---|
+//! | `math` | fixed-point and f32 arithmetic |
+//! | `surface` | the kinds of surface and their differential geometry |
+//! | `job` | the job and its checks; [`encode`] for load time |
+//! | `pass` | along a pass, and from pass to pass |
+//! | `feed` | the feed within the limits of the axes |
+//! | `sequence` | approach, passes, links and retract on a machine with limits |
+//! | `steps` | from positions to step pulses |
+//!
+//! A folder uses those above it only, and `steps` none but `math`; `tests/folders.rs` holds it.
 //!
 //! Nothing here allocates, blocks, panics or uses f64; the same calls give the same bits on every machine. Lengths are mm
 //! (f32) or nm (i32), angles turns or radians as named, parameters fractions of a span. Build job data from ordinary
@@ -68,5 +84,6 @@ pub use fault::{Fault, FaultKind};
 pub use interpolator::{Interpolator, SurfacePoint};
 pub use job::encode;
 pub use job::{AxisLimits, Header, Pattern, STORE_WORDS, Spacing, SurfaceKind, ToolSide};
+pub use math::number::NM_PER_MM;
 pub use sample::{Sample, SpanParameter, State};
 pub use steps::{AxisSteps, StepConfig, Steps};

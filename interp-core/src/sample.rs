@@ -73,7 +73,7 @@ impl State {
     }
 }
 
-/// A place along one parameter of a surface: which span of the grid, and how far through it.
+/// A surface parameter: the span of the grid, and the fraction of it.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord)]
 pub struct SpanParameter {
     /// Span of the grid, from 0, in the surface's own direction.
@@ -83,7 +83,7 @@ pub struct SpanParameter {
 }
 
 impl SpanParameter {
-    /// No place: the tool is off the passes.
+    /// No parameter: the tool is off the passes.
     pub const NONE: Self = Self {
         span: u16::MAX,
         fraction: 0,
@@ -107,9 +107,9 @@ pub struct Sample {
     pub feed_mm_s: f32,
     /// Cutter contact, nm.
     pub cc_nm: [i32; 3],
-    /// Cutter location (ball centre), nm: what the axes are told.
+    /// Cutter location (ball centre), nm: the axes' commanded position.
     pub cl_nm: [i32; 3],
-    /// `1 / interval^2`: square of the passes that the scallop limit asks for per unit of the side parameter, by this sample
+    /// `1 / interval^2`: square of the number of passes per unit of the side parameter that the scallop limit requires at this sample
     /// alone. The greatest of a pass decides; see [`Self::interval`].
     pub inv_interval_sq: f32,
 }

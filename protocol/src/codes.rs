@@ -43,7 +43,7 @@ code_byte!(tool_side, ToolSide, |code| {
         .find(|side| *side as u8 == code)
 });
 
-/// A place: the span as a varint, the fraction as eight bytes.
+/// A span parameter: the span as a varint, the fraction as eight bytes.
 pub(crate) mod span_parameter {
     use interp_core::sample::SpanParameter;
     use serde::{Deserialize, Deserializer, Serialize, Serializer};

@@ -38,14 +38,14 @@
 //! | 12 | `StepConfig` | the fields of [`StepSettings`] | `Ack`; refused while a run is under way |
 //! | 13 | `Configure` | the fields of [`Configuration`] | `Ack`, and it holds |
 //! | 14 | `Drives` | 0 off, 1 on | as `Configure` |
-//! | 15 | `SetHome` | three places in nm, `i32` each | as `Configure` |
+//! | 15 | `SetHome` | three positions in nm, `i32` each | as `Configure` |
 //! | 16 | `Acknowledge` | | as `Configure` |
 //! | 17 | `Override` | percent `u8` | as `Start` |
 //! | 18 | `Stop` | | as `Start` |
 //! | 19 | `Simulate` | inputs `u16` | `Ack`, by a board without pins only |
 //!
 //! Header: kind, pattern, spacing, tool side (a byte each), spans along path and side (`u16`), ball radius (mm), feed (mm/s),
-//! scallop height (mm), period (s) (`f32`); then 0, or 1 and what the axes can do: velocity (mm/s), acceleration (mm/s^2), jerk (mm/s^3)
+//! scallop height (mm), period (s) (`f32`); then 0, or 1 and the axes' limits: velocity (mm/s), acceleration (mm/s^2), jerk (mm/s^3)
 //! (three `f32` each), chord error (mm, `f32`), travel (least and most of each axis), home (nm, `i32`), plunge (mm, `f32`), safe height
 //! (nm, `i32`).
 //!
@@ -59,11 +59,11 @@
 //! | 1 | `Ack` | number |
 //! | 2 | `Nak` | number, [`Reason`] (its code and fields) |
 //! | 3 | `Status` | number, the fields of [`Status`] |
-//! | 4 | `Samples` | list of samples (tick, state, pass, path and side place, feed, CC and CL, interval) |
+//! | 4 | `Samples` | list of samples (tick, state, pass, path and side parameter, feed, CC and CL, interval) |
 //! | 5 | `PassDigest` | the fields of [`PassDigest`] |
 //! | 6 | `Halted` | the fields of [`Status`] |
 //!
-//! A place is its span (`u16`) and fraction. `Halted` comes when the ticks of a `Run` are used up, or when a run is over
+//! A parameter is its span (`u16`) and fraction. `Halted` comes when the ticks of a `Run` are used up, or when a run is over
 //! (finished, faulted, aborted), whichever is first.
 //!
 //! # For ever
@@ -117,7 +117,7 @@ pub enum Request {
         /// Number of the session, any.
         session: u32,
     },
-    /// Begins a job's upload; what was loaded before is gone. Refused while a run is under way.
+    /// Begins a job's upload; the job before is dropped. Refused while a run is under way.
     JobBegin {
         /// All but the surface's data.
         #[serde(with = "HeaderFields")]
@@ -145,20 +145,20 @@ pub enum Request {
     Resume,
     /// Give the run up; the job stays loaded.
     Abort,
-    /// How is it going?
+    /// Asks for the status.
     Status,
     /// What drives time. Refused while a run is under way.
     Clock(Clock),
-    /// Lockstep: let so many more periods pass.
+    /// Lockstep: let this number of further periods pass.
     Run {
         /// Periods, added to those left of the last `Run`.
         ticks: u32,
     },
-    /// What a run tells the host.
+    /// Reports of a run to the host.
     Report(Report),
-    /// What the axes' drives want. Refused while a run is under way.
+    /// Settings of the axes' drives. Refused while a run is under way.
     StepConfig(StepSettings),
-    /// What the machine around the board is like. Refused while a run is under way.
+    /// Description of the machine around the board. Refused while a run is under way.
     Configure(Configuration),
     /// Drives on or off. On is refused while emergency stop or drive fault are asserted or latched; off while a run is
     /// under way, and loses the home.

@@ -1,8 +1,8 @@
-//! Why the board did not do what it was asked: the reasons of a `Nak`.
+//! The reasons of a `Nak`: why the board refused a request.
 
 use core::fmt;
 
-use interp_core::{fault::FaultKind, sample::State};
+use interp_core::{NM_PER_MM, fault::FaultKind, sample::State};
 use serde::{Deserialize, Serialize};
 
 use crate::{
@@ -174,7 +174,7 @@ impl fmt::Display for Mm {
         for (axis, nm) in self.0.into_iter().enumerate() {
             let separator = if axis == 0 { "" } else { ", " };
             let sign = if nm < 0 { "-" } else { "" };
-            let (mm, rest) = (nm.unsigned_abs() / 1_000_000, nm.unsigned_abs() % 1_000_000);
+            let (mm, rest) = (nm.unsigned_abs() / NM_PER_MM, nm.unsigned_abs() % NM_PER_MM);
             write!(formatter, "{separator}{sign}{mm}.{rest:06}")?;
         }
         Ok(())

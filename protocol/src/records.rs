@@ -36,7 +36,7 @@ pub enum Clock {
     Lockstep,
 }
 
-/// What a run tells the host while it goes on.
+/// Reports of a run to the host while it is under way.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub enum Report {
     /// One `PassDigest` a pass.
@@ -109,7 +109,7 @@ impl From<Fault> for FaultReport {
     }
 }
 
-/// All that the board knows of its run. Counters belong to the run and restart with it, save `frames_bad`.
+/// Status of the board and its run. Counters belong to the run and restart with it, save `frames_bad`.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Status {
     /// State after the last step.
@@ -121,16 +121,16 @@ pub struct Status {
     pub clock: Clock,
     /// Ticks of the last `Run` that are left.
     pub credit: u32,
-    /// What a run tells the host.
+    /// Reports of a run to the host.
     pub report: Report,
     /// Tick of the last sample.
     pub tick: u32,
     /// Pass of the last sample; while faulted, of the fault.
     pub pass: u32,
-    /// Path place of the last sample; while faulted, of the fault.
+    /// Path parameter of the last sample; while faulted, of the fault.
     #[serde(with = "codes::span_parameter")]
     pub path: SpanParameter,
-    /// Side place of the last sample; while faulted, of the fault.
+    /// Side parameter of the last sample; while faulted, of the fault.
     #[serde(with = "codes::span_parameter")]
     pub side: SpanParameter,
     /// Samples of the run so far: those that the digest covers.
@@ -144,7 +144,7 @@ pub struct Status {
     pub deadline_misses: u32,
     /// Most CPU cycles that a tick took; 0 where the board cannot measure.
     pub tick_cycles_max: u32,
-    /// Samples (and other events) that found no room on their way to the link.
+    /// Samples (and other events) lost because the queue to the link was full.
     pub samples_lost: u32,
     /// Frames from the host that could not be read since power-up.
     pub frames_bad: u32,
@@ -254,7 +254,7 @@ struct AxisLimitsFields {
     safe_z_nm: i32,
 }
 
-/// An option of what the axes can do: 0, or 1 and the fields.
+/// An option of the axes' limits: 0, or 1 and the fields.
 mod axes {
     use super::{AxisLimits, AxisLimitsFields, Deserialize, Deserializer, Serialize, Serializer};
 
@@ -276,7 +276,7 @@ mod axes {
     }
 }
 
-/// What the axes' drives want: of each axis steps (`u32`), the millimetres that these are (`u32`), whether its direction is inverted
+/// Settings of the axes' drives: of each axis steps (`u32`), the millimetres that these are (`u32`), whether its direction is inverted
 /// (a byte, 0 or 1); then slots of a pulse (`u8`) and of the directions' set-up (`u16`).
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct StepSettings {

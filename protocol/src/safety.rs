@@ -1,4 +1,4 @@
-//! The board's safety inputs, and what follows from them: the part of the messages that is about people and drives.
+//! The board's safety inputs, drives and home: the safety part of the messages.
 
 use serde::{Deserialize, Serialize};
 
@@ -84,7 +84,7 @@ impl InputLines {
     }
 }
 
-/// What a run on a free clock does when the host is gone.
+/// Reaction of a run on a free clock to a link timeout.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub enum LinkTimeoutAction {
     /// 0: it goes on to its end.
@@ -94,19 +94,19 @@ pub enum LinkTimeoutAction {
     Hold,
 }
 
-/// What the host tells the board of the machine around it. The default is the strict one.
+/// The host's description of the machine around the board. The default is the strict one.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Configuration {
     /// A run starts only where the machine is homed.
     pub homing_required: bool,
-    /// What a run does when the host is gone.
+    /// Reaction of a run to a link timeout.
     pub on_link_timeout: LinkTimeoutAction,
-    /// Periods without a frame after which the host is gone; 0: never.
+    /// Link timeout: periods without a frame of the host; 0: none.
     pub link_timeout_ticks: u32,
 }
 
 impl Configuration {
-    /// A board that nobody has told anything.
+    /// A board that was not configured.
     pub const DEFAULT: Self = Self {
         homing_required: true,
         on_link_timeout: LinkTimeoutAction::Finish,
@@ -167,11 +167,11 @@ pub struct SafetyStatus {
     pub homed: bool,
     /// The drives are enabled.
     pub drives_on: bool,
-    /// The host was gone during this run, or the last one.
+    /// The link timed out during this run, or the last one.
     pub link_timed_out: bool,
     /// Feed override, percent.
     pub feed_override: u8,
-    /// What the host has told.
+    /// The host's configuration.
     pub configuration: Configuration,
     /// Why the board started.
     pub reset: ResetCause,

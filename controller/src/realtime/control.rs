@@ -1,4 +1,4 @@
-//! What the real-time half keeps beside the interpolator.
+//! State of the real-time half besides the interpolator.
 
 use interp_core::{
     command::Command,
@@ -18,8 +18,8 @@ use crate::{
 pub(super) struct Control {
     pub(super) run: RunRecord,
     pub(super) credit: u32,
-    /// In lockstep: an instruction was executed in this tick; the last period that there was credit for is over, and the host is to know. Time
-    /// stands still for a tick then, so that neither is on top of a period's work.
+    /// In lockstep: an instruction was executed in this tick; the last period that there was credit for is over, and the host has to hear of it. Time
+    /// stands still for a tick then, so that neither adds to a period's work.
     pub(super) obeyed: bool,
     pub(super) spent: bool,
     pub(super) tick_budget: u32,

@@ -1,9 +1,9 @@
-//! What is kept of a run.
+//! The record of a run.
 
 use interp_core::sample::Sample;
 use protocol::{digest::Digest, message::PassDigest};
 
-/// What is kept of a run: counters and digests.
+/// The record of a run: counters and digests.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct RunRecord {
     pub(super) samples: u32,

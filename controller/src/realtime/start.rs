@@ -1,10 +1,10 @@
-//! What comes before a run: drives, home, and whether it may begin.
+//! Before a run: drives, home, and whether it may begin.
 //!
 //! **Where a run begins.** A job within limits says where: at its home. Its run is refused where the axes stand elsewhere, because
 //! nothing would lead to its first sample. Run again, home not having been declared since, it begins where it ended: at its home, or
 //! where it was given up, and the way to the surface is found from there.
 //! **Without a home.** Where none is required and none was declared, the axes count as standing at the job's home.
-//! **After a job without limits** nobody knows where the axes stand: nothing led from pass to pass.
+//! **After a job without limits** the axes' position is unknown: no links led from pass to pass.
 
 use interp_core::command::Command;
 use protocol::message::Reason;
@@ -50,8 +50,8 @@ impl<S: AsRef<[i32]> + AsMut<[i32]>> RealTime<S> {
         }
     }
 
-    /// What becomes of a start whose period passes: a run that is counted from nothing, or no run where it may not start, which
-    /// the link did not know yet.
+    /// A start whose period passes: a run with its record reset, or no run where it may not start, which
+    /// the link could not know yet.
     #[cold]
     #[inline(never)]
     pub(super) fn begin(&mut self) -> Option<Command> {
@@ -73,7 +73,7 @@ impl<S: AsRef<[i32]> + AsMut<[i32]>> RealTime<S> {
         Some(Command::Start)
     }
 
-    /// The axes stand here: steps and runs count from there.
+    /// Sets the axes' position: steps and runs count from there.
     fn set_position(&mut self, at_nm: [i32; 3]) {
         self.interpolator.stand_at(Some(at_nm));
         if let Some(steps) = &mut self.steps {
@@ -82,7 +82,7 @@ impl<S: AsRef<[i32]> + AsMut<[i32]>> RealTime<S> {
         self.control.from_home = true;
     }
 
-    /// Nobody knows any more where the axes stand.
+    /// The axes' position is unknown from here on.
     pub(super) fn lose_position(&mut self) {
         self.interpolator.stand_at(None);
     }

@@ -133,7 +133,7 @@ fn drives_off_lose_the_home_and_no_order_is_taken_under_way() {
     assert_eq!(safety.home_nm(), None);
 }
 
-/// Ticks until the run is to be held, asked as the real-time half asks; `None` after so many.
+/// Ticks until the run is to be held, as the real-time half finds it; `None` after the given number.
 fn ticks_until_hold(safety: &mut Safety, clock: Clock, states: &[State]) -> Option<usize> {
     for (tick, &state) in states.iter().enumerate() {
         if !safety.is_unchanged(InputLines::NONE)

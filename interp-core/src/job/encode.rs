@@ -79,8 +79,8 @@ impl fmt::Display for EncodeError {
 
 impl core::error::Error for EncodeError {}
 
-/// Nanometres per millimetre.
-const NM_PER_MM: f64 = 1e6;
+/// Nanometres in a millimetre, exactly.
+const NM_PER_MM: f64 = crate::math::number::NM_PER_MM as f64;
 
 /// Coefficients over `u[0]..u[1]`, `v[0]..v[1]` as coefficients of parameters from -1/2 to 1/2 over those ranges.
 #[must_use]

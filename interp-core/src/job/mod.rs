@@ -1,4 +1,4 @@
-//! A job as it is asked for: the [`Header`] and, as plain words, the surface's data.
+//! A job: the [`Header`] and, as plain words, the surface's data.
 //!
 //! The words (i32) of a job, in order:
 //!
@@ -17,7 +17,7 @@ pub(crate) mod program;
 /// rational patches ([`patches_max`]).
 pub const STORE_WORDS: usize = 16_384;
 
-/// Patches that surely fit a store of so many words, however they are arranged: each may need a span width of its own,
+/// Patches that fit a store of this size in any arrangement: each may need a span width of its own,
 /// and one direction has one more.
 #[must_use]
 pub const fn patches_max(kind: SurfaceKind, store_words: usize) -> usize {
@@ -108,8 +108,8 @@ pub enum ToolSide {
     Minus = 1,
 }
 
-/// What the machine's axes x, y, z can do, and where they may go. A job that says so is run from standstill to standstill, its passes linked;
-/// without it the feed is constant from the first sample to the last, as in the paper.
+/// Limits of the machine's axes x, y, z, and their travel. A job with limits is run from standstill to standstill, its passes linked;
+/// without limits the feed is constant from the first sample to the last, as in the paper.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct AxisLimits {
     /// Greatest velocity of each axis, mm/s, 1e-3 to 1e5.
@@ -124,13 +124,13 @@ pub struct AxisLimits {
     pub travel_nm: [[i32; 2]; 3],
     /// Where the tool centre stands before the first run, nm; within the travel.
     pub home_nm: [i32; 3],
-    /// The last part of the way down to the surface, mm, 0 to 1000, that is gone no faster than at the feed.
+    /// Last part of the plunge, mm, 0 to 1000, followed no faster than at the feed.
     pub plunge_mm: f32,
     /// Height (z of the tool centre) at which the tool is clear of the surface everywhere, nm; within the travel.
     pub safe_z_nm: i32,
 }
 
-/// What a job asks for, besides its surface data. Ranges are checked when it is loaded.
+/// A job's parameters besides its surface data. Ranges are checked when it is loaded.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Header {
     /// Kind of surface.
@@ -153,6 +153,6 @@ pub struct Header {
     pub scallop_mm: f32,
     /// Sampling period T, s, 1e-5 to 0.1.
     pub period_s: f32,
-    /// What the axes can do; none for a constant feed.
+    /// Limits of the axes; none for a constant feed.
     pub axes: Option<AxisLimits>,
 }

@@ -21,7 +21,7 @@ enum LoadStage {
     Sealed,
 }
 
-/// What is known of the job in the store, which is the caller's and handed in with every call. Its surface can be read only
+/// State of the job in the store, which the caller owns and passes with every call. Its surface can be read only
 /// once the job is sealed.
 #[derive(Debug)]
 pub(crate) struct Program {
@@ -78,7 +78,7 @@ fn check_header(header: &Header) -> Result<()> {
         .map_or(Ok(()), |axes| check_axes(header, axes))
 }
 
-/// Ranges of what the axes can do: such that a step of a period fits its integer, and none of the planner's products overflows.
+/// Ranges of the axes' limits: a step of a period fits its integer, and none of the planner's products overflows.
 fn check_axes(header: &Header, axes: &AxisLimits) -> Result<()> {
     let bad = |value| Err(Fault::new(FaultKind::BadHeader, value));
     let all = [

@@ -185,7 +185,7 @@ pub(crate) const fn centred(fraction: u64) -> i32 {
     ((fraction >> 32) as u32 ^ 0x8000_0000) as i32
 }
 
-/// A place on a patch a step further; none past its end.
+/// A fraction of a patch a step further; none past its end.
 #[inline(always)]
 #[must_use]
 pub(crate) fn advanced(fraction: u64, step: u64) -> Option<u64> {

@@ -22,10 +22,14 @@ impl Bounded for f32 {
 }
 
 /// Nanometres in a millimetre.
-pub(crate) const NM_PER_MM: f32 = 1e6;
+pub const NM_PER_MM: u32 = 1_000_000;
+
+/// The same as a float, exactly.
+#[allow(clippy::cast_precision_loss, reason = "below 2^24")]
+pub(crate) const NM_PER_MM_F32: f32 = NM_PER_MM as f32;
 
 /// Millimetres in a nanometre.
-pub(crate) const MM_PER_NM: f32 = 1.0 / NM_PER_MM;
+pub(crate) const MM_PER_NM: f32 = 1.0 / NM_PER_MM_F32;
 
 /// Nanometres as mm, to 24 bits.
 #[allow(

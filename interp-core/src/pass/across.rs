@@ -1,10 +1,11 @@
-//! Step 5 with foresight: how far the next pass may lie.
+//! Step 5 with look-ahead: the step-over from a pass to the next one.
 //!
 //! The interval of eqns 10 and 11 is of first order: it takes lengths and curvatures of the pass for those of the whole gap, and a parabola
 //! for the ball. What that leaves out is a percent or two of the scallop height where lines spread or the surface bends more from pass to
-//! pass, h/(2r) everywhere, and up to four times the height at the end of a pass whose lines are skew. So a pass is also looked at from
-//! outside: in ticks that have little else to do, the inv_interval_sq `1/interval^2` is taken on two lines beside it, half a step-over and a whole
-//! one further, at the same path parameter. The step to the next pass is the one over which the mean inv_interval_sq makes the scallop.
+//! pass, h/(2r) everywhere, and up to four times the height at the end of a pass whose lines are skew. So the estimator also
+//! evaluates the surface beside the pass: in ticks with little other work it takes the inverse square interval, `1/interval^2`, on two neighbouring
+//! lines, half a step-over and a whole one further, at the same path parameter. Over the step to the next pass, the mean inverse square interval
+//! gives the scallop height.
 
 use crate::job::Header;
 use crate::job::program::Job;
@@ -16,44 +17,45 @@ use crate::pass::schedule;
 use crate::sample::{SpanParameter, interval_of};
 use crate::surface::{Contact, Pass as _};
 
-/// A slack tick in so many looks across, at one line and the other in turn: the maximum of neighbouring samples hardly differ.
+/// One in this number of ticks without other work evaluates a neighbouring line, the two lines in turn: the intervals of neighbouring samples
+/// hardly differ.
 pub(crate) const EVERY: u32 = 4;
 
-/// Longest step over the first order's: no further is looked at.
+/// Longest step, over the first order's: the lines lie no further.
 const STEP_MAX: f32 = 1.25;
-/// Shortest: where maximum rise faster than that, no pass is looked at closely enough.
+/// Shortest: where the inverse square interval rises faster than that, the lines are too far apart to resolve it.
 const STEP_MIN: f32 = 0.25;
-/// Newton steps to the root of a cubic, from at most four times the root: four bring it to a few percent there. Where the inv_interval_sq changes
+/// Newton steps to the root of a cubic, from at most four times the root: four bring it to a few percent there. Where the inverse square interval changes
 /// by a tenth two are enough: a step of [`NEWTON_LAST`] leaves 1e-6.
 const NEWTON_STEPS: u8 = 4;
 const NEWTON_LAST: f32 = 1e-3;
-/// The first pass has no step before it by which to choose the lines. They are chosen anew when the greatest inv_interval_sq has grown by so
-/// much since.
+/// The first pass has no step before it by which to choose the lines. They are chosen again when the greatest inverse square interval has grown by
+/// this factor since.
 const AIM_AGAIN: f32 = 1.25;
 
-/// What is to be done next for a line.
+/// The next work on a line.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Task {
-    /// Choose it.
+    /// Choose its side parameter.
     Aim,
-    /// Make its patch beside the one that the pass is on.
+    /// Collapse its patch beside the one that the pass is on.
     Patch,
-    /// The inv_interval_sq at its start.
+    /// The inverse square interval at its start.
     Start,
-    /// The maximum on it, until the last patch of the pass.
+    /// The inverse square intervals on it, until the last patch of the pass.
     Look,
-    /// The inv_interval_sq at its end.
+    /// The inverse square interval at its end.
     End,
-    /// The maximum on it, to the end.
+    /// The inverse square intervals on it, to the end.
     LookOn,
-    /// Nothing: the surface ends before it, or it cannot be had.
+    /// None: the surface ends before it, or its patch is faulty.
     Rest,
 }
 
-/// A line beside the pass.
+/// A line at a fixed side parameter beside the pass, ahead of it.
 #[derive(Clone, Copy, Debug)]
 struct NeighbourLine {
-    /// How far out it is, of a step-over.
+    /// Its distance from the pass, of a step-over.
     share: f32,
     patch: Patch,
     task: Task,
@@ -61,14 +63,14 @@ struct NeighbourLine {
     span: u16,
     spans: u16,
     side: SpanParameter,
-    /// The step-over, in the side parameter, and the inv_interval_sq by which it was chosen.
+    /// The step-over, in the side parameter, and the inverse square interval by which it was chosen.
     step: f32,
     aimed: f32,
-    /// Greatest inv_interval_sq on the line.
+    /// Greatest inverse square interval on the line.
     most: f32,
 }
 
-/// The greatest inv_interval_sq of the samples of a pass, and of the surface there `across` and `lateral_squared` of the [`Contact`].
+/// The greatest inverse square interval of the samples of a pass, and of the surface there `across` and `lateral_squared` of the [`Contact`].
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct PassMaximum {
     pub(crate) inv_interval_sq: f32,
@@ -83,11 +85,11 @@ impl PassMaximum {
     };
 }
 
-/// What is known of a pass's ends and the lines beside it.
+/// The greatest inverse square intervals at a pass's ends and on the lines beside it.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct StepOverEstimator {
     lines: [NeighbourLine; 2],
-    /// Greatest inv_interval_sq at the ends of the pass, and which of them are still to be looked at.
+    /// Greatest inverse square interval at the ends of the pass, and which of them are still to be evaluated.
     edge: f32,
     ends: [bool; 2],
     /// Step of the pass before.
@@ -106,7 +108,7 @@ impl StepOverEstimator {
         second: false,
     };
 
-    /// Back to before the first pass. What else there is, each pass begins anew.
+    /// Back to before the first pass. [`Self::begin`] resets the rest.
     pub(crate) const fn restart(&mut self) {
         self.before = None;
         self.second = false;
@@ -121,7 +123,7 @@ impl StepOverEstimator {
         self.ends = [true; 2];
     }
 
-    /// Looks no more on this pass.
+    /// Evaluates no more on this pass.
     #[cfg(test)]
     pub(crate) fn disable(&mut self) {
         self.ends = [false; 2];
@@ -139,7 +141,7 @@ impl StepOverEstimator {
         }
     }
 
-    /// Does one thing, for a run at this fraction of this patch. `most`: greatest inv_interval_sq of the pass so far.
+    /// One portion of work, for a run at this fraction of this patch. `most`: greatest inverse square interval of the pass so far.
     #[inline(never)]
     pub(crate) fn work(
         &mut self,
@@ -179,7 +181,7 @@ impl StepOverEstimator {
         let [half, whole] = self.lines.each_ref().map(|line| line.found(header, here));
         let mean = match (half, whole) {
             (Some(half), Some(whole)) => mean(here, half, whole),
-            // The surface ends before the second line, or there was no time to look.
+            // The surface ends before the second line, or there was no time to evaluate it.
             (Some(half), None) => half.at_least(here),
             _ => here,
         };
@@ -196,7 +198,7 @@ impl StepOverEstimator {
 }
 
 impl NeighbourLine {
-    /// No line yet, to be so far out.
+    /// No line yet, to lie at this share of a step-over.
     const fn new(share: f32) -> Self {
         Self {
             share,
@@ -280,7 +282,7 @@ impl NeighbourLine {
         }
     }
 
-    /// Greatest inv_interval_sq on the line; a line of which a part was not seen is taken to be no flatter than the pass.
+    /// Greatest inverse square interval on the line; a line that was evaluated in part counts as no flatter than the pass.
     fn found(&self, header: &Header, here: f32) -> Option<f32> {
         match self.task {
             Task::LookOn if self.spans >= header.path_spans => Some(self.most),
@@ -290,15 +292,15 @@ impl NeighbourLine {
     }
 }
 
-/// Mean inv_interval_sq over a step-over, from the values at its start, middle and end. Where the middle stands out, a parabola's; where the ends
-/// do, that of two straight lines, because a inv_interval_sq may have a kink at a knot.
+/// Mean inverse square interval over a step-over, from the values at its start, middle and end. Where the middle stands out, a parabola's; where the ends
+/// do, that of two straight lines, because an inverse square interval may have a kink at a knot.
 fn mean(here: f32, half: f32, whole: f32) -> f32 {
     let parabola = (here + 4.0 * half + whole) * (1.0 / 6.0);
     let lines = (here + 2.0 * half + whole) * 0.25;
     parabola.at_least(lines)
 }
 
-/// The inv_interval_sq at an end of a line, 0 where there is no contact. There the crest between two passes is beyond the end of one of them, where
+/// The inverse square interval at an end of a line, 0 where there is no contact. There the crest between two passes is beyond the end of one of them, where
 /// lines are skew: from the last ball of that one it is as far as the side line leads, from the other one at right angles to the pass.
 /// With a and b for |d|^2 (1 + r c) of these two directions, the crest is 4/(1 + sqrt(a/b))^2 as high.
 #[inline(never)]
@@ -321,7 +323,8 @@ fn exact_at(job: &Job<'_>, patch: &Patch, contact: &Contact) -> f32 {
     exact(job.header, patch.interval.inv_interval_sq(contact), shape)
 }
 
-/// The inv_interval_sq without the first order's approximations in h/r. The ball's circle instead of its parabola makes it 1/(1 - h/(2r)) of itself, and
+/// The inverse square interval without the first order's approximations in h/r. The ball's circle instead of its parabola
+/// makes it 1/(1 - h/(2r)) of itself, and
 /// the scallop's own height above a surface of curvature c another 1 + h c; `across` over `lateral_squared` is 1 + r c.
 fn exact(header: &Header, inv_interval_sq: f32, [across, lateral_squared]: [f32; 2]) -> f32 {
     let height = header.scallop_mm / header.ball_radius_mm;
@@ -333,7 +336,7 @@ fn exact(header: &Header, inv_interval_sq: f32, [across, lateral_squared]: [f32;
     inv_interval_sq * (1.0 + height * bend) / (1.0 - 0.5 * height)
 }
 
-/// The step x over which a inv_interval_sq that begins as `here` has the mean `here + rise x`, which is 1/x^2.
+/// The step x over which an inverse square interval that begins as `here` has the mean `here + rise x`, which is 1/x^2.
 fn step_over(here: f32, rise: f32) -> f32 {
     let first = interval_of(here);
     // In units of the first order's step, where here = 1.
@@ -341,7 +344,7 @@ fn step_over(here: f32, rise: f32) -> f32 {
     let mut step = 1.0_f32;
     for _ in 0..NEWTON_STEPS {
         let slope = step * (2.0 + 3.0 * rise * step);
-        // Where the inv_interval_sq vanishes within the step there is no root: as far as is allowed.
+        // Where the inverse square interval vanishes within the step there is no root: as far as is allowed.
         let next = step - (step * step * (1.0 + rise * step) - 1.0) / slope.at_least(0.5);
         // A NaN becomes the shortest step.
         let next = next.at_least(STEP_MIN).at_most(STEP_MAX);
@@ -358,7 +361,7 @@ fn step_over(here: f32, rise: f32) -> f32 {
 mod tests {
     use super::*;
 
-    /// Steps over a inv_interval_sq that is known everywhere end where the mean of the inv_interval_sq is 1/step^2.
+    /// Steps over an inverse square interval that is known everywhere end where the mean of the inverse square interval is 1/step^2.
     #[test]
     fn the_mean_over_the_step_makes_the_scallop() {
         for rise in [0.0, 0.01, -0.01, 0.3, -0.2, 2.0, 10.0] {
@@ -369,7 +372,7 @@ mod tests {
             let tolerance = if rise > 1.0 { 3e-2 } else { 2e-6 };
             assert!((height - 1.0).abs() < tolerance, "rise {rise}: {height}");
         }
-        // No further than is known, and not without end.
+        // Within the bounds, and finite.
         let first = interval_of(1.0);
         assert!((step_over(1.0, -1.0) / first - STEP_MAX).abs() < 1e-6);
         assert!((step_over(1.0, 1e9) / first - STEP_MIN).abs() < 1e-6);
@@ -409,7 +412,7 @@ mod tests {
             let height = if curvature == 0.0 {
                 r - (r * r - 0.25 * step * step).sqrt()
             } else {
-                // Curvature away from the ball is above 0: inside a hollow cylinder radius and heights count inwards.
+                // Curvature away from the ball is above 0: inside a concave cylinder radius and heights count inwards.
                 let radius = 1.0_f64 / curvature;
                 let (centre, half) = (radius + r, 0.5 * step / radius);
                 centre * half.cos() - (r * r - (centre * half.sin()).powi(2)).sqrt() - radius

@@ -1,15 +1,15 @@
 //! The patch that a run is on, and the next one along the pass.
 //!
 //! A tick that crosses a boundary needs the next patch collapsed, and the parametrisation at the boundary on both sides. Neither
-//! depends on where exactly the tick before ended, so both are made ahead, in ticks that have little else to do: one
-//! [`Task`] each. A boundary that is reached sooner has what is missing made in its own tick.
+//! depends on where exactly the tick before ended, so both are prepared ahead, in ticks with little other work: one
+//! [`Task`] each. A boundary that is reached sooner prepares the missing parts in its own tick.
 
 use crate::fault::Result;
 use crate::job::program::Job;
 use crate::pass::patch::Patch;
 use crate::pass::position::PassPosition;
 
-/// What is to be made next. In this order.
+/// The next part to prepare, in this order.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Task {
     /// The parametrisation at the ends of the patch.
@@ -18,9 +18,9 @@ enum Task {
     Ahead,
     /// The parametrisation at its ends.
     AheadEnds,
-    /// Nothing is left.
+    /// Nothing is left to prepare.
     Done,
-    /// The next patch is faulty: nothing is made ahead, and the fault is for the tick that gets there.
+    /// The next patch is faulty: nothing is prepared, and the tick that reaches it reports the fault.
     Faulty,
 }
 
@@ -58,13 +58,13 @@ impl PatchBuffer {
         }
     }
 
-    /// Whether there is something to be made ahead.
+    /// Whether a part is left to prepare.
     #[inline(always)]
     pub(crate) fn has_work(&self) -> bool {
         !matches!(self.task, Task::Done | Task::Faulty)
     }
 
-    /// Makes nothing more ahead on this patch.
+    /// Prepares nothing more on this patch.
     #[cfg(test)]
     pub(crate) fn disable(&mut self) {
         self.task = Task::Faulty;
@@ -96,7 +96,7 @@ impl PatchBuffer {
         Ok(())
     }
 
-    /// Makes one thing ahead, for a run on this patch.
+    /// Prepares one part, for a run on this patch.
     #[inline(never)]
     pub(crate) fn work(&mut self, job: &Job<'_>, position: &PassPosition) {
         let task = self.task;

@@ -1,4 +1,4 @@
-//! Step 2: the next cutter contact at the wanted feed (Lo 1998, eqn 9).
+//! Step 2: the next cutter contact at the commanded feed (Lo 1998, eqn 9).
 //!
 //! The paper's step is the Taylor series of u(s) to second order. Here it goes to third, `u''' = (2 p^2 - p')/|A|^3` with
 //! `p = A.A'/|A|^2`, and p' is taken from the last two samples, which costs a subtraction and leaves a relative error of (step /
@@ -36,7 +36,7 @@ const NEWTON_STEPS: u8 = 2;
 /// First-order step, as a fraction of the patch, beyond which the patch's end is looked at before the series.
 const LONG_STEP: f32 = 0.25;
 
-/// Increment of the path fraction for an arc, units of 2^-64, from the parametrisation at its start and the log_speed_derivative one
+/// Increment of the path fraction for an arc, units of 2^-64, from the parametrisation at its start and the logarithmic speed derivative one
 /// sample earlier (NaN where there is none); none where the series is not enough.
 #[inline(always)]
 pub(crate) fn step(from: &PathSpeed, log_speed_derivative_before: f32, arc: f32) -> Option<u64> {
@@ -111,7 +111,7 @@ pub(crate) enum Reach {
     Beyond(f32),
 }
 
-/// Where an arc from a place ends, by quadrature. `patch_end` is the parametrisation at the patch's end, asked for where it may matter.
+/// Where an arc from a place ends, by quadrature. `patch_end` gives the parametrisation at the patch's end, called only where the arc may reach it.
 ///
 /// # Errors
 /// [`FaultKind::ParameterBackwards`] where neither series nor quadrature can be trusted; its value is what would have to be

@@ -3,12 +3,12 @@
 //! With k the normal curvature across the path towards the tool and c = -k, the step-over along the surface is
 //! `l = sqrt(8 r h / (1 + r c))`, and the interval of the side parameter `l / |(N x t) . S_side|`. With the lateral speed inside,
 //! `interval^2 = 8 r h / (lateral^2 - r lateral^2 k)`. A pass wants the least interval of all its samples: a sample yields
-//! the [`Sample::inv_interval_sq`](crate::Sample::inv_interval_sq), `1 / interval^2`, which is a product, and root and quotient are
+//! [`Sample::inv_interval_sq`](crate::Sample::inv_interval_sq), `1 / interval^2`, which is a product, and root and quotient are
 //! taken once a pass.
 
 use crate::surface::Contact;
 
-/// The densities of one ball and scallop limit on one patch.
+/// The candidates of the path interval for one ball and scallop limit on one patch.
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct Interval {
     /// 1 / (8 r h), per units^2, over the square of the side span's width.
@@ -19,7 +19,7 @@ impl Interval {
     /// No limit yet.
     pub(crate) const NONE: Self = Self { factor: 0.0 };
 
-    /// For a ball and a scallop limit, mm, on a patch with so many units a mm, in a span of this width.
+    /// For a ball and a scallop limit, mm, on a patch with this number of units a mm, in a span of this width.
     pub(crate) fn new(radius_mm: f32, scallop_mm: f32, units_per_mm: f32, width: f32) -> Self {
         let span = units_per_mm * width;
         Self {
@@ -27,7 +27,7 @@ impl Interval {
         }
     }
 
-    /// Density at a contact that the ball fits, in the side parameter's units; 0 at a pole, where the side direction moves
+    /// Inverse square interval at a contact that the ball fits, in the side parameter's units; 0 at a pole, where the side direction moves
     /// nothing.
     #[inline(always)]
     pub(crate) fn inv_interval_sq(&self, contact: &Contact) -> f32 {

@@ -1,8 +1,16 @@
 //! A pass: from one cutter contact to the next, from contact to cutter location, and from pass to pass.
 //!
-//! In the order of a sample's way: [`position`] names a patch on a pass, [`patch`] collapses it and evaluates it, [`buffer`] holds the current and
-//! the next one, [`contact`] steps along it, [`offset`] checks that the ball fits and locates its centre, [`evaluation`] chains these two behind the contact, [`interval`] gives the candidate of the path interval,
-//! [`across`] the step-over that follows from a pass, [`schedule`] the next pass, and [`run`] chains them.
+//! In the order of a sample's way:
+//!
+//! | file | holds |
+//! |---|---|
+//! | [`position`] | a patch on a pass |
+//! | [`patch`], [`buffer`] | the patch at the pass's side parameter; the current patch and the next one |
+//! | [`contact`] | the step along the pass at the commanded feed |
+//! | [`offset`], [`evaluation`] | fit of the ball and cutter location; contact, fit and location in one call |
+//! | [`interval`], [`across`] | candidate of the path interval at a sample; the step-over that a pass allows |
+//! | [`schedule`] | the next pass |
+//! | [`run`] | chains them |
 
 pub(crate) mod across;
 pub(crate) mod buffer;

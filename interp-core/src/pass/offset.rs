@@ -4,7 +4,7 @@ use crate::fault::{Fault, FaultKind, Result};
 use crate::math::arith::{add_product, power_of_two, q30_to_f32, sqrt, truncated, whole_q30};
 use crate::surface::{Contact, OffsetUnits};
 
-/// Least room between ball and surface, as 1 - r k: the f32 curvature is good to a few 1e-6, so a ball that is within 1e-5
+/// Least clearance between ball and surface, as 1 - r k: the f32 curvature is good to a few 1e-6, so a ball that is within 1e-5
 /// of the surface's own radius counts as not fitting.
 const ROOM_MIN: f32 = 1e-5;
 

@@ -1,9 +1,10 @@
-//! The patch that a pass is on: the surface at the pass's side parameter, and what ball, feed and scallop limit are in its units.
+//! The patch that a pass is on: the surface at the pass's side parameter, with ball, feed and scallop limit in its units.
 
 use crate::fault::Result;
 use crate::job::program::Job;
 use crate::job::{SurfaceKind, ToolSide};
 use crate::math::arith::{centred, power_of_two};
+use crate::math::number::NM_PER_MM_F32;
 use crate::pass::interval::Interval;
 use crate::pass::offset::{Locator, origin_q30};
 use crate::pass::position::PassPosition;
@@ -32,7 +33,7 @@ pub(crate) struct Patch {
 }
 
 impl Patch {
-    /// None yet.
+    /// No patch yet.
     pub(crate) const NONE: Self = Self {
         surface: Surface::Grid(GridPass::NONE),
         ball: Ball::NONE,
@@ -48,7 +49,7 @@ impl Patch {
     /// Collapses the patch of a pass.
     ///
     /// # Errors
-    /// [`crate::FaultKind::WrongState`] where the job has no such patch; what the surface's kind finds wrong.
+    /// [`crate::FaultKind::WrongState`] where the job has no such patch; the faults of the surface's kind.
     #[inline(never)]
     pub(crate) fn collapse(&mut self, job: &Job<'_>, position: &PassPosition) -> Result<()> {
         let PassPosition { side, reversed, span } = *position;
@@ -99,12 +100,12 @@ impl Patch {
         Ok(())
     }
 
-    /// Finds the parametrisation at both ends, for [`Self::start`] and [`Self::end`] to have it at hand.
+    /// Finds the parametrisation at both ends, and keeps it for [`Self::start`] and [`Self::end`].
     pub(crate) fn find_ends(&mut self) {
         self.ends = Some([self.start(), self.end()]);
     }
 
-    /// Whether [`Self::find_ends`] was here.
+    /// Whether [`Self::find_ends`] was called.
     pub(crate) const fn has_ends(&self) -> bool {
         self.ends.is_some()
     }
@@ -141,7 +142,7 @@ impl Patch {
     /// Ball, feed and scallop limit in the patch's units.
     fn measure(&mut self, job: &Job<'_>, shift: u8, side_span: u16, sign: f32) {
         let header = job.header;
-        self.per_mm = 1e6 * power_of_two(shift.into());
+        self.per_mm = NM_PER_MM_F32 * power_of_two(shift.into());
         let units = OffsetUnits::new(header.ball_radius_mm, shift);
         self.ball = Ball::new(&units, sign);
         self.locator = Locator::new(&units);

@@ -13,15 +13,15 @@ use crate::pass::schedule;
 use crate::sample::{Sample, SpanParameter, interval_of};
 use crate::surface::{AnyPass, Pass, PathSpeed};
 
-/// Patch boundaries that one period's arc may cross. One lets every patch through that is longer than the arc; the cost of a second,
-/// of patches that are not, would come on top of the dearest tick there is.
+/// Patch boundaries that one period's arc may cross. One is enough for every patch that is longer than the arc; a second
+/// crossing would add its cost to the worst-case tick.
 const CROSSINGS_MAX: u8 = 1;
 
-/// Step from place to place on a pole: 16 to a span. Between two the speed of the side lines, a rational cubic of the path
+/// Step of the parameter on a pole: 16 to a span. Between two the speed of the side lines, a rational cubic of the path
 /// parameter, changes by a small part of itself.
 const POLE_STEP: u64 = 1 << 60;
 
-/// What the next tick has to do.
+/// The work of the next tick.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Next {
     /// Begin the pass at the current side place.
@@ -43,12 +43,12 @@ struct Travel {
     span: u16,
     /// Fraction of the span, in the direction of travel.
     fraction: u64,
-    /// The parametrisation at the last sample, and its log_speed_derivative at the one before; NaN where that is on another patch.
+    /// The parametrisation at the last sample, and its logarithmic speed derivative at the one before; NaN where that is on another patch.
     path: PathSpeed,
     log_speed_derivative_before: f32,
     /// r N at the last sample, in the ball's units.
     offset: [i32; 3],
-    /// Greatest inv_interval_sq of the pass, and the surface's shape there, see [`PassMaximum`].
+    /// Greatest inverse square interval of the pass, and the surface's shape there, see [`PassMaximum`].
     max_inv_interval_sq: f32,
     shape: [f32; 2],
     /// Samples so far.
@@ -69,7 +69,7 @@ pub(crate) struct Run {
     last_interval: f32,
     /// How far from it the next pass lies.
     step_over: f32,
-    /// Share of the feed of the last step along the pass.
+    /// Feed factor of the last step along the pass.
     last_feed_factor: f32,
 }
 
@@ -208,7 +208,7 @@ impl Run {
         self.advance_far(job, 1.0, last)
     }
 
-    /// The next sample, when it is not just a small step further: a feed_factor of a period's arc along the pass, or the next pass.
+    /// The next sample, when it is not just a small step further: `feed_factor` of a period's arc along the pass, or the next pass.
     ///
     /// # Errors
     /// As [`Self::advance`].
@@ -245,7 +245,7 @@ impl Run {
         Ok(true)
     }
 
-    /// Goes to this pass, which lies here: its first patch is made, and the tool stays where it is.
+    /// Enters this pass at this side parameter: its first patch is collapsed, and the tool stays where it is.
     ///
     /// # Errors
     /// As [`Self::advance`].
@@ -270,7 +270,7 @@ impl Run {
         Ok(())
     }
 
-    /// A feed_factor of a period's arc along the pass; whether that was little work.
+    /// `feed_factor` of a period's arc along the pass; whether that was little work.
     ///
     /// # Errors
     /// As [`Self::advance`].
@@ -329,14 +329,14 @@ impl Run {
     pub(crate) const fn off_surface(&mut self, at_nm: [i32; 3], speed_mm_s: f32, last: &mut Sample) {
         self.stand(last);
         last.feed_mm_s = speed_mm_s;
-        // What is there may be of the job before.
+        // The sample may still hold the fields of the job before.
         last.pass = self.travel.pass;
         (last.path, last.side) = (SpanParameter::NONE, SpanParameter::NONE);
         (last.cc_nm, last.cl_nm) = (at_nm, at_nm);
         last.inv_interval_sq = 0.0;
     }
 
-    /// Cell of the pass, of so many to a patch; none where the pass is over.
+    /// Cell of the pass, for a number of cells per patch; none where the pass is over.
     pub(crate) fn cell(&self, job: &Job<'_>, cells_per_patch: u16) -> Option<u16> {
         if !self.is_along() {
             return None;
@@ -359,7 +359,8 @@ impl Run {
         u16::try_from(high >> 32).unwrap_or(0)
     }
 
-    /// Arc since the start of the cell, mm, where a patch has so many, each of which is this fraction of it; none in the rounding before it.
+    /// Arc since the start of the cell, mm, for a number of cells per patch, each this fraction of the patch; none where rounding puts the tool
+    /// before it.
     pub(crate) fn since_station(&self, cells_per_patch: u16, part: u64) -> Option<f32> {
         let travel = &self.travel;
         let start = u64::from(self.cell_of_patch(cells_per_patch)) * part;
@@ -373,7 +374,7 @@ impl Run {
         self.buffer.patch().faces_up(self.travel.offset)
     }
 
-    /// What of a sample changes seldom.
+    /// The fields of a sample that change seldom.
     const fn describe(&self, feed_mm_s: f32, last: &mut Sample) {
         last.pass = self.travel.pass;
         last.path.span = self.travel.span;
@@ -381,7 +382,7 @@ impl Run {
         last.feed_mm_s = feed_mm_s;
     }
 
-    /// The sample where the run is.
+    /// The sample at the run's position.
     #[inline(always)]
     fn sample(&mut self, last: &mut Sample) -> Result<()> {
         let Self { travel, buffer, .. } = self;
@@ -397,7 +398,7 @@ impl Run {
         }
     }
 
-    /// A feed_factor of a period's arc along the pass, by quadrature, over as many patches as it takes.
+    /// `feed_factor` of a period's arc along the pass, by quadrature, over as many patches as it takes.
     fn step_far(&mut self, job: &Job<'_>, feed_factor: f32) -> Result<()> {
         let mut rest = feed_factor * job.header.feed_mm_s * job.header.period_s;
         let mut start = self.travel.path;
@@ -426,7 +427,7 @@ impl Run {
         Err(Fault::new(FaultKind::PatchTooShort, rest))
     }
 
-    /// On a pole, the next of its places: the tool stands, but the interval that the pass allows differs from place to place.
+    /// On a pole, the next of its parameters: the tool stands, but the interval that the pass allows differs with the parameter.
     fn step_on_pole(&mut self, job: &Job<'_>) -> Result<()> {
         if let Some(fraction) = self.travel.fraction.checked_add(POLE_STEP) {
             self.travel.fraction = fraction;
@@ -467,7 +468,7 @@ impl Run {
         self.buffer.begin(job, &travel.position())
     }
 
-    /// One look at the line a step-over further.
+    /// One portion of the step-over estimate.
     #[inline(never)]
     fn estimate_step_over(&mut self, job: &Job<'_>) {
         if job.header.spacing == Spacing::FirstOrder {

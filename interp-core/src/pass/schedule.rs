@@ -10,7 +10,7 @@ use crate::sample::SpanParameter;
 const WALK_MAX: u16 = 16;
 
 /// The next pass's side parameter, `interval` (in units of the side parameter) further; the end of the last span at most.
-/// Fractions are kept to 2^-32, so that the place that is reported is the one that is used. `width` gives a span's
+/// Fractions are kept to 2^-32, so that the reported parameter is the one that is used. `width` gives a span's
 /// width in units of the side parameter.
 ///
 /// # Errors
@@ -55,7 +55,7 @@ pub(crate) fn next_side(
     })
 }
 
-/// How far a place is from one before it, in units of the side parameter.
+/// Distance from one side parameter to a later one, in units of the side parameter.
 pub(crate) fn apart(from: SpanParameter, to: SpanParameter, width: impl Fn(u16) -> f32) -> f32 {
     let fraction =
         |place: SpanParameter| fraction_32(u32::try_from(place.fraction >> 32).unwrap_or(u32::MAX));
@@ -120,7 +120,7 @@ mod tests {
             next_side(at(1, 0.5), 1e-12, 4, width).unwrap_err().kind,
             FaultKind::IntervalTooSmall
         );
-        // No further than so many boundaries, and the last pass is at the end all the same.
+        // Over at most WALK_MAX boundaries, and the last pass lies at the end all the same.
         let even = |_| 1.0;
         let near = next_side(at(2, 0.5), f32::INFINITY, 40, even).unwrap();
         assert_eq!(near, at(2 + WALK_MAX, 0.0));

@@ -1,5 +1,5 @@
-//! From pass to pass: straight legs in the open, or a step along the boundary on the surface. Each is a path of its own, followed from
-//! standstill to standstill by the same profile as the passes.
+//! Links from pass to pass: straight moves off the surface, or a step-over along the boundary on the surface. Each is a path of its own,
+//! followed from standstill to standstill by the same profile as the passes.
 
 use crate::fault::{Fault, FaultKind, Result};
 use crate::feed::QUANTA_PER_MM;
@@ -15,17 +15,17 @@ use crate::pass::position::PassPosition;
 use crate::pass::schedule;
 use crate::sample::SpanParameter;
 
-/// Cells of a step along the boundary.
+/// Cells of a step-over along the boundary.
 const STEP_OVER_CELLS: u16 = 8;
 
-/// Share of the jerk that is used on them: a step is some tenths of a millimetre, jerk all the way, and a cutter location is good to a
-/// nanometre or two, which a third difference makes eight times.
+/// Share of the jerk that a step-over uses: it is some tenths of a millimetre long, at the jerk limit all the way, and a cutter location is good
+/// to a nanometre or two, which a third difference multiplies by eight.
 const JERK_SHARE: f32 = 0.7;
 
-/// A link shorter than this, nm, is none: a progress and itself, rounded twice.
+/// A link shorter than this, nm, is none: the rounding of one position computed twice.
 const NOTHING_NM: i64 = 2;
 
-/// A straight leg.
+/// A straight move.
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct StraightMove {
     from: [i32; 3],
@@ -33,13 +33,13 @@ pub(crate) struct StraightMove {
 }
 
 impl StraightMove {
-    /// None.
+    /// No move.
     pub(crate) const NONE: Self = Self {
         from: [0; 3],
         to: [0; 3],
     };
 
-    /// From progress to progress, the last `slow_mm` of it no faster than `feed_mm_s`; none where it is too short to be one. The plan is settled, and
+    /// From point to point, the last `slow_mm` of it no faster than `feed_mm_s`; none where it is too short to be one. The plan is settled, and
     /// still to be worked on.
     pub(crate) fn new(
         from: [i32; 3],
@@ -90,7 +90,7 @@ impl StraightMove {
         Some((Self { from, to }, speed * period_s * QUANTA_PER_MM))
     }
 
-    /// The progress so many quanta along.
+    /// The position at this progress, quanta.
     pub(crate) fn position(&self, progress: i64, plan: &Plan) -> [i32; 3] {
         if progress >= plan.end {
             return self.to;
@@ -107,27 +107,27 @@ impl StraightMove {
     }
 }
 
-/// A step from the end of a pass to the start of the next, along the boundary.
+/// A step-over from the end of a pass to the start of the next, along the boundary.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct BoundaryStepOver {
     from: SpanParameter,
     to: SpanParameter,
-    /// How far apart they are in the side parameter.
+    /// Their distance in the side parameter.
     reach: f32,
     /// Path span and direction at the end of the pass.
     line: PassPosition,
-    /// Station that is planned next, and what is known of those before.
+    /// Station that is planned next, and the differences over those before.
     station: u16,
     here: Option<Located>,
     stencil: Stencil,
     contact: [i32; 3],
     cell: f32,
-    /// Greatest length of the contact's path over the length that the plan counts.
+    /// Greatest length of the contact's path over the length in the plan.
     contact_ratio: f32,
 }
 
 impl BoundaryStepOver {
-    /// None.
+    /// No move.
     pub(crate) const NONE: Self = Self {
         from: SpanParameter { span: 0, fraction: 0 },
         to: SpanParameter { span: 0, fraction: 0 },
@@ -157,10 +157,10 @@ impl BoundaryStepOver {
         }
     }
 
-    /// Contact and centre at this part of the step, 0 to 1.
+    /// Contact and centre at this part of the step-over, 0 to 1.
     ///
     /// # Errors
-    /// What is wrong with the surface there.
+    /// The fault of the surface there.
     fn locate(&self, job: &Job<'_>, patch: &mut Patch, part: f32) -> Result<Located> {
         let width = |span| job.side_width(span);
         let side = if part >= 1.0 {
@@ -174,10 +174,11 @@ impl BoundaryStepOver {
         Ok(located)
     }
 
-    /// Plans, in portions: where a station is, or what its cell leaves; whether the step can be gone, or is too short to be one (`None`).
+    /// Plans in portions, a station's location or its cell's limits; whether the plan is complete, or `None` where the step-over is too short to be
+    /// one.
     ///
     /// # Errors
-    /// What is wrong with the surface there.
+    /// The fault of the surface there.
     pub(crate) fn work(
         &mut self,
         job: &Job<'_>,
@@ -225,10 +226,10 @@ impl BoundaryStepOver {
         Ok(Some(false))
     }
 
-    /// Contact and centre so many quanta along.
+    /// Contact and centre at this progress, quanta.
     ///
     /// # Errors
-    /// What is wrong with the surface there.
+    /// The fault of the surface there.
     pub(crate) fn position(
         &self,
         job: &Job<'_>,
@@ -244,13 +245,13 @@ impl BoundaryStepOver {
         self.locate(job, patch, part)
     }
 
-    /// What a speed of the contact is of the plan's.
+    /// Speed along the plan per speed of the contact.
     pub(crate) fn per_contact(&self) -> f32 {
         1.0 / self.contact_ratio
     }
 }
 
-/// Whether a link in the open can begin and end here.
+/// Whether a link off the surface can begin and end here.
 ///
 /// # Errors
 /// [`FaultKind::LinkBlocked`] where the surface does not face up.
@@ -274,7 +275,7 @@ fn to_mm(nm: i64) -> f32 {
     to_f32(nm) * MM_PER_NM
 }
 
-/// A step is short: 24 bits of it are below a nanometre.
+/// A step-over is short: 24 bits of it resolve less than a nanometre.
 fn ratio(part: i64, whole: i64) -> f32 {
     to_f32(part) / to_f32(whole)
 }

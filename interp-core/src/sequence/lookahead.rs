@@ -1,7 +1,7 @@
-//! The next pass, looked over while the tool is still on its way: stations in even cells_per_patch of each patch, in order, give the bounds of the
-//! feed ([`Plan`]), the interval to the pass after it, and whether the axes and the ball can go there at all.
+//! Look-ahead over the next pass while the tool is still on its way: stations in even parts of each patch, in order, give the bounds of the
+//! feed ([`Plan`]), the interval to the pass after it, and whether ball and axes can reach every station.
 //!
-//! Stations are the surface's, not the samples': however a run is held up, its passes lie in the same places.
+//! Stations belong to the surface, not to the samples: holds and overrides do not move the passes.
 
 use crate::command::OVERRIDE_MAX;
 use crate::fault::{Fault, FaultKind, Result};
@@ -17,16 +17,16 @@ use crate::pass::schedule;
 use crate::sample::{SpanParameter, interval_of};
 use crate::surface::{Contact, PathSpeed};
 
-/// Cells that a pass is cut into, as near as whole cells_per_patch of its patches come to it; no more than [`crate::job::CELLS_MAX`].
+/// Cells that a pass is cut into, as near as whole parts of its patches come to it; no more than [`crate::job::CELLS_MAX`].
 const CELLS_WANTED: u16 = 160;
 /// Cells of a patch at most.
 const CELLS_PER_PATCH_MAX: u16 = 64;
-/// Change of r times a curvature, and noise of it, below which nothing has jumped: f32 is good to so much.
+/// Change of r times a curvature below which it counts as continuous: the noise of f32.
 const NO_JUMP: f32 = 4e-6;
-/// Cells before a station that its differences say something about.
+/// Cells before a station that its differences reach over.
 const STENCIL_CELLS: usize = 2;
 
-/// One pass: its bounds, its ends, and what follows from it.
+/// The plan of one pass: its bounds, its ends, and the pass after it.
 #[derive(Clone, Debug)]
 pub(crate) struct PassPlan {
     pub(crate) plan: Plan,
@@ -48,7 +48,7 @@ pub(crate) struct PassPlan {
 }
 
 impl PassPlan {
-    /// Of no pass.
+    /// No plan.
     pub(crate) const NONE: Self = Self {
         plan: Plan::NONE,
         pass: 0,
@@ -63,7 +63,7 @@ impl PassPlan {
     };
 }
 
-/// What is to be done next.
+/// The next portion of work.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Task {
     Patch,
@@ -81,7 +81,7 @@ enum Task {
     Done,
 }
 
-/// Curvatures at the last stations, to tell a jump from a bend.
+/// Curvatures at the last stations: a jump between patches is told from a bend by them.
 #[derive(Clone, Copy, Debug)]
 struct CurvatureHistory {
     /// 1 - r k along the path and r times the twist, at the last three stations of the patch, the newest first.
@@ -123,7 +123,7 @@ impl CurvatureHistory {
     }
 }
 
-/// The look ahead at one pass.
+/// The look-ahead over one pass.
 #[derive(Clone, Debug)]
 pub(crate) struct Lookahead {
     pub(crate) patch: Patch,
@@ -139,13 +139,13 @@ pub(crate) struct Lookahead {
     here: Option<(Contact, [i32; 3])>,
     /// Length of that cell, mm.
     length: f32,
-    /// What the last station left.
+    /// Path limits at the last station.
     limits: PathLimits,
     maximum: PassMaximum,
 }
 
 impl Lookahead {
-    /// At nothing.
+    /// Over no pass.
     pub(crate) const START: Self = Self {
         patch: Patch::NONE,
         step_over: StepOverEstimator::START,
@@ -171,7 +171,7 @@ impl Lookahead {
         self.task = Task::Done;
     }
 
-    /// Whether there is nothing to be done.
+    /// Whether the plan is complete.
     pub(crate) const fn is_done(&self) -> bool {
         matches!(self.task, Task::Done)
     }
@@ -212,7 +212,7 @@ impl Lookahead {
     /// One portion.
     ///
     /// # Errors
-    /// What is wrong with the surface at the next station; the axes cannot go there ([`FaultKind::SoftLimit`]).
+    /// The fault of the surface at the next station; [`FaultKind::SoftLimit`] where it is outside the travel.
     #[inline(never)]
     pub(crate) fn work(&mut self, job: &Job<'_>, axes: &AxisLimits, out: &mut PassPlan) -> Result<()> {
         self.task = match self.task {
@@ -256,7 +256,7 @@ impl Lookahead {
         Ok(())
     }
 
-    /// Where the pass that is looked over is.
+    /// Pass, path and side parameter of the station.
     pub(crate) fn surface_position(&self, out: &PassPlan) -> (u32, SpanParameter, SpanParameter) {
         let fraction = self.fraction(out);
         let own = if self.line.reversed { !fraction } else { fraction };
@@ -274,8 +274,8 @@ impl Lookahead {
         u64::from(self.station) * out.cell_fraction
     }
 
-    /// How often to look across from a station: once at each line, twice where their patches have to be made, and more where the lines
-    /// begin and end.
+    /// Portions of the step-over estimate at a station: one for each neighbouring line, two where their patches have to be collapsed, and more at
+    /// the lines' ends.
     fn estimates(&mut self, job: &Job<'_>, out: &PassPlan) -> Task {
         if job.header.spacing == Spacing::FirstOrder || out.point {
             return self.next_station(job, out);
@@ -308,7 +308,7 @@ impl Lookahead {
         }
     }
 
-    /// The station: whether the ball fits and the axes can go there, its inv_interval_sq, and the cell that it ends.
+    /// Evaluates the station: fit of the ball, travel, inverse square interval.
     fn visit(&mut self, axes: &AxisLimits, out: &mut PassPlan) -> Result<()> {
         let fraction = self.fraction(out);
         let patch = &self.patch;
@@ -366,8 +366,8 @@ impl Lookahead {
         length * (0.5 * (first + last) + bow * length * (1.0 / 12.0)) / self.patch.per_mm
     }
 
-    /// What jumps from the patch before to this one holds the feed back at the boundary: curvatures at once, their slopes when there are
-    /// three stations on this side, too.
+    /// Jumps of the curvature from the patch before to this one limit the feed at the boundary; jumps of its slope do so when three stations
+    /// on this side are known.
     fn limit_at_jumps(
         &mut self,
         axes: &AxisLimits,
@@ -414,7 +414,7 @@ impl Lookahead {
         }
     }
 
-    /// Holds the feed back at the end of a cell, so many back, where the path jumps.
+    /// Limits the feed over a jump of the path at the end of a cell, `back` cells before the last.
     fn limit_at_jump(&self, back: u16, jump: &Jump, axes: &AxisLimits, top: &FeedLimits, out: &mut PassPlan) {
         let square = over_jump(
             jump,
@@ -426,7 +426,7 @@ impl Lookahead {
         out.plan.gate(out.plan.count().saturating_sub(back), square, top);
     }
 
-    /// The pass is complete: the mean of its feed, its interval, and the next pass.
+    /// Completes the pass: filter of the feed, interval, and the next pass.
     fn close(&mut self, job: &Job<'_>, out: &mut PassPlan) -> Result<()> {
         out.plan.settle(&top(job));
         let header = job.header;
@@ -455,7 +455,7 @@ pub(crate) fn top(job: &Job<'_>) -> FeedLimits {
 }
 
 /// # Errors
-/// [`FaultKind::SoftLimit`] with how far outside a place is, mm.
+/// [`FaultKind::SoftLimit`] with the distance outside of the travel, mm.
 pub(crate) fn check_travel(axes: &AxisLimits, place_nm: &[i32; 3]) -> Result<()> {
     for (place, [least, most]) in place_nm.iter().zip(&axes.travel_nm) {
         let outside = (i64::from(*least) - i64::from(*place)).max(i64::from(*place) - i64::from(*most));
@@ -468,7 +468,7 @@ pub(crate) fn check_travel(axes: &AxisLimits, place_nm: &[i32; 3]) -> Result<()>
 }
 
 /// # Errors
-/// [`FaultKind::LinkBlocked`] with how far a place is above the safe height, mm.
+/// [`FaultKind::LinkBlocked`] with the distance above the safe height, mm.
 fn check_height(axes: &AxisLimits, [_, _, z]: &[i32; 3]) -> Result<()> {
     if *z > axes.safe_z_nm {
         return Err(Fault::new(
@@ -479,7 +479,7 @@ fn check_height(axes: &AxisLimits, [_, _, z]: &[i32; 3]) -> Result<()> {
     Ok(())
 }
 
-/// How far the cells_per_patch of two pairs are apart, beyond the noise of each.
+/// Distance of the parts of two pairs beyond their noise.
 fn changed(from: &[f32; 2], to: &[f32; 2], noise: f32) -> [f32; 2] {
     let ([from0, from1], [to0, to1]) = (from, to);
     let apart = |from: &f32, to: &f32| ((to - from).abs() - noise).at_least(0.0);

@@ -1,8 +1,8 @@
-//! A job's course on a machine that has limits: approach, passes from standstill to standstill, links, retract.
+//! The sequence of a job on a machine with limits: approach, passes from standstill to standstill, links, retract.
 //!
-//! While a pass runs, the next one is looked over, a portion a tick ([`Lookahead`]), in ticks that have little else to do; where that is not
-//! done in time the tool waits at the end of the pass. A path is followed by [`Profile`], whatever it is: a pass, a leg in the open,
-//! a step along the boundary.
+//! While a pass runs, the look-ahead plans the next one, a portion a tick ([`Lookahead`]), in ticks with little other work; where the plan is not
+//! complete in time the tool waits at the end of the pass. [`Profile`] follows every path: a pass, a straight leg off the surface, a step-over along
+//! the boundary.
 
 use crate::fault::{Fault, Result};
 use crate::feed::QUANTA_PER_MM;
@@ -17,10 +17,10 @@ use crate::sample::{Sample, SpanParameter};
 use crate::sequence::link::{BoundaryStepOver, StraightMove, check_faces_up};
 use crate::sequence::lookahead::{Lookahead, PassPlan, check_travel, top};
 
-/// Portions of the look ahead in a tick in which the tool waits for it.
+/// Portions of the look-ahead in a tick in which the tool waits for it.
 const PORTIONS_WAITING: u8 = 2;
 
-/// Where the course is.
+/// Phase of the sequence.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Phase {
     /// Waits until the look-ahead has planned the next pass.
@@ -43,7 +43,7 @@ enum Phase {
     Done,
 }
 
-/// A leg in the open, on the way to the goal.
+/// A straight leg off the surface, on the way to the goal.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Leg {
     Retract,
@@ -51,7 +51,7 @@ enum Leg {
     Plunge,
 }
 
-/// What the legs in the open lead to.
+/// The goal of the legs.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Goal {
     /// The start of the next pass.
@@ -62,7 +62,7 @@ enum Goal {
     SafeHeight,
 }
 
-/// What a tick came to.
+/// Outcome of a tick.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Outcome {
     /// On a pass.
@@ -73,7 +73,7 @@ pub(crate) enum Outcome {
     Finished,
 }
 
-/// The course of a job.
+/// The sequence of a job.
 #[derive(Clone, Debug)]
 pub(crate) struct Sequencer {
     phase: Phase,
@@ -84,14 +84,14 @@ pub(crate) struct Sequencer {
     second: bool,
     /// The tool has been on a pass since the start.
     on_surface: bool,
-    /// What was found wrong with the next pass: for when the tool gets there.
+    /// A fault of the next pass, reported when the tool gets there.
     pending: Option<Fault>,
     profile: Profile,
     straight: StraightMove,
     step_over: BoundaryStepOver,
-    /// Speed that is wanted of a leg or a step as a rule, quanta a period.
+    /// Programmed speed of a leg or a step-over, quanta a period.
     usual: f32,
-    /// Where the tool is, once that is known.
+    /// The tool's position, once it is known.
     at: Option<[i32; 3]>,
     /// Cell of the pass that the tool is in.
     cell: u16,
@@ -134,17 +134,17 @@ impl Sequencer {
         self.lookahead.begin(job, 0, SpanParameter::default(), next);
     }
 
-    /// Where the tool is, nm, once that is known.
+    /// The tool's position, nm, once it is known.
     pub(crate) const fn stands_nm(&self) -> Option<[i32; 3]> {
         self.at
     }
 
-    /// The tool was brought here, nm, or nobody knows where it is. Not within a run.
+    /// Sets the tool's position, nm; none where it is unknown. Not within a run.
     pub(crate) const fn stand_at(&mut self, at_nm: Option<[i32; 3]>) {
         self.at = at_nm;
     }
 
-    /// Whether the tool stands, and will while no speed is wanted.
+    /// Whether the tool stands, and stays while the commanded speed is 0.
     pub(crate) const fn is_at_rest(&self) -> bool {
         match self.phase {
             Phase::StepOver | Phase::FollowLeg(_) | Phase::FollowPass => self.profile.is_at_rest(),
@@ -162,14 +162,14 @@ impl Sequencer {
         !matches!(self.phase, Phase::FollowPass)
     }
 
-    /// Pass, path and side place of what was found wrong with the next pass, if that is what stopped the run.
+    /// Pass, path and side parameter of the fault of the next pass, if it stopped the run.
     pub(crate) fn fault_position(&self) -> Option<(u32, SpanParameter, SpanParameter)> {
         let [one, other] = &self.plans;
         let next = if self.second { one } else { other };
         self.pending.map(|_| self.lookahead.surface_position(next))
     }
 
-    /// From standstill, up to the safe height, and no further. Where the surface does not face up there is no leg, and the tool stays.
+    /// From standstill, retracts to the safe height, and no further. Where the surface does not face up the tool stays.
     pub(crate) fn retract(&mut self, run: &Run) {
         let is_free = self.is_link() || run.faces_up();
         self.goal = Goal::SafeHeight;
@@ -180,8 +180,8 @@ impl Sequencer {
         };
     }
 
-    /// One period at this share of the feed, 0 to 2, into `last`. What the phases but that of a pass do is out of line, so that a pass does not
-    /// save registers for it.
+    /// One period at this factor of the feed, 0 to 2, into `last`. The phases other than that of a pass are out of line, so that a pass saves no
+    /// registers for them.
     ///
     /// # Errors
     /// The fault that stops the run; `last` is as it was.
@@ -230,7 +230,7 @@ impl Sequencer {
         })
     }
 
-    /// Some portions of the look ahead, and on when it is done.
+    /// Some portions of the look-ahead, and the next phase when it is complete.
     #[inline(never)]
     fn await_plan(&mut self, job: &Job<'_>, axes: &AxisLimits) -> Result<()> {
         for _ in 0..PORTIONS_WAITING {
@@ -259,7 +259,7 @@ impl Sequencer {
         Ok(())
     }
 
-    /// One portion of the look ahead.
+    /// One portion of the look-ahead.
     fn look_ahead(&mut self, job: &Job<'_>, axes: &AxisLimits) {
         if self.pending.is_some() || self.lookahead.is_done() {
             return;
@@ -343,7 +343,7 @@ impl Sequencer {
         Ok(())
     }
 
-    /// The arc up to a station is known from the plan: what adds up between stations does not go on.
+    /// Corrects the progress at each station, where the plan knows the arc: errors do not add up from station to station.
     fn correct_progress(&mut self, job: &Job<'_>, run: &Run) {
         let (now, _) = both(&mut self.plans, self.second);
         let Some(cell) = run
@@ -400,7 +400,7 @@ impl Sequencer {
         self.after_leg(leg, job, run, last)
     }
 
-    /// Behind a leg, the next one; behind the last, what it led to.
+    /// After a leg, the next one; after the last, its goal.
     fn after_leg(&mut self, leg: Leg, job: &Job<'_>, run: &mut Run, last: &mut Sample) -> Result<()> {
         self.phase = match (leg, self.goal) {
             (Leg::Retract, Goal::SafeHeight) | (Leg::Plunge, Goal::Home | Goal::SafeHeight) => Phase::Done,

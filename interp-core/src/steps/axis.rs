@@ -3,7 +3,7 @@
 use super::scale::Scale;
 use super::{BUFFER_WORDS, SLOTS};
 
-/// Bits of a slot's fraction: 22 leave ten for the slot, so that every number is a place in the buffer.
+/// Bits of a slot's fraction: 22 leave ten for the slot, so that every number is an index into the buffer.
 const FRACTION_BITS: u32 = 22;
 
 /// What the arithmetic of times may be off by, 2^-22 slots: 1/2048 slot, against less than 4e-4 by rounding in f32. Taken off, a
@@ -212,7 +212,7 @@ fn even(scale: &Scale, timing: Timing, from: i64, travel_nm: i64, busy: u32) -> 
     }
 }
 
-/// So many pulses spread evenly over what is free of the period.
+/// A number of pulses spread evenly over the free part of the period.
 #[inline(always)]
 fn spread(timing: Timing, free_from: u32, count: u32) -> Row {
     let first = free_from << FRACTION_BITS;

@@ -2,7 +2,7 @@
 //!
 //! ```text
 //!  CL, nm ──► scale: exact fraction ──► steps of this period, and where in it each falls
-//!                                              │ axis: direction, pauses, what is owed
+//!                                              │ axis: direction, pauses, steps carried over
 //!                                              ▼
 //!                                     slots of the next period ──► a timer hands one word a slot to the port
 //! ```
@@ -23,7 +23,7 @@
 //! - A pulse lies within a slot of its place; two pulses of an axis are never nearer than two pulse lengths, over the ends of
 //!   periods too.
 //! - The direction changes between periods, never within a pulse or the pause after it; the first pulse then comes after the
-//!   set-up time. Pulses that this leaves no room for come in the next period.
+//!   set-up time. Pulses that no longer fit come in the next period.
 //! - More steps than a period holds are a fault. They are not lost: what does not fit stays owed, and follows.
 
 mod axis;
@@ -60,7 +60,7 @@ pub const HOLD_NM: u32 = 4;
 pub struct AxisSteps {
     /// Numerator: steps.
     pub steps: u32,
-    /// Denominator: the millimetres that so many steps are.
+    /// Denominator: the millimetres of these steps.
     pub mm: u32,
     /// Whether the direction pin has the level towards plus that the board's table does not name: the opposite one.
     pub inverted: bool,
@@ -184,7 +184,7 @@ pub struct Steps {
     /// Set bit of each axis in its port's word.
     bits: [u32; 3],
     axes: [Axis; 3],
-    /// The position that the axes were told last, nm.
+    /// The last target position of the axes, nm.
     cl_nm: [i32; 3],
 }
 
@@ -202,7 +202,7 @@ impl Steps {
         steps
     }
 
-    /// Other drives, or other settings of them. The axes stand where they are: the position is kept, what is owed is dropped.
+    /// Other drives, or other settings of them. The axes stand where they are: the position is kept, steps carried over are dropped.
     pub fn configure(&mut self, checked: CheckedSteps) {
         self.checked = checked;
         self.place(self.cl_nm);
@@ -216,7 +216,7 @@ impl Steps {
         }
     }
 
-    /// The position that the axes were told last, nm.
+    /// The last target position of the axes, nm.
     #[must_use]
     pub const fn target_nm(&self) -> [i32; 3] {
         self.cl_nm
@@ -252,7 +252,7 @@ impl Steps {
     /// The pulses of the next period, in which the axes go to this cutter location. `slots`: all at [`Self::rest`]; gets
     /// the pulses added.
     ///
-    /// Bounded by [`SLOTS`]/2 writes an axis. Call it every period, also where nothing moves: what is owed follows then.
+    /// Bounded by [`SLOTS`]/2 writes an axis. Call it every period, also where nothing moves: steps carried over follow then.
     ///
     /// # Errors
     /// [`FaultKind::StepRate`] with the steps asked for, where an axis has more than a period holds. As many as fit are in the

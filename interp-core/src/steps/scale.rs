@@ -7,7 +7,7 @@
 use super::HOLD_NM;
 
 /// Nanometres per millimetre.
-const NM_PER_MM: u64 = 1_000_000;
+const NM_PER_MM: u64 = crate::math::number::NM_PER_MM as u64;
 
 /// Fewest steps a millimetre, as the greatest number of nanometres a step.
 const STEP_NM_MAX: u64 = 1_000_000_000;
@@ -36,7 +36,7 @@ pub(super) struct Scale {
 }
 
 impl Scale {
-    /// Steps per so many millimetres; none outside 1/1000 to 500 000 steps a millimetre.
+    /// Steps per number of millimetres; none outside 1/1000 to 500 000 steps a millimetre.
     pub(super) fn new(steps: u32, mm: u32) -> Option<Self> {
         let (n, d) = (u64::from(steps), u64::from(mm) * NM_PER_MM);
         if n == 0 || 2 * n > d || n * STEP_NM_MAX < d {

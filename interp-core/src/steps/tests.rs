@@ -146,7 +146,7 @@ fn config(ratios: [(u32, u32); 3], pulse_slots: u8, setup_slots: u16) -> StepCon
     }
 }
 
-/// Distance of an axis's pulses from their ideal places in this period, thousandths of a slot, at most.
+/// Distance of an axis's pulses from their ideal times in this period, thousandths of a slot, at most.
 fn unevenness(port: &Port, axis: usize, from: i32, to: i32, before: i64) -> i128 {
     let (n, d) = (
         i128::from(port.config.axes[axis].steps),
@@ -387,7 +387,7 @@ fn pulses_of_a_very_long_way_are_exact() {
     long_way(1_000_000_000);
 }
 
-/// To and fro, nearly at the highest rate, so many pulses an axis.
+/// To and fro, nearly at the highest rate, n pulses an axis.
 fn long_way(pulses: u64) {
     let mut port = Port::new(config([(16_000, 127), (3200, 7), (500_000, 3)], 1, 20));
     let (mut at, mut made) = ([0_i32; 3], 0_u64);

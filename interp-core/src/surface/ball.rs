@@ -2,7 +2,7 @@
 
 use super::SHIFT_MAX;
 use crate::math::arith::{power_of_two, to_f32, to_top, truncated};
-use crate::math::number::NM_PER_MM;
+use crate::math::number::NM_PER_MM_F32;
 use crate::math::vec3::Vec3;
 
 /// The ball on one patch, whose units are 2^-shift nm. Its offsets are in units of 2^-fine nm, the finest in which the radius is below
@@ -27,7 +27,7 @@ pub(crate) struct OffsetUnits {
 impl OffsetUnits {
     /// For a ball of this radius, 1e-6 to 1000 mm, on a patch in units of 2^-shift nm.
     pub(crate) fn new(radius_mm: f32, shift: u8) -> Self {
-        let (radius, fine) = to_top(radius_mm * NM_PER_MM);
+        let (radius, fine) = to_top(radius_mm * NM_PER_MM_F32);
         Self {
             shift: shift.min(SHIFT_MAX),
             fine,

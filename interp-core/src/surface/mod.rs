@@ -1,4 +1,4 @@
-//! Surfaces: from stored words to what the stages need at one point of a pass, a `Contact`.
+//! Surfaces: from stored words to a `Contact`, the differential geometry at one point of a pass.
 //!
 //! On a pass the side parameter is fixed. A surface kind therefore has two parts:
 //!
@@ -58,7 +58,7 @@ pub(crate) struct IsoLine {
     pub(crate) reversed: bool,
 }
 
-/// The surface and the ball on it at one point of a pass, as the stages want it. "Per path" and "per side" mean per span fraction;
+/// The surface and the ball on it at one point of a pass, as the stages use it. "Per path" and "per side" mean per span fraction;
 /// g is the factor that a surface kind scales its derivatives by (1, or a part of the weight).
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct Contact {
@@ -84,7 +84,7 @@ pub(crate) struct Contact {
     pub(crate) gauge: f32,
 }
 
-/// The path parametrisation at a place: what a step along the path needs.
+/// The path parametrisation at a point: a step along the path needs no more.
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct PathSpeed {
     /// 1/|A|, path per unit.
@@ -94,13 +94,13 @@ pub(crate) struct PathSpeed {
 }
 
 impl PathSpeed {
-    /// Of no place.
+    /// Of no point.
     pub(crate) const STILL: Self = Self {
         inv_speed: 0.0,
         log_speed_derivative: 0.0,
     };
 
-    /// From g Ã, half of its derivative, the excess of its log_speed_derivative, and g/a.
+    /// From g Ã, half of its derivative, the excess of its logarithmic speed derivative, and g/a.
     #[inline(always)]
     fn new(path: &[i32; 3], path2: &[i32; 3], excess: f32, gauge: f32) -> Self {
         let speed = Vec3::of(*path);
@@ -163,7 +163,7 @@ pub(crate) struct Local {
     pub(crate) g: f32,
     /// 1/g.
     pub(crate) inverse_g: f32,
-    /// What the log_speed_derivative of Ã has more than that of S, because g varies.
+    /// Logarithmic speed derivative of Ã less that of S, because g varies.
     pub(crate) excess: f32,
 }
 
@@ -229,7 +229,7 @@ impl Local {
         } else {
             (lateral_squared + sheared, 0.0)
         };
-        // Wanted at the ends of passes only: nothing of it is left in the sample path.
+        // Used at the ends of passes only: the compiler leaves it out of the sample path.
         let Vec3 { x, y, z } = side;
         let outwards = b * b * (x * x + y * y + z * z) - n;
         Ok(Contact {
@@ -270,7 +270,7 @@ pub(crate) enum Surface {
     Circle(CirclePass),
 }
 
-/// A surface on one pass by what evaluates it.
+/// A surface on one pass, by its kind.
 pub(crate) enum AnyPass<'a> {
     Polynomial(PolynomialPass<'a>),
     Ruled(RuledPass<'a>),
@@ -281,7 +281,7 @@ pub(crate) enum AnyPass<'a> {
     Circle(&'a CirclePass),
 }
 
-/// What the sample path asks of a surface on a pass.
+/// The sample path's interface to a surface on a pass.
 pub(crate) trait Pass {
     /// The contact at a fraction of the patch, in the direction of travel.
     ///
@@ -291,7 +291,7 @@ pub(crate) trait Pass {
 }
 
 impl Pass for Surface {
-    /// For a caller that has the time to find out what evaluates it.
+    /// Dispatches at run time: for callers outside the sample path.
     #[inline(never)]
     fn contact(&self, fraction: u64, ball: &Ball) -> Result<Contact> {
         match self.pass() {
@@ -308,7 +308,7 @@ impl Pass for Surface {
 }
 
 impl Surface {
-    /// What evaluates it.
+    /// The pass by its kind.
     #[inline(always)]
     pub(crate) const fn pass(&self) -> AnyPass<'_> {
         match self {

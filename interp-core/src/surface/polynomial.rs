@@ -76,7 +76,7 @@ pub(crate) struct RuledPass<'a>(pub(super) &'a GridPass);
 /// An extruded patch on one pass.
 pub(crate) struct ExtrudedPass<'a>(pub(super) &'a GridPass);
 
-/// `MIXED` and `SIDE2`: whether those derivatives are wanted; without the former the side derivative is constant.
+/// `MIXED` and `SIDE2`: whether those derivatives are computed; without the former the side derivative is constant.
 #[inline(always)]
 fn local<const MIXED: bool, const SIDE2: bool>(pass: &GridPass, fraction: u64) -> Local {
     let w = centred(fraction);

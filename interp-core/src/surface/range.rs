@@ -125,7 +125,7 @@ impl HeadWord {
         }
     }
 
-    /// Whether the word means what it says: no unknown bit, at most one boundary collapsed.
+    /// Whether the word is valid: no unknown bit, at most one boundary collapsed.
     pub(crate) const fn check(word: i32) -> bool {
         let head = Self::from_word(word);
         head.to_word() == word && head.edges.count() <= 1

@@ -41,7 +41,7 @@ fn place_and_arc(bend: f64, speed: f64, part: f64) -> (PathSpeed, f32) {
 }
 
 /// Mean and greatest relative error of the step over many speeds and arcs, for a curve by its inverse arc length: from
-/// speed, log_speed_derivative and arc, the exact step and the log_speed_derivative one arc before. The roundings average out in the mean.
+/// speed, logarithmic speed derivative and arc, the exact step and the logarithmic speed derivative one arc before. The roundings average out in the mean.
 fn errors(bend: f64, exact: impl Fn(f64, f64, f64) -> (f64, f64)) -> (f64, f64) {
     const COUNT: u32 = 10_000;
     let (mut sum, mut most, mut random) = (0.0, 0_f64, random());
@@ -67,7 +67,7 @@ fn linear_speed(a: f64, p: f64, arc: f64) -> (f64, f64) {
     (step, p / (1.0 - 2.0 * x).sqrt())
 }
 
-/// Speed a exp(p u): from s = a (exp(p u) - 1)/p. Its log_speed_derivative is the same everywhere.
+/// Speed a exp(p u): from s = a (exp(p u) - 1)/p. Its logarithmic speed derivative is the same everywhere.
 fn exponential_speed(a: f64, p: f64, arc: f64) -> (f64, f64) {
     ((arc * p / a).ln_1p() / p, p)
 }
@@ -132,7 +132,7 @@ fn no_step_where_the_series_is_not_enough() {
             "{bend}"
         );
     }
-    // The same by the change of the log_speed_derivative alone.
+    // The same by the change of the logarithmic speed derivative alone.
     for (change, some) in [(5.9, true), (6.1, false), (-5.9, true), (-6.1, false)]
         .map(|(change, some)| (change / (6.0 * 8.0 + 1.0), some))
     {
@@ -406,10 +406,10 @@ fn an_arc_beyond_the_patch_says_what_was_left_of_it() {
     }
 }
 
-/// What is added to the first-order step would be x (x - 1)/2, x the arc times the log_speed_derivative over the speed.
+/// What is added to the first-order step would be x (x - 1)/2, x the arc times the logarithmic derivative of the speed over the speed.
 #[test]
 fn an_arc_over_which_the_speed_falls_too_much_is_refused() {
-    // x = 5.05 u - 5 u^2/2 comes almost to a stand: at u = 0.8 its speed is 1.05, its log_speed_derivative -1/0.21.
+    // x = 5.05 u - 5 u^2/2 comes almost to a stand: at u = 0.8 its speed is 1.05, its logarithmic speed derivative -1/0.21.
     let line: Curve = [[0.0, 5.05, -2.5, 0.0], [0.0; 4], [0.0; 4]];
     let (speed, log_speed_derivative) = (1.05, -5.0 / 1.05);
     let correction = |arc: f64| {

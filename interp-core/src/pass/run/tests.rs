@@ -51,7 +51,7 @@ fn wave(pattern: Pattern) -> (Program, Vec<i32>) {
     (program, store)
 }
 
-/// What is made ahead is what would be made when it is needed: no sample differs, and most crossings find it made.
+/// Patches that are prepared ahead are those that a crossing would prepare: no sample differs, and most crossings find them prepared.
 #[test]
 fn patches_made_ahead_change_no_bit() {
     for pattern in [Pattern::Zig, Pattern::Zigzag] {
@@ -82,7 +82,7 @@ fn patches_made_ahead_change_no_bit() {
 fn a_run_that_is_begun_again_is_the_same() {
     let (program, store) = wave(Pattern::Zig);
     let job = program.job(&store).unwrap();
-    // In the first pass before the lines beside it were looked at, after either of them, and in later passes.
+    // In the first pass before its neighbouring lines were evaluated, after either of them, and in later passes.
     for stopped in [5, 601, 605, 1234, 1238, 4321] {
         let (mut first, mut again) = (Run::START, Run::START);
         let (mut here, mut there) = (Sample::START, Sample::START);
