@@ -90,6 +90,15 @@ package for this system, or name another Chromium in the variable CHROMIUM"
     need_program chromium chromium
 }
 
+# The processor of host-sim/chip: a library that is loaded when it runs, and linked with nothing.
+need_unicorn() {
+    if ldconfig -p 2> /dev/null | grep -q 'libunicorn\.so'; then return; fi
+    command -v apt-get > /dev/null || die "libunicorn is missing; install it (Debian and Ubuntu have it in the package libunicorn2)"
+    say "installing libunicorn2"
+    if ! apt-cache show libunicorn2 > /dev/null 2>&1; then as_root apt-get update -qq; fi
+    as_root env DEBIAN_FRONTEND=noninteractive apt-get install -y -qq --no-install-recommends libunicorn2 > /dev/null
+}
+
 # need_tool CRATE VERSION
 need_tool() {
     if command -v "$1" > /dev/null; then return; fi
@@ -124,5 +133,6 @@ setup_check() {
     need_program arm-none-eabi-objdump binutils-arm-none-eabi
     need_tool cargo-deny "$CARGO_DENY_VERSION"
     need_rs274
+    need_unicorn
     need_browser
 }

@@ -56,6 +56,8 @@ pub(crate) struct Chip {
     pub(crate) watchdog: Watchdog,
     pub(crate) debug: Debug,
     line: Option<Line>,
+    /// USART1 asks for its interrupt.
+    serial_asks: bool,
     script: Vec<Entry>,
     record: Option<BufWriter<File>>,
     random: fastrand::Rng,
@@ -63,6 +65,8 @@ pub(crate) struct Chip {
     /// When something happens next that TIM1 has no part in, and with it.
     pub(crate) next: u64,
     next_slot: u64,
+    /// When something happened last.
+    pub(crate) happened: u64,
     /// The first step pulse, seconds.
     pub(crate) moved: Option<f64>,
     step_port: usize,
@@ -125,20 +129,22 @@ impl Chip {
             ),
             nvic: Nvic::new(),
             ports,
-            tim1: Timer::new("TIM1", 2, 0xffff),
-            tim2: Timer::new("TIM2", 1, u32::MAX),
-            tim5: Timer::new("TIM5", 1, u32::MAX),
+            tim1: Timer::new("TIM1", 0xffff),
+            tim2: Timer::new("TIM2", u32::MAX),
+            tim5: Timer::new("TIM5", u32::MAX),
             dma: Dma::default(),
             usart: Usart::new(),
             watchdog: Watchdog::new(options.lsi_hz),
             debug: Debug::default(),
             line,
+            serial_asks: false,
             script,
             record: record.map(BufWriter::new),
             random: fastrand::Rng::with_seed(options.seed),
             next_look: 0,
             next: 0,
             next_slot: NEVER,
+            happened: 0,
             moved: None,
             step_port: board.step_port().index(),
             step_pins: steps.iter().fold(0, |bits, bit| bits | bit),
@@ -158,6 +164,7 @@ impl Chip {
 
     /// A reset: all parts as after power-on, memory and what is outside as they were.
     pub(crate) fn restart(&mut self, flags: u32) {
+        self.world.event(self.world.now, "reset");
         self.world.set_hclk(Rcc::RESET_HZ);
         self.overruns += self.usart.overruns;
         self.resets += 1;
@@ -165,9 +172,9 @@ impl Chip {
         self.rcc = Rcc::new(self.options.hse_mhz * 1e6, !self.options.no_crystal, flags);
         self.nvic = Nvic::new();
         (self.tim1, self.tim2, self.tim5) = (
-            Timer::new("TIM1", 2, 0xffff),
-            Timer::new("TIM2", 1, u32::MAX),
-            Timer::new("TIM5", 1, u32::MAX),
+            Timer::new("TIM1", 0xffff),
+            Timer::new("TIM2", u32::MAX),
+            Timer::new("TIM5", u32::MAX),
         );
         self.dma = Dma::default();
         self.usart = Usart::new();
@@ -180,7 +187,7 @@ impl Chip {
             let change = self.ports[index].change(self.world.now, false);
             self.keep(change);
         }
-        (self.hangs, self.fault, self.reset) = (false, false, None);
+        (self.hangs, self.fault, self.reset, self.serial_asks) = (false, false, None, false);
         self.usart.begin(self.world.now, 1);
         self.plan();
     }
@@ -246,15 +253,10 @@ impl Chip {
         self.next_slot = self.tim1.update_at().min(self.tim1.compare_at);
     }
 
-    /// When something happens next.
-    pub(crate) fn next_event(&self) -> u64 {
-        self.next.min(self.next_slot)
-    }
-
     /// Lets everything happen up to now.
     #[inline]
     pub(crate) fn catch_up(&mut self) {
-        if self.world.now >= self.next_event() {
+        if self.world.now >= self.next.min(self.next_slot) {
             self.catch_up_slowly();
         }
     }
@@ -275,6 +277,7 @@ impl Chip {
     fn play(&mut self, until: u64) {
         while self.next_slot <= until {
             let at = self.next_slot;
+            self.happened = at;
             let (stream, asks) = if self.tim1.compare_at <= at {
                 (TIM1_COMPARE_STREAM, self.tim1.compared())
             } else {
@@ -293,6 +296,7 @@ impl Chip {
     }
 
     fn happen(&mut self, at: u64) {
+        self.happened = at;
         let apb2 = self.rcc.apb2_cycles();
         if self.tim2.update_at() == at {
             self.periods += 1;
@@ -314,7 +318,10 @@ impl Chip {
             self.usart.receive(at, apb2, &mut self.world);
             self.serial_line();
         } else if self.watchdog.deadline == at {
-            self.world.note("the watchdog resets the chip");
+            let (at, words) = (self.at, self.nvic.words());
+            self.world
+                .note(format!("not fed: the last block was at {at:#x}; {words}"));
+            self.world.event(self.happened, "watchdog");
             self.watchdog.deadline = NEVER;
             self.reset = Some(cause::WATCHDOG | cause::PIN);
         } else if self.next_look == at {
@@ -325,26 +332,33 @@ impl Chip {
             .position(|entry| self.time_of(entry.when) == at)
         {
             let entry = self.script.remove(index);
+            self.world.event(at, &entry.name);
             self.scripted(entry.what);
         }
     }
 
-    /// Raises USART1's interrupt where it asks for it.
+    /// USART1 may have begun, or ceased, to ask for its interrupt: it is raised when it begins.
     pub(crate) fn serial_line(&mut self) {
-        if self.usart.interrupts() {
+        let asks = self.usart.interrupts();
+        if asks && !self.serial_asks {
             self.nvic.raise(nvic::USART1, self.world.now);
         }
+        self.serial_asks = asks;
     }
 
-    /// Raises TIM2's interrupt where its flag is still there.
-    pub(crate) fn timer_line(&mut self) {
-        if self.tim2.status & self.tim2.dier & timer::UPDATE != 0 {
-            self.nvic.raise(nvic::TIM2, self.world.now);
+    /// An interrupt is over; if its cause is still there it is pending again.
+    pub(crate) fn returned(&mut self, line: Option<usize>) {
+        let asks = match line {
+            Some(nvic::USART1) => self.usart.interrupts(),
+            Some(nvic::TIM2) => self.tim2.status & self.tim2.dier & timer::UPDATE != 0,
+            _ => false,
+        };
+        if let Some(line) = line.filter(|_| asks) {
+            self.nvic.raise(line, self.world.now);
         }
     }
 
     fn scripted(&mut self, event: Event) {
-        self.world.note(format!("{event:?}"));
         match event {
             Event::Input { port, pin, high } => {
                 let bit = 1 << pin;

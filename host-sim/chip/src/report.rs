@@ -52,6 +52,7 @@ pub(crate) fn of(chip: &Chip, account: &Account, seconds_spent: f64) -> Value {
         "complaints": chip.world.complaints,
         "complained": chip.world.complained,
         "notes": chip.world.notes,
+        "events": chip.world.events.iter().map(|(cycle, what)| json!({"cycle": cycle, "what": what})).collect::<Vec<_>>(),
         "resets": chip.resets,
         "periods": chip.periods,
         "slots_from_cycle": chip.slots_from,

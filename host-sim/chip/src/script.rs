@@ -25,14 +25,15 @@ pub(crate) enum When {
 }
 
 /// An event and its time, as on the command line: `500:x-max`, `motion+20:emergency-stop`, `motion+40:hang`, `900:drive-fault=closed`.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq)]
 pub(crate) struct Entry {
+    pub(crate) name: String,
     pub(crate) when: When,
     pub(crate) what: Event,
 }
 
 /// The name of an input on the command line.
-fn name(role: Role) -> Option<&'static str> {
+fn input_name(role: Role) -> Option<&'static str> {
     Some(match role {
         Role::EmergencyStop => "emergency-stop",
         Role::DriveFault => "drive-fault",
@@ -48,7 +49,7 @@ fn name(role: Role) -> Option<&'static str> {
 
 /// The safety inputs of a board.
 pub(crate) fn inputs(board: &Board) -> impl Iterator<Item = &Line> {
-    board.lines.iter().filter(|line| name(line.role).is_some())
+    board.lines.iter().filter(|line| input_name(line.role).is_some())
 }
 
 /// Reads an entry for this board.
@@ -64,6 +65,7 @@ pub(crate) fn entry(text: &str, board: &Board) -> Result<Entry, String> {
         Some(after) => When::Motion(ms(after)? / 1e3),
         None => When::Start(ms(when)? / 1e3),
     };
+    let name = what.to_owned();
     let (what, closed) = what
         .strip_suffix("=closed")
         .map_or((what, false), |name| (name, true));
@@ -73,7 +75,7 @@ pub(crate) fn entry(text: &str, board: &Board) -> Result<Entry, String> {
         "brown-out" => Event::BrownOut,
         input => {
             let line = inputs(board)
-                .find(|line| name(line.role) == Some(input))
+                .find(|line| input_name(line.role) == Some(input))
                 .ok_or_else(|| {
                     format!("{input}: neither an input of the board nor hang, fault, brown-out")
                 })?;
@@ -84,5 +86,5 @@ pub(crate) fn entry(text: &str, board: &Board) -> Result<Entry, String> {
             }
         }
     };
-    Ok(Entry { when, what })
+    Ok(Entry { name, when, what })
 }

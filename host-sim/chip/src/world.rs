@@ -21,6 +21,8 @@ pub(crate) struct World {
     pub(crate) complained: u64,
     /// What happened.
     pub(crate) notes: Vec<String>,
+    /// What the script did, and resets, with their cycles.
+    pub(crate) events: Vec<(u64, String)>,
     /// Notes go to standard error as they come.
     verbose: bool,
     once: BTreeSet<String>,
@@ -35,6 +37,7 @@ impl World {
             complaints: Vec::new(),
             complained: 0,
             notes: Vec::new(),
+            events: Vec::new(),
             verbose,
             once: BTreeSet::new(),
         }
@@ -85,6 +88,12 @@ impl World {
         if self.once.insert(text.clone()) {
             self.wrong(text);
         }
+    }
+
+    /// Notes an event.
+    pub(crate) fn event(&mut self, at: u64, what: &str) {
+        self.events.push((at, what.to_owned()));
+        self.note(what);
     }
 
     /// Notes what happened.

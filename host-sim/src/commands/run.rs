@@ -7,7 +7,7 @@ use clap::Args;
 use indicatif::ProgressBar;
 use interp_core::{Fault, FaultKind, Sample, State};
 use protocol::digest::Digest;
-use protocol::message::{Reason, Status};
+use protocol::message::{HostGone, Reason, Status};
 use serde_json::{Value, json};
 
 use super::flash::{board_of, board_parser};
@@ -45,6 +45,9 @@ pub(super) struct Arguments {
     /// Firmware image for QEMU; without it, the image is built.
     #[arg(long, value_name = "ELF", requires = "qemu")]
     firmware: Option<PathBuf>,
+    /// With --chip, as fast as it goes instead of in real time; the job must not hold for a host that is gone.
+    #[arg(long, requires = "chip")]
+    fast: bool,
     /// Writes every sample that the board sent as a row of this CSV file.
     #[arg(long, value_name = "FILE")]
     trace: Option<PathBuf>,
@@ -170,12 +173,12 @@ enum Behind {
 }
 
 /// Starts a board's image on models of its chip.
-fn connect_chip(name: &str) -> Result<(Behind, Session)> {
+fn connect_chip(name: &str, fast: bool) -> Result<(Behind, Session)> {
     let bar = spinner("building the firmware, and what executes it");
     let built = chip::image(board_of(name)).and_then(|image| Ok((chip::program()?, image)));
     bar.finish_and_clear();
     let (program, image) = built?;
-    let (chip, stream) = Chip::start(&program, &image)?;
+    let (chip, stream) = Chip::start(&program, &image, fast)?;
     Ok((Behind::Chip(chip), Session::open(stream, session_number())?))
 }
 
@@ -203,7 +206,7 @@ fn connect(arguments: &Arguments) -> Result<(Behind, Session)> {
         return Ok((Behind::Board, open_port(name)?));
     }
     if let Some(name) = &arguments.place.chip {
-        return connect_chip(name);
+        return connect_chip(name, arguments.fast);
     }
     let image = match &arguments.firmware {
         Some(image) if !image.exists() => {
@@ -447,6 +450,12 @@ fn complaint(ran: &Ran, here: &TimedRun, job: &Job) -> Option<String> {
 pub(super) fn command(arguments: &Arguments) -> Result<()> {
     let (job, prepared) = home::load(&arguments.job, arguments.home)?;
     travel::check(&job)?;
+    if arguments.fast && job.machine.host_gone == HostGone::Hold {
+        return Err(Failure::input(
+            "the chip's time runs faster than this machine can keep its link alive, and the job says host_gone = \"hold\"",
+            "leave --fast out, or say host_gone = \"finish\"",
+        ));
+    }
     if let Some(script) = &arguments.script {
         let scripted = scripted::play(&job, &prepared, script, None)?;
         let (_behind, mut session) = connect(arguments)?;

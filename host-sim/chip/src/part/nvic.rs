@@ -124,12 +124,13 @@ impl Nvic {
         }
     }
 
-    pub(crate) fn leave(&mut self, now: u64) {
-        let Some(active) = self.active.pop() else { return };
-        if let Some(line) = (active.number as usize).checked_sub(16) {
-            let account = &mut self.accounts[line];
-            account.duration_max = account.duration_max.max(now - active.entered);
-        }
+    /// The exception in progress is over; its interrupt, if it is one.
+    pub(crate) fn leave(&mut self, now: u64) -> Option<usize> {
+        let active = self.active.pop()?;
+        let line = (active.number as usize).checked_sub(16)?;
+        let account = &mut self.accounts[line];
+        account.duration_max = account.duration_max.max(now - active.entered);
+        Some(line)
     }
 
     pub(crate) fn account(&self, line: usize) -> Account {
@@ -211,6 +212,13 @@ impl Nvic {
             0xf34 => self.fpccr = value,
             _ => world.wrong_once(format!("write of 0xe000e000 + {offset:#x}: not modelled")),
         }
+    }
+
+    /// What is pending and in progress, for people.
+    pub(crate) fn words(&self) -> String {
+        let lines: Vec<_> = (0..LINES).filter(|line| self.pending >> line & 1 != 0).collect();
+        let active: Vec<_> = self.active.iter().map(|active| active.number).collect();
+        format!("interrupts pending {lines:?}, exceptions in progress {active:?}")
     }
 
     pub(crate) fn snapshot(&self) -> Vec<(String, u32)> {

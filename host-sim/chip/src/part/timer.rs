@@ -14,8 +14,6 @@ const COMPARE_1_REQUEST: u32 = 1 << 9;
 
 pub(crate) struct Timer {
     name: &'static str,
-    /// The bus that it hangs on.
-    pub(crate) apb: u8,
     cr1: u32,
     cr2: u32,
     smcr: u32,
@@ -34,10 +32,9 @@ pub(crate) struct Timer {
 }
 
 impl Timer {
-    pub(crate) const fn new(name: &'static str, apb: u8, reload: u32) -> Self {
+    pub(crate) const fn new(name: &'static str, reload: u32) -> Self {
         Self {
             name,
-            apb,
             cr1: 0,
             cr2: 0,
             smcr: 0,
@@ -164,7 +161,7 @@ impl Timer {
         } else {
             world.now
         };
-        self.step = clock * (u64::from(self.prescaler) + 1);
+        self.step = clock;
         match offset {
             0x00 => {
                 // Direction, mode, preload, divider: none is modelled.
@@ -194,7 +191,13 @@ impl Timer {
             }
             0x10 => self.status &= value,
             0x24 => (self.count, self.since) = (value.into(), world.now),
-            0x28 => self.prescaler = value,
+            0x28 => {
+                // It would take effect with the next update.
+                if value != 0 {
+                    world.wrong(format!("{} PSC {value}: not modelled", self.name));
+                }
+                self.prescaler = value;
+            }
             0x2c => {
                 if self.is_running() && self.count > value.into() {
                     world.wrong(format!("{} ARR {value} below its count", self.name));

@@ -1,5 +1,5 @@
 //! A board's image, executed on models of its chip by the program in `host-sim/chip`: a child process with a pseudo-terminal for its
-//! serial line, in real time.
+//! serial line, in real time or faster.
 
 use std::io::{self, Read};
 use std::path::{Path, PathBuf};
@@ -65,11 +65,11 @@ pub fn program() -> Result<PathBuf, ChipError> {
 }
 
 impl Chip {
-    /// Starts an image, and opens its serial line as any other.
+    /// Starts an image, and opens its serial line as any other. `fast`: as fast as it goes, which no `host_gone` outlasts.
     ///
     /// # Errors
     /// The program does not start: libunicorn2 is missing, for instance.
-    pub fn start(program: &Path, image: &Path) -> Result<(Self, Box<dyn Stream>), ChipError> {
+    pub fn start(program: &Path, image: &Path, fast: bool) -> Result<(Self, Box<dyn Stream>), ChipError> {
         let failed = |error: io::Error| ChipError::Start(error.to_string());
         let folder = tempfile::tempdir().map_err(failed)?;
         let line = folder.path().join("serial");
@@ -79,6 +79,7 @@ impl Chip {
             .arg(&line)
             .arg("--report")
             .arg(folder.path().join("report"))
+            .args(fast.then_some("--fast"))
             .stdin(Stdio::piped())
             .stdout(Stdio::null())
             .stderr(Stdio::piped())
