@@ -1,8 +1,8 @@
-//! `completions`: what makes a shell complete `cargo sim`.
+//! `completions`: writes a shell script that completes `cargo sim`.
 //!
-//! `cargo sim` is an alias of cargo's, so the shell asks cargo's completion about it, which knows nothing of our commands. The script
-//! therefore defines completions for a command of the name `cargo_sim`, which need not exist, and puts itself in front of cargo's own:
-//! behind `cargo sim` it asks the former, everywhere else what was there before.
+//! `cargo sim` is a cargo alias, so the shell calls cargo's completion, which does not list the commands of an alias. The script therefore
+//! defines completions for a command named `cargo_sim`, which need not exist, and wraps cargo's completion: after `cargo sim` it calls the
+//! former, otherwise the original.
 
 use clap::{Args, CommandFactory, ValueEnum};
 use clap_complete::Shell;
@@ -10,10 +10,10 @@ use clap_complete::Shell;
 use super::out::say_part;
 use super::{Cli, Result};
 
-/// The name that the completions are made for; with a hyphen, clap_complete 4.6 writes names for bash that do not fit each other.
+/// Command name in the completions. With a hyphen, clap_complete 4.6 writes inconsistent function names for bash.
 const NAME: &str = "cargo_sim";
 
-/// Shells whose hook was tried.
+/// Supported shells.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 enum Hooked {
     Bash,
@@ -21,7 +21,7 @@ enum Hooked {
     Fish,
 }
 
-/// Writes a script that makes your shell complete `cargo sim`; cargo's own completion stays.
+/// Writes a script that completes `cargo sim` in your shell; the completion of cargo itself remains.
 ///
 /// Example: cargo sim completions bash > ~/.isofeed.bash   # then in ~/.bashrc: source ~/.isofeed.bash
 /// Example: cargo sim completions zsh > ~/.isofeed.zsh     # then in ~/.zshrc, after compinit: source ~/.isofeed.zsh

@@ -1,4 +1,4 @@
-//! `flash`: the firmware into a board's chip, by a debug probe.
+//! `flash`: writes the firmware into the flash of a board by a debug probe.
 
 use std::path::{Path, PathBuf};
 use std::time::Instant;
@@ -15,8 +15,8 @@ use machine::remote::qemu::cargo;
 
 /// Writes the firmware into a board's flash by a debug probe, compares what was written, and starts it.
 ///
-/// Builds the firmware first where it has changed. Switch the drives' power off before: the pins of a chip that is being written do
-/// as they like. docs/bring-up.md has the wiring.
+/// Builds the firmware first if it has changed. Switch off the power of the drives before: while the chip is being written, the state
+/// of its pins is undefined. docs/bring-up.md describes the wiring.
 ///
 /// Example: cargo sim flash --board skr-pro
 /// Example: cargo sim flash --board stm32f405 --chip STM32F407VETx --probe 0483:3748
@@ -24,8 +24,8 @@ use machine::remote::qemu::cargo;
 #[command(verbatim_doc_comment)]
 pub(super) struct Arguments {
     #[command(flatten)]
-    pub(super) place: Place,
-    /// Compares only: writes nothing, and what runs goes on running.
+    pub(super) place: BoardArguments,
+    /// Compares only: writes nothing, and does not interrupt the running firmware.
     #[arg(long)]
     verify: bool,
     /// Prints one JSON object instead of text.
@@ -33,16 +33,16 @@ pub(super) struct Arguments {
     pub(super) json: bool,
 }
 
-/// Which board, by which probe.
+/// The board, its chip, the probe, and the image.
 #[derive(Debug, Args)]
-pub(super) struct Place {
+pub(super) struct BoardArguments {
     /// The board.
     #[arg(long, value_name = "BOARD", value_parser = board_parser(), default_value = "stm32f405")]
     board: String,
-    /// The chip, where it is another than the board's usual one: probe-rs's name.
+    /// The chip, if it differs from the board's default; a name of probe-rs.
     #[arg(long, value_name = "NAME")]
     chip: Option<String>,
-    /// The debug probe, where there are several: VID:PID or VID:PID:SERIAL, hexadecimal.
+    /// The debug probe, if several are connected: VID:PID or VID:PID:SERIAL, hexadecimal.
     #[arg(long, value_name = "SELECTOR")]
     probe: Option<String>,
     /// An ELF file of the firmware, instead of building it.
@@ -59,7 +59,7 @@ fn board_parser() -> clap::builder::PossibleValuesParser {
 impl From<NotRun> for Failure {
     fn from(error: NotRun) -> Self {
         match error {
-            // These are of the command line's making.
+            // Errors in command-line arguments.
             NotRun::Problem(
                 problem @ (Problem::BadSelector(_)
                 | Problem::UnknownChip(_)
@@ -78,7 +78,7 @@ impl From<NotRun> for Failure {
     }
 }
 
-impl Place {
+impl BoardArguments {
     pub(super) fn board(&self) -> &'static Board {
         BOARDS
             .into_iter()
@@ -86,7 +86,7 @@ impl Place {
             .unwrap_or(BOARDS[0])
     }
 
-    /// Is there a probe? Asked before minutes are spent on the firmware.
+    /// Looks for the probe, before the build of the firmware, which takes minutes.
     pub(super) fn find(&self, program: &Program) -> Result<String> {
         let mut found = String::new();
         let request = Request::Find {
@@ -100,7 +100,7 @@ impl Place {
         Ok(found)
     }
 
-    /// The image: the one that is named, or the board's own, built.
+    /// The image: the one given, or the board's, which is built.
     pub(super) fn image(&self) -> Result<PathBuf> {
         let board = self.board();
         let (alias, folder) = board.build;
@@ -140,7 +140,7 @@ pub(super) fn program() -> Result<Program> {
     Ok(Program::build()?)
 }
 
-/// Reads an image, and makes sure that it is one for this board and fits its flash.
+/// Reads an image and checks that it is for this board and fits its flash.
 pub(super) fn load(path: &Path, board: &Board) -> Result<Image> {
     let refused = |why: String| {
         Failure::input(
@@ -156,7 +156,7 @@ pub(super) fn load(path: &Path, board: &Board) -> Result<Image> {
     Ok(image)
 }
 
-/// A bar for each kind of work.
+/// One progress bar per kind of work.
 pub(super) struct Bars(Option<(Work, ProgressBar)>);
 
 impl Bars {
@@ -190,7 +190,7 @@ impl Bars {
 pub(super) fn command(arguments: &Arguments) -> Result<()> {
     let place = &arguments.place;
     let board = place.board();
-    // What can be told without a probe comes first, then what can without the firmware.
+    // First the checks that need no probe, then those that need no firmware.
     if place.image.is_some() {
         load(&place.image()?, board)?;
     }

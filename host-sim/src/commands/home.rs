@@ -1,4 +1,4 @@
-//! Where the axes stand: read from the command line, declared before a run, and what to do where a job begins elsewhere.
+//! The declared position of the axes: parsed from the command line, and checked against the start of the job.
 
 use protocol::message::Reason;
 
@@ -18,7 +18,7 @@ impl PlaceNm {
         self.0.map(|nm| f64::from(nm) * MM_PER_NM)
     }
 
-    /// As it is said on the command line and in a job, in mm with every nanometre.
+    /// The position in mm with six decimals, as on the command line and in a job.
     pub(super) fn words(self) -> String {
         let axis = |nm: i32| {
             let (mm, rest) = (nm.unsigned_abs() / 1_000_000, nm.unsigned_abs() % 1_000_000);
@@ -29,7 +29,7 @@ impl PlaceNm {
     }
 }
 
-/// Reads a place in mm, `X,Y,Z`.
+/// Parses a position `X,Y,Z` in mm.
 pub(super) fn place(text: &str) -> std::result::Result<PlaceNm, String> {
     let mut axes = text.split(',').map(|axis| {
         let mm: f64 = axis.trim().parse().ok()?;
@@ -40,11 +40,11 @@ pub(super) fn place(text: &str) -> std::result::Result<PlaceNm, String> {
     let mut next = || axes.next().flatten();
     match (next(), next(), next()) {
         (Some(x), Some(y), Some(z)) if axes.next().is_none() => Ok(PlaceNm([x, y, z])),
-        _ => Err("three numbers in mm are wanted, each within 2147, such as 0,0,50".to_owned()),
+        _ => Err("expected three numbers in mm, each within 2147, such as 0,0,50".to_owned()),
     }
 }
 
-/// Reads a job that begins where the axes stand, if that was given and the job does not say where it begins.
+/// Loads a job; if it has no `home_mm`, `home` becomes its home.
 pub(super) fn load(path: &std::path::Path, stands: Option<PlaceNm>) -> Result<(Job, Prepared)> {
     let mut job = job_file::load_with(path, &cad::Faces)?;
     if let Some(stands) = stands {
@@ -53,12 +53,12 @@ pub(super) fn load(path: &std::path::Path, stands: Option<PlaceNm>) -> Result<(J
     settled(job)
 }
 
-/// Where the job's run begins; without limits it begins with its first pass, wherever the axes stand.
+/// Position at which the run of the job begins. A job without limits begins with its first pass, whatever the position of the axes.
 pub(super) fn of(prepared: &Prepared) -> PlaceNm {
     PlaceNm(prepared.header.axes.map_or([0; 3], |axes| axes.home_nm))
 }
 
-/// The refusal of a start away from the job's home, with what to do.
+/// The refusal of a start away from the job's home, with its remedy.
 pub(super) fn elsewhere(error: &RemoteError) -> Option<String> {
     let RemoteError::Refused {
         reason: reason @ Reason::NotAtHome { home_nm, stands_nm },
@@ -68,12 +68,12 @@ pub(super) fn elsewhere(error: &RemoteError) -> Option<String> {
         return None;
     };
     let bring = format!(
-        "bring the axes there with the drives off, and declare it: --home {}",
+        "move the axes there with the drives off, and declare the position: --home {}",
         PlaceNm(*home_nm).words().replace(' ', "")
     );
     let remedy = match stands_nm {
         Some(at_nm) => format!(
-            "say `home_mm = [{}]` in [machine], so that the job begins where the axes stand; or {bring}",
+            "set `home_mm = [{}]` in [machine], so that the job begins at the position of the axes; or {bring}",
             PlaceNm(*at_nm).words()
         ),
         None => bring,
@@ -106,7 +106,7 @@ mod tests {
         }
     }
 
-    /// What a job is told of a place is the same nanometre again.
+    /// A position written into a job is parsed to the same nanometre.
     #[test]
     fn no_nanometre_is_lost_in_a_job() {
         for nm in (0..i32::MAX).step_by(7_919_737) {

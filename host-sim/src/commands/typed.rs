@@ -1,4 +1,4 @@
-//! What an operator types while `run --port` follows a run.
+//! Operator commands typed while `run --port` follows a run.
 
 use std::io::{BufRead, stdin};
 use std::sync::mpsc::{Receiver, TryRecvError, channel};
@@ -11,10 +11,10 @@ use super::out::to_stderr;
 use machine::remote::RemoteError;
 use machine::remote::operate::{Action, Operator};
 
-/// What can be typed.
+/// The commands, for the prompt.
 pub(super) const WORDS: &str = "hold, resume, stop, abort, override 50, status";
 
-/// The lines of standard input, and where the answers go: above the bar.
+/// The operator at the terminal: reads lines from standard input, prints the answers above the progress bar.
 pub(super) struct Typist {
     lines: Receiver<String>,
     /// Standard input has not ended.
@@ -23,10 +23,10 @@ pub(super) struct Typist {
 }
 
 impl Typist {
-    /// Reads from now on.
+    /// Starts to read standard input in a thread.
     pub(super) fn new(bar: ProgressBar) -> Self {
         let (sender, lines) = channel();
-        // It ends with standard input, or with the program.
+        // The thread ends with standard input or with the process.
         std::thread::spawn(move || {
             for line in stdin().lock().lines().map_while(Result::ok) {
                 if sender.send(line).is_err() {
