@@ -223,13 +223,13 @@ fn report_is_well_formed_small_and_says_what_was_found() {
         ("Passes", f64::from(findings.passes)),
         ("Samples", findings.samples as f64),
         ("Machining time", findings.samples as f64 * job.machine.period_s()),
-        ("Cutter contact path", report.cc_length_mm),
-        ("Tool centre path", findings.speeds.cl_length_mm),
+        ("CC path", report.cc_length_mm),
+        ("CL path", findings.speeds.cl_length_mm),
         ("Least path interval", findings.interval_min),
         ("Feed ripple", report.ripple_pct.max),
         ("Feed ripple, rms", report.ripple_pct.rms()),
-        ("Tool centre error", report.position_nm.max),
-        ("Scallop by formula", report.scallop_mm.max),
+        ("CL error", report.position_nm.max),
+        ("Scallop height, by formula", report.scallop_mm.max),
     ] {
         assert_eq!(value_of(&page, what), value, "{what}");
     }
