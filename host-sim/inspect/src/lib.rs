@@ -4,6 +4,7 @@
 //! Job ──timed──► digests, fault        the core alone
 //!     ──surveyed──► errors, speeds     every sample against the oracle
 //!     ──verified──► scallop, gouges, limits, optimum, and the verdict
+//!     ──comparison──► a board's run against the core's
 //! ```
 #![cfg_attr(
     test,
@@ -15,6 +16,7 @@
     )
 )]
 
+pub mod comparison;
 mod error;
 mod fault;
 mod pass_time;

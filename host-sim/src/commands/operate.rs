@@ -50,8 +50,8 @@ enum OperatorCommand {
     /// Declares the position of the axes; the drives must be on.
     Home {
         /// Position of the ball centre, mm: X,Y,Z.
-        #[arg(value_parser = home::place, allow_hyphen_values = true)]
-        place_mm: home::PlaceNm,
+        #[arg(value_parser = home::position, allow_hyphen_values = true)]
+        position_mm: home::PositionNm,
     },
     /// Acknowledges a released emergency stop or drive fault.
     Acknowledge,
@@ -68,7 +68,7 @@ impl OperatorCommand {
             Self::Override { percent } => Action::Override(*percent),
             Self::On => Action::Drives(true),
             Self::Off => Action::Drives(false),
-            Self::Home { place_mm } => Action::Home(place_mm.0),
+            Self::Home { position_mm } => Action::Home(position_mm.0),
             Self::Acknowledge => Action::Acknowledge,
         }
     }

@@ -1,33 +1,30 @@
-//! `run`: loads the job into the firmware, runs it there, and compares with `simulate` sample by sample.
+//! `run`: loads a job into the firmware, runs it there, and compares the samples with those of the simulation.
 
 use std::path::PathBuf;
-use std::time::Instant;
 
 use clap::Args;
 use indicatif::ProgressBar;
-use interp_core::{Fault, FaultKind, Sample, State};
-use protocol::digest::Digest;
-use protocol::message::{Reason, Status};
+use interp_core::{Fault, FaultKind};
+use protocol::message::Reason;
 use serde_json::{Value, json};
 
-use super::home::{self, PlaceNm};
+use super::home::{self, PositionNm};
 use super::out::{say, to_stderr};
 use super::outcome::Outcome;
 use super::simulate::{remarks, report, surveyed, timed};
-use super::typed::{Typist, WORDS};
+use super::typed::{Console, WORDS};
 use super::{Failure, Result, cannot_write, progress, scripted, spinner, trace};
 use approach::Kind;
-use inspect::TimedRun;
+use inspect::comparison::{self, BoardRun, ComparisonError, Reference};
 use job::Job;
-use machine::Machine;
 use machine::prepare::{self, Prepared};
 use machine::remote::operate::{self, Operator, Setup};
 use machine::remote::qemu::{self, Qemu, QemuError};
 use machine::remote::{RemoteError, Session, drive, port};
 use machine::travel;
 
-/// Runs a job in the firmware, in QEMU or on a board, and compares every sample with this machine's. While a board runs, type what an
-/// operator wants, and Enter: hold, resume, stop, abort, override 50, status. A run that was commanded is not compared.
+/// Runs a job on the firmware, in QEMU or on a board, and compares every sample with the simulation. While a board runs, type operator
+/// commands and Enter: hold, resume, stop, abort, override 50, status. A run with operator commands is not compared.
 ///
 /// Example: cargo sim run jobs/freeform.toml --qemu
 /// Example: cargo sim run jobs/plate_machine.toml --qemu --script jobs/operator.txt
@@ -38,21 +35,21 @@ pub(super) struct Arguments {
     /// Job file (TOML).
     job: PathBuf,
     #[command(flatten)]
-    place: Place,
-    /// Firmware image for QEMU; without it, the image is built.
+    target: Target,
+    /// Firmware image for QEMU. Default: built from the sources.
     #[arg(long, value_name = "ELF", requires = "qemu")]
     firmware: Option<PathBuf>,
-    /// Writes every sample that the board sent as a row of this CSV file.
+    /// Writes every sample of the board as a row of this CSV file.
     #[arg(long, value_name = "FILE")]
     trace: Option<PathBuf>,
-    /// Writes a page with a view that turns, charts and figures into this folder.
+    /// Writes a report page into this folder: 3D view, charts, figures.
     #[arg(long, value_name = "DIR")]
     report: Option<PathBuf>,
-    /// The axes stand here, mm: declared as home before the run, and the job's home where it has no `home_mm`. In QEMU, where there
-    /// are no axes, the job's home is declared.
-    #[arg(long, value_name = "X,Y,Z", value_parser = home::place, allow_hyphen_values = true)]
-    home: Option<PlaceNm>,
-    /// Does what this file says an operator does, in lockstep: lines `tick N: hold`, or resume, stop, abort, start, override P.
+    /// Position of the axes, mm: declared as home before the run, and the home of a job without `home_mm`. Default in QEMU, which
+    /// has no axes: the job's home.
+    #[arg(long, value_name = "X,Y,Z", value_parser = home::position, allow_hyphen_values = true)]
+    home: Option<PositionNm>,
+    /// Applies the operator commands in this file, in lockstep: lines `tick N: hold`, or resume, stop, abort, start, override P.
     #[arg(long, value_name = "FILE", requires = "qemu", conflicts_with_all = ["report", "trace"])]
     script: Option<PathBuf>,
     /// Prints one JSON object instead of text.
@@ -62,23 +59,22 @@ pub(super) struct Arguments {
 
 #[derive(Debug, Args)]
 #[group(required = true, multiple = false)]
-struct Place {
-    /// In QEMU, which this command starts and ends.
+struct Target {
+    /// Runs in QEMU, which the command starts and stops.
     #[arg(long)]
     qemu: bool,
-    /// On a board behind this serial port.
+    /// Runs on the board at this serial port.
     #[arg(long, value_name = "DEV")]
     port: Option<String>,
 }
 
-/// What the board did.
-struct Ran {
-    status: Status,
-    compared: u64,
-    first_difference: Option<u64>,
-    /// An operator commanded it, so that it is no run of this machine's.
-    commanded: bool,
-    ticks_per_second: f64,
+impl From<ComparisonError> for Failure {
+    fn from(error: ComparisonError) -> Self {
+        match error {
+            ComparisonError::Remote(error) => error.into(),
+            ComparisonError::Refused(error) => error.into(),
+        }
+    }
 }
 
 impl From<RemoteError> for Failure {
@@ -99,7 +95,7 @@ impl From<RemoteError> for Failure {
     }
 }
 
-/// A refusal for the sake of safety, with what it means and what to do.
+/// The text of a refusal for safety, with its remedy.
 fn unsafe_to(error: &RemoteError) -> Option<String> {
     let RemoteError::Refused {
         request,
@@ -128,14 +124,14 @@ impl From<QemuError> for Failure {
     }
 }
 
-/// A number for a session: they have to differ, no more than that.
+/// A session number; it only has to differ from that of the previous session.
 fn session_number() -> u32 {
     std::time::SystemTime::now()
         .duration_since(std::time::UNIX_EPOCH)
         .map_or(1, |now| now.subsec_nanos() ^ std::process::id().rotate_left(16))
 }
 
-/// Opens a session with the board behind this serial port.
+/// Opens a session with the board at this serial port.
 pub(super) fn open_port(name: &str) -> Result<Session> {
     let stream = port::open(name).map_err(|error| {
         let why = match error {
@@ -150,9 +146,9 @@ pub(super) fn open_port(name: &str) -> Result<Session> {
     Ok(Session::open(stream, session_number())?)
 }
 
-/// Opens the line, and keeps QEMU alive with it.
+/// Opens a session. QEMU runs as long as the returned handle lives.
 fn connect(arguments: &Arguments) -> Result<(Option<Qemu>, Session)> {
-    if let Some(name) = &arguments.place.port {
+    if let Some(name) = &arguments.target.port {
         return Ok((None, open_port(name)?));
     }
     let image = match &arguments.firmware {
@@ -174,29 +170,29 @@ fn connect(arguments: &Arguments) -> Result<(Option<Qemu>, Session)> {
     Ok((Some(qemu), Session::open(stream, session_number())?))
 }
 
-/// Where the axes are declared to stand: where they were said to, or in QEMU, which has none, where the job begins.
-fn declared(arguments: &Arguments, prepared: &Prepared) -> Option<PlaceNm> {
-    let simulated = arguments.place.qemu.then(|| home::of(prepared));
+/// Position to declare: that of `--home`; in QEMU, which has no axes, by default the start of the job.
+fn declared(arguments: &Arguments, prepared: &Prepared) -> Option<PositionNm> {
+    let simulated = arguments.target.qemu.then(|| home::of(prepared));
     arguments.home.or(simulated)
 }
 
-/// Configures the board, switches its drives on, and declares home where that is known here.
+/// Configures the board, switches its drives on, and declares home if the position is known.
 fn make_ready(arguments: &Arguments, job: &Job, prepared: &Prepared, session: &mut Session) -> Result<()> {
     let setup = Setup {
         configuration: prepare::configuration(&job.machine),
-        home_nm: declared(arguments, prepared).map(|place| place.0),
+        home_nm: declared(arguments, prepared).map(|position| position.0),
     };
     Ok(operate::make_ready(session, &setup)?)
 }
 
-/// The board's timer has to tick as the job wants it.
+/// Checks that the period of the board equals that of the job.
 fn check_period(job: &Job, session: &Session) -> Result<()> {
     let period_us = session.capabilities().description.period_us;
     if f64::from(period_us) == job.machine.period_us {
         return Ok(());
     }
     let what = format!(
-        "the job wants a period of {} us, the board's is {period_us} us",
+        "the job requires a period of {} us, the period of the board is {period_us} us",
         job.machine.period_us
     );
     Err(job
@@ -204,192 +200,54 @@ fn check_period(job: &Job, session: &Session) -> Result<()> {
         .error(
             "machine.period_us",
             what,
-            "say period_us as the board has it, or build the firmware for the other",
+            "set period_us to that of the board, or build the firmware for another period",
         )
         .into())
 }
 
 /// Runs and compares the digest of each pass; where one differs in QEMU, finds the first sample that does.
-fn by_digest(
-    arguments: &Arguments,
-    job: &Job,
-    prepared: &Prepared,
-    here: &TimedRun,
-    session: &mut Session,
-) -> Result<Ran> {
-    let expected: Vec<_> = here
-        .passes
-        .iter()
-        .map(|pass| drive::Expected {
-            first_tick: pass.first_tick,
-            samples: pass.samples,
-            digest: pass.digest,
-        })
-        .collect();
-    let bar = progress(here.samples, "running");
-    let start = Instant::now();
-    let mut typist = typist(arguments, &bar);
-    let operator = typist.as_mut().map(|typist| typist as &mut dyn Operator);
-    let compared = drive::run_digests(session, &expected, arguments.place.qemu, operator, |samples| {
+fn by_digest(arguments: &Arguments, reference: &Reference<'_>, session: &mut Session) -> Result<BoardRun> {
+    let bar = progress(reference.run.samples, "running");
+    let mut console = console(arguments, &bar);
+    let operator = console.as_mut().map(|console| console as &mut dyn Operator);
+    let run = comparison::by_digest(reference, session, arguments.target.qemu, operator, |samples| {
         bar.set_position(samples)
-    })?;
-    let seconds = start.elapsed().as_secs_f64();
-    bar.finish_and_clear();
-    let mut first_difference = None;
-    if let Some(pass) = compared.first_bad_pass {
-        let from = expected.get(pass as usize).map_or_else(
-            || expected.last().map_or(0, |last| last.first_tick + last.samples),
-            |pass| pass.first_tick,
-        );
-        first_difference = Some(from.into());
-        if arguments.place.qemu {
-            let count = expected.get(pass as usize).map_or(0, |pass| pass.samples) + 1;
-            let there = drive::samples_between(session, from, count)?;
-            let there = &there[..there.len().min(count as usize)];
-            let ours = samples_here(job, prepared, from, count)?;
-            first_difference = drive::first_difference(&ours, there)
-                .map(u64::from)
-                .or(first_difference);
-        }
-    } else if !compared.commanded && compared.status.digest != here.digest {
-        first_difference = Some(here.samples);
-    }
-    #[allow(clippy::cast_precision_loss, reason = "below 2^53")]
-    let ticks_per_second = compared.samples as f64 / seconds.max(1e-9);
-    Ok(Ran {
-        status: compared.status,
-        compared: compared.samples,
-        first_difference,
-        commanded: compared.commanded,
-        ticks_per_second,
-    })
-}
-
-/// Who can command the run: on a board, whoever types.
-fn typist(arguments: &Arguments, bar: &ProgressBar) -> Option<Typist> {
-    arguments.place.port.as_ref()?;
-    if !arguments.json {
-        bar.suspend(|| to_stderr(format_args!("type, and Enter: {WORDS}")));
-    }
-    Some(Typist::new(bar.clone()))
-}
-
-fn samples_here(job: &Job, prepared: &Prepared, from: u32, count: u32) -> Result<Vec<Sample>> {
-    let mut samples = Vec::new();
-    // A fault ends the samples, which is what is compared.
-    let mut machine = Machine::load(prepared).map_err(|fault| inspect::refused(job, fault))?;
-    let _fault = machine.run(|sample| {
-        if sample.tick >= from {
-            samples.push(*sample);
-        }
-        samples.len() < count as usize
     });
-    Ok(samples)
+    bar.finish_and_clear();
+    Ok(run?)
 }
 
-/// Runs with every sample on the line, writes them, and compares each.
-fn by_sample(
-    arguments: &Arguments,
-    job: &Job,
-    prepared: &Prepared,
-    here: &TimedRun,
-    session: &mut Session,
-) -> Result<Ran> {
-    let ours = samples_here(job, prepared, 0, u32::MAX)?;
-    let mut file = trace(arguments.trace.as_ref(), job)?;
+/// The operator's console of a run on a board; QEMU has none.
+fn console(arguments: &Arguments, bar: &ProgressBar) -> Option<Console> {
+    arguments.target.port.as_ref()?;
+    if !arguments.json {
+        bar.suspend(|| to_stderr(format_args!("type a command and Enter: {WORDS}")));
+    }
+    Some(Console::new(bar.clone()))
+}
+
+/// Runs with every sample on the line, writes the trace, and compares each sample.
+fn by_sample(arguments: &Arguments, reference: &Reference<'_>, session: &mut Session) -> Result<BoardRun> {
+    let mut file = trace(arguments.trace.as_ref(), reference.job)?;
     let mut written = Ok(());
-    let mut theirs = Vec::with_capacity(ours.len());
-    let mut digest = Digest::new();
-    let bar = progress(here.samples, "running");
-    let start = Instant::now();
-    let mut typist = typist(arguments, &bar);
-    let operator = typist.as_mut().map(|typist| typist as &mut dyn Operator);
-    let (status, commanded) = drive::run_samples(session, arguments.place.qemu, operator, |sample| {
-        digest.sample(sample);
+    let bar = progress(reference.run.samples, "running");
+    let mut console = console(arguments, &bar);
+    let operator = console.as_mut().map(|console| console as &mut dyn Operator);
+    let run = comparison::by_sample(reference, session, arguments.target.qemu, operator, |sample| {
         if let (Some(file), Ok(())) = (&mut file, &written) {
-            written = file.write(&inspect::plain(prepared, sample));
+            written = file.write(&inspect::plain(reference.prepared, sample));
         }
-        theirs.push(*sample);
         if sample.tick % 4096 == 0 {
             bar.set_position(sample.tick.into());
         }
-    })?;
-    let seconds = start.elapsed().as_secs_f64();
+    });
     bar.finish_and_clear();
+    let run = run?;
     let name = arguments.trace.clone().unwrap_or_default();
     written
         .and_then(|()| file.map_or(Ok(()), verify::trace::Trace::finish))
         .map_err(|error| cannot_write(&name, &error))?;
-    let difference = drive::first_difference(&ours, &theirs)
-        .filter(|_| !commanded)
-        .map(u64::from);
-    #[allow(clippy::cast_precision_loss, reason = "below 2^53")]
-    let ticks_per_second = theirs.len() as f64 / seconds.max(1e-9);
-    let wrong_digest = (status.digest != digest.value()).then_some(here.samples);
-    Ok(Ran {
-        status,
-        compared: theirs.len().min(ours.len()) as u64,
-        first_difference: difference.or(wrong_digest),
-        commanded,
-        ticks_per_second,
-    })
-}
-
-/// The inputs that stopped the run, or kept it from beginning, in a sentence.
-fn stopped_from_outside(status: &Status) -> Option<String> {
-    let fault = status.fault?;
-    let kind = fault.kind()?;
-    if !matches!(
-        kind,
-        FaultKind::EmergencyStop | FaultKind::LimitSwitch | FaultKind::DriveFault
-    ) {
-        return None;
-    }
-    let (what, remedy) = explain::fault(Fault::new(kind, fault.value));
-    let Status { tick, pass, .. } = status;
-    Some(format!(
-        "the board stopped the run at tick {tick}, pass {pass}: {what}\n  help: {remedy}"
-    ))
-}
-
-/// What is wrong with the board's run, if anything is.
-fn complaint(ran: &Ran, here: &TimedRun, job: &Job) -> Option<String> {
-    let status = &ran.status;
-    if let Some(stopped) = stopped_from_outside(status) {
-        return Some(stopped);
-    }
-    if status.deadline_misses > 0 {
-        return Some(format!(
-            "{} ticks of the sample timer were missed",
-            status.deadline_misses
-        ));
-    }
-    if let Some(tick) = ran.first_difference {
-        return Some(format!(
-            "the board differs from this machine, first at tick {tick}"
-        ));
-    }
-    if status.samples_lost > 0 {
-        return Some(format!("{} samples were lost on the line", status.samples_lost));
-    }
-    if ran.commanded {
-        let ends = matches!(status.state, State::Finished | State::Ready);
-        return (!ends).then(|| format!("the board ended {}", status.state.name()));
-    }
-    let expected = if here.fault.is_some() {
-        State::Faulted
-    } else {
-        State::Finished
-    };
-    let code = status.fault.map(|fault| fault.code);
-    if status.state != expected || code != here.fault.map(|at| at.fault.kind.code()) {
-        return Some(format!(
-            "the board ended {}, this machine {}",
-            status.state.name(),
-            expected.name()
-        ));
-    }
-    here.fault.as_ref().map(|fault| fault.sentence_of(job))
+    Ok(run)
 }
 
 pub(super) fn command(arguments: &Arguments) -> Result<()> {
@@ -417,17 +275,22 @@ pub(super) fn command(arguments: &Arguments) -> Result<()> {
     let bar = progress(prepared.words.len() as u64, "uploading");
     drive::upload(&mut session, &prepared, |words| bar.set_position(words as u64))?;
     bar.finish_and_clear();
-    let ran = if arguments.trace.is_some() {
-        by_sample(arguments, &job, &prepared, &here, &mut session)?
+    let reference = Reference {
+        job: &job,
+        prepared: &prepared,
+        run: &here,
+    };
+    let run = if arguments.trace.is_some() {
+        by_sample(arguments, &reference, &mut session)?
     } else {
-        by_digest(arguments, &job, &prepared, &here, &mut session)?
+        by_digest(arguments, &reference, &mut session)?
     };
     let directory = arguments.report.as_deref();
     let (findings, sketch) = surveyed(&job, &prepared, &here, None, directory.is_some())?;
-    let complaint = complaint(&ran, &here, &job);
+    let failure = run.failure(&here, &job);
     let mut remarks = remarks(&here, &findings);
-    if let Some(complaint) = complaint.as_ref().filter(|_| here.fault.is_none()) {
-        remarks.failures.insert(0, complaint.clone());
+    if let Some(failure) = failure.as_ref().filter(|_| here.fault.is_none()) {
+        remarks.failures.insert(0, failure.clone());
     }
     let page = report(&job, directory, sketch.as_ref(), &findings, &remarks)?;
     let outcome = Outcome {
@@ -436,53 +299,53 @@ pub(super) fn command(arguments: &Arguments) -> Result<()> {
         segments: prepared.patches(),
         bytes: prepared.bytes(),
         findings: &findings,
-        digest: ran.status.digest,
+        digest: run.status.digest,
         samples_per_second: here.samples_per_second,
         fault: here.fault,
     };
     let board = session.capabilities().description.board.as_str();
     if arguments.json {
-        say!("{}", json_of(&outcome, &ran, board));
+        say!("{}", json_of(&outcome, &run, board));
     } else {
         say!("{} on {board}", arguments.job.display());
         outcome.print(page.as_deref());
-        let (speed, missed) = (ran.ticks_per_second.round(), ran.status.deadline_misses);
-        say!("  board        {speed} ticks a second, {missed} missed");
-        if arguments.place.qemu && arguments.home.is_none() {
-            let place = home::of(&prepared).words();
-            say!("  home         declared at {place} mm: a simulated board has no axes");
+        let (speed, missed) = (run.ticks_per_second.round(), run.status.deadline_misses);
+        say!("  board        {speed} ticks per second, {missed} missed");
+        if arguments.target.qemu && arguments.home.is_none() {
+            let position = home::of(&prepared).words();
+            say!("  home         declared at {position} mm: a simulated board has no axes");
         }
-        if ran.status.safety.host_gone {
-            say!("  host         was gone during the run: see cargo sim explain host-gone");
+        if run.status.safety.host_gone {
+            say!("  host         heartbeat timeout during the run: see cargo sim explain host-gone");
         }
-        match (ran.commanded, ran.first_difference) {
-            (true, _) => say!("  compared     nothing: the run was commanded, or its feed is overridden"),
-            (false, None) => compared(&ran, "bit for bit the same"),
-            (false, Some(_)) => compared(&ran, "NOT the same"),
+        match (run.commanded, run.first_difference) {
+            (true, _) => say!("  compared     nothing: the run had operator commands or a feed override"),
+            (false, None) => compared(&run, "bit-identical"),
+            (false, Some(_)) => compared(&run, "NOT identical"),
         }
     }
-    complaint.map_or(Ok(()), |complaint| Err(Failure::Failed(Some(complaint))))
+    failure.map_or(Ok(()), |failure| Err(Failure::Failed(Some(failure))))
 }
 
-fn compared(ran: &Ran, verdict: &str) {
+fn compared(run: &BoardRun, verdict: &str) {
     say!(
-        "  compared     {} samples with this machine's: {verdict}",
-        ran.compared
+        "  compared     {} samples with the simulation: {verdict}",
+        run.compared
     );
 }
 
-/// The keys of `simulate`, and those of the board.
-fn json_of(outcome: &Outcome<'_>, ran: &Ran, board: &str) -> Value {
+/// The JSON keys of `simulate`, and those of the board.
+fn json_of(outcome: &Outcome<'_>, run: &BoardRun, board: &str) -> Value {
     let mut keys = outcome.json();
     let mut put = |key: &str, value| keys.insert(key.to_owned(), value);
-    let compared = if ran.commanded { 0 } else { ran.compared };
+    let compared = if run.commanded { 0 } else { run.compared };
     put("compared_samples", json!(compared));
-    put("first_difference", json!(ran.first_difference));
-    put("commanded", json!(ran.commanded));
-    put("deadline_misses", json!(ran.status.deadline_misses));
-    put("tick_cycles_max", json!(ran.status.tick_cycles_max));
-    put("ticks_per_second", json!(ran.ticks_per_second));
-    put("samples_lost", json!(ran.status.samples_lost));
+    put("first_difference", json!(run.first_difference));
+    put("commanded", json!(run.commanded));
+    put("deadline_misses", json!(run.status.deadline_misses));
+    put("tick_cycles_max", json!(run.status.tick_cycles_max));
+    put("ticks_per_second", json!(run.ticks_per_second));
+    put("samples_lost", json!(run.status.samples_lost));
     put("board", json!(board));
     Value::Object(keys)
 }

@@ -15,14 +15,14 @@ use machine::remote::operate::{Action, Operator};
 pub(super) const WORDS: &str = "hold, resume, stop, abort, override 50, status";
 
 /// The operator at the terminal: reads lines from standard input, prints the answers above the progress bar.
-pub(super) struct Typist {
+pub(super) struct Console {
     lines: Receiver<String>,
     /// Standard input has not ended.
     open: bool,
     bar: ProgressBar,
 }
 
-impl Typist {
+impl Console {
     /// Starts to read standard input in a thread.
     pub(super) fn new(bar: ProgressBar) -> Self {
         let (sender, lines) = channel();
@@ -46,7 +46,7 @@ impl Typist {
     }
 }
 
-impl Operator for Typist {
+impl Operator for Console {
     fn wish(&mut self) -> Option<Action> {
         let line = match self.lines.try_recv() {
             Ok(line) => line,
