@@ -1,12 +1,12 @@
-//! Reads a CAD file for `cargo sim import`, in a process of its own: `cad-reader FILE` writes `Result<Model, CadError>` as JSON to its
+//! Reads a CAD file for `cargo sim import`, in a separate process: `cad-reader FILE` writes `Result<Model, CadError>` as JSON to its
 //! standard output.
 //!
-//! Apart from `host-sim` because the library that knows the formats (`cadmpeg`) is twenty times as large as the rest of the tool together: it is built when
-//! the first CAD file is read, and a file that hangs a reader, or eats memory, does so here.
+//! Separate from `host-sim`, because the library of the formats (`cadmpeg`) is twenty times as large as the rest of the tool: it is built for the first CAD
+//! file, and a file that makes a reader hang or exhaust memory does so in this process.
 //!
 //! ```text
-//! main.rs ─► readers.rs   by the file's first bytes ─► step.rs, iges.rs, rhino.rs   what can be told before reading it all
-//!                                                       └─► ir.rs, ir_geometry.rs, ir_boundary.rs   cadmpeg's model -> host_sim::cad::Face
+//! main.rs ─► readers.rs   by the file's first bytes ─► step.rs, iges.rs, rhino.rs   checks before parsing
+//!                                                       └─► ir.rs, ir_geometry.rs, ir_boundary.rs   cadmpeg's model -> cad::Face
 //! ```
 
 mod iges;
@@ -23,7 +23,7 @@ use std::process::ExitCode;
 
 fn main() -> ExitCode {
     let Some(file) = std::env::args_os().nth(1) else {
-        eprintln!("usage: cad-reader FILE (`cargo sim import` is what you want)");
+        eprintln!("usage: cad-reader FILE (called by `cargo sim import`)");
         return ExitCode::from(2);
     };
     let read = readers::read(Path::new(&file));

@@ -1,5 +1,5 @@
-//! The reader of CAD files: a program of its own (`host-sim/cad-reader`), built when the first file is read, and stopped when it takes too
-//! long. So whatever is in a file, there is an answer in bounded time.
+//! The reader of CAD files: a separate program (`host-sim/cad-reader`), built for the first file and ended at a time limit, so that every
+//! file yields a model or an error in bounded time.
 
 use std::io::Read;
 use std::path::Path;
@@ -11,9 +11,9 @@ use serde::{Deserialize, Serialize};
 use super::{CadError, Face};
 use machine::remote::qemu::cargo;
 
-/// Largest file that is read, bytes: a file takes some 30 times its size in memory.
+/// Largest file, bytes; reading takes about 30 times the size of the file in memory.
 const BYTES_MAX: u64 = 64 << 20;
-/// Time that the reader may take: ten times what the largest sound file takes.
+/// Time limit of the reader: ten times the time of the largest valid file tested.
 const TIME_MAX: Duration = Duration::from_secs(120);
 /// Where the reader is built: like the firmware, in a folder of its own.
 const FOLDER: &str = "target/cad-reader";
@@ -22,19 +22,19 @@ const FOLDER: &str = "target/cad-reader";
 const PROFILE_VARIABLE: &str = "ISOFEED_CAD_PROFILE";
 const PROFILE: &str = "cad";
 
-/// What a file holds.
+/// Content of a CAD file.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Model {
-    /// Its faces, numbered from 1 in the order of the file.
+    /// The faces, numbered from 1 in the order of the file.
     pub faces: Vec<Face>,
-    /// What of it could not be read, for people.
+    /// Entities that could not be read, as sentences.
     pub warnings: Vec<String>,
 }
 
-/// Reads a CAD file: by its contents, whatever its name ends in. The first time, it builds the reader, which takes minutes, and says so.
+/// Reads a CAD file; the format is detected by its content. The first call builds the reader, which takes minutes, and says so.
 ///
 /// # Errors
-/// The file cannot be read, is none of the formats, is broken, or holds no faces; with its name and, where there is one, the line.
+/// The file cannot be read, has an unknown format, is invalid, or contains no faces; with its name and, if known, the line.
 pub fn read(path: &Path) -> Result<Model, CadError> {
     let file = path.display().to_string();
     check(&file, path)?;
@@ -64,7 +64,7 @@ pub fn read(path: &Path) -> Result<Model, CadError> {
     run(&file, path, &reader)
 }
 
-/// What need not be read to be told.
+/// Checks that need no parsing.
 fn check(file: &str, path: &Path) -> Result<(), CadError> {
     let unreadable = |cause: String| {
         CadError::new(
@@ -73,26 +73,26 @@ fn check(file: &str, path: &Path) -> Result<(), CadError> {
             "give the path of a STEP, IGES or 3DM file; samples are in jobs/cad/",
         )
     };
-    let told = std::fs::File::open(path)
+    let metadata = std::fs::File::open(path)
         .and_then(|file| file.metadata())
         .map_err(|cause| unreadable(cause.to_string()))?;
-    if !told.is_file() {
-        return Err(unreadable("it is no file".to_owned()));
+    if !metadata.is_file() {
+        return Err(unreadable("it is not a regular file".to_owned()));
     }
-    if told.len() > BYTES_MAX {
+    if metadata.len() > BYTES_MAX {
         return Err(CadError::new(
             file,
             format!("the file is larger than {} MB", BYTES_MAX >> 20),
             "export the part alone, without the rest of its assembly",
         ));
     }
-    if told.len() == 0 {
+    if metadata.len() == 0 {
         return Err(CadError::new(file, "the file is empty", "export the part again"));
     }
     Ok(())
 }
 
-/// Runs the reader, for so long at most.
+/// Runs the reader with a time limit.
 fn run(file: &str, path: &Path, reader: &Path) -> Result<Model, CadError> {
     let broken = |what: String| {
         CadError::new(
@@ -112,7 +112,7 @@ fn run(file: &str, path: &Path, reader: &Path) -> Result<Model, CadError> {
     let mut output = child
         .stdout
         .take()
-        .ok_or_else(|| broken("the reader says nothing".to_owned()))?;
+        .ok_or_else(|| broken("the reader has no output".to_owned()))?;
     let listener = std::thread::spawn(move || {
         let mut text = Vec::new();
         output.read_to_end(&mut text).map(|_| text)

@@ -401,19 +401,19 @@ fn circles_alone_bound_belts_and_caps() {
         edge(&cylinder, [0.0, 3.0], [PI, 3.0]),
         edge(&cylinder, [PI, 3.0], [TAU, 3.0]),
     ];
-    let endless = outline(&face(cylinder, vec![ring], 1.0)).unwrap_err();
-    assert!(endless.contains("endless"), "{endless}");
+    let unbounded = outline(&face(cylinder, vec![ring], 1.0)).unwrap_err();
+    assert!(unbounded.contains("unbounded"), "{unbounded}");
 }
 
 /// Hollows of a torus and a sphere, both sides, by their closed forms.
 #[test]
-fn hollows_are_measured() {
+fn concave_radii_are_measured() {
     for (surface, rectangle) in kinds() {
         let want = match surface.kind() {
-            // S_u x S_v points outwards; seen from inside, the cylinder, the sphere and the tube are hollow.
+            // S_u x S_v points outwards; the inside of the cylinder, the sphere and the tube is concave.
             "cylinder" => Some([None, Some(9.0)]),
             "sphere" => Some([None, Some(12.0)]),
-            // From outside the torus is hollow round its hole, tightest on its inner equator.
+            // The outside of the torus is concave around its hole, with the least radius on the inner equator.
             "torus" => Some([Some(14.0), Some(6.0)]),
             "plane" => Some([None, None]),
             _ => None,
