@@ -91,7 +91,7 @@ fn spans_are_bounded_and_lose_no_peak() {
     }
 }
 
-/// A run of passes of so many samples each, the tool centre where `place` says (nm, by the pass's tick).
+/// A run of passes with these numbers of samples; `place` gives the CL, nm, by the tick in the pass.
 fn series_of(passes: u32, samples: u32, place: impl Fn(u32) -> [f64; 3]) -> Value {
     let mut series = Series::new(0.001, passes / 2);
     let mut tick = 0;

@@ -12,7 +12,7 @@ use job::Job;
 use verify::speeds::Span;
 use verify::survey::Findings;
 
-/// A fault with its place, as JSON.
+/// A fault with its position, as JSON.
 fn fault_json(at: &FaultAt) -> Value {
     let (message, remedy) = explain::fault(at.fault);
     let [u, v] = at.parameters;

@@ -1,4 +1,4 @@
-//! The program that talks to probes: built when it is first wanted, run, listened to.
+//! The debug-probe program: built on first use, run with a request, its events read.
 
 use std::fs::File;
 use std::io::{BufRead, BufReader};
@@ -22,14 +22,14 @@ const BUILD: [&str; 9] = [
 ];
 const BUILT: &str = "target/debug-probe/plain/debug-probe";
 
-/// Why nothing came of a request.
+/// Failure of a request.
 #[derive(Debug, thiserror::Error)]
 pub enum NotRun {
-    /// The program says why.
+    /// The program reported a problem.
     #[error("{}", super::sentence(.0))]
     Problem(Problem),
-    /// The program cannot be built, or run: a checkout without its toolchain, or an error of ours.
-    #[error("the program that talks to debug probes {0}")]
+    /// The program cannot be built or run, or its output is invalid.
+    #[error("the debug-probe program {0}")]
     Program(String),
 }
 
@@ -54,16 +54,16 @@ impl Program {
             .map_err(|words| NotRun::Program(format!("cannot be built: {words}")))
     }
 
-    /// Another program in its place, for tests of what is made of its answers.
+    /// Another program instead, for tests of the handling of its output.
     #[must_use]
     pub fn at(path: &Path) -> Self {
         Self(path.to_owned())
     }
 
-    /// Runs a request to its end, and hands over each event on the way. `recorded` is what a recorded log is read from.
+    /// Runs a request to its end and passes on each event. `recorded`: the file of a recorded log.
     ///
     /// # Errors
-    /// The program does not run, names a problem, or ends before it is done.
+    /// The program does not run, reports a problem, or ends early.
     pub fn run(
         &self,
         request: &Request,
@@ -90,13 +90,11 @@ impl Program {
                 Ok(Event::Done) => return Ok(()),
                 Ok(event) => on_event(&event),
                 Err(error) => {
-                    return Err(NotRun::Program(format!(
-                        "says what it should not ({error}): {line}"
-                    )));
+                    return Err(NotRun::Program(format!("wrote invalid output ({error}): {line}")));
                 }
             }
         }
-        // It ended without a word: a panic of a library, say.
+        // The program ended without an event, for example by a panic.
         let mut words = String::new();
         if let Some(mut stderr) = child.0.stderr.take() {
             let _ = std::io::Read::read_to_string(&mut stderr, &mut words);
@@ -108,12 +106,12 @@ impl Program {
     }
 }
 
-/// A program that does not outlive our interest in it.
+/// A child process that is ended on drop.
 struct Ended(Child);
 
 impl Drop for Ended {
     fn drop(&mut self) {
-        // Either it is gone already, or it goes now.
+        // Errors are ignored: the process may have ended already.
         let _ = self.0.kill();
         let _ = self.0.wait();
     }
