@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 
 use cad::{
-    Axis, Face, Form, JobOptions, Machinable, Model, Options, SplineSurface, Surface, machinable, read,
+    Axis, Face, Form, JobOptions, MachinableFace, Model, Options, SplineSurface, Surface, machinable, read,
     write_job,
 };
 use inspect::BOUNDS;
@@ -119,7 +119,7 @@ fn compared(surface: &Surface, sense: f64, points: &[Reference]) -> (f64, f64) {
 }
 
 /// The face, trimmed or not; at a coarser tolerance where a fit at the default one takes more patches than the board has.
-fn taken(name: &str, face: &Face) -> Machinable {
+fn taken(name: &str, face: &Face) -> MachinableFace {
     machinable(name, face, &whole()).unwrap_or_else(|error| {
         assert!(error.what.contains("more than the board holds"), "{error}");
         let coarser = Options {
@@ -130,7 +130,7 @@ fn taken(name: &str, face: &Face) -> Machinable {
     })
 }
 
-fn made(name: &str, model: &Model) -> Vec<Machinable> {
+fn made(name: &str, model: &Model) -> Vec<MachinableFace> {
     model.faces.iter().map(|face| taken(name, face)).collect()
 }
 
@@ -428,7 +428,8 @@ fn trimmed_faces_are_said() {
 #[test]
 fn sample_jobs_out_of_files() {
     for (name, patches) in [("blade", 12), ("hood", 247)] {
-        let job = job_file::load_with(&workspace().join(format!("jobs/cad/{name}.toml")), &cad::Faces).unwrap();
+        let job =
+            job_file::load_with(&workspace().join(format!("jobs/cad/{name}.toml")), &cad::Faces).unwrap();
         assert_eq!(prepare(&job).unwrap().patches(), patches, "{name}");
         let (position_nm, ripple_pct, samples, fault) = worst_nm(&job, u64::MAX);
         println!("{name}: {position_nm:.2} nm, ripple {ripple_pct:.6} %, {samples} samples");

@@ -3,7 +3,7 @@
 use std::fmt::Write;
 
 use super::machinable::outside;
-use super::{Face, Form, Machinable, Measures, measure};
+use super::{Face, Form, MachinableFace, Measures, measure};
 use job::NurbsSpec;
 
 /// Standard radii of ball-end mills for the automatic choice, mm.
@@ -39,7 +39,7 @@ pub struct JobOptions {
 
 /// A job file and the chosen options.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Written {
+pub struct JobText {
     /// The file's text.
     pub text: String,
     /// Ball radius, mm.
@@ -79,7 +79,7 @@ fn ball(concave_mm: Option<f64>, size_mm: f64) -> f64 {
 
 /// Writes a job for a face. `source` says where it came from, for the comment.
 #[must_use]
-pub fn write_job(source: &str, face: &Face, surface: &Machinable, options: &JobOptions) -> Written {
+pub fn write_job(source: &str, face: &Face, surface: &MachinableFace, options: &JobOptions) -> JobText {
     let measures = measure(&surface.spec());
     let (chosen, sign) = side(face, &measures);
     let side = options.side.clone().unwrap_or_else(|| chosen.to_owned());
@@ -112,7 +112,7 @@ pub fn write_job(source: &str, face: &Face, surface: &Machinable, options: &JobO
     let text = text(
         source, face, surface, options, &measures, &warnings, radius_mm, &side,
     );
-    Written {
+    JobText {
         text,
         radius_mm,
         side,
@@ -125,7 +125,7 @@ pub fn write_job(source: &str, face: &Face, surface: &Machinable, options: &JobO
 fn text(
     source: &str,
     face: &Face,
-    surface: &Machinable,
+    surface: &MachinableFace,
     options: &JobOptions,
     measures: &Measures,
     warnings: &[String],

@@ -44,7 +44,7 @@ pub enum Form {
 
 /// A face converted for a job.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Machinable {
+pub struct MachinableFace {
     /// The surface.
     pub nurbs: NurbsSpec,
     /// Exact or not.
@@ -55,7 +55,7 @@ pub struct Machinable {
     pub patches: usize,
 }
 
-impl Machinable {
+impl MachinableFace {
     /// The surface of a job.
     #[must_use]
     pub fn spec(&self) -> SurfaceSpec {
@@ -98,7 +98,7 @@ fn patches(nurbs: &NurbsSpec) -> Result<usize, String> {
 /// # Errors
 /// The face is trimmed and `untrimmed` is not set; it is unbounded; no fit within the tolerance is small enough for the
 /// board; the tolerance is out of range.
-pub fn machinable(file: &str, face: &Face, options: &Options) -> Result<Machinable, CadError> {
+pub fn machinable(file: &str, face: &Face, options: &Options) -> Result<MachinableFace, CadError> {
     let name = format!("face {} ({}, {})", face.number, face.entity, face.surface.kind());
     if !(options.tolerance_mm > 0.0 && options.tolerance_mm <= TOLERANCE_MAX_MM) {
         let what = format!(
@@ -129,7 +129,7 @@ pub fn machinable(file: &str, face: &Face, options: &Options) -> Result<Machinab
             let nurbs = nurbs(&spline);
             match patches(&nurbs) {
                 Ok(patches) => {
-                    return Ok(Machinable {
+                    return Ok(MachinableFace {
                         nurbs,
                         form: Form::Exact,
                         outline,
@@ -152,7 +152,7 @@ fn fitted(
     outline: Outline,
     why: String,
     name: &str,
-) -> Result<Machinable, CadError> {
+) -> Result<MachinableFace, CadError> {
     let too_fine = |what: String| {
         CadError::face(
             file,
@@ -179,7 +179,7 @@ fn fitted(
     let patches = patches(&nurbs)
         .map_err(|still| too_fine(format!("of a fit within {} mm {still}", options.tolerance_mm)))?;
     let deviation = deviation(&face.surface, &spline);
-    Ok(Machinable {
+    Ok(MachinableFace {
         nurbs,
         form: Form::Fitted { why, deviation },
         outline,

@@ -2,7 +2,7 @@
 
 use std::fmt::Write;
 
-use super::picture::Words;
+use super::picture::PictureTexts;
 use super::scene::Ball;
 use super::svg::{escape, tenths};
 use super::view::View;
@@ -16,7 +16,7 @@ const ARM: f64 = 34.0;
 const NAME_AWAY: f64 = 15.0;
 
 /// The document's head, the card, the title.
-pub(super) fn open(out: &mut String, [width, height]: [f64; 2], words: &Words) {
+pub(super) fn open(out: &mut String, [width, height]: [f64; 2], words: &PictureTexts) {
     let (w, h) = (tenths(width), tenths(height));
     let _ = writeln!(
         out,
@@ -175,7 +175,7 @@ pub(super) fn round_below(value: f64) -> f64 {
 }
 
 /// The legend.
-pub(super) fn key(out: &mut String, words: &Words, has_tool: bool, [x, y]: [f64; 2]) {
+pub(super) fn key(out: &mut String, words: &PictureTexts, has_tool: bool, [x, y]: [f64; 2]) {
     let mut entries = vec![
         ("iso-pass iso-key-pass", words.passes.as_str()),
         ("iso-one iso-key-one", "highlighted pass"),

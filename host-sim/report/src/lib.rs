@@ -53,7 +53,7 @@ use job::Job;
 use oracle::{Checked, Emitted, Oracle};
 use verify::survey::Findings;
 
-pub use scallops::{RidgePlace, Scallops};
+pub use scallops::{RidgePoint, Scallops};
 
 /// A figure in the summary of the page.
 #[derive(Clone, Debug, PartialEq)]

@@ -7,7 +7,7 @@ use super::Remarks;
 use super::mesh::Mesh;
 use super::number::{duration, fixed, grouped, significant};
 use super::payload::payload;
-use super::picture::{Picture, Words};
+use super::picture::{Picture, PictureTexts};
 use super::record::Record;
 use super::series::Series;
 use super::svg::escape;
@@ -52,12 +52,12 @@ pub(super) struct Content<'a> {
     pub(super) series: &'a Series,
     pub(super) findings: &'a Findings,
     pub(super) remarks: &'a Remarks,
-    pub(super) words: &'a Words,
+    pub(super) words: &'a PictureTexts,
     pub(super) picture: &'a Picture,
 }
 
 /// Texts of picture and page about the job.
-pub(super) fn words(job: &Job, record: &Record, job_name: &Path, findings: &Findings) -> Words {
+pub(super) fn words(job: &Job, record: &Record, job_name: &Path, findings: &Findings) -> PictureTexts {
     let title = job_name
         .file_stem()
         .map_or_else(|| "job".to_owned(), |name| name.to_string_lossy().into_owned());
@@ -80,7 +80,7 @@ pub(super) fn words(job: &Job, record: &Record, job_name: &Path, findings: &Find
     } else {
         format!("{drawn} of ")
     };
-    Words {
+    PictureTexts {
         subtitle,
         passes: format!("cutter contact, {drawn_of}{passes} {plural}"),
         ball: format!("ball, radius {} mm, to scale", job.radius_mm),

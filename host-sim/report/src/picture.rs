@@ -37,7 +37,7 @@ const COMB: usize = 36;
 
 /// Texts of the picture.
 #[derive(Clone, Debug)]
-pub(super) struct Words {
+pub(super) struct PictureTexts {
     pub(super) title: String,
     pub(super) subtitle: String,
     /// Legend of the thin lines: "cutter contact, 55 of 164 passes".
@@ -56,7 +56,7 @@ pub(super) struct Picture {
 }
 
 /// The whole picture.
-pub(super) fn picture(mesh: &Mesh, record: &Record, radius_mm: f64, words: &Words) -> Picture {
+pub(super) fn picture(mesh: &Mesh, record: &Record, radius_mm: f64, words: &PictureTexts) -> Picture {
     let scene = Scene::new(mesh, record, radius_mm, FRAME);
     let mut out = String::new();
     furniture::open(&mut out, SIZE, words);

@@ -15,7 +15,7 @@ const MM_PER_NM: f64 = 1e-6;
 /// A decimated stream: every `stride`-th item is stored, and the stride doubles when the capacity is reached. The last
 /// item is always stored.
 #[derive(Clone, Debug)]
-pub(super) struct Thinned<T> {
+pub(super) struct DecimatedStream<T> {
     most: usize,
     stride: u64,
     seen: u64,
@@ -23,7 +23,7 @@ pub(super) struct Thinned<T> {
     last: Option<T>,
 }
 
-impl<T: Copy> Thinned<T> {
+impl<T: Copy> DecimatedStream<T> {
     pub(super) fn new(most: usize) -> Self {
         Self {
             most,
@@ -74,9 +74,9 @@ pub(super) struct Place {
 
 /// A pass that is drawn.
 #[derive(Clone, Debug)]
-pub(super) struct Drawn {
+pub(super) struct DrawnPass {
     pub(super) pass: u32,
-    pub(super) places: Thinned<Place>,
+    pub(super) places: DecimatedStream<Place>,
 }
 
 /// Side parameter of a pass and its least interval.
@@ -101,8 +101,8 @@ pub(super) struct Record {
     final_pass: u32,
     /// Index of the highlighted pass.
     pub(super) middle_pass: u32,
-    pub(super) drawn: Vec<Drawn>,
-    pub(super) intervals: Thinned<PassInterval>,
+    pub(super) drawn: Vec<DrawnPass>,
+    pub(super) intervals: DecimatedStream<PassInterval>,
     current: Option<PassInterval>,
     is_drawn: bool,
 }
@@ -121,7 +121,7 @@ impl Record {
             final_pass: passes - 1,
             middle_pass: passes / 2 / stride * stride,
             drawn: Vec::new(),
-            intervals: Thinned::new(INTERVALS_MAX),
+            intervals: DecimatedStream::new(INTERVALS_MAX),
             current: None,
             is_drawn: false,
         }
@@ -167,9 +167,9 @@ impl Record {
         self.is_drawn = (sample.pass.is_multiple_of(self.stride) && sample.pass <= self.final_pass)
             || sample.pass == self.final_pass;
         if self.is_drawn {
-            self.drawn.push(Drawn {
+            self.drawn.push(DrawnPass {
                 pass: sample.pass,
-                places: Thinned::new(POINTS_MAX),
+                places: DecimatedStream::new(POINTS_MAX),
             });
         }
     }

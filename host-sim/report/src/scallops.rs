@@ -12,7 +12,7 @@ const LIMITS_MAX: f64 = 4.0;
 
 /// A point on the ridge between two passes.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct RidgePlace {
+pub struct RidgePoint {
     /// Parameter u of the surface under it.
     pub u: f64,
     /// Parameter v of the surface under it.
@@ -29,7 +29,7 @@ pub struct Scallops {
     /// Measuring error, mm.
     pub measuring_error_mm: f64,
     /// One ridge per gap between adjacent passes: index of the gap (that of the pass before it), and points along it.
-    pub ridges: Vec<(u32, Vec<RidgePlace>)>,
+    pub ridges: Vec<(u32, Vec<RidgePoint>)>,
 }
 
 impl Scallops {
@@ -49,7 +49,7 @@ impl Scallops {
         }
         // From 0, so that the colours of two reports are comparable.
         let scale = Scale::of(heights.iter().copied().chain([0.0]));
-        let finite = |places: &'_ [RidgePlace]| -> Vec<f64> {
+        let finite = |places: &'_ [RidgePoint]| -> Vec<f64> {
             let heights = places.iter().map(|place| f64::from(place.height_mm));
             heights.filter(|height| height.is_finite()).collect()
         };
@@ -111,7 +111,7 @@ impl Scallops {
 
     /// Reach of a ridge point in cells: the largest gap between points on adjacent ridges or along one ridge.
     fn reach(&self, cells: [usize; 2], domain: [[f64; 2]; 2], along: Along) -> usize {
-        let of = |place: &RidgePlace, k: usize| if k == 0 { place.u } else { place.v };
+        let of = |place: &RidgePoint, k: usize| if k == 0 { place.u } else { place.v };
         let in_cells = |apart: f64, k: usize| (apart / (domain[k][1] - domain[k][0])).abs() * cells[k] as f64;
         let (path, side) = match along {
             Along::U => (0, 1),

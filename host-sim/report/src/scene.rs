@@ -1,7 +1,7 @@
 //! Visibility: the position of the ball, and the visible parts of lines.
 
 use super::mesh::{FINE, Mesh, Quad};
-use super::record::{Drawn, Place, Record};
+use super::record::{DrawnPass, Place, Record};
 use super::vector::{Vector, add_scaled, dot, subtract};
 use super::view::{Camera, Depth, Frame, View};
 
@@ -214,7 +214,7 @@ impl<'a> Scene<'a> {
 }
 
 /// The middle pass, or the pass nearest to the middle if the run ended before it.
-pub(super) fn highlighted(record: &Record) -> Option<&Drawn> {
+pub(super) fn highlighted(record: &Record) -> Option<&DrawnPass> {
     let middle = record.drawn.iter().find(|drawn| drawn.pass == record.middle_pass);
     middle.or_else(|| record.drawn.get(record.drawn.len() / 2))
 }

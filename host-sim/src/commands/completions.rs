@@ -15,7 +15,7 @@ const NAME: &str = "cargo_sim";
 
 /// Supported shells.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
-enum Hooked {
+enum SupportedShell {
     Bash,
     Zsh,
     Fish,
@@ -31,14 +31,14 @@ enum Hooked {
 pub(super) struct Arguments {
     /// The shell.
     #[arg(value_enum)]
-    shell: Hooked,
+    shell: SupportedShell,
 }
 
 pub(super) fn command(arguments: &Arguments) -> Result<()> {
     let (shell, hook) = match arguments.shell {
-        Hooked::Bash => (Shell::Bash, include_str!("completions/hook.bash")),
-        Hooked::Zsh => (Shell::Zsh, include_str!("completions/hook.zsh")),
-        Hooked::Fish => (Shell::Fish, include_str!("completions/hook.fish")),
+        SupportedShell::Bash => (Shell::Bash, include_str!("completions/hook.bash")),
+        SupportedShell::Zsh => (Shell::Zsh, include_str!("completions/hook.zsh")),
+        SupportedShell::Fish => (Shell::Fish, include_str!("completions/hook.fish")),
     };
     let mut script = Vec::new();
     let mut command = Cli::command().name(NAME).bin_name(NAME);

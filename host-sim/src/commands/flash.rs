@@ -10,7 +10,7 @@ use serde_json::json;
 
 use super::out::{complain, say};
 use super::{Failure, Result, progress, spinner};
-use crate::probe::{self, Event, Image, NotRun, Problem, Program, Request, Target, Work};
+use crate::probe::{self, Event, Image, ProbeError, Problem, Program, Request, Target, Work};
 use machine::remote::qemu::cargo;
 
 /// Writes the firmware into a board's flash by a debug probe, compares what was written, and starts it.
@@ -56,22 +56,22 @@ fn board_parser() -> clap::builder::PossibleValuesParser {
         .into()
 }
 
-impl From<NotRun> for Failure {
-    fn from(error: NotRun) -> Self {
+impl From<ProbeError> for Failure {
+    fn from(error: ProbeError) -> Self {
         match error {
             // Errors in command-line arguments.
-            NotRun::Problem(
+            ProbeError::Problem(
                 problem @ (Problem::BadSelector(_)
                 | Problem::UnknownChip(_)
                 | Problem::BadImage(_)
                 | Problem::SeveralProbes(_)),
             ) => Self::input(probe::sentence(&problem), probe::remedy(&problem)),
-            NotRun::Problem(problem) => Self::Failed(Some(format!(
+            ProbeError::Problem(problem) => Self::Failed(Some(format!(
                 "{}\n  help: {}",
                 probe::sentence(&problem),
                 probe::remedy(&problem)
             ))),
-            error @ NotRun::Program(_) => Self::Failed(Some(format!(
+            error @ ProbeError::Program(_) => Self::Failed(Some(format!(
                 "{error}\n  help: run it in a checkout of the project, with its toolchain (./demo sets it up)"
             ))),
         }

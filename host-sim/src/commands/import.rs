@@ -11,7 +11,7 @@ use serde_json::{Value, json};
 
 use super::{Failure, Result, cannot_write, progress};
 use cad::{
-    CadError, Face, Form, JobOptions, Machinable, Measures, Model, Options, Written, degrees, machinable,
+    CadError, Face, Form, JobOptions, JobText, MachinableFace, Measures, Model, Options, degrees, machinable,
     measure, read, write_job,
 };
 use job_file::TOLERANCE_DEFAULT_MM;
@@ -79,7 +79,7 @@ impl From<CadError> for Failure {
 struct Row<'f> {
     face: &'f Face,
     trimmed: Option<String>,
-    becomes: std::result::Result<(Machinable, Measures), CadError>,
+    becomes: std::result::Result<(MachinableFace, Measures), CadError>,
 }
 
 /// Measures all faces on all cores; rows in the order of the faces.
@@ -261,7 +261,7 @@ fn write(path: &Path, text: &str, force: bool) -> Result<()> {
     std::fs::write(path, text).map_err(|error| cannot_write(path, &error))
 }
 
-fn report(arguments: &Arguments, path: &Path, face: &Face, made: &Machinable, written: &Written) {
+fn report(arguments: &Arguments, path: &Path, face: &Face, made: &MachinableFace, written: &JobText) {
     let size = written.measures.size_mm();
     if arguments.json {
         let value = json!({

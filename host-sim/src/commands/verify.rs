@@ -7,7 +7,7 @@ use inspect::{BOUNDS, Measured, Verification, verified};
 use job::{Job, Spacing};
 use machine::prepare::Prepared;
 use oracle::{Checked, Emitted, Figure};
-use report::{Remarks, RidgePlace, Scallops, Sketch};
+use report::{Remarks, RidgePoint, Scallops, Sketch};
 use serde_json::Value;
 use verify::survey::{Each, Findings};
 use verify::swept;
@@ -79,7 +79,7 @@ fn print(findings: &Findings, scanned: Option<usize>, first_order: bool) {
 
 /// The measured heights as the report shows them.
 fn scallops(job: &Job, swept: &swept::Findings) -> Scallops {
-    let place = |spot: &swept::RidgeSpot| RidgePlace {
+    let place = |spot: &swept::RidgeSpot| RidgePoint {
         u: spot.u,
         v: spot.v,
         height_mm: spot.height_mm,

@@ -19,5 +19,5 @@ mod words;
 
 pub use event::{Event, Line, Problem, Request, Target, Work};
 pub use image::Image;
-pub use program::{NotRun, Program};
+pub use program::{ProbeError, Program};
 pub use words::{remedy, sentence};

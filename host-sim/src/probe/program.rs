@@ -24,7 +24,7 @@ const BUILT: &str = "target/debug-probe/plain/debug-probe";
 
 /// Failure of a request.
 #[derive(Debug, thiserror::Error)]
-pub enum NotRun {
+pub enum ProbeError {
     /// The program reported a problem.
     #[error("{}", super::sentence(.0))]
     Problem(Problem),
@@ -48,10 +48,10 @@ impl Program {
     ///
     /// # Errors
     /// Cargo is missing or fails; its own words are passed on.
-    pub fn build() -> Result<Self, NotRun> {
+    pub fn build() -> Result<Self, ProbeError> {
         cargo(&BUILD, BUILT)
             .map(Self)
-            .map_err(|words| NotRun::Program(format!("cannot be built: {words}")))
+            .map_err(|words| ProbeError::Program(format!("cannot be built: {words}")))
     }
 
     /// Another program instead, for tests of the handling of its output.
@@ -69,8 +69,8 @@ impl Program {
         request: &Request,
         recorded: Option<File>,
         mut on_event: impl FnMut(&Event),
-    ) -> Result<(), NotRun> {
-        let failed = |error: &dyn std::fmt::Display| NotRun::Program(format!("does not run: {error}"));
+    ) -> Result<(), ProbeError> {
+        let failed = |error: &dyn std::fmt::Display| ProbeError::Program(format!("does not run: {error}"));
         let request = serde_json::to_string(request).map_err(|error| failed(&error))?;
         let child = Command::new(&self.0)
             .arg(request)
@@ -79,18 +79,20 @@ impl Program {
             .stderr(Stdio::piped())
             .spawn()
             .map_err(|error| failed(&error))?;
-        let mut child = Ended(child);
+        let mut child = ChildGuard(child);
         let Some(output) = child.0.stdout.take() else {
             return Err(failed(&"it has no output"));
         };
         for line in BufReader::new(output).lines() {
             let line = line.map_err(|error| failed(&error))?;
             match serde_json::from_str(&line) {
-                Ok(Event::Failed(problem)) => return Err(NotRun::Problem(problem)),
+                Ok(Event::Failed(problem)) => return Err(ProbeError::Problem(problem)),
                 Ok(Event::Done) => return Ok(()),
                 Ok(event) => on_event(&event),
                 Err(error) => {
-                    return Err(NotRun::Program(format!("wrote invalid output ({error}): {line}")));
+                    return Err(ProbeError::Program(format!(
+                        "wrote invalid output ({error}): {line}"
+                    )));
                 }
             }
         }
@@ -99,7 +101,7 @@ impl Program {
         if let Some(mut stderr) = child.0.stderr.take() {
             let _ = std::io::Read::read_to_string(&mut stderr, &mut words);
         }
-        Err(NotRun::Program(format!(
+        Err(ProbeError::Program(format!(
             "ended before it was done: {}",
             words.trim()
         )))
@@ -107,9 +109,9 @@ impl Program {
 }
 
 /// A child process that is ended on drop.
-struct Ended(Child);
+struct ChildGuard(Child);
 
-impl Drop for Ended {
+impl Drop for ChildGuard {
     fn drop(&mut self) {
         // Errors are ignored: the process may have ended already.
         let _ = self.0.kill();

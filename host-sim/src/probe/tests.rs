@@ -3,7 +3,7 @@
 use std::os::unix::fs::PermissionsExt;
 use std::path::Path;
 
-use super::{Event, Image, NotRun, Problem, Program, Request, Work, remedy, sentence};
+use super::{Event, Image, ProbeError, Problem, Program, Request, Work, remedy, sentence};
 
 const LOAD: u32 = 1;
 const ARM: u16 = 40;
@@ -176,7 +176,7 @@ fn problems_come_back_as_they_were_sent() {
         let line = serde_json::to_string(&Event::Failed(problem.clone())).unwrap();
         let program = says(folder.path(), &format!("echo '{line}'\nexit 1"));
         match program.run(&FIND, None, |_| panic!("no event")) {
-            Err(NotRun::Problem(back)) => assert_eq!(back, problem),
+            Err(ProbeError::Problem(back)) => assert_eq!(back, problem),
             other => panic!("{other:?}"),
         }
         assert!(sentence(&problem).len() > 20 && remedy(&problem).len() > 20);

@@ -42,7 +42,7 @@ pub struct Options {
 
 /// An exported program.
 #[derive(Clone, Debug)]
-pub struct Exported {
+pub struct ExportedProgram {
     /// Text.
     pub text: String,
     /// Number of passes.
@@ -123,7 +123,7 @@ impl Path {
 ///
 /// # Errors
 /// See [`ExportError`].
-pub fn export(job: &Job, options: &Options, done: &dyn Fn()) -> Result<Exported, ExportError> {
+pub fn export(job: &Job, options: &Options, done: &dyn Fn()) -> Result<ExportedProgram, ExportError> {
     let oracle = Oracle::new(job)?;
     let mut paths = Vec::new();
     for pass in passes(&oracle)? {
@@ -156,7 +156,7 @@ pub fn export(job: &Job, options: &Options, done: &dyn Fn()) -> Result<Exported,
         blocks.line("%");
     }
     let cuts = || paths.iter().flat_map(|path| &path.cuts);
-    Ok(Exported {
+    Ok(ExportedProgram {
         passes: paths.len(),
         cuts: cuts().count(),
         cutting_time_s: cuts().map(Cut::time_s).sum(),
