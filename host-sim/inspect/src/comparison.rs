@@ -219,3 +219,72 @@ impl BoardRun {
         here.fault.as_ref().map(|fault| fault.sentence_of(job))
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// The verdict on a board's run with this status; the core finished without a fault.
+    fn verdict(status: Status, first_difference: Option<u64>, commanded: bool) -> Option<String> {
+        let job = job_file::parse("torus.toml", include_str!("../../../jobs/torus.toml")).unwrap();
+        let here = TimedRun {
+            digest: 0,
+            samples: 0,
+            samples_per_second: 0.0,
+            passes: Vec::new(),
+            fault: None,
+        };
+        let run = BoardRun {
+            status,
+            compared: 0,
+            first_difference,
+            commanded,
+            ticks_per_second: 0.0,
+        };
+        run.failure(&here, &job)
+    }
+
+    fn ended(state: State) -> Status {
+        Status {
+            state,
+            ..Status::default()
+        }
+    }
+
+    #[test]
+    fn the_most_severe_failure_is_reported() {
+        let finished = ended(State::Finished);
+        assert_eq!(verdict(finished, None, false), None);
+        let missed = Status {
+            deadline_misses: 2,
+            samples_lost: 3,
+            ..finished
+        };
+        let lost = Status {
+            samples_lost: 3,
+            ..finished
+        };
+        for (status, difference, text) in [
+            (missed, Some(7), "2 ticks of the sample timer were missed"),
+            (lost, Some(7), "first at tick 7"),
+            (lost, None, "3 samples were lost"),
+            (
+                ended(State::Held),
+                None,
+                "the board ended held, the simulation finished",
+            ),
+        ] {
+            let failure = verdict(status, difference, false).unwrap();
+            assert!(failure.contains(text), "{text}: {failure}");
+        }
+    }
+
+    #[test]
+    fn a_commanded_run_may_end_ready_but_not_held() {
+        assert_eq!(verdict(ended(State::Ready), None, true), None);
+        assert_eq!(verdict(ended(State::Finished), None, true), None);
+        let held = verdict(ended(State::Held), None, true).unwrap();
+        assert_eq!(held, "the board ended held");
+        assert!(verdict(ended(State::Ready), None, false).is_some());
+    }
+}
