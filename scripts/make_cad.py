@@ -1,11 +1,11 @@
 #!/usr/bin/env python3
-"""Makes the CAD files in jobs/cad and, with them, tests/golden/cad_points.txt: points and normals of each face as the kernel
-(OpenCASCADE) itself evaluates them, to check the import against.
+"""Makes the CAD files in jobs/cad and, with them, tests/golden/cad_points.txt: points and normals of each face, evaluated
+by the kernel (OpenCASCADE), as the reference for the import.
 
     python3 -m venv target/cad && target/cad/bin/pip install cadquery-ocp==8.0.1.1.0 rhino3dm==8.35.0
     target/cad/bin/python scripts/make_cad.py
 
-Only what changes the files needs this; the tests read the files as they are committed. Lengths here are mm.
+Only needed to change the files; the tests read the committed ones. Lengths are mm.
 """
 
 import math
@@ -50,7 +50,7 @@ ROOT = pathlib.Path(__file__).resolve().parent.parent
 CAD = ROOT / "jobs" / "cad"
 POINTS = ROOT / "tests" / "golden" / "cad_points.txt"
 INCH = 25.4
-# Places a side of each face's grid of reference points.
+# Reference points per side of the grid on each face.
 GRID = 7
 
 
@@ -62,7 +62,7 @@ def array1(kind, values):
 
 
 def spline_surface(poles, degree_u, degree_v, weights=None, inner_u=None, inner_v=None):
-    """A clamped B-spline surface on [0, 1]²; inner knots even unless given."""
+    """A clamped B-spline surface on [0, 1]²; interior knots uniform unless given."""
     rows, columns = len(poles), len(poles[0])
     grid = Array2_gp_Pnt(1, rows, 1, columns)
     factors = Array2_double(1, rows, 1, columns)
@@ -219,7 +219,7 @@ def lens_mould():
 
 
 def swept():
-    """Surfaces that are made by a motion: a spline moved along a line, a spline turned by 100 degrees, a spline surface's offset,
+    """Surfaces that are made by a sweep: a spline extruded along a line, a spline revolved by 100 degrees, a spline surface's offset,
     and a rational patch of degree 4 by 3."""
     gutter = spline_curve([(0, 0, 0), (12, 0, 9), (20, 0, -7), (34, 0, -3), (41, 0, 8), (55, 0, 5)], 3)
     extruded = Geom_SurfaceOfLinearExtrusion(gutter, gp_Dir(0.2, 1, 0.1))
@@ -261,7 +261,7 @@ def solids():
 
 
 def step_settings(schema, unit):
-    # The settings exist only once the controller does.
+    # The settings are created with the controller.
     STEPControl_Controller.Init_s()
     assert Interface_Static.SetCVal_s("write.step.schema", schema)
     assert Interface_Static.SetCVal_s("write.step.unit", unit)
@@ -304,7 +304,7 @@ def write_iges(path, shape, unit="MM", brep=0):
 
 
 def plain_header(path):
-    """The date of writing would change the file each time."""
+    """Removes the date of writing, which would make the file differ on each run."""
     text = path.read_text()
     text = re.sub(r"LOCAL_TIME\(\d+,\d+", "LOCAL_TIME(0,0", text)
     text = re.sub(r"CALENDAR_DATE\([\d,]+\)", "CALENDAR_DATE(2026,1,1)", text)
@@ -327,7 +327,7 @@ def rhino_surface(poles, degree, inner_u, inner_v, scale):
 
 
 def write_3dm(path):
-    """The mouse in inches, twice: as it is, and as a ball of a sphere beside it."""
+    """Two objects in inches: the mouse, and a sphere beside it."""
     model = rhino3dm.File3dm()
     model.Settings.ModelUnitSystem = rhino3dm.UnitSystem.Inches
     model.Objects.AddSurface(rhino_surface(mouse_poles(), 3, MOUSE_U, MOUSE_V, 1 / INCH))
@@ -353,7 +353,7 @@ def reference(out, name, shape):
         sign = -1.0 if part.Orientation() == TopAbs_REVERSED else 1.0
         for i in range(GRID):
             for j in range(GRID):
-                # Off the middle and the boundary, where knots and seams are.
+                # Avoids the middle and the boundary, where knots and seams are.
                 u = u0 + (u1 - u0) * (i + 0.37) / GRID
                 v = v0 + (v1 - v0) * (j + 0.41) / GRID
                 if BRepClass_FaceClassifier(part, gp_Pnt2d(u, v), 1e-7).State() != TopAbs_IN:

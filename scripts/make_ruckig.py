@@ -1,11 +1,11 @@
 #!/usr/bin/env python3
-"""Makes tests/golden/ruckig.txt: durations of time-optimal, jerk-limited moves from rest to rest, as Ruckig (Berscheid, Kroeger, "Jerk-limited
-Real-time Trajectory Generation with Arbitrary Target States", RSS 2021) computes them, to check the host's closed form against.
+"""Makes tests/golden/ruckig.txt: durations of time-optimal, jerk-limited moves from rest to rest, computed by Ruckig (Berscheid, Kroeger,
+"Jerk-limited Real-time Trajectory Generation with Arbitrary Target States", RSS 2021), as the reference for the host's closed form.
 
     python3 -m venv target/ruckig && target/ruckig/bin/pip install ruckig==0.19.4
     target/ruckig/bin/python scripts/make_ruckig.py
 
-Only what changes the table needs this; the tests read it as it is committed. Lengths are mm, times s.
+Only needed to change the table; the tests read the committed one. Lengths are mm, times s.
 """
 
 import itertools
@@ -15,9 +15,9 @@ import random
 from ruckig import InputParameter, Result, Ruckig, Trajectory
 
 TABLE = pathlib.Path(__file__).resolve().parent.parent / "tests" / "golden" / "ruckig.txt"
-# Distances from a hundredth of a millimetre, where nothing is reached, to half a metre, where everything is.
+# Distances, mm: from 0.01, where no limit but the jerk is reached, to 500, where all limits are.
 DISTANCES = [0.01, 0.1, 0.5, 1, 2, 5, 10, 20, 50, 200, 500]
-# Velocity, acceleration, jerk: usual axes, slow feeds, sluggish and stiff ones.
+# Velocity, mm/s, acceleration, mm/s2, and jerk, mm/s3: common axes, low feeds, slow and stiff axes.
 LIMITS = [
     (100, 1000, 20000),
     (10, 1000, 20000),
@@ -29,13 +29,13 @@ LIMITS = [
     (166.7, 2500, 60000),
     (300, 5000, 500000),
 ]
-# Further cases, seeded, over all decades.
+# Number of random cases, seeded, log-uniform over the decades.
 RANDOM = 120
 SEED = 6
 
 
 def duration(distance, velocity, acceleration, jerk):
-    """Duration of one move; the trajectory must end where and as it should."""
+    """Duration of one move, s. Asserts the final position and velocity."""
     wanted = InputParameter(1)
     wanted.current_position, wanted.current_velocity, wanted.current_acceleration = [0.0], [0.0], [0.0]
     wanted.target_position, wanted.target_velocity, wanted.target_acceleration = [distance], [0.0], [0.0]

@@ -1,12 +1,12 @@
 # shellcheck shell=bash
-# What ./demo and ./check need, brought in where it is missing: for Debian and Ubuntu with git and rustup.
-# To be sourced in the repository's root. Says one line for each thing that it brings; silent where nothing is missing.
+# Installs the programs that ./demo and ./check need and that are missing: for Debian and Ubuntu with git and rustup.
+# Source it in the root of the repository. Prints one line per installed item, and nothing if all are present.
 
 FLIP_LINK_VERSION=0.1.12
 CARGO_DENY_VERSION=0.20.2
 BOARD_TARGET=thumbv7em-none-eabihf
 
-# Flags from outside would replace those that the board's images are linked with.
+# These variables would override the link flags of the board images.
 unset RUSTFLAGS CARGO_ENCODED_RUSTFLAGS CARGO_BUILD_TARGET CARGO_BUILD_RUSTFLAGS
 
 say() { printf '%s\n' "-- $*"; }
@@ -36,7 +36,7 @@ need_program() {
     command -v "$1" > /dev/null || die "$2 was installed, but there is no $1"
 }
 
-# LinuxCNC's stand-alone interpreter, unpacked into target/: installed, the package would bring a desktop along.
+# LinuxCNC's stand-alone interpreter, unpacked into target/: an installation of the package would pull in a desktop.
 need_rs274() {
     local place=target/rs274
     if command -v rs274 > /dev/null || [ -x $place/rs274 ]; then return; fi
@@ -46,7 +46,7 @@ need_rs274() {
     rm -rf $place
     mkdir -p $place/packages $place/root
     local packages
-    # The libraries that the interpreter itself needs, with theirs; the C library is the machine's own.
+    # The libraries of the interpreter and their dependencies, except for the C library, which the system has.
     packages=$(apt-cache depends linuxcnc-uspace | awk '$1 == "Depends:" && /libboost-python|libedit|libpython3|libtirpc/ { print $2 }' |
         grep -v '<' | xargs apt-cache depends --recurse --no-recommends --no-suggests --no-conflicts --no-breaks \
             --no-replaces --no-enhances | grep '^[a-z]' | grep -vE '^(libc6|libgcc-s1|gcc-.*|libcrypt1|debconf.*)(:|$)' | sort -u)
@@ -65,7 +65,7 @@ export LD_LIBRARY_PATH PYTHONHOME="$root/usr" PYTHONPATH="$root/usr/lib/python3/
 exec "$root/usr/bin/rs274" "$@"
 END
     chmod +x $place/rs274
-    # A program of one block proves the unpacked one; it writes its parameters into the folder that it is started in.
+    # Runs a program of one block to check the unpacked interpreter, which writes its parameters into the working directory.
     (cd $place && : > empty.tbl && : > empty.var && printf 'G1X1F1\nM2\n' > probe.ngc &&
         ./rs274 -t empty.tbl -v empty.var -g probe.ngc < /dev/null 2> /dev/null | grep -q STRAIGHT_FEED) ||
         die "linuxcnc-uspace was unpacked into $place, but its rs274 does not run"
@@ -75,7 +75,7 @@ END
 need_browser() {
     local program version
     for program in ${CHROMIUM:+"$CHROMIUM"} chromium google-chrome google-chrome-stable chromium-browser; do
-        # A stub that stands for a snap is there, but does not run; a snap runs, but does not see files in /tmp.
+        # The stub of a snap exists but does not run; a snap runs but cannot read files in /tmp.
         if version=$("$program" --version 2> /dev/null) && [ "${version%snap*}" = "$version" ]; then return; fi
         if [ "$program" = "${CHROMIUM:-}" ]; then die "CHROMIUM=$CHROMIUM is no Chromium that runs"; fi
     done
@@ -107,7 +107,7 @@ need_tool() {
 }
 
 need_toolchain() {
-    # Installed by hand, rustup may not be on the path of a shell that is not interactive.
+    # A rustup installed by hand may not be on the path of a non-interactive shell.
     export PATH="${CARGO_HOME:-$HOME/.cargo}/bin:$PATH"
     command -v rustup > /dev/null || die "rustup is missing; it is described at https://rustup.rs"
     local channel sysroot
@@ -120,7 +120,7 @@ need_toolchain() {
     rustup toolchain install --no-self-update > /dev/null
 }
 
-# What every build needs.
+# Requirements of every build.
 setup() {
     need_toolchain
     need_program cc build-essential
@@ -128,7 +128,7 @@ setup() {
     need_tool flip-link "$FLIP_LINK_VERSION"
 }
 
-# What only the check needs.
+# Additional requirements of ./check.
 setup_check() {
     need_program arm-none-eabi-objdump binutils-arm-none-eabi
     need_tool cargo-deny "$CARGO_DENY_VERSION"

@@ -10,7 +10,7 @@ use std::time::{Duration, Instant};
 
 use boards::{SKR_PRO, STM32F405};
 use cycles::image::chip;
-use host_sim::probe::{Event, Image, Line, NotRun, Problem, Program, Request, Target};
+use host_sim::probe::{Event, Image, Line, ProbeError, Problem, Program, Request, Target};
 use integration_tests::{dome, upload};
 use machine::remote::Session;
 use machine::remote::qemu::Qemu;
@@ -197,7 +197,7 @@ fn without_a_probe_that_is_what_is_said() {
         image: image.into(),
     };
     let problem = |request: &Request| match program().run(request, None, |event| panic!("{event:?}")) {
-        Err(NotRun::Problem(problem)) => problem,
+        Err(ProbeError::Problem(problem)) => problem,
         other => panic!("{other:?}"),
     };
     let find = |probe: &str| Request::Find {

@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 use std::process::{Command, Stdio};
 
-use approach::export::{Dialect, ExportError, Exported, Options, export};
+use approach::export::{Dialect, ExportError, ExportedProgram, Options, export};
 use approach::gcode::FeedMode;
 use approach::{Kind, PassPath, passes};
 use job::{Job, Pattern};
@@ -200,7 +200,7 @@ fn check_speed(job: &Job, arc_mm: f64, time_s: f64, share: f64, cut: &Move) {
 }
 
 /// Exports a job, and holds what the interpreter makes of it against the exact path.
-fn check(job: &Job, options: &Options, bounds: &Bounds) -> Exported {
+fn check(job: &Job, options: &Options, bounds: &Bounds) -> ExportedProgram {
     let exported = export(job, options, &|| ()).unwrap();
     if options.dialect == Dialect::Grbl {
         check_grbl(&exported.text);

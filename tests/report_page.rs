@@ -8,7 +8,7 @@ use browser::Browser;
 use machine::Machine;
 use machine::prepare::prepare;
 use oracle::{Oracle, PassSample, SampleCheck};
-use report::{Remarks, RidgePlace, Scallops, Sketch};
+use report::{Remarks, RidgePoint, Scallops, Sketch};
 use verify::survey::{Survey, SurveyResult};
 
 /// WebGL on the processor, whatever graphics card there is: the same everywhere.
@@ -41,7 +41,7 @@ fn rising(domain: [[f64; 2]; 2], ridges: u32) -> Scallops {
         let v = v0 + (v1 - v0) * (f64::from(gap) + 0.5) / f64::from(ridges);
         let place = |k: u32| {
             let share = f64::from(k) / 60.0;
-            RidgePlace {
+            RidgePoint {
                 u: u0 + (u1 - u0) * share,
                 v,
                 height_mm: (0.012 * share) as f32,

@@ -1,4 +1,4 @@
-//! The program as people and scripts meet it: exit codes, streams, files, JSON.
+//! The command line: exit codes, streams, files, JSON.
 #![allow(clippy::unwrap_used, reason = "a test may fail by panic")]
 
 use std::path::{Path, PathBuf};
@@ -7,7 +7,7 @@ use std::process::{Command, Output, Stdio};
 use serde_json::Value;
 use tempfile::TempDir;
 
-/// The program in a folder, with its arguments as one would type them (without quotes).
+/// The program in a folder, with its arguments as typed (without quotes).
 fn program(folder: &Path, arguments: &str) -> Command {
     let mut command = Command::new(env!("CARGO_BIN_EXE_host-sim"));
     command
@@ -34,7 +34,7 @@ fn sample(name: &str) -> String {
     std::fs::read_to_string(path).unwrap()
 }
 
-/// A folder with a job in it: a sample with these replacements.
+/// A folder with a job file: a sample with these replacements.
 fn folder_with(name: &str, edits: &[(&str, &str)]) -> TempDir {
     let mut text = sample(name);
     for (from, to) in edits {
@@ -52,7 +52,7 @@ fn json(folder: &Path, arguments: &str) -> Value {
     serde_json::from_slice(&output.stdout).unwrap_or_else(|error| panic!("{arguments}: {error}"))
 }
 
-/// What `--help` offers as examples, of the commands that need neither QEMU nor a minute.
+/// The examples in `--help` of the commands that need no QEMU and run in less than a minute.
 #[test]
 fn examples_of_the_help_work() {
     let folder = tempfile::tempdir().unwrap();
@@ -79,7 +79,7 @@ fn examples_of_the_help_work() {
     }
 }
 
-/// `| head`: the reader goes away. No panic, and the exit code is that of the work.
+/// `| head`: the reader closes the pipe. No panic, and the exit code is that of the command.
 #[test]
 fn a_reader_that_goes_away_is_no_error() {
     let good = folder_with("torus", &[]);
@@ -121,7 +121,7 @@ fn a_full_disk_is_an_error() {
     );
 }
 
-/// The job of the bring-up guide: what it says of its directions and lengths is so.
+/// The job of the bring-up guide has the directions and lengths that the guide states.
 #[test]
 fn the_guides_job_goes_where_the_guide_says() {
     let guide = include_str!("../../docs/bring-up.md");
@@ -165,7 +165,7 @@ fn the_guides_job_goes_where_the_guide_says() {
     assert!((y_before - 50.0).abs() < 1e-5, "{y_before}");
 }
 
-/// Every kind of nonsense ends with code 2, says what is wrong, and what to do.
+/// Every kind of invalid input ends with code 2, an error and a remedy.
 #[test]
 fn nonsense_gets_a_remedy() {
     let folder = folder_with("torus", &[("scallop_mm", "scalop_mm")]);
@@ -193,8 +193,8 @@ fn nonsense_gets_a_remedy() {
         ("export job.toml --format heidenhain -o x", &["linuxcnc, grbl"]),
         ("budget --ticks 0", &["0 is not in 1.."]),
         ("explain ball-dos-not-fit", &["ball-does-not-fit"]),
-        ("new -o .", &["that is a folder: name a file in it"]),
-        ("new -o no/job.toml", &["make the folder first"]),
+        ("new -o .", &["that is a folder: give a file in it"]),
+        ("new -o no/job.toml", &["create the folder first"]),
         ("completions tcsh", &["bash, zsh, fish"]),
         ("run job.toml", &["--qemu|--port"]),
         ("flash --board arduino", &["stm32f405, skr-pro"]),
@@ -260,7 +260,7 @@ fn new_jobs_run_and_are_never_lost() {
     );
 }
 
-/// The examples that `explain` gives for faults, where a sample job shows them: the fault comes, and points to its explanation.
+/// The examples of `explain` for faults that a sample job can cause: the fault occurs, and refers to its explanation.
 #[test]
 fn faults_come_as_explained() {
     for (job, edits, code, name) in [
@@ -287,7 +287,7 @@ fn faults_come_as_explained() {
         ),
     ] {
         let folder = folder_with(job, edits);
-        // The line that has to do with it: the ball's radius, or the feed.
+        // The line of the error: the ball radius, or the feed.
         let text = std::fs::read_to_string(folder.path().join("job.toml")).unwrap();
         let line = |key: &str| text.lines().position(|line| line.starts_with(key)).unwrap() + 1;
         let lines = [line("radius_mm"), line("feed_mm_min")];
@@ -318,7 +318,7 @@ fn faults_come_as_explained() {
     }
 }
 
-/// The same for the job of `cargo sim new`.
+/// The examples of `explain` for the job of `cargo sim new`.
 #[test]
 fn faults_of_a_new_job_come_as_explained() {
     let folder = tempfile::tempdir().unwrap();
@@ -349,7 +349,7 @@ fn faults_of_a_new_job_come_as_explained() {
     }
 }
 
-/// In a real bash: the script in front of a completion of cargo's that was there before.
+/// In a real bash: the script wraps an existing completion of cargo.
 #[test]
 fn bash_completes_cargo_sim() {
     let folder = tempfile::tempdir().unwrap();
@@ -422,7 +422,7 @@ fn a_placed_job_runs_and_its_errors_point_at_the_line() {
     }
 }
 
-/// Names and types that scripts rely on: `n` number, `n?` number or null (no interval before the first sample), `s` text, `o?` object or null, `o` object, `b` true or false.
+/// JSON keys and types of the contract: `n` number, `n?` number or null (no interval before the first sample), `s` text, `o?` object or null, `o` object, `b` true or false.
 fn has(told: &Value, names: &str, of: &str) {
     for name in names.split_whitespace() {
         let (key, kind) = name.split_once(':').unwrap();
@@ -481,7 +481,7 @@ fn json_has_the_names_that_scripts_rely_on() {
     has(&told["fault"], FAULT, "fault");
 }
 
-/// No bar, and nothing else on stderr, where that is no terminal.
+/// No progress bar, and nothing else on stderr, if that is not a terminal.
 #[test]
 fn no_bars_without_a_terminal() {
     let folder = folder_with("torus", &[("along = \"u\"", "along = \"auto\"")]);

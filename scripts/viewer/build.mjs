@@ -1,4 +1,4 @@
-// Writes the libraries of the report's page, with their licences, as one file that needs nothing else.
+// Bundles the libraries of the report page, with their licences, into one self-contained file.
 import { readFile, writeFile } from "node:fs/promises";
 import { build } from "esbuild";
 
@@ -19,7 +19,7 @@ const { outputFiles } = await build({
     target: "es2020",
     legalComments: "none",
 });
-// In a page the script ends at the first end tag, wherever it stands.
+// In a page, the first end tag ends the script, even inside of a string.
 const script = outputFiles[0].text.replaceAll("</script", "<\\/script");
 await writeFile(`${FOLDER}/three-bundle.min.js`, `/*!\n${notice}\n*/\n${script}`);
 await writeFile(`${FOLDER}/three-bundle.licence.txt`, `${notice}\n`);

@@ -1,4 +1,4 @@
-// What the report's page uses of its libraries; everything else is left out of the bundle.
+// Exports the parts of the libraries that the report page uses; the bundler drops the rest.
 export {
     AmbientLight,
     BufferAttribute,

@@ -1,6 +1,6 @@
-//! The curve approach for machines that know arcs: biarcs through places of the tool centre's path, tangent to it and to
-//! each other in the plane that they turn in, while the third axis moves in proportion; each arc at one speed. Which of the
-//! three planes is taken is a matter of which reaches furthest.
+//! The curve approach for controllers with circular interpolation: biarcs through points of the CL path, tangent to the path and
+//! to each other in one of the planes G17, G18, G19, while the third axis moves in proportion; each arc at constant speed. The plane
+//! with the longest arcs is chosen.
 
 use super::curve::{SPEED_SHARE, longest};
 use super::nodes::{Node, Nodes};
@@ -8,9 +8,9 @@ use super::{ApproachError, PassPath};
 use crate::gcode::{Cut, Plane, Shape};
 use job::Job;
 
-/// Flatter arcs are cut straight: a machine that computes in f32 has no digits left for a longer radius.
+/// Largest radius of an arc, mm; flatter ones become lines: a controller in f32 has no precision for a longer radius.
 const RADIUS_MAX_MM: f64 = 1e4;
-/// A path that runs across a plane more steeply than this has no direction in it, share of a unit.
+/// Least length of the projection of a unit tangent into a plane; a steeper path has no usable direction in that plane.
 const STEEP: f64 = 1e-3;
 
 type Flat = [f64; 2];
@@ -37,7 +37,7 @@ fn outer(a: Flat, b: Flat) -> f64 {
 struct Piece {
     from: Flat,
     to: Flat,
-    /// Centre, and radius: positive if counterclockwise.
+    /// Centre and radius; the radius is positive if counterclockwise.
     turn: Option<(Flat, f64)>,
 }
 
@@ -56,7 +56,7 @@ impl Piece {
         Self { from, to, turn }
     }
 
-    /// Distance of a point from the piece, and how far along it that point lies, as a share.
+    /// Distance of a point from the piece, and the position of its foot along the piece, 0 to 1.
     fn distance(&self, point: Flat) -> (f64, f64) {
         match self.turn {
             Some((centre, radius)) => {
@@ -88,8 +88,8 @@ impl Piece {
     }
 }
 
-/// Two arcs from one place and direction to another, which meet with one tangent; those whose control polygons have equal
-/// arms. `None` where the path turns by a quarter or more.
+/// Biarc between two points with given directions, tangent at the joint; of the family, the one with control polygons of equal
+/// arms. `None` if the path turns by 90 degrees or more.
 fn biarc([from, to]: [Flat; 2], [begin, end]: [Flat; 2]) -> Option<[Piece; 2]> {
     let apart = minus(to, from);
     let (both, squared) = (inner(apart, along(begin, end, 1.0)), inner(apart, apart));
@@ -122,10 +122,10 @@ impl Arcs {
         }
     }
 
-    /// The cuts of a pass: the longest that hold the tolerances of path and speed, one after another.
+    /// The cuts of a pass: successively the longest within the tolerances of path and speed.
     ///
     /// # Errors
-    /// Nothing holds the tolerances somewhere.
+    /// At some point no cut is within the tolerances.
     pub fn cuts(&self, pass: &PassPath<'_>) -> Result<Vec<Cut>, ApproachError> {
         let nodes = Nodes::new(pass)?.0;
         let fit = |first: usize, last: usize| {
@@ -139,7 +139,7 @@ impl Arcs {
         Ok(pairs.concat())
     }
 
-    /// The two cuts over consecutive places that turn in this plane, if they hold the tolerances.
+    /// The two arcs in this plane over consecutive points, if they are within the tolerances.
     fn fit(&self, plane: Plane, nodes: &[Node]) -> Option<[Cut; 2]> {
         let [x, y, across] = plane.axes();
         let place = |node: &Node| [node.cl_mm()[x], node.cl_mm()[y]];
@@ -147,7 +147,7 @@ impl Arcs {
         let tangents = [tangent(first, plane)?, tangent(last, plane)?];
         let pieces = biarc([place(first), place(last)], tangents)?;
         let flat = pieces.map(|piece| piece.length());
-        // The joint lies off the path by less than the tolerance: its foot is found across the chord.
+        // The joint is within the tolerance of the path: its foot is searched across the chord.
         let chord = minus(place(last), place(first));
         let ahead = |node: &Node| inner(chord, minus(place(node), pieces[0].to));
         let split = nodes
@@ -185,7 +185,7 @@ impl Arcs {
             nodes.iter().all(|node| {
                 let (off, share) = pieces[k].distance(place(node));
                 let beside = heights[k] + share * (heights[k + 1] - heights[k]) - node.cl_mm()[across];
-                // The contact is off its feed by the same share as the centre is off its speed.
+                // The relative feed error of the contact equals the relative speed error of the centre.
                 let wanted = self.feed_mm_s * node.at.ratio();
                 let slow = cuts[k].speed_mm_s - wanted;
                 off.hypot(beside) <= self.path_mm && slow.abs() <= SPEED_SHARE * wanted
@@ -195,7 +195,7 @@ impl Arcs {
     }
 }
 
-/// Unit tangent in a plane; `None` where the path is steep to it.
+/// Unit tangent in a plane; `None` if the path is too steep to it.
 fn tangent(node: &Node, plane: Plane) -> Option<Flat> {
     let [x, y, _] = plane.axes();
     let tangent = [node.tangent[x], node.tangent[y]];

@@ -1,11 +1,11 @@
-//! Existing practice: the tool centre's path at constant speed of the centre. The contact's speed varies by eqn 4.
+//! Existing practice: constant speed of the cutter location (CL). The speed of the contact varies by eqn 4.
 
 use super::linear::{Chain, Chord, Pace, even_chords};
 use super::{Approach, ApproachError, Each, PassPath, Program};
 use job::Job;
 use oracle::vector::length;
 
-/// A step that would leave less than this share of itself to the end is taken to the end.
+/// A step that leaves less than this share of itself before the end is extended to the end.
 const END_SHARE: f64 = 1e-9;
 
 /// The approach for a job.
@@ -25,7 +25,7 @@ impl ConstantCl {
         }
     }
 
-    /// Chords of a pass, all at the feed.
+    /// Chords of a pass, each with the CL at the feed.
     ///
     /// # Errors
     /// As [`Approach::plan`].
@@ -47,8 +47,8 @@ impl Approach for ConstantCl {
     }
 }
 
-/// Follows the centre's path of a pass at a constant speed. A CNC is fed its chords; it is followed as if it were exact, so
-/// that what is seen is the effect of the constant speed alone.
+/// Follows the CL path of a pass at constant speed. A CNC would receive its chords; here the exact path is followed, so that the
+/// result shows only the effect of the constant speed.
 pub(super) fn follow(
     feed_mm_s: f64,
     pass: &PassPath<'_>,
@@ -61,9 +61,9 @@ pub(super) fn follow(
         Ok(pass.sense() / speed.max(1e-9))
     };
     let mut path = pass.ends[0];
-    // Bounded by the length over the way of a period.
+    // Bounded by the length of the path over the distance of a period.
     loop {
-        // Runge and Kutta's rule, with the length as the independent variable.
+        // Runge-Kutta of order 4, with the arc length as the independent variable.
         let first = rate(path)?;
         let second = rate(path + 0.5 * way * first)?;
         let third = rate(path + 0.5 * way * second)?;

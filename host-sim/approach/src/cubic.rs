@@ -1,17 +1,17 @@
-//! One segment of a composite cubic spline: the centre's path between two places with its directions there, and a cubic
-//! for the speed along it; and their fit.
+//! One segment of a composite cubic spline: the CL path between two points with its tangents there, and a cubic for the speed
+//! along it; and the fit of both.
 
 use super::nodes::Node;
 use oracle::vector::{Vector, add, dot, length, scale, subtract};
 
-/// Places within a segment at most that a fit looks at.
+/// Largest number of interior points of a segment in a fit.
 const PLACES_MAX: usize = 40;
-/// Rounds of least squares and of moving the places' parameters to the nearest points of the curve.
+/// Iterations of least squares with reparametrisation to the nearest points of the curve.
 const ROUNDS: usize = 12;
-/// Rounds of Lawson's weights, which turn least squares into least maximum.
+/// Iterations of Lawson's weights, which converge from least squares to minimax.
 const LAWSON: usize = 16;
 
-/// A cubic in Hermite's form, t from 0 to 1.
+/// A cubic in Hermite form, t from 0 to 1.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Cubic {
     /// Ends, mm.
@@ -58,7 +58,7 @@ impl Cubic {
     }
 }
 
-/// How far a fit is off.
+/// Errors of a fit.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Errors {
     /// Of the path, mm.
@@ -67,7 +67,7 @@ pub(super) struct Errors {
     pub(super) speed_mm_s: f64,
 }
 
-/// Fits a cubic to consecutive places of a pass; the contact is to run at the feed. `None` where the path turns back.
+/// Fits a cubic to consecutive points of a pass with the contact at the feed. `None` if the path reverses.
 pub(super) fn fit(nodes: &[Node], feed_mm_s: f64) -> Option<(Cubic, Errors)> {
     let (first, last) = (nodes.first()?, nodes.last()?);
     let span = last.cl_length_mm - first.cl_length_mm;
@@ -116,7 +116,7 @@ pub(super) fn fit(nodes: &[Node], feed_mm_s: f64) -> Option<(Cubic, Errors)> {
     Some((cubic, errors))
 }
 
-/// Lengths of the end derivatives by least squares, at the places' present parameters.
+/// Lengths of the end derivatives by least squares, at the current parameters of the points.
 fn magnitudes(cubic: &Cubic, tangents: [Vector; 2], inner: &[&Node], at: &[f64]) -> Option<[f64; 2]> {
     let [p, q] = cubic.points_mm;
     let (mut matrix, mut right) = ([0.0; 3], [0.0; 2]);
@@ -147,8 +147,7 @@ fn solve([m00, m01, m11]: [f64; 3], [r0, r1]: [f64; 2]) -> Option<[f64; 2]> {
     })
 }
 
-/// A cubic through the speeds at the ends, so that speed has no step, with the least maximal error between; and that
-/// error.
+/// A cubic through the speeds at the ends, so that the speed is continuous, with minimal largest error between; and that error.
 fn fit_speed([begin, end]: [f64; 2], at: &[f64], wanted: &[f64]) -> ([f64; 4], f64) {
     let line = |t: f64| begin + (end - begin) * t;
     let mut weights = vec![1.0; at.len()];
@@ -166,7 +165,7 @@ fn fit_speed([begin, end]: [f64; 2], at: &[f64], wanted: &[f64]) -> ([f64; 4], f
             right = [right[0] + weight * c * rest, right[1] + weight * d * rest];
         }
         let [c, d] = solve(matrix, right).unwrap_or_default();
-        // (1 - t) t (c + d t) written out.
+        // (1 - t) t (c + d t), expanded.
         let speed = [begin, end - begin + c, d - c, -d];
         let off =
             |t: f64, wanted: f64| (((speed[3] * t + speed[2]) * t + speed[1]) * t + speed[0] - wanted).abs();

@@ -1,5 +1,5 @@
-//! Method 2: composite cubic splines for the tool centre's path and, on the same segments, for its speed; as few segments
-//! as the tolerances allow, followed at the fitted speed.
+//! Method 2: composite cubic splines for the CL path and, on the same segments, for its speed; the least number of segments
+//! within the tolerances, followed at the fitted speed.
 
 use std::fmt::Write;
 
@@ -9,11 +9,11 @@ use super::{Approach, ApproachError, Each, PassPath, Program};
 use job::Job;
 use oracle::vector::length;
 
-/// Tolerance of the fitted speed, as a share of the feed: the paper's.
+/// Tolerance of the fitted speed, as a share of the feed (from the paper).
 pub const SPEED_SHARE: f64 = 0.01;
-/// Halvings of the tolerance's share that evens out the segments' errors.
+/// Bisections of the share of the tolerance that equalises the errors of the segments.
 const EVENING: u32 = 8;
-/// Halvings that find how much of a period leads to a segment's end.
+/// Bisections for the part of a period up to the end of a segment.
 const ENDING: u32 = 50;
 
 /// The approach for a job.
@@ -33,11 +33,11 @@ impl Curve {
         }
     }
 
-    /// The cubics of a pass: the longest that hold the tolerances one after another, which is the least number; then
-    /// their ends are moved so that all are equally far off.
+    /// The cubics of a pass: successively the longest within the tolerances, which gives the least number; then the ends are
+    /// moved to equalise the errors.
     ///
     /// # Errors
-    /// No segment holds the tolerance somewhere.
+    /// At some point no segment is within the tolerance.
     pub fn cubics(&self, pass: &PassPath<'_>, nodes: &Nodes) -> Result<Vec<Cubic>, ApproachError> {
         let mut best = self.longest(pass, nodes, 1.0)?;
         let (mut low, mut high) = (0.0, 1.0);
@@ -51,7 +51,7 @@ impl Curve {
         Ok(best)
     }
 
-    /// The longest segments one after another within a share of the tolerances.
+    /// Successively the longest segments within a share of the tolerances.
     fn longest(&self, pass: &PassPath<'_>, nodes: &Nodes, share: f64) -> Result<Vec<Cubic>, ApproachError> {
         let nodes = &nodes.0;
         let holds = |errors: &Errors| {
@@ -70,14 +70,14 @@ impl Curve {
     }
 }
 
-/// The longest stretches one after another for which `good(first, last)` has an answer, over so many places; or the place
-/// from which there is none.
+/// Successively the longest intervals of `count` points for which `good(first, last)` is `Some`; or the index from which there is
+/// none.
 pub(super) fn longest<T>(count: usize, good: impl Fn(usize, usize) -> Option<T>) -> Result<Vec<T>, usize> {
     let mut stretches = Vec::new();
     let mut first = 0;
     while first + 1 < count {
         let (mut reach, mut best) = (first + 1, good(first, first + 1).ok_or(first)?);
-        // Doubled, then halved, until no longer one holds.
+        // Exponential search, then bisection, for the longest valid one.
         let mut step = 1;
         let mut growing = true;
         while step > 0 {
@@ -119,7 +119,7 @@ fn after(cubic: &Cubic, t: f64, time_s: f64) -> f64 {
     t + time_s * (first + 2.0 * (second + third) + fourth) / 6.0
 }
 
-/// Time at the fitted speed from t to a cubic's end, known to be less than `time_s`.
+/// Time at the fitted speed from t to the end of a cubic; must be less than `time_s`.
 fn time_to_end(cubic: &Cubic, t: f64, time_s: f64) -> f64 {
     let (mut low, mut high) = (0.0, time_s);
     for _ in 0..ENDING {
@@ -138,15 +138,15 @@ impl Program for Spline {
         self.cubics.len()
     }
 
-    /// One block a segment, as a Siemens 840D reads polynomials: each axis with its end point and the coefficients of
-    /// t² and t³, the feed likewise.
+    /// One block per segment in the polynomial format of the Siemens 840D: for each axis and the feed, the end value and the
+    /// coefficients of t² and t³.
     fn write(&self, out: &mut String) {
         for cubic in &self.cubics {
             let [_, _, square, cube] = cubic.coefficients();
             out.push_str("POLY");
             for (axis, name) in ["X", "Y", "Z"].into_iter().enumerate() {
                 let end = cubic.points_mm[1][axis];
-                // Writing to a string cannot fail.
+                // Writing to a `String` cannot fail.
                 let _ = write!(
                     out,
                     " PO[{name}]=({end:.4},{:.4},{:.4})",
@@ -175,7 +175,7 @@ impl Program for Spline {
         let mut rest = self.cubics[1..].iter();
         let (mut t, mut time) = (0.0, period_s);
         let guess = |cubic: &Cubic, t: f64| cubic.path[0] + (cubic.path[1] - cubic.path[0]) * t;
-        // Bounded by the pass's time over the period, and the segments.
+        // Bounded by the duration of the pass over the period, plus the number of segments.
         loop {
             let next = after(cubic, t, time);
             if next < 1.0 {

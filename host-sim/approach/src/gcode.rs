@@ -1,21 +1,21 @@
-//! Blocks of G-code: moves with modal words left out, coordinates to a tenth of a micrometre, feeds to five digits.
+//! Blocks of G-code: modal words omitted where unchanged, coordinates with a resolution of 0.1 um, feeds with five digits.
 
 use std::fmt::Write;
 
 use oracle::vector::{length, subtract};
 
-/// Coordinates are written in steps of this, mm.
+/// Resolution of coordinates, mm.
 pub const RESOLUTION_MM: f64 = 1e-4;
-/// Digits of a feed: it is within 5e-5 of what is meant.
+/// Significant digits of a feed: relative error below 5e-5.
 const FEED_DIGITS: i32 = 5;
 const SECONDS_PER_MINUTE: f64 = 60.0;
 const AXES: [&str; 3] = ["X", "Y", "Z"];
 const OFFSETS: [&str; 3] = ["I", "J", "K"];
 
-/// What an F word means.
+/// Unit of the F words.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
 pub enum FeedMode {
-    /// Millimetres a minute.
+    /// mm/min.
     G94,
     /// Inverse time: the block takes 1/F minutes.
     G93,
@@ -47,7 +47,7 @@ impl Plane {
     /// All of them.
     pub const ALL: [Self; 3] = [Self::Xy, Self::Zx, Self::Yz];
 
-    /// The two axes in the plane, in the order in which it turns, and the one across: 0, 1, 2 for x, y, z.
+    /// The two axes of the plane in the order of counterclockwise rotation, and the axis normal to it: 0, 1, 2 for x, y, z.
     #[must_use]
     pub fn axes(self) -> [usize; 3] {
         match self {
@@ -66,32 +66,32 @@ impl Plane {
     }
 }
 
-/// The way from the last point to the next.
+/// Shape of a cut.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Shape {
     /// Straight.
     Line,
-    /// An arc of less than half a turn in its plane; the third axis moves in proportion.
+    /// An arc of less than 180 degrees in its plane; the third axis moves in proportion.
     Arc {
         /// Its plane.
         plane: Plane,
         /// Its centre, mm.
         centre_mm: [f64; 3],
-        /// Whether it turns clockwise in its plane.
+        /// Clockwise in its plane.
         clockwise: bool,
     },
 }
 
-/// A cut of the tool centre.
+/// A cut, of the ball centre.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Cut {
-    /// Where it ends, mm.
+    /// End point, mm.
     pub to_mm: [f64; 3],
-    /// Its length, mm.
+    /// Length, mm.
     pub length_mm: f64,
-    /// Its speed, mm/s.
+    /// Speed, mm/s.
     pub speed_mm_s: f64,
-    /// Its shape.
+    /// Shape.
     pub shape: Shape,
 }
 
@@ -107,21 +107,21 @@ impl Cut {
         }
     }
 
-    /// How long it takes, s.
+    /// Duration, s.
     #[must_use]
     pub fn time_s(&self) -> f64 {
         self.length_mm / self.speed_mm_s
     }
 }
 
-/// Appends blocks to a text, and knows which words hold from the block before.
+/// Appends blocks to a text; tracks the modal words.
 #[derive(Debug)]
 pub struct Blocks<'a> {
     out: &'a mut String,
     feed_mode: FeedMode,
     motion: &'static str,
     plane: Plane,
-    /// Where the tool is, in steps of the resolution.
+    /// Position of the tool, in steps of the resolution.
     at: [Option<i64>; 3],
     feed: String,
 }
@@ -130,11 +130,11 @@ fn steps(mm: f64) -> i64 {
     (mm / RESOLUTION_MM).round() as i64
 }
 
-/// A word of a number of steps, without needless zeros.
+/// Formats a number of steps as a coordinate without trailing zeros.
 fn push_steps(out: &mut String, letter: &str, steps: i64) {
     let (sign, steps) = (if steps < 0 { "-" } else { "" }, steps.unsigned_abs());
     let (whole, rest) = (steps / 10_000, steps % 10_000);
-    // Writing to a string cannot fail.
+    // Writing to a `String` cannot fail.
     let _ = write!(out, "{letter}{sign}{whole}");
     if rest > 0 {
         out.push('.');
@@ -142,7 +142,7 @@ fn push_steps(out: &mut String, letter: &str, steps: i64) {
     }
 }
 
-/// A feed's digits.
+/// Formats a feed.
 fn feed_digits(feed: f64) -> String {
     let decimals = (FEED_DIGITS - 1 - feed.log10().floor() as i32).clamp(0, 9) as usize;
     let text = format!("{feed:.decimals$}");
@@ -154,7 +154,7 @@ fn feed_digits(feed: f64) -> String {
 }
 
 impl<'a> Blocks<'a> {
-    /// Blocks at the end of this text, with nothing known of what came before but plane XY.
+    /// Appends to this text; assumes plane XY and no other modal state.
     #[must_use]
     pub fn new(out: &'a mut String, feed_mode: FeedMode) -> Self {
         Self {
@@ -167,13 +167,13 @@ impl<'a> Blocks<'a> {
         }
     }
 
-    /// A line as it is.
+    /// Appends a line unchanged.
     pub fn line(&mut self, text: &str) {
         self.out.push_str(text);
         self.out.push('\n');
     }
 
-    /// A comment; what a comment cannot hold is replaced.
+    /// Appends a comment; characters that are not allowed in it are replaced.
     pub fn comment(&mut self, text: &str) {
         let clean = text.chars().map(|c| match c {
             '(' | ')' | ';' | '%' | '!' | '?' | '~' => '_',
@@ -184,21 +184,21 @@ impl<'a> Blocks<'a> {
         self.line(&format!("({clean})"));
     }
 
-    /// Where the machine is, without a block.
+    /// Sets the position without a block.
     pub fn start(&mut self, at_mm: [f64; 3]) {
         self.at = at_mm.map(|mm| Some(steps(mm)));
     }
 
-    /// A rapid move of some axes.
+    /// Appends a rapid move of some axes.
     pub fn rapid(&mut self, to_mm: [Option<f64>; 3]) {
         self.block("G0", to_mm.map(|mm| mm.map(steps)), "", None);
     }
 
-    /// A cut. One that ends where it begins, to the resolution, leaves no block.
+    /// Appends a cut. A cut of zero length, at the resolution, is omitted.
     pub fn cut(&mut self, cut: &Cut) {
         let to = cut.to_mm.map(|mm| Some(steps(mm)));
         if to == self.at {
-            // Before the plane's word.
+            // Computed before the plane word is written.
             return;
         }
         let (motion, offsets) = match cut.shape {
@@ -244,7 +244,7 @@ impl<'a> Blocks<'a> {
         }
         self.out.push_str(offsets);
         if let Some(feed) = feed {
-            // Inverse time holds for its block alone.
+            // An inverse-time feed applies only to its block.
             if self.feed_mode == FeedMode::G93 || feed != self.feed {
                 self.out.push('F');
                 self.out.push_str(&feed);

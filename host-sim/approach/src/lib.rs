@@ -1,5 +1,5 @@
-//! The paper's four ways from a surface to a moving tool, behind one interface: plan a pass, write what a CNC would have
-//! to be fed for it, follow it period by period.
+//! The four approaches of the paper to the tool path of a surface, behind one interface: plan a pass, write the program of a CNC
+//! for it, follow it period by period.
 //!
 //! ```text
 //! job ─► oracle ─► PassPath ─► Approach::plan ─► Program ─┬─ write ─► segments, bytes
@@ -7,9 +7,9 @@
 //! job ─► prepare ─► machine (the core): the product ──────────────────────────────────────────────────────────────┴► Motion
 //! ```
 //!
-//! The first three command the tool's centre; the contact under it is the foot of that centre on the exact offset path, so
-//! their contact speed and ripple are measured with the same yardstick as the product's: arc length between two contacts.
-//! All plan in f64 on the oracle's geometry: they get every digit that they could wish for, and what is left is theirs.
+//! The first three command the ball centre (CL). Its contact is the foot of the centre on the exact offset path, so that contact speed
+//! and feed ripple are measured as for the product: by the arc length between two contacts. All plan in f64 on the exact geometry of
+//! the oracle; the error that remains is the method's.
 #![cfg_attr(
     test,
     allow(
@@ -48,21 +48,21 @@ pub use run::{Motion, Planned, passes, planned, run};
 use job::Job;
 use oracle::OracleError;
 
-/// How the tool path is made.
+/// Approach to the tool path.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
 pub enum Kind {
-    /// Existing practice: chords of the tool centre's path, at constant speed of the tool's centre.
+    /// Existing practice: chords of the CL path, at constant CL speed.
     ConstantCl,
-    /// Lo's method 1: chords, each at the speed that keeps the contact at the feed, cut into whole periods.
+    /// Lo's method 1: chords, each at the speed that keeps the contact at the feed, divided into whole periods.
     Linear,
-    /// Lo's method 2: cubic splines for the tool centre's path and for its speed.
+    /// Lo's method 2: cubic splines for the CL path and for its speed.
     Curve,
     /// Lo's method 3, the product: the surface itself, sampled each period.
     Surface,
 }
 
 impl Kind {
-    /// All of them, in the paper's order.
+    /// All approaches, in the order of the paper.
     pub const ALL: [Self; 4] = [Self::ConstantCl, Self::Linear, Self::Curve, Self::Surface];
 
     /// The name on the command line.
@@ -76,7 +76,7 @@ impl Kind {
         }
     }
 
-    /// The approach for a job; `None` for the product, which is not planned here but runs on the core.
+    /// The approach for a job; `None` for the product, which runs on the core.
     #[must_use]
     pub fn plan_for(self, job: &Job) -> Option<Box<dyn Approach>> {
         match self {
@@ -88,14 +88,14 @@ impl Kind {
     }
 }
 
-/// Why an approach has no motion for a job.
+/// Failure of an approach.
 #[derive(Clone, Debug, PartialEq)]
 pub enum ApproachError {
-    /// The geometry has no answer.
+    /// The geometry is undefined.
     Geometry(OracleError),
-    /// A pass cannot be cut into segments within the tolerance.
+    /// A pass cannot be divided into segments within the tolerance.
     NoSegment {
-        /// Path parameter of the place.
+        /// Path parameter of the point.
         path: f64,
         /// Side parameter of the pass.
         side: f64,
@@ -116,7 +116,7 @@ impl fmt::Display for ApproachError {
             Self::Geometry(error) => error.fmt(out),
             Self::NoSegment { path, side } => write!(
                 out,
-                "no segment from path parameter {path} on the pass at {side} holds the tolerance, however short"
+                "no segment from path parameter {path} on the pass at {side} is within the tolerance, however short"
             ),
             Self::Fault(sentence) => out.write_str(sentence),
         }
@@ -126,14 +126,14 @@ impl fmt::Display for ApproachError {
 impl std::error::Error for ApproachError {}
 
 impl ApproachError {
-    /// What to do about it.
+    /// The remedy.
     #[must_use]
     pub fn remedy(&self) -> &'static str {
         match self {
             Self::Geometry(OracleError::BallDoesNotFit { .. }) => {
                 "take a smaller ball, or machine this region with another tool"
             }
-            Self::Geometry(OracleError::NoUpperSide) => "say side = \"+\" or \"-\"",
+            Self::Geometry(OracleError::NoUpperSide) => "set side = \"+\" or \"-\"",
             Self::Geometry(_) => {
                 "end the surface before this place, or take a larger scallop height or a larger ball"
             }
@@ -145,31 +145,31 @@ impl ApproachError {
     }
 }
 
-/// An approach that plans each pass before it is cut.
+/// An approach that plans each pass before it runs.
 pub trait Approach {
-    /// The pass as it is fed to a CNC.
+    /// Plans a pass.
     ///
     /// # Errors
-    /// The pass has places without a normal, or no segments within the tolerance.
+    /// The pass has points without a normal, or no segments within the tolerance.
     fn plan(&self, pass: &PassPath<'_>) -> Result<Box<dyn Program>, ApproachError>;
 }
 
-/// What takes the tool's centre after each period, mm, with a guess of its contact's path parameter.
+/// Receives the ball centre after each period, mm, and an estimate of the path parameter of its contact.
 pub type Each<'a> = dyn FnMut([f64; 3], f64) -> Result<(), ApproachError> + 'a;
 
-/// A pass as an approach feeds it to a CNC.
+/// A planned pass.
 pub trait Program {
-    /// Segments.
+    /// Number of segments.
     fn segments(&self) -> usize;
 
-    /// Appends the blocks as a CNC would read them.
+    /// Appends the blocks of a CNC program.
     fn write(&self, out: &mut String);
 
-    /// Largest step of the commanded centre's speed from one segment to the next, mm/s.
+    /// Largest step of the commanded CL speed between two segments, mm/s.
     fn speed_step_mm_s(&self) -> f64;
 
-    /// Hands on the commanded tool centre after each period, with a guess of the path parameter of its contact; the
-    /// last one is the pass's end. The pass's beginning is not among them.
+    /// Passes on the commanded ball centre after each period, with an estimate of the path parameter of its contact. The start of
+    /// the pass is not included; the last one is its end.
     ///
     /// # Errors
     /// As [`Approach::plan`].

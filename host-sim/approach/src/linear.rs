@@ -1,5 +1,5 @@
-//! Method 1: cutter contacts by chord error, the offset centres joined by straight segments, each at the speed that keeps
-//! the contact at the feed (Lo eqns 6, 7), followed by a linear interpolator that cuts a segment into whole periods.
+//! Method 1: cutter contacts by chord error, the CL points joined by straight segments, each at the speed that keeps the contact
+//! at the feed (Lo eqns 6, 7), followed by a linear interpolator that divides a segment into whole periods.
 
 use super::pass::from_segment;
 use super::{Approach, ApproachError, Each, PassPath, Program};
@@ -8,29 +8,29 @@ use job::Job;
 use oracle::vector::{add, cross, dot, length, scale, subtract};
 use oracle::{OffsetPoint, OracleError};
 
-/// Places within a chord at which its error is taken.
+/// Interior points of a chord at which its error is evaluated.
 const PROBES: u32 = 12;
-/// Share of the tolerance that they may take: of a parabola, the greatest of them is at least so much of its peak.
+/// Share of the tolerance for these points: for a parabola, the largest of them is at least this share of the peak.
 const PEAK: f64 = 1.0 - 1.0 / (PROBES * PROBES) as f64;
-/// Halvings of a step that may be tried before a pass is given up.
+/// Largest number of halvings of a step.
 const HALVINGS: u32 = 40;
-/// Steps that narrow a chord's length to what the error allows: the length is within 2^-9, the error within 2^-8.
+/// Bisections of the length of a chord: the length is within 2^-9, the error within 2^-8, relative.
 const BISECTIONS: u32 = 9;
-/// Halvings of the limit's share that evens out the chords' errors.
+/// Bisections of the share of the limit that equalises the errors of the chords.
 const EVENING: u32 = 8;
-/// A segment that takes this much more than whole periods by rounding alone does not take another.
+/// Rounding tolerance of the duration of a segment, periods: an excess below it adds no period.
 const PERIOD_SLACK: f64 = 1e-9;
-/// A step that leaves less than this share of itself to the end is the last one.
+/// A step that leaves less than this share of itself before the end is extended to the end.
 const END_SHARE: f64 = 1e-9;
 
-/// How the chords are chosen.
+/// Rule for the chords.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Chords {
     /// Lo's eqn 6 as printed, with the radius of curvature of the path: the error is estimated where the chord begins.
     Equation,
-    /// The same with the radius of the surface's normal curvature along the path.
+    /// Eqn 6 with the radius of the normal curvature of the surface along the path.
     EquationNormal,
-    /// The longest chord whose error, measured on the contact's and on the centre's path, holds the limit.
+    /// The longest chord whose error, measured on the CC and on the CL path, is within the limit.
     Held,
 }
 
@@ -54,21 +54,21 @@ impl Linear {
     }
 }
 
-/// A straight segment of the centre's path.
+/// A straight segment of the CL path.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Chord {
-    /// Path parameter where it ends.
+    /// Path parameter of the end.
     pub path: f64,
-    /// Centre where it begins, mm.
+    /// CL at the start, mm.
     pub from_mm: [f64; 3],
-    /// Centre where it ends, mm.
+    /// CL at the end, mm.
     pub to_mm: [f64; 3],
-    /// Speed of the centre, mm/s.
+    /// CL speed, mm/s.
     pub speed_mm_s: f64,
 }
 
 impl Chord {
-    /// The chord as a CNC cuts it.
+    /// The chord as a cut.
     #[must_use]
     pub fn cut(&self) -> Cut {
         Cut::line(self.from_mm, self.to_mm, self.speed_mm_s)
@@ -117,8 +117,8 @@ pub fn chords(
     Ok(chords)
 }
 
-/// As few chords as hold the limit, with their ends so that all err alike: else the last one is what is left over, and a
-/// chord of half a period runs at half the speed.
+/// The least number of chords within the limit, with equalised errors. Otherwise the last chord is the remainder, and a chord of
+/// half a period runs at half the speed.
 ///
 /// # Errors
 /// As [`chords`].
@@ -135,7 +135,7 @@ pub fn even_chords(pass: &PassPath<'_>, chord_mm: f64, feed_mm_s: f64) -> Result
     Ok(best)
 }
 
-/// Curvature of the contact's path as a space curve, 1/mm.
+/// Curvature of the CC path as a space curve, 1/mm.
 fn path_curvature(pass: &PassPath<'_>, path: f64) -> f64 {
     use job::Along;
     let (u, v) = pass.oracle.swapped(path, pass.side);
@@ -161,7 +161,7 @@ fn equation_step(pass: &PassPath<'_>, at: &OffsetPoint, chord_mm: f64, curvature
 fn held_step(pass: &PassPath<'_>, at: &OffsetPoint, chord_mm: f64) -> Result<f64, ApproachError> {
     let left = pass.left(at.path);
     let holds = |step: f64| chord_holds(pass, at, step, chord_mm);
-    // Eqn 6 for a start; doubled while it holds, halved until it does.
+    // Starts with eqn 6; doubled while within the limit, then halved until within it.
     let mut good = equation_step(pass, at, chord_mm, path_curvature(pass, at.path));
     let mut bad = None;
     for halving in 0.. {
@@ -203,7 +203,7 @@ fn held_step(pass: &PassPath<'_>, at: &OffsetPoint, chord_mm: f64) -> Result<f64
 fn chord_holds(pass: &PassPath<'_>, at: &OffsetPoint, step: f64, chord_mm: f64) -> Result<bool, OracleError> {
     let place = |share: f64| pass.at(pass.kept(at.path + share * step * pass.sense()));
     let end = place(1.0)?;
-    // From the middle outwards: a chord that does not hold mostly fails there.
+    // From the middle outwards: the error is usually largest there.
     let outwards = (1..PROBES / 2).rev().flat_map(|k| [k, PROBES - k]);
     for k in std::iter::once(PROBES / 2).chain(outwards) {
         let between = place(f64::from(k) / f64::from(PROBES))?;
@@ -229,12 +229,12 @@ impl Approach for Linear {
     }
 }
 
-/// How chords are followed.
+/// Motion along chords.
 #[derive(Clone, Copy, Debug)]
 pub(super) enum Pace {
-    /// Each in whole sampling periods, as a traditional linear interpolator does.
+    /// Each chord in whole sampling periods, as in a traditional linear interpolator.
     WholePeriods,
-    /// As if they were the exact path, at this speed of the centre, mm/s.
+    /// Along the exact path at this CL speed, mm/s.
     Constant(f64),
 }
 

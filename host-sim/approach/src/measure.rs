@@ -1,4 +1,4 @@
-//! What a run by an approach came to: the same figures for all four, by the same yardstick.
+//! Figures of a run by an approach, measured in the same way for all four.
 
 use protocol::digest::Digest;
 
@@ -11,18 +11,18 @@ use verify::survey::SurveyResult;
 /// Figures of a run.
 #[derive(Clone, Debug)]
 pub struct Measured {
-    /// What a CNC has to be fed.
+    /// Size of the CNC program.
     pub planned: Planned,
     /// What a run of the core reports too.
     pub findings: SurveyResult,
     /// Machining time, s: samples times the period, as the product counts it.
     pub time_s: f64,
-    /// Digest of all samples: tick, pass, CC and CL of each, as words.
+    /// Digest of all samples: tick, pass, CC and CL.
     pub digest: u64,
 }
 
-/// Runs a job by an approach and measures it; hands every motion on, with the speeds over its period if it ends one, and
-/// with what its check found.
+/// Runs a job by an approach and measures it. Passes on every motion, with the speeds over its period if it ends one, and the
+/// result of its check.
 ///
 /// # Errors
 /// As [`run`].
@@ -34,7 +34,7 @@ pub fn measure(
     measure_run(job, &mut each, |each| run(kind, job, each))
 }
 
-/// As [`measure`], for any way to run.
+/// As [`measure`], for a given run.
 ///
 /// # Errors
 /// Those of the run.

@@ -1,42 +1,42 @@
-//! Places of a pass close to one another, with lengths from its beginning: what curves are fitted to.
+//! Dense points of a pass with arc lengths, as the data of curve fits.
 
 use super::PassPath;
 use oracle::vector::{Vector, length};
 use oracle::{OffsetPoint, OracleError};
 
-/// Places a smooth span of the surface, and at least so many a pass.
+/// Points per smooth span of the surface, and least number of points per pass.
 const PER_SPAN: usize = 48;
 const LEAST: usize = 384;
-/// Two-point Gauss-Legendre rule on [0, 1]: 0.5 -+ 1/(2 sqrt 3). Between places so close the relative error is below 1e-9.
+/// Two-point Gauss-Legendre rule on [0, 1]: 0.5 -+ 1/(2 sqrt 3). At this density the relative error is below 1e-9.
 const GAUSS: [f64; 2] = [0.211_324_865_405_187_1, 0.788_675_134_594_812_9];
 
-/// One place.
+/// One point of a pass.
 #[derive(Clone, Copy, Debug)]
 pub struct Node {
     /// Contact and centre.
     pub at: OffsetPoint,
     /// Unit tangent of the centre's path in the direction of the cut.
     pub tangent: [f64; 3],
-    /// Length of the contact's path from the beginning, mm.
+    /// Arc length of the CC path from the start, mm.
     pub cc_length_mm: f64,
-    /// Length of the centre's path from the beginning, mm.
+    /// Arc length of the CL path from the start, mm.
     pub cl_length_mm: f64,
 }
 
 impl Node {
-    /// The centre, mm.
+    /// CL, mm.
     #[must_use]
     pub fn cl_mm(&self) -> [f64; 3] {
         self.at.contact.cl_mm
     }
 }
 
-/// The places of one pass, in the order in which they are cut; none on a pass that is one point.
+/// The points of a pass in cutting order; empty for a degenerate pass.
 #[derive(Clone, Debug)]
 pub struct Nodes(pub Vec<Node>);
 
 impl Nodes {
-    /// The places of a pass.
+    /// Computes the points of a pass.
     ///
     /// # Errors
     /// The surface has no normal somewhere on the pass.
@@ -83,7 +83,7 @@ impl Nodes {
         Ok(Self(nodes))
     }
 
-    /// Lengths of the contact's and of the centre's path, mm.
+    /// Arc lengths of the CC and the CL path, mm.
     #[must_use]
     pub fn lengths_mm(&self) -> [f64; 2] {
         self.0
@@ -91,7 +91,7 @@ impl Nodes {
             .map_or([0.0; 2], |node| [node.cc_length_mm, node.cl_length_mm])
     }
 
-    /// Least and largest speed of the centre for a unit speed of the contact.
+    /// Least and largest ratio of CL speed to CC speed.
     #[must_use]
     pub fn ratios(&self) -> [f64; 2] {
         self.0

@@ -1,4 +1,4 @@
-//! A pass in the direction in which it is cut.
+//! A pass in its cutting direction.
 
 use oracle::vector::{Vector, length, subtract};
 use oracle::{OffsetPoint, Oracle, OracleError};
@@ -6,18 +6,18 @@ use oracle::{OffsetPoint, Oracle, OracleError};
 /// One pass of a job.
 #[derive(Clone, Copy, Debug)]
 pub struct PassPath<'a> {
-    /// The job's geometry.
+    /// Geometry of the job.
     pub oracle: &'a Oracle,
     /// Number of the pass, from 0.
     pub pass: u32,
     /// Its side parameter.
     pub side: f64,
-    /// Path parameters where it begins and ends.
+    /// Path parameters of start and end.
     pub ends: [f64; 2],
 }
 
 impl PassPath<'_> {
-    /// 1, or -1 on a pass that runs against the parameter.
+    /// 1, or -1 on a reversed pass.
     #[must_use]
     pub fn sense(&self) -> f64 {
         (self.ends[1] - self.ends[0]).signum()
@@ -31,20 +31,20 @@ impl PassPath<'_> {
         self.oracle.offset(path, self.side)
     }
 
-    /// How far the path has to go from a parameter to the end, in the parameter; 0 beyond the end.
+    /// Remaining parameter range up to the end; 0 beyond the end.
     #[must_use]
     pub fn left(&self, path: f64) -> f64 {
         ((self.ends[1] - path) * self.sense()).max(0.0)
     }
 
-    /// The same place, kept on the pass.
+    /// The parameter, clamped to the pass.
     #[must_use]
     pub fn kept(&self, path: f64) -> f64 {
         let [low, high] = self.oracle.path_range();
         path.clamp(low, high)
     }
 
-    /// Whether the pass is one point, as on a pole.
+    /// Whether the pass is degenerate (one point).
     #[must_use]
     pub fn is_point(&self) -> bool {
         const PLACES: u32 = 8;

@@ -9,7 +9,7 @@ use oracle::{Oracle, OracleError, PassSample};
 
 const NM_PER_MM: f64 = 1e6;
 
-/// The tool after a period.
+/// The position of the tool after a period.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Motion {
     /// As a machine emits it.
@@ -18,24 +18,24 @@ pub struct Motion {
     pub path: f64,
     /// Side parameter of the pass.
     pub side: f64,
-    /// Tool centre, mm: not rounded, but for the product.
+    /// CL, mm; rounded only for the product.
     pub cl_mm: [f64; 3],
 }
 
-/// What a CNC has to be fed for a job.
+/// Size of the CNC program of a job.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Planned {
-    /// Passes.
+    /// Number of passes.
     pub passes: usize,
-    /// Segments; for the product the patches of its surface.
+    /// Number of segments; for the product, of patches.
     pub segments: usize,
-    /// Bytes of the program; for the product those of its header and surface.
+    /// Bytes of the program; for the product, of the header and the surface data.
     pub bytes: usize,
-    /// Largest step of the commanded centre's speed between two segments of a pass, mm/s.
+    /// Largest step of the commanded CL speed between two segments of a pass, mm/s.
     pub speed_step_mm_s: f64,
 }
 
-/// The passes of a job, by the oracle's dense scan.
+/// The passes of a job, by the dense scan of the oracle.
 ///
 /// # Errors
 /// As [`Oracle::schedule`].
@@ -60,10 +60,10 @@ pub fn passes<'a>(oracle: &'a Oracle) -> Result<Vec<PassPath<'a>>, OracleError> 
         .collect())
 }
 
-/// Runs a job by an approach of this kind, and hands every sample on.
+/// Runs a job by an approach, and passes on every sample.
 ///
 /// # Errors
-/// The geometry has no answer, a pass has no segments within the tolerance, or the core has a fault.
+/// The geometry is undefined, a pass has no segments within the tolerance, or the core has a fault.
 pub fn run(kind: Kind, job: &Job, each: &mut dyn FnMut(&Motion)) -> Result<Planned, ApproachError> {
     match kind.plan_for(job) {
         Some(approach) => {
@@ -96,7 +96,7 @@ pub fn planned(
         planned.bytes += text.len();
         planned.speed_step_mm_s = planned.speed_step_mm_s.max(program.speed_step_mm_s());
         let begin = pass.at(pass.ends[0])?.contact.cl_mm;
-        // Held back by one, because only the next one tells which is the pass's last.
+        // Delayed by one sample, because only the next one shows which is the last of the pass.
         let mut pending = motion(pass, begin, pass.ends[0], 0.0)?;
         pending.emitted.first_of_pass = true;
         let mut send = |mut motion: Motion| {
@@ -111,7 +111,7 @@ pub fn planned(
             Ok(())
         })?;
         if pending.emitted.first_of_pass {
-            // A pass that is one point: it ends where it begins.
+            // A degenerate pass ends at its start.
             let next = motion(pass, begin, pass.ends[1], 0.0)?;
             send(std::mem::replace(&mut pending, next));
         }
@@ -127,7 +127,7 @@ fn nanometres(mm: [f64; 3]) -> [i32; 3] {
     mm.map(|x| (x * NM_PER_MM).round() as i32)
 }
 
-/// The motion to a commanded centre.
+/// The motion to a commanded CL.
 fn motion(pass: &PassPath<'_>, cl_mm: [f64; 3], guess: f64, feed_mm_s: f64) -> Result<Motion, OracleError> {
     let foot = pass.oracle.foot(cl_mm, guess, pass.side)?;
     let (u, v) = pass.oracle.swapped(foot.path, pass.side);
@@ -163,7 +163,7 @@ fn of_sample(prepared: &Prepared, sample: &interp_core::Sample, first: bool) -> 
 /// The product.
 fn on_the_core(job: &Job, each: &mut dyn FnMut(&Motion)) -> Result<Planned, ApproachError> {
     let mut prepared = prepare(job).map_err(|error| ApproachError::Fault(error.to_string()))?;
-    // The approaches are compared at their feeds, as in the paper: without a machine's limits.
+    // The approaches are compared at constant feed, as in the paper: without axis limits.
     prepared.header.axes = None;
     let sentence = |fault| {
         let (what, remedy) = explain::fault(fault);

@@ -1,4 +1,4 @@
-//! IGES (5.3, fixed ASCII), entities 128, and those that become one (118, 120, 122, 190 to 198), trimmed by 143 and 144.
+//! IGES (5.3, fixed ASCII), entity 128, and those that are converted to it (118, 120, 122, 190 to 198), trimmed by 143 and 144.
 
 use std::collections::BTreeSet;
 use std::ops::Range;
@@ -11,19 +11,19 @@ use cad::Model;
 /// The reader of IGES files.
 pub(crate) struct Iges;
 
-/// Columns of a line, without its end.
+/// Columns per line, without the line end.
 const COLUMNS: usize = 80;
-/// The column of the section's letter, from 0.
+/// Column of the section letter, from 0.
 const SECTION: usize = 72;
 /// The columns of a directory entry's "entity use" in its status, from 0.
 const USE: Range<usize> = 68..70;
-/// Curves that a composite curve is followed to.
+/// Largest number of curves of a composite curve.
 const CURVES_MAX: usize = 100_000;
 
-/// The lines of a file, without their ends.
+/// The lines of a file, without line ends.
 struct Lines<'b> {
     bytes: &'b [u8],
-    /// Where each line stands.
+    /// Byte range of each line.
     ranges: Vec<Range<usize>>,
 }
 
@@ -71,7 +71,7 @@ impl Reader for Iges {
 
     fn check(&self, file: &str, bytes: &[u8]) -> Result<(), CadError> {
         let lines = Lines::new(bytes);
-        let again = "the file was cut short or changed by hand; export it again";
+        let again = "the file is truncated or was edited; export it again";
         let fault = |line: usize, what: String| Err(CadError::new(file, what, again).at_line(line));
         let mut last = b'S';
         for (number, line) in lines.ranges.iter().enumerate() {
@@ -116,7 +116,7 @@ impl Reader for Iges {
     }
 }
 
-/// Words that some programs write where a number belongs.
+/// Words that some programs write instead of numbers.
 fn check_numbers(file: &str, line: &[u8], number: usize) -> Result<(), CadError> {
     let data = &line[..line.len().min(64)];
     for word in data.split(|byte| matches!(byte, b',' | b';')) {
@@ -126,10 +126,7 @@ fn check_numbers(file: &str, line: &[u8], number: usize) -> Result<(), CadError>
             word,
             b"nan" | b"inf" | b"infinity" | b"1.#ind" | b"1.#qnan" | b"1.#inf"
         ) {
-            let what = format!(
-                "`{}` stands where a number belongs",
-                String::from_utf8_lossy(word)
-            );
+            let what = format!("`{}` is not a number", String::from_utf8_lossy(word));
             let error = CadError::new(file, what, "export the part again, or mend this entity");
             return Err(error.at_line(number));
         }
@@ -137,8 +134,8 @@ fn check_numbers(file: &str, line: &[u8], number: usize) -> Result<(), CadError>
     Ok(())
 }
 
-/// Marks the curves in a surface's parameters as such. The standard (5.3, 2.2.4.4.9.3) wants entity use 05 on the curve that a
-/// 142 calls its parameter curve; OpenCASCADE and others leave it 00, and the reader then drops the whole trimmed surface.
+/// Sets the entity use of parameter curves. The standard (5.3, 2.2.4.4.9.3) requires 05 on the parameter curve of an entity 142;
+/// OpenCASCADE and others write 00, and `cadmpeg` then drops the whole trimmed surface.
 fn mark_parameter_curves(bytes: &mut [u8]) {
     let lines = Lines::new(bytes);
     let directory: Vec<Range<usize>> = lines.of(b'D').into_iter().cloned().collect();

@@ -1,4 +1,4 @@
-//! From the reader's own model (`cadmpeg`) to faces: the only file that knows it.
+//! Conversion of the model of `cadmpeg` to faces; the only file that depends on that model, with `ir_*.rs`.
 
 use std::collections::{BTreeMap, HashMap};
 use std::io::Cursor;
@@ -22,7 +22,7 @@ use cad::Model;
 use cad::{Boundary, CadError, Curve, Face, Placement, Surface};
 use oracle::vector::Vector;
 
-/// What a file may hold: many times what the largest sound part does.
+/// Limits of a file, far above those of the largest part tested.
 const LIMITS: ResourceLimits = ResourceLimits {
     max_input_bytes: 64 << 20,
     max_decompressed_bytes_total: 256 << 20,
@@ -31,15 +31,15 @@ const LIMITS: ResourceLimits = ResourceLimits {
     max_entities: 4_000_000,
     max_recursion_depth: 96,
 };
-/// Assemblies within assemblies.
+/// Nesting depth of assemblies.
 const ASSEMBLY_DEPTH_MAX: usize = 64;
-/// Surfaces made from surfaces (offsets of offsets).
+/// Nesting depth of derived surfaces (offsets of offsets).
 pub(crate) const SURFACE_DEPTH_MAX: usize = 8;
-/// Copies of all faces that an assembly may place.
+/// Largest number of faces, with all occurrences in an assembly.
 const FACES_MAX: usize = 200_000;
-/// What is said of a surface that the reader could not make out.
+/// Text about a surface of an unsupported kind.
 const NOT_READ: &str = " is of a kind that is not read";
-/// Warnings that are passed on.
+/// Largest number of warnings.
 const WARNINGS_MAX: usize = 12;
 
 /// Reads a file with one of the codecs.
@@ -52,7 +52,7 @@ pub(crate) fn decode(file: &str, codec: &dyn Codec, bytes: Vec<u8>) -> Result<Mo
         },
     };
     let decoded = codec.decode(&mut Cursor::new(bytes), &options).map_err(|error| {
-        let what = format!("the file is broken: {}", shortened(&error.to_string()));
+        let what = format!("the file is invalid: {}", shortened(&error.to_string()));
         CadError::new(
             file,
             what,
@@ -73,7 +73,7 @@ pub(crate) fn decode(file: &str, codec: &dyn Codec, bytes: Vec<u8>) -> Result<Mo
         .filter(|loss| loss.severity >= Severity::Warning);
     let telling = losses.filter(|loss| {
         let text = loss.message.to_lowercase();
-        // What is about surfaces and lost; not what is about names, colours, or curves in parameters.
+        // Losses of surfaces; not those of names, colours, or parameter curves.
         let lost = [
             "not projected",
             "invalid",
@@ -99,7 +99,7 @@ pub(crate) fn decode(file: &str, codec: &dyn Codec, bytes: Vec<u8>) -> Result<Mo
     Ok(model)
 }
 
-/// What the reader said of the surface that a warning names.
+/// Message of `cadmpeg` about the surface that a warning names.
 fn explain<'l>(warning: &mut String, mut said: impl Iterator<Item = &'l str>) {
     let Some((named, _)) = warning.split_once(NOT_READ) else {
         return;
@@ -113,7 +113,7 @@ fn explain<'l>(warning: &mut String, mut said: impl Iterator<Item = &'l str>) {
     }
 }
 
-/// The first of a long text.
+/// Shortens a long text.
 fn shortened(text: &str) -> String {
     const LENGTH: usize = 240;
     if text.chars().count() <= LENGTH {
@@ -131,7 +131,7 @@ pub(crate) fn vector(p: &Vector3) -> Vector {
     [p.x, p.y, p.z]
 }
 
-/// Directions of a frame: reference, the one across, axis.
+/// Axes of a frame: reference direction, second direction, axis.
 pub(crate) fn frame(frame: &OrthonormalFrame3) -> [Vector; 3] {
     [frame.reference(), &frame.binormal(), frame.axis()].map(|unit| vector(unit.as_raw()))
 }
@@ -142,7 +142,7 @@ pub(crate) fn placement(transform: &Transform) -> Placement {
     }
 }
 
-/// An entity's name in its file, out of the reader's: what stands after `#`, up to where it tells the context.
+/// Name of an entity in its file, from its identifier in `cadmpeg`: the part after `#`, without the context.
 pub(crate) fn entity(id: &str) -> String {
     let key = id.rsplit('#').next().unwrap_or(id);
     match key.split('-').next() {
@@ -153,7 +153,7 @@ pub(crate) fn entity(id: &str) -> String {
     }
 }
 
-/// Sorts names as people count: 2 before 10.
+/// Natural sort key: 2 before 10.
 fn natural(id: &str) -> Vec<(u64, String)> {
     let mut key: Vec<(u64, String)> = Vec::new();
     let mut digits = String::new();
@@ -173,7 +173,7 @@ fn natural(id: &str) -> Vec<(u64, String)> {
     key
 }
 
-/// The model under translation, by name.
+/// The model with its entities by name.
 pub(crate) struct Translation<'m> {
     pub(crate) source: &'m Source,
     surfaces: HashMap<&'m str, usize>,
@@ -219,7 +219,7 @@ impl<'m> Translation<'m> {
         }
     }
 
-    /// All faces of all bodies, each where every occurrence of its part places it; then surfaces that no face uses.
+    /// All faces of all bodies, once per occurrence of their part; then surfaces without a face.
     fn model(&self, file: &str) -> Result<Model, CadError> {
         let mut model = Model::default();
         let homes = self.placements();
@@ -266,7 +266,7 @@ impl<'m> Translation<'m> {
                 model.faces.push(Face {
                     number: 0,
                     entity: name.clone(),
-                    // A mirrored surface keeps its parameters, so that its S_u x S_v turns over.
+                    // A reflection keeps the parameters, so that S_u x S_v is reversed.
                     sense: sense * turn,
                     surface,
                     boundary: placed(&boundary, &home),
@@ -279,7 +279,7 @@ impl<'m> Translation<'m> {
         Ok(model)
     }
 
-    /// Surfaces that stand in the file by themselves, as IGES files often have them.
+    /// Surfaces without a face, common in IGES files.
     fn lone_surfaces(&self, model: &mut Model) {
         let mut used: Vec<&str> = self
             .source
@@ -346,7 +346,7 @@ impl<'m> Translation<'m> {
             .collect()
     }
 
-    /// Where each body stands: once for each occurrence of a part that has it.
+    /// Placements of each body, one per occurrence of its part.
     fn placements(&self) -> BTreeMap<&'m str, Vec<Placement>> {
         let occurrences: HashMap<&str, _> = self
             .source
@@ -361,7 +361,7 @@ impl<'m> Translation<'m> {
             };
             let mut whole = Placement::IDENTITY;
             let mut next = Some(occurrence);
-            // A file whose assemblies contain each other has no top: such an occurrence is left out.
+            // Assemblies that contain each other have no root: such an occurrence is left out.
             let mut depth = 0;
             while let Some(inner) = next.filter(|_| depth < ASSEMBLY_DEPTH_MAX) {
                 let Ok(transform) = inner.effective_transform() else {
@@ -394,7 +394,7 @@ impl<'m> Translation<'m> {
     /// A surface by its name.
     fn surface(&self, id: &str, depth: usize) -> Result<Surface, String> {
         if depth > SURFACE_DEPTH_MAX {
-            return Err("its surface is made from itself".to_owned());
+            return Err("its surface is defined by itself".to_owned());
         }
         let item = self
             .surfaces
@@ -415,7 +415,7 @@ impl<'m> Translation<'m> {
         }
     }
 
-    /// Whether the surface's own normal is `- S_u x S_v`.
+    /// Whether the normal of the surface is `- S_u x S_v`.
     fn turned_over(&self, id: &str) -> bool {
         let item = self
             .surfaces
@@ -425,7 +425,7 @@ impl<'m> Translation<'m> {
         matches!(solved, Some(SolvedSurfaceGeometry::Nurbs(nurbs)) if nurbs.normal_reversed())
     }
 
-    /// A surface that is made from curves or from another surface.
+    /// A surface derived from curves or from another surface.
     fn made(&self, id: &str, depth: usize) -> Result<Surface, String> {
         let item = self
             .constructions
@@ -477,11 +477,8 @@ impl<'m> Translation<'m> {
             Made::CurveBounded { support, .. } => self.surface(support.as_str(), depth + 1),
             Made::Subset(subset) => self.surface(subset.support().as_str(), depth + 1),
             Made::SubSurface(subset) => self.surface(subset.support().as_str(), depth + 1),
-            Made::DegenerateTorus { .. } => Err("it is a torus that goes through itself".to_owned()),
-            _ => Err(format!(
-                "surface {} is made in a way that is not read",
-                entity(id)
-            )),
+            Made::DegenerateTorus { .. } => Err("it is a self-intersecting torus".to_owned()),
+            _ => Err(format!("surface {} has an unsupported construction", entity(id))),
         }
     }
 

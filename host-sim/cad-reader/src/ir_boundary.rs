@@ -1,4 +1,4 @@
-//! Boundaries of the reader's own model (`cadmpeg`) as points along smooth edges.
+//! Boundaries of the model of `cadmpeg` as points along smooth edges.
 
 use cadmpeg_ir::topology::{Coedge, Edge as SourceEdge, LoopBoundary, Sense};
 
@@ -8,7 +8,7 @@ use oracle::vector::{Vector, add, dot, length, scale, subtract};
 
 /// Points along a boundary edge, its ends included.
 const EDGE_POINTS: usize = 17;
-/// How far an edge's curve may miss its vertices, mm, before it counts as not understood.
+/// Largest distance between the ends of an edge's curve and its vertices, mm; above it the edge is not supported.
 const VERTEX_MM: f64 = 0.05;
 
 impl Translation<'_> {
@@ -19,7 +19,7 @@ impl Translation<'_> {
             let Some(item) = self.loops.get(id).and_then(|index| self.source.loops.get(*index)) else {
                 return Boundary::Unknown("a loop is missing".to_owned());
             };
-            // One vertex alone bounds nothing: it is a pole.
+            // A loop of one vertex is a degenerate boundary.
             let LoopBoundary::Ring(ring) = &item.boundary else {
                 continue;
             };
@@ -48,7 +48,7 @@ impl Translation<'_> {
         }
     }
 
-    /// The smooth parts of an edge, as points along them in the direction of its use; none for one that is a point.
+    /// The smooth parts of an edge, as points in the direction of its use; empty for a degenerate edge.
     fn edge(&self, coedge: &Coedge) -> Result<Vec<Edge>, String> {
         let edge = self
             .edges
@@ -82,7 +82,7 @@ impl Translation<'_> {
         };
         let share = |k: usize| k as f64 / (EDGE_POINTS - 1) as f64;
         if let Curve::Line { .. } = curve {
-            // A line is known by its ends, whatever its parameter.
+            // A line is defined by its ends.
             let points = (0..EDGE_POINTS).map(|k| add(start, scale(subtract(end, start), share(k))));
             return Ok(vec![points.collect()]);
         }
@@ -108,7 +108,7 @@ impl Translation<'_> {
         };
         let mut ends = vec![range[0]];
         if let Curve::Spline(spline) = curve {
-            // Some writers make one curve of a whole boundary: its corners are ends of edges.
+            // Some programs write a whole boundary as one curve: it is split at its corners.
             let corner = |knot: &f64| spline.axis.multiplicity(*knot) >= spline.axis.degree;
             let inside = |knot: &f64| *knot > range[0] && *knot < range[1];
             ends.extend(
@@ -136,7 +136,7 @@ impl Translation<'_> {
     }
 }
 
-/// A boundary, placed.
+/// A boundary, transformed by a placement.
 pub(crate) fn placed(boundary: &Boundary, by: &Placement) -> Boundary {
     match boundary {
         Boundary::Loops(loops) => Boundary::Loops(

@@ -1,4 +1,4 @@
-//! Surfaces and curves of the reader's own model (`cadmpeg`) as ours, checked: degrees, knots, weights, coordinates.
+//! Conversion of surfaces and curves of `cadmpeg`, with checks of degrees, knots, weights and coordinates.
 
 use cadmpeg_ir::geometry::nurbs::{NurbsCurve, NurbsPoleGrid, NurbsPoles3, NurbsSurface, WeightedPole3};
 use cadmpeg_ir::geometry::{SolvedCurveGeometry, SolvedSurfaceGeometry};
@@ -8,7 +8,7 @@ use cad::{Axis, DEGREE_MAX, Pole, SplineCurve, SplineSurface};
 use cad::{Curve, Surface};
 use oracle::vector::{Vector, scale};
 
-/// Coordinates beyond this are no part's, mm: a kilometre.
+/// Largest coordinate, mm: 1 km.
 const FAR_MM: f64 = 1e6;
 
 pub(crate) fn solved_surface(solved: &SolvedSurfaceGeometry, depth: usize) -> Result<Surface, String> {
@@ -101,14 +101,14 @@ fn axis(degree: u32, knots: &[f64], poles: usize) -> Result<Axis, String> {
     let [start, end] = axis.domain();
     if axis.knots.iter().any(|knot| !knot.is_finite()) || axis.knots.windows(2).any(|pair| pair[0] > pair[1])
     {
-        return Err("its knots descend or are no numbers".to_owned());
+        return Err("its knots descend or are not finite".to_owned());
     }
     if start >= end {
         return Err("its range of parameters is empty".to_owned());
     }
     let inside = axis.knots.iter().filter(|knot| **knot > start && **knot < end);
     if inside.clone().any(|knot| axis.multiplicity(*knot) > degree) {
-        return Err("it is torn at a knot that stands too often".to_owned());
+        return Err("it is discontinuous at a knot of too high multiplicity".to_owned());
     }
     Ok(axis)
 }

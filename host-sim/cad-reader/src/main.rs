@@ -1,4 +1,4 @@
-//! Reads a CAD file for `cargo sim import`, in a process of its own: `cad-reader FILE` writes `Result<Model, CadError>` as JSON to its
+//! Reads a CAD file for `cargo sim import`, in a separate process: `cad-reader FILE` writes `Result<Model, CadError>` as JSON to its
 //! standard output.
 //!
 //! Apart from `cad` because the library that knows the formats (`cadmpeg`) is twenty times as large as the rest of the tool together: it is built when
@@ -23,7 +23,7 @@ use std::process::ExitCode;
 
 fn main() -> ExitCode {
     let Some(file) = std::env::args_os().nth(1) else {
-        eprintln!("usage: cad-reader FILE (`cargo sim import` is what you want)");
+        eprintln!("usage: cad-reader FILE (called by `cargo sim import`)");
         return ExitCode::from(2);
     };
     let read = readers::read(Path::new(&file));

@@ -1,4 +1,4 @@
-//! Readers of CAD files, one a format, and the guard around them: whatever is in a file, there is an answer.
+//! Readers of CAD files, one per format, and their common guard: every file yields a model or an error.
 
 use std::path::Path;
 
@@ -6,30 +6,30 @@ use cad::{CadError, Model};
 
 use crate::{iges, rhino, step};
 
-/// Stack of a reader's thread: files nest, and what is nested is read by recursion.
+/// Stack of the thread of a reader, bytes: nested entities are read by recursion.
 const STACK_BYTES: usize = 64 << 20;
 
 /// Reads one format.
 pub(crate) trait Reader: Send {
-    /// The format's name for people.
+    /// Name of the format.
     fn format(&self) -> &'static str;
 
-    /// Endings of its files, lower case.
+    /// File extensions, lower case.
     fn endings(&self) -> &'static [&'static str];
 
-    /// Whether a file that begins like this is of the format.
+    /// Whether these first bytes of a file are of the format.
     fn recognises(&self, head: &[u8]) -> bool;
 
-    /// What can be told without reading it all: a file cut short, a number that no file has. `file` is its name.
+    /// Checks before parsing: truncation, invalid numbers. `file`: name of the file.
     ///
     /// # Errors
-    /// What is wrong, with the line.
+    /// The first error, with its line.
     fn check(&self, file: &str, bytes: &[u8]) -> Result<(), CadError>;
 
-    /// The faces, in mm, where the file's assembly places them.
+    /// The faces, in mm, at their positions in the assembly.
     ///
     /// # Errors
-    /// The file is no sound one of the format.
+    /// The file is invalid in this format.
     fn read(&self, file: &str, bytes: Vec<u8>) -> Result<Model, CadError>;
 }
 
@@ -37,10 +37,10 @@ fn readers() -> [Box<dyn Reader>; 3] {
     [Box::new(step::Step), Box::new(iges::Iges), Box::new(rhino::Rhino)]
 }
 
-/// Reads a CAD file: by its contents, whatever its name ends in.
+/// Reads a CAD file; the format is detected by its content, not by the extension.
 ///
 /// # Errors
-/// The file cannot be read, is none of the formats, is broken, or holds no faces; with its name and, where there is one, the line.
+/// The file cannot be read, has an unknown format, is invalid, or contains no faces; with its name and, if known, the line.
 pub(crate) fn read(path: &Path) -> Result<Model, CadError> {
     let file = path.display().to_string();
     let bytes = std::fs::read(path).map_err(|cause| {
@@ -58,13 +58,10 @@ pub(crate) fn read(path: &Path) -> Result<Model, CadError> {
     let named = known
         .iter()
         .position(|reader| reader.endings().contains(&ending.as_str()));
-    let told = known.iter().position(|reader| reader.recognises(&bytes));
-    let Some(chosen) = told else {
+    let recognised = known.iter().position(|reader| reader.recognises(&bytes));
+    let Some(chosen) = recognised else {
         let what = match named {
-            Some(named) => format!(
-                "this is no {} file: it does not begin like one",
-                known[named].format()
-            ),
+            Some(named) => format!("this is not a {} file: its header differs", known[named].format()),
             None => "this is neither a STEP, an IGES nor a 3DM file".to_owned(),
         };
         return Err(CadError::new(
@@ -84,7 +81,7 @@ pub(crate) fn read(path: &Path) -> Result<Model, CadError> {
         model.warnings.insert(
             0,
             format!(
-                "{file} is named as a {} file, but it is a {format} file; it was read as that",
+                "{file} has the extension of a {} file, but is a {format} file; it was read as {format}",
                 known[named].format()
             ),
         );
@@ -94,7 +91,7 @@ pub(crate) fn read(path: &Path) -> Result<Model, CadError> {
             .warnings
             .first()
             .map_or(String::new(), |first| format!(" ({first})"));
-        let what = format!("this {format} file holds no surface that can be read{reason}");
+        let what = format!("this {format} file contains no surface that can be read{reason}");
         return Err(CadError::new(
             &file,
             what,
@@ -107,7 +104,7 @@ pub(crate) fn read(path: &Path) -> Result<Model, CadError> {
     Ok(model)
 }
 
-/// Runs a reader on a thread of its own, whose stack is large: a panic of it becomes an error. Time is the caller's to limit.
+/// Runs a reader in a thread with a large stack; a panic becomes an error. The caller limits the time.
 fn guarded(file: &str, reader: Box<dyn Reader>, bytes: Vec<u8>) -> Result<Model, CadError> {
     let (format, name) = (reader.format(), file.to_owned());
     let broken = |what: String| {
@@ -126,7 +123,7 @@ fn guarded(file: &str, reader: Box<dyn Reader>, bytes: Vec<u8>) -> Result<Model,
         .unwrap_or_else(|_| Err(broken(format!("the {format} reader failed on this file"))))
 }
 
-/// The line that a byte is on, from 1.
+/// Line of a byte, from 1.
 pub(crate) fn line_of(bytes: &[u8], at: usize) -> usize {
     bytes[..at.min(bytes.len())]
         .iter()

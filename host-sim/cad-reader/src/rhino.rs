@@ -1,4 +1,4 @@
-//! 3DM (openNURBS archives, as Rhino writes them).
+//! 3DM (openNURBS archives of Rhino).
 
 use crate::ir;
 use crate::readers::Reader;
@@ -8,7 +8,7 @@ use cad::Model;
 /// The reader of 3DM files.
 pub(crate) struct Rhino;
 
-/// Shortest archive: its head and the first chunk.
+/// Least size of an archive: header and first chunk, bytes.
 const HEAD_BYTES: usize = 32;
 
 impl Reader for Rhino {
@@ -29,7 +29,7 @@ impl Reader for Rhino {
             return Ok(());
         }
         let what = format!("the archive ends after {} bytes", bytes.len());
-        Err(CadError::new(file, what, "the file was cut short; save it again"))
+        Err(CadError::new(file, what, "the file is truncated; save it again"))
     }
 
     fn read(&self, file: &str, bytes: Vec<u8>) -> Result<Model, CadError> {

@@ -8,9 +8,9 @@ use cad::Model;
 /// The reader of STEP files.
 pub(crate) struct Step;
 
-/// Deepest nesting of parentheses that a file may have: sound ones stay below 10.
+/// Largest nesting depth of parentheses; valid files stay below 10.
 const NESTING_MAX: usize = 64;
-/// Longest entity, bytes: a B-spline surface of a hundred thousand poles takes less.
+/// Largest size of an entity, bytes; a B-spline surface with 100000 poles is smaller.
 const ENTITY_MAX: usize = 16 << 20;
 
 impl Reader for Step {
@@ -40,22 +40,22 @@ impl Reader for Step {
     }
 }
 
-/// Where a scan through the text is.
+/// State of the scan.
 struct Place {
-    /// Byte at which the entity began.
+    /// First byte of the entity.
     entity: usize,
-    /// Parentheses open.
+    /// Number of open parentheses.
     open: usize,
-    /// In a section.
+    /// Inside of a section.
     section: bool,
 }
 
-/// Goes through the text once: strings and comments end, parentheses match, entities end, the file ends.
+/// Scans the text once: checks that strings, comments and entities end, parentheses match, and the file is complete.
 fn scan(file: &str, bytes: &[u8]) -> Result<(), CadError> {
     let fault = |at: usize, what: &str, remedy: &str| {
         Err(CadError::new(file, what, remedy).at_line(line_of(bytes, at)))
     };
-    let again = "the file was cut short or changed by hand; export it again";
+    let again = "the file is truncated or was edited; export it again";
     let mut place = Place {
         entity: 0,
         open: 0,
@@ -66,7 +66,7 @@ fn scan(file: &str, bytes: &[u8]) -> Result<(), CadError> {
         match bytes[at] {
             b'\'' => {
                 let Some(end) = bytes[at + 1..].iter().position(|byte| *byte == b'\'') else {
-                    return fault(at, "a text has no end", again);
+                    return fault(at, "a string has no end", again);
                 };
                 at += end + 1;
             }
@@ -84,7 +84,7 @@ fn scan(file: &str, bytes: &[u8]) -> Result<(), CadError> {
             }
             b')' => {
                 if place.open == 0 {
-                    return fault(at, "a parenthesis is closed that was not opened", again);
+                    return fault(at, "a closing parenthesis has no opening one", again);
                 }
                 place.open -= 1;
             }
@@ -107,14 +107,14 @@ fn scan(file: &str, bytes: &[u8]) -> Result<(), CadError> {
             _ => {}
         }
         if at.saturating_sub(place.entity) > ENTITY_MAX {
-            return fault(place.entity, "an entity is longer than any surface", again);
+            return fault(place.entity, "an entity is too long", again);
         }
         at += 1;
     }
     fault(bytes.len(), "the file ends before its END-ISO-10303-21", again)
 }
 
-/// The numbers of one entity are numbers, and none is beyond what a float holds.
+/// Checks the numbers of an entity: valid and finite.
 fn entity_numbers(file: &str, bytes: &[u8], start: usize, end: usize) -> Result<(), CadError> {
     let text = &bytes[start..end];
     let mut at = 0;
@@ -138,7 +138,7 @@ fn entity_numbers(file: &str, bytes: &[u8], start: usize, end: usize) -> Result<
             let value: Result<f64, _> = word.parse();
             if !value.as_ref().is_ok_and(|value| value.is_finite()) {
                 let what = format!(
-                    "`{}` is no finite number",
+                    "`{}` is not a finite number",
                     word.chars().take(40).collect::<String>()
                 );
                 let error = CadError::new(file, what, "export the part again, or mend this entity");
@@ -147,7 +147,7 @@ fn entity_numbers(file: &str, bytes: &[u8], start: usize, end: usize) -> Result<
             at += length;
             continue;
         }
-        // NaN and infinity, which some programs write where a number belongs.
+        // NaN and infinity, which some programs write instead of numbers.
         if byte.is_ascii_alphabetic() && matches!(before, b'(' | b',' | b' ' | b'\n') {
             let length = text[at..]
                 .iter()
@@ -155,10 +155,7 @@ fn entity_numbers(file: &str, bytes: &[u8], start: usize, end: usize) -> Result<
             let length = length.unwrap_or(text.len() - at);
             let word = text[at..at + length].to_ascii_lowercase();
             if matches!(word.as_slice(), b"nan" | b"inf" | b"infinity" | b"ind") {
-                let what = format!(
-                    "`{}` stands where a number belongs",
-                    String::from_utf8_lossy(&word)
-                );
+                let what = format!("`{}` is not a number", String::from_utf8_lossy(&word));
                 let error = CadError::new(file, what, "export the part again, or mend this entity");
                 return Err(error.at_line(line_of(bytes, start + at)));
             }

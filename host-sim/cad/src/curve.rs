@@ -1,4 +1,4 @@
-//! Curves in space as CAD files give them, and as rational B-splines of their exact form.
+//! Curves of CAD files, and their exact conversion to rational B-splines.
 
 use serde::{Deserialize, Serialize};
 use std::f64::consts::{FRAC_PI_2, TAU};
@@ -7,14 +7,14 @@ use super::placement::Placement;
 use super::spline::{Axis, Pole, SplineCurve};
 use oracle::vector::{Vector, add, dot, length, scale, subtract};
 
-/// Places a piece of a curve at which it is looked at, where a nearest point is sought.
+/// Seeds per piece of a curve in the search of a nearest point.
 const SEEDS: usize = 12;
-/// Newton steps from the best of them.
+/// Newton iterations from the best seed.
 const STEPS: usize = 30;
-/// An arc's angle above a multiple of 90 degrees by so little, rad, takes no further arc: the rounding of files.
+/// Tolerance of an arc's angle above a multiple of 90 degrees, rad, for rounding in files: it adds no further arc.
 const ANGLE_SLACK_RAD: f64 = 1e-9;
 
-/// Distance squared of a curve's point (given with its derivatives), and the halves of its first two derivatives.
+/// Squared distance of a curve's point (given with its derivatives), and half its first two derivatives.
 type Gap<'g> = dyn Fn(&[Vector; 3]) -> (f64, f64, f64) + 'g;
 
 /// A curve, its parameter as in STEP (ISO 10303-42). Lengths in mm.
@@ -59,7 +59,7 @@ pub enum Curve {
 }
 
 impl Curve {
-    /// The curve, placed.
+    /// The curve, transformed by a placement.
     #[must_use]
     pub fn placed(&self, by: &Placement) -> Self {
         match self {
@@ -111,7 +111,7 @@ impl Curve {
         }
     }
 
-    /// The whole range of the parameter, where there is one.
+    /// Range of the parameter; `None` if unbounded.
     #[must_use]
     pub fn domain(&self) -> Option<[f64; 2]> {
         match self {
@@ -121,14 +121,14 @@ impl Curve {
         }
     }
 
-    /// Period of the parameter, where the curve returns to itself without an end.
+    /// Period of the parameter of a closed curve.
     #[must_use]
     pub fn period(&self) -> Option<f64> {
         matches!(self, Self::Ellipse { .. }).then_some(TAU)
     }
 
-    /// The part over a range as a B-spline on the same range: exact as a set of points, and at the ends of its spans in
-    /// its parameter too.
+    /// The part over a range as a B-spline on the same range. The point set is exact; the parametrisation is exact only at the
+    /// ends of the spans.
     #[must_use]
     pub fn spline(&self, range: [f64; 2]) -> SplineCurve {
         let lifted = |p: Vector, w: f64| [p[0] * w, p[1] * w, p[2] * w, w];
@@ -178,8 +178,8 @@ impl Curve {
         }
     }
 
-    /// Parameter of the point nearest by `gap`, a function of the curve's point and its derivative: the distance squared and
-    /// half its slope, in the parameter.
+    /// Parameter of the point that minimises `gap`, a function of the curve's point and its derivatives that returns the squared
+    /// distance and half its derivatives by the parameter.
     fn least(&self, range: [f64; 2], pieces: &[f64], gap: &Gap<'_>) -> f64 {
         let mut best = (f64::INFINITY, range[0]);
         for piece in pieces.windows(2) {
@@ -268,7 +268,7 @@ pub(super) fn arcs([start, end]: [f64; 2]) -> (Axis, Vec<[f64; 3]>) {
     for k in 0..count {
         let (low, high) = (angle(k), angle(k + 1));
         let middle = 0.5 * (low + high);
-        // On the tangents' intersection, at 1 / cos(half) from the centre, with the weight cos(half).
+        // The intersection of the tangents, at 1 / cos(half) from the centre, with the weight cos(half).
         poles.push([middle.cos(), middle.sin(), half.cos()]);
         poles.push([high.cos(), high.sin(), 1.0]);
         knots.extend([high; 2]);

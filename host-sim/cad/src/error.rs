@@ -1,20 +1,20 @@
-//! What can go wrong with a CAD file: what, where, and what to do.
+//! Errors of CAD files: cause, location, remedy.
 
 use serde::{Deserialize, Serialize};
 use std::fmt;
 
-/// A fault in a CAD file, or in what is asked of it.
+/// An error of a CAD file or of its import.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct CadError {
     /// The file.
     pub file: String,
-    /// Line in it, from 1, where it is known.
+    /// Line in the file, from 1, if known.
     pub line: Option<usize>,
-    /// What is wrong, with the entity where there is one.
+    /// The cause, with the entity if known.
     pub what: String,
-    /// What to do about it.
+    /// The remedy.
     pub remedy: String,
-    /// The face's number rather than the file is to blame: a job file points at `face` then.
+    /// The error is in the number of the face, not in the file: a job file points at `face`.
     pub of_face: bool,
 }
 
@@ -31,7 +31,7 @@ impl CadError {
         }
     }
 
-    /// An error of the face that was asked for.
+    /// An error of the requested face.
     #[must_use]
     pub fn face(file: &str, what: impl Into<String>, remedy: impl Into<String>) -> Self {
         Self {
@@ -40,7 +40,7 @@ impl CadError {
         }
     }
 
-    /// The same at a line.
+    /// Sets the line.
     #[must_use]
     pub fn at_line(mut self, line: usize) -> Self {
         self.line = Some(line);

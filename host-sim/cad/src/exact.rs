@@ -1,12 +1,12 @@
-//! Surfaces over a rectangle as B-splines of their exact form: the elementary ones as rational quadratics, B-splines by
-//! cutting them.
+//! Exact conversion of surfaces over a rectangle to B-splines: elementary surfaces to rational quadratics, B-splines by
+//! knot insertion.
 
 use super::curve::{Curve, arcs};
 use super::spline::{Axis, Pole, SplineCurve, SplineSurface};
 use super::surface::Surface;
 use oracle::vector::{Vector, add, cross, dot, scale, subtract};
 
-/// `w` times a place on the axis, and the turned part beside it.
+/// Homogeneous profile point, `w` times: the point on the axis, and the radial part.
 fn lifted(on_axis: Vector, beside: Vector, w: f64) -> Pole {
     [
         on_axis[0] * w + beside[0],
@@ -24,8 +24,8 @@ fn linear(range: [f64; 2]) -> Axis {
     }
 }
 
-/// The surface over a rectangle of its parameters (which may reach over the seam of a closed one), or `None` where it has no
-/// such form.
+/// The surface over a rectangle of its parameters, which may cross the seam of a closed surface; `None` without an exact
+/// form.
 #[must_use]
 pub(super) fn exact(surface: &Surface, [u, v]: [[f64; 2]; 2]) -> Option<SplineSurface> {
     match surface {
@@ -132,7 +132,7 @@ fn unit(p: Pole) -> Pole {
     [p[0] / p[3], p[1] / p[3], p[2] / p[3], 1.0]
 }
 
-/// A profile (place on the axis, radius, weight: one each pole) turned in the frame `x`, `y`.
+/// A surface of revolution of a profile (point on the axis, radius, weight for each pole) in the frame `x`, `y`.
 fn turned(u: [f64; 2], [x, y]: [Vector; 2], axis: &Axis, profile: &[(Vector, f64, f64)]) -> SplineSurface {
     let (around, circle) = arcs(u);
     let row = |[cos, sin, w]: &[f64; 3]| {
@@ -148,7 +148,7 @@ fn turned(u: [f64; 2], [x, y]: [Vector; 2], axis: &Axis, profile: &[(Vector, f64
     }
 }
 
-/// A curve turned about an axis.
+/// A surface of revolution of a curve.
 fn revolved(profile: &SplineCurve, origin: Vector, axis: Vector, u: [f64; 2]) -> SplineSurface {
     let (around, circle) = arcs(u);
     let row = |[cos, sin, w]: &[f64; 3]| {
@@ -171,7 +171,7 @@ fn revolved(profile: &SplineCurve, origin: Vector, axis: Vector, u: [f64; 2]) ->
     }
 }
 
-/// A part of a B-spline surface; where it is closed, the part may reach over the seam.
+/// A part of a B-spline surface; it may cross the seam of a closed surface.
 fn part(spline: &SplineSurface, [u, v]: [[f64; 2]; 2]) -> SplineSurface {
     let [[u0, u1], [v0, v1]] = spline.domain();
     let across_u = pieces(u, [u0, u1]);
@@ -199,7 +199,7 @@ fn part(spline: &SplineSurface, [u, v]: [[f64; 2]; 2]) -> SplineSurface {
     rows.unwrap_or_else(|| spline.clone())
 }
 
-/// A range that may reach over the domain's end, in parts within it, and by how much each is moved.
+/// Splits a range that may exceed the domain into parts within it, each with its shift by periods.
 fn pieces(range: [f64; 2], [start, end]: [f64; 2]) -> Vec<([f64; 2], f64)> {
     let period = end - start;
     let mut parts = Vec::new();
@@ -222,7 +222,7 @@ fn transposed(spline: &SplineSurface) -> SplineSurface {
     }
 }
 
-/// One clamped surface after another in u; the boundary between them is the same, and stays a crease.
+/// Joins two clamped surfaces in u that share a boundary, which becomes a knot of multiplicity degree (C0).
 fn joined(before: &SplineSurface, after: &SplineSurface) -> SplineSurface {
     let degree = before.axes[0].degree;
     let mut knots = before.axes[0].knots[..before.axes[0].knots.len() - 1].to_vec();
@@ -235,7 +235,7 @@ fn joined(before: &SplineSurface, after: &SplineSurface) -> SplineSurface {
     }
 }
 
-/// Ranges of the parameter between which a curve is smooth, and how often it can be derived at each: what a fit must keep.
+/// Breaks of a curve and the order of continuity at each, which a fit must preserve.
 pub(super) fn joints(surface: &Surface, direction: usize, range: [f64; 2]) -> Vec<(f64, usize)> {
     let of = |axis: &Axis, shift: f64| -> Vec<(f64, usize)> {
         let breaks = axis.breaks();
@@ -257,7 +257,7 @@ pub(super) fn joints(surface: &Surface, direction: usize, range: [f64; 2]) -> Ve
         (Surface::Spline(spline), _) => {
             let axis = &spline.axes[direction];
             let [start, end] = axis.domain();
-            // Over the seam of a closed surface it goes on as it began.
+            // A closed surface is periodic across its seam.
             let mut all = of(axis, 0.0);
             all.extend(of(axis, end - start));
             all.extend(of(axis, start - end));

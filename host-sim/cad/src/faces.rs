@@ -1,11 +1,11 @@
-//! The faces that jobs ask for with `kind = "file"`.
+//! Resolves the faces of jobs with `kind = "file"`.
 
 use job::SurfaceSpec;
 use job_file::{Face, FaceError, FaceReader};
 
 use crate::{CadError, Options, machinable, read};
 
-/// Reads faces by the reader of CAD files.
+/// The [`FaceReader`] that uses the reader of CAD files.
 #[derive(Clone, Copy, Debug)]
 pub struct Faces;
 

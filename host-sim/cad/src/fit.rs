@@ -1,51 +1,51 @@
-//! A bicubic B-spline near a surface that has no exact one: interpolated at the Greville abscissae of its knots (C. de Boor, "A
-//! Practical Guide to Splines", revised ed., chapter XIII), the spans divided where it is too far off.
+//! Approximation of a surface without an exact form by a bicubic B-spline: interpolated at the Greville abscissae of its knots (C. de Boor, "A
+//! Practical Guide to Splines", revised ed., chapter XIII), the spans subdivided where the error exceeds the tolerance.
 
 use super::exact::joints;
 use super::spline::{Axis, Pole, Side, SplineSurface};
 use super::surface::Surface;
 use oracle::vector::{Vector, angle, cross, length, subtract};
 
-/// Spans in one direction that a fit may take before it is given up: no job could hold more.
+/// Largest number of spans in one direction: the data of more would not fit a job.
 const SPANS_MAX: usize = 310;
-/// Lines across, along which the spans of one direction are judged.
+/// Number of lines across, on which the error in one direction is measured.
 const LINES: usize = 17;
-/// Places in a span at which a line is judged, between its ends.
+/// Interior points per span at which the error on a line is measured.
 const PLACES: usize = 6;
-/// Places a side of a patch at which the finished fit is measured.
+/// Points per side of a patch at which the deviation of the fit is measured.
 const DENSE: usize = 9;
-/// Share of the tolerance that each direction may use; less where both together take more than all.
+/// Share of the tolerance for each direction; reduced if both together exceed the tolerance.
 const SHARE: f64 = 0.9;
-/// Rounds of that.
+/// Largest number of reductions.
 const ROUNDS: usize = 8;
 /// `|S_u x S_v|` below this share of `|S_u| |S_v|`, as at a pole, leaves no normal to compare.
 const SINE_MIN: f64 = 1e-6;
 
-/// How far a fit is from what it was fitted to, measured on a grid of places between its own.
+/// Deviation of a fit from the original, measured on a grid between the interpolated points.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Deviation {
-    /// Largest distance at equal parameters, mm: not less than the distance of the surfaces.
+    /// Largest distance at equal parameters, mm: an upper bound of the distance of the surfaces at these points.
     pub max_mm: f64,
     /// Largest angle between the normals, rad.
     pub normal_rad: f64,
-    /// Places measured.
+    /// Number of measured points.
     pub places: usize,
 }
 
-/// Why there is no fit.
+/// Failure of a fit.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) enum FitError {
-    /// The tolerance takes more spans than are allowed.
+    /// The tolerance needs more spans than [`SPANS_MAX`].
     TooManySpans,
-    /// The surface has no place at some parameters.
+    /// The surface has no point at some parameters.
     NotFinite,
 }
 
-/// Basis functions at their Greville abscissae, decomposed for solving.
+/// LU decomposition of the collocation matrix at the Greville abscissae.
 struct Collocation {
     axis: Axis,
     places: Vec<f64>,
-    /// Rows of L and U in one, and the order of the rows.
+    /// Rows of L and U in place, and the row permutation.
     factors: Vec<Vec<f64>>,
     order: Vec<usize>,
 }
@@ -127,7 +127,7 @@ fn decompose(a: &mut [Vec<f64>], degree: usize) -> Vec<usize> {
     order
 }
 
-/// Cubic knots at these breaks; `order` says how often the surface can be derived at each (3 and more: as a spline may).
+/// Cubic knots at these breaks; `order`: order of continuity of the surface at each; 3 and more adds no multiplicity.
 fn knots(breaks: &[(f64, usize)]) -> Axis {
     let mut knots = vec![breaks[0].0; 4];
     for (t, order) in &breaks[1..breaks.len() - 1] {
@@ -137,7 +137,7 @@ fn knots(breaks: &[(f64, usize)]) -> Axis {
     Axis { degree: 3, knots }
 }
 
-/// Knots of one direction with which lines in that direction are held within the tolerance.
+/// Knots of one direction with which the lines in that direction are within the tolerance.
 fn direction(
     surface: &Surface,
     k: usize,
@@ -146,7 +146,7 @@ fn direction(
 ) -> Result<Axis, FitError> {
     let (range, other) = (ranges[k], ranges[1 - k]);
     let mut breaks = vec![(range[0], 0)];
-    // A joint that a cubic spline has by itself need not be kept where it is.
+    // A break of continuity C2 or more needs no knot of its own.
     breaks.extend(
         joints(surface, k, range)
             .into_iter()
@@ -160,7 +160,7 @@ fn direction(
     let lines: Vec<f64> = (0..LINES)
         .map(|i| other[0] + (other[1] - other[0]) * i as f64 / (LINES - 1) as f64)
         .collect();
-    // Parts of each span between joints, all of one width.
+    // Number of equal parts of each span between joints.
     let mut parts = vec![1_usize; breaks.len() - 1];
     loop {
         if parts.iter().sum::<usize>() > SPANS_MAX {
@@ -188,7 +188,7 @@ fn direction(
         }
         for (parts, worst) in parts.iter_mut().zip(&worst) {
             if *worst > tolerance_mm {
-                // A cubic spline's error falls with the fourth power of the width; far off that, a step at a time.
+                // The error of a cubic spline is of order 4 in the width; limits the refinement far from that regime.
                 let wanted = (worst / tolerance_mm).powf(0.25).min(2.0) * *parts as f64;
                 #[allow(
                     clippy::cast_possible_truncation,
@@ -202,7 +202,7 @@ fn direction(
     }
 }
 
-/// The breaks, each span in so many parts; at a new one a spline is as smooth as it can be.
+/// The breaks with each span divided into `parts`; new breaks have full continuity.
 fn divided(breaks: &[(f64, usize)], parts: &[usize]) -> Vec<(f64, usize)> {
     let mut all = Vec::new();
     for (span, parts) in breaks.windows(2).zip(parts) {
@@ -222,7 +222,7 @@ fn on_curve(axis: &Axis, poles: &[Vector], t: f64) -> Vector {
     })
 }
 
-/// The spline on given knots that meets the surface at all pairs of Greville abscissae.
+/// The spline on given knots that interpolates the surface at all pairs of Greville abscissae.
 fn interpolated(surface: &Surface, axes: [Axis; 2]) -> Result<SplineSurface, FitError> {
     let [in_u, in_v] = axes.map(Collocation::new);
     let mut rows: Vec<Vec<Vector>> = Vec::with_capacity(in_u.places.len());
@@ -274,7 +274,7 @@ pub(super) fn deviation(surface: &Surface, fit: &SplineSurface) -> Deviation {
     worst
 }
 
-/// A bicubic B-spline within the tolerance of the surface over a rectangle, with about as few spans as it takes; C2
+/// A bicubic B-spline within the tolerance of the surface over a rectangle, with a nearly minimal number of spans; C2
 /// except where the surface is not.
 pub(super) fn fit(
     surface: &Surface,

@@ -1,4 +1,4 @@
-//! Parameters of a point of a surface: in closed form for the elementary ones, by Newton's method for the others.
+//! Point inversion: parameters of a point of a surface, in closed form for elementary surfaces, by Newton's method for others.
 
 use std::f64::consts::PI;
 
@@ -6,18 +6,18 @@ use super::curve::Curve;
 use super::surface::Surface;
 use oracle::vector::{Vector, cross, dot, length, scale, subtract};
 
-/// Seeds a side of each patch, where the nearest point on a B-spline surface is sought.
+/// Seeds per side of each patch in the search of the nearest point on a B-spline surface.
 const SEEDS: usize = 3;
-/// Seeds a side of the whole surface at most: a surface of many patches has several in reach of each seed.
+/// Largest number of seeds per side of the whole surface; with many patches, several share a seed.
 const SEEDS_MAX: usize = 96;
-/// Newton steps from the best of them.
+/// Newton iterations from the best seed.
 const STEPS: usize = 40;
-/// Times that a step is halved until it leads nearer.
+/// Largest number of halvings of a step that does not reduce the distance.
 const HALVINGS: i32 = 16;
 
 impl Surface {
-    /// Parameters of the point of the surface that is nearest to `to`, and how far away it is, mm. `near`: where it is likely
-    /// to be; of several the one nearest to that by the surface's periods.
+    /// Parameters of the point of the surface nearest to `to`, and its distance, mm. `near`: initial guess; on a periodic
+    /// surface the result is the one nearest to the guess.
     #[must_use]
     pub fn invert(&self, to: Vector, near: Option<[f64; 2]>) -> ([f64; 2], f64) {
         let mut start = match near {
@@ -26,7 +26,7 @@ impl Surface {
         };
         let mut found = self.refined(start, to);
         if near.is_some() && !self.closed_form() {
-            // What is on the surface is found from a near place; where that leads astray, everywhere is searched.
+            // Points on the surface are found from the guess; if that fails, the whole surface is searched.
             start = self.seed(to);
             let afresh = self.refined(start, to);
             if afresh.1 < 0.5 * found.1 {
@@ -47,7 +47,7 @@ impl Surface {
         !matches!(self, Self::Spline(_) | Self::Ruled { .. } | Self::Offset { .. })
     }
 
-    /// First guess of a point's parameters: right for the elementary surfaces, the best of many for the others.
+    /// Initial parameters of a point: exact for elementary surfaces, the best of a grid of seeds for others.
     fn seed(&self, to: Vector) -> [f64; 2] {
         let share = |from: Vector, x: Vector| dot(from, x) / dot(x, x);
         match self {
@@ -69,7 +69,7 @@ impl Surface {
             } => {
                 let from = subtract(to, *origin);
                 let (a, b, v) = (share(from, *x), share(from, *y), share(from, *z));
-                // Of the two halves of the cone, the one that the point is on.
+                // The half of the cone that the point is on.
                 let turn = if radius + slope * v < 0.0 { PI } else { 0.0 };
                 [b.atan2(a) + turn, v]
             }
@@ -123,7 +123,7 @@ impl Surface {
         }
     }
 
-    /// The nearest of a grid of places.
+    /// The nearest of a grid of points.
     fn best_of_grid(&self, to: Vector) -> [f64; 2] {
         let places = |k: usize| -> Vec<f64> {
             let range = self.domain()[k].unwrap_or([0.0, 1.0]);
@@ -135,7 +135,7 @@ impl Surface {
             };
             let wanted = (SEEDS * (breaks.len() - 1)).min(SEEDS_MAX);
             let spans = breaks.len() - 1;
-            // In the middle of cells: on a pole, no direction tells where to go.
+            // Centres of cells: at a degenerate point the gradient vanishes.
             (0..wanted)
                 .map(|i| {
                     let place = (i as f64 + 0.5) * spans as f64 / wanted as f64;
@@ -163,13 +163,13 @@ impl Surface {
         best.1
     }
 
-    /// Newton's method on the distance, within the domain; `None` of its steps leads further away.
+    /// Newton's method on the distance, within the domain; no step increases the distance.
     fn refined(&self, start: [f64; 2], to: Vector) -> ([f64; 2], f64) {
         let (domain, periods) = (self.domain(), self.periods());
         let held = |place: [f64; 2]| -> [f64; 2] {
             std::array::from_fn(|k| match (domain[k], periods[k]) {
                 (Some(range), None) => place[k].clamp(range[0], range[1]),
-                // A closed B-spline ends at its seam, though the surface goes on.
+                // The parameters of a closed B-spline wrap at its seam.
                 (Some(range), Some(period)) if matches!(self, Self::Spline(_)) => {
                     range[0] + (place[k] - range[0]).rem_euclid(period)
                 }
@@ -185,7 +185,7 @@ impl Surface {
             let near = [dot(at.u, at.u), dot(at.u, at.v), dot(at.v, at.v)];
             let bent = [dot(gap, at.uu), dot(gap, at.uv), dot(gap, at.vv)];
             let exact = std::array::from_fn(|k| near[k] + bent[k]);
-            // Newton's step, Gauss and Newton's, and each parameter by itself, as on a pole: the first that leads nearer.
+            // Newton, Gauss-Newton, then each parameter alone (at a degenerate point): the first that reduces the distance.
             let steps = [
                 solved(exact, slope),
                 solved(near, slope),
@@ -217,7 +217,7 @@ fn solved(h: [f64; 3], slope: [f64; 2]) -> Option<[f64; 2]> {
     })
 }
 
-/// The same, each equation without the other.
+/// Solution of the two equations without their coupling.
 fn apart(h: [f64; 3], slope: [f64; 2]) -> [f64; 2] {
     let alone = |slope: f64, square: f64| if square > 0.0 { -slope / square } else { 0.0 };
     [alone(slope[0], h[0]), alone(slope[1], h[2])]

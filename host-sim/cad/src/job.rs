@@ -3,23 +3,24 @@
 use std::fmt::Write;
 
 use super::machinable::outside;
-use super::{Face, Form, Machinable, Measures, measure};
+use super::{Face, Form, MachinableFace, Measures, measure};
 use job::NurbsSpec;
 
-/// Radii of balls that are chosen by themselves, mm: the usual ones of ball-end mills.
+/// Standard radii of ball-end mills for the automatic choice, mm.
 const RADII_MM: [f64; 13] = [0.25, 0.5, 0.75, 1.0, 1.5, 2.0, 2.5, 3.0, 4.0, 5.0, 6.0, 8.0, 10.0];
-/// Share of the least concave radius that a chosen ball may have: the step-over in a hollow grows without bound towards 1.
+/// Largest ball radius of the automatic choice, as a share of the least concave radius; towards 1 the step-over on a concave
+/// surface grows without bound.
 const FIT: f64 = 0.8;
-/// Feed where none is given, mm/min.
+/// Default feed, mm/min.
 const FEED_MM_MIN: f64 = 1200.0;
-/// Scallop height where none is given, mm.
+/// Default scallop height, mm.
 const SCALLOP_MM: f64 = 0.01;
-/// The mean normal's z, of 1, above which a surface counts as facing up.
+/// Least z of the mean normal of a surface that faces up.
 const UP: f64 = 0.1;
-/// Digits of a written coordinate: all that f64 has.
+/// Digits of a written coordinate: full precision of f64.
 const COLUMN: usize = 100;
 
-/// What the job is to do; what is `None` is chosen.
+/// Options of the job; `None`: chosen automatically.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct JobOptions {
     /// Ball radius, mm.
@@ -28,7 +29,7 @@ pub struct JobOptions {
     pub feed_mm_min: Option<f64>,
     /// Scallop height limit, mm.
     pub scallop_mm: Option<f64>,
-    /// Path parameter, as in job files.
+    /// Surface parameter along a pass, as in job files.
     pub along: Option<String>,
     /// Side of the tool, as in job files.
     pub side: Option<String>,
@@ -36,23 +37,22 @@ pub struct JobOptions {
     pub pattern: Option<String>,
 }
 
-/// A job file and what was chosen for it.
+/// A job file and the chosen options.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Written {
+pub struct JobText {
     /// The file's text.
     pub text: String,
     /// Ball radius, mm.
     pub radius_mm: f64,
     /// Side of the tool, as in job files.
     pub side: String,
-    /// What the surface is like.
+    /// Measures of the surface.
     pub measures: Measures,
-    /// What to know before this is cut.
+    /// Warnings for the user of the job.
     pub warnings: Vec<String>,
 }
 
-/// The tool's side: up, if the surface faces up and the material is below; else out of the material, if that is known; else
-/// any.
+/// The machined side: away from the material if known, otherwise the upper side; written as `"up"` if that side faces up.
 fn side(face: &Face, measures: &Measures) -> (&'static str, f64) {
     let up = measures.facing[2];
     let signed = |sign: f64| if sign > 0.0 { "+" } else { "-" };
@@ -64,14 +64,14 @@ fn side(face: &Face, measures: &Measures) -> (&'static str, f64) {
     }
 }
 
-/// The largest usual ball that fits the hollows of the tool's side.
+/// The largest standard radius below the least concave radius of the machined side.
 fn ball(concave_mm: Option<f64>, size_mm: f64) -> f64 {
     let room = concave_mm
         .map_or(f64::INFINITY, |radius| FIT * radius)
         .min(0.5 * size_mm);
-    let usual = RADII_MM.iter().rev().find(|radius| **radius <= room);
-    // Tighter than any usual one: whatever fits, to three digits.
-    usual.copied().unwrap_or_else(|| {
+    let standard = RADII_MM.iter().rev().find(|radius| **radius <= room);
+    // Below every standard radius: the largest radius that fits, rounded down to three digits.
+    standard.copied().unwrap_or_else(|| {
         let digits = 10.0_f64.powf(2.0 - room.log10().floor());
         (room * digits).floor() / digits
     })
@@ -79,7 +79,7 @@ fn ball(concave_mm: Option<f64>, size_mm: f64) -> f64 {
 
 /// Writes a job for a face. `source` says where it came from, for the comment.
 #[must_use]
-pub fn write_job(source: &str, face: &Face, surface: &Machinable, options: &JobOptions) -> Written {
+pub fn write_job(source: &str, face: &Face, surface: &MachinableFace, options: &JobOptions) -> JobText {
     let measures = measure(&surface.spec());
     let (chosen, sign) = side(face, &measures);
     let side = options.side.clone().unwrap_or_else(|| chosen.to_owned());
@@ -106,13 +106,13 @@ pub fn write_job(source: &str, face: &Face, surface: &Machinable, options: &JobO
     }
     if let Some(concave_mm) = concave_mm.filter(|concave_mm| *concave_mm <= radius_mm) {
         warnings.push(format!(
-            "the tightest hollow on the tool's side has a radius of {concave_mm:.4} mm: the ball of {radius_mm} mm does not fit"
+            "the least concave radius on the machined side is {concave_mm:.4} mm: the ball of {radius_mm} mm does not fit"
         ));
     }
     let text = text(
         source, face, surface, options, &measures, &warnings, radius_mm, &side,
     );
-    Written {
+    JobText {
         text,
         radius_mm,
         side,
@@ -125,7 +125,7 @@ pub fn write_job(source: &str, face: &Face, surface: &Machinable, options: &JobO
 fn text(
     source: &str,
     face: &Face,
-    surface: &Machinable,
+    surface: &MachinableFace,
     options: &JobOptions,
     measures: &Measures,
     warnings: &[String],
@@ -156,28 +156,28 @@ fn text(
     out.push('\n');
     write_surface(&mut out, &surface.nurbs);
     let or = |given: &Option<String>, default: &str| given.clone().unwrap_or_else(|| default.to_owned());
-    let hollow = match measures.concave_mm {
-        [None, None] => "the surface is hollow nowhere".to_owned(),
+    let concave = match measures.concave_mm {
+        [None, None] => "the surface is not concave".to_owned(),
         [plus, minus] => {
-            let told =
+            let shown =
                 |radius: Option<f64>| radius.map_or("none".to_owned(), |radius| format!("{radius:.4} mm"));
             format!(
                 "least concave radius: {} seen from +, {} from -",
-                told(plus),
-                told(minus)
+                shown(plus),
+                shown(minus)
             )
         }
     };
     let _ = write!(
         out,
-        "\n[tool]\nkind = \"ball\"\nradius_mm = {radius_mm}               # {hollow}\n\n\
+        "\n[tool]\nkind = \"ball\"\nradius_mm = {radius_mm}               # {concave}\n\n\
          [cut]\n\
          feed_mm_min = {}           # of the cutter contact along the surface\n\
-         scallop_mm = {}            # height of the ridge that may remain between passes\n\
-         along = \"{}\"                # the parameter that runs along a pass\n\
-         side = \"{side}\"                # where the tool is: \"up\", or the sign on S_u x S_v\n\
-         pattern = \"{}\"              # \"zig\": every pass the same way; \"zigzag\": to and fro\n\
-         chord_mm = 0.005            # only for the approaches that cut chords\n\n\
+         scallop_mm = {}            # scallop height limit between passes\n\
+         along = \"{}\"                # surface parameter along a pass\n\
+         side = \"{side}\"                # machined side: \"up\", or the sign on S_u x S_v\n\
+         pattern = \"{}\"              # \"zig\": every pass in the same direction; \"zigzag\": alternating\n\
+         chord_mm = 0.005            # chord error limit, for export and the approaches made of chords\n\n\
          [machine]\n\
          period_us = 1000            # sampling period\n",
         options.feed_mm_min.unwrap_or(FEED_MM_MIN),
@@ -218,7 +218,7 @@ fn write_surface(out: &mut String, nurbs: &NurbsSpec) {
     };
     let _ = writeln!(
         out,
-        "# {what}; one block for each pole along u, in it the poles along v\npoles_mm = ["
+        "# {what}; one block per pole along u, containing the poles along v\npoles_mm = ["
     );
     for row in &nurbs.poles_mm {
         out.push_str("    [\n");

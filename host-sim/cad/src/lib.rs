@@ -1,17 +1,17 @@
-//! Surfaces out of CAD files: from a STEP, IGES or 3DM file to the `[surface]` of a job.
+//! Import of surfaces: from a face of a STEP, IGES or 3DM file to the `[surface]` of a job.
 //!
 //! ```text
-//! file ──reader.rs──► Face: Surface (exact, mm, placed) + boundary      a program of its own, `host-sim/cad-reader`
+//! file ──reader.rs──► Face: Surface (exact, mm, placed) + boundary      a separate program, `host-sim/cad-reader`
 //!                     │ outline.rs     boundary -> a rectangle of (u, v), and whether the boundary is that rectangle
 //!                     ▼
 //!                   Surface over a rectangle
-//!                     │ exact.rs       analytic -> rational quadratics; B-splines cut by knot insertion; degree <= 3
-//!                     │ fit.rs         what has no such form: a bicubic B-spline within a tolerance, measured
+//!                     │ exact.rs       analytic -> rational quadratics; B-splines by knot insertion; degree <= 3
+//!                     │ fit.rs         others: a bicubic B-spline within a tolerance, measured
 //!                     ▼
 //!                   NurbsSpec ──measure.rs──► size, least concave radius ──job.rs──► a job file
 //! ```
 //!
-//! Nothing here is in the sample path: lengths are f64 mm, angles rad.
+//! Not in the sample path: f64; lengths in mm, angles in rad.
 #![cfg_attr(
     test,
     allow(
@@ -43,8 +43,8 @@ pub use curve::Curve;
 pub use error::CadError;
 pub use faces::Faces;
 pub use fit::Deviation;
-pub use job::{JobOptions, Written, write_job};
-pub use machinable::{Form, Machinable, Options, degrees, machinable};
+pub use job::{JobOptions, JobText, write_job};
+pub use machinable::{Form, MachinableFace, Options, degrees, machinable};
 pub use measure::{Measures, measure};
 pub use outline::{Outline, outline};
 pub use placement::Placement;
@@ -58,30 +58,30 @@ use serde::{Deserialize, Serialize};
 /// One smooth boundary edge as points along it, mm, in the order of the loop.
 pub type Edge = Vec<Vector>;
 
-/// How a face is bounded.
+/// Boundary of a face.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub enum Boundary {
-    /// By the surface's own ends.
+    /// The boundary of the surface itself.
     Natural,
-    /// By closed loops of edges.
+    /// Closed loops of edges.
     Loops(Vec<Vec<Edge>>),
-    /// By something that could not be read; the text says what.
+    /// A boundary that could not be read, and the reason.
     Unknown(String),
 }
 
-/// A face as its file gives it, in mm, where its assembly places it.
+/// A face of a file, in mm, at its position in the assembly.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Face {
-    /// Number for people, from 1, in the order of the file.
+    /// Number of the face, from 1, in the order of the file.
     pub number: usize,
-    /// Its entity in the file, e.g. `#141` or `D5`.
+    /// Name of its entity in the file, e.g. `#141` or `D5`.
     pub entity: String,
-    /// The surface that it lies on.
+    /// Its untrimmed surface.
     pub surface: Surface,
     /// Its boundary.
     pub boundary: Boundary,
-    /// Sign of the face's own normal on `S_u x S_v`.
+    /// Sign of the normal of the face on `S_u x S_v`.
     pub sense: f64,
-    /// It bounds a solid, so that its normal points out of the material.
+    /// Whether it bounds a solid; its normal then points out of the material.
     pub solid: bool,
 }

@@ -1,4 +1,4 @@
-//! A face as the surface of a job: exact where the core's degree allows, else a fit within a tolerance.
+//! Conversion of a face to the surface of a job: exact up to the degree of the core, otherwise fitted within a tolerance.
 
 use super::exact::exact;
 use super::fit::{Deviation, FitError, deviation, fit};
@@ -8,14 +8,14 @@ use job::{NurbsSpec, SurfaceSpec};
 use job_file::{TOLERANCE_DEFAULT_MM, TOLERANCE_MAX_MM};
 use machine::prepare::patch_count;
 
-/// Highest degree of a job's surface.
+/// Highest degree of the surface of a job.
 const DEGREE_EXACT: usize = 3;
-/// What is asked of an import.
+/// Options of an import.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Options {
-    /// How far a fit may be from the surface, mm.
+    /// Largest deviation of a fit from the surface, mm.
     pub tolerance_mm: f64,
-    /// Take the rectangle around the boundary where a face is trimmed otherwise.
+    /// Accept a trimmed face, as the rectangle around its boundary.
     pub untrimmed: bool,
 }
 
@@ -28,34 +28,34 @@ impl Default for Options {
     }
 }
 
-/// What became of a surface.
+/// Form of a converted surface.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Form {
-    /// The surface itself.
+    /// Exact.
     Exact,
-    /// A bicubic B-spline near it.
+    /// Approximated by a bicubic B-spline.
     Fitted {
-        /// Why.
+        /// Reason of the approximation.
         why: String,
-        /// How near, as measured.
+        /// Measured deviation.
         deviation: Deviation,
     },
 }
 
-/// A face that a job can cut.
+/// A face converted for a job.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Machinable {
+pub struct MachinableFace {
     /// The surface.
     pub nurbs: NurbsSpec,
     /// Exact or not.
     pub form: Form,
-    /// What of the face's surface it is.
+    /// The part of the surface that the face uses.
     pub outline: Outline,
     /// Patches on the board.
     pub patches: usize,
 }
 
-impl Machinable {
+impl MachinableFace {
     /// The surface of a job.
     #[must_use]
     pub fn spec(&self) -> SurfaceSpec {
@@ -63,7 +63,7 @@ impl Machinable {
     }
 }
 
-/// The job's surface out of a B-spline of degree up to 3.
+/// The surface of a job from a B-spline of degree up to 3.
 fn nurbs(spline: &SplineSurface) -> NurbsSpec {
     let rational = spline.rational();
     let plain = |pole: &[f64; 4]| {
@@ -88,17 +88,17 @@ fn nurbs(spline: &SplineSurface) -> NurbsSpec {
     }
 }
 
-/// Patches that the board holds of this surface, or why it does not hold it.
+/// Number of patches of this surface on the board, or the reason why it does not fit.
 fn patches(nurbs: &NurbsSpec) -> Result<usize, String> {
     patch_count(&SurfaceSpec::Nurbs(nurbs.clone()))
 }
 
-/// Makes a face's surface one of a job.
+/// Converts a face to the surface of a job.
 ///
 /// # Errors
-/// The face is trimmed and `untrimmed` was not asked for; it is endless; no fit within the tolerance is small enough for the
-/// board; a tolerance out of range.
-pub fn machinable(file: &str, face: &Face, options: &Options) -> Result<Machinable, CadError> {
+/// The face is trimmed and `untrimmed` is not set; it is unbounded; no fit within the tolerance is small enough for the
+/// board; the tolerance is out of range.
+pub fn machinable(file: &str, face: &Face, options: &Options) -> Result<MachinableFace, CadError> {
     let name = format!("face {} ({}, {})", face.number, face.entity, face.surface.kind());
     if !(options.tolerance_mm > 0.0 && options.tolerance_mm <= TOLERANCE_MAX_MM) {
         let what = format!(
@@ -129,7 +129,7 @@ pub fn machinable(file: &str, face: &Face, options: &Options) -> Result<Machinab
             let nurbs = nurbs(&spline);
             match patches(&nurbs) {
                 Ok(patches) => {
-                    return Ok(Machinable {
+                    return Ok(MachinableFace {
                         nurbs,
                         form: Form::Exact,
                         outline,
@@ -152,7 +152,7 @@ fn fitted(
     outline: Outline,
     why: String,
     name: &str,
-) -> Result<Machinable, CadError> {
+) -> Result<MachinableFace, CadError> {
     let too_fine = |what: String| {
         CadError::face(
             file,
@@ -179,7 +179,7 @@ fn fitted(
     let patches = patches(&nurbs)
         .map_err(|still| too_fine(format!("of a fit within {} mm {still}", options.tolerance_mm)))?;
     let deviation = deviation(&face.surface, &spline);
-    Ok(Machinable {
+    Ok(MachinableFace {
         nurbs,
         form: Form::Fitted { why, deviation },
         outline,
@@ -187,13 +187,13 @@ fn fitted(
     })
 }
 
-/// Where the tool goes: the sign on `S_u x S_v` out of the material, if the face tells.
+/// Sign on `S_u x S_v` of the direction out of the material; `None` if the face does not bound a solid.
 #[must_use]
 pub(super) fn outside(face: &Face) -> Option<f64> {
     face.solid.then_some(face.sense)
 }
 
-/// The surface's degrees in u and v, as its file has it.
+/// Degrees of the surface in u and v in its file.
 #[must_use]
 pub fn degrees(surface: &Surface) -> Option<[usize; 2]> {
     match surface {

@@ -1,31 +1,32 @@
-//! What a surface is like: its size, and how tight its hollows are on either side.
+//! Measures of a surface: bounding box, least concave radius on either side, mean normal.
 
 use job::Along;
 use job::SurfaceSpec;
 use oracle::vector::{cross, dot, length, scale};
 use oracle::{Derivatives, Surface};
 
-/// Places a side of each patch at which a surface is looked at.
+/// Points per side of each patch at which a surface is evaluated.
 const PLACES: usize = 8;
-/// Places a side of the whole surface at most.
+/// Largest number of points per side of the whole surface.
 const PLACES_MAX: usize = 240;
-/// Rounds of a finer look around the tightest place, each on a grid a third as wide.
+/// Refinements around the point of largest curvature, each on a grid a third as wide.
 const ROUNDS: usize = 12;
-/// `|S_u x S_v|` below this share of `|S_u| |S_v|` leaves no curvature.
+/// `|S_u x S_v|` below this share of `|S_u| |S_v|`: degenerate, no curvature.
 const SINE_MIN: f64 = 1e-6;
-/// A derivative below this share of the other one, each times its range, is too near a pole: rounding grows as its inverse.
+/// A derivative below this share of the other one, each times its range: too near a degenerate point, where rounding grows as
+/// its inverse.
 const POLE_SHARE: f64 = 1e-3;
-/// Curvature below which a side counts as nowhere hollow, 1/mm: a radius of a kilometre.
+/// Curvature below which a side counts as not concave, 1/mm: a radius of 1 km.
 const FLAT: f64 = 1e-6;
 
-/// Figures of a surface. "Plus" is the side to which `S_u x S_v` points.
+/// Measures of a surface. The plus side is the one to which `S_u x S_v` points.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Measures {
-    /// Corners of the box around it, mm.
+    /// Corners of the bounding box, mm.
     pub corners_mm: [[f64; 3]; 2],
-    /// Least radius of a hollow seen from the plus and from the minus side, mm; `None` where there is none.
+    /// Least concave radius on the plus and on the minus side, mm; `None` on a side that is not concave.
     pub concave_mm: [Option<f64>; 2],
-    /// The normal's mean, `S_u x S_v` over the area, of length 1 for a flat surface.
+    /// Mean normal: integral of `S_u x S_v` over the area; length 1 for a plane.
     pub facing: [f64; 3],
 }
 
@@ -57,7 +58,7 @@ fn principal(at: &Derivatives, ranges: [f64; 2]) -> Option<[f64; 2]> {
     Some([mean - spread, mean + spread])
 }
 
-/// Scans a surface densely.
+/// Measures a surface on a dense grid.
 #[must_use]
 pub fn measure(spec: &SurfaceSpec) -> Measures {
     let surface = Surface::new(spec);
@@ -115,7 +116,7 @@ pub fn measure(spec: &SurfaceSpec) -> Measures {
     }
 }
 
-/// Widest gap between places.
+/// Largest distance between adjacent points.
 fn width(places: &[f64]) -> f64 {
     places
         .windows(2)
@@ -123,7 +124,7 @@ fn width(places: &[f64]) -> f64 {
         .fold(0.0, f64::max)
 }
 
-/// The largest curvature near the place that a coarser look found.
+/// The largest curvature near the point found on the coarse grid.
 fn sharpened(surface: &Surface, side: usize, found: (f64, [f64; 2]), mut widths: [f64; 2]) -> f64 {
     let (mut best, mut place) = found;
     let domain = surface.domain();

@@ -1,34 +1,34 @@
-//! A face's boundary in its surface's parameters: a rectangle, or something else around which a rectangle lies.
+//! The boundary of a face in the parameters of its surface: a rectangle, or a trimmed region with its bounding rectangle.
 
 use super::surface::Surface;
 use super::{Boundary, Edge, Face};
 use oracle::vector::length;
 
-/// How far an edge may be from a parameter line to count as lying on it, mm. Files state their edges to 1e-3 to 1e-7 mm.
+/// Tolerance of an edge on an iso-parametric line, mm. Edges in files are accurate to 1e-3 to 1e-7 mm.
 const FOLLOWS_MM: f64 = 1e-3;
-/// A derivative shorter than this, times its range, is that of a pole, mm.
+/// A derivative shorter than this, times its range, is that of a degenerate boundary, mm.
 const POLE_MM: f64 = 1e-6;
-/// Shares of the enclosing rectangle's area by which a loop that follows parameter lines may differ from it: an L differs by
-/// much more.
+/// Largest difference between the area of a loop of iso-parametric lines and that of its bounding rectangle, as a share: an
+/// L shape differs by much more.
 const AREA_SLACK: f64 = 1e-3;
 
-/// What of a surface a face uses.
+/// The part of a surface that a face uses.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Outline {
-    /// Ranges of u and v. Those of a closed surface may reach over the seam.
+    /// Ranges of u and v. Those of a closed surface may cross the seam.
     pub rectangle: [[f64; 2]; 2],
-    /// Why the face is not that whole rectangle; `None` where it is.
+    /// Reason why the face is trimmed; `None` if it is the whole rectangle.
     pub trimmed: Option<String>,
 }
 
-/// A loop, in parameters.
+/// A boundary loop in parameters.
 struct Path {
     edges: Vec<Vec<[f64; 2]>>,
-    /// Turns that it takes around the surface in u and in v.
+    /// Winding numbers in u and in v.
     winding: [f64; 2],
-    /// Touches a boundary that is a single point.
+    /// Touches a degenerate boundary.
     pole: bool,
-    /// Farthest that a boundary point lies off the surface, mm.
+    /// Largest distance of a boundary point from the surface, mm.
     off_mm: f64,
 }
 
@@ -40,14 +40,14 @@ impl Path {
         })
     }
 
-    /// How far a curved edge may reach beyond its points: the height of an arc through three of them, doubled.
+    /// Bound on the distance of a curved edge from its points: twice the sagitta of an arc through three of them.
     fn sag(&self, k: usize) -> f64 {
         let triples = self.edges.iter().flat_map(|edge| edge.windows(3));
         let bend = triples.map(|t| (t[0][k] - 2.0 * t[1][k] + t[2][k]).abs());
         0.25 * bend.fold(0.0, f64::max)
     }
 
-    /// Area that the loop encloses in the parameters, by the trapezoid rule.
+    /// Enclosed area in parameters, by the trapezoid rule.
     fn area(&self) -> f64 {
         let places: Vec<[f64; 2]> = self.edges.iter().flatten().copied().collect();
         let next = places.iter().cycle().skip(1);
@@ -56,13 +56,13 @@ impl Path {
     }
 }
 
-/// The speed of the parameter k, mm per unit.
+/// Length of the derivative by parameter k, mm per unit.
 fn speed(surface: &Surface, place: [f64; 2], k: usize) -> f64 {
     let at = surface.at(place[0], place[1]);
     length(if k == 0 { at.u } else { at.v })
 }
 
-/// Length of a unit of the parameter that matters: its period, its range, or 1.
+/// Scale of the parameter: its period, its range, or 1.
 fn reach(surface: &Surface, k: usize) -> f64 {
     let range = surface.domain()[k].map_or(1.0, |[low, high]| high - low);
     surface.periods()[k].unwrap_or(range)
@@ -109,7 +109,7 @@ fn trace(surface: &Surface, edges: &[Edge]) -> Path {
     path
 }
 
-/// On a pole the parameter k around it is anything: it is that of the edge's nearest place beside the pole.
+/// At a degenerate point the parameter k is undefined; takes that of the nearest other point of the edge.
 fn off_the_pole(places: &mut [[f64; 2]], polar: &[[bool; 2]], k: usize) {
     let beside: Vec<usize> = (0..places.len()).filter(|index| !polar[*index][k]).collect();
     for index in (0..places.len()).filter(|index| polar[*index][k]) {
@@ -119,7 +119,7 @@ fn off_the_pole(places: &mut [[f64; 2]], polar: &[[bool; 2]], k: usize) {
     }
 }
 
-/// The edge lies on a line of the constant parameter k.
+/// Whether the edge lies on a line of constant parameter k.
 fn constant(surface: &Surface, edge: &[[f64; 2]], k: usize) -> bool {
     let [low, high] = edge
         .iter()
@@ -133,17 +133,17 @@ fn constant(surface: &Surface, edge: &[[f64; 2]], k: usize) -> bool {
     0.5 * (high - low) * fastest <= FOLLOWS_MM
 }
 
-/// The rectangle that a face's boundary is or that lies around it.
+/// The bounding rectangle of a face in parameters, and whether the face is that rectangle.
 ///
 /// # Errors
-/// A text: the face has no ends, or its boundary does not lie on its surface.
+/// The face is unbounded, or its boundary is not on its surface; as text.
 pub fn outline(face: &Face) -> Result<Outline, String> {
     let surface = &face.surface;
     let natural = || {
         let [u, v] = surface.domain();
         match (u, v) {
             (Some(u), Some(v)) => Ok([u, v]),
-            _ => Err(format!("the {} has no boundary: it is endless", surface.kind())),
+            _ => Err(format!("the {} has no boundary: it is unbounded", surface.kind())),
         }
     };
     let loops = match &face.boundary {
@@ -183,7 +183,7 @@ pub fn outline(face: &Face) -> Result<Outline, String> {
         (off_mm > 10.0 * FOLLOWS_MM).then(|| format!("its boundary lies {off_mm:.4} mm off its surface"))
     });
     if rectangle.iter().flatten().any(|x| !x.is_finite()) || rectangle.iter().any(|r| r[0] >= r[1]) {
-        return Err("its boundary encloses nothing".to_owned());
+        return Err("its boundary encloses no area".to_owned());
     }
     Ok(Outline { rectangle, trimmed })
 }
@@ -200,7 +200,8 @@ fn around(paths: &[Path]) -> [[f64; 2]; 2] {
     })
 }
 
-/// A face whose loops go around nothing: a rectangle if there is one loop that follows four parameter lines. Returns why not.
+/// A face whose loops do not wind around the surface: a rectangle if it has one loop of four iso-parametric lines. Returns the
+/// reason if not.
 fn single(surface: &Surface, paths: &[Path], rectangle: &mut [[f64; 2]; 2]) -> Option<String> {
     let mut whole_turn = false;
     for (k, range) in rectangle.iter_mut().enumerate() {
@@ -211,7 +212,7 @@ fn single(surface: &Surface, paths: &[Path], rectangle: &mut [[f64; 2]; 2]) -> O
             .map(|place| speed(surface, *place, k))
             .fold(0.0, f64::max);
         if let Some(period) = surface.periods()[k].filter(|_| (high - low) * widest <= FOLLOWS_MM) {
-            // All of the boundary is the seam: the face goes all the way round.
+            // The boundary consists of the seam alone: the face covers a whole period.
             *range = [low, low + period];
             whole_turn = true;
         }
@@ -222,7 +223,7 @@ fn single(surface: &Surface, paths: &[Path], rectangle: &mut [[f64; 2]; 2]) -> O
     for (number, edge) in path.edges.iter().enumerate() {
         if !(0..2).any(|k| constant(surface, edge, k)) {
             return Some(format!(
-                "its boundary's edge {} follows no parameter line",
+                "its boundary's edge {} is not an iso-parametric line",
                 number + 1
             ));
         }
@@ -235,7 +236,8 @@ fn single(surface: &Surface, paths: &[Path], rectangle: &mut [[f64; 2]; 2]) -> O
     None
 }
 
-/// A face whose loops go around the surface in the parameter k: a belt between two lines, or between a line and a pole.
+/// A face whose loops wind around the surface in parameter k: a belt between two lines, or between a line and a degenerate
+/// boundary.
 fn belt(
     surface: &Surface,
     paths: &[Path],
@@ -264,7 +266,7 @@ fn belt(
             if constant(surface, edge, across) {
                 bounds.push(edge[0][across]);
             } else if !constant(surface, edge, k) {
-                trimmed = Some("its boundary follows no parameter line".to_owned());
+                trimmed = Some("its boundary is not an iso-parametric line".to_owned());
             }
         }
     }
@@ -279,7 +281,7 @@ fn belt(
             .fold(0.0, f64::max)
         <= FOLLOWS_MM;
     if turning.len() == 1 && flat {
-        // One line alone: the material lies to its left, as the face's normal sees it.
+        // A single line: the face is to its left, seen against the normal of the face.
         let left = turning[0].winding[k] * sense * if k == 0 { 1.0 } else { -1.0 };
         let end = surface.domain()[across]
             .map(|range| if left > 0.0 { range[1] } else { range[0] })
@@ -288,14 +290,14 @@ fn belt(
                 _ => None,
             });
         let Some(end) = end else {
-            return Err("its boundary leaves it endless".to_owned());
+            return Err("its boundary leaves it unbounded".to_owned());
         };
         rectangle[across] = [low.min(end), high.max(end)];
     }
     if trimmed.is_none() && turning.len() > 2 {
         trimmed = Some(format!("it has {} boundaries", turning.len()));
     }
-    // A belt between a line that is followed and something else in between.
+    // Further loops inside of the belt.
     let [low, high] = rectangle[across];
     let ends = |bound: &f64| {
         let slack = FOLLOWS_MM / speed(surface, [start, *bound], across).max(f64::MIN_POSITIVE);
@@ -307,7 +309,7 @@ fn belt(
     Ok(trimmed)
 }
 
-/// The rectangle within the surface's domain, its ends exactly on those of the domain where they are that to rounding.
+/// The rectangle within the domain of the surface; ends that differ from those of the domain by rounding are set to them.
 fn settled(surface: &Surface, rectangle: [[f64; 2]; 2]) -> [[f64; 2]; 2] {
     let middle = rectangle.map(|[low, high]| 0.5 * (low + high));
     std::array::from_fn(|k| {
@@ -315,7 +317,7 @@ fn settled(surface: &Surface, rectangle: [[f64; 2]; 2]) -> [[f64; 2]; 2] {
         let slack = FOLLOWS_MM / speed(surface, middle, k).max(f64::MIN_POSITIVE);
         let (domain, period) = (surface.domain()[k], surface.periods()[k]);
         if let (Some(range), Some(period)) = (domain, period) {
-            // Back by whole turns, so that it begins within the domain.
+            // Shifted by whole periods, so that it begins within the domain.
             let turns = ((low - range[0] + slack.min(0.25 * period)) / period).floor();
             (low, high) = (low - turns * period, high - turns * period);
             if (high - low - period).abs() <= slack || high - low > period {

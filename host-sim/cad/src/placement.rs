@@ -1,10 +1,10 @@
-//! Where a part stands: an affine map, rigid but for a scale.
+//! Placement of a part: an affine map.
 
 use super::spline::Pole;
 use oracle::vector::{Vector, cross, dot, length};
 use serde::{Deserialize, Serialize};
 
-/// How far a placement's matrix may be from a rotation times a scale, relative: the rounding of files.
+/// Relative tolerance of a placement's matrix against a rotation times a scale, for rounding in files.
 const SIMILARITY_SLACK: f64 = 1e-6;
 
 /// `rows` times a point, the last column added. mm.
@@ -15,12 +15,12 @@ pub struct Placement {
 }
 
 impl Placement {
-    /// Where it is.
+    /// The identity.
     pub const IDENTITY: Self = Self {
         rows: [[1.0, 0.0, 0.0, 0.0], [0.0, 1.0, 0.0, 0.0], [0.0, 0.0, 1.0, 0.0]],
     };
 
-    /// `self` after `inner`.
+    /// Composition: applies `inner`, then `self`.
     #[must_use]
     pub fn after(&self, inner: &Self) -> Self {
         let rows = std::array::from_fn(|i| {
@@ -32,20 +32,20 @@ impl Placement {
         Self { rows }
     }
 
-    /// A point, placed.
+    /// Transforms a point.
     #[must_use]
     pub fn point(&self, p: Vector) -> Vector {
         self.rows
             .map(|row| row[0] * p[0] + row[1] * p[1] + row[2] * p[2] + row[3])
     }
 
-    /// A vector, turned and scaled.
+    /// Transforms a vector: rotation and scale.
     #[must_use]
     pub fn vector(&self, p: Vector) -> Vector {
         self.rows.map(|row| row[0] * p[0] + row[1] * p[1] + row[2] * p[2])
     }
 
-    /// A homogeneous point, placed.
+    /// Transforms a homogeneous point.
     #[must_use]
     pub fn pole(&self, p: Pole) -> Pole {
         let [x, y, z] = self
@@ -58,13 +58,13 @@ impl Placement {
         self.rows.map(|row| row[k])
     }
 
-    /// Whether it mirrors.
+    /// Whether it contains a reflection.
     #[must_use]
     pub fn mirrors(&self) -> bool {
         dot(cross(self.column(0), self.column(1)), self.column(2)) < 0.0
     }
 
-    /// The scale, if the map is a rotation or reflection, a scale and a move.
+    /// The scale if the map is a similarity, otherwise `None`.
     #[must_use]
     pub fn similarity(&self) -> Option<f64> {
         let columns: [Vector; 3] = std::array::from_fn(|k| self.column(k));

@@ -1,5 +1,5 @@
-//! The reader of CAD files: a program of its own (`host-sim/cad-reader`), built when the first file is read, and stopped when it takes too
-//! long. So whatever is in a file, there is an answer in bounded time.
+//! The reader of CAD files: a separate program (`host-sim/cad-reader`), built for the first file and ended at a time limit, so that every
+//! file yields a model or an error in bounded time.
 
 use std::io::Read;
 use std::path::Path;
@@ -11,7 +11,7 @@ use serde::{Deserialize, Serialize};
 use super::{CadError, Face};
 use programs::Part;
 
-/// Largest file that is read, bytes: a file takes some 30 times its size in memory.
+/// Largest file, bytes; reading takes about 30 times the size of the file in memory.
 const BYTES_MAX: u64 = 64 << 20;
 /// From this size on, bytes, a checkout builds and takes the optimised reader. The other takes 2 s of processor time for each MB of STEP,
 /// and would not read the largest files in [`TIME_MAX`].
@@ -21,16 +21,16 @@ const TIME_MAX: Duration = Duration::from_secs(120);
 /// What a file holds.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Model {
-    /// Its faces, numbered from 1 in the order of the file.
+    /// The faces, numbered from 1 in the order of the file.
     pub faces: Vec<Face>,
-    /// What of it could not be read, for people.
+    /// Entities that could not be read, as sentences.
     pub warnings: Vec<String>,
 }
 
-/// Reads a CAD file: by its contents, whatever its name ends in. The first time, it builds the reader, which takes minutes, and says so.
+/// Reads a CAD file; the format is detected by its content. The first call builds the reader, which takes minutes, and says so.
 ///
 /// # Errors
-/// The file cannot be read, is none of the formats, is broken, or holds no faces; with its name and, where there is one, the line.
+/// The file cannot be read, has an unknown format, is invalid, or contains no faces; with its name and, if known, the line.
 pub fn read(path: &Path) -> Result<Model, CadError> {
     let file = path.display().to_string();
     let part = if check(&file, path)? < BYTES_LARGE {
@@ -60,26 +60,26 @@ fn check(file: &str, path: &Path) -> Result<u64, CadError> {
             "give the path of a STEP, IGES or 3DM file; samples are in jobs/cad/",
         )
     };
-    let told = std::fs::File::open(path)
+    let metadata = std::fs::File::open(path)
         .and_then(|file| file.metadata())
         .map_err(|cause| unreadable(cause.to_string()))?;
-    if !told.is_file() {
-        return Err(unreadable("it is no file".to_owned()));
+    if !metadata.is_file() {
+        return Err(unreadable("it is not a regular file".to_owned()));
     }
-    if told.len() > BYTES_MAX {
+    if metadata.len() > BYTES_MAX {
         return Err(CadError::new(
             file,
             format!("the file is larger than {} MB", BYTES_MAX >> 20),
             "export the part alone, without the rest of its assembly",
         ));
     }
-    if told.len() == 0 {
+    if metadata.len() == 0 {
         return Err(CadError::new(file, "the file is empty", "export the part again"));
     }
-    Ok(told.len())
+    Ok(metadata.len())
 }
 
-/// Runs the reader, for so long at most.
+/// Runs the reader with a time limit.
 fn run(file: &str, path: &Path, reader: &Path) -> Result<Model, CadError> {
     let broken = |what: String| {
         CadError::new(
@@ -99,7 +99,7 @@ fn run(file: &str, path: &Path, reader: &Path) -> Result<Model, CadError> {
     let mut output = child
         .stdout
         .take()
-        .ok_or_else(|| broken("the reader says nothing".to_owned()))?;
+        .ok_or_else(|| broken("the reader has no output".to_owned()))?;
     let listener = std::thread::spawn(move || {
         let mut text = Vec::new();
         output.read_to_end(&mut text).map(|_| text)

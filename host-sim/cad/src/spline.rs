@@ -1,4 +1,4 @@
-//! B-splines of any degree, rational or not: evaluation, and the exact cut to a part of the domain
+//! B-splines of any degree, rational or not: evaluation, and exact restriction to a part of the domain
 //! (Piegl and Tiller, "The NURBS Book", 2nd ed., A2.1 to A2.3, A4.4, A5.1; here "P&T").
 
 use oracle::Derivatives;
@@ -7,16 +7,16 @@ use serde::{Deserialize, Serialize};
 /// A homogeneous point `(w x, w y, w z, w)`, mm and a weight.
 pub type Pole = [f64; 4];
 
-/// Highest degree that is read: the highest that CAD systems write is 25 (OpenCASCADE).
+/// Highest degree that is read; CAD systems write at most 25 (OpenCASCADE).
 pub const DEGREE_MAX: usize = 25;
 
-/// Basis functions that act at a place, in one direction.
+/// Largest number of nonzero basis functions at a parameter.
 const ORDER_MAX: usize = DEGREE_MAX + 1;
 
-/// Parameters this close to a knot, as a share of the domain, are that knot: the rounding of files and of inversions.
+/// Parameters this close to a knot, as a share of the domain, are set to it: rounding of files and of point inversion.
 const KNOT_SNAP: f64 = 1e-12;
 
-/// Which polynomial piece counts at a knot.
+/// The polynomial piece that is evaluated at a knot.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Side {
     /// The piece below.
@@ -34,11 +34,11 @@ pub struct Axis {
     pub knots: Vec<f64>,
 }
 
-/// Values, first and second derivatives of the basis functions that act at a place.
+/// Values, first and second derivatives of the nonzero basis functions at a parameter.
 type Basis = [[f64; ORDER_MAX]; 3];
 
 impl Axis {
-    /// Number of poles that these knots take.
+    /// Number of poles for these knots.
     #[must_use]
     pub fn poles(&self) -> usize {
         self.knots.len() - self.degree - 1
@@ -50,7 +50,7 @@ impl Axis {
         [self.knots[self.degree], self.knots[self.poles()]]
     }
 
-    /// The domain's ends and the distinct knots between them, ascending.
+    /// Ends of the domain and the distinct knots between them, ascending.
     #[must_use]
     pub fn breaks(&self) -> Vec<f64> {
         let mut breaks = self.knots[self.degree..=self.poles()].to_vec();
@@ -58,13 +58,13 @@ impl Axis {
         breaks
     }
 
-    /// How often a knot stands.
+    /// Multiplicity of a knot.
     #[must_use]
     pub fn multiplicity(&self, knot: f64) -> usize {
         self.knots.iter().filter(|other| **other == knot).count()
     }
 
-    /// The span that holds `t`: `knots[span] <= t < knots[span + 1]`, or at a knot the one below it, if so asked (P&T A2.1).
+    /// The span that contains `t`: `knots[span] <= t < knots[span + 1]`, or at a knot the one below it for `Side::Below` (P&T A2.1).
     fn span(&self, t: f64, side: Side) -> usize {
         let inside = &self.knots[self.degree..=self.poles()];
         let [start, end] = self.domain();
@@ -76,7 +76,7 @@ impl Axis {
         self.degree + above.max(1) - 1
     }
 
-    /// Index of the first pole that acts at `t`, and the basis functions with two derivatives (P&T A2.2, eqn 2.9).
+    /// Index of the first pole with influence at `t`, and the basis functions with two derivatives (P&T A2.2, eqn 2.9).
     pub(super) fn basis(&self, t: f64, side: Side) -> (usize, Basis) {
         let (p, span) = (self.degree, self.span(t, side));
         let mut lower = [[0.0; ORDER_MAX]; 3];
@@ -85,14 +85,14 @@ impl Axis {
             let derived = d + 2 > p;
             let mut next = [[0.0; ORDER_MAX]; 3];
             for r in 0..d {
-                // Function r of degree d - 1 acts on [knots[span - d + 1 + r], knots[span + 1 + r]].
+                // The support of function r of degree d - 1 is [knots[span - d + 1 + r], knots[span + 1 + r]].
                 let (low, high) = (self.knots[span + 1 + r - d], self.knots[span + 1 + r]);
                 let width = 1.0 / (high - low);
                 let value = lower[0][r] * width;
                 next[0][r] += (high - t) * value;
                 next[0][r + 1] += (t - low) * value;
                 if derived {
-                    // A derivative of degree d is d times the difference of what is one order lower, of degree d - 1.
+                    // A derivative of degree d is d times the difference of the next lower order of degree d - 1.
                     let order = d + 2 - p;
                     for k in 1..=order.min(2) {
                         let slope = d as f64 * lower[k - 1][r] * width;
@@ -106,7 +106,7 @@ impl Axis {
         (span - p, lower)
     }
 
-    /// The parameter, or the knot that it is to rounding.
+    /// The parameter, set to a knot that it equals to rounding.
     fn snapped(&self, t: f64) -> f64 {
         let [start, end] = self.domain();
         let near = self
@@ -117,7 +117,7 @@ impl Axis {
     }
 }
 
-/// What can be blended: a pole, or a row of poles.
+/// A value that can be blended linearly: a pole, or a row of poles.
 trait Blend: Clone {
     fn blend(&self, other: &Self, share: f64) -> Self;
 }
@@ -134,7 +134,7 @@ impl Blend for Vec<Pole> {
     }
 }
 
-/// Inserts a knot once (P&T A5.1). Knots and poles keep their lengths' relation.
+/// Inserts a knot once (P&T A5.1), which adds one pole.
 fn insert<P: Blend>(axis: &mut Axis, poles: &mut Vec<P>, t: f64) {
     let p = axis.degree;
     let k = axis.knots.partition_point(|knot| *knot <= t) - 1;
@@ -296,14 +296,14 @@ impl SplineSurface {
     }
 }
 
-/// Rows to columns.
+/// Transposes.
 pub(super) fn transposed(rows: &[Vec<Pole>]) -> Vec<Vec<Pole>> {
     (0..rows.first().map_or(0, Vec::len))
         .map(|j| rows.iter().map(|row| row[j]).collect())
         .collect()
 }
 
-/// Derivatives of `(x, y, z) / w` out of those of the homogeneous surface (P&T A4.4).
+/// Derivatives of `(x, y, z) / w` from those of the homogeneous surface (P&T A4.4).
 fn quotient(s: &[[[f64; 4]; 3]; 3]) -> Derivatives {
     let mut at = Derivatives::default();
     let w = s[0][0][3];

@@ -1,4 +1,4 @@
-//! Surfaces as CAD files give them, evaluated straight from their own numbers.
+//! Surfaces of CAD files, evaluated from their original parameters.
 
 use serde::{Deserialize, Serialize};
 use std::f64::consts::{FRAC_PI_2, TAU};
@@ -9,7 +9,7 @@ use super::spline::{SplineCurve, SplineSurface};
 use oracle::Derivatives;
 use oracle::vector::{Vector, add, cross, dot, length, scale, subtract};
 
-/// Step of a difference quotient, as a share of the range; used for second derivatives of offset surfaces alone.
+/// Step of a difference quotient, as a share of the range; only for second derivatives of offset surfaces.
 const DIFFERENCE: f64 = 1e-5;
 
 /// A surface, its parameters as in STEP (ISO 10303-42). Lengths in mm. The frames' vectors are orthogonal.
@@ -47,7 +47,7 @@ pub enum Surface {
         z: Vector,
         /// Radius at v = 0.
         radius: f64,
-        /// Radius gained with v.
+        /// Increase of the radius per unit of v.
         slope: f64,
     },
     /// `center + cos v (cos u x + sin u y) + sin v z`.
@@ -76,7 +76,7 @@ pub enum Surface {
         /// Radius of the tube.
         minor: f64,
     },
-    /// A curve (parameter v) turned about an axis by the angle u.
+    /// Surface of revolution of a curve (parameter v) by the angle u.
     Revolution {
         /// The curve and its range.
         profile: Curve,
@@ -87,11 +87,11 @@ pub enum Surface {
         /// Along the axis, of length 1.
         axis: Vector,
     },
-    /// A curve (parameter u) moved along a vector, v times.
+    /// Extrusion of a curve (parameter u) along v times a vector.
     Extrusion {
         /// The curve.
         profile: Curve,
-        /// Range of its parameter; none where the curve has no ends.
+        /// Range of its parameter; `None` for an unbounded curve.
         range: Option<[f64; 2]>,
         /// S_v.
         direction: Vector,
@@ -107,7 +107,7 @@ pub enum Surface {
     Spline(SplineSurface),
     /// A surface at a distance along the normal `S_u x S_v` of another.
     Offset {
-        /// The other one.
+        /// The base surface.
         base: Box<Surface>,
         /// Distance, mm; its sign is the side.
         distance: f64,
@@ -115,7 +115,7 @@ pub enum Surface {
 }
 
 impl Surface {
-    /// The kind's name for people.
+    /// Name of the kind in texts.
     #[must_use]
     pub fn kind(&self) -> &'static str {
         match self {
@@ -133,7 +133,7 @@ impl Surface {
         }
     }
 
-    /// The surface, placed; `None` where the placement is no similarity and the surface cannot follow it.
+    /// The surface, transformed; `None` if the placement is not a similarity and the kind of surface requires one.
     #[must_use]
     pub fn placed(&self, by: &Placement) -> Option<Self> {
         let (p, d) = (|a: &Vector| by.point(*a), |a: &Vector| by.vector(*a));
@@ -192,7 +192,7 @@ impl Surface {
                 axis,
             } => {
                 let size = by.similarity()?;
-                // A mirrored turn goes the other way about the mirrored axis.
+                // A reflection reverses the rotation about the reflected axis.
                 let turn = if by.mirrors() { -1.0 } else { 1.0 };
                 Self::Revolution {
                     profile: profile.placed(by),
@@ -238,7 +238,7 @@ impl Surface {
         })
     }
 
-    /// Ranges of u and v, each if it has ends.
+    /// Ranges of u and v; `None` if unbounded.
     #[must_use]
     pub fn domain(&self) -> [Option<[f64; 2]>; 2] {
         let turn = Some([0.0, TAU]);
@@ -255,7 +255,7 @@ impl Surface {
         }
     }
 
-    /// Period of u and of v, where the surface goes on over the domain's end as it began.
+    /// Periods of u and of v of a closed surface.
     #[must_use]
     pub fn periods(&self) -> [Option<f64>; 2] {
         match self {
@@ -353,7 +353,7 @@ impl Surface {
         }
     }
 
-    /// Point and first derivatives of an offset surface from the base's derivatives; its second ones by differences.
+    /// Point and first derivatives of an offset surface from the derivatives of its base; second derivatives by differences.
     fn offset(&self, base: &Surface, distance: f64, u: f64, v: f64) -> Derivatives {
         let moved = |u: f64, v: f64| {
             let at = base.at(u, v);
@@ -387,7 +387,7 @@ impl Surface {
     }
 }
 
-/// A profile `(radius, height)` with derivatives in v, turned by u in a frame.
+/// Surface of revolution of a profile `(radius, height)` with derivatives in v, by the angle u in a frame.
 fn turned(origin: Vector, [x, y, z]: [Vector; 3], u: f64, radius: [f64; 3], height: [f64; 3]) -> Derivatives {
     let (sin, cos) = u.sin_cos();
     let out = add(scale(x, cos), scale(y, sin));
@@ -403,10 +403,10 @@ fn turned(origin: Vector, [x, y, z]: [Vector; 3], u: f64, radius: [f64; 3], heig
     }
 }
 
-/// A curve's point and derivatives, turned about an axis by u.
+/// Point and derivatives of a curve, rotated about an axis by u.
 fn revolved(profile: &[Vector; 3], origin: Vector, axis: Vector, u: f64) -> Derivatives {
     let (sin, cos) = u.sin_cos();
-    // (turned, its derivative in u, its second) of a vector.
+    // The rotated vector and its first and second derivative by u.
     let turn = |p: Vector| {
         let along = scale(axis, dot(p, axis));
         let (out, side) = (subtract(p, along), cross(axis, p));
@@ -429,7 +429,7 @@ fn revolved(profile: &[Vector; 3], origin: Vector, axis: Vector, u: f64) -> Deri
     }
 }
 
-/// Periods of a B-spline surface whose opposite boundaries are the same.
+/// Periods of a B-spline surface whose opposite boundaries coincide.
 fn closed(spline: &SplineSurface) -> [Option<f64>; 2] {
     let [[u0, u1], [v0, v1]] = spline.domain();
     let size = {

@@ -1,4 +1,4 @@
-//! The geometry by itself: cuts, exact forms, inverses and outlines against closed forms.
+//! Tests of the geometry against closed forms: restriction, exact forms, point inversion, outlines.
 
 use std::f64::consts::{FRAC_PI_2, PI, TAU};
 
@@ -6,7 +6,7 @@ use super::exact::exact;
 use super::*;
 use oracle::vector::{Vector, add, length, scale, subtract};
 
-/// A B-spline surface of any degrees with uneven knots, one of them double, unclamped, and weights.
+/// A rational, unclamped B-spline surface of given degrees with non-uniform knots, one of them double.
 fn wavy(p: usize, q: usize) -> SplineSurface {
     let axis = |degree: usize| {
         let inner = if degree > 1 {
@@ -91,7 +91,7 @@ fn derivatives_are_those_of_the_points() {
     }
 }
 
-/// One of each kind, with a rectangle of it. The frames are turned and moved.
+/// One surface of each kind in a rotated and translated frame, with a rectangle of parameters.
 fn kinds() -> Vec<(Surface, [[f64; 2]; 2])> {
     let (x, y, z) = ([0.6, 0.8, 0.0], [0.0, 0.0, 1.0], [0.8, -0.6, 0.0]);
     let origin = [100.0, -20.0, 7.0];
@@ -240,7 +240,7 @@ fn face(surface: Surface, loops: Vec<Vec<Edge>>, sense: f64) -> Face {
     }
 }
 
-/// Points between two places of a surface, straight in its parameters.
+/// Points on the straight line between two parameter points of a surface.
 fn edge(surface: &Surface, from: [f64; 2], to: [f64; 2]) -> Edge {
     (0..=16)
         .map(|k| f64::from(k) / 16.0)
@@ -274,7 +274,7 @@ fn close(a: [[f64; 2]; 2], b: [[f64; 2]; 2]) -> bool {
 #[test]
 fn rectangles_are_found() {
     for (surface, [u, v]) in kinds() {
-        // Not to the poles here, and less than a turn.
+        // Without poles, and less than a full turn.
         let v = [v[0] + 0.2 * (v[1] - v[0]), v[1]];
         let u = [u[0], u[0] + 0.8 * (u[1] - u[0])];
         let corners = [[u[0], v[0]], [u[1], v[0]], [u[1], v[1]], [u[0], v[1]]];
@@ -327,7 +327,7 @@ fn what_is_no_rectangle_is_trimmed() {
     }
 }
 
-/// An eighth of a sphere, whose third corner is the pole, begun there or elsewhere.
+/// An eighth of a sphere with the pole as third corner; the loop starts there or elsewhere.
 #[test]
 fn a_corner_may_be_a_pole() {
     let sphere = Surface::Sphere {
@@ -354,7 +354,7 @@ fn a_corner_may_be_a_pole() {
     }
 }
 
-/// Belts and caps without a seam, as some kernels write them: circles alone, and the side tells what is meant.
+/// Belts and caps without a seam edge, as written by some kernels: circles alone, whose direction defines the side.
 #[test]
 fn circles_alone_bound_belts_and_caps() {
     let radius = 10.0;
@@ -401,19 +401,19 @@ fn circles_alone_bound_belts_and_caps() {
         edge(&cylinder, [0.0, 3.0], [PI, 3.0]),
         edge(&cylinder, [PI, 3.0], [TAU, 3.0]),
     ];
-    let endless = outline(&face(cylinder, vec![ring], 1.0)).unwrap_err();
-    assert!(endless.contains("endless"), "{endless}");
+    let unbounded = outline(&face(cylinder, vec![ring], 1.0)).unwrap_err();
+    assert!(unbounded.contains("unbounded"), "{unbounded}");
 }
 
-/// Hollows of a torus and a sphere, both sides, by their closed forms.
+/// Least concave radii of a torus and a sphere, both sides, against closed forms.
 #[test]
-fn hollows_are_measured() {
+fn concave_radii_are_measured() {
     for (surface, rectangle) in kinds() {
         let want = match surface.kind() {
-            // S_u x S_v points outwards; seen from inside, the cylinder, the sphere and the tube are hollow.
+            // S_u x S_v points outwards; the inside of the cylinder, the sphere and the tube is concave.
             "cylinder" => Some([None, Some(9.0)]),
             "sphere" => Some([None, Some(12.0)]),
-            // From outside the torus is hollow round its hole, tightest on its inner equator.
+            // The outside of the torus is concave around its hole, with the least radius on the inner equator.
             "torus" => Some([Some(14.0), Some(6.0)]),
             "plane" => Some([None, None]),
             _ => None,

@@ -1,4 +1,4 @@
-//! The probe, the chip behind it, and what is in its flash.
+//! The debug probe, the chip, and the content of its flash.
 
 use probe_rs::config::RegistryError;
 use probe_rs::probe::list::{Accessibility, Lister};
@@ -11,12 +11,12 @@ use crate::tell;
 
 /// `DBGMCU_IDCODE` (RM0090, 38.6.1): `DEV_ID` in the lower 12 bits.
 const IDENTITY: u64 = 0xE004_2000;
-/// The size of flash in KiB lies in the upper half of this word (RM0090, 39.2).
+/// The upper half of this word is the size of the flash in KiB (RM0090, 39.2).
 const FLASH_SIZE: u64 = 0x1FFF_7A20;
-/// Bytes that are read at a time: some 50 ms by a slow probe.
+/// Bytes per read: about 50 ms with a slow probe.
 const CHUNK: usize = 2048;
 
-/// The one probe that is meant.
+/// The requested probe, or the only one.
 pub(crate) fn find(wanted: Option<&str>) -> Result<DebugProbeInfo, Problem> {
     let selector = wanted
         .map(|text| {
@@ -42,16 +42,16 @@ pub(crate) fn find(wanted: Option<&str>) -> Result<DebugProbeInfo, Problem> {
     Ok(probe.info)
 }
 
-/// How a chip is reached.
+/// Connection mode.
 #[derive(Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Reach {
-    /// As it runs; it goes on running.
+    /// Without reset; the firmware continues.
     Running,
-    /// Held in reset, if it does not answer as it runs.
+    /// Under reset, if the chip does not answer otherwise.
     ByReset,
 }
 
-/// Connects to the chip, and makes sure that it is the one that is meant, with room for the image.
+/// Connects to the chip, and checks its identifier and that the image fits its flash.
 pub(crate) fn connect(target: &Target, image: &Image, reach: Reach) -> Result<Session, Problem> {
     let info = find(target.probe.as_deref())?;
     let open = || info.open().map_err(|error| Problem::NotOpened(chain(&error)));
@@ -97,7 +97,7 @@ fn check(session: &mut Session, target: &Target, image: &Image) -> Result<(), Pr
     Ok(())
 }
 
-/// Whether flash holds the image. The chip may run meanwhile.
+/// Compares the flash with the image. The firmware may run meanwhile.
 pub(crate) fn compare(core: &mut Core<'_>, image: &Image) -> Result<(), Problem> {
     let (mut done, total) = (0, image.bytes());
     for (address, data) in &image.segments {
@@ -121,7 +121,7 @@ pub(crate) fn compare(core: &mut Core<'_>, image: &Image) -> Result<(), Problem>
     Ok(())
 }
 
-/// An error with what caused it.
+/// An error with the chain of its causes.
 pub(crate) fn chain(error: &dyn std::error::Error) -> String {
     let mut text = error.to_string();
     let mut cause = error.source();

@@ -1,4 +1,4 @@
-//! An image into flash.
+//! Writes an image into flash.
 
 use probe_rs::flashing::{DownloadOptions, FlashProgress, ProgressEvent, ProgressOperation};
 
@@ -7,7 +7,7 @@ use crate::event::{Event, Problem, Target, Work};
 use crate::image::Image;
 use crate::tell;
 
-/// Writes the image, compares what was written, and starts it.
+/// Writes the image, verifies it, and starts it.
 pub(crate) fn write(target: &Target) -> Result<(), Problem> {
     let image = Image::load(&target.image).map_err(Problem::BadImage)?;
     let mut session = connect(target, &image, Reach::ByReset)?;
@@ -28,7 +28,7 @@ pub(crate) fn write(target: &Target) -> Result<(), Problem> {
     core.reset().map_err(gone)
 }
 
-/// Compares the image with what is in flash, while it runs.
+/// Compares the image with the flash while the firmware runs.
 pub(crate) fn compare(target: &Target) -> Result<(), Problem> {
     let image = Image::load(&target.image).map_err(Problem::BadImage)?;
     let mut session = connect(target, &image, Reach::Running)?;
@@ -36,15 +36,15 @@ pub(crate) fn compare(target: &Target) -> Result<(), Problem> {
     same(&mut core, &image)
 }
 
-/// What probe-rs says of its progress, added up.
+/// Total progress from the events of probe-rs.
 fn progress() -> impl FnMut(ProgressEvent) {
     let work = |operation| match operation {
         ProgressOperation::Erase => Some(Work::Erase),
         ProgressOperation::Program => Some(Work::Write),
-        // Neither is asked for.
+        // Not enabled.
         ProgressOperation::Fill | ProgressOperation::Verify => None,
     };
-    // Done and in all, of erasing and of writing.
+    // Bytes done and in total, of erasing and of writing.
     let mut counts = [(0, 0); 2];
     move |event| match event {
         ProgressEvent::AddProgressBar { operation, total } => {

@@ -13,27 +13,27 @@ use crate::event::{Event, Line, Problem, Target};
 use crate::image::Image;
 use crate::tell;
 
-/// Pause where the log is empty. It holds 1 KiB, some fifty lines.
+/// Polling interval of an empty log. The buffer holds 1 KiB, about fifty lines.
 const PAUSE: Duration = Duration::from_millis(10);
-/// Time that a chip which was just reset has to set its log up.
+/// Time after a reset in which the log must be initialised.
 const START: Duration = Duration::from_secs(2);
-/// Bytes that are taken at a time.
+/// Bytes per read.
 const CHUNK: usize = 1024;
 
-/// Decodes frames.
+/// Decoder of defmt frames.
 struct Decoder<'a> {
     stream: Box<dyn StreamDecoder + Send + Sync + 'a>,
     places: &'a Locations,
     can_recover: bool,
 }
 
-/// The table of the image's messages, and where each is in the source.
+/// The message table of the image, and the source locations.
 fn table(image: &Path) -> Result<(Table, Locations), Problem> {
     let bad = |why: String| Problem::BadImage(why);
     let bytes = std::fs::read(image).map_err(|error| bad(format!("cannot read it: {error}")))?;
     let table = Table::parse(&bytes).map_err(|error| bad(format!("{error:#}")))?;
     let table = table.ok_or_else(|| bad("it has no log messages".to_owned()))?;
-    // An image without debug information tells no places.
+    // An image without debug information has no source locations.
     let places = table.get_locations(&bytes).unwrap_or_default();
     Ok((table, places))
 }
@@ -47,7 +47,7 @@ impl<'a> Decoder<'a> {
         }
     }
 
-    /// Takes what has come, and tells each whole line.
+    /// Adds received bytes, and emits each complete line.
     fn take(&mut self, bytes: &[u8]) -> Result<(), Problem> {
         self.stream.received(bytes);
         loop {
@@ -90,7 +90,8 @@ pub(crate) fn decode(image: &Path, mut recorded: impl Read) -> Result<(), Proble
     }
 }
 
-/// Follows the log of the running chip; does not reset it, and never makes it wait: what does not fit its buffer is lost, and told so.
+/// Follows the log of the running chip, without a reset and without blocking it: lines that do not fit its buffer are lost, which is
+/// reported.
 pub(crate) fn follow(target: &Target) -> Result<(), Problem> {
     let image = Image::load(&target.image).map_err(Problem::BadImage)?;
     let at = image
@@ -120,7 +121,7 @@ pub(crate) fn follow(target: &Target) -> Result<(), Problem> {
     }
 }
 
-/// Finds the log's control block where the image says it is; a chip that was just reset may not have it yet.
+/// Finds the control block of the log at the address in the image; after a reset it may not exist yet.
 fn attach(core: &mut Core<'_>, at: u32) -> Result<Rtt, Problem> {
     let begun = Instant::now();
     loop {

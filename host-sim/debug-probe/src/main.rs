@@ -1,12 +1,12 @@
 //! Talks to debug probes for `cargo sim flash` and `cargo sim log`: `debug-probe REQUEST` reads one request as JSON and writes events
-//! to its standard output, one a line.
+//! to its standard output, one per line.
 //!
-//! A program of its own, because probe-rs is as large as the rest of the tool together, and is wanted by those who have a board.
+//! A separate program, because probe-rs is as large as the rest of the tool, and only users with a board need it.
 //!
 //! ```text
-//! main.rs ─► chip.rs     the probe, the chip behind it, what is in its flash
-//!         ─► flash.rs    an image into flash
-//!         ─► log.rs      the log out of RAM, decoded
+//! main.rs ─► chip.rs     the probe, the chip, the content of its flash
+//!         ─► flash.rs    writes an image into flash
+//!         ─► log.rs      reads the log from RAM and decodes it
 //! ```
 
 mod chip;
@@ -18,7 +18,7 @@ mod flash;
 #[allow(
     unreachable_pub,
     dead_code,
-    reason = "the library's file, which does more than is wanted here"
+    reason = "a file of the library, of which only a part is used here"
 )]
 mod image;
 mod log;
@@ -28,12 +28,12 @@ use std::process::ExitCode;
 
 use event::{Event, Problem, Request};
 
-/// Writes an event. Where nobody listens any more, there is nothing left to do.
+/// Writes an event; exits if the reader has closed the output.
 fn tell(event: &Event) {
-    let told = serde_json::to_string(event)
+    let written = serde_json::to_string(event)
         .map_err(std::io::Error::from)
         .and_then(|line| writeln!(stdout().lock(), "{line}"));
-    if told.is_err() {
+    if written.is_err() {
         std::process::exit(1);
     }
 }
@@ -51,7 +51,7 @@ fn obey(request: &Request) -> Result<(), Problem> {
 fn main() -> ExitCode {
     let request = std::env::args().nth(1);
     let Some(Ok(request)) = request.map(|text| serde_json::from_str(&text)) else {
-        eprintln!("usage: debug-probe REQUEST (`cargo sim flash` and `cargo sim log` are what you want)");
+        eprintln!("usage: debug-probe REQUEST (called by `cargo sim flash` and `cargo sim log`)");
         return ExitCode::from(2);
     };
     match obey(&request) {

@@ -15,6 +15,7 @@
     )
 )]
 
+pub mod comparison;
 mod error;
 mod fault;
 mod pass_time;

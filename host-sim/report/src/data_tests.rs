@@ -1,4 +1,4 @@
-//! Tests of the data in the page: bounded, and no peak is lost on the way.
+//! Tests of the data in the page: bounded size, peaks preserved.
 
 use base64::Engine;
 use base64::engine::general_purpose::STANDARD;
@@ -6,14 +6,14 @@ use serde_json::Value;
 
 use super::embed::{Scale, words};
 use super::mesh::Mesh;
-use super::scallops::{RidgePlace, Scallops};
+use super::scallops::{RidgePoint, Scallops};
 use super::series::{Channel, Series, Spans};
 use super::tests::{BELL, BLANK, run};
 use super::track::Track;
 use job::Along;
 use oracle::{Oracle, PassSample, SampleCheck};
 
-/// Numbers as the page decodes them.
+/// Decodes numbers as the page does.
 fn decoded(low: &Value, step: &Value, data: &Value) -> Vec<f64> {
     let (low, step) = (low.as_f64().unwrap(), step.as_f64().unwrap());
     let bytes = STANDARD.decode(data.as_str().unwrap()).unwrap();
@@ -33,7 +33,7 @@ fn column(value: &Value) -> Vec<f64> {
     decoded(&value["low"], &value["step"], &value["data"])
 }
 
-/// Least and largest of each span of a channel.
+/// Minimum and maximum of each span of a channel.
 fn channel(spans: &Value, name: &str) -> [Vec<f64>; 2] {
     let channel = &spans["channels"][name];
     ["least", "largest"].map(|end| decoded(&channel["low"], &channel["step"], &channel[end]))
@@ -67,7 +67,7 @@ fn spans_are_bounded_and_lose_no_peak() {
     for count in [1_u64, 7, 8, 9, 1000, 123_457] {
         let mut spans = Spans::new(8);
         for tick in 0..count {
-            // One tick stands out each way, wherever the spans' ends lie.
+            // One peak each way, at any position relative to the spans.
             let value = match tick {
                 tick if tick == count / 3 => 40.0,
                 tick if tick == count / 2 => -30.0,
@@ -91,7 +91,7 @@ fn spans_are_bounded_and_lose_no_peak() {
     }
 }
 
-/// A run of passes of so many samples each, the tool centre where `place` says (nm, by the pass's tick).
+/// A run of passes with these numbers of samples; `place` gives the CL, nm, by the tick in the pass.
 fn series_of(passes: u32, samples: u32, place: impl Fn(u32) -> [f64; 3]) -> Value {
     let mut series = Series::new(0.001, passes / 2);
     let mut tick = 0;
@@ -118,7 +118,7 @@ fn series_of(passes: u32, samples: u32, place: impl Fn(u32) -> [f64; 3]) -> Valu
 
 #[test]
 fn acceleration_of_a_circle_is_its_speed_squared_over_its_radius() {
-    // 10 mm/s on a radius of 10 mm: 10 mm/s², of which whole nanometres alone would make 10 ± 2.
+    // 10 mm/s on a radius of 10 mm: 10 mm/s²; from single periods, rounding to nanometres would give 10 ± 2.
     let circle = |step: u32| {
         let angle = f64::from(step) * 0.001;
         [1e7 * angle.cos(), 1e7 * angle.sin(), 0.0]
@@ -130,13 +130,13 @@ fn acceleration_of_a_circle_is_its_speed_squared_over_its_radius() {
     assert!((x - 10.0).abs() < 0.1 && (y + 10.0).abs() < 0.1, "{x} {y}");
     let [_, speed] = channel(&whole, "cl_speed");
     assert!((extent(&speed)[1] - 10.0).abs() < 2e-3);
-    // Nothing of the way back to the first place, nor of the last step.
+    // The return to the first point and the last step are not included.
     assert!(extent(&channel(&whole, "velocity_x")[0])[0] > -10.01);
 }
 
 #[test]
 fn a_jolt_of_one_period_is_shown_as_emitted() {
-    // Straight at 10 mm/s, but for one centre that is 500 nm aside, in any place of a pass.
+    // Straight at 10 mm/s, except for one position that is off by 500 nm, anywhere in a pass.
     for at in [1, 2, 9, 40, 70, 77] {
         let place = |step: u32| [f64::from(step) * 1e4, if step == at { 500.0 } else { 0.0 }, 0.0];
         let whole = series_of(1, 80, place)["whole"].clone();
@@ -186,7 +186,7 @@ fn passes_are_drawn_within_bounds_and_with_their_worst() {
         assert_eq!(errors.len(), track.points());
         for pass in value["passes"].as_array().unwrap() {
             let [first, last, stride, count] = [1, 2, 3, 4].map(|k| pass[k].as_u64().unwrap());
-            // Both ends are points.
+            // Both ends of the pass are points.
             assert_eq!(last - first, u64::from(samples - 1));
             assert_eq!(count, (last - first).div_ceil(stride) + 1);
         }
@@ -229,7 +229,7 @@ fn scallops_lie_over_the_surface_where_they_were_measured() {
         let v = v0 + (v1 - v0) * (f64::from(gap) + 0.5) / 20.0;
         let place = |k: u32| {
             let u = u0 + (u1 - u0) * f64::from(k) / 50.0;
-            RidgePlace {
+            RidgePoint {
                 u,
                 v,
                 height_mm: height(u, v) as f32,
@@ -252,7 +252,7 @@ fn scallops_lie_over_the_surface_where_they_were_measured() {
         if t > 0.6 {
             assert!(shown.is_nan(), "{s} {t}: {shown}");
         } else if t < 0.49 {
-            // The nearest ridge is at most half a gap away, the nearest place on it less.
+            // The nearest ridge is at most half a gap away, the nearest point on it less.
             let wanted = height(u0 + s * (u1 - u0), v0 + t * (v1 - v0));
             assert!(
                 (shown - wanted).abs() < 0.02 / 50.0 + 0.01 / 20.0 + 2e-4,
@@ -262,7 +262,7 @@ fn scallops_lie_over_the_surface_where_they_were_measured() {
     }
     let largest = column(&value["largest"]);
     assert_eq!(largest.len(), 10);
-    // Where no ball reaches, the height is no measure of the others.
+    // A height in a region that the ball cannot reach must not scale the others.
     let mut missed = scallops.clone();
     missed.ridges[3].1[20].height_mm = 40.0;
     let value = missed.json(&mesh, domain, Along::U);

@@ -1,15 +1,15 @@
-//! Numbers as the page carries them: 16-bit steps of a range, as base64.
+//! Encoding of numbers in the page: 16-bit steps of a range, in base64.
 
 use base64::Engine;
 use base64::engine::general_purpose::STANDARD;
 use serde_json::{Value, json};
 
-/// Steps of a range.
+/// Number of steps of a range.
 const STEPS: f64 = 65_534.0;
-/// Stands for "none".
+/// Code of a missing value.
 const NONE: u16 = u16::MAX;
 
-/// Bytes of 16-bit numbers, the lower one first, as base64.
+/// 16-bit numbers, little-endian, in base64.
 pub(super) fn words(words: impl Iterator<Item = u16>) -> String {
     STANDARD.encode(words.flat_map(u16::to_le_bytes).collect::<Vec<_>>())
 }
@@ -22,7 +22,7 @@ pub(super) struct Scale {
 }
 
 impl Scale {
-    /// The scale of these values; what is no finite number does not count.
+    /// The scale of the finite ones of these values.
     pub(super) fn of(values: impl Iterator<Item = f64>) -> Self {
         let [low, high] = values
             .filter(|value| value.is_finite())
@@ -43,12 +43,12 @@ impl Scale {
         self.with(value, f64::round)
     }
 
-    /// The step below, so that a least value is none too high.
+    /// The step below: rounds a minimum down.
     pub(super) fn below(self, value: f64) -> u16 {
         self.with(value, f64::floor)
     }
 
-    /// The step above, so that a largest value is none too low.
+    /// The step above: rounds a maximum up.
     pub(super) fn above(self, value: f64) -> u16 {
         self.with(value, f64::ceil)
     }
@@ -60,7 +60,7 @@ impl Scale {
         if self.step == 0.0 {
             return 0;
         }
-        // The rounding of the quotient itself must not reach the next step.
+        // The rounding error of the quotient must not change the step.
         let steps = (value - self.low) / self.step;
         let whole = steps.round();
         let steps = if (steps - whole).abs() < 1e-6 {
@@ -71,13 +71,13 @@ impl Scale {
         steps.clamp(0.0, STEPS) as u16
     }
 
-    /// This scale and words in it, as the page reads them.
+    /// The scale and words in it as JSON.
     pub(super) fn json(self, words: String) -> Value {
         json!({ "low": self.low, "step": self.step, "data": words })
     }
 }
 
-/// Values of one kind, each to the nearest step.
+/// Values of one quantity, each rounded to the nearest step.
 pub(super) fn column(values: impl Iterator<Item = f64> + Clone) -> Value {
     let scale = Scale::of(values.clone());
     scale.json(words(values.map(|value| scale.nearest(value))))

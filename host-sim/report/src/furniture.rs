@@ -1,22 +1,22 @@
-//! What stands around the surface in the picture: card, words, ball, triad, scale bar, key.
+//! The annotations of the picture: background, texts, ball, axis triad, scale bar, legend.
 
 use std::fmt::Write;
 
-use super::picture::Words;
+use super::picture::PictureTexts;
 use super::scene::Ball;
 use super::svg::{escape, tenths};
 use super::view::View;
 
 const STYLE: &str = include_str!("picture.css");
-/// The longest the scale bar may be, pixels.
+/// Largest length of the scale bar, pixels.
 const BAR_MAX: f64 = 150.0;
 /// Length of the triad's arms, pixels.
 const ARM: f64 = 34.0;
-/// From a point to the middle of its name, pixels.
+/// Distance from a point to the middle of its label, pixels.
 const NAME_AWAY: f64 = 15.0;
 
 /// The document's head, the card, the title.
-pub(super) fn open(out: &mut String, [width, height]: [f64; 2], words: &Words) {
+pub(super) fn open(out: &mut String, [width, height]: [f64; 2], words: &PictureTexts) {
     let (w, h) = (tenths(width), tenths(height));
     let _ = writeln!(
         out,
@@ -72,7 +72,7 @@ fn dot(out: &mut String, class: &str, [x, y]: [f64; 2], radius: f64) {
     );
 }
 
-/// The ball, to scale; what lies behind it shows through.
+/// The ball, to scale, semi-transparent.
 pub(super) fn ball(out: &mut String, ball: &Ball) {
     let [x, y, r] = [ball.cl[0], ball.cl[1], ball.radius].map(tenths);
     let _ = writeln!(
@@ -81,13 +81,13 @@ pub(super) fn ball(out: &mut String, ball: &Ball) {
     );
 }
 
-/// Contact and centre of the ball, with their names.
+/// Contact and centre of the ball with their labels.
 pub(super) fn contact(out: &mut String, ball: &Ball) {
     let [cc, cl] = [ball.cc, ball.cl].map(|[x, y, _]| [x, y]);
     line(out, "iso-radius", cl, cc);
     dot(out, "iso-one-fill", cc, 4.0);
     dot(out, "iso-cl-fill", cl, 4.0);
-    // Each name beyond its end of the radius, so that the two never meet.
+    // Each label is outside of its end of the radius, so that the two do not overlap.
     let apart = [cc[0] - cl[0], cc[1] - cl[1]];
     let length = apart[0].hypot(apart[1]);
     let [right, down] = if length > 1.0 {
@@ -142,7 +142,7 @@ pub(super) fn triad(out: &mut String, view: &View, [x, y]: [f64; 2]) {
     let _ = writeln!(out, "<circle class=\"iso-ink\" cx=\"{x}\" cy=\"{y}\" r=\"2\"/>");
 }
 
-/// A bar of a round number of millimetres; `right` is its right end.
+/// The scale bar, a round number of millimetres; `right` is its right end.
 pub(super) fn scale_bar(out: &mut String, scale: f64, right: [f64; 2]) {
     let length_mm = round_below(BAR_MAX / scale);
     let [x, y] = right;
@@ -165,7 +165,7 @@ pub(super) fn scale_bar(out: &mut String, scale: f64, right: [f64; 2]) {
 /// The largest of 1, 2, 5 times a power of ten that is not above a value.
 pub(super) fn round_below(value: f64) -> f64 {
     let power = value.max(1e-9).log10().floor() as i32;
-    // Written out and read back, so that 0.2 is 0.2.
+    // Formatted and parsed, so that 0.2 is the f64 nearest to 0.2.
     let decade = |factor: i32| format!("{factor}e{power}").parse::<f64>().unwrap_or(1.0);
     [5, 2]
         .into_iter()
@@ -174,14 +174,14 @@ pub(super) fn round_below(value: f64) -> f64 {
         .unwrap_or_else(|| decade(1))
 }
 
-/// What the lines are.
-pub(super) fn key(out: &mut String, words: &Words, has_tool: bool, [x, y]: [f64; 2]) {
+/// The legend.
+pub(super) fn key(out: &mut String, words: &PictureTexts, has_tool: bool, [x, y]: [f64; 2]) {
     let mut entries = vec![
         ("iso-pass iso-key-pass", words.passes.as_str()),
-        ("iso-one iso-key-one", "one of these passes"),
+        ("iso-one iso-key-one", "highlighted pass"),
     ];
     if has_tool {
-        entries.push(("iso-cl iso-key-cl", "tool centre (CL) on that pass"));
+        entries.push(("iso-cl iso-key-cl", "cutter location (CL) of that pass"));
         entries.push(("", &words.ball));
     }
     for (index, (class, what)) in entries.iter().enumerate() {

@@ -1,7 +1,7 @@
 //! Pictures and pages of a run.
 //!
 //! ```text
-//! samples ─┬─ record.rs ──► some passes ─┬─ scene.rs, picture.rs, furniture.rs ─► path.svg
+//! samples ─┬─ record.rs ─► drawn passes ─┬─ scene.rs, picture.rs, furniture.rs ─► path.svg
 //!          │     job ─► mesh.rs, view.rs ┤                                          │
 //!          ├─ track.rs ──► all passes, thinned ─┐                                   │
 //!          ├─ series.rs ─► spans of time ───────┼─ payload.rs ─► data ─┬─ page.rs ──► index.html
@@ -9,11 +9,11 @@
 //! study of the paper ─► chart.rs, paper/ ──────────────────────────────► index.html of `cargo sim paper`
 //! ```
 //!
-//! All is drawn from the emitted samples; only the surface under them, the arc lengths, the errors and the distances
-//! between passes are the oracle's. Nothing that is written names a folder of this machine or asks for the network.
+//! The path is drawn from the emitted samples; the surface, the arc lengths, the errors and the distances between passes come
+//! from the oracle. The output contains no local path and loads nothing from the network.
 //!
-//! What is kept of a run is bounded, and nothing is left out in silence: a point of the view stands for the worst of its
-//! samples, a point of a chart for the least and the largest, and the page says for how many.
+//! The stored data of a run is bounded. A point of the view represents the worst of its samples, a point of a chart the minimum and
+//! the maximum, and the page states the number of samples per point.
 #![cfg_attr(
     test,
     allow(
@@ -53,34 +53,33 @@ use job::Job;
 use oracle::{Oracle, PassSample, SampleCheck};
 use verify::survey::SurveyResult;
 
-pub use scallops::{RidgePlace, Scallops};
+pub use scallops::{RidgePoint, Scallops};
 
-/// A figure for the page's summary.
+/// A figure in the summary of the page.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Figure {
-    /// What it is.
+    /// Name.
     pub what: String,
-    /// Its value, as people read it.
+    /// Value and unit, formatted.
     pub value: String,
 }
 
-/// What a page says besides what the samples show.
+/// Remarks on a page besides the figures of the samples.
 #[derive(Clone, Debug, Default)]
 pub struct Remarks {
-    /// What is wrong with the run, worst first: a fault with its remedy, a figure out of its bound. A sentence each; lines after
-    /// the first are what helps.
+    /// Failures of the run, worst first: a fault, a figure out of bounds. One sentence each; further lines are the remedy.
     pub failures: Vec<String>,
-    /// What is not wrong, but has to be known.
+    /// Warnings: no failures, but relevant for the run.
     pub warnings: Vec<String>,
-    /// Whether the run was checked as a whole, so that a page without failures may say that it passed.
+    /// Whether all checks were made; only then a page without failures states that the run passed.
     pub verified: bool,
-    /// Figures that the command found besides those of the samples.
+    /// Further figures of the command.
     pub figures: Vec<Figure>,
     /// Scallop heights, if they were measured.
     pub scallops: Option<Scallops>,
 }
 
-/// Gathers what the report of a run shows: a bounded amount of data, whatever the run's length.
+/// Collects the data of a report in bounded memory, independent of the length of the run.
 #[derive(Clone, Debug)]
 pub struct Sketch {
     job: Job,
@@ -91,7 +90,7 @@ pub struct Sketch {
 }
 
 impl Sketch {
-    /// A sketch of a run of this job. `passes`: how many are expected; it decides which of them are drawn.
+    /// A sketch of a run of this job. `passes`: expected number, which determines the passes that are drawn.
     #[must_use]
     pub fn new(job: &Job, passes: usize) -> Self {
         let record = record::Record::new(job, passes);
@@ -105,7 +104,7 @@ impl Sketch {
         }
     }
 
-    /// The same for a run by this approach.
+    /// Sets the approach of the run.
     #[must_use]
     pub fn by(self, approach: Kind) -> Self {
         Self { approach, ..self }
@@ -129,11 +128,11 @@ impl Sketch {
         Ok(picture::picture(&mesh, &self.record, self.job.radius_mm, &words).svg)
     }
 
-    /// Writes `path.svg` and `index.html` into a folder, which is made if there is none, and returns the page's path.
-    /// `job_name`: the job's file, of which only the name is shown.
+    /// Writes `path.svg` and `index.html` into a folder, which is created if missing, and returns the path of the page.
+    /// `job_name`: path of the job file; only the file name is shown.
     ///
     /// # Errors
-    /// The folder or the files cannot be written, or the job asks for an upper side that the surface does not have.
+    /// The folder or the files cannot be written, or `side = "up"` and the surface has no upper side.
     pub fn write(
         &self,
         directory: &Path,

@@ -1,12 +1,12 @@
-//! What the charts show, out of the record and the oracle.
+//! Figures of the charts by pass, from the record and the oracle.
 
 use super::record::PassInterval;
 use oracle::Oracle;
 
-/// Places along a pass at which the distance to the next one is taken.
+/// Number of points along a pass at which the distance to the next pass is measured.
 const PLACES: u32 = 48;
 
-/// Distance between a pass and the next, along the surface across the pass.
+/// Distance between a pass and the next, measured on the surface across the pass.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Gap {
     pub(super) pass: u32,
@@ -14,10 +14,10 @@ pub(super) struct Gap {
     pub(super) narrowest_mm: f64,
 }
 
-/// A last step shorter than its interval by more than this share was cut at the boundary.
+/// A last step-over shorter than its interval by more than this share was limited by the boundary.
 const CUT_SHARE: f64 = 0.02;
 
-/// Distances from every pass to the next, but to a last pass that the boundary brought nearer.
+/// Distances from every pass to the next, except for a last step-over limited by the boundary.
 pub(super) fn gaps(oracle: &Oracle, passes: &[PassInterval]) -> Vec<Gap> {
     let [start, end] = oracle.path_range();
     let gap = |pass: &PassInterval| {

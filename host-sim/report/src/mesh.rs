@@ -1,13 +1,13 @@
-//! The surface as a grid of quads, straight from the oracle.
+//! The surface as a grid of quads, evaluated by the oracle.
 
 use super::vector::{Vector, add_scaled, cross, dot, length, subtract, unit};
 use oracle::Oracle;
 
-/// Quads that the picture shades, about; their shape is as square as the surface allows.
+/// Approximate number of shaded quads of the picture; their aspect ratio is as near 1 as the surface allows.
 const QUADS: f64 = 4200.0;
 /// Least and most quads along one parameter.
 const QUADS_RANGE: [f64; 2] = [16.0, 160.0];
-/// Finer cells along a quad's side: for the depth of the surface, and for measuring it.
+/// Fine cells along the side of a quad, for the depth buffer and for measurements.
 pub(super) const FINE: usize = 3;
 
 /// One quad.
@@ -63,7 +63,7 @@ impl Mesh {
         self.cells
     }
 
-    /// Sign of the tool side on the product of a cell's sides along u and v.
+    /// Sign of the tool side on the cross product of a cell's sides along u and v.
     pub(super) fn sign(&self) -> f64 {
         self.sign
     }
@@ -95,7 +95,7 @@ impl Mesh {
             self.point(i_end, j_end),
             self.point(i, j_end),
         ];
-        // Half the product of the diagonals: right for a quad that has shrunk to a triangle, too.
+        // Half the cross product of the diagonals, which is also correct for a quad degenerated to a triangle.
         let product = cross(subtract(corners[2], corners[0]), subtract(corners[3], corners[1]));
         Quad {
             corners,
@@ -104,7 +104,7 @@ impl Mesh {
         }
     }
 
-    /// The surface's corner points and some between: what a frame must hold.
+    /// Corner points of the surface and some between, which the frame must contain.
     pub(super) fn extent(&self) -> Vec<Vector> {
         self.points
             .iter()
@@ -114,7 +114,7 @@ impl Mesh {
             .collect()
     }
 
-    /// The four edges of the surface, but those that have shrunk to a point.
+    /// The boundary curves of the surface, without degenerate ones.
     pub(super) fn edges(&self) -> Vec<Vec<Vector>> {
         let [rows, columns] = self.cells;
         let edges = [
@@ -132,7 +132,7 @@ impl Mesh {
         edges.into_iter().filter(is_long).collect()
     }
 
-    /// A line from side to side of the surface, across its middle.
+    /// An iso-parametric line through the middle of the surface.
     pub(super) fn side(&self) -> Vector {
         let [rows, columns] = self.cells;
         let lines = [
@@ -156,7 +156,7 @@ impl Mesh {
         sum.map(|x| x / area.max(1e-12))
     }
 
-    /// Length of the diagonal of the surface's box, mm.
+    /// Length of the diagonal of the bounding box, mm.
     pub(super) fn diagonal(&self) -> f64 {
         let [low, high] =
             self.points

@@ -1,4 +1,4 @@
-//! Numbers as pages write them.
+//! Number formats of the pages.
 
 /// A count in groups of three digits.
 pub(super) fn grouped(count: u64) -> String {
@@ -13,7 +13,7 @@ pub(super) fn grouped(count: u64) -> String {
     text
 }
 
-/// A number with so many decimals, its whole part in groups.
+/// A number with `decimals` decimals, its integer part in groups of three digits.
 #[must_use]
 pub fn fixed(value: f64, decimals: usize) -> String {
     if !value.is_finite() || value.abs() >= 1e15 {
@@ -30,7 +30,7 @@ pub fn fixed(value: f64, decimals: usize) -> String {
     }
 }
 
-/// A number with five significant digits; as `m·10^e` where it is small or large.
+/// A number with five significant digits; as `m·10^e` if it is small or large.
 #[must_use]
 pub fn significant(value: f64) -> String {
     if !value.is_finite() {
@@ -43,7 +43,7 @@ pub fn significant(value: f64) -> String {
             value.abs().log10().floor()
         };
         let text = format!("{value:.*}", (4.0 - digits).clamp(0.0, 9.0) as usize);
-        // Zeros before the point count.
+        // Leading zeros count as decimals.
         return if text.contains('.') {
             text.trim_end_matches('0').trim_end_matches('.').to_owned()
         } else {
@@ -68,7 +68,7 @@ fn superscript(c: char) -> Option<char> {
     }
 }
 
-/// A time for people.
+/// A duration in s, min or h.
 pub(super) fn duration(seconds: f64) -> String {
     match seconds {
         s if s < 60.0 => format!("{s:.1} s"),

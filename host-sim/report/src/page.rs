@@ -1,4 +1,4 @@
-//! `index.html`: view, charts, figures and warnings on one page that needs nothing else.
+//! `index.html`: view, charts, figures and warnings on one self-contained page.
 
 use std::fmt::Write;
 use std::path::Path;
@@ -7,7 +7,7 @@ use super::Remarks;
 use super::mesh::Mesh;
 use super::number::{duration, fixed, grouped, significant};
 use super::payload::payload;
-use super::picture::{Picture, Words};
+use super::picture::{Picture, PictureTexts};
 use super::record::Record;
 use super::series::Series;
 use super::svg::escape;
@@ -23,10 +23,10 @@ const REPORT_STYLE: &str = concat!(
     include_str!("viewer/uplot.min.css"),
     include_str!("viewer/view.css")
 );
-/// Nothing may be loaded: a browser holds the page to that.
+/// Content security policy: the browser refuses to load anything.
 const POLICY: &str =
     "default-src 'none'; script-src 'unsafe-inline'; style-src 'unsafe-inline'; img-src data:";
-/// The view's and the charts' libraries, by `scripts/viewer`, and our own scripts, which share one scope.
+/// The libraries of view and charts, built by `scripts/viewer`, and the scripts of the page, which share one scope.
 const LIBRARIES: &str = include_str!("viewer/three-bundle.min.js");
 const SCRIPTS: [&str; 6] = [
     include_str!("viewer/data.js"),
@@ -40,7 +40,7 @@ const VIEW: &str = include_str!("viewer/view.html");
 const CHARTS: &str = include_str!("viewer/charts.html");
 const LICENCES: &str = include_str!("viewer/three-bundle.licence.txt");
 
-/// What the page is made of.
+/// Content of the page.
 pub(super) struct Content<'a> {
     pub(super) job: &'a Job,
     pub(super) approach: Kind,
@@ -52,12 +52,12 @@ pub(super) struct Content<'a> {
     pub(super) series: &'a Series,
     pub(super) findings: &'a SurveyResult,
     pub(super) remarks: &'a Remarks,
-    pub(super) words: &'a Words,
+    pub(super) words: &'a PictureTexts,
     pub(super) picture: &'a Picture,
 }
 
 /// What picture and page say about the job.
-pub(super) fn words(job: &Job, record: &Record, job_name: &Path, findings: &SurveyResult) -> Words {
+pub(super) fn words(job: &Job, record: &Record, job_name: &Path, findings: &SurveyResult) -> PictureTexts {
     let title = job_name
         .file_stem()
         .map_or_else(|| "job".to_owned(), |name| name.to_string_lossy().into_owned());
@@ -65,8 +65,8 @@ pub(super) fn words(job: &Job, record: &Record, job_name: &Path, findings: &Surv
     let passes = findings.passes;
     let plural = if passes == 1 { "pass" } else { "passes" };
     let order = match job.pattern {
-        Pattern::Zig => "one way",
-        Pattern::Zigzag => "to and fro",
+        Pattern::Zig => "zig",
+        Pattern::Zigzag => "zigzag",
     };
     let subtitle = format!(
         "{} surface · {passes} {plural} along {along}, {order} · {} mm/min at the cutter contact · scallop {} mm",
@@ -80,13 +80,13 @@ pub(super) fn words(job: &Job, record: &Record, job_name: &Path, findings: &Surv
     } else {
         format!("{drawn} of ")
     };
-    Words {
+    PictureTexts {
         subtitle,
         passes: format!("cutter contact, {drawn_of}{passes} {plural}"),
         ball: format!("ball, radius {} mm, to scale", job.radius_mm),
         description: format!(
             "The {} surface of job {title} in parallel projection, with {drawn} of its {passes} {plural} along {along}. \
-             One pass is emphasised; the path of the tool's centre runs above it, and a ball of {} mm radius touches \
+             One pass is highlighted, with its cutter location (CL) path above it; a ball of {} mm radius touches \
              the surface on it.",
             job.surface.kind(),
             job.radius_mm
@@ -142,7 +142,7 @@ pub(super) fn page(content: &Content<'_>) -> String {
     out
 }
 
-/// What is wrong, and what has to be known.
+/// Failures and warnings.
 fn remarks(out: &mut String, content: &Content<'_>) {
     let remarks = content.remarks;
     let mut failures = remarks.failures.clone();
@@ -172,7 +172,7 @@ fn remarks(out: &mut String, content: &Content<'_>) {
     }
 }
 
-/// The figures that come first.
+/// The main figures.
 fn tiles(out: &mut String, content: &Content<'_>) {
     let (job, findings) = (content.job, content.findings);
     let report = &findings.report;
@@ -180,15 +180,19 @@ fn tiles(out: &mut String, content: &Content<'_>) {
     let scallops = content.remarks.scallops.as_ref().map(super::Scallops::largest_mm);
     let scallop = match scallops.filter(|height| height.is_finite()) {
         Some(height) => ("Scallop height, max", fixed(height.into(), 5), "mm"),
-        None => ("Scallop, by formula", fixed(report.scallop_mm.max, 5), "mm"),
+        None => (
+            "Scallop height, by formula",
+            fixed(report.scallop_mm.max, 5),
+            "mm",
+        ),
     };
     let tiles = [
         ("Machining time", duration(time_s), ""),
         ("Passes", grouped(findings.passes.into()), ""),
-        ("Path of the contact", fixed(report.cc_length_mm * 1e-3, 2), "m"),
+        ("CC path", fixed(report.cc_length_mm * 1e-3, 2), "m"),
         scallop,
         ("Feed error, max", significant(report.ripple_pct.max), "%"),
-        ("Tool centre error, max", fixed(report.position_nm.max, 1), "nm"),
+        ("CL error, max", fixed(report.position_nm.max, 1), "nm"),
     ];
     out.push_str("<dl class=\"tiles\">\n");
     for (what, value, unit) in tiles {
@@ -200,7 +204,7 @@ fn tiles(out: &mut String, content: &Content<'_>) {
     out.push_str("</dl>\n");
 }
 
-/// What stands behind the view's points.
+/// Sampling of the view: passes, points, samples per point.
 fn drawn_words(content: &Content<'_>) -> String {
     let track = content.track;
     let (passes, drawn) = (content.findings.passes as usize, track.drawn());
@@ -213,11 +217,11 @@ fn drawn_words(content: &Content<'_>) -> String {
         ),
     };
     let stands = match track.strides() {
-        [_, 1] => "every sample is one of them".to_owned(),
+        [_, 1] => "one per sample".to_owned(),
         [least, most] if least >= most => {
-            format!("one stands for {most} samples and has the colour of the worst")
+            format!("one stands for {most} samples, coloured by the worst of them")
         }
-        [least, most] => format!("one stands for {least} to {most} samples and has the colour of the worst"),
+        [least, most] => format!("one stands for {least} to {most} samples, coloured by the worst of them"),
     };
     format!(
         "The view draws {which} with {} points: {stands}.",
@@ -225,7 +229,7 @@ fn drawn_words(content: &Content<'_>) -> String {
     )
 }
 
-/// What stands behind the charts' points.
+/// Sampling of the charts.
 fn series_words(content: &Content<'_>) -> String {
     let ticks = content.series.ticks();
     let samples = grouped(content.findings.samples);
@@ -239,14 +243,16 @@ fn series_words(content: &Content<'_>) -> String {
     };
     let [low, high] = [content.findings.speeds.cl.min, content.findings.speeds.cl.max];
     let bends = if low.is_finite() && high - low > 0.01 * high {
-        format!(" The tool's centre has to run at {low:.2} to {high:.2} mm/s, as the surface bends under it.")
+        format!(
+            " The speed of the cutter location (CL) is {low:.2} to {high:.2} mm/s: it varies with the curvature of the surface."
+        )
     } else {
         String::new()
     };
     let ends = if content.job.machine.has_limits() {
-        "Each pass runs from standstill to standstill; the ways between passes are left out."
+        "Each pass runs from standstill to standstill; links between passes are not shown."
     } else {
-        "The last period of a pass, which is cut short, has no speed."
+        "The last period of a pass is shorter than the others and has no speed."
     };
     format!(
         "{}{bends} {kept} {ends} Accelerations are taken over 8 periods before and after, as \
@@ -256,9 +262,9 @@ fn series_words(content: &Content<'_>) -> String {
     )
 }
 
-/// Whether the feed is held.
+/// A sentence about the range of the feed.
 fn feed_words(content: &Content<'_>) -> String {
-    /// A speed that keeps within this share of the feed is called held.
+    /// Largest deviation of a constant feed, as a share of the feed.
     const HELD_SHARE: f64 = 0.01;
     let feed = content.job.feed_mm_s();
     let [low, high] = [content.findings.speeds.cc.min, content.findings.speeds.cc.max];
@@ -270,9 +276,9 @@ fn feed_words(content: &Content<'_>) -> String {
         .iter()
         .all(|speed| (speed - feed).abs() < HELD_SHARE * feed)
     {
-        format!("The feed of {shown} mm/s is held where the cutter touches the surface.")
+        format!("The cutter contact (CC) moves at the programmed feed of {shown} mm/s.")
     } else {
-        format!("Of the feed of {shown} mm/s the cutter contact runs at {low:.2} to {high:.2} mm/s.")
+        format!("Programmed feed {shown} mm/s; speed of the cutter contact (CC) {low:.2} to {high:.2} mm/s.")
     }
 }
 
@@ -308,14 +314,14 @@ fn footer(out: &mut String, content: &Content<'_>) {
     );
 }
 
-/// As [`escape`], line by line.
+/// [`escape`] for each line.
 fn escape_lines(text: &str) -> String {
     text.lines().map(escape).collect::<Vec<_>>().join("\n")
 }
 
-/// Data and scripts, after all that they work on.
+/// Data and scripts, behind the elements that they use.
 fn scripts(out: &mut String, content: &Content<'_>) {
-    // `<` cannot end the script then, whatever a text holds.
+    // `<` is escaped, so that no text can end the script element.
     let data = payload(content).to_string().replace('<', "\\u003c");
     let _ = writeln!(
         out,
@@ -329,7 +335,7 @@ fn scripts(out: &mut String, content: &Content<'_>) {
     );
 }
 
-/// A row of a table: what, raw value, value for people, unit.
+/// A row of a table: name, raw value, formatted value, unit.
 struct Row(&'static str, f64, String, &'static str);
 
 fn tables(out: &mut String, content: &Content<'_>) {
@@ -371,8 +377,8 @@ fn run_rows(job: &Job, findings: &SurveyResult) -> [Row; 6] {
         ),
         Row("Samples", samples, grouped(findings.samples), ""),
         Row("Machining time", time_s, duration(time_s), ""),
-        Row("Cutter contact path", cc_mm, fixed(cc_mm, 1), "mm"),
-        Row("Tool centre path", cl_mm, fixed(cl_mm, 1), "mm"),
+        Row("CC path", cc_mm, fixed(cc_mm, 1), "mm"),
+        Row("CL path", cl_mm, fixed(cl_mm, 1), "mm"),
         Row("Least path interval", interval, significant(interval), side),
     ]
 }
@@ -386,12 +392,12 @@ fn oracle_rows(findings: &SurveyResult) -> [Row; 7] {
     [
         Row("Feed ripple", ripple, significant(ripple), "%"),
         Row("Feed ripple, rms", ripple_rms, significant(ripple_rms), "%"),
-        Row("Tool centre error", cl, fixed(cl, 2), "nm"),
-        Row("Cutter contact error", cc, fixed(cc, 2), "nm"),
+        Row("CL error", cl, fixed(cl, 2), "nm"),
+        Row("CC error", cc, fixed(cc, 2), "nm"),
         Row("Normal error", normal, significant(normal), "rad"),
-        Row("Scallop by formula", scallop, fixed(scallop, 6), "mm"),
+        Row("Scallop height, by formula", scallop, fixed(scallop, 6), "mm"),
         Row(
-            "Scallop by formula, mean",
+            "Scallop height, by formula, mean",
             scallop_mean,
             fixed(scallop_mean, 6),
             "mm",
@@ -403,7 +409,7 @@ fn job_rows(job: &Job) -> [Row; 4] {
     let row = |what, value: f64, unit| Row(what, value, value.to_string(), unit);
     [
         row("Ball radius", job.radius_mm, "mm"),
-        row("Feed of the contact", job.feed_mm_min, "mm/min"),
+        row("Feed (CC)", job.feed_mm_min, "mm/min"),
         row("Scallop height limit", job.scallop_mm, "mm"),
         row("Sampling period", job.machine.period_us, "µs"),
     ]

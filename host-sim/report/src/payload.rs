@@ -10,7 +10,7 @@ use job::Along;
 
 const MM_PER_NM: f64 = 1e-6;
 
-/// The box around surface and path, in steps that are the same for all axes.
+/// Bounding box of surface and path, quantised with the same step on all axes.
 struct Box3 {
     scales: [Scale; 3],
 }
@@ -42,7 +42,7 @@ fn millimetres(nm: [i32; 3]) -> [f64; 3] {
     nm.map(|nm| f64::from(nm) * MM_PER_NM)
 }
 
-/// All that the page's scripts read.
+/// The data that the scripts of the page read.
 pub(super) fn payload(content: &Content<'_>) -> Value {
     let (job, mesh) = (content.job, content.mesh);
     let places = content.track.places().map(millimetres);
@@ -84,7 +84,7 @@ pub(super) fn payload(content: &Content<'_>) -> Value {
     })
 }
 
-/// Intervals and distances, pass by pass.
+/// Path intervals and distances by pass.
 fn intervals(content: &Content<'_>) -> Value {
     let passes = content.record.intervals.items();
     let gaps = measure::gaps(content.oracle, &passes);

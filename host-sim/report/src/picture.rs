@@ -12,43 +12,43 @@ use super::view::Frame;
 
 /// Size of the picture.
 pub(super) const SIZE: [f64; 2] = [960.0, 620.0];
-/// Where surface and tool may lie.
+/// Frame of surface and tool.
 const FRAME: Frame = [44.0, 84.0, 872.0, 432.0];
-/// Lines may leave their points by this much, pixels.
+/// Tolerance of the simplification of lines, pixels.
 const TOLERANCE: f64 = 0.12;
 /// Direction to the light: right, up, towards the viewer.
 const LIGHT: Vector = [-0.45, 0.62, 0.64];
-/// The tool side from shadow to full light, red, green, blue; and the back.
+/// Colour ramp of the tool side from shadow to full light, RGB; colour of the back.
 const RAMP: [[f64; 3]; 3] = [[74.0, 91.0, 112.0], [156.0, 173.0, 192.0], [232.0, 239.0, 246.0]];
 const BACK_RAMP: [[f64; 3]; 3] = [
     [146.0, 138.0, 130.0],
     [172.0, 165.0, 157.0],
     [203.0, 197.0, 190.0],
 ];
-/// The span of brightness that contrast is stretched to, by how much at most, and about which brightness.
+/// Contrast stretch: target span of brightness, largest factor, and centre.
 const CONTRAST: f64 = 0.62;
 const GAIN_MAX: f64 = 2.2;
 const MIDDLE: f64 = 0.66;
-/// Passes that carry an arrow, about, and where on them it may be, the best liked first.
+/// Approximate number of passes with an arrow, and its candidate positions along a pass, in order of preference.
 const ARROWS: usize = 7;
 const ARROW_PLACES: [f64; 4] = [0.72, 0.25, 0.86, 0.5];
-/// Normals that are drawn between the highlighted pass and its tool path.
+/// Number of normals drawn between the highlighted pass and its CL path.
 const COMB: usize = 36;
 
-/// What the picture says about the job.
+/// Texts of the picture.
 #[derive(Clone, Debug)]
-pub(super) struct Words {
+pub(super) struct PictureTexts {
     pub(super) title: String,
     pub(super) subtitle: String,
-    /// What the thin lines are: "cutter contact, 55 of 164 passes".
+    /// Legend of the thin lines: "cutter contact, 55 of 164 passes".
     pub(super) passes: String,
-    /// The ball: "ball, radius 6 mm".
+    /// Legend of the ball: "ball, radius 6 mm".
     pub(super) ball: String,
-    /// For those who cannot see it.
+    /// Alternative text.
     pub(super) description: String,
 }
 
-/// The picture, and where it looks from.
+/// The picture and its view direction.
 pub(super) struct Picture {
     pub(super) svg: String,
     /// Direction towards the viewer.
@@ -56,7 +56,7 @@ pub(super) struct Picture {
 }
 
 /// The whole picture.
-pub(super) fn picture(mesh: &Mesh, record: &Record, radius_mm: f64, words: &Words) -> Picture {
+pub(super) fn picture(mesh: &Mesh, record: &Record, radius_mm: f64, words: &PictureTexts) -> Picture {
     let scene = Scene::new(mesh, record, radius_mm, FRAME);
     let mut out = String::new();
     furniture::open(&mut out, SIZE, words);
@@ -92,7 +92,7 @@ pub(super) fn picture(mesh: &Mesh, record: &Record, radius_mm: f64, words: &Word
     }
 }
 
-/// Shaded quads. Each is stroked in its own colour, so that no seam shows between neighbours.
+/// Shaded quads. Each is stroked in its own colour to close the seams between adjacent quads.
 fn surface(out: &mut String, scene: &Scene<'_>, quads: &[Quad], shading: &Shading) {
     if quads.is_empty() {
         return;
@@ -115,7 +115,7 @@ fn surface(out: &mut String, scene: &Scene<'_>, quads: &[Quad], shading: &Shadin
     out.push_str("</g>\n");
 }
 
-/// From the light on a face to its colour.
+/// Maps the illumination of a face to its colour.
 #[derive(Clone, Copy, Debug)]
 struct Shading {
     middle: f64,
@@ -123,7 +123,7 @@ struct Shading {
 }
 
 impl Shading {
-    /// Contrast enough to see the shape of a surface that is nearly flat.
+    /// Stretches the contrast so that the shape of a nearly flat surface is visible.
     fn new(scene: &Scene<'_>, quads: &[Quad]) -> Self {
         let turned = quads
             .iter()
@@ -141,11 +141,11 @@ impl Shading {
         }
     }
 
-    /// The colour of a face with this normal in the picture's directions.
+    /// Colour of a face with this normal in camera coordinates.
     fn colour(&self, normal: Vector) -> [u8; 3] {
         let is_back = normal[2] < 0.0;
         let normal = if is_back { normal.map(|x| -x) } else { normal };
-        // The more the contrast is stretched, the more it is centred on the ramp's light half.
+        // With stronger stretch, the centre moves to the light half of the ramp.
         let middle = self.middle + (1.0 - 1.0 / self.gain) * (MIDDLE - self.middle);
         let bright = (middle + self.gain * (brightness(normal) - self.middle)).clamp(0.0, 1.0);
         let [dark, medium, light] = if is_back { BACK_RAMP } else { RAMP };
@@ -158,7 +158,7 @@ impl Shading {
     }
 }
 
-/// Light that a face sends to the viewer, 0 to 1.
+/// Diffuse illumination of a face, 0 to 1.
 fn brightness(normal: Vector) -> f64 {
     let light = unit(LIGHT);
     let half = unit(add_scaled(light, [0.0, 0.0, 1.0], 1.0));
@@ -166,7 +166,7 @@ fn brightness(normal: Vector) -> f64 {
     (0.08 + 0.84 * dot(normal, light).max(0.0) + 0.1 * gloss).min(1.0)
 }
 
-/// One path of all these lines.
+/// One SVG path of all these lines.
 fn lines<'a>(out: &mut String, class: &str, runs: impl Iterator<Item = &'a Vec<[f64; 2]>>) {
     let data: String = runs.map(|run| polyline(&simplified(run, TOLERANCE))).collect();
     if !data.is_empty() {
@@ -199,7 +199,7 @@ fn of_layer(runs: &[(Layer, Vec<[f64; 2]>)], layer: Layer) -> impl Iterator<Item
         .map(|(_, run)| run)
 }
 
-/// Normals between the highlighted pass and the tool centre's path.
+/// Normals between the highlighted pass and its CL path.
 fn normals(out: &mut String, scene: &Scene<'_>, layer: Layer) {
     const STEPS: u32 = 8;
     let Some((_, places)) = &scene.one else {
@@ -214,7 +214,7 @@ fn normals(out: &mut String, scene: &Scene<'_>, layer: Layer) {
     lines(out, "iso-line iso-comb", of_layer(&runs, layer));
 }
 
-/// The tool centre's path over the highlighted pass.
+/// CL path of the highlighted pass.
 fn tool_path(out: &mut String, scene: &Scene<'_>) {
     let Some((_, places)) = &scene.one else {
         return;
@@ -226,16 +226,16 @@ fn tool_path(out: &mut String, scene: &Scene<'_>) {
     lines(out, "iso-line iso-cl", runs.iter().map(|(_, run)| run));
 }
 
-/// So many places spread evenly over a pass, ends included.
+/// `count` points evenly spaced along a pass, ends included.
 fn even(places: &[Place], count: usize) -> impl Iterator<Item = &Place> {
     let last = places.len().saturating_sub(1);
     (0..=count).filter_map(move |k| places.get(k * last / count))
 }
 
-/// Arrow heads that say which way the passes run.
+/// Arrow heads in the direction of the passes.
 fn arrows(out: &mut String, scene: &Scene<'_>, record: &Record) {
     let one = scene.one.as_ref().map(|(pass, _)| *pass);
-    // Odd, so that passes to and fro both carry arrows.
+    // Odd, so that passes of both directions have arrows with zigzag.
     let every = (record.drawn.len() / ARROWS).max(1) | 1;
     let others = record
         .drawn

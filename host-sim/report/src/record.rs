@@ -1,21 +1,21 @@
-//! What is kept of a stream of samples: a bounded amount, whatever the job's length.
+//! Decimated record of a stream of samples, in bounded memory.
 
 use job::{Along, Job, Pattern};
 use oracle::PassSample;
 
-/// Passes that are drawn at most, besides the last one: more would run together in a picture of 900 pixels.
+/// Largest number of drawn passes besides the last one: more would merge in a picture of 900 pixels.
 const DRAWN_MAX: usize = 60;
-/// Points kept of a drawn pass at most: one every two to five pixels.
+/// Largest number of points of a drawn pass: one every two to five pixels.
 const POINTS_MAX: usize = 300;
-/// Passes whose interval is kept at most: two to a chart's pixel.
+/// Largest number of passes whose interval is stored: two per pixel of a chart.
 const INTERVALS_MAX: usize = 2048;
 
 const MM_PER_NM: f64 = 1e-6;
 
-/// A stream thinned as it grows: every `stride`-th item is kept, and the stride doubles when there are too many. The
-/// last item is always kept.
+/// A decimated stream: every `stride`-th item is stored, and the stride doubles when the capacity is reached. The last
+/// item is always stored.
 #[derive(Clone, Debug)]
-pub(super) struct Thinned<T> {
+pub(super) struct DecimatedStream<T> {
     most: usize,
     stride: u64,
     seen: u64,
@@ -23,7 +23,7 @@ pub(super) struct Thinned<T> {
     last: Option<T>,
 }
 
-impl<T: Copy> Thinned<T> {
+impl<T: Copy> DecimatedStream<T> {
     pub(super) fn new(most: usize) -> Self {
         Self {
             most,
@@ -52,20 +52,20 @@ impl<T: Copy> Thinned<T> {
         self.last = Some(item);
     }
 
-    /// What was kept, in order, and the last item of all.
+    /// The stored items in order, and the last item.
     pub(super) fn items(&self) -> Vec<T> {
         let last_is_kept = self.seen == 0 || (self.seen - 1).is_multiple_of(self.stride);
         let last = self.last.filter(|_| !last_is_kept);
         self.kept.iter().copied().chain(last).collect()
     }
 
-    /// How many items there were for each one kept.
+    /// Items per stored item.
     pub(super) fn stride(&self) -> u64 {
         self.stride
     }
 }
 
-/// Cutter contact and tool centre at one sample, mm.
+/// Cutter contact (CC) and ball centre (CL) of one sample, mm.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Place {
     pub(super) cc_mm: [f64; 3],
@@ -74,20 +74,20 @@ pub(super) struct Place {
 
 /// A pass that is drawn.
 #[derive(Clone, Debug)]
-pub(super) struct Drawn {
+pub(super) struct DrawnPass {
     pub(super) pass: u32,
-    pub(super) places: Thinned<Place>,
+    pub(super) places: DecimatedStream<Place>,
 }
 
-/// Where a pass lies, and the least interval on it.
+/// Side parameter of a pass and its least interval.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct PassInterval {
     pub(super) pass: u32,
-    /// Its side parameter.
+    /// Side parameter of the pass.
     pub(super) side: f64,
-    /// Least candidate of the path interval, in the side parameter; infinite where no sample had one.
+    /// Least candidate of the path interval, in the side parameter; infinite if no sample had one.
     pub(super) least: f64,
-    /// Side parameter of the next pass less this one's.
+    /// Side parameter of the next pass minus that of this one.
     pub(super) step: f64,
 }
 
@@ -95,14 +95,14 @@ pub(super) struct PassInterval {
 #[derive(Clone, Debug)]
 pub(super) struct Record {
     along: Along,
-    /// Every so many passes one is drawn.
+    /// One of this number of passes is drawn.
     stride: u32,
-    /// The pass that is expected to be the last.
+    /// Index of the last expected pass.
     final_pass: u32,
-    /// The pass that is set off from the others.
+    /// Index of the highlighted pass.
     pub(super) middle_pass: u32,
-    pub(super) drawn: Vec<Drawn>,
-    pub(super) intervals: Thinned<PassInterval>,
+    pub(super) drawn: Vec<DrawnPass>,
+    pub(super) intervals: DecimatedStream<PassInterval>,
     current: Option<PassInterval>,
     is_drawn: bool,
 }
@@ -112,7 +112,7 @@ impl Record {
         let passes = u32::try_from(passes).unwrap_or(u32::MAX).max(1);
         let mut stride = passes.div_ceil(DRAWN_MAX as u32).max(1);
         if job.pattern == Pattern::Zigzag {
-            // Odd, so that the drawn passes run to and fro as the real ones do.
+            // Odd, so that the drawn passes alternate in direction with zigzag.
             stride |= 1;
         }
         Self {
@@ -121,7 +121,7 @@ impl Record {
             final_pass: passes - 1,
             middle_pass: passes / 2 / stride * stride,
             drawn: Vec::new(),
-            intervals: Thinned::new(INTERVALS_MAX),
+            intervals: DecimatedStream::new(INTERVALS_MAX),
             current: None,
             is_drawn: false,
         }
@@ -163,13 +163,13 @@ impl Record {
             least: f64::INFINITY,
             step: 0.0,
         });
-        // The second condition bounds the record should there be more passes than were expected.
+        // The second condition bounds the record if there are more passes than expected.
         self.is_drawn = (sample.pass.is_multiple_of(self.stride) && sample.pass <= self.final_pass)
             || sample.pass == self.final_pass;
         if self.is_drawn {
-            self.drawn.push(Drawn {
+            self.drawn.push(DrawnPass {
                 pass: sample.pass,
-                places: Thinned::new(POINTS_MAX),
+                places: DecimatedStream::new(POINTS_MAX),
             });
         }
     }

@@ -1,4 +1,4 @@
-//! Scallop heights as a page shows them: over the surface, and from pass to pass.
+//! Scallop heights on the page: on the surface and by pass.
 
 use serde_json::{Value, json};
 
@@ -6,40 +6,40 @@ use super::embed::{Scale, column, words};
 use super::mesh::Mesh;
 use job::Along;
 
-/// Heights of more limits than this look alike on the surface: where no ball reaches, they would take all the steps of the
+/// Largest height on the colour scale, in units of the limit: regions that the ball cannot reach would otherwise use up the
 /// scale.
 const LIMITS_MAX: f64 = 4.0;
 
-/// A place on the ridge between two passes.
+/// A point on the ridge between two passes.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct RidgePlace {
+pub struct RidgePoint {
     /// Parameter u of the surface under it.
     pub u: f64,
     /// Parameter v of the surface under it.
     pub v: f64,
-    /// Height over the surface, mm; no number where it is not known.
+    /// Height above the surface, mm; NaN if unknown.
     pub height_mm: f32,
 }
 
-/// Scallop heights that were measured.
+/// Measured scallop heights.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Scallops {
-    /// What the job allows, mm.
+    /// Scallop height limit of the job, mm.
     pub limit_mm: f64,
     /// What the measuring may be off, mm.
     pub measurement_error_mm: f64,
     /// One ridge for each gap between neighbouring passes: the gap's number (that of the pass before it), and places along it.
-    pub ridges: Vec<(u32, Vec<RidgePlace>)>,
+    pub ridges: Vec<(u32, Vec<RidgePoint>)>,
 }
 
 impl Scallops {
-    /// Largest height; no number if none is known.
+    /// Largest height; NaN if none is known.
     pub(super) fn largest_mm(&self) -> f32 {
         let places = self.ridges.iter().flat_map(|(_, places)| places);
         places.map(|place| place.height_mm).fold(f32::NAN, f32::max)
     }
 
-    /// As the page reads it: heights at the mesh's points, and the largest and mean height of each gap.
+    /// JSON: heights at the points of the mesh, largest and mean height of each gap.
     pub(super) fn json(&self, mesh: &Mesh, domain: [[f64; 2]; 2], along: Along) -> Value {
         let mut heights = self.over(mesh.cells(), domain, along);
         for height in &mut heights {
@@ -47,9 +47,9 @@ impl Scallops {
                 *height = LIMITS_MAX * self.limit_mm;
             }
         }
-        // From 0, so that the colours of two reports compare.
+        // From 0, so that the colours of two reports are comparable.
         let scale = Scale::of(heights.iter().copied().chain([0.0]));
-        let finite = |places: &'_ [RidgePlace]| -> Vec<f64> {
+        let finite = |places: &'_ [RidgePoint]| -> Vec<f64> {
             let heights = places.iter().map(|place| f64::from(place.height_mm));
             heights.filter(|height| height.is_finite()).collect()
         };
@@ -76,7 +76,7 @@ impl Scallops {
         })
     }
 
-    /// The largest height around each point of a grid, no number where no ridge is near.
+    /// Largest height around each point of a grid; NaN where no ridge is near.
     fn over(&self, cells: [usize; 2], domain: [[f64; 2]; 2], along: Along) -> Vec<f64> {
         let columns = cells[1] + 1;
         let mut heights = vec![f64::NAN; (cells[0] + 1) * columns];
@@ -92,7 +92,7 @@ impl Scallops {
             let at = &mut heights[index(place.u, 0) * columns + index(place.v, 1)];
             *at = at.max(f64::from(place.height_mm));
         }
-        // Between ridges, and between the places along one, the nearest counts.
+        // Between ridges and between points of a ridge, the nearest height applies.
         for _ in 0..self.reach(cells, domain, along) {
             let known = heights.clone();
             let mut is_full = true;
@@ -109,10 +109,9 @@ impl Scallops {
         heights
     }
 
-    /// Cells from a ridge's place to the farthest that it stands for: the widest gap between places on neighbouring
-    /// ridges, or along one.
+    /// Reach of a ridge point in cells: the largest gap between points on adjacent ridges or along one ridge.
     fn reach(&self, cells: [usize; 2], domain: [[f64; 2]; 2], along: Along) -> usize {
-        let of = |place: &RidgePlace, k: usize| if k == 0 { place.u } else { place.v };
+        let of = |place: &RidgePoint, k: usize| if k == 0 { place.u } else { place.v };
         let in_cells = |apart: f64, k: usize| (apart / (domain[k][1] - domain[k][0])).abs() * cells[k] as f64;
         let (path, side) = match along {
             Along::U => (0, 1),
@@ -134,12 +133,12 @@ impl Scallops {
             .chain(across)
             .filter(|apart| apart.is_finite())
             .fold(0.0, f64::max);
-        // Half a step stands before the first ridge and behind the last, and rounding takes a cell each way.
+        // Half a step-over before the first and behind the last ridge, plus one cell each way for rounding.
         widest.ceil() as usize + 2
     }
 }
 
-/// The largest of the known heights beside a place of the grid.
+/// Largest known height adjacent to a point of the grid.
 fn nearest(known: &[f64], at: usize, columns: usize) -> f64 {
     let column = at % columns;
     let beside = [

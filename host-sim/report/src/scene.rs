@@ -1,34 +1,34 @@
-//! What lies before what: the ball's place, and the parts of lines that can be seen.
+//! Visibility: the position of the ball, and the visible parts of lines.
 
 use super::mesh::{FINE, Mesh, Quad};
-use super::record::{Drawn, Place, Record};
+use super::record::{DrawnPass, Place, Record};
 use super::vector::{Vector, add_scaled, dot, subtract};
 use super::view::{Camera, Depth, Frame, View};
 
-/// A ball whose radius is above this share of the surface's diagonal is left out: it would be the whole picture.
+/// Largest ball radius that is drawn, as a share of the surface's diagonal: a larger ball would cover the picture.
 const BALL_SHARE: f64 = 0.4;
-/// Places along the highlighted pass that are tried for the ball, the best liked first.
+/// Candidate positions of the ball along the highlighted pass, in order of preference.
 const BALL_PLACES: [f64; 9] = [0.5, 0.56, 0.44, 0.62, 0.38, 0.68, 0.32, 0.76, 0.24];
-/// The contact must face the viewer by this cosine to be seen well under the ball.
+/// Least cosine between tool normal and view direction at which the contact is visible under the ball.
 const BALL_FACING: f64 = 0.15;
-/// Share of a worse-liked place that a better view of the ball must gain.
+/// Least gain in visible share of the ball for a less preferred position.
 const BALL_GAIN: f64 = 0.04;
 
-/// The order in which a part of a line is drawn.
+/// Drawing order of a part of a line.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Layer {
-    /// Behind the surface: not at all.
+    /// Behind the surface: not drawn.
     Hidden,
-    /// Before the ball is drawn, which lies in front.
+    /// Drawn before the ball, which is in front.
     Under,
-    /// After the ball.
+    /// Drawn after the ball.
     Over,
 }
 
 /// The ball in the picture.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Ball {
-    /// Its contact and centre, placed.
+    /// Contact and centre in picture coordinates.
     pub(super) cc: Vector,
     pub(super) cl: Vector,
     /// Pixels.
@@ -36,18 +36,18 @@ pub(super) struct Ball {
 }
 
 impl Ball {
-    /// Whether a placed point lies behind the ball. Nothing lies within it, so its middle plane decides.
+    /// Whether a point is behind the ball. No point is inside the ball, so the plane through its centre decides.
     fn hides(&self, placed: Vector, margin: f64) -> bool {
         self.covers(placed, margin) && placed[2] < self.cl[2]
     }
 
-    /// Whether a point of the picture lies in the ball's disc, widened by a margin.
+    /// Whether a point of the picture is within the disc of the ball plus a margin.
     fn covers(&self, placed: Vector, margin: f64) -> bool {
         (placed[0] - self.cl[0]).hypot(placed[1] - self.cl[1]) < self.radius + margin
     }
 }
 
-/// The surface seen by a camera, with the tool on it.
+/// The surface and the tool as seen by a camera.
 #[derive(Debug)]
 pub(super) struct Scene<'a> {
     mesh: &'a Mesh,
@@ -59,7 +59,7 @@ pub(super) struct Scene<'a> {
 }
 
 impl<'a> Scene<'a> {
-    /// The best view of the surface and of the tool on the record's middle pass.
+    /// The best view of the surface, with the tool on the middle pass of the record.
     pub(super) fn new(mesh: &'a Mesh, record: &Record, radius_mm: f64, frame: Frame) -> Self {
         let one = highlighted(record).map(|drawn| (drawn.pass, drawn.places.items()));
         let has_tool = radius_mm < BALL_SHARE * mesh.diagonal();
@@ -91,7 +91,7 @@ impl<'a> Scene<'a> {
         scene
     }
 
-    /// The ball where it can be seen best.
+    /// The ball at its most visible position.
     fn best_ball(&self, radius: f64) -> Option<Ball> {
         let (_, places) = self.one.as_ref()?;
         let mut best: Option<(f64, Ball)> = None;
@@ -112,13 +112,13 @@ impl<'a> Scene<'a> {
         best.map(|(_, ball)| ball)
     }
 
-    /// Cosine between the tool normal at a place and the direction to the viewer.
+    /// Cosine between the tool normal at a point and the direction to the viewer.
     fn facing(&self, place: &Place) -> f64 {
         let normal = subtract(place.cl_mm, place.cc_mm);
         dot(normal, self.camera.view.toward) / dot(normal, normal).sqrt().max(1e-12)
     }
 
-    /// Share of the ball's disc that nothing covers.
+    /// Visible share of the disc of the ball.
     fn uncovered(&self, ball: &Ball) -> f64 {
         const STEPS: i32 = 8;
         let offsets = || (-STEPS..=STEPS).map(|k| f64::from(k) / f64::from(STEPS));
@@ -136,7 +136,7 @@ impl<'a> Scene<'a> {
         shown / all
     }
 
-    /// The quads of the surface, the farthest first; and of them those in front of the ball.
+    /// The quads of the surface, farthest first; and those in front of the ball.
     pub(super) fn quads(&self) -> (Vec<Quad>, Vec<Quad>) {
         let depth = |quad: &Quad| self.camera.place(middle(quad))[2];
         let mut quads: Vec<_> = self.mesh.quads(FINE).collect();
@@ -151,7 +151,7 @@ impl<'a> Scene<'a> {
         (quads, front)
     }
 
-    /// The parts of a line on the surface's tool side that can be seen.
+    /// Visible parts of a line on the tool side of the surface.
     pub(super) fn on_surface(&self, places: &[Place]) -> Vec<(Layer, Vec<[f64; 2]>)> {
         let layers = places.iter().map(|place| {
             let placed = self.camera.place(place.cc_mm);
@@ -165,7 +165,7 @@ impl<'a> Scene<'a> {
         runs(layers)
     }
 
-    /// The parts of a line in space that can be seen.
+    /// Visible parts of a line in space.
     pub(super) fn in_space(&self, points: &[Vector]) -> Vec<(Layer, Vec<[f64; 2]>)> {
         runs(points.iter().map(|point| {
             let placed = self.camera.place(*point);
@@ -173,7 +173,7 @@ impl<'a> Scene<'a> {
         }))
     }
 
-    /// The edges of the surface, the parts that can be seen.
+    /// Visible parts of the boundary of the surface.
     pub(super) fn edges(&self) -> Vec<(Layer, Vec<[f64; 2]>)> {
         self.mesh
             .edges()
@@ -182,7 +182,7 @@ impl<'a> Scene<'a> {
             .collect()
     }
 
-    /// Where a place's contact lies in the picture and which way the pass runs there, if it can be seen.
+    /// Position of a contact in the picture and direction of the pass there, if visible.
     pub(super) fn arrow(&self, places: &[Place], share: f64) -> Option<[[f64; 2]; 2]> {
         let index = (places.len() as f64 * share) as usize;
         let reach = (places.len() / 40).max(1);
@@ -214,7 +214,7 @@ impl<'a> Scene<'a> {
 }
 
 /// The middle pass, or the pass nearest to the middle if the run ended before it.
-pub(super) fn highlighted(record: &Record) -> Option<&Drawn> {
+pub(super) fn highlighted(record: &Record) -> Option<&DrawnPass> {
     let middle = record.drawn.iter().find(|drawn| drawn.pass == record.middle_pass);
     middle.or_else(|| record.drawn.get(record.drawn.len() / 2))
 }
@@ -226,8 +226,7 @@ pub(super) fn middle(quad: &Quad) -> Vector {
         .fold([0.0; 3], |sum, corner| add_scaled(sum, *corner, 0.25))
 }
 
-/// Consecutive points of one layer, hidden ones left out. Where a line passes from one layer to the other, both parts
-/// share the point.
+/// Runs of consecutive visible points of one layer. Where a line changes layers, both runs contain the point.
 fn runs(points: impl Iterator<Item = (Vector, Layer)>) -> Vec<(Layer, Vec<[f64; 2]>)> {
     let mut runs: Vec<(Layer, Vec<[f64; 2]>)> = Vec::new();
     let mut before: Option<([f64; 2], Layer)> = None;

@@ -1,5 +1,4 @@
-//! What the charts show: least and largest value of each quantity in spans of time, so that no peak is lost however long
-//! the run is.
+//! Data of the charts: minimum and maximum of each quantity in spans of time, so that decimation does not remove peaks.
 
 use serde_json::{Value, json};
 
@@ -10,13 +9,13 @@ use oracle::{PassSample, SampleCheck};
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[repr(usize)]
 pub(super) enum Channel {
-    /// Speed of the contact, mm/s.
+    /// Speed of the cutter contact (CC), mm/s.
     CcSpeed,
-    /// Speed of the tool centre, mm/s.
+    /// Speed of the cutter location (CL), mm/s.
     ClSpeed,
-    /// Error of the tool centre, nm.
+    /// Error of the cutter location, nm.
     ClError,
-    /// Error of the feed, %.
+    /// Feed error, %.
     FeedError,
     /// Velocity of x, the first of three, mm/s.
     Velocity,
@@ -24,7 +23,7 @@ pub(super) enum Channel {
     Acceleration = 7,
 }
 
-/// Names of the channels in the page, in their order.
+/// Names of the channels in the page, in the order of [`Channel`].
 const NAMES: [&str; CHANNELS] = [
     "cc_speed",
     "cl_speed",
@@ -39,29 +38,29 @@ const NAMES: [&str; CHANNELS] = [
 ];
 const CHANNELS: usize = 10;
 
-/// Spans over the whole run at most: some thirty to a pixel of a wide chart.
+/// Largest number of spans over the whole run: about thirty per pixel of a wide chart.
 const SPANS_MAX: usize = 32_768;
-/// Spans of a pass that is kept in detail: sample by sample, if it is no longer than this.
+/// Largest number of spans of a pass stored in detail; one per sample if the pass is not longer.
 const DETAIL_MAX: usize = 8192;
 
-/// Accelerations are taken over so many periods before and after.
+/// Periods before and after a position over which the wide acceleration is computed.
 const REACH: usize = 8;
-/// Unless that differs from the one over single periods by more than this, nm per period². Centres are whole
-/// nanometres, and keep within some nanometres of the exact ones: two differences of three of them.
+/// Largest difference between the accelerations over single periods and over wide ones that is attributed to noise, nm per
+/// period². Positions are whole nanometres within some nanometres of the exact ones; a second difference has four of them.
 const NOISE_NM: f64 = 8.0;
 
 const MM_PER_NM: f64 = 1e-6;
 
-/// Least and largest value of each channel; no numbers where there was none.
+/// Minimum and maximum of each channel; NaN without values.
 type Span = [[f32; 2]; CHANNELS];
 const EMPTY: Span = [[f32::NAN; 2]; CHANNELS];
 
-/// Spans of equal length, which doubles when there are too many.
+/// Spans of equal length, which doubles when the capacity is reached.
 #[derive(Clone, Debug)]
 pub(super) struct Spans {
     most: usize,
     first_tick: Option<u64>,
-    /// A span is two to this power ticks long.
+    /// Binary logarithm of the length of a span in ticks.
     doublings: u32,
     spans: Vec<Span>,
 }
@@ -76,7 +75,7 @@ impl Spans {
         }
     }
 
-    /// A value at a tick: one that is not much before the latest.
+    /// Adds a value at a tick, which may be slightly before the latest.
     pub(super) fn put(&mut self, tick: u64, channel: usize, value: f64) {
         let first = *self.first_tick.get_or_insert(tick);
         let since = tick.saturating_sub(first);
@@ -88,7 +87,7 @@ impl Spans {
             self.spans.resize(index + 1, EMPTY);
         }
         let [least, largest] = &mut self.spans[index][channel];
-        // The rounding to f32 is far below the page's 16 bits.
+        // The rounding to f32 is far below the resolution of 16 bits.
         *least = least.min(value as f32);
         *largest = largest.max(value as f32);
     }
@@ -105,7 +104,7 @@ impl Spans {
         self.doublings += 1;
     }
 
-    /// Largest value of a channel; no number if there is none.
+    /// Maximum of a channel; NaN without values.
     fn largest(&self, channel: usize) -> f32 {
         self.spans
             .iter()
@@ -113,7 +112,7 @@ impl Spans {
             .fold(f32::NAN, f32::max)
     }
 
-    /// Ticks a span.
+    /// Ticks per span.
     pub(super) fn ticks(&self) -> u64 {
         1 << self.doublings
     }
@@ -143,14 +142,14 @@ impl Spans {
     }
 }
 
-/// Velocities and accelerations of the tool centre on a pass, out of its last positions.
+/// Velocities and accelerations of the cutter location on a pass, from its last positions.
 #[derive(Clone, Debug, Default)]
 struct Axes {
     /// The last positions, nm; the newest last.
     places: std::collections::VecDeque<[i32; 3]>,
-    /// The acceleration over the wide reach, nm per period², taken last.
+    /// The latest wide acceleration, nm per period².
     wide: Option<[f64; 3]>,
-    /// Middle ticks of accelerations over single periods that wait for a wide one, with them.
+    /// Accelerations over single periods for which the wide one is still missing, with their middle ticks.
     waiting: Vec<(u64, [f64; 3])>,
 }
 
@@ -174,7 +173,7 @@ impl Axes {
         }))
     }
 
-    /// The next position; hands on accelerations, nm per period², with their ticks.
+    /// Adds the next position; passes on accelerations, nm per period², with their ticks.
     fn add(&mut self, tick: u64, place: [i32; 3], mut each: impl FnMut(u64, [f64; 3])) {
         self.places.push_back(place);
         if self.places.len() > 2 * REACH + 1 {
@@ -186,7 +185,7 @@ impl Axes {
         if let Some(wide) = self.second_difference(REACH, REACH) {
             let wide = wide.map(|x| x / (REACH * REACH) as f64);
             self.wide = Some(wide);
-            // Those about its own middle and, at the beginning of a pass, before it.
+            // Accelerations at its middle and, at the start of a pass, before it.
             let ready = self
                 .waiting
                 .partition_point(|(at, _)| *at + (REACH as u64) <= tick);
@@ -196,7 +195,7 @@ impl Axes {
         }
     }
 
-    /// The accelerations that no wide one is to come for.
+    /// The remaining accelerations, for which no wide one follows.
     fn finish(&mut self, mut each: impl FnMut(u64, [f64; 3])) {
         let wide = self.wide;
         for (at, narrow) in self.waiting.drain(..) {
@@ -205,7 +204,7 @@ impl Axes {
     }
 }
 
-/// The acceleration over single periods, or the wide one if the difference may be the positions' noise.
+/// The acceleration over single periods, or the wide one if the difference may be noise of the positions.
 fn settled(narrow: [f64; 3], wide: [f64; 3]) -> [f64; 3] {
     std::array::from_fn(|k| {
         if (narrow[k] - wide[k]).abs() <= NOISE_NM {
@@ -216,7 +215,7 @@ fn settled(narrow: [f64; 3], wide: [f64; 3]) -> [f64; 3] {
     })
 }
 
-/// A pass that is kept in detail.
+/// A pass stored in detail.
 #[derive(Clone, Debug)]
 struct Detail {
     pass: u32,
@@ -231,13 +230,13 @@ pub(super) struct Series {
     whole: Spans,
     current: Option<Detail>,
     middle: Option<Detail>,
-    /// The pass with the largest error of the tool centre.
+    /// The pass with the largest CL error.
     worst: Option<Detail>,
     axes: Axes,
 }
 
 impl Series {
-    /// Of a run with this period; `middle_pass` is kept in detail.
+    /// Series of a run with this period; `middle_pass` is stored in detail.
     pub(super) fn new(period_s: f64, middle_pass: u32) -> Self {
         Self {
             period_s,
@@ -259,7 +258,7 @@ impl Series {
             });
             self.axes.begin(sample.cl_nm);
         }
-        // The last step of a pass is cut short, and says nothing about speeds.
+        // The last step of a pass is shorter than a period's and gives no speed.
         if let (Some(arc_mm), false) = (checked.arc_mm, sample.last_of_pass) {
             self.add_rates(sample, arc_mm);
         }
@@ -329,27 +328,27 @@ impl Series {
         }
     }
 
-    /// The series up to the last sample.
+    /// Completes the series after the last sample.
     pub(super) fn finished(&self) -> Self {
         let mut series = self.clone();
         series.end_pass();
         series
     }
 
-    /// Ticks a span of the whole run; after [`Series::finished`].
+    /// Ticks per span of the whole run; call after [`Series::finished`].
     pub(super) fn ticks(&self) -> u64 {
         self.whole.ticks()
     }
 
-    /// These spans instead of the whole run's.
+    /// JSON of these spans.
     #[cfg(test)]
     pub(super) fn replace_whole(&mut self, spans: Spans) {
         self.whole = spans;
     }
 
-    /// As the page reads it; after [`Series::finished`].
+    /// JSON of the series; call after [`Series::finished`].
     pub(super) fn json(&self) -> Value {
-        // A run that keeps every sample needs no pass in detail.
+        // If every sample is stored, no pass is stored in detail.
         let details = [&self.middle, &self.worst].into_iter().flatten();
         let finer = details.filter(|detail| detail.spans.ticks() < self.whole.ticks());
         let details: Vec<_> = finer

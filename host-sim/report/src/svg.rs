@@ -1,15 +1,15 @@
-//! Pieces of SVG text.
+//! Elements of SVG text.
 
 use std::fmt::Write;
 
-/// A number with at most one decimal: a tenth of a pixel is finer than any screen.
+/// A number with at most one decimal: 0.1 pixel is below the resolution of a screen.
 pub(super) fn tenths(value: f64) -> String {
     let mut text = String::new();
     push_tenths(&mut text, round_tenths(value), true);
     text
 }
 
-/// Text that may stand between tags and in attributes.
+/// Escapes text for use between tags and in attributes.
 #[must_use]
 pub fn escape(text: &str) -> String {
     let mut escaped = String::with_capacity(text.len());
@@ -28,7 +28,7 @@ pub fn escape(text: &str) -> String {
     escaped
 }
 
-/// Path data of a polyline: one absolute point, then relative steps in tenths, which cannot drift.
+/// Path data of a polyline: one absolute point, then relative steps in tenths; rounding does not accumulate.
 pub(super) fn polyline(points: &[[f64; 2]]) -> String {
     let mut data = String::new();
     let mut at = [0_i64; 2];
@@ -46,7 +46,7 @@ pub(super) fn polyline(points: &[[f64; 2]]) -> String {
     data
 }
 
-/// The same polyline with fewer points, nowhere farther than `tolerance` from the given one (Douglas and Peucker).
+/// Simplifies a polyline; the result is within `tolerance` of the given one (Douglas and Peucker).
 #[must_use]
 pub fn simplified(points: &[[f64; 2]], tolerance: f64) -> Vec<[f64; 2]> {
     if points.len() < 3 {
@@ -55,7 +55,7 @@ pub fn simplified(points: &[[f64; 2]], tolerance: f64) -> Vec<[f64; 2]> {
     let mut keep = vec![false; points.len()];
     keep[0] = true;
     keep[points.len() - 1] = true;
-    // Every turn of the loop either drops a span or splits it, so there are fewer than twice as many as points.
+    // Each iteration removes a span or splits it, so there are fewer iterations than twice the number of points.
     let mut spans = vec![(0, points.len() - 1)];
     while let Some((first, last)) = spans.pop() {
         let (index, distance) = (first + 1..last)
@@ -92,7 +92,7 @@ fn round_tenths(value: f64) -> i64 {
     (value * 10.0).round() as i64
 }
 
-/// Appends a number of tenths; `first`: what stands before it needs no separator.
+/// Appends a number of tenths; `first`: no separator needed.
 fn push_tenths(text: &mut String, tenths: i64, first: bool) {
     if tenths < 0 {
         text.push('-');
@@ -100,7 +100,7 @@ fn push_tenths(text: &mut String, tenths: i64, first: bool) {
         text.push(' ');
     }
     let (whole, rest) = (tenths.unsigned_abs() / 10, tenths.unsigned_abs() % 10);
-    // Writing to a string cannot fail.
+    // Writing to a `String` cannot fail.
     let _ = match (whole, rest) {
         (_, 0) => write!(text, "{whole}"),
         (0, _) => write!(text, ".{rest}"),

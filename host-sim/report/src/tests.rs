@@ -1,9 +1,9 @@
-//! Tests of the report: what is kept is bounded, what is written is well formed and says what was found.
+//! Tests of the report: bounded memory, well-formed output, correct figures.
 
 use std::path::Path;
 
 use super::furniture::round_below;
-use super::record::{Record, Thinned};
+use super::record::{DecimatedStream, Record};
 use super::svg::{escape, polyline, simplified, tenths};
 use super::{Figure, Remarks, Sketch, measure, number};
 use job::Job;
@@ -12,7 +12,7 @@ use machine::prepare::prepare;
 use oracle::{Oracle, PassSample, SampleCheck};
 use verify::survey::{Survey, SurveyResult};
 
-/// A small bell: 20 passes or so, in a fraction of a second.
+/// A small bell with about 20 passes.
 pub(super) const BELL: &str = r#"
 [surface]
 kind = "revolved"
@@ -48,7 +48,7 @@ pub(super) fn run(text: &str) -> (Job, Sketch, SurveyResult) {
     (job, sketch, findings)
 }
 
-/// Panics unless every tag is closed in its turn, attributes are quoted, and no stray `&` or `<` stands in the text.
+/// Panics unless all tags are nested and closed, attributes are quoted, and `&` and `<` are escaped in the text.
 fn assert_well_formed(text: &str) {
     let mut open: Vec<&str> = Vec::new();
     let mut rest = text;
@@ -74,7 +74,7 @@ fn assert_well_formed(text: &str) {
             .unwrap();
         match () {
             () if tag.starts_with('!') || tag.ends_with('/') => {}
-            // What is in a script is the browser's to read, up to its end tag.
+            // The content of a script is skipped up to its end tag.
             () if name == "script" => {
                 let script = &from[end + 1..];
                 rest = &script[script.find("</script>").expect("a script ends") + 9..];
@@ -88,7 +88,7 @@ fn assert_well_formed(text: &str) {
     assert!(open.is_empty(), "never closed: {open:?}");
 }
 
-/// The raw value that the page gives for a row.
+/// The raw value of a row of the page.
 fn value_of(page: &str, what: &str) -> f64 {
     let row = page
         .split_once(&format!("<th scope=\"row\">{what}</th><td><data value=\""))
@@ -100,9 +100,9 @@ fn value_of(page: &str, what: &str) -> f64 {
 #[test]
 fn thinning_is_bounded_and_keeps_both_ends() {
     for count in [1_u32, 2, 9, 10, 11, 20, 21, 999, 100_000] {
-        let mut thinned = Thinned::new(10);
-        (0..count).for_each(|item| thinned.push(item));
-        let items = thinned.items();
+        let mut decimated = DecimatedStream::new(10);
+        (0..count).for_each(|item| decimated.push(item));
+        let items = decimated.items();
         assert!(
             items.len() <= 11 && items.len() >= count.min(6) as usize,
             "{count}: {items:?}"
@@ -110,13 +110,13 @@ fn thinning_is_bounded_and_keeps_both_ends() {
         assert_eq!((items.first(), items.last()), (Some(&0), Some(&(count - 1))));
         assert!(items.windows(2).all(|pair| pair[0] < pair[1]));
     }
-    assert!(Thinned::<u8>::new(10).items().is_empty());
+    assert!(DecimatedStream::<u8>::new(10).items().is_empty());
 }
 
 #[test]
 fn record_is_bounded_whatever_the_job() {
     let job = job_file::parse("bell.toml", BELL).unwrap();
-    // More passes than expected, each longer than what is kept of it.
+    // More passes than expected, each longer than its capacity.
     for (expected, passes, samples) in [(5000, 6000, 3), (3, 500, 700), (0, 2, 5000)] {
         let mut record = Record::new(&job, expected);
         for pass in 0..passes {
@@ -207,7 +207,7 @@ fn report_is_well_formed_small_and_says_what_was_found() {
         assert!(!text.contains("somewhere") && !said.contains("NaN") && !said.contains("inf "));
     }
     assert!(picture.len() < 400_000, "{} bytes", picture.len());
-    // Names of namespaces and the licences' word of where a library comes from are no requests; the policy forbids all.
+    // Namespace names and addresses in licences are not requests; the content security policy forbids requests.
     assert!(!picture.replace("http://www.w3.org/2000/svg", "").contains("://"));
     assert!(page.contains("content=\"default-src 'none';"));
     for text in [
@@ -223,13 +223,13 @@ fn report_is_well_formed_small_and_says_what_was_found() {
         ("Passes", f64::from(findings.passes)),
         ("Samples", findings.samples as f64),
         ("Machining time", findings.samples as f64 * job.machine.period_s()),
-        ("Cutter contact path", report.cc_length_mm),
-        ("Tool centre path", findings.speeds.cl_length_mm),
+        ("CC path", report.cc_length_mm),
+        ("CL path", findings.speeds.cl_length_mm),
         ("Least path interval", findings.interval_min),
         ("Feed ripple", report.ripple_pct.max),
         ("Feed ripple, rms", report.ripple_pct.rms()),
-        ("Tool centre error", report.position_nm.max),
-        ("Scallop by formula", report.scallop_mm.max),
+        ("CL error", report.position_nm.max),
+        ("Scallop height, by formula", report.scallop_mm.max),
     ] {
         assert_eq!(value_of(&page, what), value, "{what}");
     }

@@ -1,27 +1,27 @@
-//! The passes as the page's view draws them: points at equal times, each with the worst of the samples it stands for.
+//! The passes in the 3D view: points at equal times, each with the worst of the samples it represents.
 
 use serde_json::{Value, json};
 
 use super::embed::{column, words};
 use oracle::{PassSample, SampleCheck};
 
-/// Points of all passes, about.
+/// Approximate number of points of all passes.
 const POINTS: usize = 60_000;
-/// Points of a pass: at least, so that it keeps its shape, and at most.
+/// Least number of points of a pass, which preserves its shape, and largest number.
 const PASS_POINTS: [usize; 2] = [24, 8192];
-/// No more points than this are kept, should the run have more passes than were expected.
+/// Largest number of points, if the run has more passes than expected.
 const POINTS_MAX: usize = 2 * POINTS;
 
-/// What the samples of a point came to; no number where there was none.
+/// Worst values of the samples of a point; NaN without samples.
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct Worst {
-    /// Speed of the contact that is farthest from the feed, mm/s.
+    /// Speed of the cutter contact with the largest deviation from the feed, mm/s.
     cc_mm_s: f32,
-    /// Largest speed of the tool centre, mm/s.
+    /// Largest speed of the cutter location, mm/s.
     cl_mm_s: f32,
-    /// Largest error of the tool centre, nm.
+    /// Largest error of the cutter location, nm.
     cl_nm: f32,
-    /// Largest error of the feed, either way, %.
+    /// Largest feed error by magnitude, %.
     feed_pct: f32,
 }
 
@@ -58,11 +58,11 @@ struct Pass {
     pass: u32,
     first_tick: u64,
     last_tick: u64,
-    /// Samples from a point to the next.
+    /// Samples per point.
     stride: usize,
     seen: usize,
     points: Vec<Point>,
-    /// The last sample, with what came since the last point.
+    /// The last sample, with the values since the last point.
     last: Option<Point>,
 }
 
@@ -78,7 +78,7 @@ impl Pass {
         } else if self.points.len() < most {
             self.points.push(point);
         } else {
-            // The number is even: the last point goes into this one.
+            // The number of points is even: the last one is merged into this one.
             let before = self.points.last().map_or(Worst::NONE, |last| last.worst);
             self.halve(feed_mm_s);
             self.points.push(Point {
@@ -89,7 +89,7 @@ impl Pass {
         self.seen += 1;
     }
 
-    /// Every other point goes, what it stands for into the one after it.
+    /// Merges every second point into the next one.
     fn halve(&mut self, feed_mm_s: f32) {
         let halved = self.points.chunks(2).enumerate().map(|(index, pair)| {
             let before = match index {
@@ -116,7 +116,7 @@ impl Pass {
 pub(super) struct Track {
     feed_mm_s: f32,
     period_s: f64,
-    /// Every so many passes one is drawn.
+    /// One of this number of passes is drawn.
     pub(super) every: u32,
     final_pass: u32,
     most: usize,
@@ -124,12 +124,12 @@ pub(super) struct Track {
     kept: usize,
     is_drawn: bool,
     last_cl_nm: [i32; 3],
-    /// Passes seen.
+    /// Number of passes so far.
     seen: u32,
 }
 
 impl Track {
-    /// Of a run with this feed and period; `passes`: how many are expected.
+    /// Track of a run with this feed and period; `passes`: expected number.
     pub(super) fn new(feed_mm_s: f64, period_s: f64, passes: usize) -> Self {
         let passes = passes.max(1);
         let [least, most] = PASS_POINTS;
@@ -139,7 +139,7 @@ impl Track {
             period_s,
             every: u32::try_from(every).unwrap_or(u32::MAX),
             final_pass: u32::try_from(passes - 1).unwrap_or(u32::MAX),
-            // An even number, so that halving ends between two points.
+            // Even, so that merging pairs leaves no single point.
             most: (POINTS / passes.div_ceil(every)).clamp(least, most) / 2 * 2,
             passes: Vec::new(),
             kept: 0,
@@ -159,7 +159,7 @@ impl Track {
         let Some(pass) = self.passes.last_mut().filter(|_| self.is_drawn) else {
             return;
         };
-        // The last step of a pass is cut short, and says nothing about speeds.
+        // The last step of a pass is shorter than a period's and gives no speed.
         let arc_mm = checked.arc_mm.filter(|_| !sample.last_of_pass);
         let number = |value: Option<f64>| value.map_or(f32::NAN, |value| value as f32);
         pass.last_tick = sample.tick;
@@ -196,17 +196,17 @@ impl Track {
         }
     }
 
-    /// Points that are drawn.
+    /// Number of drawn points.
     pub(super) fn points(&self) -> usize {
         self.passes.iter().map(|pass| pass.points().count()).sum()
     }
 
-    /// Passes that are drawn.
+    /// Number of drawn passes.
     pub(super) fn drawn(&self) -> usize {
         self.passes.len()
     }
 
-    /// Samples from a drawn point to the next: at least and at most.
+    /// Least and largest number of samples per drawn point.
     pub(super) fn strides(&self) -> [usize; 2] {
         self.passes
             .iter()
@@ -216,13 +216,13 @@ impl Track {
             })
     }
 
-    /// The places of contact and centre at all points, nm.
+    /// Positions of contact and centre at all points, nm.
     pub(super) fn places(&self) -> impl Iterator<Item = [i32; 3]> {
         let points = self.passes.iter().flat_map(Pass::points);
         points.flat_map(|point| [point.cc_nm, point.cl_nm])
     }
 
-    /// As the page reads it. `place`: 16-bit steps of a position, nm.
+    /// JSON of the track. `place`: converts a position, nm, to 16-bit steps.
     pub(super) fn json(&self, place: impl Fn([i32; 3]) -> [u16; 3]) -> Value {
         let points = || self.passes.iter().flat_map(Pass::points);
         let of = |pick: fn(&Worst) -> f32| column(points().map(move |point| pick(&point.worst).into()));

@@ -1,32 +1,32 @@
-//! The camera: a parallel projection, and what of the surface can be seen in it.
+//! The camera: parallel projection and visibility of the surface.
 
 use super::mesh::{FINE, Mesh};
 use super::vector::{Vector, cross, dot, subtract};
 
-/// Cells of the depth buffer a pixel of the picture.
+/// Cells of the depth buffer per pixel.
 const CELLS_PER_PIXEL: f64 = 2.0;
-/// A point this many pixels behind the surface still counts as lying on it: facets, rounding.
+/// Depth tolerance for facets and rounding, pixels: a point this far behind the surface counts as on it.
 const DEPTH_SLACK: f64 = 1.5;
-/// Heights of the camera over the horizon that are tried, degrees, with the preference for each: lower is livelier,
-/// higher looks into hollows.
+/// Candidate elevations of the camera, degrees, each with its weight: low ones show the shape, high ones the inside of concave
+/// regions.
 const ELEVATIONS: [(f64, f64); 4] = [(26.0, 0.95), (34.0, 1.0), (43.0, 0.82), (56.0, 0.62)];
-/// Directions around z that are tried.
+/// Number of candidate azimuths.
 const AZIMUTHS: u32 = 36;
-/// The direction that is preferred, degrees: x to the right and towards the viewer, y away; and how much it counts.
+/// Preferred azimuth, degrees: x to the right and towards the viewer, y away; and its weight.
 const AZIMUTH_LIKED: f64 = -60.0;
 const AZIMUTH_WEIGHT: f64 = 0.15;
-/// What a view is worth that looks straight along a side of the surface, against one that looks across its corner.
+/// Weight of a view along a side of the surface, relative to one across a corner.
 const STRAIGHT_ON: f64 = 0.5;
-/// How much more a piece of the back counts against a view than a piece of the tool side counts for it.
+/// Weight of visible back side, relative to visible tool side.
 const BACK_COUNTS: f64 = 5.0;
-/// How much it counts that the surface is seen, and that it fills the frame.
+/// Exponents of the visible share of the surface and of the filled share of the frame.
 const SEEN_POWER: f64 = 0.6;
 const FILL_POWER: f64 = 0.4;
 
 /// A frame in the picture: left, top, width, height.
 pub(super) type Frame = [f64; 4];
 
-/// Directions of the picture in space.
+/// Axes of the camera in space.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct View {
     right: Vector,
@@ -36,7 +36,7 @@ pub(super) struct View {
 }
 
 impl View {
-    /// A camera at these angles around z and over the horizon, degrees.
+    /// A camera at this azimuth and elevation, degrees.
     fn at(azimuth: f64, elevation: f64) -> Self {
         let (sin_a, cos_a) = azimuth.to_radians().sin_cos();
         let (sin_e, cos_e) = elevation.to_radians().sin_cos();
@@ -49,7 +49,7 @@ impl View {
         }
     }
 
-    /// A direction in the picture: right, up, towards the viewer.
+    /// A direction in camera coordinates: right, up, towards the viewer.
     pub(super) fn turn(&self, direction: Vector) -> Vector {
         [
             dot(direction, self.right),
@@ -58,7 +58,7 @@ impl View {
         ]
     }
 
-    /// The view that shows the surface's tool side best: much of it, large, from across a corner.
+    /// The candidate with the highest score: visible share of the tool side, filled frame, oblique sides.
     pub(super) fn best(mesh: &Mesh, extent: &[Vector], frame: Frame) -> Self {
         let small = [0.0, 0.0, frame[2] / 6.0, frame[3] / 6.0];
         let below = mesh.mean_normal()[2] < -0.1;
@@ -78,7 +78,7 @@ impl View {
         best.1
     }
 
-    /// 1 where a side of the surface runs aslant in the picture, less where it runs straight across or away.
+    /// 1 if the sides of the surface are oblique in the picture, less if one is horizontal or along the view.
     fn across_corner(&self, side: Vector) -> f64 {
         let away = cross([0.0, 0.0, 1.0], self.right);
         let aslant = (2.0 * dot(side, away).atan2(dot(side, self.right))).sin().abs();
@@ -86,8 +86,8 @@ impl View {
     }
 }
 
-/// How well a camera shows the tool side: its seen area, less that of the back, as a share of the surface, and the
-/// share of the frame that it fills.
+/// Score of a camera: visible area of the tool side minus that of the back, as a share of the surface, and the filled share
+/// of the frame.
 fn shown(mesh: &Mesh, camera: &Camera) -> f64 {
     const CELLS: f64 = 0.5;
     let mut depth = Depth::new(camera, CELLS);
@@ -103,11 +103,11 @@ fn shown(mesh: &Mesh, camera: &Camera) -> f64 {
     seen.powf(SEEN_POWER) * fill.powf(FILL_POWER)
 }
 
-/// A view with the scale and the place in the frame.
+/// A camera with scale and position in the frame.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Camera {
     pub(super) view: View,
-    /// Pixels a millimetre.
+    /// Pixels per mm.
     pub(super) scale: f64,
     origin: Vector,
     centre: [f64; 2],
@@ -153,7 +153,7 @@ impl Camera {
     }
 }
 
-/// What lies foremost in every cell of the frame.
+/// Depth buffer of the frame.
 #[derive(Clone, Debug)]
 pub(super) struct Depth {
     camera: Camera,
@@ -192,7 +192,7 @@ impl Depth {
         self.triangle([a, c, d], is_front);
     }
 
-    /// A placed point in cells.
+    /// A point of the picture in cells.
     fn cell(&self, placed: Vector) -> Vector {
         let [left, top, ..] = self.camera.frame;
         [
@@ -202,7 +202,7 @@ impl Depth {
         ]
     }
 
-    /// Fills the cells whose middle lies in a triangle.
+    /// Fills the cells whose centre is in a triangle.
     fn triangle(&mut self, [a, b, c]: [Vector; 3], is_front: bool) {
         let area = (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0]);
         if area == 0.0 || !area.is_finite() {
@@ -232,7 +232,7 @@ impl Depth {
         }
     }
 
-    /// Cells that show the tool side, and cells that show the back.
+    /// Number of cells that show the tool side and the back.
     fn seen(&self) -> (f64, f64) {
         let covered = self
             .foremost
@@ -248,8 +248,8 @@ impl Depth {
         })
     }
 
-    /// Whether nothing of the surface lies before a placed point. At silhouettes the farthest of the cells around
-    /// counts, so that lines on the surface run to its very edge.
+    /// Whether a point is not hidden by the surface. At silhouettes the farthest adjacent cell decides, so that lines on the
+    /// surface are visible up to its edge.
     pub(super) fn shows(&self, placed: Vector) -> bool {
         let [x, y, depth] = self.cell(placed);
         let around = |value: f64, size: usize| {

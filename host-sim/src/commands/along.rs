@@ -1,4 +1,4 @@
-//! The direction of the passes, and who chose it: in words and as JSON, the same for every command.
+//! The direction of the passes and how it was chosen, as text and as JSON, for all commands.
 
 use serde_json::{Map, Value, json};
 
@@ -25,7 +25,7 @@ pub(super) fn json(job: &Job) -> Map<String, Value> {
     keys
 }
 
-/// The direction, and by how much it won where it was chosen.
+/// The direction; if it was chosen automatically, with the machining times of both directions.
 pub(super) fn sentence(job: &Job) -> String {
     let chosen = job.along.name();
     let AlongChoice::Chosen(trials) = job.origin.along_choice() else {

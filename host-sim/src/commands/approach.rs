@@ -15,7 +15,7 @@ pub(super) fn command(
     directory: Option<&Path>,
     as_json: bool,
 ) -> Result<()> {
-    let bar = spinner("finding the passes");
+    let bar = spinner("computing the passes");
     let passes = inspect::oracle(job)?
         .schedule()
         .map_err(approach::ApproachError::from)?;
@@ -59,6 +59,6 @@ pub(super) fn command(
         samples_per_second,
         fault: None,
     };
-    outcome.tell(as_json, page.as_deref());
+    outcome.output(as_json, page.as_deref());
     Ok(())
 }

@@ -1,4 +1,4 @@
-//! `budget`: what each stage of the sample task takes on the Cortex-M4F.
+//! `budget`: cycles of each stage of the sample task on the Cortex-M4F.
 
 mod worst;
 
@@ -19,10 +19,10 @@ use cycles::{self, BudgetError, PERIOD_CYCLES, TICKS, chart, golden};
 use machine::remote::qemu;
 use study::operations::{self, Operations};
 
-/// Cycles of a bin of the printed histogram.
+/// Width of a bin of the printed histogram, cycles.
 const BIN_CYCLES: u32 = 50;
 
-/// Counts the cycles of each stage of the sample task, for each kind of surface, in the firmware in QEMU.
+/// Counts the cycles of each stage of the sample task for each kind of surface, with the firmware in QEMU.
 ///
 /// Example: cargo sim budget --report out
 #[derive(Debug, Args)]
@@ -30,22 +30,22 @@ const BIN_CYCLES: u32 = 50;
 pub(super) struct Arguments {
     /// Job files to count instead of the golden table's.
     jobs: Vec<PathBuf>,
-    /// Ticks of each job [default: 20000; 10000 of the golden table's jobs with limits].
+    /// Ticks per job [default: 20000; 10000 for jobs of the golden table with limits].
     #[arg(long, value_parser = clap::value_parser!(u32).range(1..), allow_negative_numbers = true)]
     ticks: Option<u32>,
     /// Writes a chart (SVG) into this folder.
     #[arg(long, value_name = "DIR")]
     report: Option<PathBuf>,
-    /// Tries so many jobs, at random and made to be bad, for the worst tick, and writes the job that causes it.
+    /// Searches the worst-case tick in this number of random and adversarial jobs, and writes the job that causes it.
     #[arg(long, value_name = "JOBS", value_parser = clap::value_parser!(u32).range(1..), allow_negative_numbers = true, conflicts_with_all = ["jobs", "ticks", "report", "check", "bless"])]
     search: Option<u32>,
-    /// Seed of the search: the same finds the same.
+    /// Seed of the search, which is deterministic.
     #[arg(long, default_value_t = 1, requires = "search")]
     seed: u64,
-    /// The search's jobs run within limits of the axes, from standstill to standstill.
+    /// The jobs of the search have axis limits.
     #[arg(long, requires = "search")]
     limits: bool,
-    /// Job file that the search writes.
+    /// Output file of the search.
     #[arg(
         long,
         value_name = "FILE",
@@ -56,10 +56,10 @@ pub(super) struct Arguments {
     /// Prints JSON instead of tables.
     #[arg(long)]
     pub(super) json: bool,
-    /// Fails where a stage has grown by more than 2 % against the golden table.
+    /// Fails if a stage takes over 2 % more cycles than in the golden table.
     #[arg(long, conflicts_with_all = ["jobs", "ticks"])]
     check: bool,
-    /// Writes the golden table anew.
+    /// Rewrites the golden table.
     #[arg(long, conflicts_with_all = ["jobs", "check", "ticks"])]
     bless: bool,
 }
@@ -76,7 +76,7 @@ impl From<BudgetError> for Failure {
 
 /// A job's name and ticks.
 type Counted = (String, Ticks);
-/// By a job's name: its direction in words and as JSON.
+/// Direction of each job as text and as JSON, by the name of the job.
 type Directions = BTreeMap<String, (String, Map<String, Value>)>;
 
 /// The jobs to count: their names, files and ticks.
@@ -125,7 +125,7 @@ fn operations_json(operations: Operations) -> Value {
 struct Images {
     qemu: Sizes,
     chip: Sizes,
-    /// Deepest stack of each.
+    /// Deepest stack of each image.
     qemu_stack: Analysis,
     chip_stack: Analysis,
 }
@@ -142,7 +142,7 @@ impl Images {
     }
 
     fn print(&self) {
-        say!("Cortex-M4F, {PERIOD_CYCLES} cycles a period; bytes:");
+        say!("Cortex-M4F, {PERIOD_CYCLES} cycles per period; bytes:");
         for (board, sizes, stack) in [
             ("chip", self.chip, &self.chip_stack),
             ("QEMU", self.qemu, &self.qemu_stack),
@@ -152,7 +152,7 @@ impl Images {
                 .iter()
                 .map(|context| format!("{} {}", context.name, context.bytes));
             say!(
-                "  {board}: flash {}, RAM {} and the job store {}; stack at most {} ({}, {EXCEPTION_BYTES} an exception) of {}",
+                "  {board}: flash {}, RAM {} and the job store {}; stack at most {} ({}, {EXCEPTION_BYTES} per exception) of {}",
                 sizes.flash,
                 sizes.ram,
                 sizes.store,
@@ -234,11 +234,11 @@ fn print_histogram(histogram: &Histogram) {
     }
 }
 
-/// The worst tick of each job named.
+/// Prints the worst-case tick of each given job.
 fn print_worst(arguments: &Arguments, bench: &Bench) -> Result<()> {
     for path in &arguments.jobs {
         let (_, prepared) = load(path)?;
-        let bar = spinner("looking for the worst tick");
+        let bar = spinner("searching the worst-case tick");
         let mut lab = Lab::new(bench)?;
         let run = lab.run(&prepared, arguments.ticks.unwrap_or(TICKS))?;
         bar.finish_and_clear();
@@ -265,7 +265,7 @@ fn report(arguments: &Arguments, counted: &[Counted]) -> Result<()> {
     Ok(())
 }
 
-/// Compares with the golden table, or writes it.
+/// Compares the figures with the golden table, or writes it.
 fn hold(arguments: &Arguments, figures: &[Figure]) -> Result<()> {
     let path = golden::path();
     if arguments.bless {
@@ -280,7 +280,7 @@ fn hold(arguments: &Arguments, figures: &[Figure]) -> Result<()> {
         return Ok(());
     }
     Err(Failure::Failed(Some(format!(
-        "stages take more than the golden table allows (old -> new):\n  {}\nif that is meant: cargo sim budget --bless",
+        "stages exceed the golden table (old -> new):\n  {}\nif intended: cargo sim budget --bless",
         complaints.join("\n  ")
     ))))
 }

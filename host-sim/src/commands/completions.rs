@@ -1,8 +1,8 @@
 //! `completions`: what makes a shell complete `cargo sim`, or `isofeed` where that is installed.
 //!
-//! `cargo sim` is an alias of cargo's, so the shell asks cargo's completion about it, which knows nothing of our commands. The script
-//! therefore defines completions for a command of the name `cargo_sim`, which need not exist, and puts itself in front of cargo's own:
-//! behind `cargo sim` it asks the former, everywhere else what was there before.
+//! `cargo sim` is a cargo alias, so the shell calls cargo's completion, which does not list the commands of an alias. The script therefore
+//! defines completions for a command named `cargo_sim`, which need not exist, and wraps cargo's completion: after `cargo sim` it calls the
+//! former, otherwise the original.
 
 use clap::{Args, ValueEnum};
 use clap_complete::Shell;
@@ -11,12 +11,12 @@ use programs::Place;
 use super::Result;
 use super::out::say_part;
 
-/// The name that the completions are made for; with a hyphen, clap_complete 4.6 writes names for bash that do not fit each other.
+/// Command name in the completions. With a hyphen, clap_complete 4.6 writes inconsistent function names for bash.
 const NAME: &str = "cargo_sim";
 
-/// Shells whose hook was tried.
+/// Supported shells.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
-enum Hooked {
+enum SupportedShell {
     Bash,
     Zsh,
     Fish,
@@ -32,14 +32,14 @@ enum Hooked {
 pub(super) struct Arguments {
     /// The shell.
     #[arg(value_enum)]
-    shell: Hooked,
+    shell: SupportedShell,
 }
 
 pub(super) fn command(arguments: &Arguments) -> Result<()> {
     let (shell, hook) = match arguments.shell {
-        Hooked::Bash => (Shell::Bash, include_str!("completions/hook.bash")),
-        Hooked::Zsh => (Shell::Zsh, include_str!("completions/hook.zsh")),
-        Hooked::Fish => (Shell::Fish, include_str!("completions/hook.fish")),
+        SupportedShell::Bash => (Shell::Bash, include_str!("completions/hook.bash")),
+        SupportedShell::Zsh => (Shell::Zsh, include_str!("completions/hook.zsh")),
+        SupportedShell::Fish => (Shell::Fish, include_str!("completions/hook.fish")),
     };
     let mut script = Vec::new();
     // An installed tool is a program: it needs no hook.

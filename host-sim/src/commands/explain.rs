@@ -1,4 +1,4 @@
-//! `explain`: what a code means, why it happens, and what to do.
+//! `explain`: meaning, cause and remedy of a code.
 
 use clap::Args;
 use clap::builder::PossibleValuesParser;
@@ -8,10 +8,10 @@ use super::out::say;
 use super::{Failure, Result};
 use explain::{Entry, Family, entries, entry};
 
-/// Columns of the text.
+/// Width of the text, columns.
 const WIDTH: usize = 88;
 
-/// Explains a fault or a board's reason: what it means, why it happens, what to do.
+/// Explains a fault, or the reason of a board's refusal: meaning, cause, remedy.
 ///
 /// Example: cargo sim explain 1
 /// Example: cargo sim explain ball-does-not-fit
@@ -19,7 +19,7 @@ const WIDTH: usize = 88;
 #[derive(Debug, Args)]
 #[command(verbatim_doc_comment)]
 pub(super) struct Arguments {
-    /// Its number or name; R and a number for a board's reason. Without it, all are listed.
+    /// Number or name of the fault; R and a number for the reason of a refusal. Default: lists all.
     #[arg(value_parser = codes(), hide_possible_values = true, ignore_case = true)]
     code: Option<String>,
     /// Prints JSON instead of text.
@@ -27,12 +27,12 @@ pub(super) struct Arguments {
     pub(super) json: bool,
 }
 
-/// Every label and name, so that shells complete them and a slip is answered with the nearest.
+/// Every label and name: for completion in the shell, and for the suggestion of the nearest one.
 fn codes() -> PossibleValuesParser {
     let names = entries()
         .into_iter()
         .flat_map(|entry| [entry.label(), entry.name.to_owned()]);
-    // The values live as long as the program, once.
+    // clap wants `&'static str`; the parser is built once per process.
     PossibleValuesParser::new(names.map(|name| &*name.leak()))
 }
 
@@ -57,7 +57,7 @@ fn json(entry: &Entry) -> Value {
     })
 }
 
-/// Words in lines, each of them indented.
+/// Wraps words into lines of at most [`WIDTH`] columns, indented by `indent`.
 fn filled(text: &str, indent: usize) -> String {
     let mut lines = vec![String::new()];
     for word in text.split(' ') {
@@ -92,9 +92,12 @@ fn list(all: &[Entry]) {
     for (of, head) in [
         (
             Family::Fault,
-            "faults: they stop a run, or refuse a job (interp-core)",
+            "faults, which stop a run or refuse a job (interp-core)",
         ),
-        (Family::Reason, "a board's reasons to refuse a request (protocol)"),
+        (
+            Family::Reason,
+            "reasons of a board's refusal of a request (protocol)",
+        ),
     ] {
         say!("{head}");
         for entry in all.iter().filter(|entry| entry.family == of) {
@@ -106,7 +109,7 @@ fn list(all: &[Entry]) {
             );
         }
     }
-    say!("more of one: cargo sim explain CODE");
+    say!("details of one: cargo sim explain CODE");
 }
 
 pub(super) fn command(arguments: &Arguments) -> Result<()> {

@@ -1,4 +1,4 @@
-//! `export`: a job as a program for a machine with a controller of its own.
+//! `export`: writes a job as G-code for another controller.
 
 use std::path::PathBuf;
 
@@ -21,22 +21,22 @@ use approach::{Kind, passes};
 pub(super) struct Arguments {
     /// Job file (TOML).
     job: PathBuf,
-    /// Whose G-code.
+    /// G-code dialect.
     #[arg(long, value_enum)]
     format: Dialect,
     /// Writes the program into this file.
     #[arg(short, long, value_name = "FILE")]
     output: PathBuf,
-    /// How the tool path is made: `curve` is written as arcs.
+    /// Approximation of the tool path; `curve` is written as arcs.
     #[arg(long, value_parser = written(), default_value = "linear")]
     approach: Kind,
-    /// What the F words mean.
+    /// Unit of the F words: G93 inverse time, or G94 mm/min.
     #[arg(long, value_enum, default_value = "g94")]
     feed_mode: FeedMode,
-    /// Millimetres that the tool is lifted above the highest cut between passes, and above a cut before it plunges.
+    /// Clearance, mm: of the safe height above the highest cut, and of the start of a plunge above its cut.
     #[arg(long, value_name = "MM", default_value_t = 5.0, allow_negative_numbers = true)]
     clearance: f64,
-    /// Switches the spindle on, at so many revolutions a minute.
+    /// Switches the spindle on at this speed, rev/min.
     #[arg(long, value_name = "RPM", allow_negative_numbers = true)]
     spindle: Option<f64>,
     /// Prints one JSON object instead of text.
@@ -44,7 +44,7 @@ pub(super) struct Arguments {
     pub(super) json: bool,
 }
 
-/// The approaches that G-code can say. `surface` is understood, so that it gets a remedy, but not offered.
+/// The approaches that G-code can represent. `surface` is accepted but hidden, so that it is refused with a remedy.
 fn written() -> impl TypedValueParser<Value = Kind> {
     let values = Kind::ALL.into_iter().filter_map(|kind| {
         let value = kind.to_possible_value()?;
@@ -58,7 +58,7 @@ impl From<ExportError> for Failure {
         match error {
             ExportError::Approach(error) => error.into(),
             ExportError::SurfaceNeedsTheCore => Self::input(
-                "no other machine interpolates surfaces",
+                "G-code cannot represent a surface",
                 "export it with --approach linear or curve; the firmware runs it as a surface: cargo sim run",
             ),
             ExportError::FacesDown { u, v } => Self::Failed(Some(format!(
@@ -93,7 +93,7 @@ pub(super) fn command(arguments: &Arguments) -> Result<()> {
         spindle_rpm: arguments.spindle,
     };
     let oracle = inspect::oracle(&job)?;
-    let bar = spinner("finding the passes");
+    let bar = spinner("computing the passes");
     let count = passes(&oracle).map_err(ExportError::from)?.len();
     bar.finish_and_clear();
     let bar = progress(count as u64, "planning");

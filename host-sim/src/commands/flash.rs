@@ -1,4 +1,4 @@
-//! `flash`: the firmware into a board's chip, by a debug probe.
+//! `flash`: writes the firmware into the flash of a board by a debug probe.
 
 use std::path::{Path, PathBuf};
 use std::time::Instant;
@@ -10,13 +10,13 @@ use serde_json::json;
 
 use super::out::{complain, say};
 use super::{Failure, Result, progress, spinner};
-use crate::probe::{self, Event, Image, NotRun, Problem, Program, Request, Target, Work};
+use crate::probe::{self, Event, Image, ProbeError, Problem, Program, Request, Target, Work};
 use programs::{Part, image_remedy};
 
 /// Writes the firmware into a board's flash by a debug probe, compares what was written, and starts it.
 ///
-/// Builds the firmware first where it has changed. Switch the drives' power off before: the pins of a chip that is being written do
-/// as they like. docs/bring-up.md has the wiring.
+/// Builds the firmware first if it has changed. Switch off the power of the drives before: while the chip is being written, the state
+/// of its pins is undefined. docs/bring-up.md describes the wiring.
 ///
 /// Example: cargo sim flash --board skr-pro
 /// Example: cargo sim flash --board stm32f405 --chip STM32F407VETx --probe 0483:3748
@@ -24,8 +24,8 @@ use programs::{Part, image_remedy};
 #[command(verbatim_doc_comment)]
 pub(super) struct Arguments {
     #[command(flatten)]
-    pub(super) place: Place,
-    /// Compares only: writes nothing, and what runs goes on running.
+    pub(super) place: BoardArguments,
+    /// Compares only: writes nothing, and does not interrupt the running firmware.
     #[arg(long)]
     verify: bool,
     /// Prints one JSON object instead of text.
@@ -33,16 +33,16 @@ pub(super) struct Arguments {
     pub(super) json: bool,
 }
 
-/// Which board, by which probe.
+/// The board, its chip, the probe, and the image.
 #[derive(Debug, Args)]
-pub(super) struct Place {
+pub(super) struct BoardArguments {
     /// The board.
     #[arg(long, value_name = "BOARD", value_parser = board_parser(), default_value = "stm32f405")]
     board: String,
-    /// The chip, where it is another than the board's usual one: probe-rs's name.
+    /// The chip, if it differs from the board's default; a name of probe-rs.
     #[arg(long, value_name = "NAME")]
     chip: Option<String>,
-    /// The debug probe, where there are several: VID:PID or VID:PID:SERIAL, hexadecimal.
+    /// The debug probe, if several are connected: VID:PID or VID:PID:SERIAL, hexadecimal.
     #[arg(long, value_name = "SELECTOR")]
     probe: Option<String>,
     /// An ELF file of the firmware, instead of building it.
@@ -56,26 +56,28 @@ pub(super) fn board_parser() -> clap::builder::PossibleValuesParser {
         .into()
 }
 
-impl From<NotRun> for Failure {
-    fn from(error: NotRun) -> Self {
+impl From<ProbeError> for Failure {
+    fn from(error: ProbeError) -> Self {
         match error {
-            // These are of the command line's making.
-            NotRun::Problem(
+            // Errors in command-line arguments.
+            ProbeError::Problem(
                 problem @ (Problem::BadSelector(_)
                 | Problem::UnknownChip(_)
                 | Problem::BadImage(_)
                 | Problem::SeveralProbes(_)),
             ) => Self::input(probe::sentence(&problem), probe::remedy(&problem)),
-            NotRun::Problem(problem) => Self::Failed(Some(format!(
+            ProbeError::Problem(problem) => Self::Failed(Some(format!(
                 "{}\n  help: {}",
                 probe::sentence(&problem),
                 probe::remedy(&problem)
             ))),
-            NotRun::Unavailable(cause) => Self::Failed(Some(format!(
+            ProbeError::Unavailable(cause) => Self::Failed(Some(format!(
                 "there is no program that talks to debug probes: {cause}\n  help: {}",
                 cause.remedy()
             ))),
-            error @ NotRun::Program(_) => Self::Failed(Some(format!("{error}\n  help: please report it"))),
+            error @ ProbeError::Program(_) => {
+                Self::Failed(Some(format!("{error}\n  help: please report it")))
+            }
         }
     }
 }
@@ -88,12 +90,12 @@ pub(super) fn board_of(id: &str) -> &'static Board {
         .unwrap_or(BOARDS[0])
 }
 
-impl Place {
+impl BoardArguments {
     pub(super) fn board(&self) -> &'static Board {
         board_of(&self.board)
     }
 
-    /// Is there a probe? Asked before minutes are spent on the firmware.
+    /// Looks for the probe, before the build of the firmware, which takes minutes.
     pub(super) fn find(&self, program: &Program) -> Result<String> {
         let mut found = String::new();
         let request = Request::Find {
@@ -107,7 +109,7 @@ impl Place {
         Ok(found)
     }
 
-    /// The image: the one that is named, or the board's own, built.
+    /// The image: the one given, or the board's, which is built.
     pub(super) fn image(&self) -> Result<PathBuf> {
         let board = self.board();
         let part = Part::BoardImage(board);
@@ -161,7 +163,7 @@ pub(super) fn load(path: &Path, board: &'static Board) -> Result<Image> {
     Ok(image)
 }
 
-/// A bar for each kind of work.
+/// One progress bar per kind of work.
 pub(super) struct Bars(Option<(Work, ProgressBar)>);
 
 impl Bars {
@@ -195,7 +197,7 @@ impl Bars {
 pub(super) fn command(arguments: &Arguments) -> Result<()> {
     let place = &arguments.place;
     let board = place.board();
-    // What can be told without a probe comes first, then what can without the firmware.
+    // First the checks that need no probe, then those that need no firmware.
     if place.image.is_some() {
         load(&place.image()?, board)?;
     }

@@ -1,4 +1,4 @@
-//! Where the axes stand: read from the command line, declared before a run, and what to do where a job begins elsewhere.
+//! The declared position of the axes: parsed from the command line, and checked against the start of the job.
 
 use protocol::message::Reason;
 
@@ -9,16 +9,16 @@ use machine::remote::RemoteError;
 
 const MM_PER_NM: f64 = 1e-6;
 
-/// A place of the axes, nm.
+/// A position of the ball centre, nm.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) struct PlaceNm(pub(super) [i32; 3]);
+pub(super) struct PositionNm(pub(super) [i32; 3]);
 
-impl PlaceNm {
+impl PositionNm {
     fn mm(self) -> [f64; 3] {
         self.0.map(|nm| f64::from(nm) * MM_PER_NM)
     }
 
-    /// As it is said on the command line and in a job, in mm with every nanometre.
+    /// The position in mm with six decimals, as on the command line and in a job.
     pub(super) fn words(self) -> String {
         let axis = |nm: i32| {
             let (mm, rest) = (nm.unsigned_abs() / 1_000_000, nm.unsigned_abs() % 1_000_000);
@@ -29,8 +29,8 @@ impl PlaceNm {
     }
 }
 
-/// Reads a place in mm, `X,Y,Z`.
-pub(super) fn place(text: &str) -> std::result::Result<PlaceNm, String> {
+/// Parses a position `X,Y,Z` in mm.
+pub(super) fn position(text: &str) -> std::result::Result<PositionNm, String> {
     let mut axes = text.split(',').map(|axis| {
         let mm: f64 = axis.trim().parse().ok()?;
         let nm = (mm * 1e6).round();
@@ -39,13 +39,13 @@ pub(super) fn place(text: &str) -> std::result::Result<PlaceNm, String> {
     });
     let mut next = || axes.next().flatten();
     match (next(), next(), next()) {
-        (Some(x), Some(y), Some(z)) if axes.next().is_none() => Ok(PlaceNm([x, y, z])),
-        _ => Err("three numbers in mm are wanted, each within 2147, such as 0,0,50".to_owned()),
+        (Some(x), Some(y), Some(z)) if axes.next().is_none() => Ok(PositionNm([x, y, z])),
+        _ => Err("expected three numbers in mm, each within 2147, such as 0,0,50".to_owned()),
     }
 }
 
-/// Reads a job that begins where the axes stand, if that was given and the job does not say where it begins.
-pub(super) fn load(path: &std::path::Path, stands: Option<PlaceNm>) -> Result<(Job, Prepared)> {
+/// Loads a job; if it has no `home_mm`, `home` becomes its home.
+pub(super) fn load(path: &std::path::Path, stands: Option<PositionNm>) -> Result<(Job, Prepared)> {
     let mut job = job_file::load_with(path, &cad::Faces)?;
     if let Some(stands) = stands {
         job.machine.home_mm.get_or_insert(stands.mm());
@@ -53,12 +53,12 @@ pub(super) fn load(path: &std::path::Path, stands: Option<PlaceNm>) -> Result<(J
     settled(job)
 }
 
-/// Where the job's run begins; without limits it begins with its first pass, wherever the axes stand.
-pub(super) fn of(prepared: &Prepared) -> PlaceNm {
-    PlaceNm(prepared.header.axes.map_or([0; 3], |axes| axes.home_nm))
+/// Position at which the run of the job begins. A job without limits begins with its first pass, whatever the position of the axes.
+pub(super) fn of(prepared: &Prepared) -> PositionNm {
+    PositionNm(prepared.header.axes.map_or([0; 3], |axes| axes.home_nm))
 }
 
-/// The refusal of a start away from the job's home, with what to do.
+/// The refusal of a start away from the job's home, with its remedy.
 pub(super) fn elsewhere(error: &RemoteError) -> Option<String> {
     let RemoteError::Refused {
         reason: reason @ Reason::NotAtHome { home_nm, stands_nm },
@@ -68,13 +68,13 @@ pub(super) fn elsewhere(error: &RemoteError) -> Option<String> {
         return None;
     };
     let bring = format!(
-        "bring the axes there with the drives off, and declare it: --home {}",
-        PlaceNm(*home_nm).words().replace(' ', "")
+        "move the axes there with the drives off, and declare the position: --home {}",
+        PositionNm(*home_nm).words().replace(' ', "")
     );
     let remedy = match stands_nm {
         Some(at_nm) => format!(
-            "say `home_mm = [{}]` in [machine], so that the job begins where the axes stand; or {bring}",
-            PlaceNm(*at_nm).words()
+            "set `home_mm = [{}]` in [machine], so that the job begins at the position of the axes; or {bring}",
+            PositionNm(*at_nm).words()
         ),
         None => bring,
     };
@@ -89,29 +89,29 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_place_is_read_as_it_is_said() {
+    fn a_position_is_parsed_as_it_is_printed() {
         for nm in [
             [0, -1, 1],
             [i32::MAX, -i32::MAX, 50_000_000],
             [-120_500_000, 7, 999_999],
         ] {
-            assert_eq!(place(&PlaceNm(nm).words()), Ok(PlaceNm(nm)));
+            assert_eq!(position(&PositionNm(nm).words()), Ok(PositionNm(nm)));
         }
         assert_eq!(
-            PlaceNm([-500, 50_000_000, 1_250_000]).words(),
+            PositionNm([-500, 50_000_000, 1_250_000]).words(),
             "-0.0005, 50, 1.25"
         );
         for text in ["1,2", "1,2,3,4", "1,2,x", "0,0,2148", "0,0,inf", "nan,0,0"] {
-            assert!(place(text).is_err(), "{text}");
+            assert!(position(text).is_err(), "{text}");
         }
     }
 
-    /// What a job is told of a place is the same nanometre again.
+    /// A position written into a job is parsed to the same nanometre.
     #[test]
     fn no_nanometre_is_lost_in_a_job() {
         for nm in (0..i32::MAX).step_by(7_919_737) {
             for nm in [nm, -nm] {
-                let [mm, ..] = PlaceNm([nm; 3]).mm();
+                let [mm, ..] = PositionNm([nm; 3]).mm();
                 #[allow(clippy::cast_possible_truncation, reason = "the job's own rounding")]
                 let again = (mm * 1e6).round() as i32;
                 assert_eq!(again, nm);
@@ -128,16 +128,16 @@ mod tests {
                 stands_nm,
             },
         };
-        let told = elsewhere(&refused(Some([1_500_000, -2, 3]))).unwrap();
-        assert!(told.contains("home_mm = [1.5, -0.000002, 0.000003]"), "{told}");
+        let text = elsewhere(&refused(Some([1_500_000, -2, 3]))).unwrap();
+        assert!(text.contains("home_mm = [1.5, -0.000002, 0.000003]"), "{text}");
         assert!(
-            told.contains("--home 0,0,50") && told.contains("explain R18"),
-            "{told}"
+            text.contains("--home 0,0,50") && text.contains("explain R18"),
+            "{text}"
         );
-        let told = elsewhere(&refused(None)).unwrap();
+        let text = elsewhere(&refused(None)).unwrap();
         assert!(
-            !told.contains("home_mm") && told.contains("--home 0,0,50"),
-            "{told}"
+            !text.contains("home_mm") && text.contains("--home 0,0,50"),
+            "{text}"
         );
     }
 }

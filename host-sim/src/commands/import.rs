@@ -1,4 +1,4 @@
-//! `import`: a face of a CAD file as a job.
+//! `import`: converts a face of a CAD file to a job.
 
 use super::out::{complain, say};
 use std::num::NonZeroUsize;
@@ -11,15 +11,15 @@ use serde_json::{Value, json};
 
 use super::{Failure, Result, cannot_write, progress};
 use cad::{
-    CadError, Face, Form, JobOptions, Machinable, Measures, Model, Options, Written, degrees, machinable,
+    CadError, Face, Form, JobOptions, JobText, MachinableFace, Measures, Model, Options, degrees, machinable,
     measure, read, write_job,
 };
 use job_file::TOLERANCE_DEFAULT_MM;
 
-/// Makes a job of a face of a STEP, IGES or 3DM file, or lists the faces.
+/// Converts a face of a STEP, IGES or 3DM file to a job, or lists the faces.
 ///
-/// Planes, cylinders, cones, spheres, tori, surfaces of revolution, extrusions and B-splines of degree up to 3 are taken exactly,
-/// others are approximated within the tolerance, and the deviation is measured.
+/// Planes, cylinders, cones, spheres, tori, surfaces of revolution, extrusions and B-splines of degree up to 3 are converted exactly.
+/// Others are approximated within the tolerance, and the deviation is measured.
 ///
 /// Example: cargo sim import jobs/cad/blade.step --list
 /// Example: cargo sim import jobs/cad/blade.step --face 2 -o blade.toml --radius-mm 4
@@ -31,22 +31,22 @@ pub(super) struct Arguments {
     /// Lists the faces; writes nothing.
     #[arg(long, conflicts_with_all = ["face", "output"])]
     list: bool,
-    /// The face, by its number in the list. May be left out where the file has one face.
+    /// Number of the face in the list; optional if the file has one face.
     #[arg(long, value_name = "N")]
     face: Option<usize>,
     /// Writes the job into this file.
     #[arg(short, long, value_name = "JOB")]
     output: Option<PathBuf>,
-    /// Overwrites the job file if there is one.
+    /// Overwrites an existing job file.
     #[arg(long)]
     force: bool,
-    /// How far an approximation may be from the surface, mm.
+    /// Largest deviation of an approximation from the surface, mm.
     #[arg(long, value_name = "MM", default_value_t = TOLERANCE_DEFAULT_MM)]
     tolerance: f64,
-    /// Of a trimmed face, takes the whole rectangle of the surface around its boundary.
+    /// Machines a trimmed face over the whole rectangle of the surface around its boundary.
     #[arg(long)]
     untrimmed: bool,
-    /// Ball radius, mm; without it the largest usual one that fits the hollows.
+    /// Ball radius, mm. Default: the largest standard radius below the least concave radius.
     #[arg(long, value_name = "MM")]
     radius_mm: Option<f64>,
     /// Feed along the surface, mm/min.
@@ -55,10 +55,10 @@ pub(super) struct Arguments {
     /// Scallop height limit, mm.
     #[arg(long, value_name = "MM")]
     scallop_mm: Option<f64>,
-    /// The path parameter: "u" or "v", or what else the job file takes.
+    /// Surface parameter along a pass: "u", "v" or "auto".
     #[arg(long, value_name = "U|V")]
     along: Option<String>,
-    /// Side of the tool: "up", "+" or "-"; without it up, or out of the solid.
+    /// Machined side: "up", "+" or "-". Default: away from the material; "up" if that faces up or is unknown.
     #[arg(long, value_name = "SIDE", allow_hyphen_values = true)]
     side: Option<String>,
     /// Order of the passes: "zig" or "zigzag".
@@ -79,15 +79,15 @@ impl From<CadError> for Failure {
 struct Row<'f> {
     face: &'f Face,
     trimmed: Option<String>,
-    becomes: std::result::Result<(Machinable, Measures), CadError>,
+    becomes: std::result::Result<(MachinableFace, Measures), CadError>,
 }
 
-/// Looks at all faces, on all cores, in their order.
+/// Measures all faces on all cores; rows in the order of the faces.
 fn rows<'f>(file: &str, faces: &'f [Face], options: &Options) -> Vec<Row<'f>> {
     let bar = progress(faces.len() as u64, "measuring");
     let next = AtomicUsize::new(0);
     let done = Mutex::new(Vec::with_capacity(faces.len()));
-    // A trimmed face is listed as what it would be, so that its size can be told.
+    // A trimmed face is listed with the size of its untrimmed rectangle.
     let options = Options {
         untrimmed: true,
         ..*options
@@ -174,8 +174,8 @@ fn print_rows(rows: &[Row<'_>]) {
         "degree",
         "patches",
         "size mm",
-        "hollow +",
-        "hollow -",
+        "concave +",
+        "concave -",
         "trimmed"
     );
     for row in rows {
@@ -219,12 +219,12 @@ fn list(arguments: &Arguments, file: &str, model: &Model, options: &Options) {
     }
     print_rows(&rows);
     say!(
-        "hollow: least concave radius, mm, seen from the side of + or - S_u x S_v. Size and hollows of a trimmed face are of \
-         the rectangle around it."
+        "concave: least concave radius, mm, seen from the side of + or - S_u x S_v. Size and radii of a trimmed face are those \
+         of the rectangle around it."
     );
 }
 
-/// The face that is asked for.
+/// The face of this number; without a number, the only one.
 pub(crate) fn chosen<'m>(
     file: &str,
     model: &'m Model,
@@ -236,7 +236,7 @@ pub(crate) fn chosen<'m>(
         None => Err(CadError::new(
             file,
             format!("the file has {count} faces"),
-            "say which with --face N; import --list shows them",
+            "choose one with --face N; import --list shows them",
         )),
         Some(number) => number
             .checked_sub(1)
@@ -261,7 +261,7 @@ fn write(path: &Path, text: &str, force: bool) -> Result<()> {
     std::fs::write(path, text).map_err(|error| cannot_write(path, &error))
 }
 
-fn report(arguments: &Arguments, path: &Path, face: &Face, made: &Machinable, written: &Written) {
+fn report(arguments: &Arguments, path: &Path, face: &Face, made: &MachinableFace, written: &JobText) {
     let size = written.measures.size_mm();
     if arguments.json {
         let value = json!({
@@ -347,7 +347,7 @@ pub(super) fn command(arguments: &Arguments) -> Result<()> {
             pattern: arguments.pattern.clone(),
         },
     );
-    // What the options ask for is judged by the same rules as a job written by hand, before anything is written.
+    // The job is parsed before it is written, so that the options are checked by the rules of the job file.
     job_file::parse_with(&path.display().to_string(), &written.text, &cad::Faces)?;
     write(path, &written.text, arguments.force)?;
     report(arguments, path, face, &made, &written);

@@ -1,19 +1,19 @@
-//! `log`: what a board says, by a debug probe.
+//! `log`: reads the log of a board by a debug probe.
 
 use std::fs::File;
 use std::path::PathBuf;
 
 use clap::Args;
 
-use super::flash::{Bars, Place, load, program};
+use super::flash::{Bars, BoardArguments, load, program};
 use super::out::{complain, say};
 use super::{Failure, Result};
 use crate::probe::{Event, Line, Program, Request};
 
-/// Follows a board's log by a debug probe, until Ctrl-C. The board is not reset, and never waits for its reader.
+/// Follows a board's log by a debug probe until Ctrl-C. The board is not reset, and never blocks on the log.
 ///
-/// Each line has the board's time since its start (s), its level, and what happened. The chip's flash is compared with the image first:
-/// another image's log cannot be read.
+/// Each line has the time since the board's start (s), the level and the message. The flash of the chip is compared with the image first:
+/// the log can be decoded only with the image that writes it.
 ///
 /// Example: cargo sim log --board skr-pro
 /// Example: cargo sim log --board stm32f405 --json
@@ -21,8 +21,8 @@ use crate::probe::{Event, Line, Program, Request};
 #[command(verbatim_doc_comment)]
 pub(super) struct Arguments {
     #[command(flatten)]
-    place: Place,
-    /// Decodes a recorded log (defmt frames as they come out of RTT) instead, with the image of --image.
+    place: BoardArguments,
+    /// Decodes a recorded log (defmt frames read from RTT) with the image of --image instead.
     #[arg(long, value_name = "FILE", requires = "image", conflicts_with_all = ["probe", "chip"])]
     from: Option<PathBuf>,
     /// Prints one JSON object a line, with `time`, `level`, `message` and `place`, instead of text.
@@ -37,7 +37,7 @@ pub(super) fn command(arguments: &Arguments) -> Result<()> {
         None => follow(place)?,
     };
     let mut bars = Bars::new();
-    let ran = program.run(&request, recorded, |event| match event {
+    let outcome = program.run(&request, recorded, |event| match event {
         Event::Progress { work, done, total } => bars.show(*work, *done, *total),
         Event::Following => bars.end(),
         Event::Line(line) => print(line, arguments.json),
@@ -45,11 +45,11 @@ pub(super) fn command(arguments: &Arguments) -> Result<()> {
         Event::Probe { .. } | Event::Done | Event::Failed(_) => {}
     });
     bars.end();
-    Ok(ran?)
+    Ok(outcome?)
 }
 
-/// What is to be done for a recorded log. Any image will do, that of QEMU too.
-fn decode(place: &Place, from: &PathBuf) -> Result<(Program, Request, Option<File>)> {
+/// The request for a recorded log. Every image is accepted, that of QEMU too.
+fn decode(place: &BoardArguments, from: &PathBuf) -> Result<(Program, Request, Option<File>)> {
     let image = place.image()?;
     let recorded = File::open(from).map_err(|error| {
         Failure::input(
@@ -60,8 +60,8 @@ fn decode(place: &Place, from: &PathBuf) -> Result<(Program, Request, Option<Fil
     Ok((program()?, Request::Decode { image }, Some(recorded)))
 }
 
-/// What is to be done for a board's.
-fn follow(place: &Place) -> Result<(Program, Request, Option<File>)> {
+/// The request for the log of a board.
+fn follow(place: &BoardArguments) -> Result<(Program, Request, Option<File>)> {
     if place.image.is_some() {
         load(&place.image()?, place.board())?;
     }

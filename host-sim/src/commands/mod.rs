@@ -1,4 +1,4 @@
-//! The commands, one file each; this one reads the arguments and turns results into exit codes.
+//! The commands, one file each; this file parses the arguments and maps results to exit codes.
 
 mod along;
 mod approach;
@@ -42,12 +42,12 @@ use job::{AlongChoice, Job};
 use machine::direction::{self, DirectionError};
 use machine::prepare::Prepared;
 
-/// Why a command did not do what it was asked.
+/// Failure of a command, with its exit code.
 #[derive(Debug)]
 pub enum Failure {
     /// Bad usage or bad input: exit code 2.
     Input(miette::Report),
-    /// The run or the check failed: exit code 1. What there is to say may have been said on stdout already.
+    /// The run or the check failed: exit code 1; no message if stdout already has it.
     Failed(Option<String>),
 }
 
@@ -70,14 +70,14 @@ impl From<InspectError> for Failure {
     fn from(error: InspectError) -> Self {
         match error {
             InspectError::Refused(error) => error.into(),
-            InspectError::NoOracle(error) => Self::input(error.to_string(), "say side = \"+\" or \"-\""),
+            InspectError::NoOracle(error) => Self::input(error.to_string(), "set side = \"+\" or \"-\""),
             InspectError::Trace(error) => Self::Failed(Some(format!("cannot write the trace: {error}"))),
         }
     }
 }
 
 impl From<ApproachError> for Failure {
-    /// A surface that an approach cannot cut is a failed run; the job may be as good as any.
+    /// A surface that an approach cannot cut is a failed run, not bad input: the job itself is valid.
     fn from(error: ApproachError) -> Self {
         Self::Failed(Some(match error {
             ApproachError::Fault(sentence) => sentence,
@@ -87,7 +87,7 @@ impl From<ApproachError> for Failure {
 }
 
 impl Failure {
-    /// Bad input that no job file's line is to blame for.
+    /// Bad input that has no line in a job file.
     fn input(what: impl Into<String>, remedy: impl Into<String>) -> Self {
         Self::Input(miette::miette!(help = remedy.into(), "{}", what.into()))
     }
@@ -96,7 +96,7 @@ impl Failure {
 /// Result of a command.
 pub type Result<T> = std::result::Result<T, Failure>;
 
-/// Runs surface jobs on this machine or on a board, and checks them.
+/// Runs surface jobs on this computer or on a board, and checks them.
 #[derive(Debug, Parser)]
 #[command(name = "cargo sim", bin_name = "cargo sim", version, propagate_version = true)]
 struct Cli {
@@ -124,7 +124,7 @@ enum Command {
 }
 
 impl Command {
-    /// Whether a program is to read what it prints.
+    /// Whether the output is JSON.
     fn as_json(&self) -> bool {
         match self {
             Self::Simulate(arguments) => arguments.json,
@@ -219,12 +219,12 @@ pub fn main() -> ExitCode {
     }
 }
 
-/// Reads a job, settles its direction where that is `"auto"`, prepares it, and says what of it this version does not do yet.
+/// Reads a job, chooses its direction if `along = "auto"`, and prepares it.
 fn load(path: &Path) -> Result<(Job, Prepared)> {
     settled(job_file::load_with(path, &cad::Faces)?)
 }
 
-/// Settles the direction of a job where that is `"auto"`, and prepares it.
+/// Chooses the direction of a job if `along = "auto"`, and prepares it.
 fn settled(job: Job) -> Result<(Job, Prepared)> {
     if job.origin.along_choice() != &AlongChoice::Auto {
         return Ok(direction::choose(job)?);
@@ -235,7 +235,7 @@ fn settled(job: Job) -> Result<(Job, Prepared)> {
     Ok(settled?)
 }
 
-/// The axis limits that a job asks for and that the other approaches do not hold.
+/// A warning of the axis limits that a job sets and that the other approaches do not keep.
 fn unheld_limits(job: &Job) -> Option<String> {
     let machine = &job.machine;
     let keys = [
@@ -250,7 +250,7 @@ fn unheld_limits(job: &Job) -> Option<String> {
         .collect();
     (!given.is_empty()).then(|| {
         format!(
-            "{} not held by this approach: its feed is the paper's from the first sample to the last",
+            "{} not kept by this approach: it runs at the constant feed of the paper",
             given.join(", ")
         )
     })
@@ -262,7 +262,7 @@ fn warn_of_limits(job: &Job) {
     }
 }
 
-/// A trace file, if one is wanted.
+/// Opens the trace file, if a path is given.
 fn trace(path: Option<&PathBuf>, job: &Job) -> Result<Option<::verify::trace::Trace>> {
     path.map(|path| {
         ::verify::trace::Trace::create(path, job.machine.period_us)
@@ -274,12 +274,14 @@ fn trace(path: Option<&PathBuf>, job: &Job) -> Result<Option<::verify::trace::Tr
 fn cannot_write(path: &Path, error: &std::io::Error) -> Failure {
     use std::io::ErrorKind;
     let remedy = match error.kind() {
-        ErrorKind::IsADirectory => "that is a folder: name a file in it",
-        ErrorKind::AlreadyExists | ErrorKind::NotADirectory => "that is a file: name a folder",
-        ErrorKind::NotFound => "make the folder first, or name a file in one that exists",
-        ErrorKind::PermissionDenied | ErrorKind::ReadOnlyFilesystem => "name a place where you may write",
-        ErrorKind::StorageFull => "make room on the disk",
-        _ => "name a file in a folder that exists",
+        ErrorKind::IsADirectory => "that is a folder: give a file in it",
+        ErrorKind::AlreadyExists | ErrorKind::NotADirectory => "that is a file: give a folder",
+        ErrorKind::NotFound => "create the folder first, or give a file in an existing one",
+        ErrorKind::PermissionDenied | ErrorKind::ReadOnlyFilesystem => {
+            "choose a folder that you may write to"
+        }
+        ErrorKind::StorageFull => "free space on the disk",
+        _ => "give a file in an existing folder",
     };
     Failure::input(format!("cannot write {}: {error}", path.display()), remedy)
 }
@@ -305,7 +307,7 @@ mod tests {
                 .collect();
             assert!(!examples.is_empty(), "{} has no example", command.get_name());
             for example in examples {
-                // What follows is the shell's.
+                // The rest is shell syntax.
                 let words = example
                     .split(['>', '#'])
                     .next()

@@ -1,11 +1,11 @@
-//! How near a job's motion comes to the best that its limits allow: of the first, the middle and the last pass.
+//! Duration of the first, the middle and the last pass against the optimum within the limits, as text and as JSON.
 
 use inspect::PassTime;
 use serde_json::{Value, json};
 
 use super::out::say;
 
-/// Sums over the judged passes, and each of them; null where none was judged.
+/// Sums over the timed passes, and each pass; null if no pass was timed.
 pub(super) fn json(times: &[PassTime]) -> Value {
     if times.is_empty() {
         return Value::Null;
@@ -27,7 +27,7 @@ pub(super) fn json(times: &[PassTime]) -> Value {
     })
 }
 
-/// The same for a person.
+/// Prints the figures as text.
 pub(super) fn print(times: &[PassTime]) {
     for PassTime {
         pass,

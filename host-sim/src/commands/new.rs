@@ -1,4 +1,4 @@
-//! `new`: a commented job file to begin with.
+//! `new`: writes a commented template of a job file.
 
 use std::fs::OpenOptions;
 use std::io::{ErrorKind, Write};
@@ -18,13 +18,13 @@ use crate::template::{self, Kind};
 #[derive(Debug, Args)]
 #[command(verbatim_doc_comment)]
 pub(super) struct Arguments {
-    /// The file; one that is there stays as it is.
+    /// The file to write; an existing file is not overwritten.
     #[arg(short, long, value_name = "JOB", default_value = "job.toml")]
     output: PathBuf,
-    /// Kind of its surface.
+    /// Kind of the surface.
     #[arg(long, value_enum, default_value = "bicubic")]
     kind: Kind,
-    /// Writes over a file that is there.
+    /// Overwrites an existing file.
     #[arg(long)]
     force: bool,
     /// Prints one JSON object instead of text.
@@ -47,8 +47,8 @@ pub(super) fn command(arguments: &Arguments) -> Result<()> {
         .and_then(|mut file| file.write_all(programs::with_command_name(&text).as_bytes()));
     written.map_err(|error| match error.kind() {
         ErrorKind::AlreadyExists if !path.is_dir() => Failure::input(
-            format!("{} is there already", path.display()),
-            "name another file with -o, or say --force to write over it",
+            format!("{} exists already", path.display()),
+            "give another file with -o, or overwrite it with --force",
         ),
         ErrorKind::AlreadyExists => cannot_write(path, &ErrorKind::IsADirectory.into()),
         _ => cannot_write(path, &error),
@@ -60,7 +60,7 @@ pub(super) fn command(arguments: &Arguments) -> Result<()> {
     say!("{}", path.display());
     match arguments.kind {
         Kind::File => say!(
-            "  next: name your CAD file and its face in [surface], then cargo sim simulate {}",
+            "  next: set path and face in [surface], then cargo sim simulate {}",
             path.display()
         ),
         _ => say!("  next: cargo sim simulate {}", path.display()),

@@ -1,4 +1,4 @@
-//! `operate`: what an operator asks of a board between runs, or of a run whose host went away.
+//! `operate`: sends operator commands to a board, between runs or to a run that has lost its host.
 
 use clap::{Args, Parser, Subcommand};
 use interp_core::Command;
@@ -9,7 +9,7 @@ use super::out::say;
 use super::{Failure, Result, home, run};
 use machine::remote::operate::{act, sentences};
 
-/// Switches a board's drives, declares its home, holds, resumes or stops its run, and says how it is.
+/// Switches a board's drives, declares its home, holds, resumes or stops its run, and prints its state.
 ///
 /// Example: cargo sim operate --port /dev/ttyUSB0 status
 /// Example: cargo sim operate --port /dev/ttyUSB0 home 0,0,50
@@ -23,42 +23,42 @@ pub(super) struct Arguments {
     #[arg(long)]
     pub(super) json: bool,
     #[command(subcommand)]
-    wanted: Wanted,
+    command: OperatorCommand,
 }
 
 #[derive(Clone, Debug, Subcommand)]
-enum Wanted {
-    /// How the board is; nothing changes.
+enum OperatorCommand {
+    /// Prints the state of the board.
     Status,
-    /// The run stands on its path.
+    /// Feed hold: decelerates along the path to standstill.
     Hold,
-    /// The run goes on.
+    /// Continues a held run.
     Resume,
-    /// The run stops and is given up; the job stays loaded.
+    /// Decelerates, retracts and ends the run; the job stays loaded.
     Stop,
-    /// The run is given up; or its fault is acknowledged.
+    /// Decelerates and ends the run in place; acknowledges its fault.
     Abort,
-    /// The feed as a share of the programmed one.
+    /// Sets the feed override.
     Override {
-        /// 0 to 200 percent.
+        /// Percent of the programmed feed, 0 to 200.
         #[arg(value_parser = clap::value_parser!(u8).range(0..=i64::from(OVERRIDE_MAX_PERCENT)))]
         percent: u8,
     },
-    /// The drives on.
+    /// Switches the drives on.
     On,
-    /// The drives off: the axes can be moved by hand, and the home is lost.
+    /// Switches the drives off: the axes can be moved by hand, and home is lost.
     Off,
-    /// The axes stand here, with the drives on.
+    /// Declares the position of the axes; the drives must be on.
     Home {
-        /// Their places, mm: X,Y,Z.
-        #[arg(value_parser = home::place, allow_hyphen_values = true)]
-        place_mm: home::PlaceNm,
+        /// Position of the ball centre, mm: X,Y,Z.
+        #[arg(value_parser = home::position, allow_hyphen_values = true)]
+        position_mm: home::PositionNm,
     },
-    /// Emergency stop and drive fault are acknowledged, once they are released.
+    /// Acknowledges a released emergency stop or drive fault.
     Acknowledge,
 }
 
-impl Wanted {
+impl OperatorCommand {
     /// The request on the line.
     fn request(&self) -> Request {
         match self {
@@ -70,7 +70,9 @@ impl Wanted {
             Self::Override { percent } => Request::Override { percent: *percent },
             Self::On => Request::Drives { on: true },
             Self::Off => Request::Drives { on: false },
-            Self::Home { place_mm } => Request::SetHome { home_nm: place_mm.0 },
+            Self::Home { position_mm } => Request::SetHome {
+                home_nm: position_mm.0,
+            },
             Self::Acknowledge => Request::Acknowledge,
         }
     }
@@ -80,10 +82,10 @@ impl Wanted {
 #[command(no_binary_name = true, disable_help_flag = true)]
 struct Line {
     #[command(subcommand)]
-    wanted: Wanted,
+    command: OperatorCommand,
 }
 
-/// What the typed words of a line ask for; none of an empty line.
+/// Parses a typed line; `None` for an empty one.
 ///
 /// # Errors
 /// What is wrong with them.
@@ -93,12 +95,12 @@ pub(super) fn typed(line: &str) -> std::result::Result<Option<Request>, String> 
         return Ok(None);
     }
     match Line::try_parse_from(words) {
-        Ok(line) => Ok(Some(line.wanted.request())),
+        Ok(line) => Ok(Some(line.command.request())),
         Err(error) => Err(error.to_string()),
     }
 }
 
-/// How a board is, in a line.
+/// The state of a board in one line.
 pub(super) fn sentence(status: &Status) -> String {
     let Status {
         state, pass, tick, ..
@@ -108,7 +110,7 @@ pub(super) fn sentence(status: &Status) -> String {
 
 pub(super) fn command(arguments: &Arguments) -> Result<()> {
     let mut session = run::open_port(&arguments.port)?;
-    let status = act(&mut session, &arguments.wanted.request()).map_err(Failure::from)?;
+    let status = act(&mut session, &arguments.command.request()).map_err(Failure::from)?;
     let board = session.capabilities().description.board.as_str();
     if arguments.json {
         say!("{}", json_of(&status, board));

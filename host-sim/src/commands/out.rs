@@ -1,7 +1,7 @@
-//! What every command prints goes through here, so that a reader who goes away (`cargo sim ... | head`) is no panic.
+//! Standard output and standard error of all commands. A closed pipe (`cargo sim ... | head`) must not panic.
 //!
-//! Once nobody reads standard output any more, the rest is dropped, and the command goes on to its end: its files are written and its exit
-//! code means what it says. A disk that is full is an error, and [`finish`] says so.
+//! Once the reader has closed standard output, further output is dropped and the command continues: it writes its files and returns its
+//! proper exit code. Other write errors, such as a full disk, are returned by [`finish`].
 
 use std::fmt::Arguments;
 use std::io::{self, ErrorKind, Write, stderr, stdout};
@@ -13,19 +13,19 @@ use programs::with_command_name;
 #[derive(Debug)]
 enum Output {
     Open,
-    /// Nobody reads it.
-    Gone,
+    /// The reader has closed the pipe.
+    Closed,
     Failed(io::Error),
 }
 
 static OUTPUT: Mutex<Output> = Mutex::new(Output::Open);
 
-/// Writes unless that has failed before.
+/// Writes, unless an earlier write failed.
 fn attempt(write: impl FnOnce() -> io::Result<()>) {
     let mut output = OUTPUT.lock().unwrap_or_else(PoisonError::into_inner);
     if let (Output::Open, Err(error)) = (&*output, write()) {
         *output = if error.kind() == ErrorKind::BrokenPipe {
-            Output::Gone
+            Output::Closed
         } else {
             Output::Failed(error)
         };
@@ -37,18 +37,18 @@ pub(super) fn to_stdout(text: Arguments<'_>) {
     attempt(|| stdout().write_all(with_command_name(&text.to_string()).as_bytes()));
 }
 
-/// Prints a line to standard error; nothing can be said about it if that fails.
+/// Prints a line to standard error; a write error is ignored.
 pub(super) fn to_stderr(text: Arguments<'_>) {
     let _ = writeln!(stderr(), "{}", with_command_name(&text.to_string()));
 }
 
-/// Ends the output; tells why it did not all arrive, unless its reader had seen enough.
+/// Flushes the output. Returns the first write error, except for a pipe that the reader closed.
 pub(super) fn finish() -> Option<io::Error> {
     attempt(|| stdout().flush());
     let mut output = OUTPUT.lock().unwrap_or_else(PoisonError::into_inner);
-    match std::mem::replace(&mut *output, Output::Gone) {
+    match std::mem::replace(&mut *output, Output::Closed) {
         Output::Failed(error) => Some(error),
-        Output::Open | Output::Gone => None,
+        Output::Open | Output::Closed => None,
     }
 }
 

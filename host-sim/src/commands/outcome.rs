@@ -1,4 +1,4 @@
-//! What `simulate` and `run` tell of a run: on the terminal and as JSON.
+//! The result of a run, as printed by `simulate` and `run`: as text and as JSON.
 
 use std::path::Path;
 
@@ -12,7 +12,7 @@ use job::Job;
 use verify::speeds::SpeedRange;
 use verify::survey::SurveyResult;
 
-/// A fault with its place, as JSON.
+/// A fault with its position, as JSON.
 fn fault_json(at: &FaultAt) -> Value {
     let (message, remedy) = explain::fault(at.fault);
     let [u, v] = at.parameters;
@@ -34,9 +34,9 @@ fn fault_json(at: &FaultAt) -> Value {
 pub(super) struct Outcome<'a> {
     pub(super) kind: Kind,
     pub(super) job: &'a Job,
-    /// Segments of the program; for the product the patches of its surface.
+    /// Segments of the program; for the approach `surface`, the patches.
     pub(super) segments: usize,
-    /// Bytes of the program; for the product those of its header and surface.
+    /// Bytes of the program; for the approach `surface`, of the header and the surface data.
     pub(super) bytes: usize,
     pub(super) findings: &'a SurveyResult,
     pub(super) digest: u64,
@@ -103,8 +103,8 @@ impl Outcome<'_> {
         keys
     }
 
-    /// One JSON object, or the same for a person.
-    pub(super) fn tell(&self, as_json: bool, page: Option<&Path>) {
+    /// Prints the outcome as one JSON object or as text.
+    pub(super) fn output(&self, as_json: bool, page: Option<&Path>) {
         if as_json {
             say!("{}", Value::Object(self.json()));
         } else {
@@ -113,7 +113,7 @@ impl Outcome<'_> {
         }
     }
 
-    /// The same for a person, with the page if there is one.
+    /// Prints the outcome as text, with the path of the report page if there is one.
     pub(super) fn print(&self, page: Option<&Path>) {
         let (findings, report, speeds) = (self.findings, &self.findings.report, &self.findings.speeds);
         let parts = match self.kind {
@@ -125,12 +125,12 @@ impl Outcome<'_> {
         say!("  program      {} {parts}, {} bytes", self.segments, self.bytes);
         say!("  passes       {}", findings.passes);
         say!(
-            "  samples      {} (one each {} us)",
+            "  samples      {} (period {} us)",
             findings.samples,
             self.job.machine.period_us
         );
         say!(
-            "  machining    {:.1} min, {:.1} mm of cutter contact, {:.1} mm of tool centre",
+            "  machining    {:.1} min, CC path {:.1} mm, CL path {:.1} mm",
             self.machining_time_s() / 60.0,
             report.cc_length_mm,
             speeds.cl_length_mm
@@ -140,7 +140,7 @@ impl Outcome<'_> {
         }
         let feed = self.job.feed_mm_s();
         for (name, of, span) in [
-            ("CC", format!(", of {feed:.3}"), &speeds.cc),
+            ("CC", format!(", programmed {feed:.3}"), &speeds.cc),
             ("CL", String::new(), &speeds.cl),
         ] {
             say!(
@@ -151,11 +151,11 @@ impl Outcome<'_> {
             );
         }
         say!(
-            "  CL steps     {:.3} mm/s at most between {parts}, {:.3} from period to period",
+            "  CL jumps     {:.3} mm/s at most between {parts}, {:.3} between periods",
             speeds.cl_step_mm_s,
             speeds.cl_change_mm_s
         );
-        say!("  CL off path  {:.3} um at most", report.position_nm.max * 1e-3);
+        say!("  CL error     {:.3} um at most", report.position_nm.max * 1e-3);
         say!("  interval     {:.7} at least", findings.interval_min);
         say!(
             "  feed ripple  {:.6} % at most, {:.6} % rms",
@@ -164,7 +164,7 @@ impl Outcome<'_> {
         );
         say!("  digest       {:016x}", self.digest);
         say!(
-            "  speed        {:.2} million samples a second",
+            "  speed        {:.2} million samples per second",
             self.samples_per_second / 1e6
         );
         if let Some(page) = page {

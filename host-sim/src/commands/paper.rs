@@ -1,4 +1,4 @@
-//! `paper`: Lo's paper, every example, table and figure, against ours.
+//! `paper`: reproduces every example, table and figure of Lo's paper.
 
 use std::path::PathBuf;
 
@@ -11,13 +11,13 @@ use study::paper::{Comparison, Item, Row, STEPS, study};
 use study::report as page;
 use verify::speeds::SpeedRange;
 
-/// Reproduces Lo's paper (1998): every example, table and figure, printed against ours; four approaches side by side.
+/// Reproduces every example, table and figure of Lo's paper (1998), and compares the four approaches.
 ///
 /// Example: cargo sim paper --report out
 #[derive(Debug, Args)]
 #[command(verbatim_doc_comment)]
 pub(super) struct Arguments {
-    /// Writes the page with the figures, and their data as JSON, into this folder.
+    /// Writes a page with the figures, and their data as JSON, into this folder.
     #[arg(long, value_name = "DIR")]
     report: Option<PathBuf>,
     /// Prints JSON instead of tables.
@@ -25,7 +25,7 @@ pub(super) struct Arguments {
     pub(super) json: bool,
 }
 
-/// Significant digits enough for every figure of the paper, without the noise of the last bits.
+/// The items as JSON.
 fn json(items: &[Item]) -> Value {
     let rows = items.iter().map(|item| {
         json!({
@@ -39,7 +39,7 @@ fn json(items: &[Item]) -> Value {
     rows.collect()
 }
 
-/// The comparisons as items of the same kind, with nothing printed.
+/// The comparisons of approaches as items without a printed figure.
 fn compared(comparisons: &[Comparison]) -> Vec<Item> {
     let mut items = Vec::new();
     for comparison in comparisons {
@@ -153,7 +153,7 @@ fn print_comparison(comparison: &Comparison) {
 
 pub(super) fn command(arguments: &Arguments) -> Result<()> {
     if let Some(folder) = &arguments.report {
-        // Before the work, not after it.
+        // Created before the work, so that an invalid path fails at once.
         std::fs::create_dir_all(folder).map_err(|error| cannot_write(folder, &error))?;
     }
     let bar = progress(STEPS, "reproducing");

@@ -1,16 +1,16 @@
-//! How far the work is: bars on stderr, where that is a terminal and nobody asked for JSON.
+//! Progress bars on stderr, if that is a terminal and the output is not JSON.
 
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
 
 use indicatif::{ProgressBar, ProgressFinish, ProgressStyle};
 
-/// How often what moves on a terminal is drawn anew.
+/// Redraw interval of a bar.
 const TICK: Duration = Duration::from_millis(100);
-/// With `--json` there are no bars, wherever stderr goes: the caller is a program.
+/// Set with `--json`: no bars, even if stderr is a terminal.
 static QUIET: AtomicBool = AtomicBool::new(false);
 
-/// No bars from now on.
+/// Disables all bars.
 pub(super) fn silence() {
     QUIET.store(true, Ordering::Relaxed);
 }
@@ -24,17 +24,17 @@ fn drawn(bar: ProgressBar, template: &str, what: &'static str) -> ProgressBar {
     }
     bar.set_message(what);
     bar.enable_steady_tick(TICK);
-    // An error on the way drops the bar: nothing of it is to stand above the message.
+    // A bar that is dropped on an error is cleared, so that only the message remains.
     bar.with_finish(ProgressFinish::AndClear)
 }
 
-/// A bar that fills.
+/// A bar for a known amount of work.
 pub(super) fn progress(length: u64, what: &'static str) -> ProgressBar {
     let template = "{msg} {wide_bar} {percent:>3} % {elapsed} of {duration}";
     drawn(ProgressBar::new(length), template, what)
 }
 
-/// Something that moves while there is no telling how far the work is.
+/// A spinner for an unknown amount of work.
 pub(super) fn spinner(what: &'static str) -> ProgressBar {
     drawn(ProgressBar::new_spinner(), "{msg} {spinner} {elapsed}", what)
 }
@@ -43,7 +43,7 @@ pub(super) fn spinner(what: &'static str) -> ProgressBar {
 pub(super) struct Bar(ProgressBar);
 
 impl Bar {
-    /// A bar that shows nothing before the first part begins.
+    /// A bar that is empty until the first part begins.
     pub(super) fn new() -> Self {
         Self(progress(0, ""))
     }

@@ -1,26 +1,23 @@
-//! `run`: loads the job into the firmware, runs it there, and compares with `simulate` sample by sample.
+//! `run`: loads a job into the firmware, runs it there, and compares the samples with those of the simulation.
 
 use std::path::PathBuf;
-use std::time::Instant;
 
 use clap::Args;
 use indicatif::ProgressBar;
-use interp_core::{Fault, FaultKind, Sample, State};
-use protocol::digest::Digest;
-use protocol::message::{HostGone, Reason, Status};
+use interp_core::{Fault, FaultKind};
+use protocol::message::Reason;
 use serde_json::{Value, json};
 
 use super::flash::{board_of, board_parser};
-use super::home::{self, PlaceNm};
+use super::home::{self, PositionNm};
 use super::out::{say, to_stderr};
 use super::outcome::Outcome;
 use super::simulate::{remarks, report, surveyed, timed};
-use super::typed::{Typist, WORDS};
+use super::typed::{Console, WORDS};
 use super::{Failure, Result, cannot_write, progress, scripted, spinner, trace};
 use approach::Kind;
-use inspect::TimedRun;
-use job::Job;
-use machine::Machine;
+use inspect::comparison::{self, BoardRun, ComparisonError, Reference};
+use job::{HeartbeatAction, Job};
 use machine::prepare::{self, Prepared};
 use machine::remote::chip::{self, Chip, ChipError};
 use machine::remote::operate::{self, Operator, Setup};
@@ -28,37 +25,38 @@ use machine::remote::qemu::{self, Qemu, QemuError};
 use machine::remote::{RemoteError, Session, drive, port};
 use machine::travel;
 
-/// Runs a job in the firmware, in QEMU, on a board, or a board's image on models of its chip, and compares every sample with this machine's. While a board runs, type what an
-/// operator wants, and Enter: hold, resume, stop, abort, override 50, status. A run that was commanded is not compared.
+/// Runs a job on the firmware and compares every sample with the simulation: in QEMU, on a board, or with a board's image executed on models of
+/// its chip. While a board runs, type operator commands and Enter: hold, resume, stop, abort, override 50, status. A run with operator commands
+/// is not compared.
 ///
 /// Example: cargo sim run jobs/freeform.toml --qemu
 /// Example: cargo sim run jobs/plate_machine.toml --qemu --script jobs/operator.txt
-/// Example: cargo sim run jobs/plate_machine.toml --port /dev/ttyUSB0 --home 40,30,40
 /// Example: cargo sim run jobs/plate_machine.toml --chip skr-pro
+/// Example: cargo sim run jobs/plate_machine.toml --port /dev/ttyUSB0 --home 40,30,40
 #[derive(Debug, Args)]
 #[command(verbatim_doc_comment)]
 pub(super) struct Arguments {
     /// Job file (TOML).
     job: PathBuf,
     #[command(flatten)]
-    place: Place,
-    /// Firmware image for QEMU; without it, the image is built.
+    target: Target,
+    /// Firmware image for QEMU. Default: built from the sources.
     #[arg(long, value_name = "ELF", requires = "qemu")]
     firmware: Option<PathBuf>,
-    /// With --chip, as fast as it goes instead of in real time; the job must not hold for a host that is gone.
+    /// With --chip: as fast as possible instead of in real time. Refused for a job with `host_gone = "hold"`.
     #[arg(long, requires = "chip")]
     fast: bool,
-    /// Writes every sample that the board sent as a row of this CSV file.
+    /// Writes every sample of the board as a row of this CSV file.
     #[arg(long, value_name = "FILE")]
     trace: Option<PathBuf>,
-    /// Writes a page with a view that turns, charts and figures into this folder.
+    /// Writes a report page into this folder: 3D view, charts, figures.
     #[arg(long, value_name = "DIR")]
     report: Option<PathBuf>,
-    /// The axes stand here, mm: declared as home before the run, and the job's home where it has no `home_mm`. In QEMU and on models of
-    /// a chip, where there are no axes, the job's home is declared.
-    #[arg(long, value_name = "X,Y,Z", value_parser = home::place, allow_hyphen_values = true)]
-    home: Option<PlaceNm>,
-    /// Does what this file says an operator does, in lockstep: lines `tick N: hold`, or resume, stop, abort, start, override P.
+    /// Position of the axes, mm: declared as home before the run, and the home of a job without `home_mm`. Default in QEMU and on
+    /// models of a chip, which have no axes: the job's home.
+    #[arg(long, value_name = "X,Y,Z", value_parser = home::position, allow_hyphen_values = true)]
+    home: Option<PositionNm>,
+    /// Applies the operator commands in this file, in lockstep: lines `tick N: hold`, or resume, stop, abort, start, override P.
     #[arg(long, value_name = "FILE", conflicts_with_all = ["port", "report", "trace"])]
     script: Option<PathBuf>,
     /// Prints one JSON object instead of text.
@@ -68,26 +66,25 @@ pub(super) struct Arguments {
 
 #[derive(Debug, Args)]
 #[group(required = true, multiple = false)]
-struct Place {
-    /// In QEMU, which this command starts and ends.
+struct Target {
+    /// Runs in QEMU, which the command starts and stops.
     #[arg(long)]
     qemu: bool,
-    /// The image for this board, unchanged, on models of its chip, in real time (wants Debian's libunicorn2).
+    /// Executes the image of this board, unchanged, on models of its chip, in real time (requires Debian's libunicorn2).
     #[arg(long, value_name = "BOARD", value_parser = board_parser())]
     chip: Option<String>,
-    /// On a board behind this serial port.
+    /// Runs on the board at this serial port.
     #[arg(long, value_name = "DEV")]
     port: Option<String>,
 }
 
-/// What the board did.
-struct Ran {
-    status: Status,
-    compared: u64,
-    first_difference: Option<u64>,
-    /// An operator commanded it, so that it is no run of this machine's.
-    commanded: bool,
-    ticks_per_second: f64,
+impl From<ComparisonError> for Failure {
+    fn from(error: ComparisonError) -> Self {
+        match error {
+            ComparisonError::Remote(error) => error.into(),
+            ComparisonError::Refused(error) => error.into(),
+        }
+    }
 }
 
 impl From<RemoteError> for Failure {
@@ -108,7 +105,7 @@ impl From<RemoteError> for Failure {
     }
 }
 
-/// A refusal for the sake of safety, with what it means and what to do.
+/// The text of a refusal for safety, with its remedy.
 fn unsafe_to(error: &RemoteError) -> Option<String> {
     let RemoteError::Refused {
         request,
@@ -143,14 +140,14 @@ impl From<ChipError> for Failure {
     }
 }
 
-/// A number for a session: they have to differ, no more than that.
+/// A session number; it only has to differ from that of the previous session.
 fn session_number() -> u32 {
     std::time::SystemTime::now()
         .duration_since(std::time::UNIX_EPOCH)
         .map_or(1, |now| now.subsec_nanos() ^ std::process::id().rotate_left(16))
 }
 
-/// Opens a session with the board behind this serial port.
+/// Opens a session with the board at this serial port.
 pub(super) fn open_port(name: &str) -> Result<Session> {
     let stream = port::open(name).map_err(|error| {
         let why = match error {
@@ -165,47 +162,49 @@ pub(super) fn open_port(name: &str) -> Result<Session> {
     Ok(Session::open(stream, session_number())?)
 }
 
-/// What is behind the line, if this command has started it, and ends it.
-enum Behind {
+/// The process at the other end of the line, if this command started one. It ends when this is dropped.
+enum Peer {
     Board,
     Qemu(#[expect(dead_code, reason = "ended when it is dropped")] Qemu),
     Chip(Chip),
 }
 
 /// Starts a board's image on models of its chip.
-fn connect_chip(name: &str, fast: bool) -> Result<(Behind, Session)> {
-    let bar = spinner("building the firmware, and what executes it");
+fn connect_chip(name: &str, fast: bool) -> Result<(Peer, Session)> {
+    let bar = spinner("building the firmware and the chip emulator");
     let built = chip::image(board_of(name)).and_then(|image| Ok((chip::program()?, image)));
     bar.finish_and_clear();
     let (program, image) = built?;
     let (chip, stream) = Chip::start(&program, &image, fast)?;
-    Ok((Behind::Chip(chip), Session::open(stream, session_number())?))
+    Ok((Peer::Chip(chip), Session::open(stream, session_number())?))
 }
 
-/// What the models of a chip complained about, or lost.
-fn models_complaint(behind: &mut Behind) -> Option<String> {
-    let Behind::Chip(chip) = behind else { return None };
+/// Complaints of the models of a chip, and lost bytes; ends the emulator.
+fn models_failure(peer: &mut Peer, as_json: bool) -> Option<String> {
+    let Peer::Chip(chip) = peer else { return None };
     let Some(said) = chip.end() else {
-        return Some("the models of the chip ended without a word".to_owned());
+        return Some("the chip emulator ended without a report".to_owned());
     };
-    say!(
-        "  models       {} complaints, {} bytes lost, a byte waited {} cycles at most",
-        said.complaints.len(),
-        said.bytes_lost,
-        said.byte_wait_max_cycles
-    );
+    if !as_json {
+        say!(
+            "  models       {} complaints, {} bytes lost, longest wait of a byte {} cycles",
+            said.complaints.len(),
+            said.bytes_lost,
+            said.byte_wait_max_cycles
+        );
+    }
     if let Some(first) = said.complaints.first() {
         return Some(format!("the models of the chip complain: {first}"));
     }
-    (said.bytes_lost > 0).then(|| format!("{} bytes were lost on their way into the chip", said.bytes_lost))
+    (said.bytes_lost > 0).then(|| format!("{} bytes were lost on the way into the chip", said.bytes_lost))
 }
 
-/// Opens the line, and keeps what is behind it alive.
-fn connect(arguments: &Arguments) -> Result<(Behind, Session)> {
-    if let Some(name) = &arguments.place.port {
-        return Ok((Behind::Board, open_port(name)?));
+/// Opens a session with a board, QEMU or an emulated chip.
+fn connect(arguments: &Arguments) -> Result<(Peer, Session)> {
+    if let Some(name) = &arguments.target.port {
+        return Ok((Peer::Board, open_port(name)?));
     }
-    if let Some(name) = &arguments.place.chip {
+    if let Some(name) = &arguments.target.chip {
         return connect_chip(name, arguments.fast);
     }
     let image = match &arguments.firmware {
@@ -224,32 +223,32 @@ fn connect(arguments: &Arguments) -> Result<(Behind, Session)> {
         }
     };
     let (qemu, stream) = Qemu::start(&image)?;
-    Ok((Behind::Qemu(qemu), Session::open(stream, session_number())?))
+    Ok((Peer::Qemu(qemu), Session::open(stream, session_number())?))
 }
 
-/// Where the axes are declared to stand: where they were said to, or in QEMU, which has none, where the job begins.
-fn declared(arguments: &Arguments, prepared: &Prepared) -> Option<PlaceNm> {
-    let simulated = arguments.place.port.is_none().then(|| home::of(prepared));
+/// Position to declare: that of `--home`; without axes (in QEMU, on models of a chip), by default the start of the job.
+fn declared(arguments: &Arguments, prepared: &Prepared) -> Option<PositionNm> {
+    let simulated = arguments.target.port.is_none().then(|| home::of(prepared));
     arguments.home.or(simulated)
 }
 
-/// Configures the board, switches its drives on, and declares home where that is known here.
+/// Configures the board, switches its drives on, and declares home if the position is known.
 fn make_ready(arguments: &Arguments, job: &Job, prepared: &Prepared, session: &mut Session) -> Result<()> {
     let setup = Setup {
         configuration: prepare::configuration(&job.machine),
-        home_nm: declared(arguments, prepared).map(|place| place.0),
+        home_nm: declared(arguments, prepared).map(|position| position.0),
     };
     Ok(operate::make_ready(session, &setup)?)
 }
 
-/// The board's timer has to tick as the job wants it.
+/// Checks that the period of the board equals that of the job.
 fn check_period(job: &Job, session: &Session) -> Result<()> {
     let period_us = session.capabilities().description.period_us;
     if f64::from(period_us) == job.machine.period_us {
         return Ok(());
     }
     let what = format!(
-        "the job wants a period of {} us, the board's is {period_us} us",
+        "the job requires a period of {} us, the period of the board is {period_us} us",
         job.machine.period_us
     );
     Err(job
@@ -257,208 +256,70 @@ fn check_period(job: &Job, session: &Session) -> Result<()> {
         .error(
             "machine.period_us",
             what,
-            "say period_us as the board has it, or build the firmware for the other",
+            "set period_us to that of the board, or build the firmware for another period",
         )
         .into())
 }
 
 /// Runs and compares the digest of each pass; where one differs in QEMU, finds the first sample that does.
-fn by_digest(
-    arguments: &Arguments,
-    job: &Job,
-    prepared: &Prepared,
-    here: &TimedRun,
-    session: &mut Session,
-) -> Result<Ran> {
-    let expected: Vec<_> = here
-        .passes
-        .iter()
-        .map(|pass| drive::Expected {
-            first_tick: pass.first_tick,
-            samples: pass.samples,
-            digest: pass.digest,
-        })
-        .collect();
-    let bar = progress(here.samples, "running");
-    let start = Instant::now();
-    let mut typist = typist(arguments, &bar);
-    let operator = typist.as_mut().map(|typist| typist as &mut dyn Operator);
-    let compared = drive::run_digests(session, &expected, arguments.place.qemu, operator, |samples| {
+fn by_digest(arguments: &Arguments, reference: &Reference<'_>, session: &mut Session) -> Result<BoardRun> {
+    let bar = progress(reference.run.samples, "running");
+    let mut console = console(arguments, &bar);
+    let operator = console.as_mut().map(|console| console as &mut dyn Operator);
+    let run = comparison::by_digest(reference, session, arguments.target.qemu, operator, |samples| {
         bar.set_position(samples)
-    })?;
-    let seconds = start.elapsed().as_secs_f64();
+    });
     bar.finish_and_clear();
-    let mut first_difference = None;
-    if let Some(pass) = compared.first_bad_pass {
-        let from = expected.get(pass as usize).map_or_else(
-            || expected.last().map_or(0, |last| last.first_tick + last.samples),
-            |pass| pass.first_tick,
-        );
-        first_difference = Some(from.into());
-        if arguments.place.qemu {
-            let count = expected.get(pass as usize).map_or(0, |pass| pass.samples) + 1;
-            let there = drive::samples_between(session, from, count)?;
-            let there = &there[..there.len().min(count as usize)];
-            let ours = samples_here(job, prepared, from, count)?;
-            first_difference = drive::first_difference(&ours, there)
-                .map(u64::from)
-                .or(first_difference);
-        }
-    } else if !compared.commanded && compared.status.digest != here.digest {
-        first_difference = Some(here.samples);
-    }
-    #[allow(clippy::cast_precision_loss, reason = "below 2^53")]
-    let ticks_per_second = compared.samples as f64 / seconds.max(1e-9);
-    Ok(Ran {
-        status: compared.status,
-        compared: compared.samples,
-        first_difference,
-        commanded: compared.commanded,
-        ticks_per_second,
-    })
+    Ok(run?)
 }
 
-/// Who can command the run: on a board, whoever types.
-fn typist(arguments: &Arguments, bar: &ProgressBar) -> Option<Typist> {
-    if arguments.place.qemu {
+/// The operator's console of a run on a board; QEMU has none.
+fn console(arguments: &Arguments, bar: &ProgressBar) -> Option<Console> {
+    if arguments.target.qemu {
         return None;
     }
     if !arguments.json {
-        bar.suspend(|| to_stderr(format_args!("type, and Enter: {WORDS}")));
+        bar.suspend(|| to_stderr(format_args!("type a command and Enter: {WORDS}")));
     }
-    Some(Typist::new(bar.clone()))
+    Some(Console::new(bar.clone()))
 }
 
-fn samples_here(job: &Job, prepared: &Prepared, from: u32, count: u32) -> Result<Vec<Sample>> {
-    let mut samples = Vec::new();
-    // A fault ends the samples, which is what is compared.
-    let mut machine = Machine::load(prepared).map_err(|fault| inspect::load_error(job, fault))?;
-    let _fault = machine.run(|sample| {
-        if sample.tick >= from {
-            samples.push(*sample);
-        }
-        samples.len() < count as usize
-    });
-    Ok(samples)
-}
-
-/// Runs with every sample on the line, writes them, and compares each.
-fn by_sample(
-    arguments: &Arguments,
-    job: &Job,
-    prepared: &Prepared,
-    here: &TimedRun,
-    session: &mut Session,
-) -> Result<Ran> {
-    let ours = samples_here(job, prepared, 0, u32::MAX)?;
-    let mut file = trace(arguments.trace.as_ref(), job)?;
+/// Runs with every sample on the line, writes the trace, and compares each sample.
+fn by_sample(arguments: &Arguments, reference: &Reference<'_>, session: &mut Session) -> Result<BoardRun> {
+    let mut file = trace(arguments.trace.as_ref(), reference.job)?;
     let mut written = Ok(());
-    let mut theirs = Vec::with_capacity(ours.len());
-    let mut digest = Digest::new();
-    let bar = progress(here.samples, "running");
-    let start = Instant::now();
-    let mut typist = typist(arguments, &bar);
-    let operator = typist.as_mut().map(|typist| typist as &mut dyn Operator);
-    let (status, commanded) = drive::run_samples(session, arguments.place.qemu, operator, |sample| {
-        digest.sample(sample);
+    let bar = progress(reference.run.samples, "running");
+    let mut console = console(arguments, &bar);
+    let operator = console.as_mut().map(|console| console as &mut dyn Operator);
+    let run = comparison::by_sample(reference, session, arguments.target.qemu, operator, |sample| {
         if let (Some(file), Ok(())) = (&mut file, &written) {
-            written = file.write(&inspect::plain(prepared, sample));
+            written = file.write(&inspect::plain(reference.prepared, sample));
         }
-        theirs.push(*sample);
         if sample.tick % 4096 == 0 {
             bar.set_position(sample.tick.into());
         }
-    })?;
-    let seconds = start.elapsed().as_secs_f64();
+    });
     bar.finish_and_clear();
+    let run = run?;
     let name = arguments.trace.clone().unwrap_or_default();
     written
         .and_then(|()| file.map_or(Ok(()), verify::trace::Trace::finish))
         .map_err(|error| cannot_write(&name, &error))?;
-    let difference = drive::first_difference(&ours, &theirs)
-        .filter(|_| !commanded)
-        .map(u64::from);
-    #[allow(clippy::cast_precision_loss, reason = "below 2^53")]
-    let ticks_per_second = theirs.len() as f64 / seconds.max(1e-9);
-    let wrong_digest = (status.digest != digest.value()).then_some(here.samples);
-    Ok(Ran {
-        status,
-        compared: theirs.len().min(ours.len()) as u64,
-        first_difference: difference.or(wrong_digest),
-        commanded,
-        ticks_per_second,
-    })
-}
-
-/// The inputs that stopped the run, or kept it from beginning, in a sentence.
-fn stopped_from_outside(status: &Status) -> Option<String> {
-    let fault = status.fault?;
-    let kind = fault.kind()?;
-    if !matches!(
-        kind,
-        FaultKind::EmergencyStop | FaultKind::LimitSwitch | FaultKind::DriveFault
-    ) {
-        return None;
-    }
-    let (what, remedy) = explain::fault(Fault::new(kind, fault.value));
-    let Status { tick, pass, .. } = status;
-    Some(format!(
-        "the board stopped the run at tick {tick}, pass {pass}: {what}\n  help: {remedy}"
-    ))
-}
-
-/// What is wrong with the board's run, if anything is.
-fn complaint(ran: &Ran, here: &TimedRun, job: &Job) -> Option<String> {
-    let status = &ran.status;
-    if let Some(stopped) = stopped_from_outside(status) {
-        return Some(stopped);
-    }
-    if status.deadline_misses > 0 {
-        return Some(format!(
-            "{} ticks of the sample timer were missed",
-            status.deadline_misses
-        ));
-    }
-    if let Some(tick) = ran.first_difference {
-        return Some(format!(
-            "the board differs from this machine, first at tick {tick}"
-        ));
-    }
-    if status.samples_lost > 0 {
-        return Some(format!("{} samples were lost on the line", status.samples_lost));
-    }
-    if ran.commanded {
-        let ends = matches!(status.state, State::Finished | State::Ready);
-        return (!ends).then(|| format!("the board ended {}", status.state.name()));
-    }
-    let expected = if here.fault.is_some() {
-        State::Faulted
-    } else {
-        State::Finished
-    };
-    let code = status.fault.map(|fault| fault.code);
-    if status.state != expected || code != here.fault.map(|at| at.fault.kind.code()) {
-        return Some(format!(
-            "the board ended {}, this machine {}",
-            status.state.name(),
-            expected.name()
-        ));
-    }
-    here.fault.as_ref().map(|fault| fault.sentence_of(job))
+    Ok(run)
 }
 
 pub(super) fn command(arguments: &Arguments) -> Result<()> {
     let (job, prepared) = home::load(&arguments.job, arguments.home)?;
     travel::check(&job)?;
-    if arguments.fast && job.machine.host_gone == HostGone::Hold {
+    if arguments.fast && job.machine.heartbeat_action == HeartbeatAction::Hold {
         return Err(Failure::input(
-            "the chip's time runs faster than this machine can keep its link alive, and the job says host_gone = \"hold\"",
-            "leave --fast out, or say host_gone = \"finish\"",
+            "the emulated chip's time runs faster than this computer can send heartbeats, and the job has host_gone = \"hold\"",
+            "omit --fast, or set host_gone = \"finish\"",
         ));
     }
     if let Some(script) = &arguments.script {
         let scripted = scripted::play(&job, &prepared, script, None)?;
-        let (_behind, mut session) = connect(arguments)?;
+        let (_peer, mut session) = connect(arguments)?;
         check_period(&job, &session)?;
         make_ready(arguments, &job, &prepared, &mut session)?;
         drive::upload(&mut session, &prepared, |_| {})?;
@@ -472,23 +333,28 @@ pub(super) fn command(arguments: &Arguments) -> Result<()> {
     {
         return Err(Failure::Failed(Some(fault.sentence_of(&job))));
     }
-    let (mut behind, mut session) = connect(arguments)?;
+    let (mut peer, mut session) = connect(arguments)?;
     check_period(&job, &session)?;
     make_ready(arguments, &job, &prepared, &mut session)?;
     let bar = progress(prepared.words.len() as u64, "uploading");
     drive::upload(&mut session, &prepared, |words| bar.set_position(words as u64))?;
     bar.finish_and_clear();
-    let ran = if arguments.trace.is_some() {
-        by_sample(arguments, &job, &prepared, &here, &mut session)?
+    let reference = Reference {
+        job: &job,
+        prepared: &prepared,
+        run: &here,
+    };
+    let run = if arguments.trace.is_some() {
+        by_sample(arguments, &reference, &mut session)?
     } else {
-        by_digest(arguments, &job, &prepared, &here, &mut session)?
+        by_digest(arguments, &reference, &mut session)?
     };
     let directory = arguments.report.as_deref();
     let (findings, sketch) = surveyed(&job, &prepared, &here, None, directory.is_some())?;
-    let complaint = complaint(&ran, &here, &job);
+    let failure = run.failure(&here, &job);
     let mut remarks = remarks(&here, &findings);
-    if let Some(complaint) = complaint.as_ref().filter(|_| here.fault.is_none()) {
-        remarks.failures.insert(0, complaint.clone());
+    if let Some(failure) = failure.as_ref().filter(|_| here.fault.is_none()) {
+        remarks.failures.insert(0, failure.clone());
     }
     let page = report(&job, directory, sketch.as_ref(), &findings, &remarks)?;
     let outcome = Outcome {
@@ -497,54 +363,54 @@ pub(super) fn command(arguments: &Arguments) -> Result<()> {
         segments: prepared.patches(),
         bytes: prepared.bytes(),
         findings: &findings,
-        digest: ran.status.digest,
+        digest: run.status.digest,
         samples_per_second: here.samples_per_second,
         fault: here.fault,
     };
     let board = session.capabilities().description.board.as_str();
     if arguments.json {
-        say!("{}", json_of(&outcome, &ran, board));
+        say!("{}", json_of(&outcome, &run, board));
     } else {
         say!("{} on {board}", arguments.job.display());
         outcome.print(page.as_deref());
-        let (speed, missed) = (ran.ticks_per_second.round(), ran.status.deadline_misses);
-        say!("  board        {speed} ticks a second, {missed} missed");
-        if arguments.place.port.is_none() && arguments.home.is_none() {
-            let place = home::of(&prepared).words();
-            say!("  home         declared at {place} mm: a simulated board has no axes");
+        let (speed, missed) = (run.ticks_per_second.round(), run.status.deadline_misses);
+        say!("  board        {speed} ticks per second, {missed} missed");
+        if arguments.target.port.is_none() && arguments.home.is_none() {
+            let position = home::of(&prepared).words();
+            say!("  home         declared at {position} mm: a simulated board has no axes");
         }
-        if ran.status.safety.link_timed_out {
-            say!("  host         was gone during the run: see cargo sim explain host-gone");
+        if run.status.safety.link_timed_out {
+            say!("  host         heartbeat timeout during the run: see cargo sim explain host-gone");
         }
-        match (ran.commanded, ran.first_difference) {
-            (true, _) => say!("  compared     nothing: the run was commanded, or its feed is overridden"),
-            (false, None) => compared(&ran, "bit for bit the same"),
-            (false, Some(_)) => compared(&ran, "NOT the same"),
+        match (run.commanded, run.first_difference) {
+            (true, _) => say!("  compared     nothing: the run had operator commands or a feed override"),
+            (false, None) => compared(&run, "bit for bit the same"),
+            (false, Some(_)) => compared(&run, "NOT the same"),
         }
     }
-    let complaint = complaint.or_else(|| models_complaint(&mut behind));
-    complaint.map_or(Ok(()), |complaint| Err(Failure::Failed(Some(complaint))))
+    let failure = failure.or_else(|| models_failure(&mut peer, arguments.json));
+    failure.map_or(Ok(()), |failure| Err(Failure::Failed(Some(failure))))
 }
 
-fn compared(ran: &Ran, verdict: &str) {
+fn compared(run: &BoardRun, verdict: &str) {
     say!(
-        "  compared     {} samples with this machine's: {verdict}",
-        ran.compared
+        "  compared     {} samples with the simulation: {verdict}",
+        run.compared
     );
 }
 
-/// The keys of `simulate`, and those of the board.
-fn json_of(outcome: &Outcome<'_>, ran: &Ran, board: &str) -> Value {
+/// The JSON keys of `simulate`, and those of the board.
+fn json_of(outcome: &Outcome<'_>, run: &BoardRun, board: &str) -> Value {
     let mut keys = outcome.json();
     let mut put = |key: &str, value| keys.insert(key.to_owned(), value);
-    let compared = if ran.commanded { 0 } else { ran.compared };
+    let compared = if run.commanded { 0 } else { run.compared };
     put("compared_samples", json!(compared));
-    put("first_difference", json!(ran.first_difference));
-    put("commanded", json!(ran.commanded));
-    put("deadline_misses", json!(ran.status.deadline_misses));
-    put("tick_cycles_max", json!(ran.status.tick_cycles_max));
-    put("ticks_per_second", json!(ran.ticks_per_second));
-    put("samples_lost", json!(ran.status.samples_lost));
+    put("first_difference", json!(run.first_difference));
+    put("commanded", json!(run.commanded));
+    put("deadline_misses", json!(run.status.deadline_misses));
+    put("tick_cycles_max", json!(run.status.tick_cycles_max));
+    put("ticks_per_second", json!(run.ticks_per_second));
+    put("samples_lost", json!(run.status.samples_lost));
     put("board", json!(board));
     Value::Object(keys)
 }

@@ -1,4 +1,4 @@
-//! `simulate` and `run` with a script of what the operator does.
+//! `simulate` and `run` with a script of operator commands.
 
 use std::path::{Path, PathBuf};
 
@@ -15,7 +15,7 @@ use machine::remote::{self, Session};
 use machine::script::{self, Played, Script};
 use verify::motion::{PeakMeter, Peaks, limits};
 
-/// A script, played on the machine in this process.
+/// The result of a script on the core in this process.
 pub(super) struct Scripted {
     pub(super) script: Script,
     schedule: Schedule,
@@ -38,7 +38,7 @@ fn read(path: &Path, prepared: &Prepared) -> Result<Script> {
     Ok(script)
 }
 
-/// Plays it here, and writes the samples in which the tool moves.
+/// Runs the script in this process, and writes the samples in which the tool moves.
 pub(super) fn play(
     job: &Job,
     prepared: &Prepared,
@@ -106,7 +106,7 @@ impl Scripted {
     fn print(&self) {
         let played = &self.played;
         say!(
-            "  script       {} ticks with something to do",
+            "  script       {} ticks with a command",
             self.script.steps().len()
         );
         say!("  ticks        {}, ended {}", played.periods, played.state.name());
@@ -133,7 +133,7 @@ impl Scripted {
     }
 
     /// The outcome of `simulate`.
-    pub(super) fn tell(&self, job: &Job, as_json: bool) -> Result<()> {
+    pub(super) fn output(&self, job: &Job, as_json: bool) -> Result<()> {
         if as_json {
             say!("{}", Value::Object(self.json()));
         } else {
@@ -143,7 +143,7 @@ impl Scripted {
         self.verdict()
     }
 
-    /// Plays it on a board with the job loaded, and tells whether that came to the same.
+    /// Runs the script on a board with the job loaded, and compares the digests.
     pub(super) fn run(&self, job: &Job, session: &mut Session, as_json: bool) -> Result<()> {
         let status = remote::script::play(session, &self.script, &self.schedule)?;
         let same = self.agrees(&status);
@@ -161,13 +161,9 @@ impl Scripted {
         } else {
             say!("{} on {board}", job.origin.name());
             self.print();
-            let verdict = if same {
-                "bit for bit the same"
-            } else {
-                "NOT the same"
-            };
+            let verdict = if same { "bit-identical" } else { "NOT identical" };
             say!(
-                "  compared     {} samples with this machine's: {verdict}",
+                "  compared     {} samples with the simulation: {verdict}",
                 status.samples
             );
         }
@@ -175,7 +171,7 @@ impl Scripted {
             return self.verdict();
         }
         Err(Failure::Failed(Some(format!(
-            "the board ended {} with {} samples and digest {:016x}, this machine {} with {} and {:016x}",
+            "the board ended {} with {} samples and digest {:016x}, the simulation {} with {} and {:016x}",
             status.state.name(),
             status.samples,
             status.digest,

@@ -1,4 +1,4 @@
-//! `simulate`: runs the core on this machine.
+//! `simulate`: runs the core on this computer.
 
 use std::path::{Path, PathBuf};
 
@@ -15,7 +15,7 @@ use verify::survey::{SampleObserver, SurveyResult};
 use super::outcome::Outcome;
 use super::{Bar, Failure, Result, approach, cannot_write, load, scripted, trace, warn_of_limits};
 
-/// Runs a job on this machine: the same core, the same bits as on the board; or one of the paper's other approaches.
+/// Runs a job on this computer with the core of the firmware, bit-identical to the board, or with another approach of the paper.
 ///
 /// Example: cargo sim simulate jobs/freeform.toml --trace out.csv
 /// Example: cargo sim simulate jobs/revolved.toml --approach linear --report out
@@ -28,16 +28,16 @@ pub(super) struct Arguments {
     /// Writes every sample as a row of this CSV file.
     #[arg(long, value_name = "FILE")]
     trace: Option<PathBuf>,
-    /// Writes a page with a view that turns, charts and figures into this folder.
+    /// Writes a report page into this folder: 3D view, charts, figures.
     #[arg(long, value_name = "DIR")]
     report: Option<PathBuf>,
-    /// Does what this file says an operator does: lines `tick N: hold`, or resume, stop, abort, start, override P.
+    /// Applies the operator commands in this file: lines `tick N: hold`, or resume, stop, abort, start, override P.
     #[arg(long, value_name = "FILE", conflicts_with_all = ["report", "approach"])]
     script: Option<PathBuf>,
     /// Prints one JSON object instead of text.
     #[arg(long)]
     pub(super) json: bool,
-    /// How the tool path is made.
+    /// Approach to the tool path.
     #[arg(long, value_enum, default_value = "surface")]
     approach: Kind,
 }
@@ -50,7 +50,7 @@ pub(super) fn timed(job: &Job, prepared: &Prepared) -> Result<TimedRun> {
     Ok(timed?)
 }
 
-/// Runs the core again, measures every sample, and writes the trace if it is wanted; with what a report needs if one is
+/// Runs the core again, measures every sample, and writes the trace if a path is given; with the data of a report if
 /// `sketched`.
 pub(super) fn surveyed(
     job: &Job,
@@ -86,7 +86,7 @@ pub(super) fn remarks(timed: &TimedRun, findings: &SurveyResult) -> Remarks {
     }
 }
 
-/// Writes the report if one is wanted, and returns the page's path.
+/// Writes the report if a folder is given, and returns the path of its page.
 pub(super) fn report(
     job: &Job,
     directory: Option<&Path>,
@@ -114,7 +114,7 @@ pub(super) fn command(arguments: &Arguments) -> Result<()> {
     travel::check(&job)?;
     if let Some(script) = &arguments.script {
         let scripted = scripted::play(&job, &prepared, script, arguments.trace.as_ref())?;
-        return scripted.tell(&job, arguments.json);
+        return scripted.output(&job, arguments.json);
     }
     let timed = timed(&job, &prepared)?;
     let directory = arguments.report.as_deref();
@@ -137,7 +137,7 @@ pub(super) fn command(arguments: &Arguments) -> Result<()> {
         samples_per_second: timed.samples_per_second,
         fault: timed.fault,
     };
-    outcome.tell(arguments.json, page.as_deref());
+    outcome.output(arguments.json, page.as_deref());
     match outcome.fault {
         None => Ok(()),
         Some(fault) => Err(Failure::Failed(Some(fault.sentence_of(&job)))),

@@ -1,4 +1,4 @@
-//! What the measured tool path came to, as text and as JSON.
+//! The figures of `verify`, as text and as JSON.
 
 use super::out::say;
 use interp_core::STORE_WORDS;
@@ -10,7 +10,7 @@ use verify::motion::limits::{ORDERS, Peaks, TOLERANCES};
 use verify::survey;
 use verify::swept::{ConcaveRadius, SweptResult};
 
-/// Bytes of surface data that the board holds.
+/// Capacity of the board for surface data, bytes.
 const STORE_BYTES: usize = STORE_WORDS * size_of::<i32>();
 
 fn data_bytes(prepared: &Prepared) -> usize {
@@ -42,8 +42,8 @@ pub(super) fn json(
             "kind": if gouge.local { "local" } else { "global" },
         })
     });
-    let hollow = found.shape.concave_radius.map(|hollow| {
-        json!({ "radius_mm": hollow.radius_mm, "u": hollow.u, "v": hollow.v, "place_mm": hollow.point_mm })
+    let concave = found.shape.concave_radius.map(|concave| {
+        json!({ "radius_mm": concave.radius_mm, "u": concave.u, "v": concave.v, "place_mm": concave.point_mm })
     });
     let value = json!({
         "position_error_max_nm": report.position_nm.max.abs(),
@@ -72,7 +72,7 @@ pub(super) fn json(
             "extent_mm": found.axes.extent_mm, "travel_mm": job.machine.travel_mm, "beyond_mm": found.axes.beyond_mm,
             "velocity_mm_s": axes[0].axes, "acceleration_mm_s2": axes[1].axes, "jerk_mm_s3": axes[2].axes,
         },
-        "least_concave_radius": hollow,
+        "least_concave_radius": concave,
         "poles": found.shape.poles,
         "degenerate_places": found.shape.degenerate.map_or(0, |(count, _)| count),
         "machining_time_s": time_s(job, survey.samples),
@@ -88,7 +88,7 @@ pub(super) fn json(
     }
 }
 
-/// Null where the machine has no limits. `rounding`: what was taken off.
+/// Shares of the axis limits; null without limits. `rounding`: share subtracted for the rounding of the samples.
 fn limits(job: &Job, [velocity, acceleration, jerk]: &Peaks) -> Value {
     if !job.machine.has_limits() {
         return Value::Null;
@@ -109,7 +109,7 @@ fn um(mm: f64) -> f64 {
     1e3 * mm
 }
 
-/// The same for a person.
+/// Prints the figures as text.
 pub(super) fn print(
     job: &Job,
     prepared: &Prepared,
@@ -138,18 +138,18 @@ pub(super) fn print(
     travel(job, found);
     peaks(axes);
     let shape = &found.shape;
-    let hollow = shape.concave_radius.map_or_else(
-        || "none: nowhere hollow".to_owned(),
-        |hollow| {
-            let ConcaveRadius { radius_mm, u, v, .. } = hollow;
+    let concave = shape.concave_radius.map_or_else(
+        || "none: nowhere concave".to_owned(),
+        |concave| {
+            let ConcaveRadius { radius_mm, u, v, .. } = concave;
             format!("{radius_mm:.4} mm at u = {u:.6}, v = {v:.6}")
         },
     );
-    row("least concave radius", &hollow);
+    row("least concave radius", &concave);
     if !shape.poles.is_empty() {
         row(
             "poles",
-            &format!("boundary {} is one point", shape.poles.join(", ")),
+            &format!("boundary {} is degenerate (one point)", shape.poles.join(", ")),
         );
     }
     row(
@@ -195,17 +195,14 @@ fn scallop(job: &Job, found: &SweptResult) {
     );
     row("", &mean);
     let parts = format!(
-        "the +- in um: way between samples {:.4}, rounding {:.4}, stations {:.4}, search {:.4}",
+        "terms of the +-, um: path between samples {:.4}, rounding {:.4}, stations {:.4}, search {:.4}",
         um(error.path_mm),
         um(error.rounding_mm),
         um(error.stations_mm),
         um(error.search_mm)
     );
     row("", &parts);
-    row(
-        "",
-        "first and last pass lie on the boundaries: nothing is left outside",
-    );
+    row("", "first and last pass lie on the boundaries: no uncut margin");
 }
 
 #[allow(clippy::cast_precision_loss, reason = "sizes of memories")]

@@ -1,4 +1,4 @@
-//! What an operator types while `run --port` follows a run.
+//! Operator commands typed while `run --port` follows a run.
 
 use std::io::{BufRead, stdin};
 use std::sync::mpsc::{Receiver, TryRecvError, channel};
@@ -11,22 +11,22 @@ use super::out::to_stderr;
 use machine::remote::RemoteError;
 use machine::remote::operate::Operator;
 
-/// What can be typed.
+/// The commands, for the prompt.
 pub(super) const WORDS: &str = "hold, resume, stop, abort, override 50, status";
 
-/// The lines of standard input, and where the answers go: above the bar.
-pub(super) struct Typist {
+/// The operator at the terminal: reads lines from standard input, prints the answers above the progress bar.
+pub(super) struct Console {
     lines: Receiver<String>,
     /// Standard input has not ended.
     open: bool,
     bar: ProgressBar,
 }
 
-impl Typist {
-    /// Reads from now on.
+impl Console {
+    /// Starts to read standard input in a thread.
     pub(super) fn new(bar: ProgressBar) -> Self {
         let (sender, lines) = channel();
-        // It ends with standard input, or with the program.
+        // The thread ends with standard input or with the process.
         std::thread::spawn(move || {
             for line in stdin().lock().lines().map_while(Result::ok) {
                 if sender.send(line).is_err() {
@@ -46,7 +46,7 @@ impl Typist {
     }
 }
 
-impl Operator for Typist {
+impl Operator for Console {
     fn wish(&mut self) -> Option<Request> {
         let line = match self.lines.try_recv() {
             Ok(line) => line,

@@ -1,4 +1,4 @@
-//! `verify`: every sample of a job against the independent oracle.
+//! `verify`: checks every sample of a job against the independent oracle.
 
 use std::path::PathBuf;
 
@@ -7,7 +7,7 @@ use inspect::{BOUNDS, RunMeasurements, Verification, verify_run};
 use job::{Job, Spacing};
 use machine::prepare::Prepared;
 use oracle::{ErrorStatistics, PassSample, SampleCheck};
-use report::{Remarks, RidgePlace, Scallops, Sketch};
+use report::{Remarks, RidgePoint, Scallops, Sketch};
 use serde_json::Value;
 use verify::survey::{SampleObserver, SurveyResult};
 use verify::swept;
@@ -16,10 +16,10 @@ use super::out::say;
 use super::simulate::{remarks, report, timed};
 use super::{Bar, Failure, Result, along, load, motion_words, swept_words};
 
-/// Checks a job before anything moves. Every sample against an independent f64 oracle: positions, normals, feed ripple, path
-/// intervals, schedule. The ball's swept envelope against the surface: scallop height everywhere, gouges, local or by another
-/// part of the path. Travel of the axes; what all samples use of the axes' limits, and what the first, the middle and the last pass
-/// take against the best motion within them, where the job sets limits. The tightest hollow, machining time, size of the data.
+/// Checks a job before it runs on a machine. Every sample against an independent f64 oracle: positions, normals, feed ripple, path
+/// intervals, schedule. The swept envelope of the ball against the surface: scallop height, local and global gouges. Axis travel. With
+/// axis limits: the share of each limit that the samples use, and the duration of the first, middle and last pass against the
+/// optimum. Least concave radius, machining time, size of the surface data.
 ///
 /// Example: cargo sim verify jobs/plate.toml
 /// Example: cargo sim verify jobs/plate_machine.toml --report out
@@ -28,10 +28,10 @@ use super::{Bar, Failure, Result, along, load, motion_words, swept_words};
 pub(super) struct Arguments {
     /// Job file (TOML).
     job: PathBuf,
-    /// Writes a page with a view that turns, charts and figures into this folder.
+    /// Writes a report page into this folder: 3D view, charts, figures.
     #[arg(long, value_name = "DIR")]
     report: Option<PathBuf>,
-    /// Times the first, the middle and the last pass by the best motion within usual axis limits, where the job sets none.
+    /// Computes the optimum of the first, middle and last pass within default axis limits if the job sets none.
     #[arg(long)]
     optimum: bool,
     /// Prints one JSON object instead of text.
@@ -59,7 +59,7 @@ fn print(findings: &SurveyResult, scanned: Option<usize>, first_order: bool) {
     line("tool normal", &report.normal_rad, BOUNDS.normal_rad, "rad");
     line("feed ripple", &report.ripple_pct, BOUNDS.ripple_pct, "%");
     line("interval candidates", &report.interval, BOUNDS.interval, "rel");
-    // Exact spacing has no closed form to be held against: the scallop height tells.
+    // Exact spacing has no closed form to compare with; it is checked by the scallop height.
     if first_order {
         line(
             "step to the next pass",
@@ -79,7 +79,7 @@ fn print(findings: &SurveyResult, scanned: Option<usize>, first_order: bool) {
 
 /// The measured heights as the report shows them.
 fn scallops(job: &Job, swept: &swept::SweptResult) -> Scallops {
-    let place = |spot: &swept::RidgePoint| RidgePlace {
+    let place = |spot: &swept::RidgePoint| RidgePoint {
         u: spot.u,
         v: spot.v,
         height_mm: spot.height_mm,
@@ -109,7 +109,7 @@ fn json(job: &Job, prepared: &Prepared, found: &Verification) -> Value {
     Value::Object(value)
 }
 
-/// The same for a person.
+/// Prints the figures as text.
 fn print_verification(job: &Job, prepared: &Prepared, found: &Verification) {
     let RunMeasurements {
         findings,

@@ -1,24 +1,24 @@
-//! What `cargo sim` and the program that talks to debug probes say to each other: one request as the program's argument, events as
-//! lines of JSON on its standard output. The program (`host-sim/debug-probe`) compiles this very file.
+//! Messages between `cargo sim` and the debug-probe program (`host-sim/debug-probe`): one request as the argument of the program,
+//! events as lines of JSON on its standard output. The program compiles this file too.
 
 use std::path::PathBuf;
 
 use serde::{Deserialize, Serialize};
 
-/// What is to be done.
+/// A request.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Request {
-    /// Is there a probe? Answered with [`Event::Probe`] or a failure.
+    /// Looks for a probe; answered with [`Event::Probe`] or a failure.
     Find {
-        /// Which probe, as `VID:PID` or `VID:PID:SERIAL`; without it the only one.
+        /// The probe, as `VID:PID` or `VID:PID:SERIAL`; `None`: the only one.
         probe: Option<String>,
     },
-    /// Writes an image, compares what was written, and starts it.
+    /// Writes an image, verifies it, and starts it.
     Flash(Target),
-    /// Compares an image with what is in flash; writes nothing, and the program goes on running.
+    /// Compares an image with the flash; writes nothing and does not interrupt the firmware.
     Compare(Target),
-    /// Follows the log of a running image, until it is ended.
+    /// Follows the log of a running image until the process is ended.
     Log(Target),
     /// Decodes a recorded log from standard input.
     Decode {
@@ -27,20 +27,20 @@ pub enum Request {
     },
 }
 
-/// An image and where it belongs.
+/// An image and the chip that it is for.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Target {
-    /// Which probe, as in [`Request::Find`].
+    /// The probe, as in [`Request::Find`].
     pub probe: Option<String>,
     /// The chip, by probe-rs's name.
     pub chip: String,
-    /// What the chip says it is (`DEV_ID`).
+    /// Identifier of the chip (`DEV_ID`).
     pub device_id: u16,
     /// The firmware's ELF file.
     pub image: PathBuf,
 }
 
-/// What happened.
+/// An event.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Event {
@@ -49,65 +49,65 @@ pub enum Event {
         /// Its name and selector.
         name: String,
     },
-    /// So much of the work is done.
+    /// Progress of the work.
     Progress {
-        /// Which work.
+        /// The work.
         work: Work,
         /// Bytes done.
         done: u64,
         /// Bytes in all.
         total: u64,
     },
-    /// The log's reader is at work: what comes is the log.
+    /// The log reader has started; the following events are the log.
     Following,
     /// A line of the log.
     Line(Line),
-    /// Something of the log was lost, or is not the log.
+    /// A part of the log was lost or could not be decoded.
     Lost,
-    /// All done.
+    /// The request is complete.
     Done,
-    /// It cannot be done.
+    /// The request failed.
     Failed(Problem),
 }
 
 /// A line of the log.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Line {
-    /// The board's time since its start, as it writes it.
+    /// Time since the start of the board, as in the log.
     pub time: Option<String>,
     /// `error`, `warn`, `info`, `debug` or `trace`.
     pub level: Option<String>,
-    /// What it says.
+    /// The message.
     pub message: String,
-    /// File and line that say it.
+    /// Source file and line.
     pub place: Option<(String, u64)>,
 }
 
-/// Work that takes a while.
+/// Work with a progress bar.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Work {
     /// Erasing flash.
     Erase,
-    /// Writing it.
+    /// Writing flash.
     Write,
-    /// Comparing it.
+    /// Comparing flash.
     Compare,
 }
 
-/// Why it cannot be done.
+/// Reason of a failure.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Problem {
-    /// The probe is named by no selector.
+    /// The selector of the probe is invalid.
     BadSelector(String),
-    /// No probe, or not the one that was asked for.
+    /// No probe, or not the requested one.
     NoProbe,
-    /// There are several: these.
+    /// Several probes; their names.
     SeveralProbes(Vec<String>),
-    /// There is one, and the system does not let us have it.
+    /// The user has no permission to open the probe.
     NotAllowed(String),
-    /// It cannot be opened.
+    /// The probe cannot be opened.
     NotOpened(String),
     /// probe-rs knows no such chip.
     UnknownChip(String),
@@ -115,11 +115,11 @@ pub enum Problem {
     NoChip(String),
     /// Another chip answers, with this `DEV_ID`.
     OtherChip(u16),
-    /// The chip has so much flash, bytes, and the image wants more.
+    /// The image does not fit the flash.
     TooLarge {
-        /// What there is.
+        /// Size of the flash, bytes.
         flash_bytes: u32,
-        /// What is wanted.
+        /// Size of the image, bytes.
         image_bytes: u32,
     },
     /// Erasing, writing or comparing failed.
@@ -128,8 +128,8 @@ pub enum Problem {
     Differs(u32),
     /// The image cannot be read, or has no log.
     BadImage(String),
-    /// The program in the chip has set up no log.
+    /// The firmware in the chip has not initialised its log.
     NoLog(String),
-    /// The chip or the probe went away.
+    /// The connection to the chip or the probe was lost.
     Gone(String),
 }

@@ -1,5 +1,5 @@
-//! An image of the firmware as a debug probe sees it: what goes where in flash, and which board it is for. The program that talks to
-//! probes (`host-sim/debug-probe`) compiles this very file.
+//! An image of the firmware: its segments in flash, and the board that it is for. The debug-probe program
+//! (`host-sim/debug-probe`) compiles this file too.
 
 use std::path::Path;
 
@@ -8,19 +8,19 @@ use object::elf::PT_LOAD;
 use object::read::elf::{ElfFile32, ProgramHeader};
 use object::{Architecture, LittleEndian, Object, ObjectSection, ObjectSymbol};
 
-/// RAM that a stack may begin in: 128 KiB (RM0090, 2.3.1).
+/// Valid addresses of the initial stack pointer: 128 KiB of RAM (RM0090, 2.3.1).
 const RAM: std::ops::RangeInclusive<u32> = 0x2000_0000..=0x2002_0000;
-/// Name of the control block of the log.
+/// Symbol of the control block of the log.
 const RTT_SYMBOL: &str = "_SEGGER_RTT";
 
 /// An image.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Image {
-    /// What goes to flash: address and bytes, ascending, none empty, none overlapping.
+    /// Segments in flash: address and bytes; ascending, not empty, not overlapping.
     pub segments: Vec<(u32, Vec<u8>)>,
-    /// The board that it says it is for; an image of something else says none.
+    /// The board named in the image; `None` in an image of other firmware.
     pub board: Option<String>,
-    /// Address of the control block of the log; QEMU's image has none.
+    /// Address of the control block of the log; `None` in the image for QEMU.
     pub rtt: Option<u32>,
 }
 
@@ -30,16 +30,16 @@ impl Image {
     /// Reads an ELF file.
     ///
     /// # Errors
-    /// It cannot be read, is no ELF file for ARM, has nothing for flash, or parts that overlap: in words.
+    /// The file cannot be read, is no ELF file for ARM, has no segments in flash, or overlapping ones; as text.
     pub fn load(path: &Path) -> Result<Self, String> {
         let bytes = std::fs::read(path).map_err(|error| format!("cannot read it: {error}"))?;
         Self::parse(&bytes)
     }
 
-    /// The same from bytes.
+    /// Parses the bytes of an ELF file.
     ///
     /// # Errors
-    /// Likewise.
+    /// As [`Image::load`].
     pub fn parse(bytes: &[u8]) -> Result<Self, String> {
         let elf =
             Elf::parse(bytes).map_err(|error| format!("it is no ELF file of a 32-bit chip: {error}"))?;
@@ -71,16 +71,16 @@ impl Image {
         })
     }
 
-    /// Bytes to be written.
+    /// Number of bytes to write.
     #[must_use]
     pub fn bytes(&self) -> u64 {
         self.segments.iter().map(|(_, data)| data.len() as u64).sum()
     }
 
-    /// How much flash it needs from [`FLASH_BEGIN`] on, bytes.
+    /// End of the last segment relative to [`FLASH_BEGIN`], bytes.
     ///
     /// # Errors
-    /// A part of it lies before flash, or beyond what addresses can name: in words.
+    /// A segment begins before flash, or ends beyond the address space; as text.
     pub fn reach_bytes(&self) -> Result<u32, String> {
         let mut reach = 0;
         for (address, data) in &self.segments {
@@ -99,10 +99,10 @@ impl Image {
         Ok(reach)
     }
 
-    /// Whether it is this board's, fits its flash, and starts there.
+    /// Checks that the image is for this board, fits its flash, and starts there.
     ///
     /// # Errors
-    /// It is not, or does not: in words.
+    /// The first check that fails, as text.
     pub fn check_for(&self, board: &Board) -> Result<(), String> {
         match self.board.as_deref() {
             Some(id) if id == board.id => {}
@@ -118,7 +118,7 @@ impl Image {
         self.check_start()
     }
 
-    /// Whether a chip that begins with it finds a program: the stack in RAM, the first instruction in flash.
+    /// Checks the vector table: stack pointer in RAM, reset vector in flash with the Thumb bit.
     fn check_start(&self) -> Result<(), String> {
         let reach = self.reach_bytes()?;
         let start = match self.segments.first() {
@@ -148,7 +148,7 @@ fn symbol(elf: &Elf<'_>, name: &str) -> Option<u32> {
     u32::try_from(found.address()).ok()
 }
 
-/// The board's name behind its symbol.
+/// Name of the board, stored at [`MARK_SYMBOL`].
 fn mark(elf: &Elf<'_>) -> Option<String> {
     let address = symbol(elf, MARK_SYMBOL)?;
     let bytes = elf.sections().find_map(|section| {

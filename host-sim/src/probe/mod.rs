@@ -1,4 +1,4 @@
-//! A board's chip by a debug probe: the firmware into its flash, its log out of it.
+//! Access to the chip of a board by a debug probe: writes the firmware into flash, reads the log.
 //!
 //! ```text
 //! cargo sim flash, log ──Request──► program.rs ──► host-sim/debug-probe (probe-rs, defmt-decoder) ──USB──► probe ──SWD──► chip
@@ -7,8 +7,8 @@
 //!        └──────────────Event───────────┘
 //! ```
 //!
-//! What talks to the probe is a program of its own, because probe-rs with the descriptions of all its chips is as large as the rest of
-//! the tool: it is built when it is first wanted. All that can go wrong comes back as a [`Problem`]; what people are told about it is here.
+//! The debug-probe program is separate, because probe-rs with its chip descriptions is as large as the rest of the tool; it is built on
+//! first use. It returns a [`Problem`] on failure; the texts for it are in `words.rs`.
 
 pub mod event;
 pub mod image;
@@ -19,5 +19,5 @@ mod words;
 
 pub use event::{Event, Line, Problem, Request, Target, Work};
 pub use image::Image;
-pub use program::{NotRun, Program};
+pub use program::{ProbeError, Program};
 pub use words::{remedy, sentence};

@@ -1,4 +1,4 @@
-//! The program that talks to probes: built when it is first wanted, run, listened to.
+//! The debug-probe program: built on first use, run with a request, its events read.
 
 use std::fs::File;
 use std::io::{BufRead, BufReader};
@@ -8,10 +8,10 @@ use std::process::{Child, Command, Stdio};
 use super::{Event, Problem, Request};
 use programs::{Part, Unavailable};
 
-/// Why nothing came of a request.
+/// Failure of a request.
 #[derive(Debug, thiserror::Error)]
-pub enum NotRun {
-    /// The program says why.
+pub enum ProbeError {
+    /// The program reported a problem.
     #[error("{}", super::sentence(.0))]
     Problem(Problem),
     /// The program does not run, or not as it should: an error of ours.
@@ -37,29 +37,29 @@ impl Program {
     ///
     /// # Errors
     /// It is not there, or cannot be built: Cargo's own message.
-    pub fn find() -> Result<Self, NotRun> {
+    pub fn find() -> Result<Self, ProbeError> {
         programs::find(Part::DebugProbe)
             .map(Self)
-            .map_err(NotRun::Unavailable)
+            .map_err(ProbeError::Unavailable)
     }
 
-    /// Another program in its place, for tests of what is made of its answers.
+    /// Another program instead, for tests of the handling of its output.
     #[must_use]
     pub fn at(path: &Path) -> Self {
         Self(path.to_owned())
     }
 
-    /// Runs a request to its end, and hands over each event on the way. `recorded` is what a recorded log is read from.
+    /// Runs a request to its end and passes on each event. `recorded`: the file of a recorded log.
     ///
     /// # Errors
-    /// The program does not run, names a problem, or ends before it is done.
+    /// The program does not run, reports a problem, or ends early.
     pub fn run(
         &self,
         request: &Request,
         recorded: Option<File>,
         mut on_event: impl FnMut(&Event),
-    ) -> Result<(), NotRun> {
-        let failed = |error: &dyn std::fmt::Display| NotRun::Program(format!("does not run: {error}"));
+    ) -> Result<(), ProbeError> {
+        let failed = |error: &dyn std::fmt::Display| ProbeError::Program(format!("does not run: {error}"));
         let request = serde_json::to_string(request).map_err(|error| failed(&error))?;
         let child = Command::new(&self.0)
             .arg(request)
@@ -68,41 +68,41 @@ impl Program {
             .stderr(Stdio::piped())
             .spawn()
             .map_err(|error| failed(&error))?;
-        let mut child = Ended(child);
+        let mut child = ChildGuard(child);
         let Some(output) = child.0.stdout.take() else {
             return Err(failed(&"it has no output"));
         };
         for line in BufReader::new(output).lines() {
             let line = line.map_err(|error| failed(&error))?;
             match serde_json::from_str(&line) {
-                Ok(Event::Failed(problem)) => return Err(NotRun::Problem(problem)),
+                Ok(Event::Failed(problem)) => return Err(ProbeError::Problem(problem)),
                 Ok(Event::Done) => return Ok(()),
                 Ok(event) => on_event(&event),
                 Err(error) => {
-                    return Err(NotRun::Program(format!(
-                        "says what it should not ({error}): {line}"
+                    return Err(ProbeError::Program(format!(
+                        "wrote invalid output ({error}): {line}"
                     )));
                 }
             }
         }
-        // It ended without a word: a panic of a library, say.
+        // The program ended without an event, for example by a panic.
         let mut words = String::new();
         if let Some(mut stderr) = child.0.stderr.take() {
             let _ = std::io::Read::read_to_string(&mut stderr, &mut words);
         }
-        Err(NotRun::Program(format!(
+        Err(ProbeError::Program(format!(
             "ended before it was done: {}",
             words.trim()
         )))
     }
 }
 
-/// A program that does not outlive our interest in it.
-struct Ended(Child);
+/// A child process that is ended on drop.
+struct ChildGuard(Child);
 
-impl Drop for Ended {
+impl Drop for ChildGuard {
     fn drop(&mut self) {
-        // Either it is gone already, or it goes now.
+        // Errors are ignored: the process may have ended already.
         let _ = self.0.kill();
         let _ = self.0.wait();
     }

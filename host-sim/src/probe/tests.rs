@@ -1,9 +1,9 @@
-//! Images made by hand, and a program that says what the test wants.
+//! Hand-made images, and a program with output defined by the test.
 
 use std::os::unix::fs::PermissionsExt;
 use std::path::Path;
 
-use super::{Event, Image, NotRun, Problem, Program, Request, Work, remedy, sentence};
+use super::{Event, Image, ProbeError, Problem, Program, Request, Work, remedy, sentence};
 
 const LOAD: u32 = 1;
 const ARM: u16 = 40;
@@ -52,8 +52,8 @@ fn image(parts: &[(u32, u32, u32, &[u8])]) -> Result<Image, String> {
 const START: [u8; 12] = [0, 0, 2, 0x20, 9, 0, 0, 8, 0xFE, 0xE7, 0, 0];
 
 #[test]
-fn what_goes_to_flash_is_where_it_is_loaded_from() {
-    // Variables have an address in RAM, and their first values one in flash; what is all zeros has no bytes.
+fn segments_are_at_their_load_addresses() {
+    // Variables have an address in RAM and initial values in flash; zero-initialised data has no bytes.
     let data = [1, 2, 3, 4];
     let made = image(&[
         (LOAD, 0x2000_0000, 0x0800_000C, &data),
@@ -71,7 +71,7 @@ fn what_goes_to_flash_is_where_it_is_loaded_from() {
 }
 
 #[test]
-fn what_cannot_go_to_flash_is_refused() {
+fn invalid_images_are_refused() {
     let part = |address: u32, data: &'static [u8]| image(&[(LOAD, address, address, data)]);
     for (made, says) in [
         (Image::parse(b"no elf"), "no ELF file"),
@@ -93,12 +93,12 @@ fn what_cannot_go_to_flash_is_refused() {
         let reach = part(address, &[1, 2]).unwrap().reach_bytes();
         assert!(reach.unwrap_err().contains("no flash"), "{address:#x}");
     }
-    // RAM is no flash, but lies above it: it reaches too far.
+    // RAM is above flash: the image reaches too far.
     let reach = part(0x2000_0000, &[1]).unwrap().reach_bytes().unwrap();
     assert!(reach > boards::STM32F405.chip.flash_bytes);
 }
 
-/// With a name of the board put in, as the symbol cannot be made by hand in a few lines.
+/// The name of the board is set directly: a symbol table by hand would be long.
 #[test]
 fn an_image_has_to_be_the_boards_and_start() {
     let with = |address: u32, data: &[u8], board: Option<&str>| {
@@ -137,7 +137,7 @@ fn an_image_has_to_be_the_boards_and_start() {
 }
 
 fn problems() -> Vec<Problem> {
-    let text = || "such and such".to_owned();
+    let text = || "text".to_owned();
     vec![
         Problem::BadSelector(text()),
         Problem::NoProbe,
@@ -159,7 +159,7 @@ fn problems() -> Vec<Problem> {
     ]
 }
 
-/// A program that says these lines; it is what a shell makes of `script`.
+/// A shell script as the program.
 fn says(folder: &Path, script: &str) -> Program {
     let path = folder.join("program");
     std::fs::write(&path, format!("#!/bin/sh\n{script}\n")).unwrap();
@@ -176,7 +176,7 @@ fn problems_come_back_as_they_were_sent() {
         let line = serde_json::to_string(&Event::Failed(problem.clone())).unwrap();
         let program = says(folder.path(), &format!("echo '{line}'\nexit 1"));
         match program.run(&FIND, None, |_| panic!("no event")) {
-            Err(NotRun::Problem(back)) => assert_eq!(back, problem),
+            Err(ProbeError::Problem(back)) => assert_eq!(back, problem),
             other => panic!("{other:?}"),
         }
         assert!(sentence(&problem).len() > 20 && remedy(&problem).len() > 20);
@@ -192,7 +192,7 @@ fn events_arrive_in_their_order_and_the_request_as_it_was() {
            echo '{"progress":{"work":"erase","done":1,"total":2}}'
            echo '"lost"'
            echo '"done"'
-           echo 'what comes after is not read'"#,
+           echo 'further output is not read'"#,
     );
     let mut events = Vec::new();
     program
@@ -208,19 +208,19 @@ fn events_arrive_in_their_order_and_the_request_as_it_was() {
 }
 
 #[test]
-fn a_program_that_fails_is_told_of() {
+fn a_failing_program_is_reported() {
     let folder = tempfile::tempdir().unwrap();
     for (script, words) in [
         (
             "echo panicked >&2; exit 101",
             "ended before it was done: panicked",
         ),
-        ("echo '{}'", "says what it should not"),
+        ("echo '{}'", "wrote invalid output"),
     ] {
-        let told = says(folder.path(), script).run(&FIND, None, |_| {});
-        let told = told.unwrap_err().to_string();
-        assert!(told.contains(words), "{told}");
+        let result = says(folder.path(), script).run(&FIND, None, |_| {});
+        let text = result.unwrap_err().to_string();
+        assert!(text.contains(words), "{text}");
     }
-    let told = Program::at(&folder.path().join("nothing")).run(&FIND, None, |_| {});
-    assert!(told.unwrap_err().to_string().contains("does not run"));
+    let result = Program::at(&folder.path().join("nothing")).run(&FIND, None, |_| {});
+    assert!(result.unwrap_err().to_string().contains("does not run"));
 }

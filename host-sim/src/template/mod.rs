@@ -75,33 +75,76 @@ mod tests {
         }
     }
 
-    /// With what is commented out switched on, everything is still read: so the comments show valid values, and what they call defaults
-    /// leaves the surface as it was.
+    /// The text of a template with its optional keys and sections uncommented.
+    fn with_optional_keys(kind: Kind) -> String {
+        let is_key = |line: &str| {
+            line.split_once(" = ").is_some_and(|(key, _)| {
+                key.chars()
+                    .all(|c| c.is_ascii_lowercase() || c == '_' || c.is_ascii_digit())
+            })
+        };
+        let text = job(kind, "job.toml");
+        let lines = text.lines().map(|line| match line.strip_prefix("# ") {
+            Some(rest) if is_key(rest) || rest.starts_with('[') => rest,
+            _ => line,
+        });
+        lines.collect::<Vec<_>>().join("\n")
+    }
+
+    /// The optional keys of the templates have valid values, and those that the comments call defaults leave the job unchanged.
     #[test]
     fn optional_keys_are_valid() {
         for kind in [Kind::Bicubic, Kind::Ruled, Kind::Revolved, Kind::Nurbs] {
-            let plain = job(kind, "job.toml");
-            let is_key = |line: &str| {
-                line.split_once(" = ").is_some_and(|(key, _)| {
-                    key.chars()
-                        .all(|c| c.is_ascii_lowercase() || c == '_' || c.is_ascii_digit())
-                })
-            };
-            let lines = plain.lines().map(|line| match line.strip_prefix("# ") {
-                Some(rest) if is_key(rest) || rest.starts_with('[') => rest,
-                _ => line,
-            });
-            let full = lines.collect::<Vec<_>>().join("\n");
-            let full = job_file::parse("job.toml", &full).unwrap();
-            let plain = job_file::parse("job.toml", &plain).unwrap();
+            let full = job_file::parse("job.toml", &with_optional_keys(kind)).unwrap();
+            let plain = job_file::parse("job.toml", &job(kind, "job.toml")).unwrap();
             assert_eq!(
-                (&full.surface, full.pattern, full.chord_mm),
-                (&plain.surface, plain.pattern, plain.chord_mm)
+                (&full.surface, full.pattern, full.spacing, full.chord_mm),
+                (&plain.surface, plain.pattern, plain.spacing, plain.chord_mm)
             );
             assert_eq!(full.machine.period_us, plain.machine.period_us);
             assert_eq!(configuration(&full.machine), configuration(&plain.machine));
             assert!(full.machine.travel_mm.is_some() && full.machine.step_output.is_some());
             assert!(full.machine.has_limits());
+        }
+    }
+
+    /// The keys that the reader of job files accepts in a section of a template: it lists them when it refuses an unknown one.
+    fn accepted_keys(text: &str, section: &str) -> Vec<String> {
+        let head = format!("[{section}]\n");
+        assert!(text.contains(&head), "[{section}] is missing in\n{text}");
+        let text = text.replace(&head, &format!("{head}xxxxxxxxxxxxxxxx = 0\n"));
+        let error = job_file::parse("job.toml", &text).unwrap_err();
+        assert!(error.what().contains("unknown key"), "{}", error.what());
+        let names = error.remedy().split('`').skip(1).step_by(2);
+        names.map(str::to_owned).collect()
+    }
+
+    /// A template shows every key that the reader of job files accepts for its kind of surface, used or commented out.
+    #[test]
+    fn every_accepted_key_is_in_the_template() {
+        for kind in Kind::ALL {
+            let text = with_optional_keys(kind);
+            let mut count = 0;
+            for section in ["surface", "placement", "tool", "cut", "machine"] {
+                // A CAD file's face is resolved before the sections behind it are read; they are the same for every kind.
+                if kind == Kind::File && section != "surface" {
+                    continue;
+                }
+                let head = format!("[{section}]\n");
+                let body = text.split(&head).nth(1).unwrap();
+                let body = body.split("\n[").next().unwrap();
+                for key in accepted_keys(&text, section) {
+                    assert!(
+                        body.lines().any(|line| line.starts_with(&format!("{key} = "))),
+                        "{kind:?}: [{section}] lacks `{key}`"
+                    );
+                    count += 1;
+                }
+            }
+            assert!(
+                count >= if kind == Kind::File { 5 } else { 29 },
+                "{kind:?}: {count} keys"
+            );
         }
     }
 

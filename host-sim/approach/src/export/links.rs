@@ -1,4 +1,4 @@
-//! What lies between two passes.
+//! Links between passes.
 
 use super::Options;
 use crate::gcode::{Blocks, Cut};
@@ -7,16 +7,16 @@ use job::Job;
 use oracle::vector::{length, subtract};
 use oracle::{Oracle, OracleError};
 
-/// Cuts that a step-over may be cut into at most.
+/// Largest number of cuts of a step-over.
 const CUTS_MAX: u32 = 1 << 12;
 
-/// Up to where nothing is in the way.
+/// Retract to the safe height.
 pub(super) fn retract(blocks: &mut Blocks<'_>, safe_z_mm: f64) {
     blocks.rapid([None, None, Some(safe_z_mm)]);
 }
 
-/// Up, across, down near to the place, and down to it at the feed. Over a surface that faces up everywhere, the ball is
-/// free above every place where it touches.
+/// Retract, traverse, rapid plunge to the clearance, plunge at the feed. On a surface that faces up everywhere, the ball is free
+/// above each of its contacts.
 pub(super) fn approach(
     blocks: &mut Blocks<'_>,
     to_mm: [f64; 3],
@@ -32,7 +32,7 @@ pub(super) fn approach(
     blocks.cut(&Cut::line([x, y, near], to_mm, job.feed_mm_s()));
 }
 
-/// Along the boundary at a path parameter from one side parameter to another, within the tolerance of chords, at the
+/// Step-over along the boundary at a path parameter, from one side parameter to another, in chords within the tolerance, at the
 /// speed that keeps the contact at the feed.
 pub(super) fn step_over(
     oracle: &Oracle,
@@ -50,7 +50,7 @@ pub(super) fn step_over(
             .map(|k| at(f64::from(k) / f64::from(2 * count)).map(|contact| contact.cl_mm))
             .collect();
         let places = places?;
-        // A chord of a curve is off by most near its middle.
+        // The chord error is largest near the middle.
         Ok(places
             .windows(3)
             .step_by(2)

@@ -1,13 +1,13 @@
-//! Programs for machines that exist: a job as G-code for LinuxCNC or Grbl.
+//! Export of a job as G-code for LinuxCNC or Grbl.
 //!
 //! ```text
 //! job ─► oracle ─► PassPath ─► linear.rs or arcs.rs (approach/) ─► Cut ─┐
 //!                          └─► links.rs: retract, step-over ────────────┴─► gcode.rs: blocks ─► text
 //! ```
 //!
-//! The programmed point is the centre of the ball. Cuts are those of the approach; between passes the tool is lifted
-//! (`zig`) or steps over along the surface's boundary (`zigzag`). Lines and arcs, with the third axis
-//! in proportion, are what the interpreters of both know; neither knows cubics in space, and LinuxCNC's NURBS stay in a plane.
+//! The programmed point is the ball centre. The cuts are those of the approach; between passes the tool retracts (`zig`) or steps over
+//! along the boundary of the surface (`zigzag`). Both interpreters support lines and helical arcs; neither supports cubics in space, and
+//! LinuxCNC's NURBS are planar.
 
 mod links;
 
@@ -16,7 +16,7 @@ use crate::{ApproachError, Arcs, ConstantCl, Kind, Nodes, PassPath, even_chords,
 use job::{Job, Pattern};
 use oracle::Oracle;
 
-/// Whose G-code.
+/// G-code dialect.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
 pub enum Dialect {
     /// LinuxCNC 2.8 or later.
@@ -25,48 +25,48 @@ pub enum Dialect {
     Grbl,
 }
 
-/// How a program is to be.
+/// Options of an export.
 #[derive(Clone, Copy, Debug)]
 pub struct Options {
-    /// Whose G-code.
+    /// G-code dialect.
     pub dialect: Dialect,
     /// The approach.
     pub kind: Kind,
-    /// What F words mean.
+    /// Unit of the F words.
     pub feed_mode: FeedMode,
-    /// How far above the highest centre, or the place to cut, the tool moves rapidly, mm.
+    /// Clearance of rapid moves above the highest CL and above the start of a plunge, mm.
     pub clearance_mm: f64,
-    /// Speed of the spindle, rpm; where there is none, the program does not touch the spindle.
+    /// Spindle speed, rpm; `None`: the program contains no spindle command.
     pub spindle_rpm: Option<f64>,
 }
 
-/// A program.
+/// An exported program.
 #[derive(Clone, Debug)]
-pub struct Exported {
-    /// Its text.
+pub struct ExportedProgram {
+    /// Text.
     pub text: String,
-    /// Passes.
+    /// Number of passes.
     pub passes: usize,
-    /// Cuts on the passes.
+    /// Number of cuts on the passes.
     pub cuts: usize,
-    /// Time of these cuts, s.
+    /// Duration of these cuts, s.
     pub cutting_time_s: f64,
-    /// Height at which the tool crosses the part, mm.
+    /// Safe height, mm.
     pub safe_z_mm: f64,
 }
 
-/// Why there is no program.
+/// Failure of an export.
 #[derive(Clone, Debug, PartialEq)]
 pub enum ExportError {
-    /// The approach has none.
+    /// The approach failed.
     Approach(ApproachError),
-    /// The approach is not one that other machines can follow.
+    /// G-code cannot represent the approach.
     SurfaceNeedsTheCore,
-    /// The surface faces down, so the tool could not be lifted off it.
+    /// The surface faces down, so that the tool cannot retract.
     FacesDown {
-        /// u of the place.
+        /// Parameter u.
         u: f64,
-        /// v of the place.
+        /// Parameter v.
         v: f64,
     },
 }
@@ -77,7 +77,7 @@ impl<E: Into<ApproachError>> From<E> for ExportError {
     }
 }
 
-/// A normal may point down by this much by rounding alone.
+/// Rounding tolerance of the z of a normal below 0.
 const LEVEL: f64 = 1e-9;
 
 /// A pass with its cuts.
@@ -110,7 +110,7 @@ impl Path {
         let (begin_mm, end_mm) = (at(0)?, at(1)?);
         Ok(Self {
             begin_mm,
-            // A pass that is one point has no places.
+            // A degenerate pass has no points.
             highest_mm: highest_mm.max(begin_mm[2]).max(end_mm[2]),
             side: pass.side,
             end: pass.ends[1],
@@ -123,7 +123,7 @@ impl Path {
 ///
 /// # Errors
 /// See [`ExportError`].
-pub fn export(job: &Job, options: &Options, done: &dyn Fn()) -> Result<Exported, ExportError> {
+pub fn export(job: &Job, options: &Options, done: &dyn Fn()) -> Result<ExportedProgram, ExportError> {
     let oracle = Oracle::new(job)?;
     let mut paths = Vec::new();
     for pass in passes(&oracle)? {
@@ -156,7 +156,7 @@ pub fn export(job: &Job, options: &Options, done: &dyn Fn()) -> Result<Exported,
         blocks.line("%");
     }
     let cuts = || paths.iter().flat_map(|path| &path.cuts);
-    Ok(Exported {
+    Ok(ExportedProgram {
         passes: paths.len(),
         cuts: cuts().count(),
         cutting_time_s: cuts().map(Cut::time_s).sum(),
@@ -172,16 +172,16 @@ fn head(blocks: &mut Blocks<'_>, job: &Job, options: &Options, passes: usize) {
     let title = std::path::Path::new(job.origin.name())
         .file_stem()
         .map_or_else(|| "job".to_owned(), |name| name.to_string_lossy().into_owned());
-    // Grbl takes 80 characters a line.
+    // Grbl limits lines to 80 characters.
     let title: String = title.chars().take(30).collect();
     blocks.comment(&format!("{title}: {passes} passes, {}", options.kind.name()));
     blocks.comment(&format!(
-        "ball of {} mm radius, of which the centre is programmed",
+        "ball of {} mm radius, programmed point: centre",
         job.radius_mm
     ));
     let what = match options.kind {
-        Kind::ConstantCl => "feed of the centre",
-        _ => "feed of the contact",
+        Kind::ConstantCl => "CL feed",
+        _ => "CC feed",
     };
     blocks.comment(&format!(
         "{what} {} mm/min, tolerance {} mm",
@@ -189,12 +189,12 @@ fn head(blocks: &mut Blocks<'_>, job: &Job, options: &Options, passes: usize) {
     ));
     blocks.line("G17G21G40G90");
     if options.dialect == Dialect::Linuxcnc {
-        // Blends corners within the tolerance again; without a naive CAM detector, which would join cuts of different feeds.
+        // Path blending within the tolerance; naive CAM detector off, because it would join cuts of different feeds.
         blocks.line(&format!("G64P{}Q0", job.chord_mm));
     }
     match options.spindle_rpm {
         Some(rpm) => blocks.line(&format!("S{rpm}M3")),
-        None => blocks.comment("the spindle is not switched on here"),
+        None => blocks.comment("the spindle is not switched on by this program"),
     }
     blocks.line(options.feed_mode.word());
 }

@@ -1,17 +1,17 @@
-// Charts over time and from pass to pass, drawn with uPlot. A line over time is the band between the least and the
-// largest value of each column, so that no peak is lost.
+// Charts over time and by pass, drawn with uPlot. A curve over time is the band between the minimum and the maximum of
+// each column, so that peaks remain visible.
 
 const HEIGHT = 230;
 const COLUMNS_MAX = 1400;
-const LEAST_TICKS = 12; // no window shows less
-const PASSES_MAX = 60; // in a window with more, a column holds a pass: to and fro they would be a smear
+const LEAST_TICKS = 12; // smallest window, ticks
+const PASSES_MAX = 60; // in a window with more passes, one column per pass, so that alternating directions do not blur
 
-// Quantities over time: [name of the series, what it is called, colour, width of its line].
+// Quantities over time: [name of the series, label, colour, line width].
 const OVER_TIME = [
     {
-        title: "Speed of contact and tool centre",
+        title: "Speed of cutter contact (CC) and cutter location (CL)",
         unit: "mm/s",
-        rows: [["cl_speed", "tool centre (CL)", "violet"], ["cc_speed", "cutter contact (CC)", "warm", 2.5]],
+        rows: [["cl_speed", "cutter location (CL)", "violet"], ["cc_speed", "cutter contact (CC)", "warm", 2.5]],
     },
     {
         title: "Velocity of the axes",
@@ -25,8 +25,8 @@ const OVER_TIME = [
         limits: "acceleration",
         rows: ["x", "y", "z"].map((axis, k) => [`acceleration_${axis}`, axis, ["axis-x", "axis-y", "axis-z"][k]]),
     },
-    { title: "Error of the tool centre", unit: "nm", fromZero: true, isMagnitude: true, rows: [["cl_error", "against the oracle", "blue"]] },
-    { title: "Error of the feed", unit: "%", rows: [["feed_error", "against the wanted feed", "blue"]] },
+    { title: "CL error", unit: "nm", fromZero: true, isMagnitude: true, rows: [["cl_error", "against the oracle", "blue"]] },
+    { title: "Feed error", unit: "%", rows: [["feed_error", "against the programmed feed", "blue"]] },
 ];
 
 // Axes, grid and cursor that all charts share.
@@ -54,30 +54,30 @@ function frame(width, unit, more) {
     };
 }
 
-// Labels of an axis: as many decimals as tell them apart.
+// Labels of an axis, with enough decimals to distinguish them.
 function tickLabels(ticks) {
     const found = ticks.filter((tick) => tick !== null);
     const step = found.length > 1 ? Math.abs(found[1] - found[0]) : 1;
     const largest = Math.max(...found.map(Math.abs));
     if (largest < 1e-3 && largest > 0) return ticks.map((tick) => (tick === null ? null : tick === 0 ? "0" : shown(tick, 2)));
     const least = Math.max(-Math.floor(Math.log10(step) + 1e-9), 0);
-    // A step of 0.0025 takes a decimal more than one of 0.002.
+    // A step of 0.0025 needs one decimal more than a step of 0.002.
     const isWhole = (decimals) => Math.abs(step * 10 ** decimals - Math.round(step * 10 ** decimals)) < 1e-6;
     const decimals = isWhole(least) ? least : least + 1;
     return ticks.map((tick) => (tick === null ? null : fixed(tick, decimals)));
 }
 
-// A range with some air, from 0 if wanted.
+// A range with margins, optionally from 0.
 function airy(low, high, fromZero) {
     if (low === null || high === null || !Number.isFinite(low)) return [0, 1];
-    // What differs by rounding alone is a straight line.
+    // Values that differ only by rounding are shown as a straight line.
     const air = Math.max(0.08 * (high - low), 1e-3 * Math.max(Math.abs(low), Math.abs(high))) || 1;
     return fromZero ? [0, high + (high - 0) * 0.1 || 1] : [low - air, high + air];
 }
 
 const withAlpha = (colour, alpha) => `${colour}${Math.round(255 * alpha).toString(16).padStart(2, "0")}`;
 
-// A place for a chart, with its title and read-out.
+// The elements of a chart: title, read-out, plot.
 function card(parent, title, note) {
     const readout = element("span", { class: "values" });
     const plot = element("div", { class: "plot" });
@@ -110,7 +110,7 @@ class TimeCharts {
         this.buttons();
     }
 
-    // The panel of the view: the ball's moment is marked.
+    // `panel`: the panel of the view, whose time is marked in the charts.
     follow(panel) {
         this.panel = panel;
         const redraw = () => this.cards.forEach(({ chart }) => chart?.redraw(false, false));
@@ -172,12 +172,12 @@ class TimeCharts {
             shownColumns = columns;
         }
         const { samples, pass } = shownColumns;
-        const of = pass === undefined ? "" : ` (pass ${pass} is kept in detail)`;
+        const of = pass === undefined ? "" : ` (pass ${pass} is stored in detail)`;
         const from = fixed(this.window[0] * period, 3);
         const to = fixed(this.window[1] * period, 3);
         byId("window").textContent =
             `${from} to ${to} s: ` +
-            (samples === 1 ? `every sample is drawn${of}` : `each drawn point holds the least and the largest of ${fixed(samples, 0)} samples${of}`);
+            (samples === 1 ? `every sample is drawn${of}` : `each drawn point spans the least and the largest of ${fixed(samples, 0)} samples${of}`);
     }
 
     setWindow(from, to) {
@@ -193,7 +193,7 @@ class TimeCharts {
         this.setWindow(about + (from - about) * factor, about + (to - about) * factor);
     }
 
-    // A dragged range is the new window; a mere click brings the ball to that moment.
+    // Dragging selects the new window; a click sets the time.
     select(chart) {
         const { left, width } = chart.select;
         const tick = (x) => chart.posToVal(x, "x") / this.payload.period;
@@ -213,7 +213,7 @@ class TimeCharts {
         over.addEventListener(
             "wheel",
             (event) => {
-                // The wheel alone scrolls the page.
+                // Without Ctrl, the wheel scrolls the page.
                 if (!event.ctrlKey && !event.shiftKey && !event.metaKey) return;
                 event.preventDefault();
                 const about = chart.posToVal(event.clientX - over.getBoundingClientRect().left, "x") / this.payload.period;
@@ -223,7 +223,7 @@ class TimeCharts {
         );
     }
 
-    // Where the ball is, and the limits of the axes.
+    // Marks the time, and the axis limits.
     marks(each, chart) {
         const { ctx, bbox } = chart;
         ctx.save();
@@ -300,13 +300,13 @@ function line(ctx, x1, y1, x2, y2) {
     ctx.stroke();
 }
 
-// Least of one row and largest of another.
+// Minimum of one row and maximum of another.
 function extremes(lows, highs) {
     const low = lows.reduce((a, b) => (b === null || a < b ? a : b), null);
     return [lows.some((x) => x !== null) ? Math.min(...lows.filter((x) => x !== null)) : low, Math.max(...highs.filter((x) => x !== null), -Infinity)];
 }
 
-// A value, or the range between two, with digits enough to tell them apart.
+// A value, or the range between two, with enough digits to distinguish them.
 function between(low, high) {
     if (low === null || !Number.isFinite(high)) return "–";
     const apart = high - low;
@@ -317,7 +317,7 @@ function between(low, high) {
     return a === b ? a : `${a} … ${b}`;
 }
 
-// Charts from pass to pass: lines of one value each.
+// Charts by pass, one value per pass.
 class PassCharts {
     constructor(payload) {
         const { intervals, scallops, side } = payload;
@@ -325,7 +325,7 @@ class PassCharts {
         const charts = [];
         if (scallops) {
             charts.push({
-                title: "Scallop height between a pass and the next, mm",
+                title: "Scallop height between adjacent passes, mm",
                 unit: "mm",
                 passes: scallops.gaps,
                 rows: [["largest", "warm", columnOf(scallops.largest)], ["mean", "blue", columnOf(scallops.mean)]],
@@ -342,7 +342,7 @@ class PassCharts {
                 band: true,
             },
         );
-        // One point is no chart.
+        // A chart needs at least two points.
         this.cards = charts
             .filter(({ passes }) => passes.length > 1)
             .map((chart) => ({ ...chart, ...card(byId("pass-charts"), chart.title) }));
@@ -364,7 +364,7 @@ class PassCharts {
             options: {
                 scales: {
                     x: { time: false },
-                    // Where no ball reaches, a height would flatten all others.
+                    // Heights in regions that the ball cannot reach are clipped; they would flatten the others.
                     y: { range: (_, low, high) => airy(low, each.limit ? Math.min(Math.max(high, each.limit), 4 * each.limit) : high, true) },
                 },
                 series: [

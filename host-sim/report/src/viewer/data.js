@@ -1,4 +1,4 @@
-// The numbers that the page carries: 16-bit steps of a range, as base64, the lower byte first.
+// Decodes the numbers of the page: 16-bit steps of a range, in base64, little-endian.
 
 const NONE = 65535;
 
@@ -11,14 +11,14 @@ function wordsOf(text) {
     return words;
 }
 
-// Values of a scale; NaN where there is none.
+// Values of a scale; NaN for missing ones.
 function valuesOf(low, step, text) {
     return Float64Array.from(wordsOf(text), (word) => (word === NONE ? NaN : low + step * word));
 }
 
 const columnOf = (column) => valuesOf(column.low, column.step, column.data);
 
-// Least and largest of the numbers among some values.
+// Minimum and maximum of the values that are not NaN.
 function extentOf(values) {
     let low = Infinity;
     let high = -Infinity;
@@ -29,7 +29,7 @@ function extentOf(values) {
     return low <= high ? [low, high] : [0, 0];
 }
 
-// Positions relative to the middle of the box, mm, ready for the graphics card.
+// Positions relative to the middle of the box, mm, as a vertex buffer.
 function placesOf(text, step, middle) {
     const words = wordsOf(text);
     const places = new Float32Array(words.length);
@@ -39,7 +39,7 @@ function placesOf(text, step, middle) {
     return places;
 }
 
-// The drawn passes: places of contact and centre, and the worst of the samples that each point stands for.
+// The drawn passes: positions of contact and centre, and the worst of the samples that each point represents.
 function trackOf(payload, middle) {
     const { track, box, period } = payload;
     let from = 0;
@@ -64,7 +64,7 @@ function trackOf(payload, middle) {
         cc: placesOf(track.cc, box.step, middle),
         cl: placesOf(track.cl, box.step, middle),
         period,
-        // The drawn pass that is under way at a tick, or else the one before.
+        // The drawn pass at a tick, or the previous one.
         passAt(tick) {
             let low = 0;
             let high = passes.length - 1;
@@ -75,7 +75,7 @@ function trackOf(payload, middle) {
             }
             return low;
         },
-        // Contact and centre at a tick, between the points of its pass.
+        // Contact and centre at a tick, interpolated between the points of its pass.
         at(tick) {
             const index = this.passAt(tick);
             const pass = passes[index];
@@ -93,7 +93,7 @@ function trackOf(payload, middle) {
     };
 }
 
-// Spans of time with the least and the largest value of each quantity in them.
+// Spans of time with the minimum and maximum of each quantity.
 function spansOf(json) {
     const decoded = new Map();
     return {
@@ -112,29 +112,29 @@ function spansOf(json) {
     };
 }
 
-// The series of the run, and what a chart shows of them between two ticks.
+// The series of the run, and the columns of a chart between two ticks.
 function seriesOf(json) {
     const whole = spansOf(json.whole);
     const details = json.details.map(spansOf);
     return {
         whole,
         details,
-        // The finest spans that hold these ticks.
+        // The finest spans that contain these ticks.
         source(from, to) {
             const fits = details.filter((spans) => spans.first <= from && to <= spans.end);
             return fits.reduce((best, spans) => (spans.ticks < best.ticks ? spans : best), whole);
         },
-        // Least and largest of quantities over columns between two ticks: times in ticks, and two rows a quantity.
+        // Minimum and maximum of quantities over columns between two ticks: times in ticks, and two rows per quantity.
         columns(names, from, to, most) {
             const spans = this.source(from, to);
             const first = Math.max(Math.floor((from - spans.first) / spans.ticks) - 1, 0);
             const last = Math.min(Math.ceil((to - spans.first) / spans.ticks) + 1, spans.count);
             const group = Math.max(Math.ceil((last - first) / most), 1);
-            // Columns keep their places while the window moves.
+            // Columns are aligned to multiples of the group, so that they do not change while the window moves.
             const begin = Math.floor(first / group) * group;
             const ends = [];
             for (let k = begin; k < last; k += group) ends.push([k, Math.min(k + group, spans.count)]);
-            // What is left over at the run's end goes with the column before: alone it would look like a fall.
+            // The remainder at the end of the run joins the last column; alone it would appear as a drop.
             const [start, stop] = ends.at(-1) ?? [0, 0];
             if (ends.length > 1 && stop - start < group) {
                 ends.pop();

@@ -1,4 +1,4 @@
-// Brings the page to life: reads the data, builds view and charts, follows size and theme.
+// Start of the page: reads the data, builds view and charts, follows size and theme.
 
 function start() {
     const payload = JSON.parse(byId("iso-data").textContent);
@@ -16,7 +16,7 @@ function start() {
     report.charts = [times, passes].filter((charts) => charts !== null);
     const build = () => report.charts.forEach((charts) => charts.build());
     build();
-    // Figures and charts stand before the graphics card is asked for anything.
+    // Figures and charts are ready before WebGL is initialised.
     requestAnimationFrame(() =>
         setTimeout(() => {
             if (hasPath) openView(payload, report);
@@ -27,10 +27,10 @@ function start() {
     );
 }
 
-// The view, or the picture and a word why where the browser cannot draw it.
+// The 3D view, or the picture and the reason if the browser cannot draw it.
 function openView(payload, report) {
     try {
-        // Asked for first: three.js would write errors of its own.
+        // Checked first: three.js would log errors.
         if (!document.createElement("canvas").getContext("webgl2")) throw new Error("no WebGL 2");
         report.view = new View(payload, byId("view"));
     } catch (error) {

@@ -1,28 +1,28 @@
-// What stands around the view: colours with their legend, switches, time, read-outs, triad and scale.
+// The controls around the view: colouring and legend, switches, time, read-outs, axis triad and scale bar.
 
-// What passes can be coloured by.
+// The colourings.
 function colouringsOf(payload, track) {
     const feed = payload.feed;
     const { cc_speed, cl_speed, cl_error, feed_error } = track.values;
     const held = extentOf(cc_speed);
-    // A feed that is held to the per mille would show nothing but rounding.
+    // The scale of a feed that is constant within 0.1 % would show only rounding.
     const isHeld = held[1] - held[0] < 0.002 * feed;
     const each = "each point: the worst of its samples";
     const colourings = [
         { id: "plain", name: "plain" },
         {
             id: "feed",
-            name: "feed of the contact (CC)",
+            name: "feed (CC)",
             unit: "mm/s",
             on: "lines",
             values: cc_speed,
             worse: (a, b) => Math.abs(a - feed) > Math.abs(b - feed),
             range: isHeld ? [0.95 * feed, 1.05 * feed] : roundRange(...held),
-            note: isHeld ? `held at ${shown(feed)} mm/s, within ${shown(Math.max(...held.map((x) => Math.abs(x / feed - 1))) * 100, 2)} %` : each,
+            note: isHeld ? `constant at ${shown(feed)} mm/s, within ${shown(Math.max(...held.map((x) => Math.abs(x / feed - 1))) * 100, 2)} %` : each,
         },
-        { id: "centre", name: "speed of the tool centre (CL)", unit: "mm/s", on: "lines", values: cl_speed, range: spread(cl_speed, feed), note: each },
-        { id: "error", name: "error of the tool centre (CL)", unit: "nm", on: "lines", values: cl_error, range: fromZero(cl_error), note: each },
-        { id: "feed-error", name: "error of the feed", unit: "%", on: "lines", values: feed_error, range: fromZero(feed_error), note: each },
+        { id: "centre", name: "speed of the cutter location (CL)", unit: "mm/s", on: "lines", values: cl_speed, range: spread(cl_speed, feed), note: each },
+        { id: "error", name: "CL error", unit: "nm", on: "lines", values: cl_error, range: fromZero(cl_error), note: each },
+        { id: "feed-error", name: "feed error", unit: "%", on: "lines", values: feed_error, range: fromZero(feed_error), note: each },
     ];
     const { scallops } = payload;
     if (scallops) {
@@ -44,7 +44,7 @@ function colouringsOf(payload, track) {
 
 const fromZero = (values) => [0, roundRange(0, extentOf(values)[1])[1] || 1];
 
-// The range of speeds, no narrower than some per cent of the feed.
+// The range of speeds, at least 1 % of the feed wide.
 function spread(values, feed) {
     const [low, high] = extentOf(values);
     return high - low < 0.01 * feed ? roundRange(low - 0.05 * feed, high + 0.05 * feed) : roundRange(low, high);
@@ -52,7 +52,7 @@ function spread(values, feed) {
 
 function legend({ name, unit, range, limit, largest, note }) {
     const low = range[0];
-    // Beyond the limit the scale goes on to what was found, in the colour of what is above.
+    // Beyond the limit the scale extends to the largest value, in the colour of exceeded limits.
     const isOver = limit !== undefined && largest > limit;
     const high = isOver ? Math.min(Math.max(roundRange(low, largest)[1], 1.1 * range[1]), 1.5 * range[1]) : range[1];
     const share = (range[1] - low) / (high - low);
@@ -68,13 +68,13 @@ function legend({ name, unit, range, limit, largest, note }) {
     byId("legend").replaceChildren(element("b", {}, `${title}, ${unit}`), bar, scale, element("small", {}, note));
 }
 
-// The legend of the plain view: what the lines are.
+// The legend of the lines in the plain view.
 function key() {
     const entry = (colour, text) => element("span", { class: "key" }, element("i", { class: colour }), text);
     byId("legend").replaceChildren(
         entry("blue", "passes, cutter contact (CC)"),
         entry("warm", "this pass"),
-        entry("violet", "tool centre (CL)"),
+        entry("violet", "cutter location (CL)"),
     );
 }
 
@@ -111,7 +111,7 @@ class Panel {
 
     switches() {
         const ball = byId("show-ball");
-        // A ball as large as the part would be the whole picture.
+        // A ball as large as the part would cover it.
         ball.checked = this.payload.radius < 0.4 * this.view.diagonal;
         const update = () =>
             this.view.show({
@@ -162,7 +162,7 @@ class Panel {
         slider.addEventListener("input", () => this.setTick(Number(slider.value)));
         const speed = byId("speed");
         const whole = (this.ticks[1] - this.ticks[0]) * track.period;
-        // Real time, and the whole run in half a minute or so.
+        // Speeds from real time to the whole run in about 30 s.
         const factors = [1, 5, 20, 100, 500].filter((factor) => factor === 1 || whole / factor > 5);
         speed.append(...factors.map((factor) => element("option", { value: factor }, `${factor}×`)));
         speed.value = factors.filter((factor) => factor === 1 || whole / factor > 60).pop();
@@ -196,7 +196,7 @@ class Panel {
         byId("play").setAttribute("aria-label", "Play");
     }
 
-    // Brings everything to a moment of the run.
+    // Sets the time of view, charts and read-outs.
     setTick(tick) {
         this.tick = Math.min(Math.max(tick, this.ticks[0]), this.ticks[1]);
         byId("time").value = this.tick;
@@ -226,7 +226,7 @@ class Panel {
         );
     }
 
-    // The point of a drawn pass near a pixel, the foremost of those.
+    // The foremost point of a drawn pass near a pixel.
     pointNear(x, y) {
         const { view } = this;
         const { cc, ticks } = view.track;
@@ -241,7 +241,7 @@ class Panel {
             const dy = ((1 - row(1)) / 2) * view.height - y;
             const away = dx * dx + dy * dy;
             if (away > reach * reach) continue;
-            // A pixel nearer is worth as much as the hundredth part of the box nearer to the viewer.
+            // Weighs the distance in pixels against the depth.
             const score = row(2) + 0.002 * Math.sqrt(away);
             if (!best || score < best.score) best = { score, point: k };
         }
@@ -285,11 +285,11 @@ class Panel {
         return (
             `pass ${pass.pass}, ${fixed(ticks[point] * period, 3)} s\n` +
             `feed ${shown(values.cc_speed[point], 5)} mm/s, off by ${shown(values.feed_error[point], 2)} %\n` +
-            `tool centre ${shown(values.cl_speed[point], 4)} mm/s, off by ${shown(values.cl_error[point], 3)} nm${count}`
+            `CL ${shown(values.cl_speed[point], 4)} mm/s, off by ${shown(values.cl_error[point], 3)} nm${count}`
         );
     }
 
-    // Triad, scale bar and names of the points, after the view was drawn.
+    // Updates axis triad, scale bar and labels after the view was drawn.
     furniture() {
         const { view } = this;
         const arm = 30;
@@ -302,7 +302,7 @@ class Panel {
                 const [x, y] = [arm * right, -arm * up];
                 const far = Math.hypot(x, y) < 6 ? 0 : 1 + 11 / Math.hypot(x, y);
                 const place = [x * far, y * far];
-                // Two names never stand on each other.
+                // Labels must not overlap.
                 const other = taken.find(([a, b]) => Math.hypot(place[0] - a, place[1] - b) < 13);
                 if (other) place[0] = other[0] + (place[0] < other[0] ? -11 : 11);
                 taken.push(place);
@@ -320,7 +320,7 @@ class Panel {
             const tag = byId(id);
             tag.hidden = !shows;
             if (!shows) continue;
-            // Each name beyond its end of the radius, so that the two never meet.
+            // Each label is outside of its end of the radius, so that the two do not overlap.
             const [x, y] = view.pixel(this.at[name]);
             const [otherX, otherY] = view.pixel(this.at[name === "cc" ? "cl" : "cc"]);
             const [dx, dy] = [x - otherX, y - otherY];

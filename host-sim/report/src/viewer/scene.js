@@ -1,10 +1,10 @@
 // The view: surface, passes, tool path and ball, drawn with three.js when something has changed.
 
-const LIFT = 0.0007; // of the box's diagonal: lines lie this much over the surface, so that it does not cut them
+const LIFT = 0.0007; // of the box's diagonal: offset of lines from the surface, against depth fighting
 const WIDTH = { pass: 1.2, centre: 1.2, one: 3.2 }; // pixels
 const DOT = 4.5; // pixels
-const SEGMENT = 8; // pixels: about the length of a line's pieces, so that zooming shows finer ones
-const LIGHT = [-0.5, 0.75, 1]; // to the light: right, up, towards the viewer
+const SEGMENT = 8; // pixels: approximate length of line segments; zooming refines them
+const LIGHT = [-0.5, 0.75, 1]; // direction to the light: right, up, towards the viewer
 
 class View {
     constructor(payload, canvas) {
@@ -35,7 +35,7 @@ class View {
         this.look(payload.toward);
     }
 
-    // The box around surface and tool path in steps times the step, from the box's lowest corner.
+    // Bounding box of surface and tool path, mm, from its lowest corner.
     static boxOf({ mesh, track, box }) {
         const low = [Infinity, Infinity, Infinity];
         const high = [-Infinity, -Infinity, -Infinity];
@@ -53,7 +53,7 @@ class View {
         this.ambient = new AmbientLight(0xffffff, 1);
         this.light = new DirectionalLight(0xffffff, 2);
         this.light.position.set(...LIGHT);
-        // The light goes with the viewer.
+        // The light moves with the camera.
         this.camera.add(this.light, this.light.target);
         this.light.target.position.set(0, 0, 0);
         this.scene.add(this.ambient, this.camera);
@@ -89,7 +89,7 @@ class View {
         this.scene.add(...this.faces);
     }
 
-    // Line segments between the points of passes; those of the contact lifted off the surface towards the centre.
+    // Line segments between the points of passes; those of the contact are offset from the surface towards the centre.
     segments(passes, places, times = 1) {
         const positions = [];
         const { cc, cl } = this.track;
@@ -104,7 +104,7 @@ class View {
         return positions.length ? new Float32Array(positions) : new Float32Array(6);
     }
 
-    // The pieces of passes, from point to point, as long as the zoom asks for.
+    // The line segments of the passes, with a length that depends on the zoom.
     eachPiece(passes, each) {
         for (const { begin, count } of passes) {
             const last = begin + count - 1;
@@ -114,7 +114,7 @@ class View {
         }
     }
 
-    // How many points a piece spans: a power of two.
+    // Points per line segment: a power of two.
     wantedStride() {
         if (this.step === undefined) {
             let [sum, count] = [0, 0];
@@ -131,7 +131,7 @@ class View {
         return pixels > 0 ? 2 ** Math.min(Math.max(Math.round(Math.log2(SEGMENT / pixels)), 0), 10) : 1;
     }
 
-    // Coarser or finer lines, when the zoom has changed enough.
+    // Rebuilds the line segments if the zoom requires another length.
     refine() {
         const stride = this.wantedStride();
         if (stride === this.stride) return;
@@ -189,7 +189,7 @@ class View {
         this.scene.add(this.tool);
     }
 
-    // Colours of the theme.
+    // Applies the colours of the theme.
     dress() {
         const set = (colour, name) => colour.setStyle(variable(name));
         this.surfaceColour = variable("surface");
@@ -207,7 +207,7 @@ class View {
         }
     }
 
-    // Colours lines by the values of points, or the surface by those of its points; null: plain.
+    // Colours lines or the surface by the values of their points; null: plain.
     // colouring: { on: "lines" | "surface", values, range, limit }
     paint(colouring) {
         this.colouring = colouring;
@@ -218,7 +218,7 @@ class View {
         else colours.array.fill(1);
         colours.needsUpdate = true;
         this.front.color.setStyle(onSurface ? "#ffffff" : this.surfaceColour);
-        // On a coloured surface the light only hints at the shape, so that colours are those of the scale.
+        // On a coloured surface the shading is weak, so that the colours match the scale.
         this.ambient.intensity = onSurface ? 2.3 : 1.15;
         this.light.intensity = onSurface ? 0.9 : 2.1;
         const onLines = colouring?.on === "lines";
@@ -238,13 +238,13 @@ class View {
         this.request();
     }
 
-    // Lines a few pixels apart would hide the surface: the denser, the fainter.
+    // Opacity of the lines: dense lines are fainter, so that they do not hide the surface.
     opacity() {
         const apart = (this.spacing ??= this.meanSpacing()) * this.pixels();
         return Math.min(Math.max(apart / 9, 0.16), 0.9);
     }
 
-    // Distance between the middles of neighbouring drawn passes, on average, mm.
+    // Mean distance between the middles of adjacent drawn passes, mm.
     meanSpacing() {
         const { passes, cc } = this.track;
         let sum = 0;
@@ -255,11 +255,11 @@ class View {
         return passes.length > 1 ? sum / (passes.length - 1) : this.diagonal;
     }
 
-    // As faint as the zoom asks for.
+    // Adapts width and opacity of the lines to the zoom.
     fade() {
         const material = this.passes.material;
         if (this.colouring?.on === "lines") {
-            // Side by side, so that the colours make a whole.
+            // Adjacent lines touch, so that the colours form a closed area.
             const apart = (this.spacing ??= this.meanSpacing()) * this.pixels();
             material.linewidth = Math.min(Math.max(1.3 * apart, WIDTH.pass), 3);
             return;
@@ -279,10 +279,10 @@ class View {
         }
     }
 
-    // Colours of the pieces: each end has that of the worst point up to it.
+    // Colours of the line segments: each end has the colour of the worst point up to it.
     lineColours({ values, range, limit, worse = (a, b) => a > b }) {
         const points = new Float32Array(3 * values.length);
-        // A point without a value, the first of a pass, looks like the next.
+        // A point without a value, such as the first of a pass, has the colour of the next.
         const filled = Float64Array.from(values);
         for (let k = filled.length - 2; k >= 0; k--) if (Number.isNaN(filled[k])) filled[k] = filled[k + 1];
         for (let k = 1; k < filled.length; k++) if (Number.isNaN(filled[k])) filled[k] = filled[k - 1];
@@ -309,7 +309,7 @@ class View {
         this.request();
     }
 
-    // The tool at a tick, and its pass set off from the others.
+    // The tool at a tick, and its pass highlighted.
     moveTo(tick) {
         this.tick = tick;
         const at = this.track.at(tick);
@@ -338,11 +338,11 @@ class View {
         return at;
     }
 
-    // Looks from a direction, everything in sight.
+    // Views from a direction, with the zoom fitted to the part.
     look(direction) {
         const { Vector3 } = this.L;
         const toward = new Vector3(...direction).normalize();
-        // Straight down, north is up: a hair off the axis settles which way round.
+        // For a view along z, a small tilt makes +y point up.
         if (Math.hypot(toward.x, toward.y) < 1e-6) toward.y = -1e-4;
         this.camera.position.copy(toward).multiplyScalar(4 * this.diagonal);
         this.camera.lookAt(0, 0, 0);
@@ -360,7 +360,7 @@ class View {
             }
         }
         this.fit = low.map((a, k) => (high[k] - a) / 2 || 1);
-        // The middle of what is seen.
+        // Centre of the visible range.
         const middle = new Vector3((low[0] + high[0]) / 2, (low[1] + high[1]) / 2, 0).applyQuaternion(this.camera.quaternion);
         this.controls.target.copy(middle);
         this.camera.position.add(middle);
@@ -368,13 +368,13 @@ class View {
         this.controls.update();
     }
 
-    // The canvas's size, when it has changed.
+    // Applies a changed size of the canvas.
     resize(isNew = false) {
         const { clientWidth: width, clientHeight: height } = this.canvas.parentElement;
         if (!width || !height || (!isNew && this.width === width && this.height === height)) return;
         [this.width, this.height] = [width, height];
         this.renderer.setSize(width, height, false);
-        // A margin for what stands at the edges: triad, scale, legend.
+        // A margin for triad, scale bar and legend at the edges.
         const margin = Math.min(70, 0.08 * Math.min(width, height) + 6);
         this.scale = Math.min((width / 2 - margin) / this.fit[0], (height / 2 - margin) / this.fit[1]);
         Object.assign(this.camera, {
@@ -388,7 +388,7 @@ class View {
         this.request();
     }
 
-    // Turns about the vertical and the view's horizontal, rad.
+    // Rotates about the vertical and the horizontal axis of the view, rad.
     turn(about, over) {
         const { Vector3 } = this.L;
         const offset = this.camera.position.clone().sub(this.controls.target);
@@ -409,12 +409,12 @@ class View {
         this.request();
     }
 
-    // Pixels a millimetre.
+    // Pixels per mm.
     pixels() {
         return this.scale * this.camera.zoom;
     }
 
-    // A place of the scene in pixels of the canvas.
+    // Position of a point of the scene in pixels of the canvas.
     pixel(place) {
         const point = new this.L.Vector3(...place).project(this.camera);
         return [((point.x + 1) / 2) * this.width, ((1 - point.y) / 2) * this.height];
@@ -446,7 +446,7 @@ class View {
     }
 }
 
-// The colour of a value on a scale, as the renderer mixes it.
+// The colour of a value on a scale, interpolated as by the renderer.
 function linear(colour, value, [low, high], limit) {
     const isOver = limit !== undefined && value > limit;
     const [r, g, b] = isOver ? OVER : colourAt(high > low ? (value - low) / (high - low) : 0.5);

@@ -1,6 +1,6 @@
-// Numbers, ticks of scales, and colours: what view and charts share.
+// Shared by view and charts: number formats, ticks of scales, colours.
 
-// A number for people: so many significant digits, whole thousands apart.
+// A number with the given significant digits, integer part in groups of three digits.
 function shown(value, digits = 4) {
     if (!Number.isFinite(value)) return "–";
     const size = Math.abs(value);
@@ -12,7 +12,7 @@ function shown(value, digits = 4) {
     return fixed(value, decimals);
 }
 
-// A number with so many decimals.
+// A number with the given number of decimals.
 function fixed(value, decimals) {
     const [whole, rest] = Math.abs(value).toFixed(decimals).split(".");
     const grouped = whole.replace(/\B(?=(\d{3})+$)/g, "\u202f");
@@ -29,7 +29,7 @@ function roundAbove(value) {
     return [1, 2, 5, 10].map((k) => k * power).find((round) => round >= value * (1 - 1e-9));
 }
 
-// Round values within a range, some `count` of them, with as many decimals as tell them apart.
+// About `count` round values within a range, with enough decimals to distinguish them.
 function ticksIn(low, high, count) {
     const step = roundAbove((high - low) / count);
     const decimals = Math.max(-Math.floor(Math.log10(step) + 1e-9), 0);
@@ -46,16 +46,16 @@ function roundRange(low, high) {
     return [Math.floor(low / step + 1e-9) * step, Math.ceil(high / step - 1e-9) * step];
 }
 
-// The colour map viridis (S. van der Walt, N. Smith; CC0), at equal distances: even to the eye, and to eyes that tell
-// red from green badly.
+// The colour map viridis (S. van der Walt, N. Smith; CC0) at equal distances: perceptually uniform, also with red-green
+// colour blindness.
 const VIRIDIS = [
     [68, 1, 84], [72, 40, 120], [62, 73, 137], [49, 104, 142], [38, 130, 142],
     [31, 158, 137], [53, 183, 121], [110, 206, 88], [181, 222, 43], [253, 231, 37],
 ];
-// Of what is above its limit: found nowhere in the map.
+// Colour of exceeded limits; not in the map.
 const OVER = [230, 0, 90];
 
-// The colour at a share of the map; no number has none.
+// The colour at a share of the map, 0 to 1; for NaN, none.
 function colourAt(share) {
     const place = Math.min(Math.max(share, 0), 1) * (VIRIDIS.length - 1);
     const index = Math.min(Math.floor(place), VIRIDIS.length - 2);

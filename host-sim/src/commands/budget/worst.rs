@@ -1,4 +1,4 @@
-//! `budget --search`: the worst tick that can be found, and the job that causes it.
+//! `budget --search`: searches the worst-case tick and the job that causes it.
 
 use std::path::Path;
 
@@ -14,17 +14,17 @@ use cycles::lab::{Lab, Worst};
 use cycles::measure::Bench;
 use cycles::search::{Campaign, search, text};
 
-/// Share of the period that a tick takes.
+/// Duration of a tick, percent of the period.
 fn share_pct(cycles: u32) -> f64 {
     100.0 * f64::from(cycles) / f64::from(PERIOD_CYCLES)
 }
 
-/// What the worst tick took, as text.
+/// The worst-case tick as text.
 pub(super) fn describe(worst: &Worst) -> String {
     let total = |model| whole(&worst.record, model);
     let (nominal, pessimistic) = (total(Model::Nominal), total(Model::Pessimistic));
     let mut text = format!(
-        "worst tick: {pessimistic} cycles pessimistic ({:.2} % of the period), {nominal} nominal; tick {} of the run\n  in it: {}\n",
+        "worst-case tick: {pessimistic} cycles pessimistic ({:.2} % of the period), {nominal} nominal; tick {} of the run\n  events: {}\n",
         share_pct(pessimistic),
         worst.tick,
         worst.events.join(", ")
@@ -41,7 +41,7 @@ pub(super) fn describe(worst: &Worst) -> String {
     text
 }
 
-/// The worst tick as JSON.
+/// The worst-case tick as JSON.
 fn json(worst: &Worst) -> Value {
     let stages = Stage::ALL.map(|stage| {
         let cycles = worst.record.stages[stage as usize];
@@ -65,7 +65,7 @@ fn json(worst: &Worst) -> Value {
 fn print(campaign: &Campaign, lab: &Lab, seed: u64, out: &Path) {
     let faults: Vec<&str> = campaign.faults.iter().copied().collect();
     say!(
-        "seed {seed}: {} jobs ran, {} faulted at once, {} were refused, {} samples, stack {} bytes; faults met: {}",
+        "seed {seed}: {} jobs ran, {} faulted at the first tick, {} were refused, {} samples, stack {} bytes; faults: {}",
         campaign.ran,
         campaign.skipped,
         campaign.refused,
@@ -80,11 +80,11 @@ fn print(campaign: &Campaign, lab: &Lab, seed: u64, out: &Path) {
     if let Some(found) = campaign.elite.first() {
         say_part!("{}", describe(&found.worst));
         say!("  job: {}", out.display());
-        say!("  again: cargo sim budget {}", out.display());
+        say!("  repeat: cargo sim budget {}", out.display());
     }
 }
 
-/// Searches, prints the worst tick, and writes the job that causes it.
+/// Searches, prints the worst-case tick, and writes the job that causes it.
 pub(super) fn command(bench: &Bench, jobs: u32, arguments: &Arguments) -> Result<()> {
     let Arguments {
         seed,

@@ -1,4 +1,4 @@
-# `cargo sim` is an alias, so cargo's completion is asked about it. Behind it, this one answers as well.
+# `cargo sim` is a cargo alias, so fish calls cargo's completion for it. This completion is added to it.
 function __isofeed_is_sim
     set -l words (commandline -opc)
     string match -q -- '+*' "$words[2]"; and set -e words[2]

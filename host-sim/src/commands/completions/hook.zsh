@@ -1,4 +1,4 @@
-# `cargo sim` is an alias, so cargo's completion is asked about it. This one goes in front of it.
+# `cargo sim` is a cargo alias, so zsh calls cargo's completion for it. This function wraps that completion.
 _isofeed_cargo() {
     local at=2
     [[ ${words[2]} == +* ]] && at=3
