@@ -7,14 +7,14 @@ mod board_steps;
 
 use controller::{
     in_process::Board,
-    machine::{Command, Event, Events},
+    machine::{Event, Events, Instruction},
     realtime::{RealTime, TickInput},
     safety::Order,
 };
 use integration_tests::{HELLO, Host, MAKE_READY, dome, upload};
 use interp_core::{
     fault::{Fault, FaultKind},
-    interpolator::{self, Interpolator},
+    interpolator::Interpolator,
     sample::{Sample, State},
 };
 use protocol::{
@@ -33,12 +33,12 @@ fn samples_of_dome(missed_after: Option<usize>) -> Vec<Sample> {
     core.load_words(0, &words).unwrap();
     core.load_check(0).unwrap();
     core.load_finish().unwrap();
-    let mut samples = vec![*core.tick(interpolator::Request::Start)];
+    let mut samples = vec![*core.tick(interp_core::Command::Start)];
     while matches!(core.state(), State::Running | State::Stopping) {
         if missed_after == Some(samples.len()) {
             core.trip(Fault::new(FaultKind::DeadlineMissed, 1.0));
         }
-        samples.push(*core.tick(interpolator::Request::None));
+        samples.push(*core.tick(None));
     }
     samples.pop();
     samples
@@ -358,9 +358,9 @@ fn half_in_lockstep() -> RealTime<[i32; WORDS]> {
     half.order(Order::Drives { on: true }).unwrap();
     half.order(Order::SetHome { home_nm: [0; 3] }).unwrap();
     for command in [
-        Command::Report(Report::Samples),
-        Command::Clock(Clock::Lockstep),
-        Command::Request(interpolator::Request::Start),
+        Instruction::Report(Report::Samples),
+        Instruction::Clock(Clock::Lockstep),
+        Instruction::Command(interp_core::Command::Start),
     ] {
         half.obey(command, &mut Way::default());
     }
@@ -381,28 +381,28 @@ fn in_lockstep_commands_and_halts_come_on_top_of_no_period() {
         half.tick(TickInput::default(), &mut way);
         way.events
     };
-    assert_eq!(obey(&mut half, Command::Run { ticks: 2 }), []);
+    assert_eq!(obey(&mut half, Instruction::Run { ticks: 2 }), []);
     assert_eq!(tick(&mut half), [Event::Sample(reference()[0])]);
-    assert_eq!(obey(&mut half, Command::Report(Report::Samples)), []);
+    assert_eq!(obey(&mut half, Instruction::Report(Report::Samples)), []);
     assert_eq!(tick(&mut half), [Event::Sample(reference()[1])]);
     assert!(matches!(tick(&mut half)[..], [Event::Halted(status)] if status.credit == 0));
     assert_eq!(tick(&mut half), []);
     // A halt that is due is told before more credit is used, and before the clock is another.
-    assert_eq!(obey(&mut half, Command::Run { ticks: 1 }), []);
+    assert_eq!(obey(&mut half, Instruction::Run { ticks: 1 }), []);
     assert_eq!(tick(&mut half), [Event::Sample(reference()[2])]);
-    assert_eq!(obey(&mut half, Command::Run { ticks: 1 }), []);
+    assert_eq!(obey(&mut half, Instruction::Run { ticks: 1 }), []);
     assert!(matches!(tick(&mut half)[..], [Event::Halted(status)] if status.credit == 1));
     assert_eq!(tick(&mut half), [Event::Sample(reference()[3])]);
-    let told = obey(&mut half, Command::Clock(Clock::Free));
+    let told = obey(&mut half, Instruction::Clock(Clock::Free));
     assert!(matches!(told[..], [Event::Halted(_), Event::Sample(sample)] if sample == reference()[4]));
 }
 
 #[test]
 fn a_full_output_stops_time_in_lockstep_only() {
     let mut half = half_in_lockstep();
-    let start = Command::Request(interpolator::Request::Start);
+    let start = Instruction::Command(interp_core::Command::Start);
     let mut way = Way::default();
-    half.obey(Command::Run { ticks: 10 }, &mut way);
+    half.obey(Instruction::Run { ticks: 10 }, &mut way);
     let mut tick = |half: &mut RealTime<[i32; WORDS]>, full| {
         way.full = full;
         half.tick(TickInput::default(), &mut way);
@@ -417,13 +417,13 @@ fn a_full_output_stops_time_in_lockstep_only() {
     assert_eq!((half.status().credit, half.status().samples_lost), (8, 0));
 
     half.obey(
-        Command::Request(interpolator::Request::Abort),
+        Instruction::Command(interp_core::Command::Abort),
         &mut Way::default(),
     );
     while half.status().state.is_under_way() {
         half.tick(TickInput::default(), &mut Way::default());
     }
-    half.obey(Command::Clock(Clock::Free), &mut Way::default());
+    half.obey(Instruction::Clock(Clock::Free), &mut Way::default());
     half.obey(start, &mut Way::default());
     let mut way = Way {
         full: true,

@@ -2,7 +2,7 @@
 #![allow(clippy::unwrap_used, reason = "a test may fail by panic")]
 
 use interp_core::interpolator::STOP_PERIODS;
-use interp_core::{Fault, FaultKind, Interpolator, Place, Request, Sample, State};
+use interp_core::{Command, Fault, FaultKind, Interpolator, Place, Sample, State};
 use job::{Along, Job, Pattern, Side, Spacing, SurfaceSpec};
 use machine::prepare::{Prepared, prepare};
 
@@ -51,10 +51,10 @@ fn load(prepared: &Prepared) -> Box<Interpolator> {
 fn run(prepared: &Prepared) -> (Option<Sample>, Box<Interpolator>) {
     let mut core = load(prepared);
     let mut last = None;
-    let mut sample = *core.tick(Request::Start);
+    let mut sample = *core.tick(Command::Start);
     while sample.state == State::Running {
         last = Some(sample);
-        sample = *core.tick(Request::None);
+        sample = *core.tick(None);
     }
     (last, core)
 }
@@ -82,16 +82,16 @@ fn ball_in_a_valley_that_is_too_tight() {
 
     // The position is kept, and said again at every tick; an abort acknowledges, a start begins anew.
     for _ in 0..3 {
-        let after = core.tick(Request::Resume);
+        let after = core.tick(Command::Resume);
         assert_eq!(
             (after.state, after.cl_nm, after.path),
             (State::Faulted, last.cl_nm, last.path)
         );
     }
-    assert_eq!(core.tick(Request::Start).state, State::Faulted);
-    assert_eq!(core.tick(Request::Abort).state, State::Ready);
+    assert_eq!(core.tick(Command::Start).state, State::Faulted);
+    assert_eq!(core.tick(Command::Abort).state, State::Ready);
     assert_eq!(core.fault(), None);
-    assert_eq!(core.tick(Request::Start).tick, 0);
+    assert_eq!(core.tick(Command::Start).tick, 0);
 }
 
 /// The same valley across the passes: the other principal direction.
@@ -212,15 +212,15 @@ fn too_many_patches() {
     assert_eq!(fault.kind, FaultKind::TooManyPatches);
     assert_eq!(fault.value, large.words.len() as f32);
     // The job that was there still is.
-    assert_eq!(core.tick(Request::Start).state, State::Running);
+    assert_eq!(core.tick(Command::Start).state, State::Running);
 }
 
 #[test]
 fn loading_while_a_job_runs() {
     let prepared = prepare(&job(patch(&[(0, 1, 0, 20.0), (1, 0, 1, 20.0)]), 1.0)).unwrap();
     let mut core = load(&prepared);
-    core.tick(Request::Start);
-    let before = *core.tick(Request::Hold);
+    core.tick(Command::Start);
+    let before = *core.tick(Command::Hold);
     assert_eq!(before.state, State::Held);
     let fault = core
         .load_begin(&prepared.header, prepared.words.len() as u32)
@@ -228,7 +228,7 @@ fn loading_while_a_job_runs() {
     assert_eq!(fault.kind, FaultKind::WrongState);
     assert_eq!(core.load_words(0, &[0]).unwrap_err().kind, FaultKind::WrongState);
     assert_eq!(core.unload().unwrap_err().kind, FaultKind::WrongState);
-    assert_eq!(core.tick(Request::Resume).tick, before.tick + 1);
+    assert_eq!(core.tick(Command::Resume).tick, before.tick + 1);
 }
 
 /// Hold and resume at every tick of a job give the same samples as the job without.
@@ -239,19 +239,19 @@ fn hold_and_resume_change_nothing() {
     let prepared = prepare(&job).unwrap();
     let mut plain = load(&prepared);
     let mut held = load(&prepared);
-    let mut expected = *plain.tick(Request::Start);
-    let mut sample = *held.tick(Request::Start);
+    let mut expected = *plain.tick(Command::Start);
+    let mut sample = *held.tick(Command::Start);
     while expected.state == State::Running {
         assert_eq!(sample, expected);
         for _ in 0..3 {
-            let standing = held.tick(Request::Hold);
+            let standing = held.tick(Command::Hold);
             assert_eq!(
                 (standing.state, standing.cl_nm, standing.tick),
                 (State::Held, sample.cl_nm, sample.tick)
             );
         }
-        sample = *held.tick(Request::Resume);
-        expected = *plain.tick(Request::None);
+        sample = *held.tick(Command::Resume);
+        expected = *plain.tick(None);
     }
     assert_eq!(sample, expected);
 }
@@ -285,19 +285,19 @@ const OVER_BUDGET: Fault = Fault::new(FaultKind::TickOverBudget, 20_000.0);
 
 /// Runs to a sample that fulfils this.
 fn run_until(core: &mut Interpolator, reached: impl Fn(&Sample) -> bool) -> Sample {
-    let mut sample = *core.tick(Request::Start);
+    let mut sample = *core.tick(Command::Start);
     while !reached(&sample) {
         assert_eq!(sample.state, State::Running);
-        sample = *core.tick(Request::None);
+        sample = *core.tick(None);
     }
     sample
 }
 
 /// The samples of a stop, and the first that stands.
-fn stop(core: &mut Interpolator, request: Request) -> (Vec<Sample>, Sample) {
+fn stop(core: &mut Interpolator, command: Option<Command>) -> (Vec<Sample>, Sample) {
     let mut samples = Vec::new();
     loop {
-        let sample = *core.tick(request);
+        let sample = *core.tick(command);
         if sample.state != State::Stopping {
             return (samples, sample);
         }
@@ -326,7 +326,7 @@ fn a_fault_from_outside_stops_along_the_path() {
             core.trip(MISSED);
             assert_eq!((core.state(), core.fault()), (State::Stopping, Some(MISSED)));
             // Nobody can hold it up or make it go on.
-            let (samples, standing) = stop(&mut core, Request::Hold);
+            let (samples, standing) = stop(&mut core, Some(Command::Hold));
             assert_eq!(samples.len(), usize::from(STOP_PERIODS) - 1);
 
             let mut last = before;
@@ -370,7 +370,7 @@ fn a_fault_from_outside_stops_along_the_path() {
                 }
             );
             assert_eq!(core.place(), (last.pass, last.path, last.side));
-            assert_eq!(*core.tick(Request::Resume), standing);
+            assert_eq!(*core.tick(Command::Resume), standing);
         }
     }
 }
@@ -387,7 +387,7 @@ fn a_fault_from_outside_stops_at_the_end_of_the_pass() {
             sample.pass == 1 && length_mm - trough_arc_mm(u(sample)) < left_mm
         });
         core.trip(MISSED);
-        let (samples, standing) = stop(&mut core, Request::None);
+        let (samples, standing) = stop(&mut core, None);
         let last = *samples.last().unwrap();
         assert!(samples.len() < usize::from(STOP_PERIODS), "{left_mm}");
         assert_eq!((last.pass, last.side, u(&last)), (1, before.side, 1.0));
@@ -411,7 +411,7 @@ fn a_fault_from_outside_stops_at_the_end_of_the_pass() {
         sample.path.span == 1 && sample.path.fraction == u64::MAX
     });
     core.trip(MISSED);
-    let (samples, standing) = stop(&mut core, Request::None);
+    let (samples, standing) = stop(&mut core, None);
     assert_eq!(
         (samples, standing),
         (
@@ -436,14 +436,14 @@ fn a_fault_from_outside_in_every_state() {
     let mut core = load(&prepared);
     core.trip(MISSED);
     assert_eq!((core.state(), core.fault()), (State::Ready, None));
-    let first = *core.tick(Request::Start);
-    core.tick(Request::Hold);
-    let held = *core.tick(Request::None);
+    let first = *core.tick(Command::Start);
+    core.tick(Command::Hold);
+    let held = *core.tick(None);
     assert_eq!(held.state, State::Held);
     core.trip(MISSED);
     assert_eq!((core.state(), core.fault()), (State::Faulted, Some(MISSED)));
     assert_eq!(
-        *core.tick(Request::Resume),
+        *core.tick(Command::Resume),
         Sample {
             state: State::Faulted,
             ..held
@@ -451,14 +451,14 @@ fn a_fault_from_outside_in_every_state() {
     );
     core.trip(OVER_BUDGET);
     assert_eq!((core.state(), core.fault()), (State::Faulted, Some(MISSED)));
-    assert_eq!(core.tick(Request::Abort).state, State::Ready);
+    assert_eq!(core.tick(Command::Abort).state, State::Ready);
     assert_eq!(core.fault(), None);
 
     // A run after it is a whole one, and a second fault of a stop neither begins it anew nor replaces the first.
-    assert_eq!(*core.tick(Request::Start), first);
+    assert_eq!(*core.tick(Command::Start), first);
     core.trip(MISSED);
     let mut stopping = 0;
-    while core.tick(Request::Abort).state == State::Stopping {
+    while core.tick(Command::Abort).state == State::Stopping {
         core.trip(OVER_BUDGET);
         stopping += 1;
     }
@@ -466,12 +466,12 @@ fn a_fault_from_outside_in_every_state() {
         (stopping, core.state(), core.fault()),
         (31, State::Faulted, Some(MISSED))
     );
-    assert_eq!(core.tick(Request::Abort).state, State::Ready);
-    assert_eq!((core.fault(), *core.tick(Request::Start)), (None, first));
+    assert_eq!(core.tick(Command::Abort).state, State::Ready);
+    assert_eq!((core.fault(), *core.tick(Command::Start)), (None, first));
     let mut sample = first;
     while sample.state == State::Running {
         assert_eq!(sample.feed_mm_s, 10.0);
-        sample = *core.tick(Request::None);
+        sample = *core.tick(None);
     }
     assert_eq!(sample.state, State::Finished);
     core.trip(MISSED);
@@ -489,7 +489,7 @@ fn a_fault_from_outside_in_every_state() {
     let mut core = load(&prepared);
     run_until(&mut core, |sample| sample.tick + 5 == last.unwrap().tick);
     core.trip(MISSED);
-    let (samples, standing) = stop(&mut core, Request::None);
+    let (samples, standing) = stop(&mut core, None);
     assert!((1..10).contains(&samples.len()), "{}", samples.len());
     assert_eq!((standing.state, core.fault()), (State::Faulted, Some(MISSED)));
     assert_eq!(standing.cl_nm, samples.last().unwrap().cl_nm);

@@ -2,7 +2,7 @@
 #![allow(clippy::unwrap_used, reason = "a test may fail by panic")]
 
 use integration_tests::{dome, scaled_dome};
-use interp_core::{Axes, FaultKind, Header, Inputs, Interpolator, Pattern, Place, Request, Sample, State};
+use interp_core::{Axes, Command, FaultKind, Header, Inputs, Interpolator, Pattern, Place, Sample, State};
 use machine::prepare::prepare;
 use proptest::prelude::*;
 use std::sync::OnceLock;
@@ -104,11 +104,11 @@ fn height(header: &Header, words: &[i32]) -> (i32, u32) {
         words,
     );
     let (mut top, mut passes) = (i32::MIN, 0);
-    let mut sample = *core.tick(Request::Start);
+    let mut sample = *core.tick(Command::Start);
     while sample.state == State::Running {
         top = top.max(sample.cl_nm[2]);
         passes = sample.pass + 1;
-        sample = *core.tick(Request::None);
+        sample = *core.tick(None);
     }
     assert_eq!(sample.state, State::Finished);
     (top, passes)
@@ -141,7 +141,7 @@ fn sample_jobs_hold_the_limits() {
         let axes = header.axes.as_ref().unwrap();
         let mut core = machine(&header, &prepared.words);
         let mut used = Use::default();
-        let mut sample = *core.tick(Request::Start);
+        let mut sample = *core.tick(Command::Start);
         let mut last_pass = 0;
         while sample.state.is_under_way() {
             used.add(&sample, axes);
@@ -180,50 +180,44 @@ fn within_limits((mut header, words): (Header, Vec<i32>), pattern: Pattern) -> (
 fn scripted(
     header: &Header,
     words: &[i32],
-    commands: &[(u32, Request, u8)],
+    commands: &[(u32, Option<Command>, u8)],
 ) -> (Vec<Sample>, Box<Interpolator>) {
     let mut core = machine(header, words);
-    let mut samples = vec![*core.tick(Request::Start)];
+    let mut samples = vec![*core.tick(Command::Start)];
     let mut feed_override = 100;
-    for (wait, request, percent) in commands {
+    for (wait, command, percent) in commands {
         for _ in 0..*wait {
-            let request = Request::None;
             samples.push(*core.tick(Inputs {
-                request,
+                command: None,
                 feed_override,
             }));
         }
         feed_override = *percent;
-        let request = *request;
         samples.push(*core.tick(Inputs {
-            request,
+            command: *command,
             feed_override,
         }));
     }
     // Then on to the end.
-    samples.push(*core.tick(Request::Resume));
+    samples.push(*core.tick(Command::Resume));
     for _ in 0..100_000 {
         let state = core.state();
         if !state.is_under_way() {
             break;
         }
-        samples.push(*core.tick(if state == State::Held {
-            Request::Resume
-        } else {
-            Request::None
-        }));
+        samples.push(*core.tick((state == State::Held).then_some(Command::Resume)));
     }
     (samples, core)
 }
 
-fn command(wait_max: u32) -> impl Strategy<Value = (u32, Request, u8)> {
+fn command(wait_max: u32) -> impl Strategy<Value = (u32, Option<Command>, u8)> {
     let request = prop_oneof![
-        3 => Just(Request::None),
-        4 => Just(Request::Hold),
-        4 => Just(Request::Resume),
-        1 => Just(Request::Start),
-        1 => Just(Request::Stop),
-        1 => Just(Request::Abort),
+        3 => Just(None),
+        4 => Just(Some(Command::Hold)),
+        4 => Just(Some(Command::Resume)),
+        1 => Just(Some(Command::Start)),
+        1 => Just(Some(Command::Stop)),
+        1 => Just(Some(Command::Abort)),
     ];
     let wait = prop_oneof![0_u32..4, 0_u32..60, 0..wait_max];
     let percent = prop_oneof![Just(100_u8), Just(0), Just(200), 0_u8..=200];
@@ -232,7 +226,7 @@ fn command(wait_max: u32) -> impl Strategy<Value = (u32, Request, u8)> {
 
 /// Whatever is commanded, whenever: no limit is broken, the tool is on its path, what is held stands, and the passes lie where they lie in
 /// a run that nobody touches.
-fn check_commands(header: &Header, words: &[i32], whole: &[Place], commands: &[(u32, Request, u8)]) {
+fn check_commands(header: &Header, words: &[i32], whole: &[Place], commands: &[(u32, Option<Command>, u8)]) {
     let (samples, core) = scripted(header, words, commands);
     let axes = header.axes.as_ref().unwrap();
     let mut used = Use::default();
@@ -253,7 +247,7 @@ fn check_commands(header: &Header, words: &[i32], whole: &[Place], commands: &[(
         .filter(|sample| sample.path != Place::NONE)
         .step_by(97)
     {
-        let probe = core.probe(sample.path, sample.side).unwrap();
+        let probe = core.evaluate(sample.path, sample.side).unwrap();
         for (probe, sample) in probe.cl_nm.iter().zip(sample.cl_nm) {
             assert!((probe - sample).abs() <= 3, "{sample} for {probe}");
         }
@@ -290,7 +284,9 @@ fn undisturbed_once(small: bool, zigzag: bool) -> &'static Undisturbed {
 }
 
 /// Commands, and the job that they are for, one in eight of which is large. Pauses are some of its time.
-fn sequence(commands_max: usize) -> impl Strategy<Value = (&'static Undisturbed, Vec<(u32, Request, u8)>)> {
+fn sequence(
+    commands_max: usize,
+) -> impl Strategy<Value = (&'static Undisturbed, Vec<(u32, Option<Command>, u8)>)> {
     (prop_oneof![1 => Just(false), 7 => Just(true)], any::<bool>()).prop_flat_map(move |(small, zigzag)| {
         let pause_max = if small { 400 } else { 3000 };
         let commands = proptest::collection::vec(command(pause_max), 0..commands_max);
@@ -330,13 +326,13 @@ fn a_leg_resumed_before_its_end_keeps_the_jerk() {
     // A period more or less, and it is not that close to the end.
     for first in 740..840 {
         let commands = [
-            (first, Request::None, 200),
-            (37, Request::Resume, 100),
-            (46, Request::None, 0),
-            (150, Request::Resume, 100),
-            (24, Request::None, 0),
-            (1, Request::Resume, 100),
-            (8, Request::Hold, 100),
+            (first, None, 200),
+            (37, Some(Command::Resume), 100),
+            (46, None, 0),
+            (150, Some(Command::Resume), 100),
+            (24, None, 0),
+            (1, Some(Command::Resume), 100),
+            (8, Some(Command::Hold), 100),
         ];
         check_commands(header, words, whole, &commands);
     }
@@ -347,12 +343,12 @@ fn a_leg_resumed_before_its_end_keeps_the_jerk() {
 fn a_job_interrupted_and_resumed_takes_the_same_path() {
     for zigzag in [false, true] {
         let (header, words, whole) = undisturbed_once(false, zigzag);
-        let interruptions: Vec<(u32, Request, u8)> = (0..60)
+        let interruptions: Vec<(u32, Option<Command>, u8)> = (0..60)
             .flat_map(|turn| {
                 let percent = [100, 0, 200, 35][turn as usize % 4];
                 [
-                    (97 * (turn % 7), Request::Hold, percent),
-                    (turn, Request::Resume, 100),
+                    (97 * (turn % 7), Some(Command::Hold), percent),
+                    (turn, Some(Command::Resume), 100),
                 ]
             })
             .collect();
@@ -380,25 +376,25 @@ proptest! {
 fn hold_and_resume() {
     let (header, words, _) = undisturbed(dome_within_limits(Pattern::Zig));
     let mut core = machine(&header, &words);
-    core.tick(Request::Start);
+    core.tick(Command::Start);
     while core.state() != State::Running {
-        core.tick(Request::None);
+        core.tick(None);
     }
     for _ in 0..500 {
-        core.tick(Request::None);
+        core.tick(None);
     }
-    assert_eq!(core.tick(Request::Hold).state, State::Holding);
+    assert_eq!(core.tick(Command::Hold).state, State::Holding);
     let mut ticks = 0;
-    while core.tick(Request::None).state == State::Holding {
+    while core.tick(None).state == State::Holding {
         ticks += 1;
     }
     // v/a + a/J: 40 and 50 ms along x, and up to twice as long where the slope lets z decide.
     assert!((50..250).contains(&ticks), "{ticks}");
     let held = *core.last();
     for _ in 0..100 {
-        assert_eq!(core.tick(Request::None).cl_nm, held.cl_nm);
+        assert_eq!(core.tick(None).cl_nm, held.cl_nm);
     }
-    assert_eq!(core.tick(Request::Resume).state, State::Running);
+    assert_eq!(core.tick(Command::Resume).state, State::Running);
 }
 
 /// A stop leaves the surface, an abort stands on it; the next start begins anew from there.
@@ -406,18 +402,18 @@ fn hold_and_resume() {
 fn stop_and_abort() {
     let (header, words, _) = undisturbed(dome_within_limits(Pattern::Zigzag));
     let safe = header.axes.unwrap().safe_z_nm;
-    for (request, leaves) in [(Request::Stop, true), (Request::Abort, false)] {
+    for (request, leaves) in [(Command::Stop, true), (Command::Abort, false)] {
         let mut core = machine(&header, &words);
-        core.tick(Request::Start);
+        core.tick(Command::Start);
         for _ in 0..3000 {
-            core.tick(Request::None);
+            core.tick(None);
         }
         core.tick(request);
-        while core.tick(Request::None).state == State::Stopping {}
+        while core.tick(None).state == State::Stopping {}
         assert_eq!(core.state(), State::Ready);
         assert_eq!(core.last().cl_nm[2] == safe, leaves);
-        core.tick(Request::Start);
-        while core.tick(Request::None).state.is_under_way() {}
+        core.tick(Command::Start);
+        while core.tick(None).state.is_under_way() {}
         assert_eq!(core.state(), State::Finished);
     }
 }
@@ -429,10 +425,10 @@ fn soft_limits_stop_before_the_pass() {
     let axes = header.axes.as_mut().unwrap();
     axes.travel_nm[1][1] = 10_000_000;
     let mut core = machine(&header, &words);
-    let mut sample = *core.tick(Request::Start);
+    let mut sample = *core.tick(Command::Start);
     while sample.state.is_under_way() {
         assert!(sample.cl_nm[1] <= 10_000_000);
-        sample = *core.tick(Request::None);
+        sample = *core.tick(None);
     }
     assert_eq!(core.fault().unwrap().kind, FaultKind::SoftLimit);
 }
@@ -446,9 +442,9 @@ fn a_surface_that_faces_down_is_refused() {
         interp_core::ToolSide::Minus => interp_core::ToolSide::Plus,
     };
     let mut core = machine(&header, &words);
-    let mut sample = *core.tick(Request::Start);
+    let mut sample = *core.tick(Command::Start);
     while sample.state.is_under_way() {
-        sample = *core.tick(Request::None);
+        sample = *core.tick(None);
     }
     assert_eq!(core.fault().unwrap().kind, FaultKind::LinkBlocked);
     assert_eq!(sample.cl_nm, header.axes.unwrap().home_nm);

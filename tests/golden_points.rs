@@ -63,7 +63,7 @@ fn every_golden_point() {
         let machine = Machine::load(&prepared).unwrap();
         for point in &case.points {
             let (path, side) = places(&prepared, point.u, point.v);
-            let probe = machine.probe(path, side).unwrap();
+            let probe = machine.evaluate(path, side).unwrap();
             let distance = |nm: [i32; 3], mm: [f64; 3]| {
                 nm.iter()
                     .zip(mm)

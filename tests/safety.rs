@@ -13,7 +13,7 @@ use interp_core::{
     fault::{Fault, FaultKind},
     sample::State,
 };
-use machine::remote::operate::{Action, Operator, Setup, act, make_ready};
+use machine::remote::operate::{Operator, Setup, act, make_ready};
 use machine::remote::session::Event as Told;
 use machine::remote::{RemoteError, Session, drive};
 use protocol::message::{Clock, Configuration, HostGone, InputLines, Reason, Request, Status};
@@ -249,9 +249,9 @@ fn a_host_that_is_gone_finds_its_run_held_and_goes_on_exactly() {
     assert_eq!(desk.tick(1000).samples, gone.samples);
     // Another session, as after a restart of the host.
     desk.session = Session::open(wire(&desk.board), 2).unwrap();
-    assert!(act(&mut desk.session, Action::Status).unwrap().safety.host_gone);
+    assert!(act(&mut desk.session, &Request::Status).unwrap().safety.host_gone);
     assert_eq!(
-        act(&mut desk.session, Action::Resume).unwrap().state,
+        act(&mut desk.session, &Request::Resume).unwrap().state,
         State::Running
     );
     while desk.tick(10).state == State::Running {
@@ -290,17 +290,17 @@ fn without_homing_a_run_starts_unhomed() {
 #[test]
 fn an_operator_is_told_what_he_did() {
     let mut desk = Desk::ready();
-    let mut done = |action| act(&mut desk.session, action).unwrap();
-    assert_eq!(done(Action::Override(150)).safety.feed_override, 150);
-    assert_eq!(done(Action::Override(0)).safety.feed_override, 0);
-    let off = done(Action::Drives(false)).safety;
+    let mut done = |request: Request| act(&mut desk.session, &request).unwrap();
+    assert_eq!(done(Request::Override { percent: 150 }).safety.feed_override, 150);
+    assert_eq!(done(Request::Override { percent: 0 }).safety.feed_override, 0);
+    let off = done(Request::Drives { on: false }).safety;
     assert!(!off.drives_on && !off.homed);
-    assert!(done(Action::Drives(true)).safety.drives_on);
-    assert!(done(Action::Home([1, -2, 3])).safety.homed);
+    assert!(done(Request::Drives { on: true }).safety.drives_on);
+    assert!(done(Request::SetHome { home_nm: [1, -2, 3] }).safety.homed);
     assert_eq!(desk.board.lock().unwrap().real_time().home_nm(), Some([1, -2, 3]));
     desk.running();
-    assert_eq!(act(&mut desk.session, Action::Hold).unwrap().state, State::Held);
-    let off = act(&mut desk.session, Action::Drives(false));
+    assert_eq!(act(&mut desk.session, &Request::Hold).unwrap().state, State::Held);
+    let off = act(&mut desk.session, &Request::Drives { on: false });
     assert!(matches!(
         off,
         Err(RemoteError::Refused {
@@ -308,7 +308,10 @@ fn an_operator_is_told_what_he_did() {
             ..
         })
     ));
-    assert_eq!(act(&mut desk.session, Action::Stop).unwrap().state, State::Ready);
+    assert_eq!(
+        act(&mut desk.session, &Request::Stop).unwrap().state,
+        State::Ready
+    );
 }
 
 /// A host that waits for a long pass on the board's own clock says so often enough, and learns that the run is held.
@@ -335,14 +338,14 @@ fn a_host_that_waits_is_not_gone() {
 
 /// Wants one thing after the other, and remembers what came of it.
 struct Scripted {
-    wishes: std::vec::IntoIter<Action>,
+    wishes: std::vec::IntoIter<Request>,
     /// Waits for what comes of it.
     stays: bool,
     came: Vec<Result<State, String>>,
 }
 
 impl Operator for Scripted {
-    fn wish(&mut self) -> Option<Action> {
+    fn wish(&mut self) -> Option<Request> {
         self.wishes.next()
     }
 
@@ -350,7 +353,7 @@ impl Operator for Scripted {
         self.stays
     }
 
-    fn told(&mut self, _: Action, came: Result<Status, RemoteError>) {
+    fn told(&mut self, _: &Request, came: Result<Status, RemoteError>) {
         self.came
             .push(came.map(|status| status.state).map_err(|error| error.to_string()));
     }
@@ -358,7 +361,7 @@ impl Operator for Scripted {
 
 #[test]
 fn an_operator_commands_a_run_that_is_followed() {
-    let run = |wishes: Vec<Action>| {
+    let run = |wishes: Vec<Request>| {
         let mut desk = Desk::ready();
         let mut operator = Scripted {
             wishes: wishes.into_iter(),
@@ -371,10 +374,10 @@ fn an_operator_commands_a_run_that_is_followed() {
     };
     // Held, the run is waited for; a job without limits goes on with the next sample.
     let (compared, came) = run(vec![
-        Action::Hold,
-        Action::Status,
-        Action::Drives(false),
-        Action::Resume,
+        Request::Hold,
+        Request::Status,
+        Request::Drives { on: false },
+        Request::Resume,
     ]);
     let refusal = "the board refused to switch the drives off";
     assert!(
@@ -385,18 +388,18 @@ fn an_operator_commands_a_run_that_is_followed() {
     assert_eq!((status.state, compared.commanded), (State::Finished, true));
     assert_eq!((status.digest, status.samples), undisturbed());
 
-    let (compared, came) = run(vec![Action::Stop]);
+    let (compared, came) = run(vec![Request::Stop]);
     assert_eq!(came, [Ok(State::Ready)]);
     assert_eq!((compared.status.state, compared.commanded), (State::Ready, true));
     assert!(compared.status.samples < undisturbed().1);
     // Who only looks, commands nothing: the passes are compared, and there are too many.
-    let (compared, _) = run(vec![Action::Status]);
+    let (compared, _) = run(vec![Request::Status]);
     assert_eq!((compared.commanded, compared.first_bad_pass), (false, Some(0)));
 
     // Who holds the run and goes away leaves nobody to wait for.
     let mut desk = Desk::ready();
     let mut operator = Scripted {
-        wishes: vec![Action::Hold].into_iter(),
+        wishes: vec![Request::Hold].into_iter(),
         stays: false,
         came: Vec::new(),
     };

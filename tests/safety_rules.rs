@@ -1,12 +1,12 @@
 //! Any order of inputs, orders, requests and late ticks, against the rules in their simplest form.
 
 use controller::{
-    machine::{Command, Event},
+    machine::{Event, Instruction},
     realtime::{RealTime, TickInput},
     safety::{DEBOUNCE_TICKS, Order},
 };
 use integration_tests::dome;
-use interp_core::{fault::FaultKind, interpolator, sample::State};
+use interp_core::{fault::FaultKind, sample::State};
 use proptest::prelude::*;
 use protocol::message::{Clock, Configuration, FaultReport, HostGone, InputLines, Report, Status};
 
@@ -18,7 +18,7 @@ enum Deed {
     /// These inputs for so many ticks.
     Inputs(u16, u8),
     Order(Order),
-    Command(Command),
+    Command(Instruction),
     Heard,
     /// A tick after so many were missed, and so many cycles.
     Late(u32, u32),
@@ -27,7 +27,7 @@ enum Deed {
 const BUDGET: u32 = 16_800;
 
 fn any_deed() -> impl Strategy<Value = Deed> {
-    use interpolator::Request as Wish;
+    use interp_core::Command as Wish;
     let line = prop_oneof![
         4 => Just(0_u16),
         1 => (0_u16..11).prop_map(|bit| 1 << bit),
@@ -54,10 +54,10 @@ fn any_deed() -> impl Strategy<Value = Deed> {
         2 => Just(Deed::Order(Order::SetHome { home_nm: [1, 2, 3] })),
         2 => Just(Deed::Order(Order::Acknowledge)),
         1 => configuration.prop_map(|configuration| Deed::Order(Order::Configure(configuration))),
-        6 => prop::sample::select(wishes.to_vec()).prop_map(|wish| Deed::Command(Command::Request(wish))),
-        1 => prop::sample::select(&[Clock::Free, Clock::Lockstep][..]).prop_map(|clock| Deed::Command(Command::Clock(clock))),
-        1 => (0_u32..50).prop_map(|ticks| Deed::Command(Command::Run { ticks })),
-        1 => (0_u8..=200).prop_map(|percent| Deed::Command(Command::Override { percent })),
+        6 => prop::sample::select(wishes.to_vec()).prop_map(|wish| Deed::Command(Instruction::Command(wish))),
+        1 => prop::sample::select(&[Clock::Free, Clock::Lockstep][..]).prop_map(|clock| Deed::Command(Instruction::Clock(clock))),
+        1 => (0_u32..50).prop_map(|ticks| Deed::Command(Instruction::Run { ticks })),
+        1 => (0_u8..=200).prop_map(|percent| Deed::Command(Instruction::Override { percent })),
         1 => Just(Deed::Heard),
         1 => (0_u32..3, 0_u32..2 * BUDGET).prop_map(|(missed, cycles)| Deed::Late(missed, cycles)),
     ]
@@ -220,8 +220,8 @@ proptest! {
         if begun {
             bench.order(Order::Drives { on: true })?;
             bench.order(Order::SetHome { home_nm: [1, 2, 3] })?;
-            bench.half.obey(Command::Report(Report::Digests), &mut bench.events);
-            bench.half.obey(Command::Request(interpolator::Request::Start), &mut bench.events);
+            bench.half.obey(Instruction::Report(Report::Digests), &mut bench.events);
+            bench.half.obey(Instruction::Command(interp_core::Command::Start), &mut bench.events);
         }
         for deed in deeds {
             match deed {
@@ -235,7 +235,7 @@ proptest! {
                 Deed::Command(command) => {
                     // A clock is not changed under a run: the link sees to that.
                     let under_way = bench.half.status().state.is_under_way();
-                    if !(under_way && matches!(command, Command::Clock(_))) {
+                    if !(under_way && matches!(command, Instruction::Clock(_))) {
                         bench.half.obey(command, &mut bench.events);
                         bench.events.clear();
                     }

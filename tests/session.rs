@@ -4,9 +4,9 @@
 
 mod session_safety;
 
-use controller::{link::Link, machine::Command};
+use controller::{link::Link, machine::Instruction};
 use integration_tests::{Call, HELLO, Host, MAKE_READY, Mock, SAFE, frame, upload};
-use interp_core::{interpolator, job::Header, sample::State};
+use interp_core::{job::Header, sample::State};
 use protocol::{
     PROTOCOL_VERSION,
     digest::job_digest,
@@ -392,7 +392,7 @@ fn a_bad_record_is_named_and_the_upload_is_over() {
 
 #[test]
 fn commands_go_where_the_state_allows_them() {
-    use interpolator::Request as Wish;
+    use interp_core::Command as Wish;
     let table = [
         (Request::Start, Wish::Start, &[State::Ready, State::Finished][..]),
         (Request::Hold, Wish::Hold, &[State::Running, State::Linking]),
@@ -419,7 +419,7 @@ fn commands_go_where_the_state_allows_them() {
             let mut line = Line::open().in_state(state);
             if allowed.contains(&state) {
                 line.accepted(&request);
-                assert_eq!(line.mock.calls, [Call::Send(Command::Request(wish))]);
+                assert_eq!(line.mock.calls, [Call::Send(Instruction::Command(wish))]);
             } else {
                 assert_eq!(
                     line.refused(&request),
@@ -455,7 +455,7 @@ fn time_is_given_in_lockstep_only_and_the_clock_set_at_rest_only() {
     );
     line.accepted(&Request::Clock(Clock::Lockstep));
     line.accepted(&Request::Run { ticks: 5 });
-    let calls = [Command::Clock(Clock::Lockstep), Command::Run { ticks: 5 }].map(Call::Send);
+    let calls = [Instruction::Clock(Clock::Lockstep), Instruction::Run { ticks: 5 }].map(Call::Send);
     assert_eq!(line.mock.calls, calls);
     let mut line = line.in_state(State::Held);
     assert_eq!(

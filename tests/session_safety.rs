@@ -1,6 +1,6 @@
 //! Drives, home, inputs and override in a session.
 
-use controller::{machine::Command, safety::Order};
+use controller::{machine::Instruction, safety::Order};
 use integration_tests::{Call, SAFE};
 use interp_core::{
     fault::{Fault, FaultKind},
@@ -101,7 +101,7 @@ fn an_override_has_its_range_and_inputs_are_simulated_only_without_pins() {
             line.accepted(&Request::Override { percent });
             assert_eq!(
                 line.mock.calls.last(),
-                Some(&Call::Send(Command::Override { percent }))
+                Some(&Call::Send(Instruction::Override { percent }))
             );
         }
         for percent in [201, 255] {

@@ -12,12 +12,12 @@ use protocol::message::{Description, InputLines, Reason, Status};
 
 use crate::{
     link::Link,
-    machine::{Busy, Command, Event, Events, Machine, describe},
+    machine::{Busy, Event, Events, Instruction, Machine, describe},
     realtime::{RealTime, TickInput},
     safety::Order,
 };
 
-/// Commands that may wait for the next tick, as in the firmware.
+/// Instructions that may wait for the next tick, as in the firmware.
 pub const COMMANDS_MAX: usize = 4;
 
 /// Events without end, as the desk has room.
@@ -36,7 +36,7 @@ impl Events for Vec<Event> {
 #[derive(Debug, Default)]
 struct Half<const WORDS: usize> {
     real_time: RealTime<[i32; WORDS]>,
-    commands: VecDeque<Command>,
+    commands: VecDeque<Instruction>,
     lines: InputLines,
 }
 
@@ -73,11 +73,11 @@ impl<const WORDS: usize> Machine for Half<WORDS> {
         self.real_time.set_steps(checked)
     }
 
-    fn send(&mut self, command: Command) -> Result<(), Busy> {
+    fn send(&mut self, instruction: Instruction) -> Result<(), Busy> {
         if self.commands.len() >= COMMANDS_MAX {
             return Err(Busy);
         }
-        self.commands.push_back(command);
+        self.commands.push_back(instruction);
         Ok(())
     }
 
@@ -98,7 +98,7 @@ impl<const WORDS: usize> Machine for Half<WORDS> {
         true
     }
 
-    fn commands_wait(&mut self) -> bool {
+    fn instructions_wait(&mut self) -> bool {
         !self.commands.is_empty()
     }
 }

@@ -3,7 +3,7 @@
 //! ```text
 //!            idle, or a low-priority task          |        sample timer, one call a period
 //!                                                  |
-//!  bytes ──► Link ── Command ──────────────────────┼──queue──► RealTime ──► Interpolator::tick
+//!  bytes ──► Link ── Instruction ──────────────────┼──queue──► RealTime ──► Interpolator::tick
 //!             │ └──── load_.., status (lock) ──────┼─────────►    │
 //!  bytes ◄── Link ◄── Event ───────────────────────┼──queue───────┘
 //! ```

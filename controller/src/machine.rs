@@ -1,8 +1,8 @@
 //! What the link needs of the machine: the seam between the two halves of the board.
 
 use interp_core::{
+    command::Command,
     fault::Fault,
-    interpolator,
     job::{Header, SurfaceKind, patches_max},
     steps::CheckedSteps,
 };
@@ -14,9 +14,9 @@ use crate::safety::Order;
 
 /// What the link asks of the real-time half; taken up with the next tick of the sample timer, in order.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Command {
-    /// Start, hold, resume, stop or abort; goes to the interpolator with the next period that passes.
-    Request(interpolator::Request),
+pub enum Instruction {
+    /// The operator's command; goes to the interpolator with the next period that passes.
+    Command(Command),
     /// What drives time.
     Clock(Clock),
     /// Lockstep: so many more periods.
@@ -60,7 +60,7 @@ pub trait Events {
     fn put(&mut self, event: Event) -> bool;
 }
 
-/// No room in the queue of commands.
+/// No room in the queue of instructions.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Busy;
 
@@ -120,11 +120,11 @@ pub trait Machine {
     /// Refused while a run is under way.
     fn set_steps(&mut self, checked: &CheckedSteps) -> Result<(), Fault>;
 
-    /// Queues a command for the next tick of the sample timer.
+    /// Queues an instruction for the next tick of the sample timer.
     ///
     /// # Errors
     /// [`Busy`] where the queue is full.
-    fn send(&mut self, command: Command) -> Result<(), Busy>;
+    fn send(&mut self, instruction: Instruction) -> Result<(), Busy>;
 
     /// Does what the host asks of drives and home, at once.
     ///
@@ -147,7 +147,7 @@ pub trait Machine {
         false
     }
 
-    /// Whether commands sent before still wait in the queue: a start that waits there is not to meet another job than
+    /// Whether instructions sent before still wait in the queue: a start that waits there is not to meet another job than
     /// was loaded when it was sent.
-    fn commands_wait(&mut self) -> bool;
+    fn instructions_wait(&mut self) -> bool;
 }

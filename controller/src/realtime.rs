@@ -15,8 +15,9 @@ mod run;
 mod start;
 
 use interp_core::{
+    command::{Command, Inputs},
     fault::{Fault, FaultKind, Result},
-    interpolator::{Inputs, Interpolator, Request},
+    interpolator::Interpolator,
     job::{Header, STORE_WORDS},
     sample::{Sample, State},
     steps::{BUFFER_WORDS, CheckedSteps, Steps},
@@ -25,7 +26,7 @@ use protocol::message::{Clock, FaultReport, InputLines, Report, ResetCause, Stat
 
 use self::{control::Control, run::Run};
 use crate::{
-    machine::{Command, Event, Events},
+    machine::{Event, Events, Instruction},
     safety::Stop,
 };
 
@@ -158,11 +159,11 @@ impl<S: AsRef<[i32]> + AsMut<[i32]>> RealTime<S> {
         }
     }
 
-    /// Takes a command up, before the tick.
+    /// Executes an instruction, before the tick.
     #[cold]
     #[inline(never)]
-    pub fn obey(&mut self, command: Command, events: &mut impl Events) {
-        if !self.control.obey(command) {
+    pub fn obey(&mut self, instruction: Instruction, events: &mut impl Events) {
+        if !self.control.obey(instruction) {
             self.halt(events);
         }
     }
@@ -203,7 +204,7 @@ impl<S: AsRef<[i32]> + AsMut<[i32]>> RealTime<S> {
         if under_way && !self.interpolator.state().is_under_way() {
             self.control.safety.ending = true;
             // It meant the run that is over: an abort is not to acknowledge a fault that nobody has seen.
-            self.control.request = Request::None;
+            self.control.command = None;
         }
         if self.control.safety.ending {
             if self.control.clock == Clock::Free || events.has_room() {
@@ -213,9 +214,9 @@ impl<S: AsRef<[i32]> + AsMut<[i32]>> RealTime<S> {
             self.control.safety.look_again();
         }
         let state = self.interpolator.state();
-        let holds = self.control.request == Request::None && Request::Hold.is_allowed(state);
+        let holds = self.control.command.is_none() && Command::Hold.is_allowed(state);
         if self.control.safety.mind_silence(self.control.clock, state, holds) {
-            self.control.request = Request::Hold;
+            self.control.command = Some(Command::Hold);
         }
     }
 
@@ -239,13 +240,13 @@ impl<S: AsRef<[i32]> + AsMut<[i32]>> RealTime<S> {
     /// Lets one period pass.
     #[inline]
     fn step(&mut self, was_under_way: bool, events: &mut impl Events) {
-        let mut request = core::mem::take(&mut self.control.request);
-        let starts = request == Request::Start;
-        if starts && request.is_allowed(self.interpolator.state()) {
-            request = self.begin();
+        let mut command = self.control.command.take();
+        let starts = command == Some(Command::Start);
+        if starts && Command::Start.is_allowed(self.interpolator.state()) {
+            command = self.begin();
         }
         let inputs = Inputs {
-            request,
+            command,
             feed_override: self.control.safety.status().feed_override,
         };
         let state = self.interpolator.tick(inputs).state;
@@ -364,13 +365,13 @@ impl<S: AsRef<[i32]> + AsMut<[i32]>> RealTime<S> {
         self.interpolator.last()
     }
 
-    /// Begins to load a job; a request that waits for a period meant the job before, and is dropped.
+    /// Begins to load a job; a command that waits for a period meant the job before, and is dropped.
     ///
     /// # Errors
     /// Those of [`Interpolator::load_begin`]; nothing changes then.
     pub fn load_begin(&mut self, header: &Header, words: u32) -> Result<()> {
         self.interpolator.load_begin(header, words)?;
-        self.control.request = Request::None;
+        self.control.command = None;
         Ok(())
     }
 
@@ -402,7 +403,7 @@ impl<S: AsRef<[i32]> + AsMut<[i32]>> RealTime<S> {
     /// Those of [`Interpolator::load_finish`].
     pub fn load_finish(&mut self) -> Result<()> {
         self.interpolator.load_finish()?;
-        self.control.request = Request::None;
+        self.control.command = None;
         self.control.run = Run::NEW;
         self.control.from_home = true;
         Ok(())

@@ -2,8 +2,8 @@
 
 use heapless::Vec;
 use interp_core::{
+    command::Command,
     fault::{Fault, FaultKind},
-    interpolator,
     job::Header,
     steps::{StepConfig, StepConfigError},
 };
@@ -17,7 +17,7 @@ use protocol::{
 };
 
 use crate::{
-    machine::{Busy, Command, Machine},
+    machine::{Busy, Instruction, Machine},
     safety::Order,
     upload::Upload,
 };
@@ -87,7 +87,7 @@ pub(crate) struct Session {
     /// What the commands sent so far make of the clock; the status shows it a tick later.
     clock: Clock,
     /// A start, hold, resume, stop or abort was sent, and may still wait.
-    wished: bool,
+    commanded: bool,
     frames_bad: u32,
 }
 
@@ -98,7 +98,7 @@ impl Session {
             last: Last::new(),
             upload: None,
             clock: Clock::Free,
-            wished: false,
+            commanded: false,
             frames_bad: 0,
         }
     }
@@ -194,7 +194,6 @@ impl Session {
 
     /// Does what a request asks for.
     fn answer(&mut self, number: u16, request: Request, machine: &mut impl Machine) -> Reply {
-        use interpolator::Request as Wish;
         let done = match request {
             Request::Status => {
                 return Reply::Status {
@@ -212,11 +211,12 @@ impl Session {
                 None => Err(Reason::NoUpload),
             },
             Request::JobEnd => self.job_end(machine),
-            Request::Start => self.wish(machine, Wish::Start),
-            Request::Hold => self.wish(machine, Wish::Hold),
-            Request::Resume => self.wish(machine, Wish::Resume),
-            Request::Abort => self.wish(machine, Wish::Abort),
-            Request::Stop => self.wish(machine, Wish::Stop),
+            Request::Start | Request::Hold | Request::Resume | Request::Abort | Request::Stop => {
+                match request.command() {
+                    Some(command) => self.operate(machine, command),
+                    None => Err(Reason::Unreadable),
+                }
+            }
             Request::Override { percent } => set_override(machine, percent),
             Request::Configure(configuration) => machine.order(Order::Configure(configuration)),
             Request::Drives { on } => machine.order(Order::Drives { on }),
@@ -228,8 +228,8 @@ impl Session {
             Request::Run { .. } if self.clock != Clock::Lockstep => {
                 Err(Reason::WrongClock { clock: self.clock })
             }
-            Request::Run { ticks } => command(machine, Command::Run { ticks }),
-            Request::Report(report) => command(machine, Command::Report(report)),
+            Request::Run { ticks } => instruct(machine, Instruction::Run { ticks }),
+            Request::Report(report) => instruct(machine, Instruction::Report(report)),
             Request::StepConfig(settings) => set_steps(machine, settings.into()),
             // Answered before it comes here.
             Request::Hello { .. } => Err(Reason::Unreadable),
@@ -248,10 +248,10 @@ impl Session {
         words: u32,
         digest: u64,
     ) -> Result<(), Reason> {
-        if self.wished && machine.commands_wait() {
+        if self.commanded && machine.instructions_wait() {
             return Err(Reason::Busy);
         }
-        self.wished = false;
+        self.commanded = false;
         self.upload = Some(Upload::begin(machine, header, words, digest)?);
         Ok(())
     }
@@ -264,16 +264,16 @@ impl Session {
     }
 
     /// Queues what the state allows.
-    fn wish(&mut self, machine: &mut impl Machine, wish: interpolator::Request) -> Result<(), Reason> {
+    fn operate(&mut self, machine: &mut impl Machine, command: Command) -> Result<(), Reason> {
         let state = machine.status().state;
-        if !wish.is_allowed(state) {
+        if !command.is_allowed(state) {
             return Err(Reason::WrongState { state });
         }
-        if wish == interpolator::Request::Start {
+        if command == Command::Start {
             machine.may_start()?;
         }
-        command(machine, Command::Request(wish))?;
-        self.wished = true;
+        instruct(machine, Instruction::Command(command))?;
+        self.commanded = true;
         Ok(())
     }
 
@@ -283,7 +283,7 @@ impl Session {
         if state.is_under_way() {
             return Err(Reason::WrongState { state });
         }
-        command(machine, Command::Clock(clock))?;
+        instruct(machine, Instruction::Clock(clock))?;
         self.clock = clock;
         Ok(())
     }
@@ -296,7 +296,7 @@ fn set_override(machine: &mut impl Machine, percent: u8) -> Result<(), Reason> {
             wanted: percent.into(),
         });
     }
-    command(machine, Command::Override { percent })
+    instruct(machine, Instruction::Override { percent })
 }
 
 /// Checked here, where there is time; taken over between two ticks.
@@ -322,8 +322,8 @@ fn set_steps(machine: &mut impl Machine, config: StepConfig) -> Result<(), Reaso
         .map_err(|fault| refused(fault.value, None))
 }
 
-fn command(machine: &mut impl Machine, command: Command) -> Result<(), Reason> {
-    machine.send(command).map_err(|Busy| Reason::Busy)
+fn instruct(machine: &mut impl Machine, instruction: Instruction) -> Result<(), Reason> {
+    machine.send(instruction).map_err(|Busy| Reason::Busy)
 }
 
 /// Writes one reply as a frame. Every message fits into [`FRAME_MAX`]; a test of the protocol holds that.

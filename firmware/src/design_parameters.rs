@@ -6,7 +6,7 @@ use core::mem::size_of;
 
 use crate::guarded_machine::BoardRealTime;
 use controller::{
-    machine::{Command, Event, Events},
+    machine::{Event, Events, Instruction},
     step_output::{Buffers, slot_counts},
 };
 use interp_core::job::{STORE_WORDS, SurfaceKind, patches_max};
@@ -116,7 +116,8 @@ const _: () = {
 
     // Memory.
     let machine = size_of::<BoardRealTime>() + 4 * JOB_WORDS + size_of::<Buffers>();
-    let queues = RECEIVE_PLACES + COMMAND_PLACES * size_of::<Command>() + EVENT_PLACES * size_of::<Event>();
+    let queues =
+        RECEIVE_PLACES + COMMAND_PLACES * size_of::<Instruction>() + EVENT_PLACES * size_of::<Event>();
     assert!(
         machine + queues + STACK_BYTES <= RAM_BYTES,
         "no room is left for the stack"

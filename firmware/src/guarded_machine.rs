@@ -2,7 +2,7 @@
 //! time, and a queue.
 
 use controller::{
-    machine::{Busy, Command, Machine, describe},
+    machine::{Busy, Instruction, Machine, describe},
     realtime::RealTime,
     safety::Order,
 };
@@ -25,7 +25,7 @@ pub(crate) struct GuardedMachine<'a, M> {
     /// The real-time half.
     pub(crate) real_time: M,
     /// Commands to the next tick.
-    pub(crate) commands: &'a mut Producer<'static, Command>,
+    pub(crate) commands: &'a mut Producer<'static, Instruction>,
 }
 
 impl<M: Mutex<T = BoardRealTime>> Machine for GuardedMachine<'_, M> {
@@ -63,7 +63,7 @@ impl<M: Mutex<T = BoardRealTime>> Machine for GuardedMachine<'_, M> {
         self.real_time.lock(|real_time| real_time.set_steps(checked))
     }
 
-    fn send(&mut self, command: Command) -> Result<(), Busy> {
+    fn send(&mut self, command: Instruction) -> Result<(), Busy> {
         self.commands.enqueue(command).map_err(|_| Busy)
     }
 
@@ -83,7 +83,7 @@ impl<M: Mutex<T = BoardRealTime>> Machine for GuardedMachine<'_, M> {
         board::simulate(lines)
     }
 
-    fn commands_wait(&mut self) -> bool {
+    fn instructions_wait(&mut self) -> bool {
         !self.commands.is_empty()
     }
 }

@@ -31,7 +31,7 @@ mod app {
     use boards::{Line, Role};
     use controller::{
         link::Link,
-        machine::{Command, Event},
+        machine::{Event, Instruction},
         realtime::RealTime,
         step_output::Buffers,
     };
@@ -88,7 +88,7 @@ mod app {
         led: StatusLed<Output>,
         bytes_in: Producer<'static, u8>,
         bytes_out: Consumer<'static, u8>,
-        commands_in: Producer<'static, Command>,
+        commands_in: Producer<'static, Instruction>,
         events_out: Consumer<'static, Event>,
     }
 
@@ -100,7 +100,7 @@ mod app {
         slots: Buffers = [[0; BUFFER_WORDS]; 2],
         rest: u32 = 0,
         bytes: Queue<u8, RECEIVE_PLACES> = Queue::new(),
-        commands: Queue<Command, COMMAND_PLACES> = Queue::new(),
+        commands: Queue<Instruction, COMMAND_PLACES> = Queue::new(),
         events: Queue<Event, EVENT_PLACES> = Queue::new(),
     ])]
     fn init(context: init::Context) -> (Shared, Local) {

@@ -4,7 +4,7 @@
 use core::hint::black_box;
 
 use controller::{
-    machine::{Command, Event, Events},
+    machine::{Event, Events, Instruction},
     realtime::{RealTime, TickInput},
 };
 use heapless::spsc::{Consumer, Producer};
@@ -33,7 +33,7 @@ pub(crate) struct Guards<I, O, W> {
 pub(crate) struct SampleTask {
     timer: SampleTimer,
     counter: CycleCounter,
-    commands: Consumer<'static, Command>,
+    commands: Consumer<'static, Instruction>,
     events: EventQueue,
     /// Periods missed at the end of the last tick.
     missed: u32,
@@ -46,7 +46,7 @@ impl SampleTask {
     pub(crate) const fn new(
         timer: SampleTimer,
         counter: CycleCounter,
-        commands: Consumer<'static, Command>,
+        commands: Consumer<'static, Instruction>,
         events: Producer<'static, Event>,
     ) -> Self {
         Self {

@@ -1,99 +1,21 @@
 //! The machine: load, tick, hold, resume, abort.
 
-use crate::course::{Course, Outcome};
+use crate::command::{Command, Inputs};
 use crate::fault::{Fault, FaultKind, Result};
-use crate::interval::interval;
+use crate::job::program::Program;
 use crate::job::{Header, STORE_WORDS};
-use crate::lane::Line;
-use crate::patch::Patch;
-use crate::program::Program;
-use crate::run::Run;
-use crate::sample::{Place, Sample, State};
+use crate::pass::patch::Patch;
+use crate::pass::position::Line;
+use crate::pass::run::Run;
+use crate::sample::{Place, Sample, State, interval_of};
+use crate::sequence::course::{Course, Outcome};
 
 /// Periods over which the feed falls to nothing when a fault from outside stops the run: 1/32 less each period.
 pub const STOP_PERIODS: u8 = 32;
 
-/// What the operator or the host wants, taken up with the next tick. A request that the state does not allow is ignored.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-#[repr(u8)]
-pub enum Request {
-    /// Nothing new.
-    #[default]
-    None = 0,
-    /// Ready or finished: run the job from its beginning.
-    Start = 1,
-    /// Running: stand on the path.
-    Hold = 2,
-    /// Held: go on.
-    Resume = 3,
-    /// Running or held: give the run up; faulted: acknowledge the fault. The position is kept, the job stays loaded (ready). On a machine with
-    /// limits the tool slows down along its path first.
-    Abort = 4,
-    /// Running or held: give the run up, and leave the surface: with limits, the tool slows down along its path and goes up to the safe
-    /// height; without, as an abort.
-    Stop = 5,
-}
-
-/// What the operator wants in one period.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Inputs {
-    /// What is new.
-    pub request: Request,
-    /// Feed override, percent, 0 to [`Self::OVERRIDE_MAX`]; more counts as that. Only on a machine with limits.
-    pub feed_override: u8,
-}
-
-impl Inputs {
-    /// Greatest feed override, percent.
-    pub const OVERRIDE_MAX: u8 = 200;
-
-    /// Override as a share.
-    fn share(self) -> f32 {
-        f32::from(self.feed_override.min(Self::OVERRIDE_MAX)) * 0.01
-    }
-}
-
-impl Default for Inputs {
-    /// Nothing new, at the programmed feed.
-    fn default() -> Self {
-        Self {
-            request: Request::None,
-            feed_override: 100,
-        }
-    }
-}
-
-impl From<Request> for Inputs {
-    /// At the programmed feed.
-    fn from(request: Request) -> Self {
-        Self {
-            request,
-            ..Self::default()
-        }
-    }
-}
-
-impl Request {
-    /// Whether a machine in this state takes the request up.
-    #[must_use]
-    pub const fn is_allowed(self, state: State) -> bool {
-        match self {
-            Self::None => true,
-            Self::Start => matches!(state, State::Ready | State::Finished),
-            Self::Hold => matches!(state, State::Running | State::Linking),
-            Self::Resume => matches!(state, State::Held | State::Holding),
-            Self::Abort => matches!(state, State::Faulted) || Self::Stop.is_allowed(state),
-            Self::Stop => matches!(
-                state,
-                State::Running | State::Linking | State::Holding | State::Held
-            ),
-        }
-    }
-}
-
 /// The loaded surface at one place, outside of any run.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Probe {
+pub struct SurfacePoint {
     /// Cutter contact, nm.
     pub cc_nm: [i32; 3],
     /// Cutter location, nm.
@@ -251,14 +173,14 @@ impl<S: AsRef<[i32]> + AsMut<[i32]>> Interpolator<S> {
         self.motion.run.last_interval()
     }
 
-    /// The loaded surface at a place: what a sample there would say, whatever the machine is doing. Not for the sample path:
+    /// Evaluates the loaded surface at these parameters: what a sample there would say, whatever the machine is doing. Not for the sample path:
     /// it collapses a patch each time. The side fraction counts in steps of 2^-32.
     ///
     /// # Errors
     /// [`FaultKind::WrongState`] without a loaded job or for a span that it does not have; what is wrong with the surface
     /// there.
-    pub fn probe(&self, path: Place, side: Place) -> Result<Probe> {
-        self.motion.probe(self.store.as_ref(), path, side)
+    pub fn evaluate(&self, path: Place, side: Place) -> Result<SurfacePoint> {
+        self.motion.evaluate(self.store.as_ref(), path, side)
     }
 
     /// Stops a run with a fault from outside, such as a missed deadline: along the path, the feed falling to nothing over
@@ -387,11 +309,11 @@ impl Motion {
 
     #[inline(never)]
     fn tick(&mut self, store: &[i32], inputs: Inputs) {
-        if inputs.request != Request::None {
-            self.take_up(store, inputs.request);
+        if let Some(command) = inputs.command {
+            self.execute(store, command);
         }
         if self.program.header().axes.is_some() {
-            self.tick_within_limits(store, inputs.share());
+            self.tick_within_limits(store, inputs.feed_factor());
         } else {
             match self.state {
                 State::Running => self.advance(store),
@@ -480,14 +402,13 @@ impl Motion {
 
     #[cold]
     #[inline(never)]
-    fn take_up(&mut self, store: &[i32], request: Request) {
-        if !request.is_allowed(self.state) {
+    fn execute(&mut self, store: &[i32], command: Command) {
+        if !command.is_allowed(self.state) {
             return;
         }
         let has_limits = self.program.header().axes.is_some();
-        self.state = match request {
-            Request::None => return,
-            Request::Start => {
+        self.state = match command {
+            Command::Start => {
                 self.restart();
                 let Self { program, course, .. } = self;
                 match program.job(store) {
@@ -500,26 +421,26 @@ impl Motion {
                     _ => State::Running,
                 }
             }
-            Request::Hold if has_limits => State::Holding,
-            Request::Hold => State::Held,
-            Request::Resume if has_limits && self.course.is_link() => State::Linking,
-            Request::Resume => State::Running,
-            Request::Abort | Request::Stop if has_limits && self.state != State::Faulted => {
-                self.ending = if request == Request::Stop {
+            Command::Hold if has_limits => State::Holding,
+            Command::Hold => State::Held,
+            Command::Resume if has_limits && self.course.is_link() => State::Linking,
+            Command::Resume => State::Running,
+            Command::Abort | Command::Stop if has_limits && self.state != State::Faulted => {
+                self.ending = if command == Command::Stop {
                     Ending::Leave
                 } else {
                     Ending::Stand
                 };
                 State::Stopping
             }
-            Request::Abort | Request::Stop => {
+            Command::Abort | Command::Stop => {
                 self.fault = None;
                 State::Ready
             }
         };
     }
 
-    fn probe(&self, store: &[i32], path: Place, side: Place) -> Result<Probe> {
+    fn evaluate(&self, store: &[i32], path: Place, side: Place) -> Result<SurfacePoint> {
         let job = self.program.job(store)?;
         let header = self.program.header();
         if path.span >= header.path_spans || side.span >= header.side_spans {
@@ -534,14 +455,12 @@ impl Motion {
                 span: path.span,
             },
         )?;
-        let contact = patch.surface.contact(path.fraction, &patch.ball)?;
-        patch.ball.check_fit(&contact)?;
-        let located = patch.ball.locate(&contact, &patch.origin)?;
-        Ok(Probe {
+        let (contact, located) = patch.evaluate(path.fraction)?;
+        Ok(SurfacePoint {
             cc_nm: located.cc_nm,
             cl_nm: located.cl_nm,
             normal: patch.ball.normal(contact.offset),
-            interval: interval(patch.interval.density(&contact)),
+            interval: interval_of(patch.interval.density(&contact)),
         })
     }
 }

@@ -48,39 +48,25 @@
     )
 )]
 
-#[cfg(any(test, feature = "count"))]
+#[cfg(test)]
 extern crate std;
 
-mod across;
-mod arith;
-mod contact;
-mod course;
-pub mod encode;
+pub mod command;
 pub mod fault;
 mod feed;
 pub mod interpolator;
-mod interval;
 pub mod job;
-mod lane;
-mod link;
-mod lookahead;
-mod offset;
-mod patch;
-mod program;
-mod run;
+mod math;
+mod pass;
 pub mod sample;
-#[cfg(not(feature = "count"))]
-mod scalar;
-#[cfg(feature = "count")]
-#[path = "../../host-sim/counted-core/scalar.rs"]
-pub mod scalar;
-mod schedule;
+mod sequence;
 pub mod steps;
 pub mod surface;
-mod vec3;
 
+pub use command::{Command, Inputs};
 pub use fault::{Fault, FaultKind};
-pub use interpolator::{Inputs, Interpolator, Probe, Request};
+pub use interpolator::{Interpolator, SurfacePoint};
+pub use job::encode;
 pub use job::{Axes, Header, Pattern, STORE_WORDS, Spacing, SurfaceKind, ToolSide};
 pub use sample::{Place, Sample, State};
 pub use steps::{AxisSteps, StepConfig, Steps};

@@ -1,5 +1,7 @@
 //! What one period yields: the [`Sample`], and the running machine's [`State`].
 
+use crate::math::arith::sqrt;
+
 /// State of the running machine.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[repr(u8)]
@@ -129,6 +131,16 @@ impl Sample {
     /// Candidate of the path interval at this sample, in units of the side parameter; infinite where it sets no limit.
     #[must_use]
     pub fn interval(&self) -> f32 {
-        crate::interval::interval(self.density)
+        interval_of(self.density)
+    }
+}
+
+/// The path interval of an inverse square of it, in units of the side parameter; infinite where nothing sets a limit.
+#[must_use]
+pub(crate) fn interval_of(inv_interval_sq: f32) -> f32 {
+    if inv_interval_sq > 0.0 {
+        1.0 / sqrt(inv_interval_sq)
+    } else {
+        f32::INFINITY
     }
 }

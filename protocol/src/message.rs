@@ -77,7 +77,7 @@
 //! there. One request at a time: the host waits for the answer, or sends the same bytes again. Which answers use a number
 //! up is said at [`Reason::uses_number`].
 
-use interp_core::job::Header;
+use interp_core::{command::Command, job::Header};
 use serde::{Deserialize, Serialize};
 
 pub use crate::reason::Reason;
@@ -186,6 +186,33 @@ pub enum Request {
         /// Inputs that are asserted from the next period on.
         lines: InputLines,
     },
+}
+
+impl From<Command> for Request {
+    fn from(command: Command) -> Self {
+        match command {
+            Command::Start => Self::Start,
+            Command::Hold => Self::Hold,
+            Command::Resume => Self::Resume,
+            Command::Abort => Self::Abort,
+            Command::Stop => Self::Stop,
+        }
+    }
+}
+
+impl Request {
+    /// The operator's command that the request carries, if it carries one: the inverse of `Request::from`.
+    #[must_use]
+    pub const fn command(&self) -> Option<Command> {
+        Some(match self {
+            Self::Start => Command::Start,
+            Self::Hold => Command::Hold,
+            Self::Resume => Command::Resume,
+            Self::Abort => Command::Abort,
+            Self::Stop => Command::Stop,
+            _ => return None,
+        })
+    }
 }
 
 /// What opens a session: who the board is.
@@ -297,6 +324,14 @@ pub fn read_reply(payload: &[u8]) -> Result<Reply, Unreadable> {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_command_is_the_same_on_both_sides() {
+        for command in Command::ALL {
+            assert_eq!(Request::from(command).command(), Some(command));
+        }
+        assert_eq!(Request::Status.command(), None);
+    }
 
     #[test]
     fn numbers_skip_the_one_that_means_none() {

@@ -2,11 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
-/// Largest feed override, percent.
-pub const OVERRIDE_MAX_PERCENT: u8 = 200;
-
-/// The feed as programmed, percent.
-pub const OVERRIDE_NORMAL_PERCENT: u8 = 100;
+pub use interp_core::command::{OVERRIDE_MAX_PERCENT, OVERRIDE_NORMAL_PERCENT};
 
 /// The board's safety inputs, one bit each, set where the input is asserted whatever its level on the wire.
 ///

@@ -5,7 +5,7 @@
 pub mod golden;
 
 use controller::{
-    machine::{Busy, Command, Machine, describe},
+    machine::{Busy, Instruction, Machine, describe},
     safety::{Order, may_start},
 };
 use interp_core::{
@@ -150,7 +150,7 @@ pub enum Call {
     /// `set_steps`.
     Steps(CheckedSteps),
     /// `send`.
-    Send(Command),
+    Send(Instruction),
     /// `order`.
     Order(Order),
     /// `simulate`.
@@ -218,7 +218,7 @@ impl Machine for Mock {
         Ok(())
     }
 
-    fn send(&mut self, command: Command) -> Result<(), Busy> {
+    fn send(&mut self, command: Instruction) -> Result<(), Busy> {
         if self.busy {
             return Err(Busy);
         }
@@ -248,7 +248,7 @@ impl Machine for Mock {
     }
 
     /// Commands are taken up at once.
-    fn commands_wait(&mut self) -> bool {
+    fn instructions_wait(&mut self) -> bool {
         false
     }
 }

@@ -1,15 +1,15 @@
 //! What the real-time half keeps beside the interpolator.
 
 use interp_core::{
+    command::Command,
     fault::{Fault, FaultKind},
-    interpolator::Request,
     sample::Sample,
 };
 use protocol::message::{Clock, Report};
 
 use super::{TickInput, moves, run::Run};
 use crate::{
-    machine::{Command, Event, Events},
+    machine::{Event, Events, Instruction},
     safety::Safety,
 };
 
@@ -18,7 +18,7 @@ use crate::{
 pub(super) struct Control {
     pub(super) run: Run,
     pub(super) credit: u32,
-    /// In lockstep: a command was obeyed in this tick; the last period that there was credit for is over, and the host is to know. Time
+    /// In lockstep: an instruction was executed in this tick; the last period that there was credit for is over, and the host is to know. Time
     /// stands still for a tick then, so that neither is on top of a period's work.
     pub(super) obeyed: bool,
     pub(super) spent: bool,
@@ -26,7 +26,7 @@ pub(super) struct Control {
     pub(super) clock: Clock,
     pub(super) report: Report,
     /// Waits for a period to pass.
-    pub(super) request: Request,
+    pub(super) command: Option<Command>,
     pub(super) safety: Safety,
     /// The next run within limits has to begin at its job's home.
     pub(super) from_home: bool,
@@ -42,7 +42,7 @@ impl Control {
             tick_budget: u32::MAX,
             clock: Clock::Free,
             report: Report::Digests,
-            request: Request::None,
+            command: None,
             safety: Safety::NEW,
             from_home: true,
         }
@@ -61,28 +61,29 @@ impl Control {
         !has_limits && moves(sample.state) && sample.tick == self.run.pass.first_tick
     }
 
-    /// Takes a command up; false where the host is to be told that time stands still, or stood: for a `Run` that leaves no time, and for
-    /// a change of the clock before it was told.
-    pub(super) fn obey(&mut self, command: Command) -> bool {
+    /// Executes an instruction; false where the host is to hear that time stands still, or stood: for a `Run` that leaves no time, and for
+    /// a change of the clock before the host heard of it.
+    pub(super) fn obey(&mut self, instruction: Instruction) -> bool {
         self.obeyed = true;
-        match command {
-            // An abort or stop that waits for its period is not to be undone by what comes behind it.
-            Command::Request(_) if self.request == Request::Abort => {}
-            Command::Request(request) if self.request == Request::Stop && request != Request::Abort => {}
-            Command::Request(request) => self.request = request,
-            Command::Clock(clock) => {
+        match instruction {
+            // An abort or stop that waits for its period is not undone by a later command.
+            Instruction::Command(_) if self.command == Some(Command::Abort) => {}
+            Instruction::Command(command)
+                if self.command == Some(Command::Stop) && command != Command::Abort => {}
+            Instruction::Command(command) => self.command = Some(command),
+            Instruction::Clock(clock) => {
                 self.clock = clock;
                 self.credit = 0;
                 return !core::mem::take(&mut self.spent);
             }
-            Command::Run { ticks } => {
+            Instruction::Run { ticks } => {
                 if self.clock == Clock::Lockstep {
                     self.credit = self.credit.saturating_add(ticks);
                 }
                 return self.credit > 0;
             }
-            Command::Report(report) => self.report = report,
-            Command::Override { percent } => self.safety.set_override(percent),
+            Instruction::Report(report) => self.report = report,
+            Instruction::Override { percent } => self.safety.set_override(percent),
         }
         true
     }

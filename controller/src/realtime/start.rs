@@ -6,7 +6,7 @@
 //! **Without a home.** Where none is required and none was declared, the axes count as standing at the job's home.
 //! **After a job without limits** nobody knows where the axes stand: nothing led from pass to pass.
 
-use interp_core::interpolator::Request;
+use interp_core::command::Command;
 use protocol::message::Reason;
 
 use super::{RealTime, run::Run};
@@ -54,9 +54,9 @@ impl<S: AsRef<[i32]> + AsMut<[i32]>> RealTime<S> {
     /// the link did not know yet.
     #[cold]
     #[inline(never)]
-    pub(super) fn begin(&mut self) -> Request {
+    pub(super) fn begin(&mut self) -> Option<Command> {
         if self.may_start().is_err() {
-            return Request::None;
+            return None;
         }
         match self.interpolator.home_nm() {
             Some(home_nm) => {
@@ -70,7 +70,7 @@ impl<S: AsRef<[i32]> + AsMut<[i32]>> RealTime<S> {
         self.control.from_home = false;
         self.control.run = Run::NEW;
         self.control.safety.begin_run();
-        Request::Start
+        Some(Command::Start)
     }
 
     /// The axes stand here: steps and runs count from there.
@@ -164,13 +164,13 @@ mod tests {
         let mut half = with_plate(Some(HOME_NM));
         order(&mut half, DRIVES_ON);
         let near = [HOME_NM[0] - 1, HOME_NM[1], HOME_NM[2]];
-        for (stands_nm, begun) in [(near, Request::None), (HOME_NM, Request::Start)] {
+        for (stands_nm, begun) in [(near, None), (HOME_NM, Some(Command::Start))] {
             order(&mut half, Order::SetHome { home_nm: stands_nm });
             let refused = Err(Reason::NotAtHome {
                 home_nm: HOME_NM,
                 stands_nm: Some(stands_nm),
             });
-            let may = if begun == Request::Start { Ok(()) } else { refused };
+            let may = if begun.is_some() { Ok(()) } else { refused };
             assert_eq!(half.may_start(), may);
             assert_eq!(half.begin(), begun);
         }
@@ -178,7 +178,7 @@ mod tests {
         let mut half = with_plate(None);
         order(&mut half, DRIVES_ON);
         order(&mut half, Order::SetHome { home_nm: near });
-        assert_eq!(half.begin(), Request::Start);
+        assert_eq!(half.begin(), Some(Command::Start));
         assert_eq!(half.interpolator.stands_nm(), None);
     }
 
@@ -191,7 +191,7 @@ mod tests {
         };
         order(&mut half, Order::Configure(free));
         order(&mut half, DRIVES_ON);
-        assert_eq!(half.begin(), Request::Start);
+        assert_eq!(half.begin(), Some(Command::Start));
         assert_eq!(half.steps().unwrap().told(), HOME_NM);
         assert_eq!(half.interpolator.stands_nm(), Some(HOME_NM));
     }

@@ -22,7 +22,7 @@ mod app {
     use core::hint::black_box;
 
     use controller::{
-        machine::{Command, Event},
+        machine::{Event, Instruction},
         realtime::RealTime,
         step_output::{Buffers, Pin, Port, Wiring},
     };
@@ -57,7 +57,7 @@ mod app {
         task: SampleTask,
         guards: Guards<Ports, Ports, pac::IWDG>,
         output: StepDriver,
-        commands_in: Producer<'static, Command>,
+        commands_in: Producer<'static, Instruction>,
         events_out: Consumer<'static, Event>,
     }
 
@@ -65,7 +65,7 @@ mod app {
         store: [i32; STORE_WORDS] = [0; STORE_WORDS],
         slots: Buffers = [[0; BUFFER_WORDS]; 2],
         rest: u32 = 0,
-        commands: Queue<Command, 8> = Queue::new(),
+        commands: Queue<Instruction, 8> = Queue::new(),
         events: Queue<Event, 64> = Queue::new(),
     ])]
     fn init(context: init::Context) -> (Shared, Local) {
@@ -120,7 +120,7 @@ mod app {
     #[idle(shared = [real_time], local = [commands_in, events_out])]
     fn idle(mut context: idle::Context) -> ! {
         loop {
-            let command = black_box(Command::Run { ticks: 0 });
+            let command = black_box(Instruction::Run { ticks: 0 });
             let _ = context.local.commands_in.enqueue(command);
             black_box(context.local.events_out.dequeue());
             context.shared.real_time.lock(|real_time| {

@@ -15,30 +15,31 @@ use cycle_plugin::plan::Stage;
 
 /// A module of `interp_core` (a function in it, or all of it) and its stage; the first that fits counts. What is renamed there
 /// is renamed here: a name that occurs nowhere in the image is an error.
-const STAGES: [(&str, &str, Stage); 23] = [
-    ("contact", "", Stage::Step),
+const STAGES: [(&str, &str, Stage); 24] = [
+    ("pass::contact", "", Stage::Step),
+    ("surface::ball", "", Stage::Offset),
     ("surface", "collapse", Stage::PatchChange),
     ("surface", "", Stage::Surface),
-    ("offset", "", Stage::Offset),
-    ("interval", "", Stage::Interval),
-    ("patch", "", Stage::PatchChange),
-    ("schedule", "", Stage::PassChange),
-    ("across", "", Stage::PassChange),
-    ("run", "step_far", Stage::Step),
-    ("lane", "", Stage::PatchChange),
-    ("run", "next_span", Stage::PatchChange),
-    ("run", "begin_pass", Stage::PassChange),
-    ("run", "step_over", Stage::PassChange),
-    ("run", "look_across", Stage::PassChange),
-    ("run", "close_pass", Stage::PassChange),
-    ("run", "end_pass", Stage::PassChange),
-    ("run", "", Stage::Rest),
+    ("pass::offset", "", Stage::Offset),
+    ("pass::interval", "", Stage::Interval),
+    ("pass::patch", "", Stage::PatchChange),
+    ("pass::schedule", "", Stage::PassChange),
+    ("pass::across", "", Stage::PassChange),
+    ("pass::run", "step_far", Stage::Step),
+    ("pass::buffer", "", Stage::PatchChange),
+    ("pass::run", "next_span", Stage::PatchChange),
+    ("pass::run", "begin_pass", Stage::PassChange),
+    ("pass::run", "step_over", Stage::PassChange),
+    ("pass::run", "look_across", Stage::PassChange),
+    ("pass::run", "close_pass", Stage::PassChange),
+    ("pass::run", "end_pass", Stage::PassChange),
+    ("pass::run", "", Stage::Rest),
     ("interpolator", "", Stage::Rest),
     ("steps", "", Stage::Pulses),
     ("feed", "", Stage::Feed),
-    ("course", "", Stage::Feed),
-    ("lookahead", "", Stage::Feed),
-    ("link", "", Stage::Feed),
+    ("sequence::course", "", Stage::Feed),
+    ("sequence::lookahead", "", Stage::Feed),
+    ("sequence::link", "", Stage::Feed),
 ];
 
 /// The function that counts a sample in.
@@ -84,12 +85,15 @@ impl Entry {
             Some(root) if REST.contains(&root) => return Self::Rest,
             _ => return Self::Helper,
         }
-        let module = parts.next().unwrap_or_default();
-        let names: Vec<&str> = parts.collect();
-        let fits = |name: &str| name.is_empty() || names.iter().any(|part| is_name(part, name));
+        let parts: Vec<&str> = parts.collect();
+        let fits = |module: &str, name: &str| {
+            let mut names = parts.iter();
+            module.split("::").all(|part| names.next() == Some(&part))
+                && (name.is_empty() || names.any(|part| is_name(part, name)))
+        };
         STAGES
             .iter()
-            .position(|(of, name, _)| *of == module && fits(name))
+            .position(|(module, name, _)| fits(module, name))
             .map_or(Self::Helper, Self::Line)
     }
 
@@ -199,17 +203,17 @@ mod tests {
     #[test]
     fn functions_by_path() {
         let stage = |path| of_function(path);
-        assert_eq!(stage("interp_core::contact::step"), Some(Stage::Step));
+        assert_eq!(stage("interp_core::pass::contact::step"), Some(Stage::Step));
         assert_eq!(
             stage("interp_core::surface::polynomial::PolynomialPass::collapse"),
             Some(Stage::PatchChange)
         );
         assert_eq!(
-            stage("interp_core::run::Run::begin_pass"),
+            stage("interp_core::pass::run::Run::begin_pass"),
             Some(Stage::PassChange)
         );
         assert_eq!(
-            stage("<interp_core::vec3::Vec3 as core::ops::arith::Add>::add"),
+            stage("<interp_core::math::vec3::Vec3 as core::ops::arith::Add>::add"),
             None
         );
         assert_eq!(stage("core::num::<impl u32>::wrapping_add"), None);
@@ -244,6 +248,6 @@ mod tests {
             "<core::ops::range::Range<u16> as core::iter::Iterator>::next"
         ));
         assert!(is_of_core("<*mut u32>::offset"));
-        assert!(!is_of_core("interp_core::offset::Offset::new"));
+        assert!(!is_of_core("interp_core::pass::offset::Locator::new"));
     }
 }

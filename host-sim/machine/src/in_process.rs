@@ -1,7 +1,7 @@
 //! The machine in this process: the core with a job loaded, one call a period.
 
 use interp_core::steps::BUFFER_WORDS;
-use interp_core::{Fault, Inputs, Interpolator, Place, Probe, Request, Sample, State, Steps};
+use interp_core::{Command, Fault, Inputs, Interpolator, Place, Sample, State, Steps, SurfacePoint};
 
 use crate::prepare::Prepared;
 
@@ -39,13 +39,13 @@ impl Machine {
     /// The fault that stopped the run; [`Self::place`] says where.
     pub fn run(&mut self, mut each: impl FnMut(&Sample) -> bool) -> Result<(), Fault> {
         // A fault of the run before is acknowledged by an abort; otherwise it is ignored.
-        self.core.tick(Request::Abort);
-        let mut request = Request::Start;
+        self.core.tick(Command::Abort);
+        let mut command = Some(Command::Start);
         let mut pass = None;
         let has_limits = self.core.has_limits();
         loop {
-            let sample = self.core.tick(request);
-            request = Request::None;
+            let sample = self.core.tick(command);
+            command = None;
             if !matches!(sample.state, State::Running | State::Linking) {
                 break;
             }
@@ -58,12 +58,12 @@ impl Machine {
                     steps.place(sample.cl_nm);
                 }
                 if let Err(fault) = steps.step(sample.cl_nm, slots) {
-                    self.core.tick(Request::Abort);
+                    self.core.tick(Command::Abort);
                     return Err(fault);
                 }
             }
             if !each(sample) {
-                self.core.tick(Request::Abort);
+                self.core.tick(Command::Abort);
                 break;
             }
         }
@@ -90,9 +90,9 @@ impl Machine {
     /// The surface at a place, outside of any run.
     ///
     /// # Errors
-    /// As [`Interpolator::probe`].
-    pub fn probe(&self, path: Place, side: Place) -> Result<Probe, Fault> {
-        self.core.probe(path, side)
+    /// As [`Interpolator::evaluate`].
+    pub fn evaluate(&self, path: Place, side: Place) -> Result<SurfacePoint, Fault> {
+        self.core.evaluate(path, side)
     }
 
     /// Where the run is: pass, path and side place; after a fault, where that is.

@@ -17,7 +17,7 @@ use cycles::lab::Lab;
 use cycles::measure::{Bench, Ticks};
 use cycles::{self, BudgetError, PERIOD_CYCLES, TICKS, chart, golden};
 use machine::remote::qemu;
-use study::operations::{self, Count, Operations};
+use study::operations::{self, Operations};
 
 /// Cycles of a bin of the printed histogram.
 const BIN_CYCLES: u32 = 50;
@@ -111,58 +111,6 @@ fn count(arguments: &Arguments, bench: &Bench) -> Result<(Vec<Counted>, Directio
     Ok((counted, directions))
 }
 
-/// Operations of a sample of each job; none where no sample is far from the ends of passes and patches.
-fn count_operations(arguments: &Arguments) -> Result<BTreeMap<String, Count>> {
-    let mut counts = BTreeMap::new();
-    for (name, path, ticks) in jobs(arguments) {
-        let (_, prepared) = load(&path)?;
-        let counted = operations::count(&prepared, ticks)
-            .map_err(|fault| Failure::Failed(Some(format!("{}: {fault}", path.display()))))?;
-        if counted.samples > 0 {
-            counts.insert(name, counted.sample);
-        }
-    }
-    Ok(counts)
-}
-
-fn print_operations(arguments: &Arguments, counts: &BTreeMap<String, Count>) {
-    let row = |name: &str, operations: Operations, more: &str| {
-        let Operations {
-            add,
-            multiply,
-            divide,
-            root,
-            sine,
-        } = operations;
-        say!("  {name:<25} {add:>5} {multiply:>5} {divide:>5} {root:>5} {sine:>7}{more}");
-    };
-    say!(
-        "\noperations a sample, {STEPS_2_TO_4}\n  {:<25} {:>5} {:>5} {:>5} {:>5} {:>7}  1/sqrt, conversions, shifts",
-        "",
-        "+ -",
-        "x",
-        "/",
-        "sqrt",
-        "sin cos"
-    );
-    for (name, _, _) in jobs(arguments) {
-        if let Some(count) = counts.get(&name) {
-            let more = format!(
-                "  {:>6} {:>12} {:>7}",
-                count.inverse_root, count.convert, count.shift
-            );
-            row(&name, count.operations, &more);
-        }
-        if let Some(paper) = operations::of_paper(&name) {
-            row("  the paper's Table 1", paper, "");
-        }
-    }
-    say!(
-        "  1/sqrt and sin cos are made of + - x, which are counted with the others; comparisons and signs are not counted.\n  \
-         Once a pass, and not in here: the patch at its side parameter, and the interval's root and quotient."
-    );
-}
-
 fn operations_json(operations: Operations) -> Value {
     json!({
         "add": operations.add,
@@ -171,18 +119,6 @@ fn operations_json(operations: Operations) -> Value {
         "square_root": operations.root,
         "sine": operations.sine,
     })
-}
-
-fn count_json(count: &Count) -> Value {
-    let mut value = operations_json(count.operations);
-    for (key, more) in [
-        ("inverse_square_root", count.inverse_root),
-        ("convert", count.convert),
-        ("shift", count.shift),
-    ] {
-        value[key] = more.into();
-    }
-    value
 }
 
 /// What the images say without being run.
@@ -228,15 +164,9 @@ impl Images {
     }
 }
 
-fn json(
-    figures: &[Figure],
-    images: &Images,
-    counts: &BTreeMap<String, Count>,
-    directions: &Directions,
-) -> Value {
+fn json(figures: &[Figure], images: &Images, directions: &Directions) -> Value {
     let rows = figures.iter().map(|figure| {
         let whole = figure.stage == STEPS_2_TO_4;
-        let count = counts.get(&figure.surface).filter(|_| whole);
         let paper = operations::of_paper(&figure.surface).filter(|_| whole);
         let mut row = json!({
             "surface": figure.surface,
@@ -247,7 +177,6 @@ fn json(
             "cycles_mean": figure.mean,
             "cycles_max": figure.max,
             "period_share_pct": figure.period_share_pct(),
-            "operations": count.map(count_json),
             "operations_paper": paper.map(operations_json),
             "histogram": { "width": figure.histogram.width, "bins": figure.histogram.bins },
             "stack_bytes": figure.stack_bytes,
@@ -367,12 +296,11 @@ pub(super) fn command(arguments: &Arguments) -> Result<()> {
     }
     let (counted, directions) = count(arguments, &bench)?;
     let figures: Vec<Vec<Figure>> = counted.iter().map(|(name, ticks)| figures(name, ticks)).collect();
-    let bar = spinner("counting operations, reading the images");
-    let counts = count_operations(arguments)?;
+    let bar = spinner("reading the images");
     let images = Images::read(&image)?;
     bar.finish_and_clear();
     if arguments.json {
-        say!("{}", json(&figures.concat(), &images, &counts, &directions));
+        say!("{}", json(&figures.concat(), &images, &directions));
     } else {
         images.print();
         for ((name, ticks), figures) in counted.iter().zip(&figures) {
@@ -380,7 +308,6 @@ pub(super) fn command(arguments: &Arguments) -> Result<()> {
             say!("  along {}", directions[name].0);
             print_histogram(&histogram(ticks, Model::Pessimistic, BIN_CYCLES));
         }
-        print_operations(arguments, &counts);
     }
     if !arguments.json {
         print_worst(arguments, &bench)?;

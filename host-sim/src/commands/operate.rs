@@ -1,12 +1,13 @@
 //! `operate`: what an operator asks of a board between runs, or of a run whose host went away.
 
 use clap::{Args, Parser, Subcommand};
-use protocol::message::{OVERRIDE_MAX_PERCENT, Status};
+use interp_core::Command;
+use protocol::message::{OVERRIDE_MAX_PERCENT, Request, Status};
 use serde_json::json;
 
 use super::out::say;
 use super::{Failure, Result, home, run};
-use machine::remote::operate::{Action, act, sentences};
+use machine::remote::operate::{act, sentences};
 
 /// Switches a board's drives, declares its home, holds, resumes or stops its run, and says how it is.
 ///
@@ -58,23 +59,23 @@ enum Wanted {
 }
 
 impl Wanted {
-    fn action(&self) -> Action {
+    /// The request on the line.
+    fn request(&self) -> Request {
         match self {
-            Self::Status => Action::Status,
-            Self::Hold => Action::Hold,
-            Self::Resume => Action::Resume,
-            Self::Stop => Action::Stop,
-            Self::Abort => Action::Abort,
-            Self::Override { percent } => Action::Override(*percent),
-            Self::On => Action::Drives(true),
-            Self::Off => Action::Drives(false),
-            Self::Home { place_mm } => Action::Home(place_mm.0),
-            Self::Acknowledge => Action::Acknowledge,
+            Self::Status => Request::Status,
+            Self::Hold => Command::Hold.into(),
+            Self::Resume => Command::Resume.into(),
+            Self::Stop => Command::Stop.into(),
+            Self::Abort => Command::Abort.into(),
+            Self::Override { percent } => Request::Override { percent: *percent },
+            Self::On => Request::Drives { on: true },
+            Self::Off => Request::Drives { on: false },
+            Self::Home { place_mm } => Request::SetHome { home_nm: place_mm.0 },
+            Self::Acknowledge => Request::Acknowledge,
         }
     }
 }
 
-/// A line that an operator types.
 #[derive(Debug, Parser)]
 #[command(no_binary_name = true, disable_help_flag = true)]
 struct Line {
@@ -86,13 +87,13 @@ struct Line {
 ///
 /// # Errors
 /// What is wrong with them.
-pub(super) fn typed(line: &str) -> std::result::Result<Option<Action>, String> {
+pub(super) fn typed(line: &str) -> std::result::Result<Option<Request>, String> {
     let words: Vec<_> = line.split_whitespace().collect();
     if words.is_empty() {
         return Ok(None);
     }
     match Line::try_parse_from(words) {
-        Ok(line) => Ok(Some(line.wanted.action())),
+        Ok(line) => Ok(Some(line.wanted.request())),
         Err(error) => Err(error.to_string()),
     }
 }
@@ -107,7 +108,7 @@ pub(super) fn sentence(status: &Status) -> String {
 
 pub(super) fn command(arguments: &Arguments) -> Result<()> {
     let mut session = run::open_port(&arguments.port)?;
-    let status = act(&mut session, arguments.wanted.action()).map_err(Failure::from)?;
+    let status = act(&mut session, &arguments.wanted.request()).map_err(Failure::from)?;
     let board = session.capabilities().description.board.as_str();
     if arguments.json {
         say!("{}", json_of(&status, board));
@@ -149,8 +150,11 @@ mod tests {
 
     #[test]
     fn a_line_is_what_the_command_would_be() {
-        assert_eq!(typed("  override 50 "), Ok(Some(Action::Override(50))));
-        assert_eq!(typed("hold"), Ok(Some(Action::Hold)));
+        assert_eq!(
+            typed("  override 50 "),
+            Ok(Some(Request::Override { percent: 50 }))
+        );
+        assert_eq!(typed("hold"), Ok(Some(Request::Hold)));
         assert_eq!(typed(" "), Ok(None));
         for wrong in ["overide 50", "override 201", "hold on", "override"] {
             assert!(

@@ -4,12 +4,12 @@ use std::io::{BufRead, stdin};
 use std::sync::mpsc::{Receiver, TryRecvError, channel};
 
 use indicatif::ProgressBar;
-use protocol::message::Status;
+use protocol::message::{Request, Status};
 
 use super::operate::{sentence, typed};
 use super::out::to_stderr;
 use machine::remote::RemoteError;
-use machine::remote::operate::{Action, Operator};
+use machine::remote::operate::Operator;
 
 /// What can be typed.
 pub(super) const WORDS: &str = "hold, resume, stop, abort, override 50, status";
@@ -47,7 +47,7 @@ impl Typist {
 }
 
 impl Operator for Typist {
-    fn wish(&mut self) -> Option<Action> {
+    fn wish(&mut self) -> Option<Request> {
         let line = match self.lines.try_recv() {
             Ok(line) => line,
             Err(error) => {
@@ -68,7 +68,7 @@ impl Operator for Typist {
         self.open
     }
 
-    fn told(&mut self, _: Action, came: Result<Status, RemoteError>) {
+    fn told(&mut self, _: &Request, came: Result<Status, RemoteError>) {
         match came {
             Ok(status) => {
                 let percent = status.safety.feed_override;

@@ -4,11 +4,10 @@
 //! With q(s) the centre over the arc of the contact, q' v is an axis's velocity, q'' v^2 + q' a its acceleration and q''' v^3 + 3 q'' v a +
 //! q' j its jerk. Derivatives are divided differences of the stations, less what rounding to nanometres can make of them.
 
-use super::number::Bounded;
 use super::plan::Top;
-use crate::arith::sqrt;
 use crate::job::Axes;
-use crate::scalar::{float, real};
+use crate::math::arith::sqrt;
+use crate::math::number::{Bounded, nm_to_mm};
 
 /// Share of an axis's acceleration that bends of the path may take; the rest is kept for the feed to change.
 const BEND_SHARE: f32 = 0.8;
@@ -224,7 +223,7 @@ pub(crate) fn squared(value: f32) -> f32 {
 }
 
 pub(crate) fn root(value: f32) -> f32 {
-    float(sqrt(real(value.at_least(0.0))))
+    sqrt(value.at_least(0.0))
 }
 
 /// The cube root of a positive number, within 1e-5 of itself: a guess out of the exponent, and two of Halley's steps.
@@ -238,12 +237,4 @@ pub(crate) fn cube_root(value: f32) -> f32 {
         x *= (cube + 2.0 * value) / (2.0 * cube + value);
     }
     x
-}
-
-#[allow(
-    clippy::cast_precision_loss,
-    reason = "a difference of neighbours; its last digits count below 2^24 nm only"
-)]
-pub(crate) fn nm_to_mm(nm: i32) -> f32 {
-    nm as f32 * 1e-6
 }

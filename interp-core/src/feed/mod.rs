@@ -15,7 +15,6 @@
 //! Speeds are in quanta (2^-10 nm) a period, so sums are exact integers.
 
 pub(crate) mod demand;
-pub(crate) mod number;
 pub(crate) mod plan;
 pub(crate) mod profile;
 
@@ -25,11 +24,5 @@ pub(crate) const QUANTA_BITS: u32 = 10;
 /// Quanta in a millimetre.
 pub(crate) const QUANTA_PER_MM: f32 = 1_024e6;
 
-/// Longest step of a period, mm: in quanta it fits an i32.
-pub(crate) const STEP_MAX_MM: f32 = 2.0;
-
-/// The same, quanta.
-pub(crate) const STEP_MAX: f32 = STEP_MAX_MM * QUANTA_PER_MM;
-
-pub(crate) use demand::nm_to_mm;
-pub(crate) use plan::CELLS_MAX;
+/// Longest step of a period, quanta: it fits an i32.
+pub(crate) const STEP_MAX: f32 = crate::job::STEP_MAX_MM * QUANTA_PER_MM;

@@ -8,12 +8,10 @@ mod cell;
 
 use self::cell::{Cell, Most, between, whole_nm};
 use super::demand::{Room, ZONE_JERK, cube_root, root, squared};
-use super::number::{Bounded, to_f32, to_quanta};
 use super::profile::{WINDOW_MAX, braked, landing};
 use super::{QUANTA_BITS, QUANTA_PER_MM, STEP_MAX};
-
-/// Cells that a path may have.
-pub(crate) const CELLS_MAX: usize = 256;
+use crate::job::CELLS_MAX;
+use crate::math::number::{Bounded, to_f32, to_quanta};
 
 /// Cells to each side that a bound may reach into, and that are looked through ahead of an acceleration.
 const REACH: usize = 8;

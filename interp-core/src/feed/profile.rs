@@ -1,10 +1,9 @@
 //! The jerk-limited feed, a step a period; see [`super`].
 
-use super::number::Bounded;
 use super::plan::Plan;
 use super::{QUANTA_BITS, STEP_MAX};
-use crate::arith::sqrt;
-use crate::scalar::{float, real};
+use crate::math::arith::sqrt;
+use crate::math::number::Bounded;
 
 /// Longest mean, periods: the ring's length less what the difference of accelerations needs.
 pub(crate) const WINDOW_MAX: u8 = 250;
@@ -196,7 +195,7 @@ impl Profile {
 pub(crate) fn braked(square: f32, accel: f32, distance: f32) -> f32 {
     let reach = square + 2.0 * accel * distance.at_least(0.0);
     let half = 0.5 * accel;
-    let root = half + float(sqrt(real(half * half + reach)));
+    let root = half + sqrt(half * half + reach);
     if root > 0.0 { reach / root } else { 0.0 }
 }
 
@@ -204,7 +203,7 @@ pub(crate) fn braked(square: f32, accel: f32, distance: f32) -> f32 {
 /// `distance <= accel N (N + 1)/2`, and the first of steps that fall evenly to nothing in the period after the last.
 pub(crate) fn landing(accel: f32, distance: f32) -> f32 {
     let distance = distance.at_least(0.0);
-    let periods = 0.5 * (float(sqrt(real(1.0 + 8.0 * distance / accel))) - 1.0);
+    let periods = 0.5 * (sqrt(1.0 + 8.0 * distance / accel) - 1.0);
     2.0 * distance / (ceil(periods).at_least(1.0) + 1.0)
 }
 
@@ -239,6 +238,5 @@ const fn rounded(step: f32) -> i32 {
     (step + 0.5) as i32
 }
 
-#[cfg(not(feature = "count"))]
 #[cfg(test)]
 mod tests;

@@ -2,7 +2,7 @@
 
 use super::range::{HeadWord, Root};
 use super::{Edges, PassLine};
-use crate::arith::{cubic, jet, quadratic};
+use crate::math::arith::{cubic, jet, quadratic};
 
 /// One coordinate on a pass: cubics of the path parameter, fixed point.
 #[derive(Clone, Copy, Debug, Default)]

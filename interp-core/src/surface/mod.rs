@@ -15,6 +15,7 @@
 //! with scalars a (fixed on a pass) and b (linear along it) that carry the zero. The normal comes from `Ã x B̃`, as exact
 //! at the pole as anywhere, and nothing is divided by a or b unless it is known not to vanish.
 
+mod ball;
 mod grid;
 mod lines;
 mod pole;
@@ -28,17 +29,16 @@ pub use range::{Edges, SHIFT_MAX};
 pub use rational::{RATIONAL_WORDS, RationalRecord};
 pub use revolved::{REVOLVED_WORDS, RevolvedRecord};
 
+pub(crate) use ball::{Ball, OffsetUnits};
 pub(crate) use grid::{GridKind, GridPass};
 pub(crate) use pole::PolePass;
 pub(crate) use polynomial::{ExtrudedPass, PolynomialPass, RuledPass};
 pub(crate) use rational::RationalPass;
 pub(crate) use revolved::{CirclePass, ProfilePass};
 
-use crate::arith::{dot_hi, fraction_32, inverse_sqrt, power_of_two, sqrt, to_f32};
 use crate::fault::{Fault, FaultKind, Result};
-use crate::offset::Ball;
-use crate::scalar::{ONE, Real, float, real};
-use crate::vec3::Vec3;
+use crate::math::arith::{dot_hi, fraction_32, inverse_sqrt, power_of_two, sqrt, to_f32};
+use crate::math::vec3::Vec3;
 
 /// Least sine between the two first derivatives (after any flagged zero is divided out) at which a normal is taken.
 /// At 1e-3 the f32 cross product still gives the normal to 1e-4 rad; below, [`FaultKind::DegenerateSurface`].
@@ -69,40 +69,40 @@ pub(crate) struct Contact {
     /// The parametrisation along the path.
     pub(crate) path: PathSpeed,
     /// 1 - r k, k the normal curvature along the path towards the tool.
-    pub(crate) along: Real,
+    pub(crate) along: f32,
     /// 1 - r k across the path, times `lateral_squared`.
-    pub(crate) across: Real,
+    pub(crate) across: f32,
     /// Square of the lateral speed |(N x t) . S_side|, (g units)^2 per side^2.
-    pub(crate) lateral_squared: Real,
+    pub(crate) lateral_squared: f32,
     /// 1 - r k along the side line, times the square of the side derivative's length, likewise.
-    pub(crate) outwards: Real,
+    pub(crate) outwards: f32,
     /// Square of r times geodesic torsion times lateral speed, (g units)^2 per side^2.
-    pub(crate) twist_squared: Real,
+    pub(crate) twist_squared: f32,
     /// |A|^2, (g units)^2.
-    pub(crate) speed_squared: Real,
+    pub(crate) speed_squared: f32,
     /// 1/g^2.
-    pub(crate) gauge: Real,
+    pub(crate) gauge: f32,
 }
 
 /// The path parametrisation at a place: what a step along the path needs.
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct PathSpeed {
     /// 1/|A|, path per unit.
-    pub(crate) inverse: Real,
+    pub(crate) inverse: f32,
     /// A . A' / |A|^2: relative change of the speed, per path.
-    pub(crate) stretch: Real,
+    pub(crate) stretch: f32,
 }
 
 impl PathSpeed {
     /// Of no place.
     pub(crate) const STILL: Self = Self {
-        inverse: real(0.0),
-        stretch: real(0.0),
+        inverse: 0.0,
+        stretch: 0.0,
     };
 
     /// From g Ã, half of its derivative, the excess of its stretch, and g/a.
     #[inline(always)]
-    fn new(path: &[i32; 3], path2: &[i32; 3], excess: Real, gauge: Real) -> Self {
+    fn new(path: &[i32; 3], path2: &[i32; 3], excess: f32, gauge: f32) -> Self {
         let speed = Vec3::of(*path);
         let inverse = inverse_sqrt(speed.dot(speed));
         Self {
@@ -128,18 +128,18 @@ impl PathSpeed {
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Factors {
     /// a and 1/a: fixed on a pass; both 0 where the whole pass is a pole.
-    pub(crate) path: Real,
-    pub(crate) inverse_path: Real,
+    pub(crate) path: f32,
+    pub(crate) inverse_path: f32,
     /// b: 0 at a pole at the pass's end.
-    pub(crate) side: Real,
+    pub(crate) side: f32,
 }
 
 impl Factors {
     /// Away from poles.
     pub(crate) const ONE: Self = Self {
-        path: ONE,
-        inverse_path: ONE,
-        side: ONE,
+        path: 1.0,
+        inverse_path: 1.0,
+        side: 1.0,
     };
 }
 
@@ -160,16 +160,16 @@ pub(crate) struct Local {
     /// Half the second side derivative of S over b.
     pub(crate) side2: [i32; 3],
     /// g.
-    pub(crate) g: Real,
+    pub(crate) g: f32,
     /// 1/g.
-    pub(crate) inverse_g: Real,
+    pub(crate) inverse_g: f32,
     /// What the stretch of Ã has more than that of S, because g varies.
-    pub(crate) excess: Real,
+    pub(crate) excess: f32,
 }
 
 /// `A . A' / |A|^2` from g A, half of g A' and 1/|g A|^2.
 #[inline(always)]
-fn stretch(path: &[i32; 3], path2: &[i32; 3], inverse_e: Real, excess: Real) -> Real {
+fn stretch(path: &[i32; 3], path2: &[i32; 3], inverse_e: f32, excess: f32) -> f32 {
     const PRODUCT: f32 = power_of_two(33);
     to_f32(dot_hi(path, path2)) * (inverse_e * PRODUCT) - excess
 }
@@ -225,13 +225,13 @@ impl Local {
         };
         let (across, n) = if SIDE2 {
             let n = b * (to_f32(dot_hi(&offset, &self.side2)) * product);
-            (lateral_squared - (n - sheared), float(n))
+            (lateral_squared - (n - sheared), n)
         } else {
             (lateral_squared + sheared, 0.0)
         };
-        // Wanted at the ends of passes only. In plain f32: nothing of it is left in the sample path, nor is it counted.
-        let [x, y, z] = [side.x, side.y, side.z].map(float);
-        let outwards = real(float(b) * float(b) * (x * x + y * y + z * z) - n);
+        // Wanted at the ends of passes only: nothing of it is left in the sample path.
+        let Vec3 { x, y, z } = side;
+        let outwards = b * b * (x * x + y * y + z * z) - n;
         Ok(Contact {
             position: self.position,
             offset,
@@ -252,14 +252,10 @@ impl Local {
 
 #[cold]
 #[inline(never)]
-fn degenerate(area_squared: Real, f: Real) -> Fault {
+fn degenerate(area_squared: f32, f: f32) -> Fault {
     let eg = area_squared + f * f;
-    let sine = if eg > 0.0 {
-        sqrt(area_squared / eg)
-    } else {
-        real(0.0)
-    };
-    Fault::new(FaultKind::DegenerateSurface, float(sine))
+    let sine = if eg > 0.0 { sqrt(area_squared / eg) } else { 0.0 };
+    Fault::new(FaultKind::DegenerateSurface, sine)
 }
 
 /// A surface on one pass. The variant is a job's.
@@ -292,6 +288,23 @@ pub(crate) trait Pass {
     /// # Errors
     /// [`FaultKind::DegenerateSurface`] where there is no normal.
     fn contact(&self, fraction: u64, ball: &Ball) -> Result<Contact>;
+}
+
+impl Pass for Surface {
+    /// For a caller that has the time to find out what evaluates it.
+    #[inline(never)]
+    fn contact(&self, fraction: u64, ball: &Ball) -> Result<Contact> {
+        match self.pass() {
+            // To the bit the same, see there.
+            AnyPass::Polynomial(PolynomialPass(pass))
+            | AnyPass::Ruled(RuledPass(pass))
+            | AnyPass::Extruded(ExtrudedPass(pass)) => PolynomialPass(pass).contact(fraction, ball),
+            AnyPass::Rational(pass) => pass.contact(fraction, ball),
+            AnyPass::Pole(pass) => pass.contact(fraction, ball),
+            AnyPass::Profile(pass) => pass.contact(fraction, ball),
+            AnyPass::Circle(pass) => pass.contact(fraction, ball),
+        }
+    }
 }
 
 impl Surface {
@@ -333,24 +346,6 @@ impl Surface {
             AnyPass::Circle(pass) => pass.path(),
         }
     }
-
-    /// The contact at a fraction of the patch: for a caller that has the time to find out what evaluates it.
-    ///
-    /// # Errors
-    /// Those of [`Pass::contact`].
-    #[inline(never)]
-    pub(crate) fn contact(&self, fraction: u64, ball: &Ball) -> Result<Contact> {
-        match self.pass() {
-            // To the bit the same, see there.
-            AnyPass::Polynomial(PolynomialPass(pass))
-            | AnyPass::Ruled(RuledPass(pass))
-            | AnyPass::Extruded(ExtrudedPass(pass)) => PolynomialPass(pass).contact(fraction, ball),
-            AnyPass::Rational(pass) => pass.contact(fraction, ball),
-            AnyPass::Pole(pass) => pass.contact(fraction, ball),
-            AnyPass::Profile(pass) => pass.contact(fraction, ball),
-            AnyPass::Circle(pass) => pass.contact(fraction, ball),
-        }
-    }
 }
 
 /// A patch record's origin in nm, its shift, its collapsed boundaries and the blocks of its coordinates.
@@ -367,13 +362,13 @@ pub(crate) fn split_revolved(words: &[i32; REVOLVED_WORDS]) -> (u8, i32) {
 }
 
 /// Factors of a patch with these collapsed boundaries, fixed on this pass: a and 1/a.
-pub(crate) fn path_factor(edges: Edges, at: &PassLine) -> (Real, Real) {
+pub(crate) fn path_factor(edges: Edges, at: &PassLine) -> (f32, f32) {
     match edges.side_root() {
-        None => (real(1.0), real(1.0)),
+        None => (1.0, 1.0),
         Some(root) => {
             let factor = fraction_32(root.factor(at.side));
             let inverse = if factor > 0.0 { 1.0 / factor } else { 0.0 };
-            (real(factor), real(inverse))
+            (factor, inverse)
         }
     }
 }

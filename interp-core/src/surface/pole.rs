@@ -5,15 +5,14 @@
 //! of the pass, B vanishes there, and so does its second side derivative; they are divided by the root along the pass, and the
 //! quotient rule takes the reduced point.
 
+use super::Ball;
 use super::grid::GridPass;
 use super::lines::{Line, quotient_across, quotient_along};
 use super::range::{Edges, Root};
 use super::rational::{Weight, quarter};
 use super::{Contact, Factors, Local, Pass, PassLine, PathSpeed, path_factor};
-use crate::arith::{centred, centred_to_f32, cubic, jet, mul_q30, quarter_of, subtract, tangent};
 use crate::fault::Result;
-use crate::offset::Ball;
-use crate::scalar::{Real, real};
+use crate::math::arith::{centred, centred_to_f32, cubic, jet, mul_q30, quarter_of, subtract, tangent};
 
 /// Which derivative of the pass is reduced by a root.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -40,8 +39,8 @@ struct ReducedLine {
 pub(crate) struct Reduced {
     axes: [ReducedLine; 3],
     pole: Pole,
-    path_factor: Real,
-    inverse_path_factor: Real,
+    path_factor: f32,
+    inverse_path_factor: f32,
 }
 
 /// A patch with a pole on one pass.
@@ -56,8 +55,8 @@ impl Reduced {
             side2: [0; 4],
         }; 3],
         pole: Pole::Beside,
-        path_factor: real(1.0),
-        inverse_path_factor: real(1.0),
+        path_factor: 1.0,
+        inverse_path_factor: 1.0,
     };
 
     /// Divides the coordinates of a patch by the root of its flagged boundary.
@@ -192,7 +191,7 @@ impl Pass for PolePass<'_> {
     fn contact(&self, fraction: u64, ball: &Ball) -> Result<Contact> {
         let w = centred(fraction);
         let side = match self.0.reduced.pole {
-            Pole::Beside => real(1.0),
+            Pole::Beside => 1.0,
             Pole::AtEnd(root) => {
                 let [offset, slope] = root.linear();
                 offset + slope * centred_to_f32(w)

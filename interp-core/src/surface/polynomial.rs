@@ -4,14 +4,13 @@
 //! of x, y, z the 16 coefficients `c[i][j]` of `path^i side^j`, j fastest, in units of 2^-shift nm, both parameters centred
 //! (-1/2 to 1/2).
 
+use super::Ball;
 use super::grid::GridPass;
 use super::lines::{Line, coefficients, collapses, record_words, split};
 use super::range::{BAD_PATCH, Edges, HeadWord, fits};
 use super::{Contact, Factors, Local, Pass, PathSpeed};
-use crate::arith::{centred, cubic, jet, tangent};
 use crate::fault::Result;
-use crate::offset::Ball;
-use crate::scalar::{ONE, ZERO};
+use crate::math::arith::{centred, cubic, jet, tangent};
 
 /// Words of a polynomial patch.
 pub const POLYNOMIAL_WORDS: usize = 52;
@@ -100,9 +99,9 @@ fn local<const MIXED: bool, const SIDE2: bool>(pass: &GridPass, fraction: u64) -
         path2: [x2, y2, z2],
         mixed: [xm, ym, zm],
         side2: [side2(x), side2(y), side2(z)],
-        g: ONE,
-        inverse_g: ONE,
-        excess: ZERO,
+        g: 1.0,
+        inverse_g: 1.0,
+        excess: 0.0,
     }
 }
 
@@ -110,7 +109,7 @@ impl PolynomialPass<'_> {
     /// The parametrisation at a fraction of the patch.
     pub(crate) fn path_at(&self, fraction: u64) -> PathSpeed {
         let local = local::<false, false>(self.0, fraction);
-        PathSpeed::new(&local.path, &local.path2, ZERO, ONE)
+        PathSpeed::new(&local.path, &local.path2, 0.0, 1.0)
     }
 }
 
@@ -141,8 +140,8 @@ impl Pass for ExtrudedPass<'_> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::surface::PassLine;
     use crate::surface::grid::GridKind;
+    use crate::surface::{OffsetUnits, PassLine};
 
     /// What a shape leaves out is nothing: each agrees with the free one to the last bit.
     #[test]
@@ -167,7 +166,7 @@ mod tests {
                 let mut pass = GridPass::NONE;
                 pass.collapse(&block, Edges::default(), &at);
                 assert_eq!(pass.kind, want);
-                let ball = Ball::new(5.0, 3, 1.0);
+                let ball = Ball::new(&OffsetUnits::new(5.0, 3), 1.0);
                 for part in 0..16_u64 {
                     let fraction = part << 60;
                     let free = PolynomialPass(&pass).contact(fraction, &ball).unwrap();

@@ -5,16 +5,15 @@
 //! [1/2, 2) on the patch (a host scales it, and splits a patch whose weights vary more). Where a boundary collapses, the
 //! origin is that point, so that the numerators vanish there; at most one boundary of a patch may collapse.
 
+use super::Ball;
 use super::grid::GridPass;
 use super::lines::{Line, coefficients, collapses, record_words, split};
 use super::range::{BAD_PATCH, Edges, HeadWord, Root, fits, patch_bound};
 use super::{Contact, Factors, Local, Pass, PathSpeed};
-use crate::arith::{
+use crate::fault::Result;
+use crate::math::arith::{
     centred, cubic, jet, mul_hi, mul_q29, quarter_of, reciprocal_q29, subtract, tangent, to_f32,
 };
-use crate::fault::Result;
-use crate::offset::Ball;
-use crate::scalar::Real;
 
 /// Words of a rational patch.
 pub const RATIONAL_WORDS: usize = 68;
@@ -123,11 +122,11 @@ pub(super) struct Weight {
     /// 1/w in units of 2^-29.
     reciprocal: i32,
     /// w/4.
-    pub(super) g: Real,
+    pub(super) g: f32,
     /// 4/w.
-    pub(super) inverse_g: Real,
+    pub(super) inverse_g: f32,
     /// 2 w'/w.
-    pub(super) excess: Real,
+    pub(super) excess: f32,
     /// Derivatives in units of 2^-30: path, half of path,path; side, mixed, half of side,side.
     pub(super) path: i32,
     pub(super) path2: i32,

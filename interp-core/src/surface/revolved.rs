@@ -4,15 +4,13 @@
 //! centred profile parameter, units of 2^-shift nm, the height relative to its origin; the height's origin, nm; the start
 //! angle in turns (units of 2^-32, wrapping); the angle's extent in turns (units of 2^-31, above 0, at most 2^31).
 
+use super::Ball;
 use super::lines::turn_cubic;
 use super::range::{BAD_PATCH, SHIFT_MAX, bound, fits_range};
 use super::{Contact, Pass, PassLine, PathSpeed};
-use crate::arith::{angle, centred, count_to_f32, inverse_sqrt, jet, mul_q31, sin_cos, to_f32};
 use crate::fault::{Fault, FaultKind, Result};
-use crate::offset::Ball;
-use crate::scalar::Operation::Add;
-use crate::scalar::{ONE, Real, ZERO, note, real};
-use crate::vec3::Vec3;
+use crate::math::arith::{angle, centred, count_to_f32, inverse_sqrt, jet, mul_q31, sin_cos, to_f32};
+use crate::math::vec3::Vec3;
 
 /// Words of a revolved surface.
 pub const REVOLVED_WORDS: usize = 12;
@@ -115,7 +113,6 @@ const AXIS_UNITS: i32 = 4;
 /// Sine and cosine of an angle in turns (units of 2^-32), in units of 2^-31; 1 is a unit less.
 #[inline(always)]
 fn sin_cos_q31(turns: u32) -> [i32; 2] {
-    note([Add, Add]);
     let (sin, cos) = sin_cos(turns);
     [sin.saturating_add(sin), cos.saturating_add(cos)]
 }
@@ -157,7 +154,7 @@ impl Profile {
 impl ProfilePoint {
     /// First derivatives of radius and height, and the square of their length.
     #[inline(always)]
-    fn tangent(&self) -> ([Real; 2], Real) {
+    fn tangent(&self) -> ([f32; 2], f32) {
         let ([_, radius1, _], [_, height1, _]) = (self.radius, self.height);
         let tangent = [to_f32(radius1), to_f32(height1)];
         (tangent, plane_dot(tangent, tangent))
@@ -165,14 +162,14 @@ impl ProfilePoint {
 
     /// Second derivatives.
     #[inline(always)]
-    fn bend(&self) -> [Real; 2] {
+    fn bend(&self) -> [f32; 2] {
         let ([_, _, radius2], [_, _, height2]) = (self.radius, self.height);
         [2.0 * to_f32(radius2), 2.0 * to_f32(height2)]
     }
 }
 
 #[inline(always)]
-fn plane_dot([a0, a1]: [Real; 2], [b0, b1]: [Real; 2]) -> Real {
+fn plane_dot([a0, a1]: [f32; 2], [b0, b1]: [f32; 2]) -> f32 {
     a0 * b0 + a1 * b1
 }
 
@@ -188,17 +185,17 @@ pub(crate) struct ProfilePass {
     profile: Profile,
     sin: i32,
     cos: i32,
-    sin_float: Real,
-    cos_float: Real,
+    sin_float: f32,
+    cos_float: f32,
     /// Extent of the angle, rad per side.
-    extent_rad: Real,
+    extent_rad: f32,
     /// Ball radius in units, with the sign of the side that the tool is on.
-    radius: Real,
+    radius: f32,
 }
 
 impl ProfilePass {
     /// The profile at the pass's angle, for a ball of this radius in units.
-    pub(crate) fn collapse(&mut self, words: &[i32; REVOLVED_WORDS], at: &PassLine, radius: Real) {
+    pub(crate) fn collapse(&mut self, words: &[i32; REVOLVED_WORDS], at: &PassLine, radius: f32) {
         let record = RevolvedRecord::from_words(words);
         let [sin, cos] = sin_cos_q31(angle(record.start, record.extent, at.fraction));
         *self = Self {
@@ -207,7 +204,7 @@ impl ProfilePass {
             cos,
             sin_float: to_f32(sin) * SINE_UNIT,
             cos_float: to_f32(cos) * SINE_UNIT,
-            extent_rad: real(count_to_f32(record.extent) * RADIANS_PER_EXTENT),
+            extent_rad: count_to_f32(record.extent) * RADIANS_PER_EXTENT,
             radius,
         };
     }
@@ -257,9 +254,9 @@ impl Pass for ProfilePass {
             lateral_squared: lateral * lateral,
             across,
             outwards: across,
-            twist_squared: ZERO,
+            twist_squared: 0.0,
             speed_squared: e,
-            gauge: ONE,
+            gauge: 1.0,
         })
     }
 }
@@ -273,8 +270,8 @@ pub(crate) struct CirclePass {
     radius: i32,
     height: i32,
     /// Normal, away from the axis and up.
-    out: Real,
-    up: Real,
+    out: f32,
+    up: f32,
     /// The contact without position and offset, which is the same all around.
     shape: Contact,
 }
@@ -289,7 +286,7 @@ impl CirclePass {
         &mut self,
         words: &[i32; REVOLVED_WORDS],
         at: &PassLine,
-        radius: Real,
+        radius: f32,
     ) -> Result<()> {
         let record = RevolvedRecord::from_words(words);
         let point = Profile::new(&record, false).at(at.side);
@@ -306,7 +303,7 @@ impl CirclePass {
         let (inverse_speed, bend) = if speed > 0.0 {
             (1.0 / speed, -out * radius / circle_float)
         } else {
-            (real(0.0), real(0.0))
+            (0.0, 0.0)
         };
         let across = e - radius * plane_dot([out, up], point.bend());
         *self = Self {
@@ -320,14 +317,14 @@ impl CirclePass {
             shape: Contact {
                 path: PathSpeed {
                     inverse: inverse_speed,
-                    stretch: real(0.0),
+                    stretch: 0.0,
                 },
                 along: 1.0 - bend,
                 lateral_squared: e,
                 across,
                 outwards: across,
                 speed_squared: speed * speed,
-                gauge: real(1.0),
+                gauge: 1.0,
                 ..Contact::default()
             },
         };
@@ -353,7 +350,7 @@ impl Pass for CirclePass {
         let out = self.out * SINE_UNIT;
         Ok(Contact {
             position: [mul_q31(self.radius, cos), mul_q31(self.radius, sin), self.height],
-            offset: ball.offset(Vec3::new(out * to_f32(cos), out * to_f32(sin), self.up), ONE),
+            offset: ball.offset(Vec3::new(out * to_f32(cos), out * to_f32(sin), self.up), 1.0),
             ..self.shape
         })
     }

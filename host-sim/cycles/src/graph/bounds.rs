@@ -43,7 +43,7 @@ const BOUNDS: &[(&str, u32, &str)] = &[
     ),
     ("controller::step_output::StepOutput::turn", 3, "axes"),
     (
-        "interp_core::run::Run::step_far",
+        "interp_core::pass::run::Run::step_far",
         2,
         "patches of an arc: CROSSINGS_MAX + 1",
     ),
@@ -78,12 +78,12 @@ const BOUNDS: &[(&str, u32, &str)] = &[
         "neighbours to a side that a bound may come from: REACH",
     ),
     (
-        "interp_core::schedule::apart",
+        "interp_core::pass::schedule::apart",
         16,
         "spans between two passes: WALK_MAX",
     ),
     (
-        "interp_core::schedule::next_side",
+        "interp_core::pass::schedule::next_side",
         16,
         "boundaries between side spans: WALK_MAX",
     ),

@@ -60,13 +60,13 @@ pub fn make_ready(session: &mut Session, setup: &Setup) -> Result<(), RemoteErro
 /// Who gives commands while a run on the board's own clock is followed.
 pub trait Operator {
     /// What is wanted next, if anything is.
-    fn wish(&mut self) -> Option<Action>;
+    fn wish(&mut self) -> Option<Request>;
 
     /// Whether there is still somebody, who could resume a run that is held.
     fn is_there(&self) -> bool;
 
     /// What came of it: how the board was then, or that it refused.
-    fn told(&mut self, action: Action, came: Result<Status, RemoteError>);
+    fn told(&mut self, request: &Request, came: Result<Status, RemoteError>);
 }
 
 /// Follows a run, and hands on what its operator wants.
@@ -98,13 +98,13 @@ impl<'a> Following<'a> {
             return session.event();
         };
         loop {
-            if let Some(action) = operator.wish() {
-                let came = act(session, action);
+            if let Some(request) = operator.wish() {
+                let came = act(session, &request);
                 if let Err(RemoteError::Line(_) | RemoteError::Silent(_)) = came {
                     came?;
                 } else {
-                    self.commanded |= came.is_ok() && action != Action::Status;
-                    operator.told(action, came);
+                    self.commanded |= came.is_ok() && request != Request::Status;
+                    operator.told(&request, came);
                 }
             }
             session.set_patient(operator.is_there());
@@ -124,52 +124,13 @@ pub(super) fn keep_alive(session: &mut Session) -> Result<(), RemoteError> {
     Ok(())
 }
 
-/// What an operator wants.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Action {
-    /// To know how it is going.
-    Status,
-    /// The run to stand on its path.
-    Hold,
-    /// The run to go on.
-    Resume,
-    /// The run to stop, and be given up.
-    Stop,
-    /// The run to be given up; a fault of a run to be acknowledged.
-    Abort,
-    /// The feed as this share of the programmed one, percent.
-    Override(u8),
-    /// The drives on or off.
-    Drives(bool),
-    /// The axes to count as standing here, nm.
-    Home([i32; 3]),
-    /// Emergency stop and drive fault to be acknowledged.
-    Acknowledge,
-}
-
-impl Action {
-    fn request(self) -> Option<Request> {
-        Some(match self {
-            Self::Status => return None,
-            Self::Hold => Request::Hold,
-            Self::Resume => Request::Resume,
-            Self::Stop => Request::Stop,
-            Self::Abort => Request::Abort,
-            Self::Override(percent) => Request::Override { percent },
-            Self::Drives(on) => Request::Drives { on },
-            Self::Home(home_nm) => Request::SetHome { home_nm },
-            Self::Acknowledge => Request::Acknowledge,
-        })
-    }
-}
-
 /// Does it, and says how it is going then.
 ///
 /// # Errors
 /// The line breaks, or the board refuses.
-pub fn act(session: &mut Session, action: Action) -> Result<Status, RemoteError> {
-    if let Some(request) = action.request() {
-        session.command(&request)?;
+pub fn act(session: &mut Session, request: &Request) -> Result<Status, RemoteError> {
+    if *request != Request::Status {
+        session.command(request)?;
         // Taken up with the next period; a serial line is no faster than that, QEMU's socket may be.
         std::thread::sleep(Duration::from_millis(2));
     }

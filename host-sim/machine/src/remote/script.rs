@@ -1,9 +1,10 @@
 //! A script on a board in lockstep: its commands in exactly the periods that they have on the machine in this process.
 
+use interp_core::Command;
 use protocol::message::{Clock, Reason, Report, Request, Status};
 
 use super::session::{Event, RemoteError, Session};
-use crate::script::{Action, Inputs, Played, Script};
+use crate::script::{Inputs, Played, Script};
 
 /// When things happen, as the machine in this process found it.
 #[derive(Clone, Debug)]
@@ -40,20 +41,12 @@ impl Schedule {
     }
 }
 
-/// The request on the line; `None` where this version has none.
-const fn wire(action: Action) -> Request {
-    match action {
-        Action::Hold => Request::Hold,
-        Action::Resume => Request::Resume,
-        Action::Abort => Request::Abort,
-        Action::Start => Request::Start,
-        Action::Stop => Request::Stop,
-    }
-}
-
 /// What is sent before a period passes.
 fn sent(inputs: Inputs, begins: bool) -> impl Iterator<Item = Request> {
-    let action = inputs.action.or(begins.then_some(Action::Start)).map(wire);
+    let action = inputs
+        .action
+        .or(begins.then_some(Command::Start))
+        .map(Request::from);
     let percent = inputs
         .override_percent
         .map(|percent| Request::Override { percent });

@@ -16,61 +16,21 @@ mod play;
 
 use std::path::Path;
 
-use interp_core::Request;
+use interp_core::Command;
+pub use interp_core::command::{OVERRIDE_MAX_PERCENT, OVERRIDE_NORMAL_PERCENT};
 
 use job::JobError;
 
 pub use play::{Played, play};
 
-/// Greatest feed override, percent.
-pub const OVERRIDE_MAX_PERCENT: u8 = 200;
-/// The programmed feed.
-pub const OVERRIDE_NORMAL_PERCENT: u8 = 100;
 /// What a line looks like.
 const FORM: &str = "write a line as `tick N: hold`, with hold, resume, stop, abort, start or `override P`";
-
-/// A request of the operator.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Action {
-    /// Stand on the path.
-    Hold,
-    /// Go on.
-    Resume,
-    /// Give the run up, and leave the surface.
-    Stop,
-    /// Give the run up where it stands.
-    Abort,
-    /// Begin the job, once more.
-    Start,
-}
-
-impl Action {
-    const ALL: [(&'static str, Self); 5] = [
-        ("hold", Self::Hold),
-        ("resume", Self::Resume),
-        ("stop", Self::Stop),
-        ("abort", Self::Abort),
-        ("start", Self::Start),
-    ];
-
-    /// The core's request; `None` where this core knows none.
-    #[must_use]
-    pub const fn request(self) -> Request {
-        match self {
-            Self::Hold => Request::Hold,
-            Self::Resume => Request::Resume,
-            Self::Abort => Request::Abort,
-            Self::Start => Request::Start,
-            Self::Stop => Request::Stop,
-        }
-    }
-}
 
 /// What the operator does in one period.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Inputs {
-    /// A request.
-    pub action: Option<Action>,
+    /// A command.
+    pub action: Option<Command>,
     /// A new feed override, percent, which holds until the next.
     pub override_percent: Option<u8>,
 }
@@ -159,7 +119,7 @@ impl Script {
             .parse()
             .map_err(|_| wrong(format!("`{number}` is no number of a tick, 0 to {}", u32::MAX)))?;
         let inputs = read_action(action.trim())?;
-        if period == 0 && inputs.action.is_some_and(|action| action != Action::Start) {
+        if period == 0 && inputs.action.is_some_and(|action| action != Command::Start) {
             return Err((
                 format!(
                     "tick 0 begins the run, which leaves no room for `{}`",
@@ -212,14 +172,12 @@ fn read_action(text: &str) -> Result<Inputs, (String, String)> {
             )),
         };
     }
-    let action = Action::ALL
-        .iter()
-        .find(|(known, _)| *known == name && value.is_none());
+    let action = Command::from_name(name).filter(|_| value.is_none());
     action.map_or_else(
         || Err((format!("`{text}` is nothing an operator can do"), FORM.to_owned())),
-        |(_, action)| {
+        |action| {
             Ok(Inputs {
-                action: Some(*action),
+                action: Some(action),
                 override_percent: None,
             })
         },
@@ -242,10 +200,10 @@ mod tests {
             script.steps(),
             [
                 (0, inputs(None, Some(50))),
-                (12, inputs(Some(Action::Hold), None)),
-                (40, inputs(Some(Action::Resume), Some(150))),
-                (99, inputs(Some(Action::Abort), None)),
-                (120, inputs(Some(Action::Start), None)),
+                (12, inputs(Some(Command::Hold), None)),
+                (40, inputs(Some(Command::Resume), Some(150))),
+                (99, inputs(Some(Command::Abort), None)),
+                (120, inputs(Some(Command::Start), None)),
             ]
         );
         assert_eq!(script.at(40).override_percent, Some(150));

@@ -1,9 +1,9 @@
 //! A script on the machine in this process.
 
-use interp_core::{Fault, Sample, State};
+use interp_core::{Command, Fault, Sample, State};
 use protocol::digest::Digest;
 
-use super::{Action, Script};
+use super::Script;
 use crate::Machine;
 
 /// What a scripted run came to. Samples and digest are those of the last run that was begun, as on the board.
@@ -36,12 +36,11 @@ pub fn play(
     let mut feed_override = super::OVERRIDE_NORMAL_PERCENT;
     loop {
         let inputs = script.at(period);
-        let action = inputs.action.or((period == 0).then_some(Action::Start));
-        let request = action.map(Action::request).unwrap_or_default();
+        let command = inputs.action.or((period == 0).then_some(Command::Start));
         feed_override = inputs.override_percent.unwrap_or(feed_override);
-        let begins = request == interp_core::Request::Start && request.is_allowed(machine.state());
+        let begins = command == Some(Command::Start) && Command::Start.is_allowed(machine.state());
         let sample = machine.tick(interp_core::Inputs {
-            request,
+            command,
             feed_override,
         });
         let state = sample.state;

@@ -19,7 +19,6 @@ pub mod figures;
 pub mod geometry;
 pub mod table_1;
 
-use crate::operations;
 use approach::ApproachError;
 use job::{Job, Spacing};
 use oracle::Oracle;
@@ -175,11 +174,7 @@ pub fn study(step: &(dyn Fn() + Sync)) -> Result<Study, ApproachError> {
     let figures = Figures::new(&cases)?;
     step();
     let mut items = examples::items(&cases, &comparisons)?;
-    let operations = operations::table_1();
-    items.extend(table_1::items(
-        operations.as_ref(),
-        table_1::golden_cycles().as_ref(),
-    ));
+    items.extend(table_1::items(None, table_1::golden_cycles().as_ref()));
     step();
     Ok(Study {
         cases,

@@ -4,8 +4,8 @@ use super::cell::{Cell, between};
 use super::{Plan, REACH};
 use crate::feed::QUANTA_BITS;
 use crate::feed::demand::squared;
-use crate::feed::number::{Bounded, to_f32};
 use crate::feed::profile::{braked, landing};
+use crate::math::number::{Bounded, to_f32};
 
 impl Plan {
     /// Bounds of a cell, those of all after it known.

@@ -1,7 +1,7 @@
 //! The cells of a path, and which of them can be one.
 
 use crate::feed::QUANTA_BITS;
-use crate::feed::number::Bounded;
+use crate::math::number::Bounded;
 
 /// Most that squares of speeds, and accelerations, of cells may be apart for one cell to be made of them: it costs the feed half a percent
 /// at most.

@@ -1,9 +1,9 @@
 use super::*;
-use crate::encode;
 use crate::job::Header;
-use crate::lane::Line;
-use crate::patch::Patch;
-use crate::program::Program;
+use crate::job::encode;
+use crate::job::program::Program;
+use crate::pass::patch::Patch;
+use crate::pass::position::Line;
 use crate::sample::Place;
 use crate::surface::Edges;
 use std::vec::Vec;

@@ -1,16 +1,15 @@
 //! The patch that a pass is on: the surface at the pass's side parameter, and what ball, feed and scallop limit are in its units.
 
-use crate::arith::{centred, power_of_two};
 use crate::fault::Result;
-use crate::interval::Interval;
+use crate::job::program::Job;
 use crate::job::{SurfaceKind, ToolSide};
-use crate::lane::Line;
-use crate::offset::{Ball, origin_q30};
-use crate::program::Job;
-use crate::scalar::{Real, real};
+use crate::math::arith::{centred, power_of_two};
+use crate::pass::interval::Interval;
+use crate::pass::offset::{Locator, origin_q30};
+use crate::pass::position::Line;
 use crate::surface::{
-    CirclePass, GridPass, POLYNOMIAL_WORDS, PassLine, PathSpeed, ProfilePass, RATIONAL_WORDS, REVOLVED_WORDS,
-    Surface, split_patch, split_revolved,
+    Ball, CirclePass, GridPass, OffsetUnits, POLYNOMIAL_WORDS, PassLine, PathSpeed, ProfilePass,
+    RATIONAL_WORDS, REVOLVED_WORDS, Surface, split_patch, split_revolved,
 };
 
 /// A patch on a pass. Units are 2^-shift nm of the patch.
@@ -18,13 +17,14 @@ use crate::surface::{
 pub(crate) struct Patch {
     pub(crate) surface: Surface,
     pub(crate) ball: Ball,
+    pub(crate) locator: Locator,
     pub(crate) interval: Interval,
     /// Units of 2^-30 nm, see [`origin_q30`].
     pub(crate) origin: [i64; 3],
     /// One period's arc, units.
-    pub(crate) arc: Real,
+    pub(crate) arc: f32,
     /// Units a mm.
-    pub(crate) per_mm: Real,
+    pub(crate) per_mm: f32,
     /// The pass is a single point here.
     pub(crate) point: bool,
     /// The parametrisation at start and end, once [`Self::find_ends`] has it.
@@ -36,10 +36,11 @@ impl Patch {
     pub(crate) const NONE: Self = Self {
         surface: Surface::Grid(GridPass::NONE),
         ball: Ball::NONE,
+        locator: Locator::NONE,
         interval: Interval::NONE,
         origin: [0; 3],
-        arc: real(0.0),
-        per_mm: real(1.0),
+        arc: 0.0,
+        per_mm: 1.0,
         point: false,
         ends: None,
     };
@@ -140,8 +141,10 @@ impl Patch {
     /// Ball, feed and scallop limit in the patch's units.
     fn measure(&mut self, job: &Job<'_>, shift: u8, side_span: u16, sign: f32) {
         let header = job.header;
-        self.per_mm = real(1e6 * power_of_two(shift.into()));
-        self.ball = Ball::new(header.ball_radius_mm, shift, sign);
+        self.per_mm = 1e6 * power_of_two(shift.into());
+        let units = OffsetUnits::new(header.ball_radius_mm, shift);
+        self.ball = Ball::new(&units, sign);
+        self.locator = Locator::new(&units);
         self.arc = header.feed_mm_s * header.period_s * self.per_mm;
         let width = job.side_width(side_span);
         self.interval = Interval::new(header.ball_radius_mm, header.scallop_mm, self.per_mm, width);

@@ -6,17 +6,15 @@
 //! outside: in ticks that have little else to do, the density `1/interval^2` is taken on two lines beside it, half a step-over and a whole
 //! one further, at the same path parameter. The step to the next pass is the one over which the mean density makes the scallop.
 
-use crate::arith::sqrt;
-use crate::feed::number::Bounded;
-use crate::interval::interval;
 use crate::job::Header;
-use crate::lane::Line;
-use crate::patch::Patch;
-use crate::program::Job;
-use crate::sample::Place;
-use crate::scalar::{Real, float, real};
-use crate::schedule;
-use crate::surface::Contact;
+use crate::job::program::Job;
+use crate::math::arith::sqrt;
+use crate::math::number::Bounded;
+use crate::pass::patch::Patch;
+use crate::pass::position::Line;
+use crate::pass::schedule;
+use crate::sample::{Place, interval_of};
+use crate::surface::{Contact, Pass as _};
 
 /// A slack tick in so many looks across, at one line and the other in turn: the densities of neighbouring samples hardly differ.
 pub(crate) const EVERY: u32 = 4;
@@ -74,14 +72,14 @@ struct Beside {
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Densities {
     pub(crate) most: f32,
-    pub(crate) shape: [Real; 2],
+    pub(crate) shape: [f32; 2],
 }
 
 impl Densities {
     /// Of nothing.
     pub(crate) const NONE: Self = Self {
         most: 0.0,
-        shape: [real(0.0); 2],
+        shape: [0.0; 2],
     };
 }
 
@@ -124,7 +122,6 @@ impl Across {
     }
 
     /// Looks no more on this pass.
-    #[cfg(not(feature = "count"))]
     #[cfg(test)]
     pub(crate) fn rest(&mut self) {
         self.ends = [false; 2];
@@ -239,7 +236,7 @@ impl Beside {
 
     /// Chooses the line: by the step before, or by what the pass's samples so far would come to.
     fn aim(&mut self, job: &Job<'_>, line: &Line, most: f32, before: Option<f32>) -> Task {
-        self.step = before.unwrap_or_else(|| interval(most));
+        self.step = before.unwrap_or_else(|| interval_of(most));
         self.aimed = most;
         let spans = job.header.side_spans;
         let width = |span| job.side_width(span);
@@ -293,12 +290,12 @@ fn at_end(job: &Job<'_>, patch: &Patch, fraction: u64) -> f32 {
         return 0.0;
     };
     let density = exact_at(job, patch, &contact);
-    let part = float(contact.across / contact.outwards);
+    let part = contact.across / contact.outwards;
     // Not so at a pole, where it is a part of nothing, nor where the side line bends that much less that it rises slower.
     if !(part > 0.0 && part < 1.0) {
         return density;
     }
-    let mean = 0.5 * (1.0 + float(sqrt(real(part))));
+    let mean = 0.5 * (1.0 + sqrt(part));
     density / (mean * mean)
 }
 
@@ -309,10 +306,10 @@ fn exact_at(job: &Job<'_>, patch: &Patch, contact: &Contact) -> f32 {
 
 /// The density without the first order's approximations in h/r. The ball's circle instead of its parabola makes it 1/(1 - h/(2r)) of itself, and
 /// the scallop's own height above a surface of curvature c another 1 + h c; `across` over `lateral_squared` is 1 + r c.
-fn exact(header: &Header, density: f32, [across, lateral_squared]: [Real; 2]) -> f32 {
+fn exact(header: &Header, density: f32, [across, lateral_squared]: [f32; 2]) -> f32 {
     let height = header.scallop_mm / header.ball_radius_mm;
     let bend = if lateral_squared > 0.0 {
-        float(across / lateral_squared) - 1.0
+        across / lateral_squared - 1.0
     } else {
         0.0
     };
@@ -321,7 +318,7 @@ fn exact(header: &Header, density: f32, [across, lateral_squared]: [Real; 2]) ->
 
 /// The step x over which a density that begins as `here` has the mean `here + rise x`, which is 1/x^2.
 fn step_over(here: f32, rise: f32) -> f32 {
-    let first = interval(here);
+    let first = interval_of(here);
     // In units of the first order's step, where here = 1.
     let rise = rise * first / here;
     let mut step = 1.0_f32;
@@ -340,7 +337,6 @@ fn step_over(here: f32, rise: f32) -> f32 {
     step * first
 }
 
-#[cfg(not(feature = "count"))]
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -357,7 +353,7 @@ mod tests {
             assert!((height - 1.0).abs() < tolerance, "rise {rise}: {height}");
         }
         // No further than is known, and not without end.
-        let first = interval(1.0);
+        let first = interval_of(1.0);
         assert!((step_over(1.0, -1.0) / first - STEP_MAX).abs() < 1e-6);
         assert!((step_over(1.0, 1e9) / first - STEP_MIN).abs() < 1e-6);
         assert!(step_over(1.0, f32::NAN).is_finite());

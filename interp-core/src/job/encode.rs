@@ -2,7 +2,7 @@
 //! set-up code; nothing in the sample path uses it.
 //!
 //! ```
-//! use interp_core::{Header, Interpolator, Request, State, encode};
+//! use interp_core::{Header, Interpolator, Command, State, encode};
 //!
 //! // z = 20 - (x^2 + y^2)/100 on 80 mm x 60 mm, a shallow dome: c[axis][i][j] of u^i v^j, u and v from 0 to 1.
 //! let mut c = [[[0.0; 4]; 4]; 3];
@@ -28,9 +28,9 @@
 //! machine.load_check(0)?;
 //! machine.load_finish()?;
 //!
-//! let first = *machine.tick(Request::Start);
+//! let first = *machine.tick(Command::Start);
 //! assert_eq!(first.cc_nm, [-40_000_000, -30_000_000, -5_000_000]);
-//! let second = machine.tick(Request::None);
+//! let second = machine.tick(None);
 //! assert_eq!(second.state, State::Running);
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```

@@ -6,23 +6,21 @@
 //! the [`Sample::density`](crate::Sample::density), `1 / interval^2`, which is a product, and root and quotient are
 //! taken once a pass.
 
-use crate::arith::sqrt;
-use crate::scalar::{Real, float, real};
 use crate::surface::Contact;
 
 /// The densities of one ball and scallop limit on one patch.
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct Interval {
     /// 1 / (8 r h), per units^2, over the square of the side span's width.
-    factor: Real,
+    factor: f32,
 }
 
 impl Interval {
     /// No limit yet.
-    pub(crate) const NONE: Self = Self { factor: real(0.0) };
+    pub(crate) const NONE: Self = Self { factor: 0.0 };
 
     /// For a ball and a scallop limit, mm, on a patch with so many units a mm, in a span of this width.
-    pub(crate) fn new(radius_mm: f32, scallop_mm: f32, units_per_mm: Real, width: f32) -> Self {
+    pub(crate) fn new(radius_mm: f32, scallop_mm: f32, units_per_mm: f32, width: f32) -> Self {
         let span = units_per_mm * width;
         Self {
             factor: 1.0 / (8.0 * radius_mm * scallop_mm * (span * span)),
@@ -33,24 +31,14 @@ impl Interval {
     /// nothing.
     #[inline(always)]
     pub(crate) fn density(&self, contact: &Contact) -> f32 {
-        float(contact.across * contact.gauge * self.factor)
+        contact.across * contact.gauge * self.factor
     }
 }
 
-/// The interval of a density, in units of the side parameter; infinite where nothing sets a limit.
-#[must_use]
-pub(crate) fn interval(density: f32) -> f32 {
-    if density > 0.0 {
-        float(1.0 / sqrt(real(density)))
-    } else {
-        f32::INFINITY
-    }
-}
-
-#[cfg(not(feature = "count"))]
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::sample::interval_of;
 
     /// On a cylinder of radius R, machined lengthwise, the exact step-over is known: two balls on its outside meet at the
     /// scallop height h where the centres' angle a obeys (R + h)^2 + r^2 ... ; to first order sqrt(8 r h R/(R + r)).
@@ -64,7 +52,7 @@ mod tests {
                 ..Contact::default()
             };
             let density = Interval::new(r as f32, h as f32, 1.0, 1.0).density(&contact);
-            let got = f64::from(interval(density));
+            let got = f64::from(interval_of(density));
             // Exact: centres at R - side r, cusp at R - side h (side = +1 is the inside), half angle by the cosine law.
             let centre = radius - side * r;
             let cusp = radius - side * h;

@@ -14,9 +14,6 @@
     reason = "the conversions that lose bits are gathered here, each with its range"
 )]
 
-use crate::scalar::Operation::{Add, Convert, InverseRoot, Multiply, Shift, Sine, SquareRoot};
-use crate::scalar::{Real, float, note, real};
-
 /// 2^-32: turns a centred fixed-point parameter into a float.
 const UNIT_32: f32 = 1.0 / 4_294_967_296.0;
 
@@ -24,7 +21,6 @@ const UNIT_32: f32 = 1.0 / 4_294_967_296.0;
 #[inline(always)]
 #[must_use]
 pub(crate) fn mul_hi(a: i32, b: i32) -> i32 {
-    note([Multiply]);
     ((a as i64 * b as i64 + (1 << 31)) >> 32) as i32
 }
 
@@ -32,7 +28,6 @@ pub(crate) fn mul_hi(a: i32, b: i32) -> i32 {
 #[inline(always)]
 #[must_use]
 pub(crate) fn mul_q31(a: i32, b: i32) -> i32 {
-    note([Shift]);
     mul_hi(a, b) << 1
 }
 
@@ -40,7 +35,6 @@ pub(crate) fn mul_q31(a: i32, b: i32) -> i32 {
 #[inline(always)]
 #[must_use]
 pub(crate) fn mul_q30(a: i32, b: i32) -> i32 {
-    note([Shift]);
     mul_hi(a, b) << 2
 }
 
@@ -48,7 +42,6 @@ pub(crate) fn mul_q30(a: i32, b: i32) -> i32 {
 #[inline(always)]
 #[must_use]
 pub(crate) fn add(a: i32, b: i32) -> i32 {
-    note([Add]);
     a.wrapping_add(b)
 }
 
@@ -56,7 +49,6 @@ pub(crate) fn add(a: i32, b: i32) -> i32 {
 #[inline(always)]
 #[must_use]
 pub(crate) fn subtract(a: i32, b: i32) -> i32 {
-    note([Add]);
     a.wrapping_sub(b)
 }
 
@@ -64,7 +56,6 @@ pub(crate) fn subtract(a: i32, b: i32) -> i32 {
 #[inline(always)]
 #[must_use]
 pub(crate) fn quarter_of(value: i32) -> i32 {
-    note([Shift]);
     value >> 2
 }
 
@@ -121,7 +112,6 @@ pub(crate) fn dot_hi(a: &[i32; 3], b: &[i32; 3]) -> i32 {
 #[inline(always)]
 #[must_use]
 pub(crate) fn add_product(sum: i64, a: i32, b: i32) -> i64 {
-    note([Multiply, Add]);
     sum.wrapping_add(a as i64 * b as i64)
 }
 
@@ -129,7 +119,6 @@ pub(crate) fn add_product(sum: i64, a: i32, b: i32) -> i64 {
 #[inline(always)]
 #[must_use]
 pub(crate) fn whole_q30(value: i64) -> (i32, u32) {
-    note([Shift]);
     let high = (value >> 32) as u32;
     ((value >> 30) as i32, high ^ high << 1)
 }
@@ -143,16 +132,15 @@ pub(crate) const fn q30_to_f32(value: i64) -> f32 {
 /// A centred parameter as a float in [-1/2, 1/2].
 #[inline(always)]
 #[must_use]
-pub(crate) fn centred_to_f32(w: i32) -> Real {
+pub(crate) fn centred_to_f32(w: i32) -> f32 {
     to_f32(w) * UNIT_32
 }
 
 /// An integer as the nearest float.
 #[inline(always)]
 #[must_use]
-pub(crate) fn to_f32(value: i32) -> Real {
-    note([Convert]);
-    real(value as f32)
+pub(crate) fn to_f32(value: i32) -> f32 {
+    value as f32
 }
 
 /// A count below 2^24 as a float, exactly; larger ones rounded.
@@ -172,9 +160,8 @@ pub(crate) const fn fraction_32(value: u32) -> f32 {
 /// The integer towards zero; saturates, NaN is 0. One instruction, where rounding to nearest would take four.
 #[inline(always)]
 #[must_use]
-pub(crate) fn truncated(value: Real) -> i32 {
-    note([Convert]);
-    float(value) as i32
+pub(crate) fn truncated(value: f32) -> i32 {
+    value as i32
 }
 
 /// A value from 1 to 2^30 times the power of two that brings it to 2^29 or more, but below 2^30, and that power's exponent.
@@ -202,17 +189,15 @@ pub(crate) const fn centred(fraction: u64) -> i32 {
 #[inline(always)]
 #[must_use]
 pub(crate) fn advanced(fraction: u64, step: u64) -> Option<u64> {
-    note([Add]);
     fraction.checked_add(step)
 }
 
 /// A step of a fraction in units of 2^-64, exactly; none unless 2^-32 <= `step` < 2^-8 (or for a NaN). Seven cycles and a branch.
 #[inline(always)]
 #[must_use]
-pub(crate) fn small_step(step: Real) -> Option<u64> {
+pub(crate) fn small_step(step: f32) -> Option<u64> {
     const LEAST: u32 = 0x2f80_0000;
     const BEYOND: u32 = 0x3b80_0000;
-    note([Convert]);
     let bits = step.to_bits();
     if bits.wrapping_sub(LEAST) >= BEYOND - LEAST {
         return None;
@@ -226,8 +211,7 @@ pub(crate) fn small_step(step: Real) -> Option<u64> {
 
 /// A step of a fraction in units of 2^-64, rounded down; saturates at 0 and at 1 (NaN: 1).
 #[must_use]
-pub(crate) fn fraction_from_f32(step: Real) -> u64 {
-    note([Convert]);
+pub(crate) fn fraction_from_f32(step: f32) -> u64 {
     if step <= 0.0 {
         return 0;
     }
@@ -248,15 +232,13 @@ pub(crate) fn fraction_from_f32(step: Real) -> u64 {
 /// A fraction (units of 2^-64) as the nearest float.
 #[inline]
 #[must_use]
-pub(crate) fn fraction_to_f32(fraction: u64) -> Real {
-    note([Convert]);
-    real(fraction as f32) * (UNIT_32 * UNIT_32)
+pub(crate) fn fraction_to_f32(fraction: u64) -> f32 {
+    (fraction as f32) * (UNIT_32 * UNIT_32)
 }
 
 /// `a b / 2^BITS`, rounded to nearest, ties up.
 #[inline(always)]
 fn rounded<const BITS: u32>(a: i32, b: i32) -> i32 {
-    note([Multiply, Shift]);
     ((a as i64 * b as i64 + (1 << (BITS - 1))) >> BITS) as i32
 }
 
@@ -264,9 +246,8 @@ fn rounded<const BITS: u32>(a: i32, b: i32) -> i32 {
 /// step brings the 24 bits to 28, relative error below 2^-28.
 #[inline(always)]
 #[must_use]
-pub(crate) fn reciprocal_q29(weight_q30: i32, reciprocal: Real) -> i32 {
+pub(crate) fn reciprocal_q29(weight_q30: i32, reciprocal: f32) -> i32 {
     let first = truncated(reciprocal * 536_870_912.0);
-    note([Multiply, Add, Shift]);
     let error_q31 = (((1_i64 << 59) - first as i64 * weight_q30 as i64) >> 28) as i32;
     add(first, rounded::<31>(first, error_q31))
 }
@@ -282,7 +263,6 @@ pub(crate) fn mul_q29(a: i32, b: i32) -> i32 {
 #[inline(always)]
 #[must_use]
 pub(crate) fn angle(start: u32, extent_q31: u32, fraction: u64) -> u32 {
-    note([Multiply, Shift, Add]);
     start.wrapping_add((((fraction >> 32) * extent_q31 as u64 + (1 << 30)) >> 31) as u32)
 }
 
@@ -291,8 +271,7 @@ pub(crate) fn angle(start: u32, extent_q31: u32, fraction: u64) -> u32 {
 #[must_use]
 #[cfg(target_arch = "arm")]
 #[allow(unsafe_code, reason = "the hardware square root has no stable intrinsic")]
-pub(crate) fn sqrt(value: Real) -> Real {
-    note([SquareRoot]);
+pub(crate) fn sqrt(value: f32) -> f32 {
     let mut bits = value.to_bits();
     // SAFETY: vsqrt.f32 reads and writes s0 alone, which is declared clobbered; no memory and no flags are touched.
     // FPSCR's sticky exception bits may change, which nothing reads.
@@ -313,9 +292,8 @@ pub(crate) fn sqrt(value: Real) -> Real {
 #[inline(always)]
 #[must_use]
 #[cfg(not(target_arch = "arm"))]
-pub(crate) fn sqrt(value: Real) -> Real {
-    note([SquareRoot]);
-    real(libm::sqrtf(float(value)))
+pub(crate) fn sqrt(value: f32) -> f32 {
+    libm::sqrtf(value)
 }
 
 /// `1 / sqrt(value)` for values from 2^-125 on, within 1.5 units in the last place: an estimate from the bits (3.4 %), two Newton
@@ -328,10 +306,9 @@ pub(crate) fn sqrt(value: Real) -> Real {
 /// 1.22 units. Below 2^-125 `half` loses its last bit (2.2 units).
 #[inline(always)]
 #[must_use]
-pub(crate) fn inverse_sqrt(value: Real) -> Real {
-    note([InverseRoot, Shift, Add]);
+pub(crate) fn inverse_sqrt(value: f32) -> f32 {
     let half = 0.5 * value;
-    let estimate = Real::from_bits(0x5f37_59df - (value.to_bits() >> 1));
+    let estimate = f32::from_bits(0x5f37_59df - (value.to_bits() >> 1));
     let first = estimate * (1.5 - half * estimate * estimate);
     let second = first * (1.5 - half * first * first);
     second + second * (0.5 - half * second * second)
@@ -369,7 +346,6 @@ fn quintic(c: &[i32; 6], z: i32) -> i32 {
 #[inline]
 #[must_use]
 pub(crate) fn sin_cos(turns: u32) -> (i32, i32) {
-    note([Sine, Sine, Add, Add, Multiply, Shift, Shift, Shift]);
     let quarter = turns.wrapping_add(1 << 29) >> 30;
     // t in [-1, 1): eighths of a turn, units of 2^-31.
     let t = (turns.wrapping_sub(quarter << 30) << 2) as i32;
@@ -384,7 +360,6 @@ pub(crate) fn sin_cos(turns: u32) -> (i32, i32) {
     }
 }
 
-#[cfg(not(feature = "count"))]
 #[cfg(test)]
 mod tests {
     use super::*;

@@ -5,9 +5,9 @@
 //! [`Task`] each. A boundary that is reached sooner has what is missing made in its own tick.
 
 use crate::fault::Result;
-use crate::patch::Patch;
-use crate::program::Job;
-use crate::sample::Place;
+use crate::job::program::Job;
+use crate::pass::patch::Patch;
+use crate::pass::position::Line;
 
 /// What is to be made next. In this order.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -22,28 +22,6 @@ enum Task {
     Done,
     /// The next patch is faulty: nothing is made ahead, and the fault is for the tick that gets there.
     Faulty,
-}
-
-/// Where a pass runs, and which patch of it.
-#[derive(Clone, Copy, Debug)]
-pub(crate) struct Line {
-    pub(crate) side: Place,
-    pub(crate) reversed: bool,
-    /// Path span, in the surface's own direction.
-    pub(crate) span: u16,
-}
-
-impl Line {
-    /// The next patch along the pass, if there is one.
-    pub(crate) fn next(self, spans: u16) -> Option<Self> {
-        let span = if self.reversed {
-            self.span.checked_sub(1)
-        } else {
-            self.span.checked_add(1)
-        };
-        let span = span.filter(|span| *span < spans)?;
-        Some(Self { span, ..self })
-    }
 }
 
 /// Two patches, of which the run is on one.
@@ -87,7 +65,6 @@ impl Lane {
     }
 
     /// Makes nothing more ahead on this patch.
-    #[cfg(not(feature = "count"))]
     #[cfg(test)]
     pub(crate) fn rest(&mut self) {
         self.task = Task::Faulty;

@@ -1,10 +1,8 @@
 //! Step 3: from cutter contact to cutter location, `CL = CC + r N` (Lo 1998, eqns 2 and 3), and whether the ball fits.
 
-use crate::arith::{add_product, power_of_two, q30_to_f32, sqrt, to_f32, to_top, truncated, whole_q30};
 use crate::fault::{Fault, FaultKind, Result};
-use crate::scalar::{Real, float, real};
-use crate::surface::{Contact, SHIFT_MAX};
-use crate::vec3::Vec3;
+use crate::math::arith::{add_product, power_of_two, q30_to_f32, sqrt, truncated, whole_q30};
+use crate::surface::{Contact, OffsetUnits};
 
 /// Least room between ball and surface, as 1 - r k: the f32 curvature is good to a few 1e-6, so a ball that is within 1e-5
 /// of the surface's own radius counts as not fitting.
@@ -19,14 +17,9 @@ const POLE_MIN: f32 = 1e-10;
 /// has a radius below the scallop height.
 const FOLD_COSINE: f32 = -0.5;
 
-/// The ball on one patch, whose units are 2^-shift nm. Its offsets are in units of 2^-fine nm, the finest in which the radius is below
-/// 2^30: the same on every patch of a job.
+/// From contact to cutter location on one patch.
 #[derive(Clone, Copy, Debug, Default)]
-pub(crate) struct Ball {
-    /// r in the offsets' units, with the sign that turns `path x side` towards the tool.
-    signed_radius: Real,
-    /// What one count of the upper word of (offset . half second derivative) means for r k |.|^2, units^2.
-    product: Real,
+pub(crate) struct Locator {
     /// Least upper word of the product of two neighbours' offsets.
     fold_min: i32,
     /// The patch's unit and the offsets', in units of 2^-30 nm.
@@ -41,74 +34,28 @@ pub(crate) struct Located {
     pub(crate) cl_nm: [i32; 3],
 }
 
-impl Ball {
-    /// No ball yet.
+impl Locator {
+    /// No patch yet.
     pub(crate) const NONE: Self = Self {
-        signed_radius: real(0.0),
-        product: real(0.0),
         fold_min: 0,
         unit: 0,
         offset_unit: 0,
     };
 
-    /// The ball of this radius, 1e-6 to 1000 mm, for a patch in units of 2^-shift nm.
-    pub(crate) fn new(radius_mm: f32, shift: u8, sign: f32) -> Self {
-        let shift = shift.min(SHIFT_MAX);
-        let (radius, fine) = to_top(radius_mm * 1e6);
-        let change = i32::from(shift) - i32::from(fine);
+    /// For these units.
+    pub(crate) fn new(units: &OffsetUnits) -> Self {
+        let radius = units.radius;
         Self {
-            signed_radius: real(sign * radius),
-            product: real(power_of_two(33 + change)),
-            fold_min: truncated(real(radius * power_of_two(-32) * radius * FOLD_COSINE)),
-            unit: 1 << (30 - shift),
-            offset_unit: 1 << (30 - fine),
+            fold_min: truncated(radius * power_of_two(-32) * radius * FOLD_COSINE),
+            unit: 1 << (30 - units.shift),
+            offset_unit: 1 << (30 - units.fine),
         }
-    }
-
-    /// `r N` from a vector along the normal: `vector` times `inverse` is a unit vector. Within a unit.
-    #[inline(always)]
-    pub(crate) fn offset(&self, vector: Vec3, inverse: Real) -> [i32; 3] {
-        let Vec3 { x, y, z } = vector * (self.signed_radius * inverse);
-        [truncated(x), truncated(y), truncated(z)]
-    }
-
-    /// What one count of the upper word of (offset . half a second derivative) is of `r` times a second fundamental form, units^2.
-    #[inline(always)]
-    pub(crate) const fn product(&self) -> Real {
-        self.product
-    }
-
-    /// The unit normal of an offset.
-    pub(crate) fn normal(&self, offset: [i32; 3]) -> [f32; 3] {
-        let inverse = 1.0 / self.signed_radius.abs();
-        offset.map(|x| float(to_f32(x) * inverse))
     }
 
     /// Whether the product of two neighbours' offsets says that the surface has folded over between them.
     #[inline(always)]
     pub(crate) const fn folds(&self, product: i32) -> bool {
         product < self.fold_min
-    }
-
-    /// The ball touches the surface in this point alone, up to second order: with t along the path and d across it,
-    /// `I - r II` is positive definite, so that no principal curvature towards the tool reaches 1/r.
-    ///
-    /// # Errors
-    /// [`FaultKind::BallDoesNotFit`], its value r times the larger principal curvature (along the path where that alone is
-    /// too much).
-    #[inline(always)]
-    pub(crate) fn check_fit(&self, contact: &Contact) -> Result<()> {
-        let room = ROOM_MIN * contact.lateral_squared;
-        if contact.along > ROOM_MIN && contact.along * contact.across - contact.twist_squared > room {
-            return Ok(());
-        }
-        explain_fit(
-            contact.along,
-            contact.across,
-            contact.twist_squared,
-            contact.lateral_squared,
-            contact.speed_squared,
-        )
     }
 
     /// Cutter contact and location on a patch with this origin ([`origin_q30`]), each rounded to the nanometre once.
@@ -155,31 +102,46 @@ impl Ball {
     }
 }
 
+/// The ball touches the surface in this point alone, up to second order: with t along the path and d across it,
+/// `I - r II` is positive definite, so that no principal curvature towards the tool reaches 1/r.
+///
+/// # Errors
+/// [`FaultKind::BallDoesNotFit`], its value r times the larger principal curvature (along the path where that alone is
+/// too much).
+#[inline(always)]
+pub(crate) fn check_fit(contact: &Contact) -> Result<()> {
+    let room = ROOM_MIN * contact.lateral_squared;
+    if contact.along > ROOM_MIN && contact.along * contact.across - contact.twist_squared > room {
+        return Ok(());
+    }
+    explain_fit(
+        contact.along,
+        contact.across,
+        contact.twist_squared,
+        contact.lateral_squared,
+        contact.speed_squared,
+    )
+}
+
 /// A patch's origin in units of 2^-30 nm, and half a nanometre for the rounding.
 pub(crate) fn origin_q30(origin_nm: [i32; 3]) -> [i64; 3] {
     origin_nm.map(|nm| (i64::from(nm) << 30) + (1 << 29))
 }
 
-/// The uncommon end of [`Ball::check_fit`]: a pole, or the fault with its value.
+/// The uncommon end of [`check_fit`]: a pole, or the fault with its value.
 #[cold]
 #[inline(never)]
-fn explain_fit(
-    along: Real,
-    across: Real,
-    twist_squared: Real,
-    lateral: Real,
-    speed_squared: Real,
-) -> Result<()> {
+fn explain_fit(along: f32, across: f32, twist_squared: f32, lateral: f32, speed_squared: f32) -> Result<()> {
     if !(lateral > POLE_MIN * speed_squared) {
         return if along > ROOM_MIN {
             Ok(())
         } else {
-            Err(Fault::new(FaultKind::BallDoesNotFit, float(1.0 - along)))
+            Err(Fault::new(FaultKind::BallDoesNotFit, 1.0 - along))
         };
     }
     // Least eigenvalue of [[along, t], [t, across]] with the lateral speed scaled out; 1 minus it is r k.
     let (p, q, t_squared) = (along, across / lateral, twist_squared / lateral);
     let half = 0.5 * (p - q);
     let least = 0.5 * (p + q) - sqrt(half * half + t_squared);
-    Err(Fault::new(FaultKind::BallDoesNotFit, float(1.0 - least)))
+    Err(Fault::new(FaultKind::BallDoesNotFit, 1.0 - least))
 }

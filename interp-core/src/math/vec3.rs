@@ -1,25 +1,24 @@
 //! Three scalars, and the products the geometry needs.
 
-use crate::arith::to_f32;
-use crate::scalar::Real;
+use crate::math::arith::to_f32;
 use core::ops::{Add, Mul, Sub};
 
 /// A vector in a patch's units, or a derivative.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(crate) struct Vec3 {
     /// Along x.
-    pub(crate) x: Real,
+    pub(crate) x: f32,
     /// Along y.
-    pub(crate) y: Real,
+    pub(crate) y: f32,
     /// Along z.
-    pub(crate) z: Real,
+    pub(crate) z: f32,
 }
 
 impl Vec3 {
     /// A vector from its components.
     #[inline(always)]
     #[must_use]
-    pub(crate) const fn new(x: Real, y: Real, z: Real) -> Self {
+    pub(crate) const fn new(x: f32, y: f32, z: f32) -> Self {
         Self { x, y, z }
     }
 
@@ -33,7 +32,7 @@ impl Vec3 {
     /// Scalar product.
     #[inline(always)]
     #[must_use]
-    pub(crate) fn dot(self, other: Self) -> Real {
+    pub(crate) fn dot(self, other: Self) -> f32 {
         self.x * other.x + self.y * other.y + self.z * other.z
     }
 
@@ -65,10 +64,10 @@ impl Sub for Vec3 {
     }
 }
 
-impl Mul<Real> for Vec3 {
+impl Mul<f32> for Vec3 {
     type Output = Self;
     #[inline(always)]
-    fn mul(self, factor: Real) -> Self {
+    fn mul(self, factor: f32) -> Self {
         Self::new(self.x * factor, self.y * factor, self.z * factor)
     }
 }

@@ -3,23 +3,21 @@
 //!
 //! Stations are the surface's, not the samples': however a run is held up, its passes lie in the same places.
 
-use crate::across::{Across, Densities};
+use crate::command::OVERRIDE_MAX;
 use crate::fault::{Fault, FaultKind, Result};
 use crate::feed::demand::{Jump, Room, Stencil, over_jump, root};
-use crate::feed::nm_to_mm;
-use crate::feed::number::Bounded;
 use crate::feed::plan::{CELLS_MOVING, Plan, Top};
-use crate::interval::interval;
+use crate::job::program::Job;
 use crate::job::{Axes, Pattern, Spacing};
-use crate::lane::Line;
-use crate::patch::Patch;
-use crate::program::Job;
-use crate::sample::Place;
-use crate::scalar::float;
-use crate::schedule;
+use crate::math::number::{Bounded, nm_to_mm};
+use crate::pass::across::{Across, Densities};
+use crate::pass::patch::Patch;
+use crate::pass::position::Line;
+use crate::pass::schedule;
+use crate::sample::{Place, interval_of};
 use crate::surface::{Contact, PathSpeed};
 
-/// Cells that a pass is cut into, as near as whole parts of its patches come to it; no more than [`crate::feed::CELLS_MAX`].
+/// Cells that a pass is cut into, as near as whole parts of its patches come to it; no more than [`crate::job::CELLS_MAX`].
 const CELLS_WANTED: u16 = 160;
 /// Cells of a patch at most.
 const PARTS_MAX: u16 = 64;
@@ -27,10 +25,6 @@ const PARTS_MAX: u16 = 64;
 const NO_JUMP: f32 = 4e-6;
 /// Cells before a station that its differences say something about.
 const STENCIL_CELLS: usize = 2;
-/// Least z of the normal towards the tool where a surface counts as facing up, or sideways at most: 0, but for the noise of a normal.
-pub(crate) const UP_MIN: f32 = -2e-6;
-/// Greatest feed override, of 1.
-pub(crate) const OVERRIDE_MAX: f32 = 2.0;
 
 /// One pass: its bounds, its ends, and what follows from it.
 #[derive(Clone, Debug)]
@@ -318,9 +312,7 @@ impl Lookahead {
     fn visit(&mut self, axes: &Axes, out: &mut PassPlan) -> Result<()> {
         let fraction = self.fraction(out);
         let patch = &self.patch;
-        let contact = patch.surface.contact(fraction, &patch.ball)?;
-        patch.ball.check_fit(&contact)?;
-        let located = patch.ball.locate(&contact, &patch.origin)?;
+        let (contact, located) = patch.evaluate(fraction)?;
         check_travel(axes, &located.cl_nm)?;
         check_height(axes, &located.cl_nm)?;
         let density = patch.interval.density(&contact);
@@ -330,8 +322,7 @@ impl Lookahead {
                 shape: [contact.across, contact.lateral_squared],
             };
         }
-        let [_, _, nz] = patch.ball.normal(contact.offset);
-        let is_up = nz > UP_MIN;
+        let is_up = patch.ball.faces_up(contact.offset);
         let begins = out.plan.count() == 0 && self.station == 0;
         if begins || out.point {
             (out.ends, out.up) = ([located.cl_nm; 2], [is_up; 2]);
@@ -370,20 +361,20 @@ impl Lookahead {
     /// Arc from the last station, mm: Hermite's rule of two points.
     fn cell_length(&self, out: &PassPlan, contact: &Contact) -> f32 {
         let length = 1.0 / f32::from(out.parts);
-        let (first, last) = (1.0 / float(self.speed.inverse), 1.0 / float(contact.path.inverse));
-        let bow = first * float(self.speed.stretch) - last * float(contact.path.stretch);
-        length * (0.5 * (first + last) + bow * length * (1.0 / 12.0)) / float(self.patch.per_mm)
+        let (first, last) = (1.0 / self.speed.inverse, 1.0 / contact.path.inverse);
+        let bow = first * self.speed.stretch - last * contact.path.stretch;
+        length * (0.5 * (first + last) + bow * length * (1.0 / 12.0)) / self.patch.per_mm
     }
 
     /// What jumps from the patch before to this one holds the feed back at the boundary: curvatures at once, their slopes when there are
     /// three stations on this side, too.
     fn watch_jumps(&mut self, axes: &Axes, contact: &Contact, length: f32, top: &Top, out: &mut PassPlan) {
         let twist = if contact.lateral_squared > 0.0 {
-            root(float(contact.twist_squared / contact.lateral_squared))
+            root(contact.twist_squared / contact.lateral_squared)
         } else {
             0.0
         };
-        let value = [float(contact.along), twist];
+        let value = [contact.along, twist];
         let before = self.trail.values[0];
         if self.station == 0 {
             let first = changed(&before, &value, NO_JUMP);
@@ -426,7 +417,7 @@ impl Lookahead {
     fn close(&mut self, job: &Job<'_>, out: &mut PassPlan) -> Result<()> {
         out.plan.settle(&top(job));
         let header = job.header;
-        out.interval = interval(self.densities.most);
+        out.interval = interval_of(self.densities.most);
         let step = match header.spacing {
             Spacing::Exact if !out.point => self.across.step(header, self.densities),
             _ => out.interval,

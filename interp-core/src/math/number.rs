@@ -21,6 +21,21 @@ impl Bounded for f32 {
     }
 }
 
+/// Nanometres in a millimetre.
+pub(crate) const NM_PER_MM: f32 = 1e6;
+
+/// Millimetres in a nanometre.
+pub(crate) const MM_PER_NM: f32 = 1.0 / NM_PER_MM;
+
+/// Nanometres as mm, to 24 bits.
+#[allow(
+    clippy::cast_precision_loss,
+    reason = "the last digits count below 2^24 nm only"
+)]
+pub(crate) fn nm_to_mm(nm: i32) -> f32 {
+    nm as f32 * MM_PER_NM
+}
+
 /// 2^32.
 const HIGH: f32 = 4_294_967_296.0;
 
@@ -51,7 +66,6 @@ pub(crate) const fn to_quanta(value: f32) -> i64 {
     (high as i64) << 32 | low as i64
 }
 
-#[cfg(not(feature = "count"))]
 #[cfg(test)]
 mod tests {
     use proptest::prelude::*;

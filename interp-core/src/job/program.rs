@@ -1,8 +1,9 @@
 //! A job in the machine: raw words go in, and only a complete, checked job comes out.
 
+use crate::command::OVERRIDE_MAX;
 use crate::fault::{Fault, FaultKind, Result};
-use crate::job::{Axes, Header, SPANS_MAX, SurfaceKind};
-use crate::schedule::width_words;
+use crate::job::{Axes, CELLS_MAX, Header, SPANS_MAX, STEP_MAX_MM, SurfaceKind, width_words};
+use crate::math::number::nm_to_mm;
 use crate::surface::{
     POLYNOMIAL_WORDS, PolynomialRecord, RATIONAL_WORDS, REVOLVED_WORDS, RationalRecord, RevolvedRecord,
     split_patch,
@@ -96,11 +97,11 @@ fn check_axes(header: &Header, axes: &Axes) -> Result<()> {
     if !(axes.plunge_mm >= 0.0 && axes.plunge_mm <= 1e3) {
         return bad(axes.plunge_mm);
     }
-    // Twice the feed, which an override may ask for, has to fit a step.
-    if 2.0 * header.feed_mm_s * header.period_s > crate::feed::STEP_MAX_MM {
+    // The greatest feed that an override may ask for has to fit a step.
+    if OVERRIDE_MAX * header.feed_mm_s * header.period_s > STEP_MAX_MM {
         return bad(header.feed_mm_s);
     }
-    if usize::from(header.path_spans) > crate::feed::CELLS_MAX {
+    if usize::from(header.path_spans) > CELLS_MAX {
         return bad(f32::from(header.path_spans));
     }
     let [x, y, z] = axes.home_nm;
@@ -109,7 +110,7 @@ fn check_axes(header: &Header, axes: &Axes) -> Result<()> {
         .zip(axes.travel_nm.into_iter().chain([axes.travel_nm[2]]))
     {
         if !(least..=most).contains(&place) {
-            return bad(crate::feed::nm_to_mm(place));
+            return bad(nm_to_mm(place));
         }
     }
     Ok(())
@@ -311,9 +312,9 @@ impl<'a> Job<'a> {
 }
 
 fn bad_patch(record: u32) -> Fault {
-    Fault::new(FaultKind::BadPatch, crate::arith::count_to_f32(record))
+    Fault::new(FaultKind::BadPatch, crate::math::arith::count_to_f32(record))
 }
 
 fn bad_length(words: u32) -> Fault {
-    Fault::new(FaultKind::BadLength, crate::arith::count_to_f32(words))
+    Fault::new(FaultKind::BadLength, crate::math::arith::count_to_f32(words))
 }

@@ -10,6 +10,9 @@
 //!
 //! The records are described in the files of [`crate::surface`].
 
+pub mod encode;
+pub(crate) mod program;
+
 /// Words of surface data that the reference machine stores: 64 KiB of its 128 KiB RAM, hence 309 polynomial or 237
 /// rational patches ([`patches_max`]).
 pub const STORE_WORDS: usize = 16_384;
@@ -28,6 +31,17 @@ pub const fn patches_max(kind: SurfaceKind, store_words: usize) -> usize {
 
 /// Spans a surface may have in one direction. It bounds every loop over spans.
 pub const SPANS_MAX: u16 = 1_024;
+
+/// Longest step of a period on a machine with limits, mm.
+pub(crate) const STEP_MAX_MM: f32 = 2.0;
+
+/// Cells into which the look-ahead may cut a path, and so the patches that a pass may have on a machine with limits.
+pub(crate) const CELLS_MAX: usize = 256;
+
+/// Words of the span widths that head a job's data.
+pub(crate) fn width_words(path_spans: u16, side_spans: u16) -> u32 {
+    u32::from(path_spans) + u32::from(side_spans)
+}
 
 /// The kind of surface, and with it the record of its data.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]

@@ -1,20 +1,19 @@
 //! From pass to pass: straight legs in the open, or a step along the boundary on the surface. Each is a path of its own, followed from
 //! standstill to standstill by the same profile as the passes.
 
-use crate::arith::sqrt;
 use crate::fault::{Fault, FaultKind, Result};
 use crate::feed::QUANTA_PER_MM;
 use crate::feed::demand::{Room, Stencil, squared};
-use crate::feed::number::{Bounded, to_f32};
 use crate::feed::plan::{CELLS_STANDING, Plan, Top};
 use crate::job::Axes;
-use crate::lane::Line;
-use crate::offset::Located;
-use crate::patch::Patch;
-use crate::program::Job;
+use crate::job::program::Job;
+use crate::math::arith::sqrt;
+use crate::math::number::{Bounded, MM_PER_NM, to_f32};
+use crate::pass::offset::Located;
+use crate::pass::patch::Patch;
+use crate::pass::position::Line;
+use crate::pass::schedule;
 use crate::sample::Place;
-use crate::scalar::{float, real};
-use crate::schedule;
 
 /// Cells of a step along the boundary.
 const STEP_CELLS: u16 = 8;
@@ -60,7 +59,7 @@ impl Leg {
         }
         let mm = apart.map(to_mm);
         let [x, y, z] = mm;
-        let length = float(sqrt(real(x * x + y * y + z * z)));
+        let length = sqrt(x * x + y * y + z * z);
         let cosines = mm.map(|mm| mm / length);
         let room = Room::straight(axes, &cosines);
         let speed = crate::feed::demand::root(room.square);
@@ -163,9 +162,8 @@ impl Step {
             side.unwrap_or(self.from)
         };
         patch.collapse(job, &Line { side, ..self.line })?;
-        let contact = patch.surface.contact(u64::MAX, &patch.ball)?;
-        patch.ball.check_fit(&contact)?;
-        patch.ball.locate(&contact, &patch.origin)
+        let (_, located) = patch.evaluate(u64::MAX)?;
+        Ok(located)
     }
 
     /// Plans, in portions: where a station is, or what its cell leaves; whether the step can be gone, or is too short to be one (`None`).
@@ -186,7 +184,7 @@ impl Step {
         let Some(here) = self.here.take() else {
             let part = f32::from(self.station) / f32::from(STEP_CELLS);
             let here = self.locate(job, patch, part)?;
-            crate::lookahead::check_travel(axes, &here.cl_nm)?;
+            crate::sequence::lookahead::check_travel(axes, &here.cl_nm)?;
             self.here = Some(here);
             return Ok(Some(false));
         };
@@ -255,11 +253,11 @@ fn distance(from: &[i32; 3], to: &[i32; 3]) -> f32 {
     for (from, to) in from.iter().zip(to) {
         sum += squared(to_mm(i64::from(*to) - i64::from(*from)));
     }
-    float(sqrt(real(sum)))
+    sqrt(sum)
 }
 
 fn to_mm(nm: i64) -> f32 {
-    to_f32(nm) * 1e-6
+    to_f32(nm) * MM_PER_NM
 }
 
 /// A step is short: 24 bits of it are below a nanometre.

@@ -1,10 +1,9 @@
 //! Steps 5 and 6: from pass to pass, `v_next = v + min(dv over the pass)`, until the side parameter reaches its other
 //! boundary; the last pass lies exactly on it.
 
-use crate::arith::{fraction_32, fraction_from_f32, fraction_to_f32};
 use crate::fault::{Fault, FaultKind, Result};
+use crate::math::arith::{fraction_32, fraction_from_f32, fraction_to_f32};
 use crate::sample::Place;
-use crate::scalar::{float, real};
 
 /// Boundaries between side spans that an interval reaches over at most, so that the walk is bounded; one that reaches further
 /// ends on the last of them: nearer than the scallop asks for, where patches are that much narrower than it.
@@ -28,7 +27,7 @@ pub(crate) fn next_side(from: Place, interval: f32, spans: u16, width: impl Fn(u
             width(span) * fraction_32(u32::try_from(SPAN - at).unwrap_or(u32::MAX))
         };
         if rest < room {
-            let step = fraction_from_f32(real(rest / width(span))) >> 32;
+            let step = fraction_from_f32(rest / width(span)) >> 32;
             if step == 0 && span == from.span {
                 return Err(Fault::new(FaultKind::IntervalTooSmall, interval / width(span)));
             }
@@ -56,7 +55,7 @@ pub(crate) fn apart(from: Place, to: Place, width: impl Fn(u16) -> f32) -> f32 {
     let fraction = |place: Place| fraction_32(u32::try_from(place.fraction >> 32).unwrap_or(u32::MAX));
     if from.span == to.span {
         let between = to.fraction.saturating_sub(from.fraction);
-        return width(from.span) * float(fraction_to_f32(between));
+        return width(from.span) * fraction_to_f32(between);
     }
     let mut sum = width(from.span) * (1.0 - fraction(from)) + width(to.span) * fraction(to);
     let between = from.span.saturating_add(1)..to.span.min(from.span.saturating_add(WALK_MAX + 1));
@@ -69,11 +68,6 @@ pub(crate) fn apart(from: Place, to: Place, width: impl Fn(u16) -> f32) -> f32 {
 /// Whether a pass there is the last.
 pub(crate) fn is_last(side: Place, spans: u16) -> bool {
     side.span + 1 >= spans && side.fraction == u64::MAX
-}
-
-/// Words of the span widths that head a job's data.
-pub(crate) fn width_words(path_spans: u16, side_spans: u16) -> u32 {
-    u32::from(path_spans) + u32::from(side_spans)
 }
 
 #[cfg(test)]

@@ -1,18 +1,16 @@
 //! A run of a job, sample by sample: the one file that chains the stages.
 
-use crate::across::{self, Across, Densities};
-use crate::arith::{advanced, dot_hi, fraction_to_f32};
-use crate::contact::{self, Reach};
 use crate::fault::{Fault, FaultKind, Result};
-use crate::interval::interval;
+use crate::job::program::Job;
 use crate::job::{Pattern, Spacing};
-use crate::lane::{Lane, Line};
-use crate::lookahead::UP_MIN;
-use crate::patch::Patch;
-use crate::program::Job;
-use crate::sample::{Place, Sample};
-use crate::scalar::{Real, float, real};
-use crate::schedule;
+use crate::math::arith::{advanced, dot_hi, fraction_to_f32};
+use crate::pass::across::{self, Across, Densities};
+use crate::pass::buffer::Lane;
+use crate::pass::contact::{self, Reach};
+use crate::pass::patch::Patch;
+use crate::pass::position::Line;
+use crate::pass::schedule;
+use crate::sample::{Place, Sample, interval_of};
 use crate::surface::{AnyPass, Pass, PathSpeed};
 
 /// Patch boundaries that one period's arc may cross. One lets every patch through that is longer than the arc; the cost of a second,
@@ -47,12 +45,12 @@ struct Travel {
     fraction: u64,
     /// The parametrisation at the last sample, and its stretch at the one before; NaN where that is on another patch.
     path: PathSpeed,
-    stretch_before: Real,
+    stretch_before: f32,
     /// r N at the last sample, in the ball's units.
     offset: [i32; 3],
     /// Greatest density of the pass, and the surface's shape there, see [`Densities`].
     most: f32,
-    shape: [Real; 2],
+    shape: [f32; 2],
     /// Samples so far.
     ticks: u32,
     pass: u32,
@@ -82,13 +80,13 @@ impl Travel {
         span: 0,
         fraction: 0,
         path: PathSpeed {
-            inverse: real(0.0),
-            stretch: real(0.0),
+            inverse: 0.0,
+            stretch: 0.0,
         },
-        stretch_before: Real::NAN,
+        stretch_before: f32::NAN,
         offset: [0; 3],
         most: 0.0,
-        shape: [real(0.0); 2],
+        shape: [0.0; 2],
         ticks: 0,
         pass: 0,
         side: Place { span: 0, fraction: 0 },
@@ -116,10 +114,8 @@ impl Travel {
     /// each kind of surface saves no more registers than that kind needs.
     #[inline(never)]
     fn sample<P: Pass>(&mut self, pass: &P, patch: &Patch, last: &mut Sample) -> Result<()> {
-        let contact = pass.contact(self.fraction, &patch.ball)?;
-        patch.ball.check_fit(&contact)?;
-        let located = patch.ball.locate(&contact, &patch.origin)?;
-        if patch.ball.folds(dot_hi(&self.offset, &contact.offset)) {
+        let (contact, located) = patch.evaluate_on(pass, self.fraction)?;
+        if patch.locator.folds(dot_hi(&self.offset, &contact.offset)) {
             return Err(folded());
         }
         let density = patch.interval.density(&contact);
@@ -364,15 +360,12 @@ impl Run {
         let start = u64::from(self.cell_of_patch(parts)) * part;
         let length = fraction_to_f32(travel.fraction.checked_sub(start)?);
         let mean = 1.0 - 0.5 * travel.path.stretch * length;
-        Some(float(
-            length * mean / (travel.path.inverse * self.lane.patch().per_mm),
-        ))
+        Some(length * mean / (travel.path.inverse * self.lane.patch().per_mm))
     }
 
     /// Whether the surface faces up where the tool is, so that the tool can leave it upwards.
     pub(crate) fn faces_up(&self) -> bool {
-        let [_, _, z] = self.lane.patch().ball.normal(self.travel.offset);
-        z > UP_MIN
+        self.lane.patch().ball.faces_up(self.travel.offset)
     }
 
     /// What of a sample changes seldom.
@@ -401,7 +394,7 @@ impl Run {
 
     /// A share of a period's arc along the pass, by quadrature, over as many patches as it takes.
     fn step_far(&mut self, job: &Job<'_>, share: f32) -> Result<()> {
-        let mut rest = real(share * job.header.feed_mm_s * job.header.period_s);
+        let mut rest = share * job.header.feed_mm_s * job.header.period_s;
         let mut start = self.travel.path;
         for crossings in 0..=CROSSINGS_MAX {
             let Self { travel, lane, .. } = self;
@@ -425,7 +418,7 @@ impl Run {
             }
             start = self.lane.patch().start().checked()?;
         }
-        Err(Fault::new(FaultKind::PatchTooShort, float(rest)))
+        Err(Fault::new(FaultKind::PatchTooShort, rest))
     }
 
     /// On a pole, the next of its places: the tool stands, but the interval that the pass allows differs from place to place.
@@ -446,7 +439,7 @@ impl Run {
         };
         travel.span = line.span;
         travel.fraction = 0;
-        travel.path.stretch = Real::NAN;
+        travel.path.stretch = f32::NAN;
         self.lane.go_on(job, &line)?;
         Ok(true)
     }
@@ -464,7 +457,7 @@ impl Run {
         travel.fraction = 0;
         travel.most = 0.0;
         travel.next = Next::Along;
-        travel.path.stretch = Real::NAN;
+        travel.path.stretch = f32::NAN;
         self.across.begin();
         self.lane.begin(job, &travel.line())
     }
@@ -484,7 +477,7 @@ impl Run {
     /// The pass is over: its least interval, and the step to the next one.
     fn close_pass(&mut self, job: &Job<'_>) {
         let Travel { most, shape, .. } = self.travel;
-        self.last_interval = interval(most);
+        self.last_interval = interval_of(most);
         self.step_over = match job.header.spacing {
             Spacing::Exact => self.across.step(job.header, Densities { most, shape }),
             Spacing::FirstOrder => self.last_interval,
@@ -512,6 +505,5 @@ impl Run {
     }
 }
 
-#[cfg(not(feature = "count"))]
 #[cfg(test)]
 mod tests;

@@ -1,7 +1,7 @@
 use super::*;
-use crate::encode;
 use crate::job::Header;
-use crate::program::Program;
+use crate::job::encode;
+use crate::job::program::Program;
 use crate::surface::Edges;
 use std::vec::Vec;
 

@@ -7,9 +7,8 @@
 //! at both ends, and one or two Newton steps. That is rare, and costs an evaluation of the first derivatives for each Newton step,
 //! and one more where the speed is far from a cubic ([`SMOOTH`]).
 
-use crate::arith::{fraction_from_f32, fraction_to_f32, small_step};
 use crate::fault::{Fault, FaultKind, Result};
-use crate::scalar::{Real, float};
+use crate::math::arith::{fraction_from_f32, fraction_to_f32, small_step};
 use crate::surface::{PathSpeed, Surface};
 
 /// Largest correction of the first-order step, relative, for which a series is trusted as a first guess. At 1/2 the
@@ -40,7 +39,7 @@ const LONG_STEP: f32 = 0.25;
 /// Increment of the path fraction for an arc, units of 2^-64, from the parametrisation at its start and the stretch one
 /// sample earlier (NaN where there is none); none where the series is not enough.
 #[inline(always)]
-pub(crate) fn step(from: &PathSpeed, stretch_before: Real, arc: Real) -> Option<u64> {
+pub(crate) fn step(from: &PathSpeed, stretch_before: f32, arc: f32) -> Option<u64> {
     const THIRD: f32 = 1.0 / 3.0;
     const SIXTH: f32 = 1.0 / 6.0;
     let PathSpeed { inverse, stretch } = *from;
@@ -69,8 +68,8 @@ fn arc_over(
     from: u64,
     start: &PathSpeed,
     end: &PathSpeed,
-    length: Real,
-) -> core::result::Result<Real, Real> {
+    length: f32,
+) -> core::result::Result<f32, f32> {
     let (first, last) = (1.0 / start.inverse, 1.0 / end.inverse);
     let (rise, fall) = (first * start.stretch * length, last * end.stretch * length);
     let (sum, bow) = (first + last, rise - fall);
@@ -90,7 +89,7 @@ fn arc_over(
 }
 
 /// The path fraction of an arc within another, both from the same place: Hermite's cubic of the path over the arc.
-fn inverse_cubic(arc: Real, start: &PathSpeed, end: &PathSpeed, covered: Real, length: Real) -> Real {
+fn inverse_cubic(arc: f32, start: &PathSpeed, end: &PathSpeed, covered: f32, length: f32) -> f32 {
     let part = arc / covered;
     let rest = 1.0 - part;
     let (first, last) = (covered * start.inverse, covered * end.inverse);
@@ -103,7 +102,7 @@ pub(crate) enum Reach {
     /// On the patch, at this fraction.
     Within(u64),
     /// Beyond the patch, up to whose end there was this arc.
-    Beyond(Real),
+    Beyond(f32),
 }
 
 /// Where an arc from a place ends, by quadrature. `patch_end` is the parametrisation at the patch's end, asked for where it may matter.
@@ -117,22 +116,21 @@ pub(crate) fn solve(
     from: u64,
     start: &PathSpeed,
     patch_end: impl Fn() -> PathSpeed,
-    arc: Real,
+    arc: f32,
 ) -> Result<Reach> {
     let room = fraction_to_f32(!from);
     let first = arc * start.inverse;
     let bend = first * start.stretch;
     let correction = bend * (bend * 0.5 - 0.5);
     let mut guess = first + first * correction;
-    let refused = |guess: Real| Fault::new(FaultKind::ParameterBackwards, float(guess / first - 1.0));
+    let refused = |guess: f32| Fault::new(FaultKind::ParameterBackwards, guess / first - 1.0);
     // The series is about a small part of the patch: where the arc may be all of it, the end is looked at first.
-    let to_end = || -> Result<(PathSpeed, core::result::Result<Real, Real>)> {
+    let to_end = || -> Result<(PathSpeed, core::result::Result<f32, f32>)> {
         let end = patch_end().checked()?;
         let covered = arc_over(surface, from, start, &end, room);
         Ok((end, covered))
     };
-    let refused_at_end =
-        |end: &PathSpeed, untrusted: Real| Err(refused(room + path_of(arc - untrusted, end)));
+    let refused_at_end = |end: &PathSpeed, untrusted: f32| Err(refused(room + path_of(arc - untrusted, end)));
     let mut end = None;
     if first > LONG_STEP || guess >= room {
         match to_end()? {
@@ -145,7 +143,7 @@ pub(crate) fn solve(
     }
     // Not `>`: a NaN must not pass.
     if !(correction.abs() <= CORRECTION_MAX) {
-        return Err(Fault::new(FaultKind::ParameterBackwards, float(correction)));
+        return Err(Fault::new(FaultKind::ParameterBackwards, correction));
     }
     if let Some((end, covered)) = end {
         guess = inverse_cubic(arc, start, &end, covered, room);
@@ -178,11 +176,10 @@ pub(crate) fn solve(
 }
 
 /// The path of a short arc, to second order, from where the parametrisation is `end`.
-fn path_of(arc: Real, end: &PathSpeed) -> Real {
+fn path_of(arc: f32, end: &PathSpeed) -> f32 {
     let more = arc * end.inverse;
     more - 0.5 * end.stretch * more * more
 }
 
-#[cfg(not(feature = "count"))]
 #[cfg(test)]
 mod tests;

@@ -6,16 +6,16 @@
 
 use crate::fault::{Fault, Result};
 use crate::feed::QUANTA_PER_MM;
-use crate::feed::number::Bounded;
 use crate::feed::plan::CELLS_STANDING;
 use crate::feed::profile::Profile;
+use crate::job::program::Job;
 use crate::job::{Axes, Pattern};
-use crate::lane::Line;
-use crate::link::{Leg, Step, check_up};
-use crate::lookahead::{Lookahead, PassPlan, check_travel, top};
-use crate::program::Job;
-use crate::run::Run;
+use crate::math::number::Bounded;
+use crate::pass::position::Line;
+use crate::pass::run::Run;
 use crate::sample::{Place, Sample};
+use crate::sequence::link::{Leg, Step, check_up};
+use crate::sequence::lookahead::{Lookahead, PassPlan, check_travel, top};
 
 /// Portions of the look ahead in a tick in which the tool waits for it.
 const PORTIONS_WAITING: u8 = 2;

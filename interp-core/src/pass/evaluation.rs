@@ -1,0 +1,31 @@
+//! The one evaluation of a patch on a pass, used by the run, the look-ahead, the links and the public
+//! [`crate::Interpolator::evaluate`]: contact, fit, cutter location.
+
+use crate::fault::Result;
+use crate::pass::offset::{Located, check_fit};
+use crate::pass::patch::Patch;
+use crate::surface::{Contact, Pass};
+
+impl Patch {
+    /// Contact, fit and cutter location at a fraction of the patch, in the direction of travel, by a pass of this patch's surface. Inlined, so that the
+    /// sample path has one copy for each kind of pass.
+    ///
+    /// # Errors
+    /// [`crate::FaultKind::DegenerateSurface`], [`crate::FaultKind::BallDoesNotFit`], [`crate::FaultKind::OutOfRange`].
+    #[inline(always)]
+    pub(crate) fn evaluate_on<P: Pass>(&self, pass: &P, fraction: u64) -> Result<(Contact, Located)> {
+        let contact = pass.contact(fraction, &self.ball)?;
+        check_fit(&contact)?;
+        let located = self.locator.locate(&contact, &self.origin)?;
+        Ok((contact, located))
+    }
+
+    /// [`Self::evaluate_on`] the patch's surface, for callers outside the sample path.
+    ///
+    /// # Errors
+    /// As [`Self::evaluate_on`].
+    #[inline(always)]
+    pub(crate) fn evaluate(&self, fraction: u64) -> Result<(Contact, Located)> {
+        self.evaluate_on(&self.surface, fraction)
+    }
+}
