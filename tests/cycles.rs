@@ -239,8 +239,11 @@ fn class_of(mnemonic: &str, operands: &str) -> Class {
         _ if begins(&["it"]) => Class::IfThen,
         _ if is("udiv") || is("sdiv") => Class::Divide,
         _ if begins(&["vmla", "vmls", "vnmla", "vnmls", "vfma", "vfms", "vfnm"]) => Class::FloatMultiplyAdd,
-        _ if begins(&["vdiv", "vsqrt"]) => Class::FloatDivide,
-        _ if begins(&["vadd", "vsub", "vmul", "vnmul", "vcvt"]) => Class::FloatArithmetic,
+        _ if begins(&["vdiv"]) => Class::FloatDivide,
+        _ if begins(&["vsqrt"]) => Class::FloatRoot,
+        _ if begins(&["vadd", "vsub"]) => Class::FloatAdd,
+        _ if begins(&["vmul", "vnmul"]) => Class::FloatMultiply,
+        _ if begins(&["vcvt"]) => Class::FloatConvert,
         _ if begins(&["vmov"]) && operands.matches(',').count() >= 2 => Class::FloatMovePair,
         _ if begins(&["vmov"]) && double && operands.matches(',').count() == 2 => Class::FloatMovePair,
         _ if begins(&["vmov", "vabs", "vneg", "vcmp", "vmrs", "vmsr"]) => Class::FloatMove,
@@ -255,15 +258,21 @@ fn class_of(mnemonic: &str, operands: &str) -> Class {
         _ if begins(&["strex"]) => Class::Store,
         _ if begins(&["str"]) && indexed => Class::StoreIndexed,
         _ if begins(&["str"]) => Class::Store,
-        _ if begins(&[
-            "mul", "mla", "mls", "sml", "smm", "smul", "smull", "umull", "umlal", "umaal",
-        ]) =>
-        {
-            Class::Multiply
-        }
+        _ if begins(&["mul", "smmul", "smul", "umull"]) => Class::Multiply,
+        _ if begins(&["mla", "mls", "sml", "smml", "umlal", "umaal"]) => Class::MultiplyAdd,
         _ if into_pc && begins(&["mov", "add"]) => Class::Branch(Branch::Indirect),
+        _ if begins(&["adc", "sbc"]) => Class::AddWithCarry,
+        _ if is_addition(base, operands) => Class::Add { sets_flags: false },
         _ => Class::Simple,
     }
+}
+
+/// Whether two values are added or subtracted, neither an address on the stack or in the code nor a negation.
+fn is_addition(base: &str, operands: &str) -> bool {
+    let adds = ["add", "sub", "rsb"].iter().any(|name| base.starts_with(name));
+    let registers = operands.split(',').map(str::trim);
+    let negates = base.starts_with("rsb") && operands.ends_with("#0");
+    adds && !negates && !registers.clone().any(|name| name == "sp" || name == "pc")
 }
 
 /// A class without what the mnemonic alone does not say.
@@ -271,6 +280,8 @@ fn plain(class: Class) -> Class {
     match class {
         Class::Branch(Branch::Direct(_)) => Class::Branch(Branch::Direct(0)),
         Class::Branch(Branch::Call(_)) => Class::Branch(Branch::Call(0)),
+        // A 16-bit instruction sets no flags in an IT block.
+        Class::Add { .. } => Class::Add { sets_flags: false },
         Class::LoadMultiple(_) => Class::LoadMultiple(0),
         Class::StoreMultiple(_) => Class::StoreMultiple(0),
         Class::FloatLoadMultiple(_) => Class::FloatLoadMultiple(0),

@@ -6,6 +6,7 @@
 
 use crate::cost::{self, Cycles, EXCEPTION, LAZY_STACKING, Placed};
 use crate::decode::{Branch, Class, decode};
+use crate::operations::{Counter, Operations};
 use crate::plan::{Plan, STAGES, Stage};
 use crate::record::Record;
 
@@ -38,6 +39,8 @@ struct Context {
     float: bool,
     instructions: u32,
     stages: [Cycles; STAGES],
+    counter: Counter,
+    operations: [Operations; STAGES],
 }
 
 impl Context {
@@ -187,6 +190,7 @@ impl Account {
             unknown: self.unknown,
             stack_low: self.stack_low,
             stages: context.stages,
+            operations: context.operations,
         })
     }
 
@@ -208,6 +212,10 @@ impl Account {
         context.last = Some(index);
         context.charged = stage as usize;
         context.charge(stage as usize, cost::straight(neighbour.as_ref(), instruction));
+        let operations = context.counter.count(instruction);
+        if let Some(total) = context.operations.get_mut(stage as usize) {
+            *total = total.plus(operations);
+        }
         if instruction.class.is_float() && context.exception != 0 && !context.float {
             context.float = true;
             let stacking = Cycles {

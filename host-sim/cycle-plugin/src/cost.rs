@@ -115,18 +115,23 @@ pub const fn straight(before: Option<&Instruction>, instruction: &Instruction) -
         // The load of the table; the branch is always taken.
         Class::Table => Cycles::both(3),
         Class::FloatMultiplyAdd => Cycles::both(3),
-        Class::FloatDivide => Cycles::both(14),
+        Class::FloatDivide | Class::FloatRoot => Cycles::both(14),
         Class::FloatMovePair | Class::SpecialRegister => Cycles::both(2),
         Class::Barrier => Cycles::both(BARRIER),
         Class::Simple
+        | Class::Add { .. }
+        | Class::AddWithCarry
         | Class::Multiply
+        | Class::MultiplyAdd
         | Class::Branch(_)
         | Class::IfThen
         | Class::Hint
         | Class::Wait
         | Class::ChangeState
         | Class::Trap
-        | Class::FloatArithmetic
+        | Class::FloatAdd
+        | Class::FloatMultiply
+        | Class::FloatConvert
         | Class::FloatMove
         | Class::Unknown => Cycles::both(1),
     };
@@ -161,7 +166,12 @@ const fn stalls(before: Option<&Instruction>, instruction: &Instruction) -> u32 
     let slow_result = before.class.is_load()
         || matches!(
             before.class,
-            Class::FloatArithmetic | Class::FloatMultiplyAdd | Class::FloatDivide
+            Class::FloatAdd
+                | Class::FloatMultiply
+                | Class::FloatConvert
+                | Class::FloatMultiplyAdd
+                | Class::FloatDivide
+                | Class::FloatRoot
         );
     // A store takes its data a cycle after its address.
     let wanted_now = if instruction.class.is_store() && before.class.is_load() {

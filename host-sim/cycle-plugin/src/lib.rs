@@ -15,5 +15,6 @@ pub mod account;
 pub mod cost;
 pub mod decode;
 mod ffi;
+pub mod operations;
 pub mod plan;
 pub mod record;

@@ -3,7 +3,7 @@
 //! The code comes with the plan, because the function that would read it from QEMU has changed between versions.
 
 /// First word of the file: `ISOP` and a version.
-const MAGIC: u32 = 0x4953_4f05;
+const MAGIC: u32 = 0x4953_4f06;
 
 /// Words before the code.
 const HEAD_WORDS: usize = 5;

@@ -1,10 +1,11 @@
 //! One record a tick: what the plugin writes and the host reads. An idle tick that repeats the one before is left out.
 
 use crate::cost::Cycles;
+use crate::operations::Operations;
 use crate::plan::{STAGES, Stage};
 
 /// Words of a record.
-const WORDS: usize = 4 + 2 * STAGES;
+const WORDS: usize = 4 + (2 + 4) * STAGES;
 
 /// Bytes of a record, little endian.
 pub const RECORD_BYTES: usize = 4 * WORDS;
@@ -22,6 +23,8 @@ pub struct Record {
     pub stack_low: u32,
     /// Cycles of each stage.
     pub stages: [Cycles; STAGES],
+    /// Arithmetic operations of each stage.
+    pub operations: [Operations; STAGES],
 }
 
 impl Record {
@@ -43,8 +46,13 @@ impl Record {
             .stages
             .iter()
             .flat_map(|cycles| [cycles.nominal, cycles.pessimistic]);
+        let operations = self
+            .operations
+            .iter()
+            .flat_map(|operations| operations.to_array());
         head.into_iter()
             .chain(cycles)
+            .chain(operations)
             .flat_map(u32::to_le_bytes)
             .collect()
     }
@@ -70,6 +78,9 @@ impl Record {
         for cycles in &mut record.stages {
             cycles.nominal = next();
             cycles.pessimistic = next();
+        }
+        for operations in &mut record.operations {
+            *operations = Operations::new(next(), next(), next(), next());
         }
         record
     }

@@ -81,7 +81,8 @@ const fn processing(first: u16, second: u16) -> Instruction {
     let both = left.and(right);
     match (first >> 4) & 11 {
         0 | 1 | 9 | 10 => float(Class::FloatMultiplyAdd, both.and(to), to),
-        2 | 3 => float(Class::FloatArithmetic, both, to),
+        2 => float(Class::FloatMultiply, both, to),
+        3 => float(Class::FloatAdd, both, to),
         8 => float(Class::FloatDivide, both, to),
         _ => other(first & 15, (second >> 6) & 3, to, right),
     }
@@ -93,14 +94,14 @@ const fn other(kind: u16, variant: u16, to: Registers, from: Registers) -> Instr
         return float(Class::FloatMove, NONE, to);
     }
     match (kind, variant) {
-        (1, 3) => float(Class::FloatDivide, from, to),
+        (1, 3) => float(Class::FloatRoot, from, to),
         (0 | 1, _) => float(Class::FloatMove, from, to),
         (4, _) => float(Class::FloatMove, from.and(to), NONE),
         // Compares with zero.
         (5, _) => float(Class::FloatMove, to, NONE),
-        (2 | 3 | 8 | 12 | 13, _) => float(Class::FloatArithmetic, from, to),
+        (2 | 3 | 8 | 12 | 13, _) => float(Class::FloatConvert, from, to),
         // Fixed point, in place.
-        (10 | 11 | 14 | 15, _) => float(Class::FloatArithmetic, to, to),
+        (10 | 11 | 14 | 15, _) => float(Class::FloatConvert, to, to),
         _ => float(Class::Unknown, NONE, NONE),
     }
 }

@@ -56,6 +56,12 @@ impl Registers {
         Self(self.0 & !other.0)
     }
 
+    /// Whether there is no register in it.
+    #[must_use]
+    pub const fn is_empty(self) -> bool {
+        self.0 == 0
+    }
+
     /// Whether a register is in both.
     #[must_use]
     pub const fn meets(self, other: Self) -> bool {
@@ -81,10 +87,19 @@ pub enum Branch {
 /// What an instruction's cost depends on.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Class {
-    /// Data processing.
+    /// Data processing, apart from additions.
     Simple,
-    /// `MUL`, `MLA`, `SMMLAR`, `UMULL` and their like.
+    /// `ADD`, `SUB`, `RSB` of registers other than the stack pointer and the program counter; a negation is [`Self::Simple`].
+    Add {
+        /// The carry is set, as the lower half of a 64-bit addition does. A 16-bit instruction in an `IT` block does not.
+        sets_flags: bool,
+    },
+    /// `ADC`, `SBC`.
+    AddWithCarry,
+    /// `MUL`, `SMMUL`, `SMULL`, `UMULL` and variants.
     Multiply,
+    /// `MLA`, `MLS`, `SMMLA`, `SMLAL` and variants.
+    MultiplyAdd,
     /// `SDIV`, `UDIV`.
     Divide,
     /// A branch.
@@ -117,16 +132,22 @@ pub enum Class {
     ChangeState,
     /// `BKPT`, `SVC`, `UDF`.
     Trap,
-    /// VFP: add, subtract, multiply, convert.
-    FloatArithmetic,
+    /// VFP: add, subtract.
+    FloatAdd,
+    /// VFP: multiply, with or without negation.
+    FloatMultiply,
+    /// VFP: convert.
+    FloatConvert,
     /// VFP: move, absolute value, negate, compare, immediate, to and from a core register.
     FloatMove,
     /// VFP: two core registers to or from two single registers.
     FloatMovePair,
     /// VFP: `VMLA`, `VFMA` and their like.
     FloatMultiplyAdd,
-    /// VFP: `VDIV`, `VSQRT`.
+    /// VFP: `VDIV`.
     FloatDivide,
+    /// VFP: `VSQRT`.
+    FloatRoot,
     /// `VLDR` of a single.
     FloatLoad,
     /// `VSTR` of a single.
@@ -145,11 +166,14 @@ impl Class {
     pub const fn is_float(self) -> bool {
         matches!(
             self,
-            Self::FloatArithmetic
+            Self::FloatAdd
+                | Self::FloatMultiply
+                | Self::FloatConvert
                 | Self::FloatMove
                 | Self::FloatMovePair
                 | Self::FloatMultiplyAdd
                 | Self::FloatDivide
+                | Self::FloatRoot
                 | Self::FloatLoad
                 | Self::FloatStore
                 | Self::FloatLoadMultiple(_)
@@ -224,6 +248,14 @@ impl Instruction {
             Class::Simple
         };
         Self::new(length, class, reads, writes)
+    }
+
+    /// An addition; one that computes an address on the stack or in the code is plain data processing.
+    const fn add(length: u8, sets_flags: bool, reads: Registers, writes: Registers) -> Self {
+        if reads.and(writes).meets(Registers::SP.and(Registers::PC)) {
+            return Self::data(length, reads, writes);
+        }
+        Self::new(length, Class::Add { sets_flags }, reads, writes)
     }
 
     /// Whether what follows it in time may be elsewhere in memory.
