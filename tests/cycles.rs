@@ -12,9 +12,9 @@ use cycle_plugin::account::Account;
 use cycle_plugin::decode::{Branch, Class, decode};
 use cycle_plugin::plan::{Plan, Stage};
 use cycle_plugin::record::{RECORD_BYTES, Record};
-use cycles::lab::Lab;
 use cycles::search::search;
-use cycles::{PERIOD_CYCLES, figures, golden, graph, image, measure::Bench};
+use cycles::session::MeasurementSession;
+use cycles::{PERIOD_CYCLES, figures, golden, graph, image, measure::MeasurementSetup, operations};
 use machine::prepare::prepare;
 use machine::remote::qemu::{self, Qemu};
 
@@ -157,7 +157,7 @@ fn the_account_follows_a_loop() {
     let (outer, tick) = (code_at + guest::OUTER, code_at + guest::TICK);
     let mut account = Account::new(plan);
     let mut at = |address: u32| {
-        let index = account.place(address).unwrap();
+        let index = account.decode(address).unwrap();
         account.execute(index)
     };
     // The thread, the outer handler, the tick in it, straight to its return, and back.
@@ -338,7 +338,7 @@ fn a_tail_call_keeps_the_stage() {
     plan.starts[at(callee)] = true;
     let mut account = Account::new(plan);
     let mut run = |address: u32| {
-        let index = account.place(address).unwrap();
+        let index = account.decode(address).unwrap();
         account.execute(index)
     };
     // tick: push, bl; the reset code's `b`; callee: movs, bx; back, and out.
@@ -366,11 +366,11 @@ fn the_image_is_bounded() {
     let path = qemu::firmware().unwrap();
     let analysis = graph::analyse(&path).unwrap();
     assert!(analysis.task.len() > 5, "{:?}", analysis.task);
-    assert_eq!(analysis.lost, [""; 0], "not followed");
+    assert_eq!(analysis.unresolved, [""; 0], "not followed");
     let unbounded = analysis.unbounded();
     assert!(
         unbounded.is_empty(),
-        "loops without a bound in host-sim/src/budget/graph/bounds.rs: {unbounded:#?}"
+        "loops without a bound in host-sim/cycles/src/graph/bounds.rs: {unbounded:#?}"
     );
     assert_eq!(analysis.stale(), [""; 0], "bounds without a loop");
     assert_eq!(analysis.panics(), [""; 0], "in the sample task");
@@ -378,27 +378,29 @@ fn the_image_is_bounded() {
     assert!(u64::from(analysis.stack_bytes()) < sizes.stack_room);
 }
 
-/// No stage takes more than 2 % longer than it did when the golden table was written.
+/// No stage takes more than 2 % longer than when the golden table was written, and a sample takes the same operations.
 #[test]
 fn no_stage_has_grown() {
     let path = qemu::firmware().unwrap();
     let (plan, _) = image::read(&path).unwrap();
-    let bench = Bench::new(&path, &plan).unwrap();
-    let mut all = Vec::new();
+    let setup = MeasurementSetup::new(&path, &plan).unwrap();
+    let (mut all, mut counts) = (Vec::new(), Vec::new());
     for (name, path, ticks) in cycles::jobs() {
         let prepared = prepare(&job_file::load(&path).unwrap()).unwrap();
-        all.extend(figures::figures(name, &bench.run(&prepared, ticks).unwrap()));
+        let ticks = setup.run(&prepared, ticks).unwrap();
+        all.extend(figures::figures(name, &ticks));
+        counts.push((name.to_owned(), operations::count(&ticks).unwrap().operations));
     }
     for figure in all.iter().filter(|figure| figure.stage == "pulses") {
         assert!(figure.max < PERIOD_CYCLES / 10, "{figure:?}");
     }
-    all.extend(golden::worst(&bench).unwrap());
+    all.extend(golden::worst_tick(&setup).unwrap());
     let table = std::fs::read_to_string(golden::path()).unwrap();
-    let complaints = golden::complaints(&table, &all);
+    let differences = golden::differences(&table, &all, &counts);
     assert!(
-        complaints.is_empty(),
+        differences.is_empty(),
         "old -> new; if it is meant to be so, `cargo sim budget --bless`:\n{}",
-        complaints.join("\n")
+        differences.join("\n")
     );
 }
 
@@ -407,17 +409,17 @@ fn no_stage_has_grown() {
 fn a_short_search_finds_no_tick_over_its_budget() {
     let path = qemu::firmware().unwrap();
     let (plan, _) = image::read(&path).unwrap();
-    let mut lab = Lab::new(&Bench::new(&path, &plan).unwrap()).unwrap();
+    let mut session = MeasurementSession::new(&MeasurementSetup::new(&path, &plan).unwrap()).unwrap();
     for (jobs, limits) in [(16, false), (2, true)] {
-        let campaign = search(&mut lab, jobs, 3, limits, || {}).unwrap();
-        assert!(campaign.ran >= jobs / 3, "{} jobs ran", campaign.ran);
-        let found = &campaign.elite[0];
-        let cycles = figures::whole(&found.worst.record, figures::Model::Pessimistic);
+        let result = search(&mut session, jobs, 3, limits, || {}).unwrap();
+        assert!(result.executed >= jobs / 3, "{} jobs ran", result.executed);
+        let found = &result.elite[0];
+        let cycles = figures::tick_cycles(&found.worst.record, figures::Model::Pessimistic);
         assert!(cycles < PERIOD_CYCLES / 10, "{cycles} cycles: {found:?}");
     }
     let analysis = graph::analyse(&path).unwrap();
     assert!(
-        lab.stack_bytes() <= analysis.stack_bytes(),
+        session.stack_bytes() <= analysis.stack_bytes(),
         "more stack than the image says"
     );
 }

@@ -428,7 +428,8 @@ fn trimmed_faces_are_said() {
 #[test]
 fn sample_jobs_out_of_files() {
     for (name, patches) in [("blade", 12), ("hood", 247)] {
-        let job = job_file::load_with(&workspace().join(format!("jobs/cad/{name}.toml")), &cad::Faces).unwrap();
+        let job =
+            job_file::load_with(&workspace().join(format!("jobs/cad/{name}.toml")), &cad::Faces).unwrap();
         assert_eq!(prepare(&job).unwrap().patches(), patches, "{name}");
         let (position_nm, ripple_pct, samples, fault) = worst_nm(&job, u64::MAX);
         println!("{name}: {position_nm:.2} nm, ripple {ripple_pct:.6} %, {samples} samples");

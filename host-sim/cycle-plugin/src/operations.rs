@@ -158,9 +158,7 @@ mod tests {
     #[test]
     fn multiplications_of_integers() {
         // smmlar r0,r1,r2,r3; smlal r0,r1,r2,r3; mla r0,r1,r2,r3; smlabb r0,r1,r2,r3
-        let sums = [
-            0xfb51, 0x3012, 0xfbc2, 0x0103, 0xfb01, 0x3002, 0xfb11, 0x3002,
-        ];
+        let sums = [0xfb51, 0x3012, 0xfbc2, 0x0103, 0xfb01, 0x3002, 0xfb11, 0x3002];
         assert_eq!(count(&sums), Operations::new(4, 4, 0, 0));
         // smmulr r0,r1,r2; smull r0,r1,r2,r3; mul r0,r1,r2; muls r0,r1; udiv r0,r1,r2
         let products = [

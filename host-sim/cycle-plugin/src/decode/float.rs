@@ -11,7 +11,7 @@ const fn float(class: Class, reads: Registers, writes: Registers) -> Instruction
 /// Decodes an instruction of coprocessors 10 and 11.
 pub(super) const fn decode(first: u16, second: u16) -> Instruction {
     let coprocessor = (second >> 8) & 15;
-    // What begins with 1111 came with later units.
+    // Encodings that begin with 1111 belong to later units.
     if coprocessor & 14 != 10 || first & 0x1000 != 0 {
         return float(Class::Unknown, NONE, NONE);
     }
@@ -88,7 +88,7 @@ const fn processing(first: u16, second: u16) -> Instruction {
     }
 }
 
-/// Operations on one operand: `kind` and `variant` are the manual's `opc2` and `opc3`.
+/// Instructions with one operand: `kind` and `variant` are the manual's `opc2` and `opc3`.
 const fn other(kind: u16, variant: u16, to: Registers, from: Registers) -> Instruction {
     if variant & 1 == 0 {
         return float(Class::FloatMove, NONE, to);
@@ -106,7 +106,7 @@ const fn other(kind: u16, variant: u16, to: Registers, from: Registers) -> Instr
     }
 }
 
-/// Between one core register and the unit.
+/// Transfers between a core register and the floating-point unit.
 const fn transfer(first: u16, second: u16) -> Instruction {
     let to_core = first & 0x10 != 0;
     let t = (second >> 12) & 15;

@@ -4,7 +4,7 @@ use super::{Branch, Class, Instruction, Registers, target};
 
 const NONE: Registers = Registers::NONE;
 
-/// A register of the lowest eight at this bit.
+/// The low register whose number begins at this bit.
 const fn low(code: u16, bit: u16) -> Registers {
     Registers::core((code >> bit) & 7)
 }

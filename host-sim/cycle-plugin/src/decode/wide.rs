@@ -1,10 +1,10 @@
-//! 32-bit instructions (ARMv7-M ARM, A5.3), those of the floating-point unit apart.
+//! 32-bit instructions (ARMv7-M ARM, A5.3) except those of the floating-point unit.
 
 use super::{Branch, Class, Instruction, Registers, float, target};
 
 const NONE: Registers = Registers::NONE;
 
-/// The four registers that most encodings have in the same places; 15 stands for none where the caller says so.
+/// The register fields of most encodings; 15 means none in some of them.
 #[derive(Clone, Copy)]
 struct Fields {
     n: u16,
@@ -90,12 +90,12 @@ const fn dual_or_table(first: u16, second: u16, fields: Fields) -> Instruction {
     if load {
         return wide(Class::Load, NONE, data).at(base);
     }
-    // The result of `STREX` stands elsewhere than that of `STREXB`.
+    // `STREX` and `STREXB` have the result's register in different fields.
     let result = if byte_or_table { fields.m } else { fields.d };
     wide(Class::Store, data, Registers::core(result)).at(base)
 }
 
-/// Data processing, by the operation in its first halfword. No addition where the result (a comparison) or an operand is missing.
+/// Data processing, by the operation in its first halfword. Without a result (a comparison) or a first operand it is no addition.
 const fn processing(first: u16, reads: Registers, fields: Fields) -> Instruction {
     let d = unless_15(fields.d);
     if fields.d == 15 || fields.n == 15 {
@@ -130,7 +130,7 @@ const fn immediate(first: u16, second: u16, fields: Fields) -> Instruction {
             0b00000 | 0b01010 if fields.n != 15 => return Instruction::add(4, false, reads, d),
             // MOVW
             0b00100 => reads = NONE,
-            // MOVT keeps the lower half, BFI and BFC what stands around the field.
+            // MOVT keeps the lower half, BFI and BFC the bits outside the field.
             0b01100 => reads = d,
             0b10110 => reads = reads.and(d),
             _ => {}
