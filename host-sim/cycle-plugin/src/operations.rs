@@ -181,6 +181,19 @@ mod tests {
         );
     }
 
+    /// The value of a cubic in Horner form, as the image has it: three `SMMLAR` among loads, stores and an exclusive or.
+    #[test]
+    fn a_cubic_of_the_image() {
+        // ldr r0,[r0,#20]; ldr r4,[r1,#28]; str r0,[sp,#16]; eor.w r5,r0,#0x80000000; ldrd r6,r0,[r1,#20]; str r4,[sp,#84]
+        // smmlar r4,r4,r5,r0; ldr r0,[r1,#16]; smmlar r6,r4,r5,r6; str r4,[sp,#80]; str r3,[sp,#20]; str r6,[sp,#76]
+        // smmlar r0,r6,r5,r0
+        let cubic = [
+            0x6940, 0x69cc, 0x9004, 0xf080, 0x4500, 0xe9d1, 0x6005, 0x9415, 0xfb54, 0x0415, 0x6908, 0xfb54,
+            0x6615, 0x9414, 0x9305, 0x9613, 0xfb56, 0x0015,
+        ];
+        assert_eq!(count(&cubic), Operations::new(3, 3, 0, 0));
+    }
+
     #[test]
     fn a_pair_of_words_is_one_addition() {
         // adds r0,r0,r2; adcs r1,r3: no products
