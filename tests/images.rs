@@ -1,10 +1,10 @@
-//! The firmware's image and the bench that counts its cycles, built once for all tests.
+//! The firmware's image and the set-up that counts its cycles, built once for all tests.
 
 use std::path::{Path, PathBuf};
 use std::sync::OnceLock;
 
 use cycles::image;
-use cycles::measure::Bench;
+use cycles::measure::MeasurementSetup;
 use machine::remote::qemu;
 
 /// The image for QEMU.
@@ -14,10 +14,10 @@ pub(crate) fn for_qemu() -> &'static Path {
 }
 
 /// The image for QEMU with the plugin that counts.
-pub(crate) fn bench() -> &'static Bench {
-    static BENCH: OnceLock<Bench> = OnceLock::new();
-    BENCH.get_or_init(|| {
+pub(crate) fn setup() -> &'static MeasurementSetup {
+    static SETUP: OnceLock<MeasurementSetup> = OnceLock::new();
+    SETUP.get_or_init(|| {
         let (plan, _) = image::read(for_qemu()).unwrap();
-        Bench::new(for_qemu(), &plan).unwrap()
+        MeasurementSetup::new(for_qemu(), &plan).unwrap()
     })
 }

@@ -15,6 +15,7 @@ mod house;
 mod images;
 mod import;
 mod no_panic;
+mod operations;
 mod oracle_golden;
 mod paper;
 mod pass_times;

@@ -1,15 +1,16 @@
-//! Follows the processor from instruction to instruction, and charges each to the exception it runs in and to a stage.
+//! Follows the program flow instruction by instruction, and charges each instruction to the exception it runs in and to a stage.
 //!
-//! What is known is only which address is executed next. From that follows whether a branch was taken; that a handler's
-//! first instruction without a branch to it is an exception entry; and that a return in a handler that has no call left to
-//! return from leaves the exception (`BX LR` or `POP {PC}` with `0xFFFFFFxx`).
+//! The only input is the address that is executed next. From the addresses follows whether a branch was taken; a handler's first
+//! instruction without a branch to it is an exception entry; a return in a handler without an open call leaves the exception
+//! (`BX LR` or `POP {PC}` with `0xFFFFFFxx`).
 
-use crate::cost::{self, Cycles, EXCEPTION, LAZY_STACKING, Placed};
+use crate::cost::{self, AddressedInstruction, Cycles, EXCEPTION, LAZY_STACKING};
 use crate::decode::{Branch, Class, decode};
+use crate::operations::{Counter, Operations};
 use crate::plan::{Plan, STAGES, Stage};
 use crate::record::Record;
 
-/// Exceptions that can be nested: as many as there are priorities.
+/// Greatest nesting of exceptions: one level for each of the 16 priorities, and the thread.
 const CONTEXTS_MAX: usize = 17;
 
 /// Exceptions of the STM32F405: 16 of the core, 82 of the chip.
@@ -17,31 +18,33 @@ const VECTORS: u32 = 98;
 
 /// An instruction of the image.
 #[derive(Clone, Copy, Debug)]
-struct Known {
-    placed: Placed,
+struct ImageInstruction {
+    located: AddressedInstruction,
     stage: Option<Stage>,
     handler: Option<u32>,
-    /// A function begins here.
+    /// Whether a function begins here.
     starts: bool,
 }
 
-/// What runs: the thread, or a handler.
+/// A thread of execution: the thread mode, or a handler.
 #[derive(Debug, Default)]
 struct Context {
     exception: u32,
     /// Index of the instruction executed last.
     last: Option<usize>,
-    /// Where the cycles of that went.
+    /// Index of the stage that it was charged to.
     charged: usize,
-    /// Stages of the callers, the innermost last.
+    /// Stages of the open calls, the innermost last.
     callers: Vec<Stage>,
     float: bool,
     instructions: u32,
     stages: [Cycles; STAGES],
+    counter: Counter,
+    operations: [Operations; STAGES],
 }
 
 impl Context {
-    /// The stage of an instruction: that of a caller who keeps its callees, its own, or its caller's.
+    /// The stage that an instruction is charged to: that of a caller that keeps its callees, else its own, else its caller's.
     fn stage(&self, own: Option<Stage>) -> Stage {
         match self.callers.last() {
             Some(caller) if caller.keeps_callees() => *caller,
@@ -56,11 +59,11 @@ impl Context {
     }
 }
 
-/// All accounts.
+/// Cycles and operations of all contexts.
 #[derive(Debug)]
 pub struct Account {
     plan: Plan,
-    known: Vec<Option<Known>>,
+    decoded: Vec<Option<ImageInstruction>>,
     contexts: Vec<Context>,
     elsewhere: u32,
     unknown: u32,
@@ -68,14 +71,14 @@ pub struct Account {
 }
 
 impl Account {
-    /// Accounts of a plan, nothing executed yet.
+    /// Zero cycles, in thread mode.
     #[must_use]
     pub fn new(plan: Plan) -> Self {
         let halfwords = plan.code.len() / 2;
         let stack_low = plan.stack_end;
         Self {
             plan,
-            known: vec![None; halfwords],
+            decoded: vec![None; halfwords],
             contexts: vec![Context::default()],
             elsewhere: 0,
             unknown: 0,
@@ -83,13 +86,13 @@ impl Account {
         }
     }
 
-    /// Index of the instruction at an address; has to be asked for before it is executed. None outside the code.
-    pub fn place(&mut self, address: u32) -> Option<usize> {
+    /// Decodes the instruction at an address; required before its first execution. Its index; `None` outside the code.
+    pub fn decode(&mut self, address: u32) -> Option<usize> {
         let index = (address.checked_sub(self.plan.base)? / 2) as usize;
         let (first, second) = (self.plan.halfword(index), self.plan.halfword(index + 1));
         let handler = (2..VECTORS).find(|exception| self.plan.vector(*exception) == address);
-        *self.known.get_mut(index)? = Some(Known {
-            placed: Placed {
+        *self.decoded.get_mut(index)? = Some(ImageInstruction {
+            located: AddressedInstruction {
                 address,
                 instruction: decode(address, first, second),
             },
@@ -100,39 +103,41 @@ impl Account {
         Some(index)
     }
 
-    /// Whether an address belongs to the stack; remembers the lowest.
-    pub fn wrote(&mut self, address: u32) {
+    /// Records a store: updates the lowest stack address if the address is on the stack.
+    pub fn store(&mut self, address: u32) {
         if (0x2000_0000..self.stack_low).contains(&address) {
             self.stack_low = address;
         }
     }
 
-    fn known(&self, index: Option<usize>) -> Option<Known> {
-        self.known.get(index?).copied().flatten()
+    fn instruction(&self, index: Option<usize>) -> Option<ImageInstruction> {
+        self.decoded.get(index?).copied().flatten()
     }
 
-    /// The instruction at this index is about to be executed. Yields the record of the tick that ended with the one
-    /// before, if one did.
+    /// Charges the instruction at this index, before it is executed. The record of the tick if the preceding instruction ended one.
     pub fn execute(&mut self, index: usize) -> Option<Record> {
-        let known = self.known(Some(index))?;
-        let (ended, leaves) = self.leave(&known);
-        if let Some(exception) = known.handler.filter(|_| leaves || self.is_entry(&known)) {
-            self.enter(exception, &known);
+        let now = self.instruction(Some(index))?;
+        let (ended, leaves) = self.leave(&now);
+        if let Some(exception) = now.handler.filter(|_| leaves || self.is_entry(&now)) {
+            self.enter(exception, &now);
         }
-        self.run(index, &known);
+        self.run(index, &now);
         ended
     }
 
-    /// Whether a handler's first instruction was not branched to.
-    fn is_entry(&self, known: &Known) -> bool {
-        let before = self.contexts.last().and_then(|context| self.known(context.last));
-        before.is_none_or(|before| match before.placed.instruction.class {
-            Class::Branch(Branch::Direct(to) | Branch::Call(to)) => to != known.placed.address,
+    /// Whether a handler's first instruction was reached without a branch: an exception entry.
+    fn is_entry(&self, now: &ImageInstruction) -> bool {
+        let before = self
+            .contexts
+            .last()
+            .and_then(|context| self.instruction(context.last));
+        before.is_none_or(|before| match before.located.instruction.class {
+            Class::Branch(Branch::Direct(to) | Branch::Call(to)) => to != now.located.address,
             _ => true,
         })
     }
 
-    fn enter(&mut self, exception: u32, known: &Known) {
+    fn enter(&mut self, exception: u32, now: &ImageInstruction) {
         if self.contexts.len() > CONTEXTS_MAX {
             return;
         }
@@ -144,23 +149,24 @@ impl Account {
             Stage::Exception as usize,
             Cycles {
                 nominal: EXCEPTION,
-                pessimistic: EXCEPTION + cost::lines_entered(None, &known.placed),
+                pessimistic: EXCEPTION + cost::lines_entered(None, &now.located),
             },
         );
         self.contexts.push(context);
     }
 
-    /// If the instruction before left the exception, closes it. Whether it did, and the record of the watched task.
-    fn leave(&mut self, next: &Known) -> (Option<Record>, bool) {
+    /// Closes the exception if the preceding instruction returned from it. The record if it was the sample task, and whether an
+    /// exception was left.
+    fn leave(&mut self, next: &ImageInstruction) -> (Option<Record>, bool) {
         let Some(context) = self.contexts.last() else {
             return (None, false);
         };
-        let Some(before) = self.known(context.last) else {
+        let Some(before) = self.instruction(context.last) else {
             return (None, false);
         };
         let in_handler = context.exception != 0 && context.callers.is_empty();
-        let fell_through = next.placed.address == before.placed.end();
-        if !in_handler || !before.placed.instruction.is_return() || fell_through {
+        let fell_through = next.located.address == before.located.end();
+        if !in_handler || !before.located.instruction.is_return() || fell_through {
             return (None, false);
         }
         let Some(mut context) = self.contexts.pop() else {
@@ -187,27 +193,32 @@ impl Account {
             unknown: self.unknown,
             stack_low: self.stack_low,
             stages: context.stages,
+            operations: context.operations,
         })
     }
 
-    fn run(&mut self, index: usize, known: &Known) {
+    fn run(&mut self, index: usize, now: &ImageInstruction) {
         let last = self.contexts.last().and_then(|context| context.last);
-        let before = self.known(last);
+        let before = self.instruction(last);
         let Some(context) = self.contexts.last_mut() else {
             return;
         };
         if let Some(before) = before {
-            follow(context, &before.placed, known);
+            follow(context, &before.located, now);
         }
-        let instruction = &known.placed.instruction;
-        // Nothing of what was before a jump is left in the pipeline.
+        let instruction = &now.located.instruction;
+        // A jump flushes the pipeline.
         let neighbour = before
-            .filter(|before| before.placed.end() == known.placed.address)
-            .map(|before| before.placed.instruction);
-        let stage = context.stage(known.stage);
+            .filter(|before| before.located.end() == now.located.address)
+            .map(|before| before.located.instruction);
+        let stage = context.stage(now.stage);
         context.last = Some(index);
         context.charged = stage as usize;
         context.charge(stage as usize, cost::straight(neighbour.as_ref(), instruction));
+        let operations = context.counter.count(instruction);
+        if let Some(total) = context.operations.get_mut(stage as usize) {
+            *total = total.plus(operations);
+        }
         if instruction.class.is_float() && context.exception != 0 && !context.float {
             context.float = true;
             let stacking = Cycles {
@@ -226,20 +237,20 @@ impl Account {
     }
 }
 
-/// The instruction before was a branch if what runs now does not stand behind it: charges that, and keeps the callers.
-fn follow(context: &mut Context, before: &Placed, now: &Known) {
+/// Charges a taken branch if the instruction does not follow the preceding one in memory, and updates the open calls.
+fn follow(context: &mut Context, before: &AddressedInstruction, now: &ImageInstruction) {
     let instruction = &before.instruction;
-    if now.placed.address == before.end() || !instruction.may_branch() {
+    if now.located.address == before.end() || !instruction.may_branch() {
         return;
     }
-    context.charge(context.charged, cost::taken(before, &now.placed));
+    context.charge(context.charged, cost::taken(before, &now.located));
     let stage = Stage::ALL.get(context.charged).copied().unwrap_or(Stage::Rest);
     if instruction.is_call() {
         context.callers.push(stage);
     } else if instruction.is_return() {
         context.callers.pop();
     } else if let Some(caller) = context.callers.last_mut().filter(|_| now.starts) {
-        // A tail call: who branches here takes the place of his caller, to whom the function returns.
+        // A tail call: the function returns to the caller of the function that branched, which is charged for it.
         *caller = stage;
     }
 }

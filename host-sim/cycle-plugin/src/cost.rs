@@ -1,47 +1,46 @@
-//! What an instruction costs a Cortex-M4F, in two models (ARM DDI 0439, tables 3-1 and 7-1 and section 3.3.3).
+//! Cycles of an instruction on a Cortex-M4F, in two models (ARM DDI 0439, tables 3-1 and 7-1 and section 3.3.3).
 //!
 //! | | nominal | pessimistic |
 //! |---|---|---|
 //! | data processing, multiply, `IT`, hints | 1 | 1 |
-//! | `SDIV`, `UDIV` | 12 (of 2 to 12; operands are not looked at) | 12 |
+//! | `SDIV`, `UDIV` | 12 (2 to 12 by the operands, which are unknown here) | 12 |
 //! | load | 2; 1 right after another single load | the same |
 //! | store | 1 by base and immediate (write buffer); 2 by base and register, 1 after a load | 2; 1 after a load |
 //! | `LDRD`, `LDM`, `POP`, `VLDM` and the stores | 1 + words | 1 + words |
 //! | branch not taken | 1 | 1 |
-//! | branch taken | 1 + P; P = 1 direct, 2 by register, 3 by a load or table; one more into a 32-bit instruction that straddles two words | 1 + 3 |
-//! | a taken branch into another flash line | 0 | 5; twice where the first instruction reaches into the next line |
+//! | branch taken | 1 + P; P = 1 direct, 2 by register, 3 by a load or table; one more if the target is a 32-bit instruction across two words | 1 + 3 |
+//! | a taken branch into another flash line | 0 | 5; 10 if the first instruction reaches into the next line |
 //! | `VDIV`, `VSQRT` | 14 | 14 |
 //! | `VMLA`, `VFMA` | 3 | 3 |
 //! | other floating point | 1; two registers at once 2 | 1; 2 |
 //! | result of floating-point arithmetic used by the next instruction | 0 | 1 |
 //! | loaded register used by the next instruction | 0 | 1 |
 //! | address from the result of the instruction before | 0 | 1 |
-//! | literal load (fetch unit in the way) | 0 | 1 |
+//! | literal load (conflict with instruction fetch) | 0 | 1 |
 //! | barrier | 4 | 4 |
 //! | `MRS`, `MSR` | 2 | 2 |
-//! | exception entry, exit | 12, 12 | 12, 12 and the flash lines entered; one at the exit, whatever was interrupted |
+//! | exception entry, exit | 12, 12 | 12, 12 and 5 for each flash line entered; one line at the exit |
 //! | lazy stacking: S0 to S15 and FPSCR | 0 | 17 at the first floating-point instruction, 17 at the exit |
 //!
-//! A conditional instruction in an `IT` block is charged as if its condition held: never less than it takes.
+//! A conditional instruction in an `IT` block is charged as if its condition held: an upper bound.
 //!
-//! Neither model has: flash wait states of a sequence without branches (the prefetcher keeps up with at most four words
-//! in six cycles) and of literals, two masters at one memory (DMA), wait states of peripherals' buses, unaligned accesses,
-//! folded `IT`, tail-chaining and late arrival (each entry and exit is charged in full), and the accumulator's
-//! forwarding, which makes a chain of `VMLA` cheaper.
+//! Not modelled: flash wait states of a sequence without branches (the prefetcher supplies four words in six cycles) and of
+//! literals, bus contention with DMA, wait states of the peripheral buses, unaligned accesses, folded `IT`, tail-chaining and late
+//! arrival (each entry and exit is charged in full), accumulator forwarding in a chain of `VMLA`.
 
 use crate::decode::{Branch, Class, Instruction, Registers};
 
 /// Cycles in both models.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Cycles {
-    /// Reference manual, no wait states.
+    /// By the reference manual, without wait states.
     pub nominal: u32,
     /// With stalls and wait states.
     pub pessimistic: u32,
 }
 
 impl Cycles {
-    /// The same in both.
+    /// The same number in both models.
     #[must_use]
     pub const fn both(cycles: u32) -> Self {
         Self {
@@ -50,7 +49,7 @@ impl Cycles {
         }
     }
 
-    /// Adds to both.
+    /// Adds in both models; saturates.
     pub const fn add(&mut self, other: Self) {
         self.nominal = self.nominal.saturating_add(other.nominal);
         self.pessimistic = self.pessimistic.saturating_add(other.pessimistic);
@@ -63,36 +62,36 @@ const FLASH_LINE: u32 = 16;
 /// Wait states of the flash at 168 MHz.
 pub const WAIT_STATES: u32 = 5;
 
-/// Refill of the pipeline at worst.
+/// Greatest number of cycles that refill the pipeline.
 const REFILL_MAX: u32 = 3;
 
-/// Exception entry, and exit.
+/// Cycles of an exception entry, and of an exit.
 pub const EXCEPTION: u32 = 12;
 
-/// S0 to S15 and FPSCR.
+/// Cycles that save or restore S0 to S15 and FPSCR.
 pub const LAZY_STACKING: u32 = 17;
 
-/// Barriers: one cycle and what they wait for.
+/// Cycles of a barrier: one, and the accesses that it waits for.
 const BARRIER: u32 = 4;
 
-/// An instruction where it stands.
+/// An instruction with its address.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Placed {
+pub struct AddressedInstruction {
     /// Its address.
     pub address: u32,
-    /// What it is.
+    /// The decoded instruction.
     pub instruction: Instruction,
 }
 
-impl Placed {
-    /// Address of what follows it in memory.
+impl AddressedInstruction {
+    /// Address of the instruction that follows in memory.
     #[must_use]
     pub const fn end(&self) -> u32 {
         self.address.wrapping_add(self.instruction.length as u32)
     }
 }
 
-/// Cost of an instruction after another (none at the start of a handler), without what a taken branch adds.
+/// Cycles of an instruction after the preceding one (`None` at the start of a handler), without those of a taken branch.
 #[must_use]
 pub const fn straight(before: Option<&Instruction>, instruction: &Instruction) -> Cycles {
     let pipelined = match before {
@@ -115,18 +114,23 @@ pub const fn straight(before: Option<&Instruction>, instruction: &Instruction) -
         // The load of the table; the branch is always taken.
         Class::Table => Cycles::both(3),
         Class::FloatMultiplyAdd => Cycles::both(3),
-        Class::FloatDivide => Cycles::both(14),
+        Class::FloatDivide | Class::FloatRoot => Cycles::both(14),
         Class::FloatMovePair | Class::SpecialRegister => Cycles::both(2),
         Class::Barrier => Cycles::both(BARRIER),
         Class::Simple
+        | Class::Add { .. }
+        | Class::AddWithCarry
         | Class::Multiply
+        | Class::MultiplyAdd
         | Class::Branch(_)
         | Class::IfThen
         | Class::Hint
         | Class::Wait
         | Class::ChangeState
         | Class::Trap
-        | Class::FloatArithmetic
+        | Class::FloatAdd
+        | Class::FloatMultiply
+        | Class::FloatConvert
         | Class::FloatMove
         | Class::Unknown => Cycles::both(1),
     };
@@ -134,7 +138,7 @@ pub const fn straight(before: Option<&Instruction>, instruction: &Instruction) -
     cycles
 }
 
-/// Whether a single access runs in the shadow of the single load before it.
+/// Whether a single access is pipelined with the single load that precedes it.
 const fn follows_load(before: &Instruction, instruction: &Instruction) -> bool {
     let load = matches!(before.class, Class::Load | Class::LoadLiteral | Class::FloatLoad);
     let single = matches!(
@@ -149,7 +153,7 @@ const fn follows_load(before: &Instruction, instruction: &Instruction) -> bool {
     load && single && !before.writes.meets(instruction.address) && !instruction.may_branch()
 }
 
-/// Waiting cycles of the pessimistic model.
+/// Stall cycles of the pessimistic model.
 const fn stalls(before: Option<&Instruction>, instruction: &Instruction) -> u32 {
     let mut stalls = 0;
     if matches!(instruction.class, Class::LoadLiteral) {
@@ -161,25 +165,30 @@ const fn stalls(before: Option<&Instruction>, instruction: &Instruction) -> u32 
     let slow_result = before.class.is_load()
         || matches!(
             before.class,
-            Class::FloatArithmetic | Class::FloatMultiplyAdd | Class::FloatDivide
+            Class::FloatAdd
+                | Class::FloatMultiply
+                | Class::FloatConvert
+                | Class::FloatMultiplyAdd
+                | Class::FloatDivide
+                | Class::FloatRoot
         );
     // A store takes its data a cycle after its address.
-    let wanted_now = if instruction.class.is_store() && before.class.is_load() {
+    let needed_now = if instruction.class.is_store() && before.class.is_load() {
         instruction.address
     } else {
         instruction.reads
     };
-    // What updates a base besides its loads and stores has it ready like data processing.
+    // A base register that an access updates is available like a result of data processing.
     let results = before.writes.without(Registers::PC);
-    if (slow_result && results.meets(wanted_now)) || results.meets(instruction.address) {
+    if (slow_result && results.meets(needed_now)) || results.meets(instruction.address) {
         stalls += 1;
     }
     stalls
 }
 
-/// What a branch adds when it is taken, to this instruction.
+/// Cycles that a taken branch to this instruction adds.
 #[must_use]
-pub const fn taken(from: &Placed, to: &Placed) -> Cycles {
+pub const fn taken(from: &AddressedInstruction, to: &AddressedInstruction) -> Cycles {
     let straddles = to.instruction.length == 4 && to.address & 2 != 0;
     let refill = match from.instruction.class {
         Class::Branch(Branch::Direct(_) | Branch::Call(_)) => 1 + straddles as u32,
@@ -197,7 +206,7 @@ pub const fn taken(from: &Placed, to: &Placed) -> Cycles {
 
 /// Wait states for the flash lines that a jump to this instruction enters.
 #[must_use]
-pub const fn lines_entered(from: Option<u32>, to: &Placed) -> u32 {
+pub const fn lines_entered(from: Option<u32>, to: &AddressedInstruction) -> u32 {
     let first = to.address / FLASH_LINE;
     let last = (to.end() - 1) / FLASH_LINE;
     let here = match from {
@@ -213,7 +222,7 @@ mod tests {
     use super::*;
     use crate::decode::decode;
 
-    /// Straight code as halfwords; the manual's cycles, added up by hand, in both models.
+    /// Code without branches as halfwords; the manual's cycles, summed by hand, in both models.
     fn check(what: &str, code: &[u16], nominal: u32, pessimistic: u32) {
         let mut total = Cycles::default();
         let mut before = None;
@@ -298,8 +307,8 @@ mod tests {
         );
     }
 
-    fn placed(address: u32, code: [u16; 2]) -> Placed {
-        Placed {
+    fn placed(address: u32, code: [u16; 2]) -> AddressedInstruction {
+        AddressedInstruction {
             address,
             instruction: decode(address, code[0], code[1]),
         }

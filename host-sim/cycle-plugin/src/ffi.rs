@@ -1,13 +1,10 @@
-//! QEMU's side: the few functions of its plugin interface that all versions from 7.2 to 10 have alike.
+//! Interface to QEMU: the functions of its plugin interface that are the same in all versions from 7.2 to 10.
 //!
-//! They are looked up when QEMU loads the library, so that the host tool and the tests can link it without QEMU. The
-//! version that QEMU asks for is set at the same time: 7.2 refuses what is newer than 1, 9 and 10 what is older than
-//! theirs, and nothing used here has changed between them.
-#![allow(unreachable_pub, reason = "QEMU reaches what no Rust code does: by its name")]
-#![allow(
-    unsafe_code,
-    reason = "a C interface; everything behind it is safe code in the other modules"
-)]
+//! Their addresses are resolved when QEMU loads the library, so that the host tool and the tests can link it without QEMU. The
+//! interface version is set at the same time: 7.2 refuses versions above 1, 9 and 10 refuse versions below their own; the functions
+//! used here are the same in all of them.
+#![allow(unreachable_pub, reason = "QEMU finds these items by their names")]
+#![allow(unsafe_code, reason = "a C interface; the other modules are safe code")]
 
 use std::ffi::{CStr, c_char, c_int, c_uint, c_void};
 use std::fs::File;
@@ -34,7 +31,7 @@ const VERSION_NEW: c_int = 4;
 /// Version that QEMU 9.0 has, the last before `qemu_plugin_insn_data` copies.
 const VERSION_9_0: c_int = 2;
 
-/// What QEMU reads before it calls [`qemu_plugin_install`]: a plain `int`, set when the library is loaded.
+/// Interface version, which QEMU reads before it calls [`qemu_plugin_install`]; set when the library is loaded.
 #[unsafe(no_mangle)]
 pub static qemu_plugin_version: AtomicI32 = AtomicI32::new(VERSION_OLD);
 
@@ -65,7 +62,7 @@ unsafe extern "C" {
 }
 
 fn symbol(name: &CStr) -> Option<*mut c_void> {
-    // A null handle (RTLD_DEFAULT) looks in the program itself.
+    // A null handle (RTLD_DEFAULT) searches the program itself.
     let found = dlsym(std::ptr::null_mut(), name.as_ptr());
     (!found.is_null()).then_some(found)
 }
@@ -146,20 +143,20 @@ impl Plugin {
     }
 
     fn write(&mut self, record: &Record) {
-        // A board that waits for its host ticks by the thousand.
+        // A board that waits for its host makes thousands of equal idle ticks.
         if record.is_idle() && self.last.as_ref() == Some(record) {
             return;
         }
         self.last = Some(*record);
-        // At once: QEMU may be ended at any time. Who reads too few records notices.
+        // Unbuffered: QEMU may be terminated at any time. A write that fails shows as missing records, which the reader checks.
         let _ = self.records.write_all(&record.to_bytes());
     }
 }
 
-/// QEMU calls this once, with the arguments given after the library's name.
+/// Entry point: QEMU calls it once, with the arguments that follow the library's name.
 ///
 /// # Safety
-/// `arguments` has to be as many C strings as `count` says.
+/// `arguments` must point to `count` C strings.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn qemu_plugin_install(
     id: u64,
@@ -169,7 +166,7 @@ pub unsafe extern "C" fn qemu_plugin_install(
 ) -> c_int {
     let arguments: Vec<String> = (0..usize::try_from(count).unwrap_or(0))
         .map(|index| {
-            // SAFETY: `arguments` holds `count` C strings, as the caller vouches.
+            // SAFETY: the caller guarantees `count` C strings at `arguments`.
             let text = unsafe { CStr::from_ptr(*arguments.add(index)) };
             text.to_string_lossy().into_owned()
         })
@@ -177,8 +174,8 @@ pub unsafe extern "C" fn qemu_plugin_install(
     match Plugin::new(&arguments) {
         Ok(plugin) => {
             let api = plugin.api;
-            if let Ok(mut place) = PLUGIN.lock() {
-                *place = Some(plugin);
+            if let Ok(mut slot) = PLUGIN.lock() {
+                *slot = Some(plugin);
             }
             (api.on_translation)(id, translated);
             0
@@ -190,17 +187,17 @@ pub unsafe extern "C" fn qemu_plugin_install(
     }
 }
 
-/// A block was translated: asks to be told of each instruction and each store in it.
+/// Called for each translated block: registers callbacks for each of its instructions and stores.
 extern "C" fn translated(_id: u64, block: *mut c_void) {
     with_plugin(|plugin| {
         let api = plugin.api;
         for number in 0..(api.instructions)(block) {
             let instruction = (api.instruction)(block, number);
             let address = u32::try_from((api.address)(instruction)).unwrap_or(u32::MAX);
-            let Some(index) = plugin.account.place(address) else {
+            let Some(index) = plugin.account.decode(address) else {
                 continue;
             };
-            // The pointer only carries a number.
+            // The pointer carries the index.
             let index = std::ptr::without_provenance_mut(index);
             (api.on_execution)(instruction, executed, NO_REGISTERS, index);
             (api.on_memory)(instruction, stored, NO_REGISTERS, WRITES, std::ptr::null_mut());
@@ -219,7 +216,7 @@ extern "C" fn executed(_processor: c_uint, index: *mut c_void) {
 extern "C" fn stored(_processor: c_uint, _access: c_uint, address: u64, _data: *mut c_void) {
     with_plugin(|plugin| {
         if let Ok(address) = u32::try_from(address) {
-            plugin.account.wrote(address);
+            plugin.account.store(address);
         }
     });
 }

@@ -1,14 +1,14 @@
-//! What the plugin is to watch: the image's code, the stage of each instruction, the task whose ticks are recorded.
+//! Input of the plugin: the image's code, the stage of each instruction, the task whose ticks are recorded.
 //!
-//! The code comes with the plan, because the function that would read it from QEMU has changed between versions.
+//! The plan contains the code because QEMU's function that reads code differs between versions.
 
-/// First word of the file: `ISOP` and a version.
-const MAGIC: u32 = 0x4953_4f05;
+/// First word of the file: `ISO` and a version.
+const MAGIC: u32 = 0x4953_4f06;
 
-/// Words before the code.
+/// Words of the header, before the code.
 const HEAD_WORDS: usize = 5;
 
-/// Stages that cycles are charged to.
+/// Number of stages.
 pub const STAGES: usize = 11;
 
 /// A stage of the sample task.
@@ -19,24 +19,24 @@ pub enum Stage {
     Step = 0,
     /// Step 2: the surface at the new parameter.
     Surface = 1,
-    /// Step 3: fit of the ball, cutter location.
+    /// Step 3: fit of the ball, cutter location (offset).
     Offset = 2,
     /// Step 4: candidate of the path interval.
     Interval = 3,
-    /// A patch is collapsed.
+    /// Change of patch: a patch is reduced to its curve at the pass's side parameter.
     PatchChange = 4,
-    /// A pass begins or ends.
+    /// Change of pass: a pass begins or ends.
     PassChange = 5,
-    /// Everything else in the task.
+    /// The rest of the task.
     Rest = 6,
     /// Exception entry and exit.
     Exception = 7,
-    /// Pulses of the axes in the next period.
+    /// Step pulses of the axes in the next period.
     Pulses = 8,
-    /// The feed within the axes' limits, the look ahead at the next pass, links.
+    /// The feed within the axis limits, look-ahead, links.
     Feed = 9,
-    /// A sample is counted into the run's digest: takes cycles in those ticks that yield a sample, and in no other.
-    Count = 10,
+    /// A sample is added to the run's digest: nonzero in exactly those ticks that yield a sample.
+    Digest = 10,
 }
 
 impl Stage {
@@ -52,7 +52,7 @@ impl Stage {
         Self::Exception,
         Self::Pulses,
         Self::Feed,
-        Self::Count,
+        Self::Digest,
     ];
 
     /// Name in tables and JSON.
@@ -69,11 +69,11 @@ impl Stage {
             Self::Exception => "exception entry and exit",
             Self::Pulses => "pulses",
             Self::Feed => "feed",
-            Self::Count => "digest",
+            Self::Digest => "digest",
         }
     }
 
-    /// Whether what it calls is charged to it, whatever that is: it works on behalf of the change.
+    /// Whether its callees are charged to it, whatever stage they have.
     #[must_use]
     pub const fn keeps_callees(self) -> bool {
         matches!(self, Self::PatchChange | Self::PassChange)
@@ -88,18 +88,18 @@ impl Stage {
     }
 }
 
-/// The plan.
+/// The plugin's plan.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Plan {
-    /// Address of the first byte of code; the vector table stands there.
+    /// Address of the code, which begins with the vector table.
     pub base: u32,
-    /// Exception number of the task: 16 more than the interrupt's.
+    /// Exception number of the task: its interrupt number plus 16.
     pub exception: u32,
-    /// Addresses below this and from 0x20000000 on are the stack.
+    /// End of the stack, which lies from 0x20000000 on.
     pub stack_end: u32,
     /// The code.
     pub code: Vec<u8>,
-    /// Stage of the instruction at each halfword of the code; none for helpers, which are charged to their callers.
+    /// Stage of the instruction at each halfword of the code; `None` for helpers, which are charged to their callers.
     pub stages: Vec<Option<Stage>>,
     /// Whether a function begins at each halfword of the code: a branch there is a tail call.
     pub starts: Vec<bool>,
@@ -107,7 +107,7 @@ pub struct Plan {
 
 const NO_STAGE: u8 = 0x7f;
 
-/// Set where a function begins.
+/// Flag of a halfword where a function begins.
 const START: u8 = 0x80;
 
 impl Plan {
@@ -125,7 +125,7 @@ impl Plan {
         (u32::from(self.halfword(index)) | u32::from(self.halfword(index + 1)) << 16) & !1
     }
 
-    /// As the plugin reads it.
+    /// Encodes the plan for the plugin.
     #[must_use]
     pub fn to_bytes(&self) -> Vec<u8> {
         let length = u32::try_from(self.code.len()).unwrap_or(0);
@@ -140,7 +140,7 @@ impl Plan {
         bytes
     }
 
-    /// What [`Self::to_bytes`] wrote; none if it is something else.
+    /// Decodes the bytes of [`Self::to_bytes`]; `None` if they are another format or version.
     #[must_use]
     pub fn from_bytes(bytes: &[u8]) -> Option<Self> {
         let (words, rest) = bytes.split_at_checked(4 * HEAD_WORDS)?;

@@ -1,41 +1,44 @@
-//! One record a tick: what the plugin writes and the host reads. An idle tick that repeats the one before is left out.
+//! One record a tick, written by the plugin and read by the host. An idle tick equal to the preceding one is omitted.
 
 use crate::cost::Cycles;
+use crate::operations::Operations;
 use crate::plan::{STAGES, Stage};
 
 /// Words of a record.
-const WORDS: usize = 4 + 2 * STAGES;
+const WORDS: usize = 4 + (2 + 4) * STAGES;
 
 /// Bytes of a record, little endian.
 pub const RECORD_BYTES: usize = 4 * WORDS;
 
-/// What a tick of the watched task took.
+/// A tick of the sample task.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Record {
     /// Instructions of the task.
     pub instructions: u32,
-    /// Instructions of everything else between the last tick and this.
+    /// Instructions outside the task since the preceding tick.
     pub elsewhere: u32,
-    /// Instructions not known to the decoder, since the start. Has to be 0.
+    /// Instructions unknown to the decoder since the start; must be 0.
     pub unknown: u32,
-    /// Lowest address of the stack that has been written since the start.
+    /// Lowest stack address written since the start.
     pub stack_low: u32,
     /// Cycles of each stage.
     pub stages: [Cycles; STAGES],
+    /// Arithmetic operations of each stage.
+    pub operations: [Operations; STAGES],
 }
 
 impl Record {
-    /// Whether nothing but the task's surroundings ran.
+    /// Whether no stage took cycles but entry and exit, pulses and the rest of the task.
     #[must_use]
     pub fn is_idle(&self) -> bool {
-        let surroundings = [Stage::Rest, Stage::Exception, Stage::Pulses];
+        let always = [Stage::Rest, Stage::Exception, Stage::Pulses];
         Stage::ALL
             .into_iter()
-            .filter(|stage| !surroundings.contains(stage))
+            .filter(|stage| !always.contains(stage))
             .all(|stage| self.stages[stage as usize].nominal == 0)
     }
 
-    /// As it stands in the file.
+    /// The record's bytes in the file.
     #[must_use]
     pub fn to_bytes(&self) -> Vec<u8> {
         let head = [self.instructions, self.elsewhere, self.unknown, self.stack_low];
@@ -43,13 +46,18 @@ impl Record {
             .stages
             .iter()
             .flat_map(|cycles| [cycles.nominal, cycles.pessimistic]);
+        let operations = self
+            .operations
+            .iter()
+            .flat_map(|operations| operations.to_array());
         head.into_iter()
             .chain(cycles)
+            .chain(operations)
             .flat_map(u32::to_le_bytes)
             .collect()
     }
 
-    /// All whole records of a file.
+    /// The complete records of a file.
     #[must_use]
     pub fn read_all(bytes: &[u8]) -> Vec<Self> {
         bytes.chunks_exact(RECORD_BYTES).map(Self::from_bytes).collect()
@@ -70,6 +78,9 @@ impl Record {
         for cycles in &mut record.stages {
             cycles.nominal = next();
             cycles.pessimistic = next();
+        }
+        for operations in &mut record.operations {
+            *operations = Operations::new(next(), next(), next(), next());
         }
         record
     }

@@ -1,4 +1,4 @@
-//! The chart of a budget, as SVG: what each stage takes on the mean and the worst tick, and how the ticks are distributed.
+//! Chart of a budget as SVG: mean cycles of each stage, the worst-case tick, and the distribution of the ticks.
 
 use std::io;
 use std::path::Path;
@@ -9,20 +9,20 @@ use plotters::prelude::*;
 use plotters::style::text_anchor::{HPos, Pos, VPos};
 
 use super::PERIOD_CYCLES;
-use super::figures::{Histogram, Model, histogram, whole};
+use super::figures::{Histogram, Model, histogram, tick_cycles};
 use super::measure::Ticks;
 
-/// Pixels: the whole, and the part for the bars.
+/// Size of the chart, and height of the bars, pixels.
 const SIZE: (u32, u32) = (1100, 900);
 const BARS_HEIGHT: u32 = 420;
 
-/// Least share of the ticks that is drawn: one in a hundred thousand.
+/// Least share of the ticks on the axis.
 const SHARE_MIN: f64 = 1e-5;
 
 /// Cycles of a bin.
 const BIN_CYCLES: u32 = 50;
 
-/// A colour for each stage that the colour-blind can tell apart (Okabe and Ito 2008).
+/// A colour for each stage, distinguishable by the colour-blind (Okabe and Ito 2008).
 const COLOURS: [RGBColor; STAGES] = [
     RGBColor(0xe6, 0x9f, 0x00),
     RGBColor(0x56, 0xb4, 0xe9),
@@ -53,7 +53,7 @@ const LINES: [RGBColor; 10] = [
 
 const FONT: &str = "sans-serif";
 
-type Drawn = Result<(), Box<dyn std::error::Error>>;
+type DrawResult = Result<(), Box<dyn std::error::Error>>;
 
 /// A surface's bar and line.
 struct Bar {
@@ -77,7 +77,7 @@ impl Bar {
         let cycles = ticks
             .records
             .iter()
-            .map(|record| whole(record, Model::Pessimistic));
+            .map(|record| tick_cycles(record, Model::Pessimistic));
         Self {
             name: name.to_owned(),
             means: means.map(|sum| sum / count),
@@ -98,7 +98,7 @@ pub fn write(path: &Path, jobs: &[(String, Ticks)]) -> io::Result<()> {
     std::fs::write(path, text)
 }
 
-fn draw(text: &mut String, bars: &[Bar]) -> Drawn {
+fn draw(text: &mut String, bars: &[Bar]) -> DrawResult {
     let root = SVGBackend::with_string(text, SIZE).into_drawing_area();
     root.fill(&WHITE)?;
     let most = bars.iter().map(|bar| bar.worst).max().unwrap_or(1);
@@ -116,10 +116,10 @@ fn share_pct(cycles: f64) -> f64 {
 }
 
 #[allow(clippy::cast_precision_loss, reason = "a handful")]
-fn draw_bars(area: &DrawingArea<SVGBackend, Shift>, bars: &[Bar], most: f64) -> Drawn {
+fn draw_bars(area: &DrawingArea<SVGBackend, Shift>, bars: &[Bar], most: f64) -> DrawResult {
     let mut chart = ChartBuilder::on(area)
         .caption(
-            "Cycles of a tick on the Cortex-M4F, pessimistic model: mean by stage, and the worst tick",
+            "Cycles of a tick on the Cortex-M4F, pessimistic model: mean by stage, and the worst-case tick",
             (FONT, 18),
         )
         .margin(12)
@@ -178,7 +178,7 @@ fn draw_bars(area: &DrawingArea<SVGBackend, Shift>, bars: &[Bar], most: f64) -> 
     }
     let legend = Stage::ALL.into_iter().zip(COLOURS);
     let labels = legend.map(|(stage, colour)| (label(stage), ShapeStyle::from(colour).filled()));
-    let labels = labels.chain([("worst tick", BLACK.stroke_width(3))]);
+    let labels = labels.chain([("worst-case tick", BLACK.stroke_width(3))]);
     let mut at = 0.0;
     for (label, style) in labels {
         let width = if style.filled { 0.012 } else { 0.003 } * most;
@@ -190,7 +190,7 @@ fn draw_bars(area: &DrawingArea<SVGBackend, Shift>, bars: &[Bar], most: f64) -> 
     Ok(())
 }
 
-/// A stage's name where there is little room.
+/// Short name of a stage for the legend.
 const fn label(stage: Stage) -> &'static str {
     match stage {
         Stage::Step => "step",
@@ -200,7 +200,7 @@ const fn label(stage: Stage) -> &'static str {
     }
 }
 
-/// Points of a line: cycles, and the share of ticks that took at least those.
+/// Points of a line: cycles, and the share of ticks that take at least those.
 fn at_least(histogram: &Histogram) -> Vec<(f64, f64)> {
     let total: u32 = histogram.bins.iter().map(|bin| bin.1).sum();
     let share = |count: u32| (f64::from(count) / f64::from(total.max(1))).max(SHARE_MIN);
@@ -214,10 +214,10 @@ fn at_least(histogram: &Histogram) -> Vec<(f64, f64)> {
     points
 }
 
-fn draw_lines(area: &DrawingArea<SVGBackend, Shift>, bars: &[Bar], most: f64) -> Drawn {
+fn draw_lines(area: &DrawingArea<SVGBackend, Shift>, bars: &[Bar], most: f64) -> DrawResult {
     let mut chart = ChartBuilder::on(area)
         .caption(
-            "Distribution: share of the ticks that take at least so many cycles",
+            "Distribution: share of the ticks that take at least a number of cycles",
             (FONT, 18),
         )
         .margin(12)

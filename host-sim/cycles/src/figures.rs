@@ -1,4 +1,4 @@
-//! Least, mean and most cycles of each stage, and the histogram of the whole tick.
+//! Least, mean and greatest cycles of each stage, and the histogram of the tick.
 
 use cycle_plugin::cost::Cycles;
 use cycle_plugin::plan::Stage;
@@ -7,10 +7,10 @@ use cycle_plugin::record::Record;
 use super::PERIOD_CYCLES;
 use super::measure::Ticks;
 
-/// A model of the plugin's.
+/// A cycle model of the plugin.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Model {
-    /// Reference manual, no wait states.
+    /// By the reference manual, without wait states.
     Nominal,
     /// With stalls, wait states and lazy stacking.
     Pessimistic,
@@ -37,21 +37,18 @@ impl Model {
     }
 }
 
-/// What is reported: a name, and the stages whose cycles are added up.
+/// Rows of the report: name, and the stages whose cycles are summed.
 const ROWS: [(&str, &[Stage]); 13] = [
     ("contact: step", &[Stage::Step]),
     ("contact: surface", &[Stage::Surface]),
     ("contact", &[Stage::Step, Stage::Surface]),
     ("offset", &[Stage::Offset]),
     ("interval", &[Stage::Interval]),
-    (
-        STEPS_2_TO_4,
-        &[Stage::Step, Stage::Surface, Stage::Offset, Stage::Interval],
-    ),
+    (STEPS_2_TO_4, &STEPS_2_TO_4_STAGES),
     ("patch change", &[Stage::PatchChange]),
     ("pass change", &[Stage::PassChange]),
     ("feed", &[Stage::Feed]),
-    ("digest", &[Stage::Count]),
+    ("digest", &[Stage::Digest]),
     ("everything else", &[Stage::Rest]),
     ("exception entry and exit", &[Stage::Exception]),
     ("pulses", &[Stage::Pulses]),
@@ -60,37 +57,41 @@ const ROWS: [(&str, &[Stage]); 13] = [
 /// The row of the paper's steps 2 to 4.
 pub const STEPS_2_TO_4: &str = "steps 2-4";
 
-/// The row of the task but for the pulses, which have a budget of their own.
+/// The stages of the paper's steps 2 to 4.
+pub(super) const STEPS_2_TO_4_STAGES: [Stage; 4] =
+    [Stage::Step, Stage::Surface, Stage::Offset, Stage::Interval];
+
+/// The row of the task without the pulses, which have a budget of their own.
 pub const TICK: &str = "tick";
 
 /// The row of the whole task.
 pub const TICK_AND_PULSES: &str = "tick and pulses";
 
-/// Cycles of a stage in those ticks of a job in which it took any.
+/// Cycles of a stage over the ticks of a job in which they are not zero.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Figure {
-    /// Kind of surface.
+    /// Name of the job.
     pub surface: String,
-    /// Stage, or a sum of some.
+    /// Name of the stage or of a sum of stages.
     pub stage: &'static str,
     /// Model.
     pub model: Model,
-    /// Ticks in which it took any.
+    /// Number of those ticks.
     pub ticks: u32,
-    /// Least.
+    /// Least cycles.
     pub min: u32,
-    /// Mean.
+    /// Mean cycles.
     pub mean: f64,
-    /// Most.
+    /// Greatest cycles.
     pub max: u32,
     /// High-water mark of the stack over the job, bytes.
     pub stack_bytes: u32,
-    /// Those ticks by their cycles.
+    /// Distribution of those ticks.
     pub histogram: Histogram,
 }
 
 impl Figure {
-    /// The most, as a share of the period.
+    /// The greatest number of cycles as a share of the period, %.
     #[must_use]
     pub fn period_share_pct(&self) -> f64 {
         100.0 * f64::from(self.max) / f64::from(PERIOD_CYCLES)
@@ -131,32 +132,32 @@ impl Figure {
         }
     }
 
-    /// The whole of a single tick.
+    /// The figure of a single tick, without the pulses.
     #[must_use]
     pub fn of_tick(surface: &str, model: Model, record: &Record) -> Self {
         let ticks = Ticks {
             records: vec![*record],
             stack_bytes: 0,
         };
-        Self::of(surface, TICK, model, &ticks, |record| whole(record, model))
+        Self::of(surface, TICK, model, &ticks, |record| tick_cycles(record, model))
     }
 }
 
-/// Bins of a stage's histogram, from its least to its most.
+/// Bins of a stage's histogram.
 const BINS: u32 = 16;
 
-/// Cycles of the task in a tick, but for the pulses.
+/// Cycles of the task in a tick, without the pulses.
 #[must_use]
-pub fn whole(record: &Record, model: Model) -> u32 {
+pub fn tick_cycles(record: &Record, model: Model) -> u32 {
     with_pulses(record, model) - model.of(record.stages[Stage::Pulses as usize])
 }
 
-/// Cycles of the task in a tick, all of them.
+/// Cycles of the task in a tick.
 fn with_pulses(record: &Record, model: Model) -> u32 {
     record.stages.iter().map(|cycles| model.of(*cycles)).sum()
 }
 
-/// All figures of a job's ticks: each stage in both models, then the whole tick.
+/// All figures of a job's ticks: each stage, then the tick, in both models.
 #[must_use]
 pub fn figures(surface: &str, ticks: &Ticks) -> Vec<Figure> {
     let mut figures = Vec::new();
@@ -168,7 +169,7 @@ pub fn figures(surface: &str, ticks: &Ticks) -> Vec<Figure> {
             }));
         }
         figures.push(Figure::of(surface, TICK, model, ticks, |record| {
-            whole(record, model)
+            tick_cycles(record, model)
         }));
         figures.push(Figure::of(surface, TICK_AND_PULSES, model, ticks, |record| {
             with_pulses(record, model)
@@ -177,12 +178,12 @@ pub fn figures(surface: &str, ticks: &Ticks) -> Vec<Figure> {
     figures
 }
 
-/// A histogram: cycles at which a bin begins, and its ticks.
+/// A histogram of the cycles of ticks.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Histogram {
-    /// Cycles of a bin.
+    /// Width of a bin, cycles.
     pub width: u32,
-    /// Bins with ticks, in order.
+    /// First cycle and number of ticks of each bin that is not empty, in order.
     pub bins: Vec<(u32, u32)>,
 }
 
@@ -198,7 +199,7 @@ impl Histogram {
         }
     }
 
-    /// A line of characters, one a bin, as high as the logarithm of its ticks: a single tick is seen too.
+    /// The histogram as a line of block characters, one a bin, on a logarithmic scale, on which a single tick shows.
     #[must_use]
     pub fn sparkline(&self) -> String {
         const HEIGHTS: [char; 8] = [
@@ -222,5 +223,8 @@ impl Histogram {
 /// The histogram of a job's ticks.
 #[must_use]
 pub fn histogram(ticks: &Ticks, model: Model, width: u32) -> Histogram {
-    Histogram::of(ticks.records.iter().map(|record| whole(record, model)), width)
+    Histogram::of(
+        ticks.records.iter().map(|record| tick_cycles(record, model)),
+        width,
+    )
 }

@@ -1,4 +1,4 @@
-//! What the budget needs to know of the firmware's image: its code, its sizes, and the plan for the plugin.
+//! The firmware's image: its code, its sizes, and the plan for the plugin.
 
 use std::path::{Path, PathBuf};
 
@@ -12,10 +12,10 @@ use programs::Part;
 use super::{BudgetError, stages};
 use machine::remote::qemu::QemuError;
 
-/// Flash begins here.
+/// First address of the flash.
 const FLASH: u64 = 0x0800_0000;
 
-/// And RAM here.
+/// First address of the RAM.
 const RAM: u64 = 0x2000_0000;
 
 /// Exception number of TIM2, whose handler is the sample task.
@@ -30,7 +30,7 @@ pub struct Sizes {
     pub ram: u64,
     /// The job store.
     pub store: u64,
-    /// Room for the stack: what of the RAM is left.
+    /// RAM left for the stack.
     pub stack_room: u64,
 }
 
@@ -55,7 +55,7 @@ fn is_loaded<'data>(section: &impl ObjectSection<'data>) -> bool {
     sh_flags & u64::from(object::elf::SHF_ALLOC) != 0
 }
 
-/// Where the stack begins: it grows down to the RAM's beginning.
+/// Address where the stack begins; it grows down to the first address of the RAM.
 fn stack_start(file: &File) -> Result<u64, BudgetError> {
     file.symbols()
         .find(|symbol| symbol.name() == Ok("_stack_start"))
@@ -63,10 +63,10 @@ fn stack_start(file: &File) -> Result<u64, BudgetError> {
         .ok_or_else(|| bad(&"it has no symbol _stack_start"))
 }
 
-/// The code as it stands in flash, without stages.
+/// A plan with the code, without stages.
 ///
 /// # Errors
-/// It is no image of the firmware.
+/// The file is not an image of the firmware.
 pub fn bare_plan(file: &File) -> Result<Plan, BudgetError> {
     let mut code = Vec::new();
     for section in file.sections().filter(is_loaded) {
@@ -91,7 +91,7 @@ pub fn bare_plan(file: &File) -> Result<Plan, BudgetError> {
 /// Sizes of an image.
 ///
 /// # Errors
-/// It cannot be read, or is no image of the firmware.
+/// The file cannot be read, or is not an image of the firmware.
 pub fn sizes(path: &Path) -> Result<Sizes, BudgetError> {
     let bytes = std::fs::read(path).map_err(|error| BudgetError::File(path.into(), error.to_string()))?;
     sizes_of(&File::parse(bytes.as_slice()).map_err(|error| bad(&error))?)
@@ -130,7 +130,7 @@ fn starts(file: &File, plan: &Plan) -> Vec<bool> {
 /// Reads the image: the plan for the plugin, and the sizes.
 ///
 /// # Errors
-/// It cannot be read, is no image of the firmware, or lacks a function of the table of stages.
+/// The file cannot be read, is not an image of the firmware, or lacks a function of the table of stages.
 pub fn read(path: &Path) -> Result<(Plan, Sizes), BudgetError> {
     let bytes = std::fs::read(path).map_err(|error| BudgetError::File(path.into(), error.to_string()))?;
     let file = File::parse(bytes.as_slice()).map_err(|error| bad(&error))?;
@@ -138,7 +138,7 @@ pub fn read(path: &Path) -> Result<(Plan, Sizes), BudgetError> {
     let lines = Loader::new(path).map_err(|error| bad(&error))?;
     plan.stages = stages::map(&lines, plan.base, &plan.code).map_err(|missing| {
         bad(&format!(
-            "{} in the table of host-sim/src/budget/stages.rs: no such function in the image; was it renamed?",
+            "{} in the table of host-sim/cycles/src/stages.rs: no such function in the image; was it renamed?",
             missing.join(", ")
         ))
     })?;

@@ -1,12 +1,12 @@
-//! Cycle budgets: the firmware in QEMU with the plugin that counts what each tick takes on a Cortex-M4F.
+//! Cycle budgets: the firmware in QEMU with a plugin that counts the cycles of each tick on a Cortex-M4F.
 //!
 //! ```text
 //!  image ──stages──► plan ──► plugin in QEMU ──► a record a tick ──figures──► min, mean, max, histogram
-//!    (which stage an instruction belongs to,      │ measure                      │ golden, chart
-//!     from the image's line tables)               └─ runs a job's first ticks    ▼ table, JSON, SVG
+//!    (stage of each instruction,                  │ measure       └─operations─► operations of a sample
+//!     from the image's line tables)               └─ runs a job's first ticks      golden, chart: table, SVG
 //! ```
 //!
-//! What a cycle is, and what the two models leave out, is said in `cycle_plugin::cost`.
+//! The cycle models and their limits: `cycle_plugin::cost`.
 #![cfg_attr(
     test,
     allow(
@@ -22,9 +22,10 @@ pub mod figures;
 pub mod golden;
 pub mod graph;
 pub mod image;
-pub mod lab;
 pub mod measure;
+pub mod operations;
 pub mod search;
+pub mod session;
 pub mod stages;
 
 use std::path::PathBuf;
@@ -32,13 +33,13 @@ use std::path::PathBuf;
 use machine::remote::RemoteError;
 use machine::remote::qemu::QemuError;
 
-/// Cycles of a period: 1 ms at 168 MHz.
+/// Cycles of a period of 1 ms at 168 MHz.
 pub const PERIOD_CYCLES: u32 = 168_000;
 
-/// Ticks of each job: enough for changes of passes and of patches.
+/// Ticks of each job, which contain changes of pass and of patch.
 pub const TICKS: u32 = 20_000;
 
-/// The kinds of surface, each with a job of it.
+/// Kinds of surface, each with the name of a sample job.
 pub const SURFACES: [(&str, &str); 6] = [
     ("revolved along u", "revolved"),
     ("revolved along v", "revolved_v"),
@@ -48,11 +49,11 @@ pub const SURFACES: [(&str, &str); 6] = [
     ("NURBS rational", "torus"),
 ];
 
-/// Ticks of a job with limits: the first pass looked over, the way there, a pass and a link, and the next. They are dear to count.
+/// Ticks of a job with limits: look-ahead of the first pass, approach, a pass, a link, and the next pass. Fewer, because they run
+/// slowly.
 pub const TICKS_WITHIN_LIMITS: u32 = 10_000;
 
-/// Jobs of `tests/golden` that are counted besides, and their ticks: those that ask pulses or limits, which no kind of surface has
-/// to do with.
+/// Further jobs, of `tests/golden`, with their ticks: step rates and limits, which are independent of the kind of surface.
 pub const FURTHER: [(&str, &str, u32); 4] = [
     ("three axes at 400 kHz", "pulses", TICKS),
     ("limits, zig", "limits_zig", TICKS_WITHIN_LIMITS),
@@ -72,22 +73,22 @@ pub fn jobs() -> Vec<(&'static str, PathBuf, u32)> {
     surfaces.into_iter().chain(further).collect()
 }
 
-/// Why there is no figure.
+/// Reason for a missing figure.
 #[derive(Debug, thiserror::Error)]
 pub enum BudgetError {
     /// QEMU, the firmware or the plugin is missing.
     #[error(transparent)]
     Qemu(#[from] QemuError),
-    /// The board does not answer, or refuses.
+    /// The board does not answer, or refuses a request.
     #[error(transparent)]
     Remote(#[from] RemoteError),
     /// A file cannot be read or written.
     #[error("{0}: {1}")]
     File(PathBuf, String),
-    /// The image is not what is expected.
+    /// The image is not of the expected form.
     #[error("the firmware image cannot be used: {0}")]
     Image(String),
-    /// The plugin's figures are not whole.
-    #[error("the figures are not whole: {0}")]
+    /// The plugin's records are incomplete.
+    #[error("the records of the plugin are incomplete: {0}")]
     Figures(String),
 }

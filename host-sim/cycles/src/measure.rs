@@ -1,4 +1,4 @@
-//! Runs the first ticks of a job in QEMU, and reads what each of them took.
+//! Runs the first ticks of a job in QEMU and reads their records.
 
 use std::path::{Path, PathBuf};
 
@@ -13,34 +13,34 @@ use machine::remote::qemu::{self, Qemu};
 use machine::remote::session::Event;
 use machine::remote::{Session, drive};
 
-/// The image, the plan made of it, and the plugin: what every measurement starts from.
+/// The image, its plan and the plugin: the inputs of every measurement.
 #[derive(Debug)]
-pub struct Bench {
+pub struct MeasurementSetup {
     image: PathBuf,
     plugin: PathBuf,
     plan: Vec<u8>,
     stack_end: u32,
 }
 
-/// What a job's ticks took.
+/// The records of a job's ticks.
 #[derive(Clone, Debug, Default)]
 pub struct Ticks {
-    /// The ticks that yielded a sample, in order.
+    /// The ticks that yield a sample, in order.
     pub records: Vec<Record>,
     /// High-water mark of the stack, bytes.
     pub stack_bytes: u32,
 }
 
-/// Whether the board made a sample in a tick.
+/// Whether a tick yields a sample.
 pub(super) fn yields_sample(record: &Record) -> bool {
-    record.stages[Stage::Count as usize].nominal > 0
+    record.stages[Stage::Digest as usize].nominal > 0
 }
 
 fn file_error(path: &Path, error: &std::io::Error) -> BudgetError {
     BudgetError::File(path.into(), error.to_string())
 }
 
-impl Bench {
+impl MeasurementSetup {
     /// Builds the plugin for an image and its plan.
     ///
     /// # Errors
@@ -59,12 +59,12 @@ impl Bench {
         &self.image
     }
 
-    /// Where the stack begins.
+    /// Address where the stack begins.
     pub(super) const fn stack_end(&self) -> u32 {
         self.stack_end
     }
 
-    /// QEMU's arguments for the plugin, which writes into this folder; and the file of its records.
+    /// QEMU's arguments for the plugin, which writes into `folder`, and the file of its records.
     pub(super) fn plugin(&self, folder: &Path) -> Result<([String; 2], PathBuf), BudgetError> {
         let (plan, records) = (folder.join("plan"), folder.join("records"));
         std::fs::write(&plan, &self.plan).map_err(|error| file_error(&plan, &error))?;
@@ -77,10 +77,10 @@ impl Bench {
         Ok((["-plugin".to_owned(), plugin], records))
     }
 
-    /// Runs so many ticks of a job in lockstep, and reads the plugin's records.
+    /// Runs `ticks` ticks of a job in lockstep and reads the plugin's records.
     ///
     /// # Errors
-    /// QEMU does not start, the board refuses the job, or the records are not whole.
+    /// QEMU does not start, the board refuses the job, or records are missing.
     pub fn run(&self, job: &Prepared, ticks: u32) -> Result<Ticks, BudgetError> {
         let here = Path::new("a temporary file");
         let folder = tempfile::tempdir().map_err(|error| file_error(here, &error))?;
@@ -96,7 +96,7 @@ impl Bench {
         self.select(Record::read_all(&bytes), samples)
     }
 
-    /// The ticks that yielded a sample, if they are as many as the board says.
+    /// Selects the ticks that yield a sample; their number must be the board's.
     fn select(&self, mut records: Vec<Record>, samples: u32) -> Result<Ticks, BudgetError> {
         let last = records.last().copied().unwrap_or_default();
         if last.unknown > 0 {
@@ -105,7 +105,10 @@ impl Bench {
         }
         records.retain(yields_sample);
         if records.len() != samples as usize {
-            let what = format!("{} ticks with a sample, the board made {samples}", records.len());
+            let what = format!(
+                "{} ticks with a sample, but the board reports {samples} samples",
+                records.len()
+            );
             return Err(BudgetError::Figures(what));
         }
         Ok(Ticks {
@@ -115,7 +118,7 @@ impl Bench {
     }
 }
 
-/// Starts the loaded job, and waits until the ticks are used up. The samples that the board made.
+/// Runs `ticks` ticks of the loaded job. The number of samples that the board reports.
 fn run_ticks(session: &mut Session, ticks: u32) -> Result<u32, BudgetError> {
     for request in [
         Request::Clock(Clock::Lockstep),

@@ -1,20 +1,20 @@
-//! Which stage an instruction of the image belongs to.
+//! The stage of each instruction of the image.
 //!
 //! The compiler inlines nearly everything into the timer's handler, so symbols do not help. The line tables do: each
 //! address has a chain of functions, from the one inlined innermost to the one that has a symbol. The innermost that
 //! belongs to a stage decides, unless the chain is part of a change of pass or patch. Helpers (vectors, fixed point,
-//! `core`) belong to whoever uses them; where they are called, the plugin charges the caller.
+//! `core`) belong to the function that uses them; where they are called, the plugin charges the caller.
 //!
-//! Limits: what the compiler merged or moved out of two stages carries the place of one; evaluations at the end of
-//! a patch, which a change of patch needs, count to `step` and `surface`.
+//! Limits: code that the compiler merged from two stages has the line of one; evaluations at the end of a patch, which a change
+//! of patch needs, are charged to `step` and `surface`.
 
 use std::collections::BTreeMap;
 
 use addr2line::Loader;
 use cycle_plugin::plan::Stage;
 
-/// A module of `interp_core` (a function in it, or all of it) and its stage; the first that fits counts. What is renamed there
-/// is renamed here: a name that occurs nowhere in the image is an error.
+/// A module of `interp_core` (a function in it, or all of it) and its stage; the first match applies. A name that occurs nowhere in
+/// the image is an error: rename it here together with the core.
 const STAGES: [(&str, &str, Stage); 24] = [
     ("pass::contact", "", Stage::Step),
     ("surface::ball", "", Stage::Offset),
@@ -43,12 +43,12 @@ const STAGES: [(&str, &str, Stage); 24] = [
 ];
 
 /// The function that counts a sample in.
-const COUNT: &str = "controller::realtime::run::RunRecord::add";
+const ADD_SAMPLE: &str = "controller::realtime::run::RunRecord::add";
 
-/// What it calls: a helper.
+/// The module that it calls: helpers.
 const DIGEST: &str = "protocol::digest";
 
-/// Crates of which every other function is everything else.
+/// Crates whose other functions are [`Stage::Rest`].
 const REST: [&str; 6] = [
     "controller",
     "protocol",
@@ -58,16 +58,16 @@ const REST: [&str; 6] = [
     "stm32f4xx_hal",
 ];
 
-/// What a function's name comes to.
+/// Classification of a function by its name.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Entry {
     /// A line of [`STAGES`].
     Line(usize),
-    /// [`COUNT`].
-    Count,
+    /// [`ADD_SAMPLE`].
+    AddSample,
     /// A crate of [`REST`].
     Rest,
-    /// Charged to its caller.
+    /// A helper, charged to its caller.
     Helper,
 }
 
@@ -80,7 +80,7 @@ impl Entry {
             .map(|part| part.split('<').next().unwrap_or(part));
         match parts.next() {
             Some("interp_core") => {}
-            Some(_) if path == COUNT => return Self::Count,
+            Some(_) if path == ADD_SAMPLE => return Self::AddSample,
             Some("protocol") if path.starts_with(DIGEST) => return Self::Helper,
             Some(root) if REST.contains(&root) => return Self::Rest,
             _ => return Self::Helper,
@@ -100,19 +100,19 @@ impl Entry {
     const fn stage(self) -> Option<Stage> {
         match self {
             Self::Line(line) => Some(STAGES[line].2),
-            Self::Count => Some(Stage::Count),
+            Self::AddSample => Some(Stage::Digest),
             Self::Rest => Some(Stage::Rest),
             Self::Helper => None,
         }
     }
 }
 
-/// Whether a part of a path is this function; those of the surfaces that begin with its name are its helpers.
+/// Whether a part of a path is this function; functions that begin with `collapse` are helpers of it.
 fn is_name(part: &str, name: &str) -> bool {
     part == name || (name == "collapse" && part.starts_with("collapse"))
 }
 
-/// Stage of a function by its path; none for helpers.
+/// Stage of a function by its path; `None` for helpers.
 #[must_use]
 pub fn of_function(path: &str) -> Option<Stage> {
     Entry::of(path).stage()
@@ -126,7 +126,7 @@ fn of_chain(chain: &[Option<Stage>]) -> Option<Stage> {
         .or_else(|| chain.iter().copied().flatten().next())
 }
 
-/// The functions at an address, the innermost first, demangled; none where the image says nothing.
+/// The demangled functions at an address, the innermost first; empty without line information.
 #[must_use]
 pub fn chain(lines: &Loader, address: u32) -> Vec<String> {
     let mut functions = Vec::new();
@@ -171,7 +171,7 @@ pub fn plain(path: &str) -> String {
 /// Stage of the instruction at each halfword of the code from `base` on.
 ///
 /// # Errors
-/// The lines of the table that fit no function of the image.
+/// The lines of the table that match no function of the image.
 pub fn map(lines: &Loader, base: u32, code: &[u8]) -> Result<Vec<Option<Stage>>, Vec<String>> {
     let mut known: BTreeMap<String, Entry> = BTreeMap::new();
     let map = (0..code.len() / 2)
@@ -191,7 +191,7 @@ pub fn map(lines: &Loader, base: u32, code: &[u8]) -> Result<Vec<Option<Stage>>,
     let missing: Vec<String> = (0..STAGES.len())
         .filter(|line| !found.contains(&Entry::Line(*line)))
         .map(|line| format!("{}::{}", STAGES[line].0, STAGES[line].1))
-        .chain((!found.contains(&Entry::Count)).then(|| COUNT.to_owned()))
+        .chain((!found.contains(&Entry::AddSample)).then(|| ADD_SAMPLE.to_owned()))
         .collect();
     if missing.is_empty() { Ok(map) } else { Err(missing) }
 }
@@ -219,7 +219,7 @@ mod tests {
         assert_eq!(stage("core::num::<impl u32>::wrapping_add"), None);
         assert_eq!(
             stage("controller::realtime::run::RunRecord::add"),
-            Some(Stage::Count)
+            Some(Stage::Digest)
         );
         assert_eq!(
             stage("controller::realtime::run::RunRecord::end_pass"),

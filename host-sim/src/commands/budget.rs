@@ -13,11 +13,12 @@ use super::{Failure, Result, along, cannot_write, load, progress, spinner};
 use cycles::figures::{Figure, Histogram, Model, STEPS_2_TO_4, figures, histogram};
 use cycles::graph::{self, Analysis, EXCEPTION_BYTES};
 use cycles::image::{self, Sizes};
-use cycles::lab::Lab;
-use cycles::measure::{Bench, Ticks};
+use cycles::measure::{MeasurementSetup, Ticks};
+use cycles::operations::{self, Count, Operations};
+use cycles::session::MeasurementSession;
 use cycles::{self, BudgetError, PERIOD_CYCLES, TICKS, chart, golden};
 use machine::remote::qemu;
-use study::operations::{self, Operations};
+use study::operations::PaperRow;
 
 /// Width of a bin of the printed histogram, cycles.
 const BIN_CYCLES: u32 = 50;
@@ -36,7 +37,7 @@ pub(super) struct Arguments {
     /// Writes a chart (SVG) into this folder.
     #[arg(long, value_name = "DIR")]
     report: Option<PathBuf>,
-    /// Searches the worst-case tick in this number of random and adversarial jobs, and writes the job that causes it.
+    /// Searches for the worst-case tick over this many jobs, random and adversarial, and writes the job that causes it.
     #[arg(long, value_name = "JOBS", value_parser = clap::value_parser!(u32).range(1..), allow_negative_numbers = true, conflicts_with_all = ["jobs", "ticks", "report", "check", "bless"])]
     search: Option<u32>,
     /// Seed of the search, which is deterministic.
@@ -96,7 +97,7 @@ fn jobs(arguments: &Arguments) -> Vec<(String, PathBuf, u32)> {
     }
 }
 
-fn count(arguments: &Arguments, bench: &Bench) -> Result<(Vec<Counted>, Directions)> {
+fn count(arguments: &Arguments, setup: &MeasurementSetup) -> Result<(Vec<Counted>, Directions)> {
     let jobs = jobs(arguments);
     let bar = progress(jobs.len() as u64, "counting");
     let mut counted = Vec::new();
@@ -104,11 +105,39 @@ fn count(arguments: &Arguments, bench: &Bench) -> Result<(Vec<Counted>, Directio
     for (name, path, ticks) in jobs {
         let (job, prepared) = load(&path)?;
         directions.insert(name.clone(), (along::sentence(&job), along::json(&job)));
-        counted.push((name, bench.run(&prepared, ticks)?));
+        counted.push((name, setup.run(&prepared, ticks)?));
         bar.inc(1);
     }
     bar.finish_and_clear();
     Ok((counted, directions))
+}
+
+/// The operations of a sample of each job, beside the paper's.
+fn print_operations(counts: &[(String, Count)]) {
+    let row = |name: &str, operations: Operations, more: &str| {
+        let [add, multiply, divide, root] = operations.to_array();
+        say!("  {name:<30} {add:>5} {multiply:>5} {divide:>5} {root:>5}  {more}");
+    };
+    say!(
+        "\noperations of a sample, {STEPS_2_TO_4}\n  {:<30} {:>5} {:>5} {:>5} {:>5}  samples with these",
+        "",
+        "+ -",
+        "x",
+        "/",
+        "sqrt"
+    );
+    for (name, count) in counts {
+        let samples = format!("{} of {}", count.samples, count.samples + count.others);
+        row(name, count.operations, &samples);
+        if let Some(paper) = study::operations::of_paper(name) {
+            let sines = match paper.sines {
+                0 => String::new(),
+                sines => format!("and {sines} sines, cosines"),
+            };
+            row("  the paper's Table 1", paper.operations, &sines);
+        }
+    }
+    say!("{}", operations::CONVENTION);
 }
 
 fn operations_json(operations: Operations) -> Value {
@@ -117,8 +146,14 @@ fn operations_json(operations: Operations) -> Value {
         "multiply": operations.multiply,
         "divide": operations.divide,
         "square_root": operations.root,
-        "sine": operations.sine,
     })
+}
+
+/// The paper's row, with its sines.
+fn paper_json(row: PaperRow) -> Value {
+    let mut value = operations_json(row.operations);
+    value["sine"] = row.sines.into();
+    value
 }
 
 /// What the images say without being run.
@@ -164,10 +199,11 @@ impl Images {
     }
 }
 
-fn json(figures: &[Figure], images: &Images, directions: &Directions) -> Value {
+fn json(figures: &[Figure], images: &Images, counts: &[(String, Count)], directions: &Directions) -> Value {
     let rows = figures.iter().map(|figure| {
         let whole = figure.stage == STEPS_2_TO_4;
-        let paper = operations::of_paper(&figure.surface).filter(|_| whole);
+        let count = counts.iter().find(|(name, _)| whole && *name == figure.surface);
+        let paper = study::operations::of_paper(&figure.surface).filter(|_| whole);
         let mut row = json!({
             "surface": figure.surface,
             "stage": figure.stage,
@@ -177,7 +213,8 @@ fn json(figures: &[Figure], images: &Images, directions: &Directions) -> Value {
             "cycles_mean": figure.mean,
             "cycles_max": figure.max,
             "period_share_pct": figure.period_share_pct(),
-            "operations_paper": paper.map(operations_json),
+            "operations": count.map(|(_, count)| operations_json(count.operations)),
+            "operations_paper": paper.map(paper_json),
             "histogram": { "width": figure.histogram.width, "bins": figure.histogram.bins },
             "stack_bytes": figure.stack_bytes,
             "stack_static_bytes": images.qemu_stack.stack_bytes(),
@@ -234,18 +271,18 @@ fn print_histogram(histogram: &Histogram) {
     }
 }
 
-/// Prints the worst-case tick of each given job.
-fn print_worst(arguments: &Arguments, bench: &Bench) -> Result<()> {
+/// Prints the worst-case tick of each job named.
+fn print_worst(arguments: &Arguments, setup: &MeasurementSetup) -> Result<()> {
     for path in &arguments.jobs {
         let (_, prepared) = load(path)?;
         let bar = spinner("searching the worst-case tick");
-        let mut lab = Lab::new(bench)?;
-        let run = lab.run(&prepared, arguments.ticks.unwrap_or(TICKS))?;
+        let mut session = MeasurementSession::new(setup)?;
+        let run = session.run(&prepared, arguments.ticks.unwrap_or(TICKS))?;
         bar.finish_and_clear();
         say_part!(
             "\n{}: {}",
             path.display(),
-            worst::describe(&lab.worst(&prepared, &run)?)
+            worst::describe(&session.worst_tick(&prepared, &run)?)
         );
     }
     Ok(())
@@ -265,23 +302,28 @@ fn report(arguments: &Arguments, counted: &[Counted]) -> Result<()> {
     Ok(())
 }
 
-/// Compares the figures with the golden table, or writes it.
-fn hold(arguments: &Arguments, figures: &[Figure]) -> Result<()> {
+/// Compares with the golden table, or writes it.
+fn hold(arguments: &Arguments, figures: &[Figure], counts: &[(String, Count)]) -> Result<()> {
+    let operations: Vec<(String, Operations)> = counts
+        .iter()
+        .map(|(name, count)| (name.clone(), count.operations))
+        .collect();
     let path = golden::path();
     if arguments.bless {
-        return std::fs::write(&path, golden::table(figures)).map_err(|error| cannot_write(&path, &error));
+        return std::fs::write(&path, golden::table(figures, &operations))
+            .map_err(|error| cannot_write(&path, &error));
     }
     if !arguments.check {
         return Ok(());
     }
     let table = std::fs::read_to_string(&path).map_err(|error| cannot_write(&path, &error))?;
-    let complaints = golden::complaints(&table, figures);
-    if complaints.is_empty() {
+    let differences = golden::differences(&table, figures, &operations);
+    if differences.is_empty() {
         return Ok(());
     }
     Err(Failure::Failed(Some(format!(
-        "stages exceed the golden table (old -> new):\n  {}\nif intended: cargo sim budget --bless",
-        complaints.join("\n  ")
+        "stages take more than the golden table allows (old -> new):\n  {}\nif that is meant: cargo sim budget --bless",
+        differences.join("\n  ")
     ))))
 }
 
@@ -296,17 +338,21 @@ pub(super) fn command(arguments: &Arguments) -> Result<()> {
     let image = qemu::firmware()?;
     bar.finish_and_clear();
     let (plan, _) = image::read(&image)?;
-    let bench = Bench::new(&image, &plan)?;
+    let setup = MeasurementSetup::new(&image, &plan)?;
     if let Some(jobs) = arguments.search {
-        return worst::command(&bench, jobs, arguments);
+        return worst::command(&setup, jobs, arguments);
     }
-    let (counted, directions) = count(arguments, &bench)?;
+    let (counted, directions) = count(arguments, &setup)?;
     let figures: Vec<Vec<Figure>> = counted.iter().map(|(name, ticks)| figures(name, ticks)).collect();
+    let counts: Vec<(String, Count)> = counted
+        .iter()
+        .filter_map(|(name, ticks)| Some((name.clone(), operations::count(ticks)?)))
+        .collect();
     let bar = spinner("reading the images");
     let images = Images::read(&image)?;
     bar.finish_and_clear();
     if arguments.json {
-        say!("{}", json(&figures.concat(), &images, &directions));
+        say!("{}", json(&figures.concat(), &images, &counts, &directions));
     } else {
         images.print();
         for ((name, ticks), figures) in counted.iter().zip(&figures) {
@@ -314,16 +360,17 @@ pub(super) fn command(arguments: &Arguments) -> Result<()> {
             say!("  along {}", directions[name].0);
             print_histogram(&histogram(ticks, Model::Pessimistic, BIN_CYCLES));
         }
+        print_operations(&counts);
     }
     if !arguments.json {
-        print_worst(arguments, &bench)?;
+        print_worst(arguments, &setup)?;
     }
     report(arguments, &counted)?;
     let mut held = figures.concat();
     if arguments.check || arguments.bless {
         let bar = spinner("counting the worst job");
-        held.extend(golden::worst(&bench)?);
+        held.extend(golden::worst_tick(&setup)?);
         bar.finish_and_clear();
     }
-    hold(arguments, &held)
+    hold(arguments, &held, &counts)
 }

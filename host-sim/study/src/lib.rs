@@ -1,5 +1,5 @@
-//! The paper (Lo, Computer-Aided Design 30, 1998) reproduced: its examples, tables and figures, printed against ours. The product does not
-//! depend on this crate.
+//! The paper (Lo, Computer-Aided Design 30, 1998) reproduced: its examples, tables and figures, the printed figures against
+//! ours. The product does not depend on this crate.
 #![cfg_attr(
     test,
     allow(

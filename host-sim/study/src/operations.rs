@@ -1,58 +1,47 @@
-//! Operations of a sample (steps 2 to 4) in the terms of the paper's Table 1.
+//! Operations of a sample (steps 2 to 4) in the paper's Table 1. Ours are counted by `cycles::operations`.
 
-/// Operations in the columns of the paper's Table 1.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct Operations {
-    /// Additions and subtractions.
-    pub add: u32,
-    /// Multiplications.
-    pub multiply: u32,
-    /// Divisions.
-    pub divide: u32,
-    /// Square roots.
-    pub root: u32,
-    /// Sines and cosines. Where they are polynomials, their additions and multiplications are among the others too.
-    pub sine: u32,
+use cycles::golden;
+use cycles::operations::Operations;
+
+/// A row of the paper's Table 1.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct PaperRow {
+    /// Name of the surface in [`cycles::SURFACES`].
+    pub surface: &'static str,
+    /// Operations but for the sines.
+    pub operations: Operations,
+    /// Sines and cosines. Ours are polynomials, so that their operations are additions and multiplications.
+    pub sines: u32,
 }
 
-/// The paper's Table 1, by the names of [`cycles::SURFACES`]. It has no row for a ruled surface.
-pub const PAPER: [(&str, Operations); 3] = [
-    (
-        "revolved along u",
-        Operations {
-            add: 39,
-            multiply: 52,
-            divide: 8,
-            root: 4,
-            sine: 0,
-        },
-    ),
-    (
-        "revolved along v",
-        Operations {
-            add: 21,
-            multiply: 40,
-            divide: 8,
-            root: 4,
-            sine: 2,
-        },
-    ),
-    (
-        "bicubic",
-        Operations {
-            add: 75,
-            multiply: 92,
-            divide: 9,
-            root: 4,
-            sine: 0,
-        },
-    ),
+/// The paper's Table 1. It has no row for a ruled surface.
+pub const PAPER: [PaperRow; 3] = [
+    PaperRow {
+        surface: "revolved along u",
+        operations: Operations::new(39, 52, 8, 4),
+        sines: 0,
+    },
+    PaperRow {
+        surface: "revolved along v",
+        operations: Operations::new(21, 40, 8, 4),
+        sines: 2,
+    },
+    PaperRow {
+        surface: "bicubic",
+        operations: Operations::new(75, 92, 9, 4),
+        sines: 0,
+    },
 ];
 
 /// The paper's row of a kind of surface.
 #[must_use]
-pub fn of_paper(surface: &str) -> Option<Operations> {
-    PAPER
-        .iter()
-        .find_map(|(name, row)| (*name == surface).then_some(*row))
+pub fn of_paper(surface: &str) -> Option<PaperRow> {
+    PAPER.into_iter().find(|row| row.surface == surface)
+}
+
+/// Our operations in the order of [`PAPER`], from a text of the golden table of `budget`.
+#[must_use]
+pub fn in_table(table: &str) -> Option<[Operations; 3]> {
+    let [u, v, bicubic] = PAPER.map(|row| golden::operations(table, row.surface));
+    Some([u?, v?, bicubic?])
 }

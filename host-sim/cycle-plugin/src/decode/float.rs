@@ -11,7 +11,7 @@ const fn float(class: Class, reads: Registers, writes: Registers) -> Instruction
 /// Decodes an instruction of coprocessors 10 and 11.
 pub(super) const fn decode(first: u16, second: u16) -> Instruction {
     let coprocessor = (second >> 8) & 15;
-    // What begins with 1111 came with later units.
+    // Encodings that begin with 1111 belong to later units.
     if coprocessor & 14 != 10 || first & 0x1000 != 0 {
         return float(Class::Unknown, NONE, NONE);
     }
@@ -81,31 +81,32 @@ const fn processing(first: u16, second: u16) -> Instruction {
     let both = left.and(right);
     match (first >> 4) & 11 {
         0 | 1 | 9 | 10 => float(Class::FloatMultiplyAdd, both.and(to), to),
-        2 | 3 => float(Class::FloatArithmetic, both, to),
+        2 => float(Class::FloatMultiply, both, to),
+        3 => float(Class::FloatAdd, both, to),
         8 => float(Class::FloatDivide, both, to),
         _ => other(first & 15, (second >> 6) & 3, to, right),
     }
 }
 
-/// Operations on one operand: `kind` and `variant` are the manual's `opc2` and `opc3`.
+/// Instructions with one operand: `kind` and `variant` are the manual's `opc2` and `opc3`.
 const fn other(kind: u16, variant: u16, to: Registers, from: Registers) -> Instruction {
     if variant & 1 == 0 {
         return float(Class::FloatMove, NONE, to);
     }
     match (kind, variant) {
-        (1, 3) => float(Class::FloatDivide, from, to),
+        (1, 3) => float(Class::FloatRoot, from, to),
         (0 | 1, _) => float(Class::FloatMove, from, to),
         (4, _) => float(Class::FloatMove, from.and(to), NONE),
         // Compares with zero.
         (5, _) => float(Class::FloatMove, to, NONE),
-        (2 | 3 | 8 | 12 | 13, _) => float(Class::FloatArithmetic, from, to),
+        (2 | 3 | 8 | 12 | 13, _) => float(Class::FloatConvert, from, to),
         // Fixed point, in place.
-        (10 | 11 | 14 | 15, _) => float(Class::FloatArithmetic, to, to),
+        (10 | 11 | 14 | 15, _) => float(Class::FloatConvert, to, to),
         _ => float(Class::Unknown, NONE, NONE),
     }
 }
 
-/// Between one core register and the unit.
+/// Transfers between a core register and the floating-point unit.
 const fn transfer(first: u16, second: u16) -> Instruction {
     let to_core = first & 0x10 != 0;
     let t = (second >> 12) & 15;

@@ -1,7 +1,7 @@
-//! Thumb-2 and single-precision VFP instructions as far as their cost depends on them: length, class, and the registers
-//! that are read, written and used for an address (ARMv7-M Architecture Reference Manual, A5 to A7).
+//! Decoder of Thumb-2 and single-precision VFP instructions: length, class, and the registers that are read, written and used for an
+//! address (ARMv7-M Architecture Reference Manual, A5 to A7).
 //!
-//! Not for executing: immediates and conditions are dropped, except for the target of a direct branch.
+//! Immediates and conditions are not decoded, except for the target of a direct branch.
 
 mod float;
 mod narrow;
@@ -31,7 +31,7 @@ impl Registers {
         Self(1 << (16 + (number & 31)))
     }
 
-    /// So many single-precision registers from this one on.
+    /// `count` single-precision registers from `first` on.
     #[must_use]
     pub const fn singles(first: u16, count: u16) -> Self {
         let count = if count > 32 { 32 } else { count };
@@ -44,26 +44,32 @@ impl Registers {
         Self(list as u64)
     }
 
-    /// All of both.
+    /// The union.
     #[must_use]
     pub const fn and(self, other: Self) -> Self {
         Self(self.0 | other.0)
     }
 
-    /// This set without another's registers.
+    /// The difference.
     #[must_use]
     pub const fn without(self, other: Self) -> Self {
         Self(self.0 & !other.0)
     }
 
-    /// Whether a register is in both.
+    /// Whether the set is empty.
+    #[must_use]
+    pub const fn is_empty(self) -> bool {
+        self.0 == 0
+    }
+
+    /// Whether the sets intersect.
     #[must_use]
     pub const fn meets(self, other: Self) -> bool {
         self.0 & other.0 != 0
     }
 }
 
-/// How a branch finds its target.
+/// A branch, by the source of its target.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Branch {
     /// `B`, with or without a condition, `CBZ`, `CBNZ`: to this address.
@@ -78,13 +84,22 @@ pub enum Branch {
     Return,
 }
 
-/// What an instruction's cost depends on.
+/// Class of an instruction, by its cycles and its arithmetic operation.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Class {
-    /// Data processing.
+    /// Data processing, apart from additions.
     Simple,
-    /// `MUL`, `MLA`, `SMMLAR`, `UMULL` and their like.
+    /// `ADD`, `SUB`, `RSB` of registers other than the stack pointer and the program counter; a negation is [`Self::Simple`].
+    Add {
+        /// The carry is set, as the lower half of a 64-bit addition does. A 16-bit instruction in an `IT` block does not.
+        sets_flags: bool,
+    },
+    /// `ADC`, `SBC`.
+    AddWithCarry,
+    /// `MUL`, `SMMUL`, `SMULL`, `UMULL` and variants.
     Multiply,
+    /// `MLA`, `MLS`, `SMMLA`, `SMLAL` and variants.
+    MultiplyAdd,
     /// `SDIV`, `UDIV`.
     Divide,
     /// A branch.
@@ -93,15 +108,15 @@ pub enum Class {
     Table,
     /// Loads a byte, halfword or word; into PC it is a branch.
     Load,
-    /// The same from a literal pool.
+    /// Loads a word from a literal pool.
     LoadLiteral,
-    /// Stores a byte, halfword or word; the address is a base and an immediate.
+    /// Stores a byte, halfword or word at a base and an immediate.
     Store,
-    /// The same with a register added to the base.
+    /// Stores a byte, halfword or word at a base and a register.
     StoreIndexed,
-    /// `LDRD`, `LDM`, `POP`: so many words.
+    /// `LDRD`, `LDM`, `POP`: words.
     LoadMultiple(u8),
-    /// `STRD`, `STM`, `PUSH`: so many words.
+    /// `STRD`, `STM`, `PUSH`: words.
     StoreMultiple(u8),
     /// `IT`.
     IfThen,
@@ -117,39 +132,48 @@ pub enum Class {
     ChangeState,
     /// `BKPT`, `SVC`, `UDF`.
     Trap,
-    /// VFP: add, subtract, multiply, convert.
-    FloatArithmetic,
+    /// VFP: add, subtract.
+    FloatAdd,
+    /// VFP: multiply, with or without negation.
+    FloatMultiply,
+    /// VFP: convert.
+    FloatConvert,
     /// VFP: move, absolute value, negate, compare, immediate, to and from a core register.
     FloatMove,
     /// VFP: two core registers to or from two single registers.
     FloatMovePair,
     /// VFP: `VMLA`, `VFMA` and their like.
     FloatMultiplyAdd,
-    /// VFP: `VDIV`, `VSQRT`.
+    /// VFP: `VDIV`.
     FloatDivide,
+    /// VFP: `VSQRT`.
+    FloatRoot,
     /// `VLDR` of a single.
     FloatLoad,
     /// `VSTR` of a single.
     FloatStore,
-    /// `VLDM`, `VPOP`, `VLDR` of a double: so many words.
+    /// `VLDM`, `VPOP`, `VLDR` of a double: words.
     FloatLoadMultiple(u8),
-    /// `VSTM`, `VPUSH`, `VSTR` of a double: so many words.
+    /// `VSTM`, `VPUSH`, `VSTR` of a double: words.
     FloatStoreMultiple(u8),
-    /// Nothing that a Cortex-M4F executes, or not known here.
+    /// Not an instruction of the Cortex-M4F, or not known to this decoder.
     Unknown,
 }
 
 impl Class {
-    /// Whether the floating-point unit takes part: such an instruction sets lazy stacking off.
+    /// Whether it uses the floating-point unit, and so triggers lazy stacking.
     #[must_use]
     pub const fn is_float(self) -> bool {
         matches!(
             self,
-            Self::FloatArithmetic
+            Self::FloatAdd
+                | Self::FloatMultiply
+                | Self::FloatConvert
                 | Self::FloatMove
                 | Self::FloatMovePair
                 | Self::FloatMultiplyAdd
                 | Self::FloatDivide
+                | Self::FloatRoot
                 | Self::FloatLoad
                 | Self::FloatStore
                 | Self::FloatLoadMultiple(_)
@@ -189,13 +213,13 @@ impl Class {
 pub struct Instruction {
     /// Bytes: 2 or 4.
     pub length: u8,
-    /// What its cost depends on.
+    /// Class.
     pub class: Class,
-    /// Registers that it needs, those for an address included.
+    /// Registers that it reads, those of an address included.
     pub reads: Registers,
-    /// Registers that it sets.
+    /// Registers that it writes.
     pub writes: Registers,
-    /// Registers that an address is made of.
+    /// Registers that an address is computed from.
     pub address: Registers,
 }
 
@@ -216,7 +240,7 @@ impl Instruction {
         self
     }
 
-    /// Data processing whose result may be the program counter.
+    /// Data processing; a branch if the result is the program counter.
     const fn data(length: u8, reads: Registers, writes: Registers) -> Self {
         let class = if writes.meets(Registers::PC) {
             Class::Branch(Branch::Indirect)
@@ -226,19 +250,27 @@ impl Instruction {
         Self::new(length, class, reads, writes)
     }
 
-    /// Whether what follows it in time may be elsewhere in memory.
+    /// An addition; data processing if it computes an address on the stack or in the code.
+    const fn add(length: u8, sets_flags: bool, reads: Registers, writes: Registers) -> Self {
+        if reads.and(writes).meets(Registers::SP.and(Registers::PC)) {
+            return Self::data(length, reads, writes);
+        }
+        Self::new(length, Class::Add { sets_flags }, reads, writes)
+    }
+
+    /// Whether the next instruction executed may be another than the next in memory.
     #[must_use]
     pub const fn may_branch(&self) -> bool {
         matches!(self.class, Class::Branch(_) | Class::Table) || self.writes.meets(Registers::PC)
     }
 
-    /// Whether it calls, so that a return comes back behind it.
+    /// Whether it is a call.
     #[must_use]
     pub const fn is_call(&self) -> bool {
         matches!(self.class, Class::Branch(Branch::Call(_) | Branch::CallIndirect))
     }
 
-    /// Whether it returns, from a function or from an exception: `BX LR`, and loads of PC from the stack.
+    /// Whether it is a return from a function or an exception: `BX LR`, or a load of PC from the stack.
     #[must_use]
     pub const fn is_return(&self) -> bool {
         let popped =
@@ -247,13 +279,13 @@ impl Instruction {
     }
 }
 
-/// Whether an instruction that begins with this halfword has a second one.
+/// Whether an instruction that begins with this halfword has 32 bits.
 #[must_use]
 pub const fn is_wide(first: u16) -> bool {
     first >> 11 >= 0b11101
 }
 
-/// Decodes the instruction at an address; `second` is only looked at where the first halfword asks for it.
+/// Decodes the instruction at an address; `second` is ignored for a 16-bit instruction.
 #[must_use]
 pub const fn decode(address: u32, first: u16, second: u16) -> Instruction {
     if is_wide(first) {
@@ -263,7 +295,7 @@ pub const fn decode(address: u32, first: u16, second: u16) -> Instruction {
     }
 }
 
-/// The address that a branch with this offset, in bytes and of so many bits, reaches.
+/// Target of a branch with an offset in bytes, of `bits` bits.
 const fn target(address: u32, offset: u32, bits: u32) -> u32 {
     let shift = 32 - bits;
     #[allow(

@@ -4,7 +4,7 @@ use super::{Branch, Class, Instruction, Registers, target};
 
 const NONE: Registers = Registers::NONE;
 
-/// A register of the lowest eight at this bit.
+/// The low register whose number begins at this bit.
 const fn low(code: u16, bit: u16) -> Registers {
     Registers::core((code >> bit) & 7)
 }
@@ -58,11 +58,11 @@ const fn immediate(code: u16) -> Instruction {
         0..=2 => narrow(Class::Simple, low(code, 3), low(code, 0)),
         3 => {
             let second = if code & 0x0400 == 0 { low(code, 6) } else { NONE };
-            narrow(Class::Simple, low(code, 3).and(second), low(code, 0))
+            Instruction::add(2, true, low(code, 3).and(second), low(code, 0))
         }
         4 => narrow(Class::Simple, NONE, low(code, 8)),
         5 => narrow(Class::Simple, low(code, 8), NONE),
-        _ => narrow(Class::Simple, low(code, 8), low(code, 8)),
+        _ => Instruction::add(2, true, low(code, 8), low(code, 8)),
     }
 }
 
@@ -70,6 +70,7 @@ const fn immediate(code: u16) -> Instruction {
 const fn processing(code: u16) -> Instruction {
     let (rdn, rm) = (low(code, 0), low(code, 3));
     match (code >> 6) & 15 {
+        5 | 6 => narrow(Class::AddWithCarry, rdn.and(rm), rdn),
         8 | 10 | 11 => narrow(Class::Simple, rdn.and(rm), NONE),
         13 => narrow(Class::Multiply, rdn.and(rm), rdn),
         9 | 15 => narrow(Class::Simple, rm, rdn),
@@ -83,7 +84,7 @@ const fn high_registers(code: u16) -> Instruction {
     let number = (code >> 3) & 15;
     let rm = Registers::core(number);
     match (code >> 8) & 3 {
-        0 => Instruction::data(2, rdn.and(rm), rdn),
+        0 => Instruction::add(2, false, rdn.and(rm), rdn),
         1 => narrow(Class::Simple, rdn.and(rm), NONE),
         2 => Instruction::data(2, rm, rdn),
         _ => {

@@ -1,10 +1,10 @@
-//! 32-bit instructions (ARMv7-M ARM, A5.3), those of the floating-point unit apart.
+//! 32-bit instructions (ARMv7-M ARM, A5.3) except those of the floating-point unit.
 
 use super::{Branch, Class, Instruction, Registers, float, target};
 
 const NONE: Registers = Registers::NONE;
 
-/// The four registers that most encodings have in the same places; 15 stands for none where the caller says so.
+/// The register fields of most encodings; 15 means none in some of them.
 #[derive(Clone, Copy)]
 struct Fields {
     n: u16,
@@ -41,11 +41,11 @@ pub(super) const fn decode(address: u32, first: u16, second: u16) -> Instruction
         0b0100 if first & 0x40 == 0 => multiple(first, second, fields),
         0b0100 => dual_or_table(first, second, fields),
         // 1110 101
-        0b0101 => shifted_register(fields),
+        0b0101 => shifted_register(first, fields),
         // 1110 11, 1111 11
         0b0110 | 0b0111 => float::decode(first, second),
         // 1111 0
-        0b1000..=0b1011 if second & 0x8000 == 0 => immediate(first, fields),
+        0b1000..=0b1011 if second & 0x8000 == 0 => immediate(first, second, fields),
         0b1000..=0b1011 => control(address, first, second),
         // 1111 100
         0b1100 => memory(first, second, fields),
@@ -90,26 +90,47 @@ const fn dual_or_table(first: u16, second: u16, fields: Fields) -> Instruction {
     if load {
         return wide(Class::Load, NONE, data).at(base);
     }
-    // The result of `STREX` stands elsewhere than that of `STREXB`.
+    // `STREX` and `STREXB` have the result's register in different fields.
     let result = if byte_or_table { fields.m } else { fields.d };
     wide(Class::Store, data, Registers::core(result)).at(base)
 }
 
+/// Data processing, by the operation in its first halfword. Without a result (a comparison) or a first operand it is no addition.
+const fn processing(first: u16, reads: Registers, fields: Fields) -> Instruction {
+    let d = unless_15(fields.d);
+    if fields.d == 15 || fields.n == 15 {
+        return wide(Class::Simple, reads, d);
+    }
+    match (first >> 5) & 15 {
+        8 | 13 | 14 => Instruction::add(4, first & 0x10 != 0, reads, d),
+        10 | 11 => wide(Class::AddWithCarry, reads, d),
+        _ => wide(Class::Simple, reads, d),
+    }
+}
+
 /// Data processing with a shifted register.
-const fn shifted_register(fields: Fields) -> Instruction {
+const fn shifted_register(first: u16, fields: Fields) -> Instruction {
     let reads = unless_15(fields.n).and(Registers::core(fields.m));
-    wide(Class::Simple, reads, unless_15(fields.d))
+    processing(first, reads, fields)
 }
 
 /// Data processing with an immediate.
-const fn immediate(first: u16, fields: Fields) -> Instruction {
+const fn immediate(first: u16, second: u16, fields: Fields) -> Instruction {
     let d = unless_15(fields.d);
     let mut reads = unless_15(fields.n);
-    if first & 0x200 != 0 {
+    if first & 0x200 == 0 {
+        // RSB from 0 is a negation.
+        let negates = (first >> 5) & 15 == 14 && first & 0x400 == 0 && second & 0x70ff == 0;
+        if !negates {
+            return processing(first, reads, fields);
+        }
+    } else {
         match (first >> 4) & 0x1f {
+            // ADDW, SUBW
+            0b00000 | 0b01010 if fields.n != 15 => return Instruction::add(4, false, reads, d),
             // MOVW
             0b00100 => reads = NONE,
-            // MOVT keeps the lower half, BFI and BFC what stands around the field.
+            // MOVT keeps the lower half, BFI and BFC the bits outside the field.
             0b01100 => reads = d,
             0b10110 => reads = reads.and(d),
             _ => {}
@@ -208,13 +229,18 @@ const fn multiply(first: u16, fields: Fields) -> Instruction {
     let factors = Registers::core(fields.n).and(Registers::core(fields.m));
     let d = Registers::core(fields.d);
     if first & 0x80 == 0 {
-        return wide(Class::Multiply, factors.and(unless_15(fields.t)), d);
+        let class = if fields.t == 15 {
+            Class::Multiply
+        } else {
+            Class::MultiplyAdd
+        };
+        return wide(class, factors.and(unless_15(fields.t)), d);
     }
     let both = d.and(Registers::core(fields.t));
     match (first >> 4) & 7 {
         1 | 3 => wide(Class::Divide, factors, d),
         0 | 2 => wide(Class::Multiply, factors, both),
-        4..=6 => wide(Class::Multiply, factors.and(both), both),
+        4..=6 => wide(Class::MultiplyAdd, factors.and(both), both),
         _ => UNKNOWN,
     }
 }

@@ -1,19 +1,19 @@
-//! The bound of every loop of the sample task: a loop that is not listed fails `tests/cycles.rs`, until its bound is
-//! written down here. By function, because lines move: who adds a loop to a function of this table looks at its bound too.
+//! The bound of every loop of the sample task; a loop that is not listed fails `tests/cycles.rs`. Listed by function, because lines
+//! move: a bound holds for every loop of its function, and is to be reviewed when a loop is added.
 
-/// Place of a loop, the rounds that it makes at most, and why.
+/// Function of a loop, greatest number of iterations, reason.
 const BOUNDS: &[(&str, u32, &str)] = &[
     ("compiler_builtins::arm::__aeabi_memcpy4", 512, COPIED),
     ("compiler_builtins::arm::__aeabi_memset4", 512, COPIED),
     (
         "compiler_builtins::int::specialized_div_rem::u64_div_rem",
         8,
-        "the quotient's 32 bits that the chip's own division leaves, four a round",
+        "32 bits of the quotient, four an iteration",
     ),
     (
         "compiler_builtins::mem::impls::compare_bytes",
         12,
-        "bytes of a place of the axes",
+        "bytes of an axis position",
     ),
     (
         "compiler_builtins::mem::impls::copy_forward::copy_forward_aligned_words",
@@ -23,7 +23,7 @@ const BOUNDS: &[(&str, u32, &str)] = &[
     (
         "compiler_builtins::mem::impls::copy_forward::copy_forward_bytes",
         15,
-        "less than is copied by words",
+        "bytes that do not fill a word copy",
     ),
     (
         "compiler_builtins::mem::impls::copy_forward::copy_forward_misaligned_words",
@@ -33,7 +33,7 @@ const BOUNDS: &[(&str, u32, &str)] = &[
     (
         "compiler_builtins::mem::impls::set_bytes::set_bytes_bytes",
         15,
-        "less than is filled by words",
+        "bytes that do not fill a word",
     ),
     ("firmware::drivers::drive_enable::DriveEnable::switch", 3, "axes"),
     (
@@ -50,32 +50,32 @@ const BOUNDS: &[(&str, u32, &str)] = &[
     (
         "interp_core::feed::plan::Plan::add",
         2,
-        "cells before a station that its differences say something about: STENCIL_CELLS",
+        "cells of a finite-difference stencil before a station: STENCIL_CELLS",
     ),
     (
         "interp_core::feed::plan::Plan::is_clear",
         8,
-        "cells that are looked through ahead: REACH",
+        "cells scanned ahead: REACH",
     ),
     (
         "interp_core::feed::plan::Plan::merge",
         4,
-        "cells that are merged for one that is bounded: MERGED",
+        "cells merged for each bounded cell: MERGED",
     ),
     (
         "interp_core::feed::plan::Plan::pass_cell",
         2,
-        "cells whose time is taken for one that is bounded: TIMED",
+        "cells timed for each bounded cell: TIMED",
     ),
     (
         "interp_core::feed::plan::Plan::work",
         3,
-        "cells of a portion: CELLS_STANDING",
+        "cells of a tick at standstill: CELLS_STANDING",
     ),
     (
         "interp_core::feed::plan::bounds::bound",
         8,
-        "neighbours to a side that a bound may come from: REACH",
+        "neighbours on each side that a bound depends on: REACH",
     ),
     (
         "interp_core::pass::schedule::apart",
@@ -105,10 +105,10 @@ const BOUNDS: &[(&str, u32, &str)] = &[
     ("interp_core::surface::pole::Reduced::collapse", 3, "axes"),
 ];
 
-/// Copies and fills are of values whose size the compiler knows.
+/// Copies and fills have sizes known at compile time.
 const COPIED: &str = "words of the largest value that is copied, below 2 KiB";
 
-/// Listed places that are none of these.
+/// Listed functions without a loop.
 pub fn stale<'a>(places: impl Fn(&str) -> bool + 'a) -> impl Iterator<Item = &'static str> + 'a {
     BOUNDS
         .iter()
@@ -116,7 +116,7 @@ pub fn stale<'a>(places: impl Fn(&str) -> bool + 'a) -> impl Iterator<Item = &'s
         .filter(move |place| !places(place))
 }
 
-/// Bound of the loops at a place: rounds at most, and why.
+/// Bound of the loops of a function: iterations, reason.
 #[must_use]
 pub fn of(place: &str) -> Option<(u32, &'static str)> {
     BOUNDS

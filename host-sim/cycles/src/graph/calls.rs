@@ -1,4 +1,4 @@
-//! Who calls whom, and the deepest stack that follows.
+//! Call graph, and the deepest stack that follows from it.
 
 use std::collections::BTreeSet;
 
@@ -9,14 +9,14 @@ use super::code::Code;
 use super::flow::{self, Call, Flow};
 use super::frame::{self, Frame};
 
-/// A call: the function, and the caller's stack at that place, bytes.
+/// A call of a function.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub struct Edge {
     /// Index of the function called.
     pub to: usize,
-    /// Bytes.
+    /// Stack of the caller at the call, bytes.
     pub depth: i32,
-    /// The address of the function is not in the code: any whose address is kept somewhere may be meant.
+    /// An indirect call: the target may be any function whose address is taken.
     pub indirect: bool,
 }
 
@@ -29,8 +29,8 @@ pub struct Node {
     pub frame: Frame,
     /// Its calls.
     pub calls: Vec<Edge>,
-    /// Addresses of jumps that could not be followed.
-    pub lost: Vec<u32>,
+    /// Addresses of jumps with unknown targets.
+    pub unresolved: Vec<u32>,
 }
 
 /// All functions of an image, by the indices of [`Code::functions`].
@@ -40,22 +40,22 @@ pub struct Calls {
     pub nodes: Vec<Node>,
 }
 
-/// A stack's depth, and the chain of calls that makes it.
+/// Depth of a stack, and the chain of calls that reaches it.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
-pub struct Deepest {
+pub struct DeepestStack {
     /// Bytes.
     pub bytes: i32,
     /// Functions, the caller first.
     pub chain: Vec<usize>,
 }
 
-/// Whether a function belongs to `core::fmt` or implements one of its traits: those are called by pointer from there alone.
+/// Whether a function belongs to `core::fmt` or implements one of its traits: those are called indirectly only from there.
 fn formats(name: &str) -> bool {
     name.contains("core::fmt")
 }
 
 impl Calls {
-    /// Follows every function of an image.
+    /// Builds the call graph of an image.
     #[must_use]
     pub fn new(code: &Code, lines: &Loader) -> Self {
         let taken = code.address_taken();
@@ -63,8 +63,8 @@ impl Calls {
             let flow = flow::flow(code, function);
             let frame = frame::frame(code, &flow);
             let mut calls = BTreeSet::new();
-            let mut lost = frame.lost.clone();
-            for (step, depth) in flow.steps.iter().zip(&frame.depth) {
+            let mut unresolved = frame.unresolved.clone();
+            for (step, depth) in flow.instructions.iter().zip(&frame.depth) {
                 let mut call = |to, indirect| {
                     calls.insert(Edge {
                         to,
@@ -75,7 +75,7 @@ impl Calls {
                 match step.call {
                     Some(Call::To(address)) => match code.function_at(address) {
                         Some(to) if code.functions[to].start == address => call(to, false),
-                        _ => lost.push(step.address),
+                        _ => unresolved.push(step.address),
                     },
                     Some(Call::Indirect) => {
                         let formats = stages::chain(lines, step.address)
@@ -86,7 +86,7 @@ impl Calls {
                             .filter(|to| self::formats(&code.functions[**to].name) == formats)
                             .for_each(|to| call(*to, true));
                     }
-                    None if step.lost => lost.push(step.address),
+                    None if step.unresolved => unresolved.push(step.address),
                     None => {}
                 }
             }
@@ -94,7 +94,7 @@ impl Calls {
                 flow,
                 frame,
                 calls: calls.into_iter().collect(),
-                lost,
+                unresolved,
             }
         });
         Self {
@@ -102,7 +102,7 @@ impl Calls {
         }
     }
 
-    /// Functions that can be reached from one, itself included.
+    /// Functions reachable from one, itself included.
     #[must_use]
     pub fn reachable(&self, from: usize) -> BTreeSet<usize> {
         let mut reached = BTreeSet::from([from]);
@@ -114,14 +114,14 @@ impl Calls {
         reached
     }
 
-    /// The deepest stack of a call of this function; calls of `without` are left out.
+    /// The deepest stack of a call of this function, without the calls of `without`.
     ///
     /// # Errors
-    /// The functions that call one another in a circle.
-    pub fn deepest(&self, from: usize, without: &BTreeSet<usize>) -> Result<Deepest, Vec<usize>> {
+    /// The functions of a recursion.
+    pub fn deepest(&self, from: usize, without: &BTreeSet<usize>) -> Result<DeepestStack, Vec<usize>> {
         let mut known = vec![None; self.nodes.len()];
         for index in without {
-            known[*index] = Some(Deepest::default());
+            known[*index] = Some(DeepestStack::default());
         }
         self.descend(from, &mut known, &mut Vec::new())
     }
@@ -129,9 +129,9 @@ impl Calls {
     fn descend(
         &self,
         at: usize,
-        known: &mut [Option<Deepest>],
+        known: &mut [Option<DeepestStack>],
         path: &mut Vec<usize>,
-    ) -> Result<Deepest, Vec<usize>> {
+    ) -> Result<DeepestStack, Vec<usize>> {
         if let Some(begin) = path.iter().position(|index| *index == at) {
             return Err(path[begin..].to_vec());
         }
@@ -140,7 +140,7 @@ impl Calls {
         }
         path.push(at);
         let node = &self.nodes[at];
-        let mut deepest = Deepest {
+        let mut deepest = DeepestStack {
             bytes: node.frame.max,
             chain: vec![at],
         };

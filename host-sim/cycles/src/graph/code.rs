@@ -1,5 +1,5 @@
-//! The image as functions of instructions: symbols, mapping symbols (`$t` code, `$d` data), and addresses of functions that
-//! are kept as data, which is what an indirect call can reach.
+//! Functions of the image by its symbols, code and data by its mapping symbols (`$t`, `$d`), and functions whose address is taken:
+//! the targets of indirect calls.
 
 use std::borrow::Cow;
 use std::collections::BTreeSet;
@@ -16,17 +16,17 @@ pub struct Function {
     pub name: String,
     /// Address of its first instruction.
     pub start: u32,
-    /// Address behind it.
+    /// Address after its last instruction.
     pub end: u32,
 }
 
-/// Code, and what the symbols say of it.
+/// Code of the image with its symbols.
 #[derive(Clone, Debug)]
 pub struct Code {
     plan: Plan,
     /// Functions in order of their addresses.
     pub functions: Vec<Function>,
-    /// From each address on: code or data. Only within [`Self::text`].
+    /// Addresses from which on there is code (`true`) or data, within [`Self::text`].
     mapping: Vec<(u32, bool)>,
     /// Sections with instructions.
     text: Vec<Range<u32>>,
@@ -63,7 +63,7 @@ impl Code {
         let starts: Vec<u32> = functions.iter().map(|function| function.start).collect();
         for (index, function) in functions.iter_mut().enumerate() {
             let next = starts.get(index + 1).copied().unwrap_or(u32::MAX);
-            // Assembly may have no size.
+            // A symbol of assembly may have no size.
             if function.end == function.start || function.end > next {
                 function.end = next;
             }
@@ -80,7 +80,7 @@ impl Code {
         }
     }
 
-    /// Whether instructions stand at an address.
+    /// Whether an address is in code.
     #[must_use]
     pub fn is_code(&self, address: u32) -> bool {
         let inside = self.text.iter().any(|section| section.contains(&address));
@@ -101,7 +101,7 @@ impl Code {
         u32::from(self.halfword(address)) | u32::from(self.halfword(address + 2)) << 16
     }
 
-    /// Where the data that begin at an address end.
+    /// End of the data that contain an address.
     #[must_use]
     pub fn data_end(&self, address: u32) -> u32 {
         let after = self.mapping.partition_point(|(from, _)| *from <= address);
@@ -120,7 +120,7 @@ impl Code {
         decode(address, self.halfword(address), self.halfword(address + 2))
     }
 
-    /// Index of the function that an address lies in.
+    /// Index of the function that contains an address.
     #[must_use]
     pub fn function_at(&self, address: u32) -> Option<usize> {
         let after = self
@@ -136,7 +136,7 @@ impl Code {
         self.functions.iter().position(|function| function.name == name)
     }
 
-    /// Exceptions with their handlers, those without an own handler left out: number, index of the function.
+    /// Exceptions with a handler of their own: number, index of the function.
     #[must_use]
     pub fn handlers(&self) -> Vec<(u32, usize)> {
         let default = self.function_named("DefaultHandler_");
@@ -146,13 +146,13 @@ impl Code {
             .collect()
     }
 
-    /// The exception of the sample task.
+    /// Index of the sample task's handler.
     #[must_use]
     pub fn sample_task(&self) -> Option<usize> {
         self.function_at(self.plan.vector(self.plan.exception))
     }
 
-    /// Functions whose address stands among the image's data, or is put together by `MOVW` and `MOVT`.
+    /// Functions whose address is among the image's data, or loaded by `MOVW` and `MOVT`.
     #[must_use]
     pub fn address_taken(&self) -> BTreeSet<usize> {
         let mut taken = BTreeSet::new();
@@ -166,7 +166,7 @@ impl Code {
             }
         };
         let end = self.plan.base + self.len();
-        // The vector table holds handlers, which nobody calls.
+        // The handlers of the vector table are not called.
         for address in (self.plan.base + 4 * VECTORS..end).step_by(4) {
             if !self.is_code(address) {
                 note(self.word(address));
@@ -194,7 +194,7 @@ impl Code {
         taken
     }
 
-    /// Whether a branch at an address is taken by a condition of its own.
+    /// Whether the branch at an address is conditional by its own encoding.
     #[must_use]
     pub fn is_conditional(&self, address: u32) -> bool {
         let (first, second) = (self.halfword(address), self.halfword(address + 2));

@@ -1,4 +1,4 @@
-//! Instructions of a function that can be reached from its first, and where each of them goes on.
+//! Control flow of a function: its reachable instructions and their successors.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -6,7 +6,7 @@ use cycle_plugin::decode::{Branch, Class, Instruction};
 
 use super::code::{Code, Function};
 
-/// What an instruction calls.
+/// Target of a call.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Call {
     /// The function at this address.
@@ -17,47 +17,47 @@ pub enum Call {
 
 /// An instruction in its function.
 #[derive(Clone, Debug)]
-pub struct Step {
+pub struct FlowInstruction {
     /// Its address.
     pub address: u32,
-    /// What it is.
+    /// The decoded instruction.
     pub instruction: Instruction,
-    /// In an `IT` block.
+    /// Whether it is in an `IT` block.
     pub predicated: bool,
-    /// Indices of what may come next within the function.
+    /// Indices of its successors within the function.
     pub next: Vec<usize>,
-    /// What it calls; one without a successor is a tail call.
+    /// Its call; without a successor a tail call.
     pub call: Option<Call>,
-    /// A jump that could not be followed.
-    pub lost: bool,
+    /// Whether it is a jump with unknown targets.
+    pub unresolved: bool,
 }
 
 /// Control flow of a function.
 #[derive(Clone, Debug, Default)]
 pub struct Flow {
-    /// In order of their addresses.
-    pub steps: Vec<Step>,
+    /// Instructions in order of their addresses.
+    pub instructions: Vec<FlowInstruction>,
     /// Index of the first instruction.
     pub entry: usize,
 }
 
-/// Where an instruction goes: addresses within the function, what it calls, whether it was lost.
+/// Successors of an instruction: addresses within the function, its call, whether a target is unknown.
 #[derive(Default)]
-struct Way {
+struct Successors {
     next: Vec<u32>,
     call: Option<Call>,
-    lost: bool,
+    unresolved: bool,
 }
 
-/// Follows a function from its first instruction.
+/// Builds the control flow of a function.
 #[must_use]
 pub fn flow(code: &Code, function: &Function) -> Flow {
     let inside = |address: u32| (function.start..function.end).contains(&address) && code.is_code(address);
-    let mut ways: BTreeMap<u32, Way> = BTreeMap::new();
+    let mut visited: BTreeMap<u32, Successors> = BTreeMap::new();
     let mut predicated = BTreeSet::new();
     let mut waiting = vec![function.start];
     while let Some(address) = waiting.pop() {
-        if ways.contains_key(&address) {
+        if visited.contains_key(&address) {
             continue;
         }
         let instruction = code.instruction(address);
@@ -68,69 +68,75 @@ pub fn flow(code: &Code, function: &Function) -> Flow {
                 at += u32::from(code.instruction(at).length);
             }
         }
-        let mut way = way(
+        let mut found = successors(
             code,
             function,
             address,
             &instruction,
             predicated.contains(&address),
         );
-        // Behind a call that does not return there may be data or nothing.
-        way.next.retain(|address| inside(*address));
-        waiting.extend(&way.next);
-        ways.insert(address, way);
+        // After a call that does not return there may be data or nothing.
+        found.next.retain(|address| inside(*address));
+        waiting.extend(&found.next);
+        visited.insert(address, found);
     }
-    let index: BTreeMap<u32, usize> = ways.keys().copied().zip(0..).collect();
-    let steps = ways.iter().map(|(address, way)| Step {
+    let index: BTreeMap<u32, usize> = visited.keys().copied().zip(0..).collect();
+    let instructions = visited.iter().map(|(address, successor)| FlowInstruction {
         address: *address,
         instruction: code.instruction(*address),
         predicated: predicated.contains(address),
-        next: way
+        next: successor
             .next
             .iter()
             .filter_map(|address| index.get(address).copied())
             .collect(),
-        call: way.call,
-        lost: way.lost,
+        call: successor.call,
+        unresolved: successor.unresolved,
     });
     Flow {
-        steps: steps.collect(),
+        instructions: instructions.collect(),
         entry: index.get(&function.start).copied().unwrap_or(0),
     }
 }
 
-fn way(code: &Code, function: &Function, address: u32, instruction: &Instruction, predicated: bool) -> Way {
-    let behind = address + u32::from(instruction.length);
-    let mut way = Way::default();
-    let mut goes_on = predicated || code.is_conditional(address);
+fn successors(
+    code: &Code,
+    function: &Function,
+    address: u32,
+    instruction: &Instruction,
+    predicated: bool,
+) -> Successors {
+    let following = address + u32::from(instruction.length);
+    let mut successor = Successors::default();
+    let mut falls_through = predicated || code.is_conditional(address);
     match instruction.class {
         Class::Branch(Branch::Direct(to)) if (function.start..function.end).contains(&to) => {
-            way.next.push(to);
+            successor.next.push(to);
         }
-        Class::Branch(Branch::Direct(to)) => way.call = Some(Call::To(to)),
+        Class::Branch(Branch::Direct(to)) => successor.call = Some(Call::To(to)),
         Class::Branch(Branch::Call(to)) => {
-            way.call = Some(Call::To(to));
-            goes_on = true;
+            successor.call = Some(Call::To(to));
+            falls_through = true;
         }
         Class::Branch(Branch::CallIndirect) => {
-            way.call = Some(Call::Indirect);
-            goes_on = true;
+            successor.call = Some(Call::Indirect);
+            falls_through = true;
         }
         Class::Branch(Branch::Return) => {}
-        Class::Branch(Branch::Indirect) => way.call = Some(Call::Indirect),
-        Class::Table => way.next = table(code, address),
-        Class::Trap => goes_on = !code.is_end(address),
+        Class::Branch(Branch::Indirect) => successor.call = Some(Call::Indirect),
+        Class::Table => successor.next = table(code, address),
+        Class::Trap => falls_through = !code.is_end(address),
         _ if instruction.is_return() => {}
-        _ if instruction.may_branch() => way.lost = true,
-        _ => goes_on = true,
+        _ if instruction.may_branch() => successor.unresolved = true,
+        _ => falls_through = true,
     }
-    if goes_on {
-        way.next.push(behind);
+    if falls_through {
+        successor.next.push(following);
     }
-    way
+    successor
 }
 
-/// Targets of `TBB` and `TBH` by the program counter: the table stands behind them, up to the next code.
+/// Targets of `TBB` and `TBH` relative to the program counter: the table follows, up to the next code.
 fn table(code: &Code, address: u32) -> Vec<u32> {
     let from = address + 4;
     let halfwords = code.halfword(address + 2) & 0x10 != 0;
@@ -146,7 +152,7 @@ fn table(code: &Code, address: u32) -> Vec<u32> {
         let target = from + 2 * entry;
         if code.is_code(target) {
             targets.push(target);
-            // The first of the cases stands behind the table.
+            // The table ends at the latest where the first case begins.
             if target > at {
                 end = end.min(target);
             }

@@ -1,7 +1,8 @@
-//! Loops of a function: the strongly connected parts of its control flow, then those within each part without its head.
+//! Loops of a function: the strongly connected components of its control flow, then recursively those within each component without
+//! its head.
 //!
-//! By connection rather than by backward branches: a compiler puts blocks out of order. Two loops that share their head
-//! count as one. A part with more than one way in is a loop too, with its lowest entry as head.
+//! Backward branches would not do, because compilers reorder blocks. Two loops that share their head are one loop. A component with
+//! several entries is a loop with its lowest entry as head.
 
 use super::flow::Flow;
 
@@ -11,21 +12,21 @@ pub struct Loop {
     /// Index of the instruction where it is entered.
     pub head: usize,
     /// Indices of its instructions, in order.
-    pub steps: Vec<usize>,
+    pub instructions: Vec<usize>,
 }
 
-/// All loops of a function, the outer before the inner.
+/// All loops of a function, outer before inner.
 #[must_use]
 pub fn loops(flow: &Flow) -> Vec<Loop> {
     let mut found = Vec::new();
-    let all: Vec<usize> = (0..flow.steps.len()).collect();
+    let all: Vec<usize> = (0..flow.instructions.len()).collect();
     let mut waiting = vec![(all, None)];
-    while let Some((steps, without)) = waiting.pop() {
-        for part in connected(flow, &steps, without) {
+    while let Some((instructions, without)) = waiting.pop() {
+        for part in connected(flow, &instructions, without) {
             let head = head(flow, &part);
             found.push(Loop {
                 head,
-                steps: part.clone(),
+                instructions: part.clone(),
             });
             waiting.push((part, Some(head)));
         }
@@ -33,11 +34,11 @@ pub fn loops(flow: &Flow) -> Vec<Loop> {
     found
 }
 
-/// Where a part is entered from outside.
+/// The entry of a component.
 fn head(flow: &Flow, part: &[usize]) -> usize {
-    let entries = (0..flow.steps.len())
+    let entries = (0..flow.instructions.len())
         .filter(|index| part.binary_search(index).is_err())
-        .flat_map(|index| &flow.steps[index].next)
+        .flat_map(|index| &flow.instructions[index].next)
         .filter(|next| part.binary_search(next).is_ok());
     let first = entries.min().copied();
     if part.binary_search(&flow.entry).is_ok() {
@@ -46,7 +47,7 @@ fn head(flow: &Flow, part: &[usize]) -> usize {
     first.unwrap_or(part[0])
 }
 
-/// What is known of an instruction on the way through (Tarjan 1972).
+/// State of an instruction in Tarjan's algorithm (1972).
 #[derive(Clone, Copy, Default)]
 struct Mark {
     inside: bool,
@@ -55,19 +56,19 @@ struct Mark {
     open: bool,
 }
 
-/// Strongly connected parts with a cycle, among these instructions without one of them.
-fn connected(flow: &Flow, steps: &[usize], without: Option<usize>) -> Vec<Vec<usize>> {
-    let mut marks = vec![Mark::default(); flow.steps.len()];
-    for step in steps.iter().filter(|step| Some(**step) != without) {
+/// Strongly connected components with a cycle, among these instructions without `without`.
+fn connected(flow: &Flow, instructions: &[usize], without: Option<usize>) -> Vec<Vec<usize>> {
+    let mut marks = vec![Mark::default(); flow.instructions.len()];
+    for step in instructions.iter().filter(|step| Some(**step) != without) {
         marks[*step].inside = true;
     }
     let mut parts = Vec::new();
     let (mut count, mut open) = (0, Vec::new());
-    for root in steps {
+    for root in instructions {
         if !marks[*root].inside || marks[*root].number > 0 {
             continue;
         }
-        // An instruction, and which of its successors is next: no recursion, a function is long.
+        // Explicit stack of instructions, each with the number of its next successor: a recursion would be too deep.
         let mut path = vec![(*root, 0)];
         while let Some((at, turn)) = path.pop() {
             if turn == 0 {
@@ -77,7 +78,7 @@ fn connected(flow: &Flow, steps: &[usize], without: Option<usize>) -> Vec<Vec<us
                 marks[at].open = true;
                 open.push(at);
             }
-            if let Some(next) = flow.steps[at].next.get(turn) {
+            if let Some(next) = flow.instructions[at].next.get(turn) {
                 path.push((at, turn + 1));
                 if marks[*next].inside && marks[*next].number == 0 {
                     path.push((*next, 0));
@@ -94,7 +95,7 @@ fn connected(flow: &Flow, steps: &[usize], without: Option<usize>) -> Vec<Vec<us
                 let mut part = open.split_off(from);
                 part.iter().for_each(|index| marks[*index].open = false);
                 part.sort_unstable();
-                if part.len() > 1 || flow.steps[at].next.contains(&at) {
+                if part.len() > 1 || flow.instructions[at].next.contains(&at) {
                     parts.push(part);
                 }
             }
@@ -106,39 +107,39 @@ fn connected(flow: &Flow, steps: &[usize], without: Option<usize>) -> Vec<Vec<us
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::graph::flow::Step;
+    use crate::graph::flow::FlowInstruction;
     use cycle_plugin::decode::decode;
 
     fn flow(edges: &[&[usize]]) -> Flow {
-        let steps = edges.iter().map(|next| Step {
+        let instructions = edges.iter().map(|next| FlowInstruction {
             address: 0,
             instruction: decode(0, 0xbf00, 0),
             predicated: false,
             next: next.to_vec(),
             call: None,
-            lost: false,
+            unresolved: false,
         });
         Flow {
-            steps: steps.collect(),
+            instructions: instructions.collect(),
             entry: 0,
         }
     }
 
-    fn steps(flow: &Flow) -> Vec<Vec<usize>> {
-        loops(flow).into_iter().map(|found| found.steps).collect()
+    fn instructions(flow: &Flow) -> Vec<Vec<usize>> {
+        loops(flow).into_iter().map(|found| found.instructions).collect()
     }
 
     #[test]
     fn a_branch_backwards_is_no_loop() {
         // 0 -> 2 -> 1 -> 3: a block out of order.
-        assert!(steps(&flow(&[&[2], &[3], &[1], &[]])).is_empty());
+        assert!(instructions(&flow(&[&[2], &[3], &[1], &[]])).is_empty());
     }
 
     #[test]
     fn nested_and_twofold() {
         // 1..=4 around 2..=3, then 5 by itself.
         let flow = flow(&[&[1], &[2], &[3], &[2, 4], &[1, 5], &[5, 6], &[]]);
-        let mut found = steps(&flow);
+        let mut found = instructions(&flow);
         found.sort();
         assert_eq!(found, [vec![1, 2, 3, 4], vec![2, 3], vec![5]]);
     }
@@ -146,6 +147,6 @@ mod tests {
     #[test]
     fn two_ways_in() {
         // 0 enters 1 and 2, which go round.
-        assert_eq!(steps(&flow(&[&[1, 2], &[2], &[1, 3], &[]])), [vec![1, 2]]);
+        assert_eq!(instructions(&flow(&[&[1, 2], &[2], &[1, 3], &[]])), [vec![1, 2]]);
     }
 }

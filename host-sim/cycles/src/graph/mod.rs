@@ -1,14 +1,14 @@
-//! What can be said of the image without running it: its deepest stack, the functions of the sample task, their loops.
+//! Static analysis of the image: deepest stack, functions of the sample task, their loops.
 //!
 //! ```text
-//!  image ─code─► functions ─flow─► instructions, and where they go on ─┬─frame─► stack at each ─┐
-//!                                                                     ├─calls─► who calls whom ─┴─► deepest stack
-//!                                                                     └─loops─► loops, each with its place
+//!  image ─code─► functions ─flow─► instructions and successors ─┬─frame─► stack depth ─┐
+//!                                                              ├─calls─► call graph ──┴─► deepest stack
+//!                                                              └─loops─► loops, each with its function
 //! ```
 //!
-//! More than can happen is counted, never less: an indirect call reaches every function whose address is kept in the image
-//! (those of `core::fmt`'s traits from `core::fmt` alone), each interrupt preempts at the deepest place of the one below.
-//! Left out: a panic's and a hard fault's own report, after which nothing runs any more.
+//! The figures are upper bounds: an indirect call reaches every function whose address is taken (those of `core::fmt`'s traits from
+//! `core::fmt` alone), and each interrupt preempts the one below at its deepest stack. Left out: the reports of a panic and of a
+//! hard fault, which end the program.
 
 pub mod bounds;
 pub mod calls;
@@ -27,8 +27,7 @@ use self::calls::Calls;
 use self::code::Code;
 use super::{BudgetError, image, stages};
 
-/// What an exception leaves on the stack at most: 8 words, S0 to S15, FPSCR, a word for the alignment of the
-/// whole, and another to align what was there before.
+/// Greatest stack of an exception entry: 8 words, S0 to S15, FPSCR, a reserved word, and a word that aligns the frame; bytes.
 pub const EXCEPTION_BYTES: i32 = 4 * (8 + 16 + 1 + 1) + 4;
 
 /// The first exception number of an interrupt.
@@ -37,32 +36,32 @@ const INTERRUPTS: u32 = 16;
 /// The function that a panic ends in.
 const PANIC: &str = "rust_begin_unwind";
 
-/// A place on the stack: the thread, or an interrupt.
+/// Stack of the thread or of an interrupt.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Context {
-    /// Name of the function that it begins with.
+pub struct StackContext {
+    /// Name of its first function.
     pub name: String,
-    /// Deepest stack, bytes, without the exception's frame.
+    /// DeepestStack stack, bytes, without the exception's frame.
     pub bytes: i32,
-    /// The calls that lead there, the caller first.
+    /// The chain of calls, the caller first.
     pub chain: Vec<String>,
 }
 
-/// What follows from the image.
+/// Result of the static analysis.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Analysis {
     /// The thread first, then the interrupts.
-    pub contexts: Vec<Context>,
-    /// Functions that the sample task may reach.
+    pub contexts: Vec<StackContext>,
+    /// Functions reachable from the sample task.
     pub task: Vec<String>,
-    /// Places of the sample task's loops, and how many there are in the image.
+    /// Functions with loops in the sample task, and the number of loops in the image.
     pub loops: BTreeMap<String, u32>,
-    /// What could not be followed: then the figures are too small.
-    pub lost: Vec<String>,
+    /// Instructions that could not be analysed; if there are any, the figures are no bounds.
+    pub unresolved: Vec<String>,
 }
 
 impl Analysis {
-    /// The deepest stack: thread, and every interrupt on top of another.
+    /// The deepest stack: the thread with all interrupts nested.
     #[must_use]
     pub fn stack_bytes(&self) -> u32 {
         let interrupts = self.contexts.iter().skip(1);
@@ -71,7 +70,7 @@ impl Analysis {
         u32::try_from(bytes + thread).unwrap_or(0)
     }
 
-    /// Functions of the sample task that panic.
+    /// Functions of the sample task that can panic.
     #[must_use]
     pub fn panics(&self) -> Vec<&str> {
         let panics = |name: &&str| {
@@ -80,24 +79,24 @@ impl Analysis {
         self.task.iter().map(String::as_str).filter(panics).collect()
     }
 
-    /// Loops of the sample task that no bound is written down for.
+    /// Loops of the sample task without a listed bound.
     #[must_use]
     pub fn unbounded(&self) -> Vec<&str> {
         let places = self.loops.keys().map(String::as_str);
         places.filter(|place| bounds::of(place).is_none()).collect()
     }
 
-    /// Places that a bound is written down for, and that have no loop.
+    /// Listed bounds without a loop.
     #[must_use]
     pub fn stale(&self) -> Vec<&str> {
         bounds::stale(|place| self.loops.contains_key(place)).collect()
     }
 }
 
-/// Follows the code of an image.
+/// Analyses an image.
 ///
 /// # Errors
-/// It cannot be read, has no sample task, or functions that call one another in a circle.
+/// The image cannot be read, has no sample task, or has a recursion.
 pub fn analyse(path: &Path) -> Result<Analysis, BudgetError> {
     let bad = |error: &dyn std::fmt::Display| BudgetError::Image(error.to_string());
     let bytes = std::fs::read(path).map_err(|error| BudgetError::File(path.into(), error.to_string()))?;
@@ -121,28 +120,28 @@ pub fn analyse(path: &Path) -> Result<Analysis, BudgetError> {
     {
         let deepest = calls.deepest(begin, &without).map_err(|circle| {
             let names: Vec<_> = circle.into_iter().map(name).collect();
-            bad(&format!(
-                "a function calls itself, by way of {}",
-                names.join(", ")
-            ))
+            bad(&format!("recursion: {}", names.join(", ")))
         })?;
-        analysis.contexts.push(Context {
+        analysis.contexts.push(StackContext {
             name: name(begin),
             bytes: deepest.bytes,
             chain: deepest.chain.into_iter().map(name).collect(),
         });
         for index in calls.reachable(begin) {
-            let lost = calls.nodes[index].lost.iter();
+            let unresolved = calls.nodes[index].unresolved.iter();
             analysis
-                .lost
-                .extend(lost.map(|address| format!("{address:#x} in {}", name(index))));
+                .unresolved
+                .extend(unresolved.map(|address| format!("{address:#x} in {}", name(index))));
         }
     }
     for index in calls.reachable(task) {
         analysis.task.push(name(index));
         let flow = &calls.nodes[index].flow;
         for found in loops::loops(flow) {
-            let addresses = found.steps.iter().map(|step| flow.steps[*step].address);
+            let addresses = found
+                .instructions
+                .iter()
+                .map(|step| flow.instructions[*step].address);
             let place = place(&lines, addresses).unwrap_or_else(|| name(index));
             *analysis.loops.entry(place).or_insert(0) += 1;
         }
@@ -150,11 +149,10 @@ pub fn analyse(path: &Path) -> Result<Analysis, BudgetError> {
     Ok(analysis)
 }
 
-/// Share of a loop's instructions that have to be of a function for the loop to be in it: the rest is what the compiler
-/// shared with other code, or moved.
+/// Least share of a loop's instructions that belong to the function of the loop; the compiler shares or moves the others.
 const SHARE: f64 = 0.8;
 
-/// The function that a loop is in: the innermost that most of its instructions are of, those of `core` left out.
+/// The function of a loop: the innermost that contains [`SHARE`] of its instructions, without functions of `core`.
 fn place(lines: &Loader, addresses: impl Iterator<Item = u32>) -> Option<String> {
     let chains: Vec<Vec<String>> = addresses
         .map(|address| {

@@ -1,16 +1,16 @@
-//! Jobs made of a few numbers, so that a bad one can be changed a little into a worse one.
+//! Jobs encoded as a vector of numbers (genes) for the search.
 
 use fastrand::Rng;
 
 use job::{Along, AxisLimits, Job, MachineSpec, NurbsSpec, Pattern, Side, Spacing, SurfaceSpec};
 
-/// Numbers of a job.
+/// Number of genes.
 const GENES: usize = 21;
 
-/// Patches that surely fit the board's store, rational or not.
+/// Greatest number of patches that fit the board's store: rational, non-rational.
 const PATCHES_MAX: [usize; 2] = [230, 300];
 
-/// What a gene decides: its index.
+/// A parameter of a job; its value is the gene's index.
 #[derive(Clone, Copy)]
 enum Gene {
     Kind,
@@ -36,7 +36,7 @@ enum Gene {
     Jerk,
 }
 
-/// A job as numbers from 0 to 1, and the seed of what is random in it.
+/// A job as numbers from 0 to 1, and the seed of its random details.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Genes {
     numbers: [f64; GENES],
@@ -44,7 +44,7 @@ pub struct Genes {
 }
 
 impl Genes {
-    /// Any job.
+    /// A uniformly random job.
     pub fn random(random: &mut Rng) -> Self {
         Self {
             numbers: std::array::from_fn(|_| random.f64()),
@@ -52,19 +52,19 @@ impl Genes {
         }
     }
 
-    /// A job made to be bad in one way.
+    /// A random job with one adversarial property.
     pub fn adversarial(random: &mut Rng) -> Self {
         let mut genes = Self::random(random);
-        let way = random.u8(..5);
+        let property = random.u8(..5);
         let mut set = |gene: Gene, from: f64, to: f64| {
             genes.numbers[gene as usize] = from + (to - from) * random.f64();
         };
         set(Gene::Kind, 0.2, 0.75);
-        // Many patches take seconds to load: mostly few.
+        // Few patches, because loading many takes seconds.
         set(Gene::PathSpans, 0.0, 0.5);
         set(Gene::SideSpans, 0.0, 0.3);
-        match way {
-            // Side spans by the hundred, all within one interval: the schedule walks over them.
+        match property {
+            // Hundreds of side spans within one path interval: the schedule walks over them.
             0 => {
                 set(Gene::SideSpans, 0.9, 1.0);
                 set(Gene::PathSpans, 0.0, 0.05);
@@ -101,7 +101,7 @@ impl Genes {
         genes
     }
 
-    /// The same with a few numbers changed, by little or altogether.
+    /// A copy with up to three genes changed, slightly or completely.
     #[must_use]
     pub fn mutated(&self, random: &mut Rng) -> Self {
         let mut genes = self.clone();
@@ -110,7 +110,7 @@ impl Genes {
             *number = if random.u8(..4) == 0 {
                 random.f64()
             } else {
-                // About normal, a twentieth wide.
+                // About normal, standard deviation 0.06.
                 let sum: f64 = (0..4).map(|_| random.f64() - 0.5).sum();
                 (*number + 0.1 * sum).clamp(0.0, 1.0)
             };
@@ -125,7 +125,7 @@ impl Genes {
         self.numbers[gene as usize]
     }
 
-    /// Between two positive numbers, evenly by their logarithm.
+    /// The gene mapped to a range of positive numbers, logarithmically.
     fn log(&self, gene: Gene, from: f64, to: f64) -> f64 {
         from * (to / from).powf(self.gene(gene))
     }
@@ -144,7 +144,7 @@ impl Genes {
         1 + (2.999 * self.gene(gene)) as usize
     }
 
-    /// The job, with limits of the axes or without.
+    /// Decodes the job, with axis limits or without.
     #[must_use]
     pub fn job(&self, limits: bool) -> Job {
         let mut random = Rng::with_seed(self.seed);
@@ -164,7 +164,7 @@ impl Genes {
             scallop_mm: radius_mm * self.log(Gene::Scallop, 1e-4, 0.95),
             along: self.along(),
             side: match random.bool() {
-                // Between its passes the tool leaves the surface upwards.
+                // With limits the tool retracts upwards between the passes.
                 _ if limits => Side::Up,
                 true => Side::Plus,
                 false => Side::Minus,
@@ -185,7 +185,7 @@ impl Genes {
         }
     }
 
-    /// A machine with limits: those of the fastest reach their velocity within some periods, those of the slowest never.
+    /// A machine with limits, from those that reach the velocity limit within some periods to those that never do.
     fn machine(&self) -> MachineSpec {
         let axes = |most: f64| [most, most, 0.5 * most];
         MachineSpec {
@@ -206,7 +206,7 @@ impl Genes {
         }
     }
 
-    /// What the path and the side parameter are, as u and v.
+    /// A pair for the path and the side parameter in the order u, v.
     fn by_parameter<T>(&self, path: T, side: T) -> [T; 2] {
         match self.along() {
             Along::U => [path, side],
@@ -227,7 +227,7 @@ impl Genes {
         u.min(v) * self.log(Gene::Bump, 1e-4, 1.0)
     }
 
-    /// Far from the origin, the unit of the machine is coarser.
+    /// Offset from the origin, mm: far from it the unit of the fixed-point format is coarser.
     fn origin(&self) -> f64 {
         1000.0 * (self.gene(Gene::Origin) - 0.5).max(0.0)
     }
@@ -282,7 +282,7 @@ impl Genes {
         }
     }
 
-    /// Knots of so many spans, clamped; widths differ by a factor.
+    /// Clamped knots of `spans` spans with random widths.
     fn knots(&self, random: &mut Rng, spans: usize, degree: usize) -> Vec<f64> {
         let factor = 1000_f64.powf(self.gene(Gene::Uneven));
         let mut at = 0.0;
@@ -302,16 +302,16 @@ impl Genes {
         let spans = self.by_parameter(path, side);
         let degree = [self.degree(Gene::DegreeU), self.degree(Gene::DegreeV)];
         let [knots_u, knots_v] = [0, 1].map(|k| self.knots(random, spans[k], degree[k]));
-        let places = |knots: &[f64], degree: usize| -> Vec<f64> {
+        let abscissae = |knots: &[f64], degree: usize| -> Vec<f64> {
             let end = knots[knots.len() - 1];
-            // Where poles make the parametrisation even (Greville), bent by a power to make it uneven.
+            // Greville abscissae, which make the parametrisation uniform, raised to a power to make it non-uniform.
             let even = knots[1..knots.len() - 1].windows(degree);
             #[allow(clippy::cast_precision_loss, reason = "at most 3")]
             let even = even.map(|window| window.iter().sum::<f64>() / degree as f64 / end);
             let power = 4_f64.powf(2.0 * (self.gene(Gene::Stretch) - 0.5).max(0.0));
-            even.map(|place| place.powf(power)).collect()
+            even.map(|abscissa| abscissa.powf(power)).collect()
         };
-        let [u, v] = [places(&knots_u, degree[0]), places(&knots_v, degree[1])];
+        let [u, v] = [abscissae(&knots_u, degree[0]), abscissae(&knots_v, degree[1])];
         let [length_u, length_v] = self.lengths();
         let ratio = 4_f64.powf(self.gene(Gene::Weights));
         let bump = self.bump();
@@ -342,7 +342,7 @@ impl Genes {
         })
     }
 
-    /// Makes a boundary one point.
+    /// Collapses a boundary into a point, depending on the gene.
     fn collapse(&self, poles_mm: &mut [Vec<[f64; 4]>]) {
         let pole = self.gene(Gene::Pole);
         let last = poles_mm.len() - 1;

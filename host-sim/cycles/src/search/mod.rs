@@ -1,12 +1,12 @@
-//! The search for the worst tick: jobs at random and made to be bad, then hill climbing from the worst found.
+//! Search for the worst-case tick: random and adversarial jobs, then hill climbing from the worst found.
 //!
 //! ```text
-//!  genes ──job──► prepare ──► one QEMU for all (lab) ──► worst tick of a job ──► elite ──mutation──► genes
+//!  genes ──job──► prepare ──► one QEMU session ──► worst-case tick of a job ──► elite ──mutation──► genes
 //! ```
 //!
-//! Of each job's run every tick counts, also one that yields no sample. The worst are run again so that all that can come together
-//! with them does: a command in the same tick, a resume from a hold, samples reported, the run's ticks used up. Jobs with limits also
-//! run with an operator who holds, resumes, overrides, stops and aborts at any moment.
+//! Every tick of a run is considered, including those without a sample. The worst are repeated with coincident events: a command in
+//! the same tick, a resume from a hold, samples reported, the last tick of the run. Jobs with limits also run under random commands
+//! of an operator.
 
 pub mod genes;
 pub mod text;
@@ -17,67 +17,68 @@ use fastrand::Rng;
 use interp_core::State;
 
 use super::BudgetError;
-use super::figures::{Model, whole};
-use super::lab::{Lab, Worst};
+use super::figures::{Model, tick_cycles};
+use super::session::{MeasurementSession, WorstTick};
 use genes::Genes;
 use job::Job;
 use machine::Machine;
 use machine::prepare::{Prepared, prepare};
 use machine::remote::RemoteError;
 
-/// Ticks of each job, and of one with limits: before its first pass it is looked over, which takes some thousand.
+/// Ticks of each job, and of one with limits, whose look-ahead takes some thousand ticks before the first pass.
 const TICKS: u32 = 600;
 const TICKS_WITHIN_LIMITS: u32 = 4500;
 
-/// Jobs that hill climbing starts from.
+/// Number of jobs that hill climbing starts from.
 const ELITE: usize = 8;
 
-/// Samples of a run that is long enough, and of how many shorter ones one is tried.
+/// Least samples of a run that is worth measuring; of the shorter ones, one in `SHORT` is measured.
 const SAMPLES_MIN: u32 = 4;
 const SHORT: u8 = 8;
 
-/// Share of the jobs that are drawn afresh; the others come of the worst so far.
-const FRESH: f64 = 0.35;
+/// Share of jobs drawn at random; the others are mutations of the worst so far.
+const RANDOM_SHARE: f64 = 0.35;
 
-/// A job, and its worst tick.
+/// A job with its worst-case tick.
 #[derive(Clone, Debug)]
-pub struct Found {
+pub struct Candidate {
     /// The job.
     pub job: Job,
-    /// Its worst tick.
-    pub worst: Worst,
+    /// Its worst-case tick.
+    pub worst: WorstTick,
     genes: Genes,
 }
 
-impl Found {
+impl Candidate {
     fn cycles(&self) -> u32 {
-        whole(&self.worst.record, Model::Pessimistic)
+        tick_cycles(&self.worst.record, Model::Pessimistic)
     }
 }
 
-/// What a campaign came to.
+/// Result of a search.
 #[derive(Clone, Debug, Default)]
-pub struct Campaign {
-    /// The worst jobs, the very worst first.
-    pub elite: Vec<Found>,
-    /// Jobs that ran.
-    pub ran: u32,
-    /// Jobs that the host or the board refused.
+pub struct SearchResult {
+    /// The worst jobs, the worst first.
+    pub elite: Vec<Candidate>,
+    /// Number of jobs that ran.
+    pub executed: u32,
+    /// Number of jobs that the host or the board refused.
     pub refused: u32,
-    /// Jobs that would have faulted at once.
+    /// Number of jobs left out because they fault within a few samples.
     pub skipped: u32,
-    /// Samples that they made: ticks besides those that ended a run.
+    /// Samples of all runs.
     pub samples: u64,
     /// Names of the faults that ended runs.
     pub faults: BTreeSet<&'static str>,
 }
 
-/// A job that the machine takes, and whether it gets as far as a few samples: one that faults at once has little to show.
+/// Prepares a job; `None` if it is refused. Whether it yields at least [`SAMPLES_MIN`] samples: one that faults before is seldom
+/// measured.
 fn prepared(job: &Job) -> Option<(Prepared, bool)> {
     let prepared = prepare(job).ok()?;
     let mut machine = Machine::load(&prepared).ok()?;
     let (mut samples, mut ticks) = (0, 0);
-    // How it ends is the board's to say.
+    // The board's run decides how it ends.
     let _ = machine.run(|sample| {
         ticks += 1;
         samples += u32::from(sample.state == State::Running);
@@ -86,50 +87,50 @@ fn prepared(job: &Job) -> Option<(Prepared, bool)> {
     Some((prepared, samples >= SAMPLES_MIN))
 }
 
-/// Tries so many jobs, with `limits` or without; the same seed tries the same. `progress` is called after each.
+/// Searches `jobs` jobs, with `limits` or without; the same seed gives the same jobs. Calls `progress` after each.
 ///
 /// # Errors
-/// QEMU or the line to it breaks.
+/// QEMU or the connection to it fails.
 pub fn search(
-    lab: &mut Lab,
+    session: &mut MeasurementSession,
     jobs: u32,
     seed: u64,
     limits: bool,
     mut progress: impl FnMut(),
-) -> Result<Campaign, BudgetError> {
+) -> Result<SearchResult, BudgetError> {
     let mut random = Rng::with_seed(seed);
-    let mut campaign = Campaign::default();
+    let mut result = SearchResult::default();
     for _ in 0..jobs {
-        let genes = draw(&mut random, &campaign.elite);
+        let genes = draw(&mut random, &result.elite);
         let job = genes.job(limits);
         match prepared(&job) {
             Some((prepared, runs)) if runs || random.u8(..SHORT) == 0 => {
-                try_job(lab, &mut campaign, genes, job, &prepared)?;
+                try_job(session, &mut result, genes, job, &prepared)?;
             }
-            Some(_) => campaign.skipped += 1,
-            None => campaign.refused += 1,
+            Some(_) => result.skipped += 1,
+            None => result.refused += 1,
         }
         progress();
     }
-    Ok(campaign)
+    Ok(result)
 }
 
-fn draw(random: &mut Rng, elite: &[Found]) -> Genes {
-    if elite.is_empty() || random.f64() < FRESH {
+fn draw(random: &mut Rng, elite: &[Candidate]) -> Genes {
+    if elite.is_empty() || random.f64() < RANDOM_SHARE {
         return if random.u8(..4) == 0 {
             Genes::random(random)
         } else {
             Genes::adversarial(random)
         };
     }
-    // The worst more often than the others.
+    // Prefers the worst.
     let among = random.usize(1..=elite.len());
     elite[random.usize(..among)].genes.mutated(random)
 }
 
 fn try_job(
-    lab: &mut Lab,
-    campaign: &mut Campaign,
+    session: &mut MeasurementSession,
+    result: &mut SearchResult,
     genes: Genes,
     job: Job,
     prepared: &Prepared,
@@ -139,29 +140,29 @@ fn try_job(
     } else {
         TICKS
     };
-    let run = match lab.run(prepared, ticks) {
+    let run = match session.run(prepared, ticks) {
         Err(BudgetError::Remote(RemoteError::Refused { .. })) => {
-            campaign.refused += 1;
+            result.refused += 1;
             return Ok(());
         }
         run => run?,
     };
-    campaign.ran += 1;
-    campaign.samples += u64::from(run.samples);
-    campaign.faults.extend(run.fault);
-    let least = campaign.elite.last().map_or(0, Found::cycles);
-    // What comes together with a tick costs some hundred cycles; a tick that is far off is not worth a second run.
-    if campaign.elite.len() == ELITE && run.most() + ALONGSIDE < least {
+    result.executed += 1;
+    result.samples += u64::from(run.samples);
+    result.faults.extend(run.fault);
+    let least = result.elite.last().map_or(0, Candidate::cycles);
+    // Coincident events cost some hundred cycles; a tick that is far below needs no second run.
+    if result.elite.len() == ELITE && run.cycles_max() + COINCIDENT_CYCLES_MAX < least {
         return Ok(());
     }
-    let worst = lab.worst(prepared, &run)?;
-    campaign.elite.push(Found { job, worst, genes });
-    campaign
+    let worst = session.worst_tick(prepared, &run)?;
+    result.elite.push(Candidate { job, worst, genes });
+    result
         .elite
         .sort_by_key(|found| std::cmp::Reverse(found.cycles()));
-    campaign.elite.truncate(ELITE);
+    result.elite.truncate(ELITE);
     Ok(())
 }
 
-/// Cycles that commands and reports add to a tick at most.
-const ALONGSIDE: u32 = 1500;
+/// Greatest number of cycles that coincident commands and reports add to a tick.
+const COINCIDENT_CYCLES_MAX: u32 = 1500;

@@ -1,10 +1,10 @@
-//! A job as the text of a job file that reads back as the same job.
+//! Writes a job as a job file that reads back as the same job.
 
 use std::fmt::Write;
 
 use job::{Along, Job, Pattern, Side, Spacing, SurfaceSpec};
 
-/// Text of a number: the shortest that reads back as the same.
+/// The shortest text that reads back as the same number.
 fn number(value: f64) -> String {
     format!("{value:?}")
 }
@@ -67,7 +67,7 @@ fn surface(surface: &SurfaceSpec) -> Vec<(&'static str, String)> {
     }
 }
 
-/// The text. Of the machine, its period and the limits of its axes.
+/// The text of a job; of the machine, the period and the axis limits.
 #[must_use]
 pub fn text(job: &Job, comment: &str) -> String {
     let mut text = String::new();

@@ -1,4 +1,4 @@
-//! `budget --search`: searches the worst-case tick and the job that causes it.
+//! `budget --search`: the worst-case tick that can be found, and the job that causes it.
 
 use std::path::Path;
 
@@ -9,10 +9,10 @@ use super::super::out::{say, say_part};
 use super::super::{Failure, Result, cannot_write, progress};
 use super::Arguments;
 use cycles::PERIOD_CYCLES;
-use cycles::figures::{Model, whole};
-use cycles::lab::{Lab, Worst};
-use cycles::measure::Bench;
-use cycles::search::{Campaign, search, text};
+use cycles::figures::{Model, tick_cycles};
+use cycles::measure::MeasurementSetup;
+use cycles::search::{SearchResult, search, text};
+use cycles::session::{MeasurementSession, WorstTick};
 
 /// Duration of a tick, percent of the period.
 fn share_pct(cycles: u32) -> f64 {
@@ -20,11 +20,11 @@ fn share_pct(cycles: u32) -> f64 {
 }
 
 /// The worst-case tick as text.
-pub(super) fn describe(worst: &Worst) -> String {
-    let total = |model| whole(&worst.record, model);
+pub(super) fn describe(worst: &WorstTick) -> String {
+    let total = |model| tick_cycles(&worst.record, model);
     let (nominal, pessimistic) = (total(Model::Nominal), total(Model::Pessimistic));
     let mut text = format!(
-        "worst-case tick: {pessimistic} cycles pessimistic ({:.2} % of the period), {nominal} nominal; tick {} of the run\n  events: {}\n",
+        "worst-case tick: {pessimistic} cycles pessimistic ({:.2} % of the period), {nominal} nominal; tick {} of the run\n  in it: {}\n",
         share_pct(pessimistic),
         worst.tick,
         worst.events.join(", ")
@@ -42,7 +42,7 @@ pub(super) fn describe(worst: &Worst) -> String {
 }
 
 /// The worst-case tick as JSON.
-fn json(worst: &Worst) -> Value {
+fn json(worst: &WorstTick) -> Value {
     let stages = Stage::ALL.map(|stage| {
         let cycles = worst.record.stages[stage as usize];
         json!({
@@ -51,33 +51,33 @@ fn json(worst: &Worst) -> Value {
             "cycles_pessimistic": cycles.pessimistic,
         })
     });
-    let pessimistic = whole(&worst.record, Model::Pessimistic);
+    let pessimistic = tick_cycles(&worst.record, Model::Pessimistic);
     json!({
         "tick": worst.tick,
         "events": worst.events,
-        "cycles_nominal": whole(&worst.record, Model::Nominal),
+        "cycles_nominal": tick_cycles(&worst.record, Model::Nominal),
         "cycles_pessimistic": pessimistic,
         "period_share_pct": share_pct(pessimistic),
         "stages": stages,
     })
 }
 
-fn print(campaign: &Campaign, lab: &Lab, seed: u64, out: &Path) {
-    let faults: Vec<&str> = campaign.faults.iter().copied().collect();
+fn print(result: &SearchResult, session: &MeasurementSession, seed: u64, out: &Path) {
+    let faults: Vec<&str> = result.faults.iter().copied().collect();
     say!(
-        "seed {seed}: {} jobs ran, {} faulted at the first tick, {} were refused, {} samples, stack {} bytes; faults: {}",
-        campaign.ran,
-        campaign.skipped,
-        campaign.refused,
-        campaign.samples,
-        lab.stack_bytes(),
+        "seed {seed}: {} jobs ran, {} faulted at once, {} were refused, {} samples, stack {} bytes; faults met: {}",
+        result.executed,
+        result.skipped,
+        result.refused,
+        result.samples,
+        session.stack_bytes(),
         if faults.is_empty() {
             "none".to_owned()
         } else {
             faults.join(", ")
         }
     );
-    if let Some(found) = campaign.elite.first() {
+    if let Some(found) = result.elite.first() {
         say_part!("{}", describe(&found.worst));
         say!("  job: {}", out.display());
         say!("  repeat: cargo sim budget {}", out.display());
@@ -85,7 +85,7 @@ fn print(campaign: &Campaign, lab: &Lab, seed: u64, out: &Path) {
 }
 
 /// Searches, prints the worst-case tick, and writes the job that causes it.
-pub(super) fn command(bench: &Bench, jobs: u32, arguments: &Arguments) -> Result<()> {
+pub(super) fn command(setup: &MeasurementSetup, jobs: u32, arguments: &Arguments) -> Result<()> {
     let Arguments {
         seed,
         limits,
@@ -93,11 +93,11 @@ pub(super) fn command(bench: &Bench, jobs: u32, arguments: &Arguments) -> Result
         json: as_json,
         ..
     } = *arguments;
-    let mut lab = Lab::new(bench)?;
+    let mut session = MeasurementSession::new(setup)?;
     let bar = progress(u64::from(jobs), "searching");
-    let campaign = search(&mut lab, jobs, seed, limits, || bar.inc(1))?;
+    let result = search(&mut session, jobs, seed, limits, || bar.inc(1))?;
     bar.finish_and_clear();
-    let Some(found) = campaign.elite.first() else {
+    let Some(found) = result.elite.first() else {
         return Err(Failure::Failed(Some(format!(
             "none of {jobs} jobs ran; try more"
         ))));
@@ -115,18 +115,18 @@ pub(super) fn command(bench: &Bench, jobs: u32, arguments: &Arguments) -> Result
     if as_json {
         let report = json!({
             "seed": seed,
-            "jobs": campaign.ran,
-            "faulted_at_once": campaign.skipped,
-            "refused": campaign.refused,
-            "samples": campaign.samples,
-            "faults": campaign.faults,
-            "stack_bytes": lab.stack_bytes(),
+            "jobs": result.executed,
+            "faulted_at_once": result.skipped,
+            "refused": result.refused,
+            "samples": result.samples,
+            "faults": result.faults,
+            "stack_bytes": session.stack_bytes(),
             "job": out,
             "worst": json(&found.worst),
         });
         say!("{report}");
     } else {
-        print(&campaign, &lab, seed, out);
+        print(&result, &session, seed, out);
     }
     Ok(())
 }

@@ -9,7 +9,7 @@ use report::Sketch;
 
 /// Sampling periods that the linear interpolator is shown with, µs: the paper's, and the product's.
 pub const PERIODS_US: [f64; 2] = [5000.0, 1000.0];
-/// Threads: a run keeps a few kilobytes, so memory is no limit, and more than four runs at a time gain little.
+/// Greatest number of threads: more than four gain little.
 const THREADS: usize = 4;
 
 /// One approach on one job.
@@ -19,14 +19,14 @@ pub struct Row {
     pub kind: Kind,
     /// Its sampling period, µs.
     pub period_us: f64,
-    /// What it came to.
+    /// Its result.
     pub measured: Measured,
-    /// The passes as a picture shows them; of the product only.
+    /// The passes for the picture, of the surface interpolator only.
     pub sketch: Option<Sketch>,
 }
 
 impl Row {
-    /// The approach, with its period where that is not the product's.
+    /// Name of the approach, with its period unless that is the product's.
     #[must_use]
     pub fn name(&self) -> String {
         if self.period_us == PERIODS_US[1] {
@@ -40,13 +40,13 @@ impl Row {
 /// The approaches on one job.
 #[derive(Clone, Debug)]
 pub struct Comparison {
-    /// The job.
+    /// Name of the job.
     pub name: &'static str,
-    /// What it is.
+    /// Title of the job.
     pub title: &'static str,
     /// Feed of the contact, mm/s.
     pub feed_mm_s: f64,
-    /// Scallop height limit and tolerance of chords and splines, mm.
+    /// Scallop height limit, mm.
     pub scallop_mm: f64,
     /// Tolerance of chords and splines, mm.
     pub chord_mm: f64,
@@ -64,7 +64,7 @@ impl Comparison {
     }
 }
 
-/// What is run on each job.
+/// Approaches and sampling periods (µs) of each job.
 const ROWS: [(Kind, f64); 5] = [
     (Kind::ConstantCl, PERIODS_US[1]),
     (Kind::Linear, PERIODS_US[0]),
@@ -72,18 +72,18 @@ const ROWS: [(Kind, f64); 5] = [
     (Kind::Curve, PERIODS_US[1]),
     (Kind::Surface, PERIODS_US[1]),
 ];
-/// Jobs that are compared.
+/// Number of jobs.
 const JOBS: usize = 3;
 /// Runs of all comparisons.
 pub const RUNS: u64 = (JOBS * ROWS.len()) as u64;
-/// Parts of a run, of which each is a step.
+/// Progress steps of a run.
 pub const PARTS: u64 = 50;
 
-/// Runs one, and calls `step` [`PARTS`] times over its `passes`.
+/// Runs an approach on a job, and calls `step` [`PARTS`] times over its `passes`.
 fn row(case: &Case, kind: Kind, passes: usize, step: &dyn Fn()) -> Result<Row, ApproachError> {
     let mut sketch = (kind == Kind::Surface).then(|| Sketch::new(&case.job, passes));
     let (mut passed, mut steps) = (0, 0);
-    let mut reach = |wanted: u64| {
+    let mut advance_to = |wanted: u64| {
         while steps < wanted.min(PARTS) {
             steps += 1;
             step();
@@ -95,10 +95,10 @@ fn row(case: &Case, kind: Kind, passes: usize, step: &dyn Fn()) -> Result<Row, A
         }
         if motion.emitted.last_of_pass {
             passed += 1;
-            reach(PARTS * passed / passes.max(1) as u64);
+            advance_to(PARTS * passed / passes.max(1) as u64);
         }
     })?;
-    reach(PARTS);
+    advance_to(PARTS);
     Ok(Row {
         kind,
         period_us: case.job.machine.period_us,

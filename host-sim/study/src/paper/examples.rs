@@ -50,7 +50,7 @@ const MINUTES: (&str, usize) = ("min", 2);
 const PERCENT: (&str, usize) = ("%", 1);
 const RIPPLE: (&str, usize) = ("%", 2);
 
-/// All of them.
+/// The items of all examples.
 pub(super) fn items(cases: &Cases, comparisons: &[Comparison]) -> Result<Vec<Item>, ApproachError> {
     let bell = Geometry::new(&cases.revolved.oracle)?;
     let around = Geometry::new(&cases.revolved_v.oracle)?;
@@ -69,7 +69,7 @@ pub(super) fn items(cases: &Cases, comparisons: &[Comparison]) -> Result<Vec<Ite
     Ok(items)
 }
 
-/// The revolved surface: what existing practice does to the contact's speed.
+/// The revolved surface: speed of the contact at constant speed of the tool centre.
 fn example_1(case: &Case, u: &Geometry, v: &Geometry) -> Vec<Item> {
     let feed = case.job.feed_mm_s();
     let [low, high] = u.ratio;
@@ -80,7 +80,7 @@ fn example_1(case: &Case, u: &Geometry, v: &Geometry) -> Vec<Item> {
         Some(319.0),
         u.passes as f64,
         format!(
-            "{:.3} intervals: the first and the last pass lie on the boundaries",
+            "{:.3} intervals; the first and the last pass lie on the boundaries",
             intervals(case, u)
         ),
     );
@@ -97,7 +97,7 @@ fn example_1(case: &Case, u: &Geometry, v: &Geometry) -> Vec<Item> {
         MM,
         None,
         u.pass_mm[1],
-        "the same: the profile's turning cancels",
+        "equal to the former, because the profile's tangent turns by zero in total",
     );
     part.add("time of a pass", ("s", 3), None, u.pass_mm[0] / feed, "");
     part.add(
@@ -113,7 +113,7 @@ fn example_1(case: &Case, u: &Geometry, v: &Geometry) -> Vec<Item> {
         None,
         feed / low,
         format!(
-            "of a wanted {feed}: the surface is cut at {:.0} % to {:.0} % of the feed",
+            "programmed feed {feed}: the surface is cut at {:.0} % to {:.0} % of it",
             100.0 / high,
             100.0 / low
         ),
@@ -143,29 +143,29 @@ fn example_1(case: &Case, u: &Geometry, v: &Geometry) -> Vec<Item> {
     part.add("passes along v", COUNT, None, v.passes as f64, "");
     part.add("length of all passes along v", MM_LONG, None, v.cc_length_mm, "");
     part.add(
-        "length with the scallop height everywhere",
+        "length at constant scallop height",
         MM_LONG,
         None,
         u.even_scallop_mm,
-        "the surface's area over the local step-over: no path with this scallop height is much shorter",
+        "integral of the surface's area over the local step-over: a lower bound for this scallop height",
     );
     part.add(
         "passes along u waste",
         PERCENT,
         None,
         u.waste_pct(),
-        "iso-parametric passes crowd at the neck",
+        "iso-parametric passes are closest at the neck",
     );
     part.items
 }
 
-/// How often the least interval goes into the range of the side parameter.
+/// Range of the side parameter in least intervals.
 fn intervals(case: &Case, geometry: &Geometry) -> f64 {
     let [first, last] = case.oracle.side_range();
     (last - first) / geometry.interval_min
 }
 
-/// The ruled surface, printed and reconstructed.
+/// The ruled surface, as printed and as reconstructed.
 fn example_2(cases: &Cases) -> Result<Vec<Item>, ApproachError> {
     let mut part = Part::new("Example 2");
     for (case, which) in [
@@ -184,7 +184,7 @@ fn example_2(cases: &Cases) -> Result<Vec<Item>, ApproachError> {
         let passes = geometry.passes as f64;
         let what = |what: &str| format!("{which}: {what}");
         let differs = which == "as printed";
-        let told = if differs {
+        let note = if differs {
             "the printed equation does not give the printed figure"
         } else {
             "the paper's figure, with the u terms in y alone"
@@ -195,20 +195,20 @@ fn example_2(cases: &Cases) -> Result<Vec<Item>, ApproachError> {
             COUNT,
             Some(44.0),
             curve,
-            told,
+            note,
         );
         part.add(
             what("segments a pass, normal curvature"),
             COUNT,
             Some(44.0),
             normal,
-            "eqn 6 leaves open which curvature it means",
+            "eqn 6 does not define which curvature it uses",
         );
-        part.add(what("segments"), COUNT, Some(5808.0), passes * curve, told);
+        part.add(what("segments"), COUNT, Some(5808.0), passes * curve, note);
         let rounding = if differs {
-            told
+            note
         } else {
-            "the paper's one figure that does not fit to rounding"
+            "the only figure of the paper that differs by more than rounding"
         };
         part.add(
             what("time at constant speed of the centre"),
@@ -222,7 +222,7 @@ fn example_2(cases: &Cases) -> Result<Vec<Item>, ApproachError> {
             MINUTES,
             Some(10.7),
             cc,
-            told,
+            note,
         );
         part.add(
             what("time saved"),
@@ -230,7 +230,7 @@ fn example_2(cases: &Cases) -> Result<Vec<Item>, ApproachError> {
             Some(25.0),
             100.0 * (1.0 - cc / cl),
             if differs {
-                told
+                note
             } else {
                 "of the rounded times the paper's is 24.6"
             },
@@ -239,7 +239,7 @@ fn example_2(cases: &Cases) -> Result<Vec<Item>, ApproachError> {
     Ok(part.items)
 }
 
-/// A run over one pass by eqn 6 as printed.
+/// Runs the linear interpolator over one pass with eqn 6 as printed.
 fn by_equation(case: &Case, pass: &PassPath<'_>) -> Result<Measured, ApproachError> {
     let linear = Linear::new(&case.job, Chords::Equation);
     measure_run(&case.job, &mut |_, _, _| {}, |each| {
@@ -272,8 +272,7 @@ fn example_3(case: &Case, held: Option<&Measured>) -> Result<Vec<Item>, Approach
         Some(case.job.chord_mm),
         chords.error_mm,
         format!(
-            "eqn 6 judges by the curvature where a chord begins, and steps over the inflection at u = 0.5 in one chord from {:.3} \
-             to {:.3}",
+            "eqn 6 uses the curvature at the start of a chord; one chord from {:.3} to {:.3} spans the inflection at u = 0.5",
             chords.worst[0], chords.worst[1]
         ),
     );
@@ -312,7 +311,7 @@ fn example_3(case: &Case, held: Option<&Measured>) -> Result<Vec<Item>, Approach
             RIPPLE,
             None,
             held.findings.report.ripple_pct.max,
-            "the centre's speed is constant on a chord, the wanted one is not",
+            "the centre's speed is constant on a chord, the speed that keeps the feed is not",
         );
         part.add(
             "their step of the centre's speed",
@@ -365,7 +364,7 @@ fn example_5(surface: Option<&Measured>) -> Vec<Item> {
             COUNT,
             Some(319.0),
             surface.planned.passes as f64,
-            "the core itself, run over the whole job",
+            "counted in a run of the core",
         );
         part.add(
             "bytes of the job",

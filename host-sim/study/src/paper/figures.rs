@@ -10,57 +10,57 @@ use verify::speeds::PeriodSpeed;
 
 /// Speeds along one pass.
 #[derive(Clone, Debug)]
-pub struct Track {
+pub struct SpeedTrack {
     /// The approach.
     pub kind: Kind,
     /// Sampling period, µs.
     pub period_us: f64,
-    /// Speeds, period by period; the last, which is cut short, left out.
+    /// Speeds of the periods, without the last, which is shorter.
     pub speeds: Vec<PeriodSpeed>,
-    /// What the pass came to.
+    /// Result of the pass.
     pub measured: Measured,
 }
 
 /// Data of all figures.
 #[derive(Clone, Debug)]
 pub struct Figures {
-    /// Figure 3: the pass in its plane: distance from the axis and height of contact and centre, mm.
+    /// Figure 3: the pass in its plane.
     pub section: Section,
-    /// Lengths of the contact's and of the centre's path on it, mm.
+    /// Lengths of the paths of contact and centre, mm.
     pub lengths_mm: [f64; 2],
     /// Figure 4: existing practice, constant speed of the centre.
-    pub constant_cl: Track,
-    /// Figure 5: the centre's speed that keeps the contact at the feed: path length, speed.
+    pub constant_cl: SpeedTrack,
+    /// Figure 5: path length (mm) and speed (mm/s) of the centre that keeps the contact at the feed.
     pub wanted: Vec<[f64; 2]>,
-    /// Figure 7: the linear interpolator with eqn 6 as printed and the paper's 5 ms.
-    pub linear_printed: Track,
-    /// The same with chords that hold the tolerance.
-    pub linear_held: Track,
-    /// The same at 1 ms.
-    pub linear_1_ms: Track,
+    /// Figure 7: the linear interpolator with eqn 6 as printed, period 5 ms as in the paper.
+    pub linear_printed: SpeedTrack,
+    /// Figure 7 with chords within the tolerance, period 5 ms.
+    pub linear_held: SpeedTrack,
+    /// Figure 7 with chords within the tolerance, period 1 ms.
+    pub linear_1_ms: SpeedTrack,
     /// Figure 8: the curve interpolator.
-    pub curve: Track,
-    /// Where the cubics of Figure 8 end: path length, fitted speed of the centre.
+    pub curve: SpeedTrack,
+    /// Ends of the cubics of Figure 8: path length (mm), fitted speed of the centre (mm/s).
     pub curve_ends: Vec<[f64; 2]>,
     /// Figure 9: the surface interpolator.
-    pub surface: Track,
+    pub surface: SpeedTrack,
 }
 
-/// Contact and centre of a pass in the plane that holds it and the axis.
+/// Contact and centre of a pass in the plane of the pass and the axis.
 #[derive(Clone, Debug)]
 pub struct Section {
-    /// Contact: distance from the axis, height; mm.
+    /// Contact: distance from the axis, height, mm.
     pub cc_mm: Vec<[f64; 2]>,
-    /// Centre, the same.
+    /// Centre: distance from the axis, height, mm.
     pub cl_mm: Vec<[f64; 2]>,
 }
 
-/// Follows one pass.
+/// Measures the speeds of one pass.
 fn track(
     kind: Kind,
     case: &Case,
     run: impl FnOnce(&mut dyn FnMut(&approach::Motion)) -> Result<Planned, ApproachError>,
-) -> Result<Track, ApproachError> {
+) -> Result<SpeedTrack, ApproachError> {
     let mut speeds = Vec::new();
     let measured = measure_run(
         &case.job,
@@ -71,7 +71,7 @@ fn track(
         },
         run,
     )?;
-    Ok(Track {
+    Ok(SpeedTrack {
         kind,
         period_us: case.job.machine.period_us,
         speeds,
@@ -79,17 +79,17 @@ fn track(
     })
 }
 
-/// Follows one pass by an approach that plans.
+/// Measures the speeds of one pass of an approach that plans segments.
 fn planned_track(
     kind: Kind,
     case: &Case,
     approach: &dyn Approach,
     pass: &PassPath<'_>,
-) -> Result<Track, ApproachError> {
+) -> Result<SpeedTrack, ApproachError> {
     track(kind, case, |each| planned(approach, &case.job, &[*pass], each))
 }
 
-/// A job of the first two passes of a revolved surface: the core cuts whole jobs.
+/// A job that consists of the first two passes of a job on a revolved surface.
 fn first_passes(job: &Job, interval: f64) -> Job {
     let mut job = job.clone();
     if let (SurfaceSpec::Revolved { v_rad, .. }, Along::U) = (&mut job.surface, job.along) {
@@ -99,7 +99,7 @@ fn first_passes(job: &Job, interval: f64) -> Job {
 }
 
 impl Figures {
-    /// All of it.
+    /// Computes all figures.
     ///
     /// # Errors
     /// None that these jobs cause; those of the approaches.
@@ -107,7 +107,7 @@ impl Figures {
         let case = &cases.revolved;
         let slow = case.with_period_us(5000.0);
         let all = passes(&case.oracle)?;
-        // Every pass of a surface of revolution is like every other.
+        // All passes of a surface of revolution are congruent.
         let Some(pass) = all.first() else {
             return Err(ApproachError::Fault("the job has no pass".to_owned()));
         };
@@ -158,15 +158,15 @@ fn section(nodes: &[Node]) -> Section {
     }
 }
 
-/// The product's first pass.
-fn first_pass_of_core(case: &Case) -> Result<Track, ApproachError> {
+/// The first pass of the core.
+fn first_pass_of_core(case: &Case) -> Result<SpeedTrack, ApproachError> {
     let mut speeds = Vec::new();
     let measured = approach::measure(Kind::Surface, &case.job, |motion, speed, _| {
         if motion.emitted.pass == 0 && !motion.emitted.last_of_pass {
             speeds.extend(speed);
         }
     })?;
-    Ok(Track {
+    Ok(SpeedTrack {
         kind: Kind::Surface,
         period_us: case.job.machine.period_us,
         speeds,

@@ -1,20 +1,20 @@
-//! What a job comes to by geometry alone: passes, lengths, speeds. Quadrature on the oracle; nothing is run.
+//! Passes, lengths and speeds of a job by geometry alone: quadrature on the oracle, without a run.
 
 use approach::{ApproachError, Chords, Nodes, PassPath, chords, passes};
 use oracle::vector::{length, subtract};
 use oracle::{Oracle, OracleError};
 
-/// Cells along the path and across of the quadrature over the surface; midpoints. Relative error about 1e-6.
+/// Cells along and across the path of the midpoint quadrature over the surface. Relative error about 1e-6.
 const CELLS: [u32; 2] = [768, 64];
-/// Steps that narrow the bracket of a speed's extreme, each to two thirds.
+/// Steps of the ternary search for a speed's extreme.
 const EXTREME_STEPS: u32 = 24;
-/// Places at which a chord's error is taken.
+/// Sampling points of a chord's error.
 const PROBES: u32 = 40;
 
-/// A job by its geometry.
+/// Geometric figures of a job.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Geometry {
-    /// Passes.
+    /// Number of passes.
     pub passes: usize,
     /// Least interval between passes, in the side parameter.
     pub interval_min: f64,
@@ -22,16 +22,16 @@ pub struct Geometry {
     pub cc_length_mm: f64,
     /// Length of all passes of the tool centre, mm.
     pub cl_length_mm: f64,
-    /// Lengths of the longest pass on the surface and of its centre, mm.
+    /// Lengths of the longest pass, on the surface and of its tool centre, mm.
     pub pass_mm: [f64; 2],
-    /// Least and largest speed of the centre for a unit speed of the contact.
+    /// Least and greatest speed of the centre over that of the contact.
     pub ratio: [f64; 2],
-    /// Length of a path that had the scallop height everywhere, mm: the surface's area over the local step-over.
+    /// Length of a path of constant scallop height, mm: the integral of the surface's area over the local step-over.
     pub even_scallop_mm: f64,
 }
 
 impl Geometry {
-    /// Of a job.
+    /// Computes the figures of a job.
     ///
     /// # Errors
     /// The surface has no normal somewhere, or the ball does not fit.
@@ -63,14 +63,14 @@ impl Geometry {
         Ok(geometry)
     }
 
-    /// Share of the path that passes of constant parameter waste against even scallops, %.
+    /// Excess length of iso-parametric passes over passes of constant scallop height, as a share of the former, %.
     #[must_use]
     pub fn waste_pct(&self) -> f64 {
         100.0 * (1.0 - self.even_scallop_mm / self.cc_length_mm)
     }
 }
 
-/// Least and largest speed ratio of a pass: those of the nodes, refined between their neighbours.
+/// Least and greatest speed ratio of a pass: those of the nodes, refined between their neighbours.
 fn extremes(pass: &PassPath<'_>, nodes: &Nodes) -> Result<[f64; 2], OracleError> {
     let mut found = nodes.ratios();
     for (extreme, sign) in found.iter_mut().zip([-1.0, 1.0]) {
@@ -79,7 +79,7 @@ fn extremes(pass: &PassPath<'_>, nodes: &Nodes) -> Result<[f64; 2], OracleError>
             continue;
         };
         let (mut low, mut high) = (nodes.0[k - 1].at.path, nodes.0[k + 1].at.path);
-        // A ratio is flat at its extreme, so a bracket of a thousandth is exact.
+        // A ratio is stationary at its extreme, so a bracket of a thousandth suffices.
         for _ in 0..EXTREME_STEPS {
             let third = (high - low) / 3.0;
             let [left, right] = [pass.at(low + third)?.ratio(), pass.at(high - third)?.ratio()];
@@ -114,16 +114,16 @@ fn even_scallop_mm(oracle: &Oracle) -> Result<f64, OracleError> {
 /// Chords of a pass by a rule.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ChordsOfPass {
-    /// Their number.
+    /// Number of chords.
     pub count: usize,
     /// Largest error of the contact's path, mm.
     pub error_mm: f64,
-    /// Path parameters at the ends of the chord that errs so.
+    /// Path parameters at the ends of the chord with that error.
     pub worst: [f64; 2],
 }
 
 impl ChordsOfPass {
-    /// Chords of a pass.
+    /// Computes the chords of a pass.
     ///
     /// # Errors
     /// As [`chords`].

@@ -1,4 +1,4 @@
-//! Lo's paper, whole: every example, table and figure, printed against ours.
+//! Every example, table and figure of Lo's paper: the printed values and ours.
 //!
 //! ```text
 //! jobs (the paper's surfaces) ─► geometry.rs   lengths, speeds, passes by quadrature and scan
@@ -9,9 +9,8 @@
 //! study ─► report/paper/: the page;  commands/paper.rs: terminal and JSON
 //! ```
 //!
-//! Source: C.-C. Lo, "A new approach to CNC tool path generation", Computer-Aided Design 30 (1998). The project has the
-//! paper's algorithms and figures as its notes tell them, not the paper's pictures: the figures here are reconstructions
-//! of what a figure of that number shows, by the examples that it goes with.
+//! Source: C.-C. Lo, "A new approach to CNC tool path generation", Computer-Aided Design 30 (1998). The project has notes on the
+//! paper's algorithms and numbers, but not its pictures: the figures are reconstructions from the examples that they belong to.
 
 pub mod compare;
 mod examples;
@@ -26,27 +25,27 @@ use oracle::Oracle;
 pub use compare::{Comparison, Row};
 pub use figures::Figures;
 
-/// One figure of the paper, or one that it could have printed.
+/// A number of the paper, or a related one that the paper does not print.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Item {
-    /// Where it belongs: "Example 1", "Table 1".
+    /// Part of the paper: "Example 1", "Table 1".
     pub part: &'static str,
-    /// What it is.
+    /// Name.
     pub what: String,
-    /// Its unit, empty for counts.
+    /// Unit, empty for counts.
     pub unit: &'static str,
-    /// Decimals that it is shown with.
+    /// Decimals shown.
     pub decimals: usize,
-    /// What the paper prints.
+    /// The paper's value; `None` where it prints none.
     pub printed: Option<f64>,
-    /// What we get; `None` where it is not measured.
+    /// Our value; `None` where it is not measured.
     pub ours: Option<f64>,
-    /// What there is to say about it.
+    /// Explanation.
     pub note: String,
 }
 
 impl Item {
-    /// Ours against the printed, %.
+    /// Relative difference of our value from the printed one, %.
     #[must_use]
     pub fn difference_pct(&self) -> Option<f64> {
         let (printed, ours) = (self.printed?, self.ours?);
@@ -56,7 +55,7 @@ impl Item {
         Some(100.0 * (ours - printed) / printed)
     }
 
-    /// Part, what and unit in one line.
+    /// Part, name and unit in one line.
     #[must_use]
     pub fn name(&self) -> String {
         let unit = if self.unit.is_empty() {
@@ -68,10 +67,10 @@ impl Item {
     }
 }
 
-/// A job that is built in, with its geometry.
+/// A built-in job with its geometry.
 #[derive(Clone, Debug)]
 pub struct Case {
-    /// The file's name under `jobs/`, without its ending.
+    /// Name of the file under `jobs/`, without extension.
     pub name: &'static str,
     /// The job.
     pub job: Job,
@@ -80,7 +79,7 @@ pub struct Case {
 }
 
 impl Case {
-    /// `spacing`: the paper's own examples have the paper's.
+    /// Parses a job and sets its spacing.
     fn new(name: &'static str, text: &str, spacing: Spacing) -> Result<Self, ApproachError> {
         let file = format!("jobs/{name}.toml");
         let mut job =
@@ -90,7 +89,7 @@ impl Case {
         Ok(Self { name, job, oracle })
     }
 
-    /// The same with another sampling period.
+    /// A copy with another sampling period.
     #[must_use]
     pub fn with_period_us(&self, period_us: f64) -> Self {
         let mut case = self.clone();
@@ -100,7 +99,7 @@ impl Case {
     }
 }
 
-/// The jobs of the study: the sample jobs of the same names, built in.
+/// The jobs of the study: built-in copies of the sample jobs.
 #[derive(Clone, Debug)]
 pub struct Cases {
     /// Examples 1, 3, 4, 5, passes along u.
@@ -109,14 +108,14 @@ pub struct Cases {
     pub revolved_v: Case,
     /// Example 2 as printed.
     pub printed: Case,
-    /// Example 2 as its results have it.
+    /// Example 2 reconstructed from its results.
     pub reconstructed: Case,
     /// The freeform part, which is not in the paper.
     pub freeform: Case,
 }
 
 impl Cases {
-    /// All of them.
+    /// Parses all jobs.
     ///
     /// # Errors
     /// None that these jobs cause.
@@ -148,23 +147,23 @@ impl Cases {
     }
 }
 
-/// All of it.
+/// The results of the study.
 #[derive(Clone, Debug)]
 pub struct Study {
     /// The jobs.
     pub cases: Cases,
-    /// Every number.
+    /// All numbers.
     pub items: Vec<Item>,
     /// The four approaches on whole jobs.
     pub comparisons: Vec<Comparison>,
-    /// What the pictures show.
+    /// Data of the figures.
     pub figures: Figures,
 }
 
-/// Steps of the study, for a progress bar.
+/// Progress steps of the study.
 pub const STEPS: u64 = 2 + compare::RUNS * compare::PARTS;
 
-/// Computes all of it. `step` is called after each of [`STEPS`] steps, from any thread.
+/// Runs the study. `step` is called after each of [`STEPS`] steps, from any thread.
 ///
 /// # Errors
 /// None that these jobs cause; those of the approaches.
@@ -174,7 +173,7 @@ pub fn study(step: &(dyn Fn() + Sync)) -> Result<Study, ApproachError> {
     let figures = Figures::new(&cases)?;
     step();
     let mut items = examples::items(&cases, &comparisons)?;
-    items.extend(table_1::items(None, table_1::golden_cycles().as_ref()));
+    items.extend(table_1::items(&table_1::Ours::golden()));
     step();
     Ok(Study {
         cases,

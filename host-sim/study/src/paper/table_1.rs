@@ -1,26 +1,27 @@
 //! Table 1: operations of steps 2 to 4 in a period, and the time that they take.
 
 use super::Item;
-use crate::operations::{self, Operations};
+use crate::operations::{self, PAPER};
 use cycles::golden;
+use cycles::operations::Operations;
 
 /// Clock of the paper's 486, MHz.
 const PAPER_MHZ: f64 = 66.0;
 /// Clock of the board, MHz.
 const BOARD_MHZ: f64 = 168.0;
 
-/// The operations by name.
-fn named(of: Operations) -> [(&'static str, u32); 5] {
-    [
-        ("additions, subtractions", of.add),
-        ("multiplications", of.multiply),
-        ("divisions", of.divide),
-        ("square roots", of.root),
-        ("sines, cosines", of.sine),
-    ]
-}
+/// Names of the operations, in the order of [`Operations::to_array`].
+const OPERATIONS: [&str; 4] = [
+    "additions, subtractions",
+    "multiplications",
+    "divisions",
+    "square roots",
+];
 
-/// A row of the paper's table: what, microseconds. In the order of [`operations::PAPER`], which has the operations.
+/// Where our operations come from.
+const OPERATIONS_NOTE: &str = "ours: from the instructions that the firmware executes, multiply-accumulate as one of each (cargo sim budget)";
+
+/// Name and microseconds of a row of the paper's table, in the order of [`PAPER`], which has the operations.
 pub const PRINTED: [(&str, f64); 3] = [
     ("Example 5, revolved, path along u", 88.0),
     ("Example 5, revolved, path along v", 80.0),
@@ -30,10 +31,31 @@ pub const PRINTED: [(&str, f64); 3] = [
 /// Cycles of steps 2 to 4 for each row, by the model of a Cortex-M4F: the mean over many ticks.
 pub type Cycles = [f64; 3];
 
-/// The cycles that the golden table of `budget` holds, if it is there.
-#[must_use]
-pub fn golden_cycles() -> Option<Cycles> {
-    cycles_of(&std::fs::read_to_string(golden::path()).ok()?)
+/// Our columns of the table; `None` where the golden table of `budget` lacks them.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Ours {
+    /// Operations of steps 2 to 4, row by row.
+    pub operations: Option<[Operations; 3]>,
+    /// Cycles of steps 2 to 4.
+    pub cycles: Option<Cycles>,
+}
+
+impl Ours {
+    /// The columns in a text of the golden table.
+    #[must_use]
+    pub fn in_table(table: &str) -> Self {
+        Self {
+            operations: operations::in_table(table),
+            cycles: cycles_of(table),
+        }
+    }
+
+    /// The columns of this checkout's golden table, if it has one.
+    #[must_use]
+    pub fn golden() -> Self {
+        std::fs::read_to_string(golden::path())
+            .map_or_else(|_| Self::default(), |table| Self::in_table(&table))
+    }
 }
 
 /// The cycles in a text of the golden table.
@@ -44,63 +66,75 @@ pub fn cycles_of(table: &str) -> Option<Cycles> {
         let line = table.lines().find_map(|line| line.strip_prefix(&row))?;
         line.split(" | ").next()?.trim().parse().ok()
     };
-    let [u, v, bicubic] = operations::PAPER.map(|(surface, _)| mean(surface));
+    let [u, v, bicubic] = PAPER.map(|row| mean(row.surface));
     Some([u?, v?, bicubic?])
 }
 
-/// Table 1. `operations`: counted in our core, row by row; `cycles`: of our core on the Cortex-M4F.
+/// The items of a row of the table: its operations.
+fn operation_items(row: usize, name: &str, ours: Option<Operations>) -> Vec<Item> {
+    let paper = PAPER[row];
+    let item = |operation: &str, printed: u32, ours: Option<u32>, note: &str| Item {
+        part: "Table 1",
+        what: format!("{name}: {operation}"),
+        unit: "",
+        decimals: 0,
+        printed: Some(printed.into()),
+        ours: ours.map(f64::from),
+        note: note.into(),
+    };
+    let printed = paper.operations.to_array();
+    let mut items: Vec<Item> = (0..OPERATIONS.len())
+        .map(|k| {
+            let ours = ours.map(|ours| ours.to_array()[k]);
+            let note = if ours.is_some() {
+                OPERATIONS_NOTE
+            } else {
+                UNMEASURED
+            };
+            item(OPERATIONS[k], printed[k], ours, note)
+        })
+        .collect();
+    let note = "ours are polynomials, counted as additions and multiplications";
+    items.push(item("sines, cosines", paper.sines, None, note));
+    items
+}
+
+/// Note of an item without our figure.
+const UNMEASURED: &str = "ours is not measured: cargo sim budget --bless writes it";
+
+/// The items of Table 1, with our columns.
 #[must_use]
-pub fn items(operations: Option<&[Operations; 3]>, cycles: Option<&Cycles>) -> Vec<Item> {
+pub fn items(ours: &Ours) -> Vec<Item> {
     let mut items = Vec::new();
-    let rows = PRINTED.into_iter().zip(operations::PAPER);
-    for (index, ((what, microseconds), (_, printed))) in rows.enumerate() {
-        let ours = operations.and_then(|rows| rows.get(index)).map(|row| named(*row));
-        for (k, (operation, count)) in named(printed).into_iter().enumerate() {
-            items.push(Item {
-                part: "Table 1",
-                what: format!("{what}: {operation}"),
-                unit: "",
-                decimals: 0,
-                printed: Some(count.into()),
-                ours: ours.and_then(|row| row.get(k).map(|(_, count)| f64::from(*count))),
-                note: if ours.is_some() {
-                    ""
-                } else {
-                    "ours are counted on the sample jobs of a checkout"
-                }
-                .into(),
-            });
-        }
-        let ours = cycles.and_then(|rows| rows.get(index)).copied();
-        let unmeasured = "ours is not measured: cargo sim budget --bless writes it";
-        items.push(Item {
+    for (row, (name, microseconds)) in PRINTED.into_iter().enumerate() {
+        items.extend(operation_items(row, name, ours.operations.map(|rows| rows[row])));
+        let cycles = ours.cycles.map(|rows| rows[row]);
+        let item = |what: &str, unit, decimals, printed, ours: Option<f64>, note: &str| Item {
             part: "Table 1",
-            what: format!("{what}: cycles of steps 2 to 4"),
-            unit: "",
-            decimals: 0,
-            printed: Some(microseconds * PAPER_MHZ),
+            what: format!("{name}: {what}"),
+            unit,
+            decimals,
+            printed: Some(printed),
             ours,
-            note: if ours.is_some() {
-                "printed: its microseconds times 66 MHz; ours: mean, by the model of a Cortex-M4F (cargo sim budget), third \
-                 order, with every check"
-                    .into()
-            } else {
-                unmeasured.into()
-            },
-        });
-        items.push(Item {
-            part: "Table 1",
-            what: format!("{what}: time of steps 2 to 4"),
-            unit: "µs",
-            decimals: 2,
-            printed: Some(microseconds),
-            ours: ours.map(|cycles| cycles / BOARD_MHZ),
-            note: if ours.is_some() {
-                "a 486 at 66 MHz against a Cortex-M4F at 168 MHz".into()
-            } else {
-                unmeasured.into()
-            },
-        });
+            note: if ours.is_some() { note } else { UNMEASURED }.into(),
+        };
+        items.push(item(
+            "cycles of steps 2 to 4",
+            "",
+            0,
+            microseconds * PAPER_MHZ,
+            cycles,
+            "printed: its microseconds times 66 MHz; ours: mean, by the model of a Cortex-M4F (cargo sim budget), third \
+             order, with every check",
+        ));
+        items.push(item(
+            "time of steps 2 to 4",
+            "µs",
+            2,
+            microseconds,
+            cycles.map(|cycles| cycles / BOARD_MHZ),
+            "a 486 at 66 MHz against a Cortex-M4F at 168 MHz",
+        ));
     }
     items
 }

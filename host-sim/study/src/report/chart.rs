@@ -1,5 +1,4 @@
-//! Charts of lines over two axes, as SVG to stand in the page. Each colour here is one of the page's style sheet, which
-//! swaps it for its fellow on a dark page.
+//! Line charts as inline SVG. Each colour is one of the page's style sheet, which replaces it in dark mode.
 
 use std::io;
 
@@ -7,26 +6,26 @@ use plotters::prelude::*;
 
 use ::report::svg::simplified;
 
-/// Of the cutter contact, and of what is bounded from above.
+/// Colour of the cutter contact, and of bounds.
 pub(super) const WARM: RGBColor = RGBColor(0xd5, 0x5e, 0x00);
-/// Of the tool centre; the style sheet dashes it.
+/// Colour of the tool centre, dashed by the style sheet.
 pub(super) const VIOLET: RGBColor = RGBColor(0x6f, 0x2d, 0xa8);
-/// Of the curve interpolator; the style sheet dots it.
+/// Colour of the curve interpolator, dotted by the style sheet.
 pub(super) const GREEN: RGBColor = RGBColor(0x00, 0x7a, 0x5a);
-/// Of the passes, and of the surface interpolator.
+/// Colour of the passes, and of the surface interpolator.
 pub(super) const BLUE: RGBColor = RGBColor(0x0a, 0x4f, 0x94);
-/// Lines may leave their points by this much, pixels.
+/// Tolerance of the simplification of lines, pixels.
 const TOLERANCE: f64 = 0.1;
 const BAND: RGBColor = RGBColor(0xc9, 0xdc, 0xf0);
 pub(super) const INK: RGBColor = RGBColor(0x1c, 0x27, 0x33);
 pub(super) const AXIS: RGBColor = RGBColor(0x80, 0x8c, 0x99);
 pub(super) const GRID: RGBColor = RGBColor(0xe2, 0xe7, 0xec);
 
-/// Units a pixel: the library draws on whole units only, which would show as steps in a gentle slope.
+/// Drawing units of a pixel: the library rounds to whole units, which would show as steps in a gentle slope.
 pub(super) const FINE: u32 = 8;
-/// Pixels.
+/// Default size of a chart, pixels.
 pub(super) const SIZE: (u32, u32) = (900, 340);
-/// Room left above the highest value, as a share of it.
+/// Margin above the greatest value, as a share of it.
 const HEADROOM: f64 = 0.15;
 
 /// A line of a chart.
@@ -43,19 +42,19 @@ pub(super) struct Chart<'a> {
     pub(super) series: Vec<Series>,
     /// Whether the area between the first two series is shaded.
     pub(super) band: bool,
-    /// Points to be marked: with a colour each.
+    /// Marked points with their colours.
     pub(super) marks: Vec<(RGBColor, [f64; 2])>,
-    /// Ranges of x and y instead of those that the series need.
+    /// Ranges of x and y instead of those of the series.
     pub(super) ranges: [Option<[f64; 2]>; 2],
-    /// Pixels, if not the usual.
+    /// Height, pixels, instead of the default.
     pub(super) height: Option<u32>,
 }
 
 impl Chart<'_> {
-    /// The chart as an SVG element; nothing if there is nothing to show.
+    /// The chart as an SVG element; `None` without points.
     ///
     /// # Errors
-    /// The chart library's, which writing into memory does not cause.
+    /// Those of the chart library, which writing into memory does not cause.
     pub(super) fn svg(&self) -> io::Result<Option<String>> {
         let points = || self.series.iter().flat_map(|series| &series.points);
         let fold =
@@ -131,7 +130,7 @@ impl Chart<'_> {
     }
 }
 
-/// A label of an axis: as many digits as it takes, without the noise of binary fractions.
+/// Label of an axis: shortest decimal at seven significant digits.
 pub(super) fn short(value: f64) -> String {
     let rounded: f64 = format!("{value:.6e}").parse().unwrap_or(value);
     format!("{}", if rounded == 0.0 { 0.0 } else { rounded })

@@ -1,4 +1,4 @@
-//! Figures 3, 4, 5, 7, 8, 9, and one of all approaches.
+//! Figures 3, 4, 5, 7, 8, 9, and a comparison of the approaches.
 
 use std::fmt::Write;
 use std::io;
@@ -6,7 +6,7 @@ use std::path::Path;
 
 use super::chart::{BLUE, Chart, GREEN, Series, VIOLET, WARM};
 use super::legend;
-use crate::paper::figures::Track;
+use crate::paper::figures::SpeedTrack;
 use crate::paper::{Comparison, Study};
 use approach::Kind;
 use verify::speeds::PeriodSpeed;
@@ -14,7 +14,7 @@ use verify::speeds::PeriodSpeed;
 /// Ranges of the section: millimetres, the same scale both ways in a chart of this height.
 const SECTION: [[f64; 2]; 2] = [[10.0, 97.0], [15.0, 65.0]];
 const SECTION_HEIGHT: u32 = 520;
-/// Range of the speeds, mm/s, one for all so that the figures compare.
+/// Common range of the speeds, mm/s.
 const SPEEDS: [f64; 2] = [4.0, 16.0];
 /// Range of the deviations from the feed, %.
 const DEVIATIONS: [f64; 2] = [-8.0, 8.0];
@@ -25,8 +25,8 @@ const SPEED: &str = "speed, mm/s";
 /// All figures.
 pub(super) fn figures(out: &mut String, study: &Study) -> io::Result<()> {
     out.push_str(
-        "<section><h2>The figures</h2>\n<p>All of one pass along u of Example 1's bell, r = 10 mm, wanted feed 10 mm/s, unless they say \
-         otherwise. CC is the cutter's contact on the surface, CL the centre of the ball.</p>\n",
+        "<section><h2>The figures</h2>\n<p>One pass along u of Example 1's bell, r = 10 mm, feed 10 mm/s, unless stated \
+         otherwise. CC is the cutter contact on the surface, CL the centre of the ball.</p>\n",
     );
     figure_3(out, study)?;
     speeds(out, study)?;
@@ -50,7 +50,7 @@ const CONTACT_AND_CENTRE: [(&str, &str); 2] = [
     ("violet dashed", "tool centre (CL)"),
 ];
 
-/// The paths, and the surface.
+/// The paths of contact and centre.
 fn figure_3(out: &mut String, study: &Study) -> io::Result<()> {
     let section = &study.figures.section;
     legend(out, &CONTACT_AND_CENTRE);
@@ -73,14 +73,14 @@ fn figure_3(out: &mut String, study: &Study) -> io::Result<()> {
         &chart,
         &format!(
             "<b>Figure 3.</b> The profile that is turned about the axis, and the path of the tool's centre over it. Near the axis the \
-             surface bends away from the tool, and the centre has the longer way; near the rim it bends towards it. The paths are \
+             surface is convex, and the path of the centre is longer; near the rim it is concave. The paths are \
              {contact:.2} and {centre:.2} mm long."
         ),
     )
 }
 
 /// Speeds of contact and centre of a track.
-fn of_track(track: &Track) -> Vec<Series> {
+fn of_track(track: &SpeedTrack) -> Vec<Series> {
     let pick = |of: fn(&PeriodSpeed) -> f64| track.speeds.iter().map(|at| [at.arc_mm, of(at)]).collect();
     vec![
         Series {
@@ -94,7 +94,7 @@ fn of_track(track: &Track) -> Vec<Series> {
     ]
 }
 
-/// A chart of speeds with its legend; on stairs the centre's line is not dashed.
+/// Writes a chart of speeds with its legend; a stepped line of the centre is not dashed.
 fn put_speeds(out: &mut String, class: &str, chart: &Chart<'_>, caption: &str) -> io::Result<()> {
     let centre = if class.is_empty() {
         "violet dashed"
@@ -126,14 +126,14 @@ fn speeds(out: &mut String, study: &Study) -> io::Result<()> {
         .fold([f64::INFINITY, 0.0_f64], |[low, high], [_, speed]| {
             [low.min(*speed), high.max(*speed)]
         });
-    let segments = |track: &Track| track.measured.planned.segments;
+    let segments = |track: &SpeedTrack| track.measured.planned.segments;
     put_speeds(
         out,
         "",
         &of(&figures.constant_cl),
         &format!(
-            "<b>Figure 4.</b> Existing practice. The centre runs at a constant {:.0} mm/s; the contact crawls at {:.2} where the surface \
-             bends away from the tool and races at {:.2} where it bends towards it.",
+            "<b>Figure 4.</b> Existing practice. The centre moves at a constant {:.0} mm/s, the contact at {:.2} where the surface \
+             is convex and at {:.2} where it is concave.",
             figures.constant_cl.measured.findings.speeds.cl.mean(),
             slow.min,
             slow.max
@@ -148,7 +148,7 @@ fn speeds(out: &mut String, study: &Study) -> io::Result<()> {
         "",
         &chart(vec![wanted], Vec::new()),
         &format!(
-            "<b>Figure 5.</b> The speed that the centre would have to have for the contact to run at a constant {feed} mm/s: {:.2} to {:.2}.",
+            "<b>Figure 5.</b> The speed of the centre that moves the contact at a constant {feed} mm/s: {:.2} to {:.2}.",
             wanted_ends[0], wanted_ends[1]
         ),
     )?;
@@ -157,9 +157,9 @@ fn speeds(out: &mut String, study: &Study) -> io::Result<()> {
         " steps",
         &of(&figures.linear_printed),
         &format!(
-            "<b>Figure 7.</b> Method 1, linear interpolator, the {} segments of eqn 6, sampled each {} ms. Each segment has one speed \
-             (the stairs of the centre), the contact ripples about the feed. The flaw in the middle is the one segment that steps over \
-             the inflection; the drop at the end is what is left for the last one.",
+            "<b>Figure 7.</b> Method 1, linear interpolator, the {} segments of eqn 6, sampled each {} ms. The speed of the centre is constant on \
+             each segment, that of the contact deviates from the feed. The peak in the middle is the segment that spans \
+             the inflection; the drop at the end is the shorter last segment.",
             segments(&figures.linear_printed),
             figures.linear_printed.period_us * 1e-3
         ),
@@ -169,7 +169,7 @@ fn speeds(out: &mut String, study: &Study) -> io::Result<()> {
         " steps",
         &of(&figures.linear_held),
         &format!(
-            "<b>Figure 7, with segments that hold the tolerance.</b> The same with {} segments whose error is measured, not estimated.",
+            "<b>Figure 7, with segments within the tolerance.</b> Figure 7 with {} segments whose error is measured, not estimated.",
             segments(&figures.linear_held)
         ),
     )?;
@@ -189,15 +189,15 @@ fn speeds(out: &mut String, study: &Study) -> io::Result<()> {
         "",
         &of(&figures.surface),
         "<b>Figure 9.</b> Method 3, surface interpolator, as the core runs it each millisecond. The contact keeps the feed; the speed of the \
-         centre follows of itself.",
+         centre follows from it.",
     )
 }
 
-/// What is left of the ripple, for the methods that care.
+/// Deviation from the feed of the methods that control the contact's speed.
 fn deviations(out: &mut String, study: &Study) -> io::Result<()> {
     let figures = &study.figures;
     let feed = study.cases.revolved.job.feed_mm_s();
-    let series = |track: &Track, colour| Series {
+    let series = |track: &SpeedTrack, colour| Series {
         colour,
         points: track
             .speeds
@@ -205,7 +205,7 @@ fn deviations(out: &mut String, study: &Study) -> io::Result<()> {
             .map(|at| [at.arc_mm, 100.0 * (at.cc_mm_s / feed - 1.0)])
             .collect(),
     };
-    let segments = |track: &Track| track.measured.planned.segments;
+    let segments = |track: &SpeedTrack| track.measured.planned.segments;
     let linear = format!("linear, 1 ms, {} segments", segments(&figures.linear_1_ms));
     let curve = format!("curve, {} cubics", segments(&figures.curve));
     let slow = figures.constant_cl.measured.findings.speeds.cc;
@@ -233,8 +233,8 @@ fn deviations(out: &mut String, study: &Study) -> io::Result<()> {
         " steps broken",
         &chart,
         &format!(
-            "<b>Side by side.</b> Speed of the contact against the wanted feed, at a period of 1 ms. Constant speed of the centre, Figure 4, \
-             would lie between −{:.0} and +{:.0} %, far outside.",
+            "<b>Side by side.</b> Deviation of the contact's speed from the feed, period 1 ms. Constant speed of the centre, Figure 4, \
+             deviates by −{:.0} to +{:.0} %, outside the chart.",
             100.0 * (1.0 - slow.min / feed),
             100.0 * (slow.max / feed - 1.0)
         ),
@@ -243,10 +243,10 @@ fn deviations(out: &mut String, study: &Study) -> io::Result<()> {
 
 /// The surfaces with their passes.
 fn pictures(out: &mut String, study: &Study) -> io::Result<()> {
-    out.push_str("<section><h2>The surfaces and their passes</h2>\n<p>As the core cuts them; the first belongs to Figure 3.</p>\n");
+    out.push_str("<section><h2>The surfaces and their passes</h2>\n<p>Passes of the core; the first picture belongs to Figure 3.</p>\n");
     for (index, comparison) in study.comparisons.iter().enumerate() {
         if let Some(picture) = picture(comparison)? {
-            // Each picture's names are its own on a page of several.
+            // Identifiers must be unique on the page.
             let picture = picture
                 .replace("iso-title", &format!("iso-title-{index}"))
                 .replace("iso-desc", &format!("iso-desc-{index}"))

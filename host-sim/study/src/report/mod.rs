@@ -1,10 +1,10 @@
-//! The page of `cargo sim paper`: a replication report that needs nothing but itself.
+//! The page of `cargo sim paper`: a self-contained replication report.
 
 mod chart;
 mod figures;
 mod scatter;
 mod tables;
-mod words;
+mod text;
 
 use std::fmt::Write;
 use std::io;
@@ -12,14 +12,14 @@ use std::path::{Path, PathBuf};
 
 use serde_json::{Value, json};
 
-use crate::paper::figures::Track;
+use crate::paper::figures::SpeedTrack;
 use crate::paper::{Figures, Study};
 use ::report::number::fixed;
 use ::report::page::STYLE;
 
 const PAPER_STYLE: &str = include_str!("paper.css");
 
-/// A number as tables show it.
+/// Formats a number for a table.
 #[must_use]
 pub fn number(value: f64, decimals: usize) -> String {
     if decimals == 0 && (value - value.round()).abs() > 1e-9 {
@@ -29,7 +29,7 @@ pub fn number(value: f64, decimals: usize) -> String {
     }
 }
 
-/// A ripple, from tens of per cent to millionths.
+/// Formats a ripple with decimals by its magnitude.
 #[must_use]
 pub fn percent(value: f64) -> String {
     let decimals = if value >= 0.1 {
@@ -42,7 +42,7 @@ pub fn percent(value: f64) -> String {
     format!("{value:.decimals$}")
 }
 
-/// A number in a page, its thousands apart.
+/// Formats a number for the page, with separated thousands.
 fn shown(value: f64, decimals: usize) -> String {
     if decimals == 0 && (value - value.round()).abs() > 1e-9 {
         fixed(value, 2)
@@ -51,7 +51,7 @@ fn shown(value: f64, decimals: usize) -> String {
     }
 }
 
-/// Writes `index.html` and `figures.json` into a folder that is there, and returns the page's path.
+/// Writes `index.html` and `figures.json` into an existing folder, and returns the page's path.
 ///
 /// # Errors
 /// The files cannot be written.
@@ -65,7 +65,7 @@ pub fn write(folder: &Path, study: &Study) -> io::Result<PathBuf> {
 /// The whole page.
 ///
 /// # Errors
-/// The chart library's, which writing into memory does not cause.
+/// Those of the chart library, which writing into memory does not cause.
 pub fn page(study: &Study) -> io::Result<String> {
     let mut out = format!(
         "<!DOCTYPE html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\"/>\n\
@@ -73,20 +73,20 @@ pub fn page(study: &Study) -> io::Result<String> {
          <meta name=\"color-scheme\" content=\"light dark\"/>\n<title>Lo (1998), reproduced</title>\n\
          <style>\n{STYLE}{PAPER_STYLE}</style>\n</head>\n<body>\n<main>\n"
     );
-    words::opening(&mut out, study);
+    text::opening(&mut out, study);
     tables::comparisons(&mut out, study);
-    words::disagreements(&mut out, study);
+    text::disagreements(&mut out, study);
     figures::figures(&mut out, study)?;
     scatter::section(&mut out, study)?;
     tables::items(&mut out, study);
-    words::closing(&mut out);
+    text::closing(&mut out);
     let _ = writeln!(out, "</main>\n</body>\n</html>");
     Ok(out)
 }
 
 /// The figures' data.
 fn data(figures: &Figures) -> Value {
-    let track = |track: &Track| {
+    let track = |track: &SpeedTrack| {
         let column =
             |of: fn(&verify::speeds::PeriodSpeed) -> f64| track.speeds.iter().map(of).collect::<Vec<_>>();
         json!({
@@ -112,7 +112,7 @@ fn data(figures: &Figures) -> Value {
     })
 }
 
-/// The key of a figure: a class of the style sheet and what it stands for.
+/// Writes the key of a figure: classes of the style sheet with their meaning.
 fn legend(out: &mut String, entries: &[(&str, &str)]) {
     out.push_str("<p class=\"legend\">");
     for (class, what) in entries {

@@ -13,18 +13,18 @@ use approach::Kind;
 /// Ranges, both logarithmic: bytes, and % of the feed.
 const BYTES: [f64; 2] = [20.0, 3e6];
 const RIPPLE: [f64; 2] = [3e-6, 300.0];
-/// Pixels.
+/// Height of the chart, and size of a mark, pixels.
 const HEIGHT: u32 = 460;
 const MARK: i32 = 7;
-/// From a mark to its label, right and up.
-const BESIDE: i32 = 9;
+/// Offset of a label from its mark, right and up, pixels.
+const LABEL_OFFSET: i32 = 9;
 /// Labels of the jobs, in the study's order.
 const NAMES: [&str; 3] = ["1", "2", "F"];
 
 type Area<'a, 'b> = ChartContext<'a, SVGBackend<'b>, Cartesian2d<LogCoord<f64>, LogCoord<f64>>>;
 
 /// Colour, class of the colour in the style sheet, and shape of an approach.
-fn look(kind: Kind) -> (RGBColor, &'static str, char) {
+fn style(kind: Kind) -> (RGBColor, &'static str, char) {
     match kind {
         Kind::ConstantCl => (WARM, "warm", '✕'),
         Kind::Linear => (VIOLET, "violet", '■'),
@@ -39,7 +39,7 @@ pub(super) fn section(out: &mut String, study: &Study) -> io::Result<()> {
     draw(&mut svg, study).map_err(|error| io::Error::other(error.to_string()))?;
     out.push_str("<section><h2>Data against ripple</h2>\n<p class=\"legend\">");
     for kind in Kind::ALL {
-        let (_, class, shape) = look(kind);
+        let (_, class, shape) = style(kind);
         let _ = write!(
             out,
             "<span><b class=\"{class}\">{shape}</b>{}</span>",
@@ -48,8 +48,8 @@ pub(super) fn section(out: &mut String, study: &Study) -> io::Result<()> {
     }
     let _ = writeln!(
         out,
-        "</p>\n<figure class=\"chart\">{svg}</figure>\n<p class=\"caption\">What the CNC has to be fed for the whole job, and how far the \
-         contact's speed is off at worst, at 1 ms; both axes are logarithmic, best is bottom left. 1: Example 1; 2: Example 2, \
+        "</p>\n<figure class=\"chart\">{svg}</figure>\n<p class=\"caption\">Size of the program for the whole job against the \
+         greatest deviation of the contact's speed, period 1 ms; both axes are logarithmic. 1: Example 1; 2: Example 2, \
          reconstructed; F: the freeform shell.</p></section>"
     );
     Ok(())
@@ -90,7 +90,11 @@ fn draw(text: &mut String, study: &Study) -> Result<(), Box<dyn std::error::Erro
                 mark(&mut chart, kind, place)?;
                 let name = NAMES.get(index).copied().unwrap_or("?");
                 let label = EmptyElement::at(place)
-                    + Text::new(name, (BESIDE * FINE as i32, -BESIDE * FINE as i32), font(15));
+                    + Text::new(
+                        name,
+                        (LABEL_OFFSET * FINE as i32, -LABEL_OFFSET * FINE as i32),
+                        font(15),
+                    );
                 chart.draw_series([label])?;
             }
         }
@@ -101,7 +105,7 @@ fn draw(text: &mut String, study: &Study) -> Result<(), Box<dyn std::error::Erro
 
 /// One point, its shape by the approach.
 fn mark(chart: &mut Area<'_, '_>, kind: Kind, place: (f64, f64)) -> Result<(), Box<dyn std::error::Error>> {
-    let (colour, ..) = look(kind);
+    let (colour, ..) = style(kind);
     let size = MARK * FINE as i32;
     match kind {
         Kind::ConstantCl => {
@@ -122,7 +126,7 @@ fn mark(chart: &mut Area<'_, '_>, kind: Kind, place: (f64, f64)) -> Result<(), B
     Ok(())
 }
 
-/// A label without needless zeros.
+/// Label of a power of ten, without trailing zeros.
 fn decimal(value: f64) -> String {
     let exponent = value.log10().round() as i32;
     match exponent {

@@ -13,7 +13,7 @@ use verify::speeds::SpeedRange;
 pub(super) fn comparisons(out: &mut String, study: &Study) {
     out.push_str(
         "<section><h2>Four approaches on whole jobs</h2>\n\
-         <p>Each job at the same scallop height, tolerance and feed for all. A period is 1 ms where none is named. The times leave out \
+         <p>Each job at the same scallop height, tolerance and feed for all. The period is 1 ms unless stated. Times exclude \
          links between passes.</p>\n",
     );
     for comparison in &study.comparisons {
@@ -64,7 +64,7 @@ fn table(out: &mut String, comparison: &Comparison) {
     out.push_str("</tbody></table></div>\n");
 }
 
-/// Every number of the paper, part by part.
+/// All numbers of the paper by its parts.
 pub(super) fn items(out: &mut String, study: &Study) {
     out.push_str(
         "<section><h2>Every number</h2>\n<p>Printed in the paper, and ours; no difference where the paper prints none.</p>\n",
@@ -106,7 +106,7 @@ fn row(out: &mut String, item: &Item) {
         "<tr><th scope=\"row\">{}{unit}</th><td>{}</td><td>{}</td><td>{difference}</td><td class=\"note\">{}</td></tr>",
         escape(&item.what),
         value(item.printed, ""),
-        value(item.ours, "not yet"),
+        value(item.ours, ""),
         escape(&item.note)
     );
 }

@@ -1,4 +1,4 @@
-//! One QEMU with the plugin for many jobs: runs them, and finds the worst tick of each.
+//! A session with the firmware in QEMU under the plugin: runs any number of jobs, and finds the worst-case tick of each.
 
 use std::fs::File;
 use std::io::Read;
@@ -12,77 +12,77 @@ use interp_core::{FaultKind, State};
 use protocol::message::{Clock, Configuration, FaultReport, Report, Request, Status};
 
 use super::BudgetError;
-use super::figures::{Model, whole};
-use super::measure::{Bench, yields_sample};
+use super::figures::{Model, tick_cycles};
+use super::measure::{MeasurementSetup, yields_sample};
 use machine::prepare::Prepared;
 use machine::remote::operate::{self, Setup};
 use machine::remote::qemu::Qemu;
 use machine::remote::session::Event;
 use machine::remote::{RemoteError, Session, drive};
 
-/// Ticks of a run that are tried with all that can come together.
-const TRIED: usize = 2;
+/// Number of a run's costliest ticks that are repeated with coincident events.
+const REPEATED_TICKS: usize = 2;
 
-/// Ticks that a stop is waited for at a time, and how often: ten minutes of it.
+/// Ticks of one wait for a stop, and the number of waits: ten minutes of machine time.
 const STOP_TICKS: u32 = 10_000;
-const SETTLE_ROUNDS: u32 = 60;
+const STOP_WAITS: u32 = 60;
 
-/// Periods in which an operator disturbs a run, those between two commands at most, and the seed of what comes when.
-const DISTURBED_TICKS: u32 = 4500;
+/// Ticks with random operator commands, the most between two commands, and the seed of the commands.
+const OPERATOR_TICKS: u32 = 4500;
 const PAUSE_MAX: u32 = 24;
-const DISTURBED_SEED: u64 = 7;
+const OPERATOR_SEED: u64 = 7;
 
-/// Periods after a start that are left alone: the first pass is looked over.
-const WAIT_TICKS: u32 = 3000;
+/// Ticks without commands after a start: the look-ahead of the first pass.
+const LOOK_AHEAD_TICKS: u32 = 3000;
 
-/// QEMU, the line to the board in it, and what the plugin writes.
-pub struct Lab {
+/// QEMU, the connection to the board in it, and the plugin's records.
+pub struct MeasurementSession {
     session: Session,
     records: File,
-    /// A record that has been written in part.
+    /// The bytes of an incomplete record.
     rest: Vec<u8>,
     stack_end: u32,
     stack_low: u32,
-    /// Cycles of everything else in the cheapest tick so far.
+    /// Least cycles of [`Stage::Rest`] in a tick so far.
     idle: Option<Cycles>,
     _qemu: Qemu,
     _folder: tempfile::TempDir,
 }
 
-/// What the ticks of a run took.
+/// The records of a run.
 #[derive(Clone, Debug, Default)]
-pub struct Run {
-    /// Every tick from the start to the end, those included in which no time passed.
+pub struct RunRecords {
+    /// Every tick from the start to the end, including those in which no time passes.
     pub records: Vec<Record>,
-    /// Samples that the board made.
+    /// Samples of the run.
     pub samples: u32,
-    /// The fault that ended it.
+    /// Name of the fault that ended it.
     pub fault: Option<&'static str>,
 }
 
-/// The worst tick of a run.
+/// The worst-case tick of a run.
 #[derive(Clone, Debug, Default, PartialEq)]
-pub struct Worst {
-    /// What it took.
+pub struct WorstTick {
+    /// Its record.
     pub record: Record,
-    /// Samples before it: the number of the tick.
+    /// Index: the number of samples before it.
     pub tick: u32,
-    /// What happened in it.
+    /// Events in it.
     pub events: Vec<&'static str>,
 }
 
-impl Run {
-    /// Most cycles of a tick.
+impl RunRecords {
+    /// Greatest number of cycles of a tick, pessimistic model.
     #[must_use]
-    pub fn most(&self) -> u32 {
+    pub fn cycles_max(&self) -> u32 {
         let cycles = self
             .records
             .iter()
-            .map(|record| whole(record, Model::Pessimistic));
+            .map(|record| tick_cycles(record, Model::Pessimistic));
         cycles.max().unwrap_or(0)
     }
 
-    /// Each tick with the samples before it.
+    /// Each tick with its index.
     fn numbered(&self) -> Vec<(u32, Record)> {
         let mut samples = 0;
         self.records
@@ -96,7 +96,7 @@ impl Run {
     }
 }
 
-/// Name of a fault; the board's may be of another version.
+/// Name of a fault; a fault of another version has none.
 fn fault_name(fault: &FaultReport) -> &'static str {
     fault.kind().map_or("a fault", FaultKind::name)
 }
@@ -105,8 +105,8 @@ fn has_limits(job: &Prepared) -> bool {
     job.header.axes.is_some()
 }
 
-/// What an operator may do next.
-fn operators(random: &mut Rng, state: State) -> Request {
+/// A random request of an operator in this state.
+fn operator_request(random: &mut Rng, state: State) -> Request {
     if !state.is_under_way() {
         return match state {
             State::Faulted => Request::Abort,
@@ -116,7 +116,7 @@ fn operators(random: &mut Rng, state: State) -> Request {
     match random.u8(..=u8::MAX) {
         0..64 => Request::Hold,
         64..152 => Request::Resume,
-        // Seldom: what follows is looked over anew.
+        // Rare: the look-ahead starts again after it.
         152 => Request::Stop,
         153 => Request::Abort,
         _ => Request::Override {
@@ -129,24 +129,24 @@ fn file_error(path: &Path, error: &std::io::Error) -> BudgetError {
     BudgetError::File(path.into(), error.to_string())
 }
 
-impl Lab {
+impl MeasurementSession {
     /// Starts QEMU.
     ///
     /// # Errors
     /// It does not start, or the board does not answer.
-    pub fn new(bench: &Bench) -> Result<Self, BudgetError> {
+    pub fn new(setup: &MeasurementSetup) -> Result<Self, BudgetError> {
         let here = Path::new("a temporary file");
         let folder = tempfile::tempdir().map_err(|error| file_error(here, &error))?;
-        let (arguments, records) = bench.plugin(folder.path())?;
-        let (qemu, stream) = Qemu::start_with(bench.image(), &arguments)?;
+        let (arguments, records) = setup.plugin(folder.path())?;
+        let (qemu, stream) = Qemu::start_with(setup.image(), &arguments)?;
         let mut session = Session::open(stream, 1)?;
         operate::make_ready(&mut session, &Setup::simulated(Configuration::DEFAULT))?;
         Ok(Self {
             session,
             records: File::open(&records).map_err(|error| file_error(&records, &error))?,
             rest: Vec::new(),
-            stack_end: bench.stack_end(),
-            stack_low: bench.stack_end(),
+            stack_end: setup.stack_end(),
+            stack_low: setup.stack_end(),
             idle: None,
             _qemu: qemu,
             _folder: folder,
@@ -159,8 +159,8 @@ impl Lab {
         self.stack_end.saturating_sub(self.stack_low)
     }
 
-    /// The records since the last call.
-    fn take(&mut self) -> Result<Vec<Record>, BudgetError> {
+    /// Reads the records since the last call.
+    fn read_records(&mut self) -> Result<Vec<Record>, BudgetError> {
         let here = Path::new("the plugin's records");
         self.records
             .read_to_end(&mut self.rest)
@@ -178,9 +178,9 @@ impl Lab {
         Ok(records)
     }
 
-    /// What it takes to obey a command: the dearest of the ticks before the first with a sample, over the cheapest tick that there was. In
-    /// lockstep no period passes in a tick with a command; on the board's own clock one does.
-    fn obeying(&mut self, records: &[Record]) -> Cycles {
+    /// Cycles that a command costs: those of the worst-case tick before the first sample, less those of the cheapest idle tick. In
+    /// lockstep no period passes in a tick with a command; with the board's own clock a period does.
+    fn command_cycles(&mut self, records: &[Record]) -> Cycles {
         let rest = |record: &Record| record.stages[Stage::Rest as usize];
         let Some(first) = records.iter().position(yields_sample) else {
             return Cycles::default();
@@ -208,8 +208,8 @@ impl Lab {
         Ok(())
     }
 
-    /// Sends a request, and says whether the board took it: some states refuse it.
-    fn is_taken(&mut self, request: &Request) -> Result<bool, BudgetError> {
+    /// Sends a request; whether the board accepted it, which depends on its state.
+    fn try_command(&mut self, request: &Request) -> Result<bool, BudgetError> {
         match self.session.command(request) {
             Ok(()) => Ok(true),
             Err(RemoteError::Refused { .. }) => Ok(false),
@@ -217,8 +217,8 @@ impl Lab {
         }
     }
 
-    /// Lets so many periods pass, and waits for them.
-    fn pass(&mut self, ticks: u32) -> Result<Status, BudgetError> {
+    /// Runs `ticks` periods.
+    fn run_ticks(&mut self, ticks: u32) -> Result<Status, BudgetError> {
         self.session.command(&Request::Run { ticks })?;
         loop {
             if let Event::Halted(status) = self.session.event()? {
@@ -227,12 +227,11 @@ impl Lab {
         }
     }
 
-    /// Gives up what runs. On a machine with limits the tool slows down along its path first, and where a fault is behind that, the
-    /// fault is left to be acknowledged. Where the tool then is gets lost with the drives: each run begins at its job's home, and is
-    /// the same again.
-    fn settle(&mut self) -> Result<(), BudgetError> {
+    /// Aborts the run. On a machine with limits the tool first decelerates along its path, and a fault that stopped it has to be
+    /// acknowledged. Switching the drives off discards the position, so that each run begins at its job's home and is reproducible.
+    fn end_run(&mut self) -> Result<(), BudgetError> {
         let mut state = self.session.status()?.state;
-        for _ in 0..SETTLE_ROUNDS {
+        for _ in 0..STOP_WAITS {
             if matches!(state, State::Idle | State::Ready | State::Finished) {
                 return self.commands(&[
                     Request::Clock(Clock::Lockstep),
@@ -246,70 +245,73 @@ impl Lab {
                 self.session.command(&Request::Abort)?;
                 1
             };
-            state = self.pass(ticks)?.state;
+            state = self.run_ticks(ticks)?.state;
         }
         let what = format!("a run does not end: {}", state.name());
         Err(BudgetError::Figures(what))
     }
 
-    /// Loads a job, and runs its first ticks.
+    /// Loads a job and runs its first ticks.
     ///
     /// # Errors
-    /// The board refuses the job, the line breaks, or the records are not whole.
-    pub fn run(&mut self, job: &Prepared, ticks: u32) -> Result<Run, BudgetError> {
-        self.settle()?;
+    /// The board refuses the job, the connection breaks, or records are missing.
+    pub fn run(&mut self, job: &Prepared, ticks: u32) -> Result<RunRecords, BudgetError> {
+        self.end_run()?;
         drive::upload(&mut self.session, job, |_| {})?;
-        self.again(Report::Digests, ticks)
+        self.restart(Report::Digests, ticks)
     }
 
     /// Runs the first ticks of the loaded job.
-    fn again(&mut self, report: Report, ticks: u32) -> Result<Run, BudgetError> {
-        self.settle()?;
+    fn restart(&mut self, report: Report, ticks: u32) -> Result<RunRecords, BudgetError> {
+        self.end_run()?;
         self.commands(&[Request::Report(report)])?;
-        self.take()?;
+        self.read_records()?;
         self.commands(&[Request::Start])?;
-        let status = self.pass(ticks)?;
-        let records = self.take()?;
-        let run = Run {
+        let status = self.run_ticks(ticks)?;
+        let records = self.read_records()?;
+        let run = RunRecords {
             records,
             samples: status.samples,
             fault: status.fault.map(|fault| fault_name(&fault)),
         };
         let counted = run.records.iter().filter(|record| yields_sample(record)).count();
         if counted != run.samples as usize {
-            let what = format!("{counted} ticks with a sample, the board made {}", run.samples);
+            let what = format!(
+                "{counted} ticks with a sample, but the board reports {} samples",
+                run.samples
+            );
             return Err(BudgetError::Figures(what));
         }
         Ok(run)
     }
 
-    /// The worst tick of this job, of which this was a run and which is loaded: as it was in the run, with all that can come
-    /// together with it, or, with limits, while an operator does this and that.
+    /// The worst-case tick of the loaded job, given a run of it: as in the run, or repeated with coincident events, or, with limits,
+    /// under random commands of an operator.
     ///
     /// # Errors
     /// As [`Self::run`].
-    pub fn worst(&mut self, job: &Prepared, run: &Run) -> Result<Worst, BudgetError> {
+    pub fn worst_tick(&mut self, job: &Prepared, run: &RunRecords) -> Result<WorstTick, BudgetError> {
         let mut ticks = run.numbered();
-        let cycles = |record: &Record| whole(record, Model::Pessimistic);
+        let cycles = |record: &Record| tick_cycles(record, Model::Pessimistic);
         ticks.sort_by_key(|(_, record)| std::cmp::Reverse(cycles(record)));
-        let mut worst = Worst::default();
-        // With limits an operator's doings come on top, and each run takes long.
-        let tried = if has_limits(job) { 1 } else { TRIED };
-        for (tick, record) in ticks.iter().take(tried) {
-            let plain = Worst {
+        let mut worst = WorstTick::default();
+        // With limits a run takes long, and the operator's commands follow.
+        let repeated = if has_limits(job) { 1 } else { REPEATED_TICKS };
+        for (tick, record) in ticks.iter().take(repeated) {
+            let plain = WorstTick {
                 record: *record,
                 tick: *tick,
                 events: events(record, run, *tick),
             };
-            let crowded = self.crowded(job, *tick)?;
-            for found in [plain, crowded] {
+            let coincident = self.coincident(job, *tick)?;
+            for found in [plain, coincident] {
                 if cycles(&found.record) > cycles(&worst.record) {
                     worst = found;
                 }
             }
         }
         if has_limits(job) {
-            let found = self.disturbed()?;
+            let found = self.under_operator()?;
             if cycles(&found.record) > cycles(&worst.record) {
                 worst = found;
             }
@@ -317,41 +319,41 @@ impl Lab {
         Ok(worst)
     }
 
-    /// Runs the loaded job, which has limits, with an operator who holds, resumes, overrides, stops and aborts it at any moment; the
-    /// worst tick of that.
-    fn disturbed(&mut self) -> Result<Worst, BudgetError> {
-        let mut random = Rng::with_seed(DISTURBED_SEED);
-        self.settle()?;
+    /// Runs the loaded job, which has limits, under random commands of an operator: hold, resume, override, stop, abort. The
+    /// worst-case tick.
+    fn under_operator(&mut self) -> Result<WorstTick, BudgetError> {
+        let mut random = Rng::with_seed(OPERATOR_SEED);
+        self.end_run()?;
         self.commands(&[Request::Report(Report::Samples)])?;
-        self.take()?;
-        let mut worst = Worst::default();
+        self.read_records()?;
+        let mut worst = WorstTick::default();
         let (mut ticks, mut state) = (0, State::Ready);
-        while ticks < DISTURBED_TICKS {
-            let request = operators(&mut random, state);
+        while ticks < OPERATOR_TICKS {
+            let request = operator_request(&mut random, state);
             let starts = request == Request::Start;
-            // Where it is refused, it was about a state that is over.
-            self.is_taken(&request)?;
+            // A refused request was valid in an earlier state.
+            self.try_command(&request)?;
             let pause = random.u32(1..=PAUSE_MAX);
-            state = self.pass(pause)?.state;
+            state = self.run_ticks(pause)?.state;
             if starts {
-                // Its samples are of no use: what is reported takes as long as what is run.
+                // Reporting samples would take as long as the run.
                 self.commands(&[Request::Report(Report::Digests)])?;
-                state = self.pass(WAIT_TICKS)?.state;
-                ticks += WAIT_TICKS;
+                state = self.run_ticks(LOOK_AHEAD_TICKS)?.state;
+                ticks += LOOK_AHEAD_TICKS;
                 self.commands(&[Request::Report(Report::Samples)])?;
             }
-            let records = self.take()?;
-            let obeying = self.obeying(&records);
+            let records = self.read_records()?;
+            let command_cycles = self.command_cycles(&records);
             for (passed, record) in (0..).zip(records) {
-                let record = with_command(record, obeying);
-                let cycles = |record: &Record| whole(record, Model::Pessimistic);
+                let record = with_command(record, command_cycles);
+                let cycles = |record: &Record| tick_cycles(record, Model::Pessimistic);
                 if cycles(&record) > cycles(&worst.record) {
-                    let mut happened = events(&record, &Run::default(), 0);
-                    happened.push("an operator's doing");
-                    worst = Worst {
+                    let mut events = events(&record, &RunRecords::default(), 0);
+                    events.push("an operator's command");
+                    worst = WorstTick {
                         record,
                         tick: ticks + passed,
-                        events: happened,
+                        events,
                     };
                 }
             }
@@ -360,50 +362,50 @@ impl Lab {
         Ok(worst)
     }
 
-    /// Runs up to a tick, holds, and lets the tick come with a resume and a command. With limits a hold takes its
-    /// time: there the tick comes with the hold. Nothing where the run is over by then, or is stopping because of a fault.
-    fn crowded(&mut self, job: &Prepared, tick: u32) -> Result<Worst, BudgetError> {
+    /// Runs up to a tick, holds, and repeats the tick together with a resume and a command; with limits, where a hold takes many
+    /// ticks, together with the hold. Zero cycles if the run has ended by then or is stopping because of a fault.
+    fn coincident(&mut self, job: &Prepared, tick: u32) -> Result<WorstTick, BudgetError> {
         let limited = has_limits(job);
         if tick == 0 {
-            self.settle()?;
+            self.end_run()?;
         } else {
-            self.again(Report::Digests, tick)?;
+            self.restart(Report::Digests, tick)?;
             if !limited {
                 self.commands(&[Request::Report(Report::Samples)])?;
-                if !self.is_taken(&Request::Hold)? {
-                    return Ok(Worst::default());
+                if !self.try_command(&Request::Hold)? {
+                    return Ok(WorstTick::default());
                 }
-                self.pass(1)?;
+                self.run_ticks(1)?;
             }
         }
-        self.take()?;
+        self.read_records()?;
         let (begin, name) = match tick {
             0 => (Request::Start, "the start"),
             _ if limited => (Request::Hold, "a hold"),
             _ => (Request::Resume, "a resume from a hold"),
         };
         self.commands(&[Request::Report(Report::Samples)])?;
-        if !self.is_taken(&begin)? {
-            return Ok(Worst::default());
+        if !self.try_command(&begin)? {
+            return Ok(WorstTick::default());
         }
-        let status = self.pass(1)?;
-        let records = self.take()?;
-        let run = Run {
+        let status = self.run_ticks(1)?;
+        let records = self.read_records()?;
+        let run = RunRecords {
             records,
             samples: 0,
             fault: status.fault.map(|fault| fault_name(&fault)),
         };
-        let obeying = self.obeying(&run.records);
+        let command_cycles = self.command_cycles(&run.records);
         let worst = run
             .records
             .iter()
-            .max_by_key(|record| whole(record, Model::Pessimistic))
+            .max_by_key(|record| tick_cycles(record, Model::Pessimistic))
             .copied()
             .unwrap_or_default();
-        let worst = with_command(worst, obeying);
+        let worst = with_command(worst, command_cycles);
         let mut events = events(&worst, &run, 0);
         events.extend([name, "a command"]);
-        Ok(Worst {
+        Ok(WorstTick {
             record: worst,
             tick,
             events,
@@ -411,16 +413,16 @@ impl Lab {
     }
 }
 
-/// A tick in which a command is obeyed, too.
-fn with_command(mut record: Record, obeying: Cycles) -> Record {
+/// The record of a tick that also executes a command.
+fn with_command(mut record: Record, command_cycles: Cycles) -> Record {
     let rest = &mut record.stages[Stage::Rest as usize];
-    rest.nominal += obeying.nominal;
-    rest.pessimistic += obeying.pessimistic;
+    rest.nominal += command_cycles.nominal;
+    rest.pessimistic += command_cycles.pessimistic;
     record
 }
 
-/// What happened in a tick.
-fn events(record: &Record, run: &Run, tick: u32) -> Vec<&'static str> {
+/// Events in a tick.
+fn events(record: &Record, run: &RunRecords, tick: u32) -> Vec<&'static str> {
     let mut events = Vec::new();
     let took = |stage: Stage| record.stages[stage as usize].nominal > 0;
     if took(Stage::PassChange) {

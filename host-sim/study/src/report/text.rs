@@ -1,4 +1,4 @@
-//! What the page says besides figures and tables.
+//! Text of the page.
 
 use std::fmt::Write;
 
@@ -6,8 +6,8 @@ use super::{percent, shown};
 use crate::paper::{Comparison, Study};
 use approach::Kind;
 
-/// Ripple, bytes and segments of one approach on one job, in words.
-fn told(comparison: &Comparison, kind: Kind) -> String {
+/// Ripple and bytes of an approach on a job, as text.
+fn ripple_and_bytes(comparison: &Comparison, kind: Kind) -> String {
     comparison.row(kind).map_or(String::new(), |row| {
         format!(
             "{} % with {} bytes",
@@ -34,31 +34,31 @@ pub(super) fn opening(out: &mut String, study: &Study) {
         "<h1>A new approach to CNC tool path generation, reproduced</h1>\n\
          <p>C.-C. Lo, Computer-Aided Design 30 (1998), against the code of this project.</p>\n\
          <p class=\"lead\">The paper's claim holds. A ball-end mill whose centre runs at a constant speed cuts Example 1's bell at \
-         {:.1} to {:.1} mm/s of a wanted 10; an interpolator that is given the surface instead of a path holds 10 mm/s within \
-         rounding, and needs no path at all.",
+         {:.1} to {:.1} mm/s instead of 10; an interpolator that receives the surface instead of a path holds 10 mm/s within \
+         rounding.",
         of("Example 1", "slowest contact at constant speed of the centre"),
         of("Example 1", "fastest contact at constant speed of the centre"),
     );
     if let Some(freeform) = study.comparisons.iter().find(|of| of.name == "freeform") {
         let _ = writeln!(
             out,
-            "On a freeform part that is not in the paper, at the same scallop height, tolerance and feed, the contact's speed is \
-             off by {} in straight segments, {} in cubics, and {} as a surface.",
-            told(freeform, Kind::Linear),
-            told(freeform, Kind::Curve),
-            told(freeform, Kind::Surface)
+            "On a freeform part that is not in the paper, at the same scallop height, tolerance and feed, the contact's speed \
+             deviates by {} with straight segments, {} with cubics, and {} with the surface.",
+            ripple_and_bytes(freeform, Kind::Linear),
+            ripple_and_bytes(freeform, Kind::Curve),
+            ripple_and_bytes(freeform, Kind::Surface)
         );
     }
     let _ = writeln!(
         out,
-        "</p>\n<p class=\"lead\">Of the paper's numbers, those of Examples 1, 4 and 5 come out to the last digit. Those of \
-         Example 2 do not belong to the surface that it prints, but to a simpler one. Its rule for the length of straight \
-         segments breaks its own tolerance {:.0} times over where the profile turns from convex to concave.</p>",
+        "</p>\n<p class=\"lead\">The numbers of Examples 1, 4 and 5 are reproduced to the last digit. Those of \
+         Example 2 do not belong to the printed surface, but to a simpler one. The paper's rule for the length of straight \
+         segments exceeds its own tolerance {:.0} times where the profile turns from convex to concave.</p>",
         of("Example 3", "chord error that eqn 6 leaves") / study.cases.revolved.job.chord_mm
     );
 }
 
-/// Where the paper contradicts itself, or is at odds with what it computes.
+/// Contradictions between the paper's equations and its results.
 pub(super) fn disagreements(out: &mut String, study: &Study) {
     let of = |part, what| value(study, part, what);
     let _ = writeln!(
@@ -69,12 +69,12 @@ pub(super) fn disagreements(out: &mut String, study: &Study) {
          {:.2} and {:.2} min ({:.1} %) in {:.0}: the paper's results, but for half a per cent of the first. Both are shown; \
          pictures and comparison are of the reconstructed one.</li>\n\
          <li><b>Eqn 6.</b> The chord's length follows from the curvature where it begins. On Example 1 it gives the printed 46 segments; \
-         one of them spans the inflection and leaves the surface by {:.3} mm, where 0.005 were asked. To hold 0.005 mm takes {:.0} \
-         segments a pass. Figure 7 shows both.</li>\n\
-         <li><b>Which curvature</b> eqn 6 means, of the path as a curve or of the surface along it, the paper leaves open. On Example 1 \
-         they are the same; on Example 2 the printed 44 needs that of the curve.</li>\n\
+         one of them spans the inflection and leaves the surface by {:.3} mm, with a tolerance of 0.005 mm. Within the tolerance, {:.0} \
+         segments a pass are needed. Figure 7 shows both.</li>\n\
+         <li><b>Which curvature</b> eqn 6 means, of the path as a curve or of the surface along it, the paper does not say. On Example 1 \
+         they are equal; on Example 2 the printed 44 follows from that of the curve.</li>\n\
          <li><b>Eqns 10, 11.</b> The paper prints the same product above and below the line of α, and M twice in the normal curvature. \
-         We use α = −(A·B)/(A·A) and L, 2M, N; with them its numbers of passes come out.</li>\n</ul></section>",
+         We use α = −(A·B)/(A·A) and L, 2M, N; they reproduce the printed numbers of passes.</li>\n</ul></section>",
         of("Example 2", "as printed: time at constant speed of the centre"),
         of("Example 2", "as printed: time at constant speed of the contact"),
         of("Example 2", "as printed: time saved"),
@@ -94,23 +94,22 @@ pub(super) fn disagreements(out: &mut String, study: &Study) {
     );
 }
 
-/// How it was done.
+/// Method of measurement.
 pub(super) fn closing(out: &mut String) {
     out.push_str(
         "<section><h2>How this was measured</h2>\n<ul>\n\
          <li>Speeds are lengths over one period: of the contact by quadrature of |S<sub>u</sub>| between two samples, of the centre \
-         between the commanded points. Ripple is the contact's speed against the wanted feed, in every period of every pass but a pass's \
-         last, which is cut short.</li>\n\
+         between the commanded points. Ripple is the deviation of the contact's speed from the programmed feed, in every period but the last \
+         of a pass, which is shorter.</li>\n\
          <li>Where an approach commands the centre, the contact is the foot of that centre on the exact offset path.</li>\n\
-         <li><code>constant-cl</code> follows the exact offset path, so that what it shows is the effect of the constant speed alone; its data \
-         are the chords that such a CNC is fed.</li>\n\
-         <li><code>linear</code> holds the tolerance by measured errors, unless eqn 6 is named, and takes each segment in whole periods, rounded \
-         up and of equal length.</li>\n\
-         <li><code>curve</code> is fed blocks of a cubic for the path and one for the speed, written as polynomial blocks with a feed polynomial.</li>\n\
-         <li><code>surface</code> is the core that runs on the board. All else is in f64, and shares no code with it.</li>\n\
+         <li><code>constant-cl</code> follows the exact offset path, so that it shows the effect of the constant speed alone; its data \
+         are the chords of a conventional program.</li>\n\
+         <li><code>linear</code> keeps the tolerance by measured errors, except where eqn 6 is named, and divides each segment into equal steps, \
+         their number rounded up.</li>\n\
+         <li><code>curve</code> receives a cubic for the path and one for the speed in each block, written as polynomial blocks with a feed polynomial.</li>\n\
+         <li><code>surface</code> is the core that runs on the board. The others are in f64 and share no code with it.</li>\n\
          <li>Bytes are those of the program: G-code or polynomial blocks with four decimals; for <code>surface</code> the header and the surface.</li>\n\
-         <li>The paper's pictures are not at hand. Figures 3, 4, 5, 7, 8 and 9 are our reconstructions of that kind of figure, by the \
-         examples that they go with.</li>\n</ul></section>\n\
-         <footer>Written by Isofeed's command <code>paper</code>. The figures' data are beside this page, in <code>figures.json</code>.</footer>\n",
+         <li>The paper's pictures are not available. Figures 3, 4, 5, 7, 8 and 9 are reconstructed from the examples that they belong to.</li>\n</ul></section>\n\
+         <footer>Written by <code>cargo sim paper</code>. The figures' data are beside this page, in <code>figures.json</code>.</footer>\n",
     );
 }

@@ -1,0 +1,210 @@
+//! Operations of a sample, counted from the instructions that the firmware executes, against the operations in the source of the
+//! core, summed by hand. Needs `qemu-system-arm`; builds the firmware and the plugin.
+
+use std::sync::OnceLock;
+
+use cycle_plugin::plan::Stage;
+use cycles::measure::{MeasurementSetup, Ticks};
+use cycles::operations::{Operations, count, of_tick};
+use cycles::{SURFACES, TICKS, golden, image};
+use machine::prepare::prepare;
+use machine::remote::qemu;
+use study::operations::{PAPER, in_table};
+
+/// Ticks of the three jobs of Table 1, in its order.
+fn measured() -> &'static [Ticks; 3] {
+    static TICKS_OF_JOBS: OnceLock<[Ticks; 3]> = OnceLock::new();
+    TICKS_OF_JOBS.get_or_init(|| {
+        let path = qemu::firmware().unwrap();
+        let (plan, _) = image::read(&path).unwrap();
+        let setup = MeasurementSetup::new(&path, &plan).unwrap();
+        PAPER.map(|row| {
+            let (_, job) = SURFACES.iter().find(|(name, _)| *name == row.surface).unwrap();
+            let file = programs::sample_job(job);
+            let prepared = prepare(&job_file::load(&file).unwrap()).unwrap();
+            setup.run(&prepared, TICKS).unwrap()
+        })
+    })
+}
+
+// Additions and multiplications in the source. First the stages that all surfaces have: the step with the 64-bit sum of the
+// parameter, the fit, the location, the check for a fold, the density (of a surface that is known to have no weight).
+const STEP: [u32; 2] = [5 + 1, 8];
+const FIT: [u32; 2] = [1, 2];
+const LOCATE: [u32; 2] = [6, 6];
+const FOLD: [u32; 2] = [2, 3];
+const DENSITY: [u32; 2] = [0, 1];
+
+const CUBIC: [u32; 2] = [3, 3];
+const TANGENT: [u32; 2] = [5, 4];
+const JET: [u32; 2] = [6, 4];
+const DOT: [u32; 2] = [2, 3];
+const CROSS: [u32; 2] = [3, 6];
+const INVERSE_ROOT: [u32; 2] = [5, 10];
+
+fn total(parts: &[(u32, [u32; 2])]) -> [u32; 2] {
+    let sum = |k: usize| parts.iter().map(|(times, part)| times * part[k]).sum();
+    [sum(0), sum(1)]
+}
+
+/// A bicubic patch: three jets, tangents and cubics; then the forms.
+fn bicubic() -> [u32; 2] {
+    total(&[
+        (3, JET),
+        (3, TANGENT),
+        (3, CUBIC),
+        // A x B; E, F and its square; least sine.
+        (1, CROSS),
+        (3, DOT),
+        (1, [0, 2]),
+        // 1/W, r N, 1/|A|, 1/E, F/E.
+        (2, INVERSE_ROOT),
+        (1, [0, 1 + 3]),
+        (1, [0, 1 + 1]),
+        // L, M, N, A . A', each with its factor, M with a half besides, A . A' with 1/E.
+        (4, DOT),
+        (1, [0, 4 + 1 + 1]),
+        // Shear, its sum, twist and its square, sheared, lateral^2, along, across.
+        (1, [1 + 1 + 1 + 2, 1 + 1 + 1 + 1 + 1 + 1]),
+        (1, STEP),
+        (1, FIT),
+        (1, LOCATE),
+        (1, FOLD),
+        (1, DENSITY),
+    ])
+}
+
+/// A pass along the profile: radius and height, and the values that do not depend on the angle.
+fn profile() -> [u32; 2] {
+    total(&[
+        (2, JET),
+        // E; second derivatives; 1/|A|, 1/E; lateral speed and its square.
+        (1, [1, 2 + 2]),
+        (1, INVERSE_ROOT),
+        (1, [0, 1 + 2]),
+        // r N in the profile's plane; the circle; r N.
+        (1, [0, 3]),
+        (1, [0, 2]),
+        (1, [0, 2 + 1 + 3]),
+        // Stretch, along, across.
+        (1, [1 + 2 + 1, 3 + 3 + 2]),
+        (1, STEP),
+        // The fit without a twist.
+        (1, [0, 2]),
+        (1, LOCATE),
+        (1, FOLD),
+        (1, DENSITY),
+    ])
+}
+
+/// A pass around the axis: the angle, sine and cosine, the circle, the offset; the weight is stored.
+fn circle() -> [u32; 2] {
+    const SIN_COS: [u32; 2] = [2 * 5 + 2, 2 * 5 + 2];
+    total(&[
+        (1, [1, 1]),
+        (1, SIN_COS),
+        // Both doubled.
+        (1, [2, 0]),
+        (1, [0, 2]),
+        (1, [0, 1 + 2 + 3]),
+        (1, STEP),
+        (1, FIT),
+        (1, LOCATE),
+        (1, FOLD),
+        (1, [0, 1]),
+        (1, DENSITY),
+    ])
+}
+
+/// Greatest difference of the executed operations from those of the source. The compiler merges products by powers of two and common
+/// factors; roundings and range reductions add integer additions that the source's sums leave out.
+const DIFFERENCE_MAX: u32 = 12;
+
+/// The executed additions and multiplications are those of the source, without divisions and roots.
+#[test]
+fn executed_operations_are_those_of_the_source() {
+    let source = [profile(), circle(), bicubic()];
+    for ((ticks, source), row) in measured().iter().zip(source).zip(PAPER) {
+        let operations = count(ticks).unwrap().operations;
+        for (executed, written) in [operations.add, operations.multiply].into_iter().zip(source) {
+            assert!(
+                executed.abs_diff(written) <= DIFFERENCE_MAX,
+                "{}: {operations:?}, source {source:?}",
+                row.surface
+            );
+        }
+        assert_eq!((operations.divide, operations.root), (0, 0), "{}", row.surface);
+    }
+}
+
+/// Steps 3 and 4 by hand, to the operation: in the image, the location is two `SMLAL` for each axis, the fit two `VMUL` and a `VSUB`
+/// (none without a twist), r N of a patch four `VMUL`, the density one `VMUL`, or two with a stored weight.
+#[test]
+fn offset_and_interval_by_hand() {
+    let offset = [
+        total(&[(1, LOCATE), (1, [0, 2])]),
+        total(&[(1, LOCATE), (1, FIT)]),
+        total(&[(1, LOCATE), (1, FIT), (1, [0, 1 + 3])]),
+    ];
+    let interval = [DENSITY, [0, 2], DENSITY];
+    for (row, ticks) in measured().iter().enumerate() {
+        for (stage, [add, multiply]) in [(Stage::Offset, offset[row]), (Stage::Interval, interval[row])] {
+            let want = Operations::new(add, multiply, 0, 0);
+            let differ = |record: &&cycle_plugin::record::Record| record.operations[stage as usize] != want;
+            let others = ticks.records.iter().filter(differ).count();
+            assert_eq!(
+                others,
+                0,
+                "{}: {} is not {want:?}",
+                PAPER[row].surface,
+                stage.name()
+            );
+        }
+    }
+}
+
+/// Ticks at the ends of a pass that take another path: first sample, its two successors without a history of steps, last sample.
+const ENDS_OF_A_PASS: usize = 4;
+
+/// All samples within a pass take the same operations, up to one addition of the sine's range reduction.
+#[test]
+fn samples_within_a_pass_take_the_same() {
+    for (ticks, row) in measured().iter().zip(PAPER) {
+        let usual = count(ticks).unwrap();
+        let close = |operations: Operations| {
+            let pairs = operations.to_array().into_iter().zip(usual.operations.to_array());
+            pairs.map(|(a, b)| a.abs_diff(b)).sum::<u32>() <= 1
+        };
+        // The first sample of a pass makes no step.
+        let begins = |operations: &Operations| *operations == Operations::default();
+        let steps = ticks
+            .records
+            .iter()
+            .map(|record| record.operations[Stage::Step as usize]);
+        let passes = steps.filter(begins).count();
+        let others = ticks
+            .records
+            .iter()
+            .filter(|record| !close(of_tick(record)))
+            .count();
+        assert!((1..100).contains(&passes), "{}: {passes} passes", row.surface);
+        assert!(
+            others <= ENDS_OF_A_PASS * passes,
+            "{}: {others} samples of {passes} passes differ from {usual:?}",
+            row.surface
+        );
+    }
+}
+
+/// Table 1 shows the operations that the firmware executes now.
+#[test]
+fn table_1_is_up_to_date() {
+    let table = std::fs::read_to_string(golden::path()).unwrap();
+    let rows: Vec<(String, Operations)> = measured()
+        .iter()
+        .zip(PAPER)
+        .map(|(ticks, row)| (row.surface.to_owned(), count(ticks).unwrap().operations))
+        .collect();
+    assert_eq!(golden::differences(&table, &[], &rows), [""; 0]);
+    assert!(in_table(&table).is_some());
+}
