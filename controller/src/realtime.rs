@@ -224,6 +224,13 @@ impl<S: AsRef<[i32]> + AsMut<[i32]>> RealTime<S> {
         }
     }
 
+    /// Whether a tick has something to do at once: in lockstep, with credit left, or with its end to report. A board whose time is
+    /// simulated then need not wait for its timer.
+    #[must_use]
+    pub fn wants_tick(&self) -> bool {
+        self.control.clock == Clock::Lockstep && (self.control.credit > 0 || self.control.spent)
+    }
+
     /// In lockstep: whether a period passes in this tick.
     #[inline]
     fn may_step(&mut self, events: &mut impl Events) -> bool {

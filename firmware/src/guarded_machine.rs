@@ -28,6 +28,13 @@ pub(crate) struct GuardedMachine<'a, M> {
     pub(crate) commands: &'a mut Producer<'static, Instruction>,
 }
 
+impl<M: Mutex<T = BoardRealTime>> GuardedMachine<'_, M> {
+    /// See [`RealTime::wants_tick`].
+    pub(crate) fn wants_tick(&mut self) -> bool {
+        self.real_time.lock(|real_time| real_time.wants_tick())
+    }
+}
+
 impl<M: Mutex<T = BoardRealTime>> Machine for GuardedMachine<'_, M> {
     fn description(&mut self) -> Description {
         describe(FIRMWARE_VERSION, BOARD.id, JOB_WORDS, PERIOD_US)

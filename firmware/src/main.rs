@@ -35,6 +35,7 @@ mod app {
         realtime::RealTime,
         step_output::Buffers,
     };
+    use cortex_m::peripheral::NVIC;
     use heapless::spsc::{Consumer, Producer, Queue};
     use interp_core::steps::BUFFER_WORDS;
     use protocol::message::ResetCause;
@@ -258,7 +259,12 @@ mod app {
             // With interrupts held back none can slip in between the question and the sleep; it still ends
             // the sleep.
             cortex_m::interrupt::free(|_| {
-                if !bytes_out.ready() && !events_out.ready() {
+                if bytes_out.ready() || events_out.ready() {
+                    return;
+                }
+                if board::TIME_IS_SIMULATED && machine.wants_tick() {
+                    NVIC::pend(pac::Interrupt::TIM2);
+                } else {
                     cortex_m::asm::wfi();
                 }
             });

@@ -30,6 +30,9 @@ pub(crate) const TIMER_HZ: u32 = 2 * APB1_MHZ * 1_000_000;
 /// Timers on a divided APB2, TIM1 among them, count at twice its clock.
 pub(crate) const STEP_TIMER_HZ: u32 = 2 * APB2_MHZ * 1_000_000;
 
+/// Ticks come from the timer alone.
+pub(crate) const TIME_IS_SIMULATED: bool = false;
+
 /// The timer counts from 0 to the reload value inclusive.
 pub(crate) const TIMER_RELOAD: u32 = TIMER_HZ / 1_000_000 * PERIOD_US - 1;
 

@@ -23,6 +23,8 @@ pub(crate) struct SampleTimer {
     period_counts: u32,
     /// When the tick in work was due, in counts of the clock; unknown before the first.
     due: Option<u32>,
+    /// The tick in work was started by an update of the timer; where time is simulated, a tick may be started without one.
+    is_timed: bool,
 }
 
 impl SampleTimer {
@@ -39,11 +41,16 @@ impl SampleTimer {
             clock,
             period_counts,
             due: None,
+            is_timed: true,
         }
     }
 
     /// At the beginning of a tick: takes the interrupt's flag back.
     pub(crate) fn begin(&mut self) {
+        self.is_timed = self.timer.sr().read().uif().bit_is_set();
+        if !self.is_timed {
+            return;
+        }
         self.timer.sr().write(|w| w.uif().clear_bit());
         UPTIME_PERIODS.store(uptime_periods().wrapping_add(1), Ordering::Relaxed);
         if self.due.is_none() {
@@ -55,6 +62,9 @@ impl SampleTimer {
     /// tick is over before the next; every one counted has missed its deadline.
     #[inline]
     pub(crate) fn end(&mut self) -> u32 {
+        if !self.is_timed {
+            return 0;
+        }
         let now = self.clock.cnt().read().cnt().bits();
         let due = self.due.unwrap_or(now);
         let late = now.wrapping_sub(due);
