@@ -28,6 +28,10 @@ fn registers(port: Port) -> &'static pac::gpioi::RegisterBlock {
 /// Makes every output inactive: drives let go, heaters and fans are off.
 pub(crate) fn rest(lines: &[Line]) {
     for (port, setup) in Port::ALL.into_iter().zip(setup::ports(lines)) {
+        // The others have no clock.
+        if !setup.is_used() {
+            continue;
+        }
         // SAFETY: any bits may be written here; these are the table's outputs.
         #[allow(unsafe_code, reason = "a whole register is written")]
         registers(port)
