@@ -622,7 +622,9 @@ fn pulses_are_the_samples_up_to_500_khz() {
         });
         let taken = |axis: Axis, until: u64| -> i64 {
             let count = of_axes[axis as usize].partition_point(|pulse| pulse.rise < until);
-            count.checked_sub(1).map_or(0, |last| positions[axis as usize][last])
+            count
+                .checked_sub(1)
+                .map_or(0, |last| positions[axis as usize][last])
         };
         let steps_nm = |axis: Axis, tick: usize| {
             (samples[tick][axis as usize] - samples[0][axis as usize]) * STEPS_MM[axis as usize]

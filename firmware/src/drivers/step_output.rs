@@ -90,7 +90,9 @@ impl StepDriver {
     /// The fault that it is to a run where pulses are not as they should be.
     #[inline]
     pub(crate) fn begin(&mut self, directions: u8) -> Result<(), Fault> {
-        self.output.begin(directions ^ self.plus_is_high).map_err(Fault::from)
+        self.output
+            .begin(directions ^ self.plus_is_high)
+            .map_err(Fault::from)
     }
 
     /// At the end of a tick: the slots to be filled, if there is time for it.

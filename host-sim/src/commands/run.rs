@@ -10,7 +10,7 @@ use protocol::digest::Digest;
 use protocol::message::{HostGone, Reason, Status};
 use serde_json::{Value, json};
 
-use super::flash::{board_parser, board_of};
+use super::flash::{board_of, board_parser};
 use super::home::{self, PlaceNm};
 use super::out::{say, to_stderr};
 use super::outcome::Outcome;
