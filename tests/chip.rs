@@ -45,7 +45,7 @@ fn built() -> &'static Built {
     static BUILT: OnceLock<Built> = OnceLock::new();
     BUILT.get_or_init(|| {
         cargo(&["build", "-p", "chip"]);
-        cargo(&["build", "-p", "host-sim", "--bin", "host-sim"]);
+        cargo(&["build", "--bin", "host-sim"]);
         for board in [&STM32F405, &SKR_PRO] {
             cargo(&[board.build.0]);
         }
@@ -426,7 +426,7 @@ fn whole(board: &'static Board, name: &str, home: &str, seed: &str) {
         "{}, {name}: {tick}; {receive}; {} cycles",
         board.id, ended.report["byte_wait_max_cycles"]
     );
-    // Nothing but the receiver, the longest line of the log and a lock holds a tick up.
+    // Nothing but the receiver and a lock of the idle task holds a tick up.
     assert!(
         tick["latency_max_cycles"].as_u64().unwrap() < 10 * CYCLES_US,
         "{tick}"
