@@ -679,7 +679,10 @@ fn disturbed(board: &'static Board, what: &str) -> (Ended, String, String) {
     let status = emulated.status();
     let ended = emulated.end();
     ended.no_complaint();
-    ended.no_byte_lost();
+    // A processor that has stopped hears nothing.
+    if ended.number("resets") == 0 {
+        ended.no_byte_lost();
+    }
     (ended, said, status)
 }
 
