@@ -149,7 +149,6 @@ mod app {
         if let Ok(steps) = board::STEPS.check() {
             real_time.set_step_pins(steps, board::WIRING.step);
         }
-        // Last of all: what comes before interrupts are on is lost.
         let (transmitter, receiver) = serial::open(board.usart1, board::SERIAL_DIVIDER);
         (
             Shared { real_time },
@@ -235,6 +234,7 @@ mod app {
             real_time,
             commands: commands_in,
         };
+        transmitter.listen();
         let mut link = Link::new();
         let mut watch = Watch::default();
         let mut last_event = None;

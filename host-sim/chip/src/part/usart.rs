@@ -94,7 +94,9 @@ impl Usart {
             self.status |= OVERRUN;
             self.overruns += 1;
             let end = if byte == 0 { ", a frame's end" } else { "" };
-            world.note(format!("USART1: a byte is lost{end}; the program is at {program:#x}"));
+            world.note(format!(
+                "USART1: a byte is lost{end}; the program is at {program:#x}"
+            ));
         } else {
             self.data = byte;
             self.status |= RECEIVED;
