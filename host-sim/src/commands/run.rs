@@ -183,17 +183,19 @@ fn connect_chip(name: &str, fast: bool) -> Result<(Behind, Session)> {
 }
 
 /// What the models of a chip complained about, or lost.
-fn models_complaint(behind: &mut Behind) -> Option<String> {
+fn models_complaint(behind: &mut Behind, json: bool) -> Option<String> {
     let Behind::Chip(chip) = behind else { return None };
     let Some(said) = chip.end() else {
         return Some("the models of the chip ended without a word".to_owned());
     };
-    say!(
-        "  models       {} complaints, {} bytes lost, a byte waited {} cycles at most",
-        said.complaints.len(),
-        said.bytes_lost,
-        said.byte_wait_max_cycles
-    );
+    if !json {
+        say!(
+            "  models       {} complaints, {} bytes lost, a byte waited {} cycles at most",
+            said.complaints.len(),
+            said.bytes_lost,
+            said.byte_wait_max_cycles
+        );
+    }
     if let Some(first) = said.complaints.first() {
         return Some(format!("the models of the chip complain: {first}"));
     }
@@ -527,7 +529,7 @@ pub(super) fn command(arguments: &Arguments) -> Result<()> {
             (false, Some(_)) => compared(&ran, "NOT the same"),
         }
     }
-    let complaint = complaint.or_else(|| models_complaint(&mut behind));
+    let complaint = complaint.or_else(|| models_complaint(&mut behind, arguments.json));
     complaint.map_or(Ok(()), |complaint| Err(Failure::Failed(Some(complaint))))
 }
 
