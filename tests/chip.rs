@@ -44,7 +44,7 @@ fn built() -> &'static Built {
     static BUILT: OnceLock<Built> = OnceLock::new();
     BUILT.get_or_init(|| {
         cargo(&["build", "-p", "chip"]);
-        cargo(&["build", "-p", "host-sim", "--bin", "host-sim"]);
+        cargo(&["build", "--bin", "host-sim"]);
         for board in [&STM32F405, &SKR_PRO] {
             cargo(&[board.build.0]);
         }
@@ -156,14 +156,21 @@ impl Emulated {
         sim(["operate", "--port", &self.port(), "status"]).1
     }
 
-    /// Ends it; `self.wait` lets it end by itself.
+    /// Ends it.
     fn end(mut self) -> Ended {
         drop(self.child.stdin.take());
         self.wait()
     }
 
+    /// Waits until it ends by itself.
     fn wait(mut self) -> Ended {
-        let status = self.child.wait().unwrap();
+        // `Child::wait` would close its input, which is its end.
+        let status = loop {
+            match self.child.try_wait().unwrap() {
+                Some(status) => break status,
+                None => std::thread::sleep(Duration::from_millis(5)),
+            }
+        };
         assert!(
             matches!(status.code(), Some(0 | 1)),
             "the program that executes images: {status}"
@@ -247,12 +254,7 @@ impl Ended {
 
     /// No byte of the host was lost, and none was near it.
     fn no_byte_lost(&self) {
-        assert_eq!(
-            (self.number("bytes_lost"), self.number("bytes_unheard")),
-            (0, 0),
-            "{:#}",
-            self.report["notes"]
-        );
+        assert_eq!(self.number("bytes_lost"), 0, "{:#}", self.report["notes"]);
         let wait = self.number("byte_wait_max_cycles");
         assert!(wait < BYTE / 2, "a byte waited {wait} cycles of {BYTE}");
     }
@@ -423,7 +425,7 @@ fn whole(board: &'static Board, name: &str, home: &str, seed: &str) {
         "{}, {name}: {tick}; {receive}; {} cycles",
         board.id, ended.report["byte_wait_max_cycles"]
     );
-    // Nothing but the receiver, the longest line of the log and a lock holds a tick up.
+    // Nothing but the receiver and a lock of the idle task holds a tick up.
     assert!(
         tick["latency_max_cycles"].as_u64().unwrap() < 10 * CYCLES_US,
         "{tick}"
@@ -607,13 +609,21 @@ fn pulses_are_the_samples_up_to_500_khz() {
         assert_eq!(shortest, 2 * CYCLES_US, "500 kHz are reached");
         // A sample's steps go out in a period that is so many after the first pulse's; found by the first axis, held by all.
         let plus = |axis: Axis| (board.axis(axis).direction.active == Level::High) != INVERTED[axis as usize];
+        // Position after each pulse.
+        let positions = Axis::ALL.map(|axis| {
+            let step = |pulse: &Pulse| if pulse.direction == plus(axis) { 1 } else { -1 };
+            let steps = of_axes[axis as usize].iter().map(step);
+            let sum = |position: &mut i64, step: i64| {
+                *position += step;
+                Some(*position)
+            };
+            steps.scan(0, sum).collect::<Vec<i64>>()
+        });
         let taken = |axis: Axis, until: u64| -> i64 {
-            let pulses = &of_axes[axis as usize];
-            let until = pulses.partition_point(|pulse| pulse.rise < until);
-            pulses[..until]
-                .iter()
-                .map(|pulse| if pulse.direction == plus(axis) { 1 } else { -1 })
-                .sum()
+            let count = of_axes[axis as usize].partition_point(|pulse| pulse.rise < until);
+            count
+                .checked_sub(1)
+                .map_or(0, |last| positions[axis as usize][last])
         };
         let steps_nm = |axis: Axis, tick: usize| {
             (samples[tick][axis as usize] - samples[0][axis as usize]) * STEPS_MM[axis as usize]
@@ -668,7 +678,10 @@ fn disturbed(board: &'static Board, what: &str) -> (Ended, String, String) {
     let status = emulated.status();
     let ended = emulated.end();
     ended.no_complaint();
-    ended.no_byte_lost();
+    // A processor that has stopped hears nothing.
+    if ended.number("resets") == 0 {
+        ended.no_byte_lost();
+    }
     (ended, said, status)
 }
 

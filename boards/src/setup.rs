@@ -110,6 +110,19 @@ pub const fn ports(lines: &[Line]) -> [PortSetup; Port::ALL.len()] {
     ports
 }
 
+/// What goes to each port's `BSRR` to make every output inactive; 0 where a port has none.
+#[must_use]
+pub const fn rest(lines: &[Line]) -> [u32; Port::ALL.len()] {
+    let ports = ports(lines);
+    let mut rest = [0; Port::ALL.len()];
+    let mut index = 0;
+    while index < ports.len() {
+        rest[index] = ports[index].set_reset;
+        index += 1;
+    }
+    rest
+}
+
 /// `RCC_AHB1ENR`, whose lowest bits are the ports' clocks (RM0090, 7.3.10).
 const PORT_CLOCKS: u32 = 0x4002_3830;
 /// The registers of port A; those of the next lie [`PORT_BYTES`] further (RM0090, 2.3).

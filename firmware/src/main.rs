@@ -113,7 +113,6 @@ mod app {
             JOB_WORDS
         );
         let counter = CycleCounter::new(context.core.DCB, context.core.DWT);
-        let (transmitter, receiver) = serial::open(board.usart1, board::SERIAL_DIVIDER);
         let (bytes_in, bytes_out) = context.local.bytes.split();
         let (commands_in, commands_out) = context.local.commands.split();
         let (events_in, events_out) = context.local.events.split();
@@ -138,7 +137,7 @@ mod app {
             ResetCause::Watchdog => defmt::error!("the watchdog has reset the board"),
             cause => defmt::info!("last reset: {=str}", cause.name()),
         }
-        // Last: from here on the first tick is less than a period away.
+        // From here on the first tick is less than a period away.
         let watchdog = Watchdog::start(board.iwdg, WATCHDOG_RELOAD);
         if !watchdog.is_settled() {
             defmt::warn!("the watchdog has not taken its time over");
@@ -151,6 +150,7 @@ mod app {
         if let Ok(steps) = board::STEPS.check() {
             real_time.set_step_pins(steps, board::WIRING.step);
         }
+        let (transmitter, receiver) = serial::open(board.usart1, board::SERIAL_DIVIDER);
         (
             Shared { real_time },
             Local {
@@ -196,7 +196,7 @@ mod app {
     /// |---|---|
     /// | priority | 3, the highest: the port holds one byte, and a tick may take 18 of them |
     /// | period | 11 us at 921 600 baud, while the host sends |
-    /// | worst case | a few dozen cycles, and what holds all interrupts off: a line of the log |
+    /// | worst case | a few dozen cycles, and the few instructions that hold all interrupts off; a line of the log does not |
     /// | a miss | the byte is lost and counted; its frame fails its check, and the host repeats it |
     #[task(binds = USART1, priority = 3, local = [receiver, bytes_in])]
     fn receive(context: receive::Context) {
@@ -235,6 +235,7 @@ mod app {
             real_time,
             commands: commands_in,
         };
+        transmitter.listen();
         let mut link = Link::new();
         let mut watch = Watch::default();
         let mut last_event = None;

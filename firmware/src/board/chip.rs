@@ -107,7 +107,7 @@ pub(crate) fn simulate(_lines: InputLines) -> bool {
 /// Stays here, with every output at rest: what may still be under way to the step pins moves nothing. Nobody feeds the watchdog any
 /// more, which resets the chip after some periods; the log then tells why.
 pub(crate) fn stop_for_good() -> ! {
-    gpio::rest(BOARD.lines);
+    gpio::rest(&super::REST);
     loop {
         cortex_m::asm::nop();
     }
@@ -117,7 +117,7 @@ pub(crate) fn stop_for_good() -> ! {
 fn panic(info: &core::panic::PanicInfo<'_>) -> ! {
     // Nothing is to move meanwhile, nor to panic in between.
     cortex_m::interrupt::disable();
-    gpio::rest(BOARD.lines);
+    gpio::rest(&super::REST);
     super::log_panic(info);
     stop_for_good()
 }

@@ -73,6 +73,9 @@ use stm32f4xx_hal::pac;
 pub(crate) static MARK: [u8; boards::MARK_BYTES] = BOARD.mark();
 use crate::drivers::reset_cause::{TAKE_BACK, cause};
 
+/// What puts every output to rest, a word a port; computed when the image is built, as it is wanted when the processor has failed.
+pub(crate) static REST: [u32; boards::Port::ALL.len()] = boards::setup::rest(BOARD.lines);
+
 /// Step and direction pins, by the board's table.
 pub(crate) const WIRING: Wiring = {
     let [x, y, z] = [BOARD.axis(Axis::X), BOARD.axis(Axis::Y), BOARD.axis(Axis::Z)];

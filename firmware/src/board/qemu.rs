@@ -88,7 +88,7 @@ pub(crate) fn simulate(lines: InputLines) -> bool {
 
 /// Ends QEMU, so that whoever waits for it learns of the fault.
 pub(crate) fn stop_for_good() -> ! {
-    gpio::rest(BOARD.lines);
+    gpio::rest(&super::REST);
     semihosting::process::exit(EXIT_FAULT)
 }
 

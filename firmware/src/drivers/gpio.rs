@@ -5,7 +5,7 @@
 
 use core::convert::Infallible;
 
-use boards::{Line, Pin, Port, setup};
+use boards::{Pin, Port};
 use embedded_hal::digital::{ErrorType, OutputPin};
 use stm32f4xx_hal::pac;
 
@@ -25,14 +25,15 @@ fn registers(port: Port) -> &'static pac::gpioi::RegisterBlock {
     }
 }
 
-/// Makes every output inactive: drives let go, heaters and fans are off.
-pub(crate) fn rest(lines: &[Line]) {
-    for (port, setup) in Port::ALL.into_iter().zip(setup::ports(lines)) {
-        // SAFETY: any bits may be written here; these are the table's outputs.
-        #[allow(unsafe_code, reason = "a whole register is written")]
-        registers(port)
-            .bsrr()
-            .write(|w| unsafe { w.bits(setup.set_reset) });
+/// Makes every output inactive: drives let go, heaters and fans are off. `rest`: what goes to the ports' set/reset registers
+/// ([`boards::setup::rest`]); a port without an output may have no clock, and is left alone.
+pub(crate) fn rest(rest: &[u32; Port::ALL.len()]) {
+    for (port, bits) in Port::ALL.into_iter().zip(rest) {
+        if *bits != 0 {
+            // SAFETY: any bits may be written here; these are the table's outputs.
+            #[allow(unsafe_code, reason = "a whole register is written")]
+            registers(port).bsrr().write(|w| unsafe { w.bits(*bits) });
+        }
     }
 }
 

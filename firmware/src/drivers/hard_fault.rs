@@ -2,10 +2,7 @@
 
 use cortex_m_rt::{ExceptionFrame, exception};
 
-use crate::{
-    board::{self, BOARD},
-    drivers::gpio,
-};
+use crate::{board, drivers::gpio};
 
 // SAFETY: an exception handler has to be declared `unsafe`; this one only reads the frame that it is given
 // and never returns.
@@ -13,7 +10,7 @@ use crate::{
 #[exception]
 unsafe fn HardFault(frame: &ExceptionFrame) -> ! {
     // The log takes its time, and may itself be what is broken.
-    gpio::rest(BOARD.lines);
+    gpio::rest(&board::REST);
     defmt::error!(
         "hard fault at {=u32:#010x}, called from {=u32:#010x}",
         frame.pc(),

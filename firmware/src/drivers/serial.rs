@@ -23,7 +23,7 @@ pub(crate) fn count_lost() {
     BYTES_LOST.store(bytes_lost().saturating_add(1), Ordering::Relaxed);
 }
 
-/// Sets the port up and parts it.
+/// Sets the port up and parts it. Nothing is received before [`Transmitter::listen`].
 pub(crate) fn open(usart: pac::USART1, divider: u16) -> (Transmitter, Receiver) {
     usart.brr().write(|w| {
         w.div_mantissa()
@@ -31,11 +31,9 @@ pub(crate) fn open(usart: pac::USART1, divider: u16) -> (Transmitter, Receiver) 
             .div_fraction()
             .set((divider & 0xF) as u8)
     });
-    usart
-        .cr1()
-        .write(|w| w.ue().set_bit().te().set_bit().re().set_bit().rxneie().set_bit());
-    // SAFETY: the one port becomes two halves that are never the whole again. The transmitter only reads SR
-    // and writes DR, the receiver only reads SR and reads DR, and a read of SR changes nothing by itself.
+    usart.cr1().write(|w| w.ue().set_bit().te().set_bit());
+    // SAFETY: the one port becomes two halves that are never the whole again. The transmitter only reads SR, writes DR, and switches the
+    // receiver on before that has anything to do; the receiver only reads SR and reads DR, and a read of SR changes nothing by itself.
     #[allow(unsafe_code, reason = "one port, two halves")]
     let second = unsafe { pac::USART1::steal() };
     (Transmitter { usart }, Receiver { usart: second })
@@ -47,6 +45,13 @@ pub(crate) struct Transmitter {
 }
 
 impl Transmitter {
+    /// Begins to receive. To be called once interrupts are on: a byte that came before would be overwritten by the next.
+    pub(crate) fn listen(&mut self) {
+        self.usart
+            .cr1()
+            .modify(|_, w| w.re().set_bit().rxneie().set_bit());
+    }
+
     /// Sends these bytes; waits until the last one is on its way, at most the line's time for as many and one
     /// more.
     pub(crate) fn write(&mut self, bytes: &[u8]) {

@@ -315,7 +315,7 @@ impl Chip {
                 line.write(byte);
             }
         } else if self.usart.received_at == at {
-            self.usart.receive(at, apb2, &mut self.world);
+            self.usart.receive(at, apb2, self.at, &mut self.world);
             self.serial_line();
         } else if self.watchdog.deadline == at {
             let (at, words) = (self.at, self.nvic.words());

@@ -81,8 +81,8 @@ impl Usart {
         }
     }
 
-    /// A byte is complete.
-    pub(crate) fn receive(&mut self, at: u64, apb2: u64, world: &mut World) {
+    /// A byte is complete; `program`: where the program is meanwhile.
+    pub(crate) fn receive(&mut self, at: u64, apb2: u64, program: u32, world: &mut World) {
         self.received_at = NEVER;
         let Some(byte) = self.from_host.pop_front() else {
             return;
@@ -94,7 +94,9 @@ impl Usart {
             self.status |= OVERRUN;
             self.overruns += 1;
             let end = if byte == 0 { ", a frame's end" } else { "" };
-            world.note(format!("USART1: a byte is lost{end}"));
+            world.note(format!(
+                "USART1: a byte is lost{end}; the program is at {program:#x}"
+            ));
         } else {
             self.data = byte;
             self.status |= RECEIVED;
