@@ -278,10 +278,10 @@ fn written_data_are_the_figures() {
     );
 }
 
-/// The table of the README is that of the freeform job.
+/// The table of docs/figures.md is that of the freeform job.
 #[test]
-fn readme_says_what_a_user_gains() {
-    let readme = std::fs::read_to_string(programs::checkout().unwrap().join("README.md")).unwrap();
+fn the_figures_say_what_a_user_gains() {
+    let figures = std::fs::read_to_string(programs::checkout().unwrap().join("docs/figures.md")).unwrap();
     let freeform = shared()
         .comparisons
         .iter()
@@ -296,10 +296,10 @@ fn readme_says_what_a_user_gains() {
             row.measured.planned.bytes,
             percent(row.measured.findings.report.ripple_pct.max)
         );
-        let found = readme
+        let found = figures
             .lines()
             .any(|text| text.starts_with(&format!("| `{}`", row.kind.name())) && text.ends_with(&line));
-        assert!(found, "the README has no row {} {line}", row.name());
+        assert!(found, "docs/figures.md has no row {} {line}", row.name());
     }
 }
 
