@@ -8,6 +8,7 @@
 //! | `BOARD` | its table: name, crystal, pins (crate `boards`) |
 //! | `TIMER_HZ` | what TIM2 and TIM5 count |
 //! | `TIMER_RELOAD` | auto-reload value of TIM2 for one period |
+//! | `TIME_IS_SIMULATED` | in lockstep, ticks need not wait for the timer |
 //! | `STEP_TIMER_HZ` | what TIM1 counts |
 //! | `WIRING` | step and direction pins |
 //! | `STEPS` | what the drives want, until a host says otherwise |
@@ -38,14 +39,16 @@ compile_error!("choose one board: `cargo fw-qemu`, `cargo fw-chip` or `cargo fw-
 mod qemu;
 #[cfg(feature = "board-qemu")]
 pub(crate) use qemu::{
-    BOARD, InputPorts, SERIAL_DIVIDER, STEP_TIMER_HZ, TIMER_HZ, TIMER_RELOAD, init, simulate, stop_for_good,
+    BOARD, InputPorts, SERIAL_DIVIDER, STEP_TIMER_HZ, TIME_IS_SIMULATED, TIMER_HZ, TIMER_RELOAD, init,
+    simulate, stop_for_good,
 };
 
 #[cfg(not(feature = "board-qemu"))]
 mod chip;
 #[cfg(not(feature = "board-qemu"))]
 pub(crate) use chip::{
-    InputPorts, SERIAL_DIVIDER, STEP_TIMER_HZ, TIMER_HZ, TIMER_RELOAD, init, simulate, stop_for_good,
+    InputPorts, SERIAL_DIVIDER, STEP_TIMER_HZ, TIME_IS_SIMULATED, TIMER_HZ, TIMER_RELOAD, init, simulate,
+    stop_for_good,
 };
 
 #[cfg(feature = "board-stm32f405")]
