@@ -16,7 +16,7 @@
 //! or right after it was switched on, clocks, flash or supply out of their limits, streams changed while they run, registers that no model has.
 //!
 //! Not modelled: the flash's wait states and its cache, contention on the buses, synchronisers' delays of a few cycles, lazy stacking,
-//! tail-chaining and late arrival, analogue behaviour (start-up times are constants, levels are ideal), noise on the line, the debug unit, DMA
+//! tail-chaining and late arrival, `IPSR` (it reads 0 in a handler), analogue behaviour (start-up times are constants, levels are ideal), noise on the line, the debug unit, DMA
 //! requests of USART1, and every peripheral that the firmware does not use. All of those show up as complaints when they are touched.
 
 mod bus;
