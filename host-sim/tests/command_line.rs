@@ -196,7 +196,7 @@ fn nonsense_gets_a_remedy() {
         ("new -o .", &["that is a folder: give a file in it"]),
         ("new -o no/job.toml", &["create the folder first"]),
         ("completions tcsh", &["bash, zsh, fish"]),
-        ("run job.toml", &["--qemu|--port"]),
+        ("run job.toml", &["--qemu|--chip <BOARD>|--port"]),
         ("flash --board arduino", &["stm32f405, skr-pro"]),
         (
             "flash --image nope.elf",
