@@ -455,7 +455,7 @@ fn jobs_that_name_a_file() {
         )
     };
     let name = folder.join("job.toml").display().to_string();
-    let job = job_file::parse(&name, &text("path = \"mouse.step\"\nface = 1")).unwrap();
+    let job = job_file::parse_with(&name, &text("path = \"mouse.step\"\nface = 1"), &cad::Faces).unwrap();
     let model = read(&cad("mouse.step")).unwrap();
     let made = machinable("", &model.faces[0], &Options::default()).unwrap();
     assert_eq!(job.surface, made.spec());
@@ -473,7 +473,7 @@ fn jobs_that_name_a_file() {
             "does not belong here",
         ),
     ] {
-        let error = job_file::parse(&name, &text(surface)).unwrap_err();
+        let error = job_file::parse_with(&name, &text(surface), &cad::Faces).unwrap_err();
         assert!(error.what().contains(words), "{surface}: {error}");
         assert_eq!(error.line_and_column().unwrap().0, line, "{surface}: {error}");
     }
