@@ -6,15 +6,6 @@
 //!   cad                   │                  └──► a board, QEMU    │
 //!                         └──oracle──► verify ─────────────────────┘
 //! ```
-#![cfg_attr(
-    test,
-    allow(
-        clippy::unwrap_used,
-        clippy::cast_precision_loss,
-        clippy::cast_possible_truncation,
-        reason = "tests convert freely"
-    )
-)]
 
 pub mod commands;
 pub mod probe;

@@ -10,15 +10,6 @@
 //! The first three command the ball centre (CL). Its contact is the foot of the centre on the exact offset path, so that contact speed
 //! and feed ripple are measured as for the product: by the arc length between two contacts. All plan in f64 on the exact geometry of
 //! the oracle; the error that remains is the method's.
-#![cfg_attr(
-    test,
-    allow(
-        clippy::unwrap_used,
-        clippy::cast_precision_loss,
-        clippy::cast_possible_truncation,
-        reason = "tests convert freely"
-    )
-)]
 
 mod arcs;
 mod constant_cl;

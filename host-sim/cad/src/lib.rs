@@ -12,15 +12,6 @@
 //! ```
 //!
 //! Not in the sample path: f64; lengths in mm, angles in rad.
-#![cfg_attr(
-    test,
-    allow(
-        clippy::unwrap_used,
-        clippy::cast_precision_loss,
-        clippy::cast_possible_truncation,
-        reason = "tests convert freely"
-    )
-)]
 
 mod curve;
 mod error;

@@ -7,15 +7,6 @@
 //! ```
 //!
 //! The cycle models and their limits: `cycle_plugin::cost`.
-#![cfg_attr(
-    test,
-    allow(
-        clippy::unwrap_used,
-        clippy::cast_precision_loss,
-        clippy::cast_possible_truncation,
-        reason = "tests convert freely"
-    )
-)]
 
 pub mod chart;
 pub mod figures;

@@ -2,15 +2,6 @@
 //!
 //! `fault` describes a fault that occurred, with its value; [`entries`](entry) explain every code, for
 //! `cargo sim explain`.
-#![cfg_attr(
-    test,
-    allow(
-        clippy::unwrap_used,
-        clippy::cast_precision_loss,
-        clippy::cast_possible_truncation,
-        reason = "tests convert freely"
-    )
-)]
 
 mod faults;
 mod reasons;

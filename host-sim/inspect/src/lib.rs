@@ -5,15 +5,6 @@
 //!     ──survey_run─► errors, speeds     every sample against the oracle
 //!     ──verify_run─► scallop, gouges, limits, optimum, and pass or fail
 //! ```
-#![cfg_attr(
-    test,
-    allow(
-        clippy::unwrap_used,
-        clippy::cast_precision_loss,
-        clippy::cast_possible_truncation,
-        reason = "tests convert freely"
-    )
-)]
 
 pub mod comparison;
 mod error;

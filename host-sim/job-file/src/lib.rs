@@ -6,15 +6,6 @@
 //! ```
 //!
 //! Reading a job file starts no process: a surface of `kind = "file"` is resolved by the [`FaceReader`] that the caller passes.
-#![cfg_attr(
-    test,
-    allow(
-        clippy::unwrap_used,
-        clippy::cast_precision_loss,
-        clippy::cast_possible_truncation,
-        reason = "tests convert freely"
-    )
-)]
 
 mod file;
 mod machine;

@@ -2,15 +2,6 @@
 //! alone decides whether the job has limits. The crate depends neither on TOML nor on the core, so the oracle can depend on this crate alone.
 //!
 //! Lengths are mm and angles rad; the feed stays in mm/min, as in the file. All values are finite and within their documented ranges.
-#![cfg_attr(
-    test,
-    allow(
-        clippy::unwrap_used,
-        clippy::cast_precision_loss,
-        clippy::cast_possible_truncation,
-        reason = "tests convert freely"
-    )
-)]
 
 mod error;
 mod machine;

@@ -4,15 +4,6 @@
 //! Job ──prepare──► Prepared ──in_process──► samples
 //!                     └──────remote───────► the same from a board or QEMU
 //! ```
-#![cfg_attr(
-    test,
-    allow(
-        clippy::unwrap_used,
-        clippy::cast_precision_loss,
-        clippy::cast_possible_truncation,
-        reason = "tests convert freely"
-    )
-)]
 
 pub mod direction;
 mod in_process;

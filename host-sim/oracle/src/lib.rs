@@ -18,15 +18,6 @@
 //!
 //! Source: C.-C. Lo, "A new approach to CNC tool path generation", Computer-Aided Design 30 (1998), here "Lo"; and
 //! L. Piegl, W. Tiller, "The NURBS Book" (2nd ed., 1997), here "P&T".
-#![cfg_attr(
-    test,
-    allow(
-        clippy::unwrap_used,
-        clippy::cast_precision_loss,
-        clippy::cast_possible_truncation,
-        reason = "tests convert freely"
-    )
-)]
 
 mod arc;
 mod contact;

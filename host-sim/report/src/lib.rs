@@ -14,15 +14,6 @@
 //!
 //! The stored data of a run is bounded. A point of the view represents the worst of its samples, a point of a chart the minimum and
 //! the maximum, and the page states the number of samples per point.
-#![cfg_attr(
-    test,
-    allow(
-        clippy::unwrap_used,
-        clippy::cast_precision_loss,
-        clippy::cast_possible_truncation,
-        reason = "tests convert freely"
-    )
-)]
 
 #[cfg(test)]
 mod data_tests;

@@ -6,15 +6,6 @@
 //!    ├──────swept───► scallop height, gouges
 //!    └──────motion──► use of the axis limits, time against the optimum
 //! ```
-#![cfg_attr(
-    test,
-    allow(
-        clippy::unwrap_used,
-        clippy::cast_precision_loss,
-        clippy::cast_possible_truncation,
-        reason = "tests convert freely"
-    )
-)]
 
 pub mod motion;
 mod sample;
