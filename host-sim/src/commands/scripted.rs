@@ -161,7 +161,7 @@ impl Scripted {
         } else {
             say!("{} on {board}", job.origin.name());
             self.print();
-            let verdict = if same { "bit-identical" } else { "NOT identical" };
+            let verdict = if same { "bit for bit the same" } else { "NOT the same" };
             say!(
                 "  compared     {} samples with the simulation: {verdict}",
                 status.samples
