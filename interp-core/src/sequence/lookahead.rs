@@ -10,7 +10,7 @@ use crate::feed::plan::{CELLS_MOVING, FeedLimits, Plan};
 use crate::job::program::Job;
 use crate::job::{AxisLimits, Pattern, Spacing};
 use crate::math::number::{Bounded, nm_to_mm};
-use crate::pass::across::{PassMaximum, StepOverEstimator};
+use crate::pass::step_over::{PassMaximum, StepOverEstimator};
 use crate::pass::patch::Patch;
 use crate::pass::position::PassPosition;
 use crate::pass::schedule;
