@@ -12,7 +12,6 @@
 //! | [`schedule`] | the next pass |
 //! | [`run`] | chains them |
 
-pub(crate) mod step_over;
 pub(crate) mod buffer;
 pub(crate) mod contact;
 mod evaluation;
@@ -22,3 +21,4 @@ pub(crate) mod patch;
 pub(crate) mod position;
 pub(crate) mod run;
 pub(crate) mod schedule;
+pub(crate) mod step_over;

@@ -4,12 +4,12 @@ use crate::fault::{Fault, FaultKind, Result};
 use crate::job::program::Job;
 use crate::job::{Pattern, Spacing};
 use crate::math::arith::{advanced, dot_hi, fraction_to_f32};
-use crate::pass::step_over::{self, PassMaximum, StepOverEstimator};
 use crate::pass::buffer::PatchBuffer;
 use crate::pass::contact::{self, Reach};
 use crate::pass::patch::Patch;
 use crate::pass::position::PassPosition;
 use crate::pass::schedule;
+use crate::pass::step_over::{self, PassMaximum, StepOverEstimator};
 use crate::sample::{Sample, SpanParameter, interval_of};
 use crate::surface::{AnyPass, Pass, PathSpeed};
 

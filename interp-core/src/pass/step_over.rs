@@ -31,25 +31,25 @@ const NEWTON_STEPS: u8 = 4;
 const NEWTON_LAST: f32 = 1e-3;
 /// The first pass has no previous step from which to place the lines. They are placed again when the maximum inverse square interval has grown by
 /// this factor since.
-const AIM_AGAIN: f32 = 1.25;
+const REPLACE_FACTOR: f32 = 1.25;
 
 /// The next task on a neighbouring line.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Task {
     /// Choose the line's side parameter.
-    Aim,
+    Place,
     /// Collapse the line's patch beside the pass's current patch.
     Patch,
     /// Evaluate the inverse square interval at the line's start.
     Start,
     /// Evaluate inverse square intervals on the line, up to the last patch of the pass.
-    Look,
+    Evaluate,
     /// Evaluate the inverse square interval at the line's end.
     End,
     /// Evaluate inverse square intervals on the line's last patch.
-    LookOn,
+    EvaluateLast,
     /// No task: the line is beyond the surface, or its patch is faulty.
-    Rest,
+    Idle,
 }
 
 /// A line at a constant side parameter beside the pass, towards the next pass.
@@ -136,7 +136,7 @@ impl StepOverEstimator {
         let beside = if self.second { whole } else { half };
         match beside.task {
             Task::Patch => true,
-            Task::Look => beside.span != position.span,
+            Task::Evaluate => beside.span != position.span,
             _ => false,
         }
     }
@@ -203,7 +203,7 @@ impl NeighbourLine {
         Self {
             share,
             patch: Patch::NONE,
-            task: Task::Rest,
+            task: Task::Idle,
             span: 0,
             spans: 0,
             side: SpanParameter { span: 0, fraction: 0 },
@@ -214,7 +214,7 @@ impl NeighbourLine {
     }
 
     const fn begin(&mut self) {
-        self.task = Task::Aim;
+        self.task = Task::Place;
         self.spans = 0;
         self.most = 0.0;
     }
@@ -230,26 +230,26 @@ impl NeighbourLine {
     ) {
         let is_first = before.is_none();
         self.task = match self.task {
-            Task::Aim => self.aim(job, position, most, before),
-            _ if is_first && most > AIM_AGAIN * self.aimed => self.aim(job, position, most, before),
+            Task::Place => self.aim(job, position, most, before),
+            _ if is_first && most > REPLACE_FACTOR * self.aimed => self.aim(job, position, most, before),
             Task::Patch => self.make_patch(job, position, Task::Start),
             Task::Start => {
                 self.most = at_end(job, &self.patch, 0).at_least(self.most);
-                Task::Look
+                Task::Evaluate
             }
-            Task::Look if self.span != position.span => self.make_patch(job, position, Task::Look),
-            Task::Look if position.next(job.header.path_spans).is_none() => Task::End,
+            Task::Evaluate if self.span != position.span => self.make_patch(job, position, Task::Evaluate),
+            Task::Evaluate if position.next(job.header.path_spans).is_none() => Task::End,
             Task::End => {
                 self.most = at_end(job, &self.patch, u64::MAX).at_least(self.most);
-                Task::LookOn
+                Task::EvaluateLast
             }
-            Task::Look | Task::LookOn => {
+            Task::Evaluate | Task::EvaluateLast => {
                 if let Ok(contact) = self.patch.surface.contact(fraction, &self.patch.ball) {
                     self.most = exact_at(job, &self.patch, &contact).at_least(self.most);
                 }
                 self.task
             }
-            Task::Rest => Task::Rest,
+            Task::Idle => Task::Idle,
         };
     }
 
@@ -265,7 +265,7 @@ impl NeighbourLine {
                 self.most = 0.0;
                 Task::Patch
             }
-            _ => Task::Rest,
+            _ => Task::Idle,
         }
     }
 
@@ -278,16 +278,16 @@ impl NeighbourLine {
         self.spans = self.spans.saturating_add(1);
         match self.patch.collapse(job, &beside) {
             Ok(()) => then,
-            Err(_) => Task::Rest,
+            Err(_) => Task::Idle,
         }
     }
 
     /// Maximum inverse square interval on the line; for a line evaluated in part, at least that of the pass.
     fn found(&self, header: &Header, here: f32) -> Option<f32> {
         match self.task {
-            Task::LookOn if self.spans >= header.path_spans => Some(self.most),
-            Task::LookOn | Task::End | Task::Look => Some(self.most.at_least(here)),
-            Task::Aim | Task::Patch | Task::Start | Task::Rest => None,
+            Task::EvaluateLast if self.spans >= header.path_spans => Some(self.most),
+            Task::EvaluateLast | Task::End | Task::Evaluate => Some(self.most.at_least(here)),
+            Task::Place | Task::Patch | Task::Start | Task::Idle => None,
         }
     }
 }
