@@ -65,7 +65,7 @@ struct NeighbourLine {
     side: SpanParameter,
     /// The step-over, in the side parameter, and the inverse square interval from which it was chosen.
     step: f32,
-    aimed: f32,
+    placed_for: f32,
     /// Maximum inverse square interval on the line.
     most: f32,
 }
@@ -208,7 +208,7 @@ impl NeighbourLine {
             spans: 0,
             side: SpanParameter { span: 0, fraction: 0 },
             step: 0.0,
-            aimed: 0.0,
+            placed_for: 0.0,
             most: 0.0,
         }
     }
@@ -230,8 +230,8 @@ impl NeighbourLine {
     ) {
         let is_first = before.is_none();
         self.task = match self.task {
-            Task::Place => self.aim(job, position, most, before),
-            _ if is_first && most > REPLACE_FACTOR * self.aimed => self.aim(job, position, most, before),
+            Task::Place => self.place(job, position, most, before),
+            _ if is_first && most > REPLACE_FACTOR * self.placed_for => self.place(job, position, most, before),
             Task::Patch => self.make_patch(job, position, Task::Start),
             Task::Start => {
                 self.most = at_end(job, &self.patch, 0).at_least(self.most);
@@ -254,9 +254,9 @@ impl NeighbourLine {
     }
 
     /// Places the line: by the previous step, or by the step that the samples of this pass so far allow.
-    fn aim(&mut self, job: &Job<'_>, position: &PassPosition, most: f32, before: Option<f32>) -> Task {
+    fn place(&mut self, job: &Job<'_>, position: &PassPosition, most: f32, before: Option<f32>) -> Task {
         self.step = before.unwrap_or_else(|| interval_of(most));
-        self.aimed = most;
+        self.placed_for = most;
         let spans = job.header.side_spans;
         let width = |span| job.side_width(span);
         match schedule::next_side(position.side, self.share * self.step, spans, width) {
