@@ -18,7 +18,7 @@ pub(crate) struct Memory {
 }
 
 impl Memory {
-    /// `size` bytes, a multiple of a page, at this address of the chip.
+    /// `bytes` bytes, a multiple of a page, at this address of the chip.
     pub(crate) fn new(base: u32, bytes: u32, fill: u8) -> Self {
         let pages = vec![Page([fill; PAGE]); (bytes as usize).div_ceil(PAGE)];
         let first = Box::leak(pages.into_boxed_slice()).as_mut_ptr().cast();

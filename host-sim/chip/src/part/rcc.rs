@@ -12,7 +12,7 @@ const PLL_LOCK_S: f64 = 200e-6;
 const HCLK_MAX_HZ: f64 = 168e6;
 const PCLK1_MAX_HZ: f64 = 42e6;
 const PCLK2_MAX_HZ: f64 = 84e6;
-/// Flash requires one wait state for each full multiple of this frequency, at 2.7 to 3.6 V (RM0090, table 10).
+/// Flash requires one more wait state for each of these beyond the first, at 2.7 to 3.6 V (RM0090, table 10).
 const FLASH_HZ: f64 = 30e6;
 /// Maximum frequency with the regulator at scale 2 (RM0090, 5.4.1).
 const SCALE_2_MAX_HZ: f64 = 144e6;
