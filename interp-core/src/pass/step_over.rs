@@ -231,7 +231,9 @@ impl NeighbourLine {
         let is_first = before.is_none();
         self.task = match self.task {
             Task::Place => self.place(job, position, most, before),
-            _ if is_first && most > REPLACE_FACTOR * self.placed_for => self.place(job, position, most, before),
+            _ if is_first && most > REPLACE_FACTOR * self.placed_for => {
+                self.place(job, position, most, before)
+            }
             Task::Patch => self.make_patch(job, position, Task::Start),
             Task::Start => {
                 self.most = at_end(job, &self.patch, 0).at_least(self.most);
