@@ -23,7 +23,7 @@ use protocol::{
 
 const WORDS: usize = 64;
 
-/// The samples of the dome, by the core alone: all, or so many until a missed tick stops the run.
+/// The samples of the dome, by the core alone: all, or a given number until a missed tick stops the run.
 fn samples_of_dome(missed_after: Option<usize>) -> Vec<Sample> {
     let (header, words) = dome();
     let mut core = Interpolator::<[i32; WORDS]>::new();
@@ -57,7 +57,7 @@ fn digest(samples: &[Sample]) -> u64 {
     digest.value()
 }
 
-/// Host and board, and what the board has told by itself.
+/// Host and board, and the board's events.
 #[derive(Default)]
 struct Desk {
     host: Host,
@@ -219,7 +219,7 @@ fn time_stands_still_in_lockstep_without_credit() {
     );
     desk.ticks(100);
     assert_eq!(desk.samples, reference()[..25]);
-    // no time at all is used up at once
+    // a `Run` of 0 ticks is used up immediately
     assert_eq!(desk.run(0), status);
 }
 
@@ -249,7 +249,7 @@ fn an_abort_ends_the_run_and_keeps_the_job() {
     desk.accepted(&Request::Start);
     desk.run(100);
     desk.accepted(&Request::Abort);
-    // what comes behind an abort does not undo it
+    // a later command does not replace a queued abort
     desk.accepted(&Request::Hold);
     let status = desk.run(100);
     assert_eq!(
@@ -288,7 +288,7 @@ fn a_job_begun_withdraws_a_start_that_waits() {
             reason: Reason::Busy
         }
     );
-    // taken, but time stands still
+    // acknowledged, but time stands still
     desk.ticks(1);
     for request in &requests {
         desk.accepted(request);
@@ -386,7 +386,7 @@ fn in_lockstep_commands_and_halts_come_on_top_of_no_period() {
     assert_eq!(tick(&mut half), [Event::Sample(reference()[1])]);
     assert!(matches!(tick(&mut half)[..], [Event::Halted(status)] if status.credit == 0));
     assert_eq!(tick(&mut half), []);
-    // A halt that is due is told before more credit is used, and before the clock is another.
+    // A pending `Halted` is reported before further credit is used, and before the clock changes.
     assert_eq!(obey(&mut half, Instruction::Run { ticks: 1 }), []);
     assert_eq!(tick(&mut half), [Event::Sample(reference()[2])]);
     assert_eq!(obey(&mut half, Instruction::Run { ticks: 1 }), []);
@@ -476,7 +476,7 @@ fn a_tick_over_its_budget_trips_a_run_that_moves_on_a_free_clock() {
     );
     assert_eq!((status.deadline_misses, status.tick_cycles_max), (0, BUDGET + 9));
 
-    // in lockstep nobody waits for the tool
+    // in lockstep the link does not time out
     let mut desk = Desk::loaded(Clock::Lockstep, Report::Digests);
     desk.board.real_time().set_tick_budget(BUDGET);
     desk.accepted(&Request::Start);

@@ -20,7 +20,7 @@ const BYTE: u64 = 1_820;
 /// Time after a reset by which every output has to be at rest.
 const REST_US: u64 = 100;
 
-/// What is built once: the program that executes images, the tool, an image for each board.
+/// Built once: the emulator, the tool, an image for each board.
 struct Built {
     chip: PathBuf,
     sim: PathBuf,
@@ -56,7 +56,7 @@ fn built() -> &'static Built {
     })
 }
 
-/// The tool with these arguments; standard input is empty. Whether it succeeded, and all that it said.
+/// The tool with these arguments; standard input is empty. Returns whether it succeeded, and its output.
 fn sim<S: AsRef<std::ffi::OsStr>>(arguments: impl IntoIterator<Item = S>) -> (bool, String) {
     let output = Command::new(&built().sim)
         .args(arguments)
@@ -78,7 +78,7 @@ struct Emulated {
     folder: tempfile::TempDir,
 }
 
-/// What is left of it.
+/// Its remaining output.
 struct Ended {
     board: &'static Board,
     report: Value,
@@ -162,7 +162,7 @@ impl Emulated {
         self.wait()
     }
 
-    /// Waits until it ends by itself.
+    /// Waits for its end.
     fn wait(mut self) -> Ended {
         // `Child::wait` would close its input, which is its end.
         let status = loop {
@@ -685,7 +685,7 @@ fn disturbed(board: &'static Board, what: &str) -> (Ended, String, String) {
     (ended, said, status)
 }
 
-/// Emergency stop and drive fault let the drives go: at once, and after three looks. A limit switch stops the run along its path.
+/// Emergency stop and drive fault switch the drives off: immediately, and after three ticks. A limit switch stops the run along its path.
 #[test]
 fn each_safety_input_stops_the_run() {
     // From the edge on: the next tick and the time it takes; two more for a third look.
@@ -740,7 +740,7 @@ fn each_safety_input_stops_the_run() {
     }
 }
 
-/// The watchdog resets a chip whose processor hangs, 8 to 23 ms after it was last fed, whatever its clock; pulses stop by themselves before.
+/// The watchdog resets a chip whose processor hangs, 8 to 23 ms after it was last fed, at any LSI frequency; pulses stop earlier.
 #[test]
 fn a_processor_that_hangs_is_reset() {
     for (lsi_hz, us) in [("47000", 8_000), ("32000", 11_750), ("17000", 22_118)] {
@@ -778,7 +778,7 @@ fn a_hard_fault_puts_the_outputs_to_rest() {
     assert!(status.contains("last reset: watchdog"), "{status}");
 }
 
-/// The supply sags for a moment: the outputs float, are at rest again within 100 us, and stay there; the host is told why.
+/// Brown-out: the outputs float, are inactive again within 100 us, and stay inactive; the status reports the cause.
 #[test]
 fn a_brown_out_leaves_everything_at_rest() {
     for board in [&STM32F405, &SKR_PRO] {

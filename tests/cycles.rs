@@ -212,7 +212,7 @@ fn disassembly(image: &Path) -> Vec<(u32, String, String)> {
     tool.lines().filter_map(line).collect()
 }
 
-/// The class that a mnemonic stands for; words of several transfers as 0.
+/// The class of a mnemonic; words of several transfers as 0.
 fn class_of(mnemonic: &str, operands: &str) -> Class {
     let begins = |names: &[&str]| names.iter().any(|name| mnemonic.starts_with(name));
     let base = mnemonic.split('.').next().unwrap_or(mnemonic);

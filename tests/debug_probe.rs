@@ -1,5 +1,5 @@
-//! Flashing and the log as far as they go without a probe: images, the log's decoding, what is said where no probe is. Builds the
-//! program that talks to probes, which takes minutes the first time.
+//! Flashing and the log as far as they go without a probe: images, the log's decoding, messages without a probe. Builds the
+//! probe program, which takes minutes the first time.
 
 use std::fs::File;
 use std::io::Write;
@@ -17,7 +17,7 @@ use machine::remote::qemu::Qemu;
 
 use crate::images;
 
-/// A selector of no probe: whatever is connected where the tests run is left alone.
+/// A selector that matches no probe, so that probes connected to the test host are not used.
 const NOWHERE: &str = "0000:0000:nowhere";
 
 fn program() -> &'static Program {
@@ -78,7 +78,7 @@ fn the_image_for_qemu_is_for_no_chip() {
     }
 }
 
-/// Waits until the log's last line tells of this state; the firmware looks every 64 periods.
+/// Waits until the log's last line reports this state; the firmware reads the state every 64 periods.
 fn wait_for(qemu: &Qemu, state: &str) -> Vec<u8> {
     let begun = Instant::now();
     loop {
@@ -178,7 +178,7 @@ fn a_recorded_log_is_decoded_and_damage_costs_a_line() {
     damaged[second] ^= 0x55;
     let (after, _) = decoded(&damaged);
     assert!(after.ends_with(&lines[2..]) && after[0] == lines[0], "{after:?}");
-    // A reader that comes late begins within a frame.
+    // A reader that connects late begins within a frame.
     let (late, lost) = decoded(&log[second + 2..]);
     assert!(
         late.ends_with(&lines[2..]) && late.len() + lost <= lines.len(),
@@ -186,7 +186,7 @@ fn a_recorded_log_is_decoded_and_damage_costs_a_line() {
     );
 }
 
-/// What is said where no probe is, for each request that wants one; and of selectors that are none.
+/// Messages without a probe, for each command that requires one, and for invalid selectors.
 #[test]
 fn without_a_probe_that_is_what_is_said() {
     let image = chip_image();

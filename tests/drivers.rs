@@ -89,7 +89,7 @@ fn a_watchdog_that_takes_nothing_over_hangs_nobody() {
     assert!(!Watchdog::start(&mut iwdg, 93).is_settled());
 }
 
-/// In whole counts of a quarter of the LSI: never sooner than asked for at 47 kHz, and not a count later than need be.
+/// In whole counts of a quarter of the LSI: never shorter than the requested timeout at 47 kHz, and at most one count longer.
 #[test]
 fn the_watchdogs_time_holds_for_the_fastest_clock() {
     for least_us in [1, 86, 1000, 8000, 300_000] {
@@ -168,7 +168,7 @@ fn every_input_is_found_on_its_pin() {
     }
 }
 
-/// What stands for the pins where there are none is read as what it stands for.
+/// Simulated pin levels are decoded as the inputs that they simulate.
 #[test]
 fn simulated_pins_are_read_as_the_inputs_they_stand_for() {
     for board in BOARDS {

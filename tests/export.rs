@@ -12,11 +12,11 @@ use programs::checkout;
 
 /// The interpreter prints four decimals, and the program has four: a place is within half of each on every axis.
 const ROUNDED_MM: f64 = 1.8e-4;
-/// Places within a cut that are looked at.
+/// Points within a cut that are checked.
 const PLACES: u32 = 8;
 const CLEARANCE_MM: f64 = 3.0;
 
-/// What the interpreter tells a machine to do.
+/// Machine commands of the interpreter.
 #[derive(Clone, Copy, Debug)]
 struct Move {
     rapid: bool,
@@ -74,7 +74,7 @@ fn interpreter() -> PathBuf {
     }
 }
 
-/// What the interpreter makes of a program.
+/// The interpreter's output for a program.
 fn interpret(program: &str) -> Vec<Move> {
     let folder = tempfile::tempdir().unwrap();
     for (name, text) in [("program.ngc", program), ("tool.tbl", ""), ("parameters.var", "")] {
@@ -141,7 +141,7 @@ fn moves(canonical: &str) -> Vec<Move> {
     moves
 }
 
-/// What is allowed of an approach: distance of a cut's ends and of its inner places from the exact path, mm; deviation of
+/// Tolerances of an approach: distance of a cut's ends and of its inner places from the exact path, mm; deviation of
 /// the contact's speed from the feed, mean of a cut and mean of an eighth of it, shares.
 struct Bounds {
     ends_mm: f64,
@@ -274,7 +274,7 @@ fn check_step_over(job: &Job, pass: &PassPath<'_>, link: &[Move]) {
     }
 }
 
-/// What Grbl 1.1 takes: its line buffer, its words.
+/// Restrictions of Grbl 1.1: its line buffer, its words.
 fn check_grbl(program: &str) {
     const WORDS: [&str; 14] = [
         "G0", "G1", "G2", "G3", "G17", "G18", "G19", "G21", "G40", "G90", "G93", "G94", "M2", "M3",

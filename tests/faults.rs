@@ -162,7 +162,7 @@ fn surface_that_folds_over() {
 
 #[test]
 fn parameter_that_would_run_backwards() {
-    // x = u^3 all but stands still at its start: |A| grows a thousandfold within a step.
+    // x = u^3 has nearly zero speed at its start: |A| increases a thousandfold within a step.
     let surface = patch(&[(0, 3, 0, 20.0), (0, 1, 0, 1e-3), (1, 0, 1, 20.0)]);
     let (_, core) = run(&prepare(&job(surface, 1.0)).unwrap());
     let fault = core.fault().unwrap();
@@ -292,7 +292,7 @@ fn run_until(core: &mut Interpolator, reached: impl Fn(&Sample) -> bool) -> Samp
     sample
 }
 
-/// The samples of a stop, and the first that stands.
+/// The samples of a stop, and the first at standstill.
 fn stop(core: &mut Interpolator, command: Option<Command>) -> (Vec<Sample>, Sample) {
     let mut samples = Vec::new();
     loop {
@@ -359,7 +359,7 @@ fn a_fault_from_outside_stops_along_the_path() {
                 assert_eq!((before.path.span != last.path.span), backwards == (from > 0.4));
             }
 
-            // It stands where it came to a stop; the fault and the place say why and where.
+            // The tool stays where it stopped; the status reports fault and position.
             assert_eq!(core.fault(), Some(MISSED));
             assert_eq!(
                 standing,

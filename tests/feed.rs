@@ -115,7 +115,7 @@ fn height(header: &Header, words: &[i32]) -> (i32, u32) {
     (top, passes)
 }
 
-/// Runs a sample job with these limits, at so many times its feed: limits hold in every sample, links and standstills too; the passes are as
+/// Runs a sample job with these limits, at a multiple of its feed: limits hold in every sample, links and standstills too; the passes are as
 /// many as at constant feed.
 fn check_sample_job(name: &str, times: f32, pattern: Pattern, machine_of: fn(i32) -> AxisLimits) {
     let jobs = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("../jobs");
@@ -263,7 +263,7 @@ fn command(wait_max: u32) -> impl Strategy<Value = Step> {
 }
 
 /// Whatever is commanded, whenever: no limit is broken, the tool is on its path, what is held stands, and the passes lie where they lie in
-/// a run that nobody touches.
+/// a run without commands.
 fn check_commands(header: &Header, words: &[i32], whole: &[SpanParameter], commands: &[Step]) {
     let (samples, core) = scripted(header, words, commands);
     let axes = header.axes.as_ref().unwrap();
@@ -407,7 +407,7 @@ proptest! {
     }
 }
 
-/// A hold stands on the path within the time that braking takes, and goes on from there.
+/// A hold stops on the path within the braking time, and resumes from there.
 #[test]
 fn hold_and_resume() {
     let (header, words, _) = undisturbed(dome_within_limits(Pattern::Zig));
@@ -433,7 +433,7 @@ fn hold_and_resume() {
     assert_eq!(core.tick(Command::Resume).state, State::Running);
 }
 
-/// A stop leaves the surface, an abort stands on it; the next start begins anew from there.
+/// A stop retracts from the surface, an abort stays on it; the next start begins from that position.
 #[test]
 fn stop_and_abort() {
     let (header, words, _) = undisturbed(dome_within_limits(Pattern::Zigzag));
@@ -454,7 +454,7 @@ fn stop_and_abort() {
     }
 }
 
-/// What the axes cannot reach is found before the tool goes there.
+/// A point outside the travel is detected before the tool moves there.
 #[test]
 fn soft_limits_stop_before_the_pass() {
     let (mut header, words) = dome_within_limits(Pattern::Zig);

@@ -1,4 +1,4 @@
-//! Where a run begins: at the job's home and where the axes stand, which have to be one place. On a whole board with step outputs.
+//! Start of a run: the axes have to be at the job's home. On a whole board with step outputs.
 
 use controller::{in_process::Board, safety::DEBOUNCE_TICKS};
 use integration_tests::{HELLO, Host, MAKE_READY, dome, upload};
@@ -56,7 +56,7 @@ impl Desk {
         desk
     }
 
-    /// Drives on, and the axes declared to stand here.
+    /// Switches the drives on, and declares the position of the axes.
     fn homed(home_nm: [i32; 3]) -> Self {
         let mut desk = Self::new();
         desk.ask(Request::Drives { on: true }).unwrap();
@@ -114,7 +114,7 @@ impl Desk {
         self.ask(Request::Start)
     }
 
-    /// Starts, and goes on to the end.
+    /// Starts, and runs to the end.
     fn run(&mut self) -> Status {
         self.start().unwrap();
         loop {
@@ -135,7 +135,7 @@ impl Desk {
         assert_eq!(self.board.status().state, State::Running);
     }
 
-    /// Waits for the machine to stand.
+    /// Waits for standstill.
     fn stopped(&mut self, state: State) -> [i32; 3] {
         while self.board.status().state.is_under_way() {
             self.ticks(1);
@@ -314,7 +314,7 @@ fn where_no_home_is_required_the_axes_count_as_standing_at_the_jobs() {
             (Some(&home_nm), Some(&home_nm))
         );
     }
-    // Given up, it goes on from where it is; after an emergency stop nobody knows where that is.
+    // After an abort a run starts from the present position; after an emergency stop the position is unknown.
     desk.running();
     desk.ask(Request::Abort).unwrap();
     let at = desk.stopped(State::Ready);
@@ -329,7 +329,7 @@ fn where_no_home_is_required_the_axes_count_as_standing_at_the_jobs() {
     assert_eq!(desk.start(), elsewhere(ELSEWHERE_NM, Some(HOME_NM)));
 }
 
-/// Nothing leads from pass to pass there, so nobody knows where the axes are behind it.
+/// A job without limits has no links between passes, so the position of the axes is unknown after it.
 #[test]
 fn after_a_job_without_limits_home_is_declared_anew() {
     let mut desk = Desk::new();

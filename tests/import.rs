@@ -299,7 +299,7 @@ fn formats_units_and_placements_agree() {
     }
 }
 
-/// Runs so many samples of a job, and on to the end of the pass.
+/// Runs a given number of samples of a job, and on to the end of the pass.
 fn worst_nm(job: &Job, most: u64) -> (f64, f64, u64, Option<String>) {
     let oracle = Oracle::new(job).unwrap();
     let prepared = prepare(job).unwrap();
@@ -323,7 +323,7 @@ fn worst_nm(job: &Job, most: u64) -> (f64, f64, u64, Option<String>) {
     )
 }
 
-/// A job on every face: the ball that import chooses fits, and every sample is where the oracle wants it.
+/// A job on every face: the ball that import chooses fits, and every sample agrees with the oracle.
 #[test]
 fn samples_on_every_face() {
     for (name, ..) in FILES {
@@ -423,7 +423,7 @@ fn trimmed_faces_are_said() {
     );
 }
 
-/// The sample jobs that name a file: they load, prepare, and their samples are where the oracle wants them.
+/// The sample jobs that name a file: they load, prepare, and their samples agree with the oracle.
 #[test]
 fn sample_jobs_out_of_files() {
     for (name, patches) in [("blade", 12), ("hood", 247)] {
@@ -479,7 +479,7 @@ fn jobs_that_name_a_file() {
     }
 }
 
-/// Files that are broken, cut short, mislabelled or made to harm: each is refused in a moment, with a word on what is wrong.
+/// Files that are broken, cut short, mislabelled or made to harm: each is refused quickly, with a message that names the error.
 #[test]
 fn hostile_files() {
     let folder = workspace().join("tests/hostile_cad");

@@ -4,7 +4,7 @@
 use std::path::Path;
 use std::process::{Command, Output};
 
-/// What the linker says where a panic can be reached.
+/// The linker's message for a reachable panic.
 const MISSING: &str = "a_panic_can_be_reached_from_the_sample_task";
 
 /// Builds the image, in the folder of the image for QEMU, whose crates it shares.

@@ -6,14 +6,14 @@ use integration_tests::golden::{self, Case, Point};
 use job::{Along, Spacing};
 use oracle::Oracle;
 
-/// What f64 leaves of 16 digits after the longest of these formulas, relative to the size of what is computed.
+/// Relative rounding error of f64 in the longest of these formulas.
 const TOLERANCE: f64 = 2e-13;
 
 /// Steps of the table's scan for the least interval of a pass. The oracle looks between them as well.
 const GOLDEN_SCAN: u32 = 4000;
-/// What that scan misses of an interval, relative, and with it of a side parameter; 1.2e-8 was found.
+/// Relative error of an interval by that scan, and so of a side parameter; 1.2e-8 was measured.
 const GOLDEN_SCAN_ERROR: f64 = 2e-8;
-/// The table's lengths come from a trapezoidal rule on the same steps; 2.7e-8 was found.
+/// The table's lengths come from a trapezoidal rule on the same steps; an error of 2.7e-8 was measured.
 const GOLDEN_LENGTH_ERROR: f64 = 3e-8;
 
 /// The job file of a golden case, and its oracle.

@@ -197,7 +197,7 @@ fn data_of_the_figures() {
     }
 }
 
-/// What of the page could load something from elsewhere.
+/// Attributes of the page that could load external resources.
 fn loads(page: &str) -> Vec<&str> {
     [
         "src=", "href=", "url(", "@import", "<script", "<iframe", "<link", "://",

@@ -49,7 +49,7 @@ fn steps() -> StepConfig {
     }
 }
 
-/// What the axes of a machine with limits can do.
+/// Axis limits of the test jobs.
 fn axes() -> AxisLimits {
     AxisLimits {
         velocity_mm_s: [100.0, 80.0, 50.0],

@@ -239,7 +239,7 @@ fn refusals_change_nothing() {
     assert_eq!((status.samples, status.digest), (samples, digest));
 }
 
-/// What the board says next that it has halted with.
+/// The status of the board's next `Halted`.
 fn halted(session: &mut Session) -> Status {
     loop {
         if let Event::Halted(status) = session.event().unwrap() {
@@ -248,7 +248,7 @@ fn halted(session: &mut Session) -> Status {
     }
 }
 
-/// The emergency stop, on pins that the host sets: through the firmware's drivers, in the tick that comes next, and undone in order.
+/// The emergency stop, on pins that the host sets: through the firmware's drivers, in the next tick, and cleared in order.
 #[test]
 fn an_emergency_stop_ends_the_run_on_the_board() {
     let job = job("sphere_cap");
@@ -296,8 +296,8 @@ fn an_emergency_stop_ends_the_run_on_the_board() {
     assert_eq!((again.samples, again.digest), (500, stopped.digest));
 }
 
-/// On the board's own clock: nobody asks for two seconds of its time, and the run is held; asked again it goes on. That it
-/// goes on exactly is seen in `tests/safety.rs`; here each stand is compared with this machine's run so far.
+/// On the board's free clock: without a frame for two seconds of its time the run is held; it is then resumed. That it
+/// resumes exactly is checked in `tests/safety.rs`; here each standstill is compared with the run in this process so far.
 #[test]
 fn a_run_whose_host_is_gone_is_held_on_the_board() {
     let job = job("sphere_cap");

@@ -9,7 +9,7 @@ use proptest::prelude::*;
 use proptest::test_runner::RngSeed;
 use verify::survey::Survey;
 
-/// What a job comes to: its fault and where, and the worst figures.
+/// Result of a job: its fault with the position, and the worst figures.
 struct Ran {
     fault: Option<Fault>,
     position_nm: f64,
@@ -24,7 +24,7 @@ struct Ran {
     neighbour: Option<[f64; 2]>,
 }
 
-/// Runs so many samples, and on to the end of the pass: the survey knows a pass's last step by what follows.
+/// Runs a given number of samples, and on to the end of the pass, because the survey needs the sample after a pass's last step.
 fn run(job: &Job, most: u64) -> Ran {
     let oracle = Oracle::new(job).unwrap();
     let prepared = prepare(job).unwrap();
@@ -188,7 +188,7 @@ fn either<T: Clone + std::fmt::Debug + 'static>(a: T, b: T) -> impl Strategy<Val
     prop_oneof![Just(a), Just(b)]
 }
 
-/// The same 200 cases each time; ISOFEED_CASES asks for that many others, drawn anew.
+/// The same 200 cases each time; ISOFEED_CASES sets another number of newly drawn cases.
 fn campaign() -> ProptestConfig {
     let config = ProptestConfig {
         failure_persistence: None,

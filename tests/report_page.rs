@@ -1,4 +1,4 @@
-//! The report's page in a headless Chromium: what is drawn, what it says, what the mouse does, and that it asks for nothing.
+//! The report's page in a headless Chromium: drawing, text, mouse actions, and no external requests.
 
 mod browser;
 

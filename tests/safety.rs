@@ -63,7 +63,7 @@ struct Desk {
 }
 
 impl Desk {
-    /// In session, with the dome loaded, told this.
+    /// In session, with the dome loaded and this configuration.
     fn loaded(setup: &Setup) -> Self {
         let board = Arc::new(Mutex::new(Board::new()));
         let mut desk = Self {
@@ -275,7 +275,7 @@ fn a_host_that_is_gone_finds_its_run_held_and_goes_on_exactly() {
     // The next run begins with a host.
     assert!(!desk.running().safety.link_timed_out);
 
-    // In lockstep there is nobody to miss.
+    // In lockstep there is no link timeout.
     let mut desk = Desk::loaded(&Setup::homed(configuration(LinkTimeoutAction::Hold), [0; 3]));
     desk.ask(Request::Clock(Clock::Lockstep)).unwrap();
     desk.ask(Request::Start).unwrap();
@@ -351,7 +351,7 @@ fn a_host_that_waits_is_not_gone() {
 /// Wants one thing after the other, and remembers what came of it.
 struct Scripted {
     wishes: std::vec::IntoIter<Request>,
-    /// Waits for what comes of it.
+    /// Waits for the result.
     stays: bool,
     came: Vec<Result<State, String>>,
 }
@@ -408,7 +408,7 @@ fn an_operator_commands_a_run_that_is_followed() {
     let (compared, _) = run(vec![Request::Status]);
     assert_eq!((compared.commanded, compared.first_bad_pass), (false, Some(0)));
 
-    // Who holds the run and goes away leaves nobody to wait for.
+    // After a hold by a host that disconnects, the run is not waited for.
     let mut desk = Desk::ready();
     let mut operator = Scripted {
         wishes: vec![Request::Hold].into_iter(),

@@ -1,4 +1,4 @@
-//! A session between host and board, step by step, against a machine that writes down what it is told: each thing that
+//! A session between host and board, step by step, with a machine that records its calls: each thing that
 //! can go wrong has its answer, and changes nothing.
 
 mod safety;

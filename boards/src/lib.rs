@@ -1,20 +1,20 @@
-//! The boards that the firmware runs on: which chip, which pin is what, where it is found on a connector.
+//! The boards that the firmware runs on: chip, pin assignment, position of each pin on the connectors.
 //!
 //! ```text
-//! skr_pro.rs, stm32f405.rs   a board each: its table of lines
+//! skr_pro.rs, stm32f405.rs   one board per file: its table of lines
 //!        │
-//!        ├─► setup.rs ──► firmware     what the pin registers are set to, computed when the firmware is built
-//!        ├─► firmware's drivers        which bits are step pulses, which level of an input is the alarm
-//!        ├─► `cargo sim flash`, `log`  which chip to look for, which image to write
-//!        └─► tests                     no pin twice, each on its package, steps on one port; the guide's tables
+//!        ├─► setup.rs ──► firmware     the values of the pin registers, computed at compile time
+//!        ├─► firmware's drivers        the bits of the step pulses, the active level of each input
+//!        ├─► `cargo sim flash`, `log`  the chip to connect to, the image to write
+//!        └─► tests                     no pin twice, each on its package, step pins on one port; the guide's tables
 //! ```
 //!
 //! To add a board, add its file here and to [`BOARDS`], its feature and file in `firmware`, and its alias in
 //! `.cargo/config.toml`.
 //!
-//! **Inputs fail to the safe side.** A switch is closed in the good case and pulls its pin to ground; it opens when it is
-//! pressed, and then the pull-up makes the pin high, as it does when a wire breaks or a plug is out. So the active level of
-//! every input is [`Level::High`]. An input that is not used is bridged to ground.
+//! **Inputs are fail-safe.** Switches are normally closed and pull their pin to ground; a switch opens when it is
+//! pressed, and the pull-up then makes the pin high, as with a broken wire or a disconnected plug. So the active level of
+//! every input is [`Level::High`]. Unused inputs are bridged to ground.
 #![no_std]
 
 pub mod setup;
@@ -26,7 +26,7 @@ mod tests;
 pub use skr_pro::SKR_PRO;
 pub use stm32f405::STM32F405;
 
-/// Every board with a chip. (QEMU's board has no pins; it stands for [`STM32F405`].)
+/// Every board with a chip. (QEMU's board has no pins; it uses the table of [`STM32F405`].)
 pub const BOARDS: [&Board; 2] = [&STM32F405, &SKR_PRO];
 
 /// A board.
@@ -34,19 +34,19 @@ pub const BOARDS: [&Board; 2] = [&STM32F405, &SKR_PRO];
 pub struct Board {
     /// Its name on the command line.
     pub id: &'static str,
-    /// Its name for people.
+    /// Its display name.
     pub name: &'static str,
     /// Its chip.
     pub chip: Chip,
     /// The crystal, MHz.
     pub crystal_mhz: u32,
-    /// The alias of cargo's that builds its image, and the folder under `target/` that it is built in.
+    /// The Cargo alias that builds its image, and the image's folder under `target/`.
     pub build: (&'static str, &'static str),
-    /// Every pin that is used or held at rest.
+    /// Every pin that is used or held inactive.
     pub lines: &'static [Line],
 }
 
-/// A chip, as its reference manual (RM0090) and a debug probe know it.
+/// A chip: its identity in the reference manual (RM0090) and in probe-rs, and its package.
 #[derive(Clone, Copy, Debug)]
 pub struct Chip {
     /// Its name in probe-rs.
@@ -55,20 +55,20 @@ pub struct Chip {
     pub device_id: u16,
     /// Flash, bytes, from [`FLASH_BEGIN`] on.
     pub flash_bytes: u32,
-    /// What pins there are.
+    /// The package, which determines the available pins.
     pub package: Package,
 }
 
-/// Name of the symbol in an image of the firmware under which its board is found: [`Board::mark`], [`MARK_BYTES`] long.
+/// Symbol in a firmware image that contains the board's name: [`Board::mark`], [`MARK_BYTES`] long.
 pub const MARK_SYMBOL: &str = "isofeed_board";
 
-/// Room for a board's name in an image.
+/// Maximum length of a board's name in an image, bytes.
 pub const MARK_BYTES: usize = 24;
 
-/// Where flash begins.
+/// First address of flash.
 pub const FLASH_BEGIN: u32 = 0x0800_0000;
 
-/// Housings of the STM32F405 and F407, by the pins that they lead out (data sheet DS8626, table 7).
+/// Packages of the STM32F405 and F407 (data sheet DS8626, table 7).
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Package {
     /// 64 pins: ports A to C, PD2, PH0, PH1.
@@ -78,7 +78,7 @@ pub enum Package {
 }
 
 impl Package {
-    /// Whether it leads this pin out.
+    /// Whether the package has this pin.
     #[must_use]
     pub const fn has(self, pin: Pin) -> bool {
         let number = pin.number;
@@ -120,7 +120,7 @@ impl Port {
         Self::H,
     ];
 
-    /// 0 for A: the place among the ports' registers, and the bit in `RCC_AHB1ENR`.
+    /// 0 for A: the index of the port's registers, and its bit in `RCC_AHB1ENR`.
     #[must_use]
     pub const fn index(self) -> usize {
         self as usize
@@ -179,14 +179,14 @@ impl Axis {
     pub const ALL: [Self; 3] = [Self::X, Self::Y, Self::Z];
 }
 
-/// What a pin is for, and so what its active level means.
+/// The function of a pin, which defines its active level.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Role {
-    /// Output: a pulse to the active level is a step.
+    /// Output: each pulse to the active level is a step.
     Step(Axis),
     /// Output: active while the axis moves towards plus.
     Direction(Axis),
-    /// Output: active, the drive holds its motor.
+    /// Output: active enables the drive.
     Enable(Axis),
     /// Input: active at the lower end of the axis.
     LimitMin(Axis),
@@ -196,18 +196,18 @@ pub enum Role {
     EmergencyStop,
     /// Input: active when a drive reports a fault.
     DriveFault,
-    /// Output: active, the status LED shines.
+    /// Output: active lights the status LED.
     StatusLed,
     /// USART1, to the host.
     SerialTx,
     /// USART1, from the host.
     SerialRx,
-    /// Output that is never active: what else hangs on the board stays off.
+    /// Output that is never active: keeps other loads on the board off.
     Parked,
 }
 
 impl Role {
-    /// A number for each role: what `==` would compare, where it cannot be used yet (constants).
+    /// A number for each role, for comparison in constants, where `==` is not available.
     const fn key(self) -> u8 {
         match self {
             Self::Step(axis) => axis as u8,
@@ -255,13 +255,13 @@ impl core::fmt::Display for Role {
 /// A pin in its role.
 #[derive(Clone, Copy, Debug)]
 pub struct Line {
-    /// What for.
+    /// The function.
     pub role: Role,
     /// The pin.
     pub pin: Pin,
-    /// The level that means it (see [`Role`]).
+    /// The active level (see [`Role`]).
     pub active: Level,
-    /// Where it is found on the board.
+    /// Its position on the board.
     pub place: &'static str,
 }
 
@@ -308,7 +308,7 @@ pub struct AxisLines {
 }
 
 impl Board {
-    /// The board's name as it lies in an image of the firmware: filled up with zeros.
+    /// The board's name as stored in a firmware image, padded with zeros.
     #[must_use]
     pub const fn mark(&self) -> [u8; MARK_BYTES] {
         let id = self.id.as_bytes();
@@ -322,10 +322,10 @@ impl Board {
         mark
     }
 
-    /// The line of this role. To be used in constants, where a missing one is an error of the build.
+    /// The line of this role. For use in constants, where a missing line is a compile error.
     ///
     /// # Panics
-    /// The board has none.
+    /// The board has no such line.
     #[must_use]
     pub const fn line(&self, role: Role) -> Line {
         let mut index = 0;
@@ -338,7 +338,7 @@ impl Board {
         panic!("the board has no line of this role")
     }
 
-    /// The lines of an axis. To be used in constants, likewise.
+    /// The lines of an axis. For use in constants, like [`Self::line`].
     #[must_use]
     pub const fn axis(&self, axis: Axis) -> AxisLines {
         AxisLines {
@@ -353,7 +353,7 @@ impl Board {
     /// The port that all step pins are on: one transfer to its `BSRR` steps any of the axes at the same instant.
     ///
     /// # Panics
-    /// They are on several; to be used in constants, likewise.
+    /// The step pins are on several ports. For use in constants, like [`Self::line`].
     #[must_use]
     pub const fn step_port(&self) -> Port {
         let port = self.line(Role::Step(Axis::X)).pin.port;

@@ -1,19 +1,19 @@
-//! What the pin registers are set to, computed from the table of lines when the firmware is built (RM0090, 8.4).
+//! The values of the pin registers, computed from the table of lines at compile time (RM0090, 8.4).
 
 use crate::{Line, Port, Role};
 
 /// `MODER`: an output.
 const OUTPUT: u32 = 0b01;
-/// `MODER`: left to a peripheral.
+/// `MODER`: alternate function.
 const ALTERNATE: u32 = 0b10;
-/// `OSPEEDR` of step and direction, medium speed (25 MHz): edges of 10 ns, short beside pulses of 1 us, that a cable bears.
+/// `OSPEEDR` of step and direction, medium speed (25 MHz): edges of 10 ns, short compared with pulses of 1 us and slow enough for a cable.
 const MEDIUM: u32 = 0b01;
 /// `PUPDR`: pulled up.
 const PULL_UP: u32 = 0b01;
 /// `AFR`: USART1.
 const USART1: u32 = 7;
 
-/// What is to change in a register: these bits to that value, the rest stays.
+/// A masked write of a register: the bits to change and their values.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Field {
     /// Bits that change.
@@ -39,10 +39,10 @@ impl Field {
     }
 }
 
-/// The registers of one port. To be written in this order, so that an output appears at its inactive level at once.
+/// The registers of one port. Write them in this order, so that each output starts at its inactive level.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct PortSetup {
-    /// `BSRR`, written as it is: every output inactive.
+    /// `BSRR`, written without a mask: every output inactive.
     pub set_reset: u32,
     /// `OSPEEDR`.
     pub speed: Field,
@@ -66,13 +66,13 @@ impl PortSetup {
         }
     };
 
-    /// Whether the port has a line at all.
+    /// Whether the port has a line.
     #[must_use]
     pub const fn is_used(&self) -> bool {
         self.mode.mask != 0
     }
 
-    /// With one line more.
+    /// The registers with one more line.
     const fn with(mut self, line: &Line) -> Self {
         let number = line.pin.number;
         match line.role {
@@ -110,7 +110,7 @@ pub const fn ports(lines: &[Line]) -> [PortSetup; Port::ALL.len()] {
     ports
 }
 
-/// What goes to each port's `BSRR` to make every output inactive; 0 where a port has none.
+/// The word for each port's `BSRR` that makes every output inactive; 0 where a port has no output.
 #[must_use]
 pub const fn rest(lines: &[Line]) -> [u32; Port::ALL.len()] {
     let ports = ports(lines);
@@ -125,11 +125,11 @@ pub const fn rest(lines: &[Line]) -> [u32; Port::ALL.len()] {
 
 /// `RCC_AHB1ENR`, whose lowest bits are the ports' clocks (RM0090, 7.3.10).
 const PORT_CLOCKS: u32 = 0x4002_3830;
-/// The registers of port A; those of the next lie [`PORT_BYTES`] further (RM0090, 2.3).
+/// The registers of port A; those of the next are [`PORT_BYTES`] higher (RM0090, 2.3).
 const PORTS_BEGIN: u32 = 0x4002_0000;
 const PORT_BYTES: u32 = 0x400;
 
-/// A register is read, some bits are cleared, some are set, and it is written: three words, as the code right after a reset reads them.
+/// A read-modify-write of a register: three words, in the layout that the reset code reads.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Write {
@@ -141,10 +141,10 @@ pub struct Write {
     pub set: u32,
 }
 
-/// Registers that are written for a port: `BSRR`, `OSPEEDR`, `PUPDR`, `AFRL`, `AFRH`, `MODER`.
+/// Registers written per port: `BSRR`, `OSPEEDR`, `PUPDR`, `AFRL`, `AFRH`, `MODER`.
 const PORT_WRITES: usize = 6;
 
-/// How many [`writes`] these lines need.
+/// The number of [`writes`] for these lines.
 #[must_use]
 pub const fn writes_count(lines: &[Line]) -> usize {
     let ports = ports(lines);
@@ -159,11 +159,11 @@ pub const fn writes_count(lines: &[Line]) -> usize {
     count
 }
 
-/// All that sets the pins up, in order: the ports' clocks; the same once more, whose read waits for them (ES0182, 2.1.13); then each port, its
-/// outputs inactive before they are outputs.
+/// All writes that set up the pins, in order: the ports' clocks; the same write again, whose read waits for the clocks (ES0182, 2.1.13); then each port, with its
+/// output levels inactive before the pins become outputs.
 ///
 /// # Panics
-/// `N` is not [`writes_count`]. For constants.
+/// `N` is not [`writes_count`]. For use in constants.
 #[must_use]
 pub const fn writes<const N: usize>(lines: &[Line]) -> [Write; N] {
     let ports = ports(lines);

@@ -1,18 +1,18 @@
 //! BIGTREETECH SKR Pro V1.2: STM32F407ZGT6, 8 MHz crystal, six sockets for step drivers.
 //!
-//! Read from the maker's schematic (`SKR-PRO-V1.2/Schematic/SKR-PRO-V1.2.PDF`) and pin diagram
-//! (`SKR-PRO-V1.2/manual/SKR-PRO-V1.2PIN.PDF`, both in the repository bigtreetech/BIGTREETECH-SKR-PRO-V1.1), and compared
+//! Sources: the manufacturer's schematic (`SKR-PRO-V1.2/Schematic/SKR-PRO-V1.2.PDF`) and pin diagram
+//! (`SKR-PRO-V1.2/manual/SKR-PRO-V1.2PIN.PDF`, both in the repository bigtreetech/BIGTREETECH-SKR-PRO-V1.1), compared
 //! with Marlin's `pins_BTT_SKR_PRO_common.h` and Klipper's `generic-bigtreetech-skr-pro.cfg`, which agree.
 //!
-//! What the choice rests on:
-//! - Step pins of X, Y and Z (and E0) are all on port E, as DMA into one set/reset register wants it.
-//! - Each endstop socket has 4.7 kOhm to 3.3 V, 100 nF to ground (0.5 ms) and a red LED that shines while the pin is high:
-//!   with switches that open when pressed, it shines when the limit is reached. The sockets E0, E1, E2 take the upper ends.
-//! - Emergency stop and drive fault are on the header EXTENSION-1, which nothing else uses: PC9 lies beside ground, so that a
+//! Reasons for the assignment:
+//! - Step pins of X, Y and Z (and E0) are all on port E, as required by DMA into one set/reset register.
+//! - Each endstop socket has 4.7 kOhm to 3.3 V, 100 nF to ground (0.5 ms) and a red LED that is lit while the pin is high:
+//!   with normally closed switches, it is lit when the limit is reached. The sockets E0, E1, E2 take the upper ends.
+//! - Emergency stop and drive fault are on the header EXTENSION-1, which nothing else uses: PC9 is next to ground, so that a
 //!   two-pole plug fits. The header has no filter; the chip's pull-up (40 kOhm) holds the line.
 //! - USART1 is on the TFT socket, at 3.3 V. USB goes to the OTG port, which this firmware does not use.
-//! - The LED D13 hangs on PA7 by 1 kOhm and shines when the pin is high.
-//! - Heaters and fans are switched by MOSFETs whose inputs are active high, the other three drivers are enabled low: all are
+//! - The LED D13 is connected to PA7 through 1 kOhm and is lit while the pin is high.
+//! - Heaters and fans are switched by MOSFETs whose inputs are active high, the enable inputs of the other three drivers are active low: all are
 //!   kept off.
 
 use crate::{

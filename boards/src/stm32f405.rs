@@ -1,8 +1,8 @@
-//! A bare STM32F405RG (or any F405, F407 in a larger housing) with an 8 MHz crystal, and drives and switches wired to its pins.
+//! A bare STM32F405RG (or any F405, F407 in a larger package) with an 8 MHz crystal, and drives and switches wired to its pins.
 //!
-//! The pins are all in the smallest housing, and so on any board that leads them out; the LED is the Olimex STM32-H405's. What
-//! the choice rests on: step pins on one port, for DMA into one set/reset register; inputs on eight different lines of the
-//! interrupt controller; nothing on the pins of debugger, crystals, boot and USB, nor on PC13 to PC15, which drive next to nothing.
+//! All pins are in the smallest package, and so in every package; the LED is the Olimex STM32-H405's. Reasons for
+//! the assignment: step pins on one port, for DMA into one set/reset register; inputs on eight different lines of the
+//! interrupt controller; no use of the pins of debugger, crystals, boot and USB, nor of PC13 to PC15, whose output current is limited to 3 mA.
 
 use crate::{
     Axis::{X, Y, Z},

@@ -1,4 +1,4 @@
-//! What every table has to satisfy, and register values against the reference manual's fields, pin by pin.
+//! Checks of every board table, and register values compared with the reference manual's fields, pin by pin.
 
 extern crate std;
 
@@ -8,7 +8,7 @@ use std::vec::Vec;
 use crate::setup::{PortSetup, ports, writes, writes_count};
 use crate::{Axis, BOARDS, Board, Level, Line, Pin, Port, Role, SKR_PRO, STM32F405};
 
-/// Pins that are never to be used: SWD, the crystal, BOOT1, the clock crystal's and PC13 (which drive next to nothing), USB.
+/// Reserved pins: SWD, the crystal, BOOT1, the RTC crystal's and PC13 (limited to 3 mA), USB.
 const RESERVED: [Pin; 10] = [
     Pin::new(Port::A, 13),
     Pin::new(Port::A, 14),
@@ -50,7 +50,7 @@ fn inputs(board: &Board) -> impl Iterator<Item = &'static Line> {
         .filter(|line| line.role.is_input() && line.role != Role::SerialRx)
 }
 
-/// Each role once, no pin twice, each pin on the package and free.
+/// Each role occurs once, no pin twice, and each pin is on the package and not reserved.
 #[test]
 fn tables_are_whole_and_pins_are_free() {
     for board in BOARDS {
@@ -77,7 +77,7 @@ fn tables_are_whole_and_pins_are_free() {
     }
 }
 
-/// One transfer steps all axes; each axis by a bit of its own.
+/// One transfer steps all axes, each by a separate bit.
 #[test]
 fn steps_are_on_one_port() {
     for board in BOARDS {
@@ -90,7 +90,7 @@ fn steps_are_on_one_port() {
     assert_eq!((SKR_PRO.step_port(), STM32F405.step_port()), (Port::E, Port::C));
 }
 
-/// A broken wire is an alarm; the emergency stop could have an interrupt of its own (one line for each pin number).
+/// A broken wire asserts the input; the emergency stop could have a separate interrupt (one EXTI line per pin number).
 #[test]
 fn inputs_fail_to_the_safe_side() {
     for board in BOARDS {
@@ -117,7 +117,7 @@ fn packages_have_as_many_pins_as_the_data_sheet_says() {
     }
 }
 
-/// The registers after reset (RM0090, 8.4.1 to 8.4.4), set up, and read back pin by pin.
+/// The registers from their reset values (RM0090, 8.4.1 to 8.4.4), set up, and read back pin by pin.
 #[test]
 fn registers_say_what_the_table_says() {
     for board in BOARDS {
@@ -174,7 +174,7 @@ fn registers_say_what_the_table_says() {
     }
 }
 
-/// Hand-made values of one port, from the manual's figures: PE9, PE11, PE13 step and PE8 direction, outputs of medium speed, low;
+/// Values of one port computed by hand from the manual's figures: PE9, PE11, PE13 step and PE8 direction, outputs of medium speed, low;
 /// PE5, PE6 low; PE10, PE12, PE15 inputs with pull-ups.
 #[test]
 fn port_e_of_the_skr_pro_is_as_worked_out_by_hand() {
@@ -184,14 +184,14 @@ fn port_e_of_the_skr_pro_is_as_worked_out_by_hand() {
         ..e
     };
     assert_eq!(e, expected);
-    // Two bits a pin, from 15 down:  15 14 13 12  11 10  9  8   7  6  5  4   3 2 1 0
+    // Two bits per pin, from 15 down:  15 14 13 12  11 10  9  8   7  6  5  4   3 2 1 0
     assert_eq!(e.mode.value, 0b00_00_01_00_01_00_01_01_00_01_01_00_00_00_00_00);
     assert_eq!(e.mode.mask, 0b11_00_11_11_11_11_11_11_00_11_11_00_00_00_00_00);
     assert_eq!(e.speed.value, 0b00_00_01_00_01_00_01_01_00_00_00_00_00_00_00_00);
     assert_eq!(e.pull.value, 0b01_00_00_01_00_01_00_00_00_00_00_00_00_00_00_00);
 }
 
-/// Written one after the other to the registers after reset, the writes leave what the fields say, and no output before its level.
+/// The writes, applied in order to the reset values, produce the required fields, and no pin becomes an output before its level is set.
 #[test]
 fn the_writes_of_a_reset_are_the_fields() {
     fn check<const N: usize>(board: &Board) {
@@ -226,7 +226,7 @@ fn the_writes_of_a_reset_are_the_fields() {
     check::<{ writes_count(SKR_PRO.lines) }>(&SKR_PRO);
 }
 
-/// What the drivers write for a level, both ways round.
+/// The words that the drivers write for active and inactive, for both active levels.
 #[test]
 fn outputs_are_active_at_their_level() {
     let enable = SKR_PRO.axis(Axis::X).enable;

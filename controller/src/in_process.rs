@@ -1,4 +1,4 @@
-//! A board on the desk: both halves joined by plain calls, a byte stream on one side, ticks on the other.
+//! A board within the host process: both halves connected by function calls, with a byte stream and ticks as its interface.
 
 use std::collections::VecDeque;
 use std::vec::Vec;
@@ -17,7 +17,7 @@ use crate::{
     safety::Order,
 };
 
-/// Instructions that may wait for the next tick, as in the firmware.
+/// Capacity of the instruction queue, as in the firmware.
 pub const COMMANDS_MAX: usize = 4;
 
 /// An unbounded queue of events.
@@ -32,7 +32,7 @@ impl Events for Vec<Event> {
     }
 }
 
-/// The real-time half and the queue before it: what the link talks to.
+/// The real-time half and its instruction queue: the link's [`Machine`].
 #[derive(Debug, Default)]
 struct Half<const WORDS: usize> {
     real_time: RealTime<[i32; WORDS]>,
@@ -103,7 +103,7 @@ impl<const WORDS: usize> Machine for Half<WORDS> {
     }
 }
 
-/// The whole board but for its pins.
+/// The whole board except its pins.
 #[derive(Debug, Default)]
 pub struct Board<const WORDS: usize = STORE_WORDS> {
     half: Half<WORDS>,
@@ -112,13 +112,13 @@ pub struct Board<const WORDS: usize = STORE_WORDS> {
 }
 
 impl<const WORDS: usize> Board<WORDS> {
-    /// A board as after power-up.
+    /// A board after power-up.
     #[must_use]
     pub fn new() -> Self {
         Self::default()
     }
 
-    /// Bytes from the host, as they come off the line.
+    /// Receives bytes from the host.
     pub fn receive(&mut self, bytes: &[u8]) {
         let sent = &mut self.sent;
         for byte in bytes {
@@ -128,12 +128,12 @@ impl<const WORDS: usize> Board<WORDS> {
         }
     }
 
-    /// One tick of the sample timer, with its events on the line afterwards.
+    /// One tick of the sample timer; its events are then written to the line.
     pub fn tick(&mut self) {
         self.tick_with(0, 0);
     }
 
-    /// One tick of the sample timer with the number missed before it and the cycles of the last one.
+    /// One tick of the sample timer with the number of ticks missed before it and the cycles of the previous tick.
     pub fn tick_with(&mut self, missed: u32, cycles: u32) {
         let mut events = Vec::new();
         if let Some(command) = self.half.commands.pop_front() {

@@ -1,4 +1,4 @@
-//! The board's logic without the board, so that the firmware and a test on the desk run the same code.
+//! The hardware-independent logic of the board, so that the firmware and host tests run the same code.
 //!
 //! ```text
 //!            idle, or a low-priority task          |        sample timer, one call a period
@@ -8,10 +8,10 @@
 //!  bytes ◄── Link ◄── Event ───────────────────────┼──queue───────┘
 //! ```
 //!
-//! [`realtime::RealTime`] owns the interpolator and decides, once a timer tick, whether a period passes; it keeps the
+//! [`realtime::RealTime`] owns the interpolator and decides, once per timer tick, whether a period passes; it keeps the
 //! digests and counters of the run. [`link::Link`] keeps the session with the host: it reads frames, answers every
-//! request, and writes events. Between them stands [`machine::Machine`], which the firmware implements with short locks
-//! and a queue, and the desk with plain calls (`in_process`, feature `std`).
+//! request, and writes events. The interface between them is [`machine::Machine`], which the firmware implements with short locks
+//! and a queue, and the host with function calls (`in_process`, feature `std`).
 #![no_std]
 #![warn(clippy::indexing_slicing, clippy::panic, clippy::expect_used)]
 #![cfg_attr(

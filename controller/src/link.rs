@@ -1,7 +1,7 @@
 //! The link half: bytes from the host in, answers and events out.
 //!
-//! Runs outside the sample timer's priority. One call takes one byte; the byte that ends a frame is answered before the
-//! call returns, by one frame. `JobEnd` is the longest: one [`Machine::load_check`] a record of the job.
+//! Runs below the sample timer's priority. One call takes one byte; the byte that ends a frame is answered before the
+//! call returns, by one frame. `JobEnd` takes longest: one [`Machine::load_check`] per record of the job.
 
 use heapless::Vec;
 use protocol::{
@@ -41,12 +41,12 @@ impl Link {
         }
     }
 
-    /// Takes one byte from the host; `out` gets the bytes of the answer, if that ends a frame.
+    /// Takes one byte from the host; `out` receives the bytes of the answer, if the byte ends a frame.
     pub fn receive(&mut self, byte: u8, machine: &mut impl Machine, out: &mut impl FnMut(&[u8])) {
         match self.decoder.push(byte) {
             None => {}
             Some(Ok(frame)) => {
-                // What happened before the answer stands before it.
+                // Earlier events are sent before the answer.
                 if !self.batch.is_empty() {
                     send(&Reply::Samples(core::mem::take(&mut self.batch)), out);
                 }
@@ -59,7 +59,7 @@ impl Link {
         }
     }
 
-    /// A frame was lost on the line before it came here (the receiver overran, for instance).
+    /// Reports a frame lost before it reached the link (by a receiver overrun, for instance).
     pub fn damaged(&mut self, error: FrameError, out: &mut impl FnMut(&[u8])) {
         self.session.count_bad_frame();
         out(&[DELIMITER]);
@@ -72,13 +72,13 @@ impl Link {
         );
     }
 
-    /// Whether a host of this version has said `Hello`. Events are dropped before.
+    /// Whether a session with a host of this version is open. Without a session, events are dropped.
     #[must_use]
     pub const fn is_open(&self) -> bool {
         self.session.is_open()
     }
 
-    /// Writes an event. Samples are gathered to fill a frame; everything else sends those first.
+    /// Writes an event. Samples are collected until a frame is full; every other event sends them first.
     pub fn event(&mut self, event: &Event, out: &mut impl FnMut(&[u8])) {
         match event {
             Event::Sample(sample) => self.sample(sample, out),
@@ -87,26 +87,26 @@ impl Link {
         }
     }
 
-    /// Writes a sample, as soon as a frame is full of them.
+    /// Adds a sample, and writes the frame once it is full.
     pub fn sample(&mut self, sample: &Sample, out: &mut impl FnMut(&[u8])) {
         if !self.is_open() {
             return;
         }
-        // It fits: a full batch is flushed at once.
+        // Always fits, because a full batch is flushed immediately.
         let _ = self.batch.push(SampleRecord(*sample));
         if self.batch.is_full() {
             self.flush(out);
         }
     }
 
-    /// Writes the samples gathered so far; an answer and every other event do so too.
+    /// Writes the samples collected so far, as an answer and every other event do.
     pub fn flush(&mut self, out: &mut impl FnMut(&[u8])) {
         if !self.batch.is_empty() {
             send(&Reply::Samples(core::mem::take(&mut self.batch)), out);
         }
     }
 
-    /// Writes that a pass is over.
+    /// Writes the end of a pass.
     pub fn pass(&mut self, pass: &PassDigest, out: &mut impl FnMut(&[u8])) {
         self.flush(out);
         if self.is_open() {
@@ -114,7 +114,7 @@ impl Link {
         }
     }
 
-    /// Writes that a run is over, or its ticks are used up.
+    /// Writes the end of a run, or that its ticks are used up.
     pub fn halted(&mut self, status: &Status, out: &mut impl FnMut(&[u8])) {
         self.flush(out);
         if self.is_open() {

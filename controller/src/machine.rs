@@ -17,11 +17,11 @@ use crate::safety::Order;
 pub enum Instruction {
     /// The operator's command; goes to the interpolator with the next period that passes.
     Command(Command),
-    /// What drives time.
+    /// Time base of the board.
     Clock(Clock),
     /// Lockstep: this number of further periods.
     Run {
-        /// Periods, added to those that are left.
+        /// Periods, added to the remaining ones.
         ticks: u32,
     },
     /// Reports of a run to the host.
@@ -48,15 +48,15 @@ pub enum Event {
     Halted(Status),
 }
 
-/// Where the real-time half puts its events: a queue that never makes it wait.
+/// Sink for the events of the real-time half: a queue that never blocks.
 pub trait Events {
-    /// Most events that one tick puts in.
+    /// Maximum events of one tick.
     const TICK_MAX: usize = 3;
 
     /// Whether [`Self::TICK_MAX`] events fit.
     fn has_room(&self) -> bool;
 
-    /// Puts an event in; false where the queue is full and it is lost.
+    /// Enqueues an event; false where the queue is full and the event is lost.
     fn put(&mut self, event: Event) -> bool;
 }
 
@@ -64,7 +64,7 @@ pub trait Events {
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Busy;
 
-/// The description of a board with this store and period; a name longer than the message holds is left out.
+/// The description of a board with this store and period; a name longer than the message holds is omitted.
 #[must_use]
 pub fn describe(firmware: [u16; 3], board: &str, store_words: usize, period_us: u32) -> Description {
     let count = |words: usize| u32::try_from(words).unwrap_or(u32::MAX);
@@ -79,15 +79,15 @@ pub fn describe(firmware: [u16; 3], board: &str, store_words: usize, period_us: 
     }
 }
 
-/// The real-time half as the link sees it. Every call is short: it may hold up the sample timer for its time.
+/// The link's interface to the real-time half. Every call is short, because it may delay the sample timer for its duration.
 pub trait Machine {
-    /// The board and what it can hold.
+    /// Identity and capacities of the board.
     fn description(&mut self) -> Description;
 
     /// The status, without the link's own counter `frames_bad`.
     fn status(&mut self) -> Status;
 
-    /// [`interp_core::Interpolator::load_begin`] by way of [`crate::realtime::RealTime`].
+    /// [`interp_core::Interpolator::load_begin`] through [`crate::realtime::RealTime`].
     ///
     /// # Errors
     /// The core's.
@@ -108,7 +108,7 @@ pub trait Machine {
     /// The core's.
     fn load_check(&mut self, record: u32) -> Result<(), Fault>;
 
-    /// [`interp_core::Interpolator::load_finish`] by way of [`crate::realtime::RealTime`].
+    /// [`interp_core::Interpolator::load_finish`] through [`crate::realtime::RealTime`].
     ///
     /// # Errors
     /// The core's.
@@ -126,10 +126,10 @@ pub trait Machine {
     /// [`Busy`] where the queue is full.
     fn send(&mut self, instruction: Instruction) -> Result<(), Busy>;
 
-    /// Does what the host asks of drives and home, at once.
+    /// Executes the host's order for drives and home immediately.
     ///
     /// # Errors
-    /// Why not; nothing has changed then.
+    /// The reason of the refusal; nothing has changed.
     fn order(&mut self, order: Order) -> Result<(), Reason>;
 
     /// [`crate::realtime::RealTime::may_start`].
@@ -138,16 +138,16 @@ pub trait Machine {
     /// Why no run may start.
     fn may_start(&mut self) -> Result<(), Reason>;
 
-    /// A frame of the host arrived, whole.
+    /// Reports a valid frame from the host.
     fn heard(&mut self);
 
-    /// Gives the board these inputs; false where it reads its own.
+    /// Sets simulated inputs; false where the board reads real ones.
     fn simulate(&mut self, lines: InputLines) -> bool {
         let _ = lines;
         false
     }
 
-    /// Whether instructions sent before still wait in the queue: a start that waits there is not to meet another job than
-    /// was loaded when it was sent.
+    /// Whether earlier instructions are still queued: a queued start must not be applied to another job than
+    /// the one loaded when it was sent.
     fn instructions_wait(&mut self) -> bool;
 }

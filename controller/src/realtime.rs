@@ -1,14 +1,14 @@
-//! The real-time half: one call a tick of the sample timer.
+//! The real-time half: one call per tick of the sample timer.
 //!
 //! **Bound.** One [`Interpolator::tick`], a digest of 17 words (about 125 cycles on a Cortex-M4), no loop.
-//! **Cost.** What happens seldom (commands, misses, ends of passes and runs) is out of line: a tick in the middle of a
-//! pass copies nothing, and builds no event but the sample where the host wants it.
+//! **Cost.** Rare cases (commands, misses, ends of passes and runs) are separate functions: a tick in the middle of a
+//! pass copies no data and creates no event except the sample, if the host requested samples.
 //! **Missed tick.** Counted; on a free clock while the tool moves it stops the run with
-//! [`FaultKind::DeadlineMissed`], because the tool stood still for a period in which the feed was commanded. The run stops
+//! [`FaultKind::DeadlineMissed`], because the tool stopped for a period in which the feed was commanded. The run stops
 //! along the path ([`Interpolator::controlled_stop`]).
-//! **Tick over budget.** Its cycles are known to the next tick, which stops the run with [`FaultKind::TickOverBudget`] in the
-//! same way: before ticks are missed.
-//! **Inputs.** Evaluated in every tick of the timer, whether time passes or not; what they do is in [`crate::safety`].
+//! **Tick over budget.** The next tick reads its cycles and stops the run with [`FaultKind::TickOverBudget`] in the
+//! same way, before ticks are missed.
+//! **Inputs.** Evaluated in every tick of the timer, in lockstep also between periods; see [`crate::safety`].
 
 mod control;
 mod run;
@@ -37,11 +37,11 @@ pub struct TickInput {
     pub missed: u32,
     /// CPU cycles of the last tick; 0 where the board cannot measure.
     pub cycles: u32,
-    /// The safety inputs, as they are read now.
+    /// The present safety inputs.
     pub lines: InputLines,
 }
 
-/// Whether the tool moves, so that each sample is one of the run.
+/// Whether the tool moves, so that each sample belongs to the run.
 const fn moves(state: State) -> bool {
     matches!(
         state,
@@ -53,7 +53,7 @@ const fn moves(state: State) -> bool {
 #[derive(Debug)]
 pub struct RealTime<S = [i32; STORE_WORDS]> {
     control: Control,
-    /// None on a machine without step outputs.
+    /// `None` on a machine without step outputs.
     steps: Option<Steps>,
     interpolator: Interpolator<S>,
 }
@@ -65,7 +65,7 @@ impl<const WORDS: usize> Default for RealTime<[i32; WORDS]> {
 }
 
 impl<const WORDS: usize> RealTime<[i32; WORDS]> {
-    /// An idle machine on a free clock, reporting digests, with a store of its own; a tick may take any time.
+    /// An idle machine on a free clock, reporting digests, with a store that it owns; ticks have no cycle budget.
     #[must_use]
     pub const fn new() -> Self {
         Self::with_store([0; WORDS])
@@ -73,7 +73,7 @@ impl<const WORDS: usize> RealTime<[i32; WORDS]> {
 }
 
 impl<S> RealTime<S> {
-    /// An idle machine on a free clock, reporting digests; a tick may take any time.
+    /// An idle machine on a free clock, reporting digests; ticks have no cycle budget.
     #[must_use]
     pub const fn with_store(store: S) -> Self {
         Self {
@@ -85,22 +85,22 @@ impl<S> RealTime<S> {
 }
 
 impl<S: AsRef<[i32]> + AsMut<[i32]>> RealTime<S> {
-    /// Sets the most CPU cycles that a tick may take while the tool moves on a free clock.
+    /// Sets the cycle budget of a tick while the tool moves on a free clock, CPU cycles.
     pub const fn set_tick_budget(&mut self, cycles: u32) {
         self.control.tick_budget = cycles;
     }
 
-    /// Tells why the board started.
+    /// Sets the reset cause.
     pub const fn set_reset_cause(&mut self, cause: ResetCause) {
         self.control.safety.set_reset_cause(cause);
     }
 
-    /// Gives the machine step outputs, on these pins of a port; the axes stand at the origin.
+    /// Adds step outputs on these pins of a port, with the axes at the origin.
     pub fn set_step_pins(&mut self, checked: CheckedSteps, pins: [u8; 3]) {
         self.steps = Some(Steps::new(checked, pins));
     }
 
-    /// Other settings of the drives; without step outputs, nothing.
+    /// Changes the settings of the drives; no effect without step outputs.
     ///
     /// # Errors
     /// [`FaultKind::WrongState`] while a run is under way.
@@ -115,24 +115,24 @@ impl<S: AsRef<[i32]> + AsMut<[i32]>> RealTime<S> {
         Ok(())
     }
 
-    /// The axes' steps, where there are step outputs.
+    /// The step generator, if the machine has step outputs.
     #[must_use]
     pub const fn steps(&self) -> Option<&Steps> {
         self.steps.as_ref()
     }
 
-    /// Axes whose direction pin says minus in the period that begins, a bit each; see [`Steps::directions`].
+    /// Axes whose direction is minus in the period that begins, one bit each; see [`Steps::directions`].
     #[must_use]
     #[inline]
     pub fn directions(&self) -> u8 {
         self.steps.as_ref().map_or(0, Steps::directions)
     }
 
-    /// After the tick: makes the pulses that bring the axes to its sample in the next period; see [`Steps::step`]. Too many steps
+    /// After the tick: computes the pulses that move the axes to its sample in the next period; see [`Steps::step`]. Too many steps
     /// stop the run.
     ///
-    /// A job without limits knows no way to its passes: the axes count as standing at the first sample of each, as if
-    /// they had been brought there. Such a job is for looking at, not for a machine.
+    /// A job without limits has no approach to its passes: the axes are assumed to stand at the first sample of each, as if
+    /// moved there by other means. Such a job is for evaluation only, not for a machine.
     #[inline]
     pub fn pulses(&mut self, slots: &mut [u32; BUFFER_WORDS]) {
         let Some(steps) = &mut self.steps else { return };
@@ -150,7 +150,7 @@ impl<S: AsRef<[i32]> + AsMut<[i32]>> RealTime<S> {
         }
     }
 
-    /// Controlled stop (category 1) with a fault from outside, along the path.
+    /// Controlled stop (category 1) with an external fault, along the path.
     #[cold]
     #[inline(never)]
     pub fn controlled_stop(&mut self, fault: Fault) {
@@ -200,10 +200,10 @@ impl<S: AsRef<[i32]> + AsMut<[i32]>> RealTime<S> {
         if !self.control.safety.drives_on() {
             self.lose_position();
         }
-        // Reported here, because in lockstep no further period may come that would report it.
+        // Reported here, because in lockstep a further period that would report it may never come.
         if under_way && !self.interpolator.state().is_under_way() {
             self.control.safety.ending = true;
-            // It meant the run that is over: an abort is not to acknowledge a fault that nobody has seen.
+            // The command was for the run that has ended: an abort must not acknowledge a fault not yet reported.
             self.control.command = None;
         }
         if self.control.safety.ending {
@@ -224,7 +224,7 @@ impl<S: AsRef<[i32]> + AsMut<[i32]>> RealTime<S> {
         }
     }
 
-    /// Whether a tick has something to do at once: in lockstep, with credit left, or with its end to report. A board whose time is
+    /// Whether a tick is required immediately: in lockstep, with credit left or with its end to report. A board whose time is
     /// simulated then need not wait for its timer.
     #[must_use]
     pub fn wants_tick(&self) -> bool {
@@ -248,7 +248,7 @@ impl<S: AsRef<[i32]> + AsMut<[i32]>> RealTime<S> {
         true
     }
 
-    /// Lets one period pass.
+    /// Executes one period.
     #[inline]
     fn step(&mut self, was_under_way: bool, events: &mut impl Events) {
         let mut command = self.control.command.take();
@@ -271,7 +271,7 @@ impl<S: AsRef<[i32]> + AsMut<[i32]>> RealTime<S> {
         }
     }
 
-    /// Counts the last sample in, and reports it as the host has asked.
+    /// Adds the last sample to the record of the run, and reports it as configured by `Report`.
     #[inline]
     fn count_sample(&mut self, events: &mut impl Events) {
         let Self {
@@ -291,7 +291,7 @@ impl<S: AsRef<[i32]> + AsMut<[i32]>> RealTime<S> {
         }
     }
 
-    /// The run is over.
+    /// Ends the run.
     #[cold]
     #[inline(never)]
     fn end_run(&mut self, events: &mut impl Events) {
@@ -304,7 +304,7 @@ impl<S: AsRef<[i32]> + AsMut<[i32]>> RealTime<S> {
         self.halt(events);
     }
 
-    /// Tells the host that time stands still, or the run is over.
+    /// Reports to the host that no credit is left, or that the run has ended.
     #[cold]
     #[inline(never)]
     fn halt(&mut self, events: &mut impl Events) {
@@ -312,7 +312,7 @@ impl<S: AsRef<[i32]> + AsMut<[i32]>> RealTime<S> {
         self.control.put(halted, events);
     }
 
-    /// All that is known of the run; `frames_bad` is the link's to fill in.
+    /// The status; the link fills in `frames_bad`.
     #[must_use]
     #[inline(never)]
     pub fn status(&self) -> Status {
@@ -351,32 +351,32 @@ impl<S: AsRef<[i32]> + AsMut<[i32]>> RealTime<S> {
         }
     }
 
-    /// A frame of the host arrived.
+    /// Reports a valid frame from the host.
     pub const fn heard(&mut self) {
         self.control.safety.heard();
     }
 
-    /// Whether the drives are to be enabled. Set after each tick, so that they are off in the tick that finds the reason.
+    /// Whether the drives are enabled. Applied after each tick, so that they are off in the tick that detects the cause.
     #[must_use]
     #[inline]
     pub const fn drives_on(&self) -> bool {
         self.control.safety.drives_on()
     }
 
-    /// Whether a tick feeds the watchdog: it was over before the next one, and within its budget.
+    /// Whether a tick feeds the watchdog: it ended before the next one, and within its budget.
     #[must_use]
     #[inline]
     pub const fn feeds_watchdog(&self, missed: u32, cycles: u32) -> bool {
         missed == 0 && cycles <= self.control.tick_budget
     }
 
-    /// The sample that the axes stand on.
+    /// The last sample.
     #[must_use]
     pub const fn last(&self) -> &Sample {
         self.interpolator.last()
     }
 
-    /// Begins to load a job; a command that waits for a period meant the job before, and is dropped.
+    /// Begins to load a job; a queued command was for the previous job and is dropped.
     ///
     /// # Errors
     /// Those of [`Interpolator::load_begin`]; nothing changes then.

@@ -1,4 +1,4 @@
-//! Inputs, drives, home and link timeout: what may start, and what has to stop.
+//! Inputs, drives, home and link timeout: conditions for a start, and causes of a stop.
 //!
 //! ```text
 //!  inputs ──► Debounce ──► Safety::watch ──► Stop::Uncontrolled  category 0: drives off, the run ends in this tick
@@ -6,16 +6,16 @@
 //!  Order (from the host) ──► Safety::obey
 //! ```
 //!
-//! **Emergency stop.** Taken at its first tick. Drives off, home lost, a run under way ends at once; latched until the host
-//! acknowledges it, which it may only once the input was released for [`DEBOUNCE_TICKS`].
-//! **Drive fault.** The same, once it is steady.
-//! **Limit switch.** Steady: a run under way slows down along its path. The position stays good, and nothing is latched, but no
+//! **Emergency stop.** Acts in its first tick. Drives off, home cleared, a run under way ends immediately; latched until the host
+//! acknowledges it, which is accepted only once the input was released for [`DEBOUNCE_TICKS`].
+//! **Drive fault.** The same, after debouncing.
+//! **Limit switch.** After debouncing: controlled stop along the path. The position stays valid, and nothing is latched, but no
 //! run starts while a switch is asserted.
-//! **Drives.** Off after power-up; on only when asked for, and never while one of the first two is asserted or latched.
-//! Emergency stop and drive fault switch them off, and so does the host, but not under a run.
+//! **Drives.** Off after power-up; on only by an order of the host, and never while emergency stop or drive fault is asserted or latched.
+//! Emergency stop and drive fault switch them off; the host can switch them off except during a run.
 //! **Home.** There are no encoders and no homing moves: the operator places the axes, switches the drives on, and
-//! declares where they stand. Without drives the axes may be moved by hand, so whatever switches the drives off loses the home.
-//! **Cost.** A tick in which the inputs are as before is one comparison and one count (`is_unchanged`).
+//! declares their position. Without drives the axes may move, so every switch-off of the drives clears the home.
+//! **Cost.** A tick with unchanged inputs takes one comparison and one count (`is_unchanged`).
 
 use interp_core::{
     fault::{Fault, FaultKind},
@@ -26,27 +26,27 @@ use protocol::message::{
     SafetyStatus,
 };
 
-/// Ticks in a row in which an input has to differ before it counts, and the emergency stop before it counts as released: at 1 ms, the
-/// third comes 2 to 3 ms after the change. Contacts bounce for less, and at 100 mm/s an axis goes at most 0.3 mm meanwhile.
+/// Debounce: consecutive ticks for which an input has to differ before it is accepted, and before the emergency stop counts as released. At 1 ms, the
+/// third comes 2 to 3 ms after the change. Contacts bounce for less, and at 100 mm/s an axis moves at most 0.3 mm in this time.
 pub const DEBOUNCE_TICKS: u32 = 3;
 
-/// A value that no inputs have: the next tick is evaluated although they have not changed.
+/// A value that no inputs can have, so that the next tick is evaluated although the inputs have not changed.
 const UNSETTLED: u32 = u32::MAX;
 
 /// The host's orders for drives and home. Executed at once, under the lock of the real-time half, so that no tick comes between
 /// check and execution.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Order {
-    /// What the machine is like.
+    /// Configuration of the machine.
     Configure(Configuration),
     /// Drives on or off.
     Drives {
-        /// Whether they are to be on.
+        /// Whether to switch the drives on.
         on: bool,
     },
-    /// The axes stand here.
+    /// Declares the position of the axes.
     SetHome {
-        /// Where, nm.
+        /// Position, nm.
         home_nm: [i32; 3],
     },
     /// Clear the latch.
@@ -56,13 +56,13 @@ pub enum Order {
 /// How an input stops a run, by the categories of IEC 60204-1.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) enum Stop {
-    /// Category 0, at once: the drives are off.
+    /// Category 0, immediate: the drives are off.
     Uncontrolled(Fault),
     /// Category 1, along the path.
     Controlled(Fault),
 }
 
-/// Eleven counters to three, side by side: bit n of both words is the count of input n.
+/// Eleven two-bit vertical counters: bit n of both words is the count of input n.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 struct Debounce {
     steady: u16,
@@ -77,14 +77,14 @@ impl Debounce {
         twos: 0,
     };
 
-    /// These count from their first tick on.
+    /// Accepts these inputs without debouncing.
     const fn assert(&mut self, at_once: u16) {
         self.steady |= at_once;
         self.ones &= !at_once;
         self.twos &= !at_once;
     }
 
-    /// Takes one tick's inputs in. An input that differs for the third time in a row is taken over.
+    /// Processes one tick's inputs. An input that differs for the third consecutive tick is accepted.
     const fn push(&mut self, raw: u16) {
         let differs = raw ^ self.steady;
         let carry = self.ones & differs;
@@ -100,14 +100,14 @@ impl Debounce {
 /// The safety state of the board.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Safety {
-    /// The inputs that need nothing done; [`UNSETTLED`] where none do.
+    /// Inputs that require no evaluation; [`UNSETTLED`] where all do.
     settled: u32,
     /// Ticks until the link times out.
     ticks_to_timeout: u32,
     status: SafetyStatus,
     debounce: Debounce,
     home_nm: [i32; 3],
-    /// The end of a run has still to be reported.
+    /// Whether the end of a run is still to be reported.
     pub(crate) ending: bool,
 }
 
@@ -133,7 +133,7 @@ impl Safety {
         self.status.drives_on
     }
 
-    /// Where the axes stood when the host declared it, while that holds, nm.
+    /// The position that the host declared as home, nm; none where the machine is not homed.
     pub(crate) const fn home_nm(&self) -> Option<[i32; 3]> {
         if self.status.homed {
             Some(self.home_nm)
@@ -142,15 +142,15 @@ impl Safety {
         }
     }
 
-    /// Whether this tick has nothing to do here: the inputs are those that nothing more follows from, and the host may
-    /// stay silent. Counts the tick.
+    /// Counts the tick, and returns whether it needs no evaluation: the inputs are settled and unchanged, and the link has not
+    /// timed out.
     #[inline(always)]
     pub(crate) const fn is_unchanged(&mut self, lines: InputLines) -> bool {
         self.ticks_to_timeout = self.ticks_to_timeout.wrapping_sub(1);
         lines.0 as u32 == self.settled && self.ticks_to_timeout != 0
     }
 
-    /// Takes the inputs of a tick for which [`Self::is_unchanged`] was false; how they stop a run that is under way.
+    /// Processes the inputs of a tick for which [`Self::is_unchanged`] was false; returns how they stop a run under way.
     pub(crate) fn watch(&mut self, lines: InputLines, under_way: bool) -> Option<Stop> {
         let raw = lines.and(InputLines::ALL);
         self.debounce.assert(raw.and(InputLines::EMERGENCY_STOP).0);
@@ -177,12 +177,12 @@ impl Safety {
         })
     }
 
-    /// Has [`Self::watch`] asked in the next tick, whatever the inputs are.
+    /// Forces a call of [`Self::watch`] in the next tick.
     pub(crate) const fn recheck(&mut self) {
         self.settled = UNSETTLED;
     }
 
-    /// A frame of the host arrived.
+    /// Reports a valid frame from the host.
     pub(crate) const fn heard(&mut self) {
         self.ticks_to_timeout = match self.status.configuration.link_timeout_ticks {
             0 => u32::MAX,
@@ -190,8 +190,8 @@ impl Safety {
         };
     }
 
-    /// After a tick that was not calm: whether the run is to be held now, because the host has been silent for too long.
-    /// `holds`: whether the state takes a hold up.
+    /// After a tick for which [`Self::is_unchanged`] was false: whether the link timeout requires a hold now.
+    /// `holds`: whether the state accepts a hold.
     pub(crate) fn check_link_timeout(&mut self, clock: Clock, state: State, holds: bool) -> bool {
         if self.ticks_to_timeout != 0 {
             return false;
@@ -206,23 +206,23 @@ impl Safety {
             return false;
         }
         if !holds {
-            // On its way from one state to another: it is asked again in the next tick.
+            // In transition between states: repeated in the next tick.
             self.ticks_to_timeout = 1;
         }
         holds
     }
 
-    /// A run begins.
+    /// Reports the start of a run.
     pub(crate) const fn begin_run(&mut self) {
         self.status.link_timed_out = false;
     }
 
-    /// The feed, percent.
+    /// Sets the feed override, percent.
     pub(crate) fn set_override(&mut self, percent: u8) {
         self.status.feed_override = percent.min(OVERRIDE_MAX_PERCENT);
     }
 
-    /// Does what the host asks for, or says why not.
+    /// Executes an order of the host, or returns the reason of its refusal.
     pub(crate) fn obey(&mut self, order: Order, state: State) -> Result<(), Reason> {
         let under_way = state.is_under_way();
         match order {
@@ -257,7 +257,7 @@ impl Safety {
     }
 }
 
-/// What these inputs mean to a run: the gravest of them.
+/// The most severe stop that these inputs require.
 fn hindrance_of(lines: InputLines) -> Option<Fault> {
     let (class, kind) = if lines.has(InputLines::EMERGENCY_STOP) {
         (InputLines::EMERGENCY_STOP, FaultKind::EmergencyStop)
@@ -275,7 +275,7 @@ fn no_hindrance(lines: InputLines) -> Result<(), Reason> {
     hindrance_of(lines).map_or(Ok(()), |fault| Err(Reason::Unsafe { fault: fault.into() }))
 }
 
-/// Whether the drives may be on.
+/// Whether the drives may be switched on.
 fn may_drive(status: &SafetyStatus) -> Result<(), Reason> {
     let stops = InputLines::EMERGENCY_STOP.or(InputLines::DRIVE_FAULTS);
     no_hindrance(status.latched.or(status.lines).and(stops))
@@ -284,7 +284,7 @@ fn may_drive(status: &SafetyStatus) -> Result<(), Reason> {
 /// Whether inputs, drives and home let a run start.
 ///
 /// # Errors
-/// Why not: an input asserted or latched, the drives off, the machine not homed.
+/// The reason of the refusal: an input asserted or latched, the drives off, the machine not homed.
 pub fn may_start(status: &SafetyStatus) -> Result<(), Reason> {
     no_hindrance(status.latched.or(status.lines))?;
     if !status.drives_on {

@@ -22,24 +22,24 @@ use crate::{
     upload::Upload,
 };
 
-/// Longest answer kept for a retransmission, bytes: a frame of `Status` with every varint at its longest.
+/// Maximum length of an answer stored for a retransmission, bytes: a frame of `Status` with every varint at its maximum length.
 const ANSWER_MAX: usize = 111;
 
-/// Who is at the other end.
+/// State of the session.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Peer {
     Nobody,
-    /// Said `Hello` with another version.
+    /// The host sent `Hello` with another version.
     Stranger {
         version: u16,
     },
-    /// Said `Hello`.
+    /// The host sent `Hello` with this version.
     Host {
         session: u32,
     },
 }
 
-/// The last request that was answered: asked again, it is answered again.
+/// The last answered request, with its answer for a retransmission.
 #[derive(Debug)]
 struct Last {
     number: u16,
@@ -84,9 +84,9 @@ pub(crate) struct Session {
     peer: Peer,
     last: Last,
     upload: Option<Upload>,
-    /// What the commands sent so far make of the clock; the status shows it a tick later.
+    /// The clock after the commands sent so far; the status shows it one tick later.
     clock: Clock,
-    /// A start, hold, resume, stop or abort was sent, and may still wait.
+    /// A start, hold, resume, stop or abort was sent, and may still be queued.
     commanded: bool,
     frames_bad: u32,
 }
@@ -177,7 +177,7 @@ impl Session {
         }
     }
 
-    /// Why no request with this number is looked at, if so.
+    /// The reason to refuse a request by its number, if any.
     fn refusal(&self, number: u16) -> Option<Reason> {
         match self.peer {
             Peer::Nobody => Some(Reason::SayHello),
@@ -192,7 +192,7 @@ impl Session {
         }
     }
 
-    /// Does what a request asks for.
+    /// Executes a request.
     fn answer(&mut self, number: u16, request: Request, machine: &mut impl Machine) -> Reply {
         let done = match request {
             Request::Status => {
@@ -231,7 +231,7 @@ impl Session {
             Request::Run { ticks } => instruct(machine, Instruction::Run { ticks }),
             Request::Report(report) => instruct(machine, Instruction::Report(report)),
             Request::StepConfig(settings) => set_steps(machine, settings.into()),
-            // Answered before it comes here.
+            // Answered by the caller.
             Request::Hello { .. } => Err(Reason::Unreadable),
         };
         match done {
@@ -240,7 +240,7 @@ impl Session {
         }
     }
 
-    /// Not before the commands for the job before are taken up.
+    /// Refuses while commands for the previous job are queued.
     fn job_begin(
         &mut self,
         machine: &mut impl Machine,
@@ -263,7 +263,7 @@ impl Session {
         upload.finish(machine)
     }
 
-    /// Queues what the state allows.
+    /// Queues a command if the state permits it.
     fn operate(&mut self, machine: &mut impl Machine, command: Command) -> Result<(), Reason> {
         let state = machine.status().state;
         if !command.is_allowed(state) {
@@ -277,7 +277,7 @@ impl Session {
         Ok(())
     }
 
-    /// To stop or release time under a moving tool would tear at the axes.
+    /// A change of the clock during a motion would be a velocity step of the axes.
     fn set_clock(&mut self, machine: &mut impl Machine, clock: Clock) -> Result<(), Reason> {
         let state = machine.status().state;
         if state.is_under_way() {
@@ -299,7 +299,7 @@ fn set_override(machine: &mut impl Machine, percent: u8) -> Result<(), Reason> {
     instruct(machine, Instruction::Override { percent })
 }
 
-/// Checked here, where there is time; taken over between two ticks.
+/// Validated here, outside the tick; applied between two ticks.
 fn set_steps(machine: &mut impl Machine, config: StepConfig) -> Result<(), Reason> {
     let state = machine.status().state;
     if state.is_under_way() {
@@ -326,7 +326,7 @@ fn instruct(machine: &mut impl Machine, instruction: Instruction) -> Result<(), 
     machine.send(instruction).map_err(|Busy| Reason::Busy)
 }
 
-/// Writes one reply as a frame. Every message fits into [`FRAME_MAX`]; a test of the protocol holds that.
+/// Writes one reply as a frame. Every message fits into [`FRAME_MAX`], as a test of the protocol checks.
 pub(crate) fn send(reply: &Reply, out: &mut impl FnMut(&[u8])) {
     let mut buffer = [0; FRAME_MAX];
     if let Ok(frame) = write_reply(reply, &mut buffer) {

@@ -1,49 +1,49 @@
-//! Pulses by hardware: a timer that asks the DMA controller for one word a slot, and a port that takes it.
+//! Hardware step pulses: a timer requests one DMA transfer per slot into a port's set/reset register.
 //!
 //! ```text
 //!  TIM2 update, every period ──► trigger: starts TIM1, once
 //!  TIM1 update, every slot ──► DMA2 stream 5: buffer ──► BSRR of the step pins' port
-//!  TIM1 compare, half a slot later ──► DMA2 stream 1: the word of rest ──► the slot that was just played
+//!  TIM1 compare, half a slot later ──► DMA2 stream 1: the idle word ──► the slot that was just output
 //!
 //!  period        k                              k + 1                          k + 2
 //!  plays         buffer 0                       buffer 1                       buffer 0
 //!  processor     tick k fills buffer 1          tick k + 1 fills buffer 0      ..
 //! ```
 //!
-//! Both streams go to and fro between two buffers by themselves (double-buffer mode). **A pulse goes out once:** the second
-//! stream wipes each slot half a slot after it was played, so that no buffer ever plays again what it has played. Should the
-//! processor stop, for a fault, a debugger or for ever, the axes do what was already worked out, two periods at most, and every
-//! step pin stays low. The wiping costs the processor nothing either.
+//! Both streams alternate between two buffers in hardware (double-buffer mode). **A pulse is output once:** the second
+//! stream clears each slot half a slot after its output, so that no buffer is output twice. If the
+//! processor stops, by a fault or a debugger, the axes complete the pulses already computed, two periods at most, and every
+//! step pin stays low. Clearing takes no processor time.
 //!
 //! **Phase.** TIM1 and TIM2 count the same clock, so [`SLOTS`] slots are a period to the cycle. TIM1 starts by hardware with an
 //! update of TIM2, at a count that brings its first slot a quarter of a slot later. Period after period the last slot
-//! is played 3/4 slot and wiped 1/4 slot before TIM2's interrupt; when the tick asks which buffer plays, the change was made.
+//! is output 3/4 slot and cleared 1/4 slot before TIM2's interrupt; when the tick reads the active buffer, the switch is complete.
 //!
 //! **Directions** are set by the processor at the beginning of the tick ([`StepOutput::begin`]), on any port. The pattern leaves
-//! the first [`TURN_SLOTS`] slots and the drive's set-up time without pulses where an axis turns; that the processor was
+//! the first [`TURN_SLOTS`] slots and the drive's set-up time without pulses where an axis turns; the stream's counter shows whether the processor was
 //! in time is checked by the stream's counter, and a fault where it was not.
 //!
-//! **Too late.** A tick that has less than [`WRITE_SLOTS`] slots left, or none, writes nothing: the buffer plays blank, its
-//! steps stay owed and go out with the next.
+//! **Too late.** A tick that has less than [`WRITE_SLOTS`] slots left, or none, writes nothing: the buffer is output without pulses, its
+//! steps are carried over to the next.
 //!
 //! Sources: RM0090 rev 19, 8 (GPIO), 10.3 (DMA; requests in table 43; double buffer in 10.3.10), 17.4 (TIM1), 18.4 (TIM2). Only DMA2
-//! reaches the ports, and of the memories only SRAM can be read and written by both of its sides: the buffers and the word of
-//! rest have to be there, not in the core-coupled memory. Every register goes through [`Registers`], so that a test sees the
-//! same code drive a model of the chip. Nothing here waits: where the registers are missing (QEMU) nothing is put out.
+//! reaches the ports, and of the memories only SRAM can be read and written by both of its sides: the buffers and the idle word
+//! have to be in SRAM, not in the core-coupled memory. Every register access goes through [`Registers`], so that a test runs the
+//! same code on a model of the chip. No function waits: where the registers are missing (QEMU) there is no output.
 
 use interp_core::{
     fault::{Fault, FaultKind},
     steps::{BUFFER_WORDS, SLOTS, TURN_SLOTS},
 };
 
-/// Slots that the pulses of three axes may take to be written: 90 were counted at 400 kHz in the pessimistic model, so 112 at 500 kHz.
+/// Slots allowed for writing the pulses of three axes: 90 at 400 kHz in the pessimistic cycle model, so 112 at 500 kHz.
 pub const WRITE_SLOTS: u32 = 200;
 
-/// A chip's registers, by address.
+/// Register access by address.
 pub trait Registers {
-    /// Reads one.
+    /// Reads a register.
     fn read(&self, address: u32) -> u32;
-    /// Writes one.
+    /// Writes a register.
     fn write(&mut self, address: u32, value: u32);
 }
 
@@ -53,21 +53,21 @@ pub mod register {
     pub const RCC_AHB1ENR: u32 = 0x4002_3830;
     /// Clock of TIM1.
     pub const RCC_APB2ENR: u32 = 0x4002_3844;
-    /// TIM2, control 2: what it tells other timers.
+    /// TIM2, control 2: its trigger output.
     pub const TIM2_CR2: u32 = 0x4000_0004;
     /// TIM1, control 1.
     pub const TIM1_CR1: u32 = 0x4001_0000;
     /// TIM1, control 2.
     pub const TIM1_CR2: u32 = 0x4001_0004;
-    /// TIM1, what starts it.
+    /// TIM1, slave mode control.
     pub const TIM1_SMCR: u32 = 0x4001_0008;
-    /// TIM1, requests.
+    /// TIM1, DMA requests.
     pub const TIM1_DIER: u32 = 0x4001_000c;
     /// TIM1, flags.
     pub const TIM1_SR: u32 = 0x4001_0010;
     /// TIM1, count.
     pub const TIM1_CNT: u32 = 0x4001_0024;
-    /// TIM1, last count of a slot.
+    /// TIM1, auto-reload: last count of a slot.
     pub const TIM1_ARR: u32 = 0x4001_002c;
     /// TIM1, count of the first compare channel.
     pub const TIM1_CCR1: u32 = 0x4001_0034;
@@ -75,9 +75,9 @@ pub mod register {
     pub const DMA2_LIFCR: u32 = 0x4002_6408;
     /// DMA2, flags to clear of streams 4 to 7.
     pub const DMA2_HIFCR: u32 = 0x4002_640c;
-    /// DMA2, the stream that plays: 5, whose channel 6 is TIM1's update.
+    /// DMA2, the output stream: 5, whose channel 6 is TIM1's update.
     pub const PLAY: u32 = stream(5);
-    /// DMA2, the stream that wipes: 1, whose channel 6 is TIM1's first compare.
+    /// DMA2, the clearing stream: 1, whose channel 6 is TIM1's first compare.
     pub const WIPE: u32 = stream(1);
     /// Of a stream: its control register.
     pub const CR: u32 = 0x0;
@@ -100,7 +100,7 @@ pub mod register {
     pub const TIM1EN: u32 = 1;
     /// Stream enabled.
     pub const EN: u32 = 1;
-    /// Stream plays the second buffer.
+    /// Current target is the second buffer.
     pub const CT: u32 = 1 << 19;
     /// Channel 6, double buffer, words on both sides, address in memory counts, circular.
     pub const STREAM: u32 = 6 << 25 | 1 << 18 | 2 << 13 | 2 << 11 | 1 << 10 | 1 << 8;
@@ -110,11 +110,11 @@ pub mod register {
     pub const WIPES: u32 = STREAM | 2 << 16;
     /// All flags of stream 1 in [`DMA2_LIFCR`], and of stream 5 in [`DMA2_HIFCR`].
     pub const FLAGS: u32 = 0x3d << 6;
-    /// TIM2's update goes to other timers.
+    /// TIM2's update is its trigger output.
     pub const MMS_UPDATE: u32 = 2 << 4;
     /// The bits of `MMS`.
     pub const MMS: u32 = 7 << 4;
-    /// TIM1 starts when TIM2 (its ITR1, RM0090 table 93) says so.
+    /// TIM1 is started by TIM2's trigger output (its ITR1, RM0090 table 93).
     pub const STARTS_WITH_TIM2: u32 = 1 << 4 | 6;
     /// DMA requests of TIM1's update and first compare.
     pub const REQUESTS: u32 = 1 << 8 | 1 << 9;
@@ -155,10 +155,10 @@ impl Port {
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Pin(pub Port, pub u8);
 
-/// Where the axes' drives are connected.
+/// Pins of the axes' drives.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Wiring {
-    /// Port of all step pins: one word a slot can only go to one.
+    /// Port of all step pins: the one word per slot reaches one port.
     pub step_port: Port,
     /// Number of each axis's step pin, 0 to 15.
     pub step: [u8; 3],
@@ -166,16 +166,16 @@ pub struct Wiring {
     pub direction: [Pin; 3],
 }
 
-/// Where the buffers are: in SRAM, and never moved.
+/// The buffers, in SRAM at fixed addresses.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Memory {
     /// Addresses of the buffers of [`BUFFER_WORDS`] words.
     pub buffers: [u32; 2],
-    /// Address of the word of rest ([`interp_core::Steps::rest`]).
+    /// Address of the idle word ([`interp_core::Steps::rest`]).
     pub rest: u32,
 }
 
-/// Clocks of a slot: of a timer of `timer_hz`, at a period of `period_us`. None where that is no whole number, or
+/// Clocks of a slot: of a timer of `timer_hz`, at a period of `period_us`. None where that is not an integer, or
 /// does not fit the timer.
 #[must_use]
 pub const fn slot_counts(timer_hz: u32, period_us: u32) -> Option<u16> {
@@ -189,10 +189,10 @@ pub const fn slot_counts(timer_hz: u32, period_us: u32) -> Option<u16> {
     }
 }
 
-/// Why the pulses of a period are not as they should be.
+/// Errors of a period's pulses.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Failure {
-    /// An axis turns, and its direction pin was set after so many slots, when pulses may have been out.
+    /// A direction pin was changed after this number of slots, when pulses may already have been output.
     DirectionLate(u32),
     /// The DMA has stopped: an error on the bus.
     Stopped,
@@ -208,22 +208,22 @@ impl From<Failure> for Fault {
     }
 }
 
-/// The hardware at work.
+/// The step output hardware.
 #[derive(Debug)]
 pub struct StepOutput<R> {
     registers: R,
     wiring: Wiring,
-    /// Levels on the direction pins, a bit an axis.
+    /// Levels on the direction pins, one bit per axis.
     directions: u8,
     /// The buffer that this tick may fill.
     idle: usize,
-    /// Whether the hardware is there at all.
+    /// Whether the hardware is present.
     present: bool,
 }
 
 impl<R: Registers> StepOutput<R> {
-    /// Sets DMA and TIM1 up; the first slot is played with TIM2's next update. `slot_counts`: of TIM1; see [`slot_counts`]. The pins are
-    /// set up, and low; the buffers hold the word of rest already. TIM2 is not started here.
+    /// Sets up DMA and TIM1; the first slot is output with TIM2's next update. `slot_counts`: counts of TIM1 per slot; see [`slot_counts`]. The pins have to be
+    /// set up and low, and the buffers to hold the idle word. TIM2 is not started here.
     pub fn start(registers: R, wiring: Wiring, memory: Memory, slot_counts: u16) -> Self {
         let mut output = Self {
             registers,
@@ -240,19 +240,19 @@ impl<R: Registers> StepOutput<R> {
         output
     }
 
-    /// Whether the hardware took its settings; QEMU has none.
+    /// Whether the registers hold their settings; false in QEMU, which has no such hardware.
     pub const fn is_present(&self) -> bool {
         self.present
     }
 
-    /// Switches clocks on. The read afterwards waits until they have arrived (ES0182, 2.1.13).
+    /// Enables clocks. The read afterwards waits until they are active (ES0182, 2.1.13).
     fn enable(&mut self, address: u32, bits: u32) {
         let value = self.registers.read(address);
         self.registers.write(address, value | bits);
         let _ = self.registers.read(address);
     }
 
-    /// A stream is set up while it stands, its flags cleared before it starts (RM0090, 10.3.17).
+    /// Sets up a stream while it is disabled, with its flags cleared before it is enabled (RM0090, 10.3.17).
     fn start_stream(&mut self, stream: u32, peripheral: u32, memory: Memory, control: u32) {
         let [first, second] = memory.buffers;
         self.enable(r::RCC_AHB1ENR, r::DMA2EN);
@@ -268,7 +268,7 @@ impl<R: Registers> StepOutput<R> {
             (stream + r::PAR, peripheral),
             (stream + r::M0AR, first),
             (stream + r::M1AR, second),
-            // No FIFO: a word goes out when it is asked for.
+            // No FIFO: each request transfers one word.
             (stream + r::FCR, 0),
             (stream + r::CR, control),
             (stream + r::CR, control | r::EN),
@@ -277,7 +277,7 @@ impl<R: Registers> StepOutput<R> {
         }
     }
 
-    /// TIM1 stands until TIM2 starts it. Its registers take effect at once: nothing is preloaded, the prescaler is 1.
+    /// Sets up TIM1, which waits for TIM2's trigger. Its registers take effect immediately: no preload, prescaler 1.
     fn start_timer(&mut self, slot: u32) {
         self.enable(r::RCC_APB2ENR, r::TIM1EN);
         for (address, value) in [
@@ -297,10 +297,10 @@ impl<R: Registers> StepOutput<R> {
         self.registers.write(r::TIM2_CR2, kept | r::MMS_UPDATE);
     }
 
-    /// At the beginning of a tick: sets the direction pins for the period that has begun, a bit an axis.
+    /// At the beginning of a tick: sets the direction pins for the period that has begun, one bit per axis.
     ///
     /// # Errors
-    /// [`Failure`]; the pins are set all the same.
+    /// [`Failure`]; the pins are set in any case.
     #[inline]
     pub fn begin(&mut self, directions: u8) -> Result<(), Failure> {
         let turned = core::mem::replace(&mut self.directions, directions) ^ directions;
@@ -312,7 +312,7 @@ impl<R: Registers> StepOutput<R> {
         }
         let control = self.registers.read(r::PLAY + r::CR);
         let idle = usize::from(control & r::CT == 0);
-        // The same one twice: a whole period went by unheard, and its direction with it.
+        // The same buffer twice: a whole period was missed, and its direction change with it.
         let unheard = core::mem::replace(&mut self.idle, idle) == idle;
         if control & r::EN == 0 {
             return Err(Failure::Stopped);
@@ -338,7 +338,7 @@ impl<R: Registers> StepOutput<R> {
         }
     }
 
-    /// At the end of a tick: the buffer that may be filled, if there is time for it.
+    /// At the end of a tick: the buffer to fill, if enough slots are left.
     #[inline]
     pub fn free(&mut self) -> Option<usize> {
         if self.present {

@@ -1,4 +1,4 @@
-//! A job on its way to the board: in order, complete, and what the host meant.
+//! Upload of a job: checks order, completeness and digest.
 
 use interp_core::{fault::Fault, job::Header};
 use protocol::{digest::Digest, message::Reason};
@@ -14,7 +14,7 @@ pub(crate) struct Upload {
     digest: Digest,
 }
 
-/// The core's refusal, as a reason.
+/// The core's fault as the reason of a `Nak`.
 fn refused(fault: Fault, record: Option<u32>) -> Reason {
     Reason::Job {
         fault: fault.into(),
@@ -22,7 +22,7 @@ fn refused(fault: Fault, record: Option<u32>) -> Reason {
     }
 }
 
-/// Jobs are not exchanged under a run.
+/// Refuses while a run is under way.
 fn check_state(machine: &mut impl Machine) -> Result<(), Reason> {
     let state = machine.status().state;
     if state.is_under_way() {
@@ -33,7 +33,7 @@ fn check_state(machine: &mut impl Machine) -> Result<(), Reason> {
 }
 
 impl Upload {
-    /// `JobBegin`. A refusal leaves machine and upload as they were.
+    /// `JobBegin`. A refusal leaves machine and upload unchanged.
     pub(crate) fn begin(
         machine: &mut impl Machine,
         header: &Header,
@@ -56,7 +56,7 @@ impl Upload {
         })
     }
 
-    /// `JobChunk`. A refusal leaves the upload where it was.
+    /// `JobChunk`. A refusal leaves the upload unchanged.
     pub(crate) fn chunk(
         &mut self,
         machine: &mut impl Machine,
@@ -84,7 +84,7 @@ impl Upload {
         Ok(())
     }
 
-    /// `JobEnd` before the checks: whether all is there. The upload may go on.
+    /// `JobEnd` before the checks: whether all words were received. After a refusal the upload may continue.
     pub(crate) const fn check_complete(&self) -> Result<(), Reason> {
         if self.received == self.words {
             Ok(())
@@ -96,7 +96,7 @@ impl Upload {
         }
     }
 
-    /// `JobEnd`. Uses the upload up, whatever the outcome; after a refusal the machine is idle.
+    /// `JobEnd`. Ends the upload with either outcome; after a refusal the machine is idle.
     pub(crate) fn finish(self, machine: &mut impl Machine) -> Result<(), Reason> {
         let received = self.digest.value();
         if received != self.wanted {

@@ -1,5 +1,5 @@
-//! The machine as the link sees it: behind a lock that holds up the sample timer for one short call at a
-//! time, and a queue.
+//! The link's access to the machine: through a lock that delays the sample timer for one short call at a
+//! time, and through a queue.
 
 use controller::{
     machine::{Busy, Instruction, Machine, describe},

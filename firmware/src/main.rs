@@ -6,10 +6,10 @@
 //!  priority 0   idle      when nothing else is    bytes ──► Link ──► commands;   events ──► Link ──► port
 //! ```
 //!
-//! What crosses between two tasks does so by a queue of fixed capacity with one writer and one reader. The
+//! Tasks communicate through queues of fixed capacity with one writer and one reader. The
 //! machine itself is shared by `sample`, which gets it without a lock, and `idle`, which locks it for one
-//! short call at a time ([`guarded_machine`]). No lock holds `receive` up: it shares nothing. Everything that decides where the tool goes is in
-//! `interp-core`; what is done with a request is in `controller`; what differs between boards is in
+//! short call at a time ([`guarded_machine`]). No lock delays `receive`, which shares no data. The tool path is computed in
+//! `interp-core`; requests are handled in `controller`; board-specific code is in
 //! [`board`].
 #![no_std]
 #![no_main]
@@ -66,10 +66,10 @@ mod app {
     /// The status LED.
     const LED: Line = BOARD.line(Role::StatusLed);
 
-    /// The safety inputs, as the board has them.
+    /// The board's safety inputs.
     const INPUTS: SafetyInputs<board::InputPorts> = SafetyInputs::new(board::InputPorts, BOARD.lines);
 
-    /// The drives, off.
+    /// The drive enables, initially off.
     const DRIVES: DriveEnable<gpio::Ports> = DriveEnable::new(gpio::Ports, BOARD);
 
     #[shared]
@@ -91,9 +91,9 @@ mod app {
         events_out: Consumer<'static, Event>,
     }
 
-    /// Interrupts are off until this returns: the first tick finds everything in place.
+    /// Interrupts are off until this returns, so that initialisation is complete before the first tick.
     ///
-    /// The store is a static of its own: all zeros, it takes no flash, and the 64 KiB never pass over the stack.
+    /// The store is a separate zero-initialised static, so it takes no flash, and the 64 KiB are never moved through the stack.
     #[init(local = [
         store: [i32; JOB_WORDS] = [0; JOB_WORDS],
         slots: Buffers = [[0; BUFFER_WORDS]; 2],
@@ -104,7 +104,7 @@ mod app {
     ])]
     fn init(context: init::Context) -> (Shared, Local) {
         let board = board::init(context.device);
-        // What nobody reads would not be in the image.
+        // Read once, because the linker removes unreferenced data from the image.
         core::hint::black_box(&board::MARK);
         defmt::info!(
             "isofeed {=str} on {=str}, room for {=usize} words",
@@ -174,7 +174,7 @@ mod app {
     /// |---|---|
     /// | priority | 2: only `receive` interrupts it |
     /// | period | 1 ms, by TIM2 |
-    /// | worst case | see `cargo sim budget`; the board measures each tick and reports the most (`tick_cycles_max`) |
+    /// | worst case | see `cargo sim budget`; the board measures each tick and reports the maximum (`tick_cycles_max`) |
     /// | over a fifth of the period | a fault of the run (`tick-over-budget`), which stops along the path |
     /// | a miss | counted, reported, and a fault of the run (`deadline-missed`), which stops along the path |
     /// | either | does not feed the watchdog, which resets the board when no tick does for some periods |
@@ -190,11 +190,11 @@ mod app {
             .lock(|real_time| task.tick(real_time, guards, output));
     }
 
-    /// Takes a byte off the port.
+    /// Reads a byte from the port.
     ///
     /// | | |
     /// |---|---|
-    /// | priority | 3, the highest: the port holds one byte, and a tick may take 18 of them |
+    /// | priority | 3, the highest: the port has no FIFO, and a tick may take 18 byte times |
     /// | period | 11 us at 921 600 baud, while the host sends |
     /// | worst case | a few dozen cycles, and the few instructions that hold all interrupts off; a line of the log does not |
     /// | a miss | the byte is lost and counted; its frame fails its check, and the host repeats it |
@@ -257,7 +257,7 @@ mod app {
                 watch.look(now, &mut machine, bytes_lost());
                 led.show(watch.state, now);
             }
-            // With interrupts held back none can slip in between the question and the sleep; it still ends
+            // With interrupts masked, none is handled between the check and the sleep; a pending one still ends
             // the sleep.
             cortex_m::interrupt::free(|_| {
                 if bytes_out.ready() || events_out.ready() {

@@ -1,5 +1,5 @@
-//! All that the sample task does in a tick, apart from RTIC, so that it can be linked by itself: `no-panic`
-//! proves of this file and of what it calls that no panic can be reached.
+//! The body of the sample task, without RTIC, so that it can be linked separately: `no-panic`
+//! proves that no panic is reachable from this file and the functions that it calls.
 
 use core::hint::black_box;
 
@@ -18,8 +18,8 @@ use crate::drivers::{
     watchdog::{Registers, Watchdog},
 };
 
-/// What stands between the machine and harm: the inputs that stop it, the drives, the watchdog. Apart from the task, whose queues'
-/// lengths the compiler would lose sight of in one structure with this.
+/// The safety peripherals: inputs, drive enables, watchdog. Separate from the task, because in one structure with them the compiler
+/// no longer knows the lengths of the task's queues.
 pub(crate) struct Guards<I, O, W> {
     /// The safety inputs.
     pub(crate) inputs: SafetyInputs<I>,
@@ -29,7 +29,7 @@ pub(crate) struct Guards<I, O, W> {
     pub(crate) watchdog: Watchdog<W>,
 }
 
-/// What the task has for itself.
+/// The task's local state.
 pub(crate) struct SampleTask {
     timer: SampleTimer,
     counter: CycleCounter,
@@ -59,8 +59,8 @@ impl SampleTask {
         }
     }
 
-    /// One tick. The output is no part of the task: the compiler knows the queues' capacities only as long as no part of the
-    /// task is handed on by reference, and divides by them.
+    /// One tick. The output is not part of the task: the compiler knows the queues' capacities only as long as no part of the
+    /// task is passed by reference, and otherwise divides by them.
     #[inline]
     pub(crate) fn tick<S, I, O, W>(
         &mut self,
@@ -73,12 +73,12 @@ impl SampleTask {
         O: WritePorts,
         W: Registers,
     {
-        // Where it lies is known when the image is linked, and each access to a field would make an address of its
-        // own, two instructions long. Hidden, it is a register, and the fields are offsets from it.
+        // The address is a link-time constant, and each access to a field would load its own address in
+        // two instructions. Opaque to the compiler, it stays in a register, and fields are offsets.
         let real_time = black_box(real_time);
         let begun = self.counter.now();
         self.timer.begin();
-        // First of all: the pulses of an axis that turns wait for it.
+        // First, because the pulses of a reversing axis depend on the direction.
         if let Err(fault) = output.begin(real_time.directions()) {
             real_time.controlled_stop(fault);
         }
@@ -103,7 +103,7 @@ impl SampleTask {
     }
 }
 
-/// The way to the link.
+/// The event queue to the link.
 pub(crate) struct EventQueue(Producer<'static, Event>);
 
 impl Events for EventQueue {

@@ -1,4 +1,4 @@
-//! A look at the machine now and then: what has changed goes to the log.
+//! Periodic read of the machine's state; changes are logged.
 
 use controller::machine::Machine;
 use interp_core::{fault::FaultKind, sample::State};
@@ -6,7 +6,7 @@ use protocol::message::{InputLines, SafetyStatus, Status};
 
 use crate::design_parameters::LOOK_PERIODS;
 
-/// What was seen last.
+/// The last values read.
 #[derive(Default)]
 pub(crate) struct Watch {
     /// The machine's state.
@@ -18,12 +18,12 @@ pub(crate) struct Watch {
 }
 
 impl Watch {
-    /// Whether it is time for a look; `now` counts periods.
+    /// Whether a read is due; `now` counts periods.
     pub(crate) fn is_due(&self, now: u32) -> bool {
         now.wrapping_sub(self.looked) >= LOOK_PERIODS
     }
 
-    /// Looks, and writes what has changed.
+    /// Reads the state, and logs changes.
     pub(crate) fn look(&mut self, now: u32, machine: &mut impl Machine, bytes_lost: u32) {
         self.looked = now;
         let status = machine.status();

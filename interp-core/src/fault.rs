@@ -1,60 +1,60 @@
-//! Faults: what stops the tool or refuses a job, each with a stable code and a value.
+//! Faults: why a run stops or a job is refused, each with a stable code and a value.
 
 /// Why a run stopped or a job was refused. The code of a kind never changes; new kinds get new codes.
 ///
-/// A word, though a byte would hold it: results with a byte in them are copied byte by byte.
+/// `repr(u32)`: the compiler copies a `Result` with a byte-sized discriminant byte by byte, one with a word in words.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 #[repr(u32)]
 pub enum FaultKind {
     /// A principal curvature towards the tool is too large for the ball (local gouge).
-    /// Value: the surface's principal curvature towards the tool times the ball radius (at least 0.99999 where nothing fits).
+    /// Value: the surface's principal curvature towards the tool times the ball radius (at least 0.99999 where the ball does not fit).
     BallDoesNotFit = 1,
-    /// `S_u x S_v` is too near zero for a normal, or changed its sign between two samples, so that the tool would change
+    /// `S_u x S_v` is too small to compute a normal, or changed its sign between two samples, so that the tool would change
     /// sides. Value: `|S_u x S_v| / (|S_u| |S_v|)`, the sine between them; 0 where it went through zero.
     DegenerateSurface = 2,
-    /// The step of the path parameter for one period would not run forwards.
-    /// Value: second- and third-order terms of the step over its first-order term (at most -1 where it runs backwards).
+    /// The path parameter's increment for one period is not positive.
+    /// Value: ratio of the increment's second- and third-order terms to its first-order term (-1 or less: backwards).
     ParameterBackwards = 3,
     /// A cutter location does not fit an i32 of nanometres (±2.147 m). Value: the coordinate in metres.
     OutOfRange = 4,
     /// The job has more data than the store holds. Value: words asked for.
     TooManyPatches = 5,
-    /// One period's arc reaches past a whole patch. Value: the arc in mm that was left over.
+    /// One period's arc is longer than a whole patch. Value: the part of the arc beyond the patch, mm.
     PatchTooShort = 6,
     /// The path interval is too small to advance the side parameter. Value: the interval as a fraction of a patch.
     IntervalTooSmall = 7,
     /// A header value is not finite or out of its range. Value: the value.
     BadHeader = 8,
     /// A patch's coefficients exceed the range in which its polynomials cannot overflow, its weights vary more than
-    /// 4 : 1, or a flagged pole is none. Value: the patch's index.
+    /// 4 : 1, or a boundary flagged as a pole does not collapse. Value: the patch's index.
     BadPatch = 9,
-    /// The job's data are not complete or do not have the length that the header implies. Value: the number of words, or the offset, that does not belong.
+    /// The job's data are incomplete, or their length is not the one that the header implies. Value: the wrong number of words or offset.
     BadLength = 10,
     /// A request that does not fit the state, for instance loading while a job runs. Value: the state's code.
     WrongState = 11,
     /// A tick of the sample timer was missed. Value: ticks missed.
     DeadlineMissed = 12,
-    /// A tick took more of its period than the board allows it. Value: processor cycles.
+    /// A tick exceeded the board's cycle budget. Value: processor cycles of the tick.
     TickOverBudget = 13,
     /// An axis would leave its travel. Value: mm outside.
     SoftLimit = 14,
-    /// The tool cannot go from pass to pass in the open: the surface does not face up where a pass begins or ends, or it rises above the safe
-    /// height. Value: mm above it, or 0.
+    /// The tool cannot link two passes through the air: the surface does not face up where a pass begins or ends, or it rises above the safe
+    /// height. Value: mm above the safe height; 0 where the surface does not face up.
     LinkBlocked = 15,
-    /// The emergency stop was pressed: the drives are off, the home is lost. Value: the inputs asserted, as bits.
+    /// The emergency stop was pressed: the drives are off, the machine is not homed. Value: the inputs asserted, as bits.
     EmergencyStop = 16,
     /// A limit switch was reached. Value: the limit switches asserted, as bits.
     LimitSwitch = 17,
-    /// A drive reports a fault: the drives are off, the home is lost. Value: the drive faults asserted, as bits.
+    /// A drive reports a fault: the drives are off, the machine is not homed. Value: the drive faults asserted, as bits.
     DriveFault = 18,
-    /// Link timeout: no frame of the host for longer than configured. Value: that time in periods.
+    /// Link timeout: no frame of the host for longer than configured. Value: the timeout in periods.
     LinkTimeout = 19,
-    /// A start while the machine does not know where its axes stand. Value: 0.
+    /// A start while the machine is not homed. Value: 0.
     NotHomed = 20,
-    /// More steps of an axis in a period than fit. Value: the commanded steps.
+    /// An axis has more steps in a period than the step output can emit. Value: the commanded steps.
     StepRate = 21,
-    /// The board's pulses were not handed out in time, or the hardware that does so has stopped.
-    /// Value: slots of the period that had passed when the direction was set, where that was too late; otherwise 0.
+    /// The step pulses were not output in time, or the step timer or its DMA has stopped.
+    /// Value: slots of the period that had elapsed when the direction was set too late; otherwise 0.
     StepOutput = 22,
 }
 
@@ -130,9 +130,9 @@ impl FaultKind {
 /// A fault: its kind, and a value that quantifies it (meaning per [`FaultKind`]).
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Fault {
-    /// What went wrong.
+    /// Kind of the fault.
     pub kind: FaultKind,
-    /// The value at fault; its meaning is the kind's.
+    /// The offending value; unit and meaning are given at each [`FaultKind`].
     pub value: f32,
 }
 
@@ -152,5 +152,5 @@ impl core::fmt::Display for Fault {
 
 impl core::error::Error for Fault {}
 
-/// Result of anything in this crate that can meet a fault.
+/// Result of a function of this crate that can fail with a [`Fault`].
 pub type Result<T> = core::result::Result<T, Fault>;

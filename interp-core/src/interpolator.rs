@@ -10,10 +10,10 @@ use crate::pass::run::Run;
 use crate::sample::{Sample, SpanParameter, State, interval_of};
 use crate::sequence::sequencer::{Outcome, Sequencer};
 
-/// Periods over which the feed falls to nothing when a fault from outside stops the run: 1/32 less each period.
+/// Periods over which an external fault decelerates the run to zero feed: 1/32 of the feed per period.
 pub const STOP_PERIODS: u8 = 32;
 
-/// The loaded surface at one pair of parameters, outside of any run.
+/// The loaded surface evaluated at one pair of parameters, independent of any run.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct SurfacePoint {
     /// Cutter contact, nm.
@@ -22,14 +22,14 @@ pub struct SurfacePoint {
     pub cl_nm: [i32; 3],
     /// Unit normal towards the tool.
     pub normal: [f32; 3],
-    /// Candidate of the path interval, in units of the side parameter; infinite where it sets no limit.
+    /// Path interval allowed here, in units of the side parameter; infinite where the scallop limit does not bound the interval.
     pub interval: f32,
 }
 
 /// The interpolator: one [`Interpolator::tick`] a period gives the next cutter location.
 ///
-/// The job's data lie in a store of 32-bit words, owned (an array) or lent (a board's static one, which then need not pass
-/// over the stack). The sample path does not depend on which: it is compiled once, in this crate.
+/// The job's data lie in a store of 32-bit words, owned (an array) or borrowed (a board's static one, which is then never moved
+/// through the stack). The sample path is not generic over the store: it is compiled once, in this crate.
 #[derive(Debug)]
 pub struct Interpolator<S = [i32; STORE_WORDS]> {
     motion: Motion,
@@ -43,7 +43,7 @@ impl<const WORDS: usize> Default for Interpolator<[i32; WORDS]> {
 }
 
 impl<const WORDS: usize> Interpolator<[i32; WORDS]> {
-    /// An idle machine without a job, with a store of its own.
+    /// An idle machine without a job, with a store that it owns.
     #[must_use]
     pub const fn new() -> Self {
         Self::with_store([0; WORDS])
@@ -51,7 +51,7 @@ impl<const WORDS: usize> Interpolator<[i32; WORDS]> {
 }
 
 impl<S> Interpolator<S> {
-    /// An idle machine without a job; its jobs may be as long as the store.
+    /// An idle machine without a job. The length of the store is the longest job.
     #[must_use]
     pub const fn with_store(store: S) -> Self {
         Self {
@@ -62,33 +62,33 @@ impl<S> Interpolator<S> {
 }
 
 impl<S: AsRef<[i32]> + AsMut<[i32]>> Interpolator<S> {
-    /// Begins to load a job of this number of data words; the job before is dropped, and the machine is idle.
+    /// Begins to load a job of `words` data words; the previous job is dropped, and the machine is idle.
     ///
     /// # Errors
     /// Refused, and nothing changes: [`FaultKind::WrongState`] while a job runs or is held, [`FaultKind::BadHeader`],
-    /// [`FaultKind::TooManyPatches`] with the words that the header implies, [`FaultKind::BadLength`] where `words` are not
-    /// as many.
+    /// [`FaultKind::TooManyPatches`] with the words that the header implies, [`FaultKind::BadLength`] where `words` differs
+    /// from the length that the header implies.
     pub fn load_begin(&mut self, header: &Header, words: u32) -> Result<()> {
         self.motion.load_begin(header, words, self.store.as_ref().len())
     }
 
-    /// Writes data words at this offset: in order, or again over what was written.
+    /// Writes data words at `offset`: at the end of the words received so far, or over them again.
     ///
     /// # Errors
-    /// [`FaultKind::WrongState`]; [`FaultKind::BadLength`] where no load has begun, the words leave a gap or reach past the
-    /// job's end. Nothing is written then.
+    /// [`FaultKind::WrongState`]; [`FaultKind::BadLength`] where no load has begun, the words leave a gap or exceed the
+    /// job's length. Nothing is written on error.
     pub fn load_words(&mut self, offset: u32, words: &[i32]) -> Result<()> {
         self.motion.may_load()?;
         self.motion.program.write(self.store.as_mut(), offset, words)
     }
 
-    /// Records that [`Self::load_check`] has to be called for.
+    /// Number of records; [`Self::load_check`] has to be called for each.
     #[must_use]
     pub fn load_records(&self) -> u32 {
         self.motion.program.records()
     }
 
-    /// Checks one record: some thousand cycles, so that a board can do it between ticks. In order from 0.
+    /// Checks one record, in order from 0. Takes a few thousand cycles, so that a board can check between ticks.
     ///
     /// # Errors
     /// [`FaultKind::BadPatch`] with the record's index, [`FaultKind::BadHeader`] for a span width,
@@ -106,7 +106,7 @@ impl<S: AsRef<[i32]> + AsMut<[i32]>> Interpolator<S> {
         self.motion.load_finish()
     }
 
-    /// Gives up what was loaded: the machine is idle. Refused like [`Self::load_begin`].
+    /// Drops the loaded job: the machine is idle.
     ///
     /// # Errors
     /// [`FaultKind::WrongState`] while a job runs or is held.
@@ -126,7 +126,7 @@ impl<S: AsRef<[i32]> + AsMut<[i32]>> Interpolator<S> {
         self.motion.fault
     }
 
-    /// Pass, path and side parameter of the run. After a fault, those of the fault, which is past the last sample.
+    /// Pass, path and side parameter of the run. After a fault, those where the fault occurred, beyond the last sample.
     #[must_use]
     pub fn surface_position(&self) -> (u32, SpanParameter, SpanParameter) {
         self.motion
@@ -135,13 +135,13 @@ impl<S: AsRef<[i32]> + AsMut<[i32]>> Interpolator<S> {
             .unwrap_or_else(|| self.motion.run.surface_position())
     }
 
-    /// Whether the loaded job has limits of the axes, so that it is run from standstill to standstill with links between its passes.
+    /// Whether the loaded job has axis limits: each pass then starts and ends at standstill, and links join the passes.
     #[must_use]
     pub const fn has_limits(&self) -> bool {
         self.motion.program.header().axes.is_some()
     }
 
-    /// The loaded job's home, nm: where its run begins unless the tool is known to stand elsewhere. None for a job without limits.
+    /// The loaded job's home, nm: start of its run unless another tool position is known. None for a job without limits.
     #[must_use]
     pub fn home_nm(&self) -> Option<[i32; 3]> {
         self.motion.program.header().axes.map(|axes| axes.home_nm)
@@ -153,44 +153,44 @@ impl<S: AsRef<[i32]> + AsMut<[i32]>> Interpolator<S> {
         self.motion.sequencer.stands_nm()
     }
 
-    /// Sets the tool's position, nm, where the next run within limits begins; none where it is unknown: then that run
-    /// begins at its job's home. Ignored while a run is under way.
+    /// Sets the tool's position, nm, from which the next run within limits starts; `None` where it is unknown: that run then
+    /// starts at its job's home. Ignored while a run is under way.
     pub const fn stand_at(&mut self, at_nm: Option<[i32; 3]>) {
         if !self.motion.state.is_under_way() {
             self.motion.sequencer.stand_at(at_nm);
         }
     }
 
-    /// The last sample: its position is kept after a fault.
+    /// The last sample. A fault leaves its position unchanged.
     #[must_use]
     pub const fn last(&self) -> &Sample {
         &self.motion.last
     }
 
-    /// Least path interval of the pass that was finished last, in units of the side parameter.
+    /// Smallest path interval of the last finished pass, in units of the side parameter.
     #[must_use]
     pub const fn last_interval(&self) -> f32 {
         self.motion.run.last_interval()
     }
 
     /// Evaluates the loaded surface at these parameters, in any state of the machine. Not for the sample path:
-    /// it collapses a patch each time. The side fraction counts in steps of 2^-32.
+    /// each call collapses a patch. The side fraction is truncated to 2^-32.
     ///
     /// # Errors
-    /// [`FaultKind::WrongState`] without a loaded job or for a span that it does not have; what is wrong with the surface
-    /// there.
+    /// [`FaultKind::WrongState`] without a loaded job or for a span outside its grid; the fault of the surface
+    /// at these parameters.
     pub fn evaluate(&self, path: SpanParameter, side: SpanParameter) -> Result<SurfacePoint> {
         self.motion.evaluate(self.store.as_ref(), path, side)
     }
 
-    /// Controlled stop (IEC 60204-1 category 1) with a fault from outside, such as a missed deadline: along the path, the feed falling to nothing over
-    /// [`STOP_PERIODS`] ([`State::Stopping`]), or at the end of the pass if that is nearer. Where the run is held, it faults at
-    /// once. Ignored where nothing runs.
+    /// Controlled stop (IEC 60204-1 category 1) with an external fault, such as a missed deadline: the tool decelerates along the path to zero feed over
+    /// [`STOP_PERIODS`] ([`State::Stopping`]), or until the end of the pass if that is nearer. A held run faults
+    /// immediately. Ignored where no run is under way.
     pub fn controlled_stop(&mut self, fault: Fault) {
         self.motion.controlled_stop(fault);
     }
 
-    /// Uncontrolled stop (category 0) with a fault from outside: ends the run in this period, because the drives are off and the axes no longer
+    /// Uncontrolled stop (category 0) with an external fault: ends the run in this period, because the drives are off and the axes no longer
     /// follow the path. The first fault is kept. Ignored where no run is under way.
     pub fn uncontrolled_stop(&mut self, fault: Fault) {
         if self.motion.state.is_under_way() {
@@ -198,11 +198,11 @@ impl<S: AsRef<[i32]> + AsMut<[i32]>> Interpolator<S> {
         }
     }
 
-    /// One period. Never blocks, never panics; bounded by the collapse of a patch and its evaluation at a few
-    /// points, and at the start of a pass by a walk over 16 side spans.
+    /// One period. Does not block or panic; execution time is bounded by one patch collapse and its evaluation at a few
+    /// points, and at the start of a pass by a loop over 16 side spans.
     ///
     /// While the job runs, each call yields a sample with [`State::Running`] or [`State::Stopping`], counted by its `tick` from 0;
-    /// the one after the last has [`State::Finished`]. In every state that does not move, the sample repeats the last position.
+    /// the one after the last has [`State::Finished`]. In every state at standstill the sample repeats the last position.
     #[inline(always)]
     pub fn tick(&mut self, inputs: impl Into<Inputs>) -> &Sample {
         self.motion.tick(self.store.as_ref(), inputs.into());
@@ -215,24 +215,24 @@ impl<S: AsRef<[i32]> + AsMut<[i32]>> Interpolator<S> {
 struct Motion {
     state: State,
     fault: Option<Fault>,
-    /// Periods until a stop is over.
+    /// Periods left of a controlled stop.
     slow: u8,
     last: Sample,
-    /// The end of a stop that no fault caused.
+    /// State after a stop without a fault.
     ending: Ending,
     run: Run,
     program: Program,
     sequencer: Sequencer,
 }
 
-/// The rest of a run that was given up.
+/// Remaining motion of an aborted run.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Ending {
-    /// Stand where it stops.
+    /// Stop on the path and stay there.
     Stand,
-    /// Retract from the surface then.
+    /// Stop, then retract from the surface.
     Retract,
-    /// The tool retracts.
+    /// The retract is under way.
     Retracting,
 }
 
@@ -301,7 +301,7 @@ impl Motion {
         }
     }
 
-    /// The first fault is the one that is kept.
+    /// Only the first fault is kept.
     fn fail(&mut self, fault: Fault) {
         self.state = State::Faulted;
         self.fault.get_or_insert(fault);
@@ -324,7 +324,7 @@ impl Motion {
         self.last.state = self.state;
     }
 
-    /// One period of a machine that has limits.
+    /// One period of a job with axis limits.
     #[inline(never)]
     fn tick_within_limits(&mut self, store: &[i32], feed_factor: f32) {
         let feed_factor = match (self.state, self.ending) {
@@ -357,7 +357,7 @@ impl Motion {
         }
     }
 
-    /// The tool stands, as commanded: the run's next state. Whether that ends the period.
+    /// The tool has come to the commanded standstill: sets the next state of the run. Returns whether the period is complete.
     fn stand(&mut self) -> bool {
         match self.state {
             State::Holding => self.state = State::Held,
@@ -385,7 +385,7 @@ impl Motion {
         }
     }
 
-    /// One period of a stop: 1/32 of the feed less than in the last, until it is nothing or the pass is over.
+    /// One period of a stop: reduces the feed by 1/32, until it is zero or the pass ends.
     #[inline(never)]
     fn stop(&mut self, store: &[i32]) {
         self.slow = self.slow.saturating_sub(1);

@@ -13,7 +13,7 @@
 //!                 │                   CL = CC + rN      candidate of the pass
 //!             pass::run                    │                 │
 //!                 ▲                        ▼                 ▼
-//!   with limits: sequence, feed         Sample      pass::across, schedule: next pass
+//!   with limits: sequence, feed         Sample      pass::step_over, schedule: next pass
 //!                 ▲                        │
 //!         Interpolator::tick               ▼
 //!                 ▲                     steps: pulses

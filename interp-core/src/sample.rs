@@ -1,29 +1,29 @@
-//! What one period yields: the [`Sample`], and the running machine's [`State`].
+//! The output of one period: the [`Sample`] and the machine's [`State`].
 
 use crate::math::arith::sqrt;
 
-/// State of the running machine.
+/// State of the machine.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[repr(u8)]
 pub enum State {
     /// No job is loaded.
     #[default]
     Idle = 0,
-    /// A job is loaded and checked; nothing moves yet.
+    /// A job is loaded and checked; no run has begun.
     Ready = 1,
     /// The tool moves along its path.
     Running = 2,
-    /// Slowing down for a hold.
+    /// Decelerating for a feed hold.
     Holding = 3,
-    /// Standing on the path, to be resumed.
+    /// Feed hold: at standstill on the path, to be resumed.
     Held = 4,
-    /// Slowing down for an abort or a fault.
+    /// Decelerating for an abort or a fault.
     Stopping = 5,
-    /// The job's last sample is out.
+    /// The job's last sample was emitted.
     Finished = 6,
     /// Stopped by a fault; the position is kept.
     Faulted = 7,
-    /// The tool moves between passes, to the first or from the last, or waits there; only on a machine with limits.
+    /// The tool moves between passes, to the first or from the last, or waits there; only for a job with axis limits.
     Linking = 8,
 }
 
@@ -47,7 +47,7 @@ impl State {
         Self::ALL.into_iter().find(|state| *state as u8 == code)
     }
 
-    /// Whether a run is under way: moving, or standing on its path to be resumed.
+    /// Whether a run is under way: moving, or in a feed hold.
     #[must_use]
     pub const fn is_under_way(self) -> bool {
         matches!(
@@ -73,12 +73,12 @@ impl State {
     }
 }
 
-/// A surface parameter: the span of the grid, and the fraction of it.
+/// A surface parameter: the span of the grid, and the fraction within the span.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord)]
 pub struct SpanParameter {
     /// Span of the grid, from 0, in the surface's own direction.
     pub span: u16,
-    /// Fraction of the span in units of 2^-64; `u64::MAX` stands for its end exactly.
+    /// Fraction of the span in units of 2^-64; `u64::MAX` is the end of the span exactly.
     pub fraction: u64,
 }
 
@@ -90,18 +90,18 @@ impl SpanParameter {
     };
 }
 
-/// One period's result. Positions are exact integers; what host and board compute is the same to the last bit.
+/// One period's result. Positions are integers; host and board compute bit-identical samples.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Sample {
     /// Periods since the start of the run; the first sample has tick 0.
     pub tick: u32,
-    /// State that produced the sample.
+    /// State in which the sample was computed.
     pub state: State,
     /// Pass, from 0.
     pub pass: u32,
-    /// Where on the path parameter.
+    /// Path parameter.
     pub path: SpanParameter,
-    /// Where on the side parameter (fixed on a pass).
+    /// Side parameter (constant on a pass).
     pub side: SpanParameter,
     /// Commanded feed of the cutter contact along the surface, mm/s.
     pub feed_mm_s: f32,
@@ -109,13 +109,13 @@ pub struct Sample {
     pub cc_nm: [i32; 3],
     /// Cutter location (ball centre), nm: the axes' commanded position.
     pub cl_nm: [i32; 3],
-    /// `1 / interval^2`: square of the number of passes per unit of the side parameter that the scallop limit requires at this sample
-    /// alone. The greatest of a pass decides; see [`Self::interval`].
+    /// Inverse square interval `1 / interval^2`: square of the passes per unit of the side parameter that the scallop limit requires at this sample
+    /// alone. The maximum over a pass sets the path interval; see [`Self::interval`].
     pub inv_interval_sq: f32,
 }
 
 impl Sample {
-    /// Before anything has moved.
+    /// The sample before the first period.
     pub(crate) const START: Self = Self {
         tick: 0,
         state: State::Idle,
@@ -128,14 +128,14 @@ impl Sample {
         inv_interval_sq: 0.0,
     };
 
-    /// Candidate of the path interval at this sample, in units of the side parameter; infinite where it sets no limit.
+    /// Path interval that this sample allows, in units of the side parameter; infinite where the scallop limit does not bound the interval.
     #[must_use]
     pub fn interval(&self) -> f32 {
         interval_of(self.inv_interval_sq)
     }
 }
 
-/// The path interval of an inverse square of it, in units of the side parameter; infinite where nothing sets a limit.
+/// Path interval from an inverse square interval, in units of the side parameter; infinite where that is not positive.
 #[must_use]
 pub(crate) fn interval_of(inv_interval_sq: f32) -> f32 {
     if inv_interval_sq > 0.0 {

@@ -1,4 +1,4 @@
-//! How interp-core's types look on the wire: every enumeration as one byte (its stable code), every fraction as eight
+//! Encoding of interp-core's types on the wire: every enumeration as one byte (its stable code), every fraction as eight
 //! bytes, low byte first. Each submodule is a serde `with`.
 
 use interp_core::{
@@ -6,7 +6,7 @@ use interp_core::{
     sample::State,
 };
 
-/// One module a fieldless enumeration: its code as a byte; a code that is not known is an error.
+/// One module per fieldless enumeration: its code as a byte; an unknown code is an error.
 macro_rules! code_byte {
     ($module:ident, $kind:ty, $from_code:expr) => {
         pub(crate) mod $module {

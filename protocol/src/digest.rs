@@ -1,13 +1,13 @@
-//! One 64-bit number for many samples, so that "the same to the last bit" is one comparison.
+//! A 64-bit digest of many samples, so that one comparison checks that they are bit-identical.
 //!
-//! FNV-1a, but fed by 32-bit words instead of bytes, which costs a Cortex-M4 about seven cycles a word:
+//! FNV-1a over 32-bit words instead of bytes, about seven cycles per word on a Cortex-M4:
 //!
 //! ```text
 //! h(0)     = 0xcbf29ce484222325
 //! h(n + 1) = (h(n) xor word(n)) * 0x00000100000001b3   mod 2^64, the word zero-extended
 //! ```
 //!
-//! Every step is a bijection of `h`, so a single word that differs always shows. It is no protection against intent.
+//! Every step is a bijection of `h`, so a single differing word always changes the digest. The digest does not protect against deliberate changes.
 
 use core::hint::black_box;
 
@@ -18,31 +18,31 @@ use interp_core::sample::Sample;
 pub struct Digest(u64);
 
 impl Digest {
-    /// The digest of nothing.
+    /// The digest of no words.
     pub const EMPTY: u64 = 0xcbf2_9ce4_8422_2325;
 
     /// Low half of the prime; its high half is 2^8.
     const PRIME_LOW: u32 = 0x1b3;
 
-    /// A digest that was fed nothing yet.
+    /// The digest of no words.
     #[must_use]
     pub const fn new() -> Self {
         Self(Self::EMPTY)
     }
 
-    /// The number so far.
+    /// The digest of the words so far.
     #[must_use]
     pub const fn value(self) -> u64 {
         self.0
     }
 
-    /// Feeds one word.
+    /// Adds one word.
     #[inline]
     pub const fn word(&mut self, word: u32) {
         self.word_and(word, 0);
     }
 
-    /// Feeds one word; `zero` is added. By halves, because that is four instructions: exclusive or, product, shifted add, and
+    /// Adds one word; `zero` is added to it. Computed in halves, which takes four instructions: exclusive or, product, shifted add, and
     /// the long product that accumulates.
     #[inline]
     const fn word_and(&mut self, word: u32, zero: u32) {
@@ -54,14 +54,14 @@ impl Digest {
         self.0 = product.wrapping_add((top as u64) << 32 | zero as u64);
     }
 
-    /// Feeds the data words of a job, in order.
+    /// Adds the data words of a job, in order.
     pub fn words(&mut self, words: &[i32]) {
         for word in words {
             self.word(word.cast_unsigned());
         }
     }
 
-    /// Feeds every field of a sample as 17 words: tick, state code, pass, path span, low and high half of the path
+    /// Adds every field of a sample as 17 words: tick, state code, pass, path span, low and high half of the path
     /// fraction, the side's span, low and high half, feed (f32 bits), CC x y z (nm), CL x y z (nm), inverse square interval (f32 bits).
     #[inline]
     pub fn sample(&mut self, sample: &Sample) {
@@ -115,7 +115,7 @@ mod tests {
 
     #[test]
     fn follows_its_definition() {
-        // Worked out with integers of unlimited size: ((basis ^ 1) * prime % 2^64 ^ 0x80000000) * prime % 2^64.
+        // Computed with arbitrary-precision integers: ((basis ^ 1) * prime % 2^64 ^ 0x80000000) * prime % 2^64.
         assert_eq!(Digest::new().value(), 0xcbf2_9ce4_8422_2325);
         assert_eq!(job_digest(&[1]), 0xaf63_bc4c_8601_b62c);
         assert_eq!(job_digest(&[1, i32::MIN]), 0x082f_212e_34e8_8cc4);

@@ -1,13 +1,13 @@
-//! Frames: how a message gets over a line that may lose, add and flip bytes.
+//! Frames: message transport over a line that may lose, insert and corrupt bytes.
 //!
 //! ```text
 //! payload | CRC-32 of the payload, low byte first    -> COBS -> 0x00
 //! ```
 //!
-//! [COBS](https://doi.org/10.1109/90.769765) removes every zero byte from the frame, so that a zero ends it and nothing
-//! else: whatever came before, the frame after a zero can be read. CRC-32 is that of Ethernet and zip
-//! (CRC-32/ISO-HDLC). A zero before the first frame of a session, and before every retransmission, ends what noise may
-//! have begun; empty frames mean nothing and are passed over.
+//! [COBS](https://doi.org/10.1109/90.769765) removes every zero byte from the frame, so that a zero only ever ends a
+//! frame: the receiver resynchronises at each zero. The CRC-32 is that of Ethernet and zip
+//! (CRC-32/ISO-HDLC). A zero before the first frame of a session, and before every retransmission, ends any partial frame due to
+//! noise; empty frames are ignored.
 
 use core::fmt;
 
@@ -17,21 +17,21 @@ use serde::{Deserialize, Serialize};
 
 use crate::message::{Numbered, Reply, Request};
 
-/// Longest payload, bytes: a `Samples` message with every varint at its longest.
+/// Maximum payload, bytes: a `Samples` message with every varint at its maximum length.
 pub const PAYLOAD_MAX: usize = 288;
 
 /// Bytes of the checksum.
 const CRC_BYTES: usize = 4;
 
-/// Longest frame, bytes, with its delimiter: COBS adds one byte, and one more for every 254.
+/// Maximum frame, bytes, with its delimiter: COBS adds one byte, and one more for every 254.
 pub const FRAME_MAX: usize = cobs::max_encoding_length(PAYLOAD_MAX + CRC_BYTES) + 1;
 
-/// Ends a frame.
+/// Delimiter at the end of a frame.
 pub const DELIMITER: u8 = 0;
 
 static CRC: Crc<u32> = Crc::<u32>::new(&CRC_32_ISO_HDLC);
 
-/// What can be wrong with a frame. The codes on the wire count from 0 in this order.
+/// Errors of a frame. The codes on the wire count from 0 in this order.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub enum FrameError {
     /// 0: longer than [`FRAME_MAX`].
@@ -82,16 +82,16 @@ fn write<'a, T: Serialize>(message: &T, buffer: &'a mut [u8]) -> Result<&'a [u8]
     Ok(frame)
 }
 
-/// A frame that arrived whole.
+/// A received frame without errors.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Frame<'a> {
     /// The message.
     pub payload: &'a [u8],
-    /// Its checksum: with the length all that is needed to know the same frame again.
+    /// Its checksum; with the length it identifies a retransmitted frame.
     pub crc: u32,
 }
 
-/// Puts frames together out of bytes. Takes any input whatever; a damaged frame never affects the one after its zero.
+/// Assembles frames from bytes. Accepts any input; a damaged frame does not affect the frame after its delimiter.
 #[derive(Debug)]
 pub struct Decoder {
     buffer: [u8; FRAME_MAX],
@@ -109,13 +109,13 @@ impl Decoder {
         }
     }
 
-    /// Takes the next byte; with the one that ends a frame, the frame or what is wrong with it.
+    /// Accepts the next byte; at the end of a frame, returns the frame or its error.
     pub fn push(&mut self, byte: u8) -> Option<Result<Frame<'_>, FrameError>> {
         if byte != DELIMITER {
             if let Some(place) = self.buffer.get_mut(self.length) {
                 *place = byte;
             }
-            // One more than fits says "too long"; it stays there until the delimiter.
+            // A length of one more than the buffer marks a frame that is too long, until the delimiter.
             self.length = (self.length + 1).min(FRAME_MAX);
             return None;
         }
@@ -123,9 +123,9 @@ impl Decoder {
         (length > 0).then(|| self.frame(length))
     }
 
-    /// Undoes stuffing and checksum of `length` bytes.
+    /// Removes the stuffing of `length` bytes and checks the checksum.
     fn frame(&mut self, length: usize) -> Result<Frame<'_>, FrameError> {
-        // The buffer's last place is the delimiter's, which is not stored.
+        // The last byte of the buffer is for the delimiter, which is not stored.
         if length >= FRAME_MAX {
             return Err(FrameError::TooLong);
         }

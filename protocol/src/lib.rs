@@ -1,14 +1,14 @@
-//! What host and board say to each other, layer by layer, from the wire up. `no_std`, no allocation, no panic on any
+//! The protocol between host and board, layer by layer, from the wire up. `no_std`, no allocation, no panic on any
 //! input; both ends use this code.
 //!
 //! # The line
 //!
-//! Eight-bit bytes, any of which may be lost, added or flipped. Nothing is assumed but that they keep their order.
+//! Eight-bit bytes, any of which may be lost, inserted or corrupted. The line preserves their order.
 //!
 //! # Frames: [`frame`]
 //!
 //! A payload of at most [`frame::PAYLOAD_MAX`] bytes, its CRC-32, both stuffed by COBS, ended by a zero byte. A frame
-//! either arrives as it was sent, or is an error; damage never reaches the frame after the next zero.
+//! either arrives unchanged or is an error; damage does not extend beyond the next zero.
 //!
 //! # Messages: [`message`]
 //!
@@ -23,38 +23,38 @@
 //! | `Status` | → ← | `Status` |
 //! | | ← | `Samples`, `PassDigest`, `Halted` while a run goes on |
 //!
-//! The module's documentation has every message's bytes. One request is under way at a time; each has a number, and gets
+//! The module's documentation has every message's bytes. One request is outstanding at a time; each has a number, and gets
 //! one answer.
 //!
-//! # What happens when
+//! # Replies and errors
 //!
-//! | the board gets | it answers | and |
+//! | the board receives | it answers | and |
 //! |---|---|---|
 //! | a damaged frame | `Nak` 0, [`message::Reason::BadFrame`] | counts it |
-//! | a whole frame that is no message | `Nak`, `Unreadable` | |
+//! | a valid frame without a valid message | `Nak`, `Unreadable` | |
 //! | anything before `Hello` | `Nak`, `SayHello` | |
 //! | `Hello` of another version | `Capabilities`, whose version says so; then `Nak`, `Version` with both versions | closes the session |
 //! | `Hello` of the same session again | `Capabilities` | |
 //! | the last request again, byte for byte | the same answer again, byte for byte | |
 //! | a number that is not the next | `Nak`, `OutOfOrder` with the one expected | |
-//! | a job, another clock or other steps while a run is under way | `Nak`, `WrongState` with the state | |
+//! | a job, clock or step settings while a run is under way | `Nak`, `WrongState` with the state | |
 //! | a chunk that is not the next, or too many words | `Nak`, `WrongOffset`, `TooLong` | |
 //! | `JobEnd` too early | `Nak`, `Incomplete` | the upload may go on |
 //! | `JobEnd` with other words than announced | `Nak`, `WrongDigest` | the upload is over, no job is loaded |
 //! | `JobEnd` of a job that the core refuses | `Nak`, `Job` with fault, value, record | the upload is over, no job is loaded |
-//! | steps that the core refuses | `Nak`, `Job` with fault, value, axis | |
+//! | step settings that the core refuses | `Nak`, `Job` with fault, value, axis | |
 //! | a command that the state does not allow | `Nak`, `WrongState` | |
-//! | a start, or drives on, that inputs, latch or homing forbid | `Nak`, `Unsafe` with the fault | |
+//! | a start, or drives on, refused because of inputs, latch or homing | `Nak`, `Unsafe` with the fault | |
 //! | a start, or a home, while the drives are off | `Nak`, `DrivesOff` | |
-//! | a start while the axes do not stand at the job's home | `Nak`, `NotAtHome` with both places | |
+//! | a start while the axes do not stand at the job's home | `Nak`, `NotAtHome` with both positions | |
 //! | a value beyond its range | `Nak`, `OutOfRange` with the range | |
 //!
-//! Where the last column is empty, nothing has changed. An event that the line damages is lost: the host sees it by a
-//! tick or pass that is missing, and by `Status`, whose digest covers the whole run.
+//! Where the last column is empty, nothing has changed. An event that the line damages is lost: the host detects the loss by a
+//! missing tick or pass, and by `Status`, whose digest covers the whole run.
 //!
 //! # Digests: [`digest`]
 //!
-//! 64 bits that two ends compare instead of all samples of a pass, or all words of a job.
+//! 64 bits that both ends compare instead of all samples of a pass or all words of a job.
 //!
 //! # Versions: [`version`]
 //!

@@ -1,4 +1,4 @@
-//! The messages, in one table for both ends.
+//! The messages and their encoding.
 //!
 //! # Bytes
 //!
@@ -21,7 +21,7 @@
 //!
 //! Payload: number of the request (`u16`), code (1 byte), fields.
 //!
-//! | code | message | fields | answer, if all is well |
+//! | code | message | fields | answer on success |
 //! |---|---|---|---|
 //! | 0 | `Hello` | version `u16`, session `u32` | `Capabilities` |
 //! | 1 | `JobBegin` | header, words `u32`, digest | `Ack` |
@@ -51,7 +51,7 @@
 //!
 //! # Board to host
 //!
-//! Payload: code (1 byte), fields. The first four answer a request and carry its number; the others come by themselves.
+//! Payload: code (1 byte), fields. The first four answer a request and carry its number; the others are unsolicited events.
 //!
 //! | code | message | fields |
 //! |---|---|---|
@@ -63,19 +63,19 @@
 //! | 5 | `PassDigest` | the fields of [`PassDigest`] |
 //! | 6 | `Halted` | the fields of [`Status`] |
 //!
-//! A parameter is its span (`u16`) and fraction. `Halted` comes when the ticks of a `Run` are used up, or when a run is over
+//! A parameter is its span (`u16`) and fraction. `Halted` comes when the ticks of a `Run` are used up, or when a run ends
 //! (finished, faulted, aborted), whichever is first.
 //!
-//! # For ever
+//! # Compatibility
 //!
-//! Frame, number, `Hello` and `Capabilities` keep their bytes in every version; what a later version adds to these two
-//! comes behind, and is skipped by an earlier one. So two ends of any versions can tell each other which they speak.
+//! Frame, number, `Hello` and `Capabilities` keep their bytes in every version; fields that a later version adds to these two
+//! are appended, and an earlier version skips them. So two ends of any versions can report their versions to each other.
 //!
 //! # Numbers
 //!
-//! Requests count 1, 2, .. 65535, 1, ..; [`next_number`] says it. `Hello` may have any number, and the count goes on from
-//! there. One request at a time: the host waits for the answer, or sends the same bytes again. Which answers use a number
-//! up is said at [`Reason::uses_number`].
+//! Requests count 1, 2, .. 65535, 1, ..; see [`next_number`]. `Hello` may have any number, and the count continues from
+//! there. One request at a time: the host waits for the answer, or sends the same bytes again. [`Reason::uses_number`] defines
+//! which answers consume a number.
 
 use interp_core::{command::Command, job::Header};
 use serde::{Deserialize, Serialize};
@@ -94,7 +94,7 @@ use crate::{
     version::{PROTOCOL_VERSION, VersionMismatch},
 };
 
-/// Number of a `Nak` that answers no request that could be read.
+/// Number of a `Nak` to an unreadable request.
 pub const NO_NUMBER: u16 = 0;
 
 /// The number of the request after this one.
@@ -139,17 +139,17 @@ pub enum Request {
     JobEnd,
     /// Run the job from its beginning.
     Start,
-    /// Stand on the path.
+    /// Feed hold: decelerate along the path and stop.
     Hold,
-    /// Go on after a hold.
+    /// Resume after a hold.
     Resume,
-    /// Give the run up; the job stays loaded.
+    /// Abort the run; the job stays loaded.
     Abort,
     /// Asks for the status.
     Status,
-    /// What drives time. Refused while a run is under way.
+    /// Time base of the board. Refused while a run is under way.
     Clock(Clock),
-    /// Lockstep: let this number of further periods pass.
+    /// Lockstep: execute this number of further periods.
     Run {
         /// Periods, added to those left of the last `Run`.
         ticks: u32,
@@ -161,25 +161,25 @@ pub enum Request {
     /// Description of the machine around the board. Refused while a run is under way.
     Configure(Configuration),
     /// Drives on or off. On is refused while emergency stop or drive fault are asserted or latched; off while a run is
-    /// under way, and loses the home.
+    /// under way, and clears the home.
     Drives {
-        /// Whether they are to be on.
+        /// Whether to switch the drives on.
         on: bool,
     },
-    /// The axes stand here. Refused while a run is under way, or the drives are off: they would move when switched on.
+    /// Declares the position of the axes. Refused while a run is under way, or while the drives are off, because axes without drives may move.
     SetHome {
-        /// Where they stand, nm.
+        /// Position, nm.
         home_nm: [i32; 3],
     },
-    /// Clears the latch of emergency stop and drive fault. Refused while one of them is asserted. Neither the drives nor the
-    /// home come back by it.
+    /// Clears the latch of emergency stop and drive fault. Refused while one of them is asserted. The drives stay off and the
+    /// machine stays not homed.
     Acknowledge,
-    /// The feed, as a share of the programmed one; holds from the next period until the next `Override`.
+    /// Feed override, percent of the programmed feed; in force from the next period until the next `Override`.
     Override {
         /// Percent, at most [`OVERRIDE_MAX_PERCENT`].
         percent: u8,
     },
-    /// Stop along the path, and give the run up; the job stays loaded.
+    /// Decelerate along the path, and abort the run; the job stays loaded.
     Stop,
     /// The inputs of a board that has no pins for them, as in QEMU; refused by others.
     Simulate {
@@ -215,7 +215,7 @@ impl Request {
     }
 }
 
-/// What opens a session: who the board is.
+/// The answer to `Hello`: identity and capacities of the board.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Capabilities {
     /// Number of the `Hello` that this answers.
@@ -224,12 +224,12 @@ pub struct Capabilities {
     pub version: u16,
     /// Session of the `Hello`.
     pub session: u32,
-    /// The board and what it can hold.
+    /// Identity and capacities of the board.
     pub description: Description,
 }
 
 impl Capabilities {
-    /// Whether the board speaks this end's version; the error names both.
+    /// Checks that the board has this end's protocol version.
     ///
     /// # Errors
     /// The versions, where they differ.
@@ -254,12 +254,12 @@ impl Capabilities {
 pub enum Reply {
     /// Answer to `Hello`, whatever the host's version.
     Capabilities(Capabilities),
-    /// Done, or queued where it takes effect with the next period.
+    /// Executed, or queued where it takes effect with the next period.
     Ack {
         /// Number of the request.
         number: u16,
     },
-    /// Not done, and nothing changed, unless the reason says otherwise.
+    /// Refused; nothing changed, unless stated at the reason.
     Nak {
         /// Number of the request; [`NO_NUMBER`] where it could not be read.
         number: u16,
@@ -281,10 +281,10 @@ pub enum Reply {
     Halted(Status),
 }
 
-/// A payload whose CRC is right, but which is none of the messages of this version.
+/// A payload with a correct CRC that is not a message of this version.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Unreadable {
-    /// Number of the request; [`NO_NUMBER`] where even that is missing, or for a reply.
+    /// Number of the request; [`NO_NUMBER`] where the number is missing too, or for a reply.
     pub number: u16,
 }
 

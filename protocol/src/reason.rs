@@ -12,15 +12,15 @@ use crate::{
     version::VersionMismatch,
 };
 
-/// Why a request was refused. A refused request changes nothing, unless said here. The codes on the wire count from 0 in this order.
+/// Why a request was refused. A refused request changes nothing, unless stated here. The codes on the wire count from 0 in this order.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub enum Reason {
-    /// 0: a frame was damaged; send again what was not answered.
+    /// 0: a frame was damaged; repeat the unanswered request.
     BadFrame {
-        /// What was wrong with it.
+        /// The frame's error.
         error: FrameError,
     },
-    /// 1: the frame was whole, but is no message of this version.
+    /// 1: the frame was valid, but is not a message of this version.
     Unreadable,
     /// 2: no session is open; say `Hello` first.
     SayHello,
@@ -36,7 +36,7 @@ pub enum Reason {
         /// The number that the next request must have.
         expected: u16,
     },
-    /// 5: the state forbids it.
+    /// 5: not permitted in this state.
     WrongState {
         /// The state.
         #[serde(with = "codes::state")]
@@ -44,23 +44,23 @@ pub enum Reason {
     },
     /// 6: `Run` without lockstep.
     WrongClock {
-        /// What drives time.
+        /// Time base of the board.
         clock: Clock,
     },
-    /// 7: too many commands wait for the next period, or one for the job that this request would replace; ask again, with
+    /// 7: the command queue is full, or it holds a command for the job that this request would replace; ask again, with
     /// a new number.
     Busy,
-    /// 8: the core refuses the job. From `JobBegin` and `JobChunk` nothing has changed; from `JobEnd` the upload is given
-    /// up and the machine is idle.
+    /// 8: the core refuses the job. From `JobBegin` and `JobChunk` nothing has changed; from `JobEnd` the upload is aborted
+    /// and the machine is idle.
     Job {
-        /// What is wrong with it.
+        /// The fault of the job.
         fault: FaultReport,
-        /// In which record of the surface data, where it is one.
+        /// The record of the surface data, where the fault concerns one.
         record: Option<u32>,
     },
-    /// 9: more words than there is room for.
+    /// 9: more words than the store holds.
     TooLong {
-        /// Words that there is room for.
+        /// Capacity, words.
         limit: u32,
         /// Words asked for.
         wanted: u32,
@@ -72,14 +72,14 @@ pub enum Reason {
         /// Offset that the next chunk must have.
         expected: u32,
     },
-    /// 12: `JobEnd` before all words were there; the upload may go on.
+    /// 12: `JobEnd` before all words were received; the upload may continue.
     Incomplete {
         /// Words announced.
         wanted: u32,
         /// Words received.
         received: u32,
     },
-    /// 13: the words are not those announced; the upload is given up, the machine is idle.
+    /// 13: the words are not those announced; the upload is aborted, the machine is idle.
     WrongDigest {
         /// Digest announced.
         #[serde(with = "postcard::fixint::le")]
@@ -88,9 +88,9 @@ pub enum Reason {
         #[serde(with = "postcard::fixint::le")]
         received: u64,
     },
-    /// 14: inputs, latch or homing forbid it.
+    /// 14: refused because of inputs, latch or homing.
     Unsafe {
-        /// What would stop a run that went on, or keeps it from being begun: `emergency-stop`, `limit-switch`,
+        /// The fault that would stop a run or prevents its start: `emergency-stop`, `limit-switch`,
         /// `drive-fault` with the inputs, `not-homed`.
         fault: FaultReport,
     },
@@ -98,18 +98,18 @@ pub enum Reason {
     DrivesOff,
     /// 16: a value beyond its range.
     OutOfRange {
-        /// The largest that there is.
+        /// Maximum value.
         most: u32,
-        /// The one asked for.
+        /// Requested value.
         wanted: u32,
     },
-    /// 17: this board does not do that.
+    /// 17: not supported by this board.
     Unsupported,
-    /// 18: a start, and the axes do not stand where the job begins.
+    /// 18: a start while the axes are not at the job's home.
     NotAtHome {
         /// The job's home, nm.
         home_nm: [i32; 3],
-        /// Where the axes stand, nm; none after a run that knew no way to its passes.
+        /// Position of the axes, nm; none after a job without axis limits, which leaves it unknown.
         stands_nm: Option<[i32; 3]>,
     },
 }
@@ -141,8 +141,8 @@ impl Reason {
         }
     }
 
-    /// Whether the request counts as answered, so that the next one needs the next number. Otherwise the board forgets
-    /// that it ever came.
+    /// Whether the request counts as answered, so that the next one needs the next number. Otherwise the board ignores
+    /// the request.
     #[must_use]
     pub const fn uses_number(self) -> bool {
         !matches!(
@@ -156,7 +156,7 @@ impl Reason {
     }
 }
 
-/// The fault that forbids it, and the inputs that are its value.
+/// The fault that prevents the request, and the inputs in its value.
 fn unsafe_because(fault: FaultReport, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
     let name = fault.kind().map_or("unknown fault", FaultKind::name);
     write!(formatter, "not safe: {name} (code {})", fault.code)?;
@@ -166,7 +166,7 @@ fn unsafe_because(fault: FaultReport, formatter: &mut fmt::Formatter<'_>) -> fmt
     Ok(())
 }
 
-/// A place of the axes in millimetres, with every nanometre.
+/// A position of the axes in millimetres, with nanometre resolution.
 struct Mm([i32; 3]);
 
 impl fmt::Display for Mm {
@@ -181,7 +181,7 @@ impl fmt::Display for Mm {
     }
 }
 
-/// Where the axes should stand, and where they do.
+/// The required and the actual position of the axes.
 fn not_at_home(
     home_nm: [i32; 3],
     stands_nm: Option<[i32; 3]>,

@@ -1,7 +1,7 @@
 //! The structures that messages are made of, and their bytes.
 //!
 //! Field after field, in the order written here, without gaps. `u16`, `u32`, `i32` are varints, `f32` and the digests
-//! have fixed width; see [`crate::message`] for what that means.
+//! have fixed width; see [`crate::message`] for the encoding.
 
 use heapless::{String, Vec};
 use interp_core::{
@@ -17,47 +17,47 @@ use crate::{
     safety::{InputLines, SafetyStatus},
 };
 
-/// Words a `JobChunk` may carry: 256 bytes, so that storing one holds up the sample timer for microseconds only.
+/// Words a `JobChunk` may carry: 256 bytes, so that storing a chunk delays the sample timer by microseconds only.
 pub const CHUNK_WORDS_MAX: usize = 64;
 
-/// Samples a `Samples` message may carry. Four fill a frame about as far as a full chunk does the other way.
+/// Samples a `Samples` message may carry. Four take about as many bytes as a full chunk.
 pub const SAMPLES_MAX: usize = 4;
 
 /// Longest name of a board, bytes.
 pub const BOARD_NAME_MAX: usize = 24;
 
-/// What drives time on the board.
+/// Time base of the board.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub enum Clock {
     /// Every period of the sample timer is one step.
     #[default]
     Free,
-    /// Steps only while the ticks given by `Run` last; otherwise time stands still.
+    /// Periods pass only while ticks granted by `Run` are left.
     Lockstep,
 }
 
 /// Reports of a run to the host while it is under way.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub enum Report {
-    /// One `PassDigest` a pass.
+    /// One `PassDigest` per pass.
     #[default]
     Digests,
-    /// Every sample too.
+    /// A `PassDigest` per pass, and every sample.
     Samples,
 }
 
-/// The board and what it can hold: the part of `Capabilities` that belongs to the machine.
+/// Identity and capacities of the board: the machine's part of `Capabilities`.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Description {
     /// Version of the firmware: major, minor, patch.
     pub firmware: [u16; 3],
-    /// Name of the board, for people.
+    /// Display name of the board.
     pub board: String<BOARD_NAME_MAX>,
-    /// Data words that a job may have.
+    /// Maximum data words of a job.
     pub store_words: u32,
-    /// Polynomial patches that fit into them, at most: the widths of the spans need words too.
+    /// Maximum polynomial patches in these words, together with the span widths.
     pub patches_max_polynomial: u32,
-    /// Rational patches that fit into them, at most.
+    /// Maximum rational patches in these words.
     pub patches_max_rational: u32,
     /// Words a `JobChunk` may carry.
     pub chunk_words_max: u16,
@@ -65,28 +65,28 @@ pub struct Description {
     pub period_us: u32,
 }
 
-/// A fault as it travels. The code stays a number, because a newer board may know kinds that the host does not.
+/// A fault on the wire. The code is kept as a number, because a newer board may have kinds unknown to the host.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct FaultReport {
     /// Code of the [`FaultKind`].
     pub code: u8,
-    /// The value at fault; its meaning is the kind's.
+    /// The offending value; unit and meaning are given at each [`FaultKind`].
     pub value: f32,
 }
 
 impl FaultReport {
-    /// The kind, where this end knows it.
+    /// The kind, where the code is known.
     #[must_use]
     pub fn kind(self) -> Option<FaultKind> {
         FaultKind::from_code(self.code)
     }
 
-    /// The inputs that the value stands for, where it is the fault of one.
+    /// The inputs in the value, where the kind is that of an input.
     #[must_use]
     pub fn lines(self) -> InputLines {
         match self.kind() {
             Some(FaultKind::EmergencyStop | FaultKind::LimitSwitch | FaultKind::DriveFault) => {
-                // Saturates, so that no value is none.
+                // Saturates, so that every value yields inputs.
                 #[allow(
                     clippy::cast_possible_truncation,
                     clippy::cast_sign_loss,
@@ -109,7 +109,7 @@ impl From<Fault> for FaultReport {
     }
 }
 
-/// Status of the board and its run. Counters belong to the run and restart with it, save `frames_bad`.
+/// Status of the board and its run. Counters restart with each run, except `frames_bad`.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Status {
     /// State after the last step.
@@ -117,9 +117,9 @@ pub struct Status {
     pub state: State,
     /// The fault, while the state is faulted.
     pub fault: Option<FaultReport>,
-    /// What drives time.
+    /// Time base of the board.
     pub clock: Clock,
-    /// Ticks of the last `Run` that are left.
+    /// Remaining ticks of the last `Run`.
     pub credit: u32,
     /// Reports of a run to the host.
     pub report: Report,
@@ -142,11 +142,11 @@ pub struct Status {
     pub interval: f32,
     /// Ticks of the sample timer that were missed.
     pub deadline_misses: u32,
-    /// Most CPU cycles that a tick took; 0 where the board cannot measure.
+    /// Maximum CPU cycles of a tick; 0 where the board cannot measure.
     pub tick_cycles_max: u32,
     /// Samples (and other events) lost because the queue to the link was full.
     pub samples_lost: u32,
-    /// Frames from the host that could not be read since power-up.
+    /// Unreadable frames from the host since power-up.
     pub frames_bad: u32,
     /// Inputs, drives, home.
     pub safety: SafetyStatus,
@@ -176,7 +176,7 @@ impl Default for Status {
     }
 }
 
-/// One finished (or cut short) pass.
+/// One finished or aborted pass.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct PassDigest {
     /// Pass, from 0.
@@ -185,15 +185,15 @@ pub struct PassDigest {
     pub first_tick: u32,
     /// Its samples.
     pub samples: u32,
-    /// Digest of the whole run up to the pass's end: the first pass that differs is the first whose digest does.
+    /// Digest of the whole run up to the pass's end: the first pass with a different digest is the first that differs.
     #[serde(with = "postcard::fixint::le")]
     pub digest: u64,
-    /// Path interval that followed from it, in units of the side parameter; that of the pass before where it was cut
-    /// short.
+    /// Path interval that followed from it, in units of the side parameter; that of the previous pass where this one was
+    /// aborted.
     pub interval: f32,
 }
 
-/// The wire's view of [`Sample`]; it stops compiling when the core's grows a field.
+/// Serde mirror of [`Sample`]; does not compile if the core's structure gains a field.
 #[derive(Serialize, Deserialize)]
 #[serde(remote = "Sample")]
 struct SampleFields {
@@ -211,14 +211,14 @@ struct SampleFields {
     inv_interval_sq: f32,
 }
 
-/// A [`Sample`] as it travels.
+/// A [`Sample`] on the wire.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct SampleRecord(#[serde(with = "SampleFields")] pub Sample);
 
 /// Up to [`SAMPLES_MAX`] samples, the oldest first: their number, then each.
 pub type Batch = Vec<SampleRecord, SAMPLES_MAX>;
 
-/// The wire's view of [`Header`]; it stops compiling when the core's grows a field.
+/// Serde mirror of [`Header`]; does not compile if the core's structure gains a field.
 #[derive(Serialize, Deserialize)]
 #[serde(remote = "Header")]
 pub(crate) struct HeaderFields {
@@ -240,7 +240,7 @@ pub(crate) struct HeaderFields {
     axes: Option<AxisLimits>,
 }
 
-/// The wire's view of [`AxisLimits`]; it stops compiling when the core's grows a field.
+/// Serde mirror of [`AxisLimits`]; does not compile if the core's structure gains a field.
 #[derive(Serialize, Deserialize)]
 #[serde(remote = "AxisLimits")]
 struct AxisLimitsFields {
@@ -276,8 +276,8 @@ mod axes {
     }
 }
 
-/// Settings of the axes' drives: of each axis steps (`u32`), the millimetres that these are (`u32`), whether its direction is inverted
-/// (a byte, 0 or 1); then slots of a pulse (`u8`) and of the directions' set-up (`u16`).
+/// Settings of the axes' drives: for each axis the steps (`u32`), the millimetres for these steps (`u32`), and whether its direction is inverted
+/// (a byte, 0 or 1); then the pulse length (`u8`) and the direction set-up time (`u16`), slots.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct StepSettings {
     axes: [(u32, u32, bool); 3],
@@ -312,7 +312,7 @@ impl From<StepSettings> for StepConfig {
 pub struct Words(Vec<i32, CHUNK_WORDS_MAX>);
 
 impl Words {
-    /// These words, if they are not too many for one chunk.
+    /// A chunk of these words; none if they exceed [`CHUNK_WORDS_MAX`].
     #[must_use]
     pub fn new(words: &[i32]) -> Option<Self> {
         Vec::from_slice(words).ok().map(Self)

@@ -4,7 +4,7 @@ use serde::{Deserialize, Serialize};
 
 pub use interp_core::command::{OVERRIDE_MAX_PERCENT, OVERRIDE_NORMAL_PERCENT};
 
-/// The board's safety inputs, one bit each, set where the input is asserted whatever its level on the wire.
+/// The board's safety inputs, one bit each, set where the input is asserted, independent of its electrical level.
 ///
 /// | bit | input |
 /// |---|---|
@@ -18,7 +18,7 @@ pub use interp_core::command::{OVERRIDE_MAX_PERCENT, OVERRIDE_NORMAL_PERCENT};
 pub struct InputLines(pub u16);
 
 impl InputLines {
-    /// Nothing asserted.
+    /// No input asserted.
     pub const NONE: Self = Self(0);
     /// The emergency stop.
     pub const EMERGENCY_STOP: Self = Self(1);
@@ -26,7 +26,7 @@ impl InputLines {
     pub const LIMITS: Self = Self(0x7e);
     /// The drive faults of all axes, and the common one.
     pub const DRIVE_FAULTS: Self = Self(0x780);
-    /// Every input there is.
+    /// All inputs.
     pub const ALL: Self = Self(0x7ff);
 
     /// Names of the inputs, by bit.
@@ -44,37 +44,37 @@ impl InputLines {
         "drive fault",
     ];
 
-    /// Those that are in both.
+    /// Intersection.
     #[must_use]
     pub const fn and(self, other: Self) -> Self {
         Self(self.0 & other.0)
     }
 
-    /// Those that are in either.
+    /// Union.
     #[must_use]
     pub const fn or(self, other: Self) -> Self {
         Self(self.0 | other.0)
     }
 
-    /// Those that are not in the other.
+    /// Difference: inputs that are not in the other set.
     #[must_use]
     pub const fn without(self, other: Self) -> Self {
         Self(self.0 & !other.0)
     }
 
-    /// Whether any is in both.
+    /// Whether the sets have an input in common.
     #[must_use]
     pub const fn has(self, any_of: Self) -> bool {
         self.0 & any_of.0 != 0
     }
 
-    /// Whether none is asserted.
+    /// Whether no input is asserted.
     #[must_use]
     pub const fn is_none(self) -> bool {
         self.0 == 0
     }
 
-    /// The names of those that are asserted, in order of their bits.
+    /// The names of the asserted inputs, in order of their bits.
     pub fn names(self) -> impl Iterator<Item = &'static str> {
         Self::NAMES
             .into_iter()
@@ -87,17 +87,17 @@ impl InputLines {
 /// Reaction of a run on a free clock to a link timeout.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub enum LinkTimeoutAction {
-    /// 0: it goes on to its end.
+    /// 0: the run continues to its end.
     #[default]
     Finish,
-    /// 1: it is held along the path, to be resumed.
+    /// 1: feed hold, to be resumed.
     Hold,
 }
 
-/// The host's description of the machine around the board. The default is the strict one.
+/// The host's description of the machine around the board. The default is the strictest.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Configuration {
-    /// A run starts only where the machine is homed.
+    /// Whether a run requires a homed machine.
     pub homing_required: bool,
     /// Reaction of a run to a link timeout.
     pub on_link_timeout: LinkTimeoutAction,
@@ -106,7 +106,7 @@ pub struct Configuration {
 }
 
 impl Configuration {
-    /// A board that was not configured.
+    /// The configuration of a board before `Configure`.
     pub const DEFAULT: Self = Self {
         homing_required: true,
         on_link_timeout: LinkTimeoutAction::Finish,
@@ -123,18 +123,18 @@ impl Default for Configuration {
 /// Why the board started.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub enum ResetCause {
-    /// 0: the board does not say.
+    /// 0: not reported by the board.
     #[default]
     Unknown,
-    /// 1: power came on.
+    /// 1: power-on.
     PowerOn,
-    /// 2: the supply had sunk too low.
+    /// 2: brown-out.
     Brownout,
     /// 3: the reset pin.
     Pin,
-    /// 4: the program or a debugger.
+    /// 4: software reset, or a debugger.
     Software,
-    /// 5: the watchdog: ticks had stopped, or missed their deadline again and again.
+    /// 5: the watchdog: ticks had stopped, or had missed their deadline repeatedly.
     Watchdog,
     /// 6: a low-power mode that was entered by mistake.
     LowPower,
@@ -159,11 +159,11 @@ impl ResetCause {
 /// The safety state of the board.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct SafetyStatus {
-    /// Inputs that are asserted: the emergency stop at once, the others as soon as they are steady.
+    /// Asserted inputs: the emergency stop immediately, the others debounced.
     pub lines: InputLines,
     /// Emergency stop and drive faults that were asserted since they were last acknowledged.
     pub latched: InputLines,
-    /// The axes stand where the board believes they do.
+    /// The machine is homed: the position of the axes is known.
     pub homed: bool,
     /// The drives are enabled.
     pub drives_on: bool,
@@ -178,7 +178,7 @@ pub struct SafetyStatus {
 }
 
 impl SafetyStatus {
-    /// A board after power-up: drives off, not homed.
+    /// The state after power-up: drives off, not homed.
     pub const DEFAULT: Self = Self {
         lines: InputLines::NONE,
         latched: InputLines::NONE,

@@ -1,12 +1,12 @@
-//! The version of this protocol, and what to say where two ends differ in it.
+//! The version of this protocol, and the error where the two ends' versions differ.
 
 use core::fmt;
 
-/// Version of the messages in [`crate::message`]. It counts up with every change that the other end would notice; the
+/// Version of the messages in [`crate::message`]. It is incremented with every incompatible change; the
 /// frame, `Hello` and `Capabilities` never change.
 pub const PROTOCOL_VERSION: u16 = 4;
 
-/// Host and board speak different versions; no other message is understood.
+/// Host and board have different versions; no other message can be decoded.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct VersionMismatch {
     /// Version of the host.

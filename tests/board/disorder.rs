@@ -10,7 +10,7 @@ use protocol::message::{Clock, Reply, Report, Request, Status};
 
 use super::{Desk, digest, reference, samples_of_dome};
 
-/// What a host, or a line gone mad, may do next.
+/// Actions of a host, or faults of the line.
 #[derive(Clone, Debug)]
 enum Deed {
     Noise(Vec<u8>),
@@ -105,7 +105,7 @@ fn act(desk: &mut Desk, deed: Deed) {
     }
 }
 
-/// What the run must be, by what has happened to the board.
+/// The expected state of the run, from the actions so far.
 struct Model {
     whole: Vec<Sample>,
     before: Status,
@@ -122,7 +122,7 @@ impl Model {
         }
     }
 
-    /// Follows one deed: the status after it, and the samples that were told of during it.
+    /// Processes one action: the status after it, and the samples reported during it.
     fn follow(&mut self, deed: &Deed, status: Status, told: &[Sample]) -> Result<(), TestCaseError> {
         if let (None, Some(fault)) = (self.before.fault, status.fault) {
             // Only a missed tick can have done that, in the one tick of its deed: it stops what was there before.

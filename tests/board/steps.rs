@@ -1,4 +1,4 @@
-//! The steps of a run, and settings of the drives that come over the line.
+//! The steps of a run, and settings of the drives sent over the line.
 
 use interp_core::{
     fault::FaultKind,
@@ -9,7 +9,7 @@ use protocol::message::{Clock, Reason, Reply, Report, Request};
 
 use super::Desk;
 
-/// Steps of x, so many a millimetre; y and z as usual.
+/// Settings with this number of steps per millimetre of x; y and z by default.
 fn steps_of_x(steps: u32) -> StepConfig {
     let mut config = StepConfig::DEFAULT;
     config.axes[0] = AxisSteps {

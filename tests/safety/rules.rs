@@ -12,15 +12,15 @@ use protocol::message::{Clock, Configuration, FaultReport, InputLines, LinkTimeo
 
 use super::WORDS;
 
-/// What may happen to the real-time half.
+/// Events at the real-time half.
 #[derive(Clone, Copy, Debug)]
 enum Deed {
-    /// These inputs for so many ticks.
+    /// These inputs for a number of ticks.
     Inputs(u16, u8),
     Order(Order),
     Command(Instruction),
     Heard,
-    /// A tick after so many were missed, and so many cycles.
+    /// A tick with a number of missed ticks and of cycles.
     Late(u32, u32),
 }
 
@@ -67,7 +67,7 @@ fn any_deed() -> impl Strategy<Value = Deed> {
     ]
 }
 
-/// What the rules say, by the simplest means: a count for each input.
+/// Reference model of the rules: a count for each input.
 #[derive(Default)]
 struct Rules {
     counts: [u32; 16],

@@ -66,7 +66,7 @@ fn a_start_that_is_not_safe_is_refused_with_the_reason() {
     line.accepted(&Request::Start);
 }
 
-/// What concerns drives and home goes to the machine at once, and what it refuses, the host is told.
+/// Requests for drives and home reach the machine immediately, and its refusals are answered to the host.
 #[test]
 fn orders_go_to_the_machine_and_its_reasons_back() {
     let configuration = Configuration {

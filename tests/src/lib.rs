@@ -1,4 +1,4 @@
-//! What the tests across crates share: a host's end of the line, a machine that only writes down what it is told, and a
+//! What the tests across crates share: a host's end of the line, a machine that only records its calls, and a
 //! small job.
 #![allow(clippy::unwrap_used, reason = "a test may fail by panic")]
 

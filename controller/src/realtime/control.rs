@@ -1,4 +1,4 @@
-//! State of the real-time half besides the interpolator.
+//! State of the real-time half except the interpolator.
 
 use interp_core::{
     command::Command,
@@ -13,19 +13,19 @@ use crate::{
     safety::Safety,
 };
 
-/// All of the real-time half but the interpolator.
+/// State of the real-time half except the interpolator.
 #[derive(Debug)]
 pub(super) struct Control {
     pub(super) run: RunRecord,
     pub(super) credit: u32,
-    /// In lockstep: an instruction was executed in this tick; the last period that there was credit for is over, and the host has to hear of it. Time
-    /// stands still for a tick then, so that neither adds to a period's work.
+    /// In lockstep: an instruction was executed in this tick; the last period with credit has ended, and its end is to be reported. Time
+    /// stands still for that tick, so that neither adds to the cycles of a period.
     pub(super) obeyed: bool,
     pub(super) spent: bool,
     pub(super) tick_budget: u32,
     pub(super) clock: Clock,
     pub(super) report: Report,
-    /// Waits for a period to pass.
+    /// Command that waits for the next period.
     pub(super) command: Option<Command>,
     pub(super) safety: Safety,
     /// The next run within limits has to begin at its job's home.
@@ -48,25 +48,25 @@ impl Control {
         }
     }
 
-    /// Puts an event in its queue, or counts it as lost.
+    /// Enqueues an event, or counts it as lost.
     pub(super) fn put(&mut self, event: Event, events: &mut impl Events) {
         if !events.put(event) {
             self.run.events_lost = self.run.events_lost.saturating_add(1);
         }
     }
 
-    /// Whether nothing led to this sample: without limits, the first of each pass.
+    /// Whether this sample has no path from the previous one: without limits, the first of each pass.
     #[inline]
     pub(super) const fn jumps(&self, sample: &Sample, has_limits: bool) -> bool {
         !has_limits && moves(sample.state) && sample.tick == self.run.pass.first_tick
     }
 
-    /// Executes an instruction; false where the host is to hear that time stands still, or stood: for a `Run` that leaves no time, and for
-    /// a change of the clock before the host heard of it.
+    /// Executes an instruction; false where a `Halted` is due: for a `Run` without ticks, and for
+    /// a change of the clock before the end of a `Run` was reported.
     pub(super) fn obey(&mut self, instruction: Instruction) -> bool {
         self.obeyed = true;
         match instruction {
-            // An abort or stop that waits for its period is not undone by a later command.
+            // A queued abort or stop is not replaced by a later command.
             Instruction::Command(_) if self.command == Some(Command::Abort) => {}
             Instruction::Command(command)
                 if self.command == Some(Command::Stop) && command != Command::Abort => {}
@@ -88,13 +88,13 @@ impl Control {
         true
     }
 
-    /// Whether the last tick left nothing to note: none was missed, and it took no longer than others and than allowed.
+    /// Whether the last tick needs no record: no tick was missed, and its cycles exceed neither the maximum so far nor the budget.
     #[inline]
     pub(super) const fn is_in_time(&self, input: TickInput) -> bool {
         input.missed == 0 && input.cycles <= self.run.tick_cycles_max && input.cycles <= self.tick_budget
     }
 
-    /// Notes misses and cycles; the fault that they are to a tool that moves on a free clock.
+    /// Records misses and cycles; returns their fault while the tool moves on a free clock.
     #[cold]
     pub(super) fn note_time(&mut self, input: TickInput) -> Option<Fault> {
         self.run.deadline_misses = self.run.deadline_misses.saturating_add(input.missed);
@@ -111,7 +111,7 @@ impl Control {
     }
 }
 
-/// A count as the value of a fault: exact to 2^24, which is hours of missed ticks and a tenth of a second of cycles.
+/// A count as the value of a fault: exact up to 2^24, which is 4.6 h of missed ticks or 0.1 s of cycles.
 #[allow(
     clippy::cast_precision_loss,
     reason = "a count beyond 2^24 needs no last digit"

@@ -35,7 +35,7 @@ impl RunRecord {
         self.pass.samples == 0 || sample.pass != self.pass.pass
     }
 
-    /// Begins the pass of this sample; yields the one before.
+    /// Begins the pass of this sample; returns the previous pass.
     #[cold]
     pub(super) fn begin_pass(&mut self, sample: &Sample, interval: f32) -> Option<PassDigest> {
         let over = self.end_pass(interval);
@@ -44,7 +44,7 @@ impl RunRecord {
         over
     }
 
-    /// Counts a sample in. Not generic and not inlined: compiled here for speed, whatever its callers are compiled for.
+    /// Adds a sample. Not generic and not inlined, so that it is compiled in this crate, for speed, independent of its callers' optimisation level.
     #[inline(never)]
     pub(super) fn add(&mut self, sample: &Sample) {
         self.pass.samples = self.pass.samples.saturating_add(1);
@@ -52,7 +52,7 @@ impl RunRecord {
         self.digest.sample(sample);
     }
 
-    /// The pass so far, if it has samples; the next sample begins another.
+    /// The pass so far, if it has samples; the next sample begins a new one.
     pub(super) fn end_pass(&mut self, interval: f32) -> Option<PassDigest> {
         let digest = self.digest.value();
         let samples = core::mem::take(&mut self.pass.samples);

@@ -1,8 +1,8 @@
-//! Before a run: drives, home, and whether it may begin.
+//! Conditions for the start of a run: drives, home, position.
 //!
-//! **Where a run begins.** A job within limits says where: at its home. Its run is refused where the axes stand elsewhere, because
-//! nothing would lead to its first sample. Run again, home not having been declared since, it begins where it ended: at its home, or
-//! where it was given up, and the way to the surface is found from there.
+//! **Start position.** A job with axis limits starts at its home. The start is refused where the axes stand elsewhere, because
+//! no path would lead to its first sample. Restarted without a new declaration of the home, it starts where it ended: at its home, or
+//! where it was aborted, and the approach is planned from there.
 //! **Without a home.** Where none is required and none was declared, the axes count as standing at the job's home.
 //! **After a job without limits** the axes' position is unknown: no links led from pass to pass.
 
@@ -13,10 +13,10 @@ use super::{RealTime, run::RunRecord};
 use crate::safety::{Order, may_start};
 
 impl<S: AsRef<[i32]> + AsMut<[i32]>> RealTime<S> {
-    /// Does what the host asks of drives and home.
+    /// Executes the host's order for drives and home.
     ///
     /// # Errors
-    /// Why not; nothing has changed then.
+    /// The reason of the refusal; nothing has changed.
     pub fn order(&mut self, order: Order) -> Result<(), Reason> {
         let state = self.interpolator.state();
         self.control.safety.obey(order, state)?;
@@ -28,7 +28,7 @@ impl<S: AsRef<[i32]> + AsMut<[i32]>> RealTime<S> {
         Ok(())
     }
 
-    /// Where the axes stood when the host declared it, nm; none where the machine is not homed.
+    /// The position that the host declared as home, nm; none where the machine is not homed.
     #[must_use]
     pub const fn home_nm(&self) -> Option<[i32; 3]> {
         self.control.safety.home_nm()
@@ -37,7 +37,7 @@ impl<S: AsRef<[i32]> + AsMut<[i32]>> RealTime<S> {
     /// Whether a run may start.
     ///
     /// # Errors
-    /// Why not: an input asserted or latched, the drives off, the machine not homed, or not where the job begins.
+    /// The reason of the refusal: an input asserted or latched, the drives off, the machine not homed, or not at the start position.
     pub fn may_start(&self) -> Result<(), Reason> {
         let status = self.control.safety.status();
         may_start(&status)?;
@@ -50,8 +50,8 @@ impl<S: AsRef<[i32]> + AsMut<[i32]>> RealTime<S> {
         }
     }
 
-    /// A start whose period passes: a run with its record reset, or no run where it may not start, which
-    /// the link could not know yet.
+    /// Executes a start: resets the record of the run, or refuses the start for a reason that
+    /// arose after the link's check.
     #[cold]
     #[inline(never)]
     pub(super) fn begin(&mut self) -> Option<Command> {
@@ -73,7 +73,7 @@ impl<S: AsRef<[i32]> + AsMut<[i32]>> RealTime<S> {
         Some(Command::Start)
     }
 
-    /// Sets the axes' position: steps and runs count from there.
+    /// Sets the axes' position for steps and runs.
     fn set_position(&mut self, at_nm: [i32; 3]) {
         self.interpolator.stand_at(Some(at_nm));
         if let Some(steps) = &mut self.steps {
@@ -151,7 +151,7 @@ mod tests {
         assert_eq!(half.steps().unwrap().position(), [-1, 2, 8000]);
         assert_eq!(half.steps().unwrap().target_nm(), HOME_NM);
         assert_eq!(half.interpolator.stands_nm(), Some(HOME_NM));
-        // A home that is refused places nothing.
+        // A refused home leaves the position unchanged.
         half.order(Order::Drives { on: false }).unwrap();
         let home = Order::SetHome { home_nm: [0; 3] };
         assert_eq!(half.order(home), Err(Reason::DrivesOff));
@@ -174,7 +174,7 @@ mod tests {
             assert_eq!(half.may_start(), may);
             assert_eq!(half.begin(), begun);
         }
-        // Without limits it begins wherever it is.
+        // Without limits a run starts at any position.
         let mut half = with_plate(None);
         order(&mut half, DRIVES_ON);
         order(&mut half, Order::SetHome { home_nm: near });

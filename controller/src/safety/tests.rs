@@ -4,7 +4,7 @@ const ESTOP: InputLines = InputLines::EMERGENCY_STOP;
 const X_PLUS: InputLines = InputLines(1 << 2);
 const FAULT_Y: InputLines = InputLines(1 << 8);
 
-/// A board that may start.
+/// A board on which a run may start.
 fn ready() -> Safety {
     let mut safety = Safety::NEW;
     for order in [Order::Drives { on: true }, Order::SetHome { home_nm: [1, 2, 3] }] {
@@ -14,7 +14,7 @@ fn ready() -> Safety {
     safety
 }
 
-/// One tick as the real-time half makes it.
+/// One tick, as called by the real-time half.
 fn tick(safety: &mut Safety, lines: InputLines, under_way: bool) -> Option<Stop> {
     if safety.is_unchanged(lines) {
         None
@@ -28,7 +28,7 @@ fn unsafe_because(kind: FaultKind, lines: InputLines) -> Result<(), Reason> {
     Err(Reason::Unsafe { fault: fault.into() })
 }
 
-/// Against counters one by one: a simple generator of inputs that are steady for a while, or chatter.
+/// Compared with separate counters, on random inputs that are steady for a while or bounce.
 #[test]
 fn every_input_is_debounced_by_itself() {
     let mut debounce = Debounce::NEW;
@@ -37,7 +37,7 @@ fn every_input_is_debounced_by_itself() {
     let mut changes = 0;
     for _ in 0..100_000 {
         noise = noise.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1);
-        // Half of the bits, those above, change seldom.
+        // The upper half of the bits changes rarely.
         let raw = (noise >> 33) as u16 & 0x00ff | (noise >> 41) as u16 & (noise >> 50) as u16 & 0xff00;
         debounce.push(raw);
         for bit in 0..16 {
@@ -61,7 +61,7 @@ fn an_emergency_stop_of_one_tick_cuts_and_latches() {
     assert_eq!(tick(&mut safety, ESTOP, true), Some(Stop::Uncontrolled(fault)));
     assert!(!safety.drives_on() && safety.home_nm().is_none());
     let asserted = unsafe_because(FaultKind::EmergencyStop, ESTOP);
-    // Released, it still bounces.
+    // After the release the contact bounces.
     for _ in 1..DEBOUNCE_TICKS {
         assert_eq!(safety.obey(Order::Acknowledge, State::Faulted), asserted);
         tick(&mut safety, InputLines::NONE, false);
@@ -74,7 +74,7 @@ fn an_emergency_stop_of_one_tick_cuts_and_latches() {
     }
     assert_eq!(may_start(&safety.status), asserted);
     assert_eq!(safety.obey(Order::Acknowledge, State::Faulted), Ok(()));
-    // Nothing comes back by itself.
+    // Drives and home stay off until ordered.
     assert_eq!(may_start(&safety.status), Err(Reason::DrivesOff));
     assert_eq!(
         safety.obey(Order::SetHome { home_nm: [0; 3] }, State::Ready),
@@ -96,7 +96,7 @@ fn a_drive_fault_cuts_and_a_limit_switch_trips_once_they_are_steady() {
         for _ in 1..DEBOUNCE_TICKS {
             assert_eq!(tick(&mut safety, lines, true), None);
         }
-        // A spark is not enough, however often it comes.
+        // Pulses shorter than the debounce time have no effect, in any number.
         assert_eq!(tick(&mut safety, InputLines::NONE, true), None);
         for _ in 1..DEBOUNCE_TICKS {
             assert_eq!(tick(&mut safety, lines, true), None);
@@ -133,7 +133,7 @@ fn drives_off_lose_the_home_and_no_order_is_taken_under_way() {
     assert_eq!(safety.home_nm(), None);
 }
 
-/// Ticks until the run is to be held, as the real-time half finds it; `None` after the given number.
+/// Ticks until the link timeout requires a hold; `None` if not within the given number.
 fn ticks_until_hold(safety: &mut Safety, clock: Clock, states: &[State]) -> Option<usize> {
     for (tick, &state) in states.iter().enumerate() {
         if !safety.is_unchanged(InputLines::NONE)
@@ -168,7 +168,7 @@ fn a_host_that_is_gone_is_noticed_on_time_and_only_in_a_run_on_a_free_clock() {
     assert!(safety.status.link_timed_out);
     safety.begin_run();
     assert!(!safety.status.link_timed_out);
-    // On the way into another state it is asked again as soon as that takes a hold.
+    // During a state transition the hold is repeated until the state accepts it.
     let mut way = [State::Holding; 100];
     way[50] = State::Running;
     let mut safety = patient(LinkTimeoutAction::Hold, 20);

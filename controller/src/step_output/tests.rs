@@ -1,5 +1,5 @@
-//! The driver against a model of the chip: registers by address, and what TIM1, TIM2 and DMA2 do with them (RM0090).
-//! The model reads the registers' bits by itself, from the manual, not by the driver's constants.
+//! The driver on a model of the chip: registers by address, and the behaviour of TIM1, TIM2 and DMA2 (RM0090).
+//! The model uses the register bits of the manual, not the driver's constants.
 
 use super::*;
 use interp_core::steps::{StepConfig, Steps};
@@ -21,10 +21,10 @@ const MEMORY: Memory = Memory {
     rest: 0x2000_3000,
 };
 
-/// A stream at work.
+/// State of an enabled stream.
 #[derive(Clone, Copy, Default)]
 struct Stream {
-    /// Words of the buffer that are done.
+    /// Words of the buffer transferred so far.
     done: u32,
 }
 
@@ -35,7 +35,7 @@ struct Chip {
     written: Vec<(u32, u32)>,
     play: Stream,
     wipe: Stream,
-    /// What came to the step pins' port, a word a slot.
+    /// The words written to the step pins' port, one per slot.
     port: Vec<u32>,
 }
 
@@ -84,7 +84,7 @@ impl Chip {
         }
     }
 
-    /// TIM1's slot: its update goes to stream 5, its first compare to stream 1 (table 43), if they are asked for.
+    /// TIM1's slot: its update goes to stream 5, its first compare to stream 1 (table 43), if the requests are enabled.
     fn slot(&mut self) {
         let requests = self.word(0x4001_000c);
         if requests & 1 << 8 != 0 {
@@ -96,7 +96,7 @@ impl Chip {
     }
 }
 
-/// A hand on the chip, as the driver wants one.
+/// Register access for the driver.
 #[derive(Clone, Default)]
 struct Hand(Rc<RefCell<Chip>>);
 
@@ -112,7 +112,7 @@ impl Registers for Hand {
     }
 }
 
-/// Chip, driver and steps joined as the firmware joins them.
+/// Chip, driver and step generator connected as in the firmware.
 struct Board {
     chip: Hand,
     output: StepOutput<Hand>,
@@ -140,7 +140,7 @@ impl Board {
         }
     }
 
-    /// The end of a tick: fills the buffer that is free.
+    /// The end of a tick: fills the free buffer.
     fn fill(&mut self, cl_nm: [i32; 3]) -> bool {
         let Some(idle) = self.output.free() else {
             return false;
@@ -174,7 +174,7 @@ impl Board {
         WIRING.step.map(|pin| {
             let mut high = false;
             let rises = chip.port.iter().filter(|word| {
-                // Setting wins over resetting (8.4.7).
+                // Set has priority over reset (8.4.7).
                 let now = **word >> pin & 1 == 1 || high && **word >> (16 + pin) & 1 == 0;
                 let rises = now && !high;
                 high = now;
@@ -226,7 +226,7 @@ fn the_set_up_is_that_of_the_manual() {
         .position(|write| *write == expected[0])
         .unwrap();
     assert_eq!(chip.written[at..at + expected.len()], expected);
-    // TIM1: 168 counts a slot, compare in the middle, a quarter before the end, requests, trigger ITR1; TIM2 hands its update on. All
+    // TIM1: 168 counts a slot, compare in the middle, a quarter before the end, requests, trigger ITR1; TIM2's update as trigger output. All
     // of it after the streams.
     let expected = [
         (0x4002_3844, 1),
@@ -248,7 +248,7 @@ fn the_set_up_is_that_of_the_manual() {
             .iter()
             .all(|(address, _)| !(0x4002_0000..0x4002_3000).contains(address))
     );
-    // Nothing that another driver has set is undone.
+    // Settings of other drivers are preserved.
     let kept = Hand::default();
     kept.0
         .borrow_mut()
@@ -266,7 +266,7 @@ fn every_step_comes_to_the_port_once() {
     let mut at = [0_i32; 3];
     let (mut low, mut way) = ([0_i64; 3], 0);
     for period in 0..400_i32 {
-        // Up, and down again with turns of all axes.
+        // Forwards, then backwards with a reversal of all axes.
         let speed = [1_000_000, 300_001, 777].map(|most| if period % 100 < 50 { most } else { -most });
         let before = board.steps.position();
         for (at, speed) in at.iter_mut().zip(speed) {
@@ -280,10 +280,10 @@ fn every_step_comes_to_the_port_once() {
         way += 1;
     }
     assert_eq!(way, 400);
-    // The last fill plays in the period after.
+    // The last fill is output in the following period.
     board.period(0, at).unwrap();
     assert_eq!(board.rises().map(i64::from), low);
-    // Each pulse with the direction that it was meant for is what the core's own tests hold; here, that the pins followed.
+    // The core's tests check the direction of each pulse; this checks the pins.
     let chip = board.chip.0.borrow();
     let turns = chip
         .written
@@ -291,7 +291,7 @@ fn every_step_comes_to_the_port_once() {
         .filter(|(address, _)| *address == 0x4002_1418)
         .count();
     assert_eq!(turns, 7, "a turn each 50 periods");
-    // Both buffers are wiped but for what plays next.
+    // Both buffers are cleared except for the next output.
     assert!(chip.port.iter().all(|word| word & REST_WORD == REST_WORD));
 }
 
@@ -302,7 +302,7 @@ fn without_the_processor_no_pulse_comes_twice() {
         board.period(0, [period * 500_000, 0, 0]).unwrap();
     }
     let [sent, ..] = board.steps.position();
-    // The processor is gone: what was filled plays, and nothing after it.
+    // The processor has stopped: the filled buffers are output, and no pulse afterwards.
     board.slots(10 * SLOTS);
     assert_eq!(board.rises(), [sent, 0, 0]);
     let chip = board.chip.0.borrow();
@@ -341,7 +341,7 @@ fn a_direction_set_too_late_is_told() {
         board.period(TURN_SLOTS + 1, [100_000, 0, 0]),
         Err(Failure::DirectionLate(TURN_SLOTS + 1))
     );
-    // A period that nobody heard is late by a period.
+    // A missed period counts as late by one period.
     board.period(0, [-100_000, 0, 0]).unwrap();
     board.slots(SLOTS);
     assert_eq!(
@@ -361,7 +361,7 @@ fn a_stream_that_stops_is_told() {
     assert_eq!(board.output.begin(0), Err(Failure::Stopped));
 }
 
-/// As in QEMU: every register reads as zero. Nothing waits, nothing is a fault, and the slots are made all the same.
+/// As in QEMU, where every register reads as zero: no wait, no fault, and the slots are still computed.
 #[test]
 fn missing_hardware_holds_nothing_up() {
     struct Nothing;

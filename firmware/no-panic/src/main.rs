@@ -1,13 +1,13 @@
 //! The proof that no panic can be reached from the sample task, made by the linker.
 //!
-//! This image has the firmware's task (`sample_task.rs`, the same file) under the same RTIC handler, at the other
-//! ends of its queues as little as there can be, and a panic handler that calls a function which does not exist. Were a
-//! panic reachable, the handler would stay in the image, and the linker would miss that function by its name. Flags,
-//! profile and target are the firmware's; `tests/no_panic.rs` links it, and sees the linking fail with the feature
+//! This image has the firmware's task (`sample_task.rs`, the same file) under the same RTIC handler, with minimal
+//! code at the other ends of its queues, and a panic handler that calls an undefined function. If a
+//! panic is reachable, the handler stays in the image, and the linker reports the undefined symbol. Flags,
+//! profile and target are the firmware's; `tests/no_panic.rs` links it, and checks that linking fails with the feature
 //! `with-a-panic`. The image is never run.
 //!
-//! What the proof rests on: the compiler removes what it can show to be unreachable, so a check that can never fail but
-//! is not seen through counts as a panic here. It says nothing of faults of the processor, nor of the other tasks.
+//! Limits of the proof: the compiler removes code that it can prove unreachable, so a check that cannot fail but
+//! that the compiler cannot prove so counts as a panic. Processor faults and the other tasks are not covered.
 #![no_std]
 #![no_main]
 
@@ -102,7 +102,7 @@ mod app {
         )
     }
 
-    /// The firmware's task. What state the machine is in is hidden from the compiler there: it may be any.
+    /// The firmware's task. The machine's state is opaque to the compiler, so it may be any state.
     #[task(binds = TIM2, priority = 3, shared = [real_time], local = [task, guards, output])]
     fn sample(mut context: sample::Context) {
         let sample::LocalResources {
@@ -116,7 +116,7 @@ mod app {
         assert!(black_box(true), "the control");
     }
 
-    /// The other ends: any command may come, and each event is looked at.
+    /// The other ends of the queues: any command may arrive, and each event is read.
     #[idle(shared = [real_time], local = [commands_in, events_out])]
     fn idle(mut context: idle::Context) -> ! {
         loop {

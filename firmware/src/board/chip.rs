@@ -1,5 +1,5 @@
-//! What all boards with an STM32F405 or F407 have in common: clocks at 168 MHz from the crystal, USART1, the log by the debug probe (RTT), and
-//! so a panic.
+//! Code common to all boards with an STM32F405 or F407: clocks at 168 MHz from the crystal, USART1, the log through the debug probe (RTT), and
+//! the panic handler.
 
 use defmt_rtt as _;
 use protocol::message::InputLines;
@@ -15,7 +15,7 @@ use crate::{
     drivers::gpio,
 };
 
-/// The processor's clock, MHz: the most that the chip is made for.
+/// The processor's clock, MHz: the chip's maximum.
 const CORE_MHZ: u32 = 168;
 
 /// APB1, MHz: a quarter of the core clock, its limit being 42 MHz.
@@ -30,17 +30,17 @@ pub(crate) const TIMER_HZ: u32 = 2 * APB1_MHZ * 1_000_000;
 /// Timers on a divided APB2, TIM1 among them, count at twice its clock.
 pub(crate) const STEP_TIMER_HZ: u32 = 2 * APB2_MHZ * 1_000_000;
 
-/// Ticks come from the timer alone.
+/// Ticks are triggered only by the timer.
 pub(crate) const TIME_IS_SIMULATED: bool = false;
 
 /// The timer counts from 0 to the reload value inclusive.
 pub(crate) const TIMER_RELOAD: u32 = TIMER_HZ / 1_000_000 * PERIOD_US - 1;
 
-/// USART1 hangs on APB2; 16 samples a bit make the divider the plain quotient, here rounded.
+/// USART1 is on APB2; with 16 samples per bit the divider is the quotient, rounded.
 pub(crate) const SERIAL_DIVIDER: u16 = {
     let apb2_hz = APB2_MHZ * 1_000_000;
     let divider = (apb2_hz + SERIAL_BAUD / 2) / SERIAL_BAUD;
-    // Both ends together may differ by about 3 % before the stop bit is missed; a third of it is ours.
+    // Both ends together may differ by about 3 % before the stop bit is missed; a third of it is the limit for this end.
     let real_baud = apb2_hz / divider;
     assert!(
         real_baud.abs_diff(SERIAL_BAUD) < SERIAL_BAUD / 100,
@@ -53,7 +53,7 @@ pub(crate) const SERIAL_DIVIDER: u16 = {
     divider as u16
 };
 
-/// Sets up the clocks; the pins are at rest since the reset. Waits for crystal and PLL: without a crystal the board stays here.
+/// Sets up the clocks; the pins are at rest since the reset. Waits for crystal and PLL; without a crystal this does not return.
 pub(crate) fn init(device: pac::Peripherals) -> Board {
     let reset = take_reset_cause(&device.RCC);
     let mut rcc = device.RCC.freeze(
@@ -63,7 +63,7 @@ pub(crate) fn init(device: pac::Peripherals) -> Board {
             .pclk1(APB1_MHZ.MHz())
             .pclk2(APB2_MHZ.MHz()),
     );
-    // The constants above are what the timers and the link rely on.
+    // Timers and link depend on the constants above.
     defmt::assert_eq!(rcc.clocks.sysclk().raw(), CORE_MHZ * 1_000_000);
     defmt::assert_eq!(rcc.clocks.timclk1().raw(), TIMER_HZ);
     defmt::assert_eq!(rcc.clocks.pclk2().raw(), APB2_MHZ * 1_000_000);
@@ -71,7 +71,7 @@ pub(crate) fn init(device: pac::Peripherals) -> Board {
     pac::TIM2::enable(&mut rcc);
     pac::TIM5::enable(&mut rcc);
     pac::USART1::enable(&mut rcc);
-    // The probe reads the log while the processor sleeps.
+    // Keeps the clocks on in sleep, so that the probe can read the log.
     device.DBGMCU.cr().modify(|_, w| w.dbg_sleep().set_bit());
     // Halted by a debugger, timers and watchdog stand still, so that a breakpoint is neither a missed period nor a reset.
     device.DBGMCU.apb1_fz().modify(|_, w| {
@@ -104,8 +104,8 @@ pub(crate) fn simulate(_lines: InputLines) -> bool {
     false
 }
 
-/// Stays here, with every output at rest: what may still be under way to the step pins moves nothing. Nobody feeds the watchdog any
-/// more, which resets the chip after some periods; the log then tells why.
+/// Loops forever with every output inactive; pulses still output by DMA have no effect, because the drives are off. The watchdog is no longer fed
+/// and resets the chip after some periods; the log then reports the cause.
 pub(crate) fn stop_for_good() -> ! {
     gpio::rest(&super::REST);
     loop {
@@ -115,7 +115,7 @@ pub(crate) fn stop_for_good() -> ! {
 
 #[panic_handler]
 fn panic(info: &core::panic::PanicInfo<'_>) -> ! {
-    // Nothing is to move meanwhile, nor to panic in between.
+    // No motion and no further panic in the meantime.
     cortex_m::interrupt::disable();
     gpio::rest(&super::REST);
     super::log_panic(info);

@@ -1,25 +1,25 @@
-//! The seam between the application and the board it runs on: the only file that knows which boards there
-//! are.
+//! The interface between application and board: the only file with conditional compilation per
+//! board.
 //!
 //! A board is one file beside this one, with the same items in each:
 //!
-//! | item | what |
+//! | item | meaning |
 //! |---|---|
 //! | `BOARD` | its table: name, crystal, pins (crate `boards`) |
-//! | `TIMER_HZ` | what TIM2 and TIM5 count |
+//! | `TIMER_HZ` | clock of TIM2 and TIM5 |
 //! | `TIMER_RELOAD` | auto-reload value of TIM2 for one period |
 //! | `TIME_IS_SIMULATED` | in lockstep, ticks need not wait for the timer |
-//! | `STEP_TIMER_HZ` | what TIM1 counts |
+//! | `STEP_TIMER_HZ` | clock of TIM1 |
 //! | `WIRING` | step and direction pins |
-//! | `STEPS` | what the drives want, until a host says otherwise |
+//! | `STEPS` | default settings of the drives, until the host sends others |
 //! | `SERIAL_DIVIDER` | `BRR` of USART1 |
-//! | `init` | clocks; hands back what the drivers take |
-//! | `InputPorts` | where the safety inputs are read: the chip's ports, or what stands for them |
-//! | `simulate` | gives a board without pins its inputs |
-//! | `stop_for_good` | what follows a fault of the processor |
+//! | `init` | sets up the clocks; returns the peripherals for the drivers |
+//! | `InputPorts` | source of the safety inputs: the chip's ports, or simulated ones |
+//! | `simulate` | sets the simulated inputs of a board without pins |
+//! | `stop_for_good` | final state after a processor fault |
 //!
-//! Pins are set up before all of that, right after a reset (`reset_pins.rs`). All but the first are `chip.rs`'s for boards with a chip; QEMU has its own. So have the panic handler and the transport of the
-//! log. Drivers take their pins from `BOARD`, whatever the board. To add a board, add its table in `boards`, its file here, its
+//! Pins are set up earlier, directly after a reset (`reset_pins.rs`). For boards with a chip, `chip.rs` provides all items but the first, the panic handler and the transport of the
+//! log; QEMU has its own. Drivers take their pins from `BOARD`. To add a board, add its table in `boards`, its file here, its
 //! feature in `Cargo.toml`, and its lines below.
 
 #[cfg(not(any(
@@ -69,14 +69,14 @@ use interp_core::StepConfig;
 use protocol::message::ResetCause;
 use stm32f4xx_hal::pac;
 
-/// Which board the image is for: `cargo sim flash` finds it by this name, and refuses another board's image.
-// SAFETY: nothing else has this name; `boards::MARK_SYMBOL` says the same.
+/// The board of the image: `cargo sim flash` finds it by this name, and refuses another board's image.
+// SAFETY: the symbol name is unique; it equals `boards::MARK_SYMBOL`.
 #[allow(unsafe_code, reason = "a name that is not the compiler's")]
 #[unsafe(export_name = "isofeed_board")]
 pub(crate) static MARK: [u8; boards::MARK_BYTES] = BOARD.mark();
 use crate::drivers::reset_cause::{TAKE_BACK, cause};
 
-/// What puts every output to rest, a word a port; computed when the image is built, as it is wanted when the processor has failed.
+/// The words that make every output inactive, one per port; computed at compile time, because they are used after a processor fault.
 pub(crate) static REST: [u32; boards::Port::ALL.len()] = boards::setup::rest(BOARD.lines);
 
 /// Step and direction pins, by the board's table.
@@ -106,7 +106,7 @@ const fn port(port: boards::Port) -> Port {
     }
 }
 
-/// Axes whose direction pin is high towards plus, a bit each: where the board's table calls that level active.
+/// Axes whose direction pin is high towards plus, one bit each: those whose active level in the board's table is high.
 pub(crate) const PLUS_IS_HIGH: u8 =
     plus_is_high(Axis::X) | plus_is_high(Axis::Y) << 1 | plus_is_high(Axis::Z) << 2;
 
@@ -114,16 +114,16 @@ const fn plus_is_high(axis: Axis) -> u8 {
     matches!(BOARD.axis(axis).direction.active, Level::High) as u8
 }
 
-/// What the drives want until a host says otherwise.
+/// Default settings of the drives, until the host sends others.
 pub(crate) const STEPS: StepConfig = StepConfig::DEFAULT;
 
-/// What remains of the chip once clocks are set up: the parts that the drivers take.
+/// The peripherals for the drivers, after the clocks are set up.
 pub(crate) struct Board {
     /// The timer of the step output.
     pub(crate) tim1: pac::TIM1,
     /// The sample timer.
     pub(crate) tim2: pac::TIM2,
-    /// The reference clock that missed periods are counted by.
+    /// The reference clock for counting missed periods.
     pub(crate) tim5: pac::TIM5,
     /// The DMA of the step output.
     pub(crate) dma2: pac::DMA2,
@@ -135,16 +135,16 @@ pub(crate) struct Board {
     pub(crate) reset: ResetCause,
 }
 
-/// Why the chip started; asked once, because the flags are taken back.
+/// The reset cause. To be called once, because it clears the flags.
 #[allow(unsafe_code, reason = "a whole register is written")]
 fn take_reset_cause(rcc: &pac::rcc::RegisterBlock) -> ResetCause {
     let flags = rcc.csr().read().bits();
-    // SAFETY: the flags are taken back; the LSI, the other thing in this register, stays as it is.
+    // SAFETY: clears the flags; the LSI's enable bit, the other field of this register, is preserved.
     rcc.csr().write(|w| unsafe { w.bits(flags | TAKE_BACK) });
     cause(flags)
 }
 
-/// Where a panic happened, and its message where that is a plain text: `core`'s machinery for any other is 4 KB.
+/// Location of a panic, and its message if it is a constant string: formatting any other takes 4 KB of `core`.
 fn log_panic(info: &core::panic::PanicInfo<'_>) {
     let message = info.message().as_str().unwrap_or("");
     match info.location() {

@@ -1,7 +1,7 @@
 //! QEMU's `netduinoplus2`: the same chip without clocks, pins, flash timing or a debugger.
 //!
 //! Clock and pin registers read as zero there (on newer versions clocks are plain storage), so no clock is set
-//! up and nothing is waited for. The log goes through semihosting to QEMU's standard output; a panic ends
+//! up, without waiting for one. The log goes through semihosting to QEMU's standard output; a panic ends
 //! QEMU with exit code 101.
 
 use core::sync::atomic::{AtomicBool, AtomicU32, Ordering};
@@ -22,23 +22,23 @@ use crate::{
 // The log: this crate is linked for its `defmt` logger.
 use defmt_semihosting as _;
 
-/// The bare chip's table: registers of pins are not there, writes to them are lost, and they read as zero (no input is active).
+/// The bare chip's table: pin registers are absent, writes to them are lost, and they read as zero (no input is active).
 pub(crate) const BOARD: &boards::Board = &boards::Board {
     id: "qemu-netduinoplus2",
     ..boards::STM32F405
 };
 
-/// QEMU feeds every timer with 1 GHz, whatever the clock registers say.
+/// QEMU clocks every timer with 1 GHz, independent of the clock registers.
 pub(crate) const TIMER_HZ: u32 = 1_000_000_000;
 
-/// In lockstep a tick need not wait for the timer: each update of a timer is handed from one of QEMU's threads to another, which takes ten
+/// In lockstep a tick need not wait for the timer: each timer update is passed between two threads of QEMU, which takes ten
 /// times as long as the tick itself.
 pub(crate) const TIME_IS_SIMULATED: bool = true;
 
 /// QEMU's period is the reload value itself, not one more as on the chip.
 pub(crate) const TIMER_RELOAD: u32 = TIMER_HZ / 1_000_000 * PERIOD_US;
 
-/// What TIM1 would count, as on the chip: there is none.
+/// Clock of TIM1 on the chip; QEMU has no TIM1.
 pub(crate) const STEP_TIMER_HZ: u32 = 168_000_000;
 
 /// QEMU has no baud rate; any value other than zero will do.
@@ -50,7 +50,7 @@ const EXIT_PANIC: i32 = 101;
 /// Exit code of QEMU after a fault of the processor.
 const EXIT_FAULT: i32 = 102;
 
-/// Sorts out the peripherals.
+/// Returns the peripherals.
 pub(crate) fn init(device: pac::Peripherals) -> Board {
     Board {
         tim1: device.TIM1,
@@ -63,10 +63,10 @@ pub(crate) fn init(device: pac::Peripherals) -> Board {
     }
 }
 
-/// Stands for the input registers of the ports: what the host has set, and nothing before.
+/// Simulated input registers of the ports: the inputs set by the host, initially none.
 static INPUTS: [AtomicU32; Port::ALL.len()] = [const { AtomicU32::new(0) }; Port::ALL.len()];
 
-/// The ports of which [`INPUTS`] are the inputs.
+/// The ports whose inputs are [`INPUTS`].
 pub(crate) struct InputPorts;
 
 impl ReadPorts for InputPorts {
@@ -86,7 +86,7 @@ pub(crate) fn simulate(lines: InputLines) -> bool {
     true
 }
 
-/// Ends QEMU, so that whoever waits for it learns of the fault.
+/// Ends QEMU with an exit code that reports the fault.
 pub(crate) fn stop_for_good() -> ! {
     gpio::rest(&super::REST);
     semihosting::process::exit(EXIT_FAULT)
@@ -95,7 +95,7 @@ pub(crate) fn stop_for_good() -> ! {
 #[panic_handler]
 fn panic(info: &core::panic::PanicInfo<'_>) -> ! {
     static AGAIN: AtomicBool = AtomicBool::new(false);
-    // The log itself may be what panicked; then the exit code has to do.
+    // If the log itself panicked, only the exit code reports it.
     if !AGAIN.swap(true, Ordering::Relaxed) {
         super::log_panic(info);
     }

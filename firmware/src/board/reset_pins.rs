@@ -1,21 +1,21 @@
-//! Pins at rest right after a reset, before memory is initialised: drives, heaters and fans are off some 30 us after the chip begins to run, on
-//! its 16 MHz. (Initialising 64 KiB of memory alone takes milliseconds.) Until then, and in the reset itself, pins float: a drive's enable line
-//! wants a pull resistor of its own.
+//! Sets every output inactive directly after a reset, before memory is initialised: drives, heaters and fans are off about 30 us after the chip starts, on
+//! its 16 MHz HSI. (Initialising 64 KiB of memory alone takes milliseconds.) Until then, and during the reset, pins float: a drive's enable line
+//! needs an external pull resistor.
 //!
-//! No Rust code may run before memory is initialised. So this is assembly, in registers alone, and works off a table in flash, computed when
+//! No Rust code may run before memory is initialised. So this is assembly without memory accesses except to a table in flash, which is computed when
 //! the image is built and tested in `boards`.
 
 use boards::setup::{Write, writes, writes_count};
 
 use super::BOARD;
 
-/// How many registers are written.
+/// Number of register writes.
 const COUNT: usize = writes_count(BOARD.lines);
 
-/// What is written.
+/// The register writes.
 static WRITES: [Write; COUNT] = writes(BOARD.lines);
 
-// `cortex-m-rt` calls it first of all; a later one of this name takes the place of its own, which does nothing.
+// `cortex-m-rt` calls this function first; it overrides the crate's weak default, which is empty.
 #[allow(unsafe_code, reason = "no Rust code may run there")]
 mod pre_init {
     core::arch::global_asm!(

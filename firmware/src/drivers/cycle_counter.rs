@@ -1,8 +1,8 @@
-//! Processor cycles, by the debug unit's counter. QEMU has none: there every difference is 0.
+//! Processor cycles, by the cycle counter of the DWT. QEMU has none, so every difference is 0.
 
 use cortex_m::peripheral::{DCB, DWT};
 
-/// The running counter. It wraps after 2^32 cycles (25 s at 168 MHz); differences stay right up to there.
+/// The running counter. It wraps after 2^32 cycles (25 s at 168 MHz); differences are valid up to that time.
 pub(crate) struct CycleCounter {
     _dwt: DWT,
 }

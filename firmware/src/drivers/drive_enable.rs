@@ -1,4 +1,4 @@
-//! Drive enable of the axes: off from the first moment on, and in the tick that finds a reason.
+//! Drive enable of the axes: off after a reset, and switched off in the tick that detects a cause.
 
 use boards::{Axis, Board, Line, Port};
 
@@ -16,7 +16,7 @@ pub(crate) struct DriveEnable<P> {
 }
 
 impl<P: WritePorts> DriveEnable<P> {
-    /// Those of this board, whose pins have been set up, and are inactive.
+    /// The enable lines of this board. The pins have to be set up and inactive.
     pub(crate) const fn new(ports: P, board: &Board) -> Self {
         Self {
             ports,

@@ -1,7 +1,7 @@
-//! Pins by the board's table, which [`crate::board`] has set up right after the reset: each written or read by itself.
+//! Access to single pins of the board's table, which [`crate::board`] has set up directly after the reset.
 //!
-//! An output is switched by the port's set/reset register: one write, which touches no other pin, so that drivers with pins on
-//! the same port need not know of each other.
+//! An output is switched by the port's set/reset register: one write, which changes no other pin, so that drivers with pins on
+//! the same port are independent.
 
 use core::convert::Infallible;
 
@@ -18,15 +18,15 @@ const PORT_BYTES: usize = 0x400;
 fn registers(port: Port) -> &'static pac::gpioi::RegisterBlock {
     let first = pac::GPIOA::ptr().cast::<u8>();
     // SAFETY: RM0090, 2.3: the ports A to H lie `PORT_BYTES` apart from GPIOA on, and all have the registers of 8.4.11; `Port`
-    // names no other. The memory is the device's, there for good, and of volatile cells.
+    // names no other. The memory is that of the device, valid for 'static, and accessed through volatile cells.
     #[allow(unsafe_code, reason = "one type for all ports")]
     unsafe {
         &*first.add(port.index() * PORT_BYTES).cast()
     }
 }
 
-/// Makes every output inactive: drives let go, heaters and fans are off. `rest`: what goes to the ports' set/reset registers
-/// ([`boards::setup::rest`]); a port without an output may have no clock, and is left alone.
+/// Makes every output inactive: drives, heaters and fans are off. `rest`: the words for the ports' set/reset registers
+/// ([`boards::setup::rest`]); a port without an output may have no clock, and is not written.
 pub(crate) fn rest(rest: &[u32; Port::ALL.len()]) {
     for (port, bits) in Port::ALL.into_iter().zip(rest) {
         if *bits != 0 {

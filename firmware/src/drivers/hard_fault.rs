@@ -1,4 +1,4 @@
-//! Puts the outputs to rest, says what the processor stumbled over, and stops for good.
+//! Makes the outputs inactive, logs the fault of the processor, and stops permanently.
 
 use cortex_m_rt::{ExceptionFrame, exception};
 
@@ -9,7 +9,7 @@ use crate::{board, drivers::gpio};
 #[allow(unsafe_code, reason = "the exception's declaration")]
 #[exception]
 unsafe fn HardFault(frame: &ExceptionFrame) -> ! {
-    // The log takes its time, and may itself be what is broken.
+    // Before the log, which takes time and may itself be faulty.
     gpio::rest(&board::REST);
     defmt::error!(
         "hard fault at {=u32:#010x}, called from {=u32:#010x}",

@@ -1,4 +1,4 @@
-//! What touches the chip's registers, one file a device. They know no board and no feature.
+//! Drivers of the chip's peripherals, one file each, independent of board and features.
 
 pub(crate) mod cycle_counter;
 pub(crate) mod drive_enable;

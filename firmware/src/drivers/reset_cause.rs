@@ -1,12 +1,12 @@
-//! Why the chip started, by the flags in `RCC_CSR` (RM0090, 7.3.21).
+//! The reset cause, by the flags in `RCC_CSR` (RM0090, 7.3.21).
 
 use protocol::message::ResetCause;
 
-/// `RMVF`: takes all flags back.
+/// `RMVF`: clears all flags.
 pub(crate) const TAKE_BACK: u32 = 1 << 24;
 
-/// The cause that these flags stand for. Every reset inside the chip pulls the reset pin, too, and power coming on is
-/// both power-on and brown-out: the most particular counts.
+/// The cause for these flags. Every internal reset also sets the reset pin's flag, and power-on sets
+/// both power-on and brown-out: the most specific flag counts.
 pub(crate) const fn cause(csr: u32) -> ResetCause {
     const LOW_POWER: u32 = 1 << 31;
     const WATCHDOGS: u32 = 1 << 30 | 1 << 29;

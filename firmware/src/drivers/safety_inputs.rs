@@ -1,12 +1,12 @@
 //! The safety inputs: emergency stop, limit switches, drive fault, by the board's table.
 //!
-//! A tick reads the input register of each port that has one of them, and compares; which input is which is worked out only
-//! when a pin has changed. There is no interrupt: between two ticks nothing is decided anyway.
+//! A tick reads the input register of each port with a safety input, and compares; the inputs are decoded only
+//! when a pin has changed. No interrupt is used, because inputs are evaluated only in ticks.
 
 use boards::{Axis, Level, Line, Port, Role};
 use protocol::message::InputLines;
 
-/// Most ports that a board's safety inputs are on.
+/// Maximum number of ports with safety inputs.
 const PORTS_MAX: usize = 4;
 
 /// The input registers of the chip's ports.
@@ -15,17 +15,17 @@ pub(crate) trait ReadPorts {
     fn input(&self, port: Port) -> u32;
 }
 
-/// The pins of one port that are looked at.
+/// The monitored pins of one port.
 #[derive(Clone, Copy)]
 struct Watched {
     port: Port,
     mask: u32,
-    /// What they were when they were looked at last.
+    /// Their last levels.
     seen: u32,
 }
 
 impl Watched {
-    /// The pins as they are now.
+    /// Their present levels.
     #[inline(always)]
     fn pins(&self, ports: &impl ReadPorts) -> u32 {
         ports.input(self.port) & self.mask
@@ -40,7 +40,7 @@ pub(crate) struct SafetyInputs<P> {
     lines: InputLines,
 }
 
-/// The input that a line of the board is.
+/// The safety input of a line of the board.
 const fn input_of(role: Role) -> InputLines {
     let number = match role {
         Role::EmergencyStop => 0,
@@ -61,12 +61,12 @@ impl<P: ReadPorts> SafetyInputs<P> {
     /// The safety inputs among these lines, whose pins have been set up.
     ///
     /// # Panics
-    /// They are on more ports than there is room for. For constants and for the start of a board.
+    /// The inputs are on more ports than the maximum. For use in constants and at start-up.
     pub(crate) const fn new(ports: P, board: &'static [Line]) -> Self {
         let nothing = Watched {
             port: Port::A,
             mask: 0,
-            // No pins look like this: the first tick works them out.
+            // No port has these levels, so the first tick decodes the pins.
             seen: u32::MAX,
         };
         let mut watched = [nothing; PORTS_MAX];
@@ -92,7 +92,7 @@ impl<P: ReadPorts> SafetyInputs<P> {
     #[inline]
     pub(crate) fn read(&mut self) -> InputLines {
         let [first, second, third, fourth] = &self.watched;
-        // Written out: this runs in every tick, and a loop in a crate that is compiled for size stays one.
+        // Unrolled by hand: this runs in every tick, and a crate compiled for size does not unroll loops.
         let ports = &self.ports;
         let (a, b) = (first.pins(ports), second.pins(ports));
         let (c, d) = (third.pins(ports), fourth.pins(ports));
@@ -103,7 +103,7 @@ impl<P: ReadPorts> SafetyInputs<P> {
         self.lines
     }
 
-    /// Works out what the pins mean.
+    /// Decodes the pins.
     #[cold]
     #[inline(never)]
     fn gather(&mut self, pins: [u32; PORTS_MAX]) {
@@ -123,7 +123,7 @@ impl<P: ReadPorts> SafetyInputs<P> {
     }
 }
 
-/// The pins of a port as these inputs would set them: where there is nothing to be read, in their stead.
+/// The pin levels of a port for these inputs, for a board without pins.
 #[allow(dead_code, reason = "boards with pins need it not")]
 pub(crate) fn pins_of(board: &[Line], port: Port, lines: InputLines) -> u32 {
     let own = board.iter().filter(|line| line.pin.port as u8 == port as u8);
@@ -134,7 +134,7 @@ pub(crate) fn pins_of(board: &[Line], port: Port, lines: InputLines) -> u32 {
     .fold(0, |pins, line| pins | line.pin.bit())
 }
 
-/// The place of a port among those that are watched, or the first that is free.
+/// The index of a port among the monitored ones, or the first free index.
 const fn place_of(watched: &[Watched; PORTS_MAX], port: Port) -> usize {
     let mut place = 0;
     while watched[place].mask != 0 && watched[place].port as u8 != port as u8 {

@@ -1,8 +1,8 @@
-//! The sample timer: TIM2 says "one more period", TIM5 counts the periods that nobody heard.
+//! The sample timer: TIM2 triggers one tick per period, TIM5 counts missed periods.
 //!
-//! QEMU's timers have habits that this file respects, and the chip does not mind: a write to `CNT` or to
+//! Restrictions of QEMU's timers, which do not affect the chip: a write to `CNT` or to
 //! `EGR.UG` would lengthen every later period, a prescaler other than zero may hang, and counting begins with
-//! the write of `ARR`. So none of the first three is done, and `ARR` comes last.
+//! the write of `ARR`. So this driver does none of the first three, and writes `ARR` last.
 
 use core::sync::atomic::{AtomicU32, Ordering};
 
@@ -16,20 +16,20 @@ pub(crate) fn uptime_periods() -> u32 {
     UPTIME_PERIODS.load(Ordering::Relaxed)
 }
 
-/// Both timers and what is known of the last period.
+/// Both timers and the timing of the last period.
 pub(crate) struct SampleTimer {
     timer: pac::TIM2,
     clock: pac::TIM5,
     period_counts: u32,
-    /// When the tick in work was due, in counts of the clock; unknown before the first.
+    /// Due time of the current tick, in counts of the clock; unknown before the first.
     due: Option<u32>,
-    /// The tick in work was started by an update of the timer; where time is simulated, a tick may be started without one.
+    /// Whether an update of the timer started the current tick; where time is simulated, a tick may be started without one.
     is_timed: bool,
 }
 
 impl SampleTimer {
     /// Starts both timers. `reload` is TIM2's auto-reload value for a period of `period_counts` counts of
-    /// TIM5; both timers count alike.
+    /// TIM5; both timers count at the same rate.
     pub(crate) fn new(timer: pac::TIM2, clock: pac::TIM5, reload: u32, period_counts: u32) -> Self {
         clock.cr1().write(|w| w.cen().set_bit());
         clock.arr().write(|w| w.arr().set(u32::MAX));
@@ -45,7 +45,7 @@ impl SampleTimer {
         }
     }
 
-    /// At the beginning of a tick: takes the interrupt's flag back.
+    /// At the beginning of a tick: clears the interrupt flag.
     pub(crate) fn begin(&mut self) {
         self.is_timed = self.timer.sr().read().uif().bit_is_set();
         if !self.is_timed {
@@ -58,8 +58,8 @@ impl SampleTimer {
         }
     }
 
-    /// At the end of a tick: how many further periods have begun since this one was due. 0 as long as every
-    /// tick is over before the next; every one counted has missed its deadline.
+    /// At the end of a tick: the number of further periods that have begun since this one was due. 0 as long as every
+    /// tick ends before the next; each counted period has missed its deadline.
     #[inline]
     pub(crate) fn end(&mut self) -> u32 {
         if !self.is_timed {
@@ -68,7 +68,7 @@ impl SampleTimer {
         let now = self.clock.cnt().read().cnt().bits();
         let due = self.due.unwrap_or(now);
         let late = now.wrapping_sub(due);
-        // The flag is the last word on whether a period has begun; the clock can only say how many.
+        // The flag decides whether a period has begun; the clock yields the number of periods.
         let pending = self.timer.sr().read().uif().bit_is_set();
         self.due = Some(due.wrapping_add(self.period_counts));
         if late < self.period_counts && !pending {
@@ -81,9 +81,9 @@ impl SampleTimer {
     #[cold]
     #[inline(never)]
     fn missed(&mut self, due: u32, late: u32) -> u32 {
-        // The period is no zero; checked, so that no panic is there to be proved unreachable.
+        // The period is never zero; checked, so that the division has no panic branch.
         let missed = late.checked_div(self.period_counts).unwrap_or(0).max(1);
-        // One interrupt is pending however many periods have begun: the next tick stands for the latest of
+        // One interrupt is pending however many periods have begun: the next tick is that of the latest of
         // them.
         self.due = Some(due.wrapping_add(missed.wrapping_mul(self.period_counts)));
         missed

@@ -1,5 +1,5 @@
-//! The status LED: off without a run, on while the tool moves, blinking after a fault. Any output pin that
-//! `embedded-hal` knows.
+//! The status LED: off without a run, on while the tool moves, blinking after a fault. For any output pin of
+//! `embedded-hal`.
 
 use boards::Level;
 use embedded_hal::digital::{OutputPin, PinState};
@@ -16,7 +16,7 @@ pub(crate) struct StatusLed<P> {
 }
 
 impl<P: OutputPin> StatusLed<P> {
-    /// The LED on this pin, dark. It shines when the pin has this level.
+    /// The LED on this pin, initially off. It is lit when the pin has this level.
     pub(crate) fn new(pin: P, shines_at: Level) -> Self {
         let mut led = Self {
             pin,
@@ -27,7 +27,7 @@ impl<P: OutputPin> StatusLed<P> {
         led
     }
 
-    /// Shows this state; `periods` is the time that a blink is made of.
+    /// Shows this state; `periods` is the time in periods, for the blinking.
     pub(crate) fn show(&mut self, state: State, periods: u32) {
         self.set(match state {
             State::Idle | State::Ready | State::Held | State::Finished => false,
@@ -40,7 +40,7 @@ impl<P: OutputPin> StatusLed<P> {
         if lit != self.lit {
             self.lit = lit;
             let high = lit == (self.shines_at == Level::High);
-            // A status light that cannot be switched is no reason to stop anything.
+            // A failure of the status LED is ignored.
             let _ = self.pin.set_state(PinState::from(high));
         }
     }

@@ -1,4 +1,4 @@
-//! The step output of this chip: the registers and the memory behind [`controller::step_output`], which says how it works.
+//! The step output of this chip: the registers and the memory of [`controller::step_output`], which documents its function.
 
 use controller::step_output::{Buffers, Memory, Registers, StepOutput, Wiring};
 use interp_core::{fault::Fault, steps::BUFFER_WORDS};
@@ -37,7 +37,7 @@ impl Registers for Chip {
 /// The output with its memory.
 pub(crate) struct StepDriver {
     output: StepOutput<Chip>,
-    /// Axes whose direction pin is high towards plus, a bit each.
+    /// Axes whose direction pin is high towards plus, one bit each.
     plus_is_high: u8,
     buffers: &'static mut Buffers,
 }
@@ -65,7 +65,7 @@ impl StepDriver {
             buffers: buffers.each_ref().map(|buffer| address(buffer.as_ptr())),
             rest: address(rest),
         };
-        // What was written is there before the DMA looks.
+        // Completes the writes before the DMA reads.
         cortex_m::asm::dmb();
         let chip = Chip {
             _timer: timer,
@@ -78,7 +78,7 @@ impl StepDriver {
         }
     }
 
-    /// Whether the chip has the hardware; QEMU has not.
+    /// Whether the hardware is present; false in QEMU.
     pub(crate) const fn is_present(&self) -> bool {
         self.output.is_present()
     }
@@ -87,7 +87,7 @@ impl StepDriver {
     /// one, a bit each ([`interp_core::Steps::directions`]).
     ///
     /// # Errors
-    /// The fault that it is to a run where pulses are not as they should be.
+    /// The fault of the run where the pulses are wrong.
     #[inline]
     pub(crate) fn begin(&mut self, directions: u8) -> Result<(), Fault> {
         self.output
@@ -95,17 +95,17 @@ impl StepDriver {
             .map_err(Fault::from)
     }
 
-    /// At the end of a tick: the slots to be filled, if there is time for it.
+    /// At the end of a tick: the slots to fill, if enough are left.
     #[inline]
     pub(crate) fn slots(&mut self) -> Option<&mut [u32; BUFFER_WORDS]> {
         let idle = self.output.free()?;
-        // What the DMA has wiped is read anew.
+        // The DMA has cleared these words: they are read again.
         cortex_m::asm::dmb();
         self.buffers.get_mut(idle)
     }
 }
 
-/// An address as the DMA takes it.
+/// An address in the form of a DMA register.
 fn address(word: *const u32) -> u32 {
     word.addr() as u32
 }

@@ -1,13 +1,13 @@
-//! The independent watchdog (IWDG, RM0090 chapter 21): resets the chip when it was not fed for some periods.
+//! The independent watchdog (IWDG, RM0090 chapter 21): resets the chip if not fed for some periods.
 //!
-//! It has a clock of its own, the LSI, so it works when all others stand still; once started, nothing but a reset stops it. The LSI
-//! is coarse: 17 to 47 kHz (data sheet DS8626, table 35). The time is chosen for the fastest one, and is 2.8 times as long at
+//! Its clock is the LSI, so it works when all other clocks have stopped; once started, only a reset stops it. The LSI
+//! has a wide tolerance: 17 to 47 kHz (data sheet DS8626, table 35). The timeout is computed for the fastest LSI, and is 2.8 times as long at
 //! the slowest.
 
 /// Highest frequency of the LSI, kHz.
 const LSI_MAX_KHZ: u32 = 47;
 
-/// The prescaler's least division, with code 0: the time is the finest there is, and long enough.
+/// The prescaler's least division, with code 0: the finest resolution, with a sufficient range.
 const DIVISION: u32 = 4;
 
 /// Largest reload value.
@@ -15,15 +15,15 @@ const RELOAD_MAX: u32 = 0xfff;
 
 /// `KR`: prescaler and reload may be written.
 const UNLOCK: u16 = 0x5555;
-/// `KR`: begin again to count down.
+/// `KR`: reload the counter.
 const FEED: u16 = 0xaaaa;
 /// `KR`: start; switches the LSI on, too.
 const START: u16 = 0xcccc;
 
-/// `SR`: prescaler or reload are still on their way to the watchdog's clock.
+/// `SR`: an update of prescaler or reload is still pending.
 const UPDATING: u16 = 0b11;
 
-/// Looks at `SR` before it is given up. The way takes five clocks of the LSI (RM0090, 21.4.4), 300 us at the slowest; a look takes at
+/// Maximum reads of `SR` before a timeout. The update takes five clocks of the LSI (RM0090, 21.4.4), 300 us at the slowest; a read takes at
 /// least two cycles of 168 MHz.
 const LOOKS_MAX: u32 = 50_000;
 
@@ -42,16 +42,16 @@ pub(crate) enum Register {
 
 /// The watchdog's registers.
 pub(crate) trait Registers {
-    /// Writes one.
+    /// Writes a register.
     fn write(&mut self, register: Register, value: u16);
-    /// Reads one.
+    /// Reads a register.
     fn read(&mut self, register: Register) -> u16;
 }
 
-/// The reload value for a time of at least so many microseconds, whatever the LSI.
+/// The reload value for a timeout of at least this number of microseconds at any LSI frequency.
 ///
 /// # Panics
-/// The time is longer than the finest division counts. For constants.
+/// The timeout exceeds the range of the finest division. For use in constants.
 pub(crate) const fn reload(least_us: u32) -> u16 {
     let counts = (least_us * LSI_MAX_KHZ).div_ceil(1_000 * DIVISION);
     assert!(
@@ -61,7 +61,7 @@ pub(crate) const fn reload(least_us: u32) -> u16 {
     (counts - 1) as u16
 }
 
-/// The watchdog, once it runs.
+/// The running watchdog.
 pub(crate) struct Watchdog<R> {
     registers: R,
     settled: bool,
@@ -70,7 +70,7 @@ pub(crate) struct Watchdog<R> {
 impl<R: Registers> Watchdog<R> {
     /// Starts it with this reload value.
     pub(crate) fn start(mut registers: R, reload: u16) -> Self {
-        // Started first: only with the LSI on do the other values arrive. Until then it counts its longest time.
+        // Started first, because the other registers update only with the LSI on. Until then the timeout is the longest.
         registers.write(Register::Key, START);
         registers.write(Register::Key, UNLOCK);
         registers.write(Register::Prescaler, 0);
@@ -80,12 +80,12 @@ impl<R: Registers> Watchdog<R> {
         Self { registers, settled }
     }
 
-    /// Whether the time has arrived; otherwise it waits for up to a second before it resets.
+    /// Whether the timeout was set; otherwise the reset takes up to a second.
     pub(crate) const fn is_settled(&self) -> bool {
         self.settled
     }
 
-    /// Begins to count anew. To be called by a tick that has met its deadline, and by nothing else.
+    /// Feeds the watchdog. To be called only by a tick that has met its deadline.
     #[inline]
     pub(crate) fn feed(&mut self) {
         self.registers.write(Register::Key, FEED);

@@ -1,4 +1,4 @@
-//! Which address is what: gates of the clocks, the bit-band alias, and what the program may not do.
+//! Address decoding: clock gates, the bit-band alias, and checks of the program's accesses.
 
 use crate::{
     chip::Chip,
@@ -7,7 +7,7 @@ use crate::{
     unicorn::{Register, Registers, Surroundings},
 };
 
-/// A peripheral: where it begins, its bytes, its clock, its name.
+/// A peripheral: base address, size in bytes, clock, name.
 type Device = (u32, u32, Gate, &'static str);
 
 const DEVICES: [Device; 16] = [
@@ -33,7 +33,7 @@ const BIT_BAND: u32 = 0x4200_0000;
 const BIT_BAND_END: u32 = 0x4400_0000;
 
 impl Chip {
-    /// Whether the peripheral at this address may be used; complains otherwise.
+    /// Whether the peripheral at this address may be accessed; reports a complaint otherwise.
     fn is_open(&mut self, address: u32, what: &str) -> bool {
         let Some((_, _, gate, name)) = DEVICES
             .iter()
@@ -133,7 +133,7 @@ impl Chip {
         }
     }
 
-    /// Where a bit of the alias is: its word, and its place there.
+    /// The word and bit of a bit-band alias address.
     const fn banded(address: u32) -> (u32, u32) {
         let offset = address - BIT_BAND;
         let byte = 0x4000_0000 + (offset >> 5);
@@ -204,7 +204,7 @@ impl Chip {
         registers.get(Register::PRIMASK) & 1 == 0 && priority < self.level(registers)
     }
 
-    /// The priority that an interrupt has to beat: that of what runs, or `BASEPRI`.
+    /// The priority that an interrupt has to exceed: the execution priority, or `BASEPRI`.
     pub(crate) fn level(&self, registers: &Registers) -> u32 {
         let base = registers.get(Register::BASEPRI) & 0xff;
         let running = self.nvic.running();

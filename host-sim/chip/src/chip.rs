@@ -1,4 +1,4 @@
-//! The chip without its processor: the parts, and the order of what happens to them.
+//! The chip without its processor: the peripherals, and the order of their events.
 
 use std::fs::File;
 use std::io::{BufWriter, Write};
@@ -30,10 +30,10 @@ const TIM1_CHANNEL: u32 = 6;
 const TIM1_UPDATE_STREAM: usize = 5;
 const TIM1_COMPARE_STREAM: usize = 1;
 
-/// Between two looks for bytes of the host, seconds: at random, so that they come in any phase of a period.
+/// Interval between polls for bytes of the host, seconds: random, so that bytes arrive in any phase of a period.
 const LOOK_S: (f64, f64) = (0.1e-3, 0.3e-3);
 
-/// A program that is this far behind real time gives the lag up, seconds.
+/// Lag behind real time, seconds, beyond which the pace restarts from the present.
 const LAG_S: f64 = 0.05;
 
 pub(crate) struct Chip {
@@ -41,7 +41,7 @@ pub(crate) struct Chip {
     pub(crate) board: &'static Board,
     options: Options,
     pub(crate) code: Code,
-    /// The block in work, and where it begins.
+    /// The current block and its start address.
     pub(crate) block: Block,
     pub(crate) at: u32,
     pub(crate) sram: Memory,
@@ -56,27 +56,27 @@ pub(crate) struct Chip {
     pub(crate) watchdog: Watchdog,
     pub(crate) debug: Debug,
     line: Option<Line>,
-    /// USART1 asks for its interrupt.
+    /// USART1's interrupt request.
     serial_asks: bool,
     script: Vec<Entry>,
     record: Option<BufWriter<File>>,
     random: fastrand::Rng,
     next_look: u64,
-    /// When something happens next that TIM1 has no part in, and with it.
+    /// Times of the next event, without and with those of TIM1.
     pub(crate) next: u64,
     next_slot: u64,
-    /// When something happened last.
+    /// Time of the last event.
     pub(crate) happened: u64,
     /// The first step pulse, seconds.
     pub(crate) moved: Option<f64>,
     step_port: usize,
     step_pins: u32,
-    /// Flags of the reset that is due.
+    /// Flags of the pending reset.
     pub(crate) reset: Option<u32>,
     pub(crate) hangs: bool,
     pub(crate) fault: bool,
     pub(crate) over: bool,
-    /// Updates of TIM2, and what starts the slots: the cycle at which TIM1 was started.
+    /// Updates of TIM2, and the cycle at which TIM1 was started.
     pub(crate) periods: u64,
     pub(crate) slots_from: Option<u64>,
     /// Bytes that were lost before the last reset.
@@ -109,7 +109,7 @@ impl Chip {
         for input in script::inputs(board) {
             let port = &mut ports[input.pin.port.index()];
             port.driven |= input.pin.bit();
-            // Switches are closed: the level that is not active.
+            // Switches are closed: the inactive level.
             if input.active == Level::Low {
                 port.outside |= input.pin.bit();
             }
@@ -162,7 +162,7 @@ impl Chip {
         })
     }
 
-    /// A reset: all parts as after power-on, memory and what is outside as they were.
+    /// A reset: all peripherals as after power-on; memory and external levels are unchanged.
     pub(crate) fn restart(&mut self, flags: u32) {
         self.world.event(self.world.now, "reset");
         self.world.set_hclk(Rcc::RESET_HZ);
@@ -209,7 +209,7 @@ impl Chip {
             bytes[9] = change.by_dma.into();
             bytes[10..12].copy_from_slice(&change.levels.to_le_bytes());
             bytes[12..14].copy_from_slice(&change.outputs.to_le_bytes());
-            // A record that cannot be written is missed by whoever reads it.
+            // A failed write is detected by the reader of the record.
             let _ = record.write_all(&bytes);
         }
     }
@@ -227,7 +227,7 @@ impl Chip {
         }
     }
 
-    /// Finds out what happens next.
+    /// Computes the time of the next event.
     pub(crate) fn plan(&mut self) {
         let scripted = self
             .script
@@ -253,7 +253,7 @@ impl Chip {
         self.next_slot = self.tim1.update_at().min(self.tim1.compare_at);
     }
 
-    /// Lets everything happen up to now.
+    /// Processes all events up to now.
     #[inline]
     pub(crate) fn catch_up(&mut self) {
         if self.world.now >= self.next.min(self.next_slot) {
@@ -263,7 +263,7 @@ impl Chip {
 
     fn catch_up_slowly(&mut self) {
         loop {
-            // At one instant TIM2 comes before TIM1, which it starts.
+            // At equal times TIM2 precedes TIM1, which it starts.
             self.play(self.world.now.min(self.next.saturating_sub(1)));
             if self.next > self.world.now {
                 return;
@@ -273,7 +273,7 @@ impl Chip {
         }
     }
 
-    /// TIM1's events up to a time, and the transfers that they ask for.
+    /// TIM1's events up to a time, and the transfers that they request.
     fn play(&mut self, until: u64) {
         while self.next_slot <= until {
             let at = self.next_slot;
@@ -337,7 +337,7 @@ impl Chip {
         }
     }
 
-    /// USART1 may have begun, or ceased, to ask for its interrupt: it is raised when it begins.
+    /// Updates USART1's interrupt request: the interrupt is raised on a rising edge.
     pub(crate) fn serial_line(&mut self) {
         let asks = self.usart.interrupts();
         if asks && !self.serial_asks {
@@ -371,7 +371,7 @@ impl Chip {
         }
     }
 
-    /// Looks for bytes of the host, and keeps pace with the clock on the wall.
+    /// Polls for bytes of the host, and keeps pace with real time.
     fn look(&mut self, at: u64) {
         let wait = LOOK_S.0 + (LOOK_S.1 - LOOK_S.0) * self.random.f64();
         self.next_look = at + self.world.lasting(wait).max(1);

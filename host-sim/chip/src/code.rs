@@ -1,5 +1,5 @@
-//! What a block of the program takes, in cycles of the processor: the cost model of `cycle-plugin`, whose pessimistic figures hold stalls but here
-//! no wait states of the flash. A block's cost counts when it begins: that is the grain of time.
+//! Processor cycles of a block of the program: the cost model of `cycle-plugin`, whose pessimistic figures include stalls, but here
+//! no wait states of the flash. A block's cost is added when it begins, which is the time resolution.
 
 use cycle_plugin::{
     cost::straight,
@@ -8,10 +8,10 @@ use cycle_plugin::{
 
 use crate::memory::Memory;
 
-/// Refill of the pipeline after a branch, at worst.
+/// Pipeline refill after a branch, worst case.
 const REFILL: u32 = 3;
 
-/// A stretch of instructions without a branch but at its end.
+/// A basic block: instructions with a branch only at the end.
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct Block {
     bytes: u32,
@@ -20,7 +20,7 @@ pub(crate) struct Block {
     pub(crate) has_barrier: bool,
 }
 
-/// Blocks, by the halfword of flash that they begin with.
+/// Blocks, by the halfword index of their start in flash.
 pub(crate) struct Code {
     flash: Memory,
     blocks: Vec<Block>,
@@ -58,7 +58,7 @@ impl Code {
                 self.blocks[place] = block;
                 block
             }
-            // Code in SRAM: there is none.
+            // Code in SRAM does not occur.
             None => Block {
                 bytes,
                 cycles: bytes,

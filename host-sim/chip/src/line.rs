@@ -1,4 +1,4 @@
-//! The host's end of the serial line: a pseudo-terminal, to be opened like any serial port.
+//! The host's end of the serial line: a pseudo-terminal, opened like any serial port.
 
 use std::fs::{File, OpenOptions};
 use std::io;
@@ -13,7 +13,7 @@ use rustix::termios::{OptionalActions, tcgetattr, tcsetattr};
 
 pub(crate) struct Line {
     master: OwnedFd,
-    /// Kept open, so that the line outlives a host that closes it.
+    /// Kept open, so that the line stays valid when the host closes its end.
     _slave: File,
     link: PathBuf,
 }
@@ -45,7 +45,7 @@ impl Line {
         })
     }
 
-    /// What the host has sent.
+    /// Bytes sent by the host.
     pub(crate) fn read(&self, to: &mut impl Extend<u8>) {
         let mut bytes = [0; 4096];
         if let Ok(count) = rustix::io::read(&self.master, &mut bytes[..]) {
@@ -53,7 +53,7 @@ impl Line {
         }
     }
 
-    /// Hands the host a byte; waits as long as it reads too slowly, up to a second.
+    /// Sends a byte to the host; waits up to 1 s while the host's buffer is full.
     pub(crate) fn write(&self, byte: u8) {
         for _ in 0..5_000 {
             match rustix::io::write(&self.master, &[byte]) {

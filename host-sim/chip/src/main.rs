@@ -1,23 +1,23 @@
 //! Executes the image that would be flashed to an STM32F405/407, unchanged, without a chip: instructions by Unicorn's Cortex-M4F
-//! (`libunicorn2`, loaded at run time), everything around them by models of its own.
+//! (`libunicorn2`, loaded at run time), peripherals by the models of this crate.
 //!
 //! ```text
 //!  main.rs ── processor.rs   exceptions, sleep, resets        ── unicorn.rs   instructions (libunicorn2)
 //!                 │                                            ── memory.rs    flash and SRAM
-//!             chip.rs        the parts, and the order of what happens to them
+//!             chip.rs        the peripherals, and the order of their events
 //!                 │          ── script.rs   inputs, hang, fault, brown-out      ── line.rs   the host's pseudo-terminal
-//!             bus.rs         which address is what; clocks of peripherals; bit-band
+//!             bus.rs         address decoding; clocks of peripherals; bit-band
 //!                 │
 //!             part/          rcc (with FLASH, PWR), nvic (with SCB), gpio, timer, dma, usart, watchdog, debug (DWT, DBGMCU)
 //! ```
 //!
 //! Time is counted in cycles of HCLK: each block of instructions by the cost model of `cycle-plugin` (pessimistic, without the flash's wait
-//! states), each event of a part to the cycle. The models complain about what a correct program does not do: a peripheral used without its clock
-//! or right after it was switched on, clocks, flash or supply out of their limits, streams changed while they run, registers that no model has.
+//! states), each event of a part to the cycle. The models report complaints about incorrect accesses: a peripheral used without its clock
+//! or directly after its clock was enabled, clocks, flash or supply out of their limits, streams changed while enabled, registers that are not modelled.
 //!
 //! Not modelled: the flash's wait states and its cache, contention on the buses, synchronisers' delays of a few cycles, lazy stacking,
 //! tail-chaining and late arrival, `IPSR` (it reads 0 in a handler), analogue behaviour (start-up times are constants, levels are ideal), noise on the line, the debug unit, DMA
-//! requests of USART1, and every peripheral that the firmware does not use. All of those show up as complaints when they are touched.
+//! requests of USART1, and every peripheral that the firmware does not use. Accesses to these are reported as complaints.
 
 mod bus;
 mod chip;
@@ -49,12 +49,12 @@ use crate::{
 
 const SRAM_BEGIN: u32 = 0x2000_0000;
 const SRAM_BYTES: u32 = 128 * 1024;
-/// What SRAM holds after power-on: anything.
+/// SRAM contents after power-on: an arbitrary pattern.
 const SRAM_FILL: u8 = 0xa5;
-/// What flash holds where nothing is written.
+/// Contents of erased flash.
 const FLASH_FILL: u8 = 0xff;
 
-/// Writes the image's segments to flash, and finds out which board it is for.
+/// Writes the image's segments to flash, and reads the board of the image.
 fn load(data: &[u8], flash: Memory) -> Result<&'static Board, String> {
     let file =
         object::read::elf::ElfFile32::<object::Endianness>::parse(data).map_err(|error| error.to_string())?;

@@ -2,14 +2,14 @@
 
 use std::ffi::c_void;
 
-/// A page of the machine that this runs on, at least.
+/// A page of the host, at least.
 const PAGE: usize = 4096;
 
 #[repr(C, align(4096))]
 #[derive(Clone)]
 struct Page([u8; PAGE]);
 
-/// A piece of memory that is there until the program ends. Copies mean the same bytes; one thread uses them.
+/// Memory allocated until the program ends. Copies refer to the same bytes; used by one thread only.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Memory {
     base: u32,
@@ -18,7 +18,7 @@ pub(crate) struct Memory {
 }
 
 impl Memory {
-    /// So many bytes, a multiple of a page, at this address of the chip.
+    /// `bytes` bytes, a multiple of a page, at this address of the chip.
     pub(crate) fn new(base: u32, bytes: u32, fill: u8) -> Self {
         let pages = vec![Page([fill; PAGE]); (bytes as usize).div_ceil(PAGE)];
         let first = Box::leak(pages.into_boxed_slice()).as_mut_ptr().cast();
@@ -37,7 +37,7 @@ impl Memory {
         self.first.cast()
     }
 
-    /// Where these bytes are, if they all are in this memory.
+    /// Pointer to these bytes, if all are within this memory.
     fn place(self, address: u32, bytes: u32) -> Option<usize> {
         let offset = address.checked_sub(self.base)?;
         (offset.checked_add(bytes)? <= self.bytes).then_some(offset as usize)
@@ -76,7 +76,7 @@ impl Memory {
         else {
             return false;
         };
-        // SAFETY: within the memory, and nobody has a reference to it.
+        // SAFETY: within the memory, to which no reference exists.
         unsafe { std::ptr::copy_nonoverlapping(data.as_ptr(), self.first.add(offset), data.len()) };
         true
     }

@@ -20,7 +20,7 @@ const HARD_FAULT: u32 = 3;
 /// QEMU's number of an exception's exit.
 const EXIT: u32 = 8;
 
-/// What is said of the processor at the end.
+/// Statistics of the processor.
 #[derive(Default)]
 pub(crate) struct Account {
     pub(crate) frames: u64,
@@ -99,14 +99,14 @@ impl Processor {
             self.sleeps = false;
             return true;
         }
-        // TIM1 and its transfers wake nobody.
+        // TIM1 and its transfers do not wake the processor.
         let next = chip.next.max(chip.world.now);
         self.account.slept += next - chip.world.now;
         chip.world.now = next;
         false
     }
 
-    /// Finds out why Unicorn has stopped.
+    /// Determines why Unicorn has stopped.
     fn stopped(&mut self, halt: &Halt) {
         let pc = self.engine.registers().get(Register::PC);
         let chip = self.engine.surroundings();

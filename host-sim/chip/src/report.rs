@@ -1,4 +1,4 @@
-//! What happened, as JSON: figures, complaints, registers.
+//! The report as JSON: figures, complaints, registers.
 
 use serde_json::{Value, json};
 
@@ -38,7 +38,7 @@ fn interrupt(chip: &Chip, line: usize) -> Value {
     })
 }
 
-/// All of it.
+/// The whole report.
 pub(crate) fn of(chip: &Chip, account: &Account, seconds_spent: f64) -> Value {
     let hclk_hz = chip.world.hclk_hz();
     let now = chip.world.now;

@@ -1,21 +1,21 @@
-//! What happens to the board: inputs that open and close, a processor that hangs or faults, a supply that sags.
+//! Scripted events: inputs that open and close, a processor that hangs or faults, a brown-out.
 
 use boards::{Axis, Board, Level, Line, Role};
 
-/// What happens.
+/// Kind of event.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) enum Event {
-    /// A pin gets this level from outside.
+    /// A pin is driven to this level externally.
     Input { port: usize, pin: u8, high: bool },
-    /// The processor executes nothing any more.
+    /// The processor stops executing.
     Hang,
-    /// A hard fault, wherever the program is.
+    /// A hard fault at the program's present position.
     Fault,
-    /// The supply falls below the brown-out threshold, and is back at once.
+    /// The supply falls below the brown-out threshold and recovers immediately.
     BrownOut,
 }
 
-/// When, in seconds.
+/// Time of an event, seconds.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) enum When {
     /// After power-on.

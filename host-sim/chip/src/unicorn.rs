@@ -41,7 +41,7 @@ impl Register {
     pub(crate) const BASEPRI: Self = Self(124);
     /// The flags of `XPSR` alone.
     pub(crate) const FLAGS: Self = Self(138);
-    /// What an exception saves, in the frame's order.
+    /// The registers saved by an exception, in the frame's order.
     pub(crate) const SAVED: [Self; 6] = [Self(66), Self(67), Self(68), Self(69), Self(78), Self::LR];
 
     /// `S0` to `S31`.
@@ -139,7 +139,7 @@ impl Registers {
     }
 }
 
-/// What surrounds the processor.
+/// The processor's environment.
 pub(crate) trait Surroundings {
     /// A block of instructions is about to be executed; false leaves it, and stops.
     fn block(&mut self, registers: &Registers, address: u32, bytes: u32) -> bool;
@@ -149,7 +149,7 @@ pub(crate) trait Surroundings {
     fn write(&mut self, address: u32, bytes: u32, value: u32);
 }
 
-/// What the hooks share.
+/// State shared by the hooks.
 struct Context<H> {
     surroundings: H,
     registers: Registers,
@@ -159,7 +159,7 @@ struct Context<H> {
     invalid: Option<Invalidity>,
 }
 
-/// An access that cannot be.
+/// An invalid access.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) struct Invalidity {
     /// Its address.
@@ -168,14 +168,14 @@ pub(crate) struct Invalidity {
     pub(crate) is_fetch: bool,
 }
 
-/// Why the processor stands.
+/// Why the processor stopped.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Halt {
-    /// The surroundings asked for it.
+    /// Requested by the environment.
     pub(crate) asked: bool,
     /// An exception of the processor, by QEMU's number.
     pub(crate) interrupt: Option<u32>,
-    /// An access that cannot be.
+    /// An invalid access.
     pub(crate) invalid: Option<Invalidity>,
     /// The library's own words, if it has failed.
     pub(crate) error: Option<String>,
@@ -197,7 +197,7 @@ unsafe extern "C" fn on_block<H: Surroundings>(
     bytes: u32,
     context: *mut Context<H>,
 ) {
-    // SAFETY: the engine's own context; while the library runs, nobody else has a reference to it, and hooks do not nest.
+    // SAFETY: the engine's own context; while the library runs, no other reference to it exists, and hooks do not nest.
     let context = unsafe { &mut *context };
     if !context
         .surroundings

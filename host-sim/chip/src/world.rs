@@ -1,23 +1,23 @@
-//! Time, and what there is to say: what every model is handed.
+//! Time and log, passed to every model.
 
 use std::collections::BTreeSet;
 
-/// No time: an event that does not come.
+/// Time of an event that never occurs.
 pub(crate) const NEVER: u64 = u64::MAX;
 
-/// Complaints that are kept; all are counted.
+/// Maximum number of stored complaints; all are counted.
 const KEPT: usize = 200;
 
-/// Cycles of the bus clock (HCLK) since the first start, what they are in seconds, and the log of the models.
+/// Cycles of the bus clock (HCLK) since the first start, the time in seconds, and the log of the models.
 pub(crate) struct World {
     /// Now, in cycles.
     pub(crate) now: u64,
     hclk_hz: f64,
-    /// Where the present frequency began, cycles and seconds.
+    /// Start of the present frequency, cycles and seconds.
     since: (u64, f64),
-    /// What a correct program does not do.
+    /// Complaints: incorrect accesses by the program.
     pub(crate) complaints: Vec<String>,
-    /// How many there were.
+    /// Number of complaints.
     pub(crate) complained: u64,
     /// What happened.
     pub(crate) notes: Vec<String>,
@@ -73,7 +73,7 @@ impl World {
         format!("{:.6} ms: {text}", self.seconds(self.now) * 1e3)
     }
 
-    /// Complains.
+    /// Reports a complaint.
     pub(crate) fn wrong(&mut self, text: impl AsRef<str>) {
         self.complained += 1;
         if self.complaints.len() < KEPT {
@@ -83,7 +83,7 @@ impl World {
         }
     }
 
-    /// Complains, unless it has complained with the same words.
+    /// Reports a complaint, unless one with the same text was reported.
     pub(crate) fn wrong_once(&mut self, text: String) {
         if self.once.insert(text.clone()) {
             self.wrong(text);

@@ -24,7 +24,7 @@ const STAGES: [(&str, &str, Stage); 24] = [
     ("pass::interval", "", Stage::Interval),
     ("pass::patch", "", Stage::PatchChange),
     ("pass::schedule", "", Stage::PassChange),
-    ("pass::across", "", Stage::PassChange),
+    ("pass::step_over", "", Stage::PassChange),
     ("pass::run", "step_far", Stage::Step),
     ("pass::buffer", "", Stage::PatchChange),
     ("pass::run", "next_span", Stage::PatchChange),

@@ -2,7 +2,7 @@
 //!
 //! The paper's interval is evaluated at the pass itself (first order). The largest admissible distance of the next pass depends on the gap:
 //! the density 1/interval^2 is scanned on two more lines, with the exact scallop heights of a ball, and at the ends of skew passes with those
-//! of the crest beyond the end. The rule is the core's (`interp-core`, `across.rs`), the geometry is this oracle's; the resulting heights are
+//! of the crest beyond the end. The rule is the core's (`interp-core`, `step_over.rs`), the geometry is this oracle's; the resulting heights are
 //! measured independently from the swept ball.
 
 use super::contact::{Oracle, OracleError};

@@ -1,5 +1,5 @@
-//! From ordinary coefficients (f64, mm) to the records that a job is made of. For load time: a host, or a board's own
-//! set-up code; nothing in the sample path uses it.
+//! Encodes power-basis coefficients (f64, mm) as the records of a job. For load time: a host, or a board's
+//! set-up code. The sample path does not use it.
 //!
 //! ```
 //! use interp_core::{Header, Interpolator, Command, State, encode};
@@ -47,20 +47,20 @@ use libm::round;
 /// A cubic in two parameters, `c[i][j]` of `path^i side^j`.
 pub type Bicubic = [[f64; 4]; 4];
 
-/// Why coefficients cannot become a record.
+/// Why coefficients cannot be encoded.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum EncodeError {
     /// A coefficient or range is not a finite number.
     NotFinite,
-    /// The patch is too large for nanometres in an i32, with room for its derivatives: about 0.5 m. Split it.
+    /// Positions or derivatives of the patch exceed an i32 of nanometres (patches above about 0.5 m). Split the patch.
     TooLarge,
     /// The origin is outside ±2.147 m.
     TooFar,
-    /// The weights vary more than 4 : 1 over the patch, or are not positive. Split it.
+    /// The weights vary more than 4 : 1 over the patch, or are not positive. Split the patch.
     Weights,
     /// A flagged boundary does not collapse into a point, or more boundaries are flagged than a patch may have.
     NotAPole,
-    /// The extent of the angle is not above 0 and at most a turn.
+    /// The extent of the angle is outside 0 (exclusive) to one turn.
     Extent,
 }
 
@@ -82,7 +82,7 @@ impl core::error::Error for EncodeError {}
 /// Nanometres in a millimetre, exactly.
 const NM_PER_MM: f64 = crate::math::number::NM_PER_MM as f64;
 
-/// Coefficients over `u[0]..u[1]`, `v[0]..v[1]` as coefficients of parameters from -1/2 to 1/2 over those ranges.
+/// Substitutes parameters from -1/2 to 1/2 for `u[0]..u[1]`, `v[0]..v[1]`: the coefficients in the new parameters.
 #[must_use]
 pub fn substitute(c: &Bicubic, u: [f64; 2], v: [f64; 2]) -> Bicubic {
     let rows = c.map(|row| substitute_cubic(&row, v));
@@ -112,7 +112,7 @@ fn transpose(c: &Bicubic) -> Bicubic {
     t
 }
 
-/// The word of a span's width, in units of the surface's parameter.
+/// The word that encodes a span's width, in units of the surface's parameter.
 ///
 /// # Errors
 /// [`EncodeError::NotFinite`] where the width is not above 0 as an f32.
@@ -160,10 +160,10 @@ fn unit_mm(shift: u8) -> f64 {
     1.0 / (NM_PER_MM * f64::from(1_u32 << shift))
 }
 
-/// A polynomial patch from coefficients in mm of parameters from -1/2 to 1/2, with as fine a unit as fits.
+/// A polynomial patch from coefficients in mm of parameters from -1/2 to 1/2, with the finest unit 2^-shift nm that does not overflow.
 ///
 /// # Errors
-/// [`EncodeError`] as its variants say.
+/// See [`EncodeError`].
 pub fn polynomial(c: &[Bicubic; 3], edges: Edges) -> Result<PolynomialRecord, EncodeError> {
     check_finite(c.iter().flatten().flatten())?;
     let origin_nm = origin(c.map(|[[c00, ..], ..]| c00))?;
@@ -201,10 +201,10 @@ pub fn polynomial(c: &[Bicubic; 3], edges: Edges) -> Result<PolynomialRecord, En
 }
 
 /// A rational patch from homogeneous coefficients (w x, w y, w z in mm, then w) of parameters from -1/2 to 1/2.
-/// The weight is scaled so that its extremes over the patch's corners and middle lie evenly about 1.
+/// The weight is scaled so that the geometric mean of its extremes over a 9 x 9 grid of the patch is 1.
 ///
 /// # Errors
-/// [`EncodeError`] as its variants say.
+/// See [`EncodeError`].
 pub fn rational(c: &[Bicubic; 4], edges: Edges) -> Result<RationalRecord, EncodeError> {
     check_finite(c.iter().flatten().flatten())?;
     let [x, y, z, weight] = c;
@@ -277,7 +277,7 @@ fn evaluate(c: &Bicubic, u: f64, v: f64) -> f64 {
     cubic(c.map(|row| cubic(row, v)), u)
 }
 
-/// Least and largest value over a 9 x 9 grid of the patch.
+/// Minimum and maximum over a 9 x 9 grid of the patch.
 fn extremes(c: &Bicubic) -> (f64, f64) {
     let at = |i: i32| f64::from(i) / 8.0 - 0.5;
     let values = (0..9)
@@ -292,7 +292,7 @@ fn extremes(c: &Bicubic) -> (f64, f64) {
 /// of its angle in rad.
 ///
 /// # Errors
-/// [`EncodeError`] as its variants say.
+/// See [`EncodeError`].
 pub fn revolved(
     radius: &[f64; 4],
     height: &[f64; 4],

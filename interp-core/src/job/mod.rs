@@ -1,12 +1,12 @@
-//! A job: the [`Header`] and, as plain words, the surface's data.
+//! A job: the [`Header`] and the surface's data as 32-bit words.
 //!
 //! The words (i32) of a job, in order:
 //!
-//! | words | what |
+//! | words | content |
 //! |---|---|
 //! | `side_spans` | width of each side span in units of the surface's side parameter, f32 bits |
-//! | `path_spans` | width of each path span, f32 bits (reported, never used to step) |
-//! | rest | [`SurfaceKind::Polynomial`], [`SurfaceKind::Rational`]: one record a patch, path index fastest; [`SurfaceKind::RevolvedAlongProfile`], [`SurfaceKind::RevolvedAroundAxis`]: one record |
+//! | `path_spans` | width of each path span, f32 bits (reported only; the step along the path does not use it) |
+//! | remaining | [`SurfaceKind::Polynomial`], [`SurfaceKind::Rational`]: one record per patch, path index fastest; [`SurfaceKind::RevolvedAlongProfile`], [`SurfaceKind::RevolvedAroundAxis`]: one record |
 //!
 //! The records are described in the files of [`crate::surface`].
 
@@ -17,8 +17,8 @@ pub(crate) mod program;
 /// rational patches ([`patches_max`]).
 pub const STORE_WORDS: usize = 16_384;
 
-/// Patches that fit a store of this size in any arrangement: each may need a span width of its own,
-/// and one direction has one more.
+/// Patches that fit a store of this size in any grid: each may need its own span width,
+/// plus one width for the other direction.
 #[must_use]
 pub const fn patches_max(kind: SurfaceKind, store_words: usize) -> usize {
     let words = match kind {
@@ -29,21 +29,21 @@ pub const fn patches_max(kind: SurfaceKind, store_words: usize) -> usize {
     store_words.saturating_sub(1) / (words + 1)
 }
 
-/// Spans a surface may have in one direction. It bounds every loop over spans.
+/// Maximum spans of a surface in one direction. Bounds every loop over spans.
 pub const SPANS_MAX: u16 = 1_024;
 
-/// Longest step of a period on a machine with limits, mm.
+/// Maximum step per period of a job with axis limits, mm.
 pub(crate) const STEP_MAX_MM: f32 = 2.0;
 
-/// Cells into which the look-ahead may cut a path, and so the patches that a pass may have on a machine with limits.
+/// Maximum cells of a path in the look-ahead, and so maximum patches of a pass of a job with axis limits.
 pub(crate) const CELLS_MAX: usize = 256;
 
-/// Words of the span widths that head a job's data.
+/// Words of the span widths at the start of a job's data.
 pub(crate) fn width_words(path_spans: u16, side_spans: u16) -> u32 {
     u32::from(path_spans) + u32::from(side_spans)
 }
 
-/// The kind of surface, and with it the record of its data.
+/// The kind of surface; determines the layout of its records.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[repr(u8)]
 pub enum SurfaceKind {
@@ -52,9 +52,9 @@ pub enum SurfaceKind {
     Polynomial = 0,
     /// A grid of rational bicubic patches.
     Rational = 1,
-    /// Cubic profile turned about z; passes run along the profile, the side parameter is the angle.
+    /// Cubic profile revolved about z; passes run along the profile, the side parameter is the angle.
     RevolvedAlongProfile = 2,
-    /// Cubic profile turned about z; passes run around the axis, the side parameter is the profile's.
+    /// Cubic profile revolved about z; passes run around the axis, the side parameter is the profile's.
     RevolvedAroundAxis = 3,
 }
 
@@ -78,22 +78,22 @@ impl SurfaceKind {
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[repr(u8)]
 pub enum Pattern {
-    /// Every pass runs the same way.
+    /// One-way: every pass runs in the same direction.
     #[default]
     Zig = 0,
-    /// Every second pass runs backwards.
+    /// Zigzag: every second pass runs in the opposite direction.
     Zigzag = 1,
 }
 
-/// How far apart passes lie for the scallop height.
+/// How the path interval follows from the scallop height.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[repr(u8)]
 pub enum Spacing {
-    /// As far as the height allows over the gap to the next pass: lengths and curvatures are looked at there, and the ball is round.
+    /// The widest interval whose scallop height stays within the limit over the gap to the next pass, by the surface evaluated in the gap and the ball's circle.
     #[default]
     Exact = 0,
-    /// By the paper's interval at the pass alone (eqns 10 and 11). The height may be exceeded, by a percent or two where the surface
-    /// changes from pass to pass, by more at the ends of skew passes.
+    /// The paper's interval, from the pass alone (eqns 10 and 11). The scallop height may exceed the limit by 1 to 2 % where the surface
+    /// changes from pass to pass, and by more at the ends of skew passes.
     FirstOrder = 1,
 }
 
@@ -108,36 +108,36 @@ pub enum ToolSide {
     Minus = 1,
 }
 
-/// Limits of the machine's axes x, y, z, and their travel. A job with limits is run from standstill to standstill, its passes linked;
-/// without limits the feed is constant from the first sample to the last, as in the paper.
+/// Limits of the machine's axes x, y, z, and their travel. With limits each pass starts and ends at standstill, and links join the passes;
+/// without limits the feed is constant from the first sample to the last, as in Lo 1998.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct AxisLimits {
-    /// Greatest velocity of each axis, mm/s, 1e-3 to 1e5.
+    /// Maximum velocity of each axis, mm/s, 1e-3 to 1e5.
     pub velocity_mm_s: [f32; 3],
-    /// Greatest acceleration of each axis, mm/s^2, 1e-2 to 1e7.
+    /// Maximum acceleration of each axis, mm/s^2, 1e-2 to 1e7.
     pub acceleration_mm_s2: [f32; 3],
-    /// Greatest jerk of each axis, mm/s^3, 1e-1 to 1e9.
+    /// Maximum jerk of each axis, mm/s^3, 1e-1 to 1e9.
     pub jerk_mm_s3: [f32; 3],
-    /// Greatest distance between the path and the chord of a period, mm, 1e-6 to 1e3.
+    /// Maximum chord error of a period, mm, 1e-6 to 1e3.
     pub chord_mm: f32,
-    /// Travel of each axis, nm, least and most.
+    /// Travel of each axis, nm: minimum and maximum.
     pub travel_nm: [[i32; 2]; 3],
-    /// Where the tool centre stands before the first run, nm; within the travel.
+    /// Home: position of the tool centre before the first run, nm; within the travel.
     pub home_nm: [i32; 3],
-    /// Last part of the plunge, mm, 0 to 1000, followed no faster than at the feed.
+    /// Length of the end of the plunge, mm, 0 to 1000, over which the speed does not exceed the feed.
     pub plunge_mm: f32,
-    /// Height (z of the tool centre) at which the tool is clear of the surface everywhere, nm; within the travel.
+    /// Safe height (z of the tool centre), nm, above every point of the surface; within the travel.
     pub safe_z_nm: i32,
 }
 
-/// A job's parameters besides its surface data. Ranges are checked when it is loaded.
+/// A job's parameters without its surface data. Loading checks their ranges.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Header {
     /// Kind of surface.
     pub kind: SurfaceKind,
     /// Order of the passes.
     pub pattern: Pattern,
-    /// How far apart the passes lie.
+    /// Rule for the path interval.
     pub spacing: Spacing,
     /// Side of the surface that the tool is on.
     pub tool_side: ToolSide,
@@ -153,6 +153,6 @@ pub struct Header {
     pub scallop_mm: f32,
     /// Sampling period T, s, 1e-5 to 0.1.
     pub period_s: f32,
-    /// Limits of the axes; none for a constant feed.
+    /// Axis limits; none for a constant feed.
     pub axes: Option<AxisLimits>,
 }

@@ -1,4 +1,4 @@
-//! A job in the machine: raw words go in, and only a complete, checked job comes out.
+//! The job store: accepts words in order, and releases the job only when it is complete and checked.
 
 use crate::command::OVERRIDE_MAX;
 use crate::fault::{Fault, FaultKind, Result};
@@ -9,7 +9,7 @@ use crate::surface::{
     split_patch,
 };
 
-/// Which part of the checks a job has passed.
+/// Progress of loading and checking.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum LoadStage {
     Empty,
@@ -21,17 +21,17 @@ enum LoadStage {
     Sealed,
 }
 
-/// State of the job in the store, which the caller owns and passes with every call. Its surface can be read only
+/// State of the job in the store. The caller owns the store and passes it with every call. The surface can be read only
 /// once the job is sealed.
 #[derive(Debug)]
 pub(crate) struct Program {
     stage: LoadStage,
     header: Header,
-    /// Words that the job has.
+    /// Length of the job, words.
     length: u32,
 }
 
-/// Words of one record of a kind of surface.
+/// Words per record of a kind of surface.
 const fn record_words(kind: SurfaceKind) -> usize {
     match kind {
         SurfaceKind::Polynomial => POLYNOMIAL_WORDS,
@@ -67,7 +67,7 @@ fn check_header(header: &Header) -> Result<()> {
         (header.period_s, 1e-5, 0.1),
     ];
     for (value, least, most) in ranges {
-        // Not the negated comparisons: a NaN must not pass.
+        // Positive comparisons, so that a NaN is rejected.
         if !(value >= least && value <= most) {
             return Err(Fault::new(FaultKind::BadHeader, value));
         }
@@ -78,7 +78,7 @@ fn check_header(header: &Header) -> Result<()> {
         .map_or(Ok(()), |axes| check_axes(header, axes))
 }
 
-/// Ranges of the axes' limits: a step of a period fits its integer, and none of the planner's products overflows.
+/// Ranges of the axis limits, within which the step of a period fits its integer and no product of the planner overflows.
 fn check_axes(header: &Header, axes: &AxisLimits) -> Result<()> {
     let bad = |value| Err(Fault::new(FaultKind::BadHeader, value));
     let all = [
@@ -97,7 +97,7 @@ fn check_axes(header: &Header, axes: &AxisLimits) -> Result<()> {
     if !(axes.plunge_mm >= 0.0 && axes.plunge_mm <= 1e3) {
         return bad(axes.plunge_mm);
     }
-    // The greatest feed that an override may ask for has to fit a step.
+    // The feed at the maximum override has to fit the step of a period.
     if OVERRIDE_MAX * header.feed_mm_s * header.period_s > STEP_MAX_MM {
         return bad(header.feed_mm_s);
     }
@@ -243,7 +243,7 @@ impl Program {
     /// The sealed job.
     ///
     /// # Errors
-    /// [`FaultKind::WrongState`] where none is.
+    /// [`FaultKind::WrongState`] where no job is sealed.
     pub(crate) fn job<'a>(&'a self, store: &'a [i32]) -> Result<Job<'a>> {
         if self.stage == LoadStage::Sealed {
             Ok(Job {
@@ -279,15 +279,15 @@ impl<'a> Job<'a> {
     /// The record of the patch at these spans; `N` is the number of words of the job's kind.
     ///
     /// # Errors
-    /// [`FaultKind::WrongState`] where there is none.
+    /// [`FaultKind::WrongState`] where the job has no such patch.
     pub(crate) fn patch<const N: usize>(&self, path_span: u16, side_span: u16) -> Result<&'a [i32; N]> {
         let index = usize::from(side_span) * usize::from(self.header.path_spans) + usize::from(path_span);
         self.record(index)
             .ok_or(const { Fault::new(FaultKind::WrongState, 0.0) })
     }
 
-    /// Whether a patch's side boundaries collapse like those of the first patch beside the same pass: a pass is a point as a
-    /// whole or not at all.
+    /// Whether a patch's side boundaries collapse like those of the first patch of the same row: either a whole pass
+    /// is a pole or no part of the pass is.
     fn is_alike(&self, index: usize) -> bool {
         let beside = |index: usize| {
             let words: &[i32] = match self.header.kind {

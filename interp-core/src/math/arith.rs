@@ -1,5 +1,5 @@
 //! Arithmetic of the sample path: fixed-point Horner steps, square root, sine, and the only conversions between
-//! integers and floats. Nothing here panics; every result is the same on every machine.
+//! integers and floats. No function panics; every result is bit-identical on every target.
 //!
 //! Fixed point: a parameter within a span is centred, `w = fraction - 1/2`, and held as an i32 in units of 2^-32, so
 //! `-1/2 <= w < 1/2`. One Horner step `c + acc w` is then one `SMMLAR` of the Cortex-M4 (1 cycle, 31 bits), where f32
@@ -24,42 +24,42 @@ pub(crate) fn mul_hi(a: i32, b: i32) -> i32 {
     ((a as i64 * b as i64 + (1 << 31)) >> 32) as i32
 }
 
-/// `a b / 2^31`, even, within 2 units.
+/// `a b / 2^31`, error at most 2 units; the result is even.
 #[inline(always)]
 #[must_use]
 pub(crate) fn mul_q31(a: i32, b: i32) -> i32 {
     mul_hi(a, b) << 1
 }
 
-/// `a b / 2^30`, a multiple of 4, within 4 units.
+/// `a b / 2^30`, error at most 4 units; the result is a multiple of 4.
 #[inline(always)]
 #[must_use]
 pub(crate) fn mul_q30(a: i32, b: i32) -> i32 {
     mul_hi(a, b) << 2
 }
 
-/// `a + b`, known to fit.
+/// `a + b`. The caller guarantees that it does not overflow.
 #[inline(always)]
 #[must_use]
 pub(crate) fn add(a: i32, b: i32) -> i32 {
     a.wrapping_add(b)
 }
 
-/// `a - b`, known to fit.
+/// `a - b`. The caller guarantees that it does not overflow.
 #[inline(always)]
 #[must_use]
 pub(crate) fn subtract(a: i32, b: i32) -> i32 {
     a.wrapping_sub(b)
 }
 
-/// A quarter, rounded down.
+/// `a / 4`, rounded down.
 #[inline(always)]
 #[must_use]
 pub(crate) fn quarter_of(value: i32) -> i32 {
     value >> 2
 }
 
-/// `c0 + c1 w + c2 w^2`, within 1 unit when no partial sum overflows.
+/// `c0 + c1 w + c2 w^2`, error at most 1 unit when no partial sum overflows.
 #[inline(always)]
 #[must_use]
 pub(crate) fn quadratic(c: &[i32; 3], w: i32) -> i32 {
@@ -67,7 +67,7 @@ pub(crate) fn quadratic(c: &[i32; 3], w: i32) -> i32 {
     add(c0, mul_hi(add(c1, mul_hi(c2, w)), w))
 }
 
-/// `c0 + c1 w + c2 w^2 + c3 w^3`, within 1 unit when no partial sum overflows.
+/// `c0 + c1 w + c2 w^2 + c3 w^3`, error at most 1 unit when no partial sum overflows.
 #[inline(always)]
 #[must_use]
 pub(crate) fn cubic(c: &[i32; 4], w: i32) -> i32 {
@@ -76,7 +76,7 @@ pub(crate) fn cubic(c: &[i32; 4], w: i32) -> i32 {
 }
 
 /// A cubic's value, first derivative and half its second derivative, from one set of coefficients: the partial sums are shared.
-/// Within 3 units when no partial sum overflows.
+/// Error at most 3 units when no partial sum overflows.
 #[inline(always)]
 #[must_use]
 pub(crate) fn jet(c: &[i32; 4], w: i32) -> [i32; 3] {
@@ -88,7 +88,7 @@ pub(crate) fn jet(c: &[i32; 4], w: i32) -> [i32; 3] {
     [add(c0, mul_hi(t1, w)), add(t1, mul_hi(d2, w)), add(d2, t3)]
 }
 
-/// A cubic's value and first derivative: a [`jet`] without its last.
+/// A cubic's value and first derivative: [`jet`] without the second derivative.
 #[inline(always)]
 #[must_use]
 pub(crate) fn tangent(c: &[i32; 4], w: i32) -> [i32; 2] {
@@ -100,7 +100,7 @@ pub(crate) fn tangent(c: &[i32; 4], w: i32) -> [i32; 2] {
     [add(c0, mul_hi(t1, w)), add(t1, mul_hi(d2, w))]
 }
 
-/// The upper word of a scalar product, `a . b / 2^32`, within 2 units.
+/// The upper word of a scalar product, `a . b / 2^32`, error at most 2 units.
 #[inline(always)]
 #[must_use]
 pub(crate) fn dot_hi(a: &[i32; 3], b: &[i32; 3]) -> i32 {
@@ -108,14 +108,14 @@ pub(crate) fn dot_hi(a: &[i32; 3], b: &[i32; 3]) -> i32 {
     add(add(mul_hi(a0, b0), mul_hi(a1, b1)), mul_hi(a2, b2))
 }
 
-/// `sum + a b`, whole, known to fit: one `SMLAL` (1 cycle).
+/// `sum + a b` in 64 bits: one `SMLAL` (1 cycle). The caller guarantees that it does not overflow.
 #[inline(always)]
 #[must_use]
 pub(crate) fn add_product(sum: i64, a: i32, b: i32) -> i64 {
     sum.wrapping_add(a as i64 * b as i64)
 }
 
-/// A value in units of 2^-30, rounded down, and whether that fits: the two upper bits of the second are zero then.
+/// A value in units of 2^-30, rounded down to an integer, and an overflow check: the upper two bits of the second result are zero if the integer fits.
 #[inline(always)]
 #[must_use]
 pub(crate) fn whole_q30(value: i64) -> (i32, u32) {
@@ -143,7 +143,7 @@ pub(crate) fn to_f32(value: i32) -> f32 {
     value as f32
 }
 
-/// A count below 2^24 as a float, exactly; larger ones rounded.
+/// A count as a float: exact below 2^24, rounded above.
 #[inline(always)]
 #[must_use]
 pub(crate) const fn count_to_f32(value: u32) -> f32 {
@@ -157,14 +157,14 @@ pub(crate) const fn fraction_32(value: u32) -> f32 {
     value as f32 * UNIT_32
 }
 
-/// The integer towards zero; saturates, NaN is 0. One instruction, where rounding to nearest would take four.
+/// Truncates towards zero; saturates, NaN is 0. One instruction; rounding to nearest takes four.
 #[inline(always)]
 #[must_use]
 pub(crate) fn truncated(value: f32) -> i32 {
     value as i32
 }
 
-/// A value from 1 to 2^30 times the power of two that brings it to 2^29 or more, but below 2^30, and that power's exponent.
+/// Normalises a value from 1 to 2^30: the value times 2^n within [2^29, 2^30), and n.
 #[must_use]
 pub(crate) fn to_top(value: f32) -> (f32, u8) {
     let exponent = (156 - (value.to_bits() >> 23 & 0xff) as i32).clamp(0, 29);
@@ -185,14 +185,14 @@ pub(crate) const fn centred(fraction: u64) -> i32 {
     ((fraction >> 32) as u32 ^ 0x8000_0000) as i32
 }
 
-/// A fraction of a patch a step further; none past its end.
+/// The fraction of a patch plus a step; none beyond the patch's end.
 #[inline(always)]
 #[must_use]
 pub(crate) fn advanced(fraction: u64, step: u64) -> Option<u64> {
     fraction.checked_add(step)
 }
 
-/// A step of a fraction in units of 2^-64, exactly; none unless 2^-32 <= `step` < 2^-8 (or for a NaN). Seven cycles and a branch.
+/// A step as a fraction in units of 2^-64, exact; none unless 2^-32 <= `step` < 2^-8 (none for a NaN). Seven cycles and a branch.
 #[inline(always)]
 #[must_use]
 pub(crate) fn small_step(step: f32) -> Option<u64> {
@@ -202,20 +202,20 @@ pub(crate) fn small_step(step: f32) -> Option<u64> {
     if bits.wrapping_sub(LEAST) >= BEYOND - LEAST {
         return None;
     }
-    // The mantissa at the top of a word, and by how many bits it reaches into the upper half: 1 to 24.
+    // The mantissa at the top of a word, and the number of its bits in the upper half: 1 to 24.
     let mantissa = bits << 8 | 0x8000_0000;
     let up = (bits >> 23) - 94;
     let (low, high) = (mantissa.wrapping_shl(up), mantissa.wrapping_shr(32 - up));
     Some((high as u64) << 32 | low as u64)
 }
 
-/// A step of a fraction in units of 2^-64, rounded down; saturates at 0 and at 1 (NaN: 1).
+/// A step as a fraction in units of 2^-64, rounded down; saturates at 0 and at 1 (NaN: 1).
 #[must_use]
 pub(crate) fn fraction_from_f32(step: f32) -> u64 {
     if step <= 0.0 {
         return 0;
     }
-    // Not `>=`: a NaN is to saturate.
+    // Not `>=`, so that a NaN saturates.
     if !(step < 1.0) {
         return u64::MAX;
     }
@@ -243,7 +243,7 @@ fn rounded<const BITS: u32>(a: i32, b: i32) -> i32 {
 }
 
 /// `1 / w` in units of 2^-29 for a weight `w` in units of 2^-30 within [1/2, 2), from its float reciprocal; one Newton
-/// step brings the 24 bits to 28, relative error below 2^-28.
+/// step refines 24 bits to 28, relative error below 2^-28.
 #[inline(always)]
 #[must_use]
 pub(crate) fn reciprocal_q29(weight_q30: i32, reciprocal: f32) -> i32 {
@@ -266,15 +266,15 @@ pub(crate) fn angle(start: u32, extent_q31: u32, fraction: u64) -> u32 {
     start.wrapping_add((((fraction >> 32) * extent_q31 as u64 + (1 << 30)) >> 31) as u32)
 }
 
-/// Square root, correctly rounded; NaN below zero. By the FPU where the target has one for sure (an ABI that passes floats in its registers).
+/// Square root, correctly rounded; NaN below zero. Uses the FPU where the target guarantees one (hard-float ABI).
 #[inline(always)]
 #[must_use]
 #[cfg(all(target_arch = "arm", target_abi = "eabihf"))]
 #[allow(unsafe_code, reason = "the hardware square root has no stable intrinsic")]
 pub(crate) fn sqrt(value: f32) -> f32 {
     let mut bits = value.to_bits();
-    // SAFETY: vsqrt.f32 reads and writes s0 alone, which is declared clobbered; no memory and no flags are touched.
-    // FPSCR's sticky exception bits may change, which nothing reads.
+    // SAFETY: vsqrt.f32 reads and writes only s0, which is declared clobbered; it accesses no memory and no flags.
+    // FPSCR's sticky exception bits may change; they are never read.
     unsafe {
         core::arch::asm!(
             "vmov s0, {0}",
@@ -288,8 +288,8 @@ pub(crate) fn sqrt(value: f32) -> f32 {
     f32::from_bits(bits)
 }
 
-/// Square root, correctly rounded; NaN below zero. In software or by the target's own instruction: IEEE 754 leaves one result only, so the
-/// bits are those of the FPU.
+/// Square root, correctly rounded; NaN below zero. In software or by the target's own instruction: IEEE 754 defines the result exactly, so the
+/// bits equal those of the FPU.
 #[inline(always)]
 #[must_use]
 #[cfg(not(all(target_arch = "arm", target_abi = "eabihf")))]
@@ -297,14 +297,14 @@ pub(crate) fn sqrt(value: f32) -> f32 {
     libm::sqrtf(value)
 }
 
-/// `1 / sqrt(value)` for values from 2^-125 on, within 1.5 units in the last place: an estimate from the bits (3.4 %), two Newton
-/// steps, and a third that adds a residual. 19 cycles on a Cortex-M4F, where its square root and division take 32.
+/// `1 / sqrt(value)` for values from 2^-125, within 1.5 ulp: an initial estimate from the bits (3.4 %), two Newton
+/// steps, and a third that adds the residual. 19 cycles on a Cortex-M4F; `vsqrt` and `vdiv` take 32.
 ///
-/// The bound, with u = 2^-24: the second step y is off by e, |e| < 4.8e-6 of itself. `half y` and its product with y are rounded by
-/// at most u of themselves each, and come to 1/2; the difference from 1/2 is exact. So the residual is off by at most u, and what
-/// it adds by u y, at most one unit in the last place of the result (a unit is u y to 2 u y). The addition rounds by half a unit.
-/// What is left, 3/2 e^2 of the series and |e| u of the last product, is below 0.001 units. Over all mantissas the worst is
-/// 1.22 units. Below 2^-125 `half` loses its last bit (2.2 units).
+/// Error bound, with u = 2^-24: the second iterate y has the relative error e, |e| < 4.8e-6. `half y` and its product with y have relative
+/// rounding errors of at most u each and are close to 1/2; the difference from 1/2 is exact. So the residual's error is at most u, and that of
+/// the correction u y, at most 1 ulp of the result (1 ulp is u y to 2 u y). The addition rounds by 0.5 ulp.
+/// The remaining terms, 3/2 e^2 of the series and |e| u of the last product, are below 0.001 ulp. The maximum over all mantissas is
+/// 1.22 ulp. Below 2^-125 `half` loses its last bit (2.2 ulp).
 #[inline(always)]
 #[must_use]
 pub(crate) fn inverse_sqrt(value: f32) -> f32 {
@@ -342,13 +342,13 @@ fn quintic(c: &[i32; 6], z: i32) -> i32 {
     quadratic(&[c0, c1, low], z)
 }
 
-/// Sine and cosine of an angle in turns (units of 2^-32), in units of 2^-30. Absolute error at most 3e-9, against 3e-8 of
-/// a correctly rounded f32: at 100 mm from the axis 0.3 nm.
+/// Sine and cosine of an angle in turns (units of 2^-32), in units of 2^-30. Absolute error at most 3e-9 (3e-8 for
+/// a correctly rounded f32): 0.3 nm at 100 mm from the axis.
 #[inline]
 #[must_use]
 pub(crate) fn sin_cos(turns: u32) -> (i32, i32) {
     let quarter = turns.wrapping_add(1 << 29) >> 30;
-    // t in [-1, 1): eighths of a turn, units of 2^-31.
+    // t in [-1, 1) is eighths of a turn, units of 2^-31.
     let t = (turns.wrapping_sub(quarter << 30) << 2) as i32;
     let z = ((t as i64 * t as i64) >> 32) as i32;
     let sine = mul_hi(t, quintic(&SINE, z));
@@ -416,8 +416,8 @@ mod tests {
         }
     }
 
-    /// The portable square root against the FPU of the machine that runs the test, every binade and both ends of the range; the FPU of the
-    /// Cortex-M4F against the same figures: `tests/qemu.rs`, by the bits of every sample.
+    /// The portable square root against the host's FPU, over every binade and at both ends of the range. The FPU of the
+    /// Cortex-M4F is compared by `tests/qemu.rs`, through the bits of every sample.
     #[test]
     fn portable_square_root_has_the_bits_of_the_fpu() {
         let random = (0..4_000_000_u32).map(|n| n.wrapping_mul(2_654_435_769) >> 1);
@@ -441,7 +441,7 @@ mod tests {
         }
     }
 
-    /// The products in plain integers, as a target without DSP instructions has them, in halves of 16 bits: the same bits.
+    /// The products of a target without DSP instructions, from 16-bit halves, are bit-identical.
     #[test]
     fn products_need_no_dsp_instructions() {
         let by_halves = |a: i32, b: i32| {

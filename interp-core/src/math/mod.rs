@@ -1,4 +1,4 @@
-//! Arithmetic that gives the same bits on every machine.
+//! Arithmetic with bit-identical results on every target.
 
 pub(crate) mod arith;
 pub(crate) mod number;

@@ -1,11 +1,11 @@
-//! Numbers of bounds: comparisons and conversions that the chip does without a call. A library's take 20 to 60 cycles each, and a tick of
-//! the feed has dozens.
+//! Comparisons and conversions for bounds, compiled to single instructions without a library call. A library call takes 20 to 60 cycles, and a tick of
+//! the feed planner has dozens.
 
-/// The lesser and the greater of two numbers, a comparison and a move each.
+/// Minimum and maximum, one comparison and one conditional move each.
 pub(crate) trait Bounded {
-    /// This, or the limit where that is less; the limit for a NaN.
+    /// The minimum of `self` and the limit; the limit where `self` is a NaN.
     fn at_most(self, limit: Self) -> Self;
-    /// This, or the limit where that is greater; the limit for a NaN.
+    /// The maximum of `self` and the limit; the limit where `self` is a NaN.
     fn at_least(self, limit: Self) -> Self;
 }
 
@@ -24,14 +24,14 @@ impl Bounded for f32 {
 /// Nanometres in a millimetre.
 pub const NM_PER_MM: u32 = 1_000_000;
 
-/// The same as a float, exactly.
+/// [`NM_PER_MM`] as a float, exact.
 #[allow(clippy::cast_precision_loss, reason = "below 2^24")]
 pub(crate) const NM_PER_MM_F32: f32 = NM_PER_MM as f32;
 
 /// Millimetres in a nanometre.
 pub(crate) const MM_PER_NM: f32 = 1.0 / NM_PER_MM_F32;
 
-/// Nanometres as mm, to 24 bits.
+/// Nanometres in mm, rounded to 24 bits.
 #[allow(
     clippy::cast_precision_loss,
     reason = "the last digits count below 2^24 nm only"
@@ -43,7 +43,7 @@ pub(crate) fn nm_to_mm(nm: i32) -> f32 {
 /// 2^32.
 const HIGH: f32 = 4_294_967_296.0;
 
-/// An arc in quanta, to 24 bits: a bound needs no more.
+/// An arc in units of 2^-10 nm as a float, rounded to 24 bits, sufficient for a bound.
 #[allow(
     clippy::cast_precision_loss,
     clippy::cast_possible_truncation,
@@ -56,7 +56,7 @@ pub(crate) const fn to_f32(quanta: i64) -> f32 {
     if quanta < 0 { -size } else { size }
 }
 
-/// The whole part of a number of quanta, 0 of one that is not positive.
+/// The integer part of a number of units of 2^-10 nm; 0 where it is not positive.
 #[allow(
     clippy::cast_precision_loss,
     clippy::cast_possible_truncation,
@@ -77,7 +77,7 @@ mod tests {
     use super::*;
 
     proptest! {
-        /// Against the language's own conversions.
+        /// Compared with Rust's `as` conversions.
         #[test]
         fn conversions_are_those_of_the_language(value: i64, bits in 1_u32..63, fraction in 0.0_f32..1e6) {
             let value = value >> bits;

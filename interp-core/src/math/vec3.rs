@@ -1,4 +1,4 @@
-//! Three scalars, and the products the geometry needs.
+//! Three-component vectors with scalar and vector product.
 
 use crate::math::arith::to_f32;
 use core::ops::{Add, Mul, Sub};

@@ -1,54 +1,54 @@
-//! The patch that a run is on, and the next one along the pass.
+//! Double buffer of patches: the run's current patch, and the next one along the pass.
 //!
 //! A tick that crosses a boundary needs the next patch collapsed, and the parametrisation at the boundary on both sides. Neither
-//! depends on where exactly the tick before ended, so both are prepared ahead, in ticks with little other work: one
-//! [`Task`] each. A boundary that is reached sooner prepares the missing parts in its own tick.
+//! depends on the exact end of the previous tick, so both are prepared ahead, in ticks with little other work: one
+//! [`Task`] per tick. A tick that reaches a boundary sooner executes the missing tasks itself.
 
 use crate::fault::Result;
 use crate::job::program::Job;
 use crate::pass::patch::Patch;
 use crate::pass::position::PassPosition;
 
-/// The next part to prepare, in this order.
+/// The next task, in this order.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Task {
-    /// The parametrisation at the ends of the patch.
+    /// Find the parametrisation at the ends of the current patch.
     Ends,
-    /// The next patch.
+    /// Collapse the next patch.
     Ahead,
-    /// The parametrisation at its ends.
+    /// Find the parametrisation at the next patch's ends.
     AheadEnds,
-    /// Nothing is left to prepare.
+    /// All tasks are complete.
     Done,
-    /// The next patch is faulty: nothing is prepared, and the tick that reaches it reports the fault.
+    /// The next patch is faulty: it is not prepared, and the tick that reaches it reports the fault.
     Faulty,
 }
 
-/// Two patches, of which the run is on one.
+/// Two patches, one of them current.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct PatchBuffer {
     patches: [Patch; 2],
-    /// The run is on the second.
+    /// The second patch is current.
     second: bool,
     task: Task,
 }
 
 impl PatchBuffer {
-    /// On no patch yet.
+    /// No current patch.
     pub(crate) const START: Self = Self {
         patches: [Patch::NONE; 2],
         second: false,
         task: Task::Done,
     };
 
-    /// The patch that the run is on.
+    /// The current patch.
     #[inline(always)]
     pub(crate) const fn patch(&self) -> &Patch {
         let [first, second] = &self.patches;
         if self.second { second } else { first }
     }
 
-    /// The patch that the run is on, and the other.
+    /// The current patch, and the other.
     const fn both(&mut self) -> (&mut Patch, &mut Patch) {
         let [first, second] = &mut self.patches;
         if self.second {
@@ -58,19 +58,19 @@ impl PatchBuffer {
         }
     }
 
-    /// Whether a part is left to prepare.
+    /// Whether a task is left.
     #[inline(always)]
     pub(crate) fn has_work(&self) -> bool {
         !matches!(self.task, Task::Done | Task::Faulty)
     }
 
-    /// Prepares nothing more on this patch.
+    /// Drops the remaining tasks of this patch.
     #[cfg(test)]
     pub(crate) fn disable(&mut self) {
         self.task = Task::Faulty;
     }
 
-    /// Goes to the first patch of a pass.
+    /// Collapses the first patch of a pass and makes it current.
     ///
     /// # Errors
     /// Those of [`Patch::collapse`].
@@ -79,7 +79,7 @@ impl PatchBuffer {
         self.both().0.collapse(job, position)
     }
 
-    /// Goes to the next patch of the pass, which is this one.
+    /// Makes the next patch of the pass, which is at `position`, current.
     ///
     /// # Errors
     /// Those of [`Patch::collapse`].
@@ -96,7 +96,7 @@ impl PatchBuffer {
         Ok(())
     }
 
-    /// Prepares one part, for a run on this patch.
+    /// Executes one task, for a run on this patch.
     #[inline(never)]
     pub(crate) fn work(&mut self, job: &Job<'_>, position: &PassPosition) {
         let task = self.task;

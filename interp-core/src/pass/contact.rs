@@ -1,43 +1,43 @@
 //! Step 2: the next cutter contact at the commanded feed (Lo 1998, eqn 9).
 //!
-//! The paper's step is the Taylor series of u(s) to second order. Here it goes to third, `u''' = (2 p^2 - p')/|A|^3` with
-//! `p = A.A'/|A|^2`, and p' is taken from the last two samples, which costs a subtraction and leaves a relative error of (step /
-//! radius of curvature)^3. Where the change of the speed moves the step's end by more than [`FINE`], a step is not small
-//! ([`small_step`]), or there is only one sample yet, [`solve`] takes over: arcs by Hermite quadrature, from the speed and its slope
-//! at both ends, and one or two Newton steps. That is rare, and costs an evaluation of the first derivatives for each Newton step,
+//! The paper's step is the Taylor series of u(s) to second order. This one is to third order, `u''' = (2 p^2 - p')/|A|^3` with
+//! `p = A.A'/|A|^2`, and p' is the difference of the last two samples' p, which costs a subtraction and leaves a relative error of (step /
+//! radius of curvature)^3. Where the correction of the first-order step exceeds [`FINE`], the step is not small
+//! ([`small_step`]), or the patch has only one sample yet, [`solve`] is used: arcs by Hermite quadrature, from the speed and its derivative
+//! at both ends, and one or two Newton steps. [`solve`] is rare; it costs an evaluation of the first derivatives for each Newton step,
 //! and one more where the speed is far from a cubic ([`SMOOTH`]).
 
 use crate::fault::{Fault, FaultKind, Result};
 use crate::math::arith::{fraction_from_f32, fraction_to_f32, small_step};
 use crate::surface::{PathSpeed, Surface};
 
-/// Largest correction of the first-order step, relative, for which a series is trusted as a first guess. At 1/2 the
-/// parametrisation doubles or halves its speed within one period; past -1 the step would run backwards.
+/// Maximum relative correction of the first-order step with which the series is used as a starting value. At 1/2 the
+/// parametrisation doubles or halves its speed within one period; below -1 the step is backwards.
 const CORRECTION_MAX: f32 = 0.5;
 
-/// Largest correction of the first-order step, relative, that the series alone is trusted with: its error is then below
-/// the third power, 6e-8 times a small factor.
+/// Maximum relative correction of the first-order step with which the series is used alone: its error is then below
+/// the third power of the correction, 6e-8 times a small factor.
 const FINE: f32 = 1.0 / 256.0;
 
-/// How much more the change of p from one sample to the next counts: p' from two samples is good to first order, and a
-/// change of 1/2048 leaves less than 1e-5 of the step where p'' is what the change says.
+/// Weight of the change of p from one sample to the next: p' from two samples is of first order, and a
+/// change of 1/2048 leaves an error below 1e-5 of the step for the p'' implied by the change.
 const CHANGE: f32 = 8.0;
 
-/// Largest correction of the guess, relative, for which Newton's method is trusted.
+/// Maximum relative correction of the starting value for which Newton's method is used.
 const CORRECTED_MAX: f32 = 1.0 / 16.0;
 
-/// Largest correction of a guess, relative, after which no further one is needed: a correction is of second order, and its
-/// third power is below f32's last place.
+/// Maximum relative correction after which no further iteration is needed: the correction is of second order, and its
+/// third power is below the resolution of f32.
 const CORRECTED_FINE: f32 = 1.0 / 256.0;
 
-/// Newton steps at most.
+/// Maximum Newton iterations.
 const NEWTON_STEPS: u8 = 2;
 
-/// First-order step, as a fraction of the patch, beyond which the patch's end is looked at before the series.
+/// First-order step, as a fraction of the patch, beyond which the arc up to the patch's end is computed before the series.
 const LONG_STEP: f32 = 0.25;
 
 /// Increment of the path fraction for an arc, units of 2^-64, from the parametrisation at its start and the logarithmic speed derivative one
-/// sample earlier (NaN where there is none); none where the series is not enough.
+/// sample earlier (NaN where there is none); none where the series is not accurate enough.
 #[inline(always)]
 pub(crate) fn step(from: &PathSpeed, log_speed_derivative_before: f32, arc: f32) -> Option<u64> {
     const THIRD: f32 = 1.0 / 3.0;
@@ -50,22 +50,22 @@ pub(crate) fn step(from: &PathSpeed, log_speed_derivative_before: f32, arc: f32)
     let bend = first * log_speed_derivative;
     let change = first * (log_speed_derivative - log_speed_derivative_before);
     let correction = bend * (bend * THIRD - 0.5) - change * SIXTH;
-    // A NaN makes the step none.
+    // A NaN returns none.
     if correction.abs() + change.abs() * CHANGE > FINE {
         return None;
     }
     small_step(first + first * correction)
 }
 
-/// How far the speed may be from a cubic over an arc, relative, for which its two ends are enough: its second derivative's share of
-/// the arc, and 64 times its third's. An exponential then changes by 8 % within the arc, whose error is 4e-8 of itself.
+/// Maximum relative deviation of the speed from a cubic over an arc for which the two-point rule is enough: the share of its second derivative in
+/// the arc, and 64 times that of its third. An exponential speed then changes by 8 % within the arc, with a relative error of 4e-8.
 const SMOOTH: f32 = 1.0 / 256.0;
 
-/// How far the rules of two and three points may be apart, relative, for the latter to be trusted.
+/// Maximum relative difference of the two-point and three-point rules for which the latter is accepted.
 const APART: f32 = 1.0 / 128.0;
 
-/// Arc from a fraction of the patch over `length` more, where the parametrisation is `end`: Hermite's rule of two points (error
-/// `length^5 s^(4) / 720` for a speed s), or of three (`length^7 s^(6) / 604800`). An error where both are too far apart to be trusted.
+/// Arc from a fraction of the patch to `length` beyond it, where the parametrisation is `end`: Hermite's two-point rule (error
+/// `length^5 s^(4) / 720` for a speed s), or of three (`length^7 s^(6) / 604800`). An error where both differ by more than the tolerance.
 fn arc_over(
     surface: &Surface,
     from: u64,
@@ -86,7 +86,7 @@ fn arc_over(
     }
     let middle = surface.path_at(from.saturating_add(fraction_from_f32(0.5 * length)));
     let three = sum * (7.0 / 30.0) + bow * (1.0 / 60.0) + 16.0 / 30.0 / middle.inv_speed;
-    // A NaN is not to be trusted either.
+    // A NaN is rejected too.
     if (two - three).abs() <= APART * three {
         Ok(length * three)
     } else {
@@ -94,7 +94,7 @@ fn arc_over(
     }
 }
 
-/// The path fraction of an arc within another, both from the same place: Hermite's cubic of the path over the arc.
+/// The path fraction of an arc within a longer one from the same start: cubic Hermite interpolation of the path over the arc.
 fn inverse_cubic(arc: f32, start: &PathSpeed, end: &PathSpeed, covered: f32, length: f32) -> f32 {
     let part = arc / covered;
     let rest = 1.0 - part;
@@ -102,21 +102,21 @@ fn inverse_cubic(arc: f32, start: &PathSpeed, end: &PathSpeed, covered: f32, len
     part * (rest * rest * first + part * ((3.0 - 2.0 * part) * length - rest * last))
 }
 
-/// Where an arc ends.
+/// End of an arc.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) enum Reach {
     /// On the patch, at this fraction.
     Within(u64),
-    /// Beyond the patch, up to whose end there was this arc.
+    /// Beyond the patch; the arc up to the patch's end.
     Beyond(f32),
 }
 
-/// Where an arc from a place ends, by quadrature. `patch_end` gives the parametrisation at the patch's end, called only where the arc may reach it.
+/// Finds the end of an arc by quadrature. `patch_end` returns the parametrisation at the patch's end; called only where the arc may reach it.
 ///
 /// # Errors
-/// [`FaultKind::ParameterBackwards`] where neither series nor quadrature can be trusted; its value is what would have to be
-/// added to the first-order step, over that step: -1 or less where the parameter would run backwards.
-/// [`FaultKind::DegenerateSurface`] where the speed vanishes.
+/// [`FaultKind::ParameterBackwards`] where neither series nor quadrature is accurate enough; its value is the correction
+/// of the first-order step, relative to that step: -1 or less where the parameter would run backwards.
+/// [`FaultKind::DegenerateSurface`] where the speed is zero.
 pub(crate) fn solve(
     surface: &Surface,
     from: u64,
@@ -130,7 +130,7 @@ pub(crate) fn solve(
     let correction = bend * (bend * 0.5 - 0.5);
     let mut guess = first + first * correction;
     let refused = |guess: f32| Fault::new(FaultKind::ParameterBackwards, guess / first - 1.0);
-    // The series is about a small part of the patch: where the arc may be all of it, the end is looked at first.
+    // The series holds for a small part of the patch: where the arc may cover all of it, the end is evaluated first.
     let to_end = || -> Result<(PathSpeed, core::result::Result<f32, f32>)> {
         let end = patch_end().checked()?;
         let covered = arc_over(surface, from, start, &end, room);
@@ -143,11 +143,11 @@ pub(crate) fn solve(
             (_, Ok(covered)) if covered <= arc => return Ok(Reach::Beyond(covered)),
             (speed, Ok(covered)) => end = Some((speed, covered)),
             (speed, Err(untrusted)) if guess >= room => return refused_at_end(&speed, untrusted),
-            // The arc itself may be short enough to be trusted.
+            // The arc may be short enough for the second-order series.
             (_, Err(_)) => {}
         }
     }
-    // Not `>`: a NaN must not pass.
+    // Not `>`, so that a NaN is rejected.
     if !(correction.abs() <= CORRECTION_MAX) {
         return Err(Fault::new(FaultKind::ParameterBackwards, correction));
     }
@@ -161,7 +161,7 @@ pub(crate) fn solve(
         let covered = arc_over(surface, from, start, &end, guess);
         let (Ok(length) | Err(length)) = covered;
         let correction = path_of(arc - length, &end);
-        // Not `>`: a NaN must not pass.
+        // Not `>`, so that a NaN is rejected.
         if covered.is_err() || !(correction.abs() <= CORRECTED_MAX * guess) {
             return Err(refused(guess + correction));
         }
@@ -170,7 +170,7 @@ pub(crate) fn solve(
             break;
         }
     }
-    // The guess was short of the patch's end, and the arc is not.
+    // The starting value was before the patch's end; the arc ends beyond it.
     if guess >= room && end.is_none() {
         match to_end()? {
             (_, Ok(covered)) if covered <= arc => return Ok(Reach::Beyond(covered)),
@@ -181,7 +181,7 @@ pub(crate) fn solve(
     Ok(Reach::Within(from.saturating_add(fraction_from_f32(guess))))
 }
 
-/// The path of a short arc, to second order, from where the parametrisation is `end`.
+/// The path fraction of a short arc, to second order, from the parametrisation `end`.
 fn path_of(arc: f32, end: &PathSpeed) -> f32 {
     let more = arc * end.inv_speed;
     more - 0.5 * end.log_speed_derivative * more * more

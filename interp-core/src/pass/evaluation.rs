@@ -1,4 +1,4 @@
-//! The one evaluation of a patch on a pass, used by the run, the look-ahead, the links and the public
+//! Evaluation of a patch on a pass, used by the run, the look-ahead, the links and the public
 //! [`crate::Interpolator::evaluate`]: contact, fit, cutter location.
 
 use crate::fault::Result;
@@ -6,11 +6,11 @@ use crate::pass::offset::{Located, check_fit};
 use crate::pass::patch::Patch;
 use crate::surface::{Contact, Pass};
 
-/// Least z of the unit normal towards the tool at which a surface counts as facing up, or sideways at most: 0 less the noise of a normal.
+/// Least z of the unit normal towards the tool at which a surface counts as facing up or sideways: 0 minus the rounding error of a normal.
 const UP_MIN: f32 = -2e-6;
 
 impl Patch {
-    /// Contact, fit and cutter location at a fraction of the patch, in the direction of travel, by a pass of this patch's surface. Inlined, so that the
+    /// Contact, fit and cutter location at a fraction of the patch, in the direction of travel, on `pass`, the patch's surface. Inlined, so that the
     /// sample path has one copy for each kind of pass.
     ///
     /// # Errors
@@ -32,7 +32,7 @@ impl Patch {
         self.evaluate_on(&self.surface, fraction)
     }
 
-    /// Whether the surface faces up at a contact with this offset, so that the tool can retract from it upwards.
+    /// Whether the surface faces up at a contact with this offset, so that the tool can retract upwards.
     pub(crate) fn faces_up(&self, offset: [i32; 3]) -> bool {
         let [_, _, z] = self.ball.normal(offset);
         z > UP_MIN

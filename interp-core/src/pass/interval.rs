@@ -1,25 +1,25 @@
 //! Step 4: from the scallop limit to the path interval (Lo 1998, eqns 10 and 11).
 //!
 //! With k the normal curvature across the path towards the tool and c = -k, the step-over along the surface is
-//! `l = sqrt(8 r h / (1 + r c))`, and the interval of the side parameter `l / |(N x t) . S_side|`. With the lateral speed inside,
-//! `interval^2 = 8 r h / (lateral^2 - r lateral^2 k)`. A pass wants the least interval of all its samples: a sample yields
-//! [`Sample::inv_interval_sq`](crate::Sample::inv_interval_sq), `1 / interval^2`, which is a product, and root and quotient are
-//! taken once a pass.
+//! `l = sqrt(8 r h / (1 + r c))`, and the interval of the side parameter `l / |(N x t) . S_side|`. With the lateral speed under the root,
+//! `interval^2 = 8 r h / (lateral^2 - r lateral^2 k)`. The interval of a pass is the minimum over its samples: a sample yields
+//! [`Sample::inv_interval_sq`](crate::Sample::inv_interval_sq), `1 / interval^2`, which takes multiplications only; the root and the quotient are
+//! computed once per pass.
 
 use crate::surface::Contact;
 
 /// The candidates of the path interval for one ball and scallop limit on one patch.
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct Interval {
-    /// 1 / (8 r h), per units^2, over the square of the side span's width.
+    /// 1 / (8 r h), units^-2, divided by the square of the side span's width.
     factor: f32,
 }
 
 impl Interval {
-    /// No limit yet.
+    /// No patch yet.
     pub(crate) const NONE: Self = Self { factor: 0.0 };
 
-    /// For a ball and a scallop limit, mm, on a patch with this number of units a mm, in a span of this width.
+    /// For a ball and a scallop limit, mm, on a patch with this number of units per mm, in a span of this width.
     pub(crate) fn new(radius_mm: f32, scallop_mm: f32, units_per_mm: f32, width: f32) -> Self {
         let span = units_per_mm * width;
         Self {
@@ -27,8 +27,8 @@ impl Interval {
         }
     }
 
-    /// Inverse square interval at a contact that the ball fits, in the side parameter's units; 0 at a pole, where the side direction moves
-    /// nothing.
+    /// Inverse square interval at a contact that the ball fits, in the side parameter's units; 0 at a pole, where the side derivative is
+    /// zero.
     #[inline(always)]
     pub(crate) fn inv_interval_sq(&self, contact: &Contact) -> f32 {
         contact.across * contact.gauge * self.factor
@@ -40,7 +40,7 @@ mod tests {
     use super::*;
     use crate::sample::interval_of;
 
-    /// On a cylinder of radius R, machined lengthwise, the exact step-over is known: two balls on its outside meet at the
+    /// On a cylinder of radius R, machined lengthwise, the step-over has a closed form: two balls on its outside meet at the
     /// scallop height h where the centres' angle a obeys (R + h)^2 + r^2 ... ; to first order sqrt(8 r h R/(R + r)).
     #[test]
     fn first_order_of_the_cylinder() {

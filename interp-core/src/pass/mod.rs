@@ -1,6 +1,6 @@
 //! A pass: from one cutter contact to the next, from contact to cutter location, and from pass to pass.
 //!
-//! In the order of a sample's way:
+//! In the order of the computation of a sample:
 //!
 //! | file | holds |
 //! |---|---|
@@ -8,11 +8,10 @@
 //! | [`patch`], [`buffer`] | the patch at the pass's side parameter; the current patch and the next one |
 //! | [`contact`] | the step along the pass at the commanded feed |
 //! | [`offset`], [`evaluation`] | fit of the ball and cutter location; contact, fit and location in one call |
-//! | [`interval`], [`across`] | candidate of the path interval at a sample; the step-over that a pass allows |
+//! | [`interval`], [`step_over`] | candidate of the path interval at a sample; the step-over that a pass allows |
 //! | [`schedule`] | the next pass |
 //! | [`run`] | chains them |
 
-pub(crate) mod across;
 pub(crate) mod buffer;
 pub(crate) mod contact;
 mod evaluation;
@@ -22,3 +21,4 @@ pub(crate) mod patch;
 pub(crate) mod position;
 pub(crate) mod run;
 pub(crate) mod schedule;
+pub(crate) mod step_over;

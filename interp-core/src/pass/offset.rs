@@ -4,25 +4,25 @@ use crate::fault::{Fault, FaultKind, Result};
 use crate::math::arith::{add_product, power_of_two, q30_to_f32, sqrt, truncated, whole_q30};
 use crate::surface::{Contact, OffsetUnits};
 
-/// Least clearance between ball and surface, as 1 - r k: the f32 curvature is good to a few 1e-6, so a ball that is within 1e-5
-/// of the surface's own radius counts as not fitting.
+/// Least clearance between ball and surface, as 1 - r k: the error of the f32 curvature is a few 1e-6, so a ball whose radius is within 1e-5
+/// of the surface's radius of curvature counts as not fitting.
 const ROOM_MIN: f32 = 1e-5;
 
-/// Below this lateral speed^2 over path speed^2 a contact is at a pole, where the side direction says nothing about
-/// curvature; the neighbouring samples do.
+/// Below this lateral speed^2 over path speed^2 a contact is at a pole, where the side direction does not determine the
+/// curvature; the adjacent samples do.
 const POLE_MIN: f32 = 1e-10;
 
 /// Cosine between the normals of neighbouring samples (120 degrees) below which the surface has folded over in between.
-/// A fold turns the normal by 180 degrees less what the surface bends on the way; what bends by 120 degrees without a fold
-/// has a radius below the scallop height.
+/// A fold turns the normal by 180 degrees less the turn of the surface between the samples; a surface that turns by 120 degrees without a fold
+/// has a radius of curvature below the scallop height.
 const FOLD_COSINE: f32 = -0.5;
 
-/// From contact to cutter location on one patch.
+/// Offset from contact to cutter location on one patch.
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct Locator {
-    /// Least upper word of the product of two neighbours' offsets.
+    /// Minimum upper word of the scalar product of two adjacent offsets.
     fold_min: i32,
-    /// The patch's unit and the offsets', in units of 2^-30 nm.
+    /// The patch's unit and the offset's unit, in units of 2^-30 nm.
     unit: i32,
     offset_unit: i32,
 }
@@ -52,7 +52,7 @@ impl Locator {
         }
     }
 
-    /// Whether the product of two neighbours' offsets says that the surface has folded over between them.
+    /// Whether the surface has folded over between two samples, by the scalar product of their offsets.
     #[inline(always)]
     pub(crate) const fn folds(&self, product: i32) -> bool {
         product < self.fold_min
@@ -66,7 +66,7 @@ impl Locator {
     pub(crate) fn locate(&self, contact: &Contact, origin: &[i64; 3]) -> Result<Located> {
         let ([x, y, z], [ox, oy, oz]) = (contact.position, contact.offset);
         let [x0, y0, z0] = *origin;
-        // Neither sum reaches 2^63: they are of the origin, 2^61, the position, 2^61, and the offset, 2^60.
+        // No sum reaches 2^63: the origin is below 2^61, the position below 2^61, the offset below 2^60.
         let axis = |origin: i64, position: i32, offset: i32| {
             let contact = add_product(origin, position, self.unit);
             let ((cc, cc_excess), (cl, cl_excess)) = (
@@ -102,7 +102,7 @@ impl Locator {
     }
 }
 
-/// The ball touches the surface in this point alone, up to second order: with t along the path and d across it,
+/// Checks that, to second order, the ball touches the surface only in this point: with t along the path and d across it,
 /// `I - r II` is positive definite, so that no principal curvature towards the tool reaches 1/r.
 ///
 /// # Errors
@@ -128,7 +128,7 @@ pub(crate) fn origin_q30(origin_nm: [i32; 3]) -> [i64; 3] {
     origin_nm.map(|nm| (i64::from(nm) << 30) + (1 << 29))
 }
 
-/// The uncommon end of [`check_fit`]: a pole, or the fault with its value.
+/// The rare branch of [`check_fit`]: a pole, or the fault with its value.
 #[cold]
 #[inline(never)]
 fn explain_fit(along: f32, across: f32, twist_squared: f32, lateral: f32, speed_squared: f32) -> Result<()> {

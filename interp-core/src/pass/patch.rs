@@ -1,4 +1,4 @@
-//! The patch that a pass is on: the surface at the pass's side parameter, with ball, feed and scallop limit in its units.
+//! A patch on a pass: the surface at the pass's side parameter, with ball, feed and scallop limit in the patch's units.
 
 use crate::fault::Result;
 use crate::job::program::Job;
@@ -13,22 +13,22 @@ use crate::surface::{
     RATIONAL_WORDS, REVOLVED_WORDS, Surface, split_patch, split_revolved,
 };
 
-/// A patch on a pass. Units are 2^-shift nm of the patch.
+/// A patch on a pass. Units are the patch's, 2^-shift nm.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Patch {
     pub(crate) surface: Surface,
     pub(crate) ball: Ball,
     pub(crate) locator: Locator,
     pub(crate) interval: Interval,
-    /// Units of 2^-30 nm, see [`origin_q30`].
+    /// Origin, units of 2^-30 nm, see [`origin_q30`].
     pub(crate) origin: [i64; 3],
     /// One period's arc, units.
     pub(crate) arc: f32,
-    /// Units a mm.
+    /// Units per mm.
     pub(crate) per_mm: f32,
-    /// The pass is a single point here.
+    /// The pass degenerates to a point on this patch.
     pub(crate) point: bool,
-    /// The parametrisation at start and end, once [`Self::find_ends`] has it.
+    /// The parametrisation at start and end, once [`Self::find_ends`] was called.
     ends: Option<[PathSpeed; 2]>,
 }
 
@@ -63,7 +63,7 @@ impl Patch {
         } else {
             -1.0
         };
-        // `path x side` turns round with the path, but for a circle, which is the same both ways.
+        // `path x side` changes its sign with the direction of travel, except on a circle, whose normal is independent of it.
         let sign = if reversed && job.header.kind != SurfaceKind::RevolvedAroundAxis {
             -tool
         } else {
@@ -100,7 +100,7 @@ impl Patch {
         Ok(())
     }
 
-    /// Finds the parametrisation at both ends, and keeps it for [`Self::start`] and [`Self::end`].
+    /// Computes the parametrisation at both ends, and stores it for [`Self::start`] and [`Self::end`].
     pub(crate) fn find_ends(&mut self) {
         self.ends = Some([self.start(), self.end()]);
     }
@@ -110,7 +110,7 @@ impl Patch {
         self.ends.is_some()
     }
 
-    /// The parametrisation where the patch begins, in the direction of travel.
+    /// The parametrisation at the patch's start, in the direction of travel.
     pub(crate) fn start(&self) -> PathSpeed {
         match self.ends {
             Some([start, _]) => start,
@@ -118,7 +118,7 @@ impl Patch {
         }
     }
 
-    /// The parametrisation where it ends.
+    /// The parametrisation at the patch's end, in the direction of travel.
     pub(crate) fn end(&self) -> PathSpeed {
         match self.ends {
             Some([_, end]) => end,
@@ -126,7 +126,7 @@ impl Patch {
         }
     }
 
-    /// A patch of a grid, with as many blocks as it has coordinates.
+    /// A patch of a grid, with one block per coordinate.
     fn collapse_grid(&mut self, job: &Job<'_>, words: &[i32], side_span: u16, sign: f32, at: &IsoLine) {
         let (origin_nm, shift, edges, blocks) = split_patch(words);
         self.origin = origin_q30(origin_nm);

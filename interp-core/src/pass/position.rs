@@ -1,8 +1,8 @@
-//! Where a pass runs, and which patch of it the tool is on.
+//! Side parameter and direction of a pass, and the current patch on the pass.
 
 use crate::sample::SpanParameter;
 
-/// Where a pass runs, and which patch of it.
+/// Side parameter and direction of a pass, and a patch on the pass.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct PassPosition {
     pub(crate) side: SpanParameter,
@@ -12,7 +12,7 @@ pub(crate) struct PassPosition {
 }
 
 impl PassPosition {
-    /// The next patch along the pass, if there is one.
+    /// The position of the next patch along the pass, if there is one.
     pub(crate) fn next(self, spans: u16) -> Option<Self> {
         let span = if self.reversed {
             self.span.checked_sub(1)

@@ -4,37 +4,37 @@ use crate::fault::{Fault, FaultKind, Result};
 use crate::job::program::Job;
 use crate::job::{Pattern, Spacing};
 use crate::math::arith::{advanced, dot_hi, fraction_to_f32};
-use crate::pass::across::{self, PassMaximum, StepOverEstimator};
 use crate::pass::buffer::PatchBuffer;
 use crate::pass::contact::{self, Reach};
 use crate::pass::patch::Patch;
 use crate::pass::position::PassPosition;
 use crate::pass::schedule;
+use crate::pass::step_over::{self, PassMaximum, StepOverEstimator};
 use crate::sample::{Sample, SpanParameter, interval_of};
 use crate::surface::{AnyPass, Pass, PathSpeed};
 
-/// Patch boundaries that one period's arc may cross. One is enough for every patch that is longer than the arc; a second
+/// Patch boundaries that one period's arc may cross. One is enough where every patch is longer than the arc; a second
 /// crossing would add its cost to the worst-case tick.
 const CROSSINGS_MAX: u8 = 1;
 
-/// Step of the parameter on a pole: 16 to a span. Between two the speed of the side lines, a rational cubic of the path
-/// parameter, changes by a small part of itself.
+/// Step of the parameter on a pole: 16 per span. Between two steps the speed of the side lines, a rational cubic of the path
+/// parameter, changes little.
 const POLE_STEP: u64 = 1 << 60;
 
-/// The work of the next tick.
+/// The task of the next tick.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Next {
-    /// Begin the pass at the current side place.
+    /// Begin the pass at the current side parameter.
     Pass,
-    /// One period's arc further.
+    /// Advance by one period's arc.
     Along,
     /// Find the next pass, and begin it.
     Over,
-    /// Nothing: the last sample is out.
+    /// None: the last sample was emitted.
     End,
 }
 
-/// Where the run is.
+/// Position and progress of the run.
 #[derive(Clone, Copy, Debug)]
 struct Travel {
     next: Next,
@@ -43,12 +43,12 @@ struct Travel {
     span: u16,
     /// Fraction of the span, in the direction of travel.
     fraction: u64,
-    /// The parametrisation at the last sample, and its logarithmic speed derivative at the one before; NaN where that is on another patch.
+    /// The parametrisation at the last sample, and the logarithmic speed derivative at the sample before; NaN where that is on another patch.
     path: PathSpeed,
     log_speed_derivative_before: f32,
     /// r N at the last sample, in the ball's units.
     offset: [i32; 3],
-    /// Greatest inverse square interval of the pass, and the surface's shape there, see [`PassMaximum`].
+    /// Maximum inverse square interval of the pass, with the surface's curvature at that sample; see [`PassMaximum`].
     max_inv_interval_sq: f32,
     shape: [f32; 2],
     /// Samples so far.
@@ -57,7 +57,7 @@ struct Travel {
     side: SpanParameter,
 }
 
-/// A run: the travel, and the patches that it is on.
+/// A run: the travel and the patch buffer.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Run {
     travel: Travel,
@@ -65,9 +65,9 @@ pub(crate) struct Run {
     step_over_estimator: StepOverEstimator,
     /// r N at the pass's first sample.
     first_offset: [i32; 3],
-    /// Least interval of the pass that was finished last, in units of the side parameter.
+    /// Minimum interval of the last finished pass, in units of the side parameter.
     last_interval: f32,
-    /// How far from it the next pass lies.
+    /// Step-over from that pass to the next, in units of the side parameter.
     step_over: f32,
     /// Feed factor of the last step along the pass.
     last_feed_factor: f32,
@@ -101,7 +101,7 @@ impl Travel {
         }
     }
 
-    /// The patch that the run is on.
+    /// The current patch.
     const fn position(&self) -> PassPosition {
         PassPosition {
             side: self.side,
@@ -110,8 +110,8 @@ impl Travel {
         }
     }
 
-    /// Steps 2 to 4 at the place where the run now is. Nothing of `last` changes if there is a fault. Not inlined: a function for
-    /// each kind of surface saves no more registers than that kind needs.
+    /// Steps 2 to 4 at the run's position. A fault leaves `last` unchanged. Not inlined: a separate function for
+    /// each kind of surface saves only the registers that the kind uses.
     #[inline(never)]
     fn sample<P: Pass>(&mut self, pass: &P, patch: &Patch, last: &mut Sample) -> Result<()> {
         let (contact, located) = patch.evaluate_on(pass, self.fraction)?;
@@ -143,7 +143,7 @@ fn folded() -> Fault {
 }
 
 impl Run {
-    /// Before the first sample.
+    /// State before the first sample.
     pub(crate) const START: Self = Self {
         travel: Travel::START,
         buffer: PatchBuffer::START,
@@ -154,14 +154,14 @@ impl Run {
         last_feed_factor: 0.0,
     };
 
-    /// Back to the start.
+    /// Resets to the start.
     pub(crate) fn restart(&mut self) {
         self.travel = Travel::START;
         self.step_over_estimator.restart();
         self.last_interval = f32::INFINITY;
     }
 
-    /// Pass, and where the tool is on the path and the side parameter, in the surface's own direction.
+    /// Pass, path and side parameter of the tool, in the surface's own direction.
     pub(crate) const fn surface_position(&self) -> (u32, SpanParameter, SpanParameter) {
         let travel = &self.travel;
         let path = SpanParameter {
@@ -171,7 +171,7 @@ impl Run {
         (travel.pass, path, travel.side)
     }
 
-    /// Least path interval of the pass that was finished last.
+    /// Minimum path interval of the last finished pass.
     pub(crate) const fn last_interval(&self) -> f32 {
         self.last_interval
     }
@@ -181,10 +181,10 @@ impl Run {
         self.travel.next == Next::Along
     }
 
-    /// The next sample, into `last`; false when the last is out.
+    /// Writes the next sample into `last`; false after the last sample.
     ///
     /// # Errors
-    /// The fault that stops the run; `last` is as it was.
+    /// The fault that stops the run; `last` is unchanged.
     #[inline(always)]
     pub(crate) fn advance(&mut self, job: &Job<'_>, last: &mut Sample) -> Result<bool> {
         let travel = &mut self.travel;
@@ -199,7 +199,7 @@ impl Run {
                 self.sample(last)?;
                 if self.buffer.has_work() {
                     self.buffer.work(job, &self.travel.position());
-                } else if self.travel.ticks % across::EVERY == 1 {
+                } else if self.travel.ticks % step_over::EVERY == 1 {
                     self.estimate_step_over(job);
                 }
                 return Ok(true);
@@ -208,7 +208,7 @@ impl Run {
         self.advance_far(job, 1.0, last)
     }
 
-    /// The next sample, when it is not just a small step further: `feed_factor` of a period's arc along the pass, or the next pass.
+    /// The next sample where the short path of [`Self::advance`] does not apply: `feed_factor` of a period's arc along the pass, or the next pass.
     ///
     /// # Errors
     /// As [`Self::advance`].
@@ -245,7 +245,7 @@ impl Run {
         Ok(true)
     }
 
-    /// Enters this pass at this side parameter: its first patch is collapsed, and the tool stays where it is.
+    /// Collapses the first patch of this pass at this side parameter. The tool does not move.
     ///
     /// # Errors
     /// As [`Self::advance`].
@@ -257,7 +257,7 @@ impl Run {
         self.begin_pass(job)
     }
 
-    /// Begins the pass that was entered, and whose least interval is known: its first sample.
+    /// Emits the first sample of the pass that was entered; its minimum interval is known from the look-ahead.
     ///
     /// # Errors
     /// As [`Self::advance`].
@@ -270,13 +270,13 @@ impl Run {
         Ok(())
     }
 
-    /// `feed_factor` of a period's arc along the pass; whether that was little work.
+    /// Advances by `feed_factor` of a period's arc along the pass; returns whether the tick has time left for preparation.
     ///
     /// # Errors
     /// As [`Self::advance`].
     pub(crate) fn move_by(&mut self, job: &Job<'_>, feed_factor: f32, last: &mut Sample) -> Result<bool> {
         let travel = &mut self.travel;
-        // The series' third term is for steps of one length: the change of the last one is scaled to this.
+        // The third-order term assumes equal steps: the change over the last step is scaled to this one.
         let change = (travel.path.log_speed_derivative - travel.log_speed_derivative_before)
             * (feed_factor / self.last_feed_factor);
         let before = travel.path.log_speed_derivative - change;
@@ -300,10 +300,10 @@ impl Run {
         Ok(false)
     }
 
-    /// To the end of the pass, which is here up to rounding.
+    /// Moves to the end of the pass, which differs from the position by rounding only.
     ///
     /// # Errors
-    /// As [`Self::advance`]; [`FaultKind::PatchTooShort`] where a whole patch is still ahead.
+    /// As [`Self::advance`]; [`FaultKind::PatchTooShort`] where a whole patch is still left.
     pub(crate) fn finish_pass(&mut self, job: &Job<'_>, last: &mut Sample) -> Result<()> {
         if self.is_along() {
             if self.travel.position().next(job.header.path_spans).is_some() && !self.next_span(job)? {
@@ -318,7 +318,7 @@ impl Run {
         Ok(())
     }
 
-    /// A period in which the tool stands.
+    /// A period at standstill.
     pub(crate) const fn stand(&mut self, last: &mut Sample) {
         last.tick = self.travel.ticks;
         last.feed_mm_s = 0.0;
@@ -329,14 +329,14 @@ impl Run {
     pub(crate) const fn off_surface(&mut self, at_nm: [i32; 3], speed_mm_s: f32, last: &mut Sample) {
         self.stand(last);
         last.feed_mm_s = speed_mm_s;
-        // The sample may still hold the fields of the job before.
+        // The sample may still hold fields of the previous job.
         last.pass = self.travel.pass;
         (last.path, last.side) = (SpanParameter::NONE, SpanParameter::NONE);
         (last.cc_nm, last.cl_nm) = (at_nm, at_nm);
         last.inv_interval_sq = 0.0;
     }
 
-    /// Cell of the pass, for a number of cells per patch; none where the pass is over.
+    /// Cell of the pass at the position, for a number of cells per patch; none where the pass is over.
     pub(crate) fn cell(&self, job: &Job<'_>, cells_per_patch: u16) -> Option<u16> {
         if !self.is_along() {
             return None;
@@ -359,8 +359,8 @@ impl Run {
         u16::try_from(high >> 32).unwrap_or(0)
     }
 
-    /// Arc since the start of the cell, mm, for a number of cells per patch, each this fraction of the patch; none where rounding puts the tool
-    /// before it.
+    /// Arc since the start of the cell, mm, for a number of cells per patch, each this fraction of the patch; none where, by rounding, the position is
+    /// before the cell.
     pub(crate) fn since_station(&self, cells_per_patch: u16, part: u64) -> Option<f32> {
         let travel = &self.travel;
         let start = u64::from(self.cell_of_patch(cells_per_patch)) * part;
@@ -369,12 +369,12 @@ impl Run {
         Some(length * mean / (travel.path.inv_speed * self.buffer.patch().per_mm))
     }
 
-    /// Whether the surface faces up where the tool is, so that the tool can leave it upwards.
+    /// Whether the surface faces up at the tool, so that the tool can retract upwards.
     pub(crate) fn faces_up(&self) -> bool {
         self.buffer.patch().faces_up(self.travel.offset)
     }
 
-    /// The fields of a sample that change seldom.
+    /// Writes the fields of a sample that change only with the pass.
     const fn describe(&self, feed_mm_s: f32, last: &mut Sample) {
         last.pass = self.travel.pass;
         last.path.span = self.travel.span;
@@ -398,7 +398,7 @@ impl Run {
         }
     }
 
-    /// `feed_factor` of a period's arc along the pass, by quadrature, over as many patches as it takes.
+    /// `feed_factor` of a period's arc along the pass, by quadrature, across at most [`CROSSINGS_MAX`] boundaries.
     fn step_far(&mut self, job: &Job<'_>, feed_factor: f32) -> Result<()> {
         let mut rest = feed_factor * job.header.feed_mm_s * job.header.period_s;
         let mut start = self.travel.path;
@@ -427,7 +427,7 @@ impl Run {
         Err(Fault::new(FaultKind::PatchTooShort, rest))
     }
 
-    /// On a pole, the next of its parameters: the tool stands, but the interval that the pass allows differs with the parameter.
+    /// On a pole, advances the path parameter: the tool stands, but the interval that the pass allows depends on the parameter.
     fn step_on_pole(&mut self, job: &Job<'_>) -> Result<()> {
         if let Some(fraction) = self.travel.fraction.checked_add(POLE_STEP) {
             self.travel.fraction = fraction;
@@ -437,7 +437,7 @@ impl Run {
         Ok(())
     }
 
-    /// Goes to the start of the next patch along the pass; false at the pass's end.
+    /// Moves to the start of the next patch along the pass; false at the pass's end.
     fn next_span(&mut self, job: &Job<'_>) -> Result<bool> {
         let travel = &mut self.travel;
         let Some(line) = travel.position().next(job.header.path_spans) else {
@@ -450,7 +450,7 @@ impl Run {
         Ok(true)
     }
 
-    /// Begins the pass at the current side place.
+    /// Begins the pass at the current side parameter.
     fn begin_pass(&mut self, job: &Job<'_>) -> Result<()> {
         let header = job.header;
         let travel = &mut self.travel;
@@ -468,7 +468,7 @@ impl Run {
         self.buffer.begin(job, &travel.position())
     }
 
-    /// One portion of the step-over estimate.
+    /// Executes one task of the step-over estimator.
     #[inline(never)]
     fn estimate_step_over(&mut self, job: &Job<'_>) {
         if job.header.spacing == Spacing::FirstOrder {
@@ -489,7 +489,7 @@ impl Run {
         );
     }
 
-    /// The pass is over: its least interval, and the step to the next one.
+    /// Ends the pass: computes its minimum interval, and the step to the next pass.
     fn close_pass(&mut self, job: &Job<'_>) {
         let Travel {
             max_inv_interval_sq,
@@ -509,8 +509,8 @@ impl Run {
         };
     }
 
-    /// The side place of the next pass; its first sample is a neighbour of the last pass's first, or of its last where the
-    /// passes run to and fro.
+    /// The side parameter of the next pass. Its first sample is adjacent to the last pass's first, or to its last where the
+    /// pattern is zigzag.
     fn step_over(&mut self, job: &Job<'_>) -> Result<()> {
         let travel = &mut self.travel;
         let width = |span| job.side_width(span);
@@ -522,7 +522,7 @@ impl Run {
         Ok(())
     }
 
-    /// The run is exactly at the end of the pass.
+    /// Whether the run is exactly at the end of the pass.
     fn end_pass(&mut self, job: &Job<'_>) {
         self.travel.fraction = u64::MAX;
         let last = schedule::is_last(self.travel.side, job.header.side_spans);

@@ -5,12 +5,12 @@ use crate::fault::{Fault, FaultKind, Result};
 use crate::math::arith::{fraction_32, fraction_from_f32, fraction_to_f32};
 use crate::sample::SpanParameter;
 
-/// Boundaries between side spans that an interval reaches over at most, so that the walk is bounded; one that reaches further
-/// ends on the last of them: nearer than the scallop asks for, where patches are that much narrower than it.
+/// Maximum side span boundaries that an interval crosses, which bounds the loop. A longer interval
+/// ends on the last of them, closer than the scallop limit requires.
 const WALK_MAX: u16 = 16;
 
-/// The next pass's side parameter, `interval` (in units of the side parameter) further; the end of the last span at most.
-/// Fractions are kept to 2^-32, so that the reported parameter is the one that is used. `width` gives a span's
+/// The next pass's side parameter, `interval` (in units of the side parameter) beyond `from`, at most the end of the last span.
+/// Fractions are truncated to 2^-32, so that the reported parameter is the one that is used. `width` returns a span's
 /// width in units of the side parameter.
 ///
 /// # Errors
@@ -71,7 +71,7 @@ pub(crate) fn apart(from: SpanParameter, to: SpanParameter, width: impl Fn(u16) 
     sum
 }
 
-/// Whether a pass there is the last.
+/// Whether a pass at this side parameter is the last.
 pub(crate) fn is_last(side: SpanParameter, spans: u16) -> bool {
     side.span + 1 >= spans && side.fraction == u64::MAX
 }
@@ -120,7 +120,7 @@ mod tests {
             next_side(at(1, 0.5), 1e-12, 4, width).unwrap_err().kind,
             FaultKind::IntervalTooSmall
         );
-        // Over at most WALK_MAX boundaries, and the last pass lies at the end all the same.
+        // At most WALK_MAX boundaries per step, and the last pass still lies at the end.
         let even = |_| 1.0;
         let near = next_side(at(2, 0.5), f32::INFINITY, 40, even).unwrap();
         assert_eq!(near, at(2 + WALK_MAX, 0.0));

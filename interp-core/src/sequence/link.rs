@@ -1,5 +1,5 @@
-//! Links from pass to pass: straight moves off the surface, or a step-over along the boundary on the surface. Each is a path of its own,
-//! followed from standstill to standstill by the same profile as the passes.
+//! Links from pass to pass: straight moves off the surface, or a step-over along the boundary on the surface. Each is a separate path,
+//! traversed from standstill to standstill with the same speed profile as the passes.
 
 use crate::fault::{Fault, FaultKind, Result};
 use crate::feed::QUANTA_PER_MM;
@@ -15,14 +15,14 @@ use crate::pass::position::PassPosition;
 use crate::pass::schedule;
 use crate::sample::SpanParameter;
 
-/// Cells of a step-over along the boundary.
+/// Look-ahead cells of a step-over along the boundary.
 const STEP_OVER_CELLS: u16 = 8;
 
-/// Share of the jerk that a step-over uses: it is some tenths of a millimetre long, at the jerk limit all the way, and a cutter location is good
-/// to a nanometre or two, which a third difference multiplies by eight.
+/// Fraction of the jerk limit that a step-over uses: it is some tenths of a millimetre long and at the jerk limit throughout, and a cutter location is rounded
+/// to 1 to 2 nm, which a third difference multiplies by up to eight.
 const JERK_SHARE: f32 = 0.7;
 
-/// A link shorter than this, nm, is none: the rounding of one position computed twice.
+/// Links up to this length, nm, are omitted: the rounding difference of one position computed twice.
 const NOTHING_NM: i64 = 2;
 
 /// A straight move.
@@ -39,8 +39,8 @@ impl StraightMove {
         to: [0; 3],
     };
 
-    /// From point to point, the last `slow_mm` of it no faster than `feed_mm_s`; none where it is too short to be one. The plan is settled, and
-    /// still to be worked on.
+    /// A move from point to point whose last `slow_mm` does not exceed `feed_mm_s`; none where its length is negligible. The filter of the plan is chosen;
+    /// its speeds are still to be computed.
     pub(crate) fn new(
         from: [i32; 3],
         to: [i32; 3],
@@ -90,7 +90,7 @@ impl StraightMove {
         Some((Self { from, to }, speed * period_s * QUANTA_PER_MM))
     }
 
-    /// The position at this progress, quanta.
+    /// The position at this progress, units of 2^-10 nm.
     pub(crate) fn position(&self, progress: i64, plan: &Plan) -> [i32; 3] {
         if progress >= plan.end {
             return self.to;
@@ -98,7 +98,7 @@ impl StraightMove {
         let part = part_q30(progress, plan.end);
         let mut at = self.from;
         for (at, to) in at.iter_mut().zip(&self.to) {
-            // 32 bits times 30.
+            // 32 bits times 30 bits fits 64.
             let apart = i64::from(*to) - i64::from(*at);
             let nm = (apart * part + (1 << 29)) >> 30;
             *at = i32::try_from(i64::from(*at) + nm).unwrap_or(*at);
@@ -112,17 +112,17 @@ impl StraightMove {
 pub(crate) struct BoundaryStepOver {
     from: SpanParameter,
     to: SpanParameter,
-    /// Their distance in the side parameter.
+    /// Distance of the two passes in the side parameter.
     reach: f32,
     /// Path span and direction at the end of the pass.
     line: PassPosition,
-    /// Station that is planned next, and the differences over those before.
+    /// Next station to plan, and the differences over the previous stations.
     station: u16,
     here: Option<Located>,
     stencil: Stencil,
     contact: [i32; 3],
     cell: f32,
-    /// Greatest length of the contact's path over the length in the plan.
+    /// Maximum ratio of the length of the contact's path to the length in the plan.
     contact_ratio: f32,
 }
 
@@ -145,7 +145,7 @@ impl BoundaryStepOver {
         contact_ratio: 1.0,
     };
 
-    /// From one pass, which ends on this patch, to another.
+    /// A step-over from the pass that ends on this patch to another.
     pub(crate) fn new(job: &Job<'_>, line: &PassPosition, to: SpanParameter) -> Self {
         let width = |span| job.side_width(span);
         Self {
@@ -157,7 +157,7 @@ impl BoundaryStepOver {
         }
     }
 
-    /// Contact and centre at this part of the step-over, 0 to 1.
+    /// Contact and ball centre at this fraction of the step-over, 0 to 1.
     ///
     /// # Errors
     /// The fault of the surface there.
@@ -174,8 +174,8 @@ impl BoundaryStepOver {
         Ok(located)
     }
 
-    /// Plans in portions, a station's location or its cell's limits; whether the plan is complete, or `None` where the step-over is too short to be
-    /// one.
+    /// Plans one portion: a station's location or its cell's limits. Returns whether the plan is complete, or `None` where the length of the step-over is
+    /// negligible.
     ///
     /// # Errors
     /// The fault of the surface there.
@@ -226,7 +226,7 @@ impl BoundaryStepOver {
         Ok(Some(false))
     }
 
-    /// Contact and centre at this progress, quanta.
+    /// Contact and ball centre at this progress, units of 2^-10 nm.
     ///
     /// # Errors
     /// The fault of the surface there.
@@ -245,7 +245,7 @@ impl BoundaryStepOver {
         self.locate(job, patch, part)
     }
 
-    /// Speed along the plan per speed of the contact.
+    /// Ratio of the speed along the plan to the contact's speed.
     pub(crate) fn per_contact(&self) -> f32 {
         1.0 / self.contact_ratio
     }
@@ -275,12 +275,12 @@ fn to_mm(nm: i64) -> f32 {
     to_f32(nm) * MM_PER_NM
 }
 
-/// A step-over is short: 24 bits of it resolve less than a nanometre.
+/// A step-over is short, so that 24 bits resolve it to less than 1 nm.
 fn ratio(part: i64, whole: i64) -> f32 {
     to_f32(part) / to_f32(whole)
 }
 
-/// A part of a whole, units of 2^-30: good to 2^-30 of it, a tenth of a nanometre in 100 mm.
+/// A fraction in units of 2^-30, with an error of at most 2^-30: 0.1 nm in 100 mm.
 fn part_q30(part: i64, whole: i64) -> i64 {
     // To 31 bits.
     let shift = 33_u32.saturating_sub(whole.leading_zeros());

@@ -1,7 +1,7 @@
-//! Look-ahead over the next pass while the tool is still on its way: stations in even parts of each patch, in order, give the bounds of the
-//! feed ([`Plan`]), the interval to the pass after it, and whether ball and axes can reach every station.
+//! Look-ahead over the next pass while the tool is still moving on the current one. Stations at equal fractions of each patch, in order, yield the bounds of the
+//! feed ([`Plan`]), the interval to the following pass, and the checks that the ball fits and the axes stay within their travel at every station.
 //!
-//! Stations belong to the surface, not to the samples: holds and overrides do not move the passes.
+//! Stations depend on the surface, not on the samples, so holds and overrides do not change the passes.
 
 use crate::command::OVERRIDE_MAX;
 use crate::fault::{Fault, FaultKind, Result};
@@ -10,23 +10,23 @@ use crate::feed::plan::{CELLS_MOVING, FeedLimits, Plan};
 use crate::job::program::Job;
 use crate::job::{AxisLimits, Pattern, Spacing};
 use crate::math::number::{Bounded, nm_to_mm};
-use crate::pass::across::{PassMaximum, StepOverEstimator};
 use crate::pass::patch::Patch;
 use crate::pass::position::PassPosition;
 use crate::pass::schedule;
+use crate::pass::step_over::{PassMaximum, StepOverEstimator};
 use crate::sample::{SpanParameter, interval_of};
 use crate::surface::{Contact, PathSpeed};
 
-/// Cells that a pass is cut into, as near as whole parts of its patches come to it; no more than [`crate::job::CELLS_MAX`].
+/// Nominal cells of a pass; the number per patch is rounded to an integer. At most [`crate::job::CELLS_MAX`].
 const CELLS_WANTED: u16 = 160;
-/// Cells of a patch at most.
+/// Maximum cells of a patch.
 const CELLS_PER_PATCH_MAX: u16 = 64;
-/// Change of r times a curvature below which it counts as continuous: the noise of f32.
+/// Change of r times a curvature below which the curvature counts as continuous: the rounding error of f32.
 const NO_JUMP: f32 = 4e-6;
-/// Cells before a station that its differences reach over.
+/// Cells before a station over which its differences extend.
 const STENCIL_CELLS: usize = 2;
 
-/// The plan of one pass: its bounds, its ends, and the pass after it.
+/// The plan of one pass: its feed bounds, its ends, and the pass after it.
 #[derive(Clone, Debug)]
 pub(crate) struct PassPlan {
     pub(crate) plan: Plan,
@@ -34,14 +34,14 @@ pub(crate) struct PassPlan {
     pub(crate) side: SpanParameter,
     /// Cells of a patch.
     pub(crate) cells_per_patch: u16,
-    /// Fraction of the patch that each of them is.
+    /// Fraction of the patch per cell.
     pub(crate) cell_fraction: u64,
     /// The pass is a single point.
     pub(crate) point: bool,
     /// Cutter location at start and end, nm, and whether the surface faces up there.
     pub(crate) ends: [[i32; 3]; 2],
     pub(crate) faces_up: [bool; 2],
-    /// Least interval of the pass.
+    /// Minimum interval of the pass.
     pub(crate) interval: f32,
     /// The pass after this one.
     pub(crate) next: Option<SpanParameter>,
@@ -63,32 +63,32 @@ impl PassPlan {
     };
 }
 
-/// The next portion of work.
+/// The next task.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Task {
     Patch,
     Station,
-    /// The differences that end at the station.
+    /// Compute the differences that end at the station.
     Cell,
-    /// The path limits that follow from them.
+    /// Compute the path limits from the differences.
     Limits,
-    /// The cell that ends there.
+    /// Close the cell that ends at the station.
     Add,
-    /// The step-over estimator has this number of evaluations left at the station.
+    /// Run the step-over estimator, with this number of evaluations left at the station.
     Estimate(u8),
     Close,
     Bound,
     Done,
 }
 
-/// Curvatures at the last stations: a jump between patches is told from a bend by them.
+/// Curvatures at the last stations, which distinguish a curvature jump between patches from a continuous change.
 #[derive(Clone, Copy, Debug)]
 struct CurvatureHistory {
     /// 1 - r k along the path and r times the twist, at the last three stations of the patch, the newest first.
     values: [[f32; 2]; 3],
-    /// Lengths between them, mm.
+    /// Lengths between these stations, mm.
     lengths: [f32; 2],
-    /// Slopes at the end of the patch before.
+    /// Slopes at the end of the previous patch.
     slopes: Option<[f32; 2]>,
 }
 
@@ -105,7 +105,7 @@ impl CurvatureHistory {
         self.lengths = [length, self.lengths[0]];
     }
 
-    /// Slopes at the newest (`forwards`) or the oldest of three stations, by their parabola.
+    /// Slopes at the newest (`at_newest`) or the oldest of three stations, by the parabola through them.
     fn slopes(&self, at_newest: bool) -> [f32; 2] {
         let [newest, middle, oldest] = self.values;
         let [h1, h2] = self.lengths.map(|length| length.at_least(1e-9));
@@ -135,9 +135,9 @@ pub(crate) struct Lookahead {
     speed: PathSpeed,
     stencil: Stencil,
     history: CurvatureHistory,
-    /// The station whose cell is to be closed: contact, and centre in nm.
+    /// The station whose cell is to be closed: contact, and ball centre in nm.
     here: Option<(Contact, [i32; 3])>,
-    /// Length of that cell, mm.
+    /// Length of the open cell, mm.
     length: f32,
     /// Path limits at the last station.
     limits: PathLimits,
@@ -145,7 +145,7 @@ pub(crate) struct Lookahead {
 }
 
 impl Lookahead {
-    /// Over no pass.
+    /// No pass yet.
     pub(crate) const START: Self = Self {
         patch: Patch::NONE,
         step_over: StepOverEstimator::START,
@@ -165,7 +165,7 @@ impl Lookahead {
         maximum: PassMaximum::NONE,
     };
 
-    /// Back to before the first pass.
+    /// Resets to the state before the first pass.
     pub(crate) const fn restart(&mut self) {
         self.step_over.restart();
         self.task = Task::Done;
@@ -176,7 +176,7 @@ impl Lookahead {
         matches!(self.task, Task::Done)
     }
 
-    /// Whether the next portion collapses a patch.
+    /// Whether the next task collapses a patch.
     pub(crate) fn makes_patch(&self) -> bool {
         match self.task {
             Task::Patch => true,
@@ -185,7 +185,7 @@ impl Lookahead {
         }
     }
 
-    /// Begins with this pass.
+    /// Begins to plan this pass.
     pub(crate) fn begin(&mut self, job: &Job<'_>, pass: u32, side: SpanParameter, out: &mut PassPlan) {
         let spans = job.header.path_spans;
         let reversed = job.header.pattern == Pattern::Zigzag && pass % 2 == 1;
@@ -209,10 +209,10 @@ impl Lookahead {
         out.next = None;
     }
 
-    /// One portion.
+    /// Executes one task.
     ///
     /// # Errors
-    /// The fault of the surface at the next station; [`FaultKind::SoftLimit`] where it is outside the travel.
+    /// The fault of the surface at the next station; [`FaultKind::SoftLimit`] where the station is outside the travel.
     #[inline(never)]
     pub(crate) fn work(&mut self, job: &Job<'_>, axes: &AxisLimits, out: &mut PassPlan) -> Result<()> {
         self.task = match self.task {
@@ -274,7 +274,7 @@ impl Lookahead {
         u64::from(self.station) * out.cell_fraction
     }
 
-    /// Portions of the step-over estimate at a station: one for each neighbouring line, two where their patches have to be collapsed, and more at
+    /// Evaluations of the step-over estimator at a station: one for each neighbouring line, two where its patch has to be collapsed, and more at
     /// the lines' ends.
     fn estimates(&mut self, job: &Job<'_>, out: &PassPlan) -> Task {
         if job.header.spacing == Spacing::FirstOrder || out.point {
@@ -292,7 +292,7 @@ impl Lookahead {
         self.step_over.work(job, &self.line, &self.patch, fraction, most);
     }
 
-    /// To the next station, the next patch, or the end.
+    /// Advances to the next station, the next patch, or the end.
     fn next_station(&mut self, job: &Job<'_>, out: &PassPlan) -> Task {
         if self.station < out.cells_per_patch {
             self.station += 1;
@@ -332,7 +332,7 @@ impl Lookahead {
         Ok(())
     }
 
-    /// The differences up to the station.
+    /// Computes the differences up to the station.
     fn differences(&mut self, out: &PassPlan) {
         let Some((contact, centre_nm)) = self.here.filter(|_| !out.point) else {
             return;
@@ -346,7 +346,7 @@ impl Lookahead {
         }
     }
 
-    /// The cell up to the station.
+    /// Closes the cell up to the station.
     fn close_cell(&mut self, job: &Job<'_>, axes: &AxisLimits, out: &mut PassPlan) {
         let Some((contact, _)) = self.here.take().filter(|_| !out.point) else {
             return;
@@ -358,7 +358,7 @@ impl Lookahead {
         self.limit_at_jumps(axes, &contact, self.length, &top, out);
     }
 
-    /// Arc from the last station, mm: Hermite's rule of two points.
+    /// Arc from the last station, mm: Hermite's two-point rule.
     fn cell_length(&self, out: &PassPlan, contact: &Contact) -> f32 {
         let length = 1.0 / f32::from(out.cells_per_patch);
         let (first, last) = (1.0 / self.speed.inv_speed, 1.0 / contact.path.inv_speed);
@@ -366,7 +366,7 @@ impl Lookahead {
         length * (0.5 * (first + last) + bow * length * (1.0 / 12.0)) / self.patch.per_mm
     }
 
-    /// Jumps of the curvature from the patch before to this one limit the feed at the boundary; jumps of its slope do so when three stations
+    /// Jumps of the curvature between the previous patch and this one limit the feed at the boundary; jumps of its slope do so once three stations
     /// on this side are known.
     fn limit_at_jumps(
         &mut self,
@@ -414,7 +414,7 @@ impl Lookahead {
         }
     }
 
-    /// Limits the feed over a jump of the path at the end of a cell, `back` cells before the last.
+    /// Limits the feed at a curvature jump at the end of a cell, `back` cells before the last.
     fn limit_at_jump(&self, back: u16, jump: &Jump, axes: &AxisLimits, top: &FeedLimits, out: &mut PassPlan) {
         let square = over_jump(
             jump,
@@ -426,7 +426,7 @@ impl Lookahead {
         out.plan.gate(out.plan.count().saturating_sub(back), square, top);
     }
 
-    /// Completes the pass: filter of the feed, interval, and the next pass.
+    /// Completes the plan: the feed filter, the interval, and the next pass.
     fn close(&mut self, job: &Job<'_>, out: &mut PassPlan) -> Result<()> {
         out.plan.settle(&top(job));
         let header = job.header;
@@ -445,7 +445,7 @@ impl Lookahead {
     }
 }
 
-/// The speeds that a pass is planned for.
+/// The speeds for which a pass is planned.
 pub(crate) fn top(job: &Job<'_>) -> FeedLimits {
     FeedLimits {
         speed: OVERRIDE_MAX * job.header.feed_mm_s,
@@ -479,7 +479,7 @@ fn check_height(axes: &AxisLimits, [_, _, z]: &[i32; 3]) -> Result<()> {
     Ok(())
 }
 
-/// Distance of the parts of two pairs beyond their noise.
+/// Norm of the difference of two pairs, beyond the rounding error.
 fn changed(from: &[f32; 2], to: &[f32; 2], noise: f32) -> [f32; 2] {
     let ([from0, from1], [to0, to1]) = (from, to);
     let apart = |from: &f32, to: &f32| ((to - from).abs() - noise).at_least(0.0);

@@ -1,7 +1,7 @@
 //! The sequence of a job on a machine with limits: approach, passes from standstill to standstill, links, retract.
 //!
-//! While a pass runs, the look-ahead plans the next one, a portion a tick ([`Lookahead`]), in ticks with little other work; where the plan is not
-//! complete in time the tool waits at the end of the pass. [`Profile`] follows every path: a pass, a straight leg off the surface, a step-over along
+//! While a pass runs, the look-ahead plans the next one, one task per tick ([`Lookahead`]), in ticks with little other work; where the plan is not
+//! complete in time the tool waits at the end of the pass. [`Profile`] computes the motion along every path: a pass, a straight leg off the surface, a step-over along
 //! the boundary.
 
 use crate::fault::{Fault, Result};
@@ -17,33 +17,33 @@ use crate::sample::{Sample, SpanParameter};
 use crate::sequence::link::{BoundaryStepOver, StraightMove, check_faces_up};
 use crate::sequence::lookahead::{Lookahead, PassPlan, check_travel, top};
 
-/// Portions of the look-ahead in a tick in which the tool waits for it.
+/// Look-ahead tasks per tick while the tool waits for the plan.
 const PORTIONS_WAITING: u8 = 2;
 
 /// Phase of the sequence.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Phase {
-    /// Waits until the look-ahead has planned the next pass.
+    /// The tool waits until the look-ahead has planned the next pass.
     AwaitPlan,
     /// Plans a step-over along the boundary.
     PlanStepOver,
-    /// Follows it.
+    /// Follows the step-over.
     StepOver,
-    /// Plans a leg, a straight move in the open.
+    /// Plans a leg, a straight move off the surface.
     PlanLeg(Leg),
-    /// Bounds its speed.
+    /// Computes the speed bounds of the leg.
     BoundLeg(Leg),
-    /// Follows it.
+    /// Follows the leg.
     FollowLeg(Leg),
-    /// At the start of the next pass, whose first patch was collapsed: a tick of its own.
+    /// The tool stands at the start of the next pass, whose first patch was collapsed in a separate tick.
     EnterPass,
-    /// On a pass.
+    /// The tool is on a pass.
     FollowPass,
     /// The sequence is over.
     Done,
 }
 
-/// A straight leg off the surface, on the way to the goal.
+/// A straight leg off the surface, towards the goal.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Leg {
     Retract,
@@ -51,25 +51,25 @@ enum Leg {
     Plunge,
 }
 
-/// The goal of the legs.
+/// The goal of a sequence of legs.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Goal {
     /// The start of the next pass.
     Pass,
-    /// Where the first run began.
+    /// The position at which the first run began.
     Home,
-    /// The safe height, above where the tool is.
+    /// The safe height, above the tool's position.
     SafeHeight,
 }
 
 /// Outcome of a tick.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Outcome {
-    /// On a pass.
+    /// The tool is on a pass.
     Pass,
-    /// Between passes.
+    /// The tool is between passes.
     Link,
-    /// The last sample is out.
+    /// The last sample was emitted.
     Finished,
 }
 
@@ -80,16 +80,16 @@ pub(crate) struct Sequencer {
     goal: Goal,
     lookahead: Lookahead,
     plans: [PassPlan; 2],
-    /// The pass that the tool is on, or was, is the second.
+    /// The second plan is that of the current or last pass.
     second: bool,
-    /// The tool has been on a pass since the start.
+    /// Whether the tool has been on a pass since the start.
     on_surface: bool,
-    /// A fault of the next pass, reported when the tool gets there.
+    /// A fault of the next pass, reported when the tool reaches the pass.
     pending: Option<Fault>,
     profile: Profile,
     straight: StraightMove,
     step_over: BoundaryStepOver,
-    /// Programmed speed of a leg or a step-over, quanta a period.
+    /// Programmed speed of a leg or a step-over, units of 2^-10 nm per period.
     usual: f32,
     /// The tool's position, once it is known.
     at: Option<[i32; 3]>,
@@ -97,14 +97,14 @@ pub(crate) struct Sequencer {
     cell: u16,
 }
 
-/// The plan of the pass that the tool is on or was, and of the next.
+/// The plans of the current or last pass, and of the next.
 const fn both(plans: &mut [PassPlan; 2], second: bool) -> (&mut PassPlan, &mut PassPlan) {
     let [one, other] = plans;
     if second { (other, one) } else { (one, other) }
 }
 
 impl Sequencer {
-    /// Before anything.
+    /// State before the first run.
     pub(crate) const START: Self = Self {
         phase: Phase::Done,
         goal: Goal::Pass,
@@ -121,7 +121,7 @@ impl Sequencer {
         cell: 0,
     };
 
-    /// To the beginning of the job, from where the tool is.
+    /// Starts the job from the tool's position.
     pub(crate) fn restart(&mut self, job: &Job<'_>, axes: &AxisLimits) {
         self.at.get_or_insert(axes.home_nm);
         self.phase = Phase::AwaitPlan;
@@ -144,7 +144,7 @@ impl Sequencer {
         self.at = at_nm;
     }
 
-    /// Whether the tool stands, and stays while the commanded speed is 0.
+    /// Whether the tool is at standstill, and stays so while the commanded speed is 0.
     pub(crate) const fn is_at_rest(&self) -> bool {
         match self.phase {
             Phase::StepOver | Phase::FollowLeg(_) | Phase::FollowPass => self.profile.is_at_rest(),
@@ -169,7 +169,7 @@ impl Sequencer {
         self.pending.map(|_| self.lookahead.surface_position(next))
     }
 
-    /// From standstill, retracts to the safe height, and no further. Where the surface does not face up the tool stays.
+    /// Retracts from standstill to the safe height and ends there. Where the surface does not face up the tool stays.
     pub(crate) fn retract(&mut self, run: &Run) {
         let is_free = self.is_link() || run.faces_up();
         self.goal = Goal::SafeHeight;
@@ -180,11 +180,11 @@ impl Sequencer {
         };
     }
 
-    /// One period at this factor of the feed, 0 to 2, into `last`. The phases other than that of a pass are out of line, so that a pass saves no
+    /// One period at this feed factor, 0 to 2, into `last`. The phases off the passes are separate functions, so that a tick on a pass saves no
     /// registers for them.
     ///
     /// # Errors
-    /// The fault that stops the run; `last` is as it was.
+    /// The fault that stops the run; `last` is unchanged.
     #[inline(never)]
     pub(crate) fn tick(
         &mut self,
@@ -222,7 +222,7 @@ impl Sequencer {
             Phase::Done => return Ok(Outcome::Finished),
         }
         self.at = Some(last.cl_nm);
-        // The last sample of a pass is one of it, and so is the first.
+        // The first and the last sample of a pass belong to the pass.
         Ok(if was_link && self.is_link() {
             Outcome::Link
         } else {
@@ -230,11 +230,11 @@ impl Sequencer {
         })
     }
 
-    /// Some portions of the look-ahead, and the next phase when it is complete.
+    /// Executes tasks of the look-ahead, and enters the next phase when the plan is complete.
     #[inline(never)]
     fn await_plan(&mut self, job: &Job<'_>, axes: &AxisLimits) -> Result<()> {
         for _ in 0..PORTIONS_WAITING {
-            // A patch is a tick's work.
+            // Collapsing a patch takes a whole tick.
             let is_patch = self.lookahead.makes_patch();
             self.look_ahead(job, axes);
             if is_patch || self.lookahead.makes_patch() {
@@ -259,7 +259,7 @@ impl Sequencer {
         Ok(())
     }
 
-    /// One portion of the look-ahead.
+    /// Executes one task of the look-ahead.
     fn look_ahead(&mut self, job: &Job<'_>, axes: &AxisLimits) {
         if self.pending.is_some() || self.lookahead.is_done() {
             return;
@@ -268,7 +268,7 @@ impl Sequencer {
         self.pending = self.lookahead.work(job, axes, next).err();
     }
 
-    /// On to the next pass, which begins here.
+    /// Enters the next pass, which begins at the tool's position.
     #[inline(never)]
     fn enter_pass(&mut self, job: &Job<'_>, run: &mut Run, last: &mut Sample) -> Result<()> {
         let (_, next) = both(&mut self.plans, self.second);
@@ -278,7 +278,7 @@ impl Sequencer {
         Ok(())
     }
 
-    /// Its first sample.
+    /// Emits the first sample of the pass.
     #[inline(never)]
     fn begin_pass(&mut self, job: &Job<'_>, run: &mut Run, last: &mut Sample) -> Result<()> {
         let (_, next) = both(&mut self.plans, self.second);
@@ -343,7 +343,7 @@ impl Sequencer {
         Ok(())
     }
 
-    /// Corrects the progress at each station, where the plan knows the arc: errors do not add up from station to station.
+    /// Corrects the progress at each station by the plan's arc, so that errors do not accumulate from station to station.
     fn correct_progress(&mut self, job: &Job<'_>, run: &Run) {
         let (now, _) = both(&mut self.plans, self.second);
         let Some(cell) = run
@@ -400,7 +400,7 @@ impl Sequencer {
         self.after_leg(leg, job, run, last)
     }
 
-    /// After a leg, the next one; after the last, its goal.
+    /// Selects the next leg, or after the last leg the phase at the goal.
     fn after_leg(&mut self, leg: Leg, job: &Job<'_>, run: &mut Run, last: &mut Sample) -> Result<()> {
         self.phase = match (leg, self.goal) {
             (Leg::Retract, Goal::SafeHeight) | (Leg::Plunge, Goal::Home | Goal::SafeHeight) => Phase::Done,
@@ -496,7 +496,7 @@ fn last_patch(job: &Job<'_>, pass: &PassPlan) -> PassPosition {
 
 #[allow(
     clippy::cast_precision_loss,
-    reason = "a step beyond 2^24 quanta, 16 um, needs no last digit"
+    reason = "a step beyond 2^24 units of 2^-10 nm, 16 um, is rounded"
 )]
 const fn as_f32(moved: i32) -> f32 {
     moved as f32

@@ -1,31 +1,31 @@
-//! One axis: its steps of a period, and where in the period their pulses lie.
+//! One axis: its steps in a period, and the slots of their pulses.
 
 use super::scale::Scale;
 use super::{BUFFER_WORDS, SLOTS};
 
-/// Bits of a slot's fraction: 22 leave ten for the slot, so that every number is an index into the buffer.
+/// Bits of a slot's fraction: 22 leave ten for the slot, so that every value is a valid index into the buffer.
 const FRACTION_BITS: u32 = 22;
 
-/// What the arithmetic of times may be off by, 2^-22 slots: 1/2048 slot, against less than 4e-4 by rounding in f32. Taken off, a
-/// step at the very end of a period stays in it.
+/// Error allowance of the time arithmetic, units of 2^-22 slots: 1/2048 slot; f32 rounding is below 4e-4 slots. Subtracted, so that a
+/// step at the end of a period stays in that period.
 const GUARD: u32 = 1 << (FRACTION_BITS - 11);
 
-/// Lengths of what the drive wants, slots.
+/// The drive's timing requirements, slots.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct Timing {
-    /// A pulse; the pause after it is as long at least.
+    /// Pulse length, and minimum pause after a pulse.
     pub(super) pulse: u32,
-    /// From the beginning of a period to the first pulse in a new direction.
+    /// Time from the beginning of a period to the first pulse in a new direction.
     pub(super) setup: u32,
 }
 
 impl Timing {
-    /// From a pulse to the next, at least.
+    /// Minimum distance of two pulses.
     const fn spacing(self) -> u32 {
         2 * self.pulse
     }
 
-    /// Most steps of a period.
+    /// Maximum steps of a period.
     pub(super) const fn steps_max(self) -> u32 {
         match SLOTS.checked_div(self.spacing()) {
             Some(steps) => steps,
@@ -34,7 +34,7 @@ impl Timing {
     }
 }
 
-/// A row of pulses: the first one's place and the distance, in slots with [`FRACTION_BITS`] bits of fraction.
+/// Equidistant pulses: time of the first and distance, in slots with [`FRACTION_BITS`] fraction bits.
 #[derive(Clone, Copy)]
 struct Row {
     first: u32,
@@ -43,17 +43,17 @@ struct Row {
 
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Axis {
-    /// Steps of the position.
+    /// Position, steps.
     target: i32,
-    /// Of the position; see [`Scale`]. Within 0 to `d`, but for [`Scale::hold`] beyond either.
+    /// Remainder of the position; see [`Scale`]. Within 0 to `d`, extended by [`Scale::hold`] at both ends.
     remainder: i64,
-    /// Which way the position made its last step: -1, 1, or 0 where it has made none.
+    /// Direction of the position's last step: -1, 1, or 0 before the first.
     heading: i8,
-    /// Steps that have gone out.
+    /// Steps that were output.
     sent: i32,
-    /// Which way the direction pin points: -1, 1, or 0 where it has not been needed.
+    /// Direction set on the pin: -1, 1, or 0 before the first step.
     pointing: i8,
-    /// Slots of the next period that a last pulse reaches into, and with its pause.
+    /// Slots of the next period that the last pulse occupies, without and with its pause.
     high: u32,
     busy: u32,
 }
@@ -79,7 +79,7 @@ impl Axis {
         self.pointing < 0
     }
 
-    /// The axis stands here.
+    /// Sets the position of the axis, without steps.
     pub(super) fn place(&mut self, scale: &Scale, nm: i32) {
         let (steps, remainder) = scale.divide(scale.d / 2, nm.into());
         self.target = narrow(steps);
@@ -88,7 +88,7 @@ impl Axis {
         self.heading = 0;
     }
 
-    /// One period: adds its pulses to the slots. Yields 0, or the steps asked for where they are too many.
+    /// One period: adds its pulses to the slots. Returns 0, or the commanded steps where they exceed the limit.
     #[inline(always)]
     pub(super) fn step(
         &mut self,
@@ -101,7 +101,7 @@ impl Axis {
         if travel_nm == 0 && self.target == self.sent && self.busy == 0 {
             return 0;
         }
-        // The end of a pulse that began in the last period.
+        // The remainder of a pulse that began in the last period.
         for slot in slots.iter_mut().take(self.high as usize) {
             *slot |= bit;
         }
@@ -137,8 +137,8 @@ impl Axis {
         excess(steps, self.target.saturating_sub(self.sent), timing)
     }
 
-    /// Moves the position, and yields its steps. A single step back is not made before it is [`Scale::hold`] past the
-    /// middle.
+    /// Moves the position, and returns its steps. A single reverse step is made only once the position is [`Scale::hold`] beyond the
+    /// midpoint between two steps.
     #[inline(always)]
     fn advance(&mut self, scale: &Scale, travel_nm: i64) -> i32 {
         let (steps, remainder) = scale.divide(self.remainder, travel_nm);
@@ -156,7 +156,7 @@ impl Axis {
         0
     }
 
-    /// Adds as many of these pulses as fit to the slots, and says how many.
+    /// Adds those of these pulses that fit to the slots, and returns their number.
     #[inline(always)]
     fn fill(
         &mut self,
@@ -188,11 +188,11 @@ impl Axis {
     }
 }
 
-/// Pulses where an even travel crosses the middles between steps. `busy`: slots that are not free at the beginning.
+/// Pulses at the times at which a uniform motion crosses the midpoints between steps. `busy`: occupied slots at the beginning.
 #[inline(always)]
 fn even(scale: &Scale, timing: Timing, from: i64, travel_nm: i64, busy: u32) -> Row {
     let to_first = if travel_nm < 0 { from + 1 } else { scale.d - from };
-    // Relative errors of 2^-24 each: below 4e-4 slots at the period's end.
+    // Relative errors of 2^-24 each are below 4e-4 slots at the period's end.
     #[allow(clippy::cast_precision_loss, reason = "24 bits tell times to 1e-4 of a slot")]
     let (to_first, travel) = (
         to_first.max(0) as f32,
@@ -212,7 +212,7 @@ fn even(scale: &Scale, timing: Timing, from: i64, travel_nm: i64, busy: u32) -> 
     }
 }
 
-/// A number of pulses spread evenly over the free part of the period.
+/// A number of pulses distributed uniformly over the free part of the period.
 #[inline(always)]
 fn spread(timing: Timing, free_from: u32, count: u32) -> Row {
     let first = free_from << FRACTION_BITS;
@@ -232,12 +232,12 @@ fn spread(timing: Timing, free_from: u32, count: u32) -> Row {
     }
 }
 
-/// Adds the bit to the slots of a row.
+/// Sets the bit in the slots of a pulse.
 #[inline(always)]
 fn add(slots: &mut [u32; BUFFER_WORDS], first: u32, distance: u32, count: u32, bit: u32) {
     let mut place = first;
     let mut pulse = || {
-        // Ten bits: always within the buffer, and no check is left of it.
+        // Ten bits are always within the buffer, so the compiler removes the bounds check.
         if let Some(slot) = slots.get_mut((place >> FRACTION_BITS) as usize) {
             *slot |= bit;
         }
@@ -254,7 +254,7 @@ fn add(slots: &mut [u32; BUFFER_WORDS], first: u32, distance: u32, count: u32, b
     }
 }
 
-/// 0, or the steps asked for where the period has too many of them, or too many are owed after it.
+/// 0, or the commanded steps where they exceed the period's limit, or where the steps carried over exceed it.
 #[inline(always)]
 fn excess(steps: i32, owed: i32, timing: Timing) -> u32 {
     let most = timing.steps_max();
@@ -262,7 +262,7 @@ fn excess(steps: i32, owed: i32, timing: Timing) -> u32 {
     if asked > most { asked } else { 0 }
 }
 
-/// Steps fit: the position has 32 bits of nanometres, and a step is two at least.
+/// Steps fit an i32: the position has 32 bits of nanometres, and a step is at least 2 nm.
 #[allow(
     clippy::cast_possible_truncation,
     reason = "the position has 32 bits of nanometres, and a step is two at least"

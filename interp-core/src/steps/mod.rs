@@ -7,24 +7,24 @@
 //!                                     slots of the next period ──► a timer hands one word a slot to the port
 //! ```
 //!
-//! The axes follow one period behind: while a period passes, the tick works out the pulses of the next. Between two samples
-//! the axes move evenly, so a step belongs where that straight line crosses the middle between two step positions; pulses are
-//! even from period to period too, however slow they come.
+//! The axes lag by one period: during a period, the tick computes the pulses of the next. Between two samples
+//! the axes move at constant velocity, so a step is due where that straight line crosses the midpoint between two step positions; pulses are
+//! equidistant across periods too, at any rate.
 //!
 //! # Words
-//! A slot's word goes to a port's set/reset register: set bits in its low half, reset bits in its high half, set winning
-//! where both are given (RM0090, 8.4.7). A slot at rest resets every step pin ([`Steps::rest`]); a pulse adds its set bit to as
-//! many slots as it is long. So a pulse ends by itself, and a buffer that nobody writes holds every pin low.
+//! A slot's word goes to a port's set/reset register: set bits in its low half, reset bits in its high half; set has priority
+//! where both are given (RM0090, 8.4.7). A slot without a pulse resets every step pin ([`Steps::rest`]); a pulse adds its set bit to one slot
+//! per slot of its length. So a pulse ends without further action, and an unwritten buffer holds every pin low.
 //!
-//! # What holds
+//! # Guarantees
 //! - The number of steps is that of the position, rounded to the nearest, at any distance: the position is kept as
-//!   steps and remainder, both integers. The tool may turn without stepping back for [`HOLD_NM`], so that a position that trembles by
-//!   a nanometre where two steps meet does not make the motor tremble.
-//! - A pulse lies within a slot of its place; two pulses of an axis are never nearer than two pulse lengths, over the ends of
-//!   periods too.
+//!   steps and remainder, both integers. A reversal makes no step within [`HOLD_NM`] (hysteresis), so that a position that alternates by
+//!   1 nm at the midpoint between two steps does not make the motor step.
+//! - A pulse lies within one slot of its ideal time; two pulses of an axis are at least two pulse lengths apart, across
+//!   period boundaries too.
 //! - The direction changes between periods, never within a pulse or the pause after it; the first pulse then comes after the
-//!   set-up time. Pulses that no longer fit come in the next period.
-//! - More steps than a period holds are a fault. They are not lost: what does not fit stays owed, and follows.
+//!   set-up time. Pulses that do not fit are output in the next period.
+//! - More steps than a period holds are a fault. They are not lost: steps that do not fit are carried over to the next period.
 
 mod axis;
 mod scale;
@@ -35,53 +35,53 @@ use crate::fault::{Fault, FaultKind, Result};
 use axis::{Axis, Timing};
 use scale::Scale;
 
-/// Slots of a period. 1000 a millisecond are 168 clocks of the 168 MHz timer, a whole number as 800 (210) would be
-/// and 1250 (134.4) would not; with a slot up and a slot down, 500 kHz.
+/// Slots of a period. 1000 a millisecond are 168 clocks of the 168 MHz timer, an integer; so would be 800 (210),
+/// but not 1250 (134.4). With one slot high and one slot low the maximum rate is 500 kHz.
 pub const SLOTS: u32 = 1000;
 
-/// Words of a buffer: as many as ten bits count, so that no index can be out of range. Those from [`SLOTS`] on are never played.
+/// Words of a buffer: 2^10, so that no ten-bit index can be out of range. Words from [`SLOTS`] on are never output.
 pub const BUFFER_WORDS: usize = 1024;
 
-/// Longest pulse, slots: a pulse that begins in the last slot has to end within the buffer.
+/// Maximum pulse length, slots: a pulse that begins in the last slot has to end within the buffer.
 pub const PULSE_SLOTS_MAX: u8 = 24;
 
-/// Slots that the board has for setting the direction pins when a period begins: its interrupt's delay.
+/// Slots at the beginning of a period within which the board sets the direction pins: its interrupt latency.
 pub const TURN_SLOTS: u32 = 16;
 
-/// Longest set-up time of the direction, slots: with [`TURN_SLOTS`] about half the period.
+/// Maximum set-up time of the direction, slots: with [`TURN_SLOTS`] about half the period.
 pub const SETUP_SLOTS_MAX: u16 = 480;
 
-/// How far a position may go back over the middle between two steps before the axis follows, nm. Twice what rounding
-/// makes of a standing tool, and less than any axis shows. A quarter of a step at most.
+/// Hysteresis of a reversal: distance beyond the midpoint between two steps before the axis steps back, nm. Twice the rounding
+/// of a tool at standstill, and below the resolution of any axis. At most a quarter of a step.
 pub const HOLD_NM: u32 = 4;
 
-/// Steps of one axis a millimetre, as an exact fraction.
+/// Steps per millimetre of one axis, as an exact fraction.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct AxisSteps {
     /// Numerator: steps.
     pub steps: u32,
-    /// Denominator: the millimetres of these steps.
+    /// Denominator: the millimetres for this number of steps.
     pub mm: u32,
-    /// Whether the direction pin has the level towards plus that the board's table does not name: the opposite one.
+    /// Whether the direction is inverted: the level towards plus is the opposite of that in the board's table.
     pub inverted: bool,
 }
 
-/// What the axes' drives want. [`StepConfig::check`] makes it usable.
+/// Step scale and pulse timing of the axes' drives. [`StepConfig::check`] validates them.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct StepConfig {
     /// The axes x, y, z.
     pub axes: [AxisSteps; 3],
-    /// Length of a pulse, and least pause after it, in slots: 1 to [`PULSE_SLOTS_MAX`].
+    /// Length of a pulse, and minimum pause after a pulse, slots: 1 to [`PULSE_SLOTS_MAX`].
     pub pulse_slots: u8,
-    /// Slots from a change of direction to the first pulse, at least: at most [`SETUP_SLOTS_MAX`]. The pulse comes so many and
-    /// [`TURN_SLOTS`] after the beginning of the period.
+    /// Minimum slots from a change of direction to the first pulse, 0 to [`SETUP_SLOTS_MAX`]. The first pulse comes at least this number plus
+    /// [`TURN_SLOTS`] slots after the beginning of the period.
     pub setup_slots: u16,
 }
 
-/// Why a [`StepConfig`] cannot be used.
+/// Why a [`StepConfig`] is invalid.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum StepConfigError {
-    /// Steps a millimetre are not within 1/1000 to 500 000.
+    /// The steps per millimetre are outside 1/1000 to 500 000.
     StepsPerMm {
         /// The axis, from 0.
         axis: u8,
@@ -90,9 +90,9 @@ pub enum StepConfigError {
         /// Millimetres.
         mm: u32,
     },
-    /// The pulse's length.
+    /// The pulse length is out of range.
     PulseSlots(u8),
-    /// The set-up time.
+    /// The set-up time is out of range.
     SetupSlots(u16),
 }
 
@@ -117,18 +117,18 @@ impl core::fmt::Display for StepConfigError {
 
 impl core::error::Error for StepConfigError {}
 
-/// A [`StepConfig`] that cannot be wrong, with what the sample path wants of it.
+/// A validated [`StepConfig`], with the values derived for the sample path.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct CheckedSteps {
     scales: [Scale; 3],
-    /// A bit an axis.
+    /// One bit per axis.
     inverted: u8,
     timing: Timing,
 }
 
 impl StepConfig {
     /// Motors of 200 full steps at 16 microsteps with screws of 8 mm lead; pulses of 1 us, and 5 us from a change of direction to
-    /// the next pulse, which is what the slower ones of the usual drives ask for.
+    /// the next pulse, the requirement of the slower common drives.
     pub const DEFAULT: Self = Self {
         axes: [AxisSteps {
             steps: 400,
@@ -139,10 +139,10 @@ impl StepConfig {
         setup_slots: 5,
     };
 
-    /// Checks every value, and prepares. Some thousand cycles: not for the sample path.
+    /// Checks every value, and derives those of the sample path. Takes a few thousand cycles: not for the sample path.
     ///
     /// # Errors
-    /// [`StepConfigError`] as its variants say.
+    /// See [`StepConfigError`].
     pub fn check(&self) -> core::result::Result<CheckedSteps, StepConfigError> {
         if !(1..=PULSE_SLOTS_MAX).contains(&self.pulse_slots) {
             return Err(StepConfigError::PulseSlots(self.pulse_slots));
@@ -170,14 +170,14 @@ impl StepConfig {
 }
 
 impl CheckedSteps {
-    /// Most steps of an axis that a period holds.
+    /// Maximum steps of an axis in a period.
     #[must_use]
     pub const fn steps_max(&self) -> u32 {
         self.timing.steps_max()
     }
 }
 
-/// Three axes' steps: where they are, and what they owe.
+/// Step generator of three axes: positions and steps carried over.
 #[derive(Debug)]
 pub struct Steps {
     checked: CheckedSteps,
@@ -189,7 +189,7 @@ pub struct Steps {
 }
 
 impl Steps {
-    /// AxisLimits at the origin. `pins`: number of each axis's step pin, 0 to 15 (only the low four bits count), all on one port.
+    /// A generator with the axes at the origin. `pins`: number of each axis's step pin, 0 to 15 (only the low four bits count), all on one port.
     #[must_use]
     pub fn new(checked: CheckedSteps, pins: [u8; 3]) -> Self {
         let mut steps = Self {
@@ -202,13 +202,13 @@ impl Steps {
         steps
     }
 
-    /// Other drives, or other settings of them. The axes stand where they are: the position is kept, steps carried over are dropped.
+    /// Changes the settings of the drives. The position is kept; steps carried over are dropped.
     pub fn configure(&mut self, checked: CheckedSteps) {
         self.checked = checked;
         self.place(self.cl_nm);
     }
 
-    /// Says where the axes stand, without a pulse: after homing, or where a job begins that knows no way there.
+    /// Sets the position of the axes without a pulse: after homing, or at the start of a job without an approach.
     pub fn place(&mut self, cl_nm: [i32; 3]) {
         self.cl_nm = cl_nm;
         for ((axis, scale), nm) in self.axes.iter_mut().zip(&self.checked.scales).zip(cl_nm) {
@@ -228,35 +228,35 @@ impl Steps {
         &self.checked
     }
 
-    /// The word of a slot in which nothing happens: every step pin low.
+    /// The word of a slot without a pulse: every step pin low.
     #[must_use]
     pub fn rest(&self) -> u32 {
         let [x, y, z] = self.bits;
         (x | y | z) << 16
     }
 
-    /// Steps that have gone out to each axis, as of the end of the next period.
+    /// Steps output to each axis, as of the end of the next period.
     #[must_use]
     pub fn position(&self) -> [i32; 3] {
         self.axes.each_ref().map(Axis::position)
     }
 
-    /// Axes whose direction pin says minus in the next period, a bit each: those that move towards minus, exchanged where inverted. To be on the
-    /// pins before slot [`TURN_SLOTS`] of it, and not before it begins; which level says minus is the board's.
+    /// Axes whose direction in the next period is minus, one bit each, inverted where the direction is inverted. To be set on the
+    /// pins between the beginning of that period and its slot [`TURN_SLOTS`]; the board's table defines the level for minus.
     #[must_use]
     pub fn directions(&self) -> u8 {
         let [x, y, z] = self.axes.each_ref().map(|axis| u8::from(axis.is_negative()));
         (x | y << 1 | z << 2) ^ self.checked.inverted
     }
 
-    /// The pulses of the next period, in which the axes go to this cutter location. `slots`: all at [`Self::rest`]; gets
-    /// the pulses added.
+    /// The pulses of the next period, in which the axes go to this cutter location. `slots`: all at [`Self::rest`] on entry; receives
+    /// the pulses.
     ///
-    /// Bounded by [`SLOTS`]/2 writes an axis. Call it every period, also where nothing moves: steps carried over follow then.
+    /// Bounded by [`SLOTS`]/2 writes per axis. Call it every period, also at standstill, so that steps carried over are output.
     ///
     /// # Errors
-    /// [`FaultKind::StepRate`] with the steps asked for, where an axis has more than a period holds. As many as fit are in the
-    /// slots, and the rest is owed: stop along the path, and go on calling.
+    /// [`FaultKind::StepRate`] with the commanded steps, where an axis has more than a period holds. The steps that fit are in the
+    /// slots, the others are carried over: stop along the path, and continue to call.
     #[inline(never)]
     pub fn step(&mut self, cl_nm: [i32; 3], slots: &mut [u32; BUFFER_WORDS]) -> Result<()> {
         let mut asked_max = 0;

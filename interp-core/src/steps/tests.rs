@@ -1,26 +1,26 @@
-//! Against an ideal in exact integers: the middles between steps on a straight line from sample to sample.
+//! Compares pulses with ideal times in exact integers: the midpoints between steps on a straight line from sample to sample.
 
 use super::*;
 use std::vec::Vec;
 
-/// Pins of the axes; the port's others are not to be touched.
+/// Step pins of the axes; the other pins of the port must not change.
 const PINS: [u8; 3] = [9, 11, 13];
 
-/// What one axis's pin did.
+/// Record of one axis's step pin.
 #[derive(Clone, Default)]
 struct Pin {
     high: bool,
-    /// Slot of the last edges, counted from the beginning.
+    /// Slots of the last edges, counted from the start.
     rose: Option<u64>,
-    /// Slot at whose beginning the direction was changed last.
+    /// Slot at whose beginning the direction last changed.
     turned: Option<u64>,
     level: bool,
     steps: i64,
-    /// Slots in which it rose in the last period.
+    /// Slots of the rising edges in the last period.
     rises: Vec<u64>,
 }
 
-/// A port that plays the slots, and holds what the drives want: length of pulses, pauses, set-up.
+/// Model of a port that outputs the slots and asserts the drive's timing: pulse length, pause, set-up.
 struct Port {
     steps: Steps,
     slots: [u32; BUFFER_WORDS],
@@ -41,7 +41,7 @@ impl Port {
         }
     }
 
-    /// A period in which the axes go to this position.
+    /// One period in which the axes move to this position.
     fn go(&mut self, cl_nm: [i32; 3]) -> Result<()> {
         let done = self.steps.step(cl_nm, &mut self.slots);
         let begin = self.periods * u64::from(SLOTS);
@@ -70,7 +70,7 @@ impl Port {
         done
     }
 
-    /// Says where the axes stand.
+    /// Sets the position of the axes.
     fn place(&mut self, cl_nm: [i32; 3]) {
         self.steps.place(cl_nm);
         for (pin, position) in self.pins.iter_mut().zip(self.steps.position()) {
@@ -78,7 +78,7 @@ impl Port {
         }
     }
 
-    /// Whether the axes are within half a step (and what a turn may hold back) of a position, in exact integers.
+    /// Whether the axes are within half a step (plus the hysteresis) of a position, in exact integers.
     fn is_at(&self, cl_nm: [i32; 3]) -> bool {
         let each = self.steps.position().into_iter().zip(cl_nm).zip(self.config.axes);
         each.into_iter().all(|((sent, nm), axis)| {
@@ -112,7 +112,7 @@ impl Pin {
     }
 }
 
-/// Numbers without end (xorshift64*).
+/// Pseudo-random numbers (xorshift64*).
 struct Random(u64);
 
 impl Random {
@@ -123,7 +123,7 @@ impl Random {
         (self.0.wrapping_mul(0x2545_f491_4f6c_dd1d) >> 11) % end
     }
 
-    /// From 1 on, of any order of magnitude.
+    /// At least 1, log-uniform.
     fn magnitude(&mut self, bits: u64) -> i64 {
         let order = self.below(bits);
         1 + self.below(1 << order) as i64
@@ -146,7 +146,7 @@ fn config(ratios: [(u32, u32); 3], pulse_slots: u8, setup_slots: u16) -> StepCon
     }
 }
 
-/// Distance of an axis's pulses from their ideal times in this period, thousandths of a slot, at most.
+/// Maximum distance of an axis's pulses from their ideal times in this period, thousandths of a slot.
 fn unevenness(port: &Port, axis: usize, from: i32, to: i32, before: i64) -> i128 {
     let (n, d) = (
         i128::from(port.config.axes[axis].steps),
@@ -156,7 +156,7 @@ fn unevenness(port: &Port, axis: usize, from: i32, to: i32, before: i64) -> i128
     let way = if x1 < x0 { -1 } else { 1 };
     let rises = port.pins[axis].rises.iter().zip(0..);
     let off = rises.map(|(rose, index): (&u64, i128)| {
-        // The middle between this step and the next, and when the line is there; twice everything.
+        // The midpoint between this step and the next, and the time at which the line crosses it; all values doubled.
         let middle = (2 * (i128::from(before) + way * index) + way) * d;
         let rose = 1000 * i128::from(rose - (port.periods - 1) * u64::from(SLOTS)) + 500;
         (rose - 1000 * i128::from(SLOTS) * (middle - x0) / (x1 - x0)).abs()
@@ -164,12 +164,12 @@ fn unevenness(port: &Port, axis: usize, from: i32, to: i32, before: i64) -> i128
     off.max().unwrap_or(0)
 }
 
-/// Half a slot, which is what a slot's width makes of any place, and what f32 adds.
+/// Half a slot, the quantisation error, plus f32 rounding.
 const UNEVENNESS_MAX: i128 = 502;
 
 #[test]
 fn pulses_lie_where_the_line_crosses() {
-    // Steps a millimetre, and speeds in nm a period: from a step in 400 periods to 499 a period.
+    // Steps per millimetre, and speeds in nm per period: from one step in 400 periods to 499 per period.
     let ratios = [(400, 1), (3200, 5), (16_000, 127)];
     let mut random = Random(7);
     for round in 0..60 {
@@ -178,18 +178,18 @@ fn pulses_lie_where_the_line_crosses() {
         let mut port = Port::new(config(ratios, 1, 0));
         let mut at = [-900_000_000, -900_000_000, -900_000_000_i32];
         port.place(at);
-        // The first pulse of all sets the direction, and is spread.
+        // The first period sets the direction; its pulses are distributed.
         at = at.map(|at| at + 10_000);
         port.go(at).unwrap();
         for period in 0..80 {
             for (speed, most) in speed.iter_mut().zip(most) {
                 *speed = match round % 3 {
-                    // even, slow or fast
+                    // constant velocity, slow or fast
                     0 if period == 0 => random.magnitude(19),
                     0 => *speed,
-                    // faster and faster
+                    // accelerating
                     1 => (*speed + random.below(40_000) as i64).min(most),
-                    // any
+                    // arbitrary
                     _ => random.below(most as u64) as i64,
                 };
             }
@@ -211,7 +211,7 @@ fn pulses_lie_where_the_line_crosses() {
 
 #[test]
 fn slow_pulses_are_even_from_period_to_period() {
-    // 2500 nm a step at 7 nm a period: a step in 357 periods.
+    // 2500 nm per step at 7 nm per period: one step in 357 periods.
     for way in [1, -1] {
         let mut port = Port::new(config([(400, 1); 3], 1, 0));
         let mut rises = Vec::new();
@@ -252,7 +252,7 @@ fn too_many_steps_are_a_fault_and_none_is_lost() {
     assert!(!port.is_at(at));
     port.go(at).unwrap();
     assert!(port.is_at(at));
-    // From one end of the travel to the other, over and over the period's room.
+    // From one end of the travel to the other, with up to and beyond the maximum steps per period.
     let far = [i32::MAX, 0, 0];
     port.place([i32::MIN, 0, 0]);
     let steps = 2 * 2_147_483_648_u64 / 2500;
@@ -273,7 +273,7 @@ fn turning_keeps_count_setup_and_pauses_at_every_speed() {
             let to = [steps * 2500, steps * 2500 + 77, -steps * 2500];
             let done = port.go(to);
             let back = port.go([0; 3]);
-            // What the set-up leaves no room for is owed, and follows; a turn in every period at full speed is too much.
+            // Steps displaced by the set-up time are carried over; a reversal in every period at full speed exceeds the limit.
             if 2 * steps <= room {
                 assert!(done.is_ok() && back.is_ok(), "{steps} at {pulse}, {setup}");
             }
@@ -285,7 +285,7 @@ fn turning_keeps_count_setup_and_pauses_at_every_speed() {
     }
 }
 
-/// Walks at random, with any settings; yields the steps made.
+/// Random walk with random settings; returns the number of steps.
 fn walk(random: &mut Random, periods: u32) -> u64 {
     let ratio = |random: &mut Random| match random.below(4) {
         0 => (400, 1),
@@ -320,7 +320,7 @@ fn walk(random: &mut Random, periods: u32) -> u64 {
             .map(|(pin, before)| pin.steps.abs_diff(before));
         made += moved.sum::<u64>();
     }
-    // What is owed follows.
+    // Steps carried over are output.
     for _ in 0..2000 {
         if port.is_at(at) {
             break;
@@ -348,7 +348,7 @@ fn random_walks_lose_no_step_long() {
 
 #[test]
 fn a_thousand_million_steps_are_exact() {
-    // Sums of travels over far more than 10^9 steps, against x n / d in 128 bits.
+    // Sums of travels over far more than 10^9 steps, compared with x n / d in 128 bits.
     let mut random = Random(99);
     for (steps, mm) in [
         (500_000, 1),
@@ -387,7 +387,7 @@ fn pulses_of_a_very_long_way_are_exact() {
     long_way(1_000_000_000);
 }
 
-/// To and fro, nearly at the highest rate, n pulses an axis.
+/// Reciprocating motion near the maximum rate, n pulses per axis.
 fn long_way(pulses: u64) {
     let mut port = Port::new(config([(16_000, 127), (3200, 7), (500_000, 3)], 1, 20));
     let (mut at, mut made) = ([0_i32; 3], 0_u64);
@@ -411,7 +411,7 @@ fn long_way(pulses: u64) {
 
 #[test]
 fn trembling_where_two_steps_meet_makes_no_steps() {
-    // 1250 nm is the middle between steps 0 and 1.
+    // 1250 nm is the midpoint between steps 0 and 1.
     let mut port = Port::new(StepConfig::DEFAULT);
     let mut rises = [0; 3];
     for nm in [0, 1249, 1250, 1249, 1251, 1247, 1250, 1247, 1253] {
@@ -422,7 +422,7 @@ fn trembling_where_two_steps_meet_makes_no_steps() {
     }
     assert_eq!(rises, [1; 3]);
     assert_eq!(port.steps.position(), [1, -1, 1]);
-    // Beyond what is held it does step back, and stays there the same way.
+    // Beyond the hysteresis the axis steps back, and the hysteresis then applies in the other direction.
     port.go([1245, 0, 0]).unwrap();
     port.go([1245, 0, 0]).unwrap();
     assert_eq!(port.pins[0].steps, 0);

@@ -1,4 +1,4 @@
-//! The ball on a patch: its radius in the patch's units, and with it the vector from cutter contact to cutter location.
+//! The ball on a patch: its radius in the patch's units, and the vector from cutter contact to cutter location.
 
 use super::SHIFT_MAX;
 use crate::math::arith::{power_of_two, to_f32, to_top, truncated};
@@ -9,9 +9,9 @@ use crate::math::vec3::Vec3;
 /// 2^30: the same on every patch of a job.
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct Ball {
-    /// r in the offsets' units, with the sign that turns `path x side` towards the tool.
+    /// r in the offsets' units; its sign orients `path x side` towards the tool.
     signed_radius: f32,
-    /// r k |.|^2, units^2, of one count of the upper word of (offset . half second derivative).
+    /// Scale of the upper word of (offset . half second derivative): r k |.|^2, units^2, per count.
     product: f32,
 }
 
@@ -37,13 +37,13 @@ impl OffsetUnits {
 }
 
 impl Ball {
-    /// No ball yet.
+    /// Placeholder before the first patch.
     pub(crate) const NONE: Self = Self {
         signed_radius: 0.0,
         product: 0.0,
     };
 
-    /// The ball with these units; `sign` turns `path x side` towards the tool.
+    /// The ball with these units; `sign` orients `path x side` towards the tool.
     pub(crate) fn new(units: &OffsetUnits, sign: f32) -> Self {
         let change = i32::from(units.shift) - i32::from(units.fine);
         Self {
@@ -52,14 +52,14 @@ impl Ball {
         }
     }
 
-    /// `r N` from a vector along the normal: `vector` times `inverse` is a unit vector. Within a unit.
+    /// `r N` from a vector along the normal: `vector` times `inverse` is a unit vector. Error at most 1 unit.
     #[inline(always)]
     pub(crate) fn offset(&self, vector: Vec3, inverse: f32) -> [i32; 3] {
         let Vec3 { x, y, z } = vector * (self.signed_radius * inverse);
         [truncated(x), truncated(y), truncated(z)]
     }
 
-    /// `r` times a second fundamental form, units^2, of one count of the upper word of (offset . half a second derivative).
+    /// `r` times the second fundamental form, units^2, from the upper word of (offset . half a second derivative).
     #[inline(always)]
     pub(crate) const fn product(&self) -> f32 {
         self.product

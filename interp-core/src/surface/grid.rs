@@ -1,20 +1,20 @@
-//! A patch of a grid on one pass: cubics of the path parameter. The same for every kind of patch, so that the next one takes the
-//! place of the last without being copied.
+//! A patch of a grid on one pass: cubics of the path parameter. One type for every kind of patch, so that the next patch replaces
+//! the last without a copy.
 
 use super::lines::CoordinateCubics;
 use super::pole::Reduced;
 use super::rational::WEIGHT_ONE;
 use super::{Edges, IsoLine};
 
-/// What evaluates the cubics.
+/// The evaluation routine of the cubics.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(crate) enum GridKind {
-    /// A polynomial patch of which nothing is known to vanish.
+    /// A polynomial patch in which no derivative is known to be zero.
     #[default]
     Free,
-    /// Its second side derivative vanishes: ruled across the pass.
+    /// A polynomial patch with zero second side derivative: ruled across the pass.
     Ruled,
-    /// The mixed derivative too: every ruling is the same, and the surface an extrusion of its passes.
+    /// A ruled patch with zero mixed derivative too: the rulings are parallel and equal, an extrusion of its passes.
     Extruded,
     /// A rational patch.
     Rational,
@@ -27,14 +27,14 @@ pub(crate) enum GridKind {
 pub(crate) struct GridPass {
     pub(super) kind: GridKind,
     pub(super) axes: [CoordinateCubics; 3],
-    /// Of a rational patch, or one with a pole.
+    /// The weight of a rational patch or a patch with a pole.
     pub(super) weight: CoordinateCubics,
-    /// Of a patch with a pole.
+    /// The reduced coordinates of a patch with a pole.
     pub(super) reduced: Reduced,
 }
 
 impl GridPass {
-    /// Of no patch yet.
+    /// Placeholder before the first patch.
     pub(crate) const NONE: Self = Self {
         kind: GridKind::Free,
         axes: [CoordinateCubics::NONE; 3],

@@ -40,14 +40,14 @@ impl CoordinateCubics {
     }
 }
 
-/// Negates a coefficient of an odd power, where the pass runs backwards.
+/// Negates the coefficients of odd powers where the pass runs backwards.
 #[inline(always)]
 pub(crate) const fn turn(value: i32, turned: bool) -> i32 {
     let mask = -(turned as i32);
     (value ^ mask).wrapping_sub(mask)
 }
 
-/// A cubic travelled backwards.
+/// A cubic with its parameter reversed.
 pub(crate) const fn turn_cubic([c0, c1, c2, c3]: [i32; 4], turned: bool) -> [i32; 4] {
     [c0, turn(c1, turned), c2, turn(c3, turned)]
 }
@@ -87,10 +87,10 @@ pub(super) fn coefficients<const AXES: usize>(blocks: &[[i32; 16]]) -> [[[i32; 4
     coefficients
 }
 
-/// Units by which a collapsed boundary may miss being a point: the rounding of its coefficients.
+/// Maximum extent of a collapsed boundary, units: the rounding of its coefficients.
 const COLLAPSE_UNITS: i32 = 8;
 
-/// Whether the flagged boundaries of one coordinate are constant along themselves.
+/// Whether one coordinate is constant along the flagged boundaries.
 pub(super) fn collapses(c: &[[i32; 4]; 4], edges: Edges) -> bool {
     let small = |value: i32| value.abs() <= COLLAPSE_UNITS;
     let at = |root: Root, c: &[i32; 4]| cubic(c, if root == Root::Start { i32::MIN } else { i32::MAX });

@@ -2,18 +2,18 @@
 //!
 //! On a pass the side parameter is fixed. A surface kind therefore has two parts:
 //!
-//! * `collapse`, once a pass and patch: the patch at this side parameter becomes a handful of cubics in the path parameter;
-//! * `local`, once a sample: the cubics at a path parameter become a `Local`, whose `contact` is the same for all kinds.
+//! * `collapse`, once per pass and patch: reduces the patch at this side parameter to a few cubics in the path parameter;
+//! * `local`, once per sample: evaluates the cubics at a path parameter into a `Local`, whose `contact` is common to all kinds.
 //!
 //! Positions are fixed point, relative to the patch's own origin, in units of 2^-shift nm, and so are all derivatives (31 bits
-//! instead of 24, one cycle a Horner step instead of two). First derivatives become f32 for lengths and the normal. The
-//! normal times the ball's radius is an integer vector again, which the cutter location needs, and its products with the
+//! instead of 24, one cycle per Horner step instead of two). First derivatives are converted to f32 for lengths and the normal. The
+//! normal times the ball's radius is an integer vector, used for the cutter location; its products with the
 //! second derivatives are r times the second fundamental form. Both parameters are centred, -1/2 to 1/2 over a span.
 //!
-//! **Poles.** Where a boundary collapses into a point, one first derivative vanishes along it. A patch says so by a flag,
+//! **Poles.** Where a boundary collapses into a point, one first derivative vanishes along it. A flag of the patch marks the boundary,
 //! and `collapse` divides that derivative by its root exactly (synthetic division of the polynomial): `A = a Ã`, `B = b B̃`
-//! with scalars a (fixed on a pass) and b (linear along it) that carry the zero. The normal comes from `Ã x B̃`, as exact
-//! at the pole as anywhere, and nothing is divided by a or b unless it is known not to vanish.
+//! with scalars a (fixed on a pass) and b (linear along it) that carry the zero. The normal is computed from `Ã x B̃`, as accurate
+//! at the pole as elsewhere, and no quotient has a or b as divisor unless it is known to be non-zero.
 
 mod ball;
 mod grid;
@@ -40,25 +40,25 @@ use crate::fault::{Fault, FaultKind, Result};
 use crate::math::arith::{dot_hi, fraction_32, inverse_sqrt, power_of_two, sqrt, to_f32};
 use crate::math::vec3::Vec3;
 
-/// Least sine between the two first derivatives (after any flagged zero is divided out) at which a normal is taken.
+/// Least sine between the two first derivatives (after any flagged zero is divided out) at which a normal is computed.
 /// At 1e-3 the f32 cross product still gives the normal to 1e-4 rad; below, [`FaultKind::DegenerateSurface`].
 pub const SINE_MIN: f32 = 1e-3;
 
 /// Square of the tangent of the angle whose sine is [`SINE_MIN`].
 const TANGENT_MIN_SQUARED: f32 = SINE_MIN * SINE_MIN / (1.0 - SINE_MIN * SINE_MIN);
 
-/// Where a pass runs: everything `collapse` needs besides the patch.
+/// Side parameter and direction of a pass: the arguments of `collapse` besides the patch.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct IsoLine {
     /// Side parameter within its span, units of 2^-64.
     pub(crate) fraction: u64,
-    /// The same, centred fixed point.
+    /// The same, centred, fixed point.
     pub(crate) side: i32,
     /// The pass runs against the path parameter.
     pub(crate) reversed: bool,
 }
 
-/// The surface and the ball on it at one point of a pass, as the stages use it. "Per path" and "per side" mean per span fraction;
+/// The surface and the ball on it at one point of a pass, as used by the stages. "Per path" and "per side" mean per span fraction;
 /// g is the factor that a surface kind scales its derivatives by (1, or a part of the weight).
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct Contact {
@@ -84,7 +84,7 @@ pub(crate) struct Contact {
     pub(crate) gauge: f32,
 }
 
-/// The path parametrisation at a point: a step along the path needs no more.
+/// The path parametrisation at a point, sufficient for a step along the path.
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct PathSpeed {
     /// 1/|A|, path per unit.
@@ -94,13 +94,13 @@ pub(crate) struct PathSpeed {
 }
 
 impl PathSpeed {
-    /// Of no point.
+    /// Placeholder before the first point.
     pub(crate) const STILL: Self = Self {
         inv_speed: 0.0,
         log_speed_derivative: 0.0,
     };
 
-    /// From g Ã, half of its derivative, the excess of its logarithmic speed derivative, and g/a.
+    /// From g Ã, half its derivative, the difference of its logarithmic speed derivative from that of S, and g/a.
     #[inline(always)]
     fn new(path: &[i32; 3], path2: &[i32; 3], excess: f32, gauge: f32) -> Self {
         let speed = Vec3::of(*path);
@@ -111,10 +111,10 @@ impl PathSpeed {
         }
     }
 
-    /// The same where there is a speed.
+    /// `self`, where the speed is not zero.
     ///
     /// # Errors
-    /// [`FaultKind::DegenerateSurface`] where it vanishes.
+    /// [`FaultKind::DegenerateSurface`] where the speed is zero.
     pub(crate) fn checked(self) -> Result<Self> {
         if self.inv_speed > 0.0 && self.inv_speed < f32::INFINITY {
             Ok(self)
@@ -127,7 +127,7 @@ impl PathSpeed {
 /// The factors of A = a Ã and B = b B̃.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Factors {
-    /// a and 1/a: fixed on a pass; both 0 where the whole pass is a pole.
+    /// a and 1/a, constant on a pass; both 0 where the whole pass is a pole.
     pub(crate) path: f32,
     pub(crate) inverse_path: f32,
     /// b: 0 at a pole at the pass's end.
@@ -143,8 +143,8 @@ impl Factors {
     };
 }
 
-/// First derivatives with their zeros divided out, and what else the curvatures need. Derivatives are times g; those of
-/// second order up to tangential parts.
+/// First derivatives with their zeros divided out, and the second derivatives for the curvatures. Derivatives are scaled by g; those of
+/// second order are exact up to tangential components.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Local {
     /// Relative to the patch's origin, units of 2^-shift nm.
@@ -195,7 +195,7 @@ impl Local {
         let e = path.dot(path);
         let f = path.dot(side);
         let area_squared = cross.dot(cross);
-        // Not `<=`: a NaN must not pass.
+        // Not `<=`, so that a NaN is rejected.
         if !(area_squared > TANGENT_MIN_SQUARED * (f * f)) {
             return Err(degenerate(area_squared, f));
         }
@@ -217,7 +217,7 @@ impl Local {
         };
         let twist = shear * inverse * inverse_a;
         let sheared = shear_sum * slant * inverse_a;
-        // On a pole every side line leaves in its own direction, and its own speed counts.
+        // On a pole every side line has its own direction, and its own speed determines the interval.
         let lateral_squared = if a > 0.0 {
             b * b * (area_squared * inverse_e)
         } else {
@@ -229,7 +229,7 @@ impl Local {
         } else {
             (lateral_squared + sheared, 0.0)
         };
-        // Used at the ends of passes only: the compiler leaves it out of the sample path.
+        // Used only at the ends of passes: the compiler removes it from the sample path.
         let Vec3 { x, y, z } = side;
         let outwards = b * b * (x * x + y * y + z * z) - n;
         Ok(Contact {
@@ -258,7 +258,7 @@ fn degenerate(area_squared: f32, f: f32) -> Fault {
     Fault::new(FaultKind::DegenerateSurface, sine)
 }
 
-/// A surface on one pass. The variant is a job's.
+/// A surface on one pass. All patches of a job have the same variant.
 #[derive(Clone, Copy, Debug)]
 #[allow(
     clippy::large_enum_variant,
@@ -286,7 +286,7 @@ pub(crate) trait Pass {
     /// The contact at a fraction of the patch, in the direction of travel.
     ///
     /// # Errors
-    /// [`FaultKind::DegenerateSurface`] where there is no normal.
+    /// [`FaultKind::DegenerateSurface`] where the normal is undefined.
     fn contact(&self, fraction: u64, ball: &Ball) -> Result<Contact>;
 }
 
@@ -295,7 +295,7 @@ impl Pass for Surface {
     #[inline(never)]
     fn contact(&self, fraction: u64, ball: &Ball) -> Result<Contact> {
         match self.pass() {
-            // To the bit the same, see there.
+            // Bit-identical to the specialised evaluations, see the tests in polynomial.rs.
             AnyPass::Polynomial(PolynomialPass(pass))
             | AnyPass::Ruled(RuledPass(pass))
             | AnyPass::Extruded(ExtrudedPass(pass)) => PolynomialPass(pass).contact(fraction, ball),
@@ -324,7 +324,7 @@ impl Surface {
         }
     }
 
-    /// The pass is a single point.
+    /// Whether the pass degenerates to a point.
     pub(crate) fn is_point(&self) -> bool {
         match self.pass() {
             AnyPass::Pole(pass) => pass.is_point(),

@@ -1,9 +1,9 @@
 //! A patch, polynomial or rational, with a boundary that collapses into a point, on one pass.
 //!
-//! A polynomial patch is taken as a rational one of weight 1. Where the boundary lies beside the pass, A vanishes all
+//! A polynomial patch is treated as a rational one of weight 1. Where the boundary lies beside the pass, A vanishes all
 //! along it, and the reduced numerators `P̃` (divided by the root across) stand for P in Ã and its derivative. Where it lies at an end
 //! of the pass, B vanishes there, and so does its second side derivative; they are divided by the root along the pass, and the
-//! quotient rule takes the reduced point.
+//! quotient rule uses the reduced point.
 
 use super::Ball;
 use super::grid::GridPass;
@@ -14,7 +14,7 @@ use super::{Contact, Factors, IsoLine, Local, Pass, PathSpeed, path_factor};
 use crate::fault::Result;
 use crate::math::arith::{centred, centred_to_f32, cubic, jet, mul_q30, quarter_of, subtract, tangent};
 
-/// Which derivative of the pass is reduced by a root.
+/// The derivative of the pass that is divided by a root.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 enum Pole {
     /// A vanishes all along the boundary beside the pass.
@@ -29,12 +29,12 @@ enum Pole {
 struct ReducedCubics {
     /// P.
     value: [i32; 4],
-    /// P_side and half of P_side,side where the root is at an end, and not divided where it is beside.
+    /// P_side and half of P_side,side: divided where the root is at an end of the pass, not divided where it is beside the pass.
     side: [i32; 4],
     side2: [i32; 4],
 }
 
-/// What a pole adds to a patch on a pass.
+/// Additional data of a patch with a pole on a pass.
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct Reduced {
     axes: [ReducedCubics; 3],
@@ -47,7 +47,7 @@ pub(crate) struct Reduced {
 pub(crate) struct PolePass<'a>(pub(super) &'a GridPass);
 
 impl Reduced {
-    /// Of no pole.
+    /// Placeholder before the first pole.
     pub(super) const NONE: Self = Self {
         axes: [ReducedCubics {
             value: [0; 4],
@@ -89,7 +89,7 @@ impl Reduced {
 }
 
 impl PolePass<'_> {
-    /// The whole pass is one point: the side boundary that it lies on collapses.
+    /// Whether the whole pass is one point: it lies on a collapsed side boundary.
     pub(crate) fn is_point(&self) -> bool {
         self.0.reduced.path_factor <= 0.0
     }
@@ -176,7 +176,7 @@ impl PoleLine<'_> {
     }
 }
 
-/// A quarter of a coordinate of the reduced point: whole it may be beyond i32.
+/// A quarter of a coordinate of the reduced point, whose full value may exceed i32.
 struct Part(i32);
 
 impl Part {

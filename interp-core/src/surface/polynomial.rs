@@ -15,7 +15,7 @@ use crate::math::arith::{centred, cubic, jet, tangent};
 /// Words of a polynomial patch.
 pub const POLYNOMIAL_WORDS: usize = 52;
 
-/// A polynomial patch, unpacked: what a loader writes and a test reads.
+/// A polynomial patch, unpacked.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct PolynomialRecord {
     /// Origin of the patch, nm.
@@ -35,7 +35,7 @@ impl PolynomialRecord {
         record_words(self.origin_nm, self.shift, self.edges, &self.coefficients)
     }
 
-    /// The record of these words; meaningless bits of the head word are dropped.
+    /// The record of these words; unused bits of the head word are dropped.
     #[must_use]
     pub fn from_words(words: &[i32; POLYNOMIAL_WORDS]) -> Self {
         let ([x, y, z, head], blocks) = split(words);
@@ -48,7 +48,7 @@ impl PolynomialRecord {
         }
     }
 
-    /// Whether the board takes the patch: nothing can overflow, and flagged boundaries do collapse (to 8 units).
+    /// Checks that no evaluation can overflow, and that flagged boundaries collapse (to 8 units).
     ///
     /// # Errors
     /// [`crate::fault::FaultKind::BadPatch`].
@@ -76,7 +76,7 @@ pub(crate) struct RuledPass<'a>(pub(super) &'a GridPass);
 /// An extruded patch on one pass.
 pub(crate) struct ExtrudedPass<'a>(pub(super) &'a GridPass);
 
-/// `MIXED` and `SIDE2`: whether those derivatives are computed; without the former the side derivative is constant.
+/// `MIXED` and `SIDE2`: whether those derivatives are computed; without `MIXED` the side derivative is constant.
 #[inline(always)]
 fn local<const MIXED: bool, const SIDE2: bool>(pass: &GridPass, fraction: u64) -> Local {
     let w = centred(fraction);
@@ -143,7 +143,7 @@ mod tests {
     use crate::surface::grid::GridKind;
     use crate::surface::{IsoLine, OffsetUnits};
 
-    /// What a shape leaves out is nothing: each agrees with the free one to the last bit.
+    /// The derivatives that a specialised shape omits are zero: each result is bit-identical to the general one.
     #[test]
     fn shapes_are_the_free_patch_to_the_bit() {
         let path = [

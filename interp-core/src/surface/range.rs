@@ -1,11 +1,11 @@
-//! The word that heads a patch record, and the proof that a patch's polynomials cannot overflow.
+//! The head word of a patch record, and bounds that prove that a patch's polynomials cannot overflow.
 
 use crate::fault::{Fault, FaultKind, Result};
 
-/// Largest shift: units of 2^-12 nm, finer than any use.
+/// Maximum shift: units of 2^-12 nm, finer than any application requires.
 pub const SHIFT_MAX: u8 = 12;
 
-/// Which boundary of a patch collapses into a point: at most one.
+/// The boundary of a patch that collapses into a point; at most one.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Edges {
     /// The boundary at the start of the path parameter.
@@ -111,7 +111,7 @@ impl HeadWord {
             | (e.side_end as i32) << 11
     }
 
-    /// Bits without a meaning are ignored here; [`HeadWord::check`] refuses them.
+    /// Unused bits are ignored here; [`HeadWord::check`] refuses them.
     pub(crate) const fn from_word(word: i32) -> Self {
         let [shift, flags, ..] = word.to_le_bytes();
         Self {
@@ -144,7 +144,7 @@ pub(crate) fn bound(c: &[i64; 4]) -> i64 {
 }
 
 /// Bound of one coordinate of a patch, `c[i][j]` times `path^i side^j`, over everything that `collapse` and `contact` evaluate
-/// in fixed point: the cubics, their derivatives up to the second (halves of the pure ones), those divided by a root.
+/// in fixed point: the cubics, their derivatives up to the second (halves of the pure second ones), and those divided by a root.
 pub(crate) fn patch_bound(c: &[[i32; 4]; 4]) -> i64 {
     let wide = |row: &[i32; 4]| -> [i64; 4] { row.map(i64::from) };
     let [c0, c1, c2, c3] = c;
@@ -183,7 +183,7 @@ pub(crate) fn patch_bound(c: &[[i32; 4]; 4]) -> i64 {
     value.max(along).max(across).max(mixed).max(second)
 }
 
-/// Whether a bound stays within i32, with room for half a nanometre.
+/// Whether a bound stays within i32 with a margin of half a nanometre.
 pub(crate) fn fits_range(bound: i64) -> bool {
     bound < i64::from(i32::MAX) - (1 << SHIFT_MAX)
 }
@@ -193,7 +193,7 @@ pub(crate) fn fits(c: &[[i32; 4]; 4]) -> bool {
     fits_range(patch_bound(c))
 }
 
-/// [`FaultKind::BadPatch`]; the caller puts the patch's index in.
+/// [`FaultKind::BadPatch`]; the caller sets the patch's index as the value.
 pub(crate) const BAD_PATCH: Result<()> = Err(Fault::new(FaultKind::BadPatch, 0.0));
 
 #[cfg(test)]
@@ -204,7 +204,7 @@ mod tests {
     fn root_division_is_exact_up_to_a_unit() {
         for root in [Root::Start, Root::End] {
             let q = [123_456_i32, -98_768, 45_640];
-            // p = factor q, by hand.
+            // p = factor q, multiplied out.
             let [h, s] = root.linear().map(f64::from);
             let [q0, q1, q2] = q.map(f64::from);
             let p = [h * q0, h * q1 + s * q0, h * q2 + s * q1, s * q2].map(|c| c.round() as i32);

@@ -18,7 +18,7 @@ use crate::math::arith::{
 /// Words of a rational patch.
 pub const RATIONAL_WORDS: usize = 68;
 
-/// Least and largest weight on a patch, units of 2^-30: a hair within [1/2, 2), for the rounding of its evaluation.
+/// Least and largest weight on a patch, units of 2^-30: slightly inside [1/2, 2), by the rounding error of its evaluation.
 const WEIGHT_MIN: i32 = (1 << 29) + 8;
 const WEIGHT_MAX: i32 = i32::MAX - 8;
 
@@ -48,7 +48,7 @@ impl RationalRecord {
         record_words(self.origin_nm, self.shift, self.edges, &self.coefficients)
     }
 
-    /// The record of these words; meaningless bits of the head word are dropped.
+    /// The record of these words; unused bits of the head word are dropped.
     #[must_use]
     pub fn from_words(words: &[i32; RATIONAL_WORDS]) -> Self {
         let ([x, y, z, head], blocks) = split(words);
@@ -61,8 +61,8 @@ impl RationalRecord {
         }
     }
 
-    /// Whether the board takes the patch: nothing can overflow, the weight stays within [1/2, 2), at most one boundary
-    /// collapses, and where one does the numerators vanish.
+    /// Checks that no evaluation can overflow, the weight stays within [1/2, 2), at most one boundary
+    /// collapses, and the numerators vanish on a collapsed boundary.
     ///
     /// # Errors
     /// [`crate::fault::FaultKind::BadPatch`].
@@ -75,7 +75,7 @@ impl RationalRecord {
             |c: &[[i32; 4]; 4]| edges.count() == 0 || (collapses(c, edges) && touches_zero(c, edges));
         let good = HeadWord::check(head)
             && fits(weight)
-            // Half of i32: the quotient by a weight of at least 1/2 has to fit too.
+            // Half the range of i32, because the quotient by a weight of at least 1/2 has to fit too.
             && [x, y, z].into_iter().all(|c| patch_bound(c) < 1 << 30)
             && [x, y, z].into_iter().all(vanishes)
             && weight_in_range(weight);
@@ -83,7 +83,7 @@ impl RationalRecord {
     }
 }
 
-/// Whether a coordinate is zero (to 8 units) in the middle of its collapsed boundary.
+/// Whether a coordinate is zero (within 8 units) in the middle of its collapsed boundary.
 fn touches_zero(c: &[[i32; 4]; 4], edges: Edges) -> bool {
     let end = |root: Root| if root == Root::Start { i32::MIN } else { i32::MAX };
     let (w, y) = (
@@ -179,7 +179,7 @@ impl Weight {
     }
 }
 
-/// A quarter of `numerator' - quotient w'`: w/4 times the quotient's derivative, up to tangential parts.
+/// A quarter of `numerator' - quotient w'`: w/4 times the quotient's derivative, up to tangential components.
 #[inline(always)]
 pub(super) fn quarter(numerator: i32, quotient: i32, weight: i32) -> i32 {
     subtract(quarter_of(numerator), mul_hi(quotient, weight))
@@ -212,7 +212,7 @@ impl RationalPass<'_> {
     }
 
     /// The quotient rule with the numerators' derivatives relative to the point: `w S_path = P_path - S w_path`, and
-    /// `w N . S_xy = N . (P_xy - S w_xy)`, because the parts that are left out are tangential.
+    /// `w N . S_xy = N . (P_xy - S w_xy)`, because the omitted terms are tangential.
     #[inline(always)]
     fn local(&self, fraction: u64) -> Local {
         let w = centred(fraction);

@@ -1,4 +1,4 @@
-//! A cubic profile turned about z, for passes along the profile and for passes around the axis.
+//! A cubic profile revolved about z, for passes along the profile and for passes around the axis.
 //!
 //! Record, [`REVOLVED_WORDS`] words: the shift; four coefficients of the radius and four of the height in powers of the
 //! centred profile parameter, units of 2^-shift nm, the height relative to its origin; the height's origin, nm; the start
@@ -89,7 +89,7 @@ impl RevolvedRecord {
         }
     }
 
-    /// Whether the board takes the surface: nothing can overflow, and the extent is in range.
+    /// Checks that no evaluation can overflow, and that the extent is in range.
     ///
     /// # Errors
     /// [`FaultKind::BadPatch`].
@@ -100,17 +100,17 @@ impl RevolvedRecord {
             && (1..=1 << 31).contains(&record.extent)
             && [record.radius, record.height].into_iter().all(|c| {
                 let [c0, c1, c2, c3] = c.map(i64::from);
-                // 4: the radius turns by sine and cosine, and the rounding of both.
+                // Margin 4: the radius is multiplied by sine and cosine, each with its rounding.
                 fits_range(4 + bound(&[c0, c1, c2, c3]).max(bound(&[c1, 2 * c2, 3 * c3, 0])))
             });
         if good { Ok(()) } else { BAD_PATCH }
     }
 }
 
-/// Units by which a radius may fall below 0: the rounding of a profile that ends on the axis.
+/// Maximum negative radius, units: the rounding of a profile that ends on the axis.
 const AXIS_UNITS: i32 = 4;
 
-/// Sine and cosine of an angle in turns (units of 2^-32), in units of 2^-31; 1 is a unit less.
+/// Sine and cosine of an angle in turns (units of 2^-32), in units of 2^-31; 1 is represented as 1 - 2^-31.
 #[inline(always)]
 fn sin_cos_q31(turns: u32) -> [i32; 2] {
     let (sin, cos) = sin_cos(turns);
@@ -125,7 +125,7 @@ struct ProfilePoint {
     height: [i32; 3],
 }
 
-/// A polynomial profile, maybe travelled backwards.
+/// A polynomial profile, possibly with its parameter reversed.
 #[derive(Clone, Copy, Debug, Default)]
 struct ProfileCurve {
     radius: [i32; 4],
@@ -189,7 +189,7 @@ pub(crate) struct ProfilePass {
     cos_float: f32,
     /// Extent of the angle, rad per side.
     extent_rad: f32,
-    /// Ball radius in units, with the sign of the side that the tool is on.
+    /// Ball radius in units, signed by the tool side.
     radius: f32,
 }
 
@@ -272,7 +272,7 @@ pub(crate) struct CirclePass {
     /// Normal, away from the axis and up.
     out: f32,
     up: f32,
-    /// The contact without position and offset, which is the same all around.
+    /// The contact without position and offset, constant around the axis.
     shape: Contact,
 }
 
@@ -299,7 +299,7 @@ impl CirclePass {
         let (out, up) = (height1 * inverse, -radius1 * inverse);
         let circle_float = to_f32(circle);
         let speed = circle_float * count_to_f32(record.extent) * RADIANS_PER_EXTENT;
-        // The ball's side is the tool's, not the travelled one's: a circle is the same both ways.
+        // The ball's sign follows the tool side, not the direction of travel: the normal of a circle does not depend on it.
         let (inverse_speed, bend) = if speed > 0.0 {
             (1.0 / speed, -out * radius / circle_float)
         } else {
@@ -331,12 +331,12 @@ impl CirclePass {
         Ok(())
     }
 
-    /// The whole pass is one point on the axis.
+    /// Whether the whole pass is one point on the axis.
     pub(crate) fn is_point(&self) -> bool {
         self.radius == 0
     }
 
-    /// The parametrisation, the same all around.
+    /// The parametrisation, constant around the axis.
     pub(crate) const fn path(&self) -> PathSpeed {
         self.shape.path
     }

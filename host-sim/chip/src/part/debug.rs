@@ -1,4 +1,4 @@
-//! What a debugger would use: DWT's cycle counter, DEMCR, DBGMCU (RM0090, 38.16).
+//! Debug components: DWT's cycle counter, DEMCR, DBGMCU (RM0090, 38.16).
 
 use crate::world::World;
 

@@ -1,7 +1,7 @@
 //! DMA2 (RM0090, 10): direct mode, words or less, single or double buffer, circular or not, no interrupts.
 //!
-//! In direct mode from memory, the next word is read as soon as the last has gone out (10.3.12), so that a word written later is not the one
-//! that goes out. Arbitration takes no time: two streams never ask for the bus within the few cycles of a transfer here, which `chip.rs` sees to
+//! In direct mode from memory, the next word is read as soon as the last was transferred (10.3.12), so that a word written later is not
+//! transferred. Arbitration takes no time: two streams never request the bus within the few cycles of a transfer, which `chip.rs` ensures
 //! by the order of events.
 
 use super::gpio::Port;
@@ -14,7 +14,7 @@ const MEMORY_COUNTS: u32 = 1 << 10;
 const DOUBLE: u32 = 1 << 18;
 const SECOND: u32 = 1 << 19;
 const INTERRUPTS: u32 = 0x1e;
-/// What may not change while a stream runs (10.5.5: protected by EN).
+/// Fields that must not change while a stream is enabled (10.5.5: protected by EN).
 const PROTECTED: u32 = 0x0fe7_ffc0 & !SECOND;
 const COMPLETE: u32 = 1 << 5;
 const FLAGS: u32 = 0x3d;
@@ -27,7 +27,7 @@ struct Stream {
     peripheral: u32,
     memory: [u32; 2],
     fifo: u32,
-    /// The word that goes out next.
+    /// The next word to transfer.
     loaded: u32,
 }
 
@@ -36,14 +36,14 @@ impl Stream {
         self.control >> low & ((1 << bits) - 1)
     }
 
-    /// Address of the word in work.
+    /// Address of the current word.
     fn address(&self) -> u32 {
         let base = self.memory[usize::from(self.control & SECOND != 0)];
         base + 4 * (self.reload - self.left)
     }
 }
 
-/// Where a transfer goes that is not to memory.
+/// Destination of a transfer to a peripheral.
 pub(crate) struct Write {
     pub(crate) port: usize,
     pub(crate) value: u32,
@@ -53,12 +53,12 @@ pub(crate) struct Write {
 pub(crate) struct Dma {
     streams: [Stream; 8],
     flags: [u32; 2],
-    /// Transfers to a port, and to memory.
+    /// Numbers of transfers to a port and to memory.
     pub(crate) played: u64,
     pub(crate) stored: u64,
 }
 
-/// Where the flags of a stream are: which register, and the lowest bit.
+/// Register and lowest bit of the flags of a stream.
 const fn flags_of(stream: usize) -> (usize, u32) {
     (stream / 4, [0, 6, 16, 22][stream % 4])
 }
@@ -130,7 +130,7 @@ impl Dma {
         }
     }
 
-    /// A peripheral asks for a transfer. What it writes, if that is not memory.
+    /// Executes a peripheral's transfer request. Returns the write, if the destination is not memory.
     #[inline]
     pub(crate) fn request(
         &mut self,
@@ -240,7 +240,7 @@ impl Dma {
     fn write_stream(&mut self, number: usize, register: u32, value: u32, sram: Memory, world: &mut World) {
         let stream = &mut self.streams[number];
         let runs = stream.control & ENABLE != 0;
-        // The buffer that is not in work may be changed (10.3.10).
+        // The inactive buffer may be changed (10.3.10).
         let idle_buffer = if stream.control & SECOND != 0 { 0x0c } else { 0x10 };
         if runs && register != 0 && !(stream.control & DOUBLE != 0 && register == idle_buffer) {
             world.wrong(format!(
@@ -265,7 +265,7 @@ impl Dma {
         }
     }
 
-    /// Without addresses in memory, which change with the image.
+    /// Omits addresses in memory, which change with the image.
     pub(crate) fn snapshot(&self) -> Vec<(String, u32)> {
         let mut lines = Vec::new();
         for (number, stream) in self

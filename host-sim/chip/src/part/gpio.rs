@@ -5,11 +5,11 @@ use crate::world::World;
 /// A change of a port's outputs.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) struct Change {
-    /// When, cycles.
+    /// Time, cycles.
     pub(crate) at: u64,
     /// The port, 0 for A.
     pub(crate) port: u8,
-    /// By DMA.
+    /// Whether by DMA.
     pub(crate) by_dma: bool,
     /// `ODR` afterwards.
     pub(crate) levels: u16,
@@ -26,13 +26,13 @@ pub(crate) struct Port {
     pupdr: u32,
     pub(crate) odr: u32,
     afr: [u32; 2],
-    /// Pins that something outside drives, and its levels.
+    /// Externally driven pins, and their levels.
     pub(crate) driven: u32,
     pub(crate) outside: u32,
 }
 
 impl Port {
-    /// After a reset (8.4.1 to 8.4.4); what is connected outside stays.
+    /// After a reset (8.4.1 to 8.4.4); external levels are unchanged.
     pub(crate) const fn new(index: u8, driven: u32, outside: u32) -> Self {
         let (moder, ospeedr, pupdr) = match index {
             0 => (0xa800_0000, 0x0c00_0000, 0x6400_0000),
@@ -86,7 +86,7 @@ impl Port {
         }
     }
 
-    /// A write of `BSRR`; a bit that is set and reset is set. Whether a level changed.
+    /// A write of `BSRR`; set has priority over reset. Returns whether a level changed.
     pub(crate) fn set_reset(&mut self, value: u32) -> bool {
         let old = self.odr;
         self.odr = old & !(value >> 16) | value & 0xffff;

@@ -1,4 +1,4 @@
-//! The parts of the chip, one file each.
+//! The peripherals of the chip, one file each.
 
 pub(crate) mod debug;
 pub(crate) mod dma;

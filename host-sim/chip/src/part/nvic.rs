@@ -1,10 +1,10 @@
-//! Interrupt controller and system control (ARMv7-M, B3.2 and B3.4): what is pending, enabled, active, and at which priority.
+//! Interrupt controller and system control (ARMv7-M, B3.2 and B3.4): pending, enabled and active interrupts, and their priorities.
 
 use crate::world::World;
 
 /// Interrupts of the STM32F405/407.
 const LINES: usize = 82;
-/// Bits of a priority that are there.
+/// Implemented bits of a priority.
 const PRIORITY: u32 = 0xf0;
 /// Priority of a program that no exception has interrupted.
 pub(crate) const THREAD: u32 = 256;
@@ -21,11 +21,11 @@ struct Active {
     entered: u64,
 }
 
-/// What an interrupt came to.
+/// Statistics of an interrupt.
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct Account {
     pub(crate) count: u64,
-    /// From its being raised to its first instruction, and from there to its end, cycles.
+    /// Maximum latency from request to first instruction, and maximum duration, cycles.
     pub(crate) latency_max: u64,
     pub(crate) latency_sum: u64,
     pub(crate) duration_max: u64,
@@ -78,13 +78,13 @@ impl Nvic {
         }
     }
 
-    /// Whether one may be due: the cheap question.
+    /// Whether an interrupt may be due: a fast check.
     #[inline]
     pub(crate) const fn has_pending(&self) -> bool {
         self.pending & self.enabled != 0
     }
 
-    /// The pending and enabled interrupt that comes first, with its priority: the lowest, then the lowest number.
+    /// The pending and enabled interrupt with precedence, with its priority: the lowest priority value, then the lowest number.
     pub(crate) fn first(&self) -> Option<(usize, u32)> {
         let waiting = self.pending & self.enabled;
         let lines = (0..LINES).filter(|line| waiting >> line & 1 != 0);
@@ -93,17 +93,17 @@ impl Nvic {
             .min_by_key(|(line, priority)| (*priority, *line))
     }
 
-    /// Priority of what runs, without masks.
+    /// Execution priority, without masks.
     pub(crate) fn running(&self) -> u32 {
         self.active.last().map_or(THREAD, |active| active.priority)
     }
 
-    /// How many exceptions are in progress.
+    /// Number of active exceptions.
     pub(crate) fn depth(&self) -> usize {
         self.active.len()
     }
 
-    /// Number of the exception in progress, 0 without.
+    /// Number of the active exception, 0 if none.
     pub(crate) fn number(&self) -> u32 {
         self.active.last().map_or(0, |active| active.number)
     }
@@ -124,7 +124,7 @@ impl Nvic {
         }
     }
 
-    /// The exception in progress is over; its interrupt, if it is one.
+    /// Ends the active exception; returns its interrupt, if it is one.
     pub(crate) fn leave(&mut self, now: u64) -> Option<usize> {
         let active = self.active.pop()?;
         let line = (active.number as usize).checked_sub(16)?;
@@ -165,7 +165,7 @@ impl Nvic {
             0xd14 => self.ccr,
             0xd18..0xd24 => self.handlers[(offset as usize - 0xd18) / 4],
             0xd24 => self.shcsr,
-            // Faults' status: none is kept.
+            // Fault status is not modelled.
             0xd28..0xd3c => 0,
             0xd88 => self.cpacr,
             // DHCSR: no debugger.
@@ -214,7 +214,7 @@ impl Nvic {
         }
     }
 
-    /// What is pending and in progress, for people.
+    /// Pending and active interrupts, as text.
     pub(crate) fn words(&self) -> String {
         let lines: Vec<_> = (0..LINES).filter(|line| self.pending >> line & 1 != 0).collect();
         let active: Vec<_> = self.active.iter().map(|active| active.number).collect();

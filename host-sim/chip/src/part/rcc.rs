@@ -1,6 +1,6 @@
-//! Reset and clock control (RM0090, 7), with what flash and supply must be set to for a frequency (FLASH_ACR 3.9.1, PWR 5.4).
+//! Reset and clock control (RM0090, 7), with the flash and supply settings required for a frequency (FLASH_ACR 3.9.1, PWR 5.4).
 //!
-//! Start-up times are constants: crystal 2 ms, PLL 200 us. A crystal that is not there never gets ready.
+//! Start-up times are constants: crystal 2 ms, PLL 200 us. A missing crystal never becomes ready.
 
 use crate::world::{NEVER, World};
 
@@ -12,9 +12,9 @@ const PLL_LOCK_S: f64 = 200e-6;
 const HCLK_MAX_HZ: f64 = 168e6;
 const PCLK1_MAX_HZ: f64 = 42e6;
 const PCLK2_MAX_HZ: f64 = 84e6;
-/// Flash wants a wait state for each of these beyond the first, at 2.7 to 3.6 V (RM0090, table 10).
+/// Flash requires one more wait state for each of these beyond the first, at 2.7 to 3.6 V (RM0090, table 10).
 const FLASH_HZ: f64 = 30e6;
-/// With a regulator at scale 2 (RM0090, 5.4.1).
+/// Maximum frequency with the regulator at scale 2 (RM0090, 5.4.1).
 const SCALE_2_MAX_HZ: f64 = 144e6;
 
 const CR: usize = 0x00;
@@ -53,7 +53,7 @@ pub(crate) struct Rcc {
     pub(crate) flash_acr: u32,
     pub(crate) pwr_cr: u32,
     dividers: [u32; 3],
-    /// When each enable register was last added to, and read afterwards.
+    /// Times at which bits of each enable register were last set, and when it was read afterwards.
     enabled: [(u64, u32); 3],
 }
 
@@ -106,7 +106,7 @@ impl Rcc {
         self.registers[[AHB1ENR, APB1ENR, APB2ENR][index] / 4] & bit != 0
     }
 
-    /// Whether its clock has been switched on at this very time, and not been waited for (ES0182, 2.1.13).
+    /// Whether its clock was enabled at the present time without the required delay (ES0182, 2.1.13).
     pub(crate) fn is_fresh(&self, gate: Gate, now: u64) -> bool {
         let (index, bit) = Self::enable_register(gate);
         let (at, bits) = self.enabled[index];
@@ -201,7 +201,7 @@ impl Rcc {
         }
     }
 
-    /// Works the frequencies out, and checks what they ask for.
+    /// Computes the frequencies, and checks their limits.
     fn clocks(&mut self, world: &mut World) {
         let pll = self.registers[PLLCFGR / 4];
         let field = |low: u32, bits: u32| f64::from(pll >> low & ((1 << bits) - 1));

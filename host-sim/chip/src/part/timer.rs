@@ -1,7 +1,7 @@
 //! A timer (RM0090, 17.4 and 18.4) that counts upwards without preload: TIM1, TIM2, TIM5.
 //!
-//! Of the slave modes there is "trigger" (TIM1 by TIM2's update), of the compare channels the first, of the requests update and first
-//! compare. Other settings are complained about.
+//! Modelled are the slave mode "trigger" (TIM1 by TIM2's update), the first compare channel, and the DMA requests of update and first
+//! compare. Other settings are reported as complaints.
 
 use crate::world::{NEVER, World};
 
@@ -76,7 +76,7 @@ impl Timer {
         }
     }
 
-    /// Plans the compare of the present round, if it is still to come after `from`.
+    /// Schedules the compare of the present timer period, if it is after `from`.
     fn plan_compare(&mut self, from: u64) {
         self.compare_at = NEVER;
         if self.is_running() && u64::from(self.compare) >= self.count && self.compare <= self.reload {
@@ -87,7 +87,7 @@ impl Timer {
         }
     }
 
-    /// An update at this time: whether it raises an interrupt, and asks for a transfer.
+    /// An update at this time: whether it raises an interrupt, and requests a transfer.
     pub(crate) fn update(&mut self, at: u64) -> (bool, bool) {
         self.since = at;
         self.count = 0;
@@ -106,24 +106,24 @@ impl Timer {
         )
     }
 
-    /// A compare: whether it asks for a transfer.
+    /// A compare: whether it requests a transfer.
     pub(crate) fn compared(&mut self) -> bool {
         self.compare_at = NEVER;
         self.status |= COMPARE_1;
         self.dier & COMPARE_1_REQUEST != 0
     }
 
-    /// Whether its update goes to other timers.
+    /// Whether its update is the trigger output.
     pub(crate) const fn tells_update(&self) -> bool {
         self.cr2 >> 4 & 7 == 2
     }
 
-    /// Whether it stands and waits for that of ITR1.
+    /// Whether it is stopped and waits for the trigger of ITR1.
     pub(crate) const fn waits(&self) -> bool {
         self.smcr & 7 == 6 && self.smcr >> 4 & 7 == 1 && !self.is_running()
     }
 
-    /// Starts by that.
+    /// Starts on this trigger.
     pub(crate) fn trigger(&mut self, at: u64, world: &mut World) {
         self.since = at;
         self.cr1 |= 1;

@@ -1,6 +1,6 @@
-//! USART1 (RM0090, 30.6): 8 bits, one stop bit, 16 samples a bit; bytes take their time on the line both ways.
+//! USART1 (RM0090, 30.6): 8 bits, one stop bit, 16 samples a bit; bytes take their transmission time in both directions.
 //!
-//! A byte that is complete while the last one was not read is lost, and `ORE` says so (30.3.3). The line itself damages nothing.
+//! A byte received before the last one was read is lost, and `ORE` is set (30.3.3). The line itself causes no errors.
 
 use std::collections::VecDeque;
 
@@ -25,20 +25,20 @@ pub(crate) struct Usart {
     data: u8,
     waiting: Option<u8>,
     shifting: Option<u8>,
-    /// When the byte in the transmitter has gone, cycles.
+    /// Time at which the byte in the transmitter is sent, cycles.
     pub(crate) sent_at: u64,
-    /// When the next byte from the host is complete.
+    /// Time at which the next byte from the host is complete, cycles.
     pub(crate) received_at: u64,
-    /// Bytes of the host that are still to come.
+    /// Bytes of the host still to be received.
     pub(crate) from_host: VecDeque<u8>,
-    /// When the byte in the data register arrived.
+    /// Arrival time of the byte in the data register, cycles.
     arrived: u64,
     pub(crate) sent: u64,
     pub(crate) received: u64,
-    /// Bytes that were lost, frames' ends among them, and bytes that came while the port was off.
+    /// Lost bytes, lost frame delimiters among them, and bytes received while the port was off.
     pub(crate) overruns: u64,
     pub(crate) unheard: u64,
-    /// Longest time from a byte's arrival to its being read, cycles.
+    /// Maximum time from a byte's arrival to its read, cycles.
     pub(crate) longest_wait: u64,
 }
 
@@ -68,7 +68,7 @@ impl Usart {
         BITS * self.divider as u64 * apb2
     }
 
-    /// Whether it asks for its interrupt.
+    /// Whether the interrupt is requested.
     pub(crate) const fn interrupts(&self) -> bool {
         self.control[0] & RECEIVE_INTERRUPT != 0 && self.status & (RECEIVED | OVERRUN) != 0
     }

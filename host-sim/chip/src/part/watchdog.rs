@@ -1,11 +1,11 @@
-//! The independent watchdog (RM0090, 21): on the LSI, whose frequency is an option. Prescaler and reload take five of its clocks to arrive.
+//! The independent watchdog (RM0090, 21): on the LSI, whose frequency is an option. Updates of prescaler and reload take five LSI clocks.
 
 use crate::world::{NEVER, World};
 
 const UNLOCK: u32 = 0x5555;
 const FEED: u32 = 0xaaaa;
 const START: u32 = 0xcccc;
-/// Clocks of the LSI for a register to arrive (21.4.4).
+/// LSI clocks of a register update (21.4.4).
 const ARRIVE: f64 = 5.0;
 
 pub(crate) struct Watchdog {
@@ -14,15 +14,15 @@ pub(crate) struct Watchdog {
     unlocked: bool,
     prescaler: u32,
     reload: u32,
-    /// What is on its way, and when it arrives.
+    /// The pending update and its time.
     coming: (u32, u32),
     busy: u32,
     arrives: u64,
     fed_at: u64,
-    /// When it resets the chip, cycles.
+    /// Time of the reset, cycles.
     pub(crate) deadline: u64,
     pub(crate) fed: u64,
-    /// Longest time between two feeds, cycles.
+    /// Maximum time between two feeds, cycles.
     pub(crate) longest_gap: u64,
 }
 

@@ -8,15 +8,15 @@ use crate::sample::SpanParameter;
 use crate::surface::Edges;
 use std::vec::Vec;
 
-/// 2^-23: room for the roundings of one f32 result.
+/// 2^-23: rounding tolerance of one f32 result.
 const ROUNDING: f64 = 1.0 / 8_388_608.0;
 
-/// The step that [`step`] takes, as a fraction.
+/// The step of [`step`], as a fraction.
 fn step_of(from: PathSpeed, log_speed_derivative_before: f64, arc: f32) -> Option<f64> {
     step(&from, log_speed_derivative_before as f32, arc).map(|step| step as f64 / 2_f64.powi(64))
 }
 
-/// Evenly spread over [0, 1), the same each time.
+/// Uniformly distributed over [0, 1), from a fixed seed.
 fn random() -> impl FnMut() -> f64 {
     let mut state = 1_u64;
     move || {
@@ -27,7 +27,7 @@ fn random() -> impl FnMut() -> f64 {
     }
 }
 
-/// A place of this speed, and an arc of so much of the patch over which the speed changes by `bend` of itself.
+/// A parametrisation of this speed, and an arc of this part of the patch over which the speed changes by the relative amount `bend`.
 fn place_and_arc(bend: f64, speed: f64, part: f64) -> (PathSpeed, f32) {
     let (inverse, arc) = ((1.0 / speed) as f32, (part * speed) as f32);
     let log_speed_derivative = (bend / (f64::from(arc) * f64::from(inverse))) as f32;
@@ -62,17 +62,17 @@ fn errors(bend: f64, exact: impl Fn(f64, f64, f64) -> (f64, f64)) -> (f64, f64) 
 /// Speed a + b u, b = a p: from s = a u + b u^2/2.
 fn linear_speed(a: f64, p: f64, arc: f64) -> (f64, f64) {
     let x = arc * p / a;
-    // (sqrt(1 + 2 x) - 1)/p without cancelling.
+    // (sqrt(1 + 2 x) - 1)/p without cancellation.
     let step = 2.0 * arc / a / (1.0 + (1.0 + 2.0 * x).sqrt());
     (step, p / (1.0 - 2.0 * x).sqrt())
 }
 
-/// Speed a exp(p u): from s = a (exp(p u) - 1)/p. Its logarithmic speed derivative is the same everywhere.
+/// Speed a exp(p u): from s = a (exp(p u) - 1)/p. Its logarithmic speed derivative is constant.
 fn exponential_speed(a: f64, p: f64, arc: f64) -> (f64, f64) {
     ((arc * p / a).ln_1p() / p, p)
 }
 
-/// With x = b s/a^2, the step's series to third order leaves 7/8 x^3 of the step at a linear speed (5/8 from the series, 1/4
+/// With x = b s/a^2, the error of the third-order series is 7/8 x^3 of the step at a linear speed (5/8 from the series, 1/4
 /// from p' out of two samples) and 1/4 x^3 at an exponential one; second order would leave 1/2 and 1/3 x^2.
 #[test]
 fn steps_are_of_third_order() {
@@ -107,7 +107,7 @@ fn no_step_where_the_series_is_not_enough() {
     let (from, arc) = place_and_arc(1.0 / 130.0, 23.7, 1e-3);
     let before = from.log_speed_derivative;
     assert!(step(&from, before, arc).is_some());
-    // The first step of a patch, and what no surface should give.
+    // The first step of a patch, and values that no surface produces.
     let nan = f32::NAN;
     let with = |inverse, log_speed_derivative| PathSpeed {
         inv_speed: inverse,
@@ -118,7 +118,7 @@ fn no_step_where_the_series_is_not_enough() {
     assert_eq!(step(&with(from.inv_speed, nan), before, arc), None);
     assert_eq!(step(&with(nan, from.log_speed_derivative), before, arc), None);
     assert_eq!(step(&with(f32::INFINITY, 0.0), 0.0, arc), None);
-    // Half of the bend is the correction: 1/256 at 1/128 of bend, a little less for the square.
+    // The correction is half of the bend: 1/256 at a bend of 1/128, slightly less for the square.
     for (bend, some) in [
         (1.0 / 129.0, true),
         (1.0 / 125.0, false),
@@ -132,7 +132,7 @@ fn no_step_where_the_series_is_not_enough() {
             "{bend}"
         );
     }
-    // The same by the change of the logarithmic speed derivative alone.
+    // The same from the change of the logarithmic speed derivative alone.
     for (change, some) in [(5.9, true), (6.1, false), (-5.9, true), (-6.1, false)]
         .map(|(change, some)| (change / (6.0 * 8.0 + 1.0), some))
     {
@@ -152,7 +152,7 @@ fn no_step_where_the_series_is_not_enough() {
     assert_eq!(step(&even, 0.0, 2_f32.powi(-32)), Some(1 << 32));
 }
 
-/// Whatever the inputs, NaN and infinity among them: a step goes forwards, by the first-order step to 1/256.
+/// For all inputs, NaN and infinity included, a step is forwards and within 1/256 of the first-order step.
 #[test]
 fn a_step_never_runs_backwards() {
     let mut random = random();
@@ -185,7 +185,7 @@ fn a_step_never_runs_backwards() {
     assert!(taken > 10_000, "{taken}");
 }
 
-/// On a speed a + b u, the correction leaves the third power of what the guess misses; plain Newton would leave the second.
+/// On a speed a + b u, the error after the correction is the third power of the starting error; plain Newton would leave the second.
 #[test]
 fn a_guess_is_corrected_to_second_order() {
     let (a, b) = (2.0_f64, 3.0_f64);
@@ -212,7 +212,7 @@ fn a_guess_is_corrected_to_second_order() {
             );
         }
     }
-    // Nothing missed, nothing added.
+    // No starting error, no correction.
     let there = PathSpeed {
         inv_speed: 0.5,
         log_speed_derivative: 3.0,
@@ -223,7 +223,7 @@ fn a_guess_is_corrected_to_second_order() {
 /// A path line in mm by its coefficients, lowest power first: x(u), y(u), z(u).
 type Curve = [[f64; 4]; 3];
 
-/// The line as the pass at the start of a patch that is 20 mm wide, and units a mm. Loaded as the machine loads it.
+/// The line as the pass at the start of a patch 20 mm wide, and units per mm. Loaded as the machine loads it.
 fn surface_on(line: &Curve) -> (Surface, f64) {
     let mut c = line.map(|axis| axis.map(|value| [value, 0.0, 0.0, 0.0]));
     c[1][0][1] = 20.0;
@@ -282,13 +282,13 @@ fn fraction(u: f64) -> u64 {
     (u * 2_f64.powi(64)) as u64
 }
 
-/// Curves in space, and bends as a part makes them.
+/// Space curves, with curvatures typical of a part.
 const CURVED: Curve = [
     [0.0, 20.0, -6.0, 3.0],
     [0.0, 2.0, 5.0, -4.0],
     [1.0, 3.0, -8.0, 6.0],
 ];
-/// x alone: the speed is 30 - 20 u.
+/// Straight along x, with the speed 30 - 20 u.
 const SLOWING: Curve = [[0.0, 30.0, -10.0, 0.0], [0.0; 4], [0.0; 4]];
 
 /// The arc of a line in units by [`arc_over`], relative to the exact one, less 1.
@@ -324,7 +324,7 @@ fn derivative(line: &Curve, u: f64, order: u32) -> f64 {
     sum / H.powi(order as i32)
 }
 
-/// On a curve in space each rule leaves what its error term says, by the speed's derivatives; the third point is used where it should.
+/// On a space curve the error of each rule equals its error term, from the speed's derivatives; the three-point rule is used where required.
 #[test]
 fn arcs_over_a_curve_leave_what_the_rules_error_terms_say() {
     let mut rules = [0, 0];
@@ -358,8 +358,8 @@ fn solved(line: &Curve, u: f64, arc_mm: f64) -> Result<Reach> {
     solve(&surface, fraction(u), &start, end, (arc_mm * per_mm) as f32)
 }
 
-/// The arc that was asked for lies between a place and where it is said to end: to f32's places for a short one, and with
-/// the fourth power of its part of the patch for a long one.
+/// The arc between the start and the returned end is the requested one: to f32 resolution for a short arc, and with an error of
+/// the fourth power of its part of the patch for a long arc.
 #[test]
 fn a_solved_arc_is_as_long_as_asked() {
     for line in [CURVED, SLOWING] {
@@ -380,7 +380,7 @@ fn a_solved_arc_is_as_long_as_asked() {
     }
 }
 
-/// Beyond the end by a hair or by much, by the series and where the first-order step is long: the arc
+/// Slightly or far beyond the end, by the series and where the first-order step is long: the result is the arc
 /// up to the end, in units.
 #[test]
 fn an_arc_beyond_the_patch_says_what_was_left_of_it() {
@@ -388,7 +388,7 @@ fn an_arc_beyond_the_patch_says_what_was_left_of_it() {
     for room in [1e-3, 0.03, 0.2, 0.6, 1.0] {
         let u = 1.0 - room;
         let left = 30.0 * room - 10.0 * room * (1.0 + u);
-        // All that matters is whether the arc is more, not by how much.
+        // Only whether the arc is longer matters.
         for more in [1.000_002, 1.02, 1.2, 1.9] {
             let reach = solved(&SLOWING, u, left * more);
             let Ok(Reach::Beyond(covered)) = reach else {
@@ -397,7 +397,7 @@ fn an_arc_beyond_the_patch_says_what_was_left_of_it() {
             let error = f64::from(covered) / (left * per_mm) - 1.0;
             assert!(error.abs() < 4.0 * ROUNDING, "{room}, {more}: {error:e}");
         }
-        // A step that is not most of the patch stays on it when there is room.
+        // A step of less than most of the patch ends on the patch.
         let reach = solved(&SLOWING, u, left * 0.9999);
         assert!(
             room > 0.25 || matches!(reach, Ok(Reach::Within(_))),
@@ -406,17 +406,17 @@ fn an_arc_beyond_the_patch_says_what_was_left_of_it() {
     }
 }
 
-/// What is added to the first-order step would be x (x - 1)/2, x the arc times the logarithmic derivative of the speed over the speed.
+/// The relative correction of the first-order step is x (x - 1)/2, with x the arc times the logarithmic speed derivative over the speed.
 #[test]
 fn an_arc_over_which_the_speed_falls_too_much_is_refused() {
-    // x = 5.05 u - 5 u^2/2 comes almost to a stand: at u = 0.8 its speed is 1.05, its logarithmic speed derivative -1/0.21.
+    // x = 5.05 u - 5 u^2/2 nearly stops: at u = 0.8 its speed is 1.05, its logarithmic speed derivative -1/0.21.
     let line: Curve = [[0.0, 5.05, -2.5, 0.0], [0.0; 4], [0.0; 4]];
     let (speed, log_speed_derivative) = (1.05, -5.0 / 1.05);
     let correction = |arc: f64| {
         let x = arc / speed * log_speed_derivative;
         0.5 * x * (x - 1.0)
     };
-    // 1/2 at x = -0.618: 0.1363 mm, where the guess is still short of the end.
+    // 1/2 at x = -0.618: 0.1363 mm, where the starting value is still before the end.
     for arc in [0.1366, 0.137, 0.1375] {
         let fault = solved(&line, 0.8, arc).unwrap_err();
         assert_eq!(fault.kind, FaultKind::ParameterBackwards);
@@ -426,12 +426,12 @@ fn an_arc_over_which_the_speed_falls_too_much_is_refused() {
             "{arc}: {fault:?} for {want}"
         );
     }
-    // A guess beyond the end needs no trust: the arc up to there says whether it is.
+    // A starting value beyond the end needs no tolerance: the arc up to the end decides.
     assert!(matches!(solved(&line, 0.9, 0.0376), Ok(Reach::Beyond(_))));
 }
 
-/// A start as good as still: the first-order step says ten patches, the arc ends after a twelfth of one, and Newton's
-/// method is not to be trusted from there.
+/// A start with nearly zero speed: the first-order step is ten patches, the arc ends after a twelfth of one, and Newton's
+/// method must not be used from there.
 #[test]
 fn an_arc_over_which_the_speed_rises_too_much_is_refused() {
     let line: Curve = [[0.0, 1e-3, 0.0, 20.0], [0.0; 4], [0.0; 4]];

@@ -5,14 +5,14 @@ use crate::job::program::Program;
 use crate::surface::Edges;
 use std::vec::Vec;
 
-/// 4 x 3 patches of a wave, of uneven lengths along the pass, 20 mm to a side.
+/// 4 x 3 patches of a wavy surface, of unequal lengths along the pass, 20 mm on a side.
 fn wave(pattern: Pattern) -> (Program, Vec<i32>) {
     let along = [0.0, 0.004, 0.3, 0.35, 1.0];
     let across = [0.0, 0.5, 0.55, 1.0];
     let mut c = [[[0.0; 4]; 4]; 3];
     (c[0][1][0], c[1][0][1]) = (20.0, 20.0);
     (c[2][2][0], c[2][3][0]) = (9.0, -7.0);
-    // It bends across most in the middle of a pass, and more from pass to pass.
+    // The curvature across the pass is greatest in the middle of a pass, and increases from pass to pass.
     (c[2][1][2], c[2][2][2], c[2][1][3], c[2][2][3]) = (-20.0, 20.0, -40.0, 40.0);
     let widths = |ends: &[f64]| -> Vec<i32> {
         let pairs = ends.windows(2);
@@ -51,7 +51,7 @@ fn wave(pattern: Pattern) -> (Program, Vec<i32>) {
     (program, store)
 }
 
-/// Patches that are prepared ahead are those that a crossing would prepare: no sample differs, and most crossings find them prepared.
+/// Patches prepared ahead equal those prepared at a crossing: all samples are equal, and most crossings find the patch prepared.
 #[test]
 fn patches_made_ahead_change_no_bit() {
     for pattern in [Pattern::Zig, Pattern::Zigzag] {
@@ -62,7 +62,7 @@ fn patches_made_ahead_change_no_bit() {
         let mut patches = 0;
         loop {
             late.buffer.disable();
-            // What lies across is looked at in ticks that have nothing to make ahead; which they are is not the same.
+            // The step-over estimator runs in ticks without a patch to prepare, which differ between the two runs.
             ahead.step_over_estimator.disable();
             late.step_over_estimator.disable();
             let more = ahead.advance(&job, &mut here).unwrap();
@@ -77,12 +77,12 @@ fn patches_made_ahead_change_no_bit() {
     }
 }
 
-/// What a run leaves behind does not get into the next one: a run that was stopped anywhere, and begun again, is the first once more.
+/// The state left by a run does not affect the next one: a run that was stopped anywhere and restarted repeats the first run.
 #[test]
 fn a_run_that_is_begun_again_is_the_same() {
     let (program, store) = wave(Pattern::Zig);
     let job = program.job(&store).unwrap();
-    // In the first pass before its neighbouring lines were evaluated, after either of them, and in later passes.
+    // Stops in the first pass before, between and after the evaluation of its neighbouring lines, and in later passes.
     for stopped in [5, 601, 605, 1234, 1238, 4321] {
         let (mut first, mut again) = (Run::START, Run::START);
         let (mut here, mut there) = (Sample::START, Sample::START);

@@ -1,10 +1,10 @@
 //! Step 5 with look-ahead: the step-over from a pass to the next one.
 //!
-//! The interval of eqns 10 and 11 is of first order: it takes lengths and curvatures of the pass for those of the whole gap, and a parabola
-//! for the ball. What that leaves out is a percent or two of the scallop height where lines spread or the surface bends more from pass to
-//! pass, h/(2r) everywhere, and up to four times the height at the end of a pass whose lines are skew. So the estimator also
-//! evaluates the surface beside the pass: in ticks with little other work it takes the inverse square interval, `1/interval^2`, on two neighbouring
-//! lines, half a step-over and a whole one further, at the same path parameter. Over the step to the next pass, the mean inverse square interval
+//! The interval of eqns 10 and 11 is a first-order approximation: it uses the lengths and curvatures at the pass for the whole gap, and a parabola
+//! for the ball. Its error is 1 to 2 % of the scallop height where the path lines diverge or the curvature increases from pass to
+//! pass, h/(2r) everywhere, and up to four times the height at the end of a pass with skew path lines. So the estimator also
+//! evaluates the surface beside the pass: in ticks with little other work it computes the inverse square interval, `1/interval^2`, on two neighbouring
+//! lines, half a step-over and a whole one away, at the same path parameter. The mean inverse square interval over the step to the next pass
 //! gives the scallop height.
 
 use crate::job::Header;
@@ -17,60 +17,60 @@ use crate::pass::schedule;
 use crate::sample::{SpanParameter, interval_of};
 use crate::surface::{Contact, Pass as _};
 
-/// One in this number of ticks without other work evaluates a neighbouring line, the two lines in turn: the intervals of neighbouring samples
-/// hardly differ.
+/// One of this number of ticks without other work evaluates a neighbouring line, alternating between the two: the intervals of adjacent samples
+/// differ little.
 pub(crate) const EVERY: u32 = 4;
 
-/// Longest step, over the first order's: the lines lie no further.
+/// Maximum ratio of the step to the first-order step: the neighbouring lines extend no further.
 const STEP_MAX: f32 = 1.25;
-/// Shortest: where the inverse square interval rises faster than that, the lines are too far apart to resolve it.
+/// Minimum ratio of the step to the first-order step: where the inverse square interval rises faster, the two lines do not resolve it.
 const STEP_MIN: f32 = 0.25;
-/// Newton steps to the root of a cubic, from at most four times the root: four bring it to a few percent there. Where the inverse square interval changes
-/// by a tenth two are enough: a step of [`NEWTON_LAST`] leaves 1e-6.
+/// Maximum Newton iterations for the root of a cubic, from a start of at most four times the root, where four leave an error of a few percent. Where the inverse square interval changes
+/// by 10 %, two are enough: after a correction of [`NEWTON_LAST`] the error is 1e-6.
 const NEWTON_STEPS: u8 = 4;
 const NEWTON_LAST: f32 = 1e-3;
-/// The first pass has no step before it by which to choose the lines. They are chosen again when the greatest inverse square interval has grown by
+/// The first pass has no previous step from which to place the lines. They are placed again when the maximum inverse square interval has grown by
 /// this factor since.
-const AIM_AGAIN: f32 = 1.25;
+const REPLACE_FACTOR: f32 = 1.25;
 
-/// The next work on a line.
+/// The next task on a neighbouring line.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Task {
-    /// Choose its side parameter.
-    Aim,
-    /// Collapse its patch beside the one that the pass is on.
+    /// Choose the line's side parameter.
+    Place,
+    /// Collapse the line's patch beside the pass's current patch.
     Patch,
-    /// The inverse square interval at its start.
+    /// Evaluate the inverse square interval at the line's start.
     Start,
-    /// The inverse square intervals on it, until the last patch of the pass.
-    Look,
-    /// The inverse square interval at its end.
+    /// Evaluate inverse square intervals on the line, up to the last patch of the pass.
+    Evaluate,
+    /// Evaluate the inverse square interval at the line's end.
     End,
-    /// The inverse square intervals on it, to the end.
-    LookOn,
-    /// None: the surface ends before it, or its patch is faulty.
-    Rest,
+    /// Evaluate inverse square intervals on the line's last patch.
+    EvaluateLast,
+    /// No task: the line is beyond the surface, or its patch is faulty.
+    Idle,
 }
 
-/// A line at a fixed side parameter beside the pass, ahead of it.
+/// A line at a constant side parameter beside the pass, towards the next pass.
 #[derive(Clone, Copy, Debug)]
 struct NeighbourLine {
-    /// Its distance from the pass, of a step-over.
+    /// Distance from the pass, as a fraction of a step-over.
     share: f32,
     patch: Patch,
     task: Task,
-    /// Path span that `patch` is on, and how many spans it was on.
+    /// Path span of `patch`, and the number of spans evaluated so far.
     span: u16,
     spans: u16,
     side: SpanParameter,
-    /// The step-over, in the side parameter, and the inverse square interval by which it was chosen.
+    /// The step-over, in the side parameter, and the inverse square interval from which it was chosen.
     step: f32,
-    aimed: f32,
-    /// Greatest inverse square interval on the line.
+    placed_for: f32,
+    /// Maximum inverse square interval on the line.
     most: f32,
 }
 
-/// The greatest inverse square interval of the samples of a pass, and of the surface there `across` and `lateral_squared` of the [`Contact`].
+/// The maximum inverse square interval of the samples of a pass, with `across` and `lateral_squared` of the [`Contact`] at that sample.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct PassMaximum {
     pub(crate) inv_interval_sq: f32,
@@ -78,28 +78,28 @@ pub(crate) struct PassMaximum {
 }
 
 impl PassMaximum {
-    /// Of nothing.
+    /// No sample yet.
     pub(crate) const NONE: Self = Self {
         inv_interval_sq: 0.0,
         shape: [0.0; 2],
     };
 }
 
-/// The greatest inverse square intervals at a pass's ends and on the lines beside it.
+/// The maximum inverse square intervals at a pass's ends and on the two neighbouring lines.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct StepOverEstimator {
     lines: [NeighbourLine; 2],
-    /// Greatest inverse square interval at the ends of the pass, and which of them are still to be evaluated.
+    /// Maximum inverse square interval at the ends of the pass, and the ends still to be evaluated.
     edge: f32,
     ends: [bool; 2],
-    /// Step of the pass before.
+    /// Step of the previous pass.
     before: Option<f32>,
-    /// Which line has its turn.
+    /// The line to evaluate next.
     second: bool,
 }
 
 impl StepOverEstimator {
-    /// Before the first pass.
+    /// State before the first pass.
     pub(crate) const START: Self = Self {
         lines: [NeighbourLine::new(0.5), NeighbourLine::new(1.0)],
         edge: 0.0,
@@ -108,13 +108,13 @@ impl StepOverEstimator {
         second: false,
     };
 
-    /// Back to before the first pass. [`Self::begin`] resets the rest.
+    /// Resets to the state before the first pass. [`Self::begin`] resets the other fields.
     pub(crate) const fn restart(&mut self) {
         self.before = None;
         self.second = false;
     }
 
-    /// A pass begins.
+    /// Begins a pass.
     pub(crate) fn begin(&mut self) {
         let [half, whole] = &mut self.lines;
         half.begin();
@@ -123,25 +123,25 @@ impl StepOverEstimator {
         self.ends = [true; 2];
     }
 
-    /// Evaluates no more on this pass.
+    /// Ends evaluation on this pass.
     #[cfg(test)]
     pub(crate) fn disable(&mut self) {
         self.ends = [false; 2];
         self.lines = Self::START.lines;
     }
 
-    /// Whether the next thing to be done at this place is a patch.
+    /// Whether the next task at this position collapses a patch.
     pub(crate) fn makes_patch(&self, position: &PassPosition) -> bool {
         let [half, whole] = &self.lines;
         let beside = if self.second { whole } else { half };
         match beside.task {
             Task::Patch => true,
-            Task::Look => beside.span != position.span,
+            Task::Evaluate => beside.span != position.span,
             _ => false,
         }
     }
 
-    /// One portion of work, for a run at this fraction of this patch. `most`: greatest inverse square interval of the pass so far.
+    /// Executes one task, for a run at this fraction of this patch. `most`: maximum inverse square interval of the pass so far.
     #[inline(never)]
     pub(crate) fn work(
         &mut self,
@@ -166,8 +166,8 @@ impl StepOverEstimator {
         }
     }
 
-    /// The step to the next pass, in units of the side parameter, after the last sample of this one; infinite where nothing sets
-    /// a limit.
+    /// The step to the next pass, in units of the side parameter, after the last sample of this one; infinite where the scallop limit does
+    /// not bound the step.
     pub(crate) fn step(&mut self, header: &Header, maximum: PassMaximum) -> f32 {
         let PassMaximum {
             inv_interval_sq: most,
@@ -181,7 +181,7 @@ impl StepOverEstimator {
         let [half, whole] = self.lines.each_ref().map(|line| line.found(header, here));
         let mean = match (half, whole) {
             (Some(half), Some(whole)) => mean(here, half, whole),
-            // The surface ends before the second line, or there was no time to evaluate it.
+            // The second line is beyond the surface, or was not evaluated in time.
             (Some(half), None) => half.at_least(here),
             _ => here,
         };
@@ -198,23 +198,23 @@ impl StepOverEstimator {
 }
 
 impl NeighbourLine {
-    /// No line yet, to lie at this share of a step-over.
+    /// A line not placed yet, for this fraction of a step-over.
     const fn new(share: f32) -> Self {
         Self {
             share,
             patch: Patch::NONE,
-            task: Task::Rest,
+            task: Task::Idle,
             span: 0,
             spans: 0,
             side: SpanParameter { span: 0, fraction: 0 },
             step: 0.0,
-            aimed: 0.0,
+            placed_for: 0.0,
             most: 0.0,
         }
     }
 
     const fn begin(&mut self) {
-        self.task = Task::Aim;
+        self.task = Task::Place;
         self.spans = 0;
         self.most = 0.0;
     }
@@ -230,33 +230,35 @@ impl NeighbourLine {
     ) {
         let is_first = before.is_none();
         self.task = match self.task {
-            Task::Aim => self.aim(job, position, most, before),
-            _ if is_first && most > AIM_AGAIN * self.aimed => self.aim(job, position, most, before),
+            Task::Place => self.place(job, position, most, before),
+            _ if is_first && most > REPLACE_FACTOR * self.placed_for => {
+                self.place(job, position, most, before)
+            }
             Task::Patch => self.make_patch(job, position, Task::Start),
             Task::Start => {
                 self.most = at_end(job, &self.patch, 0).at_least(self.most);
-                Task::Look
+                Task::Evaluate
             }
-            Task::Look if self.span != position.span => self.make_patch(job, position, Task::Look),
-            Task::Look if position.next(job.header.path_spans).is_none() => Task::End,
+            Task::Evaluate if self.span != position.span => self.make_patch(job, position, Task::Evaluate),
+            Task::Evaluate if position.next(job.header.path_spans).is_none() => Task::End,
             Task::End => {
                 self.most = at_end(job, &self.patch, u64::MAX).at_least(self.most);
-                Task::LookOn
+                Task::EvaluateLast
             }
-            Task::Look | Task::LookOn => {
+            Task::Evaluate | Task::EvaluateLast => {
                 if let Ok(contact) = self.patch.surface.contact(fraction, &self.patch.ball) {
                     self.most = exact_at(job, &self.patch, &contact).at_least(self.most);
                 }
                 self.task
             }
-            Task::Rest => Task::Rest,
+            Task::Idle => Task::Idle,
         };
     }
 
-    /// Chooses the line: by the step before, or by what the pass's samples so far would come to.
-    fn aim(&mut self, job: &Job<'_>, position: &PassPosition, most: f32, before: Option<f32>) -> Task {
+    /// Places the line: by the previous step, or by the step that the samples of this pass so far allow.
+    fn place(&mut self, job: &Job<'_>, position: &PassPosition, most: f32, before: Option<f32>) -> Task {
         self.step = before.unwrap_or_else(|| interval_of(most));
-        self.aimed = most;
+        self.placed_for = most;
         let spans = job.header.side_spans;
         let width = |span| job.side_width(span);
         match schedule::next_side(position.side, self.share * self.step, spans, width) {
@@ -265,7 +267,7 @@ impl NeighbourLine {
                 self.most = 0.0;
                 Task::Patch
             }
-            _ => Task::Rest,
+            _ => Task::Idle,
         }
     }
 
@@ -278,31 +280,31 @@ impl NeighbourLine {
         self.spans = self.spans.saturating_add(1);
         match self.patch.collapse(job, &beside) {
             Ok(()) => then,
-            Err(_) => Task::Rest,
+            Err(_) => Task::Idle,
         }
     }
 
-    /// Greatest inverse square interval on the line; a line that was evaluated in part counts as no flatter than the pass.
+    /// Maximum inverse square interval on the line; for a line evaluated in part, at least that of the pass.
     fn found(&self, header: &Header, here: f32) -> Option<f32> {
         match self.task {
-            Task::LookOn if self.spans >= header.path_spans => Some(self.most),
-            Task::LookOn | Task::End | Task::Look => Some(self.most.at_least(here)),
-            Task::Aim | Task::Patch | Task::Start | Task::Rest => None,
+            Task::EvaluateLast if self.spans >= header.path_spans => Some(self.most),
+            Task::EvaluateLast | Task::End | Task::Evaluate => Some(self.most.at_least(here)),
+            Task::Place | Task::Patch | Task::Start | Task::Idle => None,
         }
     }
 }
 
-/// Mean inverse square interval over a step-over, from the values at its start, middle and end. Where the middle stands out, a parabola's; where the ends
-/// do, that of two straight lines, because an inverse square interval may have a kink at a knot.
+/// Mean inverse square interval over a step-over, from the values at its start, middle and end. By Simpson's rule where the middle is the maximum; where the ends
+/// are, by the trapezoidal rule, because an inverse square interval may have a kink at a knot.
 fn mean(here: f32, half: f32, whole: f32) -> f32 {
     let parabola = (here + 4.0 * half + whole) * (1.0 / 6.0);
     let lines = (here + 2.0 * half + whole) * 0.25;
     parabola.at_least(lines)
 }
 
-/// The inverse square interval at an end of a line, 0 where there is no contact. There the crest between two passes is beyond the end of one of them, where
-/// lines are skew: from the last ball of that one it is as far as the side line leads, from the other one at right angles to the pass.
-/// With a and b for |d|^2 (1 + r c) of these two directions, the crest is 4/(1 + sqrt(a/b))^2 as high.
+/// The inverse square interval at an end of a line; 0 where there is no contact. Where path lines are skew, the scallop crest between two passes lies beyond
+/// the end of one of them: the distance from the last ball of that pass is along the side line, from the other pass at right angles to it.
+/// With a and b for |d|^2 (1 + r c) of these two directions, the crest height is multiplied by 4/(1 + sqrt(a/b))^2.
 #[inline(never)]
 fn at_end(job: &Job<'_>, patch: &Patch, fraction: u64) -> f32 {
     let Ok(contact) = patch.surface.contact(fraction, &patch.ball) else {
@@ -310,7 +312,7 @@ fn at_end(job: &Job<'_>, patch: &Patch, fraction: u64) -> f32 {
     };
     let inv_interval_sq = exact_at(job, patch, &contact);
     let part = contact.across / contact.outwards;
-    // Not so at a pole, where it is a part of nothing, nor where the side line bends that much less that it rises slower.
+    // Not at a pole, where the ratio is 0/0, nor where the side line's lower curvature makes the ratio 1 or more.
     if !(part > 0.0 && part < 1.0) {
         return inv_interval_sq;
     }
@@ -323,9 +325,9 @@ fn exact_at(job: &Job<'_>, patch: &Patch, contact: &Contact) -> f32 {
     exact(job.header, patch.interval.inv_interval_sq(contact), shape)
 }
 
-/// The inverse square interval without the first order's approximations in h/r. The ball's circle instead of its parabola
-/// makes it 1/(1 - h/(2r)) of itself, and
-/// the scallop's own height above a surface of curvature c another 1 + h c; `across` over `lateral_squared` is 1 + r c.
+/// The inverse square interval without the first-order approximations in h/r. The ball's circle instead of the parabola
+/// multiplies the inverse square interval by 1/(1 - h/(2r)),
+/// and the scallop's height above a surface of curvature c by 1 + h c; `across / lateral_squared` is 1 + r c.
 fn exact(header: &Header, inv_interval_sq: f32, [across, lateral_squared]: [f32; 2]) -> f32 {
     let height = header.scallop_mm / header.ball_radius_mm;
     let bend = if lateral_squared > 0.0 {
@@ -336,17 +338,17 @@ fn exact(header: &Header, inv_interval_sq: f32, [across, lateral_squared]: [f32;
     inv_interval_sq * (1.0 + height * bend) / (1.0 - 0.5 * height)
 }
 
-/// The step x over which an inverse square interval that begins as `here` has the mean `here + rise x`, which is 1/x^2.
+/// The step x at which the mean inverse square interval `here + rise x` over the step is 1/x^2.
 fn step_over(here: f32, rise: f32) -> f32 {
     let first = interval_of(here);
-    // In units of the first order's step, where here = 1.
+    // In units of the first-order step, where here = 1.
     let rise = rise * first / here;
     let mut step = 1.0_f32;
     for _ in 0..NEWTON_STEPS {
         let slope = step * (2.0 + 3.0 * rise * step);
-        // Where the inverse square interval vanishes within the step there is no root: as far as is allowed.
+        // Where the inverse square interval becomes zero within the step there is no root: the maximum step.
         let next = step - (step * step * (1.0 + rise * step) - 1.0) / slope.at_least(0.5);
-        // A NaN becomes the shortest step.
+        // A NaN becomes the minimum step.
         let next = next.at_least(STEP_MIN).at_most(STEP_MAX);
         let change = (next - step).abs();
         step = next;
@@ -361,7 +363,7 @@ fn step_over(here: f32, rise: f32) -> f32 {
 mod tests {
     use super::*;
 
-    /// Steps over an inverse square interval that is known everywhere end where the mean of the inverse square interval is 1/step^2.
+    /// For a known linear inverse square interval, its mean over the step is 1/step^2.
     #[test]
     fn the_mean_over_the_step_makes_the_scallop() {
         for rise in [0.0, 0.01, -0.01, 0.3, -0.2, 2.0, 10.0] {
@@ -372,14 +374,14 @@ mod tests {
             let tolerance = if rise > 1.0 { 3e-2 } else { 2e-6 };
             assert!((height - 1.0).abs() < tolerance, "rise {rise}: {height}");
         }
-        // Within the bounds, and finite.
+        // Within the bounds and finite.
         let first = interval_of(1.0);
         assert!((step_over(1.0, -1.0) / first - STEP_MAX).abs() < 1e-6);
         assert!((step_over(1.0, 1e9) / first - STEP_MIN).abs() < 1e-6);
         assert!(step_over(1.0, f32::NAN).is_finite());
     }
 
-    /// A parabola is met exactly where it bends down, a kink where it bends up; what is even stays.
+    /// A concave parabola and a convex kink are integrated exactly; a constant is unchanged.
     #[test]
     fn means_of_parabolas_and_kinks() {
         let near = |got: f32, want: f64| assert!((f64::from(got) - want).abs() < 1e-6, "{got} for {want}");
