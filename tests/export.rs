@@ -152,7 +152,7 @@ struct Bounds {
 
 /// Follows one pass; returns the moves that it took and their time.
 fn follow(job: &Job, pass: &PassPath<'_>, moves: &[Move], bounds: &Bounds) -> (usize, f64) {
-    let end = pass.at(pass.ends[1]).unwrap().contact.cl_mm;
+    let end = pass.at(pass.ends[1]).unwrap().contact.cl_mm.to_array();
     let mut path = pass.ends[0];
     let mut time_s = 0.0;
     for (count, cut) in moves.iter().enumerate() {
@@ -165,8 +165,8 @@ fn follow(job: &Job, pass: &PassPath<'_>, moves: &[Move], bounds: &Bounds) -> (u
         let (begin, takes) = (path, cut.length() / cut.feed_mm_s);
         for k in 1..=PLACES {
             let place = cut.at(f64::from(k) / f64::from(PLACES));
-            let foot = pass.oracle.foot(place, path, pass.side).unwrap();
-            let off = distance(place, foot.contact.cl_mm);
+            let foot = pass.oracle.foot(place.into(), path, pass.side).unwrap();
+            let off = distance(place, foot.contact.cl_mm.to_array());
             let most = if k == PLACES {
                 bounds.ends_mm
             } else {
@@ -212,7 +212,7 @@ fn check(job: &Job, options: &Options, bounds: &Bounds) -> ExportedProgram {
     let mut highest = f64::NEG_INFINITY;
     let (mut next, mut time_s) = (0, 0.0);
     for pass in &passes {
-        let begin = pass.at(pass.ends[0]).unwrap().contact.cl_mm;
+        let begin = pass.at(pass.ends[0]).unwrap().contact.cl_mm.to_array();
         let link = moves[next..]
             .iter()
             .position(|link| distance(link.to, begin) < ROUNDED_MM)
@@ -266,8 +266,8 @@ fn check_step_over(job: &Job, pass: &PassPath<'_>, link: &[Move]) {
         assert!(!cut.rapid, "{cut:?}");
         for k in (0..PLACES).rev() {
             let place = cut.at(f64::from(k) / f64::from(PLACES));
-            let foot = across.foot(place, side, pass.ends[0]).unwrap();
-            let off = distance(place, foot.contact.cl_mm);
+            let foot = across.foot(place.into(), side, pass.ends[0]).unwrap();
+            let off = distance(place, foot.contact.cl_mm.to_array());
             assert!(off <= job.chord_mm + ROUNDED_MM, "{cut:?}: {off} mm off");
             side = foot.path;
         }

@@ -43,10 +43,10 @@ fn oracle_of(case: &Case) -> Oracle {
     oracle
 }
 
-/// Largest difference of two lists of numbers, relative to `size`.
-fn difference(ours: &[f64], golden: &[f64], size: f64) -> f64 {
-    assert_eq!(ours.len(), golden.len());
-    ours.iter()
+/// Largest difference of the coordinates of two vectors, relative to `size`.
+fn difference(ours: impl Into<[f64; 3]>, golden: &[f64; 3], size: f64) -> f64 {
+    ours.into()
+        .iter()
         .zip(golden)
         .map(|(a, b)| (a - b).abs() / size)
         .fold(0.0, f64::max)
@@ -67,13 +67,13 @@ fn differences(oracle: &Oracle, point: &Point) -> Vec<(&'static str, f64)> {
     let bend_path = SECOND_MM / (contact.path_speed * contact.path_speed);
     let bend_side = SECOND_MM / (contact.lateral_speed * contact.lateral_speed);
     vec![
-        ("cc", difference(&at.point, &point.cc, SIZE_MM)),
-        ("a", difference(&a, &point.a, SIZE_MM)),
-        ("b", difference(&b, &point.b, SIZE_MM)),
-        ("aa", difference(&aa, &point.aa, SECOND_MM)),
-        ("ab", difference(&at.uv, &point.ab, SECOND_MM)),
-        ("bb", difference(&bb, &point.bb, SECOND_MM)),
-        ("normal", difference(&contact.normal, &point.normal, 1.0)),
+        ("cc", difference(at.point, &point.cc, SIZE_MM)),
+        ("a", difference(a, &point.a, SIZE_MM)),
+        ("b", difference(b, &point.b, SIZE_MM)),
+        ("aa", difference(aa, &point.aa, SECOND_MM)),
+        ("ab", difference(at.uv, &point.ab, SECOND_MM)),
+        ("bb", difference(bb, &point.bb, SECOND_MM)),
+        ("normal", difference(contact.normal, &point.normal, 1.0)),
         (
             "curvature_path",
             (contact.curvature_path - point.curvature_path).abs() / bend_path,
@@ -88,7 +88,7 @@ fn differences(oracle: &Oracle, point: &Point) -> Vec<(&'static str, f64)> {
         ),
         ("step_over", relative(contact.step_over_mm, point.step_over)),
         ("interval", relative(contact.interval, point.interval)),
-        ("cl", difference(&contact.cl_mm, &point.cl, SIZE_MM)),
+        ("cl", difference(contact.cl_mm, &point.cl, SIZE_MM)),
     ]
 }
 

@@ -110,8 +110,7 @@ fn near(job: &Job, [u, v]: [f64; 2]) -> (f64, f64) {
                 sine = 0.0;
             }
             let d = oracle.surface.at(u, v);
-            let dot = |a: [f64; 3], b: [f64; 3]| a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
-            let (e, f, g) = (dot(d.u, d.u), dot(d.u, d.v), dot(d.v, d.v));
+            let (e, f, g) = (d.u.length_squared(), d.u.dot(d.v), d.v.length_squared());
             sine = sine.min(((e * g - f * f).max(0.0) / (e * g)).sqrt());
         }
     }
@@ -123,7 +122,7 @@ fn turns(job: &Job, ran: &Ran) -> bool {
     let oracle = Oracle::new(job).unwrap();
     let normal = |[u, v]: [f64; 2]| oracle.contact(u, v).map(|contact| contact.normal);
     match (normal(ran.place), ran.neighbour.map(normal)) {
-        (Ok(a), Some(Ok(b))) => a[0] * b[0] + a[1] * b[1] + a[2] * b[2] < -0.499,
+        (Ok(a), Some(Ok(b))) => a.dot(b) < -0.499,
         _ => false,
     }
 }
@@ -138,12 +137,11 @@ fn series(job: &Job, ran: &Ran) -> (f64, f64) {
         Along::U => (d.u, d.uu, u, v),
         Along::V => (d.v, d.vv, v, u),
     };
-    let dot = |a: [f64; 3], b: [f64; 3]| a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
     let way = if ran.backwards { -1.0 } else { 1.0 };
     let room = if ran.backwards { path } else { 1.0 - path };
     let arc_mm = job.feed_mm_min / 60.0 * 1e-3;
-    let first = arc_mm / dot(a, a).sqrt();
-    let bend = way * first * dot(a, a2) / dot(a, a);
+    let first = arc_mm / a.length();
+    let bend = way * first * a.dot(a2) / a.length_squared();
     let added = bend * (bend - 1.0) / 2.0;
     let step = (first * (1.0 + added)).min(room);
     let covered_mm = way * oracle.arc_of_step(path, way * step, side);

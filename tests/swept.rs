@@ -179,11 +179,8 @@ fn ball_between_two_lips() {
     let oracle = Oracle::new(&job).unwrap();
     let contact = oracle.contact(gouge.contact[0], gouge.contact[1]).unwrap();
     let place = oracle.contact(gouge.u, gouge.v).unwrap();
-    assert!(contact.cc_mm[0] * place.cc_mm[0] < 0.0);
-    let reach = (0..3)
-        .map(|k| (contact.cl_mm[k] - place.cc_mm[k]).powi(2))
-        .sum::<f64>()
-        .sqrt();
+    assert!(contact.cc_mm.x * place.cc_mm.x < 0.0);
+    let reach = contact.cl_mm.distance(place.cc_mm);
     // Along the pass the sample may be a step off.
     assert!(
         (job.radius_mm - reach - gouge.depth_mm).abs() < 0.01,

@@ -6,6 +6,7 @@ use super::curve::{SPEED_SHARE, longest};
 use super::nodes::{Node, Nodes};
 use super::{ApproachError, PassPath};
 use crate::gcode::{Cut, Plane, Shape};
+use glam::DVec3;
 use job::Job;
 
 /// Largest radius of an arc, mm; flatter ones become lines: a controller in f32 has no precision for a longer radius.
@@ -164,7 +165,7 @@ impl Arcs {
         let contact = at_joint(&|node| node.cc_length_mm) - first.cc_length_mm;
         let contacts = [contact, last.cc_length_mm - first.cc_length_mm - contact];
         let lift = |[at_x, at_y]: Flat, height: f64| {
-            let mut point = [height; 3];
+            let mut point = DVec3::splat(height);
             (point[x], point[y]) = (at_x, at_y);
             point
         };

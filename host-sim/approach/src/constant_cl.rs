@@ -3,7 +3,6 @@
 use super::linear::{Chain, Chord, Pace, even_chords};
 use super::{Approach, ApproachError, Each, PassPath, Program};
 use job::Job;
-use oracle::vector::length;
 
 /// A step that leaves less than this share of itself before the end is extended to the end.
 const END_SHARE: f64 = 1e-9;
@@ -57,7 +56,7 @@ pub(super) fn follow(
 ) -> Result<(), ApproachError> {
     let way = feed_mm_s * period_s;
     let rate = |path: f64| -> Result<f64, ApproachError> {
-        let speed = length(pass.at(pass.kept(path))?.cl_velocity);
+        let speed = pass.at(pass.kept(path))?.cl_velocity.length();
         Ok(pass.sense() / speed.max(1e-9))
     };
     let mut path = pass.ends[0];

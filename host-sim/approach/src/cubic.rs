@@ -2,7 +2,7 @@
 //! along it; and the fit of both.
 
 use super::nodes::Node;
-use oracle::vector::{Vector, add, dot, length, scale, subtract};
+use glam::DVec3;
 
 /// Largest number of interior points of a segment in a fit.
 const PLACES_MAX: usize = 40;
@@ -15,9 +15,9 @@ const LAWSON: usize = 16;
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Cubic {
     /// Ends, mm.
-    pub points_mm: [[f64; 3]; 2],
+    pub points_mm: [DVec3; 2],
     /// Derivatives at the ends, mm.
-    pub derivatives_mm: [[f64; 3]; 2],
+    pub derivatives_mm: [DVec3; 2],
     /// Speed of the centre, mm/s: coefficients of 1, t, t², t³.
     pub speed_mm_s: [f64; 4],
     /// Path parameters of the contact at the ends.
@@ -27,27 +27,27 @@ pub struct Cubic {
 impl Cubic {
     /// Coefficients of 1, t, t², t³.
     #[must_use]
-    pub fn coefficients(&self) -> [[f64; 3]; 4] {
+    pub fn coefficients(&self) -> [DVec3; 4] {
         let [p, q] = self.points_mm;
         let [a, b] = self.derivatives_mm;
-        let apart = subtract(q, p);
-        let square = subtract(scale(apart, 3.0), add(scale(a, 2.0), b));
-        let cube = add(add(a, b), scale(apart, -2.0));
+        let apart = q - p;
+        let square = apart * 3.0 - (a * 2.0 + b);
+        let cube = a + b - apart * 2.0;
         [p, a, square, cube]
     }
 
     /// The centre at t, mm.
     #[must_use]
-    pub fn at(&self, t: f64) -> [f64; 3] {
+    pub fn at(&self, t: f64) -> DVec3 {
         let [c0, c1, c2, c3] = self.coefficients();
-        add(c0, scale(add(c1, scale(add(c2, scale(c3, t)), t)), t))
+        c0 + (c1 + (c2 + c3 * t) * t) * t
     }
 
     /// Its derivative by t, mm.
     #[must_use]
-    pub fn derivative(&self, t: f64) -> [f64; 3] {
+    pub fn derivative(&self, t: f64) -> DVec3 {
         let [_, c1, c2, c3] = self.coefficients();
-        add(c1, scale(add(scale(c2, 2.0), scale(c3, 3.0 * t)), t))
+        c1 + (c2 * 2.0 + c3 * (3.0 * t)) * t
     }
 
     /// Commanded speed of the centre at t, mm/s.
@@ -82,7 +82,7 @@ pub(super) fn fit(nodes: &[Node], feed_mm_s: f64) -> Option<(Cubic, Errors)> {
         .collect();
     let mut cubic = Cubic {
         points_mm: [first.cl_mm(), last.cl_mm()],
-        derivatives_mm: [scale(first.tangent, span), scale(last.tangent, span)],
+        derivatives_mm: [first.tangent * span, last.tangent * span],
         speed_mm_s: [0.0; 4],
         path: [first.at.path, last.at.path],
     };
@@ -91,19 +91,19 @@ pub(super) fn fit(nodes: &[Node], feed_mm_s: f64) -> Option<(Cubic, Errors)> {
         if a <= 0.0 || b <= 0.0 {
             return None;
         }
-        cubic.derivatives_mm = [scale(first.tangent, a), scale(last.tangent, b)];
+        cubic.derivatives_mm = [first.tangent * a, last.tangent * b];
         for (node, t) in inner.iter().zip(&mut at) {
             let velocity = cubic.derivative(*t);
-            let squared = dot(velocity, velocity);
+            let squared = velocity.length_squared();
             if squared > 0.0 {
-                *t = (*t + dot(subtract(node.cl_mm(), cubic.at(*t)), velocity) / squared).clamp(0.0, 1.0);
+                *t = (*t + (node.cl_mm() - cubic.at(*t)).dot(velocity) / squared).clamp(0.0, 1.0);
             }
         }
     }
     let path_mm = inner
         .iter()
         .zip(&at)
-        .map(|(node, t)| length(subtract(node.cl_mm(), cubic.at(*t))))
+        .map(|(node, t)| node.cl_mm().distance(cubic.at(*t)))
         .fold(0.0, f64::max);
     let speed = |node: &Node| feed_mm_s * node.at.ratio();
     let wanted: Vec<f64> = inner.iter().map(|node| speed(node)).collect();
@@ -117,21 +117,21 @@ pub(super) fn fit(nodes: &[Node], feed_mm_s: f64) -> Option<(Cubic, Errors)> {
 }
 
 /// Lengths of the end derivatives by least squares, at the current parameters of the points.
-fn magnitudes(cubic: &Cubic, tangents: [Vector; 2], inner: &[&Node], at: &[f64]) -> Option<[f64; 2]> {
+fn magnitudes(cubic: &Cubic, tangents: [DVec3; 2], inner: &[&Node], at: &[f64]) -> Option<[f64; 2]> {
     let [p, q] = cubic.points_mm;
     let (mut matrix, mut right) = ([0.0; 3], [0.0; 2]);
     for (node, t) in inner.iter().zip(at) {
         let s = 1.0 - t;
         let [begin, end] = [t * s * s, -t * t * s];
         let to_end = t * t * (3.0 - 2.0 * t);
-        let rest = subtract(node.cl_mm(), add(scale(p, 1.0 - to_end), scale(q, to_end)));
-        let [a, b] = [scale(tangents[0], begin), scale(tangents[1], end)];
+        let rest = node.cl_mm() - (p * (1.0 - to_end) + q * to_end);
+        let [a, b] = [tangents[0] * begin, tangents[1] * end];
         matrix = [
-            matrix[0] + dot(a, a),
-            matrix[1] + dot(a, b),
-            matrix[2] + dot(b, b),
+            matrix[0] + a.length_squared(),
+            matrix[1] + a.dot(b),
+            matrix[2] + b.length_squared(),
         ];
-        right = [right[0] + dot(a, rest), right[1] + dot(b, rest)];
+        right = [right[0] + a.dot(rest), right[1] + b.dot(rest)];
     }
     solve(matrix, right)
 }

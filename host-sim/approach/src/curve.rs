@@ -7,7 +7,6 @@ use super::cubic::{Cubic, Errors, fit};
 use super::nodes::Nodes;
 use super::{Approach, ApproachError, Each, PassPath, Program};
 use job::Job;
-use oracle::vector::length;
 
 /// Tolerance of the fitted speed, as a share of the feed (from the paper).
 pub const SPEED_SHARE: f64 = 0.01;
@@ -111,7 +110,7 @@ struct Spline {
 
 /// t after a time at the fitted speed from t, along one cubic; beyond 1 if the cubic ends before.
 fn after(cubic: &Cubic, t: f64, time_s: f64) -> f64 {
-    let rate = |t: f64| cubic.speed(t) / length(cubic.derivative(t)).max(1e-12);
+    let rate = |t: f64| cubic.speed(t) / cubic.derivative(t).length().max(1e-12);
     let first = rate(t);
     let second = rate(t + 0.5 * time_s * first);
     let third = rate(t + 0.5 * time_s * second);

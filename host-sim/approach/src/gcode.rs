@@ -2,7 +2,7 @@
 
 use std::fmt::Write;
 
-use oracle::vector::{length, subtract};
+use glam::DVec3;
 
 /// Resolution of coordinates, mm.
 pub const RESOLUTION_MM: f64 = 1e-4;
@@ -76,7 +76,7 @@ pub enum Shape {
         /// Its plane.
         plane: Plane,
         /// Its centre, mm.
-        centre_mm: [f64; 3],
+        centre_mm: DVec3,
         /// Clockwise in its plane.
         clockwise: bool,
     },
@@ -86,7 +86,7 @@ pub enum Shape {
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Cut {
     /// End point, mm.
-    pub to_mm: [f64; 3],
+    pub to_mm: DVec3,
     /// Length, mm.
     pub length_mm: f64,
     /// Speed, mm/s.
@@ -98,10 +98,10 @@ pub struct Cut {
 impl Cut {
     /// A straight cut.
     #[must_use]
-    pub fn line(from_mm: [f64; 3], to_mm: [f64; 3], speed_mm_s: f64) -> Self {
+    pub fn line(from_mm: DVec3, to_mm: DVec3, speed_mm_s: f64) -> Self {
         Self {
             to_mm,
-            length_mm: length(subtract(to_mm, from_mm)),
+            length_mm: to_mm.distance(from_mm),
             speed_mm_s,
             shape: Shape::Line,
         }
@@ -185,8 +185,8 @@ impl<'a> Blocks<'a> {
     }
 
     /// Sets the position without a block.
-    pub fn start(&mut self, at_mm: [f64; 3]) {
-        self.at = at_mm.map(|mm| Some(steps(mm)));
+    pub fn start(&mut self, at_mm: DVec3) {
+        self.at = at_mm.to_array().map(|mm| Some(steps(mm)));
     }
 
     /// Appends a rapid move of some axes.
@@ -196,7 +196,7 @@ impl<'a> Blocks<'a> {
 
     /// Appends a cut. A cut of zero length, at the resolution, is omitted.
     pub fn cut(&mut self, cut: &Cut) {
-        let to = cut.to_mm.map(|mm| Some(steps(mm)));
+        let to = cut.to_mm.to_array().map(|mm| Some(steps(mm)));
         if to == self.at {
             // Computed before the plane word is written.
             return;
@@ -262,18 +262,19 @@ mod tests {
     fn text(feed_mode: FeedMode, cuts: &[Cut]) -> String {
         let mut out = String::new();
         let mut blocks = Blocks::new(&mut out, feed_mode);
-        blocks.start([0.0; 3]);
+        blocks.start(DVec3::ZERO);
         cuts.iter().for_each(|cut| blocks.cut(cut));
         out
     }
 
     #[test]
     fn words_that_hold_are_left_out() {
+        let (corner, above) = (DVec3::new(3.0, -4.0, 0.0), DVec3::new(3.0, -4.0, 0.12));
         let lines = [
-            Cut::line([0.0; 3], [3.0, -4.0, 0.0], 10.0),
-            Cut::line([3.0, -4.0, 0.0], [3.0, -4.000_04, 0.0], 10.0),
-            Cut::line([3.0, -4.0, 0.0], [3.0, -4.0, 0.12], 10.0),
-            Cut::line([3.0, -4.0, 0.12], [0.0, 0.0, 0.12], 10.123_456),
+            Cut::line(DVec3::ZERO, corner, 10.0),
+            Cut::line(corner, DVec3::new(3.0, -4.000_04, 0.0), 10.0),
+            Cut::line(corner, above, 10.0),
+            Cut::line(above, DVec3::new(0.0, 0.0, 0.12), 10.123_456),
         ];
         assert_eq!(text(FeedMode::G94, &lines), "G1X3Y-4F600\nZ0.12\nX0Y0F607.41\n");
         assert_eq!(
@@ -290,11 +291,11 @@ mod tests {
             speed_mm_s: 1.0,
             shape: Shape::Arc {
                 plane: Plane::Zx,
-                centre_mm: [5.0, 0.0, 0.0],
+                centre_mm: DVec3::new(5.0, 0.0, 0.0),
                 clockwise: true,
             },
         };
-        let cuts = [arc([5.0, 0.0, 5.0]), arc([10.0, 0.0, 0.0])];
+        let cuts = [arc(DVec3::new(5.0, 0.0, 5.0)), arc(DVec3::new(10.0, 0.0, 0.0))];
         assert_eq!(text(FeedMode::G94, &cuts), "G18G2X5Z5I5K0F60\nX10Z0I0K-5\n");
     }
 }

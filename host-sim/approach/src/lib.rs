@@ -23,6 +23,7 @@ mod nodes;
 mod pass;
 mod run;
 
+use glam::DVec3;
 use std::fmt;
 
 pub use arcs::Arcs;
@@ -146,7 +147,7 @@ pub trait Approach {
 }
 
 /// Receives the ball centre after each period, mm, and an estimate of the path parameter of its contact.
-pub type Each<'a> = dyn FnMut([f64; 3], f64) -> Result<(), ApproachError> + 'a;
+pub type Each<'a> = dyn FnMut(DVec3, f64) -> Result<(), ApproachError> + 'a;
 
 /// A planned pass.
 pub trait Program {

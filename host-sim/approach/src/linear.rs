@@ -4,8 +4,8 @@
 use super::pass::from_segment;
 use super::{Approach, ApproachError, Each, PassPath, Program};
 use crate::gcode::{Blocks, Cut, FeedMode};
+use glam::DVec3;
 use job::Job;
-use oracle::vector::{add, cross, dot, length, scale, subtract};
 use oracle::{OffsetPoint, OracleError};
 
 /// Interior points of a chord at which its error is evaluated.
@@ -60,9 +60,9 @@ pub struct Chord {
     /// Path parameter of the end.
     pub path: f64,
     /// CL at the start, mm.
-    pub from_mm: [f64; 3],
+    pub from_mm: DVec3,
     /// CL at the end, mm.
-    pub to_mm: [f64; 3],
+    pub to_mm: DVec3,
     /// CL speed, mm/s.
     pub speed_mm_s: f64,
 }
@@ -104,8 +104,8 @@ pub fn chords(
             at.path + step * pass.sense()
         };
         let next = pass.at(path)?;
-        let cc = length(subtract(next.contact.cc_mm, at.contact.cc_mm));
-        let cl = length(subtract(next.contact.cl_mm, at.contact.cl_mm));
+        let cc = next.contact.cc_mm.distance(at.contact.cc_mm);
+        let cl = next.contact.cl_mm.distance(at.contact.cl_mm);
         chords.push(Chord {
             path,
             from_mm: at.contact.cl_mm,
@@ -144,7 +144,7 @@ fn path_curvature(pass: &PassPath<'_>, path: f64) -> f64 {
         Along::U => (at.u, at.uu),
         Along::V => (at.v, at.vv),
     };
-    length(cross(a, aa)) / dot(a, a).powf(1.5)
+    a.cross(aa).length() / a.length_squared().powf(1.5)
 }
 
 /// Eqn 6: `sqrt(8 rho delta) / |A|`, as far as the pass goes.
@@ -270,15 +270,15 @@ impl Program for Chain {
         }
         let mut begin = pass.ends[0];
         for chord in &self.chords {
-            let apart = subtract(chord.to_mm, chord.from_mm);
-            let periods = (length(apart) / (chord.speed_mm_s * period_s) - PERIOD_SLACK)
+            let apart = chord.to_mm - chord.from_mm;
+            let periods = (apart.length() / (chord.speed_mm_s * period_s) - PERIOD_SLACK)
                 .ceil()
                 .max(1.0);
             let mut period = 1.0;
             while period <= periods {
                 let share = period / periods;
                 each(
-                    add(chord.from_mm, scale(apart, share)),
+                    chord.from_mm + apart * share,
                     begin + (chord.path - begin) * share,
                 )?;
                 period += 1.0;

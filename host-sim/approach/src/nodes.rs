@@ -1,7 +1,7 @@
 //! Dense points of a pass with arc lengths, as the data of curve fits.
 
 use super::PassPath;
-use oracle::vector::{Vector, length};
+use glam::DVec3;
 use oracle::{OffsetPoint, OracleError};
 
 /// Points per smooth span of the surface, and least number of points per pass.
@@ -16,7 +16,7 @@ pub struct Node {
     /// Contact and centre.
     pub at: OffsetPoint,
     /// Unit tangent of the centre's path in the direction of the cut.
-    pub tangent: [f64; 3],
+    pub tangent: DVec3,
     /// Arc length of the CC path from the start, mm.
     pub cc_length_mm: f64,
     /// Arc length of the CL path from the start, mm.
@@ -26,7 +26,7 @@ pub struct Node {
 impl Node {
     /// CL, mm.
     #[must_use]
-    pub fn cl_mm(&self) -> [f64; 3] {
+    pub fn cl_mm(&self) -> DVec3 {
         self.at.contact.cl_mm
     }
 }
@@ -68,7 +68,7 @@ impl Nodes {
                         let between = pass.at(from + (path - from) * share)?;
                         let half = 0.5 * (path - from).abs();
                         lengths[0] += half * between.contact.path_speed;
-                        lengths[1] += half * length(between.cl_velocity);
+                        lengths[1] += half * between.cl_velocity.length();
                     }
                 }
                 let at = pass.at(path)?;
@@ -103,10 +103,10 @@ impl Nodes {
     }
 }
 
-fn unit(vector: Vector, sense: f64) -> Vector {
-    let length = length(vector);
+fn unit(vector: DVec3, sense: f64) -> DVec3 {
+    let length = vector.length();
     if length > 0.0 {
-        vector.map(|x| x * sense / length)
+        vector * (sense / length)
     } else {
         vector
     }

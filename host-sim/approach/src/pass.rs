@@ -1,6 +1,6 @@
 //! A pass in its cutting direction.
 
-use oracle::vector::{Vector, length, subtract};
+use glam::DVec3;
 use oracle::{OffsetPoint, Oracle, OracleError};
 
 /// One pass of a job.
@@ -54,19 +54,18 @@ impl PassPath<'_> {
             self.oracle.surface.at(u, v).point
         };
         let first = at(0);
-        (1..=PLACES).all(|k| length(subtract(at(k), first)) < 1e-9)
+        (1..=PLACES).all(|k| at(k).distance(first) < 1e-9)
     }
 }
 
 /// Distance of a point from a segment, mm.
-pub(crate) fn from_segment(point: Vector, from: Vector, to: Vector) -> f64 {
-    use oracle::vector::{add, dot, scale};
-    let (along, away) = (subtract(to, from), subtract(point, from));
-    let squared = dot(along, along);
+pub(crate) fn from_segment(point: DVec3, from: DVec3, to: DVec3) -> f64 {
+    let (along, away) = (to - from, point - from);
+    let squared = along.length_squared();
     let share = if squared > 0.0 {
-        (dot(away, along) / squared).clamp(0.0, 1.0)
+        (away.dot(along) / squared).clamp(0.0, 1.0)
     } else {
         0.0
     };
-    length(subtract(point, add(from, scale(along, share))))
+    point.distance(from + along * share)
 }

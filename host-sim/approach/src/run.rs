@@ -1,6 +1,7 @@
 //! Runs an approach over a whole job.
 
 use crate::{Approach, ApproachError, Kind, PassPath};
+use glam::DVec3;
 use inspect::plain;
 use job::{Job, Pattern};
 use machine::Machine;
@@ -19,7 +20,7 @@ pub struct Motion {
     /// Side parameter of the pass.
     pub side: f64,
     /// CL, mm; rounded only for the product.
-    pub cl_mm: [f64; 3],
+    pub cl_mm: DVec3,
 }
 
 /// Size of the CNC program of a job.
@@ -123,12 +124,12 @@ pub fn planned(
     Ok(planned)
 }
 
-fn nanometres(mm: [f64; 3]) -> [i32; 3] {
-    mm.map(|x| (x * NM_PER_MM).round() as i32)
+fn nanometres(mm: DVec3) -> [i32; 3] {
+    mm.to_array().map(|x| (x * NM_PER_MM).round() as i32)
 }
 
 /// The motion to a commanded CL.
-fn motion(pass: &PassPath<'_>, cl_mm: [f64; 3], guess: f64, feed_mm_s: f64) -> Result<Motion, OracleError> {
+fn motion(pass: &PassPath<'_>, cl_mm: DVec3, guess: f64, feed_mm_s: f64) -> Result<Motion, OracleError> {
     let foot = pass.oracle.foot(cl_mm, guess, pass.side)?;
     let (u, v) = pass.oracle.swapped(foot.path, pass.side);
     Ok(Motion {
@@ -156,7 +157,7 @@ fn of_sample(prepared: &Prepared, sample: &interp_core::Sample, first: bool) -> 
         emitted: plain(prepared, sample).emitted(first, false)?,
         path: prepared.path.parameter(sample.path),
         side: prepared.side.parameter(sample.side),
-        cl_mm: sample.cl_nm.map(|nm| f64::from(nm) / NM_PER_MM),
+        cl_mm: DVec3::from(sample.cl_nm.map(f64::from)) / NM_PER_MM,
     })
 }
 

@@ -40,7 +40,7 @@ pub use measure::{Measures, measure};
 pub use outline::{Outline, outline};
 pub use placement::Placement;
 pub use reader::{Model, read};
-pub use spline::{Axis, DEGREE_MAX, Pole, SplineCurve, SplineSurface};
+pub use spline::{Axis, DEGREE_MAX, Derivatives, Pole, SplineCurve, SplineSurface};
 pub use surface::Surface;
 
 use oracle::vector::Vector;

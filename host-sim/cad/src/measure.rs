@@ -1,8 +1,8 @@
 //! Measures of a surface: bounding box, least concave radius on either side, mean normal.
 
+use glam::DVec3;
 use job::Along;
 use job::SurfaceSpec;
-use oracle::vector::{cross, dot, length, scale};
 use oracle::{Derivatives, Surface};
 
 /// Points per side of each patch at which a surface is evaluated.
@@ -40,18 +40,18 @@ impl Measures {
 
 /// Principal curvatures on the plus side, least and largest, 1/mm; `ranges` are the lengths of the parameters' ranges.
 fn principal(at: &Derivatives, ranges: [f64; 2]) -> Option<[f64; 2]> {
-    let normal = cross(at.u, at.v);
-    let area = length(normal);
-    let reach = [length(at.u) * ranges[0], length(at.v) * ranges[1]];
+    let normal = at.u.cross(at.v);
+    let area = normal.length();
+    let reach = [at.u.length() * ranges[0], at.v.length() * ranges[1]];
     if reach[0].min(reach[1]) <= POLE_SHARE * reach[0].max(reach[1]) {
         return None;
     }
-    if area.is_nan() || area <= SINE_MIN * length(at.u) * length(at.v) {
+    if area.is_nan() || area <= SINE_MIN * at.u.length() * at.v.length() {
         return None;
     }
-    let normal = scale(normal, 1.0 / area);
-    let (e, f, g) = (dot(at.u, at.u), dot(at.u, at.v), dot(at.v, at.v));
-    let (l, m, n) = (dot(at.uu, normal), dot(at.uv, normal), dot(at.vv, normal));
+    let normal = normal / area;
+    let (e, f, g) = (at.u.length_squared(), at.u.dot(at.v), at.v.length_squared());
+    let (l, m, n) = (at.uu.dot(normal), at.uv.dot(normal), at.vv.dot(normal));
     let mean = 0.5 * (e * n - 2.0 * f * m + g * l) / (area * area);
     let gauss = (l * n - m * m) / (area * area);
     let spread = (mean * mean - gauss).max(0.0).sqrt();
@@ -75,22 +75,17 @@ pub fn measure(spec: &SurfaceSpec) -> Measures {
     };
     let (us, vs) = (places(Along::U), places(Along::V));
     let ranges = surface.domain().map(|range| range[1] - range[0]);
-    let mut corners_mm = [[f64::INFINITY; 3], [f64::NEG_INFINITY; 3]];
+    let mut corners_mm = [DVec3::INFINITY, DVec3::NEG_INFINITY];
     let mut tightest = [(0.0, [us[0], vs[0]]); 2];
-    let (mut facing, mut whole) = ([0.0; 3], 0.0);
+    let (mut facing, mut whole) = (DVec3::ZERO, 0.0);
     for &u in &us {
         for &v in &vs {
             let at = surface.at(u, v);
             let [least, most] = corners_mm;
-            corners_mm = [
-                std::array::from_fn(|k| at.point[k].min(least[k])),
-                std::array::from_fn(|k| at.point[k].max(most[k])),
-            ];
-            let area = cross(at.u, at.v);
-            for k in 0..3 {
-                facing[k] += area[k];
-            }
-            whole += length(area);
+            corners_mm = [least.min(at.point), most.max(at.point)];
+            let area = at.u.cross(at.v);
+            facing += area;
+            whole += area.length();
             if let Some([least, most]) = principal(&at, ranges) {
                 for (side, curvature) in [(0, most), (1, -least)] {
                     if curvature > tightest[side].0 {
@@ -106,13 +101,9 @@ pub fn measure(spec: &SurfaceSpec) -> Measures {
         (curvature > FLAT).then(|| 1.0 / curvature)
     });
     Measures {
-        corners_mm,
+        corners_mm: corners_mm.map(|corner| corner.to_array()),
         concave_mm,
-        facing: if whole > 0.0 {
-            scale(facing, 1.0 / whole)
-        } else {
-            facing
-        },
+        facing: (if whole > 0.0 { facing / whole } else { facing }).to_array(),
     }
 }
 

@@ -1,11 +1,27 @@
 //! B-splines of any degree, rational or not: evaluation, and exact restriction to a part of the domain
 //! (Piegl and Tiller, "The NURBS Book", 2nd ed., A2.1 to A2.3, A4.4, A5.1; here "P&T").
 
-use oracle::Derivatives;
 use serde::{Deserialize, Serialize};
 
 /// A homogeneous point `(w x, w y, w z, w)`, mm and a weight.
 pub type Pole = [f64; 4];
+
+/// A point of a surface with its derivatives, mm.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Derivatives {
+    /// S.
+    pub point: [f64; 3],
+    /// S_u.
+    pub u: [f64; 3],
+    /// S_v.
+    pub v: [f64; 3],
+    /// S_uu.
+    pub uu: [f64; 3],
+    /// S_uv.
+    pub uv: [f64; 3],
+    /// S_vv.
+    pub vv: [f64; 3],
+}
 
 /// Highest degree that is read; CAD systems write at most 25 (OpenCASCADE).
 pub const DEGREE_MAX: usize = 25;

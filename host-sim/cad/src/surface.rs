@@ -5,8 +5,7 @@ use std::f64::consts::{FRAC_PI_2, TAU};
 
 use super::curve::Curve;
 use super::placement::Placement;
-use super::spline::{SplineCurve, SplineSurface};
-use oracle::Derivatives;
+use super::spline::{Derivatives, SplineCurve, SplineSurface};
 use oracle::vector::{Vector, add, cross, dot, length, scale, subtract};
 
 /// Step of a difference quotient, as a share of the range; only for second derivatives of offset surfaces.

@@ -1,7 +1,6 @@
 //! Arc length along a pass: the integral of |A| over the path parameter.
 
 use super::contact::Oracle;
-use super::vector::length;
 
 /// Nodes and weights of the three-point Gauss-Legendre rule on [-1, 1]: ±sqrt(3/5) and 0; 5/9 and 8/9.
 const NODE: f64 = 0.774_596_669_241_483_4;
@@ -68,6 +67,6 @@ impl Oracle {
     /// |A|, mm per unit of the path parameter.
     fn path_speed(&self, path: f64, side: f64) -> f64 {
         let (u, v) = self.swapped(path, side);
-        length(self.surface.tangent(u, v, self.along))
+        self.surface.tangent(u, v, self.along).length()
     }
 }

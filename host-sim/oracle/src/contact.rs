@@ -3,7 +3,7 @@
 use std::fmt;
 
 use super::surface::{Derivatives, Surface};
-use super::vector::{Vector, add, cross, dot, length, scale};
+use glam::DVec3;
 use job::{Along, Job, Pattern, Side, Spacing};
 
 /// A first derivative shorter than this share of the other one (each times its range) marks a pole, where the patch's
@@ -79,11 +79,11 @@ impl std::error::Error for OracleError {}
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Contact {
     /// Cutter contact CC, mm.
-    pub cc_mm: [f64; 3],
+    pub cc_mm: DVec3,
     /// Unit normal N from the material to the tool.
-    pub normal: [f64; 3],
+    pub normal: DVec3,
     /// Cutter location CL = CC + r N, mm.
-    pub cl_mm: [f64; 3],
+    pub cl_mm: DVec3,
     /// Speed of the path parameter |A|, mm per unit of the parameter; 0 on a pass that degenerates to a pole.
     pub path_speed: f64,
     /// Normal curvature along the pass, 1/mm.
@@ -205,19 +205,19 @@ impl Oracle {
     /// As [`Oracle::contact`], with the surface's derivatives precomputed.
     pub(super) fn contact_of(&self, at: &Derivatives, u: f64, v: f64) -> Result<Contact, OracleError> {
         let [[u0, u1], [v0, v1]] = self.surface.domain();
-        let (speed_u, speed_v) = (length(at.u), length(at.v));
+        let (speed_u, speed_v) = (at.u.length(), at.v.length());
         let reach = (speed_u * (u1 - u0), speed_v * (v1 - v0));
         let u_vanishes = reach.0 < reach.1;
         let (least, most) = (reach.0.min(reach.1), reach.0.max(reach.1));
         if least <= POLE_SHARE * most {
             return self.contact_at_pole(u, v, at, u_vanishes);
         }
-        let product = cross(at.u, at.v);
-        let area = length(product);
+        let product = at.u.cross(at.v);
+        let area = product.length();
         if area <= SINE_MIN * speed_u * speed_v {
             return Err(OracleError::Degenerate { u, v });
         }
-        let contact = self.regular_contact(at, scale(product, self.normal_sign / area));
+        let contact = self.regular_contact(at, product * (self.normal_sign / area));
         if least > NEAR_POLE_SHARE * most {
             return Ok(contact);
         }
@@ -233,17 +233,17 @@ impl Oracle {
     }
 
     /// Steps 3 and 4 where both derivatives are regular.
-    fn regular_contact(&self, at: &Derivatives, normal: Vector) -> Contact {
+    fn regular_contact(&self, at: &Derivatives, normal: DVec3) -> Contact {
         let (a, b, aa, bb) = match self.along {
             Along::U => (at.u, at.v, at.uu, at.vv),
             Along::V => (at.v, at.u, at.vv, at.uu),
         };
-        let (e, f) = (dot(a, a), dot(a, b));
-        let (l, m, n) = (dot(aa, normal), dot(at.uv, normal), dot(bb, normal));
+        let (e, f) = (a.length_squared(), a.dot(b));
+        let (l, m, n) = (aa.dot(normal), at.uv.dot(normal), bb.dot(normal));
         let alpha = -f / e;
         // |a A + B|^2 without the cancellation of E a^2 + 2 F a + G
-        let across = add(scale(a, alpha), b);
-        let across_squared = dot(across, across);
+        let across = a * alpha + b;
+        let across_squared = across.length_squared();
         let curvature_side = (l * alpha * alpha + 2.0 * m * alpha + n) / across_squared;
         let curvature_path = l / e;
         // The same form in the orthogonal directions: torsion of the pass, then Mohr's circle.
@@ -263,8 +263,8 @@ impl Oracle {
     /// The contact with the step-over and the interval that follow from the curvatures.
     fn with_curvatures(
         &self,
-        cc_mm: Vector,
-        normal: Vector,
+        cc_mm: DVec3,
+        normal: DVec3,
         path_speed: f64,
         lateral_speed: f64,
         [curvature_path, curvature_side]: [f64; 2],
@@ -279,7 +279,7 @@ impl Oracle {
         Contact {
             cc_mm,
             normal,
-            cl_mm: add(cc_mm, scale(normal, self.radius_mm)),
+            cl_mm: cc_mm + normal * self.radius_mm,
             path_speed,
             curvature_path,
             curvature_side,
@@ -301,27 +301,27 @@ impl Oracle {
         // Near the pole the vanishing derivative is the mixed one times the signed step into the surface.
         let inwards = self.inwards(u, v, u_vanishes);
         let (limit_u, limit_v) = if u_vanishes {
-            (scale(at.uv, inwards), at.v)
+            (at.uv * inwards, at.v)
         } else {
-            (at.u, scale(at.uv, inwards))
+            (at.u, at.uv * inwards)
         };
-        let product = cross(limit_u, limit_v);
-        let area = length(product);
-        if area.is_nan() || area <= SINE_MIN * length(limit_u) * length(limit_v) {
+        let product = limit_u.cross(limit_v);
+        let area = product.length();
+        if area.is_nan() || area <= SINE_MIN * limit_u.length() * limit_v.length() {
             return Err(OracleError::Degenerate { u, v });
         }
-        let normal = scale(product, self.normal_sign / area);
+        let normal = product * (self.normal_sign / area);
         let beside = self.beside_pole(u, v, u_vanishes)?;
         let pass_collapses = u_vanishes == (self.along == Along::U);
         let path_speed = if pass_collapses {
             0.0
         } else {
-            length(if u_vanishes { at.v } else { at.u })
+            (if u_vanishes { at.v } else { at.u }).length()
         };
         // At a pole every side line has its own direction: its own speed and curvature apply.
         let (side, side2) = if u_vanishes { (at.v, at.vv) } else { (at.u, at.uu) };
         let (lateral_speed, curvature_side) = if pass_collapses {
-            (length(side), dot(side2, normal) / dot(side, side))
+            (side.length(), side2.dot(normal) / side.length_squared())
         } else {
             (0.0, beside.curvature_side)
         };
@@ -352,10 +352,10 @@ impl Oracle {
             let by = step * (k as f64 + 1.0);
             let (u, v) = if u_vanishes { (u, v + by) } else { (u + by, v) };
             let at = self.surface.at(u, v);
-            let product = cross(at.u, at.v);
-            let area = length(product);
+            let product = at.u.cross(at.v);
+            let area = product.length();
             if area > 0.0 {
-                Ok(self.regular_contact(&at, scale(product, self.normal_sign / area)))
+                Ok(self.regular_contact(&at, product * (self.normal_sign / area)))
             } else {
                 Err(OracleError::Degenerate { u, v })
             }
@@ -381,10 +381,10 @@ fn upper_side(surface: &Surface) -> Result<f64, OracleError> {
     for i in 0..ORIENTATION_GRID {
         for j in 0..ORIENTATION_GRID {
             let at = surface.at(place((u0, u1), i), place((v0, v1), j));
-            let product = cross(at.u, at.v);
-            sum += product[2];
-            magnitudes += product[2].abs();
-            area += length(product);
+            let product = at.u.cross(at.v);
+            sum += product.z;
+            magnitudes += product.z.abs();
+            area += product.length();
         }
     }
     let decided = sum.abs() > ORIENTATION_SHARE * magnitudes && magnitudes > UPWARD_SHARE * area;
@@ -408,9 +408,8 @@ mod tests {
             for u in [1e-12, 1e-10, 1.1e-9, 1e-8, 1e-7, 1e-6, 1e-5, 1e-4, 1e-3] {
                 for v in [0.0, 0.3, 0.446_874_612_011_015_4, 1.0] {
                     let contact = oracle.contact(u, v).unwrap();
-                    for (normal, place) in contact.normal.iter().zip(contact.cc_mm) {
-                        assert!((normal - place / 25.0).abs() < 1e-6, "u = {u}, v = {v}");
-                    }
+                    let off = contact.normal - contact.cc_mm / 25.0;
+                    assert!(off.abs().max_element() < 1e-6, "u = {u}, v = {v}");
                     for curvature in contact.principal {
                         assert!(
                             (curvature + 1.0 / 25.0).abs() < 1e-6,

@@ -1,7 +1,7 @@
 //! Rational and polynomial B-spline surfaces by their basis functions (P&T A2.1, A2.3, A3.6, A4.4).
 
 use super::surface::Derivatives;
-use super::vector::Vector;
+use glam::DVec3;
 use job::{Along, NurbsSpec};
 
 /// Poles with influence at a point, in one direction: degree 3 plus one.
@@ -92,7 +92,7 @@ impl Nurbs {
     }
 
     /// First derivative along one parameter.
-    pub(super) fn tangent(&self, u: f64, v: f64, along: Along) -> Vector {
+    pub(super) fn tangent(&self, u: f64, v: f64, along: Along) -> DVec3 {
         let (first_u, basis_u) = self.directions[0].basis(u);
         let (first_v, basis_v) = self.directions[1].basis(v);
         let (order_u, order_v) = if along == Along::U { (1, 0) } else { (0, 1) };
@@ -109,7 +109,7 @@ impl Nurbs {
         if !self.rational {
             return xyz(&derivative);
         }
-        std::array::from_fn(|k| (derivative[k] - derivative[3] * s[k] / s[3]) / s[3])
+        (xyz(&derivative) - derivative[3] * xyz(&s) / s[3]) / s[3]
     }
 
     /// The poles with influence in a span, row by row.
@@ -195,8 +195,8 @@ fn accumulate(sum: &mut Homogeneous, factor: f64, term: &Homogeneous) {
     }
 }
 
-fn xyz(a: &Homogeneous) -> Vector {
-    [a[0], a[1], a[2]]
+fn xyz(a: &Homogeneous) -> DVec3 {
+    DVec3::new(a[0], a[1], a[2])
 }
 
 /// Derivatives of `(x, y, z) / w` from those of the homogeneous surface (P&T A4.4).
@@ -208,18 +208,16 @@ fn quotient(
     s_uv: &Homogeneous,
     s_vv: &Homogeneous,
 ) -> Derivatives {
-    let mut at = Derivatives::default();
     let w = s[3];
-    for k in 0..3 {
-        let point = s[k] / w;
-        let u = (s_u[k] - s_u[3] * point) / w;
-        let v = (s_v[k] - s_v[3] * point) / w;
-        at.point[k] = point;
-        at.u[k] = u;
-        at.v[k] = v;
-        at.uu[k] = (s_uu[k] - 2.0 * s_u[3] * u - s_uu[3] * point) / w;
-        at.uv[k] = (s_uv[k] - s_u[3] * v - s_v[3] * u - s_uv[3] * point) / w;
-        at.vv[k] = (s_vv[k] - 2.0 * s_v[3] * v - s_vv[3] * point) / w;
+    let point = xyz(s) / w;
+    let u = (xyz(s_u) - s_u[3] * point) / w;
+    let v = (xyz(s_v) - s_v[3] * point) / w;
+    Derivatives {
+        point,
+        u,
+        v,
+        uu: (xyz(s_uu) - 2.0 * s_u[3] * u - s_uu[3] * point) / w,
+        uv: (xyz(s_uv) - s_u[3] * v - s_v[3] * u - s_uv[3] * point) / w,
+        vv: (xyz(s_vv) - 2.0 * s_v[3] * v - s_vv[3] * point) / w,
     }
-    at
 }

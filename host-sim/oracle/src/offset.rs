@@ -3,7 +3,7 @@
 
 use super::contact::{Contact, Oracle, OracleError};
 use super::surface::Derivatives;
-use super::vector::{Vector, add, cross, dot, length, scale, subtract};
+use glam::DVec3;
 use job::Along;
 
 /// Step into the surface at which derivatives at a pole are evaluated, as a share of the range.
@@ -25,7 +25,7 @@ pub struct OffsetPoint {
     /// The contact.
     pub contact: Contact,
     /// dCL / d(path parameter), mm per unit.
-    pub cl_velocity: [f64; 3],
+    pub cl_velocity: DVec3,
 }
 
 impl OffsetPoint {
@@ -33,7 +33,7 @@ impl OffsetPoint {
     #[must_use]
     pub fn ratio(&self) -> f64 {
         if self.contact.path_speed > 0.0 {
-            length(self.cl_velocity) / self.contact.path_speed
+            self.cl_velocity.length() / self.contact.path_speed
         } else {
             1.0
         }
@@ -61,24 +61,24 @@ impl Oracle {
     }
 
     /// `A + r N_A` by the Weingarten equations; `None` where the derivatives do not span the tangent plane.
-    fn cl_velocity(&self, at: &Derivatives, normal: Vector) -> Option<Vector> {
+    fn cl_velocity(&self, at: &Derivatives, normal: DVec3) -> Option<DVec3> {
         let (a, b, aa) = match self.along {
             Along::U => (at.u, at.v, at.uu),
             Along::V => (at.v, at.u, at.vv),
         };
-        let (e, f, g) = (dot(a, a), dot(a, b), dot(b, b));
-        let product = cross(a, b);
-        let determinant = dot(product, product);
+        let (e, f, g) = (a.length_squared(), a.dot(b), b.length_squared());
+        let product = a.cross(b);
+        let determinant = product.length_squared();
         if determinant.is_nan() || determinant <= 1e-18 * e * g {
             return None;
         }
-        let (l, m) = (dot(aa, normal), dot(at.uv, normal));
-        let turned = add(scale(a, g * l - f * m), scale(b, e * m - f * l));
-        Some(add(a, scale(turned, -self.radius_mm / determinant)))
+        let (l, m) = (aa.dot(normal), at.uv.dot(normal));
+        let turned = a * (g * l - f * m) + b * (e * m - f * l);
+        Some(a - turned * (self.radius_mm / determinant))
     }
 
     /// The derivative at a small step into the surface from a pole.
-    fn velocity_beside(&self, path: f64, side: f64) -> Option<Vector> {
+    fn velocity_beside(&self, path: f64, side: f64) -> Option<DVec3> {
         let inwards = |t: f64, [low, high]: [f64; 2]| {
             let step = INWARDS * (high - low);
             if t - low <= high - t { t + step } else { t - step }
@@ -119,15 +119,15 @@ impl Oracle {
     ///
     /// # Errors
     /// As [`Oracle::offset`].
-    pub fn foot(&self, cl_mm: [f64; 3], guess: f64, side: f64) -> Result<OffsetPoint, OracleError> {
+    pub fn foot(&self, cl_mm: DVec3, guess: f64, side: f64) -> Result<OffsetPoint, OracleError> {
         let [low, high] = self.path_range();
         let mut at = self.offset(guess.clamp(low, high), side)?;
         for _ in 0..FOOT_STEPS {
-            let squared = dot(at.cl_velocity, at.cl_velocity);
+            let squared = at.cl_velocity.length_squared();
             if squared <= 0.0 {
                 break;
             }
-            let by = dot(subtract(cl_mm, at.contact.cl_mm), at.cl_velocity) / squared;
+            let by = (cl_mm - at.contact.cl_mm).dot(at.cl_velocity) / squared;
             let next = (at.path + by).clamp(low, high);
             let moved = (next - at.path).abs();
             at = self.offset(next, side)?;

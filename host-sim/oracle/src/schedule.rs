@@ -6,7 +6,6 @@
 //! measured independently from the swept ball.
 
 use super::contact::{Oracle, OracleError};
-use super::vector::dot;
 use job::{Along, Spacing};
 
 /// Points scanned per span for the least interval, and the least number of points per pass.
@@ -134,7 +133,7 @@ impl Oracle {
             Along::U => (at.v, at.vv),
             Along::V => (at.u, at.uu),
         };
-        let outwards = dot(b, b) - self.radius_mm * dot(bb, contact.normal);
+        let outwards = b.length_squared() - self.radius_mm * bb.dot(contact.normal);
         let part = across / outwards;
         if part > 0.0 && part < 1.0 {
             Ok(density * 4.0 / (1.0 + part.sqrt()).powi(2))

@@ -1,24 +1,24 @@
 //! S(u, v) and its derivatives, directly from the job's numbers.
 
 use super::nurbs::Nurbs;
-use super::vector::{Vector, add, scale, subtract};
+use glam::DVec3;
 use job::{Along, SurfaceSpec};
 
 /// A point of a surface with its derivatives, mm.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Derivatives {
     /// S.
-    pub point: [f64; 3],
+    pub point: DVec3,
     /// S_u.
-    pub u: [f64; 3],
+    pub u: DVec3,
     /// S_v.
-    pub v: [f64; 3],
+    pub v: DVec3,
     /// S_uu.
-    pub uu: [f64; 3],
+    pub uu: DVec3,
     /// S_uv.
-    pub uv: [f64; 3],
+    pub uv: DVec3,
     /// S_vv.
-    pub vv: [f64; 3],
+    pub vv: DVec3,
 }
 
 /// A surface, evaluated on its closed [`domain`](Surface::domain).
@@ -99,7 +99,7 @@ impl Surface {
     }
 
     /// First derivative along one parameter: as in [`Surface::at`], at lower cost.
-    pub(super) fn tangent(&self, u: f64, v: f64, along: Along) -> Vector {
+    pub(super) fn tangent(&self, u: f64, v: f64, along: Along) -> DVec3 {
         if let Shape::Nurbs(nurbs) = &self.shape {
             return nurbs.tangent(u, v, along);
         }
@@ -125,27 +125,28 @@ fn revolved(radius: &[f64; 4], height: &[f64; 4], u: f64, v: f64) -> Derivatives
     let (r, z) = (cubic(radius, u), cubic(height, u));
     let (sin, cos) = v.sin_cos();
     Derivatives {
-        point: [r[0] * cos, r[0] * sin, z[0]],
-        u: [r[1] * cos, r[1] * sin, z[1]],
-        v: [-r[0] * sin, r[0] * cos, 0.0],
-        uu: [r[2] * cos, r[2] * sin, z[2]],
-        uv: [-r[1] * sin, r[1] * cos, 0.0],
-        vv: [-r[0] * cos, -r[0] * sin, 0.0],
+        point: DVec3::new(r[0] * cos, r[0] * sin, z[0]),
+        u: DVec3::new(r[1] * cos, r[1] * sin, z[1]),
+        v: DVec3::new(-r[0] * sin, r[0] * cos, 0.0),
+        uu: DVec3::new(r[2] * cos, r[2] * sin, z[2]),
+        uv: DVec3::new(-r[1] * sin, r[1] * cos, 0.0),
+        vv: DVec3::new(-r[0] * cos, -r[0] * sin, 0.0),
     }
 }
 
 /// `(1 - v) rail0(u) + v rail1(u)`.
 fn ruled(rails: &[[[f64; 4]; 3]; 2], u: f64, v: f64) -> Derivatives {
-    let rail =
-        |index: usize, order: usize| -> Vector { std::array::from_fn(|k| cubic(&rails[index][k], u)[order]) };
-    let between = |order: usize| add(scale(rail(0, order), 1.0 - v), scale(rail(1, order), v));
+    let rail = |index: usize, order: usize| {
+        DVec3::from_array(rails[index].each_ref().map(|axis| cubic(axis, u)[order]))
+    };
+    let between = |order: usize| rail(0, order) * (1.0 - v) + rail(1, order) * v;
     Derivatives {
         point: between(0),
         u: between(1),
-        v: subtract(rail(1, 0), rail(0, 0)),
+        v: rail(1, 0) - rail(0, 0),
         uu: between(2),
-        uv: subtract(rail(1, 1), rail(0, 1)),
-        vv: [0.0; 3],
+        uv: rail(1, 1) - rail(0, 1),
+        vv: DVec3::ZERO,
     }
 }
 

@@ -3,6 +3,7 @@
 use std::f64::consts::{FRAC_PI_2, FRAC_PI_3, PI};
 
 use super::*;
+use glam::DVec3;
 use job::{Along, Job, MachineSpec, NurbsSpec, Origin, Pattern, Side, Spacing, SurfaceSpec};
 
 /// A job on a surface with a ball of 5 mm and a scallop of 0.005 mm.
@@ -44,10 +45,10 @@ fn close(ours: f64, exact: f64, tolerance: f64) {
     );
 }
 
-fn all_close(ours: [f64; 3], exact: [f64; 3], tolerance: f64) {
-    ours.iter()
-        .zip(exact)
-        .for_each(|(ours, exact)| close(*ours, exact, tolerance));
+fn all_close(ours: DVec3, exact: DVec3, tolerance: f64) {
+    for (ours, exact) in ours.to_array().into_iter().zip(exact.to_array()) {
+        close(ours, exact, tolerance);
+    }
 }
 
 /// Points of a grid over the domain, ends included.
@@ -108,7 +109,7 @@ fn plane_has_zero_curvature() {
     };
     let oracle = oracle(surface, Along::U, Side::Up);
     let contact = oracle.contact(0.3, 0.6).unwrap();
-    assert_eq!(contact.normal, [0.0, 0.0, 1.0]);
+    assert_eq!(contact.normal, DVec3::Z);
     assert_eq!((contact.curvature_path, contact.curvature_side), (0.0, 0.0));
     close(contact.interval, (8.0 * 5.0 * 0.005_f64).sqrt() / 20.0, 1e-16);
     close(oracle.arc_length(0.1, 0.9, 0.6), 24.0, 1e-14);
@@ -128,7 +129,7 @@ fn cylinder_has_one_curvature() {
         // S_u x S_v points towards the axis.
         all_close(
             contact.normal,
-            [sign * 1.2_f64.cos(), sign * 1.2_f64.sin(), 0.0],
+            DVec3::new(sign * 1.2_f64.cos(), sign * 1.2_f64.sin(), 0.0),
             1e-15,
         );
         close(contact.curvature_path, -sign / 20.0, 1e-16);
@@ -158,9 +159,9 @@ fn sphere_is_a_sphere_up_to_its_pole() {
         let oracle = Oracle::new(&Job { along, ..job.clone() }).unwrap();
         for (u, v) in grid(&oracle.surface, 16) {
             let contact = oracle.contact(u, v).unwrap();
-            let radial = contact.cc_mm.map(|x| x / 25.0);
+            let radial = contact.cc_mm / 25.0;
             all_close(contact.normal, radial, 1e-14);
-            all_close(contact.cl_mm, radial.map(|x| x * 30.0), 1e-13);
+            all_close(contact.cl_mm, radial * 30.0, 1e-13);
             // Near the pole the f64 value of S_v, at the pole the extrapolation.
             let tolerance = if u == 0.0 { 1e-8 } else { 1e-12 };
             for curvature in [contact.curvature_path, contact.curvature_side]
@@ -199,11 +200,11 @@ fn torus_is_a_torus() {
     let oracle = Oracle::new(&sample_job("torus")).unwrap();
     for (u, v) in grid(&oracle.surface, 20) {
         let contact = oracle.contact(u, v).unwrap();
-        let [x, y, z] = contact.cc_mm;
+        let [x, y, z] = contact.cc_mm.to_array();
         let from_axis = x.hypot(y);
         close((from_axis - 40.0).hypot(z), 8.0, 1e-13);
         // The ball's centre lies on the circle of radius 3 around the tube's centre.
-        let [x, y, z] = contact.cl_mm;
+        let [x, y, z] = contact.cl_mm.to_array();
         close((x.hypot(y) - 40.0).hypot(z), 3.0, 1e-12);
         close(contact.curvature_side, 1.0 / 8.0, 1e-12);
         close(
@@ -239,13 +240,11 @@ fn derivatives_agree_with_differences() {
                 continue;
             }
             let at = surface.at(u, v);
-            let difference = |plus: [f64; 3], minus: [f64; 3]| -> [f64; 3] {
-                std::array::from_fn(|k| (plus[k] - minus[k]) / (2.0 * STEP))
-            };
+            let difference = |plus: DVec3, minus: DVec3| (plus - minus) / (2.0 * STEP);
             let (left, right) = (surface.at(u - STEP, v), surface.at(u + STEP, v));
             let (below, above) = (surface.at(u, v - STEP), surface.at(u, v + STEP));
-            let agree = |exact: [f64; 3], plus: [f64; 3], minus: [f64; 3]| {
-                let size = exact.iter().fold(1.0, |size: f64, x| size.max(x.abs()));
+            let agree = |exact: DVec3, plus: DVec3, minus: DVec3| {
+                let size = exact.abs().max_element().max(1.0);
                 all_close(exact, difference(plus, minus), 1e-6 * size);
             };
             agree(at.u, right.point, left.point);
@@ -330,8 +329,8 @@ fn ideal_samples(oracle: &Oracle, feed_mm_s: f64) -> Vec<PassSample> {
                 pass,
                 u,
                 v,
-                cc_nm: contact.cc_mm.map(|mm| (mm * 1e6).round() as i32),
-                cl_nm: contact.cl_mm.map(|mm| (mm * 1e6).round() as i32),
+                cc_nm: contact.cc_mm.to_array().map(|mm| (mm * 1e6).round() as i32),
+                cl_nm: contact.cl_mm.to_array().map(|mm| (mm * 1e6).round() as i32),
                 feed_mm_s,
                 interval: contact.interval,
                 first_of_pass: path == from,

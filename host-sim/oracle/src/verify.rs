@@ -2,7 +2,7 @@
 
 use super::contact::Oracle;
 use super::report::{AccuracyReport, SampleLocation};
-use super::vector::{angle, length, scale, subtract};
+use glam::DVec3;
 use job::{Pattern, Spacing};
 
 /// Nanometres in a millimetre.
@@ -220,16 +220,20 @@ impl Verifier {
             self.report.degenerate += 1;
             return None;
         };
-        let [cc_nm, cl_nm] = [sample.cc_nm, sample.cl_nm].map(|nm| nm.map(f64::from));
+        let [cc_nm, cl_nm] = [sample.cc_nm, sample.cl_nm].map(|nm| DVec3::from(nm.map(f64::from)));
         let report = &mut self.report;
-        let position_nm = length(subtract(cl_nm, scale(contact.cl_mm, NM_PER_MM)));
+        let position_nm = cl_nm.distance(contact.cl_mm * NM_PER_MM);
         report.position_nm.add(position_nm, spot);
         report
             .contact_nm
-            .add(length(subtract(cc_nm, scale(contact.cc_mm, NM_PER_MM))), spot);
-        report
-            .normal_rad
-            .add(angle(subtract(cl_nm, cc_nm), contact.normal), spot);
+            .add(cc_nm.distance(contact.cc_mm * NM_PER_MM), spot);
+        let emitted = cl_nm - cc_nm;
+        // By the sine and the cosine: the arc cosine alone loses half of the digits of a small angle.
+        let tilt_rad = emitted
+            .cross(contact.normal)
+            .length()
+            .atan2(emitted.dot(contact.normal));
+        report.normal_rad.add(tilt_rad, spot);
         report.fit.add(contact.fit(self.oracle.radius_mm).max(0.0), spot);
         let [first, last] = self.oracle.side_range();
         let interval = contact.interval;

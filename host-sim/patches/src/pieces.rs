@@ -247,7 +247,7 @@ mod tests {
                         let piece = source.piece(u, v);
                         for (s, t) in [(-0.5, -0.5), (-0.1, 0.3), (0.5, 0.499), (0.2, -0.4)] {
                             let at = |[a, b]: [f64; 2], s: f64| a + (b - a) * (s + 0.5);
-                            let want = surface.at(at(u, s), at(v, t)).point;
+                            let want = surface.at(at(u, s), at(v, t)).point.to_array();
                             let w = value(&piece[3], s, t);
                             for k in 0..3 {
                                 let got = value(&piece[k], s, t) / w;

@@ -41,6 +41,7 @@ impl Mesh {
                 .surface
                 .at(u[0] + (u[1] - u[0]) * s, v[0] + (v[1] - v[0]) * t)
                 .point
+                .to_array()
         };
         let lengths = [measure(at), measure(|t, s| at(s, t))];
         let ratio = (lengths[0] / lengths[1].max(1e-12)).clamp(0.01, 100.0).sqrt();

@@ -37,13 +37,13 @@ pub(super) fn json(
     let (most, error) = (&found.scallop_max, &found.measurement_error);
     let gouge = found.gouge.map(|gouge| {
         json!({
-            "depth_mm": gouge.depth_mm, "u": gouge.u, "v": gouge.v, "place_mm": gouge.point_mm, "tick": gouge.tick,
+            "depth_mm": gouge.depth_mm, "u": gouge.u, "v": gouge.v, "place_mm": gouge.point_mm.to_array(), "tick": gouge.tick,
             "pass": gouge.pass, "contact_u": gouge.contact[0], "contact_v": gouge.contact[1],
             "kind": if gouge.local { "local" } else { "global" },
         })
     });
     let concave = found.shape.concave_radius.map(|concave| {
-        json!({ "radius_mm": concave.radius_mm, "u": concave.u, "v": concave.v, "place_mm": concave.point_mm })
+        json!({ "radius_mm": concave.radius_mm, "u": concave.u, "v": concave.v, "place_mm": concave.point_mm.to_array() })
     });
     let value = json!({
         "position_error_max_nm": report.position_nm.max.abs(),
@@ -61,7 +61,7 @@ pub(super) fn json(
         "scallop_error": {
             "path_mm": error.path_mm, "rounding_mm": error.rounding_mm, "stations_mm": error.stations_mm, "search_mm": error.search_mm,
         },
-        "scallop_at": null_unless(measured, json!({ "u": most.u, "v": most.v, "gap": most.gap, "place_mm": most.point_mm })),
+        "scallop_at": null_unless(measured, json!({ "u": most.u, "v": most.v, "gap": most.gap, "place_mm": most.point_mm.to_array() })),
         "scallop_area_by_tenth": found.scallop_histogram,
         "gouge_max_mm": found.gouge_max_mm(),
         "gouge_floor_mm": found.gouge_floor_mm,

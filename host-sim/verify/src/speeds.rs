@@ -1,7 +1,7 @@
 //! Speeds of contact and centre, period by period, measured the same way for every approach.
 
+use glam::DVec3;
 use oracle::PassSample;
-use oracle::vector::{length, subtract};
 
 /// Mean speeds over one period.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -74,7 +74,7 @@ pub struct SpeedFigures {
 pub struct SpeedRecorder {
     period_s: f64,
     figures: SpeedFigures,
-    before_mm: [f64; 3],
+    before_mm: DVec3,
     time_s: f64,
     arc_mm: f64,
     last: Option<f64>,
@@ -87,7 +87,7 @@ impl SpeedRecorder {
         Self {
             period_s,
             figures: SpeedFigures::default(),
-            before_mm: [0.0; 3],
+            before_mm: DVec3::ZERO,
             time_s: 0.0,
             arc_mm: 0.0,
             last: None,
@@ -96,8 +96,8 @@ impl SpeedRecorder {
 
     /// Adds the next sample. `arc_mm`: arc length of the contact since the previous sample of the same pass; `cl_mm`: the centre.
     /// Returns the speeds over the period that ends at this sample.
-    pub fn add(&mut self, sample: &PassSample, arc_mm: Option<f64>, cl_mm: [f64; 3]) -> Option<PeriodSpeed> {
-        let way_mm = length(subtract(cl_mm, self.before_mm));
+    pub fn add(&mut self, sample: &PassSample, arc_mm: Option<f64>, cl_mm: DVec3) -> Option<PeriodSpeed> {
+        let way_mm = cl_mm.distance(self.before_mm);
         self.before_mm = cl_mm;
         let Some(arc_mm) = arc_mm else {
             (self.time_s, self.arc_mm, self.last) = (0.0, 0.0, None);

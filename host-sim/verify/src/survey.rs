@@ -3,6 +3,7 @@
 use crate::EmittedSample;
 use crate::speeds::{SpeedFigures, SpeedRecorder};
 use crate::trace::Trace;
+use glam::DVec3;
 use oracle::{AccuracyReport, Oracle, PassSample, SampleCheck, Verifier};
 
 const MM_PER_NM: f64 = 1e-6;
@@ -104,7 +105,7 @@ impl<'a> Survey<'a> {
         self.speeds.add(
             &emitted,
             checked.arc_mm,
-            sample.cl_nm.map(|nm| f64::from(nm) * MM_PER_NM),
+            DVec3::from(sample.cl_nm.map(f64::from)) * MM_PER_NM,
         );
         if first {
             // A point without a normal is reported by the verifier.

@@ -3,8 +3,8 @@
 use super::Options;
 use crate::gcode::{Blocks, Cut};
 use crate::{ApproachError, from_segment};
+use glam::DVec3;
 use job::Job;
-use oracle::vector::{length, subtract};
 use oracle::{Oracle, OracleError};
 
 /// Largest number of cuts of a step-over.
@@ -17,19 +17,13 @@ pub(super) fn retract(blocks: &mut Blocks<'_>, safe_z_mm: f64) {
 
 /// Retract, traverse, rapid plunge to the clearance, plunge at the feed. On a surface that faces up everywhere, the ball is free
 /// above each of its contacts.
-pub(super) fn approach(
-    blocks: &mut Blocks<'_>,
-    to_mm: [f64; 3],
-    safe_z_mm: f64,
-    job: &Job,
-    options: &Options,
-) {
-    let [x, y, z] = to_mm;
+pub(super) fn approach(blocks: &mut Blocks<'_>, to_mm: DVec3, safe_z_mm: f64, job: &Job, options: &Options) {
+    let [x, y, z] = to_mm.to_array();
     let near = (z + options.clearance_mm).min(safe_z_mm);
     retract(blocks, safe_z_mm);
     blocks.rapid([Some(x), Some(y), None]);
     blocks.rapid([None, None, Some(near)]);
-    blocks.cut(&Cut::line([x, y, near], to_mm, job.feed_mm_s()));
+    blocks.cut(&Cut::line(DVec3::new(x, y, near), to_mm, job.feed_mm_s()));
 }
 
 /// Step-over along the boundary at a path parameter, from one side parameter to another, in chords within the tolerance, at the
@@ -67,8 +61,8 @@ pub(super) fn step_over(
     let mut begin = at(0.0)?;
     for k in 1..=count {
         let end = at(f64::from(k) / f64::from(count))?;
-        let contact = length(subtract(end.cc_mm, begin.cc_mm));
-        let centre = length(subtract(end.cl_mm, begin.cl_mm));
+        let contact = end.cc_mm.distance(begin.cc_mm);
+        let centre = end.cl_mm.distance(begin.cl_mm);
         if contact > 0.0 && centre > 0.0 {
             cuts.push(Cut::line(
                 begin.cl_mm,

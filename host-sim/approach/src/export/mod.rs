@@ -13,6 +13,7 @@ mod links;
 
 use crate::gcode::{Blocks, Cut, FeedMode};
 use crate::{ApproachError, Arcs, ConstantCl, Kind, Nodes, PassPath, even_chords, passes};
+use glam::DVec3;
 use job::{Job, Pattern};
 use oracle::Oracle;
 
@@ -82,7 +83,7 @@ const LEVEL: f64 = 1e-9;
 
 /// A pass with its cuts.
 struct Path {
-    begin_mm: [f64; 3],
+    begin_mm: DVec3,
     highest_mm: f64,
     side: f64,
     end: f64,

@@ -89,8 +89,8 @@ fn polynomials_and_splines_keep_their_parameters() {
             assert_eq!(placed.kind(), spec.kind());
             let (before, after) = (Surface::new(&spec), Surface::new(&placed));
             for (u, v) in grid(&spec, 9) {
-                let want = by_hand(&placement, before.at(u, v).point);
-                let off = distance(after.at(u, v).point, want);
+                let want = by_hand(&placement, before.at(u, v).point.to_array());
+                let off = distance(after.at(u, v).point.to_array(), want);
                 assert!(off < 1e-11, "{}: off by {off:e} mm at {u}, {v}", spec.kind());
             }
         }
@@ -114,8 +114,8 @@ fn a_revolved_profile_keeps_its_kind_about_its_axis() {
         assert_eq!(placed.kind(), "revolved");
         let (before, after) = (Surface::new(&spec), Surface::new(&placed));
         for (u, v) in grid(&spec, 9) {
-            let want = by_hand(&placement, before.at(u, v).point);
-            let off = distance(after.at(u, v + turned_rad).point, want);
+            let want = by_hand(&placement, before.at(u, v).point.to_array());
+            let off = distance(after.at(u, v + turned_rad).point.to_array(), want);
             assert!(off < 1e-11, "off by {off:e} mm at {u}, {v}");
         }
     }
@@ -136,8 +136,8 @@ fn a_tilted_profile_is_the_same_surface() {
         let half = (v_rad[1] - v_rad[0]) / f64::from(2 * arcs);
         let mut widest = 0.0_f64;
         for (u, v) in grid(&spec, 40 * arcs) {
-            let point = after.at(u, v).point;
-            let [x, y, z] = by_hand(&TILTED, before.at(u, v).point);
+            let point = after.at(u, v).point.to_array();
+            let [x, y, z] = by_hand(&TILTED, before.at(u, v).point.to_array());
             let apart = distance(point, [x, y, z]);
             let radius = 2.54 * (before.at(u, 0.0).point[0]);
             widest = widest.max(apart / radius);
@@ -158,7 +158,7 @@ fn a_tilted_profile_is_the_same_surface() {
             };
             let [a, b, c] = TILTED.rotate_deg;
             let [x, y, z] = back([-a, 0.0, 0.0], back([0.0, -b, 0.0], back([0.0, 0.0, -c], moved)));
-            let want = before.at(u, 0.0).point;
+            let want = before.at(u, 0.0).point.to_array();
             assert!(
                 (x.hypot(y) - want[0]).abs() < 1e-11 && (z - want[2]).abs() < 1e-11,
                 "{u}, {v}"
@@ -176,7 +176,7 @@ fn the_box_encloses_the_surface() {
         let surface = Surface::new(&spec);
         let mut seen = [[f64::INFINITY, f64::NEG_INFINITY]; 3];
         for (u, v) in grid(&spec, 400) {
-            for (range, c) in seen.iter_mut().zip(surface.at(u, v).point) {
+            for (range, c) in seen.iter_mut().zip(surface.at(u, v).point.to_array()) {
                 *range = [range[0].min(c), range[1].max(c)];
             }
         }

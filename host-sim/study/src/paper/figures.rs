@@ -151,7 +151,7 @@ impl Figures {
 }
 
 fn section(nodes: &[Node]) -> Section {
-    let in_plane = |[x, y, z]: [f64; 3]| [x.hypot(y), z];
+    let in_plane = |at: glam::DVec3| [at.x.hypot(at.y), at.z];
     Section {
         cc_mm: nodes.iter().map(|node| in_plane(node.at.contact.cc_mm)).collect(),
         cl_mm: nodes.iter().map(|node| in_plane(node.cl_mm())).collect(),

@@ -1,7 +1,7 @@
 //! Passes, lengths and speeds of a job by geometry alone: quadrature on the oracle, without a run.
 
 use approach::{ApproachError, Chords, Nodes, PassPath, chords, passes};
-use oracle::vector::{length, subtract};
+use glam::DVec3;
 use oracle::{Oracle, OracleError};
 
 /// Cells along and across the path of the midpoint quadrature over the surface. Relative error about 1e-6.
@@ -154,8 +154,7 @@ impl ChordsOfPass {
 }
 
 /// Distance of a point from a line, mm.
-fn from_line(point: [f64; 3], from: [f64; 3], to: [f64; 3]) -> f64 {
-    use oracle::vector::cross;
-    let along = subtract(to, from);
-    length(cross(subtract(point, from), along)) / length(along)
+fn from_line(point: DVec3, from: DVec3, to: DVec3) -> f64 {
+    let along = to - from;
+    (point - from).cross(along).length() / along.length()
 }

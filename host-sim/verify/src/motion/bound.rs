@@ -8,23 +8,23 @@
 
 use super::path::PassPath;
 use super::point::LineLimits;
+use glam::DVec3;
 use job::AxisLimits;
-use oracle::vector::{Vector, dot, length, scale, subtract};
 
 /// Bounds of the motion along a path, from the axis limits.
 pub(super) trait PathBounds {
     /// The largest velocity, acceleration and jerk along a unit direction of any motion within the limits.
-    fn along(&self, direction: Vector) -> LineLimits;
+    fn along(&self, direction: DVec3) -> LineLimits;
     /// Largest speed of the contact at a point, by its feed and the axis velocities.
-    fn speed_cap(&self, first: Vector, feed_mm_s: f64) -> f64;
+    fn speed_cap(&self, first: DVec3, feed_mm_s: f64) -> f64;
     /// Range of path accelerations (second time derivative of the contact's arc length) that the axes allow, mm/s^2. `first`, `second`: derivatives
     /// of the centre by that arc length; `b`: square of the speed. Descending ends mean an empty range.
-    fn accelerations(&self, first: Vector, second: Vector, b: f64) -> [f64; 2];
+    fn accelerations(&self, first: DVec3, second: DVec3, b: f64) -> [f64; 2];
 }
 
 impl PathBounds for AxisLimits {
-    fn along(&self, direction: Vector) -> LineLimits {
-        let reach = |limit: &[f64; 3]| (0..3).map(|axis| direction[axis].abs() * limit[axis]).sum();
+    fn along(&self, direction: DVec3) -> LineLimits {
+        let reach = |limit: &[f64; 3]| direction.abs().dot(DVec3::from(*limit));
         LineLimits {
             velocity: reach(&self.velocity_mm_s),
             acceleration: reach(&self.acceleration_mm_s2),
@@ -32,13 +32,13 @@ impl PathBounds for AxisLimits {
         }
     }
 
-    fn speed_cap(&self, first: Vector, feed_mm_s: f64) -> f64 {
+    fn speed_cap(&self, first: DVec3, feed_mm_s: f64) -> f64 {
         (0..3).fold(feed_mm_s, |cap, axis| {
             cap.min(self.velocity_mm_s[axis] / first[axis].abs())
         })
     }
 
-    fn accelerations(&self, first: Vector, second: Vector, b: f64) -> [f64; 2] {
+    fn accelerations(&self, first: DVec3, second: DVec3, b: f64) -> [f64; 2] {
         let mut range = [f64::NEG_INFINITY, f64::INFINITY];
         for axis in 0..3 {
             let (gain, drift, limit) = (first[axis], second[axis] * b, self.acceleration_mm_s2[axis]);
@@ -68,8 +68,8 @@ pub(super) struct MaxSpeedProfile {
     pub(super) arcs: Vec<f64>,
     /// Square of the largest speed at each arc length.
     pub(super) squares: Vec<f64>,
-    firsts: Vec<Vector>,
-    seconds: Vec<Vector>,
+    firsts: Vec<DVec3>,
+    seconds: Vec<DVec3>,
 }
 
 impl MaxSpeedProfile {
@@ -163,23 +163,23 @@ impl MaxSpeedProfile {
 }
 
 /// Least times from standstill at one end to each point, along the first direction of the path; in the order of `places`.
-fn least_times_from_rest(places: &[(Vector, Vector)], feed_mm_s: f64, limits: &AxisLimits) -> Vec<f64> {
+fn least_times_from_rest(places: &[(DVec3, DVec3)], feed_mm_s: f64, limits: &AxisLimits) -> Vec<f64> {
     let Some((from, first)) = places.first() else {
         return Vec::new();
     };
-    let direction = scale(*first, 1.0 / length(*first));
+    let direction = *first / first.length();
     let along = limits.along(direction);
     let mut gain = 0.0_f64;
     let mut best = 0.0_f64;
     places
         .iter()
         .map(|(at, first)| {
-            gain = gain.max(dot(*first, direction).abs());
+            gain = gain.max(first.dot(direction).abs());
             let line = LineLimits {
                 velocity: along.velocity.min(feed_mm_s * gain),
                 ..along
             };
-            best = best.max(line.reach_s(dot(subtract(*at, *from), direction)));
+            best = best.max(line.reach_s((*at - *from).dot(direction)));
             best
         })
         .collect()
@@ -207,7 +207,7 @@ pub(super) fn bound_of(
 ) -> f64 {
     let times = fastest.times();
     let whole = times[times.len() - 1];
-    let mut places: Vec<(Vector, Vector)> = fastest
+    let mut places: Vec<(DVec3, DVec3)> = fastest
         .arcs
         .iter()
         .zip(&fastest.firsts)
@@ -225,16 +225,16 @@ pub(super) fn bound_of(
         before = before.max(forwards[k] - times[k]);
         most = most.max(before + backwards[k] - (whole - times[k]));
     }
-    let chord = subtract(places[places.len() - 1].0, places[0].0);
-    let distance = length(chord);
+    let chord = places[places.len() - 1].0 - places[0].0;
+    let distance = chord.length();
     let mut straight = 0.0;
     if distance > 0.0 {
-        let direction = scale(chord, 1.0 / distance);
+        let direction = chord / distance;
         let along = limits.along(direction);
         let gain = fastest
             .firsts
             .iter()
-            .map(|first| dot(*first, direction).abs())
+            .map(|first| first.dot(direction).abs())
             .fold(0.0, f64::max);
         let line = LineLimits {
             velocity: along.velocity.min(feed_mm_s * gain),

@@ -12,6 +12,7 @@ use super::bound::{MaxSpeedProfile, PathBounds as _, bound_of};
 use super::path::PassPath;
 use super::programme::{Interval, MotionProfile, Programme};
 use super::timing::Timing;
+use glam::DVec3;
 use job::AxisLimits;
 
 /// Largest number of successive programmes, and the relative gain below which they end.
@@ -121,7 +122,7 @@ struct NodeGrid {
 }
 
 /// Largest path jerk within the axis limits at a point.
-fn path_jerk(first: [f64; 3], limits: &AxisLimits) -> f64 {
+fn path_jerk(first: DVec3, limits: &AxisLimits) -> f64 {
     (0..3).fold(f64::INFINITY, |least, axis| {
         least.min(limits.jerk_mm_s3[axis] / first[axis].abs())
     })
@@ -146,7 +147,7 @@ impl<'a> MotionSearch<'a> {
         let mut steps = Vec::new();
         for (span, arc) in breaks.iter().enumerate().take(breaks.len() - 1).skip(1) {
             let (before, after) = (path.at(span - 1, *arc), path.at(span, *arc));
-            let of = |a: [f64; 3], b: [f64; 3]| std::array::from_fn(|axis| (a[axis] - b[axis]).abs());
+            let of = |a: DVec3, b: DVec3| (a - b).abs().to_array();
             let step = DerivativeStep {
                 arc: *arc,
                 steps: [of(before.first, after.first), of(before.second, after.second)],

@@ -2,15 +2,16 @@
 
 use super::point::LineLimits;
 use super::*;
+use glam::DVec3;
 use job::AxisLimits;
 
 const PERIOD_S: f64 = 1e-3;
 
 /// A straight pass along a direction.
-fn line(length: f64, direction: [f64; 3]) -> PassPath<'static> {
+fn line(length: f64, direction: DVec3) -> PassPath<'static> {
     PassPath::new(&[0.0, 1.0], move |t| CurvePoint {
-        cl_mm: direction.map(|d| d * length * t),
-        cl_velocity: direction.map(|d| d * length),
+        cl_mm: direction * length * t,
+        cl_velocity: direction * length,
         cc_speed: length,
     })
 }
@@ -22,8 +23,8 @@ fn circle(radius: f64, ratio: f64, turns: f64) -> PassPath<'static> {
         let (sin, cos) = t.sin_cos();
         let centre = ratio * radius;
         CurvePoint {
-            cl_mm: [centre * cos, centre * sin, 0.0],
-            cl_velocity: [-centre * sin, centre * cos, 0.0],
+            cl_mm: DVec3::new(centre * cos, centre * sin, 0.0),
+            cl_velocity: DVec3::new(-centre * sin, centre * cos, 0.0),
             cc_speed: radius,
         }
     })
@@ -40,7 +41,7 @@ fn found(path: &PassPath<'_>, feed: f64, limits: &AxisLimits) -> Optimum {
 fn straight_passes_agree_with_the_closed_form() {
     let usual = AxisLimits::DEFAULT;
     let mut worst = 0.0_f64;
-    let (along_x, slanted) = ([1.0, 0.0, 0.0], [0.6, 0.0, 0.8]);
+    let (along_x, slanted) = (DVec3::X, DVec3::new(0.6, 0.0, 0.8));
     for (length, feed, direction) in [
         (1.0, 10.0, along_x),
         (10.0, 30.0, slanted),
@@ -113,12 +114,15 @@ fn a_bend_is_slower_than_the_straight_lines() {
     let ends = [0.0, side, side + radius * angle, 2.0 * side + radius * angle];
     let bend = PassPath::new(&ends, move |s| {
         let (cl_mm, cl_velocity) = if s < ends[1] {
-            ([s, 0.0, 0.0], [1.0, 0.0, 0.0])
+            (DVec3::X * s, DVec3::X)
         } else if s < ends[2] {
             let (sin, cos) = ((s - ends[1]) / radius).sin_cos();
-            ([side + radius * sin, radius * (1.0 - cos), 0.0], [cos, sin, 0.0])
+            (
+                DVec3::new(side + radius * sin, radius * (1.0 - cos), 0.0),
+                DVec3::new(cos, sin, 0.0),
+            )
         } else {
-            ([side + radius, radius + s - ends[2], 0.0], [0.0, 1.0, 0.0])
+            (DVec3::new(side + radius, radius + s - ends[2], 0.0), DVec3::Y)
         };
         CurvePoint {
             cl_mm,
@@ -148,8 +152,8 @@ fn a_step_of_the_speed_is_crossed_slowly() {
     let kink = PassPath::new(&[0.0, 10.0, 20.0], move |s| {
         let gain = if s < 10.0 { 1.0 } else { ratio };
         CurvePoint {
-            cl_mm: [if s < 10.0 { s } else { 10.0 + ratio * (s - 10.0) }, 0.0, 0.0],
-            cl_velocity: [gain, 0.0, 0.0],
+            cl_mm: DVec3::X * if s < 10.0 { s } else { 10.0 + ratio * (s - 10.0) },
+            cl_velocity: DVec3::X * gain,
             cc_speed: 1.0,
         }
     });

@@ -1,6 +1,6 @@
 //! The tool centre's path over one pass as a function of the contact's arc length.
 
-use oracle::vector::{Vector, scale, subtract};
+use glam::DVec3;
 use oracle::{Oracle, OracleError};
 
 /// Segments of a smooth span with tabulated arc lengths. On each, three Gauss points integrate the contact's speed.
@@ -22,9 +22,9 @@ const INSIDE: f64 = 1e-5;
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct CurvePoint {
     /// The tool centre CL, mm.
-    pub cl_mm: [f64; 3],
+    pub cl_mm: DVec3,
     /// dCL / d(parameter).
-    pub cl_velocity: [f64; 3],
+    pub cl_velocity: DVec3,
     /// Speed of the contact, d(arc) / d(parameter).
     pub cc_speed: f64,
 }
@@ -33,13 +33,13 @@ pub struct CurvePoint {
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct PathPoint {
     /// CL, mm.
-    pub cl_mm: [f64; 3],
+    pub cl_mm: DVec3,
     /// dCL/ds.
-    pub first: [f64; 3],
+    pub first: DVec3,
     /// Second derivative, 1/mm.
-    pub second: [f64; 3],
+    pub second: DVec3,
     /// Third derivative, 1/mm^2.
-    pub third: [f64; 3],
+    pub third: DVec3,
 }
 
 type Curve<'a> = Box<dyn Fn(f64) -> CurvePoint + Send + Sync + 'a>;
@@ -127,7 +127,7 @@ impl<'a> PassPath<'a> {
 
     /// Position only, mm.
     #[must_use]
-    pub fn position(&self, arc_mm: f64) -> [f64; 3] {
+    pub fn position(&self, arc_mm: f64) -> DVec3 {
         let span = self.span_of(arc_mm);
         (self.curve)(self.parameter(span, arc_mm)).cl_mm
     }
@@ -143,30 +143,22 @@ impl<'a> PassPath<'a> {
         let middle = here.clamp(low + inside + step, high - inside - step);
         let first = |parameter: f64| {
             let at = (self.curve)(parameter);
-            scale(at.cl_velocity, 1.0 / at.cc_speed)
+            at.cl_velocity / at.cc_speed
         };
         let arc = |from: f64, to: f64| gauss(&self.curve, from, to);
         let [before, at, after] = [middle - step, middle, middle + step].map(first);
         let (left, right) = (arc(middle - step, middle), arc(middle, middle + step));
         let off = arc(middle, here);
-        let mut point = PathPoint {
+        let [rising, falling] = [(after - at) / right, (at - before) / left];
+        let third = 2.0 * (rising - falling) / (left + right);
+        // Newton's interpolation through the three points, differentiated.
+        let second = falling + 0.5 * third * (left + 2.0 * off);
+        PathPoint {
             cl_mm: (self.curve)(exact).cl_mm,
-            first: first(here),
-            ..PathPoint::default()
-        };
-        let [rising, falling]: [Vector; 2] = [
-            scale(subtract(after, at), 1.0 / right),
-            scale(subtract(at, before), 1.0 / left),
-        ];
-        let outside = arc(here, exact);
-        for axis in 0..3 {
-            let third = 2.0 * (rising[axis] - falling[axis]) / (left + right);
-            point.third[axis] = third;
-            // Newton's interpolation through the three points, differentiated.
-            point.second[axis] = falling[axis] + 0.5 * third * (left + 2.0 * off);
-            point.first[axis] += outside * point.second[axis];
+            first: first(here) + arc(here, exact) * second,
+            second,
+            third,
         }
-        point
     }
 
     /// Parameter at an arc length: linear in its segment, then two Newton steps.
@@ -211,8 +203,8 @@ mod tests {
             let (angle, rate) = (t + 0.5 * t * t, 1.0 + t);
             let (sin, cos) = angle.sin_cos();
             CurvePoint {
-                cl_mm: [centre * cos, centre * sin, 0.0],
-                cl_velocity: [-centre * rate * sin, centre * rate * cos, 0.0],
+                cl_mm: DVec3::new(centre * cos, centre * sin, 0.0),
+                cl_velocity: DVec3::new(-centre * rate * sin, centre * rate * cos, 0.0),
                 cc_speed: contact * rate,
             }
         })

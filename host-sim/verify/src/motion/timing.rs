@@ -2,6 +2,7 @@
 
 use super::path::PassPath;
 use super::programme::MotionProfile;
+use glam::DVec3;
 use job::AxisLimits;
 
 /// Newton steps for the duration of an interval: each doubles the digits.
@@ -123,7 +124,7 @@ impl Timing {
     ) -> ([f64; 3], Vec<[f64; 2]>) {
         let mut uses = [0.0_f64; 3];
         let mut most = vec![[0.0_f64; 2]; self.segments.len()];
-        let mut last = [[0.0; 3]; 3];
+        let mut last = [DVec3::ZERO; 3];
         last[0] = path.position(0.0);
         let mut intervals = [0_usize; 4];
         #[allow(
@@ -146,10 +147,8 @@ impl Timing {
             for (order, last) in last.iter_mut().enumerate() {
                 let before = std::mem::replace(last, value);
                 let (limit, per) = unit[order];
-                for axis in 0..3 {
-                    value[axis] -= before[axis];
-                    here[order] = here[order].max(value[axis].abs() / per / limit[axis]);
-                }
+                value -= before;
+                here[order] = (value.abs() / per / DVec3::from(limit)).max_element();
             }
             for (most, use_) in uses.iter_mut().zip(here) {
                 *most = most.max(use_);

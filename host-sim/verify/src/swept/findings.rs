@@ -5,6 +5,7 @@ use super::gouge::GougeSearchResult;
 use super::ridge::{Crest, Gap, GapRidge, MISSED_RADII};
 use super::shape::SurfaceCheck;
 use super::track::ToolPath;
+use glam::DVec3;
 use job::Job;
 use oracle::Oracle;
 
@@ -32,7 +33,7 @@ pub struct HighestScallop {
     /// Gap between passes, from 0: between pass `gap` and the next.
     pub gap: u32,
     /// Point on the surface, mm.
-    pub point_mm: [f64; 3],
+    pub point_mm: DVec3,
 }
 
 /// The deepest gouge.
@@ -45,7 +46,7 @@ pub struct Gouge {
     /// Parameter v of the gouged point.
     pub v: f64,
     /// The point, mm.
-    pub point_mm: [f64; 3],
+    pub point_mm: DVec3,
     /// Tick of the sample that gouges (at the sample, or between it and the next one).
     pub tick: u64,
     /// Pass of that sample.
@@ -86,7 +87,7 @@ pub struct RidgePoint {
     /// Parameter v.
     pub v: f64,
     /// Point on the surface, under the crest, mm.
-    pub point_mm: [f64; 3],
+    pub point_mm: DVec3,
     /// Height of the crest above it, mm.
     pub height_mm: f32,
 }

@@ -13,8 +13,8 @@ use rayon::prelude::*;
 use super::grid::{Cell, CellGrid, LocalCurvature, local_curvature};
 use super::height::Ray;
 use super::tree::{BallDepth, DepthQuery, PathTree, SampleIndex};
+use glam::DVec3;
 use job::Along;
-use oracle::vector::{length, subtract};
 use oracle::{Oracle, OracleError};
 
 /// Largest number of splits of a cell.
@@ -40,7 +40,7 @@ pub(super) struct DeepestPoint {
     pub(super) depth_mm: f64,
     pub(super) u: f64,
     pub(super) v: f64,
-    pub(super) point_mm: [f64; 3],
+    pub(super) point_mm: DVec3,
     pub(super) by: SampleIndex,
 }
 
@@ -65,7 +65,7 @@ pub(super) struct GougeSearch<'a> {
 struct CellDepth {
     cell: Cell,
     depth: BallDepth,
-    point_mm: [f64; 3],
+    point_mm: DVec3,
 }
 
 impl GougeSearch<'_> {
@@ -147,10 +147,7 @@ impl GougeSearch<'_> {
         let around_mm = cell
             .u
             .into_iter()
-            .flat_map(|u| {
-                cell.v
-                    .map(|v| length(subtract(oracle.surface.at(u, v).point, at.point)))
-            })
+            .flat_map(|u| cell.v.map(|v| oracle.surface.at(u, v).point.distance(at.point)))
             .fold(0.0, f64::max);
         let (ray, reach) = match local_curvature(&at, oracle) {
             Some((along, curvature)) => {

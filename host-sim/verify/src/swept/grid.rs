@@ -2,8 +2,8 @@
 
 use rayon::prelude::*;
 
+use glam::DVec3;
 use job::Along;
-use oracle::vector::{cross, dot, length, scale, subtract};
 use oracle::{Derivatives, Oracle};
 
 /// Least number of cells per side of a span: a cubic has no feature narrower than a twelfth of its span.
@@ -30,21 +30,21 @@ pub(super) struct LocalCurvature {
 }
 
 /// Tool normal and curvature; `None` where the derivatives do not span a plane, and close to a pole.
-pub(super) fn local_curvature(at: &Derivatives, oracle: &Oracle) -> Option<([f64; 3], LocalCurvature)> {
-    let (speed_u, speed_v) = (length(at.u), length(at.v));
+pub(super) fn local_curvature(at: &Derivatives, oracle: &Oracle) -> Option<(DVec3, LocalCurvature)> {
+    let (speed_u, speed_v) = (at.u.length(), at.v.length());
     let [[u0, u1], [v0, v1]] = oracle.surface.domain();
     let reach = (speed_u * (u1 - u0), speed_v * (v1 - v0));
     if reach.0.min(reach.1) <= POLE_SHARE * reach.0.max(reach.1) {
         return None;
     }
-    let product = cross(at.u, at.v);
-    let area = length(product);
+    let product = at.u.cross(at.v);
+    let area = product.length();
     if area.is_nan() || area <= SINE_MIN * speed_u * speed_v || area <= 0.0 {
         return None;
     }
-    let normal = scale(product, oracle.normal_sign / area);
-    let (e, f, g) = (dot(at.u, at.u), dot(at.u, at.v), dot(at.v, at.v));
-    let (l, m, n) = (dot(at.uu, normal), dot(at.uv, normal), dot(at.vv, normal));
+    let normal = product * (oracle.normal_sign / area);
+    let (e, f, g) = (at.u.length_squared(), at.u.dot(at.v), at.v.length_squared());
+    let (l, m, n) = (at.uu.dot(normal), at.uv.dot(normal), at.vv.dot(normal));
     let mean = 0.5 * (e * n - 2.0 * f * m + g * l) / (area * area);
     let gauss = (l * n - m * m) / (area * area);
     let spread = (mean * mean - gauss).max(0.0).sqrt();
@@ -197,7 +197,7 @@ fn span_lengths(oracle: &Oracle, along: Along) -> Vec<f64> {
         (0..SPAN_CELLS)
             .map(|k| {
                 let ends = [k, k + 1].map(|k| point(part(span, k, SPAN_CELLS)));
-                length(subtract(ends[1], ends[0]))
+                ends[1].distance(ends[0])
             })
             .sum()
     };

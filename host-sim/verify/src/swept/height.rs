@@ -5,7 +5,7 @@
 //! sweeps a capsule: a cylinder with a hemisphere at each end; the entry is the least of theirs.
 
 use super::track::{ToolPathPass, across};
-use oracle::vector::{Vector, add, dot, scale, subtract};
+use glam::DVec3;
 
 /// Newton steps towards the nearest sample: each squares the error; the search over neighbours afterwards corrects the rest.
 const NEWTON_STEPS: usize = 12;
@@ -21,22 +21,22 @@ const ENTRY_TOLERANCE_MM: f64 = 1e-9;
 /// A ray: a point of the surface and the tool normal there.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Ray {
-    pub(super) from: Vector,
-    pub(super) along: Vector,
+    pub(super) from: DVec3,
+    pub(super) along: DVec3,
 }
 
 impl Ray {
-    pub(super) fn at(&self, t: f64) -> Vector {
-        add(self.from, scale(self.along, t))
+    pub(super) fn at(&self, t: f64) -> DVec3 {
+        self.from + self.along * t
     }
 
     /// Parameters at which the ray enters and leaves a ball.
-    pub(super) fn through_ball(&self, centre: Vector, radius: f64) -> Option<[f64; 2]> {
-        let m = subtract(centre, self.from);
-        let along = dot(m, self.along);
+    pub(super) fn through_ball(&self, centre: DVec3, radius: f64) -> Option<[f64; 2]> {
+        let m = centre - self.from;
+        let along = m.dot(self.along);
         // |m - (m.N) N|^2 without the cancellation of |m|^2 - (m.N)^2.
         let off = across(m, self.along);
-        let inside = radius * radius - dot(off, off);
+        let inside = radius * radius - off.length_squared();
         (inside >= 0.0).then(|| {
             let half = inside.sqrt();
             [along - half, along + half]
@@ -45,7 +45,7 @@ impl Ray {
 
     /// Entry of the ray into the capsule between two centres; infinite if the ray misses the capsule, or leaves it below
     /// the surface.
-    pub(super) fn entry(&self, [from, to]: [Vector; 2], radius: f64) -> f64 {
+    pub(super) fn entry(&self, [from, to]: [DVec3; 2], radius: f64) -> f64 {
         let mut first = f64::INFINITY;
         for centre in [from, to] {
             if let Some([enters, leaves]) = self.through_ball(centre, radius)
@@ -54,27 +54,27 @@ impl Ray {
                 first = first.min(enters);
             }
         }
-        let axis = subtract(to, from);
-        let squared = dot(axis, axis);
+        let axis = to - from;
+        let squared = axis.length_squared();
         if squared <= 0.0 {
             return first;
         }
-        let axis = scale(axis, 1.0 / squared.sqrt());
-        let m = subtract(from, self.from);
+        let axis = axis / squared.sqrt();
+        let m = from - self.from;
         let (m_off, n_off) = (across(m, axis), across(self.along, axis));
-        let (a, b) = (dot(n_off, n_off), dot(m_off, n_off));
+        let (a, b) = (n_off.length_squared(), m_off.dot(n_off));
         if a <= 0.0 {
             return first;
         }
         // |m_off|^2 - b^2 / a: squared distance of the two lines.
-        let apart = subtract(m_off, scale(n_off, b / a));
-        let inside = (radius * radius - dot(apart, apart)) / a;
+        let apart = m_off - n_off * (b / a);
+        let inside = (radius * radius - apart.length_squared()) / a;
         if inside < 0.0 {
             return first;
         }
         let half = inside.sqrt();
         let on_cylinder = |t: f64| {
-            let s = dot(subtract(self.at(t), from), axis);
+            let s = (self.at(t) - from).dot(axis);
             s >= 0.0 && s * s <= squared
         };
         let (enters, leaves) = (b / a - half, b / a + half);
@@ -141,9 +141,9 @@ impl<'a> PassHeight<'a> {
         (height, index)
     }
 
-    fn squared(&self, index: usize, target: Vector) -> f64 {
-        let off = subtract(self.pass.centre(index), target);
-        dot(off, off)
+    fn squared(&self, index: usize, target: DVec3) -> f64 {
+        let off = self.pass.centre(index) - target;
+        off.length_squared()
     }
 
     /// The sample nearest to a point, by Newton's method in strides, then by descent over neighbours.
@@ -154,7 +154,7 @@ impl<'a> PassHeight<'a> {
         clippy::cast_precision_loss,
         reason = "indices of samples, clamped to the pass"
     )]
-    fn nearest(&self, target: Vector, hint: usize) -> usize {
+    fn nearest(&self, target: DVec3, hint: usize) -> usize {
         let last = self.pass.cl_nm.len() - 1;
         let mut index = hint.min(last);
         let mut least = self.squared(index, target);

@@ -2,7 +2,7 @@
 
 use super::height::{PassHeight, Ray};
 use super::tree::PathTree;
-use oracle::vector::{cross, length, scale};
+use glam::DVec3;
 use oracle::{Oracle, OracleError};
 
 /// Points across a gap, and across each part of it between knots, at which the height is evaluated besides the crest.
@@ -36,7 +36,7 @@ pub(super) struct Crest {
     /// Height, mm.
     pub(super) height_mm: f64,
     /// Point on the surface, mm.
-    pub(super) point_mm: [f64; 3],
+    pub(super) point_mm: DVec3,
     /// |S_u x S_v| there.
     pub(super) area: f64,
 }
@@ -93,10 +93,10 @@ impl<'a> Gap<'a> {
     fn ray(&self, path: f64, share: f64) -> Result<(Ray, f64), OracleError> {
         let (u, v) = self.oracle.swapped(path, self.side(share));
         let at = self.oracle.surface.at(u, v);
-        let product = cross(at.u, at.v);
-        let area = length(product);
-        let along = if area > 1e-6 * length(at.u) * length(at.v) && area > 0.0 {
-            scale(product, self.oracle.normal_sign / area)
+        let product = at.u.cross(at.v);
+        let area = product.length();
+        let along = if area > 1e-6 * at.u.length() * at.v.length() && area > 0.0 {
+            product * (self.oracle.normal_sign / area)
         } else {
             self.oracle.contact(u, v)?.normal
         };

@@ -3,8 +3,8 @@
 use rayon::prelude::*;
 
 use super::grid::{CellGrid, local_curvature};
+use glam::DVec3;
 use oracle::Oracle;
-use oracle::vector::{length, subtract};
 
 /// Bisections of the step around the cell with the largest curvature.
 const REFINEMENTS: usize = 40;
@@ -25,7 +25,7 @@ pub struct ConcaveRadius {
     /// Parameter v.
     pub v: f64,
     /// Point, mm.
-    pub point_mm: [f64; 3],
+    pub point_mm: DVec3,
 }
 
 /// Properties of the surface that limit the ball.
@@ -47,14 +47,11 @@ impl SurfaceCheck {
             .collect();
         let mut poles = Vec::new();
         for (name, line) in boundaries(oracle) {
-            let places: Vec<[f64; 3]> = line
+            let places: Vec<DVec3> = line
                 .iter()
                 .map(|[u, v]| oracle.surface.at(*u, *v).point)
                 .collect();
-            if places
-                .iter()
-                .all(|place| length(subtract(*place, places[0])) <= POINT_MM)
-            {
+            if places.iter().all(|place| place.distance(places[0]) <= POINT_MM) {
                 poles.push(name);
             } else {
                 // The ends may be at a pole of another boundary.

@@ -3,9 +3,9 @@
 use std::f64::consts::FRAC_1_SQRT_2;
 
 use super::*;
+use glam::DVec3;
 use job::{Along, MachineSpec, NurbsSpec, Origin, Pattern, Side, SurfaceSpec};
 use oracle::PassSample;
-use oracle::vector::{length, subtract};
 
 const RADIUS: f64 = 5.0;
 
@@ -35,7 +35,7 @@ fn track(oracle: &Oracle, sides: &[f64], steps: u32) -> ToolPath {
             let path = low + (high - low) * f64::from(k) / f64::from(steps);
             let (u, v) = oracle.swapped(path, *side);
             let contact = oracle.contact(u, v).unwrap();
-            let nm = |mm: [f64; 3]| mm.map(|mm| (mm * 1e6).round() as i32);
+            let nm = |mm: DVec3| mm.to_array().map(|mm| (mm * 1e6).round() as i32);
             let sample = PassSample {
                 tick,
                 pass,
@@ -176,8 +176,8 @@ fn sphere_by_meridians() {
     let sides: Vec<f64> = (0..=60).map(|k| f64::from(k) / 60.0).collect();
     let found = measure(&job, &oracle, &track(&oracle, &sides, 2000), true, &());
     let azimuth = |v: f64| {
-        let [x, y, _] = oracle.surface.at(1.0, v).point;
-        y.atan2(x)
+        let point = oracle.surface.at(1.0, v).point;
+        point.y.atan2(point.x)
     };
     // Ball centres on great circles of R + r: the crest is at the angle `g` from both, sin g = sin 60 sin(half the azimuth difference).
     let height = |ends: &[f64]| {
@@ -245,12 +245,12 @@ fn ball_on_one_flank_gouges_the_other() {
     // Under the centre, at r along the other flank.
     let foot = RADIUS * FRAC_1_SQRT_2;
     assert!(
-        length(subtract(gouge.point_mm, [foot, gouge.point_mm[1], foot])) < 0.3,
+        gouge.point_mm.distance(DVec3::new(foot, gouge.point_mm.y, foot)) < 0.3,
         "{gouge:?}"
     );
     assert_eq!((gouge.pass, gouge.local), (2, false));
     let samples = &oracle_sample(&found, &oracle, &sides);
-    assert!(length(subtract(*samples, gouge.point_mm)) < RADIUS);
+    assert!(samples.distance(gouge.point_mm) < RADIUS);
     assert_eq!(
         found.failures.iter().filter(|line| line.contains("cuts")).count(),
         1
@@ -258,7 +258,7 @@ fn ball_on_one_flank_gouges_the_other() {
 }
 
 /// The ball's centre at the gouging tick, recomputed.
-fn oracle_sample(found: &SweptResult, oracle: &Oracle, sides: &[f64]) -> [f64; 3] {
+fn oracle_sample(found: &SweptResult, oracle: &Oracle, sides: &[f64]) -> DVec3 {
     let track = track(oracle, sides, 800);
     let tick = found.gouge.unwrap().tick;
     let pass = track.passes.iter().rfind(|pass| pass.first_tick <= tick).unwrap();

@@ -1,8 +1,8 @@
 //! The tool path of a run in compact form: 20 bytes per sample.
 
+use glam::DVec3;
 use job::Along;
 use oracle::PassSample;
-use oracle::vector::{Vector, angle, dot, length, scale, subtract};
 
 const MM_PER_NM: f64 = 1e-6;
 
@@ -22,8 +22,8 @@ pub struct ToolPathPass {
 impl ToolPathPass {
     /// Ball centre of a sample, mm.
     #[must_use]
-    pub fn centre(&self, index: usize) -> [f64; 3] {
-        self.cl_nm[index].map(|nm| f64::from(nm) * MM_PER_NM)
+    pub fn centre(&self, index: usize) -> DVec3 {
+        DVec3::from(self.cl_nm[index].map(f64::from)) * MM_PER_NM
     }
 
     /// The first sample, in the order of the pass, whose path parameter reaches this one.
@@ -39,7 +39,7 @@ impl ToolPathPass {
     pub(super) fn spacing_mm(&self) -> f64 {
         let count = self.cl_nm.len().saturating_sub(1);
         let sum: f64 = (0..count)
-            .map(|k| length(subtract(self.centre(k + 1), self.centre(k))))
+            .map(|k| self.centre(k + 1).distance(self.centre(k)))
             .sum();
         #[allow(clippy::cast_precision_loss, reason = "far below 2^53")]
         let count = count.max(1) as f64;
@@ -52,14 +52,14 @@ impl ToolPathPass {
         let mut most = 0.0_f64;
         for k in 2..self.cl_nm.len() {
             let [a, b, c] = [k - 2, k - 1, k].map(|k| self.centre(k));
-            let (one, other) = (subtract(b, a), subtract(c, b));
+            let (one, other) = (b - a, c - b);
             let (short, long) = {
-                let lengths = [length(one), length(other)];
+                let lengths = [one.length(), other.length()];
                 (lengths[0].min(lengths[1]), lengths[0].max(lengths[1]))
             };
             // A short last step has an inaccurate direction; its sagitta is below its neighbours' in any case.
             if short >= 0.5 * long && short > 0.0 {
-                let turned = angle(one, other);
+                let turned = one.cross(other).length().atan2(one.dot(other));
                 most = most.max(turned / (short + long) * long * long / 4.0);
             }
         }
@@ -149,6 +149,6 @@ impl ToolPath {
 }
 
 /// The component of a vector normal to a unit direction.
-pub(super) fn across(m: Vector, direction: Vector) -> Vector {
-    subtract(m, scale(direction, dot(m, direction)))
+pub(super) fn across(m: DVec3, direction: DVec3) -> DVec3 {
+    m - direction * m.dot(direction)
 }

@@ -2,7 +2,7 @@
 
 use super::height::Ray;
 use super::track::{ToolPath, across};
-use oracle::vector::{Vector, add, dot, length, scale, subtract};
+use glam::DVec3;
 
 /// Steps between samples per leaf: few enough for tight boxes, enough for a small tree.
 const SEGMENT_STEPS: usize = 16;
@@ -16,50 +16,42 @@ struct Segment {
     from: u32,
     to: u32,
     /// Centres at its ends, mm.
-    ends: [Vector; 2],
+    ends: [DVec3; 2],
     /// Upper bound of the distance of the samples from the straight line between the ends, mm.
     off_mm: f64,
 }
 
 #[derive(Clone, Copy, Debug)]
 struct BoundingBox {
-    low: Vector,
-    high: Vector,
+    low: DVec3,
+    high: DVec3,
 }
 
 impl BoundingBox {
     const EMPTY: Self = Self {
-        low: [f64::INFINITY; 3],
-        high: [f64::NEG_INFINITY; 3],
+        low: DVec3::INFINITY,
+        high: DVec3::NEG_INFINITY,
     };
 
-    fn with(mut self, point: Vector) -> Self {
-        for (k, at) in point.iter().enumerate() {
-            self.low[k] = self.low[k].min(*at);
-            self.high[k] = self.high[k].max(*at);
-        }
+    fn with(mut self, point: DVec3) -> Self {
+        self.low = self.low.min(point);
+        self.high = self.high.max(point);
         self
     }
 
-    fn middle(&self) -> Vector {
-        scale(add(self.low, self.high), 0.5)
+    fn middle(&self) -> DVec3 {
+        (self.low + self.high) * 0.5
     }
 
     /// Least scalar product of the box's points with a vector.
-    fn least_along(&self, along: Vector) -> f64 {
-        (0..3)
-            .map(|k| (self.low[k] * along[k]).min(self.high[k] * along[k]))
-            .sum()
+    fn least_along(&self, along: DVec3) -> f64 {
+        (self.low * along).min(self.high * along).element_sum()
     }
 
     /// Squared distance of a point from the box.
-    fn squared(&self, point: Vector) -> f64 {
-        let mut sum = 0.0;
-        for (k, at) in point.iter().enumerate() {
-            let off = (self.low[k] - at).max(at - self.high[k]).max(0.0);
-            sum += off * off;
-        }
-        sum
+    fn squared(&self, point: DVec3) -> f64 {
+        let off = (self.low - point).max(point - self.high).max(DVec3::ZERO);
+        off.length_squared()
     }
 }
 
@@ -161,14 +153,14 @@ impl<'a> PathTree<'a> {
         })
     }
 
-    fn centre(&self, pass: u32, index: u32) -> Vector {
+    fn centre(&self, pass: u32, index: u32) -> DVec3 {
         self.track.passes[pass as usize].centre(index as usize)
     }
 
     /// Visits all leaves whose boxes satisfy `wanted`, in the order of their distance from a point.
     fn walk(
         &self,
-        from: Vector,
+        from: DVec3,
         mut wanted: impl FnMut(&BoundingBox) -> bool,
         mut leaf: impl FnMut(&Segment),
     ) {
@@ -207,7 +199,7 @@ impl<'a> PathTree<'a> {
                 let half = 0.5 * best.get().max(0.0);
                 let reach = self.radius + half;
                 // The entry is at most one radius below the ball's centre.
-                let lowest = bounds.least_along(ray.along) - dot(ray.from, ray.along) - self.radius;
+                let lowest = bounds.least_along(ray.along) - ray.from.dot(ray.along) - self.radius;
                 lowest < best.get() && bounds.squared(ray.at(half)) <= reach * reach
             },
             |segment| {
@@ -249,8 +241,7 @@ impl<'a> PathTree<'a> {
                     return true;
                 }
                 let middle = bounds.middle();
-                let off = length(across(subtract(middle, ray.from), ray.along))
-                    + length(subtract(bounds.high, middle));
+                let off = across(middle - ray.from, ray.along).length() + bounds.high.distance(middle);
                 let sine = if off < near { off / near } else { 1.0 };
                 depth + reach.around_mm * sine + second > bound.get()
             },
@@ -263,7 +254,7 @@ impl<'a> PathTree<'a> {
                 let (off, distance) = nearest(ray.from, segment.ends);
                 let depth = self.radius - distance + segment.off_mm;
                 if depth <= best.get().0.max(reach.gouge_mm) {
-                    let sine = (length(across(off, ray.along)) / distance).min(1.0);
+                    let sine = (across(off, ray.along).length() / distance).min(1.0);
                     let ends = [segment.from, segment.to];
                     let left_out = beside && ends.into_iter().all(|k| inside(path, samples.path[k as usize]));
                     if left_out || depth + reach.around_mm * sine + second <= bound.get() {
@@ -282,7 +273,7 @@ impl<'a> PathTree<'a> {
                     if beside && depth <= reach.gouge_mm && inside(path, samples.path[k as usize]) {
                         continue;
                     }
-                    let sine = (length(across(off, ray.along)) / distance).min(1.0);
+                    let sine = (across(off, ray.along).length() / distance).min(1.0);
                     let may = depth + reach.around_mm * sine + second;
                     bound.set(bound.get().max(may));
                 }
@@ -298,16 +289,16 @@ impl<'a> PathTree<'a> {
 }
 
 /// Vector from a point to the nearest point of a line segment, and its length.
-fn nearest(point: Vector, [from, to]: [Vector; 2]) -> (Vector, f64) {
-    let (axis, m) = (subtract(to, from), subtract(from, point));
-    let squared = dot(axis, axis);
+fn nearest(point: DVec3, [from, to]: [DVec3; 2]) -> (DVec3, f64) {
+    let (axis, m) = (to - from, from - point);
+    let squared = axis.length_squared();
     let share = if squared > 0.0 {
-        (-dot(m, axis) / squared).clamp(0.0, 1.0)
+        (-m.dot(axis) / squared).clamp(0.0, 1.0)
     } else {
         0.0
     };
-    let off = add(m, scale(axis, share));
-    (off, length(off))
+    let off = m + axis * share;
+    (off, off.length())
 }
 
 /// Builds the nodes over these segments, parents before children, split at the median of the longest side.
@@ -328,7 +319,7 @@ fn build(nodes: &mut Vec<Node>, order: &mut [u32], boxes: &[BoundingBox]) {
     if order.len() <= 1 {
         return;
     }
-    let sizes = subtract(middles.high, middles.low);
+    let sizes = middles.high - middles.low;
     let axis = (0..3).fold(0, |axis, k| if sizes[k] > sizes[axis] { k } else { axis });
     let half = order.len() / 2;
     let key = |segment: &u32| boxes[*segment as usize].middle()[axis];
