@@ -161,7 +161,11 @@ impl Scripted {
         } else {
             say!("{} on {board}", job.origin.name());
             self.print();
-            let verdict = if same { "bit for bit the same" } else { "NOT the same" };
+            let verdict = if same {
+                "bit for bit the same"
+            } else {
+                "NOT the same"
+            };
             say!(
                 "  compared     {} samples with the simulation: {verdict}",
                 status.samples
