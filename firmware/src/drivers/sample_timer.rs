@@ -47,13 +47,12 @@ impl SampleTimer {
 
     /// At the beginning of a tick: clears the interrupt flag.
     pub(crate) fn begin(&mut self) {
+        let was_timed = self.is_timed;
         self.is_timed = self.timer.sr().read().uif().bit_is_set();
-        if !self.is_timed {
-            return;
-        }
         self.timer.sr().write(|w| w.uif().clear_bit());
         UPTIME_PERIODS.store(uptime_periods().wrapping_add(1), Ordering::Relaxed);
-        if self.due.is_none() {
+        // A tick without an update is due when it begins, and so is the first one with an update after it.
+        if !(self.is_timed && was_timed && self.due.is_some()) {
             self.due = Some(self.clock.cnt().read().cnt().bits());
         }
     }
@@ -62,16 +61,13 @@ impl SampleTimer {
     /// tick ends before the next; each counted period has missed its deadline.
     #[inline]
     pub(crate) fn end(&mut self) -> u32 {
-        if !self.is_timed {
-            return 0;
-        }
         let now = self.clock.cnt().read().cnt().bits();
         let due = self.due.unwrap_or(now);
         let late = now.wrapping_sub(due);
         // The flag decides whether a period has begun; the clock yields the number of periods.
         let pending = self.timer.sr().read().uif().bit_is_set();
         self.due = Some(due.wrapping_add(self.period_counts));
-        if late < self.period_counts && !pending {
+        if late < self.period_counts && !(pending && self.is_timed) {
             return 0;
         }
         self.missed(due, late)
