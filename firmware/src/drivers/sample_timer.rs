@@ -51,8 +51,10 @@ impl SampleTimer {
         self.is_timed = self.timer.sr().read().uif().bit_is_set();
         self.timer.sr().write(|w| w.uif().clear_bit());
         UPTIME_PERIODS.store(uptime_periods().wrapping_add(1), Ordering::Relaxed);
-        // A tick without an update is due when it begins, and so is the first one with an update after it.
-        if !(self.is_timed && was_timed && self.due.is_some()) {
+        if !self.is_timed {
+            // Not due at any time, so that no deadline is missed.
+            self.due = None;
+        } else if !was_timed || self.due.is_none() {
             self.due = Some(self.clock.cnt().read().cnt().bits());
         }
     }
