@@ -37,7 +37,7 @@ pub(crate) struct Options {
     /// What happened, as JSON, goes to this file in the end.
     #[arg(long, value_name = "FILE")]
     pub(crate) report: Option<PathBuf>,
-    /// The crystal does not swing.
+    /// The crystal does not oscillate.
     #[arg(long)]
     pub(crate) no_crystal: bool,
     /// The crystal, MHz.

@@ -200,3 +200,43 @@ pub(super) const fn along_path(sign: f64, along: Along) -> f64 {
         Along::V => -sign,
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use oracle::Oracle;
+
+    const JOBS: [(&str, &str); 6] = [
+        ("revolved", include_str!("../../../../jobs/revolved.toml")),
+        ("revolved_v", include_str!("../../../../jobs/revolved_v.toml")),
+        (
+            "ruled_printed",
+            include_str!("../../../../jobs/ruled_printed.toml"),
+        ),
+        ("plate_v", include_str!("../../../../jobs/plate_v.toml")),
+        ("freeform", include_str!("../../../../jobs/freeform.toml")),
+        // Rational, with a pole at the start.
+        ("sphere_cap", include_str!("../../../../jobs/sphere_cap.toml")),
+    ];
+
+    /// The oracle decides the tool's side and the first contact for itself: both must come to the same.
+    #[test]
+    fn side_and_first_centre_are_the_oracles() {
+        for (name, text) in JOBS {
+            for side in [Side::Up, Side::Plus, Side::Minus] {
+                let mut job = job_file::parse(name, text).unwrap();
+                job.side = side;
+                let oracle = Oracle::new(&job).unwrap();
+                let sign = tool_sign(&job).unwrap();
+                assert_eq!(sign, oracle.normal_sign, "{name} {side:?}");
+                let [us, vs] = job.surface.domain();
+                let exact = oracle.contact(us[0], vs[0]).unwrap().cl_mm.to_array();
+                let ours = first_centre_mm(&job, sign).unwrap();
+                for (ours, exact) in ours.iter().zip(exact) {
+                    // A nanometre: the machine's own resolution.
+                    assert!((ours - exact).abs() < 1e-6, "{name} {side:?}: {ours} for {exact}");
+                }
+            }
+        }
+    }
+}

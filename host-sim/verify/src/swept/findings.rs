@@ -242,14 +242,14 @@ impl SweptResult {
 
     fn other_warnings(&self, job: &Job, parts: &Measurements<'_>) -> Vec<String> {
         let mut warnings = Vec::new();
-        if let Some(hollow) = self
+        if let Some(concave) = self
             .shape
             .concave_radius
-            .filter(|hollow| hollow.radius_mm < job.radius_mm)
+            .filter(|concave| concave.radius_mm < job.radius_mm)
         {
             warnings.push(format!(
                 "the surface has a concave radius of {:.4} mm at u = {:.6}, v = {:.6}, where a ball of {} mm does not fit",
-                hollow.radius_mm, hollow.u, hollow.v, job.radius_mm
+                concave.radius_mm, concave.u, concave.v, job.radius_mm
             ));
         }
         if let Some((count, [u, v])) = self.shape.degenerate {

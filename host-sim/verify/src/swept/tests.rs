@@ -278,8 +278,8 @@ fn ball_in_a_small_concave_radius_is_a_local_gouge() {
         "{gouge:?}"
     );
     assert!(gouge.local && (gouge.v < 0.02 || gouge.v > 0.98));
-    let hollow = found.shape.concave_radius.unwrap();
-    assert!((hollow.radius_mm - 4.0).abs() < 1e-9);
+    let concave = found.shape.concave_radius.unwrap();
+    assert!((concave.radius_mm - 4.0).abs() < 1e-9);
     assert!(found.warnings.iter().any(|line| line.contains("does not fit")));
 }
 
