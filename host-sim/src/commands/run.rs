@@ -319,11 +319,14 @@ pub(super) fn command(arguments: &Arguments) -> Result<()> {
     }
     if let Some(script) = &arguments.script {
         let scripted = scripted::play(&job, &prepared, script, None)?;
-        let (_peer, mut session) = connect(arguments)?;
+        let (mut peer, mut session) = connect(arguments)?;
         check_period(&job, &session)?;
         make_ready(arguments, &job, &prepared, &mut session)?;
         drive::upload(&mut session, &prepared, |_| {})?;
-        return scripted.run(&job, &mut session, arguments.json);
+        let verdict = scripted.run(&job, &mut session, arguments.json);
+        let failure = models_failure(&mut peer, arguments.json);
+        verdict?;
+        return failure.map_or(Ok(()), |failure| Err(Failure::Failed(Some(failure))));
     }
     let here = timed(&job, &prepared)?;
     if let Some(fault) = here
