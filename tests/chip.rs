@@ -119,7 +119,7 @@ impl Emulated {
             .spawn()
             .unwrap();
         let mut emulated = Self { board, child, folder };
-        let deadline = Instant::now() + Duration::from_secs(60);
+        let deadline = Instant::now() + Duration::from_secs(600);
         while !emulated.folder.path().join("line").exists() {
             assert!(
                 emulated.child.try_wait().unwrap().is_none(),

@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
-use std::time::{Duration, Instant};
+use std::time::Instant;
 
 use cad::{
     Axis, Face, Form, JobOptions, MachinableFace, Model, Options, SplineSurface, Surface, machinable, read,
@@ -510,10 +510,8 @@ fn hostile_files() {
     for entry in std::fs::read_dir(&folder).unwrap() {
         let path = entry.unwrap().path();
         let name = path.file_name().unwrap().to_str().unwrap().to_owned();
-        let begun = Instant::now();
+        // An error of time would have none of the words that are expected.
         let result = read(&path);
-        let taken = begun.elapsed();
-        assert!(taken < Duration::from_secs(20), "{name} took {taken:?}");
         if sound.contains(&name.as_str()) {
             let model = result.unwrap();
             assert_eq!(model.faces.len(), 1, "{name}");
@@ -565,8 +563,7 @@ fn renumbered(text: &str, by: usize) -> String {
     out
 }
 
-/// Ten megabytes of STEP, made of the mouse over and over: the time is printed; that of use is with the reader as people have it, not as
-/// `./check` builds it.
+/// Ten megabytes of STEP, made of the mouse over and over, are read within the reader's own limit of time; the time is printed.
 #[test]
 fn ten_megabytes() {
     let text = std::fs::read_to_string(cad("mouse.step")).unwrap();
@@ -595,6 +592,4 @@ fn ten_megabytes() {
     );
     assert_eq!(model.faces.len(), copies);
     assert_eq!(made.patches, 64);
-    // Far above what it takes, so that a slow machine does not fail; a reader of quadratic time does.
-    assert!(taken < Duration::from_secs(120), "{taken:?}");
 }

@@ -2,22 +2,21 @@
 //! file yields a model or an error in bounded time.
 
 use std::io::Read;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
+use std::sync::OnceLock;
 use std::time::{Duration, Instant};
 
 use serde::{Deserialize, Serialize};
 
 use super::{CadError, Face};
-use programs::Part;
+use programs::{Part, Unavailable};
 
 /// Largest file, bytes; reading takes about 30 times the size of the file in memory.
 const BYTES_MAX: u64 = 64 << 20;
-/// From this size on, bytes, a checkout builds and takes the optimised reader. The other takes 2 s of processor time for each MB of STEP,
-/// and would not read the largest files in [`TIME_MAX`].
-const BYTES_LARGE: u64 = 2 << 20;
-/// Time that the reader may take: ten times what the largest sound file takes.
-const TIME_MAX: Duration = Duration::from_secs(120);
+/// Time that the reader may take: twice what the reader of a checkout, which is not optimised, takes for the largest file (2 s for each MB
+/// of STEP).
+const TIME_MAX: Duration = Duration::from_secs(300);
 /// What a file holds.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Model {
@@ -33,26 +32,26 @@ pub struct Model {
 /// The file cannot be read, has an unknown format, is invalid, or contains no faces; with its name and, if known, the line.
 pub fn read(path: &Path) -> Result<Model, CadError> {
     let file = path.display().to_string();
-    let part = if check(&file, path)? < BYTES_LARGE {
-        Part::CadReader
-    } else {
-        Part::FastCadReader
-    };
-    if programs::needs_build(part) {
-        eprintln!("building the reader of CAD files (once, some minutes)");
-    }
-    let reader = programs::find(part).map_err(|error| {
-        CadError::new(
+    check(&file, path)?;
+    static READER: OnceLock<Result<PathBuf, Unavailable>> = OnceLock::new();
+    let reader = READER.get_or_init(|| {
+        if programs::needs_build(Part::CadReader) {
+            eprintln!("building the reader of CAD files (once, some minutes)");
+        }
+        programs::find(Part::CadReader)
+    });
+    match reader {
+        Ok(reader) => run(&file, path, reader),
+        Err(error) => Err(CadError::new(
             &file,
             format!("there is no reader of CAD files: {error}"),
             error.remedy(),
-        )
-    })?;
-    run(&file, path, &reader)
+        )),
+    }
 }
 
-/// Checks that need no parsing; the file's size, bytes.
-fn check(file: &str, path: &Path) -> Result<u64, CadError> {
+/// Checks that need no parsing.
+fn check(file: &str, path: &Path) -> Result<(), CadError> {
     let unreadable = |cause: String| {
         CadError::new(
             file,
@@ -76,7 +75,7 @@ fn check(file: &str, path: &Path) -> Result<u64, CadError> {
     if metadata.len() == 0 {
         return Err(CadError::new(file, "the file is empty", "export the part again"));
     }
-    Ok(metadata.len())
+    Ok(())
 }
 
 /// Runs the reader with a time limit.
