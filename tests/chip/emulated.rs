@@ -1,0 +1,359 @@
+//! A board's image on the models of its chip, and its output: the report, and every change of the pins.
+
+use std::path::{Path, PathBuf};
+use std::process::{Child, Command, Stdio};
+use std::sync::OnceLock;
+use std::time::{Duration, Instant};
+
+use boards::{Axis, Board, Level, Line, Role, SKR_PRO, STM32F405};
+use serde_json::Value;
+
+/// The core's clock in a run, and right after a reset, cycles of a microsecond.
+pub(super) const CYCLES_US: u64 = 168;
+pub(super) const RESET_CYCLES_US: u64 = 16;
+/// Cycles of a period, and of a byte on the line at 921 600 baud.
+pub(super) const PERIOD: u64 = 1_000 * CYCLES_US;
+const BYTE: u64 = 1_820;
+/// Time after a reset by which every output has to be at rest.
+pub(super) const REST_US: u64 = 100;
+
+/// Built once: the emulator, the tool, an image for each board.
+struct Built {
+    chip: PathBuf,
+    sim: PathBuf,
+}
+
+pub(super) fn workspace() -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("..")
+}
+
+fn cargo(arguments: &[&str]) {
+    let done = Command::new(env!("CARGO"))
+        .args(arguments)
+        .arg("--quiet")
+        .current_dir(workspace())
+        .status()
+        .unwrap();
+    assert!(done.success(), "cargo {arguments:?}");
+}
+
+fn built() -> &'static Built {
+    static BUILT: OnceLock<Built> = OnceLock::new();
+    BUILT.get_or_init(|| {
+        cargo(&["build", "-p", "chip"]);
+        cargo(&["build", "--bin", "host-sim"]);
+        for board in [&STM32F405, &SKR_PRO] {
+            cargo(&[board.build.0]);
+        }
+        let debug = workspace().join("target/debug");
+        Built {
+            chip: debug.join("chip"),
+            sim: debug.join("host-sim"),
+        }
+    })
+}
+
+/// The tool with these arguments; standard input is empty. Returns whether it succeeded, and its output.
+pub(super) fn sim<S: AsRef<std::ffi::OsStr>>(arguments: impl IntoIterator<Item = S>) -> (bool, String) {
+    let output = Command::new(&built().sim)
+        .args(arguments)
+        .current_dir(workspace())
+        .stdin(Stdio::null())
+        .output()
+        .unwrap();
+    let said = [output.stdout, output.stderr].concat();
+    (
+        output.status.success(),
+        String::from_utf8_lossy(&said).into_owned(),
+    )
+}
+
+/// A board's image at work, as fast as it goes.
+pub(super) struct Emulated {
+    board: &'static Board,
+    child: Child,
+    folder: tempfile::TempDir,
+}
+
+/// Its remaining output.
+pub(super) struct Ended {
+    pub(super) board: &'static Board,
+    pub(super) report: Value,
+    pub(super) edges: Vec<Edge>,
+}
+
+/// A change of a port's outputs.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Edge {
+    pub(super) at: u64,
+    port: usize,
+    levels: u16,
+    outputs: u16,
+}
+
+impl Emulated {
+    pub(super) fn start(board: &'static Board, arguments: &[&str]) -> Self {
+        Self::begin(board, arguments, false)
+    }
+
+    fn begin(board: &'static Board, arguments: &[&str], is_recorded: bool) -> Self {
+        let folder = tempfile::tempdir().unwrap();
+        let image = format!("target/{}/thumbv7em-none-eabihf/release/firmware", board.build.1);
+        let mut command = Command::new(&built().chip);
+        if is_recorded {
+            command.arg("--edges").arg(folder.path().join("edges"));
+        }
+        let child = command
+            .arg(workspace().join(image))
+            .arg("--fast")
+            .arg("--pty")
+            .arg(folder.path().join("line"))
+            .arg("--report")
+            .arg(folder.path().join("report"))
+            .args(arguments)
+            .stdin(Stdio::piped())
+            .stderr(Stdio::null())
+            .spawn()
+            .unwrap();
+        let mut emulated = Self { board, child, folder };
+        let deadline = Instant::now() + Duration::from_secs(600);
+        while !emulated.folder.path().join("line").exists() {
+            assert!(
+                emulated.child.try_wait().unwrap().is_none(),
+                "the program ended: is libunicorn2 installed?"
+            );
+            assert!(Instant::now() < deadline);
+            std::thread::sleep(Duration::from_millis(2));
+        }
+        emulated
+    }
+
+    /// With a record of every change of the outputs.
+    pub(super) fn recorded(board: &'static Board, arguments: &[&str]) -> Self {
+        Self::begin(board, arguments, true)
+    }
+
+    fn port(&self) -> String {
+        self.folder.path().join("line").to_str().unwrap().to_owned()
+    }
+
+    /// `cargo sim run` through its line.
+    pub(super) fn run(&self, job: &Path, home: &str) -> (bool, String) {
+        sim([
+            "run",
+            job.to_str().unwrap(),
+            "--port",
+            &self.port(),
+            "--home",
+            home,
+        ])
+    }
+
+    pub(super) fn status(&self) -> String {
+        sim(["operate", "--port", &self.port(), "status"]).1
+    }
+
+    /// Ends it.
+    pub(super) fn end(mut self) -> Ended {
+        drop(self.child.stdin.take());
+        self.wait()
+    }
+
+    /// Waits for its end.
+    pub(super) fn wait(mut self) -> Ended {
+        // `Child::wait` would close its input, which is its end.
+        let status = loop {
+            match self.child.try_wait().unwrap() {
+                Some(status) => break status,
+                None => std::thread::sleep(Duration::from_millis(5)),
+            }
+        };
+        assert!(
+            matches!(status.code(), Some(0 | 1)),
+            "the program that executes images: {status}"
+        );
+        let report: Value =
+            serde_json::from_slice(&std::fs::read(self.folder.path().join("report")).unwrap()).unwrap();
+        let edges = std::fs::read(self.folder.path().join("edges"));
+        let edges = edges.map(|bytes| bytes.chunks_exact(16).map(Edge::read).collect());
+        Ended {
+            board: self.board,
+            report,
+            edges: edges.unwrap_or_default(),
+        }
+    }
+}
+
+impl Drop for Emulated {
+    fn drop(&mut self) {
+        let _ = self.child.kill();
+        let _ = self.child.wait();
+    }
+}
+
+impl Edge {
+    fn read(bytes: &[u8]) -> Self {
+        let half = |at: usize| u16::from_le_bytes([bytes[at], bytes[at + 1]]);
+        Self {
+            at: u64::from_le_bytes(bytes[..8].try_into().unwrap()),
+            port: bytes[8].into(),
+            levels: half(10),
+            outputs: half(12),
+        }
+    }
+}
+
+/// The changes of a line: cycle, level; None while it is no output.
+fn changes(edges: &[Edge], line: &Line) -> Vec<(u64, Option<bool>)> {
+    let bit = 1 << line.pin.number;
+    let mut changes = vec![(0, None)];
+    for edge in edges.iter().filter(|edge| edge.port == line.pin.port.index()) {
+        let level = (edge.outputs & bit != 0).then_some(edge.levels & bit != 0);
+        if changes.last().is_some_and(|last| last.1 != level) {
+            changes.push((edge.at, level));
+        }
+    }
+    changes
+}
+
+fn is_output(line: &Line) -> bool {
+    !line.role.is_input() && line.role != Role::SerialTx
+}
+
+impl Ended {
+    pub(super) fn number(&self, key: &str) -> u64 {
+        self.report[key]
+            .as_u64()
+            .unwrap_or_else(|| panic!("{key}: {}", self.report[key]))
+    }
+
+    /// Cycle of an event.
+    pub(super) fn event(&self, what: &str) -> u64 {
+        let event = self.report["events"]
+            .as_array()
+            .unwrap()
+            .iter()
+            .find(|event| event["what"] == what);
+        event.unwrap_or_else(|| panic!("no {what}: {}", self.report["events"]))["cycle"]
+            .as_u64()
+            .unwrap()
+    }
+
+    pub(super) fn no_complaint(&self) {
+        assert_eq!(
+            self.number("complained"),
+            0,
+            "{}: {:#}",
+            self.board.id,
+            self.report["complaints"]
+        );
+    }
+
+    /// No byte of the host was lost, and none was near it.
+    pub(super) fn no_byte_lost(&self) {
+        assert_eq!(self.number("bytes_lost"), 0, "{:#}", self.report["notes"]);
+        let wait = self.number("byte_wait_max_cycles");
+        assert!(wait < BYTE / 2, "a byte waited {wait} cycles of {BYTE}");
+    }
+
+    pub(super) fn changes(&self, line: &Line) -> Vec<(u64, Option<bool>)> {
+        changes(&self.edges, line)
+    }
+
+    /// When the last of the outputs came to rest for good after a cycle; each had to be an output at its inactive level, or to be let go.
+    pub(super) fn rest_after(&self, from: u64, until: u64) -> u64 {
+        let mut last = from;
+        for line in self.board.lines.iter().filter(|line| is_output(line)) {
+            let inactive = Some(line.active == Level::Low);
+            let changes = self.changes(line);
+            let at_end = changes.iter().rfind(|(at, _)| *at <= until).unwrap();
+            assert_eq!(
+                at_end.1, inactive,
+                "{}: {} {}",
+                self.board.id, line.role, line.pin
+            );
+            if at_end.0 >= from {
+                last = last.max(at_end.0);
+            }
+        }
+        last
+    }
+
+    /// The last rise of a step pin before a cycle.
+    pub(super) fn last_pulse(&self, until: u64) -> u64 {
+        let rises = Axis::ALL.map(|axis| {
+            let changes = self.changes(&self.board.axis(axis).step);
+            changes
+                .into_iter()
+                .filter(|(at, level)| *level == Some(true) && *at < until)
+                .map(|(at, _)| at)
+                .max()
+        });
+        rises.into_iter().flatten().max().expect("there were pulses")
+    }
+
+    /// When the enable lines went to this state, all of them, after a cycle.
+    pub(super) fn drives(&self, on: bool, from: u64) -> Option<u64> {
+        let mut last = 0;
+        for axis in Axis::ALL {
+            let line = self.board.axis(axis).enable;
+            let wanted = Some(on == (line.active == Level::High));
+            let change = self
+                .changes(&line)
+                .into_iter()
+                .find(|(at, level)| *at >= from && *level == wanted)?;
+            last = last.max(change.0);
+        }
+        Some(last)
+    }
+}
+
+/// A job file in a folder of its own.
+pub(super) struct Job {
+    _folder: tempfile::TempDir,
+    pub(super) path: PathBuf,
+}
+
+impl Job {
+    fn new(text: &str) -> Self {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("job.toml");
+        std::fs::write(&path, text).unwrap();
+        Self {
+            _folder: folder,
+            path,
+        }
+    }
+
+    /// A sample job that no host can be gone for: time here runs faster than the host's.
+    pub(super) fn sample(name: &str, changes: &[(&str, &str)]) -> Self {
+        let mut text = std::fs::read_to_string(workspace().join("jobs").join(name))
+            .unwrap()
+            .replace("host_gone = \"hold\"", "host_gone = \"finish\"");
+        for (from, to) in changes {
+            assert!(text.contains(from), "{name}: {from}");
+            text = text.replace(from, to);
+        }
+        Self::new(&text)
+    }
+
+    /// A level square in the air, as in the guide, with these lines for [machine].
+    pub(super) fn square(mm: f64, feed_mm_min: f64, machine: &str) -> Self {
+        Self::new(&format!(
+            "[surface]\nkind = \"ruled\"\nrail0_mm = [[0, 0, {mm}, 0], [0, 0, 0, 0], [0, 0, 0, 50]]\n\
+             rail1_mm = [[0, 0, {mm}, 0], [0, 0, 0, {mm}], [0, 0, 0, 50]]\nu = [0, 1]\nv = [0, 1]\n\
+             [tool]\nkind = \"ball\"\nradius_mm = 5\n\
+             [cut]\nfeed_mm_min = {feed_mm_min}\nscallop_mm = 0.5\nalong = \"u\"\nside = \"up\"\npattern = \"zigzag\"\n\
+             [machine]\nhome_mm = [0, 0, 60]\n{machine}"
+        ))
+    }
+
+    pub(super) fn slow_square() -> Self {
+        let limits = "velocity_max_mm_s = [20, 20, 10]\nacceleration_max_mm_s2 = [100, 100, 50]\njerk_max_mm_s3 = [1000, 1000, 500]";
+        Self::square(
+            20.0,
+            600.0,
+            &format!("{limits}\nsteps_per_mm = [400, 400, 400]\n"),
+        )
+    }
+}
