@@ -1,5 +1,5 @@
-//! A whole board in this process, with a real job: what comes over the line is what the interpolator did, and nothing
-//! that the line does can make it otherwise.
+//! A whole board in this process, with a real job: the line reports exactly the samples of the interpolator, and no
+//! disturbance on the line changes them.
 
 mod disorder;
 mod steps;
@@ -23,7 +23,8 @@ use protocol::{
 
 const WORDS: usize = 64;
 
-/// The samples of the dome, by the core alone: all, or a given number until a missed tick stops the run.
+/// The samples that the core alone makes of the dome: all of them, or those of a run that a missed tick stops after a given
+/// number of samples.
 fn samples_of_dome(missed_after: Option<usize>) -> Vec<Sample> {
     let (header, words) = dome();
     let mut core = Interpolator::<[i32; WORDS]>::new();
@@ -43,7 +44,7 @@ fn samples_of_dome(missed_after: Option<usize>) -> Vec<Sample> {
     samples
 }
 
-/// The whole run.
+/// All samples of an undisturbed run.
 fn reference() -> Vec<Sample> {
     let samples = samples_of_dome(None);
     assert!((500..2000).contains(&samples.len()), "{} samples", samples.len());
@@ -57,7 +58,7 @@ fn digest(samples: &[Sample]) -> u64 {
     digest.value()
 }
 
-/// Host and board, and the board's events.
+/// Host and board, with the board's reports by kind.
 #[derive(Default)]
 struct Desk {
     host: Host,
@@ -68,7 +69,7 @@ struct Desk {
 }
 
 impl Desk {
-    /// A board in session with the dome loaded, on this clock, reporting this.
+    /// A board in session with the dome loaded, on the given clock, with the given reports.
     fn loaded(clock: Clock, report: Report) -> Self {
         let mut desk = Self::default();
         assert!(matches!(desk.ask(&HELLO), Reply::Capabilities(_)));
@@ -85,7 +86,7 @@ impl Desk {
         desk
     }
 
-    /// Sorts what the board sent; the answers are left over.
+    /// Sorts the board's messages by kind; returns the answers to requests.
     fn collect(&mut self) -> Vec<Reply> {
         let sent = self.board.take_sent();
         let mut answers = Vec::new();
@@ -125,7 +126,7 @@ impl Desk {
         assert_eq!(self.collect(), []);
     }
 
-    /// Runs until the board says that it has halted.
+    /// Grants a number of ticks and runs until the board reports `Halted`.
     fn run(&mut self, ticks: u32) -> Status {
         self.accepted(&Request::Run { ticks });
         let before = self.halts.len();
@@ -136,7 +137,7 @@ impl Desk {
     }
 }
 
-/// The passes that these samples make.
+/// Checks number, samples and digest of each pass against the samples.
 fn check_passes(passes: &[PassDigest], samples: &[Sample]) {
     let mut rest = samples;
     for (pass, number) in passes.iter().zip(0..) {
@@ -219,7 +220,7 @@ fn time_stands_still_in_lockstep_without_credit() {
     );
     desk.ticks(100);
     assert_eq!(desk.samples, reference()[..25]);
-    // a `Run` of 0 ticks is used up immediately
+    // A `Run` of 0 ticks is used up immediately.
     assert_eq!(desk.run(0), status);
 }
 
@@ -249,7 +250,7 @@ fn an_abort_ends_the_run_and_keeps_the_job() {
     desk.accepted(&Request::Start);
     desk.run(100);
     desk.accepted(&Request::Abort);
-    // a later command does not replace a queued abort
+    // A later command does not replace a queued abort.
     desk.accepted(&Request::Hold);
     let status = desk.run(100);
     assert_eq!(
@@ -280,7 +281,7 @@ fn a_job_begun_withdraws_a_start_that_waits() {
     desk.accepted(&Request::Start);
     let (header, words) = dome();
     let requests = upload(header, &words);
-    // still in the queue: it would meet the other job
+    // The start is still in the queue: it would start the other job.
     assert_eq!(
         desk.ask(&requests[0]),
         Reply::Nak {
@@ -288,7 +289,7 @@ fn a_job_begun_withdraws_a_start_that_waits() {
             reason: Reason::Busy
         }
     );
-    // acknowledged, but time stands still
+    // The start is dropped; in lockstep without credit no period passes.
     desk.ticks(1);
     for request in &requests {
         desk.accepted(request);
@@ -309,7 +310,7 @@ fn a_missed_tick_trips_a_free_run_and_is_only_counted_in_lockstep() {
         desk.ticks(1);
     }
     let status = desk.halts[0];
-    // Along the path, 1/32 of the feed less with each of 31 samples.
+    // The feed falls by 1/32 with each of 31 samples along the path.
     assert_eq!((status.state, status.samples), (State::Faulted, 50 + 31));
     assert_eq!((status.deadline_misses, status.tick_cycles_max), (2, 4321));
     let fault = status.fault.unwrap();
@@ -328,7 +329,7 @@ fn a_missed_tick_trips_a_free_run_and_is_only_counted_in_lockstep() {
     assert_eq!(status.digest, digest(&reference()));
 }
 
-/// A way to the link with or without room.
+/// The event queue to the link, with or without room.
 #[derive(Default)]
 struct Way {
     full: bool,
@@ -346,7 +347,7 @@ impl Events for Way {
     }
 }
 
-/// A machine with the dome, in lockstep, that reports samples and is to start.
+/// The real-time half with the dome, in lockstep, reporting samples, with a start in its queue.
 fn half_in_lockstep() -> RealTime<[i32; WORDS]> {
     let (header, words) = dome();
     let mut half = RealTime::<[i32; WORDS]>::new();
@@ -439,16 +440,16 @@ fn a_tick_over_its_budget_trips_a_run_that_moves_on_a_free_clock() {
     const BUDGET: u32 = 16_800;
     let mut desk = Desk::loaded(Clock::Free, Report::Digests);
     desk.board.real_time().set_tick_budget(BUDGET);
-    // nothing moves yet
+    // No run is under way yet: no fault.
     desk.board.tick_with(0, 2 * BUDGET);
     assert_eq!(desk.board.status().state, State::Ready);
     desk.accepted(&Request::Start);
     desk.ticks(50);
-    // as much as is allowed, as often as one likes
+    // Ticks of exactly the budget are no fault, however many.
     desk.board.tick_with(0, BUDGET);
     desk.board.tick_with(0, BUDGET);
     assert_eq!(desk.board.status().state, State::Running);
-    // held, it is no fault, but counts as the most that a tick took
+    // While held, a tick over its budget is no fault, but it is recorded as the maximum.
     desk.accepted(&Request::Hold);
     while desk.board.status().state != State::Held {
         desk.ticks(1);
@@ -457,7 +458,7 @@ fn a_tick_over_its_budget_trips_a_run_that_moves_on_a_free_clock() {
     assert_eq!(desk.board.status().fault, None);
     desk.accepted(&Request::Resume);
     desk.ticks(2);
-    // less than the most so far, and still too much
+    // Below the recorded maximum, but above the budget: a fault.
     let before = desk.board.status();
     assert_eq!(
         (before.state, before.tick_cycles_max),
@@ -476,7 +477,7 @@ fn a_tick_over_its_budget_trips_a_run_that_moves_on_a_free_clock() {
     );
     assert_eq!((status.deadline_misses, status.tick_cycles_max), (0, BUDGET + 9));
 
-    // in lockstep the link does not time out
+    // In lockstep the budget is not enforced; the maximum is recorded.
     let mut desk = Desk::loaded(Clock::Lockstep, Report::Digests);
     desk.board.real_time().set_tick_budget(BUDGET);
     desk.accepted(&Request::Start);

@@ -1,7 +1,8 @@
 //! The images for the boards, unchanged, on models of their chip (`host-sim/chip`): from the reset to the last pulse, with `cargo sim run` at the
 //! other end of a pseudo-terminal. Needs Debian's `libunicorn2`; builds the images, the program that executes them and the tool.
 //!
-//! Time is the chip's: a machine that is busy makes these tests slower, and no figure in them other. `BLESS=1` writes the golden files anew.
+//! All times are the chip's own: on a busy machine these tests take longer, and their figures stay the same. `BLESS=1` rewrites the golden
+//! files.
 
 mod disturbed;
 mod emulated;
@@ -59,7 +60,7 @@ fn without_a_crystal_everything_stays_at_rest() {
     assert_eq!(changed, 0);
 }
 
-/// A whole sample job over the line: every sample the same, no byte lost, no tick late.
+/// Runs a whole sample job over the line: every sample equal to the host's, no byte lost, no tick late.
 fn whole(board: &'static Board, name: &str, home: &str, seed: &str) {
     let emulated = Emulated::start(board, &["--seed", seed]);
     let (done, said) = emulated.run(&Job::sample(name, &[]).path, home);
@@ -77,7 +78,7 @@ fn whole(board: &'static Board, name: &str, home: &str, seed: &str) {
         "{}, {name}: {tick}; {receive}; {} cycles",
         board.id, ended.report["byte_wait_max_cycles"]
     );
-    // Nothing but the receiver and a lock of the idle task holds a tick up.
+    // Only the receive interrupt and a critical section of the idle task delay a tick.
     assert!(
         tick["latency_max_cycles"].as_u64().unwrap() < 10 * CYCLES_US,
         "{tick}"
@@ -104,7 +105,7 @@ fn plate_machine_on_the_skr_pro() {
     whole(&SKR_PRO, "plate_machine.toml", "40,30,40", "4");
 }
 
-/// The operator's script in lockstep: on a coarser plate and four times as fast here, whole in `the_whole_script`.
+/// The operator's script in lockstep, with a coarser plate and a quarter of the ticks; `the_whole_script` runs it unchanged.
 #[test]
 fn the_operators_script() {
     let job = Job::sample("plate_machine.toml", &[("scallop_mm = 0.05 ", "scallop_mm = 2 ")]);

@@ -1,5 +1,5 @@
-//! The cycle counter: its decoder against a disassembler over the whole image, its count against a counter in the guest,
-//! and what the sample task takes against the golden table. Needs `qemu-system-arm`; builds the firmware and the plugin.
+//! The cycle counter: its decoder against a disassembler over the whole image, its count against a timer in the guest,
+//! and the cycles of the sample task against the golden table. Needs `qemu-system-arm`; builds the firmware and the plugin.
 
 use std::fmt::Write;
 use std::io::Read;
@@ -68,7 +68,7 @@ mod guest {
     pub(super) const CALLS: u32 = 50;
 }
 
-/// Image and plan of the guest, all of it one stage.
+/// Image and plan of the guest; the whole guest is one stage.
 fn guest_plan() -> Plan {
     let code_at = 4 * guest::VECTORS;
     let mut words = vec![code_at + 1; guest::VECTORS as usize];
@@ -87,10 +87,10 @@ fn guest_plan() -> Plan {
     }
 }
 
-/// QEMU's guest takes milliseconds; a busy machine may leave it without processor time for long.
+/// The guest runs for milliseconds; a busy machine may give QEMU no processor time for much longer.
 const GUEST_TIMEOUT: Duration = Duration::from_secs(600);
 
-/// Runs the guest: the differences that it sent, in instructions, and the plugin's records.
+/// Runs the guest. Returns the timer differences that it sent, in instructions, and the plugin's records.
 fn run_guest(folder: &Path) -> (Vec<u32>, Vec<Record>) {
     let path = |name: &str| folder.join(name);
     let plan = guest_plan();
@@ -111,7 +111,7 @@ fn run_guest(folder: &Path) -> (Vec<u32>, Vec<Record>) {
             bytes.extend_from_slice(&some[..count]);
         }
     }
-    // The second record comes with the first instruction after the handler.
+    // The plugin writes the second record at the first instruction after the handler.
     let mut records = Vec::new();
     while records.len() < 2 * RECORD_BYTES && Instant::now() < deadline {
         records = std::fs::read(path("records")).unwrap();
@@ -125,8 +125,8 @@ fn run_guest(folder: &Path) -> (Vec<u32>, Vec<Record>) {
     (counted, Record::read_all(&records))
 }
 
-/// Two ticks that preempt another handler: instructions as a timer in the guest counts them, cycles as counted by hand,
-/// and the other handler's instructions on its own account.
+/// Two ticks that preempt another handler: instructions against a timer in the guest, cycles against a count by hand,
+/// and the other handler's instructions charged to that handler.
 #[test]
 fn instructions_agree_with_a_counter_in_the_guest() {
     let folder = std::env::temp_dir().join(format!("isofeed-cycles-{}", std::process::id()));
@@ -134,14 +134,14 @@ fn instructions_agree_with_a_counter_in_the_guest() {
     let (counted, records) = run_guest(&folder);
     std::fs::remove_dir_all(&folder).unwrap();
     assert_eq!((counted.len(), records.len()), (2, 2));
-    // bl, movs, bx, subs, it, addne, cmp, bne; around them movs, nop, vmul, vadd and the second ldr.
+    // For each call bl, movs, bx, subs, it, addne, cmp, bne; in addition movs, nop, vmul, vadd and the second ldr.
     let work = 8 * guest::CALLS + 5;
     // push and the first ldr; subs, four str, three lsrs, pop.
     let around = 2 + 9;
-    // bl 1+1, movs 1, bx 1+2, subs, it, addne, cmp 1 each, bne 1+1, but for the last 1.
+    // bl 1+1, movs 1, bx 1+2, subs, it, addne, cmp 1 each, bne 1+1, except the last bne: 1.
     let calls = 12 * guest::CALLS - 1;
-    // Entry, exit; push 4, ldr 2, movs, nop; vmul, vadd, ldr 2, subs; four str, three lsrs, pop 4 and what its branch
-    // takes is the exit's.
+    // Entry, exit; push 4, ldr 2, movs, nop; vmul, vadd, ldr 2, subs; four str, three lsrs, pop 4. The cycles of the pop's
+    // branch belong to the exit.
     let nominal = 24 + (4 + 2 + 1 + 1) + calls + (1 + 1 + 2 + 1) + (4 + 3 + 4);
     for (record, counted) in records.iter().zip(counted) {
         assert_eq!(counted, work);
@@ -149,15 +149,15 @@ fn instructions_agree_with_a_counter_in_the_guest() {
         let cycles: u32 = record.stages.iter().map(|cycles| cycles.nominal).sum();
         assert_eq!(cycles, nominal);
         assert_eq!(record.stages[Stage::Exception as usize].nominal, 24);
-        // Both flash lines, and lazy stacking there and back.
+        // Two flash lines, and lazy stacking at entry and exit.
         let exception = record.stages[Stage::Exception as usize].pessimistic;
         assert_eq!(exception, 24 + 5 + 5 + 2 * 17);
     }
-    // Between the two ticks: dsb, isb, movs, a hundred times subs and bne, str.
+    // Between the two ticks: dsb, isb, movs, 100 times subs and bne, str.
     assert_eq!(records[1].elsewhere, 2 + 1 + 2 * 100 + 1);
 }
 
-/// The accounts without QEMU: a branch that is taken and one that is not, to the cycle.
+/// The account without QEMU: cycles of a taken and of an untaken branch.
 #[test]
 fn the_account_follows_a_loop() {
     let plan = guest_plan();
@@ -168,20 +168,20 @@ fn the_account_follows_a_loop() {
         let index = account.decode(address).unwrap();
         account.execute(index)
     };
-    // The thread, the outer handler, the tick in it, straight to its return, and back.
+    // The thread, the outer handler, the tick that preempts it, directly to its return, and the outer handler again.
     assert_eq!(at(code_at), None);
     assert_eq!(at(outer), None);
     assert_eq!(at(outer + 2), None);
     assert_eq!(at(tick), None);
     assert_eq!(at(tick + 0x30), None);
     let record = at(outer + 4).unwrap();
-    // push {r4,r7,lr} and pop {r4,r7,pc}, four each.
+    // push {r4,r7,lr} and pop {r4,r7,pc}, 4 cycles each.
     assert_eq!((record.instructions, record.elsewhere), (2, 3));
     assert_eq!(record.stages[Stage::Rest as usize].nominal, 4 + 4);
 }
 
-/// Lines of a disassembler: address, mnemonic without width, operands. Fails where none is installed: a decoder that is
-/// compared with nothing is not tested.
+/// Lines of a disassembler: address, mnemonic without width, operands. Panics if no disassembler is installed, because the
+/// decoder would then not be tested.
 fn disassembly(image: &Path) -> Vec<(u32, String, String)> {
     let tool = ["arm-none-eabi-objdump", "llvm-objdump", "rust-objdump"]
         .into_iter()
@@ -212,7 +212,7 @@ fn disassembly(image: &Path) -> Vec<(u32, String, String)> {
     tool.lines().filter_map(line).collect()
 }
 
-/// The class of a mnemonic; words of several transfers as 0.
+/// The class of a mnemonic; the number of words of multiple transfers is 0.
 fn class_of(mnemonic: &str, operands: &str) -> Class {
     let begins = |names: &[&str]| names.iter().any(|name| mnemonic.starts_with(name));
     let base = mnemonic.split('.').next().unwrap_or(mnemonic);
@@ -275,7 +275,7 @@ fn class_of(mnemonic: &str, operands: &str) -> Class {
     }
 }
 
-/// Whether two values are added or subtracted, neither an address on the stack or in the code nor a negation.
+/// Whether an instruction adds or subtracts two values. Stack and code addresses, and negations, do not count.
 fn is_addition(base: &str, operands: &str) -> bool {
     let adds = ["add", "sub", "rsb"].iter().any(|name| base.starts_with(name));
     let registers = operands.split(',').map(str::trim);
@@ -283,12 +283,12 @@ fn is_addition(base: &str, operands: &str) -> bool {
     adds && !negates && !registers.clone().any(|name| name == "sp" || name == "pc")
 }
 
-/// A class without what the mnemonic alone does not say.
+/// A class reduced to the information that the mnemonic alone gives.
 fn plain(class: Class) -> Class {
     match class {
         Class::Branch(Branch::Direct(_)) => Class::Branch(Branch::Direct(0)),
         Class::Branch(Branch::Call(_)) => Class::Branch(Branch::Call(0)),
-        // A 16-bit instruction sets no flags in an IT block.
+        // In an IT block a 16-bit instruction sets no flags.
         Class::Add { .. } => Class::Add { sets_flags: false },
         Class::LoadMultiple(_) => Class::LoadMultiple(0),
         Class::StoreMultiple(_) => Class::StoreMultiple(0),
@@ -298,8 +298,7 @@ fn plain(class: Class) -> Class {
     }
 }
 
-/// Each instruction of the image: its class is what the disassembler's mnemonic says, the next begins where it ends, and
-/// a direct branch goes where the disassembler says.
+/// For each instruction of the image, class, length and the target of a direct branch agree with the disassembler.
 #[test]
 fn the_decoder_agrees_with_a_disassembler() {
     let path = images::for_qemu();
@@ -314,7 +313,7 @@ fn the_decoder_agrees_with_a_disassembler() {
             Class::Branch(Branch::Direct(to) | Branch::Call(to)) => Some(format!("{to:x}")),
             _ => None,
         };
-        // Between functions and in front of tables there is room.
+        // Between functions and in front of tables there may be padding.
         let length = pair[1].0 - address;
         let agrees = plain(instruction.class) == class_of(mnemonic, operands)
             && (u32::from(instruction.length) == length || length > 4)
@@ -331,14 +330,14 @@ fn the_decoder_agrees_with_a_disassembler() {
     println!("{} instructions agree", lines.len());
 }
 
-/// A tail call: what the last function does is charged to the one that branched to it, not to that one's caller.
+/// A tail call: the callee's cycles are charged to the function that branched to it, not to that function's caller.
 #[test]
 fn a_tail_call_keeps_the_stage() {
     let mut plan = guest_plan();
     let code_at = 4 * guest::VECTORS;
     let at = |address: u32| (address / 2) as usize;
     let (tick, callee) = (code_at + guest::TICK, code_at + guest::TICK + 0x34);
-    // In the tick: bl to the reset code, whose last instruction is made a branch to `callee`.
+    // In the tick, `bl` calls the reset code; its last instruction is taken as a branch to `callee`.
     let reset_end = code_at + guest::OUTER - 2;
     plan.stages[at(reset_end)] = Some(Stage::PassChange);
     plan.stages[at(callee)] = Some(Stage::Surface);
@@ -349,7 +348,7 @@ fn a_tail_call_keeps_the_stage() {
         let index = account.decode(address).unwrap();
         account.execute(index)
     };
-    // tick: push, bl; the reset code's `b`; callee: movs, bx; back, and out.
+    // tick: push, bl; the reset code's `b`; callee: movs, bx; return to the tick, and from it.
     for address in [
         code_at,
         tick,
@@ -363,12 +362,12 @@ fn a_tail_call_keeps_the_stage() {
     }
     let record = run(code_at + 2).unwrap();
     assert_eq!(record.stages[Stage::Surface as usize].nominal, 0);
-    // b 1 + 1, movs 1, bx 1 + 2, one more for each target that straddles; none does.
+    // b 1 + 1, movs 1, bx 1 + 2; one more for each target that straddles a word boundary, here none.
     assert_eq!(record.stages[Stage::PassChange as usize].nominal, 6);
 }
 
-/// Every loop of the sample task is at a place whose bound is written down, no function of it panics, and the stack that
-/// follows from the image is more than any run has used, and less than there is room for.
+/// Every loop of the sample task has a documented bound, no function of it panics, and the stack bound derived from the
+/// image fits into the RAM that is left.
 #[test]
 fn the_image_is_bounded() {
     let path = images::for_qemu();
@@ -394,7 +393,7 @@ fn counted((name, path, ticks): (&str, PathBuf, u32)) -> (Vec<Figure>, (String, 
     (figures::figures(name, &ticks), (name.to_owned(), operations))
 }
 
-/// Figures and operations of all jobs of the table, as many side by side as there are processors.
+/// Figures and operations of all jobs of the table, measured in parallel on all processors.
 fn all_counted() -> (Vec<Figure>, Vec<(String, Operations)>) {
     let jobs = Mutex::new(cycles::jobs().into_iter());
     let next = || jobs.lock().unwrap().next();
@@ -419,7 +418,7 @@ fn check_growth(figures: &[Figure], counts: &[(String, Operations)]) {
     );
 }
 
-/// No stage takes more than 2 % longer than when the golden table was written, and a sample takes the same operations.
+/// No stage takes more than 2 % more cycles than in the golden table, and a sample executes the same operations.
 #[test]
 fn no_stage_has_grown() {
     let (all, counts) = all_counted();
@@ -432,13 +431,14 @@ fn no_stage_has_grown() {
     check_growth(&all, &counts);
 }
 
-/// The same of the worst-case tick that a search has found.
+/// The same for the worst-case tick that a search has found.
 #[test]
 fn the_worst_tick_has_not_grown() {
     check_growth(&golden::worst_tick(images::setup()).unwrap(), &[]);
 }
 
-/// A short search finds no tick above a tenth of the period, half of what the firmware would stop for (`TICK_BUDGET_CYCLES`, a fifth).
+/// A short search finds no tick above a tenth of the period, which is half of the firmware's tick budget (`TICK_BUDGET_CYCLES`, a fifth). The
+/// stack used is within the bound derived from the image.
 fn check_search(jobs: u32, limits: bool) {
     let mut session = MeasurementSession::new(images::setup()).unwrap();
     let result = search(&mut session, jobs, 3, limits, || {}).unwrap();

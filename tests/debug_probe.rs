@@ -1,5 +1,5 @@
-//! Flashing and the log as far as they go without a probe: images, the log's decoding, messages without a probe. Builds the
-//! probe program, which takes minutes the first time.
+//! The parts of flashing and logging that need no probe: images, decoding of the log, messages if no probe is connected. Builds
+//! the probe program, which takes minutes the first time.
 
 use std::fs::File;
 use std::io::Write;
@@ -30,7 +30,7 @@ fn chip_image() -> &'static Path {
     IMAGE.get_or_init(|| chip().unwrap())
 }
 
-/// The image as another tool flattens it, from the first byte of flash on.
+/// The image as a binary by `objcopy`, from the first byte of flash on.
 fn flat(image: &Path) -> Vec<u8> {
     let folder = tempfile::tempdir().unwrap();
     let binary = folder.path().join("image.bin");
@@ -92,8 +92,8 @@ fn wait_for(qemu: &Qemu, state: &str) -> Vec<u8> {
     }
 }
 
-/// QEMU's log of a job that is loaded, dropped, and loaded again: frames of the same encoding as the chip's, which only another way
-/// brings here.
+/// QEMU's log of a job that is loaded, dropped, and loaded again. The frames have the same encoding as the chip's; only the transport
+/// differs.
 fn recorded() -> Vec<u8> {
     let (qemu, stream) = Qemu::start(images::for_qemu()).unwrap();
     let mut session = Session::open(stream, 1).unwrap();
@@ -110,7 +110,7 @@ fn recorded() -> Vec<u8> {
     log
 }
 
-/// Lines, and how many frames were lost.
+/// The decoded lines, and the number of lost frames.
 fn decoded(log: &[u8]) -> (Vec<Line>, usize) {
     let mut file = tempfile::NamedTempFile::new().unwrap();
     file.write_all(log).unwrap();
@@ -139,7 +139,7 @@ fn a_recorded_log_is_decoded_and_damage_costs_a_line() {
     assert_eq!(lost, 0);
     let greeting = format!("isofeed {} on qemu-netduinoplus2", env!("CARGO_PKG_VERSION"));
     assert!(lines[0].message.starts_with(&greeting), "{:?}", lines[0]);
-    // QEMU's machine has no TIM1 that makes steps: that is the one warning, all else is information.
+    // QEMU's machine has no working TIM1 for steps: that is the only warning, the other lines are information.
     for line in &lines {
         let level = match line.message.as_str() {
             "this board puts no steps out" => "warn",
@@ -161,7 +161,7 @@ fn a_recorded_log_is_decoded_and_damage_costs_a_line() {
             "ready"
         ]
     );
-    // Time stamps are the board's own, s, and never go back.
+    // Time stamps are the board's own, in s, and increase monotonically.
     let times: Vec<f64> = lines
         .iter()
         .map(|line| line.time.as_ref().unwrap().parse().unwrap())
@@ -171,14 +171,14 @@ fn a_recorded_log_is_decoded_and_damage_costs_a_line() {
         "{times:?}"
     );
 
-    // A byte of the second frame is damaged: that line is lost, or another, and the rest is as it was.
+    // If a byte of the second frame is damaged, that line is lost or changed; the other lines stay the same.
     let second = log.iter().skip(1).position(|byte| *byte == 0).unwrap() + 3;
     assert!(log[second] != 0, "a byte of a frame");
     let mut damaged = log.clone();
     damaged[second] ^= 0x55;
     let (after, _) = decoded(&damaged);
     assert!(after.ends_with(&lines[2..]) && after[0] == lines[0], "{after:?}");
-    // A reader that connects late begins within a frame.
+    // A reader that connects late starts within a frame.
     let (late, lost) = decoded(&log[second + 2..]);
     assert!(
         late.ends_with(&lines[2..]) && late.len() + lost <= lines.len(),
@@ -186,7 +186,7 @@ fn a_recorded_log_is_decoded_and_damage_costs_a_line() {
     );
 }
 
-/// Messages without a probe, for each command that requires one, and for invalid selectors.
+/// Messages if no probe is connected, for each command that requires one, and for invalid selectors.
 #[test]
 fn without_a_probe_that_is_what_is_said() {
     let image = chip_image();
@@ -217,7 +217,7 @@ fn without_a_probe_that_is_what_is_said() {
             Problem::BadSelector(selector.to_owned())
         );
     }
-    // An image without a log for probes, or none at all, is refused before a probe is looked for.
+    // An image without an RTT log, or a file that is no image, is refused before the search for a probe.
     for image in [images::for_qemu().into(), "Cargo.toml".into()] {
         let request = Request::Log(Target {
             image,

@@ -1,4 +1,4 @@
-//! Drivers of the firmware against recorded registers: the same files, without the chip.
+//! Drivers of the firmware, from the same source files, against simulated registers.
 
 #[path = "../firmware/src/drivers/drive_enable.rs"]
 mod drive_enable;
@@ -20,7 +20,7 @@ use protocol::message::{InputLines, ResetCause};
 use safety_inputs::{ReadPorts, SafetyInputs, pins_of};
 use watchdog::{Register, Registers, Watchdog, reload};
 
-/// The watchdog as RM0090 describes it: keys, the lock, the way to the LSI.
+/// The independent watchdog as RM0090 describes it: keys, write protection, transfer of values to the LSI domain.
 #[derive(Default)]
 struct Iwdg {
     written: Vec<(Register, u16)>,
@@ -28,7 +28,7 @@ struct Iwdg {
     lsi_on: bool,
     prescaler: u16,
     reload: u16,
-    /// Reads of the status until the values have arrived.
+    /// Number of status reads until the values have been transferred.
     updating: Cell<u32>,
 }
 
@@ -89,7 +89,7 @@ fn a_watchdog_that_takes_nothing_over_hangs_nobody() {
     assert!(!Watchdog::start(&mut iwdg, 93).is_settled());
 }
 
-/// In whole counts of a quarter of the LSI: never shorter than the requested timeout at 47 kHz, and at most one count longer.
+/// The timeout is a whole number of counts of the LSI divided by 4: at 47 kHz never shorter than requested, and at most one count longer.
 #[test]
 fn the_watchdogs_time_holds_for_the_fastest_clock() {
     for least_us in [1, 86, 1000, 8000, 300_000] {
@@ -122,7 +122,7 @@ impl WritePorts for Chip {
     }
 }
 
-/// Every input alone, on every board, by its pin's level; other pins of its ports make no difference.
+/// Each input is detected by its pin's level, on every board, whatever the other pins of its ports are.
 #[test]
 fn every_input_is_found_on_its_pin() {
     for board in BOARDS {
@@ -174,7 +174,7 @@ fn simulated_pins_are_read_as_the_inputs_they_stand_for() {
     for board in BOARDS {
         let chip = Chip::default();
         let mut inputs = SafetyInputs::new(chip.clone(), board.lines);
-        // One drive fault for all, on both boards.
+        // Both boards have one drive fault input for all axes.
         for bits in (0..0x80).chain(0x400..0x480) {
             let lines = InputLines(bits);
             for port in Port::ALL {
@@ -214,7 +214,7 @@ fn drives_are_switched_once_and_touch_no_other_pin() {
     }
 }
 
-/// The flags as RM0090 sets them: a reset from within pulls the pin, too; power coming on sets three.
+/// The flags as RM0090 defines them: an internal reset also pulls the reset pin, and a power-on reset sets three flags.
 #[test]
 fn the_most_particular_cause_of_a_reset_counts() {
     let table = [

@@ -10,32 +10,32 @@ use job::{Job, Pattern};
 use oracle::Oracle;
 use programs::checkout;
 
-/// The interpreter prints four decimals, and the program has four: a place is within half of each on every axis.
+/// Rounding of a position: program and interpreter print four decimals each, with an error of half the last digit per axis, mm.
 const ROUNDED_MM: f64 = 1.8e-4;
-/// Points within a cut that are checked.
+/// Number of points checked on each cut.
 const PLACES: u32 = 8;
 const CLEARANCE_MM: f64 = 3.0;
 
-/// Machine commands of the interpreter.
+/// A motion command of the interpreter.
 #[derive(Clone, Copy, Debug)]
 struct Move {
     rapid: bool,
     from: [f64; 3],
     to: [f64; 3],
-    /// Axes in the plane and across, centre in the plane, sense.
+    /// Two axes of the arc's plane and the one normal to it, centre in the plane, sense of rotation (1 or -1).
     arc: Option<([usize; 3], [f64; 2], f64)>,
     feed_mm_s: f64,
 }
 
 impl Move {
-    /// Angle that an arc turns, rad, with its radius; the arc is less than half a turn.
+    /// Angle of an arc, rad, and its radius, mm. The arc must be less than half a turn.
     fn turn(&self) -> Option<(f64, f64)> {
         let ([x, y, _], centre, sense) = self.arc?;
         let arm = |at: [f64; 3]| [at[x] - centre[0], at[y] - centre[1]];
         let (a, b) = (arm(self.from), arm(self.to));
         let angle = sense * (a[0] * b[1] - a[1] * b[0]).atan2(a[0] * b[0] + a[1] * b[1]);
         assert!(angle > 0.0, "more than half a turn: {self:?}");
-        // Grbl refuses above 0.005 mm, LinuxCNC above 0.0013.
+        // Maximum difference of the radii at both ends: Grbl 0.005 mm, LinuxCNC 0.0013 mm.
         assert!((a[0].hypot(a[1]) - b[0].hypot(b[1])).abs() < 1e-3, "{self:?}");
         Some((angle, a[0].hypot(a[1])))
     }
@@ -48,7 +48,7 @@ impl Move {
         }
     }
 
-    /// The place at a share of the way.
+    /// Position at a fraction of the move's length.
     fn at(&self, share: f64) -> [f64; 3] {
         let mut place = [0, 1, 2].map(|k| self.from[k] + share * (self.to[k] - self.from[k]));
         if let (Some(([x, y, _], centre, sense)), Some((angle, radius))) = (self.arc, self.turn()) {
@@ -64,7 +64,7 @@ fn distance(a: [f64; 3], b: [f64; 3]) -> f64 {
     (a[0] - b[0]).hypot(a[1] - b[1]).hypot(a[2] - b[2])
 }
 
-/// The interpreter: installed, or where `scripts/setup.sh` unpacks it.
+/// The interpreter that `scripts/setup.sh` unpacks, else the installed one.
 fn interpreter() -> PathBuf {
     let unpacked = checkout().unwrap().join("target/rs274/rs274");
     if unpacked.exists() {
@@ -141,8 +141,8 @@ fn moves(canonical: &str) -> Vec<Move> {
     moves
 }
 
-/// Tolerances of an approach: distance of a cut's ends and of its inner places from the exact path, mm; deviation of
-/// the contact's speed from the feed, mean of a cut and mean of an eighth of it, shares.
+/// Tolerances of an approach: distance of a cut's ends and of its inner points from the exact path, mm; deviation of
+/// the contact's speed from the feed, as a fraction of it, on average over a cut and over an eighth of a cut.
 struct Bounds {
     ends_mm: f64,
     places_mm: f64,
@@ -150,13 +150,13 @@ struct Bounds {
     eighth: f64,
 }
 
-/// Follows one pass; returns the moves that it took and their time.
+/// Checks the moves of one pass; returns their number and their time, s.
 fn follow(job: &Job, pass: &PassPath<'_>, moves: &[Move], bounds: &Bounds) -> (usize, f64) {
     let end = pass.at(pass.ends[1]).unwrap().contact.cl_mm.to_array();
     let mut path = pass.ends[0];
     let mut time_s = 0.0;
     for (count, cut) in moves.iter().enumerate() {
-        // Both: a pass may end where it began.
+        // Both conditions are needed, because a closed pass ends at its start.
         let left_mm = || pass.oracle.arc_length(path, pass.ends[1], pass.side).abs();
         if distance(cut.from, end) < ROUNDED_MM && left_mm() < 2.0 * ROUNDED_MM {
             return (count, time_s);
@@ -190,7 +190,7 @@ fn follow(job: &Job, pass: &PassPath<'_>, moves: &[Move], bounds: &Bounds) -> (u
 
 fn check_speed(job: &Job, arc_mm: f64, time_s: f64, share: f64, cut: &Move) {
     let wanted = job.feed_mm_s() * time_s;
-    // Places are rounded at both ends.
+    // The positions at both ends are rounded.
     let off = (arc_mm - wanted).abs() - 2.0 * ROUNDED_MM;
     assert!(
         off <= share * wanted,
@@ -199,7 +199,7 @@ fn check_speed(job: &Job, arc_mm: f64, time_s: f64, share: f64, cut: &Move) {
     );
 }
 
-/// Exports a job, and holds what the interpreter makes of it against the exact path.
+/// Exports a job, and compares the interpreter's moves with the exact path.
 fn check(job: &Job, options: &Options, bounds: &Bounds) -> ExportedProgram {
     let exported = export(job, options, &|| ()).unwrap();
     if options.dialect == Dialect::Grbl {
@@ -241,7 +241,7 @@ fn check(job: &Job, options: &Options, bounds: &Bounds) -> ExportedProgram {
     exported
 }
 
-/// Up, across, down, and the last bit at the feed.
+/// Checks a link of retract, traverse and plunge, the last part of the plunge at the feed.
 fn check_plunge(link: &[Move], safe_z_mm: f64) {
     let (plunge, rapids) = link.split_last().unwrap();
     assert!(!plunge.rapid && plunge.from[..2] == plunge.to[..2], "{plunge:?}");
@@ -257,7 +257,7 @@ fn check_plunge(link: &[Move], safe_z_mm: f64) {
     }
 }
 
-/// Along the boundary: each place is one radius off the surface at the boundary's path parameter.
+/// Checks a step-over along the boundary: each point is one radius off the surface at the boundary's path parameter.
 fn check_step_over(job: &Job, pass: &PassPath<'_>, link: &[Move]) {
     let mut across = pass.oracle.clone();
     across.along = pass.oracle.across();
@@ -274,7 +274,7 @@ fn check_step_over(job: &Job, pass: &PassPath<'_>, link: &[Move]) {
     }
 }
 
-/// Restrictions of Grbl 1.1: its line buffer, its words.
+/// Checks the restrictions of Grbl 1.1: length of its line buffer, set of words.
 fn check_grbl(program: &str) {
     const WORDS: [&str; 14] = [
         "G0", "G1", "G2", "G3", "G17", "G18", "G19", "G21", "G40", "G90", "G93", "G94", "M2", "M3",
@@ -311,7 +311,7 @@ fn options(dialect: Dialect, kind: Kind, feed_mode: FeedMode) -> Options {
     }
 }
 
-/// A sample job with a larger scallop, so fewer passes.
+/// A sample job with a larger scallop height limit, and so fewer passes.
 fn job(name: &str, scallop_mm: f64) -> Job {
     let path = checkout().unwrap().join(format!("jobs/{name}.toml"));
     let mut job = job_file::load(&path).unwrap();
@@ -319,7 +319,7 @@ fn job(name: &str, scallop_mm: f64) -> Job {
     job
 }
 
-/// Chords end on the exact path; eqn 7 makes the contact's mean speed on each the feed.
+/// Chords end on the exact path; by eqn 7 the contact's mean speed on each chord is the feed.
 fn of_linear(job: &Job) -> Bounds {
     Bounds {
         ends_mm: 0.0,
@@ -329,7 +329,7 @@ fn of_linear(job: &Job) -> Bounds {
     }
 }
 
-/// Arcs hold the path's tolerance everywhere and the speed within 1 % of the feed.
+/// Arcs keep the path tolerance everywhere, and the contact's speed within 1 % of the feed.
 fn of_curve(job: &Job) -> Bounds {
     Bounds {
         ends_mm: job.chord_mm,
@@ -366,7 +366,7 @@ fn arcs_hold_the_tolerances_in_every_plane() {
         for (dialect, feed_mode) in [(Dialect::Linuxcnc, FeedMode::G94), (Dialect::Grbl, FeedMode::G93)] {
             let exported = check(&job, &options(dialect, Kind::Curve, feed_mode), &of_curve(&job));
             if name == "revolved" {
-                // Passes at every angle to the axes: arcs that stand in two planes, and come back to them.
+                // Passes at every angle to the axes: the program switches between arcs in the XZ and YZ planes.
                 assert!(
                     ["G18", "G19", "G2", "G3"]
                         .iter()
@@ -374,7 +374,7 @@ fn arcs_hold_the_tolerances_in_every_plane() {
                 );
             }
             if name.ends_with("_v") {
-                // Circles of 144 degrees: two pairs of arcs, whatever their size.
+                // Circles of 144 degrees: two pairs of arcs at any radius.
                 assert_eq!(exported.cuts, 4 * exported.passes);
             }
         }

@@ -1,4 +1,4 @@
-//! Faults are states: each kind that a surface can cause, with its code, value and place; the position is kept.
+//! Faults are states: each kind of fault that a surface can cause, with its code, value and position; the tool stays where it is.
 
 use interp_core::interpolator::STOP_PERIODS;
 use interp_core::{Command, Fault, FaultKind, Interpolator, Sample, SpanParameter, State};
@@ -46,7 +46,7 @@ fn load(prepared: &Prepared) -> Box<Interpolator> {
     core
 }
 
-/// Runs until nothing moves; the last sample on the path and the machine.
+/// Runs a job until it ends. Returns the last sample on the path, and the core.
 fn run(prepared: &Prepared) -> (Option<Sample>, Box<Interpolator>) {
     let mut core = load(prepared);
     let mut last = None;
@@ -60,7 +60,7 @@ fn run(prepared: &Prepared) -> (Option<Sample>, Box<Interpolator>) {
 
 #[test]
 fn ball_in_a_valley_that_is_too_tight() {
-    // A parabola on 20 mm: its curvature grows towards 0.3 per mm at the bottom, and passes 1/4 at u = 0.44.
+    // A parabola over 20 mm: its curvature rises to 0.3 per mm at the bottom, and exceeds 1/4 at u = 0.44.
     let surface = patch(&[
         (0, 1, 0, 20.0),
         (1, 0, 1, 20.0),
@@ -73,13 +73,13 @@ fn ball_in_a_valley_that_is_too_tight() {
     let (last, fault) = (last.unwrap(), core.fault().unwrap());
     assert_eq!(fault.kind, FaultKind::BallDoesNotFit);
     assert!(fault.value > 1.0 - 2e-5 && fault.value < 1.01, "{fault:?}");
-    // The oracle agrees: it just fits at the last sample, and no more 5 um further.
+    // The oracle agrees: the ball fits at the last sample, and does not fit 0.02 mm further.
     let oracle = oracle::Oracle::new(&job).unwrap();
     let [u, v] = prepared.parameters(last.path, last.side);
     assert!(oracle.contact(u, v).unwrap().fit(4.0) < 1.0);
     assert!(oracle.contact(u + 1e-3, v).unwrap().fit(4.0) > 1.0);
 
-    // The position is kept, and said again at every tick; an abort acknowledges, a start begins anew.
+    // The position stays, and every tick reports it; an abort acknowledges the fault, then a start begins a new run.
     for _ in 0..3 {
         let after = core.tick(Command::Resume);
         assert_eq!(
@@ -103,7 +103,7 @@ fn ball_in_a_valley_along_the_pass() {
         (2, 0, 1, -60.0),
     ]);
     let mut job = job(surface, 4.0);
-    // Fine passes: coarse ones step over the bottom of the valley, where the interval grows without bound.
+    // Narrow passes: wide ones would step over the bottom of the valley, where the interval tends to infinity.
     job.scallop_mm = 0.001;
     let (last, core) = run(&prepare(&job).unwrap());
     assert_eq!(core.fault().unwrap().kind, FaultKind::BallDoesNotFit);
@@ -112,7 +112,7 @@ fn ball_in_a_valley_along_the_pass() {
     assert!((0.44..0.56).contains(&(side.fraction as f64 / 2_f64.powi(64))));
 }
 
-/// A saddle turned by 45 degrees: along and across the pass it is straight, and yet the ball does not fit.
+/// A saddle turned by 45 degrees: its curvature along and across the pass is 0, but the ball does not fit.
 #[test]
 fn ball_in_a_twisted_valley() {
     let surface = |twist: f64| {
@@ -130,7 +130,7 @@ fn ball_in_a_twisted_valley() {
     assert_eq!((core.fault(), core.state()), (None, State::Finished));
 }
 
-/// y folds back half-way: along the pass, where a sample may fall near the fold or not, and across, where passes step over it.
+/// y folds back at half the range: along the pass, with samples near the fold or not, and across, where passes step over it.
 #[test]
 fn surface_that_folds_over() {
     for feed_mm_min in [60.0, 600.0, 6000.0] {
@@ -172,7 +172,7 @@ fn parameter_that_would_run_backwards() {
 
 #[test]
 fn outside_the_range_of_nanometres() {
-    // The patch ends 1 mm before the range does; the ball, 4 mm on its side, is outside from the start on.
+    // The patch lies 1 mm below the end of the range; the centre, 4 mm above the patch, is out of range from the start.
     let surface = patch(&[(0, 1, 0, 20.0), (1, 0, 1, 20.0), (2, 0, 0, 2146.0)]);
     let (last, core) = run(&prepare(&job(surface, 4.0)).unwrap());
     let fault = core.fault().unwrap();
@@ -210,7 +210,7 @@ fn too_many_patches() {
         .unwrap_err();
     assert_eq!(fault.kind, FaultKind::TooManyPatches);
     assert_eq!(fault.value, large.words.len() as f32);
-    // The job that was there still is.
+    // The job loaded before is still loaded.
     assert_eq!(core.tick(Command::Start).state, State::Running);
 }
 
@@ -230,7 +230,7 @@ fn loading_while_a_job_runs() {
     assert_eq!(core.tick(Command::Resume).tick, before.tick + 1);
 }
 
-/// Hold and resume at every tick of a job give the same samples as the job without.
+/// A job with hold and resume at every tick gives the same samples as an undisturbed job.
 #[test]
 fn hold_and_resume_change_nothing() {
     let mut job = job(patch(&[(0, 1, 0, 2.0), (1, 0, 1, 2.0), (2, 1, 1, 1.0)]), 1.0);
@@ -282,7 +282,7 @@ fn trough_arc_mm(u: f64) -> f64 {
 const MISSED: Fault = Fault::new(FaultKind::DeadlineMissed, 2.0);
 const OVER_BUDGET: Fault = Fault::new(FaultKind::TickOverBudget, 20_000.0);
 
-/// Runs to a sample that fulfils this.
+/// Runs until a sample fulfils a condition.
 fn run_until(core: &mut Interpolator, reached: impl Fn(&Sample) -> bool) -> Sample {
     let mut sample = *core.tick(Command::Start);
     while !reached(&sample) {
@@ -292,7 +292,7 @@ fn run_until(core: &mut Interpolator, reached: impl Fn(&Sample) -> bool) -> Samp
     sample
 }
 
-/// The samples of a stop, and the first at standstill.
+/// The samples of a controlled stop, and the first sample at standstill.
 fn stop(core: &mut Interpolator, command: Option<Command>) -> (Vec<Sample>, Sample) {
     let mut samples = Vec::new();
     loop {
@@ -305,12 +305,12 @@ fn stop(core: &mut Interpolator, command: Option<Command>) -> (Vec<Sample>, Samp
     }
 }
 
-/// The tool slows down along its path, over the patches' boundary too and backwards too: on the surface, each period by 1/32 of
-/// the feed less, to the last nanometre what the samples say of it.
+/// The tool decelerates along its path, by 1/32 of the feed each period, also across a patch boundary and on reversed passes. The
+/// samples are on the surface within nanometres.
 #[test]
 fn a_fault_from_outside_stops_along_the_path() {
     for (pattern, pass) in [(Pattern::Zig, 0), (Pattern::Zig, 2), (Pattern::Zigzag, 1)] {
-        // Just begun, half-way, and 0.07 mm before the next patch, where the stop is 0.155 mm long.
+        // Near the start, within a patch, and 0.07 mm before the next patch; the stopping distance is 0.155 mm.
         for from in [0.0_f64, 0.05, 0.7, 0.3965, 0.4035] {
             let prepared = prepare(&trough(pattern)).unwrap();
             let mut core = load(&prepared);
@@ -324,7 +324,7 @@ fn a_fault_from_outside_stops_along_the_path() {
             let before = run_until(&mut core, begun);
             core.controlled_stop(MISSED);
             assert_eq!((core.state(), core.fault()), (State::Stopping, Some(MISSED)));
-            // Nobody can hold it up or make it go on.
+            // No command interrupts the stop.
             let (samples, standing) = stop(&mut core, Some(Command::Hold));
             assert_eq!(samples.len(), usize::from(STOP_PERIODS) - 1);
 
@@ -334,7 +334,7 @@ fn a_fault_from_outside_stops_along_the_path() {
                 assert_eq!(sample.feed_mm_s, 10.0 * share);
                 assert_eq!((sample.tick, sample.pass), (last.tick + 1, before.pass));
                 assert_eq!(sample.side, before.side);
-                // On the path ...
+                // The contact and the centre are on the path.
                 let [u, v] = prepared.parameters(sample.path, sample.side);
                 for (nm, mm) in sample.cc_nm.into_iter().zip([20.0 * u, 20.0 * v, 8.0 * u * u]) {
                     assert!((f64::from(nm) - mm * 1e6).abs() < 2.0, "{nm} nm for {mm} mm");
@@ -344,7 +344,7 @@ fn a_fault_from_outside_stops_along_the_path() {
                 for ((cl, cc), n) in sample.cl_nm.into_iter().zip(sample.cc_nm).zip(normal) {
                     assert!((f64::from(cl - cc) - n * 1e6).abs() < 3.0, "{} for {n}", cl - cc);
                 }
-                // ... and as far along it as the feed says.
+                // The arc length of each period follows from the reported feed.
                 let [from, _] = prepared.parameters(last.path, last.side);
                 let arc_mm = (trough_arc_mm(u) - trough_arc_mm(from)).abs();
                 let want_mm = 0.01 * f64::from(share);
@@ -374,7 +374,7 @@ fn a_fault_from_outside_stops_along_the_path() {
     }
 }
 
-/// Nearer to the end of the pass than a stop is long, it stops there, and begins no other pass.
+/// Closer to the end of the pass than the stopping distance, the tool stops at the end, and no further pass begins.
 #[test]
 fn a_fault_from_outside_stops_at_the_end_of_the_pass() {
     let prepared = prepare(&trough(Pattern::Zig)).unwrap();
@@ -391,7 +391,7 @@ fn a_fault_from_outside_stops_at_the_end_of_the_pass() {
         assert!(samples.len() < usize::from(STOP_PERIODS), "{left_mm}");
         assert_eq!((last.pass, last.side, u(&last)), (1, before.side, 1.0));
         assert_eq!(last.path.fraction, u64::MAX);
-        // As many as it takes to spend what was left, the last one shorter.
+        // As many samples as the remaining length takes, the last one shorter.
         let left_mm = length_mm - trough_arc_mm(u(&before));
         let spent = |count: usize| (1..=count).map(|k| 0.01 * (32 - k) as f64 / 32.0).sum::<f64>();
         assert!(spent(samples.len()) >= left_mm && spent(samples.len() - 1) < left_mm);
@@ -404,7 +404,7 @@ fn a_fault_from_outside_stops_at_the_end_of_the_pass() {
         );
         assert_eq!(core.fault(), Some(MISSED));
     }
-    // On the last sample of a pass, there is nothing left.
+    // At the last sample of a pass the remaining length is 0.
     let mut core = load(&prepared);
     let before = run_until(&mut core, |sample| {
         sample.path.span == 1 && sample.path.fraction == u64::MAX
@@ -423,8 +423,8 @@ fn a_fault_from_outside_stops_at_the_end_of_the_pass() {
     );
 }
 
-/// Held, the tool stands already; where nothing runs, there is nothing to stop. The first fault is the one that is told, also
-/// where the surface has one on the way, and an abort acknowledges it.
+/// While held, the tool is already at standstill; without a run there is nothing to stop. The first fault is reported, also if
+/// the surface causes another during the stop, and an abort acknowledges it.
 #[test]
 fn a_fault_from_outside_in_every_state() {
     let prepared = prepare(&trough(Pattern::Zig)).unwrap();
@@ -453,7 +453,7 @@ fn a_fault_from_outside_in_every_state() {
     assert_eq!(core.tick(Command::Abort).state, State::Ready);
     assert_eq!(core.fault(), None);
 
-    // A run after it is a whole one, and a second fault of a stop neither begins it anew nor replaces the first.
+    // The next run is complete; a second fault during a stop neither restarts the stop nor replaces the first fault.
     assert_eq!(*core.tick(Command::Start), first);
     core.controlled_stop(MISSED);
     let mut stopping = 0;
@@ -476,7 +476,7 @@ fn a_fault_from_outside_in_every_state() {
     core.controlled_stop(MISSED);
     assert_eq!((core.state(), core.fault()), (State::Finished, None));
 
-    // A valley that is too tight comes within the stop.
+    // The path reaches a valley that is too tight during the stop.
     let valley = patch(&[
         (0, 1, 0, 20.0),
         (1, 0, 1, 20.0),

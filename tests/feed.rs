@@ -1,4 +1,4 @@
-//! Feed within the axes' limits, links, and what an operator does, on the core itself.
+//! Feed within the axis limits, links, and operator commands, on the core itself.
 
 use integration_tests::{dome, scaled_dome};
 use interp_core::{
@@ -8,7 +8,7 @@ use machine::prepare::prepare;
 use proptest::prelude::*;
 use std::sync::OnceLock;
 
-/// Velocity and acceleration may be above the limit by so much, and jerk: what the differences of whole nanometres cannot tell is taken off.
+/// Largest permitted use of the limits of velocity, acceleration and jerk, after the rounding of the positions to nm is subtracted.
 const MORE: [f64; 3] = [1.01, 1.01, 1.05];
 
 fn axes(safe_z_nm: i32) -> AxisLimits {
@@ -36,7 +36,7 @@ fn machine(header: &Header, words: &[i32]) -> Box<Interpolator> {
     core
 }
 
-/// Differences of the emitted positions over the limits, whatever the tool does.
+/// Differences of the emitted positions over the limits, in every state.
 #[derive(Default)]
 struct Use {
     last: [Option<[i64; 3]>; 3],
@@ -60,7 +60,7 @@ impl Use {
                 axes.acceleration_mm_s2[axis],
                 axes.jerk_mm_s3[axis],
             ];
-            // Each position is half a nanometre off at most.
+            // Each position has a rounding error of at most half a nanometre.
             let kinds = [(first, 1.0, 1e-3), (second, 2.0, 1.0), (third, 4.0, 1e3)];
             for (worst, ((value, off, to_mm), limit)) in
                 self.worst.iter_mut().zip(kinds.into_iter().zip(limits))
@@ -84,7 +84,7 @@ impl Use {
     }
 }
 
-/// Side places of the passes.
+/// Side parameters of the passes.
 fn sides(samples: &[Sample]) -> Vec<SpanParameter> {
     let mut sides: Vec<SpanParameter> = Vec::new();
     for sample in samples.iter().filter(|sample| sample.side != SpanParameter::NONE) {
@@ -115,8 +115,8 @@ fn height(header: &Header, words: &[i32]) -> (i32, u32) {
     (top, passes)
 }
 
-/// Runs a sample job with these limits, at a multiple of its feed: limits hold in every sample, links and standstills too; the passes are as
-/// many as at constant feed.
+/// Runs a sample job with these limits, at a multiple of its feed: every sample keeps the limits, links and standstill included, and the
+/// number of passes is that at constant feed.
 fn check_sample_job(name: &str, times: f32, pattern: Pattern, machine_of: fn(i32) -> AxisLimits) {
     let jobs = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("../jobs");
     let prepared = prepare(&job_file::load(&jobs.join(format!("{name}.toml"))).unwrap()).unwrap();
@@ -146,7 +146,7 @@ fn check_sample_job(name: &str, times: f32, pattern: Pattern, machine_of: fn(i32
     assert_eq!(sample.cl_nm, axes.home_nm, "{what}: back where it began");
 }
 
-/// Some jobs, slow and fast, on a machine whose z is weaker.
+/// Some jobs, at low and high feed, on a machine with lower limits on z.
 #[test]
 fn sample_jobs_hold_the_limits() {
     for (name, times, pattern) in [
@@ -166,7 +166,7 @@ fn sample_jobs_hold_the_limits() {
     }
 }
 
-/// The machine of the README's figures.
+/// The machine of the figures in `docs/figures.md`.
 fn axes_of_the_readme(safe_z_nm: i32) -> AxisLimits {
     AxisLimits {
         acceleration_mm_s2: [1000.0; 3],
@@ -175,7 +175,7 @@ fn axes_of_the_readme(safe_z_nm: i32) -> AxisLimits {
     }
 }
 
-/// The ten jobs without limits of their own, one way and to and fro, at their own feed.
+/// The ten sample jobs without limits, `zig` and `zigzag`, at their programmed feed, on the machine of the figures.
 mod both_ways {
     use super::{Pattern, axes_of_the_readme, check_sample_job};
 
@@ -195,12 +195,12 @@ mod both_ways {
     jobs!(far_plate freeform plate plate_v revolved revolved_v ruled_printed ruled_reconstructed sphere_cap torus);
 }
 
-/// The dome in some nine passes, on a machine with limits.
+/// The dome in about nine passes, on a machine with limits.
 fn dome_within_limits(pattern: Pattern) -> (Header, Vec<i32>) {
     within_limits(dome(), pattern)
 }
 
-/// An eighth of it, in some five passes: so short that the tool is hardly ever at its feed.
+/// The dome at an eighth of its size, in about five passes, so short that the tool seldom reaches the programmed feed.
 fn small_dome_within_limits(pattern: Pattern) -> (Header, Vec<i32>) {
     let (mut header, words) = scaled_dome(0.125);
     (header.ball_radius_mm, header.scallop_mm) = (1.0, 0.3);
@@ -215,10 +215,10 @@ fn within_limits((mut header, words): (Header, Vec<i32>), pattern: Pattern) -> (
     (header, words)
 }
 
-/// A wait in periods, a command, and the override from then on, percent.
+/// A wait in periods, a command, and the override from that period on, %.
 type Step = (u32, Option<Command>, u8);
 
-/// All samples of a run with these commands: what is done in which period, the later ones counted from the one before.
+/// Runs a job with these commands, the wait of each counted from the one before. Returns all samples, and the core.
 fn scripted(header: &Header, words: &[i32], commands: &[Step]) -> (Vec<Sample>, Box<Interpolator>) {
     let mut core = machine(header, words);
     let mut samples = vec![*core.tick(Command::Start)];
@@ -236,7 +236,7 @@ fn scripted(header: &Header, words: &[i32], commands: &[Step]) -> (Vec<Sample>, 
             feed_override,
         }));
     }
-    // Then on to the end.
+    // Resume, and run to the end.
     samples.push(*core.tick(Command::Resume));
     for _ in 0..100_000 {
         let state = core.state();
@@ -262,8 +262,8 @@ fn command(wait_max: u32) -> impl Strategy<Value = Step> {
     (wait, request, percent)
 }
 
-/// Whatever is commanded, whenever: no limit is broken, the tool is on its path, what is held stands, and the passes lie where they lie in
-/// a run without commands.
+/// Checks that a run with these commands keeps the limits, stays on its path, does not move while held, and has the passes of a run without
+/// commands.
 fn check_commands(header: &Header, words: &[i32], whole: &[SpanParameter], commands: &[Step]) {
     let (samples, core) = scripted(header, words, commands);
     let axes = header.axes.as_ref().unwrap();
@@ -279,7 +279,7 @@ fn check_commands(header: &Header, words: &[i32], whole: &[SpanParameter], comma
         before = Some(*sample);
     }
     used.check(&format!("{commands:?}"));
-    // On the path: the surface itself says where the centre is.
+    // The centre is on the path, by an evaluation of the surface.
     for sample in samples
         .iter()
         .filter(|sample| sample.path != SpanParameter::NONE)
@@ -290,7 +290,7 @@ fn check_commands(header: &Header, words: &[i32], whole: &[SpanParameter], comma
             assert!((probe - sample).abs() <= 3, "{sample} for {probe}");
         }
     }
-    // A start begins anew: the passes of each run are the whole job's first.
+    // A start begins the job again: the passes of each run are the first ones of the undisturbed run.
     let mut expected = whole.iter();
     for side in sides(&samples) {
         if side == whole[0] {
@@ -300,7 +300,7 @@ fn check_commands(header: &Header, words: &[i32], whole: &[SpanParameter], comma
     }
 }
 
-/// A job, and the side places of its passes.
+/// A job, and the side parameters of its passes.
 type Undisturbed = (Header, Vec<i32>, Vec<SpanParameter>);
 
 fn undisturbed((header, words): (Header, Vec<i32>)) -> Undisturbed {
@@ -311,7 +311,7 @@ fn undisturbed((header, words): (Header, Vec<i32>)) -> Undisturbed {
     (header, words, whole)
 }
 
-/// Large and small, zig and zigzag, each worked out once.
+/// The large or the small dome, `zig` or `zigzag`, each computed once.
 fn undisturbed_once(small: bool, zigzag: bool) -> &'static Undisturbed {
     static ALL: OnceLock<[[Undisturbed; 2]; 2]> = OnceLock::new();
     let all = ALL.get_or_init(|| {
@@ -321,7 +321,7 @@ fn undisturbed_once(small: bool, zigzag: bool) -> &'static Undisturbed {
     &all[usize::from(small)][usize::from(zigzag)]
 }
 
-/// Commands, and the job that they are for, one in eight of which is large. Pauses are some of its time.
+/// Commands, and the job that they are for; one job in eight is large. The waits are a part of the job's duration.
 fn sequence(commands_max: usize) -> impl Strategy<Value = (&'static Undisturbed, Vec<Step>)> {
     (prop_oneof![1 => Just(false), 7 => Just(true)], any::<bool>()).prop_flat_map(move |(small, zigzag)| {
         let pause_max = if small { 400 } else { 3000 };
@@ -330,7 +330,7 @@ fn sequence(commands_max: usize) -> impl Strategy<Value = (&'static Undisturbed,
     })
 }
 
-/// A million sequences take half an hour on two cores: as many as `SEQUENCES` says, or so many as take a minute.
+/// Runs `SEQUENCES` sequences; the default takes a minute, a million takes half an hour on two cores.
 #[test]
 #[ignore = "a minute or more; run it after a change of the feed, with SEQUENCES=1000000 for the whole"]
 fn no_sequence_of_commands_breaks_a_limit_long() {
@@ -355,11 +355,12 @@ fn no_sequence_of_commands_breaks_a_limit_long() {
     });
 }
 
-/// Set going again just before the end of a leg, when a little acceleration follows a whole one: the end comes before that has left the mean.
+/// A leg resumed just before its end, where a small acceleration follows a large one: the leg ends while the moving-average filter still holds
+/// the small one.
 #[test]
 fn a_leg_resumed_before_its_end_keeps_the_jerk() {
     let (header, words, whole) = undisturbed_once(false, false);
-    // A period more or less, and it is not that close to the end.
+    // The case occurs only in a few of these periods.
     for first in 740..840 {
         let commands = [
             (first, None, 200),
@@ -374,7 +375,7 @@ fn a_leg_resumed_before_its_end_keeps_the_jerk() {
     }
 }
 
-/// Held, slowed down and sped up in all kinds of places, and resumed each time: every pass of the undisturbed run, and home.
+/// A run held, slowed down and accelerated at many points, and resumed each time, has every pass of the undisturbed run and returns home.
 #[test]
 fn a_job_interrupted_and_resumed_takes_the_same_path() {
     for zigzag in [false, true] {
@@ -424,7 +425,7 @@ fn hold_and_resume() {
     while core.tick(None).state == State::Holding {
         ticks += 1;
     }
-    // v/a + a/J: 40 and 50 ms along x, and up to twice as long where the slope lets z decide.
+    // v/a + a/J: 40 + 50 ms along x, and up to twice as long on slopes where the limits of z decide.
     assert!((50..250).contains(&ticks), "{ticks}");
     let held = *core.last();
     for _ in 0..100 {
@@ -433,7 +434,7 @@ fn hold_and_resume() {
     assert_eq!(core.tick(Command::Resume).state, State::Running);
 }
 
-/// A stop retracts from the surface, an abort stays on it; the next start begins from that position.
+/// A stop retracts from the surface, an abort stays on it; the next start begins from the position reached.
 #[test]
 fn stop_and_abort() {
     let (header, words, _) = undisturbed(dome_within_limits(Pattern::Zigzag));
@@ -454,7 +455,7 @@ fn stop_and_abort() {
     }
 }
 
-/// A point outside the travel is detected before the tool moves there.
+/// A point outside the travel is detected before the tool moves to it.
 #[test]
 fn soft_limits_stop_before_the_pass() {
     let (mut header, words) = dome_within_limits(Pattern::Zig);
@@ -469,7 +470,7 @@ fn soft_limits_stop_before_the_pass() {
     assert_eq!(core.fault().unwrap().kind, FaultKind::SoftLimit);
 }
 
-/// Without a way up, nothing moves.
+/// If the surface faces down, the tool does not leave home.
 #[test]
 fn a_surface_that_faces_down_is_refused() {
     let (mut header, words) = dome_within_limits(Pattern::Zig);

@@ -1,4 +1,4 @@
-//! The core against the golden table, which was computed elsewhere with 40 digits: points, normals, intervals, schedules.
+//! The core against the golden table, which was computed independently with 40 digits: points, normals, intervals, schedules.
 
 use integration_tests::golden::{Case, cases};
 use interp_core::SpanParameter;
@@ -6,7 +6,7 @@ use job::{Along, Job};
 use machine::Machine;
 use machine::prepare::{ParameterSpans, Prepared, prepare};
 
-/// The job file of a golden case, with its along, tool side, ball and scallop limit.
+/// The job file of a golden case, with the path parameter, tool side, ball radius and scallop height limit of the case.
 fn job(case: &Case) -> Job {
     let name = match case.surface.as_str() {
         "revolved" => "revolved",
@@ -20,7 +20,7 @@ fn job(case: &Case) -> Job {
     job.along = if case.along == "u" { Along::U } else { Along::V };
     job.radius_mm = case.radius_mm;
     job.scallop_mm = case.scallop_mm;
-    // The table's schedules are the paper's.
+    // The table's schedules use the paper's first-order interval.
     job.spacing = job::Spacing::FirstOrder;
     job.side = if case.tool_side > 0.0 {
         job::Side::Plus
@@ -30,7 +30,7 @@ fn job(case: &Case) -> Job {
     job
 }
 
-/// The place of a parameter, to 2^-53 of its span.
+/// A parameter as span and fraction, to 2^-53 of the span.
 fn place(axis: &ParameterSpans, parameter: f64) -> SpanParameter {
     let span = axis.breaks[1..axis.breaks.len() - 1].partition_point(|end| *end <= parameter);
     let (start, end) = (axis.breaks[span], axis.breaks[span + 1]);
@@ -92,8 +92,8 @@ fn every_golden_point() {
     assert!(worst_interval <= 1e-5, "interval off by {worst_interval}");
 }
 
-/// Pass for pass: number, side parameter, least interval, length. Side parameters add up the intervals before them, so
-/// their error is measured against the whole range.
+/// Number of passes, and for each pass side parameter and least interval; the length by the number of samples. A side parameter is
+/// the sum of the intervals before it, so its error is relative to the whole range.
 #[test]
 fn every_golden_schedule() {
     for case in cases() {
@@ -131,7 +131,7 @@ fn every_golden_schedule() {
                 golden[1]
             );
         }
-        // One sample a period, and at most one period more than each pass takes.
+        // One sample per period, and for each pass one or two samples more than its whole periods.
         let periods = case.cc_length_mm / (job.feed_mm_s() * job.machine.period_s());
         let extra = f64::from(samples) - periods;
         let passes = passes.len() as f64;

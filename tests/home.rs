@@ -1,4 +1,4 @@
-//! Start of a run: the axes have to be at the job's home. On a whole board with step outputs.
+//! Start of a run: the axes must be at the job's home. On a whole board with step outputs.
 
 use controller::{in_process::Board, safety::DEBOUNCE_TICKS};
 use integration_tests::{HELLO, Host, MAKE_READY, dome, upload};
@@ -6,12 +6,12 @@ use interp_core::{AxisLimits, Header, State, StepConfig};
 use protocol::message::{Configuration, InputLines, Reason, Reply, Report, Request, Status};
 
 const WORDS: usize = 64;
-/// Above the dome's highest centre, 25 mm.
+/// Above the highest position of the ball centre on the dome, 25 mm.
 const SAFE_Z_NM: i32 = 30_000_000;
 const HOME_NM: [i32; 3] = [-10_000_000, 2_500_000, SAFE_Z_NM];
 const ELSEWHERE_NM: [i32; 3] = [1_000_000, 0, SAFE_Z_NM];
 
-/// The dome in some nine passes, on a machine with limits.
+/// The dome in about nine passes, on a machine with limits.
 fn within_limits(home_nm: [i32; 3]) -> (Header, Vec<i32>) {
     let (mut header, words) = dome();
     header.feed_mm_s = 60.0;
@@ -34,12 +34,12 @@ struct Desk {
     board: Board<WORDS>,
     /// Cutter locations of the run so far.
     path: Vec<[i32; 3]>,
-    /// The board's last word of a run.
+    /// The board's report of the end of the run.
     halted: Option<Status>,
 }
 
 impl Desk {
-    /// In session with a board that has just been switched on.
+    /// Opens a session with a board that has just been switched on.
     fn new() -> Self {
         let mut desk = Self {
             host: Host::default(),
@@ -94,7 +94,7 @@ impl Desk {
         self.board.real_time().steps().unwrap().position()
     }
 
-    /// Lets time pass. No axis ever makes more steps in a tick than its fastest velocity is, 40 a millisecond.
+    /// Runs a number of ticks. No axis makes more steps in a tick than its maximum velocity allows, 40 per millisecond.
     fn ticks(&mut self, ticks: u32) {
         for _ in 0..ticks {
             let before = self.steps();
@@ -114,7 +114,7 @@ impl Desk {
         self.ask(Request::Start)
     }
 
-    /// Starts, and runs to the end.
+    /// Starts a run and waits for its end.
     fn run(&mut self) -> Status {
         self.start().unwrap();
         loop {
@@ -125,7 +125,7 @@ impl Desk {
         }
     }
 
-    /// Starts, and is on the second pass.
+    /// Starts a run and waits until it is on the second pass.
     fn running(&mut self) {
         self.start().unwrap();
         while self.board.status().pass < 1 || self.board.status().state != State::Running {
@@ -141,12 +141,12 @@ impl Desk {
             self.ticks(1);
         }
         assert_eq!(self.board.status().state, state);
-        // Steps of the last periods are on their way yet.
+        // The steps of the last periods are not emitted yet.
         self.ticks(2);
         self.board.real_time().last().cl_nm
     }
 
-    /// Presses and releases the emergency stop, and undoes what it did but for the home.
+    /// Presses and releases the emergency stop, and recovers from it up to, but not including, the declaration of home.
     fn emergency_stop(&mut self) {
         self.board.simulate(InputLines::EMERGENCY_STOP);
         self.ticks(1);
@@ -160,7 +160,7 @@ impl Desk {
     }
 }
 
-/// A place in the default's 400 steps a millimetre, of which these are whole numbers.
+/// A position in steps at the default 400 steps per millimetre; it must be a whole number of steps.
 fn in_steps(place_nm: [i32; 3]) -> [i32; 3] {
     place_nm.map(|nm| {
         assert_eq!(nm % 2500, 0);
@@ -177,7 +177,7 @@ fn a_home_is_where_the_pulses_count_from() {
     let mut desk = Desk::homed(HOME_NM);
     assert_eq!(desk.steps(), in_steps(HOME_NM));
     assert_eq!(desk.board.real_time().steps().unwrap().target_nm(), HOME_NM);
-    // Other steps a millimetre keep the place.
+    // A change of the steps per millimetre keeps the position.
     let mut config = StepConfig::DEFAULT;
     config.axes[2].steps = 200;
     desk.ask(Request::StepConfig(config.into())).unwrap();
@@ -198,7 +198,7 @@ fn a_job_that_begins_elsewhere_is_refused() {
     assert_eq!(desk.start(), elsewhere(HOME_NM, Some([0; 3])));
     desk.ticks(100);
     assert_eq!((desk.board.status().state, desk.steps()), (State::Ready, [0; 3]));
-    // One nanometre is as good as a mile: the path is exact.
+    // A difference of 1 nm is refused too, because the path is exact.
     let near = [HOME_NM[0], HOME_NM[1] + 1, HOME_NM[2]];
     desk.ask(Request::SetHome { home_nm: near }).unwrap();
     assert_eq!(desk.start(), elsewhere(HOME_NM, Some(near)));
@@ -210,14 +210,14 @@ fn a_job_that_begins_elsewhere_is_refused() {
     );
     desk.ticks(2);
     assert_eq!(desk.steps(), in_steps(HOME_NM));
-    // It stands there now, for whatever begins there.
+    // The axes now stand at this home, and any job with the same home starts.
     desk.load(within_limits(HOME_NM));
     assert_eq!(desk.run().state, State::Finished);
     desk.load(within_limits(ELSEWHERE_NM));
     assert_eq!(desk.start(), elsewhere(ELSEWHERE_NM, Some(HOME_NM)));
 }
 
-/// Between the start's answer and its period the axes are declared to stand elsewhere: no run.
+/// If another home is declared between the acknowledgement of a start and its period, no run begins.
 #[test]
 fn a_start_that_waits_does_not_meet_another_home() {
     let mut desk = Desk::homed(HOME_NM);
@@ -245,7 +245,7 @@ fn a_run_that_was_given_up_begins_again_where_the_axes_stand() {
     assert_eq!(desk.path.first(), Some(&at));
     desk.ask(Request::Abort).unwrap();
     let at = desk.stopped(State::Ready);
-    // Loaded anew it is another job, which wants its home.
+    // A job that is loaded again is a new job, and requires its home.
     desk.load(within_limits(HOME_NM));
     assert_eq!(desk.start(), elsewhere(HOME_NM, Some(at)));
     desk.load(within_limits(at));
@@ -253,7 +253,7 @@ fn a_run_that_was_given_up_begins_again_where_the_axes_stand() {
     assert_eq!((desk.path.first(), desk.path.last()), (Some(&at), Some(&at)));
 }
 
-/// The axes were moved by hand: what the run before knew of their place is not what the next one begins with.
+/// The axes were moved by hand: the next run does not use the position at which the last one ended.
 #[test]
 fn after_an_emergency_stop_a_run_begins_where_home_is_declared() {
     let mut desk = Desk::homed(HOME_NM);
@@ -272,7 +272,7 @@ fn after_an_emergency_stop_a_run_begins_where_home_is_declared() {
     assert_eq!(desk.steps(), in_steps(HOME_NM));
 }
 
-/// Drives off: the axes may have been moved.
+/// With the drives off the axes may have been moved by hand.
 #[test]
 fn drives_off_forget_where_the_axes_stand() {
     let mut desk = Desk::homed(HOME_NM);
@@ -297,7 +297,7 @@ fn where_no_home_is_required_the_axes_count_as_standing_at_the_jobs() {
     };
     desk.ask(Request::Configure(free)).unwrap();
     desk.ask(Request::Drives { on: true }).unwrap();
-    // In the period of the start the axes are where they are said to be, without a step.
+    // In the period of the start the position becomes the job's home without a step.
     let begin = |desk: &mut Desk, home_nm| {
         desk.start().unwrap();
         desk.board.tick();
@@ -324,7 +324,7 @@ fn where_no_home_is_required_the_axes_count_as_standing_at_the_jobs() {
     begin(&mut desk, ELSEWHERE_NM);
     desk.ask(Request::Abort).unwrap();
     desk.stopped(State::Ready);
-    // A home that was declared all the same is meant.
+    // A declared home is checked although none is required.
     desk.ask(Request::SetHome { home_nm: HOME_NM }).unwrap();
     assert_eq!(desk.start(), elsewhere(ELSEWHERE_NM, Some(HOME_NM)));
 }
@@ -342,7 +342,7 @@ fn after_a_job_without_limits_home_is_declared_anew() {
         desk.board.tick();
         desk.collect();
     }
-    // Such a job runs again as it is.
+    // The same job runs again without a declaration.
     assert_eq!(desk.start(), Ok(()));
     desk.board.tick();
     desk.ask(Request::Abort).unwrap();

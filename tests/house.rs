@@ -1,4 +1,4 @@
-//! The promises of the house: which crate may see which, and no circle of imports between the folders of a crate.
+//! Structure of the workspace: permitted dependencies between crates, and no import cycles between the folders of a crate.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
@@ -8,7 +8,7 @@ fn root() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("..")
 }
 
-/// Crates of the workspace that a crate depends on, directly or not, when it is built with these flags.
+/// Crates of the workspace that a crate depends on, directly or indirectly, when it is built with these flags.
 fn dependencies(of: &str, flags: &[&str]) -> BTreeSet<String> {
     let output = Command::new(env!("CARGO"))
         .args([
@@ -36,7 +36,7 @@ fn dependencies(of: &str, flags: &[&str]) -> BTreeSet<String> {
     let lines = String::from_utf8(output.stdout).unwrap();
     lines
         .lines()
-        // A crate of the workspace has its folder behind its version.
+        // `cargo tree` prints the folder of a workspace crate after its version.
         .filter(|line| line.contains("(/"))
         .filter_map(|line| line.split(' ').next())
         .filter(|name| *name != of)
@@ -44,7 +44,7 @@ fn dependencies(of: &str, flags: &[&str]) -> BTreeSet<String> {
         .collect()
 }
 
-/// The crates that may be seen, and no others.
+/// Each of these crates depends on the listed crates and no others.
 #[test]
 fn crates_see_what_they_may_see() {
     for (of, may) in [
@@ -60,7 +60,7 @@ fn crates_see_what_they_may_see() {
     }
 }
 
-/// The preparation cannot see the oracle, and the product sees neither the study of the paper nor the cycle tools.
+/// The preparation does not depend on the oracle, and the product depends neither on the study of the paper nor on the cycle tools.
 #[test]
 fn crates_do_not_see_what_they_may_not_see() {
     let without = |of: &str, flags: &[&str], hidden: &[&str]| {
@@ -77,12 +77,12 @@ fn crates_do_not_see_what_they_may_not_see() {
     let developers = ["study", "cycles", "cycle-plugin"];
     let product = without("host-sim", &["--no-default-features"], &developers);
     assert!(product.contains("interp-core"));
-    // The flags do what the test takes them for.
+    // Control: with default features the developers' crates are dependencies.
     let whole = dependencies("host-sim", &[]);
     assert!(developers.iter().all(|name| whole.contains(*name)), "{whole:?}");
 }
 
-/// The folders and files directly below a crate's `src`, each with those that it imports.
+/// The folders and files directly below a crate's `src`, each with the others that it imports.
 fn imports(source: &Path) -> BTreeMap<String, BTreeSet<String>> {
     let mut all: BTreeMap<String, BTreeSet<String>> = BTreeMap::new();
     let mut open = vec![source.to_owned()];
@@ -110,7 +110,7 @@ fn imports(source: &Path) -> BTreeMap<String, BTreeSet<String>> {
                 .lines()
                 .filter(|line| !line.trim_start().starts_with("//"))
                 .collect();
-            // From a file beside lib.rs, and from a folder's own file, `super` is the crate.
+            // In a file beside `lib.rs`, and in a folder's `mod.rs`, `super` is the crate.
             let depth = within.matches('/').count();
             let code = match (depth, within.ends_with("/mod.rs")) {
                 (0, _) | (1, true) => code.join("\n").replace("super::", "crate::"),
@@ -143,7 +143,7 @@ fn imports(source: &Path) -> BTreeMap<String, BTreeSet<String>> {
     all
 }
 
-/// The parts that a part imports, directly or not.
+/// The parts that a part imports, directly or indirectly.
 fn reach<'a>(imports: &'a BTreeMap<String, BTreeSet<String>>, from: &str) -> BTreeSet<&'a str> {
     let mut seen = BTreeSet::new();
     let mut open: Vec<&str> = imports[from].iter().map(String::as_str).collect();

@@ -1,4 +1,4 @@
-//! The firmware's image and the set-up that counts its cycles, built once for all tests.
+//! The firmware's image and the set-up that counts its cycles, each built once for all tests.
 
 use std::path::{Path, PathBuf};
 use std::sync::OnceLock;
@@ -13,7 +13,7 @@ pub(crate) fn for_qemu() -> &'static Path {
     IMAGE.get_or_init(|| qemu::firmware().unwrap())
 }
 
-/// The image for QEMU with the plugin that counts.
+/// The image for QEMU with the plugin that counts cycles.
 pub(crate) fn setup() -> &'static MeasurementSetup {
     static SETUP: OnceLock<MeasurementSetup> = OnceLock::new();
     SETUP.get_or_init(|| {

@@ -1,4 +1,4 @@
-//! CAD files against the kernel that wrote them: every face of every file, the samples of a job on each, hostile files.
+//! CAD files against the CAD kernel that wrote them: every face of every file, the samples of a job on each face, malformed files.
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -15,11 +15,11 @@ use machine::prepare::prepare;
 use oracle::Oracle;
 use verify::survey::Survey;
 
-/// Distance of an exactly imported surface from the kernel's points, mm. Files are written to 9 (IGES) and 12 digits (STEP).
+/// Maximum distance of an exactly imported surface from the kernel's points, mm. Files have 9 (IGES) and 12 digits (STEP).
 const EXACT_MM: f64 = 1e-6;
-/// Angle of its normal, rad, likewise.
+/// Maximum angle between its normal and the kernel's, rad.
 const NORMAL_RAD: f64 = 1e-6;
-/// All CAD files with their number of faces, how many the kernel wrote that cannot be read, and how many are no faces of its.
+/// All CAD files with the number of faces read, of kernel faces that cannot be read, and of faces that are not among the kernel's.
 const FILES: [(&str, usize, usize, usize); 9] = [
     ("blade.step", 13, 0, 0),
     ("hood.igs", 2, 0, 0),
@@ -28,8 +28,8 @@ const FILES: [(&str, usize, usize, usize); 9] = [
     ("mouse.3dm", 2, 0, 0),
     ("mouse.igs", 1, 0, 0),
     ("mouse.step", 1, 0, 0),
-    // The offset surface: its entity 140 is written with an indicator that is no unit vector, and is left out with a warning.
-    // The surface that it is an offset of then stands alone.
+    // The offset surface: its entity 140 has an offset indicator that is not a unit vector, so it is left out with a warning, and its
+    // base surface is read as a face of its own.
     ("swept.igs", 4, 1, 1),
     ("swept.step", 4, 0, 0),
 ];
@@ -52,7 +52,7 @@ fn whole() -> Options {
 /// A point and a normal as the kernel evaluates them.
 type Reference = ([f64; 3], [f64; 3]);
 
-/// Reference points of each face of a file, by the kernel's own numbers.
+/// Reference points of each face of each file, by the kernel's face numbers.
 fn references() -> BTreeMap<String, BTreeMap<usize, Vec<Reference>>> {
     let text = std::fs::read_to_string(workspace().join("tests/golden/cad_points.txt")).unwrap();
     let mut files: BTreeMap<String, BTreeMap<usize, Vec<Reference>>> = BTreeMap::new();
@@ -68,7 +68,7 @@ fn references() -> BTreeMap<String, BTreeMap<usize, Vec<Reference>>> {
     files
 }
 
-/// The job's surface for the inverse: parameters of a point.
+/// The job's surface in a form that can be inverted: parameters of a point.
 fn inverse(nurbs: &NurbsSpec) -> Surface {
     let axis = |degree: usize, knots: &[f64]| Axis {
         degree,
@@ -105,7 +105,7 @@ fn angle(a: [f64; 3], b: [f64; 3]) -> f64 {
     dot(c, c).sqrt().atan2(dot(a, b))
 }
 
-/// Farthest of the points from the surface, mm, and the largest angle between normals, rad.
+/// Largest distance of the points from the surface, mm, and largest angle between the normals, rad.
 fn compared(surface: &Surface, sense: f64, points: &[Reference]) -> (f64, f64) {
     let mut worst = (0.0_f64, 0.0_f64);
     for (point, normal) in points {
@@ -117,7 +117,7 @@ fn compared(surface: &Surface, sense: f64, points: &[Reference]) -> (f64, f64) {
     worst
 }
 
-/// The face, trimmed or not; at a coarser tolerance where a fit at the default one takes more patches than the board has.
+/// The whole face, trimmed or not, at a coarser tolerance where a fit at the default tolerance has more patches than the board can store.
 fn taken(name: &str, face: &Face) -> MachinableFace {
     machinable(name, face, &whole()).unwrap_or_else(|error| {
         assert!(error.what.contains("more than the board's store"), "{error}");
@@ -133,7 +133,7 @@ fn made(name: &str, model: &Model) -> Vec<MachinableFace> {
     model.faces.iter().map(|face| taken(name, face)).collect()
 }
 
-/// Each face that the kernel wrote is found again, once, with its points, normals and sides.
+/// Each face that the kernel wrote is found exactly once, with its points, normals and sides.
 #[test]
 fn every_face_of_every_file() {
     let references = references();
@@ -155,7 +155,7 @@ fn every_face_of_every_file() {
                     Form::Exact => EXACT_MM,
                     Form::Fitted { deviation, .. } => deviation.max_mm + EXACT_MM,
                 };
-                // One point tells most faces apart.
+                // One point is enough to exclude most faces.
                 let first = surface.invert(points[0].0, None).1;
                 if first > near {
                     continue;
@@ -170,7 +170,7 @@ fn every_face_of_every_file() {
                     Form::Exact => NORMAL_RAD,
                     Form::Fitted { deviation, .. } => deviation.normal_rad + NORMAL_RAD,
                 };
-                // A surface that stands alone in its file has no side.
+                // A surface without a shell in its file has no side.
                 let sided = !name.ends_with("3dm") && !name.ends_with("igs");
                 let turned = if sided {
                     turned
@@ -206,7 +206,7 @@ fn every_face_of_every_file() {
     }
 }
 
-/// What is of degree 3 or less, or elementary, is exact; the others keep the tolerance, and a tighter one too.
+/// Surfaces that cannot be converted exactly are fitted within the tolerance, for several tolerances.
 #[test]
 fn fits_keep_the_tolerance() {
     let degree_5 = &read(&cad("hood.step")).unwrap().faces;
@@ -228,7 +228,7 @@ fn fits_keep_the_tolerance() {
                 panic!("{} cannot be exact", face.entity)
             };
             assert!(deviation.max_mm <= tolerance_mm, "{deviation:?}");
-            // The job's own surface, at places of an irregular grid, against the face's own surface.
+            // The job's surface against the face's surface, on a grid that does not coincide with that of the fit.
             let [[u0, u1], [v0, v1]] = made.outline.rectangle;
             let surface = inverse(&made.nurbs);
             for i in 0..101 {
@@ -253,7 +253,7 @@ fn fits_keep_the_tolerance() {
     }
 }
 
-/// The mouse, written by three writers in two units, is one surface; the placed one is where its assembly puts it.
+/// The mouse has the same surface in STEP, IGES and 3DM, in two units, and in `jobs/freeform.toml`.
 #[test]
 fn formats_units_and_placements_agree() {
     let poles = |name: &str, number: usize| {
@@ -299,7 +299,8 @@ fn formats_units_and_placements_agree() {
     }
 }
 
-/// Runs a given number of samples of a job, and on to the end of the pass.
+/// Runs at least a given number of samples of a job, to the end of the pass. Returns the worst position error, nm, and ripple, %, the
+/// number of samples, and the fault.
 fn worst_nm(job: &Job, most: u64) -> (f64, f64, u64, Option<String>) {
     let oracle = Oracle::new(job).unwrap();
     let prepared = prepare(job).unwrap();
@@ -323,7 +324,7 @@ fn worst_nm(job: &Job, most: u64) -> (f64, f64, u64, Option<String>) {
     )
 }
 
-/// A job on every face: the ball that import chooses fits, and every sample agrees with the oracle.
+/// A job on every face: the ball that `import` chooses fits, and every sample agrees with the oracle.
 #[test]
 fn samples_on_every_face() {
     for (name, ..) in FILES {
@@ -333,11 +334,11 @@ fn samples_on_every_face() {
             let written = write_job(name, face, &made, &JobOptions::default());
             let mut job = job_file::parse("job", &written.text)
                 .unwrap_or_else(|error| panic!("{name}, face {}: {error}", face.number));
-            // Fast, and with passes far apart: a few thousand samples on each part of the face.
+            // High feed and wide passes: a few thousand samples over the whole face.
             job.feed_mm_min = 6000.0;
             job.scallop_mm = 0.1 * job.radius_mm;
             let mut run = worst_nm(&job, 60_000);
-            // A kernel's own spans may be shorter than one period's arc: slower, then.
+            // Spans of the file may be shorter than one period's arc; the feed is then reduced.
             while run
                 .3
                 .as_ref()
@@ -365,7 +366,7 @@ fn samples_on_every_face() {
     }
 }
 
-/// A face that is trimmed is refused, and taken whole only if asked; the job file says so.
+/// A trimmed face is refused, and converted untrimmed only on request; the job file then has a note.
 #[test]
 fn trimmed_faces_are_said() {
     for name in ["hood.step", "hood.igs"] {
@@ -393,7 +394,7 @@ fn trimmed_faces_are_said() {
         );
         assert!(written.warnings.iter().any(|warning| warning.contains("trimmed")));
     }
-    // The others of analytic solids: a block with a ball and a bore cut out has trimmed planes, its sphere is whole.
+    // Faces of an analytic solid: a block with a spherical pocket and a bore, and a ball. The planes are trimmed, the other faces are not.
     let model = read(&cad("blade.step")).unwrap();
     let kinds = |trimmed: bool| {
         let mut kinds: Vec<_> = model
@@ -423,7 +424,7 @@ fn trimmed_faces_are_said() {
     );
 }
 
-/// The sample jobs that name a file: they load, prepare, and their samples agree with the oracle.
+/// The sample jobs that name a CAD file load, and their samples agree with the oracle.
 #[test]
 fn sample_jobs_out_of_files() {
     for (name, patches) in [("blade", 12), ("hood", 247)] {
@@ -444,7 +445,7 @@ fn sample_jobs_out_of_files() {
     }
 }
 
-/// A job that names a file is the same as one that holds the face, and its errors point to the line.
+/// A job that names a CAD file equals one that contains the converted face, and its errors name the line.
 #[test]
 fn jobs_that_name_a_file() {
     let folder = workspace().join("jobs/cad");
@@ -479,7 +480,7 @@ fn jobs_that_name_a_file() {
     }
 }
 
-/// Files that are broken, cut short, mislabelled or made to harm: each is refused quickly, with a message that names the error.
+/// Damaged, truncated, mislabelled and malicious files: each is refused with a message that names the error.
 #[test]
 fn hostile_files() {
     let folder = workspace().join("tests/hostile_cad");
@@ -504,13 +505,13 @@ fn hostile_files() {
         ("zero_weight.step", ("weight 0", None)),
     ]
     .into();
-    // What is sound in these is read: an assembly that contains itself has no place of its own, so its part is where it is; of
-    // an offset of itself, only the surface beside it is left, and the face is named.
+    // The valid parts of these files are read: an assembly that contains itself is ignored, and its part stays where it is; an
+    // offset surface of itself is left out with a warning, and the other surface is read.
     let sound = ["assembly_of_itself.step", "offset_of_itself.step", "sound.step"];
     for entry in std::fs::read_dir(&folder).unwrap() {
         let path = entry.unwrap().path();
         let name = path.file_name().unwrap().to_str().unwrap().to_owned();
-        // An error of time would have none of the words that are expected.
+        // A timeout would be an error without the expected words.
         let result = read(&path);
         if sound.contains(&name.as_str()) {
             let model = result.unwrap();
@@ -539,7 +540,7 @@ fn hostile_files() {
     assert!(missing.what.contains("cannot read"), "{missing}");
 }
 
-/// A file under a wrong ending is read as what it is, and that is said.
+/// A file with the wrong extension is read by its content, with a warning.
 #[test]
 fn wrong_ending() {
     let folder = tempfile::tempdir().unwrap();
@@ -550,7 +551,7 @@ fn wrong_ending() {
     assert!(model.warnings[0].contains("IGES"), "{:?}", model.warnings);
 }
 
-/// The same text with every entity's number raised.
+/// The text with all entity numbers raised by a constant.
 fn renumbered(text: &str, by: usize) -> String {
     let mut out = String::with_capacity(text.len() + text.len() / 8);
     let mut parts = text.split('#');
@@ -563,7 +564,7 @@ fn renumbered(text: &str, by: usize) -> String {
     out
 }
 
-/// Ten megabytes of STEP, made of the mouse over and over, are read within the reader's own limit of time; the time is printed.
+/// Ten megabytes of STEP, copies of the mouse, are read within the reader's time limit; the time is printed.
 #[test]
 fn ten_megabytes() {
     let text = std::fs::read_to_string(cad("mouse.step")).unwrap();

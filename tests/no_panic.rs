@@ -1,5 +1,5 @@
-//! No panic can be reached from the sample task: `firmware/no-panic` says how the linker proves it. Here the image is
-//! linked, and once more with a panic in the task, which has to fail by the name of the function that is missing.
+//! No panic is reachable from the sample task; `firmware/no-panic` describes how the linker proves it. The test links the
+//! image, and as a control links it with a panic in the task, which must fail with the name of the missing function.
 
 use std::path::Path;
 use std::process::{Command, Output};
@@ -7,12 +7,12 @@ use std::process::{Command, Output};
 /// The linker's message for a reachable panic.
 const MISSING: &str = "a_panic_can_be_reached_from_the_sample_task";
 
-/// Builds the image, in the folder of the image for QEMU, whose crates it shares.
+/// Builds the image in the target folder of the image for QEMU, to share its crates.
 fn link(features: &str) -> Output {
     let root = Path::new(env!("CARGO_MANIFEST_DIR")).parent().unwrap();
     Command::new(env!("CARGO"))
         .current_dir(root)
-        // Flags from outside would replace those that images are linked with.
+        // Flags of the environment would replace the linker flags of the images.
         .env_remove("RUSTFLAGS")
         .env_remove("CARGO_ENCODED_RUSTFLAGS")
         .args(["build", "--quiet", "--locked", "--release", "-p", "no-panic"])

@@ -1,4 +1,4 @@
-//! Operations of a sample, counted from the instructions that the firmware executes, against the operations in the source of the
+//! Operations of a sample, counted from the executed instructions of the firmware, against the operations in the source of the
 //! core, summed by hand. Needs `qemu-system-arm`; builds the firmware and the plugin.
 
 use std::sync::OnceLock;
@@ -11,7 +11,7 @@ use machine::prepare::prepare;
 use machine::remote::qemu;
 use study::operations::{PAPER, in_table};
 
-/// Ticks of the three jobs of Table 1, in its order.
+/// Ticks of the three jobs of Table 1, in the table's order.
 fn measured() -> &'static [Ticks; 3] {
     static TICKS_OF_JOBS: OnceLock<[Ticks; 3]> = OnceLock::new();
     TICKS_OF_JOBS.get_or_init(|| {
@@ -27,8 +27,8 @@ fn measured() -> &'static [Ticks; 3] {
     })
 }
 
-// Additions and multiplications in the source. First the stages that all surfaces have: the step with the 64-bit sum of the
-// parameter, the fit, the location, the check for a fold, the density (of a surface that is known to have no weight).
+// Additions and multiplications in the source. First the stages of all surfaces: the parameter step with the 64-bit sum of the
+// parameter, the check that the ball fits, the cutter location, the check for a fold, and 1/interval^2 (of a surface without weights).
 const STEP: [u32; 2] = [5 + 1, 8];
 const FIT: [u32; 2] = [1, 2];
 const LOCATE: [u32; 2] = [6, 6];
@@ -47,13 +47,13 @@ fn total(parts: &[(u32, [u32; 2])]) -> [u32; 2] {
     [sum(0), sum(1)]
 }
 
-/// A bicubic patch: three jets, tangents and cubics; then the forms.
+/// A bicubic patch: three jets, tangents and cubics; then the fundamental forms.
 fn bicubic() -> [u32; 2] {
     total(&[
         (3, JET),
         (3, TANGENT),
         (3, CUBIC),
-        // A x B; E, F and its square; least sine.
+        // A x B; E, F, F^2; the bound of the least sine.
         (1, CROSS),
         (3, DOT),
         (1, [0, 2]),
@@ -61,7 +61,7 @@ fn bicubic() -> [u32; 2] {
         (2, INVERSE_ROOT),
         (1, [0, 1 + 3]),
         (1, [0, 1 + 1]),
-        // L, M, N, A . A', each with its factor, M with a half besides, A . A' with 1/E.
+        // L, M, N, A . A', each with a factor; M also with 1/2, A . A' also with 1/E.
         (4, DOT),
         (1, [0, 4 + 1 + 1]),
         // Shear, its sum, twist and its square, sheared, lateral^2, along, across.
@@ -74,7 +74,7 @@ fn bicubic() -> [u32; 2] {
     ])
 }
 
-/// A pass along the profile: radius and height, and the values that do not depend on the angle.
+/// A pass along the profile: radius and height, and the values that are independent of the angle.
 fn profile() -> [u32; 2] {
     total(&[
         (2, JET),
@@ -86,7 +86,7 @@ fn profile() -> [u32; 2] {
         (1, [0, 3]),
         (1, [0, 2]),
         (1, [0, 2 + 1 + 3]),
-        // Stretch, along, across.
+        // Logarithmic derivative of the speed, curvature along, across.
         (1, [1 + 2 + 1, 3 + 3 + 2]),
         (1, STEP),
         // The fit without a twist.
@@ -97,13 +97,13 @@ fn profile() -> [u32; 2] {
     ])
 }
 
-/// A pass around the axis: the angle, sine and cosine, the circle, the offset; the weight is stored.
+/// A pass around the axis: the angle, sine and cosine, the circle, the offset; the weight of 1/interval^2 is stored.
 fn circle() -> [u32; 2] {
     const SIN_COS: [u32; 2] = [2 * 5 + 2, 2 * 5 + 2];
     total(&[
         (1, [1, 1]),
         (1, SIN_COS),
-        // Both doubled.
+        // Sine and cosine doubled.
         (1, [2, 0]),
         (1, [0, 2]),
         (1, [0, 1 + 2 + 3]),
@@ -116,11 +116,11 @@ fn circle() -> [u32; 2] {
     ])
 }
 
-/// Greatest difference of the executed operations from those of the source. The compiler merges products by powers of two and common
-/// factors; roundings and range reductions add integer additions that the source's sums leave out.
+/// Largest difference between executed operations and those of the source. The compiler merges products by powers of two and common
+/// factors; roundings and range reductions are additional integer additions, which the sums of the source leave out.
 const DIFFERENCE_MAX: u32 = 12;
 
-/// The executed additions and multiplications are those of the source, without divisions and roots.
+/// The executed additions and multiplications are those of the source; no division or root is executed.
 #[test]
 fn executed_operations_are_those_of_the_source() {
     let source = [profile(), circle(), bicubic()];
@@ -137,8 +137,8 @@ fn executed_operations_are_those_of_the_source() {
     }
 }
 
-/// Steps 3 and 4 by hand, to the operation: in the image, the location is two `SMLAL` for each axis, the fit two `VMUL` and a `VSUB`
-/// (none without a twist), r N of a patch four `VMUL`, the density one `VMUL`, or two with a stored weight.
+/// The operations of steps 3 and 4 are exactly those counted by hand: in the image, the location is two `SMLAL` for each axis, the fit two
+/// `VMUL` and a `VSUB` (no `VSUB` without a twist), r N of a patch four `VMUL`, 1/interval^2 one `VMUL`, or two with a stored weight.
 #[test]
 fn offset_and_interval_by_hand() {
     let offset = [
@@ -163,10 +163,10 @@ fn offset_and_interval_by_hand() {
     }
 }
 
-/// Ticks at the ends of a pass that take another path: first sample, its two successors without a history of steps, last sample.
+/// Ticks at the ends of a pass that execute other code: the first sample, its two successors, which have no history of steps, the last sample.
 const ENDS_OF_A_PASS: usize = 4;
 
-/// All samples within a pass take the same operations, up to one addition of the sine's range reduction.
+/// All samples within a pass execute the same operations, except for one addition of the sine's range reduction.
 #[test]
 fn samples_within_a_pass_take_the_same() {
     for (ticks, row) in measured().iter().zip(PAPER) {
@@ -175,7 +175,7 @@ fn samples_within_a_pass_take_the_same() {
             let pairs = operations.to_array().into_iter().zip(usual.operations.to_array());
             pairs.map(|(a, b)| a.abs_diff(b)).sum::<u32>() <= 1
         };
-        // The first sample of a pass makes no step.
+        // The first sample of a pass has no parameter step.
         let begins = |operations: &Operations| *operations == Operations::default();
         let steps = ticks
             .records
@@ -196,7 +196,7 @@ fn samples_within_a_pass_take_the_same() {
     }
 }
 
-/// Table 1 shows the operations that the firmware executes now.
+/// Table 1 has the operations that the firmware executes.
 #[test]
 fn table_1_is_up_to_date() {
     let table = std::fs::read_to_string(golden::path()).unwrap();

@@ -1,4 +1,4 @@
-//! The oracle against the golden table: every value of every place, and the schedules.
+//! The oracle against the golden table: every value at every point, and the schedules.
 
 use std::path::Path;
 
@@ -6,14 +6,14 @@ use integration_tests::golden::{self, Case, Point};
 use job::{Along, Spacing};
 use oracle::Oracle;
 
-/// Relative rounding error of f64 in the longest of these formulas.
+/// Bound of the relative f64 rounding error in the longest of the formulas.
 const TOLERANCE: f64 = 2e-13;
 
-/// Steps of the table's scan for the least interval of a pass. The oracle looks between them as well.
+/// Steps of the table's scan for the least interval of a pass. The oracle also searches between the steps.
 const GOLDEN_SCAN: u32 = 4000;
-/// Relative error of an interval by that scan, and so of a side parameter; 1.2e-8 was measured.
+/// Bound of the relative error of an interval by that scan, and so of a side parameter; measured: 1.2e-8.
 const GOLDEN_SCAN_ERROR: f64 = 2e-8;
-/// The table's lengths come from a trapezoidal rule on the same steps; an error of 2.7e-8 was measured.
+/// Bound of the relative error of the table's lengths, by the trapezoidal rule on the same steps; measured: 2.7e-8.
 const GOLDEN_LENGTH_ERROR: f64 = 3e-8;
 
 /// The job file of a golden case, and its oracle.
@@ -29,7 +29,7 @@ fn oracle_of(case: &Case) -> Oracle {
     };
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join(format!("../jobs/{name}.toml"));
     let mut job = job_file::load(&path).unwrap();
-    // The table's schedules are the paper's.
+    // The table's schedules use the paper's first-order interval.
     job.spacing = Spacing::FirstOrder;
     assert_eq!(job.surface.domain(), case.range, "{name}");
     assert_eq!(
@@ -52,7 +52,7 @@ fn difference(ours: impl Into<[f64; 3]>, golden: &[f64; 3], size: f64) -> f64 {
         .fold(0.0, f64::max)
 }
 
-/// Differences of every value of a place, each relative to the size of its kind of value.
+/// Differences of all values at a point, each relative to the magnitude of its kind of value.
 fn differences(oracle: &Oracle, point: &Point) -> Vec<(&'static str, f64)> {
     let at = oracle.surface.at(point.u, point.v);
     let contact = oracle.contact(point.u, point.v).unwrap();
@@ -63,7 +63,7 @@ fn differences(oracle: &Oracle, point: &Point) -> Vec<(&'static str, f64)> {
     const SIZE_MM: f64 = 100.0;
     const SECOND_MM: f64 = 500.0;
     let relative = |ours: f64, golden: f64| (ours / golden - 1.0).abs();
-    // A curvature is accurate relative to the second derivatives that may cancel in it.
+    // The error of a curvature is relative to the second derivatives, which may cancel in it.
     let bend_path = SECOND_MM / (contact.path_speed * contact.path_speed);
     let bend_side = SECOND_MM / (contact.lateral_speed * contact.lateral_speed);
     vec![
@@ -142,7 +142,7 @@ fn every_value_of_every_place_agrees() {
     }
 }
 
-/// Least interval on a pass among the places where the golden table looked.
+/// Least interval of a pass among the points of the golden table's scan.
 fn least_of_golden_scan(oracle: &Oracle, side: f64) -> f64 {
     let [start, end] = oracle.path_range();
     let interval = |k: u32| {

@@ -1,4 +1,4 @@
-//! The numbers of `cargo sim paper`, against the notes on the paper (computed elsewhere) and closed forms.
+//! The figures of `cargo sim paper`, against the notes on the paper (computed independently) and closed forms.
 
 use std::sync::OnceLock;
 
@@ -14,7 +14,7 @@ fn shared() -> &'static Study {
     STUDY.get_or_init(|| study(&|| ()).unwrap())
 }
 
-/// Part, item, ours, by how much it may differ: half a unit of the last digit that is known.
+/// Part, item, our value, tolerance: half a unit of the last known digit.
 const KNOWN: [(&str, &str, f64, f64); 31] = [
     ("Example 1", "passes along u", 319.0, 0.0),
     ("Example 1", "least interval", 0.007_905_694_2, 5e-11),
@@ -122,7 +122,7 @@ fn known_numbers() {
     }
 }
 
-/// Eqn 6 leaves the surface by 0.286 mm at the inflection (checked by a scan written apart from this code).
+/// The chord error by eqn 6 is 0.286 mm at the inflection (checked by an independent scan).
 #[test]
 fn equation_6_breaks_its_tolerance() {
     let item = shared()
@@ -139,7 +139,7 @@ fn approaches_hold_what_they_promise_on_every_job() {
         let of = |kind| &comparison.row(kind).unwrap().measured;
         let name = comparison.name;
         for kind in [Kind::Linear, Kind::Curve] {
-            // Nearest distance to the offset path is measured between the planner's probes too: 2 % over.
+            // The distance to the offset path is also measured between the planner's check points, so up to 2 % more is permitted.
             let off_mm = of(kind).findings.report.position_nm.max * 1e-6;
             assert!(
                 off_mm <= 1.02 * comparison.chord_mm,
@@ -151,7 +151,7 @@ fn approaches_hold_what_they_promise_on_every_job() {
             of(Kind::Surface).findings.report.ripple_pct.max <= 0.001,
             "{name}"
         );
-        // Speeds meet at the cubics' ends, but for the rounding of a sum of coefficients.
+        // The speed is continuous between cubics, within the rounding of a sum of coefficients.
         assert!(of(Kind::Curve).findings.speeds.cl_step_mm_s <= 1e-12, "{name}");
         let ripple = [Kind::ConstantCl, Kind::Linear, Kind::Curve, Kind::Surface]
             .map(|k| of(k).findings.report.ripple_pct.max);
@@ -171,11 +171,11 @@ fn approaches_hold_what_they_promise_on_every_job() {
 fn data_of_the_figures() {
     let figures = &shared().figures;
     let near = |value: f64, known: f64, by: f64| assert!((value - known).abs() <= by, "{value}, not {known}");
-    // Figure 3: the centre lies one radius off the contact.
+    // Figure 3: the centre is one radius from the contact.
     for (cc, cl) in figures.section.cc_mm.iter().zip(&figures.section.cl_mm) {
         near((cl[0] - cc[0]).hypot(cl[1] - cc[1]), 10.0, 1e-9);
     }
-    // Figures 4 and 5: one is the inverse of the other.
+    // Figures 4 and 5: the two speeds are inverse to each other.
     near(figures.constant_cl.measured.findings.speeds.cc.min, 7.577, 1e-3);
     near(figures.constant_cl.measured.findings.speeds.cc.max, 14.701, 1e-3);
     let wanted = figures.wanted.iter().map(|point| point[1]);
@@ -190,7 +190,7 @@ fn data_of_the_figures() {
     near(speeds.cc.mean(), 10.0, 1e-5);
     near(speeds.cl.min, 6.802, 1e-3);
     near(speeds.cl.max, 13.198, 1e-3);
-    // Both paths are equally long.
+    // Both paths have the same length.
     near(speeds.cl.mean(), 10.0, 1e-3);
     for speed in &figures.surface.speeds {
         near(speed.cc_mm_s, 10.0, 1e-4);
@@ -224,7 +224,7 @@ fn page_needs_nothing_else_and_shows_every_figure() {
             "Figure {figure}"
         );
     }
-    // Figures 3, 4, 5, 7 twice, 8, 9, deviations, data against ripple; each with both axes and their units.
+    // Figures 3, 4, 5, 7 (two), 8, 9, deviations, data against ripple; each chart with units on both axes.
     let charts: Vec<&str> = page.split("<figure class=\"chart").skip(1).collect();
     assert_eq!(charts.len(), 9);
     for chart in charts {
@@ -278,7 +278,7 @@ fn written_data_are_the_figures() {
     );
 }
 
-/// The table of docs/figures.md is that of the freeform job.
+/// The table of approaches in `docs/figures.md` has the figures of the freeform job.
 #[test]
 fn the_figures_say_what_a_user_gains() {
     let figures = std::fs::read_to_string(programs::checkout().unwrap().join("docs/figures.md")).unwrap();
@@ -303,7 +303,7 @@ fn the_figures_say_what_a_user_gains() {
     }
 }
 
-/// Our columns come from the golden table alone; without it they are empty.
+/// Our columns of Table 1 come from the golden table only; without it they are empty.
 #[test]
 fn table_1_invents_nothing() {
     let bare = items(&Ours::in_table(""));

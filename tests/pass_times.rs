@@ -1,5 +1,5 @@
-//! How long passes take on a machine with limits, against the best motion that a solver on this machine finds within the same limits, and
-//! straight ones against the closed form that is held to Ruckig.
+//! Duration of passes on a machine with limits, against the best motion that an offline solver finds within the same limits. Straight passes
+//! are compared with the closed form, which is itself tested against Ruckig.
 
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -13,15 +13,15 @@ use oracle::Oracle;
 use verify::motion::point::LineLimits;
 use verify::motion::{PassPath, optimum};
 
-/// A machine with the same limits on all axes but a slower z: the one of the README's figures.
+/// A machine with equal limits on all axes, except for a lower velocity of z: the machine of `docs/figures.md`.
 const LIMITS: AxisLimits = AxisLimits {
     velocity_mm_s: [100.0, 100.0, 50.0],
     acceleration_mm_s2: [1000.0; 3],
     jerk_mm_s3: [20_000.0; 3],
 };
-/// What a pass may take, over the best that is known: asked is a tenth more.
+/// Maximum duration of a pass over that of the best motion known.
 const ABOVE: f64 = 1.10;
-/// The same of a straight pass, over the exact time, and periods for its parts, each of which takes whole ones.
+/// Maximum duration of a straight pass over the exact time, and periods added because each part of a pass takes a whole number of them.
 const ABOVE_STRAIGHT: f64 = 1.02;
 const WHOLE_PERIODS: f64 = 3.0;
 
@@ -42,7 +42,7 @@ fn limited(mut job: Job, feed_mm_s: f64) -> Job {
 #[derive(Clone, Copy)]
 struct Ran {
     side: f64,
-    /// From its first sample to its last, s.
+    /// Time from the first sample to the last, s.
     time_s: f64,
 }
 
@@ -74,17 +74,17 @@ fn run(job: &Job, last: u32) -> BTreeMap<u32, Ran> {
         .collect()
 }
 
-/// Time of a pass over that of the best motion known, and over the bound that no motion is below.
+/// Time of a pass over that of the best motion known, and over the lower bound for any motion.
 fn compared(job: &Job, oracle: &Oracle, ran: &Ran) -> [f64; 2] {
     let path = PassPath::of_pass(oracle, ran.side).unwrap();
     let best = optimum(&path, job.feed_mm_s(), &LIMITS, job.machine.period_s()).unwrap();
-    // What it is held against keeps the limits, and is no faster than can be.
+    // The reference motion keeps the limits, and is not below the lower bound.
     assert!(best.uses.iter().all(|used| *used <= 1.0 + 1e-9), "{best:?}");
     assert!(best.lower_bound_s <= best.feasible_s, "{best:?}");
     [best.feasible_s, best.lower_bound_s].map(|best| ran.time_s / best)
 }
 
-/// First passes of some sample jobs, at their own feed and at some that the axes cannot hold everywhere.
+/// First passes of some sample jobs, at the programmed feed and at multiples that the axes cannot reach everywhere.
 #[test]
 fn passes_take_a_tenth_more_than_the_best_at_most() {
     let mut off = String::new();
@@ -111,13 +111,13 @@ fn passes_take_a_tenth_more_than_the_best_at_most() {
     assert!(off.is_empty(), "{off}");
 }
 
-/// A straight pass of this length, along x and y, on the machine above; time of the core's over the exact one, both in s.
+/// Time of a straight pass of this length in x and y on the machine above, s: the core's, and the exact one.
 fn straight(length_mm: f64, feed_mm_s: f64) -> [f64; 2] {
     let scale = length_mm / 80.0_f64.hypot(20.0);
     let text = include_str!("../jobs/ruled_reconstructed.toml").replace("along = \"u\"", "along = \"v\"");
     let text = format!("{text}\n[placement]\nscale = {scale}\n");
     let job = limited(job_file::parse("straight", &text).unwrap(), feed_mm_s);
-    // From (20, y, z) to (100, y - 20, z), times the scale.
+    // The pass goes from (20, y, z) to (100, y - 20, z), times the scale.
     let slope = 80.0 / 80.0_f64.hypot(20.0);
     let exact = LineLimits {
         velocity: (LIMITS.velocity_mm_s[0] / slope).min(feed_mm_s),
@@ -127,7 +127,7 @@ fn straight(length_mm: f64, feed_mm_s: f64) -> [f64; 2] {
     [run(&job, 0)[&0].time_s, exact.rest_to_rest_s(length_mm)]
 }
 
-/// Passes along the straight lines of a ruled surface, long and short, slow and fast.
+/// Passes along the straight lines of a ruled surface, of several lengths and feeds.
 #[test]
 fn straight_passes_take_the_time_of_the_exact_solution() {
     const LENGTHS_MM: [f64; 6] = [1.0, 3.0, 10.0, 30.0, 82.0, 300.0];
@@ -146,9 +146,9 @@ fn straight_passes_take_the_time_of_the_exact_solution() {
     assert!(off.is_empty(), "{off}");
 }
 
-/// All sample jobs, seven passes of each; at their own feed, which is what is asked, and at three times that, where knots that lie near to each
-/// other cost more (the README says how much). The table of the README's figure:
-/// `cargo test --release -p integration-tests pass_times -- --ignored --nocapture`, some minutes.
+/// Seven passes of each sample job, at the programmed feed, where the bound applies, and at three times that feed, where closely spaced knots
+/// cost more time (`docs/figures.md` has the values). Prints the table behind these figures, in some minutes:
+/// `cargo test --release -p integration-tests pass_times -- --ignored --nocapture`.
 #[test]
 #[ignore = "a campaign of minutes"]
 fn seven_passes_of_every_job() {

@@ -1,5 +1,5 @@
-//! The messages and their frames: every message there and back, the bytes that never change unnoticed, and a line that
-//! damages what it carries.
+//! The messages and their frames: every message encoded and decoded, golden bytes that detect a change of the format, and
+//! damaged frames.
 
 mod any_message;
 
@@ -63,7 +63,7 @@ fn axes() -> AxisLimits {
     }
 }
 
-/// One of each, in order of the codes; last, a job for a machine with limits.
+/// One request of each kind in order of the codes, and a job with axis limits.
 fn requests() -> Vec<Request> {
     vec![
         HELLO,
@@ -223,7 +223,7 @@ fn reasons() -> Vec<Reason> {
     ]
 }
 
-/// One of each, in order of the codes; `Nak` with every reason.
+/// One reply of each kind in order of the codes, `Nak` with every reason.
 fn replies() -> Vec<Reply> {
     let description = Description {
         firmware: [0, 1, 0],
@@ -271,7 +271,7 @@ fn reply_frame(reply: &Reply) -> Vec<u8> {
     write_reply(reply, &mut [0; FRAME_MAX]).unwrap().to_vec()
 }
 
-/// The payload of the one frame in these bytes.
+/// The payload of the single frame in these bytes.
 fn payload(bytes: &[u8]) -> Vec<u8> {
     let mut decoder = Decoder::new();
     let mut found = Vec::new();
@@ -357,7 +357,7 @@ fn every_reason_is_a_sentence_with_its_values() {
     assert_eq!(texts[16], "201 is more than 200");
 }
 
-/// A link in session, waiting for request 2, and the machine behind it.
+/// A link in session that expects request 2, and its machine.
 fn open_link() -> (Link, Mock) {
     let (mut link, mut mock) = (Link::new(), Mock::default());
     give(&mut link, &mut mock, &frame(1, &HELLO));
@@ -372,7 +372,7 @@ fn give(link: &mut Link, mock: &mut Mock, bytes: &[u8]) -> Vec<Reply> {
     integration_tests::Host::default().read(&sent)
 }
 
-/// Damage is answered, has no effect, and does not reach the request behind it.
+/// A damaged frame is answered with an error, has no effect, and does not affect the request after it.
 fn check_damage(damaged: &[u8], what: &str) {
     let (mut link, mut mock) = open_link();
     let replies = give(&mut link, &mut mock, damaged);
@@ -464,7 +464,7 @@ proptest! {
         }
     }
 
-    /// What the frame's payload is, whole: an error, or bytes that mean something again.
+    /// A payload of random bytes is either an error or a request that encodes and decodes to the same request.
     #[test]
     fn a_payload_with_any_bytes_is_a_message_or_none(bytes in prop::collection::vec(any::<u8>(), 0..60), code in 0_u8..24) {
         let mut bytes = bytes;

@@ -1,5 +1,5 @@
-//! The firmware in QEMU against the core on this machine: every sample of every sample job, and what happens when they
-//! differ. Needs `qemu-system-arm`; builds the firmware.
+//! The firmware in QEMU against the core on the host: every sample of every sample job, and the report of a difference.
+//! Needs `qemu-system-arm`; builds the firmware.
 
 use interp_core::{FaultKind, Sample, State};
 use machine::Machine;
@@ -30,7 +30,7 @@ fn job(name: &str) -> Prepared {
     prepare(&job_file::load(path.as_ref()).unwrap()).unwrap()
 }
 
-/// Samples and passes as this machine computes them.
+/// Passes and digest of all samples as the host computes them.
 fn here(job: &Prepared) -> (Vec<Expected>, u64) {
     let mut passes: Vec<Expected> = Vec::new();
     let mut digest = Digest::new();
@@ -54,7 +54,7 @@ fn here(job: &Prepared) -> (Vec<Expected>, u64) {
     (passes, digest.value())
 }
 
-/// Runs these jobs one after the other on one board, without a restart in between.
+/// Runs these jobs one after the other on one board, without a restart, and compares the digests.
 fn compare(names: &[&str]) {
     let (_qemu, mut session) = board();
     for name in names {
@@ -83,7 +83,7 @@ fn compare(names: &[&str]) {
     }
 }
 
-// Groups of a length, so that all processors have something to do; in each, jobs of different kinds on one board.
+// Groups of similar duration, to load all processors; each runs jobs of different kinds on one board.
 
 #[test]
 fn revolved_along_u() {
@@ -105,19 +105,19 @@ fn bicubic() {
     compare(&["far_plate", "plate", "plate_v"]);
 }
 
-/// A job within limits, before and after one without.
+/// A job with axis limits, before and after one without.
 #[test]
 fn with_limits() {
     compare(&["plate_machine", "torus", "plate_machine"]);
 }
 
-/// One unit (2^-5 nm or so) more in one coefficient of the board's job: the pass and the tick of the first sample that
-/// differs are named, and are those at which this machine differs from itself with the two jobs.
+/// The board's job differs in one coefficient, by 40 of its units: the report names the pass and the tick of the first
+/// different sample, which are those found by running both jobs on the host.
 #[test]
 fn the_first_difference_is_named() {
     let ours = job("torus");
     let mut theirs = ours.clone();
-    // The last record's height at the patch's middle, in the part of the surface that later passes reach.
+    // The height at the middle of the last patch, which later passes reach.
     let coefficient = theirs.words.len() - 2 * 16;
     theirs.words[coefficient] += 40;
     let samples = |job: &Prepared| {
@@ -149,7 +149,7 @@ fn the_first_difference_is_named() {
     );
 }
 
-/// A fault on the board is the fault here, at the same tick and place; it is acknowledged, and another job runs.
+/// A fault on the board equals that on the host, at the same position; after its acknowledgement the board accepts commands.
 #[test]
 fn a_fault_is_the_same_fault() {
     let mut job = job("torus");
@@ -178,8 +178,7 @@ fn a_fault_is_the_same_fault() {
     session.command(&Request::Run { ticks: 1 }).unwrap();
 }
 
-/// A job that is too large is refused with the limit; one in the middle of a run, too; and the run goes on as if nothing had
-/// been said.
+/// A job that is too large is refused with the limit, and any job is refused during a run; the run continues unchanged.
 #[test]
 fn refusals_change_nothing() {
     let job = job("freeform");
@@ -248,7 +247,7 @@ fn halted(session: &mut Session) -> Status {
     }
 }
 
-/// The emergency stop, on pins that the host sets: through the firmware's drivers, in the next tick, and cleared in order.
+/// The emergency stop, on simulated pins: it passes through the firmware's drivers, acts in the next tick, and is cleared step by step.
 #[test]
 fn an_emergency_stop_ends_the_run_on_the_board() {
     let job = job("sphere_cap");
@@ -282,7 +281,7 @@ fn an_emergency_stop_ends_the_run_on_the_board() {
     assert!(refused(session.command(&Request::Acknowledge)));
     let lines = InputLines::NONE;
     session.command(&Request::Simulate { lines }).unwrap();
-    // Released for some periods, it can be acknowledged; the drives do not come on before.
+    // The stop can be acknowledged some periods after its release; until then the drives stay off.
     while !session.status().unwrap().safety.lines.is_none() {}
     assert!(refused(operate::make_ready(&mut session, &setup)));
     session.command(&Request::Acknowledge).unwrap();
@@ -296,8 +295,8 @@ fn an_emergency_stop_ends_the_run_on_the_board() {
     assert_eq!((again.samples, again.digest), (500, stopped.digest));
 }
 
-/// On the board's free clock: without a frame for two seconds of its time the run is held; it is then resumed. That it
-/// resumes exactly is checked in `tests/safety.rs`; here each standstill is compared with the run in this process so far.
+/// On the free clock, the run is held after two seconds of board time without a frame, and is then resumed. `tests/safety.rs`
+/// checks that it resumes exactly; here the samples up to each standstill are compared with the host's.
 #[test]
 fn a_run_whose_host_is_gone_is_held_on_the_board() {
     let job = job("sphere_cap");
@@ -313,7 +312,7 @@ fn a_run_whose_host_is_gone_is_held_on_the_board() {
     session.command(&Request::Start).unwrap();
     let mut before = 0;
     for _ in 0..2 {
-        // The board's two seconds take 40 ms or so, unless this machine has other things to do.
+        // Two seconds of board time take about 40 ms on an idle host.
         let status = loop {
             std::thread::sleep(Duration::from_millis(500));
             let status = session.status().unwrap();
@@ -345,7 +344,7 @@ fn signal(qemu: &Qemu, name: &str) {
     assert!(sent.unwrap().success());
 }
 
-/// Sends these requests, and stops QEMU for so long, while the host does this with the session.
+/// Sends these requests, suspends QEMU for some seconds, and calls `during` with the session meanwhile.
 fn stopped_for<T>(seconds: u64, requests: &[Request], during: impl FnOnce(&mut Session) -> T) -> T {
     let (qemu, mut session) = board();
     drive::upload(&mut session, &job("torus"), |_| {}).unwrap();
@@ -364,14 +363,15 @@ fn stopped_for<T>(seconds: u64, requests: &[Request], during: impl FnOnce(&mut S
     })
 }
 
-/// A busy machine may leave QEMU without processor time for long: a serial line's board would be given up after 6 s.
+/// The host waits for an answer of QEMU for 8 s, because a busy machine may give it no processor time; for a board on a serial line the
+/// timeout is 6 s.
 #[test]
 fn an_answer_of_a_process_is_waited_for() {
     let status = stopped_for(8, &[], |session| session.status().unwrap());
     assert_eq!((status.samples, status.fault), (0, None));
 }
 
-/// The same of a run's events, after 20 s.
+/// The host waits for an event of a run in QEMU for 30 s; for a board on a serial line the timeout is 20 s.
 #[test]
 #[ignore = "stands still for half a minute"]
 fn an_event_of_a_process_is_waited_for() {
@@ -384,7 +384,7 @@ fn an_event_of_a_process_is_waited_for() {
     );
 }
 
-/// A QEMU that ends is not waited for.
+/// If QEMU ends, the host reports it without waiting for a timeout.
 #[test]
 fn a_process_that_ends_is_told_at_once() {
     let (qemu, mut session) = board();

@@ -1,4 +1,4 @@
-//! Random surfaces, also nearly degenerate ones: every sample is right, or the fault that stopped the run is.
+//! Random surfaces, also nearly degenerate ones: every sample is within its bounds, or a justified fault stopped the run.
 
 use interp_core::{Fault, FaultKind};
 use job::{Along, Job, Pattern, Side, Spacing, SurfaceSpec};
@@ -9,7 +9,7 @@ use proptest::prelude::*;
 use proptest::test_runner::RngSeed;
 use verify::survey::Survey;
 
-/// Result of a job: its fault with the position, and the worst figures.
+/// Result of a run: the fault with its position, and the worst figures.
 struct Ran {
     fault: Option<Fault>,
     position_nm: f64,
@@ -18,13 +18,13 @@ struct Ran {
     off_boundary: u32,
     samples: u64,
     place: [f64; 2],
-    /// The pass runs against its parameter.
+    /// The last pass runs against the direction of its path parameter.
     backwards: bool,
-    /// The sample before the fault that is its neighbour, along the pass or across.
+    /// Parameters of the sample next to the fault, along the pass or across.
     neighbour: Option<[f64; 2]>,
 }
 
-/// Runs a given number of samples, and on to the end of the pass, because the survey needs the sample after a pass's last step.
+/// Runs at least a given number of samples, to the end of the pass, because the survey needs the sample after a pass's last step.
 fn run(job: &Job, most: u64) -> Ran {
     let oracle = Oracle::new(job).unwrap();
     let prepared = prepare(job).unwrap();
@@ -52,7 +52,7 @@ fn run(job: &Job, most: u64) -> Ran {
         position_nm: report.position_nm.max,
         ripple_pct: report.ripple_pct.max,
         interval: report.interval.max,
-        // Of a run that was cut short, the last pass has no end.
+        // In a truncated run the last pass has no end on the boundary.
         off_boundary: if result.is_ok() && !cut {
             report.off_boundary
         } else {
@@ -81,7 +81,7 @@ fn job(surface: SurfaceSpec, along: Along, pattern: Pattern) -> Job {
     }
 }
 
-/// A plane of 20 mm x 20 mm, `bump` mm of random cubics added to every coordinate.
+/// A plane of 20 mm x 20 mm, with random cubics of amplitude `bump` mm added to every coordinate.
 fn bumpy(random: &[f64], bump: f64) -> SurfaceSpec {
     let mut coefficients_mm = [[[0.0; 4]; 4]; 3];
     for (c, random) in coefficients_mm.iter_mut().flatten().flatten().zip(random) {
@@ -96,7 +96,7 @@ fn bumpy(random: &[f64], bump: f64) -> SurfaceSpec {
     }
 }
 
-/// The oracle's worst r k and least sine between S_u and S_v close to a place.
+/// The oracle's largest product of ball radius and curvature, and its least sine between S_u and S_v, near a point.
 fn near(job: &Job, [u, v]: [f64; 2]) -> (f64, f64) {
     let oracle = Oracle::new(job).unwrap();
     let (mut fit, mut sine) = (f64::NEG_INFINITY, f64::INFINITY);
@@ -117,7 +117,7 @@ fn near(job: &Job, [u, v]: [f64; 2]) -> (f64, f64) {
     (fit, sine)
 }
 
-/// Whether the normal turns by 120 degrees (or a little less) between the fault and the sample beside it.
+/// Whether the normal turns by about 120 degrees or more between the fault and the sample next to it.
 fn turns(job: &Job, ran: &Ran) -> bool {
     let oracle = Oracle::new(job).unwrap();
     let normal = |[u, v]: [f64; 2]| oracle.contact(u, v).map(|contact| contact.normal);
@@ -127,8 +127,8 @@ fn turns(job: &Job, ran: &Ran) -> bool {
     }
 }
 
-/// How far the series to second order, from the oracle's derivatives, is from one period's arc at the place of the fault: what it
-/// would add to the first-order step, and the relative error of the arc that it covers.
+/// The second-order series of the parameter step at the fault, from the oracle's derivatives: its correction relative to the first-order
+/// step, and the relative error of the arc that it covers in one period.
 fn series(job: &Job, ran: &Ran) -> (f64, f64) {
     let oracle = Oracle::new(job).unwrap();
     let [u, v] = ran.place;
@@ -164,7 +164,7 @@ fn justified(job: &Job, ran: &Ran) -> Result<(), TestCaseError> {
             );
         }
         FaultKind::ParameterBackwards => {
-            // More than 1/2, or 1/16 of the step by what the speed makes of it.
+            // The core's limits: a correction of more than 1/2, or an error of 1/16 of the step by the change of the speed.
             let (added, missed) = series(job, ran);
             prop_assert!(
                 added.abs() > 0.499 || missed.abs() > 0.02,
@@ -186,7 +186,7 @@ fn either<T: Clone + std::fmt::Debug + 'static>(a: T, b: T) -> impl Strategy<Val
     prop_oneof![Just(a), Just(b)]
 }
 
-/// The same 200 cases each time; ISOFEED_CASES sets another number of newly drawn cases.
+/// The same 200 cases in each run; ISOFEED_CASES sets a number of new random cases.
 fn campaign() -> ProptestConfig {
     let config = ProptestConfig {
         failure_persistence: None,
@@ -208,7 +208,7 @@ fn campaign() -> ProptestConfig {
 proptest! {
     #![proptest_config(campaign())]
 
-    /// Gentle to wild: from a tenth of a millimetre of bumps to more than the plane itself.
+    /// Amplitudes from a tenth of a millimetre to more than the size of the plane.
     #[test]
     fn bicubic_patches(
         random in prop::collection::vec(-1.0..1.0_f64, 48),
@@ -221,20 +221,20 @@ proptest! {
         job.side = side;
         let ran = run(&job, 40_000);
         justified(&job, &ran)?;
-        // The offset's error grows with the ball, and with how nearly parallel S_u and S_v are.
+        // The error of the offset grows with the ball radius, and as S_u and S_v become parallel.
         prop_assert!(ran.fault.is_some() || ran.position_nm <= 10.0, "CL off by {} nm", ran.position_nm);
         prop_assert!(ran.fault.is_some() || ran.ripple_pct <= 0.001, "ripple {} %", ran.ripple_pct);
         prop_assert!(ran.fault.is_some() || ran.interval <= 1e-4, "interval off by {}", ran.interval);
         prop_assert_eq!(ran.off_boundary, 0);
     }
 
-    /// A patch whose far boundary shrinks towards a point without reaching it: the normal gets worse, never the sample
-    /// wrong in silence.
+    /// A patch with a boundary that is nearly a point: the error of the normal grows as far as the bound permits, or a fault stops the
+    /// run.
     #[test]
     fn nearly_collapsed_boundaries(shrink in -7.0..-0.5_f64, height in -6.0..6.0_f64, along in either(Along::U, Along::V)) {
         let width = 10_f64.powf(shrink);
         let mut c = [[[0.0; 4]; 4]; 3];
-        // x = 20 u - 10 at v = 0, shrinking to `width` of it at v = 1; y = 20 v; z = height v^2.
+        // x = 20 u - 10 at v = 0, scaled by `width` at v = 1; y = 20 v; z = height v^2.
         c[0][2][3] = 20.0;
         c[0][3][3] = -10.0;
         c[0][2][2] = 20.0 * (width - 1.0);
@@ -252,11 +252,10 @@ proptest! {
     }
 }
 
-/// A fan that ends in a point, the point on each of the four boundaries, passes both ways, forwards and backwards; and the
-/// same with weights.
+/// A fan with a pole on each of the four boundaries, passes along u and v, `zig` and `zigzag`, without and with weights.
 #[test]
 fn poles() {
-    // Degree 3 Bezier in "towards the pole" (t) and "around it" (s): all poles of t = 1 are one point. Tangent there.
+    // A cubic Bezier patch, t towards the pole and s around it: all control points at t = 1 coincide, and the surface is smooth there.
     let pole_at = |t: usize, s: usize| -> [f64; 3] {
         let (angle, reach) = (0.3 + 0.35 * s as f64, [30.0, 20.0, 10.0, 0.0][t]);
         [reach * angle.cos(), reach * angle.sin(), [-6.0, 1.5, 4.0, 4.0][t]]
@@ -309,7 +308,7 @@ fn poles() {
     }
 }
 
-/// The fan of [`poles`], turned away from the axes: what cancels there must not be left to the coordinates' zeros.
+/// The fan of [`poles`], rotated, so that no term vanishes merely because a coordinate is 0.
 fn turned_fan(pole_on_u: bool, weights: bool) -> SurfaceSpec {
     let turn = |[x, y, z]: [f64; 3]| {
         let (s, c) = 0.7_f64.sin_cos();
@@ -338,7 +337,7 @@ fn turned_fan(pole_on_u: bool, weights: bool) -> SurfaceSpec {
     })
 }
 
-/// Passes into a pole that lies askew, fast and slow, with small and large balls: no false gouge.
+/// Passes into a pole of the rotated fan, at several feeds and ball radii, without a false gouge fault.
 #[test]
 fn poles_askew() {
     for weights in [false, true] {
@@ -360,10 +359,10 @@ fn poles_askew() {
     }
 }
 
-/// The first interval beside a pole is that of its fastest side line.
+/// The first interval beside a pole is that of the side line with the greatest speed.
 #[test]
 fn interval_beside_a_pole() {
-    // S = v (2 + 18 u, 20 u, 0): the side lines' speed runs from 2 to 27 mm.
+    // S = v (2 + 18 u, 20 u, 0): the speed of the side lines is 2 to 28 mm.
     let mut c = [[[0.0; 4]; 4]; 3];
     (c[0][3][2], c[0][2][2], c[1][2][2]) = (2.0, 18.0, 20.0);
     let surface = SurfaceSpec::Bicubic {
@@ -383,7 +382,7 @@ fn interval_beside_a_pole() {
                 second.is_none()
             })
             .unwrap();
-        // On a plane two balls of radius r leave the height h at a distance of 2 sqrt(h (2 r - h)).
+        // On a plane, two balls of radius r at a distance of 2 sqrt(h (2 r - h)) leave a scallop of height h.
         let want = 2.0 * (0.01_f64 * (2.0 * 2.0 - 0.01)).sqrt() / 20.0_f64.hypot(20.0);
         assert!(
             (second.unwrap() / want - 1.0).abs() < 1e-5,
@@ -393,7 +392,7 @@ fn interval_beside_a_pole() {
     }
 }
 
-/// Patches smaller than the ball: its radius in the patch's fine units is beyond i32.
+/// Patches smaller than the ball, whose radius in the patch's fine units exceeds i32.
 #[test]
 fn patches_smaller_than_the_ball() {
     for size in [1.0, 2.0, 5.0, 8.0, 15.0] {
@@ -420,12 +419,12 @@ fn patches_smaller_than_the_ball() {
     }
 }
 
-/// Domes and cones that end on the axis, both ways, to and fro.
+/// Domes and cones that end on the axis, with passes along u and v, `zig` and `zigzag`.
 #[test]
 fn profiles_that_end_on_the_axis() {
     for k in 0..40 {
         let (a, b) = (20.0 + 0.377 * f64::from(k), 0.1 * f64::from(k % 7));
-        // R = a u + b u^2, Z falls: a cone for b = 0; the axis at u = 0.
+        // R = a u + b u^2, Z decreases; the axis is at u = 0.
         let surface = SurfaceSpec::Revolved {
             radius_mm: [0.0, b, a, 0.0],
             height_mm: [-1.001, -1.003 - b, -10.0, 0.0],
@@ -436,7 +435,7 @@ fn profiles_that_end_on_the_axis() {
             for pattern in [Pattern::Zig, Pattern::Zigzag] {
                 let mut job = job(surface.clone(), along, pattern);
                 (job.side, job.radius_mm, job.feed_mm_min) = (Side::Up, 2.0, 3000.0);
-                // Passes along the profile crowd at the axis; a few say all.
+                // Passes along the profile are close together at the axis; a few are enough.
                 let most = if along == Along::U { 20_000 } else { u64::MAX };
                 let ran = run(&job, most);
                 assert_eq!(ran.fault, None, "{k}, {along:?}, {pattern:?} at {:?}", ran.place);
@@ -450,7 +449,7 @@ fn profiles_that_end_on_the_axis() {
     }
 }
 
-/// A boundary of which one span is a point and the next is not cannot become passes: refused, with a sentence.
+/// A boundary with one span that is a point and one that is not is refused, with a message.
 #[test]
 fn boundary_that_is_a_point_in_part() {
     let pole = |x: f64, y: f64| [x, y, 0.0, 1.0];
@@ -469,7 +468,7 @@ fn boundary_that_is_a_point_in_part() {
     assert!(error.to_string().contains("not all of it"), "{error}");
 }
 
-/// A parametrisation whose speed changes by a large part of itself in one period faults; it never runs at another feed.
+/// If the parametric speed changes by a large fraction within a period, the run faults or keeps the feed.
 #[test]
 fn uneven_parametrisations_keep_the_feed_or_fault() {
     // x = a u + b u^2/2 + c u^3/3, and the arc of one period.
@@ -502,8 +501,8 @@ fn uneven_parametrisations_keep_the_feed_or_fault() {
     }
 }
 
-/// A ridge so sharp that the path all but turns back: S_u shrinks to a few per cent and turns by 180 degrees within some steps,
-/// at right angles to S_v throughout. The surface is regular there, and any ball fits outside.
+/// A sharp ridge on which the path nearly reverses: |S_u| falls to a few per cent and S_u turns by 180 degrees within some steps, always at
+/// right angles to S_v. The surface is regular there, and any ball fits on the convex side.
 #[test]
 fn ridge_on_which_the_path_all_but_stands() {
     let ridge = |breadth: f64| {
@@ -531,8 +530,8 @@ fn ridge_on_which_the_path_all_but_stands() {
     }
 }
 
-/// Two patches of a straight line, the first at an even speed, the second at 30 + 900 w^2: the second sample on it has no neighbour that
-/// tells how the speed's slope changes.
+/// Two patches along a straight line, the first with constant parametric speed, the second with 30 + 900 w^2: at the second sample on the
+/// second patch the derivative of the speed's slope cannot be estimated from the sample before.
 #[test]
 fn steps_after_a_boundary_between_speeds() {
     let x = [0.0, 3.333, 6.666, 9.999, 19.999, 29.999, 339.999];

@@ -11,12 +11,12 @@ use oracle::{Oracle, PassSample, SampleCheck};
 use report::{Remarks, RidgePoint, Scallops, Sketch};
 use verify::survey::{Survey, SurveyResult};
 
-/// WebGL on the processor, whatever graphics card there is: the same everywhere.
+/// WebGL in software, for the same picture on every machine.
 const SOFTWARE: [&str; 2] = ["--use-angle=swiftshader", "--enable-unsafe-swiftshader"];
 const DESK: [u32; 2] = [1280, 900];
 const PHONE: [u32; 2] = [390, 800];
 
-/// Runs a job and writes its report; with what the oracle found.
+/// Runs a job and writes its report. Returns the page, and the oracle's survey of the run.
 fn report(name: &str, folder: &Path, remarks: &Remarks) -> (PathBuf, SurveyResult) {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../jobs").join(name);
     let job = job_file::load(&path).unwrap();
@@ -34,7 +34,7 @@ fn report(name: &str, folder: &Path, remarks: &Remarks) -> (PathBuf, SurveyResul
     (page.canonicalize().unwrap(), findings)
 }
 
-/// Heights that rise along u from nothing to above the limit at u = 1.
+/// Scallop heights that rise along u, from 0 to a value above the limit at u = 1.
 fn rising(domain: [[f64; 2]; 2], ridges: u32) -> Scallops {
     let [[u0, u1], [v0, v1]] = domain;
     let ridge = |gap: u32| {
@@ -56,7 +56,7 @@ fn rising(domain: [[f64; 2]; 2], ridges: u32) -> Scallops {
     }
 }
 
-/// Draws the view and counts: different colours, share of the canvas that is painted, and pixels near a colour.
+/// Draws the view and counts the different colours, the painted fraction of the canvas, and the pixels near a colour.
 fn pixels(browser: &mut Browser, near: [u8; 3]) -> [f64; 3] {
     let [r, g, b] = near;
     let value = browser.value(&format!(
@@ -86,7 +86,7 @@ fn assert_quiet(browser: &mut Browser, page: &Path) {
     assert!(others.is_empty(), "requested: {others:?}");
 }
 
-/// Different colours in each chart's canvas.
+/// Number of different colours in each chart's canvas.
 fn chart_colours(browser: &mut Browser) -> Vec<f64> {
     let value = browser.value(
         "[...document.querySelectorAll('.chart.live canvas')].map((c) => { const d = c.getContext('2d').getImageData(0, 0, c.width, c.height).data; \
@@ -123,7 +123,7 @@ fn view_and_charts_are_drawn_in_every_colouring() {
     ] {
         assert!(said.contains(text), "{text} in {said}");
     }
-    // Scallops are shown first: from dark violet to yellow, and what is above the limit in red.
+    // The scallop height is shown first: from dark violet to yellow, and red above the limit.
     assert_eq!(browser.text("document.getElementById('colour').value"), "scallop");
     assert!(
         browser
@@ -136,7 +136,7 @@ fn view_and_charts_are_drawn_in_every_colouring() {
         "{colours} colours on {painted}"
     );
     assert!(over > 300.0, "{over} pixels above the limit");
-    // The held feed is in the middle of its scale, and lines are not shaded.
+    // A constant feed has the colour of the middle of the scale, and lines are not shaded.
     for (option, unit, near, least) in [
         ("feed", "mm/s", [35, 144, 139], 20_000.0),
         ("centre", "mm/s", [35, 144, 139], 500.0),
@@ -186,12 +186,12 @@ fn mouse_keys_and_buttons_do_what_they_say() {
     browser.key("Home");
     assert_eq!(browser.text(place), home, "Home resets");
     assert_eq!(browser.number("isofeedReport.view.camera.zoom"), 1.0);
-    // Top: x to the right, y up.
+    // Top view: x to the right, y up.
     browser.value("document.querySelector('[data-view=top]').click()");
     let axes =
         "isofeedReport.view.axes().map((a) => a.map((x) => Math.round(x * 100) / 100 + 0).join(' ')).join()";
     assert_eq!(browser.text(axes), "1 0 0,0 1 0,0 0 1");
-    // Time: the ball stands where the core was, a quarter into the run.
+    // Time: the ball is at the position of the core's sample at 100 s.
     browser.value("(() => { const t = document.getElementById('time'); t.value = 100000; t.dispatchEvent(new Event('input')); })()");
     let read = browser.text("document.getElementById('readout').innerText");
     assert!(
@@ -205,7 +205,7 @@ fn mouse_keys_and_buttons_do_what_they_say() {
         (radius - 5.0).abs() < 0.01,
         "contact and centre are {radius} mm apart"
     );
-    // Charts: a dragged range is the window; in a pass that is kept in detail every sample comes into sight.
+    // Charts: a dragged range becomes the window; in a pass stored in detail, zooming in shows every sample.
     let window = "isofeedReport.charts[0].window[1] - isofeedReport.charts[0].window[0]";
     let whole = browser.number(window);
     browser.drag("#charts .u-over", [0.25, 0.5], [0.5, 0.5]);
@@ -258,11 +258,11 @@ fn a_run_of_two_million_samples_opens_on_a_phone() {
         390.0,
         "nothing sticks out"
     );
-    // Every sample is behind a drawn point: points times the samples that they stand for.
+    // The drawn points together stand for every sample.
     let behind = browser
         .number("isofeedReport.view.track.passes.reduce((sum, pass) => sum + pass.last - pass.first + 1, 0)");
     assert_eq!(behind, 2_212_265.0);
-    // The worst sample of them all is in the charts, and in the view.
+    // The worst sample of the run appears in the charts and in the view.
     let worst = findings.report.position_nm.max;
     for values in [
         "charts[0].series.whole.channel('cl_error')[1]",

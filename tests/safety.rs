@@ -1,4 +1,4 @@
-//! Inputs, drives, home and a host that is gone, on a whole board with a real job; and any order of all of it.
+//! Inputs, drives, home and the heartbeat timeout, on a whole board with a real job, and in random sequences.
 
 mod rules;
 
@@ -22,13 +22,13 @@ const ESTOP: InputLines = InputLines::EMERGENCY_STOP;
 const X_PLUS: InputLines = InputLines(1 << 2);
 const FAULT: InputLines = InputLines(1 << 10);
 
-/// A line to a board in this process. Each read lets some periods pass.
+/// A line to a board in this process. Each read runs some periods.
 struct Wire {
     board: Arc<Mutex<Board<WORDS>>>,
     sent: VecDeque<u8>,
 }
 
-/// Periods that pass with each read, of which there is about one a millisecond.
+/// Periods per read; the host reads about once per millisecond.
 const TICKS_A_READ: usize = 2;
 
 impl Stream for Wire {}
@@ -63,7 +63,7 @@ struct Desk {
 }
 
 impl Desk {
-    /// In session, with the dome loaded and this configuration.
+    /// Opens a session with this configuration, and loads the dome.
     fn loaded(setup: &Setup) -> Self {
         let board = Arc::new(Mutex::new(Board::new()));
         let mut desk = Self {
@@ -98,7 +98,7 @@ impl Desk {
         }
     }
 
-    /// Starts, and stops asking after some periods.
+    /// Starts a run, and lets some periods pass without a request.
     fn running(&mut self) -> Status {
         self.ask(Request::Start).unwrap();
         let status = self.tick(50);
@@ -106,12 +106,12 @@ impl Desk {
         status
     }
 
-    /// From the next period on. Beside the line, whose answer would let periods pass.
+    /// Simulates inputs from the next period on. The line is not used, because its answer would take periods.
     fn assert_inputs(&self, lines: InputLines) {
         self.board.lock().unwrap().simulate(lines);
     }
 
-    /// The status that the board says the run ended with.
+    /// The status that the board reports at the end of the run.
     fn halted(&mut self) -> Status {
         loop {
             if let Told::Halted(status) = self.session.event().unwrap() {
@@ -148,7 +148,7 @@ fn an_emergency_stop_ends_the_run_in_its_tick_and_is_undone_step_by_step() {
     let running = desk.running();
     desk.assert_inputs(ESTOP);
     let stopped = desk.tick(1);
-    // No sample more: nothing follows the path.
+    // No further sample is emitted.
     assert_eq!(
         (stopped.state, stopped.samples, stopped.digest),
         (State::Faulted, running.samples, running.digest)
@@ -212,7 +212,7 @@ fn a_drive_fault_cuts_and_a_limit_switch_stops_along_the_path() {
     }
 }
 
-/// Time stands still in lockstep; the inputs do not.
+/// In lockstep no period passes without credit, but the inputs are still read.
 #[test]
 fn an_emergency_stop_is_told_in_lockstep_without_a_period() {
     for held in [false, true] {
@@ -272,7 +272,7 @@ fn a_host_that_is_gone_finds_its_run_held_and_goes_on_exactly() {
     let over = desk.tick(2000);
     assert_eq!((over.state, over.safety.link_timed_out), (State::Finished, true));
     assert_eq!((over.digest, over.samples), undisturbed());
-    // The next run begins with a host.
+    // The next run begins with the host connected.
     assert!(!desk.running().safety.link_timed_out);
 
     // In lockstep there is no link timeout.
@@ -323,7 +323,7 @@ fn an_operator_is_told_what_he_did() {
     );
 }
 
-/// A host that waits for a long pass on the board's own clock says so often enough, and learns that the run is held.
+/// While the host waits for a long pass on the free clock, its heartbeat prevents the timeout; if the run is held, the host reports it.
 #[test]
 fn a_host_that_waits_is_not_gone() {
     let mut setup = Setup::homed(Configuration::DEFAULT, [0; 3]);
@@ -348,10 +348,10 @@ fn a_host_that_waits_is_not_gone() {
     assert!(matches!(desk.session.event(), Err(RemoteError::Held)));
 }
 
-/// Wants one thing after the other, and remembers what came of it.
+/// Issues the given requests one after the other, and records the results.
 struct Scripted {
     wishes: std::vec::IntoIter<Request>,
-    /// Waits for the result.
+    /// Whether the operator stays connected.
     stays: bool,
     came: Vec<Result<State, String>>,
 }
@@ -384,7 +384,7 @@ fn an_operator_commands_a_run_that_is_followed() {
             drive::run_digests(&mut desk.session, &[], false, Some(&mut operator), |_| {}).unwrap();
         (compared, operator.came)
     };
-    // Held, the run is waited for; a job without limits goes on with the next sample.
+    // While the run is held, the host waits; a job without limits then continues with the next sample.
     let (compared, came) = run(vec![
         Request::Hold,
         Request::Status,
@@ -404,11 +404,11 @@ fn an_operator_commands_a_run_that_is_followed() {
     assert_eq!(came, [Ok(State::Ready)]);
     assert_eq!((compared.status.state, compared.commanded), (State::Ready, true));
     assert!(compared.status.samples < undisturbed().1);
-    // Who only looks, commands nothing: the passes are compared, and there are too many.
+    // A status request is no command, so the passes are compared; the run has more passes than the empty list expected.
     let (compared, _) = run(vec![Request::Status]);
     assert_eq!((compared.commanded, compared.first_bad_pass), (false, Some(0)));
 
-    // After a hold by a host that disconnects, the run is not waited for.
+    // If the operator holds the run and disconnects, the host does not wait for its end.
     let mut desk = Desk::ready();
     let mut operator = Scripted {
         wishes: vec![Request::Hold].into_iter(),

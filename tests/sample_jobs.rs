@@ -1,5 +1,5 @@
 //! Every sample job, run once: each sample against the independent oracle, scallop height and gouge of the whole path from the swept ball, and
-//! the figures that the README states.
+//! the number of passes.
 
 use std::path::PathBuf;
 
@@ -28,7 +28,7 @@ fn check(name: &str, passes: u32) {
     assert_eq!(findings.passes, passes, "{name}");
     let failures = findings.report.failures(&BOUNDS);
     assert!(failures.is_empty(), "{name}: {failures:?}");
-    // The aim, beyond the bound.
+    // The aim, tighter than the bound of 10 nm.
     let worst = findings.report.position_nm.max;
     assert!(worst <= 5.0, "{name}: CL off by {worst} nm");
     let scanned = oracle.schedule().unwrap().len();
@@ -50,7 +50,7 @@ macro_rules! jobs {
     };
 }
 
-// The paper's numbers of passes, the golden table's, and for the others the oracle's dense scan.
+// Numbers of passes from the paper, from the golden table, and for the other jobs from the oracle's dense scan.
 jobs! {
     far_plate: 18,
     freeform: 135,
@@ -70,7 +70,7 @@ fn every_job_is_listed() {
     let mut names: Vec<_> = std::fs::read_dir(jobs())
         .unwrap()
         .map(|entry| entry.unwrap().path())
-        // Beside the jobs there are a folder of CAD files and what an operator does.
+        // The folder also contains CAD files and an operator script.
         .filter(|path| path.extension().is_some_and(|extension| extension == "toml"))
         .map(|path| path.file_stem().unwrap().to_str().unwrap().to_owned())
         .collect();
@@ -86,7 +86,7 @@ mod feed_ripple {
         for feed_mm_min in [600.0, 60.0] {
             let mut job = load(name);
             job.feed_mm_min = feed_mm_min;
-            // As many passes as at 1 mm/s take about half a million samples.
+            // Scallop height limits that result in at most about half a million samples.
             job.scallop_mm = if feed_mm_min < 100.0 { 1.0 } else { 0.1 };
             let oracle = Oracle::new(&job).unwrap();
             let prepared = prepare(&job).unwrap();

@@ -1,5 +1,5 @@
-//! What an operator does in a run, from one script: on the machine in this process, on the board's logic behind a line, and on the firmware
-//! in QEMU, with the same samples. Needs `qemu-system-arm`; builds the firmware.
+//! One script of operator commands gives the same samples on the core in this process, on the board's logic over a line, and on the firmware
+//! in QEMU. Needs `qemu-system-arm`; builds the firmware.
 
 use std::io::{self, Read, Write};
 
@@ -18,14 +18,14 @@ use protocol::message::Configuration;
 
 use crate::images;
 
-/// A hold and a resume on the path, requests that the state does not allow, an abort, another run, and an abort while held.
+/// A hold and a resume on the path, commands that the state does not allow, an abort, a second run, and an abort while held.
 const SCRIPT: &str = "tick 300: hold\ntick 301: hold\ntick 340: resume\ntick 700: resume\ntick 2500: abort\ntick 2510: hold\ntick 2600: start\n\
     tick 2999: hold\ntick 3000: resume\ntick 9000: hold\ntick 9100: abort\n";
-/// Left held, one period after the resume.
+/// A second hold one period after the resume; the run stays held.
 const HELD: &str = "tick 20: hold\ntick 50: resume\ntick 51: hold\n";
 
-/// On a machine with limits: all that an operator can do, in every state: on the way there, on passes, between them, while it slows down; to
-/// 200 % and to nothing; given up on the surface and begun again from there; left by a stop.
+/// For a machine with limits, all commands in all phases: during the approach, on passes, on links, during deceleration; overrides from 0 to
+/// 200 %; an abort on the surface and a start from there; a stop at the end.
 const WITHIN_LIMITS: &str = "tick 40: hold\ntick 200: resume\ntick 900: override 200\ntick 1300: hold\ntick 1310: override 35\n\
     tick 1500: resume\ntick 2200: override 0\ntick 2600: override 120\ntick 3000: hold\ntick 3003: resume\ntick 3400: abort\n\
     tick 3600: start\ntick 3700: override 100\ntick 6000: hold\ntick 6400: stop\n";
@@ -60,7 +60,7 @@ fn here(job: &Prepared, script: &Script) -> (Played, Schedule, Vec<[i32; 3]>) {
     (played, Schedule::of(&played, ends), path)
 }
 
-/// The board's logic as a line: its time passes while the host reads.
+/// The board's logic behind a line; its periods pass while the host reads.
 struct Line {
     board: Box<Board>,
     waiting: Vec<u8>,
@@ -123,13 +123,13 @@ fn a_run_held_and_resumed_is_the_run_without() {
     assert_eq!((paused.digest, paused.samples), (plain.digest, plain.samples));
     assert_eq!(paused.periods - plain.periods, 40 + 259);
     assert_eq!(schedule.ends, [paused.periods - 1]);
-    // Another run's samples do not count, those of the last do.
+    // Digest and number of samples are those of the last run.
     let (again, schedule, _) = here(&job, &Script::parse("script", SCRIPT).unwrap());
     assert_eq!((again.state, again.samples), (State::Ready, 6399));
     assert_eq!(schedule.ends, [2500, 9100]);
 }
 
-/// The scripts, one after the other on one board.
+/// Runs the scripts one after the other on one board.
 fn all_the_same(session: &mut Session) {
     same(session, &torus(), SCRIPT, State::Ready);
     same(session, &torus_within_limits(), WITHIN_LIMITS, State::Ready);

@@ -1,5 +1,5 @@
-//! A session between host and board, step by step, with a machine that records its calls: each thing that
-//! can go wrong has its answer, and changes nothing.
+//! A session between host and board, step by step, with a machine that records its calls: each invalid frame or request
+//! has a defined answer and no effect.
 
 mod safety;
 
@@ -12,7 +12,7 @@ use protocol::{
     message::{Clock, Configuration, FaultReport, InputLines, Reason, Reply, Report, Request, Status, Words},
 };
 
-/// Both ends of a line, the machine a mock.
+/// Both ends of a line, with a mock machine.
 #[derive(Default)]
 struct Line {
     host: Host,
@@ -21,7 +21,7 @@ struct Line {
 }
 
 impl Line {
-    /// A session that is open.
+    /// An open session.
     fn open() -> Self {
         let mut line = Self::default();
         line.mock.status.safety = SAFE;
@@ -29,7 +29,7 @@ impl Line {
         line
     }
 
-    /// The bytes that the board answers to these.
+    /// The board's answer to these bytes.
     fn give(&mut self, bytes: &[u8]) -> Vec<u8> {
         let mut sent = Vec::new();
         for byte in bytes {
@@ -39,7 +39,7 @@ impl Line {
         sent
     }
 
-    /// The one answer to a frame.
+    /// The single answer to a frame.
     fn answer(&mut self, frame: &[u8]) -> Reply {
         let sent = self.give(frame);
         let mut replies = self.host.read(&sent);
@@ -53,7 +53,7 @@ impl Line {
         self.answer(&frame)
     }
 
-    /// The reason why the next request is refused; the machine must not notice it.
+    /// The reason why the next request is refused. The request must not reach the machine.
     fn refused(&mut self, request: &Request) -> Reason {
         let before = self.mock.clone();
         let answer = self.ask(request);
@@ -98,7 +98,7 @@ fn begin(words: &[i32]) -> Request {
     }
 }
 
-/// One of each that is not `Hello`.
+/// One request of each kind except `Hello`.
 fn others() -> Vec<Request> {
     let mut requests = upload(Header::default(), &[1; 30]);
     requests.extend([
@@ -190,7 +190,7 @@ fn a_frame_out_of_order_is_told_the_number_expected() {
     let mut line = Line::open().in_state(State::Ready);
     line.accepted(&Request::Report(Report::Samples));
     let before = line.mock.clone();
-    // an earlier one, one too far, the last number with other bytes, the number that means none
+    // An earlier number, the number after the next, the last number with another request, the reserved 0, the maximum.
     for number in [1, 4, 2, 0, u16::MAX] {
         let answer = line.answer(&frame(number, &Request::Start));
         assert_eq!(
@@ -244,7 +244,7 @@ fn hello_again_changes_nothing_and_a_new_session_restarts_the_numbers() {
 #[test]
 fn an_unreadable_request_uses_no_number() {
     let mut line = Line::open();
-    // `Start` with a field too many
+    // A `Start` with an additional field.
     let mut payload = vec![2, 4, 1];
     payload.extend(crc(&payload));
     let mut bytes = vec![u8::try_from(payload.len() + 1).unwrap()];
@@ -260,7 +260,7 @@ fn an_unreadable_request_uses_no_number() {
     line.accepted(&Request::Report(Report::Digests));
 }
 
-/// CRC-32/ISO-HDLC by its definition, bit by bit.
+/// CRC-32/ISO-HDLC by its bitwise definition.
 fn crc(bytes: &[u8]) -> [u8; 4] {
     let mut crc = u32::MAX;
     for byte in bytes {
@@ -437,7 +437,7 @@ fn a_full_queue_is_said_and_does_not_stick() {
     assert_eq!(line.refused(&Request::Start), Reason::Busy);
     assert_eq!(line.refused(&Request::Clock(Clock::Lockstep)), Reason::Busy);
     line.mock.busy = false;
-    // a clock that was not taken is not believed
+    // The refused change of the clock has no effect.
     assert_eq!(
         line.refused(&Request::Run { ticks: 1 }),
         Reason::WrongClock { clock: Clock::Free }

@@ -1,5 +1,5 @@
-//! Scallop height and gouge of whole jobs, as the core runs them, from the swept ball: jobs made for it; those of `jobs/` are in
-//! `sample_jobs`.
+//! Scallop height and gouge of whole jobs by the swept ball along the emitted samples. The jobs are made for these tests;
+//! `sample_jobs` has those of `jobs/`.
 
 use std::fmt::Write;
 
@@ -10,7 +10,7 @@ use oracle::{Oracle, PassSample, SampleCheck};
 use verify::survey::{self, Survey};
 use verify::swept::{SweptResult, ToolPath, measure};
 
-/// A job, run once with the oracle beside it.
+/// Results of one run of a job: the oracle, its survey, and the emitted path.
 pub(crate) struct Followed {
     pub(crate) oracle: Oracle,
     pub(crate) findings: survey::SurveyResult,
@@ -20,7 +20,7 @@ pub(crate) struct Followed {
 pub(crate) fn follow(job: &Job) -> Followed {
     let oracle = Oracle::new(job).unwrap();
     let prepared = prepare(job).unwrap();
-    // As `verify` does it: on a machine with limits the feed is low at the ends of passes.
+    // The spacing that `verify` uses: with axis limits the feed is low at the ends of passes, so samples are close together there.
     let mut track = ToolPath::with_spacing(match prepared.header.axes {
         Some(_) => 0.5e6 * job.feed_mm_s() * job.machine.period_s(),
         None => 0.0,
@@ -32,7 +32,7 @@ pub(crate) fn follow(job: &Job) -> Followed {
         .run(|sample| survey.add(&inspect::plain(&prepared, sample)).is_ok())
         .unwrap();
     let findings = survey.finish(true).unwrap();
-    // Links are no part of it.
+    // With axis limits the path has fewer samples than the run: no links, and none closer together than the spacing.
     if prepared.header.axes.is_none() {
         assert_eq!(track.samples() as u64, findings.samples);
     }
@@ -48,7 +48,7 @@ fn findings(job: &Job) -> SweptResult {
     measure(job, &followed.oracle, &followed.track, true, &())
 }
 
-/// The limit is used, and held: the largest ridge is between half of it and all of it. And nothing is cut that should stand.
+/// Checks that the largest scallop height is between half of the limit and the limit, and that there is no gouge.
 pub(crate) fn check_limit(name: &str, job: &Job, found: &SweptResult) {
     let (limit, most) = (job.scallop_mm, found.scallop_max.height_mm);
     assert!(
@@ -56,7 +56,7 @@ pub(crate) fn check_limit(name: &str, job: &Job, found: &SweptResult) {
         "{name}: {most} mm of {limit}, within {}",
         found.measurement_error_mm
     );
-    // The measuring is no worse than a thousandth of the limit, or what the samples' own distance brings.
+    // The measurement error is at most a thousandth of the limit plus the part caused by the distance of the samples.
     assert!(
         found.measurement_error_mm <= 1e-3 * limit + found.measurement_error.path_mm + 1e-6,
         "{name}: {:?}",
@@ -79,7 +79,8 @@ pub(crate) fn check_limit(name: &str, job: &Job, found: &SweptResult) {
     assert!(spots <= 100_000 && found.ridges.iter().all(|ridge| ridge.points.len() >= 3));
 }
 
-/// A patch of these corners, z = 0 but for a bulge of so many mm in the middle; ball 5 mm, scallop 0.02 mm.
+/// A patch with these corners and z = 0, except for a middle control point at z = `bulge` mm; ball radius 5 mm, scallop height limit
+/// 0.02 mm.
 fn corners(corners: [[f64; 2]; 4], bulge: f64, spacing: &str) -> Job {
     let [a, b, c, d] = corners;
     let mut text = String::from(
@@ -99,7 +100,8 @@ fn corners(corners: [[f64; 2]; 4], bulge: f64, spacing: &str) -> Job {
     job_file::parse("corners", &format!("{text}spacing = \"{spacing}\"\n")).unwrap()
 }
 
-/// Passes whose side lines are skew, and passes that spread: the paper's interval leaves more than the limit, the core's own does not.
+/// On passes with skew side lines and on diverging passes, the paper's interval exceeds the scallop height limit, and the exact interval
+/// keeps it.
 #[test]
 fn skew_and_spreading_passes_hold_the_limit() {
     let skew = |tangent: f64| {
@@ -112,11 +114,11 @@ fn skew_and_spreading_passes_hold_the_limit() {
     };
     let fan = [[0.0, 0.0], [0.0, 6.0], [40.0, 0.0], [60.0, 40.0]];
     for (name, place, bulge, excess, over) in [
-        // 4/(1 + cos p)^2 at the ends: 1.37 at 45 degrees, 1.78 at 60.
+        // The excess at the pass ends is 4/(1 + cos p)^2: 1.37 at 45 degrees, 1.78 at 60.
         ("45 degrees", skew(1.0), 0.0, 1.3, 0.0),
         ("60 degrees", skew(3.0_f64.sqrt()), 0.0, 1.7, 0.0),
-        // The crest beyond a skew end is taken to be as on a surface that bends evenly. This one does not, and 1.0011 is left: a
-        // shortfall, told in the README.
+        // Beyond a skew end the core assumes constant curvature. Here the curvature varies, and the scallop height reaches 1.0011 of
+        // the limit, a known limitation that the README lists.
         ("45 degrees, bulging", skew(1.0), 4.0, 1.2, 0.0015),
         ("fan", fan, 3.0, 1.01, 0.0),
     ] {
@@ -136,7 +138,7 @@ fn skew_and_spreading_passes_hold_the_limit() {
     }
 }
 
-/// A profile of poles (x, z), cubic between even knots, drawn out along y by 20 mm; passes along y.
+/// A cubic profile of control points (x, z) with uniform knots, extruded by 20 mm along y; passes along y.
 fn groove(profile: &[[f64; 2]], cut: &str) -> Job {
     let mut text = String::from("[surface]\nkind = \"nurbs\"\ndegree = [3, 1]\nknots_u = [0, 0, 0, 0");
     let spans = profile.len() - 3;
@@ -151,8 +153,8 @@ fn groove(profile: &[[f64; 2]], cut: &str) -> Job {
     job_file::parse("groove", &(text + cut)).unwrap()
 }
 
-/// A keyhole: a round floor wider than the ball, under lips 4 mm apart. The ball fits every curvature; on one lip it stands in the
-/// other.
+/// A keyhole slot: a round floor wider than the ball, below lips 4 mm apart. The ball fits the curvature everywhere, but in contact with
+/// one lip it cuts into the other.
 #[test]
 fn ball_between_two_lips() {
     let half = [
@@ -175,13 +177,13 @@ fn ball_between_two_lips() {
     assert!(hollow.radius_mm > job.radius_mm, "{hollow:?}");
     let gouge = found.gouge.unwrap();
     assert!(!gouge.local && gouge.depth_mm > 1.0, "{gouge:?}");
-    // The place and the contact that cuts it face each other across the slot.
+    // The gouged point and the contact that causes the gouge are on opposite sides of the slot.
     let oracle = Oracle::new(&job).unwrap();
     let contact = oracle.contact(gouge.contact[0], gouge.contact[1]).unwrap();
     let place = oracle.contact(gouge.u, gouge.v).unwrap();
     assert!(contact.cc_mm.x * place.cc_mm.x < 0.0);
     let reach = contact.cl_mm.distance(place.cc_mm);
-    // Along the pass the sample may be a step off.
+    // The sample may be one step away from the deepest point along the pass.
     assert!(
         (job.radius_mm - reach - gouge.depth_mm).abs() < 0.01,
         "{reach} {gouge:?}"
@@ -189,11 +191,11 @@ fn ball_between_two_lips() {
     assert!(found.failures.iter().any(|line| line.contains("another part")));
 }
 
-/// A flat 40 mm wide with a groove 0.8 mm wide between the first two passes, which are 2 mm apart.
+/// A plane with a groove 0.8 mm wide between the first two passes, which are 2 mm apart: `verify` finds it although no sample is in it.
 #[test]
 fn groove_that_no_sample_lies_in() {
     let flat = |depth: f64| {
-        // Poles at the knots' averages: x is even in u, 0.2 mm a span.
+        // Control points at the Greville abscissae: x is linear in u, 0.2 mm per span.
         let average = |k: i32| f64::from((k - 2..=k).map(|knot| knot.clamp(0, 98)).sum::<i32>()) / 3.0;
         let mut profile: Vec<[f64; 2]> = (0..=100).map(|k| [0.2 * average(k), 0.0]).collect();
         profile[6][1] = -depth;
@@ -213,7 +215,7 @@ fn groove_that_no_sample_lies_in() {
     assert!(cut.warnings.iter().any(|line| line.contains("concave radius")));
 }
 
-/// A part that does not fit the machine's travel fails before anything moves.
+/// A part that exceeds the machine's travel is reported, axis by axis.
 #[test]
 fn travel() {
     let flat: Vec<[f64; 2]> = (0..10).map(|k| [2.0 * f64::from(k), 0.0]).collect();

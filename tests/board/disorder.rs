@@ -1,4 +1,4 @@
-//! Any order of anything on the line, against the runs that the core would make.
+//! Random sequences of requests, noise and missed ticks, against the runs that the core alone makes.
 
 use integration_tests::{HELLO, dome, upload};
 use interp_core::{
@@ -10,17 +10,17 @@ use protocol::message::{Clock, Reply, Report, Request, Status};
 
 use super::{Desk, digest, reference, samples_of_dome};
 
-/// Actions of a host, or faults of the line.
+/// An action of the host, or a disturbance of the line.
 #[derive(Clone, Debug)]
 enum Deed {
     Noise(Vec<u8>),
     Upload,
     Ask(Request),
-    /// A number that is most likely wrong.
+    /// A request with a wrong sequence number.
     Stray(u16, Request),
     Damage(Request, usize),
     Ticks(u8),
-    /// Ticks of the sample timer missed.
+    /// A number of missed ticks of the sample timer.
     Miss(u8),
 }
 
@@ -54,7 +54,7 @@ fn any_deed() -> impl Strategy<Value = Deed> {
     ]
 }
 
-/// Gives bytes to the board that are no next request; the status must not notice, but for what the link counts.
+/// Sends bytes that are not the next request, and checks that the board's status does not change.
 fn give_without_effect(desk: &mut Desk, bytes: &[u8]) {
     let before = desk.board.status();
     desk.board.receive(&[0]);
@@ -85,7 +85,7 @@ fn act(desk: &mut Desk, deed: Deed) {
             desk.ask(&request);
         }
         Deed::Stray(number, request) => {
-            // Neither the last number nor the next.
+            // Differs from the last number and from the next.
             let number = desk.host.number.wrapping_add(2 + number % 60_000);
             if !matches!(request, Request::Hello { .. }) {
                 give_without_effect(desk, &integration_tests::frame(number, &request));
@@ -109,7 +109,7 @@ fn act(desk: &mut Desk, deed: Deed) {
 struct Model {
     whole: Vec<Sample>,
     before: Status,
-    /// The run that a missed tick has stopped, as long as it is the last; and how many ticks were missed.
+    /// The samples of the latest run if a missed tick stopped it, and the number of missed ticks.
     stopped: Option<(Vec<Sample>, f32)>,
 }
 
@@ -122,10 +122,10 @@ impl Model {
         }
     }
 
-    /// Processes one action: the status after it, and the samples reported during it.
+    /// Checks one action: the status after it, and the samples reported during it.
     fn follow(&mut self, deed: &Deed, status: Status, told: &[Sample]) -> Result<(), TestCaseError> {
         if let (None, Some(fault)) = (self.before.fault, status.fault) {
-            // Only a missed tick can have done that, in the one tick of its deed: it stops what was there before.
+            // Only a missed tick causes a fault here, in the single tick of that action: it stops the run that was under way.
             let Deed::Miss(missed @ 1..) = *deed else {
                 return Err(TestCaseError::fail(format!("{fault:?} by {deed:?}")));
             };
@@ -156,7 +156,7 @@ impl Model {
                     run.len()
                 );
             }
-            // Acknowledged when it stood; its counters stay until the next run begins.
+            // The fault was acknowledged at standstill; the counters remain until the next run begins.
             Some((run, _)) if count == run.len() && is_of(run) => {}
             _ => {
                 self.stopped = None;
@@ -179,8 +179,8 @@ impl Model {
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(300))]
 
-    /// Whatever happens: no panic, one answer a request, damage without effect, and never a sample that the core
-    /// would not have made, also while a missed tick stops the run.
+    /// No panic, one answer for each request, no effect of damaged frames, and every sample equal to that of the core,
+    /// also while a missed tick stops the run.
     #[test]
     fn any_order_of_anything_is_survived(
         clock in prop::sample::select(&[Clock::Free, Clock::Lockstep]),

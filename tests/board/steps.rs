@@ -1,4 +1,4 @@
-//! The steps of a run, and settings of the drives sent over the line.
+//! The steps of a run, and step settings sent over the line.
 
 use interp_core::{
     fault::FaultKind,
@@ -20,7 +20,7 @@ fn steps_of_x(steps: u32) -> StepConfig {
     config
 }
 
-/// The axes end where the last sample is, rounded to steps, in the steps that the host has set.
+/// The axes end at the last sample's position, rounded to the steps per millimetre that the host has set.
 #[test]
 fn the_axes_make_the_steps_of_the_run() {
     let mut desk = Desk::loaded(Clock::Lockstep, Report::Samples);
@@ -41,7 +41,8 @@ fn the_axes_make_the_steps_of_the_run() {
     }
 }
 
-/// 0.8 mm a period at 1000 steps a millimetre are 800: the run stops along its path, and the steps that it owes follow.
+/// 0.8 mm per period at 1000 steps per millimetre are 800 steps, more than a period holds: the run stops along its path, and the
+/// remaining steps are emitted in the following periods.
 #[test]
 fn too_many_steps_stop_the_run_along_its_path() {
     let mut desk = Desk::loaded(Clock::Lockstep, Report::Samples);
@@ -69,7 +70,7 @@ fn too_many_steps_stop_the_run_along_its_path() {
     assert!((steps * 1000 - nm).abs() <= 504, "{steps} steps at {nm} nm");
 }
 
-/// Settings that cannot be, and any settings under a run, are refused.
+/// Settings out of range are refused, and during a run all settings are.
 #[test]
 fn steps_are_checked_and_not_changed_under_a_run() {
     let mut desk = Desk::loaded(Clock::Lockstep, Report::Digests);

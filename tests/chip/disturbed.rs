@@ -4,7 +4,7 @@ use boards::{Board, SKR_PRO, STM32F405};
 
 use super::emulated::{CYCLES_US, Emulated, Ended, Job, PERIOD, RESET_CYCLES_US, REST_US};
 
-/// A run in which something happens a third of a second after the first pulse; what the host says, and then the board's status.
+/// A run with an event a third of a second after the first pulse. Returns the output of `run`, and of `operate status` after it.
 fn disturbed(board: &'static Board, what: &str) -> (Ended, String, String) {
     let emulated = Emulated::recorded(board, &["--seed", "6", "--at", &format!("motion+333.3:{what}")]);
     let (done, said) = emulated.run(&Job::slow_square().path, "0,0,60");
@@ -12,7 +12,7 @@ fn disturbed(board: &'static Board, what: &str) -> (Ended, String, String) {
     let status = emulated.status();
     let ended = emulated.end();
     ended.no_complaint();
-    // A processor that has stopped hears nothing.
+    // A processor that has stopped receives nothing.
     if ended.number("resets") == 0 {
         ended.no_byte_lost();
     }
@@ -22,7 +22,7 @@ fn disturbed(board: &'static Board, what: &str) -> (Ended, String, String) {
 /// Emergency stop and drive fault switch the drives off: immediately, and after three ticks. A limit switch stops the run along its path.
 #[test]
 fn each_safety_input_stops_the_run() {
-    // From the edge on: the next tick and the time it takes; two more for a third look.
+    // Measured from the edge: the next tick and its execution time; for the drive fault two more ticks, because three in a row must see it.
     let at_once = PERIOD + 100 * CYCLES_US;
     let (board, every) = (
         &STM32F405,
@@ -74,7 +74,7 @@ fn each_safety_input_stops_the_run() {
     }
 }
 
-/// The watchdog resets a chip whose processor hangs, 8 to 23 ms after it was last fed, at any LSI frequency; pulses stop earlier.
+/// If the processor hangs, the watchdog resets the chip 8 to 23 ms after it was last reloaded, at any LSI frequency; pulses stop earlier.
 #[test]
 fn a_processor_that_hangs_is_reset() {
     for (lsi_hz, us) in [("47000", 8_000), ("32000", 11_750), ("17000", 22_118)] {
@@ -100,7 +100,7 @@ fn a_processor_that_hangs_is_reset() {
     }
 }
 
-/// A hard fault: outputs at rest first, then the log, then the watchdog.
+/// A hard fault: the outputs go to rest first, then the fault is logged, then the watchdog resets the chip.
 #[test]
 fn a_hard_fault_puts_the_outputs_to_rest() {
     let (ended, _, status) = disturbed(&SKR_PRO, "fault");

@@ -8,16 +8,16 @@ use std::time::{Duration, Instant};
 use boards::{Axis, Board, Level, Line, Role, SKR_PRO, STM32F405};
 use serde_json::Value;
 
-/// The core's clock in a run, and right after a reset, cycles of a microsecond.
+/// Cycles of the core clock per microsecond: during a run, and directly after a reset.
 pub(super) const CYCLES_US: u64 = 168;
 pub(super) const RESET_CYCLES_US: u64 = 16;
-/// Cycles of a period, and of a byte on the line at 921 600 baud.
+/// Cycles of a sampling period, and of a byte on the line at 921 600 baud.
 pub(super) const PERIOD: u64 = 1_000 * CYCLES_US;
 const BYTE: u64 = 1_820;
-/// Time after a reset by which every output has to be at rest.
+/// Time after a reset within which every output must be at rest, us.
 pub(super) const REST_US: u64 = 100;
 
-/// Built once: the emulator, the tool, an image for each board.
+/// The programs that the tests run, built once together with an image for each board.
 struct Built {
     chip: PathBuf,
     sim: PathBuf,
@@ -53,7 +53,7 @@ fn built() -> &'static Built {
     })
 }
 
-/// The tool with these arguments; standard input is empty. Returns whether it succeeded, and its output.
+/// Runs the tool with these arguments and an empty standard input. Returns whether it succeeded, and its output.
 pub(super) fn sim<S: AsRef<std::ffi::OsStr>>(arguments: impl IntoIterator<Item = S>) -> (bool, String) {
     let output = Command::new(&built().sim)
         .args(arguments)
@@ -68,21 +68,21 @@ pub(super) fn sim<S: AsRef<std::ffi::OsStr>>(arguments: impl IntoIterator<Item =
     )
 }
 
-/// A board's image at work, as fast as it goes.
+/// A board's image in execution, as fast as the host allows.
 pub(super) struct Emulated {
     board: &'static Board,
     child: Child,
     folder: tempfile::TempDir,
 }
 
-/// Its remaining output.
+/// The output of an execution that has ended.
 pub(super) struct Ended {
     pub(super) board: &'static Board,
     pub(super) report: Value,
     pub(super) edges: Vec<Edge>,
 }
 
-/// A change of a port's outputs.
+/// A change of a port's output levels or directions.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Edge {
     pub(super) at: u64,
@@ -128,7 +128,7 @@ impl Emulated {
         emulated
     }
 
-    /// With a record of every change of the outputs.
+    /// Starts an execution that records every change of the outputs.
     pub(super) fn recorded(board: &'static Board, arguments: &[&str]) -> Self {
         Self::begin(board, arguments, true)
     }
@@ -137,7 +137,7 @@ impl Emulated {
         self.folder.path().join("line").to_str().unwrap().to_owned()
     }
 
-    /// `cargo sim run` through its line.
+    /// Runs a job by `cargo sim run` over the emulated line.
     pub(super) fn run(&self, job: &Path, home: &str) -> (bool, String) {
         sim([
             "run",
@@ -153,15 +153,15 @@ impl Emulated {
         sim(["operate", "--port", &self.port(), "status"]).1
     }
 
-    /// Ends it.
+    /// Ends the execution.
     pub(super) fn end(mut self) -> Ended {
         drop(self.child.stdin.take());
         self.wait()
     }
 
-    /// Waits for its end.
+    /// Waits until the execution ends.
     pub(super) fn wait(mut self) -> Ended {
-        // `Child::wait` would close its input, which is its end.
+        // `Child::wait` would close the standard input, which ends the execution.
         let status = loop {
             match self.child.try_wait().unwrap() {
                 Some(status) => break status,
@@ -203,7 +203,7 @@ impl Edge {
     }
 }
 
-/// The changes of a line: cycle, level; None while it is no output.
+/// The level changes of a line: cycle, level. The level is None while the pin is not an output.
 fn changes(edges: &[Edge], line: &Line) -> Vec<(u64, Option<bool>)> {
     let bit = 1 << line.pin.number;
     let mut changes = vec![(0, None)];
@@ -227,7 +227,7 @@ impl Ended {
             .unwrap_or_else(|| panic!("{key}: {}", self.report[key]))
     }
 
-    /// Cycle of an event.
+    /// Cycle of the first event of this name.
     pub(super) fn event(&self, what: &str) -> u64 {
         let event = self.report["events"]
             .as_array()
@@ -249,7 +249,7 @@ impl Ended {
         );
     }
 
-    /// No byte of the host was lost, and none was near it.
+    /// No byte of the host was lost, and each was read within half of a byte's time.
     pub(super) fn no_byte_lost(&self) {
         assert_eq!(self.number("bytes_lost"), 0, "{:#}", self.report["notes"]);
         let wait = self.number("byte_wait_max_cycles");
@@ -260,7 +260,7 @@ impl Ended {
         changes(&self.edges, line)
     }
 
-    /// When the last of the outputs came to rest for good after a cycle; each had to be an output at its inactive level, or to be let go.
+    /// Last level change of any output between two cycles. At the end, each pin must be an output at its inactive level.
     pub(super) fn rest_after(&self, from: u64, until: u64) -> u64 {
         let mut last = from;
         for line in self.board.lines.iter().filter(|line| is_output(line)) {
@@ -279,7 +279,7 @@ impl Ended {
         last
     }
 
-    /// The last rise of a step pin before a cycle.
+    /// Cycle of the last rising edge of a step pin before a cycle.
     pub(super) fn last_pulse(&self, until: u64) -> u64 {
         let rises = Axis::ALL.map(|axis| {
             let changes = self.changes(&self.board.axis(axis).step);
@@ -292,7 +292,7 @@ impl Ended {
         rises.into_iter().flatten().max().expect("there were pulses")
     }
 
-    /// When the enable lines went to this state, all of them, after a cycle.
+    /// Cycle at which the last of the enable lines reached this state after a cycle; None if one did not.
     pub(super) fn drives(&self, on: bool, from: u64) -> Option<u64> {
         let mut last = 0;
         for axis in Axis::ALL {
@@ -308,7 +308,7 @@ impl Ended {
     }
 }
 
-/// A job file in a folder of its own.
+/// A job file in a temporary folder.
 pub(super) struct Job {
     _folder: tempfile::TempDir,
     pub(super) path: PathBuf,
@@ -325,7 +325,7 @@ impl Job {
         }
     }
 
-    /// A sample job that no host can be gone for: time here runs faster than the host's.
+    /// A sample job without a hold on a heartbeat timeout, because emulated time runs faster than the host's.
     pub(super) fn sample(name: &str, changes: &[(&str, &str)]) -> Self {
         let mut text = std::fs::read_to_string(workspace().join("jobs").join(name))
             .unwrap()
@@ -337,7 +337,7 @@ impl Job {
         Self::new(&text)
     }
 
-    /// A level square in the air, as in the guide, with these lines for [machine].
+    /// A level square as in the bring-up guide, with these lines added to `[machine]`.
     pub(super) fn square(mm: f64, feed_mm_min: f64, machine: &str) -> Self {
         Self::new(&format!(
             "[surface]\nkind = \"ruled\"\nrail0_mm = [[0, 0, {mm}, 0], [0, 0, 0, 0], [0, 0, 0, 50]]\n\

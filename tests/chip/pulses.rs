@@ -4,7 +4,7 @@ use boards::{Axis, Level, SKR_PRO, STM32F405};
 
 use super::emulated::{CYCLES_US, Emulated, Ended, Job, PERIOD, sim};
 
-/// A pulse: its rise, its fall, and the level of the direction pin meanwhile.
+/// A step pulse: cycles of its edges, and the level of the direction pin during it.
 struct Pulse {
     rise: u64,
     fall: u64,
@@ -57,8 +57,9 @@ fn samples(job: &Job) -> Vec<[i64; 3]> {
     lines.map(row).collect()
 }
 
-/// Every pulse and direction edge of a run at up to 500 kHz against the samples: after each period, the steps taken are those of the sample; the
-/// last ones to the step. Towards plus, a direction pin has the level that the board's table names, or the other where the job inverts it.
+/// Every pulse and direction edge of a run at up to 500 kHz against the samples: after each period the position in steps is that of the sample,
+/// within one step, and within half a step at the end. For motion towards plus, a direction pin has the level of the board's table, or the
+/// opposite one where the job inverts it.
 #[test]
 fn pulses_are_the_samples_up_to_500_khz() {
     const STEPS_MM: [i64; 3] = [5000, 400, 640];
@@ -118,7 +119,8 @@ fn pulses_are_the_samples_up_to_500_khz() {
             }
         }
         assert_eq!(shortest, 2 * CYCLES_US, "500 kHz are reached");
-        // A sample's steps go out in a period that is so many after the first pulse's; found by the first axis, held by all.
+        // A sample's steps are emitted a constant number of periods after the sample. The shift with the least error is chosen, and it
+        // must hold for all axes.
         let plus = |axis: Axis| (board.axis(axis).direction.active == Level::High) != INVERTED[axis as usize];
         // Position after each pulse.
         let positions = Axis::ALL.map(|axis| {

@@ -1,4 +1,4 @@
-//! Messages of any content, for properties.
+//! Messages of random content, for property tests.
 
 use interp_core::{
     job::{AxisLimits, Header, Pattern, Spacing, SurfaceKind, ToolSide},

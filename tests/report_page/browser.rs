@@ -1,4 +1,4 @@
-//! A headless Chromium, driven over its DevTools protocol on two pipes: no port, no other program between.
+//! A headless Chromium, controlled by the DevTools protocol over two pipes, without a port or a driver program.
 #![allow(clippy::unwrap_used, reason = "a test may fail by panic")]
 
 use std::io::{BufRead, BufReader, Write};
@@ -10,14 +10,14 @@ use std::time::{Duration, Instant};
 
 use serde_json::{Value, json};
 
-/// Names under which systems install it, as in `scripts/setup.sh`.
+/// Names of the program on common systems, as in `scripts/setup.sh`.
 const NAMES: [&str; 4] = [
     "chromium",
     "google-chrome",
     "google-chrome-stable",
     "chromium-browser",
 ];
-/// The longest that an answer may take: the first drawing without a graphics card takes seconds, on a busy machine more.
+/// Timeout of an answer: the first drawing in software takes seconds, and more on a busy machine.
 const PATIENCE: Duration = Duration::from_secs(600);
 
 /// The browser's program.
@@ -37,7 +37,7 @@ fn program() -> PathBuf {
         )
 }
 
-/// One browser at a time: two would share the cores of one.
+/// Permits one browser at a time, because two would compete for the processor.
 static ONE: Mutex<()> = Mutex::new(());
 
 /// A browser with one page.
@@ -47,7 +47,7 @@ pub(crate) struct Browser {
     from: Receiver<Value>,
     session: Option<String>,
     last: u64,
-    /// Everything that the page did wrong or asked for, in words.
+    /// Errors, warnings and exceptions of the page.
     pub(crate) complaints: Vec<String>,
     /// Addresses that were requested.
     pub(crate) requests: Vec<String>,
@@ -56,12 +56,12 @@ pub(crate) struct Browser {
 }
 
 impl Browser {
-    /// Starts one, with a page of this size in pixels; `flags` besides the usual.
+    /// Starts a browser with a page of this size in pixels, and with `flags` in addition to the common ones.
     pub(crate) fn start(size: [u32; 2], theme: &str, flags: &[&str]) -> Self {
         let one = ONE.lock().unwrap_or_else(PoisonError::into_inner);
         let profile = tempfile::tempdir().unwrap();
         let log = std::fs::File::create(profile.path().join("log")).unwrap();
-        // The protocol is on descriptors 3 and 4; the shell gives them our pipes.
+        // The protocol uses descriptors 3 and 4; the shell connects them to the pipes.
         let mut child = Command::new("sh")
             .args(["-c", "exec \"$0\" \"$@\" 3<&0 4>&1 </dev/null >/dev/null"])
             .arg(program())
@@ -71,7 +71,7 @@ impl Browser {
                 "--no-first-run",
                 "--hide-scrollbars",
             ])
-            // The only page is ours and the sandbox needs rights that a container does not give.
+            // The browser opens only the report, and a container does not grant the rights that the sandbox needs.
             .args(["--no-sandbox", "--disable-dev-shm-usage"])
             .args(["--disable-background-networking", "--disable-component-update"])
             .arg(format!(
@@ -129,12 +129,12 @@ impl Browser {
         self.call("Emulation.setEmulatedMedia", features);
     }
 
-    /// What the browser wrote, for a failure's message.
+    /// The browser's standard error, for failure messages.
     fn log(&self) -> String {
         std::fs::read_to_string(self.profile.path().join("log")).unwrap_or_default()
     }
 
-    /// A call of the protocol, and its result.
+    /// Calls a method of the protocol and returns its result.
     pub(crate) fn call(&mut self, method: &str, parameters: Value) -> Value {
         self.last += 1;
         let mut message = json!({ "id": self.last, "method": method, "params": parameters });
@@ -159,7 +159,7 @@ impl Browser {
         }
     }
 
-    /// Keeps what an event says against the page.
+    /// Records complaints and requests from an event.
     fn hear(&mut self, event: &Value) {
         let parameters = &event["params"];
         match event["method"].as_str() {
@@ -181,12 +181,12 @@ impl Browser {
         }
     }
 
-    /// Opens a file, and waits until the report's scripts have done their work.
+    /// Opens a file, and waits until the report's scripts are ready.
     pub(crate) fn open(&mut self, page: &Path) {
         let url = format!("file://{}", page.display());
         self.call("Page.navigate", json!({ "url": url }));
         let ready = "new Promise((done) => { const look = () => window.isofeedReport?.ready ? done(true) : setTimeout(look, 20); look(); })";
-        // An exception while loading would let this wait in vain.
+        // After an exception during loading, the page would never become ready.
         let end = Instant::now() + PATIENCE;
         while self.value("Boolean(window.isofeedReport?.ready)") != json!(true) {
             assert!(self.complaints.is_empty(), "{:?}", self.complaints);
@@ -196,7 +196,7 @@ impl Browser {
         self.value(ready);
     }
 
-    /// The value of an expression, or of what it promises.
+    /// Evaluates an expression; a promise is awaited.
     pub(crate) fn value(&mut self, expression: &str) -> Value {
         let parameters = json!({ "expression": expression, "awaitPromise": true, "returnByValue": true });
         let answer = self.call("Runtime.evaluate", parameters);
@@ -204,13 +204,13 @@ impl Browser {
         answer["result"]["value"].clone()
     }
 
-    /// A number.
+    /// Evaluates an expression to a number.
     pub(crate) fn number(&mut self, expression: &str) -> f64 {
         let value = self.value(expression);
         value.as_f64().unwrap_or_else(|| panic!("{expression}: {value}"))
     }
 
-    /// A text.
+    /// Evaluates an expression to a string.
     pub(crate) fn text(&mut self, expression: &str) -> String {
         let value = self.value(expression);
         value
@@ -219,7 +219,7 @@ impl Browser {
             .to_owned()
     }
 
-    /// Moves the mouse from a place of an element to another, both as shares of its size, with the left button pressed.
+    /// Drags with the left button between two points of an element, each given as fractions of its size.
     pub(crate) fn drag(&mut self, element: &str, from: [f64; 2], to: [f64; 2]) {
         let [from, to] = [self.place(element, from), self.place(element, to)];
         self.mouse("mouseMoved", from, 0);
@@ -235,13 +235,13 @@ impl Browser {
         self.mouse("mouseReleased", to, 0);
     }
 
-    /// Moves the mouse onto a place of an element.
+    /// Moves the mouse to a point of an element, given as fractions of its size.
     pub(crate) fn point(&mut self, element: &str, at: [f64; 2]) {
         let at = self.place(element, at);
         self.mouse("mouseMoved", at, 0);
     }
 
-    /// Turns the wheel over the middle of an element.
+    /// Turns the mouse wheel over the middle of an element.
     pub(crate) fn wheel(&mut self, element: &str, by: f64) {
         let [x, y] = self.place(element, [0.5, 0.5]);
         let event = json!({ "type": "mouseWheel", "x": x, "y": y, "deltaX": 0, "deltaY": by });
@@ -265,7 +265,7 @@ impl Browser {
         self.call("Input.dispatchMouseEvent", event);
     }
 
-    /// A place of an element in the window, scrolled into sight.
+    /// Scrolls an element into view. Returns the window coordinates of a point of it, given as fractions of its size.
     fn place(&mut self, element: &str, share: [f64; 2]) -> [f64; 2] {
         let element = format!("document.querySelector({})", json!(element));
         let value = self.value(&format!(
@@ -277,15 +277,15 @@ impl Browser {
     }
 }
 
-/// Whether an entry of the log is about the machine and not the page: drawing without a graphics card is slow, which
-/// Chromium remarks when pixels are read back.
+/// Whether a log entry concerns the machine and not the page: when pixels are read back, Chromium warns that drawing in software is
+/// slow.
 fn is_of_the_machine(entry: &Value) -> bool {
     entry["source"] == "rendering" && entry["level"] != "error"
 }
 
 impl Drop for Browser {
     fn drop(&mut self) {
-        // It ends with its pipe; a while later at the latest.
+        // The browser ends when its pipe closes; after 5 s it is killed.
         self.to = None;
         for _ in 0..100 {
             if matches!(self.child.try_wait(), Ok(Some(_))) {

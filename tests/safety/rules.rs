@@ -1,4 +1,4 @@
-//! Any order of inputs, orders, requests and late ticks, against the rules in their simplest form.
+//! Random sequences of inputs, orders, requests and late ticks, against a reference model of the safety rules.
 
 use controller::{
     machine::{Event, Instruction},
@@ -12,15 +12,15 @@ use protocol::message::{Clock, Configuration, FaultReport, InputLines, LinkTimeo
 
 use super::WORDS;
 
-/// Events at the real-time half.
+/// An event at the real-time half.
 #[derive(Clone, Copy, Debug)]
 enum Deed {
-    /// These inputs for a number of ticks.
+    /// Raw inputs, and the number of ticks for which they are set.
     Inputs(u16, u8),
     Order(Order),
     Command(Instruction),
     Heard,
-    /// A tick with a number of missed ticks and of cycles.
+    /// A tick with the given numbers of missed ticks and of cycles.
     Late(u32, u32),
 }
 
@@ -67,7 +67,7 @@ fn any_deed() -> impl Strategy<Value = Deed> {
     ]
 }
 
-/// Reference model of the rules: a count for each input.
+/// Reference model of the rules, with a debounce counter for each input.
 #[derive(Default)]
 struct Rules {
     counts: [u32; 16],
@@ -154,7 +154,7 @@ impl Bench {
         if self.rules.steady & 0x7e != 0 && after.state.is_under_way() {
             prop_assert_eq!(after.state, State::Stopping);
         }
-        // What was not under way ends with a word of it.
+        // The end of a run is reported exactly once.
         if before.state.is_under_way() && !after.state.is_under_way() {
             let told = self
                 .events
@@ -216,8 +216,8 @@ impl Bench {
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(600))]
 
-    /// The latch never clears while it is asserted, drives are never on while it is latched, no run starts that is not safe, none goes on
-    /// without drives, no late tick feeds the watchdog.
+    /// The latch never clears while its input is asserted, the drives are never on while an input is latched, a run starts only if it is safe
+    /// and continues only with the drives on, and a late tick does not reload the watchdog.
     #[test]
     fn any_order_of_anything_keeps_the_rules(deeds in prop::collection::vec(any_deed(), 0..80), begun: bool) {
         let mut bench = Bench::new();
@@ -237,7 +237,7 @@ proptest! {
                 }
                 Deed::Order(order) => bench.order(order)?,
                 Deed::Command(command) => {
-                    // A clock is not changed under a run: the link sees to that.
+                    // The link refuses a change of the clock during a run, so it is not tried here.
                     let under_way = bench.half.status().state.is_under_way();
                     if !(under_way && matches!(command, Instruction::Clock(_))) {
                         bench.half.obey(command, &mut bench.events);

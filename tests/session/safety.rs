@@ -16,7 +16,7 @@ fn because(kind: FaultKind, value: f32) -> Reason {
     }
 }
 
-/// A start is refused with the gravest reason, and none of these refuses a hold.
+/// A start is refused with the most severe reason; none of the reasons refuses a hold.
 #[test]
 fn a_start_that_is_not_safe_is_refused_with_the_reason() {
     let lenient = Configuration {
@@ -66,7 +66,7 @@ fn a_start_that_is_not_safe_is_refused_with_the_reason() {
     line.accepted(&Request::Start);
 }
 
-/// Requests for drives and home reach the machine immediately, and its refusals are answered to the host.
+/// Requests for drives and home reach the machine immediately, and the host gets the reason of a refusal.
 #[test]
 fn orders_go_to_the_machine_and_its_reasons_back() {
     let configuration = Configuration {

@@ -1,4 +1,4 @@
-//! The golden table `golden/points.txt`: six jobs computed elsewhere with 40 digits. Its header says what it holds.
+//! The golden table `golden/points.txt`: six jobs computed independently with 40 digits. The header of the file describes its format.
 
 use std::str::FromStr;
 
@@ -27,13 +27,13 @@ pub struct Case {
     pub pass_count: usize,
     /// Length of all passes, mm.
     pub cc_length_mm: f64,
-    /// Places on the surface.
+    /// Points on the surface.
     pub points: Vec<Point>,
     /// Side parameter and least interval of each pass.
     pub passes: Vec<[f64; 2]>,
 }
 
-/// Golden values at a place. Derivatives by the path (`a`) and the side parameter (`b`).
+/// Golden values at a point. Derivatives by the path parameter (`a`) and the side parameter (`b`).
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Point {
     /// Parameter u.

@@ -1,4 +1,4 @@
-//! What the tests across crates share: a host's end of the line, a machine that only records its calls, and a
+//! Shared parts of the tests across crates: the host's end of the line, a mock machine that records its calls, and a
 //! small job.
 #![allow(clippy::unwrap_used, reason = "a test may fail by panic")]
 
@@ -46,7 +46,7 @@ impl Host {
         frame(self.number, request)
     }
 
-    /// The messages in these bytes from the board; panics on what is none.
+    /// Decodes the board's messages in these bytes; panics if one is invalid.
     pub fn read(&mut self, bytes: &[u8]) -> Vec<Reply> {
         let mut replies = Vec::new();
         for byte in bytes {
@@ -64,17 +64,17 @@ pub const HELLO: Request = Request::Hello {
     session: 1,
 };
 
-/// The requests after which a board without anything asserted may start.
+/// The requests after which a board with no input asserted may start a run.
 pub const MAKE_READY: [Request; 2] = [Request::Drives { on: true }, Request::SetHome { home_nm: [0; 3] }];
 
-/// The safety state after them.
+/// The safety status after [`MAKE_READY`].
 pub const SAFE: SafetyStatus = SafetyStatus {
     drives_on: true,
     homed: true,
     ..SafetyStatus::DEFAULT
 };
 
-/// A `Nak` without a number: what a damaged frame is answered with.
+/// Whether a reply is the answer to a damaged frame, a `Nak` without a number.
 pub fn is_bad_frame(reply: &Reply) -> bool {
     use protocol::message::Reason;
     matches!(
@@ -111,7 +111,7 @@ pub fn dome() -> (Header, Vec<i32>) {
     scaled_dome(1.0)
 }
 
-/// The same, so many times as large; not so the ball and the scallops.
+/// The dome scaled by a factor; ball radius and scallop height limit are not scaled.
 #[must_use]
 pub fn scaled_dome(scale: f64) -> (Header, Vec<i32>) {
     let mut c = [[[0.0; 4]; 4]; 3];
@@ -136,10 +136,10 @@ pub fn scaled_dome(scale: f64) -> (Header, Vec<i32>) {
     (header, words)
 }
 
-/// What a [`Mock`] was told.
+/// A call of a [`Mock`].
 #[derive(Clone, Debug, PartialEq)]
 pub enum Call {
-    /// `load_begin` with so many words.
+    /// `load_begin` with this number of words.
     Begin(u32),
     /// `load_words`.
     Words(u32, Vec<i32>),
@@ -157,22 +157,22 @@ pub enum Call {
     Simulate(InputLines),
 }
 
-/// A machine that does nothing but write down what it is told.
+/// A machine that only records its calls.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Mock {
-    /// The status that it shows.
+    /// The status that it reports.
     pub status: Status,
-    /// What it was told.
+    /// The recorded calls.
     pub calls: Vec<Call>,
-    /// Its queue is full.
+    /// Whether its queue is full.
     pub busy: bool,
-    /// Records that its job has.
+    /// Number of records of its job.
     pub records: u32,
-    /// The record that it finds bad.
+    /// The record that its check refuses.
     pub bad: Option<u32>,
-    /// Why it does not do what it is ordered.
+    /// The reason for which it refuses orders.
     pub unsafe_because: Option<Reason>,
-    /// It has no pins for its inputs.
+    /// Whether its inputs are simulated, because it has no pins.
     pub simulated: bool,
 }
 
@@ -247,7 +247,7 @@ impl Machine for Mock {
         self.simulated
     }
 
-    /// Commands are taken up at once.
+    /// Always false, because instructions are executed immediately.
     fn instructions_wait(&mut self) -> bool {
         false
     }
