@@ -160,6 +160,31 @@ fn unit_mm(shift: u8) -> f64 {
     1.0 / (NM_PER_MM * f64::from(1_u32 << shift))
 }
 
+/// The valid record with the finest unit, 2^-shift nm. `quantised` returns None where a coefficient overflows.
+///
+/// # Errors
+/// [`EncodeError::NotAPole`] if a record would be valid without collapsed boundaries, else `otherwise`.
+fn finest<R>(
+    quantised: impl Fn(u8) -> Option<R>,
+    is_valid: impl Fn(&R, Edges) -> bool,
+    edges: Edges,
+    otherwise: EncodeError,
+) -> Result<R, EncodeError> {
+    let mut failure = otherwise;
+    for shift in (0..=SHIFT_MAX).rev() {
+        let Some(record) = quantised(shift) else {
+            continue;
+        };
+        if is_valid(&record, edges) {
+            return Ok(record);
+        }
+        if is_valid(&record, Edges::default()) {
+            failure = EncodeError::NotAPole;
+        }
+    }
+    Err(failure)
+}
+
 /// A polynomial patch from coefficients in mm of parameters from -1/2 to 1/2, with the finest unit 2^-shift nm that does not overflow.
 ///
 /// # Errors
@@ -171,33 +196,18 @@ pub fn polynomial(c: &[Bicubic; 3], edges: Edges) -> Result<PolynomialRecord, En
     for ([[c00, ..], ..], nm) in local.iter_mut().zip(origin_nm) {
         *c00 -= f64::from(nm) / NM_PER_MM;
     }
-    let mut failure = EncodeError::TooLarge;
-    for shift in (0..=SHIFT_MAX).rev() {
-        let Some(coefficients) = quantise_patch(&local, [unit_mm(shift); 3]) else {
-            continue;
-        };
-        let record = PolynomialRecord {
+    let quantised = |shift| {
+        Some(PolynomialRecord {
             origin_nm,
             shift,
             edges,
-            coefficients,
-        };
-        if PolynomialRecord::check(&record.to_words()).is_ok() {
-            return Ok(record);
-        }
-        if PolynomialRecord::check(
-            &PolynomialRecord {
-                edges: Edges::default(),
-                ..record
-            }
-            .to_words(),
-        )
-        .is_ok()
-        {
-            failure = EncodeError::NotAPole;
-        }
-    }
-    Err(failure)
+            coefficients: quantise_patch(&local, [unit_mm(shift); 3])?,
+        })
+    };
+    let is_valid = |record: &PolynomialRecord, edges| {
+        PolynomialRecord::check(&PolynomialRecord { edges, ..*record }.to_words()).is_ok()
+    };
+    finest(quantised, is_valid, edges, EncodeError::TooLarge)
 }
 
 /// A rational patch from homogeneous coefficients (w x, w y, w z in mm, then w) of parameters from -1/2 to 1/2.
@@ -240,36 +250,21 @@ pub fn rational(c: &[Bicubic; 4], edges: Edges) -> Result<RationalRecord, Encode
             *value = *value * scale - origin_mm * w;
         }
     }
-    // The weights' Bernstein coefficients may leave the range although their values do not.
-    let mut failure = EncodeError::Weights;
-    for shift in (0..=SHIFT_MAX).rev() {
+    let quantised = |shift| {
         let unit = unit_mm(shift);
         let units = [unit, unit, unit, 1.0 / 1_073_741_824.0];
-        let Some(coefficients) = quantise_patch(&local, units) else {
-            continue;
-        };
-        let record = RationalRecord {
+        Some(RationalRecord {
             origin_nm,
             shift,
             edges,
-            coefficients,
-        };
-        if RationalRecord::check(&record.to_words()).is_ok() {
-            return Ok(record);
-        }
-        if RationalRecord::check(
-            &RationalRecord {
-                edges: Edges::default(),
-                ..record
-            }
-            .to_words(),
-        )
-        .is_ok()
-        {
-            failure = EncodeError::NotAPole;
-        }
-    }
-    Err(failure)
+            coefficients: quantise_patch(&local, units)?,
+        })
+    };
+    let is_valid = |record: &RationalRecord, edges| {
+        RationalRecord::check(&RationalRecord { edges, ..*record }.to_words()).is_ok()
+    };
+    // The weights' Bernstein coefficients may leave the range although their values do not.
+    finest(quantised, is_valid, edges, EncodeError::Weights)
 }
 
 fn evaluate(c: &Bicubic, u: f64, v: f64) -> f64 {
