@@ -21,6 +21,7 @@
 
 mod arc;
 mod contact;
+mod derivatives;
 mod nurbs;
 mod offset;
 mod report;
@@ -32,8 +33,9 @@ pub mod vector;
 mod verify;
 
 pub use contact::{Contact, Oracle, OracleError};
+pub use derivatives::Derivatives;
 pub use offset::OffsetPoint;
 pub use report::{AccuracyBounds, AccuracyReport, ErrorStatistics, SampleLocation};
 pub use schedule::ScheduledPass;
-pub use surface::{Derivatives, Surface};
+pub use surface::Surface;
 pub use verify::{PassSample, SampleCheck, Verifier};
