@@ -20,7 +20,7 @@ use crate::ir_boundary::placed;
 use crate::ir_geometry::{solved_curve, solved_surface};
 use cad::Model;
 use cad::{Boundary, CadError, Curve, Face, Placement, Surface};
-use oracle::vector::Vector;
+use glam::DVec3;
 
 /// Limits of a file, far above those of the largest part tested.
 const LIMITS: ResourceLimits = ResourceLimits {
@@ -123,16 +123,16 @@ fn shortened(text: &str) -> String {
     format!("{start} ...")
 }
 
-pub(crate) fn point(p: Point3) -> Vector {
-    [p.x, p.y, p.z]
+pub(crate) fn point(p: Point3) -> DVec3 {
+    DVec3::new(p.x, p.y, p.z)
 }
 
-pub(crate) fn vector(p: &Vector3) -> Vector {
-    [p.x, p.y, p.z]
+pub(crate) fn vector(p: &Vector3) -> DVec3 {
+    DVec3::new(p.x, p.y, p.z)
 }
 
 /// Axes of a frame: reference direction, second direction, axis.
-pub(crate) fn frame(frame: &OrthonormalFrame3) -> [Vector; 3] {
+pub(crate) fn frame(frame: &OrthonormalFrame3) -> [DVec3; 3] {
     [frame.reference(), &frame.binormal(), frame.axis()].map(|unit| vector(unit.as_raw()))
 }
 
@@ -182,7 +182,7 @@ pub(crate) struct Translation<'m> {
     pub(crate) loops: HashMap<&'m str, usize>,
     pub(crate) coedges: HashMap<&'m str, usize>,
     pub(crate) edges: HashMap<&'m str, usize>,
-    pub(crate) vertices: HashMap<&'m str, Vector>,
+    pub(crate) vertices: HashMap<&'m str, DVec3>,
 }
 
 impl<'m> Translation<'m> {
@@ -197,7 +197,7 @@ impl<'m> Translation<'m> {
                     .collect()
             };
         }
-        let points: HashMap<&str, Vector> = source
+        let points: HashMap<&str, DVec3> = source
             .points
             .iter()
             .map(|item| (item.id.as_str(), point(item.position().get())))
