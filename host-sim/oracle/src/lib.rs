@@ -29,7 +29,6 @@ mod schedule;
 mod surface;
 #[cfg(test)]
 mod tests;
-pub mod vector;
 mod verify;
 
 pub use contact::{Contact, Oracle, OracleError};

@@ -33,7 +33,6 @@ pub mod svg;
 #[cfg(test)]
 mod tests;
 mod track;
-mod vector;
 mod view;
 
 use std::io;
