@@ -2,9 +2,9 @@
 
 use std::fmt::Write;
 
-use super::picture::PictureTexts;
 use super::scene::Ball;
 use super::svg::{escape, tenths};
+use super::texts::PictureTexts;
 use super::view::View;
 use glam::{DVec2, DVec3};
 

@@ -2,9 +2,9 @@
 
 use serde_json::{Value, json};
 
+use super::content::Content;
 use super::embed::{Scale, words};
 use super::measure::{self, Gap};
-use super::page::Content;
 use super::record::PassInterval;
 use glam::DVec3;
 use job::Along;

@@ -7,6 +7,7 @@ use super::mesh::{Mesh, Quad};
 use super::record::{Place, Record};
 use super::scene::{Layer, Scene};
 use super::svg::{polyline, simplified, tenths};
+use super::texts::PictureTexts;
 use super::view::Frame;
 use glam::DVec3;
 
@@ -34,19 +35,6 @@ const ARROWS: usize = 7;
 const ARROW_PLACES: [f64; 4] = [0.72, 0.25, 0.86, 0.5];
 /// Number of normals drawn between the highlighted pass and its CL path.
 const COMB: usize = 36;
-
-/// Texts of the picture.
-#[derive(Clone, Debug)]
-pub(super) struct PictureTexts {
-    pub(super) title: String,
-    pub(super) subtitle: String,
-    /// Legend of the thin lines: "cutter contact, 55 of 164 passes".
-    pub(super) passes: String,
-    /// Legend of the ball: "ball, radius 6 mm".
-    pub(super) ball: String,
-    /// Alternative text.
-    pub(super) description: String,
-}
 
 /// The picture and its view direction.
 pub(super) struct Picture {
