@@ -2,7 +2,7 @@
 
 use cadmpeg_ir::topology::{Coedge, Edge as SourceEdge, LoopBoundary, Sense};
 
-use crate::ir::{Translation, entity};
+use crate::ir_index::{Translation, entity};
 use cad::{Boundary, Curve, Edge, Placement};
 use glam::DVec3;
 

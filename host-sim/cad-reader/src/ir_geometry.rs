@@ -2,14 +2,37 @@
 
 use cadmpeg_ir::geometry::nurbs::{NurbsCurve, NurbsPoleGrid, NurbsPoles3, NurbsSurface, WeightedPole3};
 use cadmpeg_ir::geometry::{SolvedCurveGeometry, SolvedSurfaceGeometry};
+use cadmpeg_ir::math::{Point3, Vector3};
+use cadmpeg_ir::transform::Transform;
+use cadmpeg_ir::units::OrthonormalFrame3;
 
-use crate::ir::{SURFACE_DEPTH_MAX, frame, placement, point, vector};
 use cad::{Axis, DEGREE_MAX, Pole, SplineCurve, SplineSurface};
-use cad::{Curve, Surface};
+use cad::{Curve, Placement, Surface};
 use glam::DVec3;
 
+/// Nesting depth of derived surfaces (offsets of offsets).
+pub(crate) const SURFACE_DEPTH_MAX: usize = 8;
 /// Largest coordinate, mm: 1 km.
 const FAR_MM: f64 = 1e6;
+
+pub(crate) fn point(p: Point3) -> DVec3 {
+    DVec3::new(p.x, p.y, p.z)
+}
+
+pub(crate) fn vector(p: &Vector3) -> DVec3 {
+    DVec3::new(p.x, p.y, p.z)
+}
+
+/// Axes of a frame: reference direction, second direction, axis.
+fn frame(frame: &OrthonormalFrame3) -> [DVec3; 3] {
+    [frame.reference(), &frame.binormal(), frame.axis()].map(|unit| vector(unit.as_raw()))
+}
+
+pub(crate) fn placement(transform: &Transform) -> Placement {
+    Placement {
+        rows: transform.affine_rows(),
+    }
+}
 
 pub(crate) fn solved_surface(solved: &SolvedSurfaceGeometry, depth: usize) -> Result<Surface, String> {
     if depth > SURFACE_DEPTH_MAX {
