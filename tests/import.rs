@@ -8,6 +8,7 @@ use cad::{
     Axis, Face, Form, JobOptions, MachinableFace, Model, Options, SplineSurface, Surface, machinable, read,
     write_job,
 };
+use glam::DVec3;
 use inspect::BOUNDS;
 use job::{Job, NurbsSpec};
 use machine::Machine;
@@ -50,7 +51,7 @@ fn whole() -> Options {
 }
 
 /// A point and a normal as the kernel evaluates them.
-type Reference = ([f64; 3], [f64; 3]);
+type Reference = (DVec3, DVec3);
 
 /// Reference points of each face of each file, by the kernel's face numbers.
 fn references() -> BTreeMap<String, BTreeMap<usize, Vec<Reference>>> {
@@ -63,7 +64,7 @@ fn references() -> BTreeMap<String, BTreeMap<usize, Vec<Reference>>> {
         faces
             .entry(words[1].parse().unwrap())
             .or_default()
-            .push(([x(2), x(3), x(4)], [x(5), x(6), x(7)]));
+            .push((DVec3::new(x(2), x(3), x(4)), DVec3::new(x(5), x(6), x(7))));
     }
     files
 }
@@ -88,21 +89,8 @@ fn inverse(nurbs: &NurbsSpec) -> Surface {
     })
 }
 
-fn cross(a: [f64; 3], b: [f64; 3]) -> [f64; 3] {
-    [
-        a[1] * b[2] - a[2] * b[1],
-        a[2] * b[0] - a[0] * b[2],
-        a[0] * b[1] - a[1] * b[0],
-    ]
-}
-
-fn dot(a: [f64; 3], b: [f64; 3]) -> f64 {
-    a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
-}
-
-fn angle(a: [f64; 3], b: [f64; 3]) -> f64 {
-    let c = cross(a, b);
-    dot(c, c).sqrt().atan2(dot(a, b))
+fn angle(a: DVec3, b: DVec3) -> f64 {
+    a.cross(b).length().atan2(a.dot(b))
 }
 
 /// Largest distance of the points from the surface, mm, and largest angle between the normals, rad.
@@ -112,7 +100,7 @@ fn compared(surface: &Surface, sense: f64, points: &[Reference]) -> (f64, f64) {
         let ([u, v], distance) = surface.invert(*point, None);
         let at = surface.at(u, v);
         worst.0 = worst.0.max(distance);
-        worst.1 = worst.1.max(angle(cross(at.u, at.v).map(|x| sense * x), *normal));
+        worst.1 = worst.1.max(angle(sense * at.u.cross(at.v), *normal));
     }
     worst
 }
@@ -236,9 +224,8 @@ fn fits_keep_the_tolerance() {
                     let u = u0 + (u1 - u0) * f64::from(i) / 100.0;
                     let v = v0 + (v1 - v0) * f64::from(j) / 96.0;
                     let (a, b) = (surface.at(u, v).point, face.surface.at(u, v).point);
-                    let gap = [a[0] - b[0], a[1] - b[1], a[2] - b[2]];
                     assert!(
-                        dot(gap, gap).sqrt() <= 1.02 * tolerance_mm,
+                        a.distance(b) <= 1.02 * tolerance_mm,
                         "{} at {u}, {v}",
                         face.entity
                     );

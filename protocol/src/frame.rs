@@ -9,12 +9,11 @@
 //! (CRC-32/ISO-HDLC). A zero before the first frame of a session, and before every retransmission, ends any partial frame due to
 //! noise; empty frames are ignored.
 
-use core::fmt;
-
 use crc::{CRC_32_ISO_HDLC, Crc};
 use postcard::ser_flavors::{Cobs, Slice, crc::CrcModifier};
-use serde::{Deserialize, Serialize};
+use serde::Serialize;
 
+pub use crate::frame_error::FrameError;
 use crate::message::{Numbered, Reply, Request};
 
 /// Maximum payload, bytes: a `Samples` message with every varint at its maximum length.
@@ -30,30 +29,6 @@ pub const FRAME_MAX: usize = cobs::max_encoding_length(PAYLOAD_MAX + CRC_BYTES) 
 pub const DELIMITER: u8 = 0;
 
 static CRC: Crc<u32> = Crc::<u32>::new(&CRC_32_ISO_HDLC);
-
-/// Errors of a frame. The codes on the wire count from 0 in this order.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
-pub enum FrameError {
-    /// 0: longer than [`FRAME_MAX`].
-    TooLong,
-    /// 1: too short to hold a checksum.
-    TooShort,
-    /// 2: not COBS.
-    Stuffing,
-    /// 3: the checksum is wrong.
-    Checksum,
-}
-
-impl fmt::Display for FrameError {
-    fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
-        formatter.write_str(match self {
-            Self::TooLong => "it is too long",
-            Self::TooShort => "it is too short",
-            Self::Stuffing => "its byte stuffing is broken",
-            Self::Checksum => "its checksum is wrong",
-        })
-    }
-}
 
 /// A message that does not fit into a frame (or into the buffer offered).
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -74,6 +74,7 @@
 mod codes;
 pub mod digest;
 pub mod frame;
+mod frame_error;
 pub mod message;
 mod reason;
 mod records;

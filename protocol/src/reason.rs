@@ -7,7 +7,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::{
     codes,
-    frame::FrameError,
+    frame_error::FrameError,
     records::{Clock, FaultReport},
     version::VersionMismatch,
 };

@@ -1,6 +1,6 @@
 //! Existing practice: constant speed of the cutter location (CL). The speed of the contact varies by eqn 4.
 
-use super::linear::{Chain, Chord, Pace, even_chords};
+use super::chords::{self, Chord, even_chords};
 use super::{Approach, ApproachError, Each, PassPath, Program};
 use job::Job;
 
@@ -39,16 +39,43 @@ impl ConstantCl {
 
 impl Approach for ConstantCl {
     fn plan(&self, pass: &PassPath<'_>) -> Result<Box<dyn Program>, ApproachError> {
-        Ok(Box::new(Chain {
+        Ok(Box::new(ConstantSpeed {
             chords: self.chords(pass)?,
-            pace: Pace::Constant(self.feed_mm_s),
+            feed_mm_s: self.feed_mm_s,
         }))
     }
 }
 
-/// Follows the CL path of a pass at constant speed. A CNC would receive its chords; here the exact path is followed, so that the
-/// result shows only the effect of the constant speed.
-pub(super) fn follow(
+/// The chords of one pass, as a CNC would receive them. Followed is the exact path at constant speed, so that the result shows
+/// only the effect of the constant speed.
+struct ConstantSpeed {
+    chords: Vec<Chord>,
+    feed_mm_s: f64,
+}
+
+impl Program for ConstantSpeed {
+    fn segments(&self) -> usize {
+        self.chords.len()
+    }
+
+    fn write(&self, out: &mut String) {
+        chords::write(&self.chords, out);
+    }
+
+    fn speed_step_mm_s(&self) -> f64 {
+        chords::speed_step_mm_s(&self.chords)
+    }
+
+    fn follow(&self, pass: &PassPath<'_>, period_s: f64, each: &mut Each<'_>) -> Result<(), ApproachError> {
+        if self.chords.is_empty() {
+            return Ok(());
+        }
+        follow(self.feed_mm_s, pass, period_s, each)
+    }
+}
+
+/// Follows the CL path of a pass at constant speed.
+fn follow(
     feed_mm_s: f64,
     pass: &PassPath<'_>,
     period_s: f64,

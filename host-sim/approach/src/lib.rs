@@ -12,6 +12,7 @@
 //! the oracle; the error that remains is the method's.
 
 mod arcs;
+mod chords;
 mod constant_cl;
 mod cubic;
 mod curve;
@@ -27,10 +28,11 @@ use glam::DVec3;
 use std::fmt;
 
 pub use arcs::Arcs;
+pub use chords::{Chord, Chords, chords, even_chords};
 pub use constant_cl::ConstantCl;
 pub use cubic::Cubic;
 pub use curve::{Curve, SPEED_SHARE};
-pub use linear::{Chord, Chords, Linear, chords, even_chords};
+pub use linear::Linear;
 pub use measure::{Measured, measure, measure_run};
 pub use nodes::{Node, Nodes};
 pub use pass::PassPath;

@@ -1,38 +1,12 @@
 //! Method 1: cutter contacts by chord error, the CL points joined by straight segments, each at the speed that keeps the contact
 //! at the feed (Lo eqns 6, 7), followed by a linear interpolator that divides a segment into whole periods.
 
-use super::pass::from_segment;
+use super::chords::{self, Chord, Chords, even_chords};
 use super::{Approach, ApproachError, Each, PassPath, Program};
-use crate::gcode::{Blocks, Cut, FeedMode};
-use glam::DVec3;
 use job::Job;
-use oracle::{OffsetPoint, OracleError};
 
-/// Interior points of a chord at which its error is evaluated.
-const PROBES: u32 = 12;
-/// Share of the tolerance for these points: for a parabola, the largest of them is at least this share of the peak.
-const PEAK: f64 = 1.0 - 1.0 / (PROBES * PROBES) as f64;
-/// Largest number of halvings of a step.
-const HALVINGS: u32 = 40;
-/// Bisections of the length of a chord: the length is within 2^-9, the error within 2^-8, relative.
-const BISECTIONS: u32 = 9;
-/// Bisections of the share of the limit that equalises the errors of the chords.
-const EVENING: u32 = 8;
 /// Rounding tolerance of the duration of a segment, periods: an excess below it adds no period.
 const PERIOD_SLACK: f64 = 1e-9;
-/// A step that leaves less than this share of itself before the end is extended to the end.
-const END_SHARE: f64 = 1e-9;
-
-/// Rule for the chords.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Chords {
-    /// Lo's eqn 6 as printed, with the radius of curvature of the path: the error is estimated where the chord begins.
-    Equation,
-    /// Eqn 6 with the radius of the normal curvature of the surface along the path.
-    EquationNormal,
-    /// The longest chord whose error, measured on the CC and on the CL path, is within the limit.
-    Held,
-}
 
 /// The approach for a job.
 #[derive(Clone, Copy, Debug)]
@@ -54,222 +28,35 @@ impl Linear {
     }
 }
 
-/// A straight segment of the CL path.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Chord {
-    /// Path parameter of the end.
-    pub path: f64,
-    /// CL at the start, mm.
-    pub from_mm: DVec3,
-    /// CL at the end, mm.
-    pub to_mm: DVec3,
-    /// CL speed, mm/s.
-    pub speed_mm_s: f64,
-}
-
-impl Chord {
-    /// The chord as a cut.
-    #[must_use]
-    pub fn cut(&self) -> Cut {
-        Cut::line(self.from_mm, self.to_mm, self.speed_mm_s)
-    }
-}
-
-/// Chords of a pass by a rule; `chord_mm` is the limit of their error.
-///
-/// # Errors
-/// As [`Approach::plan`].
-pub fn chords(
-    pass: &PassPath<'_>,
-    rule: Chords,
-    chord_mm: f64,
-    feed_mm_s: f64,
-) -> Result<Vec<Chord>, ApproachError> {
-    let mut chords = Vec::new();
-    if pass.is_point() {
-        return Ok(chords);
-    }
-    let mut at = pass.at(pass.ends[0])?;
-    // Bounded: every step is above the range times 2^-HALVINGS, and in practice by the length over sqrt(8 rho delta).
-    while pass.left(at.path) > 0.0 {
-        let step = match rule {
-            Chords::Equation => equation_step(pass, &at, chord_mm, path_curvature(pass, at.path)),
-            Chords::EquationNormal => equation_step(pass, &at, chord_mm, at.contact.curvature_path.abs()),
-            Chords::Held => held_step(pass, &at, chord_mm)?,
-        };
-        let left = pass.left(at.path);
-        let path = if step >= left * (1.0 - END_SHARE) {
-            pass.ends[1]
-        } else {
-            at.path + step * pass.sense()
-        };
-        let next = pass.at(path)?;
-        let cc = next.contact.cc_mm.distance(at.contact.cc_mm);
-        let cl = next.contact.cl_mm.distance(at.contact.cl_mm);
-        chords.push(Chord {
-            path,
-            from_mm: at.contact.cl_mm,
-            to_mm: next.contact.cl_mm,
-            speed_mm_s: feed_mm_s * if cc > 0.0 { cl / cc } else { 1.0 },
-        });
-        at = next;
-    }
-    Ok(chords)
-}
-
-/// The least number of chords within the limit, with equalised errors. Otherwise the last chord is the remainder, and a chord of
-/// half a period runs at half the speed.
-///
-/// # Errors
-/// As [`chords`].
-pub fn even_chords(pass: &PassPath<'_>, chord_mm: f64, feed_mm_s: f64) -> Result<Vec<Chord>, ApproachError> {
-    let mut best = chords(pass, Chords::Held, chord_mm, feed_mm_s)?;
-    let (mut low, mut high) = (0.5, 1.0);
-    for _ in 0..EVENING {
-        let share = 0.5 * (low + high);
-        match chords(pass, Chords::Held, share * chord_mm, feed_mm_s) {
-            Ok(found) if found.len() <= best.len() => (best, high) = (found, share),
-            _ => low = share,
-        }
-    }
-    Ok(best)
-}
-
-/// Curvature of the CC path as a space curve, 1/mm.
-fn path_curvature(pass: &PassPath<'_>, path: f64) -> f64 {
-    use job::Along;
-    let (u, v) = pass.oracle.swapped(path, pass.side);
-    let at = pass.oracle.surface.at(u, v);
-    let (a, aa) = match pass.oracle.along {
-        Along::U => (at.u, at.uu),
-        Along::V => (at.v, at.vv),
-    };
-    a.cross(aa).length() / a.length_squared().powf(1.5)
-}
-
-/// Eqn 6: `sqrt(8 rho delta) / |A|`, as far as the pass goes.
-fn equation_step(pass: &PassPath<'_>, at: &OffsetPoint, chord_mm: f64, curvature: f64) -> f64 {
-    let step = (8.0 * chord_mm / curvature).sqrt() / at.contact.path_speed;
-    if step.is_finite() {
-        step.min(pass.left(at.path))
-    } else {
-        pass.left(at.path)
-    }
-}
-
-/// The longest step whose chord holds the limit.
-fn held_step(pass: &PassPath<'_>, at: &OffsetPoint, chord_mm: f64) -> Result<f64, ApproachError> {
-    let left = pass.left(at.path);
-    let holds = |step: f64| chord_holds(pass, at, step, chord_mm);
-    // Starts with eqn 6; doubled while within the limit, then halved until within it.
-    let mut good = equation_step(pass, at, chord_mm, path_curvature(pass, at.path));
-    let mut bad = None;
-    for halving in 0.. {
-        if holds(good)? {
-            break;
-        }
-        if halving == HALVINGS {
-            return Err(ApproachError::NoSegment {
-                path: at.path,
-                side: pass.side,
-            });
-        }
-        bad = Some(good);
-        good *= 0.5;
-    }
-    while bad.is_none() && good < left {
-        let further = (2.0 * good).min(left);
-        if holds(further)? {
-            good = further;
-        } else {
-            bad = Some(further);
-        }
-    }
-    let Some(mut bad) = bad else {
-        return Ok(good);
-    };
-    for _ in 0..BISECTIONS {
-        let middle = 0.5 * (good + bad);
-        if holds(middle)? {
-            good = middle;
-        } else {
-            bad = middle;
-        }
-    }
-    Ok(good)
-}
-
-/// Whether the contact's and the centre's path stay within the limit of their chords.
-fn chord_holds(pass: &PassPath<'_>, at: &OffsetPoint, step: f64, chord_mm: f64) -> Result<bool, OracleError> {
-    let place = |share: f64| pass.at(pass.kept(at.path + share * step * pass.sense()));
-    let end = place(1.0)?;
-    // From the middle outwards: the error is usually largest there.
-    let outwards = (1..PROBES / 2).rev().flat_map(|k| [k, PROBES - k]);
-    for k in std::iter::once(PROBES / 2).chain(outwards) {
-        let between = place(f64::from(k) / f64::from(PROBES))?;
-        let contact = from_segment(between.contact.cc_mm, at.contact.cc_mm, end.contact.cc_mm);
-        let centre = from_segment(between.contact.cl_mm, at.contact.cl_mm, end.contact.cl_mm);
-        if contact.max(centre) > PEAK * chord_mm {
-            return Ok(false);
-        }
-    }
-    Ok(true)
-}
-
 impl Approach for Linear {
     fn plan(&self, pass: &PassPath<'_>) -> Result<Box<dyn Program>, ApproachError> {
         let chords = match self.chords {
             Chords::Held => even_chords(pass, self.chord_mm, self.feed_mm_s)?,
-            equation => chords(pass, equation, self.chord_mm, self.feed_mm_s)?,
+            equation => chords::chords(pass, equation, self.chord_mm, self.feed_mm_s)?,
         };
-        Ok(Box::new(Chain {
-            chords,
-            pace: Pace::WholePeriods,
-        }))
+        Ok(Box::new(WholePeriods(chords)))
     }
 }
 
-/// Motion along chords.
-#[derive(Clone, Copy, Debug)]
-pub(super) enum Pace {
-    /// Each chord in whole sampling periods, as in a traditional linear interpolator.
-    WholePeriods,
-    /// Along the exact path at this CL speed, mm/s.
-    Constant(f64),
-}
+/// The chords of one pass, each followed in whole sampling periods, as in a traditional linear interpolator.
+struct WholePeriods(Vec<Chord>);
 
-/// The chords of one pass.
-pub(super) struct Chain {
-    pub(super) chords: Vec<Chord>,
-    pub(super) pace: Pace,
-}
-
-impl Program for Chain {
+impl Program for WholePeriods {
     fn segments(&self) -> usize {
-        self.chords.len()
+        self.0.len()
     }
 
     fn write(&self, out: &mut String) {
-        let mut blocks = Blocks::new(out, FeedMode::G94);
-        for chord in &self.chords {
-            blocks.cut(&chord.cut());
-        }
+        chords::write(&self.0, out);
     }
 
     fn speed_step_mm_s(&self) -> f64 {
-        self.chords.windows(2).fold(0.0, |most: f64, pair| {
-            most.max((pair[1].speed_mm_s - pair[0].speed_mm_s).abs())
-        })
+        chords::speed_step_mm_s(&self.0)
     }
 
     fn follow(&self, pass: &PassPath<'_>, period_s: f64, each: &mut Each<'_>) -> Result<(), ApproachError> {
-        match self.pace {
-            Pace::Constant(_) if self.chords.is_empty() => return Ok(()),
-            Pace::Constant(feed_mm_s) => return super::constant_cl::follow(feed_mm_s, pass, period_s, each),
-            Pace::WholePeriods => {}
-        }
         let mut begin = pass.ends[0];
-        for chord in &self.chords {
+        for chord in &self.0 {
             let apart = chord.to_mm - chord.from_mm;
             let periods = (apart.length() / (chord.speed_mm_s * period_s) - PERIOD_SLACK)
                 .ceil()

@@ -3,8 +3,8 @@
 use std::collections::BTreeSet;
 use std::ops::Range;
 
+use crate::format::Reader;
 use crate::ir;
-use crate::readers::Reader;
 use cad::CadError;
 use cad::Model;
 

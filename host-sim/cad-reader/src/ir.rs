@@ -4,23 +4,17 @@ use std::collections::{BTreeMap, HashMap};
 use std::io::Cursor;
 
 use cadmpeg_core::decode::{DecodeDepth, DecodePolicy, ResourceLimits};
-use cadmpeg_ir::document::{CadIr, Model as Source};
-use cadmpeg_ir::geometry::{
-    CurveGeometry, ProceduralSurfaceDefinition as Made, SolvedSurfaceGeometry, SurfaceGeometry,
-};
-use cadmpeg_ir::math::{Point3, Vector3};
+use cadmpeg_ir::geometry::{ProceduralSurfaceDefinition as Made, SolvedSurfaceGeometry, SurfaceGeometry};
 use cadmpeg_ir::products::{OccurrenceParent, PrototypeReference};
 use cadmpeg_ir::report::Severity;
 use cadmpeg_ir::topology::{BodyKind, Sense};
-use cadmpeg_ir::transform::Transform;
-use cadmpeg_ir::units::OrthonormalFrame3;
 use cadmpeg_ir::{Codec, DecodeOptions};
 
 use crate::ir_boundary::placed;
-use crate::ir_geometry::{solved_curve, solved_surface};
+use crate::ir_geometry::{SURFACE_DEPTH_MAX, placement, point, solved_surface, vector};
+use crate::ir_index::{Translation, entity};
 use cad::Model;
-use cad::{Boundary, CadError, Curve, Face, Placement, Surface};
-use oracle::vector::Vector;
+use cad::{Boundary, CadError, Face, Placement, Surface};
 
 /// Limits of a file, far above those of the largest part tested.
 const LIMITS: ResourceLimits = ResourceLimits {
@@ -33,8 +27,6 @@ const LIMITS: ResourceLimits = ResourceLimits {
 };
 /// Nesting depth of assemblies.
 const ASSEMBLY_DEPTH_MAX: usize = 64;
-/// Nesting depth of derived surfaces (offsets of offsets).
-pub(crate) const SURFACE_DEPTH_MAX: usize = 8;
 /// Largest number of faces, with all occurrences in an assembly.
 const FACES_MAX: usize = 200_000;
 /// Text about a surface of an unsupported kind.
@@ -123,36 +115,6 @@ fn shortened(text: &str) -> String {
     format!("{start} ...")
 }
 
-pub(crate) fn point(p: Point3) -> Vector {
-    [p.x, p.y, p.z]
-}
-
-pub(crate) fn vector(p: &Vector3) -> Vector {
-    [p.x, p.y, p.z]
-}
-
-/// Axes of a frame: reference direction, second direction, axis.
-pub(crate) fn frame(frame: &OrthonormalFrame3) -> [Vector; 3] {
-    [frame.reference(), &frame.binormal(), frame.axis()].map(|unit| vector(unit.as_raw()))
-}
-
-pub(crate) fn placement(transform: &Transform) -> Placement {
-    Placement {
-        rows: transform.affine_rows(),
-    }
-}
-
-/// Name of an entity in its file, from its identifier in `cadmpeg`: the part after `#`, without the context.
-pub(crate) fn entity(id: &str) -> String {
-    let key = id.rsplit('#').next().unwrap_or(id);
-    match key.split('-').next() {
-        Some(first) if first.bytes().all(|byte| byte.is_ascii_digit()) && !first.is_empty() => {
-            format!("#{first}")
-        }
-        _ => key.to_owned(),
-    }
-}
-
 /// Natural sort key: 2 before 10.
 fn natural(id: &str) -> Vec<(u64, String)> {
     let mut key: Vec<(u64, String)> = Vec::new();
@@ -173,52 +135,7 @@ fn natural(id: &str) -> Vec<(u64, String)> {
     key
 }
 
-/// The model with its entities by name.
-pub(crate) struct Translation<'m> {
-    pub(crate) source: &'m Source,
-    surfaces: HashMap<&'m str, usize>,
-    curves: HashMap<&'m str, usize>,
-    constructions: HashMap<&'m str, usize>,
-    pub(crate) loops: HashMap<&'m str, usize>,
-    pub(crate) coedges: HashMap<&'m str, usize>,
-    pub(crate) edges: HashMap<&'m str, usize>,
-    pub(crate) vertices: HashMap<&'m str, Vector>,
-}
-
 impl<'m> Translation<'m> {
-    fn new(ir: &'m CadIr) -> Self {
-        let source = &ir.model;
-        macro_rules! index {
-            ($list:expr) => {
-                $list
-                    .iter()
-                    .enumerate()
-                    .map(|(index, item)| (item.id.as_str(), index))
-                    .collect()
-            };
-        }
-        let points: HashMap<&str, Vector> = source
-            .points
-            .iter()
-            .map(|item| (item.id.as_str(), point(item.position().get())))
-            .collect();
-        let vertices = source
-            .vertices
-            .iter()
-            .filter_map(|item| Some((item.id.as_str(), *points.get(item.point.as_str())?)))
-            .collect();
-        Self {
-            source,
-            surfaces: index!(source.surfaces),
-            curves: index!(source.curves),
-            constructions: index!(source.procedural_surfaces),
-            loops: index!(source.loops),
-            coedges: index!(source.coedges),
-            edges: index!(source.edges),
-            vertices,
-        }
-    }
-
     /// All faces of all bodies, once per occurrence of their part; then surfaces without a face.
     fn model(&self, file: &str) -> Result<Model, CadError> {
         let mut model = Model::default();
@@ -480,20 +397,5 @@ impl<'m> Translation<'m> {
             Made::DegenerateTorus { .. } => Err("it is a self-intersecting torus".to_owned()),
             _ => Err(format!("surface {} has an unsupported construction", entity(id))),
         }
-    }
-
-    pub(crate) fn curve(&self, id: &str) -> Result<Curve, String> {
-        let item = self
-            .curves
-            .get(id)
-            .and_then(|index| self.source.curves.get(*index))
-            .ok_or("a curve is missing")?;
-        let solved = match &item.geometry {
-            CurveGeometry::Solved(solved) => Some(solved),
-            CurveGeometry::Procedural { cache, .. } => cache.as_ref(),
-        };
-        solved
-            .and_then(solved_curve)
-            .ok_or_else(|| format!("curve {} is of a kind that is not read", entity(id)))
     }
 }

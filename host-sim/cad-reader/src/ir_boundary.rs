@@ -2,9 +2,9 @@
 
 use cadmpeg_ir::topology::{Coedge, Edge as SourceEdge, LoopBoundary, Sense};
 
-use crate::ir::{Translation, entity};
+use crate::ir_index::{Translation, entity};
 use cad::{Boundary, Curve, Edge, Placement};
-use oracle::vector::{Vector, add, dot, length, scale, subtract};
+use glam::DVec3;
 
 /// Points along a boundary edge, its ends included.
 const EDGE_POINTS: usize = 17;
@@ -83,17 +83,17 @@ impl Translation<'_> {
         let share = |k: usize| k as f64 / (EDGE_POINTS - 1) as f64;
         if let Curve::Line { .. } = curve {
             // A line is defined by its ends.
-            let points = (0..EDGE_POINTS).map(|k| add(start, scale(subtract(end, start), share(k))));
+            let points = (0..EDGE_POINTS).map(|k| start + (end - start) * share(k));
             return Ok(vec![points.collect()]);
         }
         let given = edge.carrier.param_range().map(|range| range.get());
-        let closed = edge.start == edge.end || length(subtract(start, end)) < 1e-9;
+        let closed = edge.start == edge.end || start.distance(end) < 1e-9;
         let range = match (given, curve) {
             (Some(range), _) => range,
             (None, Curve::Ellipse { center, x, y }) => {
-                let angle = |p: Vector| {
-                    let from = subtract(p, *center);
-                    (dot(from, *y) / dot(*y, *y)).atan2(dot(from, *x) / dot(*x, *x))
+                let angle = |p: DVec3| {
+                    let from = p - *center;
+                    (from.dot(*y) / y.length_squared()).atan2(from.dot(*x) / x.length_squared())
                 };
                 let first = angle(start);
                 let turn = (angle(end) - first).rem_euclid(std::f64::consts::TAU);
@@ -128,7 +128,7 @@ impl Translation<'_> {
             })
             .collect();
         let [first, last] = [curve.at(range[0])[0], curve.at(range[1])[0]];
-        let missed = length(subtract(first, start)).max(length(subtract(last, end)));
+        let missed = first.distance(start).max(last.distance(end));
         if missed.is_nan() || missed > VERTEX_MM {
             return Err(format!("edge {} misses its ends", entity(edge.id.as_str())));
         }

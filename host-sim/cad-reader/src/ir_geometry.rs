@@ -2,14 +2,37 @@
 
 use cadmpeg_ir::geometry::nurbs::{NurbsCurve, NurbsPoleGrid, NurbsPoles3, NurbsSurface, WeightedPole3};
 use cadmpeg_ir::geometry::{SolvedCurveGeometry, SolvedSurfaceGeometry};
+use cadmpeg_ir::math::{Point3, Vector3};
+use cadmpeg_ir::transform::Transform;
+use cadmpeg_ir::units::OrthonormalFrame3;
 
-use crate::ir::{SURFACE_DEPTH_MAX, frame, placement, point, vector};
 use cad::{Axis, DEGREE_MAX, Pole, SplineCurve, SplineSurface};
-use cad::{Curve, Surface};
-use oracle::vector::{Vector, scale};
+use cad::{Curve, Placement, Surface};
+use glam::DVec3;
 
+/// Nesting depth of derived surfaces (offsets of offsets).
+pub(crate) const SURFACE_DEPTH_MAX: usize = 8;
 /// Largest coordinate, mm: 1 km.
 const FAR_MM: f64 = 1e6;
+
+pub(crate) fn point(p: Point3) -> DVec3 {
+    DVec3::new(p.x, p.y, p.z)
+}
+
+pub(crate) fn vector(p: &Vector3) -> DVec3 {
+    DVec3::new(p.x, p.y, p.z)
+}
+
+/// Axes of a frame: reference direction, second direction, axis.
+fn frame(frame: &OrthonormalFrame3) -> [DVec3; 3] {
+    [frame.reference(), &frame.binormal(), frame.axis()].map(|unit| vector(unit.as_raw()))
+}
+
+pub(crate) fn placement(transform: &Transform) -> Placement {
+    Placement {
+        rows: transform.affine_rows(),
+    }
+}
 
 pub(crate) fn solved_surface(solved: &SolvedSurfaceGeometry, depth: usize) -> Result<Surface, String> {
     if depth > SURFACE_DEPTH_MAX {
@@ -29,8 +52,8 @@ pub(crate) fn solved_surface(solved: &SolvedSurfaceGeometry, depth: usize) -> Re
             let radius = cylinder.radius().get();
             Surface::Cylinder {
                 origin: point(cylinder.origin().get()),
-                x: scale(x, radius),
-                y: scale(y, radius),
+                x: x * radius,
+                y: y * radius,
                 z,
             }
         }
@@ -39,7 +62,7 @@ pub(crate) fn solved_surface(solved: &SolvedSurfaceGeometry, depth: usize) -> Re
             Surface::Cone {
                 origin: point(cone.origin().get()),
                 x,
-                y: scale(y, cone.ratio().get()),
+                y: y * cone.ratio().get(),
                 z,
                 radius: cone.radius().get(),
                 slope: cone.half_angle().get().tan(),
@@ -47,7 +70,7 @@ pub(crate) fn solved_surface(solved: &SolvedSurfaceGeometry, depth: usize) -> Re
         }
         SolvedSurfaceGeometry::Sphere(sphere) => {
             let radius = sphere.radius().get();
-            let [x, y, z] = frame(sphere.frame()).map(|unit| scale(unit, radius));
+            let [x, y, z] = frame(sphere.frame()).map(|unit| unit * radius);
             Surface::Sphere {
                 center: point(sphere.center().get()),
                 x,
@@ -75,14 +98,14 @@ pub(crate) fn solved_surface(solved: &SolvedSurfaceGeometry, depth: usize) -> Re
     };
     let [u, v] = surface.domain().map(|range| range.map_or(0.0, |r| r[0]));
     let at = surface.at(u, v).point;
-    if at.iter().any(|x| !x.is_finite() || x.abs() > FAR_MM) {
+    if !at.is_finite() || at.abs().max_element() > FAR_MM {
         return Err("it lies farther than a kilometre from the origin".to_owned());
     }
     Ok(surface)
 }
 
-fn lifted(p: Vector, w: f64) -> Pole {
-    [p[0] * w, p[1] * w, p[2] * w, w]
+fn lifted(p: DVec3, w: f64) -> Pole {
+    (p * w).extend(w).to_array()
 }
 
 /// Degree and knots, if they fit the poles.
@@ -155,7 +178,7 @@ fn spline_surface(nurbs: &NurbsSurface) -> Result<SplineSurface, String> {
     })
 }
 
-fn finite(p: &cadmpeg_ir::features::FinitePoint3) -> Vector {
+fn finite(p: &cadmpeg_ir::features::FinitePoint3) -> DVec3 {
     point(p.get())
 }
 
@@ -181,7 +204,7 @@ pub(crate) fn solved_curve(solved: &SolvedCurveGeometry) -> Option<Curve> {
             direction: vector(line.direction().as_raw()),
         },
         SolvedCurveGeometry::Circle(circle) => {
-            let [x, y, _] = frame(circle.frame()).map(|unit| scale(unit, circle.radius().get()));
+            let [x, y, _] = frame(circle.frame()).map(|unit| unit * circle.radius().get());
             Curve::Ellipse {
                 center: point(circle.center().get()),
                 x,
@@ -192,8 +215,8 @@ pub(crate) fn solved_curve(solved: &SolvedCurveGeometry) -> Option<Curve> {
             let [x, y, _] = frame(ellipse.frame());
             Curve::Ellipse {
                 center: point(ellipse.center().get()),
-                x: scale(x, ellipse.major_radius().get()),
-                y: scale(y, ellipse.minor_radius().get()),
+                x: x * ellipse.major_radius().get(),
+                y: y * ellipse.minor_radius().get(),
             }
         }
         SolvedCurveGeometry::Nurbs(nurbs) => Curve::Spline(spline_curve(nurbs)?),

@@ -6,13 +6,15 @@
 //!
 //! ```text
 //! main.rs ─► readers.rs   by the file's first bytes ─► step.rs, iges.rs, rhino.rs   what can be told before reading it all
-//!                                                       └─► ir.rs, ir_geometry.rs, ir_boundary.rs   cadmpeg's model -> cad::Face
+//!                                                       └─► ir.rs, ir_*.rs   cadmpeg's model -> cad::Face
 //! ```
 
+mod format;
 mod iges;
 mod ir;
 mod ir_boundary;
 mod ir_geometry;
+mod ir_index;
 mod readers;
 mod rhino;
 mod step;

@@ -4,34 +4,11 @@ use std::path::Path;
 
 use cad::{CadError, Model};
 
+use crate::format::Reader;
 use crate::{iges, rhino, step};
 
 /// Stack of the thread of a reader, bytes: nested entities are read by recursion.
 const STACK_BYTES: usize = 64 << 20;
-
-/// Reads one format.
-pub(crate) trait Reader: Send {
-    /// Name of the format.
-    fn format(&self) -> &'static str;
-
-    /// File extensions, lower case.
-    fn endings(&self) -> &'static [&'static str];
-
-    /// Whether these first bytes of a file are of the format.
-    fn recognises(&self, head: &[u8]) -> bool;
-
-    /// Checks before parsing: truncation, invalid numbers. `file`: name of the file.
-    ///
-    /// # Errors
-    /// The first error, with its line.
-    fn check(&self, file: &str, bytes: &[u8]) -> Result<(), CadError>;
-
-    /// The faces, in mm, at their positions in the assembly.
-    ///
-    /// # Errors
-    /// The file is invalid in this format.
-    fn read(&self, file: &str, bytes: Vec<u8>) -> Result<Model, CadError>;
-}
 
 fn readers() -> [Box<dyn Reader>; 3] {
     [Box::new(step::Step), Box::new(iges::Iges), Box::new(rhino::Rhino)]
@@ -121,13 +98,4 @@ fn guarded(file: &str, reader: Box<dyn Reader>, bytes: Vec<u8>) -> Result<Model,
     thread
         .join()
         .unwrap_or_else(|_| Err(broken(format!("the {format} reader failed on this file"))))
-}
-
-/// Line of a byte, from 1.
-pub(crate) fn line_of(bytes: &[u8], at: usize) -> usize {
-    bytes[..at.min(bytes.len())]
-        .iter()
-        .filter(|byte| **byte == b'\n')
-        .count()
-        + 1
 }

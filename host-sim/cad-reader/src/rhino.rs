@@ -1,7 +1,7 @@
 //! 3DM (openNURBS archives of Rhino).
 
+use crate::format::Reader;
 use crate::ir;
-use crate::readers::Reader;
 use cad::CadError;
 use cad::Model;
 

@@ -1,7 +1,7 @@
 //! STEP (ISO 10303-21): AP203, AP214, AP242.
 
+use crate::format::Reader;
 use crate::ir;
-use crate::readers::{Reader, line_of};
 use cad::CadError;
 use cad::Model;
 
@@ -165,4 +165,13 @@ fn entity_numbers(file: &str, bytes: &[u8], start: usize, end: usize) -> Result<
         at += 1;
     }
     Ok(())
+}
+
+/// Line of a byte, from 1.
+fn line_of(bytes: &[u8], at: usize) -> usize {
+    bytes[..at.min(bytes.len())]
+        .iter()
+        .filter(|byte| **byte == b'\n')
+        .count()
+        + 1
 }

@@ -1,11 +1,11 @@
 //! Curves of CAD files, and their exact conversion to rational B-splines.
 
+use glam::DVec3;
 use serde::{Deserialize, Serialize};
 use std::f64::consts::{FRAC_PI_2, TAU};
 
 use super::placement::Placement;
 use super::spline::{Axis, Pole, SplineCurve};
-use oracle::vector::{Vector, add, dot, length, scale, subtract};
 
 /// Seeds per piece of a curve in the search of a nearest point.
 const SEEDS: usize = 12;
@@ -15,7 +15,7 @@ const STEPS: usize = 30;
 const ANGLE_SLACK_RAD: f64 = 1e-9;
 
 /// Squared distance of a curve's point (given with its derivatives), and half its first two derivatives.
-type Gap<'g> = dyn Fn(&[Vector; 3]) -> (f64, f64, f64) + 'g;
+type Gap<'g> = dyn Fn(&[DVec3; 3]) -> (f64, f64, f64) + 'g;
 
 /// A curve, its parameter as in STEP (ISO 10303-42). Lengths in mm.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -23,36 +23,36 @@ pub enum Curve {
     /// `origin + t direction`.
     Line {
         /// Point at 0.
-        origin: Vector,
+        origin: DVec3,
         /// Derivative.
-        direction: Vector,
+        direction: DVec3,
     },
     /// `center + cos t x + sin t y`: a circle or an ellipse.
     Ellipse {
         /// Centre.
-        center: Vector,
+        center: DVec3,
         /// Radius vector at 0.
-        x: Vector,
+        x: DVec3,
         /// Radius vector at 90 degrees.
-        y: Vector,
+        y: DVec3,
     },
     /// `vertex + t² x + t y`.
     Parabola {
         /// Vertex.
-        vertex: Vector,
+        vertex: DVec3,
         /// Along its axis.
-        x: Vector,
+        x: DVec3,
         /// Along its vertex' tangent.
-        y: Vector,
+        y: DVec3,
     },
     /// `center + cosh t x + sinh t y`.
     Hyperbola {
         /// Centre.
-        center: Vector,
+        center: DVec3,
         /// To its vertex.
-        x: Vector,
+        x: DVec3,
         /// Along its vertex' tangent.
-        y: Vector,
+        y: DVec3,
     },
     /// A B-spline.
     Spline(SplineCurve),
@@ -91,13 +91,13 @@ impl Curve {
 
     /// Point, first and second derivative.
     #[must_use]
-    pub fn at(&self, t: f64) -> [Vector; 3] {
-        let conic = |c: Vector, x: Vector, y: Vector, a: [f64; 3], b: [f64; 3]| {
-            let term = |k: usize| add(scale(x, a[k]), scale(y, b[k]));
-            [add(c, term(0)), term(1), term(2)]
+    pub fn at(&self, t: f64) -> [DVec3; 3] {
+        let conic = |c: DVec3, x: DVec3, y: DVec3, a: [f64; 3], b: [f64; 3]| {
+            let term = |k: usize| x * a[k] + y * b[k];
+            [c + term(0), term(1), term(2)]
         };
         match self {
-            Self::Line { origin, direction } => [add(*origin, scale(*direction, t)), *direction, [0.0; 3]],
+            Self::Line { origin, direction } => [*origin + *direction * t, *direction, DVec3::ZERO],
             Self::Ellipse { center, x, y } => {
                 let (sin, cos) = t.sin_cos();
                 conic(*center, *x, *y, [cos, -sin, -cos], [sin, cos, -sin])
@@ -131,7 +131,7 @@ impl Curve {
     /// ends of the spans.
     #[must_use]
     pub fn spline(&self, range: [f64; 2]) -> SplineCurve {
-        let lifted = |p: Vector, w: f64| [p[0] * w, p[1] * w, p[2] * w, w];
+        let lifted = |p: DVec3, w: f64| (p * w).extend(w).to_array();
         let bezier = |degree: usize, poles: Vec<Pole>| SplineCurve {
             axis: Axis {
                 degree,
@@ -144,7 +144,7 @@ impl Curve {
             Self::Line { .. } => bezier(1, range.map(|t| lifted(point(t), 1.0)).to_vec()),
             Self::Parabola { vertex, x, y } => {
                 let [a, b] = range;
-                let middle = add(*vertex, add(scale(*x, a * b), scale(*y, 0.5 * (a + b))));
+                let middle = *vertex + (*x * (a * b) + *y * (0.5 * (a + b)));
                 bezier(
                     2,
                     vec![lifted(point(a), 1.0), lifted(middle, 1.0), lifted(point(b), 1.0)],
@@ -153,8 +153,8 @@ impl Curve {
             Self::Hyperbola { center, x, y } => {
                 let [a, b] = range;
                 let (middle, weight) = (0.5 * (a + b), (0.5 * (b - a)).cosh());
-                let offset = add(scale(*x, middle.cosh()), scale(*y, middle.sinh()));
-                let control = add(*center, scale(offset, 1.0 / weight));
+                let offset = *x * middle.cosh() + *y * middle.sinh();
+                let control = *center + offset * (1.0 / weight);
                 bezier(
                     2,
                     vec![
@@ -166,9 +166,7 @@ impl Curve {
             }
             Self::Ellipse { center, x, y } => {
                 let (axis, arcs) = arcs(range);
-                let pole = |[cos, sin, w]: &[f64; 3]| {
-                    lifted(add(*center, add(scale(*x, cos / w), scale(*y, sin / w))), *w)
-                };
+                let pole = |[cos, sin, w]: &[f64; 3]| lifted(*center + (*x * (cos / w) + *y * (sin / w)), *w);
                 SplineCurve {
                     axis,
                     poles: arcs.iter().map(pole).collect(),
@@ -204,38 +202,35 @@ impl Curve {
     }
 
     /// Parameter within `range` of the point whose distance to `to` is least, both mapped by `map` (linear).
-    pub(super) fn nearest(&self, range: [f64; 2], to: Vector, map: &dyn Fn(Vector) -> Vector) -> f64 {
+    pub(super) fn nearest(&self, range: [f64; 2], to: DVec3, map: &dyn Fn(DVec3) -> DVec3) -> f64 {
         let pieces = match self {
             Self::Spline(spline) => spline.axis.breaks(),
             _ => range.to_vec(),
         };
         let to = map(to);
         self.least(range, &pieces, &|[point, first, _]| {
-            let gap = subtract(map(*point), to);
+            let gap = map(*point) - to;
             let first = map(*first);
-            (dot(gap, gap), dot(gap, first), dot(first, first))
+            (gap.length_squared(), gap.dot(first), first.length_squared())
         })
     }
 
     /// Parameter within `range` at which the distance from an axis and the height along it are nearest to those of `to`.
-    pub(super) fn nearest_meridian(&self, range: [f64; 2], to: Vector, origin: Vector, axis: Vector) -> f64 {
+    pub(super) fn nearest_meridian(&self, range: [f64; 2], to: DVec3, origin: DVec3, axis: DVec3) -> f64 {
         let pieces = match self {
             Self::Spline(spline) => spline.axis.breaks(),
             _ => range.to_vec(),
         };
-        let meridian = |p: Vector| {
-            let from = subtract(p, origin);
-            let height = dot(from, axis);
-            (length(subtract(from, scale(axis, height))), height)
+        let meridian = |p: DVec3| {
+            let from = p - origin;
+            let height = from.dot(axis);
+            ((from - axis * height).length(), height)
         };
         let (radius, height) = meridian(to);
         self.least(range, &pieces, &|[point, first, _]| {
             let (r, z) = meridian(*point);
-            let out = subtract(subtract(*point, origin), scale(axis, z));
-            let (dr, dz) = (
-                if r > 0.0 { dot(out, *first) / r } else { 0.0 },
-                dot(*first, axis),
-            );
+            let out = *point - origin - axis * z;
+            let (dr, dz) = (if r > 0.0 { out.dot(*first) / r } else { 0.0 }, first.dot(axis));
             let gap = [r - radius, z - height];
             (
                 gap[0] * gap[0] + gap[1] * gap[1],

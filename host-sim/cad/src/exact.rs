@@ -4,16 +4,11 @@
 use super::curve::{Curve, arcs};
 use super::spline::{Axis, Pole, SplineCurve, SplineSurface};
 use super::surface::Surface;
-use oracle::vector::{Vector, add, cross, dot, scale, subtract};
+use glam::DVec3;
 
 /// Homogeneous profile point, `w` times: the point on the axis, and the radial part.
-fn lifted(on_axis: Vector, beside: Vector, w: f64) -> Pole {
-    [
-        on_axis[0] * w + beside[0],
-        on_axis[1] * w + beside[1],
-        on_axis[2] * w + beside[2],
-        w,
-    ]
+fn lifted(on_axis: DVec3, beside: DVec3, w: f64) -> Pole {
+    (on_axis * w + beside).extend(w).to_array()
 }
 
 /// Degree 1 over a range.
@@ -30,7 +25,7 @@ fn linear(range: [f64; 2]) -> Axis {
 pub(super) fn exact(surface: &Surface, [u, v]: [[f64; 2]; 2]) -> Option<SplineSurface> {
     match surface {
         Surface::Plane { origin, x, y } => {
-            let pole = |a: f64, b: f64| lifted(add(*origin, add(scale(*x, a), scale(*y, b))), [0.0; 3], 1.0);
+            let pole = |a: f64, b: f64| lifted(*origin + (*x * a + *y * b), DVec3::ZERO, 1.0);
             Some(SplineSurface {
                 axes: [linear(u), linear(v)],
                 poles: u.map(|a| v.map(|b| pole(a, b)).to_vec()).to_vec(),
@@ -40,7 +35,7 @@ pub(super) fn exact(surface: &Surface, [u, v]: [[f64; 2]; 2]) -> Option<SplineSu
             u,
             [*x, *y],
             &linear(v),
-            &v.map(|b| (add(*origin, scale(*z, b)), 1.0, 1.0)),
+            &v.map(|b| (*origin + *z * b, 1.0, 1.0)),
         )),
         Surface::Cone {
             origin,
@@ -50,14 +45,14 @@ pub(super) fn exact(surface: &Surface, [u, v]: [[f64; 2]; 2]) -> Option<SplineSu
             radius,
             slope,
         } => {
-            let at = |b: f64| (add(*origin, scale(*z, b)), radius + slope * b, 1.0);
+            let at = |b: f64| (*origin + *z * b, radius + slope * b, 1.0);
             Some(turned(u, [*x, *y], &linear(v), &v.map(at)))
         }
         Surface::Sphere { center, x, y, z } => {
             let (axis, poles) = arcs(v);
             let profile: Vec<_> = poles
                 .iter()
-                .map(|[cos, sin, w]| (add(*center, scale(*z, sin / w)), cos / w, *w))
+                .map(|[cos, sin, w]| (*center + *z * (sin / w), cos / w, *w))
                 .collect();
             Some(turned(u, [*x, *y], &axis, &profile))
         }
@@ -72,13 +67,7 @@ pub(super) fn exact(surface: &Surface, [u, v]: [[f64; 2]; 2]) -> Option<SplineSu
             let (axis, poles) = arcs(v);
             let profile: Vec<_> = poles
                 .iter()
-                .map(|[cos, sin, w]| {
-                    (
-                        add(*center, scale(*z, minor * sin / w)),
-                        major + minor * cos / w,
-                        *w,
-                    )
-                })
+                .map(|[cos, sin, w]| (*center + *z * (minor * sin / w), major + minor * cos / w, *w))
                 .collect();
             Some(turned(u, [*x, *y], &axis, &profile))
         }
@@ -93,16 +82,9 @@ pub(super) fn exact(surface: &Surface, [u, v]: [[f64; 2]; 2]) -> Option<SplineSu
         } => {
             let curve = profile.spline(u);
             let row = |pole: &Pole| {
-                v.map(|b| {
-                    let moved = scale(*direction, b * pole[3]);
-                    [
-                        pole[0] + moved[0],
-                        pole[1] + moved[1],
-                        pole[2] + moved[2],
-                        pole[3],
-                    ]
-                })
-                .to_vec()
+                let [x, y, z, w] = *pole;
+                let moved = |b: f64| DVec3::new(x, y, z) + *direction * (b * w);
+                v.map(|b| moved(b).extend(w).to_array()).to_vec()
             };
             Some(SplineSurface {
                 poles: curve.poles.iter().map(row).collect(),
@@ -133,12 +115,12 @@ fn unit(p: Pole) -> Pole {
 }
 
 /// A surface of revolution of a profile (point on the axis, radius, weight for each pole) in the frame `x`, `y`.
-fn turned(u: [f64; 2], [x, y]: [Vector; 2], axis: &Axis, profile: &[(Vector, f64, f64)]) -> SplineSurface {
+fn turned(u: [f64; 2], [x, y]: [DVec3; 2], axis: &Axis, profile: &[(DVec3, f64, f64)]) -> SplineSurface {
     let (around, circle) = arcs(u);
     let row = |[cos, sin, w]: &[f64; 3]| {
-        let out = add(scale(x, *cos), scale(y, *sin));
-        let pole = |(on_axis, radius, weight): &(Vector, f64, f64)| {
-            lifted(*on_axis, scale(out, radius * weight), w * weight)
+        let out = x * *cos + y * *sin;
+        let pole = |(on_axis, radius, weight): &(DVec3, f64, f64)| {
+            lifted(*on_axis, out * (radius * weight), w * weight)
         };
         profile.iter().map(pole).collect::<Vec<_>>()
     };
@@ -149,19 +131,19 @@ fn turned(u: [f64; 2], [x, y]: [Vector; 2], axis: &Axis, profile: &[(Vector, f64
 }
 
 /// A surface of revolution of a curve.
-fn revolved(profile: &SplineCurve, origin: Vector, axis: Vector, u: [f64; 2]) -> SplineSurface {
+fn revolved(profile: &SplineCurve, origin: DVec3, axis: DVec3, u: [f64; 2]) -> SplineSurface {
     let (around, circle) = arcs(u);
     let row = |[cos, sin, w]: &[f64; 3]| {
         profile
             .poles
             .iter()
             .map(|pole| {
-                let point = [pole[0] / pole[3], pole[1] / pole[3], pole[2] / pole[3]];
-                let from = subtract(point, origin);
-                let along = scale(axis, dot(from, axis));
-                let (out, side) = (subtract(from, along), cross(axis, from));
-                let beside = scale(add(scale(out, *cos), scale(side, *sin)), pole[3]);
-                lifted(add(origin, along), beside, w * pole[3])
+                let [x, y, z, weight] = *pole;
+                let from = DVec3::new(x, y, z) / weight - origin;
+                let along = axis * from.dot(axis);
+                let (out, side) = (from - along, axis.cross(from));
+                let beside = (out * *cos + side * *sin) * weight;
+                lifted(origin + along, beside, w * weight)
             })
             .collect::<Vec<_>>()
     };

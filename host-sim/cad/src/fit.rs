@@ -4,7 +4,7 @@
 use super::exact::joints;
 use super::spline::{Axis, Pole, Side, SplineSurface};
 use super::surface::Surface;
-use oracle::vector::{Vector, angle, cross, length, subtract};
+use glam::DVec3;
 
 /// Largest number of spans in one direction: the data of more would not fit a job.
 const SPANS_MAX: usize = 310;
@@ -73,18 +73,16 @@ impl Collocation {
     }
 
     /// Poles of the spline through these points.
-    fn solve(&self, points: &[Vector]) -> Vec<Vector> {
+    fn solve(&self, points: &[DVec3]) -> Vec<DVec3> {
         let n = points.len();
         let band = 2 * self.axis.degree;
-        let mut x: Vec<Vector> = self.order.iter().map(|row| points[*row]).collect();
+        let mut x: Vec<DVec3> = self.order.iter().map(|row| points[*row]).collect();
         for i in 0..n {
             for j in i.saturating_sub(band)..i {
                 let factor = self.factors[i][j];
                 if factor != 0.0 {
                     let known = x[j];
-                    for k in 0..3 {
-                        x[i][k] -= factor * known[k];
-                    }
+                    x[i] -= factor * known;
                 }
             }
         }
@@ -92,11 +90,9 @@ impl Collocation {
             for j in i + 1..(i + band + 1).min(n) {
                 let factor = self.factors[i][j];
                 let known = x[j];
-                for k in 0..3 {
-                    x[i][k] -= factor * known[k];
-                }
+                x[i] -= factor * known;
             }
-            x[i] = x[i].map(|known| known / self.factors[i][i]);
+            x[i] /= self.factors[i][i];
         }
         x
     }
@@ -169,8 +165,8 @@ fn direction(
         let collocation = Collocation::new(knots(&divided(&breaks, &parts)));
         let mut worst = vec![0.0_f64; parts.len()];
         for &line in &lines {
-            let points: Vec<Vector> = collocation.places.iter().map(|t| point(*t, line)).collect();
-            if points.iter().flatten().any(|x| !x.is_finite()) {
+            let points: Vec<DVec3> = collocation.places.iter().map(|t| point(*t, line)).collect();
+            if !points.iter().all(|point| point.is_finite()) {
                 return Err(FitError::NotFinite);
             }
             let poles = collocation.solve(&points);
@@ -178,8 +174,8 @@ fn direction(
                 let places = PLACES * parts;
                 for i in 0..places {
                     let t = span[0].0 + (span[1].0 - span[0].0) * (i as f64 + 0.5) / places as f64;
-                    let gap = subtract(on_curve(&collocation.axis, &poles, t), point(t, line));
-                    *worst = worst.max(length(gap));
+                    let fitted = on_curve(&collocation.axis, &poles, t);
+                    *worst = worst.max(fitted.distance(point(t, line)));
                 }
             }
         }
@@ -214,30 +210,28 @@ fn divided(breaks: &[(f64, usize)], parts: &[usize]) -> Vec<(f64, usize)> {
     all
 }
 
-fn on_curve(axis: &Axis, poles: &[Vector], t: f64) -> Vector {
+fn on_curve(axis: &Axis, poles: &[DVec3], t: f64) -> DVec3 {
     let (first, basis) = axis.basis(t, Side::Above);
-    std::array::from_fn(|k| {
-        let acting = poles[first..=first + axis.degree].iter().zip(&basis[0]);
-        acting.map(|(pole, share)| share * pole[k]).sum()
-    })
+    let acting = poles[first..=first + axis.degree].iter().zip(&basis[0]);
+    acting.map(|(pole, share)| share * pole).sum()
 }
 
 /// The spline on given knots that interpolates the surface at all pairs of Greville abscissae.
 fn interpolated(surface: &Surface, axes: [Axis; 2]) -> Result<SplineSurface, FitError> {
     let [in_u, in_v] = axes.map(Collocation::new);
-    let mut rows: Vec<Vec<Vector>> = Vec::with_capacity(in_u.places.len());
+    let mut rows: Vec<Vec<DVec3>> = Vec::with_capacity(in_u.places.len());
     for &u in &in_u.places {
-        let points: Vec<Vector> = in_v.places.iter().map(|v| surface.at(u, *v).point).collect();
-        if points.iter().flatten().any(|x| !x.is_finite()) {
+        let points: Vec<DVec3> = in_v.places.iter().map(|v| surface.at(u, *v).point).collect();
+        if !points.iter().all(|point| point.is_finite()) {
             return Err(FitError::NotFinite);
         }
         rows.push(in_v.solve(&points));
     }
     let mut poles: Vec<Vec<Pole>> = vec![vec![[0.0; 4]; in_v.places.len()]; in_u.places.len()];
     for j in 0..in_v.places.len() {
-        let column: Vec<Vector> = rows.iter().map(|row| row[j]).collect();
-        for (row, [x, y, z]) in poles.iter_mut().zip(in_u.solve(&column)) {
-            row[j] = [x, y, z, 1.0];
+        let column: Vec<DVec3> = rows.iter().map(|row| row[j]).collect();
+        for (row, pole) in poles.iter_mut().zip(in_u.solve(&column)) {
+            row[j] = pole.extend(1.0).to_array();
         }
     }
     Ok(SplineSurface {
@@ -264,10 +258,12 @@ pub(super) fn deviation(surface: &Surface, fit: &SplineSurface) -> Deviation {
     for &u in &us {
         for &v in &vs {
             let (a, b) = (surface.at(u, v), fit.at(u, v));
-            worst.max_mm = worst.max_mm.max(length(subtract(a.point, b.point)));
-            let (m, n) = (cross(a.u, a.v), cross(b.u, b.v));
-            if length(m) > SINE_MIN * length(a.u) * length(a.v) {
-                worst.normal_rad = worst.normal_rad.max(angle(m, n));
+            worst.max_mm = worst.max_mm.max(a.point.distance(b.point));
+            let (m, n) = (a.u.cross(a.v), b.u.cross(b.v));
+            if m.length() > SINE_MIN * a.u.length() * a.v.length() {
+                // The arc tangent is exact for small angles, where the arc cosine is not.
+                let angle = m.cross(n).length().atan2(m.dot(n));
+                worst.normal_rad = worst.normal_rad.max(angle);
             }
         }
     }

@@ -1,10 +1,10 @@
 //! Point inversion: parameters of a point of a surface, in closed form for elementary surfaces, by Newton's method for others.
 
+use glam::DVec3;
 use std::f64::consts::PI;
 
 use super::curve::Curve;
 use super::surface::Surface;
-use oracle::vector::{Vector, cross, dot, length, scale, subtract};
 
 /// Seeds per side of each patch in the search of the nearest point on a B-spline surface.
 const SEEDS: usize = 3;
@@ -19,7 +19,7 @@ impl Surface {
     /// Parameters of the point of the surface nearest to `to`, and its distance, mm. `near`: initial guess; on a periodic
     /// surface the result is the one nearest to the guess.
     #[must_use]
-    pub fn invert(&self, to: Vector, near: Option<[f64; 2]>) -> ([f64; 2], f64) {
+    pub fn invert(&self, to: DVec3, near: Option<[f64; 2]>) -> ([f64; 2], f64) {
         let mut start = match near {
             Some(near) if !self.closed_form() => near,
             _ => self.seed(to),
@@ -48,15 +48,15 @@ impl Surface {
     }
 
     /// Initial parameters of a point: exact for elementary surfaces, the best of a grid of seeds for others.
-    fn seed(&self, to: Vector) -> [f64; 2] {
-        let share = |from: Vector, x: Vector| dot(from, x) / dot(x, x);
+    fn seed(&self, to: DVec3) -> [f64; 2] {
+        let share = |from: DVec3, x: DVec3| from.dot(x) / x.length_squared();
         match self {
             Self::Plane { origin, x, y } => {
-                let from = subtract(to, *origin);
+                let from = to - *origin;
                 [share(from, *x), share(from, *y)]
             }
             Self::Cylinder { origin, x, y, z } => {
-                let from = subtract(to, *origin);
+                let from = to - *origin;
                 [share(from, *y).atan2(share(from, *x)), share(from, *z)]
             }
             Self::Cone {
@@ -67,14 +67,14 @@ impl Surface {
                 radius,
                 slope,
             } => {
-                let from = subtract(to, *origin);
+                let from = to - *origin;
                 let (a, b, v) = (share(from, *x), share(from, *y), share(from, *z));
                 // The half of the cone that the point is on.
                 let turn = if radius + slope * v < 0.0 { PI } else { 0.0 };
                 [b.atan2(a) + turn, v]
             }
             Self::Sphere { center, x, y, z } => {
-                let from = subtract(to, *center);
+                let from = to - *center;
                 let (a, b, c) = (share(from, *x), share(from, *y), share(from, *z));
                 [b.atan2(a), c.atan2(a.hypot(b))]
             }
@@ -86,7 +86,7 @@ impl Surface {
                 major,
                 ..
             } => {
-                let from = subtract(to, *center);
+                let from = to - *center;
                 let (a, b, c) = (share(from, *x), share(from, *y), share(from, *z));
                 [b.atan2(a), c.atan2(a.hypot(b) - major)]
             }
@@ -97,34 +97,34 @@ impl Surface {
                 axis,
             } => {
                 let v = profile.nearest_meridian(*range, to, *origin, *axis);
-                let across = |p: Vector| {
-                    let from = subtract(p, *origin);
-                    subtract(from, scale(*axis, dot(from, *axis)))
+                let across = |p: DVec3| {
+                    let from = p - *origin;
+                    from - *axis * from.dot(*axis)
                 };
                 let (from, here) = (across(profile.at(v)[0]), across(to));
-                [dot(cross(from, here), *axis).atan2(dot(from, here)), v]
+                [from.cross(here).dot(*axis).atan2(from.dot(here)), v]
             }
             Self::Extrusion {
                 profile,
                 range,
                 direction,
             } => {
-                let across = |p: Vector| subtract(p, scale(*direction, share(p, *direction)));
+                let across = |p: DVec3| p - *direction * share(p, *direction);
                 let u = match (range, profile) {
                     (None, Curve::Line { origin, direction: d }) => {
                         let d = across(*d);
-                        share(across(subtract(to, *origin)), d)
+                        share(across(to - *origin), d)
                     }
                     _ => profile.nearest(range.unwrap_or([-1e3, 1e3]), to, &across),
                 };
-                [u, share(subtract(to, profile.at(u)[0]), *direction)]
+                [u, share(to - profile.at(u)[0], *direction)]
             }
             _ => self.best_of_grid(to),
         }
     }
 
     /// The nearest of a grid of points.
-    fn best_of_grid(&self, to: Vector) -> [f64; 2] {
+    fn best_of_grid(&self, to: DVec3) -> [f64; 2] {
         let places = |k: usize| -> Vec<f64> {
             let range = self.domain()[k].unwrap_or([0.0, 1.0]);
             let breaks = match self {
@@ -153,8 +153,7 @@ impl Surface {
         let mut best = (f64::INFINITY, [us[0], vs[0]]);
         for &u in &us {
             for &v in &vs {
-                let gap = subtract(self.at(u, v).point, to);
-                let distance = dot(gap, gap);
+                let distance = self.at(u, v).point.distance_squared(to);
                 if distance < best.0 {
                     best = (distance, [u, v]);
                 }
@@ -164,7 +163,7 @@ impl Surface {
     }
 
     /// Newton's method on the distance, within the domain; no step increases the distance.
-    fn refined(&self, start: [f64; 2], to: Vector) -> ([f64; 2], f64) {
+    fn refined(&self, start: [f64; 2], to: DVec3) -> ([f64; 2], f64) {
         let (domain, periods) = (self.domain(), self.periods());
         let held = |place: [f64; 2]| -> [f64; 2] {
             std::array::from_fn(|k| match (domain[k], periods[k]) {
@@ -177,13 +176,13 @@ impl Surface {
             })
         };
         let mut place = held(start);
-        let mut gap = subtract(self.at(place[0], place[1]).point, to);
+        let mut gap = self.at(place[0], place[1]).point - to;
         for _ in 0..STEPS {
             let at = self.at(place[0], place[1]);
-            gap = subtract(at.point, to);
-            let slope = [dot(gap, at.u), dot(gap, at.v)];
-            let near = [dot(at.u, at.u), dot(at.u, at.v), dot(at.v, at.v)];
-            let bent = [dot(gap, at.uu), dot(gap, at.uv), dot(gap, at.vv)];
+            gap = at.point - to;
+            let slope = [gap.dot(at.u), gap.dot(at.v)];
+            let near = [at.u.length_squared(), at.u.dot(at.v), at.v.length_squared()];
+            let bent = [gap.dot(at.uu), gap.dot(at.uv), gap.dot(at.vv)];
             let exact = std::array::from_fn(|k| near[k] + bent[k]);
             // Newton, Gauss-Newton, then each parameter alone (at a degenerate point): the first that reduces the distance.
             let steps = [
@@ -195,14 +194,14 @@ impl Surface {
                 (0..HALVINGS).find_map(|k| {
                     let share = 0.5_f64.powi(k);
                     let next = held([place[0] + share * step[0], place[1] + share * step[1]]);
-                    let new = subtract(self.at(next[0], next[1]).point, to);
-                    (dot(new, new) < dot(gap, gap)).then_some((next, new))
+                    let new = self.at(next[0], next[1]).point - to;
+                    (new.length_squared() < gap.length_squared()).then_some((next, new))
                 })
             });
             let Some((next, new)) = moved else { break };
             (place, gap) = (next, new);
         }
-        (place, length(gap))
+        (place, gap.length())
     }
 }
 

@@ -40,14 +40,14 @@ pub use measure::{Measures, measure};
 pub use outline::{Outline, outline};
 pub use placement::Placement;
 pub use reader::{Model, read};
-pub use spline::{Axis, DEGREE_MAX, Derivatives, Pole, SplineCurve, SplineSurface};
+pub use spline::{Axis, DEGREE_MAX, Pole, SplineCurve, SplineSurface};
 pub use surface::Surface;
 
-use oracle::vector::Vector;
+use glam::DVec3;
 use serde::{Deserialize, Serialize};
 
 /// One smooth boundary edge as points along it, mm, in the order of the loop.
-pub type Edge = Vec<Vector>;
+pub type Edge = Vec<DVec3>;
 
 /// Boundary of a face.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]

@@ -49,13 +49,7 @@ fn principal(at: &Derivatives, ranges: [f64; 2]) -> Option<[f64; 2]> {
     if area.is_nan() || area <= SINE_MIN * at.u.length() * at.v.length() {
         return None;
     }
-    let normal = normal / area;
-    let (e, f, g) = (at.u.length_squared(), at.u.dot(at.v), at.v.length_squared());
-    let (l, m, n) = (at.uu.dot(normal), at.uv.dot(normal), at.vv.dot(normal));
-    let mean = 0.5 * (e * n - 2.0 * f * m + g * l) / (area * area);
-    let gauss = (l * n - m * m) / (area * area);
-    let spread = (mean * mean - gauss).max(0.0).sqrt();
-    Some([mean - spread, mean + spread])
+    Some(at.principal_curvatures(normal / area))
 }
 
 /// Measures a surface on a dense grid.

@@ -2,7 +2,6 @@
 
 use super::surface::Surface;
 use super::{Boundary, Edge, Face};
-use oracle::vector::length;
 
 /// Tolerance of an edge on an iso-parametric line, mm. Edges in files are accurate to 1e-3 to 1e-7 mm.
 const FOLLOWS_MM: f64 = 1e-3;
@@ -59,7 +58,7 @@ impl Path {
 /// Length of the derivative by parameter k, mm per unit.
 fn speed(surface: &Surface, place: [f64; 2], k: usize) -> f64 {
     let at = surface.at(place[0], place[1]);
-    length(if k == 0 { at.u } else { at.v })
+    if k == 0 { at.u } else { at.v }.length()
 }
 
 /// Scale of the parameter: its period, its range, or 1.

@@ -1,7 +1,7 @@
 //! Placement of a part: an affine map.
 
 use super::spline::Pole;
-use oracle::vector::{Vector, cross, dot, length};
+use glam::DVec3;
 use serde::{Deserialize, Serialize};
 
 /// Relative tolerance of a placement's matrix against a rotation times a scale, for rounding in files.
@@ -34,15 +34,15 @@ impl Placement {
 
     /// Transforms a point.
     #[must_use]
-    pub fn point(&self, p: Vector) -> Vector {
-        self.rows
-            .map(|row| row[0] * p[0] + row[1] * p[1] + row[2] * p[2] + row[3])
+    pub fn point(&self, p: DVec3) -> DVec3 {
+        let coordinate = |[a, b, c, moved]: [f64; 4]| a * p.x + b * p.y + c * p.z + moved;
+        self.rows.map(coordinate).into()
     }
 
     /// Transforms a vector: rotation and scale.
     #[must_use]
-    pub fn vector(&self, p: Vector) -> Vector {
-        self.rows.map(|row| row[0] * p[0] + row[1] * p[1] + row[2] * p[2])
+    pub fn vector(&self, p: DVec3) -> DVec3 {
+        self.rows.map(|[a, b, c, _]| a * p.x + b * p.y + c * p.z).into()
     }
 
     /// Transforms a homogeneous point.
@@ -54,24 +54,24 @@ impl Placement {
         [x, y, z, p[3]]
     }
 
-    fn column(&self, k: usize) -> Vector {
-        self.rows.map(|row| row[k])
+    fn column(&self, k: usize) -> DVec3 {
+        self.rows.map(|row| row[k]).into()
     }
 
     /// Whether it contains a reflection.
     #[must_use]
     pub fn mirrors(&self) -> bool {
-        dot(cross(self.column(0), self.column(1)), self.column(2)) < 0.0
+        self.column(0).cross(self.column(1)).dot(self.column(2)) < 0.0
     }
 
     /// The scale if the map is a similarity, otherwise `None`.
     #[must_use]
     pub fn similarity(&self) -> Option<f64> {
-        let columns: [Vector; 3] = std::array::from_fn(|k| self.column(k));
-        let size = length(columns[0]);
+        let columns: [DVec3; 3] = std::array::from_fn(|k| self.column(k));
+        let size = columns[0].length();
         let slack = SIMILARITY_SLACK * size;
-        let even = columns.iter().all(|c| (length(*c) - size).abs() <= slack);
-        let square = (0..3).all(|k| dot(columns[k], columns[(k + 1) % 3]).abs() <= slack * size);
+        let even = columns.iter().all(|c| (c.length() - size).abs() <= slack);
+        let square = (0..3).all(|k| columns[k].dot(columns[(k + 1) % 3]).abs() <= slack * size);
         (size > 0.0 && size.is_finite() && even && square).then_some(size)
     }
 }

@@ -1,27 +1,12 @@
 //! B-splines of any degree, rational or not: evaluation, and exact restriction to a part of the domain
 //! (Piegl and Tiller, "The NURBS Book", 2nd ed., A2.1 to A2.3, A4.4, A5.1; here "P&T").
 
+use glam::DVec3;
+use oracle::Derivatives;
 use serde::{Deserialize, Serialize};
 
 /// A homogeneous point `(w x, w y, w z, w)`, mm and a weight.
 pub type Pole = [f64; 4];
-
-/// A point of a surface with its derivatives, mm.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Derivatives {
-    /// S.
-    pub point: [f64; 3],
-    /// S_u.
-    pub u: [f64; 3],
-    /// S_v.
-    pub v: [f64; 3],
-    /// S_uu.
-    pub uu: [f64; 3],
-    /// S_uv.
-    pub uv: [f64; 3],
-    /// S_vv.
-    pub vv: [f64; 3],
-}
 
 /// Highest degree that is read; CAD systems write at most 25 (OpenCASCADE).
 pub const DEGREE_MAX: usize = 25;
@@ -204,7 +189,7 @@ pub struct SplineCurve {
 impl SplineCurve {
     /// Point, first and second derivative, mm.
     #[must_use]
-    pub fn at(&self, t: f64) -> [[f64; 3]; 3] {
+    pub fn at(&self, t: f64) -> [DVec3; 3] {
         let (first, basis) = self.axis.basis(t, Side::Above);
         let mut sums = [[0.0; 4]; 3];
         for (r, pole) in self.poles[first..=first + self.axis.degree].iter().enumerate() {
@@ -214,11 +199,10 @@ impl SplineCurve {
                 }
             }
         }
-        let [s, d, dd] = sums;
-        let point = std::array::from_fn(|k| s[k] / s[3]);
-        let first: [f64; 3] = std::array::from_fn(|k: usize| (d[k] - d[3] * s[k] / s[3]) / s[3]);
-        let second = std::array::from_fn(|k| (dd[k] - 2.0 * d[3] * first[k] - dd[3] * s[k] / s[3]) / s[3]);
-        [point, first, second]
+        let [w, d_w, dd_w] = sums.map(|sum| sum[3]);
+        let [s, d, dd] = sums.map(|[x, y, z, _]| DVec3::new(x, y, z));
+        let first = (d - d_w * s / w) / w;
+        [s / w, first, (dd - 2.0 * d_w * first - dd_w * s / w) / w]
     }
 
     /// The part over a range within the domain. Exact.
@@ -291,7 +275,8 @@ impl SplineSurface {
                 }
             }
         }
-        quotient(&sums)
+        let [[s, s_v, s_vv], [s_u, s_uv, _], [s_uu, _, _]] = sums;
+        Derivatives::from_homogeneous([s, s_u, s_v, s_uu, s_uv, s_vv])
     }
 
     /// S and its derivatives.
@@ -317,22 +302,4 @@ pub(super) fn transposed(rows: &[Vec<Pole>]) -> Vec<Vec<Pole>> {
     (0..rows.first().map_or(0, Vec::len))
         .map(|j| rows.iter().map(|row| row[j]).collect())
         .collect()
-}
-
-/// Derivatives of `(x, y, z) / w` from those of the homogeneous surface (P&T A4.4).
-fn quotient(s: &[[[f64; 4]; 3]; 3]) -> Derivatives {
-    let mut at = Derivatives::default();
-    let w = s[0][0][3];
-    for k in 0..3 {
-        let point = s[0][0][k] / w;
-        let u = (s[1][0][k] - s[1][0][3] * point) / w;
-        let v = (s[0][1][k] - s[0][1][3] * point) / w;
-        at.point[k] = point;
-        at.u[k] = u;
-        at.v[k] = v;
-        at.uu[k] = (s[2][0][k] - 2.0 * s[1][0][3] * u - s[2][0][3] * point) / w;
-        at.uv[k] = (s[1][1][k] - s[1][0][3] * v - s[0][1][3] * u - s[1][1][3] * point) / w;
-        at.vv[k] = (s[0][2][k] - 2.0 * s[0][1][3] * v - s[0][2][3] * point) / w;
-    }
-    at
 }

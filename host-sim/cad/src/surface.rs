@@ -1,12 +1,13 @@
 //! Surfaces of CAD files, evaluated from their original parameters.
 
+use glam::DVec3;
+use oracle::Derivatives;
 use serde::{Deserialize, Serialize};
 use std::f64::consts::{FRAC_PI_2, TAU};
 
 use super::curve::Curve;
 use super::placement::Placement;
-use super::spline::{Derivatives, SplineCurve, SplineSurface};
-use oracle::vector::{Vector, add, cross, dot, length, scale, subtract};
+use super::spline::{SplineCurve, SplineSurface};
 
 /// Step of a difference quotient, as a share of the range; only for second derivatives of offset surfaces.
 const DIFFERENCE: f64 = 1e-5;
@@ -17,33 +18,33 @@ pub enum Surface {
     /// `origin + u x + v y`.
     Plane {
         /// Point at (0, 0).
-        origin: Vector,
+        origin: DVec3,
         /// S_u.
-        x: Vector,
+        x: DVec3,
         /// S_v.
-        y: Vector,
+        y: DVec3,
     },
     /// `origin + cos u x + sin u y + v z`; with a slope, both radii grow: `(1 + slope v)`.
     Cylinder {
         /// On the axis.
-        origin: Vector,
+        origin: DVec3,
         /// Radius vector at u = 0.
-        x: Vector,
+        x: DVec3,
         /// Radius vector at u = 90 degrees.
-        y: Vector,
+        y: DVec3,
         /// Along the axis.
-        z: Vector,
+        z: DVec3,
     },
     /// `origin + (radius + slope v) (cos u x + sin u y) + v z`.
     Cone {
         /// On the axis.
-        origin: Vector,
+        origin: DVec3,
         /// Direction at u = 0, of length 1 times the placement's scale.
-        x: Vector,
+        x: DVec3,
         /// Direction at u = 90 degrees.
-        y: Vector,
+        y: DVec3,
         /// Along the axis.
-        z: Vector,
+        z: DVec3,
         /// Radius at v = 0.
         radius: f64,
         /// Increase of the radius per unit of v.
@@ -52,24 +53,24 @@ pub enum Surface {
     /// `center + cos v (cos u x + sin u y) + sin v z`.
     Sphere {
         /// Centre.
-        center: Vector,
+        center: DVec3,
         /// Radius vector at (0, 0).
-        x: Vector,
+        x: DVec3,
         /// Radius vector at (90 degrees, 0).
-        y: Vector,
+        y: DVec3,
         /// Radius vector to the pole.
-        z: Vector,
+        z: DVec3,
     },
     /// `center + (major + minor cos v) (cos u x + sin u y) + minor sin v z`.
     Torus {
         /// Centre.
-        center: Vector,
+        center: DVec3,
         /// Direction at u = 0.
-        x: Vector,
+        x: DVec3,
         /// Direction at u = 90 degrees.
-        y: Vector,
+        y: DVec3,
         /// Along the axis.
-        z: Vector,
+        z: DVec3,
         /// Radius of the ring.
         major: f64,
         /// Radius of the tube.
@@ -82,9 +83,9 @@ pub enum Surface {
         /// Range of its parameter.
         range: [f64; 2],
         /// On the axis.
-        origin: Vector,
+        origin: DVec3,
         /// Along the axis, of length 1.
-        axis: Vector,
+        axis: DVec3,
     },
     /// Extrusion of a curve (parameter u) along v times a vector.
     Extrusion {
@@ -93,7 +94,7 @@ pub enum Surface {
         /// Range of its parameter; `None` for an unbounded curve.
         range: Option<[f64; 2]>,
         /// S_v.
-        direction: Vector,
+        direction: DVec3,
     },
     /// `(1 - v) first(u) + v second(u)`, both curves on [0, 1].
     Ruled {
@@ -135,7 +136,7 @@ impl Surface {
     /// The surface, transformed; `None` if the placement is not a similarity and the kind of surface requires one.
     #[must_use]
     pub fn placed(&self, by: &Placement) -> Option<Self> {
-        let (p, d) = (|a: &Vector| by.point(*a), |a: &Vector| by.vector(*a));
+        let (p, d) = (|a: &DVec3| by.point(*a), |a: &DVec3| by.vector(*a));
         Some(match self {
             Self::Plane { origin, x, y } => Self::Plane {
                 origin: p(origin),
@@ -197,7 +198,7 @@ impl Surface {
                     profile: profile.placed(by),
                     range: *range,
                     origin: p(origin),
-                    axis: scale(d(axis), turn / size),
+                    axis: d(axis) * (turn / size),
                 }
             }
             Self::Extrusion {
@@ -273,7 +274,7 @@ impl Surface {
     pub fn at(&self, u: f64, v: f64) -> Derivatives {
         match self {
             Self::Plane { origin, x, y } => Derivatives {
-                point: add(*origin, add(scale(*x, u), scale(*y, v))),
+                point: *origin + (*x * u + *y * v),
                 u: *x,
                 v: *y,
                 ..Derivatives::default()
@@ -328,7 +329,7 @@ impl Surface {
             } => {
                 let [point, first, second] = profile.at(u);
                 Derivatives {
-                    point: add(point, scale(*direction, v)),
+                    point: point + *direction * v,
                     u: first,
                     v: *direction,
                     uu: second,
@@ -337,14 +338,14 @@ impl Surface {
             }
             Self::Ruled { first, second } => {
                 let (a, b) = (first.at(u), second.at(u));
-                let mixed = |k: usize| add(scale(a[k], 1.0 - v), scale(b[k], v));
+                let mixed = |k: usize| a[k] * (1.0 - v) + b[k] * v;
                 Derivatives {
                     point: mixed(0),
                     u: mixed(1),
-                    v: subtract(b[0], a[0]),
+                    v: b[0] - a[0],
                     uu: mixed(2),
-                    uv: subtract(b[1], a[1]),
-                    vv: [0.0; 3],
+                    uv: b[1] - a[1],
+                    vv: DVec3::ZERO,
                 }
             }
             Self::Spline(spline) => spline.at(u, v),
@@ -356,23 +357,19 @@ impl Surface {
     fn offset(&self, base: &Surface, distance: f64, u: f64, v: f64) -> Derivatives {
         let moved = |u: f64, v: f64| {
             let at = base.at(u, v);
-            let normal = cross(at.u, at.v);
-            let area = length(normal);
-            let unit = scale(normal, 1.0 / area);
-            let slope = |a: Vector| scale(subtract(a, scale(unit, dot(a, unit))), distance / area);
-            let along_u = slope(add(cross(at.uu, at.v), cross(at.u, at.uv)));
-            let along_v = slope(add(cross(at.uv, at.v), cross(at.u, at.vv)));
-            [
-                add(at.point, scale(unit, distance)),
-                add(at.u, along_u),
-                add(at.v, along_v),
-            ]
+            let normal = at.u.cross(at.v);
+            let area = normal.length();
+            let unit = normal * (1.0 / area);
+            let slope = |a: DVec3| (a - unit * a.dot(unit)) * (distance / area);
+            let along_u = slope(at.uu.cross(at.v) + at.u.cross(at.uv));
+            let along_v = slope(at.uv.cross(at.v) + at.u.cross(at.vv));
+            [at.point + unit * distance, at.u + along_u, at.v + along_v]
         };
         let [point, first_u, first_v] = moved(u, v);
         let [step_u, step_v] = self
             .domain()
             .map(|range| range.map_or(DIFFERENCE, |r| DIFFERENCE * (r[1] - r[0])));
-        let quotient = |a: Vector, b: Vector, step: f64| scale(subtract(a, b), 0.5 / step);
+        let quotient = |a: DVec3, b: DVec3, step: f64| (a - b) * (0.5 / step);
         let (after_u, before_u) = (moved(u + step_u, v), moved(u - step_u, v));
         let (after_v, before_v) = (moved(u, v + step_v), moved(u, v - step_v));
         Derivatives {
@@ -387,39 +384,39 @@ impl Surface {
 }
 
 /// Surface of revolution of a profile `(radius, height)` with derivatives in v, by the angle u in a frame.
-fn turned(origin: Vector, [x, y, z]: [Vector; 3], u: f64, radius: [f64; 3], height: [f64; 3]) -> Derivatives {
+fn turned(origin: DVec3, [x, y, z]: [DVec3; 3], u: f64, radius: [f64; 3], height: [f64; 3]) -> Derivatives {
     let (sin, cos) = u.sin_cos();
-    let out = add(scale(x, cos), scale(y, sin));
-    let along = add(scale(x, -sin), scale(y, cos));
-    let profile = |k: usize| add(scale(out, radius[k]), scale(z, height[k]));
+    let out = x * cos + y * sin;
+    let along = x * -sin + y * cos;
+    let profile = |k: usize| out * radius[k] + z * height[k];
     Derivatives {
-        point: add(origin, profile(0)),
-        u: scale(along, radius[0]),
+        point: origin + profile(0),
+        u: along * radius[0],
         v: profile(1),
-        uu: scale(out, -radius[0]),
-        uv: scale(along, radius[1]),
+        uu: out * -radius[0],
+        uv: along * radius[1],
         vv: profile(2),
     }
 }
 
 /// Point and derivatives of a curve, rotated about an axis by u.
-fn revolved(profile: &[Vector; 3], origin: Vector, axis: Vector, u: f64) -> Derivatives {
+fn revolved(profile: &[DVec3; 3], origin: DVec3, axis: DVec3, u: f64) -> Derivatives {
     let (sin, cos) = u.sin_cos();
     // The rotated vector and its first and second derivative by u.
-    let turn = |p: Vector| {
-        let along = scale(axis, dot(p, axis));
-        let (out, side) = (subtract(p, along), cross(axis, p));
+    let turn = |p: DVec3| {
+        let along = axis * p.dot(axis);
+        let (out, side) = (p - along, axis.cross(p));
         [
-            add(along, add(scale(out, cos), scale(side, sin))),
-            add(scale(out, -sin), scale(side, cos)),
-            add(scale(out, -cos), scale(side, -sin)),
+            along + (out * cos + side * sin),
+            out * -sin + side * cos,
+            out * -cos + side * -sin,
         ]
     };
-    let [point, u1, u2] = turn(subtract(profile[0], origin));
+    let [point, u1, u2] = turn(profile[0] - origin);
     let [v1, uv, _] = turn(profile[1]);
     let [v2, _, _] = turn(profile[2]);
     Derivatives {
-        point: add(origin, point),
+        point: origin + point,
         u: u1,
         v: v1,
         uu: u2,
@@ -436,9 +433,9 @@ fn closed(spline: &SplineSurface) -> [Option<f64>; 2] {
             spline.at(u0, v0).point,
             spline.at(0.5 * (u0 + u1), 0.5 * (v0 + v1)).point,
         );
-        length(subtract(a, b)).max(1.0)
+        a.distance(b).max(1.0)
     };
-    let same = |a: Vector, b: Vector| length(subtract(a, b)) <= 1e-9 * size;
+    let same = |a: DVec3, b: DVec3| a.distance(b) <= 1e-9 * size;
     let share = |k: usize, range: [f64; 2]| range[0] + (range[1] - range[0]) * k as f64 / 8.0;
     let in_u = (0..=8).all(|k| {
         let v = share(k, [v0, v1]);

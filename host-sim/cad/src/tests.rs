@@ -4,7 +4,7 @@ use std::f64::consts::{FRAC_PI_2, PI, TAU};
 
 use super::exact::exact;
 use super::*;
-use oracle::vector::{Vector, add, length, scale, subtract};
+use glam::{DVec3, dvec3};
 
 /// A rational, unclamped B-spline surface of given degrees with non-uniform knots, one of them double.
 fn wavy(p: usize, q: usize) -> SplineSurface {
@@ -41,8 +41,8 @@ fn wavy(p: usize, q: usize) -> SplineSurface {
     }
 }
 
-fn near(a: Vector, b: Vector, most: f64, what: &str) {
-    let gap = length(subtract(a, b));
+fn near(a: DVec3, b: DVec3, most: f64, what: &str) {
+    let gap = a.distance(b);
     assert!(gap <= most, "{what}: {gap} mm between {a:?} and {b:?}");
 }
 
@@ -80,7 +80,7 @@ fn derivatives_are_those_of_the_points() {
     let step = 1e-5;
     for (u, v) in [(0.1, 0.2), (0.5, 0.7), (1.8, 2.1)] {
         let at = surface.at(u, v);
-        let slope = |a: Vector, b: Vector| scale(subtract(a, b), 0.5 / step);
+        let slope = |a: DVec3, b: DVec3| (a - b) * (0.5 / step);
         let (right, left) = (surface.at(u + step, v), surface.at(u - step, v));
         let (above, below) = (surface.at(u, v + step), surface.at(u, v - step));
         near(at.u, slope(right.point, left.point), 1e-5, "S_u");
@@ -93,21 +93,20 @@ fn derivatives_are_those_of_the_points() {
 
 /// One surface of each kind in a rotated and translated frame, with a rectangle of parameters.
 fn kinds() -> Vec<(Surface, [[f64; 2]; 2])> {
-    let (x, y, z) = ([0.6, 0.8, 0.0], [0.0, 0.0, 1.0], [0.8, -0.6, 0.0]);
-    let origin = [100.0, -20.0, 7.0];
+    let (x, y, z) = (dvec3(0.6, 0.8, 0.0), DVec3::Z, dvec3(0.8, -0.6, 0.0));
+    let origin = dvec3(100.0, -20.0, 7.0);
     let profile = Curve::Ellipse {
-        center: [130.0, -20.0, 7.0],
-        x: [5.0, 0.0, 0.0],
-        y: [0.0, 0.0, 3.0],
+        center: dvec3(130.0, -20.0, 7.0),
+        x: 5.0 * DVec3::X,
+        y: 3.0 * DVec3::Z,
     };
-    let up = [0.0, 0.0, 1.0];
     vec![
         (Surface::Plane { origin, x, y }, [[-3.0, 9.0], [2.0, 4.0]]),
         (
             Surface::Cylinder {
                 origin,
-                x: scale(x, 9.0),
-                y: scale(y, 9.0),
+                x: x * 9.0,
+                y: y * 9.0,
                 z,
             },
             [[0.4, 5.9], [-3.0, 8.0]],
@@ -126,9 +125,9 @@ fn kinds() -> Vec<(Surface, [[f64; 2]; 2])> {
         (
             Surface::Sphere {
                 center: origin,
-                x: scale(x, 12.0),
-                y: scale(y, 12.0),
-                z: scale(z, 12.0),
+                x: x * 12.0,
+                y: y * 12.0,
+                z: z * 12.0,
             },
             [[0.0, TAU], [-FRAC_PI_2, 1.1]],
         ),
@@ -148,7 +147,7 @@ fn kinds() -> Vec<(Surface, [[f64; 2]; 2])> {
                 profile: profile.clone(),
                 range: [0.0, TAU],
                 origin,
-                axis: up,
+                axis: DVec3::Z,
             },
             [[0.2, 3.3], [0.5, 4.0]],
         ),
@@ -156,7 +155,7 @@ fn kinds() -> Vec<(Surface, [[f64; 2]; 2])> {
             Surface::Extrusion {
                 profile,
                 range: Some([0.0, TAU]),
-                direction: [1.0, 2.0, 0.5],
+                direction: dvec3(1.0, 2.0, 0.5),
             },
             [[0.5, 4.0], [-2.0, 6.0]],
         ),
@@ -295,9 +294,9 @@ fn rectangles_are_found() {
 #[test]
 fn what_is_no_rectangle_is_trimmed() {
     let plane = || Surface::Plane {
-        origin: [0.0; 3],
-        x: [1.0, 0.0, 0.0],
-        y: [0.0, 1.0, 0.0],
+        origin: DVec3::ZERO,
+        x: DVec3::X,
+        y: DVec3::Y,
     };
     let trimmed = |loops: Vec<Vec<Edge>>| outline(&face(plane(), loops, 1.0)).unwrap();
     let square = [[0.0, 0.0], [9.0, 0.0], [9.0, 9.0], [0.0, 9.0]];
@@ -331,10 +330,10 @@ fn what_is_no_rectangle_is_trimmed() {
 #[test]
 fn a_corner_may_be_a_pole() {
     let sphere = Surface::Sphere {
-        center: [0.0; 3],
-        x: [10.0, 0.0, 0.0],
-        y: [0.0, 10.0, 0.0],
-        z: [0.0, 0.0, 10.0],
+        center: DVec3::ZERO,
+        x: 10.0 * DVec3::X,
+        y: 10.0 * DVec3::Y,
+        z: 10.0 * DVec3::Z,
     };
     let edges = [
         edge(&sphere, [0.3, 0.1], [1.2, 0.1]),
@@ -359,10 +358,10 @@ fn a_corner_may_be_a_pole() {
 fn circles_alone_bound_belts_and_caps() {
     let radius = 10.0;
     let sphere = || Surface::Sphere {
-        center: [0.0; 3],
-        x: [radius, 0.0, 0.0],
-        y: [0.0, radius, 0.0],
-        z: [0.0, 0.0, radius],
+        center: DVec3::ZERO,
+        x: radius * DVec3::X,
+        y: radius * DVec3::Y,
+        z: radius * DVec3::Z,
     };
     let circle = |v: f64, turn: f64| {
         vec![
@@ -392,10 +391,10 @@ fn circles_alone_bound_belts_and_caps() {
         assert!((cap.rectangle[0][1] - cap.rectangle[0][0] - TAU).abs() < 1e-9);
     }
     let cylinder = Surface::Cylinder {
-        origin: [0.0; 3],
-        x: [radius, 0.0, 0.0],
-        y: [0.0, radius, 0.0],
-        z: [0.0, 0.0, 1.0],
+        origin: DVec3::ZERO,
+        x: radius * DVec3::X,
+        y: radius * DVec3::Y,
+        z: DVec3::Z,
     };
     let ring = vec![
         edge(&cylinder, [0.0, 3.0], [PI, 3.0]),
@@ -448,6 +447,6 @@ fn concave_radii_are_measured() {
 /// A face whose surface is the part of another one over a rectangle.
 fn rectangular(surface: &Surface, rectangle: [[f64; 2]; 2]) -> Face {
     let part = exact(surface, rectangle).unwrap();
-    assert!(add(part.at(rectangle[0][0], rectangle[1][0]).point, [0.0; 3])[0].is_finite());
+    assert!(part.at(rectangle[0][0], rectangle[1][0]).point.is_finite());
     face(Surface::Spline(part), Vec::new(), 1.0)
 }

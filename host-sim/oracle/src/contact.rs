@@ -2,7 +2,8 @@
 
 use std::fmt;
 
-use super::surface::{Derivatives, Surface};
+use super::derivatives::Derivatives;
+use super::surface::Surface;
 use glam::DVec3;
 use job::{Along, Job, Pattern, Side, Spacing};
 

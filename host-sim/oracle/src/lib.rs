@@ -21,6 +21,7 @@
 
 mod arc;
 mod contact;
+mod derivatives;
 mod nurbs;
 mod offset;
 mod report;
@@ -28,12 +29,12 @@ mod schedule;
 mod surface;
 #[cfg(test)]
 mod tests;
-pub mod vector;
 mod verify;
 
 pub use contact::{Contact, Oracle, OracleError};
+pub use derivatives::Derivatives;
 pub use offset::OffsetPoint;
 pub use report::{AccuracyBounds, AccuracyReport, ErrorStatistics, SampleLocation};
 pub use schedule::ScheduledPass;
-pub use surface::{Derivatives, Surface};
+pub use surface::Surface;
 pub use verify::{PassSample, SampleCheck, Verifier};

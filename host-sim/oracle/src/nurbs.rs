@@ -1,6 +1,6 @@
 //! Rational and polynomial B-spline surfaces by their basis functions (P&T A2.1, A2.3, A3.6, A4.4).
 
-use super::surface::Derivatives;
+use super::derivatives::{Derivatives, Homogeneous, xyz};
 use glam::DVec3;
 use job::{Along, NurbsSpec};
 
@@ -9,9 +9,6 @@ const ORDER: usize = 4;
 
 /// Basis functions of one span: `[function][derivative]`, 0 beyond the degree.
 type Basis = [[f64; 3]; ORDER];
-
-/// A homogeneous point `(w x, w y, w z, w)` or a derivative of one.
-type Homogeneous = [f64; 4];
 
 /// A B-spline surface in the form used for evaluation.
 #[derive(Clone, Debug)]
@@ -79,7 +76,7 @@ impl Nurbs {
             accumulate(&mut s_vv, in_u[0], &row_vv);
         }
         if self.rational {
-            return quotient(&s, &s_u, &s_v, &s_uu, &s_uv, &s_vv);
+            return Derivatives::from_homogeneous([s, s_u, s_v, s_uu, s_uv, s_vv]);
         }
         Derivatives {
             point: xyz(&s),
@@ -192,32 +189,5 @@ fn differentiated(lower: &[f64; ORDER], supports: &[[f64; ORDER]; ORDER], degree
 fn accumulate(sum: &mut Homogeneous, factor: f64, term: &Homogeneous) {
     for (sum, term) in sum.iter_mut().zip(term) {
         *sum += factor * term;
-    }
-}
-
-fn xyz(a: &Homogeneous) -> DVec3 {
-    DVec3::new(a[0], a[1], a[2])
-}
-
-/// Derivatives of `(x, y, z) / w` from those of the homogeneous surface (P&T A4.4).
-fn quotient(
-    s: &Homogeneous,
-    s_u: &Homogeneous,
-    s_v: &Homogeneous,
-    s_uu: &Homogeneous,
-    s_uv: &Homogeneous,
-    s_vv: &Homogeneous,
-) -> Derivatives {
-    let w = s[3];
-    let point = xyz(s) / w;
-    let u = (xyz(s_u) - s_u[3] * point) / w;
-    let v = (xyz(s_v) - s_v[3] * point) / w;
-    Derivatives {
-        point,
-        u,
-        v,
-        uu: (xyz(s_uu) - 2.0 * s_u[3] * u - s_uu[3] * point) / w,
-        uv: (xyz(s_uv) - s_u[3] * v - s_v[3] * u - s_uv[3] * point) / w,
-        vv: (xyz(s_vv) - 2.0 * s_v[3] * v - s_vv[3] * point) / w,
     }
 }

@@ -2,7 +2,7 @@
 //! commanded centre.
 
 use super::contact::{Contact, Oracle, OracleError};
-use super::surface::Derivatives;
+use super::derivatives::Derivatives;
 use glam::DVec3;
 use job::Along;
 

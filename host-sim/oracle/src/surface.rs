@@ -1,25 +1,9 @@
 //! S(u, v) and its derivatives, directly from the job's numbers.
 
+use super::derivatives::Derivatives;
 use super::nurbs::Nurbs;
 use glam::DVec3;
 use job::{Along, SurfaceSpec};
-
-/// A point of a surface with its derivatives, mm.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Derivatives {
-    /// S.
-    pub point: DVec3,
-    /// S_u.
-    pub u: DVec3,
-    /// S_v.
-    pub v: DVec3,
-    /// S_uu.
-    pub uu: DVec3,
-    /// S_uv.
-    pub uv: DVec3,
-    /// S_vv.
-    pub vv: DVec3,
-}
 
 /// A surface, evaluated on its closed [`domain`](Surface::domain).
 #[derive(Clone, Debug)]

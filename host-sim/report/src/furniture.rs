@@ -2,10 +2,11 @@
 
 use std::fmt::Write;
 
-use super::picture::PictureTexts;
 use super::scene::Ball;
 use super::svg::{escape, tenths};
+use super::texts::PictureTexts;
 use super::view::View;
+use glam::{DVec2, DVec3};
 
 const STYLE: &str = include_str!("picture.css");
 /// Largest length of the scale bar, pixels.
@@ -74,7 +75,7 @@ fn dot(out: &mut String, class: &str, [x, y]: [f64; 2], radius: f64) {
 
 /// The ball, to scale, semi-transparent.
 pub(super) fn ball(out: &mut String, ball: &Ball) {
-    let [x, y, r] = [ball.cl[0], ball.cl[1], ball.radius].map(tenths);
+    let [x, y, r] = [ball.cl.x, ball.cl.y, ball.radius].map(tenths);
     let _ = writeln!(
         out,
         "<circle cx=\"{x}\" cy=\"{y}\" r=\"{r}\" fill=\"url(#iso-ball)\" stroke=\"#6b4e0c\" stroke-width=\"1.2\"/>"
@@ -83,7 +84,7 @@ pub(super) fn ball(out: &mut String, ball: &Ball) {
 
 /// Contact and centre of the ball with their labels.
 pub(super) fn contact(out: &mut String, ball: &Ball) {
-    let [cc, cl] = [ball.cc, ball.cl].map(|[x, y, _]| [x, y]);
+    let [cc, cl] = [ball.cc, ball.cl].map(|at| at.truncate().to_array());
     line(out, "iso-radius", cl, cc);
     dot(out, "iso-one-fill", cc, 4.0);
     dot(out, "iso-cl-fill", cl, 4.0);
@@ -117,10 +118,8 @@ pub(super) fn contact(out: &mut String, ball: &Ball) {
 
 /// The directions of the axes.
 pub(super) fn triad(out: &mut String, view: &View, [x, y]: [f64; 2]) {
-    for (axis, name) in ["x", "y", "z"].into_iter().enumerate() {
-        let mut direction = [0.0; 3];
-        direction[axis] = 1.0;
-        let [right, up, _] = view.turn(direction);
+    for (name, direction) in ["x", "y", "z"].into_iter().zip(DVec3::AXES) {
+        let DVec2 { x: right, y: up } = view.turn(direction).truncate();
         let tip = [x + ARM * right, y - ARM * up];
         let length = right.hypot(up);
         if length < 0.1 {

@@ -15,6 +15,7 @@
 //! The stored data of a run is bounded. A point of the view represents the worst of its samples, a point of a chart the minimum and
 //! the maximum, and the page states the number of samples per point.
 
+mod content;
 #[cfg(test)]
 mod data_tests;
 mod embed;
@@ -32,8 +33,8 @@ mod series;
 pub mod svg;
 #[cfg(test)]
 mod tests;
+mod texts;
 mod track;
-mod vector;
 mod view;
 
 use std::io;
@@ -44,31 +45,11 @@ use job::Job;
 use oracle::{Oracle, PassSample, SampleCheck};
 use verify::survey::SurveyResult;
 
+use content::Content;
+use texts::PictureTexts;
+
+pub use content::{Figure, Remarks};
 pub use scallops::{RidgePoint, Scallops};
-
-/// A figure in the summary of the page.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Figure {
-    /// Name.
-    pub what: String,
-    /// Value and unit, formatted.
-    pub value: String,
-}
-
-/// Remarks on a page besides the figures of the samples.
-#[derive(Clone, Debug, Default)]
-pub struct Remarks {
-    /// Failures of the run, worst first: a fault, a figure out of bounds. One sentence each; further lines are the remedy.
-    pub failures: Vec<String>,
-    /// Warnings: no failures, but relevant for the run.
-    pub warnings: Vec<String>,
-    /// Whether all checks were made; only then a page without failures states that the run passed.
-    pub verified: bool,
-    /// Further figures of the command.
-    pub figures: Vec<Figure>,
-    /// Scallop heights, if they were measured.
-    pub scallops: Option<Scallops>,
-}
 
 /// Collects the data of a report in bounded memory, independent of the length of the run.
 #[derive(Clone, Debug)]
@@ -114,7 +95,7 @@ impl Sketch {
     /// The job asks for an upper side that the surface does not have.
     pub fn picture(&self, job_name: &Path, findings: &SurveyResult) -> io::Result<String> {
         let oracle = Oracle::new(&self.job).map_err(io::Error::other)?;
-        let words = page::words(&self.job, &self.record, job_name, findings);
+        let words = PictureTexts::new(&self.job, &self.record, job_name, findings);
         let mesh = mesh::Mesh::new(&oracle);
         Ok(picture::picture(&mesh, &self.record, self.job.radius_mm, &words).svg)
     }
@@ -133,9 +114,9 @@ impl Sketch {
     ) -> io::Result<PathBuf> {
         let oracle = Oracle::new(&self.job).map_err(io::Error::other)?;
         let mesh = mesh::Mesh::new(&oracle);
-        let words = page::words(&self.job, &self.record, job_name, findings);
+        let words = PictureTexts::new(&self.job, &self.record, job_name, findings);
         let picture = picture::picture(&mesh, &self.record, self.job.radius_mm, &words);
-        let page = page::page(&page::Content {
+        let page = page::page(&Content {
             job: &self.job,
             approach: self.approach,
             oracle: &oracle,

@@ -1,6 +1,6 @@
 //! The surface as a grid of quads, evaluated by the oracle.
 
-use super::vector::{Vector, add_scaled, cross, dot, length, subtract, unit};
+use glam::DVec3;
 use oracle::Oracle;
 
 /// Approximate number of shaded quads of the picture; their aspect ratio is as near 1 as the surface allows.
@@ -14,9 +14,9 @@ pub(super) const FINE: usize = 3;
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Quad {
     /// Corners in order around it, mm.
-    pub(super) corners: [Vector; 4],
+    pub(super) corners: [DVec3; 4],
     /// Unit normal towards the tool, at its middle.
-    pub(super) normal: Vector,
+    pub(super) normal: DVec3,
     /// Area, mm².
     pub(super) area: f64,
 }
@@ -27,7 +27,7 @@ pub(super) struct Mesh {
     /// Fine cells in u and v, multiples of [`FINE`].
     cells: [usize; 2],
     /// Row by row: u ascending, within it v.
-    points: Vec<Vector>,
+    points: Vec<DVec3>,
     /// 1 or -1: the sign of the tool side on the grid's own normals.
     sign: f64,
 }
@@ -41,7 +41,6 @@ impl Mesh {
                 .surface
                 .at(u[0] + (u[1] - u[0]) * s, v[0] + (v[1] - v[0]) * t)
                 .point
-                .to_array()
         };
         let lengths = [measure(at), measure(|t, s| at(s, t))];
         let ratio = (lengths[0] / lengths[1].max(1e-12)).clamp(0.01, 100.0).sqrt();
@@ -70,11 +69,11 @@ impl Mesh {
     }
 
     /// All points: u ascending, within it v, one more each way than there are cells.
-    pub(super) fn points(&self) -> &[Vector] {
+    pub(super) fn points(&self) -> &[DVec3] {
         &self.points
     }
 
-    fn point(&self, i: usize, j: usize) -> Vector {
+    fn point(&self, i: usize, j: usize) -> DVec3 {
         self.points[i * (self.cells[1] + 1) + j]
     }
 
@@ -97,16 +96,16 @@ impl Mesh {
             self.point(i, j_end),
         ];
         // Half the cross product of the diagonals, which is also correct for a quad degenerated to a triangle.
-        let product = cross(subtract(corners[2], corners[0]), subtract(corners[3], corners[1]));
+        let product = (corners[2] - corners[0]).cross(corners[3] - corners[1]);
         Quad {
             corners,
-            normal: unit(product.map(|x| x * self.sign)),
-            area: 0.5 * length(product),
+            normal: (product * self.sign).normalize_or_zero(),
+            area: 0.5 * product.length(),
         }
     }
 
     /// Corner points of the surface and some between, which the frame must contain.
-    pub(super) fn extent(&self) -> Vec<Vector> {
+    pub(super) fn extent(&self) -> Vec<DVec3> {
         self.points
             .iter()
             .copied()
@@ -116,7 +115,7 @@ impl Mesh {
     }
 
     /// The boundary curves of the surface, without degenerate ones.
-    pub(super) fn edges(&self) -> Vec<Vec<Vector>> {
+    pub(super) fn edges(&self) -> Vec<Vec<DVec3>> {
         let [rows, columns] = self.cells;
         let edges = [
             (0..=rows).map(|i| self.point(i, 0)).collect(),
@@ -124,23 +123,19 @@ impl Mesh {
             (0..=columns).map(|j| self.point(0, j)).collect(),
             (0..=columns).map(|j| self.point(rows, j)).collect::<Vec<_>>(),
         ];
-        let is_long = |edge: &Vec<Vector>| {
-            edge.windows(2)
-                .map(|ends| length(subtract(ends[1], ends[0])))
-                .sum::<f64>()
-                > 1e-9
-        };
+        let is_long =
+            |edge: &Vec<DVec3>| edge.windows(2).map(|ends| ends[1].distance(ends[0])).sum::<f64>() > 1e-9;
         edges.into_iter().filter(is_long).collect()
     }
 
     /// An iso-parametric line through the middle of the surface.
-    pub(super) fn side(&self) -> Vector {
+    pub(super) fn side(&self) -> DVec3 {
         let [rows, columns] = self.cells;
         let lines = [
-            subtract(self.point(rows, columns / 2), self.point(0, columns / 2)),
-            subtract(self.point(rows / 2, columns), self.point(rows / 2, 0)),
+            self.point(rows, columns / 2) - self.point(0, columns / 2),
+            self.point(rows / 2, columns) - self.point(rows / 2, 0),
         ];
-        let level = |line: &Vector| line[0].hypot(line[1]);
+        let level = |line: &DVec3| line.x.hypot(line.y);
         if level(&lines[0]) > level(&lines[1]) {
             lines[0]
         } else {
@@ -149,37 +144,31 @@ impl Mesh {
     }
 
     /// Normal towards the tool, averaged over the area.
-    pub(super) fn mean_normal(&self) -> Vector {
+    pub(super) fn mean_normal(&self) -> DVec3 {
         let sum = self
             .quads(FINE)
-            .fold([0.0; 3], |sum, quad| add_scaled(sum, quad.normal, quad.area));
+            .fold(DVec3::ZERO, |sum, quad| sum + quad.normal * quad.area);
         let area: f64 = self.quads(FINE).map(|quad| quad.area).sum();
-        sum.map(|x| x / area.max(1e-12))
+        sum / area.max(1e-12)
     }
 
     /// Length of the diagonal of the bounding box, mm.
     pub(super) fn diagonal(&self) -> f64 {
-        let [low, high] =
-            self.points
-                .iter()
-                .fold([[f64::INFINITY; 3], [f64::NEG_INFINITY; 3]], |[low, high], p| {
-                    [
-                        std::array::from_fn(|k| low[k].min(p[k])),
-                        std::array::from_fn(|k| high[k].max(p[k])),
-                    ]
-                });
-        dot(subtract(high, low), subtract(high, low)).sqrt()
+        let none = [DVec3::INFINITY, DVec3::NEG_INFINITY];
+        let [low, high] = self
+            .points
+            .iter()
+            .fold(none, |[low, high], point| [low.min(*point), high.max(*point)]);
+        high.distance(low)
     }
 }
 
 /// Mean length of three lines across a surface, each along the first argument at a fixed second one; both 0 to 1.
-fn measure(at: impl Fn(f64, f64) -> Vector) -> f64 {
+fn measure(at: impl Fn(f64, f64) -> DVec3) -> f64 {
     const STEPS: u32 = 48;
     let line = |s: f64| {
         let point = |k: u32| at(f64::from(k) / f64::from(STEPS), s);
-        (0..STEPS)
-            .map(|k| length(subtract(point(k + 1), point(k))))
-            .sum::<f64>()
+        (0..STEPS).map(|k| point(k + 1).distance(point(k))).sum::<f64>()
     };
     [0.1, 0.5, 0.9].map(line).iter().sum::<f64>() / 3.0
 }

@@ -1,20 +1,14 @@
 //! `index.html`: view, charts, figures and warnings on one self-contained page.
 
 use std::fmt::Write;
-use std::path::Path;
 
-use super::Remarks;
-use super::mesh::Mesh;
+use super::content::Content;
 use super::number::{duration, fixed, grouped, significant};
 use super::payload::payload;
-use super::picture::{Picture, PictureTexts};
-use super::record::Record;
-use super::series::Series;
+use super::scallops::Scallops;
 use super::svg::escape;
-use super::track::Track;
 use approach::Kind;
-use job::{Along, Job, Pattern};
-use oracle::Oracle;
+use job::{Along, Job};
 use verify::survey::SurveyResult;
 
 /// Style sheet of the pages.
@@ -39,68 +33,6 @@ const SCRIPTS: [&str; 6] = [
 const VIEW: &str = include_str!("viewer/view.html");
 const CHARTS: &str = include_str!("viewer/charts.html");
 const LICENCES: &str = include_str!("viewer/three-bundle.licence.txt");
-
-/// Content of the page.
-pub(super) struct Content<'a> {
-    pub(super) job: &'a Job,
-    pub(super) approach: Kind,
-    pub(super) oracle: &'a Oracle,
-    pub(super) mesh: &'a Mesh,
-    pub(super) record: &'a Record,
-    pub(super) track: &'a Track,
-    /// Finished.
-    pub(super) series: &'a Series,
-    pub(super) findings: &'a SurveyResult,
-    pub(super) remarks: &'a Remarks,
-    pub(super) words: &'a PictureTexts,
-    pub(super) picture: &'a Picture,
-}
-
-/// What picture and page say about the job.
-pub(super) fn words(job: &Job, record: &Record, job_name: &Path, findings: &SurveyResult) -> PictureTexts {
-    let title = job_name
-        .file_stem()
-        .map_or_else(|| "job".to_owned(), |name| name.to_string_lossy().into_owned());
-    let along = parameter(job.along);
-    let passes = findings.passes;
-    let plural = if passes == 1 { "pass" } else { "passes" };
-    let order = match job.pattern {
-        Pattern::Zig => "zig",
-        Pattern::Zigzag => "zigzag",
-    };
-    let subtitle = format!(
-        "{} surface · {passes} {plural} along {along}, {order} · {} mm/min at the cutter contact · scallop {} mm",
-        job.surface.kind(),
-        job.feed_mm_min,
-        job.scallop_mm
-    );
-    let drawn = record.drawn.len();
-    let drawn_of = if drawn == passes as usize {
-        String::new()
-    } else {
-        format!("{drawn} of ")
-    };
-    PictureTexts {
-        subtitle,
-        passes: format!("cutter contact, {drawn_of}{passes} {plural}"),
-        ball: format!("ball, radius {} mm, to scale", job.radius_mm),
-        description: format!(
-            "The {} surface of job {title} in parallel projection, with {drawn} of its {passes} {plural} along {along}. \
-             One pass is highlighted, with its cutter location (CL) path above it; a ball of {} mm radius touches \
-             the surface on it.",
-            job.surface.kind(),
-            job.radius_mm
-        ),
-        title,
-    }
-}
-
-fn parameter(along: Along) -> &'static str {
-    match along {
-        Along::U => "u",
-        Along::V => "v",
-    }
-}
 
 /// The whole page.
 pub(super) fn page(content: &Content<'_>) -> String {
@@ -177,7 +109,7 @@ fn tiles(out: &mut String, content: &Content<'_>) {
     let (job, findings) = (content.job, content.findings);
     let report = &findings.report;
     let time_s = findings.samples as f64 * job.machine.period_s();
-    let scallops = content.remarks.scallops.as_ref().map(super::Scallops::largest_mm);
+    let scallops = content.remarks.scallops.as_ref().map(Scallops::largest_mm);
     let scallop = match scallops.filter(|height| height.is_finite()) {
         Some(height) => ("Scallop height, max", fixed(height.into(), 5), "mm"),
         None => (

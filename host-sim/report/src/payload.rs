@@ -2,10 +2,11 @@
 
 use serde_json::{Value, json};
 
+use super::content::Content;
 use super::embed::{Scale, words};
 use super::measure::{self, Gap};
-use super::page::Content;
 use super::record::PassInterval;
+use glam::DVec3;
 use job::Along;
 
 const MM_PER_NM: f64 = 1e-6;
@@ -16,30 +17,23 @@ struct Box3 {
 }
 
 impl Box3 {
-    fn around(points: impl Iterator<Item = [f64; 3]>) -> Self {
-        let [low, high] = points.fold(
-            [[f64::INFINITY; 3], [f64::NEG_INFINITY; 3]],
-            |[low, high], point| {
-                [
-                    std::array::from_fn(|k| low[k].min(point[k])),
-                    std::array::from_fn(|k| high[k].max(point[k])),
-                ]
-            },
-        );
-        let longest = (0..3).map(|k| high[k] - low[k]).fold(0.0, f64::max);
+    fn around(points: impl Iterator<Item = DVec3>) -> Self {
+        let none = [DVec3::INFINITY, DVec3::NEG_INFINITY];
+        let [low, high] = points.fold(none, |[low, high], point| [low.min(point), high.max(point)]);
+        let longest = (high - low).max_element().max(0.0);
         let whole = Scale::of([0.0, longest].into_iter());
         Self {
-            scales: low.map(|low| Scale { low, ..whole }),
+            scales: low.to_array().map(|low| Scale { low, ..whole }),
         }
     }
 
-    fn place(&self, mm: [f64; 3]) -> [u16; 3] {
+    fn place(&self, mm: DVec3) -> [u16; 3] {
         std::array::from_fn(|k| self.scales[k].nearest(mm[k]))
     }
 }
 
-fn millimetres(nm: [i32; 3]) -> [f64; 3] {
-    nm.map(|nm| f64::from(nm) * MM_PER_NM)
+fn millimetres(nm: [i32; 3]) -> DVec3 {
+    DVec3::from(nm.map(f64::from)) * MM_PER_NM
 }
 
 /// The data that the scripts of the page read.
@@ -63,7 +57,7 @@ pub(super) fn payload(content: &Content<'_>) -> Value {
         "period": job.machine.period_s(),
         "samples": content.findings.samples,
         "side": side,
-        "toward": content.picture.toward,
+        "toward": content.picture.toward.to_array(),
         "limits": {
             "velocity": job.machine.limits.map(|limits| limits.velocity_mm_s),
             "acceleration": job.machine.limits.map(|limits| limits.acceleration_mm_s2),

@@ -7,8 +7,9 @@ use super::mesh::{Mesh, Quad};
 use super::record::{Place, Record};
 use super::scene::{Layer, Scene};
 use super::svg::{polyline, simplified, tenths};
-use super::vector::{Vector, add_scaled, dot, subtract, unit};
+use super::texts::PictureTexts;
 use super::view::Frame;
+use glam::DVec3;
 
 /// Size of the picture.
 pub(super) const SIZE: [f64; 2] = [960.0, 620.0];
@@ -17,7 +18,7 @@ const FRAME: Frame = [44.0, 84.0, 872.0, 432.0];
 /// Tolerance of the simplification of lines, pixels.
 const TOLERANCE: f64 = 0.12;
 /// Direction to the light: right, up, towards the viewer.
-const LIGHT: Vector = [-0.45, 0.62, 0.64];
+const LIGHT: DVec3 = DVec3::new(-0.45, 0.62, 0.64);
 /// Colour ramp of the tool side from shadow to full light, RGB; colour of the back.
 const RAMP: [[f64; 3]; 3] = [[74.0, 91.0, 112.0], [156.0, 173.0, 192.0], [232.0, 239.0, 246.0]];
 const BACK_RAMP: [[f64; 3]; 3] = [
@@ -35,24 +36,11 @@ const ARROW_PLACES: [f64; 4] = [0.72, 0.25, 0.86, 0.5];
 /// Number of normals drawn between the highlighted pass and its CL path.
 const COMB: usize = 36;
 
-/// Texts of the picture.
-#[derive(Clone, Debug)]
-pub(super) struct PictureTexts {
-    pub(super) title: String,
-    pub(super) subtitle: String,
-    /// Legend of the thin lines: "cutter contact, 55 of 164 passes".
-    pub(super) passes: String,
-    /// Legend of the ball: "ball, radius 6 mm".
-    pub(super) ball: String,
-    /// Alternative text.
-    pub(super) description: String,
-}
-
 /// The picture and its view direction.
 pub(super) struct Picture {
     pub(super) svg: String,
     /// Direction towards the viewer.
-    pub(super) toward: Vector,
+    pub(super) toward: DVec3,
 }
 
 /// The whole picture.
@@ -103,8 +91,7 @@ fn surface(out: &mut String, scene: &Scene<'_>, quads: &[Quad], shading: &Shadin
     for quad in quads {
         let corners = quad
             .corners
-            .map(|corner| scene.camera.place(corner))
-            .map(|[x, y, _]| [x, y]);
+            .map(|corner| scene.camera.place(corner).truncate().to_array());
         let [r, g, b] = shading.colour(scene.camera.view.turn(quad.normal));
         let _ = writeln!(
             out,
@@ -128,7 +115,7 @@ impl Shading {
         let turned = quads
             .iter()
             .map(|quad| scene.camera.view.turn(quad.normal))
-            .filter(|normal| normal[2] > 0.0);
+            .filter(|normal| normal.z > 0.0);
         let [low, high] = turned
             .map(brightness)
             .fold([1.0, 0.0], |[low, high]: [f64; 2], bright| {
@@ -142,9 +129,9 @@ impl Shading {
     }
 
     /// Colour of a face with this normal in camera coordinates.
-    fn colour(&self, normal: Vector) -> [u8; 3] {
-        let is_back = normal[2] < 0.0;
-        let normal = if is_back { normal.map(|x| -x) } else { normal };
+    fn colour(&self, normal: DVec3) -> [u8; 3] {
+        let is_back = normal.z < 0.0;
+        let normal = if is_back { -normal } else { normal };
         // With stronger stretch, the centre moves to the light half of the ramp.
         let middle = self.middle + (1.0 - 1.0 / self.gain) * (MIDDLE - self.middle);
         let bright = (middle + self.gain * (brightness(normal) - self.middle)).clamp(0.0, 1.0);
@@ -159,11 +146,11 @@ impl Shading {
 }
 
 /// Diffuse illumination of a face, 0 to 1.
-fn brightness(normal: Vector) -> f64 {
-    let light = unit(LIGHT);
-    let half = unit(add_scaled(light, [0.0, 0.0, 1.0], 1.0));
-    let gloss = dot(normal, half).max(0.0).powi(24);
-    (0.08 + 0.84 * dot(normal, light).max(0.0) + 0.1 * gloss).min(1.0)
+fn brightness(normal: DVec3) -> f64 {
+    let light = LIGHT.normalize();
+    let half = (light + DVec3::Z).normalize();
+    let gloss = normal.dot(half).max(0.0).powi(24);
+    (0.08 + 0.84 * normal.dot(light).max(0.0) + 0.1 * gloss).min(1.0)
 }
 
 /// One SVG path of all these lines.
@@ -206,8 +193,8 @@ fn normals(out: &mut String, scene: &Scene<'_>, layer: Layer) {
         return;
     };
     let normal = |place: &Place| {
-        let apart = subtract(place.cl_mm, place.cc_mm);
-        let points = (0..=STEPS).map(|k| add_scaled(place.cc_mm, apart, f64::from(k) / f64::from(STEPS)));
+        let apart = place.cl_mm - place.cc_mm;
+        let points = (0..=STEPS).map(|k| place.cc_mm + apart * (f64::from(k) / f64::from(STEPS)));
         scene.in_space(&points.collect::<Vec<_>>())
     };
     let runs: Vec<_> = even(places, COMB).flat_map(normal).collect();
@@ -220,7 +207,7 @@ fn tool_path(out: &mut String, scene: &Scene<'_>) {
         return;
     };
     normals(out, scene, Layer::Over);
-    let centres: Vec<Vector> = places.iter().map(|place| place.cl_mm).collect();
+    let centres: Vec<DVec3> = places.iter().map(|place| place.cl_mm).collect();
     let runs = scene.in_space(&centres);
     lines(out, "iso-line iso-casing", runs.iter().map(|(_, run)| run));
     lines(out, "iso-line iso-cl", runs.iter().map(|(_, run)| run));

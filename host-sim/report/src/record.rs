@@ -1,5 +1,6 @@
 //! Decimated record of a stream of samples, in bounded memory.
 
+use glam::DVec3;
 use job::{Along, Job, Pattern};
 use oracle::PassSample;
 
@@ -68,8 +69,8 @@ impl<T: Copy> DecimatedStream<T> {
 /// Cutter contact (CC) and ball centre (CL) of one sample, mm.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Place {
-    pub(super) cc_mm: [f64; 3],
-    pub(super) cl_mm: [f64; 3],
+    pub(super) cc_mm: DVec3,
+    pub(super) cl_mm: DVec3,
 }
 
 /// A pass that is drawn.
@@ -175,6 +176,6 @@ impl Record {
     }
 }
 
-fn millimetres(nm: [i32; 3]) -> [f64; 3] {
-    nm.map(|nm| f64::from(nm) * MM_PER_NM)
+fn millimetres(nm: [i32; 3]) -> DVec3 {
+    DVec3::from(nm.map(f64::from)) * MM_PER_NM
 }

@@ -2,8 +2,8 @@
 
 use super::mesh::{FINE, Mesh, Quad};
 use super::record::{DrawnPass, Place, Record};
-use super::vector::{Vector, add_scaled, dot, subtract};
 use super::view::{Camera, Depth, Frame, View};
+use glam::DVec3;
 
 /// Largest ball radius that is drawn, as a share of the surface's diagonal: a larger ball would cover the picture.
 const BALL_SHARE: f64 = 0.4;
@@ -29,21 +29,21 @@ pub(super) enum Layer {
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Ball {
     /// Contact and centre in picture coordinates.
-    pub(super) cc: Vector,
-    pub(super) cl: Vector,
+    pub(super) cc: DVec3,
+    pub(super) cl: DVec3,
     /// Pixels.
     pub(super) radius: f64,
 }
 
 impl Ball {
     /// Whether a point is behind the ball. No point is inside the ball, so the plane through its centre decides.
-    fn hides(&self, placed: Vector, margin: f64) -> bool {
-        self.covers(placed, margin) && placed[2] < self.cl[2]
+    fn hides(&self, placed: DVec3, margin: f64) -> bool {
+        self.covers(placed, margin) && placed.z < self.cl.z
     }
 
     /// Whether a point of the picture is within the disc of the ball plus a margin.
-    fn covers(&self, placed: Vector, margin: f64) -> bool {
-        (placed[0] - self.cl[0]).hypot(placed[1] - self.cl[1]) < self.radius + margin
+    fn covers(&self, placed: DVec3, margin: f64) -> bool {
+        (placed.x - self.cl.x).hypot(placed.y - self.cl.y) < self.radius + margin
     }
 }
 
@@ -114,8 +114,8 @@ impl<'a> Scene<'a> {
 
     /// Cosine between the tool normal at a point and the direction to the viewer.
     fn facing(&self, place: &Place) -> f64 {
-        let normal = subtract(place.cl_mm, place.cc_mm);
-        dot(normal, self.camera.view.toward) / dot(normal, normal).sqrt().max(1e-12)
+        let normal = place.cl_mm - place.cc_mm;
+        normal.dot(self.camera.view.toward) / normal.length().max(1e-12)
     }
 
     /// Visible share of the disc of the ball.
@@ -126,11 +126,7 @@ impl<'a> Scene<'a> {
             .flat_map(|x| offsets().map(move |y| (x, y)))
             .filter(|(x, y)| x.hypot(*y) <= 1.0);
         let (shown, all) = disc.fold((0.0, 0.0), |(shown, all), (x, y)| {
-            let spot = [
-                ball.cl[0] + x * ball.radius,
-                ball.cl[1] + y * ball.radius,
-                ball.cl[2],
-            ];
+            let spot = ball.cl + DVec3::new(x * ball.radius, y * ball.radius, 0.0);
             (shown + f64::from(u8::from(self.depth.shows(spot))), all + 1.0)
         });
         shown / all
@@ -138,7 +134,7 @@ impl<'a> Scene<'a> {
 
     /// The quads of the surface, farthest first; and those in front of the ball.
     pub(super) fn quads(&self) -> (Vec<Quad>, Vec<Quad>) {
-        let depth = |quad: &Quad| self.camera.place(middle(quad))[2];
+        let depth = |quad: &Quad| self.camera.place(middle(quad)).z;
         let mut quads: Vec<_> = self.mesh.quads(FINE).collect();
         quads.sort_by(|a, b| depth(a).total_cmp(&depth(b)));
         let in_front = |quad: &&Quad| {
@@ -166,7 +162,7 @@ impl<'a> Scene<'a> {
     }
 
     /// Visible parts of a line in space.
-    pub(super) fn in_space(&self, points: &[Vector]) -> Vec<(Layer, Vec<[f64; 2]>)> {
+    pub(super) fn in_space(&self, points: &[DVec3]) -> Vec<(Layer, Vec<[f64; 2]>)> {
         runs(points.iter().map(|point| {
             let placed = self.camera.place(*point);
             (placed, self.layer(placed))
@@ -199,10 +195,10 @@ impl<'a> Scene<'a> {
             return None;
         }
         let [from, to] = [from, to].map(|place| self.camera.place(place.cc_mm));
-        Some([[placed[0], placed[1]], [to[0] - from[0], to[1] - from[1]]])
+        Some([placed, to - from].map(|at| at.truncate().to_array()))
     }
 
-    fn layer(&self, placed: Vector) -> Layer {
+    fn layer(&self, placed: DVec3) -> Layer {
         if !self.depth.shows(placed) {
             Layer::Hidden
         } else if self.ball.is_some_and(|ball| ball.hides(placed, 0.0)) {
@@ -220,18 +216,18 @@ pub(super) fn highlighted(record: &Record) -> Option<&DrawnPass> {
 }
 
 /// The middle of a quad.
-pub(super) fn middle(quad: &Quad) -> Vector {
+pub(super) fn middle(quad: &Quad) -> DVec3 {
     quad.corners
         .iter()
-        .fold([0.0; 3], |sum, corner| add_scaled(sum, *corner, 0.25))
+        .fold(DVec3::ZERO, |sum, corner| sum + corner * 0.25)
 }
 
 /// Runs of consecutive visible points of one layer. Where a line changes layers, both runs contain the point.
-fn runs(points: impl Iterator<Item = (Vector, Layer)>) -> Vec<(Layer, Vec<[f64; 2]>)> {
+fn runs(points: impl Iterator<Item = (DVec3, Layer)>) -> Vec<(Layer, Vec<[f64; 2]>)> {
     let mut runs: Vec<(Layer, Vec<[f64; 2]>)> = Vec::new();
     let mut before: Option<([f64; 2], Layer)> = None;
     for (placed, layer) in points {
-        let point = [placed[0], placed[1]];
+        let point = placed.truncate().to_array();
         if layer != Layer::Hidden {
             match (runs.last_mut(), before) {
                 (Some((_, run)), Some((_, was))) if was == layer => run.push(point),

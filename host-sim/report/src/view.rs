@@ -1,7 +1,7 @@
 //! The camera: parallel projection and visibility of the surface.
 
 use super::mesh::{FINE, Mesh};
-use super::vector::{Vector, cross, dot, subtract};
+use glam::DVec3;
 
 /// Cells of the depth buffer per pixel.
 const CELLS_PER_PIXEL: f64 = 2.0;
@@ -29,10 +29,10 @@ pub(super) type Frame = [f64; 4];
 /// Axes of the camera in space.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct View {
-    right: Vector,
-    up: Vector,
+    right: DVec3,
+    up: DVec3,
     /// Towards the viewer.
-    pub(super) toward: Vector,
+    pub(super) toward: DVec3,
 }
 
 impl View {
@@ -40,28 +40,28 @@ impl View {
     fn at(azimuth: f64, elevation: f64) -> Self {
         let (sin_a, cos_a) = azimuth.to_radians().sin_cos();
         let (sin_e, cos_e) = elevation.to_radians().sin_cos();
-        let toward = [cos_a * cos_e, sin_a * cos_e, sin_e];
-        let right = [-sin_a, cos_a, 0.0];
+        let toward = DVec3::new(cos_a * cos_e, sin_a * cos_e, sin_e);
+        let right = DVec3::new(-sin_a, cos_a, 0.0);
         Self {
             right,
-            up: cross(toward, right),
+            up: toward.cross(right),
             toward,
         }
     }
 
     /// A direction in camera coordinates: right, up, towards the viewer.
-    pub(super) fn turn(&self, direction: Vector) -> Vector {
-        [
-            dot(direction, self.right),
-            dot(direction, self.up),
-            dot(direction, self.toward),
-        ]
+    pub(super) fn turn(&self, direction: DVec3) -> DVec3 {
+        DVec3::new(
+            direction.dot(self.right),
+            direction.dot(self.up),
+            direction.dot(self.toward),
+        )
     }
 
     /// The candidate with the highest score: visible share of the tool side, filled frame, oblique sides.
-    pub(super) fn best(mesh: &Mesh, extent: &[Vector], frame: Frame) -> Self {
+    pub(super) fn best(mesh: &Mesh, extent: &[DVec3], frame: Frame) -> Self {
         let small = [0.0, 0.0, frame[2] / 6.0, frame[3] / 6.0];
-        let below = mesh.mean_normal()[2] < -0.1;
+        let below = mesh.mean_normal().z < -0.1;
         let mut best = (f64::NEG_INFINITY, Self::at(AZIMUTH_LIKED, 34.0));
         for (elevation, liking) in ELEVATIONS {
             for step in 0..AZIMUTHS {
@@ -79,9 +79,9 @@ impl View {
     }
 
     /// 1 if the sides of the surface are oblique in the picture, less if one is horizontal or along the view.
-    fn across_corner(&self, side: Vector) -> f64 {
-        let away = cross([0.0, 0.0, 1.0], self.right);
-        let aslant = (2.0 * dot(side, away).atan2(dot(side, self.right))).sin().abs();
+    fn across_corner(&self, side: DVec3) -> f64 {
+        let away = DVec3::Z.cross(self.right);
+        let aslant = (2.0 * side.dot(away).atan2(side.dot(self.right))).sin().abs();
         STRAIGHT_ON + (1.0 - STRAIGHT_ON) * (aslant / 0.8).min(1.0)
     }
 }
@@ -94,7 +94,7 @@ fn shown(mesh: &Mesh, camera: &Camera) -> f64 {
     let mut area = 0.0;
     for quad in mesh.quads(FINE) {
         area += quad.area;
-        depth.quad(&quad.corners, dot(quad.normal, camera.view.toward) > 0.0);
+        depth.quad(&quad.corners, quad.normal.dot(camera.view.toward) > 0.0);
     }
     let (front, back) = depth.seen();
     let cell_mm = 1.0 / (CELLS * camera.scale);
@@ -109,19 +109,19 @@ pub(super) struct Camera {
     pub(super) view: View,
     /// Pixels per mm.
     pub(super) scale: f64,
-    origin: Vector,
+    origin: DVec3,
     centre: [f64; 2],
     frame: Frame,
 }
 
 impl Camera {
     /// The camera that fits these points into the frame.
-    pub(super) fn new(view: View, points: &[Vector], frame: Frame) -> Self {
+    pub(super) fn new(view: View, points: &[DVec3], frame: Frame) -> Self {
         let origin = points.first().copied().unwrap_or_default();
         let mut low = [f64::INFINITY; 2];
         let mut high = [f64::NEG_INFINITY; 2];
         for point in points {
-            let turned = view.turn(subtract(*point, origin));
+            let turned = view.turn(*point - origin);
             for k in 0..2 {
                 low[k] = low[k].min(turned[k]);
                 high[k] = high[k].max(turned[k]);
@@ -143,13 +143,13 @@ impl Camera {
     }
 
     /// A point in the picture: x to the right, y down, depth towards the viewer; all in pixels.
-    pub(super) fn place(&self, point: Vector) -> Vector {
-        let turned = self.view.turn(subtract(point, self.origin));
-        [
-            self.centre[0] + turned[0] * self.scale,
-            self.centre[1] - turned[1] * self.scale,
-            turned[2] * self.scale,
-        ]
+    pub(super) fn place(&self, point: DVec3) -> DVec3 {
+        let turned = self.view.turn(point - self.origin);
+        DVec3::new(
+            self.centre[0] + turned.x * self.scale,
+            self.centre[1] - turned.y * self.scale,
+            turned.z * self.scale,
+        )
     }
 }
 
@@ -181,30 +181,30 @@ impl Depth {
     pub(super) fn of(mesh: &Mesh, camera: &Camera) -> Self {
         let mut depth = Self::new(camera, CELLS_PER_PIXEL);
         for quad in mesh.quads(1) {
-            depth.quad(&quad.corners, dot(quad.normal, camera.view.toward) > 0.0);
+            depth.quad(&quad.corners, quad.normal.dot(camera.view.toward) > 0.0);
         }
         depth
     }
 
-    fn quad(&mut self, corners: &[Vector; 4], is_front: bool) {
+    fn quad(&mut self, corners: &[DVec3; 4], is_front: bool) {
         let [a, b, c, d] = corners.map(|corner| self.cell(self.camera.place(corner)));
         self.triangle([a, b, c], is_front);
         self.triangle([a, c, d], is_front);
     }
 
     /// A point of the picture in cells.
-    fn cell(&self, placed: Vector) -> Vector {
+    fn cell(&self, placed: DVec3) -> DVec3 {
         let [left, top, ..] = self.camera.frame;
-        [
-            (placed[0] - left) * self.cells + 1.0,
-            (placed[1] - top) * self.cells + 1.0,
-            placed[2],
-        ]
+        DVec3::new(
+            (placed.x - left) * self.cells + 1.0,
+            (placed.y - top) * self.cells + 1.0,
+            placed.z,
+        )
     }
 
     /// Fills the cells whose centre is in a triangle.
-    fn triangle(&mut self, [a, b, c]: [Vector; 3], is_front: bool) {
-        let area = (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0]);
+    fn triangle(&mut self, [a, b, c]: [DVec3; 3], is_front: bool) {
+        let area = (b.x - a.x) * (c.y - a.y) - (b.y - a.y) * (c.x - a.x);
         if area == 0.0 || !area.is_finite() {
             return;
         }
@@ -217,12 +217,12 @@ impl Depth {
         for row in rows {
             for column in columns.clone() {
                 let (x, y) = (column as f64, row as f64);
-                let at_b = ((x - a[0]) * (c[1] - a[1]) - (y - a[1]) * (c[0] - a[0])) / area;
-                let at_c = ((b[0] - a[0]) * (y - a[1]) - (b[1] - a[1]) * (x - a[0])) / area;
+                let at_b = ((x - a.x) * (c.y - a.y) - (y - a.y) * (c.x - a.x)) / area;
+                let at_c = ((b.x - a.x) * (y - a.y) - (b.y - a.y) * (x - a.x)) / area;
                 if at_b < -1e-9 || at_c < -1e-9 || at_b + at_c > 1.0 + 1e-9 {
                     continue;
                 }
-                let depth = (a[2] + at_b * (b[2] - a[2]) + at_c * (c[2] - a[2])) as f32;
+                let depth = (a.z + at_b * (b.z - a.z) + at_c * (c.z - a.z)) as f32;
                 let index = row * self.size[0] + column;
                 if depth > self.foremost[index] {
                     self.foremost[index] = depth;
@@ -250,8 +250,8 @@ impl Depth {
 
     /// Whether a point is not hidden by the surface. At silhouettes the farthest adjacent cell decides, so that lines on the
     /// surface are visible up to its edge.
-    pub(super) fn shows(&self, placed: Vector) -> bool {
-        let [x, y, depth] = self.cell(placed);
+    pub(super) fn shows(&self, placed: DVec3) -> bool {
+        let DVec3 { x, y, z: depth } = self.cell(placed);
         let around = |value: f64, size: usize| {
             let middle = value.round().clamp(0.0, (size - 1) as f64) as usize;
             middle.saturating_sub(1)..(middle + 2).min(size)

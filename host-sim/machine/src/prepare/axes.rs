@@ -1,5 +1,6 @@
 //! The axis limits of a job, in the core's form.
 
+use glam::DVec3;
 use interp_core::AxisLimits;
 use job::{Job, JobError};
 use patches::placement::extent_mm;
@@ -25,7 +26,7 @@ pub(super) fn axes(job: &Job, tool_sign: f64) -> Result<Option<AxisLimits>, JobE
         Some(home_mm) => home_mm,
         // Above the start of the first pass, where the surface has a normal.
         None => {
-            let [x, y, _] = geometry::first_centre_mm(job, tool_sign).unwrap_or_default();
+            let DVec3 { x, y, .. } = geometry::first_centre_mm(job, tool_sign).unwrap_or_default();
             [x, y, safe_z_mm]
         }
     };

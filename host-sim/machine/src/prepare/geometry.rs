@@ -1,10 +1,9 @@
 //! Geometry of a surface for the preparation: the sign of its upper side, and the tool centre over the first contact. Evaluated from
 //! the pieces that become the core's patches, independently of the oracle, which computes both for itself.
 
+use glam::DVec3;
 use job::{Along, Job, JobError, Side, SurfaceSpec};
 use patches::pieces::{Piece, Source};
-
-type Vector = [f64; 3];
 
 /// Cells per parameter for the average of the surface's normal.
 const GRID: u32 = 48;
@@ -18,10 +17,11 @@ const POLE_STEP: f64 = 1e-4;
 const POLE_SHARE: f64 = 1e-9;
 
 /// A point and its first derivatives.
+#[derive(Default)]
 struct Frame {
-    point: Vector,
-    u: Vector,
-    v: Vector,
+    point: DVec3,
+    u: DVec3,
+    v: DVec3,
 }
 
 /// A surface in a form for evaluation.
@@ -29,18 +29,6 @@ struct Frame {
 enum SurfaceEvaluator {
     Pieces { source: Source, breaks: [Vec<f64>; 2] },
     Profile { radius: [f64; 4], height: [f64; 4] },
-}
-
-fn cross(a: Vector, b: Vector) -> Vector {
-    [
-        a[1] * b[2] - a[2] * b[1],
-        a[2] * b[0] - a[0] * b[2],
-        a[0] * b[1] - a[1] * b[0],
-    ]
-}
-
-fn length(a: Vector) -> f64 {
-    a.iter().map(|x| x * x).sum::<f64>().sqrt()
 }
 
 /// Value and derivative of a cubic, highest power first.
@@ -90,9 +78,9 @@ impl SurfaceEvaluator {
                 let ([r, dr], [z, dz]) = (cubic(*radius, u), cubic(*height, u));
                 let (sin, cos) = v.sin_cos();
                 Frame {
-                    point: [r * cos, r * sin, z],
-                    u: [dr * cos, dr * sin, dz],
-                    v: [-r * sin, r * cos, 0.0],
+                    point: DVec3::new(r * cos, r * sin, z),
+                    u: DVec3::new(dr * cos, dr * sin, dz),
+                    v: DVec3::new(-r * sin, r * cos, 0.0),
                 }
             }
             Self::Pieces { source, breaks } => {
@@ -108,11 +96,7 @@ fn in_piece(piece: &Piece, us: [f64; 2], vs: [f64; 2], [u, v]: [f64; 2]) -> Fram
     let centred = |[start, end]: [f64; 2], at: f64| (at - start) / (end - start) - 0.5;
     let (s, t) = (centred(us, u), centred(vs, v));
     let [weight, weight_u, weight_v] = bicubic(&piece[3], s, t);
-    let mut frame = Frame {
-        point: [0.0; 3],
-        u: [0.0; 3],
-        v: [0.0; 3],
-    };
+    let mut frame = Frame::default();
     for (axis, numerator) in piece.iter().take(3).enumerate() {
         let [value, along, across] = bicubic(numerator, s, t);
         let point = value / weight;
@@ -142,10 +126,10 @@ pub(super) fn tool_sign(job: &Job) -> Result<f64, JobError> {
     for i in 0..GRID {
         for j in 0..GRID {
             let frame = surface.at(middle(us, i), middle(vs, j));
-            let normal = cross(frame.u, frame.v);
-            upright += normal[2];
-            upright_magnitude += normal[2].abs();
-            area += length(normal);
+            let normal = frame.u.cross(frame.v);
+            upright += normal.z;
+            upright_magnitude += normal.z.abs();
+            area += normal.length();
         }
     }
     if upright.abs() > BALANCE_MIN * upright_magnitude && upright_magnitude > UPRIGHT_MIN * area {
@@ -159,16 +143,16 @@ pub(super) fn tool_sign(job: &Job) -> Result<f64, JobError> {
 }
 
 /// The tool centre over the first contact of the first pass, mm; `None` where the surface has no normal there.
-pub(super) fn first_centre_mm(job: &Job, sign: f64) -> Option<Vector> {
+pub(super) fn first_centre_mm(job: &Job, sign: f64) -> Option<DVec3> {
     let surface = SurfaceEvaluator::new(&job.surface);
     let [us, vs] = job.surface.domain();
     let frame = surface.at(us[0], vs[0]);
     let (reach_u, reach_v) = (
-        length(frame.u) * (us[1] - us[0]),
-        length(frame.v) * (vs[1] - vs[0]),
+        frame.u.length() * (us[1] - us[0]),
+        frame.v.length() * (vs[1] - vs[0]),
     );
     let normal = if reach_u.min(reach_v) > POLE_SHARE * reach_u.max(reach_v) {
-        unit(cross(frame.u, frame.v))?
+        unit(frame.u.cross(frame.v))?
     } else {
         // The normal near the pole, extrapolated to it by a parabola.
         let beside = |k: f64| {
@@ -178,19 +162,17 @@ pub(super) fn first_centre_mm(job: &Job, sign: f64) -> Option<Vector> {
             } else {
                 surface.at(step(us), vs[0])
             };
-            unit(cross(place.u, place.v))
+            unit(place.u.cross(place.v))
         };
         let (one, two, three) = (beside(1.0)?, beside(2.0)?, beside(3.0)?);
-        unit(std::array::from_fn(|k| 3.0 * (one[k] - two[k]) + three[k]))?
+        unit(3.0 * (one - two) + three)?
     };
-    Some(std::array::from_fn(|k| {
-        frame.point[k] + sign * job.radius_mm * normal[k]
-    }))
+    Some(frame.point + sign * job.radius_mm * normal)
 }
 
-fn unit(a: Vector) -> Option<Vector> {
-    let size = length(a);
-    (size > 0.0 && size.is_finite()).then(|| a.map(|x| x / size))
+fn unit(a: DVec3) -> Option<DVec3> {
+    let size = a.length();
+    (size > 0.0 && size.is_finite()).then(|| a / size)
 }
 
 /// The sign on `S_path x S_side`.
@@ -230,12 +212,10 @@ mod tests {
                 let sign = tool_sign(&job).unwrap();
                 assert_eq!(sign, oracle.normal_sign, "{name} {side:?}");
                 let [us, vs] = job.surface.domain();
-                let exact = oracle.contact(us[0], vs[0]).unwrap().cl_mm.to_array();
+                let exact = oracle.contact(us[0], vs[0]).unwrap().cl_mm;
                 let ours = first_centre_mm(&job, sign).unwrap();
-                for (ours, exact) in ours.iter().zip(exact) {
-                    // A nanometre: the machine's own resolution.
-                    assert!((ours - exact).abs() < 1e-6, "{name} {side:?}: {ours} for {exact}");
-                }
+                // A nanometre: the machine's own resolution.
+                assert!(ours.distance(exact) < 1e-6, "{name} {side:?}: {ours} for {exact}");
             }
         }
     }

@@ -43,13 +43,8 @@ pub(super) fn local_curvature(at: &Derivatives, oracle: &Oracle) -> Option<(DVec
         return None;
     }
     let normal = product * (oracle.normal_sign / area);
-    let (e, f, g) = (at.u.length_squared(), at.u.dot(at.v), at.v.length_squared());
-    let (l, m, n) = (at.uu.dot(normal), at.uv.dot(normal), at.vv.dot(normal));
-    let mean = 0.5 * (e * n - 2.0 * f * m + g * l) / (area * area);
-    let gauss = (l * n - m * m) / (area * area);
-    let spread = (mean * mean - gauss).max(0.0).sqrt();
     let curvature = LocalCurvature {
-        principal: [mean - spread, mean + spread],
+        principal: at.principal_curvatures(normal),
         per_mm: [speed_v / area, speed_u / area],
     };
     Some((normal, curvature))
