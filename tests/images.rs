@@ -1,10 +1,11 @@
-//! The firmware's image and the set-up that counts its cycles, each built once for all tests.
+//! The firmware's image, the set-up that counts its cycles, and the ticks of the sample jobs that it counted, made once for all tests.
 
 use std::path::{Path, PathBuf};
 use std::sync::OnceLock;
 
-use cycles::image;
-use cycles::measure::MeasurementSetup;
+use cycles::measure::{MeasurementSetup, Ticks};
+use cycles::{SURFACES, TICKS, image};
+use machine::prepare::prepare;
 use machine::remote::qemu;
 
 /// The image for QEMU.
@@ -19,5 +20,16 @@ pub(crate) fn setup() -> &'static MeasurementSetup {
     SETUP.get_or_init(|| {
         let (plan, _) = image::read(for_qemu()).unwrap();
         MeasurementSetup::new(for_qemu(), &plan).unwrap()
+    })
+}
+
+/// Counted ticks of the sample job of a surface: the first [`TICKS`] of it.
+pub(crate) fn ticks_of(surface: &str) -> &'static Ticks {
+    static COUNTED: [OnceLock<Ticks>; SURFACES.len()] = [const { OnceLock::new() }; SURFACES.len()];
+    let index = SURFACES.iter().position(|(name, _)| *name == surface).unwrap();
+    COUNTED[index].get_or_init(|| {
+        let file = programs::sample_job(SURFACES[index].1);
+        let prepared = prepare(&job_file::load(&file).unwrap()).unwrap();
+        setup().run(&prepared, TICKS).unwrap()
     })
 }

@@ -1,30 +1,17 @@
 //! Operations of a sample, counted from the executed instructions of the firmware, against the operations in the source of the
 //! core, summed by hand. Needs `qemu-system-arm`; builds the firmware and the plugin.
 
-use std::sync::OnceLock;
-
 use cycle_plugin::plan::Stage;
-use cycles::measure::{MeasurementSetup, Ticks};
+use cycles::golden;
+use cycles::measure::Ticks;
 use cycles::operations::{Operations, count, of_tick};
-use cycles::{SURFACES, TICKS, golden, image};
-use machine::prepare::prepare;
-use machine::remote::qemu;
 use study::operations::{PAPER, in_table};
 
-/// Ticks of the three jobs of Table 1, in the table's order.
-fn measured() -> &'static [Ticks; 3] {
-    static TICKS_OF_JOBS: OnceLock<[Ticks; 3]> = OnceLock::new();
-    TICKS_OF_JOBS.get_or_init(|| {
-        let path = qemu::firmware().unwrap();
-        let (plan, _) = image::read(&path).unwrap();
-        let setup = MeasurementSetup::new(&path, &plan).unwrap();
-        PAPER.map(|row| {
-            let (_, job) = SURFACES.iter().find(|(name, _)| *name == row.surface).unwrap();
-            let file = programs::sample_job(job);
-            let prepared = prepare(&job_file::load(&file).unwrap()).unwrap();
-            setup.run(&prepared, TICKS).unwrap()
-        })
-    })
+use crate::images;
+
+/// Ticks of the three jobs of Table 1, in its order.
+fn measured() -> [&'static Ticks; 3] {
+    PAPER.map(|row| images::ticks_of(row.surface))
 }
 
 // Additions and multiplications in the source. First the stages of all surfaces: the parameter step with the 64-bit sum of the

@@ -4,6 +4,11 @@
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
+/// The workspace: there Cargo chooses the same features as for `cargo test`, and builds no dependency a second time.
+fn workspace() -> &'static Path {
+    Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/.."))
+}
+
 /// Runs a program to its end; its output.
 fn run(command: &mut Command) -> String {
     let output = command
@@ -25,16 +30,9 @@ fn build_folder() -> PathBuf {
 
 fn example(name: &str) -> String {
     run(Command::new(env!("CARGO"))
-        .args([
-            "run",
-            "--quiet",
-            "-p",
-            "interp-core",
-            "--example",
-            name,
-            "--target-dir",
-        ])
-        .arg(build_folder().parent().unwrap()))
+        .args(["run", "--quiet", "--example", name, "--target-dir"])
+        .arg(build_folder().parent().unwrap())
+        .current_dir(workspace()))
 }
 
 /// Passes and samples of the dome, as every example that runs it says them.
@@ -68,16 +66,9 @@ fn the_core_is_called_from_c() {
         return;
     }
     run(Command::new(env!("CARGO"))
-        .args([
-            "build",
-            "--quiet",
-            "-p",
-            "interp-core",
-            "--example",
-            "c_api",
-            "--target-dir",
-        ])
-        .arg(build_folder().parent().unwrap()));
+        .args(["build", "--quiet", "--example", "c_api", "--target-dir"])
+        .arg(build_folder().parent().unwrap())
+        .current_dir(workspace()));
     let source = Path::new(env!("CARGO_MANIFEST_DIR")).join("examples");
     let program = Path::new(env!("CARGO_TARGET_TMPDIR")).join("c_api");
     run(Command::new("cc")

@@ -40,8 +40,16 @@ fn cargo(arguments: &[&str]) {
 fn built() -> &'static Built {
     static BUILT: OnceLock<Built> = OnceLock::new();
     BUILT.get_or_init(|| {
-        cargo(&["build", "-p", "chip"]);
-        cargo(&["build", "--bin", "host-sim"]);
+        // With a test: Cargo then chooses the same features as for `cargo test`, and what that has built is not built again.
+        cargo(&[
+            "build",
+            "--bin",
+            "chip",
+            "--bin",
+            "host-sim",
+            "--test",
+            "integration",
+        ]);
         for board in [&STM32F405, &SKR_PRO] {
             cargo(&[board.build.0]);
         }

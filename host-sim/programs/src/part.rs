@@ -71,6 +71,9 @@ impl Part {
     pub(crate) fn build(self) -> Vec<String> {
         let words: Vec<&str> = match (self.image(), self.program()) {
             (Some((alias, _)), _) => vec![alias, "--quiet", "--locked"],
+            // By its name among the default members: with -p, features of its dependencies would differ from those that the tests use, and
+            // all of them would be built a second time.
+            (None, Some((_, "dev", file))) => vec!["build", "--quiet", "--locked", "--bin", file],
             (None, Some((package, profile, _))) => {
                 vec![
                     "build",
