@@ -386,10 +386,10 @@ fn the_image_is_bounded() {
     assert!(u64::from(analysis.stack_bytes()) < sizes.stack_room);
 }
 
-/// Figures and operations of a job of the table.
-fn counted((name, path, ticks): (&str, PathBuf, u32)) -> (Vec<Figure>, (String, Operations)) {
+/// Figures and operations of a job of the table; not the shared measurement where `again`.
+fn counted((name, path, ticks): (&str, PathBuf, u32), again: bool) -> (Vec<Figure>, (String, Operations)) {
     let other;
-    let ticks = if SURFACES.iter().any(|(surface, _)| *surface == name) {
+    let ticks = if !again && SURFACES.iter().any(|(surface, _)| *surface == name) {
         images::ticks_of(name)
     } else {
         let prepared = prepare(&job_file::load(&path).unwrap()).unwrap();
@@ -401,12 +401,16 @@ fn counted((name, path, ticks): (&str, PathBuf, u32)) -> (Vec<Figure>, (String, 
 }
 
 /// Figures and operations of all jobs of the table, measured in parallel on all processors.
-fn all_counted() -> (Vec<Figure>, Vec<(String, Operations)>) {
+fn all_counted(again: bool) -> (Vec<Figure>, Vec<(String, Operations)>) {
     let jobs = Mutex::new(cycles::jobs().into_iter());
     let next = || jobs.lock().unwrap().next();
     let threads = std::thread::available_parallelism().map_or(1, NonZero::get);
     let counted: Vec<_> = std::thread::scope(|scope| {
-        let worker = || std::iter::from_fn(next).map(counted).collect::<Vec<_>>();
+        let worker = || {
+            std::iter::from_fn(next)
+                .map(|job| counted(job, again))
+                .collect::<Vec<_>>()
+        };
         let workers: Vec<_> = (0..threads).map(|_| scope.spawn(worker)).collect();
         let counted = workers.into_iter().flat_map(|worker| worker.join().unwrap());
         counted.collect()
@@ -415,11 +419,22 @@ fn all_counted() -> (Vec<Figure>, Vec<(String, Operations)>) {
     (figures.into_iter().flatten().collect(), operations)
 }
 
-fn check_growth(figures: &[Figure], counts: &[(String, Operations)]) {
+/// Measurements after which a difference from the golden table counts.
+const MEASUREMENTS: u32 = 3;
+
+/// Compares with the golden table; `measure` gets the number of measurements before. A busy machine may stop QEMU within a tick for longer
+/// than a period, and the firmware then counts a missed one, which takes some hundred cycles: growth is what each measurement shows.
+fn check_growth(measure: impl Fn(u32) -> (Vec<Figure>, Vec<(String, Operations)>)) {
     let table = std::fs::read_to_string(golden::path()).unwrap();
-    let differences = golden::differences(&table, figures, counts);
-    assert!(
-        differences.is_empty(),
+    let mut differences = Vec::new();
+    for before in 0..MEASUREMENTS {
+        let (figures, counts) = measure(before);
+        differences = golden::differences(&table, &figures, &counts);
+        if differences.is_empty() {
+            return;
+        }
+    }
+    panic!(
         "old -> new; if it is meant to be so, `cargo sim budget --bless`:\n{}",
         differences.join("\n")
     );
@@ -428,20 +443,22 @@ fn check_growth(figures: &[Figure], counts: &[(String, Operations)]) {
 /// No stage takes more than 2 % more cycles than in the golden table, and a sample executes the same operations.
 #[test]
 fn no_stage_has_grown() {
-    let (all, counts) = all_counted();
-    for (name, ..) in cycles::jobs() {
-        assert!(all.iter().any(|figure| figure.surface == name), "{name}");
-    }
-    for figure in all.iter().filter(|figure| figure.stage == "pulses") {
-        assert!(figure.max < PERIOD_CYCLES / 10, "{figure:?}");
-    }
-    check_growth(&all, &counts);
+    check_growth(|before| {
+        let (all, counts) = all_counted(before > 0);
+        for (name, ..) in cycles::jobs() {
+            assert!(all.iter().any(|figure| figure.surface == name), "{name}");
+        }
+        for figure in all.iter().filter(|figure| figure.stage == "pulses") {
+            assert!(figure.max < PERIOD_CYCLES / 10, "{figure:?}");
+        }
+        (all, counts)
+    });
 }
 
 /// The same for the worst-case tick that a search has found.
 #[test]
 fn the_worst_tick_has_not_grown() {
-    check_growth(&golden::worst_tick(images::setup()).unwrap(), &[]);
+    check_growth(|_| (golden::worst_tick(images::setup()).unwrap(), Vec::new()));
 }
 
 /// A short search finds no tick above a tenth of the period, which is half of the firmware's tick budget (`TICK_BUDGET_CYCLES`, a fifth). The
