@@ -5,7 +5,7 @@
 //! the first CAD file is read, and a file that hangs a reader, or eats memory, does so here.
 //!
 //! ```text
-//! main.rs ─► readers.rs   by the file's first bytes ─► step.rs, iges.rs, rhino.rs   what can be told before reading it all
+//! main.rs ─► readers.rs   by the file's first bytes ─► step.rs, iges.rs, rhino.rs   what can be checked before the whole file is read
 //!                                                       └─► ir.rs, ir_*.rs   cadmpeg's model -> cad::Face
 //! ```
 

@@ -21,7 +21,7 @@ pub(crate) struct Options {
     /// As fast as it goes, instead of in real time: what waits for a host should then wait for ever.
     #[arg(long)]
     pub(crate) fast: bool,
-    /// Ends after so many milliseconds of the chip's time.
+    /// Time after which the program ends, milliseconds of the chip's time.
     #[arg(long, value_name = "MS")]
     pub(crate) ms: Option<f64>,
     /// Phase of the host's bytes.
