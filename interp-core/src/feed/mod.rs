@@ -1,28 +1,52 @@
-//! Feed along a path that a machine can follow: from standstill to the wanted feed and back, within what the axes allow.
+//! The feed along a path, from rest to rest, as fast as each axis's velocity, acceleration and jerk allow.
 //!
-//! Two stages, so that each stays simple:
+//! With q(s) the tool centre over the contact's arc, an axis moves with `q' v`, `q'' v^2 + q' a` and `q''' v^3 + 3 q'' v a + q' j`.
+//! The planner does not seek v(s). It takes a rough walk S(k) from rest to rest and plans its pace c(k) = (dk/dt)^2:
 //!
-//! 1. [`plan`] looks over the whole path in fixed portions: what the cutter centre's derivatives by arc length leave of each axis's
-//!    velocity, acceleration and jerk becomes a cap of the speed, an acceleration along the path and a share of the jerk; from the end
-//!    backwards, it becomes the greatest speed from which braking is still in time.
-//! 2. [`profile`] follows, a step a period: an acceleration-limited speed below these bounds, and the mean of the last n periods of it.
-//!    The mean of an acceleration that changes by no more than n J in n periods has a jerk of no more than J. With n and the acceleration
-//!    chosen as [`plan`] does, a path from rest to rest takes the time of the optimum.
+//! ```text
+//! v = S' sqrt(c)      a = S'' c + S' c'/2      j = sqrt(c) (S''' c + 3/2 S'' c' + S' c''/2)
+//! ```
 //!
-//! Wishes (feed, override, hold, stop) are nothing but another wanted speed, in any period: what is taken up acts in the same one, and
-//! no sequence of them can break a limit or leave the path.
+//! S carries the rests, so c is regular everywhere and of order 1: f32 suffices. The limits of velocity and acceleration are linear in c and
+//! its derivatives, that of jerk is linear against `J/sqrt(c)`, which is convex. A barrier method with a fixed number of Newton steps minimises
+//! the time, `sum 1/sqrt(c)`; the limits hold at the nodes after every step.
 //!
-//! Speeds are in quanta (2^-10 nm) a period, so sums are exact integers.
+//! | file | content |
+//! |---|---|
+//! | [`stations`] | derivatives of the path, from cutter locations rounded to nanometres |
+//! | [`walk`] | the rough walk, and where its nodes lie |
+//! | [`plan`] | a plan: stations, walk and pace; a cursor that moves along it |
+//! | [`newton`] | the barrier method |
+//! | [`planner`] | all of it in portions, and a check of the result period by period |
+//! | [`follow`] | one period along a plan, at exactly the programmed feed where the plan reaches it |
+//! | [`pace`] | hold, resume, override: checked changes of pace |
+//! | [`curve`] | rest to rest along a short or straight link in closed form |
 
-pub(crate) mod demand;
+pub(crate) mod curve;
+pub(crate) mod follow;
+pub(crate) mod limits;
+mod newton;
+pub(crate) mod pace;
 pub(crate) mod plan;
-pub(crate) mod profile;
+pub(crate) mod planner;
+pub(crate) mod stations;
+mod walk;
 
-/// Quanta of the arc in a nanometre, as a power of two.
-pub(crate) const QUANTA_BITS: u32 = 10;
+#[cfg(test)]
+mod tests;
 
-/// Quanta in a millimetre.
-pub(crate) const QUANTA_PER_MM: f32 = 1_024e6;
+use crate::math::number::to_quanta;
 
-/// Longest step of a period, quanta: it fits an i32.
-pub(crate) const STEP_MAX: f32 = crate::job::STEP_MAX_MM * QUANTA_PER_MM;
+/// Units of 2^-10 nm in a millimetre. Arcs are sums of these units, so that they are exact.
+pub(crate) const Q10_PER_MM: f32 = 1_024e6;
+
+/// Millimetres in a unit of 2^-10 nm.
+pub(crate) const MM_PER_Q10: f32 = 1.0 / Q10_PER_MM;
+
+/// Units of 2^-10 nm in a nanometre, as a power of two.
+pub(crate) const Q10_BITS: u32 = 10;
+
+/// A length of at least 0 in units of 2^-10 nm, rounded.
+pub(crate) fn to_q10(mm: f32) -> i64 {
+    to_quanta(mm * Q10_PER_MM + 0.5)
+}

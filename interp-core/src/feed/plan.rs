@@ -1,468 +1,332 @@
-//! The bounds of the feed along one path, from standstill to standstill; see [`super`].
-//!
-//! A path is cut into cells by stations. [`Plan::begin`], [`Plan::add`] with each station in turn, [`Plan::settle`] once, then [`Plan::work`]
-//! until it says that it is done: each of these is a fixed portion of work.
+//! A plan: the path's stations, a walk along them and the pace of the walk; and a cursor that moves along it.
 
-mod bounds;
-mod cell;
+use super::follow::Lead;
+use super::limits::MotionLimits;
+use super::pace::{Course, Use};
+use super::stations::Stations;
+use super::{MM_PER_Q10, Q10_BITS, Q10_PER_MM, to_q10};
+use crate::math::arith::{sqrt, truncated};
+use crate::math::number::{Bounded, to_f32};
 
-use self::cell::{Cell, Most, between, whole_nm};
-use super::demand::{PathLimits, ZONE_JERK, cube_root, root, squared};
-use super::profile::{WINDOW_MAX, braked, landing};
-use super::{QUANTA_BITS, QUANTA_PER_MM, STEP_MAX};
-use crate::job::CELLS_MAX;
-use crate::math::number::{Bounded, to_f32, to_quanta};
+/// Greatest and least number of intervals of a walk.
+pub(crate) const NODES_MAX: usize = 160;
+pub(crate) const NODES_MIN: u16 = 40;
 
-/// Cells to each side that a bound may reach into, and that are looked through ahead of an acceleration.
-const REACH: usize = 8;
+/// Coefficients of a walk's steps and of its pace.
+pub(crate) const COEFFICIENTS: usize = NODES_MAX + 2;
 
-/// Cells that are worked on in a tick in which the tool moves, and in one in which it stands and waits for the plan.
-pub(crate) const CELLS_MOVING: u8 = 1;
-pub(crate) const CELLS_STANDING: u8 = 3;
+/// Jumps of a path that a plan takes into account.
+pub(crate) const KNOTS_MAX: usize = 84;
 
-/// Cells that are merged, and whose time is taken, for one that is bounded: that is as much work.
-const MERGED: u16 = 4;
-const TIMED: u16 = 2;
+/// Distance from a jump within which a period may see it, periods.
+const JUMP_REACH: f32 = 1.2;
 
-/// Share of the greatest change of the acceleration that the feed is left near a jump: it comes twice, when it begins and when it leaves
-/// the mean.
-const ZONE_SHARE: f32 = 0.5 * ZONE_JERK;
+/// Intervals that a step of a cursor may pass.
+const INTERVALS_A_STEP: u16 = 4;
 
-/// Lengths of the mean that are tried.
-const TRIES: u8 = 5;
-
-/// Speed that a cell counts with at least, mm/s.
-const SPEED_MIN: f32 = 1e-3;
-
-/// Cells that a period may pass.
-const CELLS_A_PERIOD: u8 = 4;
-
-/// What the path is to be followed with.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub(crate) struct FeedLimits {
-    /// Greatest speed that may be wanted, mm/s.
-    pub(crate) speed: f32,
-    /// Speed that is wanted as a rule, mm/s.
-    pub(crate) usual: f32,
-    /// s.
-    pub(crate) period_s: f32,
+/// Where a jump lies: interval, fraction of it in units of 2^-16, and the first of its two stations.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Knot {
+    pub(crate) interval: u16,
+    pub(crate) part: u16,
+    pub(crate) station: u16,
 }
 
-/// What is being worked on.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Stage {
-    /// Makes one cell of neighbours that are alike.
-    Merge,
-    /// Bounds, from the end backwards.
-    Bounds,
-    /// The time that they allow, forwards.
-    Time,
-    Done,
-}
-
-/// Bounds of the feed along a path.
+/// The plan of one path.
 #[derive(Clone, Debug)]
 pub(crate) struct Plan {
-    cells: [Cell; CELLS_MAX],
-    count: u16,
-    /// Arc up to each station, nm, however cells are merged.
-    stations: [u32; CELLS_MAX],
-    /// Cells that are left of those merged so far, and the most of the last of them.
-    kept: u16,
-    most: Most,
-    stage: Stage,
-    /// Cells that are still to be worked on.
-    left: u16,
-    /// Lengths of the mean that are still to be tried, and the best of those that were, with its time.
-    tries: u8,
-    longest: u8,
-    best: (f32, u8),
-    /// Speed at the start of the cell whose time is taken next, quanta a period; whether it was rising; periods so far.
-    speed: f32,
-    rises: bool,
-    elapsed: f32,
-    /// From this cell on, all braking is for the end.
-    tail: u16,
-    /// Least jerk along the path, mm/s^3; greatest acceleration, mm/s^2; time at the cells' own speeds, s.
-    least: f32,
-    accel: f32,
-    time: f32,
-    /// Length, quanta.
-    pub(crate) end: i64,
-    /// Greatest change of the acceleration in a period, and within the mean, quanta a period^2.
-    change: f32,
-    pub(crate) swing: f32,
-    /// Periods of the mean.
-    pub(crate) window: u8,
+    pub(crate) stations: Stations,
+    pub(crate) limits: MotionLimits,
+    /// Intervals of the walk, and the time of one at pace 1, s.
+    pub(crate) intervals: u16,
+    pub(crate) step_s: f32,
+    /// The walk: S is a cubic B-spline; differences of its coefficients, mm.
+    pub(crate) walk: [f32; COEFFICIENTS],
+    /// The pace c: coefficients of a quadratic B-spline.
+    pub(crate) pace: [f32; COEFFICIENTS],
+    /// Cell of the stations at each node, and the fraction of it in units of 2^-16.
+    pub(crate) cells: [u16; NODES_MAX + 1],
+    pub(crate) parts: [u16; NODES_MAX + 1],
+    pub(crate) knots: [Knot; KNOTS_MAX],
+    pub(crate) knot_count: u16,
+    /// Periods that the plan takes at its own pace.
+    pub(crate) periods: u32,
+    /// What the length of each interval is corrected by, so that all of them are the path's length to a tenth of a nanometre, units of 2^-10 nm.
+    pub(crate) trim_q10: i64,
+    /// The place that a follower looks ahead from when it begins.
+    pub(crate) lead: Lead,
+}
+
+/// An interval of a plan.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Interval {
+    walk: [f32; 3],
+    pace: [f32; 3],
+}
+
+impl Interval {
+    /// Coefficients of the pace.
+    pub(crate) const fn pace(&self) -> &[f32; 3] {
+        &self.pace
+    }
+
+    /// Arc from the interval's start, mm.
+    pub(crate) fn arc(&self, x: f32) -> f32 {
+        let [a, b, c] = self.walk;
+        let y = 1.0 - x;
+        let start = a * (1.0 - y * y * y) + c * (x * x * x);
+        start * (1.0 / 6.0) + b * x * (0.5 + x * (0.5 - x * (1.0 / 3.0)))
+    }
+
+    /// S', S'', S''' by k, mm.
+    pub(crate) fn walk_rates(&self, x: f32) -> [f32; 3] {
+        let [a, b, c] = self.walk;
+        let y = 1.0 - x;
+        [
+            0.5 * (a * y * y + c * x * x) + b * (0.5 + x * y),
+            y * (b - a) + x * (c - b),
+            c - 2.0 * b + a,
+        ]
+    }
+
+    /// c, c', c'' by k.
+    pub(crate) fn pace_rates(&self, x: f32) -> [f32; 3] {
+        let [a, b, c] = self.pace;
+        let y = 1.0 - x;
+        [
+            0.5 * (a * y * y + c * x * x) + b * (0.5 + x * y),
+            y * (b - a) + x * (c - b),
+            c - 2.0 * b + a,
+        ]
+    }
+
+    /// Square root of the pace.
+    fn speed(&self, x: f32) -> f32 {
+        let [pace, _, _] = self.pace_rates(x);
+        sqrt(pace.at_least(0.0))
+    }
 }
 
 impl Plan {
     /// Of no path.
     pub(crate) const NONE: Self = Self {
-        cells: [Cell::NONE; CELLS_MAX],
-        count: 0,
-        stations: [0; CELLS_MAX],
-        kept: 0,
-        most: Most::NONE,
-        stage: Stage::Done,
-        left: 0,
-        tries: 0,
-        longest: 1,
-        best: (f32::MAX, 1),
-        speed: 0.0,
-        rises: false,
-        elapsed: 0.0,
-        tail: 0,
-        least: f32::MAX,
-        accel: 0.0,
-        time: 0.0,
-        end: 0,
-        change: 0.0,
-        swing: 0.0,
-        window: 1,
+        stations: Stations::NONE,
+        limits: MotionLimits::NONE,
+        intervals: 0,
+        step_s: 1.0,
+        walk: [0.0; COEFFICIENTS],
+        pace: [0.0; COEFFICIENTS],
+        cells: [0; NODES_MAX + 1],
+        parts: [0; NODES_MAX + 1],
+        knots: [Knot {
+            interval: 0,
+            part: 0,
+            station: 0,
+        }; KNOTS_MAX],
+        knot_count: 0,
+        periods: 0,
+        trim_q10: 0,
+        lead: Lead::NONE,
     };
 
-    /// A new path.
-    pub(crate) const fn begin(&mut self) {
-        self.count = 0;
-        self.left = 0;
-        self.stage = Stage::Done;
-        self.least = f32::MAX;
-        self.accel = 0.0;
-        self.time = 0.0;
-        self.end = 0;
-    }
-
-    /// Cells so far.
-    pub(crate) const fn count(&self) -> u16 {
-        self.count
-    }
-
-    /// Arc up to the station at which the so manieth cell began, before any were merged, quanta.
-    pub(crate) fn start_of(&self, cell: u16) -> i64 {
-        let before = cell.checked_sub(1);
-        let end_nm = before.and_then(|before| self.stations.get(usize::from(before)));
-        i64::from(end_nm.copied().unwrap_or(0)) << QUANTA_BITS
-    }
-
-    fn start_nm(&self, cell: u16) -> u32 {
-        let before = cell.checked_sub(1).and_then(|before| self.cell(before));
-        before.map_or(0, |before| before.end_nm)
-    }
-
-    fn cell(&self, cell: u16) -> Option<&Cell> {
-        self.cells.get(usize::from(cell))
-    }
-
-    /// One more cell, of this length, mm. What its end leaves goes for the `back` cells before, too.
-    pub(crate) fn add(&mut self, length: f32, room: &PathLimits, back: usize, top: &FeedLimits) {
-        self.end += quanta(length);
-        self.least = self.least.at_most(room.jerk);
-        self.accel = self.accel.at_least(room.accel);
-        self.time += length / root(room.max_speed_sqr).at_most(top.usual).at_least(SPEED_MIN);
-        let scale = top.period_s * QUANTA_PER_MM;
-        let square = squared((root(room.max_speed_sqr) * scale).at_most(STEP_MAX));
-        let accel = room.accel * top.period_s * scale;
-        let index = usize::from(self.count);
-        let Some(cell) = self.cells.get_mut(index) else {
-            return;
+    pub(crate) fn interval(&self, index: u16) -> Interval {
+        let three = |values: &[f32; COEFFICIENTS]| {
+            let from = usize::from(index);
+            match values.get(from..from + 3) {
+                Some(&[a, b, c]) => [a, b, c],
+                _ => [0.0; 3],
+            }
         };
-        let end_nm = whole_nm(self.end + (1 << (QUANTA_BITS - 1)));
-        if let Some(station) = self.stations.get_mut(index) {
-            *station = end_nm;
-        }
-        *cell = Cell {
-            end_nm,
-            square,
-            accel,
-            ..Cell::NONE
-        };
-        self.count += 1;
-        for cell in self
-            .cells
-            .get_mut(index.saturating_sub(back)..index)
-            .into_iter()
-            .flatten()
-        {
-            cell.square = cell.square.at_most(square);
-            cell.accel = cell.accel.at_most(accel);
+        Interval {
+            walk: three(&self.walk),
+            pace: three(&self.pace),
         }
     }
 
-    /// A bound of the square of the speed, (mm/s)^2, at the end of a cell, where the path jumps.
-    pub(crate) fn gate(&mut self, cell: u16, square: f32, top: &FeedLimits) {
-        if square >= squared(top.speed) {
-            return;
-        }
-        if let Some(cell) = self.cells.get_mut(usize::from(cell)) {
-            cell.jump = cell.jump.at_most(root(square) * top.period_s * QUANTA_PER_MM);
-        }
+    /// Length of an interval, units of 2^-10 nm.
+    fn interval_q10(&self, index: u16) -> i64 {
+        to_q10(self.interval(index).arc(1.0)) + self.trim_q10
     }
 
-    /// The path is complete: chooses the mean. Its length is that of the fastest way from rest to rest over the whole path
-    /// (acceleration, speed and arc as they are): `A/J`, `sqrt(v/J)` or `cbrt(s/(2 J))`, whichever is least. Where the speed varies, its
-    /// mean over time counts.
-    pub(crate) fn settle(&mut self, top: &FeedLimits) {
-        let jerk = self.least;
-        let arc = mm(self.end);
-        let speed = arc / self.time.at_least(top.period_s);
-        let time = (self.accel / jerk)
-            .at_most(root(speed / jerk))
-            .at_most(cube_root(0.5 * arc / jerk));
-        self.longest = upwards(time / top.period_s);
-        self.change = jerk * squared(top.period_s) * top.period_s * QUANTA_PER_MM;
-        self.best = (f32::MAX, self.longest);
-        self.stage = Stage::Merge;
-        (self.left, self.kept) = (0, 0);
-    }
-
-    /// Begins anew with a mean of so many periods.
-    fn take(&mut self, window: u8) {
-        self.window = window;
-        self.swing = self.change * f32::from(window);
-        self.stage = Stage::Bounds;
-        self.left = self.count;
-        self.tail = self.count;
-    }
-
-    /// So many cells, one at a time; whether there is nothing left to do.
-    ///
-    /// A long mean allows a high acceleration, and a short one rides closer to what is narrow: which is faster is tried.
-    pub(crate) fn work(&mut self, cells: u8) -> bool {
-        for _ in 0..cells {
-            match self.stage {
-                Stage::Done => return true,
-                Stage::Merge if self.left < self.count => {
-                    for index in self.left..(self.left + MERGED).min(self.count) {
-                        self.merge(index);
-                    }
-                }
-                Stage::Merge => {
-                    self.count = self.kept;
-                    // On a leg nothing is to be traded.
-                    self.tries = if self.count > 2 { TRIES } else { 0 };
-                    self.take(self.longest);
-                }
-                Stage::Bounds => match self.left.checked_sub(1) {
-                    Some(cell) => {
-                        self.left = cell;
-                        self.bound(usize::from(cell));
-                    }
-                    None if self.tries > 0 => {
-                        self.stage = Stage::Time;
-                        (self.speed, self.rises, self.elapsed) = (0.0, false, f32::from(self.window));
-                    }
-                    None => self.stage = Stage::Done,
-                },
-                Stage::Time if self.left < self.count => {
-                    for index in self.left..(self.left + TIMED).min(self.count) {
-                        self.pass_cell(index);
-                        self.left += 1;
-                    }
-                }
-                Stage::Time => self.judge(),
+    /// Places the nodes among the stations, and trims the intervals to the path's length.
+    pub(crate) fn place_nodes(&mut self) {
+        self.trim_q10 = 0;
+        let mut arc_q10 = 0;
+        let mut cell = 0;
+        for node in 0..=self.intervals {
+            cell = self.stations.cell_between(cell, self.stations.count(), arc_q10);
+            let since = self.stations.since(cell, arc_q10);
+            let part = (since / self.stations.cell_mm(cell).at_least(1e-7))
+                .at_least(0.0)
+                .at_most(1.0);
+            let index = usize::from(node);
+            if let (Some(to_cell), Some(to_part)) = (self.cells.get_mut(index), self.parts.get_mut(index)) {
+                *to_cell = cell;
+                *to_part = u16::try_from(truncated(part * 65535.0)).unwrap_or(u16::MAX);
+            }
+            if node < self.intervals {
+                arc_q10 += self.interval_q10(node);
             }
         }
-        self.stage == Stage::Done
+        let missing = self.length_q10() - arc_q10;
+        self.trim_q10 = missing
+            .checked_div(i64::from(self.intervals))
+            .unwrap_or(0);
     }
 
-    /// Puts a cell behind those that are kept, or into the last of them.
-    fn merge(&mut self, index: u16) {
-        self.left += 1;
-        let Some(&next) = self.cell(index) else {
-            return;
-        };
-        let last = self.kept.checked_sub(1);
-        let last = last.and_then(|last| self.cells.get_mut(usize::from(last)));
-        if last.is_some_and(|last| last.absorb(&next, &mut self.most)) {
-            return;
-        }
-        if let Some(place) = self.cells.get_mut(usize::from(self.kept)) {
-            *place = next;
-        }
-        self.most = Most::of(&next);
-        self.kept += 1;
+    /// Cell of a node, and the fraction of it in units of 2^-16.
+    pub(crate) fn node(&self, node: u16) -> [u16; 2] {
+        let index = usize::from(node);
+        [&self.cells, &self.parts].map(|values| values.get(index).copied().unwrap_or(0))
     }
 
-    /// The time of a try is known: the next one, or the best.
-    fn judge(&mut self) {
-        let (least, _) = self.best;
-        if self.elapsed < least {
-            self.best = (self.elapsed, self.window);
-        }
-        self.tries -= 1;
-        let (_, best) = self.best;
-        if self.tries > 0 {
-            // 3/4, 1/2, 3/8, 1/4 of the longest.
-            let parts = [2_u16, 3, 4, 6]
-                .get(usize::from(self.tries) - 1)
-                .copied()
-                .unwrap_or(8);
-            let window = u16::from(self.longest) * parts / 8;
-            self.take(u8::try_from(window.max(1)).unwrap_or(1));
-        } else if best == self.window {
-            self.stage = Stage::Done;
-        } else {
-            self.take(best);
+    pub(crate) fn knot(&self, index: u16) -> Option<Knot> {
+        let knots = self.knots.get(..usize::from(self.knot_count))?;
+        knots.get(usize::from(index)).copied()
+    }
+
+    /// Length of the path, units of 2^-10 nm.
+    pub(crate) fn length_q10(&self) -> i64 {
+        i64::from(self.stations.length_nm()) << Q10_BITS
+    }
+}
+
+/// A place on a plan.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Cursor {
+    pub(crate) interval: u16,
+    /// Fraction of the interval.
+    pub(crate) x: f32,
+    /// Arc at the start of the interval, units of 2^-10 nm.
+    start_q10: i64,
+}
+
+impl Cursor {
+    pub(crate) const START: Self = Self {
+        interval: 0,
+        x: 0.0,
+        start_q10: 0,
+    };
+
+    /// Arc from the start of the path, units of 2^-10 nm.
+    pub(crate) fn arc_q10(&self, plan: &Plan) -> i64 {
+        self.start_q10 + to_q10(plan.interval(self.interval).arc(self.x))
+    }
+
+    /// Speed of the plan's own pace, mm/s.
+    pub(crate) fn speed(&self, plan: &Plan) -> f32 {
+        let interval = plan.interval(self.interval);
+        let [slope, _, _] = interval.walk_rates(self.x);
+        slope * interval.speed(self.x) / plan.step_s
+    }
+
+    /// Moves by this arc, mm, small against an interval; not where the walk stands.
+    pub(crate) fn shift(&mut self, mm: f32, plan: &Plan) {
+        let [slope, _, _] = plan.interval(self.interval).walk_rates(self.x);
+        let by = mm / slope.at_least(1e-9);
+        if by.abs() < 0.5 {
+            self.x = (self.x + by).at_least(0.0);
+            self.carry(plan);
         }
     }
 
-    /// Periods that a cell takes, near enough to compare: faster as it may, slower as it must; the speed that it is left with.
-    fn pass_cell(&mut self, index: u16) {
-        let Some(&cell) = self.cell(index) else {
-            return;
-        };
-        let periods = f32::from(self.window);
-        let length = between(self.start_nm(index), cell.end_nm);
-        let accel = cell.accel_all.at_least(1.0);
-        let enter = squared(self.speed).at_most(cell.enter);
-        let leave = self
-            .leave(index)
-            .at_most(squared(cell.gate))
-            .at_most(enter + 2.0 * accel * length);
-        let peak = cell.square_all.at_most(0.5 * (enter + leave) + accel * length);
-        let [enter, leave, peak] = [enter, leave, peak].map(root);
-        let ramps = (2.0 * squared(peak) - squared(enter) - squared(leave)) / (2.0 * accel);
-        self.elapsed +=
-            (2.0 * peak - enter - leave) / accel + (length - ramps).at_least(0.0) / peak.at_least(1.0);
-        if cell.gate < f32::MAX {
-            // The way through its zone, instead of at the cell's speed.
-            self.elapsed += 2.0 * periods * (1.0 - cell.gate / peak.at_least(cell.gate));
-        }
-        let rises = leave > enter;
-        if self.rises && !rises {
-            // From faster to slower there is a wait for the mean.
-            self.elapsed += 0.5 * periods;
-        }
-        self.rises = rises;
-        self.speed = leave;
-    }
-
-    /// The cell that a place is in, from this one on.
-    pub(crate) fn cell_at(&self, mut cell: u16, place: i64) -> u16 {
-        let place_nm = whole_nm(place);
-        for _ in 0..CELLS_A_PERIOD {
-            let end_nm = self.cell(cell).map_or(u32::MAX, |cell| cell.end_nm);
-            if cell + 1 >= self.count || place_nm < end_nm {
+    /// Into the next interval where the fraction is above 1.
+    fn carry(&mut self, plan: &Plan) {
+        for _ in 0..INTERVALS_A_STEP {
+            if self.x < 1.0 || self.interval + 1 >= plan.intervals {
                 break;
             }
-            cell += 1;
-        }
-        cell
-    }
-
-    /// Acceleration at a place, quanta a period^2: the cell's; near a jump little, so that the jerk is left to the jump.
-    pub(crate) fn accel(&self, index: u16, place: i64) -> f32 {
-        let Some(cell) = self.cell(index) else {
-            return 0.0;
-        };
-        if self.is_in_zone(index, place) {
-            cell.accel_all.at_most(ZONE_SHARE * self.swing)
-        } else {
-            cell.accel_all
+            self.start_q10 += plan.interval_q10(self.interval);
+            self.x -= 1.0;
+            self.interval += 1;
         }
     }
+}
 
-    /// Whether a place is within the window's reach of a jump at one of its cell's ends.
-    fn is_in_zone(&self, index: u16, place: i64) -> bool {
-        let periods = f32::from(self.window);
-        let near = |cell: Option<&Cell>| {
-            cell.is_some_and(|cell| {
-                let apart = to_f32((i64::from(cell.end_nm) << QUANTA_BITS) - place);
-                cell.gate < f32::MAX && apart.abs() <= periods * cell.gate
-            })
+impl Course for Plan {
+    type Cursor = Cursor;
+
+    fn advance(&self, cursor: &mut Cursor, seconds: f32) {
+        // The midpoint rule.
+        let by = seconds / self.step_s;
+        let here = self.interval(cursor.interval);
+        let half = cursor.x + 0.5 * by * here.speed(cursor.x);
+        let middle = if half < 1.0 || cursor.interval + 1 >= self.intervals {
+            here.speed(half.at_most(1.0))
+        } else {
+            self.interval(cursor.interval + 1).speed(half - 1.0)
         };
-        near(self.cell(index)) || near(index.checked_sub(1).and_then(|before| self.cell(before)))
+        cursor.x += by * middle;
+        cursor.carry(self);
     }
 
-    /// Greatest speed at a place, quanta a period: the cell's own, and such that what follows is kept.
-    pub(crate) fn ceiling(&self, index: u16, place: i64) -> f32 {
-        let Some(cell) = self.cell(index) else {
-            return 0.0;
-        };
-        let end = if index + 1 == self.count {
-            self.end
+    fn is_over(&self, cursor: &Cursor) -> bool {
+        cursor.interval + 1 >= self.intervals && cursor.x >= 1.0
+    }
+
+    fn use_at(&self, cursor: &Cursor, rates: [f32; 3], around: f32) -> Use {
+        let [r, r1, r2] = rates;
+        let interval = self.interval(cursor.interval);
+        let x = cursor.x.at_most(1.0);
+        let inverse = 1.0 / self.step_s;
+        let [s1, s2, s3] = interval.walk_rates(x);
+        let [c, c1, c2] = interval.pace_rates(x);
+        let root = sqrt(c.at_least(0.0)) * inverse;
+        let square = inverse * inverse;
+        let v = s1 * root;
+        let a = (s2 * c + 0.5 * s1 * c1) * square;
+        let j = root * square * (s3 * c + 1.5 * s2 * c1 + 0.5 * s1 * c2);
+        let arc_q10 = cursor.start_q10 + to_q10(interval.arc(x));
+        let [from, _] = self.node(cursor.interval);
+        let [to, _] = self.node(cursor.interval + 1);
+        let cell = self.stations.cell_between(from, to, arc_q10);
+        let length = self.stations.cell_mm(cell);
+        let since = self.stations.since(cell, arc_q10);
+        let part = (since / length.at_least(1e-7)).at_least(0.0).at_most(1.0);
+        let [q1, q2, q3] = &self.stations.blend(cell, part);
+        let limits = &self.limits;
+        let near = (JUMP_REACH * limits.period).at_least(around) * v * r;
+        let jump = if since <= near && cell > 0 && self.stations.is_jump(cell - 1) {
+            Some(cell - 1)
+        } else if length - since <= near && self.stations.is_jump(cell + 1) {
+            Some(cell + 1)
         } else {
-            i64::from(cell.end_nm) << QUANTA_BITS
+            None
         };
-        let room = to_f32(end - place);
-        let accel = cell.accel_all;
-        let brake = if index + 1 >= self.tail {
-            landing(accel, to_f32(self.end - place))
-        } else {
-            braked(self.leave(index), accel, room)
-        };
-        let mut speed = root(cell.square_all).at_most(brake);
-        let periods = f32::from(self.window);
-        if cell.gate < f32::MAX {
-            let zone = periods * cell.gate;
-            speed = speed.at_most(if room <= zone {
-                cell.gate
-            } else {
-                braked(squared(cell.gate), accel, room - zone)
+        let extra = jump.map_or([[0.0; 3]; 2], |station| {
+            limits.jump_jerk(&self.stations.jump(station))
+        });
+        let speed = v * r;
+        let mut most = Use::NONE;
+        for axis in 0..3 {
+            let of = |values: &[f32; 3]| values.get(axis).copied().unwrap_or(0.0);
+            let (q1, q2, q3) = (of(q1), of(q2), of(q3));
+            let acceleration = q2 * v * v + q1 * a;
+            let jerk = (q3 * v * v + 3.0 * q2 * a) * v + q1 * j;
+            let [first, second] = &extra;
+            let of_jump = (of(first) + of(second) * speed) * speed;
+            most.add(&Use {
+                velocity: (q1 * speed).abs() / of(&limits.velocity),
+                acceleration: (acceleration * r * r + q1 * v * r1).abs() / of(&limits.acceleration),
+                jerk: ((jerk * r * r + 3.0 * acceleration * r1) * r + q1 * v * r2).abs()
+                    / of(&limits.jerk)
+                    + of_jump,
             });
         }
-        let before = index.checked_sub(1).and_then(|before| self.cell(before));
-        match before {
-            Some(Cell { gate, end_nm, .. })
-                if *gate < f32::MAX
-                    && to_f32(place - (i64::from(*end_nm) << QUANTA_BITS)) <= periods * gate =>
-            {
-                speed.at_most(*gate)
-            }
-            _ => speed,
-        }
-    }
-
-    /// Square of the speed that a cell may be left with.
-    fn leave(&self, index: u16) -> f32 {
-        if index + 1 < self.count {
-            self.cell(index + 1).map_or(0.0, |after| after.enter)
-        } else {
-            0.0
-        }
-    }
-
-    /// Whether a speed can be kept from a place over so many quanta, and braking still is in time.
-    pub(crate) fn is_clear(&self, index: u16, place: i64, over: f32, speed: f32) -> bool {
-        let last = place + to_quanta(over);
-        let last_nm = whole_nm(last);
-        let square = squared(speed);
-        let (first, count) = (usize::from(index), usize::from(self.count));
-        let cells = self.cells.get(first..(first + REACH).min(count));
-        let mut at = index;
-        let mut ahead = cells.unwrap_or_default().iter().peekable();
-        while let Some(cell) = ahead.next() {
-            if at + 1 >= self.count || last_nm < cell.end_nm {
-                return last < self.end && speed <= self.ceiling(at, last);
-            }
-            let leave = ahead.peek().map_or(0.0, |after| after.enter);
-            if square > leave || speed > cell.gate {
-                return false;
-            }
-            at += 1;
-        }
-        false
+        most
     }
 }
 
-fn mm(quanta: i64) -> f32 {
-    to_f32(quanta) * (1.0 / QUANTA_PER_MM)
+/// Arc of a plan in mm, from units of 2^-10 nm.
+pub(crate) fn to_mm(q10: i64) -> f32 {
+    to_f32(q10) * MM_PER_Q10
 }
 
-/// Quanta of a length in mm, in two parts so that none of its 24 bits is lost.
-pub(crate) fn quanta(mm: f32) -> i64 {
-    to_quanta(mm * QUANTA_PER_MM)
-}
-
-/// The next whole number of periods, at least 1.
+/// A step in units of 2^-10 nm, from mm.
 #[allow(
     clippy::cast_possible_truncation,
-    clippy::cast_sign_loss,
     reason = "the cast saturates, and a NaN becomes 0"
 )]
-fn upwards(periods: f32) -> u8 {
-    let whole = periods as u8;
-    let more = if f32::from(whole) < periods { 1 } else { 0 };
-    whole.saturating_add(more).clamp(1, WINDOW_MAX)
+pub(crate) fn step_q10(mm: f32) -> i32 {
+    (mm * Q10_PER_MM + 0.5) as i32
 }

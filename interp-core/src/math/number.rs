@@ -70,6 +70,19 @@ pub(crate) const fn to_quanta(value: f32) -> i64 {
     (high as i64) << 32 | low as i64
 }
 
+/// Cube root of a positive number, relative error below 1e-5: an estimate from the exponent and two steps of Halley's method; 0 for other values.
+pub(crate) fn cube_root(value: f32) -> f32 {
+    if !(value > 0.0) {
+        return 0.0;
+    }
+    let mut x = f32::from_bits(value.to_bits() / 3 + 0x2a51_4067);
+    for _ in 0..2 {
+        let cube = x * x * x;
+        x *= (cube + 2.0 * value) / (2.0 * cube + value);
+    }
+    x
+}
+
 #[cfg(test)]
 mod tests {
     use proptest::prelude::*;

@@ -1,10 +1,12 @@
-//! Links from pass to pass: straight moves off the surface, or a step-over along the boundary on the surface. Each is a separate path,
-//! traversed from standstill to standstill with the same speed profile as the passes.
+//! Links from pass to pass, each from rest to rest in closed form ([`Curve`]): straight moves off the surface, or a step-over along the boundary on
+//! the surface.
 
 use crate::fault::{Fault, FaultKind, Result};
-use crate::feed::QUANTA_PER_MM;
-use crate::feed::demand::{PathLimits, Stencil, squared};
-use crate::feed::plan::{CELLS_STANDING, FeedLimits, Plan};
+use crate::feed::curve::{Curve, CurveCursor, CurveLimits};
+use crate::feed::limits::{MotionLimits, SLOPE_MIN};
+use crate::feed::pace::{Course as _, Pace};
+use crate::feed::stations::{WINDOW, Window};
+use crate::feed::to_q10;
 use crate::job::AxisLimits;
 use crate::job::program::Job;
 use crate::math::arith::sqrt;
@@ -14,20 +16,86 @@ use crate::pass::patch::Patch;
 use crate::pass::position::PassPosition;
 use crate::pass::schedule;
 use crate::sample::SpanParameter;
-
-/// Look-ahead cells of a step-over along the boundary.
-const STEP_OVER_CELLS: u16 = 8;
-
-/// Fraction of the jerk limit that a step-over uses: it is some tenths of a millimetre long and at the jerk limit throughout, and a cutter location is rounded
-/// to 1 to 2 nm, which a third difference multiplies by up to eight.
-const JERK_SHARE: f32 = 0.7;
+use crate::sequence::lookahead::check_travel;
 
 /// Links up to this length, nm, are omitted: the rounding difference of one position computed twice.
 const NOTHING_NM: i64 = 2;
 
+/// Shares of the acceleration that a bend of a step-over may take.
+const BEND_SHARE: f32 = 0.5;
+/// Share of the jerk that it may take at most, so that something is left to move with.
+const BEND_JERK_SHARE: f32 = 0.6;
+
+/// Rounds in which the speed of a step-over and what its bends leave are adapted to each other.
+const ROUNDS: u8 = 3;
+
+/// Progress along a link.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Progress {
+    curve: Curve,
+    cursor: CurveCursor,
+    length_q10: i64,
+    pace: Pace<CurveCursor>,
+}
+
+impl Progress {
+    const NONE: Self = Self {
+        curve: Curve::NONE,
+        cursor: CurveCursor::START,
+        length_q10: 0,
+        pace: Pace::REST,
+    };
+
+    fn new(length: f32, curve: Curve) -> Self {
+        Self {
+            cursor: curve.start(),
+            curve,
+            length_q10: to_q10(length),
+            pace: Pace::REST,
+        }
+    }
+
+    /// Begins at this pace.
+    pub(crate) fn begin(&mut self, pace: f32, period: f32) {
+        self.pace.begin(pace, period);
+    }
+
+    /// One period; returns whether the end is reached.
+    pub(crate) fn tick(&mut self, pace: f32, is_fault: bool, period: f32) -> bool {
+        self.pace.want(pace, is_fault);
+        let pace = self.pace.tick();
+        self.curve.advance(&mut self.cursor, pace * period);
+        self.is_over()
+    }
+
+    pub(crate) fn is_over(&self) -> bool {
+        self.curve.is_over(&self.cursor)
+    }
+
+    pub(crate) fn is_at_rest(&self) -> bool {
+        self.pace.is_at_rest()
+    }
+
+    /// Whether a change of the pace is sought.
+    pub(crate) fn has_work(&self) -> bool {
+        self.pace.has_work()
+    }
+
+    /// One place of the search for a change of the pace.
+    pub(crate) fn work(&mut self) {
+        self.pace.work(&self.curve, &self.cursor);
+    }
+
+    /// Speed along the link, mm/s.
+    pub(crate) fn speed(&self) -> f32 {
+        self.pace.now() * self.curve.speed(&self.cursor)
+    }
+}
+
 /// A straight move.
-#[derive(Clone, Copy, Debug, Default)]
+#[derive(Clone, Copy, Debug)]
 pub(crate) struct StraightMove {
+    pub(crate) progress: Progress,
     from: [i32; 3],
     to: [i32; 3],
 }
@@ -35,21 +103,19 @@ pub(crate) struct StraightMove {
 impl StraightMove {
     /// No move.
     pub(crate) const NONE: Self = Self {
+        progress: Progress::NONE,
         from: [0; 3],
         to: [0; 3],
     };
 
-    /// A move from point to point whose last `slow_mm` does not exceed `feed_mm_s`; none where its length is negligible. The filter of the plan is chosen;
-    /// its speeds are still to be computed.
+    /// A move from point to point whose last `slow_mm` does not exceed `feed_mm_s`; none where its length is negligible.
     pub(crate) fn new(
         from: [i32; 3],
         to: [i32; 3],
         slow_mm: f32,
         feed_mm_s: f32,
         axes: &AxisLimits,
-        period_s: f32,
-        plan: &mut Plan,
-    ) -> Option<(Self, f32)> {
+    ) -> Option<Self> {
         let mut apart = [0_i64; 3];
         for ((apart, from), to) in apart.iter_mut().zip(&from).zip(&to) {
             *apart = i64::from(*to) - i64::from(*from);
@@ -60,42 +126,40 @@ impl StraightMove {
         let mm = apart.map(to_mm);
         let [x, y, z] = mm;
         let length = sqrt(x * x + y * y + z * z);
-        let cosines = mm.map(|mm| mm / length);
-        let limits = PathLimits::straight(axes, &cosines);
-        let speed = crate::feed::demand::root(limits.max_speed_sqr);
-        let top = FeedLimits {
-            speed,
-            usual: speed,
-            period_s,
+        let mut limits = CurveLimits {
+            speed: f32::MAX,
+            acceleration: f32::MAX,
+            jerk: f32::MAX,
         };
-        plan.begin();
-        let slow = slow_mm.at_most(length);
-        let fast = length - slow;
-        if fast > 0.0 {
-            plan.add(fast, &limits, 0, &top);
+        let axis = axes
+            .velocity_mm_s
+            .iter()
+            .zip(&axes.acceleration_mm_s2)
+            .zip(&axes.jerk_mm_s3)
+            .zip(&mm);
+        for (((v, a), j), mm) in axis {
+            let slope = 1.0 / (mm / length).abs().at_least(SLOPE_MIN);
+            limits.speed = limits.speed.at_most(v * slope);
+            limits.acceleration = limits.acceleration.at_most(a * slope);
+            limits.jerk = limits.jerk.at_most(j * slope);
         }
-        if slow > 0.0 {
-            let square = limits.max_speed_sqr.at_most(squared(feed_mm_s));
-            plan.add(
-                slow,
-                &PathLimits {
-                    max_speed_sqr: square,
-                    ..limits
-                },
-                0,
-                &top,
-            );
-        }
-        plan.settle(&top);
-        Some((Self { from, to }, speed * period_s * QUANTA_PER_MM))
+        let curve = Curve::new(length, &limits, slow_mm, feed_mm_s);
+        Some(Self {
+            progress: Progress::new(length, curve),
+            from,
+            to,
+        })
     }
 
-    /// The position at this progress, units of 2^-10 nm.
-    pub(crate) fn position(&self, progress: i64, plan: &Plan) -> [i32; 3] {
-        if progress >= plan.end {
+    /// The position.
+    pub(crate) fn position(&self) -> [i32; 3] {
+        let Progress {
+            cursor, length_q10, ..
+        } = &self.progress;
+        if self.progress.is_over() || cursor.moved_q10 >= *length_q10 {
             return self.to;
         }
-        let part = part_q30(progress, plan.end);
+        let part = part_q30(cursor.moved_q10, *length_q10);
         let mut at = self.from;
         for (at, to) in at.iter_mut().zip(&self.to) {
             // 32 bits times 30 bits fits 64.
@@ -107,28 +171,53 @@ impl StraightMove {
     }
 }
 
+/// What the planning of a step-over does next.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Task {
+    /// Locate the ends, for its length.
+    Ends,
+    /// Locate the n-th station.
+    Station(u8),
+    /// Compute the derivatives at the n-th station.
+    Derivatives(u8),
+    Done,
+}
+
 /// A step-over from the end of a pass to the start of the next, along the boundary.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct BoundaryStepOver {
+    pub(crate) progress: Progress,
+    patch: Patch,
     from: SpanParameter,
     to: SpanParameter,
     /// Distance of the two passes in the side parameter.
     reach: f32,
     /// Path span and direction at the end of the pass.
     line: PassPosition,
-    /// Next station to plan, and the differences over the previous stations.
-    station: u16,
-    here: Option<Located>,
-    stencil: Stencil,
+    task: Task,
+    window: Window,
+    length: f32,
+    /// Limits over the stations so far: of the speed, and of what the bends leave.
+    limits: MotionLimits,
+    curve: CurveLimits,
+    /// Greatest bends over the stations, per axis, by the arc: first, second, third derivative.
+    bends: [[f32; 3]; 3],
     contact: [i32; 3],
-    cell: f32,
     /// Maximum ratio of the length of the contact's path to the length in the plan.
     contact_ratio: f32,
+    /// Feed for which it was planned, mm/s.
+    feed: f32,
 }
+
+/// Stations of a step-over.
+const STATIONS: u8 = 5;
+const _: () = assert!(STATIONS as usize == WINDOW);
 
 impl BoundaryStepOver {
     /// No move.
     pub(crate) const NONE: Self = Self {
+        progress: Progress::NONE,
+        patch: Patch::NONE,
         from: SpanParameter { span: 0, fraction: 0 },
         to: SpanParameter { span: 0, fraction: 0 },
         reach: 0.0,
@@ -137,31 +226,47 @@ impl BoundaryStepOver {
             reversed: false,
             span: 0,
         },
-        station: 0,
-        here: None,
-        stencil: Stencil::START,
+        task: Task::Done,
+        window: Window::EMPTY,
+        length: 0.0,
+        limits: MotionLimits::NONE,
+        curve: Curve::NONE.limits(),
+        bends: [[0.0; 3]; 3],
         contact: [0; 3],
-        cell: 0.0,
         contact_ratio: 1.0,
+        feed: 1.0,
     };
 
-    /// A step-over from the pass that ends on this patch to another.
-    pub(crate) fn new(job: &Job<'_>, line: &PassPosition, to: SpanParameter) -> Self {
+    /// Begins to plan a step-over from the pass that ends on this patch to another, at this feed, mm/s.
+    pub(crate) fn begin(&mut self, job: &Job<'_>, axes: &AxisLimits, line: &PassPosition, to: SpanParameter, feed: f32) {
         let width = |span| job.side_width(span);
-        Self {
-            from: line.side,
-            to,
-            reach: schedule::apart(line.side, to, width),
-            line: *line,
-            ..Self::NONE
-        }
+        self.from = line.side;
+        self.to = to;
+        self.reach = schedule::apart(line.side, to, width);
+        self.line = *line;
+        self.task = Task::Ends;
+        self.window = Window::EMPTY;
+        self.limits = MotionLimits::new(axes, feed, job.header.period_s);
+        self.bends = [[0.0; 3]; 3];
+        self.contact_ratio = 1.0;
+        self.feed = feed;
+    }
+
+    /// Whether the planning is complete.
+    pub(crate) fn is_planned(&self) -> bool {
+        self.task == Task::Done
+    }
+
+    /// Whether the length of the step-over is negligible.
+    pub(crate) fn is_nothing(&self) -> bool {
+        !(self.length > to_mm(NOTHING_NM))
     }
 
     /// Contact and ball centre at this fraction of the step-over, 0 to 1.
     ///
     /// # Errors
     /// The fault of the surface there.
-    fn locate(&self, job: &Job<'_>, patch: &mut Patch, part: f32) -> Result<Located> {
+    fn locate(&mut self, job: &Job<'_>, part: f32) -> Result<Located> {
         let width = |span| job.side_width(span);
         let side = if part >= 1.0 {
             self.to
@@ -169,85 +274,135 @@ impl BoundaryStepOver {
             let side = schedule::next_side(self.from, self.reach * part, job.header.side_spans, width);
             side.unwrap_or(self.from)
         };
-        patch.collapse(job, &PassPosition { side, ..self.line })?;
-        let (_, located) = patch.evaluate(u64::MAX)?;
+        self.patch.collapse(job, &PassPosition { side, ..self.line })?;
+        let (_, located) = self.patch.evaluate(u64::MAX)?;
         Ok(located)
     }
 
-    /// Plans one portion: a station's location or its cell's limits. Returns whether the plan is complete, or `None` where the length of the step-over is
-    /// negligible.
+    /// Plans one portion.
     ///
     /// # Errors
-    /// The fault of the surface there.
-    pub(crate) fn work(
-        &mut self,
-        job: &Job<'_>,
-        axes: &AxisLimits,
-        patch: &mut Patch,
-        top: &FeedLimits,
-        plan: &mut Plan,
-    ) -> Result<Option<bool>> {
-        if self.station > STEP_OVER_CELLS {
-            return Ok(Some(plan.work(CELLS_STANDING)));
-        }
-        let Some(here) = self.here.take() else {
-            let part = f32::from(self.station) / f32::from(STEP_OVER_CELLS);
-            let here = self.locate(job, patch, part)?;
-            crate::sequence::lookahead::check_travel(axes, &here.cl_nm)?;
-            self.here = Some(here);
-            return Ok(Some(false));
-        };
-        if self.station == 0 {
-            let there = self.locate(job, patch, 1.0)?;
-            let length = distance(&here.cc_nm, &there.cc_nm).at_least(distance(&here.cl_nm, &there.cl_nm));
-            if !(length > to_mm(NOTHING_NM)) {
-                return Ok(None);
+    /// The fault of the surface at a station; [`FaultKind::SoftLimit`] where a station is outside the travel.
+    #[inline(never)]
+    pub(crate) fn work(&mut self, job: &Job<'_>, axes: &AxisLimits) -> Result<()> {
+        self.task = match self.task {
+            Task::Ends => {
+                let here = self.locate(job, 0.0)?;
+                let there = self.locate(job, 1.0)?;
+                self.length = distance(&here.cc_nm, &there.cc_nm).at_least(distance(&here.cl_nm, &there.cl_nm));
+                if self.is_nothing() {
+                    Task::Done
+                } else {
+                    Task::Station(0)
+                }
             }
-            self.cell = length / f32::from(STEP_OVER_CELLS);
-            self.stencil.begin(here.cl_nm);
-            plan.begin();
-        } else {
-            self.stencil.add(here.cl_nm, self.cell);
-            let limits = self.stencil.limits(axes, top);
-            let limits = PathLimits {
-                jerk: JERK_SHARE * limits.jerk,
-                ..limits
-            };
-            self.contact_ratio = self
-                .contact_ratio
-                .at_least(distance(&self.contact, &here.cc_nm) / self.cell);
-            plan.add(self.cell, &limits, 2, top);
-        }
-        self.contact = here.cc_nm;
-        if self.station == STEP_OVER_CELLS {
-            plan.settle(top);
-        }
-        self.station += 1;
-        Ok(Some(false))
+            Task::Station(index) => {
+                let part = f32::from(index) * (1.0 / f32::from(STATIONS - 1));
+                let here = self.locate(job, part)?;
+                check_travel(axes, &here.cl_nm)?;
+                self.window.push(here.cl_nm, part * self.length);
+                if index > 0 {
+                    let cell = self.length * (1.0 / f32::from(STATIONS - 1));
+                    let ratio = distance(&self.contact, &here.cc_nm) / cell;
+                    self.contact_ratio = self.contact_ratio.at_least(ratio);
+                }
+                self.contact = here.cc_nm;
+                if index + 1 < STATIONS {
+                    Task::Station(index + 1)
+                } else {
+                    Task::Derivatives(0)
+                }
+            }
+            Task::Derivatives(index) => {
+                let q = self.window.derivatives(usize::from(index));
+                for (bends, q) in self.bends.iter_mut().zip(&q) {
+                    for (bend, q) in bends.iter_mut().zip(q) {
+                        *bend = bend.at_least(q.abs());
+                    }
+                }
+                if index + 1 < STATIONS {
+                    Task::Derivatives(index + 1)
+                } else {
+                    self.choose_curve();
+                    Task::Done
+                }
+            }
+            Task::Done => Task::Done,
+        };
+        Ok(())
     }
 
-    /// Contact and ball centre at this progress, units of 2^-10 nm.
+    /// The curve that the bends leave room for.
+    fn choose_curve(&mut self) {
+        let limits = &self.limits;
+        let mut speed = sqrt(limits.speed_sqr(&self.bends)).at_most(self.feed / self.contact_ratio);
+        for (((a, j), second), third) in limits
+            .acceleration
+            .iter()
+            .zip(&limits.jerk)
+            .zip(&self.bends[1])
+            .zip(&self.bends[2])
+        {
+            let cubed = BEND_JERK_SHARE * j / third.at_least(1e-9);
+            speed = speed
+                .at_most(sqrt(BEND_SHARE * a / second.at_least(1e-9)))
+                .at_most(crate::math::number::cube_root(cubed));
+        }
+        let mut curve = Curve::NONE;
+        let mut peak = 0.0;
+        for _ in 0..ROUNDS {
+            self.curve = self.left_at(speed, peak);
+            curve = Curve::new(self.length, &self.curve, 0.0, 0.0);
+            peak = curve.peak();
+        }
+        self.progress = Progress::new(self.length, curve);
+    }
+
+    /// What the bends leave at this speed.
+    fn left_at(&self, speed: f32, peak: f32) -> CurveLimits {
+        let mut left = CurveLimits {
+            speed,
+            acceleration: f32::MAX,
+            jerk: f32::MAX,
+        };
+        let [first, second, third] = &self.bends;
+        let limits = || self.limits.acceleration.iter().zip(&self.limits.jerk);
+        for (((a, _), first), second) in limits().zip(first).zip(second) {
+            let slope = 1.0 / first.at_least(SLOPE_MIN);
+            left.acceleration = left.acceleration.at_most((a - second * peak * peak).at_least(0.2 * a) * slope);
+        }
+        for ((((_, j), first), second), third) in limits().zip(first).zip(second).zip(third) {
+            let slope = 1.0 / first.at_least(SLOPE_MIN);
+            let taken = (third * peak * peak + 3.0 * second * left.acceleration) * peak;
+            left.jerk = left.jerk.at_most((j - taken).at_least(0.15 * j) * slope);
+        }
+        left
+    }
+
+    /// Contact and ball centre.
     ///
     /// # Errors
     /// The fault of the surface there.
-    pub(crate) fn position(
-        &self,
-        job: &Job<'_>,
-        patch: &mut Patch,
-        progress: i64,
-        plan: &Plan,
-    ) -> Result<Located> {
-        let part = if progress >= plan.end {
+    pub(crate) fn position(&mut self, job: &Job<'_>) -> Result<Located> {
+        let Progress {
+            cursor, length_q10, ..
+        } = &self.progress;
+        let part = if self.progress.is_over() || cursor.moved_q10 >= *length_q10 {
             1.0
         } else {
-            ratio(progress, plan.end)
+            to_f32(cursor.moved_q10) / to_f32(*length_q10)
         };
-        self.locate(job, patch, part)
+        self.locate(job, part)
     }
 
-    /// Ratio of the speed along the plan to the contact's speed.
-    pub(crate) fn per_contact(&self) -> f32 {
-        1.0 / self.contact_ratio
+    /// Feed for which it was planned, mm/s.
+    pub(crate) const fn feed(&self) -> f32 {
+        self.feed
+    }
+
+    /// Speed of the contact, mm/s.
+    pub(crate) fn contact_speed(&self) -> f32 {
+        self.contact_ratio * self.progress.speed()
     }
 }
 
@@ -266,18 +421,14 @@ pub(crate) fn check_faces_up(up: bool) -> Result<()> {
 fn distance(from: &[i32; 3], to: &[i32; 3]) -> f32 {
     let mut sum = 0.0;
     for (from, to) in from.iter().zip(to) {
-        sum += squared(to_mm(i64::from(*to) - i64::from(*from)));
+        let mm = to_mm(i64::from(*to) - i64::from(*from));
+        sum += mm * mm;
     }
     sqrt(sum)
 }
 
 fn to_mm(nm: i64) -> f32 {
     to_f32(nm) * MM_PER_NM
-}
-
-/// A step-over is short, so that 24 bits resolve it to less than 1 nm.
-fn ratio(part: i64, whole: i64) -> f32 {
-    to_f32(part) / to_f32(whole)
 }
 
 /// A fraction in units of 2^-30, with an error of at most 2^-30: 0.1 nm in 100 mm.

@@ -1,15 +1,16 @@
-//! Look-ahead over the next pass while the tool is still moving on the current one. Stations at equal fractions of each patch, in order, yield the bounds of the
-//! feed ([`Plan`]), the interval to the following pass, and the checks that the ball fits and the axes stay within their travel at every station.
+//! Look-ahead over the next pass: stations at equal fractions of each patch, in order, yield the derivatives of the path that its feed is planned
+//! from, the interval to the following pass, and the checks that the ball fits and the axes stay within their travel at every station.
 //!
 //! Stations depend on the surface, not on the samples, so holds and overrides do not change the passes.
 
-use crate::command::OVERRIDE_MAX;
 use crate::fault::{Fault, FaultKind, Result};
-use crate::feed::demand::{Jump, PathLimits, Stencil, over_jump, root};
-use crate::feed::plan::{CELLS_MOVING, FeedLimits, Plan};
+use crate::feed::plan::Plan;
+use crate::feed::stations::{Derivatives, STATIONS_MAX, Station, WINDOW, Window};
+use crate::feed::{Q10_BITS, to_q10};
 use crate::job::program::Job;
 use crate::job::{AxisLimits, Pattern, Spacing};
-use crate::math::number::{Bounded, nm_to_mm};
+use crate::math::arith::truncated;
+use crate::math::number::{Bounded, MM_PER_NM, nm_to_mm, to_f32};
 use crate::pass::patch::Patch;
 use crate::pass::position::PassPosition;
 use crate::pass::schedule;
@@ -17,25 +18,37 @@ use crate::pass::step_over::{PassMaximum, StepOverEstimator};
 use crate::sample::{SpanParameter, interval_of};
 use crate::surface::{Contact, PathSpeed};
 
-/// Nominal cells of a pass; the number per patch is rounded to an integer. At most [`crate::job::CELLS_MAX`].
-const CELLS_WANTED: u16 = 160;
-/// Maximum cells of a patch.
-const CELLS_PER_PATCH_MAX: u16 = 64;
-/// Change of r times a curvature below which the curvature counts as continuous: the rounding error of f32.
-const NO_JUMP: f32 = 4e-6;
-/// Cells before a station over which its differences extend.
-const STENCIL_CELLS: usize = 2;
+/// Least length of a cell, mm: a shorter one has differences of rounded positions.
+const CELL_MIN_MM: f32 = 0.15;
+/// Fewest cells of a patch that are looked at: a patch has its own second derivative.
+const CELLS_MIN: u16 = 2;
+/// Cells of a patch where only its ends are kept.
+const CELLS_OF_MANY: u16 = 4;
+/// Most stations of a pass.
+const STATIONS: u16 = 168;
+const _: () = assert!(STATIONS as usize == STATIONS_MAX);
 
-/// The plan of one pass: its feed bounds, its ends, and the pass after it.
+/// Which stations of a pass are kept for its plan.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Kept {
+    /// All.
+    Every,
+    /// Those at the ends of each patch.
+    Ends,
+    /// Those at the ends of each group of so many patches, with the greatest derivatives within the group.
+    Groups(u16),
+}
+
+/// The plan of one pass: its feed, its ends, and the pass after it.
 #[derive(Clone, Debug)]
 pub(crate) struct PassPlan {
     pub(crate) plan: Plan,
     pub(crate) pass: u32,
     pub(crate) side: SpanParameter,
-    /// Cells of a patch.
-    pub(crate) cells_per_patch: u16,
-    /// Fraction of the patch per cell.
-    pub(crate) cell_fraction: u64,
+    /// Cells of a patch that are looked at, the fraction of the patch per cell, and which stations are kept.
+    cells: u16,
+    cell_fraction: u64,
+    kept: Kept,
     /// The pass is a single point.
     pub(crate) point: bool,
     /// Cutter location at start and end, nm, and whether the surface faces up there.
@@ -53,14 +66,41 @@ impl PassPlan {
         plan: Plan::NONE,
         pass: 0,
         side: SpanParameter { span: 0, fraction: 0 },
-        cells_per_patch: 1,
-        cell_fraction: u64::MAX,
+        cells: 0,
+        cell_fraction: 0,
+        kept: Kept::Every,
         point: false,
         ends: [[0; 3]; 2],
         faces_up: [false; 2],
-        interval: f32::INFINITY,
+        interval: 0.0,
         next: None,
     };
+
+    /// Cells of a patch between kept stations, and the fraction of the patch per cell.
+    pub(crate) const fn kept_cells(&self) -> (u16, u64) {
+        match self.kept {
+            Kept::Every => (self.cells, self.cell_fraction),
+            Kept::Ends | Kept::Groups(_) => (1, u64::MAX),
+        }
+    }
+
+    /// Arc at the start of a cell between kept stations, units of 2^-10 nm. `cell`: number from the start of the pass.
+    pub(crate) fn arc_q10(&self, cell: u16) -> Option<i64> {
+        let (cells, _) = self.kept_cells();
+        let patch = cell.checked_div(cells)?;
+        let within = cell - patch * cells;
+        let station = match self.kept {
+            Kept::Every | Kept::Ends => patch * (cells + 1) + within,
+            Kept::Groups(size) => {
+                let group = patch.checked_div(size)?;
+                if group * size != patch {
+                    return None;
+                }
+                2 * group
+            }
+        };
+        Some(i64::from(self.plan.stations.get(station).arc_nm) << Q10_BITS)
+    }
 }
 
 /// The next task.
@@ -68,79 +108,39 @@ impl PassPlan {
 enum Task {
     Patch,
     Station,
-    /// Compute the differences that end at the station.
-    Cell,
-    /// Compute the path limits from the differences.
-    Limits,
-    /// Close the cell that ends at the station.
-    Add,
+    /// Compute the derivatives at one of the last stations, by its place in the window, up to another.
+    Derivatives(u8, u8),
     /// Run the step-over estimator, with this number of evaluations left at the station.
     Estimate(u8),
     Close,
-    Bound,
     Done,
 }
 
-/// Curvatures at the last stations, which distinguish a curvature jump between patches from a continuous change.
-#[derive(Clone, Copy, Debug)]
-struct CurvatureHistory {
-    /// 1 - r k along the path and r times the twist, at the last three stations of the patch, the newest first.
-    values: [[f32; 2]; 3],
-    /// Lengths between these stations, mm.
-    lengths: [f32; 2],
-    /// Slopes at the end of the previous patch.
-    slopes: Option<[f32; 2]>,
-}
-
-impl CurvatureHistory {
-    const START: Self = Self {
-        values: [[0.0; 2]; 3],
-        lengths: [0.0; 2],
-        slopes: None,
-    };
-
-    const fn push(&mut self, value: [f32; 2], length: f32) {
-        let [newest, middle, _] = self.values;
-        self.values = [value, newest, middle];
-        self.lengths = [length, self.lengths[0]];
-    }
-
-    /// Slopes at the newest (`at_newest`) or the oldest of three stations, by the parabola through them.
-    fn slopes(&self, at_newest: bool) -> [f32; 2] {
-        let [newest, middle, oldest] = self.values;
-        let [h1, h2] = self.lengths.map(|length| length.at_least(1e-9));
-        let slope = |c: f32, b: f32, a: f32| {
-            let (late, early) = ((c - b) / h1, (b - a) / h2);
-            let bend = (late - early) / (h1 + h2);
-            if at_newest {
-                late + bend * h1
-            } else {
-                early - bend * h2
-            }
-        };
-        let ([c0, c1], [b0, b1], [a0, a1]) = (newest, middle, oldest);
-        [slope(c0, b0, a0), slope(c1, b1, a1)]
-    }
+/// Nominal cycles of the tasks.
+mod cycles {
+    pub(super) const PATCH: u32 = 9_000;
+    pub(super) const STATION: u32 = 4_000;
+    pub(super) const DERIVATIVES: u32 = 6_000;
+    pub(super) const ESTIMATE: u32 = 5_000;
+    pub(super) const CLOSE: u32 = 6_000;
+    pub(super) const NEXT: u32 = 300;
 }
 
 /// The look-ahead over one pass.
 #[derive(Clone, Debug)]
 pub(crate) struct Lookahead {
-    pub(crate) patch: Patch,
+    patch: Patch,
     step_over: StepOverEstimator,
     task: Task,
     line: PassPosition,
-    /// Station within the patch, from 0.
+    /// Station within the patch, from 0, and patches so far.
     station: u16,
+    patches: u16,
     speed: PathSpeed,
-    stencil: Stencil,
-    history: CurvatureHistory,
-    /// The station whose cell is to be closed: contact, and ball centre in nm.
-    here: Option<(Contact, [i32; 3])>,
-    /// Length of the open cell, mm.
-    length: f32,
-    /// Path limits at the last station.
-    limits: PathLimits,
+    window: Window,
+    /// Arc from the start of the patch, mm, and of the pass to the patch, units of 2^-10 nm.
+    arc_mm: f32,
+    start_q10: i64,
     maximum: PassMaximum,
 }
 
@@ -156,12 +156,11 @@ impl Lookahead {
             span: 0,
         },
         station: 0,
+        patches: 0,
         speed: PathSpeed::STILL,
-        stencil: Stencil::START,
-        history: CurvatureHistory::START,
-        here: None,
-        length: 0.0,
-        limits: PathLimits::WIDE,
+        window: Window::EMPTY,
+        arc_mm: 0.0,
+        start_q10: 0,
         maximum: PassMaximum::NONE,
     };
 
@@ -171,21 +170,26 @@ impl Lookahead {
         self.task = Task::Done;
     }
 
-    /// Whether the plan is complete.
+    /// Whether every station is located.
     pub(crate) const fn is_done(&self) -> bool {
         matches!(self.task, Task::Done)
     }
 
-    /// Whether the next task collapses a patch.
-    pub(crate) fn makes_patch(&self) -> bool {
+    /// Nominal cycles of the next task.
+    pub(crate) fn cycles(&self) -> u32 {
         match self.task {
-            Task::Patch => true,
-            Task::Estimate(_) => self.step_over.makes_patch(&self.line),
-            _ => false,
+            Task::Patch => cycles::PATCH,
+            Task::Station => cycles::STATION,
+            Task::Derivatives(..) => cycles::DERIVATIVES,
+            Task::Estimate(1..) if self.step_over.makes_patch(&self.line) => cycles::PATCH,
+            Task::Estimate(0) => cycles::NEXT,
+            Task::Estimate(_) => cycles::ESTIMATE,
+            Task::Close => cycles::CLOSE,
+            Task::Done => 0,
         }
     }
 
-    /// Begins to plan this pass.
+    /// Begins to look over this pass.
     pub(crate) fn begin(&mut self, job: &Job<'_>, pass: u32, side: SpanParameter, out: &mut PassPlan) {
         let spans = job.header.path_spans;
         let reversed = job.header.pattern == Pattern::Zigzag && pass % 2 == 1;
@@ -195,16 +199,14 @@ impl Lookahead {
             span: if reversed { spans.saturating_sub(1) } else { 0 },
         };
         self.task = Task::Patch;
-        self.station = 0;
-        self.history = CurvatureHistory::START;
-        self.limits = PathLimits::WIDE;
+        (self.station, self.patches) = (0, 0);
+        self.start_q10 = 0;
         self.maximum = PassMaximum::NONE;
         self.step_over.begin();
-        out.plan.begin();
+        out.plan.stations.clear();
         out.pass = pass;
         out.side = side;
-        out.cells_per_patch = (CELLS_WANTED / spans.max(1)).clamp(1, CELLS_PER_PATCH_MAX);
-        out.cell_fraction = u64::MAX / u64::from(out.cells_per_patch);
+        out.cells = 0;
         out.point = false;
         out.next = None;
     }
@@ -219,39 +221,37 @@ impl Lookahead {
             Task::Patch => {
                 self.patch.collapse(job, &self.line)?;
                 out.point |= self.patch.point;
+                if out.cells == 0 {
+                    self.choose_cells(job.header.path_spans.max(1), out);
+                }
+                self.window = Window::EMPTY;
+                self.arc_mm = 0.0;
                 Task::Station
             }
             Task::Station => {
                 self.visit(axes, out)?;
-                Task::Cell
+                self.after_station(job, out)
             }
-            Task::Cell => {
-                self.differences(out);
-                Task::Limits
-            }
-            Task::Limits => {
-                if self.station > 0 && !out.point {
-                    self.limits = self.stencil.limits(axes, &top(job));
+            Task::Derivatives(at, last) => {
+                self.differentiate(at, out);
+                if at < last {
+                    Task::Derivatives(at + 1, last)
+                } else {
+                    self.estimates(job, out)
                 }
-                Task::Add
             }
-            Task::Add => {
-                self.close_cell(job, axes, out);
-                self.estimates(job, out)
-            }
+            Task::Estimate(0) => self.next_station(job, out),
             Task::Estimate(looks) => {
-                self.estimate(job, out);
-                match looks.checked_sub(1) {
-                    Some(looks) if looks > 0 => Task::Estimate(looks),
-                    _ => self.next_station(job, out),
-                }
+                let fraction = self.fraction(out);
+                let most = self.maximum.inv_interval_sq;
+                self.step_over.work(job, &self.line, &self.patch, fraction, most);
+                Task::Estimate(looks - 1)
             }
             Task::Close => {
                 self.close(job, out)?;
-                Task::Bound
+                Task::Done
             }
-            Task::Bound if out.point || out.plan.work(CELLS_MOVING) => Task::Done,
-            task => task,
+            Task::Done => Task::Done,
         };
         Ok(())
     }
@@ -268,167 +268,194 @@ impl Lookahead {
     }
 
     fn fraction(&self, out: &PassPlan) -> u64 {
-        if self.station >= out.cells_per_patch {
+        if self.station >= out.cells {
             return u64::MAX;
         }
         u64::from(self.station) * out.cell_fraction
     }
 
-    /// Evaluations of the step-over estimator at a station: one for each neighbouring line, two where its patch has to be collapsed, and more at
-    /// the lines' ends.
-    fn estimates(&mut self, job: &Job<'_>, out: &PassPlan) -> Task {
-        if job.header.spacing == Spacing::FirstOrder || out.point {
-            return self.next_station(job, out);
-        }
-        let first = self.station == 0;
-        let begins = first && out.plan.count() == 0;
-        let ends = self.station >= out.cells_per_patch && self.line.next(job.header.path_spans).is_none();
-        Task::Estimate(2 + 2 * u8::from(first) + 6 * u8::from(begins) + 6 * u8::from(ends))
+    /// Chooses the cells of a patch by the number of patches and the length of the first.
+    fn choose_cells(&self, spans: u16, out: &mut PassPlan) {
+        let fit = (STATIONS / spans).saturating_sub(1);
+        let (most, kept) = if fit >= CELLS_MIN {
+            (fit, Kept::Every)
+        } else if spans <= STATIONS / 2 {
+            (CELLS_OF_MANY, Kept::Ends)
+        } else {
+            (CELLS_OF_MANY, Kept::Groups(spans.div_ceil(STATIONS / 2)))
+        };
+        let cells = truncated(self.patch_length() / CELL_MIN_MM);
+        out.cells = u16::try_from(cells).unwrap_or(u16::MAX).clamp(CELLS_MIN, most);
+        out.cell_fraction = u64::MAX / u64::from(out.cells);
+        out.kept = kept;
     }
 
-    fn estimate(&mut self, job: &Job<'_>, out: &PassPlan) {
-        let fraction = self.fraction(out);
-        let most = self.maximum.inv_interval_sq;
-        self.step_over.work(job, &self.line, &self.patch, fraction, most);
+    /// Length of the patch, roughly, mm; 0 where its surface is not evaluated.
+    fn patch_length(&self) -> f32 {
+        let at = |fraction| self.patch.evaluate(fraction).map(|(_, located)| located.cc_nm);
+        let (Ok(start), Ok(middle), Ok(end)) = (at(0), at(1 << 63), at(u64::MAX)) else {
+            return 0.0;
+        };
+        let apart = |from: &[i32; 3], to: &[i32; 3]| {
+            let mut sum = 0.0;
+            for (from, to) in from.iter().zip(to) {
+                let mm = to_f32(i64::from(*to) - i64::from(*from)) * MM_PER_NM;
+                sum += mm * mm;
+            }
+            crate::math::arith::sqrt(sum)
+        };
+        apart(&start, &middle) + apart(&middle, &end)
+    }
+
+    /// The derivatives that can be taken after a station.
+    fn after_station(&self, job: &Job<'_>, out: &PassPlan) -> Task {
+        if out.point {
+            return self.estimates(job, out);
+        }
+        let is_end = self.station >= out.cells;
+        let count = self.window.count();
+        let last = count.saturating_sub(1);
+        let middle = WINDOW / 2;
+        // Where the window is full for the first time, also those before its middle; at the patch's end also those behind it.
+        let from = if usize::from(self.station) + 1 == count { 0 } else { middle };
+        let to = if is_end { last } else { middle };
+        if count < WINDOW && !is_end {
+            return self.estimates(job, out);
+        }
+        match (u8::try_from(from), u8::try_from(to)) {
+            (Ok(from), Ok(to)) => Task::Derivatives(from, to),
+            _ => self.estimates(job, out),
+        }
+    }
+
+    /// Stores the derivatives at a place of the window.
+    fn differentiate(&self, at: u8, out: &mut PassPlan) {
+        let behind = self.window.count().saturating_sub(1 + usize::from(at));
+        let station = usize::from(self.station).saturating_sub(behind);
+        let q = self.window.derivatives(usize::from(at));
+        let is_start = station == 0;
+        let is_end = station >= usize::from(out.cells);
+        match out.kept {
+            Kept::Every => {
+                let back = u16::try_from(behind).unwrap_or(0) + 1;
+                if let Some(place) = out.plan.stations.back_mut(back) {
+                    place.q = q;
+                }
+            }
+            Kept::Ends => {
+                if let Some(place) = out.plan.stations.back_mut(if is_start { 2 } else { 1 }) {
+                    if is_start || is_end {
+                        place.q = q;
+                    }
+                }
+            }
+            Kept::Groups(size) => {
+                let begins = is_start && self.patches % size == 0;
+                for back in [1, 2] {
+                    if let Some(place) = out.plan.stations.back_mut(back) {
+                        widen(&mut place.q, &q, begins || back == 1);
+                    }
+                }
+            }
+        }
+    }
+
+    /// Evaluations of the step-over estimator at a station: one for each neighbouring line, two where its patch has to be collapsed, and more at
+    /// the lines' ends.
+    fn estimates(&self, job: &Job<'_>, out: &PassPlan) -> Task {
+        let first = self.station == 0;
+        let begins = first && self.patches == 0;
+        let ends = self.station >= out.cells && self.line.next(job.header.path_spans).is_none();
+        Task::Estimate(if job.header.spacing == Spacing::FirstOrder || out.point {
+            0
+        } else {
+            2 + 2 * u8::from(first) + 6 * u8::from(begins) + 6 * u8::from(ends)
+        })
     }
 
     /// Advances to the next station, the next patch, or the end.
     fn next_station(&mut self, job: &Job<'_>, out: &PassPlan) -> Task {
-        if self.station < out.cells_per_patch {
+        if self.station < out.cells {
             self.station += 1;
             return Task::Station;
         }
+        self.start_q10 += to_q10(self.arc_mm);
         match self.line.next(job.header.path_spans) {
             Some(line) => {
                 self.line = line;
                 self.station = 0;
+                self.patches += 1;
                 Task::Patch
             }
             None => Task::Close,
         }
     }
 
-    /// Evaluates the station: fit of the ball, travel, inverse square interval.
+    /// Evaluates the station: fit of the ball, travel, inverse square interval, arc.
     fn visit(&mut self, axes: &AxisLimits, out: &mut PassPlan) -> Result<()> {
         let fraction = self.fraction(out);
-        let patch = &self.patch;
-        let (contact, located) = patch.evaluate(fraction)?;
+        let (contact, located) = self.patch.evaluate(fraction)?;
         check_travel(axes, &located.cl_nm)?;
         check_height(axes, &located.cl_nm)?;
-        let inv_interval_sq = patch.interval.inv_interval_sq(&contact);
+        let inv_interval_sq = self.patch.interval.inv_interval_sq(&contact);
         if inv_interval_sq > self.maximum.inv_interval_sq {
             self.maximum = PassMaximum {
                 inv_interval_sq,
                 shape: [contact.across, contact.lateral_squared],
             };
         }
-        let is_up = patch.faces_up(contact.offset);
-        let begins = out.plan.count() == 0 && self.station == 0;
-        if begins || out.point {
+        let is_up = self.patch.faces_up(contact.offset);
+        if (self.patches == 0 && self.station == 0) || out.point {
             (out.ends, out.faces_up) = ([located.cl_nm; 2], [is_up; 2]);
         }
         (out.ends[1], out.faces_up[1]) = (located.cl_nm, is_up);
-        self.here = Some((contact, located.cl_nm));
+        if out.point {
+            return Ok(());
+        }
+        if self.station > 0 {
+            self.arc_mm += self.cell_length(out, &contact);
+        }
+        self.speed = contact.path;
+        self.window.push(located.cl_nm, self.arc_mm);
+        self.keep(out);
         Ok(())
     }
 
-    /// Computes the differences up to the station.
-    fn differences(&mut self, out: &PassPlan) {
-        let Some((contact, centre_nm)) = self.here.filter(|_| !out.point) else {
-            return;
+    /// Appends the station to the plan's, without its derivatives.
+    fn keep(&self, out: &mut PassPlan) {
+        let arc_q10 = self.start_q10 + to_q10(self.arc_mm);
+        let station = Station {
+            arc_nm: u32::try_from((arc_q10 + (1 << (Q10_BITS - 1))) >> Q10_BITS).unwrap_or(u32::MAX),
+            q: [[0.0; 3]; 3],
         };
-        self.length = self.cell_length(out, &contact);
-        self.speed = contact.path;
-        if self.station > 0 {
-            self.stencil.add(centre_nm, self.length);
-        } else if out.plan.count() == 0 {
-            self.stencil.begin(centre_nm);
+        let is_start = self.station == 0;
+        let is_end = self.station >= out.cells;
+        let stations = &mut out.plan.stations;
+        match out.kept {
+            Kept::Every => stations.push(station),
+            Kept::Ends if is_start || is_end => stations.push(station),
+            Kept::Ends => {}
+            Kept::Groups(size) => {
+                if is_start && self.patches % size == 0 {
+                    stations.push(station);
+                    stations.push(station);
+                } else if let Some(last) = stations.back_mut(1) {
+                    last.arc_nm = station.arc_nm;
+                }
+            }
         }
-    }
-
-    /// Closes the cell up to the station.
-    fn close_cell(&mut self, job: &Job<'_>, axes: &AxisLimits, out: &mut PassPlan) {
-        let Some((contact, _)) = self.here.take().filter(|_| !out.point) else {
-            return;
-        };
-        let top = top(job);
-        if self.station > 0 {
-            out.plan.add(self.length, &self.limits, STENCIL_CELLS, &top);
-        }
-        self.limit_at_jumps(axes, &contact, self.length, &top, out);
     }
 
     /// Arc from the last station, mm: Hermite's two-point rule.
     fn cell_length(&self, out: &PassPlan, contact: &Contact) -> f32 {
-        let length = 1.0 / f32::from(out.cells_per_patch);
+        let length = 1.0 / f32::from(out.cells);
         let (first, last) = (1.0 / self.speed.inv_speed, 1.0 / contact.path.inv_speed);
         let bow = first * self.speed.log_speed_derivative - last * contact.path.log_speed_derivative;
         length * (0.5 * (first + last) + bow * length * (1.0 / 12.0)) / self.patch.per_mm
     }
 
-    /// Jumps of the curvature between the previous patch and this one limit the feed at the boundary; jumps of its slope do so once three stations
-    /// on this side are known.
-    fn limit_at_jumps(
-        &mut self,
-        axes: &AxisLimits,
-        contact: &Contact,
-        length: f32,
-        top: &FeedLimits,
-        out: &mut PassPlan,
-    ) {
-        let twist = if contact.lateral_squared > 0.0 {
-            root(contact.twist_squared / contact.lateral_squared)
-        } else {
-            0.0
-        };
-        let value = [contact.along, twist];
-        let before = self.history.values[0];
-        if self.station == 0 {
-            let first = changed(&before, &value, NO_JUMP);
-            self.history.slopes = (out.cells_per_patch >= 2).then(|| self.history.slopes(true));
-            self.history.values = [value; 3];
-            if out.plan.count() > 0 {
-                let jump = Jump {
-                    first,
-                    second: [0.0; 2],
-                };
-                self.limit_at_jump(1, &jump, axes, top, out);
-            }
-            return;
-        }
-        self.history.push(value, length);
-        if self.station == 2
-            && out.plan.count() > out.cells_per_patch
-            && let Some(slopes) = self.history.slopes
-        {
-            let here = self.history.slopes(false);
-            let shortest = self.history.lengths[0]
-                .at_most(self.history.lengths[1])
-                .at_least(1e-9);
-            let second = changed(&slopes, &here, 4.0 * NO_JUMP / shortest);
-            let jump = Jump {
-                first: [0.0; 2],
-                second,
-            };
-            self.limit_at_jump(3, &jump, axes, top, out);
-        }
-    }
-
-    /// Limits the feed at a curvature jump at the end of a cell, `back` cells before the last.
-    fn limit_at_jump(&self, back: u16, jump: &Jump, axes: &AxisLimits, top: &FeedLimits, out: &mut PassPlan) {
-        let square = over_jump(
-            jump,
-            &self.stencil.cosines(),
-            self.limits.taken,
-            axes,
-            top.period_s,
-        );
-        out.plan.gate(out.plan.count().saturating_sub(back), square, top);
-    }
-
-    /// Completes the plan: the feed filter, the interval, and the next pass.
+    /// Computes the interval and the next pass.
     fn close(&mut self, job: &Job<'_>, out: &mut PassPlan) -> Result<()> {
-        out.plan.settle(&top(job));
         let header = job.header;
         out.interval = interval_of(self.maximum.inv_interval_sq);
         let step = match header.spacing {
@@ -445,12 +472,17 @@ impl Lookahead {
     }
 }
 
-/// The speeds for which a pass is planned.
-pub(crate) fn top(job: &Job<'_>) -> FeedLimits {
-    FeedLimits {
-        speed: OVERRIDE_MAX * job.header.feed_mm_s,
-        usual: job.header.feed_mm_s,
-        period_s: job.header.period_s,
+/// The direction at the station, and of each higher derivative the one that is greater.
+fn widen([direction, bends @ ..]: &mut Derivatives, [first, higher @ ..]: &Derivatives, is_here: bool) {
+    if is_here {
+        *direction = *first;
+    }
+    for (most, q) in bends.iter_mut().zip(higher) {
+        for (most, q) in most.iter_mut().zip(q) {
+            if q.abs() > most.abs() {
+                *most = *q;
+            }
+        }
     }
 }
 
@@ -477,11 +509,4 @@ fn check_height(axes: &AxisLimits, [_, _, z]: &[i32; 3]) -> Result<()> {
         ));
     }
     Ok(())
-}
-
-/// Norm of the difference of two pairs, beyond the rounding error.
-fn changed(from: &[f32; 2], to: &[f32; 2], noise: f32) -> [f32; 2] {
-    let ([from0, from1], [to0, to1]) = (from, to);
-    let apart = |from: &f32, to: &f32| ((to - from).abs() - noise).at_least(0.0);
-    [apart(from0, to0), apart(from1, to1)]
 }

@@ -1,13 +1,14 @@
-//! The sequence of a job on a machine with limits: approach, passes from standstill to standstill, links, retract.
+//! The sequence of a job on a machine with limits: approach, passes from rest to rest, links, retract.
 //!
-//! While a pass runs, the look-ahead plans the next one, one task per tick ([`Lookahead`]), in ticks with little other work; where the plan is not
-//! complete in time the tool waits at the end of the pass. [`Profile`] computes the motion along every path: a pass, a straight leg off the surface, a step-over along
-//! the boundary.
+//! [`Sequencer::tick`] moves the tool by one period. [`Sequencer::plan`] plans, a fixed portion a period: a change of the pace, the link to the next
+//! pass, the next pass. A pass is slowed down where the pass after it would not be planned in time.
 
 use crate::fault::{Fault, Result};
-use crate::feed::QUANTA_PER_MM;
-use crate::feed::plan::CELLS_STANDING;
-use crate::feed::profile::Profile;
+use crate::feed::follow::Follower;
+use crate::feed::limits::MotionLimits;
+use crate::feed::pace::Pace;
+use crate::feed::plan::Cursor;
+use crate::feed::planner::{PORTION_CYCLES, Planner};
 use crate::job::program::Job;
 use crate::job::{AxisLimits, Pattern};
 use crate::math::number::Bounded;
@@ -15,30 +16,29 @@ use crate::pass::position::PassPosition;
 use crate::pass::run::Run;
 use crate::sample::{Sample, SpanParameter};
 use crate::sequence::link::{BoundaryStepOver, StraightMove, check_faces_up};
-use crate::sequence::lookahead::{Lookahead, PassPlan, check_travel, top};
+use crate::sequence::lookahead::{Lookahead, PassPlan, check_travel};
 
-/// Look-ahead tasks per tick while the tool waits for the plan.
-const PORTIONS_WAITING: u8 = 2;
+/// Periods that a pass takes longer than the planning of the next one.
+const SPARE_PERIODS: u32 = 30;
+
+/// Nominal cycles of one place of a search for a change of the pace, along a pass and along a link; of a portion of a step-over's planning.
+const PACE_CYCLES: u32 = 2_400;
+const LINK_PACE_CYCLES: u32 = 1_000;
+const STEP_OVER_CYCLES: u32 = 15_000;
 
 /// Phase of the sequence.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Phase {
-    /// The tool waits until the look-ahead has planned the next pass.
-    AwaitPlan,
-    /// Plans a step-over along the boundary.
-    PlanStepOver,
-    /// Follows the step-over.
+    /// The tool waits until the next pass is planned.
+    Await,
+    /// A step-over along the boundary.
     StepOver,
-    /// Plans a leg, a straight move off the surface.
-    PlanLeg(Leg),
-    /// Computes the speed bounds of the leg.
-    BoundLeg(Leg),
-    /// Follows the leg.
-    FollowLeg(Leg),
-    /// The tool stands at the start of the next pass, whose first patch was collapsed in a separate tick.
-    EnterPass,
+    /// The tool waits until the goal of the leg is known.
+    AwaitGoal(Leg),
+    /// A straight move off the surface.
+    Leg(Leg),
     /// The tool is on a pass.
-    FollowPass,
+    Pass,
     /// The sequence is over.
     Done,
 }
@@ -73,12 +73,34 @@ pub(crate) enum Outcome {
     Finished,
 }
 
+/// Planning of the next pass.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Planning {
+    /// Its stations are being located.
+    Stations,
+    /// Its feed is being planned.
+    Feed,
+    /// There is no next pass, or it is planned.
+    Complete,
+}
+
+/// The wish of a period.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Wish {
+    /// Feed factor, 0 to 2.
+    pub(crate) share: f32,
+    /// A controlled stop after a fault.
+    pub(crate) is_fault: bool,
+}
+
 /// The sequence of a job.
 #[derive(Clone, Debug)]
 pub(crate) struct Sequencer {
     phase: Phase,
     goal: Goal,
     lookahead: Lookahead,
+    planner: Planner,
+    planning: Planning,
     plans: [PassPlan; 2],
     /// The second plan is that of the current or last pass.
     second: bool,
@@ -86,11 +108,16 @@ pub(crate) struct Sequencer {
     on_surface: bool,
     /// A fault of the next pass, reported when the tool reaches the pass.
     pending: Option<Fault>,
-    profile: Profile,
+    follower: Follower,
+    pace: Pace<Cursor>,
     straight: StraightMove,
     step_over: BoundaryStepOver,
-    /// Programmed speed of a leg or a step-over, units of 2^-10 nm per period.
-    usual: f32,
+    /// Whether the step-over to the next pass is begun.
+    has_step_over: bool,
+    /// Periods of planning of the next pass so far.
+    spent: u32,
+    /// Feed factor of the last period.
+    share: f32,
     /// The tool's position, once it is known.
     at: Option<[i32; 3]>,
     /// Cell of the pass that the tool is in.
@@ -109,14 +136,19 @@ impl Sequencer {
         phase: Phase::Done,
         goal: Goal::Pass,
         lookahead: Lookahead::START,
+        planner: Planner::IDLE,
+        planning: Planning::Complete,
         plans: [PassPlan::NONE; 2],
         second: false,
         on_surface: false,
         pending: None,
-        profile: Profile::START,
+        follower: Follower::START,
+        pace: Pace::REST,
         straight: StraightMove::NONE,
         step_over: BoundaryStepOver::NONE,
-        usual: 0.0,
+        has_step_over: false,
+        spent: 0,
+        share: 1.0,
         at: None,
         cell: 0,
     };
@@ -124,14 +156,14 @@ impl Sequencer {
     /// Starts the job from the tool's position.
     pub(crate) fn restart(&mut self, job: &Job<'_>, axes: &AxisLimits) {
         self.at.get_or_insert(axes.home_nm);
-        self.phase = Phase::AwaitPlan;
+        self.phase = Phase::Await;
         self.second = false;
         self.on_surface = false;
         self.pending = None;
-        self.profile.begin(1);
+        self.planner.stop();
         self.lookahead.restart();
-        let (_, next) = both(&mut self.plans, self.second);
-        self.lookahead.begin(job, 0, SpanParameter::default(), next);
+        self.share = 1.0;
+        self.begin_planning(job, 0, Some(SpanParameter::default()));
     }
 
     /// The tool's position, nm, once it is known.
@@ -144,22 +176,19 @@ impl Sequencer {
         self.at = at_nm;
     }
 
-    /// Whether the tool is at standstill, and stays so while the commanded speed is 0.
-    pub(crate) const fn is_at_rest(&self) -> bool {
+    /// Whether the tool is at rest, and stays so while the commanded speed is 0.
+    pub(crate) fn is_at_rest(&self) -> bool {
         match self.phase {
-            Phase::StepOver | Phase::FollowLeg(_) | Phase::FollowPass => self.profile.is_at_rest(),
-            Phase::AwaitPlan
-            | Phase::PlanStepOver
-            | Phase::PlanLeg(_)
-            | Phase::BoundLeg(_)
-            | Phase::EnterPass
-            | Phase::Done => true,
+            Phase::Pass => self.pace.is_at_rest(),
+            Phase::StepOver => self.step_over.progress.is_at_rest(),
+            Phase::Leg(_) => self.straight.progress.is_at_rest(),
+            Phase::Await | Phase::AwaitGoal(_) | Phase::Done => true,
         }
     }
 
     /// Whether the tool is between passes.
     pub(crate) const fn is_link(&self) -> bool {
-        !matches!(self.phase, Phase::FollowPass)
+        !matches!(self.phase, Phase::Pass)
     }
 
     /// Pass, path and side parameter of the fault of the next pass, if it stopped the run.
@@ -169,19 +198,125 @@ impl Sequencer {
         self.pending.map(|_| self.lookahead.surface_position(next))
     }
 
-    /// Retracts from standstill to the safe height and ends there. Where the surface does not face up the tool stays.
+    /// Retracts from rest to the safe height and ends there. Where the surface does not face up the tool stays.
     pub(crate) fn retract(&mut self, run: &Run) {
         let is_free = self.is_link() || run.faces_up();
         self.goal = Goal::SafeHeight;
         self.phase = if is_free {
-            Phase::PlanLeg(Leg::Retract)
+            Phase::AwaitGoal(Leg::Retract)
         } else {
             Phase::Done
         };
     }
 
-    /// One period at this feed factor, 0 to 2, into `last`. The phases off the passes are separate functions, so that a tick on a pass saves no
-    /// registers for them.
+    /// Whether [`Self::plan`] has anything to do.
+    pub(crate) fn has_to_plan(&self) -> bool {
+        let seeks_pace = match self.phase {
+            Phase::Pass => self.pace.has_work(),
+            Phase::StepOver => self.step_over.progress.has_work(),
+            Phase::Leg(_) => self.straight.progress.has_work(),
+            Phase::Await | Phase::AwaitGoal(_) | Phase::Done => false,
+        };
+        seeks_pace || (self.pending.is_none() && (self.planning != Planning::Complete || self.has_to_plan_step_over()))
+    }
+
+    fn has_to_plan_step_over(&self) -> bool {
+        self.has_step_over && !self.step_over.is_planned()
+    }
+
+    /// The planning of one period: work of at most [`PORTION_CYCLES`] nominal cycles.
+    #[inline(never)]
+    pub(crate) fn plan(&mut self, job: &Job<'_>, axes: &AxisLimits) {
+        let mut left = PORTION_CYCLES;
+        if self.planning != Planning::Complete {
+            self.spent = self.spent.saturating_add(1);
+        }
+        loop {
+            let cycles = self.next_cycles();
+            if cycles == 0 || cycles > left {
+                return;
+            }
+            left -= cycles;
+            self.work(job, axes);
+        }
+    }
+
+    /// Nominal cycles of the next piece of planning; 0 where there is none.
+    fn next_cycles(&self) -> u32 {
+        match self.phase {
+            Phase::Pass if self.pace.has_work() => return PACE_CYCLES,
+            Phase::StepOver if self.step_over.progress.has_work() => return LINK_PACE_CYCLES,
+            Phase::Leg(_) if self.straight.progress.has_work() => return LINK_PACE_CYCLES,
+            _ => {}
+        }
+        if self.pending.is_some() {
+            return 0;
+        }
+        if self.has_to_plan_step_over() {
+            return STEP_OVER_CYCLES;
+        }
+        match self.planning {
+            Planning::Stations => self.lookahead.cycles(),
+            Planning::Feed => self.planner.cycles(),
+            Planning::Complete => 0,
+        }
+    }
+
+    fn work(&mut self, job: &Job<'_>, axes: &AxisLimits) {
+        let (now, next) = both(&mut self.plans, self.second);
+        match self.phase {
+            Phase::Pass if self.pace.has_work() => return self.pace.work(&now.plan, &self.follower.cursor),
+            Phase::StepOver if self.step_over.progress.has_work() => return self.step_over.progress.work(),
+            Phase::Leg(_) if self.straight.progress.has_work() => return self.straight.progress.work(),
+            _ => {}
+        }
+        if self.has_to_plan_step_over() {
+            self.pending = self.step_over.work(job, axes).err();
+            return;
+        }
+        match self.planning {
+            Planning::Stations => {
+                self.pending = self.lookahead.work(job, axes, next).err();
+                if self.lookahead.is_done() {
+                    self.planning = if next.point {
+                        Planning::Complete
+                    } else {
+                        let feed = job.header.feed_mm_s * self.share.at_least(1.0);
+                        next.plan.limits = MotionLimits::new(axes, feed, job.header.period_s);
+                        self.planner.begin(&next.plan);
+                        Planning::Feed
+                    };
+                }
+            }
+            Planning::Feed => {
+                // The pass after it takes as long to plan.
+                let least = if next.next.is_some() {
+                    self.spent.saturating_add(SPARE_PERIODS)
+                } else {
+                    0
+                };
+                self.planner.work(&mut next.plan, least);
+                if self.planner.is_done() {
+                    self.planning = Planning::Complete;
+                }
+            }
+            Planning::Complete => {}
+        }
+    }
+
+    /// Begins to plan the pass after the one that is followed next.
+    fn begin_planning(&mut self, job: &Job<'_>, pass: u32, side: Option<SpanParameter>) {
+        let (_, next) = both(&mut self.plans, self.second);
+        self.planning = Planning::Complete;
+        self.has_step_over = false;
+        if let Some(side) = side {
+            self.lookahead.begin(job, pass, side, next);
+            self.planning = Planning::Stations;
+            self.spent = 0;
+        }
+    }
+
+    /// One period, into `last`. The phases off the passes are separate functions, so that a tick on a pass saves no registers for them.
     ///
     /// # Errors
     /// The fault that stops the run; `last` is unchanged.
@@ -191,35 +326,17 @@ impl Sequencer {
         job: &Job<'_>,
         axes: &AxisLimits,
         run: &mut Run,
-        share: f32,
+        wish: Wish,
         last: &mut Sample,
     ) -> Result<Outcome> {
         let was_link = self.is_link();
-        match self.phase {
-            Phase::FollowPass => self.follow_pass(job, axes, run, share, last)?,
-            Phase::FollowLeg(leg) => self.follow_leg(leg, job, run, share, last)?,
-            Phase::StepOver => self.follow_step_over(job, run, share, last)?,
-            Phase::AwaitPlan => {
-                self.await_plan(job, axes)?;
-                match self.at {
-                    Some(at) if !self.on_surface => run.off_surface(at, 0.0, last),
-                    _ => run.stand(last),
-                }
-            }
-            Phase::PlanStepOver => {
-                self.plan_step_over(job, axes, run, last)?;
-            }
-            Phase::PlanLeg(leg) => self.plan_leg(leg, job, axes, run, last)?,
-            Phase::BoundLeg(leg) => {
-                let (now, _) = both(&mut self.plans, self.second);
-                if now.plan.work(CELLS_STANDING) {
-                    self.profile.begin(now.plan.window);
-                    self.phase = Phase::FollowLeg(leg);
-                }
-                run.stand(last);
-            }
-            Phase::EnterPass => self.begin_pass(job, run, last)?,
-            Phase::Done => return Ok(Outcome::Finished),
+        self.share = wish.share;
+        if let Phase::Pass = self.phase {
+            self.follow_pass(job, run, wish, last)?;
+        } else if self.phase == Phase::Done {
+            return Ok(Outcome::Finished);
+        } else {
+            self.follow_link(job, axes, run, wish, last)?;
         }
         self.at = Some(last.cl_nm);
         // The first and the last sample of a pass belong to the pass.
@@ -230,67 +347,91 @@ impl Sequencer {
         })
     }
 
-    /// Executes tasks of the look-ahead, and enters the next phase when the plan is complete.
+    /// One period off the passes.
     #[inline(never)]
-    fn await_plan(&mut self, job: &Job<'_>, axes: &AxisLimits) -> Result<()> {
-        for _ in 0..PORTIONS_WAITING {
-            // Collapsing a patch takes a whole tick.
-            let is_patch = self.lookahead.makes_patch();
-            self.look_ahead(job, axes);
-            if is_patch || self.lookahead.makes_patch() {
+    fn follow_link(
+        &mut self,
+        job: &Job<'_>,
+        axes: &AxisLimits,
+        run: &mut Run,
+        wish: Wish,
+        last: &mut Sample,
+    ) -> Result<()> {
+        self.leave(job, axes, wish)?;
+        match self.phase {
+            Phase::StepOver => self.follow_step_over(job, axes, run, wish, last),
+            Phase::Leg(leg) => self.follow_leg(leg, job, axes, run, wish, last),
+            _ => {
+                match self.at {
+                    Some(at) if !self.on_surface => run.off_surface(at, 0.0, last),
+                    _ => run.stand(last),
+                }
+                Ok(())
+            }
+        }
+    }
+
+    /// Ends a wait where what is waited for is there.
+    fn leave(&mut self, job: &Job<'_>, axes: &AxisLimits, wish: Wish) -> Result<()> {
+        if self.phase == Phase::Await {
+            if let Some(fault) = self.pending {
+                return Err(fault);
+            }
+            if self.planning != Planning::Complete || self.has_to_plan_step_over() {
+                return Ok(());
+            }
+            let (now, next) = both(&mut self.plans, self.second);
+            if self.on_surface && job.header.pattern == Pattern::Zigzag {
+                self.phase = Phase::StepOver;
+                let pace = wish.share * job.header.feed_mm_s / self.step_over.feed();
+                self.step_over
+                    .progress
+                    .begin(pace.at_most(1.0), job.header.period_s);
+                self.swap(job);
+            } else {
+                check_faces_up(next.faces_up[0] && (now.faces_up[1] || !self.on_surface))?;
+                self.goal = Goal::Pass;
+                self.phase = Phase::AwaitGoal(Leg::Retract);
+            }
+        }
+        // A leg without length is followed by the next in the same period.
+        for _ in 0..LEGS {
+            let Phase::AwaitGoal(leg) = self.phase else {
+                break;
+            };
+            if !self.begin_leg(leg, job, axes, wish)? {
                 break;
             }
         }
-        if let Some(fault) = self.pending {
-            return Err(fault);
-        }
-        if !self.lookahead.is_done() {
-            return Ok(());
-        }
-        let (now, next) = both(&mut self.plans, self.second);
-        self.phase = if self.on_surface && job.header.pattern == Pattern::Zigzag {
-            self.step_over = BoundaryStepOver::new(job, &last_patch(job, now), next.side);
-            Phase::PlanStepOver
-        } else {
-            check_faces_up(next.faces_up[0] && (now.faces_up[1] || !self.on_surface))?;
-            self.goal = Goal::Pass;
-            Phase::PlanLeg(Leg::Retract)
-        };
         Ok(())
     }
 
-    /// Executes one task of the look-ahead.
-    fn look_ahead(&mut self, job: &Job<'_>, axes: &AxisLimits) {
-        if self.pending.is_some() || self.lookahead.is_done() {
-            return;
-        }
-        let (_, next) = both(&mut self.plans, self.second);
-        self.pending = self.lookahead.work(job, axes, next).err();
-    }
-
-    /// Enters the next pass, which begins at the tool's position.
-    #[inline(never)]
-    fn enter_pass(&mut self, job: &Job<'_>, run: &mut Run, last: &mut Sample) -> Result<()> {
-        let (_, next) = both(&mut self.plans, self.second);
-        run.enter_pass(job, next.pass, next.side)?;
-        run.stand(last);
-        self.phase = Phase::EnterPass;
-        Ok(())
-    }
-
-    /// Emits the first sample of the pass.
-    #[inline(never)]
-    fn begin_pass(&mut self, job: &Job<'_>, run: &mut Run, last: &mut Sample) -> Result<()> {
-        let (_, next) = both(&mut self.plans, self.second);
-        run.begin(next.interval, last)?;
+    /// The next pass becomes the one that is followed, and the one after it is planned.
+    fn swap(&mut self, job: &Job<'_>) {
         self.second = !self.second;
+        let (now, _) = both(&mut self.plans, self.second);
+        let (pass, side) = (now.pass.wrapping_add(1), now.next);
+        self.begin_planning(job, pass, side);
+    }
+
+    /// Enters the pass, which begins at the tool's position, and emits its first sample.
+    #[inline(never)]
+    fn enter_pass(&mut self, job: &Job<'_>, axes: &AxisLimits, run: &mut Run, wish: Wish, last: &mut Sample) -> Result<()> {
+        let (now, _) = both(&mut self.plans, self.second);
+        run.enter_pass(job, now.pass, now.side)?;
+        run.begin(now.interval, last)?;
         self.on_surface = true;
-        self.phase = Phase::FollowPass;
+        self.phase = Phase::Pass;
         self.cell = 0;
-        let (now, next) = both(&mut self.plans, self.second);
-        self.profile.begin(now.plan.window);
-        if let Some(side) = now.next {
-            self.lookahead.begin(job, now.pass.wrapping_add(1), side, next);
+        self.follower.begin(&now.plan);
+        let pace = pace_of(job, now, wish.share);
+        self.pace.begin(pace, job.header.period_s);
+        if job.header.pattern == Pattern::Zigzag
+            && let Some(side) = now.next
+        {
+            let feed = job.header.feed_mm_s * wish.share.at_least(1.0);
+            self.step_over.begin(job, axes, &last_patch(job, now), side, feed);
+            self.has_step_over = true;
         }
         Ok(())
     }
@@ -298,47 +439,59 @@ impl Sequencer {
     fn follow_pass(
         &mut self,
         job: &Job<'_>,
-        axes: &AxisLimits,
         run: &mut Run,
-        share: f32,
+        wish: Wish,
         last: &mut Sample,
     ) -> Result<()> {
         let (now, _) = both(&mut self.plans, self.second);
-        let period = job.header.feed_mm_s * job.header.period_s * QUANTA_PER_MM;
         let is_over = if now.point {
-            if share > 0.0 && run.is_along() {
+            if wish.share > 0.0 && run.is_along() {
                 run.advance_far(job, 1.0, last)?;
             } else {
                 run.stand(last);
             }
             !run.is_along()
         } else {
-            let moved = self.profile.tick(&now.plan, share * period);
-            if self.profile.is_done(&now.plan) {
+            self.pace.want(pace_of(job, now, wish.share), wish.is_fault);
+            let pace = self.pace.tick();
+            let moved = if pace > 0.0 {
+                self.follower.tick(&now.plan, pace)
+            } else {
+                0.0
+            };
+            if self.follower.is_over(&now.plan) {
                 run.finish_pass(job, last)?;
                 true
-            } else if moved > 0 && run.is_along() {
-                let is_light = run.move_by(job, as_f32(moved) / period, last)?;
-                self.correct_progress(job, run);
-                if is_light {
-                    self.look_ahead(job, axes);
-                }
-                false
             } else {
-                run.stand(last);
-                self.look_ahead(job, axes);
+                if moved > MOVED_MIN && run.is_along() {
+                    run.move_by(job, moved / (job.header.feed_mm_s * job.header.period_s), last)?;
+                    self.correct_progress(job, run);
+                } else {
+                    run.stand(last);
+                }
                 false
             }
         };
         if is_over {
-            let (now, _) = both(&mut self.plans, self.second);
-            self.phase = if now.next.is_some() {
-                Phase::AwaitPlan
-            } else {
-                check_faces_up(now.faces_up[1])?;
-                self.goal = Goal::Home;
-                Phase::PlanLeg(Leg::Retract)
-            };
+            self.end_pass(job)?;
+        }
+        Ok(())
+    }
+
+    /// Chooses what follows a pass.
+    #[inline(never)]
+    fn end_pass(&mut self, job: &Job<'_>) -> Result<()> {
+        let (now, _) = both(&mut self.plans, self.second);
+        if now.next.is_none() {
+            check_faces_up(now.faces_up[1])?;
+            self.goal = Goal::Home;
+            self.phase = Phase::AwaitGoal(Leg::Retract);
+        } else if job.header.pattern == Pattern::Zigzag {
+            self.phase = Phase::Await;
+        } else {
+            check_faces_up(now.faces_up[1])?;
+            self.goal = Goal::Pass;
+            self.phase = Phase::AwaitGoal(Leg::Retract);
         }
         Ok(())
     }
@@ -346,30 +499,34 @@ impl Sequencer {
     /// Corrects the progress at each station by the plan's arc, so that errors do not accumulate from station to station.
     fn correct_progress(&mut self, job: &Job<'_>, run: &Run) {
         let (now, _) = both(&mut self.plans, self.second);
-        let Some(cell) = run
-            .cell(job, now.cells_per_patch)
-            .filter(|cell| *cell != self.cell)
-        else {
-            return;
-        };
-        let Some(arc_mm) = run.since_station(now.cells_per_patch, now.cell_fraction) else {
+        let (cells, fraction) = now.kept_cells();
+        let Some(cell) = run.cell(job, cells).filter(|cell| *cell != self.cell) else {
             return;
         };
         self.cell = cell;
-        let place = now.plan.start_of(cell) + crate::feed::plan::quanta(arc_mm);
-        self.profile.shift(place - self.profile.place(), &now.plan);
+        let (Some(start_q10), Some(since_mm)) = (now.arc_q10(cell), run.since_station(cells, fraction)) else {
+            return;
+        };
+        let arc_q10 = start_q10 + crate::feed::to_q10(since_mm);
+        self.follower.correct(&now.plan, arc_q10);
     }
 
-    #[inline(never)]
-    fn plan_leg(
-        &mut self,
-        leg: Leg,
-        job: &Job<'_>,
-        axes: &AxisLimits,
-        run: &mut Run,
-        last: &mut Sample,
-    ) -> Result<()> {
-        let (now, next) = both(&mut self.plans, self.second);
+    /// Begins a leg if its goal is known; returns whether the leg has no length, so that the next one can begin.
+    fn begin_leg(&mut self, leg: Leg, job: &Job<'_>, axes: &AxisLimits, wish: Wish) -> Result<bool> {
+        if self.goal == Goal::Pass && leg != Leg::Retract {
+            if let Some(fault) = self.pending {
+                return Err(fault);
+            }
+            // The traverse needs the stations of the next pass, the plunge its plan.
+            let is_known = match leg {
+                Leg::Plunge => self.planning == Planning::Complete,
+                _ => self.planning != Planning::Stations,
+            };
+            if !is_known {
+                return Ok(false);
+            }
+        }
+        let (_, next) = both(&mut self.plans, self.second);
         let from = self.at.unwrap_or(axes.home_nm);
         let [x, y, z] = match self.goal {
             Goal::Pass => next.ends[0],
@@ -382,6 +539,9 @@ impl Sequencer {
             Leg::Traverse => [x, y, from[2]],
             Leg::Plunge => [x, y, z],
         };
+        if self.goal == Goal::Pass && leg != Leg::Retract {
+            check_faces_up(next.faces_up[0])?;
+        }
         check_travel(axes, &to)?;
         let slow_mm = if leg == Leg::Plunge && self.goal == Goal::Pass {
             axes.plunge_mm
@@ -389,94 +549,89 @@ impl Sequencer {
             0.0
         };
         let feed = job.header.feed_mm_s;
-        if let Some((straight, usual)) =
-            StraightMove::new(from, to, slow_mm, feed, axes, job.header.period_s, &mut now.plan)
-        {
-            (self.straight, self.usual) = (straight, usual);
-            self.phase = Phase::BoundLeg(leg);
-            run.stand(last);
-            return Ok(());
-        }
-        self.after_leg(leg, job, run, last)
-    }
-
-    /// Selects the next leg, or after the last leg the phase at the goal.
-    fn after_leg(&mut self, leg: Leg, job: &Job<'_>, run: &mut Run, last: &mut Sample) -> Result<()> {
-        self.phase = match (leg, self.goal) {
-            (Leg::Retract, Goal::SafeHeight) | (Leg::Plunge, Goal::Home | Goal::SafeHeight) => Phase::Done,
-            (Leg::Retract, _) => Phase::PlanLeg(Leg::Traverse),
-            (Leg::Traverse, _) => Phase::PlanLeg(Leg::Plunge),
-            (Leg::Plunge, Goal::Pass) => return self.enter_pass(job, run, last),
+        let Some(mut straight) = StraightMove::new(from, to, slow_mm, feed, axes) else {
+            self.phase = self.after(leg);
+            // A pass that begins where the tool is needs its plan only.
+            return Ok(self.phase != Phase::AwaitGoal(leg));
         };
-        run.stand(last);
-        Ok(())
+        straight
+            .progress
+            .begin(wish.share.at_most(1.0), job.header.period_s);
+        self.straight = straight;
+        self.phase = Phase::Leg(leg);
+        Ok(false)
     }
 
-    #[inline(never)]
+    /// The phase after a leg; that of the plunge to a pass is its own, and is left by [`Self::enter_pass`].
+    const fn after(&self, leg: Leg) -> Phase {
+        match (leg, self.goal) {
+            (Leg::Retract, Goal::SafeHeight) | (Leg::Plunge, Goal::Home | Goal::SafeHeight) => Phase::Done,
+            (Leg::Retract, _) => Phase::AwaitGoal(Leg::Traverse),
+            (Leg::Traverse, _) => Phase::AwaitGoal(Leg::Plunge),
+            (Leg::Plunge, Goal::Pass) => Phase::Leg(Leg::Plunge),
+        }
+    }
+
     fn follow_leg(
         &mut self,
         leg: Leg,
         job: &Job<'_>,
+        axes: &AxisLimits,
         run: &mut Run,
-        share: f32,
+        wish: Wish,
         last: &mut Sample,
     ) -> Result<()> {
-        let (now, _) = both(&mut self.plans, self.second);
-        if self.profile.is_done(&now.plan) {
-            return self.after_leg(leg, job, run, last);
+        let is_over =
+            self.straight
+                .progress
+                .tick(wish.share.at_most(1.0), wish.is_fault, job.header.period_s);
+        if is_over && leg == Leg::Plunge && self.goal == Goal::Pass {
+            self.swap(job);
+            return self.enter_pass(job, axes, run, wish, last);
         }
-        let moved = self.profile.tick(&now.plan, self.usual * share.at_most(1.0));
-        let at = self.straight.position(self.profile.place(), &now.plan);
-        let speed = as_f32(moved) / (QUANTA_PER_MM * job.header.period_s);
-        run.off_surface(at, speed, last);
+        run.off_surface(self.straight.position(), self.straight.progress.speed(), last);
+        if is_over {
+            self.phase = self.after(leg);
+        }
         Ok(())
     }
 
-    #[inline(never)]
-    fn plan_step_over(
+    fn follow_step_over(
         &mut self,
         job: &Job<'_>,
         axes: &AxisLimits,
         run: &mut Run,
+        wish: Wish,
         last: &mut Sample,
     ) -> Result<()> {
-        let (now, _) = both(&mut self.plans, self.second);
-        let patch = &mut self.lookahead.patch;
-        match self.step_over.work(job, axes, patch, &top(job), &mut now.plan)? {
-            None => return self.enter_pass(job, run, last),
-            Some(false) => {}
-            Some(true) => {
-                self.phase = Phase::StepOver;
-                self.profile.begin(now.plan.window);
-                self.usual =
-                    self.step_over.per_contact() * job.header.feed_mm_s * job.header.period_s * QUANTA_PER_MM;
-            }
+        let pace = wish.share * job.header.feed_mm_s / self.step_over.feed();
+        let is_over = self.step_over.is_nothing()
+            || self
+                .step_over
+                .progress
+                .tick(pace.at_most(1.0), wish.is_fault, job.header.period_s);
+        if is_over {
+            return self.enter_pass(job, axes, run, wish, last);
         }
-        run.stand(last);
-        Ok(())
-    }
-
-    #[inline(never)]
-    fn follow_step_over(
-        &mut self,
-        job: &Job<'_>,
-        run: &mut Run,
-        share: f32,
-        last: &mut Sample,
-    ) -> Result<()> {
-        let (now, _) = both(&mut self.plans, self.second);
-        if self.profile.is_done(&now.plan) {
-            return self.enter_pass(job, run, last);
-        }
-        let moved = self.profile.tick(&now.plan, self.usual * share);
-        let patch = &mut self.lookahead.patch;
-        let located = self
-            .step_over
-            .position(job, patch, self.profile.place(), &now.plan)?;
-        let speed = as_f32(moved) / (QUANTA_PER_MM * job.header.period_s * self.step_over.per_contact());
-        run.off_surface(located.cl_nm, speed, last);
+        let located = self.step_over.position(job)?;
+        run.off_surface(located.cl_nm, self.step_over.contact_speed(), last);
         last.cc_nm = located.cc_nm;
         Ok(())
+    }
+}
+
+/// Legs of a link off the surface.
+const LEGS: u8 = 3;
+
+/// Least move of a period, mm: a millionth of a nanometre is rounding.
+const MOVED_MIN: f32 = 1e-12;
+
+/// The pace of a pass at this feed factor.
+fn pace_of(job: &Job<'_>, pass: &PassPlan, share: f32) -> f32 {
+    if pass.plan.limits.feed > 0.0 {
+        (share * job.header.feed_mm_s / pass.plan.limits.feed).at_most(1.0)
+    } else {
+        share.at_most(1.0)
     }
 }
 
@@ -492,12 +647,4 @@ fn last_patch(job: &Job<'_>, pass: &PassPlan) -> PassPosition {
             job.header.path_spans.saturating_sub(1)
         },
     }
-}
-
-#[allow(
-    clippy::cast_precision_loss,
-    reason = "a step beyond 2^24 units of 2^-10 nm, 16 um, is rounded"
-)]
-const fn as_f32(moved: i32) -> f32 {
-    moved as f32
 }

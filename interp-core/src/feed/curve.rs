@@ -1,0 +1,323 @@
+//! Rest to rest along one coordinate in closed form, for links: constant jerk, constant acceleration, constant jerk, cruise, and back.
+
+use super::pace::{Course, Use};
+use super::{MM_PER_Q10, to_q10};
+use crate::math::arith::sqrt;
+use crate::math::number::{Bounded, cube_root, to_f32};
+
+/// Limits along the coordinate: mm/s, mm/s^2, mm/s^3.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct CurveLimits {
+    pub(crate) speed: f32,
+    pub(crate) acceleration: f32,
+    pub(crate) jerk: f32,
+}
+
+/// Fractions of the limits that a link uses: what is left is for a hold, and for the rounding of positions.
+const ACCELERATION: f32 = 0.98;
+const JERK: f32 = 0.96;
+
+/// A piece: a ramp from one speed to another, then a cruise at that speed.
+#[derive(Clone, Copy, Debug)]
+struct Piece {
+    from: f32,
+    to: f32,
+    /// Duration of the jerk at either end of the ramp, s, and of the ramp.
+    jerk_s: f32,
+    ramp_s: f32,
+    /// Length of the cruise, units of 2^-10 nm.
+    cruise_q10: i64,
+}
+
+impl Piece {
+    const NONE: Self = Self {
+        from: 0.0,
+        to: 0.0,
+        jerk_s: 0.0,
+        ramp_s: 0.0,
+        cruise_q10: 0,
+    };
+
+    fn new(from: f32, to: f32, limits: &CurveLimits, cruise: f32) -> Self {
+        let [jerk_s, ramp_s] = ramp(from - to, limits);
+        Self {
+            from,
+            to,
+            jerk_s,
+            ramp_s,
+            cruise_q10: to_q10(cruise.at_least(0.0)),
+        }
+    }
+
+    /// Speed, acceleration and jerk at a time of the ramp.
+    fn rates(&self, t: f32) -> [f32; 3] {
+        let change = self.to - self.from;
+        if t >= self.ramp_s || self.ramp_s <= 0.0 {
+            return [self.to, 0.0, 0.0];
+        }
+        // The acceleration rises to its peak, stays, and falls.
+        let peak = change / (self.ramp_s - self.jerk_s);
+        let jerk = peak / self.jerk_s;
+        let left = self.ramp_s - t;
+        if t < self.jerk_s {
+            [self.from + 0.5 * jerk * t * t, jerk * t, jerk]
+        } else if left > self.jerk_s {
+            [self.from + peak * (t - 0.5 * self.jerk_s), peak, 0.0]
+        } else {
+            [self.to - 0.5 * jerk * left * left, jerk * left, -jerk]
+        }
+    }
+
+    /// Length of the ramp up to this time, mm.
+    fn length(&self, t: f32) -> f32 {
+        if self.ramp_s <= 0.0 {
+            return 0.0;
+        }
+        let t = t.at_most(self.ramp_s);
+        let change = self.to - self.from;
+        let peak = change / (self.ramp_s - self.jerk_s);
+        let jerk = peak / self.jerk_s;
+        let left = self.ramp_s - t;
+        if t < self.jerk_s {
+            self.from * t + jerk * t * t * t * (1.0 / 6.0)
+        } else if left > self.jerk_s {
+            let from_peak = t - 0.5 * self.jerk_s;
+            self.from * t + 0.5 * peak * (from_peak * from_peak + self.jerk_s * self.jerk_s * (1.0 / 12.0))
+        } else {
+            let whole = 0.5 * (self.from + self.to) * self.ramp_s;
+            whole - self.to * left + jerk * left * left * left * (1.0 / 6.0)
+        }
+    }
+}
+
+/// Durations of the jerk and of the whole ramp for a change of speed.
+fn ramp(change: f32, limits: &CurveLimits) -> [f32; 2] {
+    let change = change.abs();
+    let (a, j) = (limits.acceleration, limits.jerk);
+    if change * j < a * a {
+        let jerk_s = sqrt(change / j);
+        [jerk_s, 2.0 * jerk_s]
+    } else {
+        let jerk_s = a / j;
+        [jerk_s, change / a + jerk_s]
+    }
+}
+
+/// Length of a ramp, mm.
+fn ramp_length(from: f32, to: f32, limits: &CurveLimits) -> f32 {
+    let [_, ramp_s] = ramp(from - to, limits);
+    0.5 * (from + to) * ramp_s
+}
+
+/// Speed that is reached at most on this length from rest to rest.
+fn peak_speed(length: f32, limits: &CurveLimits) -> f32 {
+    let CurveLimits {
+        speed,
+        acceleration: a,
+        jerk: j,
+    } = *limits;
+    if 2.0 * ramp_length(0.0, speed, limits) <= length {
+        return speed;
+    }
+    let jerk_s = cube_root(0.5 * length / j);
+    if j * jerk_s <= a {
+        return (j * jerk_s * jerk_s).at_most(speed);
+    }
+    let jerk_s = a / j;
+    let steady_s = 0.5 * (sqrt(jerk_s * jerk_s + 4.0 * length / a) - 3.0 * jerk_s);
+    (a * (jerk_s + steady_s.at_least(0.0))).at_most(speed)
+}
+
+/// Bisections of a speed.
+const BISECTIONS: u8 = 24;
+
+/// A motion of this length from rest to rest.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Curve {
+    pieces: [Piece; 3],
+    limits: CurveLimits,
+}
+
+impl Curve {
+    /// No motion.
+    pub(crate) const NONE: Self = Self {
+        pieces: [Piece::NONE; 3],
+        limits: CurveLimits {
+            speed: 1.0,
+            acceleration: 1.0,
+            jerk: 1.0,
+        },
+    };
+
+    /// Over `length` mm, the last `slow` mm of it at no more than `slow_speed`.
+    pub(crate) fn new(length: f32, machine: &CurveLimits, slow: f32, slow_speed: f32) -> Self {
+        let limits = CurveLimits {
+            speed: machine.speed,
+            acceleration: ACCELERATION * machine.acceleration,
+            jerk: JERK * machine.jerk,
+        };
+        let slow = slow.at_most(length);
+        let last = ramp_length(slow_speed, 0.0, &limits);
+        let peak = peak_speed(length, &limits);
+        let pieces = if slow > 0.0 && last < slow && peak > slow_speed {
+            let fast = length - slow;
+            let needed =
+                |top: f32| ramp_length(0.0, top, &limits) + ramp_length(top, slow_speed, &limits);
+            let mut top = limits.speed;
+            if needed(top) > fast {
+                let mut low = slow_speed;
+                for _ in 0..BISECTIONS {
+                    let middle = 0.5 * (low + top);
+                    if needed(middle) > fast {
+                        top = middle;
+                    } else {
+                        low = middle;
+                    }
+                }
+                top = low;
+            }
+            // Where even the slow speed is not reached on the fast part, it is cruised at from there on.
+            let cruise = fast - needed(top);
+            [
+                Piece::new(0.0, top, &limits, cruise),
+                Piece::new(top, slow_speed, &limits, slow - last + cruise.at_most(0.0)),
+                Piece::new(slow_speed, 0.0, &limits, 0.0),
+            ]
+        } else {
+            let cruise = length - 2.0 * ramp_length(0.0, peak, &limits);
+            [
+                Piece::new(0.0, peak, &limits, cruise),
+                Piece::new(peak, 0.0, &limits, 0.0),
+                Piece::NONE,
+            ]
+        };
+        Self {
+            pieces,
+            limits: *machine,
+        }
+    }
+
+    /// Limits of the coordinate.
+    pub(crate) const fn limits(&self) -> CurveLimits {
+        self.limits
+    }
+
+    /// Greatest speed, mm/s.
+    pub(crate) const fn peak(&self) -> f32 {
+        let [first, _, _] = &self.pieces;
+        first.to
+    }
+
+    fn piece(&self, index: u8) -> &Piece {
+        const NONE: Piece = Piece::NONE;
+        self.pieces.get(usize::from(index)).unwrap_or(&NONE)
+    }
+
+    /// The cursor at the start.
+    pub(crate) fn start(&self) -> CurveCursor {
+        CurveCursor {
+            piece: 0,
+            time: 0.0,
+            left_q10: self.piece(0).cruise_q10,
+            moved_q10: 0,
+        }
+    }
+
+    /// Speed at a place, mm/s.
+    pub(crate) fn speed(&self, cursor: &CurveCursor) -> f32 {
+        let [speed, _, _] = self.piece(cursor.piece).rates(cursor.time);
+        speed
+    }
+
+    /// Duration, s.
+    #[cfg(test)]
+    pub(crate) fn duration(&self) -> f32 {
+        let mut sum = 0.0;
+        for piece in &self.pieces {
+            sum += piece.ramp_s;
+            if piece.cruise_q10 > 0 {
+                sum += to_f32(piece.cruise_q10) * MM_PER_Q10 / piece.to;
+            }
+        }
+        sum
+    }
+}
+
+/// A place on a curve.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct CurveCursor {
+    piece: u8,
+    /// Time since the ramp's start, s.
+    time: f32,
+    /// What is left of the cruise, and the length so far, units of 2^-10 nm.
+    left_q10: i64,
+    pub(crate) moved_q10: i64,
+}
+
+impl CurveCursor {
+    pub(crate) const START: Self = Self {
+        piece: 0,
+        time: 0.0,
+        left_q10: 0,
+        moved_q10: 0,
+    };
+}
+
+impl Course for Curve {
+    type Cursor = CurveCursor;
+
+    fn advance(&self, cursor: &mut CurveCursor, seconds: f32) {
+        let mut left = seconds;
+        // A period may end a ramp and a cruise of each piece.
+        for _ in 0..self.pieces.len() {
+            let piece = self.piece(cursor.piece);
+            if cursor.time < piece.ramp_s {
+                let end = (cursor.time + left).at_most(piece.ramp_s);
+                let moved = piece.length(end) - piece.length(cursor.time);
+                cursor.moved_q10 += to_q10(moved.at_least(0.0));
+                left -= end - cursor.time;
+                cursor.time = end;
+            }
+            if cursor.time < piece.ramp_s {
+                return;
+            }
+            let step = to_q10((piece.to * left).at_least(0.0));
+            if step < cursor.left_q10 {
+                cursor.left_q10 -= step;
+                cursor.moved_q10 += step;
+                return;
+            }
+            cursor.moved_q10 += cursor.left_q10;
+            if piece.to > 0.0 {
+                left -= to_f32(cursor.left_q10) * MM_PER_Q10 / piece.to;
+            }
+            cursor.left_q10 = 0;
+            if self.is_last(cursor.piece) || !(left > 0.0) {
+                return;
+            }
+            cursor.piece += 1;
+            cursor.time = 0.0;
+            cursor.left_q10 = self.piece(cursor.piece).cruise_q10;
+        }
+    }
+
+    fn is_over(&self, cursor: &CurveCursor) -> bool {
+        self.is_last(cursor.piece) && cursor.time >= self.piece(cursor.piece).ramp_s
+    }
+
+    fn use_at(&self, cursor: &CurveCursor, [r, r1, r2]: [f32; 3], _around: f32) -> Use {
+        let [v, a, j] = self.piece(cursor.piece).rates(cursor.time);
+        let limits = &self.limits;
+        Use {
+            velocity: v * r / limits.speed,
+            acceleration: (a * r * r + v * r1).abs() / limits.acceleration,
+            jerk: ((j * r * r + 3.0 * a * r1) * r + v * r2).abs() / limits.jerk,
+        }
+    }
+}
+
+impl Curve {
+    fn is_last(&self, piece: u8) -> bool {
+        self.piece(piece).to <= 0.0
+    }
+}

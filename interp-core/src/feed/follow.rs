@@ -1,0 +1,122 @@
+//! One period along a plan. Where the plan is within a fraction of a percent of the programmed feed for long enough, the tool moves at exactly
+//! that feed; the change to it and back is smooth.
+
+use super::pace::Course;
+use super::plan::{Cursor, Plan, to_mm};
+use crate::math::number::Bounded;
+
+/// Periods that the scout is ahead of the tool.
+pub(crate) const LEAD: u8 = 64;
+/// Periods in which the speed changes from the plan's to the feed, half the lead: there is time to change to the feed and back.
+const CHANGE: u8 = LEAD / 2;
+/// Relative difference of the plan's speed from the feed that is made up for.
+const NEAR: f32 = 3e-3;
+
+/// A place ahead of the tool, and for how long the plan has been near the feed there, in periods at the plan's own pace.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Lead {
+    pub(crate) cursor: Cursor,
+    pub(crate) near: f32,
+}
+
+impl Lead {
+    pub(crate) const NONE: Self = Self {
+        cursor: Cursor::START,
+        near: 0.0,
+    };
+
+    /// Counts the time for which the plan is near the feed. `periods`: since the last look.
+    pub(crate) fn look(&mut self, plan: &Plan, cursor: &Cursor, periods: f32) {
+        let feed = plan.limits.feed;
+        let is_near = !plan.is_over(cursor) && (cursor.speed(plan) - feed).abs() < NEAR * feed;
+        self.near = if is_near { (self.near + periods).at_most(f32::from(LEAD)) } else { 0.0 };
+    }
+}
+
+/// The tool's place on a plan.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Follower {
+    pub(crate) cursor: Cursor,
+    lead: Lead,
+    /// How far the speed has changed from the plan's to the feed, 0 to [`CHANGE`], and whether it changes to it.
+    change: u8,
+    rises: bool,
+    arc_q10: i64,
+}
+
+impl Follower {
+    pub(crate) const START: Self = Self {
+        cursor: Cursor::START,
+        lead: Lead::NONE,
+        change: 0,
+        rises: false,
+        arc_q10: 0,
+    };
+
+    /// At the start of a plan.
+    pub(crate) const fn begin(&mut self, plan: &Plan) {
+        *self = Self::START;
+        self.lead = plan.lead;
+    }
+
+    /// Arc since the start, units of 2^-10 nm.
+    pub(crate) const fn arc_q10(&self) -> i64 {
+        self.arc_q10
+    }
+
+    pub(crate) fn is_over(&self, plan: &Plan) -> bool {
+        plan.is_over(&self.cursor)
+    }
+
+    /// One period at this pace, 0 to 1: the arc that the tool moves by, mm.
+    pub(crate) fn tick(&mut self, plan: &Plan, pace: f32) -> f32 {
+        let seconds = pace * plan.limits.period;
+        plan.advance(&mut self.cursor, seconds);
+        let planned_q10 = self.cursor.arc_q10(plan);
+        let planned = to_mm(planned_q10 - self.arc_q10);
+        self.look_ahead(plan, pace);
+        if self.change == 0 {
+            self.arc_q10 = planned_q10;
+            return planned;
+        }
+        let by = f32::from(self.change) * (1.0 / CHANGE as f32);
+        // Smooth: 10 t^3 - 15 t^4 + 6 t^5.
+        let share = by * by * by * (10.0 - by * (15.0 - 6.0 * by));
+        let exact = seconds * plan.limits.feed;
+        let moved = if self.change == CHANGE {
+            exact
+        } else {
+            planned + share * (exact - planned)
+        };
+        self.arc_q10 += i64::from(super::plan::step_q10(moved));
+        self.cursor.shift(moved - planned, plan);
+        moved
+    }
+
+    fn look_ahead(&mut self, plan: &Plan, pace: f32) {
+        let Lead { cursor, .. } = &mut self.lead;
+        plan.advance(cursor, pace * plan.limits.period);
+        let at = *cursor;
+        self.lead.look(plan, &at, pace);
+        self.change = match self.change {
+            0 => {
+                self.rises = self.lead.near >= f32::from(LEAD);
+                u8::from(self.rises)
+            }
+            CHANGE => {
+                self.rises = false;
+                CHANGE - u8::from(self.lead.near == 0.0)
+            }
+            change if self.rises => change + 1,
+            change => change - 1,
+        };
+    }
+
+    /// The tool is known to be at this arc, units of 2^-10 nm: the plan goes on from there.
+    pub(crate) fn correct(&mut self, plan: &Plan, arc_q10: i64) {
+        let apart = arc_q10 - self.arc_q10;
+        let mm = if apart < 0 { -to_mm(-apart) } else { to_mm(apart) };
+        self.arc_q10 = arc_q10;
+        self.cursor.shift(mm, plan);
+    }
+}

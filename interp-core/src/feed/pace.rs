@@ -1,0 +1,326 @@
+//! Hold, resume, override: the pace r of a motion as a fraction of its plan's own, and its changes.
+//!
+//! A constant pace of at most 1 keeps every limit: velocity, acceleration and jerk shrink by r, r^2, r^3. The pace changes by quintics only,
+//! each of which was followed over its whole length beforehand: per axis `a r^2 + q' v r'` and `j r^3 + 3 a r r' + q' v r''`. So by induction every
+//! period is within the limits, whatever the order of the commands.
+
+use crate::math::arith::sqrt;
+use crate::math::number::Bounded;
+
+/// Periods from the start of a search to the change that it finds: the search has so long.
+const LATENCY: u16 = 12;
+/// The same for the searches after those that found nothing.
+const LATENCY_MAX: u16 = 48;
+
+/// Durations that a search tries, shortest first, and the ratio of one to the next.
+const TRIALS: u8 = 12;
+const RATIO_MIN: f32 = 1.1;
+const RATIO_MAX: f32 = 1.5;
+
+/// Time between the places of a trial that are looked at, s, and their least number.
+const SPACING: f32 = 1.0e-3;
+const POINTS_MIN: f32 = 16.0;
+
+/// Paces below 0 and above 1 that are rounding.
+const PACE_MIN: f32 = -2e-5;
+const PACE_MAX: f32 = 1.00002;
+
+/// Fractions of the limits that a changing pace may use. The jerk is seen between periods, and its peaks are narrower.
+const ROOM: Use = Use {
+    velocity: 1.0,
+    acceleration: 0.997,
+    jerk: 1.0,
+};
+/// The same after a fault.
+const ROOM_FAULT: Use = Use {
+    velocity: 1.001,
+    acceleration: 1.1,
+    jerk: 1.5,
+};
+
+/// Change of the pace that is none.
+const SAME: f32 = 1e-6;
+
+/// Fractions of the limits, the most of the three axes.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Use {
+    pub(crate) velocity: f32,
+    pub(crate) acceleration: f32,
+    pub(crate) jerk: f32,
+}
+
+impl Use {
+    pub(crate) const NONE: Self = Self {
+        velocity: 0.0,
+        acceleration: 0.0,
+        jerk: 0.0,
+    };
+
+    pub(crate) fn add(&mut self, other: &Self) {
+        self.velocity = self.velocity.at_least(other.velocity);
+        self.acceleration = self.acceleration.at_least(other.acceleration);
+        self.jerk = self.jerk.at_least(other.jerk);
+    }
+
+    /// The greatest ratio to the room.
+    fn ratio(&self, room: &Self) -> f32 {
+        (self.velocity / room.velocity)
+            .at_least(self.acceleration / room.acceleration)
+            .at_least(self.jerk / room.jerk)
+    }
+}
+
+/// A planned motion from rest to rest.
+pub(crate) trait Course {
+    /// A place on it.
+    type Cursor: Copy;
+
+    /// Moves on by this time at the plan's own pace, s.
+    fn advance(&self, cursor: &mut Self::Cursor, seconds: f32);
+
+    /// Whether the motion is over.
+    fn is_over(&self, cursor: &Self::Cursor) -> bool;
+
+    /// Use of the limits at a place and a pace with its first two derivatives, 1, 1/s, 1/s^2. `around`: time before and behind that the place
+    /// stands for, s.
+    fn use_at(&self, cursor: &Self::Cursor, rates: [f32; 3], around: f32) -> Use;
+}
+
+/// A change of the pace: from these rates to rest at the goal.
+#[derive(Clone, Copy, Debug)]
+struct Change {
+    coefficients: [f32; 6],
+    duration: f32,
+}
+
+impl Change {
+    fn new([r, d, e]: [f32; 3], goal: f32, duration: f32) -> Self {
+        let inverse = 1.0 / duration;
+        let (h, d, e) = (goal - r, d * duration, e * duration * duration);
+        let [i3, i4, i5] = {
+            let i2 = inverse * inverse;
+            [i2 * inverse, i2 * i2, i2 * i2 * inverse]
+        };
+        Self {
+            coefficients: [
+                r,
+                d * inverse,
+                0.5 * e * inverse * inverse,
+                (10.0 * h - 6.0 * d - 1.5 * e) * i3,
+                (-15.0 * h + 8.0 * d + 1.5 * e) * i4,
+                (6.0 * h - 3.0 * d - 0.5 * e) * i5,
+            ],
+            duration,
+        }
+    }
+
+    fn rates(&self, t: f32) -> [f32; 3] {
+        let [c0, c1, c2, c3, c4, c5] = self.coefficients;
+        [
+            c0 + t * (c1 + t * (c2 + t * (c3 + t * (c4 + t * c5)))),
+            c1 + t * (2.0 * c2 + t * (3.0 * c3 + t * (4.0 * c4 + t * 5.0 * c5))),
+            2.0 * c2 + t * (6.0 * c3 + t * (12.0 * c4 + t * 20.0 * c5)),
+        ]
+    }
+}
+
+/// A search for a change.
+#[derive(Clone, Copy, Debug)]
+struct Search<C> {
+    /// Where the motion is and what the pace is when the change begins.
+    from: C,
+    rates: [f32; 3],
+    /// Periods until then.
+    left: u16,
+    trial: u8,
+    change: Change,
+    /// The trial's place, and points looked at.
+    at: C,
+    points: u16,
+    /// Whether the change holds.
+    found: bool,
+}
+
+/// The pace of a motion.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Pace<C> {
+    change: Option<Change>,
+    /// Time since the change began, s.
+    time: f32,
+    goal: f32,
+    wanted: f32,
+    is_fault: bool,
+    search: Option<Search<C>>,
+    failures: u8,
+    period: f32,
+}
+
+impl<C: Copy> Pace<C> {
+    /// At rest.
+    pub(crate) const REST: Self = Self {
+        change: None,
+        time: 0.0,
+        goal: 0.0,
+        wanted: 0.0,
+        is_fault: false,
+        search: None,
+        failures: 0,
+        period: 1e-3,
+    };
+
+    /// At the start of a motion: any constant pace is possible.
+    pub(crate) const fn begin(&mut self, pace: f32, period: f32) {
+        *self = Self::REST;
+        (self.goal, self.wanted, self.period) = (pace, pace, period);
+    }
+
+    /// Sets the pace that is wanted, 0 to 1; a controlled stop after a fault may use more than the limits.
+    pub(crate) fn want(&mut self, pace: f32, is_fault: bool) {
+        if (pace - self.wanted).abs() > SAME || is_fault != self.is_fault {
+            self.wanted = pace;
+            self.is_fault = is_fault;
+            self.search = None;
+            self.failures = 0;
+        }
+    }
+
+    /// Whether the motion stands, and will until another pace is wanted.
+    pub(crate) fn is_at_rest(&self) -> bool {
+        self.change.is_none() && self.goal == 0.0 && self.wanted == 0.0
+    }
+
+    /// Whether the pace stays as it is.
+    pub(crate) fn is_constant(&self) -> bool {
+        self.change.is_none() && !self.is_seeking()
+    }
+
+    /// The pace reached or aimed at.
+    pub(crate) const fn goal(&self) -> f32 {
+        self.goal
+    }
+
+    /// Whether there is work for [`Self::work`].
+    pub(crate) fn has_work(&self) -> bool {
+        match &self.search {
+            Some(search) => !search.found,
+            None => self.is_seeking(),
+        }
+    }
+
+    /// The pace now.
+    pub(crate) fn now(&self) -> f32 {
+        let [pace, _, _] = self.rates(0.0);
+        pace.at_least(0.0)
+    }
+
+    fn is_seeking(&self) -> bool {
+        (self.wanted - self.goal).abs() > SAME
+    }
+
+    pub(crate) fn rates(&self, ahead: f32) -> [f32; 3] {
+        let time = self.time + ahead;
+        match &self.change {
+            Some(change) if time < change.duration => change.rates(time),
+            _ => [self.goal, 0.0, 0.0],
+        }
+    }
+
+    /// One period: the pace in its middle.
+    pub(crate) fn tick(&mut self) -> f32 {
+        if let Some(search) = &mut self.search {
+            if search.left > 0 {
+                search.left -= 1;
+            } else if search.found {
+                    self.change = Some(search.change);
+                    (self.time, self.goal, self.failures) = (0.0, self.wanted, 0);
+                    self.search = None;
+            } else if self.change.is_some() || self.goal != 0.0 {
+                    self.failures = self.failures.saturating_add(1);
+                    self.search = None;
+            }
+        }
+        let [pace, _, _] = self.rates(0.5 * self.period);
+        self.time += self.period;
+        if self.change.is_some_and(|change| self.time >= change.duration) {
+            self.change = None;
+        }
+        pace.at_least(0.0)
+    }
+
+    /// One place of the search. `at`: where the motion is.
+    pub(crate) fn work<P: Course<Cursor = C>>(&mut self, course: &P, at: &C) {
+        if !self.has_work() {
+            return;
+        }
+        let Some(search) = &mut self.search else {
+            self.search = Some(self.begin_search(course, at));
+            return;
+        };
+        let room = if self.is_fault { &ROOM_FAULT } else { &ROOM };
+        let duration = search.change.duration;
+        let step = SPACING.at_most(duration / POINTS_MIN);
+        let time = (step * f32::from(search.points)).at_most(duration);
+        let rates = search.change.rates(time);
+        let [pace, _, _] = rates;
+        let mut ratio = course.use_at(&search.at, rates, 0.5 * step).ratio(room);
+        if !(PACE_MIN..=PACE_MAX).contains(&pace) {
+            ratio = ratio.at_least(RATIO_MAX);
+        }
+        if ratio > 1.0 {
+            search.trial += 1;
+            if search.trial >= TRIALS {
+                // No change holds from there: from a later place one may.
+                self.search = None;
+                return;
+            }
+            let longer = duration * ratio.at_least(RATIO_MIN).at_most(RATIO_MAX);
+            search.change = Change::new(search.rates, self.wanted, longer);
+            (search.at, search.points) = (search.from, 0);
+            return;
+        }
+        search.points += 1;
+        if time >= duration || course.is_over(&search.at) {
+            search.found = true;
+            return;
+        }
+        let [middle, _, _] = search.change.rates((time + 0.5 * step).at_most(duration));
+        course.advance(&mut search.at, step * middle.at_least(0.0));
+    }
+
+    fn begin_search<P: Course<Cursor = C>>(&self, course: &P, at: &C) -> Search<C> {
+        let latency = match self.failures {
+            0 | 1 => LATENCY,
+            2 | 3 => 2 * LATENCY,
+            _ => LATENCY_MAX,
+        };
+        let mut from = *at;
+        let mut ahead = 0.0;
+        for _ in 0..latency {
+            let [pace, _, _] = self.rates(ahead + 0.5 * self.period);
+            course.advance(&mut from, self.period * pace.at_least(0.0));
+            ahead += self.period;
+        }
+        let rates = self.rates(ahead);
+        let [pace, _, _] = rates;
+        // The shortest change that velocity along the path alone would allow at this place.
+        let apart = (self.wanted - pace).abs().at_least(0.01);
+        let [of_accel, of_jerk] = [[0.0, 1.0, 0.0], [0.0, 0.0, 1.0]].map(|mut rates| {
+            let [r, _, _] = &mut rates;
+            *r = 1e-9;
+            course.use_at(&from, rates, 0.0)
+        });
+        let shortest = (1.9 * apart * of_accel.acceleration)
+            .at_least(sqrt(5.8 * apart * of_jerk.jerk))
+            .at_least(10.0 * self.period);
+        Search {
+            from,
+            rates,
+            left: latency,
+            trial: 0,
+            change: Change::new(rates, self.wanted, shortest),
+            at: from,
+            points: 0,
+            found: false,
+        }
+    }
+}

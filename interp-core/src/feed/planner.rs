@@ -1,0 +1,264 @@
+//! Plans a path in portions: walk, barrier method, check.
+
+use super::follow::{LEAD, Lead};
+use super::limits::MotionLimits;
+use super::newton::{self, Reach, SHAPE};
+use super::pace::{Course, Use};
+use super::plan::{Cursor, Plan};
+use super::walk::{LIST, Lists, Walker};
+use crate::math::arith::{inverse_sqrt, sqrt, truncated};
+use crate::math::number::{Bounded, cube_root};
+
+/// Weight of the barrier in each step.
+const BARRIER: [f32; 12] = [
+    0.05, 0.05, 0.05, 0.008, 0.008, 0.002, 0.002, 0.0007, 0.0007, 0.00025, 0.00025, 0.00025,
+];
+
+/// Share of the greatest factor of the walk's pace that the method starts from.
+const START_SHARE: f32 = 0.85;
+
+/// Use of the jerk that the check passes: a plan with more is slowed down.
+const JERK_CHECKED: f32 = 0.998;
+
+/// Nominal cycles of a period's planning.
+pub(crate) const PORTION_CYCLES: u32 = 30_000;
+
+/// Nominal cycles of one piece of work.
+mod cycles {
+    pub(super) const WALK: u32 = 15_000;
+    pub(super) const FACTOR: u32 = 4_500;
+    pub(super) const ASSEMBLE: u32 = 5_000;
+    pub(super) const SOLVE: u32 = 15_000;
+    pub(super) const REACH: u32 = 3_300;
+    pub(super) const CHECK: u32 = 2_400;
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Stage {
+    Walk,
+    Factor,
+    Assemble,
+    Solve,
+    Reach,
+    Check,
+    Done,
+}
+
+/// The planning of one path.
+#[derive(Clone, Debug)]
+pub(crate) struct Planner {
+    stage: Stage,
+    lists: Lists,
+    walker: Walker,
+    /// What the plan may use.
+    limits: MotionLimits,
+    /// Next interval and jump of a sweep.
+    index: u16,
+    knot: u16,
+    /// Steps of the method so far.
+    step: u8,
+    /// One over the sum of the coefficients' times, and the greatest factor of the start.
+    weight: f32,
+    factor: f32,
+    reach: Reach,
+    /// The check's place, what the plan uses so far, and periods.
+    cursor: Cursor,
+    most: Use,
+    periods: u32,
+    lead: Lead,
+}
+
+impl Planner {
+    pub(crate) const IDLE: Self = Self {
+        stage: Stage::Done,
+        lists: [[0.0; LIST]; 5],
+        walker: Walker::IDLE,
+        limits: MotionLimits::NONE,
+        index: 0,
+        knot: 0,
+        step: 0,
+        weight: 0.0,
+        factor: 0.0,
+        reach: Reach::FAR,
+        cursor: Cursor::START,
+        most: Use::NONE,
+        periods: 0,
+        lead: Lead::NONE,
+    };
+
+    /// Begins to plan the path of the plan's stations within the plan's limits.
+    pub(crate) fn begin(&mut self, plan: &Plan) {
+        self.limits = plan.limits.planned();
+        self.walker.begin();
+        self.stage = Stage::Walk;
+    }
+
+    /// Gives up.
+    pub(crate) const fn stop(&mut self) {
+        self.stage = Stage::Done;
+    }
+
+    pub(crate) fn is_done(&self) -> bool {
+        self.stage == Stage::Done
+    }
+
+    /// Nominal cycles of the next piece of work.
+    pub(crate) const fn cycles(&self) -> u32 {
+        match self.stage {
+            Stage::Walk => cycles::WALK,
+            Stage::Factor => cycles::FACTOR,
+            Stage::Assemble => cycles::ASSEMBLE,
+            Stage::Solve => cycles::SOLVE,
+            Stage::Reach => cycles::REACH,
+            Stage::Check => cycles::CHECK,
+            Stage::Done => 0,
+        }
+    }
+
+    /// One piece of work. `least`: periods that the plan has to take at least.
+    pub(crate) fn work(&mut self, plan: &mut Plan, least: u32) {
+        self.stage = match self.stage {
+            Stage::Walk => {
+                if self.walker.work(&mut self.lists, plan, &self.limits) {
+                    self.begin_method(plan);
+                    Stage::Factor
+                } else {
+                    Stage::Walk
+                }
+            }
+            Stage::Factor => {
+                let factor = newton::factor(plan, &self.limits, self.index, &mut self.knot);
+                self.factor = factor.at_most(self.factor);
+                if self.next(plan) {
+                    let factor = START_SHARE * self.factor.at_least(1e-9);
+                    for pace in &mut plan.pace {
+                        *pace *= factor;
+                    }
+                    newton::clear(&mut self.lists);
+                    Stage::Assemble
+                } else {
+                    Stage::Factor
+                }
+            }
+            Stage::Assemble => {
+                let barrier = BARRIER.get(usize::from(self.step)).copied().unwrap_or(1e-3);
+                newton::assemble(
+                    plan,
+                    &self.limits,
+                    &mut self.lists,
+                    self.index,
+                    &mut self.knot,
+                    barrier,
+                    self.weight,
+                );
+                if self.next(plan) { Stage::Solve } else { Stage::Assemble }
+            }
+            Stage::Solve => {
+                newton::solve(&mut self.lists, plan.intervals + 2, 0);
+                self.reach = Reach::FAR;
+                Stage::Reach
+            }
+            Stage::Reach => {
+                newton::extend(
+                    plan,
+                    &self.limits,
+                    &self.lists,
+                    self.index,
+                    &mut self.knot,
+                    &mut self.reach,
+                );
+                if self.next(plan) { self.take(plan) } else { Stage::Reach }
+            }
+            Stage::Check => {
+                if self.check(plan) {
+                    self.slow(plan, least);
+                    Stage::Done
+                } else {
+                    Stage::Check
+                }
+            }
+            Stage::Done => Stage::Done,
+        };
+    }
+
+    /// The next interval of a sweep; whether the sweep is over.
+    const fn next(&mut self, plan: &Plan) -> bool {
+        self.index += 1;
+        let is_over = self.index >= plan.intervals;
+        if is_over {
+            (self.index, self.knot) = (0, 0);
+        }
+        is_over
+    }
+
+    fn begin_method(&mut self, plan: &Plan) {
+        let mut sum = 0.0;
+        let count = usize::from(plan.intervals) + 2;
+        if let Some(shape) = self.lists.get_mut(SHAPE) {
+            for (shape, pace) in shape.iter_mut().zip(&plan.pace).take(count) {
+                *shape = *pace;
+                sum += inverse_sqrt(pace.at_least(1e-9));
+            }
+        }
+        self.weight = 1.0 / sum.at_least(1e-9);
+        self.factor = f32::MAX;
+        (self.index, self.knot, self.step) = (0, 0, 0);
+    }
+
+    /// Takes the step that was solved for, and begins the next, or the check.
+    fn take(&mut self, plan: &mut Plan) -> Stage {
+        newton::take(plan, &self.lists, self.reach.step());
+        newton::clear(&mut self.lists);
+        self.step += 1;
+        if usize::from(self.step) < BARRIER.len() {
+            return Stage::Assemble;
+        }
+        self.cursor = Cursor::START;
+        self.most = Use::NONE;
+        self.periods = 0;
+        self.lead = Lead::NONE;
+        Stage::Check
+    }
+
+    /// One period of the plan; whether it is over.
+    fn check(&mut self, plan: &Plan) -> bool {
+        if self.periods < u32::from(LEAD) {
+            self.lead.look(plan, &self.cursor, 1.0);
+            self.lead.cursor = self.cursor;
+        }
+        let here = plan.use_at(&self.cursor, [1.0, 0.0, 0.0], 0.0);
+        self.most.add(&here);
+        let period = plan.limits.period;
+        plan.advance(&mut self.cursor, period);
+        self.periods = self.periods.saturating_add(1);
+        plan.is_over(&self.cursor)
+    }
+
+    /// Slows the plan where it uses too much, or is too short.
+    fn slow(&mut self, plan: &mut Plan, least: u32) {
+        let Use {
+            velocity,
+            acceleration,
+            jerk,
+        } = self.most;
+        let factor = velocity
+            .at_least(sqrt(acceleration))
+            .at_least(cube_root(jerk / JERK_CHECKED))
+            .at_least(to_f32(least) / to_f32(self.periods.max(1)))
+            .at_least(1.0);
+        plan.periods = u32::try_from(truncated(to_f32(self.periods) * factor)).unwrap_or(0);
+        plan.lead = self.lead;
+        if factor > 1.0 {
+            plan.lead.near = 0.0;
+            let share = 1.0 / (factor * factor);
+            for pace in &mut plan.pace {
+                *pace *= share;
+            }
+        }
+    }
+}
+
+#[allow(clippy::cast_precision_loss, reason = "24 bits of a ratio are enough")]
+const fn to_f32(count: u32) -> f32 {
+    count as f32
+}

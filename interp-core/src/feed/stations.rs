@@ -1,0 +1,249 @@
+//! Stations of a path: its derivatives at places in order, two stations at each patch boundary.
+
+use super::limits::Jump;
+use super::{MM_PER_Q10, Q10_BITS};
+use crate::math::number::{Bounded, MM_PER_NM, nm_to_mm};
+
+/// Greatest number of stations of a path.
+pub(crate) const STATIONS_MAX: usize = 168;
+
+/// Halvings until one of the stations is left.
+const CELL_BISECTIONS: u8 = 8;
+const _: () = assert!(STATIONS_MAX <= 1 << CELL_BISECTIONS);
+
+/// First, second and third derivative of each axis by the contact's arc: 1, 1/mm, 1/mm^2.
+pub(crate) type Derivatives = [[f32; 3]; 3];
+
+/// A place of the path.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Station {
+    /// Arc from the start, nm.
+    pub(crate) arc_nm: u32,
+    pub(crate) q: Derivatives,
+}
+
+/// The stations of a path, in order of their arcs. Two at the same arc are the two sides of a jump.
+#[derive(Clone, Debug)]
+pub(crate) struct Stations {
+    list: [Station; STATIONS_MAX],
+    count: u16,
+}
+
+/// Error of a derivative by differences of positions rounded to a nanometre, times the cell's length to its power: three standard deviations
+/// at the end of a window.
+const FIRST_NOISE: f32 = 2e-6;
+const SECOND_NOISE: f32 = 12e-6;
+
+impl Station {
+    const NONE: Self = Self {
+        arc_nm: 0,
+        q: [[0.0; 3]; 3],
+    };
+}
+
+impl Stations {
+    pub(crate) const NONE: Self = Self {
+        list: [Station::NONE; STATIONS_MAX],
+        count: 0,
+    };
+
+    pub(crate) const fn clear(&mut self) {
+        self.count = 0;
+    }
+
+    /// Appends a station; ignored where the list is full.
+    pub(crate) fn push(&mut self, station: Station) {
+        if let Some(place) = self.list.get_mut(usize::from(self.count)) {
+            *place = station;
+            self.count += 1;
+        }
+    }
+
+    /// The station so many before the end of the list, 1 for the last.
+    pub(crate) fn back_mut(&mut self, back: u16) -> Option<&mut Station> {
+        let index = self.count.checked_sub(back)?;
+        self.list.get_mut(usize::from(index))
+    }
+
+    pub(crate) const fn count(&self) -> u16 {
+        self.count
+    }
+
+    /// The station; that of no path beyond the last.
+    pub(crate) fn get(&self, index: u16) -> &Station {
+        const NONE: Station = Station::NONE;
+        self.list.get(usize::from(index)).unwrap_or(&NONE)
+    }
+
+    /// Length of the path, nm.
+    pub(crate) fn length_nm(&self) -> u32 {
+        self.get(self.count.saturating_sub(1)).arc_nm
+    }
+
+    /// Length of the cell that begins at a station, mm; 0 at a jump and at the end.
+    pub(crate) fn cell_mm(&self, cell: u16) -> f32 {
+        if cell + 1 >= self.count {
+            return 0.0;
+        }
+        between(self.get(cell).arc_nm, self.get(cell + 1).arc_nm)
+    }
+
+    /// Whether the station is the first side of a jump.
+    pub(crate) fn is_jump(&self, station: u16) -> bool {
+        station + 1 < self.count && self.get(station).arc_nm == self.get(station + 1).arc_nm
+    }
+
+    /// The jump at a station, less what rounding can make of it.
+    pub(crate) fn jump(&self, station: u16) -> Jump {
+        let cells = [self.cell_mm(station.saturating_sub(1)), self.cell_mm(station + 1)];
+        let [before, behind] = cells.map(|cell| 1.0 / cell.at_least(1e-3));
+        let inverse = before.at_least(behind);
+        let [from, to] = [&self.get(station).q, &self.get(station + 1).q];
+        let size = |order: usize, noise: f32| {
+            let mut size = [0.0; 3];
+            let none = [0.0; 3];
+            let from = from.get(order).unwrap_or(&none);
+            let to = to.get(order).unwrap_or(&none);
+            for ((size, from), to) in size.iter_mut().zip(from).zip(to) {
+                *size = ((to - from).abs() - noise).at_least(0.0);
+            }
+            size
+        };
+        Jump {
+            first: size(0, FIRST_NOISE * inverse),
+            second: size(1, SECOND_NOISE * inverse * inverse),
+        }
+    }
+
+    /// The cell that an arc is in, from one cell to another. A cell without length is skipped.
+    pub(crate) fn cell_between(&self, from: u16, to: u16, arc_q10: i64) -> u16 {
+        let (mut low, mut beyond) = (from, (to + 1).min(self.count.saturating_sub(1)));
+        for _ in 0..CELL_BISECTIONS {
+            if low + 1 >= beyond {
+                break;
+            }
+            let middle = u16::midpoint(low, beyond);
+            if i64::from(self.get(middle).arc_nm) << Q10_BITS <= arc_q10 {
+                low = middle;
+            } else {
+                beyond = middle;
+            }
+        }
+        low
+    }
+
+    /// Distance from a station to an arc behind it, mm.
+    pub(crate) fn since(&self, station: u16, arc_q10: i64) -> f32 {
+        let from = i64::from(self.get(station).arc_nm) << Q10_BITS;
+        crate::math::number::to_f32(arc_q10 - from) * MM_PER_Q10
+    }
+
+    /// Derivatives at a fraction of a cell.
+    pub(crate) fn blend(&self, cell: u16, part: f32) -> Derivatives {
+        let mut q = self.get(cell).q;
+        let next = &self.get((cell + 1).min(self.count.saturating_sub(1))).q;
+        for (q, next) in q.iter_mut().zip(next) {
+            for (q, next) in q.iter_mut().zip(next) {
+                *q += part * (*next - *q);
+            }
+        }
+        q
+    }
+}
+
+/// Millimetres from one arc to a later one.
+#[allow(clippy::cast_precision_loss, reason = "24 bits resolve a cell")]
+pub(crate) fn between(from_nm: u32, to_nm: u32) -> f32 {
+    to_nm.wrapping_sub(from_nm) as f32 * MM_PER_NM
+}
+
+/// Greatest number of positions that a derivative is taken from.
+pub(crate) const WINDOW: usize = 5;
+
+/// The last positions of the tool centre along a patch.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Window {
+    /// Position, nm, and arc, mm; the oldest first.
+    points: [([i32; 3], f32); WINDOW],
+    count: usize,
+}
+
+impl Window {
+    pub(crate) const EMPTY: Self = Self {
+        points: [([0; 3], 0.0); WINDOW],
+        count: 0,
+    };
+
+    pub(crate) const fn count(&self) -> usize {
+        self.count
+    }
+
+    /// Appends a position; the oldest is dropped.
+    pub(crate) fn push(&mut self, centre_nm: [i32; 3], arc_mm: f32) {
+        if self.count == WINDOW {
+            self.points.rotate_left(1);
+            self.count -= 1;
+        }
+        if let Some(place) = self.points.get_mut(self.count) {
+            *place = (centre_nm, arc_mm);
+            self.count += 1;
+        }
+    }
+
+    /// Derivatives at one of the positions, of the polynomial through all of them: Newton's divided differences.
+    pub(crate) fn derivatives(&self, at: usize) -> Derivatives {
+        let mut q = [[0.0; 3]; 3];
+        let points = self.points.get(..self.count).unwrap_or(&[]);
+        let Some((origin, start)) = points.get(at) else {
+            return q;
+        };
+        let mut arcs = [0.0; WINDOW];
+        for (arc, (_, from_start)) in arcs.iter_mut().zip(points) {
+            *arc = from_start - start;
+        }
+        for axis in 0..3 {
+            let mut differences = [0.0; WINDOW];
+            for (difference, (centre, _)) in differences.iter_mut().zip(points) {
+                let of = |centre: &[i32; 3]| centre.get(axis).copied().unwrap_or(0);
+                *difference = nm_to_mm(of(centre).wrapping_sub(of(origin)));
+            }
+            divide(&mut differences, &arcs, points.len());
+            let [_, first, second, third] = taylor(&differences, &arcs, points.len());
+            let values = [first, 2.0 * second, 6.0 * third];
+            for (q, value) in q.iter_mut().zip(values) {
+                if let Some(q) = q.get_mut(axis) {
+                    *q = value;
+                }
+            }
+        }
+        q
+    }
+}
+
+/// Values at these arguments become divided differences.
+fn divide(values: &mut [f32; WINDOW], at: &[f32; WINDOW], count: usize) {
+    for order in 1..WINDOW.min(count) {
+        for index in (order..WINDOW.min(count)).rev() {
+            let apart = get(at, index) - get(at, index - order);
+            let difference = (get(values, index) - get(values, index - 1)) / apart.at_least(1e-7);
+            if let Some(value) = values.get_mut(index) {
+                *value = difference;
+            }
+        }
+    }
+}
+
+/// The first four coefficients by powers of the argument of a polynomial in Newton's form.
+fn taylor(differences: &[f32; WINDOW], at: &[f32; WINDOW], count: usize) -> [f32; 4] {
+    let mut c = [0.0; 4];
+    for index in (0..WINDOW.min(count)).rev() {
+        let t = get(at, index);
+        let [c0, c1, c2, c3] = c;
+        c = [get(differences, index) - t * c0, c0 - t * c1, c1 - t * c2, c2 - t * c3];
+    }
+    c
+}
+
+fn get(values: &[f32; WINDOW], index: usize) -> f32 {
+    values.get(index).copied().unwrap_or(0.0)
+}

@@ -1,0 +1,319 @@
+//! The planner on paths that are known in closed form, in f64.
+
+use std::boxed::Box;
+use std::vec::Vec;
+
+use super::follow::Follower;
+use super::limits::MotionLimits;
+use super::pace::{Course, Pace};
+use super::plan::Plan;
+use super::planner::Planner;
+use super::stations::Station;
+
+const T: f64 = 1e-3;
+
+/// A path: position and its derivatives by arc, in pieces with a jump between them.
+struct Path {
+    /// Arc at the start of each piece, and at the end.
+    ends: Vec<f64>,
+    /// The piece's value or derivative of this order at an arc.
+    of: Box<dyn Fn(usize, f64, usize) -> [f64; 3]>,
+}
+
+impl Path {
+    fn smooth(length: f64, of: impl Fn(f64, usize) -> [f64; 3] + 'static) -> Self {
+        Self {
+            ends: std::vec![0.0, length],
+            of: Box::new(move |_, s, order| of(s, order)),
+        }
+    }
+
+    fn straight(length: f64) -> Self {
+        Self::smooth(length, |s, order| match order {
+            0 => [s, 0.0, 0.0],
+            1 => [1.0, 0.0, 0.0],
+            _ => [0.0; 3],
+        })
+    }
+
+    /// Around a circle.
+    fn circle(length: f64, radius: f64) -> Self {
+        Self::smooth(length, move |s, order| {
+            let scale = radius.powi(1 - order as i32);
+            let angle = s / radius + order as f64 * std::f64::consts::FRAC_PI_2;
+            [scale * angle.cos(), scale * angle.sin(), 0.0]
+        })
+    }
+
+    /// Straight, an arc, straight, an arc to the other side: the curvature jumps.
+    fn slalom(pieces: usize, length: f64, radius: f64) -> Self {
+        let mut starts: Vec<([f64; 2], f64)> = std::vec![([0.0; 2], 0.0)];
+        let bend = move |piece: usize| match piece % 4 {
+            1 => 1.0 / radius,
+            3 => -1.0 / radius,
+            _ => 0.0,
+        };
+        let along = |([x, y], angle): ([f64; 2], f64), k: f64, s: f64| {
+            let turned = angle + k * s;
+            if k == 0.0 {
+                ([x + s * angle.cos(), y + s * angle.sin()], angle)
+            } else {
+                let (dx, dy) = ((turned.sin() - angle.sin()) / k, (angle.cos() - turned.cos()) / k);
+                ([x + dx, y + dy], turned)
+            }
+        };
+        for piece in 0..pieces {
+            let next = along(starts[piece], bend(piece), length);
+            starts.push(next);
+        }
+        Self {
+            ends: (0..=pieces).map(|piece| piece as f64 * length).collect(),
+            of: Box::new(move |piece, s, order| {
+                let k = bend(piece);
+                let ([x, y], angle) = along(starts[piece], k, s - piece as f64 * length);
+                match order {
+                    0 => [x, y, 0.0],
+                    1 => [angle.cos(), angle.sin(), 0.0],
+                    2 => [-k * angle.sin(), k * angle.cos(), 0.0],
+                    _ => [-k * k * angle.cos(), -k * k * angle.sin(), 0.0],
+                }
+            }),
+        }
+    }
+
+    fn length(&self) -> f64 {
+        *self.ends.last().unwrap()
+    }
+
+    fn at(&self, s: f64) -> [f64; 3] {
+        let s = s.clamp(0.0, self.length());
+        let pieces = self.ends.len() - 1;
+        let piece = self.ends[1..pieces].iter().filter(|end| **end <= s).count();
+        (self.of)(piece, s, 0)
+    }
+
+    fn plan(&self, limits: &MotionLimits) -> Box<Plan> {
+        let mut plan = Box::new(Plan::NONE);
+        plan.limits = *limits;
+        let pieces = self.ends.len() - 1;
+        let cells = (160 / pieces).max(2);
+        for piece in 0..pieces {
+            for station in 0..=cells {
+                let part = station as f64 / cells as f64;
+                let s = self.ends[piece] + part * (self.ends[piece + 1] - self.ends[piece]);
+                plan.stations.push(Station {
+                    arc_nm: (s * 1e6).round() as u32,
+                    q: [1, 2, 3].map(|order| (self.of)(piece, s, order).map(|q| q as f32)),
+                });
+            }
+        }
+        let mut planner = Box::new(Planner::IDLE);
+        planner.begin(&plan);
+        while !planner.is_done() {
+            planner.work(&mut plan, 0);
+        }
+        plan
+    }
+}
+
+fn limits(feed: f32) -> MotionLimits {
+    MotionLimits {
+        feed,
+        velocity: [100.0, 100.0, 50.0],
+        acceleration: [1000.0, 1000.0, 500.0],
+        jerk: [20_000.0, 20_000.0, 10_000.0],
+        chord: 1.0,
+        period: T as f32,
+    }
+}
+
+/// Greatest fractions of velocity, acceleration and jerk of samples, rests before and behind included.
+fn uses(path: &Path, arcs: &[f64], limits: &MotionLimits) -> [f64; 3] {
+    let mut q: Vec<[f64; 3]> = std::vec![path.at(0.0); 3];
+    q.extend(arcs.iter().map(|s| path.at(*s)));
+    q.extend([path.at(path.length()); 3]);
+    let bounds = [&limits.velocity, &limits.acceleration, &limits.jerk];
+    let mut most = [0.0_f64; 3];
+    for (order, (most, bounds)) in most.iter_mut().zip(bounds).enumerate() {
+        q = q
+            .windows(2)
+            .map(|pair| [0, 1, 2].map(|axis| (pair[1][axis] - pair[0][axis]) / T))
+            .collect();
+        for value in &q {
+            for axis in 0..3 {
+                *most = most.max(value[axis].abs() / f64::from(bounds[axis]));
+            }
+        }
+        let _ = order;
+    }
+    most
+}
+
+/// Arcs after each period at this pace.
+fn run(plan: &Plan) -> Vec<f64> {
+    let mut follower = Follower::START;
+    follower.begin(plan);
+    let mut arcs = Vec::new();
+    while !follower.is_over(plan) {
+        follower.tick(plan, 1.0);
+        arcs.push(follower.arc_q10() as f64 / 1024e6);
+        assert!(arcs.len() < 2_000_000);
+    }
+    let length = plan.length_q10() as f64 / 1024e6;
+    let end = arcs.last_mut().unwrap();
+    assert!((*end - length).abs() < 4e-6, "{end} of {length}");
+    *end = length;
+    arcs
+}
+
+/// Time of the fastest way from rest to rest along a straight line.
+fn optimum(s: f64, v: f64, a: f64, j: f64) -> f64 {
+    let ramp = |v: f64| if v * j < a * a { 2.0 * (v / j).sqrt() } else { v / a + a / j };
+    if v * ramp(v) <= s {
+        return s / v + ramp(v);
+    }
+    let (mut low, mut high) = (0.0, v);
+    for _ in 0..200 {
+        let middle = 0.5 * (low + high);
+        if middle * ramp(middle) <= s { low = middle } else { high = middle }
+    }
+    2.0 * ramp(low)
+}
+
+#[test]
+fn straight_paths_take_the_time_of_the_closed_form() {
+    for (length, feed) in [(0.3, 60.0), (3.0, 60.0), (30.0, 60.0), (30.0, 100.0), (300.0, 100.0), (1800.0, 100.0), (0.003, 60.0), (20.0, 1.0)] {
+        let limits = limits(feed);
+        let path = Path::straight(length);
+        let plan = path.plan(&limits);
+        let arcs = run(&plan);
+        let most = uses(&path, &arcs, &limits);
+        let time = arcs.len() as f64 * T;
+        let best = optimum(length, f64::from(feed), 1000.0, 20_000.0);
+        std::println!("{length} {feed}: {time:.4} {best:.4} {:.4} {most:.4?} N {}", time / best, plan.intervals);
+        assert!(most[0] <= 1.0001 && most[1] <= 1.0 && most[2] <= 1.02, "{length} {feed}: {most:?}");
+        assert!(time <= 1.04 * best + 2.0 * T, "{length} {feed}: {time} for {best}");
+    }
+}
+
+#[test]
+fn bends_keep_the_limits() {
+    for (radius, length, feed) in [(10.0, 60.0, 60.0), (3.0, 30.0, 100.0), (50.0, 200.0, 30.0), (0.5, 3.0, 100.0)] {
+        let limits = limits(feed);
+        let path = Path::circle(length, radius);
+        let plan = path.plan(&limits);
+        let arcs = run(&plan);
+        let most = uses(&path, &arcs, &limits);
+        std::println!("{radius} {length} {feed}: {:.4} {most:.4?} N {}", arcs.len() as f64 * T, plan.intervals);
+        assert!(most[0] <= 1.0001 && most[1] <= 1.0 && most[2] <= 1.02, "{radius}: {most:?}");
+    }
+}
+
+#[test]
+fn jumps_of_the_curvature_keep_the_limits() {
+    for (pieces, length, radius, feed) in [(8, 10.0, 30.0, 60.0), (8, 10.0, 30.0, 100.0), (12, 4.0, 5.0, 60.0), (5, 20.0, 100.0, 100.0)] {
+        let limits = limits(feed);
+        let path = Path::slalom(pieces, length, radius);
+        let plan = path.plan(&limits);
+        let arcs = run(&plan);
+        let most = uses(&path, &arcs, &limits);
+        std::println!("{pieces} {length} {radius} {feed}: {:.4} {most:.4?} N {} knots {}", arcs.len() as f64 * T, plan.intervals, plan.knot_count);
+        assert!(most[0] <= 1.0001 && most[1] <= 1.0 && most[2] <= 1.03, "{pieces} {radius}: {most:?}");
+    }
+}
+
+#[test]
+fn the_feed_is_exact_where_the_plan_is_near_it() {
+    let limits = limits(20.0);
+    let path = Path::circle(100.0, 40.0);
+    let plan = path.plan(&limits);
+    let arcs = run(&plan);
+    let middle = &arcs[arcs.len() / 4..arcs.len() * 3 / 4];
+    for pair in middle.windows(2) {
+        assert!(((pair[1] - pair[0]) / T / 20.0 - 1.0).abs() < 1e-7);
+    }
+    let fastest = arcs.windows(2).map(|pair| pair[1] - pair[0]).fold(0.0, f64::max);
+    assert!(fastest / T <= 20.0 * (1.0 + 1e-6), "{fastest}");
+}
+
+/// Places of a trial that a period looks at.
+const PLACES: u32 = 12;
+
+struct Random(u64);
+
+impl Random {
+    fn next(&mut self) -> f64 {
+        self.0 ^= self.0 << 13;
+        self.0 ^= self.0 >> 7;
+        self.0 ^= self.0 << 17;
+        (self.0 >> 11) as f64 / (1_u64 << 53) as f64
+    }
+}
+
+/// Holds and overrides at random times: limits are kept, every run ends at its end; the time from a hold to rest is returned.
+fn commanded(path: &Path, plan: &Plan, limits: &MotionLimits, random: &mut Random, gap: f64) -> (Vec<f64>, [f64; 3]) {
+    let mut follower = Follower::START;
+    follower.begin(plan);
+    let mut pace = Pace::REST;
+    pace.begin(1.0, T as f32);
+    let mut arcs = Vec::new();
+    let mut holds = Vec::new();
+    let mut next = gap * random.next() * 2.0;
+    let mut held: Option<f64> = None;
+    while !follower.is_over(plan) {
+        let now = arcs.len() as f64 * T;
+        if now >= next {
+            next = now + gap * random.next() * 2.0;
+            let wanted = if random.next() < 0.4 { 0.0 } else if random.next() < 0.5 { 1.0 } else { random.next() };
+            pace.want(wanted as f32, false);
+            held = (wanted == 0.0).then_some(now);
+        }
+        if pace.is_at_rest() {
+            if let Some(from) = held.take() {
+                holds.push(now - from);
+            }
+            if now + 0.5 > next { pace.want(1.0, false); }
+        }
+        let r = pace.tick();
+        follower.tick(plan, r);
+        arcs.push(follower.arc_q10() as f64 / 1024e6);
+        for _ in 0..PLACES {
+            if pace.has_work() {
+                pace.work(plan, &follower.cursor);
+            }
+        }
+        assert!(arcs.len() < 500_000, "stalls");
+    }
+    (holds, uses(path, &arcs, limits))
+}
+
+#[test]
+fn commands_at_any_time_keep_the_limits() {
+    let mut random = Random(0x1234_5678_9abc_def1);
+    let paths = [
+        (Path::straight(60.0), 60.0),
+        (Path::circle(100.0, 10.0), 100.0),
+        (Path::slalom(8, 10.0, 30.0), 60.0),
+        (Path::slalom(12, 4.0, 5.0), 60.0),
+    ];
+    let mut holds = Vec::new();
+    let mut worst = [0.0_f64; 3];
+    for (path, feed) in &paths {
+        let limits = limits(*feed);
+        let plan = path.plan(&limits);
+        for gap in [0.05, 0.15, 0.4] {
+            for _ in 0..20 {
+                let (more, most) = commanded(path, &plan, &limits, &mut random, gap);
+                holds.extend(more);
+                for (worst, most) in worst.iter_mut().zip(most) {
+                    *worst = worst.max(most);
+                }
+            }
+        }
+    }
+    holds.sort_by(f64::total_cmp);
+    let at = |part: f64| holds[((holds.len() - 1) as f64 * part) as usize];
+    std::println!("{} holds: {:.3} {:.3} {:.3}; {worst:.4?}", holds.len(), at(0.5), at(0.9), at(1.0));
+    assert!(worst[0] <= 1.0001 && worst[1] <= 1.0 && worst[2] <= 1.02, "{worst:?}");
+    assert!(at(0.9) <= 0.25 && at(1.0) <= 0.6, "{} {}", at(0.9), at(1.0));
+}

@@ -1,0 +1,572 @@
+//! The walk along a path that a plan scales: an acceleration-limited motion below rough caps of the speed, smoothed by a moving average, with nodes
+//! close together where the speed changes.
+
+use super::limits::{MotionLimits, SLOPE_MIN};
+use super::plan::{KNOTS_MAX, Knot, NODES_MAX, NODES_MIN, Plan};
+use super::stations::{Derivatives, STATIONS_MAX, between};
+use super::to_q10;
+use crate::math::arith::{sqrt, truncated};
+use crate::math::number::{Bounded, cube_root, to_f32};
+
+/// Values of a list of the planner.
+pub(crate) const LIST: usize = 170;
+const _: () = assert!(LIST >= STATIONS_MAX + 2 && LIST >= NODES_MAX + 3);
+
+/// Lists that the stages of the planner use, each for what it needs.
+pub(crate) type Lists = [[f32; LIST]; 5];
+
+/// Spacing of nodes that is fine enough, s; its growth per second away from busy places; the widest, s.
+const SPACING: f32 = 5e-3;
+const GROWTH: f32 = 0.12;
+const SPACING_MAX: f32 = 0.1;
+/// Time between nodes that is worth its planning, s.
+const SPACING_WORTH: f32 = 4e-3;
+/// Bisections of the spacing.
+const BISECTIONS: u8 = 12;
+/// Tries to coarsen the ends.
+const COARSENINGS: u8 = 20;
+/// Stations on either side of a jump that the speed over it bounds.
+const JUMP_STATIONS: u16 = 10;
+/// Bisections of a jump's place in its interval.
+const KNOT_BISECTIONS: u8 = 16;
+
+const STATIONS_A_PORTION: u16 = 24;
+const JUMPS_A_PORTION: u16 = 6;
+const KNOTS_A_PORTION: u16 = 20;
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Stage {
+    Caps,
+    Jumps,
+    Backwards,
+    Forwards,
+    Busy,
+    /// Whether even spacing is fine enough.
+    TryEven,
+    /// Whether it is, growing away from busy places.
+    TryGrowing,
+    /// Coarser until the widest spacing fits.
+    Coarsen,
+    Bisect(u8),
+    Times,
+    Increments,
+    Steps,
+    Nodes,
+    Knots,
+    Done,
+}
+
+/// What is varied to fit the nodes.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Vary {
+    Even,
+    Growth,
+    Coarse,
+}
+
+/// The making of a walk.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Walker {
+    stage: Stage,
+    index: u16,
+    /// Least jerk along the path, mm/s^3; greatest acceleration, mm/s^2; greatest speed, mm/s.
+    jerk: f32,
+    acceleration: f32,
+    speed: f32,
+    /// Duration of the acceleration-limited motion, and length of the mean, s.
+    duration: f32,
+    mean_s: f32,
+    intervals: u16,
+    busy: u16,
+    vary: Vary,
+    low: f32,
+    high: f32,
+    /// Spacing at the ends, s.
+    ends: f32,
+    /// Nodes of the unsmoothed walk.
+    times: u16,
+    coarsenings: u8,
+}
+
+/// Lists of this stage.
+const SPEED_SQR: usize = 0;
+const TIME: usize = 1;
+/// Acceleration, negative where the speed is capped below the feed.
+const ACCEL: usize = 2;
+/// Times of busy places; then the steps between nodes.
+const BUSY: usize = 3;
+const NODES: usize = 4;
+
+impl Walker {
+    pub(crate) const IDLE: Self = Self {
+        stage: Stage::Done,
+        index: 0,
+        jerk: 0.0,
+        acceleration: 0.0,
+        speed: 0.0,
+        duration: 0.0,
+        mean_s: 0.0,
+        intervals: 0,
+        busy: 0,
+        vary: Vary::Even,
+        low: 0.0,
+        high: 0.0,
+        ends: 0.0,
+        times: 0,
+        coarsenings: 0,
+    };
+
+    pub(crate) const fn begin(&mut self) {
+        *self = Self::IDLE;
+        self.stage = Stage::Caps;
+        self.jerk = f32::MAX;
+    }
+
+    /// One portion; whether the walk is complete.
+    #[inline(never)]
+    pub(crate) fn work(&mut self, lists: &mut Lists, plan: &mut Plan, limits: &MotionLimits) -> bool {
+        let count = plan.stations.count();
+        self.stage = match self.stage {
+            Stage::Caps => {
+                let end = count.min(self.index + STATIONS_A_PORTION);
+                for station in self.index..end {
+                    self.cap(lists, station, &plan.stations.get(station).q, limits);
+                }
+                self.next(end, end == count, Stage::Caps, Stage::Jumps)
+            }
+            Stage::Jumps => {
+                let mut left = JUMPS_A_PORTION;
+                let mut station = self.index;
+                while station < count && left > 0 {
+                    if plan.stations.is_jump(station) {
+                        self.slow_at_jump(lists, plan, station, limits);
+                        left -= 1;
+                    }
+                    station += 1;
+                }
+                self.next(station, station >= count, Stage::Jumps, Stage::Backwards)
+            }
+            Stage::Backwards => {
+                self.backwards(lists, plan);
+                Stage::Forwards
+            }
+            Stage::Forwards => {
+                self.forwards(lists, plan);
+                Stage::Busy
+            }
+            Stage::Busy => {
+                self.find_busy(lists, plan, limits);
+                Stage::TryEven
+            }
+            Stage::TryEven => {
+                if self.fits(lists, SPACING, 0.0) {
+                    self.vary = Vary::Even;
+                    let least = 0.25 * (self.duration + self.mean_s) / f32::from(self.intervals);
+                    (self.low, self.high) = (least.at_most(SPACING), SPACING);
+                    Stage::Bisect(0)
+                } else {
+                    Stage::TryGrowing
+                }
+            }
+            Stage::TryGrowing => {
+                if self.fits(lists, SPACING, GROWTH) {
+                    self.vary = Vary::Growth;
+                    (self.low, self.high) = (1e-4, GROWTH);
+                    Stage::Bisect(0)
+                } else {
+                    self.vary = Vary::Coarse;
+                    let widest = 8.0 * (self.duration + self.mean_s) / f32::from(self.intervals);
+                    (self.low, self.high) = (SPACING, widest.at_least(SPACING));
+                    Stage::Coarsen
+                }
+            }
+            Stage::Coarsen => {
+                if self.fits(lists, self.high, GROWTH) || self.coarsenings >= COARSENINGS {
+                    Stage::Bisect(0)
+                } else {
+                    self.ends *= 1.5;
+                    self.coarsenings += 1;
+                    Stage::Coarsen
+                }
+            }
+            Stage::Bisect(BISECTIONS..) => Stage::Times,
+            Stage::Bisect(tried) => {
+                let middle = sqrt(self.low * self.high);
+                let [spacing, growth] = self.spacing(middle);
+                if self.fits(lists, spacing, growth) {
+                    self.high = middle;
+                } else {
+                    self.low = middle;
+                }
+                Stage::Bisect(tried + 1)
+            }
+            Stage::Times => {
+                self.times(lists, plan);
+                Stage::Increments
+            }
+            Stage::Increments => {
+                self.increments(lists, plan);
+                Stage::Steps
+            }
+            Stage::Steps => {
+                self.steps(lists, plan);
+                Stage::Nodes
+            }
+            Stage::Nodes => {
+                plan.place_nodes();
+                plan.knot_count = 0;
+                self.next(0, true, Stage::Knots, Stage::Knots)
+            }
+            Stage::Knots => {
+                let end = plan.intervals.min(self.index + KNOTS_A_PORTION);
+                for interval in self.index..end {
+                    find_knots(plan, interval, limits);
+                }
+                self.next(end, end == plan.intervals, Stage::Knots, Stage::Done)
+            }
+            Stage::Done => Stage::Done,
+        };
+        self.stage == Stage::Done
+    }
+
+    const fn next(&mut self, index: u16, is_over: bool, stage: Stage, next: Stage) -> Stage {
+        self.index = if is_over { 0 } else { index };
+        if is_over { next } else { stage }
+    }
+
+    /// Caps of speed and acceleration at a station.
+    fn cap(&mut self, lists: &mut Lists, station: u16, q: &Derivatives, limits: &MotionLimits) {
+        let [first, second, third] = q;
+        let mut square = limits.speed_sqr(q);
+        let mut jerk = f32::MAX;
+        for (((a, j), (first, second)), third) in limits
+            .acceleration
+            .iter()
+            .zip(&limits.jerk)
+            .zip(first.iter().zip(second))
+            .zip(third)
+        {
+            square = square.at_most(0.85 * a / second.abs().at_least(1e-9));
+            let speed = cube_root(0.7 * j / third.abs().at_least(1e-9));
+            square = square.at_most(speed * speed);
+            jerk = jerk.at_most(0.8 * j / first.abs().at_least(SLOPE_MIN));
+        }
+        let speed = sqrt(square);
+        let mut accel = f32::MAX;
+        for (((a, j), first), second) in limits.acceleration.iter().zip(&limits.jerk).zip(first).zip(second) {
+            let bend = second.abs().at_least(1e-9);
+            let left = (a - bend * square).at_least(0.3 * a);
+            accel = accel
+                .at_most(0.7 * left / first.abs().at_least(SLOPE_MIN))
+                .at_most(0.5 * j / (3.0 * bend * speed));
+        }
+        self.jerk = self.jerk.at_most(jerk);
+        self.acceleration = self.acceleration.at_least(accel);
+        self.speed = self.speed.at_least(speed);
+        let is_capped = speed < 0.999 * limits.feed;
+        put(lists, SPEED_SQR, station, square);
+        put(lists, ACCEL, station, if is_capped { -accel } else { accel });
+    }
+
+    /// Bounds the speed around a jump.
+    fn slow_at_jump(&self, lists: &mut Lists, plan: &Plan, jump: u16, limits: &MotionLimits) {
+        let speed = limits.jump_speed(&plan.stations.jump(jump));
+        if speed >= limits.feed {
+            return;
+        }
+        let at = plan.stations.get(jump).arc_nm;
+        let from = jump.saturating_sub(JUMP_STATIONS);
+        let to = plan.stations.count().min(jump + JUMP_STATIONS);
+        for station in from..to {
+            let arc = plan.stations.get(station).arc_nm;
+            let away = if arc < at { between(arc, at) } else { between(at, arc) };
+            let root = cube_root(6.0 * away / self.jerk);
+            let most = speed + 0.5 * self.jerk * root * root;
+            let square = get(lists, SPEED_SQR, station).at_most(most * most);
+            put(lists, SPEED_SQR, station, square);
+        }
+    }
+
+    fn accel(&self, lists: &Lists, cell: u16) -> f32 {
+        let most = sqrt(self.speed * self.jerk);
+        let of = |station| get(lists, ACCEL, station).abs().at_most(most);
+        0.5 * (of(cell) + of(cell + 1))
+    }
+
+    fn backwards(&self, lists: &mut Lists, plan: &Plan) {
+        let last = plan.stations.count().saturating_sub(1);
+        put(lists, SPEED_SQR, 0, 0.0);
+        put(lists, SPEED_SQR, last, 0.0);
+        for cell in (0..last).rev() {
+            let reach = get(lists, SPEED_SQR, cell + 1)
+                + 2.0 * self.accel(lists, cell) * plan.stations.cell_mm(cell);
+            let square = get(lists, SPEED_SQR, cell).at_most(reach);
+            put(lists, SPEED_SQR, cell, square);
+        }
+    }
+
+    /// Accelerations from the start on, times, and what follows from the whole duration.
+    fn forwards(&mut self, lists: &mut Lists, plan: &Plan) {
+        let last = plan.stations.count().saturating_sub(1);
+        let mut time = 0.0;
+        put(lists, TIME, 0, time);
+        for cell in 0..last {
+            let length = plan.stations.cell_mm(cell);
+            let here = get(lists, SPEED_SQR, cell);
+            let reach = here + 2.0 * self.accel(lists, cell) * length;
+            let there = get(lists, SPEED_SQR, cell + 1).at_most(reach);
+            put(lists, SPEED_SQR, cell + 1, there);
+            if length > 0.0 {
+                time += 2.0 * length / (sqrt(here) + sqrt(there)).at_least(1e-6);
+            }
+            put(lists, TIME, cell + 1, time);
+        }
+        self.duration = time;
+        let length = between(0, plan.stations.length_nm());
+        self.mean_s = (self.acceleration / self.jerk)
+            .at_most(1.2 * sqrt(length / time / self.jerk))
+            .at_most(cube_root(0.5 * length / self.jerk));
+        let wanted = u16::try_from(truncated(time / SPACING_WORTH)).unwrap_or(u16::MAX);
+        self.intervals = wanted.clamp(NODES_MIN, NODES_COUNT);
+        self.ends = (self.mean_s / 6.0).at_least(time / (40.0 * f32::from(self.intervals)));
+    }
+
+    /// Times at which something happens.
+    fn find_busy(&mut self, lists: &mut Lists, plan: &Plan, limits: &MotionLimits) {
+        let last = plan.stations.count().saturating_sub(1);
+        let mut top = 0.0;
+        for station in 0..=last {
+            top = get(lists, SPEED_SQR, station).at_least(top);
+        }
+        put(lists, BUSY, 0, 0.0);
+        self.busy = 1;
+        for cell in 0..last {
+            let is_busy = if plan.stations.is_jump(cell) {
+                limits.jump_speed(&plan.stations.jump(cell)) < 1.5 * limits.feed
+            } else {
+                let change = get(lists, SPEED_SQR, cell + 1) - get(lists, SPEED_SQR, cell);
+                let is_capped = get(lists, ACCEL, cell) < 0.0 || get(lists, ACCEL, cell + 1) < 0.0;
+                change.abs() >= 1e-3 * top || is_capped
+            };
+            if is_busy {
+                let middle = 0.5 * (get(lists, TIME, cell) + get(lists, TIME, cell + 1));
+                put(lists, BUSY, self.busy, middle);
+                self.busy += 1;
+            }
+        }
+        put(lists, BUSY, self.busy, self.duration);
+        self.busy += 1;
+    }
+
+    /// Spacing and growth for a value of what is varied.
+    const fn spacing(&self, value: f32) -> [f32; 2] {
+        match self.vary {
+            Vary::Even => [value, 0.0],
+            Vary::Growth => [SPACING, value],
+            Vary::Coarse => [value, GROWTH],
+        }
+    }
+
+    /// Nodes left for the mean over `n` of them.
+    fn room(&self, spacing: f32) -> u16 {
+        let mean = truncated(self.mean_s / spacing.at_most(self.ends) + 0.5).max(2);
+        self.intervals.saturating_sub(u16::try_from(mean).unwrap_or(u16::MAX))
+    }
+
+    fn fits(&self, lists: &Lists, spacing: f32, growth: f32) -> bool {
+        let room = self.room(spacing);
+        let mut nodes = self.nodes_at(spacing, growth);
+        while let Some(_) = nodes.next(lists) {
+            if nodes.count > room {
+                return false;
+            }
+        }
+        true
+    }
+
+    const fn nodes_at(&self, spacing: f32, growth: f32) -> NodeTimes {
+        NodeTimes {
+            walker: *self,
+            spacing,
+            growth,
+            at: 0.0,
+            busy: 1,
+            count: 0,
+        }
+    }
+
+    /// Writes the times of the nodes.
+    fn times(&mut self, lists: &mut Lists, plan: &mut Plan) {
+        let [spacing, growth] = self.spacing(self.high);
+        let mut nodes = self.nodes_at(spacing, growth);
+        let most = self.intervals - 2;
+        let mut last = 0.0;
+        while let Some(time) = nodes.next(lists) {
+            put(lists, NODES, nodes.count - 1, time);
+            last = time;
+            if nodes.count >= most {
+                break;
+            }
+        }
+        self.times = nodes.count;
+        let scale = self.duration / last.at_least(1e-9);
+        for node in 0..self.times {
+            let time = get(lists, NODES, node);
+            put(lists, NODES, node, time * scale);
+        }
+        plan.intervals = self.intervals;
+        plan.step_s = spacing.at_most(self.ends);
+    }
+
+    /// Lengths between the nodes.
+    fn increments(&self, lists: &mut Lists, plan: &Plan) {
+        let last = plan.stations.count().saturating_sub(1);
+        let mut cell = 0;
+        let mut before = (0, 0.0);
+        for node in 1..self.times {
+            let time = get(lists, NODES, node);
+            while cell + 1 < last && get(lists, TIME, cell + 1) <= time {
+                cell += 1;
+            }
+            let place = if node + 1 == self.times {
+                (plan.stations.length_nm(), 0.0)
+            } else {
+                let since = time - get(lists, TIME, cell);
+                let [here, there] = [cell, cell + 1].map(|station| get(lists, SPEED_SQR, station));
+                let length = plan.stations.cell_mm(cell).at_least(1e-7);
+                let moved = since * (sqrt(here) + 0.25 * (there - here) / length * since);
+                (plan.stations.get(cell).arc_nm, moved.at_most(length))
+            };
+            let ((from, from_mm), (to, to_mm)) = (before, place);
+            put(lists, BUSY, node - 1, (between(from, to) + (to_mm - from_mm)).at_least(0.0));
+            before = place;
+        }
+    }
+
+    /// The means over `n` nodes: steps of the walk, and its pace as it is.
+    fn steps(&self, lists: &mut Lists, plan: &mut Plan) {
+        let pairs = self.times - 1;
+        let n = self.intervals - pairs - 1;
+        let inverse = 1.0 / f32::from(n);
+        let h = plan.step_s;
+        let increment = |index: u16| to_q10(get(lists, BUSY, index));
+        let duration = |index: u16| get(lists, NODES, index + 1) - get(lists, NODES, index);
+        let mut sum_q10 = 0;
+        let mut time = f32::from(n) * h;
+        let coefficients = plan.walk.iter_mut().zip(&mut plan.pace);
+        for (index, (walk, pace)) in (0_u16..).zip(coefficients.take(usize::from(self.intervals) + 2)) {
+            // The newest is index - 2, the oldest that leaves is index - 2 - n.
+            if let Some(newest) = index.checked_sub(2).filter(|newest| *newest < pairs) {
+                sum_q10 += increment(newest);
+                time += duration(newest) - h;
+            }
+            if let Some(oldest) = index.checked_sub(2 + n).filter(|oldest| *oldest < pairs) {
+                sum_q10 -= increment(oldest);
+                time += h - duration(oldest);
+            }
+            *walk = to_f32(sum_q10) * super::MM_PER_Q10 * inverse;
+            let mean = time * inverse;
+            let ratio = h / mean.at_least(1e-9);
+            *pace = ratio * ratio;
+        }
+    }
+}
+
+/// Most intervals as u16.
+const NODES_COUNT: u16 = 160;
+const _: () = assert!(NODES_COUNT as usize == NODES_MAX);
+
+/// The times of nodes, one after the other.
+struct NodeTimes {
+    walker: Walker,
+    spacing: f32,
+    growth: f32,
+    at: f32,
+    busy: u16,
+    count: u16,
+}
+
+impl NodeTimes {
+    fn next(&mut self, lists: &Lists) -> Option<f32> {
+        if self.count == 0 {
+            self.count = 1;
+            return Some(0.0);
+        }
+        if self.at >= self.walker.duration {
+            return None;
+        }
+        let now = self.spacing_at(lists, self.at);
+        self.at += self.spacing_at(lists, self.at + 0.5 * now);
+        self.count += 1;
+        Some(self.at)
+    }
+
+    fn spacing_at(&mut self, lists: &Lists, at: f32) -> f32 {
+        let walker = &self.walker;
+        while self.busy + 1 < walker.busy && get(lists, BUSY, self.busy) < at {
+            self.busy += 1;
+        }
+        let before = (at - get(lists, BUSY, self.busy - 1)).abs();
+        let behind = (get(lists, BUSY, self.busy) - at).abs();
+        let away = (before.at_most(behind) - walker.mean_s).at_least(0.0);
+        let widest = SPACING_MAX
+            .at_least(3.0 * walker.duration / f32::from(walker.intervals))
+            .at_least(self.spacing);
+        let there = (self.spacing + self.growth * away).at_most(widest);
+        let from_end = at.at_most(walker.duration - at) - walker.mean_s;
+        there.at_most(self.spacing.at_most(walker.ends) + GROWTH * from_end.at_least(0.0))
+    }
+}
+
+/// Appends the jumps of an interval that matter.
+fn find_knots(plan: &mut Plan, index: u16, limits: &MotionLimits) {
+    let [from, part] = plan.node(index);
+    let [to, _] = plan.node(index + 1);
+    for station in from..to {
+        if usize::from(plan.knot_count) >= KNOTS_MAX || !plan.stations.is_jump(station) {
+            continue;
+        }
+        let [first, second] = limits.jump_jerk(&plan.stations.jump(station));
+        let feed = limits.feed;
+        let matters = |(first, second): (&f32, &f32)| (first + second * feed) * feed > 0.01;
+        if !first.iter().zip(&second).any(matters) {
+            continue;
+        }
+        let arc_of = |station| plan.stations.get(station).arc_nm;
+        let start = f32::from(part) * (1.0 / 65536.0) * plan.stations.cell_mm(from);
+        let away = between(arc_of(from), arc_of(station)) - start;
+        let interval = plan.interval(index);
+        let (mut low, mut high) = (0.0, 1.0);
+        for _ in 0..KNOT_BISECTIONS {
+            let middle = 0.5 * (low + high);
+            if interval.arc(middle) < away {
+                low = middle;
+            } else {
+                high = middle;
+            }
+        }
+        let part = u16::try_from(truncated(low * 65535.0)).unwrap_or(u16::MAX);
+        if let Some(knot) = plan.knots.get_mut(usize::from(plan.knot_count)) {
+            *knot = Knot {
+                interval: index,
+                part,
+                station,
+            };
+            plan.knot_count += 1;
+        }
+    }
+}
+
+fn get(lists: &Lists, list: usize, index: u16) -> f32 {
+    lists
+        .get(list)
+        .and_then(|list| list.get(usize::from(index)))
+        .copied()
+        .unwrap_or(0.0)
+}
+
+fn put(lists: &mut Lists, list: usize, index: u16, value: f32) {
+    if let Some(place) = lists.get_mut(list).and_then(|list| list.get_mut(usize::from(index))) {
+        *place = value;
+    }
+}
