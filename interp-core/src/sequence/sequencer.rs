@@ -1,7 +1,7 @@
 //! The sequence of a job on a machine with limits: approach, passes from standstill to standstill, links, retract.
 //!
-//! While a pass runs, the look-ahead plans the next one, one task per tick ([`Lookahead`]), in ticks with little other work; where the plan is not
-//! complete in time the tool waits at the end of the pass. [`Profile`] computes the motion along every path: a pass, a straight leg off the surface, a step-over along
+//! While a pass runs, [`Sequencer::plan`], a portion after each tick, plans the next one ([`Lookahead`]); where the plan is not complete in time the
+//! tool waits at the end of the pass. [`Profile`] computes the motion along every path: a pass, a straight leg off the surface, a step-over along
 //! the boundary.
 
 use crate::fault::{Fault, Result};
@@ -17,8 +17,13 @@ use crate::sample::{Sample, SpanParameter};
 use crate::sequence::link::{BoundaryStepOver, StraightMove, check_faces_up};
 use crate::sequence::lookahead::{Lookahead, PassPlan, check_travel, top};
 
-/// Look-ahead tasks per tick while the tool waits for the plan.
-const PORTIONS_WAITING: u8 = 2;
+/// The portion of the planning in a period, processor cycles on a Cortex-M4F by the costs below.
+const PORTION_CYCLES: u32 = 30_000;
+/// Greatest cost of a task of the look-ahead that collapses a patch, and of any other, cycles.
+const PATCH_CYCLES: u32 = 6_000;
+const TASK_CYCLES: u32 = 3_000;
+/// Greatest number of tasks in a portion.
+const TASKS_MAX: u32 = PORTION_CYCLES / TASK_CYCLES;
 
 /// Phase of the sequence.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -200,7 +205,7 @@ impl Sequencer {
             Phase::FollowLeg(leg) => self.follow_leg(leg, job, run, share, last)?,
             Phase::StepOver => self.follow_step_over(job, run, share, last)?,
             Phase::AwaitPlan => {
-                self.await_plan(job, axes)?;
+                self.await_plan(job)?;
                 match self.at {
                     Some(at) if !self.on_surface => run.off_surface(at, 0.0, last),
                     _ => run.stand(last),
@@ -230,17 +235,33 @@ impl Sequencer {
         })
     }
 
-    /// Executes tasks of the look-ahead, and enters the next phase when the plan is complete.
+    /// Whether the plan of the next pass is incomplete.
+    pub(crate) const fn has_to_plan(&self) -> bool {
+        self.pending.is_none() && !self.lookahead.is_done()
+    }
+
+    /// The planning of one period: as many tasks of the look-ahead as fit into [`PORTION_CYCLES`].
     #[inline(never)]
-    fn await_plan(&mut self, job: &Job<'_>, axes: &AxisLimits) -> Result<()> {
-        for _ in 0..PORTIONS_WAITING {
-            // Collapsing a patch takes a whole tick.
-            let is_patch = self.lookahead.makes_patch();
-            self.look_ahead(job, axes);
-            if is_patch || self.lookahead.makes_patch() {
-                break;
-            }
+    pub(crate) fn plan(&mut self, job: &Job<'_>, axes: &AxisLimits) {
+        let mut left = PORTION_CYCLES;
+        for _ in 0..TASKS_MAX {
+            let cost = if self.lookahead.makes_patch() {
+                PATCH_CYCLES
+            } else {
+                TASK_CYCLES
+            };
+            let Some(rest) = left.checked_sub(cost).filter(|_| self.has_to_plan()) else {
+                return;
+            };
+            left = rest;
+            let (_, next) = both(&mut self.plans, self.second);
+            self.pending = self.lookahead.work(job, axes, next).err();
         }
+    }
+
+    /// Enters the next phase when the plan is complete.
+    #[inline(never)]
+    fn await_plan(&mut self, job: &Job<'_>) -> Result<()> {
         if let Some(fault) = self.pending {
             return Err(fault);
         }
@@ -257,15 +278,6 @@ impl Sequencer {
             Phase::PlanLeg(Leg::Retract)
         };
         Ok(())
-    }
-
-    /// Executes one task of the look-ahead.
-    fn look_ahead(&mut self, job: &Job<'_>, axes: &AxisLimits) {
-        if self.pending.is_some() || self.lookahead.is_done() {
-            return;
-        }
-        let (_, next) = both(&mut self.plans, self.second);
-        self.pending = self.lookahead.work(job, axes, next).err();
     }
 
     /// Enters the next pass, which begins at the tool's position.
@@ -318,15 +330,11 @@ impl Sequencer {
                 run.finish_pass(job, last)?;
                 true
             } else if moved > 0 && run.is_along() {
-                let is_light = run.move_by(job, as_f32(moved) / period, last)?;
+                run.move_by(job, as_f32(moved) / period, last)?;
                 self.correct_progress(job, run);
-                if is_light {
-                    self.look_ahead(job, axes);
-                }
                 false
             } else {
                 run.stand(last);
-                self.look_ahead(job, axes);
                 false
             }
         };
