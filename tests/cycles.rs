@@ -81,6 +81,7 @@ fn guest_plan() -> Plan {
     Plan {
         base: 0,
         exception: 16 + 28,
+        planning: 16 + 37,
         stack_end: 0x2000_1000,
         stages: vec![Some(Stage::Rest); code.len() / 2],
         starts: Vec::new(),

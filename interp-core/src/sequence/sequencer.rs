@@ -201,7 +201,7 @@ impl Sequencer {
     ) -> Result<Outcome> {
         let was_link = self.is_link();
         match self.phase {
-            Phase::FollowPass => self.follow_pass(job, axes, run, share, last)?,
+            Phase::FollowPass => self.follow_pass(job, run, share, last)?,
             Phase::FollowLeg(leg) => self.follow_leg(leg, job, run, share, last)?,
             Phase::StepOver => self.follow_step_over(job, run, share, last)?,
             Phase::AwaitPlan => {
@@ -307,14 +307,7 @@ impl Sequencer {
         Ok(())
     }
 
-    fn follow_pass(
-        &mut self,
-        job: &Job<'_>,
-        axes: &AxisLimits,
-        run: &mut Run,
-        share: f32,
-        last: &mut Sample,
-    ) -> Result<()> {
+    fn follow_pass(&mut self, job: &Job<'_>, run: &mut Run, share: f32, last: &mut Sample) -> Result<()> {
         let (now, _) = both(&mut self.plans, self.second);
         let period = job.header.feed_mm_s * job.header.period_s * QUANTA_PER_MM;
         let is_over = if now.point {
