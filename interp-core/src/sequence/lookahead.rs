@@ -203,8 +203,10 @@ impl Lookahead {
         out.plan.begin();
         out.pass = pass;
         out.side = side;
-        out.cells_per_patch = (CELLS_WANTED / spans.max(1)).clamp(1, CELLS_PER_PATCH_MAX);
-        out.cell_fraction = u64::MAX / u64::from(out.cells_per_patch);
+        let cells = (CELLS_WANTED / spans.max(1)).clamp(1, CELLS_PER_PATCH_MAX);
+        out.cells_per_patch = cells;
+        // Never zero; checked, so that the division has no panic branch wherever it is inlined.
+        out.cell_fraction = u64::MAX.checked_div(u64::from(cells)).unwrap_or(u64::MAX);
         out.point = false;
         out.next = None;
     }
