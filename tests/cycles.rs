@@ -139,7 +139,10 @@ fn instructions_agree_with_a_counter_in_the_guest() {
     let [ticks @ .., outer] = &records[..] else {
         unreachable!("three records")
     };
-    assert_eq!([false, false, true], [0, 1, 2].map(|index: usize| records[index].is_planning));
+    assert_eq!(
+        [false, false, true],
+        [0, 1, 2].map(|index: usize| records[index].is_planning)
+    );
     // For each call bl, movs, bx, subs, it, addne, cmp, bne; in addition movs, nop, vmul, vadd and the second ldr.
     let work = 8 * guest::CALLS + 5;
     // push and the first ldr; subs, four str, three lsrs, pop.
@@ -477,7 +480,9 @@ fn no_stage_has_grown() {
             assert!(figure.max < PERIOD_CYCLES / 10, "{figure:?}");
         }
         let planning = all.iter().filter(|figure| figure.stage == figures::PLANNING);
-        let planned: Vec<_> = planning.inspect(|figure| assert!(figure.max <= PLANNING_CYCLES_MAX, "{figure:?}")).collect();
+        let planned: Vec<_> = planning
+            .inspect(|figure| assert!(figure.max <= PLANNING_CYCLES_MAX, "{figure:?}"))
+            .collect();
         // Three jobs have limits; two models.
         assert_eq!(planned.len(), 3 * 2, "{planned:?}");
         (all, counts)

@@ -232,16 +232,22 @@ fn scripted(header: &Header, words: &[i32], commands: &[Step]) -> (Vec<Sample>, 
     let mut feed_override = 100;
     for (wait, command, percent) in commands {
         for _ in 0..*wait {
-            samples.push(period(&mut core, Inputs {
-                command: None,
-                feed_override,
-            }));
+            samples.push(period(
+                &mut core,
+                Inputs {
+                    command: None,
+                    feed_override,
+                },
+            ));
         }
         feed_override = *percent;
-        samples.push(period(&mut core, Inputs {
-            command: *command,
-            feed_override,
-        }));
+        samples.push(period(
+            &mut core,
+            Inputs {
+                command: *command,
+                feed_override,
+            },
+        ));
     }
     // Resume, and run to the end.
     samples.push(period(&mut core, Command::Resume));
@@ -250,7 +256,10 @@ fn scripted(header: &Header, words: &[i32], commands: &[Step]) -> (Vec<Sample>, 
         if !state.is_under_way() {
             break;
         }
-        samples.push(period(&mut core, (state == State::Held).then_some(Command::Resume)));
+        samples.push(period(
+            &mut core,
+            (state == State::Held).then_some(Command::Resume),
+        ));
     }
     (samples, core)
 }

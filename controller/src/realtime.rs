@@ -176,24 +176,45 @@ impl<S: AsRef<[i32]> + AsMut<[i32]>> RealTime<S> {
 
     /// One tick of the sample timer. In lockstep time stands still while the queue of events is full, so that none is lost.
     #[inline]
-    pub fn tick(&mut self, mut input: TickInput, events: &mut impl Events) {
-        if self.control.planning != Planning::Complete {
-            input = self.control.late_planning(input);
-        }
+    pub fn tick(&mut self, input: TickInput, events: &mut impl Events) {
         if !self.control.safety.is_unchanged(input.lines) {
             self.guard(input.lines, events);
         }
         let was_under_way = self.interpolator.state().is_under_way();
-        if !self.control.is_in_time(input)
-            && let Some(fault) = self.control.note_time(input)
-            && moves(self.interpolator.state())
-        {
-            self.interpolator.controlled_stop(fault);
+        if !self.control.is_in_time(input) {
+            self.note_time(input);
+        }
+        if self.control.planning != Planning::Complete {
+            self.note_late_planning();
         }
         if self.control.clock == Clock::Lockstep && !self.may_step(events) {
             return;
         }
         self.step(was_under_way, events);
+    }
+
+    /// A missed tick, or one with more cycles than before or than the budget.
+    #[cold]
+    #[inline(never)]
+    fn note_time(&mut self, input: TickInput) {
+        if let Some(fault) = self.control.note_time(input) {
+            self.controlled_stop(fault);
+        }
+    }
+
+    /// A planning that was not complete when this tick was due: a missed deadline. Not in lockstep, where time waits for the planning.
+    #[cold]
+    #[inline(never)]
+    fn note_late_planning(&mut self) {
+        if self.control.clock == Clock::Free {
+            self.note_time(TickInput {
+                missed: 1,
+                ..TickInput::default()
+            });
+        }
+        if self.control.planning == Planning::Late {
+            self.control.planning = Planning::Complete;
+        }
     }
 
     /// A tick with other inputs than the last, or with a link timeout.

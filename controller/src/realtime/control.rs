@@ -108,20 +108,6 @@ impl Control {
         input.missed == 0 && input.cycles <= self.run.tick_cycles_max && input.cycles <= self.tick_budget
     }
 
-    /// The ticks missed before this one, and one more where the planning of the last period missed its deadline. In lockstep a deadline has no
-    /// meaning for the planning, because time waits for it.
-    #[cold]
-    pub(super) fn late_planning(&mut self, input: TickInput) -> TickInput {
-        if self.planning == Planning::Late {
-            self.planning = Planning::Complete;
-        }
-        let late = u32::from(self.clock == Clock::Free);
-        TickInput {
-            missed: input.missed.saturating_add(late),
-            ..input
-        }
-    }
-
     /// Records misses and cycles; returns their fault while the tool moves on a free clock.
     #[cold]
     pub(super) fn note_time(&mut self, input: TickInput) -> Option<Fault> {

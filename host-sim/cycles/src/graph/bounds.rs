@@ -99,7 +99,7 @@ const BOUNDS: &[(&str, u32, &str)] = &[
     ),
     (
         "interp_core::sequence::sequencer::Sequencer::plan",
-        10,
+        16,
         "tasks of the look-ahead in a period: TASKS_MAX",
     ),
     (
