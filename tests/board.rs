@@ -2,6 +2,7 @@
 //! disturbance on the line changes them.
 
 mod disorder;
+mod planning;
 mod steps;
 
 use controller::{

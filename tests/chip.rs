@@ -12,7 +12,7 @@ use std::path::Path;
 
 use boards::{Board, SKR_PRO, STM32F405};
 
-use emulated::{CYCLES_US, Emulated, Job, RESET_CYCLES_US, REST_US, sim, workspace};
+use emulated::{CYCLES_US, Emulated, Job, PERIOD, RESET_CYCLES_US, REST_US, sim, workspace};
 
 #[test]
 fn the_images_boot_as_their_registers_say() {
@@ -63,7 +63,9 @@ fn without_a_crystal_everything_stays_at_rest() {
 /// Runs a whole sample job over the line: every sample equal to the host's, no byte lost, no tick late.
 fn whole(board: &'static Board, name: &str, home: &str, seed: &str) {
     let emulated = Emulated::start(board, &["--seed", seed]);
-    let (done, said) = emulated.run(&Job::sample(name, &[]).path, home);
+    let path = Job::sample(name, &[]).path;
+    let has_limits = job_file::load(&path).unwrap().machine.has_limits();
+    let (done, said) = emulated.run(&path, home);
     let ended = emulated.end();
     assert!(
         done && said.contains("bit for bit the same"),
@@ -75,13 +77,24 @@ fn whole(board: &'static Board, name: &str, home: &str, seed: &str) {
     assert_eq!(ended.number("resets"), 0);
     let (tick, receive) = (&ended.report["tim2"], &ended.report["usart1"]);
     println!(
-        "{}, {name}: {tick}; {receive}; {} cycles",
-        board.id, ended.report["byte_wait_max_cycles"]
+        "{}, {name}: {tick}; {receive}; {}; {} cycles",
+        board.id, ended.report["exti0"], ended.report["byte_wait_max_cycles"]
     );
-    // Only the receive interrupt and a critical section of the idle task delay a tick.
+    // Only the receive interrupt and a critical section of the idle task delay a tick; the planning is over long before.
     assert!(
         tick["latency_max_cycles"].as_u64().unwrap() < 10 * CYCLES_US,
         "{tick}"
+    );
+    // The planning waits for the tick that pends it, and takes a fifth of the period at most, with the bytes that are received meanwhile.
+    let planning = &ended.report["exti0"];
+    assert_eq!(
+        planning["count"].as_u64().unwrap() > 100,
+        has_limits,
+        "{planning}"
+    );
+    assert!(
+        planning["longest_cycles"].as_u64().unwrap() < PERIOD / 5,
+        "{planning}"
     );
 }
 

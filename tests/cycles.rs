@@ -16,7 +16,7 @@ use cycle_plugin::record::{RECORD_BYTES, Record};
 use cycles::search::search;
 use cycles::session::MeasurementSession;
 use cycles::{
-    PERIOD_CYCLES, SURFACES, figures, figures::Figure, golden, graph, image, operations,
+    PERIOD_CYCLES, PLANNING_CYCLES_MAX, SURFACES, figures, figures::Figure, golden, graph, image, operations,
     operations::Operations,
 };
 use machine::prepare::prepare;
@@ -81,6 +81,7 @@ fn guest_plan() -> Plan {
     Plan {
         base: 0,
         exception: 16 + 28,
+        planning: 16 + 37,
         stack_end: 0x2000_1000,
         stages: vec![Some(Stage::Rest); code.len() / 2],
         starts: Vec::new(),
@@ -112,9 +113,9 @@ fn run_guest(folder: &Path) -> (Vec<u32>, Vec<Record>) {
             bytes.extend_from_slice(&some[..count]);
         }
     }
-    // The plugin writes the second record at the first instruction after the handler.
+    // The plugin writes a record at the first instruction after its handler: those of the two ticks, and that of the handler that they preempt.
     let mut records = Vec::new();
-    while records.len() < 2 * RECORD_BYTES && Instant::now() < deadline {
+    while records.len() < 3 * RECORD_BYTES && Instant::now() < deadline {
         records = std::fs::read(path("records")).unwrap();
         std::thread::sleep(Duration::from_millis(5));
     }
@@ -134,7 +135,14 @@ fn instructions_agree_with_a_counter_in_the_guest() {
     std::fs::create_dir_all(&folder).unwrap();
     let (counted, records) = run_guest(&folder);
     std::fs::remove_dir_all(&folder).unwrap();
-    assert_eq!((counted.len(), records.len()), (2, 2));
+    assert_eq!((counted.len(), records.len()), (2, 3));
+    let [ticks @ .., outer] = &records[..] else {
+        unreachable!("three records")
+    };
+    assert_eq!(
+        [false, false, true],
+        [0, 1, 2].map(|index: usize| records[index].is_planning)
+    );
     // For each call bl, movs, bx, subs, it, addne, cmp, bne; in addition movs, nop, vmul, vadd and the second ldr.
     let work = 8 * guest::CALLS + 5;
     // push and the first ldr; subs, four str, three lsrs, pop.
@@ -144,7 +152,7 @@ fn instructions_agree_with_a_counter_in_the_guest() {
     // Entry, exit; push 4, ldr 2, movs, nop; vmul, vadd, ldr 2, subs; four str, three lsrs, pop 4. The cycles of the pop's
     // branch belong to the exit.
     let nominal = 24 + (4 + 2 + 1 + 1) + calls + (1 + 1 + 2 + 1) + (4 + 3 + 4);
-    for (record, counted) in records.iter().zip(counted) {
+    for (record, counted) in ticks.iter().zip(counted) {
         assert_eq!(counted, work);
         assert_eq!((record.instructions, record.unknown), (work + around, 0));
         let cycles: u32 = record.stages.iter().map(|cycles| cycles.nominal).sum();
@@ -155,8 +163,22 @@ fn instructions_agree_with_a_counter_in_the_guest() {
         assert_eq!(exception, 24 + 5 + 5 + 2 * 17);
     }
     // Between the two ticks: dsb, isb, movs, 100 times subs and bne, str.
-    assert_eq!(records[1].elsewhere, 2 + 1 + 2 * 100 + 1);
+    let between = 2 + 1 + 2 * 100 + 1;
+    assert_eq!(ticks[1].elsewhere, between);
+    // The handler that they preempt stands for the planning: push, movs, ten times subs and bne, mov, str; between; dsb, isb, pop. No
+    // instruction of the ticks, but an entry and an exit of its own.
+    let own = (2 + 2 * 10 + 2) + between + 3;
+    assert_eq!((outer.instructions, outer.elsewhere), (own, 0));
+    // push 3, movs, ten times subs 1 and bne 2 but the last 1, mov, str; movs, the second loop, str; four barriers; pop 3.
+    let cycles: u32 = outer.stages.iter().map(|cycles| cycles.nominal).sum();
+    assert_eq!(
+        cycles,
+        24 + (3 + 1 + 29 + 1 + 1) + (1 + 299 + 1) + 4 * BARRIER + 3
+    );
 }
+
+/// Cycles of a barrier in both models.
+const BARRIER: u32 = 4;
 
 /// The account without QEMU: cycles of a taken and of an untaken branch.
 #[test]
@@ -367,7 +389,7 @@ fn a_tail_call_keeps_the_stage() {
     assert_eq!(record.stages[Stage::PassChange as usize].nominal, 6);
 }
 
-/// Every loop of the sample task has a documented bound, no function of it panics, and the stack bound derived from the
+/// Every loop of the sample task and of the planning task has a documented bound, no function of them panics, and the stack bound derived from the
 /// image fits into the RAM that is left.
 #[test]
 fn the_image_is_bounded() {
@@ -381,7 +403,13 @@ fn the_image_is_bounded() {
         "loops without a bound in host-sim/cycles/src/graph/bounds.rs: {unbounded:#?}"
     );
     assert_eq!(analysis.stale(), [""; 0], "bounds without a loop");
-    assert_eq!(analysis.panics(), [""; 0], "in the sample task");
+    assert_eq!(analysis.panics(), [""; 0], "in a real-time task");
+    for name in ["Sequencer::tick", "Sequencer::plan", "Lookahead::work"] {
+        assert!(
+            analysis.task.iter().any(|function| function.ends_with(name)),
+            "{name} is not followed"
+        );
+    }
     let sizes = image::sizes(path).unwrap();
     assert!(u64::from(analysis.stack_bytes()) < sizes.stack_room);
 }
@@ -451,6 +479,12 @@ fn no_stage_has_grown() {
         for figure in all.iter().filter(|figure| figure.stage == "pulses") {
             assert!(figure.max < PERIOD_CYCLES / 10, "{figure:?}");
         }
+        let planning = all.iter().filter(|figure| figure.stage == figures::PLANNING);
+        let planned: Vec<_> = planning
+            .inspect(|figure| assert!(figure.max <= PLANNING_CYCLES_MAX, "{figure:?}"))
+            .collect();
+        // Three jobs have limits; two models.
+        assert_eq!(planned.len(), 3 * 2, "{planned:?}");
         (all, counts)
     });
 }
@@ -470,6 +504,9 @@ fn check_search(jobs: u32, limits: bool) {
     let found = &result.elite[0];
     let cycles = figures::tick_cycles(&found.worst.record, figures::Model::Pessimistic);
     assert!(cycles < PERIOD_CYCLES / 10, "{cycles} cycles: {found:?}");
+    let planning = session.planning_cycles_max();
+    assert_eq!(planning > 0, limits);
+    assert!(planning <= PLANNING_CYCLES_MAX, "{planning} cycles of planning");
     let analysis = graph::analyse(images::for_qemu()).unwrap();
     assert!(
         session.stack_bytes() <= analysis.stack_bytes(),

@@ -36,6 +36,13 @@ fn machine(header: &Header, words: &[i32]) -> Box<Interpolator> {
     core
 }
 
+/// One period: the tick, then the planning.
+fn period(core: &mut Interpolator, inputs: impl Into<Inputs>) -> Sample {
+    core.tick(inputs);
+    core.plan();
+    *core.last()
+}
+
 /// Differences of the emitted positions over the limits, in every state.
 #[derive(Default)]
 struct Use {
@@ -105,11 +112,11 @@ fn height(header: &Header, words: &[i32]) -> (i32, u32) {
         words,
     );
     let (mut top, mut passes) = (i32::MIN, 0);
-    let mut sample = *core.tick(Command::Start);
+    let mut sample = period(&mut core, Command::Start);
     while sample.state == State::Running {
         top = top.max(sample.cl_nm[2]);
         passes = sample.pass + 1;
-        sample = *core.tick(None);
+        sample = period(&mut core, None);
     }
     assert_eq!(sample.state, State::Finished);
     (top, passes)
@@ -128,12 +135,12 @@ fn check_sample_job(name: &str, times: f32, pattern: Pattern, machine_of: fn(i32
     let axes = header.axes.as_ref().unwrap();
     let mut core = machine(&header, &prepared.words);
     let mut used = Use::default();
-    let mut sample = *core.tick(Command::Start);
+    let mut sample = period(&mut core, Command::Start);
     let mut last_pass = 0;
     while sample.state.is_under_way() {
         used.add(&sample, axes);
         last_pass = sample.pass;
-        sample = *core.tick(Inputs::default());
+        sample = period(&mut core, Inputs::default());
     }
     let what = format!("{name} {times} {pattern:?}");
     println!(
@@ -221,29 +228,38 @@ type Step = (u32, Option<Command>, u8);
 /// Runs a job with these commands, the wait of each counted from the one before. Returns all samples, and the core.
 fn scripted(header: &Header, words: &[i32], commands: &[Step]) -> (Vec<Sample>, Box<Interpolator>) {
     let mut core = machine(header, words);
-    let mut samples = vec![*core.tick(Command::Start)];
+    let mut samples = vec![period(&mut core, Command::Start)];
     let mut feed_override = 100;
     for (wait, command, percent) in commands {
         for _ in 0..*wait {
-            samples.push(*core.tick(Inputs {
-                command: None,
-                feed_override,
-            }));
+            samples.push(period(
+                &mut core,
+                Inputs {
+                    command: None,
+                    feed_override,
+                },
+            ));
         }
         feed_override = *percent;
-        samples.push(*core.tick(Inputs {
-            command: *command,
-            feed_override,
-        }));
+        samples.push(period(
+            &mut core,
+            Inputs {
+                command: *command,
+                feed_override,
+            },
+        ));
     }
     // Resume, and run to the end.
-    samples.push(*core.tick(Command::Resume));
+    samples.push(period(&mut core, Command::Resume));
     for _ in 0..100_000 {
         let state = core.state();
         if !state.is_under_way() {
             break;
         }
-        samples.push(*core.tick((state == State::Held).then_some(Command::Resume)));
+        samples.push(period(
+            &mut core,
+            (state == State::Held).then_some(Command::Resume),
+        ));
     }
     (samples, core)
 }
@@ -413,25 +429,25 @@ proptest! {
 fn hold_and_resume() {
     let (header, words, _) = undisturbed(dome_within_limits(Pattern::Zig));
     let mut core = machine(&header, &words);
-    core.tick(Command::Start);
+    period(&mut core, Command::Start);
     while core.state() != State::Running {
-        core.tick(None);
+        period(&mut core, None);
     }
     for _ in 0..500 {
-        core.tick(None);
+        period(&mut core, None);
     }
-    assert_eq!(core.tick(Command::Hold).state, State::Holding);
+    assert_eq!(period(&mut core, Command::Hold).state, State::Holding);
     let mut ticks = 0;
-    while core.tick(None).state == State::Holding {
+    while period(&mut core, None).state == State::Holding {
         ticks += 1;
     }
     // v/a + a/J: 40 + 50 ms along x, and up to twice as long on slopes where the limits of z decide.
     assert!((50..250).contains(&ticks), "{ticks}");
     let held = *core.last();
     for _ in 0..100 {
-        assert_eq!(core.tick(None).cl_nm, held.cl_nm);
+        assert_eq!(period(&mut core, None).cl_nm, held.cl_nm);
     }
-    assert_eq!(core.tick(Command::Resume).state, State::Running);
+    assert_eq!(period(&mut core, Command::Resume).state, State::Running);
 }
 
 /// A stop retracts from the surface, an abort stays on it; the next start begins from the position reached.
@@ -441,16 +457,16 @@ fn stop_and_abort() {
     let safe = header.axes.unwrap().safe_z_nm;
     for (request, leaves) in [(Command::Stop, true), (Command::Abort, false)] {
         let mut core = machine(&header, &words);
-        core.tick(Command::Start);
+        period(&mut core, Command::Start);
         for _ in 0..3000 {
-            core.tick(None);
+            period(&mut core, None);
         }
-        core.tick(request);
-        while core.tick(None).state == State::Stopping {}
+        period(&mut core, request);
+        while period(&mut core, None).state == State::Stopping {}
         assert_eq!(core.state(), State::Ready);
         assert_eq!(core.last().cl_nm[2] == safe, leaves);
-        core.tick(Command::Start);
-        while core.tick(None).state.is_under_way() {}
+        period(&mut core, Command::Start);
+        while period(&mut core, None).state.is_under_way() {}
         assert_eq!(core.state(), State::Finished);
     }
 }
@@ -462,10 +478,10 @@ fn soft_limits_stop_before_the_pass() {
     let axes = header.axes.as_mut().unwrap();
     axes.travel_nm[1][1] = 10_000_000;
     let mut core = machine(&header, &words);
-    let mut sample = *core.tick(Command::Start);
+    let mut sample = period(&mut core, Command::Start);
     while sample.state.is_under_way() {
         assert!(sample.cl_nm[1] <= 10_000_000);
-        sample = *core.tick(None);
+        sample = period(&mut core, None);
     }
     assert_eq!(core.fault().unwrap().kind, FaultKind::SoftLimit);
 }
@@ -479,9 +495,9 @@ fn a_surface_that_faces_down_is_refused() {
         interp_core::ToolSide::Minus => interp_core::ToolSide::Plus,
     };
     let mut core = machine(&header, &words);
-    let mut sample = *core.tick(Command::Start);
+    let mut sample = period(&mut core, Command::Start);
     while sample.state.is_under_way() {
-        sample = *core.tick(None);
+        sample = period(&mut core, None);
     }
     assert_eq!(core.fault().unwrap().kind, FaultKind::LinkBlocked);
     assert_eq!(sample.cl_nm, header.axes.unwrap().home_nm);

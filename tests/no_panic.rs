@@ -1,11 +1,11 @@
-//! No panic is reachable from the sample task; `firmware/no-panic` describes how the linker proves it. The test links the
-//! image, and as a control links it with a panic in the task, which must fail with the name of the missing function.
+//! No panic is reachable from the sample task and the planning task; `firmware/no-panic` describes how the linker proves it. The test links the
+//! image, and as controls links it with a panic in either task, which must fail with the name of the missing function.
 
 use std::path::Path;
 use std::process::{Command, Output};
 
 /// The linker's message for a reachable panic.
-const MISSING: &str = "a_panic_can_be_reached_from_the_sample_task";
+const MISSING: &str = "a_panic_can_be_reached_from_a_real_time_task";
 
 /// Builds the image in the target folder of the image for QEMU, to share its crates.
 fn link(features: &str) -> Output {
@@ -23,13 +23,15 @@ fn link(features: &str) -> Output {
 }
 
 #[test]
-fn the_sample_task_links_without_a_panic_and_the_control_does_not() {
+fn the_real_time_tasks_link_without_a_panic_and_the_controls_do_not() {
     let proof = link("");
     let said = String::from_utf8_lossy(&proof.stderr);
     assert!(proof.status.success(), "{said}");
 
-    let control = link("with-a-panic");
-    let said = String::from_utf8_lossy(&control.stderr);
-    assert!(!control.status.success(), "the control links");
-    assert!(said.contains(MISSING), "it fails otherwise: {said}");
+    for feature in ["with-a-panic", "with-a-panic-in-planning"] {
+        let control = link(feature);
+        let said = String::from_utf8_lossy(&control.stderr);
+        assert!(!control.status.success(), "the control {feature} links");
+        assert!(said.contains(MISSING), "{feature} fails otherwise: {said}");
+    }
 }

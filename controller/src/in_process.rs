@@ -128,13 +128,19 @@ impl<const WORDS: usize> Board<WORDS> {
         }
     }
 
-    /// One tick of the sample timer; its events are then written to the line.
+    /// One tick of the sample timer and the planning after it; the events are then written to the line.
     pub fn tick(&mut self) {
         self.tick_with(0, 0);
     }
 
-    /// One tick of the sample timer with the number of ticks missed before it and the cycles of the previous tick.
+    /// One tick of the sample timer with the number of ticks missed before it and the cycles of the previous tick, and the planning after it.
     pub fn tick_with(&mut self, missed: u32, cycles: u32) {
+        self.tick_without_planning(missed, cycles);
+        self.half.real_time.plan();
+    }
+
+    /// The same, but the planning does not get to run.
+    pub fn tick_without_planning(&mut self, missed: u32, cycles: u32) {
         let mut events = Vec::new();
         if let Some(command) = self.half.commands.pop_front() {
             self.half.real_time.obey(command, &mut events);

@@ -1,9 +1,9 @@
 //! The hardware-independent logic of the board, so that the firmware and host tests run the same code.
 //!
 //! ```text
-//!            idle, or a low-priority task          |        sample timer, one call a period
+//!            idle, or a low-priority task          |        sample timer, one call a period; planning, one call after each
 //!                                                  |
-//!  bytes ──► Link ── Instruction ──────────────────┼──queue──► RealTime ──► Interpolator::tick
+//!  bytes ──► Link ── Instruction ──────────────────┼──queue──► RealTime ──► Interpolator::tick, plan
 //!             │ └──── load_.., status (lock) ──────┼─────────►    │
 //!  bytes ◄── Link ◄── Event ───────────────────────┼──queue───────┘
 //! ```

@@ -1,11 +1,14 @@
-//! The real-time half: one call per tick of the sample timer.
+//! The real-time half: one call per tick of the sample timer, and one for the planning after each.
 //!
-//! **Bound.** One [`Interpolator::tick`], a digest of 17 words (about 125 cycles on a Cortex-M4), no loop.
+//! **Bound.** A tick: one [`Interpolator::tick`], a digest of 17 words (about 125 cycles on a Cortex-M4), no loop. The planning: one
+//! [`Interpolator::plan`].
 //! **Cost.** Rare cases (commands, misses, ends of passes and runs) are separate functions: a tick in the middle of a
 //! pass copies no data and creates no event except the sample, if the host requested samples.
 //! **Missed tick.** Counted; on a free clock while the tool moves it stops the run with
 //! [`FaultKind::DeadlineMissed`], because the tool stopped for a period in which the feed was commanded. The run stops
 //! along the path ([`Interpolator::controlled_stop`]).
+//! **Late planning.** The planning of a period that is not complete when the next sample is due counts as a missed tick and stops the run in the
+//! same way. In lockstep the next period waits for it.
 //! **Tick over budget.** The next tick reads its cycles and stops the run with [`FaultKind::TickOverBudget`] in the
 //! same way, before ticks are missed.
 //! **Inputs.** Evaluated in every tick of the timer, in lockstep also between periods; see [`crate::safety`].
@@ -24,7 +27,10 @@ use interp_core::{
 };
 use protocol::message::{Clock, FaultReport, InputLines, Report, ResetCause, Status};
 
-use self::{control::Control, run::RunRecord};
+use self::{
+    control::{Control, Planning},
+    run::RunRecord,
+};
 use crate::{
     machine::{Event, Events, Instruction},
     safety::Stop,
@@ -175,16 +181,40 @@ impl<S: AsRef<[i32]> + AsMut<[i32]>> RealTime<S> {
             self.guard(input.lines, events);
         }
         let was_under_way = self.interpolator.state().is_under_way();
-        if !self.control.is_in_time(input)
-            && let Some(fault) = self.control.note_time(input)
-            && moves(self.interpolator.state())
-        {
-            self.interpolator.controlled_stop(fault);
+        if !self.control.is_in_time(input) {
+            self.note_time(input);
+        }
+        if self.control.planning != Planning::Complete {
+            self.note_late_planning();
         }
         if self.control.clock == Clock::Lockstep && !self.may_step(events) {
             return;
         }
         self.step(was_under_way, events);
+    }
+
+    /// A missed tick, or one with more cycles than before or than the budget.
+    #[cold]
+    #[inline(never)]
+    fn note_time(&mut self, input: TickInput) {
+        if let Some(fault) = self.control.note_time(input) {
+            self.controlled_stop(fault);
+        }
+    }
+
+    /// A planning that was not complete when this tick was due: a missed deadline. Not in lockstep, where time waits for the planning.
+    #[cold]
+    #[inline(never)]
+    fn note_late_planning(&mut self) {
+        if self.control.clock == Clock::Free {
+            self.note_time(TickInput {
+                missed: 1,
+                ..TickInput::default()
+            });
+        }
+        if self.control.planning == Planning::Late {
+            self.control.planning = Planning::Complete;
+        }
     }
 
     /// A tick with other inputs than the last, or with a link timeout.
@@ -231,10 +261,34 @@ impl<S: AsRef<[i32]> + AsMut<[i32]>> RealTime<S> {
         self.control.clock == Clock::Lockstep && (self.control.credit > 0 || self.control.spent)
     }
 
+    /// Whether the planning of the last period is due: [`Self::plan`] is then to be called before the next tick.
+    #[must_use]
+    #[inline]
+    pub const fn has_to_plan(&self) -> bool {
+        matches!(self.control.planning, Planning::Due)
+    }
+
+    /// The planning of the last period, from a task of lower priority than the tick's; see [`Interpolator::plan`]. Once a period: does nothing where
+    /// it is complete.
+    #[inline]
+    pub fn plan(&mut self) {
+        if self.has_to_plan() {
+            self.control.planning = Planning::Complete;
+            self.interpolator.plan();
+        }
+    }
+
+    /// Reports that the next sample was due before the planning was complete; the next tick counts it as a missed one.
+    #[cold]
+    pub const fn planning_was_late(&mut self) {
+        self.control.planning = Planning::Late;
+    }
+
     /// In lockstep: whether a period passes in this tick.
     #[inline]
     fn may_step(&mut self, events: &mut impl Events) -> bool {
-        if core::mem::take(&mut self.control.obeyed) || !events.has_room() {
+        let waits = self.control.planning == Planning::Due || !events.has_room();
+        if core::mem::take(&mut self.control.obeyed) || waits {
             return false;
         }
         if core::mem::take(&mut self.control.spent) {
@@ -261,6 +315,11 @@ impl<S: AsRef<[i32]> + AsMut<[i32]>> RealTime<S> {
             feed_override: self.control.safety.status().feed_override,
         };
         let state = self.interpolator.tick(inputs).state;
+        self.control.planning = if self.interpolator.has_to_plan() {
+            Planning::Due
+        } else {
+            Planning::Complete
+        };
         if moves(state) {
             self.count_sample(events);
         }
@@ -363,7 +422,7 @@ impl<S: AsRef<[i32]> + AsMut<[i32]>> RealTime<S> {
         self.control.safety.drives_on()
     }
 
-    /// Whether a tick feeds the watchdog: it ended before the next one, and within its budget.
+    /// Whether a tick feeds the watchdog: it ended before the next one, and within its budget. A planning that never ends lets no tick pass.
     #[must_use]
     #[inline]
     pub const fn feeds_watchdog(&self, missed: u32, cycles: u32) -> bool {

@@ -1,14 +1,16 @@
-//! The firmware: three tasks around the machine.
+//! The firmware: four tasks around the machine.
 //!
 //! ```text
 //!  priority 3   receive   USART1, every byte      port ──► bytes
 //!  priority 2   sample    TIM2, every period      commands ──► RealTime::tick ──► events
+//!  priority 1   plan      EXTI0, after a sample   RealTime::plan
 //!  priority 0   idle      when nothing else is    bytes ──► Link ──► commands;   events ──► Link ──► port
 //! ```
 //!
 //! Tasks communicate through queues of fixed capacity with one writer and one reader. The
-//! machine itself is shared by `sample`, which gets it without a lock, and `idle`, which locks it for one
-//! short call at a time ([`guarded_machine`]). No lock delays `receive`, which shares no data. The tool path is computed in
+//! machine itself is shared by `sample`, which gets it without a lock, `plan`, which locks it for the planning of a period, and `idle`, which locks
+//! it for one short call at a time ([`guarded_machine`]). The planning follows the sample that pended it, and takes a fifth of the period at most, so
+//! that its lock delays a sample only where it is late, which is a fault. No lock delays `receive`, which shares no data. The tool path is computed in
 //! `interp-core`; requests are handled in `controller`; board-specific code is in
 //! [`board`].
 #![no_std]
@@ -18,6 +20,7 @@ mod board;
 mod design_parameters;
 mod drivers;
 mod guarded_machine;
+mod plan_task;
 mod sample_task;
 mod watch;
 
@@ -59,6 +62,7 @@ mod app {
             watchdog::Watchdog,
         },
         guarded_machine::{BoardRealTime, GuardedMachine},
+        plan_task,
         sample_task::{Guards, SampleTask},
         watch::Watch,
     };
@@ -188,6 +192,23 @@ mod app {
             .shared
             .real_time
             .lock(|real_time| task.tick(real_time, guards, output));
+    }
+
+    /// The planning of the period, ahead of the tool. `sample` pends it, if there is anything to plan.
+    ///
+    /// | | |
+    /// |---|---|
+    /// | priority | 1: `receive` interrupts it, and `sample` until it has locked the machine |
+    /// | period | 1 ms, after the sample |
+    /// | worst case | 30 000 cycles, 18 % of the period; see `cargo sim budget` |
+    /// | a miss | the next sample is due before the end: counted, reported, and a fault of the run (`deadline-missed`), which stops along the path; in lockstep time waits |
+    /// | a panic | cannot be reached: `firmware/no-panic` does not link otherwise |
+    #[task(binds = EXTI0, priority = 1, shared = [real_time])]
+    fn plan(mut context: plan::Context) {
+        context
+            .shared
+            .real_time
+            .lock(|real_time| plan_task::plan(real_time));
     }
 
     /// Reads a byte from the port.

@@ -9,13 +9,16 @@ use controller::{
 };
 use heapless::spsc::{Consumer, Producer};
 
-use crate::drivers::{
-    cycle_counter::CycleCounter,
-    drive_enable::{DriveEnable, WritePorts},
-    safety_inputs::{ReadPorts, SafetyInputs},
-    sample_timer::SampleTimer,
-    step_output::StepDriver,
-    watchdog::{Registers, Watchdog},
+use crate::{
+    drivers::{
+        cycle_counter::CycleCounter,
+        drive_enable::{DriveEnable, WritePorts},
+        safety_inputs::{ReadPorts, SafetyInputs},
+        sample_timer::SampleTimer,
+        step_output::StepDriver,
+        watchdog::{Registers, Watchdog},
+    },
+    plan_task,
 };
 
 /// The safety peripherals: inputs, drive enables, watchdog. Separate from the task, because in one structure with them the compiler
@@ -100,6 +103,7 @@ impl SampleTask {
         if real_time.feeds_watchdog(self.missed, self.cycles) {
             guards.watchdog.feed();
         }
+        plan_task::pend(real_time);
     }
 }
 

@@ -25,6 +25,7 @@ int main(void) {
     if (fault == 0) {
         fault = isofeed_tick(machine, ISOFEED_START, 100, &sample);
         while (fault == 0 && sample.state == ISOFEED_RUNNING) {
+            isofeed_plan(machine);
             fault = isofeed_tick(machine, ISOFEED_NONE, 100, &sample);
         }
     }

@@ -28,5 +28,7 @@ void isofeed_free(isofeed *machine);
 int32_t isofeed_patch(const double coefficients[3][4][4], int32_t words[ISOFEED_PATCH_WORDS]);
 int32_t isofeed_load(isofeed *machine, const isofeed_header *header, const int32_t *words, size_t count);
 int32_t isofeed_tick(isofeed *machine, uint8_t command, uint8_t override_percent, isofeed_sample *sample);
+/* Once after each tick and before the next: 1 where there was something to plan, 0 where not, -1 for a wrong argument. */
+int32_t isofeed_plan(isofeed *machine);
 
 #endif

@@ -165,3 +165,18 @@ pub unsafe extern "C" fn isofeed_tick(
     };
     code(machine.0.fault().map_or(Ok(()), Err))
 }
+
+/// The planning of the period, once after each tick and before the next, in a task of lower priority. 1 where there was something to plan, else 0.
+///
+/// # Safety
+/// `machine` came from [`isofeed_new`].
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn isofeed_plan(machine: *mut Machine) -> i32 {
+    // SAFETY: by the function's contract; null is turned away.
+    let Some(machine) = (unsafe { machine.as_mut() }) else {
+        return BAD_ARGUMENT;
+    };
+    let has_to_plan = machine.0.has_to_plan();
+    machine.0.plan();
+    i32::from(has_to_plan)
+}

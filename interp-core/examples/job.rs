@@ -27,6 +27,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     machine.load_finish()?;
     let mut sample = *machine.tick(Command::Start);
     while sample.state == State::Running {
+        machine.plan(); // in what is left of the period: plans ahead
         sample = *machine.tick(None); // once a period: sample.cl_nm is the ball's centre for the axes
     }
     println!(

@@ -48,6 +48,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
             // Half the feed for the first two seconds, then a tenth more than programmed.
             feed_override: if sample.tick < 2_000 { 50 } else { 110 },
         };
+        machine.plan(); // once after each tick, on a board from a task of lower priority
         sample = *machine.tick(inputs);
         held += u32::from(sample.state == State::Held);
         if sample.state == State::Running {

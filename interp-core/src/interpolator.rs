@@ -1,4 +1,4 @@
-//! The machine: load, tick, hold, resume, abort.
+//! The machine: load, tick, plan, hold, resume, abort.
 
 use crate::command::{Command, Inputs};
 use crate::fault::{Fault, FaultKind, Result};
@@ -203,10 +203,28 @@ impl<S: AsRef<[i32]> + AsMut<[i32]>> Interpolator<S> {
     ///
     /// While the job runs, each call yields a sample with [`State::Running`] or [`State::Stopping`], counted by its `tick` from 0;
     /// the one after the last has [`State::Finished`]. In every state at standstill the sample repeats the last position.
+    ///
+    /// A job with axis limits also needs [`Self::plan`], once after each tick: without it the tool waits at the start of a pass for ever.
     #[inline(always)]
     pub fn tick(&mut self, inputs: impl Into<Inputs>) -> &Sample {
         self.motion.tick(self.store.as_ref(), inputs.into());
         &self.motion.last
+    }
+
+    /// Whether [`Self::plan`] has anything to do in this period: a job with axis limits is under way, and a pass ahead of the tool is not planned.
+    #[must_use]
+    #[inline]
+    pub const fn has_to_plan(&self) -> bool {
+        self.motion.has_to_plan()
+    }
+
+    /// The planning of one period: a fixed portion of work, at most 30 000 cycles of a Cortex-M4F. To be called once after each tick and before the
+    /// next, on a board from a task of lower priority than the tick's. The samples depend on the number of calls between two ticks: with one after each,
+    /// they are the same on every machine. Does nothing where [`Self::has_to_plan`] is false. A fault of the surface ahead is reported by the tick that
+    /// reaches it.
+    #[inline(always)]
+    pub fn plan(&mut self) {
+        self.motion.plan(self.store.as_ref());
     }
 }
 
@@ -322,6 +340,30 @@ impl Motion {
             }
         }
         self.last.state = self.state;
+    }
+
+    const fn has_to_plan(&self) -> bool {
+        self.program.header().axes.is_some()
+            && matches!(
+                self.state,
+                State::Running | State::Linking | State::Holding | State::Held
+            )
+            && self.sequencer.has_to_plan()
+    }
+
+    #[inline(never)]
+    fn plan(&mut self, store: &[i32]) {
+        if !self.has_to_plan() {
+            return;
+        }
+        let Self {
+            program, sequencer, ..
+        } = self;
+        if let Ok(job) = program.job(store)
+            && let Some(axes) = &job.header.axes
+        {
+            sequencer.plan(&job, axes);
+        }
     }
 
     /// One period of a job with axis limits.

@@ -15,9 +15,9 @@
 //!                 ▲                        ▼                 ▼
 //!   with limits: sequence, feed         Sample      pass::step_over, schedule: next pass
 //!                 ▲                        │
-//!         Interpolator::tick               ▼
+//!         Interpolator::tick, then plan    ▼
 //!                 ▲                     steps: pulses
-//!         one call a period
+//!         one call of each a period
 //! ```
 //!
 //! | folder | holds |

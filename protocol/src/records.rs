@@ -140,7 +140,7 @@ pub struct Status {
     pub digest: u64,
     /// Path interval after the last finished pass, in units of the side parameter.
     pub interval: f32,
-    /// Ticks of the sample timer that were missed.
+    /// Ticks of the sample timer that were missed, and plannings that were not complete at the next one.
     pub deadline_misses: u32,
     /// Maximum CPU cycles of a tick; 0 where the board cannot measure.
     pub tick_cycles_max: u32,

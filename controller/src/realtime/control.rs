@@ -13,6 +13,17 @@ use crate::{
     safety::Safety,
 };
 
+/// The planning of a period.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Planning {
+    /// Complete, or there was nothing to plan.
+    Complete,
+    /// Not complete.
+    Due,
+    /// Complete, but not before the next sample was due.
+    Late,
+}
+
 /// State of the real-time half except the interpolator.
 #[derive(Debug)]
 pub(super) struct Control {
@@ -24,6 +35,8 @@ pub(super) struct Control {
     pub(super) spent: bool,
     pub(super) tick_budget: u32,
     pub(super) clock: Clock,
+    /// Planning of the last period.
+    pub(super) planning: Planning,
     pub(super) report: Report,
     /// Command that waits for the next period.
     pub(super) command: Option<Command>,
@@ -41,6 +54,7 @@ impl Control {
             spent: false,
             tick_budget: u32::MAX,
             clock: Clock::Free,
+            planning: Planning::Complete,
             report: Report::Digests,
             command: None,
             safety: Safety::NEW,

@@ -1,10 +1,10 @@
-//! The proof that no panic can be reached from the sample task, made by the linker.
+//! The proof that no panic can be reached from the sample task and the planning task, made by the linker.
 //!
-//! This image has the firmware's task (`sample_task.rs`, the same file) under the same RTIC handler, with minimal
+//! This image has the firmware's tasks (`sample_task.rs` and `plan_task.rs`, the same files) under the same RTIC handlers, with minimal
 //! code at the other ends of its queues, and a panic handler that calls an undefined function. If a
 //! panic is reachable, the handler stays in the image, and the linker reports the undefined symbol. Flags,
 //! profile and target are the firmware's; `tests/no_panic.rs` links it, and checks that linking fails with the feature
-//! `with-a-panic`. The image is never run.
+//! `with-a-panic` or `with-a-panic-in-planning`. The image is never run.
 //!
 //! Limits of the proof: the compiler removes code that it can prove unreachable, so a check that cannot fail but
 //! that the compiler cannot prove so counts as a panic. Processor faults and the other tasks are not covered.
@@ -14,6 +14,8 @@
 use defmt as _;
 
 mod drivers;
+#[path = "../../src/plan_task.rs"]
+mod plan_task;
 #[path = "../../src/sample_task.rs"]
 mod sample_task;
 
@@ -35,6 +37,7 @@ mod app {
             cycle_counter::CycleCounter, drive_enable::DriveEnable, gpio::Ports, safety_inputs::SafetyInputs,
             sample_timer::SampleTimer, step_output::StepDriver, watchdog::Watchdog,
         },
+        plan_task,
         sample_task::{Guards, SampleTask},
     };
 
@@ -102,7 +105,7 @@ mod app {
         )
     }
 
-    /// The firmware's task. The machine's state is opaque to the compiler, so it may be any state.
+    /// The firmware's sample task. The machine's state is opaque to the compiler, so it may be any state.
     #[task(binds = TIM2, priority = 3, shared = [real_time], local = [task, guards, output])]
     fn sample(mut context: sample::Context) {
         let sample::LocalResources {
@@ -113,6 +116,17 @@ mod app {
             .real_time
             .lock(|real_time| task.tick(real_time, guards, output));
         #[cfg(feature = "with-a-panic")]
+        assert!(black_box(true), "the control");
+    }
+
+    /// The firmware's planning task.
+    #[task(binds = EXTI0, priority = 1, shared = [real_time])]
+    fn plan(mut context: plan::Context) {
+        context
+            .shared
+            .real_time
+            .lock(|real_time| plan_task::plan(real_time));
+        #[cfg(feature = "with-a-panic-in-planning")]
         assert!(black_box(true), "the control");
     }
 
@@ -135,7 +149,7 @@ fn panic(_info: &core::panic::PanicInfo<'_>) -> ! {
     // SAFETY: the function does not exist; an image that could call it does not link.
     #[allow(unsafe_code, reason = "a name for the linker to miss")]
     unsafe extern "C" {
-        safe fn a_panic_can_be_reached_from_the_sample_task() -> !;
+        safe fn a_panic_can_be_reached_from_a_real_time_task() -> !;
     }
-    a_panic_can_be_reached_from_the_sample_task()
+    a_panic_can_be_reached_from_a_real_time_task()
 }

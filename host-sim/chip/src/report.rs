@@ -59,6 +59,7 @@ pub(crate) fn of(chip: &Chip, account: &Account, seconds_spent: f64) -> Value {
         "first_pulse_ms": chip.moved.map(|seconds| seconds * 1e3),
         "tim2": interrupt(chip, nvic::TIM2),
         "usart1": interrupt(chip, nvic::USART1),
+        "exti0": interrupt(chip, nvic::EXTI0),
         "bytes_sent": chip.usart.sent,
         "bytes_received": chip.usart.received,
         "bytes_lost": chip.overruns + chip.usart.overruns,

@@ -114,7 +114,7 @@ impl Account {
         self.decoded.get(index?).copied().flatten()
     }
 
-    /// Charges the instruction at this index, before it is executed. The record of the tick if the preceding instruction ended one.
+    /// Charges the instruction at this index, before it is executed. The record of the tick or of the planning if the preceding instruction ended one.
     pub fn execute(&mut self, index: usize) -> Option<Record> {
         let now = self.instruction(Some(index))?;
         let (ended, leaves) = self.leave(&now);
@@ -155,8 +155,8 @@ impl Account {
         self.contexts.push(context);
     }
 
-    /// Closes the exception if the preceding instruction returned from it. The record if it was the sample task, and whether an
-    /// exception was left.
+    /// Closes the exception if the preceding instruction returned from it. The record if it was the sample or the planning task, and
+    /// whether an exception was left.
     fn leave(&mut self, next: &ImageInstruction) -> (Option<Record>, bool) {
         let Some(context) = self.contexts.last() else {
             return (None, false);
@@ -184,12 +184,18 @@ impl Account {
     }
 
     fn close(&mut self, context: &Context) -> Option<Record> {
-        if context.exception != self.plan.exception {
+        let is_planning = context.exception == self.plan.planning;
+        if !is_planning && context.exception != self.plan.exception {
             return None;
         }
         Some(Record {
+            is_planning,
             instructions: context.instructions,
-            elsewhere: core::mem::take(&mut self.elsewhere),
+            elsewhere: if is_planning {
+                0
+            } else {
+                core::mem::take(&mut self.elsewhere)
+            },
             unknown: self.unknown,
             stack_low: self.stack_low,
             stages: context.stages,

@@ -1,17 +1,17 @@
-//! Input of the plugin: the image's code, the stage of each instruction, the task whose ticks are recorded.
+//! Input of the plugin: the image's code, the stage of each instruction, the tasks that are recorded.
 //!
 //! The plan contains the code because QEMU's function that reads code differs between versions.
 
 /// First word of the file: `ISO` and a version.
-const MAGIC: u32 = 0x4953_4f06;
+const MAGIC: u32 = 0x4953_4f07;
 
 /// Words of the header, before the code.
-const HEAD_WORDS: usize = 5;
+const HEAD_WORDS: usize = 6;
 
 /// Number of stages.
 pub const STAGES: usize = 11;
 
-/// A stage of the sample task.
+/// A stage of the sample task; the planning task is [`Stage::Feed`] and what it calls.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 #[repr(u8)]
 pub enum Stage {
@@ -93,8 +93,10 @@ impl Stage {
 pub struct Plan {
     /// Address of the code, which begins with the vector table.
     pub base: u32,
-    /// Exception number of the task: its interrupt number plus 16.
+    /// Exception number of the sample task: its interrupt number plus 16.
     pub exception: u32,
+    /// Exception number of the planning task; 0 without one.
+    pub planning: u32,
     /// End of the stack, which lies from 0x20000000 on.
     pub stack_end: u32,
     /// The code.
@@ -129,7 +131,14 @@ impl Plan {
     #[must_use]
     pub fn to_bytes(&self) -> Vec<u8> {
         let length = u32::try_from(self.code.len()).unwrap_or(0);
-        let head = [MAGIC, self.base, self.exception, self.stack_end, length];
+        let head = [
+            MAGIC,
+            self.base,
+            self.exception,
+            self.planning,
+            self.stack_end,
+            length,
+        ];
         let mut bytes: Vec<u8> = head.iter().flat_map(|word| word.to_le_bytes()).collect();
         bytes.extend_from_slice(&self.code);
         let starts = self.starts.iter().copied().chain(std::iter::repeat(false));
@@ -150,11 +159,13 @@ impl Plan {
         if words.next() != Some(MAGIC) {
             return None;
         }
-        let (base, exception, stack_end) = (words.next()?, words.next()?, words.next()?);
+        let (base, exception) = (words.next()?, words.next()?);
+        let (planning, stack_end) = (words.next()?, words.next()?);
         let (code, stages) = rest.split_at_checked(words.next()? as usize)?;
         Some(Self {
             base,
             exception,
+            planning,
             stack_end,
             code: code.to_vec(),
             stages: stages

@@ -1,21 +1,23 @@
-//! One record a tick, written by the plugin and read by the host. An idle tick equal to the preceding one is omitted.
+//! One record a tick, and one for each planning, written by the plugin and read by the host. An idle tick equal to the preceding one is omitted.
 
 use crate::cost::Cycles;
 use crate::operations::Operations;
 use crate::plan::{STAGES, Stage};
 
 /// Words of a record.
-const WORDS: usize = 4 + (2 + 4) * STAGES;
+const WORDS: usize = 5 + (2 + 4) * STAGES;
 
 /// Bytes of a record, little endian.
 pub const RECORD_BYTES: usize = 4 * WORDS;
 
-/// A tick of the sample task.
+/// A tick of the sample task, or a portion of the planning task.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Record {
+    /// Of the planning task.
+    pub is_planning: bool,
     /// Instructions of the task.
     pub instructions: u32,
-    /// Instructions outside the task since the preceding tick.
+    /// Instructions outside the sample task since the preceding tick; 0 in a record of the planning task.
     pub elsewhere: u32,
     /// Instructions unknown to the decoder since the start; must be 0.
     pub unknown: u32,
@@ -41,7 +43,13 @@ impl Record {
     /// The record's bytes in the file.
     #[must_use]
     pub fn to_bytes(&self) -> Vec<u8> {
-        let head = [self.instructions, self.elsewhere, self.unknown, self.stack_low];
+        let head = [
+            u32::from(self.is_planning),
+            self.instructions,
+            self.elsewhere,
+            self.unknown,
+            self.stack_low,
+        ];
         let cycles = self
             .stages
             .iter()
@@ -69,6 +77,7 @@ impl Record {
             .map(|word| word.try_into().map_or(0, u32::from_le_bytes));
         let mut next = || words.next().unwrap_or(0);
         let mut record = Self {
+            is_planning: next() != 0,
             instructions: next(),
             elsewhere: next(),
             unknown: next(),

@@ -67,7 +67,10 @@ pub const TICK: &str = "tick";
 /// The row of the whole task.
 pub const TICK_AND_PULSES: &str = "tick and pulses";
 
-/// Cycles of a stage over the ticks of a job in which they are not zero.
+/// The row of the planning task: its portions, counted apart from the sample task. Jobs without limits have none.
+pub const PLANNING: &str = "planning";
+
+/// Cycles of a stage over the ticks of a job in which they are not zero, or of the planning over its portions.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Figure {
     /// Name of the job.
@@ -76,7 +79,7 @@ pub struct Figure {
     pub stage: &'static str,
     /// Model.
     pub model: Model,
-    /// Number of those ticks.
+    /// Number of those ticks or portions.
     pub ticks: u32,
     /// Least cycles.
     pub min: u32,
@@ -104,13 +107,19 @@ impl Figure {
         ticks: &Ticks,
         cycles: impl Fn(&Record) -> u32,
     ) -> Self {
+        let all = ticks.records.iter().map(cycles);
+        Self::of_cycles(surface, stage, model, all, ticks.stack_bytes)
+    }
+
+    fn of_cycles(
+        surface: &str,
+        stage: &'static str,
+        model: Model,
+        cycles: impl Iterator<Item = u32>,
+        stack_bytes: u32,
+    ) -> Self {
         let (mut count, mut sum, mut min, mut max) = (0_u32, 0_u64, u32::MAX, 0);
-        let all: Vec<u32> = ticks
-            .records
-            .iter()
-            .map(cycles)
-            .filter(|cycles| *cycles > 0)
-            .collect();
+        let all: Vec<u32> = cycles.filter(|cycles| *cycles > 0).collect();
         for cycles in all.iter().copied() {
             count += 1;
             sum += u64::from(cycles);
@@ -127,7 +136,7 @@ impl Figure {
             min: if count == 0 { 0 } else { min },
             mean,
             max,
-            stack_bytes: ticks.stack_bytes,
+            stack_bytes,
             histogram: Histogram::of(all.into_iter(), max.saturating_sub(min) / BINS + 1),
         }
     }
@@ -137,7 +146,7 @@ impl Figure {
     pub fn of_tick(surface: &str, model: Model, record: &Record) -> Self {
         let ticks = Ticks {
             records: vec![*record],
-            stack_bytes: 0,
+            ..Ticks::default()
         };
         Self::of(surface, TICK, model, &ticks, |record| tick_cycles(record, model))
     }
@@ -152,12 +161,18 @@ pub fn tick_cycles(record: &Record, model: Model) -> u32 {
     with_pulses(record, model) - model.of(record.stages[Stage::Pulses as usize])
 }
 
+/// Cycles of a portion of the planning task, without the tasks that preempt it.
+#[must_use]
+pub fn planning_cycles(record: &Record, model: Model) -> u32 {
+    with_pulses(record, model)
+}
+
 /// Cycles of the task in a tick.
 fn with_pulses(record: &Record, model: Model) -> u32 {
     record.stages.iter().map(|cycles| model.of(*cycles)).sum()
 }
 
-/// All figures of a job's ticks: each stage, then the tick, in both models.
+/// All figures of a job's ticks: each stage, then the tick and the planning, in both models.
 #[must_use]
 pub fn figures(surface: &str, ticks: &Ticks) -> Vec<Figure> {
     let mut figures = Vec::new();
@@ -174,6 +189,17 @@ pub fn figures(surface: &str, ticks: &Ticks) -> Vec<Figure> {
         figures.push(Figure::of(surface, TICK_AND_PULSES, model, ticks, |record| {
             with_pulses(record, model)
         }));
+        if !ticks.planning.is_empty() {
+            let cycles = ticks.planning.iter();
+            let cycles = cycles.map(|record| planning_cycles(record, model));
+            figures.push(Figure::of_cycles(
+                surface,
+                PLANNING,
+                model,
+                cycles,
+                ticks.stack_bytes,
+            ));
+        }
     }
     figures
 }

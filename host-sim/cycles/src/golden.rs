@@ -24,8 +24,8 @@ const OPERATIONS: &str = "operations of steps 2-4";
 
 /// The table's header.
 const HEADER: &str = "\
-# Cycles of each stage of the sample task on the Cortex-M4F: surface, stage, model, mean, max.
-# Mean over the ticks in which the stage takes any cycles. Written by `cargo sim budget --bless`, checked by tests/cycles.rs.
+# Cycles of each stage of the sample task on the Cortex-M4F, and of the planning task: surface, stage, model, mean, max.
+# Mean over the ticks in which the stage takes any cycles, and over the portions of the planning. Written by `cargo sim budget --bless`, checked by tests/cycles.rs.
 # Rows of operations: additions, multiplications, divisions, square roots of the most frequent sample, by the convention of
 # host-sim/cycle-plugin/src/operations.rs.
 ";

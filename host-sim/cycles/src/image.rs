@@ -21,6 +21,9 @@ const RAM: u64 = 0x2000_0000;
 /// Exception number of TIM2, whose handler is the sample task.
 const TIM2: u32 = 16 + 28;
 
+/// Exception number of EXTI0, whose handler is the planning task.
+const EXTI0: u32 = 16 + 6;
+
 /// Sizes of the image, bytes.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Sizes {
@@ -81,6 +84,7 @@ pub fn bare_plan(file: &File) -> Result<Plan, BudgetError> {
     Ok(Plan {
         base: u32::try_from(FLASH).unwrap_or(0),
         exception: TIM2,
+        planning: EXTI0,
         stack_end: u32::try_from(stack_start(file)?).map_err(|error| bad(&error))?,
         stages: Vec::new(),
         starts: Vec::new(),

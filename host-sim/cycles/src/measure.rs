@@ -27,6 +27,8 @@ pub struct MeasurementSetup {
 pub struct Ticks {
     /// The ticks that yield a sample, in order.
     pub records: Vec<Record>,
+    /// The portions of the planning task during the run, in order.
+    pub planning: Vec<Record>,
     /// High-water mark of the stack, bytes.
     pub stack_bytes: u32,
 }
@@ -97,12 +99,14 @@ impl MeasurementSetup {
     }
 
     /// Selects the ticks that yield a sample; their number must be the board's.
-    fn select(&self, mut records: Vec<Record>, samples: u32) -> Result<Ticks, BudgetError> {
+    fn select(&self, records: Vec<Record>, samples: u32) -> Result<Ticks, BudgetError> {
         let last = records.last().copied().unwrap_or_default();
         if last.unknown > 0 {
             let what = format!("{} instructions are unknown to the decoder", last.unknown);
             return Err(BudgetError::Figures(what));
         }
+        let (planning, mut records): (Vec<_>, Vec<_>) =
+            records.into_iter().partition(|record| record.is_planning);
         records.retain(yields_sample);
         if records.len() != samples as usize {
             let what = format!(
@@ -113,6 +117,7 @@ impl MeasurementSetup {
         }
         Ok(Ticks {
             records,
+            planning,
             stack_bytes: self.stack_end.saturating_sub(last.stack_low),
         })
     }

@@ -75,7 +75,7 @@ mod tests {
         let records = vec![tick(&usual), tick(&rare), tick(&usual)];
         let ticks = Ticks {
             records,
-            stack_bytes: 0,
+            ..Ticks::default()
         };
         let want = Count {
             operations: Operations::new(4, 6, 1, 1),

@@ -12,7 +12,7 @@ use interp_core::{FaultKind, State};
 use protocol::message::{Clock, Configuration, FaultReport, Report, Request, Status};
 
 use super::BudgetError;
-use super::figures::{Model, tick_cycles};
+use super::figures::{Model, planning_cycles, tick_cycles};
 use super::measure::{MeasurementSetup, yields_sample};
 use machine::prepare::Prepared;
 use machine::remote::operate::{self, Setup};
@@ -43,6 +43,8 @@ pub struct MeasurementSession {
     rest: Vec<u8>,
     stack_end: u32,
     stack_low: u32,
+    /// Greatest cycles of a portion of the planning task so far, pessimistic model.
+    planning_cycles_max: u32,
     /// Least cycles of [`Stage::Rest`] in a tick so far.
     idle: Option<Cycles>,
     _qemu: Qemu,
@@ -147,6 +149,7 @@ impl MeasurementSession {
             rest: Vec::new(),
             stack_end: setup.stack_end(),
             stack_low: setup.stack_end(),
+            planning_cycles_max: 0,
             idle: None,
             _qemu: qemu,
             _folder: folder,
@@ -159,14 +162,20 @@ impl MeasurementSession {
         self.stack_end.saturating_sub(self.stack_low)
     }
 
-    /// Reads the records since the last call.
+    /// Greatest cycles of a portion of the planning task since the beginning, pessimistic model.
+    #[must_use]
+    pub const fn planning_cycles_max(&self) -> u32 {
+        self.planning_cycles_max
+    }
+
+    /// Reads the records of the sample task since the last call; of those of the planning task the worst is kept.
     fn read_records(&mut self) -> Result<Vec<Record>, BudgetError> {
         let here = Path::new("the plugin's records");
         self.records
             .read_to_end(&mut self.rest)
             .map_err(|error| file_error(here, &error))?;
         let whole = self.rest.len() / RECORD_BYTES * RECORD_BYTES;
-        let records = Record::read_all(&self.rest[..whole]);
+        let mut records = Record::read_all(&self.rest[..whole]);
         self.rest.drain(..whole);
         if let Some(last) = records.last() {
             self.stack_low = last.stack_low;
@@ -175,6 +184,10 @@ impl MeasurementSession {
                 return Err(BudgetError::Figures(what));
             }
         }
+        let planning = records.iter().filter(|record| record.is_planning);
+        let worst = planning.map(|record| planning_cycles(record, Model::Pessimistic));
+        self.planning_cycles_max = worst.fold(self.planning_cycles_max, u32::max);
+        records.retain(|record| !record.is_planning);
         Ok(records)
     }
 

@@ -100,9 +100,9 @@ fn words(kind: FaultKind) -> [&'static str; 5] {
             "A second host that uploads while the first one's job runs.",
         ],
         FaultKind::DeadlineMissed => [
-            "The sample timer ticked before the previous tick was complete. The tool decelerates along its path to standstill.",
-            "The number of missed ticks.",
-            "The processor was blocked for a whole period: by a debugger's breakpoint, or a defect of the firmware. The worst-case tick takes 6 % of the period.",
+            "The sample timer ticked before the previous tick, or the planning that follows it, was complete. The tool decelerates along its path to standstill.",
+            "The number of missed deadlines.",
+            "The processor was blocked for a whole period: by a debugger's breakpoint, or a defect of the firmware. The worst-case tick takes 6 % of the period, the planning 18 %.",
             "Run without a debugger. If the fault recurs, please report the job with the firmware's log (`cargo sim run` reports the tick).",
             "A breakpoint in the firmware while a job runs on the board's own clock.",
         ],

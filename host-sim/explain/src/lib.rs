@@ -146,7 +146,7 @@ pub fn fault(fault: Fault) -> (String, &'static str) {
             "abort the run first",
         ),
         FaultKind::DeadlineMissed => (
-            format!("{value} ticks of the sample timer were missed"),
+            format!("{value} deadlines of the sample timer were missed"),
             "this is a defect of the firmware, or a debugger halted the chip",
         ),
         FaultKind::TickOverBudget => (

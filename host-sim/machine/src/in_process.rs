@@ -1,4 +1,4 @@
-//! The machine in this process: the core with a job loaded, one call per period.
+//! The machine in this process: the core with a job loaded, a tick and the planning of the period in one call.
 
 use interp_core::steps::BUFFER_WORDS;
 use interp_core::{Command, Fault, Inputs, Interpolator, Sample, SpanParameter, State, Steps, SurfacePoint};
@@ -44,7 +44,7 @@ impl Machine {
         let mut pass = None;
         let has_limits = self.core.has_limits();
         loop {
-            let sample = self.core.tick(command);
+            let sample = *self.tick(command);
             command = None;
             if !matches!(sample.state, State::Running | State::Linking) {
                 break;
@@ -62,7 +62,7 @@ impl Machine {
                     return Err(fault);
                 }
             }
-            if !each(sample) {
+            if !each(&sample) {
                 self.core.tick(Command::Abort);
                 break;
             }
@@ -70,9 +70,11 @@ impl Machine {
         self.core.fault().map_or(Ok(()), Err)
     }
 
-    /// Executes one period.
+    /// Executes one period: the tick, then the planning.
     pub fn tick(&mut self, inputs: impl Into<Inputs>) -> &Sample {
-        self.core.tick(inputs)
+        self.core.tick(inputs);
+        self.core.plan();
+        self.core.last()
     }
 
     /// State after the last period.

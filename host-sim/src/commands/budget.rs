@@ -1,4 +1,4 @@
-//! `budget`: cycles of each stage of the sample task on the Cortex-M4F.
+//! `budget`: cycles of each stage of the sample task on the Cortex-M4F, and of the planning task.
 
 mod worst;
 
@@ -23,7 +23,7 @@ use study::operations::PaperRow;
 /// Width of a bin of the printed histogram, cycles.
 const BIN_CYCLES: u32 = 50;
 
-/// Counts the cycles of each stage of the sample task for each kind of surface, with the firmware in QEMU.
+/// Counts the cycles of each stage of the sample task, and of the planning task, for each kind of surface, with the firmware in QEMU.
 ///
 /// Example: cargo sim budget --report out
 #[derive(Debug, Args)]

@@ -12,6 +12,8 @@ pub(crate) const THREAD: u32 = 256;
 /// Interrupts that the models raise.
 pub(crate) const TIM2: usize = 28;
 pub(crate) const USART1: usize = 37;
+/// Interrupt that the program pends for its planning task; the model of the chip has no EXTI.
+pub(crate) const EXTI0: usize = 6;
 
 /// An exception in progress.
 #[derive(Clone, Copy, Debug)]

@@ -146,10 +146,13 @@ impl Code {
             .collect()
     }
 
-    /// Index of the sample task's handler.
+    /// Indices of the handlers of the sample task and of the planning task.
     #[must_use]
-    pub fn sample_task(&self) -> Option<usize> {
-        self.function_at(self.plan.vector(self.plan.exception))
+    pub fn tasks(&self) -> Option<[usize; 2]> {
+        let handler = |exception| self.function_at(self.plan.vector(exception));
+        let default = self.function_named("DefaultHandler_");
+        let [sample, planning] = [handler(self.plan.exception)?, handler(self.plan.planning)?];
+        (![sample, planning].map(Some).contains(&default)).then_some([sample, planning])
     }
 
     /// Functions whose address is among the image's data, or loaded by `MOVW` and `MOVT`.

@@ -1,4 +1,4 @@
-//! Static analysis of the image: deepest stack, functions of the sample task, their loops.
+//! Static analysis of the image: deepest stack, functions of the sample task and of the planning task, their loops.
 //!
 //! ```text
 //!  image ─code─► functions ─flow─► instructions and successors ─┬─frame─► stack depth ─┐
@@ -52,9 +52,9 @@ pub struct StackContext {
 pub struct Analysis {
     /// The thread first, then the interrupts.
     pub contexts: Vec<StackContext>,
-    /// Functions reachable from the sample task.
+    /// Functions reachable from the sample task or the planning task.
     pub task: Vec<String>,
-    /// Functions with loops in the sample task, and the number of loops in the image.
+    /// Functions with loops in these tasks, and the number of loops in the image.
     pub loops: BTreeMap<String, u32>,
     /// Instructions that could not be analysed; if there are any, the figures are no bounds.
     pub unresolved: Vec<String>,
@@ -70,7 +70,7 @@ impl Analysis {
         u32::try_from(bytes + thread).unwrap_or(0)
     }
 
-    /// Functions of the sample task that can panic.
+    /// Functions of these tasks that can panic.
     #[must_use]
     pub fn panics(&self) -> Vec<&str> {
         let panics = |name: &&str| {
@@ -79,7 +79,7 @@ impl Analysis {
         self.task.iter().map(String::as_str).filter(panics).collect()
     }
 
-    /// Loops of the sample task without a listed bound.
+    /// Loops of these tasks without a listed bound.
     #[must_use]
     pub fn unbounded(&self) -> Vec<&str> {
         let places = self.loops.keys().map(String::as_str);
@@ -96,7 +96,7 @@ impl Analysis {
 /// Analyses an image.
 ///
 /// # Errors
-/// The image cannot be read, has no sample task, or has a recursion.
+/// The image cannot be read, lacks one of the tasks, or has a recursion.
 pub fn analyse(path: &Path) -> Result<Analysis, BudgetError> {
     let bad = |error: &dyn std::fmt::Display| BudgetError::Image(error.to_string());
     let bytes = std::fs::read(path).map_err(|error| BudgetError::File(path.into(), error.to_string()))?;
@@ -107,7 +107,9 @@ pub fn analyse(path: &Path) -> Result<Analysis, BudgetError> {
     let thread = code
         .function_named("Reset")
         .ok_or_else(|| bad(&"it has no function Reset"))?;
-    let task = code.sample_task().ok_or_else(|| bad(&"it has no sample task"))?;
+    let tasks = code
+        .tasks()
+        .ok_or_else(|| bad(&"it lacks the sample task or the planning task"))?;
     let panics = |index: &usize| code.functions[*index].name.contains(PANIC);
     let without: BTreeSet<usize> = (0..code.functions.len()).filter(panics).collect();
     let name = |index: usize| code.functions[index].name.clone();
@@ -134,7 +136,8 @@ pub fn analyse(path: &Path) -> Result<Analysis, BudgetError> {
                 .extend(unresolved.map(|address| format!("{address:#x} in {}", name(index))));
         }
     }
-    for index in calls.reachable(task) {
+    let reachable: BTreeSet<usize> = tasks.iter().flat_map(|task| calls.reachable(*task)).collect();
+    for index in reachable {
         analysis.task.push(name(index));
         let flow = &calls.nodes[index].flow;
         for found in loops::loops(flow) {

@@ -65,12 +65,13 @@ fn json(worst: &WorstTick) -> Value {
 fn print(result: &SearchResult, session: &MeasurementSession, seed: u64, out: &Path) {
     let faults: Vec<&str> = result.faults.iter().copied().collect();
     say!(
-        "seed {seed}: {} jobs ran, {} faulted at once, {} were refused, {} samples, stack {} bytes; faults met: {}",
+        "seed {seed}: {} jobs ran, {} faulted at once, {} were refused, {} samples, stack {} bytes, planning at most {} cycles; faults met: {}",
         result.executed,
         result.skipped,
         result.refused,
         result.samples,
         session.stack_bytes(),
+        session.planning_cycles_max(),
         if faults.is_empty() {
             "none".to_owned()
         } else {
@@ -121,6 +122,7 @@ pub(super) fn command(setup: &MeasurementSetup, jobs: u32, arguments: &Arguments
             "samples": result.samples,
             "faults": result.faults,
             "stack_bytes": session.stack_bytes(),
+            "planning_cycles_max": session.planning_cycles_max(),
             "job": out,
             "worst": json(&found.worst),
         });
