@@ -8,7 +8,7 @@ use crate::pass::patch::Patch;
 use crate::pass::position::PassPosition;
 use crate::pass::run::Run;
 use crate::sample::{Sample, SpanParameter, State, interval_of};
-use crate::sequence::sequencer::{Outcome, Sequencer};
+use crate::sequence::sequencer::{Outcome, Sequencer, Wish};
 
 /// Periods over which an external fault decelerates the run to zero feed: 1/32 of the feed per period.
 pub const STOP_PERIODS: u8 = 32;
@@ -214,7 +214,7 @@ impl<S: AsRef<[i32]> + AsMut<[i32]>> Interpolator<S> {
     /// Whether [`Self::plan`] has anything to do in this period: a job with axis limits is under way, and a pass ahead of the tool is not planned.
     #[must_use]
     #[inline]
-    pub const fn has_to_plan(&self) -> bool {
+    pub fn has_to_plan(&self) -> bool {
         self.motion.has_to_plan()
     }
 
@@ -342,11 +342,11 @@ impl Motion {
         self.last.state = self.state;
     }
 
-    const fn has_to_plan(&self) -> bool {
+    fn has_to_plan(&self) -> bool {
         self.program.header().axes.is_some()
             && matches!(
                 self.state,
-                State::Running | State::Linking | State::Holding | State::Held
+                State::Running | State::Linking | State::Holding | State::Held | State::Stopping
             )
             && self.sequencer.has_to_plan()
     }
@@ -378,6 +378,10 @@ impl Motion {
         if feed_factor == 0.0 && self.sequencer.is_at_rest() && self.stand() {
             return;
         }
+        let wish = Wish {
+            share: feed_factor,
+            is_fault: self.fault.is_some(),
+        };
         let Self {
             program,
             sequencer,
@@ -386,7 +390,7 @@ impl Motion {
             ..
         } = self;
         let outcome = program.job(store).and_then(|job| match &job.header.axes {
-            Some(axes) => sequencer.tick(&job, axes, run, feed_factor, last),
+            Some(axes) => sequencer.tick(&job, axes, run, wish, last),
             None => Ok(Outcome::Finished),
         });
         match (outcome, self.state) {

@@ -376,7 +376,7 @@ impl Walker {
     fn fits(&self, lists: &Lists, spacing: f32, growth: f32) -> bool {
         let room = self.room(spacing);
         let mut nodes = self.nodes_at(spacing, growth);
-        while let Some(_) = nodes.next(lists) {
+        while nodes.next(lists).is_some() {
             if nodes.count > room {
                 return false;
             }

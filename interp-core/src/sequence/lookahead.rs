@@ -10,7 +10,7 @@ use crate::feed::{Q10_BITS, to_q10};
 use crate::job::program::Job;
 use crate::job::{AxisLimits, Pattern, Spacing};
 use crate::math::arith::truncated;
-use crate::math::number::{Bounded, MM_PER_NM, nm_to_mm, to_f32};
+use crate::math::number::{MM_PER_NM, nm_to_mm, to_f32};
 use crate::pass::patch::Patch;
 use crate::pass::position::PassPosition;
 use crate::pass::schedule;
@@ -276,7 +276,7 @@ impl Lookahead {
 
     /// Chooses the cells of a patch by the number of patches and the length of the first.
     fn choose_cells(&self, spans: u16, out: &mut PassPlan) {
-        let fit = (STATIONS / spans).saturating_sub(1);
+        let fit = STATIONS.checked_div(spans).unwrap_or(1).saturating_sub(1);
         let (most, kept) = if fit >= CELLS_MIN {
             (fit, Kept::Every)
         } else if spans <= STATIONS / 2 {
@@ -286,7 +286,7 @@ impl Lookahead {
         };
         let cells = truncated(self.patch_length() / CELL_MIN_MM);
         out.cells = u16::try_from(cells).unwrap_or(u16::MAX).clamp(CELLS_MIN, most);
-        out.cell_fraction = u64::MAX / u64::from(out.cells);
+        out.cell_fraction = u64::MAX.checked_div(u64::from(out.cells)).unwrap_or(u64::MAX);
         out.kept = kept;
     }
 
@@ -343,14 +343,15 @@ impl Lookahead {
                 }
             }
             Kept::Ends => {
-                if let Some(place) = out.plan.stations.back_mut(if is_start { 2 } else { 1 }) {
-                    if is_start || is_end {
-                        place.q = q;
-                    }
+                let back = if is_end { 1 } else { 1 + u16::from(self.station >= out.cells) };
+                if (is_start || is_end)
+                    && let Some(place) = out.plan.stations.back_mut(back)
+                {
+                    place.q = q;
                 }
             }
             Kept::Groups(size) => {
-                let begins = is_start && self.patches % size == 0;
+                let begins = is_start && self.patches.is_multiple_of(size);
                 for back in [1, 2] {
                     if let Some(place) = out.plan.stations.back_mut(back) {
                         widen(&mut place.q, &q, begins || back == 1);
@@ -436,7 +437,7 @@ impl Lookahead {
             Kept::Ends if is_start || is_end => stations.push(station),
             Kept::Ends => {}
             Kept::Groups(size) => {
-                if is_start && self.patches % size == 0 {
+                if is_start && self.patches.is_multiple_of(size) {
                     stations.push(station);
                     stations.push(station);
                 } else if let Some(last) = stations.back_mut(1) {

@@ -270,7 +270,7 @@ impl Sequencer {
             Phase::Leg(_) if self.straight.progress.has_work() => return self.straight.progress.work(),
             _ => {}
         }
-        if self.has_to_plan_step_over() {
+        if self.has_step_over && !self.step_over.is_planned() {
             self.pending = self.step_over.work(job, axes).err();
             return;
         }
@@ -289,8 +289,8 @@ impl Sequencer {
                 }
             }
             Planning::Feed => {
-                // The pass after it takes as long to plan.
-                let least = if next.next.is_some() {
+                // The pass after it takes as long to plan; off the surface it can be waited for.
+                let least = if next.next.is_some() && job.header.pattern == Pattern::Zigzag {
                     self.spent.saturating_add(SPARE_PERIODS)
                 } else {
                     0
