@@ -76,18 +76,18 @@ impl Follower {
         let planned_q10 = self.cursor.arc_q10(plan);
         let planned = to_mm(planned_q10 - self.arc_q10);
         self.look_ahead(plan, pace);
-        if self.change == 0 {
+        let exact = seconds * plan.limits.feed;
+        if self.change == 0 && planned <= exact {
             self.arc_q10 = planned_q10;
             return planned;
         }
         let by = f32::from(self.change) * (1.0 / CHANGE as f32);
         // Smooth: 10 t^3 - 15 t^4 + 6 t^5.
         let share = by * by * by * (10.0 - by * (15.0 - 6.0 * by));
-        let exact = seconds * plan.limits.feed;
         let moved = if self.change == CHANGE {
             exact
         } else {
-            planned + share * (exact - planned)
+            (planned + share * (exact - planned)).at_most(exact)
         };
         self.arc_q10 += i64::from(super::plan::step_q10(moved));
         self.cursor.shift(moved - planned, plan);

@@ -297,7 +297,10 @@ impl Course for Plan {
             limits.jump_jerk(&self.stations.jump(station))
         });
         let speed = v * r;
-        let mut most = Use::NONE;
+        let mut most = Use {
+            velocity: speed / limits.feed,
+            ..Use::NONE
+        };
         for axis in 0..3 {
             let of = |values: &[f32; 3]| values.get(axis).copied().unwrap_or(0.0);
             let (q1, q2, q3) = (of(q1), of(q2), of(q3));
