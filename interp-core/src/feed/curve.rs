@@ -161,8 +161,7 @@ impl Curve {
         let peak = peak_speed(length, &limits);
         let pieces = if slow > 0.0 && last < slow && peak > slow_speed {
             let fast = length - slow;
-            let needed =
-                |top: f32| ramp_length(0.0, top, &limits) + ramp_length(top, slow_speed, &limits);
+            let needed = |top: f32| ramp_length(0.0, top, &limits) + ramp_length(top, slow_speed, &limits);
             let mut top = limits.speed;
             if needed(top) > fast {
                 let mut low = slow_speed;

@@ -29,7 +29,11 @@ impl Lead {
     pub(crate) fn look(&mut self, plan: &Plan, cursor: &Cursor, periods: f32) {
         let feed = plan.limits.feed;
         let is_near = !plan.is_over(cursor) && (cursor.speed(plan) - feed).abs() < NEAR * feed;
-        self.near = if is_near { (self.near + periods).at_most(f32::from(LEAD)) } else { 0.0 };
+        self.near = if is_near {
+            (self.near + periods).at_most(f32::from(LEAD))
+        } else {
+            0.0
+        };
     }
 }
 

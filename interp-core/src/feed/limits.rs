@@ -18,87 +18,130 @@ const STEP_SHARE: f32 = 0.78;
 /// Least `|q'|` that is divided by.
 pub(crate) const SLOPE_MIN: f32 = 1e-6;
 
+/// Velocity, acceleration and jerk of an axis, mm/s, mm/s^2, mm/s^3, or their inverses.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct AxisMotion {
+    pub(crate) velocity: f32,
+    pub(crate) acceleration: f32,
+    pub(crate) jerk: f32,
+}
+
+impl AxisMotion {
+    const NONE: Self = Self {
+        velocity: 0.0,
+        acceleration: 0.0,
+        jerk: 0.0,
+    };
+
+    fn inverse(&self) -> Self {
+        Self {
+            velocity: 1.0 / self.velocity,
+            acceleration: 1.0 / self.acceleration,
+            jerk: 1.0 / self.jerk,
+        }
+    }
+}
+
 /// Limits along a path.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct MotionLimits {
     /// Programmed feed of the contact, mm/s.
     pub(crate) feed: f32,
-    /// mm/s, mm/s^2, mm/s^3 of each axis.
-    pub(crate) velocity: [f32; 3],
-    pub(crate) acceleration: [f32; 3],
-    pub(crate) jerk: [f32; 3],
-    /// Greatest distance of the path from the chord of a period, mm.
-    pub(crate) chord: f32,
-    /// s.
+    /// Limits of each axis, and their inverses.
+    pub(crate) axes: [AxisMotion; 3],
+    pub(crate) inverse: [AxisMotion; 3],
+    /// Inverse square of the feed, (s/mm)^2.
+    inverse_feed_sqr: f32,
+    /// Curvature times the square of the speed at which a period's path is as far from its chord as allowed: its inverse, s^2/mm.
+    inverse_chord: f32,
+    /// s, and 1/s.
     pub(crate) period: f32,
+    rate: f32,
 }
 
 impl MotionLimits {
     /// No limits yet.
     pub(crate) const NONE: Self = Self {
         feed: 0.0,
-        velocity: [1.0; 3],
-        acceleration: [1.0; 3],
-        jerk: [1.0; 3],
-        chord: 1.0,
-        period: 1e-3,
+        axes: [AxisMotion::NONE; 3],
+        inverse: [AxisMotion::NONE; 3],
+        inverse_feed_sqr: 0.0,
+        inverse_chord: 0.0,
+        period: 0.0,
+        rate: 0.0,
     };
 
     /// The machine's limits at this feed.
-    pub(crate) const fn new(axes: &AxisLimits, feed: f32, period: f32) -> Self {
+    pub(crate) fn new(machine: &AxisLimits, feed: f32, period: f32) -> Self {
+        let mut axes = [AxisMotion::NONE; 3];
+        let limits = machine
+            .velocity_mm_s
+            .iter()
+            .zip(&machine.acceleration_mm_s2)
+            .zip(&machine.jerk_mm_s3);
+        for (axis, ((velocity, acceleration), jerk)) in axes.iter_mut().zip(limits) {
+            *axis = AxisMotion {
+                velocity: *velocity,
+                acceleration: *acceleration,
+                jerk: *jerk,
+            };
+        }
+        // The chord of a period is off by curvature (v T)^2 / 8.
+        let inverse_chord = period * period / (8.0 * machine.chord_mm);
+        Self::of(feed, axes, inverse_chord, period)
+    }
+
+    fn of(feed: f32, axes: [AxisMotion; 3], inverse_chord: f32, period: f32) -> Self {
         Self {
             feed,
-            velocity: axes.velocity_mm_s,
-            acceleration: axes.acceleration_mm_s2,
-            jerk: axes.jerk_mm_s3,
-            chord: axes.chord_mm,
+            inverse: axes.map(|axis| axis.inverse()),
+            axes,
+            inverse_feed_sqr: 1.0 / (feed * feed),
+            inverse_chord,
             period,
+            rate: 1.0 / period,
         }
     }
 
     /// What a plan uses of them.
     pub(crate) fn planned(&self) -> Self {
-        Self {
-            feed: FEED * self.feed,
-            velocity: self.velocity.map(|limit| VELOCITY * limit),
-            acceleration: self.acceleration.map(|limit| ACCELERATION * limit),
-            jerk: self.jerk.map(|limit| JERK * limit),
-            ..*self
-        }
+        let axes = self.axes.map(|axis| AxisMotion {
+            velocity: VELOCITY * axis.velocity,
+            acceleration: ACCELERATION * axis.acceleration,
+            jerk: JERK * axis.jerk,
+        });
+        Self::of(FEED * self.feed, axes, self.inverse_chord, self.period)
     }
 
-    /// Square of the greatest speed that feed, velocity and chord allow, (mm/s)^2.
-    pub(crate) fn speed_sqr(&self, [first, second, _]: &Derivatives) -> f32 {
-        let mut square = self.feed * self.feed;
+    /// Inverse square of the greatest speed that feed, velocity and chord allow, (s/mm)^2.
+    #[inline(always)]
+    pub(crate) fn inverse_speed_sqr(&self, q: &Derivatives) -> f32 {
+        let mut most = self.inverse_feed_sqr;
         let mut curvature_sqr = 0.0;
-        for ((limit, first), second) in self.velocity.iter().zip(first).zip(second) {
-            let speed = limit / first.abs().at_least(SLOPE_MIN);
-            square = square.at_most(speed * speed);
+        for (inverse, [first, second, _]) in self.inverse.iter().zip(q) {
+            let part = first * inverse.velocity;
+            most = most.at_least(part * part);
             curvature_sqr += second * second;
         }
-        // The chord of a period is off by curvature (v T)^2 / 8.
-        let chord = 8.0 * self.chord / (self.period * self.period);
-        square.at_most(chord / sqrt(curvature_sqr).at_least(1e-9))
+        most.at_least(sqrt(curvature_sqr) * self.inverse_chord)
     }
 
-    /// Jerk that jumps of q' and q'' cause in the periods that see them, as fractions of each axis's limit: coefficients of v and of v^2.
-    pub(crate) fn jump_jerk(&self, jump: &Jump) -> [[f32; 3]; 2] {
-        let rate = 1.0 / self.period;
-        let mut shares = [[0.0; 3]; 2];
-        let [of_first, of_second] = &mut shares;
-        let axis = of_first.iter_mut().zip(of_second).zip(&self.jerk);
-        for ((((first, second), jerk), d1), d2) in axis.zip(&jump.first).zip(&jump.second) {
-            *first = d1 * rate * rate / jerk;
-            *second = STEP_SHARE * d2 * rate / jerk;
+    /// Jerk that a jump causes in the periods that see it, as fractions of each axis's limit: coefficients of v and of v^2.
+    pub(crate) fn jump_jerk(&self, jump: &Jump) -> [[f32; 2]; 3] {
+        let mut shares = [[0.0; 2]; 3];
+        for ((shares, [first, second]), inverse) in shares.iter_mut().zip(jump).zip(&self.inverse) {
+            *shares = [
+                first * self.rate * self.rate * inverse.jerk,
+                STEP_SHARE * second * self.rate * inverse.jerk,
+            ];
         }
         shares
     }
 
     /// Speed over a jump at which half of the jerk is left, mm/s.
     pub(crate) fn jump_speed(&self, jump: &Jump) -> f32 {
-        let [first, second] = self.jump_jerk(jump);
         let mut speed = f32::MAX;
-        for (first, second) in first.iter().zip(&second) {
+        for [first, second] in self.jump_jerk(jump) {
             speed = speed
                 .at_most(0.5 / first.at_least(1e-9))
                 .at_most(sqrt(0.5 / second.at_least(1e-12)));
@@ -108,8 +151,4 @@ impl MotionLimits {
 }
 
 /// Sizes of the jumps of q' (1) and q'' (1/mm) of each axis at a patch boundary.
-#[derive(Clone, Copy, Debug)]
-pub(crate) struct Jump {
-    pub(crate) first: [f32; 3],
-    pub(crate) second: [f32; 3],
-}
+pub(crate) type Jump = [[f32; 2]; 3];

@@ -64,6 +64,14 @@ struct AxisRows {
     jump: [f32; 2],
 }
 
+impl AxisRows {
+    const NONE: Self = Self {
+        accel: [0.0; 2],
+        jerk: [0.0; 3],
+        jump: [0.0; 2],
+    };
+}
+
 /// The rows at a place.
 #[derive(Clone, Copy, Debug)]
 struct Rows {
@@ -97,44 +105,38 @@ struct Local {
 }
 
 impl Rows {
-    fn new(plan: &Plan, limits: &MotionLimits, interval: &Interval, x: f32, place: &Place, kind: Kind) -> Self {
-        let h = 1.0 / plan.step_s;
+    #[inline(always)]
+    fn new(h: f32, limits: &MotionLimits, interval: &Interval, x: f32, place: &Place, kind: Kind) -> Self {
         let stencil = Stencil::at(x);
         let [s1, s2, s3] = interval.walk_rates(x);
-        let (v, a, j) = (s1 * h, s2 * h * h, s3 * h * h * h);
-        let [q1, q2, q3] = &place.q;
-        let mut axes = [AxisRows {
-            accel: [0.0; 2],
-            jerk: [0.0; 3],
-            jump: [0.0; 2],
-        }; 3];
-        let mut speed = 0.0;
-        if kind != Kind::End && kind != Kind::Jump {
-            speed = v * v / limits.speed_sqr(&place.q);
-        }
-        if kind == Kind::Middle {
-            return Self {
-                stencil,
-                axes,
-                speed,
-                kind,
-            };
-        }
-        for (axis, rows) in axes.iter_mut().enumerate() {
-            let of = |values: &[f32; 3]| values.get(axis).copied().unwrap_or(0.0);
-            let (q1, q2, q3) = (of(q1), of(q2), of(q3));
-            let (accel, jerk) = (1.0 / of(&limits.acceleration), 1.0 / of(&limits.jerk));
-            let t1 = q1 * v;
-            let t2 = q2 * v * v + q1 * a;
-            let t3 = (q3 * v * v + 3.0 * q2 * a) * v + q1 * j;
-            *rows = AxisRows {
-                accel: [t2 * accel, 0.5 * t1 * accel * h],
-                jerk: [t3 * jerk, 1.5 * t2 * jerk * h, 0.5 * t1 * jerk * h * h],
-                jump: match &place.jump {
-                    Some([first, second]) => [of(first) * v, of(second) * v * v],
-                    None => [0.0; 2],
-                },
-            };
+        let h2 = h * h;
+        let (v, a, j) = (s1 * h, s2 * h2, s3 * h2 * h);
+        let mut axes = [AxisRows::NONE; 3];
+        let speed = if matches!(kind, Kind::Node | Kind::Middle) {
+            v * v * limits.inverse_speed_sqr(&place.q)
+        } else {
+            0.0
+        };
+        if kind != Kind::Middle {
+            for ((rows, [q1, q2, q3]), inverse) in axes.iter_mut().zip(&place.q).zip(&limits.inverse) {
+                let t1 = 0.5 * q1 * v * h;
+                let t2 = q2 * v * v + q1 * a;
+                let t3 = (q3 * v * v + 3.0 * q2 * a) * v + q1 * j;
+                *rows = AxisRows {
+                    accel: [t2 * inverse.acceleration, t1 * inverse.acceleration],
+                    jerk: [
+                        t3 * inverse.jerk,
+                        1.5 * t2 * inverse.jerk * h,
+                        t1 * inverse.jerk * h,
+                    ],
+                    jump: [0.0; 2],
+                };
+            }
+            if let Some(jump) = &place.jump {
+                for (rows, [first, second]) in axes.iter_mut().zip(jump) {
+                    rows.jump = [first * v, second * v * v];
+                }
+            }
         }
         Self {
             stencil,
@@ -315,17 +317,16 @@ impl Reach {
 /// The path at a place, and the jerk that a jump nearby takes.
 struct Place {
     q: Derivatives,
-    jump: Option<[[f32; 3]; 2]>,
+    jump: Option<[[f32; 2]; 3]>,
 }
 
 /// The path at a node.
-fn at_node(plan: &Plan, limits: &MotionLimits, interval: &Interval, x: f32, node: u16) -> Place {
+fn at_node(plan: &Plan, limits: &MotionLimits, slope: f32, node: u16) -> Place {
     let [cell, part] = plan.node(node);
     let part = f32::from(part) * (1.0 / 65536.0);
     let stations = &plan.stations;
     let length = stations.cell_mm(cell);
-    let [slope, _, _] = interval.walk_rates(x);
-    let near = JUMP_REACH * limits.period * slope / plan.step_s;
+    let near = JUMP_REACH * limits.period * slope;
     let since = part * length;
     let jump = if cell > 0 && since <= near && stations.is_jump(cell - 1) {
         Some(cell - 1)
@@ -344,26 +345,51 @@ fn at_node(plan: &Plan, limits: &MotionLimits, interval: &Interval, x: f32, node
 #[inline(always)]
 fn rows(plan: &Plan, limits: &MotionLimits, index: u16, knot: &mut u16, mut each: impl FnMut(&Rows)) {
     let interval = plan.interval(index);
-    let start = at_node(plan, limits, &interval, 0.0, index);
-    each(&Rows::new(plan, limits, &interval, 0.0, &start, Kind::Node));
-    let end = at_node(plan, limits, &interval, 1.0, index + 1);
+    let h = plan.inverse_step;
+    let slope = |x| {
+        let [slope, _, _] = interval.walk_rates(x);
+        slope * h
+    };
     let is_last = index + 1 == plan.intervals;
-    let kind = if is_last { Kind::Node } else { Kind::End };
-    each(&Rows::new(plan, limits, &interval, 1.0, &end, kind));
-    let mut middle = Place { q: start.q, jump: None };
-    for (q, end) in middle.q.iter_mut().zip(&end.q) {
-        for (q, end) in q.iter_mut().zip(end) {
-            *q = 0.5 * (*q + *end);
+    let mut places = [
+        (0.0, Kind::Node, at_node(plan, limits, slope(0.0), index)),
+        (
+            1.0,
+            if is_last { Kind::Node } else { Kind::End },
+            at_node(plan, limits, slope(1.0), index + 1),
+        ),
+        (
+            0.5,
+            Kind::Middle,
+            Place {
+                q: [[0.0; 3]; 3],
+                jump: None,
+            },
+        ),
+    ];
+    let [(_, _, start), (_, _, end), (_, _, middle)] = &mut places;
+    for (middle, (start, end)) in middle.q.iter_mut().zip(start.q.iter().zip(&end.q)) {
+        for (middle, (start, end)) in middle.iter_mut().zip(start.iter().zip(end)) {
+            *middle = 0.5 * (start + end);
         }
     }
-    each(&Rows::new(plan, limits, &interval, 0.5, &middle, Kind::Middle));
+    for (x, kind, place) in &places {
+        each(&Rows::new(h, limits, &interval, *x, place, *kind));
+    }
     while let Some(at) = plan.knot(*knot).filter(|at| at.interval <= index) {
         if at.interval == index {
             let x = f32::from(at.part) * (1.0 / 65536.0);
             let jump = Some(limits.jump_jerk(&plan.stations.jump(at.station)));
             for side in [at.station, at.station + 1] {
                 let q = plan.stations.get(side).q;
-                each(&Rows::new(plan, limits, &interval, x, &Place { q, jump }, Kind::Jump));
+                each(&Rows::new(
+                    h,
+                    limits,
+                    &interval,
+                    x,
+                    &Place { q, jump },
+                    Kind::Jump,
+                ));
             }
         }
         *knot += 1;
@@ -375,7 +401,9 @@ fn rows(plan: &Plan, limits: &MotionLimits, index: u16, knot: &mut u16, mut each
 pub(crate) fn factor(plan: &Plan, limits: &MotionLimits, index: u16, knot: &mut u16) -> f32 {
     let mut factor = f32::MAX;
     let pace = *plan.interval(index).pace();
-    rows(plan, limits, index, knot, |rows| factor = factor.at_most(rows.factor(&pace)));
+    rows(plan, limits, index, knot, |rows| {
+        factor = factor.at_most(rows.factor(&pace))
+    });
     factor
 }
 
@@ -415,7 +443,11 @@ pub(crate) fn assemble(
     // Every coefficient stays positive.
     let first = if index == 0 { 0 } else { 2 };
     for offset in first..3 {
-        let value = pace.get(usize::from(offset)).copied().unwrap_or(1.0).at_least(1e-9);
+        let value = pace
+            .get(usize::from(offset))
+            .copied()
+            .unwrap_or(1.0)
+            .at_least(1e-9);
         let force = mu / value;
         add(lists, GRADIENT, index + offset, -force);
         add(lists, DIAGONALS[0], index + offset, force / value);
@@ -502,7 +534,9 @@ pub(crate) fn extend(
     for (value, direction) in pace.iter().zip(&direction) {
         reach.add(*value, -direction);
     }
-    rows(plan, limits, index, knot, |rows| rows.reach(&pace, &direction, reach));
+    rows(plan, limits, index, knot, |rows| {
+        rows.reach(&pace, &direction, reach)
+    });
 }
 
 /// Takes the step.
@@ -525,13 +559,19 @@ fn get(lists: &Lists, list: usize, index: u16) -> f32 {
 }
 
 fn put(lists: &mut Lists, list: usize, index: u16, value: f32) {
-    if let Some(place) = lists.get_mut(list).and_then(|list| list.get_mut(usize::from(index))) {
+    if let Some(place) = lists
+        .get_mut(list)
+        .and_then(|list| list.get_mut(usize::from(index)))
+    {
         *place = value;
     }
 }
 
 fn add(lists: &mut Lists, list: usize, index: u16, value: f32) {
-    if let Some(place) = lists.get_mut(list).and_then(|list| list.get_mut(usize::from(index))) {
+    if let Some(place) = lists
+        .get_mut(list)
+        .and_then(|list| list.get_mut(usize::from(index)))
+    {
         *place += value;
     }
 }

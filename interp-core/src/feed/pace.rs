@@ -221,12 +221,12 @@ impl<C: Copy> Pace<C> {
             if search.left > 0 {
                 search.left -= 1;
             } else if search.found {
-                    self.change = Some(search.change);
-                    (self.time, self.goal, self.failures) = (0.0, self.wanted, 0);
-                    self.search = None;
+                self.change = Some(search.change);
+                (self.time, self.goal, self.failures) = (0.0, self.wanted, 0);
+                self.search = None;
             } else if self.change.is_some() || self.goal != 0.0 {
-                    self.failures = self.failures.saturating_add(1);
-                    self.search = None;
+                self.failures = self.failures.saturating_add(1);
+                self.search = None;
             }
         }
         let [pace, _, _] = self.rates(0.5 * self.period);

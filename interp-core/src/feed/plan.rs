@@ -40,6 +40,7 @@ pub(crate) struct Plan {
     /// Intervals of the walk, and the time of one at pace 1, s.
     pub(crate) intervals: u16,
     pub(crate) step_s: f32,
+    pub(crate) inverse_step: f32,
     /// The walk: S is a cubic B-spline; differences of its coefficients, mm.
     pub(crate) walk: [f32; COEFFICIENTS],
     /// The pace c: coefficients of a quadratic B-spline.
@@ -113,7 +114,8 @@ impl Plan {
         stations: Stations::NONE,
         limits: MotionLimits::NONE,
         intervals: 0,
-        step_s: 1.0,
+        step_s: 0.0,
+        inverse_step: 0.0,
         walk: [0.0; COEFFICIENTS],
         pace: [0.0; COEFFICIENTS],
         cells: [0; NODES_MAX + 1],
@@ -148,30 +150,30 @@ impl Plan {
         to_q10(self.interval(index).arc(1.0)) + self.trim_q10
     }
 
-    /// Places the nodes among the stations, and trims the intervals to the path's length.
-    pub(crate) fn place_nodes(&mut self) {
-        self.trim_q10 = 0;
-        let mut arc_q10 = 0;
-        let mut cell = 0;
-        for node in 0..=self.intervals {
-            cell = self.stations.cell_between(cell, self.stations.count(), arc_q10);
-            let since = self.stations.since(cell, arc_q10);
-            let part = (since / self.stations.cell_mm(cell).at_least(1e-7))
-                .at_least(0.0)
-                .at_most(1.0);
-            let index = usize::from(node);
-            if let (Some(to_cell), Some(to_part)) = (self.cells.get_mut(index), self.parts.get_mut(index)) {
-                *to_cell = cell;
-                *to_part = u16::try_from(truncated(part * 65535.0)).unwrap_or(u16::MAX);
-            }
-            if node < self.intervals {
-                arc_q10 += self.interval_q10(node);
-            }
+    /// Places a node at this arc among the stations, from this cell on; the cell, and the arc of the next node, units of 2^-10 nm.
+    pub(crate) fn place_node(&mut self, node: u16, cell: u16, arc_q10: i64) -> (u16, i64) {
+        let cell = self.stations.cell_between(cell, self.stations.count(), arc_q10);
+        let since = self.stations.since(cell, arc_q10);
+        let part = (since / self.stations.cell_mm(cell).at_least(1e-7))
+            .at_least(0.0)
+            .at_most(1.0);
+        let index = usize::from(node);
+        if let (Some(to_cell), Some(to_part)) = (self.cells.get_mut(index), self.parts.get_mut(index)) {
+            *to_cell = cell;
+            *to_part = u16::try_from(truncated(part * 65535.0)).unwrap_or(u16::MAX);
         }
-        let missing = self.length_q10() - arc_q10;
-        self.trim_q10 = missing
-            .checked_div(i64::from(self.intervals))
-            .unwrap_or(0);
+        let length_q10 = if node < self.intervals {
+            self.interval_q10(node)
+        } else {
+            0
+        };
+        (cell, arc_q10 + length_q10)
+    }
+
+    /// Trims the intervals, which have this length together, to the path's length.
+    pub(crate) fn trim(&mut self, length_q10: i64) {
+        let missing = self.length_q10() - length_q10;
+        self.trim_q10 = missing.checked_div(i64::from(self.intervals)).unwrap_or(0);
     }
 
     /// Cell of a node, and the fraction of it in units of 2^-16.
@@ -217,7 +219,7 @@ impl Cursor {
     pub(crate) fn speed(&self, plan: &Plan) -> f32 {
         let interval = plan.interval(self.interval);
         let [slope, _, _] = interval.walk_rates(self.x);
-        slope * interval.speed(self.x) / plan.step_s
+        slope * interval.speed(self.x) * plan.inverse_step
     }
 
     /// Moves by this arc, mm, small against an interval; not where the walk stands.
@@ -248,7 +250,7 @@ impl Course for Plan {
 
     fn advance(&self, cursor: &mut Cursor, seconds: f32) {
         // The midpoint rule.
-        let by = seconds / self.step_s;
+        let by = seconds * self.inverse_step;
         let here = self.interval(cursor.interval);
         let half = cursor.x + 0.5 * by * here.speed(cursor.x);
         let middle = if half < 1.0 || cursor.interval + 1 >= self.intervals {
@@ -268,7 +270,7 @@ impl Course for Plan {
         let [r, r1, r2] = rates;
         let interval = self.interval(cursor.interval);
         let x = cursor.x.at_most(1.0);
-        let inverse = 1.0 / self.step_s;
+        let inverse = self.inverse_step;
         let [s1, s2, s3] = interval.walk_rates(x);
         let [c, c1, c2] = interval.pace_rates(x);
         let root = sqrt(c.at_least(0.0)) * inverse;
@@ -283,7 +285,7 @@ impl Course for Plan {
         let length = self.stations.cell_mm(cell);
         let since = self.stations.since(cell, arc_q10);
         let part = (since / length.at_least(1e-7)).at_least(0.0).at_most(1.0);
-        let [q1, q2, q3] = &self.stations.blend(cell, part);
+        let q = self.stations.blend(cell, part);
         let limits = &self.limits;
         let near = (JUMP_REACH * limits.period).at_least(around) * v * r;
         let jump = if since <= near && cell > 0 && self.stations.is_jump(cell - 1) {
@@ -293,7 +295,7 @@ impl Course for Plan {
         } else {
             None
         };
-        let extra = jump.map_or([[0.0; 3]; 2], |station| {
+        let extra = jump.map_or([[0.0; 2]; 3], |station| {
             limits.jump_jerk(&self.stations.jump(station))
         });
         let speed = v * r;
@@ -301,19 +303,14 @@ impl Course for Plan {
             velocity: speed / limits.feed,
             ..Use::NONE
         };
-        for axis in 0..3 {
-            let of = |values: &[f32; 3]| values.get(axis).copied().unwrap_or(0.0);
-            let (q1, q2, q3) = (of(q1), of(q2), of(q3));
+        for ((inverse, [q1, q2, q3]), [first, second]) in limits.inverse.iter().zip(&q).zip(&extra) {
             let acceleration = q2 * v * v + q1 * a;
             let jerk = (q3 * v * v + 3.0 * q2 * a) * v + q1 * j;
-            let [first, second] = &extra;
-            let of_jump = (of(first) + of(second) * speed) * speed;
+            let of_pace = (jerk * r * r + 3.0 * acceleration * r1) * r + q1 * v * r2;
             most.add(&Use {
-                velocity: (q1 * speed).abs() / of(&limits.velocity),
-                acceleration: (acceleration * r * r + q1 * v * r1).abs() / of(&limits.acceleration),
-                jerk: ((jerk * r * r + 3.0 * acceleration * r1) * r + q1 * v * r2).abs()
-                    / of(&limits.jerk)
-                    + of_jump,
+                velocity: (q1 * speed).abs() * inverse.velocity,
+                acceleration: (acceleration * r * r + q1 * v * r1).abs() * inverse.acceleration,
+                jerk: of_pace.abs() * inverse.jerk + (first + second * speed) * speed,
             });
         }
         most

@@ -151,7 +151,11 @@ impl Planner {
                     barrier,
                     self.weight,
                 );
-                if self.next(plan) { Stage::Solve } else { Stage::Assemble }
+                if self.next(plan) {
+                    Stage::Solve
+                } else {
+                    Stage::Assemble
+                }
             }
             Stage::Solve => {
                 newton::solve(&mut self.lists, plan.intervals + 2, 0);
@@ -167,7 +171,11 @@ impl Planner {
                     &mut self.knot,
                     &mut self.reach,
                 );
-                if self.next(plan) { self.take(plan) } else { Stage::Reach }
+                if self.next(plan) {
+                    self.take(plan)
+                } else {
+                    Stage::Reach
+                }
             }
             Stage::Check => {
                 if self.check(plan) {

@@ -11,7 +11,7 @@ pub(crate) const STATIONS_MAX: usize = 168;
 const CELL_BISECTIONS: u8 = 8;
 const _: () = assert!(STATIONS_MAX <= 1 << CELL_BISECTIONS);
 
-/// First, second and third derivative of each axis by the contact's arc: 1, 1/mm, 1/mm^2.
+/// For each axis its first, second and third derivative by the contact's arc: 1, 1/mm, 1/mm^2.
 pub(crate) type Derivatives = [[f32; 3]; 3];
 
 /// A place of the path.
@@ -98,21 +98,15 @@ impl Stations {
         let cells = [self.cell_mm(station.saturating_sub(1)), self.cell_mm(station + 1)];
         let [before, behind] = cells.map(|cell| 1.0 / cell.at_least(1e-3));
         let inverse = before.at_least(behind);
-        let [from, to] = [&self.get(station).q, &self.get(station + 1).q];
-        let size = |order: usize, noise: f32| {
-            let mut size = [0.0; 3];
-            let none = [0.0; 3];
-            let from = from.get(order).unwrap_or(&none);
-            let to = to.get(order).unwrap_or(&none);
-            for ((size, from), to) in size.iter_mut().zip(from).zip(to) {
-                *size = ((to - from).abs() - noise).at_least(0.0);
+        let noise = [FIRST_NOISE * inverse, SECOND_NOISE * inverse * inverse];
+        let mut jump = [[0.0; 2]; 3];
+        let sides = self.get(station).q.iter().zip(&self.get(station + 1).q);
+        for (jump, (from, to)) in jump.iter_mut().zip(sides) {
+            for (((jump, from), to), noise) in jump.iter_mut().zip(from).zip(to).zip(&noise) {
+                *jump = ((to - from).abs() - noise).at_least(0.0);
             }
-            size
-        };
-        Jump {
-            first: size(0, FIRST_NOISE * inverse),
-            second: size(1, SECOND_NOISE * inverse * inverse),
         }
+        jump
     }
 
     /// The cell that an arc is in, from one cell to another. A cell without length is skipped.
@@ -201,7 +195,7 @@ impl Window {
         for (arc, (_, from_start)) in arcs.iter_mut().zip(points) {
             *arc = from_start - start;
         }
-        for axis in 0..3 {
+        for (axis, q) in q.iter_mut().enumerate() {
             let mut differences = [0.0; WINDOW];
             for (difference, (centre, _)) in differences.iter_mut().zip(points) {
                 let of = |centre: &[i32; 3]| centre.get(axis).copied().unwrap_or(0);
@@ -209,12 +203,7 @@ impl Window {
             }
             divide(&mut differences, &arcs, points.len());
             let [_, first, second, third] = taylor(&differences, &arcs, points.len());
-            let values = [first, 2.0 * second, 6.0 * third];
-            for (q, value) in q.iter_mut().zip(values) {
-                if let Some(q) = q.get_mut(axis) {
-                    *q = value;
-                }
-            }
+            *q = [first, 2.0 * second, 6.0 * third];
         }
         q
     }
@@ -239,7 +228,12 @@ fn taylor(differences: &[f32; WINDOW], at: &[f32; WINDOW], count: usize) -> [f32
     for index in (0..WINDOW.min(count)).rev() {
         let t = get(at, index);
         let [c0, c1, c2, c3] = c;
-        c = [get(differences, index) - t * c0, c0 - t * c1, c1 - t * c2, c2 - t * c3];
+        c = [
+            get(differences, index) - t * c0,
+            c0 - t * c1,
+            c1 - t * c2,
+            c2 - t * c3,
+        ];
     }
     c
 }

@@ -5,10 +5,11 @@ use std::vec::Vec;
 
 use super::follow::Follower;
 use super::limits::MotionLimits;
-use super::pace::{Course, Pace};
+use super::pace::Pace;
 use super::plan::Plan;
 use super::planner::Planner;
 use super::stations::Station;
+use crate::job::AxisLimits;
 
 const T: f64 = 1e-3;
 
@@ -103,7 +104,7 @@ impl Path {
                 let s = self.ends[piece] + part * (self.ends[piece + 1] - self.ends[piece]);
                 plan.stations.push(Station {
                     arc_nm: (s * 1e6).round() as u32,
-                    q: [1, 2, 3].map(|order| (self.of)(piece, s, order).map(|q| q as f32)),
+                    q: [0, 1, 2].map(|axis| [1, 2, 3].map(|order| (self.of)(piece, s, order)[axis] as f32)),
                 });
             }
         }
@@ -117,14 +118,14 @@ impl Path {
 }
 
 fn limits(feed: f32) -> MotionLimits {
-    MotionLimits {
-        feed,
-        velocity: [100.0, 100.0, 50.0],
-        acceleration: [1000.0, 1000.0, 500.0],
-        jerk: [20_000.0, 20_000.0, 10_000.0],
-        chord: 1.0,
-        period: T as f32,
-    }
+    let axes = AxisLimits {
+        velocity_mm_s: [100.0, 100.0, 50.0],
+        acceleration_mm_s2: [1000.0, 1000.0, 500.0],
+        jerk_mm_s3: [20_000.0, 20_000.0, 10_000.0],
+        chord_mm: 1.0,
+        ..AxisLimits::default()
+    };
+    MotionLimits::new(&axes, feed, T as f32)
 }
 
 /// Greatest fractions of velocity, acceleration and jerk of samples, rests before and behind included.
@@ -132,19 +133,20 @@ fn uses(path: &Path, arcs: &[f64], limits: &MotionLimits) -> [f64; 3] {
     let mut q: Vec<[f64; 3]> = std::vec![path.at(0.0); 3];
     q.extend(arcs.iter().map(|s| path.at(*s)));
     q.extend([path.at(path.length()); 3]);
-    let bounds = [&limits.velocity, &limits.acceleration, &limits.jerk];
     let mut most = [0.0_f64; 3];
-    for (order, (most, bounds)) in most.iter_mut().zip(bounds).enumerate() {
+    let bounds = limits
+        .axes
+        .map(|axis| [axis.velocity, axis.acceleration, axis.jerk]);
+    for (order, most) in most.iter_mut().enumerate() {
         q = q
             .windows(2)
             .map(|pair| [0, 1, 2].map(|axis| (pair[1][axis] - pair[0][axis]) / T))
             .collect();
         for value in &q {
             for axis in 0..3 {
-                *most = most.max(value[axis].abs() / f64::from(bounds[axis]));
+                *most = most.max(value[axis].abs() / f64::from(bounds[axis][order]));
             }
         }
-        let _ = order;
     }
     most
 }
@@ -168,21 +170,40 @@ fn run(plan: &Plan) -> Vec<f64> {
 
 /// Time of the fastest way from rest to rest along a straight line.
 fn optimum(s: f64, v: f64, a: f64, j: f64) -> f64 {
-    let ramp = |v: f64| if v * j < a * a { 2.0 * (v / j).sqrt() } else { v / a + a / j };
+    let ramp = |v: f64| {
+        if v * j < a * a {
+            2.0 * (v / j).sqrt()
+        } else {
+            v / a + a / j
+        }
+    };
     if v * ramp(v) <= s {
         return s / v + ramp(v);
     }
     let (mut low, mut high) = (0.0, v);
     for _ in 0..200 {
         let middle = 0.5 * (low + high);
-        if middle * ramp(middle) <= s { low = middle } else { high = middle }
+        if middle * ramp(middle) <= s {
+            low = middle
+        } else {
+            high = middle
+        }
     }
     2.0 * ramp(low)
 }
 
 #[test]
 fn straight_paths_take_the_time_of_the_closed_form() {
-    for (length, feed) in [(0.3, 60.0), (3.0, 60.0), (30.0, 60.0), (30.0, 100.0), (300.0, 100.0), (1800.0, 100.0), (0.003, 60.0), (20.0, 1.0)] {
+    for (length, feed) in [
+        (0.3, 60.0),
+        (3.0, 60.0),
+        (30.0, 60.0),
+        (30.0, 100.0),
+        (300.0, 100.0),
+        (1800.0, 100.0),
+        (0.003, 60.0),
+        (20.0, 1.0),
+    ] {
         let limits = limits(feed);
         let path = Path::straight(length);
         let plan = path.plan(&limits);
@@ -190,35 +211,70 @@ fn straight_paths_take_the_time_of_the_closed_form() {
         let most = uses(&path, &arcs, &limits);
         let time = arcs.len() as f64 * T;
         let best = optimum(length, f64::from(feed), 1000.0, 20_000.0);
-        std::println!("{length} {feed}: {time:.4} {best:.4} {:.4} {most:.4?} N {}", time / best, plan.intervals);
-        assert!(most[0] <= 1.0001 && most[1] <= 1.0 && most[2] <= 1.02, "{length} {feed}: {most:?}");
-        assert!(time <= 1.04 * best + 2.0 * T, "{length} {feed}: {time} for {best}");
+        std::println!(
+            "{length} {feed}: {time:.4} {best:.4} {:.4} {most:.4?} N {}",
+            time / best,
+            plan.intervals
+        );
+        assert!(
+            most[0] <= 1.0001 && most[1] <= 1.0 && most[2] <= 1.02,
+            "{length} {feed}: {most:?}"
+        );
+        assert!(
+            time <= 1.04 * best + 2.0 * T,
+            "{length} {feed}: {time} for {best}"
+        );
     }
 }
 
 #[test]
 fn bends_keep_the_limits() {
-    for (radius, length, feed) in [(10.0, 60.0, 60.0), (3.0, 30.0, 100.0), (50.0, 200.0, 30.0), (0.5, 3.0, 100.0)] {
+    for (radius, length, feed) in [
+        (10.0, 60.0, 60.0),
+        (3.0, 30.0, 100.0),
+        (50.0, 200.0, 30.0),
+        (0.5, 3.0, 100.0),
+    ] {
         let limits = limits(feed);
         let path = Path::circle(length, radius);
         let plan = path.plan(&limits);
         let arcs = run(&plan);
         let most = uses(&path, &arcs, &limits);
-        std::println!("{radius} {length} {feed}: {:.4} {most:.4?} N {}", arcs.len() as f64 * T, plan.intervals);
-        assert!(most[0] <= 1.0001 && most[1] <= 1.0 && most[2] <= 1.02, "{radius}: {most:?}");
+        std::println!(
+            "{radius} {length} {feed}: {:.4} {most:.4?} N {}",
+            arcs.len() as f64 * T,
+            plan.intervals
+        );
+        assert!(
+            most[0] <= 1.0001 && most[1] <= 1.0 && most[2] <= 1.02,
+            "{radius}: {most:?}"
+        );
     }
 }
 
 #[test]
 fn jumps_of_the_curvature_keep_the_limits() {
-    for (pieces, length, radius, feed) in [(8, 10.0, 30.0, 60.0), (8, 10.0, 30.0, 100.0), (12, 4.0, 5.0, 60.0), (5, 20.0, 100.0, 100.0)] {
+    for (pieces, length, radius, feed) in [
+        (8, 10.0, 30.0, 60.0),
+        (8, 10.0, 30.0, 100.0),
+        (12, 4.0, 5.0, 60.0),
+        (5, 20.0, 100.0, 100.0),
+    ] {
         let limits = limits(feed);
         let path = Path::slalom(pieces, length, radius);
         let plan = path.plan(&limits);
         let arcs = run(&plan);
         let most = uses(&path, &arcs, &limits);
-        std::println!("{pieces} {length} {radius} {feed}: {:.4} {most:.4?} N {} knots {}", arcs.len() as f64 * T, plan.intervals, plan.knot_count);
-        assert!(most[0] <= 1.0001 && most[1] <= 1.0 && most[2] <= 1.03, "{pieces} {radius}: {most:?}");
+        std::println!(
+            "{pieces} {length} {radius} {feed}: {:.4} {most:.4?} N {} knots {}",
+            arcs.len() as f64 * T,
+            plan.intervals,
+            plan.knot_count
+        );
+        assert!(
+            most[0] <= 1.0001 && most[1] <= 1.0 && most[2] <= 1.03,
+            "{pieces} {radius}: {most:?}"
+        );
     }
 }
 
@@ -251,7 +307,13 @@ impl Random {
 }
 
 /// Holds and overrides at random times: limits are kept, every run ends at its end; the time from a hold to rest is returned.
-fn commanded(path: &Path, plan: &Plan, limits: &MotionLimits, random: &mut Random, gap: f64) -> (Vec<f64>, [f64; 3]) {
+fn commanded(
+    path: &Path,
+    plan: &Plan,
+    limits: &MotionLimits,
+    random: &mut Random,
+    gap: f64,
+) -> (Vec<f64>, [f64; 3]) {
     let mut follower = Follower::START;
     follower.begin(plan);
     let mut pace = Pace::REST;
@@ -264,7 +326,13 @@ fn commanded(path: &Path, plan: &Plan, limits: &MotionLimits, random: &mut Rando
         let now = arcs.len() as f64 * T;
         if now >= next {
             next = now + gap * random.next() * 2.0;
-            let wanted = if random.next() < 0.4 { 0.0 } else if random.next() < 0.5 { 1.0 } else { random.next() };
+            let wanted = if random.next() < 0.4 {
+                0.0
+            } else if random.next() < 0.5 {
+                1.0
+            } else {
+                random.next()
+            };
             pace.want(wanted as f32, false);
             held = (wanted == 0.0).then_some(now);
         }
@@ -272,7 +340,9 @@ fn commanded(path: &Path, plan: &Plan, limits: &MotionLimits, random: &mut Rando
             if let Some(from) = held.take() {
                 holds.push(now - from);
             }
-            if now + 0.5 > next { pace.want(1.0, false); }
+            if now + 0.5 > next {
+                pace.want(1.0, false);
+            }
         }
         let r = pace.tick();
         follower.tick(plan, r);
@@ -313,7 +383,16 @@ fn commands_at_any_time_keep_the_limits() {
     }
     holds.sort_by(f64::total_cmp);
     let at = |part: f64| holds[((holds.len() - 1) as f64 * part) as usize];
-    std::println!("{} holds: {:.3} {:.3} {:.3}; {worst:.4?}", holds.len(), at(0.5), at(0.9), at(1.0));
-    assert!(worst[0] <= 1.0001 && worst[1] <= 1.0 && worst[2] <= 1.02, "{worst:?}");
+    std::println!(
+        "{} holds: {:.3} {:.3} {:.3}; {worst:.4?}",
+        holds.len(),
+        at(0.5),
+        at(0.9),
+        at(1.0)
+    );
+    assert!(
+        worst[0] <= 1.0001 && worst[1] <= 1.0 && worst[2] <= 1.02,
+        "{worst:?}"
+    );
     assert!(at(0.9) <= 0.25 && at(1.0) <= 0.6, "{} {}", at(0.9), at(1.0));
 }

@@ -4,7 +4,7 @@
 use super::limits::{MotionLimits, SLOPE_MIN};
 use super::plan::{KNOTS_MAX, Knot, NODES_MAX, NODES_MIN, Plan};
 use super::stations::{Derivatives, STATIONS_MAX, between};
-use super::to_q10;
+use super::{MM_PER_Q10, to_q10};
 use crate::math::arith::{sqrt, truncated};
 use crate::math::number::{Bounded, cube_root, to_f32};
 
@@ -32,7 +32,9 @@ const KNOT_BISECTIONS: u8 = 16;
 
 const STATIONS_A_PORTION: u16 = 24;
 const JUMPS_A_PORTION: u16 = 6;
-const KNOTS_A_PORTION: u16 = 20;
+const NODES_A_PORTION: u16 = 60;
+const PLACES_A_PORTION: u16 = 50;
+const KNOTS_A_PORTION: u16 = 40;
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Stage {
@@ -50,7 +52,7 @@ enum Stage {
     Bisect(u8),
     Times,
     Increments,
-    Steps,
+    Means,
     Nodes,
     Knots,
     Done,
@@ -83,8 +85,15 @@ pub(crate) struct Walker {
     high: f32,
     /// Spacing at the ends, s.
     ends: f32,
-    /// Nodes of the unsmoothed walk.
+    /// Nodes of the unsmoothed walk, and what their times are scaled by.
     times: u16,
+    scale: f32,
+    /// Cell, and the place before it: station and mm beyond it.
+    cell: u16,
+    before: (u32, f32),
+    /// Sums over the mean: length, units of 2^-10 nm, and time, s.
+    sum_q10: i64,
+    sum_s: f32,
     coarsenings: u8,
 }
 
@@ -113,6 +122,11 @@ impl Walker {
         high: 0.0,
         ends: 0.0,
         times: 0,
+        scale: 0.0,
+        cell: 0,
+        before: (0, 0.0),
+        sum_q10: 0,
+        sum_s: 0.0,
         coarsenings: 0,
     };
 
@@ -205,17 +219,38 @@ impl Walker {
                 Stage::Increments
             }
             Stage::Increments => {
-                self.increments(lists, plan);
-                Stage::Steps
+                let end = self.times.min(self.index + NODES_A_PORTION);
+                for node in self.index..end {
+                    self.increment(lists, plan, node);
+                }
+                if end == self.times {
+                    self.begin_means(plan);
+                }
+                self.next(end, end == self.times, Stage::Increments, Stage::Means)
             }
-            Stage::Steps => {
-                self.steps(lists, plan);
-                Stage::Nodes
+            Stage::Means => {
+                let count = plan.intervals + 2;
+                let end = count.min(self.index + NODES_A_PORTION);
+                for index in self.index..end {
+                    self.mean(lists, plan, index);
+                }
+                if end == count {
+                    (self.cell, self.sum_q10) = (0, 0);
+                    plan.trim_q10 = 0;
+                }
+                self.next(end, end == count, Stage::Means, Stage::Nodes)
             }
             Stage::Nodes => {
-                plan.place_nodes();
-                plan.knot_count = 0;
-                self.next(0, true, Stage::Knots, Stage::Knots)
+                let count = plan.intervals + 1;
+                let end = count.min(self.index + PLACES_A_PORTION);
+                for node in self.index..end {
+                    (self.cell, self.sum_q10) = plan.place_node(node, self.cell, self.sum_q10);
+                }
+                if end == count {
+                    plan.trim(self.sum_q10);
+                    plan.knot_count = 0;
+                }
+                self.next(end, end == count, Stage::Nodes, Stage::Knots)
             }
             Stage::Knots => {
                 let end = plan.intervals.min(self.index + KNOTS_A_PORTION);
@@ -236,29 +271,22 @@ impl Walker {
 
     /// Caps of speed and acceleration at a station.
     fn cap(&mut self, lists: &mut Lists, station: u16, q: &Derivatives, limits: &MotionLimits) {
-        let [first, second, third] = q;
-        let mut square = limits.speed_sqr(q);
+        let mut square = 1.0 / limits.inverse_speed_sqr(q);
         let mut jerk = f32::MAX;
-        for (((a, j), (first, second)), third) in limits
-            .acceleration
-            .iter()
-            .zip(&limits.jerk)
-            .zip(first.iter().zip(second))
-            .zip(third)
-        {
-            square = square.at_most(0.85 * a / second.abs().at_least(1e-9));
-            let speed = cube_root(0.7 * j / third.abs().at_least(1e-9));
+        for (axis, [first, second, third]) in limits.axes.iter().zip(q) {
+            square = square.at_most(0.85 * axis.acceleration / second.abs().at_least(1e-9));
+            let speed = cube_root(0.7 * axis.jerk / third.abs().at_least(1e-9));
             square = square.at_most(speed * speed);
-            jerk = jerk.at_most(0.8 * j / first.abs().at_least(SLOPE_MIN));
+            jerk = jerk.at_most(0.8 * axis.jerk / first.abs().at_least(SLOPE_MIN));
         }
         let speed = sqrt(square);
         let mut accel = f32::MAX;
-        for (((a, j), first), second) in limits.acceleration.iter().zip(&limits.jerk).zip(first).zip(second) {
+        for (axis, [first, second, _]) in limits.axes.iter().zip(q) {
             let bend = second.abs().at_least(1e-9);
-            let left = (a - bend * square).at_least(0.3 * a);
+            let left = (axis.acceleration - bend * square).at_least(0.3 * axis.acceleration);
             accel = accel
                 .at_most(0.7 * left / first.abs().at_least(SLOPE_MIN))
-                .at_most(0.5 * j / (3.0 * bend * speed));
+                .at_most(0.5 * axis.jerk / (3.0 * bend * speed));
         }
         self.jerk = self.jerk.at_most(jerk);
         self.acceleration = self.acceleration.at_least(accel);
@@ -279,7 +307,11 @@ impl Walker {
         let to = plan.stations.count().min(jump + JUMP_STATIONS);
         for station in from..to {
             let arc = plan.stations.get(station).arc_nm;
-            let away = if arc < at { between(arc, at) } else { between(at, arc) };
+            let away = if arc < at {
+                between(arc, at)
+            } else {
+                between(at, arc)
+            };
             let root = cube_root(6.0 * away / self.jerk);
             let most = speed + 0.5 * self.jerk * root * root;
             let square = get(lists, SPEED_SQR, station).at_most(most * most);
@@ -298,8 +330,8 @@ impl Walker {
         put(lists, SPEED_SQR, 0, 0.0);
         put(lists, SPEED_SQR, last, 0.0);
         for cell in (0..last).rev() {
-            let reach = get(lists, SPEED_SQR, cell + 1)
-                + 2.0 * self.accel(lists, cell) * plan.stations.cell_mm(cell);
+            let reach =
+                get(lists, SPEED_SQR, cell + 1) + 2.0 * self.accel(lists, cell) * plan.stations.cell_mm(cell);
             let square = get(lists, SPEED_SQR, cell).at_most(reach);
             put(lists, SPEED_SQR, cell, square);
         }
@@ -370,7 +402,8 @@ impl Walker {
     /// Nodes left for the mean over `n` of them.
     fn room(&self, spacing: f32) -> u16 {
         let mean = truncated(self.mean_s / spacing.at_most(self.ends) + 0.5).max(2);
-        self.intervals.saturating_sub(u16::try_from(mean).unwrap_or(u16::MAX))
+        self.intervals
+            .saturating_sub(u16::try_from(mean).unwrap_or(u16::MAX))
     }
 
     fn fits(&self, lists: &Lists, spacing: f32, growth: f32) -> bool {
@@ -409,66 +442,79 @@ impl Walker {
             }
         }
         self.times = nodes.count;
-        let scale = self.duration / last.at_least(1e-9);
-        for node in 0..self.times {
-            let time = get(lists, NODES, node);
-            put(lists, NODES, node, time * scale);
-        }
+        self.scale = self.duration / last.at_least(1e-9);
+        (self.cell, self.before) = (0, (0, 0.0));
         plan.intervals = self.intervals;
         plan.step_s = spacing.at_most(self.ends);
+        plan.inverse_step = 1.0 / plan.step_s;
     }
 
-    /// Lengths between the nodes.
-    fn increments(&self, lists: &mut Lists, plan: &Plan) {
+    /// Length from the node before to a node.
+    fn increment(&mut self, lists: &mut Lists, plan: &Plan, node: u16) {
+        let Some(previous) = node.checked_sub(1) else {
+            return;
+        };
         let last = plan.stations.count().saturating_sub(1);
-        let mut cell = 0;
-        let mut before = (0, 0.0);
-        for node in 1..self.times {
-            let time = get(lists, NODES, node);
-            while cell + 1 < last && get(lists, TIME, cell + 1) <= time {
-                cell += 1;
-            }
-            let place = if node + 1 == self.times {
-                (plan.stations.length_nm(), 0.0)
-            } else {
-                let since = time - get(lists, TIME, cell);
-                let [here, there] = [cell, cell + 1].map(|station| get(lists, SPEED_SQR, station));
-                let length = plan.stations.cell_mm(cell).at_least(1e-7);
-                let moved = since * (sqrt(here) + 0.25 * (there - here) / length * since);
-                (plan.stations.get(cell).arc_nm, moved.at_most(length))
-            };
-            let ((from, from_mm), (to, to_mm)) = (before, place);
-            put(lists, BUSY, node - 1, (between(from, to) + (to_mm - from_mm)).at_least(0.0));
-            before = place;
+        let time = get(lists, NODES, node) * self.scale;
+        while self.cell + 1 < last && get(lists, TIME, self.cell + 1) <= time {
+            self.cell += 1;
         }
+        let place = if node + 1 == self.times {
+            (plan.stations.length_nm(), 0.0)
+        } else {
+            let since = time - get(lists, TIME, self.cell);
+            let [here, there] = [self.cell, self.cell + 1].map(|station| get(lists, SPEED_SQR, station));
+            let length = plan.stations.cell_mm(self.cell).at_least(1e-7);
+            let moved = since * (sqrt(here) + 0.25 * (there - here) / length * since);
+            (plan.stations.get(self.cell).arc_nm, moved.at_most(length))
+        };
+        let ((from, from_mm), (to, to_mm)) = (self.before, place);
+        put(
+            lists,
+            BUSY,
+            previous,
+            (between(from, to) + (to_mm - from_mm)).at_least(0.0),
+        );
+        self.before = place;
     }
 
-    /// The means over `n` nodes: steps of the walk, and its pace as it is.
-    fn steps(&self, lists: &mut Lists, plan: &mut Plan) {
+    /// Nodes that the mean is over.
+    const fn mean_nodes(&self) -> u16 {
+        self.intervals - self.times
+    }
+
+    fn begin_means(&mut self, plan: &Plan) {
+        self.sum_q10 = 0;
+        self.sum_s = f32::from(self.mean_nodes()) * plan.step_s;
+    }
+
+    /// A mean: a step of the walk, and its pace as it is.
+    fn mean(&mut self, lists: &Lists, plan: &mut Plan, index: u16) {
         let pairs = self.times - 1;
-        let n = self.intervals - pairs - 1;
+        let n = self.mean_nodes();
         let inverse = 1.0 / f32::from(n);
         let h = plan.step_s;
         let increment = |index: u16| to_q10(get(lists, BUSY, index));
-        let duration = |index: u16| get(lists, NODES, index + 1) - get(lists, NODES, index);
-        let mut sum_q10 = 0;
-        let mut time = f32::from(n) * h;
-        let coefficients = plan.walk.iter_mut().zip(&mut plan.pace);
-        for (index, (walk, pace)) in (0_u16..).zip(coefficients.take(usize::from(self.intervals) + 2)) {
-            // The newest is index - 2, the oldest that leaves is index - 2 - n.
-            if let Some(newest) = index.checked_sub(2).filter(|newest| *newest < pairs) {
-                sum_q10 += increment(newest);
-                time += duration(newest) - h;
-            }
-            if let Some(oldest) = index.checked_sub(2 + n).filter(|oldest| *oldest < pairs) {
-                sum_q10 -= increment(oldest);
-                time += h - duration(oldest);
-            }
-            *walk = to_f32(sum_q10) * super::MM_PER_Q10 * inverse;
-            let mean = time * inverse;
-            let ratio = h / mean.at_least(1e-9);
+        let duration = |index: u16| self.scale * (get(lists, NODES, index + 1) - get(lists, NODES, index));
+        // The newest is index - 2, the oldest that leaves is index - 2 - n; beyond the ends nothing moves.
+        let newest = index.checked_sub(2).filter(|newest| *newest < pairs);
+        let oldest = index.checked_sub(2 + n).filter(|oldest| *oldest < pairs);
+        let (mut sum_q10, mut sum_s) = (self.sum_q10, self.sum_s);
+        if let Some(newest) = newest {
+            sum_q10 += increment(newest);
+            sum_s += duration(newest) - h;
+        }
+        if let Some(oldest) = oldest {
+            sum_q10 -= increment(oldest);
+            sum_s += h - duration(oldest);
+        }
+        let index = usize::from(index);
+        if let (Some(walk), Some(pace)) = (plan.walk.get_mut(index), plan.pace.get_mut(index)) {
+            *walk = to_f32(sum_q10) * MM_PER_Q10 * inverse;
+            let ratio = h / (sum_s * inverse).at_least(1e-9);
             *pace = ratio * ratio;
         }
+        (self.sum_q10, self.sum_s) = (sum_q10, sum_s);
     }
 }
 
@@ -526,10 +572,12 @@ fn find_knots(plan: &mut Plan, index: u16, limits: &MotionLimits) {
         if usize::from(plan.knot_count) >= KNOTS_MAX || !plan.stations.is_jump(station) {
             continue;
         }
-        let [first, second] = limits.jump_jerk(&plan.stations.jump(station));
         let feed = limits.feed;
-        let matters = |(first, second): (&f32, &f32)| (first + second * feed) * feed > 0.01;
-        if !first.iter().zip(&second).any(matters) {
+        let jerk = limits.jump_jerk(&plan.stations.jump(station));
+        if !jerk
+            .iter()
+            .any(|[first, second]| (first + second * feed) * feed > 0.01)
+        {
             continue;
         }
         let arc_of = |station| plan.stations.get(station).arc_nm;
@@ -566,7 +614,10 @@ fn get(lists: &Lists, list: usize, index: u16) -> f32 {
 }
 
 fn put(lists: &mut Lists, list: usize, index: u16, value: f32) {
-    if let Some(place) = lists.get_mut(list).and_then(|list| list.get_mut(usize::from(index))) {
+    if let Some(place) = lists
+        .get_mut(list)
+        .and_then(|list| list.get_mut(usize::from(index)))
+    {
         *place = value;
     }
 }

@@ -5,12 +5,12 @@ use crate::fault::{Fault, FaultKind, Result};
 use crate::feed::curve::{Curve, CurveCursor, CurveLimits};
 use crate::feed::limits::{MotionLimits, SLOPE_MIN};
 use crate::feed::pace::{Course as _, Pace};
-use crate::feed::stations::{WINDOW, Window};
+use crate::feed::stations::{Derivatives, WINDOW, Window};
 use crate::feed::to_q10;
 use crate::job::AxisLimits;
 use crate::job::program::Job;
 use crate::math::arith::sqrt;
-use crate::math::number::{Bounded, MM_PER_NM, to_f32};
+use crate::math::number::{Bounded, MM_PER_NM, cube_root, to_f32};
 use crate::pass::offset::Located;
 use crate::pass::patch::Patch;
 use crate::pass::position::PassPosition;
@@ -200,8 +200,8 @@ pub(crate) struct BoundaryStepOver {
     /// Limits over the stations so far: of the speed, and of what the bends leave.
     limits: MotionLimits,
     curve: CurveLimits,
-    /// Greatest bends over the stations, per axis, by the arc: first, second, third derivative.
-    bends: [[f32; 3]; 3],
+    /// Greatest derivatives over the stations.
+    bends: Derivatives,
     contact: [i32; 3],
     /// Maximum ratio of the length of the contact's path to the length in the plan.
     contact_ratio: f32,
@@ -238,7 +238,14 @@ impl BoundaryStepOver {
     };
 
     /// Begins to plan a step-over from the pass that ends on this patch to another, at this feed, mm/s.
-    pub(crate) fn begin(&mut self, job: &Job<'_>, axes: &AxisLimits, line: &PassPosition, to: SpanParameter, feed: f32) {
+    pub(crate) fn begin(
+        &mut self,
+        job: &Job<'_>,
+        axes: &AxisLimits,
+        line: &PassPosition,
+        to: SpanParameter,
+        feed: f32,
+    ) {
         let width = |span| job.side_width(span);
         self.from = line.side;
         self.to = to;
@@ -289,7 +296,8 @@ impl BoundaryStepOver {
             Task::Ends => {
                 let here = self.locate(job, 0.0)?;
                 let there = self.locate(job, 1.0)?;
-                self.length = distance(&here.cc_nm, &there.cc_nm).at_least(distance(&here.cl_nm, &there.cl_nm));
+                self.length =
+                    distance(&here.cc_nm, &there.cc_nm).at_least(distance(&here.cl_nm, &there.cl_nm));
                 if self.is_nothing() {
                     Task::Done
                 } else {
@@ -335,18 +343,12 @@ impl BoundaryStepOver {
     /// The curve that the bends leave room for.
     fn choose_curve(&mut self) {
         let limits = &self.limits;
-        let mut speed = sqrt(limits.speed_sqr(&self.bends)).at_most(self.feed / self.contact_ratio);
-        for (((a, j), second), third) in limits
-            .acceleration
-            .iter()
-            .zip(&limits.jerk)
-            .zip(&self.bends[1])
-            .zip(&self.bends[2])
-        {
-            let cubed = BEND_JERK_SHARE * j / third.at_least(1e-9);
+        let top = 1.0 / sqrt(limits.inverse_speed_sqr(&self.bends));
+        let mut speed = top.at_most(self.feed / self.contact_ratio);
+        for (axis, [_, second, third]) in limits.axes.iter().zip(&self.bends) {
             speed = speed
-                .at_most(sqrt(BEND_SHARE * a / second.at_least(1e-9)))
-                .at_most(crate::math::number::cube_root(cubed));
+                .at_most(sqrt(BEND_SHARE * axis.acceleration / second.at_least(1e-9)))
+                .at_most(cube_root(BEND_JERK_SHARE * axis.jerk / third.at_least(1e-9)));
         }
         let mut curve = Curve::NONE;
         let mut peak = 0.0;
@@ -365,16 +367,14 @@ impl BoundaryStepOver {
             acceleration: f32::MAX,
             jerk: f32::MAX,
         };
-        let [first, second, third] = &self.bends;
-        let limits = || self.limits.acceleration.iter().zip(&self.limits.jerk);
-        for (((a, _), first), second) in limits().zip(first).zip(second) {
-            let slope = 1.0 / first.at_least(SLOPE_MIN);
-            left.acceleration = left.acceleration.at_most((a - second * peak * peak).at_least(0.2 * a) * slope);
+        for (axis, [first, second, _]) in self.limits.axes.iter().zip(&self.bends) {
+            let room = (axis.acceleration - second * peak * peak).at_least(0.2 * axis.acceleration);
+            left.acceleration = left.acceleration.at_most(room / first.at_least(SLOPE_MIN));
         }
-        for ((((_, j), first), second), third) in limits().zip(first).zip(second).zip(third) {
-            let slope = 1.0 / first.at_least(SLOPE_MIN);
+        for (axis, [first, second, third]) in self.limits.axes.iter().zip(&self.bends) {
             let taken = (third * peak * peak + 3.0 * second * left.acceleration) * peak;
-            left.jerk = left.jerk.at_most((j - taken).at_least(0.15 * j) * slope);
+            let room = (axis.jerk - taken).at_least(0.15 * axis.jerk);
+            left.jerk = left.jerk.at_most(room / first.at_least(SLOPE_MIN));
         }
         left
     }

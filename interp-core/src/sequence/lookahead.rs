@@ -317,7 +317,11 @@ impl Lookahead {
         let last = count.saturating_sub(1);
         let middle = WINDOW / 2;
         // Where the window is full for the first time, also those before its middle; at the patch's end also those behind it.
-        let from = if usize::from(self.station) + 1 == count { 0 } else { middle };
+        let from = if usize::from(self.station) + 1 == count {
+            0
+        } else {
+            middle
+        };
         let to = if is_end { last } else { middle };
         if count < WINDOW && !is_end {
             return self.estimates(job, out);
@@ -343,7 +347,11 @@ impl Lookahead {
                 }
             }
             Kept::Ends => {
-                let back = if is_end { 1 } else { 1 + u16::from(self.station >= out.cells) };
+                let back = if is_end {
+                    1
+                } else {
+                    1 + u16::from(self.station >= out.cells)
+                };
                 if (is_start || is_end)
                     && let Some(place) = out.plan.stations.back_mut(back)
                 {
@@ -474,12 +482,12 @@ impl Lookahead {
 }
 
 /// The direction at the station, and of each higher derivative the one that is greater.
-fn widen([direction, bends @ ..]: &mut Derivatives, [first, higher @ ..]: &Derivatives, is_here: bool) {
-    if is_here {
-        *direction = *first;
-    }
-    for (most, q) in bends.iter_mut().zip(higher) {
-        for (most, q) in most.iter_mut().zip(q) {
+fn widen(most: &mut Derivatives, q: &Derivatives, is_here: bool) {
+    for ([direction, bends @ ..], [first, higher @ ..]) in most.iter_mut().zip(q) {
+        if is_here {
+            *direction = *first;
+        }
+        for (most, q) in bends.iter_mut().zip(higher) {
             if q.abs() > most.abs() {
                 *most = *q;
             }

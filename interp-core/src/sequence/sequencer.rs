@@ -217,7 +217,9 @@ impl Sequencer {
             Phase::Leg(_) => self.straight.progress.has_work(),
             Phase::Await | Phase::AwaitGoal(_) | Phase::Done => false,
         };
-        seeks_pace || (self.pending.is_none() && (self.planning != Planning::Complete || self.has_to_plan_step_over()))
+        seeks_pace
+            || (self.pending.is_none()
+                && (self.planning != Planning::Complete || self.has_to_plan_step_over()))
     }
 
     fn has_to_plan_step_over(&self) -> bool {
@@ -416,7 +418,14 @@ impl Sequencer {
 
     /// Enters the pass, which begins at the tool's position, and emits its first sample.
     #[inline(never)]
-    fn enter_pass(&mut self, job: &Job<'_>, axes: &AxisLimits, run: &mut Run, wish: Wish, last: &mut Sample) -> Result<()> {
+    fn enter_pass(
+        &mut self,
+        job: &Job<'_>,
+        axes: &AxisLimits,
+        run: &mut Run,
+        wish: Wish,
+        last: &mut Sample,
+    ) -> Result<()> {
         let (now, _) = both(&mut self.plans, self.second);
         run.enter_pass(job, now.pass, now.side)?;
         run.begin(now.interval, last)?;
@@ -436,13 +445,7 @@ impl Sequencer {
         Ok(())
     }
 
-    fn follow_pass(
-        &mut self,
-        job: &Job<'_>,
-        run: &mut Run,
-        wish: Wish,
-        last: &mut Sample,
-    ) -> Result<()> {
+    fn follow_pass(&mut self, job: &Job<'_>, run: &mut Run, wish: Wish, last: &mut Sample) -> Result<()> {
         let (now, _) = both(&mut self.plans, self.second);
         let is_over = if now.point {
             if wish.share > 0.0 && run.is_along() {
@@ -504,7 +507,8 @@ impl Sequencer {
             return;
         };
         self.cell = cell;
-        let (Some(start_q10), Some(since_mm)) = (now.arc_q10(cell), run.since_station(cells, fraction)) else {
+        let (Some(start_q10), Some(since_mm)) = (now.arc_q10(cell), run.since_station(cells, fraction))
+        else {
             return;
         };
         let arc_q10 = start_q10 + crate::feed::to_q10(since_mm);
