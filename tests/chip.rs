@@ -63,9 +63,9 @@ fn without_a_crystal_everything_stays_at_rest() {
 /// Runs a whole sample job over the line: every sample equal to the host's, no byte lost, no tick late.
 fn whole(board: &'static Board, name: &str, home: &str, seed: &str) {
     let emulated = Emulated::start(board, &["--seed", seed]);
-    let path = Job::sample(name, &[]).path;
-    let has_limits = job_file::load(&path).unwrap().machine.has_limits();
-    let (done, said) = emulated.run(&path, home);
+    let job = Job::sample(name, &[]);
+    let has_limits = job_file::load(&job.path).unwrap().machine.has_limits();
+    let (done, said) = emulated.run(&job.path, home);
     let ended = emulated.end();
     assert!(
         done && said.contains("bit for bit the same"),

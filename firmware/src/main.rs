@@ -205,10 +205,7 @@ mod app {
     /// | a panic | cannot be reached: `firmware/no-panic` does not link otherwise |
     #[task(binds = EXTI0, priority = 1, shared = [real_time])]
     fn plan(mut context: plan::Context) {
-        context
-            .shared
-            .real_time
-            .lock(|real_time| plan_task::plan(real_time));
+        context.shared.real_time.lock(plan_task::plan);
     }
 
     /// Reads a byte from the port.

@@ -122,10 +122,7 @@ mod app {
     /// The firmware's planning task.
     #[task(binds = EXTI0, priority = 1, shared = [real_time])]
     fn plan(mut context: plan::Context) {
-        context
-            .shared
-            .real_time
-            .lock(|real_time| plan_task::plan(real_time));
+        context.shared.real_time.lock(plan_task::plan);
         #[cfg(feature = "with-a-panic-in-planning")]
         assert!(black_box(true), "the control");
     }
