@@ -2,11 +2,11 @@
 //!
 //! At a place with walk rates v, a, j (by time at pace 1), per axis:
 //! `|X0 c + X1 c'| < 1` for the acceleration and `|Y0 c + Y1 c' + Y2 c''| < (1 - E2 c)/sqrt(c) - E1` for the jerk, E from a jump nearby; `Z c < 1` for the
-//! speed. The rows are taken at both ends of each interval, on either side of each jump, and those of the speed also in the middle.
-//! A place is weighted by its share of the time.
+//! speed. The rows are taken at each node (that of the jerk on both sides) and on either side of each jump, those of the
+//! speed also in the middle of each interval. A place is weighted by its share of the time.
 
 use super::limits::MotionLimits;
-use super::plan::{COEFFICIENTS, Interval, Plan};
+use super::plan::{COEFFICIENTS, Plan};
 use super::stations::Derivatives;
 use super::walk::{LIST, Lists};
 use crate::math::arith::{inverse_sqrt, sqrt};
@@ -27,258 +27,181 @@ const DIAGONALS: [usize; 3] = [1, 2, 3];
 pub(crate) const SHAPE: usize = 4;
 const _: () = assert!(LIST >= COEFFICIENTS);
 
-/// Fraction of an interval, as the weights of its three coefficients for c, c', c''.
+/// c, c' of the pace, and c'' before and behind.
 #[derive(Clone, Copy, Debug)]
-struct Stencil {
-    weights: [[f32; 3]; 3],
+struct Local {
+    c: f32,
+    c1: f32,
+    c2: [f32; 2],
 }
 
-impl Stencil {
-    fn at(x: f32) -> Self {
-        let y = 1.0 - x;
-        Self {
-            weights: [
-                [0.5 * y * y, 0.5 + x * y, 0.5 * x * x],
-                [-y, y - x, x],
-                [1.0, -2.0, 1.0],
-            ],
-        }
-    }
-
-    /// c, c', c'' of these coefficients.
-    fn of(&self, coefficients: &[f32; 3]) -> [f32; 3] {
-        self.weights.map(|weights| dot(&weights, coefficients))
-    }
+/// A place of the plan: its motion at pace 1, and the path there.
+struct Place {
+    /// mm/s, mm/s^2; jerk before and behind, mm/s^3; inverse time of an interval, 1/s.
+    v: f32,
+    a: f32,
+    j: [f32; 2],
+    h: f32,
+    q: Derivatives,
+    /// Jerk that a jump nearby takes.
+    jump: [[f32; 2]; 3],
 }
 
-fn dot([a0, a1, a2]: &[f32; 3], [b0, b1, b2]: &[f32; 3]) -> f32 {
-    a0 * b0 + a1 * b1 + a2 * b2
-}
-
-/// The rows of one axis at a place.
+/// The rows of an axis at a place.
 #[derive(Clone, Copy, Debug)]
 struct AxisRows {
-    accel: [f32; 2],
-    jerk: [f32; 3],
-    /// E1, E2.
-    jump: [f32; 2],
+    x0: f32,
+    x1: f32,
+    /// Y0 before and behind.
+    y0: [f32; 2],
+    y1: f32,
+    y2: f32,
+    e1: f32,
+    e2: f32,
 }
 
-impl AxisRows {
-    const NONE: Self = Self {
-        accel: [0.0; 2],
-        jerk: [0.0; 3],
-        jump: [0.0; 2],
-    };
-}
-
-/// The rows at a place.
-#[derive(Clone, Copy, Debug)]
-struct Rows {
-    stencil: Stencil,
-    axes: [AxisRows; 3],
-    /// Z.
-    speed: f32,
-    /// Which rows count here.
-    kind: Kind,
-}
-
-/// Which rows a place has.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Kind {
-    /// All, and its part of the time.
-    Node,
-    /// The jerk of the interval's other end, whose other rows are the next interval's.
-    End,
-    /// Those of acceleration and jerk.
-    Jump,
-    /// That of the speed.
-    Middle,
-}
-
-/// Gradient and Hessian by c, c', c''.
-#[derive(Clone, Copy, Debug, Default)]
-struct Local {
-    gradient: [f32; 3],
-    /// Entries 00, 01, 02, 11, 12, 22.
-    hessian: [f32; 6],
-}
-
-impl Rows {
+impl Place {
+    /// The rows of each axis.
     #[inline(always)]
-    fn new(h: f32, limits: &MotionLimits, interval: &Interval, x: f32, place: &Place, kind: Kind) -> Self {
-        let stencil = Stencil::at(x);
-        let [s1, s2, s3] = interval.walk_rates(x);
-        let h2 = h * h;
-        let (v, a, j) = (s1 * h, s2 * h2, s3 * h2 * h);
-        let mut axes = [AxisRows::NONE; 3];
-        let speed = if matches!(kind, Kind::Node | Kind::Middle) {
-            v * v * limits.inverse_speed_sqr(&place.q)
-        } else {
-            0.0
-        };
-        if kind != Kind::Middle {
-            for ((rows, [q1, q2, q3]), inverse) in axes.iter_mut().zip(&place.q).zip(&limits.inverse) {
-                let t1 = 0.5 * q1 * v * h;
-                let t2 = q2 * v * v + q1 * a;
-                let t3 = (q3 * v * v + 3.0 * q2 * a) * v + q1 * j;
-                *rows = AxisRows {
-                    accel: [t2 * inverse.acceleration, t1 * inverse.acceleration],
-                    jerk: [
-                        t3 * inverse.jerk,
-                        1.5 * t2 * inverse.jerk * h,
-                        t1 * inverse.jerk * h,
-                    ],
-                    jump: [0.0; 2],
-                };
-            }
-            if let Some(jump) = &place.jump {
-                for (rows, [first, second]) in axes.iter_mut().zip(jump) {
-                    rows.jump = [first * v, second * v * v];
-                }
-            }
-        }
-        Self {
-            stencil,
-            axes,
-            speed,
-            kind,
+    fn rows(&self, limits: &MotionLimits, mut each: impl FnMut(&AxisRows)) {
+        let (v, a, h) = (self.v, self.a, self.h);
+        let v2 = v * v;
+        let [before, behind] = self.j;
+        for (([q1, q2, q3], inverse), [first, second]) in self.q.iter().zip(&limits.inverse).zip(&self.jump) {
+            let t1 = 0.5 * h * q1 * v;
+            let t2 = q2 * v2 + q1 * a;
+            let t3 = (q3 * v2 + 3.0 * q2 * a) * v;
+            each(&AxisRows {
+                x0: t2 * inverse.acceleration,
+                x1: t1 * inverse.acceleration,
+                y0: [
+                    (t3 + q1 * before) * inverse.jerk,
+                    (t3 + q1 * behind) * inverse.jerk,
+                ],
+                y1: 1.5 * h * t2 * inverse.jerk,
+                y2: h * t1 * inverse.jerk,
+                e1: first * v,
+                e2: second * v2,
+            });
         }
     }
 
-    const fn has_accel(&self) -> bool {
-        matches!(self.kind, Kind::Node | Kind::Jump)
-    }
-
-    const fn has_jerk(&self) -> bool {
-        !matches!(self.kind, Kind::Middle)
-    }
-
-    /// Greatest factor of these coefficients that keeps every row.
-    fn factor(&self, coefficients: &[f32; 3]) -> f32 {
-        let [c, c1, c2] = self.stencil.of(coefficients);
+    /// Greatest factor of the pace that keeps the rows.
+    fn factor(&self, limits: &MotionLimits, speed: f32, pace: &Local) -> f32 {
+        let Local { c, c1, c2 } = *pace;
         let c = c.at_least(1e-9);
-        let mut factor = 1.0 / (self.speed * c).at_least(1e-9);
-        for AxisRows { accel, jerk, jump } in &self.axes {
-            let [x0, x1] = accel;
-            if self.has_accel() {
-                factor = factor.at_most(1.0 / (x0 * c + x1 * c1).abs().at_least(1e-9));
+        let root = sqrt(c);
+        let mut factor = 1.0 / (speed * c).at_least(1e-9);
+        self.rows(limits, |rows| {
+            factor = factor.at_most(1.0 / (rows.x0 * c + rows.x1 * c1).abs().at_least(1e-9));
+            let mut y = 0.0_f32;
+            for (y0, c2) in rows.y0.iter().zip(&c2) {
+                y = y.at_least((y0 * c + rows.y1 * c1 + rows.y2 * c2).abs());
             }
-            if self.has_jerk() {
-                let [y0, y1, y2] = jerk;
-                let [e1, e2] = jump;
-                let root = sqrt(c);
-                let y = (y0 * c + y1 * c1 + y2 * c2).abs() * root;
-                // In z, the root of the factor: y z^3 + e2 c z^2 + e1 root z < 1.
-                let use_of = |z: f32| ((y * z + e2 * c) * z + e1 * root) * z;
-                let mut z = sqrt(factor);
-                for _ in 0..FACTOR_STEPS {
-                    if use_of(z) < 1.0 {
-                        break;
-                    }
-                    z *= FACTOR_STEP;
+            // In z, the root of the factor: y root z^3 + e2 c z^2 + e1 root z < 1.
+            let use_of = |z: f32| ((y * root * z + rows.e2 * c) * z + rows.e1 * root) * z;
+            let mut z = sqrt(factor);
+            for _ in 0..FACTOR_STEPS {
+                if use_of(z) < 1.0 {
+                    break;
                 }
-                factor = factor.at_most(z * z);
+                z *= FACTOR_STEP;
             }
-        }
+            factor = factor.at_most(z * z);
+        });
         factor
     }
 
-    /// Adds the barrier's derivatives, times `mu`.
-    fn add_barrier(&self, coefficients: &[f32; 3], mu: f32, local: &mut Local) {
-        let [c, c1, c2] = self.stencil.of(coefficients);
+    /// Derivatives of the barrier of every row, times `mu`.
+    #[inline(always)]
+    fn barrier(&self, limits: &MotionLimits, pace: &Local, mu: f32, sums: &mut Sums) {
+        let Local { c, c1, c2 } = *pace;
         let inverse_mu = 1.0 / mu;
         let root = inverse_sqrt(c.at_least(1e-12));
         let inverse = root * root;
-        let [mut g0, mut g1, mut g2] = local.gradient;
-        let [mut k00, mut k01, mut k02, mut k11, mut k12, mut k22] = local.hessian;
-        if self.speed > 0.0 {
-            let force = mu * self.speed / (1.0 - self.speed * c).at_least(SLACK_MIN);
-            g0 += force;
-            k00 += force * force * inverse_mu;
-        }
-        for AxisRows { accel, jerk, jump } in &self.axes {
-            if self.has_accel() {
-                let [x0, x1] = *accel;
-                let x = x0 * c + x1 * c1;
-                let u = 1.0 / (1.0 - x * x).at_least(SLACK_MIN);
-                let slope = 2.0 * mu * x * u;
-                let bend = 2.0 * mu * (1.0 + x * x) * u * u;
-                g0 += x0 * slope;
-                g1 += x1 * slope;
-                k00 += x0 * x0 * bend;
-                k01 += x0 * x1 * bend;
-                k11 += x1 * x1 * bend;
-            }
-            if self.has_jerk() {
-                let [y0, y1, y2] = *jerk;
-                let [e1, e2] = *jump;
-                let y = y0 * c + y1 * c1 + y2 * c2;
-                let w = (1.0 - e2 * c) * root - e1;
-                let wc = -0.5 * root * (inverse + e2);
+        self.rows(limits, |rows| {
+            let AxisRows { x0, x1, y1, y2, .. } = *rows;
+            let x = x0 * c + x1 * c1;
+            let u = 1.0 / (1.0 - x * x).at_least(SLACK_MIN);
+            let slope = 2.0 * mu * x * u;
+            let bend = 2.0 * mu * (1.0 + x * x) * u * u;
+            sums.g0 += x0 * slope;
+            sums.g1 += x1 * slope;
+            sums.k00 += x0 * x0 * bend;
+            sums.k01 += x0 * x1 * bend;
+            sums.k11 += x1 * x1 * bend;
+            let w = (1.0 - rows.e2 * c) * root - rows.e1;
+            let wc = -0.5 * root * (inverse + rows.e2);
+            let part = y1 * c1;
+            let Sums { sides, .. } = sums;
+            let [mut g0, mut g1, mut k00, mut k01, mut k11] = [0.0; 5];
+            for ((side, y0), c2) in sides.iter_mut().zip(&rows.y0).zip(&c2) {
+                let y = y0 * c + part + y2 * c2;
                 let t = mu / (w * w - y * y).at_least(SLACK_MIN * w * w);
                 let (up, down) = ((w + y) * t, (w - y) * t);
                 let (slope, sum) = (up - down, up + down);
-                let (bend, skew) = (
-                    (up * up + down * down) * inverse_mu,
-                    (up * up - down * down) * inverse_mu,
-                );
-                g0 += y0 * slope - wc * sum;
-                g1 += y1 * slope;
-                g2 += y2 * slope;
+                let bend = (up * up + down * down) * inverse_mu;
+                let skew = slope * sum * inverse_mu;
                 let cross = y0 * bend - wc * skew;
+                g0 += y0 * slope - wc * sum;
+                g1 += slope;
                 k00 += y0 * cross + wc * (wc * bend - y0 * skew);
-                k01 += y1 * cross;
-                k02 += y2 * cross;
-                k11 += y1 * y1 * bend;
-                k12 += y1 * y2 * bend;
-                k22 += y2 * y2 * bend;
+                k01 += cross;
+                k11 += bend;
+                side.g2 += y2 * slope;
+                side.k02 += y2 * cross;
+                side.k12 += y1 * y2 * bend;
+                side.k22 += y2 * y2 * bend;
             }
-        }
-        local.gradient = [g0, g1, g2];
-        local.hessian = [k00, k01, k02, k11, k12, k22];
-    }
-
-    /// Adds the derivatives of this place's part of the time.
-    fn add_time(&self, coefficients: &[f32; 3], weight: f32, local: &mut Local) {
-        let [c, _, _] = self.stencil.of(coefficients);
-        let root = inverse_sqrt(c.at_least(1e-12));
-        let inverse = root * root;
-        let slope = 0.5 * weight * root * inverse;
-        let [g0, _, _] = &mut local.gradient;
-        *g0 -= slope;
-        let [k00, ..] = &mut local.hessian;
-        *k00 += 1.5 * slope * inverse;
+            sums.g0 += g0;
+            sums.g1 += y1 * g1;
+            sums.k00 += k00;
+            sums.k01 += y1 * k01;
+            sums.k11 += y1 * y1 * k11;
+        });
     }
 
     /// The row that is used up first along a direction.
-    fn reach(&self, coefficients: &[f32; 3], direction: &[f32; 3], reach: &mut Reach) {
-        let [c, c1, c2] = self.stencil.of(coefficients);
-        let [d, d1, d2] = self.stencil.of(direction);
-        if self.speed > 0.0 {
-            reach.add(1.0 - self.speed * c, self.speed * d);
-        }
-        if self.kind == Kind::Middle {
-            return;
-        }
+    #[inline(always)]
+    fn reach(&self, limits: &MotionLimits, pace: &Local, direction: &Local, reach: &mut Reach) {
+        let Local { c, c1, c2 } = *pace;
+        let (d, d1, d2) = (direction.c, direction.c1, direction.c2);
         let root = inverse_sqrt(c.at_least(1e-12));
         let inverse = root * root;
-        for AxisRows { accel, jerk, jump } in &self.axes {
-            if self.has_accel() {
-                let [x0, x1] = *accel;
-                let (x, dx) = (x0 * c + x1 * c1, x0 * d + x1 * d1);
-                reach.add(1.0 - x, dx);
-                reach.add(1.0 + x, -dx);
+        self.rows(limits, |rows| {
+            let (x, dx) = (rows.x0 * c + rows.x1 * c1, rows.x0 * d + rows.x1 * d1);
+            // Of the two sides of a row only that which is approached is used up.
+            reach.add(1.0 - if dx < 0.0 { -x } else { x }, dx.abs());
+            let w = (1.0 - rows.e2 * c) * root - rows.e1;
+            let dw = -0.5 * root * (inverse + rows.e2) * d;
+            let (part, dpart) = (rows.y1 * c1, rows.y1 * d1);
+            for ((y0, c2), d2) in rows.y0.iter().zip(&c2).zip(&d2) {
+                let y = y0 * c + part + rows.y2 * c2;
+                let dy = y0 * d + dpart + rows.y2 * d2;
+                reach.add(w - y, dy - dw);
+                reach.add(w + y, -dy - dw);
             }
-            let [y0, y1, y2] = *jerk;
-            let [e1, e2] = *jump;
-            let (y, dy) = (y0 * c + y1 * c1 + y2 * c2, y0 * d + y1 * d1 + y2 * d2);
-            let w = (1.0 - e2 * c) * root - e1;
-            let dw = -0.5 * root * (inverse + e2) * d;
-            reach.add(w - y, dy - dw);
-            reach.add(w + y, -dy - dw);
-        }
+        });
     }
+}
+
+/// Derivatives by c, c' and by c'' on each side.
+#[derive(Clone, Copy, Debug, Default)]
+struct Sums {
+    g0: f32,
+    g1: f32,
+    k00: f32,
+    k01: f32,
+    k11: f32,
+    sides: [Side; 2],
+}
+
+#[derive(Clone, Copy, Debug, Default)]
+struct Side {
+    g2: f32,
+    k02: f32,
+    k12: f32,
+    k22: f32,
 }
 
 /// Steps of the search for a row's factor.
@@ -314,19 +237,62 @@ impl Reach {
     }
 }
 
-/// The path at a place, and the jerk that a jump nearby takes.
-struct Place {
-    q: Derivatives,
-    jump: Option<[[f32; 2]; 3]>,
+/// A sweep over the nodes.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Sweep {
+    pub(crate) node: u16,
+    /// The next jump.
+    knot: u16,
+    /// Inverse square of the speed that the path allows at the node before, (s/mm)^2.
+    speed: f32,
 }
 
-/// The path at a node.
-fn at_node(plan: &Plan, limits: &MotionLimits, slope: f32, node: u16) -> Place {
+impl Sweep {
+    pub(crate) const START: Self = Self {
+        node: 0,
+        knot: 0,
+        speed: 0.0,
+    };
+
+    /// Moves to the next node; whether there is none.
+    pub(crate) const fn next(&mut self, plan: &Plan) -> bool {
+        self.node += 1;
+        let is_over = self.node > plan.intervals;
+        if is_over {
+            *self = Self::START;
+        }
+        is_over
+    }
+}
+
+/// Derivatives of a B-spline's coefficients at a node: c, c', c''; at the ends c'' is that of the other side.
+fn local(values: &[f32; COEFFICIENTS], node: u16, intervals: u16) -> Local {
+    let at = |index: usize| values.get(index).copied().unwrap_or(0.0);
+    let index = usize::from(node);
+    let (here, next) = (at(index), at(index + 1));
+    let behind = at(index + 2) - 2.0 * next + here;
+    let before = match index.checked_sub(1) {
+        Some(previous) => at(previous) - 2.0 * here + next,
+        None => behind,
+    };
+    Local {
+        c: 0.5 * (here + next),
+        c1: next - here,
+        c2: [before, if node < intervals { behind } else { before }],
+    }
+}
+
+/// A node's place, and the inverse square of the speed that the path allows there.
+fn at_node(plan: &Plan, limits: &MotionLimits, node: u16) -> (Place, f32) {
+    let h = plan.inverse_step;
+    let h2 = h * h;
+    let walk = local(&plan.walk, node, plan.intervals);
+    let v = walk.c * h;
     let [cell, part] = plan.node(node);
     let part = f32::from(part) * (1.0 / 65536.0);
     let stations = &plan.stations;
     let length = stations.cell_mm(cell);
-    let near = JUMP_REACH * limits.period * slope;
+    let near = JUMP_REACH * limits.period * v;
     let since = part * length;
     let jump = if cell > 0 && since <= near && stations.is_jump(cell - 1) {
         Some(cell - 1)
@@ -335,74 +301,98 @@ fn at_node(plan: &Plan, limits: &MotionLimits, slope: f32, node: u16) -> Place {
     } else {
         None
     };
-    Place {
+    let place = Place {
+        v,
+        a: walk.c1 * h2,
+        j: walk.c2.map(|j| j * h2 * h),
+        h,
         q: stations.blend(cell, part),
-        jump: jump.map(|station| limits.jump_jerk(&stations.jump(station))),
+        jump: jump.map_or([[0.0; 2]; 3], |station| limits.jump_jerk(&stations.jump(station))),
+    };
+    let speed = limits.inverse_speed_sqr(&place.q);
+    (place, speed)
+}
+
+/// The weights of an interval's coefficients for c, c', c'' at a fraction of it.
+fn stencil(x: f32) -> [[f32; 3]; 3] {
+    let y = 1.0 - x;
+    [
+        [0.5 * y * y, 0.5 + x * y, 0.5 * x * x],
+        [-y, y - x, x],
+        [1.0, -2.0, 1.0],
+    ]
+}
+
+fn at_stencil(weights: &[[f32; 3]; 3], [a, b, c]: &[f32; 3]) -> Local {
+    let [value, first, second] = weights.map(|[x, y, z]| x * a + y * b + z * c);
+    Local {
+        c: value,
+        c1: first,
+        c2: [second; 2],
     }
 }
 
-/// Calls `each` with the rows of an interval.
-#[inline(always)]
-fn rows(plan: &Plan, limits: &MotionLimits, index: u16, knot: &mut u16, mut each: impl FnMut(&Rows)) {
-    let interval = plan.interval(index);
-    let h = plan.inverse_step;
-    let slope = |x| {
-        let [slope, _, _] = interval.walk_rates(x);
-        slope * h
-    };
-    let is_last = index + 1 == plan.intervals;
-    let mut places = [
-        (0.0, Kind::Node, at_node(plan, limits, slope(0.0), index)),
-        (
-            1.0,
-            if is_last { Kind::Node } else { Kind::End },
-            at_node(plan, limits, slope(1.0), index + 1),
-        ),
-        (
-            0.5,
-            Kind::Middle,
-            Place {
-                q: [[0.0; 3]; 3],
-                jump: None,
-            },
-        ),
-    ];
-    let [(_, _, start), (_, _, end), (_, _, middle)] = &mut places;
-    for (middle, (start, end)) in middle.q.iter_mut().zip(start.q.iter().zip(&end.q)) {
-        for (middle, (start, end)) in middle.iter_mut().zip(start.iter().zip(end)) {
-            *middle = 0.5 * (start + end);
-        }
-    }
-    for (x, kind, place) in &places {
-        each(&Rows::new(h, limits, &interval, *x, place, *kind));
-    }
-    while let Some(at) = plan.knot(*knot).filter(|at| at.interval <= index) {
-        if at.interval == index {
-            let x = f32::from(at.part) * (1.0 / 65536.0);
-            let jump = Some(limits.jump_jerk(&plan.stations.jump(at.station)));
-            for side in [at.station, at.station + 1] {
-                let q = plan.stations.get(side).q;
-                each(&Rows::new(
+/// Calls `each` with the place on either side of each jump between a node and the next.
+#[inline(never)]
+fn at_jumps(
+    plan: &Plan,
+    limits: &MotionLimits,
+    sweep: &mut Sweep,
+    each: &mut dyn FnMut(&Place, &[[f32; 3]; 3]),
+) {
+    while let Some(knot) = plan.knot(sweep.knot).filter(|knot| knot.interval <= sweep.node) {
+        if knot.interval == sweep.node {
+            let x = f32::from(knot.part) * (1.0 / 65536.0);
+            let h = plan.inverse_step;
+            let [s1, s2, s3] = plan.interval(knot.interval).walk_rates(x);
+            let jump = limits.jump_jerk(&plan.stations.jump(knot.station));
+            for side in [knot.station, knot.station + 1] {
+                let place = Place {
+                    v: s1 * h,
+                    a: s2 * h * h,
+                    j: [s3 * h * h * h; 2],
                     h,
-                    limits,
-                    &interval,
-                    x,
-                    &Place { q, jump },
-                    Kind::Jump,
-                ));
+                    q: plan.stations.get(side).q,
+                    jump,
+                };
+                each(&place, &stencil(x));
             }
         }
-        *knot += 1;
+        sweep.knot += 1;
     }
 }
 
-/// Greatest factor of the pace that keeps the rows of an interval.
+/// The speed's row in the middle of the interval before a node.
+fn middle(plan: &Plan, node: u16, speeds: [f32; 2]) -> Option<(u16, f32)> {
+    let before = node.checked_sub(1)?;
+    let [a, b] = speeds;
+    let [slope, _, _] = plan.interval(before).walk_rates(0.5);
+    let v = slope * plan.inverse_step;
+    Some((before, 0.5 * (a + b) * v * v))
+}
+
+/// Weights of the coefficients in the middle of an interval.
+const MIDDLE: [f32; 3] = [0.125, 0.75, 0.125];
+
+fn at_middle([a, b, c]: &[f32; 3]) -> f32 {
+    0.125 * (a + c) + 0.75 * b
+}
+
+/// Greatest factor of the pace that keeps the rows of a node and behind it.
 #[inline(never)]
-pub(crate) fn factor(plan: &Plan, limits: &MotionLimits, index: u16, knot: &mut u16) -> f32 {
-    let mut factor = f32::MAX;
-    let pace = *plan.interval(index).pace();
-    rows(plan, limits, index, knot, |rows| {
-        factor = factor.at_most(rows.factor(&pace))
+pub(crate) fn factor(plan: &Plan, limits: &MotionLimits, sweep: &mut Sweep) -> f32 {
+    let (place, speed) = at_node(plan, limits, sweep.node);
+    let pace = local(&plan.pace, sweep.node, plan.intervals);
+    let mut factor = place.factor(limits, speed * place.v * place.v, &pace);
+    if let Some((interval, row)) = middle(plan, sweep.node, [sweep.speed, speed]) {
+        let use_of_row = row * at_middle(plan.interval(interval).pace());
+        factor = factor.at_most(1.0 / use_of_row.at_least(1e-9));
+    }
+    sweep.speed = speed;
+    let coefficients = *plan.interval(sweep.node).pace();
+    at_jumps(plan, limits, sweep, &mut |place, weights| {
+        let pace = at_stencil(weights, &coefficients);
+        factor = factor.at_most(place.factor(limits, 0.0, &pace));
     });
     factor
 }
@@ -419,65 +409,143 @@ pub(crate) fn clear(lists: &mut Lists) {
     }
 }
 
-/// Adds the rows of an interval to gradient and Hessian. `weight`: one over the sum of `1/sqrt(shape)`.
+/// Adds the rows of a node and behind it to gradient and Hessian. `weight`: one over the sum of `1/sqrt(shape)`.
 #[inline(never)]
 pub(crate) fn assemble(
     plan: &Plan,
     limits: &MotionLimits,
     lists: &mut Lists,
-    index: u16,
-    knot: &mut u16,
+    sweep: &mut Sweep,
     mu: f32,
     weight: f32,
 ) {
-    let pace = *plan.interval(index).pace();
-    let mu = mu * share(lists, weight, index + 1);
-    rows(plan, limits, index, knot, |rows| {
-        let mut local = Local::default();
-        rows.add_barrier(&pace, mu, &mut local);
-        if rows.kind == Kind::Node {
-            rows.add_time(&pace, weight, &mut local);
-        }
-        scatter(lists, index, &rows.stencil, &local);
-    });
+    let node = sweep.node;
+    let (place, speed) = at_node(plan, limits, node);
+    let pace = local(&plan.pace, node, plan.intervals);
+    let mu = mu * share(lists, weight, node);
+    let mut sums = Sums::default();
+    // The place's part of the time, and the row of its speed.
+    let c = pace.c.at_least(1e-12);
+    let root = inverse_sqrt(c);
+    let inverse = root * root;
+    let slope = 0.5 * weight * root * inverse;
+    let row = speed * place.v * place.v;
+    let force = row / (1.0 - row * c).at_least(SLACK_MIN);
+    sums.g0 = mu * force - slope;
+    sums.k00 = mu * force * force + 1.5 * slope * inverse;
+    place.barrier(limits, &pace, mu, &mut sums);
+    scatter_node(lists, node, plan.intervals, &sums);
+    if let Some((interval, row)) = middle(plan, node, [sweep.speed, speed]) {
+        let force = row / (1.0 - row * at_middle(plan.interval(interval).pace())).at_least(SLACK_MIN);
+        scatter(lists, interval, &MIDDLE, mu * force, mu * force * force);
+    }
+    sweep.speed = speed;
     // Every coefficient stays positive.
-    let first = if index == 0 { 0 } else { 2 };
-    for offset in first..3 {
-        let value = pace
-            .get(usize::from(offset))
-            .copied()
-            .unwrap_or(1.0)
-            .at_least(1e-9);
-        let force = mu / value;
-        add(lists, GRADIENT, index + offset, -force);
-        add(lists, DIAGONALS[0], index + offset, force / value);
+    positive(plan, lists, node, mu);
+    if node == plan.intervals {
+        positive(plan, lists, node + 1, mu);
+    }
+    let coefficients = *plan.interval(node).pace();
+    at_jumps(plan, limits, sweep, &mut |place, weights| {
+        let mut sums = Sums::default();
+        place.barrier(limits, &at_stencil(weights, &coefficients), mu, &mut sums);
+        scatter_jump(lists, node, weights, &sums);
+    });
+}
+
+fn positive(plan: &Plan, lists: &mut Lists, index: u16, mu: f32) {
+    let value = plan.pace.get(usize::from(index)).copied().unwrap_or(1.0);
+    let force = 1.0 / value.at_least(1e-9);
+    add(lists, GRADIENT, index, -mu * force);
+    let [diagonal, _, _] = DIAGONALS;
+    add(lists, diagonal, index, mu * force * force);
+}
+
+/// Adds derivatives at a node to those by the coefficients: c = (P0 + P1)/2, c' = P1 - P0, c'' = P-1 - 2 P0 + P1 or P0 - 2 P1 + P2.
+fn scatter_node(lists: &mut Lists, node: u16, intervals: u16, sums: &Sums) {
+    let [h0, h1, h2] = DIAGONALS;
+    let Sums {
+        g0,
+        g1,
+        k00,
+        k01,
+        k11,
+        sides,
+    } = *sums;
+    let [before, behind] = sides;
+    add(lists, GRADIENT, node, 0.5 * g0 - g1);
+    add(lists, GRADIENT, node + 1, 0.5 * g0 + g1);
+    add(lists, h0, node, 0.25 * k00 - k01 + k11);
+    add(lists, h0, node + 1, 0.25 * k00 + k01 + k11);
+    add(lists, h1, node, 0.25 * k00 - k11);
+    if let Some(previous) = node.checked_sub(1) {
+        let Side { g2, k02, k12, k22 } = before;
+        let k02 = 0.5 * k02;
+        add(lists, GRADIENT, previous, g2);
+        add(lists, GRADIENT, node, -2.0 * g2);
+        add(lists, GRADIENT, node + 1, g2);
+        add(lists, h0, previous, k22);
+        add(lists, h0, node, 4.0 * (k12 + k22 - k02));
+        add(lists, h0, node + 1, 2.0 * (k02 + k12) + k22);
+        add(lists, h1, previous, k02 - k12 - 2.0 * k22);
+        add(lists, h1, node, -k02 - 3.0 * k12 - 2.0 * k22);
+        add(lists, h2, previous, k02 + k12 + k22);
+    }
+    if node < intervals {
+        let Side { g2, k02, k12, k22 } = behind;
+        let k02 = 0.5 * k02;
+        add(lists, GRADIENT, node, g2);
+        add(lists, GRADIENT, node + 1, -2.0 * g2);
+        add(lists, GRADIENT, node + 2, g2);
+        add(lists, h0, node, 2.0 * (k02 - k12) + k22);
+        add(lists, h0, node + 1, 4.0 * (k22 - k02 - k12));
+        add(lists, h0, node + 2, k22);
+        add(lists, h1, node, 3.0 * k12 - k02 - 2.0 * k22);
+        add(lists, h1, node + 1, k02 + k12 - 2.0 * k22);
+        add(lists, h2, node, k02 - k12 + k22);
     }
 }
 
-/// Adds derivatives by c, c', c'' to those by the three coefficients of an interval.
-fn scatter(lists: &mut Lists, index: u16, stencil: &Stencil, local: &Local) {
-    let [k00, k01, k02, k11, k12, k22] = local.hessian;
-    let [w0, w1, w2] = &stencil.weights;
+/// Adds derivatives on one side of a jump.
+fn scatter_jump(lists: &mut Lists, index: u16, weights: &[[f32; 3]; 3], sums: &Sums) {
+    let [w0, w1, w2] = weights;
+    let [one, other] = &sums.sides;
+    let side = Side {
+        g2: one.g2 + other.g2,
+        k02: one.k02 + other.k02,
+        k12: one.k12 + other.k12,
+        k22: one.k22 + other.k22,
+    };
     for (row, offset) in (0..3_usize).zip(0_u16..) {
-        let of = |weights: &[f32; 3]| weights.get(row).copied().unwrap_or(0.0);
-        let (a, b, c) = (of(w0), of(w1), of(w2));
-        let [g0, g1, g2] = local.gradient;
-        add(lists, GRADIENT, index + offset, a * g0 + b * g1 + c * g2);
-        let (p, q, r) = (
-            a * k00 + b * k01 + c * k02,
-            a * k01 + b * k11 + c * k12,
-            a * k02 + b * k12 + c * k22,
+        let of = |weights: &[f32; 3], at: usize| weights.get(at).copied().unwrap_or(0.0);
+        let (a, b, c) = (of(w0, row), of(w1, row), of(w2, row));
+        add(
+            lists,
+            GRADIENT,
+            index + offset,
+            a * sums.g0 + b * sums.g1 + c * side.g2,
         );
+        let p = a * sums.k00 + b * sums.k01 + c * side.k02;
+        let q = a * sums.k01 + b * sums.k11 + c * side.k12;
+        let r = a * side.k02 + b * side.k12 + c * side.k22;
         for (column, diagonal) in (row..3).zip(DIAGONALS) {
-            let of = |weights: &[f32; 3]| weights.get(column).copied().unwrap_or(0.0);
-            add(
-                lists,
-                diagonal,
-                index + offset,
-                p * of(w0) + q * of(w1) + r * of(w2),
-            );
+            let value = p * of(w0, column) + q * of(w1, column) + r * of(w2, column);
+            add(lists, diagonal, index + offset, value);
         }
     }
+}
+
+/// Adds derivatives by one linear form of an interval's coefficients.
+fn scatter(lists: &mut Lists, index: u16, weights: &[f32; 3], slope: f32, bend: f32) {
+    let [a, b, c] = *weights;
+    let [h0, h1, h2] = DIAGONALS;
+    for (offset, weight) in [(0, a), (1, b), (2, c)] {
+        add(lists, GRADIENT, index + offset, weight * slope);
+        add(lists, h0, index + offset, weight * weight * bend);
+    }
+    add(lists, h1, index, a * b * bend);
+    add(lists, h1, index + 1, b * c * bend);
+    add(lists, h2, index, a * c * bend);
 }
 
 /// Solves for the step, in place of the gradient; coefficients before `first` stay.
@@ -516,27 +584,63 @@ pub(crate) fn solve(lists: &mut Lists, count: u16, first: u16) {
     }
 }
 
-/// Adds the rows of an interval to the reach of the step.
+/// Adds the rows of a node and behind it to the reach of the step.
 #[inline(never)]
 pub(crate) fn extend(
     plan: &Plan,
     limits: &MotionLimits,
     lists: &Lists,
-    index: u16,
-    knot: &mut u16,
+    sweep: &mut Sweep,
     reach: &mut Reach,
 ) {
-    let pace = *plan.interval(index).pace();
-    let mut direction = [0.0; 3];
-    for (offset, direction) in (0..).zip(&mut direction) {
-        *direction = -get(lists, GRADIENT, index + offset);
+    let node = sweep.node;
+    let Some(gradient) = lists.get(GRADIENT) else {
+        return;
+    };
+    let (place, speed) = at_node(plan, limits, node);
+    let pace = local(&plan.pace, node, plan.intervals);
+    let direction = direction(gradient, node, plan.intervals);
+    let row = speed * place.v * place.v;
+    reach.add(1.0 - row * pace.c, row * direction.c);
+    place.reach(limits, &pace, &direction, reach);
+    let back = |index: u16| {
+        let at = |index: u16| -get(lists, GRADIENT, index);
+        [at(index), at(index + 1), at(index + 2)]
+    };
+    let coefficients = *plan.interval(node).pace();
+    let steps = back(node);
+    // The last node has one coefficient more.
+    let last = if node == plan.intervals { node + 1 } else { node };
+    for index in node..=last {
+        let value = plan.pace.get(usize::from(index)).copied().unwrap_or(1.0);
+        reach.add(value, get(lists, GRADIENT, index));
     }
-    for (value, direction) in pace.iter().zip(&direction) {
-        reach.add(*value, -direction);
+    if let Some((interval, row)) = middle(plan, node, [sweep.speed, speed]) {
+        let value = at_middle(plan.interval(interval).pace());
+        reach.add(1.0 - row * value, row * at_middle(&back(interval)));
     }
-    rows(plan, limits, index, knot, |rows| {
-        rows.reach(&pace, &direction, reach)
+    sweep.speed = speed;
+    at_jumps(plan, limits, sweep, &mut |place, weights| {
+        let pace = at_stencil(weights, &coefficients);
+        place.reach(limits, &pace, &at_stencil(weights, &steps), reach);
     });
+}
+
+/// The step's derivatives at a node.
+fn direction(gradient: &[f32; LIST], node: u16, intervals: u16) -> Local {
+    let at = |index: usize| -gradient.get(index).copied().unwrap_or(0.0);
+    let index = usize::from(node);
+    let (here, next) = (at(index), at(index + 1));
+    let behind = at(index + 2) - 2.0 * next + here;
+    let before = match index.checked_sub(1) {
+        Some(previous) => at(previous) - 2.0 * here + next,
+        None => behind,
+    };
+    Local {
+        c: 0.5 * (here + next),
+        c1: next - here,
+        c2: [before, if node < intervals { behind } else { before }],
+    }
 }
 
 /// Takes the step.

@@ -2,7 +2,7 @@
 
 use super::follow::{LEAD, Lead};
 use super::limits::MotionLimits;
-use super::newton::{self, Reach, SHAPE};
+use super::newton::{self, Reach, SHAPE, Sweep};
 use super::pace::{Course, Use};
 use super::plan::{Cursor, Plan};
 use super::walk::{LIST, Lists, Walker};
@@ -52,9 +52,7 @@ pub(crate) struct Planner {
     walker: Walker,
     /// What the plan may use.
     limits: MotionLimits,
-    /// Next interval and jump of a sweep.
-    index: u16,
-    knot: u16,
+    sweep: Sweep,
     /// Steps of the method so far.
     step: u8,
     /// One over the sum of the coefficients' times, and the greatest factor of the start.
@@ -74,8 +72,7 @@ impl Planner {
         lists: [[0.0; LIST]; 5],
         walker: Walker::IDLE,
         limits: MotionLimits::NONE,
-        index: 0,
-        knot: 0,
+        sweep: Sweep::START,
         step: 0,
         weight: 0.0,
         factor: 0.0,
@@ -127,9 +124,9 @@ impl Planner {
                 }
             }
             Stage::Factor => {
-                let factor = newton::factor(plan, &self.limits, self.index, &mut self.knot);
+                let factor = newton::factor(plan, &self.limits, &mut self.sweep);
                 self.factor = factor.at_most(self.factor);
-                if self.next(plan) {
+                if self.sweep.next(plan) {
                     let factor = START_SHARE * self.factor.at_least(1e-9);
                     for pace in &mut plan.pace {
                         *pace *= factor;
@@ -146,12 +143,11 @@ impl Planner {
                     plan,
                     &self.limits,
                     &mut self.lists,
-                    self.index,
-                    &mut self.knot,
+                    &mut self.sweep,
                     barrier,
                     self.weight,
                 );
-                if self.next(plan) {
+                if self.sweep.next(plan) {
                     Stage::Solve
                 } else {
                     Stage::Assemble
@@ -163,15 +159,8 @@ impl Planner {
                 Stage::Reach
             }
             Stage::Reach => {
-                newton::extend(
-                    plan,
-                    &self.limits,
-                    &self.lists,
-                    self.index,
-                    &mut self.knot,
-                    &mut self.reach,
-                );
-                if self.next(plan) {
+                newton::extend(plan, &self.limits, &self.lists, &mut self.sweep, &mut self.reach);
+                if self.sweep.next(plan) {
                     self.take(plan)
                 } else {
                     Stage::Reach
@@ -189,16 +178,6 @@ impl Planner {
         };
     }
 
-    /// The next interval of a sweep; whether the sweep is over.
-    const fn next(&mut self, plan: &Plan) -> bool {
-        self.index += 1;
-        let is_over = self.index >= plan.intervals;
-        if is_over {
-            (self.index, self.knot) = (0, 0);
-        }
-        is_over
-    }
-
     fn begin_method(&mut self, plan: &Plan) {
         let mut sum = 0.0;
         let count = usize::from(plan.intervals) + 2;
@@ -210,7 +189,7 @@ impl Planner {
         }
         self.weight = 1.0 / sum.at_least(1e-9);
         self.factor = f32::MAX;
-        (self.index, self.knot, self.step) = (0, 0, 0);
+        (self.sweep, self.step) = (Sweep::START, 0);
     }
 
     /// Takes the step that was solved for, and begins the next, or the check.
