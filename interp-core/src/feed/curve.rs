@@ -308,6 +308,7 @@ impl Course for Curve {
         let [v, a, j] = self.piece(cursor.piece).rates(cursor.time);
         let limits = &self.limits;
         Use {
+            feed: 0.0,
             velocity: v * r / limits.speed,
             acceleration: (a * r * r + v * r1).abs() / limits.acceleration,
             jerk: ((j * r * r + 3.0 * a * r1) * r + v * r2).abs() / limits.jerk,

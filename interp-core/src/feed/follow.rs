@@ -10,7 +10,7 @@ pub(crate) const LEAD: u8 = 64;
 /// Periods in which the speed changes from the plan's to the feed, half the lead: there is time to change to the feed and back.
 const CHANGE: u8 = LEAD / 2;
 /// Relative difference of the plan's speed from the feed that is made up for.
-const NEAR: f32 = 3e-3;
+pub(crate) const NEAR: f32 = 3e-3;
 
 /// A place ahead of the tool, and for how long the plan has been near the feed there, in periods at the plan's own pace.
 #[derive(Clone, Copy, Debug)]
@@ -28,7 +28,9 @@ impl Lead {
     /// Counts the time for which the plan is near the feed. `periods`: since the last look.
     pub(crate) fn look(&mut self, plan: &Plan, cursor: &Cursor, periods: f32) {
         let feed = plan.limits.feed;
-        let is_near = !plan.is_over(cursor) && (cursor.speed(plan) - feed).abs() < NEAR * feed;
+        let is_near = !plan.is_over(cursor)
+            && plan.allows_feed(cursor.interval)
+            && (cursor.speed(plan) - feed).abs() < NEAR * feed;
         self.near = if is_near {
             (self.near + periods).at_most(f32::from(LEAD))
         } else {

@@ -254,6 +254,12 @@ impl Sweep {
         speed: 0.0,
     };
 
+    /// Whether there is a jump behind the node.
+    pub(crate) fn has_jump(&self, plan: &Plan) -> bool {
+        plan.knot(self.knot)
+            .is_some_and(|knot| knot.interval == self.node)
+    }
+
     /// Moves to the next node; whether there is none.
     pub(crate) const fn next(&mut self, plan: &Plan) -> bool {
         self.node += 1;

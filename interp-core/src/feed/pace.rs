@@ -27,12 +27,14 @@ const PACE_MAX: f32 = 1.00002;
 
 /// Fractions of the limits that a changing pace may use. The jerk is seen between periods, and its peaks are narrower.
 const ROOM: Use = Use {
+    feed: 1.0,
     velocity: 1.0,
     acceleration: 0.997,
     jerk: 1.0,
 };
 /// The same after a fault.
 const ROOM_FAULT: Use = Use {
+    feed: 1.0,
     velocity: 1.001,
     acceleration: 1.1,
     jerk: 1.5,
@@ -44,6 +46,8 @@ const SAME: f32 = 1e-6;
 /// Fractions of the limits, the most of the three axes.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Use {
+    /// Of the programmed feed.
+    pub(crate) feed: f32,
     pub(crate) velocity: f32,
     pub(crate) acceleration: f32,
     pub(crate) jerk: f32,
@@ -51,12 +55,14 @@ pub(crate) struct Use {
 
 impl Use {
     pub(crate) const NONE: Self = Self {
+        feed: 0.0,
         velocity: 0.0,
         acceleration: 0.0,
         jerk: 0.0,
     };
 
     pub(crate) fn add(&mut self, other: &Self) {
+        self.feed = self.feed.at_least(other.feed);
         self.velocity = self.velocity.at_least(other.velocity);
         self.acceleration = self.acceleration.at_least(other.acceleration);
         self.jerk = self.jerk.at_least(other.jerk);

@@ -54,6 +54,8 @@ pub(crate) struct Plan {
     pub(crate) periods: u32,
     /// What the length of each interval is corrected by, so that all of them are the path's length to a tenth of a nanometre, units of 2^-10 nm.
     pub(crate) trim_q10: i64,
+    /// Intervals in which the axes allow the programmed feed where the plan is near it, a bit each.
+    exact: [u32; NODES_MAX / 32],
     /// The place that a follower looks ahead from when it begins.
     pub(crate) lead: Lead,
 }
@@ -128,6 +130,7 @@ impl Plan {
         knot_count: 0,
         periods: 0,
         trim_q10: 0,
+        exact: [0; NODES_MAX / 32],
         lead: Lead::NONE,
     };
 
@@ -185,6 +188,24 @@ impl Plan {
     pub(crate) fn knot(&self, index: u16) -> Option<Knot> {
         let knots = self.knots.get(..usize::from(self.knot_count))?;
         knots.get(usize::from(index)).copied()
+    }
+
+    /// Whether the axes allow the programmed feed in an interval where the plan is near it.
+    pub(crate) fn allows_feed(&self, interval: u16) -> bool {
+        let word = self.exact.get(usize::from(interval / 32)).copied().unwrap_or(0);
+        word >> (interval % 32) & 1 != 0
+    }
+
+    /// Every interval allows it, as far as is known.
+    pub(crate) const fn allow_feed(&mut self) {
+        self.exact = [u32::MAX; NODES_MAX / 32];
+    }
+
+    /// An interval does not allow it.
+    pub(crate) fn forbid_feed(&mut self, interval: u16) {
+        if let Some(word) = self.exact.get_mut(usize::from(interval / 32)) {
+            *word &= !(1 << (interval % 32));
+        }
     }
 
     /// Length of the path, units of 2^-10 nm.
@@ -300,7 +321,7 @@ impl Course for Plan {
         });
         let speed = v * r;
         let mut most = Use {
-            velocity: speed / limits.feed,
+            feed: speed / limits.feed,
             ..Use::NONE
         };
         for ((inverse, [q1, q2, q3]), [first, second]) in limits.inverse.iter().zip(&q).zip(&extra) {
@@ -308,6 +329,7 @@ impl Course for Plan {
             let jerk = (q3 * v * v + 3.0 * q2 * a) * v + q1 * j;
             let of_pace = (jerk * r * r + 3.0 * acceleration * r1) * r + q1 * v * r2;
             most.add(&Use {
+                feed: 0.0,
                 velocity: (q1 * speed).abs() * inverse.velocity,
                 acceleration: (acceleration * r * r + q1 * v * r1).abs() * inverse.acceleration,
                 jerk: of_pace.abs() * inverse.jerk + (first + second * speed) * speed,

@@ -1,6 +1,6 @@
 //! Plans a path in portions: walk, barrier method, check.
 
-use super::follow::{LEAD, Lead};
+use super::follow::{LEAD, Lead, NEAR};
 use super::limits::MotionLimits;
 use super::newton::{self, Reach, SHAPE, Sweep};
 use super::pace::{Course, Use};
@@ -20,17 +20,18 @@ const START_SHARE: f32 = 0.85;
 /// Use of the jerk that the check passes: a plan with more is slowed down.
 const JERK_CHECKED: f32 = 0.998;
 
-/// Nominal cycles of a period's planning.
-pub(crate) const PORTION_CYCLES: u32 = 30_000;
+/// Cycles of the pieces of work in a period's planning, by the pessimistic model of `cargo sim budget`; with the rest of the task 30 000.
+pub(crate) const PORTION_CYCLES: u32 = 28_200;
 
-/// Nominal cycles of one piece of work.
+/// Cycles of one piece of work, by the same model.
 mod cycles {
-    pub(super) const WALK: u32 = 15_000;
-    pub(super) const FACTOR: u32 = 4_500;
-    pub(super) const ASSEMBLE: u32 = 5_000;
-    pub(super) const SOLVE: u32 = 15_000;
-    pub(super) const REACH: u32 = 3_300;
-    pub(super) const CHECK: u32 = 2_400;
+    pub(super) const FACTOR: u32 = 2_300;
+    pub(super) const ASSEMBLE: u32 = 3_950;
+    pub(super) const SOLVE: u32 = 21_500;
+    pub(super) const REACH: u32 = 2_600;
+    /// More for a jump behind the node.
+    pub(super) const JUMP: u32 = 3_500;
+    pub(super) const CHECK: u32 = 1_450;
 }
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -99,14 +100,19 @@ impl Planner {
         self.stage == Stage::Done
     }
 
-    /// Nominal cycles of the next piece of work.
-    pub(crate) const fn cycles(&self) -> u32 {
+    /// Cycles of the next piece of work.
+    pub(crate) fn cycles(&self, plan: &Plan) -> u32 {
+        let jump = if self.sweep.has_jump(plan) {
+            cycles::JUMP
+        } else {
+            0
+        };
         match self.stage {
-            Stage::Walk => cycles::WALK,
-            Stage::Factor => cycles::FACTOR,
-            Stage::Assemble => cycles::ASSEMBLE,
+            Stage::Walk => self.walker.cycles(),
+            Stage::Factor => cycles::FACTOR + jump,
+            Stage::Assemble => cycles::ASSEMBLE + jump,
             Stage::Solve => cycles::SOLVE,
-            Stage::Reach => cycles::REACH,
+            Stage::Reach => cycles::REACH + jump,
             Stage::Check => cycles::CHECK,
             Stage::Done => 0,
         }
@@ -200,6 +206,7 @@ impl Planner {
         if usize::from(self.step) < BARRIER.len() {
             return Stage::Assemble;
         }
+        plan.allow_feed();
         self.cursor = Cursor::START;
         self.most = Use::NONE;
         self.periods = 0;
@@ -208,13 +215,16 @@ impl Planner {
     }
 
     /// One period of the plan; whether it is over.
-    fn check(&mut self, plan: &Plan) -> bool {
+    fn check(&mut self, plan: &mut Plan) -> bool {
         if self.periods < u32::from(LEAD) {
             self.lead.look(plan, &self.cursor, 1.0);
             self.lead.cursor = self.cursor;
         }
         let here = plan.use_at(&self.cursor, [1.0, 0.0, 0.0], 0.0);
         self.most.add(&here);
+        if here.velocity * (1.0 + NEAR) > 1.0 {
+            plan.forbid_feed(self.cursor.interval);
+        }
         let period = plan.limits.period;
         plan.advance(&mut self.cursor, period);
         self.periods = self.periods.saturating_add(1);
@@ -224,11 +234,13 @@ impl Planner {
     /// Slows the plan where it uses too much, or is too short.
     fn slow(&mut self, plan: &mut Plan, least: u32) {
         let Use {
+            feed,
             velocity,
             acceleration,
             jerk,
         } = self.most;
-        let factor = velocity
+        let factor = feed
+            .at_least(velocity)
             .at_least(sqrt(acceleration))
             .at_least(cube_root(jerk / JERK_CHECKED))
             .at_least(to_f32(least) / to_f32(self.periods.max(1)))

@@ -136,6 +136,19 @@ impl Walker {
         self.jerk = f32::MAX;
     }
 
+    /// Cycles of the next portion, by the pessimistic model of `cargo sim budget`.
+    pub(crate) const fn cycles(&self) -> u32 {
+        match self.stage {
+            Stage::Caps => 18_100,
+            Stage::Jumps | Stage::Means | Stage::Knots => 10_500,
+            Stage::Backwards | Stage::Forwards | Stage::Busy => 24_500,
+            Stage::TryEven | Stage::TryGrowing | Stage::Coarsen | Stage::Bisect(_) | Stage::Times => 28_100,
+            Stage::Increments => 13_500,
+            Stage::Nodes => 15_000,
+            Stage::Done => 0,
+        }
+    }
+
     /// One portion; whether the walk is complete.
     #[inline(never)]
     pub(crate) fn work(&mut self, lists: &mut Lists, plan: &mut Plan, limits: &MotionLimits) -> bool {

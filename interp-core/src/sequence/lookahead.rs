@@ -116,14 +116,14 @@ enum Task {
     Done,
 }
 
-/// Nominal cycles of the tasks.
+/// Cycles of the tasks, by the pessimistic model of `cargo sim budget`.
 mod cycles {
-    pub(super) const PATCH: u32 = 9_000;
-    pub(super) const STATION: u32 = 4_000;
-    pub(super) const DERIVATIVES: u32 = 6_000;
-    pub(super) const ESTIMATE: u32 = 5_000;
-    pub(super) const CLOSE: u32 = 6_000;
-    pub(super) const NEXT: u32 = 300;
+    pub(super) const PATCH: u32 = 4_200;
+    pub(super) const STATION: u32 = 1_600;
+    pub(super) const DERIVATIVES: u32 = 3_400;
+    pub(super) const ESTIMATE: u32 = 1_600;
+    pub(super) const CLOSE: u32 = 1_700;
+    pub(super) const NEXT: u32 = 800;
 }
 
 /// The look-ahead over one pass.
@@ -175,7 +175,7 @@ impl Lookahead {
         matches!(self.task, Task::Done)
     }
 
-    /// Nominal cycles of the next task.
+    /// Cycles of the next task.
     pub(crate) fn cycles(&self) -> u32 {
         match self.task {
             Task::Patch => cycles::PATCH,

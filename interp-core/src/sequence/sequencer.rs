@@ -21,10 +21,10 @@ use crate::sequence::lookahead::{Lookahead, PassPlan, check_travel};
 /// Periods that a pass takes longer than the planning of the next one.
 const SPARE_PERIODS: u32 = 30;
 
-/// Nominal cycles of one place of a search for a change of the pace, along a pass and along a link; of a portion of a step-over's planning.
-const PACE_CYCLES: u32 = 2_400;
+/// Cycles of one place of a search for a change of the pace, along a pass and along a link; of a portion of a step-over's planning.
+const PACE_CYCLES: u32 = 2_000;
 const LINK_PACE_CYCLES: u32 = 1_000;
-const STEP_OVER_CYCLES: u32 = 15_000;
+const STEP_OVER_CYCLES: u32 = 6_000;
 
 /// Phase of the sequence.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -226,7 +226,7 @@ impl Sequencer {
         self.has_step_over && !self.step_over.is_planned()
     }
 
-    /// The planning of one period: work of at most [`PORTION_CYCLES`] nominal cycles.
+    /// The planning of one period: work of at most [`PORTION_CYCLES`] cycles.
     #[inline(never)]
     pub(crate) fn plan(&mut self, job: &Job<'_>, axes: &AxisLimits) {
         let mut left = PORTION_CYCLES;
@@ -243,8 +243,10 @@ impl Sequencer {
         }
     }
 
-    /// Nominal cycles of the next piece of planning; 0 where there is none.
+    /// Cycles of the next piece of planning; 0 where there is none.
     fn next_cycles(&self) -> u32 {
+        let [one, other] = &self.plans;
+        let next = if self.second { &one.plan } else { &other.plan };
         match self.phase {
             Phase::Pass if self.pace.has_work() => return PACE_CYCLES,
             Phase::StepOver if self.step_over.progress.has_work() => return LINK_PACE_CYCLES,
@@ -259,7 +261,7 @@ impl Sequencer {
         }
         match self.planning {
             Planning::Stations => self.lookahead.cycles(),
-            Planning::Feed => self.planner.cycles(),
+            Planning::Feed => self.planner.cycles(next),
             Planning::Complete => 0,
         }
     }
