@@ -68,21 +68,23 @@ pub(crate) struct Planner {
 }
 
 impl Planner {
-    pub(crate) const IDLE: Self = Self {
-        stage: Stage::Done,
-        lists: [[0.0; LIST]; 5],
-        walker: Walker::IDLE,
-        limits: MotionLimits::NONE,
-        sweep: Sweep::START,
-        step: 0,
-        weight: 0.0,
-        factor: 0.0,
-        reach: Reach::FAR,
-        cursor: Cursor::START,
-        most: Use::NONE,
-        periods: 0,
-        lead: Lead::NONE,
-    };
+    pub(crate) const fn idle() -> Self {
+        Self {
+            stage: Stage::Done,
+            lists: [[0.0; LIST]; 5],
+            walker: Walker::IDLE,
+            limits: MotionLimits::NONE,
+            sweep: Sweep::START,
+            step: 0,
+            weight: 0.0,
+            factor: 0.0,
+            reach: Reach::FAR,
+            cursor: Cursor::START,
+            most: Use::NONE,
+            periods: 0,
+            lead: Lead::NONE,
+        }
+    }
 
     /// Begins to plan the path of the plan's stations within the plan's limits.
     pub(crate) fn begin(&mut self, plan: &Plan) {

@@ -132,26 +132,28 @@ const fn both(plans: &mut [PassPlan; 2], second: bool) -> (&mut PassPlan, &mut P
 
 impl Sequencer {
     /// State before the first run.
-    pub(crate) const START: Self = Self {
-        phase: Phase::Done,
-        goal: Goal::Pass,
-        lookahead: Lookahead::START,
-        planner: Planner::IDLE,
-        planning: Planning::Complete,
-        plans: [PassPlan::NONE; 2],
-        second: false,
-        on_surface: false,
-        pending: None,
-        follower: Follower::START,
-        pace: Pace::REST,
-        straight: StraightMove::NONE,
-        step_over: BoundaryStepOver::NONE,
-        has_step_over: false,
-        spent: 0,
-        share: 1.0,
-        at: None,
-        cell: 0,
-    };
+    pub(crate) const fn new() -> Self {
+        Self {
+            phase: Phase::Done,
+            goal: Goal::Pass,
+            lookahead: Lookahead::START,
+            planner: Planner::idle(),
+            planning: Planning::Complete,
+            plans: [PassPlan::none(), PassPlan::none()],
+            second: false,
+            on_surface: false,
+            pending: None,
+            follower: Follower::START,
+            pace: Pace::REST,
+            straight: StraightMove::NONE,
+            step_over: BoundaryStepOver::NONE,
+            has_step_over: false,
+            spent: 0,
+            share: 1.0,
+            at: None,
+            cell: 0,
+        }
+    }
 
     /// Starts the job from the tool's position.
     pub(crate) fn restart(&mut self, job: &Job<'_>, axes: &AxisLimits) {
