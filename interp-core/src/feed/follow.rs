@@ -25,12 +25,20 @@ impl Lead {
         near: 0.0,
     };
 
+    /// [`Self::look`] at a plan that is being checked, a period after the last look.
+    pub(crate) fn look_draft(&mut self, plan: &Plan, cursor: &Cursor) {
+        self.count(plan, cursor, cursor.draft_speed(plan), 1.0);
+    }
+
     /// Counts the time for which the plan is near the feed. `periods`: since the last look.
-    pub(crate) fn look(&mut self, plan: &Plan, cursor: &Cursor, periods: f32) {
+    fn look(&mut self, plan: &Plan, cursor: &Cursor, periods: f32) {
+        self.count(plan, cursor, cursor.speed(plan), periods);
+    }
+
+    fn count(&mut self, plan: &Plan, cursor: &Cursor, speed: f32, periods: f32) {
         let feed = plan.limits.feed;
-        let is_near = !plan.is_over(cursor)
-            && plan.allows_feed(cursor.interval)
-            && (cursor.speed(plan) - feed).abs() < NEAR * feed;
+        let is_near =
+            !plan.is_over(cursor) && plan.allows_feed(cursor.interval) && (speed - feed).abs() < NEAR * feed;
         self.near = if is_near {
             (self.near + periods).at_most(f32::from(LEAD))
         } else {
@@ -47,6 +55,8 @@ pub(crate) struct Follower {
     /// How far the speed has changed from the plan's to the feed, 0 to [`CHANGE`], and whether it changes to it.
     change: u8,
     rises: bool,
+    /// The speed is to be the plan's own.
+    as_planned: bool,
     arc_q10: i64,
 }
 
@@ -56,6 +66,7 @@ impl Follower {
         lead: Lead::NONE,
         change: 0,
         rises: false,
+        as_planned: false,
         arc_q10: 0,
     };
 
@@ -107,16 +118,37 @@ impl Follower {
         self.lead.look(plan, &at, pace);
         self.change = match self.change {
             0 => {
-                self.rises = self.lead.near >= f32::from(LEAD);
+                self.rises = self.lead.near >= f32::from(LEAD) && !self.as_planned;
                 u8::from(self.rises)
             }
             CHANGE => {
                 self.rises = false;
-                CHANGE - u8::from(self.lead.near == 0.0)
+                CHANGE - u8::from(self.lead.near == 0.0 || self.as_planned)
             }
             change if self.rises => change + 1,
             change => change - 1,
         };
+    }
+
+    /// Keeps to the plan's own speed, so that the plan can be replaced, or no longer.
+    pub(crate) const fn keep_to_plan(&mut self, does: bool) {
+        self.as_planned = does;
+    }
+
+    /// Whether the speed is the plan's own.
+    pub(crate) const fn is_as_planned(&self) -> bool {
+        self.change == 0
+    }
+
+    /// The plan has been replaced ahead of the tool: looks ahead anew.
+    pub(crate) fn restart_lead(&mut self, plan: &Plan) {
+        self.lead = Lead {
+            cursor: self.cursor,
+            near: 0.0,
+        };
+        for _ in 0..LEAD {
+            plan.advance(&mut self.lead.cursor, plan.limits.period);
+        }
     }
 
     /// The tool is known to be at this arc, units of 2^-10 nm: the plan goes on from there.

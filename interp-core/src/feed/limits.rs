@@ -103,6 +103,11 @@ impl MotionLimits {
         }
     }
 
+    /// The same at another feed, mm/s.
+    pub(crate) fn with_feed(&self, feed: f32) -> Self {
+        Self::of(feed, self.axes, self.inverse_chord, self.period)
+    }
+
     /// What a plan uses of them.
     pub(crate) fn planned(&self) -> Self {
         let axes = self.axes.map(|axis| AxisMotion {

@@ -240,7 +240,9 @@ impl Reach {
 /// A sweep over the nodes.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Sweep {
-    pub(crate) node: u16,
+    node: u16,
+    /// The node to begin at.
+    first: u16,
     /// The next jump.
     knot: u16,
     /// Inverse square of the speed that the path allows at the node before, (s/mm)^2.
@@ -248,11 +250,17 @@ pub(crate) struct Sweep {
 }
 
 impl Sweep {
-    pub(crate) const START: Self = Self {
-        node: 0,
-        knot: 0,
-        speed: 0.0,
-    };
+    pub(crate) const START: Self = Self::from(0);
+
+    /// Over the nodes from this one on.
+    pub(crate) const fn from(first: u16) -> Self {
+        Self {
+            node: first,
+            first,
+            knot: 0,
+            speed: 0.0,
+        }
+    }
 
     /// Whether there is a jump behind the node.
     pub(crate) fn has_jump(&self, plan: &Plan) -> bool {
@@ -265,7 +273,7 @@ impl Sweep {
         self.node += 1;
         let is_over = self.node > plan.intervals;
         if is_over {
-            *self = Self::START;
+            *self = Self::from(self.first);
         }
         is_over
     }
@@ -285,6 +293,15 @@ fn local(values: &[f32; COEFFICIENTS], node: u16, intervals: u16) -> Local {
         c: 0.5 * (here + next),
         c1: next - here,
         c2: [before, if node < intervals { behind } else { before }],
+    }
+}
+
+/// The three coefficients of the pace of an interval.
+fn three(plan: &Plan, interval: u16) -> [f32; 3] {
+    let from = usize::from(interval);
+    match plan.draft.get(from..from + 3) {
+        Some(&[a, b, c]) => [a, b, c],
+        _ => [1.0; 3],
     }
 }
 
@@ -388,14 +405,14 @@ fn at_middle([a, b, c]: &[f32; 3]) -> f32 {
 #[inline(never)]
 pub(crate) fn factor(plan: &Plan, limits: &MotionLimits, sweep: &mut Sweep) -> f32 {
     let (place, speed) = at_node(plan, limits, sweep.node);
-    let pace = local(&plan.pace, sweep.node, plan.intervals);
+    let pace = local(&plan.draft, sweep.node, plan.intervals);
     let mut factor = place.factor(limits, speed * place.v * place.v, &pace);
     if let Some((interval, row)) = middle(plan, sweep.node, [sweep.speed, speed]) {
-        let use_of_row = row * at_middle(plan.interval(interval).pace());
+        let use_of_row = row * at_middle(&three(plan, interval));
         factor = factor.at_most(1.0 / use_of_row.at_least(1e-9));
     }
     sweep.speed = speed;
-    let coefficients = *plan.interval(sweep.node).pace();
+    let coefficients = three(plan, sweep.node);
     at_jumps(plan, limits, sweep, &mut |place, weights| {
         let pace = at_stencil(weights, &coefficients);
         factor = factor.at_most(place.factor(limits, 0.0, &pace));
@@ -427,7 +444,7 @@ pub(crate) fn assemble(
 ) {
     let node = sweep.node;
     let (place, speed) = at_node(plan, limits, node);
-    let pace = local(&plan.pace, node, plan.intervals);
+    let pace = local(&plan.draft, node, plan.intervals);
     let mu = mu * share(lists, weight, node);
     let mut sums = Sums::default();
     // The place's part of the time, and the row of its speed.
@@ -442,7 +459,7 @@ pub(crate) fn assemble(
     place.barrier(limits, &pace, mu, &mut sums);
     scatter_node(lists, node, plan.intervals, &sums);
     if let Some((interval, row)) = middle(plan, node, [sweep.speed, speed]) {
-        let force = row / (1.0 - row * at_middle(plan.interval(interval).pace())).at_least(SLACK_MIN);
+        let force = row / (1.0 - row * at_middle(&three(plan, interval))).at_least(SLACK_MIN);
         scatter(lists, interval, &MIDDLE, mu * force, mu * force * force);
     }
     sweep.speed = speed;
@@ -451,7 +468,7 @@ pub(crate) fn assemble(
     if node == plan.intervals {
         positive(plan, lists, node + 1, mu);
     }
-    let coefficients = *plan.interval(node).pace();
+    let coefficients = three(plan, node);
     at_jumps(plan, limits, sweep, &mut |place, weights| {
         let mut sums = Sums::default();
         place.barrier(limits, &at_stencil(weights, &coefficients), mu, &mut sums);
@@ -460,7 +477,7 @@ pub(crate) fn assemble(
 }
 
 fn positive(plan: &Plan, lists: &mut Lists, index: u16, mu: f32) {
-    let value = plan.pace.get(usize::from(index)).copied().unwrap_or(1.0);
+    let value = plan.draft.get(usize::from(index)).copied().unwrap_or(1.0);
     let force = 1.0 / value.at_least(1e-9);
     add(lists, GRADIENT, index, -mu * force);
     let [diagonal, _, _] = DIAGONALS;
@@ -604,7 +621,7 @@ pub(crate) fn extend(
         return;
     };
     let (place, speed) = at_node(plan, limits, node);
-    let pace = local(&plan.pace, node, plan.intervals);
+    let pace = local(&plan.draft, node, plan.intervals);
     let direction = direction(gradient, node, plan.intervals);
     let row = speed * place.v * place.v;
     reach.add(1.0 - row * pace.c, row * direction.c);
@@ -613,16 +630,16 @@ pub(crate) fn extend(
         let at = |index: u16| -get(lists, GRADIENT, index);
         [at(index), at(index + 1), at(index + 2)]
     };
-    let coefficients = *plan.interval(node).pace();
+    let coefficients = three(plan, node);
     let steps = back(node);
     // The last node has one coefficient more.
     let last = if node == plan.intervals { node + 1 } else { node };
     for index in node..=last {
-        let value = plan.pace.get(usize::from(index)).copied().unwrap_or(1.0);
+        let value = plan.draft.get(usize::from(index)).copied().unwrap_or(1.0);
         reach.add(value, get(lists, GRADIENT, index));
     }
     if let Some((interval, row)) = middle(plan, node, [sweep.speed, speed]) {
-        let value = at_middle(plan.interval(interval).pace());
+        let value = at_middle(&three(plan, interval));
         reach.add(1.0 - row * value, row * at_middle(&back(interval)));
     }
     sweep.speed = speed;
@@ -655,7 +672,7 @@ pub(crate) fn take(plan: &mut Plan, lists: &Lists, step: f32) {
         return;
     }
     let count = plan.intervals + 2;
-    for (index, pace) in (0..count).zip(&mut plan.pace) {
+    for (index, pace) in (0..count).zip(&mut plan.draft) {
         *pace -= step * get(lists, GRADIENT, index);
     }
 }

@@ -195,6 +195,11 @@ impl<C: Copy> Pace<C> {
         self.change.is_none() && self.goal == 0.0 && self.wanted == 0.0
     }
 
+    /// Whether the pace stays as it is.
+    pub(crate) fn is_constant(&self) -> bool {
+        self.change.is_none() && !self.is_seeking()
+    }
+
     /// Whether there is work for [`Self::work`].
     pub(crate) fn has_work(&self) -> bool {
         match &self.search {

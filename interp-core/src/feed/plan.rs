@@ -43,8 +43,9 @@ pub(crate) struct Plan {
     pub(crate) inverse_step: f32,
     /// The walk: S is a cubic B-spline; differences of its coefficients, mm.
     pub(crate) walk: [f32; COEFFICIENTS],
-    /// The pace c: coefficients of a quadratic B-spline.
+    /// The pace c that is followed, and the one that is being planned: coefficients of a quadratic B-spline.
     pub(crate) pace: [f32; COEFFICIENTS],
+    pub(crate) draft: [f32; COEFFICIENTS],
     /// Cell of the stations at each node, and the fraction of it in units of 2^-16.
     pub(crate) cells: [u16; NODES_MAX + 1],
     pub(crate) parts: [u16; NODES_MAX + 1],
@@ -68,11 +69,6 @@ pub(crate) struct Interval {
 }
 
 impl Interval {
-    /// Coefficients of the pace.
-    pub(crate) const fn pace(&self) -> &[f32; 3] {
-        &self.pace
-    }
-
     /// Arc from the interval's start, mm.
     pub(crate) fn arc(&self, x: f32) -> f32 {
         let [a, b, c] = self.walk;
@@ -121,6 +117,7 @@ impl Plan {
             inverse_step: 0.0,
             walk: [0.0; COEFFICIENTS],
             pace: [0.0; COEFFICIENTS],
+            draft: [0.0; COEFFICIENTS],
             cells: [0; NODES_MAX + 1],
             parts: [0; NODES_MAX + 1],
             knots: [Knot {
@@ -137,6 +134,11 @@ impl Plan {
     }
 
     pub(crate) fn interval(&self, index: u16) -> Interval {
+        self.interval_of(&self.pace, index)
+    }
+
+    /// An interval with this pace.
+    fn interval_of(&self, pace: &[f32; COEFFICIENTS], index: u16) -> Interval {
         let three = |values: &[f32; COEFFICIENTS]| {
             let from = usize::from(index);
             match values.get(from..from + 3) {
@@ -146,7 +148,7 @@ impl Plan {
         };
         Interval {
             walk: three(&self.walk),
-            pace: three(&self.pace),
+            pace: three(pace),
         }
     }
 
@@ -233,6 +235,18 @@ impl Cursor {
         start_q10: 0,
     };
 
+    /// At a node, to within rounding of its part of a cell.
+    pub(crate) fn at_node(plan: &Plan, node: u16) -> Self {
+        let [cell, part] = plan.node(node);
+        let start = i64::from(plan.stations.get(cell).arc_nm) << Q10_BITS;
+        let since = plan.stations.cell_mm(cell) * f32::from(part) * (1.0 / 65536.0);
+        Self {
+            interval: node,
+            x: 0.0,
+            start_q10: start + to_q10(since),
+        }
+    }
+
     /// Arc from the start of the path, units of 2^-10 nm.
     pub(crate) fn arc_q10(&self, plan: &Plan) -> i64 {
         self.start_q10 + to_q10(plan.interval(self.interval).arc(self.x))
@@ -240,7 +254,15 @@ impl Cursor {
 
     /// Speed of the plan's own pace, mm/s.
     pub(crate) fn speed(&self, plan: &Plan) -> f32 {
-        let interval = plan.interval(self.interval);
+        self.speed_of(&plan.interval(self.interval), plan)
+    }
+
+    /// Speed of the pace that is being planned, mm/s.
+    pub(crate) fn draft_speed(&self, plan: &Plan) -> f32 {
+        self.speed_of(&plan.interval_of(&plan.draft, self.interval), plan)
+    }
+
+    fn speed_of(&self, interval: &Interval, plan: &Plan) -> f32 {
         let [slope, _, _] = interval.walk_rates(self.x);
         slope * interval.speed(self.x) * plan.inverse_step
     }
@@ -272,17 +294,7 @@ impl Course for Plan {
     type Cursor = Cursor;
 
     fn advance(&self, cursor: &mut Cursor, seconds: f32) {
-        // The midpoint rule.
-        let by = seconds * self.inverse_step;
-        let here = self.interval(cursor.interval);
-        let half = cursor.x + 0.5 * by * here.speed(cursor.x);
-        let middle = if half < 1.0 || cursor.interval + 1 >= self.intervals {
-            here.speed(half.at_most(1.0))
-        } else {
-            self.interval(cursor.interval + 1).speed(half - 1.0)
-        };
-        cursor.x += by * middle;
-        cursor.carry(self);
+        self.advance_at(&self.pace, cursor, seconds);
     }
 
     fn is_over(&self, cursor: &Cursor) -> bool {
@@ -290,8 +302,37 @@ impl Course for Plan {
     }
 
     fn use_at(&self, cursor: &Cursor, rates: [f32; 3], around: f32) -> Use {
+        self.use_of(&self.pace, &self.limits, cursor, rates, around)
+    }
+}
+
+impl Plan {
+    /// Moves on at this pace; see [`Course::advance`].
+    fn advance_at(&self, pace: &[f32; COEFFICIENTS], cursor: &mut Cursor, seconds: f32) {
+        // The midpoint rule.
+        let by = seconds * self.inverse_step;
+        let here = self.interval_of(pace, cursor.interval);
+        let half = cursor.x + 0.5 * by * here.speed(cursor.x);
+        let middle = if half < 1.0 || cursor.interval + 1 >= self.intervals {
+            here.speed(half.at_most(1.0))
+        } else {
+            self.interval_of(pace, cursor.interval + 1).speed(half - 1.0)
+        };
+        cursor.x += by * middle;
+        cursor.carry(self);
+    }
+
+    /// Use of these limits at this pace; see [`Course::use_at`].
+    fn use_of(
+        &self,
+        pace: &[f32; COEFFICIENTS],
+        limits: &MotionLimits,
+        cursor: &Cursor,
+        rates: [f32; 3],
+        around: f32,
+    ) -> Use {
         let [r, r1, r2] = rates;
-        let interval = self.interval(cursor.interval);
+        let interval = self.interval_of(pace, cursor.interval);
         let x = cursor.x.at_most(1.0);
         let inverse = self.inverse_step;
         let [s1, s2, s3] = interval.walk_rates(x);
@@ -309,7 +350,6 @@ impl Course for Plan {
         let since = self.stations.since(cell, arc_q10);
         let part = (since / length.at_least(1e-7)).at_least(0.0).at_most(1.0);
         let q = self.stations.blend(cell, part);
-        let limits = &self.limits;
         let near = (JUMP_REACH * limits.period).at_least(around) * v * r;
         let jump = if since <= near && cell > 0 && self.stations.is_jump(cell - 1) {
             Some(cell - 1)
@@ -338,6 +378,16 @@ impl Course for Plan {
             });
         }
         most
+    }
+
+    /// Moves on at the planned pace.
+    pub(crate) fn advance_draft(&self, cursor: &mut Cursor, seconds: f32) {
+        self.advance_at(&self.draft, cursor, seconds);
+    }
+
+    /// Use of these limits at the planned pace.
+    pub(crate) fn use_draft(&self, limits: &MotionLimits, cursor: &Cursor) -> Use {
+        self.use_of(&self.draft, limits, cursor, [1.0, 0.0, 0.0], 0.0)
     }
 }
 

@@ -20,6 +20,13 @@ const START_SHARE: f32 = 0.85;
 /// Use of the jerk that the check passes: a plan with more is slowed down.
 const JERK_CHECKED: f32 = 0.998;
 
+/// Coefficients that the last node before a changed one sees.
+const SEEN: u16 = 3;
+
+/// Share of its difference from the followed plan that a plan of the rest keeps each time that its check fails, and how often that is done.
+const DRAWN: f32 = 0.6;
+const DRAWN_MAX: u8 = 4;
+
 /// Cycles of the pieces of work in a period's planning, by the pessimistic model of `cargo sim budget`; with the rest of the task 30 000.
 pub(crate) const PORTION_CYCLES: u32 = 28_200;
 
@@ -51,8 +58,14 @@ pub(crate) struct Planner {
     stage: Stage,
     lists: Lists,
     walker: Walker,
-    /// What the plan may use.
+    /// Limits of the path, and what the plan may use of them.
+    machine: MotionLimits,
     limits: MotionLimits,
+    /// The first coefficient that is planned: 0, or of the rest of a path that is being followed.
+    first: u16,
+    /// Whether a plan of the rest holds, and how often it was drawn towards the plan that is followed.
+    holds: bool,
+    drawn: u8,
     sweep: Sweep,
     /// Steps of the method so far.
     step: u8,
@@ -73,7 +86,11 @@ impl Planner {
             stage: Stage::Done,
             lists: [[0.0; LIST]; 5],
             walker: Walker::IDLE,
+            machine: MotionLimits::NONE,
             limits: MotionLimits::NONE,
+            first: 0,
+            holds: false,
+            drawn: 0,
             sweep: Sweep::START,
             step: 0,
             weight: 0.0,
@@ -88,9 +105,35 @@ impl Planner {
 
     /// Begins to plan the path of the plan's stations within the plan's limits.
     pub(crate) fn begin(&mut self, plan: &Plan) {
+        self.machine = plan.limits;
         self.limits = plan.limits.planned();
+        self.first = 0;
         self.walker.begin();
         self.stage = Stage::Walk;
+    }
+
+    /// Begins to plan the rest of a path anew, from this coefficient on, at another feed, mm/s.
+    pub(crate) fn begin_rest(&mut self, plan: &mut Plan, first: u16, feed: f32) {
+        self.machine = plan.limits.with_feed(feed);
+        self.limits = self.machine.planned();
+        self.first = first;
+        (self.holds, self.drawn) = (false, 0);
+        plan.draft = plan.pace;
+        self.begin_method(plan);
+        newton::clear(&mut self.lists);
+        self.stage = Stage::Assemble;
+    }
+
+    /// The plan of the rest, if it holds: the first coefficient that it changes.
+    pub(crate) fn rest(&self) -> Option<u16> {
+        (self.is_done() && self.holds).then_some(self.first)
+    }
+
+    /// Follows the plan of the rest from now on.
+    pub(crate) fn take_over(&mut self, plan: &mut Plan) {
+        plan.pace = plan.draft;
+        plan.limits = self.machine;
+        self.holds = false;
     }
 
     /// Gives up.
@@ -136,7 +179,7 @@ impl Planner {
                 self.factor = factor.at_most(self.factor);
                 if self.sweep.next(plan) {
                     let factor = START_SHARE * self.factor.at_least(1e-9);
-                    for pace in &mut plan.pace {
+                    for pace in &mut plan.draft {
                         *pace *= factor;
                     }
                     newton::clear(&mut self.lists);
@@ -162,7 +205,7 @@ impl Planner {
                 }
             }
             Stage::Solve => {
-                newton::solve(&mut self.lists, plan.intervals + 2, 0);
+                newton::solve(&mut self.lists, plan.intervals + 2, self.first);
                 self.reach = Reach::FAR;
                 Stage::Reach
             }
@@ -175,11 +218,13 @@ impl Planner {
                 }
             }
             Stage::Check => {
-                if self.check(plan) {
+                if !self.check(plan) {
+                    Stage::Check
+                } else if self.first > 0 {
+                    self.judge_rest(plan)
+                } else {
                     self.slow(plan, least);
                     Stage::Done
-                } else {
-                    Stage::Check
                 }
             }
             Stage::Done => Stage::Done,
@@ -190,14 +235,14 @@ impl Planner {
         let mut sum = 0.0;
         let count = usize::from(plan.intervals) + 2;
         if let Some(shape) = self.lists.get_mut(SHAPE) {
-            for (shape, pace) in shape.iter_mut().zip(&plan.pace).take(count) {
+            for (shape, pace) in shape.iter_mut().zip(&plan.draft).take(count) {
                 *shape = *pace;
                 sum += inverse_sqrt(pace.at_least(1e-9));
             }
         }
         self.weight = 1.0 / sum.at_least(1e-9);
         self.factor = f32::MAX;
-        (self.sweep, self.step) = (Sweep::START, 0);
+        (self.sweep, self.step) = (Sweep::from(self.first.saturating_sub(SEEN)), 0);
     }
 
     /// Takes the step that was solved for, and begins the next, or the check.
@@ -208,27 +253,54 @@ impl Planner {
         if usize::from(self.step) < BARRIER.len() {
             return Stage::Assemble;
         }
+        self.begin_check(plan);
+        Stage::Check
+    }
+
+    fn begin_check(&mut self, plan: &mut Plan) {
         plan.allow_feed();
-        self.cursor = Cursor::START;
+        self.cursor = match self.first.checked_sub(SEEN) {
+            Some(node) if node > 0 => Cursor::at_node(plan, node),
+            _ => Cursor::START,
+        };
         self.most = Use::NONE;
         self.periods = 0;
         self.lead = Lead::NONE;
+    }
+
+    /// Whether the plan of the rest holds; if not, it is drawn towards the plan that is followed, which does.
+    fn judge_rest(&mut self, plan: &mut Plan) -> Stage {
+        let Use {
+            feed,
+            velocity,
+            acceleration,
+            jerk,
+        } = self.most;
+        self.holds = feed <= 1.0 && velocity <= 1.0 && acceleration <= 1.0 && jerk <= JERK_CHECKED;
+        if self.holds || self.drawn >= DRAWN_MAX {
+            return Stage::Done;
+        }
+        self.drawn += 1;
+        for (draft, pace) in plan.draft.iter_mut().zip(&plan.pace) {
+            *draft = pace + DRAWN * (*draft - pace);
+        }
+        self.begin_check(plan);
         Stage::Check
     }
 
     /// One period of the plan; whether it is over.
     fn check(&mut self, plan: &mut Plan) -> bool {
         if self.periods < u32::from(LEAD) {
-            self.lead.look(plan, &self.cursor, 1.0);
+            self.lead.look_draft(plan, &self.cursor);
             self.lead.cursor = self.cursor;
         }
-        let here = plan.use_at(&self.cursor, [1.0, 0.0, 0.0], 0.0);
+        let here = plan.use_draft(&self.machine, &self.cursor);
         self.most.add(&here);
         if here.velocity * (1.0 + NEAR) > 1.0 {
             plan.forbid_feed(self.cursor.interval);
         }
         let period = plan.limits.period;
-        plan.advance(&mut self.cursor, period);
+        plan.advance_draft(&mut self.cursor, period);
         self.periods = self.periods.saturating_add(1);
         plan.is_over(&self.cursor)
     }
@@ -252,10 +324,11 @@ impl Planner {
         if factor > 1.0 {
             plan.lead.near = 0.0;
             let share = 1.0 / (factor * factor);
-            for pace in &mut plan.pace {
+            for pace in &mut plan.draft {
                 *pace *= share;
             }
         }
+        plan.pace = plan.draft;
     }
 }
 

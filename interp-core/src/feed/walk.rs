@@ -522,7 +522,7 @@ impl Walker {
             sum_s += h - duration(oldest);
         }
         let index = usize::from(index);
-        if let (Some(walk), Some(pace)) = (plan.walk.get_mut(index), plan.pace.get_mut(index)) {
+        if let (Some(walk), Some(pace)) = (plan.walk.get_mut(index), plan.draft.get_mut(index)) {
             *walk = to_f32(sum_q10) * MM_PER_Q10 * inverse;
             let ratio = h / (sum_s * inverse).at_least(1e-9);
             *pace = ratio * ratio;

@@ -4,14 +4,16 @@
 //! pass, the next pass. A pass is slowed down where the pass after it would not be planned in time.
 
 use crate::fault::{Fault, Result};
+use crate::feed::MM_PER_Q10;
 use crate::feed::follow::Follower;
 use crate::feed::limits::MotionLimits;
+use crate::feed::pace::Course as _;
 use crate::feed::pace::Pace;
 use crate::feed::plan::Cursor;
 use crate::feed::planner::{PORTION_CYCLES, Planner};
 use crate::job::program::Job;
 use crate::job::{AxisLimits, Pattern};
-use crate::math::number::Bounded;
+use crate::math::number::{Bounded, to_f32};
 use crate::pass::position::PassPosition;
 use crate::pass::run::Run;
 use crate::sample::{Sample, SpanParameter};
@@ -25,6 +27,15 @@ const SPARE_PERIODS: u32 = 30;
 const PACE_CYCLES: u32 = 2_000;
 const LINK_PACE_CYCLES: u32 = 1_000;
 const STEP_OVER_CYCLES: u32 = 6_000;
+
+/// Feed above that of a plan for which it is planned anew, as a ratio.
+const REPLANNED: f32 = 1.001;
+/// Periods that planning takes: a node, the rest of a pass apart from its nodes, a whole pass.
+const PERIODS_A_NODE: f32 = 3.4;
+const PERIODS_A_REST: f32 = 40.0;
+const PERIODS_A_PASS: f32 = 100.0;
+/// Steps in which the tool's place after the planning is estimated.
+const AHEAD_STEPS: u16 = 64;
 
 /// Phase of the sequence.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -80,6 +91,8 @@ enum Planning {
     Stations,
     /// Its feed is being planned.
     Feed,
+    /// The rest of this pass is being planned anew, for an override above its plan.
+    Rest,
     /// There is no next pass, or it is planned.
     Complete,
 }
@@ -116,8 +129,9 @@ pub(crate) struct Sequencer {
     has_step_over: bool,
     /// Periods of planning of the next pass so far.
     spent: u32,
-    /// Feed factor of the last period.
+    /// Feed factor of the last period, and the feed that the rest of the pass was last planned for, mm/s.
     share: f32,
+    replanned: f32,
     /// The tool's position, once it is known.
     at: Option<[i32; 3]>,
     /// Cell of the pass that the tool is in.
@@ -150,6 +164,7 @@ impl Sequencer {
             has_step_over: false,
             spent: 0,
             share: 1.0,
+            replanned: 0.0,
             at: None,
             cell: 0,
         }
@@ -219,9 +234,16 @@ impl Sequencer {
             Phase::Leg(_) => self.straight.progress.has_work(),
             Phase::Await | Phase::AwaitGoal(_) | Phase::Done => false,
         };
+        let wants_more = self.phase == Phase::Pass && self.share > 1.0;
         seeks_pace
+            || wants_more
             || (self.pending.is_none()
                 && (self.planning != Planning::Complete || self.has_to_plan_step_over()))
+    }
+
+    /// Whether the next pass is planned.
+    fn is_planned(&self) -> bool {
+        matches!(self.planning, Planning::Complete | Planning::Rest)
     }
 
     fn has_to_plan_step_over(&self) -> bool {
@@ -232,8 +254,10 @@ impl Sequencer {
     #[inline(never)]
     pub(crate) fn plan(&mut self, job: &Job<'_>, axes: &AxisLimits) {
         let mut left = PORTION_CYCLES;
-        if self.planning != Planning::Complete {
-            self.spent = self.spent.saturating_add(1);
+        match self.planning {
+            Planning::Stations | Planning::Feed => self.spent = self.spent.saturating_add(1),
+            Planning::Complete if self.wants_more(job) => return self.plan_for_override(job, axes),
+            Planning::Complete | Planning::Rest => {}
         }
         loop {
             let cycles = self.next_cycles();
@@ -245,10 +269,22 @@ impl Sequencer {
         }
     }
 
+    /// Whether the override asks for more than the plans give.
+    fn wants_more(&self, job: &Job<'_>) -> bool {
+        let [one, other] = &self.plans;
+        let feed = job.header.feed_mm_s * self.share;
+        let of = |pass: &PassPlan| feed > REPLANNED * pass.plan.limits.feed;
+        self.phase == Phase::Pass && self.share > 1.0 && (of(one) || of(other)) && !self.pace.has_work()
+    }
+
     /// Cycles of the next piece of planning; 0 where there is none.
     fn next_cycles(&self) -> u32 {
         let [one, other] = &self.plans;
-        let next = if self.second { &one.plan } else { &other.plan };
+        let (now, next) = if self.second {
+            (&other.plan, &one.plan)
+        } else {
+            (&one.plan, &other.plan)
+        };
         match self.phase {
             Phase::Pass if self.pace.has_work() => return PACE_CYCLES,
             Phase::StepOver if self.step_over.progress.has_work() => return LINK_PACE_CYCLES,
@@ -264,6 +300,7 @@ impl Sequencer {
         match self.planning {
             Planning::Stations => self.lookahead.cycles(),
             Planning::Feed => self.planner.cycles(next),
+            Planning::Rest => self.planner.cycles(now).max(1),
             Planning::Complete => 0,
         }
     }
@@ -306,7 +343,59 @@ impl Sequencer {
                     self.planning = Planning::Complete;
                 }
             }
+            Planning::Rest => {
+                if !self.planner.is_done() {
+                    return self.planner.work(&mut now.plan, 0);
+                }
+                // A change of the pace was checked on the plan as it is.
+                let is_ahead = self.planner.rest().is_some_and(|first| {
+                    self.phase == Phase::Pass && self.follower.cursor.interval + 4 < first
+                });
+                if is_ahead && !(self.pace.is_constant() && self.follower.is_as_planned()) {
+                    return;
+                }
+                if is_ahead {
+                    self.planner.take_over(&mut now.plan);
+                    self.follower.restart_lead(&now.plan);
+                }
+                self.follower.keep_to_plan(false);
+                self.planning = Planning::Complete;
+            }
             Planning::Complete => {}
+        }
+    }
+
+    /// Plans what is ahead anew where the override asks for more than the plans give.
+    fn plan_for_override(&mut self, job: &Job<'_>, axes: &AxisLimits) {
+        let feed = job.header.feed_mm_s * self.share;
+        let (now, next) = both(&mut self.plans, self.second);
+        if self.phase != Phase::Pass || now.point {
+            return;
+        }
+        let left = to_f32(now.plan.length_q10() - self.follower.cursor.arc_q10(&now.plan)) * MM_PER_Q10;
+        let left_periods = left / (feed * job.header.period_s);
+        if feed > REPLANNED * now.plan.limits.feed && feed > REPLANNED * self.replanned {
+            self.replanned = feed;
+            let mut ahead = self.follower.cursor;
+            let nodes = f32::from(now.plan.intervals - self.follower.cursor.interval);
+            for _ in 0..AHEAD_STEPS {
+                let step = (nodes * PERIODS_A_NODE + PERIODS_A_REST) * (1.0 / f32::from(AHEAD_STEPS));
+                now.plan.advance(&mut ahead, step * job.header.period_s);
+            }
+            let first = ahead.interval + 5;
+            if first + 8 < now.plan.intervals {
+                self.planner.begin_rest(&mut now.plan, first, feed);
+                self.follower.keep_to_plan(true);
+                self.planning = Planning::Rest;
+            }
+        } else if now.next.is_some()
+            && !next.point
+            && feed > REPLANNED * next.plan.limits.feed
+            && left_periods > 1.5 * f32::from(next.plan.intervals) * PERIODS_A_NODE + PERIODS_A_PASS
+        {
+            next.plan.limits = MotionLimits::new(axes, feed, job.header.period_s);
+            self.planner.begin(&next.plan);
+            self.planning = Planning::Feed;
         }
     }
 
@@ -383,7 +472,7 @@ impl Sequencer {
             if let Some(fault) = self.pending {
                 return Err(fault);
             }
-            if self.planning != Planning::Complete || self.has_to_plan_step_over() {
+            if !self.is_planned() || self.has_to_plan_step_over() {
                 return Ok(());
             }
             let (now, next) = both(&mut self.plans, self.second);
@@ -437,6 +526,7 @@ impl Sequencer {
         self.phase = Phase::Pass;
         self.cell = 0;
         self.follower.begin(&now.plan);
+        self.replanned = 0.0;
         let pace = pace_of(job, now, wish.share);
         self.pace.begin(pace, job.header.period_s);
         if job.header.pattern == Pattern::Zigzag
@@ -527,7 +617,7 @@ impl Sequencer {
             }
             // The traverse needs the stations of the next pass, the plunge its plan.
             let is_known = match leg {
-                Leg::Plunge => self.planning == Planning::Complete,
+                Leg::Plunge => self.is_planned(),
                 _ => self.planning != Planning::Stations,
             };
             if !is_known {
