@@ -20,9 +20,10 @@ const LIMITS: AxisLimits = AxisLimits {
     jerk_mm_s3: [20_000.0; 3],
 };
 /// Maximum duration of a pass over that of the best motion known.
-const ABOVE: f64 = 1.10;
-/// Maximum duration of a straight pass over the exact time, and periods added because each part of a pass takes a whole number of them.
-const ABOVE_STRAIGHT: f64 = 1.02;
+const ABOVE: f64 = 1.05;
+/// Maximum duration of a straight pass over the exact time, half of it for the jerk that a plan leaves to a hold, and periods added because each part
+/// of a pass takes a whole number of them.
+const ABOVE_STRAIGHT: f64 = 1.03;
 const WHOLE_PERIODS: f64 = 3.0;
 
 fn on_machine(name: &str, times: f64) -> Job {

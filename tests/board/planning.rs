@@ -141,6 +141,7 @@ fn a_late_planning_stops_the_run_along_its_path() {
         desk.board.tick_without_planning(0, 0);
         let at_once = desk.board.status();
         assert_eq!((at_once.state, at_once.deadline_misses), (State::Stopping, 1));
+        desk.board.real_time().plan();
         let fault = at_once.fault.unwrap();
         assert_eq!(
             (fault.kind(), fault.value),

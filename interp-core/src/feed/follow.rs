@@ -10,7 +10,7 @@ pub(crate) const LEAD: u8 = 64;
 /// Periods in which the speed changes from the plan's to the feed, half the lead: there is time to change to the feed and back.
 const CHANGE: u8 = LEAD / 2;
 /// Relative difference of the plan's speed from the feed that is made up for.
-pub(crate) const NEAR: f32 = 3e-3;
+const NEAR: f32 = 3e-3;
 
 /// A place ahead of the tool, and for how long the plan has been near the feed there, in periods at the plan's own pace.
 #[derive(Clone, Copy, Debug)]

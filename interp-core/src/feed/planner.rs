@@ -1,6 +1,6 @@
 //! Plans a path in portions: walk, barrier method, check.
 
-use super::follow::{LEAD, Lead, NEAR};
+use super::follow::{LEAD, Lead};
 use super::limits::MotionLimits;
 use super::newton::{self, Reach, SHAPE, Sweep};
 use super::pace::{Course, Use};
@@ -296,7 +296,7 @@ impl Planner {
         }
         let here = plan.use_draft(&self.machine, &self.cursor);
         self.most.add(&here);
-        if here.velocity * (1.0 + NEAR) > 1.0 {
+        if here.velocity > here.feed {
             plan.forbid_feed(self.cursor.interval);
         }
         let period = plan.limits.period;

@@ -203,6 +203,8 @@ fn straight_paths_take_the_time_of_the_closed_form() {
         (1800.0, 100.0),
         (0.003, 60.0),
         (20.0, 1.0),
+        (1.0, 1.0),
+        (1.0, 30.0),
     ] {
         let limits = limits(feed);
         let path = Path::straight(length);

@@ -361,9 +361,7 @@ impl Walker {
             let reach = here + 2.0 * self.accel(lists, cell) * length;
             let there = get(lists, SPEED_SQR, cell + 1).at_most(reach);
             put(lists, SPEED_SQR, cell + 1, there);
-            if length > 0.0 {
-                time += 2.0 * length / (sqrt(here) + sqrt(there)).at_least(1e-6);
-            }
+            time += Motion::of(here, there, length, self.accel(lists, cell)).duration;
             put(lists, TIME, cell + 1, time);
         }
         self.duration = time;
@@ -477,9 +475,12 @@ impl Walker {
         } else {
             let since = time - get(lists, TIME, self.cell);
             let [here, there] = [self.cell, self.cell + 1].map(|station| get(lists, SPEED_SQR, station));
-            let length = plan.stations.cell_mm(self.cell).at_least(1e-7);
-            let moved = since * (sqrt(here) + 0.25 * (there - here) / length * since);
-            (plan.stations.get(self.cell).arc_nm, moved.at_most(length))
+            let length = plan.stations.cell_mm(self.cell);
+            let motion = Motion::of(here, there, length, self.accel(lists, self.cell));
+            (
+                plan.stations.get(self.cell).arc_nm,
+                motion.at(since).at_least(0.0).at_most(length),
+            )
         };
         let ((from, from_mm), (to, to_mm)) = (self.before, place);
         put(
@@ -528,6 +529,66 @@ impl Walker {
             *pace = ratio * ratio;
         }
         (self.sum_q10, self.sum_s) = (sum_q10, sum_s);
+    }
+}
+
+/// The motion over a cell: at a constant acceleration; next to a rest, at the greatest one for as long as it takes.
+struct Motion {
+    duration: f32,
+    length: f32,
+    /// Speed at the start, or from the rest's end at the other, and acceleration.
+    speed: f32,
+    acceleration: f32,
+    /// Time of the acceleration, and whether the rest is at the end.
+    ramp: f32,
+    is_end: bool,
+}
+
+impl Motion {
+    /// Between these squares of the speed.
+    fn of(here: f32, there: f32, length: f32, acceleration: f32) -> Self {
+        let is_end = there == 0.0 && here > 0.0;
+        if !(length > 0.0) {
+            return Self {
+                duration: 0.0,
+                length: 0.0,
+                speed: 0.0,
+                acceleration: 0.0,
+                ramp: 0.0,
+                is_end,
+            };
+        }
+        let top = sqrt(here.at_least(there)).at_least(1e-6);
+        if here > 0.0 && there > 0.0 {
+            let duration = 2.0 * length / (sqrt(here) + sqrt(there));
+            return Self {
+                duration,
+                length,
+                speed: sqrt(here),
+                acceleration: 0.5 * (there - here) / length,
+                ramp: duration,
+                is_end: false,
+            };
+        }
+        let acceleration = acceleration.at_least(0.5 * top * top / length);
+        let ramp = top / acceleration;
+        Self {
+            duration: ramp + (length - 0.5 * top * ramp).at_least(0.0) / top,
+            length,
+            speed: 0.0,
+            acceleration,
+            ramp,
+            is_end,
+        }
+    }
+
+    /// Length after this time.
+    fn at(&self, time: f32) -> f32 {
+        let time = if self.is_end { self.duration - time } else { time };
+        let ramp = time.at_most(self.ramp);
+        let top = self.speed + self.acceleration * ramp;
+        let moved = 0.5 * (self.speed + top) * ramp + top * (time - ramp);
+        if self.is_end { self.length - moved } else { moved }
     }
 }
 
