@@ -371,7 +371,7 @@ impl Walker {
             .at_most(cube_root(0.5 * length / self.jerk));
         let wanted = u16::try_from(truncated(time / SPACING_WORTH)).unwrap_or(u16::MAX);
         self.intervals = wanted.clamp(NODES_MIN, NODES_COUNT);
-        self.ends = (self.mean_s / 6.0).at_least(time / (40.0 * f32::from(self.intervals)));
+        self.ends = (self.mean_s / 6.0).at_least(time / (400.0 * f32::from(self.intervals)));
     }
 
     /// Times at which something happens.
