@@ -55,7 +55,7 @@ impl<S> Interpolator<S> {
     #[must_use]
     pub const fn with_store(store: S) -> Self {
         Self {
-            motion: Motion::new(),
+            motion: Motion::NEW,
             store,
         }
     }
@@ -255,19 +255,16 @@ enum Ending {
 }
 
 impl Motion {
-    /// A function, not a constant: the constant's value would be kept in flash, most of it zeros.
-    const fn new() -> Self {
-        Self {
-            state: State::Idle,
-            fault: None,
-            slow: 0,
-            last: Sample::START,
-            ending: Ending::Stand,
-            run: Run::START,
-            program: Program::new(),
-            sequencer: Sequencer::new(),
-        }
-    }
+    const NEW: Self = Self {
+        state: State::Idle,
+        fault: None,
+        slow: 0,
+        last: Sample::START,
+        ending: Ending::Stand,
+        run: Run::START,
+        program: Program::new(),
+        sequencer: Sequencer::START,
+    };
 
     fn may_load(&self) -> Result<()> {
         if self.state.is_under_way() {

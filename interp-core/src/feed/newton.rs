@@ -216,6 +216,13 @@ pub(crate) struct Reach {
 }
 
 impl Reach {
+    /// None yet.
+    pub(crate) const NONE: Self = Self {
+        slack: 0.0,
+        loss: 0.0,
+    };
+
+    /// No row is used up.
     pub(crate) const FAR: Self = Self {
         slack: 1.0,
         loss: 0.0,

@@ -108,30 +108,28 @@ impl Interval {
 
 impl Plan {
     /// Of no path.
-    pub(crate) const fn none() -> Self {
-        Self {
-            stations: Stations::NONE,
-            limits: MotionLimits::NONE,
-            intervals: 0,
-            step_s: 0.0,
-            inverse_step: 0.0,
-            walk: [0.0; COEFFICIENTS],
-            pace: [0.0; COEFFICIENTS],
-            draft: [0.0; COEFFICIENTS],
-            cells: [0; NODES_MAX + 1],
-            parts: [0; NODES_MAX + 1],
-            knots: [Knot {
-                interval: 0,
-                part: 0,
-                station: 0,
-            }; KNOTS_MAX],
-            knot_count: 0,
-            periods: 0,
-            trim_q10: 0,
-            exact: [0; NODES_MAX / 32],
-            lead: Lead::NONE,
-        }
-    }
+    pub(crate) const NONE: Self = Self {
+        stations: Stations::NONE,
+        limits: MotionLimits::NONE,
+        intervals: 0,
+        step_s: 0.0,
+        inverse_step: 0.0,
+        walk: [0.0; COEFFICIENTS],
+        pace: [0.0; COEFFICIENTS],
+        draft: [0.0; COEFFICIENTS],
+        cells: [0; NODES_MAX + 1],
+        parts: [0; NODES_MAX + 1],
+        knots: [Knot {
+            interval: 0,
+            part: 0,
+            station: 0,
+        }; KNOTS_MAX],
+        knot_count: 0,
+        periods: 0,
+        trim_q10: 0,
+        exact: [0; NODES_MAX / 32],
+        lead: Lead::NONE,
+    };
 
     pub(crate) fn interval(&self, index: u16) -> Interval {
         self.interval_of(&self.pace, index)

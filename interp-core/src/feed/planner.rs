@@ -43,13 +43,13 @@ mod cycles {
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Stage {
+    Done,
     Walk,
     Factor,
     Assemble,
     Solve,
     Reach,
     Check,
-    Done,
 }
 
 /// The planning of one path.
@@ -81,27 +81,26 @@ pub(crate) struct Planner {
 }
 
 impl Planner {
-    pub(crate) const fn idle() -> Self {
-        Self {
-            stage: Stage::Done,
-            lists: [[0.0; LIST]; 5],
-            walker: Walker::IDLE,
-            machine: MotionLimits::NONE,
-            limits: MotionLimits::NONE,
-            first: 0,
-            holds: false,
-            drawn: 0,
-            sweep: Sweep::START,
-            step: 0,
-            weight: 0.0,
-            factor: 0.0,
-            reach: Reach::FAR,
-            cursor: Cursor::START,
-            most: Use::NONE,
-            periods: 0,
-            lead: Lead::NONE,
-        }
-    }
+    /// Idle.
+    pub(crate) const IDLE: Self = Self {
+        stage: Stage::Done,
+        lists: [[0.0; LIST]; 5],
+        walker: Walker::IDLE,
+        machine: MotionLimits::NONE,
+        limits: MotionLimits::NONE,
+        first: 0,
+        holds: false,
+        drawn: 0,
+        sweep: Sweep::START,
+        step: 0,
+        weight: 0.0,
+        factor: 0.0,
+        reach: Reach::NONE,
+        cursor: Cursor::START,
+        most: Use::NONE,
+        periods: 0,
+        lead: Lead::NONE,
+    };
 
     /// Begins to plan the path of the plan's stations within the plan's limits.
     pub(crate) fn begin(&mut self, plan: &Plan) {

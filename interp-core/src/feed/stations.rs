@@ -175,7 +175,8 @@ impl Window {
     /// Appends a position; the oldest is dropped.
     pub(crate) fn push(&mut self, centre_nm: [i32; 3], arc_mm: f32) {
         if self.count == WINDOW {
-            self.points.rotate_left(1);
+            let [_, b, c, d, e] = self.points;
+            self.points = [b, c, d, e, e];
             self.count -= 1;
         }
         if let Some(place) = self.points.get_mut(self.count) {

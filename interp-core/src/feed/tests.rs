@@ -94,7 +94,7 @@ impl Path {
     }
 
     fn plan(&self, limits: &MotionLimits) -> Box<Plan> {
-        let mut plan = Box::new(Plan::none());
+        let mut plan = Box::new(Plan::NONE);
         plan.limits = *limits;
         let pieces = self.ends.len() - 1;
         let cells = (160 / pieces).max(2);
@@ -108,7 +108,7 @@ impl Path {
                 });
             }
         }
-        let mut planner = Box::new(Planner::idle());
+        let mut planner = Box::new(Planner::IDLE);
         planner.begin(&plan);
         while !planner.is_done() {
             planner.work(&mut plan, 0);

@@ -38,6 +38,7 @@ const KNOTS_A_PORTION: u16 = 40;
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Stage {
+    Done,
     Caps,
     Jumps,
     Backwards,
@@ -55,7 +56,6 @@ enum Stage {
     Means,
     Nodes,
     Knots,
-    Done,
 }
 
 /// What is varied to fit the nodes.

@@ -62,21 +62,19 @@ pub(crate) struct PassPlan {
 
 impl PassPlan {
     /// No plan.
-    pub(crate) const fn none() -> Self {
-        Self {
-            plan: Plan::none(),
-            pass: 0,
-            side: SpanParameter { span: 0, fraction: 0 },
-            cells: 0,
-            cell_fraction: 0,
-            kept: Kept::Every,
-            point: false,
-            ends: [[0; 3]; 2],
-            faces_up: [false; 2],
-            interval: 0.0,
-            next: None,
-        }
-    }
+    pub(crate) const NONE: Self = Self {
+        plan: Plan::NONE,
+        pass: 0,
+        side: SpanParameter { span: 0, fraction: 0 },
+        cells: 0,
+        cell_fraction: 0,
+        kept: Kept::Every,
+        point: false,
+        ends: [[0; 3]; 2],
+        faces_up: [false; 2],
+        interval: 0.0,
+        next: None,
+    };
 
     /// Cells of a patch between kept stations, and the fraction of the patch per cell.
     pub(crate) const fn kept_cells(&self) -> (u16, u64) {

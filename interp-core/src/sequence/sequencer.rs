@@ -27,6 +27,11 @@ const SPARE_PERIODS: u32 = 30;
 const PACE_CYCLES: u32 = 2_000;
 const LINK_PACE_CYCLES: u32 = 1_000;
 const STEP_OVER_CYCLES: u32 = 6_000;
+/// Cycles of replacing the rest of a plan, or of the wait until that is possible: once a period.
+const TAKE_OVER_CYCLES: u32 = 20_000;
+
+/// Greatest number of pieces of work in a period: the shortest is the step to the next station.
+const PIECES_MAX: u32 = 36;
 
 /// Feed above that of a plan for which it is planned anew, as a ratio.
 const REPLANNED: f32 = 1.001;
@@ -146,29 +151,27 @@ const fn both(plans: &mut [PassPlan; 2], second: bool) -> (&mut PassPlan, &mut P
 
 impl Sequencer {
     /// State before the first run.
-    pub(crate) const fn new() -> Self {
-        Self {
-            phase: Phase::Done,
-            goal: Goal::Pass,
-            lookahead: Lookahead::START,
-            planner: Planner::idle(),
-            planning: Planning::Complete,
-            plans: [PassPlan::none(), PassPlan::none()],
-            second: false,
-            on_surface: false,
-            pending: None,
-            follower: Follower::START,
-            pace: Pace::REST,
-            straight: StraightMove::NONE,
-            step_over: BoundaryStepOver::NONE,
-            has_step_over: false,
-            spent: 0,
-            share: 1.0,
-            replanned: 0.0,
-            at: None,
-            cell: 0,
-        }
-    }
+    pub(crate) const START: Self = Self {
+        phase: Phase::Done,
+        goal: Goal::Pass,
+        lookahead: Lookahead::START,
+        planner: Planner::IDLE,
+        planning: Planning::Complete,
+        plans: [PassPlan::NONE; 2],
+        second: false,
+        on_surface: false,
+        pending: None,
+        follower: Follower::START,
+        pace: Pace::REST,
+        straight: StraightMove::NONE,
+        step_over: BoundaryStepOver::NONE,
+        has_step_over: false,
+        spent: 0,
+        share: 1.0,
+        replanned: 0.0,
+        at: None,
+        cell: 0,
+    };
 
     /// Starts the job from the tool's position.
     pub(crate) fn restart(&mut self, job: &Job<'_>, axes: &AxisLimits) {
@@ -259,7 +262,7 @@ impl Sequencer {
             Planning::Complete if self.wants_more(job) => return self.plan_for_override(job, axes),
             Planning::Complete | Planning::Rest => {}
         }
-        loop {
+        for _ in 0..PIECES_MAX {
             let cycles = self.next_cycles();
             if cycles == 0 || cycles > left {
                 return;
@@ -300,7 +303,8 @@ impl Sequencer {
         match self.planning {
             Planning::Stations => self.lookahead.cycles(),
             Planning::Feed => self.planner.cycles(next),
-            Planning::Rest => self.planner.cycles(now).max(1),
+            Planning::Rest if self.planner.is_done() => TAKE_OVER_CYCLES,
+            Planning::Rest => self.planner.cycles(now),
             Planning::Complete => 0,
         }
     }
