@@ -6,11 +6,13 @@
 //!
 //! ```text
 //! main.rs ─► readers.rs   by the file's first bytes ─► step.rs, iges.rs, rhino.rs   what can be checked before the whole file is read
-//!                                                       └─► ir.rs, ir_*.rs   cadmpeg's model -> cad::Face
+//!                           step_records.rs, step_units.rs, iges_entries.rs ◄─┤   what the text says, for the cross-check
+//!                                                                             └─► ir.rs, ir_*.rs   cadmpeg's model -> cad::Face
 //! ```
 
 mod format;
 mod iges;
+mod iges_entries;
 mod ir;
 mod ir_boundary;
 mod ir_geometry;
@@ -18,6 +20,8 @@ mod ir_index;
 mod readers;
 mod rhino;
 mod step;
+mod step_records;
+mod step_units;
 
 use std::io::{BufWriter, Write, stdout};
 use std::path::Path;

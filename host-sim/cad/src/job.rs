@@ -94,9 +94,11 @@ pub fn write_job(source: &str, face: &Face, surface: &MachinableFace, options: &
     let radius_mm = options.radius_mm.unwrap_or_else(|| ball(concave_mm, size_mm));
     let mut warnings = Vec::new();
     if let Some(why) = &surface.outline.trimmed {
-        warnings.push(format!(
-            "the face is trimmed ({why}); the whole rectangle of the surface around it is machined"
-        ));
+        warnings.push(if surface.outline.unknown {
+            format!("{why}; the whole surface is machined, wherever the face on it ends")
+        } else {
+            format!("the face is trimmed ({why}); the whole rectangle of the surface around it is machined")
+        });
     }
     if let Form::Fitted { why, deviation } = &surface.form {
         warnings.push(format!(

@@ -115,12 +115,20 @@ pub fn machinable(file: &str, face: &Face, options: &Options) -> Result<Machinab
         )
     })?;
     if let Some(why) = outline.trimmed.as_ref().filter(|_| !options.untrimmed) {
-        return Err(CadError::face(
-            file,
-            format!("{name} is trimmed: {why}"),
-            "import it with --untrimmed (in a job: untrimmed = true) to machine the whole rectangle around it, or split the \
-             face in the CAD system",
-        ));
+        let (what, remedy) = if outline.unknown {
+            (
+                format!("{name}: {why}"),
+                "export the part as STEP, or import it with --untrimmed (in a job: untrimmed = true) to machine the whole \
+                 surface, wherever the face on it ends",
+            )
+        } else {
+            (
+                format!("{name} is trimmed: {why}"),
+                "import it with --untrimmed (in a job: untrimmed = true) to machine the whole rectangle around it, or split \
+                 the face in the CAD system",
+            )
+        };
+        return Err(CadError::face(file, what, remedy));
     }
     let mut why_fitted = "it has no exact form".to_owned();
     if let Some(spline) = exact(&face.surface, outline.rectangle) {

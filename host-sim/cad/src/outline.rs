@@ -18,6 +18,8 @@ pub struct Outline {
     pub rectangle: [[f64; 2]; 2],
     /// Reason why the face is trimmed; `None` if it is the whole rectangle.
     pub trimmed: Option<String>,
+    /// Whether the boundary is unknown, so that the rectangle is that of the whole surface.
+    pub unknown: bool,
 }
 
 /// A boundary loop in parameters.
@@ -150,12 +152,14 @@ pub fn outline(face: &Face) -> Result<Outline, String> {
             return Ok(Outline {
                 rectangle: natural()?,
                 trimmed: None,
+                unknown: false,
             });
         }
         Boundary::Unknown(why) => {
             return Ok(Outline {
                 rectangle: natural()?,
-                trimmed: Some(format!("its boundary cannot be read: {why}")),
+                trimmed: Some(format!("its boundary is unknown: {why}")),
+                unknown: true,
             });
         }
         Boundary::Loops(loops) => loops,
@@ -184,7 +188,11 @@ pub fn outline(face: &Face) -> Result<Outline, String> {
     if rectangle.iter().flatten().any(|x| !x.is_finite()) || rectangle.iter().any(|r| r[0] >= r[1]) {
         return Err("its boundary encloses no area".to_owned());
     }
-    Ok(Outline { rectangle, trimmed })
+    Ok(Outline {
+        rectangle,
+        trimmed,
+        unknown: false,
+    })
 }
 
 /// The rectangle around all loops.

@@ -78,7 +78,10 @@ impl From<CadError> for Failure {
 /// A line of the list.
 struct Row<'f> {
     face: &'f Face,
+    /// Why the face is not a whole rectangle.
     trimmed: Option<String>,
+    /// Whether its boundary could not be read.
+    unknown: bool,
     becomes: std::result::Result<(MachinableFace, Measures), CadError>,
 }
 
@@ -105,11 +108,13 @@ fn rows<'f>(file: &str, faces: &'f [Face], options: &Options) -> Vec<Row<'f>> {
                         .as_ref()
                         .ok()
                         .and_then(|(made, _)| made.outline.trimmed.clone());
+                    let unknown = becomes.as_ref().is_ok_and(|(made, _)| made.outline.unknown);
                     bar.inc(1);
                     if let Ok(mut done) = done.lock() {
                         done.push(Row {
                             face,
                             trimmed,
+                            unknown,
                             becomes,
                         });
                     }
@@ -133,6 +138,7 @@ fn row_json(row: &Row<'_>) -> Value {
         "solid": face.solid,
         "trimmed": row.trimmed.is_some(),
         "trimmed_why": row.trimmed,
+        "boundary_known": !row.unknown,
     });
     let more = match &row.becomes {
         Ok((made, measures)) => json!({
@@ -182,7 +188,11 @@ fn print_rows(rows: &[Row<'_>]) {
         let face = row.face;
         let degree = degrees(&face.surface).map_or("-".to_owned(), |[p, q]| format!("{p} x {q}"));
         let (kind, number) = (face.surface.kind(), face.number);
-        let trimmed = if row.trimmed.is_some() { "yes" } else { "no" };
+        let trimmed = match (&row.trimmed, row.unknown) {
+            (None, _) => "no",
+            (Some(_), false) => "yes",
+            (Some(_), true) => "unknown",
+        };
         match &row.becomes {
             Ok((made, measures)) => {
                 let [x, y, z] = measures.size_mm();

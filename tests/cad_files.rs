@@ -1,0 +1,200 @@
+//! CAD files are read right or refused: units, lost boundaries, notations that real files have. Each file is one of the samples, changed in one
+//! place, so that the right answer is known.
+
+use std::path::Path;
+
+use cad::{Boundary, CadError, Face, Model, Options, machinable, outline, read};
+use glam::DVec3;
+
+/// A sheet of 30 x 20 in its file's unit, with its corner at the origin.
+const SHEET: &str = include_str!("hostile_cad/sound.step");
+/// A trimmed face with a hole, and a face that is not trimmed.
+const HOOD: &str = include_str!("../jobs/cad/hood.igs");
+/// The line of the sheet's unit.
+const MILLIMETRE: &str = "#11=(LENGTH_UNIT()NAMED_UNIT(*)SI_UNIT(.MILLI.,.METRE.));";
+/// The inch, as a conversion of a centimetre.
+const INCH: &str = "#11=(CONVERSION_BASED_UNIT('INCH',#14)LENGTH_UNIT()NAMED_UNIT(#15));\n\
+    #14=LENGTH_MEASURE_WITH_UNIT(LENGTH_MEASURE(2.54),#16);\n\
+    #15=DIMENSIONAL_EXPONENTS(1.,0.,0.,0.,0.,0.,0.);\n\
+    #16=(LENGTH_UNIT()NAMED_UNIT(*)SI_UNIT(.CENTI.,.METRE.));";
+/// A second context, in mm.
+const MM_CONTEXT: &str = "#70=(GEOMETRIC_REPRESENTATION_CONTEXT(3)GLOBAL_UNIT_ASSIGNED_CONTEXT((#71,#12,#13))REPRESENTATION_CONTEXT('','3D'));\n\
+    #71=(LENGTH_UNIT()NAMED_UNIT(*)SI_UNIT(.MILLI.,.METRE.));";
+
+fn read_text(name: &str, text: &str) -> Result<Model, CadError> {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join(name);
+    std::fs::write(&path, text).unwrap();
+    read(&path)
+}
+
+/// The text with one place changed.
+fn changed(text: &str, from: &str, to: &str) -> String {
+    assert_eq!(text.matches(from).count(), 1, "{from}");
+    text.replace(from, to)
+}
+
+/// Adds records to the sheet.
+fn with(text: &str, records: &str) -> String {
+    changed(text, "ENDSEC;\nEND-ISO", &format!("{records}\nENDSEC;\nEND-ISO"))
+}
+
+/// The far corner of the sheet's boundary, mm.
+fn far_corner(model: &Model) -> DVec3 {
+    let Boundary::Loops(loops) = &model.faces[0].boundary else {
+        panic!("{:?}", model.faces[0].boundary)
+    };
+    let points = loops.iter().flatten().flatten();
+    points.fold(DVec3::NEG_INFINITY, |most, point| most.max(*point))
+}
+
+fn is_sheet_of(unit_mm: f64, text: &str) {
+    let model = read_text("sheet.step", text).unwrap();
+    let gap = far_corner(&model).distance(unit_mm * DVec3::new(30.0, 20.0, 5.0));
+    assert!(gap < 1e-9, "{gap} mm off at a unit of {unit_mm} mm");
+    let face = &model.faces[0];
+    let gap = face
+        .surface
+        .at(1.0, 1.0)
+        .point
+        .distance(unit_mm * DVec3::new(30.0, 20.0, 5.0));
+    assert!(
+        gap < 1e-9,
+        "the surface is {gap} mm off at a unit of {unit_mm} mm"
+    );
+    machinable("", face, &Options::default()).unwrap();
+}
+
+/// A shape has the unit of its own context, not that of a context in which it is shown (pythonocc-demos' 11752.stp).
+#[test]
+fn a_shape_in_inches_shown_in_millimetres() {
+    is_sheet_of(1.0, SHEET);
+    let inch = changed(SHEET, MILLIMETRE, INCH);
+    is_sheet_of(25.4, &inch);
+    let styles = "#72=MECHANICAL_DESIGN_GEOMETRIC_PRESENTATION_REPRESENTATION('',(#73),#70);\n\
+        #73=STYLED_ITEM('',(#74),#22);\n#74=PRESENTATION_STYLE_ASSIGNMENT((#75));\n#75=NULL_STYLE(.NULL.);";
+    let shown = with(&inch, &format!("{MM_CONTEXT}\n{styles}"));
+    is_sheet_of(25.4, &shown);
+    // The other way round.
+    let millimetres = MM_CONTEXT
+        .replace("#71=", "#77=")
+        .replace("#71,", "#11,")
+        .replace("(#11,#12,#13)", "(#78,#12,#13)");
+    let metres = millimetres.replace("#77=", "#78=").replace(".MILLI.", "$");
+    is_sheet_of(1.0, &with(SHEET, &format!("{metres}\n{styles}")));
+    // A second shape in another unit does not change the first.
+    let other = "#72=SHAPE_REPRESENTATION('',(#73),#70);\n#73=AXIS2_PLACEMENT_3D('',#74,$,$);\n#74=CARTESIAN_POINT('',(1.,2.,3.));";
+    is_sheet_of(25.4, &with(&inch, &format!("{MM_CONTEXT}\n{other}")));
+}
+
+#[test]
+fn a_doubtful_unit_is_refused() {
+    let inch = changed(SHEET, MILLIMETRE, INCH);
+    let twice = with(
+        &inch,
+        &format!("{MM_CONTEXT}\n#72=SHAPE_REPRESENTATION('',(#20),#70);"),
+    );
+    let two = changed(SHEET, "(#11,#12,#13)", "(#11,#12,#13,#71)");
+    for (text, words) in [
+        (twice, "(inch and mm)"),
+        (changed(SHEET, "(#11,#12,#13)", "(#12,#13)"), "has no length unit"),
+        (
+            changed(&inch, "LENGTH_MEASURE(2.54)", "LENGTH_MEASURE(2.45)"),
+            "named INCH, but is 24.5",
+        ),
+        (
+            with(&two, "#71=(LENGTH_UNIT()NAMED_UNIT(*)SI_UNIT($,.METRE.));"),
+            "two different units",
+        ),
+        (
+            with(
+                &changed(SHEET, ",(#20),#10)", ",(#20),#72)"),
+                &format!(
+                    "{}\n#72=GEOMETRIC_REPRESENTATION_CONTEXT(3);\n\
+                #73=SHAPE_REPRESENTATION('',(),#10);\n#74=SHAPE_REPRESENTATION('',(),#70);",
+                    MM_CONTEXT.replace(".MILLI.", "$")
+                ),
+            ),
+            "has no unit",
+        ),
+    ] {
+        let error = read_text("sheet.step", &text).expect_err(words);
+        assert!(error.what.contains(words), "{words}: {error}");
+    }
+    // IGES: the flag says inches, the name something else, or the flag is none of the standard's.
+    for (unit, words) in [
+        ("1,4HINCH", None),
+        ("2,4HINCH", Some("`INCH`")),
+        ("1,2HMM  ", Some("`MM`")),
+        ("77,3HXXX", Some("`77`")),
+    ] {
+        let text = changed(HOOD, "1,4HINCH", unit);
+        // A name of two letters leaves two columns, which are blank at the end of a field.
+        match (read_text("hood.igs", &text), words) {
+            (Ok(model), None) => assert_eq!(model.faces.len(), 2),
+            (Err(error), Some(words)) => assert!(error.what.contains(words), "{unit}: {error}"),
+            (read, _) => panic!("{unit}: {read:?}"),
+        }
+    }
+}
+
+fn unknown(face: &Face) -> bool {
+    matches!(&face.boundary, Boundary::Unknown(_))
+}
+
+/// A trimmed surface whose boundary was lost is not a face without a boundary.
+#[test]
+fn a_lost_boundary_is_not_the_surfaces_own() {
+    let whole = read_text("hood.igs", HOOD).unwrap();
+    assert!(!whole.faces.iter().any(unknown));
+    // The outer boundary is one of its four segments.
+    let open = changed(HOOD, "142,0,5,9,19,3;", "142,0,5,9,21,3;");
+    // The hole's curve is missing.
+    let hole = changed(HOOD, "142,0,5,31,37,3;", "142,0,5,31,99,3;");
+    // The trimmed surface is of a kind that does not exist.
+    let kind = HOOD.replace("     144       2 ", "     199       2 ").replace(
+        "     144       0       0       1       0                               0D0000004",
+        "     199       0       0       1       0                               0D0000004",
+    );
+    assert_ne!(kind, HOOD);
+    for (what, text) in [("open", open), ("hole", hole), ("kind", kind)] {
+        let model = read_text("hood.igs", &text).unwrap();
+        let lost: Vec<&Face> = model.faces.iter().filter(|face| unknown(face)).collect();
+        let [face] = lost.as_slice() else {
+            panic!(
+                "{what}: {} boundaries are unknown: {:?}",
+                lost.len(),
+                model.warnings
+            )
+        };
+        let error = machinable("", face, &Options::default()).unwrap_err();
+        assert!(error.what.contains("boundary is unknown"), "{what}: {error}");
+        assert!(outline(face).unwrap().trimmed.is_some());
+    }
+    // STEP: a face of which one of two boundaries is missing.
+    let less = changed(SHEET, "ADVANCED_FACE('',(#23),", "ADVANCED_FACE('',(#23,#99),");
+    let model = read_text("sheet.step", &less).unwrap();
+    assert!(unknown(&model.faces[0]), "{:?}", model.faces[0].boundary);
+    // A closed edge whose curve cannot be read is a hole that was lost, not an edge without length.
+    let closed = with(
+        &changed(SHEET, "ADVANCED_FACE('',(#23),", "ADVANCED_FACE('',(#23,#80),"),
+        "#80=FACE_BOUND('',#81,.T.);\n#81=EDGE_LOOP('',(#82));\n#82=ORIENTED_EDGE('',*,*,#83,.T.);\n#83=EDGE_CURVE('',#84,#84,#86,.T.);\n\
+         #84=VERTEX_POINT('',#85);\n#85=CARTESIAN_POINT('',(10.,10.,0.8333333333333334));\n\
+         #86=?;\n#87=DIRECTION('',(0.,0.,1.));",
+    );
+    for curve in ["#86=OFFSET_CURVE_3D('',#61,1.,.F.,#87);", "#86=CLOTHOID('',#87,1.);"] {
+        let model = read_text("sheet.step", &closed.replace("#86=?;", curve)).unwrap();
+        assert!(model.faces.iter().all(unknown), "{curve}: {:?}", model.faces);
+    }
+}
+
+/// The text of a file may begin with a comment (ISO 10303-21, 6.5).
+#[test]
+fn a_comment_before_the_header() {
+    is_sheet_of(
+        1.0,
+        &format!("/* written by hand;\n second line */ \r\n/**/{SHEET}"),
+    );
+    let error = read(Path::new("hostile_cad/none.step")).unwrap_err();
+    assert!(!error.remedy.is_empty());
+}
