@@ -3,8 +3,9 @@
 
 use std::path::Path;
 
-use cad::{Boundary, CadError, Face, Model, Options, machinable, outline, read};
+use cad::{Boundary, CadError, Face, Form, JobOptions, Model, Options, machinable, outline, read, write_job};
 use glam::DVec3;
+use machine::prepare::prepare;
 
 /// A sheet of 30 x 20 in its file's unit, with its corner at the origin.
 const SHEET: &str = include_str!("hostile_cad/sound.step");
@@ -182,7 +183,10 @@ fn a_lost_boundary_is_not_the_surfaces_own() {
          #84=VERTEX_POINT('',#85);\n#85=CARTESIAN_POINT('',(10.,10.,0.8333333333333334));\n\
          #86=?;\n#87=DIRECTION('',(0.,0.,1.));",
     );
-    for curve in ["#86=OFFSET_CURVE_3D('',#61,1.,.F.,#87);", "#86=CLOTHOID('',#87,1.);"] {
+    for curve in [
+        "#86=OFFSET_CURVE_3D('',#61,1.,.F.,#87);",
+        "#86=CLOTHOID('',#87,1.);",
+    ] {
         let model = read_text("sheet.step", &closed.replace("#86=?;", curve)).unwrap();
         assert!(model.faces.iter().all(unknown), "{curve}: {:?}", model.faces);
     }
@@ -197,4 +201,60 @@ fn a_comment_before_the_header() {
     );
     let error = read(Path::new("hostile_cad/none.step")).unwrap_err();
     assert!(!error.remedy.is_empty());
+}
+
+/// A face far from the origin, as in the coordinates of a car or a ship, is a job: `[placement]` moves it before its range is checked.
+#[test]
+fn a_face_far_from_the_origin_can_be_placed() {
+    let points = [
+        ("(0.,0.,0.)", "(5000.,-8000.,0.)"),
+        ("(0.,20.,0.)", "(5000.,-7100.,0.)"),
+        ("(30.,0.,0.)", "(5900.,-8000.,0.)"),
+        ("(30.,20.,5.)", "(5900.,-7100.,50.)"),
+    ];
+    let mut text = SHEET.to_owned();
+    for (from, to) in points {
+        text = changed(
+            &text,
+            &format!("CARTESIAN_POINT('',{from})"),
+            &format!("CARTESIAN_POINT('',{to})"),
+        );
+    }
+    let model = read_text("sheet.step", &text).unwrap();
+    let made = machinable("", &model.faces[0], &Options::default()).unwrap();
+    assert_eq!(made.form, Form::Exact, "and where the file has it");
+    assert_eq!(made.nurbs.poles_mm[0][0], [5000.0, -8000.0, 0.0, 1.0]);
+    let written = write_job("sheet.step", &model.faces[0], &made, &JobOptions::default());
+    assert!(
+        written
+            .warnings
+            .iter()
+            .any(|warning| warning.contains("up to 8000 mm")),
+        "{:?}",
+        written.warnings
+    );
+    let job = job_file::parse("sheet.toml", &written.text).unwrap();
+    prepare(&job).unwrap();
+    let extent = patches::placement::extent_mm(&job.surface);
+    for ([low, high], half) in extent.into_iter().zip([450.0, 450.0, 25.0]) {
+        assert!(
+            (low + half).abs() < 1e-6 && (high - half).abs() < 1e-6,
+            "{extent:?}"
+        );
+    }
+    // Named in a job, with a placement of its own; without one the refusal names it.
+    let folder = tempfile::tempdir().unwrap();
+    std::fs::write(folder.path().join("sheet.step"), &text).unwrap();
+    let named = |placement: &str| {
+        let rest = "[tool]\nkind = \"ball\"\nradius_mm = 3\n[cut]\nfeed_mm_min = 600\nscallop_mm = 0.01\nalong = \"u\"\nside = \"up\"\n";
+        let text = format!("[surface]\nkind = \"file\"\npath = \"sheet.step\"\n{placement}{rest}");
+        let name = folder.path().join("job.toml").display().to_string();
+        prepare(&job_file::parse_with(&name, &text, &cad::Faces).unwrap())
+    };
+    assert_eq!(
+        named("[placement]\nplace = \"corner\"\n").unwrap().patches(),
+        prepare(&job).unwrap().patches()
+    );
+    let refused = named("").unwrap_err();
+    assert!(refused.remedy().contains("[placement]"), "{}", refused.remedy());
 }

@@ -17,6 +17,9 @@ const FEED_MM_MIN: f64 = 1200.0;
 const SCALLOP_MM: f64 = 0.01;
 /// Least z of the mean normal of a surface that faces up.
 const UP: f64 = 0.1;
+/// A surface that reaches farther than this from the origin is placed with its centre there, mm: the machine's range is 2147 mm either way, and
+/// the ball and its way up and down need some.
+const REACH_MM: f64 = 2000.0;
 /// Digits of a written coordinate: full precision of f64.
 const COLUMN: usize = 100;
 
@@ -111,8 +114,19 @@ pub fn write_job(source: &str, face: &Face, surface: &MachinableFace, options: &
             "the least concave radius on the machined side is {concave_mm:.4} mm: the ball of {radius_mm} mm does not fit"
         ));
     }
+    let far_mm = measures
+        .corners_mm
+        .iter()
+        .flatten()
+        .fold(0.0_f64, |far, x| far.max(x.abs()));
+    let centred = far_mm > REACH_MM;
+    if centred {
+        warnings.push(format!(
+            "it lies up to {far_mm:.0} mm from the origin, the machine's range is 2147 mm; it is placed with its centre at the origin"
+        ));
+    }
     let text = text(
-        source, face, surface, options, &measures, &warnings, radius_mm, &side,
+        source, face, surface, options, &measures, &warnings, radius_mm, &side, centred,
     );
     JobText {
         text,
@@ -133,6 +147,7 @@ fn text(
     warnings: &[String],
     radius_mm: f64,
     side: &str,
+    centred: bool,
 ) -> String {
     let mut out = String::new();
     let size = measures.size_mm();
@@ -157,6 +172,9 @@ fn text(
     }
     out.push('\n');
     write_surface(&mut out, &surface.nurbs);
+    if centred {
+        out.push_str("\n[placement]\nplace = \"centre\"            # the centre of its box, at translate_mm\ntranslate_mm = [0, 0, 0]\n");
+    }
     let or = |given: &Option<String>, default: &str| given.clone().unwrap_or_else(|| default.to_owned());
     let concave = match measures.concave_mm {
         [None, None] => "the surface is not concave".to_owned(),

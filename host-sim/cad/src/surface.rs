@@ -383,6 +383,40 @@ impl Surface {
     }
 }
 
+/// A surface whose parameters may lie beyond the seam of a closed B-spline, one period further: its polynomials end there.
+pub(super) struct Periodic<'s> {
+    surface: &'s Surface,
+    /// Domain of the parameters that are wrapped.
+    wrapped: [Option<[f64; 2]>; 2],
+}
+
+impl<'s> Periodic<'s> {
+    pub(super) fn new(surface: &'s Surface) -> Self {
+        let mut base = surface;
+        while let Surface::Offset { base: inner, .. } = base {
+            base = inner;
+        }
+        let wrapped = match base {
+            Surface::Spline(spline) => {
+                let (domain, periods) = (spline.domain(), closed(spline));
+                std::array::from_fn(|k| periods[k].map(|_| domain[k]))
+            }
+            _ => [None, None],
+        };
+        Self { surface, wrapped }
+    }
+
+    /// S and its derivatives.
+    pub(super) fn at(&self, u: f64, v: f64) -> Derivatives {
+        let inside = |t: f64, range: Option<[f64; 2]>| match range {
+            Some([start, end]) if t < start || t > end => start + (t - start).rem_euclid(end - start),
+            _ => t,
+        };
+        self.surface
+            .at(inside(u, self.wrapped[0]), inside(v, self.wrapped[1]))
+    }
+}
+
 /// Surface of revolution of a profile `(radius, height)` with derivatives in v, by the angle u in a frame.
 fn turned(origin: DVec3, [x, y, z]: [DVec3; 3], u: f64, radius: [f64; 3], height: [f64; 3]) -> Derivatives {
     let (sin, cos) = u.sin_cos();

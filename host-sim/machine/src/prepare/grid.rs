@@ -12,7 +12,8 @@ use patches::pieces::{Piece, Source};
 
 use super::{ParameterSpans, Prepared, steps, widths};
 
-pub(super) const REMEDY: &str = "move the part nearer to the origin (±2 m), or cut it into smaller surfaces";
+pub(super) const REMEDY: &str =
+    "place it nearer to the origin (`[placement] place = \"centre\"`), or cut it into smaller surfaces";
 
 /// Distance within which the poles of a boundary count as one point, mm: 1/1000 of the core's resolution.
 const POINT_MM: f64 = 1e-9;
