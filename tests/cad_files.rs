@@ -224,7 +224,7 @@ fn a_face_far_from_the_origin_can_be_placed() {
     let made = machinable("", &model.faces[0], &Options::default()).unwrap();
     assert_eq!(made.form, Form::Exact, "and where the file has it");
     assert_eq!(made.nurbs.poles_mm[0][0], [5000.0, -8000.0, 0.0, 1.0]);
-    let written = write_job("sheet.step", &model.faces[0], &made, &JobOptions::default());
+    let written = write_job("sheet.step", &model.faces[0], &made, &JobOptions::default()).unwrap();
     assert!(
         written
             .warnings
@@ -257,4 +257,56 @@ fn a_face_far_from_the_origin_can_be_placed() {
     );
     let refused = named("").unwrap_err();
     assert!(refused.remedy().contains("[placement]"), "{}", refused.remedy());
+}
+
+/// Nothing of a CAD file becomes more than a comment of the job, and options no more than their values.
+#[test]
+fn names_do_not_write_into_the_job() {
+    let model = read_text("sheet.step", SHEET).unwrap();
+    let made = machinable("", &model.faces[0], &Options::default()).unwrap();
+    let clean = write_job("sheet.step", &model.faces[0], &made, &JobOptions::default()).unwrap();
+    let own = job_file::parse("job.toml", &clean.text).unwrap();
+    let attack = "\n[cut]\nfeed_mm_min = 9\r[machine]\u{85}\u{1b}[2J\u{2028}# ";
+    let mut face = model.faces[0].clone();
+    attack.clone_into(&mut face.entity);
+    let mut trimmed = made.clone();
+    trimmed.outline.trimmed = Some(attack.to_owned());
+    let written = write_job(attack, &face, &trimmed, &JobOptions::default()).unwrap();
+    let job = job_file::parse("job.toml", &written.text).unwrap();
+    assert_eq!((&job.surface, job.feed_mm_min), (&own.surface, own.feed_mm_min));
+    assert!(
+        !written.text.chars().any(|c| c.is_control() && c != '\n'),
+        "{}",
+        &written.text[..300]
+    );
+    let options = JobOptions {
+        pattern: Some("zig\"\nspacing = \"first-order".to_owned()),
+        ..JobOptions::default()
+    };
+    let written = write_job("sheet.step", &face, &made, &options).unwrap();
+    let error = job_file::parse("job.toml", &written.text).unwrap_err();
+    assert!(error.what().contains("`pattern`"), "{error}");
+}
+
+/// No ball is offered that is not sold: a job for one of 2 um would be refused later, or never end.
+#[test]
+fn a_ball_of_micrometres_is_not_offered() {
+    let text = changed(SHEET, MILLIMETRE, &MILLIMETRE.replace(".MILLI.", ".MICRO."));
+    let model = read_text("sheet.step", &text).unwrap();
+    let made = machinable("", &model.faces[0], &Options::default()).unwrap();
+    let error = write_job("sheet.step", &model.faces[0], &made, &JobOptions::default()).unwrap_err();
+    assert!(
+        error.what.contains("no standard ball") && error.remedy.contains("--radius-mm"),
+        "{error}"
+    );
+    let options = JobOptions {
+        radius_mm: Some(0.002),
+        ..JobOptions::default()
+    };
+    assert_eq!(
+        write_job("sheet.step", &model.faces[0], &made, &options)
+            .unwrap()
+            .radius_mm,
+        0.002
+    );
 }

@@ -356,7 +356,7 @@ pub(super) fn command(arguments: &Arguments) -> Result<()> {
             side: arguments.side.clone(),
             pattern: arguments.pattern.clone(),
         },
-    );
+    )?;
     // The job is parsed before it is written, so that the options are checked by the rules of the job file.
     job_file::parse_with(&path.display().to_string(), &written.text, &cad::Faces)?;
     write(path, &written.text, arguments.force)?;

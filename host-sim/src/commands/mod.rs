@@ -89,7 +89,12 @@ impl From<ApproachError> for Failure {
 impl Failure {
     /// Bad input that has no line in a job file.
     fn input(what: impl Into<String>, remedy: impl Into<String>) -> Self {
-        Self::Input(miette::miette!(help = remedy.into(), "{}", what.into()))
+        let (what, remedy) = (what.into(), remedy.into());
+        Self::Input(miette::miette!(
+            help = job::printable(&remedy).into_owned(),
+            "{}",
+            job::printable(&what)
+        ))
     }
 }
 
