@@ -494,3 +494,149 @@ fn no_bars_without_a_terminal() {
         assert_eq!(err(&output), "", "{arguments}");
     }
 }
+
+/// The names in a folder, ascending.
+fn names(folder: &Path) -> Vec<String> {
+    let entries = std::fs::read_dir(folder).unwrap();
+    let mut names: Vec<_> = entries
+        .map(|entry| entry.unwrap().file_name().into_string().unwrap())
+        .collect();
+    names.sort();
+    names
+}
+
+/// Nothing that is there is overwritten without `--force`, and what a command reads not even then; the work is not begun.
+#[test]
+fn outputs_are_not_overwritten() {
+    let folder = folder_with("plate", &[]);
+    let job = std::fs::read(folder.path().join("job.toml")).unwrap();
+    std::fs::write(folder.path().join("there"), "there").unwrap();
+    std::fs::create_dir(folder.path().join("page")).unwrap();
+    std::fs::write(folder.path().join("page/index.html"), "mine").unwrap();
+    let cad = Path::new(env!("CARGO_MANIFEST_DIR")).join("../jobs/cad/mouse.step");
+    std::fs::copy(cad, folder.path().join("mouse.step")).unwrap();
+    std::fs::write(
+        folder.path().join("of_file.toml"),
+        "[surface]\nkind = \"file\"\npath = \"mouse.step\"\n[tool]\nkind = \"ball\"\nradius_mm = 3\n[cut]\nfeed_mm_min = 600\n\
+         scallop_mm = 0.01\nalong = \"u\"\nside = \"up\"\n",
+    )
+    .unwrap();
+    let before = names(folder.path());
+    for (arguments, words) in [
+        ("simulate job.toml --trace there", "exists already"),
+        (
+            "simulate job.toml --trace job.toml --force",
+            "is what the command reads",
+        ),
+        ("simulate job.toml --report page", "exists already"),
+        ("simulate job.toml --report there", "that is a file"),
+        (
+            "simulate job.toml --approach linear --trace there",
+            "exists already",
+        ),
+        ("verify job.toml --report page", "exists already"),
+        ("export job.toml --format grbl -o there", "exists already"),
+        (
+            "export job.toml --format grbl -o job.toml --force",
+            "is what the command reads",
+        ),
+        (
+            "export of_file.toml --format grbl -o mouse.step --force",
+            "is what the command reads",
+        ),
+        ("import mouse.step -o there", "exists already"),
+        (
+            "import mouse.step -o mouse.step --force",
+            "is what the command reads",
+        ),
+        ("new -o there", "exists already"),
+    ] {
+        let begun = std::time::Instant::now();
+        let output = run(folder.path(), arguments);
+        assert_eq!(output.status.code(), Some(2), "{arguments}: {}", err(&output));
+        let said = err(&output);
+        // Messages are broken into lines.
+        let said: Vec<_> = said.split_whitespace().collect();
+        assert!(said.join(" ").contains(words), "{arguments}: {}", err(&output));
+        assert!(begun.elapsed().as_secs() < 20, "{arguments}");
+    }
+    assert_eq!(std::fs::read(folder.path().join("job.toml")).unwrap(), job);
+    assert_eq!(std::fs::read(folder.path().join("there")).unwrap(), b"there");
+    assert_eq!(
+        std::fs::read(folder.path().join("page/index.html")).unwrap(),
+        b"mine"
+    );
+    assert_eq!(names(folder.path()), before);
+    for arguments in [
+        "export job.toml --format grbl -o there --force",
+        "simulate job.toml --report page --trace there --force",
+    ] {
+        let output = run(folder.path(), arguments);
+        assert_eq!(output.status.code(), Some(0), "{arguments}: {}", err(&output));
+    }
+    assert!(
+        std::fs::read_to_string(folder.path().join("there"))
+            .unwrap()
+            .starts_with("tick,")
+    );
+    assert_eq!(names(&folder.path().join("page")), ["index.html", "path.svg"]);
+    assert_eq!(names(folder.path()), before);
+}
+
+/// A command that is killed while it writes leaves what was there, and nothing else.
+#[test]
+fn a_killed_command_leaves_no_file() {
+    let folder = folder_with("plate", &[]);
+    std::fs::write(folder.path().join("t.csv"), "old").unwrap();
+    let mut killed = 0;
+    for wait_ms in [300, 600, 1200] {
+        let mut child = program(folder.path(), "simulate job.toml --trace t.csv --force")
+            .stdout(Stdio::null())
+            .stderr(Stdio::null())
+            .spawn()
+            .unwrap();
+        std::thread::sleep(std::time::Duration::from_millis(wait_ms));
+        child.kill().unwrap();
+        killed += usize::from(child.wait().unwrap().code().is_none());
+        let text = std::fs::read_to_string(folder.path().join("t.csv")).unwrap();
+        assert!(text == "old" || text.ends_with('\n'), "{} bytes", text.len());
+        assert_eq!(names(folder.path()), ["job.toml", "t.csv"]);
+    }
+    assert!(killed > 0, "no run was long enough to be killed");
+}
+
+/// Nothing in a file that a command reads becomes an order to the terminal.
+#[test]
+fn no_control_character_is_printed() {
+    let folder = folder_with("plate", &[("[tool]", "[tool]\n\"\u{9b}2J\" = 1\n")]);
+    std::fs::write(folder.path().join("esc.toml"), "[sur\u{1b}[2Jface]\n\u{7}x = 1\n").unwrap();
+    std::fs::write(folder.path().join("script"), "tick 1: \u{1b}]0;title\u{7}\n").unwrap();
+    std::fs::write(folder.path().join("good.toml"), sample("plate_machine")).unwrap();
+    let cad = std::fs::read_to_string(
+        Path::new(env!("CARGO_MANIFEST_DIR")).join("../tests/hostile_cad/sound.step"),
+    )
+    .unwrap();
+    std::fs::write(
+        folder.path().join("bad.step"),
+        cad.replace("(30.,20.,5.)", "(30.,\u{1b}[2J.,5.)"),
+    )
+    .unwrap();
+    let named = "a\u{1b}[31mb.toml";
+    std::fs::write(folder.path().join(named), "x").unwrap();
+    for arguments in [
+        "simulate job.toml".to_owned(),
+        "simulate esc.toml".to_owned(),
+        "simulate good.toml --script script".to_owned(),
+        "import bad.step --list".to_owned(),
+        format!("simulate {named}"),
+        format!("simulate job.toml --trace none/{named}"),
+    ] {
+        let output = run(folder.path(), &arguments);
+        assert_eq!(output.status.code(), Some(2), "{arguments}: {}", err(&output));
+        let printed = out(&output) + &err(&output);
+        assert!(
+            !printed.chars().any(|c| c.is_control() && c != '\n'),
+            "{arguments}: {printed:?}"
+        );
+    }
+}

@@ -9,7 +9,7 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 use clap::Args;
 use serde_json::{Value, json};
 
-use super::{Failure, Result, cannot_write, progress};
+use super::{Failure, Result, progress, whole};
 use cad::{
     CadError, Face, Form, JobOptions, JobText, MachinableFace, Measures, Model, Options, degrees, machinable,
     measure, read, write_job,
@@ -261,16 +261,6 @@ pub(crate) fn chosen<'m>(
     }
 }
 
-fn write(path: &Path, text: &str, force: bool) -> Result<()> {
-    if path.exists() && !force {
-        return Err(Failure::input(
-            format!("{} exists already", path.display()),
-            "name another file, or overwrite it with --force",
-        ));
-    }
-    std::fs::write(path, text).map_err(|error| cannot_write(path, &error))
-}
-
 fn report(arguments: &Arguments, path: &Path, face: &Face, made: &MachinableFace, written: &JobText) {
     let size = written.measures.size_mm();
     if arguments.json {
@@ -334,6 +324,10 @@ pub(super) fn command(arguments: &Arguments) -> Result<()> {
             "show the faces with --list, or write a job with -o JOB.toml",
         ));
     }
+    whole::note_input(&arguments.file);
+    if let Some(path) = &arguments.output {
+        whole::check(path, arguments.force)?;
+    }
     let model = read(&arguments.file)?;
     for warning in &model.warnings {
         complain!("warning: {warning}");
@@ -359,7 +353,7 @@ pub(super) fn command(arguments: &Arguments) -> Result<()> {
     )?;
     // The job is parsed before it is written, so that the options are checked by the rules of the job file.
     job_file::parse_with(&path.display().to_string(), &written.text, &cad::Faces)?;
-    write(path, &written.text, arguments.force)?;
+    whole::write(path, written.text.as_bytes(), arguments.force)?;
     report(arguments, path, face, &made, &written);
     Ok(())
 }

@@ -130,9 +130,9 @@ pub fn patch_count(surface: &SurfaceSpec) -> Result<usize, String> {
 
 fn too_many(patches: usize) -> String {
     format!(
-        "the surface takes {patches} patches, more than the board's store: at most {} polynomial or {} rational ones",
-        STORE_WORDS / POLYNOMIAL_WORDS,
-        STORE_WORDS / RATIONAL_WORDS
+        "the surface takes {patches} patches, more than the board's store: about {} polynomial or {} rational ones",
+        STORE_WORDS / (POLYNOMIAL_WORDS + 1),
+        STORE_WORDS / (RATIONAL_WORDS + 1)
     )
 }
 
