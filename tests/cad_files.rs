@@ -310,3 +310,175 @@ fn a_ball_of_micrometres_is_not_offered() {
         0.002
     );
 }
+
+/// Edges that are parts of hyperbolas and parabolas, as where planes cut cones.
+#[test]
+fn conic_edges_are_read() {
+    // A plane between the branch x²/9 - y²/4 = 1, or the parabola x = y²/8 + 3, and a line.
+    for (curve, end, holds) in [
+        (
+            "HYPERBOLA('',#66,3.,2.)",
+            (3.0 * 2.0_f64.sqrt(), 2.0),
+            (|p: DVec3| p.x * p.x / 9.0 - p.y * p.y / 4.0 - 1.0) as fn(DVec3) -> f64,
+        ),
+        ("PARABOLA('',#67,2.)", (3.5, 2.0), |p: DVec3| {
+            p.x - p.y * p.y / 8.0 - 3.0
+        }),
+    ] {
+        let (x, y) = end;
+        let mut text = SHEET.to_owned();
+        for (from, to) in [
+            ("#24=EDGE_LOOP('',(#25,#26,#27,#28));".to_owned(), "#24=EDGE_LOOP('',(#25,#26));".to_owned()),
+            ("CARTESIAN_POINT('',(0.,0.,0.))".to_owned(), format!("CARTESIAN_POINT('',({x:?},{:?},0.))", -y)),
+            ("CARTESIAN_POINT('',(30.,0.,0.))".to_owned(), format!("CARTESIAN_POINT('',({x:?},{y:?},0.))")),
+            ("#51=EDGE_CURVE('',#41,#42,#61,.T.);".to_owned(), "#51=EDGE_CURVE('',#41,#42,#65,.T.);".to_owned()),
+            ("#52=EDGE_CURVE('',#42,#43,#62,.T.);".to_owned(), "#52=EDGE_CURVE('',#42,#41,#62,.T.);".to_owned()),
+            ("#62=B_SPLINE_CURVE_WITH_KNOTS('',1,(#33,#34)".to_owned(), "#62=B_SPLINE_CURVE_WITH_KNOTS('',1,(#33,#31)".to_owned()),
+            ("ADVANCED_FACE('',(#23),#30,.T.)".to_owned(), "ADVANCED_FACE('',(#23),#64,.T.)".to_owned()),
+            ("#64=B_SPLINE_CURVE_WITH_KNOTS('',1,(#32,#31),.UNSPECIFIED.,.F.,.F.,(2,2),(0.,1.),.UNSPECIFIED.);".to_owned(), "#64=PLANE('',#66);".to_owned()),
+        ] {
+            text = changed(&text, &from, &to);
+        }
+        let text = with(
+            &text,
+            &format!(
+                "#65={curve};\n#66=AXIS2_PLACEMENT_3D('',#68,#69,#79);\n#67=AXIS2_PLACEMENT_3D('',#78,#69,#79);\n\
+             #68=CARTESIAN_POINT('',(0.,0.,0.));\n#78=CARTESIAN_POINT('',(3.,0.,0.));\n\
+             #69=DIRECTION('',(0.,0.,1.));\n#79=DIRECTION('',(1.,0.,0.));"
+            ),
+        );
+        let model = read_text("sheet.step", &text).unwrap();
+        let face = model
+            .faces
+            .iter()
+            .find(|face| face.surface.kind() == "plane")
+            .expect("a face");
+        let Boundary::Loops(loops) = &face.boundary else {
+            panic!("{curve}: {:?}", face.boundary)
+        };
+        let edge = &loops[0][0];
+        assert_eq!(edge.len(), 17);
+        for point in edge {
+            assert!(holds(*point).abs() < 1e-9, "{curve}: {point}");
+        }
+        let error = machinable("", face, &Options::default()).unwrap_err();
+        assert!(error.what.contains("not an iso-parametric line"), "{error}");
+    }
+}
+
+/// An IGES file of fixed columns: global section, and one entity with these parameters.
+fn iges(global: &str, kind: usize, words: &[String]) -> String {
+    let mut lines = vec![format!("{:<72}S{:>7}", "made for a test", 1)];
+    for (index, part) in global.as_bytes().chunks(72).enumerate() {
+        lines.push(format!("{:<72}G{:>7}", String::from_utf8_lossy(part), index + 1));
+    }
+    let globals = lines.len() - 1;
+    let mut data: Vec<String> = vec![String::new()];
+    for (index, word) in words.iter().enumerate() {
+        let word = format!("{word}{}", if index + 1 < words.len() { ',' } else { ';' });
+        if data[data.len() - 1].len() + word.len() > 64 {
+            data.push(String::new());
+        }
+        data.last_mut().unwrap().push_str(&word);
+    }
+    let field = |value: usize| format!("{value:>8}");
+    lines.push(format!(
+        "{}{}{}00000000D{:>7}",
+        field(kind),
+        field(1),
+        "       0".repeat(6),
+        1
+    ));
+    lines.push(format!(
+        "{}{}{}{}{}{}D{:>7}",
+        field(kind),
+        "       0".repeat(2),
+        field(data.len()),
+        field(0),
+        " ".repeat(24),
+        "       0",
+        2
+    ));
+    for (index, text) in data.iter().enumerate() {
+        lines.push(format!("{text:<64} {:>7}P{:>7}", 1, index + 1));
+    }
+    lines.push(format!(
+        "{:<72}T{:>7}",
+        format!("S{:>7}G{globals:>7}D{:>7}P{:>7}", 1, 2, data.len()),
+        1
+    ));
+    lines.join("\n") + "\n"
+}
+
+/// A parametric spline surface (114) is the surface of its polynomials, in patches that meet within the file's resolution.
+#[test]
+fn an_iges_spline_surface_of_entity_114() {
+    let (breaks_u, breaks_v) = ([0.0, 1.5, 2.0], [-1.0, 1.0]);
+    // One bicubic over the whole, as the coefficients of each patch about its corner.
+    let whole = |u: f64, v: f64| {
+        DVec3::new(
+            10.0 * u + v * v * v,
+            8.0 * v + 0.3 * u * u,
+            0.5 * u * u * u - 0.7 * u * v * v,
+        )
+    };
+    let scaled = |off: f64| {
+        let mut words: Vec<String> = ["114", "3", "1", "2", "1"].map(str::to_owned).to_vec();
+        words.extend(breaks_u.iter().chain(&breaks_v).map(|t| format!("{t:?}")));
+        for i in 0..3 {
+            for j in 0..2 {
+                if i == 2 || j == 1 {
+                    words.extend((0..48).map(|_| "9.5".to_owned()));
+                    continue;
+                }
+                let (a, b) = (breaks_u[i], breaks_v[j]);
+                // Taylor coefficients of the polynomials above, [power of v][power of u].
+                let x = [
+                    [10.0 * a + b * b * b, 10.0, 0.0, 0.0],
+                    [3.0 * b * b, 0.0, 0.0, 0.0],
+                    [3.0 * b, 0.0, 0.0, 0.0],
+                    [1.0, 0.0, 0.0, 0.0],
+                ];
+                let y = [
+                    [8.0 * b + 0.3 * a * a, 0.6 * a, 0.3, 0.0],
+                    [8.0, 0.0, 0.0, 0.0],
+                    [0.0; 4],
+                    [0.0; 4],
+                ];
+                let z = [
+                    [
+                        0.5 * a * a * a - 0.7 * a * b * b + off * i as f64,
+                        1.5 * a * a - 0.7 * b * b,
+                        1.5 * a,
+                        0.5,
+                    ],
+                    [-1.4 * a * b, -1.4 * b, 0.0, 0.0],
+                    [-0.7 * a, -0.7, 0.0, 0.0],
+                    [0.0; 4],
+                ];
+                words.extend(
+                    [x, y, z]
+                        .iter()
+                        .flatten()
+                        .flatten()
+                        .map(|c: &f64| format!("{c:.12E}").replace('E', "D")),
+                );
+            }
+        }
+        words
+    };
+    let global = "1H,,1H;,4Htest,4Htest,4Htest,4Htest,32,38,6,308,15,4Htest,1.,1,4HINCH,1,0.01,15H20260101.000000,0.0001,100.,4Htest,4Htest,11,0,15H20260101.000000;";
+    for (off, most_mm) in [(0.0, 1e-9), (5e-5, 1.5e-3)] {
+        let model = read_text("spline.igs", &iges(global, 114, &scaled(off))).unwrap();
+        assert_eq!(model.faces.len(), 1);
+        let made = machinable("", &model.faces[0], &Options::default()).unwrap();
+        assert_eq!((made.form, made.patches), (Form::Exact, 2));
+        for k in 0..=60 {
+            let (u, v) = (2.0 * f64::from(k) / 60.0, (0.9 * f64::from(k)).sin());
+            let gap = model.faces[0].surface.at(u, v).point.distance(25.4 * whole(u, v));
+            assert!(gap <= most_mm, "{gap} mm off at {u}, {v}");
+        }
+    }
+    let error = read_text("spline.igs", &iges(global, 114, &scaled(5e-3))).unwrap_err();
+    assert!(error.what.contains("continuity"), "{error}");
+}

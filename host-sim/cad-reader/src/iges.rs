@@ -5,6 +5,7 @@ use std::ops::Range;
 
 use crate::format::Reader;
 use crate::iges_entries::{COLUMNS, Entries, Lines, SECTION, globals};
+use crate::iges_spline::converted;
 use crate::ir::{self, Stated};
 use cad::CadError;
 use cad::Model;
@@ -141,6 +142,7 @@ impl Reader for Iges {
     fn read(&self, file: &str, mut bytes: Vec<u8>) -> Result<Model, CadError> {
         let entries = Entries::new(&Lines::new(&bytes));
         mark_parameter_curves(&mut bytes, &entries);
+        let bytes = converted(&bytes, &entries).unwrap_or(bytes);
         ir::decode(file, &cadmpeg_codec_iges::IgesCodec, bytes, &Text(entries))
     }
 }

@@ -107,6 +107,12 @@ impl Translation<'_> {
                 };
                 [first, first + turn]
             }
+            (None, Curve::Parabola { vertex: from, y, .. }) => {
+                [start, end].map(|p| (p - *from).dot(*y) / y.length_squared())
+            }
+            (None, Curve::Hyperbola { center: from, y, .. }) => {
+                [start, end].map(|p| ((p - *from).dot(*y) / y.length_squared()).asinh())
+            }
             (None, _) => curve.domain().ok_or("an edge has no range")?,
         };
         let mut ends = vec![range[0]];

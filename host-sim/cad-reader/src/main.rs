@@ -7,12 +7,14 @@
 //! ```text
 //! main.rs ─► readers.rs   by the file's first bytes ─► step.rs, iges.rs, rhino.rs   what can be checked before the whole file is read
 //!                           step_records.rs, step_units.rs, iges_entries.rs ◄─┤   what the text says, for the cross-check
+//!                                                            iges_spline.rs ◄─┤   entities 114 as 128
 //!                                                                             └─► ir.rs, ir_*.rs   cadmpeg's model -> cad::Face
 //! ```
 
 mod format;
 mod iges;
 mod iges_entries;
+mod iges_spline;
 mod ir;
 mod ir_boundary;
 mod ir_geometry;
