@@ -43,11 +43,7 @@ mod tests {
     /// A case is what its number says, wherever it runs, and cases differ.
     #[test]
     fn cases_repeat() {
-        let seeds = vec![
-            b"a = 1\nb = [2, 3]\n".to_vec(),
-            b"\x00\x01\x02".to_vec(),
-            Vec::new(),
-        ];
+        let seeds = vec![include_bytes!("../seeds/job_file/nurbs.toml").to_vec()];
         let case = |seed: u64| mutated(&mut fastrand::Rng::with_seed(seed), &seeds);
         let all: std::collections::BTreeSet<Vec<u8>> = (0..500).map(case).collect();
         assert!(all.len() > 450, "{} of 500 differ", all.len());
