@@ -482,3 +482,26 @@ fn an_iges_spline_surface_of_entity_114() {
     let error = read_text("spline.igs", &iges(global, 114, &scaled(5e-3))).unwrap_err();
     assert!(error.what.contains("continuity"), "{error}");
 }
+
+/// A face has the name and the colour of its file, also where they stand in a context of another unit.
+#[test]
+fn names_and_colours() {
+    let styles = "#72=MECHANICAL_DESIGN_GEOMETRIC_PRESENTATION_REPRESENTATION('',(#90),#70);\n#90=STYLED_ITEM('color',(#91),#22);\n\
+        #91=PRESENTATION_STYLE_ASSIGNMENT((#92));\n#92=SURFACE_STYLE_USAGE(.BOTH.,#93);\n#93=SURFACE_SIDE_STYLE('',(#94));\n\
+        #94=SURFACE_STYLE_FILL_AREA(#95);\n#95=FILL_AREA_STYLE('',(#96));\n#96=FILL_AREA_STYLE_COLOUR('',#97);\n\
+        #97=COLOUR_RGB('',1.,0.50196078,0.);";
+    let named = changed(SHEET, "#22=ADVANCED_FACE('',", "#22=ADVANCED_FACE('lid',");
+    for (text, unit_mm) in [(named.clone(), 1.0), (changed(&named, MILLIMETRE, INCH), 25.4)] {
+        let text = with(&text, &format!("{MM_CONTEXT}\n{styles}"));
+        let model = read_text("sheet.step", &text).unwrap();
+        assert_eq!(model.faces[0].name.as_deref(), Some("lid"));
+        assert_eq!(model.faces[0].colour, Some([255, 128, 0]));
+        is_sheet_of(unit_mm, &text);
+    }
+    // Of the part, where the face has none.
+    let model = read_text("sheet.step", SHEET).unwrap();
+    assert_eq!(
+        (model.faces[0].name.as_deref(), model.faces[0].colour),
+        (Some("sheet"), None)
+    );
+}

@@ -640,3 +640,62 @@ fn no_control_character_is_printed() {
         );
     }
 }
+
+/// The list of a file's faces: measures against closed forms, conditions and order.
+#[test]
+fn faces_are_listed_as_asked() {
+    let folder = tempfile::tempdir().unwrap();
+    let cad = Path::new(env!("CARGO_MANIFEST_DIR")).join("../jobs/cad/blade.step");
+    std::fs::copy(cad, folder.path().join("blade.step")).unwrap();
+    let faces = |more: &str| {
+        let list = json(folder.path(), &format!("import blade.step --list --json {more}"));
+        list["faces"].as_array().unwrap().clone()
+    };
+    let whole = faces("");
+    assert_eq!(whole.len(), 13);
+    let area = |face: &Value| face["area_mm2"].as_f64().unwrap();
+    let number = |face: &Value| face["face"].as_u64().unwrap();
+    for face in &whole {
+        let size: Vec<f64> = face["size_mm"]
+            .as_array()
+            .unwrap()
+            .iter()
+            .map(|x| x.as_f64().unwrap())
+            .collect();
+        let round = &face["least_concave_radius_mm"];
+        let radius = round["minus"].as_f64().or(round["plus"].as_f64());
+        let height = match face["kind"].as_str().unwrap() {
+            // A zone of a sphere is as large as that of the cylinder about it.
+            "sphere" | "cylinder" => size[2],
+            _ => continue,
+        };
+        let exact = std::f64::consts::TAU * radius.unwrap() * height;
+        assert!((area(face) / exact - 1.0).abs() < 1e-3, "{face}: {exact} mm2");
+    }
+    let up = faces("--only up --sort area --reverse");
+    assert!(!up.is_empty() && up.len() < whole.len());
+    assert!(up.windows(2).all(|pair| area(&pair[0]) >= area(&pair[1])));
+    let facing_up = |face: &&Value| {
+        face["normal"]
+            .as_array()
+            .is_some_and(|normal| normal[2].as_f64().unwrap() > 0.1)
+    };
+    assert_eq!(up.len(), whole.iter().filter(facing_up).count());
+    let large = faces("--only kind=PLANE --only area>3000 --only whole");
+    let expected: Vec<u64> = whole
+        .iter()
+        .filter(|face| face["kind"] == "plane" && area(face) > 3000.0 && face["trimmed"] == false)
+        .map(number)
+        .collect();
+    assert_eq!(large.iter().map(number).collect::<Vec<_>>(), expected);
+    for (wrong, words) in [("--only down", "kind=WORD"), ("--sort size", "patches")] {
+        let output = run(folder.path(), &format!("import blade.step --list {wrong}"));
+        assert_eq!(output.status.code(), Some(2));
+        assert!(err(&output).contains(words), "{}", err(&output));
+    }
+    let text = out(&run(
+        folder.path(),
+        "import blade.step --list --only name=nothing",
+    ));
+    assert!(text.contains("0 of 13 faces"), "{text}");
+}

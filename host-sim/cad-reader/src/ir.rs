@@ -212,6 +212,7 @@ impl<'m> Translation<'m> {
         let mut order: Vec<_> = self.source.faces.iter().collect();
         order.sort_by_cached_key(|face| natural(face.id.as_str()));
         let identity = vec![Placement::IDENTITY];
+        let parts = self.names_of_parts();
         for face in order {
             let body = shell_body.get(face.shell.as_str());
             let solid = body.is_some_and(|body| body.kind == BodyKind::Solid);
@@ -241,6 +242,25 @@ impl<'m> Translation<'m> {
             } else {
                 -1.0
             };
+            let colour = face.color.or(body.and_then(|body| body.color)).map(|colour| {
+                #[allow(
+                    clippy::cast_possible_truncation,
+                    clippy::cast_sign_loss,
+                    reason = "rounded, 0 to 255"
+                )]
+                [colour.r(), colour.g(), colour.b()]
+                    .map(|share| (share * 255.0).round().clamp(0.0, 255.0) as u8)
+            });
+            let part = body.and_then(|body| parts.get(body.id.as_str()).copied());
+            let label = [
+                face.name.as_deref(),
+                body.and_then(|body| body.name.as_deref()),
+                part,
+            ]
+            .into_iter()
+            .flatten()
+            .find(|text| !text.trim().is_empty())
+            .map(|text| shortened(text.trim()));
             for home in homes {
                 if model.faces.len() >= FACES_MAX {
                     let what = format!("the file's assembly places more than {FACES_MAX} faces");
@@ -257,6 +277,8 @@ impl<'m> Translation<'m> {
                 model.faces.push(Face {
                     number: 0,
                     entity: name.clone(),
+                    name: label.clone(),
+                    colour,
                     // A reflection keeps the parameters, so that S_u x S_v is reversed.
                     sense: sense * turn,
                     surface,
@@ -302,6 +324,8 @@ impl<'m> Translation<'m> {
             match self.surface(item.id.as_str(), 0) {
                 Ok(surface) if surface.domain().iter().all(Option::is_some) => model.faces.push(Face {
                     number: 0,
+                    name: None,
+                    colour: None,
                     boundary: match stated.owner(&name) {
                         Some(owner) => Boundary::Unknown(format!("it is of {owner}, which was not read")),
                         None => Boundary::Natural,
@@ -337,6 +361,15 @@ impl<'m> Translation<'m> {
                 let body = regions.get(shell.region.as_str())?;
                 Some((shell.id.as_str(), *bodies.get(body)?))
             })
+            .collect()
+    }
+
+    /// Names of the parts, by their bodies.
+    fn names_of_parts(&self) -> HashMap<&'m str, &'m str> {
+        let parts = self.source.product_definitions.iter();
+        parts
+            .filter_map(|part| Some((part, part.label.as_deref().or(part.source_name.as_deref())?)))
+            .flat_map(|(part, name)| part.bodies.iter().map(move |body| (body.as_str(), name)))
             .collect()
     }
 

@@ -231,6 +231,8 @@ fn placements_move_points() {
 fn face(surface: Surface, loops: Vec<Vec<Edge>>, sense: f64) -> Face {
     Face {
         number: 1,
+        name: None,
+        colour: None,
         entity: "#1".to_owned(),
         surface,
         boundary: Boundary::Loops(loops),
@@ -421,6 +423,8 @@ fn concave_radii_are_measured() {
         let made = machinable(
             "",
             &Face {
+                name: None,
+                colour: None,
                 boundary: Boundary::Natural,
                 ..rectangular(&surface, rectangle)
             },
