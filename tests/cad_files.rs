@@ -425,13 +425,12 @@ fn an_iges_spline_surface_of_entity_114() {
     let scaled = |off: f64| {
         let mut words: Vec<String> = ["114", "3", "1", "2", "1"].map(str::to_owned).to_vec();
         words.extend(breaks_u.iter().chain(&breaks_v).map(|t| format!("{t:?}")));
-        for i in 0..3 {
-            for j in 0..2 {
+        for (i, &a) in breaks_u.iter().enumerate() {
+            for (j, &b) in breaks_v.iter().enumerate() {
                 if i == 2 || j == 1 {
                     words.extend((0..48).map(|_| "9.5".to_owned()));
                     continue;
                 }
-                let (a, b) = (breaks_u[i], breaks_v[j]);
                 // Taylor coefficients of the polynomials above, [power of v][power of u].
                 let x = [
                     [10.0 * a + b * b * b, 10.0, 0.0, 0.0],

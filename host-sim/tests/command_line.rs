@@ -699,3 +699,81 @@ fn faces_are_listed_as_asked() {
     ));
     assert!(text.contains("0 of 13 faces"), "{text}");
 }
+
+/// The page of a file's faces has them all, where they are, and no name in the file is more than text on it.
+#[test]
+fn a_page_shows_the_part() {
+    let folder = tempfile::tempdir().unwrap();
+    let cad = Path::new(env!("CARGO_MANIFEST_DIR")).join("../jobs/cad");
+    std::fs::copy(cad.join("blade.step"), folder.path().join("blade.step")).unwrap();
+    let sheet = std::fs::read_to_string(cad.join("../../tests/hostile_cad/sound.step")).unwrap();
+    let attack = "</script><img src=x onerror=alert(1)>";
+    let named = sheet.replacen("ADVANCED_FACE('',", &format!("ADVANCED_FACE('{attack}',"), 1);
+    assert_ne!(named, sheet);
+    std::fs::write(folder.path().join("sheet.step"), named).unwrap();
+    let page = |file: &str| -> (String, Value) {
+        let output = run(
+            folder.path(),
+            &format!("import {file}.step --list --page {file}.html"),
+        );
+        assert_eq!(output.status.code(), Some(0), "{}", err(&output));
+        let text = std::fs::read_to_string(folder.path().join(format!("{file}.html"))).unwrap();
+        let data = text
+            .split_once("id=\"data\">")
+            .unwrap()
+            .1
+            .split_once("</script>")
+            .unwrap()
+            .0;
+        let data = serde_json::from_str(data).unwrap();
+        (text, data)
+    };
+    let (text, data) = page("sheet");
+    assert_eq!(data["faces"][0]["name"], attack);
+    assert!(!text.contains("<img"));
+    assert_eq!(text.matches("</script>").count(), 2);
+    let (_, data) = page("blade");
+    let faces = data["faces"].as_array().unwrap();
+    assert_eq!(faces.len(), 13);
+    let listed = json(folder.path(), "import blade.step --list --json");
+    for (face, listed) in faces.iter().zip(listed["faces"].as_array().unwrap()) {
+        assert_eq!(face["number"], listed["face"]);
+        let points: Vec<Vec<f64>> = face["polygons"]
+            .as_array()
+            .unwrap()
+            .iter()
+            .flat_map(|rings| rings.as_array().unwrap())
+            .flat_map(|ring| ring.as_array().unwrap())
+            .map(|point| {
+                point
+                    .as_array()
+                    .unwrap()
+                    .iter()
+                    .map(|x| x.as_f64().unwrap())
+                    .collect()
+            })
+            .collect();
+        assert!(points.len() >= 4, "face {}", face["number"]);
+        // Within the box of the list, which is that of the rectangle around a trimmed face.
+        let [low, high] = [0, 1].map(|k| listed["corners_mm"][k].as_array().unwrap().clone());
+        for point in &points {
+            for axis in 0..3 {
+                let (low, high) = (low[axis].as_f64().unwrap(), high[axis].as_f64().unwrap());
+                let slack = 0.01 + 0.01 * (high - low);
+                assert!(
+                    (low - slack..=high + slack).contains(&point[axis]),
+                    "face {}: {point:?}",
+                    face["number"]
+                );
+            }
+        }
+        assert!(
+            face["command"]
+                .as_str()
+                .unwrap()
+                .contains(&format!("import blade.step --face {}", face["number"]))
+        );
+    }
+    let again = run(folder.path(), "import blade.step --list --page blade.html");
+    assert_eq!(again.status.code(), Some(2), "{}", err(&again));
+}

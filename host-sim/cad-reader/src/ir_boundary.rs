@@ -66,10 +66,7 @@ impl Translation<'_> {
                 Err(format!("edge {} has no curve in space", entity(edge.id.as_str())))
             };
         };
-        let curve = match self.curve(curve.as_str()) {
-            Ok(curve) => curve,
-            Err(why) => return Err(why),
-        };
+        let curve = self.curve(curve.as_str())?;
         let mut parts = self.along(edge, &curve)?;
         if coedge.sense == Sense::Reversed {
             parts.reverse();

@@ -269,6 +269,12 @@ impl Surface {
         }
     }
 
+    /// S and its derivatives, with parameters that may lie one period beyond the seam of a closed B-spline.
+    #[must_use]
+    pub fn at_periodic(&self, u: f64, v: f64) -> Derivatives {
+        Periodic::new(self).at(u, v)
+    }
+
     /// S and its derivatives.
     #[must_use]
     pub fn at(&self, u: f64, v: f64) -> Derivatives {

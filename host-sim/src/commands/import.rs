@@ -2,6 +2,7 @@
 
 mod condition;
 mod list;
+mod page;
 
 use super::out::{complain, say};
 use std::path::{Path, PathBuf};
@@ -24,6 +25,7 @@ use list::Key;
 ///
 /// Example: cargo sim import jobs/cad/blade.step --list
 /// Example: cargo sim import jobs/cad/blade.step --list --only up --only whole --sort area --reverse
+/// Example: cargo sim import jobs/cad/blade.step --list --page faces.html
 /// Example: cargo sim import jobs/cad/blade.step --face 2 -o blade.toml --radius-mm 4
 #[derive(Debug, Args)]
 #[command(verbatim_doc_comment)]
@@ -43,13 +45,16 @@ pub(super) struct Arguments {
     /// With --list: the other way round.
     #[arg(long, requires = "list")]
     reverse: bool,
+    /// With --list: writes a page with the picture of the part, on which faces are chosen, into this file.
+    #[arg(long, value_name = "FILE.html", requires = "list")]
+    page: Option<PathBuf>,
     /// Number of the face in the list; optional if the file has one face.
     #[arg(long, value_name = "N")]
     face: Option<usize>,
     /// Writes the job into this file.
     #[arg(short, long, value_name = "JOB")]
     output: Option<PathBuf>,
-    /// Overwrites an existing job file.
+    /// Overwrites an existing job file or page.
     #[arg(long)]
     force: bool,
     /// Largest deviation of an approximation from the surface, mm.
@@ -190,7 +195,7 @@ pub(super) fn command(arguments: &Arguments) -> Result<()> {
         ));
     }
     whole::note_input(&arguments.file);
-    if let Some(path) = &arguments.output {
+    for path in arguments.output.iter().chain(&arguments.page) {
         whole::check(path, arguments.force)?;
     }
     let model = read(&arguments.file)?;
@@ -198,8 +203,7 @@ pub(super) fn command(arguments: &Arguments) -> Result<()> {
         complain!("warning: {warning}");
     }
     let Some(path) = arguments.output.as_ref().filter(|_| !arguments.list) else {
-        list::list(arguments, &file, &model, &options);
-        return Ok(());
+        return list::list(arguments, &file, &model, &options);
     };
     let face = chosen(&file, &model, arguments.face)?;
     let made = machinable(&file, face, &options)?;

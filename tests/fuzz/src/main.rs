@@ -15,6 +15,9 @@ const SEED: u64 = 0x0150_feed;
 /// Time that one case may take, also on a busy computer.
 const CASE_MAX: Duration = Duration::from_secs(60);
 
+/// What is fuzzed.
+type Target<'t> = dyn FnMut(&[u8]) + 't;
+
 /// The files of these folders and these files.
 fn seeds(places: &[&str]) -> Vec<Vec<u8>> {
     let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("../..");
@@ -44,7 +47,7 @@ fn main() -> ExitCode {
         return ExitCode::from(2);
     };
     let mut reader = None;
-    let (seeds, mut run): (_, Box<dyn FnMut(&[u8])>) = match target.as_str() {
+    let (seeds, mut run): (_, Box<Target<'_>>) = match target.as_str() {
         "protocol" => (seeds(&["tests/fuzz/seeds/protocol"]), Box::new(protocol)),
         "job_file" => (seeds(&["tests/fuzz/seeds/job_file", "jobs"]), Box::new(job_file)),
         "cad" => match Reader::new() {

@@ -9,8 +9,8 @@ use clap::ValueEnum;
 use serde_json::{Value, json};
 
 use super::super::out::say;
-use super::super::progress;
-use super::{Arguments, condition, deviation_json};
+use super::super::{Result, progress, whole};
+use super::{Arguments, condition, deviation_json, page};
 use cad::{CadError, Face, Form, MachinableFace, Measures, Model, Options, degrees, machinable, measure};
 use job::one_line;
 
@@ -95,6 +95,17 @@ pub(super) struct Row<'f> {
     /// Whether its boundary could not be read.
     unknown: bool,
     pub(super) becomes: std::result::Result<(MachinableFace, Measures), CadError>,
+}
+
+impl Row<'_> {
+    /// Whether the face is trimmed, in a word.
+    pub(super) fn boundary(&self) -> &'static str {
+        match (&self.trimmed, self.unknown) {
+            (None, _) => "no",
+            (Some(_), false) => "yes",
+            (Some(_), true) => "unknown",
+        }
+    }
 }
 
 /// Measures all faces on all cores; rows in the order of the faces.
@@ -200,11 +211,7 @@ fn print_rows(rows: &[Row<'_>]) {
         let (kind, number) = (face.surface.kind(), face.number);
         let colour = face.colour.map_or("-".to_owned(), condition::hex);
         let name = one_line(face.name.as_deref().unwrap_or("-"));
-        let trimmed = match (&row.trimmed, row.unknown) {
-            (None, _) => "no",
-            (Some(_), false) => "yes",
-            (Some(_), true) => "unknown",
-        };
+        let trimmed = row.boundary();
         match &row.becomes {
             Ok((made, measures)) => {
                 let [x, y, z] = measures.size_mm();
@@ -240,12 +247,18 @@ fn print_rows(rows: &[Row<'_>]) {
 }
 
 /// Prints the faces that meet the conditions, in the order that is asked for.
-pub(super) fn list(arguments: &Arguments, file: &str, model: &Model, options: &Options) {
+///
+/// # Errors
+/// The page cannot be written.
+pub(super) fn list(arguments: &Arguments, file: &str, model: &Model, options: &Options) -> Result<()> {
     let mut rows = rows(file, &model.faces, options);
     rows.retain(|row| arguments.only.iter().all(|condition| condition.holds(row)));
     arguments.sort.sort(&mut rows);
     if arguments.reverse {
         rows.reverse();
+    }
+    if let Some(path) = &arguments.page {
+        whole::write(path, page::page(file, &rows).as_bytes(), arguments.force)?;
     }
     if arguments.json {
         let value = json!({
@@ -254,7 +267,7 @@ pub(super) fn list(arguments: &Arguments, file: &str, model: &Model, options: &O
             "warnings": model.warnings,
         });
         say!("{value}");
-        return;
+        return Ok(());
     }
     print_rows(&rows);
     say!(
@@ -263,4 +276,8 @@ pub(super) fn list(arguments: &Arguments, file: &str, model: &Model, options: &O
         rows.len(),
         model.faces.len()
     );
+    if let Some(path) = &arguments.page {
+        say!("page: {}", path.display());
+    }
+    Ok(())
 }
