@@ -7,6 +7,14 @@ use cad::{Boundary, CadError, Face, Form, JobOptions, Model, Options, machinable
 use glam::DVec3;
 use machine::prepare::prepare;
 
+// Their own tests: as a test, the reader would be built a second time with the libraries that know the formats, for minutes.
+#[allow(dead_code, reason = "used by the reader")]
+#[path = "../host-sim/cad-reader/src/iges_entries.rs"]
+mod iges_entries;
+#[allow(dead_code, reason = "used by the reader")]
+#[path = "../host-sim/cad-reader/src/step_records.rs"]
+mod step_records;
+
 /// A sheet of 30 x 20 in its file's unit, with its corner at the origin.
 const SHEET: &str = include_str!("hostile_cad/sound.step");
 /// A trimmed face with a hole, and a face that is not trimmed.
