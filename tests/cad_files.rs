@@ -200,6 +200,19 @@ fn a_lost_boundary_is_not_the_surfaces_own() {
     }
 }
 
+/// What has no end, or never begins, is not read.
+#[test]
+fn devices_and_pipes_are_refused() {
+    let folder = tempfile::tempdir().unwrap();
+    let pipe = folder.path().join("pipe.step");
+    let made = std::process::Command::new("mkfifo").arg(&pipe).status().unwrap();
+    assert!(made.success());
+    for path in [pipe.as_path(), Path::new("/dev/zero"), folder.path()] {
+        let error = read(path).unwrap_err();
+        assert!(error.what.contains("not a regular file"), "{error}");
+    }
+}
+
 /// The text of a file may begin with a comment (ISO 10303-21, 6.5).
 #[test]
 fn a_comment_before_the_header() {

@@ -44,7 +44,7 @@ pub fn read_bytes(file: &str, ending: &str, bytes: Vec<u8>) -> Result<Model, Cad
     let recognised = known.iter().position(|reader| reader.recognises(&bytes));
     let Some(chosen) = recognised else {
         let what = match named {
-            Some(named) => format!("this is not a {} file: its header differs", known[named].format()),
+            Some(named) => format!("this is no {} file: its header differs", known[named].format()),
             None => "this is neither a STEP, an IGES nor a 3DM file".to_owned(),
         };
         return Err(CadError::new(
