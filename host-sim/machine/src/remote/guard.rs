@@ -108,9 +108,10 @@ mod tests {
     fn a_killed_process_leaves_no_program_and_no_folder() {
         if std::env::var_os(KILLED).is_some() {
             let folder = GuardedFolder::new().unwrap();
-            let _program = program(&folder);
+            let mut program = program(&folder);
             println!("\nfolder {}", folder.path().display());
-            std::thread::sleep(Duration::from_secs(600));
+            // This process is killed before the program ends.
+            program.wait().unwrap();
         }
         let mut host = Command::new(std::env::current_exe().unwrap())
             .args([
