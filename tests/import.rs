@@ -318,7 +318,7 @@ fn samples_on_every_face() {
         let model = read(&cad(name)).unwrap();
         for face in &model.faces {
             let made = taken(name, face);
-            let written = write_job(name, face, &made, &JobOptions::default());
+            let written = write_job(name, face, &made, &JobOptions::default()).unwrap();
             let mut job = job_file::parse("job", &written.text)
                 .unwrap_or_else(|error| panic!("{name}, face {}: {error}", face.number));
             // High feed and wide passes: a few thousand samples over the whole face.
@@ -373,7 +373,7 @@ fn trimmed_faces_are_said() {
         assert!(error.what.contains("trimmed"), "{error}");
         assert!(error.remedy.contains("--untrimmed"), "{}", error.remedy);
         let made = taken(name, face);
-        let written = write_job(name, face, &made, &JobOptions::default());
+        let written = write_job(name, face, &made, &JobOptions::default()).unwrap();
         assert!(
             written.text.contains("# Note: the face is trimmed"),
             "{}",

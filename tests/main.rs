@@ -2,6 +2,7 @@
 #![allow(clippy::unwrap_used, reason = "a test may fail by panic")]
 
 mod board;
+mod cad_files;
 mod chip;
 mod cycles;
 mod debug_probe;

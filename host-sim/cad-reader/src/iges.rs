@@ -4,53 +4,82 @@ use std::collections::BTreeSet;
 use std::ops::Range;
 
 use crate::format::Reader;
-use crate::ir;
+use crate::iges_entries::{COLUMNS, Entries, Lines, SECTION, globals};
+use crate::iges_spline::converted;
+use crate::ir::{self, Stated};
 use cad::CadError;
 use cad::Model;
 
 /// The reader of IGES files.
 pub(crate) struct Iges;
 
-/// Columns per line, without the line end.
-const COLUMNS: usize = 80;
-/// Column of the section letter, from 0.
-const SECTION: usize = 72;
 /// The columns of a directory entry's "entity use" in its status, from 0.
 const USE: Range<usize> = 68..70;
 /// Largest number of curves of a composite curve.
 const CURVES_MAX: usize = 100_000;
 
-/// The lines of a file, without line ends.
-struct Lines<'b> {
-    bytes: &'b [u8],
-    /// Byte range of each line.
-    ranges: Vec<Range<usize>>,
+/// Names of the units flags (5.3, 2.2.4.3.14), as other programs write them too.
+const UNITS: [(&str, &[&str]); 10] = [
+    ("1", &["IN", "INCH", "INCHES"]),
+    (
+        "2",
+        &["MM", "MILLIMETER", "MILLIMETERS", "MILLIMETRE", "MILLIMETRES"],
+    ),
+    ("4", &["FT", "FEET", "FOOT"]),
+    ("5", &["MI", "MILE", "MILES"]),
+    ("6", &["M", "METER", "METERS", "METRE", "METRES"]),
+    ("7", &["KM", "KILOMETER", "KILOMETERS"]),
+    ("8", &["MIL", "MILS"]),
+    ("9", &["UM", "MICRON", "MICRONS"]),
+    ("10", &["CM", "CENTIMETER", "CENTIMETERS"]),
+    ("11", &["UIN", "MICROINCH", "MICROINCHES"]),
+];
+/// Index of the units flag in the global section; the unit's name follows.
+const UNITS_FLAG: usize = 13;
+
+/// What the file's text says, for the cross-check.
+struct Text(Entries);
+
+/// Sequence number of the entry with a name such as `D12`.
+fn sequence(entity: &str) -> Option<usize> {
+    let digits: String = entity.chars().filter(char::is_ascii_digit).collect();
+    digits.parse().ok()
 }
 
-impl<'b> Lines<'b> {
-    fn new(bytes: &'b [u8]) -> Self {
-        let mut ranges = Vec::new();
-        let mut start = 0;
-        for line in bytes.split_inclusive(|byte| *byte == b'\n') {
-            let text = line.strip_suffix(b"\n").unwrap_or(line);
-            let text = text.strip_suffix(b"\r").unwrap_or(text);
-            if !text.trim_ascii().is_empty() {
-                ranges.push(start..start + text.len());
-            }
-            start += line.len();
-        }
-        Self { bytes, ranges }
+impl Stated for Text {
+    fn boundaries(&self, face: &str) -> Option<usize> {
+        self.0.boundaries(sequence(face)?)
     }
 
-    fn section(&self, line: &Range<usize>) -> u8 {
-        self.bytes[line.clone()].get(SECTION).copied().unwrap_or(b' ')
+    fn owner(&self, surface: &str) -> Option<String> {
+        self.0.owner(sequence(surface)?)
     }
+}
 
-    fn of(&self, letter: u8) -> Vec<&Range<usize>> {
-        self.ranges
-            .iter()
-            .filter(|line| self.section(line) == letter)
-            .collect()
+/// Checks that the units flag and the unit's name are of one unit.
+fn check_unit(file: &str, lines: &Lines<'_>) -> Result<(), CadError> {
+    let fields = globals(lines);
+    let of = |index: usize| fields.get(index).map_or("", String::as_str);
+    let doubt = |what: String| {
+        let line = lines.ranges.iter().position(|line| lines.section(line) == b'G');
+        Err(
+            CadError::new(file, what, "export the part again with its unit (mm or inch)")
+                .at_line(line.unwrap_or(0) + 1),
+        )
+    };
+    let (flag, name) = (of(UNITS_FLAG), of(UNITS_FLAG + 1).to_uppercase());
+    if !flag.is_empty() && flag != "3" && !UNITS.iter().any(|(known, _)| *known == flag) {
+        return doubt(format!(
+            "the file's unit is in doubt: there is no units flag `{flag}`"
+        ));
+    }
+    let meant = UNITS.iter().find(|(_, names)| names.contains(&name.as_str()));
+    match meant {
+        // Without a flag the unit is the inch.
+        Some((known, _)) if *known != if flag.is_empty() { "1" } else { flag } && flag != "3" => doubt(
+            format!("the file's unit is in doubt: its units flag is `{flag}`, but the unit's name `{name}`"),
+        ),
+        _ => Ok(()),
     }
 }
 
@@ -107,12 +136,14 @@ impl Reader for Iges {
         if !lines.of(b'D').len().is_multiple_of(2) {
             return fault(1, "a directory entry has one line instead of two".to_owned());
         }
-        Ok(())
+        check_unit(file, &lines)
     }
 
     fn read(&self, file: &str, mut bytes: Vec<u8>) -> Result<Model, CadError> {
-        mark_parameter_curves(&mut bytes);
-        ir::decode(file, &cadmpeg_codec_iges::IgesCodec, bytes)
+        let entries = Entries::new(&Lines::new(&bytes));
+        mark_parameter_curves(&mut bytes, &entries);
+        let bytes = converted(&bytes, &entries).unwrap_or(bytes);
+        ir::decode(file, &cadmpeg_codec_iges::IgesCodec, bytes, &Text(entries))
     }
 }
 
@@ -136,35 +167,10 @@ fn check_numbers(file: &str, line: &[u8], number: usize) -> Result<(), CadError>
 
 /// Sets the entity use of parameter curves. The standard (5.3, 2.2.4.4.9.3) requires 05 on the parameter curve of an entity 142;
 /// OpenCASCADE and others write 00, and `cadmpeg` then drops the whole trimmed surface.
-fn mark_parameter_curves(bytes: &mut [u8]) {
-    let lines = Lines::new(bytes);
-    let directory: Vec<Range<usize>> = lines.of(b'D').into_iter().cloned().collect();
-    let data: Vec<Range<usize>> = lines.of(b'P').into_iter().cloned().collect();
-    let field = |line: &Range<usize>, column: usize| -> Option<usize> {
-        let text = bytes.get(line.clone())?.get(8 * column..8 * column + 8)?;
-        std::str::from_utf8(text).ok()?.trim().parse().ok()
-    };
-    let kind = |entry: usize| field(directory.get(entry.checked_sub(1)?)?, 0);
-    let parameters = |entry: usize| -> Option<Vec<usize>> {
-        let first = field(directory.get(entry.checked_sub(1)?)?, 1)?;
-        let count = field(directory.get(entry)?, 3)?;
-        let mut words = Vec::new();
-        for line in data.get(first.checked_sub(1)?..first.checked_sub(1)?.checked_add(count)?)? {
-            let text = bytes.get(line.start..line.start + 64)?;
-            let text = std::str::from_utf8(text).ok()?;
-            words.extend(
-                text.split([',', ';'])
-                    .map(|word| word.trim().parse().unwrap_or(0)),
-            );
-        }
-        Some(words)
-    };
+fn mark_parameter_curves(bytes: &mut [u8], entries: &Entries) {
     let mut marked = BTreeSet::new();
-    for entry in (1..=directory.len())
-        .step_by(2)
-        .filter(|entry| kind(*entry) == Some(142))
-    {
-        let Some(curve) = parameters(entry).and_then(|words| words.get(3).copied()) else {
+    for (_, entry) in entries.iter().filter(|(_, entry)| entry.kind == 142) {
+        let Some(curve) = entry.whole(3) else {
             continue;
         };
         let mut wanted = vec![curve];
@@ -172,19 +178,15 @@ fn mark_parameter_curves(bytes: &mut [u8]) {
             if curve == 0 || marked.len() > CURVES_MAX || !marked.insert(curve) {
                 continue;
             }
-            if kind(curve) == Some(102) {
-                let members = parameters(curve).unwrap_or_default();
-                let count = members.get(1).copied().unwrap_or(0);
-                wanted.extend(members.iter().skip(2).take(count));
+            if let Some(composite) = entries.get(curve).filter(|entry| entry.kind == 102) {
+                let count = composite.whole(1).unwrap_or(0).min(composite.words.len());
+                wanted.extend((2..2 + count).filter_map(|index| composite.whole(index)));
             }
         }
     }
-    for entry in marked {
-        let Some(line) = entry.checked_sub(1).and_then(|index| directory.get(index)) else {
-            continue;
-        };
-        let place = line.start + USE.start..line.start + USE.end;
-        if entry % 2 == 1 && place.end <= line.end {
+    for entry in marked.into_iter().filter_map(|sequence| entries.get(sequence)) {
+        let place = entry.line.start + USE.start..entry.line.start + USE.end;
+        if place.end <= entry.line.end {
             bytes[place].copy_from_slice(b"05");
         }
     }

@@ -15,6 +15,8 @@ use crate::ir_geometry::{SURFACE_DEPTH_MAX, placement, point, solved_surface, ve
 use crate::ir_index::{Translation, entity};
 use cad::Model;
 use cad::{Boundary, CadError, Face, Placement, Surface};
+use cadmpeg_ir::document::CadIr;
+use glam::DVec3;
 
 /// Limits of a file, far above those of the largest part tested.
 const LIMITS: ResourceLimits = ResourceLimits {
@@ -31,11 +33,76 @@ const ASSEMBLY_DEPTH_MAX: usize = 64;
 const FACES_MAX: usize = 200_000;
 /// Text about a surface of an unsupported kind.
 const NOT_READ: &str = " is of a kind that is not read";
+/// Relative tolerance of a point that was read and scaled twice.
+const SAME_POINT: f64 = 1e-9;
 /// Largest number of warnings.
 const WARNINGS_MAX: usize = 12;
 
-/// Reads a file with one of the codecs.
-pub(crate) fn decode(file: &str, codec: &dyn Codec, bytes: Vec<u8>) -> Result<Model, CadError> {
+/// What the text of a file says, read apart from the codec: for the cross-check. Entities have their names in the file, such as `#12`.
+pub(crate) trait Stated {
+    /// Position of a point, mm, before the placement of its part; `None` if the text does not say.
+    fn point(&self, _entity: &str) -> Option<DVec3> {
+        None
+    }
+
+    /// Whether a face's unit of length is known.
+    fn has_unit(&self, _entity: &str) -> bool {
+        true
+    }
+
+    /// Number of boundaries of a face; `None` if the text does not say.
+    fn boundaries(&self, _face: &str) -> Option<usize> {
+        None
+    }
+
+    /// What trims or derives from a surface, in words; `None` for a surface on its own.
+    fn owner(&self, _surface: &str) -> Option<String> {
+        None
+    }
+}
+
+/// Compares the points with what the text says of them, and refuses a unit that is in doubt.
+fn cross_check(file: &str, ir: &CadIr, stated: &dyn Stated) -> Result<(), CadError> {
+    let again = "export the part again with one unit, alone, or in another format";
+    for item in &ir.model.points {
+        let name = entity(item.id.as_str());
+        let read = point(item.position().get());
+        if let Some(said) = stated.point(&name).filter(|said| !agree(read, *said)) {
+            let what = format!(
+                "the unit of point {name} is in doubt: it is at [{}, {}, {}] or at [{}, {}, {}] mm",
+                read.x, read.y, read.z, said.x, said.y, said.z
+            );
+            return Err(CadError::new(file, what, again));
+        }
+    }
+    for face in &ir.model.faces {
+        let name = entity(face.id.as_str());
+        if !stated.has_unit(&name) {
+            return Err(CadError::new(
+                file,
+                format!("face {name} has no unit of length"),
+                again,
+            ));
+        }
+    }
+    Ok(())
+}
+
+/// Whether a point is where the text says.
+fn agree(read: DVec3, said: DVec3) -> bool {
+    read.distance(said) <= SAME_POINT * (1.0 + said.abs().max_element())
+}
+
+/// Reads a file with one of the codecs; `stated` is what its text says.
+///
+/// # Errors
+/// The file is invalid, or the codec read another unit than the text gives.
+pub(crate) fn decode(
+    file: &str,
+    codec: &dyn Codec,
+    bytes: Vec<u8>,
+    stated: &dyn Stated,
+) -> Result<Model, CadError> {
     let options = DecodeOptions {
         depth: DecodeDepth::Geometry,
         policy: DecodePolicy {
@@ -51,7 +118,8 @@ pub(crate) fn decode(file: &str, codec: &dyn Codec, bytes: Vec<u8>) -> Result<Mo
             "export the part again, or in another format (STEP is read best)",
         )
     })?;
-    let mut model = Translation::new(decoded.ir()).model(file)?;
+    cross_check(file, decoded.ir(), stated)?;
+    let mut model = Translation::new(decoded.ir()).model(file, stated)?;
     for warning in &mut model.warnings {
         explain(
             warning,
@@ -137,13 +205,14 @@ fn natural(id: &str) -> Vec<(u64, String)> {
 
 impl<'m> Translation<'m> {
     /// All faces of all bodies, once per occurrence of their part; then surfaces without a face.
-    fn model(&self, file: &str) -> Result<Model, CadError> {
+    fn model(&self, file: &str, stated: &dyn Stated) -> Result<Model, CadError> {
         let mut model = Model::default();
         let homes = self.placements();
         let shell_body = self.bodies_of_shells();
         let mut order: Vec<_> = self.source.faces.iter().collect();
         order.sort_by_cached_key(|face| natural(face.id.as_str()));
         let identity = vec![Placement::IDENTITY];
+        let parts = self.names_of_parts();
         for face in order {
             let body = shell_body.get(face.shell.as_str());
             let solid = body.is_some_and(|body| body.kind == BodyKind::Solid);
@@ -161,12 +230,37 @@ impl<'m> Translation<'m> {
                     continue;
                 }
             };
-            let boundary = self.boundary(face.loops.iter().map(|id| id.as_str()));
+            let loops: Vec<_> = face.loops.iter().map(|id| id.as_str()).collect();
+            let boundary = match stated.boundaries(&name).filter(|count| *count != loops.len()) {
+                Some(count) => {
+                    Boundary::Unknown(format!("{} of its {count} boundaries were read", loops.len()))
+                }
+                None => self.boundary(loops.into_iter()),
+            };
             let sense = if (face.sense == Sense::Forward) != self.turned_over(face.surface.as_str()) {
                 1.0
             } else {
                 -1.0
             };
+            let colour = face.color.or(body.and_then(|body| body.color)).map(|colour| {
+                #[allow(
+                    clippy::cast_possible_truncation,
+                    clippy::cast_sign_loss,
+                    reason = "rounded, 0 to 255"
+                )]
+                [colour.r(), colour.g(), colour.b()]
+                    .map(|share| (share * 255.0).round().clamp(0.0, 255.0) as u8)
+            });
+            let part = body.and_then(|body| parts.get(body.id.as_str()).copied());
+            let label = [
+                face.name.as_deref(),
+                body.and_then(|body| body.name.as_deref()),
+                part,
+            ]
+            .into_iter()
+            .flatten()
+            .find(|text| !text.trim().is_empty())
+            .map(|text| shortened(text.trim()));
             for home in homes {
                 if model.faces.len() >= FACES_MAX {
                     let what = format!("the file's assembly places more than {FACES_MAX} faces");
@@ -183,6 +277,8 @@ impl<'m> Translation<'m> {
                 model.faces.push(Face {
                     number: 0,
                     entity: name.clone(),
+                    name: label.clone(),
+                    colour,
                     // A reflection keeps the parameters, so that S_u x S_v is reversed.
                     sense: sense * turn,
                     surface,
@@ -191,13 +287,13 @@ impl<'m> Translation<'m> {
                 });
             }
         }
-        self.lone_surfaces(&mut model);
+        self.lone_surfaces(&mut model, stated);
         model.warnings.truncate(WARNINGS_MAX);
         Ok(model)
     }
 
     /// Surfaces without a face, common in IGES files.
-    fn lone_surfaces(&self, model: &mut Model) {
+    fn lone_surfaces(&self, model: &mut Model, stated: &dyn Stated) {
         let mut used: Vec<&str> = self
             .source
             .faces
@@ -228,9 +324,14 @@ impl<'m> Translation<'m> {
             match self.surface(item.id.as_str(), 0) {
                 Ok(surface) if surface.domain().iter().all(Option::is_some) => model.faces.push(Face {
                     number: 0,
+                    name: None,
+                    colour: None,
+                    boundary: match stated.owner(&name) {
+                        Some(owner) => Boundary::Unknown(format!("it is of {owner}, which was not read")),
+                        None => Boundary::Natural,
+                    },
                     entity: name,
                     surface,
-                    boundary: Boundary::Natural,
                     sense: 1.0,
                     solid: false,
                 }),
@@ -260,6 +361,15 @@ impl<'m> Translation<'m> {
                 let body = regions.get(shell.region.as_str())?;
                 Some((shell.id.as_str(), *bodies.get(body)?))
             })
+            .collect()
+    }
+
+    /// Names of the parts, by their bodies.
+    fn names_of_parts(&self) -> HashMap<&'m str, &'m str> {
+        let parts = self.source.product_definitions.iter();
+        parts
+            .filter_map(|part| Some((part, part.label.as_deref().or(part.source_name.as_deref())?)))
+            .flat_map(|(part, name)| part.bodies.iter().map(move |body| (body.as_str(), name)))
             .collect()
     }
 

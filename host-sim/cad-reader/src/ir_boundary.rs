@@ -37,6 +37,9 @@ impl Translation<'_> {
                     Err(why) => return Boundary::Unknown(why),
                 }
             }
+            if let Some(gap_mm) = gap_mm(&edges).filter(|gap_mm| gap_mm.is_nan() || *gap_mm > VERTEX_MM) {
+                return Boundary::Unknown(format!("a loop has a gap of {gap_mm:.3} mm"));
+            }
             if !edges.is_empty() {
                 all.push(edges);
             }
@@ -56,17 +59,14 @@ impl Translation<'_> {
             .and_then(|index| self.source.edges.get(*index))
             .ok_or("an edge is missing")?;
         let Some(curve) = edge.carrier.curve() else {
+            // At a degenerate point an edge has no curve; where there should be one, the reader gave none either.
             return if edge.start == edge.end {
                 Ok(Vec::new())
             } else {
                 Err(format!("edge {} has no curve in space", entity(edge.id.as_str())))
             };
         };
-        let curve = match self.curve(curve.as_str()) {
-            Ok(curve) => curve,
-            Err(_) if edge.start == edge.end => return Ok(Vec::new()),
-            Err(why) => return Err(why),
-        };
+        let curve = self.curve(curve.as_str())?;
         let mut parts = self.along(edge, &curve)?;
         if coedge.sense == Sense::Reversed {
             parts.reverse();
@@ -104,6 +104,12 @@ impl Translation<'_> {
                 };
                 [first, first + turn]
             }
+            (None, Curve::Parabola { vertex: from, y, .. }) => {
+                [start, end].map(|p| (p - *from).dot(*y) / y.length_squared())
+            }
+            (None, Curve::Hyperbola { center: from, y, .. }) => {
+                [start, end].map(|p| ((p - *from).dot(*y) / y.length_squared()).asinh())
+            }
             (None, _) => curve.domain().ok_or("an edge has no range")?,
         };
         let mut ends = vec![range[0]];
@@ -134,6 +140,19 @@ impl Translation<'_> {
         }
         Ok(parts)
     }
+}
+
+/// Largest distance between the end of an edge and the beginning of the next, mm.
+fn gap_mm(edges: &[Edge]) -> Option<f64> {
+    let next = edges.iter().cycle().skip(1);
+    let gaps = edges
+        .iter()
+        .zip(next)
+        .map(|(edge, next)| match (edge.last(), next.first()) {
+            (Some(end), Some(start)) => end.distance(*start),
+            _ => f64::NAN,
+        });
+    gaps.reduce(|most, gap| if gap > most || gap.is_nan() { gap } else { most })
 }
 
 /// A boundary, transformed by a placement.

@@ -219,6 +219,22 @@ pub(crate) fn solved_curve(solved: &SolvedCurveGeometry) -> Option<Curve> {
                 y: y * ellipse.minor_radius().get(),
             }
         }
+        SolvedCurveGeometry::Parabola(parabola) => {
+            let [x, y, _] = frame(parabola.frame()).map(|unit| unit * parabola.focal_distance().get());
+            Curve::Parabola {
+                vertex: point(parabola.vertex().get()),
+                x,
+                y: y * 2.0,
+            }
+        }
+        SolvedCurveGeometry::Hyperbola(hyperbola) => {
+            let [x, y, _] = frame(hyperbola.frame());
+            Curve::Hyperbola {
+                center: point(hyperbola.center().get()),
+                x: x * hyperbola.major_radius().get(),
+                y: y * hyperbola.minor_radius().get(),
+            }
+        }
         SolvedCurveGeometry::Nurbs(nurbs) => Curve::Spline(spline_curve(nurbs)?),
         SolvedCurveGeometry::Transformed(placed) => {
             solved_curve(placed.basis())?.placed(&placement(placed.transform()))

@@ -1,23 +1,4 @@
-//! Reads a CAD file for `cargo sim import`, in a separate process: `cad-reader FILE` writes `Result<Model, CadError>` as JSON to its
-//! standard output.
-//!
-//! Apart from `cad` because the library that knows the formats (`cadmpeg`) is twenty times as large as the rest of the tool together: it is built when
-//! the first CAD file is read, and a file that hangs a reader, or eats memory, does so here.
-//!
-//! ```text
-//! main.rs ─► readers.rs   by the file's first bytes ─► step.rs, iges.rs, rhino.rs   what can be checked before the whole file is read
-//!                                                       └─► ir.rs, ir_*.rs   cadmpeg's model -> cad::Face
-//! ```
-
-mod format;
-mod iges;
-mod ir;
-mod ir_boundary;
-mod ir_geometry;
-mod ir_index;
-mod readers;
-mod rhino;
-mod step;
+//! `cad-reader FILE` writes `Result<Model, CadError>` as JSON to its standard output.
 
 use std::io::{BufWriter, Write, stdout};
 use std::path::Path;
@@ -28,7 +9,7 @@ fn main() -> ExitCode {
         eprintln!("usage: cad-reader FILE (called by `cargo sim import`)");
         return ExitCode::from(2);
     };
-    let read = readers::read(Path::new(&file));
+    let read = cad_reader::read(Path::new(&file));
     let mut out = BufWriter::new(stdout().lock());
     match serde_json::to_writer(&mut out, &read)
         .map_err(std::io::Error::from)

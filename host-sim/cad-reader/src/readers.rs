@@ -18,7 +18,7 @@ fn readers() -> [Box<dyn Reader>; 3] {
 ///
 /// # Errors
 /// The file cannot be read, has an unknown format, is invalid, or contains no faces; with its name and, if known, the line.
-pub(crate) fn read(path: &Path) -> Result<Model, CadError> {
+pub fn read(path: &Path) -> Result<Model, CadError> {
     let file = path.display().to_string();
     let bytes = std::fs::read(path).map_err(|cause| {
         CadError::new(
@@ -31,29 +31,35 @@ pub(crate) fn read(path: &Path) -> Result<Model, CadError> {
         .extension()
         .map(|ending| ending.to_string_lossy().to_lowercase())
         .unwrap_or_default();
+    read_bytes(&file, &ending, bytes)
+}
+
+/// Reads the bytes of a file. `file`: its name in errors; `ending`: its extension, lower case, of which a different format is told.
+///
+/// # Errors
+/// As [`read`].
+pub fn read_bytes(file: &str, ending: &str, bytes: Vec<u8>) -> Result<Model, CadError> {
     let known = readers();
-    let named = known
-        .iter()
-        .position(|reader| reader.endings().contains(&ending.as_str()));
+    let named = known.iter().position(|reader| reader.endings().contains(&ending));
     let recognised = known.iter().position(|reader| reader.recognises(&bytes));
     let Some(chosen) = recognised else {
         let what = match named {
-            Some(named) => format!("this is not a {} file: its header differs", known[named].format()),
+            Some(named) => format!("this is no {} file: its header differs", known[named].format()),
             None => "this is neither a STEP, an IGES nor a 3DM file".to_owned(),
         };
         return Err(CadError::new(
-            &file,
+            file,
             what,
             "export the part again as STEP (AP203, AP214 or AP242), IGES or 3DM",
         ));
     };
     let reader = readers().into_iter().nth(chosen);
     let Some(reader) = reader else {
-        return Err(CadError::new(&file, "there is no reader", "report this"));
+        return Err(CadError::new(file, "there is no reader", "report this"));
     };
     let format = reader.format();
-    reader.check(&file, &bytes)?;
-    let mut model = guarded(&file, reader, bytes)?;
+    reader.check(file, &bytes)?;
+    let mut model = guarded(file, reader, bytes)?;
     if let Some(named) = named.filter(|named| *named != chosen) {
         model.warnings.insert(
             0,
@@ -70,7 +76,7 @@ pub(crate) fn read(path: &Path) -> Result<Model, CadError> {
             .map_or(String::new(), |first| format!(" ({first})"));
         let what = format!("this {format} file contains no surface that can be read{reason}");
         return Err(CadError::new(
-            &file,
+            file,
             what,
             "export the part as surfaces or solids, not as a mesh, a drawing or curves",
         ));

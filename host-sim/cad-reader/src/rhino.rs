@@ -1,12 +1,17 @@
 //! 3DM (openNURBS archives of Rhino).
 
 use crate::format::Reader;
-use crate::ir;
+use crate::ir::{self, Stated};
 use cad::CadError;
 use cad::Model;
 
 /// The reader of 3DM files.
 pub(crate) struct Rhino;
+
+/// The archive is binary: its text says nothing.
+struct Nothing;
+
+impl Stated for Nothing {}
 
 /// Least size of an archive: header and first chunk, bytes.
 const HEAD_BYTES: usize = 32;
@@ -33,6 +38,6 @@ impl Reader for Rhino {
     }
 
     fn read(&self, file: &str, bytes: Vec<u8>) -> Result<Model, CadError> {
-        ir::decode(file, &cadmpeg_codec_rhino::RhinoCodec, bytes)
+        ir::decode(file, &cadmpeg_codec_rhino::RhinoCodec, bytes, &Nothing)
     }
 }

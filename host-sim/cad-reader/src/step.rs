@@ -1,9 +1,12 @@
 //! STEP (ISO 10303-21): AP203, AP214, AP242.
 
 use crate::format::Reader;
-use crate::ir;
+use crate::ir::{self, Stated};
+use crate::step_records::{Records, arguments, references};
+use crate::step_units::{Units, units};
 use cad::CadError;
 use cad::Model;
+use glam::DVec3;
 
 /// The reader of STEP files.
 pub(crate) struct Step;
@@ -23,11 +26,17 @@ impl Reader for Step {
     }
 
     fn recognises(&self, head: &[u8]) -> bool {
-        let text = head.trim_ascii_start();
-        let text = text
+        let mut text = head
             .strip_prefix(b"\xef\xbb\xbf")
-            .unwrap_or(text)
+            .unwrap_or(head)
             .trim_ascii_start();
+        // Comments may stand before the first word.
+        while let Some(comment) = text.strip_prefix(b"/*") {
+            let Some(end) = comment.windows(2).position(|pair| pair == b"*/") else {
+                return false;
+            };
+            text = comment[end + 2..].trim_ascii_start();
+        }
         text.starts_with(b"ISO-10303-21;")
     }
 
@@ -36,7 +45,56 @@ impl Reader for Step {
     }
 
     fn read(&self, file: &str, bytes: Vec<u8>) -> Result<Model, CadError> {
-        ir::decode(file, &cadmpeg_codec_step::StepCodec::default(), bytes)
+        let records = Records::new(&bytes);
+        let units = units(file, &bytes, &records)?;
+        let mut readable = bytes.clone();
+        units.only_of_shapes(&mut readable);
+        let codec = cadmpeg_codec_step::StepCodec::default();
+        ir::decode(file, &codec, readable, &Text { records, units })
+    }
+}
+
+/// What the file's text says, for the cross-check.
+struct Text<'b> {
+    records: Records<'b>,
+    units: Units,
+}
+
+/// Number of the record with a name such as `#12`.
+fn number(entity: &str) -> Option<u64> {
+    entity.strip_prefix('#')?.parse().ok()
+}
+
+impl Stated for Text<'_> {
+    fn point(&self, entity: &str) -> Option<DVec3> {
+        self.units.point(&self.records, number(entity)?)
+    }
+
+    fn has_unit(&self, entity: &str) -> bool {
+        number(entity).is_none_or(|id| self.units.known(id))
+    }
+
+    fn boundaries(&self, face: &str) -> Option<usize> {
+        let record = self.records.get(number(face)?)?;
+        let parts = record.parts();
+        let (_, inner) = parts
+            .iter()
+            .find(|(name, _)| matches!(*name, "ADVANCED_FACE" | "FACE_SURFACE" | "FACE"))?;
+        let words = arguments(inner);
+        Some(references(words.iter().find(|word| word.starts_with(b"("))?).len())
+    }
+
+    fn owner(&self, surface: &str) -> Option<String> {
+        let id = number(surface)?;
+        let owns = |name: &str| name.ends_with("FACE") || name.ends_with("SURFACE");
+        self.records.iter().find_map(|(owner, record)| {
+            let parts = record.parts();
+            let (name, _) = parts.iter().find(|(name, _)| owns(name))?;
+            record
+                .references()
+                .contains(&id)
+                .then(|| format!("#{owner}, {name}"))
+        })
     }
 }
 
@@ -168,7 +226,7 @@ fn entity_numbers(file: &str, bytes: &[u8], start: usize, end: usize) -> Result<
 }
 
 /// Line of a byte, from 1.
-fn line_of(bytes: &[u8], at: usize) -> usize {
+pub(crate) fn line_of(bytes: &[u8], at: usize) -> usize {
     bytes[..at.min(bytes.len())]
         .iter()
         .filter(|byte| **byte == b'\n')

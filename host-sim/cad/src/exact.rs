@@ -6,6 +6,10 @@ use super::spline::{Axis, Pole, SplineCurve, SplineSurface};
 use super::surface::Surface;
 use glam::DVec3;
 
+/// Joints this close to each other or to the ends, as a share of the range, are one: they differ by rounding, and no tool sees a span of
+/// that width.
+const JOINT_SLACK: f64 = 1e-9;
+
 /// Homogeneous profile point, `w` times: the point on the axis, and the radial part.
 fn lifted(on_axis: DVec3, beside: DVec3, w: f64) -> Pole {
     (on_axis * w + beside).extend(w).to_array()
@@ -255,8 +259,15 @@ pub(super) fn joints(surface: &Surface, direction: usize, range: [f64; 2]) -> Ve
             .collect(),
         _ => Vec::new(),
     };
-    all.retain(|(t, _)| *t > range[0] && *t < range[1]);
-    all.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
-    all.dedup_by(|b, a| (b.0 - a.0).abs() <= 1e-12 * (range[1] - range[0]));
+    let slack = JOINT_SLACK * (range[1] - range[0]);
+    all.retain(|(t, _)| *t > range[0] + slack && *t < range[1] - slack);
+    all.sort_by(|a, b| a.0.total_cmp(&b.0));
+    all.dedup_by(|b, a| {
+        let one = b.0 - a.0 <= slack;
+        if one {
+            a.1 = a.1.min(b.1);
+        }
+        one
+    });
     all
 }

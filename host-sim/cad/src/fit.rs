@@ -3,7 +3,7 @@
 
 use super::exact::joints;
 use super::spline::{Axis, Pole, Side, SplineSurface};
-use super::surface::Surface;
+use super::surface::{Periodic, Surface};
 use glam::DVec3;
 
 /// Largest number of spans in one direction: the data of more would not fit a job.
@@ -149,9 +149,10 @@ fn direction(
             .filter(|(_, order)| *order < 2),
     );
     breaks.push((range[1], 0));
+    let whole = Periodic::new(surface);
     let point = |t: f64, line: f64| {
         let (u, v) = if k == 0 { (t, line) } else { (line, t) };
-        surface.at(u, v).point
+        whole.at(u, v).point
     };
     let lines: Vec<f64> = (0..LINES)
         .map(|i| other[0] + (other[1] - other[0]) * i as f64 / (LINES - 1) as f64)
@@ -219,6 +220,7 @@ fn on_curve(axis: &Axis, poles: &[DVec3], t: f64) -> DVec3 {
 /// The spline on given knots that interpolates the surface at all pairs of Greville abscissae.
 fn interpolated(surface: &Surface, axes: [Axis; 2]) -> Result<SplineSurface, FitError> {
     let [in_u, in_v] = axes.map(Collocation::new);
+    let surface = Periodic::new(surface);
     let mut rows: Vec<Vec<DVec3>> = Vec::with_capacity(in_u.places.len());
     for &u in &in_u.places {
         let points: Vec<DVec3> = in_v.places.iter().map(|v| surface.at(u, *v).point).collect();
@@ -251,6 +253,7 @@ pub(super) fn deviation(surface: &Surface, fit: &SplineSurface) -> Deviation {
             .collect()
     };
     let (us, vs) = (places(0), places(1));
+    let surface = Periodic::new(surface);
     let mut worst = Deviation {
         places: us.len() * vs.len(),
         ..Deviation::default()

@@ -3,8 +3,8 @@
 use std::fmt::Write;
 
 use super::machinable::outside;
-use super::{Face, Form, MachinableFace, Measures, measure};
-use job::NurbsSpec;
+use super::{CadError, Face, Form, MachinableFace, Measures, measure};
+use job::{NurbsSpec, one_line};
 
 /// Standard radii of ball-end mills for the automatic choice, mm.
 const RADII_MM: [f64; 13] = [0.25, 0.5, 0.75, 1.0, 1.5, 2.0, 2.5, 3.0, 4.0, 5.0, 6.0, 8.0, 10.0];
@@ -17,6 +17,9 @@ const FEED_MM_MIN: f64 = 1200.0;
 const SCALLOP_MM: f64 = 0.01;
 /// Least z of the mean normal of a surface that faces up.
 const UP: f64 = 0.1;
+/// A surface that reaches farther than this from the origin is placed with its centre there, mm: the machine's range is 2147 mm either way, and
+/// the ball and its way up and down need some.
+const REACH_MM: f64 = 2000.0;
 /// Digits of a written coordinate: full precision of f64.
 const COLUMN: usize = 100;
 
@@ -64,22 +67,24 @@ fn side(face: &Face, measures: &Measures) -> (&'static str, f64) {
     }
 }
 
-/// The largest standard radius below the least concave radius of the machined side.
-fn ball(concave_mm: Option<f64>, size_mm: f64) -> f64 {
+/// The largest standard radius below the least concave radius of the machined side; `None` below the smallest.
+fn ball(concave_mm: Option<f64>, size_mm: f64) -> Option<f64> {
     let room = concave_mm
         .map_or(f64::INFINITY, |radius| FIT * radius)
         .min(0.5 * size_mm);
-    let standard = RADII_MM.iter().rev().find(|radius| **radius <= room);
-    // Below every standard radius: the largest radius that fits, rounded down to three digits.
-    standard.copied().unwrap_or_else(|| {
-        let digits = 10.0_f64.powf(2.0 - room.log10().floor());
-        (room * digits).floor() / digits
-    })
+    RADII_MM.into_iter().rev().find(|radius| *radius <= room)
 }
 
 /// Writes a job for a face. `source` says where it came from, for the comment.
-#[must_use]
-pub fn write_job(source: &str, face: &Face, surface: &MachinableFace, options: &JobOptions) -> JobText {
+///
+/// # Errors
+/// No standard ball fits, and the options give none.
+pub fn write_job(
+    source: &str,
+    face: &Face,
+    surface: &MachinableFace,
+    options: &JobOptions,
+) -> Result<JobText, CadError> {
     let measures = measure(&surface.spec());
     let (chosen, sign) = side(face, &measures);
     let side = options.side.clone().unwrap_or_else(|| chosen.to_owned());
@@ -91,12 +96,25 @@ pub fn write_job(source: &str, face: &Face, surface: &MachinableFace, options: &
     };
     let concave_mm = measures.concave_mm[usize::from(sign < 0.0)];
     let size_mm = measures.size_mm().into_iter().fold(0.0, f64::max);
-    let radius_mm = options.radius_mm.unwrap_or_else(|| ball(concave_mm, size_mm));
+    let radius_mm = options.radius_mm.or_else(|| ball(concave_mm, size_mm)).ok_or_else(|| {
+        let [least, ..] = RADII_MM;
+        let room = match concave_mm {
+            Some(concave_mm) if concave_mm < size_mm => format!("its least concave radius is {concave_mm:.4} mm"),
+            _ => format!("it is {size_mm:.4} mm long"),
+        };
+        CadError::face(
+            source,
+            format!("face {}: {room}, no standard ball (from {least} mm) fits", face.number),
+            "give the ball with --radius-mm R (verify shows where it does not fit), or choose another side with --side",
+        )
+    })?;
     let mut warnings = Vec::new();
     if let Some(why) = &surface.outline.trimmed {
-        warnings.push(format!(
-            "the face is trimmed ({why}); the whole rectangle of the surface around it is machined"
-        ));
+        warnings.push(if surface.outline.unknown {
+            format!("{why}; the whole surface is machined, wherever the face on it ends")
+        } else {
+            format!("the face is trimmed ({why}); the whole rectangle of the surface around it is machined")
+        });
     }
     if let Form::Fitted { why, deviation } = &surface.form {
         warnings.push(format!(
@@ -109,16 +127,27 @@ pub fn write_job(source: &str, face: &Face, surface: &MachinableFace, options: &
             "the least concave radius on the machined side is {concave_mm:.4} mm: the ball of {radius_mm} mm does not fit"
         ));
     }
+    let far_mm = measures
+        .corners_mm
+        .iter()
+        .flatten()
+        .fold(0.0_f64, |far, x| far.max(x.abs()));
+    let centred = far_mm > REACH_MM;
+    if centred {
+        warnings.push(format!(
+            "it lies up to {far_mm:.0} mm from the origin, the machine's range is 2147 mm; it is placed with its centre at the origin"
+        ));
+    }
     let text = text(
-        source, face, surface, options, &measures, &warnings, radius_mm, &side,
+        source, face, surface, options, &measures, &warnings, radius_mm, &side, centred,
     );
-    JobText {
+    Ok(JobText {
         text,
         radius_mm,
         side,
         measures,
         warnings,
-    }
+    })
 }
 
 #[allow(clippy::too_many_arguments, reason = "all of them are of one file")]
@@ -131,15 +160,17 @@ fn text(
     warnings: &[String],
     radius_mm: f64,
     side: &str,
+    centred: bool,
 ) -> String {
     let mut out = String::new();
     let size = measures.size_mm();
     let _ = writeln!(
         out,
-        "# Face {} ({}, {}) of {source}: {:.3} x {:.3} x {:.3} mm, {} patches{}.",
+        "# Face {} ({}, {}) of {}: {:.3} x {:.3} x {:.3} mm, {} patches{}.",
         face.number,
-        face.entity,
+        one_line(&face.entity),
         face.surface.kind(),
+        one_line(source),
         size[0],
         size[1],
         size[2],
@@ -151,10 +182,13 @@ fn text(
         }
     );
     for warning in warnings {
-        let _ = writeln!(out, "# Note: {warning}.");
+        let _ = writeln!(out, "# Note: {}.", one_line(warning));
     }
     out.push('\n');
     write_surface(&mut out, &surface.nurbs);
+    if centred {
+        out.push_str("\n[placement]\nplace = \"centre\"            # the centre of its box, at translate_mm\ntranslate_mm = [0, 0, 0]\n");
+    }
     let or = |given: &Option<String>, default: &str| given.clone().unwrap_or_else(|| default.to_owned());
     let concave = match measures.concave_mm {
         [None, None] => "the surface is not concave".to_owned(),
@@ -174,18 +208,27 @@ fn text(
          [cut]\n\
          feed_mm_min = {}           # of the cutter contact along the surface\n\
          scallop_mm = {}            # scallop height limit between passes\n\
-         along = \"{}\"                # surface parameter along a pass\n\
-         side = \"{side}\"                # machined side: \"up\", or the sign on S_u x S_v\n\
-         pattern = \"{}\"              # \"zig\": every pass in the same direction; \"zigzag\": alternating\n\
+         along = {}                # surface parameter along a pass\n\
+         side = {}                # machined side: \"up\", or the sign on S_u x S_v\n\
+         pattern = {}              # \"zig\": every pass in the same direction; \"zigzag\": alternating\n\
          chord_mm = 0.005            # chord error limit, for export and the approaches made of chords\n\n\
          [machine]\n\
          period_us = 1000            # sampling period\n",
         options.feed_mm_min.unwrap_or(FEED_MM_MIN),
         options.scallop_mm.unwrap_or(SCALLOP_MM.min(0.1 * radius_mm)),
-        or(&options.along, "u"),
-        or(&options.pattern, "zig"),
+        quoted(&or(&options.along, "u")),
+        quoted(side),
+        quoted(&or(&options.pattern, "zig")),
     );
     out
+}
+
+/// A TOML string.
+fn quoted(text: &str) -> String {
+    format!(
+        "\"{}\"",
+        one_line(&text.replace('\\', "\\\\").replace('"', "\\\""))
+    )
 }
 
 fn write_surface(out: &mut String, nurbs: &NurbsSpec) {

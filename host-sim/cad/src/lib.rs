@@ -67,6 +67,12 @@ pub struct Face {
     pub number: usize,
     /// Name of its entity in the file, e.g. `#141` or `D5`.
     pub entity: String,
+    /// Its name in the CAD system, or that of its body or part.
+    #[serde(default)]
+    pub name: Option<String>,
+    /// Its colour, or that of its body: red, green, blue.
+    #[serde(default)]
+    pub colour: Option<[u8; 3]>,
     /// Its untrimmed surface.
     pub surface: Surface,
     /// Its boundary.

@@ -88,9 +88,23 @@ fn nurbs(spline: &SplineSurface) -> NurbsSpec {
     }
 }
 
-/// Number of patches of this surface on the board, or the reason why it does not fit.
+/// Number of patches of this surface on the board, or the reason why it does not fit. Where it lies does not count: a job's `[placement]`
+/// moves it.
 fn patches(nurbs: &NurbsSpec) -> Result<usize, String> {
-    patch_count(&SurfaceSpec::Nurbs(nurbs.clone()))
+    let mut centred = nurbs.clone();
+    let poles = || nurbs.poles_mm.iter().flatten();
+    for axis in 0..3 {
+        let [low, high] = poles().fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], pole| {
+            [low.min(pole[axis]), high.max(pole[axis])]
+        });
+        let middle = 0.5 * (low + high);
+        centred
+            .poles_mm
+            .iter_mut()
+            .flatten()
+            .for_each(|pole| pole[axis] -= middle);
+    }
+    patch_count(&SurfaceSpec::Nurbs(centred))
 }
 
 /// Converts a face to the surface of a job.
@@ -115,12 +129,20 @@ pub fn machinable(file: &str, face: &Face, options: &Options) -> Result<Machinab
         )
     })?;
     if let Some(why) = outline.trimmed.as_ref().filter(|_| !options.untrimmed) {
-        return Err(CadError::face(
-            file,
-            format!("{name} is trimmed: {why}"),
-            "import it with --untrimmed (in a job: untrimmed = true) to machine the whole rectangle around it, or split the \
-             face in the CAD system",
-        ));
+        let (what, remedy) = if outline.unknown {
+            (
+                format!("{name}: {why}"),
+                "export the part as STEP, or import it with --untrimmed (in a job: untrimmed = true) to machine the whole \
+                 surface, wherever the face on it ends",
+            )
+        } else {
+            (
+                format!("{name} is trimmed: {why}"),
+                "import it with --untrimmed (in a job: untrimmed = true) to machine the whole rectangle around it, or split \
+                 the face in the CAD system",
+            )
+        };
+        return Err(CadError::face(file, what, remedy));
     }
     let mut why_fitted = "it has no exact form".to_owned();
     if let Some(spline) = exact(&face.surface, outline.rectangle) {

@@ -28,9 +28,17 @@ pub struct Measures {
     pub concave_mm: [Option<f64>; 2],
     /// Mean normal: integral of `S_u x S_v` over the area; length 1 for a plane.
     pub facing: [f64; 3],
+    /// Area, mm².
+    pub area_mm2: f64,
 }
 
 impl Measures {
+    /// Centre of the bounding box, mm.
+    #[must_use]
+    pub fn centre_mm(&self) -> [f64; 3] {
+        std::array::from_fn(|k| 0.5 * (self.corners_mm[0][k] + self.corners_mm[1][k]))
+    }
+
     /// Extent in x, y and z, mm.
     #[must_use]
     pub fn size_mm(&self) -> [f64; 3] {
@@ -72,12 +80,13 @@ pub fn measure(spec: &SurfaceSpec) -> Measures {
     let mut corners_mm = [DVec3::INFINITY, DVec3::NEG_INFINITY];
     let mut tightest = [(0.0, [us[0], vs[0]]); 2];
     let (mut facing, mut whole) = (DVec3::ZERO, 0.0);
-    for &u in &us {
-        for &v in &vs {
+    let (weights_u, weights_v) = (weights(&us), weights(&vs));
+    for (&u, weight_u) in us.iter().zip(&weights_u) {
+        for (&v, weight_v) in vs.iter().zip(&weights_v) {
             let at = surface.at(u, v);
             let [least, most] = corners_mm;
             corners_mm = [least.min(at.point), most.max(at.point)];
-            let area = at.u.cross(at.v);
+            let area = at.u.cross(at.v) * (weight_u * weight_v);
             facing += area;
             whole += area.length();
             if let Some([least, most]) = principal(&at, ranges) {
@@ -97,8 +106,30 @@ pub fn measure(spec: &SurfaceSpec) -> Measures {
     Measures {
         corners_mm: corners_mm.map(|corner| corner.to_array()),
         concave_mm,
+        area_mm2: whole,
         facing: (if whole > 0.0 { facing / whole } else { facing }).to_array(),
     }
+}
+
+/// Weights of the points in an integral: Simpson's rule, for points of which each two intervals are as wide as each other; else the trapezoid rule.
+fn weights(places: &[f64]) -> Vec<f64> {
+    let mut weights = vec![0.0; places.len()];
+    let mut at = 0;
+    while at + 1 < places.len() {
+        let first = places[at + 1] - places[at];
+        let second = places.get(at + 2).map(|next| next - places[at + 1]);
+        if second.is_some_and(|second| (second - first).abs() <= 1e-9 * first) {
+            for (offset, share) in [1.0, 4.0, 1.0].into_iter().enumerate() {
+                weights[at + offset] += share * first / 3.0;
+            }
+            at += 2;
+        } else {
+            weights[at] += 0.5 * first;
+            weights[at + 1] += 0.5 * first;
+            at += 1;
+        }
+    }
+    weights
 }
 
 /// Largest distance between adjacent points.

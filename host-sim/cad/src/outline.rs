@@ -1,10 +1,13 @@
 //! The boundary of a face in the parameters of its surface: a rectangle, or a trimmed region with its bounding rectangle.
 
-use super::surface::Surface;
+use super::exact::joints;
+use super::surface::{Periodic, Surface};
 use super::{Boundary, Edge, Face};
 
 /// Tolerance of an edge on an iso-parametric line, mm. Edges in files are accurate to 1e-3 to 1e-7 mm.
 const FOLLOWS_MM: f64 = 1e-3;
+/// Tolerance of an end of the rectangle on a knot, mm: a patch that is narrower is rounding of the file.
+const KNOT_MM: f64 = 1e-4;
 /// A derivative shorter than this, times its range, is that of a degenerate boundary, mm.
 const POLE_MM: f64 = 1e-6;
 /// Largest difference between the area of a loop of iso-parametric lines and that of its bounding rectangle, as a share: an
@@ -18,6 +21,8 @@ pub struct Outline {
     pub rectangle: [[f64; 2]; 2],
     /// Reason why the face is trimmed; `None` if it is the whole rectangle.
     pub trimmed: Option<String>,
+    /// Whether the boundary is unknown, so that the rectangle is that of the whole surface.
+    pub unknown: bool,
 }
 
 /// A boundary loop in parameters.
@@ -57,7 +62,7 @@ impl Path {
 
 /// Length of the derivative by parameter k, mm per unit.
 fn speed(surface: &Surface, place: [f64; 2], k: usize) -> f64 {
-    let at = surface.at(place[0], place[1]);
+    let at = Periodic::new(surface).at(place[0], place[1]);
     if k == 0 { at.u } else { at.v }.length()
 }
 
@@ -150,12 +155,14 @@ pub fn outline(face: &Face) -> Result<Outline, String> {
             return Ok(Outline {
                 rectangle: natural()?,
                 trimmed: None,
+                unknown: false,
             });
         }
         Boundary::Unknown(why) => {
             return Ok(Outline {
                 rectangle: natural()?,
-                trimmed: Some(format!("its boundary cannot be read: {why}")),
+                trimmed: Some(format!("its boundary is unknown: {why}")),
+                unknown: true,
             });
         }
         Boundary::Loops(loops) => loops,
@@ -184,7 +191,11 @@ pub fn outline(face: &Face) -> Result<Outline, String> {
     if rectangle.iter().flatten().any(|x| !x.is_finite()) || rectangle.iter().any(|r| r[0] >= r[1]) {
         return Err("its boundary encloses no area".to_owned());
     }
-    Ok(Outline { rectangle, trimmed })
+    Ok(Outline {
+        rectangle,
+        trimmed,
+        unknown: false,
+    })
 }
 
 /// The rectangle around all loops.
@@ -334,6 +345,18 @@ fn settled(surface: &Surface, rectangle: [[f64; 2]; 2]) -> [[f64; 2]; 2] {
             if period.is_none() {
                 (low, high) = (low.max(range[0]), high.min(range[1]));
             }
+        }
+        let near = 0.1 * (high - low);
+        for end in [&mut low, &mut high] {
+            let slack = KNOT_MM / FOLLOWS_MM * slack;
+            let knots = joints(surface, k, [*end - near, *end + near]);
+            let nearest = knots
+                .iter()
+                .map(|(knot, _)| *knot)
+                .min_by(|a, b| (a - *end).abs().total_cmp(&(b - *end).abs()));
+            *end = nearest
+                .filter(|knot| (knot - *end).abs() <= slack)
+                .unwrap_or(*end);
         }
         [low, high]
     })

@@ -59,12 +59,13 @@ fn check(file: &str, path: &Path) -> Result<(), CadError> {
             "give the path of a STEP, IGES or 3DM file; samples are in jobs/cad/",
         )
     };
-    let metadata = std::fs::File::open(path)
-        .and_then(|file| file.metadata())
-        .map_err(|cause| unreadable(cause.to_string()))?;
+    let readable = |cause: std::io::Error| unreadable(cause.to_string());
+    let metadata = std::fs::metadata(path).map_err(readable)?;
+    // Before it is opened: a pipe without a writer would wait for one.
     if !metadata.is_file() {
         return Err(unreadable("it is not a regular file".to_owned()));
     }
+    std::fs::File::open(path).map_err(readable)?;
     if metadata.len() > BYTES_MAX {
         return Err(CadError::new(
             file,

@@ -269,6 +269,12 @@ impl Surface {
         }
     }
 
+    /// S and its derivatives, with parameters that may lie one period beyond the seam of a closed B-spline.
+    #[must_use]
+    pub fn at_periodic(&self, u: f64, v: f64) -> Derivatives {
+        Periodic::new(self).at(u, v)
+    }
+
     /// S and its derivatives.
     #[must_use]
     pub fn at(&self, u: f64, v: f64) -> Derivatives {
@@ -380,6 +386,40 @@ impl Surface {
             uv: quotient(after_v[1], before_v[1], step_v),
             vv: quotient(after_v[2], before_v[2], step_v),
         }
+    }
+}
+
+/// A surface whose parameters may lie beyond the seam of a closed B-spline, one period further: its polynomials end there.
+pub(super) struct Periodic<'s> {
+    surface: &'s Surface,
+    /// Domain of the parameters that are wrapped.
+    wrapped: [Option<[f64; 2]>; 2],
+}
+
+impl<'s> Periodic<'s> {
+    pub(super) fn new(surface: &'s Surface) -> Self {
+        let mut base = surface;
+        while let Surface::Offset { base: inner, .. } = base {
+            base = inner;
+        }
+        let wrapped = match base {
+            Surface::Spline(spline) => {
+                let (domain, periods) = (spline.domain(), closed(spline));
+                std::array::from_fn(|k| periods[k].map(|_| domain[k]))
+            }
+            _ => [None, None],
+        };
+        Self { surface, wrapped }
+    }
+
+    /// S and its derivatives.
+    pub(super) fn at(&self, u: f64, v: f64) -> Derivatives {
+        let inside = |t: f64, range: Option<[f64; 2]>| match range {
+            Some([start, end]) if t < start || t > end => start + (t - start).rem_euclid(end - start),
+            _ => t,
+        };
+        self.surface
+            .at(inside(u, self.wrapped[0]), inside(v, self.wrapped[1]))
     }
 }
 

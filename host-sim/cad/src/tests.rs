@@ -231,6 +231,8 @@ fn placements_move_points() {
 fn face(surface: Surface, loops: Vec<Vec<Edge>>, sense: f64) -> Face {
     Face {
         number: 1,
+        name: None,
+        colour: None,
         entity: "#1".to_owned(),
         surface,
         boundary: Boundary::Loops(loops),
@@ -421,6 +423,8 @@ fn concave_radii_are_measured() {
         let made = machinable(
             "",
             &Face {
+                name: None,
+                colour: None,
                 boundary: Boundary::Natural,
                 ..rectangular(&surface, rectangle)
             },
@@ -449,4 +453,122 @@ fn rectangular(surface: &Surface, rectangle: [[f64; 2]; 2]) -> Face {
     let part = exact(surface, rectangle).unwrap();
     assert!(part.at(rectangle[0][0], rectangle[1][0]).point.is_finite());
     face(Surface::Spline(part), Vec::new(), 1.0)
+}
+
+/// A closed tube of degree 5 about the z axis: periodic knots, uneven, of a period that is no round number.
+fn tube() -> SplineSurface {
+    let spans = [0.7, 1.1, 0.9, 1.3, 0.8, 1.0, 1.2, 0.6].map(|width| width * PI / 10.0);
+    let period: f64 = spans.iter().sum();
+    let knot = |index: i32| {
+        let turns = index.div_euclid(8);
+        let within = usize::try_from(index.rem_euclid(8)).unwrap();
+        f64::from(turns) * period + spans[..within].iter().sum::<f64>()
+    };
+    let knots: Vec<f64> = (-5..=13).map(knot).collect();
+    let pole = |i: usize, z: f64| {
+        let angle = TAU * (i % 8) as f64 / 8.0;
+        [
+            30.0 * angle.cos(),
+            22.0 * angle.sin(),
+            z + 3.0 * (2.0 * angle).sin(),
+            1.0,
+        ]
+    };
+    SplineSurface {
+        poles: (0..13).map(|i| vec![pole(i, 0.0), pole(i, 25.0)]).collect(),
+        axes: [
+            Axis { degree: 5, knots },
+            Axis {
+                degree: 1,
+                knots: vec![0.0, 0.0, 1.0, 1.0],
+            },
+        ],
+    }
+}
+
+/// Beyond the seam a closed B-spline goes on at its beginning; its last polynomial does not.
+#[test]
+fn a_fit_over_the_seam_follows_the_surface() {
+    let spline = tube();
+    let [[start, end], _] = spline.domain();
+    let period = end - start;
+    let surface = Surface::Spline(spline.clone());
+    assert_eq!(surface.periods()[0], Some(period), "closed");
+    let offset = Surface::Offset {
+        base: Box::new(surface.clone()),
+        distance: 2.0,
+    };
+    for (surface, widest) in [(&surface, 1.0), (&offset, 0.9)] {
+        for first in [0.6, 0.999, 1e-9] {
+            let range = [start + first * period, start + (first + widest) * period];
+            let (fitted, said) = super::fit::fit(surface, [range, [0.0, 1.0]], 1e-3).unwrap();
+            assert!(said.max_mm <= 1e-3, "{said:?}");
+            for k in 0..=400 {
+                let u = range[0] + (range[1] - range[0]) * f64::from(k) / 400.0;
+                let within = if u > end { u - period } else { u };
+                let gap = fitted.at(u, 0.3).point.distance(surface.at(within, 0.3).point);
+                assert!(gap <= 1.1e-3, "{gap} mm off at {u}, from {range:?}");
+            }
+        }
+    }
+}
+
+/// Ends of a range that differ from a knot by rounding make no joint.
+#[test]
+fn knots_at_the_ends_are_no_joints() {
+    let surface = Surface::Spline(tube());
+    let knots: Vec<f64> = super::exact::joints(&surface, 0, [-10.0, 10.0])
+        .iter()
+        .map(|(knot, _)| *knot)
+        .collect();
+    let next = |t: f64, ulps: i64| f64::from_bits(t.to_bits().wrapping_add_signed(ulps));
+    let inner: Vec<f64> = knots.into_iter().filter(|knot| *knot > 0.1).take(7).collect();
+    for pair in inner.windows(3) {
+        for (before, after) in [(0, 0), (-1, 1), (1, -1), (-3, 2), (5, -4)] {
+            let range = [next(pair[0], before), next(pair[2], after)];
+            let joints = super::exact::joints(&surface, 0, range);
+            assert_eq!(joints.len(), 1, "{range:?}: {joints:?}");
+            assert_eq!(joints[0].1, 4);
+            let (fitted, said) = super::fit::fit(&surface, [range, [0.0, 1.0]], 1e-3).unwrap();
+            assert!(
+                said.max_mm <= 1e-3 && fitted.patches() < 40,
+                "{} patches",
+                fitted.patches()
+            );
+        }
+    }
+}
+
+/// A face that ends on a knot, as the file's digits say, has no patch of a few nanometres there.
+#[test]
+fn an_outline_ends_on_the_knot() {
+    let surface = Surface::Spline(wavy(3, 3));
+    for (off, exact) in [(1e-9, true), (-2e-8, true), (1e-2, false)] {
+        let (u, v) = ([0.35 + off, 2.2], [0.0, 1.0 - off]);
+        let corners = [[u[0], v[0]], [u[1], v[0]], [u[1], v[1]], [u[0], v[1]]];
+        let outline = outline(&face(surface.clone(), vec![around(&surface, &corners)], 1.0)).unwrap();
+        assert_eq!(outline.trimmed, None);
+        assert_eq!(
+            outline.rectangle[0][0] == 0.35,
+            exact,
+            "{off}: {:?}",
+            outline.rectangle
+        );
+        assert_eq!(
+            outline.rectangle[1][1] == 1.0,
+            exact,
+            "{off}: {:?}",
+            outline.rectangle
+        );
+        let ends = outline
+            .rectangle
+            .iter()
+            .flatten()
+            .zip([u, v].iter().flatten().copied().collect::<Vec<_>>());
+        assert!(
+            ends.into_iter().all(|(a, b)| (a - b).abs() < 1e-7),
+            "{:?}",
+            outline.rectangle
+        );
+    }
 }

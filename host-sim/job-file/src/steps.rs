@@ -112,6 +112,19 @@ fn time(machine: &Section<'_>, key: &str, default_us: f64, most_us: f64) -> Resu
     ))
 }
 
+/// Length of a pulse, us: above 0, because a drive does not see a pulse of no length.
+fn pulse_time(machine: &Section<'_>, key: &str, most_us: f64) -> Result<f64, JobError> {
+    let value = time(machine, key, PULSE_DEFAULT_US, most_us)?;
+    if value > 0.0 {
+        return Ok(value);
+    }
+    Err(machine.error(
+        key,
+        format!("`{key}` must be above 0, at most {most_us} (at this period)"),
+        "give the least length of a pulse in the drive's manual, in microseconds, e.g. 2.5",
+    ))
+}
+
 /// Requirements of the drives; `None` where the job gives none.
 pub(super) fn read(machine: &Section<'_>, period_us: f64) -> Result<Option<StepOutput>, JobError> {
     debug_assert!(period_us >= PERIOD_RANGE_US[0]);
@@ -135,7 +148,7 @@ pub(super) fn read(machine: &Section<'_>, period_us: f64) -> Result<Option<StepO
     Ok(Some(StepOutput {
         steps_per_mm,
         direction_inverted: read_inverted(machine, inverted)?,
-        pulse_us: time(machine, pulse, PULSE_DEFAULT_US, pulse_max_us)?,
+        pulse_us: pulse_time(machine, pulse, pulse_max_us)?,
         direction_setup_us: time(machine, setup, SETUP_DEFAULT_US, setup_max_us)?,
     }))
 }
@@ -208,7 +221,10 @@ mod tests {
             given.pulse_us == 0.24 && given.direction_setup_us == 4.8,
             "{given:?}"
         );
-        assert!(config("pulse_us = 25").unwrap_err().contains("`pulse_us`"));
+        for wrong in ["25", "0", "0.0", "-0.0", "-1", "nan"] {
+            let said = config(&format!("pulse_us = {wrong}")).unwrap_err();
+            assert!(said.contains("`pulse_us`"), "{wrong}: {said}");
+        }
         assert!(read_from("pulse_us = 2").unwrap_err().contains("steps_per_mm"));
     }
 

@@ -2,6 +2,8 @@
 
 use std::f64::consts::TAU;
 
+use interp_core::STORE_WORDS;
+use interp_core::surface::POLYNOMIAL_WORDS;
 use job::{JobError, NurbsSpec, SurfaceSpec};
 
 use crate::file::FaceReader;
@@ -131,6 +133,7 @@ fn nurbs(section: &Section<'_>) -> Result<SurfaceSpec, JobError> {
     let columns = poles_mm.first().map_or(0, Vec::len);
     let knots_u = read_knots(section, "knots_u", degree[0], poles_mm.len())?;
     let knots_v = read_knots(section, "knots_v", degree[1], columns)?;
+    few_enough(section, degree, [&knots_u, &knots_v])?;
     let weight = poles_mm[0][0][3];
     let rational = poles_mm.iter().flatten().any(|pole| pole[3] != weight);
     if !rational {
@@ -143,6 +146,26 @@ fn nurbs(section: &Section<'_>) -> Result<SurfaceSpec, JobError> {
         poles_mm,
         rational,
     }))
+}
+
+/// The board's store holds the patches between the knots; a file has room for a hundred thousand, which would take minutes to place.
+fn few_enough(section: &Section<'_>, degree: [usize; 2], knots: [&[f64]; 2]) -> Result<(), JobError> {
+    let spans = |knots: &[f64], degree: usize| {
+        let inside = &knots[degree..knots.len() - degree];
+        inside.windows(2).filter(|pair| pair[0] < pair[1]).count()
+    };
+    let patches = spans(knots[0], degree[0]) * spans(knots[1], degree[1]);
+    if patches <= STORE_WORDS / POLYNOMIAL_WORDS {
+        return Ok(());
+    }
+    // The width of a span is a word, too.
+    let most = STORE_WORDS / (POLYNOMIAL_WORDS + 1);
+    let what = format!("the knots make {patches} patches; the board's store holds about {most}");
+    Err(section.error(
+        "poles_mm",
+        what,
+        "use fewer knots, or cut the part into several jobs",
+    ))
 }
 
 /// Degree in u (direction 0) or v (direction 1).

@@ -362,3 +362,31 @@ fn one_limit_brings_the_defaults_of_the_others() {
         assert!(job.machine.has_limits());
     }
 }
+
+/// More patches than the board stores are refused before anything is made of them.
+#[test]
+fn too_many_patches_are_refused_at_once() {
+    let job = |n: usize| {
+        let knots: Vec<String> = (0..=n + 1).map(|k| k.clamp(1, n).to_string()).collect();
+        let row = format!(
+            "[{}]",
+            (0..n)
+                .map(|j| format!("[0, {j}, 0]"))
+                .collect::<Vec<_>>()
+                .join(",")
+        );
+        let rows = vec![row; n].join(",");
+        let knots = knots.join(",");
+        format!(
+            "[surface]\nkind = \"nurbs\"\ndegree = [1, 1]\nknots_u = [{knots}]\nknots_v = [{knots}]\npoles_mm = [{rows}]\n\
+             [placement]\nplace = \"centre\"\n[tool]\nkind = \"ball\"\nradius_mm = 1\n[cut]\nfeed_mm_min = 600\n\
+             scallop_mm = 0.01\nalong = \"u\"\nside = \"+\"\n"
+        )
+    };
+    parse("x", &job(18)).unwrap();
+    let begun = std::time::Instant::now();
+    let error = parse("x", &job(400)).unwrap_err();
+    assert!(error.what().contains("make 159201 patches"), "{error}");
+    assert_eq!(error.line_and_column().unwrap().0, 6);
+    assert!(begun.elapsed().as_secs() < 20, "{:?}", begun.elapsed());
+}

@@ -3,7 +3,10 @@
 use std::io::ErrorKind;
 use std::path::Path;
 
-use job::JobError;
+use job::{JobError, read_regular};
+
+/// Largest job file, bytes: many times what the board's store takes; its poles are read in about a second.
+const BYTES_MAX: u64 = 4_000_000;
 
 /// Magic bytes of files often given instead of a job file: bytes, message, remedy.
 const MAGIC_BYTES: [(&[u8], &str, &str); 6] = [
@@ -43,7 +46,7 @@ const MAGIC_BYTES: [(&[u8], &str, &str); 6] = [
 pub(super) fn read(path: &Path) -> Result<String, JobError> {
     let name = path.display().to_string();
     let error = |what: String, remedy: &str| JobError::of_file(&name, what, remedy);
-    let bytes = std::fs::read(path).map_err(|cause| match cause.kind() {
+    let bytes = read_regular(path, BYTES_MAX).map_err(|cause| match cause.kind() {
         ErrorKind::NotFound => error(
             "there is no such file".to_owned(),
             "give the path of a job file; samples are in jobs/, and `cargo sim new` writes a first one",
@@ -51,6 +54,15 @@ pub(super) fn read(path: &Path) -> Result<String, JobError> {
         ErrorKind::IsADirectory => error(
             "is a folder, not a job file".to_owned(),
             "give the path of a job file (.toml) in it",
+        ),
+        ErrorKind::InvalidInput => error(
+            "is a device or a pipe, not a job file".to_owned(),
+            "write the job into a file first",
+        ),
+        ErrorKind::FileTooLarge => error(
+            format!("is larger than {} MB, the most that a job file may have", BYTES_MAX / 1_000_000),
+            "the board's store holds some hundred patches: approximate the surface with fewer poles (`cargo sim import` does so with a \
+             larger --tolerance), or cut it into several jobs",
         ),
         _ => error(
             format!("cannot read the job file: {cause}"),
@@ -125,6 +137,49 @@ mod tests {
             said.starts_with(&format!("Some(({line}, 11)) `pattern` cannot be")),
             "{said}"
         );
+    }
+
+    #[test]
+    fn what_has_no_end_is_not_read() {
+        let said = |path: &std::path::Path| crate::load(path).unwrap_err().what().to_owned();
+        for device in ["/dev/zero", "/dev/null"] {
+            assert_eq!(said(device.as_ref()), "is a device or a pipe, not a job file");
+        }
+        let folder = tempfile::tempdir().unwrap();
+        let pipe = folder.path().join("pipe");
+        assert!(
+            std::process::Command::new("mkfifo")
+                .arg(&pipe)
+                .status()
+                .unwrap()
+                .success()
+        );
+        assert_eq!(said(&pipe), "is a device or a pipe, not a job file");
+        let large = format!("{TORUS}\n# {}", "x".repeat(4_000_000));
+        let refused = loaded(large.as_bytes()).unwrap_err();
+        assert!(refused.contains("is larger than 4 MB"), "{refused}");
+        let full = format!("{TORUS}\n# {}", "x".repeat(4_000_000 - TORUS.len() - 3));
+        assert!(loaded(full.as_bytes()).is_ok());
+    }
+
+    /// A terminal would obey the line that the message shows.
+    #[test]
+    fn control_characters_of_a_job_are_not_in_its_messages() {
+        let hostile = TORUS.replace("pattern = ", "\"pat\u{9b}31m\u{7f}\" = ");
+        for text in [
+            hostile,
+            TORUS.replace("kind = \"", "kind = \"\u{1b}[2J"),
+            format!("x\u{1b}]0;t\u{7} = 1\n{TORUS}"),
+        ] {
+            let error = crate::parse("job\u{1b}[1m.toml", &text).unwrap_err();
+            let report = miette::Report::new(error);
+            let mut shown = String::new();
+            miette::NarratableReportHandler::new()
+                .render_report(&mut shown, report.as_ref())
+                .unwrap();
+            let said = format!("{shown}{report}");
+            assert!(!said.chars().any(|c| c.is_control() && c != '\n'), "{said:?}");
+        }
     }
 
     #[test]

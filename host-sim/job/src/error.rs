@@ -3,6 +3,7 @@
 use std::fmt;
 use std::ops::Range;
 
+use crate::text::{masked, one_line, printable};
 use miette::{Diagnostic, LabeledSpan, NamedSource, SourceCode};
 
 /// A fault in a job file. As a [`miette::Diagnostic`] it shows the line with a caret; as text it reads
@@ -34,11 +35,12 @@ impl JobError {
         let before = text.get(..span.start).unwrap_or(text);
         let line = before.matches('\n').count() + 1;
         let column = before.rsplit('\n').next().map_or(0, |last| last.chars().count()) + 1;
-        let source = NamedSource::new(name, text.to_owned());
+        // The line is shown, so that a terminal obeys nothing in it.
+        let source = NamedSource::new(one_line(name), masked(text));
         Self(Box::new(Inner {
-            what,
-            remedy,
-            name: name.to_owned(),
+            what: printable(&what).into_owned(),
+            remedy: printable(&remedy).into_owned(),
+            name: one_line(name),
             place: Some(Location {
                 source,
                 span,
@@ -56,9 +58,9 @@ impl JobError {
     /// An error of the file as a whole.
     pub(super) fn whole(name: &str, what: String, remedy: String) -> Self {
         Self(Box::new(Inner {
-            what,
-            remedy,
-            name: name.to_owned(),
+            what: printable(&what).into_owned(),
+            remedy: printable(&remedy).into_owned(),
+            name: one_line(name),
             place: None,
         }))
     }

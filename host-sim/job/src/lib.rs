@@ -7,6 +7,7 @@ mod error;
 mod machine;
 mod origin;
 mod surface;
+mod text;
 
 pub use error::JobError;
 pub use machine::{
@@ -15,6 +16,7 @@ pub use machine::{
 };
 pub use origin::{AlongChoice, DirectionTrial, Origin};
 pub use surface::{NurbsSpec, SurfaceSpec};
+pub use text::{one_line, printable, read_regular};
 
 /// Largest ball radius, mm: the core's limit, ten times the radius of any ball-end mill.
 pub const RADIUS_MAX_MM: f64 = 1000.0;

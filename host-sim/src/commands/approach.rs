@@ -1,9 +1,8 @@
 //! `simulate --approach`: the paper's other approaches on a job.
 
-use std::path::{Path, PathBuf};
-
 use super::outcome::Outcome;
-use super::{Result, cannot_write, progress, spinner, trace, unheld_limits};
+use super::simulate::WantedReport;
+use super::{Result, WantedTrace, begun, completed, progress, spinner, unheld_limits};
 use approach::{Kind, measure};
 use job::Job;
 use report::{Remarks, Sketch};
@@ -11,8 +10,8 @@ use report::{Remarks, Sketch};
 pub(super) fn command(
     kind: Kind,
     job: &Job,
-    trace_file: Option<&PathBuf>,
-    directory: Option<&Path>,
+    wanted: Option<WantedTrace<'_>>,
+    directory: Option<WantedReport<'_>>,
     as_json: bool,
 ) -> Result<()> {
     let bar = spinner("computing the passes");
@@ -21,7 +20,7 @@ pub(super) fn command(
         .map_err(approach::ApproachError::from)?;
     bar.finish_and_clear();
     let mut sketch = directory.map(|_| Sketch::new(job, passes.len()).by(kind));
-    let mut trace = trace(trace_file, job)?;
+    let (mut trace, whole) = begun(wanted, job)?;
     let mut written = Ok(());
     let bar = progress(passes.len() as u64, "following");
     let start = std::time::Instant::now();
@@ -40,10 +39,7 @@ pub(super) fn command(
     bar.finish_and_clear();
     #[allow(clippy::cast_precision_loss, reason = "below 2^53")]
     let samples_per_second = measured.findings.samples as f64 / start.elapsed().as_secs_f64().max(1e-9);
-    let name = trace_file.cloned().unwrap_or_default();
-    written
-        .and_then(|()| trace.map_or(Ok(()), verify::trace::Trace::finish))
-        .map_err(|error| cannot_write(&name, &error))?;
+    completed(written, trace, whole, wanted)?;
     let remarks = Remarks {
         warnings: unheld_limits(job).into_iter().collect(),
         ..Remarks::default()

@@ -7,7 +7,7 @@ use clap::{Args, ValueEnum};
 use serde_json::json;
 
 use super::out::say;
-use super::{Failure, Result, along, cannot_write, load, progress, spinner};
+use super::{Failure, Result, along, load, progress, spinner, whole};
 use approach::export::{Dialect, ExportError, Options, export};
 use approach::gcode::FeedMode;
 use approach::{Kind, passes};
@@ -27,6 +27,9 @@ pub(super) struct Arguments {
     /// Writes the program into this file.
     #[arg(short, long, value_name = "FILE")]
     output: PathBuf,
+    /// Overwrites an existing file.
+    #[arg(long)]
+    force: bool,
     /// Approximation of the tool path; `curve` is written as arcs.
     #[arg(long, value_parser = written(), default_value = "linear")]
     approach: Kind,
@@ -85,6 +88,7 @@ pub(super) fn command(arguments: &Arguments) -> Result<()> {
         .spindle
         .map_or(Ok(()), |rpm| positive(rpm, "--spindle"))?;
     let (job, _) = load(&arguments.job)?;
+    whole::check(&arguments.output, arguments.force)?;
     let options = Options {
         dialect: arguments.format,
         kind: arguments.approach,
@@ -99,8 +103,7 @@ pub(super) fn command(arguments: &Arguments) -> Result<()> {
     let bar = progress(count as u64, "planning");
     let exported = export(&job, &options, &|| bar.inc(1))?;
     bar.finish_and_clear();
-    std::fs::write(&arguments.output, &exported.text)
-        .map_err(|error| cannot_write(&arguments.output, &error))?;
+    whole::write(&arguments.output, exported.text.as_bytes(), arguments.force)?;
     let (bytes, blocks) = (exported.text.len(), exported.text.lines().count());
     if arguments.json {
         let mut value = json!({

@@ -2,7 +2,7 @@
 
 use protocol::message::Reason;
 
-use super::{Result, settled};
+use super::{Result, read_job, settled};
 use job::Job;
 use machine::prepare::Prepared;
 use machine::remote::RemoteError;
@@ -46,7 +46,7 @@ pub(super) fn position(text: &str) -> std::result::Result<PositionNm, String> {
 
 /// Loads a job; if it has no `home_mm`, `home` becomes its home.
 pub(super) fn load(path: &std::path::Path, stands: Option<PositionNm>) -> Result<(Job, Prepared)> {
-    let mut job = job_file::load_with(path, &cad::Faces)?;
+    let mut job = read_job(path)?;
     if let Some(stands) = stands {
         job.machine.home_mm.get_or_insert(stands.mm());
     }

@@ -1,20 +1,22 @@
 //! `import`: converts a face of a CAD file to a job.
 
+mod condition;
+mod list;
+mod page;
+
 use super::out::{complain, say};
-use std::num::NonZeroUsize;
 use std::path::{Path, PathBuf};
-use std::sync::Mutex;
-use std::sync::atomic::{AtomicUsize, Ordering};
 
 use clap::Args;
 use serde_json::{Value, json};
 
-use super::{Failure, Result, cannot_write, progress};
+use super::{Failure, Result, whole};
 use cad::{
-    CadError, Face, Form, JobOptions, JobText, MachinableFace, Measures, Model, Options, degrees, machinable,
-    measure, read, write_job,
+    CadError, Face, Form, JobOptions, JobText, MachinableFace, Model, Options, machinable, read, write_job,
 };
+use condition::Condition;
 use job_file::TOLERANCE_DEFAULT_MM;
+use list::Key;
 
 /// Converts a face of a STEP, IGES or 3DM file to a job, or lists the faces.
 ///
@@ -22,6 +24,8 @@ use job_file::TOLERANCE_DEFAULT_MM;
 /// Others are approximated within the tolerance, and the deviation is measured.
 ///
 /// Example: cargo sim import jobs/cad/blade.step --list
+/// Example: cargo sim import jobs/cad/blade.step --list --only up --only whole --sort area --reverse
+/// Example: cargo sim import jobs/cad/blade.step --list --page faces.html
 /// Example: cargo sim import jobs/cad/blade.step --face 2 -o blade.toml --radius-mm 4
 #[derive(Debug, Args)]
 #[command(verbatim_doc_comment)]
@@ -31,13 +35,26 @@ pub(super) struct Arguments {
     /// Lists the faces; writes nothing.
     #[arg(long, conflicts_with_all = ["face", "output"])]
     list: bool,
+    /// With --list: only faces that meet this; repeatable. `up` (the machined side faces up), `whole` (not trimmed), `kind=WORD`, `name=WORD`,
+    /// `colour=#RRGGBB`, `area>MM2`, `area<MM2`.
+    #[arg(long, value_name = "CONDITION", requires = "list")]
+    only: Vec<Condition>,
+    /// With --list: order of the faces.
+    #[arg(long, value_enum, requires = "list", default_value = "face")]
+    sort: Key,
+    /// With --list: the other way round.
+    #[arg(long, requires = "list")]
+    reverse: bool,
+    /// With --list: writes a page with the picture of the part, on which faces are chosen, into this file.
+    #[arg(long, value_name = "FILE.html", requires = "list")]
+    page: Option<PathBuf>,
     /// Number of the face in the list; optional if the file has one face.
     #[arg(long, value_name = "N")]
     face: Option<usize>,
     /// Writes the job into this file.
     #[arg(short, long, value_name = "JOB")]
     output: Option<PathBuf>,
-    /// Overwrites an existing job file.
+    /// Overwrites an existing job file or page.
     #[arg(long)]
     force: bool,
     /// Largest deviation of an approximation from the surface, mm.
@@ -75,85 +92,6 @@ impl From<CadError> for Failure {
     }
 }
 
-/// A line of the list.
-struct Row<'f> {
-    face: &'f Face,
-    trimmed: Option<String>,
-    becomes: std::result::Result<(MachinableFace, Measures), CadError>,
-}
-
-/// Measures all faces on all cores; rows in the order of the faces.
-fn rows<'f>(file: &str, faces: &'f [Face], options: &Options) -> Vec<Row<'f>> {
-    let bar = progress(faces.len() as u64, "measuring");
-    let next = AtomicUsize::new(0);
-    let done = Mutex::new(Vec::with_capacity(faces.len()));
-    // A trimmed face is listed with the size of its untrimmed rectangle.
-    let options = Options {
-        untrimmed: true,
-        ..*options
-    };
-    let threads = std::thread::available_parallelism().map_or(1, NonZeroUsize::get);
-    std::thread::scope(|scope| {
-        for _ in 0..threads.min(faces.len()) {
-            scope.spawn(|| {
-                while let Some(face) = faces.get(next.fetch_add(1, Ordering::Relaxed)) {
-                    let becomes = machinable(file, face, &options).map(|made| {
-                        let measures = measure(&made.spec());
-                        (made, measures)
-                    });
-                    let trimmed = becomes
-                        .as_ref()
-                        .ok()
-                        .and_then(|(made, _)| made.outline.trimmed.clone());
-                    bar.inc(1);
-                    if let Ok(mut done) = done.lock() {
-                        done.push(Row {
-                            face,
-                            trimmed,
-                            becomes,
-                        });
-                    }
-                }
-            });
-        }
-    });
-    bar.finish_and_clear();
-    let mut rows = done.into_inner().unwrap_or_default();
-    rows.sort_by_key(|row| row.face.number);
-    rows
-}
-
-fn row_json(row: &Row<'_>) -> Value {
-    let face = row.face;
-    let mut value = json!({
-        "face": face.number,
-        "entity": face.entity,
-        "kind": face.surface.kind(),
-        "degree": degrees(&face.surface),
-        "solid": face.solid,
-        "trimmed": row.trimmed.is_some(),
-        "trimmed_why": row.trimmed,
-    });
-    let more = match &row.becomes {
-        Ok((made, measures)) => json!({
-            "poles": [made.nurbs.poles_mm.len(), made.nurbs.poles_mm[0].len()],
-            "patches": made.patches,
-            "rational": made.nurbs.rational,
-            "size_mm": measures.size_mm(),
-            "corners_mm": measures.corners_mm,
-            "least_concave_radius_mm": { "plus": measures.concave_mm[0], "minus": measures.concave_mm[1] },
-            "becomes": if made.form == Form::Exact { "exact" } else { "approximated" },
-            "deviation": deviation_json(&made.form),
-            "error": Value::Null,
-        }),
-        Err(error) => json!({ "becomes": Value::Null, "error": error.what }),
-    };
-    if let (Value::Object(value), Value::Object(more)) = (&mut value, more) {
-        value.extend(more);
-    }
-    value
-}
-
 fn deviation_json(form: &Form) -> Value {
     match form {
         Form::Exact => Value::Null,
@@ -164,64 +102,6 @@ fn deviation_json(form: &Form) -> Value {
             "places": deviation.places,
         }),
     }
-}
-
-fn print_rows(rows: &[Row<'_>]) {
-    say!(
-        "{:>5} {:<18} {:<6} {:>8} {:>26} {:>11} {:>11} {:<8} becomes",
-        "face",
-        "kind",
-        "degree",
-        "patches",
-        "size mm",
-        "concave +",
-        "concave -",
-        "trimmed"
-    );
-    for row in rows {
-        let face = row.face;
-        let degree = degrees(&face.surface).map_or("-".to_owned(), |[p, q]| format!("{p} x {q}"));
-        let (kind, number) = (face.surface.kind(), face.number);
-        let trimmed = if row.trimmed.is_some() { "yes" } else { "no" };
-        match &row.becomes {
-            Ok((made, measures)) => {
-                let [x, y, z] = measures.size_mm();
-                let size = format!("{x:.2} x {y:.2} x {z:.2}");
-                let [plus, minus] = measures
-                    .concave_mm
-                    .map(|radius| radius.map_or("-".to_owned(), |radius| format!("{radius:.3}")));
-                let becomes = match &made.form {
-                    Form::Exact => "exact".to_owned(),
-                    Form::Fitted { deviation, .. } => {
-                        format!("approximated, within {:.1e} mm", deviation.max_mm)
-                    }
-                };
-                let patches = made.patches;
-                say!(
-                    "{number:>5} {kind:<18} {degree:<6} {patches:>8} {size:>26} {plus:>11} {minus:>11} {trimmed:<8} {becomes}"
-                );
-            }
-            Err(error) => say!("{number:>5} {kind:<18} {degree:<6} {:>8} {}", "-", error.what),
-        }
-    }
-}
-
-fn list(arguments: &Arguments, file: &str, model: &Model, options: &Options) {
-    let rows = rows(file, &model.faces, options);
-    if arguments.json {
-        let value = json!({
-            "file": file,
-            "faces": rows.iter().map(row_json).collect::<Vec<_>>(),
-            "warnings": model.warnings,
-        });
-        say!("{value}");
-        return;
-    }
-    print_rows(&rows);
-    say!(
-        "concave: least concave radius, mm, seen from the side of + or - S_u x S_v. Size and radii of a trimmed face are those \
-         of the rectangle around it."
-    );
 }
 
 /// The face of this number; without a number, the only one.
@@ -249,16 +129,6 @@ pub(crate) fn chosen<'m>(
                 )
             }),
     }
-}
-
-fn write(path: &Path, text: &str, force: bool) -> Result<()> {
-    if path.exists() && !force {
-        return Err(Failure::input(
-            format!("{} exists already", path.display()),
-            "name another file, or overwrite it with --force",
-        ));
-    }
-    std::fs::write(path, text).map_err(|error| cannot_write(path, &error))
 }
 
 fn report(arguments: &Arguments, path: &Path, face: &Face, made: &MachinableFace, written: &JobText) {
@@ -324,13 +194,16 @@ pub(super) fn command(arguments: &Arguments) -> Result<()> {
             "show the faces with --list, or write a job with -o JOB.toml",
         ));
     }
+    whole::note_input(&arguments.file);
+    for path in arguments.output.iter().chain(&arguments.page) {
+        whole::check(path, arguments.force)?;
+    }
     let model = read(&arguments.file)?;
     for warning in &model.warnings {
         complain!("warning: {warning}");
     }
     let Some(path) = arguments.output.as_ref().filter(|_| !arguments.list) else {
-        list(arguments, &file, &model, &options);
-        return Ok(());
+        return list::list(arguments, &file, &model, &options);
     };
     let face = chosen(&file, &model, arguments.face)?;
     let made = machinable(&file, face, &options)?;
@@ -346,10 +219,10 @@ pub(super) fn command(arguments: &Arguments) -> Result<()> {
             side: arguments.side.clone(),
             pattern: arguments.pattern.clone(),
         },
-    );
+    )?;
     // The job is parsed before it is written, so that the options are checked by the rules of the job file.
     job_file::parse_with(&path.display().to_string(), &written.text, &cad::Faces)?;
-    write(path, &written.text, arguments.force)?;
+    whole::write(path, written.text.as_bytes(), arguments.force)?;
     report(arguments, path, face, &made, &written);
     Ok(())
 }

@@ -25,6 +25,7 @@ mod simulate;
 mod swept_words;
 mod typed;
 mod verify;
+mod whole;
 
 use out::complain;
 use programs::with_command_name;
@@ -35,6 +36,7 @@ use std::process::ExitCode;
 
 use clap::builder::{Resettable, StyledStr};
 use clap::{CommandFactory, FromArgMatches, Parser, Subcommand};
+use whole::Whole;
 
 use ::approach::ApproachError;
 use inspect::InspectError;
@@ -89,7 +91,12 @@ impl From<ApproachError> for Failure {
 impl Failure {
     /// Bad input that has no line in a job file.
     fn input(what: impl Into<String>, remedy: impl Into<String>) -> Self {
-        Self::Input(miette::miette!(help = remedy.into(), "{}", what.into()))
+        let (what, remedy) = (what.into(), remedy.into());
+        Self::Input(miette::miette!(
+            help = job::printable(&remedy).into_owned(),
+            "{}",
+            job::printable(&what)
+        ))
     }
 }
 
@@ -219,9 +226,25 @@ pub fn main() -> ExitCode {
     }
 }
 
+/// The faces of CAD files, noted as inputs.
+struct Faces;
+
+impl job_file::FaceReader for Faces {
+    fn surface(&self, face: &job_file::Face) -> std::result::Result<job::SurfaceSpec, job_file::FaceError> {
+        whole::note_input(&face.path);
+        cad::Faces.surface(face)
+    }
+}
+
+/// Reads a job file, and notes it as an input.
+fn read_job(path: &Path) -> Result<Job> {
+    whole::note_input(path);
+    Ok(job_file::load_with(path, &Faces)?)
+}
+
 /// Reads a job, chooses its direction if `along = "auto"`, and prepares it.
 fn load(path: &Path) -> Result<(Job, Prepared)> {
-    settled(job_file::load_with(path, &cad::Faces)?)
+    settled(read_job(path)?)
 }
 
 /// Chooses the direction of a job if `along = "auto"`, and prepares it.
@@ -262,13 +285,48 @@ fn warn_of_limits(job: &Job) {
     }
 }
 
-/// Opens the trace file, if a path is given.
-fn trace(path: Option<&PathBuf>, job: &Job) -> Result<Option<::verify::trace::Trace>> {
-    path.map(|path| {
-        ::verify::trace::Trace::create(path, job.machine.period_us)
-            .map_err(|error| cannot_write(path, &error))
-    })
-    .transpose()
+/// A trace that a command was asked for.
+#[derive(Clone, Copy)]
+struct WantedTrace<'a> {
+    path: &'a Path,
+    /// Overwrites an existing file.
+    force: bool,
+}
+
+impl<'a> WantedTrace<'a> {
+    fn new(path: Option<&'a PathBuf>, force: bool) -> Option<Self> {
+        path.map(|path| Self { path, force })
+    }
+
+    /// Begins the file.
+    fn begin(self, job: &Job) -> Result<(::verify::trace::Trace, Whole)> {
+        let whole = Whole::begin(self.path, self.force)?;
+        let trace = ::verify::trace::Trace::new(whole.file()?, job.machine.period_us)
+            .map_err(|error| cannot_write(self.path, &error))?;
+        Ok((trace, whole))
+    }
+}
+
+/// Begins the trace, if one is wanted.
+fn begun(
+    wanted: Option<WantedTrace<'_>>,
+    job: &Job,
+) -> Result<(Option<::verify::trace::Trace>, Option<Whole>)> {
+    Ok(wanted.map(|wanted| wanted.begin(job)).transpose()?.unzip())
+}
+
+/// Gives a trace its name, after its last row: `written` is what came of writing it.
+fn completed(
+    written: std::io::Result<()>,
+    trace: Option<::verify::trace::Trace>,
+    whole: Option<Whole>,
+    wanted: Option<WantedTrace<'_>>,
+) -> Result<()> {
+    let path = wanted.map_or(Path::new(""), |wanted| wanted.path);
+    written
+        .and_then(|()| trace.map_or(Ok(()), ::verify::trace::Trace::finish))
+        .map_err(|error| cannot_write(path, &error))?;
+    whole.map_or(Ok(()), Whole::finish)
 }
 
 fn cannot_write(path: &Path, error: &std::io::Error) -> Failure {

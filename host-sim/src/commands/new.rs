@@ -1,14 +1,12 @@
 //! `new`: writes a commented template of a job file.
 
-use std::fs::OpenOptions;
-use std::io::{ErrorKind, Write};
 use std::path::PathBuf;
 
 use clap::Args;
 use serde_json::json;
 
 use super::out::say;
-use super::{Failure, Result, cannot_write};
+use super::{Result, whole};
 use crate::template::{self, Kind};
 
 /// Writes a commented job file that runs at once, with every key, its unit, range and default.
@@ -35,24 +33,11 @@ pub(super) struct Arguments {
 pub(super) fn command(arguments: &Arguments) -> Result<()> {
     let path = &arguments.output;
     let text = template::job(arguments.kind, &path.display().to_string());
-    let mut options = OpenOptions::new();
-    options.write(true);
-    if arguments.force {
-        options.create(true).truncate(true);
-    } else {
-        options.create_new(true);
-    }
-    let written = options
-        .open(path)
-        .and_then(|mut file| file.write_all(programs::with_command_name(&text).as_bytes()));
-    written.map_err(|error| match error.kind() {
-        ErrorKind::AlreadyExists if !path.is_dir() => Failure::input(
-            format!("{} exists already", path.display()),
-            "give another file with -o, or overwrite it with --force",
-        ),
-        ErrorKind::AlreadyExists => cannot_write(path, &ErrorKind::IsADirectory.into()),
-        _ => cannot_write(path, &error),
-    })?;
+    whole::write(
+        path,
+        programs::with_command_name(&text).as_bytes(),
+        arguments.force,
+    )?;
     if arguments.json {
         say!("{}", json!({ "job": path }));
         return Ok(());

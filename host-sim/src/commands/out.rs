@@ -7,6 +7,7 @@ use std::fmt::Arguments;
 use std::io::{self, ErrorKind, Write, stderr, stdout};
 use std::sync::{Mutex, PoisonError};
 
+use job::printable;
 use programs::with_command_name;
 
 /// What came of writing to standard output.
@@ -32,14 +33,40 @@ fn attempt(write: impl FnOnce() -> io::Result<()>) {
     }
 }
 
-/// Prints to standard output.
+/// The text as a terminal may have it: printable, with the colours of messages.
+fn coloured(text: &str) -> String {
+    let mut out = String::with_capacity(text.len());
+    for (index, part) in text.split('\u{1b}').enumerate() {
+        let colour = part.strip_prefix('[').and_then(|rest| {
+            let numbers = rest.trim_start_matches(|c: char| c.is_ascii_digit() || c == ';');
+            let rest = numbers.strip_prefix('m')?;
+            Some((&part[..part.len() - rest.len()], rest))
+        });
+        match (index, colour) {
+            (0, _) => out.push_str(&printable(part)),
+            (_, Some((code, rest))) => {
+                out.push('\u{1b}');
+                out.push_str(code);
+                out.push_str(&printable(rest));
+            }
+            _ => {
+                out.push_str("\\u001b");
+                out.push_str(&printable(part));
+            }
+        }
+    }
+    out
+}
+
+/// Prints to standard output, with escapes for control characters, as JSON has them.
 pub(super) fn to_stdout(text: Arguments<'_>) {
-    attempt(|| stdout().write_all(with_command_name(&text.to_string()).as_bytes()));
+    let text = text.to_string();
+    attempt(|| stdout().write_all(with_command_name(&printable(&text)).as_bytes()));
 }
 
 /// Prints a line to standard error; a write error is ignored.
 pub(super) fn to_stderr(text: Arguments<'_>) {
-    let _ = writeln!(stderr(), "{}", with_command_name(&text.to_string()));
+    let _ = writeln!(stderr(), "{}", with_command_name(&coloured(&text.to_string())));
 }
 
 /// Flushes the output. Returns the first write error, except for a pipe that the reader closed.
@@ -71,3 +98,18 @@ macro_rules! complain {
 }
 
 pub(super) use {complain, say, say_part};
+
+#[cfg(test)]
+mod tests {
+    use super::coloured;
+
+    #[test]
+    fn only_colours_pass() {
+        let message = "\u{1b}[31merror\u{1b}[0m: \u{1b}[38;5;2mx";
+        assert_eq!(coloured(message), message);
+        assert_eq!(
+            coloured("a\u{1b}[2Jb\u{1b}]0;t\u{7}c\u{9b}1m\r\n\u{1b}"),
+            "a\\u001b[2Jb\\u001b]0;t\\u0007c\\u009b1m\\u000d\n\\u001b"
+        );
+    }
+}

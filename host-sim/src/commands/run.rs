@@ -12,9 +12,9 @@ use super::flash::{board_of, board_parser};
 use super::home::{self, PositionNm};
 use super::out::{say, to_stderr};
 use super::outcome::Outcome;
-use super::simulate::{remarks, report, surveyed, timed};
+use super::simulate::{WantedReport, remarks, report, surveyed, timed};
 use super::typed::{Console, WORDS};
-use super::{Failure, Result, cannot_write, progress, scripted, spinner, trace};
+use super::{Failure, Result, WantedTrace, begun, completed, progress, scripted, spinner, whole};
 use approach::Kind;
 use inspect::comparison::{self, BoardRun, ComparisonError, Reference};
 use job::{HeartbeatAction, Job};
@@ -52,6 +52,9 @@ pub(super) struct Arguments {
     /// Writes a report page into this folder: 3D view, charts, figures.
     #[arg(long, value_name = "DIR")]
     report: Option<PathBuf>,
+    /// Overwrites existing files of --trace and --report.
+    #[arg(long)]
+    force: bool,
     /// Position of the axes, mm: declared as home before the run, and the home of a job without `home_mm`. Default in QEMU and on
     /// models of a chip, which have no axes: the job's home.
     #[arg(long, value_name = "X,Y,Z", value_parser = home::position, allow_hyphen_values = true)]
@@ -286,7 +289,8 @@ fn console(arguments: &Arguments, bar: &ProgressBar) -> Option<Console> {
 
 /// Runs with every sample on the line, writes the trace, and compares each sample.
 fn by_sample(arguments: &Arguments, reference: &Reference<'_>, session: &mut Session) -> Result<BoardRun> {
-    let mut file = trace(arguments.trace.as_ref(), reference.job)?;
+    let wanted = WantedTrace::new(arguments.trace.as_ref(), arguments.force);
+    let (mut file, whole) = begun(wanted, reference.job)?;
     let mut written = Ok(());
     let bar = progress(reference.run.samples, "running");
     let mut console = console(arguments, &bar);
@@ -301,16 +305,21 @@ fn by_sample(arguments: &Arguments, reference: &Reference<'_>, session: &mut Ses
     });
     bar.finish_and_clear();
     let run = run?;
-    let name = arguments.trace.clone().unwrap_or_default();
-    written
-        .and_then(|()| file.map_or(Ok(()), verify::trace::Trace::finish))
-        .map_err(|error| cannot_write(&name, &error))?;
+    completed(written, file, whole, wanted)?;
     Ok(run)
 }
 
 pub(super) fn command(arguments: &Arguments) -> Result<()> {
     let (job, prepared) = home::load(&arguments.job, arguments.home)?;
     travel::check(&job)?;
+    arguments
+        .script
+        .iter()
+        .for_each(|script| whole::note_input(script));
+    if let Some(path) = &arguments.trace {
+        whole::check(path, arguments.force)?;
+    }
+    let directory = WantedReport::new(arguments.report.as_ref(), arguments.force)?;
     if arguments.fast && job.machine.heartbeat_action == HeartbeatAction::Hold {
         return Err(Failure::input(
             "the emulated chip's time runs faster than this computer can send heartbeats, and the job has host_gone = \"hold\"",
@@ -352,7 +361,6 @@ pub(super) fn command(arguments: &Arguments) -> Result<()> {
     } else {
         by_digest(arguments, &reference, &mut session)?
     };
-    let directory = arguments.report.as_deref();
     let (findings, sketch) = surveyed(&job, &prepared, &here, None, directory.is_some())?;
     let failure = run.failure(&here, &job);
     let mut remarks = remarks(&here, &findings);

@@ -1,12 +1,12 @@
 //! `simulate` and `run` with a script of operator commands.
 
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 use protocol::message::Status;
 use serde_json::{Map, Value, json};
 
 use super::out::say;
-use super::{Failure, Result, cannot_write, trace};
+use super::{Failure, Result, WantedTrace, begun, completed};
 use job::Job;
 use machine::Machine;
 use machine::prepare::Prepared;
@@ -43,10 +43,10 @@ pub(super) fn play(
     job: &Job,
     prepared: &Prepared,
     path: &Path,
-    trace_file: Option<&PathBuf>,
+    wanted: Option<WantedTrace<'_>>,
 ) -> Result<Scripted> {
     let script = read(path, prepared)?;
-    let mut file = trace(trace_file, job)?;
+    let (mut file, whole) = begun(wanted, job)?;
     let mut written = Ok(());
     let mut machine = Machine::load(prepared).map_err(|fault| inspect::load_error(job, fault))?;
     let has_limits = job.machine.has_limits();
@@ -70,10 +70,7 @@ pub(super) fn play(
         |period| ends.push(period),
     );
     gauge.end_at_rest();
-    let name = trace_file.cloned().unwrap_or_default();
-    written
-        .and_then(|()| file.map_or(Ok(()), verify::trace::Trace::finish))
-        .map_err(|error| cannot_write(&name, &error))?;
+    completed(written, file, whole, wanted)?;
     Ok(Scripted {
         script,
         schedule: Schedule::of(&played, ends),

@@ -13,7 +13,10 @@ use report::{Remarks, Sketch};
 use verify::survey::{SampleObserver, SurveyResult};
 
 use super::outcome::Outcome;
-use super::{Bar, Failure, Result, approach, cannot_write, load, scripted, trace, warn_of_limits};
+use super::{
+    Bar, Failure, Result, WantedTrace, approach, begun, cannot_write, completed, load, scripted,
+    warn_of_limits, whole,
+};
 
 /// Runs a job on this computer with the core of the firmware, bit-identical to the board, or with another approach of the paper.
 ///
@@ -31,6 +34,9 @@ pub(super) struct Arguments {
     /// Writes a report page into this folder: 3D view, charts, figures.
     #[arg(long, value_name = "DIR")]
     report: Option<PathBuf>,
+    /// Overwrites existing files of --trace and --report.
+    #[arg(long)]
+    force: bool,
     /// Applies the operator commands in this file: lines `tick N: hold`, or resume, stop, abort, start, override P.
     #[arg(long, value_name = "FILE", conflicts_with_all = ["report", "approach"])]
     script: Option<PathBuf>,
@@ -41,6 +47,9 @@ pub(super) struct Arguments {
     #[arg(long, value_enum, default_value = "surface")]
     approach: Kind,
 }
+
+/// The files of a report, the page first.
+const REPORT_FILES: [&str; 2] = ["index.html", "path.svg"];
 
 /// Runs the core alone.
 pub(super) fn timed(job: &Job, prepared: &Prepared) -> Result<TimedRun> {
@@ -56,7 +65,7 @@ pub(super) fn surveyed(
     job: &Job,
     prepared: &Prepared,
     timed: &TimedRun,
-    trace_file: Option<&PathBuf>,
+    wanted: Option<WantedTrace<'_>>,
     sketched: bool,
 ) -> Result<(SurveyResult, Option<Sketch>)> {
     let mut sketch = sketched.then(|| Sketch::new(job, timed.passes.len()));
@@ -65,12 +74,14 @@ pub(super) fn surveyed(
         .map(|sketch| |emitted: &PassSample, checked: &SampleCheck| sketch.add(emitted, checked));
     let each = draw.as_mut().map(|draw| draw as &mut SampleObserver<'_>);
     let bar = Bar::new();
-    let findings = inspect::survey_run(job, prepared, timed.samples, trace(trace_file, job)?, each, &bar);
+    let (trace, whole) = begun(wanted, job)?;
+    let findings = inspect::survey_run(job, prepared, timed.samples, trace, each, &bar);
     bar.clear();
-    let findings = findings.map_err(|error| match (error, trace_file) {
-        (InspectError::Trace(error), Some(path)) => cannot_write(path, &error),
+    let findings = findings.map_err(|error| match (error, wanted) {
+        (InspectError::Trace(error), Some(wanted)) => cannot_write(wanted.path, &error),
         (error, _) => error.into(),
     })?;
+    completed(Ok(()), None, whole, wanted)?;
     Ok((findings, sketch))
 }
 
@@ -86,45 +97,64 @@ pub(super) fn remarks(timed: &TimedRun, findings: &SurveyResult) -> Remarks {
     }
 }
 
-/// Writes the report if a folder is given, and returns the path of its page.
+/// A report that a command was asked for.
+#[derive(Clone, Copy)]
+pub(super) struct WantedReport<'a> {
+    directory: &'a Path,
+    force: bool,
+}
+
+impl<'a> WantedReport<'a> {
+    /// Checks that the report can be written, before the work for it is done.
+    pub(super) fn new(directory: Option<&'a PathBuf>, force: bool) -> Result<Option<Self>> {
+        directory
+            .map(|directory| {
+                whole::check_folder(directory, &REPORT_FILES, force)?;
+                Ok(Self { directory, force })
+            })
+            .transpose()
+    }
+}
+
+/// Writes the report if one is wanted, and returns the path of its page.
 pub(super) fn report(
     job: &Job,
-    directory: Option<&Path>,
+    wanted: Option<WantedReport<'_>>,
     sketch: Option<&Sketch>,
     findings: &SurveyResult,
     remarks: &Remarks,
 ) -> Result<Option<PathBuf>> {
-    let write = |(directory, sketch): (&Path, &Sketch)| {
-        sketch
-            .write(directory, Path::new(job.origin.name()), findings, remarks)
-            .map_err(|error| cannot_write(directory, &error))
+    let write = |(wanted, sketch): (WantedReport<'_>, &Sketch)| {
+        let WantedReport { directory, force } = wanted;
+        whole::write_folder(directory, &REPORT_FILES, force, |folder| {
+            let name = Path::new(job.origin.name());
+            sketch.write(folder, name, findings, remarks).map(|_| ())
+        })?;
+        Ok(directory.join(REPORT_FILES[0]))
     };
-    directory.zip(sketch).map(write).transpose()
+    wanted.zip(sketch).map(write).transpose()
 }
 
 pub(super) fn command(arguments: &Arguments) -> Result<()> {
     let (job, prepared) = load(&arguments.job)?;
+    arguments
+        .script
+        .iter()
+        .for_each(|script| whole::note_input(script));
+    let wanted = WantedTrace::new(arguments.trace.as_ref(), arguments.force);
+    wanted.map_or(Ok(()), |wanted| whole::check(wanted.path, wanted.force))?;
+    let directory = WantedReport::new(arguments.report.as_ref(), arguments.force)?;
     if arguments.approach != Kind::Surface {
         warn_of_limits(&job);
-        let Arguments {
-            trace, report, json, ..
-        } = arguments;
-        return approach::command(arguments.approach, &job, trace.as_ref(), report.as_deref(), *json);
+        return approach::command(arguments.approach, &job, wanted, directory, arguments.json);
     }
     travel::check(&job)?;
     if let Some(script) = &arguments.script {
-        let scripted = scripted::play(&job, &prepared, script, arguments.trace.as_ref())?;
+        let scripted = scripted::play(&job, &prepared, script, wanted)?;
         return scripted.output(&job, arguments.json);
     }
     let timed = timed(&job, &prepared)?;
-    let directory = arguments.report.as_deref();
-    let (findings, sketch) = surveyed(
-        &job,
-        &prepared,
-        &timed,
-        arguments.trace.as_ref(),
-        directory.is_some(),
-    )?;
+    let (findings, sketch) = surveyed(&job, &prepared, &timed, wanted, directory.is_some())?;
     let remarks = remarks(&timed, &findings);
     let page = report(&job, directory, sketch.as_ref(), &findings, &remarks)?;
     let outcome = Outcome {

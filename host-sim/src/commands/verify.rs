@@ -13,7 +13,7 @@ use verify::survey::{SampleObserver, SurveyResult};
 use verify::swept;
 
 use super::out::say;
-use super::simulate::{remarks, report, timed};
+use super::simulate::{WantedReport, remarks, report, timed};
 use super::{Bar, Failure, Result, along, load, motion_words, swept_words};
 
 /// Checks a job before it runs on a machine. Every sample against an independent f64 oracle: positions, normals, feed ripple, path
@@ -31,6 +31,9 @@ pub(super) struct Arguments {
     /// Writes a report page into this folder: 3D view, charts, figures.
     #[arg(long, value_name = "DIR")]
     report: Option<PathBuf>,
+    /// Overwrites existing files of --report.
+    #[arg(long)]
+    force: bool,
     /// Computes the optimum of the first, middle and last pass within default axis limits if the job sets none.
     #[arg(long)]
     optimum: bool,
@@ -133,9 +136,9 @@ fn print_verification(job: &Job, prepared: &Prepared, found: &Verification) {
 
 pub(super) fn command(arguments: &Arguments) -> Result<()> {
     let (job, prepared) = load(&arguments.job)?;
+    let directory = WantedReport::new(arguments.report.as_ref(), arguments.force)?;
     let timed = timed(&job, &prepared)?;
     let with_optimum = arguments.optimum || job.machine.has_limits();
-    let directory = arguments.report.as_deref();
     let mut sketch = directory.map(|_| Sketch::new(&job, timed.passes.len()));
     let mut draw = sketch
         .as_mut()

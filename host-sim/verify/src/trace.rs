@@ -2,7 +2,6 @@
 
 use std::fs::File;
 use std::io::{self, BufWriter};
-use std::path::Path;
 
 use oracle::PassSample;
 
@@ -46,12 +45,12 @@ pub struct Trace {
 }
 
 impl Trace {
-    /// Creates the file, and writes the header line.
+    /// Writes the header line into a new file.
     ///
     /// # Errors
     /// The file cannot be written.
-    pub fn create(path: &Path, period_us: f64) -> io::Result<Self> {
-        let mut writer = csv::Writer::from_writer(BufWriter::new(File::create(path)?));
+    pub fn new(file: File, period_us: f64) -> io::Result<Self> {
+        let mut writer = csv::Writer::from_writer(BufWriter::new(file));
         writer.write_record(COLUMNS)?;
         Ok(Self { writer, period_us })
     }

@@ -4,7 +4,7 @@ use std::collections::BTreeSet;
 
 use interp_core::encode::{self, Bicubic, EncodeError};
 use interp_core::job::SPANS_MAX;
-use interp_core::surface::Edges;
+use interp_core::surface::{Edges, POLYNOMIAL_WORDS, RATIONAL_WORDS};
 use interp_core::{Header, STORE_WORDS, SurfaceKind};
 
 use job::{Along, Job, JobError, SurfaceSpec};
@@ -12,7 +12,8 @@ use patches::pieces::{Piece, Source};
 
 use super::{ParameterSpans, Prepared, steps, widths};
 
-pub(super) const REMEDY: &str = "move the part nearer to the origin (±2 m), or cut it into smaller surfaces";
+pub(super) const REMEDY: &str =
+    "place it nearer to the origin (`[placement] place = \"centre\"`), or cut it into smaller surfaces";
 
 /// Distance within which the poles of a boundary count as one point, mm: 1/1000 of the core's resolution.
 const POINT_MM: f64 = 1e-9;
@@ -58,7 +59,20 @@ fn records(source: &Source, along: Along) -> Result<Records, NoRecords> {
         Along::U => (u, v),
         Along::V => (v, u),
     };
+    let record_words = if source.rational() {
+        RATIONAL_WORDS
+    } else {
+        POLYNOMIAL_WORDS
+    };
     for _ in 0..ROUNDS_MAX {
+        // Before the patches are made: a job file has room for a hundred thousand.
+        let patches = (path.len() - 1) * (side.len() - 1);
+        if patches > STORE_WORDS / record_words {
+            return Err(no(
+                too_many(patches),
+                "use fewer knots, or cut the part into several jobs",
+            ));
+        }
         let grid = grid(source, along, &path, &side).map_err(|why| {
             no(
                 format!("the machine cannot represent this surface: {why}"),
@@ -109,11 +123,17 @@ pub fn patch_count(surface: &SurfaceSpec) -> Result<usize, String> {
     let patches = path_spans * side_spans;
     // The width of each span is a word, too.
     if words.len() + path_spans + side_spans > STORE_WORDS {
-        return Err(format!(
-            "the surface takes {patches} patches, more than the board's store"
-        ));
+        return Err(too_many(patches));
     }
     Ok(patches)
+}
+
+fn too_many(patches: usize) -> String {
+    format!(
+        "the surface takes {patches} patches, more than the board's store: about {} polynomial or {} rational ones",
+        STORE_WORDS / (POLYNOMIAL_WORDS + 1),
+        STORE_WORDS / (RATIONAL_WORDS + 1)
+    )
 }
 
 fn halve(breaks: &mut Vec<f64>, spans: &BTreeSet<usize>) {

@@ -9,6 +9,7 @@ use std::time::{Duration, Instant};
 use boards::Board;
 use serde::Deserialize;
 
+use super::guard::GuardedFolder;
 use super::{RemoteError, Stream, port};
 use programs::Part;
 
@@ -43,7 +44,7 @@ pub struct Said {
 #[derive(Debug)]
 pub struct Chip {
     child: Child,
-    folder: tempfile::TempDir,
+    folder: GuardedFolder,
 }
 
 /// Builds a board's image (at once where nothing changed).
@@ -71,8 +72,8 @@ impl Chip {
     /// The program does not start: libunicorn2 is missing, for instance.
     pub fn start(program: &Path, image: &Path, fast: bool) -> Result<(Self, Box<dyn Stream>), ChipError> {
         let failed = |error: io::Error| ChipError::Start(error.to_string());
-        let folder = tempfile::tempdir().map_err(failed)?;
-        let line = folder.path().join("serial");
+        let folder = GuardedFolder::new().map_err(failed)?;
+        let line = folder.serial();
         let child = Command::new(program)
             .arg(image)
             .arg("--pty")

@@ -6,10 +6,12 @@
 //! session.rs  requests, answers, events; retransmission
 //! script.rs   plays what an operator does, period by period
 //! qemu.rs     starts and ends QEMU with the firmware   |   port.rs  a serial port   |   chip.rs  a board's image without the board
+//!             └── guard.rs   their folder; ends them and removes it where this process is killed ──┘
 //! ```
 
 pub mod chip;
 pub mod drive;
+mod guard;
 pub mod operate;
 pub mod port;
 pub mod qemu;

@@ -9,6 +9,7 @@ use std::sync::{Mutex, OnceLock, PoisonError};
 use std::time::{Duration, Instant};
 
 use super::Stream;
+use super::guard::GuardedFolder;
 use programs::{Part, Unavailable};
 
 /// Program and machine: QEMU's model of the STM32F405.
@@ -42,7 +43,7 @@ pub enum QemuError {
 #[derive(Debug)]
 pub struct Qemu {
     child: Child,
-    folder: tempfile::TempDir,
+    folder: GuardedFolder,
     _place: Option<Place>,
 }
 
@@ -159,8 +160,8 @@ impl Qemu {
     /// As [`Self::start`].
     pub fn start_with(image: &Path, further: &[String]) -> Result<(Self, Box<dyn Stream>), QemuError> {
         let failed = |error: io::Error| QemuError::Start(error.to_string());
-        let folder = tempfile::tempdir().map_err(failed)?;
-        let socket = folder.path().join("serial");
+        let folder = GuardedFolder::new().map_err(failed)?;
+        let socket = folder.serial();
         // The log (defmt frames) is on stdout, QEMU's own messages on stderr.
         let log = File::create(folder.path().join("log")).map_err(failed)?;
         let (mut program, place) = program();

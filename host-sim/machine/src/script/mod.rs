@@ -35,6 +35,9 @@ pub struct Inputs {
     pub override_percent: Option<u8>,
 }
 
+/// Largest script, bytes: a hundred thousand commands.
+const BYTES_MAX: u64 = 2_000_000;
+
 /// Operator inputs, period by period, ascending.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Script {
@@ -48,13 +51,15 @@ impl Script {
     /// The file cannot be read, or a line is not a step: with the line and the remedy.
     pub fn load(path: &Path) -> Result<Self, JobError> {
         let name = path.display().to_string();
-        let text = std::fs::read_to_string(path).map_err(|cause| {
+        let unreadable = |cause: String| {
             JobError::of_file(
                 &name,
                 format!("cannot read the script: {cause}"),
                 "give the path of a text file",
             )
-        })?;
+        };
+        let bytes = job::read_regular(path, BYTES_MAX).map_err(|cause| unreadable(cause.to_string()))?;
+        let text = String::from_utf8(bytes).map_err(|_| unreadable("it is not UTF-8 text".to_owned()))?;
         Self::parse(&name, &text)
     }
 

@@ -1,0 +1,121 @@
+//! `import --list --page`: a page with the picture of the part, on which faces are chosen.
+
+use serde_json::{Value, json};
+
+use super::list::Row;
+use cad::{Boundary, Edge, Face, Outline};
+
+/// The page; `@DATA@` is where the faces stand.
+const PAGE: &str = include_str!("page.html");
+/// Quadrilaterals per side of a curved face, for few and for many faces.
+const QUADS: [usize; 2] = [12, 5];
+/// Number of faces from which they are many.
+const MANY: usize = 200;
+
+/// Coordinates of the page: a micrometre is finer than a pixel of any part.
+fn rounded(point: impl Into<[f64; 3]>) -> [f64; 3] {
+    point.into().map(|x| (x * 1e3).round() / 1e3)
+}
+
+/// A face as polygons, each a list of rings: its boundary if it is flat or trimmed, quadrilaterals of its surface otherwise.
+fn polygons(face: &Face, outline: Option<&Outline>, quads: usize) -> Vec<Vec<Vec<[f64; 3]>>> {
+    let trimmed = outline.is_none_or(|outline| outline.trimmed.is_some() && !outline.unknown);
+    if let (Boundary::Loops(loops), true) = (&face.boundary, trimmed || face.surface.kind() == "plane") {
+        let ring = |edges: &Vec<Edge>| edges.iter().flatten().map(|point| rounded(*point)).collect();
+        return vec![loops.iter().map(ring).collect()];
+    }
+    let Some([u, v]) = outline.map(|outline| outline.rectangle) else {
+        return Vec::new();
+    };
+    let quads = if face.surface.kind() == "plane" { 1 } else { quads };
+    let at = |i: usize, j: usize| {
+        let [u, v] =
+            [(u, i), (v, j)].map(|([low, high], index)| low + (high - low) * index as f64 / quads as f64);
+        face.surface.at_periodic(u, v).point
+    };
+    let mut polygons = Vec::new();
+    for i in 0..quads {
+        for j in 0..quads {
+            let corners = [at(i, j), at(i + 1, j), at(i + 1, j + 1), at(i, j + 1)];
+            if corners.iter().all(|corner| corner.is_finite()) {
+                polygons.push(vec![corners.map(rounded).to_vec()]);
+            }
+        }
+    }
+    polygons
+}
+
+/// A file's name as one word of a shell's command line.
+fn quoted(file: &str) -> String {
+    let plain = |c: char| c.is_ascii_alphanumeric() || "/._-+,:@".contains(c);
+    if !file.is_empty() && file.chars().all(plain) && !file.starts_with('-') {
+        return file.to_owned();
+    }
+    let path = if file.starts_with('-') {
+        format!("./{file}")
+    } else {
+        file.to_owned()
+    };
+    format!("'{}'", path.replace('\'', "'\\''"))
+}
+
+fn face(file: &str, row: &Row<'_>, quads: usize) -> Value {
+    let face = row.face;
+    let outline = cad::outline(face).ok();
+    let (area, size) = match &row.becomes {
+        Ok((_, measures)) => {
+            let [x, y, z] = measures.size_mm();
+            (Some(measures.area_mm2), Some(format!("{x:.2} x {y:.2} x {z:.2}")))
+        }
+        Err(_) => (None, None),
+    };
+    let state = match (&row.becomes, row.boundary()) {
+        (Err(_), _) => "cannot be imported",
+        (Ok(_), "no") => "whole",
+        (Ok(_), "yes") => "trimmed",
+        (Ok(_), _) => "boundary unknown",
+    };
+    let untrimmed = if row.boundary() == "no" {
+        ""
+    } else {
+        " --untrimmed"
+    };
+    let command = format!(
+        "{} import {} --face {}{untrimmed} -o part.toml",
+        programs::command_name(),
+        quoted(file),
+        face.number
+    );
+    let polygons = polygons(face, outline.as_ref(), quads);
+    json!({
+        "number": face.number, "entity": face.entity, "kind": face.surface.kind(), "name": face.name, "rgb": face.colour, "area": area,
+        "size": size, "state": state, "command": command, "whole_outline": polygons.len() == 1, "polygons": polygons,
+    })
+}
+
+/// The page of these faces.
+pub(super) fn page(file: &str, rows: &[Row<'_>]) -> String {
+    let quads = QUADS[usize::from(rows.len() > MANY)];
+    let data =
+        json!({ "file": file, "faces": rows.iter().map(|row| face(file, row, quads)).collect::<Vec<_>>() });
+    // No text of the file ends the script.
+    PAGE.replace("@DATA@", &data.to_string().replace('<', "\\u003c"))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::quoted;
+
+    #[test]
+    fn a_file_is_one_word() {
+        for (file, word) in [
+            ("jobs/cad/blade.step", "jobs/cad/blade.step"),
+            ("a b.step", "'a b.step'"),
+            ("x;rm -rf .step", "'x;rm -rf .step'"),
+            ("it's $(1).igs", "'it'\\''s $(1).igs'"),
+            ("-o", "'./-o'"),
+        ] {
+            assert_eq!(quoted(file), word);
+        }
+    }
+}
