@@ -33,7 +33,11 @@ fn check(name: &str, passes: u32) {
     assert!(worst <= 5.0, "{name}: CL off by {worst} nm");
     let scanned = oracle.schedule().unwrap().len();
     assert_eq!(scanned, passes as usize, "{name}: passes of a dense scan");
-    check_limit(name, &job, &measure(&job, oracle, &followed.track, true, &()));
+    check_limit(
+        name,
+        &job,
+        &measure(&job, oracle, &followed.track, true, 0.0, &()),
+    );
 }
 
 /// A test for each job, with its number of passes.

@@ -45,7 +45,7 @@ pub(crate) fn follow(job: &Job) -> Followed {
 
 fn findings(job: &Job) -> SweptResult {
     let followed = follow(job);
-    measure(job, &followed.oracle, &followed.track, true, &())
+    measure(job, &followed.oracle, &followed.track, true, 0.0, &())
 }
 
 /// Checks that the largest scallop height is between half of the limit and the limit, and that there is no gouge.

@@ -19,4 +19,4 @@ pub use fault::FaultAt;
 pub use pass_time::{PassTime, pass_times};
 pub use run::{PassDigest, TimedRun, load_error, oracle, survey_run, time_run};
 pub use sample::{is_on_pass, plain};
-pub use verification::{BOUNDS, RunMeasurements, Verification, verify_run};
+pub use verification::{BOUNDS, Requirements, RunMeasurements, Verification, verify_run};

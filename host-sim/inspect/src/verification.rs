@@ -96,8 +96,16 @@ pub struct Verification {
     pub warnings: Vec<String>,
 }
 
-/// Verifies a job after its timed run. `each` is called for every sample on a pass; `with_optimum` also computes the optimum of the first,
-/// the middle and the last pass.
+/// What a verification computes and requires besides the bounds of every sample.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Requirements {
+    /// Computes the optimum of the first, the middle and the last pass.
+    pub with_optimum: bool,
+    /// Permitted excess of the scallop height, as a share of its limit; 0 or more.
+    pub scallop_tolerance: f64,
+}
+
+/// Verifies a job after its timed run. `each` is called for every sample on a pass.
 ///
 /// # Errors
 /// The core refuses the job, or the oracle has no result for it.
@@ -106,10 +114,10 @@ pub fn verify_run<'a>(
     prepared: &Prepared,
     timed: &TimedRun,
     each: Option<&'a mut SampleObserver<'a>>,
-    with_optimum: bool,
+    requirements: &Requirements,
     progress: &dyn Progress,
 ) -> Result<Verification, InspectError> {
-    let measured = measure(job, prepared, timed, each, with_optimum, progress)?;
+    let measured = measure(job, prepared, timed, each, requirements, progress)?;
     let scanned = oracle(job)?.schedule().ok().map(|passes| passes.len());
     let failures = failures(job, timed, &measured, scanned);
     let own = |warning: &&String| !failures.contains(warning);
@@ -128,7 +136,7 @@ fn measure<'a>(
     prepared: &Prepared,
     timed: &TimedRun,
     mut each: Option<&'a mut SampleObserver<'a>>,
-    with_optimum: bool,
+    requirements: &Requirements,
     progress: &dyn Progress,
 ) -> Result<RunMeasurements, InspectError> {
     let oracle = oracle(job)?;
@@ -164,8 +172,15 @@ fn measure<'a>(
     });
     written?;
     let findings = survey.finish(ran.is_ok())?;
-    let swept = swept::measure(job, &oracle, &track, ran.is_ok(), progress);
-    let pass_times = if with_optimum {
+    let swept = swept::measure(
+        job,
+        &oracle,
+        &track,
+        ran.is_ok(),
+        requirements.scallop_tolerance,
+        progress,
+    );
+    let pass_times = if requirements.with_optimum {
         progress.begin("the optimum", 1);
         pass_times(job, &oracle, &track, &running)
     } else {
@@ -218,7 +233,11 @@ mod tests {
         job.scallop_mm = 0.1;
         let prepared = prepare(&job).unwrap();
         let timed = time_run(&job, &prepared, &()).unwrap();
-        let found = verify_run(&job, &prepared, &timed, None, true, &()).unwrap();
+        let requirements = Requirements {
+            with_optimum: true,
+            ..Requirements::default()
+        };
+        let found = verify_run(&job, &prepared, &timed, None, &requirements, &()).unwrap();
         assert_eq!(found.failures, Vec::<String>::new());
         for peak in &found.measured.axes {
             let share = peak.share.unwrap();
@@ -232,7 +251,7 @@ mod tests {
             jerk_mm_s3: limits.jerk_mm_s3.map(|jerk| 0.5 * jerk),
             ..limits
         });
-        let judged = verify_run(&job, &prepared, &timed, None, false, &()).unwrap();
+        let judged = verify_run(&job, &prepared, &timed, None, &Requirements::default(), &()).unwrap();
         assert!(
             judged
                 .failures

@@ -7,8 +7,8 @@ use serde_json::{Map, Value, json};
 use job::Job;
 use machine::prepare::Prepared;
 use verify::motion::limits::{ORDERS, Peaks, TOLERANCES};
-use verify::survey;
 use verify::swept::{ConcaveRadius, SweptResult};
+use verify::{Verdict, survey};
 
 /// Capacity of the board for surface data, bytes.
 const STORE_BYTES: usize = STORE_WORDS * size_of::<i32>();
@@ -32,7 +32,7 @@ pub(super) fn json(
     axes: &Peaks,
 ) -> Map<String, Value> {
     let report = &survey.report;
-    let measured = !found.ridges.is_empty();
+    let measured = found.scallop_verdict != Verdict::Unknown;
     let null_unless = |known: bool, value: Value| if known { value } else { Value::Null };
     let (most, error) = (&found.scallop_max, &found.measurement_error);
     let gouge = found.gouge.map(|gouge| {
@@ -63,7 +63,7 @@ pub(super) fn json(
         },
         "scallop_at": null_unless(measured, json!({ "u": most.u, "v": most.v, "gap": most.gap, "place_mm": most.point_mm.to_array() })),
         "scallop_area_by_tenth": found.scallop_histogram,
-        "gouge_max_mm": found.gouge_max_mm(),
+        "gouge_max_mm": null_unless(found.gouge_verdict != Verdict::Unknown, json!(found.gouge_max_mm())),
         "gouge_floor_mm": found.gouge_floor_mm,
         "gouge_bound_mm": found.gouge_bound_mm,
         "gouge": gouge,
@@ -80,12 +80,25 @@ pub(super) fn json(
         "data_bytes": data_bytes(prepared),
         "data_bytes_max": STORE_BYTES,
         "stations": found.stations,
+        "not_measured": not_measured(found),
         "warnings": found.warnings,
     });
     match value {
         Value::Object(map) => map,
         _ => Map::new(),
     }
+}
+
+/// The keys of the figures that could not be measured.
+fn not_measured(found: &SweptResult) -> Vec<&'static str> {
+    let figures = [
+        ("scallop_max_mm", found.scallop_verdict),
+        ("gouge_max_mm", found.gouge_verdict),
+    ];
+    let unknown = figures
+        .into_iter()
+        .filter(|(_, verdict)| *verdict == Verdict::Unknown);
+    unknown.map(|(key, _)| key).collect()
 }
 
 /// Shares of the axis limits; null without limits. `rounding`: share subtracted for the rounding of the samples.
@@ -99,6 +112,15 @@ fn limits(job: &Job, [velocity, acceleration, jerk]: &Peaks) -> Value {
             "velocity": velocity.rounding_share, "acceleration": acceleration.rounding_share, "jerk": jerk.rounding_share,
         },
     })
+}
+
+/// The verdict before a figure.
+pub(super) fn mark(verdict: Verdict) -> &'static str {
+    match verdict {
+        Verdict::Met => "ok  ",
+        Verdict::Violated => "FAIL",
+        Verdict::Unknown => "?   ",
+    }
 }
 
 fn row(name: &str, text: &str) {
@@ -120,7 +142,8 @@ pub(super) fn print(
     scallop(job, found);
     match &found.gouge {
         None => say!(
-            "  ok   {:<22} none deeper than {:.4} um ({} cells)",
+            "  {} {:<22} none deeper than {:.4} um ({} cells)",
+            mark(found.gouge_verdict),
             "gouge",
             um(found.gouge_bound_mm),
             found.cells
@@ -169,14 +192,17 @@ pub(super) fn print(
 
 fn scallop(job: &Job, found: &SweptResult) {
     if found.ridges.is_empty() {
-        row("scallop height", "not measured: fewer than two whole passes");
+        say!(
+            "  {} {:<22} not measured: fewer than two whole passes",
+            mark(Verdict::Unknown),
+            "scallop height"
+        );
         return;
     }
     let (most, error) = (&found.scallop_max, &found.measurement_error);
-    let good = most.height_mm <= job.scallop_mm + found.measurement_error_mm;
     say!(
         "  {} {:<22} {:.4} um +- {:.4}, limit {} (max / limit {:.4}), between passes {} and {}, u = {:.6}, v = {:.6}",
-        if good { "ok  " } else { "FAIL" },
+        mark(found.scallop_verdict),
         "scallop height",
         um(most.height_mm),
         um(found.measurement_error_mm),

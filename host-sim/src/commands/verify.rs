@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 
 use clap::Args;
-use inspect::{BOUNDS, RunMeasurements, Verification, verify_run};
+use inspect::{BOUNDS, Requirements, RunMeasurements, Verification, verify_run};
 use job::{Job, Spacing};
 use machine::prepare::Prepared;
 use oracle::{ErrorStatistics, PassSample, SampleCheck};
@@ -134,7 +134,10 @@ fn print_verification(job: &Job, prepared: &Prepared, found: &Verification) {
 pub(super) fn command(arguments: &Arguments) -> Result<()> {
     let (job, prepared) = load(&arguments.job)?;
     let timed = timed(&job, &prepared)?;
-    let with_optimum = arguments.optimum || job.machine.has_limits();
+    let requirements = Requirements {
+        with_optimum: arguments.optimum || job.machine.has_limits(),
+        scallop_tolerance: 0.0,
+    };
     let directory = arguments.report.as_deref();
     let mut sketch = directory.map(|_| Sketch::new(&job, timed.passes.len()));
     let mut draw = sketch
@@ -142,7 +145,7 @@ pub(super) fn command(arguments: &Arguments) -> Result<()> {
         .map(|sketch| |emitted: &PassSample, checked: &SampleCheck| sketch.add(emitted, checked));
     let each = draw.as_mut().map(|draw| draw as &mut SampleObserver<'_>);
     let bar = Bar::new();
-    let found = verify_run(&job, &prepared, &timed, each, with_optimum, &bar);
+    let found = verify_run(&job, &prepared, &timed, each, &requirements, &bar);
     bar.clear();
     let found = found?;
     let RunMeasurements { findings, swept, .. } = &found.measured;

@@ -13,5 +13,7 @@ pub mod speeds;
 pub mod survey;
 pub mod swept;
 pub mod trace;
+mod verdict;
 
 pub use sample::EmittedSample;
+pub use verdict::Verdict;
