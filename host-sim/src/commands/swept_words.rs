@@ -6,7 +6,7 @@ use serde_json::{Map, Value, json};
 
 use job::Job;
 use machine::prepare::Prepared;
-use verify::motion::limits::{ORDERS, Peaks, TOLERANCES};
+use verify::motion::limits::{ORDERS, Peak, Peaks};
 use verify::swept::{ConcaveRadius, SweptResult};
 use verify::{Verdict, survey};
 
@@ -80,7 +80,7 @@ pub(super) fn json(
         "data_bytes": data_bytes(prepared),
         "data_bytes_max": STORE_BYTES,
         "stations": found.stations,
-        "not_measured": not_measured(found),
+        "not_measured": not_measured(found, axes),
         "warnings": found.warnings,
     });
     match value {
@@ -90,10 +90,13 @@ pub(super) fn json(
 }
 
 /// The keys of the figures that could not be measured.
-fn not_measured(found: &SweptResult) -> Vec<&'static str> {
+fn not_measured(found: &SweptResult, [velocity, acceleration, jerk]: &Peaks) -> Vec<&'static str> {
     let figures = [
         ("scallop_max_mm", found.scallop_verdict),
         ("gouge_max_mm", found.gouge_verdict),
+        ("limits.velocity", velocity.verdict),
+        ("limits.acceleration", acceleration.verdict),
+        ("limits.jerk", jerk.verdict),
     ];
     let unknown = figures
         .into_iter()
@@ -101,15 +104,20 @@ fn not_measured(found: &SweptResult) -> Vec<&'static str> {
     unknown.map(|(key, _)| key).collect()
 }
 
-/// Shares of the axis limits; null without limits. `rounding`: share subtracted for the rounding of the samples.
+/// Shares of the axis limits; null without limits, and where the positions do not tell. `base_s`: over which they are judged;
+/// `uncertainty`: error over that base, as a share of the limit.
 fn limits(job: &Job, [velocity, acceleration, jerk]: &Peaks) -> Value {
     if !job.machine.has_limits() {
         return Value::Null;
     }
+    let known = |peak: &Peak| peak.share.filter(|_| peak.verdict != Verdict::Unknown);
     json!({
-        "velocity": velocity.share, "acceleration": acceleration.share, "jerk": jerk.share,
-        "rounding": {
-            "velocity": velocity.rounding_share, "acceleration": acceleration.rounding_share, "jerk": jerk.rounding_share,
+        "velocity": known(velocity), "acceleration": known(acceleration), "jerk": known(jerk),
+        "base_s": {
+            "velocity": velocity.base_s, "acceleration": acceleration.base_s, "jerk": jerk.base_s,
+        },
+        "uncertainty": {
+            "velocity": velocity.uncertainty, "acceleration": acceleration.uncertainty, "jerk": jerk.uncertainty,
         },
     })
 }
@@ -258,18 +266,23 @@ fn travel(job: &Job, found: &SweptResult) {
 }
 
 fn peaks(axes: &Peaks) {
-    for ((peak, (name, unit)), tolerance) in axes.iter().zip(ORDERS).zip(TOLERANCES) {
+    for (peak, (name, unit)) in axes.iter().zip(ORDERS) {
         let [x, y, z] = peak.axes;
         let (verdict, share) = match peak.share {
             None => ("    ", "within passes; no limit given".to_owned()),
-            Some(share) => (
-                if share <= 1.0 + tolerance { "ok  " } else { "FAIL" },
-                format!(
-                    "{:.1} % of its limit at most (and {:.1} % for rounding)",
-                    100.0 * share,
-                    100.0 * peak.rounding_share
-                ),
-            ),
+            Some(share) => {
+                let figure = format!("{:.1} % of its limit", 100.0 * share);
+                let error = 100.0 * peak.uncertainty;
+                let told = if peak.verdict == Verdict::Unknown {
+                    format!(
+                        "cannot tell: at least {figure}, but over {:.3} ms",
+                        1e3 * peak.base_s
+                    )
+                } else {
+                    format!("{figure}, over {:.3} ms within {error:.2} %", 1e3 * peak.base_s)
+                };
+                (mark(peak.verdict), told)
+            }
         };
         say!(
             "  {verdict} {:<22} {x:.1}, {y:.1}, {z:.1} {unit}; {share}",
