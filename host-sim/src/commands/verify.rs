@@ -98,10 +98,11 @@ fn json(job: &Job, prepared: &Prepared, found: &Verification) -> Value {
         findings,
         swept,
         axes,
-        pass_times,
+        times,
+        optimum,
     } = &found.measured;
     let mut value = swept_words::json(job, prepared, findings, swept, axes);
-    value.insert("motion".to_owned(), motion_words::json(pass_times));
+    value.extend(motion_words::json(times, optimum));
     value.extend(along::json(job));
     value.insert("passes_scanned".to_owned(), found.scanned.into());
     value.insert("failures".to_owned(), found.failures.clone().into());
@@ -115,12 +116,13 @@ fn print_verification(job: &Job, prepared: &Prepared, found: &Verification) {
         findings,
         swept,
         axes,
-        pass_times,
+        times,
+        optimum,
     } = &found.measured;
     say!("  along        {}", along::sentence(job));
     print(findings, found.scanned, job.spacing == Spacing::FirstOrder);
     swept_words::print(job, prepared, findings, swept, axes);
-    motion_words::print(pass_times);
+    motion_words::print(times, optimum);
     for failure in &found.failures {
         say!("  FAIL {failure}");
     }
