@@ -4,9 +4,9 @@ use std::path::PathBuf;
 
 use clap::Args;
 use inspect::{BOUNDS, Requirements, RunMeasurements, Verification, verify_run};
-use job::{Job, Spacing};
+use job::Job;
 use machine::prepare::Prepared;
-use oracle::{ErrorStatistics, PassSample, SampleCheck};
+use oracle::{AccuracyFigure, PassSample, SampleCheck};
 use report::{Remarks, RidgePoint, Scallops, Sketch};
 use serde_json::Value;
 use verify::survey::{SampleObserver, SurveyResult};
@@ -39,12 +39,16 @@ pub(super) struct Arguments {
     pub(super) json: bool,
 }
 
-fn line(name: &str, figure: &ErrorStatistics, bound: f64, unit: &str) {
-    let verdict = if figure.max.abs() <= bound { "ok  " } else { "FAIL" };
-    let at = figure.at;
+/// A figure with the bound that applies to it.
+fn line(figure: &AccuracyFigure) {
+    let verdict = if figure.is_met() { "ok  " } else { "FAIL" };
+    let at = figure.errors.at;
     say!(
-        "  {verdict} {name:<22} {:>10.3e} {unit:<4} (at most {bound:.0e}) at tick {}, pass {}, u = {:.6}, v = {:.6}",
-        figure.max.abs(),
+        "  {verdict} {:<22} {:>10.3e} {:<4} (at most {:.3e}) at tick {}, pass {}, u = {:.6}, v = {:.6}",
+        figure.label,
+        figure.errors.max.abs(),
+        figure.unit,
+        figure.bound,
         at.tick,
         at.pass,
         at.u,
@@ -52,23 +56,16 @@ fn line(name: &str, figure: &ErrorStatistics, bound: f64, unit: &str) {
     );
 }
 
-fn print(findings: &SurveyResult, scanned: Option<usize>, first_order: bool) {
-    let report = &findings.report;
-    line("cutter location", &report.position_nm, BOUNDS.position_nm, "nm");
-    line("cutter contact", &report.contact_nm, BOUNDS.contact_nm, "nm");
-    line("tool normal", &report.normal_rad, BOUNDS.normal_rad, "rad");
-    line("feed ripple", &report.ripple_pct, BOUNDS.ripple_pct, "%");
-    line("interval candidates", &report.interval, BOUNDS.interval, "rel");
-    // Exact spacing has no closed form to compare with; it is checked by the scallop height.
-    if first_order {
-        line(
-            "step to the next pass",
-            &report.side_step,
-            BOUNDS.side_step,
-            "rel",
-        );
+fn print(findings: &SurveyResult, scanned: Option<usize>) {
+    // The step to the next pass has no closed form with exact spacing; it is checked by the scallop height.
+    for figure in findings
+        .report
+        .figures(&BOUNDS)
+        .iter()
+        .filter(|figure| figure.errors.count > 0)
+    {
+        line(figure);
     }
-    line("ball fits (r k)", &report.fit, BOUNDS.fit, "");
     let scan = scanned.map_or_else(|| "no count".to_owned(), |passes| passes.to_string());
     say!(
         "  passes {} (dense scan of the surface: {scan}), samples {}",
@@ -120,7 +117,7 @@ fn print_verification(job: &Job, prepared: &Prepared, found: &Verification) {
         optimum,
     } = &found.measured;
     say!("  along        {}", along::sentence(job));
-    print(findings, found.scanned, job.spacing == Spacing::FirstOrder);
+    print(findings, found.scanned);
     swept_words::print(job, prepared, findings, swept, axes);
     motion_words::print(times, optimum);
     for failure in &found.failures {
