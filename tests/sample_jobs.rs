@@ -9,7 +9,7 @@ use machine::Machine;
 use machine::prepare::prepare;
 use oracle::Oracle;
 use verify::survey::Survey;
-use verify::swept::measure;
+use verify::swept::{Requirements, measure};
 
 use crate::swept::{check_limit, follow};
 
@@ -36,7 +36,7 @@ fn check(name: &str, passes: u32) {
     check_limit(
         name,
         &job,
-        &measure(&job, oracle, &followed.track, true, 0.0, &()),
+        &measure(&job, oracle, &followed.track, true, &Requirements::default(), &()),
     );
 }
 

@@ -101,12 +101,12 @@ pub struct Verification {
 }
 
 /// What a verification computes and requires besides the bounds of every sample.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Requirements {
+#[derive(Clone, Copy, Default)]
+pub struct Requirements<'a> {
     /// Computes the optimum of the first, the middle and the last pass; with limits also of those that could be slowest.
     pub with_optimum: bool,
-    /// Permitted excess of the scallop height, as a share of its limit; 0 or more.
-    pub scallop_tolerance: f64,
+    /// Requirements of the swept ball.
+    pub swept: swept::Requirements<'a>,
 }
 
 /// Verifies a job after its timed run. `each` is called for every sample on a pass.
@@ -118,7 +118,7 @@ pub fn verify_run<'a>(
     prepared: &Prepared,
     timed: &TimedRun,
     each: Option<&'a mut SampleObserver<'a>>,
-    requirements: &Requirements,
+    requirements: &Requirements<'_>,
     progress: &dyn Progress,
 ) -> Result<Verification, InspectError> {
     let measured = measure(job, prepared, timed, each, requirements, progress)?;
@@ -141,7 +141,7 @@ fn measure<'a>(
     prepared: &Prepared,
     timed: &TimedRun,
     mut each: Option<&'a mut SampleObserver<'a>>,
-    requirements: &Requirements,
+    requirements: &Requirements<'_>,
     progress: &dyn Progress,
 ) -> Result<RunMeasurements, InspectError> {
     let oracle = oracle(job)?;
@@ -181,14 +181,7 @@ fn measure<'a>(
     written?;
     let times = time.finish();
     let findings = survey.finish(ran.is_ok())?;
-    let swept = swept::measure(
-        job,
-        &oracle,
-        &track,
-        ran.is_ok(),
-        requirements.scallop_tolerance,
-        progress,
-    );
+    let swept = swept::measure(job, &oracle, &track, ran.is_ok(), &requirements.swept, progress);
     let optimum = if requirements.with_optimum {
         progress.begin("the optimum", 1);
         optimum_times(job, &oracle, &run_passes(&track, &running), &times)

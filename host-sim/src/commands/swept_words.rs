@@ -72,6 +72,10 @@ pub(super) fn json(
             "extent_mm": found.axes.extent_mm, "travel_mm": job.machine.travel_mm, "beyond_mm": found.axes.beyond_mm,
             "velocity_mm_s": axes[0].axes, "acceleration_mm_s2": axes[1].axes, "jerk_mm_s3": axes[2].axes,
         },
+        "cad_face": found.original.map(|original| json!({
+            "above_max_mm": original.above_mm, "below_max_mm": original.below_mm, "tolerance_mm": original.tolerance_mm,
+            "scallop_over_surface_max_mm": original.over_surface_mm,
+        })),
         "least_concave_radius": concave,
         "poles": found.shape.poles,
         "degenerate_places": found.shape.degenerate.map_or(0, |(count, _)| count),
@@ -165,6 +169,21 @@ pub(super) fn print(
             gouge.tick,
             gouge.pass
         ),
+    }
+    if let Some(original) = &found.original {
+        row(
+            "CAD face",
+            &format!(
+                "up to {:.4} um above the job's surface, {:.4} below, tolerance {}; heights are those above the face: limit {}, and {:.4} um \
+                 above the job's surface: limit {}",
+                um(original.above_mm),
+                um(original.below_mm),
+                um(original.tolerance_mm),
+                um(job.scallop_mm + original.tolerance_mm),
+                um(original.over_surface_mm),
+                um(job.scallop_mm)
+            ),
+        );
     }
     travel(job, found);
     peaks(axes);

@@ -130,12 +130,39 @@ fn print_verification(job: &Job, prepared: &Prepared, found: &Verification) {
     say!("  {}", if passed { "passed" } else { "FAILED" });
 }
 
+/// Distance of the CAD face from the job's surface, and its tolerance, mm; `None` where the surface is exact or no face is named.
+fn original(job: &Job) -> Result<Option<(Box<swept::OriginalOffset<'static>>, f64)>> {
+    let Some(source) = job.origin.cad() else {
+        return Ok(None);
+    };
+    let face = cad::Original::read(source).map_err(|error| Failure::input(error.what, error.remedy))?;
+    let surface = oracle::Surface::new(&source.surface);
+    Ok(face.map(|face| {
+        let offset = move |u: f64, v: f64| {
+            let at = surface.at(u, v);
+            face.from_surface(u, v, at.point)
+                .dot(at.u.cross(at.v).normalize())
+        };
+        let boxed: Box<swept::OriginalOffset<'static>> = Box::new(offset);
+        (boxed, source.tolerance_mm * source.scale)
+    }))
+}
+
 pub(super) fn command(arguments: &Arguments) -> Result<()> {
     let (job, prepared) = load(&arguments.job)?;
     let timed = timed(&job, &prepared)?;
+    let original = original(&job)?;
     let requirements = Requirements {
         with_optimum: arguments.optimum || job.machine.has_limits(),
-        scallop_tolerance: 0.0,
+        swept: swept::Requirements {
+            scallop_tolerance: 0.0,
+            original: original
+                .as_ref()
+                .map(|(offset_mm, tolerance_mm)| swept::Original {
+                    offset_mm: offset_mm.as_ref(),
+                    tolerance_mm: *tolerance_mm,
+                }),
+        },
     };
     let directory = arguments.report.as_deref();
     let mut sketch = directory.map(|_| Sketch::new(&job, timed.passes.len()));

@@ -1,7 +1,9 @@
 //! Result of the measurement, in figures and in sentences.
 
+use super::Requirements;
 use super::axes::AxisTravel;
 use super::gouge::GougeSearchResult;
+use super::original::OriginalDeviation;
 use super::ridge::{Crest, Gap, GapRidge, MISSED_RADII};
 use super::shape::SurfaceCheck;
 use super::track::ToolPath;
@@ -139,6 +141,8 @@ pub struct SweptResult {
     pub axes: AxisTravel,
     /// Concave radius, poles and degenerate points of the surface.
     pub shape: SurfaceCheck,
+    /// Deviation of the surface from its original, against which heights are measured; `None` without one.
+    pub original: Option<OriginalDeviation>,
     /// One sentence per violated requirement; empty if all are met.
     pub failures: Vec<String>,
     /// One sentence per condition to know before the run, failures included.
@@ -154,8 +158,8 @@ pub(super) struct Measurements<'a> {
     pub(super) axes: AxisTravel,
     pub(super) shape: SurfaceCheck,
     pub(super) complete: bool,
-    /// Permitted excess of the scallop height, as a share of its limit.
-    pub(super) tolerance: f64,
+    pub(super) requirements: &'a Requirements<'a>,
+    pub(super) original: Option<OriginalDeviation>,
 }
 
 impl SweptResult {
@@ -192,13 +196,17 @@ impl SweptResult {
             cells: parts.search.cells,
             axes: parts.axes,
             shape: parts.shape.clone(),
+            original: parts.original,
             failures: Vec::new(),
             warnings: Vec::new(),
         };
-        let limit_mm = job.scallop_mm * (1.0 + parts.tolerance);
+        let by_original_mm = parts.original.map_or(0.0, |original| original.tolerance_mm);
+        let limit_mm = job.scallop_mm * (1.0 + parts.requirements.scallop_tolerance) + by_original_mm;
         // Between stations a ridge can only be higher, so this error is that of the highest crest itself.
         let own_error_mm = own_error_mm + measurement_error.rounding_mm + measurement_error.search_mm;
-        let surely_above = findings.scallop_max.height_mm - own_error_mm > limit_mm;
+        let over_surface_mm = parts.original.map_or(0.0, |original| original.over_surface_mm);
+        let surely_above = findings.scallop_max.height_mm - own_error_mm > limit_mm
+            || over_surface_mm - findings.measurement_error_mm > limit_mm - by_original_mm;
         findings.scallop_verdict = findings.judge_scallop(job, limit_mm, surely_above);
         findings.gouge_verdict = findings.judge_gouge(job);
         findings.failures = findings.failing(job);
@@ -259,6 +267,13 @@ impl SweptResult {
         match self.scallop_verdict {
             Verdict::Met => None,
             Verdict::Violated if self.uncut(job) => Some(format!("no ball reaches the material {place}")),
+            Verdict::Violated if self.original.is_some() => Some(format!(
+                "the scallop is {:.6} mm high from the CAD face, {place}, and {:.6} mm from the job's surface, where the limit is {limit} mm \
+                 (measured within {:.1e} mm)",
+                most.height_mm,
+                self.original.map_or(0.0, |original| original.over_surface_mm),
+                self.measurement_error_mm
+            )),
             Verdict::Violated => Some(format!(
                 "the scallop is {:.6} mm high, {:.2} % above the limit of {limit} mm, {place} (measured within {:.1e} mm)",
                 most.height_mm,
@@ -308,6 +323,7 @@ impl SweptResult {
                 gouge.contact[1]
             ));
         }
+        failures.extend(self.original.and_then(|original| original.failure()));
         failures.extend(self.axes.failures(&job.machine));
         failures
     }

@@ -27,6 +27,7 @@ mod findings;
 mod gouge;
 mod grid;
 mod height;
+mod original;
 mod ridge;
 mod shape;
 mod smooth;
@@ -37,6 +38,7 @@ mod tree;
 
 pub use axes::AxisTravel;
 pub use findings::{Gouge, HighestScallop, MeasurementError, Ridge, RidgePoint, SweptResult};
+pub use original::OriginalDeviation;
 pub use shape::{ConcaveRadius, SurfaceCheck};
 pub use track::{ToolPath, ToolPathPass};
 
@@ -73,15 +75,36 @@ impl Progress for () {
     fn done(&self, _: u64) {}
 }
 
+/// Signed distance of the surface's original from the surface at (u, v), along S_u x S_v, mm.
+pub type OriginalOffset<'a> = dyn Fn(f64, f64) -> f64 + Sync + 'a;
+
+/// The original of a surface that approximates it.
+#[derive(Clone, Copy)]
+pub struct Original<'a> {
+    /// Where it is.
+    pub offset_mm: &'a OriginalOffset<'a>,
+    /// Permitted deviation of the surface from it, mm.
+    pub tolerance_mm: f64,
+}
+
+/// What a measurement requires besides the job's own limits.
+#[derive(Clone, Copy, Default)]
+pub struct Requirements<'a> {
+    /// Permitted excess of the scallop height, as a share of its limit.
+    pub scallop_tolerance: f64,
+    /// Heights are measured from this original, and may exceed the scallop limit there by its tolerance, but not from the surface itself.
+    pub original: Option<Original<'a>>,
+}
+
 /// Measures a tool path against the job's surface, on all cores. `complete`: the run reached its end; otherwise its last pass
-/// is left out of the ridges. `tolerance`: permitted excess of the scallop height, as a share of its limit.
+/// is left out of the ridges.
 #[must_use]
 pub fn measure(
     job: &Job,
     oracle: &Oracle,
     track: &ToolPath,
     complete: bool,
-    tolerance: f64,
+    requirements: &Requirements<'_>,
     progress: &dyn Progress,
 ) -> SweptResult {
     let emitted = track;
@@ -98,7 +121,7 @@ pub fn measure(
         .map(|pair| Gap::new(oracle, [pair[0], pair[1]], &tree))
         .collect();
     progress.begin("scallop", gaps.len() as u64);
-    let ridges: Vec<GapRidge> = gaps
+    let mut ridges: Vec<GapRidge> = gaps
         .par_iter()
         .map(|gap| {
             let ridge = gap.ridge();
@@ -106,6 +129,19 @@ pub fn measure(
             ridge
         })
         .collect();
+    let over_surface_mm = ridges
+        .iter()
+        .flat_map(|ridge| &ridge.crests)
+        .map(|crest| crest.height_mm)
+        .fold(0.0, f64::max);
+    if let Some(original) = &requirements.original {
+        ridges.par_iter_mut().zip(&gaps).for_each(|(ridge, gap)| {
+            for crest in &mut ridge.crests {
+                let (u, v) = oracle.swapped(crest.path, gap.side(crest.share));
+                crest.height_mm -= oracle.normal_sign * (original.offset_mm)(u, v);
+            }
+        });
+    }
     let grid = CellGrid::new(oracle);
     let deviation_mm = smooth.deviation_max_mm();
     progress.begin("gouge", grid.count() as u64);
@@ -124,7 +160,8 @@ pub fn measure(
         axes: AxisTravel::new(emitted, &job.machine),
         shape: SurfaceCheck::new(oracle, &grid),
         complete,
-        tolerance,
+        requirements,
+        original: OriginalDeviation::new(oracle, &grid, requirements, over_surface_mm),
     };
     SweptResult::new(job, oracle, track, &parts)
 }
