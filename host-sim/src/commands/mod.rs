@@ -5,6 +5,7 @@ mod approach;
 #[cfg(feature = "developer")]
 mod budget;
 mod completions;
+mod error_json;
 mod explain;
 mod export;
 mod flash;
@@ -26,7 +27,7 @@ mod swept_words;
 mod typed;
 mod verify;
 
-use out::complain;
+use out::{complain, say};
 use programs::with_command_name;
 use progress::{Bar, progress, spinner};
 
@@ -193,12 +194,29 @@ fn with_name(command: clap::Command) -> clap::Command {
 /// Reads the arguments, runs the command, and returns its exit code: 0 done, 1 failed, 2 bad usage or bad input.
 #[must_use]
 pub fn main() -> ExitCode {
-    let parsed = Cli::from_arg_matches(&arguments().get_matches());
-    let command = parsed.unwrap_or_else(|error| error.exit()).command;
+    let parsed = arguments()
+        .try_get_matches()
+        .and_then(|matches| Cli::from_arg_matches(&matches));
+    let command = match parsed {
+        Ok(parsed) => parsed.command,
+        Err(error) => {
+            // The arguments were not understood, so only their text tells whether JSON is expected.
+            if error.use_stderr() && std::env::args_os().any(|argument| argument == "--json") {
+                say!("{}", error_json::of_usage(&error));
+                out::finish();
+            }
+            error.exit()
+        }
+    };
     if command.as_json() {
         progress::silence();
     }
     let result = command.execute();
+    if let (true, Err(failure)) = (command.as_json() && !out::printed(), &result)
+        && let Some(object) = error_json::of_failure(failure)
+    {
+        say!("{object}");
+    }
     let unwritten = out::finish();
     if let Some(error) = &unwritten {
         complain!("error: cannot write to standard output: {error}");

@@ -5,6 +5,7 @@
 
 use std::fmt::Arguments;
 use std::io::{self, ErrorKind, Write, stderr, stdout};
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Mutex, PoisonError};
 
 use programs::with_command_name;
@@ -18,6 +19,8 @@ enum Output {
     Failed(io::Error),
 }
 
+/// Whether anything was printed to standard output.
+static PRINTED: AtomicBool = AtomicBool::new(false);
 static OUTPUT: Mutex<Output> = Mutex::new(Output::Open);
 
 /// Writes, unless an earlier write failed.
@@ -34,7 +37,13 @@ fn attempt(write: impl FnOnce() -> io::Result<()>) {
 
 /// Prints to standard output.
 pub(super) fn to_stdout(text: Arguments<'_>) {
+    PRINTED.store(true, Ordering::Relaxed);
     attempt(|| stdout().write_all(with_command_name(&text.to_string()).as_bytes()));
+}
+
+/// Whether anything was printed to standard output.
+pub(super) fn printed() -> bool {
+    PRINTED.load(Ordering::Relaxed)
 }
 
 /// Prints a line to standard error; a write error is ignored.

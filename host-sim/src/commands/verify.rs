@@ -1,6 +1,6 @@
 //! `verify`: checks every sample of a job against the independent oracle.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use clap::Args;
 use inspect::{BOUNDS, Requirements, RunMeasurements, Verification, verify_run};
@@ -12,9 +12,9 @@ use serde_json::Value;
 use verify::survey::{SampleObserver, SurveyResult};
 use verify::swept;
 
-use super::out::say;
+use super::out::{complain, say};
 use super::simulate::{remarks, report, timed};
-use super::{Bar, Failure, Result, along, load, motion_words, swept_words};
+use super::{Bar, Failure, Result, along, error_json, load, motion_words, swept_words};
 
 /// Checks a job before it runs on a machine. Every sample against an independent f64 oracle: positions, normals, feed ripple, path
 /// intervals, schedule. The swept envelope of the ball against the surface: scallop height, local and global gouges. Axis travel. With
@@ -22,21 +22,40 @@ use super::{Bar, Failure, Result, along, load, motion_words, swept_words};
 /// optimum. Least concave radius, machining time, size of the surface data.
 ///
 /// Example: cargo sim verify jobs/plate.toml
+/// Several jobs are verified one after the other; the JSON object then has the list `jobs`, with an error for one that cannot be read.
+///
 /// Example: cargo sim verify jobs/plate_machine.toml --report out
+/// Example: cargo sim verify jobs/plate.toml jobs/torus.toml --scallop-tolerance 1% --json
 #[derive(Debug, Args)]
 #[command(verbatim_doc_comment)]
 pub(super) struct Arguments {
-    /// Job file (TOML).
-    job: PathBuf,
-    /// Writes a report page into this folder: 3D view, charts, figures.
+    /// Job files (TOML).
+    #[arg(required = true, value_name = "JOB")]
+    jobs: Vec<PathBuf>,
+    /// Writes a report page into this folder: 3D view, charts, figures. With several jobs: a folder for each in it.
     #[arg(long, value_name = "DIR")]
     report: Option<PathBuf>,
     /// Computes the optimum of the first, middle and last pass within default axis limits if the job sets none.
     #[arg(long)]
     optimum: bool,
+    /// Accepts scallops this much above the limit: in percent, or as a share (1% or 0.01).
+    #[arg(long, value_name = "SHARE", value_parser = share, default_value = "0%")]
+    scallop_tolerance: f64,
     /// Prints one JSON object instead of text.
     #[arg(long)]
     pub(super) json: bool,
+}
+
+/// A share: `1%` or `0.01`, from 0 to 100 %.
+fn share(text: &str) -> std::result::Result<f64, String> {
+    let text = text.trim();
+    let (number, unit) = text
+        .strip_suffix('%')
+        .map_or((text, 1.0), |number| (number, 0.01));
+    match number.trim().parse::<f64>() {
+        Ok(number) if (0.0..=1.0).contains(&(number * unit)) => Ok(number * unit),
+        _ => Err("give a share from 0 to 100 %, e.g. 1% or 0.01".to_owned()),
+    }
 }
 
 /// A figure with the bound that applies to it.
@@ -148,14 +167,70 @@ fn original(job: &Job) -> Result<Option<(Box<swept::OriginalOffset<'static>>, f6
     }))
 }
 
+/// Verifies the jobs, prints the figures, and fails if any job does; with the exit code of bad input if a job cannot be read.
 pub(super) fn command(arguments: &Arguments) -> Result<()> {
-    let (job, prepared) = load(&arguments.job)?;
+    if let [job] = arguments.jobs.as_slice() {
+        let (passed, value) = verify_job(arguments, job, arguments.report.as_deref())?;
+        if arguments.json {
+            say!("{value}");
+        }
+        return if passed {
+            Ok(())
+        } else {
+            Err(Failure::Failed(None))
+        };
+    }
+    let (mut values, mut all_passed, mut refused) = (Vec::new(), true, None);
+    for job in &arguments.jobs {
+        let directory = arguments
+            .report
+            .as_ref()
+            .map(|directory| directory.join(job.file_stem().unwrap_or(job.as_os_str())));
+        match verify_job(arguments, job, directory.as_deref()) {
+            Ok((passed, value)) => {
+                all_passed &= passed;
+                values.push(value);
+            }
+            Err(failure) => {
+                all_passed = false;
+                let mut value = error_json::of_failure(&failure).unwrap_or_default();
+                value["job"] = job.display().to_string().into();
+                value["passed"] = false.into();
+                values.push(value);
+                match &failure {
+                    Failure::Input(report) => complain!("{report:?}"),
+                    Failure::Failed(message) => {
+                        complain!("error: {}", message.as_deref().unwrap_or_default())
+                    }
+                }
+                if matches!(failure, Failure::Input(_)) && refused.is_none() {
+                    refused = Some(job.display().to_string());
+                }
+            }
+        }
+    }
+    if arguments.json {
+        say!("{}", serde_json::json!({ "jobs": values, "passed": all_passed }));
+    }
+    match refused {
+        Some(job) => Err(Failure::input(
+            format!("{job} was not verified"),
+            "correct what is said above; the other jobs were verified",
+        )),
+        None if all_passed => Ok(()),
+        None => Err(Failure::Failed(None)),
+    }
+}
+
+/// Verifies one job and prints its figures unless JSON is requested. Returns whether it passed, and its JSON object.
+fn verify_job(arguments: &Arguments, path: &Path, directory: Option<&Path>) -> Result<(bool, Value)> {
+    let (job, prepared) = load(path)?;
     let timed = timed(&job, &prepared)?;
     let original = original(&job)?;
     let requirements = Requirements {
         with_optimum: arguments.optimum || job.machine.has_limits(),
         swept: swept::Requirements {
-            scallop_tolerance: 0.0,
+            scallop_tolerance: arguments.scallop_tolerance,
             original: original
                 .as_ref()
                 .map(|(offset_mm, tolerance_mm)| swept::Original {
@@ -164,7 +239,6 @@ pub(super) fn command(arguments: &Arguments) -> Result<()> {
                 }),
         },
     };
-    let directory = arguments.report.as_deref();
     let mut sketch = directory.map(|_| Sketch::new(&job, timed.passes.len()));
     let mut draw = sketch
         .as_mut()
@@ -183,18 +257,36 @@ pub(super) fn command(arguments: &Arguments) -> Result<()> {
     };
     remarks.warnings.extend(found.warnings.iter().cloned());
     let page = report(&job, directory, sketch.as_ref(), findings, &remarks)?;
-    if arguments.json {
-        say!("{}", json(&job, &prepared, &found));
-    } else {
-        say!("{}", arguments.job.display());
+    let passed = found.failures.is_empty();
+    if !arguments.json {
+        say!("{}", path.display());
         print_verification(&job, &prepared, &found);
         if let Some(page) = page {
             say!("  report {}", page.display());
         }
     }
-    if found.failures.is_empty() {
-        Ok(())
-    } else {
-        Err(Failure::Failed(None))
+    let mut value = json(&job, &prepared, &found);
+    value["job"] = path.display().to_string().into();
+    Ok((passed, value))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn shares_are_percents_or_numbers() {
+        for (text, exact) in [
+            ("1%", 0.01),
+            ("0.5 %", 0.005),
+            ("0.01", 0.01),
+            ("0", 0.0),
+            ("100%", 1.0),
+        ] {
+            assert!((share(text).unwrap() - exact).abs() < 1e-15, "{text}");
+        }
+        for text in ["", "%", "-1%", "101%", "nan", "inf", "1 percent", "2"] {
+            assert!(share(text).is_err(), "{text}");
+        }
     }
 }

@@ -21,6 +21,10 @@ const BINS: usize = 13;
 const ROUNDING_MM: f64 = 0.866_025_403_784_438_6e-6;
 /// Tolerance of the search for a crest, mm: the two heights agree within it.
 const CREST_MM: f64 = 1e-8;
+/// A new limit is proposed with this margin: heights are proportional to the limit where the step-over is small.
+const ASKED_SHARE: f64 = 0.995;
+/// A tolerance is proposed with this margin, as a share.
+const ACCEPTED_MARGIN: f64 = 1e-4;
 /// Every gouge deeper than this must be seen, mm, or than [`super::ERROR_SHARE_MAX`] of the scallop limit if that is more: ten times the
 /// position tolerance.
 const GOUGE_SEEN_MM: f64 = 1e-4;
@@ -275,20 +279,34 @@ impl SweptResult {
                 self.measurement_error_mm
             )),
             Verdict::Violated => Some(format!(
-                "the scallop is {:.6} mm high, {:.2} % above the limit of {limit} mm, {place} (measured within {:.1e} mm)",
+                "the scallop is {:.6} mm high, {:.2} % above the limit of {limit} mm, {place} (measured within {:.1e} mm): ask for scallop_mm = {:.3e}, or \
+                 accept it with --scallop-tolerance {:.2}%",
                 most.height_mm,
                 100.0 * (most.height_mm / limit - 1.0),
-                self.measurement_error_mm
+                self.measurement_error_mm,
+                ASKED_SHARE * limit * limit / most.height_mm,
+                100.0 * ((most.height_mm / limit - 1.0).max(0.0) + ACCEPTED_MARGIN)
             )),
             Verdict::Unknown if self.ridges.is_empty() => {
                 Some("the scallop height is not measured: fewer than two whole passes".to_owned())
             }
             Verdict::Unknown => Some(format!(
-                "the scallop height is not measured: {:.6} mm within {:.1e} mm, which is more than {} % of the limit of {limit} mm, {place}",
+                "the scallop height is not measured: {:.6} mm within {:.1e} mm, which is more than {} % of the limit of {limit} mm, {place}: {}",
                 most.height_mm,
                 self.measurement_error_mm,
-                100.0 * super::ERROR_SHARE_MAX
+                100.0 * super::ERROR_SHARE_MAX,
+                self.measuring_remedy()
             )),
+        }
+    }
+
+    /// What makes a height measurable that is not.
+    fn measuring_remedy(&self) -> &'static str {
+        let error = &self.measurement_error;
+        if error.path_mm >= error.stations_mm {
+            "the samples are too far apart for the path's bends: lower the feed, or shorten period_us"
+        } else {
+            "the height changes too fast along the gap: choose along = the other parameter, or cut the surface where it folds"
         }
     }
 
