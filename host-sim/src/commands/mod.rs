@@ -11,6 +11,7 @@ mod export;
 mod flash;
 mod home;
 mod import;
+mod judge;
 mod log;
 mod motion_words;
 mod new;
@@ -111,6 +112,7 @@ enum Command {
     Run(run::Arguments),
     Operate(operate::Arguments),
     Verify(verify::Arguments),
+    Judge(judge::Arguments),
     Export(export::Arguments),
     Import(import::Arguments),
     #[cfg(feature = "developer")]
@@ -132,6 +134,7 @@ impl Command {
             Self::Run(arguments) => arguments.json,
             Self::Operate(arguments) => arguments.json,
             Self::Verify(arguments) => arguments.json,
+            Self::Judge(arguments) => arguments.json,
             Self::Export(arguments) => arguments.json,
             Self::Import(arguments) => arguments.json,
             #[cfg(feature = "developer")]
@@ -152,6 +155,7 @@ impl Command {
             Self::Run(arguments) => run::command(arguments),
             Self::Operate(arguments) => operate::command(arguments),
             Self::Verify(arguments) => verify::command(arguments),
+            Self::Judge(arguments) => judge::command(arguments),
             Self::Export(arguments) => export::command(arguments),
             Self::Import(arguments) => import::command(arguments),
             #[cfg(feature = "developer")]

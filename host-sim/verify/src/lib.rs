@@ -7,6 +7,7 @@
 //!    └──────motion──► use of the axis limits, time against the optimum
 //! ```
 
+pub mod judge;
 pub mod motion;
 mod sample;
 pub mod speeds;

@@ -23,6 +23,7 @@
 //! the number of threads.
 
 mod axes;
+mod field;
 mod findings;
 mod gouge;
 mod grid;
@@ -37,6 +38,7 @@ mod track;
 mod tree;
 
 pub use axes::AxisTravel;
+pub use field::{FieldPoint, HeightField, height_field};
 pub use findings::{Gouge, HighestScallop, MeasurementError, Ridge, RidgePoint, SweptResult};
 pub use original::OriginalDeviation;
 pub use shape::{ConcaveRadius, SurfaceCheck};

@@ -138,6 +138,19 @@ impl ToolPath {
         }
     }
 
+    /// Adds the next centre of a motion without parameters; `first`: the tool was off the surface before.
+    pub fn add_centre(&mut self, cl_nm: [i32; 3], first: bool) {
+        if first || self.passes.is_empty() {
+            self.passes.push(ToolPathPass::default());
+        }
+        if let Some(pass) = self.passes.last_mut() {
+            pass.periods
+                .push(u32::try_from(pass.periods.len()).unwrap_or(u32::MAX));
+            pass.path.push(0.0);
+            pass.cl_nm.push(cl_nm);
+        }
+    }
+
     /// Number of samples.
     #[must_use]
     pub fn samples(&self) -> usize {
