@@ -270,7 +270,7 @@ mod tests {
         assert!(optimum.passes.len() >= 3 && optimum.passes.iter().all(|time| time.ours_s.is_some()));
         // No pass is worse than the worst one solved, or than the bound that is told.
         let worst = optimum.ratio_max.unwrap();
-        assert!(worst >= 1.0 - 1e-3 && worst < 1.3, "{worst}");
+        assert!((0.999..1.3).contains(&worst), "{worst}");
         assert!(
             optimum.ratio_bound < 1.3 && optimum.whole_ratio.unwrap() > 1.0 - 1e-3,
             "{optimum:?}"

@@ -62,7 +62,7 @@ pub(crate) fn read(path: &Path, job: &Job, tip: bool) -> Result<Motion, MotionEr
     if let Some(index) = motion
         .centres_mm
         .iter()
-        .position(|centre| !(centre.abs().max_element() <= COORDINATE_MAX_MM))
+        .position(|centre| !centre.is_finite() || centre.abs().max_element() > COORDINATE_MAX_MM)
     {
         return Err(MotionError::new(
             format!("{name}: position {index} is not within {COORDINATE_MAX_MM} mm of the origin"),
