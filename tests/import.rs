@@ -581,3 +581,45 @@ fn ten_megabytes() {
     assert_eq!(model.faces.len(), copies);
     assert_eq!(made.patches, 64);
 }
+
+/// A job of an approximated face names the face, and the face is within the tolerance of the job's surface, whatever its placement; an exact
+/// one names none.
+#[test]
+fn approximated_faces_name_their_source() {
+    let model = read(&cad("swept.step")).unwrap();
+    let folder = tempfile::tempdir().unwrap();
+    std::fs::copy(cad("swept.step"), folder.path().join("part.step")).unwrap();
+    for (number, fitted) in [(1, false), (3, true)] {
+        let face = &model.faces[number - 1];
+        let made = machinable("part.step", face, &whole()).unwrap();
+        let options = JobOptions {
+            source: Some(("part.step".to_owned(), 0.001)),
+            ..JobOptions::default()
+        };
+        let text = write_job("part.step", face, &made, &options).text;
+        assert_eq!(text.contains("source = \"part.step\""), fitted);
+        let text = format!("{text}\n[placement]\nscale = 2\nrotate_deg = [10, 20, 30]\n");
+        let name = folder.path().join("job.toml");
+        let job = job_file::parse_with(name.to_str().unwrap(), &text, &cad::Faces).unwrap();
+        let Some(source) = job.origin.cad() else {
+            assert!(!fitted);
+            continue;
+        };
+        assert_eq!(
+            (source.face, source.scale, source.tolerance_mm),
+            (number, 2.0, 0.001)
+        );
+        let original = cad::Original::read(source).unwrap().unwrap();
+        let surface = oracle::Surface::new(&source.surface);
+        let [u, v] = surface.domain();
+        let mut most = 0.0_f64;
+        for i in 0..=40 {
+            for j in 0..=40 {
+                let at = |[low, high]: [f64; 2], k: i32| low + (high - low) * f64::from(k) / 40.0;
+                let (u, v) = (at(u, i), at(v, j));
+                most = most.max(original.from_surface(u, v, surface.at(u, v).point).length());
+            }
+        }
+        assert!(most <= 2.0 * 0.001 * 1.05 && most > 1e-5, "{most}");
+    }
+}

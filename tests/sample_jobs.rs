@@ -9,7 +9,7 @@ use machine::Machine;
 use machine::prepare::prepare;
 use oracle::Oracle;
 use verify::survey::Survey;
-use verify::swept::measure;
+use verify::swept::{Requirements, measure};
 
 use crate::swept::{check_limit, follow};
 
@@ -33,7 +33,11 @@ fn check(name: &str, passes: u32) {
     assert!(worst <= 5.0, "{name}: CL off by {worst} nm");
     let scanned = oracle.schedule().unwrap().len();
     assert_eq!(scanned, passes as usize, "{name}: passes of a dense scan");
-    check_limit(name, &job, &measure(&job, oracle, &followed.track, true, &()));
+    check_limit(
+        name,
+        &job,
+        &measure(&job, oracle, &followed.track, true, &Requirements::default(), &()),
+    );
 }
 
 /// A test for each job, with its number of passes.

@@ -8,7 +8,7 @@ use machine::Machine;
 use machine::prepare::prepare;
 use oracle::{Oracle, PassSample, SampleCheck};
 use verify::survey::{self, Survey};
-use verify::swept::{SweptResult, ToolPath, measure};
+use verify::swept::{Requirements, SweptResult, ToolPath, measure};
 
 /// Results of one run of a job: the oracle, its survey, and the emitted path.
 pub(crate) struct Followed {
@@ -45,7 +45,14 @@ pub(crate) fn follow(job: &Job) -> Followed {
 
 fn findings(job: &Job) -> SweptResult {
     let followed = follow(job);
-    measure(job, &followed.oracle, &followed.track, true, &())
+    measure(
+        job,
+        &followed.oracle,
+        &followed.track,
+        true,
+        &Requirements::default(),
+        &(),
+    )
 }
 
 /// Checks that the largest scallop height is between half of the limit and the limit, and that there is no gouge.

@@ -8,5 +8,6 @@
 //! ```
 
 pub mod commands;
+mod motion;
 pub mod probe;
 pub mod template;

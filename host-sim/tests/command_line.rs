@@ -481,6 +481,225 @@ fn json_has_the_names_that_scripts_rely_on() {
     has(&told["fault"], FAULT, "fault");
 }
 
+/// Checks a value against the part of JSON Schema that `docs/verify.schema.json` uses. Returns what does not fit.
+fn misfits(value: &Value, schema: &Value, at: &str, all: &mut Vec<String>) {
+    let name = match value {
+        Value::Null => "null",
+        Value::Bool(_) => "boolean",
+        Value::Number(_) => "number",
+        Value::String(_) => "string",
+        Value::Array(_) => "array",
+        Value::Object(_) => "object",
+    };
+    let permitted = match &schema["type"] {
+        Value::String(one) => one == name,
+        Value::Array(several) => several.iter().any(|one| one == name),
+        _ => schema["enum"].as_array().unwrap().contains(value),
+    };
+    if !permitted {
+        all.push(format!("{at}: {value}"));
+    }
+    let (Value::Object(keys), Some(known)) = (value, schema["properties"].as_object()) else {
+        return;
+    };
+    for (key, value) in keys {
+        match known.get(key) {
+            Some(schema) => misfits(value, schema, &format!("{at}.{key}"), all),
+            None => all.push(format!("{at}.{key} is not in the schema")),
+        }
+    }
+    for required in schema["required"].as_array().into_iter().flatten() {
+        if !keys.contains_key(required.as_str().unwrap()) {
+            all.push(format!("{at} lacks {required}"));
+        }
+    }
+}
+
+fn misfits_of(value: &Value, definition: &str) -> Vec<String> {
+    let schema: Value = serde_json::from_str(include_str!("../../docs/verify.schema.json")).unwrap();
+    let mut all = Vec::new();
+    misfits(value, &schema["$defs"][definition], definition, &mut all);
+    all
+}
+
+/// Whatever happens, `verify --json` prints one object of the schema, with the exit code of old.
+#[test]
+fn verify_prints_an_object_of_the_schema_for_every_outcome() {
+    let folder = folder_with("torus", &[]);
+    let write = |name: &str, text: &str| std::fs::write(folder.path().join(name), text).unwrap();
+    let torus = std::fs::read_to_string(folder.path().join("job.toml")).unwrap();
+    write(
+        "limits.toml",
+        &format!(
+            "{}\n[machine]\njerk_max_mm_s3 = [2000, 2000, 2000]\n",
+            torus.replace("scallop_mm = 0.005", "scallop_mm = 0.2")
+        ),
+    );
+    write("fault.toml", &torus.replace("radius_mm = 5", "radius_mm = 9"));
+    write(
+        "line.toml",
+        &torus.replace("feed_mm_min = 600", "feed_mm_min = -1"),
+    );
+    for (arguments, code, definition) in [
+        ("verify job.toml --json", 0, "verification"),
+        ("verify limits.toml --json", 0, "verification"),
+        ("verify fault.toml --json", 1, "verification"),
+        ("verify line.toml --json", 2, "error"),
+        ("verify nothing.toml --json", 2, "error"),
+        ("verify --json", 2, "error"),
+        ("verify job.toml --json --scallop-tolerance x", 2, "error"),
+        ("verify job.toml limits.toml --json", 0, "several"),
+        ("verify job.toml fault.toml --json", 1, "several"),
+        ("verify fault.toml line.toml job.toml --json", 2, "several"),
+    ] {
+        let output = run(folder.path(), arguments);
+        assert_eq!(output.status.code(), Some(code), "{arguments}: {}", err(&output));
+        let told: Value =
+            serde_json::from_slice(&output.stdout).unwrap_or_else(|error| panic!("{arguments}: {error}"));
+        assert_eq!(misfits_of(&told, definition), Vec::<String>::new(), "{arguments}");
+        for job in told["jobs"].as_array().into_iter().flatten() {
+            let definition = if job.get("error").is_some() {
+                "error"
+            } else {
+                "verification"
+            };
+            let mut off = misfits_of(job, definition);
+            // In a list an error names its job too.
+            off.retain(|line| {
+                definition == "verification" || !(line.contains(".job") || line.contains(".passed"))
+            });
+            assert_eq!(off, Vec::<String>::new(), "{arguments}");
+        }
+        assert_eq!(
+            told["passed"].as_bool().unwrap_or(false),
+            code == 0,
+            "{arguments}"
+        );
+    }
+    let told: Value = serde_json::from_slice(&run(folder.path(), "verify line.toml --json").stdout).unwrap();
+    let line = torus
+        .lines()
+        .position(|line| line.starts_with("feed_mm_min"))
+        .unwrap()
+        + 1;
+    assert_eq!(told["error"]["line"], line, "{told}");
+    assert!(told["error"]["help"].as_str().unwrap().contains("600"));
+}
+
+/// A scallop above its limit is told with what helps, and both remedies do.
+#[test]
+fn remedies_for_a_scallop_help() {
+    // The paper's spacing exceeds the height on this job.
+    let first_order = (
+        "pattern = \"zigzag\"",
+        "pattern = \"zigzag\"\nspacing = \"first-order\"",
+    );
+    let folder = folder_with("torus", &[first_order]);
+    let output = run(folder.path(), "verify job.toml");
+    let told = out(&output);
+    assert_eq!(output.status.code(), Some(1), "{told}");
+    let after = |what: &str| {
+        let rest = told
+            .split(what)
+            .nth(1)
+            .unwrap_or_else(|| panic!("no {what} in {told}"));
+        rest.split([',', '\n']).next().unwrap().trim().to_owned()
+    };
+    let tolerance = after("--scallop-tolerance ");
+    let accepted = run(
+        folder.path(),
+        &format!("verify job.toml --scallop-tolerance {tolerance}"),
+    );
+    assert_eq!(accepted.status.code(), Some(0), "{}", out(&accepted));
+    let asked = format!("scallop_mm = {}", after("ask for scallop_mm = "));
+    let lower = folder_with("torus", &[first_order, ("scallop_mm = 0.005", &asked)]);
+    let found = json(lower.path(), "verify job.toml --json --scallop-tolerance 100%");
+    assert!(found["scallop_max_mm"].as_f64().unwrap() <= 0.005, "{found}");
+}
+
+/// The core's own samples, judged as anybody's: as `verify` finds them. Moved by 4 um they fail, with that path error.
+#[test]
+fn judge_takes_samples_and_agrees_with_verify() {
+    let folder = folder_with("torus", &[("scallop_mm = 0.005", "scallop_mm = 0.02")]);
+    assert!(
+        run(folder.path(), "simulate job.toml --trace own.csv")
+            .status
+            .success()
+    );
+    let told = json(folder.path(), "judge job.toml own.csv --json");
+    let verified = json(folder.path(), "verify job.toml --json");
+    let number = |value: &Value| value.as_f64().unwrap();
+    assert_eq!(told["passed"], true, "{told}");
+    assert_eq!(told["given"], told["core"], "the same motion");
+    let [theirs, ours] = [&told["given"], &verified].map(|of| number(&of["scallop_max_mm"]));
+    assert!((theirs / ours - 1.0).abs() < 2e-3, "{theirs} and {ours}");
+    assert!(number(&told["given"]["path_error_max_mm"]) < 10e-6, "{told}");
+    assert!(number(&told["given"]["ripple_rms_pct"]) < 0.02, "{told}");
+    let trace = std::fs::read_to_string(folder.path().join("own.csv")).unwrap();
+    let mut table = "t_s,x_mm,y_mm,z_mm\n".to_owned();
+    for line in trace.lines().skip(1) {
+        let fields: Vec<&str> = line.split(',').collect();
+        let mm = |index: usize| fields[index].parse::<f64>().unwrap() * 1e-6;
+        table += &format!("{},{},{},{}\n", fields[1], mm(10), mm(11), mm(12) - 5.0 + 0.004);
+    }
+    std::fs::write(folder.path().join("tip.csv"), &table).unwrap();
+    let output = run(folder.path(), "judge job.toml tip.csv --tip --alone --json");
+    assert_eq!(output.status.code(), Some(1), "{}", err(&output));
+    let told: Value = serde_json::from_slice(&output.stdout).unwrap();
+    // The ball sits in the groove, so a lift moves it off the bottom by all of it, and nearer to neither flank.
+    assert!(
+        (number(&told["given"]["path_error_max_mm"]) - 0.004).abs() < 5e-5,
+        "{told}"
+    );
+    assert!(told["core"].is_null());
+    for (text, wanted) in [
+        ("t_s,x,y,z\n0,1,2,3\n", ":1: the columns"),
+        (
+            "t_s,x_mm,y_mm,z_mm\n0,1,2,3\n0.001,1,2,x\n",
+            ":3: `x` is no number",
+        ),
+        (
+            "t_s,x_mm,y_mm,z_mm\n0,1,2,3\n0.001,1,2,3\n0.005,1,2,3\n",
+            "not evenly spaced",
+        ),
+        ("t_s,x_mm,y_mm,z_mm\n0,1,2,3\n", "do not ascend"),
+        ("t_s,x_mm,y_mm,z_mm\n0,1,2,3\n1,1,2,9000\n", "not within 2147"),
+    ] {
+        std::fs::write(folder.path().join("bad.csv"), text).unwrap();
+        let output = run(folder.path(), "judge job.toml bad.csv --json");
+        assert_eq!(output.status.code(), Some(2), "{text}");
+        let told: Value = serde_json::from_slice(&output.stdout).unwrap();
+        assert!(
+            told["error"]["message"].as_str().unwrap().contains(wanted),
+            "{told}"
+        );
+    }
+}
+
+/// A program of chords within 5 um, read by LinuxCNC's interpreter: its path error is at most that, and it shows.
+#[test]
+fn judge_takes_programs() {
+    let folder = folder_with("torus", &[("scallop_mm = 0.005", "scallop_mm = 0.02")]);
+    let exported = run(folder.path(), "export job.toml --format linuxcnc -o part.ngc");
+    assert!(exported.status.success(), "{}", err(&exported));
+    let output = run(
+        folder.path(),
+        "judge job.toml part.ngc --alone --json --path-tolerance 0.0052",
+    );
+    let told: Value = serde_json::from_slice(&output.stdout).unwrap();
+    assert!(
+        told.get("given").is_some(),
+        "LinuxCNC's rs274 is needed, as scripts/setup.sh brings it: {told}"
+    );
+    let error = told["given"]["path_error_max_mm"].as_f64().unwrap();
+    assert!(error > 0.002 && error <= 0.0052, "{error}");
+    let [least, mean] = ["min", "mean"].map(|key| told["given"]["feed_mm_s"][key].as_f64().unwrap());
+    assert!(least < mean && (mean - 10.0).abs() < 0.1, "{mean}");
+    std::fs::write(folder.path().join("bad.ngc"), "G1 X1 Y2 F0 Q\n").unwrap();
+    let refused = run(folder.path(), "judge job.toml bad.ngc --json");
+    assert_eq!(refused.status.code(), Some(2), "{}", out(&refused));
+}
+
 /// No progress bar, and nothing else on stderr, if that is not a terminal.
 #[test]
 fn no_bars_without_a_terminal() {

@@ -38,6 +38,8 @@ pub struct JobOptions {
     pub side: Option<String>,
     /// Order of the passes, as in job files.
     pub pattern: Option<String>,
+    /// Path of the CAD file relative to the job file, and the tolerance of an approximation, mm: an approximated surface names its source.
+    pub source: Option<(String, f64)>,
 }
 
 /// A job file and the chosen options.
@@ -186,6 +188,13 @@ fn text(
     }
     out.push('\n');
     write_surface(&mut out, &surface.nurbs);
+    if let (Form::Fitted { .. }, Some((path, tolerance_mm))) = (&surface.form, &options.source) {
+        let _ = writeln!(
+            out,
+            "# What the surface approximates: `cargo sim verify` measures against it\nsource = {path:?}\nsource_face = {}\ntolerance_mm = {tolerance_mm}",
+            face.number
+        );
+    }
     if centred {
         out.push_str("\n[placement]\nplace = \"centre\"            # the centre of its box, at translate_mm\ntranslate_mm = [0, 0, 0]\n");
     }

@@ -32,7 +32,7 @@ mod tests;
 
 pub use curve::Curve;
 pub use error::CadError;
-pub use faces::Faces;
+pub use faces::{Faces, Original};
 pub use fit::Deviation;
 pub use job::{JobOptions, JobText, write_job};
 pub use machinable::{Form, MachinableFace, Options, degrees, machinable};

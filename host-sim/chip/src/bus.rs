@@ -195,13 +195,18 @@ impl Surroundings for Chip {
     }
 }
 
+/// Bits of the program status register that are not 0 within an IT block.
+pub(crate) const IT_STATE: u32 = 0x0600_fc00;
+
 impl Chip {
-    /// Whether an interrupt would be taken now.
+    /// Whether an interrupt would be taken now. The chip takes one within an IT block, too; here it waits for the block's end, four instructions at
+    /// most.
     pub(crate) fn is_deliverable(&self, registers: &Registers) -> bool {
         let Some((_, priority)) = self.nvic.first() else {
             return false;
         };
-        registers.get(Register::PRIMASK) & 1 == 0 && priority < self.level(registers)
+        let in_block = registers.get(Register::XPSR) & IT_STATE != 0;
+        !in_block && registers.get(Register::PRIMASK) & 1 == 0 && priority < self.level(registers)
     }
 
     /// The priority that an interrupt has to exceed: the execution priority, or `BASEPRI`.

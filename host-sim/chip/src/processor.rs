@@ -3,6 +3,7 @@
 //! Frames are stacked at once: lazy stacking of floating-point registers is not modelled, nor tail-chaining and late arrival.
 
 use crate::{
+    bus::IT_STATE,
     chip::Chip,
     memory::Memory,
     part::rcc::cause,
@@ -151,7 +152,7 @@ impl Processor {
         let has_float = control & 4 != 0;
         let chip = self.engine.surroundings();
         let (running, depth) = (chip.nvic.number(), chip.nvic.depth());
-        if xpsr & 0x0600_fc00 != 0 {
+        if xpsr & IT_STATE != 0 {
             chip.world.wrong("an exception within an IT block: not modelled");
         }
         if control & 2 != 0 {

@@ -9,14 +9,12 @@
 pub mod comparison;
 mod error;
 mod fault;
-mod pass_time;
 mod run;
 mod sample;
 mod verification;
 
 pub use error::InspectError;
 pub use fault::FaultAt;
-pub use pass_time::{PassTime, pass_times};
 pub use run::{PassDigest, TimedRun, load_error, oracle, survey_run, time_run};
 pub use sample::{is_on_pass, plain};
-pub use verification::{BOUNDS, RunMeasurements, Verification, verify_run};
+pub use verification::{BOUNDS, Requirements, RunMeasurements, Verification, verify_run};

@@ -8,12 +8,14 @@ use job::Job;
 use machine::prepare::Prepared;
 use machine::travel;
 use oracle::{AccuracyBounds, PassSample, SampleCheck};
-use verify::motion::{PeakMeter, Peaks, limits};
+use verify::motion::{
+    JobTimes, OptimumTimes, PeakMeter, Peaks, RunPass, TimeMeter, limits, optimum_times, times,
+};
 use verify::survey::{SampleObserver, Survey, SurveyResult};
 use verify::swept::{self, Progress, ToolPath};
 
 use crate::run::{PROGRESS_SAMPLES, machine, oracle};
-use crate::{InspectError, PassTime, TimedRun, pass_times, plain};
+use crate::{InspectError, TimedRun, plain};
 
 /// Bounds of every sample, as in the README.
 pub const BOUNDS: AccuracyBounds = AccuracyBounds {
@@ -80,8 +82,10 @@ pub struct RunMeasurements {
     pub swept: swept::SweptResult,
     /// Use of the axis limits.
     pub axes: Peaks,
-    /// Passes against the optimum; empty if not requested.
-    pub pass_times: Vec<PassTime>,
+    /// The time and its parts.
+    pub times: JobTimes,
+    /// Passes and the whole job against the optimum; empty if not requested.
+    pub optimum: OptimumTimes,
 }
 
 /// A verified job.
@@ -96,8 +100,16 @@ pub struct Verification {
     pub warnings: Vec<String>,
 }
 
-/// Verifies a job after its timed run. `each` is called for every sample on a pass; `with_optimum` also computes the optimum of the first,
-/// the middle and the last pass.
+/// What a verification computes and requires besides the bounds of every sample.
+#[derive(Clone, Copy, Default)]
+pub struct Requirements<'a> {
+    /// Computes the optimum of the first, the middle and the last pass; with limits also of those that could be slowest.
+    pub with_optimum: bool,
+    /// Requirements of the swept ball.
+    pub swept: swept::Requirements<'a>,
+}
+
+/// Verifies a job after its timed run. `each` is called for every sample on a pass.
 ///
 /// # Errors
 /// The core refuses the job, or the oracle has no result for it.
@@ -106,14 +118,15 @@ pub fn verify_run<'a>(
     prepared: &Prepared,
     timed: &TimedRun,
     each: Option<&'a mut SampleObserver<'a>>,
-    with_optimum: bool,
+    requirements: &Requirements<'_>,
     progress: &dyn Progress,
 ) -> Result<Verification, InspectError> {
-    let measured = measure(job, prepared, timed, each, with_optimum, progress)?;
+    let measured = measure(job, prepared, timed, each, requirements, progress)?;
     let scanned = oracle(job)?.schedule().ok().map(|passes| passes.len());
     let failures = failures(job, timed, &measured, scanned);
     let own = |warning: &&String| !failures.contains(warning);
-    let warnings = measured.swept.warnings.iter().filter(own).cloned().collect();
+    let mut warnings: Vec<String> = measured.swept.warnings.iter().filter(own).cloned().collect();
+    warnings.extend(times::warning(&measured.times));
     Ok(Verification {
         measured,
         scanned,
@@ -128,7 +141,7 @@ fn measure<'a>(
     prepared: &Prepared,
     timed: &TimedRun,
     mut each: Option<&'a mut SampleObserver<'a>>,
-    with_optimum: bool,
+    requirements: &Requirements<'_>,
     progress: &dyn Progress,
 ) -> Result<RunMeasurements, InspectError> {
     let oracle = oracle(job)?;
@@ -150,33 +163,58 @@ fn measure<'a>(
     let mut survey = Survey::new(&oracle, None, Some(&mut keep));
     let mut written = Ok(());
     let mut running = BTreeMap::<u32, u64>::new();
+    let mut time = TimeMeter::new(job.machine.period_s(), job.feed_mm_s());
     progress.begin("measuring", timed.samples);
     let ran = machine(job, prepared)?.run(|sample| {
         axes.borrow_mut().emitted(sample.tick, sample.cl_nm);
         if sample.state == State::Running {
             *running.entry(sample.pass).or_default() += 1;
         }
-        written = survey.add(&plain(prepared, sample));
+        let emitted = plain(prepared, sample);
+        time.add(&emitted);
+        written = survey.add(&emitted);
         if u64::from(sample.tick) % PROGRESS_SAMPLES == PROGRESS_SAMPLES - 1 {
             progress.done(PROGRESS_SAMPLES);
         }
         written.is_ok()
     });
     written?;
+    let times = time.finish();
     let findings = survey.finish(ran.is_ok())?;
-    let swept = swept::measure(job, &oracle, &track, ran.is_ok(), progress);
-    let pass_times = if with_optimum {
+    let swept = swept::measure(job, &oracle, &track, ran.is_ok(), &requirements.swept, progress);
+    let optimum = if requirements.with_optimum {
         progress.begin("the optimum", 1);
-        pass_times(job, &oracle, &track, &running)
+        optimum_times(job, &oracle, &run_passes(&track, &running), &times)
     } else {
-        Vec::new()
+        OptimumTimes::default()
     };
     Ok(RunMeasurements {
         findings,
         swept,
         axes: axes.into_inner().finish(),
-        pass_times,
+        times,
+        optimum,
     })
+}
+
+/// The passes that ran, with the number of their samples.
+fn run_passes(track: &ToolPath, samples: &BTreeMap<u32, u64>) -> Vec<RunPass> {
+    let count = |pass: usize| {
+        u32::try_from(pass)
+            .ok()
+            .and_then(|pass| samples.get(&pass))
+            .copied()
+    };
+    let passes = track.passes.iter().enumerate();
+    passes
+        .filter_map(|(pass, path)| {
+            Some(RunPass {
+                pass,
+                side: path.side,
+                samples: count(pass)?,
+            })
+        })
+        .collect()
 }
 
 /// Reasons against the job, most severe first.
@@ -218,21 +256,36 @@ mod tests {
         job.scallop_mm = 0.1;
         let prepared = prepare(&job).unwrap();
         let timed = time_run(&job, &prepared, &()).unwrap();
-        let found = verify_run(&job, &prepared, &timed, None, true, &()).unwrap();
+        let requirements = Requirements {
+            with_optimum: true,
+            ..Requirements::default()
+        };
+        let found = verify_run(&job, &prepared, &timed, None, &requirements, &()).unwrap();
         assert_eq!(found.failures, Vec::<String>::new());
         for peak in &found.measured.axes {
             let share = peak.share.unwrap();
             assert!(share > 0.1 && share < 1.06, "{share}");
         }
-        assert_eq!(found.measured.pass_times.len(), 3);
-        assert!(found.measured.pass_times.iter().all(|time| time.ours_s.is_some()));
+        let optimum = &found.measured.optimum;
+        assert!(optimum.passes.len() >= 3 && optimum.passes.iter().all(|time| time.ours_s.is_some()));
+        // No pass is worse than the worst one solved, or than the bound that is told.
+        let worst = optimum.ratio_max.unwrap();
+        assert!((0.999..1.3).contains(&worst), "{worst}");
+        assert!(
+            optimum.ratio_bound < 1.3 && optimum.whole_ratio.unwrap() > 1.0 - 1e-3,
+            "{optimum:?}"
+        );
+        let times = &found.measured.times;
+        let period_s = job.machine.period_s();
+        assert!((times.whole_s - timed.samples as f64 * period_s).abs() < 0.5 * period_s);
+        assert!(times.at_feed_s > 0.5 * times.whole_s && times.turns_s > 0.0 && times.links_s > 0.0);
         // The same motion against a default that it does not hold.
         let limits = job.machine.limits.unwrap();
         job.machine.limits = Some(AxisLimits {
             jerk_mm_s3: limits.jerk_mm_s3.map(|jerk| 0.5 * jerk),
             ..limits
         });
-        let judged = verify_run(&job, &prepared, &timed, None, false, &()).unwrap();
+        let judged = verify_run(&job, &prepared, &timed, None, &Requirements::default(), &()).unwrap();
         assert!(
             judged
                 .failures

@@ -69,41 +69,72 @@ impl FaceReader for NoFaces {
     }
 }
 
-/// The surface of kind "file".
+/// The surface of kind "file", and its face.
 pub(crate) fn read(
     section: &Section<'_>,
     elsewhere: &[(&str, &str)],
     faces: &dyn FaceReader,
-) -> Result<SurfaceSpec, JobError> {
+) -> Result<(SurfaceSpec, Face), JobError> {
     section.only(&["kind", "path", "face", "tolerance_mm", "untrimmed"], elsewhere)?;
-    let path = section.text("path")?;
-    let number = read_number(section)?;
-    let untrimmed = section.switch("untrimmed")?;
-    let tolerance_mm = if section.has("tolerance_mm") {
-        let want = "the tolerance of an approximation in mm, e.g. 0.001";
-        section.number_within("tolerance_mm", 0.0, TOLERANCE_MAX_MM, want)?
-    } else {
-        TOLERANCE_DEFAULT_MM
-    };
-    let folder = Path::new(section.file()).parent().unwrap_or(Path::new(""));
     let face = Face {
-        path: folder.join(path),
-        number,
-        tolerance_mm,
-        untrimmed,
+        path: beside(section, section.text("path")?),
+        number: read_number(section, "face")?,
+        tolerance_mm: read_tolerance(section)?,
+        untrimmed: section.switch("untrimmed")?,
     };
-    faces.surface(&face).map_err(|error| {
+    let surface = faces.surface(&face).map_err(|error| {
         let key = if error.of_face { "face" } else { "path" };
         section.error(key, error.what, error.remedy)
-    })
+    })?;
+    Ok((surface, face))
+}
+
+/// The face of which a surface of kind "nurbs" is an approximation, if the section names one. It is not read here.
+pub(crate) fn source(section: &Section<'_>) -> Result<Option<Face>, JobError> {
+    if !section.has("source") {
+        return match ["source_face", "tolerance_mm"]
+            .into_iter()
+            .find(|key| section.has(key))
+        {
+            None => Ok(None),
+            Some(key) => Err(section.error(
+                key,
+                format!("`{key}` belongs to `source`"),
+                "name the CAD file, e.g. source = \"part.step\"",
+            )),
+        };
+    }
+    Ok(Some(Face {
+        path: beside(section, section.text("source")?),
+        number: read_number(section, "source_face")?,
+        tolerance_mm: read_tolerance(section)?,
+        untrimmed: true,
+    }))
+}
+
+/// A path relative to the job file.
+fn beside(section: &Section<'_>, path: impl AsRef<Path>) -> PathBuf {
+    Path::new(section.file())
+        .parent()
+        .unwrap_or(Path::new(""))
+        .join(path)
+}
+
+/// The tolerance of an approximation, mm.
+fn read_tolerance(section: &Section<'_>) -> Result<f64, JobError> {
+    if !section.has("tolerance_mm") {
+        return Ok(TOLERANCE_DEFAULT_MM);
+    }
+    let want = "the tolerance of an approximation in mm, e.g. 0.001";
+    section.number_within("tolerance_mm", 0.0, TOLERANCE_MAX_MM, want)
 }
 
 /// The face's number, from 1.
-fn read_number(section: &Section<'_>) -> Result<usize, JobError> {
-    if !section.has("face") {
+fn read_number(section: &Section<'_>, key: &str) -> Result<usize, JobError> {
+    if !section.has(key) {
         return Ok(1);
     }
-    let number = section.number("face")?;
+    let number = section.number(key)?;
     if number.fract() == 0.0 && (1.0..=FACE_MAX).contains(&number) {
         #[allow(
             clippy::cast_possible_truncation,
@@ -113,8 +144,8 @@ fn read_number(section: &Section<'_>) -> Result<usize, JobError> {
         return Ok(number as usize);
     }
     Err(section.error(
-        "face",
-        format!("`face` must be a whole number from 1, not {number}"),
+        key,
+        format!("`{key}` must be a whole number from 1, not {number}"),
         "give the face's number, as `cargo sim import FILE --list` shows it",
     ))
 }

@@ -20,8 +20,8 @@ mod text;
 use std::path::Path;
 
 use job::{
-    Along, AlongChoice, CHORD_DEFAULT_MM, FEED_MAX_MM_MIN, FEED_MIN_MM_MIN, Job, JobError, MachineSpec,
-    Pattern, RADIUS_MAX_MM, Side, Spacing,
+    Along, AlongChoice, CHORD_DEFAULT_MM, CadSource, FEED_MAX_MM_MIN, FEED_MIN_MM_MIN, Job, JobError,
+    MachineSpec, Pattern, RADIUS_MAX_MM, Side, Spacing,
 };
 use section::{Reader, Section};
 
@@ -62,10 +62,10 @@ pub fn parse_with(name: &str, text: &str, faces: &dyn FaceReader) -> Result<Job,
     let reader = Reader::new(name, text);
     let document = reader.document()?;
     document.only(&["surface", "placement", "tool", "cut", "machine"], &[])?;
-    let surface = surface::read(&document.section("surface")?, faces)?;
-    let surface = match document.optional_section("placement")? {
-        Some(section) => placement::place(&section, &surface)?,
-        None => surface,
+    let (unplaced, face) = surface::read(&document.section("surface")?, faces)?;
+    let (surface, scale) = match document.optional_section("placement")? {
+        Some(section) => placement::place(&section, &unplaced)?,
+        None => (unplaced.clone(), 1.0),
     };
     let radius_mm = read_tool(&document.section("tool")?)?;
     let cut = document.section("cut")?;
@@ -93,6 +93,14 @@ pub fn parse_with(name: &str, text: &str, faces: &dyn FaceReader) -> Result<Job,
     let directions = [("u", Some(Along::U)), ("v", Some(Along::V)), ("auto", None)];
     let along = cut.choice("along", &directions)?;
     let mut origin = reader.origin(&document);
+    origin.set_cad(face.map(|face| CadSource {
+        path: face.path,
+        face: face.number,
+        tolerance_mm: face.tolerance_mm,
+        untrimmed: face.untrimmed,
+        surface: unplaced,
+        scale,
+    }));
     if along.is_none() {
         origin.set_along_choice(AlongChoice::Auto);
     }

@@ -41,9 +41,10 @@ fn read(section: &Section<'_>) -> Result<Placement, JobError> {
     Ok(read)
 }
 
-/// The surface after the placement of the section.
-pub(super) fn place(section: &Section<'_>, surface: &SurfaceSpec) -> Result<SurfaceSpec, JobError> {
-    read(section)?.place(surface).map_err(|outside| {
+/// The surface after the placement of the section, and the placement's scale.
+pub(super) fn place(section: &Section<'_>, surface: &SurfaceSpec) -> Result<(SurfaceSpec, f64), JobError> {
+    let placement = read(section)?;
+    let placed = placement.place(surface).map_err(|outside| {
         let (keys, remedy) = if outside.too_large {
             (["scale", "translate_mm"], "scale it down, or cut it into smaller surfaces")
         } else {
@@ -51,5 +52,6 @@ pub(super) fn place(section: &Section<'_>, surface: &SurfaceSpec) -> Result<Surf
         };
         let key = keys.into_iter().find(|key| section.has(key)).unwrap_or("place");
         section.error(key, outside.to_string(), remedy)
-    })
+    })?;
+    Ok((placed, placement.scale))
 }

@@ -6,7 +6,7 @@ use interp_core::STORE_WORDS;
 use interp_core::surface::POLYNOMIAL_WORDS;
 use job::{JobError, NurbsSpec, SurfaceSpec};
 
-use crate::file::FaceReader;
+use crate::file::{Face, FaceReader};
 use crate::section::{Section, Value};
 
 /// Highest degree of a NURBS surface: the core's patches are bicubic.
@@ -17,7 +17,7 @@ const TURN_TOLERANCE_RAD: f64 = 1e-9;
 const RADIUS_TOLERANCE_MM: f64 = 1e-9;
 
 /// Every key of any kind of surface, and the kinds that have the key.
-const KEYS: [(&str, &str); 14] = [
+const KEYS: [(&str, &str); 16] = [
     ("radius_mm", "only a revolved surface has it"),
     ("height_mm", "only a revolved surface has it"),
     ("v_rad", "only a revolved surface has it; here the range is `v`"),
@@ -31,6 +31,8 @@ const KEYS: [(&str, &str); 14] = [
     ("path", "only a surface of kind \"file\" has it"),
     ("face", "only a surface of kind \"file\" has it"),
     ("tolerance_mm", "only a surface of kind \"file\" has it"),
+    ("source", "only a nurbs surface has it"),
+    ("source_face", "only a nurbs surface has it"),
     ("untrimmed", "only a surface of kind \"file\" has it"),
 ];
 
@@ -45,7 +47,12 @@ enum Kind {
 }
 
 /// Reads the section `[surface]`.
-pub(super) fn read(section: &Section<'_>, faces: &dyn FaceReader) -> Result<SurfaceSpec, JobError> {
+///
+/// Returns the surface, and the face of a CAD file that it was made from.
+pub(super) fn read(
+    section: &Section<'_>,
+    faces: &dyn FaceReader,
+) -> Result<(SurfaceSpec, Option<Face>), JobError> {
     let kind = section.choice(
         "kind",
         &[
@@ -57,11 +64,11 @@ pub(super) fn read(section: &Section<'_>, faces: &dyn FaceReader) -> Result<Surf
         ],
     )?;
     match kind {
-        Kind::Revolved => revolved(section),
-        Kind::Ruled => ruled(section),
-        Kind::Bicubic => bicubic(section),
-        Kind::Nurbs => nurbs(section),
-        Kind::File => crate::file::read(section, &KEYS, faces),
+        Kind::Revolved => Ok((revolved(section)?, None)),
+        Kind::Ruled => Ok((ruled(section)?, None)),
+        Kind::Bicubic => Ok((bicubic(section)?, None)),
+        Kind::Nurbs => Ok((nurbs(section)?, crate::file::source(section)?)),
+        Kind::File => crate::file::read(section, &KEYS, faces).map(|(surface, face)| (surface, Some(face))),
     }
 }
 
@@ -127,7 +134,19 @@ fn nurbs(section: &Section<'_>) -> Result<SurfaceSpec, JobError> {
         .into_iter()
         .chain(KEYS)
         .collect();
-    section.only(&["kind", "degree", "knots_u", "knots_v", "poles_mm"], &elsewhere)?;
+    section.only(
+        &[
+            "kind",
+            "degree",
+            "knots_u",
+            "knots_v",
+            "poles_mm",
+            "source",
+            "source_face",
+            "tolerance_mm",
+        ],
+        &elsewhere,
+    )?;
     let degree = [read_degree(section, 0)?, read_degree(section, 1)?];
     let mut poles_mm = read_poles(section)?;
     let columns = poles_mm.first().map_or(0, Vec::len);

@@ -71,6 +71,12 @@ impl JobError {
         &self.0.what
     }
 
+    /// The file's name as given.
+    #[must_use]
+    pub fn name(&self) -> &str {
+        &self.0.name
+    }
+
     /// The remedy.
     #[must_use]
     pub fn remedy(&self) -> &str {

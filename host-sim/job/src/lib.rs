@@ -14,7 +14,7 @@ pub use machine::{
     AXES, AxisLimits, HEARTBEAT_TIMEOUT_DEFAULT_MS, HEARTBEAT_TIMEOUT_RANGE_MS, HeartbeatAction, MachineSpec,
     PERIOD_DEFAULT_US, PERIOD_RANGE_US, Ratio, StepOutput,
 };
-pub use origin::{AlongChoice, DirectionTrial, Origin};
+pub use origin::{AlongChoice, CadSource, DirectionTrial, Origin};
 pub use surface::{NurbsSpec, SurfaceSpec};
 pub use text::{one_line, printable, read_regular};
 

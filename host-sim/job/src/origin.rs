@@ -2,9 +2,10 @@
 
 use std::collections::BTreeMap;
 use std::ops::Range;
+use std::path::PathBuf;
 use std::sync::Arc;
 
-use crate::{Along, JobError};
+use crate::{Along, JobError, SurfaceSpec};
 
 /// Result of a run of the core with the passes in one direction.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -29,13 +30,31 @@ pub enum AlongChoice {
     Chosen([DirectionTrial; 2]),
 }
 
+/// The face of a CAD file from which a job's surface was made.
+#[derive(Clone, Debug, PartialEq)]
+pub struct CadSource {
+    /// The CAD file, relative to the working directory.
+    pub path: PathBuf,
+    /// Number of the face in the file, from 1.
+    pub face: usize,
+    /// Tolerance of an approximation, mm.
+    pub tolerance_mm: f64,
+    /// A trimmed face is machined over the rectangle that encloses it.
+    pub untrimmed: bool,
+    /// The job's surface before its placement, with the parameters of the face if it is an approximation.
+    pub surface: SurfaceSpec,
+    /// Scale of the placement.
+    pub scale: f64,
+}
+
 /// Origin of a job: the file and the ranges of its keys, to which later errors refer, and the choice of the direction.
-#[derive(Clone, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Debug, Default, PartialEq)]
 pub struct Origin {
     name: Arc<str>,
     text: Arc<str>,
     keys: BTreeMap<String, Range<usize>>,
     along_choice: AlongChoice,
+    cad: Option<Arc<CadSource>>,
 }
 
 impl Origin {
@@ -47,6 +66,7 @@ impl Origin {
             text: text.into(),
             keys,
             along_choice: AlongChoice::Given,
+            cad: None,
         }
     }
 
@@ -76,6 +96,17 @@ impl Origin {
     /// Records the origin of the direction.
     pub fn set_along_choice(&mut self, choice: AlongChoice) {
         self.along_choice = choice;
+    }
+
+    /// The face of a CAD file that the job names as the source of its surface.
+    #[must_use]
+    pub fn cad(&self) -> Option<&CadSource> {
+        self.cad.as_deref()
+    }
+
+    /// Records the source of the surface.
+    pub fn set_cad(&mut self, cad: Option<CadSource>) {
+        self.cad = cad.map(Arc::new);
     }
 
     /// An error at the value of `section.key`; at the section, else at the file, where the key is missing.

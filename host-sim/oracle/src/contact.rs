@@ -203,6 +203,37 @@ impl Oracle {
         self.contact_of(&self.surface.at(u, v), u, v)
     }
 
+    /// Unit normal N from the material to the tool at (u, v); `at`: the surface's derivatives there. At a pole as in [`Oracle::contact`].
+    ///
+    /// # Errors
+    /// [`OracleError::Degenerate`] where there is no normal.
+    pub fn normal(&self, at: &Derivatives, u: f64, v: f64) -> Result<DVec3, OracleError> {
+        let [[u0, u1], [v0, v1]] = self.surface.domain();
+        let reach = (at.u.length() * (u1 - u0), at.v.length() * (v1 - v0));
+        let (least, most) = (reach.0.min(reach.1), reach.0.max(reach.1));
+        let (limit_u, limit_v) = if least <= POLE_SHARE * most {
+            self.limits_at_pole(u, v, at, reach.0 < reach.1)
+        } else {
+            (at.u, at.v)
+        };
+        let product = limit_u.cross(limit_v);
+        let area = product.length();
+        if area.is_nan() || area <= SINE_MIN * limit_u.length() * limit_v.length() {
+            return Err(OracleError::Degenerate { u, v });
+        }
+        Ok(product * (self.normal_sign / area))
+    }
+
+    /// Directions of S_u and S_v at a pole: near it the derivative that vanishes is the mixed one times the signed step into the surface.
+    fn limits_at_pole(&self, u: f64, v: f64, at: &Derivatives, u_vanishes: bool) -> (DVec3, DVec3) {
+        let inwards = self.inwards(u, v, u_vanishes);
+        if u_vanishes {
+            (at.uv * inwards, at.v)
+        } else {
+            (at.u, at.uv * inwards)
+        }
+    }
+
     /// As [`Oracle::contact`], with the surface's derivatives precomputed.
     pub(super) fn contact_of(&self, at: &Derivatives, u: f64, v: f64) -> Result<Contact, OracleError> {
         let [[u0, u1], [v0, v1]] = self.surface.domain();
@@ -213,12 +244,7 @@ impl Oracle {
         if least <= POLE_SHARE * most {
             return self.contact_at_pole(u, v, at, u_vanishes);
         }
-        let product = at.u.cross(at.v);
-        let area = product.length();
-        if area <= SINE_MIN * speed_u * speed_v {
-            return Err(OracleError::Degenerate { u, v });
-        }
-        let contact = self.regular_contact(at, product * (self.normal_sign / area));
+        let contact = self.regular_contact(at, self.normal(at, u, v)?);
         if least > NEAR_POLE_SHARE * most {
             return Ok(contact);
         }
@@ -299,19 +325,7 @@ impl Oracle {
         at: &Derivatives,
         u_vanishes: bool,
     ) -> Result<Contact, OracleError> {
-        // Near the pole the vanishing derivative is the mixed one times the signed step into the surface.
-        let inwards = self.inwards(u, v, u_vanishes);
-        let (limit_u, limit_v) = if u_vanishes {
-            (at.uv * inwards, at.v)
-        } else {
-            (at.u, at.uv * inwards)
-        };
-        let product = limit_u.cross(limit_v);
-        let area = product.length();
-        if area.is_nan() || area <= SINE_MIN * limit_u.length() * limit_v.length() {
-            return Err(OracleError::Degenerate { u, v });
-        }
-        let normal = product * (self.normal_sign / area);
+        let normal = self.normal(at, u, v)?;
         let beside = self.beside_pole(u, v, u_vanishes)?;
         let pass_collapses = u_vanishes == (self.along == Along::U);
         let path_speed = if pass_collapses {

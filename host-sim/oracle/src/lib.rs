@@ -34,7 +34,7 @@ mod verify;
 pub use contact::{Contact, Oracle, OracleError};
 pub use derivatives::Derivatives;
 pub use offset::OffsetPoint;
-pub use report::{AccuracyBounds, AccuracyReport, ErrorStatistics, SampleLocation};
+pub use report::{AccuracyBounds, AccuracyFigure, AccuracyReport, ErrorStatistics, SampleLocation};
 pub use schedule::ScheduledPass;
 pub use surface::Surface;
 pub use verify::{PassSample, SampleCheck, Verifier};

@@ -51,6 +51,29 @@ impl ErrorStatistics {
     }
 }
 
+/// An error with the bound that applies to it.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct AccuracyFigure {
+    /// Name in a sentence.
+    pub name: &'static str,
+    /// What is measured.
+    pub label: &'static str,
+    /// The errors; none where the figure does not apply to the job.
+    pub errors: ErrorStatistics,
+    /// Largest permitted magnitude.
+    pub bound: f64,
+    /// Unit of both.
+    pub unit: &'static str,
+}
+
+impl AccuracyFigure {
+    /// Whether no error exceeds the bound.
+    #[must_use]
+    pub fn is_met(&self) -> bool {
+        self.errors.max.abs() <= self.bound
+    }
+}
+
 /// Result of a verification. Every error is emitted against oracle.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct AccuracyReport {
@@ -115,47 +138,84 @@ impl AccuracyReport {
         self.failures(bounds).is_empty()
     }
 
-    /// One sentence per error that exceeds its bound.
+    /// Every error with the bound that applies to it.
     #[must_use]
-    pub fn failures(&self, bounds: &AccuracyBounds) -> Vec<String> {
-        let figures = [
-            ("position error", self.position_nm, bounds.position_nm, "nm"),
-            ("contact error", self.contact_nm, bounds.contact_nm, "nm"),
-            (
-                "normal error",
-                self.normal_rad,
-                bounds.normal_rad + self.normal_floor_rad,
-                "rad",
+    pub fn figures(&self, bounds: &AccuracyBounds) -> [AccuracyFigure; 8] {
+        let figure = |name, label, errors: ErrorStatistics, bound, unit| AccuracyFigure {
+            name,
+            label,
+            errors,
+            bound,
+            unit,
+        };
+        let normal_rad = bounds.normal_rad + self.normal_floor_rad;
+        let whole_step = 1.0 + bounds.ripple_pct / 100.0;
+        [
+            figure(
+                "position error",
+                "cutter location",
+                self.position_nm,
+                bounds.position_nm,
+                "nm",
             ),
-            ("feed ripple", self.ripple_pct, bounds.ripple_pct, "%"),
-            (
+            figure(
+                "contact error",
+                "cutter contact",
+                self.contact_nm,
+                bounds.contact_nm,
+                "nm",
+            ),
+            figure("normal error", "tool normal", self.normal_rad, normal_rad, "rad"),
+            figure(
+                "feed ripple",
+                "feed ripple",
+                self.ripple_pct,
+                bounds.ripple_pct,
+                "%",
+            ),
+            figure(
+                "last step of a pass",
                 "last step of a pass",
                 self.last_step,
-                1.0 + bounds.ripple_pct / 100.0,
+                whole_step,
                 "of a full step",
             ),
-            (
+            figure(
                 "path interval error",
+                "interval candidates",
                 self.interval,
                 bounds.interval,
                 "(relative)",
             ),
-            (
+            figure(
                 "error of the pass position",
+                "step to the next pass",
                 self.side_step,
                 bounds.side_step,
                 "of its interval",
             ),
-            ("curvature times ball radius", self.fit, bounds.fit, ""),
-        ];
-        let mut failures: Vec<String> = figures
+            figure(
+                "curvature times ball radius",
+                "ball fits (r k)",
+                self.fit,
+                bounds.fit,
+                "",
+            ),
+        ]
+    }
+
+    /// One sentence per error that exceeds its bound.
+    #[must_use]
+    pub fn failures(&self, bounds: &AccuracyBounds) -> Vec<String> {
+        let mut failures: Vec<String> = self
+            .figures(bounds)
             .into_iter()
-            .filter(|(_, figure, bound, _)| figure.max > *bound)
-            .map(|(name, figure, bound, unit)| {
-                let SampleLocation { tick, pass, u, v } = figure.at;
+            .filter(|figure| !figure.is_met())
+            .map(|figure| {
+                let SampleLocation { tick, pass, u, v } = figure.errors.at;
                 format!(
-                    "{name} {:.6e} {unit} exceeds {bound:.6e} at tick {tick}, pass {pass}, u = {u}, v = {v}",
-                    figure.max
+                    "{} {:.6e} {} exceeds {:.6e} at tick {tick}, pass {pass}, u = {u}, v = {v}",
+                    figure.name, figure.errors.max, figure.unit, figure.bound
                 )
             })
             .collect();

@@ -131,6 +131,26 @@ pub(crate) fn chosen<'m>(
     }
 }
 
+/// Path of a CAD file as its job file names it: relative to the job's folder where both have a common one. `None` where TOML cannot
+/// express it plainly.
+fn relative(file: &Path, job: &Path) -> Option<String> {
+    let folder = job.parent().filter(|folder| !folder.as_os_str().is_empty());
+    let folder = folder.unwrap_or(Path::new(".")).canonicalize().ok()?;
+    let file = file.canonicalize().ok()?;
+    let common = file
+        .components()
+        .zip(folder.components())
+        .take_while(|(a, b)| a == b)
+        .count();
+    let up = folder
+        .components()
+        .skip(common)
+        .map(|_| std::path::Component::ParentDir);
+    let path: PathBuf = up.chain(file.components().skip(common)).collect();
+    let text = path.to_str()?;
+    (!text.chars().any(char::is_control)).then(|| text.to_owned())
+}
+
 fn report(arguments: &Arguments, path: &Path, face: &Face, made: &MachinableFace, written: &JobText) {
     let size = written.measures.size_mm();
     if arguments.json {
@@ -218,6 +238,7 @@ pub(super) fn command(arguments: &Arguments) -> Result<()> {
             along: arguments.along.clone(),
             side: arguments.side.clone(),
             pattern: arguments.pattern.clone(),
+            source: relative(&arguments.file, path).map(|source| (source, arguments.tolerance)),
         },
     )?;
     // The job is parsed before it is written, so that the options are checked by the rules of the job file.

@@ -5,11 +5,13 @@ mod approach;
 #[cfg(feature = "developer")]
 mod budget;
 mod completions;
+mod error_json;
 mod explain;
 mod export;
 mod flash;
 mod home;
 mod import;
+mod judge;
 mod log;
 mod motion_words;
 mod new;
@@ -27,7 +29,7 @@ mod typed;
 mod verify;
 mod whole;
 
-use out::complain;
+use out::{complain, say};
 use programs::with_command_name;
 use progress::{Bar, progress, spinner};
 
@@ -117,6 +119,7 @@ enum Command {
     Run(run::Arguments),
     Operate(operate::Arguments),
     Verify(verify::Arguments),
+    Judge(judge::Arguments),
     Export(export::Arguments),
     Import(import::Arguments),
     #[cfg(feature = "developer")]
@@ -138,6 +141,7 @@ impl Command {
             Self::Run(arguments) => arguments.json,
             Self::Operate(arguments) => arguments.json,
             Self::Verify(arguments) => arguments.json,
+            Self::Judge(arguments) => arguments.json,
             Self::Export(arguments) => arguments.json,
             Self::Import(arguments) => arguments.json,
             #[cfg(feature = "developer")]
@@ -158,6 +162,7 @@ impl Command {
             Self::Run(arguments) => run::command(arguments),
             Self::Operate(arguments) => operate::command(arguments),
             Self::Verify(arguments) => verify::command(arguments),
+            Self::Judge(arguments) => judge::command(arguments),
             Self::Export(arguments) => export::command(arguments),
             Self::Import(arguments) => import::command(arguments),
             #[cfg(feature = "developer")]
@@ -200,12 +205,29 @@ fn with_name(command: clap::Command) -> clap::Command {
 /// Reads the arguments, runs the command, and returns its exit code: 0 done, 1 failed, 2 bad usage or bad input.
 #[must_use]
 pub fn main() -> ExitCode {
-    let parsed = Cli::from_arg_matches(&arguments().get_matches());
-    let command = parsed.unwrap_or_else(|error| error.exit()).command;
+    let parsed = arguments()
+        .try_get_matches()
+        .and_then(|matches| Cli::from_arg_matches(&matches));
+    let command = match parsed {
+        Ok(parsed) => parsed.command,
+        Err(error) => {
+            // The arguments were not understood, so only their text tells whether JSON is expected.
+            if error.use_stderr() && std::env::args_os().any(|argument| argument == "--json") {
+                say!("{}", error_json::of_usage(&error));
+                out::finish();
+            }
+            error.exit()
+        }
+    };
     if command.as_json() {
         progress::silence();
     }
     let result = command.execute();
+    if let (true, Err(failure)) = (command.as_json() && !out::printed(), &result)
+        && let Some(object) = error_json::of_failure(failure)
+    {
+        say!("{object}");
+    }
     let unwritten = out::finish();
     if let Some(error) = &unwritten {
         complain!("error: cannot write to standard output: {error}");

@@ -5,6 +5,7 @@
 
 use std::fmt::Arguments;
 use std::io::{self, ErrorKind, Write, stderr, stdout};
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Mutex, PoisonError};
 
 use job::printable;
@@ -19,6 +20,8 @@ enum Output {
     Failed(io::Error),
 }
 
+/// Whether anything was printed to standard output.
+static PRINTED: AtomicBool = AtomicBool::new(false);
 static OUTPUT: Mutex<Output> = Mutex::new(Output::Open);
 
 /// Writes, unless an earlier write failed.
@@ -60,8 +63,14 @@ fn coloured(text: &str) -> String {
 
 /// Prints to standard output, with escapes for control characters, as JSON has them.
 pub(super) fn to_stdout(text: Arguments<'_>) {
+    PRINTED.store(true, Ordering::Relaxed);
     let text = text.to_string();
     attempt(|| stdout().write_all(with_command_name(&printable(&text)).as_bytes()));
+}
+
+/// Whether anything was printed to standard output.
+pub(super) fn printed() -> bool {
+    PRINTED.load(Ordering::Relaxed)
 }
 
 /// Prints a line to standard error; a write error is ignored.

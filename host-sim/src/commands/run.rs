@@ -319,7 +319,7 @@ pub(super) fn command(arguments: &Arguments) -> Result<()> {
     if let Some(path) = &arguments.trace {
         whole::check(path, arguments.force)?;
     }
-    let directory = WantedReport::new(arguments.report.as_ref(), arguments.force)?;
+    let directory = WantedReport::new(arguments.report.as_deref(), arguments.force)?;
     if arguments.fast && job.machine.heartbeat_action == HeartbeatAction::Hold {
         return Err(Failure::input(
             "the emulated chip's time runs faster than this computer can send heartbeats, and the job has host_gone = \"hold\"",

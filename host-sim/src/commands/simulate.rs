@@ -106,7 +106,7 @@ pub(super) struct WantedReport<'a> {
 
 impl<'a> WantedReport<'a> {
     /// Checks that the report can be written, before the work for it is done.
-    pub(super) fn new(directory: Option<&'a PathBuf>, force: bool) -> Result<Option<Self>> {
+    pub(super) fn new(directory: Option<&'a Path>, force: bool) -> Result<Option<Self>> {
         directory
             .map(|directory| {
                 whole::check_folder(directory, &REPORT_FILES, force)?;
@@ -143,7 +143,7 @@ pub(super) fn command(arguments: &Arguments) -> Result<()> {
         .for_each(|script| whole::note_input(script));
     let wanted = WantedTrace::new(arguments.trace.as_ref(), arguments.force);
     wanted.map_or(Ok(()), |wanted| whole::check(wanted.path, wanted.force))?;
-    let directory = WantedReport::new(arguments.report.as_ref(), arguments.force)?;
+    let directory = WantedReport::new(arguments.report.as_deref(), arguments.force)?;
     if arguments.approach != Kind::Surface {
         warn_of_limits(&job);
         return approach::command(arguments.approach, &job, wanted, directory, arguments.json);

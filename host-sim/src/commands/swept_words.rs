@@ -6,9 +6,9 @@ use serde_json::{Map, Value, json};
 
 use job::Job;
 use machine::prepare::Prepared;
-use verify::motion::limits::{ORDERS, Peaks, TOLERANCES};
-use verify::survey;
+use verify::motion::limits::{ORDERS, Peak, Peaks};
 use verify::swept::{ConcaveRadius, SweptResult};
+use verify::{Verdict, survey};
 
 /// Capacity of the board for surface data, bytes.
 const STORE_BYTES: usize = STORE_WORDS * size_of::<i32>();
@@ -32,7 +32,7 @@ pub(super) fn json(
     axes: &Peaks,
 ) -> Map<String, Value> {
     let report = &survey.report;
-    let measured = !found.ridges.is_empty();
+    let measured = found.scallop_verdict != Verdict::Unknown;
     let null_unless = |known: bool, value: Value| if known { value } else { Value::Null };
     let (most, error) = (&found.scallop_max, &found.measurement_error);
     let gouge = found.gouge.map(|gouge| {
@@ -63,7 +63,7 @@ pub(super) fn json(
         },
         "scallop_at": null_unless(measured, json!({ "u": most.u, "v": most.v, "gap": most.gap, "place_mm": most.point_mm.to_array() })),
         "scallop_area_by_tenth": found.scallop_histogram,
-        "gouge_max_mm": found.gouge_max_mm(),
+        "gouge_max_mm": null_unless(found.gouge_verdict != Verdict::Unknown, json!(found.gouge_max_mm())),
         "gouge_floor_mm": found.gouge_floor_mm,
         "gouge_bound_mm": found.gouge_bound_mm,
         "gouge": gouge,
@@ -72,6 +72,10 @@ pub(super) fn json(
             "extent_mm": found.axes.extent_mm, "travel_mm": job.machine.travel_mm, "beyond_mm": found.axes.beyond_mm,
             "velocity_mm_s": axes[0].axes, "acceleration_mm_s2": axes[1].axes, "jerk_mm_s3": axes[2].axes,
         },
+        "cad_face": found.original.map(|original| json!({
+            "above_max_mm": original.above_mm, "below_max_mm": original.below_mm, "tolerance_mm": original.tolerance_mm,
+            "scallop_over_surface_max_mm": original.over_surface_mm,
+        })),
         "least_concave_radius": concave,
         "poles": found.shape.poles,
         "degenerate_places": found.shape.degenerate.map_or(0, |(count, _)| count),
@@ -80,6 +84,7 @@ pub(super) fn json(
         "data_bytes": data_bytes(prepared),
         "data_bytes_max": STORE_BYTES,
         "stations": found.stations,
+        "not_measured": not_measured(found, axes),
         "warnings": found.warnings,
     });
     match value {
@@ -88,17 +93,46 @@ pub(super) fn json(
     }
 }
 
-/// Shares of the axis limits; null without limits. `rounding`: share subtracted for the rounding of the samples.
+/// The keys of the figures that could not be measured.
+fn not_measured(found: &SweptResult, [velocity, acceleration, jerk]: &Peaks) -> Vec<&'static str> {
+    let figures = [
+        ("scallop_max_mm", found.scallop_verdict),
+        ("gouge_max_mm", found.gouge_verdict),
+        ("limits.velocity", velocity.verdict),
+        ("limits.acceleration", acceleration.verdict),
+        ("limits.jerk", jerk.verdict),
+    ];
+    let unknown = figures
+        .into_iter()
+        .filter(|(_, verdict)| *verdict == Verdict::Unknown);
+    unknown.map(|(key, _)| key).collect()
+}
+
+/// Shares of the axis limits; null without limits, and where the positions do not tell. `base_s`: over which they are judged;
+/// `uncertainty`: error over that base, as a share of the limit.
 fn limits(job: &Job, [velocity, acceleration, jerk]: &Peaks) -> Value {
     if !job.machine.has_limits() {
         return Value::Null;
     }
+    let known = |peak: &Peak| peak.share.filter(|_| peak.verdict != Verdict::Unknown);
     json!({
-        "velocity": velocity.share, "acceleration": acceleration.share, "jerk": jerk.share,
-        "rounding": {
-            "velocity": velocity.rounding_share, "acceleration": acceleration.rounding_share, "jerk": jerk.rounding_share,
+        "velocity": known(velocity), "acceleration": known(acceleration), "jerk": known(jerk),
+        "base_s": {
+            "velocity": velocity.base_s, "acceleration": acceleration.base_s, "jerk": jerk.base_s,
+        },
+        "uncertainty": {
+            "velocity": velocity.uncertainty, "acceleration": acceleration.uncertainty, "jerk": jerk.uncertainty,
         },
     })
+}
+
+/// The verdict before a figure.
+pub(super) fn mark(verdict: Verdict) -> &'static str {
+    match verdict {
+        Verdict::Met => "ok  ",
+        Verdict::Violated => "FAIL",
+        Verdict::Unknown => "?   ",
+    }
 }
 
 fn row(name: &str, text: &str) {
@@ -120,7 +154,8 @@ pub(super) fn print(
     scallop(job, found);
     match &found.gouge {
         None => say!(
-            "  ok   {:<22} none deeper than {:.4} um ({} cells)",
+            "  {} {:<22} none deeper than {:.4} um ({} cells)",
+            mark(found.gouge_verdict),
             "gouge",
             um(found.gouge_bound_mm),
             found.cells
@@ -134,6 +169,21 @@ pub(super) fn print(
             gouge.tick,
             gouge.pass
         ),
+    }
+    if let Some(original) = &found.original {
+        row(
+            "CAD face",
+            &format!(
+                "up to {:.4} um above the job's surface, {:.4} below, tolerance {}; heights are those above the face: limit {}, and {:.4} um \
+                 above the job's surface: limit {}",
+                um(original.above_mm),
+                um(original.below_mm),
+                um(original.tolerance_mm),
+                um(job.scallop_mm + original.tolerance_mm),
+                um(original.over_surface_mm),
+                um(job.scallop_mm)
+            ),
+        );
     }
     travel(job, found);
     peaks(axes);
@@ -169,14 +219,17 @@ pub(super) fn print(
 
 fn scallop(job: &Job, found: &SweptResult) {
     if found.ridges.is_empty() {
-        row("scallop height", "not measured: fewer than two whole passes");
+        say!(
+            "  {} {:<22} not measured: fewer than two whole passes",
+            mark(Verdict::Unknown),
+            "scallop height"
+        );
         return;
     }
     let (most, error) = (&found.scallop_max, &found.measurement_error);
-    let good = most.height_mm <= job.scallop_mm + found.measurement_error_mm;
     say!(
         "  {} {:<22} {:.4} um +- {:.4}, limit {} (max / limit {:.4}), between passes {} and {}, u = {:.6}, v = {:.6}",
-        if good { "ok  " } else { "FAIL" },
+        mark(found.scallop_verdict),
         "scallop height",
         um(most.height_mm),
         um(found.measurement_error_mm),
@@ -232,18 +285,23 @@ fn travel(job: &Job, found: &SweptResult) {
 }
 
 fn peaks(axes: &Peaks) {
-    for ((peak, (name, unit)), tolerance) in axes.iter().zip(ORDERS).zip(TOLERANCES) {
+    for (peak, (name, unit)) in axes.iter().zip(ORDERS) {
         let [x, y, z] = peak.axes;
         let (verdict, share) = match peak.share {
             None => ("    ", "within passes; no limit given".to_owned()),
-            Some(share) => (
-                if share <= 1.0 + tolerance { "ok  " } else { "FAIL" },
-                format!(
-                    "{:.1} % of its limit at most (and {:.1} % for rounding)",
-                    100.0 * share,
-                    100.0 * peak.rounding_share
-                ),
-            ),
+            Some(share) => {
+                let figure = format!("{:.1} % of its limit", 100.0 * share);
+                let error = 100.0 * peak.uncertainty;
+                let told = if peak.verdict == Verdict::Unknown {
+                    format!(
+                        "cannot tell: at least {figure}, but over {:.3} ms",
+                        1e3 * peak.base_s
+                    )
+                } else {
+                    format!("{figure}, over {:.3} ms within {error:.2} %", 1e3 * peak.base_s)
+                };
+                (mark(peak.verdict), told)
+            }
         };
         say!(
             "  {verdict} {:<22} {x:.1}, {y:.1}, {z:.1} {unit}; {share}",

@@ -1,20 +1,20 @@
 //! `verify`: checks every sample of a job against the independent oracle.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use clap::Args;
-use inspect::{BOUNDS, RunMeasurements, Verification, verify_run};
-use job::{Job, Spacing};
+use inspect::{BOUNDS, Requirements, RunMeasurements, Verification, verify_run};
+use job::Job;
 use machine::prepare::Prepared;
-use oracle::{ErrorStatistics, PassSample, SampleCheck};
+use oracle::{AccuracyFigure, PassSample, SampleCheck};
 use report::{Remarks, RidgePoint, Scallops, Sketch};
 use serde_json::Value;
 use verify::survey::{SampleObserver, SurveyResult};
 use verify::swept;
 
-use super::out::say;
+use super::out::{complain, say};
 use super::simulate::{WantedReport, remarks, report, timed};
-use super::{Bar, Failure, Result, along, load, motion_words, swept_words};
+use super::{Bar, Failure, Result, along, error_json, load, motion_words, swept_words};
 
 /// Checks a job before it runs on a machine. Every sample against an independent f64 oracle: positions, normals, feed ripple, path
 /// intervals, schedule. The swept envelope of the ball against the surface: scallop height, local and global gouges. Axis travel. With
@@ -22,13 +22,17 @@ use super::{Bar, Failure, Result, along, load, motion_words, swept_words};
 /// optimum. Least concave radius, machining time, size of the surface data.
 ///
 /// Example: cargo sim verify jobs/plate.toml
+/// Several jobs are verified one after the other; the JSON object then has the list `jobs`, with an error for one that cannot be read.
+///
 /// Example: cargo sim verify jobs/plate_machine.toml --report out
+/// Example: cargo sim verify jobs/plate.toml jobs/torus.toml --scallop-tolerance 1% --json
 #[derive(Debug, Args)]
 #[command(verbatim_doc_comment)]
 pub(super) struct Arguments {
-    /// Job file (TOML).
-    job: PathBuf,
-    /// Writes a report page into this folder: 3D view, charts, figures.
+    /// Job files (TOML).
+    #[arg(required = true, value_name = "JOB")]
+    jobs: Vec<PathBuf>,
+    /// Writes a report page into this folder: 3D view, charts, figures. With several jobs: a folder for each in it.
     #[arg(long, value_name = "DIR")]
     report: Option<PathBuf>,
     /// Overwrites existing files of --report.
@@ -37,17 +41,36 @@ pub(super) struct Arguments {
     /// Computes the optimum of the first, middle and last pass within default axis limits if the job sets none.
     #[arg(long)]
     optimum: bool,
+    /// Accepts scallops this much above the limit: in percent, or as a share (1% or 0.01).
+    #[arg(long, value_name = "SHARE", value_parser = share, default_value = "0%")]
+    scallop_tolerance: f64,
     /// Prints one JSON object instead of text.
     #[arg(long)]
     pub(super) json: bool,
 }
 
-fn line(name: &str, figure: &ErrorStatistics, bound: f64, unit: &str) {
-    let verdict = if figure.max.abs() <= bound { "ok  " } else { "FAIL" };
-    let at = figure.at;
+/// A share: `1%` or `0.01`, from 0 to 100 %.
+fn share(text: &str) -> std::result::Result<f64, String> {
+    let text = text.trim();
+    let (number, unit) = text
+        .strip_suffix('%')
+        .map_or((text, 1.0), |number| (number, 0.01));
+    match number.trim().parse::<f64>() {
+        Ok(number) if (0.0..=1.0).contains(&(number * unit)) => Ok(number * unit),
+        _ => Err("give a share from 0 to 100 %, e.g. 1% or 0.01".to_owned()),
+    }
+}
+
+/// A figure with the bound that applies to it.
+fn line(figure: &AccuracyFigure) {
+    let verdict = if figure.is_met() { "ok  " } else { "FAIL" };
+    let at = figure.errors.at;
     say!(
-        "  {verdict} {name:<22} {:>10.3e} {unit:<4} (at most {bound:.0e}) at tick {}, pass {}, u = {:.6}, v = {:.6}",
-        figure.max.abs(),
+        "  {verdict} {:<22} {:>10.3e} {:<4} (at most {:.3e}) at tick {}, pass {}, u = {:.6}, v = {:.6}",
+        figure.label,
+        figure.errors.max.abs(),
+        figure.unit,
+        figure.bound,
         at.tick,
         at.pass,
         at.u,
@@ -55,23 +78,16 @@ fn line(name: &str, figure: &ErrorStatistics, bound: f64, unit: &str) {
     );
 }
 
-fn print(findings: &SurveyResult, scanned: Option<usize>, first_order: bool) {
-    let report = &findings.report;
-    line("cutter location", &report.position_nm, BOUNDS.position_nm, "nm");
-    line("cutter contact", &report.contact_nm, BOUNDS.contact_nm, "nm");
-    line("tool normal", &report.normal_rad, BOUNDS.normal_rad, "rad");
-    line("feed ripple", &report.ripple_pct, BOUNDS.ripple_pct, "%");
-    line("interval candidates", &report.interval, BOUNDS.interval, "rel");
-    // Exact spacing has no closed form to compare with; it is checked by the scallop height.
-    if first_order {
-        line(
-            "step to the next pass",
-            &report.side_step,
-            BOUNDS.side_step,
-            "rel",
-        );
+fn print(findings: &SurveyResult, scanned: Option<usize>) {
+    // The step to the next pass has no closed form with exact spacing; it is checked by the scallop height.
+    for figure in findings
+        .report
+        .figures(&BOUNDS)
+        .iter()
+        .filter(|figure| figure.errors.count > 0)
+    {
+        line(figure);
     }
-    line("ball fits (r k)", &report.fit, BOUNDS.fit, "");
     let scan = scanned.map_or_else(|| "no count".to_owned(), |passes| passes.to_string());
     say!(
         "  passes {} (dense scan of the surface: {scan}), samples {}",
@@ -101,10 +117,11 @@ fn json(job: &Job, prepared: &Prepared, found: &Verification) -> Value {
         findings,
         swept,
         axes,
-        pass_times,
+        times,
+        optimum,
     } = &found.measured;
     let mut value = swept_words::json(job, prepared, findings, swept, axes);
-    value.insert("motion".to_owned(), motion_words::json(pass_times));
+    value.extend(motion_words::json(times, optimum));
     value.extend(along::json(job));
     value.insert("passes_scanned".to_owned(), found.scanned.into());
     value.insert("failures".to_owned(), found.failures.clone().into());
@@ -118,12 +135,13 @@ fn print_verification(job: &Job, prepared: &Prepared, found: &Verification) {
         findings,
         swept,
         axes,
-        pass_times,
+        times,
+        optimum,
     } = &found.measured;
     say!("  along        {}", along::sentence(job));
-    print(findings, found.scanned, job.spacing == Spacing::FirstOrder);
+    print(findings, found.scanned);
     swept_words::print(job, prepared, findings, swept, axes);
-    motion_words::print(pass_times);
+    motion_words::print(times, optimum);
     for failure in &found.failures {
         say!("  FAIL {failure}");
     }
@@ -134,18 +152,104 @@ fn print_verification(job: &Job, prepared: &Prepared, found: &Verification) {
     say!("  {}", if passed { "passed" } else { "FAILED" });
 }
 
+/// Distance of the CAD face from the job's surface, and its tolerance, mm; `None` where the surface is exact or no face is named.
+fn original(job: &Job) -> Result<Option<(Box<swept::OriginalOffset<'static>>, f64)>> {
+    let Some(source) = job.origin.cad() else {
+        return Ok(None);
+    };
+    let face = cad::Original::read(source).map_err(|error| Failure::input(error.what, error.remedy))?;
+    let surface = oracle::Surface::new(&source.surface);
+    Ok(face.map(|face| {
+        let offset = move |u: f64, v: f64| {
+            let at = surface.at(u, v);
+            face.from_surface(u, v, at.point)
+                .dot(at.u.cross(at.v).normalize())
+        };
+        let boxed: Box<swept::OriginalOffset<'static>> = Box::new(offset);
+        (boxed, source.tolerance_mm * source.scale)
+    }))
+}
+
+/// Verifies the jobs, prints the figures, and fails if any job does; with the exit code of bad input if a job cannot be read.
 pub(super) fn command(arguments: &Arguments) -> Result<()> {
-    let (job, prepared) = load(&arguments.job)?;
-    let directory = WantedReport::new(arguments.report.as_ref(), arguments.force)?;
+    if let [job] = arguments.jobs.as_slice() {
+        let (passed, value) = verify_job(arguments, job, arguments.report.as_deref())?;
+        if arguments.json {
+            say!("{value}");
+        }
+        return if passed {
+            Ok(())
+        } else {
+            Err(Failure::Failed(None))
+        };
+    }
+    let (mut values, mut all_passed, mut refused) = (Vec::new(), true, None);
+    for job in &arguments.jobs {
+        let directory = arguments
+            .report
+            .as_ref()
+            .map(|directory| directory.join(job.file_stem().unwrap_or(job.as_os_str())));
+        match verify_job(arguments, job, directory.as_deref()) {
+            Ok((passed, value)) => {
+                all_passed &= passed;
+                values.push(value);
+            }
+            Err(failure) => {
+                all_passed = false;
+                let mut value = error_json::of_failure(&failure).unwrap_or_default();
+                value["job"] = job.display().to_string().into();
+                value["passed"] = false.into();
+                values.push(value);
+                match &failure {
+                    Failure::Input(report) => complain!("{report:?}"),
+                    Failure::Failed(message) => {
+                        complain!("error: {}", message.as_deref().unwrap_or_default())
+                    }
+                }
+                if matches!(failure, Failure::Input(_)) && refused.is_none() {
+                    refused = Some(job.display().to_string());
+                }
+            }
+        }
+    }
+    if arguments.json {
+        say!("{}", serde_json::json!({ "jobs": values, "passed": all_passed }));
+    }
+    match refused {
+        Some(job) => Err(Failure::input(
+            format!("{job} was not verified"),
+            "correct what is said above; the other jobs were verified",
+        )),
+        None if all_passed => Ok(()),
+        None => Err(Failure::Failed(None)),
+    }
+}
+
+/// Verifies one job and prints its figures unless JSON is requested. Returns whether it passed, and its JSON object.
+fn verify_job(arguments: &Arguments, path: &Path, directory: Option<&Path>) -> Result<(bool, Value)> {
+    let (job, prepared) = load(path)?;
+    let directory = WantedReport::new(directory, arguments.force)?;
     let timed = timed(&job, &prepared)?;
-    let with_optimum = arguments.optimum || job.machine.has_limits();
+    let original = original(&job)?;
+    let requirements = Requirements {
+        with_optimum: arguments.optimum || job.machine.has_limits(),
+        swept: swept::Requirements {
+            scallop_tolerance: arguments.scallop_tolerance,
+            original: original
+                .as_ref()
+                .map(|(offset_mm, tolerance_mm)| swept::Original {
+                    offset_mm: offset_mm.as_ref(),
+                    tolerance_mm: *tolerance_mm,
+                }),
+        },
+    };
     let mut sketch = directory.map(|_| Sketch::new(&job, timed.passes.len()));
     let mut draw = sketch
         .as_mut()
         .map(|sketch| |emitted: &PassSample, checked: &SampleCheck| sketch.add(emitted, checked));
     let each = draw.as_mut().map(|draw| draw as &mut SampleObserver<'_>);
     let bar = Bar::new();
-    let found = verify_run(&job, &prepared, &timed, each, with_optimum, &bar);
+    let found = verify_run(&job, &prepared, &timed, each, &requirements, &bar);
     bar.clear();
     let found = found?;
     let RunMeasurements { findings, swept, .. } = &found.measured;
@@ -157,18 +261,36 @@ pub(super) fn command(arguments: &Arguments) -> Result<()> {
     };
     remarks.warnings.extend(found.warnings.iter().cloned());
     let page = report(&job, directory, sketch.as_ref(), findings, &remarks)?;
-    if arguments.json {
-        say!("{}", json(&job, &prepared, &found));
-    } else {
-        say!("{}", arguments.job.display());
+    let passed = found.failures.is_empty();
+    if !arguments.json {
+        say!("{}", path.display());
         print_verification(&job, &prepared, &found);
         if let Some(page) = page {
             say!("  report {}", page.display());
         }
     }
-    if found.failures.is_empty() {
-        Ok(())
-    } else {
-        Err(Failure::Failed(None))
+    let mut value = json(&job, &prepared, &found);
+    value["job"] = path.display().to_string().into();
+    Ok((passed, value))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn shares_are_percents_or_numbers() {
+        for (text, exact) in [
+            ("1%", 0.01),
+            ("0.5 %", 0.005),
+            ("0.01", 0.01),
+            ("0", 0.0),
+            ("100%", 1.0),
+        ] {
+            assert!((share(text).unwrap() - exact).abs() < 1e-15, "{text}");
+        }
+        for text in ["", "%", "-1%", "101%", "nan", "inf", "1 percent", "2"] {
+            assert!(share(text).is_err(), "{text}");
+        }
     }
 }

@@ -7,11 +7,14 @@
 //!    └──────motion──► use of the axis limits, time against the optimum
 //! ```
 
+pub mod judge;
 pub mod motion;
 mod sample;
 pub mod speeds;
 pub mod survey;
 pub mod swept;
 pub mod trace;
+mod verdict;
 
 pub use sample::EmittedSample;
+pub use verdict::Verdict;

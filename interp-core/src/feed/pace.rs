@@ -4,12 +4,13 @@
 //! each of which was followed over its whole length beforehand: per axis `a r^2 + q' v r'` and `j r^3 + 3 a r r' + q' v r''`. So by induction every
 //! period is within the limits, whatever the order of the commands.
 
-use crate::math::arith::sqrt;
+use crate::math::arith::{sqrt, truncated};
 use crate::math::number::Bounded;
 
-/// Periods from the start of a search to the change that it finds: the search has so long.
-const LATENCY: u16 = 12;
-/// The same for the searches after those that found nothing.
+/// Periods from the start of a search to the change that it finds, for the search: some, and as many as the places of two short trials take.
+const LATENCY: u16 = 8;
+const PLACES_A_PERIOD: f32 = 18.0;
+/// The most of it.
 const LATENCY_MAX: u16 = 48;
 
 /// Durations that a search tries, shortest first, and the ratio of one to the next.
@@ -288,12 +289,24 @@ impl<C: Copy> Pace<C> {
         course.advance(&mut search.at, step * middle.at_least(0.0));
     }
 
+    /// Duration of the shortest change that the velocity along the path alone would allow at a place, s.
+    fn shortest<P: Course<Cursor = C>>(&self, course: &P, at: &C, [pace, _, _]: [f32; 3]) -> f32 {
+        let apart = (self.wanted - pace).abs().at_least(0.01);
+        let [of_accel, of_jerk] =
+            [[0.0, 1.0, 0.0], [0.0, 0.0, 1.0]].map(|[_, r1, r2]| course.use_at(at, [1e-9, r1, r2], 0.0));
+        (1.9 * apart * of_accel.acceleration)
+            .at_least(sqrt(5.8 * apart * of_jerk.jerk))
+            .at_least(10.0 * self.period)
+    }
+
     fn begin_search<P: Course<Cursor = C>>(&self, course: &P, at: &C) -> Search<C> {
-        let latency = match self.failures {
-            0 | 1 => LATENCY,
-            2 | 3 => 2 * LATENCY,
-            _ => LATENCY_MAX,
-        };
+        let shortest = self.shortest(course, at, self.rates(0.0));
+        let places = 2.0 * shortest / SPACING;
+        let latency = u16::try_from(truncated(places / PLACES_A_PERIOD)).unwrap_or(LATENCY_MAX);
+        let latency = LATENCY
+            .saturating_add(latency)
+            .saturating_mul(1 + u16::from(self.failures))
+            .min(LATENCY_MAX);
         let mut from = *at;
         let mut ahead = 0.0;
         for _ in 0..latency {
@@ -302,17 +315,7 @@ impl<C: Copy> Pace<C> {
             ahead += self.period;
         }
         let rates = self.rates(ahead);
-        let [pace, _, _] = rates;
-        // The shortest change that velocity along the path alone would allow at this place.
-        let apart = (self.wanted - pace).abs().at_least(0.01);
-        let [of_accel, of_jerk] = [[0.0, 1.0, 0.0], [0.0, 0.0, 1.0]].map(|mut rates| {
-            let [r, _, _] = &mut rates;
-            *r = 1e-9;
-            course.use_at(&from, rates, 0.0)
-        });
-        let shortest = (1.9 * apart * of_accel.acceleration)
-            .at_least(sqrt(5.8 * apart * of_jerk.jerk))
-            .at_least(10.0 * self.period);
+        let shortest = self.shortest(course, &from, rates);
         Search {
             from,
             rates,

@@ -24,7 +24,7 @@ use crate::sequence::lookahead::{Lookahead, PassPlan, check_travel};
 const SPARE_PERIODS: u32 = 30;
 
 /// Cycles of one place of a search for a change of the pace, along a pass and along a link; of a portion of a step-over's planning.
-const PACE_CYCLES: u32 = 2_000;
+const PACE_CYCLES: u32 = 1_560;
 const LINK_PACE_CYCLES: u32 = 1_000;
 const STEP_OVER_CYCLES: u32 = 6_000;
 /// Cycles of replacing the rest of a plan, or of the wait until that is possible: once a period.

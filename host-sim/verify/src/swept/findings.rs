@@ -1,10 +1,13 @@
 //! Result of the measurement, in figures and in sentences.
 
+use super::Requirements;
 use super::axes::AxisTravel;
 use super::gouge::GougeSearchResult;
+use super::original::OriginalDeviation;
 use super::ridge::{Crest, Gap, GapRidge, MISSED_RADII};
 use super::shape::SurfaceCheck;
 use super::track::ToolPath;
+use crate::Verdict;
 use glam::DVec3;
 use job::Job;
 use oracle::Oracle;
@@ -18,6 +21,13 @@ const BINS: usize = 13;
 const ROUNDING_MM: f64 = 0.866_025_403_784_438_6e-6;
 /// Tolerance of the search for a crest, mm: the two heights agree within it.
 const CREST_MM: f64 = 1e-8;
+/// A new limit is proposed with this margin: heights are proportional to the limit where the step-over is small.
+const ASKED_SHARE: f64 = 0.995;
+/// A tolerance is proposed with this margin, as a share.
+const ACCEPTED_MARGIN: f64 = 1e-4;
+/// Every gouge deeper than this must be seen, mm, or than [`super::ERROR_SHARE_MAX`] of the scallop limit if that is more: ten times the
+/// position tolerance.
+const GOUGE_SEEN_MM: f64 = 1e-4;
 /// Rounding in f64, as a share of the coordinates: tens of operations of 1.1e-16 each.
 const ARITHMETIC: f64 = 1e-14;
 
@@ -61,7 +71,7 @@ pub struct Gouge {
 /// Error bound of the measured scallop heights, mm, by contribution; the sum is [`MeasurementError::total_mm`].
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct MeasurementError {
-    /// Interpolation between samples: sagitta of an arc through three samples over the straight lines used.
+    /// Deviation of the path's chords from the centre's curve between samples.
     pub path_mm: f64,
     /// Rounding of positions to whole nanometres.
     pub rounding_mm: f64,
@@ -106,6 +116,11 @@ pub struct Ridge {
 pub struct SweptResult {
     /// The highest ridge. Zero with fewer than two complete passes: `ridges` is empty then.
     pub scallop_max: HighestScallop,
+    /// Verdict on the highest ridge. [`Verdict::Unknown`]: the error bound is above [`super::ERROR_SHARE_MAX`] of the limit, or there are
+    /// fewer than two whole passes.
+    pub scallop_verdict: Verdict,
+    /// Verdict on gouges. [`Verdict::Unknown`]: the bound of the search is above [`super::ERROR_SHARE_MAX`] of the scallop limit.
+    pub gouge_verdict: Verdict,
     /// Mean of the crest's height, weighted by the surface's area (each gap's strip counts with its crest's height), mm.
     pub scallop_mean_mm: f64,
     /// Shares of that area by crest height: 0 to 0.1 h, 0.1 to 0.2 h, ..., 1.1 to 1.2 h, more.
@@ -130,6 +145,8 @@ pub struct SweptResult {
     pub axes: AxisTravel,
     /// Concave radius, poles and degenerate points of the surface.
     pub shape: SurfaceCheck,
+    /// Deviation of the surface from its original, against which heights are measured; `None` without one.
+    pub original: Option<OriginalDeviation>,
     /// One sentence per violated requirement; empty if all are met.
     pub failures: Vec<String>,
     /// One sentence per condition to know before the run, failures included.
@@ -140,15 +157,19 @@ pub(super) struct Measurements<'a> {
     pub(super) gaps: &'a [Gap<'a>],
     pub(super) ridges: &'a [GapRidge],
     pub(super) search: GougeSearchResult,
-    pub(super) sagitta_mm: f64,
+    /// Deviation of each pass's chords from the centre's curve, mm.
+    pub(super) deviation_mm: &'a [f64],
     pub(super) axes: AxisTravel,
     pub(super) shape: SurfaceCheck,
     pub(super) complete: bool,
+    pub(super) requirements: &'a Requirements<'a>,
+    pub(super) original: Option<OriginalDeviation>,
 }
 
 impl SweptResult {
     pub(super) fn new(job: &Job, oracle: &Oracle, track: &ToolPath, parts: &Measurements<'_>) -> Self {
-        let (scallop_max, most_possible) = extreme(oracle, parts);
+        let deviation_mm = parts.deviation_mm.iter().copied().fold(0.0, f64::max);
+        let (scallop_max, own_error_mm, [most_at_stations, most_possible]) = extreme(oracle, parts);
         let (scallop_mean_mm, scallop_histogram) = mean(oracle, parts);
         let sensitivity = sensitivity(scallop_max.height_mm, oracle.radius_mm);
         let coordinates = parts.axes.extent_mm.map_or(0.0, |extent| {
@@ -158,28 +179,40 @@ impl SweptResult {
                 .fold(0.0_f64, |most, at| most.max(at.abs()))
         });
         let measurement_error = MeasurementError {
-            path_mm: parts.sagitta_mm * sensitivity,
+            path_mm: most_possible - most_at_stations,
             rounding_mm: ROUNDING_MM * sensitivity,
-            stations_mm: most_possible - scallop_max.height_mm,
+            stations_mm: most_at_stations - scallop_max.height_mm,
             search_mm: CREST_MM + ARITHMETIC * (coordinates + oracle.radius_mm) * sensitivity,
         };
         let mut findings = Self {
             scallop_max,
+            scallop_verdict: Verdict::Unknown,
+            gouge_verdict: Verdict::Unknown,
             scallop_mean_mm,
             scallop_histogram,
             measurement_error_mm: measurement_error.total_mm(),
             measurement_error,
             gouge: gouge(oracle, track, &parts.search),
-            gouge_floor_mm: super::POSITION_MM + parts.sagitta_mm,
+            gouge_floor_mm: super::POSITION_MM + deviation_mm,
             gouge_bound_mm: parts.search.bound_mm,
             ridges: thinned(oracle, parts),
             stations: parts.ridges.iter().map(|ridge| ridge.crests.len()).sum(),
             cells: parts.search.cells,
             axes: parts.axes,
             shape: parts.shape.clone(),
+            original: parts.original,
             failures: Vec::new(),
             warnings: Vec::new(),
         };
+        let by_original_mm = parts.original.map_or(0.0, |original| original.tolerance_mm);
+        let limit_mm = job.scallop_mm * (1.0 + parts.requirements.scallop_tolerance) + by_original_mm;
+        // Between stations a ridge can only be higher, so this error is that of the highest crest itself.
+        let own_error_mm = own_error_mm + measurement_error.rounding_mm + measurement_error.search_mm;
+        let over_surface_mm = parts.original.map_or(0.0, |original| original.over_surface_mm);
+        let surely_above = findings.scallop_max.height_mm - own_error_mm > limit_mm
+            || over_surface_mm - findings.measurement_error_mm > limit_mm - by_original_mm;
+        findings.scallop_verdict = findings.judge_scallop(job, limit_mm, surely_above);
+        findings.gouge_verdict = findings.judge_gouge(job);
         findings.failures = findings.failing(job);
         findings.warnings = findings.failures.clone();
         findings.warnings.extend(findings.other_warnings(job, parts));
@@ -192,27 +225,99 @@ impl SweptResult {
         self.gouge.map_or(0.0, |gouge| gouge.depth_mm)
     }
 
-    fn failing(&self, job: &Job) -> Vec<String> {
-        let mut failures = Vec::new();
+    /// Whether the material at the highest ridge is out of every ball's reach.
+    fn uncut(&self, job: &Job) -> bool {
+        self.scallop_max.height_mm >= MISSED_RADII * job.radius_mm
+    }
+
+    fn judge_scallop(&self, job: &Job, limit_mm: f64, surely_above: bool) -> Verdict {
+        let (height_mm, error_mm) = (self.scallop_max.height_mm, self.measurement_error_mm);
+        let certain = error_mm <= super::ERROR_SHARE_MAX * job.scallop_mm;
+        if self.ridges.is_empty() {
+            Verdict::Unknown
+        } else if self.uncut(job) || surely_above || (certain && height_mm > limit_mm + error_mm) {
+            Verdict::Violated
+        } else if certain {
+            Verdict::Met
+        } else {
+            Verdict::Unknown
+        }
+    }
+
+    fn judge_gouge(&self, job: &Job) -> Verdict {
+        if self.gouge.is_some() {
+            Verdict::Violated
+        } else if self.gouge_bound_mm.max(self.gouge_floor_mm) <= self.gouge_seen_mm(job) {
+            Verdict::Met
+        } else {
+            Verdict::Unknown
+        }
+    }
+
+    /// Depth above which every gouge must be seen, mm.
+    fn gouge_seen_mm(&self, job: &Job) -> f64 {
+        (super::ERROR_SHARE_MAX * job.scallop_mm).max(GOUGE_SEEN_MM)
+    }
+
+    fn scallop_failure(&self, job: &Job) -> Option<String> {
         let (most, limit) = (&self.scallop_max, job.scallop_mm);
-        if most.height_mm >= MISSED_RADII * job.radius_mm {
-            failures.push(format!(
-                "no ball reaches the material between passes {} and {} at u = {:.6}, v = {:.6}",
-                most.gap,
-                most.gap + 1,
-                most.u,
-                most.v
-            ));
-        } else if most.height_mm > limit + self.measurement_error_mm {
-            failures.push(format!(
-                "the scallop is {:.6} mm high, {:.2} % above the limit of {limit} mm, between passes {} and {} at u = {:.6}, v = {:.6} (measured within {:.1e} mm)",
+        let place = format!(
+            "between passes {} and {} at u = {:.6}, v = {:.6}",
+            most.gap,
+            most.gap + 1,
+            most.u,
+            most.v
+        );
+        match self.scallop_verdict {
+            Verdict::Met => None,
+            Verdict::Violated if self.uncut(job) => Some(format!("no ball reaches the material {place}")),
+            Verdict::Violated if self.original.is_some() => Some(format!(
+                "the scallop is {:.6} mm high from the CAD face, {place}, and {:.6} mm from the job's surface, where the limit is {limit} mm \
+                 (measured within {:.1e} mm)",
+                most.height_mm,
+                self.original.map_or(0.0, |original| original.over_surface_mm),
+                self.measurement_error_mm
+            )),
+            Verdict::Violated => Some(format!(
+                "the scallop is {:.6} mm high, {:.2} % above the limit of {limit} mm, {place} (measured within {:.1e} mm): ask for scallop_mm = {:.3e}, or \
+                 accept it with --scallop-tolerance {:.2}%",
                 most.height_mm,
                 100.0 * (most.height_mm / limit - 1.0),
-                most.gap,
-                most.gap + 1,
-                most.u,
-                most.v,
-                self.measurement_error_mm
+                self.measurement_error_mm,
+                ASKED_SHARE * limit * limit / most.height_mm,
+                100.0 * ((most.height_mm / limit - 1.0).max(0.0) + ACCEPTED_MARGIN)
+            )),
+            Verdict::Unknown if self.ridges.is_empty() => {
+                Some("the scallop height is not measured: fewer than two whole passes".to_owned())
+            }
+            Verdict::Unknown => Some(format!(
+                "the scallop height is not measured: {:.6} mm within {:.1e} mm, which is more than {} % of the limit of {limit} mm, {place}: {}",
+                most.height_mm,
+                self.measurement_error_mm,
+                100.0 * super::ERROR_SHARE_MAX,
+                self.measuring_remedy()
+            )),
+        }
+    }
+
+    /// What makes a height measurable that is not.
+    fn measuring_remedy(&self) -> &'static str {
+        let error = &self.measurement_error;
+        if error.path_mm >= error.stations_mm {
+            "the samples are too far apart for the path's bends: lower the feed, or shorten period_us"
+        } else {
+            "the height changes too fast along the gap: choose along = the other parameter, or cut the surface where it folds"
+        }
+    }
+
+    fn failing(&self, job: &Job) -> Vec<String> {
+        let mut failures: Vec<String> = self.scallop_failure(job).into_iter().collect();
+        if self.gouge_verdict == Verdict::Unknown {
+            failures.push(format!(
+                "gouges are not measured: searched only down to {:.6} mm, but all deeper than {:.6} mm must be seen; at too many points the ball \
+                 hardly fits: take a smaller ball",
+                self.gouge_bound_mm.max(self.gouge_floor_mm),
+                self.gouge_seen_mm(job)
             ));
         }
         if let Some(gouge) = &self.gouge {
@@ -236,6 +341,7 @@ impl SweptResult {
                 gouge.contact[1]
             ));
         }
+        failures.extend(self.original.and_then(|original| original.failure()));
         failures.extend(self.axes.failures(&job.machine));
         failures
     }
@@ -268,13 +374,6 @@ impl SweptResult {
                 "the run is not complete: the part after its last complete pass is not measured".to_owned(),
             );
         }
-        let unseen = self.gouge_bound_mm - self.gouge_max_mm().max(self.gouge_floor_mm);
-        if unseen > 1e-3 * self.gouge_max_mm() + 1e-9 {
-            warnings.push(format!(
-                "gouges are searched only down to {:.6} mm: at too many points the ball hardly fits",
-                self.gouge_bound_mm
-            ));
-        }
         warnings
     }
 }
@@ -285,10 +384,12 @@ fn sensitivity(height_mm: f64, radius_mm: f64) -> f64 {
     1.0 / (1.0 - 2.0 * height_mm / radius_mm).max(0.1)
 }
 
-/// The highest crest, and the upper bound of a crest between stations.
-fn extreme(oracle: &Oracle, parts: &Measurements<'_>) -> (HighestScallop, f64) {
+/// The highest crest; its error by the deviation of the path's chords, mm; and the upper bounds of a crest, mm: between stations, and with
+/// that deviation.
+fn extreme(oracle: &Oracle, parts: &Measurements<'_>) -> (HighestScallop, f64, [f64; 2]) {
     let mut most: Option<(f64, &Crest, usize)> = None;
-    let mut possible = 0.0_f64;
+    let (mut possible, mut own_error_mm) = ([0.0_f64; 2], 0.0);
+    let path_mm = parts.deviation_mm.iter().copied().fold(0.0, f64::max);
     for (gap, ridge) in parts.ridges.iter().enumerate() {
         let mut own = 0.0_f64;
         for crest in &ridge.crests {
@@ -297,10 +398,23 @@ fn extreme(oracle: &Oracle, parts: &Measurements<'_>) -> (HighestScallop, f64) {
                 most = Some((crest.height_mm, crest, gap));
             }
         }
-        possible = possible.max(own + ridge.excess_mm);
+        let highest = most.is_some_and(|(.., of)| of == gap);
+        // The chords of a gap's own two passes count, and those of all passes where another one lowers the crest.
+        let deviation_mm = if ridge.crests.iter().any(|crest| crest.lowered) {
+            path_mm
+        } else {
+            parts.deviation_mm[gap].max(parts.deviation_mm[gap + 1])
+        };
+        let between = own + ridge.excess_mm;
+        let by_path = deviation_mm * sensitivity(own, oracle.radius_mm);
+        if highest {
+            own_error_mm = by_path;
+        }
+        let all = between + by_path;
+        possible = [possible[0].max(between), possible[1].max(all)];
     }
     let Some((height_mm, crest, index)) = most else {
-        return (HighestScallop::default(), 0.0);
+        return (HighestScallop::default(), 0.0, [0.0; 2]);
     };
     let (u, v) = oracle.swapped(crest.path, parts.gaps[index].side(crest.share));
     let extreme = HighestScallop {
@@ -310,7 +424,7 @@ fn extreme(oracle: &Oracle, parts: &Measurements<'_>) -> (HighestScallop, f64) {
         gap: number(index),
         point_mm: crest.point_mm,
     };
-    (extreme, possible.max(height_mm))
+    (extreme, own_error_mm, possible)
 }
 
 #[allow(clippy::cast_possible_truncation, reason = "passes are 32 bits")]
@@ -356,7 +470,7 @@ fn gouge(oracle: &Oracle, track: &ToolPath, search: &GougeSearchResult) -> Optio
         u: deepest.u,
         v: deepest.v,
         point_mm: deepest.point_mm,
-        tick: samples.first_tick + u64::from(index),
+        tick: samples.tick(index as usize),
         pass,
         contact: [u, v],
         local: tight(u, v) || tight(deepest.u, deepest.v),

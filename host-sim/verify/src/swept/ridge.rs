@@ -9,8 +9,14 @@ use oracle::{Oracle, OracleError};
 const ACROSS: usize = 8;
 /// Initial number of stations along a gap.
 const STATIONS: usize = 96;
-/// Largest number of bisections of the intervals between stations.
+/// Largest number of bisections of the intervals between stations, and the number after which they go on only where the error bound is
+/// above its requirement.
+const HALVINGS_MAX: usize = 30;
 const HALVINGS: usize = 10;
+/// Largest number of stations of a gap.
+const STATIONS_MAX: usize = 50_000;
+/// Required error bound of a gap's ridge, as a share of the scallop limit: half of [`super::ERROR_SHARE_MAX`].
+const REQUIRED_SHARE: f64 = 0.5 * super::ERROR_SHARE_MAX;
 /// Heights are equal within this share of the gap's largest, or within this, mm: the rounding of centres to nanometres.
 const EQUAL_SHARE: f64 = 1e-4;
 const EQUAL_MM: f64 = 2e-6;
@@ -39,6 +45,8 @@ pub(super) struct Crest {
     pub(super) point_mm: DVec3,
     /// |S_u x S_v| there.
     pub(super) area: f64,
+    /// Whether another part of the path than the gap's two passes lowers the crest.
+    pub(super) lowered: bool,
 }
 
 /// Result of one gap.
@@ -93,18 +101,11 @@ impl<'a> Gap<'a> {
     fn ray(&self, path: f64, share: f64) -> Result<(Ray, f64), OracleError> {
         let (u, v) = self.oracle.swapped(path, self.side(share));
         let at = self.oracle.surface.at(u, v);
-        let product = at.u.cross(at.v);
-        let area = product.length();
-        let along = if area > 1e-6 * at.u.length() * at.v.length() && area > 0.0 {
-            product * (self.oracle.normal_sign / area)
-        } else {
-            self.oracle.contact(u, v)?.normal
-        };
         let ray = Ray {
             from: at.point,
-            along,
+            along: self.oracle.normal(&at, u, v)?,
         };
-        Ok((ray, area))
+        Ok((ray, at.u.cross(at.v).length()))
     }
 
     pub(super) fn side(&self, share: f64) -> f64 {
@@ -140,10 +141,11 @@ impl<'a> Gap<'a> {
         let met = self.meeting(path, guess, &mut near)?;
         let (mut share, mut height) = self.highest(path, met, &mut near, false)?;
         let whole = self.tree.entry(&self.ray(path, share)?.0, height);
+        let lowered = whole < height - EQUAL_MM;
         if whole < -GOUGED_MM {
             // The crest is below the surface: reported by the gouge search.
             height = whole;
-        } else if whole < height - EQUAL_MM {
+        } else if lowered {
             // Another part of the path lowers this crest: the maximum is elsewhere.
             (share, height) = self.highest(path, (share, whole), &mut near, true)?;
         }
@@ -154,6 +156,7 @@ impl<'a> Gap<'a> {
             height_mm: height,
             point_mm: ray.from,
             area,
+            lowered,
         })
     }
 
@@ -286,7 +289,7 @@ impl<'a> Gap<'a> {
         }
         stations.sort_by(f64::total_cmp);
         let nearest = 1e-5 * (high - low);
-        stations.dedup_by(|b, a| *b - *a < nearest && *b < high);
+        stations.dedup_by(|b, a| *b - *a < nearest && (*b < high || *a == high));
         stations
     }
 
@@ -302,9 +305,14 @@ impl<'a> Gap<'a> {
             }
         }
         let intervals = |crests: &[Crest]| crests.len().saturating_sub(1);
-        for _ in 0..HALVINGS {
+        for round in 0..HALVINGS_MAX {
             let best = highest(&crests);
-            let enough = best + (EQUAL_SHARE * best).max(EQUAL_MM);
+            let required = if round < HALVINGS {
+                EQUAL_SHARE * best
+            } else {
+                REQUIRED_SHARE * self.oracle.scallop_mm
+            };
+            let enough = best + required.max(EQUAL_MM);
             let mut refined = Vec::with_capacity(crests.len() + 16);
             for k in 0..intervals(&crests) {
                 refined.push(crests[k]);
@@ -314,10 +322,11 @@ impl<'a> Gap<'a> {
                 }
             }
             refined.extend(crests.last());
-            if refined.len() == crests.len() {
+            let done = refined.len() == crests.len() || refined.len() > STATIONS_MAX;
+            crests = refined;
+            if done {
                 break;
             }
-            crests = refined;
         }
         let best = highest(&crests);
         let most = (0..intervals(&crests))

@@ -1,4 +1,4 @@
-//! The tool path of a run in compact form: 20 bytes per sample.
+//! The tool path of a run in compact form: 24 bytes per sample.
 
 use glam::DVec3;
 use job::Along;
@@ -11,8 +11,10 @@ const MM_PER_NM: f64 = 1e-6;
 pub struct ToolPathPass {
     /// Side parameter.
     pub side: f64,
-    /// Tick of the first sample; one sample per tick follows.
+    /// Tick of the first sample.
     pub first_tick: u64,
+    /// Periods from the first sample to each sample; a point interpolated between two samples has the first one's.
+    pub periods: Vec<u32>,
     /// Path parameter of each sample: not descending, or not ascending on a pass in the opposite direction.
     pub path: Vec<f64>,
     /// Ball centre of each sample, nm.
@@ -46,24 +48,29 @@ impl ToolPathPass {
         sum / count
     }
 
-    /// Largest distance between the polyline through the samples and a smooth curve through them, mm: the sagitta of an
-    /// arc through three neighbouring samples.
-    pub(super) fn sagitta_mm(&self) -> f64 {
-        let mut most = 0.0_f64;
-        for k in 2..self.cl_nm.len() {
-            let [a, b, c] = [k - 2, k - 1, k].map(|k| self.centre(k));
-            let (one, other) = (b - a, c - b);
-            let (short, long) = {
-                let lengths = [one.length(), other.length()];
-                (lengths[0].min(lengths[1]), lengths[0].max(lengths[1]))
-            };
-            // A short last step has an inaccurate direction; its sagitta is below its neighbours' in any case.
-            if short >= 0.5 * long && short > 0.0 {
-                let turned = one.cross(other).length().atan2(one.dot(other));
-                most = most.max(turned / (short + long) * long * long / 4.0);
-            }
-        }
-        most
+    /// Appends a sample of another pass.
+    pub(super) fn copy(&mut self, of: &Self, index: usize) {
+        self.periods.push(of.periods[index]);
+        self.path.push(of.path[index]);
+        self.cl_nm.push(of.cl_nm[index]);
+    }
+
+    /// Appends a point between a sample of another pass and its next one.
+    pub(super) fn add_between(&mut self, of: &Self, index: usize, share: f64, centre_mm: DVec3) {
+        let [from, to] = [of.path[index], of.path[index + 1]];
+        self.periods.push(of.periods[index]);
+        self.path.push(from + (to - from) * share);
+        #[allow(
+            clippy::cast_possible_truncation,
+            reason = "between positions that are 32 bits"
+        )]
+        let cl_nm = (centre_mm / MM_PER_NM).round().to_array().map(|nm| nm as i32);
+        self.cl_nm.push(cl_nm);
+    }
+
+    /// Tick of a sample.
+    pub(super) fn tick(&self, index: usize) -> u64 {
+        self.first_tick + u64::from(self.periods[index])
     }
 }
 
@@ -115,6 +122,7 @@ impl ToolPath {
             self.passes.push(ToolPathPass {
                 side,
                 first_tick: sample.tick,
+                periods: Vec::with_capacity(room),
                 path: Vec::with_capacity(room),
                 cl_nm: Vec::with_capacity(room),
             });
@@ -123,8 +131,23 @@ impl ToolPath {
             return;
         }
         if let Some(pass) = self.passes.last_mut() {
+            pass.periods
+                .push(u32::try_from(sample.tick.saturating_sub(pass.first_tick)).unwrap_or(u32::MAX));
             pass.path.push(path);
             pass.cl_nm.push(sample.cl_nm);
+        }
+    }
+
+    /// Adds the next centre of a motion without parameters; `first`: the tool was off the surface before.
+    pub fn add_centre(&mut self, cl_nm: [i32; 3], first: bool) {
+        if first || self.passes.is_empty() {
+            self.passes.push(ToolPathPass::default());
+        }
+        if let Some(pass) = self.passes.last_mut() {
+            pass.periods
+                .push(u32::try_from(pass.periods.len()).unwrap_or(u32::MAX));
+            pass.path.push(0.0);
+            pass.cl_nm.push(cl_nm);
         }
     }
 

@@ -1,0 +1,279 @@
+//! `judge`: a motion from elsewhere against the exact surface, beside the motion of the core.
+
+use std::path::PathBuf;
+
+use clap::Args;
+use glam::DVec3;
+use job::Job;
+use oracle::Oracle;
+use serde_json::{Value, json};
+use verify::Verdict;
+use verify::judge::{Judged, judge};
+use verify::motion::limits::{ORDERS, failures};
+use verify::swept::Progress;
+
+use super::out::say;
+use super::{Bar, Failure, Result, load};
+use crate::motion::{self, MotionError};
+
+/// Largest path error that is accepted, as a share of the scallop limit, unless `--path-tolerance` gives it.
+const PATH_SHARE: f64 = 0.1;
+
+/// Judges a motion from elsewhere on a job's surface, with its ball: samples of the ball's centre as CSV (t_s, x_mm, y_mm, z_mm; or a trace of
+/// simulate), or a program in G-code, read by LinuxCNC's rs274. Contact feed and its ripple, path error, scallop, gouge, the side of the ball that
+/// cuts, axis limits; beside the figures of the core's own run of the job.
+///
+/// The contact is the surface's nearest point, so the motion may follow any pattern. Samples more than a tenth of the radius from contact
+/// are links.
+///
+/// Example: cargo sim judge jobs/torus.toml samples.csv
+/// Example: cargo sim judge jobs/plate_machine.toml posted.ngc --tip --json
+#[derive(Debug, Args)]
+#[command(verbatim_doc_comment)]
+pub(super) struct Arguments {
+    /// Job file (TOML): surface, tool, feed, scallop limit, machine.
+    job: PathBuf,
+    /// Samples (.csv), else a program in G-code.
+    motion: PathBuf,
+    /// The positions are those of the ball's lowest point, as most programs have it, not of its centre.
+    #[arg(long)]
+    tip: bool,
+    /// Accepts centres this far from the exact offset surface, mm; default a tenth of the scallop limit.
+    #[arg(long, value_name = "MM")]
+    path_tolerance: Option<f64>,
+    /// Judges the motion alone, without a run of the core.
+    #[arg(long)]
+    alone: bool,
+    /// Prints one JSON object instead of text.
+    #[arg(long)]
+    pub(super) json: bool,
+}
+
+impl From<MotionError> for Failure {
+    fn from(error: MotionError) -> Self {
+        Self::input(error.what, error.remedy)
+    }
+}
+
+/// Reasons against a motion.
+fn reasons(job: &Job, judged: &Judged, path_tolerance_mm: f64) -> Vec<String> {
+    let mut reasons = Vec::new();
+    if judged.in_contact == 0 {
+        return vec!["the motion never touches the surface: is it in the job's coordinates? --tip if it is of the ball's tip".to_owned()];
+    }
+    let error = &judged.path_error_mm;
+    if error.value.abs() > path_tolerance_mm {
+        reasons.push(format!(
+            "the centre is {:+.6} mm off the exact offset surface at sample {}, u = {:.6}, v = {:.6}; {path_tolerance_mm} mm is accepted",
+            error.value, error.sample, error.uv[0], error.uv[1]
+        ));
+    }
+    let highest = judged.highest();
+    if judged.field.uncut_share > 0.0 {
+        reasons.push(format!(
+            "no ball reaches {:.3} % of the surface",
+            100.0 * judged.field.uncut_share
+        ));
+    } else if highest.height_mm > job.scallop_mm * (1.0 + SCALLOP_SLACK) {
+        reasons.push(format!(
+            "the scallop is {:.6} mm high, {:.2} % above the limit of {} mm, at u = {:.6}, v = {:.6}",
+            highest.height_mm,
+            100.0 * (highest.height_mm / job.scallop_mm - 1.0),
+            job.scallop_mm,
+            highest.uv[0],
+            highest.uv[1]
+        ));
+    }
+    if judged.gouge_mm() > path_tolerance_mm {
+        let lowest = &judged.field.lowest;
+        reasons.push(format!(
+            "the ball cuts {:.6} mm below the surface at u = {:.6}, v = {:.6}; {path_tolerance_mm} mm is accepted",
+            judged.gouge_mm(),
+            lowest.uv[0],
+            lowest.uv[1]
+        ));
+    }
+    if judged.above_equator > 0 {
+        reasons.push(format!(
+            "at {} samples the contact is above the ball's equator, most at sample {}: the tool cannot be held along z",
+            judged.above_equator, judged.steepest.sample
+        ));
+    }
+    reasons.extend(failures(&judged.axes));
+    reasons
+}
+
+/// Excess of the searched height that is accepted: the search's own error.
+const SCALLOP_SLACK: f64 = 1e-3;
+
+fn object(job: &Job, judged: &Judged) -> Value {
+    let [velocity, acceleration, jerk] = &judged.axes;
+    let known = |peak: &verify::motion::Peak| peak.share.filter(|_| peak.verdict != Verdict::Unknown);
+    let limits =
+        json!({ "velocity": known(velocity), "acceleration": known(acceleration), "jerk": known(jerk) });
+    json!({
+        "samples": judged.samples,
+        "in_contact": judged.in_contact,
+        "jumps": judged.jumps,
+        "time_s": judged.time_s,
+        "feed_mm_s": { "programmed": job.feed_mm_s(), "min": judged.feed.range[0], "mean": judged.feed.mean, "max": judged.feed.range[1] },
+        "ripple_max_pct": judged.feed.ripple_max_pct,
+        "ripple_rms_pct": judged.feed.ripple_rms_pct,
+        "path_error_max_mm": judged.path_error_mm.value.abs(),
+        "path_error_rms_mm": judged.path_error_rms_mm,
+        "path_error_at": { "sample": judged.path_error_mm.sample, "u": judged.path_error_mm.uv[0], "v": judged.path_error_mm.uv[1] },
+        "scallop_max_mm": judged.highest().height_mm,
+        "scallop_mean_mm": judged.field.mean_mm,
+        "scallop_at": { "u": judged.highest().uv[0], "v": judged.highest().uv[1], "place_mm": judged.highest().point_mm.to_array() },
+        "uncut_share": judged.field.uncut_share,
+        "gouge_max_mm": judged.gouge_mm(),
+        "above_equator": judged.above_equator,
+        "normal_z_min": judged.steepest.value,
+        "limits": job.machine.has_limits().then_some(limits),
+        "axes": { "velocity_mm_s": velocity.axes, "acceleration_mm_s2": acceleration.axes, "jerk_mm_s3": jerk.axes },
+    })
+}
+
+/// A row of the table: name, unit, figure.
+type Row = (&'static str, &'static str, Box<dyn Fn(&Judged) -> f64>);
+
+fn rows() -> Vec<Row> {
+    let mut rows: Vec<Row> = vec![
+        ("jumps", "steps", Box::new(|judged| count(judged.jumps))),
+        ("time", "s", Box::new(|judged| judged.time_s)),
+        (
+            "contact feed, least",
+            "mm/s",
+            Box::new(|judged| judged.feed.range[0]),
+        ),
+        ("contact feed, mean", "mm/s", Box::new(|judged| judged.feed.mean)),
+        (
+            "contact feed, largest",
+            "mm/s",
+            Box::new(|judged| judged.feed.range[1]),
+        ),
+        (
+            "feed ripple, largest",
+            "%",
+            Box::new(|judged| judged.feed.ripple_max_pct),
+        ),
+        (
+            "feed ripple, rms",
+            "%",
+            Box::new(|judged| judged.feed.ripple_rms_pct),
+        ),
+        (
+            "path error, largest",
+            "um",
+            Box::new(|judged| 1e3 * judged.path_error_mm.value.abs()),
+        ),
+        (
+            "path error, rms",
+            "um",
+            Box::new(|judged| 1e3 * judged.path_error_rms_mm),
+        ),
+        (
+            "scallop, largest",
+            "um",
+            Box::new(|judged| 1e3 * judged.highest().height_mm),
+        ),
+        (
+            "scallop, mean",
+            "um",
+            Box::new(|judged| 1e3 * judged.field.mean_mm),
+        ),
+        ("uncut", "%", Box::new(|judged| 100.0 * judged.field.uncut_share)),
+        ("gouge", "um", Box::new(|judged| 1e3 * judged.gouge_mm())),
+        (
+            "above the equator",
+            "samples",
+            Box::new(|judged| count(judged.above_equator)),
+        ),
+    ];
+    for (order, (name, unit)) in ORDERS.into_iter().enumerate() {
+        rows.push((
+            name,
+            unit,
+            Box::new(move |judged| judged.axes[order].axes.into_iter().fold(0.0, f64::max)),
+        ));
+    }
+    rows
+}
+
+#[allow(clippy::cast_precision_loss, reason = "below 2^53")]
+fn count(number: usize) -> f64 {
+    number as f64
+}
+
+fn print(theirs: &Judged, ours: Option<&Judged>) {
+    let heading = if ours.is_some() { "this core" } else { "" };
+    say!("  {:<24}{:>16} {heading:>16}", "", "given");
+    for (name, unit, figure) in rows() {
+        let own = ours.map_or_else(String::new, |ours| format!("{:.6}", figure(ours)));
+        say!("  {name:<24}{:>16.6} {own:>16} {unit}", figure(theirs));
+    }
+}
+
+/// The core's own run of the job, as positions.
+fn own_run(job: &Job, prepared: &machine::prepare::Prepared) -> Result<Vec<DVec3>> {
+    let mut centres = Vec::new();
+    let mut machine = machine::Machine::load(prepared).map_err(|fault| inspect::load_error(job, fault))?;
+    let ran = machine.run(|sample| {
+        centres.push(DVec3::from(sample.cl_nm.map(f64::from)) * 1e-6);
+        true
+    });
+    // A fault ends the run; what was emitted is judged.
+    let _ = ran;
+    Ok(centres)
+}
+
+pub(super) fn command(arguments: &Arguments) -> Result<()> {
+    let (own_job, prepared) = load(&arguments.job)?;
+    let oracle = Oracle::new(&own_job)
+        .map_err(|error| Failure::input(error.to_string(), "set side = \"+\" or \"-\""))?;
+    let given = motion::read(&arguments.motion, &own_job, arguments.tip)?;
+    // The motion's own period, for its speeds; everything else is the job's.
+    let mut job = own_job.clone();
+    job.machine.period_us = 1e6 * given.period_s;
+    let bar = Bar::new();
+    let progress: &dyn Progress = &bar;
+    let theirs = judge(&job, &oracle, &given.centres_mm, progress);
+    let ours = if arguments.alone {
+        None
+    } else {
+        Some(judge(&own_job, &oracle, &own_run(&own_job, &prepared)?, progress))
+    };
+    bar.clear();
+    let reasons = reasons(
+        &job,
+        &theirs,
+        arguments.path_tolerance.unwrap_or(PATH_SHARE * job.scallop_mm),
+    );
+    if arguments.json {
+        let value = json!({
+            "job": arguments.job.display().to_string(), "motion": arguments.motion.display().to_string(), "period_s": given.period_s,
+            "given": object(&job, &theirs), "core": ours.as_ref().map(|ours| object(&own_job, ours)),
+            "failures": reasons, "passed": reasons.is_empty(),
+        });
+        say!("{value}");
+    } else {
+        say!("{} on {}", arguments.motion.display(), arguments.job.display());
+        say!(
+            "  {} samples, period {:.6} ms, {} in contact; heights at {} points and searched from the highest",
+            theirs.samples,
+            1e3 * given.period_s,
+            theirs.in_contact,
+            theirs.field.points
+        );
+        print(&theirs, ours.as_ref());
+        for reason in &reasons {
+            say!("  FAIL {reason}");
+        }
+        say!("  {}", if reasons.is_empty() { "passed" } else { "FAILED" });
+    }
+    if reasons.is_empty() {
+        Ok(())
+    } else {
+        Err(Failure::Failed(None))
+    }
+}

@@ -1,0 +1,435 @@
+//! Anybody's motion against the exact surface: positions of the ball's centre, one a period, and nothing else.
+//!
+//! ```text
+//! positions ──closest.rs──► contact (nearest point), path error, contact feed, side of the ball
+//!     ├────────swept──────► heights over the whole surface: scallop, gouge
+//!     └────────motion─────► use of the axis limits
+//! ```
+//!
+//! The motion need not follow lines of the surface and has no parameters, so ridges are searched over the whole surface instead of pass by pass.
+
+mod closest;
+
+pub use closest::{NearestPoint, Projector};
+
+use glam::DVec3;
+use job::Job;
+use oracle::Oracle;
+
+use crate::motion::{PeakMeter, Peaks};
+use crate::swept::{FieldPoint, HeightField, Progress, ToolPath, height_field};
+
+const NM_PER_MM: f64 = 1e6;
+/// A centre farther than this from the radius, as a share of the radius, is off the surface.
+const CONTACT_SHARE: f64 = 0.1;
+/// The same, mm, for small balls.
+const CONTACT_MIN_MM: f64 = 0.05;
+/// Share of the programmed feed from which a period counts for the ripple, if as many periods on both sides reach it too: that leaves ramps out.
+const AT_FEED: f64 = 0.9;
+const RAMP_PERIODS: usize = 50;
+/// A step of more than this many programmed steps is a jump: a link that the motion leaves out.
+const JUMP_STEPS: f64 = 3.0;
+
+/// Statistics of the contact's feed, mm/s.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct ContactFeed {
+    /// Least and largest, over all periods in contact.
+    pub range: [f64; 2],
+    /// Mean over time in contact.
+    pub mean: f64,
+    /// Root mean square deviation from the programmed feed, %, over periods at 90 % of it or more, 50 periods from slower ones.
+    pub ripple_rms_pct: f64,
+    /// Largest such deviation, %.
+    pub ripple_max_pct: f64,
+}
+
+/// A place on the motion.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct MotionPoint {
+    /// Index of the sample, from 0.
+    pub sample: usize,
+    /// Parameters of the contact.
+    pub uv: [f64; 2],
+    /// Value there.
+    pub value: f64,
+}
+
+/// The figures of a motion.
+#[derive(Clone, Debug)]
+pub struct Judged {
+    /// Number of samples.
+    pub samples: usize,
+    /// Of them in contact.
+    pub in_contact: usize,
+    /// Steps in contact of more than three programmed ones; they do not count as feed.
+    pub jumps: usize,
+    /// Time of the whole, s.
+    pub time_s: f64,
+    /// The contact's feed.
+    pub feed: ContactFeed,
+    /// Largest distance of the centre from the exact offset surface while in contact, mm; below zero towards the surface. Where the tool comes
+    /// to the surface or leaves it, the distance does not count: what is then left of the material is in the heights.
+    pub path_error_mm: MotionPoint,
+    /// Root mean square of it, mm.
+    pub path_error_rms_mm: f64,
+    /// Samples whose contact is on the ball's upper half (spindle along z).
+    pub above_equator: usize,
+    /// The steepest of them: z of the tool normal.
+    pub steepest: MotionPoint,
+    /// Heights left on the surface.
+    pub field: HeightField,
+    /// Use of the axis limits.
+    pub axes: Peaks,
+}
+
+impl Judged {
+    /// The deepest gouge, mm: a ball below the surface.
+    #[must_use]
+    pub fn gouge_mm(&self) -> f64 {
+        (-self.field.lowest.height_mm).max(0.0)
+    }
+
+    /// The highest place that is left.
+    #[must_use]
+    pub fn highest(&self) -> &FieldPoint {
+        &self.field.highest
+    }
+}
+
+/// Judges the positions of the ball's centre, mm, one for each of the job's periods.
+#[must_use]
+pub fn judge(job: &Job, oracle: &Oracle, centres_mm: &[DVec3], progress: &dyn Progress) -> Judged {
+    let period_s = job.machine.period_s();
+    let mut meter = PeakMeter::new(&job.machine);
+    let mut path = ToolPath::default();
+    let projector = Projector::new(oracle);
+    let contact_mm = (CONTACT_SHARE * oracle.radius_mm).max(CONTACT_MIN_MM);
+    let mut state = Contacts::new(job.feed_mm_s());
+    let mut last: Option<NearestPoint> = None;
+    progress.begin("contacts", centres_mm.len() as u64);
+    for (index, centre_mm) in centres_mm.iter().enumerate() {
+        #[allow(clippy::cast_possible_truncation, reason = "positions are within two metres")]
+        let cl_nm = (*centre_mm * NM_PER_MM).round().to_array().map(|nm| nm as i32);
+        let near = last.map(|last| projector.nearest_from(*centre_mm, last.uv));
+        let fits = |near: &NearestPoint| (near.distance_mm - oracle.radius_mm).abs() <= contact_mm;
+        let nearest = near.filter(fits).unwrap_or_else(|| projector.nearest(*centre_mm));
+        let touches = fits(&nearest) && on_side(oracle, &nearest, *centre_mm);
+        let mut jumps = false;
+        if touches {
+            jumps = state.add(oracle, index, &nearest, last.as_ref(), *centre_mm, period_s);
+            path.add_centre(cl_nm, last.is_none() || jumps);
+        } else {
+            state.leave();
+        }
+        // Without limits a motion may leave out its links.
+        if jumps && !job.machine.has_limits() {
+            meter.discontinuity();
+        }
+        meter.add(index as u64, cl_nm);
+        last = touches.then_some(nearest);
+        progress.done(1);
+    }
+    let field = height_field(oracle, &path, progress);
+    #[allow(clippy::cast_precision_loss, reason = "below 2^53")]
+    let time_s = centres_mm.len() as f64 * period_s;
+    state.finish(centres_mm.len(), time_s, field, meter.peaks())
+}
+
+/// Whether the centre is on the tool's side of the surface.
+fn on_side(oracle: &Oracle, nearest: &NearestPoint, centre_mm: DVec3) -> bool {
+    let [u, v] = nearest.uv;
+    let normal = oracle.normal(&oracle.surface.at(u, v), u, v);
+    normal.is_ok_and(|normal| (centre_mm - nearest.point_mm).dot(normal) > 0.0)
+}
+
+/// Sums over the samples in contact.
+struct Contacts {
+    feed_mm_s: f64,
+    count: usize,
+    jumps: usize,
+    /// Speed of every period in contact, mm/s; `None` between stretches.
+    speeds: Vec<Option<f64>>,
+    /// Errors of the present stretch.
+    stretch: Vec<MotionPoint>,
+    error: MotionPoint,
+    error_squares: f64,
+    errors: usize,
+    above: usize,
+    steepest: MotionPoint,
+}
+
+impl Contacts {
+    fn new(feed_mm_s: f64) -> Self {
+        Self {
+            feed_mm_s,
+            count: 0,
+            jumps: 0,
+            speeds: Vec::new(),
+            stretch: Vec::new(),
+            error: MotionPoint::default(),
+            error_squares: 0.0,
+            errors: 0,
+            above: 0,
+            steepest: MotionPoint {
+                value: 1.0,
+                ..MotionPoint::default()
+            },
+        }
+    }
+
+    /// Adds a sample in contact; returns whether the motion jumps to it.
+    fn add(
+        &mut self,
+        oracle: &Oracle,
+        sample: usize,
+        nearest: &NearestPoint,
+        before: Option<&NearestPoint>,
+        centre_mm: DVec3,
+        period_s: f64,
+    ) -> bool {
+        self.count += 1;
+        let uv = nearest.uv;
+        self.stretch.push(MotionPoint {
+            sample,
+            uv,
+            value: nearest.distance_mm - oracle.radius_mm,
+        });
+        let up = (centre_mm - nearest.point_mm).z / nearest.distance_mm.max(f64::MIN_POSITIVE);
+        self.above += usize::from(up < 0.0);
+        if up < self.steepest.value {
+            self.steepest = MotionPoint {
+                sample,
+                uv,
+                value: up,
+            };
+        }
+        let Some(before) = before else {
+            return false;
+        };
+        let speed = arc_mm(oracle, before, nearest) / period_s;
+        let jumps = speed > JUMP_STEPS * self.feed_mm_s;
+        self.jumps += usize::from(jumps);
+        self.speeds.push((!jumps).then_some(speed));
+        jumps
+    }
+
+    /// The tool leaves the surface: the errors of the stretch count, except those of coming and leaving.
+    fn leave(&mut self) {
+        let errors = std::mem::take(&mut self.stretch);
+        let falls = |pair: &[MotionPoint]| pair[0].value > 0.0 && pair[1].value < pair[0].value;
+        let coming = errors.windows(2).take_while(|pair| falls(pair)).count();
+        let rises = |pair: &[MotionPoint]| pair[1].value > 0.0 && pair[1].value > pair[0].value;
+        let leaving = errors.windows(2).rev().take_while(|pair| rises(pair)).count();
+        let counted = errors.get(coming..errors.len() - leaving).unwrap_or_default();
+        for error in counted {
+            self.errors += 1;
+            self.error_squares += error.value * error.value;
+            if error.value.abs() > self.error.value.abs() {
+                self.error = *error;
+            }
+        }
+        self.speeds.push(None);
+    }
+
+    /// Largest and mean square deviation from the feed, %, away from ramps.
+    fn ripple_pct(&self) -> [f64; 2] {
+        let slow = |speed: &Option<f64>| speed.is_none_or(|speed| speed < AT_FEED * self.feed_mm_s);
+        // Periods since the last slow one, in both directions.
+        let mut since = vec![0_usize; self.speeds.len()];
+        let mut last = 0;
+        for (since, speed) in since.iter_mut().zip(&self.speeds) {
+            last = if slow(speed) { 0 } else { last + 1 };
+            *since = last;
+        }
+        let (mut next, mut most, mut squares, mut count) = (0_usize, 0.0_f64, 0.0, 0_usize);
+        for (since, speed) in since.iter().zip(&self.speeds).rev() {
+            next = if slow(speed) { 0 } else { next + 1 };
+            if let (Some(speed), true) = (speed, next.min(*since) > RAMP_PERIODS) {
+                let off = 100.0 * (speed / self.feed_mm_s - 1.0);
+                most = most.max(off.abs());
+                squares += off * off;
+                count += 1;
+            }
+        }
+        [most, per(squares, count)]
+    }
+
+    fn finish(mut self, samples: usize, time_s: f64, field: HeightField, axes: Peaks) -> Judged {
+        self.leave();
+        let speeds = || self.speeds.iter().flatten().copied();
+        let [ripple_max_pct, mean_square] = self.ripple_pct();
+        let least = speeds().fold(f64::INFINITY, f64::min);
+        Judged {
+            samples,
+            in_contact: self.count,
+            jumps: self.jumps,
+            time_s,
+            feed: ContactFeed {
+                range: [
+                    if least.is_finite() { least } else { 0.0 },
+                    speeds().fold(0.0, f64::max),
+                ],
+                mean: per(speeds().sum(), speeds().count()),
+                ripple_rms_pct: mean_square.sqrt(),
+                ripple_max_pct,
+            },
+            path_error_mm: self.error,
+            path_error_rms_mm: per(self.error_squares, self.errors).sqrt(),
+            above_equator: self.above,
+            steepest: self.steepest,
+            field,
+            axes,
+        }
+    }
+}
+
+#[allow(clippy::cast_precision_loss, reason = "below 2^53")]
+fn per(sum: f64, count: usize) -> f64 {
+    sum / count.max(1) as f64
+}
+
+/// Length of the contact's way between two points, mm: the chord, and by how much a circle through both with the tangents of the surface
+/// is longer. The turn of the normal gives the circle.
+fn arc_mm(oracle: &Oracle, from: &NearestPoint, to: &NearestPoint) -> f64 {
+    let chord = to.point_mm - from.point_mm;
+    let length = chord.length();
+    let normal =
+        |at: &NearestPoint| oracle.normal(&oracle.surface.at(at.uv[0], at.uv[1]), at.uv[0], at.uv[1]);
+    let (Ok(one), Ok(other)) = (normal(from), normal(to)) else {
+        return length;
+    };
+    let turn = (other - one).dot(chord) / length.max(f64::MIN_POSITIVE);
+    length * (1.0 + turn * turn / 24.0)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// The sample job's groove, a torus, with passes around it: contact at the angle `a` around the axis and `b` across the groove.
+    fn centre(radius: f64, a: f64, b: f64) -> DVec3 {
+        let (sin, cos) = b.sin_cos();
+        let across = 40.0 + (8.0 - radius) * sin;
+        DVec3::new(across * a.cos(), across * a.sin(), -(8.0 - radius) * cos)
+    }
+
+    fn torus(scallop_mm: f64) -> (Job, Oracle) {
+        let mut job = job_file::parse("torus.toml", include_str!("../../../../jobs/torus.toml")).unwrap();
+        job.scallop_mm = scallop_mm;
+        let oracle = Oracle::new(&job).unwrap();
+        (job, oracle)
+    }
+
+    /// Passes at even angles across the groove, at a feed with a ripple of 2 %, with the centre `high` above where it should be.
+    fn passes(count: u32, high: f64, ripple: f64) -> Vec<DVec3> {
+        let mut centres = Vec::new();
+        for pass in 0..=count {
+            let b = (f64::from(pass) / f64::from(count) * 2.0 - 1.0) * 60.0_f64.to_radians();
+            let mut a = 0.0;
+            let mut k = 0_u32;
+            while a < std::f64::consts::FRAC_PI_2 {
+                centres.push(centre(5.0 + high, a, b));
+                let step = 0.01 * (1.0 + ripple * (f64::from(k) * 0.05).sin());
+                a += step / (40.0 + 8.0 * b.sin());
+                k += 1;
+            }
+            centres.push(centre(5.0 + high, std::f64::consts::FRAC_PI_2, b));
+        }
+        centres
+    }
+
+    #[test]
+    fn a_known_motion_has_its_figures() {
+        let (job, oracle) = torus(0.05);
+        let judged = judge(&job, &oracle, &passes(12, 0.0, 0.02), &());
+        assert_eq!((judged.in_contact, judged.jumps), (judged.samples, 12));
+        assert!(
+            judged.path_error_mm.value.abs() < 2e-6,
+            "{:?}",
+            judged.path_error_mm
+        );
+        assert!(
+            (judged.feed.ripple_max_pct - 2.0).abs() < 0.01,
+            "{:?}",
+            judged.feed
+        );
+        assert!((judged.feed.ripple_rms_pct - 2.0_f64 / 2.0_f64.sqrt()).abs() < 0.02);
+        assert!((judged.feed.mean - 10.0).abs() < 0.02);
+        // Balls on a circle of 8 - 5 mm inside one of 8 mm: the crest is half-way, 5 degrees from both.
+        let (sin, cos) = 5.0_f64.to_radians().sin_cos();
+        let crest = 3.0 * cos + (25.0 - (3.0 * sin).powi(2)).sqrt();
+        let exact = 8.0 - crest;
+        assert!(
+            (judged.highest().height_mm - exact).abs() < 2e-3 * exact,
+            "{} for {exact}",
+            judged.highest().height_mm
+        );
+        assert!(judged.gouge_mm() < 5e-6 && judged.field.uncut_share == 0.0);
+        assert_eq!(judged.above_equator, 0);
+    }
+
+    #[test]
+    fn a_motion_too_deep_or_too_high_is_seen() {
+        let (job, oracle) = torus(0.05);
+        let deep = judge(&job, &oracle, &passes(12, -0.004, 0.0), &());
+        assert!(
+            (deep.path_error_mm.value + 0.004).abs() < 5e-6,
+            "{:?}",
+            deep.path_error_mm
+        );
+        assert!((deep.gouge_mm() - 0.004).abs() < 5e-6, "{}", deep.gouge_mm());
+        let high = judge(&job, &oracle, &passes(12, 0.003, 0.0), &());
+        assert!((high.path_error_mm.value - 0.003).abs() < 5e-6);
+        assert!(high.gouge_mm() == 0.0 && high.field.mean_mm > 0.003);
+        // Half of the groove is left out.
+        let half: Vec<DVec3> = passes(12, 0.0, 0.0)
+            .into_iter()
+            .filter(|centre| centre.y > centre.x)
+            .collect();
+        let uncut = judge(&job, &oracle, &half, &()).field.uncut_share;
+        assert!(uncut > 0.3 && uncut < 0.5, "{uncut}");
+    }
+
+    /// A plunge, a way along the groove and a retract: the way alone has an error.
+    #[test]
+    fn coming_and_leaving_are_no_errors() {
+        let (job, oracle) = torus(0.05);
+        let mut centres: Vec<DVec3> = (0..300)
+            .map(|k| centre(5.0, 0.3, 0.0) + DVec3::Z * (6.0 - 0.02 * f64::from(k)))
+            .collect();
+        centres.extend((0..1000).map(|k| centre(5.001, 0.3 + 0.00025 * f64::from(k), 0.0)));
+        let end = *centres.last().unwrap();
+        centres.extend((1..300).map(|k| end + DVec3::Z * 0.02 * f64::from(k)));
+        let judged = judge(&job, &oracle, &centres, &());
+        assert!(
+            (judged.path_error_mm.value - 0.001).abs() < 5e-6,
+            "{:?}",
+            judged.path_error_mm
+        );
+        assert!(judged.in_contact >= 1000 && judged.in_contact < 1100);
+    }
+
+    /// Nearest points from afar, and where the nearest is on the boundary.
+    #[test]
+    fn nearest_points_are_nearest() {
+        let (_, oracle) = torus(0.05);
+        let projector = Projector::new(&oracle);
+        for (a, b, off) in [
+            (0.2, 0.5, 3.0),
+            (1.5, -1.0, 5.0),
+            (0.0, 0.0, 7.0),
+            (0.7, 1.0, 4.99),
+        ] {
+            let at = centre(off, a, b);
+            let nearest = projector.nearest(at);
+            assert!((nearest.distance_mm - off).abs() < 1e-9, "{nearest:?}");
+        }
+        // Beyond the groove's end, at the angle 0: the end's own point.
+        let nearest = projector.nearest(DVec3::new(40.0, -10.0, -3.0));
+        let (to_circle, back) = (5.0_f64, 10.0_f64);
+        assert!(
+            (nearest.distance_mm - to_circle.hypot(back)).abs() < 1e-9,
+            "{nearest:?}"
+        );
+    }
+}

@@ -1,0 +1,153 @@
+//! Heights of the material over the whole surface, for a path that need not follow lines of the surface.
+//!
+//! The height at a point is the distance along the tool normal to the swept ball, as for a ridge; below zero a ball has cut into the surface.
+//! It is evaluated in the middle of every cell of the grid, then the highest and the lowest places are searched in ever smaller steps. Ridges
+//! between passes are sharp, so the search moves by both parameters and by each alone.
+
+use rayon::prelude::*;
+
+use super::Progress;
+use super::grid::CellGrid;
+use super::height::Ray;
+use super::track::ToolPath;
+use super::tree::PathTree;
+use glam::DVec3;
+use oracle::Oracle;
+
+/// Places from which the highest and the lowest point are searched, and bisections of the step.
+const STARTS: usize = 64;
+const HALVINGS: usize = 40;
+/// Height of a point that no ball reaches, in radii.
+const MISSED_RADII: f64 = 4.0;
+
+/// A place of the field.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct FieldPoint {
+    /// Height, mm; four radii where no ball reaches the point.
+    pub height_mm: f64,
+    /// Parameters.
+    pub uv: [f64; 2],
+    /// Point on the surface, mm.
+    pub point_mm: DVec3,
+}
+
+/// Heights over the surface.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct HeightField {
+    /// The highest place found.
+    pub highest: FieldPoint,
+    /// The lowest: below zero a gouge.
+    pub lowest: FieldPoint,
+    /// Mean over the area, gouges counted as zero, mm.
+    pub mean_mm: f64,
+    /// Share of the area that no ball reaches.
+    pub uncut_share: f64,
+    /// Points of the grid.
+    pub points: usize,
+}
+
+/// Measures the heights that a path leaves.
+#[must_use]
+pub fn height_field(oracle: &Oracle, path: &ToolPath, progress: &dyn Progress) -> HeightField {
+    let tree = PathTree::new(path, oracle.radius_mm);
+    let grid = CellGrid::new(oracle);
+    let missed = MISSED_RADII * oracle.radius_mm;
+    let at = |[u, v]: [f64; 2]| -> Option<(FieldPoint, f64)> {
+        let at = oracle.surface.at(u, v);
+        let ray = Ray {
+            from: at.point,
+            along: oracle.normal(&at, u, v).ok()?,
+        };
+        let place = FieldPoint {
+            height_mm: tree.entry(&ray, missed),
+            uv: [u, v],
+            point_mm: at.point,
+        };
+        Some((place, at.u.cross(at.v).length()))
+    };
+    progress.begin("heights", grid.count() as u64);
+    let places: Vec<(FieldPoint, f64)> = (0..grid.count())
+        .into_par_iter()
+        .filter_map(|index| {
+            progress.done(1);
+            let cell = grid.cell(index);
+            let (u, v) = cell.middle();
+            let (place, area) = at([u, v])?;
+            Some((place, area * (cell.u[1] - cell.u[0]) * (cell.v[1] - cell.v[0])))
+        })
+        .collect();
+    let area: f64 = places.iter().map(|(_, area)| area).sum();
+    let sum: f64 = places
+        .iter()
+        .map(|(place, area)| place.height_mm.clamp(0.0, missed) * area)
+        .sum();
+    let uncut: f64 = places
+        .iter()
+        .filter(|(place, _)| place.height_mm >= missed)
+        .map(|(_, area)| area)
+        .sum();
+    let [du, dv] = [0, 1].map(|axis: usize| {
+        let edges = &grid.edges[axis];
+        edges.windows(2).map(|ends| ends[1] - ends[0]).fold(0.0, f64::max)
+    });
+    let extreme = |sign: f64| {
+        let mut order: Vec<FieldPoint> = places.iter().map(|(place, _)| *place).collect();
+        order.sort_by(|a, b| (sign * b.height_mm).total_cmp(&(sign * a.height_mm)));
+        let searched = order
+            .par_iter()
+            .take(STARTS)
+            .map(|start| climb(oracle, &at, *start, sign, [du, dv]));
+        let best = |a: FieldPoint, b: FieldPoint| {
+            if sign * b.height_mm > sign * a.height_mm {
+                b
+            } else {
+                a
+            }
+        };
+        searched.reduce_with(best).unwrap_or_default()
+    };
+    HeightField {
+        highest: extreme(1.0),
+        lowest: extreme(-1.0),
+        mean_mm: if area > 0.0 { sum / area } else { 0.0 },
+        uncut_share: if area > 0.0 { uncut.abs() / area } else { 0.0 },
+        points: places.len(),
+    }
+}
+
+/// Pattern search from a place with bisected steps, within the surface.
+fn climb(
+    oracle: &Oracle,
+    at: &(dyn Fn([f64; 2]) -> Option<(FieldPoint, f64)> + Sync),
+    start: FieldPoint,
+    sign: f64,
+    [mut du, mut dv]: [f64; 2],
+) -> FieldPoint {
+    let [[u0, u1], [v0, v1]] = oracle.surface.domain();
+    let mut best = start;
+    for _ in 0..HALVINGS {
+        let mut moved = false;
+        for (i, j) in [
+            (1, 0),
+            (-1, 0),
+            (0, 1),
+            (0, -1),
+            (1, 1),
+            (1, -1),
+            (-1, 1),
+            (-1, -1),
+        ] {
+            let u = (best.uv[0] + f64::from(i) * du).clamp(u0, u1);
+            let v = (best.uv[1] + f64::from(j) * dv).clamp(v0, v1);
+            if let Some((place, _)) = at([u, v])
+                && sign * place.height_mm > sign * best.height_mm
+            {
+                (best, moved) = (place, true);
+            }
+        }
+        if !moved {
+            (du, dv) = (0.5 * du, 0.5 * dv);
+        }
+    }
+    best
+}
