@@ -39,17 +39,27 @@ mod cycles {
     /// More for a jump behind the node.
     pub(super) const JUMP: u32 = 3_500;
     pub(super) const CHECK: u32 = 1_450;
+    /// Something for each coefficient.
+    pub(super) const LIST: u32 = 13_000;
 }
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Stage {
     Done,
     Walk,
+    /// Weighs the places.
+    Weigh,
     Factor,
+    /// Takes the factor.
+    Scale,
     Assemble,
     Solve,
     Reach,
+    /// Takes the step.
+    Take,
     Check,
+    /// Slows the plan down where it uses too much.
+    Finish,
 }
 
 /// The planning of one path.
@@ -158,6 +168,7 @@ impl Planner {
             Stage::Solve => cycles::SOLVE,
             Stage::Reach => cycles::REACH + jump,
             Stage::Check => cycles::CHECK,
+            Stage::Weigh | Stage::Scale | Stage::Take | Stage::Finish => cycles::LIST,
             Stage::Done => 0,
         }
     }
@@ -167,25 +178,31 @@ impl Planner {
         self.stage = match self.stage {
             Stage::Walk => {
                 if self.walker.work(&mut self.lists, plan, &self.limits) {
-                    self.begin_method(plan);
-                    Stage::Factor
+                    Stage::Weigh
                 } else {
                     Stage::Walk
                 }
+            }
+            Stage::Weigh => {
+                self.begin_method(plan);
+                Stage::Factor
             }
             Stage::Factor => {
                 let factor = newton::factor(plan, &self.limits, &mut self.sweep);
                 self.factor = factor.at_most(self.factor);
                 if self.sweep.next(plan) {
-                    let factor = START_SHARE * self.factor.at_least(1e-9);
-                    for pace in &mut plan.draft {
-                        *pace *= factor;
-                    }
-                    newton::clear(&mut self.lists);
-                    Stage::Assemble
+                    Stage::Scale
                 } else {
                     Stage::Factor
                 }
+            }
+            Stage::Scale => {
+                let factor = START_SHARE * self.factor.at_least(1e-9);
+                for pace in &mut plan.draft {
+                    *pace *= factor;
+                }
+                newton::clear(&mut self.lists);
+                Stage::Assemble
             }
             Stage::Assemble => {
                 let barrier = BARRIER.get(usize::from(self.step)).copied().unwrap_or(1e-3);
@@ -211,20 +228,24 @@ impl Planner {
             Stage::Reach => {
                 newton::extend(plan, &self.limits, &self.lists, &mut self.sweep, &mut self.reach);
                 if self.sweep.next(plan) {
-                    self.take(plan)
+                    Stage::Take
                 } else {
                     Stage::Reach
                 }
             }
+            Stage::Take => self.take(plan),
             Stage::Check => {
                 if !self.check(plan) {
                     Stage::Check
                 } else if self.first > 0 {
                     self.judge_rest(plan)
                 } else {
-                    self.slow(plan, least);
-                    Stage::Done
+                    Stage::Finish
                 }
+            }
+            Stage::Finish => {
+                self.slow(plan, least);
+                Stage::Done
             }
             Stage::Done => Stage::Done,
         };

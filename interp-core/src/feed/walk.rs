@@ -143,7 +143,7 @@ impl Walker {
             Stage::Jumps | Stage::Means | Stage::Knots => 10_500,
             Stage::Backwards | Stage::Forwards | Stage::Busy => 24_500,
             Stage::TryEven | Stage::TryGrowing | Stage::Coarsen | Stage::Bisect(_) | Stage::Times => 28_100,
-            Stage::Increments => 13_500,
+            Stage::Increments => 21_500,
             Stage::Nodes => 15_000,
             Stage::Done => 0,
         }
@@ -232,7 +232,7 @@ impl Walker {
                 Stage::Increments
             }
             Stage::Increments => {
-                let end = self.times.min(self.index + NODES_A_PORTION);
+                let end = self.times.min(self.index + PLACES_A_PORTION);
                 for node in self.index..end {
                     self.increment(lists, plan, node);
                 }
