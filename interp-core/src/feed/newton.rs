@@ -205,8 +205,8 @@ struct Side {
 }
 
 /// Steps of the search for a row's factor.
-const FACTOR_STEPS: u8 = 80;
-const FACTOR_STEP: f32 = 0.94;
+const FACTOR_STEPS: u8 = 32;
+const FACTOR_STEP: f32 = 0.85;
 
 /// The least ratio of a slack to what it loses.
 #[derive(Clone, Copy, Debug)]

@@ -28,11 +28,11 @@ const DRAWN: f32 = 0.6;
 const DRAWN_MAX: u8 = 4;
 
 /// Cycles of the pieces of work in a period's planning, by the pessimistic model of `cargo sim budget`; with the rest of the task 30 000.
-pub(crate) const PORTION_CYCLES: u32 = 28_200;
+pub(crate) const PORTION_CYCLES: u32 = 28_100;
 
 /// Cycles of one piece of work, by the same model.
 mod cycles {
-    pub(super) const FACTOR: u32 = 2_300;
+    pub(super) const FACTOR: u32 = 3_000;
     pub(super) const ASSEMBLE: u32 = 3_950;
     pub(super) const SOLVE: u32 = 21_500;
     pub(super) const REACH: u32 = 2_600;

@@ -174,6 +174,8 @@ impl StraightMove {
 /// What the planning of a step-over does next.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Task {
+    /// Begin.
+    Begin,
     /// Locate the ends, for its length.
     Ends,
     /// Locate the n-th station.
@@ -259,6 +261,16 @@ impl BoundaryStepOver {
         self.feed = feed;
     }
 
+    /// A step-over is to be planned: [`Self::begin`] does so later, in a portion of the planning.
+    pub(crate) const fn request(&mut self) {
+        self.task = Task::Begin;
+    }
+
+    /// Whether [`Self::begin`] is due.
+    pub(crate) fn is_requested(&self) -> bool {
+        self.task == Task::Begin
+    }
+
     /// Whether the planning is complete.
     pub(crate) fn is_planned(&self) -> bool {
         self.task == Task::Done
@@ -335,7 +347,7 @@ impl BoundaryStepOver {
                     Task::Done
                 }
             }
-            Task::Done => Task::Done,
+            task @ (Task::Begin | Task::Done) => task,
         };
         Ok(())
     }

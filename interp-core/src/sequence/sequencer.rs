@@ -317,6 +317,13 @@ impl Sequencer {
             Phase::Leg(_) if self.straight.progress.has_work() => return self.straight.progress.work(),
             _ => {}
         }
+        if self.has_step_over && self.step_over.is_requested() {
+            if let Some(side) = now.next {
+                let feed = job.header.feed_mm_s * self.share.at_least(1.0);
+                self.step_over.begin(job, axes, &last_patch(job, now), side, feed);
+            }
+            return;
+        }
         if self.has_step_over && !self.step_over.is_planned() {
             self.pending = self.step_over.work(job, axes).err();
             return;
@@ -458,8 +465,8 @@ impl Sequencer {
     ) -> Result<()> {
         self.leave(job, axes, wish)?;
         match self.phase {
-            Phase::StepOver => self.follow_step_over(job, axes, run, wish, last),
-            Phase::Leg(leg) => self.follow_leg(leg, job, axes, run, wish, last),
+            Phase::StepOver => self.follow_step_over(job, run, wish, last),
+            Phase::Leg(leg) => self.follow_leg(leg, job, run, wish, last),
             _ => {
                 match self.at {
                     Some(at) if !self.on_surface => run.off_surface(at, 0.0, last),
@@ -515,14 +522,7 @@ impl Sequencer {
 
     /// Enters the pass, which begins at the tool's position, and emits its first sample.
     #[inline(never)]
-    fn enter_pass(
-        &mut self,
-        job: &Job<'_>,
-        axes: &AxisLimits,
-        run: &mut Run,
-        wish: Wish,
-        last: &mut Sample,
-    ) -> Result<()> {
+    fn enter_pass(&mut self, job: &Job<'_>, run: &mut Run, wish: Wish, last: &mut Sample) -> Result<()> {
         let (now, _) = both(&mut self.plans, self.second);
         run.enter_pass(job, now.pass, now.side)?;
         run.begin(now.interval, last)?;
@@ -533,11 +533,8 @@ impl Sequencer {
         self.replanned = 0.0;
         let pace = pace_of(job, now, wish.share);
         self.pace.begin(pace, job.header.period_s);
-        if job.header.pattern == Pattern::Zigzag
-            && let Some(side) = now.next
-        {
-            let feed = job.header.feed_mm_s * wish.share.at_least(1.0);
-            self.step_over.begin(job, axes, &last_patch(job, now), side, feed);
+        if job.header.pattern == Pattern::Zigzag && now.next.is_some() {
+            self.step_over.request();
             self.has_step_over = true;
         }
         Ok(())
@@ -678,7 +675,6 @@ impl Sequencer {
         &mut self,
         leg: Leg,
         job: &Job<'_>,
-        axes: &AxisLimits,
         run: &mut Run,
         wish: Wish,
         last: &mut Sample,
@@ -689,7 +685,7 @@ impl Sequencer {
                 .tick(wish.share.at_most(1.0), wish.is_fault, job.header.period_s);
         if is_over && leg == Leg::Plunge && self.goal == Goal::Pass {
             self.swap(job);
-            return self.enter_pass(job, axes, run, wish, last);
+            return self.enter_pass(job, run, wish, last);
         }
         run.off_surface(self.straight.position(), self.straight.progress.speed(), last);
         if is_over {
@@ -701,7 +697,6 @@ impl Sequencer {
     fn follow_step_over(
         &mut self,
         job: &Job<'_>,
-        axes: &AxisLimits,
         run: &mut Run,
         wish: Wish,
         last: &mut Sample,
@@ -713,7 +708,7 @@ impl Sequencer {
                 .progress
                 .tick(pace.at_most(1.0), wish.is_fault, job.header.period_s);
         if is_over {
-            return self.enter_pass(job, axes, run, wish, last);
+            return self.enter_pass(job, run, wish, last);
         }
         let located = self.step_over.position(job)?;
         run.off_surface(located.cl_nm, self.step_over.contact_speed(), last);

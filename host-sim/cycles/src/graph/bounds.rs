@@ -59,7 +59,7 @@ const BOUNDS: &[(&str, u32, &str)] = &[
     ),
     (
         "interp_core::feed::newton::Place::factor",
-        80,
+        32,
         "steps of a factor for each of three axes: FACTOR_STEPS",
     ),
     (
