@@ -28,7 +28,7 @@ const DRAWN: f32 = 0.6;
 const DRAWN_MAX: u8 = 4;
 
 /// Cycles of the pieces of work in a period's planning, by the pessimistic model of `cargo sim budget`; with the rest of the task 30 000.
-pub(crate) const PORTION_CYCLES: u32 = 28_100;
+pub(crate) const PORTION_CYCLES: u32 = 27_000;
 
 /// Cycles of one piece of work, by the same model.
 mod cycles {

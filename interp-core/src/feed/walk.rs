@@ -142,7 +142,7 @@ impl Walker {
             Stage::Caps => 18_100,
             Stage::Jumps | Stage::Means | Stage::Knots => 10_500,
             Stage::Backwards | Stage::Forwards | Stage::Busy => 24_500,
-            Stage::TryEven | Stage::TryGrowing | Stage::Coarsen | Stage::Bisect(_) | Stage::Times => 28_100,
+            Stage::TryEven | Stage::TryGrowing | Stage::Coarsen | Stage::Bisect(_) | Stage::Times => 26_500,
             Stage::Increments => 21_500,
             Stage::Nodes => 15_000,
             Stage::Done => 0,
