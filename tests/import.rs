@@ -596,7 +596,7 @@ fn approximated_faces_name_their_source() {
             source: Some(("part.step".to_owned(), 0.001)),
             ..JobOptions::default()
         };
-        let text = write_job("part.step", face, &made, &options).text;
+        let text = write_job("part.step", face, &made, &options).unwrap().text;
         assert_eq!(text.contains("source = \"part.step\""), fitted);
         let text = format!("{text}\n[placement]\nscale = 2\nrotate_deg = [10, 20, 30]\n");
         let name = folder.path().join("job.toml");

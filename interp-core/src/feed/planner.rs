@@ -28,19 +28,19 @@ const DRAWN: f32 = 0.6;
 const DRAWN_MAX: u8 = 4;
 
 /// Cycles of the pieces of work in a period's planning, by the pessimistic model of `cargo sim budget`; with the rest of the task 30 000.
-pub(crate) const PORTION_CYCLES: u32 = 27_000;
+pub(crate) const PORTION_CYCLES: u32 = 26_500;
 
 /// Cycles of one piece of work, by the same model.
 mod cycles {
     pub(super) const FACTOR: u32 = 3_000;
     pub(super) const ASSEMBLE: u32 = 3_950;
-    pub(super) const SOLVE: u32 = 21_500;
+    pub(super) const SOLVE: u32 = 22_500;
     pub(super) const REACH: u32 = 2_600;
     /// More for a jump behind the node.
     pub(super) const JUMP: u32 = 3_500;
     pub(super) const CHECK: u32 = 1_450;
     /// Something for each coefficient.
-    pub(super) const LIST: u32 = 13_000;
+    pub(super) const LIST: u32 = 15_000;
 }
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -141,7 +141,7 @@ impl Walker {
         match self.stage {
             Stage::Caps => 18_100,
             Stage::Jumps | Stage::Means | Stage::Knots => 10_500,
-            Stage::Backwards | Stage::Forwards | Stage::Busy => 24_500,
+            Stage::Backwards | Stage::Forwards | Stage::Busy => 25_000,
             Stage::TryEven | Stage::TryGrowing | Stage::Coarsen | Stage::Bisect(_) | Stage::Times => 26_500,
             Stage::Increments => 21_500,
             Stage::Nodes => 15_000,
