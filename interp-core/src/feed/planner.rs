@@ -38,7 +38,7 @@ mod cycles {
     pub(super) const REACH: u32 = 2_600;
     /// More for a jump behind the node.
     pub(super) const JUMP: u32 = 3_500;
-    pub(super) const CHECK: u32 = 1_450;
+    pub(super) const CHECK: u32 = 1_650;
     /// Something for each coefficient.
     pub(super) const LIST: u32 = 15_000;
 }
