@@ -85,7 +85,7 @@ fn whole(board: &'static Board, name: &str, home: &str, seed: &str) {
         tick["latency_max_cycles"].as_u64().unwrap() < 10 * CYCLES_US,
         "{tick}"
     );
-    // The planning waits for the tick that pends it, and takes a fifth of the period at most, with the bytes that are received meanwhile.
+    // The planning waits for the tick that pends it, and takes a quarter of the period at most, with the bytes that are received meanwhile.
     let planning = &ended.report["exti0"];
     assert_eq!(
         planning["count"].as_u64().unwrap() > 100,
@@ -93,7 +93,7 @@ fn whole(board: &'static Board, name: &str, home: &str, seed: &str) {
         "{planning}"
     );
     assert!(
-        planning["longest_cycles"].as_u64().unwrap() < PERIOD / 5,
+        planning["longest_cycles"].as_u64().unwrap() < PERIOD / 4,
         "{planning}"
     );
 }
