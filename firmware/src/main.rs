@@ -9,7 +9,7 @@
 //!
 //! Tasks communicate through queues of fixed capacity with one writer and one reader. The
 //! machine itself is shared by `sample`, which gets it without a lock, `plan`, which locks it for the planning of a period, and `idle`, which locks
-//! it for one short call at a time ([`guarded_machine`]). The planning follows the sample that pended it, and takes a fifth of the period at most, so
+//! it for one short call at a time ([`guarded_machine`]). The planning follows the sample that pended it, and takes a quarter of the period at most, so
 //! that its lock delays a sample only where it is late, which is a fault. No lock delays `receive`, which shares no data. The tool path is computed in
 //! `interp-core`; requests are handled in `controller`; board-specific code is in
 //! [`board`].
@@ -200,7 +200,7 @@ mod app {
     /// |---|---|
     /// | priority | 1: `receive` interrupts it, and `sample` until it has locked the machine |
     /// | period | 1 ms, after the sample |
-    /// | worst case | 30 000 cycles, 18 % of the period; see `cargo sim budget` |
+    /// | worst case | 36 000 cycles, 21 % of the period; see `cargo sim budget` |
     /// | a miss | the next sample is due before the end: counted, reported, and a fault of the run (`deadline-missed`), which stops along the path; in lockstep time waits |
     /// | a panic | cannot be reached: `firmware/no-panic` does not link otherwise |
     #[task(binds = EXTI0, priority = 1, shared = [real_time])]

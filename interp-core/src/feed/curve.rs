@@ -68,25 +68,19 @@ impl Piece {
         }
     }
 
-    /// Length of the ramp up to this time, mm.
-    fn length(&self, t: f32) -> f32 {
-        if self.ramp_s <= 0.0 {
-            return 0.0;
+    /// Length between two times of the ramp, mm: by each phase's own rates, so that no long lengths are subtracted.
+    fn length(&self, from: f32, to: f32) -> f32 {
+        let mut at = from;
+        let mut length = 0.0;
+        for end in [self.jerk_s, self.ramp_s - self.jerk_s, self.ramp_s] {
+            let step = to.at_most(end) - at;
+            if step > 0.0 {
+                let [v, a, j] = self.rates(at);
+                length += step * (v + step * (0.5 * a + step * j * (1.0 / 6.0)));
+                at += step;
+            }
         }
-        let t = t.at_most(self.ramp_s);
-        let change = self.to - self.from;
-        let peak = change / (self.ramp_s - self.jerk_s);
-        let jerk = peak / self.jerk_s;
-        let left = self.ramp_s - t;
-        if t < self.jerk_s {
-            self.from * t + jerk * t * t * t * (1.0 / 6.0)
-        } else if left > self.jerk_s {
-            let from_peak = t - 0.5 * self.jerk_s;
-            self.from * t + 0.5 * peak * (from_peak * from_peak + self.jerk_s * self.jerk_s * (1.0 / 12.0))
-        } else {
-            let whole = 0.5 * (self.from + self.to) * self.ramp_s;
-            whole - self.to * left + jerk * left * left * left * (1.0 / 6.0)
-        }
+        length
     }
 }
 
@@ -272,7 +266,7 @@ impl Course for Curve {
             let piece = self.piece(cursor.piece);
             if cursor.time < piece.ramp_s {
                 let end = (cursor.time + left).at_most(piece.ramp_s);
-                let moved = piece.length(end) - piece.length(cursor.time);
+                let moved = piece.length(cursor.time, end);
                 cursor.moved_q10 += to_q10(moved.at_least(0.0));
                 left -= end - cursor.time;
                 cursor.time = end;

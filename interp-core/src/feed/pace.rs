@@ -31,8 +31,11 @@ const ROOM: Use = Use {
     feed: 1.0,
     velocity: 1.0,
     acceleration: 0.997,
-    jerk: 1.0,
+    jerk: 0.98,
 };
+/// The same at nearly the plan's own pace, which may use that much by itself.
+const ROOM_PLANNED: Use = Use { jerk: 1.0, ..ROOM };
+const NEARLY_PLANNED: f32 = 0.97;
 /// The same after a fault.
 const ROOM_FAULT: Use = Use {
     feed: 1.0,
@@ -258,12 +261,16 @@ impl<C: Copy> Pace<C> {
             self.search = Some(self.begin_search(course, at));
             return;
         };
-        let room = if self.is_fault { &ROOM_FAULT } else { &ROOM };
         let duration = search.change.duration;
         let step = SPACING.at_most(duration / POINTS_MIN);
         let time = (step * f32::from(search.points)).at_most(duration);
         let rates = search.change.rates(time);
         let [pace, _, _] = rates;
+        let room = match (self.is_fault, pace > NEARLY_PLANNED) {
+            (true, _) => &ROOM_FAULT,
+            (false, true) => &ROOM_PLANNED,
+            (false, false) => &ROOM,
+        };
         let mut ratio = course.use_at(&search.at, rates, 0.5 * step).ratio(room);
         if !(PACE_MIN..=PACE_MAX).contains(&pace) {
             ratio = ratio.at_least(RATIO_MAX);

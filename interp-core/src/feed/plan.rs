@@ -340,6 +340,20 @@ impl Plan {
         let v = s1 * root;
         let a = (s2 * c + 0.5 * s1 * c1) * square;
         let j = root * square * (s3 * c + 1.5 * s2 * c1 + 0.5 * s1 * c2);
+        // The jerk steps at a node: where the place stands for some time around it, both sides count.
+        let reach = 2.0 * around * root * r;
+        let beside = if x + reach > 1.0 && cursor.interval + 1 < self.intervals {
+            Some(self.interval_of(pace, cursor.interval + 1))
+        } else if x < reach && cursor.interval > 0 {
+            Some(self.interval_of(pace, cursor.interval - 1))
+        } else {
+            None
+        };
+        let j_beside = beside.map_or(j, |beside| {
+            let [_, _, s3] = beside.walk_rates(0.0);
+            let [_, _, c2] = beside.pace_rates(0.0);
+            root * square * (s3 * c + 1.5 * s2 * c1 + 0.5 * s1 * c2)
+        });
         let arc_q10 = cursor.start_q10 + to_q10(interval.arc(x));
         let [from, _] = self.node(cursor.interval);
         let [to, _] = self.node(cursor.interval + 1);
@@ -366,13 +380,17 @@ impl Plan {
         };
         for ((inverse, [q1, q2, q3]), [first, second]) in limits.inverse.iter().zip(&q).zip(&extra) {
             let acceleration = q2 * v * v + q1 * a;
-            let jerk = (q3 * v * v + 3.0 * q2 * a) * v + q1 * j;
-            let of_pace = (jerk * r * r + 3.0 * acceleration * r1) * r + q1 * v * r2;
+            let bend = (q3 * v * v + 3.0 * q2 * a) * v;
+            let jerk = |j: f32| {
+                let jerk = ((bend + q1 * j) * r * r + 3.0 * acceleration * r1) * r + q1 * v * r2;
+                jerk.abs()
+            };
+            let of_pace = jerk(j).at_least(jerk(j_beside));
             most.add(&Use {
                 feed: 0.0,
                 velocity: (q1 * speed).abs() * inverse.velocity,
                 acceleration: (acceleration * r * r + q1 * v * r1).abs() * inverse.acceleration,
-                jerk: of_pace.abs() * inverse.jerk + (first + second * speed) * speed,
+                jerk: of_pace * inverse.jerk + (first + second * speed) * speed,
             });
         }
         most

@@ -3,9 +3,10 @@
 use std::boxed::Box;
 use std::vec::Vec;
 
+use super::curve::{Curve, CurveLimits};
 use super::follow::Follower;
 use super::limits::MotionLimits;
-use super::pace::Pace;
+use super::pace::{Course, Pace};
 use super::plan::Plan;
 use super::planner::Planner;
 use super::stations::Station;
@@ -146,6 +147,19 @@ fn uses(path: &Path, arcs: &[f64], limits: &MotionLimits) -> [f64; 3] {
             for axis in 0..3 {
                 *most = most.max(value[axis].abs() / f64::from(bounds[axis][order]));
             }
+        }
+    }
+    most
+}
+
+/// Greatest fraction of the jerk over four periods.
+fn long_jerk(path: &Path, arcs: &[f64], limits: &MotionLimits) -> f64 {
+    let q: Vec<[f64; 3]> = arcs.iter().map(|s| path.at(*s)).collect();
+    let mut most = 0.0_f64;
+    for places in q.windows(13) {
+        for (axis, bound) in limits.axes.iter().enumerate() {
+            let third = places[12][axis] - 3.0 * places[8][axis] + 3.0 * places[4][axis] - places[0][axis];
+            most = most.max(third.abs() / (4.0 * T).powi(3) / f64::from(bound.jerk));
         }
     }
     most
@@ -315,7 +329,7 @@ fn commanded(
     limits: &MotionLimits,
     random: &mut Random,
     gap: f64,
-) -> (Vec<f64>, [f64; 3]) {
+) -> (Vec<f64>, [f64; 3], f64) {
     let mut follower = Follower::START;
     follower.begin(plan);
     let mut pace = Pace::REST;
@@ -356,7 +370,7 @@ fn commanded(
         }
         assert!(arcs.len() < 500_000, "stalls");
     }
-    (holds, uses(path, &arcs, limits))
+    (holds, uses(path, &arcs, limits), long_jerk(path, &arcs, limits))
 }
 
 #[test]
@@ -369,14 +383,16 @@ fn commands_at_any_time_keep_the_limits() {
         (Path::slalom(12, 4.0, 5.0), 60.0),
     ];
     let mut holds = Vec::new();
+    let mut long = 0.0_f64;
     let mut worst = [0.0_f64; 3];
     for (path, feed) in &paths {
         let limits = limits(*feed);
         let plan = path.plan(&limits);
         for gap in [0.05, 0.15, 0.4] {
             for _ in 0..20 {
-                let (more, most) = commanded(path, &plan, &limits, &mut random, gap);
+                let (more, most, jerk) = commanded(path, &plan, &limits, &mut random, gap);
                 holds.extend(more);
+                long = long.max(jerk);
                 for (worst, most) in worst.iter_mut().zip(most) {
                     *worst = worst.max(most);
                 }
@@ -392,9 +408,79 @@ fn commands_at_any_time_keep_the_limits() {
         at(0.9),
         at(1.0)
     );
+    // The jerk steps from node to node: a difference over one period may see a step that no place of the search did.
     assert!(
-        worst[0] <= 1.0001 && worst[1] <= 1.0 && worst[2] <= 1.02,
-        "{worst:?}"
+        worst[0] <= 1.0001 && worst[1] <= 1.0 && worst[2] <= 1.05 && long <= 1.02,
+        "{worst:?} {long}"
     );
     assert!(at(0.9) <= 0.25 && at(1.0) <= 0.6, "{} {}", at(0.9), at(1.0));
+}
+
+/// Links: the time of the closed form within the share of the limits that they use, the length to the nanometre, and the slow end of a plunge.
+#[test]
+fn links_are_the_closed_form() {
+    let machine = CurveLimits {
+        speed: 80.0,
+        acceleration: 1000.0,
+        jerk: 20_000.0,
+    };
+    for (length, slow, slow_speed) in [
+        (0.01, 0.0, 0.0),
+        (0.4, 0.0, 0.0),
+        (5.0, 0.0, 0.0),
+        (40.0, 0.0, 0.0),
+        (700.0, 0.0, 0.0),
+        (30.0, 2.0, 10.0),
+        (3.0, 2.0, 10.0),
+        (30.0, 2.0, 60.0),
+    ] {
+        let curve = Curve::new(length, &machine, slow, slow_speed);
+        let mut cursor = curve.start();
+        let mut places = std::vec![0.0; 3];
+        while !curve.is_over(&cursor) {
+            curve.advance(&mut cursor, T as f32);
+            places.push(cursor.moved_q10 as f64 / 1024e6);
+            assert!(places.len() < 100_000, "{length}");
+        }
+        let end = *places.last().unwrap();
+        assert!(
+            (end - f64::from(length)).abs() < 2e-6 + 1e-8 * f64::from(length),
+            "{end} of {length}"
+        );
+        let periods = places.len() - 3;
+        assert!(
+            (periods as f64 * T - f64::from(curve.duration())).abs() <= T,
+            "{length}"
+        );
+        if slow == 0.0 {
+            let best = optimum(f64::from(length), 80.0, 980.0, 19_200.0);
+            assert!(
+                (f64::from(curve.duration()) / best - 1.0).abs() < 1e-3,
+                "{length}"
+            );
+        }
+        places.extend([end; 3]);
+        let mut differences = places.clone();
+        for bound in [80.0, 1000.0, 20_000.0] {
+            differences = differences
+                .windows(2)
+                .map(|pair| (pair[1] - pair[0]) / T)
+                .collect();
+            let most = differences
+                .iter()
+                .fold(0.0_f64, |most, value| most.max(value.abs()));
+            assert!(most <= 1.002 * bound, "{length}: {most} of {bound}");
+        }
+        if slow > 0.0 && slow_speed < 20.0 {
+            for pair in places
+                .windows(2)
+                .filter(|pair| pair[0] >= f64::from(length - slow))
+            {
+                assert!(
+                    (pair[1] - pair[0]) / T <= f64::from(slow_speed) * 1.0001,
+                    "{length}"
+                );
+            }
+        }
+    }
 }
