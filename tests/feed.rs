@@ -64,7 +64,7 @@ impl Use {
         for (order, (worst, limits)) in self.worst.iter_mut().zip(limits).enumerate() {
             let base = if order == 2 { BASE } else { 1 };
             let weights: &[i64] = [&[1, -1][..], &[1, -2, 1], &[1, -3, 3, -1]][order];
-            for axis in 0..3 {
+            for (axis, limit) in limits.into_iter().enumerate() {
                 // Before the first sample the tool stood there.
                 let at = |back: usize| self.last.get(back).or(self.last.back()).unwrap()[axis];
                 let nm: i64 = weights
@@ -77,7 +77,7 @@ impl Use {
                 let period_s = base as f64 * 1e-3;
                 #[allow(clippy::cast_precision_loss, reason = "far below 2^53")]
                 let value = (nm.abs() as f64 - rounding).max(0.0) * 1e-6 / period_s.powi(order as i32 + 1);
-                *worst = worst.max(value / f64::from(limits[axis]));
+                *worst = worst.max(value / f64::from(limit));
             }
         }
     }
