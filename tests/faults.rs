@@ -1,7 +1,7 @@
 //! Faults are states: each kind of fault that a surface can cause, with its code, value and position; the tool stays where it is.
 
 use interp_core::interpolator::STOP_PERIODS;
-use interp_core::{Command, Fault, FaultKind, Interpolator, Sample, SpanParameter, State};
+use interp_core::{Command, Fault, FaultKind, Header, Interpolator, Sample, SpanParameter, State};
 use job::{Along, Job, Pattern, Side, Spacing, SurfaceSpec};
 use machine::prepare::{Prepared, prepare};
 
@@ -203,13 +203,18 @@ fn too_many_patches() {
     // 17 x 17 = 289 patches fit, 18 x 18 = 324 do not.
     let fits = prepare(&job(flat(17), 1.0)).unwrap();
     assert_eq!(load(&fits).state(), State::Ready);
-    let large = prepare(&job(flat(18), 1.0)).unwrap();
+    assert!(prepare(&job(flat(18), 1.0)).is_err());
+    let large = Header {
+        path_spans: 18,
+        side_spans: 18,
+        ..fits.header
+    };
+    let of_a_patch = (fits.words.len() - 2 * 17) / (17 * 17);
+    let words = 18 * 18 * of_a_patch + 2 * 18;
     let mut core = load(&fits);
-    let fault = core
-        .load_begin(&large.header, large.words.len() as u32)
-        .unwrap_err();
+    let fault = core.load_begin(&large, words as u32).unwrap_err();
     assert_eq!(fault.kind, FaultKind::TooManyPatches);
-    assert_eq!(fault.value, large.words.len() as f32);
+    assert_eq!(fault.value, words as f32);
     // The job loaded before is still loaded.
     assert_eq!(core.tick(Command::Start).state, State::Running);
 }

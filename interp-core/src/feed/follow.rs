@@ -107,7 +107,7 @@ impl Follower {
             (planned + share * (exact - planned)).at_most(exact)
         };
         self.arc_q10 += i64::from(super::plan::step_q10(moved));
-        self.cursor.shift(moved - planned, plan);
+        self.shift(moved - planned, plan);
         moved
     }
 
@@ -151,11 +151,19 @@ impl Follower {
         }
     }
 
+    /// Moves tool and lead by this arc, mm, so that the lead stays.
+    fn shift(&mut self, mm: f32, plan: &Plan) {
+        self.cursor.shift(mm, plan);
+        if !plan.is_over(&self.lead.cursor) {
+            self.lead.cursor.shift(mm, plan);
+        }
+    }
+
     /// The tool is known to be at this arc, units of 2^-10 nm: the plan goes on from there.
     pub(crate) fn correct(&mut self, plan: &Plan, arc_q10: i64) {
         let apart = arc_q10 - self.arc_q10;
         let mm = if apart < 0 { -to_mm(-apart) } else { to_mm(apart) };
         self.arc_q10 = arc_q10;
-        self.cursor.shift(mm, plan);
+        self.shift(mm, plan);
     }
 }

@@ -33,8 +33,13 @@ const ROOM: Use = Use {
     acceleration: 0.997,
     jerk: 0.98,
 };
-/// The same at nearly the plan's own pace, which may use that much by itself.
-const ROOM_PLANNED: Use = Use { jerk: 1.0, ..ROOM };
+/// The same at nearly the plan's own pace: what a checked plan uses is never refused.
+const ROOM_PLANNED: Use = Use {
+    feed: 1.001,
+    velocity: 1.0005,
+    acceleration: 1.001,
+    jerk: 1.001,
+};
 const NEARLY_PLANNED: f32 = 0.97;
 /// The same after a fault.
 const ROOM_FAULT: Use = Use {
@@ -161,7 +166,9 @@ pub(crate) struct Pace<C> {
     wanted: f32,
     is_fault: bool,
     search: Option<Search<C>>,
+    /// Searches in a row that found nothing, and that were not complete in time.
     failures: u8,
+    timeouts: u8,
     period: f32,
 }
 
@@ -175,6 +182,7 @@ impl<C: Copy> Pace<C> {
         is_fault: false,
         search: None,
         failures: 0,
+        timeouts: 0,
         period: 1e-3,
     };
 
@@ -190,7 +198,7 @@ impl<C: Copy> Pace<C> {
             self.wanted = pace;
             self.is_fault = is_fault;
             self.search = None;
-            self.failures = 0;
+            (self.failures, self.timeouts) = (0, 0);
         }
     }
 
@@ -237,10 +245,11 @@ impl<C: Copy> Pace<C> {
                 search.left -= 1;
             } else if search.found {
                 self.change = Some(search.change);
-                (self.time, self.goal, self.failures) = (0.0, self.wanted, 0);
+                (self.time, self.goal) = (0.0, self.wanted);
+                (self.failures, self.timeouts) = (0, 0);
                 self.search = None;
             } else if self.change.is_some() || self.goal != 0.0 {
-                self.failures = self.failures.saturating_add(1);
+                self.timeouts = self.timeouts.saturating_add(1);
                 self.search = None;
             }
         }
@@ -278,8 +287,9 @@ impl<C: Copy> Pace<C> {
         if ratio > 1.0 {
             search.trial += 1;
             if search.trial >= TRIALS {
-                // No change holds from there: from a later place one may.
+                // No change holds from there: from a later place one may, or at rest a longer one.
                 self.search = None;
+                self.failures = self.failures.saturating_add(1);
                 return;
             }
             let longer = duration * ratio.at_least(RATIO_MIN).at_most(RATIO_MAX);
@@ -312,7 +322,7 @@ impl<C: Copy> Pace<C> {
         let latency = u16::try_from(truncated(places / PLACES_A_PERIOD)).unwrap_or(LATENCY_MAX);
         let latency = LATENCY
             .saturating_add(latency)
-            .saturating_mul(1 + u16::from(self.failures))
+            .saturating_mul(1 + u16::from(self.timeouts))
             .min(LATENCY_MAX);
         let mut from = *at;
         let mut ahead = 0.0;
@@ -322,7 +332,13 @@ impl<C: Copy> Pace<C> {
             ahead += self.period;
         }
         let rates = self.rates(ahead);
-        let shortest = self.shortest(course, &from, rates);
+        let is_standing = self.change.is_none() && self.goal == 0.0;
+        let longer = if is_standing {
+            1.0 + f32::from(self.failures)
+        } else {
+            1.0
+        };
+        let shortest = longer * self.shortest(course, &from, rates);
         Search {
             from,
             rates,

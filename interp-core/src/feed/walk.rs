@@ -18,6 +18,9 @@ pub(crate) type Lists = [[f32; LIST]; 5];
 /// Spacing of nodes that is fine enough, s; its growth per second away from busy places; the widest, s.
 const SPACING: f32 = 5e-3;
 const GROWTH: f32 = 0.12;
+/// The same for a pass that takes longer than this, s, so that its nodes are still fine at the rests.
+const GROWTH_LONG: f32 = 0.25;
+const LONG: f32 = 20.0;
 const SPACING_MAX: f32 = 0.1;
 /// Time between nodes that is worth its planning, s.
 const SPACING_WORTH: f32 = 4e-3;
@@ -83,8 +86,9 @@ pub(crate) struct Walker {
     vary: Vary,
     low: f32,
     high: f32,
-    /// Spacing at the ends, s.
+    /// Spacing at the ends, s, and its greatest growth.
     ends: f32,
+    growth: f32,
     /// Nodes of the unsmoothed walk, and what their times are scaled by.
     times: u16,
     scale: f32,
@@ -121,6 +125,7 @@ impl Walker {
         low: 0.0,
         high: 0.0,
         ends: 0.0,
+        growth: GROWTH,
         times: 0,
         scale: 0.0,
         cell: 0,
@@ -196,9 +201,9 @@ impl Walker {
                 }
             }
             Stage::TryGrowing => {
-                if self.fits(lists, SPACING, GROWTH) {
+                if self.fits(lists, SPACING, self.growth) {
                     self.vary = Vary::Growth;
-                    (self.low, self.high) = (1e-4, GROWTH);
+                    (self.low, self.high) = (1e-4, self.growth);
                     Stage::Bisect(0)
                 } else {
                     self.vary = Vary::Coarse;
@@ -208,7 +213,7 @@ impl Walker {
                 }
             }
             Stage::Coarsen => {
-                if self.fits(lists, self.high, GROWTH) || self.coarsenings >= COARSENINGS {
+                if self.fits(lists, self.high, self.growth) || self.coarsenings >= COARSENINGS {
                     Stage::Bisect(0)
                 } else {
                     self.ends *= 1.5;
@@ -371,7 +376,8 @@ impl Walker {
             .at_most(cube_root(0.5 * length / self.jerk));
         let wanted = u16::try_from(truncated(time / SPACING_WORTH)).unwrap_or(u16::MAX);
         self.intervals = wanted.clamp(NODES_MIN, NODES_COUNT);
-        self.ends = (self.mean_s / 6.0).at_least(time / (400.0 * f32::from(self.intervals)));
+        self.growth = if time > LONG { GROWTH_LONG } else { GROWTH };
+        self.ends = (self.mean_s / 6.0).at_least(time / (4000.0 * f32::from(self.intervals)));
     }
 
     /// Times at which something happens.
@@ -406,7 +412,7 @@ impl Walker {
         match self.vary {
             Vary::Even => [value, 0.0],
             Vary::Growth => [SPACING, value],
-            Vary::Coarse => [value, GROWTH],
+            Vary::Coarse => [value, self.growth],
         }
     }
 
@@ -634,7 +640,7 @@ impl NodeTimes {
             .at_least(self.spacing);
         let there = (self.spacing + self.growth * away).at_most(widest);
         let from_end = at.at_most(walker.duration - at) - walker.mean_s;
-        there.at_most(self.spacing.at_most(walker.ends) + GROWTH * from_end.at_least(0.0))
+        there.at_most(self.spacing.at_most(walker.ends) + walker.growth * from_end.at_least(0.0))
     }
 }
 
