@@ -12,6 +12,9 @@ const CHANGE: u8 = LEAD / 2;
 /// Relative difference of the plan's speed from the feed that is made up for.
 const NEAR: f32 = 3e-3;
 
+/// Periods at the programmed feed by which the lead may be behind.
+const BEHIND_MAX: f32 = 2.0;
+
 /// A place ahead of the tool, and for how long the plan has been near the feed there, in periods at the plan's own pace.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Lead {
@@ -57,6 +60,8 @@ pub(crate) struct Follower {
     rises: bool,
     /// The speed is to be the plan's own.
     as_planned: bool,
+    /// Arc by which the tool has moved more than the lead, mm.
+    behind: f32,
     arc_q10: i64,
 }
 
@@ -67,6 +72,7 @@ impl Follower {
         change: 0,
         rises: false,
         as_planned: false,
+        behind: 0.0,
         arc_q10: 0,
     };
 
@@ -146,16 +152,21 @@ impl Follower {
             cursor: self.cursor,
             near: 0.0,
         };
+        self.behind = 0.0;
         for _ in 0..LEAD {
             plan.advance(&mut self.lead.cursor, plan.limits.period);
         }
     }
 
-    /// Moves tool and lead by this arc, mm, so that the lead stays.
+    /// Moves tool and lead by this arc, mm, so that the lead stays; the lead once it is worth its time.
     fn shift(&mut self, mm: f32, plan: &Plan) {
         self.cursor.shift(mm, plan);
-        if !plan.is_over(&self.lead.cursor) {
-            self.lead.cursor.shift(mm, plan);
+        self.behind += mm;
+        if self.behind.abs() > BEHIND_MAX * plan.limits.feed * plan.limits.period {
+            if !plan.is_over(&self.lead.cursor) {
+                self.lead.cursor.shift(self.behind, plan);
+            }
+            self.behind = 0.0;
         }
     }
 
