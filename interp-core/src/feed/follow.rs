@@ -2,10 +2,10 @@
 //! that feed; the change to it and back is smooth.
 
 use super::pace::Course;
-use super::plan::{Cursor, Plan, to_mm};
+use super::plan::{Cursor, Lead, Plan, to_mm};
 use crate::math::number::Bounded;
 
-/// Periods that the scout is ahead of the tool.
+/// Periods that the lead is ahead of the tool.
 pub(crate) const LEAD: u8 = 64;
 /// Periods in which the speed changes from the plan's to the feed, half the lead: there is time to change to the feed and back.
 const CHANGE: u8 = LEAD / 2;
@@ -15,19 +15,7 @@ const NEAR: f32 = 3e-3;
 /// Periods at the programmed feed by which the lead may be behind.
 const BEHIND_MAX: f32 = 2.0;
 
-/// A place ahead of the tool, and for how long the plan has been near the feed there, in periods at the plan's own pace.
-#[derive(Clone, Copy, Debug)]
-pub(crate) struct Lead {
-    pub(crate) cursor: Cursor,
-    pub(crate) near: f32,
-}
-
 impl Lead {
-    pub(crate) const NONE: Self = Self {
-        cursor: Cursor::START,
-        near: 0.0,
-    };
-
     /// [`Self::look`] at a plan that is being checked, a period after the last look.
     pub(crate) fn look_draft(&mut self, plan: &Plan, cursor: &Cursor) {
         self.count(plan, cursor, cursor.draft_speed(plan), 1.0);

@@ -1,6 +1,6 @@
 //! What a plan may use of the limits of the machine.
 
-use super::stations::Derivatives;
+use super::stations::{Derivatives, Jump};
 use crate::job::AxisLimits;
 use crate::math::arith::sqrt;
 use crate::math::number::Bounded;
@@ -154,6 +154,3 @@ impl MotionLimits {
         speed
     }
 }
-
-/// Sizes of the jumps of q' (1) and q'' (1/mm) of each axis at a patch boundary.
-pub(crate) type Jump = [[f32; 2]; 3];

@@ -1,6 +1,5 @@
 //! A plan: the path's stations, a walk along them and the pace of the walk; and a cursor that moves along it.
 
-use super::follow::Lead;
 use super::limits::MotionLimits;
 use super::pace::{Course, Use};
 use super::stations::Stations;
@@ -30,6 +29,20 @@ pub(crate) struct Knot {
     pub(crate) interval: u16,
     pub(crate) part: u16,
     pub(crate) station: u16,
+}
+
+/// A place ahead of the tool, and for how long the plan has been near the feed there, in periods at the plan's own pace.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Lead {
+    pub(crate) cursor: Cursor,
+    pub(crate) near: f32,
+}
+
+impl Lead {
+    pub(crate) const NONE: Self = Self {
+        cursor: Cursor::START,
+        near: 0.0,
+    };
 }
 
 /// The plan of one path.

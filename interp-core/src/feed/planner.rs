@@ -1,10 +1,10 @@
 //! Plans a path in portions: walk, barrier method, check.
 
-use super::follow::{LEAD, Lead};
+use super::follow::LEAD;
 use super::limits::MotionLimits;
 use super::newton::{self, Reach, SHAPE, Sweep};
 use super::pace::{Course, Use};
-use super::plan::{Cursor, Plan};
+use super::plan::{Cursor, Lead, Plan};
 use super::walk::{LIST, Lists, Walker};
 use crate::math::arith::{inverse_sqrt, sqrt, truncated};
 use crate::math::number::{Bounded, cube_root};

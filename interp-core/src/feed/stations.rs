@@ -1,6 +1,5 @@
 //! Stations of a path: its derivatives at places in order, two stations at each patch boundary.
 
-use super::limits::Jump;
 use super::{MM_PER_Q10, Q10_BITS};
 use crate::math::number::{Bounded, MM_PER_NM, nm_to_mm};
 
@@ -13,6 +12,9 @@ const _: () = assert!(STATIONS_MAX <= 1 << CELL_BISECTIONS);
 
 /// For each axis its first, second and third derivative by the contact's arc: 1, 1/mm, 1/mm^2.
 pub(crate) type Derivatives = [[f32; 3]; 3];
+
+/// Sizes of the jumps of q' (1) and q'' (1/mm) of each axis at a patch boundary.
+pub(crate) type Jump = [[f32; 2]; 3];
 
 /// A place of the path.
 #[derive(Clone, Copy, Debug)]
