@@ -48,6 +48,11 @@ const BOUNDS: &[(&str, u32, &str)] = &[
         "patches of an arc: CROSSINGS_MAX + 1",
     ),
     (
+        "interp_core::feed::curve::Curve as interp_core::feed::pace::Course::advance",
+        3,
+        "pieces of a curve, and phases of a ramp",
+    ),
+    (
         "interp_core::feed::curve::Curve::new",
         24,
         "halvings of a speed: BISECTIONS",
