@@ -29,6 +29,8 @@ pub(crate) struct Station {
 pub(crate) struct Stations {
     list: [Station; STATIONS_MAX],
     count: u16,
+    /// Least length of a cell that derivatives were taken over, mm.
+    spacing: f32,
 }
 
 /// Error of a derivative by differences of positions rounded to a nanometre, times the cell's length to its power: three standard deviations
@@ -47,10 +49,17 @@ impl Stations {
     pub(crate) const NONE: Self = Self {
         list: [Station::NONE; STATIONS_MAX],
         count: 0,
+        spacing: 0.0,
     };
 
     pub(crate) const fn clear(&mut self) {
         self.count = 0;
+        self.spacing = f32::MAX;
+    }
+
+    /// Derivatives are taken over cells of this length, mm.
+    pub(crate) fn note_spacing(&mut self, mm: f32) {
+        self.spacing = self.spacing.at_most(mm);
     }
 
     /// Appends a station; ignored where the list is full.
@@ -97,9 +106,7 @@ impl Stations {
 
     /// The jump at a station, less what rounding can make of it.
     pub(crate) fn jump(&self, station: u16) -> Jump {
-        let cells = [self.cell_mm(station.saturating_sub(1)), self.cell_mm(station + 1)];
-        let [before, behind] = cells.map(|cell| 1.0 / cell.at_least(1e-3));
-        let inverse = before.at_least(behind);
+        let inverse = 1.0 / self.spacing.at_least(1e-3);
         let noise = [FIRST_NOISE * inverse, SECOND_NOISE * inverse * inverse];
         let mut jump = [[0.0; 2]; 3];
         let sides = self.get(station).q.iter().zip(&self.get(station + 1).q);

@@ -97,6 +97,7 @@ impl Path {
     fn plan(&self, limits: &MotionLimits) -> Box<Plan> {
         let mut plan = Box::new(Plan::NONE);
         plan.limits = *limits;
+        plan.stations.clear();
         let pieces = self.ends.len() - 1;
         let cells = (160 / pieces).max(2);
         for piece in 0..pieces {

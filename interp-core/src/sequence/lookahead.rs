@@ -6,11 +6,11 @@
 use crate::fault::{Fault, FaultKind, Result};
 use crate::feed::plan::Plan;
 use crate::feed::stations::{Derivatives, STATIONS_MAX, Station, WINDOW, Window};
-use crate::feed::{Q10_BITS, to_q10};
+use crate::feed::{MM_PER_Q10, Q10_BITS, to_q10};
 use crate::job::program::Job;
 use crate::job::{AxisLimits, Pattern, Spacing};
-use crate::math::arith::truncated;
-use crate::math::number::{MM_PER_NM, nm_to_mm, to_f32};
+use crate::math::arith::{sqrt, truncated};
+use crate::math::number::{Bounded, MM_PER_NM, nm_to_mm, to_f32};
 use crate::pass::patch::Patch;
 use crate::pass::position::PassPosition;
 use crate::pass::schedule;
@@ -20,24 +20,21 @@ use crate::surface::{Contact, PathSpeed};
 
 /// Least length of a cell, mm: a shorter one has differences of rounded positions.
 const CELL_MIN_MM: f32 = 0.15;
-/// Fewest cells of a patch that are looked at: a patch has its own second derivative.
-const CELLS_MIN: u16 = 2;
-/// Cells of a patch where only its ends are kept.
-const CELLS_OF_MANY: u16 = 4;
-/// Most stations of a pass.
+/// Length of a cell between kept stations that is short enough, mm.
+const CELL_KEPT_MM: f32 = 0.3;
+/// Length of a cell that derivatives are good to, mm, and fewest cells for them: a patch has its own second derivative.
+const CELL_FINE_MM: f32 = 0.25;
+const CELLS_FINE: u16 = 4;
+/// Most cells that are looked at for one between kept stations.
+const LOOKS_MAX: u16 = 32;
+/// Cells between kept stations of a patch that are fine as they are.
+const CELLS_MANY: u16 = 8;
+/// Change of 1 - r k from patch to patch below which it is rounding of single precision.
+const NO_JUMP: f32 = 4e-6;
+/// Most stations of a pass, and most patches of which both ends are kept.
 const STATIONS: u16 = 168;
+const PATCHES: u16 = STATIONS / 2;
 const _: () = assert!(STATIONS as usize == STATIONS_MAX);
-
-/// Which stations of a pass are kept for its plan.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Kept {
-    /// All.
-    Every,
-    /// Those at the ends of each patch.
-    Ends,
-    /// Those at the ends of each group of so many patches, with the greatest derivatives within the group.
-    Groups(u16),
-}
 
 /// The plan of one pass: its feed, its ends, and the pass after it.
 #[derive(Clone, Debug)]
@@ -45,10 +42,11 @@ pub(crate) struct PassPlan {
     pub(crate) plan: Plan,
     pub(crate) pass: u32,
     pub(crate) side: SpanParameter,
-    /// Cells of a patch that are looked at, the fraction of the patch per cell, and which stations are kept.
+    /// Cells of a patch between kept stations, 0 before the first patch, and the fraction of the patch per cell.
     cells: u16,
     cell_fraction: u64,
-    kept: Kept,
+    /// Patches of a group: where a pass has more than [`PATCHES`], the ends of groups are kept, with the greatest derivatives within them.
+    group: u16,
     /// The pass is a single point.
     pub(crate) point: bool,
     /// Cutter location at start and end, nm, and whether the surface faces up there.
@@ -68,7 +66,7 @@ impl PassPlan {
         side: SpanParameter { span: 0, fraction: 0 },
         cells: 0,
         cell_fraction: 0,
-        kept: Kept::Every,
+        group: 1,
         point: false,
         ends: [[0; 3]; 2],
         faces_up: [false; 2],
@@ -78,27 +76,18 @@ impl PassPlan {
 
     /// Cells of a patch between kept stations, and the fraction of the patch per cell.
     pub(crate) const fn kept_cells(&self) -> (u16, u64) {
-        match self.kept {
-            Kept::Every => (self.cells, self.cell_fraction),
-            Kept::Ends | Kept::Groups(_) => (1, u64::MAX),
-        }
+        (self.cells, self.cell_fraction)
     }
 
     /// Arc at the start of a cell between kept stations, units of 2^-10 nm. `cell`: number from the start of the pass.
     pub(crate) fn arc_q10(&self, cell: u16) -> Option<i64> {
-        let (cells, _) = self.kept_cells();
-        let patch = cell.checked_div(cells)?;
-        let within = cell - patch * cells;
-        let station = match self.kept {
-            Kept::Every | Kept::Ends => patch * (cells + 1) + within,
-            Kept::Groups(size) => {
-                let group = patch.checked_div(size)?;
-                if group * size != patch {
-                    return None;
-                }
-                2 * group
-            }
-        };
+        let patch = cell.checked_div(self.cells)?;
+        let within = cell - patch * self.cells;
+        let group = patch.checked_div(self.group)?;
+        if group * self.group != patch {
+            return None;
+        }
+        let station = group * (self.cells + 1) + within;
         Some(i64::from(self.plan.stations.get(station).arc_nm) << Q10_BITS)
     }
 }
@@ -136,6 +125,16 @@ pub(crate) struct Lookahead {
     /// Station within the patch, from 0, and patches so far.
     station: u16,
     patches: u16,
+    /// Cells of the patch that are looked at: for each of those between kept stations, and all of them, with the fraction of the patch of one.
+    looks: u16,
+    cells: u16,
+    cell_fraction: u64,
+    /// Mean length of a patch of the last pass, mm.
+    patch_mm: f32,
+    /// What is continuous if the direction of the tool centre's path is, at the end of the last patch: 1 - r k along the path, r times the twist.
+    bend: [f32; 2],
+    /// Whether it is, from the last patch to this.
+    is_smooth: bool,
     speed: PathSpeed,
     window: Window,
     /// Arc from the start of the patch, mm, and of the pass to the patch, units of 2^-10 nm.
@@ -157,6 +156,12 @@ impl Lookahead {
         },
         station: 0,
         patches: 0,
+        looks: 1,
+        cells: 1,
+        cell_fraction: 0,
+        patch_mm: 0.0,
+        bend: [0.0; 2],
+        is_smooth: false,
         speed: PathSpeed::STILL,
         window: Window::EMPTY,
         arc_mm: 0.0,
@@ -167,6 +172,7 @@ impl Lookahead {
     /// Resets to the state before the first pass.
     pub(crate) const fn restart(&mut self) {
         self.step_over.restart();
+        self.patch_mm = 0.0;
         self.task = Task::Done;
     }
 
@@ -221,9 +227,7 @@ impl Lookahead {
             Task::Patch => {
                 self.patch.collapse(job, &self.line)?;
                 out.point |= self.patch.point;
-                if out.cells == 0 {
-                    self.choose_cells(job.header.path_spans.max(1), out);
-                }
+                self.choose_cells(job.header.path_spans.max(1), out);
                 self.window = Window::EMPTY;
                 self.arc_mm = 0.0;
                 Task::Station
@@ -240,9 +244,9 @@ impl Lookahead {
                     self.estimates(job, out)
                 }
             }
-            Task::Estimate(0) => self.next_station(job, out),
+            Task::Estimate(0) => self.next_station(job),
             Task::Estimate(looks) => {
-                let fraction = self.fraction(out);
+                let fraction = self.fraction();
                 let most = self.maximum.inv_interval_sq;
                 self.step_over.work(job, &self.line, &self.patch, fraction, most);
                 Task::Estimate(looks - 1)
@@ -258,7 +262,7 @@ impl Lookahead {
 
     /// Pass, path and side parameter of the station.
     pub(crate) fn surface_position(&self, out: &PassPlan) -> (u32, SpanParameter, SpanParameter) {
-        let fraction = self.fraction(out);
+        let fraction = self.fraction();
         let own = if self.line.reversed { !fraction } else { fraction };
         let path = SpanParameter {
             span: self.line.span,
@@ -267,27 +271,44 @@ impl Lookahead {
         (out.pass, path, out.side)
     }
 
-    fn fraction(&self, out: &PassPlan) -> u64 {
-        if self.station >= out.cells {
-            return u64::MAX;
-        }
-        u64::from(self.station) * out.cell_fraction
+    const fn is_end(&self) -> bool {
+        self.station >= self.cells
     }
 
-    /// Chooses the cells of a patch by the number of patches and the length of the first.
-    fn choose_cells(&self, spans: u16, out: &mut PassPlan) {
-        let fit = STATIONS.checked_div(spans).unwrap_or(1).saturating_sub(1);
-        let (most, kept) = if fit >= CELLS_MIN {
-            (fit, Kept::Every)
-        } else if spans <= STATIONS / 2 {
-            (CELLS_OF_MANY, Kept::Ends)
+    fn fraction(&self) -> u64 {
+        if self.is_end() {
+            return u64::MAX;
+        }
+        u64::from(self.station) * self.cell_fraction
+    }
+
+    /// Chooses the cells of a patch: those between kept stations by the number of patches and their length, the same for the whole pass; those
+    /// that are looked at by the length of this patch.
+    fn choose_cells(&mut self, spans: u16, out: &mut PassPlan) {
+        let whole = |value: f32| u16::try_from(truncated(value)).unwrap_or(u16::MAX);
+        let part = |cells: u16| u64::MAX.checked_div(u64::from(cells)).unwrap_or(u64::MAX);
+        let length = self.patch_length();
+        if out.cells == 0 {
+            let fit = STATIONS.checked_div(spans).unwrap_or(1).saturating_sub(1).max(1);
+            let mean = if self.patch_mm > 0.0 {
+                self.patch_mm
+            } else {
+                length
+            };
+            out.cells = whole(mean / CELL_KEPT_MM).clamp(1, fit);
+            out.cell_fraction = part(out.cells);
+            out.group = spans.div_ceil(PATCHES);
+        }
+        let fine = whole(length / CELL_FINE_MM).max(CELLS_FINE);
+        let most = whole(length / CELL_MIN_MM).max(2);
+        self.looks = if out.cells >= CELLS_MANY {
+            1
         } else {
-            (CELLS_OF_MANY, Kept::Groups(spans.div_ceil(STATIONS / 2)))
+            fine.min(most).div_ceil(out.cells).clamp(1, LOOKS_MAX)
         };
-        let cells = truncated(self.patch_length() / CELL_MIN_MM);
-        out.cells = u16::try_from(cells).unwrap_or(u16::MAX).clamp(CELLS_MIN, most);
-        out.cell_fraction = u64::MAX.checked_div(u64::from(out.cells)).unwrap_or(u64::MAX);
-        out.kept = kept;
+        self.cells = out.cells * self.looks;
+        self.cell_fraction = part(self.cells);
+        out.plan.stations.note_spacing(length / f32::from(self.cells));
     }
 
     /// Length of the patch, roughly, mm; 0 where its surface is not evaluated.
@@ -302,7 +323,7 @@ impl Lookahead {
                 let mm = to_f32(i64::from(*to) - i64::from(*from)) * MM_PER_NM;
                 sum += mm * mm;
             }
-            crate::math::arith::sqrt(sum)
+            sqrt(sum)
         };
         apart(&start, &middle) + apart(&middle, &end)
     }
@@ -312,7 +333,7 @@ impl Lookahead {
         if out.point {
             return self.estimates(job, out);
         }
-        let is_end = self.station >= out.cells;
+        let is_end = self.is_end();
         let count = self.window.count();
         let last = count.saturating_sub(1);
         let middle = WINDOW / 2;
@@ -332,37 +353,30 @@ impl Lookahead {
         }
     }
 
-    /// Stores the derivatives at a place of the window.
+    /// Stores the derivatives at a place of the window, if its station is kept or belongs to a group.
     fn differentiate(&self, at: u8, out: &mut PassPlan) {
         let behind = self.window.count().saturating_sub(1 + usize::from(at));
-        let station = usize::from(self.station).saturating_sub(behind);
-        let q = self.window.derivatives(usize::from(at));
-        let is_start = station == 0;
-        let is_end = station >= usize::from(out.cells);
-        match out.kept {
-            Kept::Every => {
-                let back = u16::try_from(behind).unwrap_or(0) + 1;
-                if let Some(place) = out.plan.stations.back_mut(back) {
-                    place.q = q;
+        let station = self.station.saturating_sub(u16::try_from(behind).unwrap_or(0));
+        let looks = self.looks.max(1);
+        let (kept, rest) = (station / looks, station % looks);
+        let stations = &mut out.plan.stations;
+        if out.group > 1 {
+            let q = self.window.derivatives(usize::from(at));
+            let begins = station == 0 && self.patches.is_multiple_of(out.group);
+            for back in [1, 2] {
+                if let Some(place) = stations.back_mut(back) {
+                    widen(&mut place.q, &q, begins || back == 1);
                 }
             }
-            Kept::Ends => {
-                let back = if is_end {
-                    1
-                } else {
-                    1 + u16::from(self.station >= out.cells)
-                };
-                if (is_start || is_end)
-                    && let Some(place) = out.plan.stations.back_mut(back)
-                {
-                    place.q = q;
-                }
-            }
-            Kept::Groups(size) => {
-                let begins = is_start && self.patches.is_multiple_of(size);
-                for back in [1, 2] {
-                    if let Some(place) = out.plan.stations.back_mut(back) {
-                        widen(&mut place.q, &q, begins || back == 1);
+        } else if rest == 0 {
+            let back = self.station / looks - kept + 1;
+            if let Some(place) = stations.back_mut(back) {
+                // The direction at the start of a patch is that at the end of the last, where it is known not to jump.
+                let direction = place.q;
+                place.q = self.window.derivatives(usize::from(at));
+                if station == 0 && self.is_smooth {
+                    for (q, direction) in place.q.iter_mut().zip(&direction) {
+                        q[0] = direction[0];
                     }
                 }
             }
@@ -374,7 +388,7 @@ impl Lookahead {
     fn estimates(&self, job: &Job<'_>, out: &PassPlan) -> Task {
         let first = self.station == 0;
         let begins = first && self.patches == 0;
-        let ends = self.station >= out.cells && self.line.next(job.header.path_spans).is_none();
+        let ends = self.is_end() && self.line.next(job.header.path_spans).is_none();
         Task::Estimate(if job.header.spacing == Spacing::FirstOrder || out.point {
             0
         } else {
@@ -383,8 +397,8 @@ impl Lookahead {
     }
 
     /// Advances to the next station, the next patch, or the end.
-    fn next_station(&mut self, job: &Job<'_>, out: &PassPlan) -> Task {
-        if self.station < out.cells {
+    fn next_station(&mut self, job: &Job<'_>) -> Task {
+        if !self.is_end() {
             self.station += 1;
             return Task::Station;
         }
@@ -402,7 +416,7 @@ impl Lookahead {
 
     /// Evaluates the station: fit of the ball, travel, inverse square interval, arc.
     fn visit(&mut self, axes: &AxisLimits, out: &mut PassPlan) -> Result<()> {
-        let fraction = self.fraction(out);
+        let fraction = self.fraction();
         let (contact, located) = self.patch.evaluate(fraction)?;
         check_travel(axes, &located.cl_nm)?;
         check_height(axes, &located.cl_nm)?;
@@ -422,42 +436,51 @@ impl Lookahead {
             return Ok(());
         }
         if self.station > 0 {
-            self.arc_mm += self.cell_length(out, &contact);
+            self.arc_mm += self.cell_length(&contact);
         }
+        let twist = if contact.lateral_squared > 0.0 {
+            sqrt((contact.twist_squared / contact.lateral_squared).at_least(0.0))
+        } else {
+            0.0
+        };
+        let bend = [contact.along, twist];
+        if self.station == 0 {
+            let apart = |(from, to): (&f32, &f32)| (to - from).abs() > NO_JUMP;
+            self.is_smooth = self.patches > 0 && !self.bend.iter().zip(&bend).any(apart);
+        }
+        self.bend = bend;
         self.speed = contact.path;
         self.window.push(located.cl_nm, self.arc_mm);
         self.keep(out);
         Ok(())
     }
 
-    /// Appends the station to the plan's, without its derivatives.
+    /// Appends the station to the plan's if it is kept, with the last one's derivatives until its own are taken.
     fn keep(&self, out: &mut PassPlan) {
         let arc_q10 = self.start_q10 + to_q10(self.arc_mm);
-        let station = Station {
-            arc_nm: u32::try_from((arc_q10 + (1 << (Q10_BITS - 1))) >> Q10_BITS).unwrap_or(u32::MAX),
-            q: [[0.0; 3]; 3],
-        };
-        let is_start = self.station == 0;
-        let is_end = self.station >= out.cells;
         let stations = &mut out.plan.stations;
-        match out.kept {
-            Kept::Every => stations.push(station),
-            Kept::Ends if is_start || is_end => stations.push(station),
-            Kept::Ends => {}
-            Kept::Groups(size) => {
-                if is_start && self.patches.is_multiple_of(size) {
-                    stations.push(station);
-                    stations.push(station);
-                } else if let Some(last) = stations.back_mut(1) {
-                    last.arc_nm = station.arc_nm;
-                }
+        let arc_nm = u32::try_from((arc_q10 + (1 << (Q10_BITS - 1))) >> Q10_BITS).unwrap_or(u32::MAX);
+        let q = stations.back_mut(1).map_or([[0.0; 3]; 3], |last| last.q);
+        let begins = self.station == 0 && self.patches.is_multiple_of(out.group);
+        if out.group > 1 {
+            if begins {
+                let station = Station {
+                    arc_nm,
+                    q: [[0.0; 3]; 3],
+                };
+                stations.push(station);
+                stations.push(station);
+            } else if let Some(last) = stations.back_mut(1) {
+                last.arc_nm = arc_nm;
             }
+        } else if self.station.is_multiple_of(self.looks) {
+            stations.push(Station { arc_nm, q });
         }
     }
 
     /// Arc from the last station, mm: Hermite's two-point rule.
-    fn cell_length(&self, out: &PassPlan, contact: &Contact) -> f32 {
-        let length = 1.0 / f32::from(out.cells);
+    fn cell_length(&self, contact: &Contact) -> f32 {
+        let length = 1.0 / f32::from(self.cells);
         let (first, last) = (1.0 / self.speed.inv_speed, 1.0 / contact.path.inv_speed);
         let bow = first * self.speed.log_speed_derivative - last * contact.path.log_speed_derivative;
         length * (0.5 * (first + last) + bow * length * (1.0 / 12.0)) / self.patch.per_mm
@@ -465,6 +488,8 @@ impl Lookahead {
 
     /// Computes the interval and the next pass.
     fn close(&mut self, job: &Job<'_>, out: &mut PassPlan) -> Result<()> {
+        let patches = f32::from(self.patches.saturating_add(1));
+        self.patch_mm = to_f32(self.start_q10) * MM_PER_Q10 / patches;
         let header = job.header;
         out.interval = interval_of(self.maximum.inv_interval_sq);
         let step = match header.spacing {
