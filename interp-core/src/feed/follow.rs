@@ -71,7 +71,6 @@ impl Follower {
     }
 
     /// Arc since the start, units of 2^-10 nm.
-    #[cfg(test)]
     pub(crate) const fn arc_q10(&self) -> i64 {
         self.arc_q10
     }

@@ -20,8 +20,9 @@ pub(crate) const KNOTS_MAX: usize = 84;
 /// Distance from a jump within which a period may see it, periods.
 const JUMP_REACH: f32 = 1.2;
 
-/// Intervals that a step of a cursor may pass.
+/// Intervals that a step of a cursor may pass, and steps that a period is made of where nodes are closer together than that.
 const INTERVALS_A_STEP: u16 = 4;
+const PARTS_MAX: u8 = 8;
 
 /// Where a jump lies: interval, fraction of it in units of 2^-16, and the first of its two stations.
 #[derive(Clone, Copy, Debug)]
@@ -320,8 +321,24 @@ impl Course for Plan {
 impl Plan {
     /// Moves on at this pace; see [`Course::advance`].
     fn advance_at(&self, pace: &[f32; COEFFICIENTS], cursor: &mut Cursor, seconds: f32) {
-        // The midpoint rule.
         let by = seconds * self.inverse_step;
+        let intervals = by * self.interval_of(pace, cursor.interval).speed(cursor.x);
+        // As a rule a step stays within one interval and the next.
+        if intervals <= 1.0 {
+            return self.step_at(pace, cursor, by);
+        }
+        let parts = u8::try_from(truncated(intervals))
+            .unwrap_or(u8::MAX)
+            .saturating_add(1)
+            .min(PARTS_MAX);
+        for _ in 0..parts {
+            self.step_at(pace, cursor, by / f32::from(parts));
+        }
+    }
+
+    /// A step by the midpoint rule, in time of an interval at pace 1.
+    #[inline(always)]
+    fn step_at(&self, pace: &[f32; COEFFICIENTS], cursor: &mut Cursor, by: f32) {
         let here = self.interval_of(pace, cursor.interval);
         let half = cursor.x + 0.5 * by * here.speed(cursor.x);
         let middle = if half < 1.0 || cursor.interval + 1 >= self.intervals {

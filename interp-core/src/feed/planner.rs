@@ -117,7 +117,7 @@ impl Planner {
         self.machine = plan.limits;
         self.limits = plan.limits.planned();
         self.first = 0;
-        self.walker.begin();
+        self.walker.begin(plan.limits.period);
         self.stage = Stage::Walk;
     }
 

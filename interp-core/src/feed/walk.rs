@@ -89,6 +89,8 @@ pub(crate) struct Walker {
     /// Spacing at the ends, s, and its greatest growth.
     ends: f32,
     growth: f32,
+    /// Least spacing, s.
+    finest: f32,
     /// Nodes of the unsmoothed walk, and what their times are scaled by.
     times: u16,
     scale: f32,
@@ -126,6 +128,7 @@ impl Walker {
         high: 0.0,
         ends: 0.0,
         growth: GROWTH,
+        finest: 0.0,
         times: 0,
         scale: 0.0,
         cell: 0,
@@ -135,8 +138,10 @@ impl Walker {
         coarsenings: 0,
     };
 
-    pub(crate) const fn begin(&mut self) {
+    pub(crate) const fn begin(&mut self, period: f32) {
         *self = Self::IDLE;
+        // Nodes much closer together than periods would not be seen.
+        self.finest = 0.5 * period;
         self.stage = Stage::Caps;
         self.jerk = f32::MAX;
     }
@@ -191,24 +196,26 @@ impl Walker {
                 Stage::TryEven
             }
             Stage::TryEven => {
-                if self.fits(lists, SPACING, 0.0) {
+                if self.fits(lists, SPACING.at_least(self.finest), 0.0) {
                     self.vary = Vary::Even;
                     let least = 0.25 * (self.duration + self.mean_s) / f32::from(self.intervals);
-                    (self.low, self.high) = (least.at_most(SPACING), SPACING);
+                    let fine = SPACING.at_least(self.finest);
+                    (self.low, self.high) = (least.at_least(self.finest).at_most(fine), fine);
                     Stage::Bisect(0)
                 } else {
                     Stage::TryGrowing
                 }
             }
             Stage::TryGrowing => {
-                if self.fits(lists, SPACING, self.growth) {
+                if self.fits(lists, SPACING.at_least(self.finest), self.growth) {
                     self.vary = Vary::Growth;
                     (self.low, self.high) = (1e-4, self.growth);
                     Stage::Bisect(0)
                 } else {
                     self.vary = Vary::Coarse;
                     let widest = 8.0 * (self.duration + self.mean_s) / f32::from(self.intervals);
-                    (self.low, self.high) = (SPACING, widest.at_least(SPACING));
+                    let fine = SPACING.at_least(self.finest);
+                    (self.low, self.high) = (fine, widest.at_least(fine));
                     Stage::Coarsen
                 }
             }
@@ -374,10 +381,15 @@ impl Walker {
         self.mean_s = (self.acceleration / self.jerk)
             .at_most(1.2 * sqrt(length / time / self.jerk))
             .at_most(cube_root(0.5 * length / self.jerk));
-        let wanted = u16::try_from(truncated(time / SPACING_WORTH)).unwrap_or(u16::MAX);
-        self.intervals = wanted.clamp(NODES_MIN, NODES_COUNT);
+        let whole = |value: f32| u16::try_from(truncated(value)).unwrap_or(u16::MAX);
+        let most = whole(time / self.finest).clamp(NODES_LEAST, NODES_COUNT);
+        let wanted = whole(time / SPACING_WORTH.at_least(self.finest));
+        self.intervals = wanted.clamp(NODES_MIN.min(most), most);
         self.growth = if time > LONG { GROWTH_LONG } else { GROWTH };
-        self.ends = (self.mean_s / 6.0).at_least(time / (4000.0 * f32::from(self.intervals)));
+        self.mean_s = self.mean_s.at_least(4.0 * self.finest);
+        self.ends = (self.mean_s / 6.0)
+            .at_least(self.finest)
+            .at_least(time / (4000.0 * f32::from(self.intervals)));
     }
 
     /// Times at which something happens.
@@ -408,10 +420,10 @@ impl Walker {
     }
 
     /// Spacing and growth for a value of what is varied.
-    const fn spacing(&self, value: f32) -> [f32; 2] {
+    fn spacing(&self, value: f32) -> [f32; 2] {
         match self.vary {
             Vary::Even => [value, 0.0],
-            Vary::Growth => [SPACING, value],
+            Vary::Growth => [SPACING.at_least(self.finest), value],
             Vary::Coarse => [value, self.growth],
         }
     }
@@ -598,6 +610,8 @@ impl Motion {
     }
 }
 
+/// Least intervals of a pass of few periods.
+const NODES_LEAST: u16 = 12;
 /// Most intervals as u16.
 const NODES_COUNT: u16 = 160;
 const _: () = assert!(NODES_COUNT as usize == NODES_MAX);

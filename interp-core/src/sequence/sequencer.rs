@@ -3,13 +3,12 @@
 //! [`Sequencer::tick`] moves the tool by one period. [`Sequencer::plan`] plans, a fixed portion a period: a change of the pace, the link to the next
 //! pass, the next pass. A pass is slowed down where the pass after it would not be planned in time.
 
-use crate::fault::{Fault, Result};
+use crate::fault::{Fault, FaultKind, Result};
 use crate::feed::MM_PER_Q10;
 use crate::feed::follow::Follower;
 use crate::feed::limits::MotionLimits;
-use crate::feed::pace::Course as _;
-use crate::feed::pace::Pace;
-use crate::feed::plan::Cursor;
+use crate::feed::pace::{Course as _, Pace};
+use crate::feed::plan::{Cursor, Plan};
 use crate::feed::planner::{PORTION_CYCLES, Planner};
 use crate::job::program::Job;
 use crate::job::{AxisLimits, Pattern};
@@ -558,6 +557,7 @@ impl Sequencer {
                 0.0
             };
             if self.follower.is_over(&now.plan) {
+                check_end(&now.plan, &self.follower)?;
                 run.finish_pass(job, last)?;
                 true
             } else {
@@ -720,8 +720,24 @@ impl Sequencer {
 /// Legs of a link off the surface.
 const LEGS: u8 = 3;
 
+/// Greatest length left at the end of a plan, mm.
+const END_MAX_MM: f32 = 1e-3;
+
 /// Least move of a period, mm: a millionth of a nanometre is rounding.
 const MOVED_MIN: f32 = 1e-12;
+
+/// The end of a plan is the end of its path: a step to there is none that an axis would notice.
+///
+/// # Errors
+/// [`FaultKind::PatchTooShort`] with the length that is left, mm.
+fn check_end(plan: &Plan, follower: &Follower) -> Result<()> {
+    let left = to_f32(plan.length_q10() - follower.arc_q10()) * MM_PER_Q10;
+    if left.abs() <= END_MAX_MM.at_most(plan.limits.feed * plan.limits.period) {
+        Ok(())
+    } else {
+        Err(Fault::new(FaultKind::PatchTooShort, left))
+    }
+}
 
 /// The pace of a pass at this feed factor.
 fn pace_of(job: &Job<'_>, pass: &PassPlan, share: f32) -> f32 {
