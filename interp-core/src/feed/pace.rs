@@ -11,16 +11,17 @@ use crate::math::number::Bounded;
 const LATENCY: u16 = 8;
 const PLACES_A_PERIOD: f32 = 18.0;
 /// The most of it.
-const LATENCY_MAX: u16 = 48;
+const LATENCY_MAX: u16 = 96;
 
 /// Durations that a search tries, shortest first, and the ratio of one to the next.
 const TRIALS: u8 = 12;
 const RATIO_MIN: f32 = 1.1;
 const RATIO_MAX: f32 = 1.5;
 
-/// Time between the places of a trial that are looked at, s, and their least number.
+/// Time between the places of a trial that are looked at, s, and their least and greatest number.
 const SPACING: f32 = 1.0e-3;
-const POINTS_MIN: f32 = 16.0;
+const PLACES_MIN: f32 = 16.0;
+const PLACES_MAX: f32 = 200.0;
 
 /// Paces below 0 and above 1 that are rounding.
 const PACE_MIN: f32 = -2e-5;
@@ -271,7 +272,9 @@ impl<C: Copy> Pace<C> {
             return;
         };
         let duration = search.change.duration;
-        let step = SPACING.at_most(duration / POINTS_MIN);
+        let step = SPACING
+            .at_most(duration / PLACES_MIN)
+            .at_least(duration / PLACES_MAX);
         let time = (step * f32::from(search.points)).at_most(duration);
         let rates = search.change.rates(time);
         let [pace, _, _] = rates;
@@ -318,7 +321,7 @@ impl<C: Copy> Pace<C> {
 
     fn begin_search<P: Course<Cursor = C>>(&self, course: &P, at: &C) -> Search<C> {
         let shortest = self.shortest(course, at, self.rates(0.0));
-        let places = 2.0 * shortest / SPACING;
+        let places = 2.0 * (shortest / SPACING).at_most(PLACES_MAX);
         let latency = u16::try_from(truncated(places / PLACES_A_PERIOD)).unwrap_or(LATENCY_MAX);
         let latency = LATENCY
             .saturating_add(latency)

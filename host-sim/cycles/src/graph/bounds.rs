@@ -89,7 +89,7 @@ const BOUNDS: &[(&str, u32, &str)] = &[
     ),
     (
         "interp_core::feed::pace::Pace::begin_search",
-        48,
+        96,
         "periods until a change begins: LATENCY_MAX",
     ),
     (
