@@ -1,19 +1,15 @@
 //! One period along a plan. Where the plan is within a fraction of a percent of the programmed feed for long enough, the tool moves at exactly
 //! that feed; the change to it and back is smooth.
 
+use super::limits::{CHANGE_MIN, FeedChange};
 use super::pace::Course;
 use super::plan::{Cursor, Lead, Plan, to_mm};
 use crate::math::number::Bounded;
 
-/// Periods that the lead is ahead of the tool.
-pub(crate) const LEAD: u8 = 64;
-/// Periods in which the speed changes from the plan's to the feed, half the lead: there is time to change to the feed and back.
-const CHANGE: u8 = LEAD / 2;
-/// Relative difference of the plan's speed from the feed that is made up for.
-const NEAR: f32 = 3e-3;
-
 /// Periods at the programmed feed by which the lead may be behind.
 const BEHIND_MAX: f32 = 2.0;
+/// Steps in which a new lead goes ahead.
+const LEAD_STEPS: u16 = 2 * CHANGE_MIN;
 
 impl Lead {
     /// [`Self::look`] at a plan that is being checked, a period after the last look.
@@ -27,11 +23,11 @@ impl Lead {
     }
 
     fn count(&mut self, plan: &Plan, cursor: &Cursor, speed: f32, periods: f32) {
-        let feed = plan.limits.feed;
-        let is_near =
-            !plan.is_over(cursor) && plan.allows_feed(cursor.interval) && (speed - feed).abs() < NEAR * feed;
+        let FeedChange { near, .. } = plan.change;
+        let apart = (speed - plan.limits.feed).abs();
+        let is_near = !plan.is_over(cursor) && plan.allows_feed(cursor.interval) && apart < near;
         self.near = if is_near {
-            (self.near + periods).at_most(f32::from(LEAD))
+            (self.near + periods).at_most(f32::from(plan.change.lead()))
         } else {
             0.0
         };
@@ -43,8 +39,8 @@ impl Lead {
 pub(crate) struct Follower {
     pub(crate) cursor: Cursor,
     lead: Lead,
-    /// How far the speed has changed from the plan's to the feed, 0 to [`CHANGE`], and whether it changes to it.
-    change: u8,
+    /// How far the speed has changed from the plan's to the feed, periods of [`FeedChange`], and whether it changes to it.
+    change: u16,
     rises: bool,
     /// The speed is to be the plan's own.
     as_planned: bool,
@@ -91,10 +87,11 @@ impl Follower {
             self.arc_q10 = planned_q10;
             return planned;
         }
-        let by = f32::from(self.change) * (1.0 / CHANGE as f32);
+        let whole = plan.change.periods;
+        let by = f32::from(self.change) / f32::from(whole);
         // Smooth: 10 t^3 - 15 t^4 + 6 t^5.
         let share = by * by * by * (10.0 - by * (15.0 - 6.0 * by));
-        let moved = if self.change == CHANGE {
+        let moved = if self.change == whole {
             exact
         } else {
             (planned + share * (exact - planned)).at_most(exact)
@@ -109,14 +106,15 @@ impl Follower {
         plan.advance(cursor, pace * plan.limits.period);
         let at = *cursor;
         self.lead.look(plan, &at, pace);
+        let whole = plan.change.periods;
         self.change = match self.change {
             0 => {
-                self.rises = self.lead.near >= f32::from(LEAD) && !self.as_planned;
-                u8::from(self.rises)
+                self.rises = self.lead.near >= f32::from(plan.change.lead()) && !self.as_planned;
+                u16::from(self.rises)
             }
-            CHANGE => {
+            change if change >= whole => {
                 self.rises = false;
-                CHANGE - u8::from(self.lead.near == 0.0 || self.as_planned)
+                whole - u16::from(self.lead.near == 0.0 || self.as_planned)
             }
             change if self.rises => change + 1,
             change => change - 1,
@@ -140,8 +138,9 @@ impl Follower {
             near: 0.0,
         };
         self.behind = 0.0;
-        for _ in 0..LEAD {
-            plan.advance(&mut self.lead.cursor, plan.limits.period);
+        let step = f32::from(plan.change.lead()) * (1.0 / f32::from(LEAD_STEPS));
+        for _ in 0..LEAD_STEPS {
+            plan.advance(&mut self.lead.cursor, step * plan.limits.period);
         }
     }
 

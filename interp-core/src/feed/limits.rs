@@ -2,7 +2,7 @@
 
 use super::stations::{Derivatives, Jump};
 use crate::job::AxisLimits;
-use crate::math::arith::sqrt;
+use crate::math::arith::{sqrt, truncated};
 use crate::math::number::Bounded;
 
 /// Fractions of the limits that a plan uses. The jerk left over is what a hold begins with while the plan's own jerk is at its limit.
@@ -14,6 +14,16 @@ const FEED: f32 = 0.9995;
 
 /// Jerk of a step of the acceleration, as a multiple of step/period: a third difference sees 0.75 at its worst phase.
 const STEP_SHARE: f32 = 0.78;
+
+/// Least and greatest number of periods in which the speed changes from the plan's to the feed.
+pub(crate) const CHANGE_MIN: u16 = 32;
+const CHANGE_MAX: u16 = 16 * CHANGE_MIN;
+/// Greatest relative difference of the plan's speed from the feed that is made up for, and the one that is worth a longer change.
+const NEAR: f32 = 3e-3;
+const NEAR_WORTH: f32 = 2e-3;
+/// Share of the least jerk limit that a change takes, and its jerk as a multiple of difference/duration^2.
+const JERK_SHARE: f32 = 0.03;
+const CHANGE_JERK: f32 = 5.78;
 
 /// Least `|q'|` that is divided by.
 pub(crate) const SLOPE_MIN: f32 = 1e-6;
@@ -152,5 +162,42 @@ impl MotionLimits {
                 .at_most(sqrt(0.5 / second.at_least(1e-12)));
         }
         speed
+    }
+}
+
+/// How the speed changes from a plan's own to the programmed feed.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct FeedChange {
+    /// Duration, periods.
+    pub(crate) periods: u16,
+    /// Greatest difference of speed, mm/s.
+    pub(crate) near: f32,
+}
+
+impl FeedChange {
+    pub(crate) const NONE: Self = Self {
+        periods: CHANGE_MIN,
+        near: 0.0,
+    };
+
+    /// Within these limits.
+    pub(crate) fn new(limits: &MotionLimits) -> Self {
+        let [x, y, z] = limits.axes.map(|axis| axis.jerk);
+        let jerk = JERK_SHARE * x.at_most(y).at_most(z);
+        let shortest = f32::from(CHANGE_MIN) * limits.period;
+        let short = jerk * shortest * shortest * (1.0 / CHANGE_JERK);
+        let longer = sqrt((NEAR_WORTH * limits.feed / short.at_least(1e-12)).at_least(1.0));
+        let periods = f32::from(CHANGE_MIN) * longer.at_most(f32::from(CHANGE_MAX / CHANGE_MIN));
+        let periods = u16::try_from(truncated(periods)).unwrap_or(CHANGE_MAX);
+        let ratio = f32::from(periods) * (1.0 / f32::from(CHANGE_MIN));
+        Self {
+            periods,
+            near: (short * ratio * ratio).at_most(NEAR * limits.feed),
+        }
+    }
+
+    /// Periods that the lead is ahead of the tool: there is time to change to the feed and back.
+    pub(crate) const fn lead(&self) -> u16 {
+        2 * self.periods
     }
 }

@@ -1,6 +1,6 @@
 //! A plan: the path's stations, a walk along them and the pace of the walk; and a cursor that moves along it.
 
-use super::limits::MotionLimits;
+use super::limits::{FeedChange, MotionLimits};
 use super::pace::{Course, Use};
 use super::stations::Stations;
 use super::{MM_PER_Q10, Q10_BITS, Q10_PER_MM, to_q10};
@@ -51,6 +51,7 @@ impl Lead {
 pub(crate) struct Plan {
     pub(crate) stations: Stations,
     pub(crate) limits: MotionLimits,
+    pub(crate) change: FeedChange,
     /// Intervals of the walk, and the time of one at pace 1, s.
     pub(crate) intervals: u16,
     pub(crate) step_s: f32,
@@ -125,6 +126,7 @@ impl Plan {
     pub(crate) const NONE: Self = Self {
         stations: Stations::NONE,
         limits: MotionLimits::NONE,
+        change: FeedChange::NONE,
         intervals: 0,
         step_s: 0.0,
         inverse_step: 0.0,

@@ -1,7 +1,6 @@
 //! Plans a path in portions: walk, barrier method, check.
 
-use super::follow::LEAD;
-use super::limits::MotionLimits;
+use super::limits::{FeedChange, MotionLimits};
 use super::newton::{self, Reach, SHAPE, Sweep};
 use super::pace::{Course, Use};
 use super::plan::{Cursor, Lead, Plan};
@@ -113,7 +112,8 @@ impl Planner {
     };
 
     /// Begins to plan the path of the plan's stations within the plan's limits.
-    pub(crate) fn begin(&mut self, plan: &Plan) {
+    pub(crate) fn begin(&mut self, plan: &mut Plan) {
+        plan.change = FeedChange::new(&plan.limits);
         self.machine = plan.limits;
         self.limits = plan.limits.planned();
         self.first = 0;
@@ -142,6 +142,7 @@ impl Planner {
     pub(crate) fn take_over(&mut self, plan: &mut Plan) {
         plan.pace = plan.draft;
         plan.limits = self.machine;
+        plan.change = FeedChange::new(&plan.limits);
         self.holds = false;
     }
 
@@ -310,7 +311,7 @@ impl Planner {
 
     /// One period of the plan; whether it is over.
     fn check(&mut self, plan: &mut Plan) -> bool {
-        if self.periods < u32::from(LEAD) {
+        if self.periods < u32::from(plan.change.lead()) {
             self.lead.look_draft(plan, &self.cursor);
             self.lead.cursor = self.cursor;
         }

@@ -111,7 +111,7 @@ impl Path {
             }
         }
         let mut planner = Box::new(Planner::IDLE);
-        planner.begin(&plan);
+        planner.begin(&mut plan);
         while !planner.is_done() {
             planner.work(&mut plan, 0);
         }

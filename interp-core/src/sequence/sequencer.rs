@@ -336,7 +336,7 @@ impl Sequencer {
                     } else {
                         let feed = job.header.feed_mm_s * self.share.at_least(1.0);
                         next.plan.limits = MotionLimits::new(axes, feed, job.header.period_s);
-                        self.planner.begin(&next.plan);
+                        self.planner.begin(&mut next.plan);
                         Planning::Feed
                     };
                 }
@@ -404,7 +404,7 @@ impl Sequencer {
             && left_periods > 1.5 * f32::from(next.plan.intervals) * PERIODS_A_NODE + PERIODS_A_PASS
         {
             next.plan.limits = MotionLimits::new(axes, feed, job.header.period_s);
-            self.planner.begin(&next.plan);
+            self.planner.begin(&mut next.plan);
             self.planning = Planning::Feed;
         }
     }
@@ -720,8 +720,9 @@ impl Sequencer {
 /// Legs of a link off the surface.
 const LEGS: u8 = 3;
 
-/// Greatest length left at the end of a plan, mm.
+/// Greatest length left at the end of a plan, mm, or as a share of what a period at the jerk limit makes of it.
 const END_MAX_MM: f32 = 1e-3;
+const END_MAX_SHARE: f32 = 0.25;
 
 /// Least move of a period, mm: a millionth of a nanometre is rounding.
 const MOVED_MIN: f32 = 1e-12;
@@ -732,7 +733,15 @@ const MOVED_MIN: f32 = 1e-12;
 /// [`FaultKind::PatchTooShort`] with the length that is left, mm.
 fn check_end(plan: &Plan, follower: &Follower) -> Result<()> {
     let left = to_f32(plan.length_q10() - follower.arc_q10()) * MM_PER_Q10;
-    if left.abs() <= END_MAX_MM.at_most(plan.limits.feed * plan.limits.period) {
+    let MotionLimits {
+        feed, period, axes, ..
+    } = &plan.limits;
+    let [x, y, z] = axes.map(|axis| axis.jerk);
+    let jerk = x.at_most(y).at_most(z);
+    let most = END_MAX_MM
+        .at_least(END_MAX_SHARE * jerk * period * period * period)
+        .at_most(feed * period);
+    if left.abs() <= most {
         Ok(())
     } else {
         Err(Fault::new(FaultKind::PatchTooShort, left))
