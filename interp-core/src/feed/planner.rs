@@ -13,6 +13,14 @@ const BARRIER: [f32; 12] = [
     0.05, 0.05, 0.05, 0.008, 0.008, 0.002, 0.002, 0.0007, 0.0007, 0.00025, 0.00025, 0.00025,
 ];
 
+/// The same of a pass that lasts long against its planning: more steps are worth their time.
+const BARRIER_LONG: [f32; 18] = [
+    0.05, 0.05, 0.05, 0.02, 0.02, 0.008, 0.008, 0.008, 0.003, 0.003, 0.003, 0.001, 0.001, 0.001, 0.00025,
+    0.00025, 0.00025, 0.00025,
+];
+/// Periods of the start's motion that such a pass has at least, for each of its nodes.
+const LONG_PERIODS: f32 = 16.0;
+
 /// Share of the greatest factor of the walk's pace that the method starts from.
 const START_SHARE: f32 = 0.85;
 
@@ -76,8 +84,9 @@ pub(crate) struct Planner {
     holds: bool,
     drawn: u8,
     sweep: Sweep,
-    /// Steps of the method so far.
+    /// Steps of the method so far, and whether it takes many.
     step: u8,
+    is_long: bool,
     /// One over the sum of the coefficients' times, and the greatest factor of the start.
     weight: f32,
     factor: f32,
@@ -102,6 +111,7 @@ impl Planner {
         drawn: 0,
         sweep: Sweep::START,
         step: 0,
+        is_long: false,
         weight: 0.0,
         factor: 0.0,
         reach: Reach::NONE,
@@ -126,7 +136,7 @@ impl Planner {
         self.machine = plan.limits.with_feed(feed);
         self.limits = self.machine.planned();
         self.first = first;
-        (self.holds, self.drawn) = (false, 0);
+        (self.holds, self.drawn, self.is_long) = (false, 0, false);
         plan.draft = plan.pace;
         self.begin_method(plan);
         newton::clear(&mut self.lists);
@@ -199,6 +209,9 @@ impl Planner {
             }
             Stage::Scale => {
                 let factor = START_SHARE * self.factor.at_least(1e-9);
+                let nodes = f32::from(plan.intervals);
+                let lasts = plan.step_s / (self.weight * sqrt(factor) * plan.limits.period);
+                self.is_long = lasts > LONG_PERIODS * nodes;
                 for pace in &mut plan.draft {
                     *pace *= factor;
                 }
@@ -206,7 +219,11 @@ impl Planner {
                 Stage::Assemble
             }
             Stage::Assemble => {
-                let barrier = BARRIER.get(usize::from(self.step)).copied().unwrap_or(1e-3);
+                let barrier = self
+                    .barrier()
+                    .get(usize::from(self.step))
+                    .copied()
+                    .unwrap_or(1e-3);
                 newton::assemble(
                     plan,
                     &self.limits,
@@ -252,6 +269,10 @@ impl Planner {
         };
     }
 
+    const fn barrier(&self) -> &'static [f32] {
+        if self.is_long { &BARRIER_LONG } else { &BARRIER }
+    }
+
     fn begin_method(&mut self, plan: &Plan) {
         let mut sum = 0.0;
         let count = usize::from(plan.intervals) + 2;
@@ -271,7 +292,7 @@ impl Planner {
         newton::take(plan, &self.lists, self.reach.step());
         newton::clear(&mut self.lists);
         self.step += 1;
-        if usize::from(self.step) < BARRIER.len() {
+        if usize::from(self.step) < self.barrier().len() {
             return Stage::Assemble;
         }
         self.begin_check(plan);
@@ -279,7 +300,7 @@ impl Planner {
     }
 
     fn begin_check(&mut self, plan: &mut Plan) {
-        plan.allow_feed();
+        plan.allow_feed_from(self.first.saturating_sub(SEEN), true);
         self.cursor = match self.first.checked_sub(SEEN) {
             Some(node) if node > 0 => Cursor::at_node(plan, node),
             _ => Cursor::START,
@@ -298,7 +319,11 @@ impl Planner {
             jerk,
         } = self.most;
         self.holds = feed <= 1.0 && velocity <= 1.0 && acceleration <= 1.0 && jerk <= JERK_CHECKED;
-        if self.holds || self.drawn >= DRAWN_MAX {
+        if self.holds {
+            return Stage::Done;
+        }
+        if self.drawn >= DRAWN_MAX {
+            plan.allow_feed_from(self.first.saturating_sub(SEEN), false);
             return Stage::Done;
         }
         self.drawn += 1;
