@@ -51,20 +51,29 @@ impl Piece {
 
     /// Speed, acceleration and jerk at a time of the ramp.
     fn rates(&self, t: f32) -> [f32; 3] {
-        let change = self.to - self.from;
-        if t >= self.ramp_s || self.ramp_s <= 0.0 {
-            return [self.to, 0.0, 0.0];
-        }
+        let phase = if t >= self.ramp_s || self.ramp_s <= 0.0 {
+            Phase::Cruise
+        } else if t < self.jerk_s {
+            Phase::Begin
+        } else if self.ramp_s - t > self.jerk_s {
+            Phase::Steady
+        } else {
+            Phase::End
+        };
+        self.rates_in(phase, t)
+    }
+
+    /// The same where the phase is known: at its ends rounding could make it another.
+    fn rates_in(&self, phase: Phase, t: f32) -> [f32; 3] {
         // The acceleration rises to its peak, stays, and falls.
-        let peak = change / (self.ramp_s - self.jerk_s);
+        let peak = (self.to - self.from) / (self.ramp_s - self.jerk_s);
         let jerk = peak / self.jerk_s;
         let left = self.ramp_s - t;
-        if t < self.jerk_s {
-            [self.from + 0.5 * jerk * t * t, jerk * t, jerk]
-        } else if left > self.jerk_s {
-            [self.from + peak * (t - 0.5 * self.jerk_s), peak, 0.0]
-        } else {
-            [self.to - 0.5 * jerk * left * left, jerk * left, -jerk]
+        match phase {
+            Phase::Begin => [self.from + 0.5 * jerk * t * t, jerk * t, jerk],
+            Phase::Steady => [self.from + peak * (t - 0.5 * self.jerk_s), peak, 0.0],
+            Phase::End => [self.to - 0.5 * jerk * left * left, jerk * left, -jerk],
+            Phase::Cruise => [self.to, 0.0, 0.0],
         }
     }
 
@@ -72,16 +81,34 @@ impl Piece {
     fn length(&self, from: f32, to: f32) -> f32 {
         let mut at = from;
         let mut length = 0.0;
-        for end in [self.jerk_s, self.ramp_s - self.jerk_s, self.ramp_s] {
-            let step = to.at_most(end) - at;
+        for (phase, end) in [
+            (Phase::Begin, self.jerk_s),
+            (Phase::Steady, self.ramp_s - self.jerk_s),
+            (Phase::End, self.ramp_s),
+        ] {
+            let end = to.at_most(end);
+            let step = end - at;
             if step > 0.0 {
-                let [v, a, j] = self.rates(at);
+                let [v, a, j] = self.rates_in(phase, at);
                 length += step * (v + step * (0.5 * a + step * j * (1.0 / 6.0)));
-                at += step;
+                at = end;
             }
         }
         length
     }
+}
+
+/// A part of a piece.
+#[derive(Clone, Copy, Debug)]
+enum Phase {
+    /// Constant jerk at the begin of the ramp.
+    Begin,
+    /// Constant acceleration.
+    Steady,
+    /// Constant jerk at the end of the ramp.
+    End,
+    /// Constant speed.
+    Cruise,
 }
 
 /// Durations of the jerk and of the whole ramp for a change of speed.
