@@ -45,7 +45,7 @@ mod cycles {
     pub(super) const REACH: u32 = 2_600;
     /// More for a jump behind the node.
     pub(super) const JUMP: u32 = 3_500;
-    pub(super) const CHECK: u32 = 1_650;
+    pub(super) const CHECK: u32 = 1_850;
     /// Something for each coefficient.
     pub(super) const LIST: u32 = 15_000;
 }
@@ -188,7 +188,7 @@ impl Planner {
     pub(crate) fn work(&mut self, plan: &mut Plan, least: u32) {
         self.stage = match self.stage {
             Stage::Walk => {
-                if self.walker.work(&mut self.lists, plan, &self.limits) {
+                if self.walker.work(&mut self.lists, plan, &self.limits, least) {
                     Stage::Weigh
                 } else {
                     Stage::Walk

@@ -24,6 +24,10 @@ const LONG: f32 = 20.0;
 const SPACING_MAX: f32 = 0.1;
 /// Time between nodes that is worth its planning, s.
 const SPACING_WORTH: f32 = 4e-3;
+/// Periods that the rest of the planning takes: for a node, for a place of the check, and for what is left.
+const PERIODS_A_NODE: f32 = 3.2;
+const PERIODS_A_PLACE: f32 = 0.07;
+const PERIODS_A_PLAN: f32 = 55.0;
 /// Bisections of the spacing.
 const BISECTIONS: u8 = 12;
 /// Tries to coarsen the ends.
@@ -159,9 +163,15 @@ impl Walker {
         }
     }
 
-    /// One portion; whether the walk is complete.
+    /// One portion; whether the walk is complete. `least`: periods that the plan has to take at least, for the planning so far.
     #[inline(never)]
-    pub(crate) fn work(&mut self, lists: &mut Lists, plan: &mut Plan, limits: &MotionLimits) -> bool {
+    pub(crate) fn work(
+        &mut self,
+        lists: &mut Lists,
+        plan: &mut Plan,
+        limits: &MotionLimits,
+        least: u32,
+    ) -> bool {
         let count = plan.stations.count();
         self.stage = match self.stage {
             Stage::Caps => {
@@ -189,6 +199,7 @@ impl Walker {
             }
             Stage::Forwards => {
                 self.forwards(lists, plan);
+                self.choose_intervals(limits, least);
                 Stage::Busy
             }
             Stage::Busy => {
@@ -381,12 +392,23 @@ impl Walker {
         self.mean_s = (self.acceleration / self.jerk)
             .at_most(1.2 * sqrt(length / time / self.jerk))
             .at_most(cube_root(0.5 * length / self.jerk));
-        let whole = |value: f32| u16::try_from(truncated(value)).unwrap_or(u16::MAX);
+        self.mean_s = self.mean_s.at_least(4.0 * self.finest);
+    }
+
+    /// As many intervals as are worth their planning, and no more than leave the plan longer than its planning.
+    fn choose_intervals(&mut self, limits: &MotionLimits, least: u32) {
+        let whole = |value: f32| u16::try_from(truncated(value.at_least(0.0))).unwrap_or(u16::MAX);
+        let time = self.duration;
         let most = whole(time / self.finest).clamp(NODES_LEAST, NODES_COUNT);
         let wanted = whole(time / SPACING_WORTH.at_least(self.finest));
-        self.intervals = wanted.clamp(NODES_MIN.min(most), most);
+        let fewest = NODES_MIN.min(most);
+        self.intervals = wanted.clamp(fewest, most);
+        if least > 0 {
+            let lasts = (time + self.mean_s) / limits.period;
+            let left = lasts * (1.0 - PERIODS_A_PLACE) - PERIODS_A_PLAN - to_f32(i64::from(least));
+            self.intervals = self.intervals.min(whole(left / PERIODS_A_NODE)).max(fewest);
+        }
         self.growth = if time > LONG { GROWTH_LONG } else { GROWTH };
-        self.mean_s = self.mean_s.at_least(4.0 * self.finest);
         self.ends = (self.mean_s / 6.0)
             .at_least(self.finest)
             .at_least(time / (4000.0 * f32::from(self.intervals)));
