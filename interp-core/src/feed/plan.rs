@@ -216,10 +216,12 @@ impl Plan {
 
     /// Whether every interval from this one on allows it, as far as is known.
     pub(crate) fn allow_feed_from(&mut self, first: u16, does: bool) {
-        for (word, start) in self.exact.iter_mut().zip((0..).step_by(32)) {
-            let before = u32::from(first.saturating_sub(start).min(32));
+        let mut left = u32::from(first);
+        for word in &mut self.exact {
+            let before = left.min(32);
             let kept = u32::MAX.checked_shr(32 - before).unwrap_or(0);
             *word = (*word & kept) | if does { !kept } else { 0 };
+            left -= before;
         }
     }
 
