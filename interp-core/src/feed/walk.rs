@@ -39,6 +39,7 @@ const KNOT_BISECTIONS: u8 = 16;
 
 const STATIONS_A_PORTION: u16 = 24;
 const JUMPS_A_PORTION: u16 = 6;
+const CELLS_A_PORTION: u16 = 84;
 const NODES_A_PORTION: u16 = 60;
 const PLACES_A_PORTION: u16 = 50;
 const KNOTS_A_PORTION: u16 = 40;
@@ -155,8 +156,9 @@ impl Walker {
         match self.stage {
             Stage::Caps => 18_100,
             Stage::Jumps | Stage::Means | Stage::Knots => 10_500,
-            Stage::Backwards | Stage::Forwards | Stage::Busy => 25_000,
-            Stage::TryEven | Stage::TryGrowing | Stage::Coarsen | Stage::Bisect(_) | Stage::Times => 26_500,
+            Stage::Backwards | Stage::Busy => 25_000,
+            Stage::Forwards => 17_000,
+            Stage::TryEven | Stage::TryGrowing | Stage::Coarsen | Stage::Bisect(_) | Stage::Times => 25_500,
             Stage::Increments => 21_500,
             Stage::Nodes => 15_000,
             Stage::Done => 0,
@@ -198,9 +200,14 @@ impl Walker {
                 Stage::Forwards
             }
             Stage::Forwards => {
-                self.forwards(lists, plan);
-                self.choose_intervals(limits, least);
-                Stage::Busy
+                let last = count.saturating_sub(1);
+                let end = last.min(self.index + CELLS_A_PORTION);
+                self.forwards(lists, plan, self.index, end);
+                if end == last {
+                    self.choose_mean(plan);
+                    self.choose_intervals(limits, least);
+                }
+                self.next(end, end == last, Stage::Forwards, Stage::Busy)
             }
             Stage::Busy => {
                 self.find_busy(lists, plan, limits);
@@ -373,12 +380,11 @@ impl Walker {
         }
     }
 
-    /// Accelerations from the start on, times, and what follows from the whole duration.
-    fn forwards(&mut self, lists: &mut Lists, plan: &Plan) {
-        let last = plan.stations.count().saturating_sub(1);
-        let mut time = 0.0;
-        put(lists, TIME, 0, time);
-        for cell in 0..last {
+    /// Accelerations and times from a station on, up to another.
+    fn forwards(&mut self, lists: &mut Lists, plan: &Plan, from: u16, to: u16) {
+        let mut time = if from == 0 { 0.0 } else { self.duration };
+        put(lists, TIME, from, time);
+        for cell in from..to {
             let length = plan.stations.cell_mm(cell);
             let here = get(lists, SPEED_SQR, cell);
             let reach = here + 2.0 * self.accel(lists, cell) * length;
@@ -388,11 +394,16 @@ impl Walker {
             put(lists, TIME, cell + 1, time);
         }
         self.duration = time;
+    }
+
+    /// Length of the mean, once the duration is known.
+    fn choose_mean(&mut self, plan: &Plan) {
+        let time = self.duration;
         let length = between(0, plan.stations.length_nm());
         self.mean_s = (self.acceleration / self.jerk)
             .at_most(1.2 * sqrt(length / time / self.jerk))
-            .at_most(cube_root(0.5 * length / self.jerk));
-        self.mean_s = self.mean_s.at_least(4.0 * self.finest);
+            .at_most(cube_root(0.5 * length / self.jerk))
+            .at_least(4.0 * self.finest);
     }
 
     /// As many intervals as are worth their planning, and no more than leave the plan longer than its planning.
@@ -468,13 +479,20 @@ impl Walker {
         true
     }
 
-    const fn nodes_at(&self, spacing: f32, growth: f32) -> NodeTimes {
+    fn nodes_at(&self, spacing: f32, growth: f32) -> NodeTimes {
         NodeTimes {
-            walker: *self,
+            duration: self.duration,
+            mean_s: self.mean_s,
             spacing,
             growth,
+            widest: SPACING_MAX
+                .at_least(3.0 * self.duration / f32::from(self.intervals))
+                .at_least(spacing),
+            end_spacing: spacing.at_most(self.ends),
+            end_growth: self.growth,
             at: 0.0,
             busy: 1,
+            busy_count: self.busy,
             count: 0,
         }
     }
@@ -640,11 +658,19 @@ const _: () = assert!(NODES_COUNT as usize == NODES_MAX);
 
 /// The times of nodes, one after the other.
 struct NodeTimes {
-    walker: Walker,
+    /// Duration of the unsmoothed walk, and length of the mean, s.
+    duration: f32,
+    mean_s: f32,
+    /// Spacing at busy places, s, its growth away from them, per second, and the widest.
     spacing: f32,
     growth: f32,
+    widest: f32,
+    /// The same at the ends.
+    end_spacing: f32,
+    end_growth: f32,
     at: f32,
     busy: u16,
+    busy_count: u16,
     count: u16,
 }
 
@@ -654,7 +680,7 @@ impl NodeTimes {
             self.count = 1;
             return Some(0.0);
         }
-        if self.at >= self.walker.duration {
+        if self.at >= self.duration {
             return None;
         }
         let now = self.spacing_at(lists, self.at);
@@ -664,19 +690,15 @@ impl NodeTimes {
     }
 
     fn spacing_at(&mut self, lists: &Lists, at: f32) -> f32 {
-        let walker = &self.walker;
-        while self.busy + 1 < walker.busy && get(lists, BUSY, self.busy) < at {
+        while self.busy + 1 < self.busy_count && get(lists, BUSY, self.busy) < at {
             self.busy += 1;
         }
         let before = (at - get(lists, BUSY, self.busy - 1)).abs();
         let behind = (get(lists, BUSY, self.busy) - at).abs();
-        let away = (before.at_most(behind) - walker.mean_s).at_least(0.0);
-        let widest = SPACING_MAX
-            .at_least(3.0 * walker.duration / f32::from(walker.intervals))
-            .at_least(self.spacing);
-        let there = (self.spacing + self.growth * away).at_most(widest);
-        let from_end = at.at_most(walker.duration - at) - walker.mean_s;
-        there.at_most(self.spacing.at_most(walker.ends) + walker.growth * from_end.at_least(0.0))
+        let away = (before.at_most(behind) - self.mean_s).at_least(0.0);
+        let there = (self.spacing + self.growth * away).at_most(self.widest);
+        let from_end = at.at_most(self.duration - at) - self.mean_s;
+        there.at_most(self.end_spacing + self.end_growth * from_end.at_least(0.0))
     }
 }
 
