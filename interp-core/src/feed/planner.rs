@@ -13,6 +13,8 @@ const BARRIER: [f32; 12] = [
     0.05, 0.05, 0.05, 0.008, 0.008, 0.002, 0.002, 0.0007, 0.0007, 0.00025, 0.00025, 0.00025,
 ];
 
+/// The same of a pass that takes no longer than its planning.
+const BARRIER_SHORT: [f32; 7] = [0.05, 0.02, 0.008, 0.002, 0.0007, 0.00025, 0.00025];
 /// The same of a pass that lasts long against its planning: more steps are worth their time.
 const BARRIER_LONG: [f32; 18] = [
     0.05, 0.05, 0.05, 0.02, 0.02, 0.008, 0.008, 0.008, 0.003, 0.003, 0.003, 0.001, 0.001, 0.001, 0.00025,
@@ -69,6 +71,14 @@ enum Stage {
     Finish,
 }
 
+/// How many steps of the method are worth their time.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Effort {
+    Little,
+    Usual,
+    Much,
+}
+
 /// The planning of one path.
 #[derive(Clone, Debug)]
 pub(crate) struct Planner {
@@ -84,9 +94,9 @@ pub(crate) struct Planner {
     holds: bool,
     drawn: u8,
     sweep: Sweep,
-    /// Steps of the method so far, and whether it takes many.
+    /// Steps of the method so far, and how many are worth their time.
     step: u8,
-    is_long: bool,
+    effort: Effort,
     /// One over the sum of the coefficients' times, and the greatest factor of the start.
     weight: f32,
     factor: f32,
@@ -111,7 +121,7 @@ impl Planner {
         drawn: 0,
         sweep: Sweep::START,
         step: 0,
-        is_long: false,
+        effort: Effort::Usual,
         weight: 0.0,
         factor: 0.0,
         reach: Reach::NONE,
@@ -136,7 +146,7 @@ impl Planner {
         self.machine = plan.limits.with_feed(feed);
         self.limits = self.machine.planned();
         self.first = first;
-        (self.holds, self.drawn, self.is_long) = (false, 0, false);
+        (self.holds, self.drawn, self.effort) = (false, 0, Effort::Usual);
         plan.draft = plan.pace;
         self.begin_method(plan);
         newton::clear(&mut self.lists);
@@ -211,7 +221,13 @@ impl Planner {
                 let factor = START_SHARE * self.factor.at_least(1e-9);
                 let nodes = f32::from(plan.intervals);
                 let lasts = plan.step_s / (self.weight * sqrt(factor) * plan.limits.period);
-                self.is_long = lasts > LONG_PERIODS * nodes;
+                self.effort = if self.walker.is_short {
+                    Effort::Little
+                } else if lasts > LONG_PERIODS * nodes {
+                    Effort::Much
+                } else {
+                    Effort::Usual
+                };
                 for pace in &mut plan.draft {
                     *pace *= factor;
                 }
@@ -270,7 +286,11 @@ impl Planner {
     }
 
     const fn barrier(&self) -> &'static [f32] {
-        if self.is_long { &BARRIER_LONG } else { &BARRIER }
+        match self.effort {
+            Effort::Little => &BARRIER_SHORT,
+            Effort::Usual => &BARRIER,
+            Effort::Much => &BARRIER_LONG,
+        }
     }
 
     fn begin_method(&mut self, plan: &Plan) {

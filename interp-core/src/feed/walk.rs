@@ -87,6 +87,8 @@ pub(crate) struct Walker {
     duration: f32,
     mean_s: f32,
     intervals: u16,
+    /// The plan takes no longer than its planning: the fewest steps are to be made.
+    pub(crate) is_short: bool,
     busy: u16,
     vary: Vary,
     low: f32,
@@ -127,6 +129,7 @@ impl Walker {
         duration: 0.0,
         mean_s: 0.0,
         intervals: 0,
+        is_short: false,
         busy: 0,
         vary: Vary::Even,
         low: 0.0,
@@ -417,7 +420,9 @@ impl Walker {
         if least > 0 {
             let lasts = (time + self.mean_s) / limits.period;
             let left = lasts * (1.0 - PERIODS_A_PLACE) - PERIODS_A_PLAN - to_f32(i64::from(least));
-            self.intervals = self.intervals.min(whole(left / PERIODS_A_NODE)).max(fewest);
+            let planned = whole(left / PERIODS_A_NODE);
+            self.is_short = planned < fewest;
+            self.intervals = self.intervals.min(planned).max(fewest);
         }
         self.growth = if time > LONG { GROWTH_LONG } else { GROWTH };
         self.ends = (self.mean_s / 6.0)
