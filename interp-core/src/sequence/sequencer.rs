@@ -20,7 +20,7 @@ use crate::sequence::link::{BoundaryStepOver, StraightMove, check_faces_up};
 use crate::sequence::lookahead::{Lookahead, PassPlan, check_travel};
 
 /// Periods that a pass takes longer than the planning of the next one.
-const SPARE_PERIODS: u32 = 30;
+const SPARE_PERIODS: u32 = 15;
 
 /// Cycles of one place of a search for a change of the pace, along a pass and along a link, and of its begin along a pass; of a portion of a
 /// step-over's planning.
