@@ -471,6 +471,36 @@ fn stop_and_abort() {
     }
 }
 
+/// Between two zig passes the tool goes up, across and down as one motion: across only at the safe height or above, and no axis waits for another.
+#[test]
+fn a_hop_is_above_the_safe_height_while_it_goes_across() {
+    let (header, words) = dome_within_limits(Pattern::Zig);
+    let axes = header.axes.as_ref().unwrap();
+    let mut core = machine(&header, &words);
+    let mut last = period(&mut core, Command::Start);
+    let (mut both, mut hops) = (0, 0);
+    while last.state.is_under_way() {
+        let sample = period(&mut core, None);
+        let [x, y, z] = [0, 1, 2].map(|axis| sample.cl_nm[axis] - last.cl_nm[axis]);
+        if sample.state == State::Linking && last.state == State::Linking && sample.pass > 0 {
+            // The safe height may be passed within a period: across begins after, and ends before.
+            let higher = sample.cl_nm[2].max(last.cl_nm[2]);
+            if x.abs().max(y.abs()) > 2 {
+                assert!(higher >= axes.safe_z_nm - 2, "{sample:?}");
+                both += u32::from(z != 0);
+            }
+        }
+        hops += u32::from(last.state == State::Running && sample.state == State::Linking);
+        last = sample;
+    }
+    assert_eq!(last.state, State::Finished);
+    // On each hop but the last way home, across overlaps with up and with down.
+    assert!(
+        hops > 4 && both > 20 * (hops - 1),
+        "{both} periods of {hops} hops"
+    );
+}
+
 /// A point outside the travel is detected before the tool moves to it.
 #[test]
 fn soft_limits_stop_before_the_pass() {

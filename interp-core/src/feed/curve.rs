@@ -250,7 +250,6 @@ impl Curve {
     }
 
     /// Duration, s.
-    #[cfg(test)]
     pub(crate) fn duration(&self) -> f32 {
         let mut sum = 0.0;
         for piece in &self.pieces {

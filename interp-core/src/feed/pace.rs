@@ -10,8 +10,9 @@ use crate::math::number::Bounded;
 /// Periods from the start of a search to the change that it finds, for the search: some, and as many as the places of two short trials take.
 const LATENCY: u16 = 8;
 const PLACES_A_PERIOD: f32 = 18.0;
-/// The most of it.
+/// The most of it, and steps in which the place there is found.
 const LATENCY_MAX: u16 = 96;
+const STEPS_AHEAD: u16 = 24;
 
 /// Durations that a search tries, shortest first, and the ratio of one to the next.
 const TRIALS: u8 = 12;
@@ -343,10 +344,12 @@ impl<C: Copy> Pace<C> {
             .min(LATENCY_MAX);
         let mut from = *at;
         let mut ahead = 0.0;
-        for _ in 0..latency {
-            let [pace, _, _] = self.rates(ahead + 0.5 * self.period);
-            course.advance(&mut from, self.period * pace.at_least(0.0));
-            ahead += self.period;
+        let steps = latency.min(STEPS_AHEAD);
+        let step = self.period * f32::from(latency) / f32::from(steps.max(1));
+        for _ in 0..steps {
+            let [pace, _, _] = self.rates(ahead + 0.5 * step);
+            course.advance(&mut from, step * pace.at_least(0.0));
+            ahead += step;
         }
         let rates = self.rates(ahead);
         let is_standing = self.change.is_none() && self.goal == 0.0;

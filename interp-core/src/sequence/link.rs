@@ -55,6 +55,11 @@ impl Progress {
         }
     }
 
+    /// The motion along the link.
+    pub(crate) const fn curve(&self) -> &Curve {
+        &self.curve
+    }
+
     /// Begins at this pace.
     pub(crate) fn begin(&mut self, pace: f32, period: f32) {
         self.pace.begin(pace, period);
@@ -153,10 +158,15 @@ impl StraightMove {
 
     /// The position.
     pub(crate) fn position(&self) -> [i32; 3] {
+        self.position_at(&self.progress.cursor)
+    }
+
+    /// The position at a place of its curve.
+    pub(crate) fn position_at(&self, cursor: &CurveCursor) -> [i32; 3] {
         let Progress {
-            cursor, length_q10, ..
+            curve, length_q10, ..
         } = &self.progress;
-        if self.progress.is_over() || cursor.moved_q10 >= *length_q10 {
+        if curve.is_over(cursor) || cursor.moved_q10 >= *length_q10 {
             return self.to;
         }
         let part = part_q30(cursor.moved_q10, *length_q10);

@@ -16,6 +16,7 @@ use crate::math::number::{Bounded, to_f32};
 use crate::pass::position::PassPosition;
 use crate::pass::run::Run;
 use crate::sample::{Sample, SpanParameter};
+use crate::sequence::hop::Hop;
 use crate::sequence::link::{BoundaryStepOver, StraightMove, check_faces_up};
 use crate::sequence::lookahead::{Lookahead, PassPlan, check_travel};
 
@@ -25,9 +26,12 @@ const SPARE_PERIODS: u32 = 15;
 /// Cycles of one place of a search for a change of the pace, along a pass and along a link, and of its begin along a pass; of a portion of a
 /// step-over's planning.
 const PACE_CYCLES: u32 = 1_560;
-const PACE_BEGIN_CYCLES: u32 = 24_000;
+const PACE_BEGIN_CYCLES: u32 = 8_000;
 const LINK_PACE_CYCLES: u32 = 1_000;
 const STEP_OVER_CYCLES: u32 = 6_000;
+/// Cycles of the same of a hop, and of its planning.
+const HOP_PACE_CYCLES: u32 = 2_500;
+const HOP_CYCLES: u32 = 24_000;
 /// Cycles of replacing the rest of a plan, or of the wait until that is possible: once a period.
 const TAKE_OVER_CYCLES: u32 = 20_000;
 
@@ -54,6 +58,8 @@ enum Phase {
     AwaitGoal(Leg),
     /// A straight move off the surface.
     Leg(Leg),
+    /// Up, across and down to the next pass as one motion.
+    Hop,
     /// The tool is on a pass.
     Pass,
     /// The sequence is over.
@@ -130,6 +136,9 @@ pub(crate) struct Sequencer {
     follower: Follower,
     pace: Pace<Cursor>,
     straight: StraightMove,
+    hop: Hop,
+    /// Whether the hop to the next pass is to be planned.
+    has_hop: bool,
     step_over: BoundaryStepOver,
     /// Whether the step-over to the next pass is begun.
     has_step_over: bool,
@@ -165,6 +174,8 @@ impl Sequencer {
         follower: Follower::START,
         pace: Pace::REST,
         straight: StraightMove::NONE,
+        hop: Hop::NONE,
+        has_hop: false,
         step_over: BoundaryStepOver::NONE,
         has_step_over: false,
         spent: 0,
@@ -203,6 +214,7 @@ impl Sequencer {
             Phase::Pass => self.pace.is_at_rest(),
             Phase::StepOver => self.step_over.progress.is_at_rest(),
             Phase::Leg(_) => self.straight.progress.is_at_rest(),
+            Phase::Hop => self.hop.is_at_rest(),
             Phase::Await | Phase::AwaitGoal(_) | Phase::Done => true,
         }
     }
@@ -236,13 +248,14 @@ impl Sequencer {
             Phase::Pass => self.pace.has_work(),
             Phase::StepOver => self.step_over.progress.has_work(),
             Phase::Leg(_) => self.straight.progress.has_work(),
+            Phase::Hop => self.hop.has_work(),
             Phase::Await | Phase::AwaitGoal(_) | Phase::Done => false,
         };
         let wants_more = self.phase == Phase::Pass && self.share > 1.0;
         seeks_pace
             || wants_more
             || (self.pending.is_none()
-                && (self.planning != Planning::Complete || self.has_to_plan_step_over()))
+                && (self.planning != Planning::Complete || self.has_to_plan_step_over() || self.has_hop))
     }
 
     /// Whether the next pass is planned.
@@ -294,6 +307,7 @@ impl Sequencer {
             Phase::Pass if self.pace.has_work() => return PACE_CYCLES,
             Phase::StepOver if self.step_over.progress.has_work() => return LINK_PACE_CYCLES,
             Phase::Leg(_) if self.straight.progress.has_work() => return LINK_PACE_CYCLES,
+            Phase::Hop if self.hop.has_work() => return HOP_PACE_CYCLES,
             _ => {}
         }
         if self.pending.is_some() {
@@ -307,6 +321,7 @@ impl Sequencer {
             Planning::Feed => self.planner.cycles(next),
             Planning::Rest if self.planner.is_done() => TAKE_OVER_CYCLES,
             Planning::Rest => self.planner.cycles(now),
+            Planning::Complete if self.has_hop => HOP_CYCLES,
             Planning::Complete => 0,
         }
     }
@@ -317,6 +332,7 @@ impl Sequencer {
             Phase::Pass if self.pace.has_work() => return self.pace.work(&now.plan, &self.follower.cursor),
             Phase::StepOver if self.step_over.progress.has_work() => return self.step_over.progress.work(),
             Phase::Leg(_) if self.straight.progress.has_work() => return self.straight.progress.work(),
+            Phase::Hop if self.hop.has_work() => return self.hop.work(),
             _ => {}
         }
         if self.has_step_over && self.step_over.is_requested() {
@@ -373,6 +389,11 @@ impl Sequencer {
                 }
                 self.follower.keep_to_plan(false);
                 self.planning = Planning::Complete;
+            }
+            Planning::Complete if self.has_hop => {
+                self.has_hop = false;
+                self.hop
+                    .plan(now.ends[1], next.ends[0], job.header.feed_mm_s, axes);
             }
             Planning::Complete => {}
         }
@@ -469,6 +490,7 @@ impl Sequencer {
         match self.phase {
             Phase::StepOver => self.follow_step_over(job, run, wish, last),
             Phase::Leg(leg) => self.follow_leg(leg, job, run, wish, last),
+            Phase::Hop => self.follow_hop(job, run, wish, last),
             _ => {
                 match self.at {
                     Some(at) if !self.on_surface => run.off_surface(at, 0.0, last),
@@ -539,6 +561,8 @@ impl Sequencer {
             self.step_over.request();
             self.has_step_over = true;
         }
+        self.has_hop = job.header.pattern == Pattern::Zig && now.next.is_some();
+        self.hop.clear();
         Ok(())
     }
 
@@ -574,15 +598,15 @@ impl Sequencer {
             }
         };
         if is_over {
-            self.end_pass(job)?;
+            self.end_pass(job, wish)?;
         }
         Ok(())
     }
 
     /// Chooses what follows a pass.
     #[inline(never)]
-    fn end_pass(&mut self, job: &Job<'_>) -> Result<()> {
-        let (now, _) = both(&mut self.plans, self.second);
+    fn end_pass(&mut self, job: &Job<'_>, wish: Wish) -> Result<()> {
+        let (now, next) = both(&mut self.plans, self.second);
         if now.next.is_none() {
             check_faces_up(now.faces_up[1])?;
             self.goal = Goal::Home;
@@ -592,7 +616,14 @@ impl Sequencer {
         } else {
             check_faces_up(now.faces_up[1])?;
             self.goal = Goal::Pass;
-            self.phase = Phase::AwaitGoal(Leg::Retract);
+            // Planning never delays the lift: what is not planned yet is waited for above the surface.
+            let is_planned = self.pending.is_none() && self.planning == Planning::Complete;
+            self.phase = if is_planned && next.faces_up[0] && self.hop.leads(now.ends[1], next.ends[0]) {
+                self.hop.begin(wish.share.at_most(1.0), job.header.period_s);
+                Phase::Hop
+            } else {
+                Phase::AwaitGoal(Leg::Retract)
+            };
         }
         Ok(())
     }
@@ -694,6 +725,18 @@ impl Sequencer {
         if is_over {
             self.phase = self.after(leg);
         }
+        Ok(())
+    }
+
+    fn follow_hop(&mut self, job: &Job<'_>, run: &mut Run, wish: Wish, last: &mut Sample) -> Result<()> {
+        if self
+            .hop
+            .tick(wish.share.at_most(1.0), wish.is_fault, job.header.period_s)
+        {
+            self.swap(job);
+            return self.enter_pass(job, run, wish, last);
+        }
+        run.off_surface(self.hop.position(), self.hop.speed(), last);
         Ok(())
     }
 

@@ -89,8 +89,13 @@ const BOUNDS: &[(&str, u32, &str)] = &[
     ),
     (
         "interp_core::feed::pace::Pace::begin_search",
-        96,
-        "periods until a change begins: LATENCY_MAX",
+        24,
+        "steps to the place where a change begins: STEPS_AHEAD",
+    ),
+    (
+        "interp_core::sequence::hop::time_at",
+        20,
+        "bisections of a time: BISECTIONS",
     ),
     (
         "interp_core::feed::plan::Plan::step_at",
@@ -187,6 +192,11 @@ const BOUNDS: &[(&str, u32, &str)] = &[
         "interp_core::feed::walk::find_knots",
         168,
         "stations of an interval, and halvings for each: STATIONS_MAX",
+    ),
+    (
+        "interp_core::sequence::sequencer::Sequencer::begin_leg",
+        3,
+        "legs of a link, axes of a position",
     ),
     (
         "interp_core::sequence::sequencer::Sequencer::plan_for_override",

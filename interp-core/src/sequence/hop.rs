@@ -1,0 +1,211 @@
+//! A hop from the end of a pass to the start of the next, above the surface: up, across and down as one motion. Across moves x and y only, and only while
+//! the ball is at the safe height or above; up and down move z only, so each axis keeps its limits whatever the others do.
+
+use crate::feed::curve::{Curve, CurveCursor};
+use crate::feed::pace::{Course, Pace, Use};
+use crate::job::AxisLimits;
+use crate::math::arith::{sqrt, truncated};
+use crate::math::number::Bounded;
+use crate::sequence::link::StraightMove;
+use crate::sequence::lookahead::check_travel;
+
+/// Greatest height above the safe height that a hop takes, mm.
+const ABOVE_MAX_MM: f32 = 10.0;
+/// Time by which across keeps away from the safe height's passing, s.
+const APART_S: f32 = 1e-4;
+/// Bisections of the time at which a height is passed.
+const BISECTIONS: u8 = 20;
+
+/// A place in time: since the start, s, and on each of the three curves.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct HopCursor {
+    time: f32,
+    curves: [CurveCursor; 3],
+}
+
+/// The curves of a hop: up, across, down, and when each begins, s.
+#[derive(Clone, Copy, Debug)]
+struct Curves {
+    curves: [Curve; 3],
+    begins: [f32; 3],
+}
+
+impl Course for Curves {
+    type Cursor = HopCursor;
+
+    fn advance(&self, cursor: &mut HopCursor, seconds: f32) {
+        let places = cursor.curves.iter_mut().zip(&self.curves).zip(&self.begins);
+        for ((place, curve), begin) in places {
+            let left = seconds - (begin - cursor.time).at_least(0.0);
+            if left > 0.0 {
+                curve.advance(place, left);
+            }
+        }
+        cursor.time += seconds;
+    }
+
+    fn is_over(&self, cursor: &HopCursor) -> bool {
+        let mut each = cursor.curves.iter().zip(&self.curves);
+        each.all(|(place, curve)| curve.is_over(place))
+    }
+
+    fn use_at(&self, cursor: &HopCursor, rates: [f32; 3], around: f32) -> Use {
+        let mut most = Use::NONE;
+        for (place, curve) in cursor.curves.iter().zip(&self.curves) {
+            most.add(&curve.use_at(place, rates, around));
+        }
+        most
+    }
+}
+
+/// A hop from pass to pass.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Hop {
+    curves: Curves,
+    legs: [StraightMove; 3],
+    cursor: HopCursor,
+    pace: Pace<HopCursor>,
+    /// It is planned, from and to these positions.
+    ends: Option<[[i32; 3]; 2]>,
+}
+
+impl Hop {
+    /// None.
+    pub(crate) const NONE: Self = Self {
+        curves: Curves {
+            curves: [Curve::NONE; 3],
+            begins: [0.0; 3],
+        },
+        legs: [StraightMove::NONE; 3],
+        cursor: HopCursor {
+            time: 0.0,
+            curves: [CurveCursor::START; 3],
+        },
+        pace: Pace::REST,
+        ends: None,
+    };
+
+    /// Forgets the hop.
+    pub(crate) const fn clear(&mut self) {
+        self.ends = None;
+    }
+
+    /// Whether it is planned from here to there.
+    pub(crate) fn leads(&self, from: [i32; 3], to: [i32; 3]) -> bool {
+        self.ends == Some([from, to])
+    }
+
+    /// Plans a hop, if its top is within the travel and each part of it has a length. Takes some 15 000 cycles.
+    #[inline(never)]
+    pub(crate) fn plan(&mut self, from: [i32; 3], to: [i32; 3], feed_mm_s: f32, axes: &AxisLimits) {
+        self.ends = None;
+        let safe = from[2].max(to[2]).max(axes.safe_z_nm);
+        let above_nm = truncated(1e6 * braking_mm(axes).at_most(ABOVE_MAX_MM));
+        let [_, _, [_, highest]] = axes.travel_nm;
+        let top = safe.saturating_add(above_nm).min(highest).max(safe);
+        let above = [from[0], from[1], top];
+        let there = [to[0], to[1], top];
+        if check_travel(axes, &above).is_err() || check_travel(axes, &there).is_err() {
+            return;
+        }
+        let feed = feed_mm_s;
+        let (Some(up), Some(across), Some(down)) = (
+            StraightMove::new(from, above, 0.0, feed, axes),
+            StraightMove::new(above, there, 0.0, feed, axes),
+            StraightMove::new(there, to, axes.plunge_mm, feed, axes),
+        ) else {
+            return;
+        };
+        let [rise, move_, fall] = [&up, &across, &down].map(|leg| leg.progress.curve());
+        // Across begins when the ball passes the safe height, and ends before it passes it again.
+        let leaves = time_at(rise, nm_q10(safe, from[2])) + APART_S;
+        let returns = time_at(fall, nm_q10(top, safe)) - APART_S;
+        let falls = rise.duration().at_least(leaves + move_.duration() - returns);
+        self.curves = Curves {
+            curves: [*rise, *move_, *fall],
+            begins: [0.0, leaves, falls],
+        };
+        self.cursor = HopCursor {
+            time: 0.0,
+            curves: self.curves.curves.each_ref().map(Curve::start),
+        };
+        self.legs = [up, across, down];
+        self.ends = Some([from, to]);
+    }
+
+    /// Begins at this pace.
+    pub(crate) fn begin(&mut self, pace: f32, period: f32) {
+        self.pace.begin(pace, period);
+    }
+
+    /// One period; returns whether the end is reached.
+    pub(crate) fn tick(&mut self, pace: f32, is_fault: bool, period: f32) -> bool {
+        self.pace.want(pace, is_fault);
+        let pace = self.pace.tick();
+        self.curves.advance(&mut self.cursor, pace * period);
+        self.curves.is_over(&self.cursor)
+    }
+
+    pub(crate) fn is_at_rest(&self) -> bool {
+        self.pace.is_at_rest()
+    }
+
+    /// Whether a change of the pace is sought.
+    pub(crate) fn has_work(&self) -> bool {
+        self.pace.has_work()
+    }
+
+    /// One place of the search for a change of the pace.
+    pub(crate) fn work(&mut self) {
+        self.pace.work(&self.curves, &self.cursor);
+    }
+
+    /// The position.
+    pub(crate) fn position(&self) -> [i32; 3] {
+        let [up, across, down] = [0, 1, 2].map(|leg: usize| {
+            let places = self.legs.get(leg).zip(self.cursor.curves.get(leg));
+            places.map_or([0; 3], |(leg, place)| leg.position_at(place))
+        });
+        let falls = self.cursor.time > self.curves.begins[2];
+        [across[0], across[1], if falls { down[2] } else { up[2] }]
+    }
+
+    /// Speed, mm/s.
+    pub(crate) fn speed(&self) -> f32 {
+        let mut sum = 0.0;
+        for (place, curve) in self.cursor.curves.iter().zip(&self.curves.curves) {
+            let speed = curve.speed(place);
+            sum += speed * speed;
+        }
+        self.pace.now() * sqrt(sum)
+    }
+}
+
+/// Length in which the z axis comes to rest from its greatest speed, mm.
+fn braking_mm(axes: &AxisLimits) -> f32 {
+    let [_, _, v] = axes.velocity_mm_s;
+    let [_, _, a] = axes.acceleration_mm_s2;
+    let [_, _, j] = axes.jerk_mm_s3;
+    0.5 * v * (v / a + a / j).at_least(2.0 * sqrt(v / j).at_most(a / j))
+}
+
+/// Height between two levels, units of 2^-10 nm.
+fn nm_q10(high: i32, low: i32) -> i64 {
+    (i64::from(high) - i64::from(low)) << 10
+}
+
+/// Time at which a curve has covered this length, s, from below.
+fn time_at(curve: &Curve, length_q10: i64) -> f32 {
+    let (mut low, mut high) = (0.0, curve.duration());
+    for _ in 0..BISECTIONS {
+        let middle = 0.5 * (low + high);
+        let mut at = curve.start();
+        curve.advance(&mut at, middle);
+        if at.moved_q10 < length_q10 {
+            low = middle;
+        } else {
+            high = middle;
+        }
+    }
+    high
+}
