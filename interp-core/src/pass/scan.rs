@@ -7,8 +7,8 @@
 //!
 //! The first pass has no previous step by which the neighbouring lines are placed. It is scanned twice, the first time at few stations and without lines.
 
-use crate::job::program::Job;
 use crate::job::Header;
+use crate::job::program::Job;
 use crate::math::arith::{sqrt, truncated};
 use crate::math::number::{Bounded, MM_PER_NM, to_f32};
 use crate::pass::patch::Patch;

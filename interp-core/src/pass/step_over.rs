@@ -259,7 +259,10 @@ impl StepOverEstimator {
             .at_least(self.edge);
         let [half, whole] = &self.lines;
         let found = |line: &NeighbourLine| line.found(header, here);
-        let knots = [half.side.span != self.side_span, whole.side.span != half.side.span];
+        let knots = [
+            half.side.span != self.side_span,
+            whole.side.span != half.side.span,
+        ];
         let mean = match (found(half), found(whole)) {
             (Some(half), Some(whole)) => mean(here, half, whole, knots),
             // The farther line was not evaluated in time.
@@ -335,13 +338,7 @@ impl NeighbourLine {
     }
 
     /// Places the line: by the expected step, or by the step that the samples of this pass so far allow; at most at the surface's boundary.
-    fn place(
-        &mut self,
-        job: &Job<'_>,
-        position: &PassPosition,
-        most: f32,
-        expected: Option<f32>,
-    ) -> Task {
+    fn place(&mut self, job: &Job<'_>, position: &PassPosition, most: f32, expected: Option<f32>) -> Task {
         let spans = job.header.side_spans;
         let width = |span| job.side_width(span);
         if schedule::is_last(position.side, spans) {
