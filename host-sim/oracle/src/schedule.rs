@@ -24,8 +24,8 @@ const STEP_RANGE: [f64; 2] = [0.25, 1.25];
 const TREND_MAX: f64 = 1.25;
 /// Error of the core's cutter location along the normal, for which it lowers the scallop limit: mm, and a share of the ball's radius; and the least
 /// share of the limit that is left.
-const LOCATION_ERROR_MM: f64 = 1e-6;
-const LOCATION_ERROR_SHARE: f64 = 1.2e-7;
+const LOCATION_ERROR_MM: f64 = 0.87e-6;
+const LOCATION_ERROR_SHARE: f64 = 1.0 / 16_777_216.0;
 const HEIGHT_SHARE_MIN: f64 = 0.5;
 /// Newton iterations for the root of a cubic: more than needed.
 const NEWTON_STEPS: u8 = 12;

@@ -32,10 +32,10 @@ const NEWTON_LAST: f32 = 1e-3;
 const REPLACE_FACTOR: f32 = 1.25;
 /// Maximum ratio of the expected step to the previous one.
 const TREND_MAX: f32 = 1.25;
-/// Error of the emitted cutter location along the normal, which is missing from the scallop limit: 1 nm by rounding of three coordinates and of the
-/// offset, and two units in the last place of the normal, times the ball's radius.
-const LOCATION_ERROR_MM: f32 = 1e-6;
-const LOCATION_ERROR_SHARE: f32 = 1.2e-7;
+/// Error of the emitted cutter location along the normal, by which the scallop limit is lowered: half a nanometre in each of three coordinates, and the
+/// rounding of the normal to 24 bits, times the ball's radius.
+const LOCATION_ERROR_MM: f32 = 0.87e-6;
+const LOCATION_ERROR_SHARE: f32 = 1.0 / 16_777_216.0;
 /// Minimum share of the scallop limit that is left by the location error.
 const HEIGHT_SHARE_MIN: f32 = 0.5;
 
