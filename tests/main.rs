@@ -26,6 +26,7 @@ mod random_surfaces;
 mod report_page;
 mod safety;
 mod sample_jobs;
+mod scallop_limit;
 mod script;
 mod session;
 mod swept;

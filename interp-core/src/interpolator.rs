@@ -204,14 +204,17 @@ impl<S: AsRef<[i32]> + AsMut<[i32]>> Interpolator<S> {
     /// While the job runs, each call yields a sample with [`State::Running`] or [`State::Stopping`], counted by its `tick` from 0;
     /// the one after the last has [`State::Finished`]. In every state at standstill the sample repeats the last position.
     ///
-    /// A job with axis limits also needs [`Self::plan`], once after each tick: without it the tool waits at the start of a pass for ever.
+    /// Also needs [`Self::plan`], once after each tick. Without it the tool of a job with axis limits waits at the start of a pass for ever; that of a job without
+    /// them has passes spaced by the surface at each pass alone, not by that of the gap beside it: up to some percent over the scallop limit, and more where
+    /// path lines are skew.
     #[inline(always)]
     pub fn tick(&mut self, inputs: impl Into<Inputs>) -> &Sample {
         self.motion.tick(self.store.as_ref(), inputs.into());
         &self.motion.last
     }
 
-    /// Whether [`Self::plan`] has anything to do in this period: a job with axis limits is under way, and a pass ahead of the tool is not planned.
+    /// Whether [`Self::plan`] has anything to do in this period: a job with axis limits is under way, and a pass ahead of the tool is not planned; or one without
+    /// them, and the current pass is not scanned for the step to the next one.
     #[must_use]
     #[inline]
     pub fn has_to_plan(&self) -> bool {
@@ -343,12 +346,14 @@ impl Motion {
     }
 
     fn has_to_plan(&self) -> bool {
-        self.program.header().axes.is_some()
-            && matches!(
-                self.state,
-                State::Running | State::Linking | State::Holding | State::Held | State::Stopping
-            )
-            && self.sequencer.has_to_plan()
+        let header = self.program.header();
+        if header.axes.is_none() {
+            return self.state == State::Running && self.run.has_to_plan(header.spacing);
+        }
+        matches!(
+            self.state,
+            State::Running | State::Linking | State::Holding | State::Held | State::Stopping
+        ) && self.sequencer.has_to_plan()
     }
 
     #[inline(never)]
@@ -357,12 +362,16 @@ impl Motion {
             return;
         }
         let Self {
-            program, sequencer, ..
+            program,
+            sequencer,
+            run,
+            ..
         } = self;
-        if let Ok(job) = program.job(store)
-            && let Some(axes) = &job.header.axes
-        {
-            sequencer.plan(&job, axes);
+        if let Ok(job) = program.job(store) {
+            match &job.header.axes {
+                Some(axes) => sequencer.plan(&job, axes),
+                None => run.plan(&job),
+            }
         }
     }
 

@@ -20,6 +20,13 @@ const REFINE_SHARE: f64 = 1e-2;
 const BOUNDARY_SHARE: f64 = 1e-9;
 /// Least and greatest ratio of a pass's step to its first-order step; the core's values.
 const STEP_RANGE: [f64; 2] = [0.25, 1.25];
+/// Greatest ratio of the step expected of a pass to the one before; the core's value.
+const TREND_MAX: f64 = 1.25;
+/// Error of the core's cutter location along the normal, for which it lowers the scallop limit: mm, and a share of the ball's radius; and the least
+/// share of the limit that is left.
+const LOCATION_ERROR_MM: f64 = 0.87e-6;
+const LOCATION_ERROR_SHARE: f64 = 1.0 / 16_777_216.0;
+const HEIGHT_SHARE_MIN: f64 = 0.5;
 /// Newton iterations for the root of a cubic: more than needed.
 const NEWTON_STEPS: u8 = 12;
 /// Largest number of passes of a schedule.
@@ -45,10 +52,15 @@ impl Oracle {
         let mut passes = Vec::new();
         let mut side = start;
         while passes.len() < PASSES_MAX {
-            let before = passes.last().map(|pass: &ScheduledPass| pass.interval);
+            let before: Vec<f64> = passes
+                .iter()
+                .rev()
+                .take(2)
+                .map(|pass: &ScheduledPass| pass.interval)
+                .collect();
             let interval = match self.spacing {
                 Spacing::FirstOrder => self.least_interval(side)?,
-                Spacing::Exact => self.exact_interval(side, before)?,
+                Spacing::Exact => self.exact_interval(side, &before)?,
             };
             passes.push(ScheduledPass { side, interval });
             if side >= end {
@@ -67,31 +79,36 @@ impl Oracle {
         Err(OracleError::TooManyPasses)
     }
 
-    /// Largest step from the pass at `side` to the next; `before`: step from the previous pass to this one.
+    /// Largest step from the pass at `side` to the next; `before`: steps of the previous passes, the last one first.
     ///
     /// # Errors
     /// As [`Oracle::schedule`].
-    pub fn exact_interval(&self, side: f64, before: Option<f64>) -> Result<f64, OracleError> {
+    pub fn exact_interval(&self, side: f64, before: &[f64]) -> Result<f64, OracleError> {
         let [_, end] = self.side_range();
         let here = self.greatest_density(side)?;
-        if here <= 0.0 {
+        if here <= 0.0 || side >= end {
             return Ok(f64::INFINITY);
         }
         let first = 1.0 / here.sqrt();
-        let distance = before.unwrap_or(first);
-        let beside = |share: f64| {
-            let line = side + share * distance;
-            (line < end).then(|| self.greatest_density(line)).transpose()
-        };
-        let mean = match (beside(0.5)?, beside(1.0)?) {
-            (Some(half), Some(whole)) => {
-                let parabola = (here + 4.0 * half + whole) / 6.0;
-                let lines = (here + 2.0 * half + whole) / 4.0;
-                parabola.max(lines)
+        let expected = match *before {
+            [last, older, ..] if last.is_finite() && older.is_finite() => {
+                last * (last / older).clamp(1.0 / TREND_MAX, TREND_MAX)
             }
-            (Some(half), None) => half.max(here),
-            _ => here,
+            [last, ..] if last.is_finite() => last,
+            _ => first,
         };
+        let distance = expected.min(end - side);
+        let beside = |share: f64| self.greatest_density(side + share * distance);
+        let (half, whole) = (beside(0.5)?, beside(1.0)?);
+        let breaks = self.surface.breaks(self.across());
+        let has_knot = |from: f64, to: f64| {
+            breaks
+                .iter()
+                .any(|knot| from < *knot && *knot <= to && *knot < end)
+        };
+        let middle = side + 0.5 * distance;
+        let knots = [has_knot(side, middle), has_knot(middle, side + distance)];
+        let mean = mean_density(here, half, whole, knots);
         // x^2 (1 + rise x) = 1, in units of the first-order step.
         let rise = (mean / here - 1.0) * first / distance;
         let mut step = 1.0_f64;
@@ -99,6 +116,10 @@ impl Oracle {
             let slope = step * (2.0 + 3.0 * rise * step);
             let next = step - (step * step * (1.0 + rise * step) - 1.0) / slope.max(0.5);
             step = next.clamp(STEP_RANGE[0], STEP_RANGE[1]);
+        }
+        // A falling mean falls no further than over the distance at which it was scanned.
+        if rise < 0.0 && step * first > distance {
+            step = step.min((here / mean).sqrt().max(STEP_RANGE[0]));
         }
         Ok(step * first)
     }
@@ -122,7 +143,9 @@ impl Oracle {
         let room = 1.0 - self.radius_mm * contact.curvature_side;
         let across = contact.lateral_speed * contact.lateral_speed * room;
         let height = self.scallop_mm / self.radius_mm;
-        let exact = (1.0 + height * (room - 1.0)) / (1.0 - 0.5 * height);
+        let error_mm = LOCATION_ERROR_MM + LOCATION_ERROR_SHARE * self.radius_mm;
+        let left = (1.0 - error_mm / self.scallop_mm).max(HEIGHT_SHARE_MIN);
+        let exact = (1.0 + height * (room - 1.0)) / ((1.0 - 0.5 * height) * left);
         let density = across * exact / (8.0 * self.radius_mm * self.scallop_mm);
         if !is_end {
             return Ok(density);
@@ -212,4 +235,22 @@ impl Oracle {
         }
         Ok(contact.interval)
     }
+}
+
+/// Mean density over a gap from that at its start, middle and end; at a knot in a half of it the density may jump, and the mean is the greatest that the
+/// place of the knot can make it.
+fn mean_density(here: f64, half: f64, whole: f64, [first, second]: [bool; 2]) -> f64 {
+    let parabola = (here + 4.0 * half + whole) / 6.0;
+    let lines = (here + 2.0 * half + whole) / 4.0;
+    let mut mean = parabola.max(lines);
+    if first {
+        mean = mean.max(0.5 * (half + whole));
+    }
+    if second {
+        mean = mean.max(0.5 * (here + half));
+    }
+    if first || second {
+        mean = mean.max(0.5 * (here + whole));
+    }
+    mean
 }

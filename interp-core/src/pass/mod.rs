@@ -10,6 +10,7 @@
 //! | [`offset`], [`evaluation`] | fit of the ball and cutter location; contact, fit and location in one call |
 //! | [`interval`], [`step_over`] | candidate of the path interval at a sample; the step-over that a pass allows |
 //! | [`schedule`] | the next pass |
+//! | [`scan`] | the look over a pass for the step to the next one, without axis limits |
 //! | [`run`] | chains them |
 
 pub(crate) mod buffer;
@@ -20,5 +21,6 @@ pub(crate) mod offset;
 pub(crate) mod patch;
 pub(crate) mod position;
 pub(crate) mod run;
+pub(crate) mod scan;
 pub(crate) mod schedule;
 pub(crate) mod step_over;

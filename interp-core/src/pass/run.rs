@@ -8,8 +8,9 @@ use crate::pass::buffer::PatchBuffer;
 use crate::pass::contact::{self, Reach};
 use crate::pass::patch::Patch;
 use crate::pass::position::PassPosition;
+use crate::pass::scan::PassScan;
 use crate::pass::schedule;
-use crate::pass::step_over::{self, PassMaximum, StepOverEstimator};
+use crate::pass::step_over::PassMaximum;
 use crate::sample::{Sample, SpanParameter, interval_of};
 use crate::surface::{AnyPass, Pass, PathSpeed};
 
@@ -62,13 +63,13 @@ struct Travel {
 pub(crate) struct Run {
     travel: Travel,
     buffer: PatchBuffer,
-    step_over_estimator: StepOverEstimator,
+    scan: PassScan,
     /// r N at the pass's first sample.
     first_offset: [i32; 3],
     /// Minimum interval of the last finished pass, in units of the side parameter.
     last_interval: f32,
-    /// Step-over from that pass to the next, in units of the side parameter.
-    step_over: f32,
+    /// Step-over from that pass to the next, in units of the side parameter, where it is known.
+    step_over: Option<f32>,
     /// Feed factor of the last step along the pass.
     last_feed_factor: f32,
 }
@@ -147,18 +148,19 @@ impl Run {
     pub(crate) const START: Self = Self {
         travel: Travel::START,
         buffer: PatchBuffer::START,
-        step_over_estimator: StepOverEstimator::START,
+        scan: PassScan::START,
         first_offset: [0; 3],
         last_interval: f32::INFINITY,
-        step_over: f32::INFINITY,
+        step_over: None,
         last_feed_factor: 0.0,
     };
 
     /// Resets to the start.
     pub(crate) fn restart(&mut self) {
         self.travel = Travel::START;
-        self.step_over_estimator.restart();
+        self.scan.restart();
         self.last_interval = f32::INFINITY;
+        self.step_over = None;
     }
 
     /// Pass, path and side parameter of the tool, in the surface's own direction.
@@ -199,8 +201,6 @@ impl Run {
                 self.sample(last)?;
                 if self.buffer.has_work() {
                     self.buffer.work(job, &self.travel.position());
-                } else if self.travel.ticks % step_over::EVERY == 1 {
-                    self.estimate_step_over(job);
                 }
                 return Ok(true);
             }
@@ -231,7 +231,7 @@ impl Run {
             self.first_offset = travel.offset;
         }
         if travel.next != Next::Along {
-            self.close_pass(job);
+            self.last_interval = interval_of(travel.max_inv_interval_sq);
         }
         let travel = &self.travel;
         last.pass = travel.pass;
@@ -463,41 +463,38 @@ impl Run {
         travel.max_inv_interval_sq = 0.0;
         travel.next = Next::Along;
         travel.path.log_speed_derivative = f32::NAN;
-        self.step_over_estimator.begin();
+        self.scan.begin(&travel.position());
         self.buffer.begin(job, &travel.position())
     }
 
-    /// Executes one task of the step-over estimator.
-    #[inline(never)]
-    fn estimate_step_over(&mut self, job: &Job<'_>) {
-        if job.header.spacing == Spacing::FirstOrder {
-            return;
-        }
-        let Self {
-            travel,
-            buffer,
-            step_over_estimator,
-            ..
-        } = self;
-        step_over_estimator.work(
-            job,
-            &travel.position(),
-            buffer.patch(),
-            travel.fraction,
-            travel.max_inv_interval_sq,
-        );
+    /// Whether [`Self::plan`] has anything to do.
+    pub(crate) fn has_to_plan(&self, spacing: Spacing) -> bool {
+        spacing == Spacing::Exact && (self.scan.has_work() || self.is_step_due())
     }
 
-    /// Ends the pass: computes its minimum interval, and the step to the next pass.
-    fn close_pass(&mut self, job: &Job<'_>) {
+    /// Whether the pass is over, and the step to the next one is not known yet.
+    fn is_step_due(&self) -> bool {
+        self.travel.next == Next::Over && self.step_over.is_none()
+    }
+
+    /// The planning of one period without axis limits: scans the pass for the step to the next one.
+    pub(crate) fn plan(&mut self, job: &Job<'_>) {
+        self.scan.plan(job);
+        if self.is_step_due() && !self.scan.has_work() {
+            self.step_over = Some(self.find_step_over(job));
+        }
+    }
+
+    /// The step to the next pass.
+    #[inline(never)]
+    fn find_step_over(&mut self, job: &Job<'_>) -> f32 {
         let Travel {
             max_inv_interval_sq,
             shape,
             ..
         } = self.travel;
-        self.last_interval = interval_of(max_inv_interval_sq);
-        self.step_over = match job.header.spacing {
-            Spacing::Exact => self.step_over_estimator.step(
+        match job.header.spacing {
+            Spacing::Exact => self.scan.step(
                 job.header,
                 PassMaximum {
                     inv_interval_sq: max_inv_interval_sq,
@@ -505,15 +502,19 @@ impl Run {
                 },
             ),
             Spacing::FirstOrder => self.last_interval,
-        };
+        }
     }
 
     /// The side parameter of the next pass. Its first sample is adjacent to the last pass's first, or to its last where the
     /// pattern is zigzag.
     fn step_over(&mut self, job: &Job<'_>) -> Result<()> {
+        let step = match self.step_over.take() {
+            Some(step) => step,
+            None => self.find_step_over(job),
+        };
         let travel = &mut self.travel;
         let width = |span| job.side_width(span);
-        travel.side = schedule::next_side(travel.side, self.step_over, job.header.side_spans, width)?;
+        travel.side = schedule::next_side(travel.side, step, job.header.side_spans, width)?;
         travel.pass = travel.pass.wrapping_add(1);
         if job.header.pattern == Pattern::Zig {
             travel.offset = self.first_offset;

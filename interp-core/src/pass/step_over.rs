@@ -3,9 +3,11 @@
 //! The interval of eqns 10 and 11 is a first-order approximation: it uses the lengths and curvatures at the pass for the whole gap, and a parabola
 //! for the ball. Its error is 1 to 2 % of the scallop height where the path lines diverge or the curvature increases from pass to
 //! pass, h/(2r) everywhere, and up to four times the height at the end of a pass with skew path lines. So the estimator also
-//! evaluates the surface beside the pass: in ticks with little other work it computes the inverse square interval, `1/interval^2`, on two neighbouring
+//! evaluates the surface beside the pass: at stations along the pass it computes the inverse square interval, `1/interval^2`, on two neighbouring
 //! lines, half a step-over and a whole one away, at the same path parameter. The mean inverse square interval over the step to the next pass
 //! gives the scallop height.
+//!
+//! The stations are the caller's ([`crate::pass::scan`], or the look-ahead of a job with axis limits): even parts of each patch, in order.
 
 use crate::job::Header;
 use crate::job::program::Job;
@@ -16,10 +18,6 @@ use crate::pass::position::PassPosition;
 use crate::pass::schedule;
 use crate::sample::{SpanParameter, interval_of};
 use crate::surface::{Contact, Pass as _};
-
-/// One of this number of ticks without other work evaluates a neighbouring line, alternating between the two: the intervals of adjacent samples
-/// differ little.
-pub(crate) const EVERY: u32 = 4;
 
 /// Maximum ratio of the step to the first-order step: the neighbouring lines extend no further.
 const STEP_MAX: f32 = 1.25;
@@ -32,6 +30,14 @@ const NEWTON_LAST: f32 = 1e-3;
 /// The first pass has no previous step from which to place the lines. They are placed again when the maximum inverse square interval has grown by
 /// this factor since.
 const REPLACE_FACTOR: f32 = 1.25;
+/// Maximum ratio of the expected step to the previous one.
+const TREND_MAX: f32 = 1.25;
+/// Error of the emitted cutter location along the normal, by which the scallop limit is lowered: half a nanometre in each of three coordinates, and the
+/// rounding of the normal to 24 bits, times the ball's radius.
+const LOCATION_ERROR_MM: f32 = 0.87e-6;
+const LOCATION_ERROR_SHARE: f32 = 1.0 / 16_777_216.0;
+/// Minimum share of the scallop limit that is left by the location error.
+const HEIGHT_SHARE_MIN: f32 = 0.5;
 
 /// The next task on a neighbouring line.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -52,6 +58,45 @@ enum Task {
     Idle,
 }
 
+/// Maximum of a function that is evaluated at even stations of each patch, in order. Between stations it is that of the parabola through three.
+#[derive(Clone, Copy, Debug)]
+struct Peak {
+    most: f32,
+    /// The last two values, the older one first; NaN where they are on another patch.
+    last: [f32; 2],
+    /// The last station.
+    fraction: u64,
+}
+
+impl Peak {
+    const NONE: Self = Self {
+        most: 0.0,
+        last: [f32::NAN; 2],
+        fraction: 0,
+    };
+
+    /// The next value is on another patch.
+    const fn cut(&mut self) {
+        self.last = [f32::NAN; 2];
+    }
+
+    fn see(&mut self, value: f32, fraction: u64) {
+        let [before, middle] = self.last;
+        self.most = value.at_least(self.most);
+        // A NaN compares false.
+        if middle == middle && fraction == self.fraction {
+            return;
+        }
+        let (rise, fall) = (middle - before, middle - value);
+        if rise > 0.0 && fall > 0.0 {
+            let tilt = rise - fall;
+            self.most = (middle + tilt * tilt / (8.0 * (rise + fall))).at_least(self.most);
+        }
+        self.last = [middle, value];
+        self.fraction = fraction;
+    }
+}
+
 /// A line at a constant side parameter beside the pass, towards the next pass.
 #[derive(Clone, Copy, Debug)]
 struct NeighbourLine {
@@ -63,11 +108,11 @@ struct NeighbourLine {
     span: u16,
     spans: u16,
     side: SpanParameter,
-    /// The step-over, in the side parameter, and the inverse square interval from which it was chosen.
-    step: f32,
+    /// Distance of the farther line from the pass, in the side parameter, and the inverse square interval from which it was chosen.
+    distance: f32,
     placed_for: f32,
-    /// Maximum inverse square interval on the line.
-    most: f32,
+    /// Inverse square interval on the line.
+    peak: Peak,
 }
 
 /// The maximum inverse square interval of the samples of a pass, with `across` and `lateral_squared` of the [`Contact`] at that sample.
@@ -89,11 +134,17 @@ impl PassMaximum {
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct StepOverEstimator {
     lines: [NeighbourLine; 2],
+    /// Inverse square interval at the stations of the pass.
+    own: Peak,
     /// Maximum inverse square interval at the ends of the pass, and the ends still to be evaluated.
     edge: f32,
     ends: [bool; 2],
     /// Step of the previous pass.
     before: Option<f32>,
+    /// Ratio of the last two steps, between 1 / [`TREND_MAX`] and [`TREND_MAX`].
+    trend: f32,
+    /// Side span of the pass.
+    side_span: u16,
     /// The line to evaluate next.
     second: bool,
 }
@@ -102,15 +153,19 @@ impl StepOverEstimator {
     /// State before the first pass.
     pub(crate) const START: Self = Self {
         lines: [NeighbourLine::new(0.5), NeighbourLine::new(1.0)],
+        own: Peak::NONE,
         edge: 0.0,
         ends: [false; 2],
         before: None,
+        trend: 1.0,
+        side_span: 0,
         second: false,
     };
 
     /// Resets to the state before the first pass. [`Self::begin`] resets the other fields.
     pub(crate) const fn restart(&mut self) {
         self.before = None;
+        self.trend = 1.0;
         self.second = false;
     }
 
@@ -119,15 +174,35 @@ impl StepOverEstimator {
         let [half, whole] = &mut self.lines;
         half.begin();
         whole.begin();
+        self.own = Peak::NONE;
         self.edge = 0.0;
         self.ends = [true; 2];
     }
 
-    /// Ends evaluation on this pass.
-    #[cfg(test)]
-    pub(crate) fn disable(&mut self) {
-        self.ends = [false; 2];
-        self.lines = Self::START.lines;
+    /// A patch of the pass begins.
+    pub(crate) const fn begin_patch(&mut self) {
+        self.own.cut();
+    }
+
+    /// A station of the pass.
+    pub(crate) fn see(&mut self, job: &Job<'_>, patch: &Patch, contact: &Contact, fraction: u64) {
+        self.own.see(exact_at(job, patch, contact), fraction);
+    }
+
+    /// Maximum inverse square interval at the stations so far.
+    pub(crate) const fn most(&self) -> f32 {
+        self.own.most
+    }
+
+    /// Whether the first pass is not followed yet: the lines then have no previous step to be placed by.
+    pub(crate) const fn is_first(&self) -> bool {
+        self.before.is_none()
+    }
+
+    /// Evaluations at a station: one for each neighbouring line, two where its patch has to be collapsed, and more at the lines' ends. `begins_patch`,
+    /// `begins`, `ends`: the station is the first of a patch, the first and the last of the pass.
+    pub(crate) fn evaluations(begins_patch: bool, begins: bool, ends: bool) -> u8 {
+        2 + 2 * u8::from(begins_patch) + 6 * u8::from(begins) + 6 * u8::from(ends)
     }
 
     /// Whether the next task at this position collapses a patch.
@@ -162,7 +237,9 @@ impl StepOverEstimator {
             let [half, whole] = &mut self.lines;
             let beside = if self.second { whole } else { half };
             self.second = !self.second;
-            beside.work(job, position, fraction, most, self.before);
+            self.side_span = position.side.span;
+            let expected = self.before.map(|step| step * self.trend);
+            beside.work(job, position, fraction, most, expected);
         }
     }
 
@@ -177,21 +254,26 @@ impl StepOverEstimator {
             self.before = None;
             return f32::INFINITY;
         }
-        let here = exact(header, most, shape).at_least(self.edge);
-        let [half, whole] = self.lines.each_ref().map(|line| line.found(header, here));
-        let mean = match (half, whole) {
-            (Some(half), Some(whole)) => mean(here, half, whole),
-            // The second line is beyond the surface, or was not evaluated in time.
+        let here = exact(header, most, shape)
+            .at_least(self.own.most)
+            .at_least(self.edge);
+        let [half, whole] = &self.lines;
+        let found = |line: &NeighbourLine| line.found(header, here);
+        let knots = [
+            half.side.span != self.side_span,
+            whole.side.span != half.side.span,
+        ];
+        let mean = match (found(half), found(whole)) {
+            (Some(half), Some(whole)) => mean(here, half, whole, knots),
+            // The farther line was not evaluated in time.
             (Some(half), None) => half.at_least(here),
             _ => here,
         };
-        let [_, NeighbourLine { step: distance, .. }] = self.lines;
-        let rise = if mean == here {
-            0.0
-        } else {
-            (mean - here) / distance
+        let step = step_over(here, mean, whole.distance);
+        self.trend = match self.before {
+            Some(before) => (step / before).at_most(TREND_MAX).at_least(1.0 / TREND_MAX),
+            None => 1.0,
         };
-        let step = step_over(here, rise);
         self.before = Some(step);
         step
     }
@@ -207,16 +289,16 @@ impl NeighbourLine {
             span: 0,
             spans: 0,
             side: SpanParameter { span: 0, fraction: 0 },
-            step: 0.0,
+            distance: 0.0,
             placed_for: 0.0,
-            most: 0.0,
+            peak: Peak::NONE,
         }
     }
 
     const fn begin(&mut self) {
         self.task = Task::Place;
         self.spans = 0;
-        self.most = 0.0;
+        self.peak = Peak::NONE;
     }
 
     #[inline(never)]
@@ -226,28 +308,28 @@ impl NeighbourLine {
         position: &PassPosition,
         fraction: u64,
         most: f32,
-        before: Option<f32>,
+        expected: Option<f32>,
     ) {
-        let is_first = before.is_none();
+        let is_first = expected.is_none();
         self.task = match self.task {
-            Task::Place => self.place(job, position, most, before),
+            Task::Place => self.place(job, position, most, expected),
             _ if is_first && most > REPLACE_FACTOR * self.placed_for => {
-                self.place(job, position, most, before)
+                self.place(job, position, most, expected)
             }
             Task::Patch => self.make_patch(job, position, Task::Start),
             Task::Start => {
-                self.most = at_end(job, &self.patch, 0).at_least(self.most);
+                self.peak.most = at_end(job, &self.patch, 0).at_least(self.peak.most);
                 Task::Evaluate
             }
             Task::Evaluate if self.span != position.span => self.make_patch(job, position, Task::Evaluate),
             Task::Evaluate if position.next(job.header.path_spans).is_none() => Task::End,
             Task::End => {
-                self.most = at_end(job, &self.patch, u64::MAX).at_least(self.most);
+                self.peak.most = at_end(job, &self.patch, u64::MAX).at_least(self.peak.most);
                 Task::EvaluateLast
             }
             Task::Evaluate | Task::EvaluateLast => {
                 if let Ok(contact) = self.patch.surface.contact(fraction, &self.patch.ball) {
-                    self.most = exact_at(job, &self.patch, &contact).at_least(self.most);
+                    self.peak.see(exact_at(job, &self.patch, &contact), fraction);
                 }
                 self.task
             }
@@ -255,19 +337,28 @@ impl NeighbourLine {
         };
     }
 
-    /// Places the line: by the previous step, or by the step that the samples of this pass so far allow.
-    fn place(&mut self, job: &Job<'_>, position: &PassPosition, most: f32, before: Option<f32>) -> Task {
-        self.step = before.unwrap_or_else(|| interval_of(most));
-        self.placed_for = most;
+    /// Places the line: by the expected step, or by the step that the samples of this pass so far allow; at most at the surface's boundary.
+    fn place(&mut self, job: &Job<'_>, position: &PassPosition, most: f32, expected: Option<f32>) -> Task {
         let spans = job.header.side_spans;
         let width = |span| job.side_width(span);
-        match schedule::next_side(position.side, self.share * self.step, spans, width) {
-            Ok(side) if !schedule::is_last(side, spans) => {
+        if schedule::is_last(position.side, spans) {
+            return Task::Idle;
+        }
+        let end = SpanParameter {
+            span: spans.saturating_sub(1),
+            fraction: u64::MAX,
+        };
+        let step = expected.unwrap_or_else(|| interval_of(most));
+        self.distance = step.at_most(schedule::apart(position.side, end, width));
+        self.placed_for = most;
+        match schedule::next_side(position.side, self.share * self.distance, spans, width) {
+            Ok(side) => {
                 self.side = side;
-                self.most = 0.0;
+                self.spans = 0;
+                self.peak = Peak::NONE;
                 Task::Patch
             }
-            _ => Task::Idle,
+            Err(_) => Task::Idle,
         }
     }
 
@@ -276,6 +367,7 @@ impl NeighbourLine {
             side: self.side,
             ..*position
         };
+        self.peak.cut();
         self.span = position.span;
         self.spans = self.spans.saturating_add(1);
         match self.patch.collapse(job, &beside) {
@@ -287,19 +379,33 @@ impl NeighbourLine {
     /// Maximum inverse square interval on the line; for a line evaluated in part, at least that of the pass.
     fn found(&self, header: &Header, here: f32) -> Option<f32> {
         match self.task {
-            Task::EvaluateLast if self.spans >= header.path_spans => Some(self.most),
-            Task::EvaluateLast | Task::End | Task::Evaluate => Some(self.most.at_least(here)),
+            Task::EvaluateLast if self.spans >= header.path_spans => Some(self.peak.most),
+            Task::EvaluateLast | Task::End | Task::Evaluate => Some(self.peak.most.at_least(here)),
             Task::Place | Task::Patch | Task::Start | Task::Idle => None,
         }
     }
 }
 
 /// Mean inverse square interval over a step-over, from the values at its start, middle and end. By Simpson's rule where the middle is the maximum; where the ends
-/// are, by the trapezoidal rule, because an inverse square interval may have a kink at a knot.
-fn mean(here: f32, half: f32, whole: f32) -> f32 {
+/// are, by the trapezoidal rule, because the curvature counts with a weight that falls from the ends to the middle.
+///
+/// At a knot the curvature may jump. `knots`: whether there are any in the first half, in the second. The weight of what lies beyond a knot in the first half
+/// is 1/2 to 1, in the second half 0 to 1/2; the mean is the greatest of these.
+fn mean(here: f32, half: f32, whole: f32, knots: [bool; 2]) -> f32 {
     let parabola = (here + 4.0 * half + whole) * (1.0 / 6.0);
     let lines = (here + 2.0 * half + whole) * 0.25;
-    parabola.at_least(lines)
+    let [first, second] = knots;
+    let mut mean = parabola.at_least(lines);
+    if first {
+        mean = (0.5 * (half + whole)).at_least(mean);
+    }
+    if second {
+        mean = (0.5 * (here + half)).at_least(mean);
+    }
+    if first || second {
+        mean = (0.5 * (here + whole)).at_least(mean);
+    }
+    mean
 }
 
 /// The inverse square interval at an end of a line; 0 where there is no contact. Where path lines are skew, the scallop crest between two passes lies beyond
@@ -328,6 +434,8 @@ fn exact_at(job: &Job<'_>, patch: &Patch, contact: &Contact) -> f32 {
 /// The inverse square interval without the first-order approximations in h/r. The ball's circle instead of the parabola
 /// multiplies the inverse square interval by 1/(1 - h/(2r)),
 /// and the scallop's height above a surface of curvature c by 1 + h c; `across / lateral_squared` is 1 + r c.
+///
+/// The limit is lowered by the error of the emitted location.
 fn exact(header: &Header, inv_interval_sq: f32, [across, lateral_squared]: [f32; 2]) -> f32 {
     let height = header.scallop_mm / header.ball_radius_mm;
     let bend = if lateral_squared > 0.0 {
@@ -335,14 +443,18 @@ fn exact(header: &Header, inv_interval_sq: f32, [across, lateral_squared]: [f32;
     } else {
         0.0
     };
-    inv_interval_sq * (1.0 + height * bend) / (1.0 - 0.5 * height)
+    let error_mm = LOCATION_ERROR_MM + LOCATION_ERROR_SHARE * header.ball_radius_mm;
+    let left = (1.0 - error_mm / header.scallop_mm).at_least(HEIGHT_SHARE_MIN);
+    inv_interval_sq * (1.0 + height * bend) / ((1.0 - 0.5 * height) * left)
 }
 
-/// The step x at which the mean inverse square interval `here + rise x` over the step is 1/x^2.
-fn step_over(here: f32, rise: f32) -> f32 {
+/// The step x at which the mean inverse square interval over the step is 1/x^2, for the inverse square interval `here` and its mean over a distance. The
+/// mean is linear in x; where it falls, it falls no further than over that distance.
+fn step_over(here: f32, mean: f32, distance: f32) -> f32 {
     let first = interval_of(here);
     // In units of the first-order step, where here = 1.
-    let rise = rise * first / here;
+    let (mean, distance) = (mean / here, distance / first);
+    let rise = if mean == 1.0 { 0.0 } else { (mean - 1.0) / distance };
     let mut step = 1.0_f32;
     for _ in 0..NEWTON_STEPS {
         let slope = step * (2.0 + 3.0 * rise * step);
@@ -355,6 +467,9 @@ fn step_over(here: f32, rise: f32) -> f32 {
         if change < NEWTON_LAST {
             break;
         }
+    }
+    if rise < 0.0 && step > distance {
+        step = interval_of(mean).at_least(STEP_MIN).at_most(step);
     }
     step * first
 }
@@ -369,28 +484,34 @@ mod tests {
         for rise in [0.0, 0.01, -0.01, 0.3, -0.2, 2.0, 10.0] {
             let here = 2500.0_f64;
             let first = here.sqrt().recip();
-            let x = f64::from(step_over(here as f32, (rise * here / first) as f32)) / first;
+            // The mean over twice the first-order step.
+            let mean = here * (1.0 + 2.0 * rise);
+            let x = f64::from(step_over(here as f32, mean as f32, 2.0 * first as f32)) / first;
             let height = x * x * (1.0 + rise * x);
             let tolerance = if rise > 1.0 { 3e-2 } else { 2e-6 };
             assert!((height - 1.0).abs() < tolerance, "rise {rise}: {height}");
         }
         // Within the bounds and finite.
         let first = interval_of(1.0);
-        assert!((step_over(1.0, -1.0) / first - STEP_MAX).abs() < 1e-6);
-        assert!((step_over(1.0, 1e9) / first - STEP_MIN).abs() < 1e-6);
-        assert!(step_over(1.0, f32::NAN).is_finite());
+        assert!((step_over(1.0, -1.0, 2.0) / first - STEP_MAX).abs() < 1e-6);
+        assert!((step_over(1.0, 1e9, 1.0) / first - STEP_MIN).abs() < 1e-6);
+        assert!(step_over(1.0, f32::NAN, 1.0).is_finite());
+        // No extrapolation of a fall beyond the lines.
+        let step = step_over(1.0, 0.9, 0.5);
+        assert!((step - 0.9_f32.sqrt().recip()).abs() < 1e-6, "{step}");
     }
 
     /// A concave parabola and a convex kink are integrated exactly; a constant is unchanged.
     #[test]
     fn means_of_parabolas_and_kinks() {
         let near = |got: f32, want: f64| assert!((f64::from(got) - want).abs() < 1e-6, "{got} for {want}");
-        near(mean(1.0, 1.0, 1.0), 1.0);
-        near(mean(1.0, 1.1, 1.2), 1.1);
+        let smooth = [false; 2];
+        near(mean(1.0, 1.0, 1.0, smooth), 1.0);
+        near(mean(1.0, 1.1, 1.2, smooth), 1.1);
         // 1 + x (1 - x): mean 1 + 1/2 - 1/3.
-        near(mean(1.0, 1.25, 1.0), 1.0 + 1.0 / 6.0);
+        near(mean(1.0, 1.25, 1.0, smooth), 1.0 + 1.0 / 6.0);
         // |1 - 2 x|: mean 1/2.
-        near(mean(1.0, 0.0, 1.0), 0.5);
+        near(mean(1.0, 0.0, 1.0, smooth), 0.5);
     }
 
     /// Two balls on a cylinder of radius R: centres at R + r, the cusp at R + h, half the angle between the centres by the cosine law.

@@ -107,12 +107,10 @@ enum Task {
 
 /// Cycles of the tasks, by the pessimistic model of `cargo sim budget`.
 mod cycles {
-    pub(super) const PATCH: u32 = 4_200;
-    pub(super) const STATION: u32 = 1_600;
+    pub(super) use crate::pass::scan::cycles::{ESTIMATE, NEXT, PATCH, STATION};
+
     pub(super) const DERIVATIVES: u32 = 3_400;
-    pub(super) const ESTIMATE: u32 = 1_600;
     pub(super) const CLOSE: u32 = 1_700;
-    pub(super) const NEXT: u32 = 800;
 }
 
 /// The look-ahead over one pass.
@@ -227,13 +225,14 @@ impl Lookahead {
             Task::Patch => {
                 self.patch.collapse(job, &self.line)?;
                 out.point |= self.patch.point;
+                self.step_over.begin_patch();
                 self.choose_cells(job.header.path_spans.max(1), out);
                 self.window = Window::EMPTY;
                 self.arc_mm = 0.0;
                 Task::Station
             }
             Task::Station => {
-                self.visit(axes, out)?;
+                self.visit(job, axes, out)?;
                 self.after_station(job, out)
             }
             Task::Derivatives(at, last) => {
@@ -241,7 +240,7 @@ impl Lookahead {
                 if at < last {
                     Task::Derivatives(at + 1, last)
                 } else {
-                    self.estimates(job, out)
+                    self.estimates(job)
                 }
             }
             Task::Estimate(0) => self.next_station(job),
@@ -331,7 +330,7 @@ impl Lookahead {
     /// The derivatives that can be taken after a station.
     fn after_station(&self, job: &Job<'_>, out: &PassPlan) -> Task {
         if out.point {
-            return self.estimates(job, out);
+            return self.estimates(job);
         }
         let is_end = self.is_end();
         let count = self.window.count();
@@ -345,11 +344,11 @@ impl Lookahead {
         };
         let to = if is_end { last } else { middle };
         if count < WINDOW && !is_end {
-            return self.estimates(job, out);
+            return self.estimates(job);
         }
         match (u8::try_from(from), u8::try_from(to)) {
             (Ok(from), Ok(to)) => Task::Derivatives(from, to),
-            _ => self.estimates(job, out),
+            _ => self.estimates(job),
         }
     }
 
@@ -383,16 +382,15 @@ impl Lookahead {
         }
     }
 
-    /// Evaluations of the step-over estimator at a station: one for each neighbouring line, two where its patch has to be collapsed, and more at
-    /// the lines' ends.
-    fn estimates(&self, job: &Job<'_>, out: &PassPlan) -> Task {
+    /// Evaluations of the step-over estimator at a station.
+    fn estimates(&self, job: &Job<'_>) -> Task {
         let first = self.station == 0;
         let begins = first && self.patches == 0;
         let ends = self.is_end() && self.line.next(job.header.path_spans).is_none();
-        Task::Estimate(if job.header.spacing == Spacing::FirstOrder || out.point {
+        Task::Estimate(if job.header.spacing == Spacing::FirstOrder {
             0
         } else {
-            2 + 2 * u8::from(first) + 6 * u8::from(begins) + 6 * u8::from(ends)
+            StepOverEstimator::evaluations(first, begins, ends)
         })
     }
 
@@ -415,7 +413,7 @@ impl Lookahead {
     }
 
     /// Evaluates the station: fit of the ball, travel, inverse square interval, arc.
-    fn visit(&mut self, axes: &AxisLimits, out: &mut PassPlan) -> Result<()> {
+    fn visit(&mut self, job: &Job<'_>, axes: &AxisLimits, out: &mut PassPlan) -> Result<()> {
         let fraction = self.fraction();
         let (contact, located) = self.patch.evaluate(fraction)?;
         check_travel(axes, &located.cl_nm)?;
@@ -427,6 +425,7 @@ impl Lookahead {
                 shape: [contact.across, contact.lateral_squared],
             };
         }
+        self.step_over.see(job, &self.patch, &contact, fraction);
         let is_up = self.patch.faces_up(contact.offset);
         if (self.patches == 0 && self.station == 0) || out.point {
             (out.ends, out.faces_up) = ([located.cl_nm; 2], [is_up; 2]);
@@ -493,8 +492,8 @@ impl Lookahead {
         let header = job.header;
         out.interval = interval_of(self.maximum.inv_interval_sq);
         let step = match header.spacing {
-            Spacing::Exact if !out.point => self.step_over.step(header, self.maximum),
-            _ => out.interval,
+            Spacing::Exact => self.step_over.step(header, self.maximum),
+            Spacing::FirstOrder => out.interval,
         };
         let width = |span| job.side_width(span);
         out.next = if schedule::is_last(out.side, header.side_spans) {

@@ -43,6 +43,11 @@ const BOUNDS: &[(&str, u32, &str)] = &[
     ),
     ("controller::step_output::StepOutput::turn", 3, "axes"),
     (
+        "interp_core::pass::scan::PassScan::plan",
+        33,
+        "pieces of a portion: PIECES_MAX",
+    ),
+    (
         "interp_core::pass::run::Run::step_far",
         2,
         "patches of an arc: CROSSINGS_MAX + 1",

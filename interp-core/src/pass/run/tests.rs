@@ -62,9 +62,8 @@ fn patches_made_ahead_change_no_bit() {
         let mut patches = 0;
         loop {
             late.buffer.disable();
-            // The step-over estimator runs in ticks without a patch to prepare, which differ between the two runs.
-            ahead.step_over_estimator.disable();
-            late.step_over_estimator.disable();
+            ahead.plan(&job);
+            late.plan(&job);
             let more = ahead.advance(&job, &mut here).unwrap();
             assert_eq!(late.advance(&job, &mut there).unwrap(), more);
             if !more {
@@ -88,11 +87,14 @@ fn a_run_that_is_begun_again_is_the_same() {
         let (mut here, mut there) = (Sample::START, Sample::START);
         for _ in 0..stopped {
             assert!(again.advance(&job, &mut there).unwrap());
+            again.plan(&job);
         }
         again.restart();
         while first.advance(&job, &mut here).unwrap() && here.pass < 4 {
             assert!(again.advance(&job, &mut there).unwrap());
             assert_eq!(here, there, "after {stopped} samples");
+            first.plan(&job);
+            again.plan(&job);
         }
         assert_eq!(here.pass, 4);
     }

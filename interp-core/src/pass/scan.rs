@@ -1,0 +1,261 @@
+//! The look over a pass for the step to the next one, of a job without axis limits.
+//!
+//! The tool moves at constant feed from the first sample to the last, so nothing is planned ahead: the scan goes over the current pass while the tool is on
+//! it, in the planning of each period ([`crate::Interpolator::plan`]). Its stations are even parts of each patch, and do not depend on the samples. It keeps
+//! ahead of the end of the pass: a patch has one station for two periods of the tool on it and at least both ends, and costs less than the
+//! planning of the one period that the tool is on it at least. So a pass of any length is looked at, whatever the feed.
+//!
+//! The first pass has no previous step by which the neighbouring lines are placed. It is scanned twice, the first time at few stations and without lines.
+
+use crate::job::Header;
+use crate::job::program::Job;
+use crate::math::arith::{sqrt, truncated};
+use crate::math::number::{Bounded, MM_PER_NM, to_f32};
+use crate::pass::patch::Patch;
+use crate::pass::position::PassPosition;
+use crate::pass::step_over::{PassMaximum, StepOverEstimator};
+use crate::sample::SpanParameter;
+use crate::surface::Pass as _;
+
+/// Cycles of the pieces, by the pessimistic model of `cargo sim budget`.
+pub(crate) mod cycles {
+    pub(crate) const PATCH: u32 = 4_200;
+    pub(crate) const STATION: u32 = 1_600;
+    pub(crate) const ESTIMATE: u32 = 1_600;
+    pub(crate) const NEXT: u32 = 800;
+    /// A patch of a scan: also three points of it.
+    pub(super) const MEASURED_PATCH: u32 = PATCH + 1_800;
+}
+
+/// Cycles of the planning in a period of 1 ms, a share of the period; never less than one piece, nor more than in 1 ms.
+const PORTION_CYCLES: f32 = 26_500.0;
+const PORTION_PERIOD_S: f32 = 1e-3;
+/// Most pieces of a period: each takes at least [`cycles::NEXT`].
+const PIECES_MAX: u8 = 33;
+
+/// Periods of the tool on a cell.
+const PERIODS_PER_CELL: f32 = 2.0;
+/// Periods of the tool on a patch that is a point.
+const POINT_PERIODS: f32 = 16.0;
+/// Most cells of a patch: between them the maximum is that of a parabola.
+const CELLS_MAX: f32 = 96.0;
+/// Cells of the first lap of the first pass, as a share.
+const FIRST_LAP: u16 = 4;
+
+/// The next piece.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Piece {
+    /// Collapse the patch of the pass, and choose its cells.
+    Patch,
+    /// Evaluate the pass at the station.
+    Station,
+    /// Run the step-over estimator, with this number of evaluations left at the station.
+    Estimate(u8),
+    /// The pass is scanned.
+    Done,
+}
+
+/// The scan of one pass.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct PassScan {
+    line: PassPosition,
+    patch: Patch,
+    piece: Piece,
+    /// The first lap of the first pass: without neighbouring lines.
+    is_first_lap: bool,
+    /// Station within the patch, from 0, cells of the patch, and the fraction of the patch per cell.
+    station: u16,
+    cells: u16,
+    cell_fraction: u64,
+    is_first_patch: bool,
+    /// Maximum found by the first lap.
+    first_lap: f32,
+    estimator: StepOverEstimator,
+}
+
+impl PassScan {
+    /// State before the first pass.
+    pub(crate) const START: Self = Self {
+        line: PassPosition {
+            side: SpanParameter { span: 0, fraction: 0 },
+            reversed: false,
+            span: 0,
+        },
+        patch: Patch::NONE,
+        piece: Piece::Done,
+        is_first_lap: false,
+        station: 0,
+        cells: 1,
+        cell_fraction: u64::MAX,
+        is_first_patch: true,
+        first_lap: 0.0,
+        estimator: StepOverEstimator::START,
+    };
+
+    /// Resets to the state before the first pass.
+    pub(crate) const fn restart(&mut self) {
+        self.estimator.restart();
+        self.piece = Piece::Done;
+    }
+
+    /// Begins the scan of a pass whose first patch is at this position.
+    pub(crate) fn begin(&mut self, position: &PassPosition) {
+        self.line = *position;
+        self.first_lap = 0.0;
+        self.is_first_lap = self.estimator.is_first();
+        self.begin_lap();
+    }
+
+    fn begin_lap(&mut self) {
+        self.is_first_patch = true;
+        self.piece = Piece::Patch;
+        self.estimator.begin();
+    }
+
+    /// Whether a piece is left.
+    pub(crate) fn has_work(&self) -> bool {
+        self.piece != Piece::Done
+    }
+
+    /// The step from the pass to the next one; `maximum`: that of the pass's samples.
+    pub(crate) fn step(&mut self, header: &Header, maximum: PassMaximum) -> f32 {
+        self.piece = Piece::Done;
+        self.estimator.step(header, maximum)
+    }
+
+    /// The pieces of one period.
+    #[inline(never)]
+    pub(crate) fn plan(&mut self, job: &Job<'_>) {
+        let share = (job.header.period_s / PORTION_PERIOD_S).at_most(1.0);
+        let mut left = share * PORTION_CYCLES;
+        for pieces in 0..PIECES_MAX {
+            let cycles = f32::from(u16::try_from(self.cycles()).unwrap_or(u16::MAX));
+            if cycles == 0.0 || (cycles > left && pieces > 0) {
+                return;
+            }
+            left -= cycles;
+            self.work(job);
+        }
+    }
+
+    /// Cycles of the next piece; 0 where none is left.
+    fn cycles(&self) -> u32 {
+        match self.piece {
+            Piece::Patch => cycles::MEASURED_PATCH,
+            Piece::Station => cycles::STATION,
+            Piece::Estimate(0) => cycles::NEXT,
+            Piece::Estimate(_) if self.estimator.makes_patch(&self.line) => cycles::PATCH,
+            Piece::Estimate(_) => cycles::ESTIMATE,
+            Piece::Done => 0,
+        }
+    }
+
+    fn work(&mut self, job: &Job<'_>) {
+        self.piece = match self.piece {
+            Piece::Patch => self.begin_patch(job),
+            Piece::Station => {
+                let fraction = self.fraction();
+                // A fault is reported by the tick that reaches it.
+                if let Ok(contact) = self.patch.surface.contact(fraction, &self.patch.ball) {
+                    self.estimator.see(job, &self.patch, &contact, fraction);
+                }
+                Piece::Estimate(self.estimates(job))
+            }
+            Piece::Estimate(0) => self.next_station(job),
+            Piece::Estimate(left) => {
+                let most = self.estimator.most().at_least(self.first_lap);
+                let fraction = self.fraction();
+                self.estimator.work(job, &self.line, &self.patch, fraction, most);
+                Piece::Estimate(left - 1)
+            }
+            Piece::Done => Piece::Done,
+        };
+    }
+
+    fn begin_patch(&mut self, job: &Job<'_>) -> Piece {
+        if self.patch.collapse(job, &self.line).is_err() {
+            return Piece::Done;
+        }
+        self.estimator.begin_patch();
+        let periods = if self.patch.point {
+            POINT_PERIODS
+        } else {
+            self.length() / self.patch.arc
+        };
+        let cells = (periods / PERIODS_PER_CELL).at_least(1.0).at_most(CELLS_MAX);
+        let cells = u16::try_from(truncated(cells)).unwrap_or(1);
+        self.cells = if self.is_first_lap {
+            (cells / FIRST_LAP).max(1)
+        } else {
+            cells
+        };
+        let part = u64::MAX.checked_div(u64::from(self.cells));
+        self.cell_fraction = part.unwrap_or(u64::MAX);
+        self.station = 0;
+        Piece::Station
+    }
+
+    /// Length of the patch, roughly, units; 0 where its surface is not evaluated.
+    fn length(&self) -> f32 {
+        let at = |fraction| self.patch.evaluate(fraction).map(|(_, located)| located.cc_nm);
+        let (Ok(start), Ok(middle), Ok(end)) = (at(0), at(1 << 63), at(u64::MAX)) else {
+            return 0.0;
+        };
+        let apart = |from: &[i32; 3], to: &[i32; 3]| {
+            let mut sum = 0.0;
+            for (from, to) in from.iter().zip(to) {
+                let mm = to_f32(i64::from(*to) - i64::from(*from)) * MM_PER_NM;
+                sum += mm * mm;
+            }
+            sqrt(sum)
+        };
+        (apart(&start, &middle) + apart(&middle, &end)) * self.patch.per_mm
+    }
+
+    const fn is_end(&self) -> bool {
+        self.station >= self.cells
+    }
+
+    fn fraction(&self) -> u64 {
+        if self.is_end() {
+            u64::MAX
+        } else {
+            u64::from(self.station) * self.cell_fraction
+        }
+    }
+
+    fn estimates(&self, job: &Job<'_>) -> u8 {
+        if self.is_first_lap {
+            return 0;
+        }
+        let first = self.station == 0;
+        let last = self.is_end() && self.line.next(job.header.path_spans).is_none();
+        StepOverEstimator::evaluations(first, first && self.is_first_patch, last)
+    }
+
+    /// Advances to the next station, the next patch, the second lap, or the end.
+    fn next_station(&mut self, job: &Job<'_>) -> Piece {
+        if !self.is_end() {
+            self.station += 1;
+            return Piece::Station;
+        }
+        let spans = job.header.path_spans;
+        if let Some(line) = self.line.next(spans) {
+            self.line = line;
+            self.is_first_patch = false;
+            return Piece::Patch;
+        }
+        if !self.is_first_lap {
+            return Piece::Done;
+        }
+        self.is_first_lap = false;
+        self.first_lap = self.estimator.most();
+        self.line.span = if self.line.reversed {
+            spans.saturating_sub(1)
+        } else {
+            0
+        };
+        self.begin_lap();
+        Piece::Patch
+    }
+}
