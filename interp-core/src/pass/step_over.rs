@@ -83,8 +83,7 @@ impl Peak {
     fn see(&mut self, value: f32, fraction: u64) {
         let [before, middle] = self.last;
         self.most = value.at_least(self.most);
-        // A NaN compares false.
-        if middle == middle && fraction == self.fraction {
+        if !middle.is_nan() && fraction == self.fraction {
             return;
         }
         let (rise, fall) = (middle - before, middle - value);
