@@ -14,7 +14,7 @@ use verify::swept;
 
 use super::out::{complain, say};
 use super::simulate::{WantedReport, remarks, report, timed};
-use super::{Bar, Failure, Result, along, error_json, load, motion_words, swept_words};
+use super::{Bar, Failure, Result, along, error_json, load, motion_words, reach_words, swept_words};
 
 /// Checks a job before it runs on a machine. Every sample against an independent f64 oracle: positions, normals, feed ripple, path
 /// intervals, schedule. The swept envelope of the ball against the surface: scallop height, local and global gouges. Axis travel. With
@@ -116,13 +116,19 @@ fn json(job: &Job, prepared: &Prepared, found: &Verification) -> Value {
     let RunMeasurements {
         findings,
         swept,
+        reach,
         axes,
         times,
         optimum,
+        ..
     } = &found.measured;
     let mut value = swept_words::json(job, prepared, findings, swept, axes);
     value.extend(motion_words::json(times, optimum));
     value.extend(along::json(job));
+    value.insert("reach".to_owned(), reach_words::json(job, reach));
+    if let (Some(key), Some(Value::Array(keys))) = (reach_words::not_measured(reach), value.get_mut("not_measured")) {
+        keys.push(key.into());
+    }
     value.insert("passes_scanned".to_owned(), found.scanned.into());
     value.insert("failures".to_owned(), found.failures.clone().into());
     value.insert("passed".to_owned(), found.failures.is_empty().into());
@@ -134,13 +140,16 @@ fn print_verification(job: &Job, prepared: &Prepared, found: &Verification) {
     let RunMeasurements {
         findings,
         swept,
+        reach,
         axes,
         times,
         optimum,
+        ..
     } = &found.measured;
     say!("  along        {}", along::sentence(job));
     print(findings, found.scanned);
     swept_words::print(job, prepared, findings, swept, axes);
+    reach_words::print(job, reach);
     motion_words::print(times, optimum);
     for failure in &found.failures {
         say!("  FAIL {failure}");

@@ -34,7 +34,7 @@ use job::{Fixture, Job};
 use oracle::{Oracle, facing};
 
 use crate::swept::Progress;
-use path::{CHORD_MM, PathTree};
+use path::{CHORD_MM, PathTree, chords};
 use search::{Searched, Shape, search};
 use stock::StockObstacle;
 use surface::SurfaceObstacle;
@@ -51,17 +51,18 @@ pub fn measure(
     contact: &ContactSide,
     progress: &dyn Progress,
 ) -> ReachResult {
-    let tree = PathTree::new(motion, CHORD_RADII * job.radius_mm, false);
+    let tree = PathTree::new(chords(motion, CHORD_RADII * job.radius_mm));
     let solids = solids(job);
     let mut findings = Vec::new();
     if tree.chords.is_empty() {
         return ReachResult::new(job, *contact, facing(&oracle.surface, oracle.normal_sign), findings);
     }
+    progress.begin("reach", 0);
     let surface = SurfaceObstacle::new(oracle);
-    let done = |steps: u64| progress.done(steps);
+    // Their number is not known before.
+    let done = |_: u64| ();
     for solid in &solids {
         let shape = Shape::Solid(*solid);
-        progress.begin("reach: surface", 0);
         // How far neck and shank are from their own contact is no figure that anybody wants; how far the holder is, is one.
         let is_holder = matches!(solid.part, ToolPart::Holder(_));
         let floor = if is_holder { f64::NEG_INFINITY } else { TOUCH_MM };
@@ -74,24 +75,24 @@ pub fn measure(
         .chain(solids.into_iter().map(Shape::Solid))
         .collect();
     if let Some(block) = &job.setup.stock {
-        let cleared = PathTree::new(motion, CHORD_RADII * job.radius_mm, true);
+        let cleared = tree.part(true);
+        let links = tree.part(false);
         let stock = StockObstacle {
             block,
             cleared: &cleared,
             radius_mm: job.radius_mm,
         };
         for shape in &shapes {
-            progress.begin("reach: stock", 0);
-            let found = search(&stock, &tree, shape, TOUCH_MM, &done);
+            // In contact, what is no wider than the ball is within what the ball clears.
+            let is_wide = shape.widest() > job.radius_mm;
+            let found = search(&stock, if is_wide { &tree } else { &links }, shape, TOUCH_MM, &done);
             findings.push(finding(shape, Obstacle::Stock, &found, None));
         }
     }
-    progress.begin("reach: fixtures", job.setup.fixtures.len() as u64);
     for (number, fixture) in job.setup.fixtures.iter().enumerate() {
         for shape in &shapes {
             findings.push(against(fixture, number, shape, &tree));
         }
-        progress.done(1);
     }
     ReachResult::new(
         job,

@@ -33,6 +33,25 @@ impl Motion {
         self.centres_nm.push(cl_nm);
     }
 
+    /// Takes stretches off the surface as in contact, as in a turn along the boundary. `in_contact`: for each of them, in order.
+    pub fn join(&mut self, in_contact: impl Iterator<Item = bool>) {
+        let count = u32::try_from(self.centres_nm.len()).unwrap_or(u32::MAX);
+        let starts = [0].into_iter().chain(self.turns.iter().copied());
+        let ends = self.turns.iter().copied().chain([count]);
+        let off: Vec<[u32; 2]> = starts
+            .zip(ends)
+            .step_by(2)
+            .map(|(start, end)| [start, end])
+            .filter(|[start, end]| start < end)
+            .collect();
+        for ([start, end], _) in off.into_iter().zip(in_contact).filter(|(_, joins)| *joins) {
+            // Without its two ends the contact goes on; at the motion's own ends there is but one.
+            if start > 0 && end < count {
+                self.turns.retain(|turn| *turn != start && *turn != end);
+            }
+        }
+    }
+
     /// Number of samples.
     #[must_use]
     pub fn samples(&self) -> usize {
@@ -130,18 +149,20 @@ pub(super) struct PathTree {
 }
 
 impl PathTree {
-    /// The tree over a motion; `only_contact`: over its parts in contact.
-    pub(super) fn new(motion: &Motion, longest_mm: f64, only_contact: bool) -> Self {
-        let mut chords = chords(motion, longest_mm);
-        if only_contact {
-            chords.retain(|chord| chord.in_contact);
-        }
+    /// The tree over chords.
+    pub(super) fn new(chords: Vec<Chord>) -> Self {
         let mut order: Vec<u32> = (0..u32::try_from(chords.len()).unwrap_or(u32::MAX)).collect();
         let mut nodes = Vec::with_capacity(2 * chords.len());
         if !chords.is_empty() {
             build(&mut nodes, &mut order, &chords);
         }
         Self { chords, nodes }
+    }
+
+    /// The tree over the chords in contact, or over the others.
+    pub(super) fn part(&self, in_contact: bool) -> Self {
+        let part = |chord: &&Chord| chord.in_contact == in_contact;
+        Self::new(self.chords.iter().filter(part).copied().collect())
     }
 
     /// Visits the chords in boxes for which `bound` is above what `floor` is at that moment, those with the largest bounds first.
@@ -270,6 +291,27 @@ fn build(nodes: &mut Vec<Node>, order: &mut [u32], chords: &[Chord]) {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn stretches_are_joined() {
+        let mut motion = Motion::default();
+        // Off the surface, in contact, off, in contact, off, in contact, off.
+        for (stretch, count) in [5, 7, 3, 8, 4, 6, 9].into_iter().enumerate() {
+            for k in 0..count {
+                let x = 1000 * (100 * i32::try_from(stretch).unwrap() + k);
+                motion.add([x, 0, 0], stretch % 2 == 1, false);
+            }
+        }
+        assert_eq!(motion.turns, [5, 12, 15, 23, 27, 33]);
+        motion.join([false, true, false, false].into_iter());
+        assert_eq!(motion.turns, [5, 23, 27, 33]);
+        let mut begins_in_contact = Motion::default();
+        for in_contact in [true, false, true] {
+            begins_in_contact.add([0; 3], in_contact, false);
+        }
+        begins_in_contact.join([true].into_iter());
+        assert_eq!(begins_in_contact.turns, [0]);
+    }
 
     #[test]
     fn chords_hold_every_sample_and_no_jump() {

@@ -17,8 +17,9 @@ use super::path::{Bounds, Chord, PathTree};
 const SPLITS_MAX: usize = 20;
 /// Largest number of cells evaluated for one part.
 const CELLS_MAX: usize = 2_000_000;
-/// Relative tolerance of the deepest place, and of a clearance.
-const DEPTH_SHARE: f64 = 1e-3;
+/// The deepest place is searched to this share and this length, mm; a clearance to a share.
+const DEPTH_SHARE: f64 = 0.01;
+const DEPTH_MM: f64 = 1e-3;
 const CLEARANCE_SHARE: f64 = 0.02;
 
 /// What is searched for: a solid, or the ball.
@@ -31,6 +32,14 @@ pub(super) enum Shape {
 }
 
 impl Shape {
+    /// Largest radius, mm.
+    pub(super) fn widest(&self) -> f64 {
+        match self {
+            Self::Ball(radius) => *radius,
+            Self::Solid(solid) => solid.radius[0].max(solid.radius[1]),
+        }
+    }
+
     pub(super) fn part(&self) -> ToolPart {
         match self {
             Self::Ball(_) => ToolPart::Ball,
@@ -261,7 +270,7 @@ pub(super) fn search<O: Obstacle>(
     let closing = |deepest: &Option<Deepest<O::Cell>>| {
         let found = deepest.as_ref().map_or(f64::NEG_INFINITY, |deepest| deepest.depth_mm);
         let share = if found > 0.0 { DEPTH_SHARE } else { CLEARANCE_SHARE };
-        floor_mm.max(found + found.abs() * share)
+        floor_mm.max(found + found.abs() * share + DEPTH_MM)
     };
     let mut cells = obstacle.start();
     let (mut evaluations, mut left) = (0, f64::NEG_INFINITY);

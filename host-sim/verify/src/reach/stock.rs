@@ -13,7 +13,7 @@ use super::search::{Obstacle, Spot};
 
 /// Cells per side with which the search begins.
 const START: u32 = 32;
-/// The ball's radius less this, mm, is cleared: samples are known to the nanometre, and chords to a quarter of a micrometre.
+/// So much more than the ball's radius is cleared, mm: walls that the ball has made do not touch it.
 const SLACK_MM: f64 = 1e-3;
 
 /// The remaining stock, seen from above.
@@ -59,7 +59,7 @@ impl Obstacle for StockObstacle<'_> {
     fn spot(&self, &[x, y, wide, deep]: &Rectangle) -> Option<Spot> {
         let place = DVec3::new(x + 0.5 * wide, y + 0.5 * deep, self.block.low_mm[2]);
         let around_mm = 0.5 * wide.hypot(deep);
-        let radius = self.radius_mm - SLACK_MM;
+        let radius = self.radius_mm + SLACK_MM;
         let distance = self.distance(place, radius + around_mm);
         (distance + around_mm > radius).then_some(Spot {
             place,

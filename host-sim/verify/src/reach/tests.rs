@@ -5,9 +5,9 @@ use crate::Verdict;
 use crate::swept::Progress;
 use job::{Block, Fixture, HolderPart, NurbsSpec, Side, SurfaceSpec};
 
-/// Searches end when nothing is left above this share of a depth, and chords leave this much.
+/// A depth is searched to 1 % and 1 um; a wall of the stock begins 1 um beside what the ball clears.
 fn near(found: f64, exact: f64) -> bool {
-    (found - exact).abs() <= 2e-3 * exact.abs() + 1e-3
+    (found - exact).abs() <= 0.01 * exact.abs() + 2e-3
 }
 
 fn job(surface: SurfaceSpec, side: Side, radius_mm: f64) -> Job {
@@ -144,7 +144,8 @@ fn an_overhang() {
     let shank = find(&found, ToolPart::Shank, Obstacle::Surface);
     let exact = 5.0 - (5.0 * cos - 12.0 * sin).abs();
     assert!(near(shank.depth_mm, exact), "{shank:?}, exact {exact}");
-    assert!((shank.place_mm.z - 12.0 * cos).abs() < 1e-2);
+    // The depth is within 1 % and 1 um, so the place is within that over the sine.
+    assert!((shank.place_mm.z - 12.0 * cos).abs() < 0.2);
 }
 
 /// A shank beside a wall, at known distances.
@@ -200,7 +201,7 @@ fn a_slope_under_a_holder() {
         let gap = 3.0 + (length - 3.0) * cos - 0.5 * diameter * sin;
         if gap > 0.0 {
             let clearance = holder.clearance_mm().unwrap();
-            assert!(clearance <= gap && clearance > 0.96 * gap - 1e-3, "{holder:?}, exact {gap}");
+            assert!(clearance <= gap && clearance > 0.96 * gap - 2e-3, "{holder:?}, exact {gap}");
             assert_eq!(holder.verdict(), Verdict::Met);
         } else {
             // As deep from the side as from below.
