@@ -93,17 +93,17 @@ pub(super) fn print(job: &Job, reach: &ReachResult) {
     }
     for finding in &reach.findings {
         let name = format!("reach: {}", finding.part.name());
-        let obstacle = finding.obstacle.name(job);
+        let obstacle = finding.obstacle.told(job);
         let [x, y, z] = finding.place_mm.to_array();
         let place = format!("x = {x:.3}, y = {y:.3}, z = {z:.3}, tick {}", finding.sample);
         let error = finding.bound_mm - finding.depth_mm;
         let text = match (finding.verdict(), finding.clearance_mm()) {
-            (Verdict::Violated, _) => format!("{:.4} mm +- {error:.4} deep in the {obstacle} at {place}", finding.depth_mm),
-            (Verdict::Unknown, _) => format!("not measured: up to {:.4} mm in the {obstacle} near {place}", finding.bound_mm),
+            (Verdict::Violated, _) => format!("{:.4} mm +- {error:.4} deep in {obstacle} at {place}", finding.depth_mm),
+            (Verdict::Unknown, _) => format!("not measured: up to {:.4} mm in {obstacle} near {place}", finding.bound_mm),
             (Verdict::Met, Some(clearance)) if finding.depth_mm.is_finite() => {
-                format!("off the {obstacle}, by {clearance:.3} mm at least; nearest at {place}")
+                format!("off {obstacle}, by {clearance:.3} mm at least; nearest at {place}")
             }
-            (Verdict::Met, _) => format!("does not touch the {obstacle}"),
+            (Verdict::Met, _) => format!("does not touch {obstacle}"),
         };
         say!("  {} {name:<22} {text}", mark(finding.verdict()));
     }

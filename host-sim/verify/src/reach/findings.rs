@@ -24,6 +24,15 @@ pub enum Obstacle {
 }
 
 impl Obstacle {
+    /// Its name in a sentence.
+    #[must_use]
+    pub fn told(self, job: &Job) -> String {
+        match self {
+            Self::Fixture(_) => self.name(job),
+            _ => format!("the {}", self.name(job)),
+        }
+    }
+
     /// Its name in a job.
     #[must_use]
     pub fn name(self, job: &Job) -> String {
@@ -167,13 +176,13 @@ impl ReachResult {
 }
 
 fn sentence(job: &Job, finding: &ReachFinding) -> Option<String> {
-    let (part, obstacle) = (finding.part.name(), finding.obstacle.name(job));
+    let (part, obstacle) = (finding.part.name(), finding.obstacle.told(job));
     let [x, y, z] = finding.place_mm.to_array();
     let at = format!("x = {x:.3}, y = {y:.3}, z = {z:.3}, at tick {}", finding.sample);
     match finding.verdict() {
         Verdict::Met => None,
         Verdict::Unknown => Some(format!(
-            "reach: whether the {part} touches the {obstacle} could not be measured: up to {:.4} mm near {at}",
+            "reach: whether the {part} touches {obstacle} could not be measured: up to {:.4} mm near {at}",
             finding.bound_mm
         )),
         Verdict::Violated => {
@@ -184,7 +193,7 @@ fn sentence(job: &Job, finding: &ReachFinding) -> Option<String> {
                 (_, _) => "take a slimmer or longer tool, raise safe_z_mm, or move what is in the way",
             };
             Some(format!(
-                "reach: the {part} is {:.4} mm deep in the {obstacle} at {at}; {remedy}",
+                "reach: the {part} is {:.4} mm deep in {obstacle} at {at}; {remedy}",
                 finding.depth_mm
             ))
         }

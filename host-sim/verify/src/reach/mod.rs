@@ -59,14 +59,9 @@ pub fn measure(
     }
     progress.begin("reach", 0);
     let surface = SurfaceObstacle::new(oracle);
-    // Their number is not known before.
-    let done = |_: u64| ();
     for solid in &solids {
         let shape = Shape::Solid(*solid);
-        // How far neck and shank are from their own contact is no figure that anybody wants; how far the holder is, is one.
-        let is_holder = matches!(solid.part, ToolPart::Holder(_));
-        let floor = if is_holder { f64::NEG_INFINITY } else { TOUCH_MM };
-        let found = search(&surface, &tree, &shape, floor, &done);
+        let found = search(&surface, &tree, &shape, floor(&shape));
         let uv = found.deepest.map(|deepest| surface.parameters(&deepest.cell));
         findings.push(finding(&shape, Obstacle::Surface, &found, uv));
     }
@@ -85,8 +80,12 @@ pub fn measure(
         for shape in &shapes {
             // In contact, what is no wider than the ball is within what the ball clears.
             let is_wide = shape.widest() > job.radius_mm;
-            let found = search(&stock, if is_wide { &tree } else { &links }, shape, TOUCH_MM, &done);
-            findings.push(finding(shape, Obstacle::Stock, &found, None));
+            let floor = floor(shape);
+            let found = search(&stock, if is_wide { &tree } else { &links }, shape, floor);
+            let mut finding = finding(shape, Obstacle::Stock, &found, None);
+            // A column of the stock is found by its foot.
+            finding.place_mm.z = block.high_mm[2];
+            findings.push(finding);
         }
     }
     for (number, fixture) in job.setup.fixtures.iter().enumerate() {
@@ -100,6 +99,15 @@ pub fn measure(
         facing(&oracle.surface, oracle.normal_sign),
         merged(findings),
     )
+}
+
+/// The depth from which on a search goes into the matter. How far ball, neck and shank are from what they cut beside is no figure that anybody
+/// wants; how far the holder is, is one.
+fn floor(shape: &Shape) -> f64 {
+    match shape.part() {
+        ToolPart::Holder(_) => f64::NEG_INFINITY,
+        _ => TOUCH_MM,
+    }
 }
 
 /// The result of a search as a finding.
@@ -116,10 +124,7 @@ fn finding<C>(
         obstacle,
         depth_mm,
         bound_mm: found.bound_mm.max(depth_mm) + CHORD_MM,
-        place_mm: deepest.map_or(DVec3::ZERO, |deepest| {
-            // Of a column that is as high as the stock: its place at the height of the tool.
-            deepest.place
-        }),
+        place_mm: deepest.map_or(DVec3::ZERO, |deepest| deepest.place),
         centre_mm: deepest.map_or(DVec3::ZERO, |deepest| deepest.centre),
         sample: deepest.map_or(0, |deepest| deepest.sample),
         uv,

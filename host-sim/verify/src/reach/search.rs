@@ -264,7 +264,6 @@ pub(super) fn search<O: Obstacle>(
     tree: &PathTree,
     shape: &Shape,
     floor_mm: f64,
-    done: &(dyn Fn(u64) + Sync),
 ) -> Searched<O::Cell> {
     let mut deepest: Option<Deepest<O::Cell>> = None;
     let closing = |deepest: &Option<Deepest<O::Cell>>| {
@@ -279,10 +278,7 @@ pub(super) fn search<O: Obstacle>(
         let floor = closing(&deepest);
         let mut open: Vec<Evaluated<O::Cell>> = cells
             .par_iter()
-            .filter_map(|cell| {
-                done(1);
-                evaluate(obstacle, tree, shape, *cell, floor)
-            })
+            .filter_map(|cell| evaluate(obstacle, tree, shape, *cell, floor))
             .collect();
         for evaluated in &open {
             let most = deepest.as_ref().map_or(f64::NEG_INFINITY, |most| most.depth_mm);
