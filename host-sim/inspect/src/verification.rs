@@ -84,8 +84,8 @@ pub struct RunMeasurements {
     pub swept: swept::SweptResult,
     /// The reach of the tool.
     pub reach: ReachResult,
-    /// The motion of the ball's centre, links included.
-    pub motion: Motion,
+    /// The ways of the ball's centre between passes, turns along the boundary included, mm.
+    pub links_mm: Vec<Vec<DVec3>>,
     /// Use of the axis limits.
     pub axes: Peaks,
     /// The time and its parts.
@@ -195,6 +195,7 @@ fn measure<'a>(
     let times = time.finish();
     let findings = survey.finish(ran.is_ok())?;
     let swept = swept::measure(job, &oracle, &track, ran.is_ok(), &requirements.swept, progress);
+    let links_mm = motion.links();
     motion.join(times.links.iter().map(|link| link.turn));
     let reach = reach::measure(job, &oracle, &motion, &contact, progress);
     let optimum = if requirements.with_optimum {
@@ -207,7 +208,7 @@ fn measure<'a>(
         findings,
         swept,
         reach,
-        motion,
+        links_mm,
         axes: axes.into_inner().finish(),
         times,
         optimum,

@@ -22,10 +22,11 @@ const POLICY: &str =
     "default-src 'none'; script-src 'unsafe-inline'; style-src 'unsafe-inline'; img-src data:";
 /// The libraries of view and charts, built by `scripts/viewer`, and the scripts of the page, which share one scope.
 const LIBRARIES: &str = include_str!("viewer/three-bundle.min.js");
-const SCRIPTS: [&str; 6] = [
+const SCRIPTS: [&str; 7] = [
     include_str!("viewer/data.js"),
     include_str!("viewer/words.js"),
     include_str!("viewer/scene.js"),
+    include_str!("viewer/setting.js"),
     include_str!("viewer/panel.js"),
     include_str!("viewer/charts.js"),
     include_str!("viewer/main.js"),
@@ -182,7 +183,7 @@ fn series_words(content: &Content<'_>) -> String {
         String::new()
     };
     let ends = if content.job.machine.has_limits() {
-        "Each pass runs from standstill to standstill; links between passes are not shown."
+        "Each pass runs from standstill to standstill; links between passes are not in the charts."
     } else {
         "The last period of a pass is shorter than the others and has no speed."
     };

@@ -3,6 +3,7 @@
 use serde_json::{Value, json};
 
 use job::Job;
+use report::Mark;
 use verify::Verdict;
 use verify::reach::{ReachFinding, ReachResult};
 
@@ -59,6 +60,28 @@ fn part(job: &Job, finding: &ReachFinding) -> Value {
 /// The keys that could not be measured.
 pub(super) fn not_measured(reach: &ReachResult) -> Option<&'static str> {
     (reach.verdict() == Verdict::Unknown).then_some("reach")
+}
+
+/// Places at which the tool does not reach the surface, or touches what it must not.
+pub(super) fn marks(job: &Job, reach: &ReachResult) -> Vec<Mark> {
+    let contact = reach.contact.at.filter(|_| reach.contact.verdict() == Verdict::Violated);
+    let contact = contact.map(|at| Mark {
+        what: format!("contact {:.3} mm above the equator", reach.contact.height_max_mm),
+        place_mm: at.place_mm,
+        tick: Some(at.sample as u64),
+    });
+    let touching = reach.findings.iter().filter(|finding| finding.verdict() == Verdict::Violated);
+    let touching = touching.map(|finding| Mark {
+        what: format!(
+            "{} {:.3} mm in {}",
+            finding.part.name(),
+            finding.depth_mm,
+            finding.obstacle.told(job)
+        ),
+        place_mm: finding.place_mm,
+        tick: Some(finding.sample as u64),
+    });
+    contact.into_iter().chain(touching).collect()
 }
 
 /// Prints the rows.

@@ -3,12 +3,13 @@
 use std::path::{Path, PathBuf};
 
 use clap::Args;
-use inspect::{BOUNDS, Requirements, RunMeasurements, Verification, verify_run};
+use inspect::{BOUNDS, Requirements, RunMeasurements, TimedRun, Verification, verify_run};
 use job::Job;
 use machine::prepare::Prepared;
 use oracle::{AccuracyFigure, PassSample, SampleCheck};
-use report::{Remarks, RidgePoint, Scallops, Sketch};
+use report::{Mark, Remarks, RidgePoint, Scallops, Sketch};
 use serde_json::Value;
+use verify::Verdict;
 use verify::survey::{SampleObserver, SurveyResult};
 use verify::swept;
 
@@ -109,6 +110,36 @@ fn scallops(job: &Job, swept: &swept::SweptResult) -> Scallops {
         measurement_error_mm: swept.measurement_error_mm,
         ridges: swept.ridges.iter().map(ridge).collect(),
     }
+}
+
+/// Places of what is wrong.
+fn marks(job: &Job, timed: &TimedRun, measured: &RunMeasurements) -> Vec<Mark> {
+    let mut marks = Vec::new();
+    if let Some(fault) = &timed.fault {
+        let [u, v] = fault.parameters;
+        marks.push(Mark {
+            what: format!("fault {}: {}", fault.fault.kind.code(), fault.fault.kind.name()),
+            place_mm: oracle::Surface::new(&job.surface).at(u, v).point,
+            tick: Some(fault.tick),
+        });
+    }
+    let swept = &measured.swept;
+    if let Some(gouge) = &swept.gouge {
+        marks.push(Mark {
+            what: format!("gouge {:.4} mm", gouge.depth_mm),
+            place_mm: gouge.point_mm,
+            tick: Some(gouge.tick),
+        });
+    }
+    if swept.scallop_verdict == Verdict::Violated {
+        marks.push(Mark {
+            what: format!("scallop {:.5} mm", swept.scallop_max.height_mm),
+            place_mm: swept.scallop_max.point_mm,
+            tick: None,
+        });
+    }
+    marks.extend(reach_words::marks(job, &measured.reach));
+    marks
 }
 
 /// The keys of `verify`.
@@ -266,6 +297,8 @@ fn verify_job(arguments: &Arguments, path: &Path, directory: Option<&Path>) -> R
         failures: found.failures.clone(),
         verified: true,
         scallops: Some(scallops(&job, swept)),
+        marks: marks(&job, &timed, &found.measured),
+        links_mm: found.measured.links_mm.clone(),
         ..remarks(&timed, findings)
     };
     remarks.warnings.extend(found.warnings.iter().cloned());

@@ -52,6 +52,21 @@ impl Motion {
         }
     }
 
+    /// The ways off the surface, as chords, mm.
+    #[must_use]
+    pub fn links(&self) -> Vec<Vec<DVec3>> {
+        let mut links: Vec<Vec<DVec3>> = Vec::new();
+        let mut last = None;
+        for chord in chords(self, f64::INFINITY).iter().filter(|chord| !chord.in_contact) {
+            match links.last_mut().filter(|_| last == Some(chord.samples[0])) {
+                Some(link) => link.push(chord.ends[1]),
+                None => links.push(chord.ends.to_vec()),
+            }
+            last = Some(chord.samples[1]);
+        }
+        links
+    }
+
     /// Number of samples.
     #[must_use]
     pub fn samples(&self) -> usize {
