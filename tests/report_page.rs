@@ -53,6 +53,7 @@ fn rising(domain: [[f64; 2]; 2], ridges: u32) -> Scallops {
         limit_mm: 0.01,
         measurement_error_mm: 1e-4,
         ridges: (0..ridges).map(ridge).collect(),
+        anywhere: false,
     }
 }
 

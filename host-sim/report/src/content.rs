@@ -46,6 +46,8 @@ pub struct Remarks {
     pub figures: Vec<Figure>,
     /// Scallop heights, if they were measured.
     pub scallops: Option<Scallops>,
+    /// Where the samples come from, if not from the core: for the footer.
+    pub source: Option<String>,
     /// Places of faults, gouges and the like.
     pub marks: Vec<Mark>,
     /// The ways of the ball's centre between passes, mm.

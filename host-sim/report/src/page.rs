@@ -234,9 +234,10 @@ fn interval_words(content: &Content<'_>) -> String {
 }
 
 fn footer(out: &mut String, content: &Content<'_>) {
-    let emitter = match content.approach {
-        Kind::Surface => "those that the core emitted".to_owned(),
-        other => format!("those of the approach <code>{}</code>, in f64", other.name()),
+    let emitter = match (&content.remarks.source, content.approach) {
+        (Some(source), _) => format!("those of {}", escape(source)),
+        (None, Kind::Surface) => "those that the core emitted".to_owned(),
+        (None, other) => format!("those of the approach <code>{}</code>, in f64", other.name()),
     };
     let _ = writeln!(
         out,
@@ -273,12 +274,15 @@ struct Row(&'static str, f64, String, &'static str);
 
 fn tables(out: &mut String, content: &Content<'_>) {
     out.push_str("<div class=\"tables\">\n");
-    table(out, "Run", &run_rows(content.job, content.findings));
-    table(out, "Against the oracle, at most", &oracle_rows(content.findings));
+    if content.remarks.source.is_none() {
+        table(out, "Run", &run_rows(content.job, content.findings));
+        table(out, "Against the oracle, at most", &oracle_rows(content.findings));
+    }
     table(out, "Job", &job_rows(content.job));
     let figures = &content.remarks.figures;
     if !figures.is_empty() {
-        out.push_str("<table><caption>Verified</caption><tbody>\n");
+        let caption = if content.remarks.source.is_some() { "Judged: given, and this core" } else { "Verified" };
+        let _ = writeln!(out, "<table><caption>{caption}</caption><tbody>");
         for figure in figures {
             let _ = writeln!(
                 out,

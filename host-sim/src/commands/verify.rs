@@ -109,6 +109,7 @@ fn scallops(job: &Job, swept: &swept::SweptResult) -> Scallops {
         limit_mm: job.scallop_mm,
         measurement_error_mm: swept.measurement_error_mm,
         ridges: swept.ridges.iter().map(ridge).collect(),
+        anywhere: false,
     }
 }
 
