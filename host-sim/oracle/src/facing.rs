@@ -65,11 +65,15 @@ impl Areas<'_> {
         let Some(middle) = self.normal(u, v) else {
             return;
         };
-        let looks_down = |normal: DVec3| normal.z < DOWN * normal.length();
-        let down = looks_down(middle);
+        let down = middle.z < DOWN * middle.length();
+        // A wall is neither.
+        let differs = |normal: &DVec3| match down {
+            true => normal.z > -DOWN * normal.length(),
+            false => normal.z < DOWN * normal.length(),
+        };
         // A corner at a pole has no normal.
         let corners = [(u0, v0), (u0, v1), (u1, v0), (u1, v1)].map(|(u, v)| self.normal(u, v));
-        let mixed = corners.iter().flatten().any(|corner| looks_down(*corner) != down);
+        let mixed = corners.iter().flatten().any(differs);
         if splits == SPLITS {
             let all = corners.iter().flatten().chain([&middle]);
             self.normals.extend(all.map(|normal| normal.normalize()));

@@ -48,7 +48,7 @@ pub(super) fn page(content: &Content<'_>) -> String {
     let _ = writeln!(
         out,
         "<header><h1>{title}</h1>\n<p class=\"sub\">{}</p></header>",
-        escape(&content.words.subtitle)
+        escape(&subtitle(content))
     );
     remarks(&mut out, content);
     tiles(&mut out, content);
@@ -73,6 +73,24 @@ pub(super) fn page(content: &Content<'_>) -> String {
     scripts(&mut out, content);
     out.push_str("</main>\n</body>\n</html>\n");
     out
+}
+
+/// The line under the title.
+fn subtitle(content: &Content<'_>) -> String {
+    let job = content.job;
+    match &content.remarks.source {
+        None => content.words.subtitle.clone(),
+        Some(source) => format!(
+            "{source} on the job's {} surface · {} in contact · {} mm/min programmed at the cutter contact · scallop limit {} mm",
+            job.surface.kind(),
+            match content.findings.passes {
+                1 => "one stretch".to_owned(),
+                stretches => format!("{} stretches", grouped(stretches.into())),
+            },
+            job.feed_mm_min,
+            job.scallop_mm
+        ),
+    }
 }
 
 /// Failures and warnings.
@@ -121,7 +139,11 @@ fn tiles(out: &mut String, content: &Content<'_>) {
     };
     let tiles = [
         ("Machining time", duration(time_s), ""),
-        ("Passes", grouped(findings.passes.into()), ""),
+        (
+            if content.remarks.source.is_some() { "Stretches in contact" } else { "Passes" },
+            grouped(findings.passes.into()),
+            "",
+        ),
         ("CC path", fixed(report.cc_length_mm * 1e-3, 2), "m"),
         scallop,
         ("Feed error, max", significant(report.ripple_pct.max), "%"),

@@ -307,7 +307,11 @@ fn page(
         scallops: Some(Scallops {
             limit_mm: job.scallop_mm,
             measurement_error_mm: SCALLOP_SLACK * job.scallop_mm,
-            ridges: (0..).zip(&judged.field_lines).map(line).collect(),
+            // With the highest place, which was searched between the lines.
+            ridges: (0..)
+                .zip(judged.field_lines.iter().chain([&vec![*judged.highest()]]))
+                .map(line)
+                .collect(),
             anywhere: true,
         }),
         source: Some(name.to_string_lossy().into_owned()),
