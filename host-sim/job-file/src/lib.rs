@@ -63,7 +63,8 @@ pub fn parse(name: &str, text: &str) -> Result<Job, JobError> {
 pub fn parse_with(name: &str, text: &str, faces: &dyn FaceReader) -> Result<Job, JobError> {
     let reader = Reader::new(name, text);
     let document = reader.document()?;
-    document.only(&[
+    document.only(
+        &[
             "surface",
             "placement",
             "tool",

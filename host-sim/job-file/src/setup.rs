@@ -9,7 +9,8 @@ use crate::section::Section;
 const PARTS_MAX: usize = 100;
 /// Largest coordinate of a box, mm: ten times the range of the machine's positions.
 const PLACE_MAX_MM: f64 = 20_000.0;
-const BOX: &str = "give [least, most] for each of x, y and z, in mm, e.g. box_mm = [[-50, 50], [-40, 40], [-20, 0]]";
+const BOX: &str =
+    "give [least, most] for each of x, y and z, in mm, e.g. box_mm = [[-50, 50], [-40, 40], [-20, 0]]";
 const HOLDER: &str = "{ diameter_mm = 40, length_mm = 60 }";
 
 /// The ball's radius, mm, and the tool above it.
@@ -76,7 +77,11 @@ fn holder(tool: &Section<'_>) -> Result<Vec<HolderPart>, JobError> {
     let parts = tool.tables("holder", HOLDER)?;
     if parts.is_empty() || parts.len() > PARTS_MAX {
         let what = format!("`holder` must have 1 to {PARTS_MAX} parts, not {}", parts.len());
-        return Err(tool.error("holder", what, format!("write holder = {HOLDER}, or leave it out")));
+        return Err(tool.error(
+            "holder",
+            what,
+            format!("write holder = {HOLDER}, or leave it out"),
+        ));
     }
     parts.iter().map(holder_part).collect()
 }
@@ -144,7 +149,8 @@ fn block(section: &Section<'_>) -> Result<Block, JobError> {
             return Err(section.error("box_mm", what, BOX));
         }
         if let Some(far) = [low, high].into_iter().find(|mm| mm.abs() > PLACE_MAX_MM) {
-            let what = format!("`box_mm` must be within {PLACE_MAX_MM} mm of the origin; {axis} reaches {far}");
+            let what =
+                format!("`box_mm` must be within {PLACE_MAX_MM} mm of the origin; {axis} reaches {far}");
             return Err(section.error("box_mm", what, BOX));
         }
     }
@@ -190,7 +196,11 @@ mod tests {
         let names: Vec<_> = job.setup.fixtures.iter().map(|f| f.name.as_str()).collect();
         assert_eq!(names, ["vice", "2"]);
         assert_eq!(job.setup.fixtures[1].block.high_mm, [6.0, 2.0, 3.0]);
-        let one = with("length_mm = 40\nholder = { diameter_mm = 30, length_mm = 20 }", "").unwrap();
+        let one = with(
+            "length_mm = 40\nholder = { diameter_mm = 30, length_mm = 20 }",
+            "",
+        )
+        .unwrap();
         assert_eq!(one.body.holder, [part([30.0; 2], 20.0)]);
         let plain = with("", "").unwrap();
         assert_eq!(
@@ -207,17 +217,42 @@ mod tests {
             ("shank_mm = 0", "", "shank_mm", "`shank_mm` must be above 0"),
             ("shank_mm = \"6\"", "", "shank_mm", "must be a number"),
             ("shank = 6", "", "shank = 6", "did you mean `shank_mm`?"),
-            ("neck_mm = 4.9", "", "neck_mm", "at least the ball's radius of 5 mm"),
-            ("length_mm = 5", "", "length_mm", "above the ball's radius of 5 mm, not 5"),
-            ("neck_mm = 9\nlength_mm = 9", "", "length_mm", "above the neck of 9 mm"),
+            (
+                "neck_mm = 4.9",
+                "",
+                "neck_mm",
+                "at least the ball's radius of 5 mm",
+            ),
+            (
+                "length_mm = 5",
+                "",
+                "length_mm",
+                "above the ball's radius of 5 mm, not 5",
+            ),
+            (
+                "neck_mm = 9\nlength_mm = 9",
+                "",
+                "length_mm",
+                "above the neck of 9 mm",
+            ),
             (
                 "holder = { diameter_mm = 40, length_mm = 60 }",
                 "",
                 "holder",
                 "`holder` needs `length_mm`",
             ),
-            ("holder = []\nlength_mm = 30", "", "holder", "1 to 100 parts, not 0"),
-            ("holder = 40\nlength_mm = 30", "", "holder", "must be a table, not a number"),
+            (
+                "holder = []\nlength_mm = 30",
+                "",
+                "holder",
+                "1 to 100 parts, not 0",
+            ),
+            (
+                "holder = 40\nlength_mm = 30",
+                "",
+                "holder",
+                "must be a table, not a number",
+            ),
             (
                 "length_mm = 30\nholder = { diameter_mm = [40, -1], length_mm = 60 }",
                 "",
@@ -243,9 +278,24 @@ mod tests {
                 "box_mm",
                 "the range of y in `box_mm` must ascend",
             ),
-            ("", "[[stock]]\nbox_mm = [[0, 1], [0, 1], [0, 1]]\n", "stock", "must be a section"),
-            ("", "[fixture]\nbox_mm = [[0, 1], [0, 1], [0, 1]]\n", "fixture", "a list of sections"),
-            ("", &fixture("box_mm = [[0, 1], [0, 1]]"), "box_mm", "must have 3 rows, not 2"),
+            (
+                "",
+                "[[stock]]\nbox_mm = [[0, 1], [0, 1], [0, 1]]\n",
+                "stock",
+                "must be a section",
+            ),
+            (
+                "",
+                "[fixture]\nbox_mm = [[0, 1], [0, 1], [0, 1]]\n",
+                "fixture",
+                "a list of sections",
+            ),
+            (
+                "",
+                &fixture("box_mm = [[0, 1], [0, 1]]"),
+                "box_mm",
+                "must have 3 rows, not 2",
+            ),
             (
                 "",
                 &fixture("box_mm = [[0, 1], [0, 1], [0, 1e6]]"),

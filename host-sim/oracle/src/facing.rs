@@ -109,7 +109,11 @@ impl Areas<'_> {
 fn edges(surface: &Surface, along: Along) -> Vec<f64> {
     let breaks = surface.breaks(along);
     let each = (SIDE_CELLS_MAX / (breaks.len() - 1)).clamp(2, 4 * SPAN_CELLS);
-    let each = if breaks.len() > 3 { each.min(SPAN_CELLS) } else { each };
+    let each = if breaks.len() > 3 {
+        each.min(SPAN_CELLS)
+    } else {
+        each
+    };
     let mut edges = vec![breaks[0]];
     for span in breaks.windows(2) {
         #[allow(clippy::cast_precision_loss, reason = "small")]
@@ -137,7 +141,13 @@ pub fn facing(surface: &Surface, sign: f64) -> Facing {
             areas.add([[u[0], u[1]], [v[0], v[1]]], SPLITS);
         }
     }
-    let share = |part: f64| if areas.whole > 0.0 { part / areas.whole } else { 0.0 };
+    let share = |part: f64| {
+        if areas.whole > 0.0 {
+            part / areas.whole
+        } else {
+            0.0
+        }
+    };
     let (turn_deg, turned_z_min) = match turn(&areas.normals, areas.mean) {
         Some((turn, least)) => (Some(turn), least),
         None => (None, 0.0),
@@ -236,10 +246,18 @@ pub fn turned_further(first_deg: [f64; 3], then_deg: [f64; 3]) -> [f64; 3] {
     let [across, up, out] = [whole.x_axis, whole.y_axis, whole.z_axis];
     let sine = -across.z;
     let angles = if sine.abs() < 1.0 - 1e-12 {
-        [up.z.atan2(out.z), sine.clamp(-1.0, 1.0).asin(), across.y.atan2(across.x)]
+        [
+            up.z.atan2(out.z),
+            sine.clamp(-1.0, 1.0).asin(),
+            across.y.atan2(across.x),
+        ]
     } else {
         // About y by a quarter turn: x and z are one axis.
-        [(sine * up.x).atan2(up.y), sine.signum() * std::f64::consts::FRAC_PI_2, 0.0]
+        [
+            (sine * up.x).atan2(up.y),
+            sine.signum() * std::f64::consts::FRAC_PI_2,
+            0.0,
+        ]
     };
     angles.map(|angle| {
         let rounded = (angle.to_degrees() * 1e6).round() * 1e-6;
@@ -266,7 +284,13 @@ mod tests {
     /// A plane at this slope about the y axis: normal (-sin, 0, cos).
     fn plane(angle_deg: f64) -> Surface {
         let (sin, cos) = angle_deg.to_radians().sin_cos();
-        let line = |x: f64, y: f64, z: f64| [[0.0, 0.0, 10.0 * cos, x], [0.0, 0.0, 0.0, y], [0.0, 0.0, 10.0 * sin, z]];
+        let line = |x: f64, y: f64, z: f64| {
+            [
+                [0.0, 0.0, 10.0 * cos, x],
+                [0.0, 0.0, 0.0, y],
+                [0.0, 0.0, 10.0 * sin, z],
+            ]
+        };
         Surface::new(&SurfaceSpec::Ruled {
             rail0_mm: line(0.0, 0.0, 0.0),
             rail1_mm: line(0.0, 10.0, 0.0),
@@ -287,7 +311,9 @@ mod tests {
 
     fn outside(surface: &Surface) -> f64 {
         let at = surface.at(0.3, surface.domain()[1][0]);
-        at.u.cross(at.v).dot(DVec3::new(at.point.x, at.point.y, 0.0)).signum()
+        at.u.cross(at.v)
+            .dot(DVec3::new(at.point.x, at.point.y, 0.0))
+            .signum()
     }
 
     fn looks_up(surface: &Surface, sign: f64, turn: [f64; 3]) -> f64 {
@@ -318,10 +344,7 @@ mod tests {
         // The barrel is symmetric about its equator.
         let barrel = barrel();
         let found = facing(&barrel, outside(&barrel));
-        assert!(
-            (found.down_share - 0.5).abs() <= found.error_share,
-            "{found:?}"
-        );
+        assert!((found.down_share - 0.5).abs() <= found.error_share, "{found:?}");
         assert!(found.error_share < 0.01, "{found:?}");
         // Walls do not look down.
         let wall = cylinder([0.0, 1.0]);
@@ -347,7 +370,11 @@ mod tests {
         // A plane lies nearly flat afterwards.
         assert!(facing(&plane(137.0), 1.0).turned_z_min > 0.9);
         // Half a cylinder can just be reached, more than that cannot.
-        assert!(facing(&cylinder([0.0, PI]), outside(&cylinder([0.0, PI]))).turn_deg.is_some());
+        assert!(
+            facing(&cylinder([0.0, PI]), outside(&cylinder([0.0, PI])))
+                .turn_deg
+                .is_some()
+        );
         let wide = Surface::new(&SurfaceSpec::Revolved {
             radius_mm: [0.0, -8.0, 8.0, 10.0],
             height_mm: [0.0, 0.0, 20.0, 0.0],
@@ -360,7 +387,12 @@ mod tests {
     #[test]
     fn turns_are_composed() {
         let near = |a: DMat3, b: DMat3| (a - b).to_cols_array().iter().all(|x| x.abs() < 1e-7);
-        for first in [[0.0; 3], [90.0, 0.0, 0.0], [10.0, -75.0, 130.0], [0.0, 90.0, 20.0]] {
+        for first in [
+            [0.0; 3],
+            [90.0, 0.0, 0.0],
+            [10.0, -75.0, 130.0],
+            [0.0, 90.0, 20.0],
+        ] {
             for then in [[0.0; 3], [180.0, 0.0, 0.0], [0.0, -90.0, 0.0], [33.0, 12.0, 0.0]] {
                 let whole = turned_further(first, then);
                 assert!(

@@ -140,7 +140,11 @@ fn tiles(out: &mut String, content: &Content<'_>) {
     let tiles = [
         ("Machining time", duration(time_s), ""),
         (
-            if content.remarks.source.is_some() { "Stretches in contact" } else { "Passes" },
+            if content.remarks.source.is_some() {
+                "Stretches in contact"
+            } else {
+                "Passes"
+            },
             grouped(findings.passes.into()),
             "",
         ),
@@ -303,7 +307,11 @@ fn tables(out: &mut String, content: &Content<'_>) {
     table(out, "Job", &job_rows(content.job));
     let figures = &content.remarks.figures;
     if !figures.is_empty() {
-        let caption = if content.remarks.source.is_some() { "Judged: given, and this core" } else { "Verified" };
+        let caption = if content.remarks.source.is_some() {
+            "Judged: given, and this core"
+        } else {
+            "Verified"
+        };
         let _ = writeln!(out, "<table><caption>{caption}</caption><tbody>");
         for figure in figures {
             let _ = writeln!(

@@ -62,11 +62,18 @@ pub(super) fn setting(content: &Content<'_>) -> Value {
         .home_mm
         .map(DVec3::from)
         .or(link_ends.filter(|_| machine.has_limits()));
-    let highest = content.mesh.points().iter().map(|point| point.z).fold(f64::NEG_INFINITY, f64::max);
+    let highest = content
+        .mesh
+        .points()
+        .iter()
+        .map(|point| point.z)
+        .fold(f64::NEG_INFINITY, f64::max);
     // Without a number of its own it is that of the clearance between the ball and the highest point.
-    let safe_z = machine
-        .safe_z_mm
-        .or_else(|| machine.has_limits().then(|| highest + job.radius_mm + machine.clearance_mm));
+    let safe_z = machine.safe_z_mm.or_else(|| {
+        machine
+            .has_limits()
+            .then(|| highest + job.radius_mm + machine.clearance_mm)
+    });
     json!({
         "marks": remarks.marks.iter().map(|mark| json!({
             "what": mark.what, "place": place(mark.place_mm), "tick": mark.tick,
@@ -105,7 +112,14 @@ mod tests {
             "[tool]\nshank_mm = 4\nneck_mm = 8\nlength_mm = 30\nholder = { diameter_mm = [20, 40], length_mm = 10 }",
         );
         let job = job_file::parse("a", &text).unwrap();
-        let exact = [[5.0, 0.0], [5.0, 3.0], [2.0, 3.0], [2.0, 25.0], [10.0, 25.0], [20.0, 35.0]];
+        let exact = [
+            [5.0, 0.0],
+            [5.0, 3.0],
+            [2.0, 3.0],
+            [2.0, 25.0],
+            [10.0, 25.0],
+            [20.0, 35.0],
+        ];
         assert_eq!(profile(&job, 50.0), exact);
     }
 }

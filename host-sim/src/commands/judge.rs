@@ -266,7 +266,10 @@ fn page(
     for (sample, check) in samples {
         sketch.add(sample, check);
     }
-    let name = arguments.motion.file_name().unwrap_or(arguments.motion.as_os_str());
+    let name = arguments
+        .motion
+        .file_name()
+        .unwrap_or(arguments.motion.as_os_str());
     let figures = rows().into_iter().map(|(name, unit, figure)| {
         let given = format!("{:.6}", figure(judged));
         let own = ours.map_or_else(String::new, |ours| format!(" | {:.6}", figure(ours)));
@@ -358,7 +361,13 @@ pub(super) fn command(arguments: &Arguments) -> Result<()> {
     let ours = if arguments.alone {
         None
     } else {
-        Some(judge(&own_job, &oracle, &own_run(&own_job, &prepared)?, None, progress))
+        Some(judge(
+            &own_job,
+            &oracle,
+            &own_run(&own_job, &prepared)?,
+            None,
+            progress,
+        ))
     };
     bar.clear();
     let reasons = reasons(

@@ -64,13 +64,19 @@ pub(super) fn not_measured(reach: &ReachResult) -> Option<&'static str> {
 
 /// Places at which the tool does not reach the surface, or touches what it must not.
 pub(super) fn marks(job: &Job, reach: &ReachResult) -> Vec<Mark> {
-    let contact = reach.contact.at.filter(|_| reach.contact.verdict() == Verdict::Violated);
+    let contact = reach
+        .contact
+        .at
+        .filter(|_| reach.contact.verdict() == Verdict::Violated);
     let contact = contact.map(|at| Mark {
         what: format!("contact {:.3} mm above the equator", reach.contact.height_max_mm),
         place_mm: at.place_mm,
         tick: Some(at.sample as u64),
     });
-    let touching = reach.findings.iter().filter(|finding| finding.verdict() == Verdict::Violated);
+    let touching = reach
+        .findings
+        .iter()
+        .filter(|finding| finding.verdict() == Verdict::Violated);
     let touching = touching.map(|finding| Mark {
         what: format!(
             "{} {:.3} mm in {}",
@@ -88,7 +94,11 @@ pub(super) fn marks(job: &Job, reach: &ReachResult) -> Vec<Mark> {
 pub(super) fn print(job: &Job, reach: &ReachResult) {
     let contact = &reach.contact;
     if let Some(at) = contact.at {
-        let side = if contact.height_max_mm > 0.0 { "above" } else { "below" };
+        let side = if contact.height_max_mm > 0.0 {
+            "above"
+        } else {
+            "below"
+        };
         say!(
             "  {} {:<22} highest {:.4} mm {side} the ball's equator at u = {:.6}, v = {:.6}, pass {}; {} of {} contacts above it",
             mark(contact.verdict()),
@@ -121,8 +131,14 @@ pub(super) fn print(job: &Job, reach: &ReachResult) {
         let place = format!("x = {x:.3}, y = {y:.3}, z = {z:.3}, tick {}", finding.sample);
         let error = finding.bound_mm - finding.depth_mm;
         let text = match (finding.verdict(), finding.clearance_mm()) {
-            (Verdict::Violated, _) => format!("{:.4} mm +- {error:.4} deep in {obstacle} at {place}", finding.depth_mm),
-            (Verdict::Unknown, _) => format!("not measured: up to {:.4} mm in {obstacle} near {place}", finding.bound_mm),
+            (Verdict::Violated, _) => format!(
+                "{:.4} mm +- {error:.4} deep in {obstacle} at {place}",
+                finding.depth_mm
+            ),
+            (Verdict::Unknown, _) => format!(
+                "not measured: up to {:.4} mm in {obstacle} near {place}",
+                finding.bound_mm
+            ),
             (Verdict::Met, Some(clearance)) if finding.depth_mm.is_finite() => {
                 format!("off {obstacle}, by {clearance:.3} mm at least; nearest at {place}")
             }

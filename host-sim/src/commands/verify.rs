@@ -158,7 +158,9 @@ fn json(job: &Job, prepared: &Prepared, found: &Verification) -> Value {
     value.extend(motion_words::json(times, optimum));
     value.extend(along::json(job));
     value.insert("reach".to_owned(), reach_words::json(job, reach));
-    if let (Some(key), Some(Value::Array(keys))) = (reach_words::not_measured(reach), value.get_mut("not_measured")) {
+    if let (Some(key), Some(Value::Array(keys))) =
+        (reach_words::not_measured(reach), value.get_mut("not_measured"))
+    {
         keys.push(key.into());
     }
     value.insert("passes_scanned".to_owned(), found.scanned.into());

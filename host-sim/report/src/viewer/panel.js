@@ -196,8 +196,10 @@ class Panel {
         speed.value = factors.filter((factor) => factor === 1 || whole / factor > 60).pop();
         const play = byId("play");
         play.addEventListener("click", () => (this.playing ? this.pause() : this.play()));
+        // At the first mark, else in the middle.
+        const marked = this.view.setting.marks.find(({ tick }) => tick !== null);
         const middle = track.passes[Math.floor(track.passes.length / 2)];
-        this.setTick(middle ? Math.round((middle.first + middle.last) / 2) : 0);
+        this.setTick(marked ? marked.tick : middle ? Math.round((middle.first + middle.last) / 2) : 0);
     }
 
     play() {

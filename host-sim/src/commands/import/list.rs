@@ -12,7 +12,8 @@ use super::super::out::say;
 use super::super::{Result, progress, whole};
 use super::{Arguments, condition, deviation_json, page};
 use cad::{
-    CadError, Face, Form, MachinableFace, Measures, Model, Options, degrees, machinable, machined_sign, measure,
+    CadError, Face, Form, MachinableFace, Measures, Model, Options, degrees, machinable, machined_sign,
+    measure,
 };
 use job::one_line;
 use oracle::{Facing, Surface, facing};

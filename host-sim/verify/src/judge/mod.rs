@@ -143,7 +143,13 @@ pub fn judge(
         if touches {
             jumps = state.add(oracle, index, &nearest, last.as_ref(), *centre_mm, period_s);
             path.add_centre(cl_nm, last.is_none() || jumps);
-            stretches.add(index, &nearest, *centre_mm, last.is_none() || jumps, state.step_mm);
+            stretches.add(
+                index,
+                &nearest,
+                *centre_mm,
+                last.is_none() || jumps,
+                state.step_mm,
+            );
         } else {
             state.leave();
         }

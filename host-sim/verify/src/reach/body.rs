@@ -122,11 +122,8 @@ impl Solid {
             (rho - self.radius[end]).max(0.0).hypot(beyond)
         };
         let line_end = |z: f64| {
-            let [bottom, top] = [0, 1].map(|end| {
-                (rho - self.radius[end])
-                    .max(0.0)
-                    .hypot((z - self.z[end]).abs())
-            });
+            let [bottom, top] =
+                [0, 1].map(|end| (rho - self.radius[end]).max(0.0).hypot((z - self.z[end]).abs()));
             bottom.min(top).min(self.side_distance(rho, z))
         };
         -corner(0).min(corner(1)).min(line_end(z[0])).min(line_end(z[1]))
@@ -211,7 +208,10 @@ mod tests {
                 let found = solid.depth(rho, z);
                 let exact = sampled(&solid, rho, z);
                 if found < 0.0 {
-                    assert!((found + exact).abs() < 0.05, "{solid:?} {rho} {z:?}: {found} {exact}");
+                    assert!(
+                        (found + exact).abs() < 0.05,
+                        "{solid:?} {rho} {z:?}: {found} {exact}"
+                    );
                 } else {
                     assert!(exact < 0.05, "{solid:?} {rho} {z:?}: {found} {exact} {depth}");
                 }

@@ -115,12 +115,7 @@ pub struct ReachResult {
 }
 
 impl ReachResult {
-    pub(super) fn new(
-        job: &Job,
-        contact: ContactSide,
-        facing: Facing,
-        findings: Vec<ReachFinding>,
-    ) -> Self {
+    pub(super) fn new(job: &Job, contact: ContactSide, facing: Facing, findings: Vec<ReachFinding>) -> Self {
         let rotate_deg = facing
             .turn_deg
             .filter(|turn| turn.iter().any(|angle| *angle != 0.0))
@@ -189,7 +184,9 @@ fn sentence(job: &Job, finding: &ReachFinding) -> Option<String> {
             let remedy = match (finding.part, finding.obstacle) {
                 (ToolPart::Ball, _) => "raise safe_z_mm, or move what is in the way",
                 (ToolPart::Holder(_), _) => "take a longer tool (length_mm) or a slimmer holder",
-                (_, Obstacle::Surface) => "take a slimmer shank, a longer neck or a larger ball, or turn the part",
+                (_, Obstacle::Surface) => {
+                    "take a slimmer shank, a longer neck or a larger ball, or turn the part"
+                }
                 (_, _) => "take a slimmer or longer tool, raise safe_z_mm, or move what is in the way",
             };
             Some(format!(

@@ -55,7 +55,12 @@ pub fn measure(
     let solids = solids(job);
     let mut findings = Vec::new();
     if tree.chords.is_empty() {
-        return ReachResult::new(job, *contact, facing(&oracle.surface, oracle.normal_sign), findings);
+        return ReachResult::new(
+            job,
+            *contact,
+            facing(&oracle.surface, oracle.normal_sign),
+            findings,
+        );
     }
     progress.begin("reach", 0);
     let surface = SurfaceObstacle::new(oracle);
@@ -111,12 +116,7 @@ fn floor(shape: &Shape) -> f64 {
 }
 
 /// The result of a search as a finding.
-fn finding<C>(
-    shape: &Shape,
-    obstacle: Obstacle,
-    found: &Searched<C>,
-    uv: Option<[f64; 2]>,
-) -> ReachFinding {
+fn finding<C>(shape: &Shape, obstacle: Obstacle, found: &Searched<C>, uv: Option<[f64; 2]>) -> ReachFinding {
     let deepest = found.deepest.as_ref();
     let depth_mm = deepest.map_or(f64::NEG_INFINITY, |deepest| deepest.depth_mm);
     ReachFinding {
@@ -141,7 +141,9 @@ fn against(fixture: &Fixture, number: usize, shape: &Shape, tree: &PathTree) -> 
             best = (depth, Some((chord, share)));
         }
     }
-    let at = best.1.map(|(chord, share)| (chord.at(share), chord.sample(share)));
+    let at = best
+        .1
+        .map(|(chord, share)| (chord.at(share), chord.sample(share)));
     let centre_mm = at.map_or(DVec3::ZERO, |(centre, _)| centre);
     ReachFinding {
         part: shape.part(),

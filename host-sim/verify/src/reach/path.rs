@@ -57,7 +57,10 @@ impl Motion {
     pub fn links(&self) -> Vec<Vec<DVec3>> {
         let mut links: Vec<Vec<DVec3>> = Vec::new();
         let mut last = None;
-        for chord in chords(self, f64::INFINITY).iter().filter(|chord| !chord.in_contact) {
+        for chord in chords(self, f64::INFINITY)
+            .iter()
+            .filter(|chord| !chord.in_contact)
+        {
             match links.last_mut().filter(|_| last == Some(chord.samples[0])) {
                 Some(link) => link.push(chord.ends[1]),
                 None => links.push(chord.ends.to_vec()),
@@ -204,7 +207,8 @@ impl PathTree {
                 visit(&self.chords[node.next as usize]);
                 continue;
             }
-            let mut children = [index + 1, node.next].map(|child| (child, bound(&self.nodes[child as usize].bounds)));
+            let mut children =
+                [index + 1, node.next].map(|child| (child, bound(&self.nodes[child as usize].bounds)));
             if children[0].1 > children[1].1 {
                 children.reverse();
             }
@@ -246,7 +250,11 @@ pub(super) fn chords(motion: &Motion, longest_mm: f64) -> Vec<Chord> {
             in_contact,
         });
         let jumps_next = jumps.peek().is_some_and(|jump| index(*jump) == to + 1);
-        from = if last || jumps_next || to + 1 == count { to + 1 } else { to };
+        from = if last || jumps_next || to + 1 == count {
+            to + 1
+        } else {
+            to
+        };
     }
     chords
 }
@@ -362,7 +370,11 @@ mod tests {
             let least = own.map(off).fold(f64::INFINITY, f64::min);
             assert!(least < 1.01 * CHORD_MM, "{k}: {least}");
         }
-        assert!(chords.iter().all(|chord| chord.ends[0].distance(chord.ends[1]) < 5.1));
+        assert!(
+            chords
+                .iter()
+                .all(|chord| chord.ends[0].distance(chord.ends[1]) < 5.1)
+        );
         for chord in &chords {
             let middle = (chord.samples[0] + chord.samples[1]) / 2;
             assert_eq!(chord.in_contact, (500..1500).contains(&middle), "{chord:?}");

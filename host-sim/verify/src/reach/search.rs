@@ -112,9 +112,9 @@ struct Query<'a> {
 
 impl Query<'_> {
     fn new<'a>(shape: &'a Shape, spot: Spot) -> Query<'a> {
-        let second = spot.normal.map_or(0.0, |_| {
-            0.5 * spot.around_mm * spot.around_mm * spot.curvature
-        });
+        let second = spot
+            .normal
+            .map_or(0.0, |_| 0.5 * spot.around_mm * spot.around_mm * spot.curvature);
         Query {
             shape,
             vertical: spot
@@ -206,10 +206,7 @@ impl Query<'_> {
                 best = (there, end);
             }
         }
-        let lipschitz = self
-            .shape
-            .depth(rho, self.heights(a.min(b), a.max(b)))
-            + around;
+        let lipschitz = self.shape.depth(rho, self.heights(a.min(b), a.max(b))) + around;
         (bound.min(lipschitz), best.0, best.1)
     }
 }
@@ -267,7 +264,9 @@ pub(super) fn search<O: Obstacle>(
 ) -> Searched<O::Cell> {
     let mut deepest: Option<Deepest<O::Cell>> = None;
     let closing = |deepest: &Option<Deepest<O::Cell>>| {
-        let found = deepest.as_ref().map_or(f64::NEG_INFINITY, |deepest| deepest.depth_mm);
+        let found = deepest
+            .as_ref()
+            .map_or(f64::NEG_INFINITY, |deepest| deepest.depth_mm);
         let share = if found > 0.0 { DEPTH_SHARE } else { CLEARANCE_SHARE };
         floor_mm.max(found + found.abs() * share + DEPTH_MM)
     };

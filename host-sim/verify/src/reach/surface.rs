@@ -47,14 +47,15 @@ impl<'a> SurfaceObstacle<'a> {
                 let (row, column) = (index / (columns - 1), index % (columns - 1));
                 let first = row * columns + column;
                 let corners = [first, first + 1, first + columns, first + columns + 1];
-                spot(oracle, &grid, grid.cell(index), corners.map(|corner| nodes[corner]))
+                spot(
+                    oracle,
+                    &grid,
+                    grid.cell(index),
+                    corners.map(|corner| nodes[corner]),
+                )
             })
             .collect();
-        Self {
-            oracle,
-            grid,
-            spots,
-        }
+        Self { oracle, grid, spots }
     }
 
     /// Parameters of a cell's middle.
@@ -72,8 +73,7 @@ impl<'a> SurfaceObstacle<'a> {
     }
 
     fn indices(&self, first: [usize; 2], count: [usize; 2]) -> impl Iterator<Item = usize> + '_ {
-        (0..count[0] * count[1])
-            .map(move |k| self.index([first[0] + k / count[1], first[1] + k % count[1]]))
+        (0..count[0] * count[1]).map(move |k| self.index([first[0] + k / count[1], first[1] + k % count[1]]))
     }
 }
 

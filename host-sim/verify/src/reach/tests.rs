@@ -37,7 +37,11 @@ fn motion(places: &[(DVec3, bool)]) -> Motion {
         let count = (from.distance(to) / 0.05).ceil().max(1.0);
         for k in 0..count as usize {
             let place = from.lerp(to, k as f64 / count);
-            motion.add((place * 1e6).to_array().map(|nm| nm.round() as i32), in_contact, false);
+            motion.add(
+                (place * 1e6).to_array().map(|nm| nm.round() as i32),
+                in_contact,
+                false,
+            );
         }
     }
     motion
@@ -74,7 +78,11 @@ fn find(result: &ReachResult, part: ToolPart, obstacle: Obstacle) -> ReachFindin
 fn sphere() -> SurfaceSpec {
     let half = 0.5_f64.sqrt();
     let (radius, out) = (20.0, 20.0 / half);
-    let profile = [(20.0 * half, -20.0 * half, 1.0), (out, 0.0, half), (20.0 * half, 20.0 * half, 1.0)];
+    let profile = [
+        (20.0 * half, -20.0 * half, 1.0),
+        (out, 0.0, half),
+        (20.0 * half, 20.0 * half, 1.0),
+    ];
     let around = [(1.0, 0.0, 1.0), (1.0, 1.0, half), (0.0, 1.0, 1.0)];
     let _ = radius;
     SurfaceSpec::Nurbs(NurbsSpec {
@@ -83,7 +91,12 @@ fn sphere() -> SurfaceSpec {
         knots_v: vec![0.0, 0.0, 0.0, 1.0, 1.0, 1.0],
         poles_mm: around
             .iter()
-            .map(|(x, y, w)| profile.iter().map(|(r, z, v)| [r * x, r * y, *z, w * v]).collect())
+            .map(|(x, y, w)| {
+                profile
+                    .iter()
+                    .map(|(r, z, v)| [r * x, r * y, *z, w * v])
+                    .collect()
+            })
             .collect(),
         rational: true,
     })
@@ -118,15 +131,29 @@ fn a_sphere_below_its_equator() {
         if touches {
             assert_eq!(contact.verdict(), Verdict::Violated);
             assert_eq!(contact.above_equator, 901);
-            assert!(near(shank.depth_mm, exact), "{latitude}: {shank:?}, exact {exact}");
-            assert!(shank.depth_mm <= exact + 1e-3 && shank.bound_mm >= exact - 1e-3, "{shank:?}");
+            assert!(
+                near(shank.depth_mm, exact),
+                "{latitude}: {shank:?}, exact {exact}"
+            );
+            assert!(
+                shank.depth_mm <= exact + 1e-3 && shank.bound_mm >= exact - 1e-3,
+                "{shank:?}"
+            );
             assert!(shank.place_mm.z.abs() < 0.5, "{shank:?}");
             assert_eq!(shank.verdict(), Verdict::Violated);
             // Half of it looks down; it is less than a quarter of a sphere, so a turn helps.
             assert!((found.facing.down_share - 0.5).abs() <= found.facing.error_share);
-            assert!(found.failures.iter().any(|text| text.contains("rotate_deg")), "{:?}", found.failures);
+            assert!(
+                found.failures.iter().any(|text| text.contains("rotate_deg")),
+                "{:?}",
+                found.failures
+            );
         } else {
-            assert_eq!((contact.verdict(), shank.verdict()), (Verdict::Met, Verdict::Met), "{latitude}: {shank:?}");
+            assert_eq!(
+                (contact.verdict(), shank.verdict()),
+                (Verdict::Met, Verdict::Met),
+                "{latitude}: {shank:?}"
+            );
         }
     }
 }
@@ -151,7 +178,11 @@ fn an_overhang() {
 /// A shank beside a wall, at known distances.
 #[test]
 fn a_wall_beside_a_shank() {
-    let mut job = job(plane(DVec3::ZERO, DVec3::Y * 30.0, DVec3::Z * 40.0), Side::Plus, 3.0);
+    let mut job = job(
+        plane(DVec3::ZERO, DVec3::Y * 30.0, DVec3::Z * 40.0),
+        Side::Plus,
+        3.0,
+    );
     job.body.shank_mm = Some(8.0);
     job.body.neck_mm = Some(9.0);
     for (off, depth, verdict) in [
@@ -161,7 +192,10 @@ fn a_wall_beside_a_shank() {
         (4.01, 0.0, Verdict::Met),
         (9.0, 0.0, Verdict::Met),
     ] {
-        let path = motion(&[(DVec3::new(off, 0.0, 5.0), false), (DVec3::new(off, 30.0, 5.0), true)]);
+        let path = motion(&[
+            (DVec3::new(off, 0.0, 5.0), false),
+            (DVec3::new(off, 30.0, 5.0), true),
+        ]);
         let found = reach(&job, &path);
         let shank = find(&found, ToolPart::Shank, Obstacle::Surface);
         assert_eq!(shank.verdict(), verdict, "{off}: {shank:?}");
@@ -174,7 +208,10 @@ fn a_wall_beside_a_shank() {
     }
     // Above the wall's upper edge there is nothing to touch.
     job.body.neck_mm = Some(42.0);
-    let path = motion(&[(DVec3::new(3.5, 0.0, 5.0), false), (DVec3::new(3.5, 30.0, 5.0), true)]);
+    let path = motion(&[
+        (DVec3::new(3.5, 0.0, 5.0), false),
+        (DVec3::new(3.5, 30.0, 5.0), true),
+    ]);
     let shank = find(&reach(&job, &path), ToolPart::Shank, Obstacle::Surface);
     assert_eq!(shank.verdict(), Verdict::Met, "{shank:?}");
 }
@@ -201,7 +238,10 @@ fn a_slope_under_a_holder() {
         let gap = 3.0 + (length - 3.0) * cos - 0.5 * diameter * sin;
         if gap > 0.0 {
             let clearance = holder.clearance_mm().unwrap();
-            assert!(clearance <= gap && clearance > 0.96 * gap - 2e-3, "{holder:?}, exact {gap}");
+            assert!(
+                clearance <= gap && clearance > 0.96 * gap - 2e-3,
+                "{holder:?}, exact {gap}"
+            );
             assert_eq!(holder.verdict(), Verdict::Met);
         } else {
             // As deep from the side as from below.
@@ -219,17 +259,27 @@ fn a_slope_under_a_holder() {
     let holder = find(&reach(&job, &path), ToolPart::Holder(1), Obstacle::Surface);
     let gap = 3.0 + 27.0 * cos - 5.0 * sin;
     let clearance = holder.clearance_mm().unwrap();
-    assert!(clearance <= gap && clearance > 0.96 * gap, "{holder:?}, exact {gap}");
+    assert!(
+        clearance <= gap && clearance > 0.96 * gap,
+        "{holder:?}, exact {gap}"
+    );
 }
 
 /// A floor of 40 x 40 mm, 20 mm deep in its stock.
 fn pocket() -> (Job, Motion) {
-    let mut job = job(plane(DVec3::ZERO, DVec3::X * 40.0, DVec3::Y * 40.0), Side::Up, 3.0);
+    let mut job = job(
+        plane(DVec3::ZERO, DVec3::X * 40.0, DVec3::Y * 40.0),
+        Side::Up,
+        3.0,
+    );
     job.setup.stock = Some(Block {
         low_mm: [-10.0, -10.0, -15.0],
         high_mm: [50.0, 50.0, 20.0],
     });
-    let mut places = vec![(DVec3::new(0.0, 0.0, 30.0), false), (DVec3::new(0.0, 0.0, 3.0), false)];
+    let mut places = vec![
+        (DVec3::new(0.0, 0.0, 30.0), false),
+        (DVec3::new(0.0, 0.0, 3.0), false),
+    ];
     for k in 0..=20 {
         let y = 2.0 * f64::from(k);
         let ends = if k % 2 == 0 { [0.0, 40.0] } else { [40.0, 0.0] };
@@ -314,12 +364,24 @@ fn fixtures() {
         (ToolPart::Shank, 2, 0.2),
     ] {
         let finding = find(&found, part, Obstacle::Fixture(index));
-        assert!((finding.depth_mm - exact).abs() < 3e-4, "{finding:?}, exact {exact}");
-        let expected = if exact > 0.0 { Verdict::Violated } else { Verdict::Met };
+        assert!(
+            (finding.depth_mm - exact).abs() < 3e-4,
+            "{finding:?}, exact {exact}"
+        );
+        let expected = if exact > 0.0 {
+            Verdict::Violated
+        } else {
+            Verdict::Met
+        };
         assert_eq!(finding.verdict(), expected);
     }
     assert_eq!(found.failures.len(), 3, "{:?}", found.failures);
-    assert!(found.failures.iter().all(|text| text.contains("fixture clamp") && text.contains("tick")));
+    assert!(
+        found
+            .failures
+            .iter()
+            .all(|text| text.contains("fixture clamp") && text.contains("tick"))
+    );
 }
 
 /// A search that may not look further says so.

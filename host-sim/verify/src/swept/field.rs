@@ -137,7 +137,10 @@ fn thinned(
         clippy::cast_sign_loss,
         reason = "small and positive"
     )]
-    let step = ((rows * columns) as f64 / THINNED_MAX as f64).sqrt().ceil().max(1.0) as usize;
+    let step = ((rows * columns) as f64 / THINNED_MAX as f64)
+        .sqrt()
+        .ceil()
+        .max(1.0) as usize;
     let middles = |axis: usize| -> Vec<f64> {
         let edges = grid.edges[axis].windows(2).step_by(step);
         edges.map(|ends| 0.5 * (ends[0] + ends[1])).collect()
