@@ -72,7 +72,7 @@ pub(super) fn setting(content: &Content<'_>) -> Value {
     let safe_z = machine.safe_z_mm.or_else(|| {
         machine
             .has_limits()
-            .then(|| highest + job.radius_mm + machine.clearance_mm)
+            .then_some(highest + job.radius_mm + machine.clearance_mm)
     });
     json!({
         "marks": remarks.marks.iter().map(|mark| json!({
