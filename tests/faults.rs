@@ -9,6 +9,8 @@ fn job(surface: SurfaceSpec, radius_mm: f64) -> Job {
     Job {
         surface,
         radius_mm,
+        body: job::ToolBody::default(),
+        setup: job::Setup::default(),
         feed_mm_min: 600.0,
         scallop_mm: 0.05,
         along: Along::U,

@@ -69,6 +69,8 @@ fn job(surface: SurfaceSpec, along: Along, pattern: Pattern) -> Job {
     Job {
         surface,
         radius_mm: 3.0,
+        body: job::ToolBody::default(),
+        setup: job::Setup::default(),
         feed_mm_min: 600.0,
         scallop_mm: 0.5,
         along,

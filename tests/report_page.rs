@@ -5,10 +5,11 @@ mod browser;
 use std::path::{Path, PathBuf};
 
 use browser::Browser;
+use glam::DVec3;
 use machine::Machine;
 use machine::prepare::prepare;
 use oracle::{Oracle, PassSample, SampleCheck};
-use report::{Remarks, RidgePoint, Scallops, Sketch};
+use report::{Mark, Remarks, RidgePoint, Scallops, Sketch};
 use verify::survey::{Survey, SurveyResult};
 
 /// WebGL in software, for the same picture on every machine.
@@ -53,6 +54,7 @@ fn rising(domain: [[f64; 2]; 2], ridges: u32) -> Scallops {
         limit_mm: 0.01,
         measurement_error_mm: 1e-4,
         ridges: (0..ridges).map(ridge).collect(),
+        anywhere: false,
     }
 }
 
@@ -290,5 +292,91 @@ fn without_webgl_the_picture_stands_in() {
     let shown = "['stage', 'picture', 'no-view'].map((id) => document.getElementById(id).getBoundingClientRect().height > 10).join()";
     assert_eq!(browser.text(shown), "false,true,true");
     assert!(chart_colours(&mut browser).iter().all(|colours| *colours > 20.0));
+    assert_quiet(&mut browser, &page);
+}
+
+/// Marks, links, home, safe height, travel, stock and fixtures are drawn, each with its switch; a mark's button brings the tool there.
+#[test]
+fn marks_links_and_the_machine_are_drawn() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../jobs/plate_machine.toml");
+    let text = std::fs::read_to_string(path).unwrap();
+    let text = text.replace("scallop_mm = 0.05", "scallop_mm = 1").replace(
+        "radius_mm = 4\n",
+        "radius_mm = 4\nshank_mm = 6\nlength_mm = 20\nholder = { diameter_mm = 20, length_mm = 15 }\n",
+    ) + "\n[stock]\nbox_mm = [[-10, 90], [-10, 70], [-10, 12]]\n[[fixture]]\nname = \"<jaw>\"\nbox_mm = [[90, 99], [0, 40], [-10, 25]]\n";
+    let job_path = folder.path().join("set.toml");
+    std::fs::write(&job_path, text).unwrap();
+    let mark = |what: &str, x: f64, tick: Option<u64>| Mark {
+        what: what.to_owned(),
+        place_mm: DVec3::new(x, 30.0, 14.0),
+        tick,
+    };
+    let remarks = Remarks {
+        failures: vec!["reach: the holder is 2 mm deep".to_owned()],
+        marks: vec![
+            mark("holder 2 mm in <jaw>", 60.0, Some(9000)),
+            mark("gouge", 20.0, None),
+        ],
+        links_mm: vec![vec![
+            DVec3::new(40.0, 30.0, 40.0),
+            DVec3::new(40.0, 30.0, 20.0),
+            DVec3::new(0.0, 0.0, 20.0),
+        ]],
+        scallops: Some(rising([[0.0, 1.0]; 2], 40)),
+        ..Remarks::default()
+    };
+    let (page, _) = report(job_path.to_str().unwrap(), folder.path(), &remarks);
+    let mut browser = Browser::start(DESK, "light", &SOFTWARE);
+    browser.open(&page);
+    let click = |browser: &mut Browser, id: &str| {
+        browser.value(&format!("document.getElementById('{id}').click()"));
+    };
+    let bad = [192, 16, 72];
+    let marks = browser.text("document.getElementById('marks').innerText");
+    assert!(
+        marks.contains("1 holder 2 mm in <jaw>") && marks.contains("2 gouge"),
+        "{marks}"
+    );
+    for tag in ["home", "safe height"] {
+        assert!(
+            browser
+                .text("document.querySelector('.canvas').innerText")
+                .contains(tag)
+        );
+    }
+    browser.value("document.querySelector('#marks button').click()");
+    let tick = browser.value("isofeedReport.panel.tick");
+    assert_eq!(tick.as_f64(), Some(9000.0));
+    // Without what was switched off there is less of it.
+    let with = pixels(&mut browser, bad)[2];
+    click(&mut browser, "show-marks");
+    let without = pixels(&mut browser, bad)[2];
+    assert!(with > without + 60.0, "{with} and {without} red pixels");
+    let mut before = pixels(&mut browser, [0, 0, 0]);
+    // The tool is transparent: where it was there are fewer colours, not fewer pixels.
+    for (id, figure) in [
+        ("show-setup", 1),
+        ("show-machine", 1),
+        ("show-links", 1),
+        ("show-ball", 0),
+    ] {
+        click(&mut browser, id);
+        let after = pixels(&mut browser, [0, 0, 0]);
+        assert!(after[figure] < before[figure], "{id}: {before:?} and {after:?}");
+        before = after;
+    }
+    // Everything is in the view of everything: home is within the canvas, above the part.
+    for id in ["show-setup", "show-machine", "show-links", "show-marks"] {
+        click(&mut browser, id);
+    }
+    browser.value("document.querySelector('[data-view=all]').click()");
+    let corners = browser.value(
+        "(() => { const { view } = isofeedReport; view.draw(); const places = view.setting.everything(); \
+         const out = []; for (let k = 0; k < places.length; k += 3) out.push(...view.pixel(places.slice(k, k + 3))); \
+         return [Math.min(...out), Math.max(...out), view.width]; })()",
+    );
+    let [least, most, width] = [0, 1, 2].map(|k| corners[k].as_f64().unwrap());
+    assert!(least > 0.0 && most < width, "{least} to {most} of {width}");
     assert_quiet(&mut browser, &page);
 }

@@ -5,6 +5,7 @@ use std::fmt::Write;
 use super::machinable::outside;
 use super::{CadError, Face, Form, MachinableFace, Measures, measure};
 use job::{NurbsSpec, one_line};
+use oracle::{Surface, facing};
 
 /// Standard radii of ball-end mills for the automatic choice, mm.
 const RADII_MM: [f64; 13] = [0.25, 0.5, 0.75, 1.0, 1.5, 2.0, 2.5, 3.0, 4.0, 5.0, 6.0, 8.0, 10.0];
@@ -69,6 +70,12 @@ fn side(face: &Face, measures: &Measures) -> (&'static str, f64) {
     }
 }
 
+/// Sign on `S_u x S_v` of the side of a face that is machined unless the user chooses another: out of the material if that is known, else up.
+#[must_use]
+pub fn machined_sign(face: &Face, measures: &Measures) -> f64 {
+    side(face, measures).1
+}
+
 /// The largest standard radius below the least concave radius of the machined side; `None` below the smallest.
 fn ball(concave_mm: Option<f64>, size_mm: f64) -> Option<f64> {
     let room = concave_mm
@@ -127,6 +134,17 @@ pub fn write_job(
     if let Some(concave_mm) = concave_mm.filter(|concave_mm| *concave_mm <= radius_mm) {
         warnings.push(format!(
             "the least concave radius on the machined side is {concave_mm:.4} mm: the ball of {radius_mm} mm does not fit"
+        ));
+    }
+    let facing = facing(&Surface::new(&surface.spec()), sign);
+    if facing.down_share > 0.0 {
+        let turn = facing.turn_deg.map_or_else(
+            || "no turn makes all of it look up".to_owned(),
+            |turn| format!("rotate_deg = {turn:?} in [placement] turns it up"),
+        );
+        warnings.push(format!(
+            "{:.2} % of the machined side looks down, where no tool along z can cut; {turn}",
+            100.0 * facing.down_share
         ));
     }
     let far_mm = measures

@@ -34,7 +34,7 @@ pub use curve::Curve;
 pub use error::CadError;
 pub use faces::{Faces, Original};
 pub use fit::Deviation;
-pub use job::{JobOptions, JobText, write_job};
+pub use job::{JobOptions, JobText, machined_sign, write_job};
 pub use machinable::{Form, MachinableFace, Options, degrees, machinable};
 pub use measure::{Measures, measure};
 pub use outline::{Outline, outline};

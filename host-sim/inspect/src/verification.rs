@@ -3,6 +3,7 @@
 use std::cell::RefCell;
 use std::collections::BTreeMap;
 
+use glam::DVec3;
 use interp_core::State;
 use job::Job;
 use machine::prepare::Prepared;
@@ -11,6 +12,7 @@ use oracle::{AccuracyBounds, PassSample, SampleCheck};
 use verify::motion::{
     JobTimes, OptimumTimes, PeakMeter, Peaks, RunPass, TimeMeter, limits, optimum_times, times,
 };
+use verify::reach::{self, ContactPlace, ContactSide, Motion, ReachResult};
 use verify::survey::{SampleObserver, Survey, SurveyResult};
 use verify::swept::{self, Progress, ToolPath};
 
@@ -80,6 +82,10 @@ pub struct RunMeasurements {
     pub findings: SurveyResult,
     /// The swept ball against the surface.
     pub swept: swept::SweptResult,
+    /// The reach of the tool.
+    pub reach: ReachResult,
+    /// The ways of the ball's centre between passes, turns along the boundary included, mm.
+    pub links_mm: Vec<Vec<DVec3>>,
     /// Use of the axis limits.
     pub axes: Peaks,
     /// The time and its parts.
@@ -153,8 +159,10 @@ fn measure<'a>(
     };
     let mut track = ToolPath::with_spacing(spacing_nm);
     let axes = RefCell::new(AxesUse::new(job));
+    let mut contact = ContactSide::default();
     let mut keep = |emitted: &PassSample, checked: &SampleCheck| {
         track.add(emitted, job.along);
+        contact.add(contact_place(emitted), millimetres(emitted.cl_nm));
         axes.borrow_mut().on_pass(emitted);
         if let Some(each) = &mut each {
             each(emitted, checked);
@@ -162,7 +170,9 @@ fn measure<'a>(
     };
     let mut survey = Survey::new(&oracle, None, Some(&mut keep));
     let mut written = Ok(());
+    let mut last_pass = None;
     let mut running = BTreeMap::<u32, u64>::new();
+    let mut motion = Motion::default();
     let mut time = TimeMeter::new(job.machine.period_s(), job.feed_mm_s());
     progress.begin("measuring", timed.samples);
     let ran = machine(job, prepared)?.run(|sample| {
@@ -172,6 +182,9 @@ fn measure<'a>(
         }
         let emitted = plain(prepared, sample);
         time.add(&emitted);
+        // Without limits the passes follow each other without links.
+        let jumps = !job.machine.has_limits() && last_pass.replace(sample.pass) != Some(sample.pass);
+        motion.add(sample.cl_nm, emitted.parameters.is_some(), jumps);
         written = survey.add(&emitted);
         if u64::from(sample.tick) % PROGRESS_SAMPLES == PROGRESS_SAMPLES - 1 {
             progress.done(PROGRESS_SAMPLES);
@@ -182,6 +195,9 @@ fn measure<'a>(
     let times = time.finish();
     let findings = survey.finish(ran.is_ok())?;
     let swept = swept::measure(job, &oracle, &track, ran.is_ok(), &requirements.swept, progress);
+    let links_mm = motion.links();
+    motion.join(times.links.iter().map(|link| link.turn));
+    let reach = reach::measure(job, &oracle, &motion, &contact, progress);
     let optimum = if requirements.with_optimum {
         progress.begin("the optimum", 1);
         optimum_times(job, &oracle, &run_passes(&track, &running), &times)
@@ -191,10 +207,26 @@ fn measure<'a>(
     Ok(RunMeasurements {
         findings,
         swept,
+        reach,
+        links_mm,
         axes: axes.into_inner().finish(),
         times,
         optimum,
     })
+}
+
+fn millimetres(nm: [i32; 3]) -> DVec3 {
+    DVec3::from(nm.map(f64::from)) * 1e-6
+}
+
+/// The contact of a sample.
+fn contact_place(sample: &PassSample) -> ContactPlace {
+    ContactPlace {
+        sample: usize::try_from(sample.tick).unwrap_or(usize::MAX),
+        pass: sample.pass,
+        uv: [sample.u, sample.v],
+        place_mm: millimetres(sample.cc_nm),
+    }
 }
 
 /// The passes that ran, with the number of their samples.
@@ -231,6 +263,7 @@ fn failures(job: &Job, timed: &TimedRun, measured: &RunMeasurements, scanned: Op
         ));
     }
     failures.extend(measured.swept.failures.iter().cloned());
+    failures.extend(measured.reach.failures.iter().cloned());
     if let Err(error) = travel::check(job) {
         failures.push(format!("{}: {}", error.what(), error.remedy()));
     }

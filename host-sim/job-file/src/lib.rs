@@ -11,6 +11,7 @@ mod file;
 mod machine;
 mod placement;
 mod section;
+mod setup;
 mod steps;
 mod surface;
 #[cfg(test)]
@@ -21,9 +22,10 @@ use std::path::Path;
 
 use job::{
     Along, AlongChoice, CHORD_DEFAULT_MM, CadSource, FEED_MAX_MM_MIN, FEED_MIN_MM_MIN, Job, JobError,
-    MachineSpec, Pattern, RADIUS_MAX_MM, Side, Spacing,
+    MachineSpec, Pattern, Side, Spacing,
 };
-use section::{Reader, Section};
+use patches::placement::Placement;
+use section::Reader;
 
 pub use file::{Face, FaceError, FaceReader, TOLERANCE_DEFAULT_MM, TOLERANCE_MAX_MM};
 pub use steps::slots_max_us;
@@ -61,13 +63,25 @@ pub fn parse(name: &str, text: &str) -> Result<Job, JobError> {
 pub fn parse_with(name: &str, text: &str, faces: &dyn FaceReader) -> Result<Job, JobError> {
     let reader = Reader::new(name, text);
     let document = reader.document()?;
-    document.only(&["surface", "placement", "tool", "cut", "machine"], &[])?;
+    document.only(
+        &[
+            "surface",
+            "placement",
+            "tool",
+            "stock",
+            "fixture",
+            "cut",
+            "machine",
+        ],
+        &[],
+    )?;
     let (unplaced, face) = surface::read(&document.section("surface")?, faces)?;
-    let (surface, scale) = match document.optional_section("placement")? {
+    let (surface, placement) = match document.optional_section("placement")? {
         Some(section) => placement::place(&section, &unplaced)?,
-        None => (unplaced.clone(), 1.0),
+        None => (unplaced.clone(), Placement::default()),
     };
-    let radius_mm = read_tool(&document.section("tool")?)?;
+    let (radius_mm, body) = setup::tool(&document.section("tool")?)?;
+    let setup = setup::read(&document)?;
     let cut = document.section("cut")?;
     cut.only(
         &[
@@ -99,14 +113,17 @@ pub fn parse_with(name: &str, text: &str, faces: &dyn FaceReader) -> Result<Job,
         tolerance_mm: face.tolerance_mm,
         untrimmed: face.untrimmed,
         surface: unplaced,
-        scale,
+        scale: placement.scale,
     }));
+    origin.set_rotate_deg(placement.rotate_deg);
     if along.is_none() {
         origin.set_along_choice(AlongChoice::Auto);
     }
     Ok(Job {
         surface,
         radius_mm,
+        body,
+        setup,
         feed_mm_min: cut.number_within(
             "feed_mm_min",
             FEED_MIN_MM_MIN,
@@ -136,16 +153,4 @@ pub fn parse_with(name: &str, text: &str, faces: &dyn FaceReader) -> Result<Job,
             .map_or(Ok(MachineSpec::default()), |section| machine::read(&section))?,
         origin,
     })
-}
-
-/// The tool's radius, mm.
-fn read_tool(tool: &Section<'_>) -> Result<f64, JobError> {
-    tool.only(&["kind", "radius_mm"], &[])?;
-    tool.choice("kind", &[("ball", ())])?;
-    tool.number_within(
-        "radius_mm",
-        0.0,
-        RADIUS_MAX_MM,
-        "the ball's radius in mm (half its diameter), e.g. 10",
-    )
 }

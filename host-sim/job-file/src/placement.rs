@@ -41,8 +41,11 @@ fn read(section: &Section<'_>) -> Result<Placement, JobError> {
     Ok(read)
 }
 
-/// The surface after the placement of the section, and the placement's scale.
-pub(super) fn place(section: &Section<'_>, surface: &SurfaceSpec) -> Result<(SurfaceSpec, f64), JobError> {
+/// The surface after the placement of the section, and the placement.
+pub(super) fn place(
+    section: &Section<'_>,
+    surface: &SurfaceSpec,
+) -> Result<(SurfaceSpec, Placement), JobError> {
     let placement = read(section)?;
     let placed = placement.place(surface).map_err(|outside| {
         let (keys, remedy) = if outside.too_large {
@@ -53,5 +56,5 @@ pub(super) fn place(section: &Section<'_>, surface: &SurfaceSpec) -> Result<(Sur
         let key = keys.into_iter().find(|key| section.has(key)).unwrap_or("place");
         section.error(key, outside.to_string(), remedy)
     })?;
-    Ok((placed, placement.scale))
+    Ok((placed, placement))
 }

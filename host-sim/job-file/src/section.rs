@@ -136,6 +136,57 @@ impl<'t> Section<'t> {
         }))
     }
 
+    /// The sections of this name in an array of sections (`[[name]]`), in order; `name` and number are their name in errors.
+    pub(super) fn sections(&self, name: &str) -> Result<Vec<Section<'t>>, JobError> {
+        let Some((key, value)) = self.table.get_key_value(name) else {
+            return Ok(Vec::new());
+        };
+        let remedy = format!("write `[[{name}]]` on a line of its own, once for each");
+        let DeValue::Array(array) = value.get_ref() else {
+            let what = format!(
+                "`{name}` must be a list of sections, not {}",
+                kind_of(value.get_ref())
+            );
+            return Err(self.reader.error(key.span(), what, remedy));
+        };
+        let section = |(index, entry): (usize, &Spanned<DeValue<'t>>)| match entry.get_ref() {
+            DeValue::Table(table) => Ok(Section {
+                reader: self.reader,
+                name: format!("{name} {}", index + 1),
+                head: entry.span(),
+                table: table.clone(),
+            }),
+            other => Err(self.reader.error(
+                entry.span(),
+                format!("`{name}` {} must be a section, not {}", index + 1, kind_of(other)),
+                remedy.clone(),
+            )),
+        };
+        array.iter().enumerate().map(section).collect()
+    }
+
+    /// The tables of a key whose value is a table or a list of tables.
+    pub(super) fn tables(&self, key: &str, example: &str) -> Result<Vec<Section<'t>>, JobError> {
+        let value = self.value(key)?;
+        let entries = match value.get() {
+            DeValue::Array(_) => value.list("part")?,
+            _ => vec![value],
+        };
+        let table = |entry: Value<'_, 't>| match entry.get() {
+            DeValue::Table(table) => Ok(Section {
+                reader: self.reader,
+                name: entry.path.replace('`', ""),
+                head: entry.value.span(),
+                table: table.clone(),
+            }),
+            other => Err(entry.error(
+                &format!("must be a table, not {}", kind_of(other)),
+                format!("write {key} = {example}, or a list of those from the face upwards"),
+            )),
+        };
+        entries.into_iter().map(table).collect()
+    }
+
     /// Whether the key is present.
     pub(super) fn has(&self, key: &str) -> bool {
         self.table.contains_key(key)

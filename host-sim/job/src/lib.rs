@@ -6,6 +6,7 @@
 mod error;
 mod machine;
 mod origin;
+mod setup;
 mod surface;
 mod text;
 
@@ -15,6 +16,7 @@ pub use machine::{
     PERIOD_DEFAULT_US, PERIOD_RANGE_US, Ratio, StepOutput,
 };
 pub use origin::{AlongChoice, CadSource, DirectionTrial, Origin};
+pub use setup::{Block, Fixture, HolderPart, Setup, TOOL_SIZE_MAX_MM, ToolBody};
 pub use surface::{NurbsSpec, SurfaceSpec};
 pub use text::{one_line, printable, read_regular};
 
@@ -83,6 +85,10 @@ pub struct Job {
     pub surface: SurfaceSpec,
     /// Ball radius r, mm, above 0, at most [`RADIUS_MAX_MM`].
     pub radius_mm: f64,
+    /// The tool above the ball.
+    pub body: ToolBody,
+    /// Stock and fixtures.
+    pub setup: Setup,
     /// Feed of the cutter contact along the surface, mm/min, above [`FEED_MIN_MM_MIN`], at most [`FEED_MAX_MM_MIN`].
     pub feed_mm_min: f64,
     /// Scallop height limit h, mm, above 0, below the ball radius.

@@ -55,6 +55,7 @@ pub struct Origin {
     keys: BTreeMap<String, Range<usize>>,
     along_choice: AlongChoice,
     cad: Option<Arc<CadSource>>,
+    rotate_deg: [f64; 3],
 }
 
 impl Origin {
@@ -67,6 +68,7 @@ impl Origin {
             keys,
             along_choice: AlongChoice::Given,
             cad: None,
+            rotate_deg: [0.0; 3],
         }
     }
 
@@ -102,6 +104,17 @@ impl Origin {
     #[must_use]
     pub fn cad(&self) -> Option<&CadSource> {
         self.cad.as_deref()
+    }
+
+    /// Rotation of the job's placement about x, y and z, in this order, degrees.
+    #[must_use]
+    pub fn rotate_deg(&self) -> [f64; 3] {
+        self.rotate_deg
+    }
+
+    /// Records the rotation of the placement.
+    pub fn set_rotate_deg(&mut self, rotate_deg: [f64; 3]) {
+        self.rotate_deg = rotate_deg;
     }
 
     /// Records the source of the surface.

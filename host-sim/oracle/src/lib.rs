@@ -10,6 +10,7 @@
 //!             -> arc.rs                 arc length along a pass
 //!             -> offset.rs              the offset path of the tool centre: its derivative, and the foot point of a given centre
 //!             -> schedule.rs            passes by a dense scan
+//!             -> facing.rs              what looks down, and the turn after which nothing does
 //! samples     -> verify.rs, report.rs   errors of emitted samples
 //! ```
 //!
@@ -22,6 +23,7 @@
 mod arc;
 mod contact;
 mod derivatives;
+mod facing;
 mod nurbs;
 mod offset;
 mod report;
@@ -33,6 +35,7 @@ mod verify;
 
 pub use contact::{Contact, Oracle, OracleError};
 pub use derivatives::Derivatives;
+pub use facing::{Facing, facing, turned_further};
 pub use offset::OffsetPoint;
 pub use report::{AccuracyBounds, AccuracyFigure, AccuracyReport, ErrorStatistics, SampleLocation};
 pub use schedule::ScheduledPass;

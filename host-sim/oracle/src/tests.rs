@@ -11,6 +11,8 @@ fn job(surface: SurfaceSpec, along: Along, side: Side) -> Job {
     Job {
         surface,
         radius_mm: 5.0,
+        body: job::ToolBody::default(),
+        setup: job::Setup::default(),
         feed_mm_min: 600.0,
         scallop_mm: 0.005,
         along,

@@ -8,6 +8,7 @@ use super::series::Series;
 use super::texts::PictureTexts;
 use super::track::Track;
 use approach::Kind;
+use glam::DVec3;
 use job::Job;
 use oracle::Oracle;
 use verify::survey::SurveyResult;
@@ -19,6 +20,17 @@ pub struct Figure {
     pub what: String,
     /// Value and unit, formatted.
     pub value: String,
+}
+
+/// A place on the part to which a remark belongs.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Mark {
+    /// What is there, in a word or two: fault, gouge, shank in the surface.
+    pub what: String,
+    /// The place, mm.
+    pub place_mm: DVec3,
+    /// Tick of the tool there.
+    pub tick: Option<u64>,
 }
 
 /// Remarks on a page besides the figures of the samples.
@@ -34,6 +46,12 @@ pub struct Remarks {
     pub figures: Vec<Figure>,
     /// Scallop heights, if they were measured.
     pub scallops: Option<Scallops>,
+    /// Where the samples come from, if not from the core: for the footer.
+    pub source: Option<String>,
+    /// Places of faults, gouges and the like.
+    pub marks: Vec<Mark>,
+    /// The ways of the ball's centre between passes, mm.
+    pub links_mm: Vec<Vec<DVec3>>,
 }
 
 /// Content of the page.

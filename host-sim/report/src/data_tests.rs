@@ -241,6 +241,7 @@ fn scallops_lie_over_the_surface_where_they_were_measured() {
         limit_mm: 0.05,
         measurement_error_mm: 1e-4,
         ridges: (0..10).map(ridge).collect(),
+        anywhere: false,
     };
     let value = scallops.json(&mesh, domain, Along::U);
     let heights = column(&value["mesh"]);

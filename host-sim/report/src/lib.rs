@@ -5,7 +5,8 @@
 //!          │     job ─► mesh.rs, view.rs ┤                                          │
 //!          ├─ track.rs ──► all passes, thinned ─┐                                   │
 //!          ├─ series.rs ─► spans of time ───────┼─ payload.rs ─► data ─┬─ page.rs ──► index.html
-//!          └─ scallops.rs ─► heights ───────────┘   viewer/: scripts ──┘
+//!          ├─ scallops.rs ─► heights ───────────┤   viewer/: scripts ──┘
+//!          └─ setting.rs ──► marks, machine ────┘
 //! study of the paper ─► chart.rs, paper/ ──────────────────────────────► index.html of `cargo sim paper`
 //! ```
 //!
@@ -30,6 +31,7 @@ mod record;
 mod scallops;
 mod scene;
 mod series;
+mod setting;
 pub mod svg;
 #[cfg(test)]
 mod tests;
@@ -48,7 +50,7 @@ use verify::survey::SurveyResult;
 use content::Content;
 use texts::PictureTexts;
 
-pub use content::{Figure, Remarks};
+pub use content::{Figure, Mark, Remarks};
 pub use scallops::{RidgePoint, Scallops};
 
 /// Collects the data of a report in bounded memory, independent of the length of the run.

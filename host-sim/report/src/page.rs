@@ -22,10 +22,11 @@ const POLICY: &str =
     "default-src 'none'; script-src 'unsafe-inline'; style-src 'unsafe-inline'; img-src data:";
 /// The libraries of view and charts, built by `scripts/viewer`, and the scripts of the page, which share one scope.
 const LIBRARIES: &str = include_str!("viewer/three-bundle.min.js");
-const SCRIPTS: [&str; 6] = [
+const SCRIPTS: [&str; 7] = [
     include_str!("viewer/data.js"),
     include_str!("viewer/words.js"),
     include_str!("viewer/scene.js"),
+    include_str!("viewer/setting.js"),
     include_str!("viewer/panel.js"),
     include_str!("viewer/charts.js"),
     include_str!("viewer/main.js"),
@@ -47,7 +48,7 @@ pub(super) fn page(content: &Content<'_>) -> String {
     let _ = writeln!(
         out,
         "<header><h1>{title}</h1>\n<p class=\"sub\">{}</p></header>",
-        escape(&content.words.subtitle)
+        escape(&subtitle(content))
     );
     remarks(&mut out, content);
     tiles(&mut out, content);
@@ -72,6 +73,24 @@ pub(super) fn page(content: &Content<'_>) -> String {
     scripts(&mut out, content);
     out.push_str("</main>\n</body>\n</html>\n");
     out
+}
+
+/// The line under the title.
+fn subtitle(content: &Content<'_>) -> String {
+    let job = content.job;
+    match &content.remarks.source {
+        None => content.words.subtitle.clone(),
+        Some(source) => format!(
+            "{source} on the job's {} surface · {} in contact · {} mm/min programmed at the cutter contact · scallop limit {} mm",
+            job.surface.kind(),
+            match content.findings.passes {
+                1 => "one stretch".to_owned(),
+                stretches => format!("{} stretches", grouped(stretches.into())),
+            },
+            job.feed_mm_min,
+            job.scallop_mm
+        ),
+    }
 }
 
 /// Failures and warnings.
@@ -120,7 +139,15 @@ fn tiles(out: &mut String, content: &Content<'_>) {
     };
     let tiles = [
         ("Machining time", duration(time_s), ""),
-        ("Passes", grouped(findings.passes.into()), ""),
+        (
+            if content.remarks.source.is_some() {
+                "Stretches in contact"
+            } else {
+                "Passes"
+            },
+            grouped(findings.passes.into()),
+            "",
+        ),
         ("CC path", fixed(report.cc_length_mm * 1e-3, 2), "m"),
         scallop,
         ("Feed error, max", significant(report.ripple_pct.max), "%"),
@@ -182,7 +209,7 @@ fn series_words(content: &Content<'_>) -> String {
         String::new()
     };
     let ends = if content.job.machine.has_limits() {
-        "Each pass runs from standstill to standstill; links between passes are not shown."
+        "Each pass runs from standstill to standstill; links between passes are not in the charts."
     } else {
         "The last period of a pass is shorter than the others and has no speed."
     };
@@ -233,9 +260,10 @@ fn interval_words(content: &Content<'_>) -> String {
 }
 
 fn footer(out: &mut String, content: &Content<'_>) {
-    let emitter = match content.approach {
-        Kind::Surface => "those that the core emitted".to_owned(),
-        other => format!("those of the approach <code>{}</code>, in f64", other.name()),
+    let emitter = match (&content.remarks.source, content.approach) {
+        (Some(source), _) => format!("those of {}", escape(source)),
+        (None, Kind::Surface) => "those that the core emitted".to_owned(),
+        (None, other) => format!("those of the approach <code>{}</code>, in f64", other.name()),
     };
     let _ = writeln!(
         out,
@@ -272,12 +300,19 @@ struct Row(&'static str, f64, String, &'static str);
 
 fn tables(out: &mut String, content: &Content<'_>) {
     out.push_str("<div class=\"tables\">\n");
-    table(out, "Run", &run_rows(content.job, content.findings));
-    table(out, "Against the oracle, at most", &oracle_rows(content.findings));
+    if content.remarks.source.is_none() {
+        table(out, "Run", &run_rows(content.job, content.findings));
+        table(out, "Against the oracle, at most", &oracle_rows(content.findings));
+    }
     table(out, "Job", &job_rows(content.job));
     let figures = &content.remarks.figures;
     if !figures.is_empty() {
-        out.push_str("<table><caption>Verified</caption><tbody>\n");
+        let caption = if content.remarks.source.is_some() {
+            "Judged: given, and this core"
+        } else {
+            "Verified"
+        };
+        let _ = writeln!(out, "<table><caption>{caption}</caption><tbody>");
         for figure in figures {
             let _ = writeln!(
                 out,

@@ -6,6 +6,7 @@ use super::content::Content;
 use super::embed::{Scale, words};
 use super::measure::{self, Gap};
 use super::record::PassInterval;
+use super::setting::setting;
 use glam::DVec3;
 use job::Along;
 
@@ -75,6 +76,7 @@ pub(super) fn payload(content: &Content<'_>) -> Value {
         "series": content.series.json(),
         "intervals": intervals(content),
         "scallops": scallops,
+        "setting": setting(content),
     })
 }
 

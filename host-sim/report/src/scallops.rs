@@ -30,6 +30,8 @@ pub struct Scallops {
     pub measurement_error_mm: f64,
     /// One ridge for each gap between neighbouring passes: the gap's number (that of the pass before it), and places along it.
     pub ridges: Vec<(u32, Vec<RidgePoint>)>,
+    /// The ridges are lines anywhere on the surface, along the path parameter, not between passes.
+    pub anywhere: bool,
 }
 
 impl Scallops {
@@ -57,7 +59,7 @@ impl Scallops {
             .ridges
             .iter()
             .map(|(gap, places)| (*gap, finite(places)))
-            .filter(|(_, heights)| !heights.is_empty())
+            .filter(|(_, heights)| !heights.is_empty() && !self.anywhere)
             .collect();
         let largest = gaps
             .iter()

@@ -5,23 +5,28 @@ use std::path::PathBuf;
 use clap::Args;
 use glam::DVec3;
 use job::Job;
-use oracle::Oracle;
+use oracle::{AccuracyReport, Oracle, PassSample, SampleCheck};
+use report::{Figure, Mark, Remarks, RidgePoint, Scallops, Sketch};
 use serde_json::{Value, json};
 use verify::Verdict;
 use verify::judge::{Judged, judge};
 use verify::motion::limits::{ORDERS, failures};
-use verify::swept::Progress;
+use verify::reach::ReachFinding;
+use verify::speeds::SpeedFigures;
+use verify::survey::{SampleObserver, SurveyResult};
+use verify::swept::{FieldPoint, Progress};
 
 use super::out::say;
-use super::{Bar, Failure, Result, load};
+use super::simulate::{WantedReport, report};
+use super::{Bar, Failure, Result, load, reach_words};
 use crate::motion::{self, MotionError};
 
 /// Largest path error that is accepted, as a share of the scallop limit, unless `--path-tolerance` gives it.
 const PATH_SHARE: f64 = 0.1;
 
 /// Judges a motion from elsewhere on a job's surface, with its ball: samples of the ball's centre as CSV (t_s, x_mm, y_mm, z_mm; or a trace of
-/// simulate), or a program in G-code, read by LinuxCNC's rs274. Contact feed and its ripple, path error, scallop, gouge, the side of the ball that
-/// cuts, axis limits; beside the figures of the core's own run of the job.
+/// simulate), or a program in G-code, read by LinuxCNC's rs274. Contact feed and its ripple, path error, scallop, gouge, the reach of the tool,
+/// axis limits; beside the figures of the core's own run of the job.
 ///
 /// The contact is the surface's nearest point, so the motion may follow any pattern. Samples more than a tenth of the radius from contact
 /// are links.
@@ -44,6 +49,12 @@ pub(super) struct Arguments {
     /// Judges the motion alone, without a run of the core.
     #[arg(long)]
     alone: bool,
+    /// Writes a report page into this folder: 3D view, charts, the table.
+    #[arg(long, value_name = "DIR")]
+    report: Option<PathBuf>,
+    /// Overwrites existing files of --report.
+    #[arg(long)]
+    force: bool,
     /// Prints one JSON object instead of text.
     #[arg(long)]
     pub(super) json: bool,
@@ -93,12 +104,7 @@ fn reasons(job: &Job, judged: &Judged, path_tolerance_mm: f64) -> Vec<String> {
             lowest.uv[1]
         ));
     }
-    if judged.above_equator > 0 {
-        reasons.push(format!(
-            "at {} samples the contact is above the ball's equator, most at sample {}: the tool cannot be held along z",
-            judged.above_equator, judged.steepest.sample
-        ));
-    }
+    reasons.extend(judged.reach.failures.iter().cloned());
     reasons.extend(failures(&judged.axes));
     reasons
 }
@@ -129,6 +135,7 @@ fn object(job: &Job, judged: &Judged) -> Value {
         "gouge_max_mm": judged.gouge_mm(),
         "above_equator": judged.above_equator,
         "normal_z_min": judged.steepest.value,
+        "reach": reach_words::json(job, &judged.reach),
         "limits": job.machine.has_limits().then_some(limits),
         "axes": { "velocity_mm_s": velocity.axes, "acceleration_mm_s2": acceleration.axes, "jerk_mm_s3": jerk.axes },
     })
@@ -189,6 +196,19 @@ fn rows() -> Vec<Row> {
             "samples",
             Box::new(|judged| count(judged.above_equator)),
         ),
+        (
+            "surface looks down",
+            "%",
+            Box::new(|judged| 100.0 * judged.reach.facing.down_share),
+        ),
+        (
+            "reach: deepest touch",
+            "um",
+            Box::new(|judged| {
+                let touches = judged.reach.findings.iter().map(ReachFinding::touch_mm);
+                1e3 * touches.fold(0.0, f64::max)
+            }),
+        ),
     ];
     for (order, (name, unit)) in ORDERS.into_iter().enumerate() {
         rows.push((
@@ -227,21 +247,127 @@ fn own_run(job: &Job, prepared: &machine::prepare::Prepared) -> Result<Vec<DVec3
     Ok(centres)
 }
 
+/// Samples of a motion in contact, with what was found for each.
+type Samples = Vec<(PassSample, SampleCheck)>;
+
+/// The page of a judged motion, beside the core's.
+fn page(
+    arguments: &Arguments,
+    wanted: Option<WantedReport<'_>>,
+    job: &Job,
+    samples: &Samples,
+    (judged, ours): (&Judged, Option<&Judged>),
+    failures: &[String],
+) -> Result<Option<PathBuf>> {
+    if wanted.is_none() {
+        return Ok(None);
+    }
+    let mut sketch = Sketch::new(job, judged.stretches as usize);
+    for (sample, check) in samples {
+        sketch.add(sample, check);
+    }
+    let name = arguments
+        .motion
+        .file_name()
+        .unwrap_or(arguments.motion.as_os_str());
+    let figures = rows().into_iter().map(|(name, unit, figure)| {
+        let given = format!("{:.6}", figure(judged));
+        let own = ours.map_or_else(String::new, |ours| format!(" | {:.6}", figure(ours)));
+        Figure {
+            what: format!("{name}, {unit}"),
+            value: format!("{given}{own}"),
+        }
+    });
+    let line = |(number, line): (u32, &Vec<FieldPoint>)| {
+        let place = |at: &FieldPoint| RidgePoint {
+            u: at.uv[0],
+            v: at.uv[1],
+            #[allow(clippy::cast_possible_truncation, reason = "for a picture")]
+            height_mm: at.height_mm as f32,
+        };
+        (number, line.iter().map(place).collect())
+    };
+    let mut marks = reach_words::marks(job, &judged.reach);
+    let lowest = &judged.field.lowest;
+    if judged.gouge_mm() > arguments.path_tolerance.unwrap_or(PATH_SHARE * job.scallop_mm) {
+        marks.push(Mark {
+            what: format!("gouge {:.4} mm", judged.gouge_mm()),
+            place_mm: lowest.point_mm,
+            tick: None,
+        });
+    }
+    if judged.highest().height_mm > job.scallop_mm * (1.0 + SCALLOP_SLACK) {
+        marks.push(Mark {
+            what: format!("scallop {:.5} mm", judged.highest().height_mm),
+            place_mm: judged.highest().point_mm,
+            tick: None,
+        });
+    }
+    let remarks = Remarks {
+        failures: failures.to_vec(),
+        verified: true,
+        figures: figures.collect(),
+        scallops: Some(Scallops {
+            limit_mm: job.scallop_mm,
+            measurement_error_mm: SCALLOP_SLACK * job.scallop_mm,
+            // With the highest place, which was searched between the lines.
+            ridges: (0..)
+                .zip(judged.field_lines.iter().chain([&vec![*judged.highest()]]))
+                .map(line)
+                .collect(),
+            anywhere: true,
+        }),
+        source: Some(name.to_string_lossy().into_owned()),
+        marks,
+        links_mm: judged.links_mm.clone(),
+        ..Remarks::default()
+    };
+    report(job, wanted, Some(&sketch), &survey(judged), &remarks)
+}
+
+/// The figures of a judged motion as those of a survey.
+fn survey(judged: &Judged) -> SurveyResult {
+    let mut report = AccuracyReport::default();
+    report.samples = judged.in_contact as u64;
+    report.passes = judged.stretches;
+    report.cc_length_mm = judged.contact_length_mm;
+    report.complete = true;
+    report.position_nm.max = 1e6 * judged.path_error_mm.value.abs();
+    report.ripple_pct.max = judged.feed.ripple_max_pct;
+    SurveyResult {
+        samples: judged.samples as u64,
+        passes: judged.stretches,
+        speeds: SpeedFigures::default(),
+        interval_min: f64::INFINITY,
+        report,
+    }
+}
+
 pub(super) fn command(arguments: &Arguments) -> Result<()> {
     let (own_job, prepared) = load(&arguments.job)?;
     let oracle = Oracle::new(&own_job)
         .map_err(|error| Failure::input(error.to_string(), "set side = \"+\" or \"-\""))?;
+    let wanted = WantedReport::new(arguments.report.as_deref(), arguments.force)?;
     let given = motion::read(&arguments.motion, &own_job, arguments.tip)?;
     // The motion's own period, for its speeds; everything else is the job's.
     let mut job = own_job.clone();
     job.machine.period_us = 1e6 * given.period_s;
     let bar = Bar::new();
     let progress: &dyn Progress = &bar;
-    let theirs = judge(&job, &oracle, &given.centres_mm, progress);
+    let mut samples = Samples::new();
+    let mut keep = |sample: &PassSample, check: &SampleCheck| samples.push((*sample, *check));
+    let each = wanted.map(|_| &mut keep as &mut SampleObserver<'_>);
+    let theirs = judge(&job, &oracle, &given.centres_mm, each, progress);
     let ours = if arguments.alone {
         None
     } else {
-        Some(judge(&own_job, &oracle, &own_run(&own_job, &prepared)?, progress))
+        Some(judge(
+            &own_job,
+            &oracle,
+            &own_run(&own_job, &prepared)?,
+            None,
+            progress,
+        ))
     };
     bar.clear();
     let reasons = reasons(
@@ -249,6 +375,14 @@ pub(super) fn command(arguments: &Arguments) -> Result<()> {
         &theirs,
         arguments.path_tolerance.unwrap_or(PATH_SHARE * job.scallop_mm),
     );
+    let page = page(
+        arguments,
+        wanted,
+        &job,
+        &samples,
+        (&theirs, ours.as_ref()),
+        &reasons,
+    )?;
     if arguments.json {
         let value = json!({
             "job": arguments.job.display().to_string(), "motion": arguments.motion.display().to_string(), "period_s": given.period_s,
@@ -266,8 +400,12 @@ pub(super) fn command(arguments: &Arguments) -> Result<()> {
             theirs.field.points
         );
         print(&theirs, ours.as_ref());
+        reach_words::print(&job, &theirs.reach);
         for reason in &reasons {
             say!("  FAIL {reason}");
+        }
+        if let Some(page) = page {
+            say!("  report {}", page.display());
         }
         say!("  {}", if reasons.is_empty() { "passed" } else { "FAILED" });
     }

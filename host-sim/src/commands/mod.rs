@@ -21,6 +21,7 @@ mod outcome;
 #[cfg(feature = "developer")]
 mod paper;
 mod progress;
+mod reach_words;
 mod run;
 mod scripted;
 mod simulate;

@@ -3,18 +3,19 @@
 use std::path::{Path, PathBuf};
 
 use clap::Args;
-use inspect::{BOUNDS, Requirements, RunMeasurements, Verification, verify_run};
+use inspect::{BOUNDS, Requirements, RunMeasurements, TimedRun, Verification, verify_run};
 use job::Job;
 use machine::prepare::Prepared;
 use oracle::{AccuracyFigure, PassSample, SampleCheck};
-use report::{Remarks, RidgePoint, Scallops, Sketch};
+use report::{Mark, Remarks, RidgePoint, Scallops, Sketch};
 use serde_json::Value;
+use verify::Verdict;
 use verify::survey::{SampleObserver, SurveyResult};
 use verify::swept;
 
 use super::out::{complain, say};
 use super::simulate::{WantedReport, remarks, report, timed};
-use super::{Bar, Failure, Result, along, error_json, load, motion_words, swept_words};
+use super::{Bar, Failure, Result, along, error_json, load, motion_words, reach_words, swept_words};
 
 /// Checks a job before it runs on a machine. Every sample against an independent f64 oracle: positions, normals, feed ripple, path
 /// intervals, schedule. The swept envelope of the ball against the surface: scallop height, local and global gouges. Axis travel. With
@@ -108,7 +109,38 @@ fn scallops(job: &Job, swept: &swept::SweptResult) -> Scallops {
         limit_mm: job.scallop_mm,
         measurement_error_mm: swept.measurement_error_mm,
         ridges: swept.ridges.iter().map(ridge).collect(),
+        anywhere: false,
     }
+}
+
+/// Places of what is wrong.
+fn marks(job: &Job, timed: &TimedRun, measured: &RunMeasurements) -> Vec<Mark> {
+    let mut marks = Vec::new();
+    if let Some(fault) = &timed.fault {
+        let [u, v] = fault.parameters;
+        marks.push(Mark {
+            what: format!("fault {}: {}", fault.fault.kind.code(), fault.fault.kind.name()),
+            place_mm: oracle::Surface::new(&job.surface).at(u, v).point,
+            tick: Some(fault.tick),
+        });
+    }
+    let swept = &measured.swept;
+    if let Some(gouge) = &swept.gouge {
+        marks.push(Mark {
+            what: format!("gouge {:.4} mm", gouge.depth_mm),
+            place_mm: gouge.point_mm,
+            tick: Some(gouge.tick),
+        });
+    }
+    if swept.scallop_verdict == Verdict::Violated {
+        marks.push(Mark {
+            what: format!("scallop {:.5} mm", swept.scallop_max.height_mm),
+            place_mm: swept.scallop_max.point_mm,
+            tick: None,
+        });
+    }
+    marks.extend(reach_words::marks(job, &measured.reach));
+    marks
 }
 
 /// The keys of `verify`.
@@ -116,13 +148,21 @@ fn json(job: &Job, prepared: &Prepared, found: &Verification) -> Value {
     let RunMeasurements {
         findings,
         swept,
+        reach,
         axes,
         times,
         optimum,
+        ..
     } = &found.measured;
     let mut value = swept_words::json(job, prepared, findings, swept, axes);
     value.extend(motion_words::json(times, optimum));
     value.extend(along::json(job));
+    value.insert("reach".to_owned(), reach_words::json(job, reach));
+    if let (Some(key), Some(Value::Array(keys))) =
+        (reach_words::not_measured(reach), value.get_mut("not_measured"))
+    {
+        keys.push(key.into());
+    }
     value.insert("passes_scanned".to_owned(), found.scanned.into());
     value.insert("failures".to_owned(), found.failures.clone().into());
     value.insert("passed".to_owned(), found.failures.is_empty().into());
@@ -134,13 +174,16 @@ fn print_verification(job: &Job, prepared: &Prepared, found: &Verification) {
     let RunMeasurements {
         findings,
         swept,
+        reach,
         axes,
         times,
         optimum,
+        ..
     } = &found.measured;
     say!("  along        {}", along::sentence(job));
     print(findings, found.scanned);
     swept_words::print(job, prepared, findings, swept, axes);
+    reach_words::print(job, reach);
     motion_words::print(times, optimum);
     for failure in &found.failures {
         say!("  FAIL {failure}");
@@ -257,6 +300,8 @@ fn verify_job(arguments: &Arguments, path: &Path, directory: Option<&Path>) -> R
         failures: found.failures.clone(),
         verified: true,
         scallops: Some(scallops(&job, swept)),
+        marks: marks(&job, &timed, &found.measured),
+        links_mm: found.measured.links_mm.clone(),
         ..remarks(&timed, findings)
     };
     remarks.warnings.extend(found.warnings.iter().cloned());

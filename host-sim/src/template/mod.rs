@@ -125,7 +125,7 @@ mod tests {
         for kind in Kind::ALL {
             let text = with_optional_keys(kind);
             let mut count = 0;
-            for section in ["surface", "placement", "tool", "cut", "machine"] {
+            for section in ["surface", "placement", "tool", "stock", "cut", "machine"] {
                 // A CAD file's face is resolved before the sections behind it are read; they are the same for every kind.
                 if kind == Kind::File && section != "surface" {
                     continue;

@@ -4,11 +4,13 @@
 //! samples ──survey──► errors, feed ripple, schedule      speeds   contact and centre
 //!    │                                                   trace    every sample as CSV
 //!    ├──────swept───► scallop height, gouges
-//!    └──────motion──► use of the axis limits, time against the optimum
+//!    ├──────motion──► use of the axis limits, time against the optimum
+//!    └──────reach───► side of the ball, shank and holder against surface, stock and fixtures
 //! ```
 
 pub mod judge;
 pub mod motion;
+pub mod reach;
 mod sample;
 pub mod speeds;
 pub mod survey;

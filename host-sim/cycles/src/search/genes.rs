@@ -159,6 +159,8 @@ impl Genes {
         Job {
             surface,
             radius_mm,
+            body: job::ToolBody::default(),
+            setup: job::Setup::default(),
             // Up to 10 mm in a period of a millisecond, which is the limit.
             feed_mm_min: self.log(Gene::Arc, 60.0, 600_000.0),
             scallop_mm: radius_mm * self.log(Gene::Scallop, 1e-4, 0.95),

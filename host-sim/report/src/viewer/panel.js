@@ -75,6 +75,7 @@ function key() {
         entry("blue", "passes, cutter contact (CC)"),
         entry("warm", "this pass"),
         entry("violet", "cutter location (CL)"),
+        entry("green", "links, home, safe height"),
     );
 }
 
@@ -87,6 +88,7 @@ class Panel {
         this.fillColours();
         this.switches();
         this.views();
+        this.marks();
         this.keys();
         this.timeline();
         this.pointing();
@@ -113,21 +115,47 @@ class Panel {
         const ball = byId("show-ball");
         // A ball as large as the part would cover it.
         ball.checked = this.payload.radius < 0.4 * this.view.diagonal;
-        const update = () =>
+        const { setting } = this.view;
+        const has = { links: setting.hasLinks, machine: setting.hasMachine, setup: setting.hasSetup, marks: setting.marks.length > 0 };
+        for (const [name, there] of Object.entries(has)) byId(`show-${name}`).parentElement.hidden = !there;
+        const shows = (name) => has[name] && byId(`show-${name}`).checked;
+        const update = () => {
             this.view.show({
                 surface: byId("show-surface").checked,
                 passes: byId("show-passes").checked,
                 centres: byId("centres").value,
                 ball: ball.checked,
             });
-        for (const id of ["show-surface", "show-passes", "show-ball", "centres"]) byId(id).addEventListener("change", update);
+            setting.show({ links: shows("links"), machine: shows("machine"), setup: shows("setup"), marks: shows("marks"), body: true });
+        };
+        this.shows = shows;
+        for (const id of ["show-surface", "show-passes", "show-ball", "show-links", "show-machine", "show-setup", "show-marks", "centres"]) byId(id).addEventListener("change", update);
         update();
     }
 
+    // The marks: a label at each place, and a button that brings the tool there.
+    marks() {
+        const { marks } = this.view.setting;
+        const row = byId("marks");
+        row.hidden = marks.length === 0;
+        marks.forEach((mark, k) => {
+            mark.tag = element("span", { class: "tag bad" }, `${k + 1}`);
+            byId("mark-tags").append(mark.tag);
+            const button = element("button", { type: "button" }, `${k + 1} ${mark.what}`);
+            button.addEventListener("click", () => {
+                if (mark.tick !== null) this.setTick(mark.tick);
+                this.view.request();
+            });
+            row.append(button);
+        });
+    }
+
     views() {
-        const directions = { home: this.payload.toward, top: [0, 0, 1], front: [0, -1, 0], right: [1, 0, 0] };
+        const directions = { home: this.payload.toward, all: this.payload.toward, top: [0, 0, 1], front: [0, -1, 0], right: [1, 0, 0] };
         for (const button of document.querySelectorAll("[data-view]")) {
-            button.addEventListener("click", () => this.view.look(directions[button.dataset.view]));
+            button.addEventListener("click", () =>
+                this.view.look(directions[button.dataset.view], button.dataset.view === "all"),
+            );
         }
     }
 
@@ -168,8 +196,10 @@ class Panel {
         speed.value = factors.filter((factor) => factor === 1 || whole / factor > 60).pop();
         const play = byId("play");
         play.addEventListener("click", () => (this.playing ? this.pause() : this.play()));
+        // At the first mark, else in the middle.
+        const marked = this.view.setting.marks.find(({ tick }) => tick !== null);
         const middle = track.passes[Math.floor(track.passes.length / 2)];
-        this.setTick(middle ? Math.round((middle.first + middle.last) / 2) : 0);
+        this.setTick(marked ? marked.tick : middle ? Math.round((middle.first + middle.last) / 2) : 0);
     }
 
     play() {
@@ -315,6 +345,16 @@ class Panel {
         const length = above * view.pixels() <= most * 1.001 ? above : [0.5, 0.4, 0.2, 0.1].map((k) => k * above).find((k) => k * view.pixels() <= most && roundAbove(k) - k < 1e-9 * k);
         byId("scale-bar").style.width = `${length * view.pixels()}px`;
         byId("scale-bar").firstChild.textContent = length < 1 ? `${shown(length * 1000, 1)} µm` : `${shown(length, length >= 1000 ? 4 : 1)} mm`;
+        const { setting } = view;
+        const label = (tag, at, visible) => {
+            tag.hidden = !visible;
+            if (!visible) return;
+            const [x, y] = view.pixel(at);
+            tag.style.transform = `translate(${x + 8}px,${y - 16}px)`;
+        };
+        label(byId("tag-home"), setting.home, this.shows("machine") && setting.home);
+        label(byId("tag-safe"), setting.safeCorner, this.shows("machine") && setting.safeCorner);
+        for (const mark of setting.marks) label(mark.tag, mark.at, this.shows("marks"));
         const shows = byId("show-ball").checked && this.at;
         for (const [id, name] of [["tag-cc", "cc"], ["tag-cl", "cl"]]) {
             const tag = byId(id);

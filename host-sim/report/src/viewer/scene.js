@@ -28,6 +28,7 @@ class View {
         this.addSurface(step);
         this.addLines();
         this.addTool();
+        this.setting = new Setting(this, payload.setting);
         this.controls = new L.OrbitControls(this.camera, canvas);
         Object.assign(this.controls, { enableDamping: false, zoomToCursor: true, minZoom: 0.2, maxZoom: 400 });
         this.controls.addEventListener("change", () => this.request());
@@ -177,13 +178,13 @@ class View {
         );
         ball.renderOrder = 3;
         const dot = () => {
-            const made = new Mesh(new SphereGeometry(1, 20, 14), new MeshBasicMaterial({ depthTest: false, transparent: true }));
+            const made = new Mesh(new SphereGeometry(1, 20, 14), new MeshBasicMaterial({ transparent: true }));
             made.renderOrder = 4;
             return made;
         };
         this.ball = ball;
         this.dots = { cc: dot(), cl: dot() };
-        this.radius = this.line(new Float32Array(6), 1.6, { depthTest: false, transparent: true });
+        this.radius = this.line(new Float32Array(6), 1.6, { transparent: true });
         this.radius.renderOrder = 4;
         this.tool.add(ball, this.dots.cc, this.dots.cl, this.radius);
         this.scene.add(this.tool);
@@ -193,6 +194,7 @@ class View {
     dress() {
         const set = (colour, name) => colour.setStyle(variable(name));
         this.surfaceColour = variable("surface");
+        this.setting.dress();
         set(this.back.color, "surface-back");
         set(this.ball.material.color, "ball");
         this.ball.material.specular.setStyle("#555");
@@ -339,7 +341,7 @@ class View {
     }
 
     // Views from a direction, with the zoom fitted to the part.
-    look(direction) {
+    look(direction, everything = false) {
         const { Vector3 } = this.L;
         const toward = new Vector3(...direction).normalize();
         // For a view along z, a small tilt makes +y point up.
@@ -350,7 +352,8 @@ class View {
         const inverse = this.camera.matrixWorldInverse.elements;
         const low = [Infinity, Infinity];
         const high = [-Infinity, -Infinity];
-        for (const places of [this.surface.getAttribute("position").array, this.track.cl]) {
+        const around = everything ? this.setting.everything() : [];
+        for (const places of [this.surface.getAttribute("position").array, this.track.cl, around]) {
             for (let at = 0; at < places.length; at += 3) {
                 for (let k = 0; k < 2; k++) {
                     const x = inverse[k] * places[at] + inverse[4 + k] * places[at + 1] + inverse[8 + k] * places[at + 2];
@@ -441,6 +444,7 @@ class View {
         const size = DOT / this.pixels();
         this.dots.cc.scale.setScalar(size);
         this.dots.cl.scale.setScalar(size);
+        this.setting.draw(size);
         this.renderer.render(this.scene, this.camera);
         this.after.forEach((each) => each());
     }

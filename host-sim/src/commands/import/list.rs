@@ -11,8 +11,12 @@ use serde_json::{Value, json};
 use super::super::out::say;
 use super::super::{Result, progress, whole};
 use super::{Arguments, condition, deviation_json, page};
-use cad::{CadError, Face, Form, MachinableFace, Measures, Model, Options, degrees, machinable, measure};
+use cad::{
+    CadError, Face, Form, MachinableFace, Measures, Model, Options, degrees, machinable, machined_sign,
+    measure,
+};
 use job::one_line;
+use oracle::{Facing, Surface, facing};
 
 /// What the faces are sorted by, ascending.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
@@ -95,6 +99,8 @@ pub(super) struct Row<'f> {
     /// Whether its boundary could not be read.
     unknown: bool,
     pub(super) becomes: std::result::Result<(MachinableFace, Measures), CadError>,
+    /// How the side that is machined faces.
+    pub(super) facing: Option<Facing>,
 }
 
 impl Row<'_> {
@@ -132,6 +138,9 @@ fn rows<'f>(file: &str, faces: &'f [Face], options: &Options) -> Vec<Row<'f>> {
                         .ok()
                         .and_then(|(made, _)| made.outline.trimmed.clone());
                     let unknown = becomes.as_ref().is_ok_and(|(made, _)| made.outline.unknown);
+                    let facing = becomes.as_ref().ok().map(|(made, measures)| {
+                        facing(&Surface::new(&made.spec()), machined_sign(face, measures))
+                    });
                     bar.inc(1);
                     if let Ok(mut done) = done.lock() {
                         done.push(Row {
@@ -139,6 +148,7 @@ fn rows<'f>(file: &str, faces: &'f [Face], options: &Options) -> Vec<Row<'f>> {
                             trimmed,
                             unknown,
                             becomes,
+                            facing,
                         });
                     }
                 }
@@ -178,6 +188,9 @@ fn row_json(row: &Row<'_>) -> Value {
             "least_concave_radius_mm": { "plus": measures.concave_mm[0], "minus": measures.concave_mm[1] },
             "becomes": if made.form == Form::Exact { "exact" } else { "approximated" },
             "deviation": deviation_json(&made.form),
+            "undercut_share": row.facing.map(|facing| facing.down_share),
+            "undercut_error_share": row.facing.map(|facing| facing.error_share),
+            "turn_deg": row.facing.and_then(|facing| facing.turn_deg),
             "error": Value::Null,
         }),
         Err(error) => json!({ "becomes": Value::Null, "error": error.what }),
@@ -188,9 +201,25 @@ fn row_json(row: &Row<'_>) -> Value {
     value
 }
 
+/// Share of the area that looks down, and the turn after which nothing does.
+pub(super) fn words(facing: Facing) -> [String; 2] {
+    let share = 100.0 * facing.down_share;
+    let turn = match facing.turn_deg {
+        Some(turn) if turn == [0.0; 3] => "-".to_owned(),
+        Some([x, y, z]) => format!("[{x}, {y}, {z}]"),
+        None => "none".to_owned(),
+    };
+    let undercut = if facing.down_share > 0.0 && share < 0.01 {
+        "< 0.01 %".to_owned()
+    } else {
+        format!("{share:.2} %")
+    };
+    [undercut, turn]
+}
+
 fn print_rows(rows: &[Row<'_>]) {
     say!(
-        "{:>5} {:<18} {:<6} {:>8} {:>26} {:>11} {:>11} {:<8} {:>11} {:>28} {:<17} {:<28} {:<8} name",
+        "{:>5} {:<18} {:<6} {:>8} {:>26} {:>11} {:>11} {:<8} {:>11} {:>28} {:<17} {:>8} {:<20} {:<28} {:<8} name",
         "face",
         "kind",
         "degree",
@@ -202,6 +231,8 @@ fn print_rows(rows: &[Row<'_>]) {
         "area mm2",
         "centre mm",
         "normal",
+        "undercut",
+        "turn",
         "becomes",
         "colour"
     );
@@ -236,9 +267,10 @@ fn print_rows(rows: &[Row<'_>]) {
                     let [x, y, z] = [x, y, z].map(plain);
                     format!("{x:.2} {y:.2} {z:.2}")
                 });
+                let [undercut, turn] = row.facing.map_or([const { String::new() }; 2], words);
                 say!(
                     "{number:>5} {kind:<18} {degree:<6} {patches:>8} {size:>26} {plus:>11} {minus:>11} {trimmed:<8} {area:>11.2} {centre:>28} \
-                     {normal:<17} {becomes:<28} {colour:<8} {name}"
+                     {normal:<17} {undercut:>8} {turn:<20} {becomes:<28} {colour:<8} {name}"
                 );
             }
             Err(error) => say!("{number:>5} {kind:<18} {degree:<6} {:>8} {}", "-", error.what),
@@ -272,7 +304,8 @@ pub(super) fn list(arguments: &Arguments, file: &str, model: &Model, options: &O
     print_rows(&rows);
     say!(
         "{} of {} faces. concave: least concave radius, mm, seen from the side of + or - S_u x S_v. normal: mean, out of the material where \
-         that is known. Size, area and radii of a trimmed face are those of the rectangle around it.",
+         that is known. undercut: share of the machined side's area that looks down, where no tool along z can cut. turn: rotate_deg in [placement] \
+         after which nothing of it does. Size, area and radii of a trimmed face are those of the rectangle around it.",
         rows.len(),
         model.faces.len()
     );

@@ -2,7 +2,7 @@
 
 use serde_json::{Value, json};
 
-use super::list::Row;
+use super::list::{Row, words};
 use cad::{Boundary, Edge, Face, Outline};
 
 /// The page; `@DATA@` is where the faces stand.
@@ -75,6 +75,11 @@ fn face(file: &str, row: &Row<'_>, quads: usize) -> Value {
         (Ok(_), "yes") => "trimmed",
         (Ok(_), _) => "boundary unknown",
     };
+    let undercut = row.facing.filter(|facing| facing.down_share > 0.0).map(words);
+    let state = undercut.map_or_else(
+        || state.to_owned(),
+        |[undercut, turn]| format!("{state}; {undercut} looks down, turn: {turn}"),
+    );
     let untrimmed = if row.boundary() == "no" {
         ""
     } else {

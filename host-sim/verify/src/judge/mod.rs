@@ -3,12 +3,14 @@
 //! ```text
 //! positions ──closest.rs──► contact (nearest point), path error, contact feed, side of the ball
 //!     ├────────swept──────► heights over the whole surface: scallop, gouge
+//!     ├────────reach──────► neck, shank and holder against surface, stock and fixtures
 //!     └────────motion─────► use of the axis limits
 //! ```
 //!
 //! The motion need not follow lines of the surface and has no parameters, so ridges are searched over the whole surface instead of pass by pass.
 
 mod closest;
+mod stretches;
 
 pub use closest::{NearestPoint, Projector};
 
@@ -17,7 +19,11 @@ use job::Job;
 use oracle::Oracle;
 
 use crate::motion::{PeakMeter, Peaks};
+use crate::reach::{self, Motion, ReachResult};
+use crate::survey::SampleObserver;
 use crate::swept::{FieldPoint, HeightField, Progress, ToolPath, height_field};
+
+use stretches::Stretches;
 
 const NM_PER_MM: f64 = 1e6;
 /// A centre farther than this from the radius, as a share of the radius, is off the surface.
@@ -78,6 +84,16 @@ pub struct Judged {
     pub steepest: MotionPoint,
     /// Heights left on the surface.
     pub field: HeightField,
+    /// The same along lines of the surface, thinned, for a picture.
+    pub field_lines: Vec<Vec<FieldPoint>>,
+    /// The reach of the tool.
+    pub reach: ReachResult,
+    /// The ways off the surface, mm.
+    pub links_mm: Vec<Vec<DVec3>>,
+    /// Length of the contact's way, mm.
+    pub contact_length_mm: f64,
+    /// Number of stretches in contact.
+    pub stretches: u32,
     /// Use of the axis limits.
     pub axes: Peaks,
 }
@@ -96,9 +112,16 @@ impl Judged {
     }
 }
 
-/// Judges the positions of the ball's centre, mm, one for each of the job's periods.
+/// Judges the positions of the ball's centre, mm, one for each of the job's periods. `each` is called for every sample in contact; a stretch in
+/// contact takes the place of a pass.
 #[must_use]
-pub fn judge(job: &Job, oracle: &Oracle, centres_mm: &[DVec3], progress: &dyn Progress) -> Judged {
+pub fn judge(
+    job: &Job,
+    oracle: &Oracle,
+    centres_mm: &[DVec3],
+    each: Option<&mut SampleObserver<'_>>,
+    progress: &dyn Progress,
+) -> Judged {
     let period_s = job.machine.period_s();
     let mut meter = PeakMeter::new(&job.machine);
     let mut path = ToolPath::default();
@@ -106,6 +129,8 @@ pub fn judge(job: &Job, oracle: &Oracle, centres_mm: &[DVec3], progress: &dyn Pr
     let contact_mm = (CONTACT_SHARE * oracle.radius_mm).max(CONTACT_MIN_MM);
     let mut state = Contacts::new(job.feed_mm_s());
     let mut last: Option<NearestPoint> = None;
+    let mut motion = Motion::default();
+    let mut stretches = Stretches::new(each, job, oracle.radius_mm);
     progress.begin("contacts", centres_mm.len() as u64);
     for (index, centre_mm) in centres_mm.iter().enumerate() {
         #[allow(clippy::cast_possible_truncation, reason = "positions are within two metres")]
@@ -118,9 +143,17 @@ pub fn judge(job: &Job, oracle: &Oracle, centres_mm: &[DVec3], progress: &dyn Pr
         if touches {
             jumps = state.add(oracle, index, &nearest, last.as_ref(), *centre_mm, period_s);
             path.add_centre(cl_nm, last.is_none() || jumps);
+            stretches.add(
+                index,
+                &nearest,
+                *centre_mm,
+                last.is_none() || jumps,
+                state.step_mm,
+            );
         } else {
             state.leave();
         }
+        motion.add(cl_nm, touches, jumps && !job.machine.has_limits());
         // Without limits a motion may leave out its links.
         if jumps && !job.machine.has_limits() {
             meter.discontinuity();
@@ -129,10 +162,18 @@ pub fn judge(job: &Job, oracle: &Oracle, centres_mm: &[DVec3], progress: &dyn Pr
         last = touches.then_some(nearest);
         progress.done(1);
     }
-    let field = height_field(oracle, &path, progress);
+    let (field, field_lines) = height_field(oracle, &path, progress);
+    let stretches = stretches.finish();
+    let around = Around {
+        field,
+        field_lines,
+        reach: reach::measure(job, oracle, &motion, &stretches.contact, progress),
+        links_mm: motion.links(),
+        stretches: stretches.count,
+    };
     #[allow(clippy::cast_precision_loss, reason = "below 2^53")]
     let time_s = centres_mm.len() as f64 * period_s;
-    state.finish(centres_mm.len(), time_s, field, meter.peaks())
+    state.finish(centres_mm.len(), time_s, around, meter.peaks())
 }
 
 /// Whether the centre is on the tool's side of the surface.
@@ -142,9 +183,21 @@ fn on_side(oracle: &Oracle, nearest: &NearestPoint, centre_mm: DVec3) -> bool {
     normal.is_ok_and(|normal| (centre_mm - nearest.point_mm).dot(normal) > 0.0)
 }
 
+/// What is measured besides the samples in contact.
+struct Around {
+    field: HeightField,
+    field_lines: Vec<Vec<FieldPoint>>,
+    reach: ReachResult,
+    links_mm: Vec<Vec<DVec3>>,
+    stretches: u32,
+}
+
 /// Sums over the samples in contact.
 struct Contacts {
     feed_mm_s: f64,
+    /// Length of the last step, mm; `None` after a jump and at the first sample of a stretch.
+    step_mm: Option<f64>,
+    length_mm: f64,
     count: usize,
     jumps: usize,
     /// Speed of every period in contact, mm/s; `None` between stretches.
@@ -162,6 +215,8 @@ impl Contacts {
     fn new(feed_mm_s: f64) -> Self {
         Self {
             feed_mm_s,
+            step_mm: None,
+            length_mm: 0.0,
             count: 0,
             jumps: 0,
             speeds: Vec::new(),
@@ -203,11 +258,17 @@ impl Contacts {
                 value: up,
             };
         }
+        self.step_mm = None;
         let Some(before) = before else {
             return false;
         };
-        let speed = arc_mm(oracle, before, nearest) / period_s;
+        let step_mm = arc_mm(oracle, before, nearest);
+        let speed = step_mm / period_s;
         let jumps = speed > JUMP_STEPS * self.feed_mm_s;
+        if !jumps {
+            self.step_mm = Some(step_mm);
+            self.length_mm += step_mm;
+        }
         self.jumps += usize::from(jumps);
         self.speeds.push((!jumps).then_some(speed));
         jumps
@@ -254,7 +315,7 @@ impl Contacts {
         [most, per(squares, count)]
     }
 
-    fn finish(mut self, samples: usize, time_s: f64, field: HeightField, axes: Peaks) -> Judged {
+    fn finish(mut self, samples: usize, time_s: f64, around: Around, axes: Peaks) -> Judged {
         self.leave();
         let speeds = || self.speeds.iter().flatten().copied();
         let [ripple_max_pct, mean_square] = self.ripple_pct();
@@ -277,7 +338,12 @@ impl Contacts {
             path_error_rms_mm: per(self.error_squares, self.errors).sqrt(),
             above_equator: self.above,
             steepest: self.steepest,
-            field,
+            field: around.field,
+            field_lines: around.field_lines,
+            reach: around.reach,
+            links_mm: around.links_mm,
+            contact_length_mm: self.length_mm,
+            stretches: around.stretches,
             axes,
         }
     }
@@ -341,7 +407,7 @@ mod tests {
     #[test]
     fn a_known_motion_has_its_figures() {
         let (job, oracle) = torus(0.05);
-        let judged = judge(&job, &oracle, &passes(12, 0.0, 0.02), &());
+        let judged = judge(&job, &oracle, &passes(12, 0.0, 0.02), None, &());
         assert_eq!((judged.in_contact, judged.jumps), (judged.samples, 12));
         assert!(
             judged.path_error_mm.value.abs() < 2e-6,
@@ -371,14 +437,14 @@ mod tests {
     #[test]
     fn a_motion_too_deep_or_too_high_is_seen() {
         let (job, oracle) = torus(0.05);
-        let deep = judge(&job, &oracle, &passes(12, -0.004, 0.0), &());
+        let deep = judge(&job, &oracle, &passes(12, -0.004, 0.0), None, &());
         assert!(
             (deep.path_error_mm.value + 0.004).abs() < 5e-6,
             "{:?}",
             deep.path_error_mm
         );
         assert!((deep.gouge_mm() - 0.004).abs() < 5e-6, "{}", deep.gouge_mm());
-        let high = judge(&job, &oracle, &passes(12, 0.003, 0.0), &());
+        let high = judge(&job, &oracle, &passes(12, 0.003, 0.0), None, &());
         assert!((high.path_error_mm.value - 0.003).abs() < 5e-6);
         assert!(high.gouge_mm() == 0.0 && high.field.mean_mm > 0.003);
         // Half of the groove is left out.
@@ -386,7 +452,7 @@ mod tests {
             .into_iter()
             .filter(|centre| centre.y > centre.x)
             .collect();
-        let uncut = judge(&job, &oracle, &half, &()).field.uncut_share;
+        let uncut = judge(&job, &oracle, &half, None, &()).field.uncut_share;
         assert!(uncut > 0.3 && uncut < 0.5, "{uncut}");
     }
 
@@ -400,7 +466,7 @@ mod tests {
         centres.extend((0..1000).map(|k| centre(5.001, 0.3 + 0.00025 * f64::from(k), 0.0)));
         let end = *centres.last().unwrap();
         centres.extend((1..300).map(|k| end + DVec3::Z * 0.02 * f64::from(k)));
-        let judged = judge(&job, &oracle, &centres, &());
+        let judged = judge(&job, &oracle, &centres, None, &());
         assert!(
             (judged.path_error_mm.value - 0.001).abs() < 5e-6,
             "{:?}",

@@ -12,6 +12,7 @@ use super::height::Ray;
 use super::track::ToolPath;
 use super::tree::PathTree;
 use glam::DVec3;
+use job::Along;
 use oracle::Oracle;
 
 /// Places from which the highest and the lowest point are searched, and bisections of the step.
@@ -46,9 +47,16 @@ pub struct HeightField {
     pub points: usize,
 }
 
-/// Measures the heights that a path leaves.
+/// Largest number of points of the thinned field.
+const THINNED_MAX: usize = 20_000;
+
+/// Measures the heights that a path leaves. Also returns lines of the field, thinned, along the path parameter.
 #[must_use]
-pub fn height_field(oracle: &Oracle, path: &ToolPath, progress: &dyn Progress) -> HeightField {
+pub fn height_field(
+    oracle: &Oracle,
+    path: &ToolPath,
+    progress: &dyn Progress,
+) -> (HeightField, Vec<Vec<FieldPoint>>) {
     let tree = PathTree::new(path, oracle.radius_mm);
     let grid = CellGrid::new(oracle);
     let missed = MISSED_RADII * oracle.radius_mm;
@@ -106,13 +114,49 @@ pub fn height_field(oracle: &Oracle, path: &ToolPath, progress: &dyn Progress) -
         };
         searched.reduce_with(best).unwrap_or_default()
     };
-    HeightField {
+    let field = HeightField {
         highest: extreme(1.0),
         lowest: extreme(-1.0),
         mean_mm: if area > 0.0 { sum / area } else { 0.0 },
         uncut_share: if area > 0.0 { uncut.abs() / area } else { 0.0 },
         points: places.len(),
-    }
+    };
+    (field, thinned(oracle, &grid, &at))
+}
+
+/// Lines of the field along the path parameter, through the middles of evenly spread cells.
+fn thinned(
+    oracle: &Oracle,
+    grid: &CellGrid,
+    at: &(dyn Fn([f64; 2]) -> Option<(FieldPoint, f64)> + Sync),
+) -> Vec<Vec<FieldPoint>> {
+    let [rows, columns] = grid.shape();
+    #[allow(
+        clippy::cast_possible_truncation,
+        clippy::cast_precision_loss,
+        clippy::cast_sign_loss,
+        reason = "small and positive"
+    )]
+    let step = ((rows * columns) as f64 / THINNED_MAX as f64)
+        .sqrt()
+        .ceil()
+        .max(1.0) as usize;
+    let middles = |axis: usize| -> Vec<f64> {
+        let edges = grid.edges[axis].windows(2).step_by(step);
+        edges.map(|ends| 0.5 * (ends[0] + ends[1])).collect()
+    };
+    let (along_path, beside) = match oracle.along {
+        Along::U => (middles(0), middles(1)),
+        Along::V => (middles(1), middles(0)),
+    };
+    let place = |path: f64, side: f64| {
+        let (u, v) = oracle.swapped(path, side);
+        at([u, v]).map(|(place, _)| place)
+    };
+    beside
+        .par_iter()
+        .map(|side| along_path.iter().filter_map(|path| place(*path, *side)).collect())
+        .collect()
 }
 
 /// Pattern search from a place with bisected steps, within the surface.

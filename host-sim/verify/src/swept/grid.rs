@@ -22,15 +22,15 @@ const POLE_SHARE: f64 = 1e-5;
 
 /// Curvature at a point.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) struct LocalCurvature {
+pub(crate) struct LocalCurvature {
     /// Least and largest principal curvature towards the tool, 1/mm.
-    pub(super) principal: [f64; 2],
+    pub(crate) principal: [f64; 2],
     /// Upper bound of the change of u, and of v, per millimetre on the surface.
-    pub(super) per_mm: [f64; 2],
+    pub(crate) per_mm: [f64; 2],
 }
 
 /// Tool normal and curvature; `None` where the derivatives do not span a plane, and close to a pole.
-pub(super) fn local_curvature(at: &Derivatives, oracle: &Oracle) -> Option<(DVec3, LocalCurvature)> {
+pub(crate) fn local_curvature(at: &Derivatives, oracle: &Oracle) -> Option<(DVec3, LocalCurvature)> {
     let (speed_u, speed_v) = (at.u.length(), at.v.length());
     let [[u0, u1], [v0, v1]] = oracle.surface.domain();
     let reach = (speed_u * (u1 - u0), speed_v * (v1 - v0));
@@ -52,26 +52,26 @@ pub(super) fn local_curvature(at: &Derivatives, oracle: &Oracle) -> Option<(DVec
 
 /// The grid: cell edges along u and v, and the curvature at each cell's centre.
 #[derive(Debug)]
-pub(super) struct CellGrid {
-    pub(super) edges: [Vec<f64>; 2],
+pub(crate) struct CellGrid {
+    pub(crate) edges: [Vec<f64>; 2],
     /// v fastest; `None` in degenerate cells.
-    pub(super) curvatures: Vec<Option<LocalCurvature>>,
+    pub(crate) curvatures: Vec<Option<LocalCurvature>>,
 }
 
 /// Part of the surface between two values of each parameter.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Cell {
-    pub(super) u: [f64; 2],
-    pub(super) v: [f64; 2],
+pub(crate) struct Cell {
+    pub(crate) u: [f64; 2],
+    pub(crate) v: [f64; 2],
 }
 
 impl Cell {
-    pub(super) fn middle(&self) -> (f64, f64) {
+    pub(crate) fn middle(&self) -> (f64, f64) {
         (0.5 * (self.u[0] + self.u[1]), 0.5 * (self.v[0] + self.v[1]))
     }
 
     /// The four quarters of the cell.
-    pub(super) fn quarters(&self) -> [Self; 4] {
+    pub(crate) fn quarters(&self) -> [Self; 4] {
         let (u, v) = self.middle();
         let (us, vs) = ([[self.u[0], u], [u, self.u[1]]], [[self.v[0], v], [v, self.v[1]]]);
         std::array::from_fn(|k| Self {
@@ -82,7 +82,7 @@ impl Cell {
 }
 
 impl CellGrid {
-    pub(super) fn new(oracle: &Oracle) -> Self {
+    pub(crate) fn new(oracle: &Oracle) -> Self {
         let spans = [Along::U, Along::V].map(|along| span_lengths(oracle, along));
         let cells = |share: f64| {
             spans.each_ref().map(|lengths| {
@@ -130,16 +130,16 @@ impl CellGrid {
     }
 
     /// Cells along u and along v.
-    pub(super) fn shape(&self) -> [usize; 2] {
+    pub(crate) fn shape(&self) -> [usize; 2] {
         self.edges.each_ref().map(|edges| edges.len() - 1)
     }
 
-    pub(super) fn count(&self) -> usize {
+    pub(crate) fn count(&self) -> usize {
         let [rows, columns] = self.shape();
         rows * columns
     }
 
-    pub(super) fn cell(&self, index: usize) -> Cell {
+    pub(crate) fn cell(&self, index: usize) -> Cell {
         let columns = self.shape()[1];
         let (i, j) = (index / columns, index % columns);
         Cell {
@@ -150,7 +150,7 @@ impl CellGrid {
 
     /// Least and largest principal curvature in the cells that intersect a range of parameters; evaluates at most `looks` cells per side,
     /// evenly spread.
-    pub(super) fn principal(&self, ranges: [[f64; 2]; 2], looks: usize) -> [f64; 2] {
+    pub(crate) fn principal(&self, ranges: [[f64; 2]; 2], looks: usize) -> [f64; 2] {
         let columns = self.shape()[1];
         let [(i0, i1, i_step), (j0, j1, j_step)] = [0, 1].map(|axis: usize| {
             let edges = &self.edges[axis];

@@ -26,7 +26,7 @@ mod axes;
 mod field;
 mod findings;
 mod gouge;
-mod grid;
+pub(crate) mod grid;
 mod height;
 mod original;
 mod ridge;

@@ -15,6 +15,8 @@ fn job(surface: SurfaceSpec, along: Along, side: Side, scallop_mm: f64) -> Job {
     Job {
         surface,
         radius_mm: RADIUS,
+        body: job::ToolBody::default(),
+        setup: job::Setup::default(),
         feed_mm_min: 600.0,
         scallop_mm,
         along,
