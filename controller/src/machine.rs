@@ -84,7 +84,7 @@ pub trait Machine {
     /// Identity and capacities of the board.
     fn description(&mut self) -> Description;
 
-    /// The status, without the link's own counter `frames_bad`.
+    /// The status, without the link's own counters `frames_bad` and `events`.
     fn status(&mut self) -> Status;
 
     /// [`interp_core::Interpolator::load_begin`] through [`crate::realtime::RealTime`].
@@ -138,7 +138,7 @@ pub trait Machine {
     /// Why no run may start.
     fn may_start(&mut self) -> Result<(), Reason>;
 
-    /// Reports a valid frame from the host.
+    /// Reports a sign of life of the host: a request that the session answered.
     fn heard(&mut self);
 
     /// Sets simulated inputs; false where the board reads real ones.

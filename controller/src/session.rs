@@ -17,13 +17,14 @@ use protocol::{
 };
 
 use crate::{
+    history::History,
     machine::{Busy, Instruction, Machine},
     safety::Order,
     upload::Upload,
 };
 
 /// Maximum length of an answer stored for a retransmission, bytes: a frame of `Status` with every varint at its maximum length.
-const ANSWER_MAX: usize = 111;
+const ANSWER_MAX: usize = 121;
 
 /// State of the session.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -89,6 +90,7 @@ pub(crate) struct Session {
     /// A start, hold, resume, stop or abort was sent, and may still be queued.
     commanded: bool,
     frames_bad: u32,
+    events: History,
 }
 
 impl Session {
@@ -100,6 +102,7 @@ impl Session {
             clock: Clock::Free,
             commanded: false,
             frames_bad: 0,
+            events: History::new(),
         }
     }
 
@@ -111,21 +114,41 @@ impl Session {
         self.frames_bad = self.frames_bad.saturating_add(1);
     }
 
-    /// The machine's status with the link's own counter.
-    pub(crate) const fn complete(&self, status: Status) -> Status {
+    /// The machine's status with the link's own counters.
+    const fn complete(&self, status: Status) -> Status {
         Status {
             frames_bad: self.frames_bad,
+            events: self.events.last(),
             ..status
         }
     }
 
-    /// Answers a frame.
+    /// Writes the next event, made with its number, and keeps it. Without a session it is dropped.
+    pub(crate) fn event(&mut self, make: impl FnOnce(u32) -> Reply, out: &mut impl FnMut(&[u8])) {
+        if !self.is_open() {
+            return;
+        }
+        let mut buffer = [0; FRAME_MAX];
+        if let Ok(frame) = write_reply(&make(self.events.next()), &mut buffer) {
+            self.events.push(frame);
+            out(frame);
+        }
+    }
+
+    /// Writes the end of a run, or that its ticks are used up.
+    pub(crate) fn halted(&mut self, status: &Status, out: &mut impl FnMut(&[u8])) {
+        let status = self.complete(*status);
+        self.event(|events| Reply::Halted(Status { events, ..status }), out);
+    }
+
+    /// Answers a frame. Whether it is a sign of life: a request that was carried out or refused on its merits, now or when it was first sent. Noise, frames of
+    /// another session and requests out of order are none.
     pub(crate) fn frame(
         &mut self,
         frame: Frame<'_>,
         machine: &mut impl Machine,
         out: &mut impl FnMut(&[u8]),
-    ) {
+    ) -> bool {
         let (number, request) = match read_request(frame.payload) {
             Ok((number, request)) => (number, Some(request)),
             Err(unreadable) => (unreadable.number, None),
@@ -141,14 +164,21 @@ impl Session {
             };
             out(&[DELIMITER]);
             send(&Reply::Capabilities(capabilities), out);
-        } else if self.last.is(number, &frame) {
+            return self.is_open();
+        }
+        if self.last.is(number, &frame) {
             out(&self.last.answer);
-        } else if let Some(reason) = self.refusal(number) {
+            return true;
+        }
+        if let Some(reason) = self.refusal(number) {
             send(&Reply::Nak { number, reason }, out);
-        } else if let Some(request) = request {
-            let answer = self.answer(number, request, machine);
+            return false;
+        }
+        if let Some(request) = request {
+            let answer = self.answer(number, request, machine, out);
             self.last.set(number, &frame, &answer);
             out(&self.last.answer);
+            true
         } else {
             send(
                 &Reply::Nak {
@@ -157,6 +187,7 @@ impl Session {
                 },
                 out,
             );
+            false
         }
     }
 
@@ -170,6 +201,7 @@ impl Session {
         if peer != self.peer {
             self.peer = peer;
             self.upload = None;
+            self.events.clear();
             self.last = Last {
                 number,
                 ..Last::new()
@@ -193,7 +225,13 @@ impl Session {
     }
 
     /// Executes a request.
-    fn answer(&mut self, number: u16, request: Request, machine: &mut impl Machine) -> Reply {
+    fn answer(
+        &mut self,
+        number: u16,
+        request: Request,
+        machine: &mut impl Machine,
+        out: &mut impl FnMut(&[u8]),
+    ) -> Reply {
         let done = match request {
             Request::Status => {
                 return Reply::Status {
@@ -231,6 +269,10 @@ impl Session {
             Request::Run { ticks } => instruct(machine, Instruction::Run { ticks }),
             Request::Report(report) => instruct(machine, Instruction::Report(report)),
             Request::StepConfig(settings) => set_steps(machine, settings.into()),
+            Request::Repeat { event, count } if self.events.repeat(event, count, out) => Ok(()),
+            Request::Repeat { .. } => Err(Reason::EventGone {
+                first: self.events.first(),
+            }),
             // Answered by the caller.
             Request::Hello { .. } => Err(Reason::Unreadable),
         };
@@ -366,6 +408,8 @@ mod tests {
             tick_cycles_max: u32::MAX,
             samples_lost: u32::MAX,
             frames_bad: u32::MAX,
+            halts: u32::MAX,
+            events: u32::MAX,
             safety: SafetyStatus {
                 lines: InputLines(u16::MAX),
                 latched: InputLines(u16::MAX),

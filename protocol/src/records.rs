@@ -148,6 +148,10 @@ pub struct Status {
     pub samples_lost: u32,
     /// Unreadable frames from the host since power-up.
     pub frames_bad: u32,
+    /// `Halted` since power-up, modulo 2^32; of a `Halted` its own number.
+    pub halts: u32,
+    /// Number of the last event of this session; of a `Halted` its own.
+    pub events: u32,
     /// Inputs, drives, home.
     pub safety: SafetyStatus,
 }
@@ -171,6 +175,8 @@ impl Default for Status {
             tick_cycles_max: 0,
             samples_lost: 0,
             frames_bad: 0,
+            halts: 0,
+            events: 0,
             safety: SafetyStatus::DEFAULT,
         }
     }

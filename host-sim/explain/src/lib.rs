@@ -270,6 +270,7 @@ mod tests {
                 home_nm: [1, -2, 3],
                 stands_nm: Some([4, 5, 6]),
             },
+            Reason::EventGone { first: 4 },
         ]
     }
 

@@ -8,6 +8,7 @@ use interp_core::{Fault, FaultKind};
 use protocol::message::Reason;
 use serde_json::{Value, json};
 
+use super::attach::unreachable_run;
 use super::flash::{board_of, board_parser};
 use super::home::{self, PositionNm};
 use super::out::{say, to_stderr};
@@ -22,6 +23,7 @@ use machine::prepare::{self, Prepared};
 use machine::remote::chip::{self, Chip, ChipError};
 use machine::remote::operate::{self, Operator, Setup};
 use machine::remote::qemu::{self, Qemu, QemuError};
+use machine::remote::session::LineLosses;
 use machine::remote::{RemoteError, Session, drive, port};
 use machine::travel;
 
@@ -267,24 +269,32 @@ fn check_period(job: &Job, session: &Session) -> Result<()> {
 /// Runs and compares the digest of each pass; where one differs in QEMU, finds the first sample that does.
 fn by_digest(arguments: &Arguments, reference: &Reference<'_>, session: &mut Session) -> Result<BoardRun> {
     let bar = progress(reference.run.samples, "running");
-    let mut console = console(arguments, &bar);
+    let mut console = console(arguments, &bar, reference.job.machine.has_limits());
     let operator = console.as_mut().map(|console| console as &mut dyn Operator);
     let run = comparison::by_digest(reference, session, arguments.target.qemu, operator, |samples| {
         bar.set_position(samples)
     });
     bar.finish_and_clear();
-    Ok(run?)
+    run.map_err(|error| left(error, arguments, reference.job))
+}
+
+/// The failure of a comparison: on a board the run goes on, or is held.
+fn left(error: ComparisonError, arguments: &Arguments, job: &Job) -> Failure {
+    match (error, &arguments.target.port) {
+        (ComparisonError::Remote(error), Some(port)) => unreachable_run(error, port, Some(&job.machine)),
+        (error, _) => error.into(),
+    }
 }
 
 /// The operator's console of a run on a board; QEMU has none.
-fn console(arguments: &Arguments, bar: &ProgressBar) -> Option<Console> {
+fn console(arguments: &Arguments, bar: &ProgressBar, has_limits: bool) -> Option<Console> {
     if arguments.target.qemu {
         return None;
     }
     if !arguments.json {
         bar.suspend(|| to_stderr(format_args!("type a command and Enter: {WORDS}")));
     }
-    Some(Console::new(bar.clone()))
+    Some(Console::new(bar.clone(), Some(has_limits)))
 }
 
 /// Runs with every sample on the line, writes the trace, and compares each sample.
@@ -293,19 +303,31 @@ fn by_sample(arguments: &Arguments, reference: &Reference<'_>, session: &mut Ses
     let (mut file, whole) = begun(wanted, reference.job)?;
     let mut written = Ok(());
     let bar = progress(reference.run.samples, "running");
-    let mut console = console(arguments, &bar);
+    let mut console = console(arguments, &bar, reference.job.machine.has_limits());
     let operator = console.as_mut().map(|console| console as &mut dyn Operator);
-    let run = comparison::by_sample(reference, session, arguments.target.qemu, operator, |sample| {
-        if let (Some(file), Ok(())) = (&mut file, &written) {
-            written = file.write(&inspect::plain(reference.prepared, sample));
-        }
-        if sample.tick % 4096 == 0 {
-            bar.set_position(sample.tick.into());
-        }
-    });
+    let length = reference.run.samples;
+    let run = comparison::by_sample(
+        reference,
+        session,
+        arguments.target.qemu,
+        operator,
+        |samples| {
+            if samples % 4096 == 0 {
+                bar.set_position(samples.min(length));
+            }
+        },
+        |sample| {
+            if let (Some(file), Ok(())) = (&mut file, &written) {
+                written = file.write(&inspect::plain(reference.prepared, sample));
+            }
+        },
+    );
     bar.finish_and_clear();
-    let run = run?;
-    completed(written, file, whole, wanted)?;
+    let run = run.map_err(|error| left(error, arguments, reference.job))?;
+    // Otherwise no file is left behind.
+    if run.is_complete() {
+        completed(written, file, whole, wanted)?;
+    }
     Ok(run)
 }
 
@@ -390,6 +412,14 @@ pub(super) fn command(arguments: &Arguments) -> Result<()> {
             let position = home::of(&prepared).words();
             say!("  home         declared at {position} mm: a simulated board has no axes");
         }
+        if run.losses != LineLosses::default() {
+            let LineLosses { repeated, lost } = run.losses;
+            say!("  line         {repeated} lost events were sent again, {lost} were not");
+        }
+        if run.missing > 0 && run.is_complete() {
+            let missing = run.missing;
+            say!("  trace        {missing} samples did not come: the simulation's, which the digest proves to be the same");
+        }
         if run.status.safety.link_timed_out {
             say!("  host         heartbeat timeout during the run: see cargo sim explain host-gone");
         }
@@ -422,6 +452,9 @@ fn json_of(outcome: &Outcome<'_>, run: &BoardRun, board: &str) -> Value {
     put("tick_cycles_max", json!(run.status.tick_cycles_max));
     put("ticks_per_second", json!(run.ticks_per_second));
     put("samples_lost", json!(run.status.samples_lost));
+    put("events_repeated", json!(run.losses.repeated));
+    put("events_lost", json!(run.losses.lost));
+    put("samples_missing", json!(run.missing));
     put("board", json!(board));
     Value::Object(keys)
 }
