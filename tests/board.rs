@@ -93,8 +93,10 @@ impl Desk {
         let mut answers = Vec::new();
         for reply in self.host.read(&sent) {
             match reply {
-                Reply::Samples(batch) => self.samples.extend(batch.iter().map(|record| record.0)),
-                Reply::PassDigest(pass) => self.passes.push(pass),
+                Reply::Samples { samples, .. } => {
+                    self.samples.extend(samples.iter().map(|record| record.0));
+                }
+                Reply::PassDigest { pass, .. } => self.passes.push(pass),
                 Reply::Halted(status) => self.halts.push(status),
                 answer => answers.push(answer),
             }

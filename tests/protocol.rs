@@ -97,6 +97,7 @@ fn requests() -> Vec<Request> {
         Request::Simulate {
             lines: InputLines(0x102),
         },
+        Request::Repeat { event: 300, count: 4 },
         Request::JobBegin {
             header: Header {
                 axes: Some(axes()),
@@ -155,6 +156,8 @@ fn status() -> Status {
         tick_cycles_max: 20_000,
         samples_lost: 2,
         frames_bad: 3,
+        halts: 4,
+        events: 302,
         safety: SafetyStatus {
             lines: InputLines(1),
             latched: InputLines(0x201),
@@ -220,6 +223,7 @@ fn reasons() -> Vec<Reason> {
             home_nm: [0; 3],
             stands_nm: None,
         },
+        Reason::EventGone { first: 290 },
     ]
 }
 
@@ -260,8 +264,11 @@ fn replies() -> Vec<Reply> {
             number: 3,
             status: status(),
         },
-        Reply::Samples(Batch::from_slice(&[SampleRecord(sample()); 2]).unwrap()),
-        Reply::PassDigest(pass),
+        Reply::Samples {
+            event: 300,
+            samples: Batch::from_slice(&[SampleRecord(sample()); 2]).unwrap(),
+        },
+        Reply::PassDigest { event: 301, pass },
         Reply::Halted(status()),
     ]);
     replies

@@ -119,6 +119,7 @@ fn others() -> Vec<Request> {
         Request::Simulate {
             lines: InputLines::NONE,
         },
+        Request::Repeat { event: 1, count: 1 },
     ]);
     requests.extend(MAKE_READY);
     requests

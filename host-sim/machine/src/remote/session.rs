@@ -264,6 +264,8 @@ impl Session {
     /// # Errors
     /// The line breaks, or no event arrived within the time-out.
     pub fn poll(&mut self) -> Result<Option<Event>, RemoteError> {
+        // What was read after the last answer. An answer here belongs to a request that has been answered already.
+        while self.next_reply()?.is_some() {}
         if let Some(event) = self.events.pop() {
             self.heard = Instant::now();
             if matches!(event, Event::Halted(_)) {
@@ -280,11 +282,8 @@ impl Session {
             return Ok(None);
         }
         std::thread::sleep(GATHER);
-        let before = self.input.len();
-        // A reply at this point belongs to a request that has been answered already.
         self.read_some()?;
-        let grew = self.input.len() != before;
-        while self.next_reply()?.is_some() {}
+        let grew = !self.input.is_empty();
         let (timeout, silent) = if self.stream.is_process() {
             (PROCESS_SILENCE_TIMEOUT, "no word of the run for 13 minutes")
         } else {
