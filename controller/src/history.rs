@@ -154,10 +154,15 @@ mod tests {
             history.push(&frame(event));
             assert_eq!(history.last(), event);
             let first = history.first();
-            let bytes: usize = (first..=event).map(|event| frame(event).len() + LENGTH_BYTES).sum();
+            let bytes: usize = (first..=event)
+                .map(|event| frame(event).len() + LENGTH_BYTES)
+                .sum();
             // One more would not have fitted.
             let one_more = first.checked_sub(1).filter(|event| *event > 0);
-            assert!(bytes <= BYTES && one_more.is_none_or(|event| bytes + frame(event).len() + LENGTH_BYTES > BYTES));
+            assert!(
+                bytes <= BYTES
+                    && one_more.is_none_or(|event| bytes + frame(event).len() + LENGTH_BYTES > BYTES)
+            );
             for asked in first..=event {
                 assert_eq!(repeated(&history, asked, 1), Some(frame(asked)));
             }

@@ -246,7 +246,10 @@ impl fmt::Display for Reason {
             Self::OutOfRange { most, wanted } => write!(formatter, "{wanted} is more than {most}"),
             Self::Unsupported => write!(formatter, "this board cannot do that"),
             Self::NotAtHome { home_nm, stands_nm } => not_at_home(home_nm, stands_nm, formatter),
-            Self::EventGone { first } => write!(formatter, "the board keeps its events from number {first} on only"),
+            Self::EventGone { first } => write!(
+                formatter,
+                "the board keeps its events from number {first} on only"
+            ),
         }
     }
 }

@@ -23,8 +23,14 @@ fn a_run_in_qemu_stays_the_same() {
     let events = u32::try_from(bench.run.passes.len()).unwrap() + 1;
     let losses: [(&str, Loses); 5] = [
         ("the first pass", Box::new(|event, _| event == 1)),
-        ("every second event, once", Box::new(|event, before| event % 2 == 0 && before == 0)),
-        ("the last pass, once", Box::new(move |event, before| event == events - 1 && before == 0)),
+        (
+            "every second event, once",
+            Box::new(|event, before| event % 2 == 0 && before == 0),
+        ),
+        (
+            "the last pass, once",
+            Box::new(move |event, before| event == events - 1 && before == 0),
+        ),
         ("the end", Box::new(move |event, _| event == events)),
         ("everything", Box::new(|_, _| true)),
     ];
@@ -43,9 +49,15 @@ fn the_samples_of_a_run_in_qemu_stay_the_same() {
     let bench = dome();
     let samples = bench.samples();
     let losses: [(&str, Loses); 3] = [
-        ("one frame in ten, once", Box::new(|event, before| event % 10 == 0 && before == 0)),
+        (
+            "one frame in ten, once",
+            Box::new(|event, before| event % 10 == 0 && before == 0),
+        ),
         ("fifty in a row", Box::new(|event, _| (30..80).contains(&event))),
-        ("the last frames and the end, once", Box::new(|event, before| event > 200 && before == 0)),
+        (
+            "the last frames and the end, once",
+            Box::new(|event, before| event > 200 && before == 0),
+        ),
     ];
     for (what, loses) in losses {
         let (_qemu, mut session) = session(&bench, loses);

@@ -101,7 +101,9 @@ fn any_burst_of_lost_events_leaves_a_run_the_same() {
     for length in [2, 5, events] {
         for first in 1..=events - length + 1 {
             for times in [1, u32::MAX] {
-                let burst = Box::new(move |event: u32, before| (first..first + length).contains(&event) && before < times);
+                let burst = Box::new(move |event: u32, before| {
+                    (first..first + length).contains(&event) && before < times
+                });
                 let run = bench.by_digest(&mut session(&bench, burst), false);
                 bench.assert_same(&run, &format!("{length} events from {first} on, {times} times"));
                 assert_eq!(run.compared, bench.run.samples);
@@ -146,7 +148,11 @@ fn lost_samples_come_again() {
             Box::new(move |event, before| event == lost && before == 0),
             &format!("event {lost}"),
         );
-        assert_eq!((run.missing, run.losses.lost, run.losses.repeated), (0, 0, 1), "event {lost}");
+        assert_eq!(
+            (run.missing, run.losses.lost, run.losses.repeated),
+            (0, 0, 1),
+            "event {lost}"
+        );
     }
     for first in (1..events).step_by(17) {
         let burst = move |event, before| (first..first + 4).contains(&event) && before == 0;

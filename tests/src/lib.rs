@@ -174,6 +174,8 @@ pub struct Mock {
     pub unsafe_because: Option<Reason>,
     /// Whether its inputs are simulated, because it has no pins.
     pub simulated: bool,
+    /// How often it heard a sign of life of the host.
+    pub heard: u32,
 }
 
 impl Machine for Mock {
@@ -238,7 +240,9 @@ impl Machine for Mock {
         may_start(&self.status.safety)
     }
 
-    fn heard(&mut self) {}
+    fn heard(&mut self) {
+        self.heard += 1;
+    }
 
     fn simulate(&mut self, lines: InputLines) -> bool {
         if self.simulated {

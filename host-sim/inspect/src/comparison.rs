@@ -353,7 +353,11 @@ mod tests {
         assert_eq!(verdict_without(5, lost, None, false), None);
         let failure = verdict_without(5, lost, None, true).unwrap();
         assert_eq!(failure, "5 samples of the board were lost on the line");
-        assert!(verdict_without(5, lost, Some(7), false).unwrap().contains("first at tick 7"));
+        assert!(
+            verdict_without(5, lost, Some(7), false)
+                .unwrap()
+                .contains("first at tick 7")
+        );
     }
 
     /// A sample of this tick and feed.

@@ -418,7 +418,9 @@ pub(super) fn command(arguments: &Arguments) -> Result<()> {
         }
         if run.missing > 0 && run.is_complete() {
             let missing = run.missing;
-            say!("  trace        {missing} samples did not come: the simulation's, which the digest proves to be the same");
+            say!(
+                "  trace        {missing} samples did not come: the simulation's, which the digest proves to be the same"
+            );
         }
         if run.status.safety.link_timed_out {
             say!("  host         heartbeat timeout during the run: see cargo sim explain host-gone");

@@ -80,7 +80,9 @@ impl Operator for Console {
             OVERRIDE_NORMAL_PERCENT => {}
             _ if self.has_limits == Some(false) => {}
             0 => self.say("warning: the feed override is 0 %: the tool does not move. Type override 100"),
-            percent => self.say(&format!("the feed override is {percent} %, so the run is not compared")),
+            percent => self.say(&format!(
+                "the feed override is {percent} %, so the run is not compared"
+            )),
         }
     }
 

@@ -195,7 +195,10 @@ mod tests {
             received.take(number, vec![pass(number)]);
         }
         assert_eq!(all(&mut received), [1, 2, 3, 4, 5].map(pass));
-        assert_eq!((received.missing(), received.losses()), (None, LineLosses::default()));
+        assert_eq!(
+            (received.missing(), received.losses()),
+            (None, LineLosses::default())
+        );
     }
 
     #[test]

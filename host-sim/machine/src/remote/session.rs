@@ -324,7 +324,8 @@ impl Session {
                 });
             }
             _ if self.events.next() > event => {
-                self.events.count_repeated((self.events.next() - event).min(count.into()));
+                self.events
+                    .count_repeated((self.events.next() - event).min(count.into()));
                 self.repeats = 0;
             }
             _ => {
