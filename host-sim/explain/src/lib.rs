@@ -182,7 +182,7 @@ pub fn fault(fault: Fault) -> (String, &'static str) {
         ),
         FaultKind::LinkTimeout => (
             format!("no word of the host for {value} periods"),
-            "connect again, and resume or stop the run (`cargo sim operate`)",
+            "connect again with `cargo sim operate --port DEV attach`, and resume or stop the run",
         ),
         FaultKind::NotHomed => (
             "the machine is not homed: the position of its axes has not been declared".to_owned(),
