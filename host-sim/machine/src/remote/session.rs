@@ -4,7 +4,7 @@ use std::io::{self, Read, Write};
 use std::time::{Duration, Instant};
 
 use protocol::frame::{DELIMITER, Decoder, FRAME_MAX, write_request};
-use protocol::message::{Capabilities, Reason, Reply, Request, Status, next_number, read_reply};
+use protocol::message::{Capabilities, Clock, Reason, Reply, Request, Status, next_number, read_reply};
 use protocol::version::{PROTOCOL_VERSION, VersionMismatch};
 
 use interp_core::State;
@@ -91,6 +91,8 @@ pub struct Session {
     input: Vec<u8>,
     capabilities: Capabilities,
     keep_alive: Option<Duration>,
+    /// Whether silence is no reason to request the status.
+    quiet: bool,
     /// Whether to wait for a run that stands still.
     patient: bool,
     asked: Instant,
@@ -141,6 +143,7 @@ impl Session {
             input: Vec::new(),
             capabilities: Capabilities::default(),
             keep_alive: None,
+            quiet: false,
             patient: false,
             asked: Instant::now(),
             heard: Instant::now(),
@@ -182,6 +185,11 @@ impl Session {
     #[must_use]
     pub fn keep_alive(&self) -> Option<Duration> {
         self.keep_alive
+    }
+
+    /// Whether [`Self::event`] requests no status however long no event comes: then nothing but the run takes the board's time.
+    pub fn set_quiet(&mut self, quiet: bool) {
+        self.quiet = quiet;
     }
 
     /// Whether [`Self::event`] waits for a run that stands still, because an operator can resume it.
@@ -307,7 +315,7 @@ impl Session {
         let since = self.asked.elapsed();
         self.ending.is_some()
             || self.keep_alive.is_some_and(|every| since >= every)
-            || (since >= look && self.heard.elapsed() >= look)
+            || (!self.quiet && since >= look && self.heard.elapsed() >= look)
     }
 
     /// Requests missing events again, or gives them up.
@@ -353,7 +361,8 @@ impl Session {
             }
             return Ok(());
         }
-        if state == State::Held && !self.patient {
+        // In lockstep the host itself lets time pass, held or not.
+        if state == State::Held && status.clock == Clock::Free && !self.patient {
             return Err(RemoteError::Held);
         }
         if state.is_under_way() {
