@@ -140,11 +140,12 @@ impl Desk {
     }
 }
 
-/// A status without the counters of the session, which do not belong to the run.
+/// A status without what the link fills in and what counts over several runs.
 const fn of_the_run(status: Status) -> Status {
     Status {
         halts: 0,
         events: 0,
+        steps: 0,
         ..status
     }
 }

@@ -19,8 +19,8 @@ use protocol::{
     frame::{Decoder, FRAME_MAX, FrameError, write_reply},
     message::{
         Batch, Capabilities, Clock, Configuration, Description, FaultReport, InputLines, LinkTimeoutAction,
-        PassDigest, Reason, Reply, Report, Request, ResetCause, SafetyStatus, SampleRecord, Status, Words,
-        read_reply, read_request,
+        PassDigest, Reason, Reply, Report, Request, ResetCause, SafetyStatus, SampleRecord, Status,
+        StepSettings, Words, read_reply, read_request,
     },
 };
 
@@ -158,6 +158,7 @@ fn status() -> Status {
         frames_bad: 3,
         halts: 4,
         events: 302,
+        steps: 0x1234_5678,
         safety: SafetyStatus {
             lines: InputLines(1),
             latched: InputLines(0x201),
@@ -404,6 +405,7 @@ fn check_damage(damaged: &[u8], what: &str) {
         status,
         Status {
             frames_bad: bad,
+            steps: StepSettings::from(StepConfig::DEFAULT).digest(),
             ..Status::default()
         },
         "{what}"

@@ -5,7 +5,7 @@ mod safety;
 
 use controller::{link::Link, machine::Instruction};
 use integration_tests::{Call, HELLO, Host, MAKE_READY, Mock, SAFE, frame, upload};
-use interp_core::{job::Header, sample::State};
+use interp_core::{job::Header, sample::State, steps::StepConfig};
 use protocol::{
     PROTOCOL_VERSION,
     digest::job_digest,
@@ -404,6 +404,7 @@ fn a_job_arrives_word_for_word_and_is_checked() {
     }
     let calls = [
         Call::Begin(30),
+        Call::Steps(StepConfig::DEFAULT.check().unwrap()),
         Call::Words(0, words[..20].to_vec()),
         Call::Words(20, words[20..].to_vec()),
         Call::Check(0),

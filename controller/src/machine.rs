@@ -4,7 +4,7 @@ use interp_core::{
     command::Command,
     fault::Fault,
     job::{Header, SurfaceKind, patches_max},
-    steps::CheckedSteps,
+    steps::{CheckedSteps, StepConfig},
 };
 use protocol::message::{
     CHUNK_WORDS_MAX, Clock, Description, InputLines, PassDigest, Reason, Report, Status,
@@ -84,7 +84,7 @@ pub trait Machine {
     /// Identity and capacities of the board.
     fn description(&mut self) -> Description;
 
-    /// The status, without the link's own counters `frames_bad` and `events`.
+    /// The status, without what the link fills in: `frames_bad`, `events`, `steps`.
     fn status(&mut self) -> Status;
 
     /// [`interp_core::Interpolator::load_begin`] through [`crate::realtime::RealTime`].
@@ -113,6 +113,9 @@ pub trait Machine {
     /// # Errors
     /// The core's.
     fn load_finish(&mut self) -> Result<(), Fault>;
+
+    /// The board's own settings of the drives: those of a job that has none.
+    fn own_steps(&mut self) -> StepConfig;
 
     /// [`crate::realtime::RealTime::set_steps`].
     ///

@@ -372,7 +372,7 @@ impl<S: AsRef<[i32]> + AsMut<[i32]>> RealTime<S> {
         self.control.put(halted, events);
     }
 
-    /// The status; the link fills in `frames_bad` and `events`.
+    /// The status; the link fills in `frames_bad`, `events` and `steps`.
     #[must_use]
     #[inline(never)]
     pub fn status(&self) -> Status {
@@ -409,6 +409,7 @@ impl<S: AsRef<[i32]> + AsMut<[i32]>> RealTime<S> {
             frames_bad: 0,
             halts: self.control.halts,
             events: 0,
+            steps: 0,
             safety: self.control.safety.status(),
         }
     }

@@ -10,8 +10,8 @@ use interp_core::{
 use protocol::{
     frame::{DELIMITER, FRAME_MAX, Frame, write_reply},
     message::{
-        Capabilities, Clock, NO_NUMBER, OVERRIDE_MAX_PERCENT, Reason, Reply, Request, Status, next_number,
-        read_request,
+        Capabilities, Clock, NO_NUMBER, OVERRIDE_MAX_PERCENT, Reason, Reply, Request, Status, StepSettings,
+        next_number, read_request,
     },
     version::PROTOCOL_VERSION,
 };
@@ -24,7 +24,7 @@ use crate::{
 };
 
 /// Maximum length of an answer stored for a retransmission, bytes: a frame of `Status` with every varint at its maximum length.
-const ANSWER_MAX: usize = 121;
+const ANSWER_MAX: usize = 126;
 
 /// State of the session.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -91,6 +91,8 @@ pub(crate) struct Session {
     commanded: bool,
     frames_bad: u32,
     events: History,
+    /// Settings of the drives in force; none before the first job: the board's own.
+    steps: Option<StepConfig>,
 }
 
 impl Session {
@@ -103,6 +105,7 @@ impl Session {
             commanded: false,
             frames_bad: 0,
             events: History::new(),
+            steps: None,
         }
     }
 
@@ -114,9 +117,18 @@ impl Session {
         self.frames_bad = self.frames_bad.saturating_add(1);
     }
 
+    /// The status of an answer: with the link's counters, and the settings of the drives.
+    fn complete_with_steps(&mut self, machine: &mut impl Machine) -> Status {
+        let config = self.steps.unwrap_or_else(|| machine.own_steps());
+        self.steps = Some(config);
+        self.complete(machine.status())
+    }
+
     /// The machine's status with the link's own counters.
-    const fn complete(&self, status: Status) -> Status {
+    fn complete(&self, status: Status) -> Status {
+        let steps = self.steps.map_or(0, |config| StepSettings::from(config).digest());
         Status {
+            steps,
             frames_bad: self.frames_bad,
             events: self.events.last(),
             ..status
@@ -236,7 +248,7 @@ impl Session {
             Request::Status => {
                 return Reply::Status {
                     number,
-                    status: self.complete(machine.status()),
+                    status: self.complete_with_steps(machine),
                 };
             }
             Request::JobBegin {
@@ -268,7 +280,7 @@ impl Session {
             }
             Request::Run { ticks } => instruct(machine, Instruction::Run { ticks }),
             Request::Report(report) => instruct(machine, Instruction::Report(report)),
-            Request::StepConfig(settings) => set_steps(machine, settings.into()),
+            Request::StepConfig(settings) => self.set_steps(machine, settings.into()),
             Request::Repeat { event, count } if self.events.repeat(event, count, out) => Ok(()),
             Request::Repeat { .. } => Err(Reason::EventGone {
                 first: self.events.first(),
@@ -295,6 +307,14 @@ impl Session {
         }
         self.commanded = false;
         self.upload = Some(Upload::begin(machine, header, words, digest)?);
+        // Those of the job before are not for this one.
+        let own = machine.own_steps();
+        self.set_steps(machine, own)
+    }
+
+    fn set_steps(&mut self, machine: &mut impl Machine, config: StepConfig) -> Result<(), Reason> {
+        set_steps(machine, config)?;
+        self.steps = Some(config);
         Ok(())
     }
 
@@ -410,6 +430,7 @@ mod tests {
             frames_bad: u32::MAX,
             halts: u32::MAX,
             events: u32::MAX,
+            steps: u32::MAX,
             safety: SafetyStatus {
                 lines: InputLines(u16::MAX),
                 latched: InputLines(u16::MAX),

@@ -35,7 +35,7 @@
 //! | 9 | `Clock` | 0 free, 1 lockstep | `Ack` |
 //! | 10 | `Run` | ticks `u32` | `Ack`, and `Halted` when the ticks are used up |
 //! | 11 | `Report` | 0 digests, 1 samples | `Ack` |
-//! | 12 | `StepConfig` | the fields of [`StepSettings`] | `Ack`; refused while a run is under way |
+//! | 12 | `StepConfig` | the fields of [`StepSettings`] | `Ack`; refused while a run is under way; in force until the next `JobBegin` |
 //! | 13 | `Configure` | the fields of [`Configuration`] | `Ack`, and it holds |
 //! | 14 | `Drives` | 0 off, 1 on | as `Configure` |
 //! | 15 | `SetHome` | three positions in nm, `i32` each | as `Configure` |
@@ -125,7 +125,7 @@ pub enum Request {
         /// Number of the session, any.
         session: u32,
     },
-    /// Begins a job's upload; the job before is dropped. Refused while a run is under way.
+    /// Begins a job's upload; the job before is dropped, and the drives have the board's own settings again. Refused while a run is under way.
     JobBegin {
         /// All but the surface's data.
         #[serde(with = "HeaderFields")]
@@ -164,7 +164,7 @@ pub enum Request {
     },
     /// Reports of a run to the host.
     Report(Report),
-    /// Settings of the axes' drives. Refused while a run is under way.
+    /// Settings of the axes' drives for the loaded job. Refused while a run is under way.
     StepConfig(StepSettings),
     /// Description of the machine around the board. Refused while a run is under way.
     Configure(Configuration),

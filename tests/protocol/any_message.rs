@@ -133,9 +133,9 @@ prop_compose! {
 
 prop_compose! {
     fn any_status()(at in any_sample(), fault in prop::option::of((any::<u8>(), real())), clock in any_clock(),
-                    report in any_report(), counts in any::<[u32; 8]>(), digest in any::<u64>(),
+                    report in any_report(), counts in any::<[u32; 9]>(), digest in any::<u64>(),
                     safety in any_safety()) -> Status {
-        let [credit, samples, deadline_misses, tick_cycles_max, samples_lost, frames_bad, halts, events] = counts;
+        let [credit, samples, deadline_misses, tick_cycles_max, samples_lost, frames_bad, halts, events, steps] = counts;
         Status {
             state: at.state,
             fault: fault.map(|(code, value)| FaultReport { code, value }),
@@ -155,6 +155,7 @@ prop_compose! {
             frames_bad,
             halts,
             events,
+            steps,
             safety,
         }
     }

@@ -12,7 +12,7 @@ use interp_core::{
     encode,
     fault::{Fault, FaultKind},
     job::Header,
-    steps::CheckedSteps,
+    steps::{CheckedSteps, StepConfig},
 };
 use protocol::{
     PROTOCOL_VERSION,
@@ -213,6 +213,10 @@ impl Machine for Mock {
     fn load_finish(&mut self) -> Result<(), Fault> {
         self.calls.push(Call::Finish);
         Ok(())
+    }
+
+    fn own_steps(&mut self) -> StepConfig {
+        StepConfig::DEFAULT
     }
 
     fn set_steps(&mut self, checked: &CheckedSteps) -> Result<(), Fault> {

@@ -2,7 +2,7 @@
 
 use interp_core::{Sample, State};
 use protocol::digest::job_digest;
-use protocol::message::{CHUNK_WORDS_MAX, Clock, PassDigest, Report, Request, Status, Words};
+use protocol::message::{CHUNK_WORDS_MAX, Clock, PassDigest, Report, Request, Status, StepSettings, Words};
 
 use super::operate::{self, Following, Operator};
 use super::session::{Event, LineLosses, RemoteError, Session};
@@ -34,18 +34,15 @@ pub struct Compared {
     pub losses: LineLosses,
 }
 
-/// Uploads a job, and its step output if it gives one. `progress` is called with the number of words transferred.
+/// Uploads a job, then the settings of its drives if it gives any; the board has its own for a job without. `progress` is called with the number of words transferred.
 ///
 /// # Errors
-/// The line breaks, or the board refuses the job.
+/// The line breaks, the board refuses the job, or it reports other settings of the drives than the job's.
 pub fn upload(
     session: &mut Session,
     job: &Prepared,
     mut progress: impl FnMut(usize),
 ) -> Result<(), RemoteError> {
-    if let Some(steps) = job.steps {
-        session.command(&Request::StepConfig(steps.into()))?;
-    }
     let words = u32::try_from(job.words.len()).unwrap_or(u32::MAX);
     let digest = job_digest(&job.words);
     session.command(&Request::JobBegin {
@@ -61,7 +58,16 @@ pub fn upload(
         offset += u32::try_from(chunk.len()).unwrap_or(0);
         progress(offset as usize);
     }
-    session.command(&Request::JobEnd)
+    session.command(&Request::JobEnd)?;
+    let Some(steps) = job.steps.map(StepSettings::from) else {
+        return Ok(());
+    };
+    session.command(&Request::StepConfig(steps))?;
+    if session.status()?.steps == steps.digest() {
+        Ok(())
+    } else {
+        Err(RemoteError::OtherSteps)
+    }
 }
 
 /// Starts the loaded job: in lockstep for a number of periods, or on the board's own clock.

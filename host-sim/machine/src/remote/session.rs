@@ -65,6 +65,9 @@ pub enum RemoteError {
     /// The run stands still while the host waits for its end.
     #[error("the run is held: the board took this host for gone, or another one held it")]
     Held,
+    /// The board drives its axes by other settings than the job's.
+    #[error("the board reports other steps per millimetre, directions or pulse times than the job's")]
+    OtherSteps,
     /// The feed override is 0 and nobody is there to change it.
     #[error("the feed override is 0 %, so the tool does not move, and nobody is there to change it")]
     NoFeed,
