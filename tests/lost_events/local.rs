@@ -219,7 +219,7 @@ fn a_difference_is_found_whatever_is_lost() {
 fn one_run_after_the_other_has_its_own_end() {
     let bench = dome();
     let per_run = events(&bench, false);
-    let loses = move |event: u32, _| event % per_run == 0 && event / per_run % 2 == 1;
+    let loses = move |event: u32, _| event.is_multiple_of(per_run) && event / per_run % 2 == 1;
     let mut session = session(&bench, Box::new(loses));
     for run in 0..4 {
         let ended = bench.by_digest(&mut session, run % 2 == 1);

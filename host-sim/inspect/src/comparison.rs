@@ -156,14 +156,14 @@ pub fn by_sample(
     let mut digest = Digest::new();
     rows.iter().for_each(|sample| digest.sample(sample));
     let is_proven = status.digest == digest.value();
+    // What did not come of a commanded run has nothing to be compared with.
+    let unproven = (!is_proven && (!commanded || missing == 0)).then_some(first_missing);
     let run = BoardRun {
         status,
         compared,
         missing,
         losses: session.losses(),
-        first_difference: difference
-            .map(u64::from)
-            .or((!is_proven && !(commanded && missing > 0)).then_some(first_missing)),
+        first_difference: difference.map(u64::from).or(unproven),
         commanded,
         ticks_per_second,
     };
