@@ -7,6 +7,8 @@ mod local;
 
 use std::collections::{BTreeMap, VecDeque};
 use std::io::{self, Read, Write};
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
 
 use inspect::TimedRun;
 use inspect::comparison::{self, BoardRun, Reference};
@@ -22,7 +24,30 @@ use protocol::message::{Reply, read_reply};
 /// Whether the line loses an event: its number, and how often it was sent before.
 type Loses = Box<dyn FnMut(u32, u32) -> bool + Send>;
 
-/// A line that loses events of the board whole.
+/// Damage of single bytes, both ways, once it is switched on: one bit of about one byte in this number.
+struct Noise {
+    is_on: Arc<AtomicBool>,
+    one_in: u64,
+    /// State of a linear congruential generator.
+    random: u64,
+}
+
+impl Noise {
+    fn damage(&mut self, bytes: &mut [u8]) {
+        for byte in bytes {
+            self.random = self
+                .random
+                .wrapping_mul(6_364_136_223_846_793_005)
+                .wrapping_add(1_442_695_040_888_963_407);
+            let high = self.random >> 33;
+            if self.is_on.load(Ordering::Relaxed) && high.is_multiple_of(self.one_in) {
+                *byte ^= 1 << (self.random >> 20 & 7);
+            }
+        }
+    }
+}
+
+/// A line that loses events of the board whole, and may damage bytes of any frame.
 struct Lossy {
     inner: Box<dyn Stream>,
     loses: Loses,
@@ -31,6 +56,7 @@ struct Lossy {
     ready: VecDeque<u8>,
     /// How often each event was sent.
     sent: BTreeMap<u32, u32>,
+    noise: Option<Noise>,
 }
 
 impl Lossy {
@@ -42,6 +68,14 @@ impl Lossy {
             frame: Vec::new(),
             ready: VecDeque::new(),
             sent: BTreeMap::new(),
+            noise: None,
+        }
+    }
+
+    fn with_noise(inner: Box<dyn Stream>, noise: Noise) -> Self {
+        Self {
+            noise: Some(noise),
+            ..Self::new(inner, Box::new(|_, _| false))
         }
     }
 
@@ -83,13 +117,22 @@ impl Read for Lossy {
         if self.ready.is_empty() {
             return Err(io::ErrorKind::WouldBlock.into());
         }
-        self.ready.read(bytes)
+        let count = self.ready.read(bytes)?;
+        if let Some(noise) = &mut self.noise {
+            noise.damage(&mut bytes[..count]);
+        }
+        Ok(count)
     }
 }
 
 impl Write for Lossy {
     fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
-        self.inner.write(bytes)
+        let mut bytes = bytes.to_vec();
+        if let Some(noise) = &mut self.noise {
+            noise.damage(&mut bytes);
+        }
+        self.inner.write_all(&bytes)?;
+        Ok(bytes.len())
     }
 
     fn flush(&mut self) -> io::Result<()> {

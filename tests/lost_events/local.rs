@@ -2,6 +2,8 @@
 
 use std::collections::VecDeque;
 use std::io::{self, Read, Write};
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
 
 use controller::in_process::Board;
 use interp_core::{Sample, State};
@@ -11,7 +13,7 @@ use machine::remote::operate::{Setup, make_ready};
 use machine::remote::session::{LineLosses, Stream};
 use protocol::message::Configuration;
 
-use super::{Bench, Loses, Lossy, dome, dome_with_limits};
+use super::{Bench, Loses, Lossy, Noise, dome, dome_with_limits};
 
 const WORDS: usize = 64;
 
@@ -50,11 +52,18 @@ impl Write for Wire {
 
 /// A session with the job loaded, over a line that loses events.
 fn session(bench: &Bench, loses: Loses) -> Session {
-    let wire = Wire {
+    loaded(bench, Lossy::new(wire(), loses))
+}
+
+fn wire() -> Box<Wire> {
+    Box::new(Wire {
         board: Box::new(Board::new()),
         sent: VecDeque::new(),
-    };
-    let mut session = Session::open(Box::new(Lossy::new(Box::new(wire), loses)), 1).unwrap();
+    })
+}
+
+fn loaded(bench: &Bench, line: Lossy) -> Session {
+    let mut session = Session::open(Box::new(line), 1).unwrap();
     let home_nm = bench.prepared.header.axes.map_or([0; 3], |axes| axes.home_nm);
     make_ready(&mut session, &Setup::homed(Configuration::DEFAULT, home_nm)).unwrap();
     drive::upload(&mut session, &bench.prepared, |_| {}).unwrap();
@@ -174,6 +183,36 @@ fn samples_that_never_come_are_proven_by_the_digest() {
         assert!(run.missing > 0 && run.losses.lost > 0, "{what}: {run:?}");
         assert_eq!(run.compared + run.missing, bench.run.samples, "{what}");
     }
+}
+
+/// One byte in some hundred is damaged, in either direction: requests, answers and events, in any combination.
+#[test]
+fn a_noisy_line_leaves_a_run_the_same() {
+    let bench = dome();
+    let mut losses = LineLosses::default();
+    for seed in 1..=6 {
+        let is_on = Arc::new(AtomicBool::new(false));
+        let noise = Noise {
+            is_on: is_on.clone(),
+            one_in: 400,
+            random: seed,
+        };
+        let mut session = loaded(&bench, Lossy::with_noise(wire(), noise));
+        is_on.store(true, Ordering::Relaxed);
+        let what = format!("seed {seed}");
+        let run = if seed % 2 == 0 {
+            bench.by_digest(&mut session, seed % 4 == 0)
+        } else {
+            let (run, trace) = bench.by_sample(&mut session, seed % 4 == 1);
+            assert_trace(&bench, &trace, &what);
+            run
+        };
+        bench.assert_same(&run, &what);
+        losses.repeated += run.losses.repeated;
+        losses.lost += run.losses.lost;
+    }
+    // Frames of samples are so long that about half of them are damaged; some come again before the board drops them.
+    assert!(losses.repeated > 5 && losses.lost > 5, "{losses:?}");
 }
 
 /// A run that differs is found to differ, whatever is lost: by digest and sample by sample.
