@@ -1,6 +1,8 @@
 //! A session between host and board, step by step, with a machine that records its calls: each invalid frame or request
 //! has a defined answer and no effect.
 
+mod events;
+mod life;
 mod safety;
 
 use controller::{link::Link, machine::Instruction};
@@ -9,11 +11,7 @@ use interp_core::{job::Header, sample::State, steps::StepConfig};
 use protocol::{
     PROTOCOL_VERSION,
     digest::job_digest,
-    frame::{FRAME_MAX, write_reply},
-    message::{
-        Clock, Configuration, FaultReport, InputLines, PassDigest, Reason, Reply, Report, Request, Status,
-        Words,
-    },
+    message::{Clock, Configuration, FaultReport, InputLines, Reason, Reply, Report, Request, Status, Words},
 };
 
 /// Both ends of a line, with a mock machine.
@@ -257,116 +255,6 @@ fn unreadable() -> Vec<u8> {
     bytes.extend(&payload);
     bytes.push(0);
     bytes
-}
-
-/// A host is alive by the requests that are answered, executed or refused; noise, damaged and foreign frames are no host.
-#[test]
-fn only_a_request_is_a_sign_of_life() {
-    let mut line = Line::open().in_state(State::Running);
-    assert_eq!(line.mock.heard, 1);
-    let mut damaged = frame(2, &Request::Status);
-    damaged[3] ^= 0x10;
-    // The board's own answer, as by a bridge between its two lines.
-    let echo = write_reply(&Reply::Ack { number: 4 }, &mut [0; FRAME_MAX])
-        .unwrap()
-        .to_vec();
-    for bytes in [
-        vec![0x55; 700],
-        vec![0; 50],
-        damaged,
-        unreadable(),
-        frame(3, &Request::Status),
-        frame(0, &Request::Status),
-        echo,
-        b"hold\n\0resume\n\0".to_vec(),
-    ] {
-        line.give(&bytes);
-        line.give(&[0]);
-        assert_eq!(line.mock.heard, 1, "{bytes:?}");
-    }
-    let request = frame(2, &Request::Status);
-    line.give(&request);
-    line.give(&request);
-    assert_eq!(line.mock.heard, 3);
-    // Refused because the run is under way.
-    line.give(&frame(3, &Request::Start));
-    assert_eq!(line.mock.heard, 4);
-
-    // A host of another version, and one without a session, are none either.
-    let mut line = Line::default();
-    line.give(&frame(1, &Request::Status));
-    let other = Request::Hello {
-        version: PROTOCOL_VERSION + 1,
-        session: 1,
-    };
-    line.give(&frame(1, &other));
-    line.give(&frame(2, &Request::Status));
-    assert_eq!(line.mock.heard, 0);
-}
-
-/// Events are numbered from 1 in each session and sent again byte for byte, as long as they are kept.
-#[test]
-fn an_event_again_is_the_same_event() {
-    let mut line = Line::open();
-    let mut sent = Vec::new();
-    let pass = |line: &mut Line, pass| {
-        let pass = PassDigest {
-            pass,
-            ..PassDigest::default()
-        };
-        let mut bytes = Vec::new();
-        line.link.pass(&pass, &mut |frame| bytes.extend_from_slice(frame));
-        bytes
-    };
-    for number in 0..300 {
-        sent.push(pass(&mut line, number));
-    }
-    let Reply::PassDigest { event: 300, .. } = line.host.read(&sent[299])[..][0] else {
-        panic!("not numbered from 1")
-    };
-    let Reply::Status { status, .. } = line.ask(&Request::Status) else {
-        panic!("no status")
-    };
-    assert_eq!(status.events, 300);
-    let Reason::EventGone { first } = line.refused(&Request::Repeat { event: 1, count: 1 }) else {
-        panic!("not gone")
-    };
-    // About a hundred passes are kept.
-    assert!((150..250).contains(&first), "{first}");
-    assert_eq!(
-        line.refused(&Request::Repeat { event: 301, count: 1 }),
-        Reason::EventGone { first }
-    );
-    for event in [first, 299] {
-        let request = line.host.next(&Request::Repeat { event, count: 2 });
-        let again = line.give(&request);
-        let index = event as usize - 1;
-        assert!(again.starts_with(&sent[index..index + 2].concat()), "{event}");
-        let ack = Reply::Ack {
-            number: line.host.number,
-        };
-        assert_eq!(line.host.read(&again).last(), Some(&ack));
-        // The same request again is only acknowledged again.
-        let again = line.give(&request);
-        assert_eq!(line.host.read(&again), [ack]);
-    }
-    let other = Request::Hello {
-        version: PROTOCOL_VERSION,
-        session: 2,
-    };
-    assert!(matches!(line.ask(&other), Reply::Capabilities(_)));
-    assert_eq!(
-        line.refused(&Request::Repeat {
-            event: first,
-            count: 1
-        }),
-        Reason::EventGone { first: 1 }
-    );
-    let first = pass(&mut line, 0);
-    assert!(matches!(
-        line.host.read(&first)[..],
-        [Reply::PassDigest { event: 1, .. }]
-    ));
 }
 
 #[test]

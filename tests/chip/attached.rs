@@ -82,6 +82,11 @@ fn a_resumed_run_is_not_held_again() {
     let emulated = Emulated::in_real_time(&SKR_PRO);
     begun_and_left(&emulated);
     when_held(&emulated);
+    let (done, said) = emulated.run(&job().path, "0,0,60");
+    assert!(
+        !done && said.contains("a run is under way") && said.contains("attach"),
+        "{said}"
+    );
     let (done, said) = operate(&emulated, &["attach"], "");
     assert!(
         !done && said.contains("the run is held") && said.contains("attach"),

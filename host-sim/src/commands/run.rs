@@ -11,6 +11,7 @@ use serde_json::{Value, json};
 use super::attach::unreachable_run;
 use super::flash::{board_of, board_parser};
 use super::home::{self, PositionNm};
+use super::operate::sentence;
 use super::out::{say, to_stderr};
 use super::outcome::Outcome;
 use super::simulate::{WantedReport, remarks, report, surveyed, timed};
@@ -239,6 +240,13 @@ fn declared(arguments: &Arguments, prepared: &Prepared) -> Option<PositionNm> {
 
 /// Configures the board, switches its drives on, and declares home if the position is known.
 fn make_ready(arguments: &Arguments, job: &Job, prepared: &Prepared, session: &mut Session) -> Result<()> {
+    let status = session.status()?;
+    if let (true, Some(port)) = (status.state.is_under_way(), &arguments.target.port) {
+        return Err(Failure::Failed(Some(format!(
+            "a run is under way on the board: {}\n  help: follow it with cargo sim operate --port {port} attach, or end it there with stop",
+            sentence(&status)
+        ))));
+    }
     let setup = Setup {
         configuration: prepare::configuration(&job.machine),
         home_nm: declared(arguments, prepared).map(|position| position.0),
@@ -412,27 +420,32 @@ pub(super) fn command(arguments: &Arguments) -> Result<()> {
             let position = home::of(&prepared).words();
             say!("  home         declared at {position} mm: a simulated board has no axes");
         }
-        if run.losses != LineLosses::default() {
-            let LineLosses { repeated, lost } = run.losses;
-            say!("  line         {repeated} lost events were sent again, {lost} were not");
-        }
-        if run.missing > 0 && run.is_complete() {
-            let missing = run.missing;
-            say!(
-                "  trace        {missing} samples did not come: the simulation's, which the digest proves to be the same"
-            );
-        }
-        if run.status.safety.link_timed_out {
-            say!("  host         heartbeat timeout during the run: see cargo sim explain host-gone");
-        }
-        match (run.commanded, run.first_difference) {
-            (true, _) => say!("  compared     nothing: the run had operator commands or a feed override"),
-            (false, None) => compared(&run, "bit for bit the same"),
-            (false, Some(_)) => compared(&run, "NOT the same"),
-        }
+        print_line(&run);
     }
     let failure = failure.or_else(|| models_failure(&mut peer, arguments.json));
     failure.map_or(Ok(()), |failure| Err(Failure::Failed(Some(failure))))
+}
+
+/// What the line did to the run, and the result of the comparison.
+fn print_line(run: &BoardRun) {
+    if run.losses != LineLosses::default() {
+        let LineLosses { repeated, lost } = run.losses;
+        say!("  line         {repeated} lost events were sent again, {lost} were not");
+    }
+    if run.missing > 0 && run.is_complete() {
+        let missing = run.missing;
+        say!(
+            "  trace        {missing} samples did not come: the simulation's, which the digest proves to be the same"
+        );
+    }
+    if run.status.safety.link_timed_out {
+        say!("  host         heartbeat timeout during the run: see cargo sim explain host-gone");
+    }
+    match (run.commanded, run.first_difference) {
+        (true, _) => say!("  compared     nothing: the run had operator commands or a feed override"),
+        (false, None) => compared(run, "bit for bit the same"),
+        (false, Some(_)) => compared(run, "NOT the same"),
+    }
 }
 
 fn compared(run: &BoardRun, verdict: &str) {
