@@ -39,6 +39,7 @@ fn samples_of_dome(missed_after: Option<usize>) -> Vec<Sample> {
         if missed_after == Some(samples.len()) {
             core.controlled_stop(Fault::new(FaultKind::DeadlineMissed, 1.0));
         }
+        core.plan();
         samples.push(*core.tick(None));
     }
     samples.pop();
@@ -390,11 +391,13 @@ fn in_lockstep_commands_and_halts_come_on_top_of_no_period() {
         let mut way = Way::default();
         half.obey(command, &mut way);
         half.tick(TickInput::default(), &mut way);
+        half.plan();
         way.events
     };
     let tick = |half: &mut RealTime<[i32; WORDS]>| {
         let mut way = Way::default();
         half.tick(TickInput::default(), &mut way);
+        half.plan();
         way.events
     };
     assert_eq!(obey(&mut half, Instruction::Run { ticks: 2 }), []);
@@ -422,6 +425,7 @@ fn a_full_output_stops_time_in_lockstep_only() {
     let mut tick = |half: &mut RealTime<[i32; WORDS]>, full| {
         way.full = full;
         half.tick(TickInput::default(), &mut way);
+        half.plan();
         core::mem::take(&mut way.events)
     };
     assert_eq!(tick(&mut half, true), []);
@@ -438,6 +442,7 @@ fn a_full_output_stops_time_in_lockstep_only() {
     );
     while half.status().state.is_under_way() {
         half.tick(TickInput::default(), &mut Way::default());
+        half.plan();
     }
     half.obey(Instruction::Clock(Clock::Free), &mut Way::default());
     half.obey(start, &mut Way::default());
@@ -447,6 +452,7 @@ fn a_full_output_stops_time_in_lockstep_only() {
     };
     for _ in 0..3 {
         half.tick(TickInput::default(), &mut way);
+        half.plan();
     }
     assert_eq!((half.status().samples, half.status().samples_lost), (3, 3));
 }
