@@ -4,6 +4,7 @@
 //! All times are the chip's own: on a busy machine these tests take longer, and their figures stay the same. `BLESS=1` rewrites the golden
 //! files.
 
+mod attached;
 mod disturbed;
 mod emulated;
 mod pulses;

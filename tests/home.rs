@@ -68,7 +68,9 @@ impl Desk {
         let mut answer = None;
         for reply in self.host.read(&self.board.take_sent()) {
             match reply {
-                Reply::Samples(batch) => self.path.extend(batch.iter().map(|record| record.0.cl_nm)),
+                Reply::Samples { samples, .. } => {
+                    self.path.extend(samples.iter().map(|record| record.0.cl_nm));
+                }
                 Reply::Halted(status) => self.halted = Some(status),
                 Reply::Ack { .. } => answer = Some(Ok(())),
                 Reply::Nak { reason, .. } => answer = Some(Err(reason)),

@@ -15,6 +15,7 @@ mod home;
 mod house;
 mod images;
 mod import;
+mod lost_events;
 mod no_panic;
 mod operations;
 mod oracle_golden;

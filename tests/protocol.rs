@@ -19,8 +19,8 @@ use protocol::{
     frame::{Decoder, FRAME_MAX, FrameError, write_reply},
     message::{
         Batch, Capabilities, Clock, Configuration, Description, FaultReport, InputLines, LinkTimeoutAction,
-        PassDigest, Reason, Reply, Report, Request, ResetCause, SafetyStatus, SampleRecord, Status, Words,
-        read_reply, read_request,
+        PassDigest, Reason, Reply, Report, Request, ResetCause, SafetyStatus, SampleRecord, Status,
+        StepSettings, Words, read_reply, read_request,
     },
 };
 
@@ -97,6 +97,7 @@ fn requests() -> Vec<Request> {
         Request::Simulate {
             lines: InputLines(0x102),
         },
+        Request::Repeat { event: 300, count: 4 },
         Request::JobBegin {
             header: Header {
                 axes: Some(axes()),
@@ -155,6 +156,9 @@ fn status() -> Status {
         tick_cycles_max: 20_000,
         samples_lost: 2,
         frames_bad: 3,
+        halts: 4,
+        events: 302,
+        steps: 0x1234_5678,
         safety: SafetyStatus {
             lines: InputLines(1),
             latched: InputLines(0x201),
@@ -220,6 +224,7 @@ fn reasons() -> Vec<Reason> {
             home_nm: [0; 3],
             stands_nm: None,
         },
+        Reason::EventGone { first: 290 },
     ]
 }
 
@@ -260,8 +265,11 @@ fn replies() -> Vec<Reply> {
             number: 3,
             status: status(),
         },
-        Reply::Samples(Batch::from_slice(&[SampleRecord(sample()); 2]).unwrap()),
-        Reply::PassDigest(pass),
+        Reply::Samples {
+            event: 300,
+            samples: Batch::from_slice(&[SampleRecord(sample()); 2]).unwrap(),
+        },
+        Reply::PassDigest { event: 301, pass },
         Reply::Halted(status()),
     ]);
     replies
@@ -380,7 +388,14 @@ fn check_damage(damaged: &[u8], what: &str) {
         !replies.is_empty() && replies.iter().all(is_bad_frame),
         "{what}: {replies:?}"
     );
-    assert_eq!(mock, Mock::default(), "{what}");
+    assert_eq!(
+        mock,
+        Mock {
+            heard: 1,
+            ..Mock::default()
+        },
+        "{what}"
+    );
     let [Reply::Status { number: 2, status }] = give(&mut link, &mut mock, &frame(2, &Request::Status))[..]
     else {
         panic!("{what}: no status");
@@ -390,6 +405,7 @@ fn check_damage(damaged: &[u8], what: &str) {
         status,
         Status {
             frames_bad: bad,
+            steps: StepSettings::from(StepConfig::DEFAULT).digest(),
             ..Status::default()
         },
         "{what}"

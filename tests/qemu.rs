@@ -295,7 +295,7 @@ fn an_emergency_stop_ends_the_run_on_the_board() {
     assert_eq!((again.samples, again.digest), (500, stopped.digest));
 }
 
-/// On the free clock, the run is held after two seconds of board time without a frame, and is then resumed. `tests/safety.rs`
+/// On the free clock, the run is held after two seconds of board time without a request, and is then resumed. `tests/safety.rs`
 /// checks that it resumes exactly; here the samples up to each standstill are compared with the host's.
 #[test]
 fn a_run_whose_host_is_gone_is_held_on_the_board() {

@@ -12,7 +12,7 @@ use interp_core::{
     fault::{Fault, FaultKind},
     sample::State,
 };
-use machine::remote::operate::{Operator, Setup, act, make_ready};
+use machine::remote::operate::{Operator, Setup, act, follow, make_ready};
 use machine::remote::session::{Event as Told, Stream};
 use machine::remote::{RemoteError, Session, drive};
 use protocol::message::{Clock, Configuration, InputLines, LinkTimeoutAction, Reason, Request, Status};
@@ -345,7 +345,82 @@ fn a_host_that_waits_is_not_gone() {
     desk.running();
     desk.tick(1000);
     desk.session.set_keep_alive(Some(std::time::Duration::ZERO));
-    assert!(matches!(desk.session.event(), Err(RemoteError::Held)));
+    // The passes before the standstill come first.
+    let mut events = std::iter::repeat_with(|| desk.session.event());
+    let last = events.find(|event| !matches!(event, Ok(Told::Pass(_))));
+    assert!(matches!(last, Some(Err(RemoteError::Held))), "{last:?}");
+}
+
+/// A run that is held because its host was gone goes on when another host follows it and resumes it, to its end and without another hold: that host keeps
+/// the heartbeat. One that only resumes it, and leaves, finds it held again.
+#[test]
+fn a_held_run_is_followed_to_its_end() {
+    let mut setup = Setup::homed(Configuration::DEFAULT, [0; 3]);
+    (
+        setup.configuration.on_link_timeout,
+        setup.configuration.link_timeout_ticks,
+    ) = (LinkTimeoutAction::Hold, 400);
+    let mut desk = Desk::loaded(&setup);
+    desk.running();
+    assert_eq!(desk.tick(450).state, State::Held);
+    desk.session = Session::open(wire(&desk.board), 2).unwrap();
+    desk.ask(Request::Resume).unwrap();
+    let held = desk.tick(450);
+    assert_eq!((held.state, held.fault), (State::Held, None));
+    assert!(held.samples < undisturbed().1);
+
+    desk.session = Session::open(wire(&desk.board), 3).unwrap();
+    let mut operator = Scripted {
+        wishes: vec![Request::Status, Request::Resume].into_iter(),
+        stays: false,
+        came: Vec::new(),
+    };
+    let mut passes = 0;
+    let ended = follow(&mut desk.session, &mut operator, |event| {
+        passes += u32::from(matches!(event, Told::Pass(_)));
+    });
+    let ended = ended.unwrap();
+    assert_eq!(operator.came, [Ok(State::Held), Ok(State::Running)]);
+    assert_eq!(
+        (ended.state, ended.digest, ended.samples),
+        (State::Finished, undisturbed().0, undisturbed().1)
+    );
+    assert!(passes > 3 && ended.safety.link_timed_out);
+
+    // Nothing is under way any more, so there is nothing to follow.
+    let again = follow(&mut desk.session, &mut operator, |_| panic!("no event")).unwrap();
+    assert_eq!(again.state, State::Finished);
+}
+
+/// Who follows a held run and can no longer resume it does not wait; nor does he where the override is 0 and nobody can change it.
+#[test]
+fn a_run_that_stands_still_is_not_waited_for_without_an_operator() {
+    let nobody = || Scripted {
+        wishes: Vec::new().into_iter(),
+        stays: false,
+        came: Vec::new(),
+    };
+    let mut desk = Desk::ready();
+    desk.running();
+    desk.ask(Request::Hold).unwrap();
+    assert_eq!(desk.tick(50).state, State::Held);
+    desk.session.set_keep_alive(Some(std::time::Duration::ZERO));
+    let left = follow(&mut desk.session, &mut nobody(), |_| {});
+    assert!(matches!(left, Err(RemoteError::Held)), "{left:?}");
+
+    let mut desk = Desk::ready();
+    desk.ask(Request::Override { percent: 0 }).unwrap();
+    let left = drive::run_digests(&mut desk.session, &[], false, Some(&mut nobody()), |_| {});
+    assert!(matches!(left, Err(RemoteError::NoFeed)), "{left:?}");
+    // A run with an operator is waited for, and he can set it again.
+    let mut desk = Desk::ready();
+    desk.ask(Request::Override { percent: 0 }).unwrap();
+    let mut operator = Scripted {
+        wishes: vec![Request::Override { percent: 100 }].into_iter(),
+        ..nobody()
+    };
+    let ended = drive::run_digests(&mut desk.session, &[], false, Some(&mut operator), |_| {}).unwrap();
+    assert_eq!((ended.status.state, ended.commanded), (State::Finished, true));
 }
 
 /// Issues the given requests one after the other, and records the results.

@@ -1,11 +1,13 @@
 //! A session between host and board, step by step, with a machine that records its calls: each invalid frame or request
 //! has a defined answer and no effect.
 
+mod events;
+mod life;
 mod safety;
 
 use controller::{link::Link, machine::Instruction};
 use integration_tests::{Call, HELLO, Host, MAKE_READY, Mock, SAFE, frame, upload};
-use interp_core::{job::Header, sample::State};
+use interp_core::{job::Header, sample::State, steps::StepConfig};
 use protocol::{
     PROTOCOL_VERSION,
     digest::job_digest,
@@ -53,11 +55,13 @@ impl Line {
         self.answer(&frame)
     }
 
-    /// The reason why the next request is refused. The request must not reach the machine.
+    /// The reason why the next request is refused. The request must not reach the machine, but it is a sign of life if the number is used up.
     fn refused(&mut self, request: &Request) -> Reason {
         let before = self.mock.clone();
         let answer = self.ask(request);
-        assert_eq!(self.mock, before);
+        let heard =
+            before.heard + u32::from(matches!(answer, Reply::Nak { reason, .. } if reason.uses_number()));
+        assert_eq!(self.mock, Mock { heard, ..before });
         let Reply::Nak { number, reason } = answer else {
             panic!("{request:?}: {answer:?}")
         };
@@ -119,6 +123,7 @@ fn others() -> Vec<Request> {
         Request::Simulate {
             lines: InputLines::NONE,
         },
+        Request::Repeat { event: 1, count: 1 },
     ]);
     requests.extend(MAKE_READY);
     requests
@@ -164,7 +169,8 @@ fn a_request_again_is_answered_again_and_done_once() {
         let first = line.give(&frame);
         let (machine, again) = (line.mock.clone(), line.give(&frame));
         assert_eq!(first, again, "{request:?}");
-        assert_eq!(line.mock, machine, "{request:?}");
+        let heard = machine.heard + 1;
+        assert_eq!(line.mock, Mock { heard, ..machine }, "{request:?}");
         line.host.read(&first);
     }
 }
@@ -241,17 +247,21 @@ fn hello_again_changes_nothing_and_a_new_session_restarts_the_numbers() {
     assert_eq!(line.refused(first), Reason::NoUpload);
 }
 
-#[test]
-fn an_unreadable_request_uses_no_number() {
-    let mut line = Line::open();
-    // A `Start` with an additional field.
+/// The frame of a `Start` with the number 2 and an additional field. No byte of it is 0, so it is one block of COBS.
+fn unreadable() -> Vec<u8> {
     let mut payload = vec![2, 4, 1];
     payload.extend(crc(&payload));
     let mut bytes = vec![u8::try_from(payload.len() + 1).unwrap()];
     bytes.extend(&payload);
     bytes.push(0);
+    bytes
+}
+
+#[test]
+fn an_unreadable_request_uses_no_number() {
+    let mut line = Line::open();
     assert_eq!(
-        line.answer(&bytes),
+        line.answer(&unreadable()),
         Reply::Nak {
             number: 2,
             reason: Reason::Unreadable
@@ -282,6 +292,7 @@ fn a_job_arrives_word_for_word_and_is_checked() {
     }
     let calls = [
         Call::Begin(30),
+        Call::Steps(StepConfig::DEFAULT.check().unwrap()),
         Call::Words(0, words[..20].to_vec()),
         Call::Words(20, words[20..].to_vec()),
         Call::Check(0),

@@ -6,7 +6,7 @@ use std::vec::Vec;
 use interp_core::{
     fault::Fault,
     job::{Header, STORE_WORDS},
-    steps::{BUFFER_WORDS, CheckedSteps},
+    steps::{BUFFER_WORDS, CheckedSteps, StepConfig},
 };
 use protocol::message::{Description, InputLines, Reason, Status};
 
@@ -67,6 +67,10 @@ impl<const WORDS: usize> Machine for Half<WORDS> {
 
     fn load_finish(&mut self) -> Result<(), Fault> {
         self.real_time.load_finish()
+    }
+
+    fn own_steps(&mut self) -> StepConfig {
+        StepConfig::DEFAULT
     }
 
     fn set_steps(&mut self, checked: &CheckedSteps) -> Result<(), Fault> {

@@ -27,6 +27,7 @@
 #[cfg(any(test, feature = "std"))]
 extern crate std;
 
+mod history;
 #[cfg(any(test, feature = "std"))]
 pub mod in_process;
 pub mod link;

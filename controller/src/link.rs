@@ -47,11 +47,8 @@ impl Link {
             None => {}
             Some(Ok(frame)) => {
                 // Earlier events are sent before the answer.
-                if !self.batch.is_empty() {
-                    send(&Reply::Samples(core::mem::take(&mut self.batch)), out);
-                }
-                self.session.frame(frame, machine, out);
-                if self.is_open() {
+                flush(&mut self.batch, &mut self.session, out);
+                if self.session.frame(frame, machine, out) {
                     machine.heard();
                 }
             }
@@ -101,24 +98,27 @@ impl Link {
 
     /// Writes the samples collected so far, as an answer and every other event do.
     pub fn flush(&mut self, out: &mut impl FnMut(&[u8])) {
-        if !self.batch.is_empty() {
-            send(&Reply::Samples(core::mem::take(&mut self.batch)), out);
-        }
+        flush(&mut self.batch, &mut self.session, out);
     }
 
     /// Writes the end of a pass.
     pub fn pass(&mut self, pass: &PassDigest, out: &mut impl FnMut(&[u8])) {
         self.flush(out);
-        if self.is_open() {
-            send(&Reply::PassDigest(*pass), out);
-        }
+        let pass = *pass;
+        self.session.event(|event| Reply::PassDigest { event, pass }, out);
     }
 
     /// Writes the end of a run, or that its ticks are used up.
     pub fn halted(&mut self, status: &Status, out: &mut impl FnMut(&[u8])) {
         self.flush(out);
-        if self.is_open() {
-            send(&Reply::Halted(self.session.complete(*status)), out);
-        }
+        self.session.halted(status, out);
+    }
+}
+
+/// Writes the samples collected so far, if there are any. Not a method, because a frame of the decoder is borrowed where it is called.
+fn flush(batch: &mut Batch, session: &mut Session, out: &mut impl FnMut(&[u8])) {
+    if !batch.is_empty() {
+        let samples = core::mem::take(batch);
+        session.event(|event| Reply::Samples { event, samples }, out);
     }
 }

@@ -4,7 +4,7 @@ use interp_core::{
     command::Command,
     fault::Fault,
     job::{Header, SurfaceKind, patches_max},
-    steps::CheckedSteps,
+    steps::{CheckedSteps, StepConfig},
 };
 use protocol::message::{
     CHUNK_WORDS_MAX, Clock, Description, InputLines, PassDigest, Reason, Report, Status,
@@ -84,7 +84,7 @@ pub trait Machine {
     /// Identity and capacities of the board.
     fn description(&mut self) -> Description;
 
-    /// The status, without the link's own counter `frames_bad`.
+    /// The status, without what the link fills in: `frames_bad`, `events`, `steps`.
     fn status(&mut self) -> Status;
 
     /// [`interp_core::Interpolator::load_begin`] through [`crate::realtime::RealTime`].
@@ -114,6 +114,9 @@ pub trait Machine {
     /// The core's.
     fn load_finish(&mut self) -> Result<(), Fault>;
 
+    /// The board's own settings of the drives: those of a job that has none.
+    fn own_steps(&mut self) -> StepConfig;
+
     /// [`crate::realtime::RealTime::set_steps`].
     ///
     /// # Errors
@@ -138,7 +141,7 @@ pub trait Machine {
     /// Why no run may start.
     fn may_start(&mut self) -> Result<(), Reason>;
 
-    /// Reports a valid frame from the host.
+    /// Reports a sign of life of the host: a request that the session answered.
     fn heard(&mut self);
 
     /// Sets simulated inputs; false where the board reads real ones.

@@ -367,11 +367,12 @@ impl<S: AsRef<[i32]> + AsMut<[i32]>> RealTime<S> {
     #[cold]
     #[inline(never)]
     fn halt(&mut self, events: &mut impl Events) {
+        self.control.halts = self.control.halts.wrapping_add(1);
         let halted = Event::Halted(self.status_now());
         self.control.put(halted, events);
     }
 
-    /// The status; the link fills in `frames_bad`.
+    /// The status; the link fills in `frames_bad`, `events` and `steps`.
     #[must_use]
     #[inline(never)]
     pub fn status(&self) -> Status {
@@ -406,11 +407,14 @@ impl<S: AsRef<[i32]> + AsMut<[i32]>> RealTime<S> {
             tick_cycles_max: run.tick_cycles_max,
             samples_lost: run.events_lost,
             frames_bad: 0,
+            halts: self.control.halts,
+            events: 0,
+            steps: 0,
             safety: self.control.safety.status(),
         }
     }
 
-    /// Reports a valid frame from the host.
+    /// Reports a sign of life of the host.
     pub const fn heard(&mut self) {
         self.control.safety.heard();
     }

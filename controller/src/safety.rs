@@ -182,7 +182,7 @@ impl Safety {
         self.settled = UNSETTLED;
     }
 
-    /// Reports a valid frame from the host.
+    /// Reports a sign of life of the host.
     pub(crate) const fn heard(&mut self) {
         self.ticks_to_timeout = match self.status.configuration.link_timeout_ticks {
             0 => u32::MAX,

@@ -10,20 +10,21 @@ use interp_core::{
 use protocol::{
     frame::{DELIMITER, FRAME_MAX, Frame, write_reply},
     message::{
-        Capabilities, Clock, NO_NUMBER, OVERRIDE_MAX_PERCENT, Reason, Reply, Request, Status, next_number,
-        read_request,
+        Capabilities, Clock, NO_NUMBER, OVERRIDE_MAX_PERCENT, Reason, Reply, Request, Status, StepSettings,
+        next_number, read_request,
     },
     version::PROTOCOL_VERSION,
 };
 
 use crate::{
+    history::History,
     machine::{Busy, Instruction, Machine},
     safety::Order,
     upload::Upload,
 };
 
 /// Maximum length of an answer stored for a retransmission, bytes: a frame of `Status` with every varint at its maximum length.
-const ANSWER_MAX: usize = 111;
+const ANSWER_MAX: usize = 126;
 
 /// State of the session.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -89,6 +90,9 @@ pub(crate) struct Session {
     /// A start, hold, resume, stop or abort was sent, and may still be queued.
     commanded: bool,
     frames_bad: u32,
+    events: History,
+    /// Settings of the drives in force; none before the first job: the board's own.
+    steps: Option<StepConfig>,
 }
 
 impl Session {
@@ -100,6 +104,8 @@ impl Session {
             clock: Clock::Free,
             commanded: false,
             frames_bad: 0,
+            events: History::new(),
+            steps: None,
         }
     }
 
@@ -111,21 +117,50 @@ impl Session {
         self.frames_bad = self.frames_bad.saturating_add(1);
     }
 
-    /// The machine's status with the link's own counter.
-    pub(crate) const fn complete(&self, status: Status) -> Status {
+    /// The status of an answer: with the link's counters, and the settings of the drives.
+    fn complete_with_steps(&mut self, machine: &mut impl Machine) -> Status {
+        let config = self.steps.unwrap_or_else(|| machine.own_steps());
+        self.steps = Some(config);
+        self.complete(machine.status())
+    }
+
+    /// The machine's status with the link's own counters.
+    fn complete(&self, status: Status) -> Status {
+        let steps = self.steps.map_or(0, |config| StepSettings::from(config).digest());
         Status {
+            steps,
             frames_bad: self.frames_bad,
+            events: self.events.last(),
             ..status
         }
     }
 
-    /// Answers a frame.
+    /// Writes the next event, made with its number, and keeps it. Without a session it is dropped.
+    pub(crate) fn event(&mut self, make: impl FnOnce(u32) -> Reply, out: &mut impl FnMut(&[u8])) {
+        if !self.is_open() {
+            return;
+        }
+        let mut buffer = [0; FRAME_MAX];
+        if let Ok(frame) = write_reply(&make(self.events.next()), &mut buffer) {
+            self.events.push(frame);
+            out(frame);
+        }
+    }
+
+    /// Writes the end of a run, or that its ticks are used up.
+    pub(crate) fn halted(&mut self, status: &Status, out: &mut impl FnMut(&[u8])) {
+        let status = self.complete(*status);
+        self.event(|events| Reply::Halted(Status { events, ..status }), out);
+    }
+
+    /// Answers a frame. Whether it is a sign of life: a request that was carried out or refused on its merits, now or when it was first sent. Noise, frames of
+    /// another session and requests out of order are none.
     pub(crate) fn frame(
         &mut self,
         frame: Frame<'_>,
         machine: &mut impl Machine,
         out: &mut impl FnMut(&[u8]),
-    ) {
+    ) -> bool {
         let (number, request) = match read_request(frame.payload) {
             Ok((number, request)) => (number, Some(request)),
             Err(unreadable) => (unreadable.number, None),
@@ -141,14 +176,21 @@ impl Session {
             };
             out(&[DELIMITER]);
             send(&Reply::Capabilities(capabilities), out);
-        } else if self.last.is(number, &frame) {
+            return self.is_open();
+        }
+        if self.last.is(number, &frame) {
             out(&self.last.answer);
-        } else if let Some(reason) = self.refusal(number) {
+            return true;
+        }
+        if let Some(reason) = self.refusal(number) {
             send(&Reply::Nak { number, reason }, out);
-        } else if let Some(request) = request {
-            let answer = self.answer(number, request, machine);
+            return false;
+        }
+        if let Some(request) = request {
+            let answer = self.answer(number, request, machine, out);
             self.last.set(number, &frame, &answer);
             out(&self.last.answer);
+            true
         } else {
             send(
                 &Reply::Nak {
@@ -157,6 +199,7 @@ impl Session {
                 },
                 out,
             );
+            false
         }
     }
 
@@ -170,6 +213,7 @@ impl Session {
         if peer != self.peer {
             self.peer = peer;
             self.upload = None;
+            self.events.clear();
             self.last = Last {
                 number,
                 ..Last::new()
@@ -193,12 +237,18 @@ impl Session {
     }
 
     /// Executes a request.
-    fn answer(&mut self, number: u16, request: Request, machine: &mut impl Machine) -> Reply {
+    fn answer(
+        &mut self,
+        number: u16,
+        request: Request,
+        machine: &mut impl Machine,
+        out: &mut impl FnMut(&[u8]),
+    ) -> Reply {
         let done = match request {
             Request::Status => {
                 return Reply::Status {
                     number,
-                    status: self.complete(machine.status()),
+                    status: self.complete_with_steps(machine),
                 };
             }
             Request::JobBegin {
@@ -230,7 +280,11 @@ impl Session {
             }
             Request::Run { ticks } => instruct(machine, Instruction::Run { ticks }),
             Request::Report(report) => instruct(machine, Instruction::Report(report)),
-            Request::StepConfig(settings) => set_steps(machine, settings.into()),
+            Request::StepConfig(settings) => self.set_steps(machine, settings.into()),
+            Request::Repeat { event, count } if self.events.repeat(event, count, out) => Ok(()),
+            Request::Repeat { .. } => Err(Reason::EventGone {
+                first: self.events.first(),
+            }),
             // Answered by the caller.
             Request::Hello { .. } => Err(Reason::Unreadable),
         };
@@ -253,6 +307,14 @@ impl Session {
         }
         self.commanded = false;
         self.upload = Some(Upload::begin(machine, header, words, digest)?);
+        // Those of the job before are not for this one.
+        let own = machine.own_steps();
+        self.set_steps(machine, own)
+    }
+
+    fn set_steps(&mut self, machine: &mut impl Machine, config: StepConfig) -> Result<(), Reason> {
+        set_steps(machine, config)?;
+        self.steps = Some(config);
         Ok(())
     }
 
@@ -366,6 +428,9 @@ mod tests {
             tick_cycles_max: u32::MAX,
             samples_lost: u32::MAX,
             frames_bad: u32::MAX,
+            halts: u32::MAX,
+            events: u32::MAX,
+            steps: u32::MAX,
             safety: SafetyStatus {
                 lines: InputLines(u16::MAX),
                 latched: InputLines(u16::MAX),

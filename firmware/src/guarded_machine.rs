@@ -7,7 +7,11 @@ use controller::{
     safety::Order,
 };
 use heapless::spsc::Producer;
-use interp_core::{fault::Fault, job::Header, steps::CheckedSteps};
+use interp_core::{
+    fault::Fault,
+    job::Header,
+    steps::{CheckedSteps, StepConfig},
+};
 use protocol::message::{Description, InputLines, Reason, Status};
 use rtic::Mutex;
 
@@ -64,6 +68,10 @@ impl<M: Mutex<T = BoardRealTime>> Machine for GuardedMachine<'_, M> {
 
     fn load_finish(&mut self) -> Result<(), Fault> {
         self.real_time.lock(|real_time| real_time.load_finish())
+    }
+
+    fn own_steps(&mut self) -> StepConfig {
+        board::STEPS
     }
 
     fn set_steps(&mut self, checked: &CheckedSteps) -> Result<(), Fault> {

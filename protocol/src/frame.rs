@@ -17,7 +17,7 @@ pub use crate::frame_error::FrameError;
 use crate::message::{Numbered, Reply, Request};
 
 /// Maximum payload, bytes: a `Samples` message with every varint at its maximum length.
-pub const PAYLOAD_MAX: usize = 288;
+pub const PAYLOAD_MAX: usize = 293;
 
 /// Bytes of the checksum.
 const CRC_BYTES: usize = 4;
@@ -161,7 +161,10 @@ mod tests {
             cl_nm: [i32::MIN; 3],
             inv_interval_sq: f32::MAX,
         };
-        let samples = Reply::Samples([SampleRecord(sample); SAMPLES_MAX].into_iter().collect());
+        let samples = Reply::Samples {
+            event: u32::MAX,
+            samples: [SampleRecord(sample); SAMPLES_MAX].into_iter().collect(),
+        };
         let mut buffer = [0; FRAME_MAX];
         let length = write_reply(&samples, &mut buffer).unwrap().len();
         assert!(

@@ -21,6 +21,7 @@
 //! | `Configure`, `Drives`, `SetHome`, `Acknowledge` | → ← | `Ack` or `Nak` |
 //! | `Run` | → ← | `Ack` or `Nak`, later `Halted` |
 //! | `Status` | → ← | `Status` |
+//! | `Repeat` | → ← | events again, then `Ack`; or `Nak` |
 //! | | ← | `Samples`, `PassDigest`, `Halted` while a run goes on |
 //!
 //! The module's documentation has every message's bytes. One request is outstanding at a time; each has a number, and gets
@@ -48,9 +49,13 @@
 //! | a start, or a home, while the drives are off | `Nak`, `DrivesOff` | |
 //! | a start while the axes do not stand at the job's home | `Nak`, `NotAtHome` with both positions | |
 //! | a value beyond its range | `Nak`, `OutOfRange` with the range | |
+//! | a `Repeat` of an event that is not kept any more | `Nak`, `EventGone` with the first that is | |
 //!
-//! Where the last column is empty, nothing has changed. An event that the line damages is lost: the host detects the loss by a
-//! missing tick or pass, and by `Status`, whose digest covers the whole run.
+//! Where the last column is empty, nothing has changed. An event that the line damages is lost: the host sees it by the numbers of the
+//! events around it or by a status, and asks for it again ([`message`]).
+//!
+//! A host counts as alive by requests that the board answers: the next one, or the last one again. Whatever is answered with `BadFrame`, `Unreadable`,
+//! `SayHello`, `Version` or `OutOfOrder` does not count.
 //!
 //! # Digests: [`digest`]
 //!

@@ -35,7 +35,7 @@
 //! | 9 | `Clock` | 0 free, 1 lockstep | `Ack` |
 //! | 10 | `Run` | ticks `u32` | `Ack`, and `Halted` when the ticks are used up |
 //! | 11 | `Report` | 0 digests, 1 samples | `Ack` |
-//! | 12 | `StepConfig` | the fields of [`StepSettings`] | `Ack`; refused while a run is under way |
+//! | 12 | `StepConfig` | the fields of [`StepSettings`] | `Ack`; refused while a run is under way; in force until the next `JobBegin` |
 //! | 13 | `Configure` | the fields of [`Configuration`] | `Ack`, and it holds |
 //! | 14 | `Drives` | 0 off, 1 on | as `Configure` |
 //! | 15 | `SetHome` | three positions in nm, `i32` each | as `Configure` |
@@ -43,6 +43,7 @@
 //! | 17 | `Override` | percent `u8` | as `Start` |
 //! | 18 | `Stop` | | as `Start` |
 //! | 19 | `Simulate` | inputs `u16` | `Ack`, by a board without pins only |
+//! | 20 | `Repeat` | event `u32`, count `u8` | these events again, then `Ack` |
 //!
 //! Header: kind, pattern, spacing, tool side (a byte each), spans along path and side (`u16`), ball radius (mm), feed (mm/s),
 //! scallop height (mm), period (s) (`f32`); then 0, or 1 and the axes' limits: velocity (mm/s), acceleration (mm/s^2), jerk (mm/s^3)
@@ -59,12 +60,19 @@
 //! | 1 | `Ack` | number |
 //! | 2 | `Nak` | number, [`Reason`] (its code and fields) |
 //! | 3 | `Status` | number, the fields of [`Status`] |
-//! | 4 | `Samples` | list of samples (tick, state, pass, path and side parameter, feed, CC and CL, interval) |
-//! | 5 | `PassDigest` | the fields of [`PassDigest`] |
-//! | 6 | `Halted` | the fields of [`Status`] |
+//! | 4 | `Samples` | event `u32`, list of samples (tick, state, pass, path and side parameter, feed, CC and CL, interval) |
+//! | 5 | `PassDigest` | event `u32`, the fields of [`PassDigest`] |
+//! | 6 | `Halted` | the fields of [`Status`], with the event in `events` |
 //!
 //! A parameter is its span (`u16`) and fraction. `Halted` comes when the ticks of a `Run` are used up, or when a run ends
 //! (finished, faulted, aborted), whichever is first.
+//!
+//! # Lost events
+//!
+//! Each event has a number: 1, 2, .. from the session's `Hello` on, without a gap. The board keeps the latest events in some kilobytes and sends
+//! them again for `Repeat`, with the numbers and bytes that they had. A host sees a loss by the next event's number, or by `events` of a status, which is
+//! the number of the last event before it. The board counts each `Halted` in `halts`, so a status tells the end of a run whose `Halted` was
+//! lost, and its digest covers the whole run.
 //!
 //! # Compatibility
 //!
@@ -117,7 +125,7 @@ pub enum Request {
         /// Number of the session, any.
         session: u32,
     },
-    /// Begins a job's upload; the job before is dropped. Refused while a run is under way.
+    /// Begins a job's upload; the job before is dropped, and the drives have the board's own settings again. Refused while a run is under way.
     JobBegin {
         /// All but the surface's data.
         #[serde(with = "HeaderFields")]
@@ -156,7 +164,7 @@ pub enum Request {
     },
     /// Reports of a run to the host.
     Report(Report),
-    /// Settings of the axes' drives. Refused while a run is under way.
+    /// Settings of the axes' drives for the loaded job. Refused while a run is under way.
     StepConfig(StepSettings),
     /// Description of the machine around the board. Refused while a run is under way.
     Configure(Configuration),
@@ -185,6 +193,13 @@ pub enum Request {
     Simulate {
         /// Inputs that are asserted from the next period on.
         lines: InputLines,
+    },
+    /// Asks for events of this session again.
+    Repeat {
+        /// Number of the first.
+        event: u32,
+        /// How many; fewer where the last one comes before.
+        count: u8,
     },
 }
 
@@ -274,10 +289,20 @@ pub enum Reply {
         status: Status,
     },
     /// Samples of the run, in order.
-    Samples(Batch),
+    Samples {
+        /// Number of the event.
+        event: u32,
+        /// The samples.
+        samples: Batch,
+    },
     /// A pass is over.
-    PassDigest(PassDigest),
-    /// The ticks of a `Run` are used up, or the run is over.
+    PassDigest {
+        /// Number of the event.
+        event: u32,
+        /// The pass.
+        pass: PassDigest,
+    },
+    /// The ticks of a `Run` are used up, or the run is over. The number of the event is the status's `events`.
     Halted(Status),
 }
 
@@ -376,7 +401,7 @@ mod tests {
         assert_eq!(read_request(&[]), Err(Unreadable { number: NO_NUMBER }));
         assert_eq!(read_request(&[9]), Err(Unreadable { number: 9 }));
         // an unknown code, a missing field, a byte left over, an unknown clock
-        for payload in [&[9, 20][..], &[9, 10], &[9, 4, 0], &[9, 9, 2]] {
+        for payload in [&[9, 21][..], &[9, 10], &[9, 4, 0], &[9, 9, 2]] {
             assert_eq!(
                 read_request(payload),
                 Err(Unreadable { number: 9 }),

@@ -112,6 +112,11 @@ pub enum Reason {
         /// Position of the axes, nm; none after a job without axis limits, which leaves it unknown.
         stands_nm: Option<[i32; 3]>,
     },
+    /// 19: the event asked for is not kept any more, or was not sent yet.
+    EventGone {
+        /// The earliest event that is kept; the number of the next one where none is.
+        first: u32,
+    },
 }
 
 impl Reason {
@@ -138,6 +143,7 @@ impl Reason {
             Self::OutOfRange { .. } => 16,
             Self::Unsupported => 17,
             Self::NotAtHome { .. } => 18,
+            Self::EventGone { .. } => 19,
         }
     }
 
@@ -240,6 +246,10 @@ impl fmt::Display for Reason {
             Self::OutOfRange { most, wanted } => write!(formatter, "{wanted} is more than {most}"),
             Self::Unsupported => write!(formatter, "this board cannot do that"),
             Self::NotAtHome { home_nm, stands_nm } => not_at_home(home_nm, stands_nm, formatter),
+            Self::EventGone { first } => write!(
+                formatter,
+                "the board keeps its events from number {first} on only"
+            ),
         }
     }
 }

@@ -14,6 +14,7 @@ use serde::{Deserialize, Deserializer, Serialize, Serializer, de, ser::Serialize
 
 use crate::{
     codes,
+    digest::Digest,
     safety::{InputLines, SafetyStatus},
 };
 
@@ -148,6 +149,12 @@ pub struct Status {
     pub samples_lost: u32,
     /// Unreadable frames from the host since power-up.
     pub frames_bad: u32,
+    /// `Halted` since power-up, modulo 2^32; of a `Halted` its own number.
+    pub halts: u32,
+    /// Number of the last event of this session; of a `Halted` its own.
+    pub events: u32,
+    /// Digest of the settings of the drives in force: [`StepSettings::digest`].
+    pub steps: u32,
     /// Inputs, drives, home.
     pub safety: SafetyStatus,
 }
@@ -171,6 +178,9 @@ impl Default for Status {
             tick_cycles_max: 0,
             samples_lost: 0,
             frames_bad: 0,
+            halts: 0,
+            events: 0,
+            steps: 0,
             safety: SafetyStatus::DEFAULT,
         }
     }
@@ -285,6 +295,26 @@ pub struct StepSettings {
     setup_slots: u16,
 }
 
+impl StepSettings {
+    /// Digest of every value, by which host and board compare the settings in force: the [`Digest`] of three words for each axis and two for the times,
+    /// its halves combined by exclusive or.
+    #[must_use]
+    pub const fn digest(&self) -> u32 {
+        let mut digest = Digest::new();
+        let mut axes: &[(u32, u32, bool)] = &self.axes;
+        while let [(steps, mm, inverted), rest @ ..] = axes {
+            digest.word(*steps);
+            digest.word(*mm);
+            digest.word(*inverted as u32);
+            axes = rest;
+        }
+        digest.word(self.pulse_slots as u32);
+        digest.word(self.setup_slots as u32);
+        let value = digest.value();
+        ((value >> 32) ^ (value & 0xffff_ffff)) as u32
+    }
+}
+
 impl From<StepConfig> for StepSettings {
     fn from(config: StepConfig) -> Self {
         Self {
@@ -358,5 +388,21 @@ impl<'de> Deserialize<'de> for Words {
         }
 
         deserializer.deserialize_seq(Visitor)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::digest::job_digest;
+
+    #[test]
+    fn settings_have_the_digest_of_their_words() {
+        let mut config = StepConfig::DEFAULT;
+        (config.axes[1].mm, config.axes[2].inverted) = (7, true);
+        (config.pulse_slots, config.setup_slots) = (3, 258);
+        let value = job_digest(&[400, 1, 0, 400, 7, 0, 400, 1, 1, 3, 258]);
+        let [low, high] = [value & 0xffff_ffff, value >> 32];
+        assert_eq!(u64::from(StepSettings::from(config).digest()), low ^ high);
     }
 }

@@ -101,7 +101,7 @@ pub struct Configuration {
     pub homing_required: bool,
     /// Reaction of a run to a link timeout.
     pub on_link_timeout: LinkTimeoutAction,
-    /// Link timeout: periods without a frame of the host; 0: none.
+    /// Link timeout: periods without a sign of life of the host; 0: none.
     pub link_timeout_ticks: u32,
 }
 

@@ -1,11 +1,12 @@
 //! The steps of a run, and step settings sent over the line.
 
+use integration_tests::{dome, upload};
 use interp_core::{
     fault::FaultKind,
     sample::State,
     steps::{AxisSteps, StepConfig},
 };
-use protocol::message::{Clock, Reason, Reply, Report, Request};
+use protocol::message::{Clock, Reason, Reply, Report, Request, StepSettings};
 
 use super::Desk;
 
@@ -95,4 +96,37 @@ fn steps_are_checked_and_not_changed_under_a_run() {
             state: State::Running
         }
     );
+}
+
+/// A job has the settings of its own drives, or the board's: not those of the job before it. The status tells which are in force.
+#[test]
+fn no_job_inherits_the_steps_of_the_one_before() {
+    let mut desk = Desk::loaded(Clock::Lockstep, Report::Digests);
+    let own = StepConfig::DEFAULT;
+    let checked = own.check().unwrap();
+    desk.board.real_time().set_step_pins(checked, [9, 11, 13]);
+    let (mut inverted, mut pulse) = (own, own);
+    inverted.axes[2].inverted = true;
+    pulse.pulse_slots = 3;
+    for other in [steps_of_x(100), inverted, pulse] {
+        desk.accepted(&Request::StepConfig(other.into()));
+        let in_force = |desk: &mut Desk, config: StepConfig| {
+            let settings = *desk.board.real_time().steps().unwrap().settings();
+            assert_eq!(settings, config.check().unwrap());
+            let Reply::Status { status, .. } = desk.ask(&Request::Status) else {
+                panic!("no status")
+            };
+            assert_eq!(status.steps, StepSettings::from(config).digest());
+        };
+        in_force(&mut desk, other);
+        assert_ne!(
+            StepSettings::from(other).digest(),
+            StepSettings::from(own).digest()
+        );
+        let (header, words) = dome();
+        for request in upload(header, &words) {
+            desk.accepted(&request);
+        }
+        in_force(&mut desk, own);
+    }
 }

@@ -1,5 +1,6 @@
 //! A board's image on the models of its chip, and its output: the report, and every change of the pins.
 
+use std::io::Write;
 use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Stdio};
 use std::sync::OnceLock;
@@ -63,12 +64,30 @@ fn built() -> &'static Built {
 
 /// Runs the tool with these arguments and an empty standard input. Returns whether it succeeded, and its output.
 pub(super) fn sim<S: AsRef<std::ffi::OsStr>>(arguments: impl IntoIterator<Item = S>) -> (bool, String) {
-    let output = Command::new(&built().sim)
+    sim_typed(arguments, "")
+}
+
+/// Begins to run the tool with these arguments.
+pub(super) fn begin_sim<S: AsRef<std::ffi::OsStr>>(arguments: impl IntoIterator<Item = S>) -> Child {
+    Command::new(&built().sim)
         .args(arguments)
         .current_dir(workspace())
-        .stdin(Stdio::null())
-        .output()
-        .unwrap();
+        .stdin(Stdio::piped())
+        .stdout(Stdio::piped())
+        .stderr(Stdio::piped())
+        .spawn()
+        .unwrap()
+}
+
+/// Runs the tool with these arguments and this standard input. Returns whether it succeeded, and its output.
+pub(super) fn sim_typed<S: AsRef<std::ffi::OsStr>>(
+    arguments: impl IntoIterator<Item = S>,
+    typed: &str,
+) -> (bool, String) {
+    let mut child = begin_sim(arguments);
+    // The end of standard input comes with the drop.
+    child.stdin.take().unwrap().write_all(typed.as_bytes()).unwrap();
+    let output = child.wait_with_output().unwrap();
     let said = [output.stdout, output.stderr].concat();
     (
         output.status.success(),
@@ -101,7 +120,12 @@ pub(super) struct Edge {
 
 impl Emulated {
     pub(super) fn start(board: &'static Board, arguments: &[&str]) -> Self {
-        Self::begin(board, arguments, false)
+        Self::begin(board, &[&["--fast"], arguments].concat(), false)
+    }
+
+    /// Starts an execution in real time, for what waits for the host.
+    pub(super) fn in_real_time(board: &'static Board) -> Self {
+        Self::begin(board, &[], false)
     }
 
     fn begin(board: &'static Board, arguments: &[&str], is_recorded: bool) -> Self {
@@ -113,7 +137,6 @@ impl Emulated {
         }
         let child = command
             .arg(workspace().join(image))
-            .arg("--fast")
             .arg("--pty")
             .arg(folder.path().join("line"))
             .arg("--report")
@@ -138,10 +161,10 @@ impl Emulated {
 
     /// Starts an execution that records every change of the outputs.
     pub(super) fn recorded(board: &'static Board, arguments: &[&str]) -> Self {
-        Self::begin(board, arguments, true)
+        Self::begin(board, &[&["--fast"], arguments].concat(), true)
     }
 
-    fn port(&self) -> String {
+    pub(super) fn port(&self) -> String {
         self.folder.path().join("line").to_str().unwrap().to_owned()
     }
 

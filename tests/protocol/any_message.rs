@@ -117,6 +117,7 @@ pub(crate) fn any_request() -> impl Strategy<Value = Request> {
         any::<[i32; 3]>().prop_map(|home_nm| Request::SetHome { home_nm }),
         any::<u8>().prop_map(|percent| Request::Override { percent }),
         any_lines().prop_map(|lines| Request::Simulate { lines }),
+        any::<(u32, u8)>().prop_map(|(event, count)| Request::Repeat { event, count }),
         any_steps().prop_map(|config| Request::StepConfig(config.into())),
     ]
 }
@@ -132,9 +133,9 @@ prop_compose! {
 
 prop_compose! {
     fn any_status()(at in any_sample(), fault in prop::option::of((any::<u8>(), real())), clock in any_clock(),
-                    report in any_report(), counts in any::<[u32; 6]>(), digest in any::<u64>(),
+                    report in any_report(), counts in any::<[u32; 9]>(), digest in any::<u64>(),
                     safety in any_safety()) -> Status {
-        let [credit, samples, deadline_misses, tick_cycles_max, samples_lost, frames_bad] = counts;
+        let [credit, samples, deadline_misses, tick_cycles_max, samples_lost, frames_bad, halts, events, steps] = counts;
         Status {
             state: at.state,
             fault: fault.map(|(code, value)| FaultReport { code, value }),
@@ -152,6 +153,9 @@ prop_compose! {
             tick_cycles_max,
             samples_lost,
             frames_bad,
+            halts,
+            events,
+            steps,
             safety,
         }
     }
@@ -195,6 +199,7 @@ fn any_reason() -> impl Strategy<Value = Reason> {
         any::<(u32, u32)>().prop_map(|(wanted, received)| Reason::Incomplete { wanted, received }),
         any::<(u64, u64)>().prop_map(|(wanted, received)| Reason::WrongDigest { wanted, received }),
         any::<u32>().prop_map(|expected| Reason::WrongOffset { expected }),
+        any::<u32>().prop_map(|first| Reason::EventGone { first }),
     ]
 }
 
@@ -205,16 +210,20 @@ pub(crate) fn any_reply() -> impl Strategy<Value = Reply> {
         any::<u16>().prop_map(|number| Reply::Ack { number }),
         (any::<u16>(), any_reason()).prop_map(|(number, reason)| Reply::Nak { number, reason }),
         (any::<u16>(), any_status()).prop_map(|(number, status)| Reply::Status { number, status }),
-        samples.prop_map(|samples| Reply::Samples(samples.into_iter().collect())),
-        (any::<[u32; 3]>(), any::<u64>(), real()).prop_map(
-            |([pass, first_tick, samples], digest, interval)| {
-                Reply::PassDigest(PassDigest {
+        (any::<u32>(), samples).prop_map(|(event, samples)| Reply::Samples {
+            event,
+            samples: samples.into_iter().collect()
+        }),
+        (any::<[u32; 4]>(), any::<u64>(), real()).prop_map(
+            |([event, pass, first_tick, samples], digest, interval)| {
+                let pass = PassDigest {
                     pass,
                     first_tick,
                     samples,
                     digest,
                     interval,
-                })
+                };
+                Reply::PassDigest { event, pass }
             }
         ),
         any_status().prop_map(Reply::Halted),

@@ -12,7 +12,7 @@ use interp_core::{
     encode,
     fault::{Fault, FaultKind},
     job::Header,
-    steps::CheckedSteps,
+    steps::{CheckedSteps, StepConfig},
 };
 use protocol::{
     PROTOCOL_VERSION,
@@ -174,6 +174,8 @@ pub struct Mock {
     pub unsafe_because: Option<Reason>,
     /// Whether its inputs are simulated, because it has no pins.
     pub simulated: bool,
+    /// How often it heard a sign of life of the host.
+    pub heard: u32,
 }
 
 impl Machine for Mock {
@@ -213,6 +215,10 @@ impl Machine for Mock {
         Ok(())
     }
 
+    fn own_steps(&mut self) -> StepConfig {
+        StepConfig::DEFAULT
+    }
+
     fn set_steps(&mut self, checked: &CheckedSteps) -> Result<(), Fault> {
         self.calls.push(Call::Steps(*checked));
         Ok(())
@@ -238,7 +244,9 @@ impl Machine for Mock {
         may_start(&self.status.safety)
     }
 
-    fn heard(&mut self) {}
+    fn heard(&mut self) {
+        self.heard += 1;
+    }
 
     fn simulate(&mut self, lines: InputLines) -> bool {
         if self.simulated {

@@ -34,6 +34,8 @@ pub(super) struct Control {
     pub(super) obeyed: bool,
     pub(super) spent: bool,
     pub(super) tick_budget: u32,
+    /// Halts reported, or lost, since power-up.
+    pub(super) halts: u32,
     pub(super) clock: Clock,
     /// Planning of the last period.
     pub(super) planning: Planning,
@@ -53,6 +55,7 @@ impl Control {
             obeyed: false,
             spent: false,
             tick_budget: u32::MAX,
+            halts: 0,
             clock: Clock::Free,
             planning: Planning::Complete,
             report: Report::Digests,

@@ -182,7 +182,7 @@ pub fn fault(fault: Fault) -> (String, &'static str) {
         ),
         FaultKind::LinkTimeout => (
             format!("no word of the host for {value} periods"),
-            "connect again, and resume or stop the run (`cargo sim operate`)",
+            "connect again with `cargo sim operate --port DEV attach`, and resume or stop the run",
         ),
         FaultKind::NotHomed => (
             "the machine is not homed: the position of its axes has not been declared".to_owned(),
@@ -270,6 +270,7 @@ mod tests {
                 home_nm: [1, -2, 3],
                 stands_nm: Some([4, 5, 6]),
             },
+            Reason::EventGone { first: 4 },
         ]
     }
 

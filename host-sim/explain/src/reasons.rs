@@ -3,7 +3,7 @@
 use super::{Entry, Family};
 
 /// In the order of codes.
-pub(super) const ENTRIES: [Entry; 19] = [
+pub(super) const ENTRIES: [Entry; 20] = [
     reason(
         0,
         "bad-frame",
@@ -174,6 +174,15 @@ pub(super) const ENTRIES: [Entry; 19] = [
         "The declared home differs from the job's `home_mm`, or another job or an aborted run has left the axes elsewhere.",
         "Set the job's home to the position of the axes in [machine]: `home_mm = [X, Y, Z]`. Or switch the drives off, move the axes to the job's home, and declare it: `cargo sim run JOB --port DEV --home X,Y,Z`.",
         "Home declared at 0, 0, 0 for a job with `home_mm = [0, 0, 50]`.",
+    ),
+    reason(
+        19,
+        "event-gone",
+        "The board does not keep the event any more.",
+        "The number of the earliest event that it keeps.",
+        "The line lost more than some kilobytes of events in a row, or the host asked late. The board's final digest still covers the whole run.",
+        "Nothing: `cargo sim run` compares the final digest instead. If it happens often, check cable, hub and the computer's load.",
+        "A cable unplugged for a second while every sample is reported.",
     ),
 ];
 

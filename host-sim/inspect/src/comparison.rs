@@ -11,6 +11,7 @@ use interp_core::{Fault, FaultKind, Sample, State};
 use job::{Job, JobError};
 use machine::prepare::Prepared;
 use machine::remote::operate::Operator;
+use machine::remote::session::LineLosses;
 use machine::remote::{RemoteError, Session, drive};
 use protocol::digest::Digest;
 use protocol::message::Status;
@@ -36,6 +37,10 @@ pub struct BoardRun {
     pub status: Status,
     /// Number of samples compared, by digest or bit by bit.
     pub compared: u64,
+    /// Samples that were wanted one by one and did not come. If the run has no other difference, its digest proves that they are the core's.
+    pub missing: u64,
+    /// What the line lost of the board's events.
+    pub losses: LineLosses,
     /// Tick of the first sample that differs, or of the first pass that does where only digests are known; `None` if all are
     /// identical.
     pub first_difference: Option<u64>,
@@ -108,13 +113,17 @@ pub fn by_digest(
     Ok(BoardRun {
         status: compared.status,
         compared: compared.samples,
+        missing: 0,
+        losses: compared.losses,
         first_difference,
         commanded: compared.commanded,
         ticks_per_second,
     })
 }
 
-/// Runs the loaded job on a board and compares every sample bit by bit. `each` receives the samples of the board.
+/// Runs the loaded job on a board and compares every sample bit by bit. `progress` receives the number of samples so far, and `each`, at the end, the samples
+/// of the board. In the place of those that the line lost it gets the core's, if the board's digest proves that they are the same; otherwise none at all
+/// ([`BoardRun::is_complete`]).
 ///
 /// # Errors
 /// [`ComparisonError`].
@@ -123,29 +132,65 @@ pub fn by_sample(
     session: &mut Session,
     lockstep: bool,
     operator: Option<&mut dyn Operator>,
-    mut each: impl FnMut(&Sample),
+    mut progress: impl FnMut(u64),
+    each: impl FnMut(&Sample),
 ) -> Result<BoardRun, ComparisonError> {
     let ours = samples_of(reference, 0, u32::MAX)?;
     let mut theirs = Vec::with_capacity(ours.len());
-    let mut digest = Digest::new();
     let start = Instant::now();
     let (status, commanded) = drive::run_samples(session, lockstep, operator, |sample| {
-        digest.sample(sample);
-        each(sample);
         theirs.push(*sample);
+        progress(theirs.len() as u64);
     })?;
     let ticks_per_second = rate(theirs.len() as u64, start);
-    let difference = drive::first_difference(&ours, &theirs)
-        .filter(|_| !commanded)
-        .map(u64::from);
-    let wrong_digest = (status.digest != digest.value()).then_some(reference.run.samples);
-    Ok(BoardRun {
+    let missing = u64::from(status.samples).saturating_sub(theirs.len() as u64);
+    let compared = theirs.len().min(ours.len()) as u64;
+    let in_place = |(ours, theirs): &(&Sample, &Sample)| ours.tick == theirs.tick;
+    let first_missing = ours.iter().zip(&theirs).take_while(in_place).count() as u64;
+    let (rows, difference) = if commanded || missing == 0 {
+        let difference = drive::first_difference(&ours, &theirs).filter(|_| !commanded);
+        (theirs, difference)
+    } else {
+        completed(&ours, &theirs)
+    };
+    let mut digest = Digest::new();
+    rows.iter().for_each(|sample| digest.sample(sample));
+    let is_proven = status.digest == digest.value();
+    // What did not come of a commanded run has nothing to be compared with.
+    let unproven = (!is_proven && (!commanded || missing == 0)).then_some(first_missing);
+    let run = BoardRun {
         status,
-        compared: theirs.len().min(ours.len()) as u64,
-        first_difference: difference.or(wrong_digest),
+        compared,
+        missing,
+        losses: session.losses(),
+        first_difference: difference.map(u64::from).or(unproven),
         commanded,
         ticks_per_second,
-    })
+    };
+    if run.is_complete() {
+        rows.iter().for_each(each);
+    }
+    Ok(run)
+}
+
+/// The board's samples with the core's where they are missing, and the tick of the first that came and differs. Both are in the order of their ticks.
+fn completed(ours: &[Sample], theirs: &[Sample]) -> (Vec<Sample>, Option<u32>) {
+    let mut rows = Vec::with_capacity(ours.len());
+    let mut came = theirs.iter().peekable();
+    let mut first_difference = None;
+    for our in ours {
+        match came.next_if(|sample| sample.tick <= our.tick) {
+            Some(sample) => {
+                let difference = drive::first_difference(&[*our], &[*sample]);
+                first_difference = first_difference.or(difference);
+                rows.push(*sample);
+            }
+            None => rows.push(*our),
+        }
+    }
+    let surplus = came.peek().map(|sample| sample.tick);
+    rows.extend(came.copied());
+    (rows, first_difference.or(surplus))
 }
 
 /// The samples of the core from tick `from` on, at most `count`. A fault ends them, which is part of the comparison.
@@ -178,6 +223,12 @@ fn stopped_by_input(status: &Status) -> Option<String> {
 }
 
 impl BoardRun {
+    /// Whether every sample that was wanted one by one is known: it came, or the digest proves that it is the core's.
+    #[must_use]
+    pub const fn is_complete(&self) -> bool {
+        self.missing == 0 || (!self.commanded && self.first_difference.is_none())
+    }
+
     /// The failure of the run as a sentence, the most severe first; `None` if the board ran as the core did, or as commanded.
     #[must_use]
     pub fn failure(&self, here: &TimedRun, job: &Job) -> Option<String> {
@@ -196,8 +247,9 @@ impl BoardRun {
                 "the board differs from the simulation, first at tick {tick}"
             ));
         }
-        if status.samples_lost > 0 {
-            return Some(format!("{} samples were lost on the line", status.samples_lost));
+        if !self.is_complete() {
+            let missing = self.missing;
+            return Some(format!("{missing} samples of the board were lost on the line"));
         }
         if self.commanded {
             let ends = matches!(status.state, State::Finished | State::Ready);
@@ -226,6 +278,16 @@ mod tests {
 
     /// The verdict on a board's run with this status; the core finished without a fault.
     fn verdict(status: Status, first_difference: Option<u64>, commanded: bool) -> Option<String> {
+        verdict_without(0, status, first_difference, commanded)
+    }
+
+    /// The same where this number of samples did not come.
+    fn verdict_without(
+        missing: u64,
+        status: Status,
+        first_difference: Option<u64>,
+        commanded: bool,
+    ) -> Option<String> {
         let job = job_file::parse("torus.toml", include_str!("../../../jobs/torus.toml")).unwrap();
         let here = TimedRun {
             digest: 0,
@@ -237,6 +299,8 @@ mod tests {
         let run = BoardRun {
             status,
             compared: 0,
+            missing,
+            losses: LineLosses::default(),
             first_difference,
             commanded,
             ticks_per_second: 0.0,
@@ -267,7 +331,6 @@ mod tests {
         for (status, difference, text) in [
             (missed, Some(7), "2 ticks of the sample timer were missed"),
             (lost, Some(7), "first at tick 7"),
-            (lost, None, "3 samples were lost"),
             (
                 ended(State::Held),
                 None,
@@ -277,6 +340,52 @@ mod tests {
             let failure = verdict(status, difference, false).unwrap();
             assert!(failure.contains(text), "{text}: {failure}");
         }
+    }
+
+    /// The digest covers the whole run, so it proves what did not come; a run with commands has no digest to compare with.
+    #[test]
+    fn what_was_lost_on_the_line_matters_where_nothing_proves_it() {
+        let lost = Status {
+            samples_lost: 3,
+            ..ended(State::Finished)
+        };
+        assert_eq!(verdict(lost, None, false), None);
+        assert_eq!(verdict_without(5, lost, None, false), None);
+        let failure = verdict_without(5, lost, None, true).unwrap();
+        assert_eq!(failure, "5 samples of the board were lost on the line");
+        assert!(
+            verdict_without(5, lost, Some(7), false)
+                .unwrap()
+                .contains("first at tick 7")
+        );
+    }
+
+    /// A sample of this tick and feed.
+    fn sample(tick: u32, feed_mm_s: f32) -> Sample {
+        Sample {
+            tick,
+            feed_mm_s,
+            ..Sample::default()
+        }
+    }
+
+    #[test]
+    fn missing_samples_are_completed_in_their_places() {
+        let ours: Vec<_> = (0..6).map(|tick| sample(tick, 1.0)).collect();
+        let but = |gone: &[u32]| -> Vec<_> {
+            let stays = |sample: &&Sample| !gone.contains(&sample.tick);
+            ours.iter().filter(stays).copied().collect()
+        };
+        for gone in [&[][..], &[0], &[2, 3], &[5], &[0, 5], &[0, 1, 2, 3, 4, 5]] {
+            assert_eq!(completed(&ours, &but(gone)), (ours.clone(), None), "{gone:?}");
+        }
+        let mut theirs = but(&[1]);
+        theirs[2].feed_mm_s = 2.0;
+        let (rows, difference) = completed(&ours, &theirs);
+        assert_eq!((rows[3], difference), (sample(3, 2.0), Some(3)));
+        let surplus = [but(&[1]), vec![sample(6, 1.0)]].concat();
+        let (rows, difference) = completed(&ours, &surplus);
+        assert_eq!((rows.len(), difference), (7, Some(6)));
     }
 
     #[test]

@@ -2,6 +2,7 @@
 
 mod along;
 mod approach;
+mod attach;
 #[cfg(feature = "developer")]
 mod budget;
 mod completions;
@@ -119,6 +120,7 @@ enum Command {
     Simulate(simulate::Arguments),
     Run(run::Arguments),
     Operate(operate::Arguments),
+    Attach(attach::Arguments),
     Verify(verify::Arguments),
     Judge(judge::Arguments),
     Export(export::Arguments),
@@ -141,6 +143,7 @@ impl Command {
             Self::Simulate(arguments) => arguments.json,
             Self::Run(arguments) => arguments.json,
             Self::Operate(arguments) => arguments.json,
+            Self::Attach(arguments) => arguments.json,
             Self::Verify(arguments) => arguments.json,
             Self::Judge(arguments) => arguments.json,
             Self::Export(arguments) => arguments.json,
@@ -162,6 +165,7 @@ impl Command {
             Self::Simulate(arguments) => simulate::command(arguments),
             Self::Run(arguments) => run::command(arguments),
             Self::Operate(arguments) => operate::command(arguments),
+            Self::Attach(arguments) => attach::command(arguments),
             Self::Verify(arguments) => verify::command(arguments),
             Self::Judge(arguments) => judge::command(arguments),
             Self::Export(arguments) => export::command(arguments),

@@ -5,25 +5,34 @@ use interp_core::Command;
 use protocol::message::{OVERRIDE_MAX_PERCENT, Request, Status};
 use serde_json::json;
 
-use super::out::say;
-use super::{Failure, Result, home, run};
+use super::out::{say, to_stderr};
+use super::{Failure, Result, attach, home, run};
 use machine::remote::operate::{act, sentences};
 
-/// Switches a board's drives, declares its home, holds, resumes or stops its run, and prints its state.
+/// Switches a board's drives, declares its home, holds, resumes or stops its run, follows it, and prints its state.
 ///
 /// Example: cargo sim operate --port /dev/ttyUSB0 status
 /// Example: cargo sim operate --port /dev/ttyUSB0 home 0,0,50
+/// Example: cargo sim operate --port /dev/ttyUSB0 attach
 #[derive(Debug, Args)]
 #[command(verbatim_doc_comment)]
 pub(super) struct Arguments {
     /// The board's serial port.
-    #[arg(long, value_name = "DEV")]
-    port: String,
+    #[arg(long, value_name = "DEV", global = true)]
+    port: Option<String>,
     /// Prints one JSON object instead of text.
-    #[arg(long)]
+    #[arg(long, global = true)]
     pub(super) json: bool,
     #[command(subcommand)]
-    command: OperatorCommand,
+    action: Action,
+}
+
+#[derive(Clone, Debug, Subcommand)]
+enum Action {
+    /// Follows the run to its end, keeps its heartbeat, and takes operator commands from standard input.
+    Attach,
+    #[command(flatten)]
+    Command(OperatorCommand),
 }
 
 #[derive(Clone, Debug, Subcommand)]
@@ -32,7 +41,7 @@ enum OperatorCommand {
     Status,
     /// Feed hold: decelerates along the path to standstill.
     Hold,
-    /// Continues a held run.
+    /// Continues a held run. If the board holds a run whose host is gone (`host_gone = "hold"`), the command then follows it to its end.
     Resume,
     /// Decelerates, retracts and ends the run; the job stays loaded.
     Stop,
@@ -109,30 +118,57 @@ pub(super) fn sentence(status: &Status) -> String {
 }
 
 pub(super) fn command(arguments: &Arguments) -> Result<()> {
-    let mut session = run::open_port(&arguments.port)?;
-    let status = act(&mut session, &arguments.command.request()).map_err(Failure::from)?;
-    let board = session.capabilities().description.board.as_str();
+    let Some(port) = &arguments.port else {
+        return Err(Failure::input(
+            "no --port is given",
+            "name the board's serial port: cargo sim operate --port /dev/ttyUSB0 status",
+        ));
+    };
+    let command = match &arguments.action {
+        Action::Attach => return attach::to_port(port, arguments.json),
+        Action::Command(command) => command,
+    };
+    let mut session = run::open_port(port)?;
+    let status = act(&mut session, &command.request()).map_err(Failure::from)?;
+    let board = session.capabilities().description.board.clone();
+    let stays = matches!(command, OperatorCommand::Resume) && attach::needs_a_host(&status);
     if arguments.json {
-        say!("{}", json_of(&status, board));
-        return Ok(());
+        if !stays {
+            say!("{}", json_of(&status, &board));
+        }
+    } else {
+        print(&status, &board);
     }
-    say!("{board}: {}", sentence(&status));
+    if stays {
+        to_stderr(format_args!(
+            "this command keeps the heartbeat until the run ends: without it the board holds the run again"
+        ));
+        return attach::to_run(&mut session, port, arguments.json);
+    }
+    Ok(())
+}
+
+/// Prints the state of a board.
+pub(super) fn print(status: &Status, board: &str) {
+    say!("{board}: {}", sentence(status));
     if let Some(kind) = status.fault.and_then(|fault| fault.kind()) {
         say!("  fault {} ({})", kind.code(), kind.name());
     }
     for sentence in sentences(&status.safety) {
         say!("  {sentence}");
     }
-    Ok(())
 }
 
-fn json_of(status: &Status, board: &str) -> serde_json::Value {
+/// The state of a board.
+pub(super) fn json_of(status: &Status, board: &str) -> serde_json::Value {
     let safety = &status.safety;
     json!({
         "board": board,
         "state": status.state.name(),
         "pass": status.pass,
         "tick": status.tick,
+        "samples": status.samples,
+        "digest": format!("{:016x}", status.digest),
         "fault": status.fault.map(|fault| fault.code),
         "inputs": safety.lines.names().collect::<Vec<_>>(),
         "latched": safety.latched.names().collect::<Vec<_>>(),

@@ -8,8 +8,10 @@ use interp_core::{Fault, FaultKind};
 use protocol::message::Reason;
 use serde_json::{Value, json};
 
+use super::attach::unreachable_run;
 use super::flash::{board_of, board_parser};
 use super::home::{self, PositionNm};
+use super::operate::sentence;
 use super::out::{say, to_stderr};
 use super::outcome::Outcome;
 use super::simulate::{WantedReport, remarks, report, surveyed, timed};
@@ -22,6 +24,7 @@ use machine::prepare::{self, Prepared};
 use machine::remote::chip::{self, Chip, ChipError};
 use machine::remote::operate::{self, Operator, Setup};
 use machine::remote::qemu::{self, Qemu, QemuError};
+use machine::remote::session::LineLosses;
 use machine::remote::{RemoteError, Session, drive, port};
 use machine::travel;
 
@@ -237,6 +240,13 @@ fn declared(arguments: &Arguments, prepared: &Prepared) -> Option<PositionNm> {
 
 /// Configures the board, switches its drives on, and declares home if the position is known.
 fn make_ready(arguments: &Arguments, job: &Job, prepared: &Prepared, session: &mut Session) -> Result<()> {
+    let status = session.status()?;
+    if let (true, Some(port)) = (status.state.is_under_way(), &arguments.target.port) {
+        return Err(Failure::Failed(Some(format!(
+            "a run is under way on the board: {}\n  help: follow it with cargo sim operate --port {port} attach, or end it there with stop",
+            sentence(&status)
+        ))));
+    }
     let setup = Setup {
         configuration: prepare::configuration(&job.machine),
         home_nm: declared(arguments, prepared).map(|position| position.0),
@@ -267,24 +277,32 @@ fn check_period(job: &Job, session: &Session) -> Result<()> {
 /// Runs and compares the digest of each pass; where one differs in QEMU, finds the first sample that does.
 fn by_digest(arguments: &Arguments, reference: &Reference<'_>, session: &mut Session) -> Result<BoardRun> {
     let bar = progress(reference.run.samples, "running");
-    let mut console = console(arguments, &bar);
+    let mut console = console(arguments, &bar, reference.job.machine.has_limits());
     let operator = console.as_mut().map(|console| console as &mut dyn Operator);
     let run = comparison::by_digest(reference, session, arguments.target.qemu, operator, |samples| {
         bar.set_position(samples)
     });
     bar.finish_and_clear();
-    Ok(run?)
+    run.map_err(|error| left(error, arguments, reference.job))
+}
+
+/// The failure of a comparison: on a board the run goes on, or is held.
+fn left(error: ComparisonError, arguments: &Arguments, job: &Job) -> Failure {
+    match (error, &arguments.target.port) {
+        (ComparisonError::Remote(error), Some(port)) => unreachable_run(error, port, Some(&job.machine)),
+        (error, _) => error.into(),
+    }
 }
 
 /// The operator's console of a run on a board; QEMU has none.
-fn console(arguments: &Arguments, bar: &ProgressBar) -> Option<Console> {
+fn console(arguments: &Arguments, bar: &ProgressBar, has_limits: bool) -> Option<Console> {
     if arguments.target.qemu {
         return None;
     }
     if !arguments.json {
         bar.suspend(|| to_stderr(format_args!("type a command and Enter: {WORDS}")));
     }
-    Some(Console::new(bar.clone()))
+    Some(Console::new(bar.clone(), Some(has_limits)))
 }
 
 /// Runs with every sample on the line, writes the trace, and compares each sample.
@@ -293,19 +311,31 @@ fn by_sample(arguments: &Arguments, reference: &Reference<'_>, session: &mut Ses
     let (mut file, whole) = begun(wanted, reference.job)?;
     let mut written = Ok(());
     let bar = progress(reference.run.samples, "running");
-    let mut console = console(arguments, &bar);
+    let mut console = console(arguments, &bar, reference.job.machine.has_limits());
     let operator = console.as_mut().map(|console| console as &mut dyn Operator);
-    let run = comparison::by_sample(reference, session, arguments.target.qemu, operator, |sample| {
-        if let (Some(file), Ok(())) = (&mut file, &written) {
-            written = file.write(&inspect::plain(reference.prepared, sample));
-        }
-        if sample.tick % 4096 == 0 {
-            bar.set_position(sample.tick.into());
-        }
-    });
+    let length = reference.run.samples;
+    let run = comparison::by_sample(
+        reference,
+        session,
+        arguments.target.qemu,
+        operator,
+        |samples| {
+            if samples % 4096 == 0 {
+                bar.set_position(samples.min(length));
+            }
+        },
+        |sample| {
+            if let (Some(file), Ok(())) = (&mut file, &written) {
+                written = file.write(&inspect::plain(reference.prepared, sample));
+            }
+        },
+    );
     bar.finish_and_clear();
-    let run = run?;
-    completed(written, file, whole, wanted)?;
+    let run = run.map_err(|error| left(error, arguments, reference.job))?;
+    // Otherwise no file is left behind.
+    if run.is_complete() {
+        completed(written, file, whole, wanted)?;
+    }
     Ok(run)
 }
 
@@ -390,17 +420,32 @@ pub(super) fn command(arguments: &Arguments) -> Result<()> {
             let position = home::of(&prepared).words();
             say!("  home         declared at {position} mm: a simulated board has no axes");
         }
-        if run.status.safety.link_timed_out {
-            say!("  host         heartbeat timeout during the run: see cargo sim explain host-gone");
-        }
-        match (run.commanded, run.first_difference) {
-            (true, _) => say!("  compared     nothing: the run had operator commands or a feed override"),
-            (false, None) => compared(&run, "bit for bit the same"),
-            (false, Some(_)) => compared(&run, "NOT the same"),
-        }
+        print_line(&run);
     }
     let failure = failure.or_else(|| models_failure(&mut peer, arguments.json));
     failure.map_or(Ok(()), |failure| Err(Failure::Failed(Some(failure))))
+}
+
+/// What the line did to the run, and the result of the comparison.
+fn print_line(run: &BoardRun) {
+    if run.losses != LineLosses::default() {
+        let LineLosses { repeated, lost } = run.losses;
+        say!("  line         {repeated} lost events were sent again, {lost} were not");
+    }
+    if run.missing > 0 && run.is_complete() {
+        let missing = run.missing;
+        say!(
+            "  trace        {missing} samples did not come: the simulation's, which the digest proves to be the same"
+        );
+    }
+    if run.status.safety.link_timed_out {
+        say!("  host         heartbeat timeout during the run: see cargo sim explain host-gone");
+    }
+    match (run.commanded, run.first_difference) {
+        (true, _) => say!("  compared     nothing: the run had operator commands or a feed override"),
+        (false, None) => compared(run, "bit for bit the same"),
+        (false, Some(_)) => compared(run, "NOT the same"),
+    }
 }
 
 fn compared(run: &BoardRun, verdict: &str) {
@@ -422,6 +467,9 @@ fn json_of(outcome: &Outcome<'_>, run: &BoardRun, board: &str) -> Value {
     put("tick_cycles_max", json!(run.status.tick_cycles_max));
     put("ticks_per_second", json!(run.ticks_per_second));
     put("samples_lost", json!(run.status.samples_lost));
+    put("events_repeated", json!(run.losses.repeated));
+    put("events_lost", json!(run.losses.lost));
+    put("samples_missing", json!(run.missing));
     put("board", json!(board));
     Value::Object(keys)
 }

@@ -1,10 +1,10 @@
-//! Operator commands typed while `run --port` follows a run.
+//! Operator commands typed while `run --port` or `attach` follows a run.
 
 use std::io::{BufRead, stdin};
 use std::sync::mpsc::{Receiver, TryRecvError, channel};
 
 use indicatif::ProgressBar;
-use protocol::message::{Request, Status};
+use protocol::message::{OVERRIDE_NORMAL_PERCENT, Request, Status};
 
 use super::operate::{sentence, typed};
 use super::out::to_stderr;
@@ -20,11 +20,13 @@ pub(super) struct Console {
     /// Standard input has not ended.
     open: bool,
     bar: ProgressBar,
+    /// Whether the job has limits, so that it obeys the feed override; unknown for a run that another command started.
+    has_limits: Option<bool>,
 }
 
 impl Console {
     /// Starts to read standard input in a thread.
-    pub(super) fn new(bar: ProgressBar) -> Self {
+    pub(super) fn new(bar: ProgressBar, has_limits: Option<bool>) -> Self {
         let (sender, lines) = channel();
         // The thread ends with standard input or with the process.
         std::thread::spawn(move || {
@@ -38,6 +40,7 @@ impl Console {
             lines,
             open: true,
             bar,
+            has_limits,
         }
     }
 
@@ -66,6 +69,21 @@ impl Operator for Console {
 
     fn is_there(&self) -> bool {
         self.open
+    }
+
+    fn obeys_override(&self) -> bool {
+        self.has_limits == Some(true)
+    }
+
+    fn begins(&mut self, status: &Status) {
+        match status.safety.feed_override {
+            OVERRIDE_NORMAL_PERCENT => {}
+            _ if self.has_limits == Some(false) => {}
+            0 => self.say("warning: the feed override is 0 %: the tool does not move. Type override 100"),
+            percent => self.say(&format!(
+                "the feed override is {percent} %, so the run is not compared"
+            )),
+        }
     }
 
     fn told(&mut self, _: &Request, came: Result<Status, RemoteError>) {

@@ -2,10 +2,10 @@
 
 use interp_core::{Sample, State};
 use protocol::digest::job_digest;
-use protocol::message::{CHUNK_WORDS_MAX, Clock, PassDigest, Report, Request, Status, Words};
+use protocol::message::{CHUNK_WORDS_MAX, Clock, PassDigest, Report, Request, Status, StepSettings, Words};
 
 use super::operate::{self, Following, Operator};
-use super::session::{Event, RemoteError, Session};
+use super::session::{Event, LineLosses, RemoteError, Session};
 use crate::prepare::Prepared;
 
 /// A pass as computed in this process.
@@ -30,20 +30,19 @@ pub struct Compared {
     pub first_bad_pass: Option<u32>,
     /// An operator changed the run, so that nothing was compared.
     pub commanded: bool,
+    /// What the line lost.
+    pub losses: LineLosses,
 }
 
-/// Uploads a job, and its step output if it gives one. `progress` is called with the number of words transferred.
+/// Uploads a job, then the settings of its drives if it gives any; the board has its own for a job without. `progress` is called with the number of words transferred.
 ///
 /// # Errors
-/// The line breaks, or the board refuses the job.
+/// The line breaks, the board refuses the job, or it reports other settings of the drives than the job's.
 pub fn upload(
     session: &mut Session,
     job: &Prepared,
     mut progress: impl FnMut(usize),
 ) -> Result<(), RemoteError> {
-    if let Some(steps) = job.steps {
-        session.command(&Request::StepConfig(steps.into()))?;
-    }
     let words = u32::try_from(job.words.len()).unwrap_or(u32::MAX);
     let digest = job_digest(&job.words);
     session.command(&Request::JobBegin {
@@ -59,7 +58,16 @@ pub fn upload(
         offset += u32::try_from(chunk.len()).unwrap_or(0);
         progress(offset as usize);
     }
-    session.command(&Request::JobEnd)
+    session.command(&Request::JobEnd)?;
+    let Some(steps) = job.steps.map(StepSettings::from) else {
+        return Ok(());
+    };
+    session.command(&Request::StepConfig(steps))?;
+    if session.status()?.steps == steps.digest() {
+        Ok(())
+    } else {
+        Err(RemoteError::OtherSteps)
+    }
 }
 
 /// Starts the loaded job: in lockstep for a number of periods, or on the board's own clock.
@@ -75,22 +83,74 @@ fn start(session: &mut Session, report: Report, lockstep: Option<u32>) -> Result
         None => operate::keep_alive(session)?,
         Some(_) => session.set_keep_alive(None),
     }
+    session.begin_run()?;
     session.command(&Request::Start)?;
     lockstep.map_or(Ok(()), |ticks| session.command(&Request::Run { ticks }))
 }
 
-/// Whether a pass of the board equals the expected one.
-fn agrees(pass: &PassDigest, expected: &[Expected]) -> bool {
-    let here = Expected {
-        first_tick: pass.first_tick,
-        samples: pass.samples,
-        digest: pass.digest,
-    };
-    expected.get(pass.pass as usize) == Some(&here)
+/// The comparison of passes, in order. A pass's digest covers the run up to its end, so one that agrees proves those before it whose events were lost; so
+/// does the final digest.
+struct PassCheck<'a> {
+    expected: &'a [Expected],
+    /// The pass after the last one compared.
+    next: usize,
+    samples: u64,
+    first_bad: Option<u32>,
+}
+
+impl<'a> PassCheck<'a> {
+    const fn new(expected: &'a [Expected]) -> Self {
+        Self {
+            expected,
+            next: 0,
+            samples: 0,
+            first_bad: None,
+        }
+    }
+
+    fn note_bad(&mut self, pass: usize) {
+        let pass = u32::try_from(pass).unwrap_or(u32::MAX);
+        self.first_bad.get_or_insert(pass);
+    }
+
+    fn samples_of(&self, passes: std::ops::Range<usize>) -> u64 {
+        let passes = self.expected.get(passes).unwrap_or(&[]);
+        passes.iter().map(|pass| u64::from(pass.samples)).sum()
+    }
+
+    fn add(&mut self, pass: &PassDigest) {
+        let here = Expected {
+            first_tick: pass.first_tick,
+            samples: pass.samples,
+            digest: pass.digest,
+        };
+        let number = pass.pass as usize;
+        let agrees = self.expected.get(number) == Some(&here);
+        if agrees && number >= self.next {
+            self.samples += self.samples_of(self.next..number);
+        } else {
+            self.note_bad(number.min(self.next));
+        }
+        self.samples += u64::from(pass.samples);
+        self.next = number + 1;
+    }
+
+    /// The end of the run.
+    fn end(&mut self, status: &Status) {
+        let Some(last) = self.expected.last() else {
+            return;
+        };
+        let all = self.samples_of(0..self.expected.len());
+        if (status.digest, u64::from(status.samples)) == (last.digest, all) {
+            self.samples += self.samples_of(self.next..self.expected.len());
+        } else if self.next != self.expected.len() {
+            self.note_bad(self.next);
+        }
+    }
 }
 
 /// Runs the loaded job to its end, and compares the digest of every pass. `progress` is called with the number of samples so far. With an
-/// operator, on the board's own clock.
+/// operator, on the board's own clock. Lost events do not change the result.
 ///
 /// # Errors
 /// The line breaks, or the board refuses to start.
@@ -103,36 +163,29 @@ pub fn run_digests(
 ) -> Result<Compared, RemoteError> {
     start(session, Report::Digests, lockstep.then_some(u32::MAX))?;
     let mut following = Following::new(session, operator)?;
-    let mut next = 0_u32;
-    let mut samples = 0_u64;
-    let mut first_bad_pass = None;
+    let mut passes = PassCheck::new(expected);
     loop {
         match following.event(session)? {
             Event::Pass(pass) => {
-                samples += u64::from(pass.samples);
-                if first_bad_pass.is_none() && (pass.pass != next || !agrees(&pass, expected)) {
-                    first_bad_pass = Some(pass.pass.min(next));
-                }
-                next = pass.pass + 1;
-                progress(samples);
+                passes.add(&pass);
+                progress(passes.samples);
             }
             Event::Halted(status) => {
-                if first_bad_pass.is_none() && next as usize != expected.len() {
-                    first_bad_pass = Some(next);
-                }
+                passes.end(&status);
                 return Ok(Compared {
                     status,
-                    samples,
-                    first_bad_pass: first_bad_pass.filter(|_| !following.commanded),
+                    samples: passes.samples,
+                    first_bad_pass: passes.first_bad.filter(|_| !following.commanded),
                     commanded: following.commanded,
+                    losses: session.losses(),
                 });
             }
-            Event::Sample(_) => {}
+            Event::Sample(_) | Event::Lost(_) => {}
         }
     }
 }
 
-/// Runs the loaded job to its end, and passes on every sample. Returns the board's final status, and whether an operator changed the run.
+/// Runs the loaded job to its end, and passes on every sample that came, in order. Returns the board's final status, and whether an operator changed the run.
 ///
 /// # Errors
 /// The line breaks, or the board refuses to start.
@@ -148,7 +201,7 @@ pub fn run_samples(
         match following.event(session)? {
             Event::Sample(sample) => each(&sample),
             Event::Halted(status) => return Ok((status, following.commanded)),
-            Event::Pass(_) => {}
+            Event::Pass(_) | Event::Lost(_) => {}
         }
     }
 }
@@ -183,7 +236,7 @@ fn wait_halted(session: &mut Session, samples: &mut Vec<Sample>) -> Result<Statu
         match session.event()? {
             Event::Sample(sample) => samples.push(sample),
             Event::Halted(status) => return Ok(status),
-            Event::Pass(_) => {}
+            Event::Pass(_) | Event::Lost(_) => {}
         }
     }
 }

@@ -3,7 +3,7 @@
 //! ```text
 //! drive.rs    loads and runs a job there, compares with what was computed here
 //! operate.rs  drives, home, hold and resume: what an operator asks
-//! session.rs  requests, answers, events; retransmission
+//! session.rs  requests, answers; retransmission   |   events.rs  events in order, lost ones again
 //! script.rs   plays what an operator does, period by period
 //! qemu.rs     starts and ends QEMU with the firmware   |   port.rs  a serial port   |   chip.rs  a board's image without the board
 //!             └── guard.rs   their folder; ends them and removes it where this process is killed ──┘
@@ -11,6 +11,7 @@
 
 pub mod chip;
 pub mod drive;
+mod events;
 mod guard;
 pub mod operate;
 pub mod port;

@@ -2,7 +2,7 @@
 
 use std::time::Duration;
 
-use protocol::message::{Configuration, Request, SafetyStatus, Status};
+use protocol::message::{Configuration, OVERRIDE_NORMAL_PERCENT, Request, SafetyStatus, Status};
 
 use super::session::{Event, RemoteError, Session};
 
@@ -65,6 +65,16 @@ pub trait Operator {
     /// Whether an operator who could resume a held run is still present.
     fn is_there(&self) -> bool;
 
+    /// Whether the run obeys the feed override; a job without limits does not.
+    fn obeys_override(&self) -> bool {
+        true
+    }
+
+    /// How the board is when the run begins to be followed.
+    fn begins(&mut self, status: &Status) {
+        let _ = status;
+    }
+
     /// What came of it: how the board was then, or that it refused.
     fn told(&mut self, request: &Request, came: Result<Status, RemoteError>);
 }
@@ -74,6 +84,8 @@ pub(super) struct Following<'a> {
     operator: Option<&'a mut dyn Operator>,
     /// A command changed the run: its samples differ from those of an undisturbed run.
     pub(super) commanded: bool,
+    /// The feed override is 0.
+    no_feed: bool,
 }
 
 impl<'a> Following<'a> {
@@ -82,14 +94,21 @@ impl<'a> Following<'a> {
         session: &mut Session,
         operator: Option<&'a mut dyn Operator>,
     ) -> Result<Self, RemoteError> {
-        let mut commanded = false;
         session.set_patient(false);
-        if operator.is_some() {
-            commanded = session.status()?.safety.feed_override != 100;
+        let mut following = Self {
+            operator,
+            commanded: false,
+            no_feed: false,
+        };
+        if let Some(operator) = &mut following.operator {
+            let status = session.status()?;
+            following.commanded = status.safety.feed_override != OVERRIDE_NORMAL_PERCENT;
+            following.no_feed = status.safety.feed_override == 0;
             let every = session.keep_alive().unwrap_or(ASKED);
             session.set_keep_alive(Some(every));
+            operator.begins(&status);
         }
-        Ok(Self { operator, commanded })
+        Ok(following)
     }
 
     /// The next event.
@@ -104,13 +123,45 @@ impl<'a> Following<'a> {
                     came?;
                 } else {
                     self.commanded |= came.is_ok() && request != Request::Status;
+                    if let Ok(status) = &came {
+                        self.no_feed = status.safety.feed_override == 0;
+                    }
                     operator.told(&request, came);
                 }
+                continue;
             }
             session.set_patient(operator.is_there());
+            if self.no_feed && operator.obeys_override() && !operator.is_there() {
+                return Err(RemoteError::NoFeed);
+            }
             if let Some(event) = session.poll()? {
                 return Ok(event);
             }
+        }
+    }
+}
+
+/// Follows the run that is under way on a board to its end, whoever started it: keeps its heartbeat, and forwards the commands of the operator. `each` is called
+/// with its events, the end excepted. Returns the last status, at once where no run is under way.
+///
+/// # Errors
+/// The line breaks; the run stands still, held or by an override of 0, and no operator is left who could change that.
+pub fn follow(
+    session: &mut Session,
+    operator: &mut dyn Operator,
+    mut each: impl FnMut(&Event),
+) -> Result<Status, RemoteError> {
+    keep_alive(session)?;
+    let status = session.begin_run()?;
+    if !status.state.is_under_way() {
+        return Ok(status);
+    }
+    let mut following = Following::new(session, Some(operator))?;
+    loop {
+        match following.event(session)? {
+            // In lockstep the ticks of a `Run` may be used up before the end of the run.
+            Event::Halted(status) if !status.state.is_under_way() => return Ok(status),
+            event => each(&event),
         }
     }
 }

@@ -1,14 +1,16 @@
 //! One session with a board: numbered requests with their replies, and events in between.
 
-use std::collections::VecDeque;
 use std::io::{self, Read, Write};
 use std::time::{Duration, Instant};
 
 use protocol::frame::{DELIMITER, Decoder, FRAME_MAX, write_request};
-use protocol::message::{Capabilities, PassDigest, Reason, Reply, Request, Status, next_number, read_reply};
+use protocol::message::{Capabilities, Clock, Reason, Reply, Request, Status, next_number, read_reply};
 use protocol::version::{PROTOCOL_VERSION, VersionMismatch};
 
-use interp_core::{Sample, State};
+use interp_core::State;
+
+use super::events::Received;
+pub use super::events::{Event, LineLosses};
 
 /// Time-out of a reply, after which the request is sent again. A reply takes 0.2 ms in QEMU and a few ms over a serial line; a board that
 /// checks a job, or a QEMU that shares its processor, may take longer.
@@ -27,6 +29,13 @@ const SILENCE_TIMEOUT: Duration = Duration::from_secs(20);
 
 /// The same of a process.
 const PROCESS_SILENCE_TIMEOUT: Duration = Duration::from_secs(780);
+
+/// Silence in a run after which the status is requested: it tells an end whose event was lost. A process loses nothing, but may be slow.
+const LOOK: Duration = Duration::from_secs(1);
+const PROCESS_LOOK: Duration = Duration::from_secs(3);
+
+/// Requests for the same missing event, before it is given up: each is repeated until it is answered, so only the event itself was lost again.
+const REPEATS_MAX: u32 = 8;
 
 /// Pause before each read of events: QEMU hands its serial line's bytes over one by one, and a reader that is woken by each
 /// takes the processor from it.
@@ -54,10 +63,14 @@ pub enum RemoteError {
     #[error("{0}")]
     Version(VersionMismatch),
     /// The run stands still while the host waits for its end.
-    #[error(
-        "the run is held: the board took this host for gone, or another one held it\n  help: cargo sim operate resume, or stop"
-    )]
+    #[error("the run is held: the board took this host for gone, or another one held it")]
     Held,
+    /// The board drives its axes by other settings than the job's.
+    #[error("the board reports other steps per millimetre, directions or pulse times than the job's")]
+    OtherSteps,
+    /// The feed override is 0 and nobody is there to change it.
+    #[error("the feed override is 0 %, so the tool does not move, and nobody is there to change it")]
+    NoFeed,
     /// The board refused a request.
     #[error("the board refused {request}: {reason}")]
     Refused {
@@ -68,26 +81,21 @@ pub enum RemoteError {
     },
 }
 
-/// Events that a board sends without a request.
-#[derive(Clone, Debug, PartialEq)]
-pub enum Event {
-    /// The next sample, in order.
-    Sample(Sample),
-    /// A pass is over.
-    Pass(PassDigest),
-    /// The ticks of a `Run` request are used up, or the run is over.
-    Halted(Status),
-}
-
 /// An open session.
 pub struct Session {
     stream: Box<dyn Stream>,
     decoder: Decoder,
     number: u16,
-    events: VecDeque<Event>,
+    events: Received,
+    /// A status told an end whose event had not come.
+    ending: Option<u32>,
+    /// Requests so far for the event that is missing.
+    repeats: u32,
     input: Vec<u8>,
     capabilities: Capabilities,
     keep_alive: Option<Duration>,
+    /// Whether silence is no reason to request the status.
+    quiet: bool,
     /// Whether to wait for a run that stands still.
     patient: bool,
     asked: Instant,
@@ -118,6 +126,7 @@ fn name(request: &Request) -> &'static str {
         Request::Stop => "to stop",
         Request::Simulate { .. } => "simulated inputs",
         Request::StepConfig(_) => "the steps of the axes",
+        Request::Repeat { .. } => "lost events",
     }
 }
 
@@ -131,10 +140,13 @@ impl Session {
             stream,
             decoder: Decoder::new(),
             number: 0,
-            events: VecDeque::new(),
+            events: Received::new(),
+            ending: None,
+            repeats: 0,
             input: Vec::new(),
             capabilities: Capabilities::default(),
             keep_alive: None,
+            quiet: false,
             patient: false,
             asked: Instant::now(),
             heard: Instant::now(),
@@ -149,7 +161,9 @@ impl Session {
             Reply::Capabilities(capabilities) => {
                 capabilities.check_version().map_err(RemoteError::Version)?;
                 session.capabilities = capabilities;
-                session.events.clear();
+                // From here on events are numbered from 1; those before were for another session.
+                session.events = Received::new();
+                session.begin_run()?;
                 Ok(session)
             }
             _ => Err(RemoteError::Silent(
@@ -174,6 +188,11 @@ impl Session {
     #[must_use]
     pub fn keep_alive(&self) -> Option<Duration> {
         self.keep_alive
+    }
+
+    /// Whether [`Self::event`] requests no status however long no event comes: then nothing but the run takes the board's time.
+    pub fn set_quiet(&mut self, quiet: bool) {
+        self.quiet = quiet;
     }
 
     /// Whether [`Self::event`] waits for a run that stands still, because an operator can resume it.
@@ -208,13 +227,34 @@ impl Session {
     /// As [`Self::command`].
     pub fn status(&mut self) -> Result<Status, RemoteError> {
         match self.ask(&Request::Status)? {
-            Reply::Status { status, .. } => Ok(status),
+            Reply::Status { status, .. } => {
+                self.events.announce(status.events);
+                Ok(status)
+            }
             Reply::Nak { reason, .. } => Err(RemoteError::Refused {
                 request: "its status",
                 reason,
             }),
             _ => Err(RemoteError::Silent("it did not answer with its status")),
         }
+    }
+
+    /// Drops the events so far: [`Self::event`] is then about what follows. Returns the board's status.
+    ///
+    /// # Errors
+    /// As [`Self::command`].
+    pub fn begin_run(&mut self) -> Result<Status, RemoteError> {
+        let status = self.status()?;
+        self.events.ends_are_over(status.halts);
+        self.events.drop_ready();
+        self.ending = None;
+        Ok(status)
+    }
+
+    /// What the line lost of the events of this session.
+    #[must_use]
+    pub const fn losses(&self) -> LineLosses {
+        self.events.losses()
     }
 
     /// Waits for the next event.
@@ -235,20 +275,26 @@ impl Session {
     /// # Errors
     /// The line breaks, or no event arrived within the time-out.
     pub fn poll(&mut self) -> Result<Option<Event>, RemoteError> {
-        if let Some(event) = self.events.pop_front() {
+        // What was read after the last answer. An answer here belongs to a request that has been answered already.
+        while self.next_reply()?.is_some() {}
+        if let Some(event) = self.events.pop() {
             self.heard = Instant::now();
+            if matches!(event, Event::Halted(_)) {
+                self.ending = None;
+            }
             return Ok(Some(event));
         }
-        if self.keep_alive.is_some_and(|every| self.asked.elapsed() >= every) {
+        if let Some((event, count)) = self.events.missing() {
+            self.ask_again(event, count)?;
+            return Ok(None);
+        }
+        if self.is_look_due() {
             self.look_after()?;
             return Ok(None);
         }
         std::thread::sleep(GATHER);
-        let before = self.input.len();
-        // A reply at this point belongs to a request that has been answered already.
         self.read_some()?;
-        let grew = self.input.len() != before;
-        while self.next_reply()?.is_some() {}
+        let grew = !self.input.is_empty();
         let (timeout, silent) = if self.stream.is_process() {
             (PROCESS_SILENCE_TIMEOUT, "no word of the run for 13 minutes")
         } else {
@@ -262,10 +308,64 @@ impl Session {
         Ok(None)
     }
 
-    /// Requests the status of the run; while the run continues, a board without events is not silent.
+    /// Whether to request the status: for the heartbeat, after some silence, or because the last one told an end.
+    fn is_look_due(&self) -> bool {
+        let look = if self.stream.is_process() {
+            PROCESS_LOOK
+        } else {
+            LOOK
+        };
+        let since = self.asked.elapsed();
+        self.ending.is_some()
+            || self.keep_alive.is_some_and(|every| since >= every)
+            || (!self.quiet && since >= look && self.heard.elapsed() >= look)
+    }
+
+    /// Requests missing events again, or gives them up.
+    fn ask_again(&mut self, event: u32, count: u8) -> Result<(), RemoteError> {
+        match self.ask(&Request::Repeat { event, count })? {
+            Reply::Nak {
+                reason: Reason::EventGone { first },
+                ..
+            } => self.events.give_up(first),
+            Reply::Nak { reason, .. } => {
+                return Err(RemoteError::Refused {
+                    request: "lost events",
+                    reason,
+                });
+            }
+            _ if self.events.next() > event => {
+                self.events
+                    .count_repeated((self.events.next() - event).min(count.into()));
+                self.repeats = 0;
+            }
+            _ => {
+                self.repeats += 1;
+                if self.repeats >= REPEATS_MAX {
+                    self.repeats = 0;
+                    self.events.give_up(event + 1);
+                }
+            }
+        }
+        Ok(())
+    }
+
+    /// Requests the status of the run; while the run continues, a board without events is not silent. An end that it tells takes the place of its event, if a
+    /// second status tells it and still no event came: the board sends what waits in its queue before it reads the next request.
     fn look_after(&mut self) -> Result<(), RemoteError> {
-        let state = self.status()?.state;
-        if state == State::Held && !self.patient {
+        let status = self.status()?;
+        let state = status.state;
+        if !self.events.is_empty() || self.events.missing().is_some() {
+            return Ok(());
+        }
+        if self.events.tells_an_end(status.halts) {
+            if self.ending.replace(status.halts) == Some(status.halts) {
+                self.events.end(status);
+            }
+            return Ok(());
+        }
+        // In lockstep the host itself lets time pass, held or not.
+        if state == State::Held && status.clock == Clock::Free && !self.patient {
             return Err(RemoteError::Held);
         }
         if state.is_under_way() {
@@ -355,11 +455,12 @@ impl Session {
                 continue;
             };
             match reply {
-                Reply::Samples(samples) => self
-                    .events
-                    .extend(samples.iter().map(|record| Event::Sample(record.0))),
-                Reply::PassDigest(pass) => self.events.push_back(Event::Pass(pass)),
-                Reply::Halted(status) => self.events.push_back(Event::Halted(status)),
+                Reply::Samples { event, samples } => {
+                    let samples = samples.iter().map(|record| Event::Sample(record.0));
+                    self.events.take(event, samples.collect());
+                }
+                Reply::PassDigest { event, pass } => self.events.take(event, vec![Event::Pass(pass)]),
+                Reply::Halted(status) => self.events.take(status.events, vec![Event::Halted(status)]),
                 answer => {
                     self.input = input[index + 1..].to_vec();
                     return Ok(Some(answer));
@@ -375,6 +476,6 @@ fn answered(reply: &Reply) -> Option<u16> {
     match reply {
         Reply::Capabilities(capabilities) => Some(capabilities.number),
         Reply::Ack { number } | Reply::Nak { number, .. } | Reply::Status { number, .. } => Some(*number),
-        Reply::Samples(_) | Reply::PassDigest(_) | Reply::Halted(_) => None,
+        Reply::Samples { .. } | Reply::PassDigest { .. } | Reply::Halted(_) => None,
     }
 }
