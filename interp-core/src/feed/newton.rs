@@ -6,7 +6,7 @@
 //! speed also in the middle of each interval. A place is weighted by its share of the time.
 
 use super::limits::MotionLimits;
-use super::plan::{COEFFICIENTS, Plan};
+use super::plan::{COEFFICIENTS, PINNED, Plan};
 use super::stations::Derivatives;
 use super::walk::{LIST, Lists};
 use crate::math::arith::{inverse_sqrt, sqrt};
@@ -578,7 +578,7 @@ fn scatter(lists: &mut Lists, index: u16, weights: &[f32; 3], slope: f32, bend: 
     add(lists, h2, index, a * c * bend);
 }
 
-/// Solves for the step, in place of the gradient; coefficients before `first` stay.
+/// Solves for the step, in place of the gradient; coefficients before `first` and from `count` on stay.
 #[inline(never)]
 pub(crate) fn solve(lists: &mut Lists, count: u16, first: u16) {
     let [mut l1, mut l2, mut l2_before] = [0.0_f32; 3];
@@ -609,7 +609,7 @@ pub(crate) fn solve(lists: &mut Lists, count: u16, first: u16) {
         put(lists, GRADIENT, index, value);
         (x2, x1) = (x1, value);
     }
-    for index in 0..first {
+    for index in (0..first).chain(count..count + PINNED) {
         put(lists, GRADIENT, index, 0.0);
     }
 }

@@ -4,6 +4,7 @@ use super::limits::{FeedChange, MotionLimits};
 use super::newton::{self, Reach, SHAPE, Sweep};
 use super::pace::{Course, Use};
 use super::plan::{Cursor, Lead, Plan};
+use super::road::GateSearch;
 use super::walk::{LIST, Lists, Walker};
 use crate::math::arith::{inverse_sqrt, sqrt, truncated};
 use crate::math::number::{Bounded, cube_root};
@@ -15,6 +16,9 @@ const BARRIER: [f32; 12] = [
 
 /// Share of the greatest factor of the walk's pace that the method starts from.
 const START_SHARE: f32 = 0.85;
+
+/// Coefficients over which the start goes from an end at speed to the factor.
+const BLENDED: u16 = 14;
 
 /// Use of the jerk that the check passes: a plan with more is slowed down.
 const JERK_CHECKED: f32 = 0.998;
@@ -38,6 +42,7 @@ mod cycles {
     /// More for a jump behind the node.
     pub(super) const JUMP: u32 = 3_500;
     pub(super) const CHECK: u32 = 1_650;
+    pub(super) const GATE: u32 = 2_600;
     /// Something for each coefficient.
     pub(super) const LIST: u32 = 15_000;
 }
@@ -59,6 +64,8 @@ enum Stage {
     Check,
     /// Slows the plan down where it uses too much.
     Finish,
+    /// Finds the last stop before the end.
+    Gate,
 }
 
 /// The planning of one path.
@@ -87,6 +94,7 @@ pub(crate) struct Planner {
     most: Use,
     periods: u32,
     lead: Lead,
+    gate: GateSearch,
 }
 
 impl Planner {
@@ -109,6 +117,7 @@ impl Planner {
         most: Use::NONE,
         periods: 0,
         lead: Lead::NONE,
+        gate: GateSearch::START,
     };
 
     /// Begins to plan the path of the plan's stations within the plan's limits.
@@ -170,6 +179,7 @@ impl Planner {
             Stage::Reach => cycles::REACH + jump,
             Stage::Check => cycles::CHECK,
             Stage::Weigh | Stage::Scale | Stage::Take | Stage::Finish => cycles::LIST,
+            Stage::Gate => cycles::GATE,
             Stage::Done => 0,
         }
     }
@@ -199,9 +209,7 @@ impl Planner {
             }
             Stage::Scale => {
                 let factor = START_SHARE * self.factor.at_least(1e-9);
-                for pace in &mut plan.draft {
-                    *pace *= factor;
-                }
+                scale(plan, factor);
                 newton::clear(&mut self.lists);
                 Stage::Assemble
             }
@@ -222,7 +230,8 @@ impl Planner {
                 }
             }
             Stage::Solve => {
-                newton::solve(&mut self.lists, plan.intervals + 2, self.first);
+                let [start, end] = plan.pinned();
+                newton::solve(&mut self.lists, plan.intervals + 2 - end, self.first.max(start));
                 self.reach = Reach::FAR;
                 Stage::Reach
             }
@@ -246,7 +255,19 @@ impl Planner {
             }
             Stage::Finish => {
                 self.slow(plan, least);
-                Stage::Done
+                self.gate = GateSearch::START;
+                if plan.goes_on() {
+                    Stage::Gate
+                } else {
+                    Stage::Done
+                }
+            }
+            Stage::Gate => {
+                if self.gate.work(plan) {
+                    Stage::Done
+                } else {
+                    Stage::Gate
+                }
             }
             Stage::Done => Stage::Done,
         };
@@ -342,7 +363,11 @@ impl Planner {
             .at_least(1.0);
         plan.periods = u32::try_from(truncated(to_f32(self.periods) * factor)).unwrap_or(0);
         plan.lead = self.lead;
-        if factor > 1.0 {
+        plan.pace_max = 1.0;
+        let is_between = plan.pinned() != [0; 2];
+        if is_between {
+            plan.pace_max = 1.0 / factor;
+        } else if factor > 1.0 {
             plan.lead.near = 0.0;
             let share = 1.0 / (factor * factor);
             for pace in &mut plan.draft {
@@ -350,6 +375,27 @@ impl Planner {
             }
         }
         plan.pace = plan.draft;
+    }
+}
+
+/// Multiplies the pace of the walk; near an end at speed by less, so that the end keeps its speed.
+fn scale(plan: &mut Plan, factor: f32) {
+    let [start, end] = plan.pinned();
+    let count = plan.intervals + 2;
+    for (index, pace) in (0..count).zip(&mut plan.draft) {
+        let share = |pinned: u16, away: u16| {
+            if pinned == 0 {
+                return 1.0;
+            }
+            let by = (f32::from(away.saturating_sub(pinned - 1)) * (1.0 / f32::from(BLENDED))).at_most(1.0);
+            by * by * (3.0 - 2.0 * by)
+        };
+        let share = share(start, index).at_most(share(end, count - 1 - index));
+        *pace *= if share < 1.0 {
+            1.0 + share * (factor - 1.0)
+        } else {
+            factor
+        };
     }
 }
 

@@ -24,6 +24,9 @@ const LONG: f32 = 20.0;
 const SPACING_MAX: f32 = 0.1;
 /// Time between nodes that is worth its planning, s.
 const SPACING_WORTH: f32 = 4e-3;
+/// Longest mean of a walk with an end at speed, s, and the time for which it has that speed, as a multiple of it.
+const MEAN_MAX: f32 = 0.04;
+const FLAT: f32 = 1.0;
 /// Bisections of the spacing.
 const BISECTIONS: u8 = 12;
 /// Tries to coarsen the ends.
@@ -101,6 +104,9 @@ pub(crate) struct Walker {
     sum_q10: i64,
     sum_s: f32,
     coarsenings: u8,
+    /// Speeds at the ends, mm/s, and nodes of the mean where one is not a rest.
+    speeds: [f32; 2],
+    mean: u16,
 }
 
 /// Lists of this stage.
@@ -136,6 +142,8 @@ impl Walker {
         sum_q10: 0,
         sum_s: 0.0,
         coarsenings: 0,
+        speeds: [0.0; 2],
+        mean: 0,
     };
 
     pub(crate) const fn begin(&mut self, period: f32) {
@@ -184,6 +192,7 @@ impl Walker {
                 self.next(station, station >= count, Stage::Jumps, Stage::Backwards)
             }
             Stage::Backwards => {
+                self.speeds = plan.ends;
                 self.backwards(lists, plan);
                 Stage::Forwards
             }
@@ -248,8 +257,10 @@ impl Walker {
                 for node in self.index..end {
                     self.increment(lists, plan, node);
                 }
-                if end == self.times {
+                if end == self.times && self.is_from_rest_to_rest() {
                     self.begin_means(plan);
+                } else if end == self.times {
+                    self.begin_means_at_speed(lists, plan);
                 }
                 self.next(end, end == self.times, Stage::Increments, Stage::Means)
             }
@@ -257,7 +268,11 @@ impl Walker {
                 let count = plan.intervals + 2;
                 let end = count.min(self.index + NODES_A_PORTION);
                 for index in self.index..end {
-                    self.mean(lists, plan, index);
+                    if self.is_from_rest_to_rest() {
+                        self.mean(lists, plan, index);
+                    } else {
+                        self.mean_at_speed(lists, plan, index);
+                    }
                 }
                 if end == count {
                     (self.cell, self.sum_q10) = (0, 0);
@@ -352,14 +367,43 @@ impl Walker {
 
     fn backwards(&self, lists: &mut Lists, plan: &Plan) {
         let last = plan.stations.count().saturating_sub(1);
-        put(lists, SPEED_SQR, 0, 0.0);
-        put(lists, SPEED_SQR, last, 0.0);
+        let [start, end] = self.speeds;
+        put(lists, SPEED_SQR, 0, start * start);
+        put(lists, SPEED_SQR, last, end * end);
+        self.flatten(lists, plan);
         for cell in (0..last).rev() {
             let reach =
                 get(lists, SPEED_SQR, cell + 1) + 2.0 * self.accel(lists, cell) * plan.stations.cell_mm(cell);
             let square = get(lists, SPEED_SQR, cell).at_most(reach);
             put(lists, SPEED_SQR, cell, square);
         }
+    }
+
+    /// Holds the speed of an end that is not a rest for as long as the mean reaches.
+    fn flatten(&self, lists: &mut Lists, plan: &Plan) {
+        let [start, end] = self.speeds;
+        let length = plan.stations.length_nm();
+        let time = FLAT * (self.acceleration / self.jerk).at_most(MEAN_MAX);
+        for station in 0..plan.stations.count() {
+            let at = plan.stations.get(station).arc_nm;
+            for (speed, away) in [(start, between(0, at)), (end, between(at, length))] {
+                if speed > 0.0 && away < speed * time {
+                    let square = get(lists, SPEED_SQR, station).at_most(speed * speed);
+                    put(lists, SPEED_SQR, station, square);
+                }
+            }
+        }
+    }
+
+    /// Whether the walk is from rest to rest.
+    fn is_from_rest_to_rest(&self) -> bool {
+        self.speeds == [0.0; 2]
+    }
+
+    /// Nodes by which the mean lengthens the walk: half of it at each rest.
+    fn lengthening(&self, mean: u16) -> u16 {
+        let [start, end] = self.speeds.map(|speed| u16::from(speed == 0.0));
+        (start + end) * ((mean + 1) / 2)
     }
 
     /// Accelerations from the start on, times, and what follows from the whole duration.
@@ -386,6 +430,9 @@ impl Walker {
         let wanted = whole(time / SPACING_WORTH.at_least(self.finest));
         self.intervals = wanted.clamp(NODES_MIN.min(most), most);
         self.growth = if time > LONG { GROWTH_LONG } else { GROWTH };
+        if !self.is_from_rest_to_rest() {
+            self.mean_s = self.mean_s.at_most(MEAN_MAX);
+        }
         self.mean_s = self.mean_s.at_least(4.0 * self.finest);
         self.ends = (self.mean_s / 6.0)
             .at_least(self.finest)
@@ -430,9 +477,17 @@ impl Walker {
 
     /// Nodes left for the mean over `n` of them.
     fn room(&self, spacing: f32) -> u16 {
+        let mean = self.mean_at(spacing);
+        if self.is_from_rest_to_rest() {
+            return self.intervals.saturating_sub(mean);
+        }
+        (self.intervals + 1).saturating_sub(self.lengthening(mean | 1))
+    }
+
+    /// Nodes that the mean is over, at a spacing at the ends.
+    fn mean_at(&self, spacing: f32) -> u16 {
         let mean = truncated(self.mean_s / spacing.at_most(self.ends) + 0.5).max(2);
-        self.intervals
-            .saturating_sub(u16::try_from(mean).unwrap_or(u16::MAX))
+        u16::try_from(mean).unwrap_or(u16::MAX).min(self.intervals)
     }
 
     fn fits(&self, lists: &Lists, spacing: f32, growth: f32) -> bool {
@@ -461,7 +516,11 @@ impl Walker {
     fn times(&mut self, lists: &mut Lists, plan: &mut Plan) {
         let [spacing, growth] = self.spacing(self.high);
         let mut nodes = self.nodes_at(spacing, growth);
-        let most = self.intervals - 2;
+        let most = if self.is_from_rest_to_rest() {
+            self.intervals - 2
+        } else {
+            self.room(spacing)
+        };
         let mut last = 0.0;
         while let Some(time) = nodes.next(lists) {
             put(lists, NODES, nodes.count - 1, time);
@@ -473,8 +532,14 @@ impl Walker {
         self.times = nodes.count;
         self.scale = self.duration / last.at_least(1e-9);
         (self.cell, self.before) = (0, (0, 0.0));
-        plan.intervals = self.intervals;
         plan.step_s = spacing.at_most(self.ends);
+        if !self.is_from_rest_to_rest() {
+            // The interval is as long as the spacing at an end, so that the walk has the speed there.
+            self.mean = self.mean_at(spacing) | 1;
+            self.intervals = (self.times - 1).saturating_add(self.lengthening(self.mean)).min(NODES_COUNT);
+            plan.step_s *= self.scale;
+        }
+        plan.intervals = self.intervals;
         plan.inverse_step = 1.0 / plan.step_s;
     }
 
@@ -488,8 +553,15 @@ impl Walker {
         while self.cell + 1 < last && get(lists, TIME, self.cell + 1) <= time {
             self.cell += 1;
         }
+        let [start, end] = self.speeds.map(|speed| speed * plan.step_s);
+        let flat = self.mean / 2 + 2;
         let place = if node + 1 == self.times {
             (plan.stations.length_nm(), 0.0)
+        } else if start > 0.0 && node <= flat {
+            (0, f32::from(node) * start)
+        } else if end > 0.0 && node + 1 + flat >= self.times {
+            let left = f32::from(self.times - 1 - node) * end;
+            (plan.stations.length_nm(), -left)
         } else {
             let since = time - get(lists, TIME, self.cell);
             let [here, there] = [self.cell, self.cell + 1].map(|station| get(lists, SPEED_SQR, station));
@@ -505,14 +577,86 @@ impl Walker {
             lists,
             BUSY,
             previous,
-            (between(from, to) + (to_mm - from_mm)).at_least(0.0),
+            self.flat_increment(plan, previous)
+                .unwrap_or((between(from, to) + (to_mm - from_mm)).at_least(0.0)),
         );
         self.before = place;
     }
 
+    /// The exact length of an increment at the speed of an end.
+    fn flat_increment(&self, plan: &Plan, index: u16) -> Option<f32> {
+        let [start, end] = self.speeds;
+        let flat = self.mean / 2 + 2;
+        if start > 0.0 && index < flat {
+            Some(start * plan.step_s)
+        } else if end > 0.0 && index + 1 + flat >= self.times {
+            Some(end * plan.step_s)
+        } else {
+            None
+        }
+    }
+
     /// Nodes that the mean is over.
     const fn mean_nodes(&self) -> u16 {
-        self.intervals - self.times
+        if self.mean > 0 {
+            self.mean
+        } else {
+            self.intervals - self.times
+        }
+    }
+
+    /// An increment and its time, also beyond the ends, where the speed is that of the end.
+    fn step_of(&self, lists: &Lists, plan: &Plan, index: i32) -> (i64, f32) {
+        let [start, end] = self.speeds.map(|speed| to_q10(speed * plan.step_s));
+        match u16::try_from(index) {
+            Err(_) => (start, plan.step_s),
+            Ok(index) if index + 1 >= self.times => (end, plan.step_s),
+            Ok(index) => (
+                to_q10(get(lists, BUSY, index)),
+                self.scale * (get(lists, NODES, index + 1) - get(lists, NODES, index)),
+            ),
+        }
+    }
+
+    /// Increments of the mean before the first that the walk has where it begins at speed.
+    fn skipped(&self) -> i32 {
+        let [start, _] = self.speeds;
+        if start > 0.0 {
+            i32::from(self.mean + 1) / 2
+        } else {
+            0
+        }
+    }
+
+    /// Sums of the mean before the first coefficient.
+    fn begin_means_at_speed(&mut self, lists: &Lists, plan: &Plan) {
+        let n = i32::from(self.mean);
+        let newest = self.skipped() - 3;
+        (self.sum_q10, self.sum_s) = (0, 0.0);
+        for index in newest + 1 - n..=newest {
+            let (q10, seconds) = self.step_of(lists, plan, index);
+            self.sum_q10 += q10;
+            self.sum_s += seconds;
+        }
+    }
+
+    /// A coefficient of a walk with an end at speed.
+    fn mean_at_speed(&mut self, lists: &Lists, plan: &mut Plan, index: u16) {
+        let n = i32::from(self.mean);
+        let newest = i32::from(index) + self.skipped() - 2;
+        let (in_q10, in_s) = self.step_of(lists, plan, newest);
+        let (out_q10, out_s) = self.step_of(lists, plan, newest - n);
+        self.sum_q10 += in_q10 - out_q10;
+        self.sum_s += in_s - out_s;
+        let inverse = 1.0 / f32::from(self.mean);
+        let [start, end] = plan.pinned();
+        let is_pinned = index < start || index + end >= plan.intervals + 2;
+        let at = usize::from(index);
+        if let (Some(walk), Some(pace)) = (plan.walk.get_mut(at), plan.draft.get_mut(at)) {
+            *walk = to_f32(self.sum_q10) * MM_PER_Q10 * inverse;
+            let ratio = plan.step_s / (self.sum_s * inverse).at_least(1e-9);
+            *pace = if is_pinned { 1.0 } else { ratio * ratio };
+        }
     }
 
     fn begin_means(&mut self, plan: &Plan) {

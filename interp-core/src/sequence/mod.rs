@@ -5,3 +5,4 @@
 pub(crate) mod link;
 pub(crate) mod lookahead;
 pub(crate) mod sequencer;
+mod turning;
