@@ -258,6 +258,10 @@ pub(crate) struct Sweep {
 
 impl Sweep {
     pub(crate) const START: Self = Self::from(0);
+    /// The node.
+    pub(crate) const fn node(&self) -> u16 {
+        self.node
+    }
 
     /// Over the nodes from this one on.
     pub(crate) const fn from(first: u16) -> Self {

@@ -27,6 +27,9 @@ const PARTS_MAX: u8 = 8;
 /// Coefficients of the pace next to an end at speed: the interval there has the speed of the end.
 pub(crate) const PINNED: u16 = 3;
 
+/// Distance from an end at speed within which the walk is made slower until the plan can begin at it, nm.
+const NEAR_TURN_NM: u32 = 4_000_000;
+
 /// Where a jump lies: interval, fraction of it in units of 2^-16, and the first of its two stations.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Knot {
@@ -40,6 +43,8 @@ pub(crate) struct Knot {
 pub(crate) struct Gate {
     pub(crate) interval: u16,
     pub(crate) duration: f32,
+    /// Time from there to the end at pace 1, s.
+    pub(crate) before_end: f32,
 }
 
 /// A place ahead of the tool, and for how long the plan has been near the feed there, in periods at the plan's own pace.
@@ -148,6 +153,7 @@ impl Plan {
         gate: Gate {
             interval: 0,
             duration: 0.0,
+            before_end: 0.0,
         },
         intervals: 0,
         step_s: 0.0,
@@ -348,6 +354,18 @@ impl Plan {
     /// Whether a cursor is where the last stop before the end has begun.
     pub(crate) const fn is_past_gate(&self, cursor: &Cursor) -> bool {
         cursor.interval >= self.gate.interval
+    }
+
+    /// Time to the gate at pace 1, s.
+    pub(crate) fn before_gate(&self) -> f32 {
+        to_f32(i64::from(self.periods)) * self.limits.period - self.gate.before_end
+    }
+
+    /// Whether an arc is near an end at speed.
+    pub(crate) fn is_near_turn(&self, arc_nm: u32) -> bool {
+        let [start, end] = self.ends;
+        let left = self.stations.length_nm().saturating_sub(arc_nm);
+        (start > 0.0 && arc_nm < NEAR_TURN_NM) || (end > 0.0 && left < NEAR_TURN_NM)
     }
 
     /// Time at pace 1 by which a cursor is beyond the end, s.

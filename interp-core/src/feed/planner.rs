@@ -17,8 +17,12 @@ const BARRIER: [f32; 12] = [
 /// Share of the greatest factor of the walk's pace that the method starts from.
 const START_SHARE: f32 = 0.85;
 
-/// Coefficients over which the start goes from an end at speed to the factor.
-const BLENDED: u16 = 14;
+/// Rounds in which a walk with an end at speed is made slower, until the method can start from it; share of what it needs, and the least of it.
+const WALKS_MAX: u8 = 0;
+const WALK_SHARE: f32 = 0.97;
+/// Coefficients over which the start goes from the pace near an end at speed to the factor.
+const BLENDED: u16 = super::turn::ov("BLEND", 3000) as u16;
+const WALK_LEAST: f32 = 0.5;
 
 /// Use of the jerk that the check passes: a plan with more is slowed down.
 const JERK_CHECKED: f32 = 0.998;
@@ -95,6 +99,12 @@ pub(crate) struct Planner {
     periods: u32,
     lead: Lead,
     gate: GateSearch,
+    /// What the walk uses of the caps, and how often it was made.
+    tightened: f32,
+    walks: u8,
+    /// The greatest factor near an end at speed.
+    end_factor: f32,
+    #[cfg(dbgx)] worst: (u16,f32),
 }
 
 impl Planner {
@@ -118,6 +128,10 @@ impl Planner {
         periods: 0,
         lead: Lead::NONE,
         gate: GateSearch::START,
+        tightened: 1.0,
+        walks: 0,
+        end_factor: 0.0,
+        #[cfg(dbgx)] worst: (0,0.0),
     };
 
     /// Begins to plan the path of the plan's stations within the plan's limits.
@@ -126,7 +140,8 @@ impl Planner {
         self.machine = plan.limits;
         self.limits = plan.limits.planned();
         self.first = 0;
-        self.walker.begin(plan.limits.period);
+        (self.tightened, self.walks) = (super::turn::ov("ACC", 25), 0);
+        self.walker.begin(plan.limits.period, self.tightened);
         self.stage = Stage::Walk;
     }
 
@@ -200,7 +215,13 @@ impl Planner {
             }
             Stage::Factor => {
                 let factor = newton::factor(plan, &self.limits, &mut self.sweep);
-                self.factor = factor.at_most(self.factor);
+                #[cfg(dbgx)] if factor<self.factor { self.worst=(self.sweep.node(),0.0); }
+                let [cell, _] = plan.node(self.sweep.node());
+                if plan.is_near_turn(plan.stations.get(cell).arc_nm) {
+                    self.end_factor = factor.at_most(self.end_factor);
+                } else {
+                    self.factor = factor.at_most(self.factor);
+                }
                 if self.sweep.next(plan) {
                     Stage::Scale
                 } else {
@@ -208,8 +229,19 @@ impl Planner {
                 }
             }
             Stage::Scale => {
-                let factor = START_SHARE * self.factor.at_least(1e-9);
-                scale(plan, factor);
+                if plan.pinned() != [0; 2] {
+                    if self.slows_walk() {
+                        self.walker.begin(plan.limits.period, self.tightened);
+                        self.stage = Stage::Walk;
+                        return;
+                    }
+                    scale(plan, START_SHARE * self.factor.at_least(1e-9));
+                } else {
+                    let factor = START_SHARE * self.factor.at_least(1e-9);
+                    for pace in &mut plan.draft {
+                        *pace *= factor;
+                    }
+                }
                 newton::clear(&mut self.lists);
                 Stage::Assemble
             }
@@ -264,6 +296,10 @@ impl Planner {
             }
             Stage::Gate => {
                 if self.gate.work(plan) {
+                    // The next plan has to be complete before the gate.
+                    let before = plan.before_gate() / plan.limits.period;
+                    let pace = before / to_f32(least).at_least(1.0);
+                    plan.pace_max = plan.pace_max.at_most(pace.at_least(0.1));
                     Stage::Done
                 } else {
                     Stage::Gate
@@ -271,6 +307,18 @@ impl Planner {
             }
             Stage::Done => Stage::Done,
         };
+    }
+
+    /// Whether the walk has to be made slower: an end at speed keeps its pace, so that the method starts from the walk's own.
+    fn slows_walk(&mut self) -> bool {
+        #[cfg(dbgx)] std::eprintln!("  EF {:.3} {:.3} walk {} factor {:.3} end {:.3} at node {} of, {:?}", self.end_factor, self.factor, self.walks, self.factor, self.end_factor, self.worst.0, self.limits.feed);
+        let needed = WALK_SHARE * self.end_factor;
+        if needed >= 1.0 || self.walks >= WALKS_MAX {
+            return false;
+        }
+        self.walks += 1;
+        self.tightened *= needed.at_least(WALK_LEAST);
+        true
     }
 
     fn begin_method(&mut self, plan: &Plan) {
@@ -284,6 +332,7 @@ impl Planner {
         }
         self.weight = 1.0 / sum.at_least(1e-9);
         self.factor = f32::MAX;
+        self.end_factor = f32::MAX;
         (self.sweep, self.step) = (Sweep::from(self.first.saturating_sub(SEEN)), 0);
     }
 
@@ -337,6 +386,7 @@ impl Planner {
             self.lead.cursor = self.cursor;
         }
         let here = plan.use_draft(&self.machine, &self.cursor);
+        #[cfg(dbgx)] if here.jerk>self.most.jerk { self.worst=(self.cursor.interval,self.cursor.arc_q10(plan) as f32*1e-9/1.024); }
         self.most.add(&here);
         if here.velocity > here.feed {
             plan.forbid_feed(self.cursor.interval);
@@ -361,6 +411,7 @@ impl Planner {
             .at_least(cube_root(jerk / JERK_CHECKED))
             .at_least(to_f32(least) / to_f32(self.periods.max(1)))
             .at_least(1.0);
+        #[cfg(dbgx)] std::eprintln!("plan ends {:?} walks {} tight {:.3} n {} step {} factor0 {:.3} most {:?} at {:?} periods {} least {} factor {:.3}", plan.ends, self.walks, self.tightened, plan.intervals, plan.step_s, self.factor, self.most, self.worst, self.periods, least, factor);
         plan.periods = u32::try_from(truncated(to_f32(self.periods) * factor)).unwrap_or(0);
         plan.lead = self.lead;
         plan.pace_max = 1.0;
@@ -378,24 +429,23 @@ impl Planner {
     }
 }
 
-/// Multiplies the pace of the walk; near an end at speed by less, so that the end keeps its speed.
+/// Multiplies the pace of the walk, but near an end at speed.
 fn scale(plan: &mut Plan, factor: f32) {
-    let [start, end] = plan.pinned();
     let count = plan.intervals + 2;
+    let [at_start, at_end] = plan.ends.map(|speed| speed > 0.0);
+    let is_near = |index: u16| {
+        let [cell, _] = plan.node(index.min(plan.intervals));
+        plan.is_near_turn(plan.stations.get(cell).arc_nm)
+    };
+    let from = if at_start { (0..count).find(|index| !is_near(*index)).unwrap_or(count) } else { 0 };
+    let to = if at_end { (0..count).rev().find(|index| !is_near(*index)).unwrap_or(0) } else { count };
     for (index, pace) in (0..count).zip(&mut plan.draft) {
-        let share = |pinned: u16, away: u16| {
-            if pinned == 0 {
-                return 1.0;
-            }
-            let by = (f32::from(away.saturating_sub(pinned - 1)) * (1.0 / f32::from(BLENDED))).at_most(1.0);
-            by * by * (3.0 - 2.0 * by)
+        let share = |is_at: bool, away: u16| {
+            let by = (f32::from(away) * (1.0 / f32::from(BLENDED))).at_most(1.0);
+            if is_at { by * by * (3.0 - 2.0 * by) } else { 1.0 }
         };
-        let share = share(start, index).at_most(share(end, count - 1 - index));
-        *pace *= if share < 1.0 {
-            1.0 + share * (factor - 1.0)
-        } else {
-            factor
-        };
+        let share = share(at_start, index.saturating_sub(from)).at_most(share(at_end, to.saturating_sub(index)));
+        *pace *= 1.0 + share * (factor - 1.0);
     }
 }
 

@@ -102,6 +102,7 @@ impl GateSearch {
         gate: Gate {
             interval: 0,
             duration: SHORTEST_S,
+            before_end: 0.0,
         },
         cursor: Cursor::START,
         time: 0.0,
@@ -153,6 +154,7 @@ impl GateSearch {
             return;
         }
         self.gate.interval = node;
+        self.gate.before_end = left;
         self.cursor = Cursor::at_node(plan, node);
         self.time = 0.0;
         self.is_placed = true;

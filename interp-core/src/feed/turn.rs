@@ -16,8 +16,9 @@ pub(crate) const CELLS: u16 = 10;
 /// Stations of half a turn.
 pub(crate) const STATIONS: u16 = CELLS + 1;
 
-/// Length of the plan's arc along a turn, as a multiple of the distance between the passes.
-const STRETCH: f32 = 3.5;
+/// Length of the plan's arc along a turn, for the time t that the step takes at its jerk limit, as a multiple of a t^2 and of v t.
+const REVERSAL: f32 = ov("STRETCH", 260);
+const CRUISE: f32 = ov("CRUISE", 400);
 /// Rounds in which the length is adapted to the greatest overrun.
 pub(crate) const ROUNDS: u8 = 4;
 /// Least length of half a turn, mm: a shorter one is noise of rounded positions.
@@ -25,7 +26,7 @@ const HALF_MIN_MM: f32 = 0.05;
 
 /// Shares of the limits at the apex.
 const ACCELERATION_SHARE: f32 = 0.9;
-const JERK_SHARE: f32 = 0.7;
+const JERK_SHARE: f32 = ov("JS", 85);
 
 /// The end of a pass at a turn.
 #[derive(Clone, Copy, Debug)]
@@ -68,12 +69,11 @@ impl Turn {
     };
 
     /// A turn between two ends, and how far it overruns them, mm. `length`: of the plan's arc, mm; 0 for the first try.
-    pub(crate) fn try_length(from: &TurnEnd, to: &TurnEnd, length: f32) -> (Self, f32) {
-        let [x, y, z] = apart_mm(&from.cl_nm, &to.cl_nm);
+    pub(crate) fn try_length(from: &TurnEnd, to: &TurnEnd, limits: &MotionLimits, length: f32) -> (Self, f32) {
         let length = if length > 0.0 {
             length
         } else {
-            STRETCH * sqrt(x * x + y * y + z * z)
+            first_length(from, to, limits)
         };
         let turn = Self::of(from, to, length);
         let over = turn.overrun(from, to);
@@ -221,18 +221,36 @@ impl Turn {
         most
     }
 
-    /// Speed at the apex.
+    /// Speed at the apex: the whole turn could be passed at it.
     fn apex_speed(&self, limits: &MotionLimits) -> f32 {
-        let q = self.derivatives(0.5);
         let mut speed = limits.feed;
-        for (axis, [first, second, third]) in limits.axes.iter().zip(&q) {
-            speed = speed
-                .at_most(axis.velocity / first.abs().at_least(1e-6))
-                .at_most(sqrt(ACCELERATION_SHARE * axis.acceleration / second.abs().at_least(1e-9)))
-                .at_most(cube_root(JERK_SHARE * axis.jerk / third.abs().at_least(1e-9)));
+        for station in 0..STATIONS {
+            for second in [false, true] {
+                let q = self.station(second, station);
+                for (axis, [first, second, third]) in limits.axes.iter().zip(&q) {
+                    speed = speed
+                        .at_most(axis.velocity / first.abs().at_least(1e-6))
+                        .at_most(sqrt(ACCELERATION_SHARE * axis.acceleration / second.abs().at_least(1e-9)))
+                        .at_most(cube_root(JERK_SHARE * axis.jerk / third.abs().at_least(1e-9)));
+                }
+            }
         }
         speed
     }
+}
+
+/// The length of the plan's arc for which a turn is fast: while the step to the next pass takes its time, which its jerk bounds, the axes reverse.
+fn first_length(from: &TurnEnd, to: &TurnEnd, limits: &MotionLimits) -> f32 {
+    let apart = apart_mm(&from.cl_nm, &to.cl_nm);
+    let [x, y, z] = apart;
+    let distance = sqrt(x * x + y * y + z * z);
+    let (mut jerk, mut acceleration) = (f32::MAX, f32::MAX);
+    for ((axis, apart), [first, ..]) in limits.axes.iter().zip(&apart).zip(&from.q) {
+        jerk = jerk.at_most(axis.jerk * distance / apart.abs().at_least(1e-3 * distance));
+        acceleration = acceleration.at_most(axis.acceleration / first.abs().at_least(1e-3));
+    }
+    let time = cube_root(distance / jerk);
+    (REVERSAL * acceleration * time * time).at_most(CRUISE * limits.feed * time)
 }
 
 fn apart_mm(from: &[i32; 3], to: &[i32; 3]) -> [f32; 3] {
@@ -246,4 +264,29 @@ fn apart_mm(from: &[i32; 3], to: &[i32; 3]) -> [f32; 3] {
 #[allow(clippy::cast_precision_loss, reason = "24 bits resolve a turn to nanometres")]
 const fn nm_to_mm(nm: u32) -> f32 {
     nm as f32 * MM_PER_NM
+}
+
+pub(crate) const fn ov(name: &str, default: u32) -> f32 {
+    let text = match name.as_bytes()[0] {
+        b'S' => option_env!("OV_STRETCH"),
+        b'J' => option_env!("OV_JS"),
+        b'M' => option_env!("OV_MEAN"),
+        b'C' => option_env!("OV_CRUISE"),
+        b'N' => option_env!("OV_NODE"),
+        b'F' => option_env!("OV_FLAT"),
+        b'B' => option_env!("OV_BLEND"),
+        b'A' => option_env!("OV_ACC"),
+        _ => None,
+    };
+    let mut value = default;
+    if let Some(text) = text {
+        value = 0;
+        let b = text.as_bytes();
+        let mut i = 0;
+        while i < b.len() {
+            value = value * 10 + (b[i] - b'0') as u32;
+            i += 1;
+        }
+    }
+    value as f32 * 0.01
 }

@@ -3,7 +3,7 @@
 
 use super::limits::{MotionLimits, SLOPE_MIN};
 use super::plan::{KNOTS_MAX, Knot, NODES_MAX, NODES_MIN, Plan};
-use super::stations::{Derivatives, STATIONS_MAX, between};
+use super::stations::{Derivatives, STATIONS_MAX, Station, between};
 use super::{MM_PER_Q10, to_q10};
 use crate::math::arith::{sqrt, truncated};
 use crate::math::number::{Bounded, cube_root, to_f32};
@@ -25,7 +25,7 @@ const SPACING_MAX: f32 = 0.1;
 /// Time between nodes that is worth its planning, s.
 const SPACING_WORTH: f32 = 4e-3;
 /// Longest mean of a walk with an end at speed, s, and the time for which it has that speed, as a multiple of it.
-const MEAN_MAX: f32 = 0.04;
+const MEAN_MAX: f32 = super::turn::ov("MEAN", 5);
 const FLAT: f32 = 1.0;
 /// Bisections of the spacing.
 const BISECTIONS: u8 = 12;
@@ -107,6 +107,7 @@ pub(crate) struct Walker {
     /// Speeds at the ends, mm/s, and nodes of the mean where one is not a rest.
     speeds: [f32; 2],
     mean: u16,
+    tightened: f32,
 }
 
 /// Lists of this stage.
@@ -144,10 +145,13 @@ impl Walker {
         coarsenings: 0,
         speeds: [0.0; 2],
         mean: 0,
+        tightened: 1.0,
     };
 
-    pub(crate) const fn begin(&mut self, period: f32) {
+    /// `tightened`: share of the acceleration near an end at speed.
+    pub(crate) const fn begin(&mut self, period: f32, tightened: f32) {
         *self = Self::IDLE;
+        self.tightened = tightened;
         // Nodes much closer together than periods would not be seen.
         self.finest = 0.5 * period;
         self.stage = Stage::Caps;
@@ -173,9 +177,12 @@ impl Walker {
         let count = plan.stations.count();
         self.stage = match self.stage {
             Stage::Caps => {
+                self.speeds = plan.ends;
                 let end = count.min(self.index + STATIONS_A_PORTION);
                 for station in self.index..end {
-                    self.cap(lists, station, &plan.stations.get(station).q, limits);
+                    let Station { arc_nm, q } = plan.stations.get(station);
+                    let share = if plan.is_near_turn(*arc_nm) { self.tightened } else { 1.0 };
+                    self.cap(lists, station, q, limits, share);
                 }
                 self.next(end, end == count, Stage::Caps, Stage::Jumps)
             }
@@ -192,7 +199,6 @@ impl Walker {
                 self.next(station, station >= count, Stage::Jumps, Stage::Backwards)
             }
             Stage::Backwards => {
-                self.speeds = plan.ends;
                 self.backwards(lists, plan);
                 Stage::Forwards
             }
@@ -310,7 +316,7 @@ impl Walker {
     }
 
     /// Caps of speed and acceleration at a station.
-    fn cap(&mut self, lists: &mut Lists, station: u16, q: &Derivatives, limits: &MotionLimits) {
+    fn cap(&mut self, lists: &mut Lists, station: u16, q: &Derivatives, limits: &MotionLimits, share: f32) {
         let mut square = 1.0 / limits.inverse_speed_sqr(q);
         let mut jerk = f32::MAX;
         for (axis, [first, second, third]) in limits.axes.iter().zip(q) {
@@ -332,6 +338,13 @@ impl Walker {
         self.acceleration = self.acceleration.at_least(accel);
         self.speed = self.speed.at_least(speed);
         let is_capped = speed < 0.999 * limits.feed;
+        let [start, end] = self.speeds;
+        let least = square.at_most(start.at_least(end) * start.at_least(end));
+        let (square, accel) = if share < 1.0 {
+            ((share * square).at_least(least), share * accel)
+        } else {
+            (square, accel)
+        };
         put(lists, SPEED_SQR, station, square);
         put(lists, ACCEL, station, if is_capped { -accel } else { accel });
     }
@@ -388,8 +401,7 @@ impl Walker {
             let at = plan.stations.get(station).arc_nm;
             for (speed, away) in [(start, between(0, at)), (end, between(at, length))] {
                 if speed > 0.0 && away < speed * time {
-                    let square = get(lists, SPEED_SQR, station).at_most(speed * speed);
-                    put(lists, SPEED_SQR, station, square);
+                    put(lists, SPEED_SQR, station, speed * speed);
                 }
             }
         }
@@ -427,14 +439,16 @@ impl Walker {
             .at_most(cube_root(0.5 * length / self.jerk));
         let whole = |value: f32| u16::try_from(truncated(value)).unwrap_or(u16::MAX);
         let most = whole(time / self.finest).clamp(NODES_LEAST, NODES_COUNT);
-        let wanted = whole(time / SPACING_WORTH.at_least(self.finest));
+        let worth = if self.is_from_rest_to_rest() { SPACING_WORTH } else { super::turn::ov("NODE", 50) * 0.01 };
+        let wanted = whole(time / worth.at_least(self.finest));
         self.intervals = wanted.clamp(NODES_MIN.min(most), most);
         self.growth = if time > LONG { GROWTH_LONG } else { GROWTH };
         if !self.is_from_rest_to_rest() {
             self.mean_s = self.mean_s.at_most(MEAN_MAX);
         }
         self.mean_s = self.mean_s.at_least(4.0 * self.finest);
-        self.ends = (self.mean_s / 6.0)
+        let parts = if self.is_from_rest_to_rest() { 6.0 } else { super::turn::ov("FLAT", 1600) };
+        self.ends = (self.mean_s / parts)
             .at_least(self.finest)
             .at_least(time / (4000.0 * f32::from(self.intervals)));
     }

@@ -623,7 +623,8 @@ impl Lookahead {
     fn find_turn(&mut self, job: &Job<'_>, axes: &AxisLimits, round: u8, out: &mut PassPlan) -> Task {
         let [from, to] = &self.ends;
         if round < turn::ROUNDS {
-            let (turn, over_mm) = Turn::try_length(from, to, self.length);
+            let limits = MotionLimits::new(axes, job.header.feed_mm_s, job.header.period_s);
+            let (turn, over_mm) = Turn::try_length(from, to, &limits, self.length);
             if !turn.is_long() {
                 return Task::Done;
             }
