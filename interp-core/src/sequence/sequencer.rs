@@ -328,7 +328,7 @@ impl Sequencer {
             Phase::Pass | Phase::Turn if self.pace.has_work() => {
                 let known = is_known.then_some(&next.plan);
                 let stops = self.pace.wanted() == 0.0;
-                let road = road(&now.plan, known, pace_on(job, next, self.share), stops);
+                let road = road(&now.plan, known, next.plan.pace_max, stops);
                 return self.pace.work(&road, &self.follower.cursor);
             }
             Phase::StepOver if self.step_over.progress.has_work() => return self.step_over.progress.work(),

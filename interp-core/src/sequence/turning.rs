@@ -52,7 +52,8 @@ pub(super) fn road<'a>(now: &'a Plan, next: Option<&'a Plan>, next_pace: f32, st
 impl Sequencer {
     /// The pace that is wanted before a turn: that of both passes, or a stop where the next is not planned in time.
     pub(super) fn pace_before_turn(&mut self, wanted: f32, next_pace: Option<f32>) -> f32 {
-        let (now, _) = self.plans_ref();
+        let (now, next) = self.plans_ref();
+        let next_most = next.plan.pace_max + SAME;
         let wanted = wanted.at_most(now.plan.pace_max);
         if !now.turns() {
             return wanted;
@@ -60,7 +61,7 @@ impl Sequencer {
         let is_past = now.plan.is_past_gate(&self.follower.cursor);
         let (gate, greatest) = (now.plan.gate, now.plan.pace_max);
         let pace = self.pace.now();
-        let goes_on = next_pace.is_some_and(|next| self.pace.is_changing() || self.pace.goal() <= next + SAME);
+        let goes_on = next_pace.is_some() && (self.pace.is_changing() || self.pace.goal() <= next_most);
         if is_past && !goes_on && self.pace.goal() > 0.0 {
             // Slower than the greatest pace, the same stop takes longer.
             self.pace
@@ -82,6 +83,7 @@ impl Sequencer {
 
     /// The tool has crossed the apex: the next plan is followed, from what is left of the period on.
     pub(super) fn cross_apex(&mut self, job: &Job<'_>, run: &mut Run) -> Result<()> {
+        #[cfg(dbgx)] std::eprintln!("APEX");
         let (now, _) = self.plans_ref();
         let beyond = now.plan.beyond(&self.follower.cursor);
         self.turn = now.tail;
