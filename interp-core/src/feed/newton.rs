@@ -213,6 +213,8 @@ const FACTOR_STEP: f32 = 0.85;
 pub(crate) struct Reach {
     slack: f32,
     loss: f32,
+    /// Rows that do not hold, which the start next to an end at speed may have, do not bound the step.
+    passes: bool,
 }
 
 impl Reach {
@@ -220,17 +222,27 @@ impl Reach {
     pub(crate) const NONE: Self = Self {
         slack: 0.0,
         loss: 0.0,
+        passes: false,
     };
 
     /// No row is used up.
     pub(crate) const FAR: Self = Self {
         slack: 1.0,
         loss: 0.0,
+        passes: false,
     };
 
+    /// Far, for a plan with an end at speed or without.
+    pub(crate) fn far(passes: bool) -> Self {
+        Self { passes, ..Self::FAR }
+    }
+
     fn add(&mut self, slack: f32, loss: f32) {
+        if self.passes && slack <= 0.0 {
+            return;
+        }
         if loss * self.slack > slack * self.loss {
-            *self = Self { slack, loss };
+            (self.slack, self.loss) = (slack, loss);
         }
     }
 

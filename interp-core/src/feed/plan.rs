@@ -71,6 +71,8 @@ pub(crate) struct Plan {
     pub(crate) ends: [f32; 2],
     /// Greatest pace at which it may be followed.
     pub(crate) pace_max: f32,
+    /// Use of the feed at the plan's own pace, where it is more than 1.
+    pub(crate) over: f32,
     /// Where the last stop before the end begins.
     pub(crate) gate: Gate,
     /// Intervals of the walk, and the time of one at pace 1, s.
@@ -150,6 +152,7 @@ impl Plan {
         change: FeedChange::NONE,
         ends: [0.0; 2],
         pace_max: 1.0,
+        over: 1.0,
         gate: Gate {
             interval: 0,
             duration: 0.0,

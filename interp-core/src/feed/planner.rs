@@ -264,7 +264,7 @@ impl Planner {
             Stage::Solve => {
                 let [start, end] = plan.pinned();
                 newton::solve(&mut self.lists, plan.intervals + 2 - end, self.first.max(start));
-                self.reach = Reach::FAR;
+                self.reach = Reach::far(plan.pinned() != [0; 2]);
                 Stage::Reach
             }
             Stage::Reach => {
@@ -298,6 +298,7 @@ impl Planner {
                 if self.gate.work(plan) {
                     // The next plan has to be complete before the gate.
                     let before = plan.before_gate() / plan.limits.period;
+                    #[cfg(dbgx)] std::eprintln!("gate {:?} of {} pace_max {} before {before} least {least} spare {}", plan.gate, plan.intervals, plan.pace_max, plan.periods);
                     let pace = before / to_f32(least).at_least(1.0);
                     plan.pace_max = plan.pace_max.at_most(pace.at_least(0.1));
                     Stage::Done
@@ -414,10 +415,11 @@ impl Planner {
         #[cfg(dbgx)] std::eprintln!("plan ends {:?} walks {} tight {:.3} n {} step {} factor0 {:.3} most {:?} at {:?} periods {} least {} factor {:.3}", plan.ends, self.walks, self.tightened, plan.intervals, plan.step_s, self.factor, self.most, self.worst, self.periods, least, factor);
         plan.periods = u32::try_from(truncated(to_f32(self.periods) * factor)).unwrap_or(0);
         plan.lead = self.lead;
-        plan.pace_max = 1.0;
+        (plan.pace_max, plan.over) = (1.0, 1.0);
         let is_between = plan.pinned() != [0; 2];
         if is_between {
             plan.pace_max = 1.0 / factor;
+            plan.over = feed.at_least(1.0);
         } else if factor > 1.0 {
             plan.lead.near = 0.0;
             let share = 1.0 / (factor * factor);

@@ -27,6 +27,9 @@ const SPACING_WORTH: f32 = 4e-3;
 /// Longest mean of a walk with an end at speed, s, and the time for which it has that speed, as a multiple of it.
 const MEAN_MAX: f32 = super::turn::ov("MEAN", 5);
 const FLAT: f32 = 1.0;
+/// Periods that the planning of a node takes, and what it takes besides, the last stop before a turn included.
+const PERIODS_A_NODE: f32 = 4.0;
+const PERIODS_BESIDES: f32 = 250.0;
 /// Bisections of the spacing.
 const BISECTIONS: u8 = 12;
 /// Tries to coarsen the ends.
@@ -439,8 +442,12 @@ impl Walker {
             .at_most(cube_root(0.5 * length / self.jerk));
         let whole = |value: f32| u16::try_from(truncated(value)).unwrap_or(u16::MAX);
         let most = whole(time / self.finest).clamp(NODES_LEAST, NODES_COUNT);
-        let worth = if self.is_from_rest_to_rest() { SPACING_WORTH } else { super::turn::ov("NODE", 50) * 0.01 };
-        let wanted = whole(time / worth.at_least(self.finest));
+        let mut wanted = whole(time / SPACING_WORTH.at_least(self.finest));
+        if !self.is_from_rest_to_rest() {
+            // The next plan has to be complete before the last stop in front of the turn.
+            let periods = super::turn::ov("NODE", 85) * time / (2.0 * self.finest);
+            wanted = wanted.min(whole((periods - PERIODS_BESIDES) * (1.0 / PERIODS_A_NODE)));
+        }
         self.intervals = wanted.clamp(NODES_MIN.min(most), most);
         self.growth = if time > LONG { GROWTH_LONG } else { GROWTH };
         if !self.is_from_rest_to_rest() {
