@@ -17,12 +17,14 @@ const BARRIER: [f32; 12] = [
 /// Share of the greatest factor of the walk's pace that the method starts from.
 const START_SHARE: f32 = 0.85;
 
-/// Rounds in which a walk with an end at speed is made slower, until the method can start from it; share of what it needs, and the least of it.
-const WALKS_MAX: u8 = 0;
-const WALK_SHARE: f32 = 0.97;
+/// Share of the caps that a walk uses near an end at speed, so that the method can start from its own pace there.
+const WALK_NEAR_TURN: f32 = 0.25;
 /// Coefficients over which the start goes from the pace near an end at speed to the factor.
-const BLENDED: u16 = super::turn::ov("BLEND", 3000) as u16;
+const BLENDED: u16 = 30;
 const WALK_LEAST: f32 = 0.5;
+
+/// Share of the planned jerk that is used in a turn.
+const TURN_JERK: f32 = 0.88;
 
 /// Use of the jerk that the check passes: a plan with more is slowed down.
 const JERK_CHECKED: f32 = 0.998;
@@ -81,6 +83,7 @@ pub(crate) struct Planner {
     /// Limits of the path, and what the plan may use of them.
     machine: MotionLimits,
     limits: MotionLimits,
+    turn_limits: MotionLimits,
     /// The first coefficient that is planned: 0, or of the rest of a path that is being followed.
     first: u16,
     /// Whether a plan of the rest holds, and how often it was drawn towards the plan that is followed.
@@ -99,11 +102,6 @@ pub(crate) struct Planner {
     periods: u32,
     lead: Lead,
     gate: GateSearch,
-    /// What the walk uses of the caps, and how often it was made.
-    tightened: f32,
-    walks: u8,
-    /// The greatest factor near an end at speed.
-    end_factor: f32,
     #[cfg(dbgx)] worst: (u16,f32),
 }
 
@@ -115,6 +113,7 @@ impl Planner {
         walker: Walker::IDLE,
         machine: MotionLimits::NONE,
         limits: MotionLimits::NONE,
+        turn_limits: MotionLimits::NONE,
         first: 0,
         holds: false,
         drawn: 0,
@@ -128,9 +127,6 @@ impl Planner {
         periods: 0,
         lead: Lead::NONE,
         gate: GateSearch::START,
-        tightened: 1.0,
-        walks: 0,
-        end_factor: 0.0,
         #[cfg(dbgx)] worst: (0,0.0),
     };
 
@@ -139,9 +135,9 @@ impl Planner {
         plan.change = FeedChange::new(&plan.limits);
         self.machine = plan.limits;
         self.limits = plan.limits.planned();
+        self.turn_limits = self.limits.with_less_jerk(TURN_JERK);
         self.first = 0;
-        (self.tightened, self.walks) = (super::turn::ov("ACC", 25), 0);
-        self.walker.begin(plan.limits.period, self.tightened);
+        self.walker.begin(plan.limits.period, WALK_NEAR_TURN);
         self.stage = Stage::Walk;
     }
 
@@ -214,12 +210,11 @@ impl Planner {
                 Stage::Factor
             }
             Stage::Factor => {
-                let factor = newton::factor(plan, &self.limits, &mut self.sweep);
+                let limits = self.limits_at(plan);
+                let factor = newton::factor(plan, &limits, &mut self.sweep);
                 #[cfg(dbgx)] if factor<self.factor { self.worst=(self.sweep.node(),0.0); }
                 let [cell, _] = plan.node(self.sweep.node());
-                if plan.is_near_turn(plan.stations.get(cell).arc_nm) {
-                    self.end_factor = factor.at_most(self.end_factor);
-                } else {
+                if !plan.is_near_turn(plan.stations.get(cell).arc_nm) {
                     self.factor = factor.at_most(self.factor);
                 }
                 if self.sweep.next(plan) {
@@ -230,11 +225,6 @@ impl Planner {
             }
             Stage::Scale => {
                 if plan.pinned() != [0; 2] {
-                    if self.slows_walk() {
-                        self.walker.begin(plan.limits.period, self.tightened);
-                        self.stage = Stage::Walk;
-                        return;
-                    }
                     scale(plan, START_SHARE * self.factor.at_least(1e-9));
                 } else {
                     let factor = START_SHARE * self.factor.at_least(1e-9);
@@ -247,9 +237,10 @@ impl Planner {
             }
             Stage::Assemble => {
                 let barrier = BARRIER.get(usize::from(self.step)).copied().unwrap_or(1e-3);
+                let limits = self.limits_at(plan);
                 newton::assemble(
                     plan,
-                    &self.limits,
+                    &limits,
                     &mut self.lists,
                     &mut self.sweep,
                     barrier,
@@ -268,7 +259,8 @@ impl Planner {
                 Stage::Reach
             }
             Stage::Reach => {
-                newton::extend(plan, &self.limits, &self.lists, &mut self.sweep, &mut self.reach);
+                let limits = self.limits_at(plan);
+                newton::extend(plan, &limits, &self.lists, &mut self.sweep, &mut self.reach);
                 if self.sweep.next(plan) {
                     Stage::Take
                 } else {
@@ -310,16 +302,14 @@ impl Planner {
         };
     }
 
-    /// Whether the walk has to be made slower: an end at speed keeps its pace, so that the method starts from the walk's own.
-    fn slows_walk(&mut self) -> bool {
-        #[cfg(dbgx)] std::eprintln!("  EF {:.3} {:.3} walk {} factor {:.3} end {:.3} at node {} of, {:?}", self.end_factor, self.factor, self.walks, self.factor, self.end_factor, self.worst.0, self.limits.feed);
-        let needed = WALK_SHARE * self.end_factor;
-        if needed >= 1.0 || self.walks >= WALKS_MAX {
-            return false;
+    /// The limits at the node of the sweep: in a turn, where the path changes from node to node, the plan uses less of the jerk.
+    fn limits_at(&self, plan: &Plan) -> MotionLimits {
+        let [cell, _] = plan.node(self.sweep.node());
+        if plan.is_near_turn(plan.stations.get(cell).arc_nm) {
+            self.turn_limits
+        } else {
+            self.limits
         }
-        self.walks += 1;
-        self.tightened *= needed.at_least(WALK_LEAST);
-        true
     }
 
     fn begin_method(&mut self, plan: &Plan) {
@@ -333,7 +323,6 @@ impl Planner {
         }
         self.weight = 1.0 / sum.at_least(1e-9);
         self.factor = f32::MAX;
-        self.end_factor = f32::MAX;
         (self.sweep, self.step) = (Sweep::from(self.first.saturating_sub(SEEN)), 0);
     }
 

@@ -17,8 +17,8 @@ pub(crate) const CELLS: u16 = 10;
 pub(crate) const STATIONS: u16 = CELLS + 1;
 
 /// Length of the plan's arc along a turn, for the time t that the step takes at its jerk limit, as a multiple of a t^2 and of v t.
-const REVERSAL: f32 = ov("STRETCH", 260);
-const CRUISE: f32 = ov("CRUISE", 400);
+const REVERSAL: f32 = 2.6;
+const CRUISE: f32 = 4.0;
 /// Rounds in which the length is adapted to the greatest overrun.
 pub(crate) const ROUNDS: u8 = 4;
 /// Least length of half a turn, mm: a shorter one is noise of rounded positions.
@@ -26,7 +26,7 @@ const HALF_MIN_MM: f32 = 0.05;
 
 /// Shares of the limits at the apex.
 const ACCELERATION_SHARE: f32 = 0.9;
-const JERK_SHARE: f32 = ov("JS", 85);
+const JERK_SHARE: f32 = 0.65;
 
 /// The end of a pass at a turn.
 #[derive(Clone, Copy, Debug)]
@@ -264,29 +264,4 @@ fn apart_mm(from: &[i32; 3], to: &[i32; 3]) -> [f32; 3] {
 #[allow(clippy::cast_precision_loss, reason = "24 bits resolve a turn to nanometres")]
 const fn nm_to_mm(nm: u32) -> f32 {
     nm as f32 * MM_PER_NM
-}
-
-pub(crate) const fn ov(name: &str, default: u32) -> f32 {
-    let text = match name.as_bytes()[0] {
-        b'S' => option_env!("OV_STRETCH"),
-        b'J' => option_env!("OV_JS"),
-        b'M' => option_env!("OV_MEAN"),
-        b'C' => option_env!("OV_CRUISE"),
-        b'N' => option_env!("OV_NODE"),
-        b'F' => option_env!("OV_FLAT"),
-        b'B' => option_env!("OV_BLEND"),
-        b'A' => option_env!("OV_ACC"),
-        _ => None,
-    };
-    let mut value = default;
-    if let Some(text) = text {
-        value = 0;
-        let b = text.as_bytes();
-        let mut i = 0;
-        while i < b.len() {
-            value = value * 10 + (b[i] - b'0') as u32;
-            i += 1;
-        }
-    }
-    value as f32 * 0.01
 }

@@ -25,7 +25,7 @@ const SPACING_MAX: f32 = 0.1;
 /// Time between nodes that is worth its planning, s.
 const SPACING_WORTH: f32 = 4e-3;
 /// Longest mean of a walk with an end at speed, s, and the time for which it has that speed, as a multiple of it.
-const MEAN_MAX: f32 = super::turn::ov("MEAN", 5);
+const MEAN_MAX: f32 = 0.05;
 const FLAT: f32 = 1.0;
 /// Periods that the planning of a node takes, and what it takes besides, the last stop before a turn included.
 const PERIODS_A_NODE: f32 = 4.0;
@@ -445,7 +445,7 @@ impl Walker {
         let mut wanted = whole(time / SPACING_WORTH.at_least(self.finest));
         if !self.is_from_rest_to_rest() {
             // The next plan has to be complete before the last stop in front of the turn.
-            let periods = super::turn::ov("NODE", 85) * time / (2.0 * self.finest);
+            let periods = 0.75 * time / (2.0 * self.finest);
             wanted = wanted.min(whole((periods - PERIODS_BESIDES) * (1.0 / PERIODS_A_NODE)));
         }
         self.intervals = wanted.clamp(NODES_MIN.min(most), most);
@@ -454,7 +454,7 @@ impl Walker {
             self.mean_s = self.mean_s.at_most(MEAN_MAX);
         }
         self.mean_s = self.mean_s.at_least(4.0 * self.finest);
-        let parts = if self.is_from_rest_to_rest() { 6.0 } else { super::turn::ov("FLAT", 1600) };
+        let parts = if self.is_from_rest_to_rest() { 6.0 } else { 16.0 };
         self.ends = (self.mean_s / parts)
             .at_least(self.finest)
             .at_least(time / (4000.0 * f32::from(self.intervals)));
