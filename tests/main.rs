@@ -29,3 +29,4 @@ mod sample_jobs;
 mod script;
 mod session;
 mod swept;
+mod unusual_motion;

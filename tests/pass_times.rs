@@ -33,7 +33,7 @@ fn on_machine(name: &str, times: f64) -> Job {
     limited(job, feed_mm_s)
 }
 
-fn limited(mut job: Job, feed_mm_s: f64) -> Job {
+pub(crate) fn limited(mut job: Job, feed_mm_s: f64) -> Job {
     job.feed_mm_min = 60.0 * feed_mm_s;
     job.machine.limits = Some(LIMITS);
     job
@@ -41,14 +41,14 @@ fn limited(mut job: Job, feed_mm_s: f64) -> Job {
 
 /// A pass as the core ran it.
 #[derive(Clone, Copy)]
-struct Ran {
+pub(crate) struct Ran {
     side: f64,
     /// Time from the first sample to the last, s.
     time_s: f64,
 }
 
 /// Runs a job until the end of its pass `last`.
-fn run(job: &Job, last: u32) -> BTreeMap<u32, Ran> {
+pub(crate) fn run(job: &Job, last: u32) -> BTreeMap<u32, Ran> {
     let prepared = prepare(job).unwrap();
     let mut passes = BTreeMap::<u32, (SpanParameter, u32)>::new();
     let mut machine = Machine::load(&prepared).unwrap();
@@ -76,7 +76,7 @@ fn run(job: &Job, last: u32) -> BTreeMap<u32, Ran> {
 }
 
 /// Time of a pass over that of the best motion known, and over the lower bound for any motion.
-fn compared(job: &Job, oracle: &Oracle, ran: &Ran) -> [f64; 2] {
+pub(crate) fn compared(job: &Job, oracle: &Oracle, ran: &Ran) -> [f64; 2] {
     let path = PassPath::of_pass(oracle, ran.side).unwrap();
     let best = optimum(&path, job.feed_mm_s(), &LIMITS, job.machine.period_s()).unwrap();
     // The reference motion keeps the limits, and is not below the lower bound.

@@ -97,6 +97,27 @@ fn bumpy(random: &[f64], bump: f64) -> SurfaceSpec {
     }
 }
 
+/// A bumpy patch of this number, along u or v, in passes with half a millimetre of scallop height.
+pub(crate) fn bumpy_job(seed: usize) -> Job {
+    // A linear congruential generator: the same surfaces on each machine.
+    let mut state = 0x9e37_79b9_7f4a_7c15_u64 ^ (seed as u64).wrapping_mul(0xd134_2543_de82_ef95);
+    let mut random = || {
+        state = state
+            .wrapping_mul(6_364_136_223_846_793_005)
+            .wrapping_add(1_442_695_040_888_963_407);
+        #[allow(clippy::cast_precision_loss, reason = "32 bits")]
+        let unit = (state >> 32) as f64 / 2_f64.powi(31) - 1.0;
+        unit
+    };
+    let coefficients: Vec<f64> = (0..48).map(|_| random()).collect();
+    let along = if random() > 0.0 { Along::U } else { Along::V };
+    job(
+        bumpy(&coefficients, 10_f64.powf(0.8 * random())),
+        along,
+        Pattern::Zigzag,
+    )
+}
+
 /// The oracle's largest product of ball radius and curvature, and its least sine between S_u and S_v, near a point.
 fn near(job: &Job, [u, v]: [f64; 2]) -> (f64, f64) {
     let oracle = Oracle::new(job).unwrap();

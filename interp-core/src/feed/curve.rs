@@ -51,20 +51,29 @@ impl Piece {
 
     /// Speed, acceleration and jerk at a time of the ramp.
     fn rates(&self, t: f32) -> [f32; 3] {
-        let change = self.to - self.from;
-        if t >= self.ramp_s || self.ramp_s <= 0.0 {
-            return [self.to, 0.0, 0.0];
-        }
+        let phase = if t >= self.ramp_s || self.ramp_s <= 0.0 {
+            Phase::Cruise
+        } else if t < self.jerk_s {
+            Phase::Begin
+        } else if self.ramp_s - t > self.jerk_s {
+            Phase::Steady
+        } else {
+            Phase::End
+        };
+        self.rates_in(phase, t)
+    }
+
+    /// The same where the phase is known: at its ends rounding could make it another.
+    fn rates_in(&self, phase: Phase, t: f32) -> [f32; 3] {
         // The acceleration rises to its peak, stays, and falls.
-        let peak = change / (self.ramp_s - self.jerk_s);
+        let peak = (self.to - self.from) / (self.ramp_s - self.jerk_s);
         let jerk = peak / self.jerk_s;
         let left = self.ramp_s - t;
-        if t < self.jerk_s {
-            [self.from + 0.5 * jerk * t * t, jerk * t, jerk]
-        } else if left > self.jerk_s {
-            [self.from + peak * (t - 0.5 * self.jerk_s), peak, 0.0]
-        } else {
-            [self.to - 0.5 * jerk * left * left, jerk * left, -jerk]
+        match phase {
+            Phase::Begin => [self.from + 0.5 * jerk * t * t, jerk * t, jerk],
+            Phase::Steady => [self.from + peak * (t - 0.5 * self.jerk_s), peak, 0.0],
+            Phase::End => [self.to - 0.5 * jerk * left * left, jerk * left, -jerk],
+            Phase::Cruise => [self.to, 0.0, 0.0],
         }
     }
 
@@ -72,16 +81,34 @@ impl Piece {
     fn length(&self, from: f32, to: f32) -> f32 {
         let mut at = from;
         let mut length = 0.0;
-        for end in [self.jerk_s, self.ramp_s - self.jerk_s, self.ramp_s] {
-            let step = to.at_most(end) - at;
+        for (phase, end) in [
+            (Phase::Begin, self.jerk_s),
+            (Phase::Steady, self.ramp_s - self.jerk_s),
+            (Phase::End, self.ramp_s),
+        ] {
+            let end = to.at_most(end);
+            let step = end - at;
             if step > 0.0 {
-                let [v, a, j] = self.rates(at);
+                let [v, a, j] = self.rates_in(phase, at);
                 length += step * (v + step * (0.5 * a + step * j * (1.0 / 6.0)));
-                at += step;
+                at = end;
             }
         }
         length
     }
+}
+
+/// A part of a piece.
+#[derive(Clone, Copy, Debug)]
+enum Phase {
+    /// Constant jerk at the begin of the ramp.
+    Begin,
+    /// Constant acceleration.
+    Steady,
+    /// Constant jerk at the end of the ramp.
+    End,
+    /// Constant speed.
+    Cruise,
 }
 
 /// Durations of the jerk and of the whole ramp for a change of speed.
@@ -298,14 +325,20 @@ impl Course for Curve {
         self.is_last(cursor.piece) && cursor.time >= self.piece(cursor.piece).ramp_s
     }
 
-    fn use_at(&self, cursor: &CurveCursor, [r, r1, r2]: [f32; 3], _around: f32) -> Use {
-        let [v, a, j] = self.piece(cursor.piece).rates(cursor.time);
+    fn use_at(&self, cursor: &CurveCursor, [r, r1, r2]: [f32; 3], around: f32) -> Use {
+        let piece = self.piece(cursor.piece);
+        let [v, a, j] = piece.rates(cursor.time);
+        // The jerk steps: where the place stands for some time around it, both sides count.
+        let reach = around * r;
+        let [_, _, before] = piece.rates((cursor.time - reach).at_least(0.0));
+        let [_, _, behind] = piece.rates(cursor.time + reach);
+        let jerk = |j: f32| ((j * r * r + 3.0 * a * r1) * r + v * r2).abs();
         let limits = &self.limits;
         Use {
             feed: 0.0,
             velocity: v * r / limits.speed,
             acceleration: (a * r * r + v * r1).abs() / limits.acceleration,
-            jerk: ((j * r * r + 3.0 * a * r1) * r + v * r2).abs() / limits.jerk,
+            jerk: jerk(j).at_least(jerk(before)).at_least(jerk(behind)) / limits.jerk,
         }
     }
 }

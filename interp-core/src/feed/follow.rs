@@ -114,7 +114,7 @@ impl Follower {
             }
             change if change >= whole => {
                 self.rises = false;
-                whole - u16::from(self.lead.near == 0.0 || self.as_planned)
+                whole.saturating_sub(u16::from(self.lead.near == 0.0 || self.as_planned))
             }
             change if self.rises => change + 1,
             change => change - 1,

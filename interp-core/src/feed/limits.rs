@@ -207,6 +207,6 @@ impl FeedChange {
 
     /// Periods that the lead is ahead of the tool: there is time to change to the feed and back.
     pub(crate) const fn lead(&self) -> u16 {
-        2 * self.periods
+        self.periods.saturating_mul(2)
     }
 }

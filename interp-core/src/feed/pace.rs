@@ -18,9 +18,12 @@ const TRIALS: u8 = 12;
 const RATIO_MIN: f32 = 1.1;
 const RATIO_MAX: f32 = 1.5;
 
-/// Time between the places of a trial that are looked at, s, and their least and greatest number.
+/// Time between the places of a trial that are looked at, s: close together, and as far apart as keeps to a number of places; and their least
+/// and greatest number.
 const SPACING: f32 = 1.0e-3;
+const SPACING_WIDE: f32 = 2.0e-3;
 const PLACES_MIN: f32 = 16.0;
+const PLACES_ENOUGH: f32 = 100.0;
 const PLACES_MAX: f32 = 200.0;
 
 /// Paces below 0 and above 1 that are rounding.
@@ -84,6 +87,14 @@ impl Use {
             .at_least(self.acceleration / room.acceleration)
             .at_least(self.jerk / room.jerk)
     }
+}
+
+/// Time between the places of a trial of this duration, s.
+fn spacing(duration: f32) -> f32 {
+    SPACING
+        .at_least((duration / PLACES_ENOUGH).at_most(SPACING_WIDE))
+        .at_most(duration / PLACES_MIN)
+        .at_least(duration / PLACES_MAX)
 }
 
 /// A planned motion from rest to rest.
@@ -264,6 +275,11 @@ impl<C: Copy> Pace<C> {
         };
     }
 
+    /// Whether a search begins with the next piece of work: its place is a good number of periods ahead.
+    pub(crate) const fn begins_search(&self) -> bool {
+        self.search.is_none()
+    }
+
     /// The pace now.
     pub(crate) fn now(&self) -> f32 {
         let [pace, _, _] = self.rates(0.0);
@@ -316,9 +332,7 @@ impl<C: Copy> Pace<C> {
             return;
         };
         let duration = search.change.duration;
-        let step = SPACING
-            .at_most(duration / PLACES_MIN)
-            .at_least(duration / PLACES_MAX);
+        let step = spacing(duration);
         let time = (step * f32::from(search.points)).at_most(duration);
         let rates = search.change.rates(time);
         let [pace, _, _] = rates;
@@ -361,7 +375,7 @@ impl<C: Copy> Pace<C> {
 
     fn begin_search<P: Course<Cursor = C>>(&self, course: &P, at: &C) -> Search<C> {
         let shortest = self.shortest(course, at, self.rates(0.0));
-        let places = 2.0 * (shortest / SPACING).at_most(PLACES_MAX);
+        let places = 2.0 * shortest / spacing(shortest);
         let latency = u16::try_from(truncated(places / PLACES_A_PERIOD)).unwrap_or(LATENCY_MAX);
         let latency = LATENCY
             .saturating_add(latency)

@@ -14,6 +14,16 @@ const BARRIER: [f32; 12] = [
     0.05, 0.05, 0.05, 0.008, 0.008, 0.002, 0.002, 0.0007, 0.0007, 0.00025, 0.00025, 0.00025,
 ];
 
+/// The same of a pass that takes no longer than its planning.
+const BARRIER_SHORT: [f32; 7] = [0.05, 0.02, 0.008, 0.002, 0.0007, 0.00025, 0.00025];
+/// The same of a pass that lasts long against its planning: more steps are worth their time.
+const BARRIER_LONG: [f32; 18] = [
+    0.05, 0.05, 0.05, 0.02, 0.02, 0.008, 0.008, 0.008, 0.003, 0.003, 0.003, 0.001, 0.001, 0.001, 0.00025,
+    0.00025, 0.00025, 0.00025,
+];
+/// Periods of the start's motion that such a pass has at least, for each of its nodes.
+const LONG_PERIODS: f32 = 16.0;
+
 /// Share of the greatest factor of the walk's pace that the method starts from.
 const START_SHARE: f32 = 0.85;
 
@@ -21,7 +31,6 @@ const START_SHARE: f32 = 0.85;
 const WALK_NEAR_TURN: f32 = 0.25;
 /// Coefficients over which the start goes from the pace near an end at speed to the factor.
 const BLENDED: u16 = 30;
-const WALK_LEAST: f32 = 0.5;
 
 /// Share of the planned jerk that is used in a turn.
 const TURN_JERK: f32 = 0.88;
@@ -47,7 +56,7 @@ mod cycles {
     pub(super) const REACH: u32 = 2_600;
     /// More for a jump behind the node.
     pub(super) const JUMP: u32 = 3_500;
-    pub(super) const CHECK: u32 = 1_650;
+    pub(super) const CHECK: u32 = 1_850;
     pub(super) const GATE: u32 = 2_600;
     /// Something for each coefficient.
     pub(super) const LIST: u32 = 15_000;
@@ -74,6 +83,14 @@ enum Stage {
     Gate,
 }
 
+/// How many steps of the method are worth their time.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Effort {
+    Little,
+    Usual,
+    Much,
+}
+
 /// The planning of one path.
 #[derive(Clone, Debug)]
 pub(crate) struct Planner {
@@ -90,8 +107,9 @@ pub(crate) struct Planner {
     holds: bool,
     drawn: u8,
     sweep: Sweep,
-    /// Steps of the method so far.
+    /// Steps of the method so far, and how many are worth their time.
     step: u8,
+    effort: Effort,
     /// One over the sum of the coefficients' times, and the greatest factor of the start.
     weight: f32,
     factor: f32,
@@ -119,6 +137,7 @@ impl Planner {
         drawn: 0,
         sweep: Sweep::START,
         step: 0,
+        effort: Effort::Usual,
         weight: 0.0,
         factor: 0.0,
         reach: Reach::NONE,
@@ -146,7 +165,7 @@ impl Planner {
         self.machine = plan.limits.with_feed(feed);
         self.limits = self.machine.planned();
         self.first = first;
-        (self.holds, self.drawn) = (false, 0);
+        (self.holds, self.drawn, self.effort) = (false, 0, Effort::Usual);
         plan.draft = plan.pace;
         self.begin_method(plan);
         newton::clear(&mut self.lists);
@@ -199,7 +218,7 @@ impl Planner {
     pub(crate) fn work(&mut self, plan: &mut Plan, least: u32) {
         self.stage = match self.stage {
             Stage::Walk => {
-                if self.walker.work(&mut self.lists, plan, &self.limits) {
+                if self.walker.work(&mut self.lists, plan, &self.limits, least) {
                     Stage::Weigh
                 } else {
                     Stage::Walk
@@ -224,19 +243,32 @@ impl Planner {
                 }
             }
             Stage::Scale => {
-                if plan.pinned() != [0; 2] {
-                    scale(plan, START_SHARE * self.factor.at_least(1e-9));
+                let factor = START_SHARE * self.factor.at_least(1e-9);
+                let nodes = f32::from(plan.intervals);
+                let lasts = plan.step_s / (self.weight * sqrt(factor) * plan.limits.period);
+                self.effort = if self.walker.is_short {
+                    Effort::Little
+                } else if lasts > LONG_PERIODS * nodes {
+                    Effort::Much
                 } else {
-                    let factor = START_SHARE * self.factor.at_least(1e-9);
+                    Effort::Usual
+                };
+                if plan.pinned() == [0; 2] {
                     for pace in &mut plan.draft {
                         *pace *= factor;
                     }
+                } else {
+                    scale(plan, factor);
                 }
                 newton::clear(&mut self.lists);
                 Stage::Assemble
             }
             Stage::Assemble => {
-                let barrier = BARRIER.get(usize::from(self.step)).copied().unwrap_or(1e-3);
+                let barrier = self
+                    .barrier()
+                    .get(usize::from(self.step))
+                    .copied()
+                    .unwrap_or(1e-3);
                 let limits = self.limits_at(plan);
                 newton::assemble(
                     plan,
@@ -312,6 +344,14 @@ impl Planner {
         }
     }
 
+    const fn barrier(&self) -> &'static [f32] {
+        match self.effort {
+            Effort::Little => &BARRIER_SHORT,
+            Effort::Usual => &BARRIER,
+            Effort::Much => &BARRIER_LONG,
+        }
+    }
+
     fn begin_method(&mut self, plan: &Plan) {
         let mut sum = 0.0;
         let count = usize::from(plan.intervals) + 2;
@@ -331,7 +371,7 @@ impl Planner {
         newton::take(plan, &self.lists, self.reach.step());
         newton::clear(&mut self.lists);
         self.step += 1;
-        if usize::from(self.step) < BARRIER.len() {
+        if usize::from(self.step) < self.barrier().len() {
             return Stage::Assemble;
         }
         self.begin_check(plan);
@@ -339,7 +379,7 @@ impl Planner {
     }
 
     fn begin_check(&mut self, plan: &mut Plan) {
-        plan.allow_feed();
+        plan.allow_feed_from(self.first.saturating_sub(SEEN), true);
         self.cursor = match self.first.checked_sub(SEEN) {
             Some(node) if node > 0 => Cursor::at_node(plan, node),
             _ => Cursor::START,
@@ -358,7 +398,11 @@ impl Planner {
             jerk,
         } = self.most;
         self.holds = feed <= 1.0 && velocity <= 1.0 && acceleration <= 1.0 && jerk <= JERK_CHECKED;
-        if self.holds || self.drawn >= DRAWN_MAX {
+        if self.holds {
+            return Stage::Done;
+        }
+        if self.drawn >= DRAWN_MAX {
+            plan.allow_feed_from(self.first.saturating_sub(SEEN), false);
             return Stage::Done;
         }
         self.drawn += 1;

@@ -70,11 +70,6 @@ impl Stations {
         }
     }
 
-    /// Drops the stations from this one on.
-    pub(crate) fn truncate(&mut self, count: u16) {
-        self.count = self.count.min(count);
-    }
-
     /// The station so many before the end of the list, 1 for the last.
     pub(crate) fn back_mut(&mut self, back: u16) -> Option<&mut Station> {
         let index = self.count.checked_sub(back)?;

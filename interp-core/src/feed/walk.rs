@@ -27,9 +27,13 @@ const SPACING_WORTH: f32 = 4e-3;
 /// Longest mean of a walk with an end at speed, s, and the time for which it has that speed, as a multiple of it.
 const MEAN_MAX: f32 = 0.05;
 const FLAT: f32 = 1.0;
-/// Periods that the planning of a node takes, and what it takes besides, the last stop before a turn included.
-const PERIODS_A_NODE: f32 = 4.0;
-const PERIODS_BESIDES: f32 = 250.0;
+/// Periods that the rest of the planning takes: for a node, for a place of the check, and for what is left.
+const PERIODS_A_NODE: f32 = 3.2;
+const PERIODS_A_PLACE: f32 = 0.07;
+const PERIODS_A_PLAN: f32 = 55.0;
+/// The same for the last stop before a turn, and the share of the walk's time that a plan with an end at speed takes.
+const PERIODS_A_STOP: f32 = 110.0;
+const WALKED: f32 = 0.75;
 /// Bisections of the spacing.
 const BISECTIONS: u8 = 12;
 /// Tries to coarsen the ends.
@@ -41,6 +45,7 @@ const KNOT_BISECTIONS: u8 = 16;
 
 const STATIONS_A_PORTION: u16 = 24;
 const JUMPS_A_PORTION: u16 = 6;
+const CELLS_A_PORTION: u16 = 84;
 const NODES_A_PORTION: u16 = 60;
 const PLACES_A_PORTION: u16 = 50;
 const KNOTS_A_PORTION: u16 = 40;
@@ -88,6 +93,8 @@ pub(crate) struct Walker {
     duration: f32,
     mean_s: f32,
     intervals: u16,
+    /// The plan takes no longer than its planning: the fewest steps are to be made.
+    pub(crate) is_short: bool,
     busy: u16,
     vary: Vary,
     low: f32,
@@ -132,6 +139,7 @@ impl Walker {
         duration: 0.0,
         mean_s: 0.0,
         intervals: 0,
+        is_short: false,
         busy: 0,
         vary: Vary::Even,
         low: 0.0,
@@ -166,17 +174,24 @@ impl Walker {
         match self.stage {
             Stage::Caps => 18_100,
             Stage::Jumps | Stage::Means | Stage::Knots => 10_500,
-            Stage::Backwards | Stage::Forwards | Stage::Busy => 25_000,
-            Stage::TryEven | Stage::TryGrowing | Stage::Coarsen | Stage::Bisect(_) | Stage::Times => 26_500,
+            Stage::Backwards | Stage::Busy => 25_000,
+            Stage::Forwards => 17_000,
+            Stage::TryEven | Stage::TryGrowing | Stage::Coarsen | Stage::Bisect(_) | Stage::Times => 25_500,
             Stage::Increments => 21_500,
             Stage::Nodes => 15_000,
             Stage::Done => 0,
         }
     }
 
-    /// One portion; whether the walk is complete.
+    /// One portion; whether the walk is complete. `least`: periods that the plan has to take at least, for the planning so far.
     #[inline(never)]
-    pub(crate) fn work(&mut self, lists: &mut Lists, plan: &mut Plan, limits: &MotionLimits) -> bool {
+    pub(crate) fn work(
+        &mut self,
+        lists: &mut Lists,
+        plan: &mut Plan,
+        limits: &MotionLimits,
+        least: u32,
+    ) -> bool {
         let count = plan.stations.count();
         self.stage = match self.stage {
             Stage::Caps => {
@@ -206,8 +221,14 @@ impl Walker {
                 Stage::Forwards
             }
             Stage::Forwards => {
-                self.forwards(lists, plan);
-                Stage::Busy
+                let last = count.saturating_sub(1);
+                let end = last.min(self.index + CELLS_A_PORTION);
+                self.forwards(lists, plan, self.index, end);
+                if end == last {
+                    self.choose_mean(plan);
+                    self.choose_intervals(limits, least);
+                }
+                self.next(end, end == last, Stage::Forwards, Stage::Busy)
             }
             Stage::Busy => {
                 self.find_busy(lists, plan, limits);
@@ -421,12 +442,11 @@ impl Walker {
         (start + end) * ((mean + 1) / 2)
     }
 
-    /// Accelerations from the start on, times, and what follows from the whole duration.
-    fn forwards(&mut self, lists: &mut Lists, plan: &Plan) {
-        let last = plan.stations.count().saturating_sub(1);
-        let mut time = 0.0;
-        put(lists, TIME, 0, time);
-        for cell in 0..last {
+    /// Accelerations and times from a station on, up to another.
+    fn forwards(&mut self, lists: &mut Lists, plan: &Plan, from: u16, to: u16) {
+        let mut time = if from == 0 { 0.0 } else { self.duration };
+        put(lists, TIME, from, time);
+        for cell in from..to {
             let length = plan.stations.cell_mm(cell);
             let here = get(lists, SPEED_SQR, cell);
             let reach = here + 2.0 * self.accel(lists, cell) * length;
@@ -436,24 +456,42 @@ impl Walker {
             put(lists, TIME, cell + 1, time);
         }
         self.duration = time;
+    }
+
+    /// Length of the mean, once the duration is known.
+    fn choose_mean(&mut self, plan: &Plan) {
+        let time = self.duration;
         let length = between(0, plan.stations.length_nm());
         self.mean_s = (self.acceleration / self.jerk)
             .at_most(1.2 * sqrt(length / time / self.jerk))
             .at_most(cube_root(0.5 * length / self.jerk));
-        let whole = |value: f32| u16::try_from(truncated(value)).unwrap_or(u16::MAX);
-        let most = whole(time / self.finest).clamp(NODES_LEAST, NODES_COUNT);
-        let mut wanted = whole(time / SPACING_WORTH.at_least(self.finest));
-        if !self.is_from_rest_to_rest() {
-            // The next plan has to be complete before the last stop in front of the turn.
-            let periods = 0.75 * time / (2.0 * self.finest);
-            wanted = wanted.min(whole((periods - PERIODS_BESIDES) * (1.0 / PERIODS_A_NODE)));
-        }
-        self.intervals = wanted.clamp(NODES_MIN.min(most), most);
-        self.growth = if time > LONG { GROWTH_LONG } else { GROWTH };
         if !self.is_from_rest_to_rest() {
             self.mean_s = self.mean_s.at_most(MEAN_MAX);
         }
         self.mean_s = self.mean_s.at_least(4.0 * self.finest);
+    }
+
+    /// As many intervals as are worth their planning, and no more than leave the plan longer than its planning.
+    fn choose_intervals(&mut self, limits: &MotionLimits, least: u32) {
+        let whole = |value: f32| u16::try_from(truncated(value.at_least(0.0))).unwrap_or(u16::MAX);
+        let time = self.duration;
+        let most = whole(time / self.finest).clamp(NODES_LEAST, NODES_COUNT);
+        let wanted = whole(time / SPACING_WORTH.at_least(self.finest));
+        let fewest = NODES_MIN.min(most);
+        self.intervals = wanted.clamp(fewest, most);
+        if least > 0 {
+            let (lasts, plan) = if self.is_from_rest_to_rest() {
+                (time + self.mean_s, PERIODS_A_PLAN)
+            } else {
+                (WALKED * time, PERIODS_A_PLAN + PERIODS_A_STOP)
+            };
+            let lasts = lasts / limits.period;
+            let left = lasts * (1.0 - PERIODS_A_PLACE) - plan - to_f32(i64::from(least));
+            let planned = whole(left / PERIODS_A_NODE);
+            self.is_short = planned < fewest;
+            self.intervals = self.intervals.min(planned).max(fewest);
+        }
+        self.growth = if time > LONG { GROWTH_LONG } else { GROWTH };
         let parts = if self.is_from_rest_to_rest() { 6.0 } else { 16.0 };
         self.ends = (self.mean_s / parts)
             .at_least(self.finest)
@@ -522,13 +560,20 @@ impl Walker {
         true
     }
 
-    const fn nodes_at(&self, spacing: f32, growth: f32) -> NodeTimes {
+    fn nodes_at(&self, spacing: f32, growth: f32) -> NodeTimes {
         NodeTimes {
-            walker: *self,
+            duration: self.duration,
+            mean_s: self.mean_s,
             spacing,
             growth,
+            widest: SPACING_MAX
+                .at_least(3.0 * self.duration / f32::from(self.intervals))
+                .at_least(spacing),
+            end_spacing: spacing.at_most(self.ends),
+            end_growth: self.growth,
             at: 0.0,
             busy: 1,
+            busy_count: self.busy,
             count: 0,
         }
     }
@@ -783,11 +828,19 @@ const _: () = assert!(NODES_COUNT as usize == NODES_MAX);
 
 /// The times of nodes, one after the other.
 struct NodeTimes {
-    walker: Walker,
+    /// Duration of the unsmoothed walk, and length of the mean, s.
+    duration: f32,
+    mean_s: f32,
+    /// Spacing at busy places, s, its growth away from them, per second, and the widest.
     spacing: f32,
     growth: f32,
+    widest: f32,
+    /// The same at the ends.
+    end_spacing: f32,
+    end_growth: f32,
     at: f32,
     busy: u16,
+    busy_count: u16,
     count: u16,
 }
 
@@ -797,7 +850,7 @@ impl NodeTimes {
             self.count = 1;
             return Some(0.0);
         }
-        if self.at >= self.walker.duration {
+        if self.at >= self.duration {
             return None;
         }
         let now = self.spacing_at(lists, self.at);
@@ -807,19 +860,15 @@ impl NodeTimes {
     }
 
     fn spacing_at(&mut self, lists: &Lists, at: f32) -> f32 {
-        let walker = &self.walker;
-        while self.busy + 1 < walker.busy && get(lists, BUSY, self.busy) < at {
+        while self.busy + 1 < self.busy_count && get(lists, BUSY, self.busy) < at {
             self.busy += 1;
         }
         let before = (at - get(lists, BUSY, self.busy - 1)).abs();
         let behind = (get(lists, BUSY, self.busy) - at).abs();
-        let away = (before.at_most(behind) - walker.mean_s).at_least(0.0);
-        let widest = SPACING_MAX
-            .at_least(3.0 * walker.duration / f32::from(walker.intervals))
-            .at_least(self.spacing);
-        let there = (self.spacing + self.growth * away).at_most(widest);
-        let from_end = at.at_most(walker.duration - at) - walker.mean_s;
-        there.at_most(self.spacing.at_most(walker.ends) + walker.growth * from_end.at_least(0.0))
+        let away = (before.at_most(behind) - self.mean_s).at_least(0.0);
+        let there = (self.spacing + self.growth * away).at_most(self.widest);
+        let from_end = at.at_most(self.duration - at) - self.mean_s;
+        there.at_most(self.end_spacing + self.end_growth * from_end.at_least(0.0))
     }
 }
 

@@ -286,11 +286,11 @@ impl Run {
         Ok(())
     }
 
-    /// Advances by `feed_factor` of a period's arc along the pass; returns whether the tick has time left for preparation.
+    /// Advances by `feed_factor` of a period's arc along the pass.
     ///
     /// # Errors
     /// As [`Self::advance`].
-    pub(crate) fn move_by(&mut self, job: &Job<'_>, feed_factor: f32, last: &mut Sample) -> Result<bool> {
+    pub(crate) fn move_by(&mut self, job: &Job<'_>, feed_factor: f32, last: &mut Sample) -> Result<()> {
         let travel = &mut self.travel;
         // The third-order term assumes equal steps: the change over the last step is scaled to this one.
         let change = (travel.path.log_speed_derivative - travel.log_speed_derivative_before)
@@ -302,18 +302,17 @@ impl Run {
             travel.fraction = fraction;
             self.sample(last)?;
             last.feed_mm_s = job.header.feed_mm_s * feed_factor;
-            if !self.buffer.has_work() {
-                return Ok(true);
+            if self.buffer.has_work() {
+                self.buffer.work(job, &self.travel.position());
             }
-            self.buffer.work(job, &self.travel.position());
-            return Ok(false);
+            return Ok(());
         }
         let interval = self.last_interval;
         self.step_far(job, feed_factor)?;
         self.sample(last)?;
         self.last_interval = interval;
         self.describe(job.header.feed_mm_s * feed_factor, last);
-        Ok(false)
+        Ok(())
     }
 
     /// Moves to the end of the pass, which differs from the position by rounding only.

@@ -380,7 +380,7 @@ impl Lookahead {
         self.looks = if out.cells >= CELLS_MANY {
             1
         } else {
-            fine.min(most).div_ceil(out.cells).clamp(1, LOOKS_MAX)
+            fine.min(most).div_ceil(out.cells.max(1)).clamp(1, LOOKS_MAX)
         };
         self.cells = out.cells * self.looks;
         self.cell_fraction = part(self.cells);

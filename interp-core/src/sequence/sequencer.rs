@@ -22,10 +22,12 @@ use crate::sequence::lookahead::{Lookahead, PassPlan, check_travel, has_turns};
 use crate::sequence::turning::{Part, road};
 
 /// Periods that a pass takes longer than the planning of the next one.
-const SPARE_PERIODS: u32 = 30;
+const SPARE_PERIODS: u32 = 15;
 
-/// Cycles of one place of a search for a change of the pace, along a pass and along a link; of a portion of a step-over's planning.
+/// Cycles of one place of a search for a change of the pace, along a pass and along a link, and of its begin along a pass; of a portion of a
+/// step-over's planning.
 const PACE_CYCLES: u32 = 1_560;
+const PACE_BEGIN_CYCLES: u32 = 24_000;
 const LINK_PACE_CYCLES: u32 = 1_000;
 const STEP_OVER_CYCLES: u32 = 6_000;
 /// Cycles of replacing the rest of a plan, or of the wait until that is possible: once a period.
@@ -301,6 +303,7 @@ impl Sequencer {
             (&one.plan, &other.plan)
         };
         match self.phase {
+            Phase::Pass | Phase::Turn if self.pace.has_work() && self.pace.begins_search() => return PACE_BEGIN_CYCLES,
             Phase::Pass | Phase::Turn if self.pace.has_work() => return PACE_CYCLES,
             Phase::StepOver if self.step_over.progress.has_work() => return LINK_PACE_CYCLES,
             Phase::Leg(_) if self.straight.progress.has_work() => return LINK_PACE_CYCLES,

@@ -93,6 +93,11 @@ const BOUNDS: &[(&str, u32, &str)] = &[
         "periods until a change begins: LATENCY_MAX",
     ),
     (
+        "interp_core::feed::plan::Plan::step_at",
+        4,
+        "intervals that a step may pass: INTERVALS_A_STEP",
+    ),
+    (
         "interp_core::feed::plan::Plan::place_node",
         8,
         "halvings of the stations: CELL_BISECTIONS",
