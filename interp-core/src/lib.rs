@@ -79,8 +79,6 @@ mod sequence;
 pub mod steps;
 pub mod surface;
 
-#[cfg(dbgx)]
-extern crate std;
 pub use command::{Command, Inputs};
 pub use fault::{Fault, FaultKind};
 pub use interpolator::{Interpolator, SurfacePoint};

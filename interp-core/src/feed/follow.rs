@@ -25,7 +25,8 @@ impl Lead {
     fn count(&mut self, plan: &Plan, cursor: &Cursor, speed: f32, periods: f32) {
         let FeedChange { near, .. } = plan.change;
         let apart = (speed - plan.limits.feed).abs();
-        let is_near = plan.over <= 1.0 && !plan.is_over(cursor) && plan.allows_feed(cursor.interval) && apart < near;
+        let is_near =
+            plan.over <= 1.0 && !plan.is_over(cursor) && plan.allows_feed(cursor.interval) && apart < near;
         self.near = if is_near {
             (self.near + periods).at_most(f32::from(plan.change.lead()))
         } else {

@@ -243,7 +243,6 @@ impl<C: Copy> Pace<C> {
 
     /// Stops within this time, s.
     pub(crate) fn stop_within(&mut self, seconds: f32) {
-        #[cfg(dbgx)] std::eprintln!("FORCED {:?} {seconds}", self.rates(0.0));
         self.change = Some(Change::new(self.rates(0.0), 0.0, seconds));
         (self.time, self.goal, self.wanted) = (0.0, 0.0, 0.0);
         self.search = None;
@@ -304,7 +303,6 @@ impl<C: Copy> Pace<C> {
             if search.left > 0 {
                 search.left -= 1;
             } else if search.found {
-                #[cfg(dbgx)] std::eprintln!("COMMIT rates {:?} goal {} duration {} failures {}", search.rates, self.wanted, search.change.duration, self.failures);
                 self.change = Some(search.change);
                 (self.time, self.goal) = (0.0, self.wanted);
                 (self.failures, self.timeouts) = (0, 0);

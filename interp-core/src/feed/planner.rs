@@ -120,7 +120,6 @@ pub(crate) struct Planner {
     periods: u32,
     lead: Lead,
     gate: GateSearch,
-    #[cfg(dbgx)] worst: (u16,f32),
 }
 
 impl Planner {
@@ -146,7 +145,6 @@ impl Planner {
         periods: 0,
         lead: Lead::NONE,
         gate: GateSearch::START,
-        #[cfg(dbgx)] worst: (0,0.0),
     };
 
     /// Begins to plan the path of the plan's stations within the plan's limits.
@@ -231,7 +229,6 @@ impl Planner {
             Stage::Factor => {
                 let limits = self.limits_at(plan);
                 let factor = newton::factor(plan, &limits, &mut self.sweep);
-                #[cfg(dbgx)] if factor<self.factor { self.worst=(self.sweep.node(),0.0); }
                 let [cell, _] = plan.node(self.sweep.node());
                 if !plan.is_near_turn(plan.stations.get(cell).arc_nm) {
                     self.factor = factor.at_most(self.factor);
@@ -248,7 +245,7 @@ impl Planner {
                 let lasts = plan.step_s / (self.weight * sqrt(factor) * plan.limits.period);
                 self.effort = if self.walker.is_short {
                     Effort::Little
-                } else if lasts > LONG_PERIODS * nodes {
+                } else if plan.pinned() == [0; 2] && lasts > LONG_PERIODS * nodes {
                     Effort::Much
                 } else {
                     Effort::Usual
@@ -312,17 +309,12 @@ impl Planner {
             Stage::Finish => {
                 self.slow(plan, least);
                 self.gate = GateSearch::START;
-                if plan.goes_on() {
-                    Stage::Gate
-                } else {
-                    Stage::Done
-                }
+                if plan.goes_on() { Stage::Gate } else { Stage::Done }
             }
             Stage::Gate => {
                 if self.gate.work(plan) {
                     // The next plan has to be complete before the gate.
                     let before = plan.before_gate() / plan.limits.period;
-                    #[cfg(dbgx)] std::eprintln!("gate {:?} of {} pace_max {} before {before} least {least} spare {}", plan.gate, plan.intervals, plan.pace_max, plan.periods);
                     let pace = before / to_f32(least).at_least(1.0);
                     plan.pace_max = plan.pace_max.at_most(pace.at_least(0.1));
                     Stage::Done
@@ -420,7 +412,6 @@ impl Planner {
             self.lead.cursor = self.cursor;
         }
         let here = plan.use_draft(&self.machine, &self.cursor);
-        #[cfg(dbgx)] if here.jerk>self.most.jerk { self.worst=(self.cursor.interval,self.cursor.arc_q10(plan) as f32*1e-9/1.024); }
         self.most.add(&here);
         if here.velocity > here.feed {
             plan.forbid_feed(self.cursor.interval);
@@ -445,7 +436,6 @@ impl Planner {
             .at_least(cube_root(jerk / JERK_CHECKED))
             .at_least(to_f32(least) / to_f32(self.periods.max(1)))
             .at_least(1.0);
-        #[cfg(dbgx)] std::eprintln!("plan ends {:?} walks {} tight {:.3} n {} step {} factor0 {:.3} most {:?} at {:?} periods {} least {} factor {:.3}", plan.ends, self.walks, self.tightened, plan.intervals, plan.step_s, self.factor, self.most, self.worst, self.periods, least, factor);
         plan.periods = u32::try_from(truncated(to_f32(self.periods) * factor)).unwrap_or(0);
         plan.lead = self.lead;
         (plan.pace_max, plan.over) = (1.0, 1.0);
@@ -472,14 +462,23 @@ fn scale(plan: &mut Plan, factor: f32) {
         let [cell, _] = plan.node(index.min(plan.intervals));
         plan.is_near_turn(plan.stations.get(cell).arc_nm)
     };
-    let from = if at_start { (0..count).find(|index| !is_near(*index)).unwrap_or(count) } else { 0 };
-    let to = if at_end { (0..count).rev().find(|index| !is_near(*index)).unwrap_or(0) } else { count };
+    let from = if at_start {
+        (0..count).find(|index| !is_near(*index)).unwrap_or(count)
+    } else {
+        0
+    };
+    let to = if at_end {
+        (0..count).rev().find(|index| !is_near(*index)).unwrap_or(0)
+    } else {
+        count
+    };
     for (index, pace) in (0..count).zip(&mut plan.draft) {
         let share = |is_at: bool, away: u16| {
             let by = (f32::from(away) * (1.0 / f32::from(BLENDED))).at_most(1.0);
             if is_at { by * by * (3.0 - 2.0 * by) } else { 1.0 }
         };
-        let share = share(at_start, index.saturating_sub(from)).at_most(share(at_end, to.saturating_sub(index)));
+        let share =
+            share(at_start, index.saturating_sub(from)).at_most(share(at_end, to.saturating_sub(index)));
         *pace *= 1.0 + share * (factor - 1.0);
     }
 }

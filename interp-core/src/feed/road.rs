@@ -149,7 +149,6 @@ impl GateSearch {
             left += plan.step_s * inverse_sqrt(pace.at_least(1e-9));
         }
         if left < needed || self.tried >= TRIES {
-            #[cfg(dbgx)] std::eprintln!("GATE slower left {left} needed {needed} tried {}", self.tried);
             plan.pace_max *= SLOWER;
             *self = Self::START;
             return;

@@ -17,7 +17,7 @@ pub(crate) const CELLS: u16 = 10;
 pub(crate) const STATIONS: u16 = CELLS + 1;
 
 /// Length of the plan's arc along a turn, for the time t that the step takes at its jerk limit, as a multiple of a t^2 and of v t.
-const REVERSAL: f32 = 2.6;
+const REVERSAL: f32 = 3.0;
 const CRUISE: f32 = 4.0;
 /// Rounds in which the length is adapted to the greatest overrun.
 pub(crate) const ROUNDS: u8 = 4;
@@ -69,7 +69,12 @@ impl Turn {
     };
 
     /// A turn between two ends, and how far it overruns them, mm. `length`: of the plan's arc, mm; 0 for the first try.
-    pub(crate) fn try_length(from: &TurnEnd, to: &TurnEnd, limits: &MotionLimits, length: f32) -> (Self, f32) {
+    pub(crate) fn try_length(
+        from: &TurnEnd,
+        to: &TurnEnd,
+        limits: &MotionLimits,
+        length: f32,
+    ) -> (Self, f32) {
         let length = if length > 0.0 {
             length
         } else {
@@ -199,7 +204,11 @@ impl Turn {
             }
             let inverse = self.inverse;
             let square = inverse * inverse;
-            *q = [first * inverse, 2.0 * second * square, 6.0 * third * square * inverse];
+            *q = [
+                first * inverse,
+                2.0 * second * square,
+                6.0 * third * square * inverse,
+            ];
         }
         q
     }
@@ -230,7 +239,9 @@ impl Turn {
                 for (axis, [first, second, third]) in limits.axes.iter().zip(&q) {
                     speed = speed
                         .at_most(axis.velocity / first.abs().at_least(1e-6))
-                        .at_most(sqrt(ACCELERATION_SHARE * axis.acceleration / second.abs().at_least(1e-9)))
+                        .at_most(sqrt(
+                            ACCELERATION_SHARE * axis.acceleration / second.abs().at_least(1e-9),
+                        ))
                         .at_most(cube_root(JERK_SHARE * axis.jerk / third.abs().at_least(1e-9)));
                 }
             }

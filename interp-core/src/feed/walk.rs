@@ -32,7 +32,7 @@ const PERIODS_A_NODE: f32 = 3.2;
 const PERIODS_A_PLACE: f32 = 0.07;
 const PERIODS_A_PLAN: f32 = 55.0;
 /// The same for the last stop before a turn, and the share of the walk's time that a plan with an end at speed takes.
-const PERIODS_A_STOP: f32 = 110.0;
+const PERIODS_A_STOP: f32 = 150.0;
 const WALKED: f32 = 0.75;
 /// Bisections of the spacing.
 const BISECTIONS: u8 = 12;
@@ -199,7 +199,11 @@ impl Walker {
                 let end = count.min(self.index + STATIONS_A_PORTION);
                 for station in self.index..end {
                     let Station { arc_nm, q } = plan.stations.get(station);
-                    let share = if plan.is_near_turn(*arc_nm) { self.tightened } else { 1.0 };
+                    let share = if plan.is_near_turn(*arc_nm) {
+                        self.tightened
+                    } else {
+                        1.0
+                    };
                     self.cap(lists, station, q, limits, share);
                 }
                 self.next(end, end == count, Stage::Caps, Stage::Jumps)
@@ -602,7 +606,9 @@ impl Walker {
         if !self.is_from_rest_to_rest() {
             // The interval is as long as the spacing at an end, so that the walk has the speed there.
             self.mean = self.mean_at(spacing) | 1;
-            self.intervals = (self.times - 1).saturating_add(self.lengthening(self.mean)).min(NODES_COUNT);
+            self.intervals = (self.times - 1)
+                .saturating_add(self.lengthening(self.mean))
+                .min(NODES_COUNT);
             plan.step_s *= self.scale;
         }
         plan.intervals = self.intervals;

@@ -274,7 +274,13 @@ impl Run {
     ///
     /// # Errors
     /// As [`Self::advance`].
-    pub(crate) fn arrive(&mut self, job: &Job<'_>, pass: u32, side: SpanParameter, interval: f32) -> Result<()> {
+    pub(crate) fn arrive(
+        &mut self,
+        job: &Job<'_>,
+        pass: u32,
+        side: SpanParameter,
+        interval: f32,
+    ) -> Result<()> {
         self.enter_pass(job, pass, side)?;
         let ticks = self.travel.ticks;
         let mut start = Sample::START;

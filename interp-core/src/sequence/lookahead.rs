@@ -4,10 +4,10 @@
 //! Stations depend on the surface, not on the samples, so holds and overrides do not change the passes.
 
 use crate::fault::{Fault, FaultKind, Result};
+use crate::feed::limits::MotionLimits;
 use crate::feed::plan::Plan;
 use crate::feed::stations::{Derivatives, STATIONS_MAX, Station, WINDOW, Window};
 use crate::feed::turn::{self, Turn, TurnEnd};
-use crate::feed::limits::MotionLimits;
 use crate::feed::{MM_PER_Q10, Q10_BITS, to_q10};
 use crate::job::program::Job;
 use crate::job::{AxisLimits, Pattern, Spacing};
@@ -365,7 +365,11 @@ impl Lookahead {
         let part = |cells: u16| u64::MAX.checked_div(u64::from(cells)).unwrap_or(u64::MAX);
         let length = self.patch_length();
         if out.cells == 0 {
-            let fit = stations_of(job).checked_div(spans).unwrap_or(1).saturating_sub(1).max(1);
+            let fit = stations_of(job)
+                .checked_div(spans)
+                .unwrap_or(1)
+                .saturating_sub(1)
+                .max(1);
             let mean = if self.patch_mm > 0.0 {
                 self.patch_mm
             } else {
@@ -650,8 +654,11 @@ impl Lookahead {
                 }
             }
         }
-        self.turn
-            .set_speed(&MotionLimits::new(axes, job.header.feed_mm_s, job.header.period_s));
+        self.turn.set_speed(&MotionLimits::new(
+            axes,
+            job.header.feed_mm_s,
+            job.header.period_s,
+        ));
         out.tail_q10 = i64::from(out.plan.stations.length_nm()) << Q10_BITS;
         Task::Tail(0)
     }

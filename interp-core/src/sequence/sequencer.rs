@@ -303,7 +303,9 @@ impl Sequencer {
             (&one.plan, &other.plan)
         };
         match self.phase {
-            Phase::Pass | Phase::Turn if self.pace.has_work() && self.pace.begins_search() => return PACE_BEGIN_CYCLES,
+            Phase::Pass | Phase::Turn if self.pace.has_work() && self.pace.begins_search() => {
+                return PACE_BEGIN_CYCLES;
+            }
             Phase::Pass | Phase::Turn if self.pace.has_work() => return PACE_CYCLES,
             Phase::StepOver if self.step_over.progress.has_work() => return LINK_PACE_CYCLES,
             Phase::Leg(_) if self.straight.progress.has_work() => return LINK_PACE_CYCLES,
@@ -602,7 +604,10 @@ impl Sequencer {
             let next_pace = self.next_pace(job);
             let wanted = self.pace_before_turn(wanted, next_pace);
             self.pace.want(wanted, wish.is_fault);
-            if let Some(fault) = self.pending.filter(|_| self.pace.is_at_rest() && wish.share > 0.0) {
+            if let Some(fault) = self
+                .pending
+                .filter(|_| self.pace.is_at_rest() && wish.share > 0.0)
+            {
                 return Err(fault);
             }
             let pace = self.pace.tick();

@@ -83,7 +83,6 @@ impl Sequencer {
 
     /// The tool has crossed the apex: the next plan is followed, from what is left of the period on.
     pub(super) fn cross_apex(&mut self, job: &Job<'_>, run: &mut Run) -> Result<()> {
-        #[cfg(dbgx)] std::eprintln!("APEX");
         let (now, _) = self.plans_ref();
         let beyond = now.plan.beyond(&self.follower.cursor);
         self.turn = now.tail;
