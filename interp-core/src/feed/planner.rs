@@ -58,6 +58,9 @@ mod cycles {
     pub(super) const JUMP: u32 = 3_500;
     pub(super) const CHECK: u32 = 1_850;
     pub(super) const GATE: u32 = 2_600;
+    pub(super) const GATE_PLACE: u32 = 22_000;
+    /// The start of a plan with an end at speed.
+    pub(super) const BLEND: u32 = 25_000;
     /// Something for each coefficient.
     pub(super) const LIST: u32 = 15_000;
 }
@@ -206,8 +209,10 @@ impl Planner {
             Stage::Solve => cycles::SOLVE,
             Stage::Reach => cycles::REACH + jump,
             Stage::Check => cycles::CHECK,
+            Stage::Scale if plan.pinned() != [0; 2] => cycles::BLEND,
             Stage::Weigh | Stage::Scale | Stage::Take | Stage::Finish => cycles::LIST,
-            Stage::Gate => cycles::GATE,
+            Stage::Gate if self.gate.is_placed() => cycles::GATE,
+            Stage::Gate => cycles::GATE_PLACE,
             Stage::Done => 0,
         }
     }
@@ -227,8 +232,8 @@ impl Planner {
                 Stage::Factor
             }
             Stage::Factor => {
-                let limits = self.limits_at(plan);
-                let factor = newton::factor(plan, &limits, &mut self.sweep);
+                let limits = limits_at(plan, &self.sweep, [&self.limits, &self.turn_limits]);
+                let factor = newton::factor(plan, limits, &mut self.sweep);
                 let [cell, _] = plan.node(self.sweep.node());
                 if !plan.is_near_turn(plan.stations.get(cell).arc_nm) {
                     self.factor = factor.at_most(self.factor);
@@ -266,10 +271,10 @@ impl Planner {
                     .get(usize::from(self.step))
                     .copied()
                     .unwrap_or(1e-3);
-                let limits = self.limits_at(plan);
+                let limits = limits_at(plan, &self.sweep, [&self.limits, &self.turn_limits]);
                 newton::assemble(
                     plan,
-                    &limits,
+                    limits,
                     &mut self.lists,
                     &mut self.sweep,
                     barrier,
@@ -288,8 +293,8 @@ impl Planner {
                 Stage::Reach
             }
             Stage::Reach => {
-                let limits = self.limits_at(plan);
-                newton::extend(plan, &limits, &self.lists, &mut self.sweep, &mut self.reach);
+                let limits = limits_at(plan, &self.sweep, [&self.limits, &self.turn_limits]);
+                newton::extend(plan, limits, &self.lists, &mut self.sweep, &mut self.reach);
                 if self.sweep.next(plan) {
                     Stage::Take
                 } else {
@@ -324,16 +329,6 @@ impl Planner {
             }
             Stage::Done => Stage::Done,
         };
-    }
-
-    /// The limits at the node of the sweep: in a turn, where the path changes from node to node, the plan uses less of the jerk.
-    fn limits_at(&self, plan: &Plan) -> MotionLimits {
-        let [cell, _] = plan.node(self.sweep.node());
-        if plan.is_near_turn(plan.stations.get(cell).arc_nm) {
-            self.turn_limits
-        } else {
-            self.limits
-        }
     }
 
     const fn barrier(&self) -> &'static [f32] {
@@ -451,6 +446,19 @@ impl Planner {
             }
         }
         plan.pace = plan.draft;
+    }
+}
+
+/// The limits at the node of a sweep: in a turn, where the path changes from node to node, the plan uses less of the jerk.
+fn limits_at<'a>(plan: &Plan, sweep: &Sweep, [usual, in_turn]: [&'a MotionLimits; 2]) -> &'a MotionLimits {
+    if plan.pinned() == [0; 2] {
+        return usual;
+    }
+    let [cell, _] = plan.node(sweep.node());
+    if plan.is_near_turn(plan.stations.get(cell).arc_nm) {
+        in_turn
+    } else {
+        usual
     }
 }
 

@@ -110,6 +110,11 @@ impl GateSearch {
         is_placed: false,
     };
 
+    /// Whether the next piece of work is a place of a stop.
+    pub(crate) const fn is_placed(&self) -> bool {
+        self.is_placed
+    }
+
     /// One place of a stop, or the place of the next; whether the gate is found.
     #[inline(never)]
     pub(crate) fn work(&mut self, plan: &mut Plan) -> bool {

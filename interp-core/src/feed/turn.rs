@@ -96,9 +96,23 @@ impl Turn {
         self.half_mm() >= HALF_MIN_MM
     }
 
-    /// Gives it the speed at the apex.
-    pub(crate) fn set_speed(&mut self, limits: &MotionLimits) {
-        self.speed = self.apex_speed(limits);
+    /// Bounds the speed at the apex by a station of each half, so that the whole turn could be passed at it. The first one sets it.
+    pub(crate) fn bound_speed(&mut self, station: u16, limits: &MotionLimits) {
+        if station == 0 {
+            self.speed = limits.feed;
+        }
+        for second in [false, true] {
+            let q = self.station(second, station);
+            for (axis, [first, second, third]) in limits.axes.iter().zip(&q) {
+                self.speed = self
+                    .speed
+                    .at_most(axis.velocity / first.abs().at_least(1e-6))
+                    .at_most(sqrt(
+                        ACCELERATION_SHARE * axis.acceleration / second.abs().at_least(1e-9),
+                    ))
+                    .at_most(cube_root(JERK_SHARE * axis.jerk / third.abs().at_least(1e-9)));
+            }
+        }
     }
 
     /// Of this length, mm.
@@ -228,25 +242,6 @@ impl Turn {
             }
         }
         most
-    }
-
-    /// Speed at the apex: the whole turn could be passed at it.
-    fn apex_speed(&self, limits: &MotionLimits) -> f32 {
-        let mut speed = limits.feed;
-        for station in 0..STATIONS {
-            for second in [false, true] {
-                let q = self.station(second, station);
-                for (axis, [first, second, third]) in limits.axes.iter().zip(&q) {
-                    speed = speed
-                        .at_most(axis.velocity / first.abs().at_least(1e-6))
-                        .at_most(sqrt(
-                            ACCELERATION_SHARE * axis.acceleration / second.abs().at_least(1e-9),
-                        ))
-                        .at_most(cube_root(JERK_SHARE * axis.jerk / third.abs().at_least(1e-9)));
-                }
-            }
-        }
-        speed
     }
 }
 

@@ -55,6 +55,8 @@ enum Stage {
     Done,
     Caps,
     Jumps,
+    /// The speed of an end that is not a rest is held.
+    Flatten,
     Backwards,
     Forwards,
     Busy,
@@ -175,7 +177,7 @@ impl Walker {
             Stage::Caps => 18_100,
             Stage::Jumps | Stage::Means | Stage::Knots => 10_500,
             Stage::Backwards | Stage::Busy => 25_000,
-            Stage::Forwards => 17_000,
+            Stage::Forwards | Stage::Flatten => 17_000,
             Stage::TryEven | Stage::TryGrowing | Stage::Coarsen | Stage::Bisect(_) | Stage::Times => 25_500,
             Stage::Increments => 21_500,
             Stage::Nodes => 15_000,
@@ -218,7 +220,16 @@ impl Walker {
                     }
                     station += 1;
                 }
-                self.next(station, station >= count, Stage::Jumps, Stage::Backwards)
+                let next = if self.is_from_rest_to_rest() {
+                    Stage::Backwards
+                } else {
+                    Stage::Flatten
+                };
+                self.next(station, station >= count, Stage::Jumps, next)
+            }
+            Stage::Flatten => {
+                self.flatten(lists, plan);
+                Stage::Backwards
             }
             Stage::Backwards => {
                 self.backwards(lists, plan);
@@ -411,7 +422,6 @@ impl Walker {
         let [start, end] = self.speeds;
         put(lists, SPEED_SQR, 0, start * start);
         put(lists, SPEED_SQR, last, end * end);
-        self.flatten(lists, plan);
         for cell in (0..last).rev() {
             let reach =
                 get(lists, SPEED_SQR, cell + 1) + 2.0 * self.accel(lists, cell) * plan.stations.cell_mm(cell);
@@ -443,7 +453,7 @@ impl Walker {
     /// Nodes by which the mean lengthens the walk: half of it at each rest.
     fn lengthening(&self, mean: u16) -> u16 {
         let [start, end] = self.speeds.map(|speed| u16::from(speed == 0.0));
-        (start + end) * ((mean + 1) / 2)
+        (start + end) * mean.div_ceil(2)
     }
 
     /// Accelerations and times from a station on, up to another.

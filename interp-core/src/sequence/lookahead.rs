@@ -136,8 +136,9 @@ mod cycles {
     pub(super) const ESTIMATE: u32 = 1_600;
     pub(super) const CLOSE: u32 = 1_700;
     pub(super) const NEXT: u32 = 800;
-    pub(super) const HALF: u32 = 2_500;
-    pub(super) const TURN: u32 = 24_000;
+    pub(super) const HEAD: u32 = 1_500;
+    pub(super) const TAIL: u32 = 5_000;
+    pub(super) const TURN: u32 = 15_000;
 }
 
 /// The look-ahead over one pass.
@@ -226,7 +227,8 @@ impl Lookahead {
             Task::Across => cycles::PATCH,
             Task::Start => cycles::STATION,
             Task::Turn(_) => cycles::TURN,
-            Task::Head(_) | Task::Tail(_) => cycles::HALF,
+            Task::Head(_) => cycles::HEAD,
+            Task::Tail(_) => cycles::TAIL,
             Task::Done => 0,
         }
     }
@@ -321,6 +323,8 @@ impl Lookahead {
             Task::Turn(round) => self.find_turn(job, axes, round, out),
             Task::Tail(index) => {
                 self.push_half(false, index, out);
+                let limits = MotionLimits::new(axes, job.header.feed_mm_s, job.header.period_s);
+                self.turn.bound_speed(index, &limits);
                 if index + 1 < turn::STATIONS {
                     Task::Tail(index + 1)
                 } else {
@@ -654,11 +658,6 @@ impl Lookahead {
                 }
             }
         }
-        self.turn.set_speed(&MotionLimits::new(
-            axes,
-            job.header.feed_mm_s,
-            job.header.period_s,
-        ));
         out.tail_q10 = i64::from(out.plan.stations.length_nm()) << Q10_BITS;
         Task::Tail(0)
     }

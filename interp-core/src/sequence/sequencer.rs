@@ -580,7 +580,7 @@ impl Sequencer {
     }
 
     /// Whether the plan of the next pass is complete.
-    fn knows_next(&self) -> bool {
+    pub(super) fn knows_next(&self) -> bool {
         self.is_planned() && self.pending.is_none()
     }
 

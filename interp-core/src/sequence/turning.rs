@@ -2,7 +2,7 @@
 
 use super::lookahead::PassPlan;
 use super::sequencer::Sequencer;
-use crate::fault::Result;
+use crate::fault::{Fault, FaultKind, Result};
 use crate::feed::plan::{Cursor, Plan};
 use crate::feed::road::Road;
 use crate::feed::turn::Turn;
@@ -83,6 +83,10 @@ impl Sequencer {
 
     /// The tool has crossed the apex: the next plan is followed, from what is left of the period on.
     pub(super) fn cross_apex(&mut self, job: &Job<'_>, run: &mut Run) -> Result<()> {
+        // By the last stop before the apex the tool stands where the next plan is not complete.
+        if !self.knows_next() {
+            return Err(Fault::new(FaultKind::PatchTooShort, 0.0));
+        }
         let (now, _) = self.plans_ref();
         let beyond = now.plan.beyond(&self.follower.cursor);
         self.turn = now.tail;
