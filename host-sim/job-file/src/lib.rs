@@ -20,9 +20,8 @@ mod text;
 use std::path::Path;
 
 use job::{
-    OVERRUN_MAX_MM,
     Along, AlongChoice, CHORD_DEFAULT_MM, CadSource, FEED_MAX_MM_MIN, FEED_MIN_MM_MIN, Job, JobError,
-    MachineSpec, Pattern, RADIUS_MAX_MM, Side, Spacing,
+    MachineSpec, OVERRUN_MAX_MM, Pattern, RADIUS_MAX_MM, Side, Spacing,
 };
 use section::{Reader, Section};
 
@@ -151,7 +150,11 @@ fn read_overrun(cut: &Section<'_>) -> Result<f64, JobError> {
         return Ok(value);
     }
     let what = format!("`overrun_mm` must be at least 0 and at most {OVERRUN_MAX_MM}, not {value}");
-    Err(cut.error("overrun_mm", what, "give the greatest overrun of a turn in mm, e.g. 2, or 0 for none"))
+    Err(cut.error(
+        "overrun_mm",
+        what,
+        "give the greatest overrun of a turn in mm, e.g. 2, or 0 for none",
+    ))
 }
 
 /// The tool's radius, mm.

@@ -7,7 +7,7 @@
 
 use super::limits::MotionLimits;
 use super::stations::Derivatives;
-use super::{Q10_BITS, Q10_PER_MM};
+use super::{MM_PER_Q10, Q10_BITS};
 use crate::math::arith::{sqrt, truncated};
 use crate::math::number::{Bounded, MM_PER_NM, NM_PER_MM_F32, cube_root, to_f32};
 
@@ -19,6 +19,11 @@ pub(crate) const STATIONS: u16 = CELLS + 1;
 /// Length of the plan's arc along a turn, for the time t that the step takes at its jerk limit, as a multiple of a t^2 and of v t.
 const REVERSAL: f32 = 3.0;
 const CRUISE: f32 = 4.0;
+/// Time of a step from rest to rest at its jerk limit, as a multiple of the cube root of distance over jerk: 4 / 2^(1/3).
+const STEP_TIME: f32 = 3.17;
+/// Greatest time of a turn at the speed of its apex, as a multiple of that of two rests and the step.
+const WORTH: f32 = 0.9;
+
 /// Rounds in which the length is adapted to the greatest overrun.
 pub(crate) const ROUNDS: u8 = 4;
 /// Least length of half a turn, mm: a shorter one is noise of rounded positions.
@@ -49,9 +54,9 @@ impl TurnEnd {
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Turn {
     from_nm: [i32; 3],
-    /// Coefficients by the fraction of the length, mm, the lowest power first.
+    /// Coefficients by the distance from the apex as a fraction of half the length, mm, the lowest power first: they are no larger than the turn.
     coefficients: [[f32; 8]; 3],
-    /// Half the length of the plan's arc, nm, and the inverse length, 1/mm.
+    /// Half the length of the plan's arc, nm, and its inverse, 1/mm.
     half_nm: u32,
     inverse: f32,
     /// Speed at the apex, mm/s of the plan's arc; 0 where there is no turn.
@@ -78,7 +83,7 @@ impl Turn {
         let length = if length > 0.0 {
             length
         } else {
-            first_length(from, to, limits)
+            Step::new(from, to, limits).turn_length(limits)
         };
         let turn = Self::of(from, to, length);
         let over = turn.overrun(from, to);
@@ -115,35 +120,47 @@ impl Turn {
         }
     }
 
+    /// Whether the turn is faster than two rests with a step between them.
+    pub(crate) fn is_worth(&self, from: &TurnEnd, to: &TurnEnd, limits: &MotionLimits) -> bool {
+        let turn = 2.0 * self.half_mm() / self.speed.at_least(1e-6);
+        let Step {
+            time,
+            distance,
+            jerk,
+            acceleration,
+        } = Step::new(from, to, limits);
+        let ramp = limits.feed / acceleration + acceleration / jerk;
+        let ramp = ramp.at_most(2.0 * sqrt(limits.feed / jerk));
+        let step = (STEP_TIME * time).at_least(distance / limits.feed);
+        turn < WORTH * (ramp + step)
+    }
+
     /// Of this length, mm.
     fn of(from: &TurnEnd, to: &TurnEnd, length: f32) -> Self {
         let half_nm = u32::try_from(truncated(0.5 * length * NM_PER_MM_F32)).unwrap_or(0);
-        let length = 2.0 * nm_to_mm(half_nm);
+        let half = nm_to_mm(half_nm);
         let mut coefficients = [[0.0; 8]; 3];
         let apart = apart_mm(&from.cl_nm, &to.cl_nm);
         for (((c, apart), a), b) in coefficients.iter_mut().zip(apart).zip(&from.q).zip(&to.q) {
             let ([a1, a2, _], [b1, b2, _]) = (*a, *b);
-            let square = length * length;
-            let (p1, p2) = (length * a1, 0.5 * square * a2);
-            let r0 = apart - (p1 + p2);
-            let r1 = length * b1 - (p1 + 2.0 * p2);
-            let r2 = square * b2 - 2.0 * p2;
-            *c = [
-                0.0,
-                p1,
-                p2,
-                0.0,
-                35.0 * r0 - 15.0 * r1 + 2.5 * r2,
-                -84.0 * r0 + 39.0 * r1 - 7.0 * r2,
-                70.0 * r0 - 34.0 * r1 + 6.5 * r2,
-                -20.0 * r0 + 10.0 * r1 - 2.0 * r2,
-            ];
+            // Even and odd parts by their value and derivatives at 1; the third ones are 0.
+            let place = 0.5 * apart;
+            let [slope, odd_slope] = [b1 - a1, b1 + a1].map(|sum| 0.5 * half * sum);
+            let [bend, odd_bend] = [b2 + a2, b2 - a2].map(|sum| 0.5 * half * half * sum);
+            let c6 = (slope - bend) * (1.0 / 16.0);
+            let c4 = -5.0 * c6;
+            let c2 = 0.5 * slope + 7.0 * c6;
+            let c7 = (2.5 * (odd_slope - place) - odd_bend) * (1.0 / 8.0);
+            let c5 = (place - odd_slope) * (1.0 / 16.0) - 4.0 * c7;
+            let c3 = -10.0 * c5 - 35.0 * c7;
+            let c1 = place - c3 - c5 - c7;
+            *c = [place - c2 - c4 - c6, c1, c2, c3, c4, c5, c6, c7];
         }
         Self {
             from_nm: from.cl_nm,
             coefficients,
             half_nm,
-            inverse: 1.0 / length.at_least(1e-6),
+            inverse: 1.0 / half.at_least(1e-6),
             speed: 0.0,
         }
     }
@@ -170,27 +187,31 @@ impl Turn {
 
     /// Derivatives at a station of the first or of the second half, by the plan's arc.
     pub(crate) fn station(&self, second: bool, station: u16) -> Derivatives {
-        let start = if second { self.half_mm() } else { 0.0 };
-        self.derivatives((start + nm_to_mm(self.station_nm(station))) * self.inverse)
+        let start = if second { 0.0 } else { self.half_mm() };
+        self.derivatives((nm_to_mm(self.station_nm(station)) - start) * self.inverse)
     }
 
     /// Ball centre at a station, nm.
     pub(crate) fn place(&self, second: bool, station: u16) -> [i32; 3] {
-        let start = if second { self.half_mm() } else { 0.0 };
-        self.position((start + nm_to_mm(self.station_nm(station))) * self.inverse)
+        let start = if second { 0.0 } else { self.half_mm() };
+        self.position((nm_to_mm(self.station_nm(station)) - start) * self.inverse)
     }
 
     /// Ball centre at this arc from the start, units of 2^-10 nm.
     pub(crate) fn position_at(&self, arc_q10: i64) -> [i32; 3] {
-        let part = to_f32(arc_q10) * (1.0 / Q10_PER_MM) * self.inverse;
-        self.position(part.at_least(0.0).at_most(1.0))
+        self.position(self.part(arc_q10))
     }
 
     /// Speed of the ball centre at this arc and a speed of the plan, mm/s.
     pub(crate) fn speed_at(&self, arc_q10: i64, speed: f32) -> f32 {
-        let part = to_f32(arc_q10) * (1.0 / Q10_PER_MM) * self.inverse;
-        let [[x, ..], [y, ..], [z, ..]] = self.derivatives(part.at_least(0.0).at_most(1.0));
+        let [[x, ..], [y, ..], [z, ..]] = self.derivatives(self.part(arc_q10));
         speed * sqrt(x * x + y * y + z * z)
+    }
+
+    /// The distance from the apex of an arc from the start, as a fraction of half the length.
+    fn part(&self, arc_q10: i64) -> f32 {
+        let part = to_f32(arc_q10 - self.half_q10()) * MM_PER_Q10 * self.inverse;
+        part.at_least(-1.0).at_most(1.0)
     }
 
     fn position(&self, part: f32) -> [i32; 3] {
@@ -245,18 +266,38 @@ impl Turn {
     }
 }
 
-/// The length of the plan's arc for which a turn is fast: while the step to the next pass takes its time, which its jerk bounds, the axes reverse.
-fn first_length(from: &TurnEnd, to: &TurnEnd, limits: &MotionLimits) -> f32 {
-    let apart = apart_mm(&from.cl_nm, &to.cl_nm);
-    let [x, y, z] = apart;
-    let distance = sqrt(x * x + y * y + z * z);
-    let (mut jerk, mut acceleration) = (f32::MAX, f32::MAX);
-    for ((axis, apart), [first, ..]) in limits.axes.iter().zip(&apart).zip(&from.q) {
-        jerk = jerk.at_most(axis.jerk * distance / apart.abs().at_least(1e-3 * distance));
-        acceleration = acceleration.at_most(axis.acceleration / first.abs().at_least(1e-3));
+/// A step from one end to the other, and the limits of the reversal.
+struct Step {
+    /// The cube root of the distance over the jerk limit in its direction, s; the distance, mm.
+    time: f32,
+    distance: f32,
+    /// Jerk limit of the step, mm/s^3, and acceleration limit along the pass, mm/s^2.
+    jerk: f32,
+    acceleration: f32,
+}
+
+impl Step {
+    fn new(from: &TurnEnd, to: &TurnEnd, limits: &MotionLimits) -> Self {
+        let apart = apart_mm(&from.cl_nm, &to.cl_nm);
+        let [x, y, z] = apart;
+        let distance = sqrt(x * x + y * y + z * z);
+        let (mut jerk, mut acceleration) = (f32::MAX, f32::MAX);
+        for ((axis, apart), [first, ..]) in limits.axes.iter().zip(&apart).zip(&from.q) {
+            jerk = jerk.at_most(axis.jerk * distance / apart.abs().at_least(1e-3 * distance).at_least(1e-9));
+            acceleration = acceleration.at_most(axis.acceleration / first.abs().at_least(1e-3));
+        }
+        Self {
+            time: cube_root(distance / jerk),
+            distance,
+            jerk,
+            acceleration,
+        }
     }
-    let time = cube_root(distance / jerk);
-    (REVERSAL * acceleration * time * time).at_most(CRUISE * limits.feed * time)
+
+    /// The length of the plan's arc for which a turn is fast: while the step takes its time, which its jerk bounds, the axes reverse.
+    fn turn_length(&self, limits: &MotionLimits) -> f32 {
+        (REVERSAL * self.acceleration * self.time * self.time).at_most(CRUISE * limits.feed * self.time)
+    }
 }
 
 fn apart_mm(from: &[i32; 3], to: &[i32; 3]) -> [f32; 3] {

@@ -426,22 +426,46 @@ impl Walker {
             let reach =
                 get(lists, SPEED_SQR, cell + 1) + 2.0 * self.accel(lists, cell) * plan.stations.cell_mm(cell);
             let square = get(lists, SPEED_SQR, cell).at_most(reach);
+            let square = self.unless_held(plan, cell, square);
             put(lists, SPEED_SQR, cell, square);
         }
     }
 
-    /// Holds the speed of an end that is not a rest for as long as the mean reaches.
-    fn flatten(&self, lists: &mut Lists, plan: &Plan) {
+    /// The square of the speed of an end that is not a rest, at a station where it is held because the mean reaches there; 0 elsewhere.
+    fn held(&self, plan: &Plan, station: u16) -> f32 {
         let [start, end] = self.speeds;
-        let length = plan.stations.length_nm();
+        let stations = &plan.stations;
         let time = FLAT * (self.acceleration / self.jerk).at_most(MEAN_MAX);
+        // With the first station beyond, so that the speed is held over the whole of the cell before it.
+        let before = stations.get(station.saturating_sub(1)).arc_nm;
+        let behind = stations
+            .get((station + 1).min(stations.count().saturating_sub(1)))
+            .arc_nm;
+        if start > 0.0 && between(0, before) < start * time {
+            start * start
+        } else if end > 0.0 && between(behind, stations.length_nm()) < end * time {
+            end * end
+        } else {
+            0.0
+        }
+    }
+
+    /// Holds the speeds of the ends that are not rests.
+    fn flatten(&self, lists: &mut Lists, plan: &Plan) {
         for station in 0..plan.stations.count() {
-            let at = plan.stations.get(station).arc_nm;
-            for (speed, away) in [(start, between(0, at)), (end, between(at, length))] {
-                if speed > 0.0 && away < speed * time {
-                    put(lists, SPEED_SQR, station, speed * speed);
-                }
+            let held = self.held(plan, station);
+            if held > 0.0 {
+                put(lists, SPEED_SQR, station, held);
             }
+        }
+    }
+
+    /// The square of a speed where it is not held.
+    fn unless_held(&self, plan: &Plan, station: u16, square: f32) -> f32 {
+        if self.is_from_rest_to_rest() {
+            square
+        } else {
+            square.at_least(self.held(plan, station))
         }
     }
 
@@ -465,6 +489,7 @@ impl Walker {
             let here = get(lists, SPEED_SQR, cell);
             let reach = here + 2.0 * self.accel(lists, cell) * length;
             let there = get(lists, SPEED_SQR, cell + 1).at_most(reach);
+            let there = self.unless_held(plan, cell + 1, there);
             put(lists, SPEED_SQR, cell + 1, there);
             time += Motion::of(here, there, length, self.accel(lists, cell)).duration;
             put(lists, TIME, cell + 1, time);

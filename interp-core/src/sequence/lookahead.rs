@@ -123,6 +123,8 @@ enum Task {
     Start,
     /// Find the turn to the next pass, in rounds.
     Turn(u8),
+    /// Bound the turn's speed by a station of each half.
+    Bound(u16),
     /// Append a station of the half of the turn behind the pass.
     Tail(u16),
     Done,
@@ -136,8 +138,8 @@ mod cycles {
     pub(super) const ESTIMATE: u32 = 1_600;
     pub(super) const CLOSE: u32 = 1_700;
     pub(super) const NEXT: u32 = 800;
-    pub(super) const HEAD: u32 = 1_500;
-    pub(super) const TAIL: u32 = 5_000;
+    pub(super) const HALF: u32 = 1_500;
+    pub(super) const BOUND: u32 = 5_000;
     pub(super) const TURN: u32 = 15_000;
 }
 
@@ -171,6 +173,8 @@ pub(crate) struct Lookahead {
     turn: Turn,
     ends: [TurnEnd; 2],
     length: f32,
+    /// Passes for which no turn is tried, because the last one slowed its pass down.
+    without: u8,
 }
 
 impl Lookahead {
@@ -200,12 +204,14 @@ impl Lookahead {
         turn: Turn::NONE,
         ends: [TurnEnd::NONE; 2],
         length: 0.0,
+        without: 0,
     };
 
     /// Resets to the state before the first pass.
     pub(crate) const fn restart(&mut self) {
         self.step_over.restart();
         self.patch_mm = 0.0;
+        self.without = 0;
         self.task = Task::Done;
     }
 
@@ -227,8 +233,8 @@ impl Lookahead {
             Task::Across => cycles::PATCH,
             Task::Start => cycles::STATION,
             Task::Turn(_) => cycles::TURN,
-            Task::Head(_) => cycles::HEAD,
-            Task::Tail(_) => cycles::TAIL,
+            Task::Head(_) | Task::Tail(_) => cycles::HALF,
+            Task::Bound(_) => cycles::BOUND,
             Task::Done => 0,
         }
     }
@@ -304,7 +310,9 @@ impl Lookahead {
             }
             Task::Close => {
                 self.close(job, out)?;
-                if self.may_turn(job, axes, out) {
+                let rests = self.without > 0;
+                self.without = self.without.saturating_sub(1);
+                if !rests && self.may_turn(job, axes, out) {
                     Task::Across
                 } else {
                     Task::Done
@@ -321,10 +329,9 @@ impl Lookahead {
             Task::Across => self.look_across(job, out),
             Task::Start => self.visit_start(axes),
             Task::Turn(round) => self.find_turn(job, axes, round, out),
+            Task::Bound(index) => self.bound_turn(job, axes, index, out),
             Task::Tail(index) => {
                 self.push_half(false, index, out);
-                let limits = MotionLimits::new(axes, job.header.feed_mm_s, job.header.period_s);
-                self.turn.bound_speed(index, &limits);
                 if index + 1 < turn::STATIONS {
                     Task::Tail(index + 1)
                 } else {
@@ -570,6 +577,11 @@ impl Lookahead {
         length * (0.5 * (first + last) + bow * length * (1.0 / 12.0)) / self.patch.per_mm
     }
 
+    /// No turn is tried for some passes: the plan before the last one is slower than a rest would make it.
+    pub(crate) const fn avoid_turns(&mut self) {
+        self.without = PASSES_WITHOUT;
+    }
+
     /// Whether a turn may lead to the next pass.
     fn may_turn(&self, job: &Job<'_>, axes: &AxisLimits, out: &PassPlan) -> bool {
         let [_, is_up] = out.faces_up;
@@ -658,6 +670,20 @@ impl Lookahead {
                 }
             }
         }
+        Task::Bound(0)
+    }
+
+    /// Bounds the turn's speed; at last, takes the turn where it is faster than two rests with a step-over between them.
+    fn bound_turn(&mut self, job: &Job<'_>, axes: &AxisLimits, index: u16, out: &mut PassPlan) -> Task {
+        let limits = MotionLimits::new(axes, job.header.feed_mm_s, job.header.period_s);
+        self.turn.bound_speed(index, &limits);
+        if index + 1 < turn::STATIONS {
+            return Task::Bound(index + 1);
+        }
+        let [from, to] = &self.ends;
+        if !self.turn.is_worth(from, to, &limits) {
+            return Task::Done;
+        }
         out.tail_q10 = i64::from(out.plan.stations.length_nm()) << Q10_BITS;
         Task::Tail(0)
     }
@@ -694,6 +720,9 @@ impl Lookahead {
         Ok(())
     }
 }
+
+/// Passes without a turn after one whose plan had to be slowed down for it.
+const PASSES_WITHOUT: u8 = 60;
 
 /// Stations that a pass may have: in a job with turns there is room for their halves.
 fn stations_of(job: &Job<'_>) -> u16 {

@@ -42,6 +42,8 @@ const REPLANNED: f32 = 1.001;
 const PERIODS_A_NODE: f32 = 3.4;
 const PERIODS_A_REST: f32 = 40.0;
 const PERIODS_A_PASS: f32 = 100.0;
+/// Share of the time of a rest by which a turn may slow its plan down.
+const REST_SHARE: f32 = 0.3;
 /// Steps in which the tool's place after the planning is estimated.
 const AHEAD_STEPS: u16 = 64;
 
@@ -375,6 +377,9 @@ impl Sequencer {
                 self.planner.work(&mut next.plan, least);
                 if self.planner.is_done() {
                     self.planning = Planning::Complete;
+                    if next.turns() && is_too_slow(next) {
+                        self.lookahead.avoid_turns();
+                    }
                 }
             }
             Planning::Rest => {
@@ -848,6 +853,20 @@ fn pace_of(job: &Job<'_>, pass: &PassPlan, share: f32) -> f32 {
 /// The greatest pace on a pass at this feed factor.
 fn pace_on(job: &Job<'_>, pass: &PassPlan, share: f32) -> f32 {
     pace_of(job, pass, share).at_most(pass.plan.pace_max)
+}
+
+/// Whether a turn costs more than it saves: the time by which its plan is slowed down, against that of a rest.
+fn is_too_slow(pass: &PassPlan) -> bool {
+    let MotionLimits {
+        feed, axes, period, ..
+    } = &pass.plan.limits;
+    let jerk = axes.iter().fold(f32::MAX, |least, axis| least.at_most(axis.jerk));
+    let acceleration = axes
+        .iter()
+        .fold(f32::MAX, |least, axis| least.at_most(axis.acceleration));
+    let rest_s = feed / acceleration + acceleration / jerk;
+    let lasts_s = to_f32(i64::from(pass.plan.periods)) * period;
+    lasts_s * (1.0 / pass.plan.pace_max - 1.0) > REST_SHARE * rest_s
 }
 
 /// The last patch of a pass.
