@@ -328,7 +328,7 @@ impl Lookahead {
             }
             Task::Across => self.look_across(job, out),
             Task::Start => self.visit_start(axes),
-            Task::Turn(round) => self.find_turn(job, axes, round, out),
+            Task::Turn(round) => self.find_turn(job, axes, round),
             Task::Bound(index) => self.bound_turn(job, axes, index, out),
             Task::Tail(index) => {
                 self.push_half(false, index, out);
@@ -640,7 +640,7 @@ impl Lookahead {
     }
 
     /// Tries a length of the turn; the last round checks the places of the turn.
-    fn find_turn(&mut self, job: &Job<'_>, axes: &AxisLimits, round: u8, out: &mut PassPlan) -> Task {
+    fn find_turn(&mut self, job: &Job<'_>, axes: &AxisLimits, round: u8) -> Task {
         let [from, to] = &self.ends;
         if round < turn::ROUNDS {
             let limits = MotionLimits::new(axes, job.header.feed_mm_s, job.header.period_s);
