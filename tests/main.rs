@@ -18,6 +18,7 @@ mod import;
 mod no_panic;
 mod operations;
 mod oracle_golden;
+mod overrun;
 mod paper;
 mod pass_times;
 mod protocol;
