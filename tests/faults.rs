@@ -18,6 +18,7 @@ fn job(surface: SurfaceSpec, radius_mm: f64) -> Job {
         pattern: Pattern::Zig,
         spacing: Spacing::Exact,
         chord_mm: 0.005,
+        overrun_mm: 0.0,
         machine: Default::default(),
         origin: Default::default(),
     }

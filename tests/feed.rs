@@ -18,6 +18,7 @@ fn axes(safe_z_nm: i32) -> AxisLimits {
         acceleration_mm_s2: [1000.0, 1000.0, 500.0],
         jerk_mm_s3: [20_000.0, 20_000.0, 10_000.0],
         chord_mm: 0.005,
+        overrun_mm: 0.0,
         travel_nm: [[i32::MIN, i32::MAX]; 3],
         home_nm: [0, 0, safe_z_nm],
         plunge_mm: 2.0,

@@ -20,6 +20,7 @@ fn within_limits(home_nm: [i32; 3]) -> (Header, Vec<i32>) {
         acceleration_mm_s2: [2000.0; 3],
         jerk_mm_s3: [50_000.0; 3],
         chord_mm: 0.005,
+        overrun_mm: 0.0,
         travel_nm: [[i32::MIN, i32::MAX]; 3],
         home_nm,
         plunge_mm: 2.0,

@@ -19,6 +19,7 @@ mod lost_events;
 mod no_panic;
 mod operations;
 mod oracle_golden;
+mod overrun;
 mod paper;
 mod pass_times;
 mod protocol;

@@ -56,6 +56,7 @@ fn axes() -> AxisLimits {
         acceleration_mm_s2: [1000.0, 800.0, 500.0],
         jerk_mm_s3: [20_000.0, 16_000.0, 10_000.0],
         chord_mm: 0.005,
+        overrun_mm: 0.0,
         travel_nm: [[-1, 1], [i32::MIN, i32::MAX], [0, 64]],
         home_nm: [1, -2, i32::MAX],
         plunge_mm: 2.0,

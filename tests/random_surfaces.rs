@@ -78,6 +78,7 @@ fn job(surface: SurfaceSpec, along: Along, pattern: Pattern) -> Job {
         pattern,
         spacing: Spacing::Exact,
         chord_mm: 0.005,
+        overrun_mm: 0.0,
         machine: Default::default(),
         origin: Default::default(),
     }

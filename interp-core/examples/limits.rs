@@ -13,6 +13,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         acceleration_mm_s2: [1000.0, 1000.0, 500.0],
         jerk_mm_s3: [20_000.0, 20_000.0, 10_000.0],
         chord_mm: 0.005,
+        overrun_mm: 0.0,
         travel_nm: [[-100_000_000, 100_000_000]; 3],
         home_nm: [0, 0, 30_000_000],
         plunge_mm: 2.0,

@@ -262,6 +262,7 @@ struct AxisLimitsFields {
     home_nm: [i32; 3],
     plunge_mm: f32,
     safe_z_nm: i32,
+    overrun_mm: f32,
 }
 
 /// An option of the axes' limits: 0, or 1 and the fields.

@@ -23,6 +23,7 @@ fn limited() -> (interp_core::Header, Vec<i32>) {
         acceleration_mm_s2: [1000.0; 3],
         jerk_mm_s3: [20_000.0; 3],
         chord_mm: 0.005,
+        overrun_mm: 0.0,
         travel_nm: [[i32::MIN, i32::MAX]; 3],
         home_nm: [0, 0, 50_000_000],
         plunge_mm: 2.0,

@@ -24,9 +24,9 @@ fn real() -> impl Strategy<Value = f32> {
 }
 
 prop_compose! {
-    fn any_axes()(reals in prop::array::uniform11(real()), travel_nm in any::<[[i32; 2]; 3]>(), home_nm in any::<[i32; 3]>(),
+    fn any_axes()(reals in prop::array::uniform12(real()), travel_nm in any::<[[i32; 2]; 3]>(), home_nm in any::<[i32; 3]>(),
                   safe_z_nm: i32) -> AxisLimits {
-        let [vx, vy, vz, ax, ay, az, jx, jy, jz, chord_mm, plunge_mm] = reals;
+        let [vx, vy, vz, ax, ay, az, jx, jy, jz, chord_mm, plunge_mm, overrun_mm] = reals;
         AxisLimits {
             velocity_mm_s: [vx, vy, vz],
             acceleration_mm_s2: [ax, ay, az],
@@ -36,6 +36,7 @@ prop_compose! {
             home_nm,
             plunge_mm,
             safe_z_nm,
+            overrun_mm,
         }
     }
 }

@@ -113,6 +113,7 @@ mod tests {
             acceleration_mm_s2: [1000.0; 3],
             jerk_mm_s3: [20_000.0; 3],
             chord_mm: 0.005,
+            overrun_mm: 0.0,
             travel_nm: [[i32::MIN, i32::MAX]; 3],
             home_nm,
             plunge_mm: 1.0,

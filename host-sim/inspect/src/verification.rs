@@ -9,6 +9,7 @@ use job::Job;
 use machine::prepare::Prepared;
 use machine::travel;
 use oracle::{AccuracyBounds, PassSample, SampleCheck};
+use verify::EmittedSample;
 use verify::motion::{
     JobTimes, OptimumTimes, PeakMeter, Peaks, RunPass, TimeMeter, limits, optimum_times, times,
 };
@@ -157,11 +158,12 @@ fn measure<'a>(
     } else {
         0.0
     };
-    let mut track = ToolPath::with_spacing(spacing_nm);
+    let track = RefCell::new(ToolPath::with_spacing(spacing_nm));
+    let mut turn = TurnEnds::new(&oracle);
     let axes = RefCell::new(AxesUse::new(job));
     let mut contact = ContactSide::default();
     let mut keep = |emitted: &PassSample, checked: &SampleCheck| {
-        track.add(emitted, job.along);
+        track.borrow_mut().add(emitted, job.along);
         contact.add(contact_place(emitted), millimetres(emitted.cl_nm));
         axes.borrow_mut().on_pass(emitted);
         if let Some(each) = &mut each {
@@ -185,7 +187,9 @@ fn measure<'a>(
         // Without limits the passes follow each other without links.
         let jumps = !job.machine.has_limits() && last_pass.replace(sample.pass) != Some(sample.pass);
         motion.add(sample.cl_nm, emitted.parameters.is_some(), jumps);
+        turn.enter(&emitted, &track);
         written = survey.add(&emitted);
+        turn.leave(&emitted, &track);
         if u64::from(sample.tick) % PROGRESS_SAMPLES == PROGRESS_SAMPLES - 1 {
             progress.done(PROGRESS_SAMPLES);
         }
@@ -194,6 +198,7 @@ fn measure<'a>(
     written?;
     let times = time.finish();
     let findings = survey.finish(ran.is_ok())?;
+    let track = track.into_inner();
     let swept = swept::measure(job, &oracle, &track, ran.is_ok(), &requirements.swept, progress);
     let links_mm = motion.links();
     motion.join(times.links.iter().map(|link| link.turn));
@@ -226,6 +231,46 @@ fn contact_place(sample: &PassSample) -> ContactPlace {
         pass: sample.pass,
         uv: [sample.u, sample.v],
         place_mm: millimetres(sample.cc_nm),
+    }
+}
+
+/// Gives the swept ball the centres of turns next to the passes, so that the surface is swept up to its boundary.
+struct TurnEnds<'a> {
+    oracle: &'a oracle::Oracle,
+    last: Option<EmittedSample>,
+}
+
+impl<'a> TurnEnds<'a> {
+    const fn new(oracle: &'a oracle::Oracle) -> Self {
+        Self { oracle, last: None }
+    }
+
+    /// The boundary next to a sample on a pass.
+    fn boundary(&self, [u, v]: [f64; 2]) -> f64 {
+        let (path, _) = self.oracle.swapped(u, v);
+        let [low, high] = self.oracle.path_range();
+        if path - low < high - path { low } else { high }
+    }
+
+    /// A pass begins with this sample: the one before it is in the turn.
+    fn enter(&self, sample: &EmittedSample, track: &RefCell<ToolPath>) {
+        if let (true, Some(before), Some(at)) = (self.oracle.overruns, &self.last, sample.parameters)
+            && before.parameters.is_none()
+            && self.boundary(at) != self.oracle.swapped(at[0], at[1]).0
+        {
+            track.borrow_mut().enter(before.cl_nm, self.boundary(at));
+        }
+    }
+
+    /// A pass has ended before this sample, which is in the turn.
+    fn leave(&mut self, sample: &EmittedSample, track: &RefCell<ToolPath>) {
+        if let (true, Some(before)) = (self.oracle.overruns, &self.last)
+            && let (Some(at), None) = (before.parameters, sample.parameters)
+            && self.boundary(at) != self.oracle.swapped(at[0], at[1]).0
+        {
+            track.borrow_mut().leave(sample.cl_nm, self.boundary(at));
+        }
+        self.last = Some(*sample);
     }
 }
 

@@ -22,10 +22,10 @@ use std::path::Path;
 
 use job::{
     Along, AlongChoice, CHORD_DEFAULT_MM, CadSource, FEED_MAX_MM_MIN, FEED_MIN_MM_MIN, Job, JobError,
-    MachineSpec, Pattern, Side, Spacing,
+    MachineSpec, OVERRUN_MAX_MM, Pattern, Side, Spacing,
 };
 use patches::placement::Placement;
-use section::Reader;
+use section::{Reader, Section};
 
 pub use file::{Face, FaceError, FaceReader, TOLERANCE_DEFAULT_MM, TOLERANCE_MAX_MM};
 pub use steps::slots_max_us;
@@ -92,6 +92,7 @@ pub fn parse_with(name: &str, text: &str, faces: &dyn FaceReader) -> Result<Job,
             "pattern",
             "spacing",
             "chord_mm",
+            "overrun_mm",
         ],
         &[],
     )?;
@@ -148,9 +149,27 @@ pub fn parse_with(name: &str, text: &str, faces: &dyn FaceReader) -> Result<Job,
             true => below_radius("chord_mm", "give the chord error limit in mm, e.g. 0.005")?,
             false => CHORD_DEFAULT_MM.min(0.5 * radius_mm),
         },
+        overrun_mm: match cut.has("overrun_mm") {
+            true => read_overrun(&cut)?,
+            false => 0.0,
+        },
         machine: document
             .optional_section("machine")?
             .map_or(Ok(MachineSpec::default()), |section| machine::read(&section))?,
         origin,
     })
+}
+
+/// The overrun of turns, mm.
+fn read_overrun(cut: &Section<'_>) -> Result<f64, JobError> {
+    let value = cut.number("overrun_mm")?;
+    if (0.0..=OVERRUN_MAX_MM).contains(&value) {
+        return Ok(value);
+    }
+    let what = format!("`overrun_mm` must be at least 0 and at most {OVERRUN_MAX_MM}, not {value}");
+    Err(cut.error(
+        "overrun_mm",
+        what,
+        "give the greatest overrun of a turn in mm, e.g. 2, or 0 for none",
+    ))
 }

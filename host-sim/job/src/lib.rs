@@ -22,6 +22,9 @@ pub use text::{one_line, printable, read_regular};
 
 /// Largest ball radius, mm: the core's limit, ten times the radius of any ball-end mill.
 pub const RADIUS_MAX_MM: f64 = 1000.0;
+
+/// Greatest overrun of a turn, mm.
+pub const OVERRUN_MAX_MM: f64 = 100.0;
 /// Lower bound of the feed (exclusive), mm/min (1 um/s): below it the core's parameter step loses digits.
 pub const FEED_MIN_MM_MIN: f64 = 0.06;
 /// Largest feed, mm/min (10 m/s): the core's limit.
@@ -103,6 +106,9 @@ pub struct Job {
     pub spacing: Spacing,
     /// Chord error limit delta, mm, above 0, below the ball radius; used by the approaches that cut chords.
     pub chord_mm: f64,
+    /// Greatest length by which a turn of a zigzag job leaves the surface beyond its boundary, mm, 0 to [`OVERRUN_MAX_MM`]; 0 for a standstill at each
+    /// pass end.
+    pub overrun_mm: f64,
     /// The machine.
     pub machine: MachineSpec,
     /// The file, the line of each key, and the choice of the direction.

@@ -130,6 +130,8 @@ pub struct Oracle {
     pub period_s: f64,
     /// Programmed feed, mm/s.
     pub feed_mm_s: f64,
+    /// Whether turns beyond the boundary join the passes: these then begin and end within a period's step of it.
+    pub overruns: bool,
 }
 
 /// Curvatures of a contact, 1/mm; see [`Contact`].
@@ -161,6 +163,7 @@ impl Oracle {
             spacing: job.spacing,
             period_s: job.machine.period_s(),
             feed_mm_s: job.feed_mm_s(),
+            overruns: job.overrun_mm > 0.0 && job.pattern == Pattern::Zigzag && job.machine.has_limits(),
         })
     }
 

@@ -20,6 +20,7 @@ fn job(surface: SurfaceSpec, along: Along, side: Side) -> Job {
         pattern: Pattern::Zig,
         spacing: Spacing::Exact,
         chord_mm: 0.005,
+        overrun_mm: 0.0,
         machine: MachineSpec::default(),
         origin: Origin::default(),
     }

@@ -67,6 +67,9 @@ struct PassState {
     finished: bool,
 }
 
+/// Longest step of a period, as a multiple of that at the programmed feed: the greatest override.
+const STEP_MOST: f64 = 2.0;
+
 impl Verifier {
     /// A verifier of a job's samples.
     #[must_use]
@@ -101,7 +104,7 @@ impl Verifier {
         };
         let position_nm = self.check_geometry(sample, spot);
         if sample.last_of_pass {
-            if path != self.pass_ends(sample.pass)[1] {
+            if self.is_off(sample, path, side, self.pass_ends(sample.pass)[1]) {
                 self.report.off_boundary += 1;
             }
             if let Some(pass) = &mut self.current {
@@ -123,6 +126,19 @@ impl Verifier {
             self.report.last_on_boundary = pass.side == self.oracle.side_range()[1];
         }
         self.report
+    }
+
+    /// Whether a pass does not start or end at this path parameter: exactly, or before a turn within the longest step of a period.
+    fn is_off(&self, sample: &PassSample, path: f64, side: f64, end: f64) -> bool {
+        if path == end || !self.oracle.overruns {
+            return path != end;
+        }
+        let (u, v) = self.oracle.swapped(end, side);
+        let Ok(contact) = self.oracle.contact(u, v) else {
+            return true;
+        };
+        let cc_mm = DVec3::from(sample.cc_nm.map(f64::from)) / NM_PER_MM;
+        cc_mm.distance(contact.cc_mm) > STEP_MOST * self.oracle.feed_mm_s * self.oracle.period_s
     }
 
     /// Path parameters where a pass starts and ends.
@@ -150,7 +166,7 @@ impl Verifier {
                 }
             }
         }
-        if path != self.pass_ends(sample.pass)[0] {
+        if self.is_off(sample, path, side, self.pass_ends(sample.pass)[0]) {
             self.report.off_boundary += 1;
         }
         self.report.passes += 1;

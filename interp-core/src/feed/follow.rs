@@ -25,7 +25,8 @@ impl Lead {
     fn count(&mut self, plan: &Plan, cursor: &Cursor, speed: f32, periods: f32) {
         let FeedChange { near, .. } = plan.change;
         let apart = (speed - plan.limits.feed).abs();
-        let is_near = !plan.is_over(cursor) && plan.allows_feed(cursor.interval) && apart < near;
+        let is_near =
+            plan.over <= 1.0 && !plan.is_over(cursor) && plan.allows_feed(cursor.interval) && apart < near;
         self.near = if is_near {
             (self.near + periods).at_most(f32::from(plan.change.lead()))
         } else {
@@ -83,7 +84,7 @@ impl Follower {
         let planned = to_mm(planned_q10 - self.arc_q10);
         self.look_ahead(plan, pace);
         let exact = seconds * plan.limits.feed;
-        if self.change == 0 && planned <= exact {
+        if self.change == 0 && planned <= exact * plan.over {
             self.arc_q10 = planned_q10;
             return planned;
         }

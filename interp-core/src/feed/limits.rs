@@ -118,6 +118,15 @@ impl MotionLimits {
         Self::of(feed, self.axes, self.inverse_chord, self.period)
     }
 
+    /// The same with this share of the jerk.
+    pub(crate) fn with_less_jerk(&self, share: f32) -> Self {
+        let axes = self.axes.map(|axis| AxisMotion {
+            jerk: share * axis.jerk,
+            ..axis
+        });
+        Self::of(self.feed, axes, self.inverse_chord, self.period)
+    }
+
     /// What a plan uses of them.
     pub(crate) fn planned(&self) -> Self {
         let axes = self.axes.map(|axis| AxisMotion {

@@ -29,7 +29,9 @@ mod newton;
 pub(crate) mod pace;
 pub(crate) mod plan;
 pub(crate) mod planner;
+pub(crate) mod road;
 pub(crate) mod stations;
+pub(crate) mod turn;
 mod walk;
 
 #[cfg(test)]

@@ -6,7 +6,7 @@
 //! speed also in the middle of each interval. A place is weighted by its share of the time.
 
 use super::limits::MotionLimits;
-use super::plan::{COEFFICIENTS, Plan};
+use super::plan::{COEFFICIENTS, PINNED, Plan};
 use super::stations::Derivatives;
 use super::walk::{LIST, Lists};
 use crate::math::arith::{inverse_sqrt, sqrt};
@@ -213,6 +213,8 @@ const FACTOR_STEP: f32 = 0.85;
 pub(crate) struct Reach {
     slack: f32,
     loss: f32,
+    /// Rows that do not hold, which the start next to an end at speed may have, do not bound the step.
+    passes: bool,
 }
 
 impl Reach {
@@ -220,17 +222,27 @@ impl Reach {
     pub(crate) const NONE: Self = Self {
         slack: 0.0,
         loss: 0.0,
+        passes: false,
     };
 
     /// No row is used up.
     pub(crate) const FAR: Self = Self {
         slack: 1.0,
         loss: 0.0,
+        passes: false,
     };
 
+    /// Far, for a plan with an end at speed or without.
+    pub(crate) fn far(passes: bool) -> Self {
+        Self { passes, ..Self::FAR }
+    }
+
     fn add(&mut self, slack: f32, loss: f32) {
+        if self.passes && slack <= 0.0 {
+            return;
+        }
         if loss * self.slack > slack * self.loss {
-            *self = Self { slack, loss };
+            (self.slack, self.loss) = (slack, loss);
         }
     }
 
@@ -258,6 +270,10 @@ pub(crate) struct Sweep {
 
 impl Sweep {
     pub(crate) const START: Self = Self::from(0);
+    /// The node.
+    pub(crate) const fn node(&self) -> u16 {
+        self.node
+    }
 
     /// Over the nodes from this one on.
     pub(crate) const fn from(first: u16) -> Self {
@@ -578,7 +594,7 @@ fn scatter(lists: &mut Lists, index: u16, weights: &[f32; 3], slope: f32, bend: 
     add(lists, h2, index, a * c * bend);
 }
 
-/// Solves for the step, in place of the gradient; coefficients before `first` stay.
+/// Solves for the step, in place of the gradient; coefficients before `first` and from `count` on stay.
 #[inline(never)]
 pub(crate) fn solve(lists: &mut Lists, count: u16, first: u16) {
     let [mut l1, mut l2, mut l2_before] = [0.0_f32; 3];
@@ -609,7 +625,7 @@ pub(crate) fn solve(lists: &mut Lists, count: u16, first: u16) {
         put(lists, GRADIENT, index, value);
         (x2, x1) = (x1, value);
     }
-    for index in 0..first {
+    for index in (0..first).chain(count..count + PINNED) {
         put(lists, GRADIENT, index, 0.0);
     }
 }

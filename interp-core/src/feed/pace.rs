@@ -83,7 +83,7 @@ impl Use {
     }
 
     /// The greatest ratio to the room.
-    fn ratio(&self, room: &Self) -> f32 {
+    pub(crate) fn ratio(&self, room: &Self) -> f32 {
         (self.velocity / room.velocity)
             .at_least(self.acceleration / room.acceleration)
             .at_least(self.jerk / room.jerk)
@@ -116,13 +116,13 @@ pub(crate) trait Course {
 
 /// A change of the pace: from these rates to rest at the goal.
 #[derive(Clone, Copy, Debug)]
-struct Change {
+pub(crate) struct Change {
     coefficients: [f32; 6],
     duration: f32,
 }
 
 impl Change {
-    fn new([r, d, e]: [f32; 3], goal: f32, duration: f32) -> Self {
+    pub(crate) fn new([r, d, e]: [f32; 3], goal: f32, duration: f32) -> Self {
         let inverse = 1.0 / duration;
         let (h, d, e) = (goal - r, d * duration, e * duration * duration);
         let [i3, i4, i5] = {
@@ -142,13 +142,22 @@ impl Change {
         }
     }
 
-    fn rates(&self, t: f32) -> [f32; 3] {
+    pub(crate) fn rates(&self, t: f32) -> [f32; 3] {
         let [c0, c1, c2, c3, c4, c5] = self.coefficients;
         [
             c0 + t * (c1 + t * (c2 + t * (c3 + t * (c4 + t * c5)))),
             c1 + t * (2.0 * c2 + t * (3.0 * c3 + t * (4.0 * c4 + t * 5.0 * c5))),
             2.0 * c2 + t * (6.0 * c3 + t * (12.0 * c4 + t * 20.0 * c5)),
         ]
+    }
+}
+
+/// Fractions of the limits that a changing pace may use.
+pub(crate) fn room_of(is_fault: bool, pace: f32) -> &'static Use {
+    match (is_fault, pace > NEARLY_PLANNED) {
+        (true, _) => &ROOM_FAULT,
+        (false, true) => &ROOM_PLANNED,
+        (false, false) => &ROOM,
     }
 }
 
@@ -233,6 +242,39 @@ impl<C: Copy> Pace<C> {
         }
     }
 
+    /// Stops within this time, s.
+    pub(crate) fn stop_within(&mut self, seconds: f32) {
+        self.change = Some(Change::new(self.rates(0.0), 0.0, seconds));
+        (self.time, self.goal, self.wanted) = (0.0, 0.0, 0.0);
+        self.search = None;
+    }
+
+    /// The pace that it comes to.
+    pub(crate) const fn goal(&self) -> f32 {
+        self.goal
+    }
+
+    /// The pace that is wanted.
+    pub(crate) const fn wanted(&self) -> f32 {
+        self.wanted
+    }
+
+    /// Whether the pace changes.
+    pub(crate) const fn is_changing(&self) -> bool {
+        self.change.is_some()
+    }
+
+    /// Moves the places of a search on; it ends where one of them cannot be.
+    pub(crate) fn relocate(&mut self, of: impl Fn(&C) -> Option<C>) {
+        self.search = match self.search {
+            Some(search) => match (of(&search.from), of(&search.at)) {
+                (Some(from), Some(at)) => Some(Search { from, at, ..search }),
+                _ => None,
+            },
+            None => None,
+        };
+    }
+
     /// Whether a search begins with the next piece of work: its place is a good number of periods ahead.
     pub(crate) const fn begins_search(&self) -> bool {
         self.search.is_none()
@@ -293,11 +335,7 @@ impl<C: Copy> Pace<C> {
         let time = (step * f32::from(search.points)).at_most(duration);
         let rates = search.change.rates(time);
         let [pace, _, _] = rates;
-        let room = match (self.is_fault, pace > NEARLY_PLANNED) {
-            (true, _) => &ROOM_FAULT,
-            (false, true) => &ROOM_PLANNED,
-            (false, false) => &ROOM,
-        };
+        let room = room_of(self.is_fault, pace);
         let mut ratio = course.use_at(&search.at, rates, 0.5 * step).ratio(room);
         if !(PACE_MIN..=PACE_MAX).contains(&pace) {
             ratio = ratio.at_least(RATIO_MAX);

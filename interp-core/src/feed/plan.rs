@@ -24,12 +24,27 @@ const JUMP_REACH: f32 = 1.2;
 const INTERVALS_A_STEP: u16 = 4;
 const PARTS_MAX: u8 = 8;
 
+/// Coefficients of the pace next to an end at speed: the interval there has the speed of the end.
+pub(crate) const PINNED: u16 = 3;
+
+/// Distance from an end at speed within which the walk is made slower until the plan can begin at it, nm.
+const NEAR_TURN_NM: u32 = 4_000_000;
+
 /// Where a jump lies: interval, fraction of it in units of 2^-16, and the first of its two stations.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Knot {
     pub(crate) interval: u16,
     pub(crate) part: u16,
     pub(crate) station: u16,
+}
+
+/// The last stop before the end of a plan that goes on: the interval that it begins at, and its duration from the greatest pace, s.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Gate {
+    pub(crate) interval: u16,
+    pub(crate) duration: f32,
+    /// Time from there to the end at pace 1, s.
+    pub(crate) before_end: f32,
 }
 
 /// A place ahead of the tool, and for how long the plan has been near the feed there, in periods at the plan's own pace.
@@ -52,6 +67,14 @@ pub(crate) struct Plan {
     pub(crate) stations: Stations,
     pub(crate) limits: MotionLimits,
     pub(crate) change: FeedChange,
+    /// Speeds at the start and the end, mm/s: those of the apexes of turns, or rests.
+    pub(crate) ends: [f32; 2],
+    /// Greatest pace at which it may be followed.
+    pub(crate) pace_max: f32,
+    /// Use of the feed at the plan's own pace, where it is more than 1.
+    pub(crate) over: f32,
+    /// Where the last stop before the end begins.
+    pub(crate) gate: Gate,
     /// Intervals of the walk, and the time of one at pace 1, s.
     pub(crate) intervals: u16,
     pub(crate) step_s: f32,
@@ -127,6 +150,14 @@ impl Plan {
         stations: Stations::NONE,
         limits: MotionLimits::NONE,
         change: FeedChange::NONE,
+        ends: [0.0; 2],
+        pace_max: 1.0,
+        over: 1.0,
+        gate: Gate {
+            interval: 0,
+            duration: 0.0,
+            before_end: 0.0,
+        },
         intervals: 0,
         step_s: 0.0,
         inverse_step: 0.0,
@@ -244,16 +275,27 @@ pub(crate) struct Cursor {
     pub(crate) interval: u16,
     /// Fraction of the interval.
     pub(crate) x: f32,
+    /// On the plan after the one that is followed.
+    pub(crate) is_next: bool,
     /// Arc at the start of the interval, units of 2^-10 nm.
-    start_q10: i64,
+    pub(super) start_q10: i64,
 }
 
 impl Cursor {
     pub(crate) const START: Self = Self {
         interval: 0,
         x: 0.0,
+        is_next: false,
         start_q10: 0,
     };
+
+    /// The same place on the plan that is followed, of a place on the one after it.
+    pub(crate) fn come_near(&self) -> Option<Self> {
+        self.is_next.then_some(Self {
+            is_next: false,
+            ..*self
+        })
+    }
 
     /// At a node, to within rounding of its part of a cell.
     pub(crate) fn at_node(plan: &Plan, node: u16) -> Self {
@@ -263,6 +305,7 @@ impl Cursor {
         Self {
             interval: node,
             x: 0.0,
+            is_next: false,
             start_q10: start + to_q10(since),
         }
     }
@@ -307,6 +350,41 @@ impl Cursor {
             self.x -= 1.0;
             self.interval += 1;
         }
+    }
+}
+
+impl Plan {
+    /// Whether it goes on in the plan of the next pass.
+    pub(crate) fn goes_on(&self) -> bool {
+        let [_, end] = self.ends;
+        end > 0.0
+    }
+
+    /// Whether a cursor is where the last stop before the end has begun.
+    pub(crate) const fn is_past_gate(&self, cursor: &Cursor) -> bool {
+        cursor.interval >= self.gate.interval
+    }
+
+    /// Time to the gate at pace 1, s.
+    pub(crate) fn before_gate(&self) -> f32 {
+        to_f32(i64::from(self.periods)) * self.limits.period - self.gate.before_end
+    }
+
+    /// Whether an arc is near an end at speed.
+    pub(crate) fn is_near_turn(&self, arc_nm: u32) -> bool {
+        let [start, end] = self.ends;
+        let left = self.stations.length_nm().saturating_sub(arc_nm);
+        (start > 0.0 && arc_nm < NEAR_TURN_NM) || (end > 0.0 && left < NEAR_TURN_NM)
+    }
+
+    /// Time at pace 1 by which a cursor is beyond the end, s.
+    pub(crate) fn beyond(&self, cursor: &Cursor) -> f32 {
+        (cursor.x - 1.0).at_least(0.0) * self.step_s
+    }
+
+    /// Coefficients of the pace that the speeds at the ends fix, at the start and at the end.
+    pub(crate) fn pinned(&self) -> [u16; 2] {
+        self.ends.map(|speed| if speed > 0.0 { PINNED } else { 0 })
     }
 }
 

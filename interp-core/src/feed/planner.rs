@@ -4,6 +4,7 @@ use super::limits::{FeedChange, MotionLimits};
 use super::newton::{self, Reach, SHAPE, Sweep};
 use super::pace::{Course, Use};
 use super::plan::{Cursor, Lead, Plan};
+use super::road::GateSearch;
 use super::walk::{LIST, Lists, Walker};
 use crate::math::arith::{inverse_sqrt, sqrt, truncated};
 use crate::math::number::{Bounded, cube_root};
@@ -25,6 +26,14 @@ const LONG_PERIODS: f32 = 16.0;
 
 /// Share of the greatest factor of the walk's pace that the method starts from.
 const START_SHARE: f32 = 0.85;
+
+/// Share of the caps that a walk uses near an end at speed, so that the method can start from its own pace there.
+const WALK_NEAR_TURN: f32 = 0.25;
+/// Coefficients over which the start goes from the pace near an end at speed to the factor.
+const BLENDED: u16 = 30;
+
+/// Share of the planned jerk that is used in a turn.
+const TURN_JERK: f32 = 0.88;
 
 /// Use of the jerk that the check passes: a plan with more is slowed down.
 const JERK_CHECKED: f32 = 0.998;
@@ -48,6 +57,10 @@ mod cycles {
     /// More for a jump behind the node.
     pub(super) const JUMP: u32 = 3_500;
     pub(super) const CHECK: u32 = 1_850;
+    pub(super) const GATE: u32 = 2_600;
+    pub(super) const GATE_PLACE: u32 = 22_000;
+    /// The start of a plan with an end at speed.
+    pub(super) const BLEND: u32 = 25_000;
     /// Something for each coefficient.
     pub(super) const LIST: u32 = 15_000;
 }
@@ -69,6 +82,8 @@ enum Stage {
     Check,
     /// Slows the plan down where it uses too much.
     Finish,
+    /// Finds the last stop before the end.
+    Gate,
 }
 
 /// How many steps of the method are worth their time.
@@ -88,6 +103,7 @@ pub(crate) struct Planner {
     /// Limits of the path, and what the plan may use of them.
     machine: MotionLimits,
     limits: MotionLimits,
+    turn_limits: MotionLimits,
     /// The first coefficient that is planned: 0, or of the rest of a path that is being followed.
     first: u16,
     /// Whether a plan of the rest holds, and how often it was drawn towards the plan that is followed.
@@ -106,6 +122,7 @@ pub(crate) struct Planner {
     most: Use,
     periods: u32,
     lead: Lead,
+    gate: GateSearch,
 }
 
 impl Planner {
@@ -116,6 +133,7 @@ impl Planner {
         walker: Walker::IDLE,
         machine: MotionLimits::NONE,
         limits: MotionLimits::NONE,
+        turn_limits: MotionLimits::NONE,
         first: 0,
         holds: false,
         drawn: 0,
@@ -129,6 +147,7 @@ impl Planner {
         most: Use::NONE,
         periods: 0,
         lead: Lead::NONE,
+        gate: GateSearch::START,
     };
 
     /// Begins to plan the path of the plan's stations within the plan's limits.
@@ -136,8 +155,9 @@ impl Planner {
         plan.change = FeedChange::new(&plan.limits);
         self.machine = plan.limits;
         self.limits = plan.limits.planned();
+        self.turn_limits = self.limits.with_less_jerk(TURN_JERK);
         self.first = 0;
-        self.walker.begin(plan.limits.period);
+        self.walker.begin(plan.limits.period, WALK_NEAR_TURN);
         self.stage = Stage::Walk;
     }
 
@@ -189,7 +209,10 @@ impl Planner {
             Stage::Solve => cycles::SOLVE,
             Stage::Reach => cycles::REACH + jump,
             Stage::Check => cycles::CHECK,
+            Stage::Scale if plan.pinned() != [0; 2] => cycles::BLEND,
             Stage::Weigh | Stage::Scale | Stage::Take | Stage::Finish => cycles::LIST,
+            Stage::Gate if self.gate.is_placed() => cycles::GATE,
+            Stage::Gate => cycles::GATE_PLACE,
             Stage::Done => 0,
         }
     }
@@ -209,8 +232,12 @@ impl Planner {
                 Stage::Factor
             }
             Stage::Factor => {
-                let factor = newton::factor(plan, &self.limits, &mut self.sweep);
-                self.factor = factor.at_most(self.factor);
+                let limits = limits_at(plan, &self.sweep, [&self.limits, &self.turn_limits]);
+                let factor = newton::factor(plan, limits, &mut self.sweep);
+                let [cell, _] = plan.node(self.sweep.node());
+                if !plan.is_near_turn(plan.stations.get(cell).arc_nm) {
+                    self.factor = factor.at_most(self.factor);
+                }
                 if self.sweep.next(plan) {
                     Stage::Scale
                 } else {
@@ -223,13 +250,17 @@ impl Planner {
                 let lasts = plan.step_s / (self.weight * sqrt(factor) * plan.limits.period);
                 self.effort = if self.walker.is_short {
                     Effort::Little
-                } else if lasts > LONG_PERIODS * nodes {
+                } else if plan.pinned() == [0; 2] && lasts > LONG_PERIODS * nodes {
                     Effort::Much
                 } else {
                     Effort::Usual
                 };
-                for pace in &mut plan.draft {
-                    *pace *= factor;
+                if plan.pinned() == [0; 2] {
+                    for pace in &mut plan.draft {
+                        *pace *= factor;
+                    }
+                } else {
+                    scale(plan, factor);
                 }
                 newton::clear(&mut self.lists);
                 Stage::Assemble
@@ -240,9 +271,10 @@ impl Planner {
                     .get(usize::from(self.step))
                     .copied()
                     .unwrap_or(1e-3);
+                let limits = limits_at(plan, &self.sweep, [&self.limits, &self.turn_limits]);
                 newton::assemble(
                     plan,
-                    &self.limits,
+                    limits,
                     &mut self.lists,
                     &mut self.sweep,
                     barrier,
@@ -255,12 +287,14 @@ impl Planner {
                 }
             }
             Stage::Solve => {
-                newton::solve(&mut self.lists, plan.intervals + 2, self.first);
-                self.reach = Reach::FAR;
+                let [start, end] = plan.pinned();
+                newton::solve(&mut self.lists, plan.intervals + 2 - end, self.first.max(start));
+                self.reach = Reach::far(plan.pinned() != [0; 2]);
                 Stage::Reach
             }
             Stage::Reach => {
-                newton::extend(plan, &self.limits, &self.lists, &mut self.sweep, &mut self.reach);
+                let limits = limits_at(plan, &self.sweep, [&self.limits, &self.turn_limits]);
+                newton::extend(plan, limits, &self.lists, &mut self.sweep, &mut self.reach);
                 if self.sweep.next(plan) {
                     Stage::Take
                 } else {
@@ -279,7 +313,19 @@ impl Planner {
             }
             Stage::Finish => {
                 self.slow(plan, least);
-                Stage::Done
+                self.gate = GateSearch::START;
+                if plan.goes_on() { Stage::Gate } else { Stage::Done }
+            }
+            Stage::Gate => {
+                if self.gate.work(plan) {
+                    // The next plan has to be complete before the gate.
+                    let before = plan.before_gate() / plan.limits.period;
+                    let pace = before / to_f32(least).at_least(1.0);
+                    plan.pace_max = plan.pace_max.at_most(pace.at_least(0.1));
+                    Stage::Done
+                } else {
+                    Stage::Gate
+                }
             }
             Stage::Done => Stage::Done,
         };
@@ -387,7 +433,12 @@ impl Planner {
             .at_least(1.0);
         plan.periods = u32::try_from(truncated(to_f32(self.periods) * factor)).unwrap_or(0);
         plan.lead = self.lead;
-        if factor > 1.0 {
+        (plan.pace_max, plan.over) = (1.0, 1.0);
+        let is_between = plan.pinned() != [0; 2];
+        if is_between {
+            plan.pace_max = 1.0 / factor;
+            plan.over = feed.at_least(1.0);
+        } else if factor > 1.0 {
             plan.lead.near = 0.0;
             let share = 1.0 / (factor * factor);
             for pace in &mut plan.draft {
@@ -395,6 +446,48 @@ impl Planner {
             }
         }
         plan.pace = plan.draft;
+    }
+}
+
+/// The limits at the node of a sweep: in a turn, where the path changes from node to node, the plan uses less of the jerk.
+fn limits_at<'a>(plan: &Plan, sweep: &Sweep, [usual, in_turn]: [&'a MotionLimits; 2]) -> &'a MotionLimits {
+    if plan.pinned() == [0; 2] {
+        return usual;
+    }
+    let [cell, _] = plan.node(sweep.node());
+    if plan.is_near_turn(plan.stations.get(cell).arc_nm) {
+        in_turn
+    } else {
+        usual
+    }
+}
+
+/// Multiplies the pace of the walk, but near an end at speed.
+fn scale(plan: &mut Plan, factor: f32) {
+    let count = plan.intervals + 2;
+    let [at_start, at_end] = plan.ends.map(|speed| speed > 0.0);
+    let is_near = |index: u16| {
+        let [cell, _] = plan.node(index.min(plan.intervals));
+        plan.is_near_turn(plan.stations.get(cell).arc_nm)
+    };
+    let from = if at_start {
+        (0..count).find(|index| !is_near(*index)).unwrap_or(count)
+    } else {
+        0
+    };
+    let to = if at_end {
+        (0..count).rev().find(|index| !is_near(*index)).unwrap_or(0)
+    } else {
+        count
+    };
+    for (index, pace) in (0..count).zip(&mut plan.draft) {
+        let share = |is_at: bool, away: u16| {
+            let by = (f32::from(away) * (1.0 / f32::from(BLENDED))).at_most(1.0);
+            if is_at { by * by * (3.0 - 2.0 * by) } else { 1.0 }
+        };
+        let share =
+            share(at_start, index.saturating_sub(from)).at_most(share(at_end, to.saturating_sub(index)));
+        *pace *= 1.0 + share * (factor - 1.0);
     }
 }
 

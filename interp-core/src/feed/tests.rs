@@ -125,6 +125,7 @@ fn limits(feed: f32) -> MotionLimits {
         acceleration_mm_s2: [1000.0, 1000.0, 500.0],
         jerk_mm_s3: [20_000.0, 20_000.0, 10_000.0],
         chord_mm: 1.0,
+        overrun_mm: 0.0,
         ..AxisLimits::default()
     };
     MotionLimits::new(&axes, feed, T as f32)

@@ -3,7 +3,7 @@
 
 use super::limits::{MotionLimits, SLOPE_MIN};
 use super::plan::{KNOTS_MAX, Knot, NODES_MAX, NODES_MIN, Plan};
-use super::stations::{Derivatives, STATIONS_MAX, between};
+use super::stations::{Derivatives, STATIONS_MAX, Station, between};
 use super::{MM_PER_Q10, to_q10};
 use crate::math::arith::{sqrt, truncated};
 use crate::math::number::{Bounded, cube_root, to_f32};
@@ -24,10 +24,16 @@ const LONG: f32 = 20.0;
 const SPACING_MAX: f32 = 0.1;
 /// Time between nodes that is worth its planning, s.
 const SPACING_WORTH: f32 = 4e-3;
+/// Longest mean of a walk with an end at speed, s, and the time for which it has that speed, as a multiple of it.
+const MEAN_MAX: f32 = 0.05;
+const FLAT: f32 = 1.0;
 /// Periods that the rest of the planning takes: for a node, for a place of the check, and for what is left.
 const PERIODS_A_NODE: f32 = 3.2;
 const PERIODS_A_PLACE: f32 = 0.07;
 const PERIODS_A_PLAN: f32 = 55.0;
+/// The same for the last stop before a turn, and the share of the walk's time that a plan with an end at speed takes.
+const PERIODS_A_STOP: f32 = 150.0;
+const WALKED: f32 = 0.75;
 /// Bisections of the spacing.
 const BISECTIONS: u8 = 12;
 /// Tries to coarsen the ends.
@@ -49,6 +55,8 @@ enum Stage {
     Done,
     Caps,
     Jumps,
+    /// The speed of an end that is not a rest is held.
+    Flatten,
     Backwards,
     Forwards,
     Busy,
@@ -108,6 +116,10 @@ pub(crate) struct Walker {
     sum_q10: i64,
     sum_s: f32,
     coarsenings: u8,
+    /// Speeds at the ends, mm/s, and nodes of the mean where one is not a rest.
+    speeds: [f32; 2],
+    mean: u16,
+    tightened: f32,
 }
 
 /// Lists of this stage.
@@ -144,10 +156,15 @@ impl Walker {
         sum_q10: 0,
         sum_s: 0.0,
         coarsenings: 0,
+        speeds: [0.0; 2],
+        mean: 0,
+        tightened: 1.0,
     };
 
-    pub(crate) const fn begin(&mut self, period: f32) {
+    /// `tightened`: share of the acceleration near an end at speed.
+    pub(crate) const fn begin(&mut self, period: f32, tightened: f32) {
         *self = Self::IDLE;
+        self.tightened = tightened;
         // Nodes much closer together than periods would not be seen.
         self.finest = 0.5 * period;
         self.stage = Stage::Caps;
@@ -160,7 +177,7 @@ impl Walker {
             Stage::Caps => 18_100,
             Stage::Jumps | Stage::Means | Stage::Knots => 10_500,
             Stage::Backwards | Stage::Busy => 25_000,
-            Stage::Forwards => 17_000,
+            Stage::Forwards | Stage::Flatten => 17_000,
             Stage::TryEven | Stage::TryGrowing | Stage::Coarsen | Stage::Bisect(_) | Stage::Times => 25_500,
             Stage::Increments => 21_500,
             Stage::Nodes => 15_000,
@@ -180,9 +197,16 @@ impl Walker {
         let count = plan.stations.count();
         self.stage = match self.stage {
             Stage::Caps => {
+                self.speeds = plan.ends;
                 let end = count.min(self.index + STATIONS_A_PORTION);
                 for station in self.index..end {
-                    self.cap(lists, station, &plan.stations.get(station).q, limits);
+                    let Station { arc_nm, q } = plan.stations.get(station);
+                    let share = if plan.is_near_turn(*arc_nm) {
+                        self.tightened
+                    } else {
+                        1.0
+                    };
+                    self.cap(lists, station, q, limits, share);
                 }
                 self.next(end, end == count, Stage::Caps, Stage::Jumps)
             }
@@ -196,7 +220,16 @@ impl Walker {
                     }
                     station += 1;
                 }
-                self.next(station, station >= count, Stage::Jumps, Stage::Backwards)
+                let next = if self.is_from_rest_to_rest() {
+                    Stage::Backwards
+                } else {
+                    Stage::Flatten
+                };
+                self.next(station, station >= count, Stage::Jumps, next)
+            }
+            Stage::Flatten => {
+                self.flatten(lists, plan);
+                Stage::Backwards
             }
             Stage::Backwards => {
                 self.backwards(lists, plan);
@@ -269,8 +302,10 @@ impl Walker {
                 for node in self.index..end {
                     self.increment(lists, plan, node);
                 }
-                if end == self.times {
+                if end == self.times && self.is_from_rest_to_rest() {
                     self.begin_means(plan);
+                } else if end == self.times {
+                    self.begin_means_at_speed(lists, plan);
                 }
                 self.next(end, end == self.times, Stage::Increments, Stage::Means)
             }
@@ -278,7 +313,11 @@ impl Walker {
                 let count = plan.intervals + 2;
                 let end = count.min(self.index + NODES_A_PORTION);
                 for index in self.index..end {
-                    self.mean(lists, plan, index);
+                    if self.is_from_rest_to_rest() {
+                        self.mean(lists, plan, index);
+                    } else {
+                        self.mean_at_speed(lists, plan, index);
+                    }
                 }
                 if end == count {
                     (self.cell, self.sum_q10) = (0, 0);
@@ -316,7 +355,7 @@ impl Walker {
     }
 
     /// Caps of speed and acceleration at a station.
-    fn cap(&mut self, lists: &mut Lists, station: u16, q: &Derivatives, limits: &MotionLimits) {
+    fn cap(&mut self, lists: &mut Lists, station: u16, q: &Derivatives, limits: &MotionLimits, share: f32) {
         let mut square = 1.0 / limits.inverse_speed_sqr(q);
         let mut jerk = f32::MAX;
         for (axis, [first, second, third]) in limits.axes.iter().zip(q) {
@@ -338,6 +377,13 @@ impl Walker {
         self.acceleration = self.acceleration.at_least(accel);
         self.speed = self.speed.at_least(speed);
         let is_capped = speed < 0.999 * limits.feed;
+        let [start, end] = self.speeds;
+        let least = square.at_most(start.at_least(end) * start.at_least(end));
+        let (square, accel) = if share < 1.0 {
+            ((share * square).at_least(least), share * accel)
+        } else {
+            (square, accel)
+        };
         put(lists, SPEED_SQR, station, square);
         put(lists, ACCEL, station, if is_capped { -accel } else { accel });
     }
@@ -373,14 +419,65 @@ impl Walker {
 
     fn backwards(&self, lists: &mut Lists, plan: &Plan) {
         let last = plan.stations.count().saturating_sub(1);
-        put(lists, SPEED_SQR, 0, 0.0);
-        put(lists, SPEED_SQR, last, 0.0);
+        let [start, end] = self.speeds;
+        put(lists, SPEED_SQR, 0, start * start);
+        put(lists, SPEED_SQR, last, end * end);
         for cell in (0..last).rev() {
             let reach =
                 get(lists, SPEED_SQR, cell + 1) + 2.0 * self.accel(lists, cell) * plan.stations.cell_mm(cell);
             let square = get(lists, SPEED_SQR, cell).at_most(reach);
+            let square = self.unless_held(plan, cell, square);
             put(lists, SPEED_SQR, cell, square);
         }
+    }
+
+    /// The square of the speed of an end that is not a rest, at a station where it is held because the mean reaches there; 0 elsewhere.
+    fn held(&self, plan: &Plan, station: u16) -> f32 {
+        let [start, end] = self.speeds;
+        let stations = &plan.stations;
+        let time = FLAT * (self.acceleration / self.jerk).at_most(MEAN_MAX);
+        // With the first station beyond, so that the speed is held over the whole of the cell before it.
+        let before = stations.get(station.saturating_sub(1)).arc_nm;
+        let behind = stations
+            .get((station + 1).min(stations.count().saturating_sub(1)))
+            .arc_nm;
+        if start > 0.0 && between(0, before) < start * time {
+            start * start
+        } else if end > 0.0 && between(behind, stations.length_nm()) < end * time {
+            end * end
+        } else {
+            0.0
+        }
+    }
+
+    /// Holds the speeds of the ends that are not rests.
+    fn flatten(&self, lists: &mut Lists, plan: &Plan) {
+        for station in 0..plan.stations.count() {
+            let held = self.held(plan, station);
+            if held > 0.0 {
+                put(lists, SPEED_SQR, station, held);
+            }
+        }
+    }
+
+    /// The square of a speed where it is not held.
+    fn unless_held(&self, plan: &Plan, station: u16, square: f32) -> f32 {
+        if self.is_from_rest_to_rest() {
+            square
+        } else {
+            square.at_least(self.held(plan, station))
+        }
+    }
+
+    /// Whether the walk is from rest to rest.
+    fn is_from_rest_to_rest(&self) -> bool {
+        self.speeds == [0.0; 2]
+    }
+
+    /// Nodes by which the mean lengthens the walk: half of it at each rest.
+    fn lengthening(&self, mean: u16) -> u16 {
+        let [start, end] = self.speeds.map(|speed| u16::from(speed == 0.0));
+        (start + end) * mean.div_ceil(2)
     }
 
     /// Accelerations and times from a station on, up to another.
@@ -392,6 +489,7 @@ impl Walker {
             let here = get(lists, SPEED_SQR, cell);
             let reach = here + 2.0 * self.accel(lists, cell) * length;
             let there = get(lists, SPEED_SQR, cell + 1).at_most(reach);
+            let there = self.unless_held(plan, cell + 1, there);
             put(lists, SPEED_SQR, cell + 1, there);
             time += Motion::of(here, there, length, self.accel(lists, cell)).duration;
             put(lists, TIME, cell + 1, time);
@@ -405,8 +503,11 @@ impl Walker {
         let length = between(0, plan.stations.length_nm());
         self.mean_s = (self.acceleration / self.jerk)
             .at_most(1.2 * sqrt(length / time / self.jerk))
-            .at_most(cube_root(0.5 * length / self.jerk))
-            .at_least(4.0 * self.finest);
+            .at_most(cube_root(0.5 * length / self.jerk));
+        if !self.is_from_rest_to_rest() {
+            self.mean_s = self.mean_s.at_most(MEAN_MAX);
+        }
+        self.mean_s = self.mean_s.at_least(4.0 * self.finest);
     }
 
     /// As many intervals as are worth their planning, and no more than leave the plan longer than its planning.
@@ -418,14 +519,20 @@ impl Walker {
         let fewest = NODES_MIN.min(most);
         self.intervals = wanted.clamp(fewest, most);
         if least > 0 {
-            let lasts = (time + self.mean_s) / limits.period;
-            let left = lasts * (1.0 - PERIODS_A_PLACE) - PERIODS_A_PLAN - to_f32(i64::from(least));
+            let (lasts, plan) = if self.is_from_rest_to_rest() {
+                (time + self.mean_s, PERIODS_A_PLAN)
+            } else {
+                (WALKED * time, PERIODS_A_PLAN + PERIODS_A_STOP)
+            };
+            let lasts = lasts / limits.period;
+            let left = lasts * (1.0 - PERIODS_A_PLACE) - plan - to_f32(i64::from(least));
             let planned = whole(left / PERIODS_A_NODE);
             self.is_short = planned < fewest;
             self.intervals = self.intervals.min(planned).max(fewest);
         }
         self.growth = if time > LONG { GROWTH_LONG } else { GROWTH };
-        self.ends = (self.mean_s / 6.0)
+        let parts = if self.is_from_rest_to_rest() { 6.0 } else { 16.0 };
+        self.ends = (self.mean_s / parts)
             .at_least(self.finest)
             .at_least(time / (4000.0 * f32::from(self.intervals)));
     }
@@ -468,9 +575,17 @@ impl Walker {
 
     /// Nodes left for the mean over `n` of them.
     fn room(&self, spacing: f32) -> u16 {
+        let mean = self.mean_at(spacing);
+        if self.is_from_rest_to_rest() {
+            return self.intervals.saturating_sub(mean);
+        }
+        (self.intervals + 1).saturating_sub(self.lengthening(mean | 1))
+    }
+
+    /// Nodes that the mean is over, at a spacing at the ends.
+    fn mean_at(&self, spacing: f32) -> u16 {
         let mean = truncated(self.mean_s / spacing.at_most(self.ends) + 0.5).max(2);
-        self.intervals
-            .saturating_sub(u16::try_from(mean).unwrap_or(u16::MAX))
+        u16::try_from(mean).unwrap_or(u16::MAX).min(self.intervals)
     }
 
     fn fits(&self, lists: &Lists, spacing: f32, growth: f32) -> bool {
@@ -506,7 +621,11 @@ impl Walker {
     fn times(&mut self, lists: &mut Lists, plan: &mut Plan) {
         let [spacing, growth] = self.spacing(self.high);
         let mut nodes = self.nodes_at(spacing, growth);
-        let most = self.intervals - 2;
+        let most = if self.is_from_rest_to_rest() {
+            self.intervals - 2
+        } else {
+            self.room(spacing)
+        };
         let mut last = 0.0;
         while let Some(time) = nodes.next(lists) {
             put(lists, NODES, nodes.count - 1, time);
@@ -518,8 +637,16 @@ impl Walker {
         self.times = nodes.count;
         self.scale = self.duration / last.at_least(1e-9);
         (self.cell, self.before) = (0, (0, 0.0));
-        plan.intervals = self.intervals;
         plan.step_s = spacing.at_most(self.ends);
+        if !self.is_from_rest_to_rest() {
+            // The interval is as long as the spacing at an end, so that the walk has the speed there.
+            self.mean = self.mean_at(spacing) | 1;
+            self.intervals = (self.times - 1)
+                .saturating_add(self.lengthening(self.mean))
+                .min(NODES_COUNT);
+            plan.step_s *= self.scale;
+        }
+        plan.intervals = self.intervals;
         plan.inverse_step = 1.0 / plan.step_s;
     }
 
@@ -533,8 +660,15 @@ impl Walker {
         while self.cell + 1 < last && get(lists, TIME, self.cell + 1) <= time {
             self.cell += 1;
         }
+        let [start, end] = self.speeds.map(|speed| speed * plan.step_s);
+        let flat = self.mean / 2 + 2;
         let place = if node + 1 == self.times {
             (plan.stations.length_nm(), 0.0)
+        } else if start > 0.0 && node <= flat {
+            (0, f32::from(node) * start)
+        } else if end > 0.0 && node + 1 + flat >= self.times {
+            let left = f32::from(self.times - 1 - node) * end;
+            (plan.stations.length_nm(), -left)
         } else {
             let since = time - get(lists, TIME, self.cell);
             let [here, there] = [self.cell, self.cell + 1].map(|station| get(lists, SPEED_SQR, station));
@@ -550,14 +684,86 @@ impl Walker {
             lists,
             BUSY,
             previous,
-            (between(from, to) + (to_mm - from_mm)).at_least(0.0),
+            self.flat_increment(plan, previous)
+                .unwrap_or((between(from, to) + (to_mm - from_mm)).at_least(0.0)),
         );
         self.before = place;
     }
 
+    /// The exact length of an increment at the speed of an end.
+    fn flat_increment(&self, plan: &Plan, index: u16) -> Option<f32> {
+        let [start, end] = self.speeds;
+        let flat = self.mean / 2 + 2;
+        if start > 0.0 && index < flat {
+            Some(start * plan.step_s)
+        } else if end > 0.0 && index + 1 + flat >= self.times {
+            Some(end * plan.step_s)
+        } else {
+            None
+        }
+    }
+
     /// Nodes that the mean is over.
     const fn mean_nodes(&self) -> u16 {
-        self.intervals - self.times
+        if self.mean > 0 {
+            self.mean
+        } else {
+            self.intervals - self.times
+        }
+    }
+
+    /// An increment and its time, also beyond the ends, where the speed is that of the end.
+    fn step_of(&self, lists: &Lists, plan: &Plan, index: i32) -> (i64, f32) {
+        let [start, end] = self.speeds.map(|speed| to_q10(speed * plan.step_s));
+        match u16::try_from(index) {
+            Err(_) => (start, plan.step_s),
+            Ok(index) if index + 1 >= self.times => (end, plan.step_s),
+            Ok(index) => (
+                to_q10(get(lists, BUSY, index)),
+                self.scale * (get(lists, NODES, index + 1) - get(lists, NODES, index)),
+            ),
+        }
+    }
+
+    /// Increments of the mean before the first that the walk has where it begins at speed.
+    fn skipped(&self) -> i32 {
+        let [start, _] = self.speeds;
+        if start > 0.0 {
+            i32::from(self.mean + 1) / 2
+        } else {
+            0
+        }
+    }
+
+    /// Sums of the mean before the first coefficient.
+    fn begin_means_at_speed(&mut self, lists: &Lists, plan: &Plan) {
+        let n = i32::from(self.mean);
+        let newest = self.skipped() - 3;
+        (self.sum_q10, self.sum_s) = (0, 0.0);
+        for index in newest + 1 - n..=newest {
+            let (q10, seconds) = self.step_of(lists, plan, index);
+            self.sum_q10 += q10;
+            self.sum_s += seconds;
+        }
+    }
+
+    /// A coefficient of a walk with an end at speed.
+    fn mean_at_speed(&mut self, lists: &Lists, plan: &mut Plan, index: u16) {
+        let n = i32::from(self.mean);
+        let newest = i32::from(index) + self.skipped() - 2;
+        let (in_q10, in_s) = self.step_of(lists, plan, newest);
+        let (out_q10, out_s) = self.step_of(lists, plan, newest - n);
+        self.sum_q10 += in_q10 - out_q10;
+        self.sum_s += in_s - out_s;
+        let inverse = 1.0 / f32::from(self.mean);
+        let [start, end] = plan.pinned();
+        let is_pinned = index < start || index + end >= plan.intervals + 2;
+        let at = usize::from(index);
+        if let (Some(walk), Some(pace)) = (plan.walk.get_mut(at), plan.draft.get_mut(at)) {
+            *walk = to_f32(self.sum_q10) * MM_PER_Q10 * inverse;
+            let ratio = plan.step_s / (self.sum_s * inverse).at_least(1e-9);
+            *pace = if is_pinned { 1.0 } else { ratio * ratio };
+        }
     }
 
     fn begin_means(&mut self, plan: &Plan) {

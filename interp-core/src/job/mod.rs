@@ -38,6 +38,9 @@ pub(crate) const STEP_MAX_MM: f32 = 2.0;
 /// Maximum cells of a path in the look-ahead, and so maximum patches of a pass of a job with axis limits.
 pub(crate) const CELLS_MAX: usize = 256;
 
+/// Greatest overrun of a turn, mm.
+pub const OVERRUN_MAX_MM: f32 = 100.0;
+
 /// Words of the span widths at the start of a job's data.
 pub(crate) fn width_words(path_spans: u16, side_spans: u16) -> u32 {
     u32::from(path_spans) + u32::from(side_spans)
@@ -128,6 +131,8 @@ pub struct AxisLimits {
     pub plunge_mm: f32,
     /// Safe height (z of the tool centre), nm, above every point of the surface; within the travel.
     pub safe_z_nm: i32,
+    /// Greatest length by which a turn of a zigzag job leaves the surface beyond its boundary, mm, 0 to 100; 0 for a standstill at each pass end.
+    pub overrun_mm: f32,
 }
 
 /// A job's parameters without its surface data. Loading checks their ranges.

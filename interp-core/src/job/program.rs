@@ -2,7 +2,9 @@
 
 use crate::command::OVERRIDE_MAX;
 use crate::fault::{Fault, FaultKind, Result};
-use crate::job::{AxisLimits, CELLS_MAX, Header, SPANS_MAX, STEP_MAX_MM, SurfaceKind, width_words};
+use crate::job::{
+    AxisLimits, CELLS_MAX, Header, OVERRUN_MAX_MM, SPANS_MAX, STEP_MAX_MM, SurfaceKind, width_words,
+};
 use crate::math::number::nm_to_mm;
 use crate::surface::{
     POLYNOMIAL_WORDS, PolynomialRecord, RATIONAL_WORDS, REVOLVED_WORDS, RationalRecord, RevolvedRecord,
@@ -96,6 +98,9 @@ fn check_axes(header: &Header, axes: &AxisLimits) -> Result<()> {
     }
     if !(axes.plunge_mm >= 0.0 && axes.plunge_mm <= 1e3) {
         return bad(axes.plunge_mm);
+    }
+    if !(axes.overrun_mm >= 0.0 && axes.overrun_mm <= OVERRUN_MAX_MM) {
+        return bad(axes.overrun_mm);
     }
     // The feed at the maximum override has to fit the step of a period.
     if OVERRIDE_MAX * header.feed_mm_s * header.period_s > STEP_MAX_MM {

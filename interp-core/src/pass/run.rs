@@ -270,6 +270,28 @@ impl Run {
         Ok(())
     }
 
+    /// Prepares the pass that a turn leads to, at its start, without a sample.
+    ///
+    /// # Errors
+    /// As [`Self::advance`].
+    pub(crate) fn arrive(
+        &mut self,
+        job: &Job<'_>,
+        pass: u32,
+        side: SpanParameter,
+        interval: f32,
+    ) -> Result<()> {
+        self.enter_pass(job, pass, side)?;
+        let ticks = self.travel.ticks;
+        let mut start = Sample::START;
+        self.sample(&mut start)?;
+        self.travel.ticks = ticks;
+        self.first_offset = self.travel.offset;
+        self.last_interval = interval;
+        self.last_feed_factor = 0.0;
+        Ok(())
+    }
+
     /// Advances by `feed_factor` of a period's arc along the pass.
     ///
     /// # Errors

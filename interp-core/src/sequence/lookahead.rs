@@ -4,8 +4,10 @@
 //! Stations depend on the surface, not on the samples, so holds and overrides do not change the passes.
 
 use crate::fault::{Fault, FaultKind, Result};
+use crate::feed::limits::MotionLimits;
 use crate::feed::plan::Plan;
 use crate::feed::stations::{Derivatives, STATIONS_MAX, Station, WINDOW, Window};
+use crate::feed::turn::{self, Turn, TurnEnd};
 use crate::feed::{MM_PER_Q10, Q10_BITS, to_q10};
 use crate::job::program::Job;
 use crate::job::{AxisLimits, Pattern, Spacing};
@@ -35,6 +37,8 @@ const NO_JUMP: f32 = 4e-6;
 const STATIONS: u16 = 168;
 const PATCHES: u16 = STATIONS / 2;
 const _: () = assert!(STATIONS as usize == STATIONS_MAX);
+/// Most patches of a pass with turns: both ends of each are kept.
+const SPANS_TURNED: u16 = (STATIONS - 2 * turn::STATIONS) / 2;
 
 /// The plan of one pass: its feed, its ends, and the pass after it.
 #[derive(Clone, Debug)]
@@ -56,6 +60,12 @@ pub(crate) struct PassPlan {
     pub(crate) interval: f32,
     /// The pass after this one.
     pub(crate) next: Option<SpanParameter>,
+    /// Stations of half the turn before the pass, and its length, units of 2^-10 nm.
+    head: u16,
+    pub(crate) head_q10: i64,
+    /// The turn to the next pass, if there is one, and the arc at which it begins, units of 2^-10 nm.
+    pub(crate) tail: Turn,
+    pub(crate) tail_q10: i64,
 }
 
 impl PassPlan {
@@ -72,6 +82,10 @@ impl PassPlan {
         faces_up: [false; 2],
         interval: 0.0,
         next: None,
+        head: 0,
+        head_q10: 0,
+        tail: Turn::NONE,
+        tail_q10: 0,
     };
 
     /// Cells of a patch between kept stations, and the fraction of the patch per cell.
@@ -87,7 +101,7 @@ impl PassPlan {
         if group * self.group != patch {
             return None;
         }
-        let station = group * (self.cells + 1) + within;
+        let station = self.head + group * (self.cells + 1) + within;
         Some(i64::from(self.plan.stations.get(station).arc_nm) << Q10_BITS)
     }
 }
@@ -102,6 +116,17 @@ enum Task {
     /// Run the step-over estimator, with this number of evaluations left at the station.
     Estimate(u8),
     Close,
+    /// Append a station of the half of the turn before the pass.
+    Head(u16),
+    /// Begin to look at the start of the next pass, at one of its stations.
+    Across,
+    Start,
+    /// Find the turn to the next pass, in rounds.
+    Turn(u8),
+    /// Bound the turn's speed by a station of each half.
+    Bound(u16),
+    /// Append a station of the half of the turn behind the pass.
+    Tail(u16),
     Done,
 }
 
@@ -111,6 +136,9 @@ mod cycles {
 
     pub(super) const DERIVATIVES: u32 = 3_400;
     pub(super) const CLOSE: u32 = 1_700;
+    pub(super) const HALF: u32 = 1_500;
+    pub(super) const BOUND: u32 = 5_000;
+    pub(super) const TURN: u32 = 15_000;
 }
 
 /// The look-ahead over one pass.
@@ -139,6 +167,12 @@ pub(crate) struct Lookahead {
     arc_mm: f32,
     start_q10: i64,
     maximum: PassMaximum,
+    /// The turn before the pass; then the one behind it, its ends and the length that is tried.
+    turn: Turn,
+    ends: [TurnEnd; 2],
+    length: f32,
+    /// Passes for which no turn is tried, because the last one slowed its pass down.
+    without: u8,
 }
 
 impl Lookahead {
@@ -165,12 +199,17 @@ impl Lookahead {
         arc_mm: 0.0,
         start_q10: 0,
         maximum: PassMaximum::NONE,
+        turn: Turn::NONE,
+        ends: [TurnEnd::NONE; 2],
+        length: 0.0,
+        without: 0,
     };
 
     /// Resets to the state before the first pass.
     pub(crate) const fn restart(&mut self) {
         self.step_over.restart();
         self.patch_mm = 0.0;
+        self.without = 0;
         self.task = Task::Done;
     }
 
@@ -189,12 +228,24 @@ impl Lookahead {
             Task::Estimate(0) => cycles::NEXT,
             Task::Estimate(_) => cycles::ESTIMATE,
             Task::Close => cycles::CLOSE,
+            Task::Across => cycles::PATCH,
+            Task::Start => cycles::STATION,
+            Task::Turn(_) => cycles::TURN,
+            Task::Head(_) | Task::Tail(_) => cycles::HALF,
+            Task::Bound(_) => cycles::BOUND,
             Task::Done => 0,
         }
     }
 
     /// Begins to look over this pass.
-    pub(crate) fn begin(&mut self, job: &Job<'_>, pass: u32, side: SpanParameter, out: &mut PassPlan) {
+    pub(crate) fn begin(
+        &mut self,
+        job: &Job<'_>,
+        pass: u32,
+        side: SpanParameter,
+        head: &Turn,
+        out: &mut PassPlan,
+    ) {
         let spans = job.header.path_spans;
         let reversed = job.header.pattern == Pattern::Zigzag && pass % 2 == 1;
         self.line = PassPosition {
@@ -202,9 +253,15 @@ impl Lookahead {
             reversed,
             span: if reversed { spans.saturating_sub(1) } else { 0 },
         };
-        self.task = Task::Patch;
+        let has_head = head.exists();
+        self.turn = *head;
+        self.task = if has_head { Task::Head(0) } else { Task::Patch };
         (self.station, self.patches) = (0, 0);
-        self.start_q10 = 0;
+        self.start_q10 = if has_head { head.half_q10() } else { 0 };
+        out.head = if has_head { turn::STATIONS } else { 0 };
+        out.head_q10 = self.start_q10;
+        out.tail = Turn::NONE;
+        out.plan.ends = [head.speed, 0.0];
         self.maximum = PassMaximum::NONE;
         self.step_over.begin();
         out.plan.stations.clear();
@@ -226,7 +283,7 @@ impl Lookahead {
                 self.patch.collapse(job, &self.line)?;
                 out.point |= self.patch.point;
                 self.step_over.begin_patch();
-                self.choose_cells(job.header.path_spans.max(1), out);
+                self.choose_cells(job, out);
                 self.window = Window::EMPTY;
                 self.arc_mm = 0.0;
                 Task::Station
@@ -252,7 +309,36 @@ impl Lookahead {
             }
             Task::Close => {
                 self.close(job, out)?;
-                Task::Done
+                let rests = self.without > 0;
+                self.without = self.without.saturating_sub(1);
+                if !rests && self.may_turn(job, axes, out) {
+                    Task::Across
+                } else {
+                    Task::Done
+                }
+            }
+            Task::Head(index) => {
+                self.push_half(true, index, out);
+                if index + 1 < turn::STATIONS {
+                    Task::Head(index + 1)
+                } else {
+                    Task::Patch
+                }
+            }
+            Task::Across => self.look_across(job, out),
+            Task::Start => self.visit_start(axes),
+            Task::Turn(round) => self.find_turn(job, axes, round),
+            Task::Bound(index) => self.bound_turn(job, axes, index, out),
+            Task::Tail(index) => {
+                self.push_half(false, index, out);
+                if index + 1 < turn::STATIONS {
+                    Task::Tail(index + 1)
+                } else {
+                    out.tail = self.turn;
+                    let [start, _] = out.plan.ends;
+                    out.plan.ends = [start, self.turn.speed];
+                    Task::Done
+                }
             }
             Task::Done => Task::Done,
         };
@@ -283,12 +369,17 @@ impl Lookahead {
 
     /// Chooses the cells of a patch: those between kept stations by the number of patches and their length, the same for the whole pass; those
     /// that are looked at by the length of this patch.
-    fn choose_cells(&mut self, spans: u16, out: &mut PassPlan) {
+    fn choose_cells(&mut self, job: &Job<'_>, out: &mut PassPlan) {
+        let spans = job.header.path_spans.max(1);
         let whole = |value: f32| u16::try_from(truncated(value)).unwrap_or(u16::MAX);
         let part = |cells: u16| u64::MAX.checked_div(u64::from(cells)).unwrap_or(u64::MAX);
         let length = self.patch_length();
         if out.cells == 0 {
-            let fit = STATIONS.checked_div(spans).unwrap_or(1).saturating_sub(1).max(1);
+            let fit = stations_of(job)
+                .checked_div(spans)
+                .unwrap_or(1)
+                .saturating_sub(1)
+                .max(1);
             let mean = if self.patch_mm > 0.0 {
                 self.patch_mm
             } else {
@@ -485,10 +576,134 @@ impl Lookahead {
         length * (0.5 * (first + last) + bow * length * (1.0 / 12.0)) / self.patch.per_mm
     }
 
+    /// No turn is tried for some passes: the plan before the last one is slower than a rest would make it.
+    pub(crate) const fn avoid_turns(&mut self) {
+        self.without = PASSES_WITHOUT;
+    }
+
+    /// Whether a turn may lead to the next pass.
+    fn may_turn(&self, job: &Job<'_>, axes: &AxisLimits, out: &PassPlan) -> bool {
+        let [_, is_up] = out.faces_up;
+        axes.overrun_mm > 0.0 && has_turns(job) && out.next.is_some() && is_up && !out.point && out.group == 1
+    }
+
+    /// Turns to the start of the next pass; without a turn where it cannot be evaluated.
+    fn look_across(&mut self, job: &Job<'_>, out: &PassPlan) -> Task {
+        let Some(side) = out.next else {
+            return Task::Done;
+        };
+        let last = self.window.count().saturating_sub(1);
+        let [_, cl_nm] = out.ends;
+        let from = TurnEnd {
+            cl_nm,
+            q: self.window.derivatives(last),
+        };
+        self.ends = [from, from];
+        self.line = PassPosition {
+            side,
+            reversed: !self.line.reversed,
+            span: self.line.span,
+        };
+        if self.patch.collapse(job, &self.line).is_err() || self.patch.point {
+            return Task::Done;
+        }
+        self.window = Window::EMPTY;
+        (self.station, self.arc_mm) = (0, 0.0);
+        Task::Start
+    }
+
+    /// A station at the start of the next pass.
+    fn visit_start(&mut self, axes: &AxisLimits) -> Task {
+        let Ok((contact, located)) = self.patch.evaluate(self.fraction()) else {
+            return Task::Done;
+        };
+        if self.station == 0 {
+            let [_, to] = &mut self.ends;
+            to.cl_nm = located.cl_nm;
+            if !self.patch.faces_up(contact.offset) || check_travel(axes, &located.cl_nm).is_err() {
+                return Task::Done;
+            }
+        } else {
+            self.arc_mm += self.cell_length(&contact);
+        }
+        self.speed = contact.path;
+        self.window.push(located.cl_nm, self.arc_mm);
+        if self.window.count() < WINDOW && !self.is_end() {
+            self.station += 1;
+            return Task::Start;
+        }
+        let [_, to] = &mut self.ends;
+        to.q = self.window.derivatives(0);
+        self.length = 0.0;
+        Task::Turn(0)
+    }
+
+    /// Tries a length of the turn; the last round checks the places of the turn.
+    fn find_turn(&mut self, job: &Job<'_>, axes: &AxisLimits, round: u8) -> Task {
+        let [from, to] = &self.ends;
+        if round < turn::ROUNDS {
+            let limits = MotionLimits::new(axes, job.header.feed_mm_s, job.header.period_s);
+            let (turn, over_mm) = Turn::try_length(from, to, &limits, self.length);
+            if !turn.is_long() {
+                return Task::Done;
+            }
+            self.turn = turn;
+            if over_mm <= axes.overrun_mm {
+                return Task::Turn(turn::ROUNDS);
+            }
+            let Some(length) = turn.shorter(over_mm, axes.overrun_mm) else {
+                return Task::Done;
+            };
+            self.length = length;
+            return if round + 1 < turn::ROUNDS {
+                Task::Turn(round + 1)
+            } else {
+                Task::Done
+            };
+        }
+        for station in 0..turn::STATIONS {
+            for second in [false, true] {
+                let place = self.turn.place(second, station);
+                if check_travel(axes, &place).is_err() || check_height(axes, &place).is_err() {
+                    return Task::Done;
+                }
+            }
+        }
+        Task::Bound(0)
+    }
+
+    /// Bounds the turn's speed; at last, takes the turn where it is faster than two rests with a step-over between them.
+    fn bound_turn(&mut self, job: &Job<'_>, axes: &AxisLimits, index: u16, out: &mut PassPlan) -> Task {
+        let limits = MotionLimits::new(axes, job.header.feed_mm_s, job.header.period_s);
+        self.turn.bound_speed(index, &limits);
+        if index + 1 < turn::STATIONS {
+            return Task::Bound(index + 1);
+        }
+        let [from, to] = &self.ends;
+        if !self.turn.is_worth(from, to, &limits) {
+            return Task::Done;
+        }
+        out.tail_q10 = i64::from(out.plan.stations.length_nm()) << Q10_BITS;
+        Task::Tail(0)
+    }
+
+    /// Appends a station of half a turn.
+    fn push_half(&self, second: bool, index: u16, out: &mut PassPlan) {
+        let from_nm = if second {
+            0
+        } else {
+            u32::try_from(out.tail_q10 >> Q10_BITS).unwrap_or(0)
+        };
+        out.plan.stations.push(Station {
+            arc_nm: from_nm.saturating_add(self.turn.station_nm(index)),
+            q: self.turn.station(second, index),
+        });
+    }
+
     /// Computes the interval and the next pass.
     fn close(&mut self, job: &Job<'_>, out: &mut PassPlan) -> Result<()> {
         let patches = f32::from(self.patches.saturating_add(1));
-        self.patch_mm = to_f32(self.start_q10) * MM_PER_Q10 / patches;
+        self.patch_mm = to_f32(self.start_q10 - out.head_q10) * MM_PER_Q10 / patches;
         let header = job.header;
         out.interval = interval_of(self.maximum.inv_interval_sq);
         let step = match header.spacing {
@@ -503,6 +718,24 @@ impl Lookahead {
         };
         Ok(())
     }
+}
+
+/// Passes without a turn after one whose plan had to be slowed down for it.
+const PASSES_WITHOUT: u8 = 60;
+
+/// Stations that a pass may have: in a job with turns there is room for their halves.
+fn stations_of(job: &Job<'_>) -> u16 {
+    if has_turns(job) {
+        STATIONS - 2 * turn::STATIONS
+    } else {
+        STATIONS
+    }
+}
+
+/// Whether the passes of a job may be joined by turns.
+pub(crate) fn has_turns(job: &Job<'_>) -> bool {
+    let overruns = job.header.axes.is_some_and(|axes| axes.overrun_mm > 0.0);
+    overruns && job.header.pattern == Pattern::Zigzag && job.header.path_spans <= SPANS_TURNED
 }
 
 /// The direction at the station, and of each higher derivative the one that is greater.

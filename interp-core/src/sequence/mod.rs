@@ -6,3 +6,4 @@ pub(crate) mod hop;
 pub(crate) mod link;
 pub(crate) mod lookahead;
 pub(crate) mod sequencer;
+mod turning;

@@ -10,6 +10,7 @@ use crate::feed::limits::MotionLimits;
 use crate::feed::pace::{Course as _, Pace};
 use crate::feed::plan::{Cursor, Plan};
 use crate::feed::planner::{PORTION_CYCLES, Planner};
+use crate::feed::turn::Turn;
 use crate::job::program::Job;
 use crate::job::{AxisLimits, Pattern};
 use crate::math::number::{Bounded, to_f32};
@@ -18,7 +19,8 @@ use crate::pass::run::Run;
 use crate::sample::{Sample, SpanParameter};
 use crate::sequence::hop::Hop;
 use crate::sequence::link::{BoundaryStepOver, StraightMove, check_faces_up};
-use crate::sequence::lookahead::{Lookahead, PassPlan, check_travel};
+use crate::sequence::lookahead::{Lookahead, PassPlan, check_travel, has_turns};
+use crate::sequence::turning::{Part, road};
 
 /// Periods that a pass takes longer than the planning of the next one.
 const SPARE_PERIODS: u32 = 15;
@@ -44,6 +46,8 @@ const REPLANNED: f32 = 1.001;
 const PERIODS_A_NODE: f32 = 3.4;
 const PERIODS_A_REST: f32 = 40.0;
 const PERIODS_A_PASS: f32 = 100.0;
+/// Share of the time of a rest by which a turn may slow its plan down.
+const REST_SHARE: f32 = 0.3;
 /// Steps in which the tool's place after the planning is estimated.
 const AHEAD_STEPS: u16 = 64;
 
@@ -62,6 +66,8 @@ enum Phase {
     Hop,
     /// The tool is on a pass.
     Pass,
+    /// The tool is in a turn from pass to pass.
+    Turn,
     /// The sequence is over.
     Done,
 }
@@ -133,8 +139,10 @@ pub(crate) struct Sequencer {
     on_surface: bool,
     /// A fault of the next pass, reported when the tool reaches the pass.
     pending: Option<Fault>,
-    follower: Follower,
-    pace: Pace<Cursor>,
+    pub(super) follower: Follower,
+    pub(super) pace: Pace<Cursor>,
+    /// The turn that the tool is in, or was last.
+    pub(super) turn: Turn,
     straight: StraightMove,
     hop: Hop,
     /// Whether the hop to the next pass is to be planned.
@@ -173,6 +181,7 @@ impl Sequencer {
         pending: None,
         follower: Follower::START,
         pace: Pace::REST,
+        turn: Turn::NONE,
         straight: StraightMove::NONE,
         hop: Hop::NONE,
         has_hop: false,
@@ -193,6 +202,9 @@ impl Sequencer {
         self.on_surface = false;
         self.pending = None;
         self.planner.stop();
+        for pass in &mut self.plans {
+            pass.tail = Turn::NONE;
+        }
         self.lookahead.restart();
         self.share = 1.0;
         self.begin_planning(job, 0, Some(SpanParameter::default()));
@@ -211,7 +223,7 @@ impl Sequencer {
     /// Whether the tool is at rest, and stays so while the commanded speed is 0.
     pub(crate) fn is_at_rest(&self) -> bool {
         match self.phase {
-            Phase::Pass => self.pace.is_at_rest(),
+            Phase::Pass | Phase::Turn => self.pace.is_at_rest(),
             Phase::StepOver => self.step_over.progress.is_at_rest(),
             Phase::Leg(_) => self.straight.progress.is_at_rest(),
             Phase::Hop => self.hop.is_at_rest(),
@@ -245,7 +257,7 @@ impl Sequencer {
     /// Whether [`Self::plan`] has anything to do.
     pub(crate) fn has_to_plan(&self) -> bool {
         let seeks_pace = match self.phase {
-            Phase::Pass => self.pace.has_work(),
+            Phase::Pass | Phase::Turn => self.pace.has_work(),
             Phase::StepOver => self.step_over.progress.has_work(),
             Phase::Leg(_) => self.straight.progress.has_work(),
             Phase::Hop => self.hop.has_work(),
@@ -288,6 +300,9 @@ impl Sequencer {
 
     /// Whether the override asks for more than the plans give.
     fn wants_more(&self, job: &Job<'_>) -> bool {
+        if has_turns(job) {
+            return false;
+        }
         let [one, other] = &self.plans;
         let feed = job.header.feed_mm_s * self.share;
         let of = |pass: &PassPlan| feed > REPLANNED * pass.plan.limits.feed;
@@ -303,8 +318,10 @@ impl Sequencer {
             (&one.plan, &other.plan)
         };
         match self.phase {
-            Phase::Pass if self.pace.has_work() && self.pace.begins_search() => return PACE_BEGIN_CYCLES,
-            Phase::Pass if self.pace.has_work() => return PACE_CYCLES,
+            Phase::Pass | Phase::Turn if self.pace.has_work() && self.pace.begins_search() => {
+                return PACE_BEGIN_CYCLES;
+            }
+            Phase::Pass | Phase::Turn if self.pace.has_work() => return PACE_CYCLES,
             Phase::StepOver if self.step_over.progress.has_work() => return LINK_PACE_CYCLES,
             Phase::Leg(_) if self.straight.progress.has_work() => return LINK_PACE_CYCLES,
             Phase::Hop if self.hop.has_work() => return HOP_PACE_CYCLES,
@@ -327,9 +344,15 @@ impl Sequencer {
     }
 
     fn work(&mut self, job: &Job<'_>, axes: &AxisLimits) {
+        let is_known = self.knows_next();
         let (now, next) = both(&mut self.plans, self.second);
         match self.phase {
-            Phase::Pass if self.pace.has_work() => return self.pace.work(&now.plan, &self.follower.cursor),
+            Phase::Pass | Phase::Turn if self.pace.has_work() => {
+                let known = is_known.then_some(&next.plan);
+                let stops = self.pace.wanted() == 0.0;
+                let road = road(&now.plan, known, next.plan.pace_max, stops);
+                return self.pace.work(&road, &self.follower.cursor);
+            }
             Phase::StepOver if self.step_over.progress.has_work() => return self.step_over.progress.work(),
             Phase::Leg(_) if self.straight.progress.has_work() => return self.straight.progress.work(),
             Phase::Hop if self.hop.has_work() => return self.hop.work(),
@@ -370,6 +393,9 @@ impl Sequencer {
                 self.planner.work(&mut next.plan, least);
                 if self.planner.is_done() {
                     self.planning = Planning::Complete;
+                    if next.turns() && is_too_slow(next) {
+                        self.lookahead.avoid_turns();
+                    }
                 }
             }
             Planning::Rest => {
@@ -435,11 +461,11 @@ impl Sequencer {
 
     /// Begins to plan the pass after the one that is followed next.
     fn begin_planning(&mut self, job: &Job<'_>, pass: u32, side: Option<SpanParameter>) {
-        let (_, next) = both(&mut self.plans, self.second);
+        let (now, next) = both(&mut self.plans, self.second);
         self.planning = Planning::Complete;
         self.has_step_over = false;
         if let Some(side) = side {
-            self.lookahead.begin(job, pass, side, next);
+            self.lookahead.begin(job, pass, side, &now.tail, next);
             self.planning = Planning::Stations;
             self.spent = 0;
         }
@@ -458,10 +484,14 @@ impl Sequencer {
         wish: Wish,
         last: &mut Sample,
     ) -> Result<Outcome> {
-        let was_link = self.is_link();
+        let was_link = self.is_link() && self.phase != Phase::Turn;
         self.share = wish.share;
-        if let Phase::Pass = self.phase {
+        if let Phase::Pass | Phase::Turn = self.phase {
             self.follow_pass(job, run, wish, last)?;
+            if self.phase == Phase::Turn {
+                self.at = Some(last.cl_nm);
+                return Ok(Outcome::Link);
+            }
         } else if self.phase == Phase::Done {
             return Ok(Outcome::Finished);
         } else {
@@ -537,7 +567,7 @@ impl Sequencer {
     }
 
     /// The next pass becomes the one that is followed, and the one after it is planned.
-    fn swap(&mut self, job: &Job<'_>) {
+    pub(super) fn swap(&mut self, job: &Job<'_>) {
         self.second = !self.second;
         let (now, _) = both(&mut self.plans, self.second);
         let (pass, side) = (now.pass.wrapping_add(1), now.next);
@@ -552,18 +582,41 @@ impl Sequencer {
         run.begin(now.interval, last)?;
         self.on_surface = true;
         self.phase = Phase::Pass;
-        self.cell = 0;
         self.follower.begin(&now.plan);
-        self.replanned = 0.0;
-        let pace = pace_of(job, now, wish.share);
+        let pace = pace_of(job, now, wish.share).at_most(now.plan.pace_max);
         self.pace.begin(pace, job.header.period_s);
-        if job.header.pattern == Pattern::Zigzag && now.next.is_some() {
+        self.settle_in(job);
+        Ok(())
+    }
+
+    /// What begins with a pass.
+    pub(super) fn settle_in(&mut self, job: &Job<'_>) {
+        let (now, _) = both(&mut self.plans, self.second);
+        self.cell = 0;
+        self.replanned = 0.0;
+        if job.header.pattern == Pattern::Zigzag && now.next.is_some() && !now.turns() {
             self.step_over.request();
             self.has_step_over = true;
         }
         self.has_hop = job.header.pattern == Pattern::Zig && now.next.is_some();
         self.hop.clear();
-        Ok(())
+    }
+
+    /// The plans of the current or last pass, and of the next.
+    pub(super) const fn plans_ref(&self) -> (&PassPlan, &PassPlan) {
+        let [one, other] = &self.plans;
+        if self.second { (other, one) } else { (one, other) }
+    }
+
+    /// Whether the plan of the next pass is complete.
+    pub(super) fn knows_next(&self) -> bool {
+        self.is_planned() && self.pending.is_none()
+    }
+
+    /// The greatest pace on the next pass, if it is planned and a turn leads there.
+    fn next_pace(&self, job: &Job<'_>) -> Option<f32> {
+        let (now, next) = self.plans_ref();
+        (now.turns() && self.knows_next()).then(|| pace_on(job, next, self.share))
     }
 
     fn follow_pass(&mut self, job: &Job<'_>, run: &mut Run, wish: Wish, last: &mut Sample) -> Result<()> {
@@ -576,29 +629,66 @@ impl Sequencer {
             }
             !run.is_along()
         } else {
-            self.pace.want(pace_of(job, now, wish.share), wish.is_fault);
+            let wanted = pace_of(job, now, wish.share);
+            let next_pace = self.next_pace(job);
+            let wanted = self.pace_before_turn(wanted, next_pace);
+            self.pace.want(wanted, wish.is_fault);
+            if let Some(fault) = self
+                .pending
+                .filter(|_| self.pace.is_at_rest() && wish.share > 0.0)
+            {
+                return Err(fault);
+            }
             let pace = self.pace.tick();
+            let (now, _) = both(&mut self.plans, self.second);
             let moved = if pace > 0.0 {
                 self.follower.tick(&now.plan, pace)
             } else {
                 0.0
             };
-            if self.follower.is_over(&now.plan) {
+            if self.follower.is_over(&now.plan) && !now.turns() {
                 check_end(&now.plan, &self.follower)?;
                 run.finish_pass(job, last)?;
+                self.phase = Phase::Pass;
                 true
             } else {
-                if moved > MOVED_MIN && run.is_along() {
-                    run.move_by(job, moved / (job.header.feed_mm_s * job.header.period_s), last)?;
-                    self.correct_progress(job, run);
-                } else {
-                    run.stand(last);
+                if self.follower.is_over(&now.plan) {
+                    self.cross_apex(job, run)?;
                 }
+                self.follow_part(job, run, moved, last)?;
                 false
             }
         };
         if is_over {
             self.end_pass(job, wish)?;
+        }
+        Ok(())
+    }
+
+    /// The sample at the follower's place: on the pass or in a turn.
+    fn follow_part(&mut self, job: &Job<'_>, run: &mut Run, moved: f32, last: &mut Sample) -> Result<()> {
+        let (now, _) = both(&mut self.plans, self.second);
+        let arc_q10 = self.follower.arc_q10();
+        if let Part::Turn(turn_q10) = now.part(arc_q10, &self.turn) {
+            if self.phase == Phase::Pass {
+                self.turn = now.tail;
+                self.phase = Phase::Turn;
+            }
+            let turn = self.turn;
+            self.emit_turn(&turn, turn_q10, run, last);
+            return Ok(());
+        }
+        let moved = if self.phase == Phase::Turn {
+            to_f32(arc_q10 - now.head_q10) * MM_PER_Q10
+        } else {
+            moved
+        };
+        self.phase = Phase::Pass;
+        if moved > MOVED_MIN && run.is_along() {
+            run.move_by(job, moved / (job.header.feed_mm_s * job.header.period_s), last)?;
+            self.correct_progress(job, run);
+        } else {
+            run.stand(last);
         }
         Ok(())
     }
@@ -801,6 +891,25 @@ fn pace_of(job: &Job<'_>, pass: &PassPlan, share: f32) -> f32 {
     } else {
         share.at_most(1.0)
     }
+}
+
+/// The greatest pace on a pass at this feed factor.
+fn pace_on(job: &Job<'_>, pass: &PassPlan, share: f32) -> f32 {
+    pace_of(job, pass, share).at_most(pass.plan.pace_max)
+}
+
+/// Whether a turn costs more than it saves: the time by which its plan is slowed down, against that of a rest.
+fn is_too_slow(pass: &PassPlan) -> bool {
+    let MotionLimits {
+        feed, axes, period, ..
+    } = &pass.plan.limits;
+    let jerk = axes.iter().fold(f32::MAX, |least, axis| least.at_most(axis.jerk));
+    let acceleration = axes
+        .iter()
+        .fold(f32::MAX, |least, axis| least.at_most(axis.acceleration));
+    let rest_s = feed / acceleration + acceleration / jerk;
+    let lasts_s = to_f32(i64::from(pass.plan.periods)) * period;
+    lasts_s * (1.0 / pass.plan.pace_max - 1.0) > REST_SHARE * rest_s
 }
 
 /// The last patch of a pass.

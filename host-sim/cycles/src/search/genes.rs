@@ -178,6 +178,7 @@ impl Genes {
             },
             spacing: Spacing::Exact,
             chord_mm: 0.5 * radius_mm,
+            overrun_mm: 0.0,
             machine: if limits {
                 self.machine()
             } else {

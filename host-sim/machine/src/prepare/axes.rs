@@ -74,6 +74,7 @@ pub(super) fn axes(job: &Job, tool_sign: f64) -> Result<Option<AxisLimits>, JobE
         home_nm,
         plunge_mm: machine.plunge_mm as f32,
         safe_z_nm,
+        overrun_mm: job.overrun_mm as f32,
     }))
 }
 

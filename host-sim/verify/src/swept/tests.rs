@@ -24,6 +24,7 @@ fn job(surface: SurfaceSpec, along: Along, side: Side, scallop_mm: f64) -> Job {
         pattern: Pattern::Zig,
         spacing: job::Spacing::Exact,
         chord_mm: 0.005,
+        overrun_mm: 0.0,
         machine: MachineSpec::default(),
         origin: Origin::default(),
     }

@@ -82,6 +82,10 @@ pub struct ToolPath {
     /// Minimum distance of stored samples, nm: nearer ones are left out, except the last of a pass. At low feed the samples are
     /// denser than needed.
     spacing_nm: f64,
+    /// The last centre of a turn, and the boundary there: it belongs to the pass that follows.
+    lead_in: Option<([i32; 3], f64)>,
+    /// The first centre of a turn, likewise: it belongs to the pass before.
+    lead_out: Option<([i32; 3], f64)>,
 }
 
 impl ToolPath {
@@ -91,6 +95,8 @@ impl ToolPath {
         Self {
             passes: Vec::new(),
             spacing_nm,
+            lead_in: None,
+            lead_out: None,
         }
     }
 
@@ -126,6 +132,9 @@ impl ToolPath {
                 path: Vec::with_capacity(room),
                 cl_nm: Vec::with_capacity(room),
             });
+            if let Some((cl_nm, boundary)) = self.lead_in.take() {
+                self.push_turn(cl_nm, boundary);
+            }
         }
         if !sample.first_of_pass && self.is_near(sample) {
             return;
@@ -135,6 +144,30 @@ impl ToolPath {
                 .push(u32::try_from(sample.tick.saturating_sub(pass.first_tick)).unwrap_or(u32::MAX));
             pass.path.push(path);
             pass.cl_nm.push(sample.cl_nm);
+        }
+        if sample.last_of_pass
+            && let Some((cl_nm, boundary)) = self.lead_out.take()
+        {
+            self.push_turn(cl_nm, boundary);
+        }
+    }
+
+    /// Adds a centre of a turn next to the pass that it leaves, as its end at the boundary.
+    pub fn leave(&mut self, cl_nm: [i32; 3], boundary: f64) {
+        self.lead_out = Some((cl_nm, boundary));
+    }
+
+    /// Adds a centre of a turn next to the pass that it leads to, as its start at the boundary.
+    pub fn enter(&mut self, cl_nm: [i32; 3], boundary: f64) {
+        self.lead_in = Some((cl_nm, boundary));
+    }
+
+    fn push_turn(&mut self, cl_nm: [i32; 3], boundary: f64) {
+        if let Some(pass) = self.passes.last_mut() {
+            let periods = pass.periods.last().map_or(0, |last| last.saturating_add(1));
+            pass.periods.push(periods);
+            pass.path.push(boundary);
+            pass.cl_nm.push(cl_nm);
         }
     }
 
