@@ -228,7 +228,8 @@ fn commands_in_turns_hold_the_limits() {
             limits.add(&sample);
             let mut command = None;
             if left == 0 {
-                left = random(if random(2) == 0 { 60 } else { 900 });
+                let most = if random(2) == 0 { 60 } else { 900 };
+                left = random(most);
                 in_turns += u32::from(sample.state == State::Linking);
                 match random(10) {
                     0..=3 => command = Some(Command::Hold),

@@ -202,6 +202,15 @@ pub(super) fn print(
             &format!("boundary {} is degenerate (one point)", shape.poles.join(", ")),
         );
     }
+    if job.overrun_mm > 0.0 {
+        row(
+            "turns",
+            &format!(
+                "up to {} mm beyond the boundary: what stands there is not known to the job, and not checked",
+                job.overrun_mm
+            ),
+        );
+    }
     row(
         "machining time",
         &format!("{:.2} min", time_s(job, survey.samples) / 60.0),
