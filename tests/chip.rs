@@ -65,7 +65,6 @@ fn without_a_crystal_everything_stays_at_rest() {
 fn whole(board: &'static Board, name: &str, home: &str, seed: &str) {
     let emulated = Emulated::start(board, &["--seed", seed]);
     let job = Job::sample(name, &[]);
-    let has_limits = job_file::load(&job.path).unwrap().machine.has_limits();
     let (done, said) = emulated.run(&job.path, home);
     let ended = emulated.end();
     assert!(
@@ -88,11 +87,7 @@ fn whole(board: &'static Board, name: &str, home: &str, seed: &str) {
     );
     // The planning waits for the tick that pends it, and takes a quarter of the period at most, with the bytes that are received meanwhile.
     let planning = &ended.report["exti0"];
-    assert_eq!(
-        planning["count"].as_u64().unwrap() > 100,
-        has_limits,
-        "{planning}"
-    );
+    assert!(planning["count"].as_u64().unwrap() > 100, "{planning}");
     assert!(
         planning["longest_cycles"].as_u64().unwrap() < PERIOD / 4,
         "{planning}"

@@ -43,11 +43,6 @@ const BOUNDS: &[(&str, u32, &str)] = &[
     ),
     ("controller::step_output::StepOutput::turn", 3, "axes"),
     (
-        "interp_core::pass::scan::PassScan::plan",
-        33,
-        "pieces of a portion: PIECES_MAX",
-    ),
-    (
         "interp_core::pass::run::Run::step_far",
         2,
         "patches of an arc: CROSSINGS_MAX + 1",
@@ -98,6 +93,63 @@ const BOUNDS: &[(&str, u32, &str)] = &[
         "steps to the place where a change begins: STEPS_AHEAD",
     ),
     (
+        "compiler_builtins::mem::impls::copy_backward::copy_backward_aligned_words",
+        512,
+        COPIED,
+    ),
+    (
+        "compiler_builtins::mem::impls::copy_backward::copy_backward_bytes",
+        15,
+        "bytes that do not fill a word copy",
+    ),
+    (
+        "compiler_builtins::mem::impls::copy_backward::copy_backward_misaligned_words",
+        512,
+        COPIED,
+    ),
+    (
+        "interp_core::feed::planner::scale",
+        162,
+        "coefficients of a pace: COEFFICIENTS",
+    ),
+    (
+        "interp_core::feed::road::GateSearch::place",
+        160,
+        "nodes of a plan: NODES_MAX",
+    ),
+    (
+        "interp_core::feed::road::Road as interp_core::feed::pace::Course::advance",
+        8,
+        "steps that a period is made of: PARTS_MAX",
+    ),
+    ("interp_core::feed::turn::Turn::bound_speed", 3, "axes"),
+    (
+        "interp_core::feed::turn::Turn::overrun",
+        11,
+        "stations of half a turn: STATIONS",
+    ),
+    (
+        "interp_core::feed::walk::Walker::begin_means_at_speed",
+        160,
+        "nodes of a mean: NODES_MAX",
+    ),
+    (
+        "interp_core::feed::walk::Walker::flatten",
+        168,
+        "stations of a pass: STATIONS_MAX",
+    ),
+    (
+        "interp_core::sequence::lookahead::Lookahead::find_turn",
+        11,
+        "stations of half a turn: STATIONS",
+    ),
+    (
+        "interp_core::pass::scan::PassScan::work",
+        33,
+        "pieces of a portion: PIECES_MAX",
+    ),
+    ("interp_core::feed::walk::Walker::mean_at_speed", 2, "ends of a plan"),
+    (
         "interp_core::sequence::hop::time_at",
         20,
         "bisections of a time: BISECTIONS",
@@ -134,11 +186,6 @@ const BOUNDS: &[(&str, u32, &str)] = &[
     ),
     (
         "interp_core::feed::stations::Stations::cell_between",
-        8,
-        "halvings of the stations: CELL_BISECTIONS",
-    ),
-    (
-        "interp_core::feed::stations::Stations::is_jump",
         8,
         "halvings of the stations: CELL_BISECTIONS",
     ),
