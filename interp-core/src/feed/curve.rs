@@ -150,7 +150,7 @@ fn peak_speed(length: f32, limits: &CurveLimits) -> f32 {
 }
 
 /// Bisections of a speed.
-const BISECTIONS: u8 = 24;
+const BISECTIONS: u8 = 12;
 
 /// A motion of this length from rest to rest.
 #[derive(Clone, Copy, Debug)]

@@ -23,6 +23,7 @@ const JUMP_REACH: f32 = 1.2;
 /// Intervals that a step of a cursor may pass, and steps that a period is made of where nodes are closer together than that.
 const INTERVALS_A_STEP: u16 = 4;
 const PARTS_MAX: u8 = 8;
+const INTERVALS_A_PART: f32 = 2.0;
 
 /// Coefficients of the pace next to an end at speed: the interval there has the speed of the end.
 pub(crate) const PINNED: u16 = 3;
@@ -409,11 +410,11 @@ impl Plan {
     fn advance_at(&self, pace: &[f32; COEFFICIENTS], cursor: &mut Cursor, seconds: f32) {
         let by = seconds * self.inverse_step;
         let intervals = by * self.interval_of(pace, cursor.interval).speed(cursor.x);
-        // As a rule a step stays within one interval and the next.
-        if intervals <= 1.0 {
+        // As a rule a step stays within two intervals.
+        if intervals <= INTERVALS_A_PART {
             return self.step_at(pace, cursor, by);
         }
-        let parts = u8::try_from(truncated(intervals))
+        let parts = u8::try_from(truncated(intervals * (1.0 / INTERVALS_A_PART)))
             .unwrap_or(u8::MAX)
             .saturating_add(1)
             .min(PARTS_MAX);

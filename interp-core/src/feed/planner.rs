@@ -3,7 +3,7 @@
 use super::limits::{FeedChange, MotionLimits};
 use super::newton::{self, Reach, SHAPE, Sweep};
 use super::pace::{Course, Use};
-use super::plan::{Cursor, Lead, Plan};
+use super::plan::{Cursor, Lead, NODES_MAX, Plan};
 use super::road::GateSearch;
 use super::walk::{LIST, Lists, Walker};
 use crate::math::arith::{inverse_sqrt, sqrt, truncated};
@@ -191,6 +191,11 @@ impl Planner {
         self.stage = Stage::Done;
     }
 
+    /// Whether the walk is being made, whose nodes are chosen by the time that is left.
+    pub(crate) fn is_walking(&self) -> bool {
+        self.stage == Stage::Walk
+    }
+
     pub(crate) fn is_done(&self) -> bool {
         self.stage == Stage::Done
     }
@@ -250,7 +255,10 @@ impl Planner {
                 let lasts = plan.step_s / (self.weight * sqrt(factor) * plan.limits.period);
                 self.effort = if self.walker.is_short {
                     Effort::Little
-                } else if plan.pinned() == [0; 2] && lasts > LONG_PERIODS * nodes {
+                } else if plan.pinned() == [0; 2]
+                    && usize::from(plan.intervals) >= NODES_MAX
+                    && lasts > LONG_PERIODS * nodes
+                {
                     Effort::Much
                 } else {
                     Effort::Usual

@@ -385,7 +385,8 @@ impl Sequencer {
             }
             Planning::Feed => {
                 // The pass after it takes as long to plan; off the surface it can be waited for.
-                let least = if next.next.is_some() && job.header.pattern == Pattern::Zigzag {
+                let is_last = next.next.is_none() && !self.planner.is_walking();
+                let least = if !is_last && job.header.pattern == Pattern::Zigzag {
                     self.spent.saturating_add(SPARE_PERIODS)
                 } else {
                     0

@@ -54,7 +54,7 @@ const BOUNDS: &[(&str, u32, &str)] = &[
     ),
     (
         "interp_core::feed::curve::Curve::new",
-        24,
+        12,
         "halvings of a speed: BISECTIONS",
     ),
     (
@@ -148,7 +148,11 @@ const BOUNDS: &[(&str, u32, &str)] = &[
         33,
         "pieces of a portion: PIECES_MAX",
     ),
-    ("interp_core::feed::walk::Walker::mean_at_speed", 2, "ends of a plan"),
+    (
+        "interp_core::feed::walk::Walker::mean_at_speed",
+        2,
+        "ends of a plan",
+    ),
     (
         "interp_core::sequence::hop::time_at",
         20,
