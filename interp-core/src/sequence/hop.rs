@@ -109,14 +109,15 @@ impl Hop {
             return;
         }
         let feed = feed_mm_s;
-        let (Some(up), Some(across), Some(down)) = (
-            StraightMove::new(from, above, 0.0, feed, axes),
-            StraightMove::new(above, there, 0.0, feed, axes),
-            StraightMove::new(there, to, axes.plunge_mm, feed, axes),
-        ) else {
+        let [up, across, down] = &mut self.legs;
+        let has_each = up.lead(from, above, 0.0, feed, axes)
+            && across.lead(above, there, 0.0, feed, axes)
+            && down.lead(there, to, axes.plunge_mm, feed, axes);
+        if !has_each {
             return;
-        };
-        let [rise, move_, fall] = [&up, &across, &down].map(|leg| leg.progress.curve());
+        }
+        let [up, across, down] = &self.legs;
+        let [rise, move_, fall] = [up, across, down].map(|leg| leg.progress.curve());
         // Across begins when the ball passes the safe height, and ends before it passes it again.
         let leaves = time_at(rise, nm_q10(safe, from[2])) + APART_S;
         let returns = time_at(fall, nm_q10(top, safe)) - APART_S;
@@ -129,7 +130,6 @@ impl Hop {
             time: 0.0,
             curves: self.curves.curves.each_ref().map(Curve::start),
         };
-        self.legs = [up, across, down];
         self.ends = Some([from, to]);
     }
 

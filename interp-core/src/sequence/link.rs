@@ -46,13 +46,11 @@ impl Progress {
         pace: Pace::REST,
     };
 
-    fn new(length: f32, curve: Curve) -> Self {
-        Self {
-            cursor: curve.start(),
-            curve,
-            length_q10: to_q10(length),
-            pace: Pace::REST,
-        }
+    fn lead(&mut self, length: f32, curve: Curve) {
+        self.cursor = curve.start();
+        self.curve = curve;
+        self.length_q10 = to_q10(length);
+        self.pace = Pace::REST;
     }
 
     /// The motion along the link.
@@ -113,20 +111,22 @@ impl StraightMove {
         to: [0; 3],
     };
 
-    /// A move from point to point whose last `slow_mm` does not exceed `feed_mm_s`; none where its length is negligible.
-    pub(crate) fn new(
+    /// Becomes a move from point to point whose last `slow_mm` does not exceed `feed_mm_s`; returns whether its length is more than negligible. In
+    /// place, because a copy costs more than the rest.
+    pub(crate) fn lead(
+        &mut self,
         from: [i32; 3],
         to: [i32; 3],
         slow_mm: f32,
         feed_mm_s: f32,
         axes: &AxisLimits,
-    ) -> Option<Self> {
+    ) -> bool {
         let mut apart = [0_i64; 3];
         for ((apart, from), to) in apart.iter_mut().zip(&from).zip(&to) {
             *apart = i64::from(*to) - i64::from(*from);
         }
         if apart.iter().all(|apart| apart.abs() <= NOTHING_NM) {
-            return None;
+            return false;
         }
         let mm = apart.map(to_mm);
         let [x, y, z] = mm;
@@ -148,12 +148,10 @@ impl StraightMove {
             limits.acceleration = limits.acceleration.at_most(a * slope);
             limits.jerk = limits.jerk.at_most(j * slope);
         }
-        let curve = Curve::new(length, &limits, slow_mm, feed_mm_s);
-        Some(Self {
-            progress: Progress::new(length, curve),
-            from,
-            to,
-        })
+        self.progress
+            .lead(length, Curve::new(length, &limits, slow_mm, feed_mm_s));
+        (self.from, self.to) = (from, to);
+        true
     }
 
     /// The position.
@@ -379,7 +377,7 @@ impl BoundaryStepOver {
             curve = Curve::new(self.length, &self.curve, 0.0, 0.0);
             peak = curve.peak();
         }
-        self.progress = Progress::new(self.length, curve);
+        self.progress.lead(self.length, curve);
     }
 
     /// What the bends leave at this speed.

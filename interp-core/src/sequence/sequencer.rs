@@ -773,15 +773,14 @@ impl Sequencer {
             0.0
         };
         let feed = job.header.feed_mm_s;
-        let Some(mut straight) = StraightMove::new(from, to, slow_mm, feed, axes) else {
+        if !self.straight.lead(from, to, slow_mm, feed, axes) {
             self.phase = self.after(leg);
             // A pass that begins where the tool is needs its plan only.
             return Ok(self.phase != Phase::AwaitGoal(leg));
-        };
-        straight
+        }
+        self.straight
             .progress
             .begin(wish.share.at_most(1.0), job.header.period_s);
-        self.straight = straight;
         self.phase = Phase::Leg(leg);
         Ok(false)
     }
