@@ -324,20 +324,14 @@ impl Course for Curve {
         self.is_last(cursor.piece) && cursor.time >= self.piece(cursor.piece).ramp_s
     }
 
-    fn use_at(&self, cursor: &CurveCursor, [r, r1, r2]: [f32; 3], around: f32) -> Use {
-        let piece = self.piece(cursor.piece);
-        let [v, a, j] = piece.rates(cursor.time);
-        // The jerk steps: where the place stands for some time around it, both sides count.
-        let reach = around * r;
-        let [_, _, before] = piece.rates((cursor.time - reach).at_least(0.0));
-        let [_, _, behind] = piece.rates(cursor.time + reach);
-        let jerk = |j: f32| ((j * r * r + 3.0 * a * r1) * r + v * r2).abs();
+    fn use_at(&self, cursor: &CurveCursor, [r, r1, r2]: [f32; 3], _around: f32) -> Use {
+        let [v, a, j] = self.piece(cursor.piece).rates(cursor.time);
         let limits = &self.limits;
         Use {
             feed: 0.0,
             velocity: v * r / limits.speed,
             acceleration: (a * r * r + v * r1).abs() / limits.acceleration,
-            jerk: jerk(j).at_least(jerk(before)).at_least(jerk(behind)) / limits.jerk,
+            jerk: ((j * r * r + 3.0 * a * r1) * r + v * r2).abs() / limits.jerk,
         }
     }
 }
