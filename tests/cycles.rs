@@ -483,8 +483,8 @@ fn no_stage_has_grown() {
         let planned: Vec<_> = planning
             .inspect(|figure| assert!(figure.max <= PLANNING_CYCLES_MAX, "{figure:?}"))
             .collect();
-        // Three jobs have limits; two models.
-        assert_eq!(planned.len(), 3 * 2, "{planned:?}");
+        // Every job has a planning; two models.
+        assert_eq!(planned.len(), cycles::jobs().len() * 2, "{planned:?}");
         (all, counts)
     });
 }
@@ -505,7 +505,7 @@ fn check_search(jobs: u32, limits: bool) {
     let cycles = figures::tick_cycles(&found.worst.record, figures::Model::Pessimistic);
     assert!(cycles < PERIOD_CYCLES / 10, "{cycles} cycles: {found:?}");
     let planning = session.planning_cycles_max();
-    assert_eq!(planning > 0, limits);
+    assert!(planning > 0);
     assert!(planning <= PLANNING_CYCLES_MAX, "{planning} cycles of planning");
     let analysis = graph::analyse(images::for_qemu()).unwrap();
     assert!(
