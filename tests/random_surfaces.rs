@@ -406,12 +406,19 @@ fn interval_beside_a_pole() {
                 second.is_none()
             })
             .unwrap();
-        // On a plane, two balls of radius r at a distance of 2 sqrt(h (2 r - h)) leave a scallop of height h.
-        let want = 2.0 * (0.01_f64 * (2.0 * 2.0 - 0.01)).sqrt() / 20.0_f64.hypot(20.0);
-        assert!(
-            (second.unwrap() / want - 1.0).abs() < 1e-5,
-            "{second:?} for {want}"
-        );
+        // On a plane a ball of radius r leaves at most h within sqrt(h (2 r - h)) of it. The pass before is the pole, and the next one a line from
+        // v (2, 0) to v (20, 20): at least the distance along the longest side line, and no place between them is farther than that from both.
+        let reach = (0.01_f64 * (2.0 * 2.0 - 0.01)).sqrt();
+        let v = second.unwrap();
+        assert!(v > 2.0 * reach / 20.0_f64.hypot(20.0) * (1.0 - 1e-5), "{v}");
+        for (i, j) in
+            (0..=100).flat_map(|i| (0..=100).map(move |j| (f64::from(i) / 100.0, f64::from(j) / 100.0)))
+        {
+            let (x, y) = (j * v * (2.0 + 18.0 * i), j * v * 20.0 * i);
+            let along = (((x - 2.0 * v) * 18.0 + y * 20.0) / (724.0 * v)).clamp(0.0, 1.0);
+            let to_line = (x - v * (2.0 + 18.0 * along)).hypot(y - v * 20.0 * along);
+            assert!(x.hypot(y).min(to_line) <= reach, "{x} {y}: {to_line}");
+        }
         assert_eq!(run(&job, u64::MAX).fault, None);
     }
 }

@@ -119,7 +119,7 @@ fn view_and_charts_are_drawn_in_every_colouring() {
         "gouge of 0.2 mm at u = 0.5",
         "the velocity is <not> held",
         "135 passes",
-        "387\u{202f}902",
+        "387\u{202f}905",
         "one stands for 8 samples",
         "6.5 min",
     ] {
