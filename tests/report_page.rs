@@ -10,6 +10,7 @@ use machine::Machine;
 use machine::prepare::prepare;
 use oracle::{Oracle, PassSample, SampleCheck};
 use report::{Mark, Remarks, RidgePoint, Scallops, Sketch};
+use verify::motion::Binding;
 use verify::survey::{Survey, SurveyResult};
 
 /// WebGL in software, for the same picture on every machine.
@@ -119,7 +120,7 @@ fn view_and_charts_are_drawn_in_every_colouring() {
         "gouge of 0.2 mm at u = 0.5",
         "the velocity is <not> held",
         "135 passes",
-        "387\u{202f}905",
+        "387\u{202f}908",
         "one stands for 8 samples",
         "6.5 min",
     ] {
@@ -171,6 +172,8 @@ fn mouse_keys_and_buttons_do_what_they_say() {
         options, "plain,feed,centre,error,feed-error",
         "no scallops, no such colouring"
     );
+    let limits = browser.number("document.getElementById('by-limit').hidden ? 1 : 0");
+    assert_eq!(limits, 1.0, "no limits, no such chart");
     let place =
         "JSON.stringify(isofeedReport.view.camera.position.toArray().map((x) => Math.round(x * 100)))";
     let home = browser.text(place);
@@ -236,6 +239,106 @@ fn mouse_keys_and_buttons_do_what_they_say() {
             .text("document.getElementById('window').innerText")
             .contains("least and the largest")
     );
+    assert_quiet(&mut browser, &page);
+}
+
+/// The speed of a pass against the limit that binds: the reading at the cursor is that of the verifier, whichever pass is chosen.
+#[test]
+fn speeds_are_drawn_against_the_limit_that_binds() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../jobs/plate_machine.toml");
+    let mut job = job_file::load(&path).unwrap();
+    (job.scallop_mm, job.feed_mm_min) = (1.0, 6000.0);
+    let prepared = prepare(&job).unwrap();
+    let timed = inspect::time_run(&job, &prepared, &()).unwrap();
+    let mut sketch = Sketch::new(&job, timed.passes.len());
+    let mut feeds = std::collections::BTreeMap::new();
+    let mut draw = |sample: &PassSample, checked: &SampleCheck| {
+        feeds.insert(sample.tick, sample.feed_mm_s);
+        sketch.add(sample, checked);
+    };
+    let requirements = inspect::Requirements {
+        with_optimum: true,
+        ..inspect::Requirements::default()
+    };
+    let found = inspect::verify_run(&job, &prepared, &timed, Some(&mut draw), &requirements, &()).unwrap();
+    let measured = &found.measured;
+    let passes = measured.optimum.passes.clone();
+    let remarks = Remarks {
+        passes: passes.clone(),
+        ..Remarks::default()
+    };
+    let page = sketch
+        .write(folder.path(), &path, &measured.findings, &remarks)
+        .unwrap()
+        .canonicalize()
+        .unwrap();
+    let mut browser = Browser::start(DESK, "light", &SOFTWARE);
+    browser.open(&page);
+    assert_eq!(
+        browser.number("document.getElementById('by-limit').hidden ? 1 : 0"),
+        0.0
+    );
+    let options = browser.number("document.getElementById('binding-pass').options.length");
+    assert_eq!(options, passes.len() as f64);
+    let chart = "isofeedReport.charts.at(-1)";
+    let mut seen = std::collections::BTreeSet::new();
+    for (index, time) in passes.iter().enumerate() {
+        choose(&mut browser, "binding-pass", &index.to_string());
+        let head = browser.text("document.querySelector('#binding-chart .values').innerText");
+        assert!(head.contains(&format!("pass {}: ", time.pass)), "{head}");
+        let count = browser.number(&format!("{chart}.pass.arc.length")) as usize;
+        assert_eq!(count, time.profile.len(), "a point for each period");
+        for k in (0..count).step_by(count / 40) {
+            let at = |row: &str| format!("{chart}.pass.{row}[{k}]");
+            let [arc, least, largest, tick] =
+                ["arc", "least", "largest", "ticks"].map(|row| browser.number(&at(row)));
+            // The speed as emitted is the commanded one, within what it changes by in two periods.
+            let feed = feeds[&(tick as u64)];
+            assert!(
+                least < feed + 2.5 && largest > feed - 2.5,
+                "pass {}, {arc} mm: {least} to {largest}, commanded {feed}",
+                time.pass
+            );
+            let point = time.profile[k];
+            let words = browser.text(&format!("{chart}.words({k})"));
+            let name = match point.binding {
+                Binding::Feed => "the programmed feed".to_owned(),
+                Binding::Velocity(axis) => format!("velocity of {}", ["x", "y", "z"][axis]),
+                Binding::Acceleration(axis) => format!("acceleration of {}", ["x", "y", "z"][axis]),
+                Binding::Jerk(axis) => format!("jerk of {}", ["x", "y", "z"][axis]),
+            };
+            assert!(
+                words.contains(&name),
+                "pass {}, {arc} mm: {words}, not {name}",
+                time.pass
+            );
+            let limit = browser.number(&at("limit"));
+            assert!((limit - point.speed_mm_s).abs() < 0.1, "{limit} for {point:?}");
+            seen.insert(name);
+        }
+    }
+    assert!(seen.len() >= 4, "{seen:?}");
+    // The fastest motion is coloured by what binds: the feed's blue, the orange of x.
+    let painted = "(() => { const c = document.querySelector('#binding-chart canvas'); const d = c.getContext('2d').getImageData(0, 0, c.width, c.height).data; \
+         const near = (rgb) => { let n = 0; for (let k = 0; k < d.length; k += 4) if (d[k + 3] > 200 && Math.hypot(...rgb.map((v, i) => v - d[k + i])) < 30) n++; return n; }; \
+         return [near([10, 79, 148]), near([194, 65, 12])]; })()";
+    let painted = browser.value(painted);
+    assert!((0..2).all(|k| painted[k].as_f64().unwrap() > 100.0), "{painted}");
+    // Pointing reads, clicking brings the tool there.
+    browser.point("#binding-chart .u-over", [0.5, 0.5]);
+    let read = browser.text("document.querySelector('#binding-chart .values').innerText");
+    assert!(
+        read.contains(" binds: ") && read.contains("emitted ") && read.contains(" mm"),
+        "{read}"
+    );
+    browser.drag("#binding-chart .u-over", [0.5, 0.5], [0.5, 0.5]);
+    let [tick, pass] =
+        ["tick", "at.pass.pass"].map(|what| browser.number(&format!("isofeedReport.panel.{what}")));
+    let last = passes.last().unwrap();
+    let ticks = [last.emitted.first().unwrap(), last.emitted.last().unwrap()].map(|at| at.tick as f64);
+    assert_eq!(pass, last.pass as f64);
+    assert!(tick > ticks[0] && tick < ticks[1], "{tick} of {ticks:?}");
     assert_quiet(&mut browser, &page);
 }
 

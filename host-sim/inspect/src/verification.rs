@@ -11,7 +11,7 @@ use machine::travel;
 use oracle::{AccuracyBounds, PassSample, SampleCheck};
 use verify::EmittedSample;
 use verify::motion::{
-    JobTimes, OptimumTimes, PeakMeter, Peaks, RunPass, TimeMeter, limits, optimum_times, times,
+    JobTimes, OptimumTimes, PassEnd, PeakMeter, Peaks, RunPass, TimeMeter, limits, optimum_times, times,
 };
 use verify::reach::{self, ContactPlace, ContactSide, Motion, ReachResult};
 use verify::survey::{SampleObserver, Survey, SurveyResult};
@@ -159,11 +159,18 @@ fn measure<'a>(
         0.0
     };
     let track = RefCell::new(ToolPath::with_spacing(spacing_nm));
+    let slow = RefCell::new(BTreeMap::<u32, Vec<(u64, f64)>>::new());
     let mut turn = TurnEnds::new(&oracle);
     let axes = RefCell::new(AxesUse::new(job));
     let mut contact = ContactSide::default();
     let mut keep = |emitted: &PassSample, checked: &SampleCheck| {
-        track.borrow_mut().add(emitted, job.along);
+        if !track.borrow_mut().add(emitted, job.along) {
+            let (path, _) = oracle.swapped(emitted.u, emitted.v);
+            slow.borrow_mut()
+                .entry(emitted.pass)
+                .or_default()
+                .push((emitted.tick, path));
+        }
         contact.add(contact_place(emitted), millimetres(emitted.cl_nm));
         axes.borrow_mut().on_pass(emitted);
         if let Some(each) = &mut each {
@@ -173,16 +180,23 @@ fn measure<'a>(
     let mut survey = Survey::new(&oracle, None, Some(&mut keep));
     let mut written = Ok(());
     let mut last_pass = None;
-    let mut running = BTreeMap::<u32, u64>::new();
+    let mut running = BTreeMap::<u32, PassSamples>::new();
     let mut motion = Motion::default();
     let mut time = TimeMeter::new(job.machine.period_s(), job.feed_mm_s());
     progress.begin("measuring", timed.samples);
     let ran = machine(job, prepared)?.run(|sample| {
         axes.borrow_mut().emitted(sample.tick, sample.cl_nm);
-        if sample.state == State::Running {
-            *running.entry(sample.pass).or_default() += 1;
-        }
         let emitted = plain(prepared, sample);
+        if let (State::Running, Some([u, v])) = (sample.state, emitted.parameters) {
+            let (path, _) = oracle.swapped(u, v);
+            let pass = running.entry(sample.pass).or_insert(PassSamples {
+                count: 0,
+                path: [path; 2],
+                slow: Vec::new(),
+            });
+            pass.count += 1;
+            pass.path[1] = path;
+        }
         time.add(&emitted);
         // Without limits the passes follow each other without links.
         let jumps = !job.machine.has_limits() && last_pass.replace(sample.pass) != Some(sample.pass);
@@ -199,13 +213,18 @@ fn measure<'a>(
     let times = time.finish();
     let findings = survey.finish(ran.is_ok())?;
     let track = track.into_inner();
+    for (pass, slow) in slow.into_inner() {
+        if let Some(samples) = running.get_mut(&pass) {
+            samples.slow = slow;
+        }
+    }
     let swept = swept::measure(job, &oracle, &track, ran.is_ok(), &requirements.swept, progress);
     let links_mm = motion.links();
     motion.join(times.links.iter().map(|link| link.turn));
     let reach = reach::measure(job, &oracle, &motion, &contact, progress);
     let optimum = if requirements.with_optimum {
         progress.begin("the optimum", 1);
-        optimum_times(job, &oracle, &run_passes(&track, &running), &times)
+        optimum_times(job, &oracle, &run_passes(&oracle, &track, &running), &times)
     } else {
         OptimumTimes::default()
     };
@@ -274,21 +293,41 @@ impl<'a> TurnEnds<'a> {
     }
 }
 
-/// The passes that ran, with the number of their samples.
-fn run_passes(track: &ToolPath, samples: &BTreeMap<u32, u64>) -> Vec<RunPass> {
-    let count = |pass: usize| {
-        u32::try_from(pass)
-            .ok()
-            .and_then(|pass| samples.get(&pass))
-            .copied()
+/// The samples on a pass.
+#[derive(Clone, Debug)]
+struct PassSamples {
+    count: u64,
+    /// Path parameters of the first and the last one.
+    path: [f64; 2],
+    /// Ticks and path parameters of those that the tool path leaves out.
+    slow: Vec<(u64, f64)>,
+}
+
+/// The passes that ran. An end off the boundary is that of a turn beyond it.
+fn run_passes<'a>(
+    oracle: &oracle::Oracle,
+    track: &'a ToolPath,
+    samples: &'a BTreeMap<u32, PassSamples>,
+) -> Vec<RunPass<'a>> {
+    let of_pass = |pass: usize| samples.get(&u32::try_from(pass).ok()?);
+    let end = |path: f64| {
+        if oracle.overruns && !oracle.path_range().contains(&path) {
+            PassEnd::Free
+        } else {
+            PassEnd::Rest
+        }
     };
     let passes = track.passes.iter().enumerate();
     passes
         .filter_map(|(pass, path)| {
+            let samples = of_pass(pass)?;
             Some(RunPass {
                 pass,
-                side: path.side,
-                samples: count(pass)?,
+                track: path,
+                slow: &samples.slow,
+                samples: samples.count,
+                path: samples.path,
+                ends: samples.path.map(end),
             })
         })
         .collect()
@@ -322,6 +361,39 @@ mod tests {
     use crate::time_run;
     use job::AxisLimits;
     use machine::prepare::prepare;
+
+    /// With turns beyond the boundary the ends of passes between them are free, and no pass is faster than its optimum.
+    #[test]
+    fn passes_between_turns_are_compared_with_free_ends() {
+        let plate = include_str!("../../../jobs/plate_machine.toml");
+        for feed_mm_min in [1800.0, 6000.0] {
+            let mut job = job_file::parse("job.toml", plate).unwrap();
+            (job.overrun_mm, job.feed_mm_min) = (2.0, feed_mm_min);
+            let prepared = prepare(&job).unwrap();
+            let timed = time_run(&job, &prepared, &()).unwrap();
+            let requirements = Requirements {
+                with_optimum: true,
+                ..Requirements::default()
+            };
+            let found = verify_run(&job, &prepared, &timed, None, &requirements, &()).unwrap();
+            let optimum = &found.measured.optimum;
+            assert!(optimum.free_ends > timed.passes.len(), "{}", optimum.free_ends);
+            let last = timed.passes.len() - 1;
+            for time in &optimum.passes {
+                // The run begins and ends at rest.
+                assert!(time.pass != 0 || time.ends[0] == PassEnd::Rest);
+                assert!(time.pass != last || time.ends[1] == PassEnd::Rest);
+                let ratio = time.ratio().unwrap();
+                assert!((1.0 - 1e-4..1.3).contains(&ratio), "pass {}: {ratio}", time.pass);
+                assert!(time.best.lower_bound_s <= time.ours_s.unwrap(), "{}", time.pass);
+                // The motion as emitted: the sum of its steps is its length.
+                let ends = [time.emitted.first().unwrap(), time.emitted.last().unwrap()];
+                assert!(ends[0].arc_mm < 0.2 && ends[1].arc_mm > time.length_mm - 0.2);
+            }
+            let whole = optimum.whole_ratio.unwrap();
+            assert!((1.0..1.3).contains(&whole), "{whole}");
+        }
+    }
 
     /// A job that names one limit runs within the defaults of the others, and is judged by them: of velocity, acceleration and jerk each
     /// has a share of its limit, and the passes are timed by all three.

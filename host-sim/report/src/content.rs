@@ -11,6 +11,7 @@ use approach::Kind;
 use glam::DVec3;
 use job::Job;
 use oracle::Oracle;
+use verify::motion::PassTime;
 use verify::survey::SurveyResult;
 
 /// A figure in the summary of the page.
@@ -52,6 +53,8 @@ pub struct Remarks {
     pub marks: Vec<Mark>,
     /// The ways of the ball's centre between passes, mm.
     pub links_mm: Vec<Vec<DVec3>>,
+    /// Passes against the fastest motion within the limits.
+    pub passes: Vec<PassTime>,
 }
 
 /// Content of the page.

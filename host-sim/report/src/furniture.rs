@@ -49,7 +49,7 @@ pub(super) fn open(out: &mut String, [width, height]: [f64; 2], words: &PictureT
     text(out, "iso-soft", [28.0, 64.0], 15.0, "", &words.subtitle);
 }
 
-fn text(out: &mut String, class: &str, [x, y]: [f64; 2], size: f64, more: &str, words: &str) {
+pub(super) fn text(out: &mut String, class: &str, [x, y]: [f64; 2], size: f64, more: &str, words: &str) {
     let (x, y, size, words) = (tenths(x), tenths(y), tenths(size), escape(words));
     let _ = writeln!(
         out,

@@ -1,11 +1,12 @@
 //! Pictures and pages of a run.
 //!
 //! ```text
-//! samples ─┬─ record.rs ─► drawn passes ─┬─ scene.rs, picture.rs, furniture.rs ─► path.svg
+//! samples ─┬─ record.rs ─► drawn passes ─┬─ scene.rs, picture.rs, furniture.rs, marks.rs ─► path.svg
 //!          │     job ─► mesh.rs, view.rs ┤                                          │
 //!          ├─ track.rs ──► all passes, thinned ─┐                                   │
 //!          ├─ series.rs ─► spans of time ───────┼─ payload.rs ─► data ─┬─ page.rs ──► index.html
 //!          ├─ scallops.rs ─► heights ───────────┤   viewer/: scripts ──┘
+//!          ├─ binding.rs ──► speed and limits ──┤
 //!          └─ setting.rs ──► marks, machine ────┘
 //! study of the paper ─► chart.rs, paper/ ──────────────────────────────► index.html of `cargo sim paper`
 //! ```
@@ -16,11 +17,13 @@
 //! The stored data of a run is bounded. A point of the view represents the worst of its samples, a point of a chart the minimum and
 //! the maximum, and the page states the number of samples per point.
 
+mod binding;
 mod content;
 #[cfg(test)]
 mod data_tests;
 mod embed;
 mod furniture;
+mod marks;
 mod measure;
 mod mesh;
 pub mod number;
@@ -99,7 +102,8 @@ impl Sketch {
         let oracle = Oracle::new(&self.job).map_err(io::Error::other)?;
         let words = PictureTexts::new(&self.job, &self.record, job_name, findings);
         let mesh = mesh::Mesh::new(&oracle);
-        Ok(picture::picture(&mesh, &self.record, self.job.radius_mm, &words).svg)
+        let marks = marks::Marks::default();
+        Ok(picture::picture(&mesh, &self.record, self.job.radius_mm, &words, &marks).svg)
     }
 
     /// Writes `path.svg` and `index.html` into a folder, which is created if missing, and returns the path of the page.
@@ -117,7 +121,8 @@ impl Sketch {
         let oracle = Oracle::new(&self.job).map_err(io::Error::other)?;
         let mesh = mesh::Mesh::new(&oracle);
         let words = PictureTexts::new(&self.job, &self.record, job_name, findings);
-        let picture = picture::picture(&mesh, &self.record, self.job.radius_mm, &words);
+        let marks = marks::Marks::new(&oracle, remarks);
+        let picture = picture::picture(&mesh, &self.record, self.job.radius_mm, &words, &marks);
         let page = page::page(&Content {
             job: &self.job,
             approach: self.approach,

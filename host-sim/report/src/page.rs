@@ -22,18 +22,25 @@ const POLICY: &str =
     "default-src 'none'; script-src 'unsafe-inline'; style-src 'unsafe-inline'; img-src data:";
 /// The libraries of view and charts, built by `scripts/viewer`, and the scripts of the page, which share one scope.
 const LIBRARIES: &str = include_str!("viewer/three-bundle.min.js");
-const SCRIPTS: [&str; 7] = [
+const SCRIPTS: [&str; 8] = [
     include_str!("viewer/data.js"),
     include_str!("viewer/words.js"),
     include_str!("viewer/scene.js"),
     include_str!("viewer/setting.js"),
     include_str!("viewer/panel.js"),
     include_str!("viewer/charts.js"),
+    include_str!("viewer/binding.js"),
     include_str!("viewer/main.js"),
 ];
 const VIEW: &str = include_str!("viewer/view.html");
 const CHARTS: &str = include_str!("viewer/charts.html");
 const LICENCES: &str = include_str!("viewer/three-bundle.licence.txt");
+
+/// What the chart of the limits shows.
+const BINDING_WORDS: &str = "The speed of the cutter contact (CC) as emitted, and the fastest motion on the same pass that an offline solver finds within the \
+programmed feed and the limits of the axes, coloured by what binds: of velocity, acceleration and jerk of x, y, z, as differences of that motion's samples, \
+the one that uses most of its limit. The solver's motion holds every limit but is not proved to be the fastest, so the emitted speed may be above it in places. The first, the middle and the last pass, and \
+those that could be slowest. At a turn beyond the boundary the fastest motion may begin and end at any speed.";
 
 /// The whole page.
 pub(super) fn page(content: &Content<'_>) -> String {
@@ -66,7 +73,8 @@ pub(super) fn page(content: &Content<'_>) -> String {
     out.push_str(
         &CHARTS
             .replace("@series", &series_words(content))
-            .replace("@intervals", &interval_words(content)),
+            .replace("@intervals", &interval_words(content))
+            .replace("@binding", BINDING_WORDS),
     );
     tables(&mut out, content);
     footer(&mut out, content);
@@ -208,7 +216,9 @@ fn series_words(content: &Content<'_>) -> String {
     } else {
         String::new()
     };
-    let ends = if content.job.machine.has_limits() {
+    let ends = if content.oracle.overruns {
+        "The first pass begins and the last one ends at standstill; turns and other links between passes are not in the charts."
+    } else if content.job.machine.has_limits() {
         "Each pass runs from standstill to standstill; links between passes are not in the charts."
     } else {
         "The last period of a pass is shorter than the others and has no speed."

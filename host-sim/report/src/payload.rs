@@ -2,6 +2,7 @@
 
 use serde_json::{Value, json};
 
+use super::binding;
 use super::content::Content;
 use super::embed::{Scale, words};
 use super::measure::{self, Gap};
@@ -75,6 +76,7 @@ pub(super) fn payload(content: &Content<'_>) -> Value {
         "track": content.track.json(|nm| around.place(millimetres(nm))),
         "series": content.series.json(),
         "intervals": intervals(content),
+        "binding": binding::json(&content.remarks.passes),
         "scallops": scallops,
         "setting": setting(content),
     })

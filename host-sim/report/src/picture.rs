@@ -3,6 +3,7 @@
 use std::fmt::Write;
 
 use super::furniture;
+use super::marks::Marks;
 use super::mesh::{Mesh, Quad};
 use super::record::{Place, Record};
 use super::scene::{Layer, Scene};
@@ -44,8 +45,14 @@ pub(super) struct Picture {
 }
 
 /// The whole picture.
-pub(super) fn picture(mesh: &Mesh, record: &Record, radius_mm: f64, words: &PictureTexts) -> Picture {
-    let scene = Scene::new(mesh, record, radius_mm, FRAME);
+pub(super) fn picture(
+    mesh: &Mesh,
+    record: &Record,
+    radius_mm: f64,
+    words: &PictureTexts,
+    marks: &Marks,
+) -> Picture {
+    let scene = Scene::new(mesh, record, radius_mm, marks.places(), FRAME);
     let mut out = String::new();
     furniture::open(&mut out, SIZE, words);
     let (quads, front) = scene.quads();
@@ -57,6 +64,7 @@ pub(super) fn picture(mesh: &Mesh, record: &Record, radius_mm: f64, words: &Pict
         scene.edges().iter().map(|(_, run)| run),
     );
     passes(&mut out, &scene, record, Layer::Under);
+    marks.ridges(&mut out, &scene, Layer::Under);
     one(&mut out, &scene, Layer::Under);
     if let Some(ball) = &scene.ball {
         normals(&mut out, &scene, Layer::Under);
@@ -64,12 +72,14 @@ pub(super) fn picture(mesh: &Mesh, record: &Record, radius_mm: f64, words: &Pict
     }
     surface(&mut out, &scene, &front, &shading);
     passes(&mut out, &scene, record, Layer::Over);
+    marks.ridges(&mut out, &scene, Layer::Over);
     one(&mut out, &scene, Layer::Over);
     arrows(&mut out, &scene, record);
     if let Some(ball) = &scene.ball {
         tool_path(&mut out, &scene);
         furniture::contact(&mut out, ball);
     }
+    marks.numbers(&mut out, &scene, [28.0, 88.0]);
     furniture::triad(&mut out, &scene.camera.view, [70.0, SIZE[1] - 58.0]);
     furniture::scale_bar(&mut out, scene.camera.scale, [SIZE[0] - 44.0, SIZE[1] - 44.0]);
     furniture::key(&mut out, words, scene.ball.is_some(), [150.0, SIZE[1] - 62.0]);
@@ -154,7 +164,7 @@ fn brightness(normal: DVec3) -> f64 {
 }
 
 /// One SVG path of all these lines.
-fn lines<'a>(out: &mut String, class: &str, runs: impl Iterator<Item = &'a Vec<[f64; 2]>>) {
+pub(super) fn lines<'a>(out: &mut String, class: &str, runs: impl Iterator<Item = &'a Vec<[f64; 2]>>) {
     let data: String = runs.map(|run| polyline(&simplified(run, TOLERANCE))).collect();
     if !data.is_empty() {
         let _ = writeln!(out, "<path class=\"{class}\" d=\"{data}\"/>");

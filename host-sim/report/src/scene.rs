@@ -59,8 +59,14 @@ pub(super) struct Scene<'a> {
 }
 
 impl<'a> Scene<'a> {
-    /// The best view of the surface, with the tool on the middle pass of the record.
-    pub(super) fn new(mesh: &'a Mesh, record: &Record, radius_mm: f64, frame: Frame) -> Self {
+    /// The best view of the surface, with the tool on the middle pass of the record, and these places within the frame.
+    pub(super) fn new(
+        mesh: &'a Mesh,
+        record: &Record,
+        radius_mm: f64,
+        marked: impl Iterator<Item = DVec3>,
+        frame: Frame,
+    ) -> Self {
         let one = highlighted(record).map(|drawn| (drawn.pass, drawn.places.items()));
         let has_tool = radius_mm < BALL_SHARE * mesh.diagonal();
         let mut extent = mesh.extent();
@@ -77,6 +83,7 @@ impl<'a> Scene<'a> {
                 }));
             }
         }
+        extent.extend(marked);
         let camera = Camera::new(view, &extent, frame);
         let mut scene = Self {
             mesh,
@@ -159,6 +166,12 @@ impl<'a> Scene<'a> {
             (placed, layer)
         });
         runs(layers)
+    }
+
+    /// A place in the picture, and whether it is visible.
+    pub(super) fn spot(&self, place: DVec3) -> ([f64; 2], bool) {
+        let placed = self.camera.place(place);
+        (placed.truncate().to_array(), self.depth.shows(placed))
     }
 
     /// Visible parts of a line in space.

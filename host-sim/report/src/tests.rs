@@ -5,7 +5,7 @@ use std::path::Path;
 use super::furniture::round_below;
 use super::record::{DecimatedStream, Record};
 use super::svg::{escape, polyline, simplified, tenths};
-use super::{Figure, Remarks, Sketch, measure, number};
+use super::{Figure, Mark, Remarks, RidgePoint, Scallops, Sketch, measure, number};
 use job::Job;
 use machine::Machine;
 use machine::prepare::prepare;
@@ -233,6 +233,97 @@ fn report_is_well_formed_small_and_says_what_was_found() {
     ] {
         assert_eq!(value_of(&page, what), value, "{what}");
     }
+}
+
+/// The picture has what is wrong, too: marks with numbers and words, and the ridges above the limit, as long as they are.
+#[test]
+fn marks_and_high_ridges_are_in_the_picture() {
+    let (_, sketch, findings) = run(BELL);
+    let folder = tempfile::tempdir().unwrap();
+    let oracle = Oracle::new(&sketch.job).unwrap();
+    let [[u0, u1], [v0, v1]] = oracle.surface.domain();
+    let at = |share: f64, height_mm: f32| RidgePoint {
+        u: u0 + (u1 - u0) * share,
+        v: 0.5 * (v0 + v1),
+        height_mm,
+    };
+    // Above the limit of 0.05 mm and the error from 0.25 to 0.5 of the way.
+    let ridge = (0..=100).map(|k| {
+        at(
+            f64::from(k) / 100.0,
+            if (25..=50).contains(&k) { 0.06 } else { 0.0505 },
+        )
+    });
+    let mark = |what: &str, share: f64| Mark {
+        what: what.to_owned(),
+        place_mm: oracle.surface.at(u0 + (u1 - u0) * share, 0.5 * (v0 + v1)).point,
+        tick: None,
+    };
+    let mut marks: Vec<Mark> = (0..9)
+        .map(|k| mark(&format!("touch {k} in <jaw>"), 0.1 * f64::from(k)))
+        .collect();
+    marks.push(Mark {
+        place_mm: oracle.surface.at(0.5 * (u0 + u1), 0.5 * (v0 + v1)).point - glam::DVec3::Z * 30.0,
+        ..mark("gouge far below", 0.0)
+    });
+    let picture = |remarks: &Remarks| {
+        let page = sketch
+            .write(folder.path(), Path::new("bell.toml"), &findings, remarks)
+            .unwrap();
+        let page = std::fs::read_to_string(page).unwrap();
+        let svg = std::fs::read_to_string(folder.path().join("path.svg")).unwrap();
+        assert!(page.contains(&svg));
+        assert_well_formed(&svg);
+        svg
+    };
+    let bare = picture(&Remarks::default());
+    assert!(!bare.contains("class=\"iso-mark") && !bare.contains("iso-line iso-over"));
+    let mut scallops = Scallops {
+        limit_mm: 0.05,
+        measurement_error_mm: 0.001,
+        ridges: vec![(0, ridge.collect())],
+        anywhere: false,
+    };
+    let svg = picture(&Remarks {
+        marks: marks.clone(),
+        scallops: Some(scallops.clone()),
+        ..Remarks::default()
+    });
+    for text in [
+        "1 touch 0 in &lt;jaw&gt;",
+        "8 touch 7 in &lt;jaw&gt;",
+        "and 2 more",
+        "above the scallop limit",
+    ] {
+        assert!(svg.contains(text), "{text}");
+    }
+    assert_eq!(svg.matches("class=\"iso-mark").count(), 10);
+    // The one behind the surface is hollow, and within the picture.
+    let hollow = svg
+        .lines()
+        .rfind(|line| line.contains("class=\"iso-mark-hidden"))
+        .unwrap();
+    let centre = |name: &str| {
+        let from = hollow.find(name).unwrap() + name.len();
+        hollow[from..].split('"').next().unwrap().parse::<f64>().unwrap()
+    };
+    assert!(
+        (0.0..960.0).contains(&centre("cx=\"")) && (0.0..620.0).contains(&centre("cy=\"")),
+        "{hollow}"
+    );
+    assert!(svg.contains("iso-line iso-over"));
+    // One point is drawn, none is not.
+    scallops.ridges[0].1.truncate(26);
+    let only = |scallops: &Scallops| {
+        picture(&Remarks {
+            scallops: Some(scallops.clone()),
+            ..Remarks::default()
+        })
+        .contains("iso-line iso-over")
+    };
+    assert!(only(&scallops));
+    scallops.ridges[0].1.truncate(25);
+    assert!(!only(&scallops));
 }
 
 #[test]

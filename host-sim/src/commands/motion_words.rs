@@ -2,7 +2,7 @@
 
 use serde_json::{Map, Value, json};
 use verify::motion::times::STAND_MAX_S;
-use verify::motion::{JobTimes, OptimumTimes, PassTime};
+use verify::motion::{JobTimes, OptimumTimes, PassEnd, PassTime};
 
 use super::out::say;
 
@@ -59,6 +59,7 @@ fn motion(optimum: &OptimumTimes) -> Value {
             json!({
                 "pass": judged.pass, "length_mm": judged.length_mm, "optimum_s": judged.best.feasible_s,
                 "bound_s": judged.best.lower_bound_s, "ours_s": judged.ours_s, "ratio": judged.ratio(),
+                "ends": judged.ends.map(end_name),
             })
         })
         .collect();
@@ -66,6 +67,14 @@ fn motion(optimum: &OptimumTimes) -> Value {
         "optimum_s": sum(&|judged| judged.best.feasible_s), "bound_s": sum(&|judged| judged.best.lower_bound_s),
         "ours_s": ours, "ratio_bound_others": optimum.ratio_bound, "passes": passes,
     })
+}
+
+/// The name of an end in JSON.
+fn end_name(end: PassEnd) -> &'static str {
+    match end {
+        PassEnd::Rest => "rest",
+        PassEnd::Free => "free",
+    }
 }
 
 fn row(name: &str, text: &str) {
@@ -104,8 +113,14 @@ pub(super) fn print(times: &JobTimes, optimum: &OptimumTimes) {
         row(
             &format!("motion, pass {}", judged.pass),
             &format!(
-                "{:.2} mm: at least {bound:.4} s, optimum {best:.4} s{ours}",
-                judged.length_mm
+                "{:.2} mm: at least {bound:.4} s, optimum {best:.4} s{ours}{}",
+                judged.length_mm,
+                match judged.ends {
+                    [PassEnd::Rest, PassEnd::Rest] => "",
+                    [PassEnd::Rest, PassEnd::Free] => "; end free",
+                    [PassEnd::Free, PassEnd::Rest] => "; beginning free",
+                    [PassEnd::Free, PassEnd::Free] => "; both ends free",
+                }
             ),
         );
     }
@@ -122,5 +137,11 @@ pub(super) fn print(times: &JobTimes, optimum: &OptimumTimes) {
             .whole_ratio
             .map_or_else(String::new, |ratio| format!("; the whole job at most {ratio:.4}"));
         row("time over optimum", &format!("{worst:.4}{others}{whole}"));
+        if optimum.free_ends > 0 {
+            row(
+                "",
+                "free ends: where the tool turns beyond the boundary, the optimum passes it at any speed",
+            );
+        }
     }
 }

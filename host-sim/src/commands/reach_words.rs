@@ -5,7 +5,7 @@ use serde_json::{Value, json};
 use job::Job;
 use report::Mark;
 use verify::Verdict;
-use verify::reach::{ReachFinding, ReachResult};
+use verify::reach::{Obstacle, ReachFinding, ReachResult, ToolPart};
 
 use super::out::say;
 use super::swept_words::mark;
@@ -82,7 +82,7 @@ pub(super) fn marks(job: &Job, reach: &ReachResult) -> Vec<Mark> {
             "{} {:.3} mm in {}",
             finding.part.name(),
             finding.depth_mm,
-            finding.obstacle.told(job)
+            finding.told(job)
         ),
         place_mm: finding.place_mm,
         tick: Some(finding.sample as u64),
@@ -126,7 +126,7 @@ pub(super) fn print(job: &Job, reach: &ReachResult) {
     }
     for finding in &reach.findings {
         let name = format!("reach: {}", finding.part.name());
-        let obstacle = finding.obstacle.told(job);
+        let obstacle = finding.told(job);
         let [x, y, z] = finding.place_mm.to_array();
         let place = format!("x = {x:.3}, y = {y:.3}, z = {z:.3}, tick {}", finding.sample);
         let error = finding.bound_mm - finding.depth_mm;
@@ -141,6 +141,9 @@ pub(super) fn print(job: &Job, reach: &ReachResult) {
             ),
             (Verdict::Met, Some(clearance)) if finding.depth_mm.is_finite() => {
                 format!("off {obstacle}, by {clearance:.3} mm at least; nearest at {place}")
+            }
+            (Verdict::Met, _) if (finding.part, finding.obstacle) == (ToolPart::Ball, Obstacle::Surface) => {
+                format!("is not below {obstacle}")
             }
             (Verdict::Met, _) => format!("does not touch {obstacle}"),
         };

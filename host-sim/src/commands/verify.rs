@@ -302,6 +302,7 @@ fn verify_job(arguments: &Arguments, path: &Path, directory: Option<&Path>) -> R
         scallops: Some(scallops(&job, swept)),
         marks: marks(&job, &timed, &found.measured),
         links_mm: found.measured.links_mm.clone(),
+        passes: found.measured.optimum.passes.clone(),
         ..remarks(&timed, findings)
     };
     remarks.warnings.extend(found.warnings.iter().cloned());

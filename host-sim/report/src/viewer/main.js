@@ -11,16 +11,18 @@ function start() {
     document.querySelectorAll(".needs-script").forEach((part) => (part.hidden = false));
     const times = payload.series.whole.count > 1 ? new TimeCharts(payload) : null;
     const passes = new PassCharts(payload);
+    const binding = payload.binding.length > 0 ? new BindingChart(payload) : null;
     byId("over-time").hidden = !times;
+    byId("by-limit").hidden = !binding;
     byId("by-pass").hidden = passes.cards.length === 0;
-    report.charts = [times, passes].filter((charts) => charts !== null);
+    report.charts = [times, passes, binding].filter((charts) => charts !== null);
     const build = () => report.charts.forEach((charts) => charts.build());
     build();
     // Figures and charts are ready before WebGL is initialised.
     requestAnimationFrame(() =>
         setTimeout(() => {
             if (hasPath) openView(payload, report);
-            if (report.panel) times?.follow(report.panel);
+            if (report.panel) [times, binding].forEach((charts) => charts?.follow(report.panel));
             follow(report, build);
             report.ready = true;
         }),

@@ -1,11 +1,12 @@
-//! Lower bound of the time of a pass from standstill to standstill.
+//! Lower bound of the time of a pass, from standstill to standstill or with ends that are free: passed at any speed and acceleration.
 //!
 //! Two relaxations are combined. Within the pass jerk is ignored: velocity and acceleration alone give the largest speed of any motion
 //! at each point, by a backward and a forward sweep over `v^2` (Q.-C. Pham, H. Pham, "A New Approach to Time-Optimal Path
 //! Parameterization Based on Reachability Analysis", IEEE Trans. Robotics 34, 2018). At each end the path is replaced by the distance of the
 //! centre along its first (last) direction, whose least time from standstill includes the jerk limit. The bound is the larger of this and of the
-//! time of the jerk-limited move over the chord. The extra time for steps of the path's derivatives is ignored.
+//! time of the jerk-limited move over the chord. At a free end there is no ramp, and no chord. The extra time for steps of the path's derivatives is ignored.
 
+use super::optimum::PassEnd;
 use super::path::PassPath;
 use super::point::LineLimits;
 use glam::DVec3;
@@ -73,7 +74,7 @@ pub(super) struct MaxSpeedProfile {
 }
 
 impl MaxSpeedProfile {
-    pub(super) fn new(path: &PassPath<'_>, feed_mm_s: f64, limits: &AxisLimits) -> Self {
+    pub(super) fn new(path: &PassPath<'_>, feed_mm_s: f64, limits: &AxisLimits, ends: [PassEnd; 2]) -> Self {
         let (mut arcs, mut firsts, mut seconds) = (Vec::new(), Vec::new(), Vec::new());
         for (span, ends) in path.breaks().windows(2).enumerate() {
             let share = (ends[1] - ends[0]) / path.length_mm();
@@ -101,7 +102,11 @@ impl MaxSpeedProfile {
             .iter()
             .map(|first| limits.speed_cap(*first, feed_mm_s).powi(2))
             .collect();
-        (squares[0], squares[count - 1]) = (0.0, 0.0);
+        for (end, index) in ends.into_iter().zip([0, count - 1]) {
+            if end == PassEnd::Rest {
+                squares[index] = 0.0;
+            }
+        }
         let mut fastest = Self {
             arcs,
             squares,
@@ -187,15 +192,16 @@ fn least_times_from_rest(places: &[(DVec3, DVec3)], feed_mm_s: f64, limits: &Axi
 
 /// The lower bound, s. 0 for a pass of zero length.
 #[must_use]
-pub fn lower_bound_s(path: &PassPath<'_>, feed_mm_s: f64, limits: &AxisLimits) -> f64 {
+pub fn lower_bound_s(path: &PassPath<'_>, feed_mm_s: f64, limits: &AxisLimits, ends: [PassEnd; 2]) -> f64 {
     if path.length_mm() <= 0.0 {
         return 0.0;
     }
     bound_of(
-        &MaxSpeedProfile::new(path, feed_mm_s, limits),
+        &MaxSpeedProfile::new(path, feed_mm_s, limits, ends),
         path,
         feed_mm_s,
         limits,
+        ends,
     )
 }
 
@@ -204,6 +210,7 @@ pub(super) fn bound_of(
     path: &PassPath<'_>,
     feed_mm_s: f64,
     limits: &AxisLimits,
+    ends: [PassEnd; 2],
 ) -> f64 {
     let times = fastest.times();
     let whole = times[times.len() - 1];
@@ -213,9 +220,13 @@ pub(super) fn bound_of(
         .zip(&fastest.firsts)
         .map(|(arc, first)| (path.position(*arc), *first))
         .collect();
-    let forwards = least_times_from_rest(&places, feed_mm_s, limits);
+    let least_times = |places: &[(DVec3, DVec3)], end: PassEnd| match end {
+        PassEnd::Rest => least_times_from_rest(places, feed_mm_s, limits),
+        PassEnd::Free => vec![0.0; places.len()],
+    };
+    let forwards = least_times(&places, ends[0]);
     places.reverse();
-    let mut backwards = least_times_from_rest(&places, feed_mm_s, limits);
+    let mut backwards = least_times(&places, ends[1]);
     backwards.reverse();
     places.reverse();
     // Extra time of the ramps at both ends over the sweep, maximised over the two points where the relaxations change, in order.
@@ -228,7 +239,7 @@ pub(super) fn bound_of(
     let chord = places[places.len() - 1].0 - places[0].0;
     let distance = chord.length();
     let mut straight = 0.0;
-    if distance > 0.0 {
+    if distance > 0.0 && ends == [PassEnd::Rest; 2] {
         let direction = chord / distance;
         let along = limits.along(direction);
         let gain = fastest

@@ -1,4 +1,4 @@
-//! The least time of a pass from standstill to standstill: a lower bound, and a motion that holds all limits.
+//! The least time of a pass, from standstill to standstill or with free ends: a lower bound, and a motion that holds all limits.
 //!
 //! ```text
 //! PassPath ──bound.rs──► lower bound; largest speeds ──► grid ──programme.rs──► motion, faster each time ──timing.rs──► one
@@ -10,6 +10,7 @@
 
 use super::bound::{MaxSpeedProfile, PathBounds as _, bound_of};
 use super::path::PassPath;
+use super::profile::SpeedPoint;
 use super::programme::{Interval, MotionProfile, Programme};
 use super::timing::Timing;
 use glam::DVec3;
@@ -35,6 +36,15 @@ const CHANGE: f64 = 0.04;
 const LEAST: f64 = 1e-9;
 /// Steps of a derivative below this share of a jerk limit are ignored.
 const STEP_JERK_SHARE_MIN: f64 = 1e-3;
+
+/// How a pass begins or ends.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum PassEnd {
+    /// At standstill.
+    Rest,
+    /// At any speed and acceleration within the limits: the tool comes from beyond the boundary, or goes there.
+    Free,
+}
 
 /// Bounds of the least time of a pass.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -62,23 +72,53 @@ pub fn optimum(
     feed_mm_s: f64,
     limits: &AxisLimits,
     period_s: f64,
+    ends: [PassEnd; 2],
 ) -> Result<Optimum, NoFeasibleMotion> {
+    optimum_profile(path, feed_mm_s, limits, period_s, ends).map(|(optimum, _)| optimum)
+}
+
+/// As [`optimum`], with the speed of the motion and the limit that binds it, period by period.
+///
+/// # Errors
+/// [`NoFeasibleMotion`] where the solver fails.
+pub fn optimum_profile(
+    path: &PassPath<'_>,
+    feed_mm_s: f64,
+    limits: &AxisLimits,
+    period_s: f64,
+    ends: [PassEnd; 2],
+) -> Result<(Optimum, Vec<SpeedPoint>), NoFeasibleMotion> {
     if path.length_mm() <= 0.0 {
-        return Ok(Optimum {
+        let nothing = Optimum {
             lower_bound_s: 0.0,
             feasible_s: 0.0,
             uses: [0.0; 3],
-        });
+        };
+        return Ok((nothing, Vec::new()));
     }
-    let fastest = MaxSpeedProfile::new(path, feed_mm_s, limits);
-    let lower_bound_s = bound_of(&fastest, path, feed_mm_s, limits);
-    let search = MotionSearch::new(path, feed_mm_s, limits, period_s, &fastest);
-    let (feasible_s, uses) = search.motion()?;
-    Ok(Optimum {
+    let fastest = MaxSpeedProfile::new(path, feed_mm_s, limits, ends);
+    let lower_bound_s = bound_of(&fastest, path, feed_mm_s, limits, ends);
+    let search = MotionSearch::new(path, feed_mm_s, limits, period_s, &fastest, ends);
+    let motion = search.motion()?;
+    let optimum = Optimum {
         lower_bound_s,
-        feasible_s,
-        uses,
-    })
+        feasible_s: motion.time_s,
+        uses: motion.uses,
+    };
+    let profile = motion
+        .timing
+        .profile(path, feed_mm_s, limits, period_s, motion.slower);
+    Ok((optimum, profile))
+}
+
+/// A motion within the limits.
+struct FoundMotion {
+    time_s: f64,
+    /// Largest use of the limits by its samples.
+    uses: [f64; 3],
+    /// The motion before it is slowed down, and the factor of time by which it is.
+    timing: Timing,
+    slower: f64,
 }
 
 /// A point where the motion slows down: an end, or a break where the path's derivatives step.
@@ -110,6 +150,9 @@ struct MotionSearch<'a> {
     limits: &'a AxisLimits,
     period_s: f64,
     fastest: &'a MaxSpeedProfile,
+    ends: [PassEnd; 2],
+    /// Path jerk of the ramps at the ends, mm/s^3.
+    end_jerks: [f64; 2],
     slow_points: Vec<SlowPoint>,
     steps: Vec<DerivativeStep>,
 }
@@ -135,15 +178,20 @@ impl<'a> MotionSearch<'a> {
         limits: &'a AxisLimits,
         period_s: f64,
         fastest: &'a MaxSpeedProfile,
+        ends: [PassEnd; 2],
     ) -> Self {
         let length = path.length_mm();
         let breaks = path.breaks();
-        let end = |span: usize, arc: f64| SlowPoint {
-            arc,
-            speed: 0.0,
-            jerk: END_JERK * path_jerk(path.at(span, arc).first, limits),
-        };
-        let mut slow_points = vec![end(0, 0.0), end(breaks.len() - 2, length)];
+        let places = [(0, 0.0), (breaks.len() - 2, length)];
+        let end_jerks = places.map(|(span, arc)| END_JERK * path_jerk(path.at(span, arc).first, limits));
+        let mut slow_points: Vec<SlowPoint> = (0..2)
+            .filter(|end| ends[*end] == PassEnd::Rest)
+            .map(|end| SlowPoint {
+                arc: places[end].1,
+                speed: 0.0,
+                jerk: end_jerks[end],
+            })
+            .collect();
         let mut steps = Vec::new();
         for (span, arc) in breaks.iter().enumerate().take(breaks.len() - 1).skip(1) {
             let (before, after) = (path.at(span - 1, *arc), path.at(span, *arc));
@@ -183,6 +231,8 @@ impl<'a> MotionSearch<'a> {
             limits,
             period_s,
             fastest,
+            ends,
+            end_jerks,
             slow_points,
             steps,
         }
@@ -202,9 +252,12 @@ impl<'a> MotionSearch<'a> {
             })
     }
 
-    /// Duration of the motion before the first node, and after the last one: a ramp at the jerk limit.
+    /// Duration of the motion before the first node, and after the last one: a ramp at the jerk limit; 0 where the end is free.
     fn end_time_s(&self, end: usize) -> f64 {
-        let jerk = self.slow_points[end].jerk;
+        if self.ends[end] == PassEnd::Free {
+            return 0.0;
+        }
+        let jerk = self.end_jerks[end];
         // Limits the ramp to less than half of a short pass.
         let rise = (self.feed_mm_s / jerk).sqrt();
         let whole = (6.0 * self.path.length_mm() / jerk).cbrt();
@@ -212,15 +265,15 @@ impl<'a> MotionSearch<'a> {
     }
 
     fn end_arc(&self, end: usize) -> f64 {
-        self.slow_points[end].jerk * self.end_time_s(end).powi(3) / 6.0
+        self.end_jerks[end] * self.end_time_s(end).powi(3) / 6.0
     }
 
-    /// Squared speed and acceleration at the first node, and at the last.
-    fn ends(&self) -> [[f64; 2]; 2] {
+    /// Squared speed and acceleration at the first node, and at the last, where the pass begins or ends at rest.
+    fn ends(&self) -> [Option<[f64; 2]>; 2] {
         [0, 1].map(|end| {
-            let (jerk, time) = (self.slow_points[end].jerk, self.end_time_s(end));
+            let (jerk, time) = (self.end_jerks[end], self.end_time_s(end));
             let acceleration = if end == 0 { jerk * time } else { -jerk * time };
-            [(0.5 * jerk * time * time).powi(2), acceleration]
+            (time > 0.0).then_some([(0.5 * jerk * time * time).powi(2), acceleration])
         })
     }
 
@@ -235,7 +288,7 @@ impl<'a> MotionSearch<'a> {
         for slow in &self.slow_points {
             let (way, reach) = ((arc - slow.arc).abs(), reach(slow));
             if way < 3.0 * reach {
-                let least = (slow.speed * self.period_s).max(0.5 * self.end_arc(0));
+                let least = (slow.speed * self.period_s).max(0.5 * self.end_arc(0).max(self.end_arc(1)));
                 most = most.min((reach / RAMP).min((GROWTH * way).max(least)));
             }
         }
@@ -312,8 +365,8 @@ impl<'a> MotionSearch<'a> {
         most
     }
 
-    /// The fastest motion found: its duration, and the use of the limits by its samples.
-    fn motion(&self) -> Result<(f64, [f64; 3]), NoFeasibleMotion> {
+    /// The fastest motion found.
+    fn motion(&self) -> Result<FoundMotion, NoFeasibleMotion> {
         let coarse = self.grid(None);
         let floor = LEAST * self.feed_mm_s.powi(2);
         let guess: Vec<f64> = coarse
@@ -328,7 +381,7 @@ impl<'a> MotionSearch<'a> {
             .iter()
             .map(|arc| interpolated(&coarse, &profile, *arc).max(floor))
             .collect();
-        let mut best: Option<(f64, [f64; 3])> = None;
+        let mut best: Option<FoundMotion> = None;
         for _ in 0..ROUNDS {
             let profile = self.improved(&grid, guess)?;
             let timing = self.timing(&grid, &profile);
@@ -336,9 +389,14 @@ impl<'a> MotionSearch<'a> {
             // Slowed down by one factor until the samples hold every limit.
             let slower = uses[0].max(uses[1].sqrt()).max(uses[2].cbrt()).max(1.0);
             let time = timing.duration_s() * slower;
-            if best.is_none_or(|(least, _)| time < least) {
+            if best.as_ref().is_none_or(|best| time < best.time_s) {
                 let powers = [slower, slower.powi(2), slower.powi(3)];
-                best = Some((time, std::array::from_fn(|k| uses[k] / powers[k])));
+                best = Some(FoundMotion {
+                    time_s: time,
+                    uses: std::array::from_fn(|k| uses[k] / powers[k]),
+                    timing,
+                    slower,
+                });
             }
             if slower <= 1.0 + ABOVE {
                 break;
@@ -387,7 +445,7 @@ impl<'a> MotionSearch<'a> {
         Timing::new(
             &grid.arcs,
             profile,
-            [0, 1].map(|end| (self.slow_points[end].jerk, self.end_time_s(end))),
+            [0, 1].map(|end| (self.end_jerks[end], self.end_time_s(end))),
             self.path.length_mm(),
         )
     }

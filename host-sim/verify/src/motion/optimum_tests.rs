@@ -31,7 +31,7 @@ fn circle(radius: f64, ratio: f64, turns: f64) -> PassPath<'static> {
 }
 
 fn found(path: &PassPath<'_>, feed: f64, limits: &AxisLimits) -> Optimum {
-    let found = optimum(path, feed, limits, PERIOD_S).unwrap();
+    let found = optimum(path, feed, limits, PERIOD_S, [PassEnd::Rest; 2]).unwrap();
     assert!(found.uses.iter().all(|use_| *use_ <= 1.0 + 1e-9), "{found:?}");
     assert!(found.lower_bound_s <= found.feasible_s, "{found:?}");
     found
@@ -106,6 +106,82 @@ fn circles_run_at_their_limit_speed() {
         assert!(turn <= 1.002 * exact && turn >= 0.85 * exact, "{turn} {exact}");
     }
 }
+
+/// From rest, or to rest, with the other end free: jerk and acceleration at their limits, and at the feed what is left of the way.
+#[test]
+fn free_ends_agree_with_the_closed_form() {
+    let usual = AxisLimits::DEFAULT;
+    for (length, feed) in [(1.0, 90.0), (6.0, 90.0), (40.0, 90.0), (20.0, 10.0)] {
+        let line = line(length, DVec3::X);
+        let limits = LineLimits {
+            velocity: feed,
+            acceleration: usual.acceleration_mm_s2[0],
+            jerk: usual.jerk_mm_s3[0],
+        };
+        let ramp = limits.ramp_s(feed);
+        let exact = if 0.5 * feed * ramp > length {
+            limits.reach_s(length)
+        } else {
+            ramp + (length - 0.5 * feed * ramp) / feed
+        };
+        for (ends, exact) in [
+            ([PassEnd::Rest, PassEnd::Free], exact),
+            ([PassEnd::Free, PassEnd::Rest], exact),
+            ([PassEnd::Free; 2], length / feed),
+        ] {
+            let (found, profile) = optimum_profile(&line, feed, &usual, PERIOD_S, ends).unwrap();
+            assert!(found.uses.iter().all(|use_| *use_ <= 1.0 + 1e-9), "{found:?}");
+            assert!(
+                found.lower_bound_s <= found.feasible_s * (1.0 + 1e-9),
+                "{found:?}"
+            );
+            // A ramp takes about a period more: its samples are differences, too.
+            assert!(
+                (found.feasible_s - exact).abs() <= 1.5 * PERIOD_S,
+                "{length} {feed} {ends:?}: {found:?}, exactly {exact}"
+            );
+            // Where the motion is not at the feed, the jerk or the acceleration of x binds: no other axis moves.
+            let others = profile.iter().filter(|point| {
+                ![Binding::Feed, Binding::Acceleration(0), Binding::Jerk(0)].contains(&point.binding)
+            });
+            assert_eq!(others.count(), 0, "{length} {feed} {ends:?}");
+        }
+    }
+}
+
+/// On a circle the acceleration binds, of the axis that points to the middle; on a straight way the axis with the least velocity.
+#[test]
+fn the_binding_limit_is_the_one_that_is_met() {
+    let limits = AxisLimits {
+        velocity_mm_s: [500.0, 500.0, 40.0],
+        acceleration_mm_s2: [500.0; 3],
+        jerk_mm_s3: [1e6; 3],
+    };
+    let free = [PassEnd::Free; 2];
+    let radius: f64 = 20.0;
+    let path = circle(radius, 1.0, 1.0);
+    let (_, profile) = optimum_profile(&path, 400.0, &limits, PERIOD_S, free).unwrap();
+    let inner = |point: &&SpeedPoint| point.arc_mm > 10.0 && point.arc_mm < path.length_mm() - 10.0;
+    for point in profile.iter().filter(inner) {
+        let (sin, cos) = (point.arc_mm / radius).sin_cos();
+        assert!(point.share < 1.0 + 1e-9, "{point:?}");
+        // Away from the diagonals the axis is certain.
+        if (cos.abs() - sin.abs()).abs() > 0.6 {
+            assert!(point.share > 0.95, "{point:?}");
+            let inwards = usize::from(sin.abs() > cos.abs());
+            assert_eq!(point.binding, Binding::Acceleration(inwards), "{point:?}");
+        }
+    }
+    let slanted = line(60.0, DVec3::new(0.6, 0.0, 0.8));
+    let (_, profile) = optimum_profile(&slanted, 400.0, &limits, PERIOD_S, free).unwrap();
+    for point in &profile {
+        assert_eq!(point.binding, Binding::Velocity(2), "{point:?}");
+        assert!((point.speed_mm_s - 50.0).abs() < 0.05, "{point:?}");
+    }
+    let (_, profile) = optimum_profile(&slanted, 30.0, &limits, PERIOD_S, free).unwrap();
+    assert!(profile.iter().all(|point| point.binding == Binding::Feed));
+}
+
 /// A quarter turn of small radius between two straight lines: the tool slows down in it.
 #[test]
 fn a_bend_is_slower_than_the_straight_lines() {

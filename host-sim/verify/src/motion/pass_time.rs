@@ -6,14 +6,18 @@
 //!
 //! The lower bound is quick and the optimum slow; a pass's time over its optimum is at most its time over its bound, so the passes with the
 //! largest quotients of the latter decide.
+//!
+//! A pass is compared from its first sample to its last. Where a turn beyond the boundary leads to it or away from it, that end is free: the
+//! optimum passes it at any speed, so it is not slower than any motion through the turn, and the quotient includes what the turn costs the pass.
 
 use rayon::prelude::*;
 
 use super::bound::{PathBounds as _, lower_bound_s};
-use super::optimum::{Optimum, optimum};
+use super::optimum::{Optimum, PassEnd, optimum_profile};
 use super::path::PassPath;
-use super::point::LineLimits;
+use super::profile::{EmittedSpeed, SpeedPoint, emitted_speeds};
 use super::times::{JobTimes, LinkTime};
+use crate::swept::ToolPathPass;
 use glam::DVec3;
 use job::{AxisLimits, Job};
 use oracle::Oracle;
@@ -25,17 +29,40 @@ const AT_ONCE: usize = 2;
 
 /// A pass as it ran.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct RunPass {
+pub struct RunPass<'a> {
     /// Pass, from 0.
     pub pass: usize,
-    /// Side parameter.
-    pub side: f64,
+    /// Its samples, without those near the one before.
+    pub track: &'a ToolPathPass,
+    /// Ticks and path parameters of these.
+    pub slow: &'a [(u64, f64)],
     /// Number of samples.
     pub samples: u64,
+    /// Path parameters of the first and the last sample.
+    pub path: [f64; 2],
+    /// How it begins and ends.
+    pub ends: [PassEnd; 2],
+}
+
+impl RunPass<'_> {
+    /// Whether it runs against its path parameter.
+    fn is_reversed(&self) -> bool {
+        self.path[0] > self.path[1]
+    }
+
+    /// The ends in the order of the path parameter.
+    fn path_ends(&self) -> [PassEnd; 2] {
+        let [first, last] = self.ends;
+        if self.is_reversed() {
+            [last, first]
+        } else {
+            self.ends
+        }
+    }
 }
 
 /// The time of a pass, and the least time within the limits.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct PassTime {
     /// Pass, from 0.
     pub pass: usize,
@@ -45,6 +72,12 @@ pub struct PassTime {
     pub best: Optimum,
     /// Time of the job's own samples, s; `None` where the job has no limits.
     pub ours_s: Option<f64>,
+    /// How it begins and ends.
+    pub ends: [PassEnd; 2],
+    /// The fastest motion found, period by period.
+    pub profile: Vec<SpeedPoint>,
+    /// The job's own motion, from sample to sample.
+    pub emitted: Vec<EmittedSpeed>,
 }
 
 impl PassTime {
@@ -67,11 +100,13 @@ pub struct OptimumTimes {
     /// Time of the whole job over the sum of the optima, and where a pass has none, of the lower bounds: at most so much over the optimum.
     /// `None` without limits, and where a pass has neither.
     pub whole_ratio: Option<f64>,
+    /// Ends of passes that are free, because the tool turns beyond the boundary there.
+    pub free_ends: usize,
 }
 
 /// A pass with its lower bound.
-struct Bounded {
-    run: RunPass,
+struct Bounded<'a> {
+    run: RunPass<'a>,
     bound_s: f64,
     ours_s: f64,
 }
@@ -79,27 +114,34 @@ struct Bounded {
 /// Times of the passes by the job's limits, or by [`AxisLimits::DEFAULT`] where it has none: of these the first, the middle and the last
 /// only. Passes for which the oracle has no result, and passes that are a point, are left out.
 #[must_use]
-pub fn optimum_times(job: &Job, oracle: &Oracle, passes: &[RunPass], times: &JobTimes) -> OptimumTimes {
+pub fn optimum_times(job: &Job, oracle: &Oracle, passes: &[RunPass<'_>], times: &JobTimes) -> OptimumTimes {
     let limits = job.machine.limits.unwrap_or(AxisLimits::DEFAULT);
     let period_s = job.machine.period_s();
     let feed_mm_s = job.feed_mm_s();
     let has_limits = job.machine.has_limits();
     #[allow(clippy::cast_precision_loss, reason = "below 2^53")]
-    let ours_s = |run: &RunPass| run.samples.saturating_sub(1) as f64 * period_s;
-    let solve = |run: &RunPass| {
-        let path = PassPath::of_pass(oracle, run.side).ok()?;
-        let best = optimum(&path, feed_mm_s, &limits, period_s).ok()?;
+    let ours_s = |run: &RunPass<'_>| run.samples.saturating_sub(1) as f64 * period_s;
+    let solve = |run: &RunPass<'_>| {
+        let path = PassPath::between(oracle, run.track.side, run.path).ok()?;
+        let (best, mut profile) =
+            optimum_profile(&path, feed_mm_s, &limits, period_s, run.path_ends()).ok()?;
+        if run.is_reversed() {
+            SpeedPoint::reverse(&mut profile, path.length_mm());
+        }
         (best.feasible_s > 0.0).then(|| PassTime {
             pass: run.pass,
             length_mm: path.length_mm(),
             best,
             ours_s: has_limits.then(|| ours_s(run)),
+            ends: run.ends,
+            profile,
+            emitted: emitted_speeds(&path, run.track, run.slow, run.path, period_s),
         })
     };
     let last = passes.len().saturating_sub(1);
     let mut chosen = vec![0, last / 2, last];
     chosen.dedup();
-    let first: Vec<RunPass> = chosen
+    let first: Vec<RunPass<'_>> = chosen
         .iter()
         .filter_map(|index| passes.get(*index).copied())
         .collect();
@@ -107,14 +149,15 @@ pub fn optimum_times(job: &Job, oracle: &Oracle, passes: &[RunPass], times: &Job
     if !has_limits {
         return OptimumTimes {
             passes: solved,
+            free_ends: free_ends(passes),
             ..OptimumTimes::default()
         };
     }
-    let bounded: Vec<Option<Bounded>> = passes
+    let bounded: Vec<Option<Bounded<'_>>> = passes
         .par_iter()
         .map(|run| {
-            let path = PassPath::of_pass(oracle, run.side).ok()?;
-            let bound_s = lower_bound_s(&path, feed_mm_s, &limits);
+            let path = PassPath::between(oracle, run.track.side, run.path).ok()?;
+            let bound_s = lower_bound_s(&path, feed_mm_s, &limits, run.path_ends());
             Some(Bounded {
                 run: *run,
                 bound_s,
@@ -122,14 +165,14 @@ pub fn optimum_times(job: &Job, oracle: &Oracle, passes: &[RunPass], times: &Job
             })
         })
         .collect();
-    let mut open: Vec<&Bounded> = bounded
+    let mut open: Vec<&Bounded<'_>> = bounded
         .iter()
         .flatten()
         .filter(|pass| pass.bound_s > 0.0 && !chosen.contains(&pass.run.pass))
         .collect();
     open.sort_by(|a, b| (b.ours_s / b.bound_s).total_cmp(&(a.ours_s / a.bound_s)));
     let most = |solved: &[PassTime]| solved.iter().filter_map(PassTime::ratio).fold(0.0, f64::max);
-    let bound_of = |open: &[&Bounded]| open.first().map_or(0.0, |pass| pass.ours_s / pass.bound_s);
+    let bound_of = |open: &[&Bounded<'_>]| open.first().map_or(0.0, |pass| pass.ours_s / pass.bound_s);
     let mut left = &open[..];
     for _ in 0..OPTIMA_MAX / AT_ONCE {
         if bound_of(left) <= most(&solved) {
@@ -144,14 +187,20 @@ pub fn optimum_times(job: &Job, oracle: &Oracle, passes: &[RunPass], times: &Job
         ratio_max: (!solved.is_empty()).then(|| most(&solved)),
         ratio_bound: bound_of(left),
         whole_ratio: whole_ratio(job, &limits, &bounded, &solved, times),
+        free_ends: free_ends(passes),
         passes: solved,
     }
+}
+
+fn free_ends(passes: &[RunPass<'_>]) -> usize {
+    let ends = passes.iter().flat_map(|run| run.ends);
+    ends.filter(|end| *end == PassEnd::Free).count()
 }
 
 fn whole_ratio(
     job: &Job,
     limits: &AxisLimits,
-    bounded: &[Option<Bounded>],
+    bounded: &[Option<Bounded<'_>>],
     solved: &[PassTime],
     times: &JobTimes,
 ) -> Option<f64> {
@@ -161,47 +210,46 @@ fn whole_ratio(
         let optimum = solved.iter().find(|time| time.pass == run.pass);
         best_s += optimum.map_or(*bound_s, |time| time.best.feasible_s);
     }
+    let leaves = |link: &LinkTime| {
+        let mut runs = bounded.iter().flatten().map(|pass| &pass.run);
+        runs.any(|run| u32::try_from(run.pass) == Ok(link.pass) && run.ends[1] == PassEnd::Free)
+    };
     best_s += times
         .links
         .iter()
-        .map(|link| link_s(job, limits, link))
+        .map(|link| link_s(job, limits, link, link.turn && leaves(link)))
         .sum::<f64>();
     (best_s > 0.0).then(|| times.whole_s / best_s)
 }
 
-/// Lower bound of the time of a link, s: of a turn that of its chord; else of its legs up, across and down, with the last part at the feed.
-fn link_s(job: &Job, limits: &AxisLimits, link: &LinkTime) -> f64 {
+/// Lower bound of the time of a link, s: of a turn that of its chord, `moving` without rests at its ends; else of any motion from rest to rest
+/// through its highest point, the axes by themselves, with the last part of the way down at the feed.
+fn link_s(job: &Job, limits: &AxisLimits, link: &LinkTime, moving: bool) -> f64 {
     let [from, to] = link.ends_mm;
-    let line = |from: DVec3, to: DVec3| -> Option<(LineLimits, f64)> {
-        let length = from.distance(to);
-        (length > 0.0).then(|| (along(limits, (to - from) / length), length))
-    };
-    let rest_to_rest =
-        |from: DVec3, to: DVec3| line(from, to).map_or(0.0, |(limits, length)| limits.rest_to_rest_s(length));
     if link.turn {
         // Any motion from end to end, on whatever way.
         let length = from.distance(to);
         return if length > 0.0 {
-            limits.along((to - from) / length).rest_to_rest_s(length)
+            let along = limits.along((to - from) / length);
+            if moving {
+                length / along.velocity
+            } else {
+                along.rest_to_rest_s(length)
+            }
         } else {
             0.0
         };
     }
-    let [above_from, above_to] = [from, to].map(|end| end.with_z(link.top_mm));
-    let down = line(above_to, to).map_or(0.0, |(limits, length)| {
-        let slow_mm = job.machine.plunge_mm.min(length);
-        let fast_s = limits.reach_s(length - slow_mm) + slow_mm / job.feed_mm_s().min(limits.velocity);
-        limits.rest_to_rest_s(length).max(fast_s)
-    });
-    rest_to_rest(from, above_from) + rest_to_rest(above_from, above_to) + down
-}
-
-/// Limits of a motion along a unit direction.
-fn along(limits: &AxisLimits, direction: DVec3) -> LineLimits {
-    let least = |limit: &[f64; 3]| (DVec3::from(*limit) / direction.abs()).min_element();
-    LineLimits {
-        velocity: least(&limits.velocity_mm_s),
-        acceleration: least(&limits.acceleration_mm_s2),
-        jerk: least(&limits.jerk_mm_s3),
-    }
+    let across = (to - from).with_z(0.0);
+    let across_s = if across.length() > 0.0 {
+        limits.along(across.normalize()).rest_to_rest_s(across.length())
+    } else {
+        0.0
+    };
+    let z = limits.along(DVec3::Z);
+    let (up_mm, down_mm) = ((link.top_mm - from.z).max(0.0), (link.top_mm - to.z).max(0.0));
+    let slow_mm = job.machine.plunge_mm.min(down_mm);
+    let plunge_s = z.reach_s(down_mm - slow_mm) + slow_mm / job.feed_mm_s().min(z.velocity);
+    let height_s = z.rest_to_rest_s(up_mm) + z.rest_to_rest_s(down_mm).max(plunge_s);
+    across_s.max(height_s)
 }

@@ -88,7 +88,18 @@ impl<'a> PassPath<'a> {
     /// # Errors
     /// [`OracleError::Degenerate`] where the surface has no normal on it.
     pub fn of_pass(oracle: &'a Oracle, side: f64) -> Result<Self, OracleError> {
-        let parameters = oracle.surface.breaks(oracle.along);
+        Self::between(oracle, side, oracle.path_range())
+    }
+
+    /// The part of the pass at a side parameter between two path parameters, in any order.
+    ///
+    /// # Errors
+    /// [`OracleError::Degenerate`] where the surface has no normal on it.
+    pub fn between(oracle: &'a Oracle, side: f64, ends: [f64; 2]) -> Result<Self, OracleError> {
+        let [low, high] = [ends[0].min(ends[1]), ends[0].max(ends[1])];
+        let inner = oracle.surface.breaks(oracle.along);
+        let inner = inner.iter().copied().filter(|at| *at > low && *at < high);
+        let parameters: Vec<f64> = std::iter::once(low).chain(inner).chain([high]).collect();
         for ends in parameters.windows(2) {
             for place in [ends[0], 0.5 * (ends[0] + ends[1]), ends[1]] {
                 oracle.offset(place, side)?;
@@ -159,6 +170,19 @@ impl<'a> PassPath<'a> {
             second,
             third,
         }
+    }
+
+    /// Arc length at a parameter, mm.
+    #[must_use]
+    pub fn arc_of(&self, parameter: f64) -> f64 {
+        let before = |span: &SmoothSpan| span.parameters[PIECES] < parameter;
+        let span = &self.spans[self.spans.partition_point(before).min(self.spans.len() - 1)];
+        let piece = span
+            .parameters
+            .partition_point(|at| *at <= parameter)
+            .clamp(1, PIECES)
+            - 1;
+        span.arcs[piece] + gauss(&self.curve, span.parameters[piece], parameter)
     }
 
     /// Parameter at an arc length: linear in its segment, then two Newton steps.
@@ -237,6 +261,7 @@ mod tests {
                 assert!((ours[1] - exact[1]).abs() < by, "{arc}: {ours:?} for {exact:?}");
             }
             let position = path.position(arc);
+            assert!((path.arc_of(path.parameter(path.span_of(arc), arc)) - arc).abs() < 1e-9);
             assert!((position[0] - 8.0 * cos).abs() < 1e-10);
         }
     }

@@ -68,8 +68,8 @@ pub(super) struct Programme<'a> {
     /// Largest squared speed at each node.
     pub(super) caps: &'a [f64],
     pub(super) period_s: f64,
-    /// Squared speed and acceleration at the first and the last node.
-    pub(super) ends: [[f64; 2]; 2],
+    /// Squared speed and acceleration at the first and the last node; `None` where they are free.
+    pub(super) ends: [Option<[f64; 2]>; 2],
 }
 
 impl Programme<'_> {
@@ -138,7 +138,10 @@ impl Programme<'_> {
     /// The given ends; `b1 - b0 = (a0 + a1) ds`.
     fn equalities(&self, around: &[f64], scales: &[f64], rows: &mut Rows) {
         let last = around.len() - 1;
-        for (node, [square, acceleration]) in [(0, self.ends[0]), (last, self.ends[1])] {
+        for (node, end) in [(0, self.ends[0]), (last, self.ends[1])] {
+            let Some([square, acceleration]) = end else {
+                continue;
+            };
             rows.add(&[(VARIABLES * node, 1.0)], square / around[node]);
             rows.add(&[(VARIABLES * node + 1, 1.0)], acceleration / scales[node]);
         }

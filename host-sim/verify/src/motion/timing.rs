@@ -92,12 +92,17 @@ impl Timing {
         }
     }
 
+    /// Whether the motion begins (0) or ends (1) at rest.
+    pub(super) fn rests(&self, end: usize) -> bool {
+        self.ends[end].1 > 0.0
+    }
+
     pub(super) fn duration_s(&self) -> f64 {
         self.fall + self.ends[1].1
     }
 
     /// Arc length at a time, and its interval.
-    fn at(&self, time: f64) -> (f64, usize) {
+    pub(super) fn at(&self, time: f64) -> (f64, usize) {
         let [(rise, _), (fall, last)] = self.ends;
         let segment = self
             .segments
@@ -132,7 +137,11 @@ impl Timing {
             clippy::cast_sign_loss,
             reason = "a count of periods"
         )]
-        let periods = (self.duration_s() / period_s).ceil() as u32 + 3;
+        let periods = if self.rests(1) {
+            (self.duration_s() / period_s).ceil() as u32 + 3
+        } else {
+            (self.duration_s() / period_s).floor() as u32
+        };
         let unit = [
             (limits.velocity_mm_s, period_s),
             (limits.acceleration_mm_s2, period_s.powi(2)),
@@ -144,11 +153,13 @@ impl Timing {
             intervals[0] = interval;
             let mut value = path.position(arc);
             let mut here = [0.0_f64; 3];
-            for (order, last) in last.iter_mut().enumerate() {
+            for (order, (last, (limit, per))) in (0_u32..).zip(last.iter_mut().zip(unit)) {
                 let before = std::mem::replace(last, value);
-                let (limit, per) = unit[order];
                 value -= before;
-                here[order] = (value.abs() / per / DVec3::from(limit)).max_element();
+                // Before a free end there is no motion to take differences with.
+                if self.rests(0) || tick > order {
+                    here[order as usize] = (value.abs() / per / DVec3::from(limit)).max_element();
+                }
             }
             for (most, use_) in uses.iter_mut().zip(here) {
                 *most = most.max(use_);

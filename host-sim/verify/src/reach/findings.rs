@@ -82,6 +82,15 @@ impl ReachFinding {
         }
     }
 
+    /// The obstacle in a sentence; the ball is sought in the surface between passes only.
+    #[must_use]
+    pub fn told(&self, job: &Job) -> String {
+        match (self.part, self.obstacle) {
+            (ToolPart::Ball, Obstacle::Surface) => "the surface between passes".to_owned(),
+            (_, obstacle) => obstacle.told(job),
+        }
+    }
+
     /// Depth, mm, if the part touches; else 0.
     #[must_use]
     pub fn touch_mm(&self) -> f64 {
@@ -171,7 +180,7 @@ impl ReachResult {
 }
 
 fn sentence(job: &Job, finding: &ReachFinding) -> Option<String> {
-    let (part, obstacle) = (finding.part.name(), finding.obstacle.told(job));
+    let (part, obstacle) = (finding.part.name(), finding.told(job));
     let [x, y, z] = finding.place_mm.to_array();
     let at = format!("x = {x:.3}, y = {y:.3}, z = {z:.3}, at tick {}", finding.sample);
     match finding.verdict() {
@@ -182,6 +191,9 @@ fn sentence(job: &Job, finding: &ReachFinding) -> Option<String> {
         )),
         Verdict::Violated => {
             let remedy = match (finding.part, finding.obstacle) {
+                (ToolPart::Ball, Obstacle::Surface) => {
+                    "raise safe_z_mm, let turns overrun less (overrun_mm), or take a smaller ball"
+                }
                 (ToolPart::Ball, _) => "raise safe_z_mm, or move what is in the way",
                 (ToolPart::Holder(_), _) => "take a longer tool (length_mm) or a slimmer holder",
                 (_, Obstacle::Surface) => {

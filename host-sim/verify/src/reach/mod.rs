@@ -3,12 +3,13 @@
 //!
 //! ```text
 //! samples ──contact.rs──► height of the contact above the ball's centre
-//!    └──path.rs──► chords in a tree ─┬─search.rs, surface.rs──► deepest place of the surface in neck, shank, holder
+//!    └──path.rs──► chords in a tree ─┬─search.rs, surface.rs──► deepest place of the surface in neck, shank, holder; between passes in the ball
 //!  job ──body.rs──► solids           ├─search.rs, stock.rs────► of the stock that no pass clears, in the whole tool
 //!                                    └─fixture.rs─────────────► of each fixture
 //! ```
 //!
-//! All emitted samples count, links included. The surface's places under the ball are the gouge's (`swept`).
+//! All emitted samples count, links included. The surface's places under the ball are the gouge's (`swept`) on passes, and are found here between them: in
+//! step-overs, turns, approaches, retracts, traverses.
 //!
 //! **Error bound**: each figure has an upper bound over all places and positions, besides the depth found. A part touches where the depth found is
 //! above [`TOUCH_MM`]; it is clear where the bound is not; else the verdict is unknown.
@@ -34,7 +35,7 @@ use job::{Fixture, Job};
 use oracle::{Oracle, facing};
 
 use crate::swept::Progress;
-use path::{CHORD_MM, PathTree, chords};
+use path::{CHORD_MM, PathTree, chords, links};
 use search::{Searched, Shape, search};
 use stock::StockObstacle;
 use surface::SurfaceObstacle;
@@ -64,6 +65,13 @@ pub fn measure(
     }
     progress.begin("reach", 0);
     let surface = SurfaceObstacle::new(oracle);
+    let between = PathTree::new(links(motion, CHORD_RADII * job.radius_mm));
+    if !between.chords.is_empty() {
+        let shape = Shape::Ball(job.radius_mm);
+        let found = search(&surface, &between, &shape, floor(&shape));
+        let uv = found.deepest.map(|deepest| surface.parameters(&deepest.cell));
+        findings.push(finding(&shape, Obstacle::Surface, &found, uv));
+    }
     for solid in &solids {
         let shape = Shape::Solid(*solid);
         let found = search(&surface, &tree, &shape, floor(&shape));

@@ -16,6 +16,8 @@ pub struct Motion {
     centres_nm: Vec<[i32; 3]>,
     /// First ticks of stretches in contact and off the surface, in turn; the first one is off the surface.
     turns: Vec<u32>,
+    /// The same with turns in contact as off the surface: stretches on passes and between them.
+    passes: Vec<u32>,
     /// Ticks before which the motion jumps: nothing is between these samples and those before.
     jumps: Vec<u32>,
 }
@@ -26,6 +28,7 @@ impl Motion {
         let at = u32::try_from(self.centres_nm.len()).unwrap_or(u32::MAX);
         if (self.turns.len() % 2 == 1) != in_contact {
             self.turns.push(at);
+            self.passes.push(at);
         }
         if jumps {
             self.jumps.push(at);
@@ -101,6 +104,17 @@ impl Chord {
             (self.ends[1] - self.ends[0]).truncate(),
             (point - self.ends[0]).truncate(),
         );
+        let squared = way.length_squared();
+        if squared > 0.0 {
+            (off.dot(way) / squared).clamp(0.0, 1.0)
+        } else {
+            0.0
+        }
+    }
+
+    /// Share of the way at which it is nearest to a point.
+    pub(super) fn nearest_in_space(&self, point: DVec3) -> f64 {
+        let (way, off) = (self.ends[1] - self.ends[0], point - self.ends[0]);
         let squared = way.length_squared();
         if squared > 0.0 {
             (off.dot(way) / squared).clamp(0.0, 1.0)
@@ -224,9 +238,21 @@ impl PathTree {
 
 /// The chords of a motion: each as long as its samples are within [`CHORD_MM`] of it.
 pub(super) fn chords(motion: &Motion, longest_mm: f64) -> Vec<Chord> {
+    chords_of(motion, &motion.turns, longest_mm)
+}
+
+/// The chords between passes, turns in contact included.
+pub(super) fn links(motion: &Motion, longest_mm: f64) -> Vec<Chord> {
+    let mut chords = chords_of(motion, &motion.passes, longest_mm);
+    chords.retain(|chord| !chord.in_contact);
+    chords
+}
+
+/// The chords; `turns`: first ticks of stretches in contact and off the surface, in turn.
+fn chords_of(motion: &Motion, turns: &[u32], longest_mm: f64) -> Vec<Chord> {
     let mut chords = Vec::new();
     let count = motion.samples();
-    let mut turns = motion.turns.iter().copied().peekable();
+    let mut turns = turns.iter().copied().peekable();
     let mut jumps = motion.jumps.iter().copied().peekable();
     let (mut from, mut in_contact) = (0, false);
     while from < count {
@@ -328,6 +354,22 @@ mod tests {
         assert_eq!(motion.turns, [5, 12, 15, 23, 27, 33]);
         motion.join([false, true, false, false].into_iter());
         assert_eq!(motion.turns, [5, 23, 27, 33]);
+        // What is joined is between passes all the same.
+        let between = links(&motion, f64::INFINITY);
+        for (sample, is_link) in [
+            (2, true),
+            (8, false),
+            (13, true),
+            (19, false),
+            (25, true),
+            (30, false),
+            (40, true),
+        ] {
+            let has = between
+                .iter()
+                .any(|chord| (chord.samples[0]..=chord.samples[1]).contains(&sample));
+            assert_eq!(has, is_link, "{sample}");
+        }
         let mut begins_in_contact = Motion::default();
         for in_contact in [true, false, true] {
             begins_in_contact.add([0; 3], in_contact, false);

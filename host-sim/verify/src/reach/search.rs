@@ -4,6 +4,8 @@
 //! p - c, and changes by at most the distance. So around p it is below its tangent plane: over a cell of radius R on a surface with the normal N
 //! and the largest curvature k it grows by at most R times the gradient's part across N, and by R^2 k / 2 along N. Each face of the part (bottom,
 //! top, side) gives such a bound; their least holds. A wall beside the shank is closed by the side alone, with cells of sqrt(2 r floor).
+//!
+//! For the ball the cell is within a disc of radius R and half the height R^2 k / 2 along N. Its distance from the centre is convex along a chord.
 
 use std::cell::Cell;
 
@@ -21,6 +23,10 @@ const CELLS_MAX: usize = 2_000_000;
 const DEPTH_SHARE: f64 = 0.01;
 const DEPTH_MM: f64 = 1e-3;
 const CLEARANCE_SHARE: f64 = 0.02;
+
+/// Steps of the golden section along a chord: to 1e-7 of its length.
+const GOLDEN_STEPS: usize = 34;
+const GOLDEN: f64 = 0.618_033_988_749_894_9;
 
 /// What is searched for: a solid, or the ball.
 #[derive(Clone, Copy, Debug)]
@@ -172,8 +178,44 @@ impl Query<'_> {
         self.bound(rho, self.heights(bounds.low.z, bounds.high.z), sideways)
     }
 
+    /// [`Self::chord`] for a ball of this radius and a place of a surface with this normal.
+    fn ball_chord(&self, radius: f64, normal: DVec3, chord: &Chord) -> (f64, f64, f64) {
+        let (place, around) = (self.spot.place, self.spot.around_mm);
+        let share = chord.nearest_in_space(place);
+        let depth = radius - chord.at(share).distance(place);
+        if depth + around <= 0.0 {
+            return (depth + around, depth, share);
+        }
+        let distance = |share: f64| {
+            let off = chord.at(share) - place;
+            let along = off.dot(normal);
+            let beside = (off - normal * along).length();
+            (beside - around)
+                .max(0.0)
+                .hypot((along.abs() - self.second).max(0.0))
+        };
+        let (mut low, mut high) = (0.0, 1.0);
+        for _ in 0..GOLDEN_STEPS {
+            let reach = GOLDEN * (high - low);
+            if distance(high - reach) <= distance(low + reach) {
+                high = low + reach;
+            } else {
+                low = high - reach;
+            }
+        }
+        // The distance changes by at most as much as the centre moves.
+        let rest = (high - low) * chord.ends[0].distance(chord.ends[1]);
+        let bound = radius - distance(0.5 * (low + high)) + rest;
+        (bound.min(depth + around), depth, share)
+    }
+
     /// Upper bound around the place for a chord, and the depth at its nearest point or its ends, with the share of the way.
     fn chord(&self, chord: &Chord) -> (f64, f64, f64) {
+        if let (Shape::Ball(radius), Some(normal)) = (self.shape, self.spot.normal)
+            && self.spot.up_to <= self.spot.place.z
+        {
+            return self.ball_chord(*radius, normal, chord);
+        }
         let place = self.spot.place;
         let share = chord.nearest(place);
         let off = (chord.at(share) - place).truncate();

@@ -399,3 +399,128 @@ fn what_is_not_measured_is_not_met() {
     };
     assert_eq!(finding.verdict(), Verdict::Unknown);
 }
+
+/// The ball between passes, in contact as in a step-over, or below the surface.
+#[test]
+fn the_ball_between_passes() {
+    let ball = |job: &Job, motion: &Motion| find(&reach(job, motion), ToolPart::Ball, Obstacle::Surface);
+    // A plane: a step-over in contact, and one that dips.
+    let job_of_plane = job(
+        plane(DVec3::ZERO, DVec3::X * 40.0, DVec3::Y * 30.0),
+        Side::Plus,
+        4.0,
+    );
+    for (dip, verdict) in [
+        (0.0, Verdict::Met),
+        (1e-3, Verdict::Met),
+        (4e-3, Verdict::Violated),
+        (0.7, Verdict::Violated),
+        (5.0, Verdict::Violated),
+    ] {
+        let at = |x: f64, y: f64, z: f64| DVec3::new(x, y, 4.0 + z);
+        let mut motion = motion(&[
+            (at(3.0, 5.0, 0.0), true),
+            (at(37.0, 5.0, 0.0), true),
+            (at(35.0, 6.3, -dip), false),
+            (at(37.0, 7.0, 0.0), false),
+            (at(3.0, 7.0, 0.0), true),
+        ]);
+        for joined in [false, true] {
+            let found = ball(&job_of_plane, &motion);
+            assert_eq!(found.verdict(), verdict, "{dip}: {found:?}");
+            if verdict == Verdict::Violated {
+                // At most the radius: where the centre is on the surface.
+                let exact = dip.min(4.0);
+                assert!(near(found.depth_mm, exact), "{dip}: {found:?}");
+                assert!(found.bound_mm >= exact - 1e-3);
+                let lowest = at(35.0, 6.3, -dip);
+                assert!(dip > 4.0 || found.centre_mm.distance(lowest) < 0.1, "{found:?}");
+            }
+            // A turn that counts as in contact is between passes all the same.
+            if !joined {
+                motion.join([true].into_iter());
+            }
+        }
+    }
+    // Along a chord from contact to contact over a sphere: (S + r) (1 - cos).
+    let mut job_of_sphere = job(sphere(), Side::Plus, 4.0);
+    let oracle = Oracle::new(&job_of_sphere).unwrap();
+    let at = oracle.surface.at(0.5, 0.5);
+    if oracle.normal(&at, 0.5, 0.5).unwrap().dot(at.point) < 0.0 {
+        job_of_sphere.side = Side::Minus;
+    }
+    for half in [0.4_f64, 3.0, 10.0] {
+        let at = |degrees: f64| {
+            let (sin, cos) = (45.0 + degrees).to_radians().sin_cos();
+            DVec3::new(cos, sin, 0.3).normalize() * 24.0
+        };
+        let found = ball(&job_of_sphere, &motion(&[(at(-half), false), (at(half), false)]));
+        let exact = 24.0 - 0.5 * (at(-half) + at(half)).length();
+        assert!(near(found.depth_mm, exact), "{half}: {exact}, {found:?}");
+        let violated = exact > TOUCH_MM;
+        assert_eq!(found.verdict() == Verdict::Violated, violated, "{half}");
+    }
+    // No links, no row.
+    let motion = motion(&[
+        (DVec3::new(3.0, 5.0, 4.0), true),
+        (DVec3::new(30.0, 5.0, 4.0), true),
+    ]);
+    let found = reach(&job_of_plane, &motion);
+    let balls = found
+        .findings
+        .iter()
+        .filter(|finding| finding.part == ToolPart::Ball);
+    assert_eq!(balls.filter(|finding| finding.sample > 0).count(), 0);
+}
+
+/// On a bent patch, links through places near the surface: the depth is that of the nearest of very many places of it.
+#[test]
+fn the_ball_between_passes_against_dense_places() {
+    let job = job_file::parse("plate.toml", include_str!("../../../../jobs/plate.toml")).unwrap();
+    let oracle = Oracle::new(&job).unwrap();
+    let steps = 500_u32;
+    let share = |k: u32| f64::from(k) / f64::from(steps);
+    let places: Vec<DVec3> = (0..=steps)
+        .flat_map(|i| (0..=steps).map(move |j| (i, j)))
+        .map(|(i, j)| oracle.surface.at(share(i), share(j)).point)
+        .collect();
+    let mut state = 7_u64;
+    let mut random = || {
+        state = state
+            .wrapping_mul(6_364_136_223_846_793_005)
+            .wrapping_add(1_442_695_040_888_963_407);
+        (state >> 11) as f64 / (1_u64 << 53) as f64
+    };
+    let mut violated = 0;
+    for _ in 0..12 {
+        let mut corner = || {
+            let at = oracle.contact(random(), random()).unwrap();
+            (at.cl_mm + at.normal * (0.5 * random() - 0.1), false)
+        };
+        let from = corner();
+        let to = corner();
+        // Short, so that the ends decide as often as the middle.
+        let to = (from.0.lerp(to.0, 0.2), false);
+        let motion = motion(&[from, to]);
+        let found = find(&reach(&job, &motion), ToolPart::Ball, Obstacle::Surface);
+        let way = to.0 - from.0;
+        let nearest = places.iter().map(|place| {
+            let along = ((*place - from.0).dot(way) / way.length_squared()).clamp(0.0, 1.0);
+            (from.0 + way * along).distance(*place)
+        });
+        let dense = job.radius_mm - nearest.fold(f64::INFINITY, f64::min);
+        assert!(found.bound_mm >= dense - 1e-3, "{dense}, {found:?}");
+        if dense > 0.01 {
+            violated += 1;
+            // Between the places, 0.2 mm apart, the surface comes nearer by up to 0.1^2 / 2 r.
+            assert!(
+                found.depth_mm > 0.985 * dense - 2e-3 && found.depth_mm < dense + 4e-3,
+                "{dense}, {found:?}"
+            );
+            assert_eq!(found.verdict(), Verdict::Violated);
+        } else if dense < -0.01 {
+            assert_eq!(found.verdict(), Verdict::Met, "{dense}, {found:?}");
+        }
+    }
+    assert!((3..12).contains(&violated), "{violated}");
+}

@@ -113,8 +113,8 @@ impl ToolPath {
             })
     }
 
-    /// Adds the next sample.
-    pub fn add(&mut self, sample: &PassSample, along: Along) {
+    /// Adds the next sample. Returns whether it was stored: it is not where it is near the last one.
+    pub fn add(&mut self, sample: &PassSample, along: Along) -> bool {
         let (path, side) = match along {
             Along::U => (sample.u, sample.v),
             Along::V => (sample.v, sample.u),
@@ -137,7 +137,7 @@ impl ToolPath {
             }
         }
         if !sample.first_of_pass && self.is_near(sample) {
-            return;
+            return false;
         }
         if let Some(pass) = self.passes.last_mut() {
             pass.periods
@@ -150,6 +150,7 @@ impl ToolPath {
         {
             self.push_turn(cl_nm, boundary);
         }
+        true
     }
 
     /// Adds a centre of a turn next to the pass that it leaves, as its end at the boundary.
