@@ -16,6 +16,11 @@ pub(crate) fn uptime_periods() -> u32 {
     UPTIME_PERIODS.load(Ordering::Relaxed)
 }
 
+/// Whether a count of the clock is `now` or earlier: by less than half of its range.
+const fn is_past(count: u32, now: u32) -> bool {
+    now.wrapping_sub(count) <= u32::MAX / 2
+}
+
 /// Both timers and the timing of the last period.
 pub(crate) struct SampleTimer {
     timer: pac::TIM2,
@@ -64,7 +69,8 @@ impl SampleTimer {
     #[inline]
     pub(crate) fn end(&mut self) -> u32 {
         let now = self.clock.cnt().read().cnt().bits();
-        let due = self.due.unwrap_or(now);
+        // A due time that lies ahead comes from a tick that was itself served late: this tick was due by now.
+        let due = self.due.filter(|due| is_past(*due, now)).unwrap_or(now);
         let late = now.wrapping_sub(due);
         // The flag decides whether a period has begun; the clock yields the number of periods.
         let pending = self.timer.sr().read().uif().bit_is_set();
