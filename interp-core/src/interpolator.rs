@@ -8,7 +8,7 @@ use crate::pass::patch::Patch;
 use crate::pass::position::PassPosition;
 use crate::pass::run::Run;
 use crate::sample::{Sample, SpanParameter, State, interval_of};
-use crate::sequence::sequencer::{Outcome, Sequencer, Wish};
+use crate::sequence::sequencer::{FeedCommand, Outcome, Sequencer};
 
 /// Periods over which an external fault decelerates the run to zero feed: 1/32 of the feed per period.
 pub const STOP_PERIODS: u8 = 32;
@@ -369,7 +369,7 @@ impl Motion {
         } = self;
         if let Ok(job) = program.job(store) {
             match &job.header.axes {
-                Some(axes) => sequencer.plan(&job, axes),
+                Some(axes) => sequencer.plan(&job, axes, run),
                 None => run.plan(&job),
             }
         }
@@ -387,8 +387,8 @@ impl Motion {
         if feed_factor == 0.0 && self.sequencer.is_at_rest() && self.stand() {
             return;
         }
-        let wish = Wish {
-            share: feed_factor,
+        let command = FeedCommand {
+            feed_factor,
             is_fault: self.fault.is_some(),
         };
         let Self {
@@ -398,10 +398,9 @@ impl Motion {
             last,
             ..
         } = self;
-        let outcome = program.job(store).and_then(|job| match &job.header.axes {
-            Some(axes) => sequencer.tick(&job, axes, run, wish, last),
-            None => Ok(Outcome::Finished),
-        });
+        let outcome = program
+            .job(store)
+            .and_then(|job| sequencer.tick(&job, run, command, last));
         match (outcome, self.state) {
             (Ok(Outcome::Pass), State::Linking) => self.state = State::Running,
             (Ok(Outcome::Link), State::Running) => self.state = State::Linking,
@@ -471,7 +470,7 @@ impl Motion {
                 match program.job(store) {
                     Ok(job) if has_limits => {
                         if let Some(axes) = &job.header.axes {
-                            sequencer.restart(&job, axes);
+                            sequencer.restart(axes);
                         }
                         State::Linking
                     }

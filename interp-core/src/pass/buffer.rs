@@ -20,7 +20,7 @@ enum Task {
     AheadEnds,
     /// All tasks are complete.
     Done,
-    /// The next patch is faulty: it is not prepared, and the tick that reaches it reports the fault.
+    /// The next patch is not prepared, because it is faulty, which the tick that reaches it reports, or because there is none.
     Faulty,
 }
 
@@ -31,6 +31,8 @@ pub(crate) struct PatchBuffer {
     /// The second patch is current.
     second: bool,
     task: Task,
+    /// The first patch of a pass for which the other patch is collapsed.
+    prepared: Option<PassPosition>,
 }
 
 impl PatchBuffer {
@@ -39,6 +41,7 @@ impl PatchBuffer {
         patches: [Patch::NONE; 2],
         second: false,
         task: Task::Done,
+        prepared: None,
     };
 
     /// The current patch.
@@ -70,12 +73,29 @@ impl PatchBuffer {
         self.task = Task::Faulty;
     }
 
-    /// Collapses the first patch of a pass and makes it current.
+    /// Collapses the first patch of the next pass ahead of [`Self::begin`], while the present pass needs no further patch. A fault is left for that.
+    #[inline(never)]
+    pub(crate) fn prepare(&mut self, job: &Job<'_>, position: &PassPosition) {
+        self.task = Task::Faulty;
+        let is_sound = self.both().1.collapse(job, position).is_ok();
+        self.prepared = is_sound.then_some(*position);
+    }
+
+    /// Forgets what is prepared.
+    pub(crate) const fn forget(&mut self) {
+        self.prepared = None;
+    }
+
+    /// Makes the first patch of a pass current.
     ///
     /// # Errors
     /// Those of [`Patch::collapse`].
     pub(crate) fn begin(&mut self, job: &Job<'_>, position: &PassPosition) -> Result<()> {
         self.task = Task::Ends;
+        if self.prepared.take() == Some(*position) {
+            self.second = !self.second;
+            return Ok(());
+        }
         self.both().0.collapse(job, position)
     }
 
@@ -84,6 +104,7 @@ impl PatchBuffer {
     /// # Errors
     /// Those of [`Patch::collapse`].
     pub(crate) fn advance(&mut self, job: &Job<'_>, position: &PassPosition) -> Result<()> {
+        self.prepared = None;
         if !matches!(self.task, Task::AheadEnds | Task::Done) {
             self.both().1.collapse(job, position)?;
         }

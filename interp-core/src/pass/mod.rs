@@ -9,12 +9,14 @@
 //! | [`contact`] | the step along the pass at the commanded feed |
 //! | [`offset`], [`evaluation`] | fit of the ball and cutter location; contact, fit and location in one call |
 //! | [`interval`], [`step_over`] | candidate of the path interval at a sample; the step-over that a pass allows |
+//! | [`edge`] | the crest at an end of the gap to the next pass |
 //! | [`schedule`] | the next pass |
 //! | [`scan`] | the look over a pass for the step to the next one, without axis limits |
 //! | [`run`] | chains them |
 
 pub(crate) mod buffer;
 pub(crate) mod contact;
+mod edge;
 mod evaluation;
 pub(crate) mod interval;
 pub(crate) mod offset;

@@ -2,6 +2,8 @@
 
 use crate::fault::{Fault, FaultKind, Result};
 use crate::math::arith::{add_product, power_of_two, q30_to_f32, sqrt, truncated, whole_q30};
+use crate::math::number::MM_PER_NM;
+use crate::math::vec3::Vec3;
 use crate::surface::{Contact, OffsetUnits};
 
 /// Least clearance between ball and surface, as 1 - r k: the error of the f32 curvature is a few 1e-6, so a ball whose radius is within 1e-5
@@ -83,6 +85,17 @@ impl Locator {
             cc_nm: [cx, cy, cz],
             cl_nm: [lx, ly, lz],
         })
+    }
+
+    /// Cutter contact on a patch with this origin ([`origin_q30`]), units of 2^-30 nm, half a nanometre too large in each coordinate.
+    pub(crate) fn contact_q30(&self, contact: &Contact, origin: &[i64; 3]) -> [i64; 3] {
+        let ([x, y, z], [x0, y0, z0]) = (contact.position, *origin);
+        [(x, x0), (y, y0), (z, z0)].map(|(position, origin)| add_product(origin, position, self.unit))
+    }
+
+    /// The vector from cutter contact to cutter location, mm.
+    pub(crate) fn offset_mm(&self, contact: &Contact) -> Vec3 {
+        Vec3::of(contact.offset) * (q30_to_f32(i64::from(self.offset_unit)) * MM_PER_NM)
     }
 
     #[cold]

@@ -3,7 +3,7 @@
 use crate::sample::SpanParameter;
 
 /// Side parameter and direction of a pass, and a patch on the pass.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) struct PassPosition {
     pub(crate) side: SpanParameter,
     pub(crate) reversed: bool,

@@ -158,6 +158,7 @@ impl Run {
     /// Resets to the start.
     pub(crate) fn restart(&mut self) {
         self.travel = Travel::START;
+        self.buffer.forget();
         self.scan.restart();
         self.last_interval = f32::INFINITY;
         self.step_over = None;
@@ -255,6 +256,11 @@ impl Run {
         }
         (self.travel.pass, self.travel.side) = (pass, side);
         self.begin_pass(job)
+    }
+
+    /// Collapses the first patch of a pass ahead of [`Self::enter_pass`], once the present pass needs no further patch.
+    pub(crate) fn prepare_pass(&mut self, job: &Job<'_>, first: &PassPosition) {
+        self.buffer.prepare(job, first);
     }
 
     /// Emits the first sample of the pass that was entered; its minimum interval is known from the look-ahead.
@@ -357,34 +363,33 @@ impl Run {
         last.inv_interval_sq = 0.0;
     }
 
-    /// Cell of the pass at the position, for a number of cells per patch; none where the pass is over.
-    pub(crate) fn cell(&self, job: &Job<'_>, cells_per_patch: u16) -> Option<u16> {
+    /// Whether the patch after this one is being prepared: an item a tick.
+    pub(crate) fn prepares_patch(&self) -> bool {
+        self.buffer.has_work()
+    }
+
+    /// Number of the patch from the start of the pass, and of the cell within the patch, at the position, for a number of cells per patch; none where
+    /// the pass is over.
+    pub(crate) fn cell(&self, job: &Job<'_>, cells_per_patch: u16) -> Option<[u16; 2]> {
         if !self.is_along() {
             return None;
         }
         let travel = &self.travel;
-        let within = self.cell_of_patch(cells_per_patch);
-        let span = if travel.reversed {
-            job.header
-                .path_spans
-                .saturating_sub(1)
-                .saturating_sub(travel.span)
+        let high = (travel.fraction >> 32) * u64::from(cells_per_patch);
+        let within = u16::try_from(high >> 32).unwrap_or(0);
+        let last = job.header.path_spans.saturating_sub(1);
+        let patch = if travel.reversed {
+            last.saturating_sub(travel.span)
         } else {
             travel.span
         };
-        Some(span.saturating_mul(cells_per_patch).saturating_add(within))
+        Some([patch, within])
     }
 
-    fn cell_of_patch(&self, cells_per_patch: u16) -> u16 {
-        let high = (self.travel.fraction >> 32) * u64::from(cells_per_patch);
-        u16::try_from(high >> 32).unwrap_or(0)
-    }
-
-    /// Arc since the start of the cell, mm, for a number of cells per patch, each this fraction of the patch; none where, by rounding, the position is
-    /// before the cell.
-    pub(crate) fn since_station(&self, cells_per_patch: u16, part: u64) -> Option<f32> {
+    /// Arc since the start of a cell of [`Self::cell`], mm, each cell this fraction of the patch; none where, by rounding, the position is before the cell.
+    pub(crate) fn since_station(&self, [_, within]: [u16; 2], part: u64) -> Option<f32> {
         let travel = &self.travel;
-        let start = u64::from(self.cell_of_patch(cells_per_patch)) * part;
+        let start = u64::from(within).wrapping_mul(part);
         let length = fraction_to_f32(travel.fraction.checked_sub(start)?);
         let mean = 1.0 - 0.5 * travel.path.log_speed_derivative * length;
         Some(length * mean / (travel.path.inv_speed * self.buffer.patch().per_mm))

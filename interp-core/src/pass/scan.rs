@@ -5,7 +5,8 @@
 //! ahead of the end of the pass: a patch has one station for two periods of the tool on it and at least both ends, and costs less than the
 //! planning of the one period that the tool is on it at least. So a pass of any length is looked at, whatever the feed.
 //!
-//! The first pass has no previous step by which the neighbouring lines are placed. It is scanned twice, the first time at few stations and without lines.
+//! The first pass has no previous step by which the neighbouring lines are placed. It is scanned twice, the first time at few stations and without lines,
+//! and once more where the lines turn out to be far from the step.
 
 use crate::job::Header;
 use crate::job::program::Job;
@@ -45,6 +46,8 @@ const FIRST_LAP: u16 = 4;
 /// The next piece.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Piece {
+    /// Begin a pass.
+    Pass,
     /// Collapse the patch of the pass, and choose its cells.
     Patch,
     /// Evaluate the pass at the station.
@@ -99,8 +102,12 @@ impl PassScan {
     }
 
     /// Begins the scan of a pass whose first patch is at this position.
-    pub(crate) fn begin(&mut self, position: &PassPosition) {
+    pub(crate) const fn begin(&mut self, position: &PassPosition) {
         self.line = *position;
+        self.piece = Piece::Pass;
+    }
+
+    fn begin_pass(&mut self) {
         self.first_lap = 0.0;
         self.is_first_lap = self.estimator.is_first();
         self.begin_lap();
@@ -119,6 +126,9 @@ impl PassScan {
 
     /// The step from the pass to the next one; `maximum`: that of the pass's samples.
     pub(crate) fn step(&mut self, header: &Header, maximum: PassMaximum) -> f32 {
+        if self.piece == Piece::Pass {
+            self.begin_pass();
+        }
         self.piece = Piece::Done;
         self.estimator.step(header, maximum)
     }
@@ -141,10 +151,11 @@ impl PassScan {
     /// Cycles of the next piece; 0 where none is left.
     fn cycles(&self) -> u32 {
         match self.piece {
+            Piece::Pass => cycles::NEXT,
             Piece::Patch => cycles::MEASURED_PATCH,
             Piece::Station => cycles::STATION,
             Piece::Estimate(0) => cycles::NEXT,
-            Piece::Estimate(_) if self.estimator.makes_patch(&self.line) => cycles::PATCH,
+            Piece::Estimate(_) if self.estimator.makes_patch(&self.line, self.fraction()) => cycles::PATCH,
             Piece::Estimate(_) => cycles::ESTIMATE,
             Piece::Done => 0,
         }
@@ -152,6 +163,10 @@ impl PassScan {
 
     fn work(&mut self, job: &Job<'_>) {
         self.piece = match self.piece {
+            Piece::Pass => {
+                self.begin_pass();
+                Piece::Patch
+            }
             Piece::Patch => self.begin_patch(job),
             Piece::Station => {
                 let fraction = self.fraction();
@@ -230,7 +245,8 @@ impl PassScan {
         }
         let first = self.station == 0;
         let last = self.is_end() && self.line.next(job.header.path_spans).is_none();
-        StepOverEstimator::evaluations(first, first && self.is_first_patch, last)
+        self.estimator
+            .evaluations(first, first && self.is_first_patch, last)
     }
 
     /// Advances to the next station, the next patch, the second lap, or the end.
@@ -245,7 +261,7 @@ impl PassScan {
             self.is_first_patch = false;
             return Piece::Patch;
         }
-        if !self.is_first_lap {
+        if !self.is_first_lap && !self.estimator.looks_again(job.header) {
             return Piece::Done;
         }
         self.is_first_lap = false;

@@ -13,6 +13,7 @@ use crate::job::Header;
 use crate::job::program::Job;
 use crate::math::arith::sqrt;
 use crate::math::number::Bounded;
+use crate::pass::edge::{self, EdgeCrest, EdgeSearch};
 use crate::pass::patch::Patch;
 use crate::pass::position::PassPosition;
 use crate::pass::schedule;
@@ -31,7 +32,11 @@ const NEWTON_LAST: f32 = 1e-3;
 /// this factor since.
 const REPLACE_FACTOR: f32 = 1.25;
 /// Maximum ratio of the expected step to the previous one.
-const TREND_MAX: f32 = 1.25;
+const FORECAST_MAX: f32 = 1.4;
+/// Margin in height, per relative difference of the step from the distance of the lines, as a share of the second difference of the inverse square interval.
+const MARGIN_OF_BEND: f32 = 0.1;
+/// The lines of the first pass are placed again where the step differs by more than this share from their distance.
+const AGAIN_MIN: f32 = 0.03;
 /// Error of the emitted cutter location along the normal, by which the scallop limit is lowered: half a nanometre in each of three coordinates, and the
 /// rounding of the normal to 24 bits, times the ball's radius.
 const LOCATION_ERROR_MM: f32 = 0.87e-6;
@@ -110,6 +115,8 @@ struct NeighbourLine {
     /// Distance of the farther line from the pass, in the side parameter, and the inverse square interval from which it was chosen.
     distance: f32,
     placed_for: f32,
+    /// The farther line is at the surface's boundary.
+    is_at_boundary: bool,
     /// Inverse square interval on the line.
     peak: Peak,
 }
@@ -135,15 +142,24 @@ pub(crate) struct StepOverEstimator {
     lines: [NeighbourLine; 2],
     /// Inverse square interval at the stations of the pass.
     own: Peak,
-    /// Maximum inverse square interval at the ends of the pass, and the ends still to be evaluated.
-    edge: f32,
+    /// Inverse square interval at the ends of the pass, from the pass alone, and the ends still to be evaluated.
+    edges: [f32; 2],
     ends: [bool; 2],
+    /// The crests at the ends of the gap, once measured, and the search for the next one.
+    crests: [Option<EdgeCrest>; 2],
+    searches: [bool; 2],
+    search: EdgeSearch,
+    /// Evaluations of the lines at the last station.
+    at_last: u8,
     /// Step of the previous pass.
     before: Option<f32>,
-    /// Ratio of the last two steps, between 1 / [`TREND_MAX`] and [`TREND_MAX`].
-    trend: f32,
-    /// Side span of the pass.
+    /// The step that is expected of this pass, by what the lines of the previous one showed.
+    expected: f32,
+    /// The first pass is looked at for the second time.
+    looked_again: bool,
+    /// Side span of the pass, and spans along the path.
     side_span: u16,
+    path_spans: u16,
     /// The line to evaluate next.
     second: bool,
 }
@@ -153,19 +169,26 @@ impl StepOverEstimator {
     pub(crate) const START: Self = Self {
         lines: [NeighbourLine::new(0.5), NeighbourLine::new(1.0)],
         own: Peak::NONE,
-        edge: 0.0,
+        edges: [0.0; 2],
         ends: [false; 2],
+        crests: [None; 2],
+        searches: [false; 2],
+        search: EdgeSearch::DONE,
+        at_last: 0,
         before: None,
-        trend: 1.0,
+        expected: 0.0,
+        looked_again: false,
         side_span: 0,
+        path_spans: 0,
         second: false,
     };
 
     /// Resets to the state before the first pass. [`Self::begin`] resets the other fields.
     pub(crate) const fn restart(&mut self) {
         self.before = None;
-        self.trend = 1.0;
+        self.looked_again = false;
         self.second = false;
+        self.search = EdgeSearch::DONE;
     }
 
     /// Begins a pass.
@@ -174,8 +197,12 @@ impl StepOverEstimator {
         half.begin();
         whole.begin();
         self.own = Peak::NONE;
-        self.edge = 0.0;
+        self.edges = [0.0; 2];
         self.ends = [true; 2];
+        self.crests = [None; 2];
+        self.searches = [true; 2];
+        self.search.stop();
+        self.at_last = 0;
     }
 
     /// A patch of the pass begins.
@@ -198,21 +225,56 @@ impl StepOverEstimator {
         self.before.is_none()
     }
 
-    /// Evaluations at a station: one for each neighbouring line, two where its patch has to be collapsed, and more at the lines' ends. `begins_patch`,
+    /// Evaluations at a station: one for each neighbouring line, two where its patch has to be collapsed, and more at the passes' ends. `begins_patch`,
     /// `begins`, `ends`: the station is the first of a patch, the first and the last of the pass.
-    pub(crate) fn evaluations(begins_patch: bool, begins: bool, ends: bool) -> u8 {
-        2 + 2 * u8::from(begins_patch) + 6 * u8::from(begins) + 6 * u8::from(ends)
+    pub(crate) fn evaluations(&self, begins_patch: bool, begins: bool, ends: bool) -> u8 {
+        let rounds = 1 + u8::from(self.is_first());
+        let at_an_end = 4 + rounds * edge::EVALUATIONS;
+        2 + 2 * u8::from(begins_patch) + at_an_end * (u8::from(begins) + u8::from(ends))
     }
 
-    /// Whether the next task at this position collapses a patch.
-    pub(crate) fn makes_patch(&self, position: &PassPosition) -> bool {
-        let [half, whole] = &self.lines;
-        let beside = if self.second { whole } else { half };
+    /// Whether the next task at this fraction of this patch collapses a patch.
+    pub(crate) fn makes_patch(&self, position: &PassPosition, fraction: u64) -> bool {
+        if self.search.is_active() {
+            return self.search.makes_patch();
+        }
+        if self
+            .due_search(is_end(self.path_spans, position, fraction))
+            .is_some()
+        {
+            return true;
+        }
+        let beside = self.next_line();
         match beside.task {
             Task::Patch => true,
             Task::Evaluate => beside.span != position.span,
             _ => false,
         }
+    }
+
+    /// The line to evaluate next.
+    fn next_line(&self) -> &NeighbourLine {
+        let [half, whole] = &self.lines;
+        if self.is_second_next() { whole } else { half }
+    }
+
+    /// Whether the farther line is evaluated next: the line halfway waits for the search at the start, which uses its patch.
+    fn is_second_next(&self) -> bool {
+        let [at_start, _] = self.searches;
+        let [half, whole] = &self.lines;
+        self.second || (at_start && half.task == Task::Patch && whole.task != Task::Idle)
+    }
+
+    /// The search for the crest at an end of the gap that is due, and whether it is that at the end of the passes. At the start it uses the patch of the line
+    /// halfway before that is collapsed, at the end after its last station.
+    fn due_search(&self, is_end: bool) -> Option<bool> {
+        let [half, whole] = &self.lines;
+        let [at_start, at_end] = self.searches;
+        if at_start && whole.spans == 1 && whole.task == Task::Evaluate && half.task == Task::Patch {
+            return Some(false);
+        }
+        let are_seen = self.at_last >= 2 && whole.task == Task::EvaluateLast;
+        (at_end && is_end && are_seen).then_some(true)
     }
 
     /// Executes one task, for a run at this fraction of this patch. `most`: maximum inverse square interval of the pass so far.
@@ -226,36 +288,108 @@ impl StepOverEstimator {
         most: f32,
     ) {
         let [start, end] = self.ends;
+        let [edge_start, edge_end] = self.edges;
+        self.path_spans = job.header.path_spans;
+        let is_end = is_end(self.path_spans, position, fraction);
         if start {
             self.ends = [false, end];
-            self.edge = at_end(job, patch, 0);
+            self.edges = [at_end(job, patch, 0), edge_end];
         } else if end && position.next(job.header.path_spans).is_none() {
             self.ends = [false; 2];
-            self.edge = at_end(job, patch, u64::MAX).at_least(self.edge);
+            self.edges = [edge_start, at_end(job, patch, u64::MAX)];
+        } else if self.search.is_active() {
+            self.search(job, position, patch);
+        } else if let Some(at_end) = self.due_search(is_end) {
+            let [at_start, _] = self.searches;
+            self.searches = [at_start && at_end, !at_end];
+            let [_, whole] = &self.lines;
+            self.search.begin(
+                at_end != position.reversed,
+                at_end,
+                whole.distance,
+                self.is_first(),
+            );
+            self.search(job, position, patch);
         } else {
-            let [half, whole] = &mut self.lines;
-            let beside = if self.second { whole } else { half };
-            self.second = !self.second;
+            let is_second = self.is_second_next();
+            self.second = !is_second;
             self.side_span = position.side.span;
-            let expected = self.before.map(|step| step * self.trend);
+            self.at_last = self.at_last.saturating_add(u8::from(is_end));
+            let expected = self.expects();
+            let most = edge_start.at_least(edge_end).at_least(most);
+            let [half, whole] = &mut self.lines;
+            let beside = if is_second { whole } else { half };
             beside.work(job, position, fraction, most, expected);
+        }
+    }
+
+    /// One evaluation of the search for a crest.
+    fn search(&mut self, job: &Job<'_>, position: &PassPosition, patch: &Patch) {
+        let [half, whole] = &mut self.lines;
+        let crest = self
+            .search
+            .work(job, position, [patch, &whole.patch], &mut half.patch);
+        if crest.is_some() {
+            let [start, end] = self.crests;
+            self.crests = if self.search.is_at_end() {
+                [start, crest]
+            } else {
+                [crest, end]
+            };
         }
     }
 
     /// The step to the next pass, in units of the side parameter, after the last sample of this one; infinite where the scallop limit does
     /// not bound the step.
     pub(crate) fn step(&mut self, header: &Header, maximum: PassMaximum) -> f32 {
+        let Some((step, next)) = self.allowed(header, maximum) else {
+            self.before = None;
+            return f32::INFINITY;
+        };
+        // A second look that was not finished in time does not go beyond the first one.
+        let [_, is_unfinished] = self.searches;
+        let step = if self.is_first() && self.looked_again && is_unfinished {
+            self.expected.at_most(step)
+        } else {
+            step
+        };
+        self.expected = next.at_most(step * FORECAST_MAX).at_least(step / FORECAST_MAX);
+        self.before = Some(step);
+        step
+    }
+
+    /// Whether the first pass is to be looked at again, because its lines were placed far from the step that they showed. They are placed by it then.
+    pub(crate) fn looks_again(&mut self, header: &Header) -> bool {
+        if !self.is_first() || self.looked_again {
+            return false;
+        }
+        let Some((step, _)) = self.allowed(header, PassMaximum::NONE) else {
+            return false;
+        };
+        let [_, whole] = &self.lines;
+        let is_far = (step - whole.distance).abs() > AGAIN_MIN * whole.distance && step < f32::INFINITY;
+        if is_far && !whole.is_at_boundary {
+            self.looked_again = true;
+            self.expected = step;
+        }
+        self.looked_again
+    }
+
+    /// The step of the next pass that is expected, if it is.
+    fn expects(&self) -> Option<f32> {
+        (self.before.is_some() || self.looked_again).then_some(self.expected)
+    }
+
+    /// The step that a pass allows, and that expected of the next one; none where the scallop limit does not bound it.
+    fn allowed(&self, header: &Header, maximum: PassMaximum) -> Option<(f32, f32)> {
         let PassMaximum {
             inv_interval_sq: most,
             shape,
         } = maximum;
-        if !(most > 0.0) {
-            self.before = None;
-            return f32::INFINITY;
+        let here = exact(header, most, shape).at_least(self.own.most);
+        if !(here > 0.0) {
+            return None;
         }
-        let here = exact(header, most, shape)
-            .at_least(self.own.most)
-            .at_least(self.edge);
         let [half, whole] = &self.lines;
         let found = |line: &NeighbourLine| line.found(header, here);
         let knots = [
@@ -268,13 +402,27 @@ impl StepOverEstimator {
             (Some(half), None) => half.at_least(here),
             _ => here,
         };
-        let step = step_over(here, mean, whole.distance);
-        self.trend = match self.before {
-            Some(before) => (step / before).at_most(TREND_MAX).at_least(1.0 / TREND_MAX),
-            None => 1.0,
-        };
-        self.before = Some(step);
-        step
+        let mut step = step_over(here, mean, whole.distance);
+        let [first, second] = knots;
+        let jumps = first || second;
+        if let (Some(half), Some(whole_line)) = (found(half), found(whole)) {
+            step = step.at_most(nearer(here, [half, whole_line], step, whole.distance, knots));
+        }
+        let beyond = found(whole).unwrap_or(here);
+        let mut next = forecast(mean, beyond - here, step, whole.distance);
+        for (crest, edge) in self.crests.iter().zip(&self.edges) {
+            let allowed = match crest {
+                Some(crest) => crest.step(jumps),
+                // As the pass itself where the crest was not measured in time.
+                None => step_over(*edge, *edge * (mean / here).at_least(1.0), whole.distance),
+            };
+            if let Some(crest) = crest {
+                let change = crest.beyond - crest.here;
+                next = forecast(crest.mean, change, allowed, crest.distance).at_most(next);
+            }
+            step = allowed.at_most(step);
+        }
+        Some((step, next))
     }
 }
 
@@ -290,7 +438,15 @@ impl NeighbourLine {
             side: SpanParameter { span: 0, fraction: 0 },
             distance: 0.0,
             placed_for: 0.0,
+            is_at_boundary: false,
             peak: Peak::NONE,
+        }
+    }
+
+    /// Evaluates the line's start or end.
+    fn see_end(&mut self, job: &Job<'_>, fraction: u64) {
+        if let Ok(contact) = self.patch.surface.contact(fraction, &self.patch.ball) {
+            self.peak.most = exact_at(job, &self.patch, &contact).at_least(self.peak.most);
         }
     }
 
@@ -317,13 +473,13 @@ impl NeighbourLine {
             }
             Task::Patch => self.make_patch(job, position, Task::Start),
             Task::Start => {
-                self.peak.most = at_end(job, &self.patch, 0).at_least(self.peak.most);
+                self.see_end(job, 0);
                 Task::Evaluate
             }
             Task::Evaluate if self.span != position.span => self.make_patch(job, position, Task::Evaluate),
             Task::Evaluate if position.next(job.header.path_spans).is_none() => Task::End,
             Task::End => {
-                self.peak.most = at_end(job, &self.patch, u64::MAX).at_least(self.peak.most);
+                self.see_end(job, u64::MAX);
                 Task::EvaluateLast
             }
             Task::Evaluate | Task::EvaluateLast => {
@@ -348,7 +504,9 @@ impl NeighbourLine {
             fraction: u64::MAX,
         };
         let step = expected.unwrap_or_else(|| interval_of(most));
-        self.distance = step.at_most(schedule::apart(position.side, end, width));
+        let apart = schedule::apart(position.side, end, width);
+        self.is_at_boundary = step >= apart;
+        self.distance = step.at_most(apart);
         self.placed_for = most;
         match schedule::next_side(position.side, self.share * self.distance, spans, width) {
             Ok(side) => {
@@ -407,6 +565,11 @@ fn mean(here: f32, half: f32, whole: f32, knots: [bool; 2]) -> f32 {
     mean
 }
 
+/// Whether this is the end of the pass.
+fn is_end(path_spans: u16, position: &PassPosition, fraction: u64) -> bool {
+    fraction == u64::MAX && position.next(path_spans).is_none()
+}
+
 /// The inverse square interval at an end of a line; 0 where there is no contact. Where path lines are skew, the scallop crest between two passes lies beyond
 /// the end of one of them: the distance from the last ball of that pass is along the side line, from the other pass at right angles to it.
 /// With a and b for |d|^2 (1 + r c) of these two directions, the crest height is multiplied by 4/(1 + sqrt(a/b))^2.
@@ -416,16 +579,21 @@ fn at_end(job: &Job<'_>, patch: &Patch, fraction: u64) -> f32 {
         return 0.0;
     };
     let inv_interval_sq = exact_at(job, patch, &contact);
-    let part = contact.across / contact.outwards;
-    // Not at a pole, where the ratio is 0/0, nor where the side line's lower curvature makes the ratio 1 or more.
-    if !(part > 0.0 && part < 1.0) {
-        return inv_interval_sq;
-    }
-    let mean = 0.5 * (1.0 + sqrt(part));
-    inv_interval_sq / (mean * mean)
+    inv_interval_sq * skew_factor(contact.outwards / contact.across)
 }
 
-fn exact_at(job: &Job<'_>, patch: &Patch, contact: &Contact) -> f32 {
+/// Factor of the crest's height where one of two passes has its ball at its end: from the ratio of the inverse square interval along the boundary to that at
+/// right angles to the pass.
+pub(crate) fn skew_factor(ratio: f32) -> f32 {
+    // Not at a pole, where the ratio is 0/0, nor where the side line's lower curvature makes the ratio 1 or less.
+    if !(ratio > 1.0 && ratio.is_finite()) {
+        return 1.0;
+    }
+    let mean = 0.5 * (1.0 + 1.0 / sqrt(ratio));
+    1.0 / (mean * mean)
+}
+
+pub(crate) fn exact_at(job: &Job<'_>, patch: &Patch, contact: &Contact) -> f32 {
     let shape = [contact.across, contact.lateral_squared];
     exact(job.header, patch.interval.inv_interval_sq(contact), shape)
 }
@@ -442,14 +610,40 @@ fn exact(header: &Header, inv_interval_sq: f32, [across, lateral_squared]: [f32;
     } else {
         0.0
     };
-    let error_mm = LOCATION_ERROR_MM + LOCATION_ERROR_SHARE * header.ball_radius_mm;
-    let left = (1.0 - error_mm / header.scallop_mm).at_least(HEIGHT_SHARE_MIN);
+    let left = height_limit_mm(header) / header.scallop_mm;
     inv_interval_sq * (1.0 + height * bend) / ((1.0 - 0.5 * height) * left)
+}
+
+/// The scallop limit, lowered by the error of the emitted location, mm.
+pub(crate) fn height_limit_mm(header: &Header) -> f32 {
+    let error_mm = LOCATION_ERROR_MM + LOCATION_ERROR_SHARE * header.ball_radius_mm;
+    header.scallop_mm * (1.0 - error_mm / header.scallop_mm).at_least(HEIGHT_SHARE_MIN)
+}
+
+/// The step where it is not the distance of the farther line: with the values at its middle and its end on the parabola through those of the pass and the two
+/// lines, less a margin for what a parabola does not know.
+fn nearer(here: f32, [half, whole]: [f32; 2], step: f32, distance: f32, knots: [bool; 2]) -> f32 {
+    let ratio = step / distance;
+    let bend = here - 2.0 * half + whole;
+    let slope = whole - here - bend;
+    let at = |share: f32| here + share * (slope + share * bend);
+    let mean = mean(here, at(0.5 * ratio), at(ratio), knots);
+    let off = (1.0 - ratio).abs().at_most(1.0);
+    let margin = MARGIN_OF_BEND * off * (bend / here).abs();
+    step_over(here, mean * (1.0 + margin), step)
+}
+
+/// The step that follows a step, from the mean inverse square interval over a distance and the inverse square interval's change over it.
+fn forecast(mean: f32, change: f32, step: f32, distance: f32) -> f32 {
+    if !(step < f32::INFINITY) {
+        return f32::INFINITY;
+    }
+    interval_of((mean + change * (step / distance)).at_least(0.25 * mean))
 }
 
 /// The step x at which the mean inverse square interval over the step is 1/x^2, for the inverse square interval `here` and its mean over a distance. The
 /// mean is linear in x; where it falls, it falls no further than over that distance.
-fn step_over(here: f32, mean: f32, distance: f32) -> f32 {
+pub(crate) fn step_over(here: f32, mean: f32, distance: f32) -> f32 {
     let first = interval_of(here);
     // In units of the first-order step, where here = 1.
     let (mean, distance) = (mean / here, distance / first);
