@@ -11,6 +11,8 @@ use std::sync::OnceLock;
 
 /// Largest permitted use of the limits of velocity, acceleration and jerk, after the rounding of the positions to nm is subtracted.
 const MORE: [f64; 3] = [1.001, 1.0, 1.02];
+/// Rounding of a quotient.
+const ROUNDING: f64 = 1e-12;
 
 fn axes(safe_z_nm: i32) -> AxisLimits {
     AxisLimits {
@@ -86,7 +88,7 @@ impl Use {
     fn check(&self, what: &str) {
         for (worst, most) in self.worst.iter().zip(MORE) {
             assert!(
-                *worst <= most,
+                *worst <= most * (1.0 + ROUNDING),
                 "{what}: velocity, acceleration, jerk {:?} of their limits",
                 self.worst
             );

@@ -24,6 +24,7 @@ mod paper;
 mod pass_times;
 mod protocol;
 mod qemu;
+mod random_passes;
 mod random_surfaces;
 mod report_page;
 mod safety;

@@ -11,7 +11,7 @@ use machine::Machine;
 use machine::prepare::prepare;
 use oracle::Oracle;
 use verify::motion::point::LineLimits;
-use verify::motion::{PassPath, optimum};
+use verify::motion::{PassEnd, PassPath, optimum};
 
 /// A machine with equal limits on all axes, except for a lower velocity of z: the machine of `docs/figures.md`.
 const LIMITS: AxisLimits = AxisLimits {
@@ -47,6 +47,17 @@ pub(crate) struct Ran {
     time_s: f64,
 }
 
+impl Ran {
+    /// A pass at this side parameter that took so long.
+    pub(crate) fn new(side: f64, time_s: f64) -> Self {
+        Self { side, time_s }
+    }
+
+    pub(crate) fn time_s(&self) -> f64 {
+        self.time_s
+    }
+}
+
 /// Runs a job until the end of its pass `last`.
 pub(crate) fn run(job: &Job, last: u32) -> BTreeMap<u32, Ran> {
     let prepared = prepare(job).unwrap();
@@ -77,12 +88,19 @@ pub(crate) fn run(job: &Job, last: u32) -> BTreeMap<u32, Ran> {
 
 /// Time of a pass over that of the best motion known, and over the lower bound for any motion.
 pub(crate) fn compared(job: &Job, oracle: &Oracle, ran: &Ran) -> [f64; 2] {
+    compared_if_solved(job, oracle, ran).unwrap()
+}
+
+/// As [`compared`]; `None` where the solver finds no motion.
+pub(crate) fn compared_if_solved(job: &Job, oracle: &Oracle, ran: &Ran) -> Option<[f64; 2]> {
     let path = PassPath::of_pass(oracle, ran.side).unwrap();
-    let best = optimum(&path, job.feed_mm_s(), &LIMITS, job.machine.period_s()).unwrap();
+    let rests = [PassEnd::Rest; 2];
+    let limits = job.machine.limits.unwrap();
+    let best = optimum(&path, job.feed_mm_s(), &limits, job.machine.period_s(), rests).ok()?;
     // The reference motion keeps the limits, and is not below the lower bound.
     assert!(best.uses.iter().all(|used| *used <= 1.0 + 1e-9), "{best:?}");
     assert!(best.lower_bound_s <= best.feasible_s, "{best:?}");
-    [best.feasible_s, best.lower_bound_s].map(|best| ran.time_s / best)
+    Some([best.feasible_s, best.lower_bound_s].map(|best| ran.time_s / best))
 }
 
 /// First passes of some sample jobs, at the programmed feed and at multiples that the axes cannot reach everywhere.

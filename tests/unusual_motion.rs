@@ -35,17 +35,17 @@ fn plate(feed_mm_min: f64, limits: AxisLimits, period_us: f64) -> Job {
 }
 
 /// What a run used.
-struct Used {
+pub(crate) struct Used {
     /// Greatest shares of velocity, acceleration and jerk that were surely reached, each over the base that positions good to 10 nm allow.
-    shares: [f64; 3],
+    pub(crate) shares: [f64; 3],
     /// Longest stand within the cut, periods.
-    stand: u32,
+    pub(crate) stand: u32,
     /// Greatest feed of the contact over the programmed one.
-    feed: f64,
+    pub(crate) feed: f64,
 }
 
 /// Runs a job to its end.
-fn used(job: &Job) -> Used {
+pub(crate) fn used(job: &Job) -> Used {
     let prepared = prepare(job).unwrap();
     let mut meter = PeakMeter::new(&job.machine);
     let mut machine = Machine::load(&prepared).unwrap();

@@ -149,20 +149,41 @@ fn peak_speed(length: f32, limits: &CurveLimits) -> f32 {
     (a * (jerk_s + steady_s.at_least(0.0))).at_most(speed)
 }
 
+/// What a link uses of its limits.
+fn planned(machine: &CurveLimits) -> CurveLimits {
+    CurveLimits {
+        speed: machine.speed,
+        acceleration: ACCELERATION * machine.acceleration,
+        jerk: JERK * machine.jerk,
+    }
+}
+
+/// From rest to rest over a length, mm, with this peak of the speed.
+fn there_and_back(length: f32, peak: f32, limits: &CurveLimits) -> [Piece; 2] {
+    let cruise = length - 2.0 * ramp_length(0.0, peak, limits);
+    [
+        Piece::new(0.0, peak, limits, cruise),
+        Piece::new(peak, 0.0, limits, 0.0),
+    ]
+}
+
 /// Bisections of a speed.
 const BISECTIONS: u8 = 12;
 
 /// A motion of this length from rest to rest.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Curve {
-    pieces: [Piece; 3],
+    pieces: [Piece; 4],
+    /// The piece that ends at rest at the curve's end.
+    last: u8,
     limits: CurveLimits,
 }
 
 impl Curve {
     /// No motion.
     pub(crate) const NONE: Self = Self {
-        pieces: [Piece::NONE; 3],
+        pieces: [Piece::NONE; 4],
+        last: 0,
         limits: CurveLimits {
             speed: 1.0,
             acceleration: 1.0,
@@ -172,15 +193,11 @@ impl Curve {
 
     /// Over `length` mm, the last `slow` mm of it at no more than `slow_speed`.
     pub(crate) fn new(length: f32, machine: &CurveLimits, slow: f32, slow_speed: f32) -> Self {
-        let limits = CurveLimits {
-            speed: machine.speed,
-            acceleration: ACCELERATION * machine.acceleration,
-            jerk: JERK * machine.jerk,
-        };
+        let limits = planned(machine);
         let slow = slow.at_most(length);
         let last = ramp_length(slow_speed, 0.0, &limits);
         let peak = peak_speed(length, &limits);
-        let pieces = if slow > 0.0 && last < slow && peak > slow_speed {
+        let (pieces, last) = if slow > 0.0 && last < slow && peak > slow_speed {
             let fast = length - slow;
             let needed = |top: f32| ramp_length(0.0, top, &limits) + ramp_length(top, slow_speed, &limits);
             let mut top = limits.speed;
@@ -198,22 +215,33 @@ impl Curve {
             }
             // Where even the slow speed is not reached on the fast part, it is cruised at from there on.
             let cruise = fast - needed(top);
-            [
+            let pieces = [
                 Piece::new(0.0, top, &limits, cruise),
                 Piece::new(top, slow_speed, &limits, slow - last + cruise.at_most(0.0)),
                 Piece::new(slow_speed, 0.0, &limits, 0.0),
-            ]
-        } else {
-            let cruise = length - 2.0 * ramp_length(0.0, peak, &limits);
-            [
-                Piece::new(0.0, peak, &limits, cruise),
-                Piece::new(peak, 0.0, &limits, 0.0),
                 Piece::NONE,
-            ]
+            ];
+            (pieces, 2)
+        } else {
+            let [up, down] = there_and_back(length, peak, &limits);
+            ([up, down, Piece::NONE, Piece::NONE], 1)
         };
         Self {
             pieces,
+            last,
             limits: *machine,
+        }
+    }
+
+    /// A curve of two pieces, and after its rest a further length, mm, to another rest.
+    pub(crate) fn and_then(self, length: f32) -> Self {
+        let limits = planned(&self.limits);
+        let [up, down, ..] = self.pieces;
+        let [again, end] = there_and_back(length, peak_speed(length, &limits), &limits);
+        Self {
+            pieces: [up, down, again, end],
+            last: 3,
+            ..self
         }
     }
 
@@ -223,9 +251,9 @@ impl Curve {
     }
 
     /// Greatest speed, mm/s.
-    pub(crate) const fn peak(&self) -> f32 {
-        let [first, _, _] = &self.pieces;
-        first.to
+    pub(crate) fn peak(&self) -> f32 {
+        let [first, _, third, _] = &self.pieces;
+        first.to.at_least(third.to)
     }
 
     fn piece(&self, index: u8) -> &Piece {
@@ -337,7 +365,7 @@ impl Course for Curve {
 }
 
 impl Curve {
-    fn is_last(&self, piece: u8) -> bool {
-        self.piece(piece).to <= 0.0
+    const fn is_last(&self, piece: u8) -> bool {
+        piece >= self.last
     }
 }

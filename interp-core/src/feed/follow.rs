@@ -14,19 +14,24 @@ const LEAD_STEPS: u16 = 2 * CHANGE_MIN;
 impl Lead {
     /// [`Self::look`] at a plan that is being checked, a period after the last look.
     pub(crate) fn look_draft(&mut self, plan: &Plan, cursor: &Cursor) {
-        self.count(plan, cursor, cursor.draft_speed(plan), 1.0);
+        self.count(plan, cursor, cursor.draft_speed_sqr(plan), 1.0);
     }
 
     /// Counts the time for which the plan is near the feed. `periods`: since the last look.
     fn look(&mut self, plan: &Plan, cursor: &Cursor, periods: f32) {
-        self.count(plan, cursor, cursor.speed(plan), periods);
+        self.count(plan, cursor, cursor.speed_sqr(plan), periods);
     }
 
-    fn count(&mut self, plan: &Plan, cursor: &Cursor, speed: f32, periods: f32) {
+    /// By the square of the plan's speed, (mm/s)^2.
+    fn count(&mut self, plan: &Plan, cursor: &Cursor, speed_sqr: f32, periods: f32) {
         let FeedChange { near, .. } = plan.change;
-        let apart = (speed - plan.limits.feed).abs();
-        let is_near =
-            plan.over <= 1.0 && !plan.is_over(cursor) && plan.allows_feed(cursor.interval) && apart < near;
+        let feed = plan.limits.feed;
+        let (least, most) = (feed - near, feed + near);
+        let is_near = speed_sqr > least * least
+            && speed_sqr < most * most
+            && plan.over <= 1.0
+            && !plan.is_over(cursor)
+            && plan.allows_feed(cursor.interval);
         self.near = if is_near {
             (self.near + periods).at_most(f32::from(plan.change.lead()))
         } else {
@@ -145,9 +150,11 @@ impl Follower {
         }
     }
 
-    /// Moves tool and lead by this arc, mm, so that the lead stays; the lead once it is worth its time.
-    fn shift(&mut self, mm: f32, plan: &Plan) {
-        self.cursor.shift(mm, plan);
+    /// Moves tool and lead by this arc, mm, so that the lead stays; the lead once it is worth its time. Returns whether they moved.
+    fn shift(&mut self, mm: f32, plan: &Plan) -> bool {
+        if !self.cursor.shift(mm, plan) {
+            return false;
+        }
         self.behind += mm;
         if self.behind.abs() > BEHIND_MAX * plan.limits.feed * plan.limits.period {
             if !plan.is_over(&self.lead.cursor) {
@@ -155,13 +162,21 @@ impl Follower {
             }
             self.behind = 0.0;
         }
+        true
     }
 
-    /// The tool is known to be at this arc, units of 2^-10 nm: the plan goes on from there.
-    pub(crate) fn correct(&mut self, plan: &Plan, arc_q10: i64) {
-        let apart = arc_q10 - self.arc_q10;
-        let mm = if apart < 0 { -to_mm(-apart) } else { to_mm(apart) };
-        self.arc_q10 = arc_q10;
-        self.shift(mm, plan);
+    /// The tool is known to be ahead by this arc, units of 2^-10 nm: the plan goes on from there. Returns whether it does: not where the walk nearly
+    /// stands.
+    pub(crate) fn correct(&mut self, plan: &Plan, apart_q10: i64) -> bool {
+        let mm = if apart_q10 < 0 {
+            -to_mm(-apart_q10)
+        } else {
+            to_mm(apart_q10)
+        };
+        let is_done = self.shift(mm, plan);
+        if is_done {
+            self.arc_q10 += apart_q10;
+        }
+        is_done
     }
 }

@@ -14,7 +14,7 @@
 //! | file | content |
 //! |---|---|
 //! | [`stations`] | derivatives of the path, from cutter locations rounded to nanometres |
-//! | [`walk`] | the rough walk, and where its nodes lie |
+//! | [`walk`] | the rough walk, and where its nodes lie ([`cell_motion`], [`node_times`], [`knots`]) |
 //! | [`plan`] | a plan: stations, walk and pace; a cursor that moves along it |
 //! | [`newton`] | the barrier method |
 //! | [`planner`] | all of it in portions, and a check of the result period by period |
@@ -22,10 +22,14 @@
 //! | [`pace`] | hold, resume, override: checked changes of pace |
 //! | [`curve`] | rest to rest along a short or straight link in closed form |
 
+mod cell_motion;
 pub(crate) mod curve;
 pub(crate) mod follow;
+mod knots;
 pub(crate) mod limits;
+mod lists;
 mod newton;
+mod node_times;
 pub(crate) mod pace;
 pub(crate) mod plan;
 pub(crate) mod planner;

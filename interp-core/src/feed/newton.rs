@@ -6,9 +6,10 @@
 //! speed also in the middle of each interval. A place is weighted by its share of the time.
 
 use super::limits::MotionLimits;
+use super::lists::{LIST, Lists, get, put};
 use super::plan::{COEFFICIENTS, PINNED, Plan};
 use super::stations::Derivatives;
-use super::walk::{LIST, Lists};
+
 use crate::math::arith::{inverse_sqrt, sqrt};
 use crate::math::number::Bounded;
 
@@ -391,7 +392,11 @@ fn at_jumps(
             let x = f32::from(knot.part) * (1.0 / 65536.0);
             let h = plan.inverse_step;
             let [s1, s2, s3] = plan.interval(knot.interval).walk_rates(x);
-            let jump = limits.jump_jerk(&plan.stations.jump(knot.station));
+            let jump = if plan.stations.is_jump(knot.station) {
+                limits.jump_jerk(&plan.stations.jump(knot.station))
+            } else {
+                [[0.0; 2]; 3]
+            };
             for side in [knot.station, knot.station + 1] {
                 let place = Place {
                     v: s1 * h,
@@ -697,23 +702,6 @@ pub(crate) fn take(plan: &mut Plan, lists: &Lists, step: f32) {
     let count = plan.intervals + 2;
     for (index, pace) in (0..count).zip(&mut plan.draft) {
         *pace -= step * get(lists, GRADIENT, index);
-    }
-}
-
-fn get(lists: &Lists, list: usize, index: u16) -> f32 {
-    lists
-        .get(list)
-        .and_then(|list| list.get(usize::from(index)))
-        .copied()
-        .unwrap_or(0.0)
-}
-
-fn put(lists: &mut Lists, list: usize, index: u16, value: f32) {
-    if let Some(place) = lists
-        .get_mut(list)
-        .and_then(|list| list.get_mut(usize::from(index)))
-    {
-        *place = value;
     }
 }
 

@@ -209,8 +209,13 @@ impl<C: Copy> Pace<C> {
     };
 
     /// At the start of a motion: any constant pace is possible.
-    pub(crate) const fn begin(&mut self, pace: f32, period: f32) {
-        *self = Self::REST;
+    pub(crate) fn begin(&mut self, pace: f32, period: f32) {
+        // Field by field: a search that is none needs no copy of the rest of it.
+        self.change = None;
+        self.search = None;
+        self.time = 0.0;
+        self.is_fault = false;
+        (self.failures, self.timeouts) = (0, 0);
         (self.goal, self.wanted, self.period) = (pace, pace, period);
     }
 

@@ -25,6 +25,9 @@ const INTERVALS_A_STEP: u16 = 4;
 const PARTS_MAX: u8 = 8;
 const INTERVALS_A_PART: f32 = 2.0;
 
+/// Part of an interval by which a cursor is shifted at most.
+const SHIFT_MAX: f32 = 0.05;
+
 /// Coefficients of the pace next to an end at speed: the interval there has the speed of the end.
 pub(crate) const PINNED: u16 = 3;
 
@@ -321,24 +324,38 @@ impl Cursor {
         self.speed_of(&plan.interval(self.interval), plan)
     }
 
-    /// Speed of the pace that is being planned, mm/s.
-    pub(crate) fn draft_speed(&self, plan: &Plan) -> f32 {
-        self.speed_of(&plan.interval_of(&plan.draft, self.interval), plan)
-    }
-
     fn speed_of(&self, interval: &Interval, plan: &Plan) -> f32 {
         let [slope, _, _] = interval.walk_rates(self.x);
         slope * interval.speed(self.x) * plan.inverse_step
     }
 
-    /// Moves by this arc, mm, small against an interval; not where the walk stands.
-    pub(crate) fn shift(&mut self, mm: f32, plan: &Plan) {
+    /// Square of the speed of the plan's own pace, (mm/s)^2: without a root.
+    pub(crate) fn speed_sqr(&self, plan: &Plan) -> f32 {
+        self.speed_sqr_of(&plan.interval(self.interval), plan)
+    }
+
+    /// The same of the pace that is being planned.
+    pub(crate) fn draft_speed_sqr(&self, plan: &Plan) -> f32 {
+        self.speed_sqr_of(&plan.interval_of(&plan.draft, self.interval), plan)
+    }
+
+    fn speed_sqr_of(&self, interval: &Interval, plan: &Plan) -> f32 {
+        let [slope, _, _] = interval.walk_rates(self.x);
+        let [pace, _, _] = interval.pace_rates(self.x);
+        let slope = slope * plan.inverse_step;
+        slope * slope * pace.at_least(0.0)
+    }
+
+    /// Moves by this arc, mm, small against an interval; not where the walk nearly stands, and would have to go far. Returns whether it moved.
+    pub(crate) fn shift(&mut self, mm: f32, plan: &Plan) -> bool {
         let [slope, _, _] = plan.interval(self.interval).walk_rates(self.x);
         let by = mm / slope.at_least(1e-9);
-        if by.abs() < 0.5 {
+        let is_small = by.abs() < SHIFT_MAX;
+        if is_small {
             self.x = (self.x + by).at_least(0.0);
             self.carry(plan);
         }
+        is_small
     }
 
     /// Into the next interval where the fraction is above 1.

@@ -1,11 +1,12 @@
 //! Plans a path in portions: walk, barrier method, check.
 
 use super::limits::{FeedChange, MotionLimits};
+use super::lists::{LIST, Lists};
 use super::newton::{self, Reach, SHAPE, Sweep};
 use super::pace::{Course, Use};
 use super::plan::{Cursor, Lead, NODES_MAX, Plan};
 use super::road::GateSearch;
-use super::walk::{LIST, Lists, Walker};
+use super::walk::Walker;
 use crate::math::arith::{inverse_sqrt, sqrt, truncated};
 use crate::math::number::{Bounded, cube_root};
 
@@ -179,11 +180,11 @@ impl Planner {
     }
 
     /// Follows the plan of the rest from now on.
-    pub(crate) fn take_over(&mut self, plan: &mut Plan) {
+    pub(crate) fn take_over(&mut self, plan: &mut Plan) -> MotionLimits {
         plan.pace = plan.draft;
-        plan.limits = self.machine;
-        plan.change = FeedChange::new(&plan.limits);
+        plan.change = FeedChange::new(&self.machine);
         self.holds = false;
+        self.machine
     }
 
     /// Gives up.

@@ -70,7 +70,7 @@ impl Stations {
         }
     }
 
-    /// The station so many before the end of the list, 1 for the last.
+    /// A station by its number from the end of the list, 1 for the last.
     pub(crate) fn back_mut(&mut self, back: u16) -> Option<&mut Station> {
         let index = self.count.checked_sub(back)?;
         self.list.get_mut(usize::from(index))

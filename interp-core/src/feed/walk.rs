@@ -1,19 +1,16 @@
 //! The walk along a path that a plan scales: an acceleration-limited motion below rough caps of the speed, smoothed by a moving average, with nodes
 //! close together where the speed changes.
 
+use super::cell_motion::CellMotion;
+use super::knots::find_knots;
 use super::limits::{MotionLimits, SLOPE_MIN};
-use super::plan::{KNOTS_MAX, Knot, NODES_MAX, NODES_MIN, Plan};
-use super::stations::{Derivatives, STATIONS_MAX, Station, between};
+use super::lists::{Lists, get, put};
+use super::node_times::NodeTimes;
+use super::plan::{NODES_MAX, NODES_MIN, Plan};
+use super::stations::{Derivatives, Station, between};
 use super::{MM_PER_Q10, to_q10};
 use crate::math::arith::{sqrt, truncated};
 use crate::math::number::{Bounded, cube_root, to_f32};
-
-/// Values of a list of the planner.
-pub(crate) const LIST: usize = 170;
-const _: () = assert!(LIST >= STATIONS_MAX + 2 && LIST >= NODES_MAX + 3);
-
-/// Lists that the stages of the planner use, each for what it needs.
-pub(crate) type Lists = [[f32; LIST]; 5];
 
 /// Spacing of nodes that is fine enough, s; its growth per second away from busy places; the widest, s.
 const SPACING: f32 = 5e-3;
@@ -34,15 +31,16 @@ const PERIODS_A_PLAN: f32 = 55.0;
 /// The same for the last stop before a turn, and the share of the walk's time that a plan with an end at speed takes.
 const PERIODS_A_STOP: f32 = 150.0;
 const WALKED: f32 = 0.75;
+/// Speed over a jump below which the walk rests there, as a share of the one that a ramp without constant acceleration reaches; duration of the rest, as a
+/// multiple of the mean's.
+const REST_BELOW: f32 = 0.1;
+const REST_SHARE: f32 = 1.25;
 /// Bisections of the spacing.
 const BISECTIONS: u8 = 12;
 /// Tries to coarsen the ends.
 const COARSENINGS: u8 = 20;
 /// Stations on either side of a jump that the speed over it bounds.
 const JUMP_STATIONS: u16 = 10;
-/// Bisections of a jump's place in its interval.
-const KNOT_BISECTIONS: u8 = 16;
-
 const STATIONS_A_PORTION: u16 = 24;
 const JUMPS_A_PORTION: u16 = 6;
 const CELLS_A_PORTION: u16 = 84;
@@ -127,8 +125,8 @@ const SPEED_SQR: usize = 0;
 const TIME: usize = 1;
 /// Acceleration, negative where the speed is capped below the feed.
 const ACCEL: usize = 2;
-/// Times of busy places; then the steps between nodes.
-const BUSY: usize = 3;
+/// Times of busy places, those of rests with a minus; then the steps between nodes.
+pub(super) const BUSY: usize = 3;
 const NODES: usize = 4;
 
 impl Walker {
@@ -388,12 +386,17 @@ impl Walker {
         put(lists, ACCEL, station, if is_capped { -accel } else { accel });
     }
 
-    /// Bounds the speed around a jump.
+    /// Bounds the speed around a jump, down to a rest.
     fn slow_at_jump(&self, lists: &mut Lists, plan: &Plan, jump: u16, limits: &MotionLimits) {
         let speed = limits.jump_speed(&plan.stations.jump(jump));
         if speed >= limits.feed {
             return;
         }
+        let speed = if self.may_rest(plan, jump) && speed < self.rest_below() {
+            0.0
+        } else {
+            speed
+        };
         let at = plan.stations.get(jump).arc_nm;
         let from = jump.saturating_sub(JUMP_STATIONS);
         let to = plan.stations.count().min(jump + JUMP_STATIONS);
@@ -408,6 +411,31 @@ impl Walker {
             let most = speed + 0.5 * self.jerk * root * root;
             let square = get(lists, SPEED_SQR, station).at_most(most * most);
             put(lists, SPEED_SQR, station, square);
+        }
+    }
+
+    /// Speed over a jump, mm/s, below which a rest there is better: the walk's mean would not leave so narrow a slow place.
+    fn rest_below(&self) -> f32 {
+        REST_BELOW * self.acceleration * self.acceleration / self.jerk
+    }
+
+    /// Whether the walk can rest at a jump: there are two cells at least to the next jump and to the ends.
+    fn may_rest(&self, plan: &Plan, jump: u16) -> bool {
+        let stations = &plan.stations;
+        jump >= 2
+            && jump + 3 < stations.count()
+            && !stations.is_jump(jump - 2)
+            && !stations.is_jump(jump + 2)
+            && self.is_from_rest_to_rest()
+    }
+
+    /// Time for which the walk rests in a cell, s: in the cell of no length of a jump whose speed is 0, as long as the mean, so that its speed is 0 there, too.
+    fn rest(&self, lists: &Lists, plan: &Plan, cell: u16) -> f32 {
+        if plan.stations.is_jump(cell) && get(lists, SPEED_SQR, cell) == 0.0 {
+            let length = between(0, plan.stations.length_nm());
+            REST_SHARE * (self.acceleration / self.jerk).at_most(cube_root(0.5 * length / self.jerk))
+        } else {
+            0.0
         }
     }
 
@@ -491,7 +519,8 @@ impl Walker {
             let there = get(lists, SPEED_SQR, cell + 1).at_most(reach);
             let there = self.unless_held(plan, cell + 1, there);
             put(lists, SPEED_SQR, cell + 1, there);
-            time += Motion::of(here, there, length, self.accel(lists, cell)).duration;
+            time += CellMotion::of(here, there, length, self.accel(lists, cell)).duration;
+            time += self.rest(lists, plan, cell);
             put(lists, TIME, cell + 1, time);
         }
         self.duration = time;
@@ -556,7 +585,8 @@ impl Walker {
             };
             if is_busy {
                 let middle = 0.5 * (get(lists, TIME, cell) + get(lists, TIME, cell + 1));
-                put(lists, BUSY, self.busy, middle);
+                let rests = self.rest(lists, plan, cell) > 0.0;
+                put(lists, BUSY, self.busy, if rests { -middle } else { middle });
                 self.busy += 1;
             }
         }
@@ -590,7 +620,7 @@ impl Walker {
 
     fn fits(&self, lists: &Lists, spacing: f32, growth: f32) -> bool {
         let room = self.room(spacing);
-        let mut nodes = self.nodes_at(spacing, growth);
+        let mut nodes = self.nodes_at(lists, spacing, growth);
         while nodes.next(lists).is_some() {
             if nodes.count > room {
                 return false;
@@ -599,7 +629,7 @@ impl Walker {
         true
     }
 
-    fn nodes_at(&self, spacing: f32, growth: f32) -> NodeTimes {
+    fn nodes_at(&self, lists: &Lists, spacing: f32, growth: f32) -> NodeTimes {
         NodeTimes {
             duration: self.duration,
             mean_s: self.mean_s,
@@ -613,6 +643,10 @@ impl Walker {
             at: 0.0,
             busy: 1,
             busy_count: self.busy,
+            last: get(lists, BUSY, 0),
+            following: get(lists, BUSY, 1),
+            rests: [0.0; 2],
+            rest: 1,
             count: 0,
         }
     }
@@ -620,7 +654,7 @@ impl Walker {
     /// Writes the times of the nodes.
     fn times(&mut self, lists: &mut Lists, plan: &mut Plan) {
         let [spacing, growth] = self.spacing(self.high);
-        let mut nodes = self.nodes_at(spacing, growth);
+        let mut nodes = self.nodes_at(lists, spacing, growth);
         let most = if self.is_from_rest_to_rest() {
             self.intervals - 2
         } else {
@@ -673,7 +707,7 @@ impl Walker {
             let since = time - get(lists, TIME, self.cell);
             let [here, there] = [self.cell, self.cell + 1].map(|station| get(lists, SPEED_SQR, station));
             let length = plan.stations.cell_mm(self.cell);
-            let motion = Motion::of(here, there, length, self.accel(lists, self.cell));
+            let motion = CellMotion::of(here, there, length, self.accel(lists, self.cell));
             (
                 plan.stations.get(self.cell).arc_nm,
                 motion.at(since).at_least(0.0).at_most(length),
@@ -801,172 +835,8 @@ impl Walker {
     }
 }
 
-/// The motion over a cell: at a constant acceleration; next to a rest, at the greatest one for as long as it takes.
-struct Motion {
-    duration: f32,
-    length: f32,
-    /// Speed at the start, or from the rest's end at the other, and acceleration.
-    speed: f32,
-    acceleration: f32,
-    /// Time of the acceleration, and whether the rest is at the end.
-    ramp: f32,
-    is_end: bool,
-}
-
-impl Motion {
-    /// Between these squares of the speed.
-    fn of(here: f32, there: f32, length: f32, acceleration: f32) -> Self {
-        let is_end = there == 0.0 && here > 0.0;
-        if !(length > 0.0) {
-            return Self {
-                duration: 0.0,
-                length: 0.0,
-                speed: 0.0,
-                acceleration: 0.0,
-                ramp: 0.0,
-                is_end,
-            };
-        }
-        let top = sqrt(here.at_least(there)).at_least(1e-6);
-        if here > 0.0 && there > 0.0 {
-            let duration = 2.0 * length / (sqrt(here) + sqrt(there));
-            return Self {
-                duration,
-                length,
-                speed: sqrt(here),
-                acceleration: 0.5 * (there - here) / length,
-                ramp: duration,
-                is_end: false,
-            };
-        }
-        let acceleration = acceleration.at_least(0.5 * top * top / length);
-        let ramp = top / acceleration;
-        Self {
-            duration: ramp + (length - 0.5 * top * ramp).at_least(0.0) / top,
-            length,
-            speed: 0.0,
-            acceleration,
-            ramp,
-            is_end,
-        }
-    }
-
-    /// Length after this time.
-    fn at(&self, time: f32) -> f32 {
-        let time = if self.is_end { self.duration - time } else { time };
-        let ramp = time.at_most(self.ramp);
-        let top = self.speed + self.acceleration * ramp;
-        let moved = 0.5 * (self.speed + top) * ramp + top * (time - ramp);
-        if self.is_end { self.length - moved } else { moved }
-    }
-}
-
 /// Least intervals of a pass of few periods.
 const NODES_LEAST: u16 = 12;
 /// Most intervals as u16.
 const NODES_COUNT: u16 = 160;
 const _: () = assert!(NODES_COUNT as usize == NODES_MAX);
-
-/// The times of nodes, one after the other.
-struct NodeTimes {
-    /// Duration of the unsmoothed walk, and length of the mean, s.
-    duration: f32,
-    mean_s: f32,
-    /// Spacing at busy places, s, its growth away from them, per second, and the widest.
-    spacing: f32,
-    growth: f32,
-    widest: f32,
-    /// The same at the ends.
-    end_spacing: f32,
-    end_growth: f32,
-    at: f32,
-    busy: u16,
-    busy_count: u16,
-    count: u16,
-}
-
-impl NodeTimes {
-    fn next(&mut self, lists: &Lists) -> Option<f32> {
-        if self.count == 0 {
-            self.count = 1;
-            return Some(0.0);
-        }
-        if self.at >= self.duration {
-            return None;
-        }
-        let now = self.spacing_at(lists, self.at);
-        self.at += self.spacing_at(lists, self.at + 0.5 * now);
-        self.count += 1;
-        Some(self.at)
-    }
-
-    fn spacing_at(&mut self, lists: &Lists, at: f32) -> f32 {
-        while self.busy + 1 < self.busy_count && get(lists, BUSY, self.busy) < at {
-            self.busy += 1;
-        }
-        let before = (at - get(lists, BUSY, self.busy - 1)).abs();
-        let behind = (get(lists, BUSY, self.busy) - at).abs();
-        let away = (before.at_most(behind) - self.mean_s).at_least(0.0);
-        let there = (self.spacing + self.growth * away).at_most(self.widest);
-        let from_end = at.at_most(self.duration - at) - self.mean_s;
-        there.at_most(self.end_spacing + self.end_growth * from_end.at_least(0.0))
-    }
-}
-
-/// Appends the jumps of an interval that matter.
-fn find_knots(plan: &mut Plan, index: u16, limits: &MotionLimits) {
-    let [from, part] = plan.node(index);
-    let [to, _] = plan.node(index + 1);
-    for station in from..to {
-        if usize::from(plan.knot_count) >= KNOTS_MAX || !plan.stations.is_jump(station) {
-            continue;
-        }
-        let feed = limits.feed;
-        let jerk = limits.jump_jerk(&plan.stations.jump(station));
-        if !jerk
-            .iter()
-            .any(|[first, second]| (first + second * feed) * feed > 0.01)
-        {
-            continue;
-        }
-        let arc_of = |station| plan.stations.get(station).arc_nm;
-        let start = f32::from(part) * (1.0 / 65536.0) * plan.stations.cell_mm(from);
-        let away = between(arc_of(from), arc_of(station)) - start;
-        let interval = plan.interval(index);
-        let (mut low, mut high) = (0.0, 1.0);
-        for _ in 0..KNOT_BISECTIONS {
-            let middle = 0.5 * (low + high);
-            if interval.arc(middle) < away {
-                low = middle;
-            } else {
-                high = middle;
-            }
-        }
-        let part = u16::try_from(truncated(low * 65535.0)).unwrap_or(u16::MAX);
-        if let Some(knot) = plan.knots.get_mut(usize::from(plan.knot_count)) {
-            *knot = Knot {
-                interval: index,
-                part,
-                station,
-            };
-            plan.knot_count += 1;
-        }
-    }
-}
-
-fn get(lists: &Lists, list: usize, index: u16) -> f32 {
-    lists
-        .get(list)
-        .and_then(|list| list.get(usize::from(index)))
-        .copied()
-        .unwrap_or(0.0)
-}
-
-fn put(lists: &mut Lists, list: usize, index: u16, value: f32) {
-    if let Some(place) = lists
-        .get_mut(list)
-        .and_then(|list| list.get_mut(usize::from(index)))
-    {
-        *place = value;
-    }
-}

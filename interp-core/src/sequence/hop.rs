@@ -37,7 +37,7 @@ impl Course for Curves {
         let places = cursor.curves.iter_mut().zip(&self.curves).zip(&self.begins);
         for ((place, curve), begin) in places {
             let left = seconds - (begin - cursor.time).at_least(0.0);
-            if left > 0.0 {
+            if left > 0.0 && !curve.is_over(place) {
                 curve.advance(place, left);
             }
         }
@@ -162,20 +162,23 @@ impl Hop {
 
     /// The position.
     pub(crate) fn position(&self) -> [i32; 3] {
-        let [up, across, down] = [0, 1, 2].map(|leg: usize| {
+        let falls = self.cursor.time > self.curves.begins[2];
+        let [across, vertical] = [1, if falls { 2 } else { 0 }].map(|leg: usize| {
             let places = self.legs.get(leg).zip(self.cursor.curves.get(leg));
             places.map_or([0; 3], |(leg, place)| leg.position_at(place))
         });
-        let falls = self.cursor.time > self.curves.begins[2];
-        [across[0], across[1], if falls { down[2] } else { up[2] }]
+        [across[0], across[1], vertical[2]]
     }
 
     /// Speed, mm/s.
     pub(crate) fn speed(&self) -> f32 {
         let mut sum = 0.0;
-        for (place, curve) in self.cursor.curves.iter().zip(&self.curves.curves) {
-            let speed = curve.speed(place);
-            sum += speed * speed;
+        let Curves { curves, begins } = &self.curves;
+        for ((place, curve), begin) in self.cursor.curves.iter().zip(curves).zip(begins) {
+            if self.cursor.time > *begin && !curve.is_over(place) {
+                let speed = curve.speed(place);
+                sum += speed * speed;
+            }
         }
         self.pace.now() * sqrt(sum)
     }

@@ -26,6 +26,11 @@ const BEND_SHARE: f32 = 0.5;
 /// Share of the jerk that it may take at most, so that something is left to move with.
 const BEND_JERK_SHARE: f32 = 0.6;
 
+/// Knots of a step-over that are looked at.
+const KNOTS_MAX: u16 = 4;
+/// Share of the jerk that a jump of the direction may take in the periods that see it.
+const JUMP_JERK_SHARE: f32 = 0.1;
+
 /// Rounds in which the speed of a step-over and what its bends leave are adapted to each other.
 const ROUNDS: u8 = 3;
 
@@ -186,6 +191,8 @@ enum Task {
     Begin,
     /// Locate the ends, for its length.
     Ends,
+    /// Find whether the curvature jumps at the knot behind the n-th span of the step-over.
+    Knot(u16),
     /// Locate the n-th station.
     Station(u8),
     /// Compute the derivatives at the n-th station.
@@ -212,6 +219,11 @@ pub(crate) struct BoundaryStepOver {
     curve: CurveLimits,
     /// Greatest derivatives over the stations.
     bends: Derivatives,
+    /// The knot with the greatest jump of the curvature: its share of the way and the jump of the centre's speed there, as a share of the contact's; and the
+    /// greatest jump at another knot.
+    jump_at: f32,
+    jump: f32,
+    jump_beside: f32,
     contact: [i32; 3],
     /// Maximum ratio of the length of the contact's path to the length in the plan.
     contact_ratio: f32,
@@ -242,6 +254,9 @@ impl BoundaryStepOver {
         limits: MotionLimits::NONE,
         curve: Curve::NONE.limits(),
         bends: [[0.0; 3]; 3],
+        jump_at: 0.0,
+        jump: 0.0,
+        jump_beside: 0.0,
         contact: [0; 3],
         contact_ratio: 1.0,
         feed: 1.0,
@@ -265,6 +280,7 @@ impl BoundaryStepOver {
         self.window = Window::EMPTY;
         self.limits = MotionLimits::new(axes, feed, job.header.period_s);
         self.bends = [[0.0; 3]; 3];
+        (self.jump_at, self.jump, self.jump_beside) = (0.0, 0.0, 0.0);
         self.contact_ratio = 1.0;
         self.feed = feed;
     }
@@ -321,8 +337,12 @@ impl BoundaryStepOver {
                 if self.is_nothing() {
                     Task::Done
                 } else {
-                    Task::Station(0)
+                    self.next_knot(0)
                 }
+            }
+            Task::Knot(index) => {
+                self.look_at_knot(job, index)?;
+                self.next_knot(index + 1)
             }
             Task::Station(index) => {
                 let part = f32::from(index) * (1.0 / f32::from(STATIONS - 1));
@@ -360,7 +380,51 @@ impl BoundaryStepOver {
         Ok(())
     }
 
-    /// The curve that the bends leave room for.
+    /// The task for a knot, if the step-over crosses as many; the first station else.
+    const fn next_knot(&self, index: u16) -> Task {
+        if index < KNOTS_MAX && self.from.span + index < self.to.span {
+            Task::Knot(index)
+        } else {
+            Task::Station(0)
+        }
+    }
+
+    /// Where the curvature across a knot jumps, so does the direction of the centre's motion.
+    fn look_at_knot(&mut self, job: &Job<'_>, index: u16) -> Result<()> {
+        let span = self.from.span + index;
+        let before = SpanParameter {
+            span,
+            fraction: u64::MAX,
+        };
+        let behind = SpanParameter {
+            span: span + 1,
+            fraction: 0,
+        };
+        let mut sides = [0.0; 2];
+        for (of_side, side) in sides.iter_mut().zip([before, behind]) {
+            self.patch.collapse(job, &PassPosition { side, ..self.line })?;
+            let (contact, _) = self.patch.evaluate(u64::MAX)?;
+            *of_side = contact.across / contact.lateral_squared;
+        }
+        let [before, behind] = sides;
+        let jump = (behind - before).abs();
+        // A NaN, at a pole, is none.
+        if jump > self.jump {
+            let width = |span| job.side_width(span);
+            let start = SpanParameter {
+                span: span + 1,
+                fraction: 0,
+            };
+            self.jump_beside = self.jump;
+            self.jump = jump;
+            self.jump_at = schedule::apart(self.from, start, width) / self.reach;
+        } else if jump > self.jump_beside {
+            self.jump_beside = jump;
+        }
+        Ok(())
+    }
+
+    /// The curve that the bends leave room for, with a rest where the centre's direction jumps.
     fn choose_curve(&mut self) {
         let limits = &self.limits;
         let top = 1.0 / sqrt(limits.inverse_speed_sqr(&self.bends));
@@ -370,11 +434,27 @@ impl BoundaryStepOver {
                 .at_most(sqrt(BEND_SHARE * axis.acceleration / second.at_least(1e-9)))
                 .at_most(cube_root(BEND_JERK_SHARE * axis.jerk / third.at_least(1e-9)));
         }
+        let least = limits
+            .axes
+            .iter()
+            .fold(f32::MAX, |least, axis| least.at_most(axis.jerk));
+        let passed =
+            |jump: f32| JUMP_JERK_SHARE * least * limits.period * limits.period / jump.at_least(1e-9);
+        speed = speed.at_most(passed(self.jump_beside));
+        let rests = passed(self.jump) < speed;
+        let first = if rests {
+            self.jump_at * self.length
+        } else {
+            self.length
+        };
         let mut curve = Curve::NONE;
         let mut peak = 0.0;
         for _ in 0..ROUNDS {
             self.curve = self.left_at(speed, peak);
-            curve = Curve::new(self.length, &self.curve, 0.0, 0.0);
+            curve = Curve::new(first, &self.curve, 0.0, 0.0);
+            if rests {
+                curve = curve.and_then(self.length - first);
+            }
             peak = curve.peak();
         }
         self.progress.lead(self.length, curve);

@@ -53,6 +53,8 @@ pub(crate) struct PassPlan {
     group: u16,
     /// The pass is a single point.
     pub(crate) point: bool,
+    /// The pace at the programmed feed.
+    full_pace: f32,
     /// Cutter location at start and end, nm, and whether the surface faces up there.
     pub(crate) ends: [[i32; 3]; 2],
     pub(crate) faces_up: [bool; 2],
@@ -78,6 +80,7 @@ impl PassPlan {
         cell_fraction: 0,
         group: 1,
         point: false,
+        full_pace: 1.0,
         ends: [[0; 3]; 2],
         faces_up: [false; 2],
         interval: 0.0,
@@ -93,10 +96,20 @@ impl PassPlan {
         (self.cells, self.cell_fraction)
     }
 
-    /// Arc at the start of a cell between kept stations, units of 2^-10 nm. `cell`: number from the start of the pass.
-    pub(crate) fn arc_q10(&self, cell: u16) -> Option<i64> {
-        let patch = cell.checked_div(self.cells)?;
-        let within = cell - patch * self.cells;
+    /// The pace at a feed factor, 0 to 1.
+    pub(crate) fn pace(&self, feed_factor: f32) -> f32 {
+        (feed_factor * self.full_pace).at_most(1.0)
+    }
+
+    /// Sets the limits that it is planned for.
+    pub(crate) fn set_limits(&mut self, job: &Job<'_>, limits: MotionLimits) {
+        self.full_pace = job.header.feed_mm_s / limits.feed;
+        self.plan.limits = limits;
+    }
+
+    /// Arc at the start of a cell between kept stations, units of 2^-10 nm, by the number of the patch from the start of the pass and of the cell
+    /// within the patch.
+    pub(crate) fn arc_q10(&self, [patch, within]: [u16; 2]) -> Option<i64> {
         let group = patch.checked_div(self.group)?;
         if group * self.group != patch {
             return None;
@@ -224,7 +237,7 @@ impl Lookahead {
             Task::Patch => cycles::PATCH,
             Task::Station => cycles::STATION,
             Task::Derivatives(..) => cycles::DERIVATIVES,
-            Task::Estimate(1..) if self.step_over.makes_patch(&self.line) => cycles::PATCH,
+            Task::Estimate(1..) if self.step_over.makes_patch(&self.line, self.fraction()) => cycles::PATCH,
             Task::Estimate(0) => cycles::NEXT,
             Task::Estimate(_) => cycles::ESTIMATE,
             Task::Close => cycles::CLOSE,
@@ -269,6 +282,7 @@ impl Lookahead {
         out.side = side;
         out.cells = 0;
         out.point = false;
+        out.full_pace = 1.0;
         out.next = None;
     }
 
@@ -308,6 +322,11 @@ impl Lookahead {
                 Task::Estimate(looks - 1)
             }
             Task::Close => {
+                if self.looks_again(job) {
+                    let (pass, side, head) = (out.pass, out.side, self.turn);
+                    self.begin(job, pass, side, &head, out);
+                    return Ok(());
+                }
                 self.close(job, out)?;
                 let rests = self.without > 0;
                 self.without = self.without.saturating_sub(1);
@@ -481,7 +500,7 @@ impl Lookahead {
         Task::Estimate(if job.header.spacing == Spacing::FirstOrder {
             0
         } else {
-            StepOverEstimator::evaluations(first, begins, ends)
+            self.step_over.evaluations(first, begins, ends)
         })
     }
 
@@ -698,6 +717,11 @@ impl Lookahead {
             arc_nm: from_nm.saturating_add(self.turn.station_nm(index)),
             q: self.turn.station(second, index),
         });
+    }
+
+    /// Whether the first pass is to be looked at again for the step-over.
+    fn looks_again(&mut self, job: &Job<'_>) -> bool {
+        job.header.spacing == Spacing::Exact && self.step_over.looks_again(job.header)
     }
 
     /// Computes the interval and the next pass.

@@ -16,10 +16,12 @@ use crate::job::{AxisLimits, Pattern};
 use crate::math::number::{Bounded, to_f32};
 use crate::pass::position::PassPosition;
 use crate::pass::run::Run;
+use crate::pass::scan::cycles::PATCH;
 use crate::sample::{Sample, SpanParameter};
 use crate::sequence::hop::Hop;
+use crate::sequence::legs::{Goal, Leg, LegPlanning};
 use crate::sequence::link::{BoundaryStepOver, StraightMove, check_faces_up};
-use crate::sequence::lookahead::{Lookahead, PassPlan, check_travel, has_turns};
+use crate::sequence::lookahead::{Lookahead, PassPlan, has_turns};
 use crate::sequence::turning::{Part, road};
 
 /// Periods that a pass takes longer than the planning of the next one.
@@ -34,6 +36,9 @@ const STEP_OVER_CYCLES: u32 = 6_000;
 /// Cycles of the same of a hop, and of its planning.
 const HOP_PACE_CYCLES: u32 = 2_500;
 const HOP_CYCLES: u32 = 24_000;
+/// Cycles of the begin of a look-ahead, and of the planning of a leg.
+const BEGIN_CYCLES: u32 = 1_500;
+const LEG_CYCLES: u32 = 5_000;
 /// Cycles of replacing the rest of a plan, or of the wait until that is possible: once a period.
 const TAKE_OVER_CYCLES: u32 = 20_000;
 
@@ -48,12 +53,14 @@ const PERIODS_A_REST: f32 = 40.0;
 const PERIODS_A_PASS: f32 = 100.0;
 /// Share of the time of a rest by which a turn may slow its plan down.
 const REST_SHARE: f32 = 0.3;
+/// Periods by which a correction of the progress waits for a cheaper tick, at most.
+const WAITS_MAX: u8 = 4;
 /// Steps in which the tool's place after the planning is estimated.
 const AHEAD_STEPS: u16 = 64;
 
 /// Phase of the sequence.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Phase {
+pub(super) enum Phase {
     /// The tool waits until the next pass is planned.
     Await,
     /// A step-over along the boundary.
@@ -72,25 +79,6 @@ enum Phase {
     Done,
 }
 
-/// A straight leg off the surface, towards the goal.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Leg {
-    Retract,
-    Traverse,
-    Plunge,
-}
-
-/// The goal of a sequence of legs.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Goal {
-    /// The start of the next pass.
-    Pass,
-    /// The position at which the first run began.
-    Home,
-    /// The safe height, above the tool's position.
-    SafeHeight,
-}
-
 /// Outcome of a tick.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Outcome {
@@ -104,7 +92,9 @@ pub(crate) enum Outcome {
 
 /// Planning of the next pass.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Planning {
+pub(super) enum Planning {
+    /// It is to be begun, for this number of the pass and this side parameter.
+    Requested(u32, SpanParameter),
     /// Its stations are being located.
     Stations,
     /// Its feed is being planned.
@@ -115,11 +105,18 @@ enum Planning {
     Complete,
 }
 
-/// The wish of a period.
+/// A correction of the progress: how far the tool is ahead of it, units of 2^-10 nm, and for how many periods that has been known.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Wish {
+struct Correction {
+    apart_q10: i64,
+    waited: u8,
+}
+
+/// The feed that is commanded for a period.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct FeedCommand {
     /// Feed factor, 0 to 2.
-    pub(crate) share: f32,
+    pub(crate) feed_factor: f32,
     /// A controlled stop after a fault.
     pub(crate) is_fault: bool,
 }
@@ -127,23 +124,25 @@ pub(crate) struct Wish {
 /// The sequence of a job.
 #[derive(Clone, Debug)]
 pub(crate) struct Sequencer {
-    phase: Phase,
-    goal: Goal,
+    pub(super) phase: Phase,
+    pub(super) goal: Goal,
+    /// The planning of the leg that is waited for.
+    pub(super) leg: LegPlanning,
     lookahead: Lookahead,
     planner: Planner,
-    planning: Planning,
-    plans: [PassPlan; 2],
+    pub(super) planning: Planning,
+    pub(super) plans: [PassPlan; 2],
     /// The second plan is that of the current or last pass.
-    second: bool,
+    pub(super) second: bool,
     /// Whether the tool has been on a pass since the start.
     on_surface: bool,
     /// A fault of the next pass, reported when the tool reaches the pass.
-    pending: Option<Fault>,
+    pub(super) pending: Option<Fault>,
     pub(super) follower: Follower,
     pub(super) pace: Pace<Cursor>,
     /// The turn that the tool is in, or was last.
     pub(super) turn: Turn,
-    straight: StraightMove,
+    pub(super) straight: StraightMove,
     hop: Hop,
     /// Whether the hop to the next pass is to be planned.
     has_hop: bool,
@@ -153,16 +152,19 @@ pub(crate) struct Sequencer {
     /// Periods of planning of the next pass so far.
     spent: u32,
     /// Feed factor of the last period, and the feed that the rest of the pass was last planned for, mm/s.
-    share: f32,
+    feed_factor: f32,
     replanned: f32,
     /// The tool's position, once it is known.
-    at: Option<[i32; 3]>,
-    /// Cell of the pass that the tool is in.
-    cell: u16,
+    pub(super) at: Option<[i32; 3]>,
+    /// Whether the first patch of the pass ahead is to be collapsed.
+    has_first_patch: bool,
+    /// Patch of the pass and cell of the patch that the tool is in.
+    cell: [u16; 2],
+    correction: Option<Correction>,
 }
 
 /// The plans of the current or last pass, and of the next.
-const fn both(plans: &mut [PassPlan; 2], second: bool) -> (&mut PassPlan, &mut PassPlan) {
+pub(super) const fn both(plans: &mut [PassPlan; 2], second: bool) -> (&mut PassPlan, &mut PassPlan) {
     let [one, other] = plans;
     if second { (other, one) } else { (one, other) }
 }
@@ -172,6 +174,7 @@ impl Sequencer {
     pub(crate) const START: Self = Self {
         phase: Phase::Done,
         goal: Goal::Pass,
+        leg: LegPlanning::Requested,
         lookahead: Lookahead::START,
         planner: Planner::IDLE,
         planning: Planning::Complete,
@@ -188,26 +191,29 @@ impl Sequencer {
         step_over: BoundaryStepOver::NONE,
         has_step_over: false,
         spent: 0,
-        share: 1.0,
+        feed_factor: 1.0,
         replanned: 0.0,
         at: None,
-        cell: 0,
+        has_first_patch: false,
+        cell: [0; 2],
+        correction: None,
     };
 
     /// Starts the job from the tool's position.
-    pub(crate) fn restart(&mut self, job: &Job<'_>, axes: &AxisLimits) {
+    pub(crate) fn restart(&mut self, axes: &AxisLimits) {
         self.at.get_or_insert(axes.home_nm);
         self.phase = Phase::Await;
         self.second = false;
         self.on_surface = false;
         self.pending = None;
+        self.has_first_patch = true;
         self.planner.stop();
         for pass in &mut self.plans {
             pass.tail = Turn::NONE;
         }
         self.lookahead.restart();
-        self.share = 1.0;
-        self.begin_planning(job, 0, Some(SpanParameter::default()));
+        self.feed_factor = 1.0;
+        self.request_planning(0, Some(SpanParameter::default()));
     }
 
     /// The tool's position, nm, once it is known.
@@ -247,31 +253,33 @@ impl Sequencer {
     pub(crate) fn retract(&mut self, run: &Run) {
         let is_free = self.is_link() || run.faces_up();
         self.goal = Goal::SafeHeight;
-        self.phase = if is_free {
-            Phase::AwaitGoal(Leg::Retract)
+        if is_free {
+            self.await_goal(Leg::Retract);
         } else {
-            Phase::Done
-        };
+            self.phase = Phase::Done;
+        }
     }
 
     /// Whether [`Self::plan`] has anything to do.
     pub(crate) fn has_to_plan(&self) -> bool {
-        let seeks_pace = match self.phase {
+        let is_busy = match self.phase {
             Phase::Pass | Phase::Turn => self.pace.has_work(),
             Phase::StepOver => self.step_over.progress.has_work(),
             Phase::Leg(_) => self.straight.progress.has_work(),
             Phase::Hop => self.hop.has_work(),
-            Phase::Await | Phase::AwaitGoal(_) | Phase::Done => false,
+            Phase::AwaitGoal(leg) => self.has_to_plan_leg(leg),
+            Phase::Await | Phase::Done => false,
         };
-        let wants_more = self.phase == Phase::Pass && self.share > 1.0;
-        seeks_pace
+        let wants_more = self.phase == Phase::Pass && self.feed_factor > 1.0;
+        is_busy
             || wants_more
+            || self.pass_ahead().is_some()
             || (self.pending.is_none()
                 && (self.planning != Planning::Complete || self.has_to_plan_step_over() || self.has_hop))
     }
 
     /// Whether the next pass is planned.
-    fn is_planned(&self) -> bool {
+    pub(super) fn is_planned(&self) -> bool {
         matches!(self.planning, Planning::Complete | Planning::Rest)
     }
 
@@ -281,10 +289,12 @@ impl Sequencer {
 
     /// The planning of one period: work of at most [`PORTION_CYCLES`] cycles.
     #[inline(never)]
-    pub(crate) fn plan(&mut self, job: &Job<'_>, axes: &AxisLimits) {
+    pub(crate) fn plan(&mut self, job: &Job<'_>, axes: &AxisLimits, run: &mut Run) {
         let mut left = PORTION_CYCLES;
         match self.planning {
-            Planning::Stations | Planning::Feed => self.spent = self.spent.saturating_add(1),
+            Planning::Requested(..) | Planning::Stations | Planning::Feed => {
+                self.spent = self.spent.saturating_add(1);
+            }
             Planning::Complete if self.wants_more(job) => return self.plan_for_override(job, axes),
             Planning::Complete | Planning::Rest => {}
         }
@@ -294,7 +304,7 @@ impl Sequencer {
                 return;
             }
             left -= cycles;
-            self.work(job, axes);
+            self.work(job, axes, run);
         }
     }
 
@@ -304,9 +314,9 @@ impl Sequencer {
             return false;
         }
         let [one, other] = &self.plans;
-        let feed = job.header.feed_mm_s * self.share;
+        let feed = job.header.feed_mm_s * self.feed_factor;
         let of = |pass: &PassPlan| feed > REPLANNED * pass.plan.limits.feed;
-        self.phase == Phase::Pass && self.share > 1.0 && (of(one) || of(other)) && !self.pace.has_work()
+        self.phase == Phase::Pass && self.feed_factor > 1.0 && (of(one) || of(other)) && !self.pace.has_work()
     }
 
     /// Cycles of the next piece of planning; 0 where there is none.
@@ -325,7 +335,11 @@ impl Sequencer {
             Phase::StepOver if self.step_over.progress.has_work() => return LINK_PACE_CYCLES,
             Phase::Leg(_) if self.straight.progress.has_work() => return LINK_PACE_CYCLES,
             Phase::Hop if self.hop.has_work() => return HOP_PACE_CYCLES,
+            Phase::AwaitGoal(leg) if self.has_to_plan_leg(leg) => return LEG_CYCLES,
             _ => {}
+        }
+        if self.pass_ahead().is_some() {
+            return PATCH;
         }
         if self.pending.is_some() {
             return 0;
@@ -334,6 +348,7 @@ impl Sequencer {
             return STEP_OVER_CYCLES;
         }
         match self.planning {
+            Planning::Requested(..) => BEGIN_CYCLES,
             Planning::Stations => self.lookahead.cycles(),
             Planning::Feed => self.planner.cycles(next),
             Planning::Rest if self.planner.is_done() => TAKE_OVER_CYCLES,
@@ -343,7 +358,12 @@ impl Sequencer {
         }
     }
 
-    fn work(&mut self, job: &Job<'_>, axes: &AxisLimits) {
+    fn work(&mut self, job: &Job<'_>, axes: &AxisLimits, run: &mut Run) {
+        if let Phase::AwaitGoal(leg) = self.phase
+            && self.has_to_plan_leg(leg)
+        {
+            return self.plan_leg(leg, job, axes);
+        }
         let is_known = self.knows_next();
         let (now, next) = both(&mut self.plans, self.second);
         match self.phase {
@@ -358,9 +378,14 @@ impl Sequencer {
             Phase::Hop if self.hop.has_work() => return self.hop.work(),
             _ => {}
         }
+        if let Some(first) = self.pass_ahead().map(|pass| first_patch(job, pass)) {
+            self.has_first_patch = false;
+            return run.prepare_pass(job, &first);
+        }
+        let (now, next) = both(&mut self.plans, self.second);
         if self.has_step_over && self.step_over.is_requested() {
             if let Some(side) = now.next {
-                let feed = job.header.feed_mm_s * self.share.at_least(1.0);
+                let feed = job.header.feed_mm_s * self.feed_factor.at_least(1.0);
                 self.step_over.begin(job, axes, &last_patch(job, now), side, feed);
             }
             return;
@@ -370,14 +395,18 @@ impl Sequencer {
             return;
         }
         match self.planning {
+            Planning::Requested(pass, side) => {
+                self.lookahead.begin(job, pass, side, &now.tail, next);
+                self.planning = Planning::Stations;
+            }
             Planning::Stations => {
                 self.pending = self.lookahead.work(job, axes, next).err();
                 if self.lookahead.is_done() {
                     self.planning = if next.point {
                         Planning::Complete
                     } else {
-                        let feed = job.header.feed_mm_s * self.share.at_least(1.0);
-                        next.plan.limits = MotionLimits::new(axes, feed, job.header.period_s);
+                        let feed = job.header.feed_mm_s * self.feed_factor.at_least(1.0);
+                        next.set_limits(job, MotionLimits::new(axes, feed, job.header.period_s));
                         self.planner.begin(&mut next.plan);
                         Planning::Feed
                     };
@@ -411,7 +440,8 @@ impl Sequencer {
                     return;
                 }
                 if is_ahead {
-                    self.planner.take_over(&mut now.plan);
+                    let limits = self.planner.take_over(&mut now.plan);
+                    now.set_limits(job, limits);
                     self.follower.restart_lead(&now.plan);
                 }
                 self.follower.keep_to_plan(false);
@@ -428,7 +458,7 @@ impl Sequencer {
 
     /// Plans what is ahead anew where the override asks for more than the plans give.
     fn plan_for_override(&mut self, job: &Job<'_>, axes: &AxisLimits) {
-        let feed = job.header.feed_mm_s * self.share;
+        let feed = job.header.feed_mm_s * self.feed_factor;
         let (now, next) = both(&mut self.plans, self.second);
         if self.phase != Phase::Pass || now.point {
             return;
@@ -454,22 +484,17 @@ impl Sequencer {
             && feed > REPLANNED * next.plan.limits.feed
             && left_periods > 1.5 * f32::from(next.plan.intervals) * PERIODS_A_NODE + PERIODS_A_PASS
         {
-            next.plan.limits = MotionLimits::new(axes, feed, job.header.period_s);
+            next.set_limits(job, MotionLimits::new(axes, feed, job.header.period_s));
             self.planner.begin(&mut next.plan);
             self.planning = Planning::Feed;
         }
     }
 
-    /// Begins to plan the pass after the one that is followed next.
-    fn begin_planning(&mut self, job: &Job<'_>, pass: u32, side: Option<SpanParameter>) {
-        let (now, next) = both(&mut self.plans, self.second);
-        self.planning = Planning::Complete;
+    /// Has the pass after the one that is followed next planned, if there is one.
+    fn request_planning(&mut self, pass: u32, side: Option<SpanParameter>) {
+        self.planning = side.map_or(Planning::Complete, |side| Planning::Requested(pass, side));
         self.has_step_over = false;
-        if let Some(side) = side {
-            self.lookahead.begin(job, pass, side, &now.tail, next);
-            self.planning = Planning::Stations;
-            self.spent = 0;
-        }
+        self.spent = 0;
     }
 
     /// One period, into `last`. The phases off the passes are separate functions, so that a tick on a pass saves no registers for them.
@@ -480,15 +505,15 @@ impl Sequencer {
     pub(crate) fn tick(
         &mut self,
         job: &Job<'_>,
-        axes: &AxisLimits,
+
         run: &mut Run,
-        wish: Wish,
+        command: FeedCommand,
         last: &mut Sample,
     ) -> Result<Outcome> {
         let was_link = self.is_link() && self.phase != Phase::Turn;
-        self.share = wish.share;
+        self.feed_factor = command.feed_factor;
         if let Phase::Pass | Phase::Turn = self.phase {
-            self.follow_pass(job, run, wish, last)?;
+            self.follow_pass(job, run, command, last)?;
             if self.phase == Phase::Turn {
                 self.at = Some(last.cl_nm);
                 return Ok(Outcome::Link);
@@ -496,7 +521,7 @@ impl Sequencer {
         } else if self.phase == Phase::Done {
             return Ok(Outcome::Finished);
         } else {
-            self.follow_link(job, axes, run, wish, last)?;
+            self.follow_link(job, run, command, last)?;
         }
         self.at = Some(last.cl_nm);
         // The first and the last sample of a pass belong to the pass.
@@ -512,16 +537,15 @@ impl Sequencer {
     fn follow_link(
         &mut self,
         job: &Job<'_>,
-        axes: &AxisLimits,
         run: &mut Run,
-        wish: Wish,
+        command: FeedCommand,
         last: &mut Sample,
     ) -> Result<()> {
-        self.leave(job, axes, wish)?;
+        self.leave(job, command)?;
         match self.phase {
-            Phase::StepOver => self.follow_step_over(job, run, wish, last),
-            Phase::Leg(leg) => self.follow_leg(leg, job, run, wish, last),
-            Phase::Hop => self.follow_hop(job, run, wish, last),
+            Phase::StepOver => self.follow_step_over(job, run, command, last),
+            Phase::Leg(leg) => self.follow_leg(leg, job, run, command, last),
+            Phase::Hop => self.follow_hop(job, run, command, last),
             _ => {
                 match self.at {
                     Some(at) if !self.on_surface => run.off_surface(at, 0.0, last),
@@ -533,7 +557,7 @@ impl Sequencer {
     }
 
     /// Ends a wait where what is waited for is there.
-    fn leave(&mut self, job: &Job<'_>, axes: &AxisLimits, wish: Wish) -> Result<()> {
+    fn leave(&mut self, job: &Job<'_>, command: FeedCommand) -> Result<()> {
         if self.phase == Phase::Await {
             if let Some(fault) = self.pending {
                 return Err(fault);
@@ -544,56 +568,58 @@ impl Sequencer {
             let (now, next) = both(&mut self.plans, self.second);
             if self.on_surface && job.header.pattern == Pattern::Zigzag {
                 self.phase = Phase::StepOver;
-                let pace = wish.share * job.header.feed_mm_s / self.step_over.feed();
+                let pace = command.feed_factor * job.header.feed_mm_s / self.step_over.feed();
                 self.step_over
                     .progress
                     .begin(pace.at_most(1.0), job.header.period_s);
-                self.swap(job);
+                self.swap();
             } else {
                 check_faces_up(next.faces_up[0] && (now.faces_up[1] || !self.on_surface))?;
                 self.goal = Goal::Pass;
-                self.phase = Phase::AwaitGoal(Leg::Retract);
+                self.await_goal(Leg::Retract);
             }
         }
-        // A leg without length is followed by the next in the same period.
-        for _ in 0..LEGS {
-            let Phase::AwaitGoal(leg) = self.phase else {
-                break;
-            };
-            if !self.begin_leg(leg, job, axes, wish)? {
-                break;
-            }
+        if let Phase::AwaitGoal(leg) = self.phase {
+            self.begin_leg(leg, job, command)?;
         }
         Ok(())
     }
 
     /// The next pass becomes the one that is followed, and the one after it is planned.
-    pub(super) fn swap(&mut self, job: &Job<'_>) {
+    pub(super) fn swap(&mut self) {
         self.second = !self.second;
         let (now, _) = both(&mut self.plans, self.second);
         let (pass, side) = (now.pass.wrapping_add(1), now.next);
-        self.begin_planning(job, pass, side);
+        self.request_planning(pass, side);
     }
 
     /// Enters the pass, which begins at the tool's position, and emits its first sample.
     #[inline(never)]
-    fn enter_pass(&mut self, job: &Job<'_>, run: &mut Run, wish: Wish, last: &mut Sample) -> Result<()> {
+    pub(super) fn enter_pass(
+        &mut self,
+        job: &Job<'_>,
+        run: &mut Run,
+        command: FeedCommand,
+        last: &mut Sample,
+    ) -> Result<()> {
         let (now, _) = both(&mut self.plans, self.second);
         run.enter_pass(job, now.pass, now.side)?;
         run.begin(now.interval, last)?;
         self.on_surface = true;
         self.phase = Phase::Pass;
         self.follower.begin(&now.plan);
-        let pace = pace_of(job, now, wish.share).at_most(now.plan.pace_max);
+        let pace = pace_on(now, command.feed_factor);
         self.pace.begin(pace, job.header.period_s);
-        self.settle_in(job);
+        self.start_pass(job);
         Ok(())
     }
 
-    /// What begins with a pass.
-    pub(super) fn settle_in(&mut self, job: &Job<'_>) {
+    /// Resets what belongs to a pass, and requests the link to the next one.
+    pub(super) fn start_pass(&mut self, job: &Job<'_>) {
+        self.has_first_patch = true;
         let (now, _) = both(&mut self.plans, self.second);
-        self.cell = 0;
+        self.cell = [0; 2];
+        self.correction = None;
         self.replanned = 0.0;
         if job.header.pattern == Pattern::Zigzag && now.next.is_some() && !now.turns() {
             self.step_over.request();
@@ -614,29 +640,56 @@ impl Sequencer {
         self.is_planned() && self.pending.is_none()
     }
 
-    /// The greatest pace on the next pass, if it is planned and a turn leads there.
-    fn next_pace(&self, job: &Job<'_>) -> Option<f32> {
+    /// The pass that a link leads to, if its first patch is to be collapsed, and can be.
+    fn pass_ahead(&self) -> Option<&PassPlan> {
+        if !self.has_first_patch || self.pending.is_some() {
+            return None;
+        }
         let (now, next) = self.plans_ref();
-        (now.turns() && self.knows_next()).then(|| pace_on(job, next, self.share))
+        let is_located = !matches!(self.planning, Planning::Requested(..) | Planning::Stations);
+        match self.phase {
+            Phase::StepOver => Some(now),
+            Phase::Turn => {
+                let is_behind = self.follower.arc_q10() >= now.tail_q10;
+                Some(next).filter(|_| now.turns() && is_behind && is_located)
+            }
+            Phase::Hop | Phase::Leg(_) | Phase::AwaitGoal(_) => {
+                Some(next).filter(|_| self.goal == Goal::Pass && is_located)
+            }
+            Phase::Await | Phase::Pass | Phase::Done => None,
+        }
     }
 
-    fn follow_pass(&mut self, job: &Job<'_>, run: &mut Run, wish: Wish, last: &mut Sample) -> Result<()> {
+    /// The greatest pace on the next pass, if it is planned and a turn leads there.
+    fn next_pace(&self) -> Option<f32> {
+        let (now, next) = self.plans_ref();
+        (now.turns() && self.knows_next()).then(|| pace_on(next, self.feed_factor))
+    }
+
+    fn follow_pass(
+        &mut self,
+        job: &Job<'_>,
+        run: &mut Run,
+        command: FeedCommand,
+        last: &mut Sample,
+    ) -> Result<()> {
+        self.correct_progress(job, run);
         let (now, _) = both(&mut self.plans, self.second);
         let is_over = if now.point {
-            if wish.share > 0.0 && run.is_along() {
+            if command.feed_factor > 0.0 && run.is_along() {
                 run.advance_far(job, 1.0, last)?;
             } else {
                 run.stand(last);
             }
             !run.is_along()
         } else {
-            let wanted = pace_of(job, now, wish.share);
-            let next_pace = self.next_pace(job);
+            let wanted = now.pace(command.feed_factor);
+            let next_pace = self.next_pace();
             let wanted = self.pace_before_turn(wanted, next_pace);
-            self.pace.want(wanted, wish.is_fault);
+            self.pace.want(wanted, command.is_fault);
             if let Some(fault) = self
                 .pending
-                .filter(|_| self.pace.is_at_rest() && wish.share > 0.0)
+                .filter(|_| self.pace.is_at_rest() && command.feed_factor > 0.0)
             {
                 return Err(fault);
             }
@@ -661,7 +714,7 @@ impl Sequencer {
             }
         };
         if is_over {
-            self.end_pass(job, wish)?;
+            self.end_pass(job, command)?;
         }
         Ok(())
     }
@@ -687,7 +740,6 @@ impl Sequencer {
         self.phase = Phase::Pass;
         if moved > MOVED_MIN && run.is_along() {
             run.move_by(job, moved / (job.header.feed_mm_s * job.header.period_s), last)?;
-            self.correct_progress(job, run);
         } else {
             run.stand(last);
         }
@@ -696,12 +748,12 @@ impl Sequencer {
 
     /// Chooses what follows a pass.
     #[inline(never)]
-    fn end_pass(&mut self, job: &Job<'_>, wish: Wish) -> Result<()> {
+    fn end_pass(&mut self, job: &Job<'_>, command: FeedCommand) -> Result<()> {
         let (now, next) = both(&mut self.plans, self.second);
         if now.next.is_none() {
             check_faces_up(now.faces_up[1])?;
             self.goal = Goal::Home;
-            self.phase = Phase::AwaitGoal(Leg::Retract);
+            self.await_goal(Leg::Retract);
         } else if job.header.pattern == Pattern::Zigzag {
             self.phase = Phase::Await;
         } else {
@@ -709,122 +761,61 @@ impl Sequencer {
             self.goal = Goal::Pass;
             // Planning never delays the lift: what is not planned yet is waited for above the surface.
             let is_planned = self.pending.is_none() && self.planning == Planning::Complete;
-            self.phase = if is_planned && next.faces_up[0] && self.hop.leads(now.ends[1], next.ends[0]) {
-                self.hop.begin(wish.share.at_most(1.0), job.header.period_s);
-                Phase::Hop
+            if is_planned && next.faces_up[0] && self.hop.leads(now.ends[1], next.ends[0]) {
+                self.hop
+                    .begin(command.feed_factor.at_most(1.0), job.header.period_s);
+                self.phase = Phase::Hop;
             } else {
-                Phase::AwaitGoal(Leg::Retract)
-            };
+                self.await_goal(Leg::Retract);
+            }
         }
         Ok(())
     }
 
-    /// Corrects the progress at each station by the plan's arc, so that errors do not accumulate from station to station.
+    /// Corrects the progress at each station by the plan's arc, so that errors do not accumulate from station to station: some periods after it was
+    /// measured, because those in which the tool comes to a patch, and the patch after it is prepared, are the worst-case ticks.
     fn correct_progress(&mut self, job: &Job<'_>, run: &Run) {
         let (now, _) = both(&mut self.plans, self.second);
         let (cells, fraction) = now.kept_cells();
+        if self.phase != Phase::Pass || now.point {
+            return;
+        }
+        if let Some(correction) = &mut self.correction {
+            if run.prepares_patch() && correction.waited < WAITS_MAX {
+                correction.waited += 1;
+            } else if self.follower.correct(&now.plan, correction.apart_q10) {
+                self.correction = None;
+            }
+            return;
+        }
         let Some(cell) = run.cell(job, cells).filter(|cell| *cell != self.cell) else {
             return;
         };
         self.cell = cell;
-        let (Some(start_q10), Some(since_mm)) = (now.arc_q10(cell), run.since_station(cells, fraction))
-        else {
+        let (Some(start_q10), Some(since_mm)) = (now.arc_q10(cell), run.since_station(cell, fraction)) else {
             return;
         };
         let arc_q10 = start_q10 + crate::feed::to_q10(since_mm);
-        self.follower.correct(&now.plan, arc_q10);
+        self.correction = Some(Correction {
+            apart_q10: arc_q10 - self.follower.arc_q10(),
+            waited: 0,
+        });
     }
 
-    /// Begins a leg if its goal is known; returns whether the leg has no length, so that the next one can begin.
-    fn begin_leg(&mut self, leg: Leg, job: &Job<'_>, axes: &AxisLimits, wish: Wish) -> Result<bool> {
-        if self.goal == Goal::Pass && leg != Leg::Retract {
-            if let Some(fault) = self.pending {
-                return Err(fault);
-            }
-            // The traverse needs the stations of the next pass, the plunge its plan.
-            let is_known = match leg {
-                Leg::Plunge => self.is_planned(),
-                _ => self.planning != Planning::Stations,
-            };
-            if !is_known {
-                return Ok(false);
-            }
-        }
-        let (_, next) = both(&mut self.plans, self.second);
-        let from = self.at.unwrap_or(axes.home_nm);
-        let [x, y, z] = match self.goal {
-            Goal::Pass => next.ends[0],
-            Goal::Home => axes.home_nm,
-            Goal::SafeHeight => from,
-        };
-        let height = from[2].max(axes.safe_z_nm);
-        let to = match leg {
-            Leg::Retract => [from[0], from[1], height],
-            Leg::Traverse => [x, y, from[2]],
-            Leg::Plunge => [x, y, z],
-        };
-        if self.goal == Goal::Pass && leg != Leg::Retract {
-            check_faces_up(next.faces_up[0])?;
-        }
-        check_travel(axes, &to)?;
-        let slow_mm = if leg == Leg::Plunge && self.goal == Goal::Pass {
-            axes.plunge_mm
-        } else {
-            0.0
-        };
-        let feed = job.header.feed_mm_s;
-        if !self.straight.lead(from, to, slow_mm, feed, axes) {
-            self.phase = self.after(leg);
-            // A pass that begins where the tool is needs its plan only.
-            return Ok(self.phase != Phase::AwaitGoal(leg));
-        }
-        self.straight
-            .progress
-            .begin(wish.share.at_most(1.0), job.header.period_s);
-        self.phase = Phase::Leg(leg);
-        Ok(false)
-    }
-
-    /// The phase after a leg; that of the plunge to a pass is its own, and is left by [`Self::enter_pass`].
-    const fn after(&self, leg: Leg) -> Phase {
-        match (leg, self.goal) {
-            (Leg::Retract, Goal::SafeHeight) | (Leg::Plunge, Goal::Home | Goal::SafeHeight) => Phase::Done,
-            (Leg::Retract, _) => Phase::AwaitGoal(Leg::Traverse),
-            (Leg::Traverse, _) => Phase::AwaitGoal(Leg::Plunge),
-            (Leg::Plunge, Goal::Pass) => Phase::Leg(Leg::Plunge),
-        }
-    }
-
-    fn follow_leg(
+    fn follow_hop(
         &mut self,
-        leg: Leg,
         job: &Job<'_>,
         run: &mut Run,
-        wish: Wish,
+        command: FeedCommand,
         last: &mut Sample,
     ) -> Result<()> {
-        let is_over =
-            self.straight
-                .progress
-                .tick(wish.share.at_most(1.0), wish.is_fault, job.header.period_s);
-        if is_over && leg == Leg::Plunge && self.goal == Goal::Pass {
-            self.swap(job);
-            return self.enter_pass(job, run, wish, last);
-        }
-        run.off_surface(self.straight.position(), self.straight.progress.speed(), last);
-        if is_over {
-            self.phase = self.after(leg);
-        }
-        Ok(())
-    }
-
-    fn follow_hop(&mut self, job: &Job<'_>, run: &mut Run, wish: Wish, last: &mut Sample) -> Result<()> {
-        if self
-            .hop
-            .tick(wish.share.at_most(1.0), wish.is_fault, job.header.period_s)
-        {
-            self.swap(job);
-            return self.enter_pass(job, run, wish, last);
+        if self.hop.tick(
+            command.feed_factor.at_most(1.0),
+            command.is_fault,
+            job.header.period_s,
+        ) {
+            self.swap();
+            return self.enter_pass(job, run, command, last);
         }
         run.off_surface(self.hop.position(), self.hop.speed(), last);
         Ok(())
@@ -834,17 +825,17 @@ impl Sequencer {
         &mut self,
         job: &Job<'_>,
         run: &mut Run,
-        wish: Wish,
+        command: FeedCommand,
         last: &mut Sample,
     ) -> Result<()> {
-        let pace = wish.share * job.header.feed_mm_s / self.step_over.feed();
+        let pace = command.feed_factor * job.header.feed_mm_s / self.step_over.feed();
         let is_over = self.step_over.is_nothing()
             || self
                 .step_over
                 .progress
-                .tick(pace.at_most(1.0), wish.is_fault, job.header.period_s);
+                .tick(pace.at_most(1.0), command.is_fault, job.header.period_s);
         if is_over {
-            return self.enter_pass(job, run, wish, last);
+            return self.enter_pass(job, run, command, last);
         }
         let located = self.step_over.position(job)?;
         run.off_surface(located.cl_nm, self.step_over.contact_speed(), last);
@@ -852,9 +843,6 @@ impl Sequencer {
         Ok(())
     }
 }
-
-/// Legs of a link off the surface.
-const LEGS: u8 = 3;
 
 /// Greatest length left at the end of a plan, mm, or as a share of what a period at the jerk limit makes of it.
 const END_MAX_MM: f32 = 1e-3;
@@ -884,18 +872,9 @@ fn check_end(plan: &Plan, follower: &Follower) -> Result<()> {
     }
 }
 
-/// The pace of a pass at this feed factor.
-fn pace_of(job: &Job<'_>, pass: &PassPlan, share: f32) -> f32 {
-    if pass.plan.limits.feed > 0.0 {
-        (share * job.header.feed_mm_s / pass.plan.limits.feed).at_most(1.0)
-    } else {
-        share.at_most(1.0)
-    }
-}
-
 /// The greatest pace on a pass at this feed factor.
-fn pace_on(job: &Job<'_>, pass: &PassPlan, share: f32) -> f32 {
-    pace_of(job, pass, share).at_most(pass.plan.pace_max)
+fn pace_on(pass: &PassPlan, share: f32) -> f32 {
+    pass.pace(share).at_most(pass.plan.pace_max)
 }
 
 /// Whether a turn costs more than it saves: the time by which its plan is slowed down, against that of a rest.
@@ -912,13 +891,22 @@ fn is_too_slow(pass: &PassPlan) -> bool {
     lasts_s * (1.0 / pass.plan.pace_max - 1.0) > REST_SHARE * rest_s
 }
 
+/// The first patch of a pass.
+fn first_patch(job: &Job<'_>, pass: &PassPlan) -> PassPosition {
+    end_patch(job, pass, false)
+}
+
 /// The last patch of a pass.
 fn last_patch(job: &Job<'_>, pass: &PassPlan) -> PassPosition {
+    end_patch(job, pass, true)
+}
+
+fn end_patch(job: &Job<'_>, pass: &PassPlan, is_last: bool) -> PassPosition {
     let reversed = job.header.pattern == Pattern::Zigzag && pass.pass % 2 == 1;
     PassPosition {
         side: pass.side,
         reversed,
-        span: if reversed {
+        span: if reversed == is_last {
             0
         } else {
             job.header.path_spans.saturating_sub(1)

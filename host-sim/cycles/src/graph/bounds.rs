@@ -209,7 +209,17 @@ const BOUNDS: &[(&str, u32, &str)] = &[
         "positions of a derivative: WINDOW",
     ),
     (
-        "interp_core::feed::walk::NodeTimes::spacing_at",
+        "interp_core::feed::knots::rest_beside",
+        168,
+        "stations of a few intervals: STATIONS_MAX",
+    ),
+    (
+        "interp_core::feed::node_times::rest_from",
+        170,
+        "busy places, once a list of nodes: LIST",
+    ),
+    (
+        "interp_core::feed::node_times::NodeTimes::spacing_at",
         170,
         "busy places: LIST",
     ),
@@ -245,14 +255,9 @@ const BOUNDS: &[(&str, u32, &str)] = &[
         "stations around a jump, twice JUMP_STATIONS",
     ),
     (
-        "interp_core::feed::walk::find_knots",
+        "interp_core::feed::knots::find_knots",
         168,
         "stations of an interval, and halvings for each: STATIONS_MAX",
-    ),
-    (
-        "interp_core::sequence::sequencer::Sequencer::begin_leg",
-        3,
-        "legs of a link, axes of a position",
     ),
     (
         "interp_core::sequence::sequencer::Sequencer::plan_for_override",

@@ -1,0 +1,162 @@
+//! Straight legs off the surface: retract, traverse, plunge. Each is planned in the planning of the period before it begins.
+
+use crate::fault::{Fault, Result};
+use crate::job::AxisLimits;
+use crate::job::program::Job;
+use crate::math::number::Bounded;
+use crate::pass::run::Run;
+use crate::sample::Sample;
+use crate::sequence::link::check_faces_up;
+use crate::sequence::lookahead::check_travel;
+use crate::sequence::sequencer::{FeedCommand, Phase, Planning, Sequencer, both};
+
+/// A straight leg off the surface, towards the goal.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Leg {
+    Retract,
+    Traverse,
+    Plunge,
+}
+
+/// The goal of a sequence of legs.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Goal {
+    /// The start of the next pass.
+    Pass,
+    /// The position at which the first run began.
+    Home,
+    /// The safe height, above the tool's position.
+    SafeHeight,
+}
+
+/// Planning of a leg.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) enum LegPlanning {
+    /// It begins once the goal is known.
+    Requested,
+    /// The leg can begin.
+    Complete,
+    /// The leg must not begin.
+    Refused(Fault),
+}
+
+impl Sequencer {
+    /// Waits for the goal of a leg.
+    pub(super) const fn await_goal(&mut self, leg: Leg) {
+        self.phase = Phase::AwaitGoal(leg);
+        self.leg = LegPlanning::Requested;
+    }
+
+    /// Whether the leg can be planned, and is not.
+    pub(super) fn has_to_plan_leg(&self, leg: Leg) -> bool {
+        self.leg == LegPlanning::Requested && self.knows_goal(leg)
+    }
+
+    /// The traverse needs the stations of the next pass, the plunge its plan; or a fault there is reported.
+    fn knows_goal(&self, leg: Leg) -> bool {
+        if self.goal != Goal::Pass || self.pending.is_some() {
+            return true;
+        }
+        match leg {
+            Leg::Retract => true,
+            Leg::Traverse => !matches!(self.planning, Planning::Requested(..) | Planning::Stations),
+            Leg::Plunge => self.is_planned(),
+        }
+    }
+
+    /// Plans a leg whose goal is known. One without length is over.
+    pub(super) fn plan_leg(&mut self, leg: Leg, job: &Job<'_>, axes: &AxisLimits) {
+        match self.lead_leg(leg, job, axes) {
+            Ok(true) => self.leg = LegPlanning::Complete,
+            Ok(false) => self.end_leg(leg),
+            Err(fault) => self.leg = LegPlanning::Refused(fault),
+        }
+    }
+
+    /// Returns whether the leg has a length.
+    fn lead_leg(&mut self, leg: Leg, job: &Job<'_>, axes: &AxisLimits) -> Result<bool> {
+        let is_approach = self.goal == Goal::Pass && leg != Leg::Retract;
+        if let Some(fault) = self.pending.filter(|_| is_approach) {
+            return Err(fault);
+        }
+        let (_, next) = both(&mut self.plans, self.second);
+        let from = self.at.unwrap_or(axes.home_nm);
+        let [x, y, z] = match self.goal {
+            Goal::Pass => next.ends[0],
+            Goal::Home => axes.home_nm,
+            Goal::SafeHeight => from,
+        };
+        let height = from[2].max(axes.safe_z_nm);
+        let to = match leg {
+            Leg::Retract => [from[0], from[1], height],
+            Leg::Traverse => [x, y, from[2]],
+            Leg::Plunge => [x, y, z],
+        };
+        if is_approach {
+            check_faces_up(next.faces_up[0])?;
+        }
+        check_travel(axes, &to)?;
+        let slow_mm = if is_approach && leg == Leg::Plunge {
+            axes.plunge_mm
+        } else {
+            0.0
+        };
+        let feed = job.header.feed_mm_s;
+        Ok(self.straight.lead(from, to, slow_mm, feed, axes))
+    }
+
+    /// Begins a leg if it is planned.
+    ///
+    /// # Errors
+    /// The fault for which it was refused.
+    pub(super) fn begin_leg(&mut self, leg: Leg, job: &Job<'_>, command: FeedCommand) -> Result<()> {
+        match self.leg {
+            LegPlanning::Requested => {}
+            LegPlanning::Complete => {
+                self.straight
+                    .progress
+                    .begin(command.feed_factor.at_most(1.0), job.header.period_s);
+                self.phase = Phase::Leg(leg);
+            }
+            LegPlanning::Refused(fault) => return Err(fault),
+        }
+        Ok(())
+    }
+
+    /// Chooses what follows a leg. The plunge to a pass is left by [`Self::enter_pass`].
+    fn end_leg(&mut self, leg: Leg) {
+        match (leg, self.goal) {
+            (Leg::Retract, Goal::SafeHeight) | (Leg::Plunge, Goal::Home | Goal::SafeHeight) => {
+                self.phase = Phase::Done;
+            }
+            (Leg::Retract, _) => self.await_goal(Leg::Traverse),
+            (Leg::Traverse, _) => self.await_goal(Leg::Plunge),
+            (Leg::Plunge, Goal::Pass) => self.phase = Phase::Leg(Leg::Plunge),
+        }
+    }
+
+    /// One period of a leg.
+    pub(super) fn follow_leg(
+        &mut self,
+        leg: Leg,
+        job: &Job<'_>,
+        run: &mut Run,
+        command: FeedCommand,
+        last: &mut Sample,
+    ) -> Result<()> {
+        let is_over = self.straight.progress.tick(
+            command.feed_factor.at_most(1.0),
+            command.is_fault,
+            job.header.period_s,
+        );
+        if is_over && leg == Leg::Plunge && self.goal == Goal::Pass {
+            self.swap();
+            return self.enter_pass(job, run, command, last);
+        }
+        run.off_surface(self.straight.position(), self.straight.progress.speed(), last);
+        if is_over {
+            self.end_leg(leg);
+        }
+        Ok(())
+    }
+}
