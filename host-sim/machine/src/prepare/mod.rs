@@ -112,6 +112,8 @@ pub fn prepare(job: &Job) -> Result<Prepared, JobError> {
         spacing: match job.spacing {
             job::Spacing::Exact => Spacing::Exact,
             job::Spacing::FirstOrder => Spacing::FirstOrder,
+            job::Spacing::Constant(job::Start::Edge) => Spacing::Constant,
+            job::Spacing::Constant(job::Start::Middle) => Spacing::ConstantFromMiddle,
         },
         tool_side: if geometry::along_path(sign, job.along) > 0.0 {
             ToolSide::Plus

@@ -1,0 +1,706 @@
+//! The next front, made in portions in the planning of each period.
+
+use core::ops::DerefMut;
+
+use crate::fault::{Fault, FaultKind};
+use crate::job::program::Job;
+use crate::math::arith::{sqrt, to_f32, truncated};
+use crate::math::number::{Bounded, MM_PER_NM, to_f32 as wide_to_f32};
+use crate::pass::front::crest::{CrestSearch, Place, Tools};
+use crate::pass::front::frame::{Frame, MARGIN, Step};
+use crate::pass::front::limits::Limiter;
+use crate::pass::front::side::{Direction, SideCursor, UNIT, WHOLE};
+use crate::pass::front::spline;
+use crate::job::stations::Stations;
+use crate::pass::front::table::{Column, Table, UNMEASURED};
+use crate::pass::patch::Patch;
+use crate::pass::scan::cycles;
+use crate::sample::SpanParameter;
+
+/// Points on the first line and on the last one by which the pass's length is measured.
+const LENGTH_POINTS: u16 = 9;
+/// Shortest interval between stations, in periods at the feed and in step-overs.
+const INTERVAL_PERIODS: f32 = 2.0;
+const INTERVAL_STEPS: f32 = 0.125;
+/// Greatest turn of a pass in one period, rad.
+const TURN_PER_PERIOD: f32 = 0.05;
+/// Least radius of a pass in the tangent plane, in step-overs.
+const RADIUS_STEPS: f32 = 0.5;
+/// Tangent of the greatest angle of a pass to the lines of the side parameter: 80 degrees.
+const TANGENT_MAX: f32 = 5.671_282;
+/// At an end where the front leaves, the crest lies beyond the last ball: of the skew, half by theory, and more because neighbouring passes turn.
+const END_SHARE: f32 = 0.5 + 0.06;
+/// Share of the pass's length over which fronts are slowed at such an end.
+const TAPER: f32 = 0.08;
+/// Rounds in which what is measured between the fronts is lowered, and by how much more than the excess.
+const ROUNDS: u8 = 5;
+const LOWER: f32 = 1.1;
+/// Scallop height to which the crests are measured, as a share of the limit.
+const MEASURED_MARGIN: f32 = 0.99;
+/// Rows of a sweep in one portion.
+const CHUNK: u16 = 16;
+/// Greatest slope.
+const SLOPE_MAX: f32 = 1e9;
+/// Squares of the derivatives' lengths, side to path, below which an end of the passes is a pole.
+const POLE_MAX: f32 = 1e-10;
+/// Least advance of a front, as a share of the whole side parameter.
+const ADVANCE_MIN: f32 = 1e-6;
+
+/// The next portion.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Task {
+    /// Measure the length of the passes.
+    Length,
+    /// Set the front to the first line.
+    Clear,
+    /// Step at the front, at half the step, and at the whole of it.
+    Here,
+    HalfForwards,
+    HalfBackwards,
+    Half,
+    Whole,
+    /// The limits: sweeps and hull, twice.
+    Forwards,
+    Backwards,
+    Hull,
+    Apply,
+    /// The spline.
+    Eliminate,
+    Substitute,
+    /// Measure the crests, then lower where they are too high.
+    Crest,
+    Lower,
+    /// The front is made, or none is wanted.
+    Done,
+}
+
+/// What has been made.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Made {
+    /// A front with a part before the boundary.
+    Front,
+    /// Every station is at the boundary or beyond it.
+    Beyond,
+}
+
+/// The generator of fronts.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Advance {
+    task: Task,
+    station: u16,
+    /// Second pass of the limits; rounds of measuring.
+    again: bool,
+    round: u8,
+    is_lowered: bool,
+    stations: Stations,
+    pub(crate) direction: Direction,
+    cursor: SideCursor,
+    patch: Patch,
+    limiter: Limiter,
+    search: CrestSearch,
+    before: Option<[i64; 3]>,
+    length_mm: f32,
+    /// Greatest advance, as a share of the whole side parameter.
+    advanced: f32,
+    /// The passes' ends are poles.
+    poles: [bool; 2],
+    made: Option<Made>,
+}
+
+impl Advance {
+    pub(crate) const START: Self = Self {
+        task: Task::Done,
+        station: 0,
+        again: false,
+        round: 0,
+        is_lowered: false,
+        stations: Stations { spans: 1, bits: 6 },
+        direction: Direction::FROM_EDGE,
+        cursor: SideCursor::NONE,
+        patch: Patch::NONE,
+        limiter: Limiter::NONE,
+        search: CrestSearch::NONE,
+        before: None,
+        length_mm: 0.0,
+        advanced: 0.0,
+        poles: [false; 2],
+        made: None,
+    };
+
+    /// Begins with the front after the first line in this direction. `is_first`: the stations are not chosen yet.
+    pub(crate) const fn begin(&mut self, cursor: SideCursor, direction: Direction, is_first: bool) {
+        self.direction = direction;
+        self.made = None;
+        self.station = 0;
+        if is_first {
+            self.cursor = cursor;
+            self.advanced = 0.0;
+            self.length_mm = 0.0;
+            self.before = None;
+        }
+        self.task = if is_first { Task::Length } else { Task::Clear };
+    }
+
+    /// Begins with the front after the current one.
+    pub(crate) const fn go_on(&mut self) {
+        self.made = None;
+        self.start_front();
+    }
+
+    /// Ends the work.
+    pub(crate) const fn stop(&mut self) {
+        self.task = Task::Done;
+        self.made = None;
+    }
+
+    const fn start_front(&mut self) {
+        self.task = Task::Here;
+        self.station = 0;
+        self.round = 0;
+        self.again = false;
+        self.advanced = 0.0;
+        self.length_mm = 0.0;
+    }
+
+    pub(crate) fn has_work(&self) -> bool {
+        self.task != Task::Done
+    }
+
+    pub(crate) const fn stations(&self) -> Stations {
+        self.stations
+    }
+
+    /// What was made, once it is.
+    ///
+    /// # Errors
+    /// [`FaultKind::IntervalTooSmall`] where the front does not move.
+    pub(crate) fn made(&self) -> Option<Result<Made, Fault>> {
+        if self.has_work() {
+            return None;
+        }
+        let made = self.made?;
+        Some(if self.advanced < ADVANCE_MIN && made == Made::Front {
+            Err(Fault::new(FaultKind::IntervalTooSmall, self.advanced))
+        } else {
+            Ok(made)
+        })
+    }
+
+    /// Cycles of the next portion.
+    pub(crate) const fn cycles(&self) -> u32 {
+        match self.task {
+            Task::Done => 0,
+            Task::Length | Task::Here | Task::Half | Task::Whole | Task::Crest => {
+                cycles::PATCH + 2 * cycles::STATION
+            }
+            _ => 6_000,
+        }
+    }
+
+    /// Executes a portion.
+    pub(crate) fn work<W: DerefMut<Target = [i32]>>(&mut self, job: &Job<'_>, table: &mut Table<W>) {
+        match self.task {
+            Task::Length => self.measure_length(job),
+            Task::Here | Task::Half | Task::Whole => {
+                self.step_at(job, table);
+                self.next_station(self.stations.count());
+            }
+            Task::Crest => self.measure_crest(job, table),
+            Task::Done => {}
+            _ => {
+                for _ in 0..CHUNK {
+                    let task = self.task;
+                    self.sweep(job, table);
+                    if self.task != task {
+                        break;
+                    }
+                }
+            }
+        }
+    }
+
+    /// Measures the length of the first and of the last line, then chooses the stations.
+    fn measure_length(&mut self, job: &Job<'_>) {
+        let spans = job.header.path_spans;
+        let number = self.station % LENGTH_POINTS;
+        let at = u64::from(number) * u64::from(spans) * (1 << 32) / u64::from(LENGTH_POINTS - 1);
+        let span = u16::try_from(at >> 32).unwrap_or(0);
+        let path = if span >= spans {
+            SpanParameter {
+                span: spans.saturating_sub(1),
+                fraction: u64::MAX,
+            }
+        } else {
+            SpanParameter {
+                span,
+                fraction: at << 32,
+            }
+        };
+        let distance = if self.station < LENGTH_POINTS {
+            0
+        } else {
+            self.direction.end
+        };
+        let frame = Frame::at(
+            &mut self.patch,
+            job,
+            &mut self.cursor,
+            &self.direction,
+            path,
+            distance,
+        );
+        let point = frame.ok().map(|frame| frame.point);
+        if number == 0 {
+            self.advanced = self.advanced.at_least(self.length_mm);
+            self.length_mm = 0.0;
+        } else if let (Some(from), Some(to)) = (self.before, point) {
+            self.length_mm += distance_mm(&from, &to);
+        }
+        self.before = point;
+        self.station += 1;
+        if self.station == 2 * LENGTH_POINTS {
+            let longest = self.length_mm.at_least(self.advanced);
+            let header = job.header;
+            let step = sqrt(8.0 * header.ball_radius_mm * header.scallop_mm);
+            let period = header.feed_mm_s * header.period_s;
+            let interval = (INTERVAL_PERIODS * period).at_least(INTERVAL_STEPS * step);
+            self.stations = Stations::for_intervals(spans, longest / interval);
+            self.limiter.turn_per_mm =
+                (TURN_PER_PERIOD / period).at_most(1.0 / (RADIUS_STEPS * step));
+            (self.task, self.station) = (Task::Clear, 0);
+        }
+    }
+
+    fn next_station(&mut self, end: u16) {
+        self.station += 1;
+        if self.station < end {
+            return;
+        }
+        let count = self.stations.count();
+        (self.task, self.station) = match self.task {
+            Task::Clear => {
+                self.start_front();
+                return;
+            }
+            Task::Here => (Task::HalfForwards, 0),
+            Task::HalfForwards => (Task::HalfBackwards, 0),
+            Task::HalfBackwards => (Task::Half, 0),
+            Task::Half => (Task::Whole, 0),
+            Task::Whole => (Task::Forwards, 0),
+            Task::Forwards => (Task::Backwards, 0),
+            Task::Backwards => {
+                self.limiter.begin();
+                (Task::Hull, 0)
+            }
+            Task::Hull => (Task::Apply, 0),
+            Task::Apply if !self.again => {
+                self.again = true;
+                (Task::Forwards, 0)
+            }
+            Task::Apply => (Task::Eliminate, 0),
+            Task::Eliminate => (Task::Substitute, 0),
+            Task::Substitute if self.round < ROUNDS => {
+                self.is_lowered = false;
+                self.search.begin(self.crest_place(0));
+                (Task::Crest, 0)
+            }
+            Task::Crest if self.is_lowered => {
+                self.round += 1;
+                self.again = false;
+                (Task::Lower, 0)
+            }
+            Task::Lower => (Task::Forwards, 0),
+            _ => (Task::Done, count),
+        };
+    }
+
+    /// A row of a sweep.
+    fn sweep<W: DerefMut<Target = [i32]>>(&mut self, job: &Job<'_>, table: &mut Table<W>) {
+        let count = self.stations.count();
+        let station = self.station;
+        let backwards = count.saturating_sub(station + 1);
+        match self.task {
+            Task::Clear => self.clear(job, table),
+            Task::HalfForwards | Task::Eliminate => {
+                spline::eliminate(table, job, [Column::Next, Column::NextSlope], station);
+            }
+            Task::HalfBackwards | Task::Substitute => {
+                spline::substitute(table, job, Column::NextSlope, backwards);
+                if self.task == Task::Substitute {
+                    self.finish_station(table, backwards);
+                }
+            }
+            Task::Forwards => self.limiter.sweep(table, job, station, true),
+            Task::Backwards => self.limiter.sweep(table, job, backwards, false),
+            Task::Hull => self.limiter.add(table, job, station),
+            Task::Apply => {
+                self.limiter.apply(table, station);
+                self.floor(table, station);
+                self.at_poles(table, station);
+            }
+            Task::Lower => self.lower(table, station),
+            _ => {}
+        }
+        self.next_station(count);
+    }
+
+    fn clear<W: DerefMut<Target = [i32]>>(&self, job: &Job<'_>, table: &mut Table<W>) {
+        let station = self.station;
+        let stations = self.stations;
+        let abscissa = match station.checked_sub(1) {
+            Some(before) => table.real(Column::Abscissa, before) + stations.length(job, before),
+            None => 0.0,
+        };
+        table.set_real(Column::Abscissa, station, abscissa);
+        table.set_real(Column::Arc, station, abscissa);
+        for column in [Column::Front, Column::Slope, Column::Step, Column::Speed] {
+            table.set_word(column, station, 0);
+        }
+        for column in [Column::Rise, Column::Fall, Column::Turn] {
+            table.set_real(column, station, SLOPE_MAX);
+        }
+    }
+
+    /// The value of a station from which the slopes of the step are taken.
+    fn value<W: DerefMut<Target = [i32]>>(&self, table: &Table<W>, station: u16) -> i32 {
+        match self.task {
+            Task::Here => table.word(Column::Front, station),
+            Task::Half => table.word(Column::Next, station),
+            _ => self.whole(table, station),
+        }
+    }
+
+    /// A whole step from the front.
+    fn whole<W: DerefMut<Target = [i32]>>(&self, table: &Table<W>, station: u16) -> i32 {
+        let step = to_units(table.real(Column::Step, station));
+        table
+            .word(Column::Front, station)
+            .saturating_add(step)
+            .min(self.direction.cap())
+    }
+
+    /// Slope at a station of the cubic through four: two of them before it, or one.
+    fn slope<W: DerefMut<Target = [i32]>>(&self, table: &Table<W>, station: u16, before: u16) -> f32 {
+        let count = self.stations.count();
+        let first = if station == 1 {
+            0
+        } else if station + 2 == count {
+            count.saturating_sub(4)
+        } else {
+            station.saturating_sub(before).min(count.saturating_sub(4))
+        };
+        let own = self.value(table, station);
+        let origin = table.real(Column::Abscissa, station);
+        let at = |k: u16| {
+            let station = first + k;
+            let rise = to_f32(self.value(table, station).wrapping_sub(own)) * UNIT;
+            (table.real(Column::Abscissa, station) - origin, rise)
+        };
+        let [(x0, y0), (x1, y1), (x2, y2), (x3, y3)] = [at(0), at(1), at(2), at(3)];
+        let (f01, f12, f23) = (
+            (y1 - y0) / (x1 - x0),
+            (y2 - y1) / (x2 - x1),
+            (y3 - y2) / (x3 - x2),
+        );
+        let (f012, f123) = ((f12 - f01) / (x2 - x0), (f23 - f12) / (x3 - x1));
+        let third = (f123 - f012) / (x3 - x0);
+        f01 - f012 * (x0 + x1) + third * (x0 * x1 + x0 * x2 + x1 * x2)
+    }
+
+    /// The step at a station: from the slope where the front comes from.
+    fn step_at<W: DerefMut<Target = [i32]>>(&mut self, job: &Job<'_>, table: &mut Table<W>) {
+        let station = self.station;
+        let slopes = [2, 1].map(|before| self.slope(table, station, before));
+        let at = self.value(table, station);
+        let own = (self.task == Task::Half).then(|| table.real(Column::NextSlope, station));
+        let mut found = self.step_on(job, table, self.stations.place(station), at, slopes, own, true);
+        if self.stations.is_knot(station) {
+            // The other side of the knot, where the curvature may be another one.
+            let before = SpanParameter {
+                span: self.stations.span(station).saturating_sub(1),
+                fraction: u64::MAX,
+            };
+            let other = self.step_on(job, table, before, at, slopes, own, false);
+            found = found.at_most(other);
+        }
+        let front = table.word(Column::Front, station);
+        match self.task {
+            Task::Here => {
+                table.set_real(Column::Scratch, station, found);
+                table.set_real(Column::Step, station, found);
+                let half = front
+                    .saturating_add(to_units(0.5 * found))
+                    .min(self.direction.cap());
+                table.set_word(Column::Next, station, half);
+            }
+            Task::Half => {
+                // The elimination has used the column.
+                table.set_real(Column::Scratch, station, table.real(Column::Step, station));
+                table.set_real(Column::Step, station, found);
+            }
+            _ => {
+                let density = |step: f32| 1.0 / (step * step).at_least(1e-12);
+                let first = density(table.real(Column::Scratch, station));
+                let (half, whole) = (density(table.real(Column::Step, station)), density(found));
+                let mean = half
+                    .at_least((first + 4.0 * half + whole) * (1.0 / 6.0))
+                    .at_least((first + 2.0 * half + whole) * 0.25);
+                let step = 1.0 / sqrt(mean);
+                let next = front
+                    .saturating_add(to_units(step))
+                    .min(self.direction.cap());
+                table.set_word(Column::Next, station, next);
+                table.set_word(Column::Mark, station, UNMEASURED);
+            }
+        }
+    }
+
+    /// The step on one side of a station.
+    #[allow(clippy::too_many_arguments, reason = "a station of one task")]
+    fn step_on<W: DerefMut<Target = [i32]>>(
+        &mut self,
+        job: &Job<'_>,
+        table: &mut Table<W>,
+        place: SpanParameter,
+        at: i32,
+        [left, right]: [f32; 2],
+        own: Option<f32>,
+        is_main: bool,
+    ) -> f32 {
+        let station = self.station;
+        let frame = Frame::at(
+            &mut self.patch,
+            job,
+            &mut self.cursor,
+            &self.direction,
+            place,
+            at,
+        );
+        let Ok(frame) = frame else {
+            // The tool reports the fault where it reaches it.
+            return table.real(Column::Step, station).at_least(1e-3).at_most(1.5);
+        };
+        let mean = 0.5 * (left + right);
+        let slope = if frame.b + frame.c * mean > 0.0 { right } else { left };
+        let mut step = frame.step(job.header, slope, MARGIN);
+        if let Some(own) = own {
+            step.whole = step.whole.at_most(frame.step(job.header, own, MARGIN).whole);
+        }
+        if is_main {
+            self.note(table, &frame, own.unwrap_or(mean));
+        }
+        self.at_ends(table, step)
+    }
+
+    /// Length of the pass, and the limits at a station.
+    fn note<W: DerefMut<Target = [i32]>>(&mut self, table: &mut Table<W>, frame: &Frame, slope: f32) {
+        let station = self.station;
+        match self.task {
+            Task::Half => {
+                let speed_squared = frame.speed_squared(slope);
+                let area = frame.area();
+                let is_pole = frame.g <= POLE_MAX * frame.e;
+                let [start, end] = self.poles;
+                if station == 0 {
+                    self.poles = [is_pole, end];
+                } else if station + 1 == self.stations.count() {
+                    self.poles = [start, is_pole];
+                }
+                table.set_real(Column::Speed, station, sqrt(speed_squared));
+                table.set_real(Column::Turn, station, speed_squared / area);
+                let most = |down: f32| {
+                    let room = area + down * frame.f * TANGENT_MAX;
+                    if room > 1e-9 {
+                        (frame.e * TANGENT_MAX / room).at_most(SLOPE_MAX)
+                    } else {
+                        SLOPE_MAX
+                    }
+                };
+                table.set_real(Column::Rise, station, most(-1.0));
+                table.set_real(Column::Fall, station, most(1.0));
+            }
+            Task::Whole => {}
+            _ => {
+                if let (Some(from), true) = (self.before, station > 0) {
+                    self.length_mm += distance_mm(&from, &frame.point);
+                }
+                self.before = Some(frame.point);
+                table.set_real(Column::Arc, station, self.length_mm);
+            }
+        }
+    }
+
+    /// Share of the slowing at an end, for the start of the passes or their end.
+    fn taper<W: DerefMut<Target = [i32]>>(&self, table: &Table<W>, station: u16, at_start: bool) -> f32 {
+        let last = self.stations.count().saturating_sub(1);
+        let column = if self.task == Task::Here {
+            Column::Abscissa
+        } else {
+            Column::Arc
+        };
+        let whole = table.real(column, last);
+        let at = table.real(column, station);
+        let from = if at_start { at } else { whole - at };
+        let rest = (1.0 - from / (TAPER * whole)).at_least(0.0);
+        rest * rest
+    }
+
+    /// The step at a station, slowed at an end: where the front enters, it runs along the boundary; where it leaves, the crest lies beyond the last ball.
+    fn at_ends<W: DerefMut<Target = [i32]>>(&self, table: &Table<W>, step: Step) -> f32 {
+        let station = self.station;
+        let last = self.stations.count().saturating_sub(1);
+        let mut whole = step.whole;
+        for (end, at_start) in [(0, true), (last, false)] {
+            let leaves = (step.across > 0.0) == at_start;
+            if leaves {
+                let taper = self.taper(table, station, at_start);
+                if taper > 0.0 {
+                    let skew = (1.0 - step.least / whole).at_least(0.0);
+                    whole *= 1.0 - END_SHARE * skew * taper;
+                }
+            } else if station == end {
+                whole = whole.at_most(step.least);
+            }
+        }
+        whole
+    }
+
+    /// At a pole every distance is the same: the front goes on as beside it, once that is limited.
+    fn at_poles<W: DerefMut<Target = [i32]>>(&self, table: &mut Table<W>, station: u16) {
+        let last = self.stations.count().saturating_sub(1);
+        let [at_start, at_end] = self.poles;
+        let ends = [
+            (at_start && station == 2, [0, 1, 2]),
+            (
+                at_end && station == last,
+                [last, last.saturating_sub(1), last.saturating_sub(2)],
+            ),
+        ];
+        for (is_due, [pole, near, far]) in ends {
+            if is_due {
+                let [near, far] = [near, far].map(|at| table.word(Column::Next, at));
+                let most = near
+                    .saturating_add(near.saturating_sub(far))
+                    .min(self.direction.cap());
+                table.lower(pole, most);
+                self.floor(table, pole);
+            }
+        }
+    }
+
+    /// A front never goes back.
+    fn floor<W: DerefMut<Target = [i32]>>(&self, table: &mut Table<W>, station: u16) {
+        let front = table.word(Column::Front, station);
+        if table.word(Column::Next, station) < front {
+            table.set_word(Column::Next, station, front);
+        }
+    }
+
+    /// Takes a station into account of the finished front.
+    fn finish_station<W: DerefMut<Target = [i32]>>(&mut self, table: &mut Table<W>, station: u16) {
+        let (front, next) = (
+            table.word(Column::Front, station),
+            table.word(Column::Next, station),
+        );
+        if station + 1 == self.stations.count() {
+            self.made = Some(Made::Beyond);
+            self.advanced = 0.0;
+        }
+        if next < self.direction.end {
+            self.made = Some(Made::Front);
+        }
+        if front < self.direction.end {
+            let advance = to_f32(next.saturating_sub(front)) * UNIT;
+            self.advanced = self.advanced.at_least(advance);
+        }
+        table.set_word(Column::Scratch, station, 0);
+    }
+
+    /// Places at which crests are measured: the middle of each interval, then both ends.
+    fn crest_place(&self, number: u16) -> Place {
+        let intervals = self.stations.count().saturating_sub(1);
+        if number < intervals {
+            (number, 1 << 30)
+        } else if number == intervals {
+            (0, 0)
+        } else {
+            (intervals.saturating_sub(1), i32::MAX)
+        }
+    }
+
+    /// The station whose mark stands for a place.
+    fn mark_of(&self, number: u16) -> u16 {
+        let intervals = self.stations.count().saturating_sub(1);
+        if number < intervals {
+            number
+        } else if number == intervals {
+            0
+        } else {
+            intervals.saturating_sub(1)
+        }
+    }
+
+    fn measure_crest<W: DerefMut<Target = [i32]>>(&mut self, job: &Job<'_>, table: &mut Table<W>) {
+        let places = self.stations.count() + 1;
+        let number = self.station;
+        let station = self.mark_of(number);
+        let bit = if number + 1 < self.stations.count() { 1 } else { 2 };
+        let mark = table.word(Column::Mark, station);
+        if mark & bit == 0 {
+            self.next_crest(places);
+            return;
+        }
+        let mut tools = Tools {
+            patch: &mut self.patch,
+            job,
+            cursor: &mut self.cursor,
+            direction: &self.direction,
+        };
+        let Some(excess) = self.search.work(&mut tools, table, MEASURED_MARGIN) else {
+            return;
+        };
+        table.set_word(Column::Mark, station, mark & !bit);
+        if excess > 0 {
+            self.is_lowered = true;
+            let lower = truncated(LOWER * to_f32(excess));
+            for at in [station, station + 1] {
+                let most = table.word(Column::Scratch, at).max(lower);
+                table.set_word(Column::Scratch, at, most);
+            }
+        }
+        self.next_crest(places);
+    }
+
+    fn next_crest(&mut self, places: u16) {
+        self.next_station(places);
+        if self.task == Task::Crest {
+            let place = self.crest_place(self.station);
+            self.search.begin(place);
+        }
+    }
+
+    /// Lowers a station by what was measured beside it.
+    fn lower<W: DerefMut<Target = [i32]>>(&self, table: &mut Table<W>, station: u16) {
+        let by = table.word(Column::Scratch, station);
+        if by > 0 {
+            let lower = table.word(Column::Next, station).saturating_sub(by);
+            table.lower(station, lower);
+            self.floor(table, station);
+        }
+    }
+}
+
+/// A share of the whole in units of the fronts.
+fn to_units(share: f32) -> i32 {
+    truncated(share.at_most(1.5) * to_f32(WHOLE))
+}
+
+fn distance_mm(from: &[i64; 3], to: &[i64; 3]) -> f32 {
+    const MM_PER_Q30: f32 = MM_PER_NM / 1_073_741_824.0;
+    let mut sum = 0.0;
+    for (from, to) in from.iter().zip(to) {
+        let mm = wide_to_f32(to.wrapping_sub(*from)) * MM_PER_Q30;
+        sum += mm * mm;
+    }
+    sqrt(sum)
+}
