@@ -6,11 +6,12 @@ use crate::fault::{Fault, FaultKind};
 use crate::job::program::Job;
 use crate::math::arith::{sqrt, to_f32, truncated};
 use crate::math::number::{Bounded, MM_PER_NM, to_f32 as wide_to_f32};
-use crate::pass::front::crest::{CrestSearch, Place, Tools};
-use crate::pass::front::frame::{Frame, MARGIN, Step};
+use crate::pass::front::crest::{CURRENT, CrestSearch, NEXT, Place, Tools};
+use crate::pass::front::foot::{FootStep, Found};
+use crate::pass::front::frame::{Frame, MARGIN};
 use crate::pass::front::limits::Limiter;
 use crate::pass::front::side::{Direction, SideCursor, UNIT, WHOLE};
-use crate::pass::front::spline;
+use crate::pass::front::spline::{self, Cubic};
 use crate::job::stations::Stations;
 use crate::pass::front::table::{Column, Table, UNMEASURED};
 use crate::pass::patch::Patch;
@@ -21,19 +22,20 @@ use crate::sample::SpanParameter;
 const LENGTH_POINTS: u16 = 9;
 /// Shortest interval between stations, in periods at the feed and in step-overs.
 const INTERVAL_PERIODS: f32 = 2.0;
-const INTERVAL_STEPS: f32 = 0.125;
+const INTERVAL_STEPS: f32 = 0.5;
 /// Greatest turn of a pass in one period, rad.
 const TURN_PER_PERIOD: f32 = 0.05;
 /// Least radius of a pass in the tangent plane, in step-overs.
 const RADIUS_STEPS: f32 = 0.5;
 /// Tangent of the greatest angle of a pass to the lines of the side parameter: 80 degrees.
 const TANGENT_MAX: f32 = 5.671_282;
-/// At an end where the front leaves, the crest lies beyond the last ball: of the skew, half by theory, and more because neighbouring passes turn.
-const END_SHARE: f32 = 0.5 + 0.06;
-/// Share of the pass's length over which fronts are slowed at such an end.
-const TAPER: f32 = 0.08;
-/// Rounds in which what is measured between the fronts is lowered, and by how much more than the excess.
-const ROUNDS: u8 = 5;
+/// Rounds in which a front is lowered where its curve is too far between the stations, and after the crests are measured; by how much more than the excess.
+const ROUNDS: u8 = 4;
+const MEASUREMENTS: u8 = 3;
+/// Tolerance of the curve between stations, over the step there.
+const MIDDLE_TOLERANCE: f32 = 1.003;
+/// Step where the surface is faulty, units of the fronts.
+const FAULTY_STEP: i32 = WHOLE / 256;
 const LOWER: f32 = 1.1;
 /// Scallop height to which the crests are measured, as a share of the limit.
 const MEASURED_MARGIN: f32 = 0.99;
@@ -53,12 +55,8 @@ enum Task {
     Length,
     /// Set the front to the first line.
     Clear,
-    /// Step at the front, at half the step, and at the whole of it.
-    Here,
-    HalfForwards,
-    HalfBackwards,
-    Half,
-    Whole,
+    /// Step at each station and in the middle of each interval.
+    Step,
     /// The limits: sweeps and hull, twice.
     Forwards,
     Backwards,
@@ -67,8 +65,11 @@ enum Task {
     /// The spline.
     Eliminate,
     Substitute,
-    /// Measure the crests, then lower where they are too high.
+    /// Compare the curve with the steps between the stations.
+    Compare,
+    /// Measure the crests.
     Crest,
+    /// Lower where the front is too far.
     Lower,
     /// The front is made, or none is wanted.
     Done,
@@ -91,12 +92,14 @@ pub(crate) struct Advance {
     /// Second pass of the limits; rounds of measuring.
     again: bool,
     round: u8,
+    measured: u8,
     is_lowered: bool,
     stations: Stations,
     pub(crate) direction: Direction,
     cursor: SideCursor,
     patch: Patch,
     limiter: Limiter,
+    foot: FootStep,
     search: CrestSearch,
     before: Option<[i64; 3]>,
     length_mm: f32,
@@ -113,12 +116,14 @@ impl Advance {
         station: 0,
         again: false,
         round: 0,
+        measured: 0,
         is_lowered: false,
         stations: Stations { spans: 1, bits: 6 },
         direction: Direction::FROM_EDGE,
         cursor: SideCursor::NONE,
         patch: Patch::NONE,
         limiter: Limiter::NONE,
+        foot: FootStep::NONE,
         search: CrestSearch::NONE,
         before: None,
         length_mm: 0.0,
@@ -154,12 +159,13 @@ impl Advance {
     }
 
     const fn start_front(&mut self) {
-        self.task = Task::Here;
+        self.task = Task::Step;
         self.station = 0;
         self.round = 0;
+        self.measured = 0;
         self.again = false;
         self.advanced = 0.0;
-        self.length_mm = 0.0;
+        self.foot.begin((0, 0));
     }
 
     pub(crate) fn has_work(&self) -> bool {
@@ -190,7 +196,7 @@ impl Advance {
     pub(crate) const fn cycles(&self) -> u32 {
         match self.task {
             Task::Done => 0,
-            Task::Length | Task::Here | Task::Half | Task::Whole | Task::Crest => {
+            Task::Length | Task::Step | Task::Crest => {
                 cycles::PATCH + 2 * cycles::STATION
             }
             _ => 6_000,
@@ -201,10 +207,7 @@ impl Advance {
     pub(crate) fn work<W: DerefMut<Target = [i32]>>(&mut self, job: &Job<'_>, table: &mut Table<W>) {
         match self.task {
             Task::Length => self.measure_length(job),
-            Task::Here | Task::Half | Task::Whole => {
-                self.step_at(job, table);
-                self.next_station(self.stations.count());
-            }
+            Task::Step => self.step(job, table),
             Task::Crest => self.measure_crest(job, table),
             Task::Done => {}
             _ => {
@@ -282,11 +285,7 @@ impl Advance {
                 self.start_front();
                 return;
             }
-            Task::Here => (Task::HalfForwards, 0),
-            Task::HalfForwards => (Task::HalfBackwards, 0),
-            Task::HalfBackwards => (Task::Half, 0),
-            Task::Half => (Task::Whole, 0),
-            Task::Whole => (Task::Forwards, 0),
+            Task::Step => (Task::Forwards, 0),
             Task::Forwards => (Task::Backwards, 0),
             Task::Backwards => {
                 self.limiter.begin();
@@ -299,13 +298,23 @@ impl Advance {
             }
             Task::Apply => (Task::Eliminate, 0),
             Task::Eliminate => (Task::Substitute, 0),
-            Task::Substitute if self.round < ROUNDS => {
+            Task::Substitute => {
+                self.is_lowered = false;
+                (Task::Compare, 0)
+            }
+            Task::Compare if self.is_lowered && self.round < ROUNDS => {
+                self.round += 1;
+                self.again = false;
+                (Task::Lower, 0)
+            }
+            Task::Compare if self.measured < MEASUREMENTS => {
                 self.is_lowered = false;
                 self.search.begin(self.crest_place(0));
                 (Task::Crest, 0)
             }
             Task::Crest if self.is_lowered => {
-                self.round += 1;
+                self.measured += 1;
+                self.round = 0;
                 self.again = false;
                 (Task::Lower, 0)
             }
@@ -321,15 +330,14 @@ impl Advance {
         let backwards = count.saturating_sub(station + 1);
         match self.task {
             Task::Clear => self.clear(job, table),
-            Task::HalfForwards | Task::Eliminate => {
+            Task::Eliminate => {
                 spline::eliminate(table, job, [Column::Next, Column::NextSlope], station);
             }
-            Task::HalfBackwards | Task::Substitute => {
+            Task::Substitute => {
                 spline::substitute(table, job, Column::NextSlope, backwards);
-                if self.task == Task::Substitute {
-                    self.finish_station(table, backwards);
-                }
+                self.finish_station(table, backwards);
             }
+            Task::Compare => self.compare(job, table, station),
             Task::Forwards => self.limiter.sweep(table, job, station, true),
             Task::Backwards => self.limiter.sweep(table, job, backwards, false),
             Task::Hull => self.limiter.add(table, job, station),
@@ -352,7 +360,6 @@ impl Advance {
             None => 0.0,
         };
         table.set_real(Column::Abscissa, station, abscissa);
-        table.set_real(Column::Arc, station, abscissa);
         for column in [Column::Front, Column::Slope, Column::Step, Column::Speed] {
             table.set_word(column, station, 0);
         }
@@ -361,208 +368,111 @@ impl Advance {
         }
     }
 
-    /// The value of a station from which the slopes of the step are taken.
-    fn value<W: DerefMut<Target = [i32]>>(&self, table: &Table<W>, station: u16) -> i32 {
-        match self.task {
-            Task::Here => table.word(Column::Front, station),
-            Task::Half => table.word(Column::Next, station),
-            _ => self.whole(table, station),
-        }
-    }
-
-    /// A whole step from the front.
-    fn whole<W: DerefMut<Target = [i32]>>(&self, table: &Table<W>, station: u16) -> i32 {
-        let step = to_units(table.real(Column::Step, station));
-        table
-            .word(Column::Front, station)
-            .saturating_add(step)
-            .min(self.direction.cap())
-    }
-
-    /// Slope at a station of the cubic through four: two of them before it, or one.
-    fn slope<W: DerefMut<Target = [i32]>>(&self, table: &Table<W>, station: u16, before: u16) -> f32 {
+    /// An evaluation of the step at a station, or in the middle of the interval after it.
+    fn step<W: DerefMut<Target = [i32]>>(&mut self, job: &Job<'_>, table: &mut Table<W>) {
         let count = self.stations.count();
-        let first = if station == 1 {
-            0
-        } else if station + 2 == count {
-            count.saturating_sub(4)
-        } else {
-            station.saturating_sub(before).min(count.saturating_sub(4))
-        };
-        let own = self.value(table, station);
-        let origin = table.real(Column::Abscissa, station);
-        let at = |k: u16| {
-            let station = first + k;
-            let rise = to_f32(self.value(table, station).wrapping_sub(own)) * UNIT;
-            (table.real(Column::Abscissa, station) - origin, rise)
-        };
-        let [(x0, y0), (x1, y1), (x2, y2), (x3, y3)] = [at(0), at(1), at(2), at(3)];
-        let (f01, f12, f23) = (
-            (y1 - y0) / (x1 - x0),
-            (y2 - y1) / (x2 - x1),
-            (y3 - y2) / (x3 - x2),
-        );
-        let (f012, f123) = ((f12 - f01) / (x2 - x0), (f23 - f12) / (x3 - x1));
-        let third = (f123 - f012) / (x3 - x0);
-        f01 - f012 * (x0 + x1) + third * (x0 * x1 + x0 * x2 + x1 * x2)
-    }
-
-    /// The step at a station: from the slope where the front comes from.
-    fn step_at<W: DerefMut<Target = [i32]>>(&mut self, job: &Job<'_>, table: &mut Table<W>) {
-        let station = self.station;
-        let slopes = [2, 1].map(|before| self.slope(table, station, before));
-        let at = self.value(table, station);
-        let own = (self.task == Task::Half).then(|| table.real(Column::NextSlope, station));
-        let mut found = self.step_on(job, table, self.stations.place(station), at, slopes, own, true);
-        if self.stations.is_knot(station) {
-            // The other side of the knot, where the curvature may be another one.
-            let before = SpanParameter {
-                span: self.stations.span(station).saturating_sub(1),
-                fraction: u64::MAX,
-            };
-            let other = self.step_on(job, table, before, at, slopes, own, false);
-            found = found.at_most(other);
-        }
-        let front = table.word(Column::Front, station);
-        match self.task {
-            Task::Here => {
-                table.set_real(Column::Scratch, station, found);
-                table.set_real(Column::Step, station, found);
-                let half = front
-                    .saturating_add(to_units(0.5 * found))
-                    .min(self.direction.cap());
-                table.set_word(Column::Next, station, half);
-            }
-            Task::Half => {
-                // The elimination has used the column.
-                table.set_real(Column::Scratch, station, table.real(Column::Step, station));
-                table.set_real(Column::Step, station, found);
-            }
-            _ => {
-                let density = |step: f32| 1.0 / (step * step).at_least(1e-12);
-                let first = density(table.real(Column::Scratch, station));
-                let (half, whole) = (density(table.real(Column::Step, station)), density(found));
-                let mean = half
-                    .at_least((first + 4.0 * half + whole) * (1.0 / 6.0))
-                    .at_least((first + 2.0 * half + whole) * 0.25);
-                let step = 1.0 / sqrt(mean);
-                let next = front
-                    .saturating_add(to_units(step))
-                    .min(self.direction.cap());
-                table.set_word(Column::Next, station, next);
-                table.set_word(Column::Mark, station, UNMEASURED);
-            }
-        }
-    }
-
-    /// The step on one side of a station.
-    #[allow(clippy::too_many_arguments, reason = "a station of one task")]
-    fn step_on<W: DerefMut<Target = [i32]>>(
-        &mut self,
-        job: &Job<'_>,
-        table: &mut Table<W>,
-        place: SpanParameter,
-        at: i32,
-        [left, right]: [f32; 2],
-        own: Option<f32>,
-        is_main: bool,
-    ) -> f32 {
-        let station = self.station;
-        let frame = Frame::at(
-            &mut self.patch,
+        let number = self.station;
+        let (station, is_middle) = (number >> 1, number & 1 == 1);
+        let is_end = !is_middle && (station == 0 || station + 1 == count);
+        let mut tools = Tools {
+            patch: &mut self.patch,
             job,
-            &mut self.cursor,
-            &self.direction,
-            place,
-            at,
-        );
-        let Ok(frame) = frame else {
+            cursor: &mut self.cursor,
+            direction: &self.direction,
+        };
+        let front = match self.foot.work(&mut tools, table, is_end, MARGIN) {
+            Found::More(half) => {
+                if let (Some((frame, slope)), false) = (half, is_middle) {
+                    self.note(table, station, &frame, slope);
+                }
+                return;
+            }
+            Found::Front(front) => front,
             // The tool reports the fault where it reaches it.
-            return table.real(Column::Step, station).at_least(1e-3).at_most(1.5);
+            Found::Faulty => table.word(Column::Front, station).saturating_add(FAULTY_STEP),
         };
-        let mean = 0.5 * (left + right);
-        let slope = if frame.b + frame.c * mean > 0.0 { right } else { left };
-        let mut step = frame.step(job.header, slope, MARGIN);
-        if let Some(own) = own {
-            step.whole = step.whole.at_most(frame.step(job.header, own, MARGIN).whole);
-        }
-        if is_main {
-            self.note(table, &frame, own.unwrap_or(mean));
-        }
-        self.at_ends(table, step)
-    }
-
-    /// Length of the pass, and the limits at a station.
-    fn note<W: DerefMut<Target = [i32]>>(&mut self, table: &mut Table<W>, frame: &Frame, slope: f32) {
-        let station = self.station;
-        match self.task {
-            Task::Half => {
-                let speed_squared = frame.speed_squared(slope);
-                let area = frame.area();
-                let is_pole = frame.g <= POLE_MAX * frame.e;
-                let [start, end] = self.poles;
-                if station == 0 {
-                    self.poles = [is_pole, end];
-                } else if station + 1 == self.stations.count() {
-                    self.poles = [start, is_pole];
-                }
-                table.set_real(Column::Speed, station, sqrt(speed_squared));
-                table.set_real(Column::Turn, station, speed_squared / area);
-                let most = |down: f32| {
-                    let room = area + down * frame.f * TANGENT_MAX;
-                    if room > 1e-9 {
-                        (frame.e * TANGENT_MAX / room).at_most(SLOPE_MAX)
-                    } else {
-                        SLOPE_MAX
-                    }
-                };
-                table.set_real(Column::Rise, station, most(-1.0));
-                table.set_real(Column::Fall, station, most(1.0));
-            }
-            Task::Whole => {}
-            _ => {
-                if let (Some(from), true) = (self.before, station > 0) {
-                    self.length_mm += distance_mm(&from, &frame.point);
-                }
-                self.before = Some(frame.point);
-                table.set_real(Column::Arc, station, self.length_mm);
-            }
-        }
-    }
-
-    /// Share of the slowing at an end, for the start of the passes or their end.
-    fn taper<W: DerefMut<Target = [i32]>>(&self, table: &Table<W>, station: u16, at_start: bool) -> f32 {
-        let last = self.stations.count().saturating_sub(1);
-        let column = if self.task == Task::Here {
-            Column::Abscissa
+        if is_middle {
+            table.set_word(Column::Middle, station, front);
         } else {
-            Column::Arc
-        };
-        let whole = table.real(column, last);
-        let at = table.real(column, station);
-        let from = if at_start { at } else { whole - at };
-        let rest = (1.0 - from / (TAPER * whole)).at_least(0.0);
-        rest * rest
+            table.set_word(Column::Next, station, front);
+            table.set_word(Column::Mark, station, UNMEASURED);
+        }
+        self.next_station(2 * count - 1);
+        if self.task == Task::Step {
+            self.foot.begin(self.step_place(self.station));
+        }
     }
 
-    /// The step at a station, slowed at an end: where the front enters, it runs along the boundary; where it leaves, the crest lies beyond the last ball.
-    fn at_ends<W: DerefMut<Target = [i32]>>(&self, table: &Table<W>, step: Step) -> f32 {
-        let station = self.station;
-        let last = self.stations.count().saturating_sub(1);
-        let mut whole = step.whole;
-        for (end, at_start) in [(0, true), (last, false)] {
-            let leaves = (step.across > 0.0) == at_start;
-            if leaves {
-                let taper = self.taper(table, station, at_start);
-                if taper > 0.0 {
-                    let skew = (1.0 - step.least / whole).at_least(0.0);
-                    whole *= 1.0 - END_SHARE * skew * taper;
-                }
-            } else if station == end {
-                whole = whole.at_most(step.least);
+    /// Stations and the middles between them, in turns.
+    fn step_place(&self, number: u16) -> Place {
+        let intervals = self.stations.count().saturating_sub(1);
+        let station = number >> 1;
+        if number & 1 == 1 {
+            (station, 1 << 30)
+        } else if station < intervals {
+            (station, 0)
+        } else {
+            (intervals.saturating_sub(1), i32::MAX)
+        }
+    }
+
+    /// The limits at a station.
+    fn note<W: DerefMut<Target = [i32]>>(
+        &mut self,
+        table: &mut Table<W>,
+        station: u16,
+        frame: &Frame,
+        slope: f32,
+    ) {
+        let speed_squared = frame.speed_squared(slope);
+        let area = frame.area();
+        let is_pole = frame.g <= POLE_MAX * frame.e;
+        let [start, end] = self.poles;
+        if station == 0 {
+            self.poles = [is_pole, end];
+        } else if station + 1 == self.stations.count() {
+            self.poles = [start, is_pole];
+        }
+        table.set_real(Column::Speed, station, sqrt(speed_squared));
+        table.set_real(Column::Turn, station, speed_squared / area);
+        let most = |down: f32| {
+            let room = area + down * frame.f * TANGENT_MAX;
+            if room > 1e-9 {
+                (frame.e * TANGENT_MAX / room).at_most(SLOPE_MAX)
+            } else {
+                SLOPE_MAX
+            }
+        };
+        table.set_real(Column::Rise, station, most(-1.0));
+        table.set_real(Column::Fall, station, most(1.0));
+    }
+
+    /// Compares the curve with the step in the middle of an interval.
+    fn compare<W: DerefMut<Target = [i32]>>(&mut self, job: &Job<'_>, table: &mut Table<W>, station: u16) {
+        if station + 1 >= self.stations.count() {
+            return;
+        }
+        let length = self.stations.length(job, station);
+        let [low, high] = [CURRENT, NEXT].map(|columns| Cubic::of(table, columns, station, length).value(1 << 30));
+        let boundary = self.direction.end;
+        if low.saturating_add(high) / 2 > boundary.saturating_add(boundary / 20) {
+            return;
+        }
+        let step = table.word(Column::Middle, station).saturating_sub(low);
+        let most = low.saturating_add(truncated(MIDDLE_TOLERANCE * to_f32(step)));
+        self.note_excess(table, station, high.saturating_sub(most));
+    }
+
+    /// Notes that the front is too far at an interval.
+    fn note_excess<W: DerefMut<Target = [i32]>>(&mut self, table: &mut Table<W>, station: u16, excess: i32) {
+        if excess > 0 {
+            self.is_lowered = true;
+            let lower = truncated(LOWER * to_f32(excess)).max(1);
+            for at in [station, station + 1] {
+                let most = table.word(Column::Scratch, at).max(lower);
+                table.set_word(Column::Scratch, at, most);
             }
         }
-        whole
     }
 
     /// At a pole every distance is the same: the front goes on as beside it, once that is limited.
@@ -660,14 +570,7 @@ impl Advance {
             return;
         };
         table.set_word(Column::Mark, station, mark & !bit);
-        if excess > 0 {
-            self.is_lowered = true;
-            let lower = truncated(LOWER * to_f32(excess));
-            for at in [station, station + 1] {
-                let most = table.word(Column::Scratch, at).max(lower);
-                table.set_word(Column::Scratch, at, most);
-            }
-        }
+        self.note_excess(table, station, excess);
         self.next_crest(places);
     }
 
@@ -688,11 +591,6 @@ impl Advance {
             self.floor(table, station);
         }
     }
-}
-
-/// A share of the whole in units of the fronts.
-fn to_units(share: f32) -> i32 {
-    truncated(share.at_most(1.5) * to_f32(WHOLE))
 }
 
 fn distance_mm(from: &[i64; 3], to: &[i64; 3]) -> f32 {

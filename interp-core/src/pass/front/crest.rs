@@ -50,7 +50,7 @@ pub(crate) struct Tools<'a, 'b> {
 }
 
 impl Tools<'_, '_> {
-    fn frame<W: Deref<Target = [i32]>>(
+    pub(crate) fn frame<W: Deref<Target = [i32]>>(
         &mut self,
         table: &Table<W>,
         (interval, within): Place,
@@ -60,14 +60,25 @@ impl Tools<'_, '_> {
         Frame::at(self.patch, self.job, self.cursor, self.direction, path, at)
     }
 
-    fn curve<W: Deref<Target = [i32]>>(
+    /// A front at a place.
+    pub(crate) fn front<W: Deref<Target = [i32]>>(
         &self,
         table: &Table<W>,
         columns: [Column; 2],
         (interval, within): Place,
     ) -> CurvePoint {
         let length = table.stations().length(self.job, interval);
-        let point = Cubic::of(table, columns, interval, length).point(within, length);
+        Cubic::of(table, columns, interval, length).point(within, length)
+    }
+
+    /// The pass on a front: along the boundary where the front is beyond it.
+    fn curve<W: Deref<Target = [i32]>>(
+        &self,
+        table: &Table<W>,
+        columns: [Column; 2],
+        place: Place,
+    ) -> CurvePoint {
+        let point = self.front(table, columns, place);
         if point.at >= self.direction.end {
             CurvePoint {
                 at: self.direction.end,
@@ -79,8 +90,8 @@ impl Tools<'_, '_> {
     }
 }
 
-const CURRENT: [Column; 2] = [Column::Front, Column::Slope];
-const NEXT: [Column; 2] = [Column::Next, Column::NextSlope];
+pub(crate) const CURRENT: [Column; 2] = [Column::Front, Column::Slope];
+pub(crate) const NEXT: [Column; 2] = [Column::Next, Column::NextSlope];
 
 impl CrestSearch {
     pub(crate) const NONE: Self = Self {
@@ -220,13 +231,13 @@ impl CrestSearch {
 }
 
 /// Path parameter of a place, roughly.
-fn offset<W: Deref<Target = [i32]>>(table: &Table<W>, (interval, within): Place) -> f32 {
+pub(crate) fn offset<W: Deref<Target = [i32]>>(table: &Table<W>, (interval, within): Place) -> f32 {
     let [start, end] = [interval, interval.saturating_add(1)].map(|at| table.real(Column::Abscissa, at));
     start + (end - start) * (to_f32(within) / WITHIN)
 }
 
 /// A place moved along the path parameter, and whether it would be beyond an end.
-fn shifted<W: Deref<Target = [i32]>>(
+pub(crate) fn shifted<W: Deref<Target = [i32]>>(
     table: &Table<W>,
     job: &Job<'_>,
     (interval, within): Place,

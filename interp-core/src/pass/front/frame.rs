@@ -16,8 +16,6 @@ use crate::surface::Pass as _;
 
 /// Scallop height for which the fronts are made, as a share of the limit.
 pub(crate) const MARGIN: f32 = 0.98;
-/// Longest step, as a share of the whole side parameter.
-const STEP_MAX: f32 = 1.5;
 
 /// First fundamental form (e, f, g) and `I - r II` (a, b, c) by the path parameter and the share of the whole side parameter, mm^2.
 #[derive(Clone, Copy, Debug, Default)]
@@ -35,17 +33,6 @@ pub(crate) struct Frame {
     pub(crate) a: f32,
     pub(crate) b: f32,
     pub(crate) c: f32,
-}
-
-/// Distances to the next pass at a fixed path parameter, shares of the whole side parameter.
-#[derive(Clone, Copy, Debug)]
-pub(crate) struct Step {
-    /// Of a pass with the slope.
-    pub(crate) whole: f32,
-    /// Of one that crosses the side line at right angles in the metric.
-    pub(crate) least: f32,
-    /// Product of the pass's direction and the side line: positive where the front comes from the end of the pass.
-    pub(crate) across: f32,
 }
 
 impl Frame {
@@ -94,11 +81,6 @@ impl Frame {
         })
     }
 
-    /// The metric's determinant.
-    pub(crate) fn determinant(&self) -> f32 {
-        self.a * self.c - self.b * self.b
-    }
-
     /// The surface's area per parameters.
     pub(crate) fn area(&self) -> f32 {
         sqrt((self.e * self.g - self.f * self.f).at_least(0.0))
@@ -114,23 +96,16 @@ impl Frame {
         self.e + slope * (2.0 * self.f + self.g * slope)
     }
 
-    /// The step for a share of the scallop limit.
-    pub(crate) fn step(&self, header: &Header, slope: f32, margin: f32) -> Step {
+    /// `1/K` for a step in this direction: the metric's square of it, times this, is 1 at the distance to the next pass.
+    pub(crate) fn scale(&self, header: &Header, along: f32, across: f32, margin: f32) -> f32 {
         let radius = header.ball_radius_mm;
         let height = margin * height_limit_mm(header);
-        let across = self.b + self.c * slope;
-        let (du, dv) = (-across, self.a + self.b * slope);
+        let (du, dv) = (along, across);
         let metric = self.a * du * du + 2.0 * self.b * du * dv + self.c * dv * dv;
         let length = self.e * du * du + 2.0 * self.f * du * dv + self.g * dv * dv;
         let ratio = metric / length;
         let bend = if ratio.is_finite() { ratio - 1.0 } else { 0.0 };
         let share = height / radius;
-        let factor = 8.0 * radius * height * (1.0 - 0.5 * share) / (1.0 + share * bend);
-        let root = |value: f32| sqrt(value.at_least(0.0)).at_most(STEP_MAX);
-        Step {
-            whole: root(factor * self.stretch(slope) / self.determinant()),
-            least: root(factor / self.c),
-            across,
-        }
+        (1.0 + share * bend) / (8.0 * radius * height * (1.0 - 0.5 * share))
     }
 }

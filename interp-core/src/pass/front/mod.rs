@@ -5,7 +5,7 @@
 //! fixed stations of the path parameter, with a cubic spline between them, so it is never parametrised anew:
 //!
 //! ```text
-//! H(p)^2 = K (a + 2 b p + c p^2) / (a c - b^2)     [a b; b c] = I - r II,  p = g',  K = 8 r h (1 - h/2r)/(1 + h k)
+//! a dx^2 + 2 b dx dy + c dy^2 = K     [a b; b c] = I - r II,  K = 8 r h (1 - h/2r)/(1 + h k), k the curvature away from the tool
 //! ```
 //!
 //! Whatever limits the front lowers it, which is safe: the height between two passes grows with their distance. A part of a front beyond the last side boundary is not
@@ -15,7 +15,8 @@
 //! |---|---|
 //! | [`table`] | the stations, in the job store behind the job's words |
 //! | [`side`] | the side parameter as one integer over all spans |
-//! | [`frame`] | the metric at a surface point, and the step H |
+//! | [`frame`] | the metric at a surface point |
+//! | [`foot`] | the step of a front at a place |
 //! | [`spline`] | the curve through the stations |
 //! | [`limits`] | slope and turning of a front |
 //! | [`crest`] | the height between two fronts, measured by the balls |
@@ -24,6 +25,7 @@
 
 mod advance;
 mod crest;
+mod foot;
 mod frame;
 mod limits;
 mod side;

@@ -21,12 +21,12 @@ pub(crate) enum Column {
     Fall,
     /// Change of the slope per radian of turn (f32).
     Turn,
-    /// Step (f32), then stations of the convex hull.
+    /// Stations of the convex hull.
     Step,
-    /// Elimination of the spline (f32), or density of a step.
+    /// Elimination of the spline (f32), then by how much a station is to be lowered.
     Scratch,
-    /// Arc since the start of the pass, mm (f32).
-    Arc,
+    /// The step in the middle of the interval from the station, units of the fronts.
+    Middle,
     /// Length of the pass per path parameter, mm (f32).
     Speed,
     /// Path parameter (f32).

@@ -23,8 +23,8 @@ const PORTION_CYCLES: f32 = 26_500.0;
 const PORTION_PERIOD_S: f32 = 1e-3;
 /// Most portions of a period.
 const PORTIONS_MAX: u8 = 8;
-/// Path spans that a period's arc may end in after the one that it begins in.
-const CROSSINGS_MAX: u8 = 1;
+/// Stations and path spans that a period's arc may end beyond: stations are two periods apart, except on short passes.
+const CROSSINGS_MAX: u8 = 3;
 
 /// The line that the tool is on.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -69,10 +69,10 @@ pub(crate) struct CurveRun {
     place: SpanParameter,
     fraction: u64,
     side: SpanParameter,
-    /// End of the pass in the surface's own direction, the station after it, and whether it is on the last side boundary.
-    end: SpanParameter,
+    /// Start and end of the pass in the surface's own direction, whether they are on the last side boundary, and the station after the end.
+    ends: [SpanParameter; 2],
+    are_on_boundary: [bool; 2],
     after: u16,
-    ends_beyond: bool,
     /// The parametrisation at the last sample, per mm, and the logarithmic speed derivative at the sample before.
     path: PathSpeed,
     log_speed_derivative_before: f32,
@@ -105,9 +105,9 @@ impl CurveRun {
         place: SpanParameter { span: 0, fraction: 0 },
         fraction: 0,
         side: SpanParameter { span: 0, fraction: 0 },
-        end: SpanParameter { span: 0, fraction: 0 },
+        ends: [SpanParameter { span: 0, fraction: 0 }; 2],
+        are_on_boundary: [false; 2],
         after: 0,
-        ends_beyond: false,
         path: PathSpeed::STILL,
         log_speed_derivative_before: f32::NAN,
         offset: [0; 3],
@@ -243,8 +243,8 @@ impl CurveRun {
         let near = SpanParameter { span: 0, fraction: 0 };
         let (start, end) = if self.reversed { (far, near) } else { (near, far) };
         self.begin_at(start);
-        self.end = end;
-        self.ends_beyond = false;
+        self.ends = [start, end];
+        self.are_on_boundary = [false; 2];
         self.after = u16::MAX;
     }
 
@@ -277,6 +277,9 @@ impl CurveRun {
             return Ok(false);
         };
         let made = made?;
+        if self.begins_part {
+            self.part = 1;
+        }
         self.begins_part = false;
         self.direction = self.advance.direction;
         self.fronts = self.fronts.wrapping_add(1);
@@ -333,10 +336,10 @@ impl CurveRun {
         if index >= count {
             return false;
         }
-        let start = if index == 0 {
-            stations.place(own(0))
+        let (start, is_from_boundary) = if index == 0 {
+            (stations.place(own(0)), false)
         } else {
-            crossing(index - 1)
+            (crossing(index - 1), true)
         };
         while index < count && is_before(index) {
             index += 1;
@@ -346,7 +349,9 @@ impl CurveRun {
         } else {
             (stations.place(own(count - 1)), false)
         };
-        (self.end, self.ends_beyond, self.after) = (end, is_beyond, index);
+        self.ends = [start, end];
+        self.are_on_boundary = [is_from_boundary, is_beyond];
+        self.after = index;
         self.begin_at(start);
         true
     }
@@ -378,8 +383,10 @@ impl CurveRun {
         place: SpanParameter,
     ) -> Result<OnCurve> {
         let mut point = self.point(job, words, place);
-        if place == self.end && self.ends_beyond {
-            point.at = self.direction.end;
+        for (end, is_on_boundary) in self.ends.iter().zip(self.are_on_boundary) {
+            if place == *end && is_on_boundary {
+                point.at = self.direction.end;
+            }
         }
         let (side, share) = self.cursor.seek(job, &self.direction, point.at);
         let position = PassPosition {
@@ -407,13 +414,24 @@ impl CurveRun {
         })
     }
 
-    /// End of the pass, or of the path span where it goes on, in the direction of travel.
-    fn limit(&self) -> u64 {
-        if self.end.span == self.place.span {
-            self.turned(self.end.fraction)
+    /// End of the pass, in the direction of travel; of the path span where it goes on beyond.
+    fn end(&self) -> u64 {
+        let [_, end] = self.ends;
+        if end.span == self.place.span {
+            self.turned(end.fraction)
         } else {
             u64::MAX
         }
+    }
+
+    /// End of the smooth part of the pass: of the interval between stations, or of the pass.
+    fn limit(&self) -> u64 {
+        let end = self.end();
+        if self.line != Line::Front {
+            return end;
+        }
+        let bits = u32::from(self.stations().bits);
+        (self.fraction | u64::MAX >> bits).min(end)
     }
 
     /// Moves by a share of a period's arc. Returns the feed, mm/s.
@@ -427,9 +445,10 @@ impl CurveRun {
         let header = job.header;
         let feed_mm_s = header.feed_mm_s * feed_factor;
         let arc = feed_mm_s * header.period_s;
+        let limit = self.limit();
         let step = contact::step(&self.path, self.log_speed_derivative_before, arc);
         if let Some(fraction) = step.and_then(|step| advanced(self.fraction, step))
-            && fraction < self.limit()
+            && fraction < limit
         {
             self.move_to(fraction);
             return Ok(feed_mm_s);
@@ -457,14 +476,22 @@ impl CurveRun {
                 Reach::Beyond(covered) => covered,
             };
             rest -= covered;
-            if span == self.end.span {
+            let [_, end] = self.ends;
+            if span == end.span && limit == self.end() {
                 self.move_to(limit);
                 self.next = Next::Over;
-                let share = (1.0 - rest / arc).at_least(0.0).at_most(1.0);
-                return Ok(feed_mm_s * share);
+                return Ok(feed_mm_s);
             }
             if crossings == CROSSINGS_MAX {
                 break;
+            }
+            // A polynomial begins: no difference to the sample before.
+            self.path.log_speed_derivative = f32::NAN;
+            if limit < u64::MAX {
+                self.move_to(limit + 1);
+                let (_, patch) = buffer.free();
+                start = self.evaluate(job, words, patch, self.place)?.path.checked()?;
+                continue;
             }
             self.place.span = if self.reversed {
                 span.saturating_sub(1)
@@ -472,7 +499,6 @@ impl CurveRun {
                 span.saturating_add(1)
             };
             self.move_to(0);
-            self.path.log_speed_derivative = f32::NAN;
             let (_, patch) = buffer.free();
             start = self.evaluate(job, words, patch, self.place)?.path.checked()?;
         }
