@@ -45,7 +45,7 @@ pub struct SampleCheck {
 }
 
 /// Distance of the first pass from the middle of the side parameter at most, a share of the parameter: its rounding.
-const START_SHARE: f64 = 1e-8;
+const START_SHARE: f64 = 1e-6;
 
 /// Accumulates a [`AccuracyReport`] from a stream of samples.
 #[derive(Clone, Debug)]

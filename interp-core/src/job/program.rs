@@ -53,13 +53,14 @@ pub(crate) fn extent(header: &Header) -> (u32, u64) {
     )
 }
 
-/// Words of the store behind the job's, in which passes of constant scallop height are made.
-pub(crate) fn front_words(header: &Header) -> u64 {
-    if header.spacing.is_constant() {
-        Stations::most(header.path_spans).words() as u64
-    } else {
-        0
+/// Words of the store that a job takes behind its data, for the stations of passes of constant scallop height; none where it crosses more patches than there
+/// may be stations for.
+#[must_use]
+pub fn front_words(header: &Header) -> Option<usize> {
+    if !header.spacing.is_constant() {
+        return Some(0);
     }
+    (header.path_spans <= FRONT_SPANS_MAX).then(|| Stations::most(header.path_spans).words())
 }
 
 fn check_header(header: &Header) -> Result<()> {
@@ -72,7 +73,7 @@ fn check_header(header: &Header) -> Result<()> {
             return Err(Fault::new(FaultKind::BadHeader, f32::from(spans)));
         }
     }
-    if header.spacing.is_constant() && (header.axes.is_some() || header.path_spans > FRONT_SPANS_MAX) {
+    if header.spacing.is_constant() && (header.axes.is_some() || front_words(header).is_none()) {
         return Err(Fault::new(FaultKind::BadHeader, f32::from(header.path_spans)));
     }
     let ranges = [
@@ -159,7 +160,7 @@ impl Program {
     pub(crate) fn begin(&mut self, header: &Header, words: u32, capacity: usize) -> Result<()> {
         check_header(header)?;
         let (_, needed) = extent(header);
-        let stored = needed + front_words(header);
+        let stored = needed + front_words(header).unwrap_or(0) as u64;
         if stored > capacity as u64 {
             #[allow(clippy::cast_precision_loss, reason = "a report; at most 2^27")]
             return Err(Fault::new(FaultKind::TooManyPatches, stored as f32));

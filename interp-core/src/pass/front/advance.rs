@@ -57,6 +57,8 @@ enum Task {
     Clear,
     /// Step at each station and in the middle of each interval.
     Step,
+    /// A straight front at the least step, in place of the limits.
+    Level,
     /// The limits: sweeps and hull, twice.
     Forwards,
     Backwards,
@@ -285,7 +287,11 @@ impl Advance {
                 self.start_front();
                 return;
             }
-            Task::Step => (Task::Forwards, 0),
+            Task::Step => {
+                self.is_level = self.level > 0 && to_f32(self.steps[1]) <= LEVEL * to_f32(self.steps[0]);
+                (if self.is_level { Task::Level } else { Task::Forwards }, 0)
+            }
+            Task::Level => (Task::Compare, 0),
             Task::Forwards => (Task::Backwards, 0),
             Task::Backwards => {
                 self.limiter.begin();
