@@ -32,6 +32,13 @@ const TANGENT_MAX: f32 = 5.671_282;
 /// Rounds in which a front is lowered where its curve is too far between the stations, and after the crests are measured; by how much more than the excess.
 const ROUNDS: u8 = 4;
 const MEASUREMENTS: u8 = 3;
+/// Ratio of the steps up to which a straight front stays straight, and how much longer its step is: all of the limit but for an error.
+const LEVEL: f32 = 1.002;
+const LEVEL_MORE: f32 = 1.0099;
+const LEVEL_MARGIN: f32 = 0.9999;
+/// Turn of the curve beyond which a front is not taken, as a multiple of the limit by length, and between stations, rad.
+const SHARP: f32 = 2.5;
+const SHARP_TURN: f32 = 0.5;
 /// Tolerance of the curve between stations, over the step there.
 const MIDDLE_TOLERANCE: f32 = 1.003;
 /// Step where the surface is faulty, units of the fronts.
@@ -59,6 +66,8 @@ enum Task {
     Step,
     /// A straight front at the least step, in place of the limits.
     Level,
+    /// The current front, moved.
+    Shift,
     /// The limits: sweeps and hull, twice.
     Forwards,
     Backwards,
@@ -93,6 +102,16 @@ pub(crate) struct Advance {
     station: u16,
     /// Second pass of the limits; rounds of measuring.
     again: bool,
+    /// The current front is straight, and the next one.
+    is_straight: bool,
+    is_next_straight: bool,
+    /// The next one is made straight; the least and the greatest step, units of the fronts.
+    is_level: bool,
+    steps: [i32; 2],
+    /// The curve turns too sharply; it was replaced by the current one, moved by the least advance, units of the fronts.
+    is_sharp: bool,
+    is_shifted: bool,
+    shift: i32,
     round: u8,
     measured: u8,
     is_lowered: bool,
@@ -117,6 +136,13 @@ impl Advance {
         task: Task::Done,
         station: 0,
         again: false,
+        is_straight: true,
+        is_next_straight: true,
+        is_level: false,
+        steps: [0; 2],
+        is_sharp: false,
+        is_shifted: false,
+        shift: 0,
         round: 0,
         measured: 0,
         is_lowered: false,
@@ -137,6 +163,7 @@ impl Advance {
     /// Begins with the front after the first line in this direction. `is_first`: the stations are not chosen yet.
     pub(crate) const fn begin(&mut self, cursor: SideCursor, direction: Direction, is_first: bool) {
         self.direction = direction;
+        self.is_straight = true;
         self.made = None;
         self.station = 0;
         if is_first {
@@ -151,6 +178,7 @@ impl Advance {
     /// Begins with the front after the current one.
     pub(crate) const fn go_on(&mut self) {
         self.made = None;
+        self.is_straight = self.is_next_straight;
         self.start_front();
     }
 
@@ -167,6 +195,9 @@ impl Advance {
         self.measured = 0;
         self.again = false;
         self.advanced = 0.0;
+        self.steps = [i32::MAX, 0];
+        self.is_level = false;
+        self.is_shifted = false;
         self.foot.begin((0, 0));
     }
 
@@ -288,10 +319,17 @@ impl Advance {
                 return;
             }
             Task::Step => {
-                self.is_level = self.level > 0 && to_f32(self.steps[1]) <= LEVEL * to_f32(self.steps[0]);
-                (if self.is_level { Task::Level } else { Task::Forwards }, 0)
+                let [least, most] = self.steps.map(to_f32);
+                self.is_level = self.is_straight && most <= LEVEL * least;
+                let next = if self.is_level {
+                    Task::Level
+                } else {
+                    Task::Forwards
+                };
+                (next, 0)
             }
-            Task::Level => (Task::Compare, 0),
+            Task::Level => (Task::Eliminate, 0),
+            Task::Shift => (Task::Eliminate, 0),
             Task::Forwards => (Task::Backwards, 0),
             Task::Backwards => {
                 self.limiter.begin();
@@ -306,7 +344,15 @@ impl Advance {
             Task::Eliminate => (Task::Substitute, 0),
             Task::Substitute => {
                 self.is_lowered = false;
-                (Task::Compare, 0)
+                if self.is_sharp && !self.is_shifted {
+                    self.is_shifted = true;
+                    (Task::Shift, 0)
+                } else if self.is_level || self.is_shifted {
+                    self.search.begin(self.crest_place(0));
+                    (Task::Crest, 0)
+                } else {
+                    (Task::Compare, 0)
+                }
             }
             Task::Compare if self.is_lowered && self.round < ROUNDS => {
                 self.round += 1;
@@ -318,7 +364,13 @@ impl Advance {
                 self.search.begin(self.crest_place(0));
                 (Task::Crest, 0)
             }
-            Task::Crest if self.is_lowered => {
+            Task::Crest if self.is_lowered && self.is_level => {
+                // Not straight after all, or with the common margin.
+                self.is_level = false;
+                (Task::Level, 0)
+            }
+            Task::Crest if self.is_lowered && self.measured < MEASUREMENTS => {
+                self.is_shifted = false;
                 self.measured += 1;
                 self.round = 0;
                 self.again = false;
@@ -341,7 +393,7 @@ impl Advance {
             }
             Task::Substitute => {
                 spline::substitute(table, job, Column::NextSlope, backwards);
-                self.finish_station(table, backwards);
+                self.finish_station(job, table, backwards);
             }
             Task::Compare => self.compare(job, table, station),
             Task::Forwards => self.limiter.sweep(table, job, station, true),
@@ -353,6 +405,18 @@ impl Advance {
                 self.at_poles(table, station);
             }
             Task::Lower => self.lower(table, station),
+            Task::Level => {
+                let [least, _] = self.steps;
+                let more = if self.is_level { LEVEL_MORE } else { 1.0 };
+                let step = truncated(to_f32(least) * more);
+                let next = table.word(Column::Front, station).saturating_add(step);
+                table.set_word(Column::Next, station, next.min(self.direction.cap()));
+                table.set_word(Column::Mark, station, UNMEASURED);
+            }
+            Task::Shift => {
+                let next = table.word(Column::Front, station).saturating_add(self.shift);
+                table.lower(station, next.min(self.direction.cap()));
+            }
             _ => {}
         }
         self.next_station(count);
@@ -397,6 +461,12 @@ impl Advance {
             // The tool reports the fault where it reaches it.
             Found::Faulty => table.word(Column::Front, station).saturating_add(FAULTY_STEP),
         };
+        let own = front_at(table, station, is_middle, job);
+        if own < self.direction.end {
+            let step = front.saturating_sub(own);
+            let [least, most] = self.steps;
+            self.steps = [least.min(step), most.max(step)];
+        }
         if is_middle {
             table.set_word(Column::Middle, station, front);
         } else {
@@ -513,7 +583,12 @@ impl Advance {
     }
 
     /// Takes a station into account of the finished front.
-    fn finish_station<W: DerefMut<Target = [i32]>>(&mut self, table: &mut Table<W>, station: u16) {
+    fn finish_station<W: DerefMut<Target = [i32]>>(
+        &mut self,
+        job: &Job<'_>,
+        table: &mut Table<W>,
+        station: u16,
+    ) {
         let (front, next) = (
             table.word(Column::Front, station),
             table.word(Column::Next, station),
@@ -521,15 +596,35 @@ impl Advance {
         if station + 1 == self.stations.count() {
             self.made = Some(Made::Beyond);
             self.advanced = 0.0;
+            self.is_sharp = false;
+            self.is_next_straight = true;
+            self.shift = i32::MAX;
+        } else {
+            self.look_at_bend(job, table, station);
         }
+        self.is_next_straight &= table.real(Column::NextSlope, station) == 0.0;
         if next < self.direction.end {
             self.made = Some(Made::Front);
         }
         if front < self.direction.end {
+            self.shift = self.shift.min(next.saturating_sub(front));
             let advance = to_f32(next.saturating_sub(front)) * UNIT;
             self.advanced = self.advanced.at_least(advance);
         }
         table.set_word(Column::Scratch, station, 0);
+    }
+
+    /// Looks whether the curve turns too sharply at a station.
+    fn look_at_bend<W: DerefMut<Target = [i32]>>(&mut self, job: &Job<'_>, table: &Table<W>, station: u16) {
+        if table.word(Column::Next, station).min(table.word(Column::Next, station + 1)) >= self.direction.end {
+            return;
+        }
+        let length = self.stations.length(job, station);
+        let bend = Cubic::of(table, NEXT, station, length).point(0, length).bend;
+        let speed = table.real(Column::Speed, station);
+        let per_mm = bend.abs() / (table.real(Column::Turn, station) * speed);
+        let most = (SHARP * self.limiter.turn_per_mm).at_most(SHARP_TURN / (speed * length));
+        self.is_sharp |= per_mm > most;
     }
 
     /// Places at which crests are measured: the middle of each interval, then both ends.
@@ -566,13 +661,14 @@ impl Advance {
             self.next_crest(places);
             return;
         }
+        let margin = if self.is_level { LEVEL_MARGIN } else { MEASURED_MARGIN };
         let mut tools = Tools {
             patch: &mut self.patch,
             job,
             cursor: &mut self.cursor,
             direction: &self.direction,
         };
-        let Some(excess) = self.search.work(&mut tools, table, MEASURED_MARGIN) else {
+        let Some(excess) = self.search.work(&mut tools, table, margin) else {
             return;
         };
         table.set_word(Column::Mark, station, mark & !bit);
@@ -596,6 +692,16 @@ impl Advance {
             table.lower(station, lower);
             self.floor(table, station);
         }
+    }
+}
+
+/// The current front at a station, or in the middle of the interval after it.
+fn front_at<W: DerefMut<Target = [i32]>>(table: &Table<W>, station: u16, is_middle: bool, job: &Job<'_>) -> i32 {
+    if is_middle {
+        let length = table.stations().length(job, station);
+        Cubic::of(table, CURRENT, station, length).value(1 << 30)
+    } else {
+        table.word(Column::Front, station)
     }
 }
 

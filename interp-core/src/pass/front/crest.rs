@@ -21,6 +21,11 @@ const FOOT_STEPS: u8 = 3;
 const INTERVALS_MAX: u8 = 16;
 /// Greatest correction of the foot that is taken from one ball, as a share of the distance in the metric.
 const CORRECTION_MAX: f32 = 0.3;
+/// A crest that is farther than this from where it was expected, as a share of the gap, is measured again, unless the gap could be wider by this factor.
+const REPEAT_MIN: f32 = 0.03;
+const CLEAR: f32 = 1.05;
+/// Least share of the gap between the crest and a pass.
+const SHARE_MIN: f32 = 0.1;
 /// 2^31.
 const WITHIN: f32 = power_of_two(31);
 
@@ -39,6 +44,8 @@ pub(crate) struct CrestSearch {
     at: i32,
     gap: i32,
     first: f32,
+    /// The crest was looked for at another share before.
+    is_repeated: bool,
 }
 
 /// What the search evaluates with.
@@ -113,6 +120,7 @@ impl CrestSearch {
         at: 0,
         gap: 0,
         first: 0.0,
+        is_repeated: false,
     };
 
     /// Begins at a place.
@@ -120,6 +128,7 @@ impl CrestSearch {
         self.place = place;
         self.next = 0;
         self.share = 0.5;
+        self.is_repeated = false;
     }
 
     /// An evaluation. Returns, after the last one, by how much the gap is too wide at the place for this share of the limit, units of the fronts; 0 where it is not.
@@ -153,7 +162,7 @@ impl CrestSearch {
             _ => {
                 let second = self.height(tools, table, NEXT);
                 self.next = 0;
-                Some(self.excess(tools.job, second, margin))
+                self.excess(tools.job, second, margin)
             }
         }
     }
@@ -213,7 +222,7 @@ impl CrestSearch {
     }
 
     /// The crest from the heights of both balls at the point: their roots are linear in the distance.
-    fn excess(&self, job: &Job<'_>, second: f32, margin: f32) -> i32 {
+    fn excess(&mut self, job: &Job<'_>, second: f32, margin: f32) -> Option<i32> {
         let share = self.share;
         let (near, far) = (sqrt(self.first) / share, sqrt(second) / (1.0 - share));
         let root = if near.is_finite() && far.is_finite() {
@@ -222,11 +231,17 @@ impl CrestSearch {
             near.at_most(far)
         };
         let ratio = sqrt(margin * height_limit_mm(job.header)) / root;
-        if ratio < 1.0 {
+        let at = far / (near + far);
+        if !self.is_repeated && ratio < CLEAR && (at - share).abs() > REPEAT_MIN {
+            self.is_repeated = true;
+            self.share = at.at_least(SHARE_MIN).at_most(1.0 - SHARE_MIN);
+            return None;
+        }
+        Some(if ratio < 1.0 {
             truncated(to_f32(self.gap) * (1.0 - ratio)).max(1)
         } else {
             0
-        }
+        })
     }
 }
 
