@@ -7,10 +7,12 @@ use crate::sample::SpanParameter;
 /// Words of a station.
 const COLUMNS: usize = 13;
 /// Parts of each path span between stations, as powers of two: at least, and at most for a surface of many spans.
-const BITS_MIN: u8 = 2;
+const BITS_MIN: u8 = 1;
 const BITS_MANY: u8 = 3;
 /// Parts of the whole path parameter at most, except where [`BITS_MANY`] gives more.
 const PARTS: u32 = 64;
+/// Fewest parts of the whole path parameter.
+const INTERVALS_MIN: u32 = 8;
 /// Most parts in all: bounds the loops over the stations.
 const PARTS_MAX: u32 = 512;
 
@@ -41,7 +43,7 @@ impl Stations {
     /// The fewest with at least this number of intervals, not above the most.
     pub(crate) fn for_intervals(spans: u16, intervals: f32) -> Self {
         let mut stations = Self::most(spans);
-        while stations.bits > BITS_MANY && count_to_f32(stations.intervals() / 2) >= intervals {
+        while stations.bits > BITS_MIN && stations.intervals() > INTERVALS_MIN && count_to_f32(stations.intervals() / 2) >= intervals {
             stations.bits -= 1;
         }
         stations

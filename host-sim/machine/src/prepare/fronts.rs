@@ -5,8 +5,14 @@ use interp_core::{STORE_WORDS, SurfaceKind, front_words};
 use job::{Job, JobError};
 
 use super::Prepared;
+use super::geometry::SurfaceEvaluator;
 
 const REMEDY: &str = "write spacing = \"exact\"";
+/// Points of each knot line at which the derivatives on both sides are compared, their distance from it as a share of the range, and their greatest relative
+/// difference: a pass bends by as much there.
+const CREASE_POINTS: u32 = 9;
+const CREASE_STEP: f64 = 1e-9;
+const CREASE_MAX: f64 = 1e-3;
 /// Radius of a circle that is a point, mm.
 const POINT_MM: f64 = 1e-5;
 
@@ -25,7 +31,7 @@ pub(super) fn check_job(job: &Job) -> Result<(), JobError> {
     Ok(())
 }
 
-/// Refuses a pole beside the passes, too many path spans, and a job for whose stations the store has no room.
+/// Refuses a crease, a pole beside the passes, too many path spans, and a job for whose stations the store has no room.
 ///
 /// # Errors
 /// As above.
@@ -46,6 +52,9 @@ pub(super) fn check(job: &Job, prepared: &Prepared) -> Result<(), JobError> {
             &remedy,
         );
     }
+    if let Some(crease) = crease(job, prepared) {
+        return no(crease, REMEDY);
+    }
     let Some(words) = front_words(&prepared.header) else {
         return no(
             format!(
@@ -65,6 +74,41 @@ pub(super) fn check(job: &Job, prepared: &Prepared) -> Result<(), JobError> {
         );
     }
     Ok(())
+}
+
+/// A knot at which the surface's first derivatives jump.
+fn crease(job: &Job, prepared: &Prepared) -> Option<String> {
+    let surface = SurfaceEvaluator::new(&job.surface);
+    let (path, side) = (&prepared.path.breaks, &prepared.side.breaks);
+    let names = match job.along {
+        job::Along::U => ["u", "v"],
+        job::Along::V => ["v", "u"],
+    };
+    for (name, knots, across) in [(names[0], path, side), (names[1], side, path)] {
+        let [low, high] = [across[0], across[across.len() - 1]];
+        let width = knots[knots.len() - 1] - knots[0];
+        for knot in &knots[1..knots.len() - 1] {
+            for k in 0..CREASE_POINTS {
+                let at = low + (high - low) * (f64::from(k) + 0.5) / f64::from(CREASE_POINTS);
+                let sides = [-CREASE_STEP, CREASE_STEP].map(|step| {
+                    let moved = knot + step * width;
+                    let frame = if name == "u" {
+                        surface.at(moved, at)
+                    } else {
+                        surface.at(at, moved)
+                    };
+                    if name == "u" { frame.u } else { frame.v }
+                });
+                let [before, after] = sides;
+                if before.distance(after) > CREASE_MAX * before.length().max(after.length()) {
+                    return Some(format!(
+                        "passes of constant scallop height need a smooth parametrisation, but its derivative along {name} jumps at {name} = {knot}"
+                    ));
+                }
+            }
+        }
+    }
+    None
 }
 
 /// Whether a side boundary is a single point.

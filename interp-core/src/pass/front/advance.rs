@@ -26,7 +26,7 @@ const INTERVAL_STEPS: f32 = 0.5;
 /// Greatest turn of a pass in one period, rad.
 const TURN_PER_PERIOD: f32 = 0.05;
 /// Least radius of a pass in the tangent plane, in step-overs.
-const RADIUS_STEPS: f32 = 0.5;
+const RADIUS_STEPS: f32 = 1.0;
 /// Tangent of the greatest angle of a pass to the lines of the side parameter: 80 degrees.
 const TANGENT_MAX: f32 = 5.671_282;
 /// Rounds in which a front is lowered where its curve is too far between the stations, and after the crests are measured; by how much more than the excess.
@@ -34,18 +34,18 @@ const ROUNDS: u8 = 4;
 const MEASUREMENTS: u8 = 3;
 /// Ratio of the steps up to which a straight front stays straight, and how much longer its step is: all of the limit but for an error.
 const LEVEL: f32 = 1.002;
-const LEVEL_MORE: f32 = 1.0099;
+const LEVEL_MORE: f32 = 1.00115;
 const LEVEL_MARGIN: f32 = 0.9999;
 /// Turn of the curve beyond which a front is not taken, as a multiple of the limit by length, and between stations, rad.
 const SHARP: f32 = 2.5;
 const SHARP_TURN: f32 = 0.5;
 /// Tolerance of the curve between stations, over the step there.
-const MIDDLE_TOLERANCE: f32 = 1.003;
+const MIDDLE_TOLERANCE: f32 = 1.0005;
 /// Step where the surface is faulty, units of the fronts.
 const FAULTY_STEP: i32 = WHOLE / 256;
 const LOWER: f32 = 1.1;
 /// Scallop height to which the crests are measured, as a share of the limit.
-const MEASURED_MARGIN: f32 = 0.99;
+const MEASURED_MARGIN: f32 = 0.997;
 /// Rows of a sweep in one portion.
 const CHUNK: u16 = 16;
 /// Greatest slope.

@@ -216,14 +216,11 @@ impl FootStep {
         };
     }
 
-    /// The step at which the mean of the form over the way is 1: by a parabola or a kink half way, where that is more than half way.
+    /// The step at which the mean of the form over the way is 1. The height at a share s of the way is the integral of (s - t) times the form, and the crest is where
+    /// both sides have the same: what lies next to the passes counts most.
     fn finish(&self, cap: i32) -> i32 {
         let [first, half, whole] = self.forms;
-        let means = [
-            half,
-            Form::mean(&[(first, 1.0 / 6.0), (half, 4.0 / 6.0), (whole, 1.0 / 6.0)]),
-            Form::mean(&[(first, 0.25), (half, 0.5), (whole, 0.25)]),
-        ];
+        let means = [Form::mean(&[(first, 0.25), (half, 0.5), (whole, 0.25)])];
         let mut base = self.base;
         let mut least = STEP_MAX;
         for mean in &means {
