@@ -70,11 +70,6 @@ impl Stations {
         interval >> self.bits
     }
 
-    /// Whether a station is at a knot within the pass.
-    pub(crate) const fn is_knot(self, station: u16) -> bool {
-        station & ((1 << self.bits) - 1) == 0 && station > 0 && station + 1 < self.count()
-    }
-
     /// Place of a station.
     pub(crate) fn place(self, station: u16) -> SpanParameter {
         if station + 1 >= self.count() {

@@ -6,7 +6,7 @@ use crate::job::program::Job;
 use crate::math::arith::sqrt;
 use crate::math::number::Bounded;
 use crate::math::vec3::Vec3;
-use crate::pass::front::side::{Direction, SideCursor};
+use crate::pass::front::side::{Direction, SideCursor, fine};
 use crate::pass::offset::check_fit;
 use crate::pass::patch::Patch;
 use crate::pass::position::PassPosition;
@@ -15,7 +15,7 @@ use crate::sample::SpanParameter;
 use crate::surface::Pass as _;
 
 /// Scallop height for which the fronts are made, as a share of the limit.
-pub(crate) const MARGIN: f32 = 0.9975;
+pub(crate) const MARGIN: f32 = 0.996;
 
 /// First fundamental form (e, f, g) and `I - r II` (a, b, c) by the path parameter and the share of the whole side parameter, mm^2.
 #[derive(Clone, Copy, Debug, Default)]
@@ -49,7 +49,7 @@ impl Frame {
         path: SpanParameter,
         distance: i32,
     ) -> Result<Self> {
-        let (side, share) = cursor.seek(job, direction, distance);
+        let (side, share) = cursor.seek(job, direction, fine(distance));
         patch.collapse(
             job,
             &PassPosition {

@@ -9,6 +9,20 @@ pub(crate) const WHOLE: i32 = 1 << 28;
 /// The unit as a share of the whole.
 pub(crate) const UNIT: f32 = power_of_two(-28);
 
+/// Bits of a fine distance below the unit.
+pub(crate) const FINE_BITS: u32 = 12;
+
+/// A distance in fine units.
+pub(crate) fn fine(distance: i32) -> i64 {
+    i64::from(distance) << FINE_BITS
+}
+
+/// A fine distance in units, rounded down.
+#[allow(clippy::cast_possible_truncation, reason = "distances are below 2^31 units")]
+pub(crate) const fn coarse(distance: i64) -> i32 {
+    (distance >> FINE_BITS) as i32
+}
+
 /// The direction of the fronts.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) struct Direction {
@@ -93,19 +107,21 @@ impl SideCursor {
         truncated(job.side_width(span) * self.scale).max(1)
     }
 
-    /// Moves to the span of a distance from the first front. Returns the side parameter, and the span's share of the whole parameter.
+    /// Moves to the span of a distance from the first front, fine units. Returns the side parameter, and the span's share of the whole parameter.
     pub(crate) fn seek(
         &mut self,
         job: &Job<'_>,
         direction: &Direction,
-        distance: i32,
+        distance: i64,
     ) -> (SpanParameter, f32) {
-        let distance = distance.clamp(0, direction.end);
-        let at = if direction.forwards {
-            direction.origin.wrapping_add(distance)
+        let distance = distance.clamp(0, fine(direction.end));
+        let origin = fine(direction.origin);
+        let whole = if direction.forwards {
+            origin.wrapping_add(distance)
         } else {
-            direction.origin.wrapping_sub(distance)
+            origin.wrapping_sub(distance)
         };
+        let at = coarse(whole);
         let spans = job.header.side_spans;
         for _ in 0..crate::job::SPANS_MAX {
             if at < self.start && self.span > 0 {
@@ -123,9 +139,10 @@ impl SideCursor {
         let fraction = if at >= WHOLE {
             u64::MAX
         } else {
-            let within = u64::from(at.wrapping_sub(self.start).max(0).cast_unsigned());
+            let within = whole.wrapping_sub(fine(self.start)).max(0).cast_unsigned();
             let width = u64::from(self.width.cast_unsigned());
-            (within << 32).checked_div(width).unwrap_or(0).min(0xffff_ffff) << 32
+            let fraction = (within << (32 - FINE_BITS)).checked_div(width).unwrap_or(0);
+            fraction.min(0xffff_ffff) << 32
         };
         let place = SpanParameter {
             span: self.span,

@@ -5,15 +5,16 @@ use core::ops::{Deref, DerefMut};
 use crate::job::program::Job;
 use crate::math::arith::{power_of_two, to_f32, truncated};
 use crate::math::number::Bounded;
-use crate::pass::front::side::{UNIT, WHOLE};
+use crate::pass::front::side::{FINE_BITS, UNIT, WHOLE, coarse, fine};
 use crate::pass::front::table::{Column, Table};
 
 /// 2^-31, the unit of a place within an interval.
 const WITHIN: f32 = power_of_two(-31);
 
-/// The cubic between two stations, units of the front.
+/// The cubic between two stations: its coefficients in units of the front times 2^-shift, as fine as they allow.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) struct Cubic {
+    shift: u32,
     start: i32,
     first: i32,
     second: i32,
@@ -24,21 +25,13 @@ pub(crate) struct Cubic {
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct CurvePoint {
     pub(crate) at: i32,
+    /// The distance in fine units.
+    pub(crate) fine: i64,
     pub(crate) slope: f32,
     pub(crate) bend: f32,
 }
 
 impl Cubic {
-    /// Constant.
-    pub(crate) const fn level(at: i32) -> Self {
-        Self {
-            start: at,
-            first: 0,
-            second: 0,
-            third: 0,
-        }
-    }
-
     /// The cubic of an interval with this length.
     pub(crate) fn of<W: Deref<Target = [i32]>>(
         table: &Table<W>,
@@ -50,9 +43,16 @@ impl Cubic {
         let start = table.word(front, interval);
         let rise = table.word(front, next).wrapping_sub(start);
         let scale = length * to_f32(WHOLE);
-        let [from, to] = [interval, next].map(|station| truncated(table.real(slope, station) * scale));
+        let ends = [interval, next].map(|station| table.real(slope, station) * scale);
+        let [from, to] = ends.map(|slope| truncated(slope).unsigned_abs());
+        let size = from.max(to).max(rise.unsigned_abs()).max(1);
+        // The sums below are at most 8 times as large.
+        let shift = size.leading_zeros().saturating_sub(4).min(FINE_BITS);
+        let [from, to] = ends.map(|slope| truncated(slope * power_of_two(shift.cast_signed())));
+        let rise = rise.wrapping_shl(shift);
         let rest = from.wrapping_add(to).wrapping_sub(rise.wrapping_mul(2));
         Self {
+            shift,
             start,
             first: from,
             second: rise.wrapping_sub(from).wrapping_sub(rest),
@@ -60,21 +60,29 @@ impl Cubic {
         }
     }
 
-    /// The distance at a place within the interval, units of 2^-31.
-    pub(crate) fn value(&self, at: i32) -> i32 {
+    /// The distance at a place within the interval (units of 2^-31), fine units.
+    pub(crate) fn fine(&self, at: i32) -> i64 {
         let times = |value: i32| mul_31(value, at);
         let sum = self.second.wrapping_add(times(self.third));
         let sum = self.first.wrapping_add(times(sum));
-        self.start.wrapping_add(times(sum))
+        let rise = i64::from(sum).wrapping_mul(i64::from(at));
+        fine(self.start).wrapping_add(rise >> (31 + self.shift).saturating_sub(FINE_BITS))
+    }
+
+    /// The same in units of the front.
+    pub(crate) fn value(&self, at: i32) -> i32 {
+        coarse(self.fine(at))
     }
 
     /// The point at a place within the interval.
     pub(crate) fn point(&self, at: i32, length: f32) -> CurvePoint {
         let t = to_f32(at) * WITHIN;
-        let [first, second, third] = [self.first, self.second, self.third].map(|value| to_f32(value) * UNIT);
+        let unit = UNIT * power_of_two(-self.shift.cast_signed());
+        let [first, second, third] = [self.first, self.second, self.third].map(|value| to_f32(value) * unit);
         let inverse = 1.0 / length;
         CurvePoint {
             at: self.value(at),
+            fine: self.fine(at),
             slope: (first + t * (2.0 * second + 3.0 * third * t)) * inverse,
             bend: (2.0 * second + 6.0 * third * t) * (inverse * inverse),
         }

@@ -8,7 +8,7 @@ use crate::math::number::Bounded;
 use crate::pass::buffer::PatchBuffer;
 use crate::pass::contact::{self, Reach};
 use crate::pass::front::advance::{Advance, Made};
-use crate::pass::front::side::{Direction, SideCursor};
+use crate::pass::front::side::{Direction, SideCursor, fine};
 use crate::pass::front::spline::{Cubic, CurvePoint};
 use crate::job::stations::Stations;
 use crate::pass::front::table::{Column, Table};
@@ -362,6 +362,7 @@ impl CurveRun {
             Line::First => CurvePoint::default(),
             Line::Last => CurvePoint {
                 at: self.direction.end,
+                fine: fine(self.direction.end),
                 ..CurvePoint::default()
             },
             Line::Front => {
@@ -385,10 +386,10 @@ impl CurveRun {
         let mut point = self.point(job, words, place);
         for (end, is_on_boundary) in self.ends.iter().zip(self.are_on_boundary) {
             if place == *end && is_on_boundary {
-                point.at = self.direction.end;
+                point.fine = fine(self.direction.end);
             }
         }
-        let (side, share) = self.cursor.seek(job, &self.direction, point.at);
+        let (side, share) = self.cursor.seek(job, &self.direction, point.fine);
         let position = PassPosition {
             side,
             reversed: false,
