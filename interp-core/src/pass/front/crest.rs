@@ -21,9 +21,12 @@ const FOOT_STEPS: u8 = 3;
 const INTERVALS_MAX: u8 = 16;
 /// Greatest correction of the foot that is taken from one ball, as a share of the distance in the metric.
 const CORRECTION_MAX: f32 = 0.3;
-/// A crest that is farther than this from where it was expected, as a share of the gap, is measured again, unless the gap could be wider by this factor.
+/// A crest that is farther than this from where it was expected, as a share of the gap, is measured again, unless the gap could be wider by this factor, and more where it
+/// is far.
 const REPEAT_MIN: f32 = 0.03;
+const REPEATS_MAX: u8 = 2;
 const CLEAR: f32 = 1.05;
+const CLEAR_OFF: f32 = 2.0;
 /// Least share of the gap between the crest and a pass.
 const SHARE_MIN: f32 = 0.1;
 /// 2^31.
@@ -44,8 +47,8 @@ pub(crate) struct CrestSearch {
     at: i32,
     gap: i32,
     first: f32,
-    /// The crest was looked for at another share before.
-    is_repeated: bool,
+    /// Other shares at which the crest was looked for before.
+    repeats: u8,
 }
 
 /// What the search evaluates with.
@@ -120,7 +123,7 @@ impl CrestSearch {
         at: 0,
         gap: 0,
         first: 0.0,
-        is_repeated: false,
+        repeats: 0,
     };
 
     /// Begins at a place.
@@ -128,7 +131,7 @@ impl CrestSearch {
         self.place = place;
         self.next = 0;
         self.share = 0.5;
-        self.is_repeated = false;
+        self.repeats = 0;
     }
 
     /// An evaluation. Returns, after the last one, by how much the gap is too wide at the place for this share of the limit, units of the fronts; 0 where it is not.
@@ -232,8 +235,9 @@ impl CrestSearch {
         };
         let ratio = sqrt(margin * height_limit_mm(job.header)) / root;
         let at = far / (near + far);
-        if !self.is_repeated && ratio < CLEAR && (at - share).abs() > REPEAT_MIN {
-            self.is_repeated = true;
+        let off = (at - share).abs();
+        if self.repeats < REPEATS_MAX && off > REPEAT_MIN && ratio < CLEAR + CLEAR_OFF * off {
+            self.repeats += 1;
             self.share = at.at_least(SHARE_MIN).at_most(1.0 - SHARE_MIN);
             return None;
         }
