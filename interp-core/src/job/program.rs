@@ -2,10 +2,10 @@
 
 use crate::command::OVERRIDE_MAX;
 use crate::fault::{Fault, FaultKind, Result};
+use crate::job::stations::{SPANS_MAX as FRONT_SPANS_MAX, Stations};
 use crate::job::{
     AxisLimits, CELLS_MAX, Header, OVERRUN_MAX_MM, SPANS_MAX, STEP_MAX_MM, SurfaceKind, width_words,
 };
-use crate::job::stations::{SPANS_MAX as FRONT_SPANS_MAX, Stations};
 use crate::math::number::nm_to_mm;
 use crate::surface::{
     POLYNOMIAL_WORDS, PolynomialRecord, RATIONAL_WORDS, REVOLVED_WORDS, RationalRecord, RevolvedRecord,

@@ -43,7 +43,10 @@ impl Stations {
     /// The fewest with at least this number of intervals, not above the most.
     pub(crate) fn for_intervals(spans: u16, intervals: f32) -> Self {
         let mut stations = Self::most(spans);
-        while stations.bits > BITS_MIN && stations.intervals() > INTERVALS_MIN && count_to_f32(stations.intervals() / 2) >= intervals {
+        while stations.bits > BITS_MIN
+            && stations.intervals() > INTERVALS_MIN
+            && count_to_f32(stations.intervals() / 2) >= intervals
+        {
             stations.bits -= 1;
         }
         stations

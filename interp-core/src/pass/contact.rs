@@ -132,11 +132,12 @@ pub(crate) fn solve(
     let mut guess = first + first * correction;
     let refused = |guess: f32| Fault::new(FaultKind::ParameterBackwards, guess / first - 1.0);
     // The series holds for a small part of the patch: where the arc may cover all of it, the end is evaluated first.
-    let to_end = |path_at: &mut dyn FnMut(u64) -> PathSpeed| -> Result<(PathSpeed, core::result::Result<f32, f32>)> {
-        let end = patch_end().unwrap_or_else(|| path_at(limit)).checked()?;
-        let covered = arc_over(&mut |at| path_at(at), from, start, &end, room);
-        Ok((end, covered))
-    };
+    let to_end =
+        |path_at: &mut dyn FnMut(u64) -> PathSpeed| -> Result<(PathSpeed, core::result::Result<f32, f32>)> {
+            let end = patch_end().unwrap_or_else(|| path_at(limit)).checked()?;
+            let covered = arc_over(&mut |at| path_at(at), from, start, &end, room);
+            Ok((end, covered))
+        };
     let refused_at_end = |end: &PathSpeed, untrusted: f32| Err(refused(room + path_of(arc - untrusted, end)));
     let mut end = None;
     if first > LONG_STEP || guess >= room {

@@ -149,7 +149,8 @@ impl<'a> Gap<'a> {
         let mut found: Vec<([usize; 2], [f64; 2])> = Vec::new();
         for part in ends.windows(2) {
             let middle = 0.5 * (part[0] + part[1]);
-            let covers = |range: &Option<[f64; 2]>| range.is_some_and(|[low, high]| low < middle && middle < high);
+            let covers =
+                |range: &Option<[f64; 2]>| range.is_some_and(|[low, high]| low < middle && middle < high);
             let mut here: Vec<usize> = (0..heights.len()).filter(|k| covers(&ranges[*k])).collect();
             let side = |k: &usize| heights[*k].pass().side_at(middle);
             here.sort_by(|a, b| side(a).total_cmp(&side(b)));

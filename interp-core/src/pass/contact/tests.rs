@@ -355,7 +355,13 @@ fn solved(line: &Curve, u: f64, arc_mm: f64) -> Result<Reach> {
     let (surface, per_mm) = surface_on(line);
     let start = surface.path_at(fraction(u));
     let path_at = |fraction| surface.path_at(fraction);
-    solve(path_at, [fraction(u), u64::MAX], &start, || None, (arc_mm * per_mm) as f32)
+    solve(
+        path_at,
+        [fraction(u), u64::MAX],
+        &start,
+        || None,
+        (arc_mm * per_mm) as f32,
+    )
 }
 
 /// The arc between the start and the returned end is the requested one: to f32 resolution for a short arc, and with an error of
@@ -451,8 +457,7 @@ fn a_place_without_a_stretch_is_refused() {
             log_speed_derivative: start.log_speed_derivative * log_speed_derivative,
         };
         let path_at = |fraction| surface.path_at(fraction);
-        let fault = solve(path_at, [0, u64::MAX], &start, || None, (0.01 * per_mm) as f32)
-        .unwrap_err();
+        let fault = solve(path_at, [0, u64::MAX], &start, || None, (0.01 * per_mm) as f32).unwrap_err();
         assert_eq!(fault.kind, FaultKind::ParameterBackwards);
         assert!(fault.value.is_nan());
     }

@@ -4,6 +4,7 @@ use core::ops::DerefMut;
 
 use crate::fault::{Fault, FaultKind};
 use crate::job::program::Job;
+use crate::job::stations::Stations;
 use crate::math::arith::{sqrt, to_f32, truncated};
 use crate::math::number::{Bounded, MM_PER_NM, to_f32 as wide_to_f32};
 use crate::pass::front::crest::{CURRENT, CrestSearch, NEXT, Place, Tools};
@@ -12,7 +13,6 @@ use crate::pass::front::frame::{Frame, MARGIN};
 use crate::pass::front::limits::Limiter;
 use crate::pass::front::side::{Direction, SideCursor, UNIT, WHOLE};
 use crate::pass::front::spline::{self, Cubic};
-use crate::job::stations::Stations;
 use crate::pass::front::table::{Column, Table, UNMEASURED};
 use crate::pass::patch::Patch;
 use crate::pass::scan::cycles;
@@ -229,9 +229,7 @@ impl Advance {
     pub(crate) const fn cycles(&self) -> u32 {
         match self.task {
             Task::Done => 0,
-            Task::Length | Task::Step | Task::Crest => {
-                cycles::PATCH + 2 * cycles::STATION
-            }
+            Task::Length | Task::Step | Task::Crest => cycles::PATCH + 2 * cycles::STATION,
             _ => 6_000,
         }
     }
@@ -301,8 +299,7 @@ impl Advance {
             let period = header.feed_mm_s * header.period_s;
             let interval = (INTERVAL_PERIODS * period).at_least(INTERVAL_STEPS * step);
             self.stations = Stations::for_intervals(spans, longest / interval);
-            self.limiter.turn_per_mm =
-                (TURN_PER_PERIOD / period).at_most(1.0 / (RADIUS_STEPS * step));
+            self.limiter.turn_per_mm = (TURN_PER_PERIOD / period).at_most(1.0 / (RADIUS_STEPS * step));
             (self.task, self.station) = (Task::Clear, 0);
         }
     }
@@ -529,7 +526,8 @@ impl Advance {
             return;
         }
         let length = self.stations.length(job, station);
-        let [low, high] = [CURRENT, NEXT].map(|columns| Cubic::of(table, columns, station, length).value(1 << 30));
+        let [low, high] =
+            [CURRENT, NEXT].map(|columns| Cubic::of(table, columns, station, length).value(1 << 30));
         let boundary = self.direction.end;
         if low.saturating_add(high) / 2 > boundary.saturating_add(boundary / 20) {
             return;
@@ -616,7 +614,11 @@ impl Advance {
 
     /// Looks whether the curve turns too sharply at a station.
     fn look_at_bend<W: DerefMut<Target = [i32]>>(&mut self, job: &Job<'_>, table: &Table<W>, station: u16) {
-        if table.word(Column::Next, station).min(table.word(Column::Next, station + 1)) >= self.direction.end {
+        if table
+            .word(Column::Next, station)
+            .min(table.word(Column::Next, station + 1))
+            >= self.direction.end
+        {
             return;
         }
         let length = self.stations.length(job, station);
@@ -661,7 +663,11 @@ impl Advance {
             self.next_crest(places);
             return;
         }
-        let margin = if self.is_level { LEVEL_MARGIN } else { MEASURED_MARGIN };
+        let margin = if self.is_level {
+            LEVEL_MARGIN
+        } else {
+            MEASURED_MARGIN
+        };
         let mut tools = Tools {
             patch: &mut self.patch,
             job,
@@ -696,7 +702,12 @@ impl Advance {
 }
 
 /// The current front at a station, or in the middle of the interval after it.
-fn front_at<W: DerefMut<Target = [i32]>>(table: &Table<W>, station: u16, is_middle: bool, job: &Job<'_>) -> i32 {
+fn front_at<W: DerefMut<Target = [i32]>>(
+    table: &Table<W>,
+    station: u16,
+    is_middle: bool,
+    job: &Job<'_>,
+) -> i32 {
     if is_middle {
         let length = table.stations().length(job, station);
         Cubic::of(table, CURRENT, station, length).value(1 << 30)

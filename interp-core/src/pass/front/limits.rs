@@ -138,11 +138,7 @@ impl Limiter {
     }
 
     /// Lowers a station to the hull, in the order of the stations.
-    pub(crate) fn apply<W: DerefMut<Target = [i32]>>(
-        &mut self,
-        table: &mut Table<W>,
-        station: u16,
-    ) {
+    pub(crate) fn apply<W: DerefMut<Target = [i32]>>(&mut self, table: &mut Table<W>, station: u16) {
         let end = self.segment.saturating_add(1);
         if end >= self.size {
             return;

@@ -137,10 +137,7 @@ pub(crate) fn eliminate<W: DerefMut<Target = [i32]>>(
         } else {
             [last.saturating_sub(1), last.saturating_sub(2)]
         };
-        let value = end_slope(
-            [rise(table, near), rise(table, far)],
-            [length(near), length(far)],
-        );
+        let value = end_slope([rise(table, near), rise(table, far)], [length(near), length(far)]);
         table.set_real(slope, station, bounded(value, length(near)));
         table.set_real(Column::Scratch, station, 0.0);
         return;

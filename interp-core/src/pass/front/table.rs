@@ -70,10 +70,7 @@ impl<W: Deref<Target = [i32]>> Table<W> {
     /// A word; 0 outside the table.
     #[inline(always)]
     pub(crate) fn word(&self, column: Column, station: u16) -> i32 {
-        self.words
-            .get(self.index(column, station))
-            .copied()
-            .unwrap_or(0)
+        self.words.get(self.index(column, station)).copied().unwrap_or(0)
     }
 
     /// A float.

@@ -2,6 +2,7 @@
 
 use crate::fault::{Fault, FaultKind, Result};
 use crate::job::program::Job;
+use crate::job::stations::Stations;
 use crate::job::{Pattern, Spacing};
 use crate::math::arith::{advanced, dot_hi};
 use crate::math::number::Bounded;
@@ -10,7 +11,6 @@ use crate::pass::contact::{self, Reach};
 use crate::pass::front::advance::{Advance, Made};
 use crate::pass::front::side::{Direction, SideCursor, fine};
 use crate::pass::front::spline::{Cubic, CurvePoint};
-use crate::job::stations::Stations;
 use crate::pass::front::table::{Column, Table};
 use crate::pass::offset::check_fit;
 use crate::pass::patch::Patch;
