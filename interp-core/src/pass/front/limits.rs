@@ -16,6 +16,8 @@ const TURN_BACK: f32 = 0.15;
 const HULL_BITS: u32 = 6;
 /// Greatest second difference that is added for the hull, a share of the whole side parameter.
 const BEND_MAX: f32 = 0.1;
+/// Members that leave the hull in one call.
+const MEMBERS_MAX: u8 = 8;
 /// Change of the front that is left as it is, units of the hull.
 const HULL_NOISE: i32 = 1;
 
@@ -24,6 +26,8 @@ const HULL_NOISE: i32 = 1;
 pub(crate) struct Limiter {
     /// Greatest turn per mm of the pass.
     pub(crate) turn_per_mm: f32,
+    /// A station is being added to the hull.
+    is_open: bool,
     /// State of the hull: its size, and the sums of its second differences.
     size: u16,
     slope: f32,
@@ -35,6 +39,7 @@ pub(crate) struct Limiter {
 impl Limiter {
     pub(crate) const NONE: Self = Self {
         turn_per_mm: f32::INFINITY,
+        is_open: false,
         size: 0,
         slope: 0.0,
         sum: 0.0,
@@ -94,10 +99,34 @@ impl Limiter {
     /// Begins the convex hull.
     pub(crate) const fn begin(&mut self) {
         (self.size, self.slope, self.sum, self.segment) = (0, 0.0, 0.0, 0);
+        self.is_open = false;
     }
 
-    /// Adds a station to the hull of the front and a parabola of the greatest turn. The ordinates replace the column of slopes.
+    /// Adds a station to the hull of the front and a parabola of the greatest turn. The ordinates replace the column of slopes. False where the hull has to be
+    /// gone back further, in another call.
     pub(crate) fn add<W: DerefMut<Target = [i32]>>(
+        &mut self,
+        table: &mut Table<W>,
+        job: &Job<'_>,
+        station: u16,
+    ) -> bool {
+        if !self.is_open {
+            self.is_open = true;
+            self.set_ordinate(table, job, station);
+        }
+        for _ in 0..MEMBERS_MAX {
+            if self.size < 2 || self.is_convex(table, station) {
+                table.set_word(Column::Step, self.size, i32::from(station));
+                self.size += 1;
+                self.is_open = false;
+                return true;
+            }
+            self.size -= 1;
+        }
+        false
+    }
+
+    fn set_ordinate<W: DerefMut<Target = [i32]>>(
         &mut self,
         table: &mut Table<W>,
         job: &Job<'_>,
@@ -114,22 +143,19 @@ impl Limiter {
         let scale = to_f32(WHOLE >> HULL_BITS);
         let ordinate = front.saturating_add(truncated(self.sum * scale));
         table.set_word(Column::NextSlope, station, ordinate);
-        while self.size > 1 {
-            let top = self.member(table, self.size - 1);
-            let below = self.member(table, self.size - 2);
-            let slope = |from: u16, to: u16| {
-                let rise = table
-                    .word(Column::NextSlope, to)
-                    .wrapping_sub(table.word(Column::NextSlope, from));
-                to_f32(rise) / (abscissa(table, to) - abscissa(table, from))
-            };
-            if slope(below, top) < slope(top, station) {
-                break;
-            }
-            self.size -= 1;
-        }
-        table.set_word(Column::Step, self.size, i32::from(station));
-        self.size += 1;
+    }
+
+    /// Whether the hull's last segment is below the line from its end to a station.
+    fn is_convex<W: DerefMut<Target = [i32]>>(&self, table: &Table<W>, station: u16) -> bool {
+        let top = self.member(table, self.size.saturating_sub(1));
+        let below = self.member(table, self.size.saturating_sub(2));
+        let slope = |from: u16, to: u16| {
+            let rise = table
+                .word(Column::NextSlope, to)
+                .wrapping_sub(table.word(Column::NextSlope, from));
+            to_f32(rise) / (abscissa(table, to) - abscissa(table, from))
+        };
+        slope(below, top) < slope(top, station)
     }
 
     fn member<W: DerefMut<Target = [i32]>>(&self, table: &Table<W>, index: u16) -> u16 {
