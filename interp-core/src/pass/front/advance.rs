@@ -34,7 +34,7 @@ const ROUNDS: u8 = 4;
 const MEASUREMENTS: u8 = 3;
 /// Ratio of the steps up to which a straight front stays straight, and how much longer its step is: all of the limit but for an error.
 const LEVEL: f32 = 1.002;
-const LEVEL_MORE: f32 = 1.0019;
+const LEVEL_MORE: f32 = 1.0034;
 const LEVEL_MARGIN: f32 = 0.9999;
 /// Turn of the curve beyond which a front is not taken, as a multiple of the limit by length, and between stations, rad.
 const SHARP: f32 = 2.5;
@@ -45,7 +45,7 @@ const MIDDLE_TOLERANCE: f32 = 1.0005;
 const FAULTY_STEP: i32 = WHOLE / 256;
 const LOWER: f32 = 1.1;
 /// Scallop height to which the crests are measured, as a share of the limit.
-const MEASURED_MARGIN: f32 = 0.995;
+const MEASURED_MARGIN: f32 = 0.990;
 /// Rows of a sweep in one portion.
 const CHUNK: u16 = 16;
 /// Greatest slope.

@@ -15,7 +15,7 @@ use crate::sample::SpanParameter;
 use crate::surface::Pass as _;
 
 /// Scallop height for which the fronts are made, as a share of the limit.
-pub(crate) const MARGIN: f32 = 0.996;
+pub(crate) const MARGIN: f32 = 0.993;
 
 /// First fundamental form (e, f, g) and `I - r II` (a, b, c) by the path parameter and the share of the whole side parameter, mm^2.
 #[derive(Clone, Copy, Debug, Default)]

@@ -175,3 +175,56 @@ fn bounded(slope: f32, length: f32) -> f32 {
     let most = 1.0 / length;
     slope.at_most(most).at_least(-most)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::job::stations::Stations;
+    use std::vec;
+
+    const COLUMNS: [Column; 2] = [Column::Front, Column::Slope];
+
+    /// The cubic has its stations' distances and slopes, in fine units and whole ones, and crosses a distance where it is.
+    #[test]
+    fn a_cubic_between_stations() {
+        let stations = Stations::most(1);
+        let mut words = vec![0; stations.words()];
+        let mut table = Table::new(words.as_mut_slice(), stations, false);
+        let (low, high) = (3_000_000, 7_500_001);
+        table.set_word(Column::Front, 4, low);
+        table.set_word(Column::Front, 5, high);
+        table.set_real(Column::Slope, 4, 0.5);
+        table.set_real(Column::Slope, 5, 2.0);
+        let length = 1.0 / 64.0;
+        let cubic = Cubic::of(&table, COLUMNS, 4, length);
+        assert_eq!(cubic.value(0), low);
+        assert!((cubic.value(i32::MAX) - high).abs() <= 1);
+        for (at, slope) in [(0, 0.5_f32), (i32::MAX, 2.0)] {
+            assert!((cubic.point(at, length).slope - slope).abs() < 1e-4);
+        }
+        let middle = i32::midpoint(low, high);
+        let at = cubic.crossing(middle);
+        assert!((cubic.value(at) - middle).abs() <= 1);
+        // By the cubic's formula, to a fiftieth of a unit.
+        let t = f64::from(at) / 2_f64.powi(31);
+        let [from, to] = [0.5, 2.0].map(|slope: f64| slope * f64::from(length) * f64::from(WHOLE));
+        let rise = f64::from(high - low);
+        let rest = from + to - 2.0 * rise;
+        let want = f64::from(low) + t * (from + t * (rise - from - rest + t * rest));
+        let got = cubic.fine(at) as f64 / f64::from(1 << FINE_BITS);
+        assert!((got - want).abs() < 0.1, "{got} for {want}");
+    }
+
+    /// Stations are even parts of each span, the last one at the end; an interval and the place in it are those of a place.
+    #[test]
+    fn places_of_stations() {
+        for spans in [1, 3, 64, 128] {
+            let stations = Stations::most(spans);
+            assert!(stations.count() <= 513);
+            for interval in 0..stations.count() - 1 {
+                let place = stations.place_within(interval, 1 << 30);
+                assert_eq!(stations.interval(place), (interval, 1 << 30));
+            }
+        }
+    }
+}
