@@ -58,7 +58,6 @@ macro_rules! jobs {
 
 // Numbers of passes from the paper, from the golden table, and for the other jobs from the oracle's dense scan, but for curved passes.
 jobs! {
-    constant: 95,
     far_plate: 18,
     freeform: 135,
     plate: 164,

@@ -114,7 +114,7 @@ impl SideCursor {
         direction: &Direction,
         distance: i64,
     ) -> (SpanParameter, f32) {
-        let distance = distance.clamp(0, fine(direction.end));
+        let distance = distance.min(fine(direction.end)).max(0);
         let origin = fine(direction.origin);
         let whole = if direction.forwards {
             origin.wrapping_add(distance)
