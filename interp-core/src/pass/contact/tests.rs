@@ -6,6 +6,7 @@ use crate::pass::patch::Patch;
 use crate::pass::position::PassPosition;
 use crate::sample::SpanParameter;
 use crate::surface::Edges;
+use crate::surface::Surface;
 use std::vec::Vec;
 
 /// 2^-23: rounding tolerance of one f32 result.

@@ -395,11 +395,7 @@ impl Advance {
             Task::Compare => self.compare(job, table, station),
             Task::Forwards => self.limiter.sweep(table, job, station, true),
             Task::Backwards => self.limiter.sweep(table, job, backwards, false),
-            Task::Hull => {
-                if !self.limiter.add(table, job, station) {
-                    return;
-                }
-            }
+            Task::Hull if !self.limiter.add(table, job, station) => return,
             Task::Apply => {
                 self.limiter.apply(table, station);
                 self.floor(table, station);
