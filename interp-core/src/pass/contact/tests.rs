@@ -297,7 +297,8 @@ fn arc_error(line: &Curve, u: f64, length: f64) -> f64 {
     let (surface, per_mm) = surface_on(line);
     let (from, to) = (fraction(u), fraction(u).saturating_add(fraction(length)));
     let (start, end) = (surface.path_at(from), surface.path_at(to));
-    let covered = arc_over(&surface, from, &start, &end, length as f32).unwrap();
+    let mut path_at = |fraction| surface.path_at(fraction);
+    let covered = arc_over(&mut path_at, from, &start, &end, length as f32).unwrap();
     f64::from(covered) / (arc_length(line, u, length) * per_mm) - 1.0
 }
 
