@@ -134,6 +134,11 @@ const BOUNDS: &[(&str, u32, &str)] = &[
         "nodes of a mean: NODES_MAX",
     ),
     (
+        "interp_core::feed::walk::Walker::rest_at_jumps",
+        167,
+        "cells of a pass: STATIONS_MAX - 1",
+    ),
+    (
         "interp_core::feed::walk::Walker::flatten",
         168,
         "stations of a pass: STATIONS_MAX",
