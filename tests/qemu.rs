@@ -2,6 +2,7 @@
 //! Needs `qemu-system-arm`; builds the firmware.
 
 use interp_core::{FaultKind, Sample, State};
+use job::{Spacing, Start};
 use machine::Machine;
 use machine::prepare::{Prepared, prepare};
 use machine::remote::drive::{self, Expected};
@@ -56,11 +57,15 @@ fn here(job: &Prepared) -> (Vec<Expected>, u64) {
 
 /// Runs these jobs one after the other on one board, without a restart, and compares the digests.
 fn compare(names: &[&str]) {
+    let jobs: Vec<(&str, Prepared)> = names.iter().map(|name| (*name, job(name))).collect();
+    compare_prepared(&jobs);
+}
+
+fn compare_prepared(jobs: &[(&str, Prepared)]) {
     let (_qemu, mut session) = board();
-    for name in names {
-        let job = job(name);
-        let (passes, digest) = here(&job);
-        drive::upload(&mut session, &job, |_| {}).unwrap();
+    for (name, job) in jobs {
+        let (passes, digest) = here(job);
+        drive::upload(&mut session, job, |_| {}).unwrap();
         let start = Instant::now();
         let compared = drive::run_digests(&mut session, &passes, true, None, |_| {}).unwrap();
         let samples: u64 = passes.iter().map(|pass| u64::from(pass.samples)).sum();
@@ -103,6 +108,22 @@ fn ruled() {
 #[test]
 fn bicubic() {
     compare(&["far_plate", "plate", "plate_v"]);
+}
+
+/// Curved passes, whose stations lie in the store behind the job.
+#[test]
+fn constant_scallop_height() {
+    let constant = |name: &str, start| {
+        let path = format!("{}/../jobs/{name}.toml", env!("CARGO_MANIFEST_DIR"));
+        let mut job = job_file::load(path.as_ref()).unwrap();
+        (job.spacing, job.scallop_mm) = (Spacing::Constant(start), 0.05);
+        prepare(&job).unwrap()
+    };
+    compare_prepared(&[
+        ("freeform", constant("freeform", Start::Edge)),
+        ("sphere_cap", constant("sphere_cap", Start::Middle)),
+        ("torus", job("torus")),
+    ]);
 }
 
 /// A job with axis limits, before and after one without.

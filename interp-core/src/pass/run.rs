@@ -6,6 +6,7 @@ use crate::job::{Pattern, Spacing};
 use crate::math::arith::{advanced, dot_hi, fraction_to_f32};
 use crate::pass::buffer::PatchBuffer;
 use crate::pass::contact::{self, Reach};
+use crate::pass::front::CurveRun;
 use crate::pass::patch::Patch;
 use crate::pass::position::PassPosition;
 use crate::pass::scan::PassScan;
@@ -58,12 +59,22 @@ struct Travel {
     side: SpanParameter,
 }
 
+/// What is planned while the tool is on a pass, by the job's spacing.
+#[derive(Clone, Copy, Debug)]
+#[allow(clippy::large_enum_variant, reason = "one lives in the interpolator for ever")]
+enum PassPlanning {
+    /// The step to the next straight pass.
+    Scan(PassScan),
+    /// The run of a job of constant scallop height: of the rest of the run, only the buffer is used then.
+    Curve(CurveRun),
+}
+
 /// A run: the travel and the patch buffer.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Run {
     travel: Travel,
     buffer: PatchBuffer,
-    scan: PassScan,
+    planning: PassPlanning,
     /// r N at the pass's first sample.
     first_offset: [i32; 3],
     /// Minimum interval of the last finished pass, in units of the side parameter.
@@ -148,24 +159,32 @@ impl Run {
     pub(crate) const START: Self = Self {
         travel: Travel::START,
         buffer: PatchBuffer::START,
-        scan: PassScan::START,
+        planning: PassPlanning::Scan(PassScan::START),
         first_offset: [0; 3],
         last_interval: f32::INFINITY,
         step_over: None,
         last_feed_factor: 0.0,
     };
 
-    /// Resets to the start.
-    pub(crate) fn restart(&mut self) {
+    /// Resets to the start of a job with this spacing.
+    pub(crate) fn restart(&mut self, spacing: Spacing) {
+        match (&mut self.planning, spacing.is_constant()) {
+            (PassPlanning::Scan(scan), false) => scan.restart(),
+            (PassPlanning::Curve(curve), true) => curve.restart(),
+            (planning, true) => *planning = PassPlanning::Curve(CurveRun::START),
+            (planning, false) => *planning = PassPlanning::Scan(PassScan::START),
+        }
         self.travel = Travel::START;
         self.buffer.forget();
-        self.scan.restart();
         self.last_interval = f32::INFINITY;
         self.step_over = None;
     }
 
     /// Pass, path and side parameter of the tool, in the surface's own direction.
     pub(crate) const fn surface_position(&self) -> (u32, SpanParameter, SpanParameter) {
+        if let PassPlanning::Curve(curve) = &self.planning {
+            return curve.surface_position();
+        }
         let travel = &self.travel;
         let path = SpanParameter {
             span: travel.span,
@@ -176,12 +195,20 @@ impl Run {
 
     /// Minimum path interval of the last finished pass.
     pub(crate) const fn last_interval(&self) -> f32 {
-        self.last_interval
+        if let PassPlanning::Curve(curve) = &self.planning {
+            curve.last_interval()
+        } else {
+            self.last_interval
+        }
     }
 
     /// Whether the next sample continues the pass.
     pub(crate) fn is_along(&self) -> bool {
-        self.travel.next == Next::Along
+        if let PassPlanning::Curve(curve) = &self.planning {
+            curve.is_along()
+        } else {
+            self.travel.next == Next::Along
+        }
     }
 
     /// Writes the next sample into `last`; false after the last sample.
@@ -190,6 +217,9 @@ impl Run {
     /// The fault that stops the run; `last` is unchanged.
     #[inline(always)]
     pub(crate) fn advance(&mut self, job: &Job<'_>, last: &mut Sample) -> Result<bool> {
+        if matches!(self.planning, PassPlanning::Curve(_)) {
+            return self.advance_far(job, 1.0, last);
+        }
         let travel = &mut self.travel;
         if travel.next == Next::Along {
             let step = contact::step(
@@ -215,6 +245,10 @@ impl Run {
     /// As [`Self::advance`].
     #[inline(never)]
     pub(crate) fn advance_far(&mut self, job: &Job<'_>, feed_factor: f32, last: &mut Sample) -> Result<bool> {
+        let Self { planning, buffer, .. } = self;
+        if let PassPlanning::Curve(curve) = planning {
+            return curve.advance(job, job.rest(), buffer, feed_factor, last);
+        }
         let begins = !self.is_along();
         match self.travel.next {
             Next::Along if self.buffer.patch().point => self.step_on_pole(job)?,
@@ -432,8 +466,9 @@ impl Run {
             let Self { travel, buffer, .. } = self;
             let patch = buffer.patch();
             let arc = rest * patch.per_mm;
-            let end = || patch.end();
-            let covered = match contact::solve(&patch.surface, travel.fraction, &start, end, arc)? {
+            let end = || Some(patch.end());
+            let path_at = |fraction| patch.surface.path_at(fraction);
+            let covered = match contact::solve(path_at, [travel.fraction, u64::MAX], &start, end, arc)? {
                 Reach::Within(fraction) => {
                     travel.fraction = fraction;
                     return Ok(());
@@ -490,13 +525,18 @@ impl Run {
         travel.max_inv_interval_sq = 0.0;
         travel.next = Next::Along;
         travel.path.log_speed_derivative = f32::NAN;
-        self.scan.begin(&travel.position());
+        if let PassPlanning::Scan(scan) = &mut self.planning {
+            scan.begin(&travel.position());
+        }
         self.buffer.begin(job, &travel.position())
     }
 
     /// Whether [`Self::plan`] has anything to do.
     pub(crate) fn has_to_plan(&self, spacing: Spacing) -> bool {
-        spacing == Spacing::Exact && (self.scan.has_work() || self.is_step_due())
+        match &self.planning {
+            PassPlanning::Curve(curve) => curve.has_to_plan(),
+            PassPlanning::Scan(scan) => spacing == Spacing::Exact && (scan.has_work() || self.is_step_due()),
+        }
     }
 
     /// Whether the pass is over, and the step to the next one is not known yet.
@@ -504,10 +544,16 @@ impl Run {
         self.travel.next == Next::Over && self.step_over.is_none()
     }
 
-    /// The planning of one period without axis limits: scans the pass for the step to the next one.
-    pub(crate) fn plan(&mut self, job: &Job<'_>) {
-        self.scan.plan(job);
-        if self.is_step_due() && !self.scan.has_work() {
+    /// The planning of one period without axis limits: scans the pass for the step to the next one, or makes the next front in the words behind the job's.
+    pub(crate) fn plan(&mut self, job: &Job<'_>, rest: &mut [i32]) {
+        let has_work = match &mut self.planning {
+            PassPlanning::Curve(curve) => return curve.plan(job, rest),
+            PassPlanning::Scan(scan) => {
+                scan.plan(job);
+                scan.has_work()
+            }
+        };
+        if self.is_step_due() && !has_work {
             self.step_over = Some(self.find_step_over(job));
         }
     }
@@ -520,15 +566,15 @@ impl Run {
             shape,
             ..
         } = self.travel;
-        match job.header.spacing {
-            Spacing::Exact => self.scan.step(
+        match (&mut self.planning, job.header.spacing) {
+            (PassPlanning::Scan(scan), Spacing::Exact) => scan.step(
                 job.header,
                 PassMaximum {
                     inv_interval_sq: max_inv_interval_sq,
                     shape,
                 },
             ),
-            Spacing::FirstOrder => self.last_interval,
+            _ => self.last_interval,
         }
     }
 

@@ -305,6 +305,76 @@ const BOUNDS: &[(&str, u32, &str)] = &[
         "rows of a block",
     ),
     ("interp_core::surface::pole::Reduced::collapse", 3, "axes"),
+    (
+        "interp_core::job::stations::Stations::for_intervals",
+        10,
+        "powers of two of a span's parts",
+    ),
+    (
+        "interp_core::job::stations::Stations::most",
+        10,
+        "powers of two of a span's parts",
+    ),
+    (
+        "interp_core::pass::contact::solve",
+        2,
+        "Newton iterations: NEWTON_STEPS",
+    ),
+    (
+        "interp_core::pass::front::advance::Advance::sweep",
+        8,
+        "members that leave the hull: MEMBERS_MAX; columns of a station",
+    ),
+    (
+        "interp_core::pass::front::advance::Advance::work",
+        16,
+        "rows of a portion: CHUNK",
+    ),
+    (
+        "interp_core::pass::front::crest::shifted",
+        16,
+        "intervals to a foot: INTERVALS_MAX",
+    ),
+    (
+        "interp_core::pass::front::foot::FootStep::find",
+        4,
+        "iterations for the foot: ROUNDS",
+    ),
+    (
+        "interp_core::pass::front::limits::Limiter::is_convex",
+        8,
+        "members that leave the hull: MEMBERS_MAX",
+    ),
+    (
+        "interp_core::pass::front::side::SideCursor::new",
+        1_024,
+        "side spans: SPANS_MAX",
+    ),
+    (
+        "interp_core::pass::front::side::SideCursor::seek",
+        1_024,
+        "side spans: SPANS_MAX",
+    ),
+    (
+        "interp_core::pass::front::spline::Cubic::crossing",
+        31,
+        "bisections of an interval",
+    ),
+    (
+        "interp_core::pass::front::table::Table::lower",
+        4,
+        "intervals beside a station",
+    ),
+    (
+        "interp_core::pass::front::travel::CurveRun::along",
+        4,
+        "stations and spans of an arc: CROSSINGS_MAX + 1",
+    ),
+    (
+        "interp_core::pass::front::travel::CurveRun::next_part_of_front",
+        513,
+        "stations: PARTS_MAX + 1",
+    ),
 ];
 
 /// Copies and fills have sizes known at compile time.

@@ -6,6 +6,7 @@ use crate::pass::patch::Patch;
 use crate::pass::position::PassPosition;
 use crate::sample::SpanParameter;
 use crate::surface::Edges;
+use crate::surface::Surface;
 use std::vec::Vec;
 
 /// 2^-23: rounding tolerance of one f32 result.
@@ -296,7 +297,8 @@ fn arc_error(line: &Curve, u: f64, length: f64) -> f64 {
     let (surface, per_mm) = surface_on(line);
     let (from, to) = (fraction(u), fraction(u).saturating_add(fraction(length)));
     let (start, end) = (surface.path_at(from), surface.path_at(to));
-    let covered = arc_over(&surface, from, &start, &end, length as f32).unwrap();
+    let mut path_at = |fraction| surface.path_at(fraction);
+    let covered = arc_over(&mut path_at, from, &start, &end, length as f32).unwrap();
     f64::from(covered) / (arc_length(line, u, length) * per_mm) - 1.0
 }
 
@@ -354,8 +356,14 @@ fn arcs_over_a_curve_leave_what_the_rules_error_terms_say() {
 fn solved(line: &Curve, u: f64, arc_mm: f64) -> Result<Reach> {
     let (surface, per_mm) = surface_on(line);
     let start = surface.path_at(fraction(u));
-    let end = || surface.path_at(u64::MAX);
-    solve(&surface, fraction(u), &start, end, (arc_mm * per_mm) as f32)
+    let path_at = |fraction| surface.path_at(fraction);
+    solve(
+        path_at,
+        [fraction(u), u64::MAX],
+        &start,
+        || None,
+        (arc_mm * per_mm) as f32,
+    )
 }
 
 /// The arc between the start and the returned end is the requested one: to f32 resolution for a short arc, and with an error of
@@ -450,14 +458,8 @@ fn a_place_without_a_stretch_is_refused() {
             inv_speed: start.inv_speed * inverse,
             log_speed_derivative: start.log_speed_derivative * log_speed_derivative,
         };
-        let fault = solve(
-            &surface,
-            0,
-            &start,
-            || surface.path_at(u64::MAX),
-            (0.01 * per_mm) as f32,
-        )
-        .unwrap_err();
+        let path_at = |fraction| surface.path_at(fraction);
+        let fault = solve(path_at, [0, u64::MAX], &start, || None, (0.01 * per_mm) as f32).unwrap_err();
         assert_eq!(fault.kind, FaultKind::ParameterBackwards);
         assert!(fault.value.is_nan());
     }

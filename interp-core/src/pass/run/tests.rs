@@ -62,8 +62,8 @@ fn patches_made_ahead_change_no_bit() {
         let mut patches = 0;
         loop {
             late.buffer.disable();
-            ahead.plan(&job);
-            late.plan(&job);
+            ahead.plan(&job, &mut []);
+            late.plan(&job, &mut []);
             let more = ahead.advance(&job, &mut here).unwrap();
             assert_eq!(late.advance(&job, &mut there).unwrap(), more);
             if !more {
@@ -87,14 +87,14 @@ fn a_run_that_is_begun_again_is_the_same() {
         let (mut here, mut there) = (Sample::START, Sample::START);
         for _ in 0..stopped {
             assert!(again.advance(&job, &mut there).unwrap());
-            again.plan(&job);
+            again.plan(&job, &mut []);
         }
-        again.restart();
+        again.restart(Spacing::Exact);
         while first.advance(&job, &mut here).unwrap() && here.pass < 4 {
             assert!(again.advance(&job, &mut there).unwrap());
             assert_eq!(here, there, "after {stopped} samples");
-            first.plan(&job);
-            again.plan(&job);
+            first.plan(&job, &mut []);
+            again.plan(&job, &mut []);
         }
         assert_eq!(here.pass, 4);
     }
