@@ -9,7 +9,8 @@
 //!
 //! The ball at a contact leaves above the surface point at a small parameter distance d the height (I - r II)(d, d) / (2 r). So the scallop height is a squared
 //! distance in that metric (T. Kim, "Constant cusp height tool paths as geodesic parallels on an abstract Riemannian manifold", Computer-Aided Design 39
-//! (2007)), and the next pass is the parallel curve one step out: g(x) grows by H(x, g, g'), the eikonal equation.
+//! (2007)), and the next pass is the parallel curve one step out. The metric gives direction and first length of a step; the length is then measured by the balls
+//! at its two contacts.
 
 mod crest;
 mod limits;

@@ -165,7 +165,7 @@ impl<'a> Stepper<'a> {
         for _ in 0..MEASUREMENTS {
             // Beyond the end line there is no surface: measured as far as that line.
             let measured = dy.min(1.0 - from);
-            if !(measured > 0.0) {
+            if measured <= 0.0 {
                 break;
             }
             let end = forms(chord.x, from + measured)?;
@@ -208,7 +208,7 @@ impl<'a> Stepper<'a> {
         };
         for _ in 0..MEASUREMENTS {
             let measured = dy.min(1.0 - half);
-            if !(measured > 0.0) {
+            if measured <= 0.0 {
                 break;
             }
             let end = self.fitting(at, half + measured)?;
@@ -232,14 +232,16 @@ impl<'a> Stepper<'a> {
         for x in &self.x {
             new.push(self.reach(pass, *x, 1.0, 1.0)?);
         }
-        for i in 0..n {
-            let x = self.x[i];
-            if self.creases.iter().any(|at| (at - x).abs() < CREASE_GAP) {
-                for side in [1.0, -1.0] {
-                    if x + side * CREASE_GAP > 0.0 && x + side * CREASE_GAP < 1.0 {
-                        new[i] = new[i].min(self.reach(pass, x, 1.0, side)?);
-                        new[i] = new[i].min(self.reach_at_end(pass, x, side)?);
-                    }
+        for (x, new) in self.x.iter().zip(&mut new) {
+            if !self.creases.iter().any(|at| (at - x).abs() < CREASE_GAP) {
+                continue;
+            }
+            for side in [1.0, -1.0] {
+                let beside = x + side * CREASE_GAP;
+                if beside > 0.0 && beside < 1.0 {
+                    *new = new
+                        .min(self.reach(pass, *x, 1.0, side)?)
+                        .min(self.reach_at_end(pass, *x, side)?);
                 }
             }
         }

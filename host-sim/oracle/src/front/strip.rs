@@ -111,7 +111,7 @@ impl Forms {
         let mut dy = f64::NAN;
         for _ in 0..2 {
             let root = square * self.c - self.det * dx * dx;
-            if !(root >= 0.0) {
+            if root.is_nan() || root < 0.0 {
                 return None;
             }
             dy = (root.sqrt() - self.b * dx) / self.c;
