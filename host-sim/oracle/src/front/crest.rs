@@ -62,36 +62,10 @@ impl Balls {
         [from, to]: [f64; 2],
         spacing: f64,
     ) -> Result<Self, OracleError> {
-        let length = strip.length(pass, [from, to])?;
-        let count = ((length / spacing).ceil() as usize).clamp(8, 20_000);
-        // Even in arc length: the inverse of a table.
-        let table = 4 * count;
-        let mut arc = vec![0.0];
-        let mut before = None;
-        for k in 0..=table {
-            let x = from + (to - from) * k as f64 / table as f64;
-            let point = strip.forms(x, pass.at(x)[0])?.point;
-            if let Some(before) = before {
-                arc.push(arc[arc.len() - 1] + point.distance(before));
-            }
-            before = Some(point);
-        }
-        let total = arc[table];
-        let (mut x, mut centres) = (Vec::new(), Vec::new());
-        let mut k = 0;
-        for i in 0..=count {
-            let want = total * i as f64 / count as f64;
-            while k + 1 < table && arc[k + 1] < want {
-                k += 1;
-            }
-            let share = if arc[k + 1] > arc[k] {
-                (want - arc[k]) / (arc[k + 1] - arc[k])
-            } else {
-                0.0
-            };
-            let at = from + (to - from) * (k as f64 + share.clamp(0.0, 1.0)) / table as f64;
-            let forms = strip.forms(at, pass.at(at)[0].min(1.0))?;
-            x.push(at);
+        let mut x = strip.even_places(pass, [from, to], spacing)?;
+        let mut centres = Vec::with_capacity(x.len());
+        for at in &x {
+            let forms = strip.forms(*at, pass.at(*at)[0].min(1.0))?;
             centres.push(forms.point + forms.normal * strip.oracle.radius_mm);
         }
         // Both sides of the knots: the normal may jump.

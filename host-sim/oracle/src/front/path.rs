@@ -17,6 +17,9 @@ const GAUSS: [(f64, f64); 3] = [
 ];
 /// Quadrature intervals of a station interval.
 const PIECES: usize = 4;
+/// Fewest and most pieces between even places of a segment.
+const PLACES_MIN: usize = 8;
+const PLACES_MAX: usize = 20_000;
 /// A segment shorter than this is none, path share.
 const SEGMENT_MIN: f64 = 1e-9;
 /// A pass this close to the end line lies on it, side share.
@@ -118,9 +121,69 @@ impl Strip<'_> {
         }
         Ok(sum)
     }
+
+    /// Path shares evenly apart in arc length, ends included, at most `spacing` mm: the inverse of a table of chords.
+    pub(super) fn even_places(
+        &self,
+        pass: &Spline,
+        [from, to]: [f64; 2],
+        spacing: f64,
+    ) -> Result<Vec<f64>, OracleError> {
+        let length = self.length(pass, [from, to])?;
+        let count = ((length / spacing).ceil() as usize).clamp(PLACES_MIN, PLACES_MAX);
+        let table = 4 * count;
+        let mut arc = vec![0.0];
+        let mut before = None;
+        for k in 0..=table {
+            let x = from + (to - from) * k as f64 / table as f64;
+            let point = self.forms(x, pass.at(x)[0])?.point;
+            if let Some(before) = before {
+                arc.push(arc[arc.len() - 1] + point.distance(before));
+            }
+            before = Some(point);
+        }
+        let mut places = Vec::with_capacity(count + 1);
+        let mut k = 0;
+        for i in 0..=count {
+            let want = arc[table] * i as f64 / count as f64;
+            while k + 1 < table && arc[k + 1] < want {
+                k += 1;
+            }
+            let step = arc[k + 1] - arc[k];
+            let share = if step > 0.0 { (want - arc[k]) / step } else { 0.0 };
+            places.push(from + (to - from) * (k as f64 + share.clamp(0.0, 1.0)) / table as f64);
+        }
+        // The first and the last one exactly.
+        places[0] = from;
+        places[count] = to;
+        Ok(places)
+    }
 }
 
 impl Fronts<'_> {
+    /// Places (u, v) on each segment of each pass that is machined, evenly apart in arc length, at most `spacing` mm.
+    ///
+    /// # Errors
+    /// Where the surface has no contact geometry.
+    pub fn places(&self, spacing_mm: f64) -> Result<Vec<Vec<(f64, f64)>>, OracleError> {
+        let mut all = Vec::new();
+        for (number, part) in self.parts.iter().enumerate() {
+            let strip = self.strip(part);
+            for pass in part.passes.iter().skip(usize::from(number > 0)) {
+                for [from, to] in inside(pass) {
+                    let places = strip.even_places(pass, [from, to], spacing_mm)?;
+                    let on_end_line = |x: f64| x > 0.0 && x < 1.0 && (x == from || x == to);
+                    let place = |x: &f64| {
+                        let y = pass.at(*x)[0];
+                        strip.parameters(*x, if on_end_line(*x) { 1.0 } else { y.clamp(0.0, 1.0) })
+                    };
+                    all.push(places.iter().map(place).collect());
+                }
+            }
+        }
+        Ok(all)
+    }
+
     /// Segments of each pass that is machined, part by part.
     ///
     /// # Errors
