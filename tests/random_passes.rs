@@ -252,7 +252,7 @@ fn knots_where_the_curvature_jumps_are_passed_at_a_rest() {
         );
         assert!(used.feed <= 1.00001, "{seed}: {}", used.feed);
         for one in compare(kind, seed, &AtomicUsize::new(0)).unwrap() {
-            assert!(one.over_best < 2.5, "{}: {}", one.what, one.over_best);
+            assert!(one.over_best < 1.6, "{}: {}", one.what, one.over_best);
             measured += 1;
         }
     }

@@ -13,6 +13,8 @@ const BESIDE_REST: u16 = 2;
 const BESIDE_REST_MM_S: f32 = 6.0;
 /// Entries above which none is added beside a rest, so that there is room for the jumps.
 const BESIDE_RESTS_MAX: u16 = 40;
+/// Rounding of a node's place, in units of 2^-16 of its cell.
+const PART_ROUNDING: u16 = 4;
 /// Middle of an interval, in units of 2^-16.
 const MIDDLE: u16 = 1 << 15;
 
@@ -59,11 +61,22 @@ pub(super) fn find_knots(plan: &mut Plan, index: u16, limits: &MotionLimits) {
 /// middle are needed, too.
 fn rest_beside(plan: &Plan, index: u16) -> Option<u16> {
     let [speed, _, _] = plan.interval(index).walk_rates(0.5);
-    if speed * plan.inverse_step > BESIDE_REST_MM_S {
+    let speed = speed * plan.inverse_step;
+    if speed <= 0.0 || speed > BESIDE_REST_MM_S {
         return None;
     }
-    let [from, _] = plan.node(index.saturating_sub(BESIDE_REST));
-    let [to, _] = plan.node((index + BESIDE_REST + 1).min(plan.intervals));
+    let [from, part] = plan.node(index.saturating_sub(BESIDE_REST));
+    let from = if part <= PART_ROUNDING {
+        from.saturating_sub(1)
+    } else {
+        from
+    };
+    let [to, part] = plan.node((index + BESIDE_REST + 1).min(plan.intervals));
+    let to = if part >= u16::MAX - PART_ROUNDING {
+        to + 1
+    } else {
+        to
+    };
     let jump = (from..=to).find(|station| plan.stations.is_jump(*station))?;
     let [cell, _] = plan.node(index);
     Some(if cell < jump {

@@ -7,9 +7,10 @@ use super::{MM_PER_Q10, Q10_BITS, Q10_PER_MM, to_q10};
 use crate::math::arith::{sqrt, truncated};
 use crate::math::number::{Bounded, to_f32};
 
-/// Greatest and least number of intervals of a walk.
+/// Greatest and least number of intervals of a walk, and the least where their planning takes longer than the pass.
 pub(crate) const NODES_MAX: usize = 160;
 pub(crate) const NODES_MIN: u16 = 40;
+pub(crate) const NODES_FEW: u16 = 30;
 
 /// Coefficients of a walk's steps and of its pace.
 pub(crate) const COEFFICIENTS: usize = NODES_MAX + 2;

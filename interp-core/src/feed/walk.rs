@@ -6,7 +6,7 @@ use super::knots::find_knots;
 use super::limits::{MotionLimits, SLOPE_MIN};
 use super::lists::{Lists, get, put};
 use super::node_times::NodeTimes;
-use super::plan::{NODES_MAX, NODES_MIN, Plan};
+use super::plan::{NODES_FEW, NODES_MAX, NODES_MIN, Plan};
 use super::stations::{Derivatives, Station, between};
 use super::{MM_PER_Q10, to_q10};
 use crate::math::arith::{sqrt, truncated};
@@ -28,13 +28,14 @@ const FLAT: f32 = 1.0;
 const PERIODS_A_NODE: f32 = 3.2;
 const PERIODS_A_PLACE: f32 = 0.07;
 const PERIODS_A_PLAN: f32 = 55.0;
-/// The same for the last stop before a turn, and the share of the walk's time that a plan with an end at speed takes.
+/// The same for the last stop before a turn, and the shares of the walk's time that a plan takes: with an end at speed, and from rest to rest.
 const PERIODS_A_STOP: f32 = 150.0;
 const WALKED: f32 = 0.75;
-/// Speed over a jump below which the walk rests there, as a share of the one that a ramp without constant acceleration reaches; duration of the rest, as a
-/// multiple of the mean's.
+const WALKED_TO_REST: f32 = 0.7;
+/// Speed over a jump below which the walk rests there, as a share of the one that a ramp without constant acceleration reaches; nodes by which the rest is
+/// longer than the mean.
 const REST_BELOW: f32 = 0.1;
-const REST_SHARE: f32 = 1.25;
+const REST_NODES: f32 = 1.5;
 /// Bisections of the spacing.
 const BISECTIONS: u8 = 12;
 /// Tries to coarsen the ends.
@@ -57,6 +58,8 @@ enum Stage {
     Flatten,
     Backwards,
     Forwards,
+    /// Inserts the rests at jumps.
+    Rests,
     Busy,
     /// Whether even spacing is fine enough.
     TryEven,
@@ -174,6 +177,7 @@ impl Walker {
         match self.stage {
             Stage::Caps => 18_100,
             Stage::Jumps | Stage::Means | Stage::Knots => 10_500,
+            Stage::Rests => 12_000,
             Stage::Backwards | Stage::Busy => 25_000,
             Stage::Forwards | Stage::Flatten => 17_000,
             Stage::TryEven | Stage::TryGrowing | Stage::Coarsen | Stage::Bisect(_) | Stage::Times => 25_500,
@@ -241,7 +245,11 @@ impl Walker {
                     self.choose_mean(plan);
                     self.choose_intervals(limits, least);
                 }
-                self.next(end, end == last, Stage::Forwards, Stage::Busy)
+                self.next(end, end == last, Stage::Forwards, Stage::Rests)
+            }
+            Stage::Rests => {
+                self.rest_at_jumps(lists, plan);
+                Stage::Busy
             }
             Stage::Busy => {
                 self.find_busy(lists, plan, limits);
@@ -429,14 +437,9 @@ impl Walker {
             && self.is_from_rest_to_rest()
     }
 
-    /// Time for which the walk rests in a cell, s: in the cell of no length of a jump whose speed is 0, as long as the mean, so that its speed is 0 there, too.
-    fn rest(&self, lists: &Lists, plan: &Plan, cell: u16) -> f32 {
-        if plan.stations.is_jump(cell) && get(lists, SPEED_SQR, cell) == 0.0 {
-            let length = between(0, plan.stations.length_nm());
-            REST_SHARE * (self.acceleration / self.jerk).at_most(cube_root(0.5 * length / self.jerk))
-        } else {
-            0.0
-        }
+    /// Whether the walk rests in a cell: in that of no length of a jump whose speed is 0.
+    fn rests_in(&self, lists: &Lists, plan: &Plan, cell: u16) -> bool {
+        plan.stations.is_jump(cell) && get(lists, SPEED_SQR, cell) == 0.0
     }
 
     fn accel(&self, lists: &Lists, cell: u16) -> f32 {
@@ -520,7 +523,6 @@ impl Walker {
             let there = self.unless_held(plan, cell + 1, there);
             put(lists, SPEED_SQR, cell + 1, there);
             time += CellMotion::of(here, there, length, self.accel(lists, cell)).duration;
-            time += self.rest(lists, plan, cell);
             put(lists, TIME, cell + 1, time);
         }
         self.duration = time;
@@ -539,23 +541,39 @@ impl Walker {
         self.mean_s = self.mean_s.at_least(4.0 * self.finest);
     }
 
+    /// Inserts the rests at jumps: somewhat longer than the mean, so that the mean's speed is 0 there, too.
+    fn rest_at_jumps(&mut self, lists: &mut Lists, plan: &Plan) {
+        let spacing = SPACING.at_least(self.duration / f32::from(self.intervals));
+        let rest = self.mean_s + REST_NODES * spacing;
+        let last = plan.stations.count().saturating_sub(1);
+        let mut later = 0.0;
+        for cell in 0..last {
+            if self.rests_in(lists, plan, cell) {
+                later += rest;
+            }
+            let time = get(lists, TIME, cell + 1);
+            put(lists, TIME, cell + 1, time + later);
+        }
+        self.duration += later;
+    }
+
     /// As many intervals as are worth their planning, and no more than leave the plan longer than its planning.
     fn choose_intervals(&mut self, limits: &MotionLimits, least: u32) {
         let whole = |value: f32| u16::try_from(truncated(value.at_least(0.0))).unwrap_or(u16::MAX);
         let time = self.duration;
         let most = whole(time / self.finest).clamp(NODES_LEAST, NODES_COUNT);
         let wanted = whole(time / SPACING_WORTH.at_least(self.finest));
-        let fewest = NODES_MIN.min(most);
-        self.intervals = wanted.clamp(fewest, most);
+        self.intervals = wanted.clamp(NODES_MIN.min(most), most);
         if least > 0 {
             let (lasts, plan) = if self.is_from_rest_to_rest() {
-                (time + self.mean_s, PERIODS_A_PLAN)
+                (WALKED_TO_REST * (time + self.mean_s), PERIODS_A_PLAN)
             } else {
                 (WALKED * time, PERIODS_A_PLAN + PERIODS_A_STOP)
             };
             let lasts = lasts / limits.period;
             let left = lasts * (1.0 - PERIODS_A_PLACE) - plan - to_f32(i64::from(least));
             let planned = whole(left / PERIODS_A_NODE);
+            let fewest = NODES_FEW.min(most);
             self.is_short = planned < fewest;
             self.intervals = self.intervals.min(planned).max(fewest);
         }
@@ -585,7 +603,7 @@ impl Walker {
             };
             if is_busy {
                 let middle = 0.5 * (get(lists, TIME, cell) + get(lists, TIME, cell + 1));
-                let rests = self.rest(lists, plan, cell) > 0.0;
+                let rests = self.rests_in(lists, plan, cell);
                 put(lists, BUSY, self.busy, if rests { -middle } else { middle });
                 self.busy += 1;
             }

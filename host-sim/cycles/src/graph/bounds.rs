@@ -134,6 +134,11 @@ const BOUNDS: &[(&str, u32, &str)] = &[
         "nodes of a mean: NODES_MAX",
     ),
     (
+        "interp_core::feed::walk::Walker::rest_at_jumps",
+        167,
+        "cells of a pass: STATIONS_MAX - 1",
+    ),
+    (
         "interp_core::feed::walk::Walker::flatten",
         168,
         "stations of a pass: STATIONS_MAX",
@@ -152,6 +157,11 @@ const BOUNDS: &[(&str, u32, &str)] = &[
         "interp_core::feed::walk::Walker::mean_at_speed",
         2,
         "ends of a plan",
+    ),
+    (
+        "interp_core::sequence::link::BoundaryStepOver::choose_curve",
+        3,
+        "axes; rounds of the search for a speed: ROUNDS",
     ),
     (
         "interp_core::sequence::hop::time_at",
