@@ -23,6 +23,8 @@ const CREASE_GAP: f64 = 1e-9;
 /// Least jump of the normal at a crease, rad.
 const CREASE_MIN: f64 = 1e-5;
 
+/// Places between stations at which the step is checked, shares of the interval.
+const BETWEEN: [f64; 3] = [0.25, 0.5, 0.75];
 /// Iterations for a foot, and feet that are tried.
 const FOOT_ROUNDS: usize = 4;
 const FEET: usize = 6;
@@ -273,23 +275,29 @@ impl<'a> Stepper<'a> {
         };
         settle(&mut new);
         // Between the stations.
+        let place = |i: usize, k: usize| self.x[i] + (self.x[i + 1] - self.x[i]) * BETWEEN[k];
         let mut tops = Vec::with_capacity(n);
-        for pair in self.x.windows(2) {
-            tops.push(self.reach(pass, 0.5 * (pair[0] + pair[1]), 1.0, 1.0)?);
+        for i in 0..n - 1 {
+            let mut top = [0.0; BETWEEN.len()];
+            for (k, top) in top.iter_mut().enumerate() {
+                *top = self.reach(pass, place(i, k), 1.0, 1.0)?;
+            }
+            tops.push(top);
         }
         for _ in 0..o.repairs {
             let next = Spline::new(&self.x, new.clone());
             let mut cut = vec![0.0_f64; n];
             let mut any = false;
             for i in 0..n - 1 {
-                let x = 0.5 * (self.x[i] + self.x[i + 1]);
-                let y = next.at(x)[0];
-                let from = pass.at(x)[0];
-                let excess = y - tops[i] - o.slack * (tops[i] - from);
-                if excess > 0.0 && y < 1.05 + (tops[i] - from) {
-                    any = true;
-                    cut[i] = cut[i].max(excess);
-                    cut[i + 1] = cut[i + 1].max(excess);
+                for (k, top) in tops[i].iter().enumerate() {
+                    let x = place(i, k);
+                    let (y, from) = (next.at(x)[0], pass.at(x)[0]);
+                    let excess = y - top - o.slack * (top - from);
+                    if excess > 0.0 && y < 1.05 + (top - from) {
+                        any = true;
+                        cut[i] = cut[i].max(excess);
+                        cut[i + 1] = cut[i + 1].max(excess);
+                    }
                 }
             }
             if !any {
