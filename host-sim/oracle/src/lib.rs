@@ -11,6 +11,7 @@
 //!             -> offset.rs              the offset path of the tool centre: its derivative, and the foot point of a given centre
 //!             -> schedule.rs            passes by a dense scan
 //!             -> facing.rs              what looks down, and the turn after which nothing does
+//!             -> front/                 passes of constant scallop height, curved and partial
 //! samples     -> verify.rs, report.rs   errors of emitted samples
 //! ```
 //!
@@ -24,6 +25,7 @@ mod arc;
 mod contact;
 mod derivatives;
 mod facing;
+pub mod front;
 mod nurbs;
 mod offset;
 mod report;
