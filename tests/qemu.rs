@@ -105,6 +105,12 @@ fn bicubic() {
     compare(&["far_plate", "plate", "plate_v"]);
 }
 
+/// Curved passes, whose stations lie in the store behind the job.
+#[test]
+fn constant_scallop_height() {
+    compare(&["constant", "torus"]);
+}
+
 /// A job with axis limits, before and after one without.
 #[test]
 fn with_limits() {

@@ -1,6 +1,7 @@
 //! The scallop limit held by the emitted passes, to the error of its measurement: faces of CAD files with the defaults of `import`, and seeded random
 //! surfaces with what makes the step to the next pass difficult: short passes at high feed, many patches.
 
+mod constant;
 mod shapes;
 
 use std::path::PathBuf;

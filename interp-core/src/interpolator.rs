@@ -227,7 +227,7 @@ impl<S: AsRef<[i32]> + AsMut<[i32]>> Interpolator<S> {
     /// reaches it.
     #[inline(always)]
     pub fn plan(&mut self) {
-        self.motion.plan(self.store.as_ref());
+        self.motion.plan(self.store.as_mut());
     }
 }
 
@@ -301,7 +301,7 @@ impl Motion {
     }
 
     fn restart(&mut self) {
-        self.run.restart();
+        self.run.restart(self.program.header().spacing);
         self.fault = None;
     }
 
@@ -357,7 +357,7 @@ impl Motion {
     }
 
     #[inline(never)]
-    fn plan(&mut self, store: &[i32]) {
+    fn plan(&mut self, store: &mut [i32]) {
         if !self.has_to_plan() {
             return;
         }
@@ -367,10 +367,10 @@ impl Motion {
             run,
             ..
         } = self;
-        if let Ok(job) = program.job(store) {
+        if let Ok((job, rest)) = program.job_and_rest(store) {
             match &job.header.axes {
                 Some(axes) => sequencer.plan(&job, axes, run),
-                None => run.plan(&job),
+                None => run.plan(&job, rest),
             }
         }
     }

@@ -83,6 +83,7 @@ pub use command::{Command, Inputs};
 pub use fault::{Fault, FaultKind};
 pub use interpolator::{Interpolator, SurfacePoint};
 pub use job::encode;
+pub use job::program::front_words;
 pub use job::{AxisLimits, Header, Pattern, STORE_WORDS, Spacing, SurfaceKind, ToolSide};
 pub use math::number::NM_PER_MM;
 pub use sample::{Sample, SpanParameter, State};

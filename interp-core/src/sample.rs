@@ -101,7 +101,7 @@ pub struct Sample {
     pub pass: u32,
     /// Path parameter.
     pub path: SpanParameter,
-    /// Side parameter (constant on a pass).
+    /// Side parameter: constant on a pass, unless the passes are of constant scallop height.
     pub side: SpanParameter,
     /// Commanded feed of the cutter contact along the surface, mm/s.
     pub feed_mm_s: f32,

@@ -32,11 +32,7 @@ code_byte!(pattern, Pattern, |code| {
         .into_iter()
         .find(|pattern| *pattern as u8 == code)
 });
-code_byte!(spacing, Spacing, |code| {
-    [Spacing::Exact, Spacing::FirstOrder]
-        .into_iter()
-        .find(|spacing| *spacing as u8 == code)
-});
+code_byte!(spacing, Spacing, Spacing::from_code);
 code_byte!(tool_side, ToolSide, |code| {
     [ToolSide::Plus, ToolSide::Minus]
         .into_iter()

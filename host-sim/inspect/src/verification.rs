@@ -129,7 +129,11 @@ pub fn verify_run<'a>(
     progress: &dyn Progress,
 ) -> Result<Verification, InspectError> {
     let measured = measure(job, prepared, timed, each, requirements, progress)?;
-    let scanned = oracle(job)?.schedule().ok().map(|passes| passes.len());
+    // Curved passes are checked by the scallop height alone.
+    let scanned = match job.spacing.is_constant() {
+        true => None,
+        false => oracle(job)?.schedule().ok().map(|passes| passes.len()),
+    };
     let failures = failures(job, timed, &measured, scanned);
     let own = |warning: &&String| !failures.contains(warning);
     let mut warnings: Vec<String> = measured.swept.warnings.iter().filter(own).cloned().collect();
@@ -222,7 +226,7 @@ fn measure<'a>(
     let links_mm = motion.links();
     motion.join(times.links.iter().map(|link| link.turn));
     let reach = reach::measure(job, &oracle, &motion, &contact, progress);
-    let optimum = if requirements.with_optimum {
+    let optimum = if requirements.with_optimum && !job.spacing.is_constant() {
         progress.begin("the optimum", 1);
         optimum_times(job, &oracle, &run_passes(&oracle, &track, &running), &times)
     } else {

@@ -22,7 +22,7 @@ use std::path::Path;
 
 use job::{
     Along, AlongChoice, CHORD_DEFAULT_MM, CadSource, FEED_MAX_MM_MIN, FEED_MIN_MM_MIN, Job, JobError,
-    MachineSpec, OVERRUN_MAX_MM, Pattern, Side, Spacing,
+    MachineSpec, OVERRUN_MAX_MM, Pattern, Side, Spacing, Start,
 };
 use patches::placement::Placement;
 use section::{Reader, Section};
@@ -91,6 +91,7 @@ pub fn parse_with(name: &str, text: &str, faces: &dyn FaceReader) -> Result<Job,
             "side",
             "pattern",
             "spacing",
+            "start",
             "chord_mm",
             "overrun_mm",
         ],
@@ -138,13 +139,7 @@ pub fn parse_with(name: &str, text: &str, faces: &dyn FaceReader) -> Result<Job,
             true => cut.choice("pattern", &[("zig", Pattern::Zig), ("zigzag", Pattern::Zigzag)])?,
             false => Pattern::Zig,
         },
-        spacing: match cut.has("spacing") {
-            true => cut.choice(
-                "spacing",
-                &[("exact", Spacing::Exact), ("first-order", Spacing::FirstOrder)],
-            )?,
-            false => Spacing::Exact,
-        },
+        spacing: read_spacing(&cut)?,
         chord_mm: match cut.has("chord_mm") {
             true => below_radius("chord_mm", "give the chord error limit in mm, e.g. 0.005")?,
             false => CHORD_DEFAULT_MM.min(0.5 * radius_mm),
@@ -158,6 +153,31 @@ pub fn parse_with(name: &str, text: &str, faces: &dyn FaceReader) -> Result<Job,
             .map_or(Ok(MachineSpec::default()), |section| machine::read(&section))?,
         origin,
     })
+}
+
+/// The rule for the distance between passes, and where passes of constant scallop height start.
+fn read_spacing(cut: &Section<'_>) -> Result<Spacing, JobError> {
+    let start = match cut.has("start") {
+        true => cut.choice("start", &[("edge", Start::Edge), ("middle", Start::Middle)])?,
+        false => Start::Edge,
+    };
+    let choices = [
+        ("exact", Spacing::Exact),
+        ("first-order", Spacing::FirstOrder),
+        ("constant", Spacing::Constant(start)),
+    ];
+    let spacing = match cut.has("spacing") {
+        true => cut.choice("spacing", &choices)?,
+        false => Spacing::Exact,
+    };
+    if cut.has("start") && !spacing.is_constant() {
+        return Err(cut.error(
+            "start",
+            "`start` is for passes of constant scallop height only",
+            "remove it, or write spacing = \"constant\"",
+        ));
+    }
+    Ok(spacing)
 }
 
 /// The overrun of turns, mm.

@@ -79,6 +79,25 @@ pub enum Spacing {
     Exact,
     /// The paper's interval, evaluated at the pass alone; the scallop may exceed the height limit.
     FirstOrder,
+    /// Passes of constant scallop height: curves, each made from the one before.
+    Constant(Start),
+}
+
+/// Where passes of constant scallop height begin.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Start {
+    /// The first side boundary of the surface.
+    Edge,
+    /// The middle of the side parameter: from there to its end, then from there to its start.
+    Middle,
+}
+
+impl Spacing {
+    /// Whether the passes are curves of constant scallop height.
+    #[must_use]
+    pub const fn is_constant(self) -> bool {
+        matches!(self, Self::Constant(_))
+    }
 }
 
 /// A job as its file states it.

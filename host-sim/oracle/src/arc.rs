@@ -1,5 +1,7 @@
 //! Arc length along a pass: the integral of |A| over the path parameter.
 
+use job::Along;
+
 use super::contact::Oracle;
 
 /// Nodes and weights of the three-point Gauss-Legendre rule on [-1, 1]: ±sqrt(3/5) and 0; 5/9 and 8/9.
@@ -62,6 +64,34 @@ impl Oracle {
             piece += 1.0;
         }
         sum * half
+    }
+
+    /// Arc of the curve whose side parameter is the parabola through three points (path, side), from the second to the third, mm.
+    pub(super) fn arc_of_curve(&self, breaks: &[f64], [before, from, to]: [[f64; 2]; 3]) -> f64 {
+        let first = (to[1] - from[1]) / (to[0] - from[0]);
+        let last = (from[1] - before[1]) / (from[0] - before[0]);
+        let second = (first - last) / (to[0] - before[0]);
+        let side = |path: f64| from[1] + (path - from[0]) * (first + second * (path - to[0]));
+        let slope = |path: f64| first + second * (2.0 * path - from[0] - to[0]);
+        let speed = |path: f64| {
+            let (u, v) = self.swapped(path, side(path));
+            let at = self.surface.at(u, v);
+            let (along, across) = match self.along {
+                Along::U => (at.u, at.v),
+                Along::V => (at.v, at.u),
+            };
+            (along + across * slope(path)).length()
+        };
+        let (low, high) = (from[0].min(to[0]), from[0].max(to[0]));
+        let inner = breaks.iter().copied().filter(|knot| low < *knot && *knot < high);
+        let ends: Vec<f64> = [low].into_iter().chain(inner).chain([high]).collect();
+        let mut sum = 0.0;
+        for part in ends.windows(2) {
+            let (middle, half) = (0.5 * (part[0] + part[1]), 0.5 * (part[1] - part[0]));
+            let outer = speed(middle - NODE * half) + speed(middle + NODE * half);
+            sum += half * (WEIGHT_OUTER * outer + WEIGHT_MIDDLE * speed(middle));
+        }
+        sum
     }
 
     /// |A|, mm per unit of the path parameter.

@@ -60,7 +60,7 @@ impl Oracle {
                 .collect();
             let interval = match self.spacing {
                 Spacing::FirstOrder => self.least_interval(side)?,
-                Spacing::Exact => self.exact_interval(side, &before)?,
+                Spacing::Exact | Spacing::Constant(_) => self.exact_interval(side, &before)?,
             };
             passes.push(ScheduledPass { side, interval });
             if side >= end {

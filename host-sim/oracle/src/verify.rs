@@ -3,7 +3,7 @@
 use super::contact::Oracle;
 use super::report::{AccuracyReport, SampleLocation};
 use glam::DVec3;
-use job::{Pattern, Spacing};
+use job::{Pattern, Spacing, Start};
 
 /// Nanometres in a millimetre.
 const NM_PER_MM: f64 = 1e6;
@@ -44,6 +44,9 @@ pub struct SampleCheck {
     pub position_nm: Option<f64>,
 }
 
+/// Distance of the first pass from the middle of the side parameter at most, a share of the parameter: its rounding.
+const START_SHARE: f64 = 1e-6;
+
 /// Accumulates a [`AccuracyReport`] from a stream of samples.
 #[derive(Clone, Debug)]
 pub struct Verifier {
@@ -59,6 +62,8 @@ struct PassState {
     side: f64,
     /// Path parameter of the last sample.
     path: f64,
+    /// The samples of a curved pass before: path and side parameter, the older one first.
+    before: [Option<[f64; 2]>; 2],
     least_interval: f64,
     least_at: SampleLocation,
     /// Sum over samples of (1 / interval)^2, and their number: gives the scallop's mean when the next pass is known.
@@ -104,7 +109,12 @@ impl Verifier {
         };
         let position_nm = self.check_geometry(sample, spot);
         if sample.last_of_pass {
-            if self.is_off(sample, path, side, self.pass_ends(sample.pass)[1]) {
+            let is_off = if self.oracle.spacing.is_constant() {
+                self.is_off_curve(path, side)
+            } else {
+                self.is_off(sample, path, side, self.pass_ends(sample.pass)[1])
+            };
+            if is_off {
                 self.report.off_boundary += 1;
             }
             if let Some(pass) = &mut self.current {
@@ -123,7 +133,12 @@ impl Verifier {
     pub fn finish(mut self) -> AccuracyReport {
         if let Some(pass) = self.current {
             self.report.complete = pass.finished;
-            self.report.last_on_boundary = pass.side == self.oracle.side_range()[1];
+            let [first, last] = self.oracle.side_range();
+            let end = match self.oracle.spacing {
+                Spacing::Constant(Start::Middle) => first,
+                _ => last,
+            };
+            self.report.last_on_boundary = pass.side == end;
         }
         self.report
     }
@@ -141,6 +156,11 @@ impl Verifier {
         cc_mm.distance(contact.cc_mm) > STEP_MOST * self.oracle.feed_mm_s * self.oracle.period_s
     }
 
+    /// Whether an end of a curved pass is on no boundary of the surface.
+    fn is_off_curve(&self, path: f64, side: f64) -> bool {
+        !self.oracle.path_range().contains(&path) && !self.oracle.side_range().contains(&side)
+    }
+
     /// Path parameters where a pass starts and ends.
     fn pass_ends(&self, pass: u32) -> [f64; 2] {
         let [low, high] = self.oracle.path_range();
@@ -151,8 +171,21 @@ impl Verifier {
     /// Begins a pass and checks its side parameter against the least interval of the previous pass.
     fn begin_pass(&mut self, sample: &PassSample, path: f64, side: f64, spot: SampleLocation) {
         let [first, last] = self.oracle.side_range();
+        let is_curve = self.oracle.spacing.is_constant();
         match self.current {
-            None => self.report.first_on_boundary = side == first && sample.pass == 0,
+            None => {
+                let start = match self.oracle.spacing {
+                    Spacing::Constant(Start::Middle) => 0.5 * (first + last),
+                    _ => first,
+                };
+                let is_near = (side - start).abs() <= START_SHARE * (last - first);
+                self.report.first_on_boundary = sample.pass == 0 && (side == start || is_curve && is_near);
+            }
+            Some(before) if is_curve => {
+                if !before.finished || sample.pass != self.report.passes {
+                    self.report.off_boundary += 1;
+                }
+            }
             Some(before) => {
                 let interval = before.least_interval.min(last - before.side);
                 if self.oracle.spacing == Spacing::FirstOrder {
@@ -166,13 +199,19 @@ impl Verifier {
                 }
             }
         }
-        if self.is_off(sample, path, side, self.pass_ends(sample.pass)[0]) {
+        let is_off = if is_curve {
+            self.is_off_curve(path, side)
+        } else {
+            self.is_off(sample, path, side, self.pass_ends(sample.pass)[0])
+        };
+        if is_off {
             self.report.off_boundary += 1;
         }
         self.report.passes += 1;
         self.current = Some(PassState {
             side,
             path,
+            before: [None, Some([path, side])],
             least_interval: f64::INFINITY,
             least_at: spot,
             inverse_squares: 0.0,
@@ -202,6 +241,9 @@ impl Verifier {
             self.report.off_pass += 1;
             return (None, None);
         };
+        if self.oracle.spacing.is_constant() {
+            return self.check_curve(sample, [path, side], spot);
+        }
         let forwards = if self.oracle.pattern == Pattern::Zigzag && sample.pass % 2 == 1 {
             -1.0
         } else {
@@ -213,6 +255,48 @@ impl Verifier {
             self.report.off_pass += 1;
         }
         let arc = forwards * self.oracle.arc_between(&self.breaks, from, path, side);
+        self.check_arc(sample, arc, spot)
+    }
+
+    /// The step on a curve: its direction, and its arc on the parabola through three samples.
+    fn check_curve(
+        &mut self,
+        sample: &PassSample,
+        at: [f64; 2],
+        spot: SampleLocation,
+    ) -> (Option<f64>, Option<f64>) {
+        let Some(pass) = &mut self.current else {
+            return (None, None);
+        };
+        let [older, last] = pass.before;
+        pass.before = [last, Some(at)];
+        let Some(last) = last else {
+            return (None, None);
+        };
+        pass.path = at[0];
+        let backwards = older.is_some_and(|older| (at[0] - last[0]) * (last[0] - older[0]) <= 0.0);
+        if backwards || at[0] == last[0] || pass.finished {
+            self.report.off_pass += 1;
+            return (None, None);
+        }
+        let Some(older) = older else {
+            // The curve's bend is not known yet.
+            let straight = [0, 1].map(|k| 2.0 * last[k] - at[k]);
+            let arc = self.oracle.arc_of_curve(&self.breaks, [straight, last, at]);
+            self.report.cc_length_mm += arc;
+            return (Some(arc), None);
+        };
+        let arc = self.oracle.arc_of_curve(&self.breaks, [older, last, at]);
+        self.check_arc(sample, arc, spot)
+    }
+
+    /// The arc of a step against the feed.
+    fn check_arc(
+        &mut self,
+        sample: &PassSample,
+        arc: f64,
+        spot: SampleLocation,
+    ) -> (Option<f64>, Option<f64>) {
         self.report.cc_length_mm += arc;
         let wanted = sample.feed_mm_s * self.oracle.period_s;
         if sample.last_of_pass {

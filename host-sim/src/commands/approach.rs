@@ -14,6 +14,7 @@ pub(super) fn command(
     directory: Option<WantedReport<'_>>,
     as_json: bool,
 ) -> Result<()> {
+    super::straight_passes(job)?;
     let bar = spinner("computing the passes");
     let passes = inspect::oracle(job)?
         .schedule()

@@ -88,6 +88,7 @@ pub(super) fn command(arguments: &Arguments) -> Result<()> {
         .spindle
         .map_or(Ok(()), |rpm| positive(rpm, "--spindle"))?;
     let (job, _) = load(&arguments.job)?;
+    super::straight_passes(&job)?;
     whole::check(&arguments.output, arguments.force)?;
     let options = Options {
         dialect: arguments.format,

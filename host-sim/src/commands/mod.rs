@@ -285,6 +285,21 @@ fn settled(job: Job) -> Result<(Job, Prepared)> {
     Ok(settled?)
 }
 
+/// Refuses passes of constant scallop height, which only the board makes.
+fn straight_passes(job: &Job) -> Result<()> {
+    if job.spacing.is_constant() {
+        return Err(job
+            .origin
+            .error(
+                "cut.spacing",
+                "the other approaches have straight passes only",
+                "write spacing = \"exact\"",
+            )
+            .into());
+    }
+    Ok(())
+}
+
 /// A warning of the axis limits that a job sets and that the other approaches do not keep.
 fn unheld_limits(job: &Job) -> Option<String> {
     let machine = &job.machine;

@@ -12,6 +12,7 @@
 
 pub mod encode;
 pub(crate) mod program;
+pub(crate) mod stations;
 
 /// Words of surface data that the reference machine stores: 64 KiB of its 128 KiB RAM, hence 309 polynomial or 237
 /// rational patches ([`patches_max`]).
@@ -98,6 +99,33 @@ pub enum Spacing {
     /// The paper's interval, from the pass alone (eqns 10 and 11). The scallop height may exceed the limit by 1 to 2 % where the surface
     /// changes from pass to pass, and by more at the ends of skew passes.
     FirstOrder = 1,
+    /// Passes of constant scallop height ([`crate::Interpolator::plan`] makes each from the one before): curves `side = g(path)`, the first on the surface's first side
+    /// boundary. The limit holds as with [`Self::Exact`].
+    Constant = 2,
+    /// The same from the middle of the side parameter to its end, then from the middle to its start.
+    ConstantFromMiddle = 3,
+}
+
+impl Spacing {
+    /// Every rule, in order of its code.
+    pub const ALL: [Self; 4] = [
+        Self::Exact,
+        Self::FirstOrder,
+        Self::Constant,
+        Self::ConstantFromMiddle,
+    ];
+
+    /// The rule with this code.
+    #[must_use]
+    pub fn from_code(code: u8) -> Option<Self> {
+        Self::ALL.into_iter().find(|spacing| *spacing as u8 == code)
+    }
+
+    /// Whether the passes are curves of constant scallop height.
+    #[must_use]
+    pub const fn is_constant(self) -> bool {
+        matches!(self, Self::Constant | Self::ConstantFromMiddle)
+    }
 }
 
 /// Side of the surface that the tool is on.

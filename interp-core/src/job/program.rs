@@ -2,6 +2,7 @@
 
 use crate::command::OVERRIDE_MAX;
 use crate::fault::{Fault, FaultKind, Result};
+use crate::job::stations::{SPANS_MAX as FRONT_SPANS_MAX, Stations};
 use crate::job::{
     AxisLimits, CELLS_MAX, Header, OVERRUN_MAX_MM, SPANS_MAX, STEP_MAX_MM, SurfaceKind, width_words,
 };
@@ -52,6 +53,16 @@ pub(crate) fn extent(header: &Header) -> (u32, u64) {
     )
 }
 
+/// Words of the store that a job takes behind its data, for the stations of passes of constant scallop height; none where it crosses more patches than there
+/// may be stations for.
+#[must_use]
+pub fn front_words(header: &Header) -> Option<usize> {
+    if !header.spacing.is_constant() {
+        return Some(0);
+    }
+    (header.path_spans <= FRONT_SPANS_MAX).then(|| Stations::most(header.path_spans).words())
+}
+
 fn check_header(header: &Header) -> Result<()> {
     let spans_max = match header.kind {
         SurfaceKind::Polynomial | SurfaceKind::Rational => SPANS_MAX,
@@ -61,6 +72,9 @@ fn check_header(header: &Header) -> Result<()> {
         if !(1..=spans_max).contains(&spans) {
             return Err(Fault::new(FaultKind::BadHeader, f32::from(spans)));
         }
+    }
+    if header.spacing.is_constant() && (header.axes.is_some() || front_words(header).is_none()) {
+        return Err(Fault::new(FaultKind::BadHeader, f32::from(header.path_spans)));
     }
     let ranges = [
         (header.ball_radius_mm, f32::MIN_POSITIVE, 1000.0),
@@ -146,9 +160,10 @@ impl Program {
     pub(crate) fn begin(&mut self, header: &Header, words: u32, capacity: usize) -> Result<()> {
         check_header(header)?;
         let (_, needed) = extent(header);
-        if needed > capacity as u64 {
+        let stored = needed + front_words(header).unwrap_or(0) as u64;
+        if stored > capacity as u64 {
             #[allow(clippy::cast_precision_loss, reason = "a report; at most 2^27")]
-            return Err(Fault::new(FaultKind::TooManyPatches, needed as f32));
+            return Err(Fault::new(FaultKind::TooManyPatches, stored as f32));
         }
         if u64::from(words) != needed {
             return Err(bad_length(words));
@@ -203,6 +218,7 @@ impl Program {
         let job = Job {
             header: &self.header,
             store,
+            length: self.length as usize,
         };
         if record == 0 {
             job.check_widths()?;
@@ -245,6 +261,25 @@ impl Program {
         &self.header
     }
 
+    /// The sealed job, and the words behind it.
+    ///
+    /// # Errors
+    /// As [`Self::job`].
+    pub(crate) fn job_and_rest<'a>(&'a self, store: &'a mut [i32]) -> Result<(Job<'a>, &'a mut [i32])> {
+        self.job(store)?;
+        let length = self.length as usize;
+        let split = store.split_at_mut_checked(length);
+        let (store, rest) = split.ok_or(const { Fault::new(FaultKind::WrongState, 0.0) })?;
+        Ok((
+            Job {
+                header: &self.header,
+                store,
+                length,
+            },
+            rest,
+        ))
+    }
+
     /// The sealed job.
     ///
     /// # Errors
@@ -254,6 +289,7 @@ impl Program {
             Ok(Job {
                 header: &self.header,
                 store,
+                length: self.length as usize,
             })
         } else {
             Err(Fault::new(FaultKind::WrongState, 0.0))
@@ -266,14 +302,26 @@ impl Program {
 pub(crate) struct Job<'a> {
     pub(crate) header: &'a Header,
     store: &'a [i32],
+    /// Words of the job.
+    length: usize,
 }
 
 impl<'a> Job<'a> {
+    /// The words behind the job's.
+    pub(crate) fn rest(&self) -> &'a [i32] {
+        self.store.get(self.length..).unwrap_or(&[])
+    }
+
     /// Width of a side span, in units of the side parameter.
     pub(crate) fn side_width(&self, span: u16) -> f32 {
         self.store
             .get(usize::from(span))
             .map_or(1.0, |word| f32::from_bits(word.cast_unsigned()))
+    }
+
+    /// Width of a path span, in units of the path parameter.
+    pub(crate) fn path_width(&self, span: u16) -> f32 {
+        self.side_width(self.header.side_spans.saturating_add(span))
     }
 
     fn record<const N: usize>(&self, index: usize) -> Option<&'a [i32; N]> {

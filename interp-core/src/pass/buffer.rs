@@ -61,6 +61,11 @@ impl PatchBuffer {
         }
     }
 
+    /// Both patches, for a pass that evaluates each sample's patch anew.
+    pub(crate) const fn free(&mut self) -> (&mut Patch, &mut Patch) {
+        self.both()
+    }
+
     /// Whether a task is left.
     #[inline(always)]
     pub(crate) fn has_work(&self) -> bool {

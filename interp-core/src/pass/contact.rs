@@ -9,7 +9,7 @@
 
 use crate::fault::{Fault, FaultKind, Result};
 use crate::math::arith::{fraction_from_f32, fraction_to_f32, small_step};
-use crate::surface::{PathSpeed, Surface};
+use crate::surface::PathSpeed;
 
 /// Maximum relative correction of the first-order step with which the series is used as a starting value. At 1/2 the
 /// parametrisation doubles or halves its speed within one period; below -1 the step is backwards.
@@ -67,7 +67,7 @@ const APART: f32 = 1.0 / 128.0;
 /// Arc from a fraction of the patch to `length` beyond it, where the parametrisation is `end`: Hermite's two-point rule (error
 /// `length^5 s^(4) / 720` for a speed s), or of three (`length^7 s^(6) / 604800`). An error where both differ by more than the tolerance.
 fn arc_over(
-    surface: &Surface,
+    path_at: &mut impl FnMut(u64) -> PathSpeed,
     from: u64,
     start: &PathSpeed,
     end: &PathSpeed,
@@ -84,7 +84,7 @@ fn arc_over(
     if bow.abs() + 64.0 * jerk.abs() <= SMOOTH * sum {
         return Ok(length * two);
     }
-    let middle = surface.path_at(from.saturating_add(fraction_from_f32(0.5 * length)));
+    let middle = path_at(from.saturating_add(fraction_from_f32(0.5 * length)));
     let three = sum * (7.0 / 30.0) + bow * (1.0 / 60.0) + 16.0 / 30.0 / middle.inv_speed;
     // A NaN is rejected too.
     if (two - three).abs() <= APART * three {
@@ -111,35 +111,37 @@ pub(crate) enum Reach {
     Beyond(f32),
 }
 
-/// Finds the end of an arc by quadrature. `patch_end` returns the parametrisation at the patch's end; called only where the arc may reach it.
+/// Finds the end of an arc by quadrature, on a pass with the parametrisation `path_at`. `limit`: end of the patch, or of the pass on it; `patch_end` returns the
+/// parametrisation there, and is called only where the arc may reach it.
 ///
 /// # Errors
 /// [`FaultKind::ParameterBackwards`] where neither series nor quadrature is accurate enough; its value is the correction
 /// of the first-order step, relative to that step: -1 or less where the parameter would run backwards.
 /// [`FaultKind::DegenerateSurface`] where the speed is zero.
 pub(crate) fn solve(
-    surface: &Surface,
-    from: u64,
+    mut path_at: impl FnMut(u64) -> PathSpeed,
+    [from, limit]: [u64; 2],
     start: &PathSpeed,
-    patch_end: impl Fn() -> PathSpeed,
+    patch_end: impl Fn() -> Option<PathSpeed>,
     arc: f32,
 ) -> Result<Reach> {
-    let room = fraction_to_f32(!from);
+    let room = fraction_to_f32(limit.saturating_sub(from));
     let first = arc * start.inv_speed;
     let bend = first * start.log_speed_derivative;
     let correction = bend * (bend * 0.5 - 0.5);
     let mut guess = first + first * correction;
     let refused = |guess: f32| Fault::new(FaultKind::ParameterBackwards, guess / first - 1.0);
     // The series holds for a small part of the patch: where the arc may cover all of it, the end is evaluated first.
-    let to_end = || -> Result<(PathSpeed, core::result::Result<f32, f32>)> {
-        let end = patch_end().checked()?;
-        let covered = arc_over(surface, from, start, &end, room);
-        Ok((end, covered))
-    };
+    let to_end =
+        |path_at: &mut dyn FnMut(u64) -> PathSpeed| -> Result<(PathSpeed, core::result::Result<f32, f32>)> {
+            let end = patch_end().unwrap_or_else(|| path_at(limit)).checked()?;
+            let covered = arc_over(&mut |at| path_at(at), from, start, &end, room);
+            Ok((end, covered))
+        };
     let refused_at_end = |end: &PathSpeed, untrusted: f32| Err(refused(room + path_of(arc - untrusted, end)));
     let mut end = None;
     if first > LONG_STEP || guess >= room {
-        match to_end()? {
+        match to_end(&mut path_at)? {
             (_, Ok(covered)) if covered <= arc => return Ok(Reach::Beyond(covered)),
             (speed, Ok(covered)) => end = Some((speed, covered)),
             (speed, Err(untrusted)) if guess >= room => return refused_at_end(&speed, untrusted),
@@ -155,10 +157,8 @@ pub(crate) fn solve(
         guess = inverse_cubic(arc, start, &end, covered, room);
     }
     for _ in 0..NEWTON_STEPS {
-        let end = surface
-            .path_at(from.saturating_add(fraction_from_f32(guess)))
-            .checked()?;
-        let covered = arc_over(surface, from, start, &end, guess);
+        let end = path_at(from.saturating_add(fraction_from_f32(guess))).checked()?;
+        let covered = arc_over(&mut path_at, from, start, &end, guess);
         let (Ok(length) | Err(length)) = covered;
         let correction = path_of(arc - length, &end);
         // Not `>`, so that a NaN is rejected.
@@ -172,7 +172,7 @@ pub(crate) fn solve(
     }
     // The starting value was before the patch's end; the arc ends beyond it.
     if guess >= room && end.is_none() {
-        match to_end()? {
+        match to_end(&mut path_at)? {
             (_, Ok(covered)) if covered <= arc => return Ok(Reach::Beyond(covered)),
             (_, Ok(_)) => {}
             (speed, Err(untrusted)) => return refused_at_end(&speed, untrusted),

@@ -367,19 +367,19 @@ impl EdgeSearch {
 }
 
 /// A surface point, seen from a ball's contact.
-struct Seen {
+pub(crate) struct Seen {
     /// Distance of the two surface points, mm.
-    chord_mm: f32,
+    pub(crate) chord_mm: f32,
     /// Power of the point with respect to the ball, mm^2: with e the chord, e^2 + 2 r e.N'.
-    power: f32,
+    pub(crate) power: f32,
     /// Distance of the ball's centre along the point's normal, mm.
-    middle: f32,
+    pub(crate) middle: f32,
 }
 
 impl Seen {
     /// Height of a ball of this power above the point, along the normal, mm; infinite where the normal does not meet it. The normal meets the ball at t, where
     /// t^2 - 2 t `middle` + `power` = 0.
-    fn height(&self, power: f32) -> f32 {
+    pub(crate) fn height(&self, power: f32) -> f32 {
         let root = self.middle * self.middle - power;
         if root > 0.0 {
             (power / (self.middle + sqrt(root))).at_least(0.0)

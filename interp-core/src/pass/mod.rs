@@ -11,6 +11,7 @@
 //! | [`interval`], [`step_over`] | candidate of the path interval at a sample; the step-over that a pass allows |
 //! | [`edge`] | the crest at an end of the gap to the next pass |
 //! | [`schedule`] | the next pass |
+//! | [`front`] | passes of constant scallop height |
 //! | [`scan`] | the look over a pass for the step to the next one, without axis limits |
 //! | [`run`] | chains them |
 
@@ -18,6 +19,7 @@ pub(crate) mod buffer;
 pub(crate) mod contact;
 mod edge;
 mod evaluation;
+pub(crate) mod front;
 pub(crate) mod interval;
 pub(crate) mod offset;
 pub(crate) mod patch;

@@ -6,6 +6,7 @@ use crate::job::{Pattern, Spacing};
 use crate::math::arith::{advanced, dot_hi, fraction_to_f32};
 use crate::pass::buffer::PatchBuffer;
 use crate::pass::contact::{self, Reach};
+use crate::pass::front::CurveRun;
 use crate::pass::patch::Patch;
 use crate::pass::position::PassPosition;
 use crate::pass::scan::PassScan;
@@ -64,6 +65,9 @@ pub(crate) struct Run {
     travel: Travel,
     buffer: PatchBuffer,
     scan: PassScan,
+    /// The run of a job of constant scallop height: nothing else here is used then but the buffer.
+    curve: CurveRun,
+    is_curve: bool,
     /// r N at the pass's first sample.
     first_offset: [i32; 3],
     /// Minimum interval of the last finished pass, in units of the side parameter.
@@ -149,14 +153,18 @@ impl Run {
         travel: Travel::START,
         buffer: PatchBuffer::START,
         scan: PassScan::START,
+        curve: CurveRun::START,
+        is_curve: false,
         first_offset: [0; 3],
         last_interval: f32::INFINITY,
         step_over: None,
         last_feed_factor: 0.0,
     };
 
-    /// Resets to the start.
-    pub(crate) fn restart(&mut self) {
+    /// Resets to the start of a job with this spacing.
+    pub(crate) fn restart(&mut self, spacing: Spacing) {
+        self.is_curve = spacing.is_constant();
+        self.curve.restart();
         self.travel = Travel::START;
         self.buffer.forget();
         self.scan.restart();
@@ -166,6 +174,9 @@ impl Run {
 
     /// Pass, path and side parameter of the tool, in the surface's own direction.
     pub(crate) const fn surface_position(&self) -> (u32, SpanParameter, SpanParameter) {
+        if self.is_curve {
+            return self.curve.surface_position();
+        }
         let travel = &self.travel;
         let path = SpanParameter {
             span: travel.span,
@@ -176,12 +187,20 @@ impl Run {
 
     /// Minimum path interval of the last finished pass.
     pub(crate) const fn last_interval(&self) -> f32 {
-        self.last_interval
+        if self.is_curve {
+            self.curve.last_interval()
+        } else {
+            self.last_interval
+        }
     }
 
     /// Whether the next sample continues the pass.
     pub(crate) fn is_along(&self) -> bool {
-        self.travel.next == Next::Along
+        if self.is_curve {
+            self.curve.is_along()
+        } else {
+            self.travel.next == Next::Along
+        }
     }
 
     /// Writes the next sample into `last`; false after the last sample.
@@ -190,6 +209,9 @@ impl Run {
     /// The fault that stops the run; `last` is unchanged.
     #[inline(always)]
     pub(crate) fn advance(&mut self, job: &Job<'_>, last: &mut Sample) -> Result<bool> {
+        if self.is_curve {
+            return self.advance_far(job, 1.0, last);
+        }
         let travel = &mut self.travel;
         if travel.next == Next::Along {
             let step = contact::step(
@@ -215,6 +237,10 @@ impl Run {
     /// As [`Self::advance`].
     #[inline(never)]
     pub(crate) fn advance_far(&mut self, job: &Job<'_>, feed_factor: f32, last: &mut Sample) -> Result<bool> {
+        if self.is_curve {
+            let Self { curve, buffer, .. } = self;
+            return curve.advance(job, job.rest(), buffer, feed_factor, last);
+        }
         let begins = !self.is_along();
         match self.travel.next {
             Next::Along if self.buffer.patch().point => self.step_on_pole(job)?,
@@ -432,8 +458,9 @@ impl Run {
             let Self { travel, buffer, .. } = self;
             let patch = buffer.patch();
             let arc = rest * patch.per_mm;
-            let end = || patch.end();
-            let covered = match contact::solve(&patch.surface, travel.fraction, &start, end, arc)? {
+            let end = || Some(patch.end());
+            let path_at = |fraction| patch.surface.path_at(fraction);
+            let covered = match contact::solve(path_at, [travel.fraction, u64::MAX], &start, end, arc)? {
                 Reach::Within(fraction) => {
                     travel.fraction = fraction;
                     return Ok(());
@@ -496,6 +523,9 @@ impl Run {
 
     /// Whether [`Self::plan`] has anything to do.
     pub(crate) fn has_to_plan(&self, spacing: Spacing) -> bool {
+        if self.is_curve {
+            return self.curve.has_to_plan();
+        }
         spacing == Spacing::Exact && (self.scan.has_work() || self.is_step_due())
     }
 
@@ -504,8 +534,11 @@ impl Run {
         self.travel.next == Next::Over && self.step_over.is_none()
     }
 
-    /// The planning of one period without axis limits: scans the pass for the step to the next one.
-    pub(crate) fn plan(&mut self, job: &Job<'_>) {
+    /// The planning of one period without axis limits: scans the pass for the step to the next one, or makes the next front in the words behind the job's.
+    pub(crate) fn plan(&mut self, job: &Job<'_>, rest: &mut [i32]) {
+        if self.is_curve {
+            return self.curve.plan(job, rest);
+        }
         self.scan.plan(job);
         if self.is_step_due() && !self.scan.has_work() {
             self.step_over = Some(self.find_step_over(job));
@@ -528,7 +561,7 @@ impl Run {
                     shape,
                 },
             ),
-            Spacing::FirstOrder => self.last_interval,
+            _ => self.last_interval,
         }
     }
 

@@ -731,7 +731,9 @@ impl Lookahead {
         let header = job.header;
         out.interval = interval_of(self.maximum.inv_interval_sq);
         let step = match header.spacing {
-            Spacing::Exact => self.step_over.step(header, self.maximum),
+            Spacing::Exact | Spacing::Constant | Spacing::ConstantFromMiddle => {
+                self.step_over.step(header, self.maximum)
+            }
             Spacing::FirstOrder => out.interval,
         };
         let width = |span| job.side_width(span);

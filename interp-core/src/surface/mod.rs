@@ -167,6 +167,16 @@ pub(crate) struct Local {
     pub(crate) excess: f32,
 }
 
+/// First and second derivatives at a point, units per span fraction.
+#[derive(Clone, Copy, Debug, Default)]
+pub(crate) struct Derivatives {
+    pub(crate) path: Vec3,
+    pub(crate) side: Vec3,
+    pub(crate) path2: Vec3,
+    pub(crate) mixed: Vec3,
+    pub(crate) side2: Vec3,
+}
+
 /// `A . A' / |A|^2` from g A, half of g A' and 1/|g A|^2.
 #[inline(always)]
 fn log_speed_derivative(path: &[i32; 3], path2: &[i32; 3], inverse_e: f32, excess: f32) -> f32 {
@@ -175,6 +185,20 @@ fn log_speed_derivative(path: &[i32; 3], path2: &[i32; 3], inverse_e: f32, exces
 }
 
 impl Local {
+    /// The derivatives of S; `log_weight`: relative change of the weight along the path and across it.
+    fn derivatives(&self, factors: &Factors, [along, across]: [f32; 2]) -> Derivatives {
+        let Factors { path: a, side: b, .. } = *factors;
+        let scaled = |vector: [i32; 3], factor: f32| Vec3::of(vector) * (factor / self.g);
+        let (path, side) = (scaled(self.path, a), scaled(self.side, b));
+        Derivatives {
+            path,
+            side,
+            path2: scaled(self.path2, 2.0 * a) - path * (2.0 * along),
+            mixed: scaled(self.mixed, 1.0) - side * along - path * across,
+            side2: scaled(self.side2, 2.0 * b) - side * (2.0 * across),
+        }
+    }
+
     /// The contact's differential geometry (Lo 1998, eqns 9 to 11). With E, F, G, L, M, N the fundamental forms, W^2 = EG -
     /// F^2 and d = B - (F/E) A: lateral speed^2 = |d|^2 = W^2/E, II(d, d) = N - 2 M F/E + L (F/E)^2, II(t, d) = (M - L F/E)/sqrt E.
     ///
@@ -321,6 +345,20 @@ impl Surface {
             },
             Self::Profile(pass) => AnyPass::Profile(pass),
             Self::Circle(pass) => AnyPass::Circle(pass),
+        }
+    }
+
+    /// First and second derivatives at a fraction of the patch, in the direction of travel.
+    #[inline(never)]
+    pub(crate) fn derivatives(&self, fraction: u64) -> Derivatives {
+        match self.pass() {
+            AnyPass::Polynomial(PolynomialPass(pass))
+            | AnyPass::Ruled(RuledPass(pass))
+            | AnyPass::Extruded(ExtrudedPass(pass)) => PolynomialPass(pass).derivatives(fraction),
+            AnyPass::Rational(pass) => pass.derivatives(fraction),
+            AnyPass::Pole(pass) => pass.derivatives(fraction),
+            AnyPass::Profile(pass) => pass.derivatives(fraction),
+            AnyPass::Circle(pass) => pass.derivatives(fraction),
         }
     }
 

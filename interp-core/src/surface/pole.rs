@@ -10,7 +10,7 @@ use super::grid::GridPass;
 use super::lines::{CoordinateCubics, quotient_across, quotient_along};
 use super::range::{Edges, Root};
 use super::rational::{Weight, quarter};
-use super::{Contact, Factors, IsoLine, Local, Pass, PathSpeed, path_factor};
+use super::{Contact, Derivatives, Factors, IsoLine, Local, Pass, PathSpeed, path_factor};
 use crate::fault::Result;
 use crate::math::arith::{centred, centred_to_f32, cubic, jet, mul_q30, quarter_of, subtract, tangent};
 
@@ -192,10 +192,8 @@ impl Part {
     }
 }
 
-impl Pass for PolePass<'_> {
-    #[inline(never)]
-    fn contact(&self, fraction: u64, ball: &Ball) -> Result<Contact> {
-        let w = centred(fraction);
+impl PolePass<'_> {
+    fn factors(&self, w: i32) -> Factors {
         let side = match self.0.reduced.pole {
             Pole::Beside => 1.0,
             Pole::AtEnd(root) => {
@@ -203,11 +201,26 @@ impl Pass for PolePass<'_> {
                 offset + slope * centred_to_f32(w)
             }
         };
-        let factors = Factors {
+        Factors {
             path: self.0.reduced.path_factor,
             inverse_path: self.0.reduced.inverse_path_factor,
             side,
-        };
-        self.local(w).contact::<true, true>(ball, &factors)
+        }
+    }
+
+    /// Derivatives at a fraction of the patch.
+    pub(crate) fn derivatives(&self, fraction: u64) -> Derivatives {
+        let w = centred(fraction);
+        let weight = Weight::at(&self.0.weight, w);
+        self.local(w)
+            .derivatives(&self.factors(w), weight.log_derivatives())
+    }
+}
+
+impl Pass for PolePass<'_> {
+    #[inline(never)]
+    fn contact(&self, fraction: u64, ball: &Ball) -> Result<Contact> {
+        let w = centred(fraction);
+        self.local(w).contact::<true, true>(ball, &self.factors(w))
     }
 }

@@ -9,7 +9,7 @@ use super::Ball;
 use super::grid::GridPass;
 use super::lines::{CoordinateCubics, coefficients, collapses, record_words, split};
 use super::range::{BAD_PATCH, Edges, HeadWord, Root, fits, patch_bound};
-use super::{Contact, Factors, Local, Pass, PathSpeed};
+use super::{Contact, Derivatives, Factors, Local, Pass, PathSpeed};
 use crate::fault::Result;
 use crate::math::arith::{
     centred, cubic, jet, mul_hi, mul_q29, quarter_of, reciprocal_q29, subtract, tangent, to_f32,
@@ -172,6 +172,12 @@ impl Weight {
         }
     }
 
+    /// Relative change of the weight along the path and across it.
+    pub(super) fn log_derivatives(&self) -> [f32; 2] {
+        let inverse = 0.25 * WEIGHT_UNIT * self.inverse_g;
+        [to_f32(self.path) * inverse, to_f32(self.side) * inverse]
+    }
+
     /// A numerator over the weight.
     #[inline(always)]
     pub(super) fn divide(&self, numerator: i32) -> i32 {
@@ -209,6 +215,13 @@ impl RationalPass<'_> {
     pub(crate) fn path_at(&self, fraction: u64) -> PathSpeed {
         let local = self.local(fraction);
         PathSpeed::new(&local.path, &local.path2, local.excess, local.g)
+    }
+
+    /// Derivatives at a fraction of the patch.
+    pub(crate) fn derivatives(&self, fraction: u64) -> Derivatives {
+        let weight = Weight::at(&self.0.weight, centred(fraction));
+        self.local(fraction)
+            .derivatives(&Factors::ONE, weight.log_derivatives())
     }
 
     /// The quotient rule with the numerators' derivatives relative to the point: `w S_path = P_path - S w_path`, and

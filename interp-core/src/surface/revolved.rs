@@ -7,7 +7,7 @@
 use super::Ball;
 use super::lines::turn_cubic;
 use super::range::{BAD_PATCH, SHIFT_MAX, bound, fits_range};
-use super::{Contact, IsoLine, Pass, PathSpeed};
+use super::{Contact, Derivatives, IsoLine, Pass, PathSpeed};
 use crate::fault::{Fault, FaultKind, Result};
 use crate::math::arith::{angle, centred, count_to_f32, inverse_sqrt, jet, mul_q31, sin_cos, to_f32};
 use crate::math::vec3::Vec3;
@@ -221,6 +221,56 @@ impl ProfilePass {
     }
 }
 
+impl ProfilePass {
+    /// Derivatives at a fraction of the profile.
+    pub(crate) fn derivatives(&self, fraction: u64) -> Derivatives {
+        let point = self.profile.at(centred(fraction));
+        let ([radius, ..], (tangent, _)) = (point.radius, point.tangent());
+        let turned = Turned {
+            sin: self.sin_float,
+            cos: self.cos_float,
+            radius: to_f32(radius),
+            tangent,
+            bend: point.bend(),
+        };
+        let [profile, angle, profile2, mixed, angle2] = turned.derivatives(self.extent_rad);
+        Derivatives {
+            path: profile,
+            side: angle,
+            path2: profile2,
+            mixed,
+            side2: angle2,
+        }
+    }
+}
+
+/// A point of a profile turned about the axis.
+struct Turned {
+    sin: f32,
+    cos: f32,
+    radius: f32,
+    /// First and second derivatives of radius and height.
+    tangent: [f32; 2],
+    bend: [f32; 2],
+}
+
+impl Turned {
+    /// By the profile's parameter and the angle's fraction: first, first, second, mixed, second.
+    fn derivatives(&self, extent_rad: f32) -> [Vec3; 5] {
+        let Self { sin, cos, radius, .. } = *self;
+        let ([radius1, height1], [radius2, height2]) = (self.tangent, self.bend);
+        let turned = |out: f32, up: f32| Vec3::new(out * cos, out * sin, up);
+        let around = |speed: f32| Vec3::new(-speed * sin, speed * cos, 0.0);
+        [
+            turned(radius1, height1),
+            around(radius * extent_rad),
+            turned(radius2, height2),
+            around(radius1 * extent_rad),
+            turned(-radius * extent_rad * extent_rad, 0.0),
+        ]
+    }
+}
+
 impl Pass for ProfilePass {
     /// `S_path x S_side = R extent (-z' cos, -z' sin, R')`.
     #[inline(always)]
@@ -272,6 +322,9 @@ pub(crate) struct CirclePass {
     /// Normal, away from the axis and up.
     out: f32,
     up: f32,
+    /// First and second derivatives of the profile's radius and height.
+    tangent: [f32; 2],
+    bend: [f32; 2],
     /// The contact without position and offset, constant around the axis.
     shape: Contact,
 }
@@ -314,6 +367,8 @@ impl CirclePass {
             height,
             out,
             up,
+            tangent: [radius1, height1],
+            bend: point.bend(),
             shape: Contact {
                 path: PathSpeed {
                     inv_speed: inverse_speed,
@@ -334,6 +389,29 @@ impl CirclePass {
     /// Whether the whole pass is one point on the axis.
     pub(crate) fn is_point(&self) -> bool {
         self.radius == 0
+    }
+
+    /// Derivatives at a fraction of the angle.
+    pub(crate) fn derivatives(&self, fraction: u64) -> Derivatives {
+        let travelled = if self.reversed { !fraction } else { fraction };
+        let [sin, cos] = sin_cos_q31(angle(self.start, self.extent, travelled));
+        let turned = Turned {
+            sin: to_f32(sin) * SINE_UNIT,
+            cos: to_f32(cos) * SINE_UNIT,
+            radius: to_f32(self.radius),
+            tangent: self.tangent,
+            bend: self.bend,
+        };
+        let extent_rad = count_to_f32(self.extent) * RADIANS_PER_EXTENT;
+        let [profile, angle, profile2, mixed, angle2] = turned.derivatives(extent_rad);
+        let sign = if self.reversed { -1.0 } else { 1.0 };
+        Derivatives {
+            path: angle * sign,
+            side: profile,
+            path2: angle2,
+            mixed: mixed * sign,
+            side2: profile2,
+        }
     }
 
     /// The parametrisation, constant around the axis.

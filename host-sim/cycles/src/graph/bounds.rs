@@ -154,6 +154,11 @@ const BOUNDS: &[(&str, u32, &str)] = &[
         "ends of a plan",
     ),
     (
+        "interp_core::sequence::link::BoundaryStepOver::choose_curve",
+        3,
+        "axes; rounds of the search for a speed: ROUNDS",
+    ),
+    (
         "interp_core::sequence::hop::time_at",
         20,
         "bisections of a time: BISECTIONS",

@@ -6,6 +6,7 @@
 //! ```
 
 mod axes;
+mod fronts;
 mod geometry;
 mod grid;
 mod steps;
@@ -101,6 +102,7 @@ pub fn prepare(job: &Job) -> Result<Prepared, JobError> {
             "write along = \"u\" or \"v\", or call `direction::choose`",
         ));
     }
+    fronts::check_job(job)?;
     let sign = geometry::tool_sign(job)?;
     #[allow(clippy::cast_possible_truncation, reason = "the machine's own precision")]
     let header = Header {
@@ -112,6 +114,8 @@ pub fn prepare(job: &Job) -> Result<Prepared, JobError> {
         spacing: match job.spacing {
             job::Spacing::Exact => Spacing::Exact,
             job::Spacing::FirstOrder => Spacing::FirstOrder,
+            job::Spacing::Constant(job::Start::Edge) => Spacing::Constant,
+            job::Spacing::Constant(job::Start::Middle) => Spacing::ConstantFromMiddle,
         },
         tool_side: if geometry::along_path(sign, job.along) > 0.0 {
             ToolSide::Plus
@@ -126,7 +130,7 @@ pub fn prepare(job: &Job) -> Result<Prepared, JobError> {
         period_s: job.machine.period_s() as f32,
         axes: axes::axes(job, sign)?,
     };
-    match &job.surface {
+    let prepared = match &job.surface {
         SurfaceSpec::Revolved {
             radius_mm,
             height_mm,
@@ -134,7 +138,9 @@ pub fn prepare(job: &Job) -> Result<Prepared, JobError> {
             v_rad,
         } => revolved(job, header, [*radius_mm, *height_mm], *u, *v_rad),
         surface => grid::prepare(job, header, &Source::new(surface)),
-    }
+    }?;
+    fronts::check(job, &prepared)?;
+    Ok(prepared)
 }
 
 /// Words of the widths of spans.

@@ -403,7 +403,8 @@ fn extreme(oracle: &Oracle, parts: &Measurements<'_>) -> (HighestScallop, f64, [
         let deviation_mm = if ridge.crests.iter().any(|crest| crest.lowered) {
             path_mm
         } else {
-            parts.deviation_mm[gap].max(parts.deviation_mm[gap + 1])
+            let [from, to] = parts.gaps[gap].indices;
+            parts.deviation_mm[from].max(parts.deviation_mm[to])
         };
         let between = own + ridge.excess_mm;
         let by_path = deviation_mm * sensitivity(own, oracle.radius_mm);
@@ -416,7 +417,7 @@ fn extreme(oracle: &Oracle, parts: &Measurements<'_>) -> (HighestScallop, f64, [
     let Some((height_mm, crest, index)) = most else {
         return (HighestScallop::default(), 0.0, [0.0; 2]);
     };
-    let (u, v) = oracle.swapped(crest.path, parts.gaps[index].side(crest.share));
+    let (u, v) = oracle.swapped(crest.path, parts.gaps[index].side(crest.path, crest.share));
     let extreme = HighestScallop {
         height_mm,
         u,
@@ -436,11 +437,11 @@ fn number(gap: usize) -> u32 {
 fn mean(oracle: &Oracle, parts: &Measurements<'_>) -> (f64, [f64; BINS]) {
     let (mut sum, mut area, mut histogram) = (0.0, 0.0, [0.0; BINS]);
     for (gap, ridge) in parts.gaps.iter().zip(parts.ridges) {
-        let width = gap.side(1.0) - gap.side(0.0);
         for pair in ridge.crests.windows(2) {
-            let step = 0.5 * width * (pair[1].path - pair[0].path);
+            let step = 0.5 * (pair[1].path - pair[0].path);
             for crest in pair {
-                let part = crest.area * step;
+                let width = gap.side(crest.path, 1.0) - gap.side(crest.path, 0.0);
+                let part = crest.area * (width * step);
                 // Where a ball has gouged, no scallop remains.
                 sum += crest.height_mm.max(0.0) * part;
                 area += part;
@@ -460,7 +461,7 @@ fn gouge(oracle: &Oracle, track: &ToolPath, search: &GougeSearchResult) -> Optio
     let deepest = search.deepest?;
     let (pass, index) = deepest.by;
     let samples = &track.passes[pass as usize];
-    let (u, v) = oracle.swapped(samples.path[index as usize], samples.side);
+    let (u, v) = oracle.swapped(samples.path[index as usize], samples.side_of(index as usize));
     let tight = |u: f64, v: f64| {
         super::grid::local_curvature(&oracle.surface.at(u, v), oracle)
             .is_some_and(|(_, curvature)| curvature.principal[1] * oracle.radius_mm >= 1.0)
@@ -496,7 +497,7 @@ fn thinned(oracle: &Oracle, parts: &Measurements<'_>) -> Vec<Ridge> {
         let points = kept
             .map(|k| {
                 let crest = &crests[k];
-                let (u, v) = oracle.swapped(crest.path, gap.side(crest.share));
+                let (u, v) = oracle.swapped(crest.path, gap.side(crest.path, crest.share));
                 #[allow(clippy::cast_possible_truncation, reason = "for drawing")]
                 let height_mm = crest.height_mm as f32;
                 RidgePoint {

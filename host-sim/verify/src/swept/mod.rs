@@ -118,10 +118,7 @@ pub fn measure(
         .par_iter()
         .map(|pass| PassHeight::new(pass, oracle.radius_mm))
         .collect();
-    let gaps: Vec<Gap<'_>> = heights
-        .windows(2)
-        .map(|pair| Gap::new(oracle, [pair[0], pair[1]], &tree))
-        .collect();
+    let gaps = Gap::all(oracle, &heights, &tree);
     progress.begin("scallop", gaps.len() as u64);
     let mut ridges: Vec<GapRidge> = gaps
         .par_iter()
@@ -139,7 +136,7 @@ pub fn measure(
     if let Some(original) = &requirements.original {
         ridges.par_iter_mut().zip(&gaps).for_each(|(ridge, gap)| {
             for crest in &mut ridge.crests {
-                let (u, v) = oracle.swapped(crest.path, gap.side(crest.share));
+                let (u, v) = oracle.swapped(crest.path, gap.side(crest.path, crest.share));
                 crest.height_mm -= oracle.normal_sign * (original.offset_mm)(u, v);
             }
         });

@@ -1,5 +1,7 @@
 //! The ridge between two neighbouring passes: the highest point across the gap, at stations along the gap.
 
+use std::collections::BTreeMap;
+
 use super::height::{PassHeight, Ray};
 use super::tree::PathTree;
 use glam::DVec3;
@@ -9,6 +11,8 @@ use oracle::{Oracle, OracleError};
 const ACROSS: usize = 8;
 /// Initial number of stations along a gap.
 const STATIONS: usize = 96;
+/// Fewest of a gap that is short.
+const STATIONS_MIN: usize = 6;
 /// Largest number of bisections of the intervals between stations, and the number after which they go on only where the error bound is
 /// above its requirement.
 const HALVINGS_MAX: usize = 30;
@@ -65,19 +69,29 @@ pub(super) struct Gap<'a> {
     passes: [PassHeight<'a>; 2],
     tree: &'a PathTree<'a>,
     sides: [f64; 2],
+    /// Indices of the passes.
+    pub(super) indices: [usize; 2],
+    /// Range of the path parameter of a gap between curved passes.
+    range: Option<[f64; 2]>,
     /// Shares of the gap that are evaluated, 0 and 1 among them.
     across: Vec<f64>,
     missed: f64,
 }
 
 impl<'a> Gap<'a> {
-    pub(super) fn new(oracle: &'a Oracle, passes: [PassHeight<'a>; 2], tree: &'a PathTree<'a>) -> Self {
+    pub(super) fn new(
+        oracle: &'a Oracle,
+        passes: [PassHeight<'a>; 2],
+        indices: [usize; 2],
+        range: Option<[f64; 2]>,
+        tree: &'a PathTree<'a>,
+    ) -> Self {
         let sides = passes.map(|pass| pass.pass().side);
         let width = sides[1] - sides[0];
         let mut ends = vec![0.0];
         for at in oracle.surface.breaks(oracle.across()) {
             let share = (at - sides[0]) / width;
-            if share > 1e-9 && share < 1.0 - 1e-9 {
+            if range.is_none() && share > 1e-9 && share < 1.0 - 1e-9 {
                 ends.push(share);
             }
         }
@@ -92,6 +106,8 @@ impl<'a> Gap<'a> {
             passes,
             tree,
             sides,
+            indices,
+            range,
             across,
             missed: MISSED_RADII * oracle.radius_mm,
         }
@@ -99,7 +115,7 @@ impl<'a> Gap<'a> {
 
     /// The ray from a point of the gap, and |S_u x S_v| there.
     fn ray(&self, path: f64, share: f64) -> Result<(Ray, f64), OracleError> {
-        let (u, v) = self.oracle.swapped(path, self.side(share));
+        let (u, v) = self.oracle.swapped(path, self.side(path, share));
         let at = self.oracle.surface.at(u, v);
         let ray = Ray {
             from: at.point,
@@ -108,9 +124,54 @@ impl<'a> Gap<'a> {
         Ok((ray, at.u.cross(at.v).length()))
     }
 
-    pub(super) fn side(&self, share: f64) -> f64 {
+    pub(super) fn side(&self, path: f64, share: f64) -> f64 {
+        let [from, to] = match self.range {
+            Some(_) => self.passes.map(|pass| pass.pass().side_at(path)),
+            None => self.sides,
+        };
         // Exact at both ends.
-        self.sides[0] * (1.0 - share) + self.sides[1] * share
+        from * (1.0 - share) + to * share
+    }
+
+    /// All gaps between passes: each pass and the next one, or of curved passes that which is next to it at each path parameter.
+    pub(super) fn all(oracle: &'a Oracle, heights: &[PassHeight<'a>], tree: &'a PathTree<'a>) -> Vec<Self> {
+        if !oracle.spacing.is_constant() {
+            let pairs = heights.windows(2).enumerate();
+            return pairs
+                .map(|(k, pair)| Self::new(oracle, [pair[0], pair[1]], [k, k + 1], None, tree))
+                .collect();
+        }
+        let ranges: Vec<Option<[f64; 2]>> = heights.iter().map(|height| height.pass().path_range()).collect();
+        let mut ends: Vec<f64> = ranges.iter().flatten().flatten().copied().collect();
+        ends.sort_by(f64::total_cmp);
+        ends.dedup();
+        let mut open: BTreeMap<[usize; 2], [f64; 2]> = BTreeMap::new();
+        let mut found: Vec<([usize; 2], [f64; 2])> = Vec::new();
+        for part in ends.windows(2) {
+            let middle = 0.5 * (part[0] + part[1]);
+            let covers =
+                |range: &Option<[f64; 2]>| range.is_some_and(|[low, high]| low < middle && middle < high);
+            let mut here: Vec<usize> = (0..heights.len()).filter(|k| covers(&ranges[*k])).collect();
+            let side = |k: &usize| heights[*k].pass().side_at(middle);
+            here.sort_by(|a, b| side(a).total_cmp(&side(b)));
+            let pairs: Vec<[usize; 2]> = here.windows(2).map(|pair| [pair[0], pair[1]]).collect();
+            open.retain(|pair, range| {
+                let goes_on = pairs.contains(pair);
+                if !goes_on {
+                    found.push((*pair, *range));
+                }
+                goes_on
+            });
+            for pair in pairs {
+                open.entry(pair).or_insert([part[0], part[1]])[1] = part[1];
+            }
+        }
+        found.extend(open);
+        found.sort_by(|a, b| a.0.cmp(&b.0).then(a.1[0].total_cmp(&b.1[0])));
+        found
+            .into_iter()
+            .map(|(pair, range)| Self::new(oracle, pair.map(|k| heights[k]), pair, Some(range), tree))
+            .collect()
     }
 
     /// Heights of both passes at a point.
@@ -279,14 +340,24 @@ impl<'a> Gap<'a> {
 
     /// The initial stations: knots, and equal shares of the parameter and of the second pass's length.
     fn stations(&self) -> Vec<f64> {
-        let [low, high] = self.oracle.path_range();
+        let whole = self.oracle.path_range();
+        let [low, high] = self.range.unwrap_or(whole);
         let mut stations = self.oracle.surface.breaks(self.oracle.along);
         let samples = &self.passes[1].pass().path;
+        #[allow(
+            clippy::cast_precision_loss,
+            clippy::cast_possible_truncation,
+            clippy::cast_sign_loss,
+            reason = "small"
+        )]
+        let count = ((high - low) / (whole[1] - whole[0]) * STATIONS as f64).ceil() as usize;
+        let count = count.clamp(STATIONS_MIN, STATIONS);
         #[allow(clippy::cast_precision_loss, reason = "small")]
-        for k in 0..=STATIONS {
-            stations.push(low + (high - low) * k as f64 / STATIONS as f64);
-            stations.push(samples[k * (samples.len() - 1) / STATIONS]);
+        for k in 0..=count {
+            stations.push(low + (high - low) * k as f64 / count as f64);
+            stations.push(samples[k * (samples.len() - 1) / count]);
         }
+        stations.retain(|at| (low..=high).contains(at));
         stations.sort_by(f64::total_cmp);
         let nearest = 1e-5 * (high - low);
         stations.dedup_by(|b, a| *b - *a < nearest && (*b < high || *a == high));

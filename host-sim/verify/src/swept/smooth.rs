@@ -197,7 +197,9 @@ fn refined(pass: &ToolPathPass, tolerance_mm: f64) -> (Option<ToolPathPass>, f64
                 periods: pass.periods[..k].to_vec(),
                 path: pass.path[..k].to_vec(),
                 cl_nm: pass.cl_nm[..k].to_vec(),
-                ..*pass
+                sides: pass.sides.iter().take(k).copied().collect(),
+                side: pass.side,
+                first_tick: pass.first_tick,
             });
         }
         if let Some(finer) = &mut finer {

@@ -9,8 +9,10 @@ const MM_PER_NM: f64 = 1e-6;
 /// One pass as emitted.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct ToolPathPass {
-    /// Side parameter.
+    /// Side parameter; of a curved pass that of its first sample.
     pub side: f64,
+    /// Side parameter of each sample of a curved pass; empty on others.
+    pub sides: Vec<f64>,
     /// Tick of the first sample.
     pub first_tick: u64,
     /// Periods from the first sample to each sample; a point interpolated between two samples has the first one's.
@@ -26,6 +28,43 @@ impl ToolPathPass {
     #[must_use]
     pub fn centre(&self, index: usize) -> DVec3 {
         DVec3::from(self.cl_nm[index].map(f64::from)) * MM_PER_NM
+    }
+
+    /// Side parameter of a sample.
+    #[must_use]
+    pub fn side_of(&self, index: usize) -> f64 {
+        self.sides.get(index).copied().unwrap_or(self.side)
+    }
+
+    /// Side parameter at a path parameter, linear between samples.
+    pub(super) fn side_at(&self, path: f64) -> f64 {
+        if self.sides.is_empty() {
+            return self.side;
+        }
+        let index = self.index_at(path);
+        let before = index.saturating_sub(1);
+        let [from, to] = [self.path[before], self.path[index]];
+        if to == from {
+            return self.side_of(index);
+        }
+        let share = ((path - from) / (to - from)).clamp(0.0, 1.0);
+        self.side_of(before) * (1.0 - share) + self.side_of(index) * share
+    }
+
+    /// Range of the path parameter.
+    pub(super) fn path_range(&self) -> Option<[f64; 2]> {
+        let (first, last) = (*self.path.first()?, *self.path.last()?);
+        Some([first.min(last), first.max(last)])
+    }
+
+    /// Adds the side parameter of the sample that was added last.
+    fn add_side(&mut self, side: f64) {
+        if self.sides.is_empty() && side != self.side {
+            self.sides = vec![self.side; self.path.len().saturating_sub(1)];
+        }
+        if !self.sides.is_empty() || side != self.side {
+            self.sides.push(side);
+        }
     }
 
     /// The first sample, in the order of the pass, whose path parameter reaches this one.
@@ -53,6 +92,7 @@ impl ToolPathPass {
         self.periods.push(of.periods[index]);
         self.path.push(of.path[index]);
         self.cl_nm.push(of.cl_nm[index]);
+        self.add_side(of.side_of(index));
     }
 
     /// Appends a point between a sample of another pass and its next one.
@@ -66,6 +106,8 @@ impl ToolPathPass {
         )]
         let cl_nm = (centre_mm / MM_PER_NM).round().to_array().map(|nm| nm as i32);
         self.cl_nm.push(cl_nm);
+        let [from, to] = [of.side_of(index), of.side_of(index + 1)];
+        self.add_side(from + (to - from) * share);
     }
 
     /// Tick of a sample.
@@ -127,6 +169,7 @@ impl ToolPath {
                 .map_or(0, |pass| pass.path.len() + pass.path.len() / 64);
             self.passes.push(ToolPathPass {
                 side,
+                sides: Vec::new(),
                 first_tick: sample.tick,
                 periods: Vec::with_capacity(room),
                 path: Vec::with_capacity(room),
@@ -144,6 +187,7 @@ impl ToolPath {
                 .push(u32::try_from(sample.tick.saturating_sub(pass.first_tick)).unwrap_or(u32::MAX));
             pass.path.push(path);
             pass.cl_nm.push(sample.cl_nm);
+            pass.add_side(side);
         }
         if sample.last_of_pass
             && let Some((cl_nm, boundary)) = self.lead_out.take()

@@ -249,7 +249,8 @@ impl<'a> PathTree<'a> {
                 let samples = &self.track.passes[segment.pass as usize];
                 let [path, side] = reach.excluded;
                 let inside = |range: [f64; 2], at: f64| (range[0]..=range[1]).contains(&at);
-                let beside = inside(side, samples.side);
+                let is_curve = !samples.sides.is_empty();
+                let beside = !is_curve && inside(side, samples.side);
                 // First the same bound for the chord between the ends, with the segment's largest deviation from it.
                 let (off, distance) = nearest(ray.from, segment.ends);
                 let depth = self.radius - distance + segment.off_mm;

@@ -354,8 +354,14 @@ fn arcs_over_a_curve_leave_what_the_rules_error_terms_say() {
 fn solved(line: &Curve, u: f64, arc_mm: f64) -> Result<Reach> {
     let (surface, per_mm) = surface_on(line);
     let start = surface.path_at(fraction(u));
-    let end = || surface.path_at(u64::MAX);
-    solve(&surface, fraction(u), &start, end, (arc_mm * per_mm) as f32)
+    let path_at = |fraction| surface.path_at(fraction);
+    solve(
+        path_at,
+        [fraction(u), u64::MAX],
+        &start,
+        || None,
+        (arc_mm * per_mm) as f32,
+    )
 }
 
 /// The arc between the start and the returned end is the requested one: to f32 resolution for a short arc, and with an error of
@@ -450,14 +456,8 @@ fn a_place_without_a_stretch_is_refused() {
             inv_speed: start.inv_speed * inverse,
             log_speed_derivative: start.log_speed_derivative * log_speed_derivative,
         };
-        let fault = solve(
-            &surface,
-            0,
-            &start,
-            || surface.path_at(u64::MAX),
-            (0.01 * per_mm) as f32,
-        )
-        .unwrap_err();
+        let path_at = |fraction| surface.path_at(fraction);
+        let fault = solve(path_at, [0, u64::MAX], &start, || None, (0.01 * per_mm) as f32).unwrap_err();
         assert_eq!(fault.kind, FaultKind::ParameterBackwards);
         assert!(fault.value.is_nan());
     }

@@ -1,0 +1,140 @@
+//! What passes of constant scallop height are refused for.
+
+use interp_core::surface::{PolynomialRecord, RationalRecord};
+use interp_core::{STORE_WORDS, SurfaceKind, front_words};
+use job::{Job, JobError};
+
+use super::Prepared;
+use super::geometry::SurfaceEvaluator;
+
+const REMEDY: &str = "write spacing = \"exact\"";
+/// Points of each knot line at which the derivatives on both sides are compared, their distance from it as a share of the range, and their greatest relative
+/// difference: a pass bends by as much there.
+const CREASE_POINTS: u32 = 9;
+const CREASE_STEP: f64 = 1e-9;
+const CREASE_MAX: f64 = 1e-3;
+/// Radius of a circle that is a point, mm.
+const POINT_MM: f64 = 1e-5;
+
+/// Refuses what the fronts are not made for, before the surface is prepared.
+///
+/// # Errors
+/// Axis limits.
+pub(super) fn check_job(job: &Job) -> Result<(), JobError> {
+    if job.spacing.is_constant() && job.machine.has_limits() {
+        return Err(job.origin.error(
+            "cut.spacing",
+            "passes of constant scallop height are made for jobs without axis limits only",
+            "write spacing = \"exact\", or remove the axis limits",
+        ));
+    }
+    Ok(())
+}
+
+/// Refuses a crease, a pole beside the passes, too many path spans, and a job for whose stations the store has no room.
+///
+/// # Errors
+/// As above.
+pub(super) fn check(job: &Job, prepared: &Prepared) -> Result<(), JobError> {
+    if !job.spacing.is_constant() {
+        return Ok(());
+    }
+    let no = |what: String, remedy: &str| Err(job.origin.error("cut.spacing", what, remedy));
+    if has_pole_beside(job, prepared) {
+        let other = match job.along {
+            job::Along::U => "v",
+            job::Along::V => "u",
+        };
+        let remedy = format!("write along = \"{other}\", so that the passes end at the pole, or {REMEDY}");
+        return no(
+            "passes of constant scallop height cannot be made where a boundary beside them is a single point"
+                .to_owned(),
+            &remedy,
+        );
+    }
+    if let Some(crease) = crease(job, prepared) {
+        return no(crease, REMEDY);
+    }
+    let Some(words) = front_words(&prepared.header) else {
+        return no(
+            format!(
+                "passes of constant scallop height cross {} patches each, more than the board has stations for",
+                prepared.path.spans()
+            ),
+            REMEDY,
+        );
+    };
+    if prepared.words.len() + words > STORE_WORDS {
+        return no(
+            format!(
+                "the surface and the stations of its passes take {} words, more than the {STORE_WORDS} of the board's store",
+                prepared.words.len() + words
+            ),
+            "use fewer knots, cut the part into several jobs, or write spacing = \"exact\"",
+        );
+    }
+    Ok(())
+}
+
+/// A knot at which the surface's first derivatives jump.
+fn crease(job: &Job, prepared: &Prepared) -> Option<String> {
+    let surface = SurfaceEvaluator::new(&job.surface);
+    let (path, side) = (&prepared.path.breaks, &prepared.side.breaks);
+    let names = match job.along {
+        job::Along::U => ["u", "v"],
+        job::Along::V => ["v", "u"],
+    };
+    for (name, knots, across) in [(names[0], path, side), (names[1], side, path)] {
+        let [low, high] = [across[0], across[across.len() - 1]];
+        let width = knots[knots.len() - 1] - knots[0];
+        for knot in &knots[1..knots.len() - 1] {
+            for k in 0..CREASE_POINTS {
+                let at = low + (high - low) * (f64::from(k) + 0.5) / f64::from(CREASE_POINTS);
+                let sides = [-CREASE_STEP, CREASE_STEP].map(|step| {
+                    let moved = knot + step * width;
+                    let frame = if name == "u" {
+                        surface.at(moved, at)
+                    } else {
+                        surface.at(at, moved)
+                    };
+                    if name == "u" { frame.u } else { frame.v }
+                });
+                let [before, after] = sides;
+                if before.distance(after) > CREASE_MAX * before.length().max(after.length()) {
+                    return Some(format!(
+                        "passes of constant scallop height need a smooth parametrisation, but its derivative along {name} jumps at {name} = {knot}"
+                    ));
+                }
+            }
+        }
+    }
+    None
+}
+
+/// Whether a side boundary is a single point.
+fn has_pole_beside(job: &Job, prepared: &Prepared) -> bool {
+    let widths = prepared.path.spans() + prepared.side.spans();
+    let records = prepared.words.get(widths..).unwrap_or(&[]);
+    match prepared.header.kind {
+        SurfaceKind::Polynomial => records
+            .as_chunks()
+            .0
+            .iter()
+            .map(|words| PolynomialRecord::from_words(words).edges)
+            .any(|edges| edges.side_start || edges.side_end),
+        SurfaceKind::Rational => records
+            .as_chunks()
+            .0
+            .iter()
+            .map(|words| RationalRecord::from_words(words).edges)
+            .any(|edges| edges.side_start || edges.side_end),
+        SurfaceKind::RevolvedAlongProfile => false,
+        SurfaceKind::RevolvedAroundAxis => match &job.surface {
+            job::SurfaceSpec::Revolved { radius_mm, u, .. } => u.iter().any(|u| {
+                let [c3, c2, c1, c0] = *radius_mm;
+                (((c3 * u + c2) * u + c1) * u + c0).abs() < POINT_MM
+            }),
+            _ => false,
+        },
+    }
+}

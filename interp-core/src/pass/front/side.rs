@@ -1,0 +1,153 @@
+//! The side parameter as one integer over all spans, [`WHOLE`] from boundary to boundary, and the direction in which fronts move over it.
+
+use crate::job::program::Job;
+use crate::math::arith::{power_of_two, to_f32, truncated};
+use crate::sample::SpanParameter;
+
+/// The whole side parameter.
+pub(crate) const WHOLE: i32 = 1 << 28;
+/// The unit as a share of the whole.
+pub(crate) const UNIT: f32 = power_of_two(-28);
+
+/// Bits of a fine distance below the unit.
+pub(crate) const FINE_BITS: u32 = 12;
+
+/// A distance in fine units.
+pub(crate) fn fine(distance: i32) -> i64 {
+    i64::from(distance) << FINE_BITS
+}
+
+/// A fine distance in units, rounded down.
+#[allow(clippy::cast_possible_truncation, reason = "distances are below 2^31 units")]
+pub(crate) const fn coarse(distance: i64) -> i32 {
+    (distance >> FINE_BITS) as i32
+}
+
+/// The direction of the fronts.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) struct Direction {
+    /// Side parameter of the first front.
+    pub(crate) origin: i32,
+    /// Fronts move towards the end of the parameter, or towards its start.
+    pub(crate) forwards: bool,
+    /// Distance to the boundary.
+    pub(crate) end: i32,
+}
+
+impl Direction {
+    /// From the first boundary to the other.
+    pub(crate) const FROM_EDGE: Self = Self {
+        origin: 0,
+        forwards: true,
+        end: WHOLE,
+    };
+    /// From the middle to the end, and from the middle to the start.
+    pub(crate) const FROM_MIDDLE: [Self; 2] = [
+        Self {
+            origin: WHOLE / 2,
+            forwards: true,
+            end: WHOLE / 2,
+        },
+        Self {
+            origin: WHOLE / 2,
+            forwards: false,
+            end: WHOLE / 2,
+        },
+    ];
+
+    /// Fronts are followed beyond the boundary up to here.
+    pub(crate) const fn cap(&self) -> i32 {
+        self.end + self.end / 2
+    }
+
+    /// Sign of the side parameter's change.
+    pub(crate) const fn sign(&self) -> f32 {
+        if self.forwards { 1.0 } else { -1.0 }
+    }
+}
+
+/// A span of the side parameter, moved by neighbours.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct SideCursor {
+    /// Units per unit of the parameter's widths.
+    scale: f32,
+    span: u16,
+    start: i32,
+    width: i32,
+}
+
+impl SideCursor {
+    pub(crate) const NONE: Self = Self {
+        scale: 1.0,
+        span: 0,
+        start: 0,
+        width: WHOLE,
+    };
+
+    /// At the first span of a job.
+    pub(crate) fn new(job: &Job<'_>) -> Self {
+        let spans = job.header.side_spans;
+        let mut sum = 0.0;
+        for span in 0..spans {
+            sum += job.side_width(span);
+        }
+        let mut cursor = Self {
+            scale: to_f32(WHOLE) / sum,
+            ..Self::NONE
+        };
+        cursor.width = cursor.width_of(job, 0);
+        cursor
+    }
+
+    /// Width of a span other than the last, whose width is what is left.
+    fn width_of(&self, job: &Job<'_>, span: u16) -> i32 {
+        if span + 1 >= job.header.side_spans {
+            return WHOLE.saturating_sub(self.start).max(1);
+        }
+        truncated(job.side_width(span) * self.scale).max(1)
+    }
+
+    /// Moves to the span of a distance from the first front, fine units. Returns the side parameter, and the span's share of the whole parameter.
+    pub(crate) fn seek(
+        &mut self,
+        job: &Job<'_>,
+        direction: &Direction,
+        distance: i64,
+    ) -> (SpanParameter, f32) {
+        let distance = distance.clamp(0, fine(direction.end));
+        let origin = fine(direction.origin);
+        let whole = if direction.forwards {
+            origin.wrapping_add(distance)
+        } else {
+            origin.wrapping_sub(distance)
+        };
+        let at = coarse(whole);
+        let spans = job.header.side_spans;
+        for _ in 0..crate::job::SPANS_MAX {
+            if at < self.start && self.span > 0 {
+                self.span -= 1;
+                self.width = truncated(job.side_width(self.span) * self.scale).max(1);
+                self.start = self.start.saturating_sub(self.width);
+            } else if at.wrapping_sub(self.start) >= self.width && self.span + 1 < spans {
+                self.span += 1;
+                self.start = self.start.saturating_add(self.width);
+                self.width = self.width_of(job, self.span);
+            } else {
+                break;
+            }
+        }
+        let fraction = if at >= WHOLE {
+            u64::MAX
+        } else {
+            let within = whole.wrapping_sub(fine(self.start)).max(0).cast_unsigned();
+            let width = u64::from(self.width.cast_unsigned());
+            let fraction = (within << (32 - FINE_BITS)).checked_div(width).unwrap_or(0);
+            fraction.min(0xffff_ffff) << 32
+        };
+        let place = SpanParameter {
+            span: self.span,
+            fraction,
+        };
+        (place, to_f32(self.width) * UNIT)
+    }
+}
