@@ -551,3 +551,87 @@ fn heights_are_measured_from_the_original() {
         }
     }
 }
+
+/// A tool path along the passes of a front, curved and partial.
+fn track_of_front(oracle: &Oracle, fronts: &oracle::front::Fronts<'_>, spacing_mm: f64) -> ToolPath {
+    let mut track = ToolPath::default();
+    let mut tick = 0;
+    for (pass, places) in (0_u32..).zip(fronts.places(spacing_mm).unwrap()) {
+        for (k, (u, v)) in places.iter().enumerate() {
+            let contact = oracle.contact(*u, *v).unwrap();
+            let nm = |mm: DVec3| mm.to_array().map(|mm| (mm * 1e6).round() as i32);
+            let sample = PassSample {
+                tick,
+                pass,
+                u: *u,
+                v: *v,
+                cc_nm: nm(contact.cc_mm),
+                cl_nm: nm(contact.cl_mm),
+                feed_mm_s: 10.0,
+                interval: 0.0,
+                first_of_pass: k == 0,
+                last_of_pass: k + 1 == places.len(),
+            };
+            track.add(&sample, oracle.along);
+            tick += 1;
+        }
+    }
+    track
+}
+
+/// Curved passes, many of which end at the last boundary: the greatest crest is that of another measurement (the ball at places on the passes, parabolas between
+/// them), and a pass that is missing is found.
+#[test]
+fn curved_and_partial_passes() {
+    use oracle::front::{FrontOptions, Fronts, StartLine};
+    let pole = |x: f64, y: f64, z: f64| [x, y, z, 1.0];
+    let fan = SurfaceSpec::Nurbs(NurbsSpec {
+        degree: [1, 1],
+        knots_u: vec![0.0, 0.0, 1.0, 1.0],
+        knots_v: vec![0.0, 0.0, 1.0, 1.0],
+        poles_mm: vec![
+            vec![pole(0.0, -5.0, 0.0), pole(0.0, 5.0, 2.0)],
+            vec![pole(30.0, -14.0, 1.0), pole(34.0, 18.0, -3.0)],
+        ],
+        rational: false,
+    });
+    let job = job(fan, Along::U, Side::Up, 0.02);
+    for start in [StartLine::Edge, StartLine::Middle] {
+        let mut job = job.clone();
+        job.spacing = job::Spacing::Constant(match start {
+            StartLine::Middle => job::Start::Middle,
+            _ => job::Start::Edge,
+        });
+        let oracle = Oracle::new(&job).unwrap();
+        let fronts = Fronts::new(&oracle, start, &FrontOptions::default()).unwrap();
+        let segments = fronts.segments().unwrap();
+        assert!(
+            segments
+                .iter()
+                .flatten()
+                .any(|segment| segment.ends != [0.0, 1.0])
+        );
+        let whole = track_of_front(&oracle, &fronts, 0.05);
+        let found = measure(&job, &oracle, &whole, true, &Requirements::default(), &());
+        let other = fronts.crests().unwrap();
+        assert!(
+            (found.scallop_max.height_mm - other.max_mm).abs()
+                <= found.measurement_error_mm + 2e-3 * job.scallop_mm
+        );
+        assert!(
+            found.gouge.is_none() && found.failures.is_empty(),
+            "{:?}",
+            found.failures
+        );
+        // The last pass, on the boundary, is the oracle's to check: `last_on_boundary`.
+        for missing in [whole.passes.len() / 3, whole.passes.len() - 4] {
+            let mut track = whole.clone();
+            track.passes.remove(missing);
+            let found = measure(&job, &oracle, &track, true, &Requirements::default(), &());
+            assert!(
+                found.scallop_max.height_mm > 2.0 * job.scallop_mm && !found.failures.is_empty(),
+                "{missing}"
+            );
+        }
+    }
+}
