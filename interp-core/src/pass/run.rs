@@ -69,6 +69,12 @@ enum PassPlanning {
     Curve(CurveRun),
 }
 
+impl PassPlanning {
+    /// The starts as constants, so that they are not made on the stack.
+    const SCAN: Self = Self::Scan(PassScan::START);
+    const CURVE: Self = Self::Curve(CurveRun::START);
+}
+
 /// A run: the travel and the patch buffer.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Run {
@@ -159,7 +165,7 @@ impl Run {
     pub(crate) const START: Self = Self {
         travel: Travel::START,
         buffer: PatchBuffer::START,
-        planning: PassPlanning::Scan(PassScan::START),
+        planning: PassPlanning::SCAN,
         first_offset: [0; 3],
         last_interval: f32::INFINITY,
         step_over: None,
@@ -171,8 +177,8 @@ impl Run {
         match (&mut self.planning, spacing.is_constant()) {
             (PassPlanning::Scan(scan), false) => scan.restart(),
             (PassPlanning::Curve(curve), true) => curve.restart(),
-            (planning, true) => *planning = PassPlanning::Curve(CurveRun::START),
-            (planning, false) => *planning = PassPlanning::Scan(PassScan::START),
+            (planning, true) => *planning = PassPlanning::CURVE,
+            (planning, false) => *planning = PassPlanning::SCAN,
         }
         self.travel = Travel::START;
         self.buffer.forget();
