@@ -111,6 +111,20 @@ pub(crate) enum Reach {
     Beyond(f32),
 }
 
+/// The parametrisation at the end of the patch, or of the pass on it, and the arc to there.
+#[inline(always)]
+fn covered_to_end(
+    path_at: &mut impl FnMut(u64) -> PathSpeed,
+    patch_end: &impl Fn() -> Option<PathSpeed>,
+    [from, limit]: [u64; 2],
+    start: &PathSpeed,
+    room: f32,
+) -> Result<(PathSpeed, core::result::Result<f32, f32>)> {
+    let end = patch_end().unwrap_or_else(|| path_at(limit)).checked()?;
+    let covered = arc_over(path_at, from, start, &end, room);
+    Ok((end, covered))
+}
+
 /// Finds the end of an arc by quadrature, on a pass with the parametrisation `path_at`. `limit`: end of the patch, or of the pass on it; `patch_end` returns the
 /// parametrisation there, and is called only where the arc may reach it.
 ///
@@ -131,17 +145,11 @@ pub(crate) fn solve(
     let correction = bend * (bend * 0.5 - 0.5);
     let mut guess = first + first * correction;
     let refused = |guess: f32| Fault::new(FaultKind::ParameterBackwards, guess / first - 1.0);
-    // The series holds for a small part of the patch: where the arc may cover all of it, the end is evaluated first.
-    let to_end =
-        |path_at: &mut dyn FnMut(u64) -> PathSpeed| -> Result<(PathSpeed, core::result::Result<f32, f32>)> {
-            let end = patch_end().unwrap_or_else(|| path_at(limit)).checked()?;
-            let covered = arc_over(&mut |at| path_at(at), from, start, &end, room);
-            Ok((end, covered))
-        };
     let refused_at_end = |end: &PathSpeed, untrusted: f32| Err(refused(room + path_of(arc - untrusted, end)));
     let mut end = None;
+    // The series holds for a small part of the patch: where the arc may cover all of it, the end is evaluated first.
     if first > LONG_STEP || guess >= room {
-        match to_end(&mut path_at)? {
+        match covered_to_end(&mut path_at, &patch_end, [from, limit], start, room)? {
             (_, Ok(covered)) if covered <= arc => return Ok(Reach::Beyond(covered)),
             (speed, Ok(covered)) => end = Some((speed, covered)),
             (speed, Err(untrusted)) if guess >= room => return refused_at_end(&speed, untrusted),
@@ -172,7 +180,7 @@ pub(crate) fn solve(
     }
     // The starting value was before the patch's end; the arc ends beyond it.
     if guess >= room && end.is_none() {
-        match to_end(&mut path_at)? {
+        match covered_to_end(&mut path_at, &patch_end, [from, limit], start, room)? {
             (_, Ok(covered)) if covered <= arc => return Ok(Reach::Beyond(covered)),
             (_, Ok(_)) => {}
             (speed, Err(untrusted)) => return refused_at_end(&speed, untrusted),
