@@ -44,6 +44,9 @@ const MIDDLE_TOLERANCE: f32 = 1.0005;
 /// Step where the surface is faulty, units of the fronts.
 const FAULTY_STEP: i32 = WHOLE / 256;
 const LOWER: f32 = 1.1;
+/// Places in each interval at which crests are measured, and the bend of a front over an interval above which all of them are, as a share of the step there.
+const PLACES: u16 = 3;
+const BENT: f32 = 0.1;
 /// Scallop height to which the crests are measured, as a share of the limit.
 const MEASURED_MARGIN: f32 = 0.990;
 /// Rows of a sweep in one portion.
@@ -629,12 +632,18 @@ impl Advance {
         self.is_sharp |= per_mm > most;
     }
 
-    /// Places at which crests are measured: the middle of each interval, then both ends.
+    /// Places at which crests are measured: three in each interval, its middle first, then both ends.
     fn crest_place(&self, number: u16) -> Place {
         let intervals = self.stations.count().saturating_sub(1);
-        if number < intervals {
-            (number, 1 << 30)
-        } else if number == intervals {
+        let station = number / PLACES;
+        if station < intervals {
+            let at = match number % PLACES {
+                0 => 1 << 30,
+                1 => 1 << 29,
+                _ => 3 << 29,
+            };
+            (station, at)
+        } else if number == PLACES * intervals {
             (0, 0)
         } else {
             (intervals.saturating_sub(1), i32::MAX)
@@ -644,46 +653,56 @@ impl Advance {
     /// The station whose mark stands for a place.
     fn mark_of(&self, number: u16) -> u16 {
         let intervals = self.stations.count().saturating_sub(1);
-        if number < intervals {
-            number
-        } else if number == intervals {
+        let station = number / PLACES;
+        if station < intervals {
+            station
+        } else if number == PLACES * intervals {
             0
         } else {
             intervals.saturating_sub(1)
         }
     }
 
-    fn measure_crest<W: DerefMut<Target = [i32]>>(&mut self, job: &Job<'_>, table: &mut Table<W>) {
-        let places = self.stations.count() + 1;
-        let number = self.station;
-        let station = self.mark_of(number);
-        let bit = if number + 1 < self.stations.count() { 1 } else { 2 };
-        let mark = table.word(Column::Mark, station);
-        if mark & bit == 0 {
-            self.next_crest(places);
-            return;
-        }
-        let margin = if self.is_level {
-            LEVEL_MARGIN
-        } else {
-            MEASURED_MARGIN
-        };
-        let mut tools = Tools {
-            patch: &mut self.patch,
-            job,
-            cursor: &mut self.cursor,
-            direction: &self.direction,
-        };
-        let Some(excess) = self.search.work(&mut tools, table, margin) else {
-            return;
-        };
-        table.set_word(Column::Mark, station, mark & !bit);
-        self.note_excess(table, station, excess);
-        self.next_crest(places);
+    /// Whether the front is bent so much in an interval that its middle alone does not tell the crest.
+    fn is_bent<W: DerefMut<Target = [i32]>>(&self, job: &Job<'_>, table: &Table<W>, station: u16) -> bool {
+        let length = self.stations.length(job, station);
+        let bend = Cubic::of(table, NEXT, station, length)
+            .point(1 << 30, length)
+            .bend;
+        let [front, next] =
+            [CURRENT, NEXT].map(|columns| Cubic::of(table, columns, station, length).value(1 << 30));
+        let step = to_f32(next.saturating_sub(front)) * UNIT;
+        !(bend.abs() * length * length <= BENT * step)
     }
 
-    fn next_crest(&mut self, places: u16) {
-        self.next_station(places);
+    fn measure_crest<W: DerefMut<Target = [i32]>>(&mut self, job: &Job<'_>, table: &mut Table<W>) {
+        let places = PLACES * self.stations.count().saturating_sub(1);
+        let number = self.station;
+        let station = self.mark_of(number);
+        let bit = if number < places { 1 } else { 2 };
+        let mark = table.word(Column::Mark, station);
+        let is_middle = number.is_multiple_of(PLACES) || number >= places;
+        if mark & bit != 0 && (is_middle || self.is_bent(job, table, station)) {
+            let margin = if self.is_level {
+                LEVEL_MARGIN
+            } else {
+                MEASURED_MARGIN
+            };
+            let mut tools = Tools {
+                patch: &mut self.patch,
+                job,
+                cursor: &mut self.cursor,
+                direction: &self.direction,
+            };
+            let Some(excess) = self.search.work(&mut tools, table, margin) else {
+                return;
+            };
+            self.note_excess(table, station, excess);
+        }
+        if number >= places || (number + 1).is_multiple_of(PLACES) {
+            table.set_word(Column::Mark, station, mark & !bit);
+        }
+        self.next_station(places + 2);
         if self.task == Task::Crest {
             let place = self.crest_place(self.station);
             self.search.begin(place);
