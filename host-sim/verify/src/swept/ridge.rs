@@ -9,6 +9,8 @@ use oracle::{Oracle, OracleError};
 
 /// Points across a gap, and across each part of it between knots, at which the height is evaluated besides the crest.
 const ACROSS: usize = 8;
+/// The same where other parts of the path lower the crest.
+const ACROSS_WHOLE: usize = 32;
 /// Initial number of stations along a gap.
 const STATIONS: usize = 96;
 /// Fewest of a gap that is short.
@@ -200,7 +202,7 @@ impl<'a> Gap<'a> {
     pub(super) fn crest(&self, path: f64, guess: f64) -> Result<Crest, OracleError> {
         let mut near = self.passes.map(|pass| pass.pass().index_at(path));
         let met = self.meeting(path, guess, &mut near)?;
-        let (mut share, mut height) = self.highest(path, met, &mut near, false)?;
+        let (mut share, mut height) = self.highest(path, met, &mut near)?;
         let whole = self.tree.entry(&self.ray(path, share)?.0, height);
         let lowered = whole < height - EQUAL_MM;
         if whole < -GOUGED_MM {
@@ -208,7 +210,7 @@ impl<'a> Gap<'a> {
             height = whole;
         } else if lowered {
             // Another part of the path lowers this crest: the maximum is elsewhere.
-            (share, height) = self.highest(path, (share, whole), &mut near, true)?;
+            (share, height) = self.highest_of_whole(path, (share, whole), &mut near)?;
         }
         let (ray, area) = self.ray(path, share)?;
         Ok(Crest {
@@ -221,13 +223,12 @@ impl<'a> Gap<'a> {
         })
     }
 
-    /// The highest point across the gap, if it is above the one found already.
+    /// The highest point across the gap under its two passes, if it is above the one found already.
     fn highest(
         &self,
         path: f64,
         found: (f64, f64),
         near: &mut [usize; 2],
-        whole: bool,
     ) -> Result<(f64, f64), OracleError> {
         let mut highest = (0, f64::NEG_INFINITY);
         for (k, at) in self.across.iter().enumerate() {
@@ -240,7 +241,7 @@ impl<'a> Gap<'a> {
             }
             // A close search only where it can raise the maximum.
             if least > found.1.max(highest.1) {
-                least = self.least(path, *at, near, whole)?;
+                least = self.least(path, *at, near, false)?;
             }
             if least > highest.1 {
                 highest = (k, least);
@@ -256,8 +257,42 @@ impl<'a> Gap<'a> {
             [low, high],
             (self.across[highest.0], highest.1),
             near,
-            whole,
+            false,
         )
+    }
+
+    /// The highest point across the gap under the whole path: the best of the local maxima, each of which is one between two parts of the path.
+    fn highest_of_whole(
+        &self,
+        path: f64,
+        found: (f64, f64),
+        near: &mut [usize; 2],
+    ) -> Result<(f64, f64), OracleError> {
+        let share = |k: usize| {
+            #[allow(clippy::cast_precision_loss, reason = "small")]
+            let share = k as f64 / ACROSS_WHOLE as f64;
+            share
+        };
+        let heights: Vec<f64> = (0..=ACROSS_WHOLE)
+            .map(|k| self.least(path, share(k), near, true))
+            .collect::<Result<_, _>>()?;
+        let at = |k: Option<usize>| {
+            k.and_then(|k| heights.get(k))
+                .copied()
+                .unwrap_or(f64::NEG_INFINITY)
+        };
+        let mut best = found;
+        for (k, height) in heights.iter().enumerate() {
+            if *height < at(k.checked_sub(1)) || *height < at(Some(k + 1)) {
+                continue;
+            }
+            let bracket = [share(k.saturating_sub(1)), share((k + 1).min(ACROSS_WHOLE))];
+            let top = self.golden_maximum(path, bracket, (share(k), *height), near, true)?;
+            if top.1 > best.1 {
+                best = top;
+            }
+        }
+        Ok(best)
     }
 
     /// The point where both heights agree (regula falsi, Illinois variant; bisection where a ray misses).

@@ -249,15 +249,20 @@ impl<'a> PathTree<'a> {
                 let samples = &self.track.passes[segment.pass as usize];
                 let [path, side] = reach.excluded;
                 let inside = |range: [f64; 2], at: f64| (range[0]..=range[1]).contains(&at);
-                let is_curve = !samples.sides.is_empty();
-                let beside = !is_curve && inside(side, samples.side);
+                let is_beside = |k: u32| {
+                    inside(side, samples.side_of(k as usize)) && inside(path, samples.path[k as usize])
+                };
                 // First the same bound for the chord between the ends, with the segment's largest deviation from it.
                 let (off, distance) = nearest(ray.from, segment.ends);
                 let depth = self.radius - distance + segment.off_mm;
                 if depth <= best.get().0.max(reach.gouge_mm) {
                     let sine = (across(off, ray.along).length() / distance).min(1.0);
-                    let ends = [segment.from, segment.to];
-                    let left_out = beside && ends.into_iter().all(|k| inside(path, samples.path[k as usize]));
+                    // Along a straight pass the ends tell of all between them.
+                    let left_out = if samples.sides.is_empty() {
+                        is_beside(segment.from) && is_beside(segment.to)
+                    } else {
+                        (segment.from..=segment.to).all(is_beside)
+                    };
                     if left_out || depth + reach.around_mm * sine + second <= bound.get() {
                         return;
                     }
@@ -271,7 +276,7 @@ impl<'a> PathTree<'a> {
                     if depth > best.get().0 {
                         best.set((depth, Some((segment.pass, k))));
                     }
-                    if beside && depth <= reach.gouge_mm && inside(path, samples.path[k as usize]) {
+                    if depth <= reach.gouge_mm && is_beside(k) {
                         continue;
                     }
                     let sine = (across(off, ray.along).length() / distance).min(1.0);
