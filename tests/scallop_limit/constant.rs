@@ -95,6 +95,22 @@ fn sample_job(name: &str) -> Job {
     job_file::load(path.as_ref()).unwrap()
 }
 
+/// A whole job at its own limit: passes that end on the last edge, lowered crests beside it, sharp bends where the front has a shock.
+#[test]
+fn a_freeform_job_holds_the_limit() {
+    for start in [Start::Edge, Start::Middle] {
+        let mut job = sample_job("freeform");
+        job.spacing = Spacing::Constant(start);
+        let (excess, error) = excess(&job, &measured(&job));
+        assert!(
+            excess <= error && error <= ERROR_SHARE_MAX,
+            "{start:?}: {:.4} % above the limit, within {:.4} %",
+            100.0 * excess,
+            100.0 * error
+        );
+    }
+}
+
 /// Lengths against straight passes at the exact step.
 #[test]
 fn lengths_of_sample_jobs() {
