@@ -316,11 +316,6 @@ const BOUNDS: &[(&str, u32, &str)] = &[
         "powers of two of a span's parts",
     ),
     (
-        "interp_core::pass::contact::solve",
-        2,
-        "Newton iterations: NEWTON_STEPS",
-    ),
-    (
         "interp_core::pass::front::advance::Advance::sweep",
         8,
         "members that leave the hull: MEMBERS_MAX; columns of a station",
