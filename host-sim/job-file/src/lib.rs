@@ -170,10 +170,10 @@ fn read_spacing(cut: &Section<'_>) -> Result<Spacing, JobError> {
         true => cut.choice("spacing", &choices)?,
         false => Spacing::Exact,
     };
-    if cut.has("start") && !spacing.is_constant() {
+    if start != Start::Edge && !spacing.is_constant() {
         return Err(cut.error(
             "start",
-            "`start` is for passes of constant scallop height only",
+            "`start = \"middle\"` is for passes of constant scallop height only",
             "remove it, or write spacing = \"constant\"",
         ));
     }
