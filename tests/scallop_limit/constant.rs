@@ -49,9 +49,10 @@ fn add_case(seed: u64, start: Start, campaign: &mut Campaign) {
         return;
     }
     let (excess, error) = excess(&job, &measured(&job));
-    if error > ERROR_SHARE_MAX {
+    // Where the measuring error is large, a crest that was found above the limit is above it all the same.
+    if error > ERROR_SHARE_MAX && excess <= ERROR_SHARE_MAX {
         campaign.unmeasured += 1;
-    } else if excess > error {
+    } else if excess > error.min(ERROR_SHARE_MAX) {
         campaign.above += 1;
         println!(
             "{shape:?} {seed} {start:?}: {:.4} % above the limit, within {:.4} %",
@@ -63,9 +64,9 @@ fn add_case(seed: u64, start: Start, campaign: &mut Campaign) {
     }
 }
 
-fn campaign(cases: u64) -> Campaign {
+fn campaign(seeds: std::ops::Range<u64>) -> Campaign {
     let mut campaign = Campaign::default();
-    for seed in 0..cases {
+    for seed in seeds {
         for start in [Start::Edge, Start::Middle] {
             add_case(seed, start, &mut campaign);
         }
@@ -77,16 +78,16 @@ fn campaign(cases: u64) -> Campaign {
 /// Skew and bent ends, curvature that jumps, tapers, short passes, weights, lenses: no fault, and no crest above the limit.
 #[test]
 fn difficult_surfaces() {
-    let found = campaign(14);
+    let found = campaign(0..14);
     assert!(found.faults + found.above == 0 && found.held >= 12, "{found:?}");
 }
 
-/// `ISOFEED_CASES` sets the number of surfaces, 210 without.
+/// `ISOFEED_CASES` sets the number of surfaces, 210 without, and `ISOFEED_FIRST` leaves out those before it.
 #[test]
 #[ignore = "minutes: a campaign, see docs/figures.md"]
 fn campaign_of_difficult_surfaces() {
-    let cases = std::env::var("ISOFEED_CASES").map_or(210, |cases| cases.parse().unwrap());
-    let found = campaign(cases);
+    let number = |name: &str, usual: u64| std::env::var(name).map_or(usual, |cases| cases.parse().unwrap());
+    let found = campaign(number("ISOFEED_FIRST", 0)..number("ISOFEED_CASES", 210));
     assert!(found.faults + found.above == 0, "{found:?}");
 }
 
