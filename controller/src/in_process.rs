@@ -8,13 +8,16 @@ use interp_core::{
     job::{Header, STORE_WORDS},
     steps::{BUFFER_WORDS, CheckedSteps, StepConfig},
 };
-use protocol::message::{Description, InputLines, Reason, Status};
+use protocol::message::{Description, InputLines, Profile, Reason, Status};
 
 use crate::{
     link::Link,
     machine::{Busy, Event, Events, Instruction, Machine, describe},
+    ram_flash::RamFlash,
     realtime::{RealTime, TickInput},
     safety::Order,
+    settings::Settings,
+    storage::StorageError,
 };
 
 /// Capacity of the instruction queue, as in the firmware.
@@ -33,12 +36,16 @@ impl Events for Vec<Event> {
 }
 
 /// The real-time half and its instruction queue: the link's [`Machine`].
-#[derive(Debug, Default)]
+#[derive(Debug)]
 struct Half<const WORDS: usize> {
     real_time: RealTime<[i32; WORDS]>,
     commands: VecDeque<Instruction>,
     lines: InputLines,
+    settings: Settings<RamFlash<SECTOR>>,
 }
+
+/// Bytes of a sector of the board's flash.
+const SECTOR: usize = 4096;
 
 impl<const WORDS: usize> Machine for Half<WORDS> {
     fn description(&mut self) -> Description {
@@ -67,6 +74,14 @@ impl<const WORDS: usize> Machine for Half<WORDS> {
 
     fn load_finish(&mut self) -> Result<(), Fault> {
         self.real_time.load_finish()
+    }
+
+    fn profile(&mut self) -> Option<Profile> {
+        self.settings.profile()
+    }
+
+    fn keep_profile(&mut self, profile: Option<&Profile>) -> Result<(), StorageError> {
+        self.settings.keep(profile)
     }
 
     fn own_steps(&mut self) -> StepConfig {
@@ -108,18 +123,47 @@ impl<const WORDS: usize> Machine for Half<WORDS> {
 }
 
 /// The whole board except its pins.
-#[derive(Debug, Default)]
+#[derive(Debug)]
 pub struct Board<const WORDS: usize = STORE_WORDS> {
     half: Half<WORDS>,
     link: Link,
     sent: Vec<u8>,
 }
 
+impl<const WORDS: usize> Default for Board<WORDS> {
+    fn default() -> Self {
+        Self::with_flash(RamFlash::new())
+    }
+}
+
 impl<const WORDS: usize> Board<WORDS> {
-    /// A board after power-up.
+    /// A board after its first power-up.
     #[must_use]
     pub fn new() -> Self {
         Self::default()
+    }
+
+    /// A board after power-up, with what its flash has.
+    fn with_flash(flash: RamFlash<SECTOR>) -> Self {
+        let mut half = Half {
+            real_time: RealTime::default(),
+            commands: VecDeque::new(),
+            lines: InputLines::NONE,
+            settings: Settings::open(flash),
+        };
+        let mut link = Link::new();
+        link.power_up(&mut half);
+        Self {
+            half,
+            link,
+            sent: Vec::new(),
+        }
+    }
+
+    /// Cuts the power, and restores it.
+    #[must_use]
+    pub fn power_cycle(self) -> Self {
+        Self::with_flash(self.half.settings.into_flash())
     }
 
     /// Receives bytes from the host.

@@ -41,6 +41,12 @@ impl Link {
         }
     }
 
+    /// Puts the profile that the board keeps in force. To be called once, before the first byte.
+    pub fn power_up(&mut self, machine: &mut impl Machine) {
+        // Nothing is under way yet, which alone could refuse it.
+        let _ = self.session.enforce_profile(machine);
+    }
+
     /// Takes one byte from the host; `out` receives the bytes of the answer, if the byte ends a frame.
     pub fn receive(&mut self, byte: u8, machine: &mut impl Machine, out: &mut impl FnMut(&[u8])) {
         match self.decoder.push(byte) {

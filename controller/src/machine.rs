@@ -7,10 +7,10 @@ use interp_core::{
     steps::{CheckedSteps, StepConfig},
 };
 use protocol::message::{
-    CHUNK_WORDS_MAX, Clock, Description, InputLines, PassDigest, Reason, Report, Status,
+    CHUNK_WORDS_MAX, Clock, Description, InputLines, PassDigest, Profile, Reason, Report, Status,
 };
 
-use crate::safety::Order;
+use crate::{safety::Order, storage::StorageError};
 
 /// Instructions from the link to the real-time half; executed with the next tick of the sample timer, in order.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -84,7 +84,7 @@ pub trait Machine {
     /// Identity and capacities of the board.
     fn description(&mut self) -> Description;
 
-    /// The status, without what the link fills in: `frames_bad`, `events`, `steps`.
+    /// The status, without what the link fills in: `frames_bad`, `events`, `steps`, `profile`.
     fn status(&mut self) -> Status;
 
     /// [`interp_core::Interpolator::load_begin`] through [`crate::realtime::RealTime`].
@@ -114,7 +114,16 @@ pub trait Machine {
     /// The core's.
     fn load_finish(&mut self) -> Result<(), Fault>;
 
-    /// The board's own settings of the drives: those of a job that has none.
+    /// The profile that the board keeps, if any.
+    fn profile(&mut self) -> Option<Profile>;
+
+    /// Keeps a profile beyond a power cut; none: forgets it. Takes some milliseconds.
+    ///
+    /// # Errors
+    /// The storage cannot be written: the profile is as before.
+    fn keep_profile(&mut self, profile: Option<&Profile>) -> Result<(), StorageError>;
+
+    /// The board's own settings of the drives: those of a job that has none, on a board without a profile.
     fn own_steps(&mut self) -> StepConfig;
 
     /// [`crate::realtime::RealTime::set_steps`].

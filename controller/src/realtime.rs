@@ -101,6 +101,11 @@ impl<S: AsRef<[i32]> + AsMut<[i32]>> RealTime<S> {
         self.control.safety.set_reset_cause(cause);
     }
 
+    /// Declares that the step outputs lead to drives: jobs without limits are then refused, unless no homing is required.
+    pub const fn set_has_drives(&mut self, has_drives: bool) {
+        self.control.has_drives = has_drives;
+    }
+
     /// Adds step outputs on these pins of a port, with the axes at the origin.
     pub fn set_step_pins(&mut self, checked: CheckedSteps, pins: [u8; 3]) {
         self.steps = Some(Steps::new(checked, pins));
@@ -372,7 +377,7 @@ impl<S: AsRef<[i32]> + AsMut<[i32]>> RealTime<S> {
         self.control.put(halted, events);
     }
 
-    /// The status; the link fills in `frames_bad`, `events` and `steps`.
+    /// The status; the link fills in `frames_bad`, `events`, `steps` and `profile`.
     #[must_use]
     #[inline(never)]
     pub fn status(&self) -> Status {
@@ -410,6 +415,7 @@ impl<S: AsRef<[i32]> + AsMut<[i32]>> RealTime<S> {
             halts: self.control.halts,
             events: 0,
             steps: 0,
+            profile: 0,
             safety: self.control.safety.status(),
         }
     }

@@ -10,8 +10,8 @@ use interp_core::{
 use protocol::{
     frame::{DELIMITER, FRAME_MAX, Frame, write_reply},
     message::{
-        Capabilities, Clock, NO_NUMBER, OVERRIDE_MAX_PERCENT, Reason, Reply, Request, Status, StepSettings,
-        next_number, read_request,
+        Capabilities, Clock, Configuration, Excess, NO_NUMBER, OVERRIDE_MAX_PERCENT, Profile, ProfileLimit,
+        Reason, Reply, Request, Status, StepSettings, next_number, read_request,
     },
     version::PROTOCOL_VERSION,
 };
@@ -20,11 +20,12 @@ use crate::{
     history::History,
     machine::{Busy, Instruction, Machine},
     safety::Order,
+    storage::StorageError,
     upload::Upload,
 };
 
-/// Maximum length of an answer stored for a retransmission, bytes: a frame of `Status` with every varint at its maximum length.
-const ANSWER_MAX: usize = 126;
+/// Maximum length of an answer stored for a retransmission, bytes: a frame of `Status` with every varint at its maximum length. That of a `Profile` is shorter.
+const ANSWER_MAX: usize = 131;
 
 /// State of the session.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -93,6 +94,10 @@ pub(crate) struct Session {
     events: History,
     /// Settings of the drives in force; none before the first job: the board's own.
     steps: Option<StepConfig>,
+    /// Digest of the profile that the board keeps.
+    profile: u32,
+    /// The job was loaded under another profile.
+    is_outdated: bool,
 }
 
 impl Session {
@@ -106,7 +111,39 @@ impl Session {
             frames_bad: 0,
             events: History::new(),
             steps: None,
+            profile: 0,
+            is_outdated: false,
         }
+    }
+
+    /// Puts the profile that the board keeps in force: at power-up, and after a change.
+    ///
+    /// # Errors
+    /// A run is under way.
+    pub(crate) fn enforce_profile(&mut self, machine: &mut impl Machine) -> Result<(), Reason> {
+        let profile = machine.profile();
+        self.profile = profile.map_or(0, |profile| profile.digest());
+        let configuration = profile.map_or(Configuration::DEFAULT, |profile| profile.configuration);
+        machine.order(Order::Configure(configuration))?;
+        let own = own_steps(machine);
+        self.set_steps(machine, own)
+    }
+
+    /// Keeps another profile, or none.
+    fn set_profile(&mut self, machine: &mut impl Machine, profile: Option<&Profile>) -> Result<(), Reason> {
+        let state = machine.status().state;
+        if state.is_under_way() {
+            return Err(Reason::WrongState { state });
+        }
+        if profile.is_some_and(|profile| !profile.is_valid()) {
+            return Err(Reason::BadProfile);
+        }
+        machine
+            .keep_profile(profile)
+            .map_err(|StorageError| Reason::Storage)?;
+        self.is_outdated = true;
+        self.upload = None;
+        self.enforce_profile(machine)
     }
 
     pub(crate) const fn is_open(&self) -> bool {
@@ -119,7 +156,7 @@ impl Session {
 
     /// The status of an answer: with the link's counters, and the settings of the drives.
     fn complete_with_steps(&mut self, machine: &mut impl Machine) -> Status {
-        let config = self.steps.unwrap_or_else(|| machine.own_steps());
+        let config = self.steps.unwrap_or_else(|| own_steps(machine));
         self.steps = Some(config);
         self.complete(machine.status())
     }
@@ -129,6 +166,7 @@ impl Session {
         let steps = self.steps.map_or(0, |config| StepSettings::from(config).digest());
         Status {
             steps,
+            profile: self.profile,
             frames_bad: self.frames_bad,
             events: self.events.last(),
             ..status
@@ -251,6 +289,13 @@ impl Session {
                     status: self.complete_with_steps(machine),
                 };
             }
+            Request::Profile => {
+                return Reply::Profile {
+                    number,
+                    profile: machine.profile(),
+                };
+            }
+            Request::SetProfile(profile) => self.set_profile(machine, profile.as_ref()),
             Request::JobBegin {
                 header,
                 words,
@@ -268,7 +313,7 @@ impl Session {
                 }
             }
             Request::Override { percent } => set_override(machine, percent),
-            Request::Configure(configuration) => machine.order(Order::Configure(configuration)),
+            Request::Configure(configuration) => configure(machine, configuration),
             Request::Drives { on } => machine.order(Order::Drives { on }),
             Request::SetHome { home_nm } => machine.order(Order::SetHome { home_nm }),
             Request::Acknowledge => machine.order(Order::Acknowledge),
@@ -280,6 +325,9 @@ impl Session {
             }
             Request::Run { ticks } => instruct(machine, Instruction::Run { ticks }),
             Request::Report(report) => instruct(machine, Instruction::Report(report)),
+            Request::StepConfig(settings) if has_other_steps(machine, settings) => {
+                Err(beyond(Excess::of(ProfileLimit::Steps)))
+            }
             Request::StepConfig(settings) => self.set_steps(machine, settings.into()),
             Request::Repeat { event, count } if self.events.repeat(event, count, out) => Ok(()),
             Request::Repeat { .. } => Err(Reason::EventGone {
@@ -305,10 +353,17 @@ impl Session {
         if self.commanded && machine.instructions_wait() {
             return Err(Reason::Busy);
         }
+        let profile = machine.profile();
+        if let (Some(profile), Some(axes)) = (profile, &header.axes)
+            && let Some(excess) = profile.exceeded_by(axes)
+        {
+            return Err(beyond(excess));
+        }
         self.commanded = false;
         self.upload = Some(Upload::begin(machine, header, words, digest)?);
+        self.is_outdated = false;
         // Those of the job before are not for this one.
-        let own = machine.own_steps();
+        let own = own_steps(machine);
         self.set_steps(machine, own)
     }
 
@@ -332,6 +387,9 @@ impl Session {
             return Err(Reason::WrongState { state });
         }
         if command == Command::Start {
+            if self.is_outdated {
+                return Err(Reason::OtherProfile);
+            }
             machine.may_start()?;
         }
         instruct(machine, Instruction::Command(command))?;
@@ -349,6 +407,34 @@ impl Session {
         self.clock = clock;
         Ok(())
     }
+}
+
+/// The settings of the drives of a job that has none: the profile's, or the board's own.
+fn own_steps(machine: &mut impl Machine) -> StepConfig {
+    match machine.profile() {
+        Some(profile) => profile.steps.into(),
+        None => machine.own_steps(),
+    }
+}
+
+const fn beyond(excess: Excess) -> Reason {
+    Reason::BeyondProfile { excess }
+}
+
+/// Whether these settings differ from the profile's, if the board keeps one.
+fn has_other_steps(machine: &mut impl Machine, settings: StepSettings) -> bool {
+    machine.profile().is_some_and(|profile| profile.steps != settings)
+}
+
+/// A job may want a machine to be homed that need not be, but not the other way round.
+fn configure(machine: &mut impl Machine, configuration: Configuration) -> Result<(), Reason> {
+    let must_home = machine
+        .profile()
+        .is_some_and(|profile| profile.configuration.homing_required);
+    if must_home && !configuration.homing_required {
+        return Err(beyond(Excess::of(ProfileLimit::Homing)));
+    }
+    machine.order(Order::Configure(configuration))
 }
 
 fn set_override(machine: &mut impl Machine, percent: u8) -> Result<(), Reason> {
@@ -400,7 +486,7 @@ pub(crate) fn send(reply: &Reply, out: &mut impl FnMut(&[u8])) {
 mod tests {
     use super::*;
     use interp_core::sample::{SpanParameter, State};
-    use protocol::message::{Configuration, FaultReport, InputLines, Report, SafetyStatus};
+    use protocol::message::{FaultReport, InputLines, Report, SafetyStatus};
 
     #[test]
     fn the_longest_status_is_kept() {
@@ -431,6 +517,7 @@ mod tests {
             halts: u32::MAX,
             events: u32::MAX,
             steps: u32::MAX,
+            profile: u32::MAX,
             safety: SafetyStatus {
                 lines: InputLines(u16::MAX),
                 latched: InputLines(u16::MAX),

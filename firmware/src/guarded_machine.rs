@@ -5,6 +5,8 @@ use controller::{
     machine::{Busy, Instruction, Machine, describe},
     realtime::RealTime,
     safety::Order,
+    settings::Settings,
+    storage::StorageError,
 };
 use heapless::spsc::Producer;
 use interp_core::{
@@ -12,11 +14,11 @@ use interp_core::{
     job::Header,
     steps::{CheckedSteps, StepConfig},
 };
-use protocol::message::{Description, InputLines, Reason, Status};
+use protocol::message::{Description, InputLines, Profile, Reason, Status};
 use rtic::Mutex;
 
 use crate::{
-    board::{self, BOARD},
+    board::{self, BOARD, SettingsFlash},
     design_parameters::{FIRMWARE_VERSION, JOB_WORDS, PERIOD_US},
 };
 
@@ -30,6 +32,8 @@ pub(crate) struct GuardedMachine<'a, M> {
     pub(crate) real_time: M,
     /// Commands to the next tick.
     pub(crate) commands: &'a mut Producer<'static, Instruction>,
+    /// The machine's profile.
+    pub(crate) settings: &'a mut Settings<SettingsFlash>,
 }
 
 impl<M: Mutex<T = BoardRealTime>> GuardedMachine<'_, M> {
@@ -68,6 +72,14 @@ impl<M: Mutex<T = BoardRealTime>> Machine for GuardedMachine<'_, M> {
 
     fn load_finish(&mut self) -> Result<(), Fault> {
         self.real_time.lock(|real_time| real_time.load_finish())
+    }
+
+    fn profile(&mut self) -> Option<Profile> {
+        self.settings.profile()
+    }
+
+    fn keep_profile(&mut self, profile: Option<&Profile>) -> Result<(), StorageError> {
+        self.settings.keep(profile)
     }
 
     fn own_steps(&mut self) -> StepConfig {

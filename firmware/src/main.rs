@@ -36,6 +36,7 @@ mod app {
         link::Link,
         machine::{Event, Instruction},
         realtime::RealTime,
+        settings::Settings,
         step_output::Buffers,
     };
     use cortex_m::peripheral::NVIC;
@@ -89,6 +90,7 @@ mod app {
         receiver: Receiver,
         transmitter: Transmitter,
         led: StatusLed<Output>,
+        settings: Settings<board::SettingsFlash>,
         bytes_in: Producer<'static, u8>,
         bytes_out: Consumer<'static, u8>,
         commands_in: Producer<'static, Instruction>,
@@ -133,10 +135,13 @@ mod app {
         if !output.is_present() {
             defmt::warn!("this board puts no steps out");
         }
+        // Before the first tick, because an erase stops the processor.
+        let settings = Settings::open(board.settings);
         let timer = SampleTimer::new(board.tim2, board.tim5, board::TIMER_RELOAD, PERIOD_COUNTS);
         let mut real_time = RealTime::with_store(context.local.store);
         real_time.set_tick_budget(TICK_BUDGET_CYCLES);
         real_time.set_reset_cause(board.reset);
+        real_time.set_has_drives(output.is_present());
         match board.reset {
             ResetCause::Watchdog => defmt::error!("the watchdog has reset the board"),
             cause => defmt::info!("last reset: {=str}", cause.name()),
@@ -164,6 +169,7 @@ mod app {
                 receiver,
                 transmitter,
                 led: StatusLed::new(Output::new(LED.pin), LED.active),
+                settings,
                 bytes_in,
                 bytes_out,
                 commands_in,
@@ -237,12 +243,13 @@ mod app {
     /// | a miss | in lockstep time waits for it; on a free clock events are lost once their queue is full, and counted (`samples_lost`) |
     #[idle(
         shared = [real_time],
-        local = [transmitter, led, bytes_out, commands_in, events_out]
+        local = [transmitter, led, settings, bytes_out, commands_in, events_out]
     )]
     fn idle(context: idle::Context) -> ! {
         let idle::LocalResources {
             transmitter,
             led,
+            settings,
             bytes_out,
             commands_in,
             events_out,
@@ -252,9 +259,11 @@ mod app {
         let mut machine = GuardedMachine {
             real_time,
             commands: commands_in,
+            settings,
         };
         transmitter.listen();
         let mut link = Link::new();
+        link.power_up(&mut machine);
         let mut watch = Watch::default();
         let mut last_event = None;
         loop {

@@ -30,6 +30,12 @@ pub const DELIMITER: u8 = 0;
 
 static CRC: Crc<u32> = Crc::<u32>::new(&CRC_32_ISO_HDLC);
 
+/// The CRC-32 of frames (ISO HDLC) of any bytes.
+#[must_use]
+pub fn crc32(bytes: &[u8]) -> u32 {
+    CRC.checksum(bytes)
+}
+
 /// A message that does not fit into a frame (or into the buffer offered).
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct NoRoom;

@@ -18,7 +18,8 @@
 //! | `JobBegin`, `JobChunk` .., `JobEnd` | → ← | `Ack` or `Nak` each |
 //! | `Clock`, `Report`, `StepConfig` | → ← | `Ack` or `Nak` |
 //! | `Start`, `Hold`, `Resume`, `Stop`, `Abort`, `Override` | → ← | `Ack` or `Nak` |
-//! | `Configure`, `Drives`, `SetHome`, `Acknowledge` | → ← | `Ack` or `Nak` |
+//! | `Configure`, `Drives`, `SetHome`, `Acknowledge`, `SetProfile` | → ← | `Ack` or `Nak` |
+//! | `Profile` | → ← | `Profile` |
 //! | `Run` | → ← | `Ack` or `Nak`, later `Halted` |
 //! | `Status` | → ← | `Status` |
 //! | `Repeat` | → ← | events again, then `Ack`; or `Nak` |
@@ -49,6 +50,11 @@
 //! | a start, or a home, while the drives are off | `Nak`, `DrivesOff` | |
 //! | a start while the axes do not stand at the job's home | `Nak`, `NotAtHome` with both positions | |
 //! | a value beyond its range | `Nak`, `OutOfRange` with the range | |
+//! | a job that exceeds the board's profile, or other steps than the profile's | `Nak`, `BeyondProfile` with the value | |
+//! | a profile with an invalid value | `Nak`, `BadProfile` | |
+//! | a profile that cannot be kept | `Nak`, `Storage` | |
+//! | a start of a job that was loaded under another profile | `Nak`, `OtherProfile` | |
+//! | a start of a job without axis limits, on a board with drives that has to be homed | `Nak`, `NoLimits` | |
 //! | a `Repeat` of an event that is not kept any more | `Nak`, `EventGone` with the first that is | |
 //!
 //! Where the last column is empty, nothing has changed. An event that the line damages is lost: the host sees it by the numbers of the
@@ -81,6 +87,7 @@ pub mod digest;
 pub mod frame;
 mod frame_error;
 pub mod message;
+mod profile;
 mod reason;
 mod records;
 pub mod safety;

@@ -35,7 +35,7 @@
 //! | 9 | `Clock` | 0 free, 1 lockstep | `Ack` |
 //! | 10 | `Run` | ticks `u32` | `Ack`, and `Halted` when the ticks are used up |
 //! | 11 | `Report` | 0 digests, 1 samples | `Ack` |
-//! | 12 | `StepConfig` | the fields of [`StepSettings`] | `Ack`; refused while a run is under way; in force until the next `JobBegin` |
+//! | 12 | `StepConfig` | the fields of [`StepSettings`] | `Ack`; refused while a run is under way; in force until the next `JobBegin`; those of the profile only, where the board has one |
 //! | 13 | `Configure` | the fields of [`Configuration`] | `Ack`, and it holds |
 //! | 14 | `Drives` | 0 off, 1 on | as `Configure` |
 //! | 15 | `SetHome` | three positions in nm, `i32` each | as `Configure` |
@@ -44,6 +44,8 @@
 //! | 18 | `Stop` | | as `Start` |
 //! | 19 | `Simulate` | inputs `u16` | `Ack`, by a board without pins only |
 //! | 20 | `Repeat` | event `u32`, count `u8` | these events again, then `Ack` |
+//! | 21 | `Profile` | | `Profile` |
+//! | 22 | `SetProfile` | option of the fields of [`Profile`] | `Ack`, and it holds, also after a power cut |
 //!
 //! Header: kind, pattern, spacing, tool side (a byte each), spans along path and side (`u16`), ball radius (mm), feed (mm/s),
 //! scallop height (mm), period (s) (`f32`); then 0, or 1 and the axes' limits: velocity (mm/s), acceleration (mm/s^2), jerk (mm/s^3)
@@ -63,6 +65,7 @@
 //! | 4 | `Samples` | event `u32`, list of samples (tick, state, pass, path and side parameter, feed, CC and CL, interval) |
 //! | 5 | `PassDigest` | event `u32`, the fields of [`PassDigest`] |
 //! | 6 | `Halted` | the fields of [`Status`], with the event in `events` |
+//! | 7 | `Profile` | number, option of the fields of [`Profile`]; an answer like the first four |
 //!
 //! A parameter is its span (`u16`) and fraction. `Halted` comes when the ticks of a `Run` are used up, or when a run ends
 //! (finished, faulted, aborted), whichever is first.
@@ -88,6 +91,7 @@
 use interp_core::{command::Command, job::Header};
 use serde::{Deserialize, Serialize};
 
+pub use crate::profile::{Excess, PROFILE_BYTES_MAX, Profile, ProfileLimit};
 pub use crate::reason::Reason;
 pub use crate::records::{
     BOARD_NAME_MAX, Batch, CHUNK_WORDS_MAX, Clock, Description, FaultReport, PassDigest, Report, SAMPLES_MAX,
@@ -201,6 +205,10 @@ pub enum Request {
         /// How many; fewer where the last one comes before.
         count: u8,
     },
+    /// Asks for the profile that the board keeps.
+    Profile,
+    /// Keeps a profile beyond a power cut; none: forgets it. In force at once; the job has to be loaded again. Refused while a run is under way.
+    SetProfile(Option<Profile>),
 }
 
 impl From<Command> for Request {
@@ -304,6 +312,13 @@ pub enum Reply {
     },
     /// The ticks of a `Run` are used up, or the run is over. The number of the event is the status's `events`.
     Halted(Status),
+    /// Answer to `Profile`.
+    Profile {
+        /// Number of the request.
+        number: u16,
+        /// The profile; none where the board keeps none.
+        profile: Option<Profile>,
+    },
 }
 
 /// A payload with a correct CRC that is not a message of this version.
@@ -401,7 +416,7 @@ mod tests {
         assert_eq!(read_request(&[]), Err(Unreadable { number: NO_NUMBER }));
         assert_eq!(read_request(&[9]), Err(Unreadable { number: 9 }));
         // an unknown code, a missing field, a byte left over, an unknown clock
-        for payload in [&[9, 21][..], &[9, 10], &[9, 4, 0], &[9, 9, 2]] {
+        for payload in [&[9, 23][..], &[9, 10], &[9, 4, 0], &[9, 9, 2]] {
             assert_eq!(
                 read_request(payload),
                 Err(Unreadable { number: 9 }),

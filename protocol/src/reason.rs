@@ -8,6 +8,7 @@ use serde::{Deserialize, Serialize};
 use crate::{
     codes,
     frame_error::FrameError,
+    profile::{Excess, ProfileLimit},
     records::{Clock, FaultReport},
     version::VersionMismatch,
 };
@@ -117,6 +118,19 @@ pub enum Reason {
         /// The earliest event that is kept; the number of the next one where none is.
         first: u32,
     },
+    /// 20: a job, or a setting for it, exceeds the profile that the board keeps.
+    BeyondProfile {
+        /// What does.
+        excess: Excess,
+    },
+    /// 21: a profile with a value out of range.
+    BadProfile,
+    /// 22: the board cannot write its settings: they are as before.
+    Storage,
+    /// 23: the job was loaded under another profile, and has to be loaded again.
+    OtherProfile,
+    /// 24: a job without axis limits, on a board with drives: it would begin with a jump of the position and without a ramp.
+    NoLimits,
 }
 
 impl Reason {
@@ -144,6 +158,11 @@ impl Reason {
             Self::Unsupported => 17,
             Self::NotAtHome { .. } => 18,
             Self::EventGone { .. } => 19,
+            Self::BeyondProfile { .. } => 20,
+            Self::BadProfile => 21,
+            Self::Storage => 22,
+            Self::OtherProfile => 23,
+            Self::NoLimits => 24,
         }
     }
 
@@ -203,6 +222,25 @@ fn not_at_home(
     }
 }
 
+/// What of a job exceeds the profile.
+fn beyond_profile(excess: Excess, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
+    let Excess {
+        limit,
+        axis,
+        most,
+        wanted,
+    } = excess;
+    write!(formatter, "beyond the machine's profile: {}", limit.name())?;
+    match limit {
+        ProfileLimit::Steps | ProfileLimit::Homing => Ok(()),
+        _ => {
+            let axis = usize::from(axis);
+            let axis = ["x", "y", "z"].get(axis).copied().unwrap_or("?");
+            write!(formatter, ": {wanted} on {axis}, the profile has {most}")
+        }
+    }
+}
+
 impl fmt::Display for Reason {
     fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
         match *self {
@@ -249,6 +287,14 @@ impl fmt::Display for Reason {
             Self::EventGone { first } => write!(
                 formatter,
                 "the board keeps its events from number {first} on only"
+            ),
+            Self::BeyondProfile { excess } => beyond_profile(excess, formatter),
+            Self::BadProfile => write!(formatter, "a value of the profile is out of range"),
+            Self::Storage => write!(formatter, "the board cannot write its settings"),
+            Self::OtherProfile => write!(formatter, "the job was loaded under another profile"),
+            Self::NoLimits => write!(
+                formatter,
+                "the job has no axis limits, and the board has drives: they would jump to its first point"
             ),
         }
     }

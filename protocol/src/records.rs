@@ -155,6 +155,8 @@ pub struct Status {
     pub events: u32,
     /// Digest of the settings of the drives in force: [`StepSettings::digest`].
     pub steps: u32,
+    /// Digest of the profile that the board keeps, [`crate::message::Profile::digest`]; 0 where it keeps none.
+    pub profile: u32,
     /// Inputs, drives, home.
     pub safety: SafetyStatus,
 }
@@ -181,6 +183,7 @@ impl Default for Status {
             halts: 0,
             events: 0,
             steps: 0,
+            profile: 0,
             safety: SafetyStatus::DEFAULT,
         }
     }
@@ -297,6 +300,24 @@ pub struct StepSettings {
 }
 
 impl StepSettings {
+    /// [`StepConfig::DEFAULT`].
+    pub const DEFAULT: Self = {
+        let StepConfig {
+            axes: [x, y, z],
+            pulse_slots,
+            setup_slots,
+        } = StepConfig::DEFAULT;
+        Self {
+            axes: [
+                (x.steps, x.mm, x.inverted),
+                (y.steps, y.mm, y.inverted),
+                (z.steps, z.mm, z.inverted),
+            ],
+            pulse_slots,
+            setup_slots,
+        }
+    };
+
     /// Digest of every value, by which host and board compare the settings in force: the [`Digest`] of three words for each axis and two for the times,
     /// its halves combined by exclusive or.
     #[must_use]

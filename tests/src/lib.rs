@@ -7,6 +7,7 @@ pub mod golden;
 use controller::{
     machine::{Busy, Instruction, Machine, describe},
     safety::{Order, may_start},
+    storage::StorageError,
 };
 use interp_core::{
     encode,
@@ -19,7 +20,7 @@ use protocol::{
     digest::job_digest,
     frame::{Decoder, FRAME_MAX, write_request},
     message::{
-        Description, InputLines, NO_NUMBER, Reason, Reply, Request, SafetyStatus, Status, Words, next_number,
+        Description, InputLines, NO_NUMBER, Profile, Reason, Reply, Request, SafetyStatus, Status, Words, next_number,
         read_reply,
     },
 };
@@ -176,6 +177,8 @@ pub struct Mock {
     pub simulated: bool,
     /// How often it heard a sign of life of the host.
     pub heard: u32,
+    /// The profile that it keeps.
+    pub profile: Option<Profile>,
 }
 
 impl Machine for Mock {
@@ -212,6 +215,15 @@ impl Machine for Mock {
 
     fn load_finish(&mut self) -> Result<(), Fault> {
         self.calls.push(Call::Finish);
+        Ok(())
+    }
+
+    fn profile(&mut self) -> Option<Profile> {
+        self.profile
+    }
+
+    fn keep_profile(&mut self, profile: Option<&Profile>) -> Result<(), StorageError> {
+        self.profile = profile.copied();
         Ok(())
     }
 

@@ -45,6 +45,8 @@ pub(super) struct Control {
     pub(super) safety: Safety,
     /// The next run within limits has to begin at its job's home.
     pub(super) from_home: bool,
+    /// The step outputs lead to drives.
+    pub(super) has_drives: bool,
 }
 
 impl Control {
@@ -62,6 +64,7 @@ impl Control {
             command: None,
             safety: Safety::NEW,
             from_home: true,
+            has_drives: false,
         }
     }
 

@@ -37,10 +37,15 @@ impl<S: AsRef<[i32]> + AsMut<[i32]>> RealTime<S> {
     /// Whether a run may start.
     ///
     /// # Errors
-    /// The reason of the refusal: an input asserted or latched, the drives off, the machine not homed, or not at the start position.
+    /// The reason of the refusal: an input asserted or latched, the drives off, the machine not homed, or not at the start position; a job without limits on
+    /// drives.
     pub fn may_start(&self) -> Result<(), Reason> {
         let status = self.control.safety.status();
         may_start(&status)?;
+        let has_axes = self.control.has_drives && status.configuration.homing_required;
+        if has_axes && !self.interpolator.has_limits() {
+            return Err(Reason::NoLimits);
+        }
         let stands_nm = self.interpolator.stands_nm();
         match self.interpolator.home_nm() {
             Some(home_nm) if status.homed && self.control.from_home && stands_nm != Some(home_nm) => {
@@ -175,10 +180,13 @@ mod tests {
             assert_eq!(half.may_start(), may);
             assert_eq!(half.begin(), begun);
         }
-        // Without limits a run starts at any position.
+        // Without limits a run starts at any position, but not on drives.
         let mut half = with_plate(None);
         order(&mut half, DRIVES_ON);
         order(&mut half, Order::SetHome { home_nm: near });
+        half.set_has_drives(true);
+        assert_eq!(half.may_start(), Err(Reason::NoLimits));
+        half.set_has_drives(false);
         assert_eq!(half.begin(), Some(Command::Start));
         assert_eq!(half.interpolator.stands_nm(), None);
     }

@@ -92,10 +92,13 @@ pub(crate) fn init(device: pac::Peripherals) -> Board {
         dma2: device.DMA2,
         usart1: device.USART1,
         iwdg: device.IWDG,
+        settings: SettingsFlash::new(device.FLASH),
         reset,
     }
 }
 
+/// Settings are kept in the chip's flash.
+pub(crate) use crate::drivers::settings_flash::SettingsFlash;
 /// The safety inputs are pins.
 pub(crate) use crate::drivers::gpio::Ports as InputPorts;
 

@@ -15,6 +15,7 @@
 //! | `SERIAL_DIVIDER` | `BRR` of USART1 |
 //! | `init` | sets up the clocks; returns the peripherals for the drivers |
 //! | `InputPorts` | source of the safety inputs: the chip's ports, or simulated ones |
+//! | `SettingsFlash` | where settings are kept |
 //! | `simulate` | sets the simulated inputs of a board without pins |
 //! | `stop_for_good` | final state after a processor fault |
 //!
@@ -39,16 +40,16 @@ compile_error!("choose one board: `cargo fw-qemu`, `cargo fw-chip` or `cargo fw-
 mod qemu;
 #[cfg(feature = "board-qemu")]
 pub(crate) use qemu::{
-    BOARD, InputPorts, SERIAL_DIVIDER, STEP_TIMER_HZ, TIME_IS_SIMULATED, TIMER_HZ, TIMER_RELOAD, init,
-    simulate, stop_for_good,
+    BOARD, InputPorts, SERIAL_DIVIDER, STEP_TIMER_HZ, SettingsFlash, TIME_IS_SIMULATED, TIMER_HZ,
+    TIMER_RELOAD, init, simulate, stop_for_good,
 };
 
 #[cfg(not(feature = "board-qemu"))]
 mod chip;
 #[cfg(not(feature = "board-qemu"))]
 pub(crate) use chip::{
-    InputPorts, SERIAL_DIVIDER, STEP_TIMER_HZ, TIME_IS_SIMULATED, TIMER_HZ, TIMER_RELOAD, init, simulate,
-    stop_for_good,
+    InputPorts, SERIAL_DIVIDER, STEP_TIMER_HZ, SettingsFlash, TIME_IS_SIMULATED, TIMER_HZ, TIMER_RELOAD,
+    init, simulate, stop_for_good,
 };
 
 #[cfg(feature = "board-stm32f405")]
@@ -131,6 +132,8 @@ pub(crate) struct Board {
     pub(crate) usart1: pac::USART1,
     /// The watchdog, not started.
     pub(crate) iwdg: pac::IWDG,
+    /// Where settings are kept.
+    pub(crate) settings: SettingsFlash,
     /// Why the chip started.
     pub(crate) reset: ResetCause,
 }

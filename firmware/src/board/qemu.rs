@@ -7,6 +7,7 @@
 use core::sync::atomic::{AtomicBool, AtomicU32, Ordering};
 
 use boards::Port;
+use controller::ram_flash::RamFlash;
 use protocol::message::InputLines;
 use stm32f4xx_hal::pac;
 
@@ -59,9 +60,13 @@ pub(crate) fn init(device: pac::Peripherals) -> Board {
         dma2: device.DMA2,
         usart1: device.USART1,
         iwdg: device.IWDG,
+        settings: SettingsFlash::new(),
         reset: take_reset_cause(&device.RCC),
     }
 }
+
+/// QEMU's flash cannot be written: settings are kept as long as QEMU runs.
+pub(crate) type SettingsFlash = RamFlash<1024>;
 
 /// Simulated input registers of the ports: the inputs set by the host, initially none.
 static INPUTS: [AtomicU32; Port::ALL.len()] = [const { AtomicU32::new(0) }; Port::ALL.len()];

@@ -9,6 +9,8 @@ pub(crate) mod reset_cause;
 pub(crate) mod safety_inputs;
 pub(crate) mod sample_timer;
 pub(crate) mod serial;
+#[cfg(not(feature = "board-qemu"))]
+pub(crate) mod settings_flash;
 pub(crate) mod status_led;
 pub(crate) mod step_output;
 pub(crate) mod watchdog;

@@ -1,0 +1,156 @@
+use super::*;
+use crate::ram_flash::{OutOfBounds, RamFlash};
+use embedded_storage::nor_flash::{ErrorType, ReadNorFlash};
+use std::vec::Vec;
+
+/// Slots of a sector.
+const SLOTS: usize = 6;
+const SECTOR: usize = SLOTS * SLOT;
+
+/// Flash whose supply fails after a number of bytes written and halves of sectors erased: the one after that is done in part, those behind it not at all.
+#[derive(Clone, Debug)]
+struct Failing {
+    flash: RamFlash<SECTOR>,
+    left: u32,
+    /// Bits of the last byte that are still written.
+    bits: u8,
+}
+
+impl ErrorType for Failing {
+    type Error = OutOfBounds;
+}
+
+impl ReadNorFlash for Failing {
+    const READ_SIZE: usize = 1;
+
+    fn read(&mut self, offset: u32, bytes: &mut [u8]) -> Result<(), OutOfBounds> {
+        self.flash.read(offset, bytes)
+    }
+
+    fn capacity(&self) -> usize {
+        self.flash.capacity()
+    }
+}
+
+impl NorFlash for Failing {
+    const WRITE_SIZE: usize = 1;
+    const ERASE_SIZE: usize = SECTOR;
+
+    fn erase(&mut self, from: u32, to: u32) -> Result<(), OutOfBounds> {
+        // The order in which a sector is erased is not specified: the second half first, so that the older records last.
+        let middle = from + (to - from) / 2;
+        for (from, to) in [(middle, to), (from, middle)] {
+            self.left = self.left.checked_sub(1).ok_or(OutOfBounds)?;
+            self.flash.erase(from, to)?;
+        }
+        Ok(())
+    }
+
+    fn write(&mut self, offset: u32, bytes: &[u8]) -> Result<(), OutOfBounds> {
+        for (at, byte) in (offset..).zip(bytes) {
+            let Some(left) = self.left.checked_sub(1) else {
+                self.flash.write(at, &[byte | !self.bits])?;
+                self.bits = 0;
+                return Err(OutOfBounds);
+            };
+            self.left = left;
+            self.flash.write(at, &[*byte])?;
+        }
+        Ok(())
+    }
+}
+
+fn read(flash: &RamFlash<SECTOR>) -> Option<Vec<u8>> {
+    let found = Storage::open(flash.clone()).newest(Kind::Profile);
+    found.map(|payload| payload.bytes().to_vec())
+}
+
+#[test]
+fn the_newest_record_is_in_force() {
+    let mut storage = Storage::open(RamFlash::<SECTOR>::new());
+    assert!(storage.newest(Kind::Profile).is_none());
+    for length in 0..3 * SLOTS {
+        let payload: Vec<u8> = (0..length as u8).collect();
+        storage.keep(Kind::Profile, &payload).unwrap();
+        assert_eq!(storage.newest(Kind::Profile).unwrap().bytes(), payload);
+        // At a power-up in between.
+        storage = Storage::open(storage.flash);
+        assert_eq!(storage.newest(Kind::Profile).unwrap().bytes(), payload);
+    }
+    assert_eq!(storage.keep(Kind::Profile, &[0; PAYLOAD_MAX + 1]), Err(StorageError));
+    storage.keep(Kind::Profile, &[0; PAYLOAD_MAX]).unwrap();
+}
+
+#[test]
+fn without_a_power_up_there_is_room_for_two_sectors() {
+    let mut storage = Storage::open(RamFlash::<SECTOR>::new());
+    for record in 0..2 * SLOTS {
+        storage.keep(Kind::Profile, &[record as u8]).unwrap();
+    }
+    assert_eq!(storage.keep(Kind::Profile, &[99]), Err(StorageError));
+    assert_eq!(
+        storage.newest(Kind::Profile).unwrap().bytes(),
+        [2 * SLOTS as u8 - 1]
+    );
+    let mut storage = Storage::open(storage.flash);
+    storage.keep(Kind::Profile, &[99]).unwrap();
+    assert_eq!(storage.newest(Kind::Profile).unwrap().bytes(), [99]);
+}
+
+#[test]
+fn what_else_was_in_the_sectors_is_erased() {
+    let mut flash = RamFlash::<SECTOR>::new();
+    flash.write(700, &[0; 900]).unwrap();
+    let mut storage = Storage::open(flash);
+    for record in 0..SLOTS as u8 {
+        storage.keep(Kind::Profile, &[record]).unwrap();
+    }
+    assert_eq!(storage.newest(Kind::Profile).unwrap().bytes(), [SLOTS as u8 - 1]);
+}
+
+/// The supply fails at every byte and at every half of an erase, during several turns of both sectors: what is read at the next power-up is the last record
+/// that was kept, or the one whose writing was cut short, and both can be followed by others.
+#[test]
+fn a_power_cut_at_any_operation_loses_nothing_that_was_kept() {
+    let mut cuts = 0;
+    for bits in [0, 0x0f, 0xff] {
+        for left in 0.. {
+            let mut flash = RamFlash::<SECTOR>::new();
+            let mut kept = None;
+            let mut tried = None;
+            let mut failing = Failing {
+                flash: flash.clone(),
+                left,
+                bits,
+            };
+            let mut was_cut = false;
+            // There is always room for a sector of records, whatever the last power-up left.
+            'life: for turn in 0..5_u8 {
+                let mut storage = Storage::open(failing);
+                for record in 0..SLOTS as u8 - turn % 2 {
+                    let payload = [turn, record, 0x55];
+                    tried = Some(payload.to_vec());
+                    if storage.keep(Kind::Profile, &payload).is_err() {
+                        was_cut = true;
+                        flash = storage.flash.flash;
+                        break 'life;
+                    }
+                    kept.clone_from(&tried);
+                }
+                failing = storage.flash;
+                flash = failing.flash.clone();
+            }
+            let found = read(&flash);
+            assert!(found == kept || found == tried, "{left}: {found:?}, not {kept:?}");
+            // The supply is back, also if the cut was in an erase.
+            let mut storage = Storage::open(flash);
+            storage.keep(Kind::Profile, &[7; 40]).unwrap();
+            assert_eq!(read(&storage.flash), Some([7; 40].to_vec()));
+            if !was_cut {
+                break;
+            }
+            cuts += 1;
+        }
+    }
+    assert!(cuts > 1000, "{cuts}");
+}
