@@ -32,5 +32,6 @@ mod sample_jobs;
 mod scallop_limit;
 mod script;
 mod session;
+mod settings;
 mod swept;
 mod unusual_motion;

@@ -18,9 +18,9 @@ use proptest::prelude::*;
 use protocol::{
     frame::{Decoder, FRAME_MAX, FrameError, write_reply},
     message::{
-        Batch, Capabilities, Clock, Configuration, Description, FaultReport, InputLines, LinkTimeoutAction,
-        PassDigest, Reason, Reply, Report, Request, ResetCause, SafetyStatus, SampleRecord, Status,
-        StepSettings, Words, read_reply, read_request,
+        Batch, Capabilities, Clock, Configuration, Description, Excess, FaultReport, InputLines,
+        LinkTimeoutAction, PassDigest, Profile, ProfileLimit, Reason, Reply, Report, Request, ResetCause,
+        SafetyStatus, SampleRecord, Status, StepSettings, Words, read_reply, read_request,
     },
 };
 
@@ -64,6 +64,17 @@ fn axes() -> AxisLimits {
     }
 }
 
+fn profile() -> Profile {
+    Profile {
+        steps: steps().into(),
+        velocity_mm_s: axes().velocity_mm_s,
+        acceleration_mm_s2: axes().acceleration_mm_s2,
+        jerk_mm_s3: axes().jerk_mm_s3,
+        travel_nm: Some([[-1, 1], [i32::MIN, i32::MAX], [0, 64]]),
+        configuration: CONFIGURATION,
+    }
+}
+
 /// One request of each kind in order of the codes, and a job with axis limits.
 fn requests() -> Vec<Request> {
     vec![
@@ -99,6 +110,9 @@ fn requests() -> Vec<Request> {
             lines: InputLines(0x102),
         },
         Request::Repeat { event: 300, count: 4 },
+        Request::Profile,
+        Request::SetProfile(Some(profile())),
+        Request::SetProfile(None),
         Request::JobBegin {
             header: Header {
                 axes: Some(axes()),
@@ -160,6 +174,7 @@ fn status() -> Status {
         halts: 4,
         events: 302,
         steps: 0x1234_5678,
+        profile: 0x9abc_def0,
         safety: SafetyStatus {
             lines: InputLines(1),
             latched: InputLines(0x201),
@@ -226,6 +241,18 @@ fn reasons() -> Vec<Reason> {
             stands_nm: None,
         },
         Reason::EventGone { first: 290 },
+        Reason::BeyondProfile {
+            excess: Excess {
+                limit: ProfileLimit::Jerk,
+                axis: 2,
+                most: 10_000.0,
+                wanted: 10_001.0,
+            },
+        },
+        Reason::BadProfile,
+        Reason::Storage,
+        Reason::OtherProfile,
+        Reason::NoLimits,
     ]
 }
 
@@ -272,6 +299,14 @@ fn replies() -> Vec<Reply> {
         },
         Reply::PassDigest { event: 301, pass },
         Reply::Halted(status()),
+        Reply::Profile {
+            number: 4,
+            profile: Some(profile()),
+        },
+        Reply::Profile {
+            number: 5,
+            profile: None,
+        },
     ]);
     replies
 }
@@ -364,6 +399,10 @@ fn every_reason_is_a_sentence_with_its_values() {
         "not safe: limit-switch (code 17), limit switch x-, limit switch y-"
     );
     assert_eq!(texts[16], "201 is more than 200");
+    assert_eq!(
+        texts[21],
+        "beyond the machine's profile: jerk, mm/s^3: 10001 on z, the profile has 10000"
+    );
 }
 
 /// A link in session that expects request 2, and its machine.

@@ -39,7 +39,10 @@ impl<const SECTOR: usize> RamFlash<SECTOR> {
     fn range(&mut self, offset: u32, bytes: usize) -> Result<&mut [u8], OutOfBounds> {
         let from = offset as usize;
         let to = from.checked_add(bytes).ok_or(OutOfBounds)?;
-        self.sectors.as_flattened_mut().get_mut(from..to).ok_or(OutOfBounds)
+        self.sectors
+            .as_flattened_mut()
+            .get_mut(from..to)
+            .ok_or(OutOfBounds)
     }
 }
 

@@ -155,7 +155,9 @@ impl<F: NorFlash> Storage<F> {
     /// The payload of the newest record of a kind, if there is one.
     pub fn newest(&mut self, kind: Kind) -> Option<Payload> {
         let active = self.active.sector;
-        let found = self.newest_in(active, kind).or_else(|| self.newest_in(1 - active, kind));
+        let found = self
+            .newest_in(active, kind)
+            .or_else(|| self.newest_in(1 - active, kind));
         found.map(|(_, payload)| payload)
     }
 
@@ -214,7 +216,10 @@ impl<F: NorFlash> Storage<F> {
         let (head, place) = data.split_at_mut(HEAD);
         let place = place.get_mut(..payload.len()).ok_or(StorageError)?;
         place.copy_from_slice(payload);
-        for (to, from) in head.iter_mut().zip(sequence.to_le_bytes().into_iter().chain([kind as u8, length])) {
+        for (to, from) in head
+            .iter_mut()
+            .zip(sequence.to_le_bytes().into_iter().chain([kind as u8, length]))
+        {
             *to = from;
         }
         crc.copy_from_slice(&crc32(data).to_le_bytes());

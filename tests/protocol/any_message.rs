@@ -8,8 +8,8 @@ use interp_core::{
 use proptest::prelude::*;
 use protocol::message::{
     CHUNK_WORDS_MAX, Capabilities, Clock, Configuration, Description, FaultReport, InputLines,
-    LinkTimeoutAction, PassDigest, Reason, Reply, Report, Request, ResetCause, SAMPLES_MAX, SafetyStatus,
-    SampleRecord, Status, Words,
+    LinkTimeoutAction, PassDigest, Profile, Reason, Reply, Report, Request, ResetCause, SAMPLES_MAX,
+    SafetyStatus, SampleRecord, Status, Words,
 };
 
 use super::{reasons, requests};
@@ -96,6 +96,19 @@ prop_compose! {
     }
 }
 
+prop_compose! {
+    fn any_profile()(axes in any_axes(), steps in any_steps(), has_travel: bool, configuration in any_configuration()) -> Profile {
+        Profile {
+            steps: steps.into(),
+            velocity_mm_s: axes.velocity_mm_s,
+            acceleration_mm_s2: axes.acceleration_mm_s2,
+            jerk_mm_s3: axes.jerk_mm_s3,
+            travel_nm: has_travel.then_some(axes.travel_nm),
+            configuration,
+        }
+    }
+}
+
 pub(crate) fn any_request() -> impl Strategy<Value = Request> {
     let words = prop::collection::vec(any::<i32>(), 0..=CHUNK_WORDS_MAX);
     prop_oneof![
@@ -120,6 +133,7 @@ pub(crate) fn any_request() -> impl Strategy<Value = Request> {
         any_lines().prop_map(|lines| Request::Simulate { lines }),
         any::<(u32, u8)>().prop_map(|(event, count)| Request::Repeat { event, count }),
         any_steps().prop_map(|config| Request::StepConfig(config.into())),
+        prop::option::of(any_profile()).prop_map(Request::SetProfile),
     ]
 }
 
@@ -134,9 +148,9 @@ prop_compose! {
 
 prop_compose! {
     fn any_status()(at in any_sample(), fault in prop::option::of((any::<u8>(), real())), clock in any_clock(),
-                    report in any_report(), counts in any::<[u32; 9]>(), digest in any::<u64>(),
+                    report in any_report(), counts in any::<[u32; 10]>(), digest in any::<u64>(),
                     safety in any_safety()) -> Status {
-        let [credit, samples, deadline_misses, tick_cycles_max, samples_lost, frames_bad, halts, events, steps] = counts;
+        let [credit, samples, deadline_misses, tick_cycles_max, samples_lost, frames_bad, halts, events, steps, profile] = counts;
         Status {
             state: at.state,
             fault: fault.map(|(code, value)| FaultReport { code, value }),
@@ -157,6 +171,7 @@ prop_compose! {
             halts,
             events,
             steps,
+            profile,
             safety,
         }
     }
@@ -228,5 +243,7 @@ pub(crate) fn any_reply() -> impl Strategy<Value = Reply> {
             }
         ),
         any_status().prop_map(Reply::Halted),
+        (any::<u16>(), prop::option::of(any_profile()))
+            .prop_map(|(number, profile)| Reply::Profile { number, profile }),
     ]
 }

@@ -20,8 +20,8 @@ use protocol::{
     digest::job_digest,
     frame::{Decoder, FRAME_MAX, write_request},
     message::{
-        Description, InputLines, NO_NUMBER, Profile, Reason, Reply, Request, SafetyStatus, Status, Words, next_number,
-        read_reply,
+        Description, InputLines, NO_NUMBER, Profile, Reason, Reply, Request, SafetyStatus, Status, Words,
+        next_number, read_reply,
     },
 };
 

@@ -77,7 +77,10 @@ fn the_newest_record_is_in_force() {
         storage = Storage::open(storage.flash);
         assert_eq!(storage.newest(Kind::Profile).unwrap().bytes(), payload);
     }
-    assert_eq!(storage.keep(Kind::Profile, &[0; PAYLOAD_MAX + 1]), Err(StorageError));
+    assert_eq!(
+        storage.keep(Kind::Profile, &[0; PAYLOAD_MAX + 1]),
+        Err(StorageError)
+    );
     storage.keep(Kind::Profile, &[0; PAYLOAD_MAX]).unwrap();
 }
 

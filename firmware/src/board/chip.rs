@@ -97,10 +97,10 @@ pub(crate) fn init(device: pac::Peripherals) -> Board {
     }
 }
 
-/// Settings are kept in the chip's flash.
-pub(crate) use crate::drivers::settings_flash::SettingsFlash;
 /// The safety inputs are pins.
 pub(crate) use crate::drivers::gpio::Ports as InputPorts;
+/// Settings are kept in the chip's flash.
+pub(crate) use crate::drivers::settings_flash::SettingsFlash;
 
 /// This board has pins of its own.
 pub(crate) fn simulate(_lines: InputLines) -> bool {

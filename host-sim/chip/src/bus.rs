@@ -3,7 +3,10 @@
 use crate::{
     chip::Chip,
     code::Block,
-    part::rcc::Gate,
+    part::{
+        flash::{SETTINGS, SETTINGS_BYTES},
+        rcc::{Gate, cause},
+    },
     unicorn::{Register, Registers, Surroundings},
 };
 
@@ -29,6 +32,7 @@ const DEVICES: [Device; 16] = [
     (0x4002_6400, 0x400, Gate::Ahb1(22), "DMA2"),
 ];
 
+const SETTINGS_END: u32 = SETTINGS + SETTINGS_BYTES;
 const BIT_BAND: u32 = 0x4200_0000;
 const BIT_BAND_END: u32 = 0x4400_0000;
 
@@ -74,7 +78,11 @@ impl Chip {
                 self.ports[(address as usize - 0x4002_0000) / 0x400].read(address & 0x3ff, world)
             }
             0x4002_3800..0x4002_3900 => self.rcc.read(address & 0xff, world),
+            SETTINGS..SETTINGS_END => self.flash.word(address),
+            // The size of flash, KB, in the upper half.
+            0x1fff_7a20 => 1024 << 16,
             0x4002_3c00 => self.rcc.flash_acr,
+            0x4002_3c04..0x4002_4000 => self.flash.read(address & 0x3ff, world),
             0x4002_6400..0x4002_6800 => self.dma.read(address & 0x3ff),
             0xe000_1000..0xe000_2000 | 0xe000_edfc | 0xe004_2000..0xe004_2010 => {
                 self.debug.read(address, world)
@@ -124,12 +132,23 @@ impl Chip {
                 self.rcc.flash_acr = value;
                 self.rcc.check_supply(world);
             }
+            0x4002_3c04..0x4002_4000 => {
+                self.flash.write(address & 0x3ff, value, world);
+                self.fail_supply();
+            }
             0x4002_6400..0x4002_6800 => self.dma.write(address & 0x3ff, value, self.sram, world),
             0xe000_1000..0xe000_2000 | 0xe000_edfc | 0xe004_2000..0xe004_2010 => {
                 self.debug.write(address, value, world)
             }
             0xe000_e000..0xe000_f000 => self.nvic.write(address & 0xfff, bytes, value, world),
             _ => world.wrong_once(format!("write of {address:#x}: not modelled")),
+        }
+    }
+
+    /// The supply has failed in an operation of the flash: it comes back at once.
+    const fn fail_supply(&mut self) {
+        if self.flash.is_cut && self.reset.is_none() {
+            self.reset = Some(cause::POWER_ON | cause::PIN | cause::BROWN_OUT);
         }
     }
 
@@ -181,6 +200,9 @@ impl Surroundings for Chip {
             let (word, bit) = Self::banded(address);
             let old = self.read_word(word);
             self.write_word(word, 4, old & !(1 << bit) | (value & 1) << bit);
+        } else if (SETTINGS..SETTINGS_END).contains(&address) {
+            self.flash.program(address, bytes, value, &mut self.world);
+            self.fail_supply();
         } else {
             // Halfwords where the registers have no more; bytes of priorities.
             let narrow = matches!(address, 0x4000_0000..0x4000_1000 | 0x4000_3000..0x4000_3400 | 0x4001_0000..0x4001_1400);

@@ -7,6 +7,7 @@ use std::time::{Duration, Instant};
 use boards::{Axis, Board, Level};
 
 use crate::{
+    SRAM_FILL,
     code::{Block, Code},
     line::Line,
     memory::Memory,
@@ -14,6 +15,7 @@ use crate::{
     part::{
         debug::Debug,
         dma::{self, Dma},
+        flash::Flash,
         gpio::{Change, Port},
         nvic::{self, Nvic},
         rcc::{Rcc, cause},
@@ -55,6 +57,7 @@ pub(crate) struct Chip {
     pub(crate) usart: Usart,
     pub(crate) watchdog: Watchdog,
     pub(crate) debug: Debug,
+    pub(crate) flash: Flash,
     line: Option<Line>,
     /// USART1's interrupt request.
     serial_asks: bool,
@@ -136,6 +139,7 @@ impl Chip {
             usart: Usart::new(),
             watchdog: Watchdog::new(options.lsi_hz),
             debug: Debug::default(),
+            flash: Flash::new(options.cut_flash_every),
             line,
             serial_asks: false,
             script,
@@ -181,6 +185,10 @@ impl Chip {
         self.usart.from_host = from_host;
         self.watchdog = Watchdog::new(self.options.lsi_hz);
         self.debug = Debug::default();
+        self.flash.restart();
+        if flags & cause::POWER_ON != 0 {
+            self.sram.fill(SRAM_FILL);
+        }
         for index in 0..self.ports.len() {
             let Port { driven, outside, .. } = self.ports[index];
             self.ports[index] = Port::new(index as u8, driven, outside);

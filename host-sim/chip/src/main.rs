@@ -44,6 +44,7 @@ use crate::{
     line::Line,
     memory::Memory,
     options::Options,
+    part::flash::SETTINGS,
     processor::{Account, Processor},
 };
 
@@ -91,7 +92,7 @@ fn run(options: Options) -> Result<bool, String> {
     let begun = Instant::now();
     let data =
         std::fs::read(&options.image).map_err(|error| format!("{}: {error}", options.image.display()))?;
-    let flash = Memory::new(FLASH_BEGIN, 1024 * 1024, FLASH_FILL);
+    let flash = Memory::new(FLASH_BEGIN, SETTINGS - FLASH_BEGIN, FLASH_FILL);
     let sram = Memory::new(SRAM_BEGIN, SRAM_BYTES, SRAM_FILL);
     let board = load(&data, flash).map_err(|error| format!("{}: {error}", options.image.display()))?;
     let line = options

@@ -67,6 +67,13 @@ impl Memory {
         true
     }
 
+    /// Sets every byte.
+    #[allow(unsafe_code, reason = "memory that the processor shares")]
+    pub(crate) fn fill(self, value: u8) {
+        // SAFETY: within the memory, to which no reference exists; the processor of the library does not run meanwhile.
+        unsafe { std::ptr::write_bytes(self.first, value, self.bytes as usize) };
+    }
+
     /// Copies bytes there; false where they do not fit.
     #[allow(unsafe_code, reason = "memory that the processor shares")]
     pub(crate) fn load(self, address: u32, data: &[u8]) -> bool {

@@ -46,6 +46,9 @@ pub(crate) struct Options {
     /// The watchdog's clock, Hz: 17 000 to 47 000.
     #[arg(long, default_value_t = 32_000.0)]
     pub(crate) lsi_hz: f64,
+    /// The supply fails in every N-th byte or sector that the program writes or erases in flash, and comes back at once.
+    #[arg(long, value_name = "N")]
+    pub(crate) cut_flash_every: Option<u64>,
     /// Says what happens as it does.
     #[arg(short, long)]
     pub(crate) verbose: bool,

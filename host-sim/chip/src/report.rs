@@ -54,6 +54,8 @@ pub(crate) fn of(chip: &Chip, account: &Account, seconds_spent: f64) -> Value {
         "notes": chip.world.notes,
         "events": chip.world.events.iter().map(|(cycle, what)| json!({"cycle": cycle, "what": what})).collect::<Vec<_>>(),
         "resets": chip.resets,
+        "flash_operations": chip.flash.operations,
+        "flash_erased": chip.flash.erased,
         "periods": chip.periods,
         "slots_from_cycle": chip.slots_from,
         "first_pulse_ms": chip.moved.map(|seconds| seconds * 1e3),

@@ -265,6 +265,9 @@ unsafe extern "C" fn on_write<H: Surroundings, const BASE: u32>(
         .write(BASE + offset as u32, bytes, value as u32);
 }
 
+/// The sectors of flash that can be written, and the system memory with the chip's size.
+const SETTINGS: u32 = crate::part::flash::SETTINGS;
+const SYSTEM: u32 = 0x1fff_0000;
 /// The peripherals, their bit-band alias, and the processor's own.
 const PERIPHERALS: u32 = 0x4000_0000;
 const BIT_BAND: u32 = 0x4200_0000;
@@ -339,6 +342,8 @@ impl<H: Surroundings> Engine<H> {
         map(flash, flash.base(), PROTECT_READ_EXECUTE)?;
         map(flash, 0, PROTECT_READ_EXECUTE)?;
         map(sram, sram.base(), PROTECT_ALL)?;
+        self.map_device::<SETTINGS>(crate::part::flash::SETTINGS_BYTES.into())?;
+        self.map_device::<SYSTEM>(0x8000)?;
         self.map_device::<PERIPHERALS>(0x8_0000)?;
         self.map_device::<BIT_BAND>(0x200_0000)?;
         self.map_device::<PRIVATE>(0x10_0000)

@@ -271,6 +271,13 @@ mod tests {
                 stands_nm: Some([4, 5, 6]),
             },
             Reason::EventGone { first: 4 },
+            Reason::BeyondProfile {
+                excess: protocol::message::Excess::of(protocol::message::ProfileLimit::Jerk),
+            },
+            Reason::BadProfile,
+            Reason::Storage,
+            Reason::OtherProfile,
+            Reason::NoLimits,
         ]
     }
 

@@ -3,7 +3,7 @@
 use super::{Entry, Family};
 
 /// In the order of codes.
-pub(super) const ENTRIES: [Entry; 20] = [
+pub(super) const ENTRIES: [Entry; 25] = [
     reason(
         0,
         "bad-frame",
@@ -183,6 +183,51 @@ pub(super) const ENTRIES: [Entry; 20] = [
         "The line lost more than some kilobytes of events in a row, or the host asked late. The board's final digest still covers the whole run.",
         "Nothing: `cargo sim run` compares the final digest instead. If it happens often, check cable, hub and the computer's load.",
         "A cable unplugged for a second while every sample is reported.",
+    ),
+    reason(
+        20,
+        "beyond-profile",
+        "The job, or a setting for it, exceeds the machine profile that the board keeps.",
+        "Which value of which axis, the profile's value, and the requested one.",
+        "A job may lower the limits of the machine, but not raise them; steps, directions and pulse times are the machine's alone.",
+        "Remove the key from [machine] of the job: the profile then holds. If the machine is able to do it, change its profile: `cargo sim settings --port DEV --machine FILE`.",
+        "`velocity_max_mm_s = [200, 200, 50]` in a job for a machine with [100, 100, 50].",
+    ),
+    reason(
+        21,
+        "bad-profile",
+        "A value of the machine profile is out of its range.",
+        "None.",
+        "Limits have to be above 0, travel has to ascend, steps per millimetre are 1/1000 to 500000.",
+        "Correct the profile; `cargo sim settings` checks its file before it is sent.",
+        "A profile sent by another program, with a jerk limit of 0.",
+    ),
+    reason(
+        22,
+        "storage",
+        "The board cannot write its settings; they are as before.",
+        "None.",
+        "The two sectors have been filled since the last power-up, after some hundred changes of the profile, or the flash is worn out or protected.",
+        "Switch the board off and on, which erases a sector, and try again.",
+        "A script that writes the profile in a loop.",
+    ),
+    reason(
+        23,
+        "other-profile",
+        "The job was loaded under another machine profile.",
+        "None.",
+        "The profile was changed after the job was loaded, and the job was checked against the old one.",
+        "Load the job again: `cargo sim run`.",
+        "`cargo sim settings --machine FILE` between the upload and the start of a job.",
+    ),
+    reason(
+        24,
+        "no-limits",
+        "The job has no axis limits, and the board has drives.",
+        "None.",
+        "Such a job runs at constant feed from the first sample: the axes would jump to it, and start without a ramp.",
+        "Give the board a machine profile (`cargo sim settings --port DEV --machine FILE`), whose limits the job then has, or set limits in [machine] of the job. On a bench without axes: `homing_required = false`.",
+        "`cargo sim run jobs/revolved.toml --port DEV` on a board without a profile.",
     ),
 ];
 

@@ -22,7 +22,7 @@ use std::path::Path;
 
 use job::{
     Along, AlongChoice, CHORD_DEFAULT_MM, CadSource, FEED_MAX_MM_MIN, FEED_MIN_MM_MIN, Job, JobError,
-    MachineSpec, OVERRUN_MAX_MM, Pattern, Side, Spacing, Start,
+    MachineProfile, OVERRUN_MAX_MM, Pattern, Side, Spacing, Start,
 };
 use patches::placement::Placement;
 use section::{Reader, Section};
@@ -48,6 +48,38 @@ pub fn load_with(path: &Path, faces: &dyn FaceReader) -> Result<Job, JobError> {
     parse_with(&name, &text, faces)
 }
 
+/// Reads a job from a file for a machine with this profile: what the job does not say of the machine is the profile's.
+///
+/// # Errors
+/// As [`load_with`]; the job exceeds the profile.
+pub fn load_on(
+    path: &Path,
+    faces: &dyn FaceReader,
+    profile: Option<&MachineProfile>,
+) -> Result<Job, JobError> {
+    let name = path.display().to_string();
+    let text = text::read(path)?;
+    parse_on(&name, &text, faces, profile)
+}
+
+/// Reads a machine's profile from a file: one section `[machine]`, with the keys of a job's that are the machine's.
+///
+/// # Errors
+/// The file cannot be read, is not TOML, or a value in it is missing, unknown, of the wrong shape or out of range.
+pub fn load_profile(path: &Path) -> Result<MachineProfile, JobError> {
+    parse_profile(&path.display().to_string(), &text::read(path)?)
+}
+
+/// Reads a machine's profile from text; errors name the file `name`.
+///
+/// # Errors
+/// As [`load_profile`].
+pub fn parse_profile(name: &str, text: &str) -> Result<MachineProfile, JobError> {
+    let document = Reader::new(name, text).document()?;
+    document.only(&["machine"], &[])?;
+    machine::read_profile(&document.section("machine")?)
+}
+
 /// Reads a job without a surface of `kind = "file"` from text; errors name the file `name`.
 ///
 /// # Errors
@@ -61,6 +93,15 @@ pub fn parse(name: &str, text: &str) -> Result<Job, JobError> {
 /// # Errors
 /// As [`load_with`].
 pub fn parse_with(name: &str, text: &str, faces: &dyn FaceReader) -> Result<Job, JobError> {
+    parse_on(name, text, faces, None)
+}
+
+fn parse_on(
+    name: &str,
+    text: &str,
+    faces: &dyn FaceReader,
+    profile: Option<&MachineProfile>,
+) -> Result<Job, JobError> {
     let reader = Reader::new(name, text);
     let document = reader.document()?;
     document.only(
@@ -148,9 +189,7 @@ pub fn parse_with(name: &str, text: &str, faces: &dyn FaceReader) -> Result<Job,
             true => read_overrun(&cut)?,
             false => 0.0,
         },
-        machine: document
-            .optional_section("machine")?
-            .map_or(Ok(MachineSpec::default()), |section| machine::read(&section))?,
+        machine: machine::read_on(document.optional_section("machine")?.as_ref(), profile)?,
         origin,
     })
 }

@@ -1,6 +1,9 @@
-//! The section `[machine]`: the machine, with every default applied.
+//! The section `[machine]` of a job and of a machine's profile, with every default applied.
 
-use job::{AxisLimits, HEARTBEAT_TIMEOUT_RANGE_MS, HeartbeatAction, JobError, MachineSpec, PERIOD_RANGE_US};
+use job::{
+    AXES, AxisLimits, HEARTBEAT_TIMEOUT_RANGE_MS, HeartbeatAction, JobError, MachineProfile, MachineSpec,
+    PERIOD_DEFAULT_US, PERIOD_RANGE_US,
+};
 
 use crate::section::Section;
 use crate::steps;
@@ -8,30 +11,134 @@ use crate::steps;
 /// Largest clearance and plunge, mm.
 const HEIGHT_MAX_MM: f64 = 1000.0;
 
-/// The optional section `[machine]`.
-pub(super) fn read(machine: &Section<'_>) -> Result<MachineSpec, JobError> {
-    const AXES: &str = "three numbers above 0, one each for x, y and z, e.g. [100, 100, 50]";
-    machine.only(
-        &[
-            "period_us",
-            "velocity_max_mm_s",
-            "acceleration_max_mm_s2",
-            "jerk_max_mm_s3",
-            "travel_mm",
-            "home_mm",
-            "safe_z_mm",
-            "clearance_mm",
-            "plunge_mm",
-            "homing_required",
-            "host_gone",
-            "host_gone_ms",
-            steps::KEYS[0],
-            steps::KEYS[1],
-            steps::KEYS[2],
-            steps::KEYS[3],
-        ],
-        &[],
-    )?;
+/// What three limits are.
+const LIMITS: &str = "three numbers above 0, one each for x, y and z, e.g. [100, 100, 50]";
+
+/// Keys of a job and of a machine's profile alike.
+const COMMON: [&str; 7] = [
+    "velocity_max_mm_s",
+    "acceleration_max_mm_s2",
+    "jerk_max_mm_s3",
+    "travel_mm",
+    "homing_required",
+    "host_gone",
+    "host_gone_ms",
+];
+/// Keys of a job alone.
+const OF_JOBS: [&str; 5] = ["period_us", "home_mm", "safe_z_mm", "clearance_mm", "plunge_mm"];
+
+/// A machine's profile: the section `[machine]` of its file.
+pub(super) fn read_profile(machine: &Section<'_>) -> Result<MachineProfile, JobError> {
+    let of_jobs = OF_JOBS.map(|key| (key, "it is a job's"));
+    machine.only(&[&COMMON[..], &steps::KEYS].concat(), &of_jobs)?;
+    let mut read = MachineSpec::default();
+    read_supervision(machine, &mut read)?;
+    let limits = read_limits(machine)?;
+    Ok(MachineProfile {
+        limits: limits.unwrap_or(AxisLimits::DEFAULT),
+        travel_mm: read_travel(machine)?,
+        homing_required: read.homing_required,
+        heartbeat_action: read.heartbeat_action,
+        heartbeat_timeout_ms: read.heartbeat_timeout_ms,
+        step_output: steps::read(machine, PERIOD_DEFAULT_US)?.ok_or_else(|| {
+            machine.error(
+                steps::KEYS[0],
+                "`steps_per_mm` is missing",
+                "add steps_per_mm = [x, y, z], the motor steps for each millimetre",
+            )
+        })?,
+    })
+}
+
+/// The limits of the axes, if any of them is given.
+fn read_limits(machine: &Section<'_>) -> Result<Option<AxisLimits>, JobError> {
+    let [velocity, acceleration, jerk, ..] = COMMON;
+    Ok(AxisLimits::of_given(
+        machine.positive_axes(velocity, LIMITS)?,
+        machine.positive_axes(acceleration, LIMITS)?,
+        machine.positive_axes(jerk, LIMITS)?,
+    ))
+}
+
+/// The optional section `[machine]` of a job, on a machine with this profile.
+pub(super) fn read_on(
+    machine: Option<&Section<'_>>,
+    profile: Option<&MachineProfile>,
+) -> Result<MachineSpec, JobError> {
+    let Some(machine) = machine else {
+        return Ok(profile.map_or_else(MachineSpec::default, MachineProfile::spec));
+    };
+    let mut spec = read(machine)?;
+    if let Some(profile) = profile {
+        within(machine, &mut spec, profile)?;
+    }
+    Ok(spec)
+}
+
+/// Completes a job's machine by the profile, and refuses what exceeds it.
+fn within(machine: &Section<'_>, spec: &mut MachineSpec, profile: &MachineProfile) -> Result<(), JobError> {
+    const REMEDY: &str = "lower it, or remove it: the machine's profile then holds";
+    let most = profile.limits.by_order();
+    let mut limits = most;
+    for ((key, limit), most) in COMMON.iter().zip(&mut limits).zip(most) {
+        let Some(given) = machine.positive_axes(key, LIMITS)? else {
+            continue;
+        };
+        for ((axis, given), most) in AXES.iter().zip(given).zip(most) {
+            if given > most {
+                let what = format!("`{key}` exceeds the machine's profile: {given} on {axis}, {most} there");
+                return Err(machine.error(key, what, REMEDY));
+            }
+        }
+        *limit = given;
+    }
+    let [velocity_mm_s, acceleration_mm_s2, jerk_mm_s3] = limits;
+    spec.limits = Some(AxisLimits {
+        velocity_mm_s,
+        acceleration_mm_s2,
+        jerk_mm_s3,
+    });
+    let ranges = spec.travel_mm.zip(profile.travel_mm);
+    for (axis, ([from, to], [least, most])) in ranges
+        .map(|(job, machine)| AXES.into_iter().zip(job.into_iter().zip(machine)))
+        .into_iter()
+        .flatten()
+    {
+        if from < least || to > most {
+            let what = format!(
+                "`travel_mm` exceeds the machine's profile: {from} to {to} on {axis}, {least} to {most} there"
+            );
+            return Err(machine.error("travel_mm", what, REMEDY));
+        }
+    }
+    spec.travel_mm = spec.travel_mm.or(profile.travel_mm);
+    if spec
+        .step_output
+        .is_some_and(|output| output != profile.step_output)
+    {
+        let what = "the steps of the axes are the machine's, and its profile has others";
+        let remedy = "remove steps_per_mm, pulse_us, direction_setup_us and direction_inverted from the job";
+        return Err(machine.error(steps::KEYS[0], what, remedy));
+    }
+    spec.step_output = Some(profile.step_output);
+    if !machine.has("homing_required") {
+        spec.homing_required = profile.homing_required;
+    } else if profile.homing_required && !spec.homing_required {
+        let what = "the machine has to be homed, as its profile says";
+        return Err(machine.error("homing_required", what, "remove it"));
+    }
+    if !machine.has("host_gone") {
+        spec.heartbeat_action = profile.heartbeat_action;
+    }
+    if !machine.has("host_gone_ms") {
+        spec.heartbeat_timeout_ms = profile.heartbeat_timeout_ms;
+    }
+    Ok(())
+}
+
+/// The section `[machine]` of a job, without a profile.
+fn read(machine: &Section<'_>) -> Result<MachineSpec, JobError> {
+    machine.only(&[&COMMON[..], &OF_JOBS, &steps::KEYS].concat(), &[])?;
     let mut read = MachineSpec::default();
     if machine.has("period_us") {
         let [least, most] = PERIOD_RANGE_US;
@@ -45,25 +152,9 @@ pub(super) fn read(machine: &Section<'_>) -> Result<MachineSpec, JobError> {
             ));
         }
     }
-    read.limits = AxisLimits::of_given(
-        machine.positive_axes("velocity_max_mm_s", AXES)?,
-        machine.positive_axes("acceleration_max_mm_s2", AXES)?,
-        machine.positive_axes("jerk_max_mm_s3", AXES)?,
-    );
+    read.limits = read_limits(machine)?;
     read.step_output = steps::read(machine, read.period_us)?;
-    if machine.has("travel_mm") {
-        let travel: [[f64; 2]; 3] = machine.matrix("travel_mm")?;
-        for (range, axis) in travel.iter().zip(["x", "y", "z"]) {
-            if range[0] >= range[1] {
-                let what = format!(
-                    "the travel of {axis} must ascend, not run from {} to {}",
-                    range[0], range[1]
-                );
-                return Err(machine.error("travel_mm", what, "give [least, most] for each axis, in mm"));
-            }
-        }
-        read.travel_mm = Some(travel);
-    }
+    read.travel_mm = read_travel(machine)?;
     if machine.has("home_mm") {
         read.home_mm = Some(machine.numbers("home_mm")?);
     }
@@ -80,6 +171,24 @@ pub(super) fn read(machine: &Section<'_>) -> Result<MachineSpec, JobError> {
     }
     read_supervision(machine, &mut read)?;
     Ok(read)
+}
+
+/// The travel of the axes, if it is given.
+fn read_travel(machine: &Section<'_>) -> Result<Option<[[f64; 2]; 3]>, JobError> {
+    if !machine.has("travel_mm") {
+        return Ok(None);
+    }
+    let travel: [[f64; 2]; 3] = machine.matrix("travel_mm")?;
+    for (range, axis) in travel.iter().zip(AXES) {
+        if range[0] >= range[1] {
+            let what = format!(
+                "the travel of {axis} must ascend, not run from {} to {}",
+                range[0], range[1]
+            );
+            return Err(machine.error("travel_mm", what, "give [least, most] for each axis, in mm"));
+        }
+    }
+    Ok(Some(travel))
 }
 
 /// The keys for homing and for the heartbeat timeout.

@@ -1,6 +1,6 @@
 //! Every kind of bad input yields its line, a message and a remedy; the sample jobs are valid.
 
-use job::{AxisLimits, HeartbeatAction, Job, JobError, NurbsSpec, SurfaceSpec};
+use job::{AxisLimits, HeartbeatAction, Job, JobError, MachineSpec, NurbsSpec, SurfaceSpec};
 
 use super::*;
 
@@ -54,6 +54,95 @@ scallop_mm = 0.005
 along = "v"
 side = "-"
 "#;
+
+const PROFILE: &str = r#"[machine]
+velocity_max_mm_s = [80, 90, 40]
+travel_mm = [[-400, 400], [-400, 400], [-200, 200]]
+steps_per_mm = [400, 400, 400]
+direction_inverted = [true, false, false]
+host_gone = "hold"
+"#;
+
+/// Reads a job on the machine of [`PROFILE`].
+fn on_machine(text: &str) -> Result<Job, JobError> {
+    parse_on(
+        "job.toml",
+        text,
+        &file::NoFaces,
+        Some(&parse_profile("machine.toml", PROFILE).unwrap()),
+    )
+}
+
+#[test]
+fn a_job_has_the_machine_of_the_profile() {
+    let profile = parse_profile("machine.toml", PROFILE).unwrap();
+    assert_eq!(profile.limits.jerk_mm_s3, AxisLimits::DEFAULT.jerk_mm_s3);
+    let (silent, _) = REVOLVED.split_once("[machine]").unwrap();
+    assert_eq!(on_machine(silent).unwrap().machine, profile.spec());
+    let lower = format!(
+        "{silent}[machine]\nvelocity_max_mm_s = [80, 10, 40]\ntravel_mm = [[0, 100], [0, 100], [0, 200]]\nhost_gone = \"finish\"\n"
+    );
+    let machine = on_machine(&lower).unwrap().machine;
+    let limits = AxisLimits {
+        velocity_mm_s: [80.0, 10.0, 40.0],
+        ..profile.limits
+    };
+    assert_eq!(machine.limits, Some(limits));
+    assert_eq!(
+        machine.travel_mm,
+        Some([[0.0, 100.0], [0.0, 100.0], [0.0, 200.0]])
+    );
+    assert_eq!(machine.heartbeat_action, HeartbeatAction::Finish);
+    assert_eq!(machine.step_output, Some(profile.step_output));
+}
+
+#[test]
+fn a_job_beyond_the_profile_is_refused_at_its_line() {
+    let (silent, _) = REVOLVED.split_once("[machine]").unwrap();
+    for (key, what) in [
+        (
+            "velocity_max_mm_s = [80, 91, 40]",
+            "`velocity_max_mm_s` exceeds the machine's profile: 91 on y, 90 there",
+        ),
+        (
+            "travel_mm = [[0, 1], [0, 1], [-201, 1]]",
+            "`travel_mm` exceeds the machine's profile: -201 to 1 on z, -200 to 200 there",
+        ),
+        (
+            "steps_per_mm = [400, 400, 400]",
+            "the steps of the axes are the machine's, and its profile has others",
+        ),
+        (
+            "homing_required = false",
+            "the machine has to be homed, as its profile says",
+        ),
+    ] {
+        let error = on_machine(&format!("{silent}[machine]\n{key}\n")).unwrap_err();
+        assert_eq!(error.what(), what);
+    }
+    // Its own steps may be repeated.
+    let same = format!(
+        "{silent}[machine]\nsteps_per_mm = [400, 400, 400]\ndirection_inverted = [true, false, false]\n"
+    );
+    on_machine(&same).unwrap();
+}
+
+#[test]
+fn a_profile_has_the_machines_keys_only() {
+    for (text, what) in [
+        (
+            "[machine]\nhome_mm = [0, 0, 0]\n",
+            "`home_mm` does not belong here: it is a job's",
+        ),
+        (
+            "[machine]\nvelocity_max_mm_s = [1, 1, 1]\n",
+            "`steps_per_mm` is missing",
+        ),
+        ("[tool]\n", "unknown section `tool`"),
+    ] {
+        assert_eq!(parse_profile("machine.toml", text).unwrap_err().what(), what);
+    }
+}
 
 /// Reads `text` with its first `from` replaced by `to`.
 fn edited(text: &str, from: &str, to: &str) -> Result<Job, JobError> {

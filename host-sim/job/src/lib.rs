@@ -12,8 +12,8 @@ mod text;
 
 pub use error::JobError;
 pub use machine::{
-    AXES, AxisLimits, HEARTBEAT_TIMEOUT_DEFAULT_MS, HEARTBEAT_TIMEOUT_RANGE_MS, HeartbeatAction, MachineSpec,
-    PERIOD_DEFAULT_US, PERIOD_RANGE_US, Ratio, StepOutput,
+    AXES, AxisLimits, HEARTBEAT_TIMEOUT_DEFAULT_MS, HEARTBEAT_TIMEOUT_RANGE_MS, HeartbeatAction,
+    MachineProfile, MachineSpec, PERIOD_DEFAULT_US, PERIOD_RANGE_US, Ratio, StepOutput,
 };
 pub use origin::{AlongChoice, CadSource, DirectionTrial, Origin};
 pub use setup::{Block, Fixture, HolderPart, Setup, TOOL_SIZE_MAX_MM, ToolBody};

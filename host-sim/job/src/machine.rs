@@ -91,6 +91,39 @@ pub enum HeartbeatAction {
     Hold,
 }
 
+/// A machine as its board keeps it: the greatest limits, the drives, the supervision. A job may lower the limits, but not exceed them.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct MachineProfile {
+    /// Greatest limits of the axes.
+    pub limits: AxisLimits,
+    /// Travel of the axes, mm, `[min, max]`; `None`: not limited.
+    pub travel_mm: Option<[[f64; 2]; 3]>,
+    /// A board starts a run only after homing.
+    pub homing_required: bool,
+    /// Reaction to a heartbeat timeout, where a job gives none.
+    pub heartbeat_action: HeartbeatAction,
+    /// Heartbeat timeout, ms, where a job gives none.
+    pub heartbeat_timeout_ms: f64,
+    /// The drives.
+    pub step_output: StepOutput,
+}
+
+impl MachineProfile {
+    /// The machine of a job that gives nothing of its own.
+    #[must_use]
+    pub fn spec(&self) -> MachineSpec {
+        MachineSpec {
+            limits: Some(self.limits),
+            travel_mm: self.travel_mm,
+            homing_required: self.homing_required,
+            heartbeat_action: self.heartbeat_action,
+            heartbeat_timeout_ms: self.heartbeat_timeout_ms,
+            step_output: Some(self.step_output),
+            ..MachineSpec::default()
+        }
+    }
+}
+
 /// The machine that runs the job.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct MachineSpec {

@@ -8,6 +8,7 @@
 pub mod direction;
 mod in_process;
 pub mod prepare;
+pub mod profile;
 pub mod remote;
 pub mod script;
 pub mod travel;

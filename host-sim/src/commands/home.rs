@@ -3,7 +3,7 @@
 use protocol::message::Reason;
 
 use super::{Result, read_job, settled};
-use job::Job;
+use job::{Job, MachineProfile};
 use machine::prepare::Prepared;
 use machine::remote::RemoteError;
 
@@ -44,9 +44,13 @@ pub(super) fn position(text: &str) -> std::result::Result<PositionNm, String> {
     }
 }
 
-/// Loads a job; if it has no `home_mm`, `home` becomes its home.
-pub(super) fn load(path: &std::path::Path, stands: Option<PositionNm>) -> Result<(Job, Prepared)> {
-    let mut job = read_job(path)?;
+/// Loads a job for a machine with this profile; if it has no `home_mm`, `home` becomes its home.
+pub(super) fn load(
+    path: &std::path::Path,
+    profile: Option<&MachineProfile>,
+    stands: Option<PositionNm>,
+) -> Result<(Job, Prepared)> {
+    let mut job = read_job(path, profile)?;
     if let Some(stands) = stands {
         job.machine.home_mm.get_or_insert(stands.mm());
     }

@@ -25,6 +25,7 @@ mod progress;
 mod reach_words;
 mod run;
 mod scripted;
+mod settings;
 mod simulate;
 mod swept_words;
 mod typed;
@@ -44,7 +45,7 @@ use whole::Whole;
 
 use ::approach::ApproachError;
 use inspect::InspectError;
-use job::{AlongChoice, Job};
+use job::{AlongChoice, Job, MachineProfile};
 use machine::direction::{self, DirectionError};
 use machine::prepare::Prepared;
 
@@ -131,6 +132,7 @@ enum Command {
     Budget(budget::Arguments),
     Flash(flash::Arguments),
     Log(log::Arguments),
+    Settings(settings::Arguments),
     New(new::Arguments),
     Explain(explain::Arguments),
     Completions(completions::Arguments),
@@ -154,6 +156,7 @@ impl Command {
             Self::Budget(arguments) => arguments.json,
             Self::Flash(arguments) => arguments.json,
             Self::Log(arguments) => arguments.json,
+            Self::Settings(arguments) => arguments.json,
             Self::New(arguments) => arguments.json,
             Self::Explain(arguments) => arguments.json,
             Self::Completions(_) => false,
@@ -176,6 +179,7 @@ impl Command {
             Self::Budget(arguments) => budget::command(arguments),
             Self::Flash(arguments) => flash::command(arguments),
             Self::Log(arguments) => log::command(arguments),
+            Self::Settings(arguments) => settings::command(arguments),
             Self::New(arguments) => new::command(arguments),
             Self::Explain(arguments) => explain::command(arguments),
             Self::Completions(arguments) => completions::command(arguments),
@@ -264,14 +268,26 @@ impl job_file::FaceReader for Faces {
 }
 
 /// Reads a job file, and notes it as an input.
-fn read_job(path: &Path) -> Result<Job> {
+fn read_job(path: &Path, profile: Option<&MachineProfile>) -> Result<Job> {
     whole::note_input(path);
-    Ok(job_file::load_with(path, &Faces)?)
+    Ok(job_file::load_on(path, &Faces, profile)?)
+}
+
+/// Reads a machine's profile, if one is given, and notes it as an input.
+fn read_profile(path: Option<&PathBuf>) -> Result<Option<MachineProfile>> {
+    let Some(path) = path else { return Ok(None) };
+    whole::note_input(path);
+    Ok(Some(job_file::load_profile(path)?))
 }
 
 /// Reads a job, chooses its direction if `along = "auto"`, and prepares it.
 fn load(path: &Path) -> Result<(Job, Prepared)> {
-    settled(read_job(path)?)
+    settled(read_job(path, None)?)
+}
+
+/// The same on a machine with this profile.
+fn load_on(path: &Path, machine: Option<&PathBuf>) -> Result<(Job, Prepared)> {
+    settled(read_job(path, read_profile(machine)?.as_ref())?)
 }
 
 /// Chooses the direction of a job if `along = "auto"`, and prepares it.

@@ -1,11 +1,11 @@
 //! `run`: loads a job into the firmware, runs it there, and compares the samples with those of the simulation.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use clap::Args;
 use indicatif::ProgressBar;
 use interp_core::{Fault, FaultKind};
-use protocol::message::Reason;
+use protocol::message::{Reason, Request};
 use serde_json::{Value, json};
 
 use super::attach::unreachable_run;
@@ -16,11 +16,14 @@ use super::out::{say, to_stderr};
 use super::outcome::Outcome;
 use super::simulate::{WantedReport, remarks, report, surveyed, timed};
 use super::typed::{Console, WORDS};
-use super::{Failure, Result, WantedTrace, begun, completed, progress, scripted, spinner, whole};
+use super::{
+    Failure, Result, WantedTrace, begun, completed, progress, read_profile, scripted, spinner, whole,
+};
 use approach::Kind;
 use inspect::comparison::{self, BoardRun, ComparisonError, Reference};
-use job::{HeartbeatAction, Job};
+use job::{HeartbeatAction, Job, MachineProfile};
 use machine::prepare::{self, Prepared};
+use machine::profile;
 use machine::remote::chip::{self, Chip, ChipError};
 use machine::remote::operate::{self, Operator, Setup};
 use machine::remote::qemu::{self, Qemu, QemuError};
@@ -35,6 +38,7 @@ use machine::travel;
 /// Example: cargo sim run jobs/freeform.toml --qemu
 /// Example: cargo sim run jobs/plate_machine.toml --qemu --script jobs/operator.txt
 /// Example: cargo sim run jobs/plate_machine.toml --chip skr-pro
+/// Example: cargo sim run jobs/plate_machine.toml --qemu --machine machine.toml
 /// Example: cargo sim run jobs/plate_machine.toml --port /dev/ttyUSB0 --home 40,30,40
 #[derive(Debug, Args)]
 #[command(verbatim_doc_comment)]
@@ -43,6 +47,10 @@ pub(super) struct Arguments {
     job: PathBuf,
     #[command(flatten)]
     target: Target,
+    /// Machine profile (TOML). Default with --port: the profile that the board keeps; a board with another one than this refuses the run. A simulated board
+    /// keeps this one.
+    #[arg(long, value_name = "FILE")]
+    machine: Option<PathBuf>,
     /// Firmware image for QEMU. Default: built from the sources.
     #[arg(long, value_name = "ELF", requires = "qemu")]
     firmware: Option<PathBuf>,
@@ -339,8 +347,44 @@ fn by_sample(arguments: &Arguments, reference: &Reference<'_>, session: &mut Ses
     Ok(run)
 }
 
+/// The line to a board, and the profile of the machine: of `--machine`, or the one that the board keeps.
+fn machine(arguments: &Arguments) -> Result<(Option<(Peer, Session)>, Option<MachineProfile>)> {
+    let given = read_profile(arguments.machine.as_ref())?;
+    if given.is_some() || arguments.target.port.is_none() {
+        return Ok((None, given));
+    }
+    let (peer, mut session) = connect(arguments)?;
+    let kept = session.profile()?;
+    Ok((Some((peer, session)), kept.as_ref().map(profile::of_board)))
+}
+
+/// Makes sure that the board keeps this profile: a simulated one takes it, another one must have it.
+fn agree(arguments: &Arguments, wanted: Option<&MachineProfile>, session: &mut Session) -> Result<()> {
+    let Some(wanted) = wanted.map(profile::for_board) else {
+        return Ok(());
+    };
+    let Some(port) = &arguments.target.port else {
+        return Ok(session.command(&Request::SetProfile(Some(wanted)))?);
+    };
+    let kept = session.status()?.profile;
+    if kept == wanted.digest() {
+        return Ok(());
+    }
+    let what = if kept == 0 {
+        "keeps no machine profile"
+    } else {
+        "keeps another machine profile"
+    };
+    let file = arguments.machine.as_deref().unwrap_or(Path::new("machine.toml"));
+    Err(Failure::Failed(Some(format!(
+        "the board {what} than the one given\n  help: write it: cargo sim settings --port {port} --machine {}; or omit --machine: the board's own is then used",
+        file.display()
+    ))))
+}
+
 pub(super) fn command(arguments: &Arguments) -> Result<()> {
-    let (job, prepared) = home::load(&arguments.job, arguments.home)?;
+    let (connected, profile) = machine(arguments)?;
+    let (job, prepared) = home::load(&arguments.job, profile.as_ref(), arguments.home)?;
     travel::check(&job)?;
     arguments
         .script
@@ -359,6 +403,7 @@ pub(super) fn command(arguments: &Arguments) -> Result<()> {
     if let Some(script) = &arguments.script {
         let scripted = scripted::play(&job, &prepared, script, None)?;
         let (mut peer, mut session) = connect(arguments)?;
+        agree(arguments, profile.as_ref(), &mut session)?;
         check_period(&job, &session)?;
         make_ready(arguments, &job, &prepared, &mut session)?;
         drive::upload(&mut session, &prepared, |_| {})?;
@@ -375,7 +420,11 @@ pub(super) fn command(arguments: &Arguments) -> Result<()> {
     {
         return Err(Failure::Failed(Some(fault.sentence_of(&job))));
     }
-    let (mut peer, mut session) = connect(arguments)?;
+    let (mut peer, mut session) = match connected {
+        Some(connected) => connected,
+        None => connect(arguments)?,
+    };
+    agree(arguments, profile.as_ref(), &mut session)?;
     check_period(&job, &session)?;
     make_ready(arguments, &job, &prepared, &mut session)?;
     let bar = progress(prepared.words.len() as u64, "uploading");

@@ -14,7 +14,7 @@ use verify::survey::{SampleObserver, SurveyResult};
 
 use super::outcome::Outcome;
 use super::{
-    Bar, Failure, Result, WantedTrace, approach, begun, cannot_write, completed, load, scripted,
+    Bar, Failure, Result, WantedTrace, approach, begun, cannot_write, completed, load_on, scripted,
     warn_of_limits, whole,
 };
 
@@ -28,6 +28,9 @@ use super::{
 pub(super) struct Arguments {
     /// Job file (TOML).
     job: PathBuf,
+    /// Machine profile (TOML): what the job does not say of the machine is the profile's, and the job may not exceed it.
+    #[arg(long, value_name = "FILE")]
+    machine: Option<PathBuf>,
     /// Writes every sample as a row of this CSV file.
     #[arg(long, value_name = "FILE")]
     trace: Option<PathBuf>,
@@ -136,7 +139,7 @@ pub(super) fn report(
 }
 
 pub(super) fn command(arguments: &Arguments) -> Result<()> {
-    let (job, prepared) = load(&arguments.job)?;
+    let (job, prepared) = load_on(&arguments.job, arguments.machine.as_ref())?;
     arguments
         .script
         .iter()

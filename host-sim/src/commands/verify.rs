@@ -15,7 +15,7 @@ use verify::swept;
 
 use super::out::{complain, say};
 use super::simulate::{WantedReport, remarks, report, timed};
-use super::{Bar, Failure, Result, along, error_json, load, motion_words, reach_words, swept_words};
+use super::{Bar, Failure, Result, along, error_json, load_on, motion_words, reach_words, swept_words};
 
 /// Checks a job before it runs on a machine. Every sample against an independent f64 oracle: positions, normals, feed ripple, path
 /// intervals, schedule. The swept envelope of the ball against the surface: scallop height, local and global gouges. Axis travel. With
@@ -33,6 +33,9 @@ pub(super) struct Arguments {
     /// Job files (TOML).
     #[arg(required = true, value_name = "JOB")]
     jobs: Vec<PathBuf>,
+    /// Machine profile (TOML): what the job does not say of the machine is the profile's, and the job may not exceed it.
+    #[arg(long, value_name = "FILE")]
+    machine: Option<PathBuf>,
     /// Writes a report page into this folder: 3D view, charts, figures. With several jobs: a folder for each in it.
     #[arg(long, value_name = "DIR")]
     report: Option<PathBuf>,
@@ -270,7 +273,7 @@ pub(super) fn command(arguments: &Arguments) -> Result<()> {
 
 /// Verifies one job and prints its figures unless JSON is requested. Returns whether it passed, and its JSON object.
 fn verify_job(arguments: &Arguments, path: &Path, directory: Option<&Path>) -> Result<(bool, Value)> {
-    let (job, prepared) = load(path)?;
+    let (job, prepared) = load_on(path, arguments.machine.as_ref())?;
     let directory = WantedReport::new(directory, arguments.force)?;
     let timed = timed(&job, &prepared)?;
     let original = original(&job)?;

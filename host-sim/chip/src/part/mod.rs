@@ -2,6 +2,7 @@
 
 pub(crate) mod debug;
 pub(crate) mod dma;
+pub(crate) mod flash;
 pub(crate) mod gpio;
 pub(crate) mod nvic;
 pub(crate) mod rcc;

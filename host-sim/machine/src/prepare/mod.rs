@@ -18,7 +18,7 @@ use job::{Along, AlongChoice, Job, JobError, SurfaceSpec};
 use patches::pieces::Source;
 
 pub use grid::patch_count;
-pub use steps::configuration;
+pub use steps::{config as step_config, configuration};
 
 /// One parameter of the prepared surface: its spans, in the parameter's own units.
 #[derive(Clone, Debug, PartialEq)]

@@ -21,7 +21,8 @@ fn slots(time_us: f64, period_us: f64, most: u16) -> u16 {
 }
 
 /// The core's step configuration; `None` where the job keeps the board's own.
-pub(super) fn config(machine: &MachineSpec) -> Option<StepConfig> {
+#[must_use]
+pub fn config(machine: &MachineSpec) -> Option<StepConfig> {
     let output = machine.step_output?;
     let pulse_slots = slots(output.pulse_us, machine.period_us, PULSE_SLOTS_MAX.into()).max(1);
     Some(StepConfig {

@@ -4,7 +4,9 @@ use std::io::{self, Read, Write};
 use std::time::{Duration, Instant};
 
 use protocol::frame::{DELIMITER, Decoder, FRAME_MAX, write_request};
-use protocol::message::{Capabilities, Clock, Reason, Reply, Request, Status, next_number, read_reply};
+use protocol::message::{
+    Capabilities, Clock, Profile, Reason, Reply, Request, Status, next_number, read_reply,
+};
 use protocol::version::{PROTOCOL_VERSION, VersionMismatch};
 
 use interp_core::State;
@@ -127,6 +129,7 @@ fn name(request: &Request) -> &'static str {
         Request::Simulate { .. } => "simulated inputs",
         Request::StepConfig(_) => "the steps of the axes",
         Request::Repeat { .. } => "lost events",
+        Request::Profile | Request::SetProfile(_) => "the machine's profile",
     }
 }
 
@@ -236,6 +239,21 @@ impl Session {
                 reason,
             }),
             _ => Err(RemoteError::Silent("it did not answer with its status")),
+        }
+    }
+
+    /// Requests the profile that the board keeps.
+    ///
+    /// # Errors
+    /// As [`Self::command`].
+    pub fn profile(&mut self) -> Result<Option<Profile>, RemoteError> {
+        match self.ask(&Request::Profile)? {
+            Reply::Profile { profile, .. } => Ok(profile),
+            Reply::Nak { reason, .. } => Err(RemoteError::Refused {
+                request: name(&Request::Profile),
+                reason,
+            }),
+            _ => Err(RemoteError::Silent("it did not answer with its profile")),
         }
     }
 
@@ -475,7 +493,10 @@ impl Session {
 fn answered(reply: &Reply) -> Option<u16> {
     match reply {
         Reply::Capabilities(capabilities) => Some(capabilities.number),
-        Reply::Ack { number } | Reply::Nak { number, .. } | Reply::Status { number, .. } => Some(*number),
+        Reply::Ack { number }
+        | Reply::Nak { number, .. }
+        | Reply::Status { number, .. }
+        | Reply::Profile { number, .. } => Some(*number),
         Reply::Samples { .. } | Reply::PassDigest { .. } | Reply::Halted(_) => None,
     }
 }

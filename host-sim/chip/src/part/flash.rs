@@ -1,0 +1,178 @@
+//! The flash interface (RM0090, 3) and the two sectors that keep settings. The sectors of the program cannot be written here.
+//!
+//! The processor waits while a byte is written or a sector erased, because it fetches from the same bank. The supply may fail in any of these operations.
+
+use crate::world::World;
+
+/// First address and bytes of the sectors, and the number of the first.
+pub(crate) const SETTINGS: u32 = 0x080c_0000;
+pub(crate) const SETTINGS_BYTES: u32 = 2 * SECTOR;
+const SECTOR: u32 = 128 * 1024;
+const FIRST: u32 = 10;
+
+const KEYS: [u32; 2] = [0x4567_0123, 0xcdef_89ab];
+
+/// Registers, by offset.
+const KEYR: u32 = 0x04;
+const SR: u32 = 0x0c;
+const CR: u32 = 0x10;
+
+/// Bits of `CR`.
+const PG: u32 = 1 << 0;
+const SER: u32 = 1 << 1;
+const MER: u32 = 1 << 2;
+const STRT: u32 = 1 << 16;
+const LOCK: u32 = 1 << 31;
+
+/// Times (DS8626, table 40): a byte, and a sector of 128 KB with a parallelism of eight bits, s.
+const BYTE_S: f64 = 16e-6;
+const ERASE_S: f64 = 2.0;
+
+pub(crate) struct Flash {
+    sectors: Vec<u8>,
+    cr: u32,
+    keys: usize,
+    /// A wrong key locks `CR` until the next reset.
+    shut: bool,
+    /// The supply fails in every operation of which the number is a multiple of this.
+    cut_every: Option<u64>,
+    /// Bytes written and sectors erased.
+    pub(crate) operations: u64,
+    pub(crate) erased: u64,
+    /// The supply has failed: nothing is written any more.
+    pub(crate) is_cut: bool,
+}
+
+impl Flash {
+    /// Erased.
+    pub(crate) fn new(cut_every: Option<u64>) -> Self {
+        Self {
+            sectors: vec![0xff; SETTINGS_BYTES as usize],
+            cr: LOCK,
+            keys: 0,
+            shut: false,
+            cut_every,
+            operations: 0,
+            erased: 0,
+            is_cut: false,
+        }
+    }
+
+    /// After a reset: what is written stays.
+    pub(crate) fn restart(&mut self) {
+        (self.cr, self.keys, self.shut, self.is_cut) = (LOCK, 0, false, false);
+    }
+
+    /// Reads a register.
+    pub(crate) fn read(&self, offset: u32, world: &mut World) -> u32 {
+        match offset {
+            // Nothing is under way when the processor goes on, and nothing has failed.
+            SR => 0,
+            CR => self.cr,
+            _ => {
+                world.wrong_once(format!("read of FLASH at {offset:#x}: not modelled"));
+                0
+            }
+        }
+    }
+
+    /// Writes a register.
+    pub(crate) fn write(&mut self, offset: u32, value: u32, world: &mut World) {
+        match offset {
+            KEYR => {
+                let wanted = KEYS.get(self.keys).copied();
+                if self.shut || wanted != Some(value) {
+                    self.shut = true;
+                    world.wrong("a wrong key of FLASH");
+                } else {
+                    self.keys += 1;
+                    if self.keys == KEYS.len() {
+                        (self.cr, self.keys) = (self.cr & !LOCK, 0);
+                    }
+                }
+            }
+            SR => {}
+            CR if self.cr & LOCK != 0 => {
+                // Locking it again is no mistake.
+                if value & LOCK == 0 {
+                    world.wrong("a write of FLASH_CR while it is locked");
+                }
+            }
+            CR => {
+                self.cr = value & !STRT;
+                if value & STRT != 0 {
+                    self.erase(world);
+                }
+            }
+            _ => world.wrong_once(format!("write of FLASH at {offset:#x}: not modelled")),
+        }
+    }
+
+    /// Counts an operation; false where the supply fails in it.
+    fn holds(&mut self, world: &mut World) -> bool {
+        self.operations += 1;
+        if self
+            .cut_every
+            .is_some_and(|every| self.operations.is_multiple_of(every))
+        {
+            world.event(world.now, "power cut");
+            self.is_cut = true;
+        }
+        !self.is_cut
+    }
+
+    fn erase(&mut self, world: &mut World) {
+        let sector = self.cr >> 3 & 0x1f;
+        if self.cr & SER == 0
+            || self.cr & (PG | MER) != 0
+            || !(FIRST..FIRST + 2).contains(&sector)
+            || self.is_cut
+        {
+            if !self.is_cut {
+                world.wrong(format!(
+                    "an erase of sector {sector} with FLASH_CR = {:#x}",
+                    self.cr
+                ));
+            }
+            return;
+        }
+        let from = ((sector - FIRST) * SECTOR) as usize;
+        let whole = self.holds(world);
+        // An erase that is cut short has reached a part of the sector.
+        let bytes = if whole { SECTOR } else { SECTOR / 3 } as usize;
+        self.sectors[from..from + bytes].fill(0xff);
+        self.erased += u64::from(whole);
+        world.now += world.lasting(if whole { ERASE_S } else { ERASE_S / 3.0 });
+    }
+
+    /// The word at an address within the sectors.
+    pub(crate) fn word(&self, address: u32) -> u32 {
+        let at = (address - SETTINGS) as usize & !3;
+        u32::from_le_bytes([0, 1, 2, 3].map(|byte| self.sectors[at + byte]))
+    }
+
+    /// Programs a byte: bits are only cleared.
+    pub(crate) fn program(&mut self, address: u32, bytes: u32, value: u32, world: &mut World) {
+        if self.is_cut {
+            return;
+        }
+        // PSIZE 0: bytes.
+        if self.cr & LOCK != 0
+            || self.cr & PG == 0
+            || self.cr & SER != 0
+            || bytes != 1
+            || self.cr >> 8 & 3 != 0
+        {
+            world.wrong(format!(
+                "{bytes} bytes are written to flash at {address:#x} with FLASH_CR = {:#x}",
+                self.cr
+            ));
+            return;
+        }
+        let whole = self.holds(world);
+        let byte = &mut self.sectors[(address - SETTINGS) as usize];
+        // A byte that is cut short has some of its bits.
+        *byte &= value as u8 | if whole { 0 } else { 0x5a };
+        world.now += world.lasting(BYTE_S);
+    }
+}

@@ -1,0 +1,158 @@
+//! A machine's profile, between the desk's form, the board's and the text of its file.
+
+use std::fmt::Write as _;
+
+use interp_core::StepConfig;
+use job::{AxisLimits, HeartbeatAction, MachineProfile, PERIOD_DEFAULT_US, Ratio, StepOutput};
+use protocol::message::{LinkTimeoutAction, Profile};
+
+use crate::prepare;
+
+const NM_PER_MM: f64 = 1e6;
+const US_PER_MS: f64 = 1e3;
+
+/// The profile in the board's form, by its period.
+#[must_use]
+pub fn for_board(profile: &MachineProfile) -> Profile {
+    let spec = profile.spec();
+    #[allow(clippy::cast_possible_truncation, reason = "the board's precision")]
+    let [velocity_mm_s, acceleration_mm_s2, jerk_mm_s3] = profile
+        .limits
+        .by_order()
+        .map(|limits| limits.map(|limit| limit as f32));
+    #[allow(clippy::cast_possible_truncation, reason = "the cast saturates")]
+    let nm = |mm: f64| (mm * NM_PER_MM).round() as i32;
+    Profile {
+        steps: prepare::step_config(&spec).unwrap_or(StepConfig::DEFAULT).into(),
+        velocity_mm_s,
+        acceleration_mm_s2,
+        jerk_mm_s3,
+        travel_nm: profile.travel_mm.map(|travel| travel.map(|range| range.map(nm))),
+        configuration: prepare::configuration(&spec),
+    }
+}
+
+/// The profile of a board: limits as the shortest decimal numbers that the board's stand for.
+#[must_use]
+pub fn of_board(profile: &Profile) -> MachineProfile {
+    let Profile {
+        steps,
+        velocity_mm_s,
+        acceleration_mm_s2,
+        jerk_mm_s3,
+        travel_nm,
+        configuration,
+    } = *profile;
+    let decimal =
+        |limits: [f32; 3]| limits.map(|limit| limit.to_string().parse().unwrap_or(f64::from(limit)));
+    let slot_us = PERIOD_DEFAULT_US / f64::from(interp_core::steps::SLOTS);
+    let config = StepConfig::from(steps);
+    MachineProfile {
+        limits: AxisLimits {
+            velocity_mm_s: decimal(velocity_mm_s),
+            acceleration_mm_s2: decimal(acceleration_mm_s2),
+            jerk_mm_s3: decimal(jerk_mm_s3),
+        },
+        travel_mm: travel_nm.map(|travel| travel.map(|range| range.map(|nm| f64::from(nm) / NM_PER_MM))),
+        homing_required: configuration.homing_required,
+        heartbeat_action: match configuration.on_link_timeout {
+            LinkTimeoutAction::Finish => HeartbeatAction::Finish,
+            LinkTimeoutAction::Hold => HeartbeatAction::Hold,
+        },
+        heartbeat_timeout_ms: f64::from(configuration.link_timeout_ticks) * PERIOD_DEFAULT_US / US_PER_MS,
+        step_output: StepOutput {
+            steps_per_mm: config.axes.map(|axis| Ratio {
+                numerator: axis.steps,
+                denominator: axis.mm,
+            }),
+            direction_inverted: config.axes.map(|axis| axis.inverted),
+            pulse_us: f64::from(config.pulse_slots) * slot_us,
+            direction_setup_us: f64::from(config.setup_slots) * slot_us,
+        },
+    }
+}
+
+/// The text of the profile's file.
+#[must_use]
+pub fn text(profile: &MachineProfile) -> String {
+    let MachineProfile {
+        limits,
+        travel_mm,
+        homing_required,
+        heartbeat_action,
+        heartbeat_timeout_ms,
+        step_output,
+    } = profile;
+    let ratio = |ratio: Ratio| match ratio.denominator {
+        1 => ratio.numerator.to_string(),
+        mm => format!("\"{}/{mm}\"", ratio.numerator),
+    };
+    let steps = step_output.steps_per_mm.map(ratio).join(", ");
+    let mut text = String::from("[machine]\n");
+    let mut line = |line: std::fmt::Arguments<'_>| {
+        // A text takes every line.
+        let _ = writeln!(text, "{line}");
+    };
+    line(format_args!("velocity_max_mm_s = {:?}", limits.velocity_mm_s));
+    line(format_args!(
+        "acceleration_max_mm_s2 = {:?}",
+        limits.acceleration_mm_s2
+    ));
+    line(format_args!("jerk_max_mm_s3 = {:?}", limits.jerk_mm_s3));
+    if let Some(travel) = travel_mm {
+        line(format_args!("travel_mm = {travel:?}"));
+    }
+    line(format_args!("steps_per_mm = [{steps}]"));
+    line(format_args!("pulse_us = {:?}", step_output.pulse_us));
+    line(format_args!(
+        "direction_setup_us = {:?}",
+        step_output.direction_setup_us
+    ));
+    line(format_args!(
+        "direction_inverted = {:?}",
+        step_output.direction_inverted
+    ));
+    line(format_args!("homing_required = {homing_required}"));
+    let action = match heartbeat_action {
+        HeartbeatAction::Finish => "finish",
+        HeartbeatAction::Hold => "hold",
+    };
+    line(format_args!("host_gone = \"{action}\""));
+    line(format_args!("host_gone_ms = {heartbeat_timeout_ms:?}"));
+    text
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const FILE: &str = r#"
+[machine]
+velocity_max_mm_s = [120, 80.7, 33.3]
+acceleration_max_mm_s2 = [1000, 0.7, 500]
+jerk_max_mm_s3 = [20000, 19999.9, 1e6]
+travel_mm = [[-0.5, 300], [0, 200.000001], [-80, 0]]
+steps_per_mm = [400, 78.74, "3200/7"]
+pulse_us = 2.5
+direction_setup_us = 20
+direction_inverted = [true, false, true]
+host_gone = "hold"
+host_gone_ms = 750
+"#;
+
+    /// What is kept by a board is what its text says, and the text again.
+    #[test]
+    fn a_profile_survives_board_and_text() {
+        let given = job_file::parse_profile("machine.toml", FILE).unwrap();
+        let on_board = for_board(&given);
+        assert!(on_board.is_valid());
+        let back = of_board(&on_board);
+        // A pulse takes whole slots of a microsecond, and is never shorter.
+        let mut kept = given;
+        kept.step_output.pulse_us = 3.0;
+        assert_eq!(back, kept);
+        let read = job_file::parse_profile("again", &text(&back)).unwrap();
+        assert_eq!(read, back);
+        assert_eq!(for_board(&read).digest(), on_board.digest());
+    }
+}

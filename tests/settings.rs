@@ -1,0 +1,240 @@
+//! The machine profile that a board keeps: through power cuts, and against jobs that exceed it.
+
+use controller::in_process::Board;
+use integration_tests::{HELLO, Host, dome, upload};
+use interp_core::{
+    AxisLimits, Header,
+    steps::{AxisSteps, StepConfig},
+};
+use protocol::message::{
+    Configuration, Excess, LinkTimeoutAction, Profile, ProfileLimit, Reason, Reply, Request, Status,
+    StepSettings,
+};
+
+const WORDS: usize = 64;
+
+const CONFIGURATION: Configuration = Configuration {
+    homing_required: true,
+    on_link_timeout: LinkTimeoutAction::Hold,
+    link_timeout_ticks: 700,
+};
+
+fn profile() -> Profile {
+    let axis = |steps, inverted| AxisSteps {
+        steps,
+        mm: 1,
+        inverted,
+    };
+    let steps = StepConfig {
+        axes: [axis(200, true), axis(400, false), axis(1600, false)],
+        pulse_slots: 3,
+        setup_slots: 20,
+    };
+    Profile {
+        steps: steps.into(),
+        velocity_mm_s: [100.0, 100.0, 50.0],
+        acceleration_mm_s2: [1000.0; 3],
+        jerk_mm_s3: [20_000.0; 3],
+        travel_nm: Some([[-100_000_000, 100_000_000]; 3]),
+        configuration: CONFIGURATION,
+    }
+}
+
+/// The dome within the profile's limits.
+fn limited() -> (Header, Vec<i32>) {
+    let (mut header, words) = dome();
+    header.axes = Some(AxisLimits {
+        velocity_mm_s: [100.0, 100.0, 50.0],
+        acceleration_mm_s2: [1000.0; 3],
+        jerk_mm_s3: [20_000.0; 3],
+        chord_mm: 0.005,
+        overrun_mm: 0.0,
+        travel_nm: [[-100_000_000, 100_000_000]; 3],
+        home_nm: [0, 0, 50_000_000],
+        plunge_mm: 2.0,
+        safe_z_nm: 40_000_000,
+    });
+    (header, words)
+}
+
+/// Host and board.
+struct Desk {
+    host: Host,
+    board: Board<WORDS>,
+}
+
+impl Desk {
+    fn new(board: Board<WORDS>) -> Self {
+        let mut desk = Self {
+            host: Host::default(),
+            board,
+        };
+        desk.board.receive(&desk.host.next(&HELLO));
+        desk.board.take_sent();
+        desk
+    }
+
+    fn answer(&mut self, request: &Request) -> Reply {
+        self.board.receive(&self.host.next(request));
+        self.board.tick();
+        let mut replies = self.host.read(&self.board.take_sent());
+        assert_eq!(replies.len(), 1);
+        replies.remove(0)
+    }
+
+    fn ask(&mut self, request: &Request) -> Result<(), Reason> {
+        match self.answer(request) {
+            Reply::Ack { .. } => Ok(()),
+            Reply::Nak { reason, .. } => Err(reason),
+            other => panic!("{other:?}"),
+        }
+    }
+
+    fn status(&mut self) -> Status {
+        match self.answer(&Request::Status) {
+            Reply::Status { status, .. } => status,
+            other => panic!("{other:?}"),
+        }
+    }
+
+    fn kept(&mut self) -> Option<Profile> {
+        match self.answer(&Request::Profile) {
+            Reply::Profile { profile, .. } => profile,
+            other => panic!("{other:?}"),
+        }
+    }
+
+    fn load(&mut self, (header, words): (Header, Vec<i32>)) -> Result<(), Reason> {
+        upload(header, &words)
+            .iter()
+            .try_for_each(|request| self.ask(request))
+    }
+
+    fn power_cycle(self) -> Self {
+        Self::new(self.board.power_cycle())
+    }
+}
+
+#[test]
+fn a_profile_is_in_force_at_once_and_after_a_power_cut() {
+    let mut desk = Desk::new(Board::new());
+    assert_eq!((desk.kept(), desk.status().profile), (None, 0));
+    desk.ask(&Request::SetProfile(Some(profile()))).unwrap();
+    for _ in 0..2 {
+        assert_eq!(desk.kept(), Some(profile()));
+        let status = desk.status();
+        assert_eq!(status.profile, profile().digest());
+        assert_eq!(status.steps, profile().steps.digest());
+        assert_eq!(status.safety.configuration, CONFIGURATION);
+        desk = desk.power_cycle();
+    }
+    desk.ask(&Request::SetProfile(None)).unwrap();
+    for _ in 0..2 {
+        assert_eq!((desk.kept(), desk.status().profile), (None, 0));
+        let own = StepSettings::from(StepConfig::DEFAULT);
+        assert_eq!(desk.status().steps, own.digest());
+        assert_eq!(desk.status().safety.configuration, Configuration::DEFAULT);
+        desk = desk.power_cycle();
+    }
+}
+
+/// More changes than both sectors hold, with a power cut now and then.
+#[test]
+fn a_profile_can_be_changed_for_ever() {
+    let mut desk = Desk::new(Board::new());
+    for change in 1..100_u16 {
+        let mut changed = profile();
+        changed.velocity_mm_s[0] = change.into();
+        desk.ask(&Request::SetProfile(Some(changed))).unwrap();
+        if change % 7 == 0 {
+            desk = desk.power_cycle();
+        }
+        assert_eq!(desk.kept(), Some(changed));
+    }
+}
+
+#[test]
+fn no_job_exceeds_the_profile() {
+    let mut desk = Desk::new(Board::new());
+    desk.ask(&Request::SetProfile(Some(profile()))).unwrap();
+    desk.load(limited()).unwrap();
+    let (mut fast, words) = limited();
+    if let Some(axes) = &mut fast.axes {
+        axes.jerk_mm_s3[2] = 30_000.0;
+    }
+    let excess = Excess {
+        limit: ProfileLimit::Jerk,
+        axis: 2,
+        most: 20_000.0,
+        wanted: 30_000.0,
+    };
+    assert_eq!(desk.load((fast, words)), Err(Reason::BeyondProfile { excess }));
+    // The job before is still loaded.
+    desk.ask(&Request::Drives { on: true }).unwrap();
+    let home_nm = [0, 0, 50_000_000];
+    desk.ask(&Request::SetHome { home_nm }).unwrap();
+    assert_eq!(desk.ask(&Request::Start), Ok(()));
+    // Neither are settings changed under a run.
+    let refused = desk.ask(&Request::SetProfile(None)).unwrap_err();
+    assert!(matches!(refused, Reason::WrongState { .. }), "{refused}");
+    assert_eq!(desk.kept(), Some(profile()));
+}
+
+#[test]
+fn steps_and_homing_are_the_machines() {
+    let mut desk = Desk::new(Board::new());
+    desk.ask(&Request::SetProfile(Some(profile()))).unwrap();
+    let beyond = |limit| {
+        Err(Reason::BeyondProfile {
+            excess: Excess::of(limit),
+        })
+    };
+    let other = StepSettings::from(StepConfig::DEFAULT);
+    assert_eq!(desk.ask(&Request::StepConfig(other)), beyond(ProfileLimit::Steps));
+    assert_eq!(desk.ask(&Request::StepConfig(profile().steps)), Ok(()));
+    let free = Configuration {
+        homing_required: false,
+        ..CONFIGURATION
+    };
+    assert_eq!(desk.ask(&Request::Configure(free)), beyond(ProfileLimit::Homing));
+    let finish = Configuration {
+        on_link_timeout: LinkTimeoutAction::Finish,
+        ..CONFIGURATION
+    };
+    assert_eq!(desk.ask(&Request::Configure(finish)), Ok(()));
+    assert_eq!(desk.status().steps, profile().steps.digest());
+}
+
+#[test]
+fn a_job_is_loaded_again_after_a_change_of_the_profile() {
+    let mut desk = Desk::new(Board::new());
+    desk.load(limited()).unwrap();
+    desk.ask(&Request::Drives { on: true }).unwrap();
+    let home_nm = [0, 0, 50_000_000];
+    desk.ask(&Request::SetHome { home_nm }).unwrap();
+    let mut slow = profile();
+    slow.velocity_mm_s = [10.0; 3];
+    desk.ask(&Request::SetProfile(Some(slow))).unwrap();
+    assert_eq!(desk.ask(&Request::Start), Err(Reason::OtherProfile));
+    let too_fast = desk.load(limited()).unwrap_err();
+    assert!(matches!(too_fast, Reason::BeyondProfile { .. }), "{too_fast}");
+    desk.ask(&Request::SetProfile(Some(profile()))).unwrap();
+    desk.load(limited()).unwrap();
+    assert_eq!(desk.ask(&Request::Start), Ok(()));
+}
+
+#[test]
+fn a_profile_with_a_bad_value_is_refused() {
+    let mut desk = Desk::new(Board::new());
+    desk.ask(&Request::SetProfile(Some(profile()))).unwrap();
+    for change in [
+        (|profile: &mut Profile| profile.jerk_mm_s3[0] = 0.0) as fn(&mut Profile),
+        |profile| profile.velocity_mm_s[1] = f32::NAN,
+        |profile| profile.travel_nm = Some([[1, 0]; 3]),
+    ] {
+        let mut bad = profile();
+        change(&mut bad);
+        assert_eq!(desk.ask(&Request::SetProfile(Some(bad))), Err(Reason::BadProfile));
+        assert_eq!(desk.kept(), Some(profile()));
+    }
+}
