@@ -250,12 +250,18 @@ impl<F: NorFlash> Storage<F> {
     }
 
     fn slot(&mut self, sector: u32, slot: u32) -> Content {
+        // Most slots are blank: a look at their head is enough, because it is written first.
+        let mut head = [0; HEAD];
         let mut bytes = [0; SLOT];
-        if self.flash.read(self.offset(sector, slot), &mut bytes).is_err() {
+        let offset = self.offset(sector, slot);
+        if self.flash.read(offset, &mut head).is_err() {
             return Content::Broken;
         }
-        if bytes.iter().all(|byte| *byte == BLANK) {
+        if head == [BLANK; HEAD] {
             return Content::Blank;
+        }
+        if self.flash.read(offset, &mut bytes).is_err() {
+            return Content::Broken;
         }
         let (data, crc) = bytes.split_at(SLOT - CRC);
         let [a, b, c, d, kind, length, ..] = *data else {
