@@ -411,7 +411,12 @@ fn the_image_is_bounded() {
         );
     }
     let sizes = image::sizes(path).unwrap();
-    assert!(u64::from(analysis.stack_bytes()) < sizes.stack_room);
+    let (needed, room) = (u64::from(analysis.stack_bytes()), sizes.stack_room);
+    assert!(
+        needed < room,
+        "{needed} of {room} bytes of stack: {:?}",
+        analysis.contexts
+    );
 }
 
 /// Figures and operations of a job of the table; not the shared measurement where `again`.

@@ -64,6 +64,7 @@ impl Payload {
 }
 
 /// A slot's content.
+#[allow(clippy::large_enum_variant, reason = "there is no allocator to box with")]
 enum Content {
     Blank,
     /// Neither blank nor a record: its writing was cut short.

@@ -66,7 +66,7 @@ pub(crate) fn init(device: pac::Peripherals) -> Board {
 }
 
 /// QEMU's flash cannot be written: settings are kept as long as QEMU runs.
-pub(crate) type SettingsFlash = RamFlash<1024>;
+pub(crate) type SettingsFlash = RamFlash<512>;
 
 /// Simulated input registers of the ports: the inputs set by the host, initially none.
 static INPUTS: [AtomicU32; Port::ALL.len()] = [const { AtomicU32::new(0) }; Port::ALL.len()];

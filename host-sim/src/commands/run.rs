@@ -183,8 +183,11 @@ enum Peer {
     Chip(Chip),
 }
 
+/// A session, with the process at its other end.
+type Connected = (Peer, Session);
+
 /// Starts a board's image on models of its chip.
-fn connect_chip(name: &str, fast: bool) -> Result<(Peer, Session)> {
+fn connect_chip(name: &str, fast: bool) -> Result<Connected> {
     let bar = spinner("building the firmware and the chip emulator");
     let built = chip::image(board_of(name)).and_then(|image| Ok((chip::program()?, image)));
     bar.finish_and_clear();
@@ -214,7 +217,7 @@ fn models_failure(peer: &mut Peer, as_json: bool) -> Option<String> {
 }
 
 /// Opens a session with a board, QEMU or an emulated chip.
-fn connect(arguments: &Arguments) -> Result<(Peer, Session)> {
+fn connect(arguments: &Arguments) -> Result<Connected> {
     if let Some(name) = &arguments.target.port {
         return Ok((Peer::Board, open_port(name)?));
     }
@@ -348,7 +351,7 @@ fn by_sample(arguments: &Arguments, reference: &Reference<'_>, session: &mut Ses
 }
 
 /// The line to a board, and the profile of the machine: of `--machine`, or the one that the board keeps.
-fn machine(arguments: &Arguments) -> Result<(Option<(Peer, Session)>, Option<MachineProfile>)> {
+fn machine(arguments: &Arguments) -> Result<(Option<Connected>, Option<MachineProfile>)> {
     let given = read_profile(arguments.machine.as_ref())?;
     if given.is_some() || arguments.target.port.is_none() {
         return Ok((None, given));
