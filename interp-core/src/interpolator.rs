@@ -353,7 +353,7 @@ impl Motion {
         matches!(
             self.state,
             State::Running | State::Linking | State::Holding | State::Held | State::Stopping
-        ) && self.sequencer.has_to_plan()
+        ) && self.sequencer.has_to_plan(&self.run)
     }
 
     #[inline(never)]
@@ -367,11 +367,10 @@ impl Motion {
             run,
             ..
         } = self;
-        if let Ok((job, rest)) = program.job_and_rest(store) {
-            match &job.header.axes {
-                Some(axes) => sequencer.plan(&job, axes, run),
-                None => run.plan(&job, rest),
-            }
+        if program.header().axes.is_some() {
+            sequencer.plan(program, store, run);
+        } else if let Ok((job, rest)) = program.job_and_rest(store) {
+            run.plan(&job, rest);
         }
     }
 
@@ -465,12 +464,15 @@ impl Motion {
             Command::Start => {
                 self.restart();
                 let Self {
-                    program, sequencer, ..
+                    program,
+                    sequencer,
+                    run,
+                    ..
                 } = self;
                 match program.job(store) {
                     Ok(job) if has_limits => {
                         if let Some(axes) = &job.header.axes {
-                            sequencer.restart(job.header, axes);
+                            sequencer.restart(&job, axes, run);
                         }
                         State::Linking
                     }

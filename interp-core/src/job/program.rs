@@ -73,7 +73,7 @@ fn check_header(header: &Header) -> Result<()> {
             return Err(Fault::new(FaultKind::BadHeader, f32::from(spans)));
         }
     }
-    if header.spacing.is_constant() && (header.axes.is_some() || front_words(header).is_none()) {
+    if front_words(header).is_none() {
         return Err(Fault::new(FaultKind::BadHeader, f32::from(header.path_spans)));
     }
     let ranges = [

@@ -5,13 +5,15 @@ use crate::job::program::Job;
 use crate::job::{SurfaceKind, ToolSide};
 use crate::math::arith::{centred, power_of_two};
 use crate::math::number::NM_PER_MM_F32;
+use crate::pass::front::{FrontLine, FrontPiece};
 use crate::pass::interval::Interval;
 use crate::pass::offset::{Locator, origin_q30};
 use crate::pass::position::PassPosition;
-use crate::pass::route::Piece;
+use crate::pass::route::{Piece, Route};
+use crate::sample::SpanParameter;
 use crate::surface::{
-    Ball, CirclePass, GridPass, IsoLine, OffsetUnits, POLYNOMIAL_WORDS, PathSpeed, ProfilePass,
-    RATIONAL_WORDS, REVOLVED_WORDS, Surface, split_patch, split_revolved,
+    Ball, CirclePass, CurvePass, GridPass, IsoLine, OffsetUnits, POLYNOMIAL_WORDS, PathSpeed, ProfilePass,
+    RATIONAL_WORDS, REVOLVED_WORDS, RecordKind, Surface, split_patch, split_revolved,
 };
 
 /// A patch on a pass. Units are the patch's, 2^-shift nm.
@@ -54,9 +56,70 @@ impl Patch {
     ///
     /// # Errors
     /// As [`Self::collapse`].
-    pub(crate) fn lay(&mut self, job: &Job<'_>, piece: &Piece) -> Result<()> {
+    pub(crate) fn lay(&mut self, job: &Job<'_>, route: &Route, piece: &Piece) -> Result<()> {
         self.range = piece.range;
-        self.collapse(job, &piece.position)
+        match (&route.front, &piece.front) {
+            (Some(line), Some(on)) => self.lay_on_front(job, line, on, &piece.position),
+            _ => self.collapse(job, &piece.position),
+        }
+    }
+
+    /// Becomes the patch of a piece of a pass on a front.
+    #[inline(never)]
+    fn lay_on_front(
+        &mut self,
+        job: &Job<'_>,
+        line: &FrontLine,
+        piece: &FrontPiece,
+        position: &PassPosition,
+    ) -> Result<()> {
+        let PassPosition { side, span, reversed } = *position;
+        let tool = if job.header.tool_side == ToolSide::Plus {
+            1.0
+        } else {
+            -1.0
+        };
+        let (kind, words) = match job.header.kind {
+            SurfaceKind::Polynomial => {
+                let words = job.patch::<POLYNOMIAL_WORDS>(span, side.span)?;
+                (RecordKind::Polynomial, words.as_slice())
+            }
+            SurfaceKind::Rational => {
+                let words = job.patch::<RATIONAL_WORDS>(span, side.span)?;
+                (RecordKind::Rational, words.as_slice())
+            }
+            SurfaceKind::RevolvedAlongProfile => {
+                let words = job.patch::<REVOLVED_WORDS>(span, side.span)?;
+                (RecordKind::Profile, words.as_slice())
+            }
+            SurfaceKind::RevolvedAroundAxis => {
+                let words = job.patch::<REVOLVED_WORDS>(span, side.span)?;
+                (RecordKind::Circle, words.as_slice())
+            }
+        };
+        let (origin_nm, shift) = match job.header.kind {
+            SurfaceKind::Polynomial | SurfaceKind::Rational => {
+                let (origin_nm, shift, _, _) = split_patch(words);
+                (origin_nm, shift)
+            }
+            _ => {
+                let (shift, height_nm) = words.first_chunk().map_or((0, 0), split_revolved);
+                ([0, 0, height_nm], shift)
+            }
+        };
+        self.origin = origin_q30(origin_nm);
+        self.measure(job, shift, side.span, tool);
+        let radius = tool * job.header.ball_radius_mm * self.per_mm;
+        if !matches!(self.surface, Surface::Curve(_)) {
+            self.surface = Surface::Curve(CurvePass::NONE);
+        }
+        if let Surface::Curve(pass) = &mut self.surface {
+            pass.lay(kind, words, line.side_curve(job, piece), radius);
+            pass.set_ends(reversed, self.range, line.boundary_fractions(piece));
+        }
+        self.point = false;
+        self.ends = None;
+        Ok(())
     }
 
     /// Collapses the patch of a pass.
@@ -111,6 +174,17 @@ impl Patch {
         self.point = self.surface.is_point();
         self.ends = None;
         Ok(())
+    }
+
+    /// The side parameter at a fraction of the patch, in the direction of travel.
+    pub(crate) fn side_at(&self, position: &PassPosition, fraction: u64) -> SpanParameter {
+        match &self.surface {
+            Surface::Curve(pass) => SpanParameter {
+                span: position.side.span,
+                fraction: pass.side(fraction).fraction,
+            },
+            _ => position.side,
+        }
     }
 
     /// Computes the parametrisation at both ends, and stores it for [`Self::start`] and [`Self::end`].

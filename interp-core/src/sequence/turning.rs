@@ -90,7 +90,7 @@ impl Sequencer {
         let (now, _) = self.plans_ref();
         let beyond = now.plan.beyond(&self.follower.cursor);
         self.turn = now.tail;
-        self.swap();
+        self.swap(run);
         let (now, _) = self.plans_ref();
         run.arrive(job, now.pass, now.route, now.interval)?;
         let mut follower = self.follower;

@@ -4,7 +4,8 @@
 use super::lines::CoordinateCubics;
 use super::pole::Reduced;
 use super::rational::WEIGHT_ONE;
-use super::{Edges, IsoLine};
+use super::{Ball, Contact, Derivatives, Edges, IsoLine, Pass as _, PolePass, PolynomialPass, RationalPass};
+use crate::fault::Result;
 
 /// The evaluation routine of the cubics.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -41,6 +42,32 @@ impl GridPass {
         weight: CoordinateCubics::NONE,
         reduced: Reduced::NONE,
     };
+
+    /// The contact at a fraction of the patch, for callers outside the sample path of straight passes.
+    ///
+    /// # Errors
+    /// As [`Pass::contact`].
+    pub(super) fn contact(&self, fraction: u64, ball: &Ball) -> Result<Contact> {
+        match self.kind {
+            // Bit-identical to the specialised evaluations, see the tests in polynomial.rs.
+            GridKind::Free | GridKind::Ruled | GridKind::Extruded => {
+                PolynomialPass(self).contact(fraction, ball)
+            }
+            GridKind::Rational => RationalPass(self).contact(fraction, ball),
+            GridKind::Pole => PolePass(self).contact(fraction, ball),
+        }
+    }
+
+    /// First and second derivatives at a fraction of the patch.
+    pub(super) fn derivatives(&self, fraction: u64) -> Derivatives {
+        match self.kind {
+            GridKind::Free | GridKind::Ruled | GridKind::Extruded => {
+                PolynomialPass(self).derivatives(fraction)
+            }
+            GridKind::Rational => RationalPass(self).derivatives(fraction),
+            GridKind::Pole => PolePass(self).derivatives(fraction),
+        }
+    }
 
     /// Collapses a patch of three coordinates, and the weight if it is rational.
     pub(crate) fn collapse(&mut self, blocks: &[[i32; 16]], edges: Edges, at: &IsoLine) {

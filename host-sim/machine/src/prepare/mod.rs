@@ -109,7 +109,6 @@ pub fn prepare(job: &Job) -> Result<Prepared, JobError> {
             "remove the section, for the whole surface",
         ));
     }
-    fronts::check_job(job)?;
     let sign = geometry::tool_sign(job)?;
     #[allow(clippy::cast_possible_truncation, reason = "the machine's own precision")]
     let header = Header {
