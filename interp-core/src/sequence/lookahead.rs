@@ -513,27 +513,21 @@ impl Lookahead {
         }
         let [start, end] = out.route.ends;
         let spans = start.span.abs_diff(end.span) + 1;
-        let mut estimate = self.pass_mm;
-        if spans == 1 {
-            let part = out
-                .route
-                .turned(end.fraction)
-                .abs_diff(out.route.turned(start.fraction));
-            estimate = estimate.at_most(2.0 * self.part_mm(part));
-        }
+        let pieces = out.route.front.map_or(1, |front| front.pieces);
         out.group = if spans > SPANS_DIVIDED {
             spans.div_ceil(PATCHES)
         } else {
             1
         };
-        let room = f32::from(PATCHES.saturating_sub(SPANS_DIVIDED.min(spans)).saturating_sub(8));
+        let room = PATCHES.saturating_sub(SPANS_DIVIDED.min(spans)).saturating_sub(8);
         self.least_mm = if spans > SPANS_DIVIDED {
             f32::MAX
+        } else if pieces + 4 <= PATCHES {
+            STRETCH_MIN_MM
         } else {
-            (estimate / room).at_least(STRETCH_MIN_MM)
+            (self.pass_mm / f32::from(room)).at_least(STRETCH_MIN_MM)
         };
-        let stretches = truncated(estimate / self.least_mm).clamp(1, i32::from(PATCHES));
-        let expected = u16::try_from(stretches).unwrap_or(PATCHES) + spans + 4;
+        let expected = pieces.min(PATCHES - 4) + 4;
         let fit = STATIONS
             .checked_div(expected)
             .unwrap_or(1)

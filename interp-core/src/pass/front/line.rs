@@ -25,6 +25,8 @@ pub(crate) struct FrontLine {
     pub(super) cursor: SideCursor,
     /// Whether start and end of the pass are on the last side boundary.
     pub(crate) are_on_boundary: [bool; 2],
+    /// Pieces of the pass, about.
+    pub(crate) pieces: u16,
 }
 
 /// A piece of a pass on a front.

@@ -6,7 +6,7 @@ use crate::job::{Pattern, Spacing};
 use crate::math::number::Bounded;
 use crate::pass::front::advance::{Advance, Made};
 use crate::pass::front::line::FrontLine;
-use crate::pass::front::side::{Direction, SideCursor};
+use crate::pass::front::side::{Direction, SideCursor, fine};
 use crate::pass::front::spline::Cubic;
 use crate::pass::front::table::{Column, Table};
 use crate::pass::route::Route;
@@ -256,7 +256,15 @@ impl FrontSequence {
         } else {
             (crossing(index - 1), true)
         };
+        let mut cursor = self.cursor;
+        let mut pieces = 1_u16;
+        let mut span = None;
         while index < count && is_before(index) {
+            let at = table.word(Column::Front, own(index));
+            cursor.seek(job, &self.direction, fine(at));
+            let crossed = span.map_or(0, |span: u16| cursor.span().abs_diff(span));
+            span = Some(cursor.span());
+            pieces = pieces.saturating_add(1 + crossed);
             index += 1;
         }
         let (end, is_beyond) = if index < count {
@@ -274,6 +282,7 @@ impl FrontSequence {
             swapped,
             cursor: self.cursor,
             are_on_boundary: [is_from_boundary, is_beyond],
+            pieces,
         };
         self.is_last_part = index >= count;
         Some(Route {
