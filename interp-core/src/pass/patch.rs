@@ -115,7 +115,8 @@ impl Patch {
         }
         if let Surface::Curve(pass) = &mut self.surface {
             pass.lay(kind, words, line.side_curve(job, piece), radius);
-            pass.set_ends(reversed, self.range, line.boundary_fractions(piece));
+            let (are_on, is_far) = line.boundary_of(piece);
+            pass.set_ends(reversed, self.range, are_on, is_far);
         }
         self.point = false;
         self.ends = None;

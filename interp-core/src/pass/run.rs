@@ -11,7 +11,7 @@ use crate::pass::patch::Patch;
 use crate::pass::route::{Piece, Route};
 use crate::pass::scan::PassScan;
 use crate::pass::schedule;
-use crate::pass::step_over::PassMaximum;
+use crate::pass::step_over::{PassMaximum, StepOverEstimator};
 use crate::sample::{Sample, SpanParameter, interval_of};
 use crate::surface::{AnyPass, Pass, PathSpeed};
 
@@ -584,6 +584,21 @@ impl Run {
                 },
             ),
             _ => self.last_interval,
+        }
+    }
+
+    /// The estimator of the step to the next straight pass.
+    pub(crate) const fn estimator(&mut self) -> Option<&mut StepOverEstimator> {
+        match &mut self.planning {
+            PassPlanning::Scan(scan) => Some(scan.estimator()),
+            PassPlanning::Fronts(_) => None,
+        }
+    }
+
+    pub(crate) const fn estimator_ref(&self) -> Option<&StepOverEstimator> {
+        match &self.planning {
+            PassPlanning::Scan(scan) => Some(scan.estimator_ref()),
+            PassPlanning::Fronts(_) => None,
         }
     }
 

@@ -101,6 +101,15 @@ impl PassScan {
         self.piece = Piece::Done;
     }
 
+    /// The estimator of the step to the next pass; a job with limits uses it in its look-ahead.
+    pub(crate) const fn estimator(&mut self) -> &mut StepOverEstimator {
+        &mut self.estimator
+    }
+
+    pub(crate) const fn estimator_ref(&self) -> &StepOverEstimator {
+        &self.estimator
+    }
+
     /// Begins the scan of a pass whose first patch is at this position.
     pub(crate) const fn begin(&mut self, position: &PassPosition) {
         self.line = *position;

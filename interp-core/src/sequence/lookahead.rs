@@ -238,7 +238,6 @@ mod cycles {
 #[derive(Clone, Debug)]
 pub(crate) struct Lookahead {
     patch: Patch,
-    step_over: StepOverEstimator,
     task: Task,
     /// The piece of the pass that is looked at, and the range of the path span whose stations are counted: the piece's, or on a front that of a stretch of several
     /// pieces in one span, long enough for differences.
@@ -285,7 +284,6 @@ impl Lookahead {
     /// No pass yet.
     pub(crate) const START: Self = Self {
         patch: Patch::NONE,
-        step_over: StepOverEstimator::START,
         task: Task::Done,
         piece: Piece::NONE,
         range: [0, u64::MAX],
@@ -316,7 +314,6 @@ impl Lookahead {
 
     /// Resets to the state before the first pass.
     pub(crate) const fn restart(&mut self) {
-        self.step_over.restart();
         (self.patch_mm, self.pass_mm) = (0.0, 0.0);
         self.without = 0;
         self.task = Task::Done;
@@ -328,7 +325,9 @@ impl Lookahead {
     }
 
     /// Cycles of the next task.
-    pub(crate) fn cycles(&self) -> u32 {
+    pub(crate) fn cycles(&self, estimator: Option<&StepOverEstimator>) -> u32 {
+        let makes_patch =
+            |estimator: &StepOverEstimator| estimator.makes_patch(&self.piece.position, self.fraction());
         match self.task {
             Task::Patch => cycles::PATCH,
             Task::Extend => cycles::EXTEND,
@@ -336,9 +335,7 @@ impl Lookahead {
             Task::Station if self.is_on_front() => cycles::FRONT_STATION,
             Task::Station => cycles::STATION,
             Task::Derivatives(..) => cycles::DERIVATIVES,
-            Task::Estimate(1..) if self.step_over.makes_patch(&self.piece.position, self.fraction()) => {
-                cycles::PATCH
-            }
+            Task::Estimate(1..) if estimator.is_some_and(makes_patch) => cycles::PATCH,
             Task::Estimate(0) => cycles::NEXT,
             Task::Estimate(_) => cycles::ESTIMATE,
             Task::Close => cycles::CLOSE,
@@ -363,7 +360,6 @@ impl Lookahead {
         out.tail = Turn::NONE;
         out.plan.ends = [head.speed, 0.0];
         self.maximum = PassMaximum::NONE;
-        self.step_over.begin();
         out.plan.stations.clear();
         out.pass = pass;
         out.route = route;
@@ -381,7 +377,13 @@ impl Lookahead {
     /// # Errors
     /// The fault of the surface at the next station; [`FaultKind::SoftLimit`] where the station is outside the travel.
     #[inline(never)]
-    pub(crate) fn work(&mut self, job: &Job<'_>, axes: &AxisLimits, out: &mut PassPlan) -> Result<()> {
+    pub(crate) fn work(
+        &mut self,
+        job: &Job<'_>,
+        axes: &AxisLimits,
+        mut estimator: Option<&mut StepOverEstimator>,
+        out: &mut PassPlan,
+    ) -> Result<()> {
         self.task = match self.task {
             Task::Patch => {
                 let first = self.patches == 0;
@@ -396,7 +398,12 @@ impl Lookahead {
                     return Ok(());
                 }
                 out.point |= self.patch.point;
-                self.step_over.begin_patch();
+                if let Some(estimator) = estimator {
+                    if first {
+                        estimator.begin();
+                    }
+                    estimator.begin_patch();
+                }
                 self.choose_cells(job, out);
                 self.window = Window::EMPTY;
                 self.arc_mm = 0.0;
@@ -410,32 +417,33 @@ impl Lookahead {
                 Task::Station
             }
             Task::Station => {
-                self.visit(job, axes, out)?;
-                self.after_station(job, out)
+                self.visit(job, axes, estimator.as_deref_mut(), out)?;
+                self.after_station(job, estimator.as_deref(), out)
             }
             Task::Derivatives(at, last) => {
                 self.differentiate(at, out);
                 if at < last {
                     Task::Derivatives(at + 1, last)
                 } else {
-                    self.estimates(job, out)
+                    self.estimates(job, estimator.as_deref(), out)
                 }
             }
             Task::Estimate(0) => self.next_station(job, out),
             Task::Estimate(looks) => {
                 let fraction = self.fraction();
                 let most = self.maximum.inv_interval_sq;
-                self.step_over
-                    .work(job, &self.piece.position, &self.patch, fraction, most);
+                if let Some(estimator) = estimator {
+                    estimator.work(job, &self.piece.position, &self.patch, fraction, most);
+                }
                 Task::Estimate(looks - 1)
             }
             Task::Close => {
-                if self.looks_again(job) {
+                if looks_again(job, estimator.as_deref_mut()) {
                     let (pass, route, head) = (out.pass, out.route, self.turn);
                     self.begin(pass, route, &head, out);
                     return Ok(());
                 }
-                self.close(job, out)?;
+                self.close(job, estimator, out)?;
                 let rests = self.without > 0;
                 self.without = self.without.saturating_sub(1);
                 if !rests && self.may_turn(job, axes, out) {
@@ -671,9 +679,9 @@ impl Lookahead {
     }
 
     /// The derivatives that can be taken after a station.
-    fn after_station(&self, job: &Job<'_>, out: &PassPlan) -> Task {
+    fn after_station(&self, job: &Job<'_>, estimator: Option<&StepOverEstimator>, out: &PassPlan) -> Task {
         if out.point || (self.is_on_front() && self.is_short) {
-            return self.estimates(job, out);
+            return self.estimates(job, estimator, out);
         }
         let is_end = self.is_end();
         let count = self.window.count();
@@ -687,11 +695,11 @@ impl Lookahead {
         };
         let to = if is_end { last } else { middle };
         if count < WINDOW && !is_end {
-            return self.estimates(job, out);
+            return self.estimates(job, estimator, out);
         }
         match (u8::try_from(from), u8::try_from(to)) {
             (Ok(from), Ok(to)) => Task::Derivatives(from, to),
-            _ => self.estimates(job, out),
+            _ => self.estimates(job, estimator, out),
         }
     }
 
@@ -736,15 +744,12 @@ impl Lookahead {
     }
 
     /// Evaluations of the step-over estimator at a station.
-    fn estimates(&self, job: &Job<'_>, out: &PassPlan) -> Task {
+    fn estimates(&self, job: &Job<'_>, estimator: Option<&StepOverEstimator>, out: &PassPlan) -> Task {
         let first = self.station == 0;
         let begins = first && self.patches == 0;
         let ends = self.is_end() && out.route.next(job, &self.piece).is_none();
-        Task::Estimate(if job.header.spacing == Spacing::Exact {
-            self.step_over.evaluations(first, begins, ends)
-        } else {
-            0
-        })
+        let estimator = estimator.filter(|_| job.header.spacing == Spacing::Exact);
+        Task::Estimate(estimator.map_or(0, |estimator| estimator.evaluations(first, begins, ends)))
     }
 
     /// Advances to the next station, the next patch, or the end.
@@ -771,7 +776,13 @@ impl Lookahead {
     }
 
     /// Evaluates the station: fit of the ball, travel, inverse square interval, arc.
-    fn visit(&mut self, job: &Job<'_>, axes: &AxisLimits, out: &mut PassPlan) -> Result<()> {
+    fn visit(
+        &mut self,
+        job: &Job<'_>,
+        axes: &AxisLimits,
+        estimator: Option<&mut StepOverEstimator>,
+        out: &mut PassPlan,
+    ) -> Result<()> {
         let fraction = self.fraction();
         let (contact, located) = self.patch.evaluate(fraction)?;
         check_travel(axes, &located.cl_nm)?;
@@ -783,8 +794,8 @@ impl Lookahead {
                 shape: [contact.across, contact.lateral_squared],
             };
         }
-        if job.header.spacing == Spacing::Exact {
-            self.step_over.see(job, &self.patch, &contact, fraction);
+        if let Some(estimator) = estimator {
+            estimator.see(job, &self.patch, &contact, fraction);
         }
         let side = self.patch.side_at(&self.piece.position, fraction);
         let is_up = self.patch.faces_up(contact.offset);
@@ -995,20 +1006,22 @@ impl Lookahead {
         });
     }
 
-    /// Whether the first pass is to be looked at again for the step-over.
-    fn looks_again(&mut self, job: &Job<'_>) -> bool {
-        job.header.spacing == Spacing::Exact && self.step_over.looks_again(job.header)
-    }
-
     /// Computes the interval and the next pass.
-    fn close(&mut self, job: &Job<'_>, out: &mut PassPlan) -> Result<()> {
+    fn close(
+        &mut self,
+        job: &Job<'_>,
+        estimator: Option<&mut StepOverEstimator>,
+        out: &mut PassPlan,
+    ) -> Result<()> {
         let patches = f32::from(self.patches.saturating_add(1));
         self.pass_mm = to_f32(self.start_q10 - out.head_q10) * MM_PER_Q10;
         self.patch_mm = self.pass_mm / patches;
         let header = job.header;
         out.interval = interval_of(self.maximum.inv_interval_sq);
         let step = match header.spacing {
-            Spacing::Exact => self.step_over.step(header, self.maximum),
+            Spacing::Exact => {
+                estimator.map_or(out.interval, |estimator| estimator.step(header, self.maximum))
+            }
             Spacing::FirstOrder => out.interval,
             Spacing::Constant | Spacing::ConstantFromMiddle => {
                 self.finish_short(out);
@@ -1043,6 +1056,12 @@ impl Lookahead {
             }
         }
     }
+}
+
+/// Whether the first pass is to be looked at again for the step-over.
+fn looks_again(job: &Job<'_>, estimator: Option<&mut StepOverEstimator>) -> bool {
+    let estimator = estimator.filter(|_| job.header.spacing == Spacing::Exact);
+    estimator.is_some_and(|estimator| estimator.looks_again(job.header))
 }
 
 /// Passes without a turn after one whose plan had to be slowed down for it.

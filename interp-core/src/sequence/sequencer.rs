@@ -92,12 +92,12 @@ pub(crate) enum Outcome {
 }
 
 /// Planning of the next pass.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Planning {
     /// It waits until the pass with this number is made, of a job of constant scallop height.
     Awaited(u32),
-    /// It is to be begun, for this number of the pass on this route.
-    Requested(u32, Route),
+    /// It is to be begun, for this number of the pass on the plan's route.
+    Requested(u32),
     /// Its stations are being located.
     Stations,
     /// Its feed is being planned.
@@ -225,7 +225,9 @@ impl Sequencer {
         self.feed_factor = 1.0;
         (self.front_spent, self.front_last) = (0, 0);
         self.has_to_choose = false;
-        self.request_planning(Planning::Requested(0, run.first_route(job)));
+        let (_, next) = both(&mut self.plans, self.second);
+        next.route = run.first_route(job);
+        self.request_planning(Planning::Requested(0));
     }
 
     /// The tool's position, nm, once it is known.
@@ -368,7 +370,7 @@ impl Sequencer {
 
     /// Cycles of the next piece of planning, 0 where there is none; and whether it is a portion of the next front.
     fn next_cycles(&self, run: &Run) -> (bool, u32) {
-        let cycles = self.next_own_cycles();
+        let cycles = self.next_own_cycles(run);
         let waits = matches!(self.planning, Planning::Awaited(_) | Planning::Complete);
         let front = run.front_cycles();
         match cycles {
@@ -380,7 +382,7 @@ impl Sequencer {
     }
 
     /// Cycles of the next piece apart from the next front; none where there is none, or the next front comes first.
-    fn next_own_cycles(&self) -> Option<u32> {
+    fn next_own_cycles(&self, run: &Run) -> Option<u32> {
         let [one, other] = &self.plans;
         let (now, next) = if self.second {
             (&other.plan, &one.plan)
@@ -413,7 +415,7 @@ impl Sequencer {
         Some(match self.planning {
             Planning::Awaited(_) => return None,
             Planning::Requested(..) => BEGIN_CYCLES,
-            Planning::Stations => self.lookahead.cycles(),
+            Planning::Stations => self.lookahead.cycles(run.estimator_ref()),
             Planning::Feed => self.planner.cycles(next),
             Planning::Rest if self.planner.is_done() => TAKE_OVER_CYCLES,
             Planning::Rest => self.planner.cycles(now),
@@ -472,18 +474,21 @@ impl Sequencer {
         }
         match self.planning {
             Planning::Awaited(pass) => match run.next_pass(job) {
-                Ok(NextPass::Pass(route)) => self.planning = Planning::Requested(pass, route),
+                Ok(NextPass::Pass(route)) => {
+                    next.route = route;
+                    self.planning = Planning::Requested(pass);
+                }
                 Ok(NextPass::NotYet) => {}
                 Ok(NextPass::None) => self.planning = Planning::Complete,
                 Err(fault) => self.pending = Some(fault),
             },
-            Planning::Requested(pass, route) => {
-                self.lookahead.begin(pass, route, &now.tail, next);
+            Planning::Requested(pass) => {
+                self.lookahead.begin(pass, next.route, &now.tail, next);
                 next.is_last = run.is_last_pass();
                 self.planning = Planning::Stations;
             }
             Planning::Stations => {
-                self.pending = self.lookahead.work(job, axes, next).err();
+                self.pending = self.lookahead.work(job, axes, run.estimator(), next).err();
                 if self.lookahead.is_done() {
                     self.planning = if next.point {
                         Planning::Complete
@@ -697,10 +702,13 @@ impl Sequencer {
     /// The next pass becomes the one that is followed, and the one after it is planned.
     pub(super) fn swap(&mut self, run: &mut Run) {
         self.second = !self.second;
-        let (now, _) = both(&mut self.plans, self.second);
+        let (now, next) = both(&mut self.plans, self.second);
         let pass = now.pass.wrapping_add(1);
         let planning = match now.next {
-            Some(route) => Planning::Requested(pass, route),
+            Some(route) => {
+                next.route = route;
+                Planning::Requested(pass)
+            }
             None if now.is_last => Planning::Complete,
             None => Planning::Awaited(pass),
         };

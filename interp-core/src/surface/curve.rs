@@ -20,13 +20,13 @@ pub(crate) struct SideCurve {
     start: i64,
     /// Coefficients by the place on the part, units of 2^-shift.
     coefficients: [i32; 3],
-    shift: u32,
+    shift: u8,
     bits: u8,
-    /// Width of the side span in units of `start`, and to fractions of 2^-32: dropped bits, factor, shift.
-    width: i64,
-    dropped: u32,
+    /// Width of the side span in units of the coefficients, and to fractions of 2^-32: dropped bits, shift, factor.
+    width: i32,
+    dropped: u8,
+    down: u8,
     factor: u32,
-    down: u32,
     /// Derivative of the fraction by that of the path, and the second one.
     slope_unit: f32,
     bend_unit: f32,
@@ -48,30 +48,33 @@ impl SideCurve {
         bits: 0,
         width: 1,
         dropped: 0,
-        factor: 0,
         down: 0,
+        factor: 0,
         slope_unit: 0.0,
         bend_unit: 0.0,
     };
 
     /// From the value at the start, units of 2^-12; coefficients, units of 2^-shift, shift at most 12; the span's width, units.
-    pub(crate) fn new(start: i64, coefficients: [i32; 3], shift: u32, bits: u8, width: i32) -> Self {
-        let fine = i64::from(width.max(1)) << FINE_BITS;
-        let dropped = (64 - fine.leading_zeros()).saturating_sub(32);
+    pub(crate) fn new(start: i64, coefficients: [i32; 3], shift: u8, bits: u8, width: i32) -> Self {
+        let width = width.max(1);
+        let fine = i64::from(width) << FINE_BITS;
+        // At most 12 bits.
+        let dropped = 32_u32.saturating_sub(fine.leading_zeros());
         let divisor = (fine >> dropped).cast_unsigned();
         let down = 63 - divisor.leading_zeros();
         // Between 2^31 and 2^32.
         let factor = (1_u64 << (32 + down)).checked_div(divisor).unwrap_or(0);
-        let unit = power_of_two(i32::from(bits) - shift.cast_signed()) / to_f32(width.max(1));
+        let byte = |value: u32| u8::try_from(value).unwrap_or(0);
+        let unit = power_of_two(i32::from(bits) - i32::from(shift)) / to_f32(width);
         Self {
             start,
             coefficients,
-            shift: shift.min(FINE_BITS),
+            shift: shift.min(byte(FINE_BITS)),
             bits,
-            width: fine,
-            dropped,
+            width,
+            dropped: byte(dropped),
+            down: byte(down),
             factor: u32::try_from(factor).unwrap_or(u32::MAX),
-            down,
             slope_unit: unit,
             bend_unit: unit * power_of_two(i32::from(bits)),
         }
@@ -85,8 +88,9 @@ impl SideCurve {
         let [first, second, third] = self.coefficients;
         let sum = second.wrapping_add(mul_31(third, at));
         let sum = first.wrapping_add(mul_31(sum, at));
-        let rise = i64::from(sum).wrapping_mul(i64::from(at)) >> (31 + self.shift - FINE_BITS);
-        let within = self.start.wrapping_add(rise).max(0).min(self.width);
+        let rise = i64::from(sum).wrapping_mul(i64::from(at)) >> (31 + u32::from(self.shift) - FINE_BITS);
+        let width = i64::from(self.width) << FINE_BITS;
+        let within = self.start.wrapping_add(rise).max(0).min(width);
         let high = (within >> self.dropped)
             .cast_unsigned()
             .wrapping_mul(u64::from(self.factor));
@@ -127,9 +131,10 @@ pub(crate) struct CurvePass {
     /// Ball radius in units, signed by the tool side, for a revolved surface.
     radius: f32,
     reversed: bool,
-    /// Start and end in the direction of travel, and the side parameter there where it is a boundary's.
+    /// Start and end in the direction of travel, whether they are on a boundary, and whether that is the end of the side span.
     range: [u64; 2],
-    ends: [Option<u64>; 2],
+    are_on_boundary: [bool; 2],
+    is_far: bool,
 }
 
 impl CurvePass {
@@ -141,7 +146,8 @@ impl CurvePass {
         radius: 0.0,
         reversed: false,
         range: [0, u64::MAX],
-        ends: [None; 2],
+        are_on_boundary: [false; 2],
+        is_far: false,
     };
 
     /// Becomes the patch with this record along this curve. `radius`: the ball's in units, signed by the tool side.
@@ -152,9 +158,16 @@ impl CurvePass {
         }
     }
 
-    /// Sets start and end in the direction of travel, with the side parameter there where it is a boundary's.
-    pub(crate) const fn set_ends(&mut self, reversed: bool, range: [u64; 2], ends: [Option<u64>; 2]) {
-        (self.reversed, self.range, self.ends) = (reversed, range, ends);
+    /// Sets start and end in the direction of travel, whether they are on a boundary, and whether that is the end of the side span.
+    pub(crate) const fn set_ends(
+        &mut self,
+        reversed: bool,
+        range: [u64; 2],
+        are_on: [bool; 2],
+        is_far: bool,
+    ) {
+        (self.reversed, self.range) = (reversed, range);
+        (self.are_on_boundary, self.is_far) = (are_on, is_far);
     }
 
     const fn own(&self, fraction: u64) -> u64 {
@@ -164,9 +177,9 @@ impl CurvePass {
     /// The side parameter at a fraction of the path span, in the direction of travel.
     pub(crate) fn side(&self, fraction: u64) -> SidePoint {
         let mut point = self.curve.point(self.own(fraction));
-        for (at, end) in self.range.iter().zip(self.ends) {
-            if let Some(side) = end.filter(|_| fraction == *at) {
-                point.fraction = side;
+        for (at, is_on) in self.range.iter().zip(self.are_on_boundary) {
+            if is_on && fraction == *at {
+                point.fraction = if self.is_far { u64::MAX } else { 0 };
             }
         }
         point

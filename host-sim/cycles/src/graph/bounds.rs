@@ -44,8 +44,8 @@ const BOUNDS: &[(&str, u32, &str)] = &[
     ("controller::step_output::StepOutput::turn", 3, "axes"),
     (
         "interp_core::pass::run::Run::step_far",
-        2,
-        "patches of an arc: CROSSINGS_MAX + 1",
+        5,
+        "pieces of an arc: CROSSINGS_ON_FRONT_MAX + 1",
     ),
     (
         "interp_core::feed::curve::Curve as interp_core::feed::pace::Course::advance",
@@ -361,14 +361,14 @@ const BOUNDS: &[(&str, u32, &str)] = &[
         "intervals beside a station",
     ),
     (
-        "interp_core::pass::front::travel::CurveRun::along",
-        4,
-        "stations and spans of an arc: CROSSINGS_MAX + 1",
-    ),
-    (
-        "interp_core::pass::front::travel::CurveRun::next_part_of_front",
+        "interp_core::pass::front::sequence::FrontSequence::next_part",
         513,
         "stations: PARTS_MAX + 1",
+    ),
+    (
+        "interp_core::pass::front::line::FrontLine::leaves",
+        31,
+        "bisections of a place: BISECTIONS; extrema of a cubic",
     ),
 ];
 

@@ -218,16 +218,15 @@ impl FrontLine {
         SideCurve::new(
             origin.wrapping_add(from_origin).wrapping_sub(span_start),
             [cubic.first, cubic.second, cubic.third].map(turn),
-            cubic.shift,
+            u8::try_from(cubic.shift).unwrap_or(0),
             self.stations.bits,
             piece.cursor.width(),
         )
     }
 
-    /// The side parameter at the piece's start and end, where that is the boundary's: a fraction of the span.
-    pub(crate) fn boundary_fractions(&self, piece: &FrontPiece) -> [Option<u64>; 2] {
-        let fraction = if self.direction.forwards { u64::MAX } else { 0 };
-        piece.are_on_boundary.map(|is_on| is_on.then_some(fraction))
+    /// Whether the piece's start and end are on the last side boundary, and whether that is the end of a side span.
+    pub(crate) const fn boundary_of(&self, piece: &FrontPiece) -> ([bool; 2], bool) {
+        (piece.are_on_boundary, self.direction.forwards)
     }
 }
 
