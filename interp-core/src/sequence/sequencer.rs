@@ -15,7 +15,6 @@ use crate::job::program::{Job, Program};
 use crate::job::{AxisLimits, Pattern};
 use crate::math::number::{Bounded, to_f32};
 use crate::pass::front::NextPass;
-use crate::pass::route::Route;
 use crate::pass::run::Run;
 use crate::pass::scan::cycles::{NEXT, PATCH};
 use crate::sample::{Sample, SpanParameter};
