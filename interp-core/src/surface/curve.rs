@@ -1,12 +1,15 @@
 //! A patch along a curve `side = g(path)`: the side parameter is a cubic of the path parameter on a part of the patch.
 
-use super::grid::GridPass;
+use super::lines::CoordinateCubics;
+use super::pole::PoleAt;
+use super::rational::{Weight, axis as rational_axis};
 use super::revolved::{CirclePass, ProfilePass};
 use super::{
-    Ball, Contact, Derivatives, IsoLine, Pass, PathSpeed, RATIONAL_WORDS, REVOLVED_WORDS, split_patch,
+    Ball, Contact, Derivatives, Edges, Factors, IsoLine, Local, Pass, PathSpeed, RATIONAL_WORDS,
+    REVOLVED_WORDS, split_patch,
 };
 use crate::fault::Result;
-use crate::math::arith::{centred, power_of_two, sqrt, to_f32};
+use crate::math::arith::{centred, cubic, inverse_sqrt, jet, power_of_two, tangent, to_f32};
 
 /// 2^-31, the unit of a place on the part.
 const WITHIN: f32 = power_of_two(-31);
@@ -150,12 +153,17 @@ impl CurvePass {
         is_far: false,
     };
 
-    /// Becomes the patch with this record along this curve. `radius`: the ball's in units, signed by the tool side.
-    pub(crate) fn lay(&mut self, kind: RecordKind, words: &[i32], curve: SideCurve, radius: f32) {
-        (self.kind, self.curve, self.radius) = (kind, curve, radius);
+    /// Becomes the patch with this record. `radius`: the ball's in units, signed by the tool side.
+    pub(crate) fn take(&mut self, kind: RecordKind, words: &[i32], radius: f32) {
+        (self.kind, self.radius) = (kind, radius);
         for (slot, word) in self.words.iter_mut().zip(words) {
             *slot = *word;
         }
+    }
+
+    /// Sets the curve.
+    pub(crate) const fn set_curve(&mut self, curve: SideCurve) {
+        self.curve = curve;
     }
 
     /// Sets start and end in the direction of travel, whether they are on a boundary, and whether that is the end of the side span.
@@ -185,50 +193,68 @@ impl CurvePass {
         point
     }
 
-    /// The surface at a place: contact and derivatives on the line of the side parameter.
+    /// Contact and derivatives on the line of the side parameter, at any place of the patch.
+    ///
+    /// # Errors
+    /// As [`Pass::contact`].
+    #[inline(always)]
+    pub(crate) fn at(&self, path: u64, side: u64, ball: &Ball) -> Result<(Contact, Derivatives)> {
+        match self.kind {
+            RecordKind::Polynomial | RecordKind::Rational => self.grid(path, side, ball),
+            RecordKind::Profile | RecordKind::Circle => self.revolved(path, side, Some(ball)),
+        }
+    }
+
+    /// The derivatives of [`Self::at`]; zero where the surface cannot be evaluated.
     #[inline(never)]
-    fn at(&self, path: u64, side: u64, ball: Option<&Ball>) -> Result<(Contact, Derivatives)> {
+    fn derivatives_at(&self, path: u64, side: u64) -> Derivatives {
+        match self.kind {
+            RecordKind::Polynomial | RecordKind::Rational => {
+                let (edges, blocks) = self.record();
+                grid_at(blocks, edges, path, side).derivatives()
+            }
+            RecordKind::Profile | RecordKind::Circle => {
+                let found = self.revolved(path, side, None);
+                found.map(|(_, by)| by).unwrap_or_default()
+            }
+        }
+    }
+
+    /// The record's collapsed boundaries and blocks.
+    fn record(&self) -> (Edges, &[[i32; 16]]) {
+        let (_, _, edges, blocks) = split_patch(&self.words);
+        let axes = if self.kind == RecordKind::Rational { 4 } else { 3 };
+        (edges, blocks.get(..axes).unwrap_or(blocks))
+    }
+
+    #[inline(never)]
+    fn grid(&self, path: u64, side: u64, ball: &Ball) -> Result<(Contact, Derivatives)> {
+        let (edges, blocks) = self.record();
+        let point = grid_at(blocks, edges, path, side);
+        let contact = point.local.contact::<true, true>(ball, &point.factors)?;
+        Ok((contact, point.derivatives()))
+    }
+
+    #[inline(never)]
+    fn revolved(&self, path: u64, side: u64, ball: Option<&Ball>) -> Result<(Contact, Derivatives)> {
         let line = IsoLine {
             fraction: side,
             side: centred(side),
             reversed: false,
         };
-        let revolved = || self.words.first_chunk::<REVOLVED_WORDS>();
-        match self.kind {
-            RecordKind::Polynomial | RecordKind::Rational => {
-                let (_, _, edges, blocks) = split_patch(&self.words);
-                let axes = if self.kind == RecordKind::Rational { 4 } else { 3 };
-                let blocks = blocks.get(..axes).unwrap_or(blocks);
-                let mut pass = GridPass::NONE;
-                pass.collapse(blocks, edges, &line);
-                let contact = match ball {
-                    Some(ball) => pass.contact(path, ball)?,
-                    None => Contact::default(),
-                };
-                Ok((contact, pass.derivatives(path)))
-            }
-            RecordKind::Profile => {
-                let mut pass = ProfilePass::default();
-                if let Some(words) = revolved() {
-                    pass.collapse(words, &line, self.radius);
-                }
-                let contact = match ball {
-                    Some(ball) => pass.contact(path, ball)?,
-                    None => Contact::default(),
-                };
-                Ok((contact, pass.derivatives(path)))
-            }
-            RecordKind::Circle => {
-                let mut pass = CirclePass::default();
-                if let Some(words) = revolved() {
-                    pass.collapse(words, &line, self.radius)?;
-                }
-                let contact = match ball {
-                    Some(ball) => pass.contact(path, ball)?,
-                    None => Contact::default(),
-                };
-                Ok((contact, pass.derivatives(path)))
-            }
+        let Some(words) = self.words.first_chunk::<REVOLVED_WORDS>() else {
+            return Ok(Default::default());
+        };
+        if self.kind == RecordKind::Profile {
+            let mut pass = ProfilePass::default();
+            pass.collapse(words, &line, self.radius);
+            let contact = ball.map_or(Ok(Contact::default()), |ball| pass.contact(path, ball));
+            Ok((contact?, pass.derivatives(path)))
+        } else {
+            let mut pass = CirclePass::default();
+            pass.collapse(words, &line, self.radius)?;
+            let contact = ball.map_or(Ok(Contact::default()), |ball| pass.contact(path, ball));
+            Ok((contact?, pass.derivatives(path)))
         }
     }
 
@@ -239,37 +265,117 @@ impl CurvePass {
         let change = by.path2 + by.mixed * (2.0 * slope) + by.side2 * (slope * slope) + by.side * bend;
         let squared = tangent.dot(tangent);
         let turn = if self.reversed { -1.0 } else { 1.0 };
+        let inverse = inverse_sqrt(squared);
         PathSpeed {
-            inv_speed: 1.0 / sqrt(squared),
-            log_speed_derivative: turn * tangent.dot(change) / squared,
+            inv_speed: inverse,
+            log_speed_derivative: turn * tangent.dot(change) * (inverse * inverse),
         }
     }
 
     /// The parametrisation at a fraction of the patch, in the direction of travel; still where the surface cannot be evaluated.
     pub(crate) fn path_at(&self, fraction: u64) -> PathSpeed {
         let side = self.side(fraction);
-        match self.at(self.own(fraction), side.fraction, None) {
-            Ok((_, by)) => self.speed(&side, &by),
-            Err(_) => PathSpeed::STILL,
-        }
-    }
-
-    /// First and second derivatives by path and side parameter.
-    pub(crate) fn derivatives(&self, fraction: u64) -> Derivatives {
-        let side = self.side(fraction);
-        let found = self.at(self.own(fraction), side.fraction, None);
-        found.map(|(_, by)| by).unwrap_or_default()
+        self.speed(&side, &self.derivatives_at(self.own(fraction), side.fraction))
     }
 }
 
 impl Pass for CurvePass {
     /// The contact on the line of the side parameter, with the parametrisation along the curve.
+    #[inline(always)]
     fn contact(&self, fraction: u64, ball: &Ball) -> Result<Contact> {
         let side = self.side(fraction);
-        let (contact, by) = self.at(self.own(fraction), side.fraction, Some(ball))?;
+        let (contact, by) = self.at(self.own(fraction), side.fraction, ball)?;
         Ok(Contact {
             path: self.speed(&side, &by),
             ..contact
         })
     }
+}
+
+/// A point of a grid's patch, evaluated in rows across the path, then along it.
+struct GridPoint {
+    local: Local,
+    factors: Factors,
+    /// Relative change of the weight along the path and across it.
+    log_weight: [f32; 2],
+}
+
+impl GridPoint {
+    #[inline(always)]
+    fn derivatives(&self) -> Derivatives {
+        self.local.derivatives(&self.factors, self.log_weight)
+    }
+}
+
+#[inline(always)]
+fn grid_at(blocks: &[[i32; 16]], edges: Edges, path: u64, side: u64) -> GridPoint {
+    match blocks {
+        [x, y, z] if edges.count() == 0 => {
+            let w = centred(path);
+            let line = iso_line(side);
+            let axis = |block: &[i32; 16]| polynomial_axis(block, &line, w);
+            let ([x0, x1, x2, xs, xm, xx], [y0, y1, y2, ys, ym, yy], [z0, z1, z2, zs, zm, zz]) =
+                (axis(x), axis(y), axis(z));
+            GridPoint {
+                local: Local {
+                    position: [x0, y0, z0],
+                    path: [x1, y1, z1],
+                    side: [xs, ys, zs],
+                    path2: [x2, y2, z2],
+                    mixed: [xm, ym, zm],
+                    side2: [xx, yy, zz],
+                    g: 1.0,
+                    inverse_g: 1.0,
+                    excess: 0.0,
+                },
+                factors: Factors::ONE,
+                log_weight: [0.0; 2],
+            }
+        }
+        _ => weighted_at(blocks, edges, path, side),
+    }
+}
+
+/// The same of a rational patch, or of one with a pole.
+#[inline(never)]
+fn weighted_at(blocks: &[[i32; 16]], edges: Edges, path: u64, side: u64) -> GridPoint {
+    const NONE: [i32; 16] = [0; 16];
+    let w = centred(path);
+    let line = iso_line(side);
+    let (axes, weight) = match blocks {
+        [x, y, z, weight] => ([x, y, z], CoordinateCubics::at(weight, &line)),
+        [x, y, z] => ([x, y, z], CoordinateCubics::ONE),
+        _ => ([&NONE; 3], CoordinateCubics::ONE),
+    };
+    let weight = Weight::at(&weight, w);
+    let pole = PoleAt::new(edges, &line);
+    let [x, y, z] = axes.map(|block| {
+        let cubics = CoordinateCubics::at(block, &line);
+        match &pole {
+            Some(pole) => pole.axis(&cubics, block, &line, &weight, w),
+            None => rational_axis(&cubics, &weight, w),
+        }
+    });
+    GridPoint {
+        local: weight.local(x, y, z),
+        factors: pole.map_or(Factors::ONE, |pole| pole.factors(w)),
+        log_weight: weight.log_derivatives(),
+    }
+}
+
+const fn iso_line(side: u64) -> IsoLine {
+    IsoLine {
+        fraction: side,
+        side: centred(side),
+        reversed: false,
+    }
+}
+
+/// One coordinate of a [`Local`]: position, path, path2, side, mixed, side2.
+#[inline(always)]
+fn polynomial_axis(block: &[i32; 16], line: &IsoLine, w: i32) -> [i32; 6] {
+    let cubics = CoordinateCubics::at(block, line);
+    let [value, path, path2] = jet(&cubics.value, w);
+    let [side, mixed] = tangent(&cubics.side, w);
+    [value, path, path2, side, mixed, cubic(&cubics.side2, w)]
 }

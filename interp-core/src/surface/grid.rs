@@ -3,9 +3,7 @@
 
 use super::lines::CoordinateCubics;
 use super::pole::Reduced;
-use super::rational::WEIGHT_ONE;
-use super::{Ball, Contact, Derivatives, Edges, IsoLine, Pass as _, PolePass, PolynomialPass, RationalPass};
-use crate::fault::Result;
+use super::{Edges, IsoLine};
 
 /// The evaluation routine of the cubics.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -43,32 +41,6 @@ impl GridPass {
         reduced: Reduced::NONE,
     };
 
-    /// The contact at a fraction of the patch, for callers outside the sample path of straight passes.
-    ///
-    /// # Errors
-    /// As [`Pass::contact`].
-    pub(super) fn contact(&self, fraction: u64, ball: &Ball) -> Result<Contact> {
-        match self.kind {
-            // Bit-identical to the specialised evaluations, see the tests in polynomial.rs.
-            GridKind::Free | GridKind::Ruled | GridKind::Extruded => {
-                PolynomialPass(self).contact(fraction, ball)
-            }
-            GridKind::Rational => RationalPass(self).contact(fraction, ball),
-            GridKind::Pole => PolePass(self).contact(fraction, ball),
-        }
-    }
-
-    /// First and second derivatives at a fraction of the patch.
-    pub(super) fn derivatives(&self, fraction: u64) -> Derivatives {
-        match self.kind {
-            GridKind::Free | GridKind::Ruled | GridKind::Extruded => {
-                PolynomialPass(self).derivatives(fraction)
-            }
-            GridKind::Rational => RationalPass(self).derivatives(fraction),
-            GridKind::Pole => PolePass(self).derivatives(fraction),
-        }
-    }
-
     /// Collapses a patch of three coordinates, and the weight if it is rational.
     pub(crate) fn collapse(&mut self, blocks: &[[i32; 16]], edges: Edges, at: &IsoLine) {
         let mut rest = blocks.iter();
@@ -96,10 +68,7 @@ impl GridPass {
         }
         if self.kind == GridKind::Pole {
             if weight.is_none() {
-                self.weight = CoordinateCubics {
-                    value: [WEIGHT_ONE, 0, 0, 0],
-                    ..CoordinateCubics::NONE
-                };
+                self.weight = CoordinateCubics::ONE;
             }
             self.reduced.collapse(&self.axes, blocks, edges, at);
         }

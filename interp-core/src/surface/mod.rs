@@ -356,21 +356,6 @@ impl Surface {
         }
     }
 
-    /// First and second derivatives at a fraction of the patch, in the direction of travel.
-    #[inline(never)]
-    pub(crate) fn derivatives(&self, fraction: u64) -> Derivatives {
-        match self.pass() {
-            AnyPass::Polynomial(PolynomialPass(pass))
-            | AnyPass::Ruled(RuledPass(pass))
-            | AnyPass::Extruded(ExtrudedPass(pass)) => PolynomialPass(pass).derivatives(fraction),
-            AnyPass::Rational(pass) => pass.derivatives(fraction),
-            AnyPass::Pole(pass) => pass.derivatives(fraction),
-            AnyPass::Profile(pass) => pass.derivatives(fraction),
-            AnyPass::Circle(pass) => pass.derivatives(fraction),
-            AnyPass::Curve(pass) => pass.derivatives(fraction),
-        }
-    }
-
     /// Whether the pass degenerates to a point.
     pub(crate) fn is_point(&self) -> bool {
         match self.pass() {

@@ -43,11 +43,6 @@ const BOUNDS: &[(&str, u32, &str)] = &[
     ),
     ("controller::step_output::StepOutput::turn", 3, "axes"),
     (
-        "interp_core::pass::run::Run::step_far",
-        5,
-        "pieces of an arc: CROSSINGS_ON_FRONT_MAX + 1",
-    ),
-    (
         "interp_core::feed::curve::Curve as interp_core::feed::pace::Course::advance",
         3,
         "pieces of a curve, and phases of a ramp",
@@ -321,11 +316,6 @@ const BOUNDS: &[(&str, u32, &str)] = &[
         "members that leave the hull: MEMBERS_MAX; columns of a station",
     ),
     (
-        "interp_core::pass::front::advance::Advance::work",
-        16,
-        "rows of a portion: CHUNK",
-    ),
-    (
         "interp_core::pass::front::crest::shifted",
         16,
         "intervals to a foot: INTERVALS_MAX",
@@ -369,6 +359,31 @@ const BOUNDS: &[(&str, u32, &str)] = &[
         "interp_core::pass::front::line::FrontLine::leaves",
         31,
         "bisections of a place: BISECTIONS; extrema of a cubic",
+    ),
+    (
+        "interp_core::pass::contact::solve",
+        2,
+        "Newton iterations: NEWTON_STEPS",
+    ),
+    (
+        "interp_core::sequence::link::BoundaryStepOver::look_at_knot",
+        2,
+        "sides of a knot",
+    ),
+    (
+        "interp_core::sequence::lookahead::Lookahead::differentiate",
+        168,
+        "stations of a pass: STATIONS",
+    ),
+    (
+        "interp_core::sequence::lookahead::Lookahead::finish_short",
+        168,
+        "stations of a pass: STATIONS",
+    ),
+    (
+        "interp_core::sequence::lookahead::PassPlan::arc_at_piece_q10",
+        8,
+        "halvings of the stretches: PATCHES",
     ),
 ];
 
