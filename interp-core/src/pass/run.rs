@@ -242,17 +242,13 @@ impl Run {
         match self.travel.next {
             Next::Along if self.buffer.patch().point => self.step_on_pole(job)?,
             Next::Along => self.step_far(job, feed_factor)?,
-            Next::Pass => {
-                let route = self.first_route(job);
-                self.begin_pass(job, route)?;
-            }
-            Next::Over => match self.step_over(job)? {
-                NextPass::Pass(route) => self.begin_pass(job, route)?,
-                NextPass::NotYet => {
+            Next::Pass | Next::Over => match self.change_pass(job)? {
+                Some(true) => {}
+                Some(false) => {
                     self.stand(last);
                     return Ok(true);
                 }
-                NextPass::None => return Ok(false),
+                None => return Ok(false),
             },
             Next::End => return Ok(false),
         }
@@ -274,6 +270,22 @@ impl Run {
             job.header.feed_mm_s * feed_factor
         };
         Ok(true)
+    }
+
+    /// Begins the first pass, or the next one. False where that is not made yet; none where there is none.
+    #[inline(never)]
+    fn change_pass(&mut self, job: &Job<'_>) -> Result<Option<bool>> {
+        let next = if self.travel.next == Next::Pass {
+            NextPass::Pass(self.first_route(job))
+        } else {
+            self.step_over(job)?
+        };
+        match next {
+            NextPass::Pass(route) => self.begin_pass(job, route)?,
+            NextPass::NotYet => return Ok(Some(false)),
+            NextPass::None => return Ok(None),
+        }
+        Ok(Some(true))
     }
 
     /// Collapses the first patch of this pass. The tool does not move.

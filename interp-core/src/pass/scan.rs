@@ -16,7 +16,6 @@ use crate::pass::patch::Patch;
 use crate::pass::position::PassPosition;
 use crate::pass::step_over::{PassMaximum, StepOverEstimator};
 use crate::sample::SpanParameter;
-use crate::surface::Pass as _;
 
 /// Cycles of the pieces, by the pessimistic model of `cargo sim budget`.
 pub(crate) mod cycles {
@@ -180,7 +179,7 @@ impl PassScan {
             Piece::Station => {
                 let fraction = self.fraction();
                 // A fault is reported by the tick that reaches it.
-                if let Ok(contact) = self.patch.surface.contact(fraction, &self.patch.ball) {
+                if let Ok(contact) = self.patch.surface.contact_on_line(fraction, &self.patch.ball) {
                     self.estimator.see(job, &self.patch, &contact, fraction);
                 }
                 Piece::Estimate(self.estimates(job))

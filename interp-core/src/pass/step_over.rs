@@ -18,7 +18,7 @@ use crate::pass::patch::Patch;
 use crate::pass::position::PassPosition;
 use crate::pass::schedule;
 use crate::sample::{SpanParameter, interval_of};
-use crate::surface::{Contact, Pass as _};
+use crate::surface::Contact;
 
 /// Maximum ratio of the step to the first-order step: the neighbouring lines extend no further.
 const STEP_MAX: f32 = 1.25;
@@ -445,7 +445,7 @@ impl NeighbourLine {
 
     /// Evaluates the line's start or end.
     fn see_end(&mut self, job: &Job<'_>, fraction: u64) {
-        if let Ok(contact) = self.patch.surface.contact(fraction, &self.patch.ball) {
+        if let Ok(contact) = self.patch.surface.contact_on_line(fraction, &self.patch.ball) {
             self.peak.most = exact_at(job, &self.patch, &contact).at_least(self.peak.most);
         }
     }
@@ -483,7 +483,7 @@ impl NeighbourLine {
                 Task::EvaluateLast
             }
             Task::Evaluate | Task::EvaluateLast => {
-                if let Ok(contact) = self.patch.surface.contact(fraction, &self.patch.ball) {
+                if let Ok(contact) = self.patch.surface.contact_on_line(fraction, &self.patch.ball) {
                     self.peak.see(exact_at(job, &self.patch, &contact), fraction);
                 }
                 self.task
@@ -575,7 +575,7 @@ fn is_end(path_spans: u16, position: &PassPosition, fraction: u64) -> bool {
 /// With a and b for |d|^2 (1 + r c) of these two directions, the crest height is multiplied by 4/(1 + sqrt(a/b))^2.
 #[inline(never)]
 fn at_end(job: &Job<'_>, patch: &Patch, fraction: u64) -> f32 {
-    let Ok(contact) = patch.surface.contact(fraction, &patch.ball) else {
+    let Ok(contact) = patch.surface.contact_on_line(fraction, &patch.ball) else {
         return 0.0;
     };
     let inv_interval_sq = exact_at(job, patch, &contact);

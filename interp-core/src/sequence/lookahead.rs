@@ -37,6 +37,8 @@ const NO_JUMP: f32 = 4e-6;
 /// Most stations of a pass, and most patches of which both ends are kept.
 const STATIONS: u16 = 168;
 const PATCHES: u16 = STATIONS / 2;
+/// Words of a bit for each piece of a pass on a front: intervals between stations, and as many crossings of knots; a stretch beyond begins without its arc noted.
+const PIECE_WORDS: usize = 20;
 /// Least length of a stretch of a pass on a front, mm, and of one that ends at a knot; shorter ones have no derivatives of their own.
 const STRETCH_MIN_MM: f32 = 0.6;
 const STRETCH_KNOT_MM: f32 = 0.3;
@@ -69,14 +71,12 @@ pub(crate) struct PassPlan {
     pub(crate) faces_up: [bool; 2],
     /// Side parameter at start and end.
     pub(crate) sides: [SpanParameter; 2],
-    /// Of a pass on a front, the number of the piece with which each patch of [`Self::cells`] begins.
-    starts: [u16; PATCHES as usize],
+    /// Of a pass on a front, a bit for each piece with which a stretch begins.
+    starts: [u32; PIECE_WORDS],
     /// Minimum interval of the pass.
     pub(crate) interval: f32,
     /// The pass after this one, where that is known from the pass alone.
     pub(crate) next: Option<Route>,
-    /// Stretches of a pass on a front that [`Self::starts`] has.
-    stretches: u16,
     /// There is no pass after this one.
     pub(crate) is_last: bool,
     /// Stations of half the turn before the pass, and its length, units of 2^-10 nm.
@@ -101,10 +101,9 @@ impl PassPlan {
         ends: [[0; 3]; 2],
         faces_up: [false; 2],
         sides: [SpanParameter { span: 0, fraction: 0 }; 2],
-        starts: [0; PATCHES as usize],
+        starts: [0; PIECE_WORDS],
         interval: 0.0,
         next: None,
-        stretches: 0,
         is_last: false,
         head: 0,
         head_q10: 0,
@@ -143,8 +142,15 @@ impl PassPlan {
 impl PassPlan {
     /// Arc at the start of a piece of a pass on a front, units of 2^-10 nm, if a stretch begins with it.
     pub(crate) fn arc_at_piece_q10(&self, number: u16) -> Option<i64> {
-        let starts = self.starts.get(..usize::from(self.stretches))?;
-        let index = starts.binary_search(&number).ok()?;
+        let (word, bit) = (usize::from(number >> 5), number & 31);
+        let starts = *self.starts.get(word)?;
+        if starts >> bit & 1 == 0 {
+            return None;
+        }
+        let mut index = (starts & ((1 << bit) - 1)).count_ones();
+        for starts in self.starts.iter().take(word) {
+            index += starts.count_ones();
+        }
         let station = u16::try_from(index).ok()?.saturating_mul(self.cells + 1);
         Some(i64::from(self.plan.stations.get(station).arc_nm) << Q10_BITS)
     }
@@ -186,9 +192,8 @@ impl PassPlan {
 
     /// Notes the piece with which a stretch begins.
     fn note_stretch(&mut self, number: u16) {
-        if let Some(start) = self.starts.get_mut(usize::from(self.stretches)) {
-            *start = number;
-            self.stretches += 1;
+        if let Some(starts) = self.starts.get_mut(usize::from(number >> 5)) {
+            *starts |= 1 << (number & 31);
         }
     }
 }
@@ -368,7 +373,7 @@ impl Lookahead {
         out.full_pace = 1.0;
         out.next = None;
         out.is_last = false;
-        out.stretches = 0;
+        out.starts = [0; PIECE_WORDS];
         self.has_derivatives = false;
     }
 

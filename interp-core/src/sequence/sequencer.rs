@@ -423,6 +423,7 @@ impl Sequencer {
         })
     }
 
+    #[inline(never)]
     fn work(&mut self, job: &Job<'_>, axes: &AxisLimits, run: &mut Run) {
         if let Phase::AwaitGoal(leg) = self.phase
             && self.has_to_plan_leg(leg)

@@ -307,7 +307,7 @@ impl GridPoint {
     }
 }
 
-#[inline(always)]
+#[inline(never)]
 fn grid_at(blocks: &[[i32; 16]], edges: Edges, path: u64, side: u64) -> GridPoint {
     match blocks {
         [x, y, z] if edges.count() == 0 => {

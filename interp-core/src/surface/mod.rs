@@ -324,6 +324,20 @@ impl Pass for Surface {
     /// Dispatches at run time: for callers outside the sample path.
     #[inline(never)]
     fn contact(&self, fraction: u64, ball: &Ball) -> Result<Contact> {
+        match self {
+            Self::Curve(pass) => pass.contact(fraction, ball),
+            _ => self.contact_on_line(fraction, ball),
+        }
+    }
+}
+
+impl Surface {
+    /// [`Pass::contact`] on a line of constant side parameter, for what is never on a curve.
+    ///
+    /// # Errors
+    /// As [`Pass::contact`].
+    #[inline(never)]
+    pub(crate) fn contact_on_line(&self, fraction: u64, ball: &Ball) -> Result<Contact> {
         match self.pass() {
             // Bit-identical to the specialised evaluations, see the tests in polynomial.rs.
             AnyPass::Polynomial(PolynomialPass(pass))
@@ -333,12 +347,10 @@ impl Pass for Surface {
             AnyPass::Pole(pass) => pass.contact(fraction, ball),
             AnyPass::Profile(pass) => pass.contact(fraction, ball),
             AnyPass::Circle(pass) => pass.contact(fraction, ball),
-            AnyPass::Curve(pass) => pass.contact(fraction, ball),
+            AnyPass::Curve(_) => Err(degenerate(0.0, 0.0)),
         }
     }
-}
 
-impl Surface {
     /// The pass by its kind.
     #[inline(always)]
     pub(crate) const fn pass(&self) -> AnyPass<'_> {

@@ -295,12 +295,6 @@ const BOUNDS: &[(&str, u32, &str)] = &[
         "pulses of a period: SLOTS over the shortest spacing, 2",
     ),
     (
-        "interp_core::surface::lines::CoordinateCubics::collapse",
-        4,
-        "rows of a block",
-    ),
-    ("interp_core::surface::pole::Reduced::collapse", 3, "axes"),
-    (
         "interp_core::job::stations::Stations::for_intervals",
         10,
         "powers of two of a span's parts",
@@ -361,11 +355,6 @@ const BOUNDS: &[(&str, u32, &str)] = &[
         "bisections of a place: BISECTIONS; extrema of a cubic",
     ),
     (
-        "interp_core::pass::contact::solve",
-        2,
-        "Newton iterations: NEWTON_STEPS",
-    ),
-    (
         "interp_core::sequence::link::BoundaryStepOver::look_at_knot",
         2,
         "sides of a knot",
@@ -382,8 +371,23 @@ const BOUNDS: &[(&str, u32, &str)] = &[
     ),
     (
         "interp_core::sequence::lookahead::PassPlan::arc_at_piece_q10",
-        8,
-        "halvings of the stretches: PATCHES",
+        20,
+        "words of the pieces: PIECE_WORDS",
+    ),
+    (
+        "interp_core::pass::run::Run::step_far",
+        5,
+        "pieces of an arc: CROSSINGS_ON_FRONT_MAX + 1",
+    ),
+    (
+        "interp_core::surface::curve::weighted_at",
+        4,
+        "rows of a block; coordinates",
+    ),
+    (
+        "interp_core::surface::grid::GridPass::collapse",
+        4,
+        "rows of a block; coordinates",
     ),
 ];
 
