@@ -17,6 +17,7 @@ use crate::math::number::{Bounded, cube_root, to_f32, to_quanta};
 
 /// Binary places of a position, below a nanometre.
 const PLACES: u32 = 28;
+#[allow(clippy::cast_precision_loss, reason = "a power of two")]
 const ONE: f32 = (1_u32 << PLACES) as f32;
 
 /// Most periods of jerk, and of acceleration: more than a minute at 1 ms.
@@ -263,8 +264,8 @@ impl Move {
     /// Stops within the limits, as soon as possible: the next periods brake. No effect where they do already.
     pub fn stop(&mut self) {
         let [rise, steady, fall, ..] = self.phases;
-        let is_last = self.index > CRUISE;
-        if is_last {
+        let is_braking = self.index > CRUISE || self.goal_nm.is_none();
+        if is_braking {
             return;
         }
         self.goal_nm = None;
@@ -337,7 +338,8 @@ mod tests {
         let mut all = std::vec![start; 3];
         let mut ticks = 0;
         while !moving.is_over() {
-            if stop_after == Some(ticks) {
+            // Again and again, as an input that stays asserted does.
+            if stop_after.is_some_and(|after| ticks >= after) {
                 moving.stop();
                 if moving.is_over() {
                     break;

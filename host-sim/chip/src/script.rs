@@ -37,6 +37,7 @@ fn input_name(role: Role) -> Option<&'static str> {
     Some(match role {
         Role::EmergencyStop => "emergency-stop",
         Role::DriveFault => "drive-fault",
+        Role::Probe => "probe",
         Role::LimitMin(Axis::X) => "x-min",
         Role::LimitMin(Axis::Y) => "y-min",
         Role::LimitMin(Axis::Z) => "z-min",
