@@ -51,16 +51,29 @@ const HOME: Request = Request::Home { axes: 0 };
 
 #[test]
 fn every_axis_finds_its_switch_wherever_it_stands() {
-    for start_mm in [[120, 30, -40], [0, 0, 0], [299, 199, -79], [-2, -2, 2], [-3, 77, 3]] {
+    for start_mm in [
+        [120, 30, -40],
+        [0, 0, 0],
+        [299, 199, -79],
+        [-2, -2, 2],
+        [-3, 77, 3],
+    ] {
         let mut rig = Rig::homable(start_mm.map(|mm| mm * MM));
         rig.ask(&HOME).unwrap();
         let motion = rig.until_rest();
-        assert_eq!((motion.end, motion.homed_axes), (MotionEnd::Done, 0b111), "{start_mm:?}");
+        assert_eq!(
+            (motion.end, motion.homed_axes),
+            (MotionEnd::Done, 0b111),
+            "{start_mm:?}"
+        );
         assert!(rig.status().safety.homed);
         // Where the board believes the axes to be, they are: to a step, and what an axis moves in a period of the approach.
         let off = rig.stands_nm().into_iter().zip(motion.at_nm);
         for (axis, (really, believed)) in off.enumerate() {
-            assert!((really - believed).abs() <= STEP_NM + 1_000, "{axis}: {really}, {believed}");
+            assert!(
+                (really - believed).abs() <= STEP_NM + 1_000,
+                "{axis}: {really}, {believed}"
+            );
         }
         // Off the switches, so that a run can start: 3 mm from each.
         assert!(rig.status().safety.lines.is_none());
@@ -129,7 +142,10 @@ fn a_jog_goes_its_distance_within_the_travel() {
     assert_eq!((motion.end, motion.activity), (MotionEnd::Done, Activity::Rest));
     assert!((rig.stands_nm()[1] - before[1] - 50 * MM).abs() <= STEP_NM);
     let refused = rig.ask(&by(2, 20)).unwrap_err();
-    assert!(matches!(refused, Reason::BeyondTravel { axis: 2, .. }), "{refused}");
+    assert!(
+        matches!(refused, Reason::BeyondTravel { axis: 2, .. }),
+        "{refused}"
+    );
     assert!(matches!(rig.ask(&by(3, 1)), Err(Reason::OutOfRange { .. })));
     // Stopped by the operator: along the ramp, and the position stays known.
     rig.ask(&by(0, 250)).unwrap();
@@ -138,7 +154,10 @@ fn a_jog_goes_its_distance_within_the_travel() {
     let motion = rig.until_rest();
     assert_eq!(motion.end, MotionEnd::Stopped);
     assert!((rig.stands_nm()[0] - motion.at_nm[0]).abs() <= STEP_NM + 1_000);
-    assert!(motion.at_nm[0] > 30 * MM && motion.at_nm[0] < 100 * MM, "{motion:?}");
+    assert!(
+        motion.at_nm[0] > 30 * MM && motion.at_nm[0] < 100 * MM,
+        "{motion:?}"
+    );
 }
 
 #[test]
@@ -153,7 +172,10 @@ fn a_continuous_jog_ends_with_its_repetition_and_at_the_travels_end() {
     }
     let motion = rig.until_rest();
     assert_eq!(motion.end, MotionEnd::HostGone);
-    assert!(motion.at_nm[0] > 90 * MM && motion.at_nm[0] < 140 * MM, "{motion:?}");
+    assert!(
+        motion.at_nm[0] > 90 * MM && motion.at_nm[0] < 140 * MM,
+        "{motion:?}"
+    );
     // Held: to the end of the travel, exactly.
     for _ in 0..200 {
         match rig.ask(&jog(0, JogWay::Plus)) {
@@ -175,7 +197,11 @@ fn a_limit_switch_stops_a_jog_and_lets_it_go_back() {
     let switch = InputLines::limit(0, false);
     assert_eq!((motion.end, motion.lines), (MotionEnd::LimitSwitch, switch));
     // Along the ramp: 100 mm/s at 1000 mm/s^2 and 20000 mm/s^3.
-    assert!((rig.stands_nm()[0] + 2 * MM).abs() < 9 * MM, "{:?}", rig.stands_nm());
+    assert!(
+        (rig.stands_nm()[0] + 2 * MM).abs() < 9 * MM,
+        "{:?}",
+        rig.stands_nm()
+    );
     assert!(matches!(rig.ask(&by(0, -1)), Err(Reason::Unsafe { .. })));
     rig.ask(&by(0, 20)).unwrap();
     assert_eq!(rig.until_rest().end, MotionEnd::Done);
@@ -192,7 +218,10 @@ fn the_emergency_stop_ends_it_at_once() {
     rig.pressed = InputLines::EMERGENCY_STOP;
     rig.rest(1);
     let motion = rig.motion();
-    assert_eq!((motion.activity, motion.end), (Activity::Rest, MotionEnd::DrivesOff));
+    assert_eq!(
+        (motion.activity, motion.end),
+        (Activity::Rest, MotionEnd::DrivesOff)
+    );
     assert!(!rig.status().safety.homed && !rig.status().safety.drives_on);
     assert_eq!(motion.homed_axes, 0);
 }

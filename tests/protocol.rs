@@ -19,8 +19,9 @@ use protocol::{
     frame::{Decoder, FRAME_MAX, FrameError, write_reply},
     message::{
         Activity, Batch, Capabilities, Clock, Configuration, Description, Excess, FaultReport, Homing,
-        InputLines, JogWay, LinkTimeoutAction, MotionEnd, MotionStatus, Offsets, PassDigest, Profile, ProfileLimit, Reason, Reply, Report, Request, ResetCause,
-        SafetyStatus, SampleRecord, Status, StepSettings, Words, read_reply, read_request,
+        InputLines, JogWay, LinkTimeoutAction, MotionEnd, MotionStatus, Offsets, PassDigest, Profile,
+        ProfileLimit, Reason, Reply, Report, Request, ResetCause, SafetyStatus, SampleRecord, Status,
+        StepSettings, Words, read_reply, read_request,
     },
 };
 

@@ -231,7 +231,9 @@ impl<const WORDS: usize> Board<WORDS> {
         for (axis, carriage) in self.carriages.iter_mut().enumerate() {
             let is_high = |word: &u32| word >> axis & 1 != 0;
             let begins = slots.iter().zip(slots.iter().skip(1));
-            let pulses = begins.filter(|(before, after)| !is_high(before) && is_high(after)).count()
+            let pulses = begins
+                .filter(|(before, after)| !is_high(before) && is_high(after))
+                .count()
                 + usize::from(slots.first().is_some_and(is_high));
             let pulses = i32::try_from(pulses).unwrap_or(i32::MAX);
             *carriage += if minus >> axis & 1 != 0 { -pulses } else { pulses };

@@ -17,7 +17,9 @@ mod homing;
 use interp_core::positioning::{Move, MoveLimits};
 use protocol::{
     digest::Digest,
-    message::{Activity, Homing as HomingProfile, InputLines, JogWay, MotionEnd, MotionStatus, Profile, Reason},
+    message::{
+        Activity, Homing as HomingProfile, InputLines, JogWay, MotionEnd, MotionStatus, Profile, Reason,
+    },
 };
 
 use self::homing::{Homing, Next};
@@ -97,7 +99,8 @@ impl Setup {
         };
         let [least, most] = travel_nm;
         // From outside, as at a switch, the way back is open.
-        let is_outside = (wanted_nm < least && wanted_nm < from_nm) || (wanted_nm > most && wanted_nm > from_nm);
+        let is_outside =
+            (wanted_nm < least && wanted_nm < from_nm) || (wanted_nm > most && wanted_nm > from_nm);
         if is_far || is_outside {
             return Err(Reason::BeyondTravel {
                 axis,
@@ -544,7 +547,9 @@ impl Manual {
         };
         let tripped_nm = self.status.tripped_nm;
         let at = self.axis_nm(axis);
-        let next = self.homing.after(self.status.activity, steady, judged, at, &self.contact);
+        let next = self
+            .homing
+            .after(self.status.activity, steady, judged, at, &self.contact);
         match next {
             Next::Fails(end) => self.finish(end, switch),
             Next::Moves(activity, nm, speed_mm_s) => self.lead_homing(activity, at, nm, speed_mm_s, steady),

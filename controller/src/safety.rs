@@ -17,11 +17,11 @@
 //! declares their position. Without drives the axes may move, so every switch-off of the drives clears the home, unless the profile says that it survives.
 //! **Cost.** A tick with unchanged inputs takes one comparison and one count (`is_unchanged`).
 
+use crate::manual::{Motion, Setup};
 use interp_core::{
     fault::{Fault, FaultKind},
     sample::State,
 };
-use crate::manual::{Motion, Setup};
 use protocol::message::{
     Clock, Configuration, InputLines, LinkTimeoutAction, OVERRIDE_MAX_PERCENT, Reason, ResetCause,
     SafetyStatus,

@@ -10,8 +10,8 @@ use interp_core::{
 use protocol::{
     frame::{DELIMITER, FRAME_MAX, Frame, write_reply},
     message::{
-        Activity, Capabilities, Clock, Configuration, Excess, NO_NUMBER, OVERRIDE_MAX_PERCENT, Offsets, Profile, ProfileLimit,
-        Reason, Reply, Request, Status, StepSettings, next_number, read_request,
+        Activity, Capabilities, Clock, Configuration, Excess, NO_NUMBER, OVERRIDE_MAX_PERCENT, Offsets,
+        Profile, ProfileLimit, Reason, Reply, Request, Status, StepSettings, next_number, read_request,
     },
     version::PROTOCOL_VERSION,
 };
@@ -129,7 +129,9 @@ impl Session {
         machine.order(Order::Configure(configuration))?;
         #[allow(clippy::cast_precision_loss, reason = "a period is below 2^24 us")]
         let period_s = machine.description().period_us as f32 * 1e-6;
-        machine.order(Order::SetUp(profile.map(|profile| Setup::new(&profile, period_s))))?;
+        machine.order(Order::SetUp(
+            profile.map(|profile| Setup::new(&profile, period_s)),
+        ))?;
         let own = own_steps(machine);
         self.set_steps(machine, own)
     }

@@ -254,6 +254,12 @@ mod tests {
             assert!(!Homing { order, ..homing }.is_valid([10.0; 3]));
         }
         let slow = [1.0, f32::NAN, 1.0];
-        assert!(!Homing { approach_mm_s: slow, ..homing }.is_valid([10.0; 3]));
+        assert!(
+            !Homing {
+                approach_mm_s: slow,
+                ..homing
+            }
+            .is_valid([10.0; 3])
+        );
     }
 }

@@ -28,7 +28,9 @@ pub(super) enum Fault {
     /// The switches close when they are pressed.
     Opposite,
     /// A contact bounces for so long.
-    Bounce { ticks: u32 },
+    Bounce {
+        ticks: u32,
+    },
     /// An axis turns the other way.
     Reversed(usize),
 }
@@ -91,7 +93,11 @@ impl Rig {
     pub(super) fn stands_nm(&self) -> [i32; 3] {
         let mut at = self.start_nm;
         for (axis, (at, steps)) in at.iter_mut().zip(self.steps[2]).enumerate() {
-            let sign = if self.fault == Fault::Reversed(axis) { -1 } else { 1 };
+            let sign = if self.fault == Fault::Reversed(axis) {
+                -1
+            } else {
+                1
+            };
             *at += sign * steps * STEP_NM;
         }
         at
@@ -112,7 +118,11 @@ impl Rig {
         if at[2] <= PLATE_NM {
             touched = touched.or(InputLines::PROBE);
         }
-        self.ticks = if touched == self.touched { self.ticks + 1 } else { 0 };
+        self.ticks = if touched == self.touched {
+            self.ticks + 1
+        } else {
+            0
+        };
         self.touched = touched;
         let seen = match self.fault {
             Fault::Nothing | Fault::Reversed(_) => touched,

@@ -20,8 +20,8 @@ use protocol::{
     digest::job_digest,
     frame::{Decoder, FRAME_MAX, write_request},
     message::{
-        Description, InputLines, MotionStatus, NO_NUMBER, Offsets, Profile, Reason, Reply, Request, SafetyStatus, Status, Words,
-        next_number, read_reply,
+        Description, InputLines, MotionStatus, NO_NUMBER, Offsets, Profile, Reason, Reply, Request,
+        SafetyStatus, Status, Words, next_number, read_reply,
     },
 };
 

@@ -132,7 +132,11 @@ impl Homing {
 
     /// Off the switch by its distance and some more, nm.
     fn off(&self, activity: Activity, more_nm: i64) -> Next {
-        Next::Moves(activity, -self.towards(self.back_off_nm() + more_nm), self.seek_mm_s())
+        Next::Moves(
+            activity,
+            -self.towards(self.back_off_nm() + more_nm),
+            self.seek_mm_s(),
+        )
     }
 
     /// The last move of an axis: back to where the switch is released.
@@ -156,9 +160,9 @@ impl Homing {
             Activity::Seek if !is_tripped => Next::Fails(MotionEnd::NotFound),
             Activity::Seek => {
                 // As far as it has run on, and the distance.
-                let over = contact.touched_nm.map_or(0, |touched| {
-                    (i64::from(at_nm) - i64::from(touched)).abs()
-                });
+                let over = contact
+                    .touched_nm
+                    .map_or(0, |touched| (i64::from(at_nm) - i64::from(touched)).abs());
                 self.off(Activity::BackOff, over)
             }
             Activity::BackOff | Activity::Clear if is_tripped => {

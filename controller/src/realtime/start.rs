@@ -146,7 +146,9 @@ impl<S: AsRef<[i32]> + AsMut<[i32]>> RealTime<S> {
         let stands_nm = self.interpolator.stands_nm();
         MotionStatus {
             // After a run, or a declaration, its position.
-            at_nm: stands_nm.filter(|_| !self.control.manual.is_active()).unwrap_or(motion.at_nm),
+            at_nm: stands_nm
+                .filter(|_| !self.control.manual.is_active())
+                .unwrap_or(motion.at_nm),
             ..motion
         }
     }

@@ -56,19 +56,32 @@ pub(super) fn read(
         .positive_axes("back_off_mm", ABOVE_0)?
         .unwrap_or([BACK_OFF_MM; 3]);
     for (index, axis) in AXES.into_iter().enumerate() {
-        let (seek, approach, most) = (seek_mm_s[index], approach_mm_s[index], limits.velocity_mm_s[index]);
+        let (seek, approach, most) = (
+            seek_mm_s[index],
+            approach_mm_s[index],
+            limits.velocity_mm_s[index],
+        );
         if seek > most {
-            let what = format!("`seek_mm_s` is faster than {axis} may be: {seek}, {most} in velocity_max_mm_s");
+            let what =
+                format!("`seek_mm_s` is faster than {axis} may be: {seek}, {most} in velocity_max_mm_s");
             return Err(home.error("seek_mm_s", what, "search more slowly"));
         }
         if approach > seek {
             let what = format!("`approach_mm_s` of {axis} is faster than its search: {approach}, {seek}");
-            return Err(home.error("approach_mm_s", what, "approach more slowly: its speed makes the home exact"));
+            return Err(home.error(
+                "approach_mm_s",
+                what,
+                "approach more slowly: its speed makes the home exact",
+            ));
         }
         let off = back_off_mm[index];
         if off > BACK_OFF_MAX_MM {
             let what = format!("`back_off_mm` of {axis} must be at most {BACK_OFF_MAX_MM}, not {off}");
-            return Err(home.error("back_off_mm", what, "give a distance at which the switch is released"));
+            return Err(home.error(
+                "back_off_mm",
+                what,
+                "give a distance at which the switch is released",
+            ));
         }
         let [least, most] = travel_mm[index];
         let rests = position_mm[index] + if at_upper_end[index] { -off } else { off };

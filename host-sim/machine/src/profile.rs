@@ -161,7 +161,9 @@ pub fn text(profile: &MachineProfile) -> String {
     line(format_args!("host_gone = \"{action}\""));
     line(format_args!("host_gone_ms = {heartbeat_timeout_ms:?}"));
     if let Some(homing) = homing {
-        let order = homing.order.map(|axis| AXES.get(usize::from(axis)).copied().unwrap_or("?"));
+        let order = homing
+            .order
+            .map(|axis| AXES.get(usize::from(axis)).copied().unwrap_or("?"));
         line(format_args!("\n[home]"));
         line(format_args!("order = \"{}\"", order.concat()));
         line(format_args!("at_upper_end = {:?}", homing.at_upper_end));
