@@ -27,7 +27,7 @@ use crate::{
 
 /// Maximum length of an answer stored for a retransmission, bytes: a frame of a `Profile` with every varint at its maximum length. That of a
 /// `Status` is shorter.
-const ANSWER_MAX: usize = 187;
+const ANSWER_MAX: usize = 185;
 
 /// State of the session.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -554,7 +554,7 @@ mod tests {
     use protocol::message::{FaultReport, InputLines, Report, SafetyStatus};
 
     #[test]
-    fn the_longest_status_is_kept() {
+    fn the_longest_answers_are_kept() {
         let place = SpanParameter {
             span: u16::MAX,
             fraction: u64::MAX,
@@ -602,6 +602,40 @@ mod tests {
                 status,
             },
         );
+        assert!(!last.answer.is_empty() && last.answer.len() < ANSWER_MAX);
+        let axis = interp_core::steps::AxisSteps {
+            steps: u32::MAX,
+            mm: u32::MAX,
+            inverted: true,
+        };
+        let steps = StepConfig {
+            axes: [axis; 3],
+            pulse_slots: u8::MAX,
+            setup_slots: u16::MAX,
+        };
+        let profile = Profile {
+            steps: steps.into(),
+            velocity_mm_s: [1.0; 3],
+            acceleration_mm_s2: [1.0; 3],
+            jerk_mm_s3: [1.0; 3],
+            travel_nm: Some([[i32::MIN, i32::MAX]; 3]),
+            configuration: status.safety.configuration,
+            homing: Some(protocol::message::Homing {
+                order: [2, 1, 0],
+                at_upper_end: [true; 3],
+                position_nm: [i32::MIN; 3],
+                seek_mm_s: [1.0; 3],
+                approach_mm_s: [1.0; 3],
+                back_off_nm: [i32::MAX; 3],
+                survives_off: true,
+            }),
+            probe_inverted: true,
+        };
+        let longest = Reply::Profile {
+            number: u16::MAX,
+            profile: Some(profile),
+        };
+        last.set(u16::MAX, &Frame { payload: &[], crc: 0 }, &longest);
         assert_eq!(last.answer.len(), ANSWER_MAX);
     }
 }
