@@ -43,6 +43,16 @@ const BOUNDS: &[(&str, u32, &str)] = &[
     ),
     ("controller::step_output::StepOutput::turn", 3, "axes"),
     (
+        "interp_core::positioning::Periods::shortest",
+        3,
+        "whole numbers beside the best real one",
+    ),
+    (
+        "interp_core::pass::run::Run::step_far",
+        2,
+        "patches of an arc: CROSSINGS_MAX + 1",
+    ),
+    (
         "interp_core::feed::curve::Curve as interp_core::feed::pace::Course::advance",
         3,
         "pieces of a curve, and phases of a ramp",
