@@ -48,11 +48,6 @@ const BOUNDS: &[(&str, u32, &str)] = &[
         "whole numbers beside the best real one",
     ),
     (
-        "interp_core::pass::run::Run::step_far",
-        2,
-        "patches of an arc: CROSSINGS_MAX + 1",
-    ),
-    (
         "interp_core::feed::curve::Curve as interp_core::feed::pace::Course::advance",
         3,
         "pieces of a curve, and phases of a ramp",
@@ -280,11 +275,6 @@ const BOUNDS: &[(&str, u32, &str)] = &[
         "steps of an estimate: AHEAD_STEPS",
     ),
     (
-        "interp_core::sequence::sequencer::Sequencer::work",
-        64,
-        "periods ahead of the tool: LEAD",
-    ),
-    (
         "interp_core::pass::schedule::apart",
         16,
         "spans between two passes: WALK_MAX",
@@ -398,6 +388,11 @@ const BOUNDS: &[(&str, u32, &str)] = &[
         "interp_core::surface::grid::GridPass::collapse",
         4,
         "rows of a block; coordinates",
+    ),
+    (
+        "interp_core::sequence::sequencer::Sequencer::next_own_cycles",
+        2,
+        "ends of a plan that are compared",
     ),
 ];
 
