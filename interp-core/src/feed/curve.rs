@@ -1,6 +1,7 @@
 //! Rest to rest along one coordinate in closed form, for links: constant jerk, constant acceleration, constant jerk, cruise, and back.
 
 use super::pace::{Course, Use};
+use super::profile::{SlotAt, Span};
 use super::{MM_PER_Q10, to_q10};
 use crate::math::arith::sqrt;
 use crate::math::number::{Bounded, cube_root, to_f32};
@@ -361,6 +362,28 @@ impl Course for Curve {
             acceleration: (a * r * r + v * r1).abs() / limits.acceleration,
             jerk: ((j * r * r + 3.0 * a * r1) * r + v * r2).abs() / limits.jerk,
         }
+    }
+
+    fn span_at(&self, cursor: &CurveCursor, slot: &SlotAt, room: &Use) -> Span {
+        let SlotAt {
+            r,
+            first,
+            slot_s,
+            around,
+        } = *slot;
+        let [v, a, j] = self.piece(cursor.piece).rates(cursor.time);
+        let limits = &self.limits;
+        let mut span = Span::WIDE;
+        span.add_acceleration(a * r * r, v, room.acceleration * limits.acceleration);
+        // The speed changes over the time around the place.
+        let fastest = v + a.abs() * r * around;
+        let by_first = 3.0 * a * r;
+        span.add_jerk(
+            j * r * r * r + by_first * first,
+            [fastest, fastest + by_first * slot_s],
+            room.jerk * limits.jerk,
+        );
+        span
     }
 }
 

@@ -4,8 +4,9 @@
 //! each of which was followed over its whole length beforehand: per axis `a r^2 + q' v r'` and `j r^3 + 3 a r r' + q' v r''`. So by induction every
 //! period is within the limits, whatever the order of the commands.
 
+use super::profile::{Making, Profile, ProfilePlace, Slot, SlotAt, Span};
 use crate::math::arith::{sqrt, truncated};
-use crate::math::number::Bounded;
+use crate::math::number::{Bounded, to_f32};
 
 /// Periods from the start of a search to the change that it finds, for the search: some, and as many as the places of two short trials take.
 const LATENCY: u16 = 8;
@@ -13,6 +14,15 @@ const PLACES_A_PERIOD: f32 = 18.0;
 /// The most of it, and steps in which the place there is found.
 const LATENCY_MAX: u16 = 96;
 const STEPS_AHEAD: u16 = 24;
+
+/// The same of a profile: least periods, and places for the shortest change, as a multiple of its slots.
+const LATENCY_OF_PROFILE: u16 = 3;
+const PROFILE_PLACES: f32 = 2.5;
+/// Least duration of a slot of a profile, s, and slots of the shortest change that are enough; longest period with profiles, s.
+const SLOT_MIN: f32 = 2e-3;
+const SLOTS_ENOUGH: f32 = 80.0;
+const PROFILE_ACCELERATION: f32 = 0.9945;
+const PROFILE_PERIOD_MAX: f32 = 2.5e-3;
 
 /// Durations that a search tries, shortest first, and the ratio of one to the next.
 const TRIALS: u8 = 12;
@@ -112,6 +122,9 @@ pub(crate) trait Course {
     /// Use of the limits at a place and a pace with its first two derivatives, 1, 1/s, 1/s^2. `around`: time before and behind that the place
     /// stands for, s.
     fn use_at(&self, cursor: &Self::Cursor, rates: [f32; 3], around: f32) -> Use;
+
+    /// What the room leaves to the derivatives of the pace in a slot of a profile, at the place of its middle.
+    fn span_at(&self, cursor: &Self::Cursor, slot: &SlotAt, room: &Use) -> Span;
 }
 
 /// A change of the pace: from these rates to rest at the goal.
@@ -171,6 +184,9 @@ struct Search<C> {
     left: u16,
     trial: u8,
     change: Change,
+    /// A profile is being made, in the list that is not followed.
+    making: Option<Making>,
+    is_profile: bool,
     /// The trial's place, and points looked at.
     at: C,
     points: u16,
@@ -184,6 +200,11 @@ pub(crate) struct Pace<C> {
     change: Option<Change>,
     /// Time since the change began, s.
     time: f32,
+    /// The profile that is followed, and one that is being made; which one is followed, and whether; the place on it.
+    profiles: [Profile; 2],
+    second: bool,
+    on_profile: bool,
+    place: ProfilePlace,
     goal: f32,
     wanted: f32,
     is_fault: bool,
@@ -199,6 +220,10 @@ impl<C: Copy> Pace<C> {
     pub(crate) const REST: Self = Self {
         change: None,
         time: 0.0,
+        profiles: [Profile::NONE; 2],
+        second: false,
+        on_profile: false,
+        place: ProfilePlace::START,
         goal: 0.0,
         wanted: 0.0,
         is_fault: false,
@@ -212,6 +237,7 @@ impl<C: Copy> Pace<C> {
     pub(crate) fn begin(&mut self, pace: f32, period: f32) {
         // Field by field: a search that is none needs no copy of the rest of it.
         self.change = None;
+        self.on_profile = false;
         self.search = None;
         self.time = 0.0;
         self.is_fault = false;
@@ -231,12 +257,12 @@ impl<C: Copy> Pace<C> {
 
     /// Whether the motion stands, and will until another pace is wanted.
     pub(crate) fn is_at_rest(&self) -> bool {
-        self.change.is_none() && self.goal == 0.0 && self.wanted == 0.0
+        !self.is_changing() && self.goal == 0.0 && self.wanted == 0.0
     }
 
     /// Whether the pace stays as it is.
     pub(crate) fn is_constant(&self) -> bool {
-        self.change.is_none() && !self.is_seeking()
+        !self.is_changing() && !self.is_seeking()
     }
 
     /// Whether there is work for [`Self::work`].
@@ -251,6 +277,7 @@ impl<C: Copy> Pace<C> {
     pub(crate) fn stop_within(&mut self, seconds: f32) {
         self.change = Some(Change::new(self.rates(0.0), 0.0, seconds));
         (self.time, self.goal, self.wanted) = (0.0, 0.0, 0.0);
+        self.on_profile = false;
         self.search = None;
     }
 
@@ -266,7 +293,7 @@ impl<C: Copy> Pace<C> {
 
     /// Whether the pace changes.
     pub(crate) const fn is_changing(&self) -> bool {
-        self.change.is_some()
+        self.change.is_some() || self.on_profile
     }
 
     /// Moves the places of a search on; it ends where one of them cannot be.
@@ -295,12 +322,26 @@ impl<C: Copy> Pace<C> {
         (self.wanted - self.goal).abs() > SAME
     }
 
+    /// r, r', r'' less than a period ahead.
     pub(crate) fn rates(&self, ahead: f32) -> [f32; 3] {
+        if self.on_profile {
+            return self.place.rates(self.followed(), ahead);
+        }
+        self.rates_of_change(ahead)
+    }
+
+    fn rates_of_change(&self, ahead: f32) -> [f32; 3] {
         let time = self.time + ahead;
         match &self.change {
             Some(change) if time < change.duration => change.rates(time),
             _ => [self.goal, 0.0, 0.0],
         }
+    }
+
+    /// The profile that is followed.
+    const fn followed(&self) -> &Profile {
+        let [one, other] = &self.profiles;
+        if self.second { other } else { one }
     }
 
     /// One period: the pace in its middle.
@@ -309,21 +350,43 @@ impl<C: Copy> Pace<C> {
             if search.left > 0 {
                 search.left -= 1;
             } else if search.found {
-                self.change = Some(search.change);
-                (self.time, self.goal) = (0.0, self.wanted);
-                (self.failures, self.timeouts) = (0, 0);
-                self.search = None;
-            } else if self.change.is_some() || self.goal != 0.0 {
+                self.take();
+            } else if self.is_changing() || self.goal != 0.0 {
                 self.timeouts = self.timeouts.saturating_add(1);
                 self.search = None;
             }
         }
         let [pace, _, _] = self.rates(0.5 * self.period);
-        self.time += self.period;
-        if self.change.is_some_and(|change| self.time >= change.duration) {
-            self.change = None;
+        if self.on_profile {
+            let [one, other] = &self.profiles;
+            let followed = if self.second { other } else { one };
+            self.place.advance(followed, self.period);
+            self.on_profile = !self.place.is_over(followed);
+        } else {
+            self.time += self.period;
+            if self.change.is_some_and(|change| self.time >= change.duration) {
+                self.change = None;
+            }
         }
         pace.at_least(0.0)
+    }
+
+    /// Follows the change that was found.
+    fn take(&mut self) {
+        let Some(search) = &self.search else {
+            return;
+        };
+        self.on_profile = search.is_profile;
+        if search.is_profile {
+            self.change = None;
+            self.second = !self.second;
+            self.place = self.followed().begin();
+        } else {
+            self.change = Some(search.change);
+        }
+        (self.time, self.goal) = (0.0, self.wanted);
+        (self.failures, self.timeouts) = (0, 0);
+        self.search = None;
     }
 
     /// One place of the search. `at`: where the motion is.
@@ -335,6 +398,42 @@ impl<C: Copy> Pace<C> {
             self.search = Some(self.begin_search(course, at));
             return;
         };
+        if let Some(making) = &mut search.making {
+            let [one, other] = &mut self.profiles;
+            let profile = if self.second { one } else { other };
+            let step = profile.slot_s();
+            let slot_at = making.slot(profile, 0.5 * self.period);
+            let room = room_of(self.is_fault, slot_at.r);
+            let room = Use {
+                acceleration: PROFILE_ACCELERATION * room.acceleration,
+                ..*room
+            };
+            let span = course.span_at(&search.at, &slot_at, &room);
+            let slot = making.append(profile, &span, PACE_MAX);
+            match slot {
+                Slot::Appended if course.is_over(&search.at) => {
+                    making.end(profile);
+                    search.found = true;
+                }
+                Slot::Appended => {
+                    let [pace, _] = making.rates();
+                    course.advance(&mut search.at, step * pace.at_least(0.0));
+                }
+                Slot::Complete => search.found = true,
+                Slot::Again | Slot::Failed => {
+                    search.at = search.from;
+                    let [pace, first] = making.rates();
+                    course.advance(
+                        &mut search.at,
+                        0.5 * step * (pace + 0.25 * step * first).at_least(0.0),
+                    );
+                    if slot == Slot::Failed {
+                        (search.at, search.making, search.is_profile) = (search.from, None, false);
+                    }
+                }
+            }
+            return;
+        }
         let duration = search.change.duration;
         let step = spacing(duration);
         let time = (step * f32::from(search.points)).at_most(duration);
@@ -377,40 +476,88 @@ impl<C: Copy> Pace<C> {
             .at_least(10.0 * self.period)
     }
 
-    fn begin_search<P: Course<Cursor = C>>(&self, course: &P, at: &C) -> Search<C> {
+    fn begin_search<P: Course<Cursor = C>>(&mut self, course: &P, at: &C) -> Search<C> {
         let shortest = self.shortest(course, at, self.rates(0.0));
-        let places = 2.0 * shortest / spacing(shortest);
+        let makes_profile = self.makes_profile();
+        let slot_s = self.slot(shortest);
+        let places = if makes_profile {
+            PROFILE_PLACES * shortest / slot_s
+        } else {
+            2.0 * shortest / spacing(shortest)
+        };
         let latency = u16::try_from(truncated(places / PLACES_A_PERIOD)).unwrap_or(LATENCY_MAX);
-        let latency = LATENCY
+        let least = if makes_profile { LATENCY_OF_PROFILE } else { LATENCY };
+        let latency = least
             .saturating_add(latency)
             .saturating_mul(1 + u16::from(self.timeouts))
             .min(LATENCY_MAX);
         let mut from = *at;
         let mut ahead = 0.0;
+        let mut place = self.place;
         let steps = latency.min(STEPS_AHEAD);
         let step = self.period * f32::from(latency) / f32::from(steps.max(1));
         for _ in 0..steps {
-            let [pace, _, _] = self.rates(ahead + 0.5 * step);
+            let pace = if self.on_profile {
+                let followed = self.followed();
+                place.advance(followed, 0.5 * step);
+                let [pace, _, _] = place.rates(followed, 0.0);
+                place.advance(followed, 0.5 * step);
+                pace
+            } else {
+                let [pace, _, _] = self.rates_of_change(ahead + 0.5 * step);
+                pace
+            };
             course.advance(&mut from, step * pace.at_least(0.0));
             ahead += step;
         }
-        let rates = self.rates(ahead);
-        let is_standing = self.change.is_none() && self.goal == 0.0;
+        let rates = if self.on_profile {
+            place.rates(self.followed(), 0.0)
+        } else {
+            self.rates_of_change(ahead)
+        };
+        let is_standing = !self.is_changing() && self.goal == 0.0;
         let longer = if is_standing {
             1.0 + f32::from(self.failures)
         } else {
             1.0
         };
         let shortest = longer * self.shortest(course, &from, rates);
-        Search {
+        let mut search = Search {
             from,
             rates,
             left: latency,
             trial: 0,
             change: Change::new(rates, self.wanted, shortest),
+            making: None,
+            is_profile: false,
             at: from,
             points: 0,
             found: false,
+        };
+        if makes_profile {
+            let [pace, first, _] = rates;
+            let [one, other] = &mut self.profiles;
+            let profile = if self.second { one } else { other };
+            profile.clear([pace, first], self.wanted, slot_s);
+            search.making = Some(Making::new([pace, first]));
+            search.is_profile = true;
+            course.advance(
+                &mut search.at,
+                0.5 * slot_s * (pace + 0.25 * slot_s * first).at_least(0.0),
+            );
         }
+        search
+    }
+
+    /// Whether a profile is made for the change that is wanted.
+    fn makes_profile(&self) -> bool {
+        self.period <= PROFILE_PERIOD_MAX && self.wanted == 0.0
+    }
+
+    /// Duration of a slot, s: whole periods.
+    fn slot(&self, shortest: f32) -> f32 {
+        let wanted = SLOT_MIN.at_least(shortest * (1.0 / SLOTS_ENOUGH));
+        let periods = truncated(wanted / self.period + 0.99).max(1);
+        to_f32(i64::from(periods)) * self.period
     }
 }

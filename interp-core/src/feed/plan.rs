@@ -1,8 +1,9 @@
 //! A plan: the path's stations, a walk along them and the pace of the walk; and a cursor that moves along it.
 
-use super::limits::{FeedChange, MotionLimits};
+use super::limits::{AxisMotion, FeedChange, MotionLimits};
 use super::pace::{Course, Use};
-use super::stations::Stations;
+use super::profile::{SlotAt, Span};
+use super::stations::{Derivatives, Stations};
 use super::{MM_PER_Q10, Q10_BITS, Q10_PER_MM, to_q10};
 use crate::math::arith::{sqrt, truncated};
 use crate::math::number::{Bounded, to_f32};
@@ -421,6 +422,10 @@ impl Course for Plan {
     fn use_at(&self, cursor: &Cursor, rates: [f32; 3], around: f32) -> Use {
         self.use_of(&self.pace, &self.limits, cursor, rates, around)
     }
+
+    fn span_at(&self, cursor: &Cursor, slot: &SlotAt, room: &Use) -> Span {
+        self.span_of(&self.limits, cursor, slot, room)
+    }
 }
 
 impl Plan {
@@ -465,6 +470,72 @@ impl Plan {
         around: f32,
     ) -> Use {
         let [r, r1, r2] = rates;
+        let here = self.motion_at(pace, limits, cursor, r, around);
+        let v = here.v;
+        let speed = v * r;
+        let mut most = Use {
+            feed: speed / limits.feed,
+            ..Use::NONE
+        };
+        here.each_axis(limits, |axis| {
+            let jerk = |j: f32| {
+                let jerk = (j * r * r + 3.0 * axis.acceleration * r1) * r + axis.slope * v * r2;
+                jerk.abs()
+            };
+            let [j, j_beside] = axis.jerk;
+            let of_pace = jerk(j).at_least(jerk(j_beside));
+            most.add(&Use {
+                feed: 0.0,
+                velocity: (axis.slope * speed).abs() * axis.inverse.velocity,
+                acceleration: (axis.acceleration * r * r + axis.slope * v * r1).abs() * axis.inverse.acceleration,
+                jerk: of_pace * axis.inverse.jerk + axis.of_jump,
+            });
+        });
+        most
+    }
+
+    /// What the limits leave to the derivatives of the pace; see [`Course::span_at`].
+    fn span_of(&self, limits: &MotionLimits, cursor: &Cursor, slot: &SlotAt, room: &Use) -> Span {
+        let SlotAt {
+            r,
+            first,
+            slot_s,
+            around,
+        } = *slot;
+        let here = self.motion_at(&self.pace, limits, cursor, r, around);
+        // The speed changes over the time around the place.
+        let fastest = here.v + here.a.abs() * r * around;
+        let mut span = Span::WIDE;
+        here.each_axis(limits, |axis| {
+            let along = axis.slope * fastest;
+            span.add_acceleration(
+                axis.acceleration * r * r * axis.inverse.acceleration,
+                axis.slope * here.v * axis.inverse.acceleration,
+                room.acceleration,
+            );
+            let inverse = axis.inverse.jerk;
+            let by_first = 3.0 * axis.acceleration * r;
+            for j in axis.jerk {
+                span.add_jerk(
+                    (j * r * r * r + by_first * first) * inverse,
+                    [along * inverse, (along + by_first * slot_s) * inverse],
+                    room.jerk - axis.of_jump,
+                );
+            }
+        });
+        span
+    }
+
+    /// The motion at a place, and at the pace r the jumps that a time around it sees.
+    #[inline(always)]
+    fn motion_at(
+        &self,
+        pace: &[f32; COEFFICIENTS],
+        limits: &MotionLimits,
+        cursor: &Cursor,
+        r: f32,
+        around: f32,
+    ) -> MotionAt {
         let interval = self.interval_of(pace, cursor.interval);
         let x = cursor.x.at_most(1.0);
         let inverse = self.inverse_step;
@@ -505,30 +576,17 @@ impl Plan {
         } else {
             None
         };
-        let extra = jump.map_or([[0.0; 2]; 3], |station| {
+        let jump = jump.map_or([[0.0; 2]; 3], |station| {
             limits.jump_jerk(&self.stations.jump(station))
         });
-        let speed = v * r;
-        let mut most = Use {
-            feed: speed / limits.feed,
-            ..Use::NONE
-        };
-        for ((inverse, [q1, q2, q3]), [first, second]) in limits.inverse.iter().zip(&q).zip(&extra) {
-            let acceleration = q2 * v * v + q1 * a;
-            let bend = (q3 * v * v + 3.0 * q2 * a) * v;
-            let jerk = |j: f32| {
-                let jerk = ((bend + q1 * j) * r * r + 3.0 * acceleration * r1) * r + q1 * v * r2;
-                jerk.abs()
-            };
-            let of_pace = jerk(j).at_least(jerk(j_beside));
-            most.add(&Use {
-                feed: 0.0,
-                velocity: (q1 * speed).abs() * inverse.velocity,
-                acceleration: (acceleration * r * r + q1 * v * r1).abs() * inverse.acceleration,
-                jerk: of_pace * inverse.jerk + (first + second * speed) * speed,
-            });
+        MotionAt {
+            v,
+            a,
+            j: [j, j_beside],
+            speed: v * r,
+            q,
+            jump,
         }
-        most
     }
 
     /// Moves on at the planned pace.
@@ -539,6 +597,47 @@ impl Plan {
     /// Use of these limits at the planned pace.
     pub(crate) fn use_draft(&self, limits: &MotionLimits, cursor: &Cursor) -> Use {
         self.use_of(&self.draft, limits, cursor, [1.0, 0.0, 0.0], 0.0)
+    }
+}
+
+/// The motion of a plan at a place.
+struct MotionAt {
+    /// mm/s, mm/s^2; jerk on either side of a node nearby, mm/s^3.
+    v: f32,
+    a: f32,
+    j: [f32; 2],
+    /// Speed at the pace, mm/s.
+    speed: f32,
+    q: Derivatives,
+    jump: [[f32; 2]; 3],
+}
+
+/// The motion of an axis at a place.
+struct AxisAt<'a> {
+    slope: f32,
+    /// mm/s^2, and mm/s^3 on either side of a node nearby.
+    acceleration: f32,
+    jerk: [f32; 2],
+    /// Jerk of a jump nearby, as a fraction of the limit.
+    of_jump: f32,
+    inverse: &'a AxisMotion,
+}
+
+impl MotionAt {
+    /// Calls `each` with each axis.
+    #[inline(always)]
+    fn each_axis(&self, limits: &MotionLimits, mut each: impl FnMut(&AxisAt)) {
+        let Self { v, a, speed, .. } = *self;
+        for ((inverse, [q1, q2, q3]), [first, second]) in limits.inverse.iter().zip(&self.q).zip(&self.jump) {
+            let bend = (q3 * v * v + 3.0 * q2 * a) * v;
+            each(&AxisAt {
+                slope: *q1,
+                acceleration: q2 * v * v + q1 * a,
+                jerk: self.j.map(|j| bend + q1 * j),
+                of_jump: (first + second * speed) * speed,
+                inverse,
+            });
+        }
     }
 }
 

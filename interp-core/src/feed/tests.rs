@@ -359,6 +359,7 @@ fn commanded(
     let mut pace = Pace::REST;
     pace.begin(1.0, T as f32);
     let mut arcs = Vec::new();
+    let mut rs = Vec::new();
     let mut holds = Vec::new();
     let mut next = gap * random.next() * 2.0;
     let mut held: Option<f64> = None;
@@ -385,6 +386,7 @@ fn commanded(
             }
         }
         let r = pace.tick();
+        rs.push(r);
         follower.tick(plan, r);
         arcs.push(follower.arc_q10() as f64 / 1024e6);
         for _ in 0..PLACES {
@@ -393,6 +395,20 @@ fn commanded(
             }
         }
         assert!(arcs.len() < 500_000, "stalls");
+    }
+    if std::env::var("DBG").is_ok() {
+        let q: Vec<[f64; 3]> = arcs.iter().map(|s| path.at(*s)).collect();
+        for k in 3..q.len() {
+            for axis in 0..3 {
+                let j = (q[k][axis] - 3.0 * q[k - 1][axis] + 3.0 * q[k - 2][axis] - q[k - 3][axis]) / 1e-9
+                    / f64::from(limits.axes[axis].jerk);
+                let a = (q[k][axis] - 2.0 * q[k - 1][axis] + q[k - 2][axis]) / 1e-6
+                    / f64::from(limits.axes[axis].acceleration);
+                if j.abs() > 1.02 || a.abs() > 1.0 {
+                    std::println!("{k} {axis}: {a:.3} {j:.3} r {:.5?}", &rs[k - 4..k+1]);
+                }
+            }
+        }
     }
     (holds, uses(path, &arcs, limits), long_jerk(path, &arcs, limits))
 }

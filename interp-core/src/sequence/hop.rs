@@ -3,6 +3,7 @@
 
 use crate::feed::curve::{Curve, CurveCursor};
 use crate::feed::pace::{Course, Pace, Use};
+use crate::feed::profile::{SlotAt, Span};
 use crate::job::AxisLimits;
 use crate::math::arith::{sqrt, truncated};
 use crate::math::number::Bounded;
@@ -53,6 +54,14 @@ impl Course for Curves {
         let mut most = Use::NONE;
         for (place, curve) in cursor.curves.iter().zip(&self.curves) {
             most.add(&curve.use_at(place, rates, around));
+        }
+        most
+    }
+
+    fn span_at(&self, cursor: &HopCursor, slot: &SlotAt, room: &Use) -> Span {
+        let mut most = Span::WIDE;
+        for (place, curve) in cursor.curves.iter().zip(&self.curves) {
+            most.add(&curve.span_at(place, slot, room));
         }
         most
     }
