@@ -18,8 +18,9 @@ const STEPS_AHEAD: u16 = 24;
 /// The same of a profile: least periods, and places for the shortest change, as a multiple of its slots.
 const LATENCY_OF_PROFILE: u16 = 3;
 const PROFILE_PLACES: f32 = 2.5;
-/// Least duration of a slot of a profile, s, and slots of the shortest change that are enough; longest period with profiles, s.
+/// Least duration of a slot of a profile, s, first and where that fails, and slots of the shortest change that are enough; longest period with profiles, s.
 const SLOT_MIN: f32 = 2e-3;
+const SLOT_FINE: f32 = 1e-3;
 const SLOTS_ENOUGH: f32 = 80.0;
 const PROFILE_ACCELERATION: f32 = 0.9945;
 const PROFILE_PERIOD_MAX: f32 = 2.5e-3;
@@ -401,7 +402,6 @@ impl<C: Copy> Pace<C> {
         if let Some(making) = &mut search.making {
             let [one, other] = &mut self.profiles;
             let profile = if self.second { one } else { other };
-            let step = profile.slot_s();
             let slot_at = making.slot(profile, 0.5 * self.period);
             let room = room_of(self.is_fault, slot_at.r);
             let room = Use {
@@ -410,6 +410,7 @@ impl<C: Copy> Pace<C> {
             };
             let span = course.span_at(&search.at, &slot_at, &room);
             let slot = making.append(profile, &span, PACE_MAX);
+            let step = profile.slot_s();
             match slot {
                 Slot::Appended if course.is_over(&search.at) => {
                     making.end(profile);
@@ -536,10 +537,11 @@ impl<C: Copy> Pace<C> {
         };
         if makes_profile {
             let [pace, first, _] = rates;
+            let finest = self.slot_of(SLOT_FINE);
             let [one, other] = &mut self.profiles;
             let profile = if self.second { one } else { other };
             profile.clear([pace, first], self.wanted, slot_s);
-            search.making = Some(Making::new([pace, first]));
+            search.making = Some(Making::new([pace, first], finest));
             search.is_profile = true;
             course.advance(
                 &mut search.at,
@@ -556,7 +558,11 @@ impl<C: Copy> Pace<C> {
 
     /// Duration of a slot, s: whole periods.
     fn slot(&self, shortest: f32) -> f32 {
-        let wanted = SLOT_MIN.at_least(shortest * (1.0 / SLOTS_ENOUGH));
+        self.slot_of(SLOT_MIN.at_least(shortest * (1.0 / SLOTS_ENOUGH)))
+    }
+
+    /// Whole periods, s.
+    fn slot_of(&self, wanted: f32) -> f32 {
         let periods = truncated(wanted / self.period + 0.99).max(1);
         to_f32(i64::from(periods)) * self.period
     }

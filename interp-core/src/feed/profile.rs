@@ -20,8 +20,16 @@ const SECOND_MAX: f32 = 4.0;
 /// Parts of the best r'' that are tried where it is too much before the goal.
 const PARTS: [f32; 4] = [1.0, 0.5, 0.25, 0.125];
 
-/// Attempts: shares of the r'' that the axes allow, away from rest, and to rest at the goal.
-const ATTEMPTS: [[f32; 2]; 4] = [[1.0, 0.9], [0.8, 0.6], [0.5, 0.6], [0.25, 0.4]];
+/// Attempts that are made; share of r' that the next one takes up to where nothing was allowed; shares of r'' with which the first one
+/// comes to rest at the goal, and the next one where that was too much.
+const ATTEMPTS: u8 = 6;
+const SLOWER: f32 = 0.55;
+const TO_REST: f32 = 0.9;
+const LESS_TO_REST: f32 = 0.75;
+/// Share of the range of r'' that the next slot is assumed to have at least.
+const HALF_KEPT: f32 = 0.85;
+/// The attempt from which on slots are as short as can be.
+const FINE: u8 = 2;
 
 /// What the axes allow at a place: r' by acceleration, 1/s, and r'' by jerk, 1/s^2.
 #[derive(Clone, Copy, Debug)]
@@ -271,14 +279,27 @@ pub(crate) struct Making {
     rates: [f32; 2],
     slots: u16,
     attempt: u8,
+    /// Shortest slot, s.
+    finest: f32,
+    /// Greatest r' towards the goal up to a slot, 1/s.
+    most: f32,
+    until: u16,
+    /// Share of r'' that is counted on to come to rest, and half of the range of r'' that the axes leave at a constant pace: at a single place it may be little.
+    to_rest: f32,
+    half: f32,
 }
 
 impl Making {
-    pub(crate) const fn new(start: [f32; 2]) -> Self {
+    pub(crate) const fn new(start: [f32; 2], finest: f32) -> Self {
         Self {
+            finest,
             rates: start,
             slots: 0,
             attempt: 0,
+            most: f32::MAX,
+            until: 0,
+            to_rest: TO_REST,
+            half: 0.0,
         }
     }
 
@@ -315,6 +336,7 @@ impl Making {
             let [low, _] = span.second;
             let end_s = 2.0 * left / first;
             if first > -low * end_s * (1.0 + ROUNDING) {
+                self.to_rest *= LESS_TO_REST;
                 return self.try_again(profile);
             }
             profile.end_s = end_s;
@@ -334,14 +356,15 @@ impl Making {
     }
 
     /// r'' of a slot, towards the goal; none where nothing is allowed.
-    fn choose(&self, span: &Span, [left, first]: [f32; 2], last: f32, slot_s: f32) -> Option<f32> {
-        let [away, to_rest] = ATTEMPTS.get(usize::from(self.attempt)).copied()?;
+    fn choose(&mut self, span: &Span, [left, first]: [f32; 2], last: f32, slot_s: f32) -> Option<f32> {
         let most = SECOND_MAX / (slot_s * slot_s);
         let [low, high] = [
             span.second[0].at_least(-most),
             span.second[1].at_most(most),
         ];
         if low > high {
+            self.most = SLOWER * first.at_most(self.most).at_least(0.0);
+            self.until = self.until.max(self.slots + 1);
             return None;
         }
         // To rest on the parabola from here.
@@ -350,15 +373,21 @@ impl Making {
         } else {
             0.0
         };
-        let fastest = span.first[1];
-        let best = if high > 0.0 { away * high } else { high };
-        let best = best
+        let [_, mut fastest] = span.first;
+        if self.slots <= self.until {
+            fastest = fastest.at_most(self.most);
+        }
+        let best = high
             .at_most((fastest - first) / slot_s)
             .at_least(low);
+        // What slows the pace down to the goal: what the axes leave here, but the motion of the plan itself matters less at a slower pace.
+        let half = (0.5 * (high - low)).at_least(HALF_KEPT * self.half);
+        self.half = half;
+        let braking = self.to_rest * half.at_most((-low).at_least(0.5 * half));
         let is_early = |second: f32| {
             let [moved, first] = after([0.0, first], second, slot_s);
             let left = left - moved;
-            first <= 0.0 || (left > 0.0 && 0.5 * first * first <= -to_rest * low * left)
+            first <= 0.0 || (left > 0.0 && 0.5 * first * first <= braking * left)
         };
         let goes_on = (last - best).abs() <= SAME * best.abs()
             && (low..=high).contains(&last)
@@ -370,9 +399,15 @@ impl Making {
         };
         let second = wanted.unwrap_or(rest);
         // On the parabola r'' stays what it is, but for rounding.
-        let second = if (second - last).abs() <= 1e-3 * last.abs() { last } else { second };
-        let rounding = 1e-3 * (high - low);
-        (second >= low - rounding && second <= high + rounding).then_some(second)
+        let is_same = (second - last).abs() <= 1e-3 * last.abs() && (low..=high).contains(&last);
+        let second = if is_same { last } else { second };
+        // Less than that is made up for later: at a slower pace the axes leave more.
+        let second = second.at_least(low);
+        if second > high || -rest > 2.0 * half {
+            self.to_rest *= LESS_TO_REST;
+            return None;
+        }
+        Some(second)
     }
 
     /// The motion ends here: what is left of the profile does not matter.
@@ -385,10 +420,16 @@ impl Making {
 
     fn try_again(&mut self, profile: &mut Profile) -> Slot {
         self.attempt += 1;
-        self.slots = 0;
+        (self.slots, self.half) = (0, 0.0);
         self.rates = profile.start;
-        profile.clear(profile.start, profile.goal, profile.slot_s);
-        if usize::from(self.attempt) < ATTEMPTS.len() {
+        let mut slot_s = profile.slot_s;
+        if self.attempt == FINE && slot_s > self.finest {
+            // Places that are closer together tell apart what happens at them, as at a patch boundary.
+            slot_s = self.finest;
+            (self.most, self.to_rest) = (f32::MAX, TO_REST);
+        }
+        profile.clear(profile.start, profile.goal, slot_s);
+        if self.attempt < ATTEMPTS {
             Slot::Again
         } else {
             Slot::Failed
