@@ -18,6 +18,9 @@ pub(crate) struct CurveLimits {
 const ACCELERATION: f32 = 0.98;
 const JERK: f32 = 0.96;
 
+/// A place just before the end of a ramp, as a share of it.
+const BEFORE_END: f32 = 0.999;
+
 /// A piece: a ramp from one speed to another, then a cruise at that speed.
 #[derive(Clone, Copy, Debug)]
 struct Piece {
@@ -375,19 +378,45 @@ impl Course for Curve {
         let limits = &self.limits;
         let mut span = Span::WIDE;
         span.add_acceleration(a * r * r, v, room.acceleration * limits.acceleration);
-        // The speed changes over the time around the place.
+        // The speed changes over the time around the place, and the jerk steps.
         let fastest = v + a.abs() * r * around;
         let by_first = 3.0 * a * r;
-        span.add_jerk(
-            j * r * r * r + by_first * first,
-            [fastest, fastest + by_first * slot_s],
-            room.jerk * limits.jerk,
-        );
+        let [before, behind] = self.jerk_beside(cursor, r * around, v);
+        for j in [j, before, behind] {
+            span.add_jerk(
+                j * r * r * r + by_first * first,
+                [fastest, fastest + by_first * slot_s],
+                room.jerk * limits.jerk,
+            );
+        }
         span
     }
 }
 
 impl Curve {
+    /// Jerk this time before and behind a place with this speed.
+    fn jerk_beside(&self, cursor: &CurveCursor, around: f32, speed: f32) -> [f32; 2] {
+        let piece = self.piece(cursor.piece);
+        let jerk = |piece: &Piece, time: f32| {
+            let [_, _, jerk] = piece.rates(time);
+            jerk
+        };
+        let before = match cursor.piece.checked_sub(1).map(|before| self.piece(before)) {
+            Some(before) if cursor.time < around && before.cruise_q10 == 0 => {
+                jerk(before, before.ramp_s * BEFORE_END)
+            }
+            _ => jerk(piece, (cursor.time - around).at_least(0.0)),
+        };
+        let ends = cursor.time + around >= piece.ramp_s
+            && to_f32(cursor.left_q10) * MM_PER_Q10 <= speed * around;
+        let behind = if ends && !self.is_last(cursor.piece) {
+            jerk(self.piece(cursor.piece + 1), 0.0)
+        } else {
+            jerk(piece, cursor.time + around)
+        };
+        [before, behind]
+    }
+
     const fn is_last(&self, piece: u8) -> bool {
         piece >= self.last
     }
