@@ -1,7 +1,7 @@
 //! Rest to rest along one coordinate in closed form, for links: constant jerk, constant acceleration, constant jerk, cruise, and back.
 
 use super::pace::{Course, Use};
-use super::profile::{SlotAt, Span};
+use super::profile::{SlotAt, Span, fastest_around};
 use super::{MM_PER_Q10, to_q10};
 use crate::math::arith::sqrt;
 use crate::math::number::{Bounded, cube_root, to_f32};
@@ -379,7 +379,7 @@ impl Course for Curve {
         let mut span = Span::WIDE;
         span.add_acceleration(a * r * r, v, room.acceleration * limits.acceleration);
         // The speed changes over the time around the place, and the jerk steps.
-        let fastest = v + a.abs() * r * around;
+        let fastest = fastest_around([v, a, j], r * around);
         let by_first = 3.0 * a * r;
         let [before, behind] = self.jerk_beside(cursor, r * around, v);
         for j in [j, before, behind] {

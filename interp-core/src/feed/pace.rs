@@ -553,7 +553,7 @@ impl<C: Copy> Pace<C> {
 
     /// Whether a profile is made for the change that is wanted.
     fn makes_profile(&self) -> bool {
-        self.period <= PROFILE_PERIOD_MAX && self.wanted == 0.0
+        self.period <= PROFILE_PERIOD_MAX && self.wanted < self.now()
     }
 
     /// Duration of a slot, s: whole periods.

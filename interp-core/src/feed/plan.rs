@@ -2,7 +2,7 @@
 
 use super::limits::{AxisMotion, FeedChange, MotionLimits};
 use super::pace::{Course, Use};
-use super::profile::{SlotAt, Span};
+use super::profile::{SlotAt, Span, fastest_around};
 use super::stations::{Derivatives, Stations};
 use super::{MM_PER_Q10, Q10_BITS, Q10_PER_MM, to_q10};
 use crate::math::arith::{sqrt, truncated};
@@ -504,7 +504,8 @@ impl Plan {
         } = *slot;
         let here = self.motion_at(&self.pace, limits, cursor, r, around);
         // The speed changes over the time around the place.
-        let fastest = here.v + here.a.abs() * r * around;
+        let [j, j_beside] = here.j;
+        let fastest = fastest_around([here.v, here.a, j.abs().at_least(j_beside.abs())], r * around);
         let mut span = Span::WIDE;
         here.each_axis(limits, |axis| {
             let along = axis.slope * fastest;

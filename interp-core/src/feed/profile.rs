@@ -17,6 +17,8 @@ const ROUNDING: f32 = 1e-3;
 const SAME: f32 = 0.08;
 /// Greatest r'', as a multiple of one over the square of a slot.
 const SECOND_MAX: f32 = 4.0;
+/// Greatest r', as a multiple of one over a slot: where the tool hardly moves, speed and acceleration of the plan change much within a slot.
+const FIRST_MAX: f32 = 0.07;
 /// Parts of the best r'' that are tried where it is too much before the goal.
 const PARTS: [f32; 4] = [1.0, 0.5, 0.25, 0.125];
 
@@ -94,6 +96,12 @@ fn narrow([low, high]: &mut [f32; 2], at: f32, slope: f32, most: f32) {
     let half = most * inverse;
     *low = low.at_least(middle - half);
     *high = high.at_most(middle + half);
+}
+
+/// The greatest speed within a time of a place with this speed, acceleration and jerk.
+#[inline(always)]
+pub(crate) fn fastest_around([v, a, j]: [f32; 3], around: f32) -> f32 {
+    v + around * (a.abs() + 0.5 * j.abs() * around)
 }
 
 /// A slot of a profile that is to be chosen.
@@ -373,7 +381,8 @@ impl Making {
         } else {
             0.0
         };
-        let [_, mut fastest] = span.first;
+        let [_, fastest] = span.first;
+        let mut fastest = fastest.at_most(FIRST_MAX / slot_s);
         if self.slots <= self.until {
             fastest = fastest.at_most(self.most);
         }
