@@ -83,17 +83,32 @@ fn holds_stand_soon() {
         ("revolved", &[6000.0]),
     ] {
         for feed in feeds {
-            for (pattern, overrun) in [(Pattern::Zigzag, 0.0), (Pattern::Zigzag, 2.0), (Pattern::Zig, 0.0)] {
-                let Holds { mut on_pass, mut in_link } = holds(name, *feed, pattern, overrun, count);
+            for (pattern, overrun) in [
+                (Pattern::Zigzag, 0.0),
+                (Pattern::Zigzag, 2.0),
+                (Pattern::Zig, 0.0),
+            ] {
+                let Holds {
+                    mut on_pass,
+                    mut in_link,
+                } = holds(name, *feed, pattern, overrun, count);
                 on_pass.sort_unstable();
                 in_link.sort_unstable();
                 let at = |list: &Vec<u32>, part: f64| {
-                    list.get((list.len().saturating_sub(1) as f64 * part) as usize).copied().unwrap_or(0)
+                    list.get((list.len().saturating_sub(1) as f64 * part) as usize)
+                        .copied()
+                        .unwrap_or(0)
                 };
                 println!(
                     "{name:<14} {feed:>5} {pattern:?} {overrun}: pass {} {:>4} {:>4} {:>4} ms, link {} {:>4} {:>4} {:>4} ms",
-                    on_pass.len(), at(&on_pass, 0.5), at(&on_pass, 0.9), at(&on_pass, 1.0),
-                    in_link.len(), at(&in_link, 0.5), at(&in_link, 0.9), at(&in_link, 1.0),
+                    on_pass.len(),
+                    at(&on_pass, 0.5),
+                    at(&on_pass, 0.9),
+                    at(&on_pass, 1.0),
+                    in_link.len(),
+                    at(&in_link, 0.5),
+                    at(&in_link, 0.9),
+                    at(&in_link, 1.0),
                 );
                 all.extend(on_pass);
             }

@@ -401,14 +401,16 @@ impl Curve {
             let [_, _, jerk] = piece.rates(time);
             jerk
         };
+        let moved = to_f32(piece.cruise_q10 - cursor.left_q10) * MM_PER_Q10;
         let before = match cursor.piece.checked_sub(1).map(|before| self.piece(before)) {
+            _ if moved > speed * around => 0.0,
             Some(before) if cursor.time < around && before.cruise_q10 == 0 => {
                 jerk(before, before.ramp_s * BEFORE_END)
             }
             _ => jerk(piece, (cursor.time - around).at_least(0.0)),
         };
-        let ends = cursor.time + around >= piece.ramp_s
-            && to_f32(cursor.left_q10) * MM_PER_Q10 <= speed * around;
+        let ends =
+            cursor.time + around >= piece.ramp_s && to_f32(cursor.left_q10) * MM_PER_Q10 <= speed * around;
         let behind = if ends && !self.is_last(cursor.piece) {
             jerk(self.piece(cursor.piece + 1), 0.0)
         } else {

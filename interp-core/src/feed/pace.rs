@@ -4,7 +4,7 @@
 //! each of which was followed over its whole length beforehand: per axis `a r^2 + q' v r'` and `j r^3 + 3 a r r' + q' v r''`. So by induction every
 //! period is within the limits, whatever the order of the commands.
 
-use super::profile::{Making, Profile, ProfilePlace, Slot, SlotAt, Span};
+use super::profile::{Making, ProfilePlace, Profiles, Slot, SlotAt, Span};
 use crate::math::arith::{sqrt, truncated};
 use crate::math::number::{Bounded, to_f32};
 
@@ -37,6 +37,9 @@ const SPACING_WIDE: f32 = 2.0e-3;
 const PLACES_MIN: f32 = 16.0;
 const PLACES_ENOUGH: f32 = 100.0;
 const PLACES_MAX: f32 = 200.0;
+
+/// Greatest change of the pace from place to place: where the tool hardly moves, the plan's own motion changes as fast.
+const CHANGE_MAX: f32 = 0.05;
 
 /// Paces below 0 and above 1 that are rounding.
 const PACE_MIN: f32 = -2e-5;
@@ -201,11 +204,10 @@ pub(crate) struct Pace<C> {
     change: Option<Change>,
     /// Time since the change began, s.
     time: f32,
-    /// The profile that is followed, and one that is being made; which one is followed, and whether; the place on it.
-    profiles: [Profile; 2],
-    second: bool,
+    /// Whether a profile is followed, the place on it, and r, r', r'' there.
     on_profile: bool,
     place: ProfilePlace,
+    there: [f32; 3],
     goal: f32,
     wanted: f32,
     is_fault: bool,
@@ -221,10 +223,9 @@ impl<C: Copy> Pace<C> {
     pub(crate) const REST: Self = Self {
         change: None,
         time: 0.0,
-        profiles: [Profile::NONE; 2],
-        second: false,
         on_profile: false,
         place: ProfilePlace::START,
+        there: [0.0; 3],
         goal: 0.0,
         wanted: 0.0,
         is_fault: false,
@@ -276,7 +277,7 @@ impl<C: Copy> Pace<C> {
 
     /// Stops within this time, s.
     pub(crate) fn stop_within(&mut self, seconds: f32) {
-        self.change = Some(Change::new(self.rates(0.0), 0.0, seconds));
+        self.change = Some(Change::new(self.rates(), 0.0, seconds));
         (self.time, self.goal, self.wanted) = (0.0, 0.0, 0.0);
         self.on_profile = false;
         self.search = None;
@@ -315,7 +316,7 @@ impl<C: Copy> Pace<C> {
 
     /// The pace now.
     pub(crate) fn now(&self) -> f32 {
-        let [pace, _, _] = self.rates(0.0);
+        let [pace, _, _] = self.rates();
         pace.at_least(0.0)
     }
 
@@ -323,12 +324,13 @@ impl<C: Copy> Pace<C> {
         (self.wanted - self.goal).abs() > SAME
     }
 
-    /// r, r', r'' less than a period ahead.
-    pub(crate) fn rates(&self, ahead: f32) -> [f32; 3] {
+    /// r, r', r'' now.
+    fn rates(&self) -> [f32; 3] {
         if self.on_profile {
-            return self.place.rates(self.followed(), ahead);
+            self.there
+        } else {
+            self.rates_of_change(0.0)
         }
-        self.rates_of_change(ahead)
     }
 
     fn rates_of_change(&self, ahead: f32) -> [f32; 3] {
@@ -339,49 +341,45 @@ impl<C: Copy> Pace<C> {
         }
     }
 
-    /// The profile that is followed.
-    const fn followed(&self) -> &Profile {
-        let [one, other] = &self.profiles;
-        if self.second { other } else { one }
-    }
-
     /// One period: the pace in its middle.
-    pub(crate) fn tick(&mut self) -> f32 {
+    pub(crate) fn tick(&mut self, profiles: &mut Profiles) -> f32 {
         if let Some(search) = &mut self.search {
             if search.left > 0 {
                 search.left -= 1;
             } else if search.found {
-                self.take();
+                self.take(profiles);
             } else if self.is_changing() || self.goal != 0.0 {
                 self.timeouts = self.timeouts.saturating_add(1);
                 self.search = None;
             }
         }
-        let [pace, _, _] = self.rates(0.5 * self.period);
+        let half = 0.5 * self.period;
         if self.on_profile {
-            let [one, other] = &self.profiles;
-            let followed = if self.second { other } else { one };
+            let followed = profiles.followed();
+            let [pace, _, _] = self.place.rates(followed, half);
             self.place.advance(followed, self.period);
+            self.there = self.place.rates(followed, 0.0);
             self.on_profile = !self.place.is_over(followed);
-        } else {
-            self.time += self.period;
-            if self.change.is_some_and(|change| self.time >= change.duration) {
-                self.change = None;
-            }
+            return pace.at_least(0.0);
+        }
+        let [pace, _, _] = self.rates_of_change(half);
+        self.time += self.period;
+        if self.change.is_some_and(|change| self.time >= change.duration) {
+            self.change = None;
         }
         pace.at_least(0.0)
     }
 
     /// Follows the change that was found.
-    fn take(&mut self) {
+    fn take(&mut self, profiles: &mut Profiles) {
         let Some(search) = &self.search else {
             return;
         };
         self.on_profile = search.is_profile;
         if search.is_profile {
             self.change = None;
-            self.second = !self.second;
-            self.place = self.followed().begin();
+            profiles.swap();
+            self.place = profiles.followed().begin();
         } else {
             self.change = Some(search.change);
         }
@@ -391,17 +389,16 @@ impl<C: Copy> Pace<C> {
     }
 
     /// One place of the search. `at`: where the motion is.
-    pub(crate) fn work<P: Course<Cursor = C>>(&mut self, course: &P, at: &C) {
+    pub(crate) fn work<P: Course<Cursor = C>>(&mut self, course: &P, at: &C, profiles: &mut Profiles) {
         if !self.has_work() {
             return;
         }
         let Some(search) = &mut self.search else {
-            self.search = Some(self.begin_search(course, at));
+            self.search = Some(self.begin_search(course, at, profiles));
             return;
         };
         if let Some(making) = &mut search.making {
-            let [one, other] = &mut self.profiles;
-            let profile = if self.second { one } else { other };
+            let profile = profiles.made();
             let slot_at = making.slot(profile, 0.5 * self.period);
             let room = room_of(self.is_fault, slot_at.r);
             let room = Use {
@@ -439,9 +436,10 @@ impl<C: Copy> Pace<C> {
         let step = spacing(duration);
         let time = (step * f32::from(search.points)).at_most(duration);
         let rates = search.change.rates(time);
-        let [pace, _, _] = rates;
+        let [pace, first, _] = rates;
         let room = room_of(self.is_fault, pace);
         let mut ratio = course.use_at(&search.at, rates, 0.5 * step).ratio(room);
+        ratio = ratio.at_least(first.abs() * step * (1.0 / CHANGE_MAX));
         if !(PACE_MIN..=PACE_MAX).contains(&pace) {
             ratio = ratio.at_least(RATIO_MAX);
         }
@@ -477,8 +475,8 @@ impl<C: Copy> Pace<C> {
             .at_least(10.0 * self.period)
     }
 
-    fn begin_search<P: Course<Cursor = C>>(&mut self, course: &P, at: &C) -> Search<C> {
-        let shortest = self.shortest(course, at, self.rates(0.0));
+    fn begin_search<P: Course<Cursor = C>>(&self, course: &P, at: &C, profiles: &mut Profiles) -> Search<C> {
+        let shortest = self.shortest(course, at, self.rates());
         let makes_profile = self.makes_profile();
         let slot_s = self.slot(shortest);
         let places = if makes_profile {
@@ -487,7 +485,11 @@ impl<C: Copy> Pace<C> {
             2.0 * shortest / spacing(shortest)
         };
         let latency = u16::try_from(truncated(places / PLACES_A_PERIOD)).unwrap_or(LATENCY_MAX);
-        let least = if makes_profile { LATENCY_OF_PROFILE } else { LATENCY };
+        let least = if makes_profile {
+            LATENCY_OF_PROFILE
+        } else {
+            LATENCY
+        };
         let latency = least
             .saturating_add(latency)
             .saturating_mul(1 + u16::from(self.timeouts))
@@ -499,7 +501,7 @@ impl<C: Copy> Pace<C> {
         let step = self.period * f32::from(latency) / f32::from(steps.max(1));
         for _ in 0..steps {
             let pace = if self.on_profile {
-                let followed = self.followed();
+                let followed = profiles.followed();
                 place.advance(followed, 0.5 * step);
                 let [pace, _, _] = place.rates(followed, 0.0);
                 place.advance(followed, 0.5 * step);
@@ -512,7 +514,7 @@ impl<C: Copy> Pace<C> {
             ahead += step;
         }
         let rates = if self.on_profile {
-            place.rates(self.followed(), 0.0)
+            place.rates(profiles.followed(), 0.0)
         } else {
             self.rates_of_change(ahead)
         };
@@ -538,8 +540,7 @@ impl<C: Copy> Pace<C> {
         if makes_profile {
             let [pace, first, _] = rates;
             let finest = self.slot_of(SLOT_FINE);
-            let [one, other] = &mut self.profiles;
-            let profile = if self.second { one } else { other };
+            let profile = profiles.made();
             profile.clear([pace, first], self.wanted, slot_s);
             search.making = Some(Making::new([pace, first], finest));
             search.is_profile = true;

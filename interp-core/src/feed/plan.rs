@@ -487,7 +487,8 @@ impl Plan {
             most.add(&Use {
                 feed: 0.0,
                 velocity: (axis.slope * speed).abs() * axis.inverse.velocity,
-                acceleration: (axis.acceleration * r * r + axis.slope * v * r1).abs() * axis.inverse.acceleration,
+                acceleration: (axis.acceleration * r * r + axis.slope * v * r1).abs()
+                    * axis.inverse.acceleration,
                 jerk: of_pace * axis.inverse.jerk + axis.of_jump,
             });
         });

@@ -11,14 +11,20 @@ const SEGMENTS: usize = 48;
 /// Most slots of a segment, and of a profile.
 const SLOTS_A_SEGMENT: u8 = u8::MAX;
 const SLOTS_MAX: u16 = 300;
+/// Most slots that a place moves on by at once.
+const SLOTS_A_STEP: u8 = 8;
 /// Part of a slot by which rounding may be short of its end.
 const ROUNDING: f32 = 1e-3;
 /// Difference of r'' from the one that is best, as a share of it, for which a segment goes on.
 const SAME: f32 = 0.08;
+/// How much more that is where there are too many segments.
+const COARSER: f32 = 2.5;
+/// Pace below 0 that is rounding.
+const PACE_MIN: f32 = -1e-5;
 /// Greatest r'', as a multiple of one over the square of a slot.
 const SECOND_MAX: f32 = 4.0;
 /// Greatest r', as a multiple of one over a slot: where the tool hardly moves, speed and acceleration of the plan change much within a slot.
-const FIRST_MAX: f32 = 0.07;
+const FIRST_MAX: f32 = 0.05;
 /// Parts of the best r'' that are tried where it is too much before the goal.
 const PARTS: [f32; 4] = [1.0, 0.5, 0.25, 0.125];
 
@@ -197,6 +203,37 @@ impl Profile {
     }
 }
 
+/// The profile that is followed, and the one that is being made, for whatever moves.
+#[derive(Clone, Debug)]
+pub(crate) struct Profiles {
+    lists: [Profile; 2],
+    second: bool,
+}
+
+impl Profiles {
+    pub(crate) const NONE: Self = Self {
+        lists: [Profile::NONE; 2],
+        second: false,
+    };
+
+    /// The profile that is followed.
+    pub(crate) const fn followed(&self) -> &Profile {
+        let [one, other] = &self.lists;
+        if self.second { other } else { one }
+    }
+
+    /// The one that is being made.
+    pub(crate) const fn made(&mut self) -> &mut Profile {
+        let [one, other] = &mut self.lists;
+        if self.second { one } else { other }
+    }
+
+    /// Follows the one that was made.
+    pub(crate) const fn swap(&mut self) {
+        self.second = !self.second;
+    }
+}
+
 /// A place on a profile.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct ProfilePlace {
@@ -216,10 +253,10 @@ impl ProfilePlace {
         since: 0.0,
     };
 
-    /// Moves on by this time, s.
+    /// Moves on by this time, s: a few slots.
     pub(crate) fn advance(&mut self, profile: &Profile, seconds: f32) {
         self.since += seconds;
-        for _ in 0..SLOTS_MAX {
+        for _ in 0..SLOTS_A_STEP {
             let Some(second) = profile.second_at(self) else {
                 return;
             };
@@ -289,6 +326,8 @@ pub(crate) struct Making {
     attempt: u8,
     /// Shortest slot, s.
     finest: f32,
+    /// Difference of r'' for which a segment goes on.
+    same: f32,
     /// Greatest r' towards the goal up to a slot, 1/s.
     most: f32,
     until: u16,
@@ -301,6 +340,7 @@ impl Making {
     pub(crate) const fn new(start: [f32; 2], finest: f32) -> Self {
         Self {
             finest,
+            same: SAME,
             rates: start,
             slots: 0,
             attempt: 0,
@@ -356,7 +396,11 @@ impl Making {
         let rates = after(self.rates, sign * second, slot_s);
         let [pace, _] = rates;
         self.slots += 1;
-        if self.slots > SLOTS_MAX || !(-1e-5..=most).contains(&pace) || !profile.push(sign * second) {
+        if self.slots > SLOTS_MAX || !(PACE_MIN..=most).contains(&pace) {
+            return self.try_again(profile);
+        }
+        if !profile.push(sign * second) {
+            self.same *= COARSER;
             return self.try_again(profile);
         }
         self.rates = rates;
@@ -366,10 +410,7 @@ impl Making {
     /// r'' of a slot, towards the goal; none where nothing is allowed.
     fn choose(&mut self, span: &Span, [left, first]: [f32; 2], last: f32, slot_s: f32) -> Option<f32> {
         let most = SECOND_MAX / (slot_s * slot_s);
-        let [low, high] = [
-            span.second[0].at_least(-most),
-            span.second[1].at_most(most),
-        ];
+        let [low, high] = [span.second[0].at_least(-most), span.second[1].at_most(most)];
         if low > high {
             self.most = SLOWER * first.at_most(self.most).at_least(0.0);
             self.until = self.until.max(self.slots + 1);
@@ -386,9 +427,7 @@ impl Making {
         if self.slots <= self.until {
             fastest = fastest.at_most(self.most);
         }
-        let best = high
-            .at_most((fastest - first) / slot_s)
-            .at_least(low);
+        let best = high.at_most((fastest - first) / slot_s).at_least(low);
         // What slows the pace down to the goal: what the axes leave here, but the motion of the plan itself matters less at a slower pace.
         let half = (0.5 * (high - low)).at_least(HALF_KEPT * self.half);
         self.half = half;
@@ -398,13 +437,16 @@ impl Making {
             let left = left - moved;
             first <= 0.0 || (left > 0.0 && 0.5 * first * first <= braking * left)
         };
-        let goes_on = (last - best).abs() <= SAME * best.abs()
+        let goes_on = (last - best).abs() <= self.same * best.abs()
             && (low..=high).contains(&last)
             && first + last * slot_s <= fastest;
         let wanted = if goes_on && is_early(last) {
             Some(last)
         } else {
-            PARTS.iter().map(|part| part * best).find(|second| is_early(*second))
+            PARTS
+                .iter()
+                .map(|part| part * best)
+                .find(|second| is_early(*second))
         };
         let second = wanted.unwrap_or(rest);
         // On the parabola r'' stays what it is, but for rounding.

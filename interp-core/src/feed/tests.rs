@@ -9,6 +9,7 @@ use super::limits::MotionLimits;
 use super::pace::{Course, Pace};
 use super::plan::Plan;
 use super::planner::Planner;
+use super::profile::Profiles;
 use super::stations::Station;
 use crate::job::AxisLimits;
 
@@ -357,9 +358,9 @@ fn commanded(
     let mut follower = Follower::START;
     follower.begin(plan);
     let mut pace = Pace::REST;
+    let mut profiles = Profiles::NONE;
     pace.begin(1.0, T as f32);
     let mut arcs = Vec::new();
-    let mut rs = Vec::new();
     let mut holds = Vec::new();
     let mut next = gap * random.next() * 2.0;
     let mut held: Option<f64> = None;
@@ -385,30 +386,15 @@ fn commanded(
                 pace.want(1.0, false);
             }
         }
-        let r = pace.tick();
-        rs.push(r);
+        let r = pace.tick(&mut profiles);
         follower.tick(plan, r);
         arcs.push(follower.arc_q10() as f64 / 1024e6);
         for _ in 0..PLACES {
             if pace.has_work() {
-                pace.work(plan, &follower.cursor);
+                pace.work(plan, &follower.cursor, &mut profiles);
             }
         }
         assert!(arcs.len() < 500_000, "stalls");
-    }
-    if std::env::var("DBG").is_ok() {
-        let q: Vec<[f64; 3]> = arcs.iter().map(|s| path.at(*s)).collect();
-        for k in 3..q.len() {
-            for axis in 0..3 {
-                let j = (q[k][axis] - 3.0 * q[k - 1][axis] + 3.0 * q[k - 2][axis] - q[k - 3][axis]) / 1e-9
-                    / f64::from(limits.axes[axis].jerk);
-                let a = (q[k][axis] - 2.0 * q[k - 1][axis] + q[k - 2][axis]) / 1e-6
-                    / f64::from(limits.axes[axis].acceleration);
-                if j.abs() > 1.02 || a.abs() > 1.0 {
-                    std::println!("{k} {axis}: {a:.3} {j:.3} r {:.5?}", &rs[k - 4..k+1]);
-                }
-            }
-        }
     }
     (holds, uses(path, &arcs, limits), long_jerk(path, &arcs, limits))
 }
@@ -494,7 +480,7 @@ fn commands_at_any_time_keep_the_limits() {
         worst[0] <= 1.0001 && worst[1] <= 1.0 && worst[2] <= 1.05 && long <= 1.02,
         "{worst:?} {long}"
     );
-    assert!(at(0.9) <= 0.25 && at(1.0) <= 0.6, "{} {}", at(0.9), at(1.0));
+    assert!(at(0.9) <= 0.25 && at(1.0) <= 0.4, "{} {}", at(0.9), at(1.0));
 }
 
 /// Links: the time of the closed form within the share of the limits that they use, the length to the nanometre, and the slow end of a plunge.

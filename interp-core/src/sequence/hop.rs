@@ -3,7 +3,7 @@
 
 use crate::feed::curve::{Curve, CurveCursor};
 use crate::feed::pace::{Course, Pace, Use};
-use crate::feed::profile::{SlotAt, Span};
+use crate::feed::profile::{Profiles, SlotAt, Span};
 use crate::job::AxisLimits;
 use crate::math::arith::{sqrt, truncated};
 use crate::math::number::Bounded;
@@ -148,9 +148,9 @@ impl Hop {
     }
 
     /// One period; returns whether the end is reached.
-    pub(crate) fn tick(&mut self, pace: f32, is_fault: bool, period: f32) -> bool {
+    pub(crate) fn tick(&mut self, pace: f32, is_fault: bool, period: f32, profiles: &mut Profiles) -> bool {
         self.pace.want(pace, is_fault);
-        let pace = self.pace.tick();
+        let pace = self.pace.tick(profiles);
         self.curves.advance(&mut self.cursor, pace * period);
         self.curves.is_over(&self.cursor)
     }
@@ -165,8 +165,8 @@ impl Hop {
     }
 
     /// One place of the search for a change of the pace.
-    pub(crate) fn work(&mut self) {
-        self.pace.work(&self.curves, &self.cursor);
+    pub(crate) fn work(&mut self, profiles: &mut Profiles) {
+        self.pace.work(&self.curves, &self.cursor, profiles);
     }
 
     /// The position.
