@@ -69,52 +69,95 @@ fn holds(name: &str, feed_mm_min: f64, pattern: Pattern, overrun_mm: f64, count:
     holds
 }
 
-#[test]
-#[ignore = "campaign"]
-fn holds_stand_soon() {
-    let count = std::env::var("ISOFEED_HOLDS").map_or(150, |count| count.parse().unwrap());
-    let mut all = Vec::new();
-    for (name, feeds) in [
-        ("freeform", &[1800.0, 3600.0, 6000.0][..]),
-        ("plate_v", &[3600.0, 6000.0]),
-        ("torus", &[3600.0, 6000.0]),
-        ("sphere_cap", &[1200.0, 6000.0]),
-        ("ruled_printed", &[3600.0, 6000.0]),
-        ("revolved", &[6000.0]),
-    ] {
-        for feed in feeds {
+/// The part of a sorted list up to which so many of it are.
+fn quantile(sorted: &[u32], part: f64) -> u32 {
+    #[allow(
+        clippy::cast_precision_loss,
+        clippy::cast_possible_truncation,
+        clippy::cast_sign_loss,
+        reason = "small counts"
+    )]
+    let index = (sorted.len().saturating_sub(1) as f64 * part) as usize;
+    sorted.get(index).copied().unwrap_or(0)
+}
+
+/// Holds of some jobs at these feeds, mm/min: with rests, with turns, and with hops between the passes. Prints and returns all on passes and all in
+/// links, sorted.
+fn all_holds(jobs: &[(&str, &[f64])], count: usize) -> [Vec<u32>; 2] {
+    let mut all = [Vec::new(), Vec::new()];
+    for (name, feeds) in jobs {
+        for feed in *feeds {
             for (pattern, overrun) in [
                 (Pattern::Zigzag, 0.0),
                 (Pattern::Zigzag, 2.0),
                 (Pattern::Zig, 0.0),
             ] {
-                let Holds {
-                    mut on_pass,
-                    mut in_link,
-                } = holds(name, *feed, pattern, overrun, count);
-                on_pass.sort_unstable();
-                in_link.sort_unstable();
-                let at = |list: &Vec<u32>, part: f64| {
-                    list.get((list.len().saturating_sub(1) as f64 * part) as usize)
-                        .copied()
-                        .unwrap_or(0)
-                };
-                println!(
-                    "{name:<14} {feed:>5} {pattern:?} {overrun}: pass {} {:>4} {:>4} {:>4} ms, link {} {:>4} {:>4} {:>4} ms",
-                    on_pass.len(),
-                    at(&on_pass, 0.5),
-                    at(&on_pass, 0.9),
-                    at(&on_pass, 1.0),
-                    in_link.len(),
-                    at(&in_link, 0.5),
-                    at(&in_link, 0.9),
-                    at(&in_link, 1.0),
-                );
-                all.extend(on_pass);
+                let Holds { on_pass, in_link } = holds(name, *feed, pattern, overrun, count);
+                for (all, mut list) in all.iter_mut().zip([on_pass, in_link]) {
+                    list.sort_unstable();
+                    println!(
+                        "{name} {feed} {pattern:?} {overrun}: {} holds, {} {} {} ms",
+                        list.len(),
+                        quantile(&list, 0.5),
+                        quantile(&list, 0.9),
+                        quantile(&list, 1.0)
+                    );
+                    all.extend(list);
+                }
             }
         }
     }
-    all.sort_unstable();
-    let at = |part: f64| all[((all.len() - 1) as f64 * part) as usize];
-    println!("{} holds: {} {} {} ms", all.len(), at(0.5), at(0.9), at(1.0));
+    for (all, name) in all.iter_mut().zip(["on passes", "in links"]) {
+        all.sort_unstable();
+        let late = all.iter().filter(|periods| **periods > WORST).count();
+        println!(
+            "{} {name}: half {}, nine of ten {}, worst {} ms; {late} above {WORST} ms",
+            all.len(),
+            quantile(all, 0.5),
+            quantile(all, 0.9),
+            quantile(all, 1.0)
+        );
+    }
+    all
+}
+
+/// Nine of ten holds stand within this, and all of them, periods of 1 ms.
+const NINE_OF_TEN: u32 = 250;
+const WORST: u32 = 400;
+
+#[test]
+fn a_hold_stands_within_four_tenths_of_a_second() {
+    let all = all_holds(
+        &[
+            ("freeform", &[3600.0, 6000.0]),
+            ("torus", &[6000.0]),
+            ("sphere_cap", &[1200.0, 6000.0]),
+        ],
+        60,
+    );
+    for list in all {
+        assert!(quantile(&list, 0.9) <= NINE_OF_TEN && quantile(&list, 1.0) <= WORST);
+    }
+}
+
+/// Some ten thousand holds, in minutes; ISOFEED_HOLDS sets the number of each job, feed and pattern:
+/// `cargo test --release -p integration-tests holds -- --ignored --nocapture`.
+#[test]
+#[ignore = "a campaign of minutes"]
+fn holds_of_many_jobs() {
+    let count = std::env::var("ISOFEED_HOLDS").map_or(300, |count| count.parse().unwrap());
+    let [on_pass, in_link] = all_holds(
+        &[
+            ("freeform", &[1800.0, 3600.0, 6000.0]),
+            ("plate_v", &[3600.0, 6000.0]),
+            ("torus", &[3600.0, 6000.0]),
+            ("sphere_cap", &[1200.0, 6000.0]),
+            ("ruled_printed", &[3600.0, 6000.0]),
+            ("revolved", &[6000.0]),
+        ],
+        count,
+    );
+    for list in [on_pass, in_link] {
+        assert!(quantile(&list, 0.9) <= NINE_OF_TEN && quantile(&list, 0.999) <= WORST);
+    }
 }

@@ -382,13 +382,13 @@ impl Course for Curve {
         let fastest = fastest_around([v, a, j], r * around);
         let by_first = 3.0 * a * r;
         let [before, behind] = self.jerk_beside(cursor, r * around, v);
-        for j in [j, before, behind] {
-            span.add_jerk(
-                j * r * r * r + by_first * first,
-                [fastest, fastest + by_first * slot_s],
-                room.jerk * limits.jerk,
-            );
-        }
+        let least = j.at_most(before).at_most(behind);
+        let greatest = j.at_least(before).at_least(behind);
+        span.add_jerk(
+            [least, greatest].map(|j| j * r * r * r + by_first * first),
+            [fastest, fastest + by_first * slot_s],
+            room.jerk * limits.jerk,
+        );
         span
     }
 }

@@ -517,13 +517,14 @@ impl Plan {
             );
             let inverse = axis.inverse.jerk;
             let by_first = 3.0 * axis.acceleration * r;
-            for j in axis.jerk {
-                span.add_jerk(
-                    (j * r * r * r + by_first * first) * inverse,
-                    [along * inverse, (along + by_first * slot_s) * inverse],
-                    room.jerk - axis.of_jump,
-                );
-            }
+            let [one, other] = axis.jerk;
+            let cube = r * r * r * inverse;
+            let of_first = by_first * first * inverse;
+            span.add_jerk(
+                [one.at_most(other), one.at_least(other)].map(|j| j * cube + of_first),
+                [along * inverse, (along + by_first * slot_s) * inverse],
+                room.jerk - axis.of_jump,
+            );
         });
         span
     }

@@ -67,15 +67,15 @@ impl Span {
         both(&mut self.second, other.second);
     }
 
-    /// An axis: fractions of the limit that it uses at a constant pace and for each unit of r', and the greatest.
+    /// An axis: the fraction of the limit that it uses at a constant pace and for each unit of r', and the greatest.
     #[inline(always)]
     pub(crate) fn add_acceleration(&mut self, at: f32, slope: f32, most: f32) {
-        narrow(&mut self.first, at, slope, most);
+        narrow(&mut self.first, [at, at], slope, most);
     }
 
-    /// The same for each unit of r'', at the start and at the end of a slot.
+    /// The same, the least and greatest fraction around the place, for each unit of r'' at the start and at the end of a slot.
     #[inline(always)]
-    pub(crate) fn add_jerk(&mut self, at: f32, slopes: [f32; 2], most: f32) {
+    pub(crate) fn add_jerk(&mut self, at: [f32; 2], slopes: [f32; 2], most: f32) {
         for slope in slopes {
             narrow(&mut self.second, at, slope, most);
         }
@@ -94,14 +94,18 @@ impl Span {
     }
 }
 
-/// Narrows a range to `|at + slope x| <= most`.
+/// Narrows a range to `|at + slope x| <= most` for everything between two values.
 #[inline(always)]
-fn narrow([low, high]: &mut [f32; 2], at: f32, slope: f32, most: f32) {
+fn narrow([low, high]: &mut [f32; 2], [least, greatest]: [f32; 2], slope: f32, most: f32) {
     let inverse = 1.0 / slope.abs().at_least(1e-9);
-    let middle = inverse * if slope < 0.0 { at } else { -at };
-    let half = most * inverse;
-    *low = low.at_least(middle - half);
-    *high = high.at_most(middle + half);
+    let (below, above) = ((-most - least) * inverse, (most - greatest) * inverse);
+    let (from, to) = if slope < 0.0 {
+        (-above, -below)
+    } else {
+        (below, above)
+    };
+    *low = low.at_least(from);
+    *high = high.at_most(to);
 }
 
 /// The greatest speed within a time of a place with this speed, acceleration and jerk.

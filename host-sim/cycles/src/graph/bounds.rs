@@ -92,17 +92,7 @@ const BOUNDS: &[(&str, u32, &str)] = &[
         24,
         "steps to the place where a change begins: STEPS_AHEAD",
     ),
-    (
-        "interp_core::feed::profile::ProfilePlace::advance",
-        8,
-        "slots of a step: SLOTS_A_STEP",
-    ),
     ("interp_core::feed::plan::Plan::span_of", 3, "axes"),
-    (
-        "interp_core::feed::profile::Making::append",
-        4,
-        "parts of the best second derivative: PARTS",
-    ),
     (
         "compiler_builtins::mem::impls::copy_backward::copy_backward_aligned_words",
         512,
