@@ -22,7 +22,7 @@ const PROFILE_PLACES: f32 = 2.5;
 const SLOT_MIN: f32 = 2e-3;
 const SLOT_FINE: f32 = 1e-3;
 const SLOTS_ENOUGH: f32 = 80.0;
-const PROFILE_ACCELERATION: f32 = 0.9945;
+const PROFILE_ACCELERATION: f32 = 0.991;
 const PROFILE_PERIOD_MAX: f32 = 2.5e-3;
 
 /// Durations that a search tries, shortest first, and the ratio of one to the next.
@@ -126,6 +126,11 @@ pub(crate) trait Course {
     /// Use of the limits at a place and a pace with its first two derivatives, 1, 1/s, 1/s^2. `around`: time before and behind that the place
     /// stands for, s.
     fn use_at(&self, cursor: &Self::Cursor, rates: [f32; 3], around: f32) -> Use;
+
+    /// Whether the path changes much within a slot near a place.
+    fn is_uneven(&self, _cursor: &Self::Cursor) -> bool {
+        false
+    }
 
     /// What the room leaves to the derivatives of the pace in a slot of a profile, at the place of its middle.
     fn span_at(&self, cursor: &Self::Cursor, slot: &SlotAt, room: &Use) -> Span;
@@ -478,7 +483,12 @@ impl<C: Copy> Pace<C> {
     fn begin_search<P: Course<Cursor = C>>(&self, course: &P, at: &C, profiles: &mut Profiles) -> Search<C> {
         let shortest = self.shortest(course, at, self.rates());
         let makes_profile = self.makes_profile();
-        let slot_s = self.slot(shortest);
+        let finest = self.slot_of(SLOT_FINE);
+        let slot_s = if course.is_uneven(at) {
+            finest
+        } else {
+            self.slot(shortest)
+        };
         let places = if makes_profile {
             PROFILE_PLACES * shortest / slot_s
         } else {
@@ -539,7 +549,6 @@ impl<C: Copy> Pace<C> {
         };
         if makes_profile {
             let [pace, first, _] = rates;
-            let finest = self.slot_of(SLOT_FINE);
             let profile = profiles.made();
             profile.clear([pace, first], self.wanted, slot_s);
             search.making = Some(Making::new([pace, first], finest));

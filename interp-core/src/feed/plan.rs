@@ -36,6 +36,9 @@ pub(crate) const PINNED: u16 = 3;
 /// Distance from an end at speed within which the walk is made slower until the plan can begin at it, nm.
 const NEAR_TURN_NM: u32 = 4_000_000;
 
+/// Distance from an end at speed within which a change of the pace is looked at closely, nm.
+const UNEVEN_NM: u32 = 15_000_000;
+
 /// Where a jump lies: interval, fraction of it in units of 2^-16, and the first of its two stations.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Knot {
@@ -87,9 +90,8 @@ pub(crate) struct Plan {
     pub(crate) inverse_step: f32,
     /// The walk: S is a cubic B-spline; differences of its coefficients, mm.
     pub(crate) walk: [f32; COEFFICIENTS],
-    /// The pace c that is followed, and the one that is being planned: coefficients of a quadratic B-spline.
+    /// The pace c that is followed: coefficients of a quadratic B-spline.
     pub(crate) pace: [f32; COEFFICIENTS],
-    pub(crate) draft: [f32; COEFFICIENTS],
     /// Cell of the stations at each node, and the fraction of it in units of 2^-16.
     pub(crate) cells: [u16; NODES_MAX + 1],
     pub(crate) parts: [u16; NODES_MAX + 1],
@@ -169,7 +171,6 @@ impl Plan {
         inverse_step: 0.0,
         walk: [0.0; COEFFICIENTS],
         pace: [0.0; COEFFICIENTS],
-        draft: [0.0; COEFFICIENTS],
         cells: [0; NODES_MAX + 1],
         parts: [0; NODES_MAX + 1],
         knots: [Knot {
@@ -189,8 +190,8 @@ impl Plan {
     }
 
     /// An interval with this pace.
-    fn interval_of(&self, pace: &[f32; COEFFICIENTS], index: u16) -> Interval {
-        let three = |values: &[f32; COEFFICIENTS]| {
+    fn interval_of(&self, pace: &[f32], index: u16) -> Interval {
+        let three = |values: &[f32]| {
             let from = usize::from(index);
             match values.get(from..from + 3) {
                 Some(&[a, b, c]) => [a, b, c],
@@ -336,9 +337,9 @@ impl Cursor {
         self.speed_sqr_of(&plan.interval(self.interval), plan)
     }
 
-    /// The same of the pace that is being planned.
-    pub(crate) fn draft_speed_sqr(&self, plan: &Plan) -> f32 {
-        self.speed_sqr_of(&plan.interval_of(&plan.draft, self.interval), plan)
+    /// The same of a pace that is being planned.
+    pub(crate) fn draft_speed_sqr(&self, plan: &Plan, draft: &[f32]) -> f32 {
+        self.speed_sqr_of(&plan.interval_of(draft, self.interval), plan)
     }
 
     fn speed_sqr_of(&self, interval: &Interval, plan: &Plan) -> f32 {
@@ -392,9 +393,13 @@ impl Plan {
 
     /// Whether an arc is near an end at speed.
     pub(crate) fn is_near_turn(&self, arc_nm: u32) -> bool {
+        self.is_near_end_at_speed(arc_nm, NEAR_TURN_NM)
+    }
+
+    fn is_near_end_at_speed(&self, arc_nm: u32, near_nm: u32) -> bool {
         let [start, end] = self.ends;
         let left = self.stations.length_nm().saturating_sub(arc_nm);
-        (start > 0.0 && arc_nm < NEAR_TURN_NM) || (end > 0.0 && left < NEAR_TURN_NM)
+        (start > 0.0 && arc_nm < near_nm) || (end > 0.0 && left < near_nm)
     }
 
     /// Time at pace 1 by which a cursor is beyond the end, s.
@@ -423,6 +428,11 @@ impl Course for Plan {
         self.use_of(&self.pace, &self.limits, cursor, rates, around)
     }
 
+    fn is_uneven(&self, cursor: &Cursor) -> bool {
+        let arc_nm = u32::try_from(cursor.start_q10 >> Q10_BITS).unwrap_or(u32::MAX);
+        self.is_near_end_at_speed(arc_nm, UNEVEN_NM)
+    }
+
     fn span_at(&self, cursor: &Cursor, slot: &SlotAt, room: &Use) -> Span {
         self.span_of(&self.limits, cursor, slot, room)
     }
@@ -430,7 +440,7 @@ impl Course for Plan {
 
 impl Plan {
     /// Moves on at this pace; see [`Course::advance`].
-    fn advance_at(&self, pace: &[f32; COEFFICIENTS], cursor: &mut Cursor, seconds: f32) {
+    fn advance_at(&self, pace: &[f32], cursor: &mut Cursor, seconds: f32) {
         let by = seconds * self.inverse_step;
         let intervals = by * self.interval_of(pace, cursor.interval).speed(cursor.x);
         // As a rule a step stays within two intervals.
@@ -448,7 +458,7 @@ impl Plan {
 
     /// A step by the midpoint rule, in time of an interval at pace 1.
     #[inline(always)]
-    fn step_at(&self, pace: &[f32; COEFFICIENTS], cursor: &mut Cursor, by: f32) {
+    fn step_at(&self, pace: &[f32], cursor: &mut Cursor, by: f32) {
         let here = self.interval_of(pace, cursor.interval);
         let half = cursor.x + 0.5 * by * here.speed(cursor.x);
         let middle = if half < 1.0 || cursor.interval + 1 >= self.intervals {
@@ -463,7 +473,7 @@ impl Plan {
     /// Use of these limits at this pace; see [`Course::use_at`].
     fn use_of(
         &self,
-        pace: &[f32; COEFFICIENTS],
+        pace: &[f32],
         limits: &MotionLimits,
         cursor: &Cursor,
         rates: [f32; 3],
@@ -533,7 +543,7 @@ impl Plan {
     #[inline(always)]
     fn motion_at(
         &self,
-        pace: &[f32; COEFFICIENTS],
+        pace: &[f32],
         limits: &MotionLimits,
         cursor: &Cursor,
         r: f32,
@@ -592,14 +602,14 @@ impl Plan {
         }
     }
 
-    /// Moves on at the planned pace.
-    pub(crate) fn advance_draft(&self, cursor: &mut Cursor, seconds: f32) {
-        self.advance_at(&self.draft, cursor, seconds);
+    /// Moves on at a pace that is being planned.
+    pub(crate) fn advance_draft(&self, draft: &[f32], cursor: &mut Cursor, seconds: f32) {
+        self.advance_at(draft, cursor, seconds);
     }
 
-    /// Use of these limits at the planned pace.
-    pub(crate) fn use_draft(&self, limits: &MotionLimits, cursor: &Cursor) -> Use {
-        self.use_of(&self.draft, limits, cursor, [1.0, 0.0, 0.0], 0.0)
+    /// Use of these limits at a pace that is being planned.
+    pub(crate) fn use_draft(&self, draft: &[f32], limits: &MotionLimits, cursor: &Cursor) -> Use {
+        self.use_of(draft, limits, cursor, [1.0, 0.0, 0.0], 0.0)
     }
 }
 

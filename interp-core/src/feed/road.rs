@@ -87,6 +87,10 @@ impl Course for Road<'_> {
         most
     }
 
+    fn is_uneven(&self, cursor: &Cursor) -> bool {
+        self.plan(cursor).is_uneven(cursor)
+    }
+
     fn span_at(&self, cursor: &Cursor, slot: &SlotAt, room: &Use) -> Span {
         if self.is_beyond(cursor) || (cursor.is_next && slot.r > self.next_pace * 1.001) {
             return Span::NONE;
