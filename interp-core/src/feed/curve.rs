@@ -377,7 +377,12 @@ impl Course for Curve {
         let [v, a, j] = self.piece(cursor.piece).rates(cursor.time);
         let limits = &self.limits;
         let mut span = Span::WIDE;
-        span.add_acceleration(a * r * r, v, room.acceleration * limits.acceleration);
+        let later = a + 0.5 * slot_s * r * j;
+        span.add_acceleration(
+            [a, later].map(|a| a * r * r),
+            v,
+            room.acceleration * limits.acceleration,
+        );
         // The speed changes over the time around the place, and the jerk steps.
         let fastest = fastest_around([v, a, j], r * around);
         let by_first = 3.0 * a * r;

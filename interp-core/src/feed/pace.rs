@@ -10,7 +10,7 @@ use crate::math::number::{Bounded, to_f32};
 
 /// Periods from the start of a search to the change that it finds, for the search: some, and as many as the places of two short trials take.
 const LATENCY: u16 = 8;
-const PLACES_A_PERIOD: f32 = 18.0;
+const PLACES_A_PERIOD: f32 = 13.0;
 /// The most of it, and steps in which the place there is found.
 const LATENCY_MAX: u16 = 96;
 const STEPS_AHEAD: u16 = 24;
@@ -22,7 +22,9 @@ const PROFILE_PLACES: f32 = 2.5;
 const SLOT_MIN: f32 = 2e-3;
 const SLOT_FINE: f32 = 1e-3;
 const SLOTS_ENOUGH: f32 = 80.0;
-const PROFILE_ACCELERATION: f32 = 0.991;
+/// Shares of the room that a profile uses: what happens within a slot.
+const PROFILE_ACCELERATION: f32 = 0.995;
+const PROFILE_JERK: f32 = 0.99;
 const PROFILE_PERIOD_MAX: f32 = 2.5e-3;
 
 /// Durations that a search tries, shortest first, and the ratio of one to the next.
@@ -38,11 +40,11 @@ const PLACES_MIN: f32 = 16.0;
 const PLACES_ENOUGH: f32 = 100.0;
 const PLACES_MAX: f32 = 200.0;
 
-/// Greatest change of the pace from place to place: where the tool hardly moves, the plan's own motion changes as fast.
+/// Greatest change of the pace in a period: where the tool hardly moves, the plan's own motion changes as fast.
 const CHANGE_MAX: f32 = 0.05;
 
 /// Paces below 0 and above 1 that are rounding.
-const PACE_MIN: f32 = -2e-5;
+const PACE_MIN: f32 = -2e-6;
 const PACE_MAX: f32 = 1.00002;
 
 /// Fractions of the limits that a changing pace may use. The jerk is seen between periods, and its peaks are narrower.
@@ -105,9 +107,9 @@ impl Use {
 }
 
 /// Time between the places of a trial of this duration, s.
-fn spacing(duration: f32) -> f32 {
+fn spacing(duration: f32, widest: f32) -> f32 {
     SPACING
-        .at_least((duration / PLACES_ENOUGH).at_most(SPACING_WIDE))
+        .at_least((duration / PLACES_ENOUGH).at_most(widest))
         .at_most(duration / PLACES_MIN)
         .at_least(duration / PLACES_MAX)
 }
@@ -192,6 +194,8 @@ struct Search<C> {
     /// Periods until then.
     left: u16,
     trial: u8,
+    /// Greatest time between the places of a trial, s.
+    widest: f32,
     change: Change,
     /// A profile is being made, in the list that is not followed.
     making: Option<Making>,
@@ -408,6 +412,7 @@ impl<C: Copy> Pace<C> {
             let room = room_of(self.is_fault, slot_at.r);
             let room = Use {
                 acceleration: PROFILE_ACCELERATION * room.acceleration,
+                jerk: PROFILE_JERK * room.jerk,
                 ..*room
             };
             let span = course.span_at(&search.at, &slot_at, &room);
@@ -438,13 +443,13 @@ impl<C: Copy> Pace<C> {
             return;
         }
         let duration = search.change.duration;
-        let step = spacing(duration);
+        let step = spacing(duration, search.widest);
         let time = (step * f32::from(search.points)).at_most(duration);
         let rates = search.change.rates(time);
         let [pace, first, _] = rates;
         let room = room_of(self.is_fault, pace);
         let mut ratio = course.use_at(&search.at, rates, 0.5 * step).ratio(room);
-        ratio = ratio.at_least(first.abs() * step * (1.0 / CHANGE_MAX));
+        ratio = ratio.at_least(first.abs() * self.period * (1.0 / CHANGE_MAX));
         if !(PACE_MIN..=PACE_MAX).contains(&pace) {
             ratio = ratio.at_least(RATIO_MAX);
         }
@@ -484,15 +489,13 @@ impl<C: Copy> Pace<C> {
         let shortest = self.shortest(course, at, self.rates());
         let makes_profile = self.makes_profile();
         let finest = self.slot_of(SLOT_FINE);
-        let slot_s = if course.is_uneven(at) {
-            finest
-        } else {
-            self.slot(shortest)
-        };
+        let is_uneven = course.is_uneven(at);
+        let widest = if is_uneven { SPACING } else { SPACING_WIDE };
+        let slot_s = if is_uneven { finest } else { self.slot(shortest) };
         let places = if makes_profile {
             PROFILE_PLACES * shortest / slot_s
         } else {
-            2.0 * shortest / spacing(shortest)
+            2.0 * shortest / spacing(shortest, widest)
         };
         let latency = u16::try_from(truncated(places / PLACES_A_PERIOD)).unwrap_or(LATENCY_MAX);
         let least = if makes_profile {
@@ -540,6 +543,7 @@ impl<C: Copy> Pace<C> {
             rates,
             left: latency,
             trial: 0,
+            widest,
             change: Change::new(rates, self.wanted, shortest),
             making: None,
             is_profile: false,

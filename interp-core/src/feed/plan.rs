@@ -520,8 +520,10 @@ impl Plan {
         let mut span = Span::WIDE;
         here.each_axis(limits, |axis| {
             let along = axis.slope * fastest;
+            let [jerk, _] = axis.jerk;
+            let later = axis.acceleration + 0.5 * slot_s * r * jerk;
             span.add_acceleration(
-                axis.acceleration * r * r * axis.inverse.acceleration,
+                [axis.acceleration, later].map(|a| a * r * r * axis.inverse.acceleration),
                 axis.slope * here.v * axis.inverse.acceleration,
                 room.acceleration,
             );

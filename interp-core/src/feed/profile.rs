@@ -67,10 +67,12 @@ impl Span {
         both(&mut self.second, other.second);
     }
 
-    /// An axis: the fraction of the limit that it uses at a constant pace and for each unit of r', and the greatest.
+    /// An axis: the fraction of the limit that it uses at a constant pace, in the middle and at the end of the slot, and for each unit of r', and the
+    /// greatest.
     #[inline(always)]
-    pub(crate) fn add_acceleration(&mut self, at: f32, slope: f32, most: f32) {
-        narrow(&mut self.first, [at, at], slope, most);
+    pub(crate) fn add_acceleration(&mut self, [middle, end]: [f32; 2], slope: f32, most: f32) {
+        let at = [middle.at_most(end), middle.at_least(end)];
+        narrow(&mut self.first, at, slope, most);
     }
 
     /// The same, the least and greatest fraction around the place, for each unit of r'' at the start and at the end of a slot.

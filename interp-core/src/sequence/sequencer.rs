@@ -30,12 +30,12 @@ const SPARE_PERIODS: u32 = 15;
 
 /// Cycles of one place of a search for a change of the pace, along a pass and along a link, and of its begin along a pass; of a portion of a
 /// step-over's planning.
-const PACE_CYCLES: u32 = 1_560;
-const PACE_BEGIN_CYCLES: u32 = 8_000;
-const LINK_PACE_CYCLES: u32 = 1_000;
+const PACE_CYCLES: u32 = 1_900;
+const PACE_BEGIN_CYCLES: u32 = 9_500;
+const LINK_PACE_CYCLES: u32 = 1_300;
 const STEP_OVER_CYCLES: u32 = 6_000;
 /// Cycles of the same of a hop, and of its planning.
-const HOP_PACE_CYCLES: u32 = 2_500;
+const HOP_PACE_CYCLES: u32 = 3_300;
 const HOP_CYCLES: u32 = 24_000;
 /// Cycles of the begin of a look-ahead, and of the planning of a leg.
 const BEGIN_CYCLES: u32 = 1_500;
