@@ -17,6 +17,7 @@ mod house;
 mod images;
 mod import;
 mod lost_events;
+mod manual;
 mod no_panic;
 mod operations;
 mod oracle_golden;
