@@ -301,7 +301,7 @@ impl Motion {
     }
 
     fn restart(&mut self) {
-        self.run.restart(self.program.header().spacing);
+        self.run.restart(&self.program);
         self.fault = None;
     }
 

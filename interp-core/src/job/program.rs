@@ -193,6 +193,7 @@ impl Program {
         };
         self.header = *header;
         self.length = words;
+        self.region = RegionCheck::START;
         Ok(())
     }
 

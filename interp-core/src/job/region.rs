@@ -258,9 +258,11 @@ impl ScanLine {
         joins: [false; 2],
     };
 
-    /// Goes on to a line further up.
-    pub(crate) const fn go_on(&mut self, side: i32) {
-        self.before = self.side;
+    /// Goes on to a line further up. `skips`: this one is left out, and does not count as the line before.
+    pub(crate) const fn go_on(&mut self, side: i32, skips: bool) {
+        if !skips {
+            self.before = self.side;
+        }
         self.side = side;
         self.met = 0;
         self.joins = [false; 2];

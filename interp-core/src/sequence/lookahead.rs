@@ -250,7 +250,7 @@ impl Lookahead {
     }
 
     /// Begins to look over this pass.
-    pub(crate) fn begin(&mut self, pass: u32, route: Route, head: &Turn, out: &mut PassPlan) {
+    pub(crate) fn begin(&mut self, job: &Job<'_>, pass: u32, route: Route, head: &Turn, out: &mut PassPlan) {
         let has_head = head.exists();
         self.turn = *head;
         self.task = if has_head { Task::Head(0) } else { Task::Patch };
@@ -261,7 +261,7 @@ impl Lookahead {
         out.tail = Turn::NONE;
         out.plan.ends = [head.speed, 0.0];
         self.maximum = PassMaximum::NONE;
-        self.step_over.begin();
+        self.step_over.begin(job, &route);
         out.plan.stations.clear();
         out.pass = pass;
         out.route = route;
@@ -314,7 +314,7 @@ impl Lookahead {
             Task::Close => {
                 if self.looks_again(job) {
                     let (pass, route, head) = (out.pass, out.route, self.turn);
-                    self.begin(pass, route, &head, out);
+                    self.begin(job, pass, route, &head, out);
                     return Ok(());
                 }
                 self.close(job, out)?;

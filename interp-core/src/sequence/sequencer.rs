@@ -396,7 +396,7 @@ impl Sequencer {
         }
         match self.planning {
             Planning::Requested(pass, route) => {
-                self.lookahead.begin(pass, route, &now.tail, next);
+                self.lookahead.begin(job, pass, route, &now.tail, next);
                 self.planning = Planning::Stations;
             }
             Planning::Stations => {

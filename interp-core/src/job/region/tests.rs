@@ -60,7 +60,7 @@ fn words(loops: &[Vec<[i32; 2]>], least: i32) -> Vec<i32> {
 
 /// Moves a line to a side; its crossings in pairs.
 fn cross(line: &mut ScanLine, region: &RegionWords<'_>, side: i32, path_end: i32) -> Vec<[i32; 2]> {
-    line.go_on(side);
+    line.go_on(side, false);
     let mut portions = 0;
     while !line.is_done() {
         line.work(region, path_end).unwrap();
@@ -254,7 +254,7 @@ fn a_comb_with_too_many_teeth_is_refused() {
         let words = comb(teeth);
         let region = RegionWords::new(&words).unwrap();
         let mut line = ScanLine::START;
-        line.go_on(1000);
+        line.go_on(1000, false);
         let mut result = Ok(());
         while result.is_ok() && !line.is_done() {
             result = line.work(&region, end_of(1));

@@ -89,7 +89,7 @@ fn a_run_that_is_begun_again_is_the_same() {
             assert!(again.advance(&job, &mut there).unwrap());
             again.plan(&job, &mut []);
         }
-        again.restart(Spacing::Exact);
+        again.restart(&program);
         while first.advance(&job, &mut here).unwrap() && here.pass < 4 {
             assert!(again.advance(&job, &mut there).unwrap());
             assert_eq!(here, there, "after {stopped} samples");
