@@ -582,7 +582,10 @@ impl Run {
 
     /// Whether the next pass of a region is to be sought.
     fn is_pass_due(&self) -> bool {
-        self.lines.is_in_use() && self.travel.next == Next::Over && self.next_pass == NextPass::Sought && self.pending.is_none()
+        self.lines.is_in_use()
+            && self.travel.next == Next::Over
+            && self.next_pass == NextPass::Sought
+            && self.pending.is_none()
     }
 
     /// Whether the pass is over, and the step to the next one is not known yet.
@@ -669,7 +672,11 @@ impl Run {
     fn end_pass(&mut self, job: &Job<'_>) {
         self.travel.fraction = self.travel.piece.end();
         let last = schedule::is_last(self.travel.route.side, job.header.side_spans);
-        self.travel.next = if last && job.header.edges == 0 { Next::End } else { Next::Over };
+        self.travel.next = if last && job.header.edges == 0 {
+            Next::End
+        } else {
+            Next::Over
+        };
     }
 }
 

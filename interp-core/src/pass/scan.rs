@@ -163,7 +163,9 @@ impl PassScan {
             Task::Patch => cycles::MEASURED_PATCH,
             Task::Station => cycles::STATION,
             Task::Estimate(0) => cycles::NEXT,
-            Task::Estimate(_) if self.estimator.makes_patch(&self.piece.position, self.fraction()) => cycles::PATCH,
+            Task::Estimate(_) if self.estimator.makes_patch(&self.piece.position, self.fraction()) => {
+                cycles::PATCH
+            }
             Task::Estimate(_) => cycles::ESTIMATE,
             Task::Done => 0,
         }

@@ -15,6 +15,9 @@ const LEAST_SHARE: f64 = 0.1;
 /// Points along and across each span at which the speed of the path parameter is taken.
 const SPEEDS: u32 = 9;
 
+/// Widths of spans that differ by less, relatively, are the same: over 1024 spans it adds up to less than a place.
+const SAME_WIDTH: f64 = 1e-10;
+
 const KEY: &str = "region.loops";
 
 /// Refuses what passes of a region are not made for.
@@ -29,6 +32,13 @@ pub(super) fn check_job(job: &Job) -> Result<(), JobError> {
             "write spacing = \"exact\", or remove the section [region]",
         ));
     }
+    if job.region.is_some() && job.machine.has_limits() {
+        return Err(job.origin.error(
+            "region",
+            "a part of a surface is machined without axis limits only",
+            "remove the axis limits, or the section [region]",
+        ));
+    }
     Ok(())
 }
 
@@ -40,7 +50,9 @@ pub(super) fn add(job: &Job, region: &Region, prepared: &mut Prepared) -> Result
     let no = |what: String, remedy: &str| Err(job.origin.error(KEY, what, remedy));
     if prepared.path.spans().max(prepared.side.spans()) > usize::from(REGION_SPANS_MAX) {
         return no(
-            format!("a surface with a region may have at most {REGION_SPANS_MAX} patches along each parameter"),
+            format!(
+                "a surface with a region may have at most {REGION_SPANS_MAX} patches along each parameter"
+            ),
             "use fewer knots, or cut the part into several jobs",
         );
     }
@@ -48,7 +60,9 @@ pub(super) fn add(job: &Job, region: &Region, prepared: &mut Prepared) -> Result
     let words = prepared.words.len() + 3 + 4 * edges.len();
     if words > STORE_WORDS {
         return no(
-            format!("the surface and its region take {words} words, more than the {STORE_WORDS} of the board's store"),
+            format!(
+                "the surface and its region take {words} words, more than the {STORE_WORDS} of the board's store"
+            ),
             "simplify the loops, use fewer knots, or cut the part into several jobs",
         );
     }
@@ -75,8 +89,12 @@ pub(super) fn add(job: &Job, region: &Region, prepared: &mut Prepared) -> Result
     };
     prepared.header.edges = u16::try_from(edges.len()).unwrap_or(u16::MAX);
     prepared.words.extend([first, last, least]);
-    prepared.words.extend(edges.iter().flat_map(|edge| edge.to_words()));
-    let start = intervals(&edges, first, least).first().map_or(0, |[from, _]| *from);
+    prepared
+        .words
+        .extend(edges.iter().flat_map(|edge| edge.to_words()));
+    let start = intervals(&edges, first, least)
+        .first()
+        .map_or(0, |[from, _]| *from);
     let (path, side) = (parameter(&prepared.path, start), parameter(&prepared.side, first));
     Ok(match job.along {
         Along::U => [path, side],
@@ -84,28 +102,66 @@ pub(super) fn add(job: &Job, region: &Region, prepared: &mut Prepared) -> Result
     })
 }
 
-/// The edges in order, without those of constant side.
+/// The edges in order, without those of constant side. Places are fractions of spans, so an edge is parted where it crosses a knot between spans of
+/// different width: it is straight on both sides, but not over both.
 fn edges(along: Along, region: &Region, prepared: &Prepared) -> Vec<Edge> {
-    let at = |[u, v]: [f64; 2]| {
-        let (path, side) = match along {
-            Along::U => (u, v),
-            Along::V => (v, u),
-        };
-        [place(&prepared.path, path), place(&prepared.side, side)]
+    let swapped = |[u, v]: [f64; 2]| match along {
+        Along::U => [u, v],
+        Along::V => [v, u],
     };
-    let mut edges: Vec<Edge> = region
-        .edges()
-        .filter_map(|[from, to]| Edge::between(at(from), at(to)))
-        .collect();
+    let axes = [&prepared.path, &prepared.side];
+    let knots = axes.map(bends);
+    let at = |point: [f64; 2]| [0, 1].map(|k| place(axes[k], point[k]));
+    let mut edges = Vec::new();
+    for [from, to] in region.edges() {
+        let (from, to) = (swapped(from), swapped(to));
+        let mut shares: Vec<f64> = (0..2)
+            .flat_map(|k| {
+                knots[k]
+                    .iter()
+                    .map(move |knot| (knot - from[k]) / (to[k] - from[k]))
+            })
+            .filter(|share| *share > 0.0 && *share < 1.0)
+            .collect();
+        shares.sort_by(f64::total_cmp);
+        let middle = shares
+            .iter()
+            .map(|share| [0, 1].map(|k| from[k] + share * (to[k] - from[k])));
+        let vertices: Vec<[i32; 2]> = [from].into_iter().chain(middle).chain([to]).map(at).collect();
+        edges.extend(
+            vertices
+                .windows(2)
+                .filter_map(|ends| Edge::between(ends[0], ends[1])),
+        );
+    }
     edges.sort();
     edges
 }
 
+/// The knots between spans of different width.
+fn bends(axis: &ParameterSpans) -> Vec<f64> {
+    let differ = |ends: &&[f64]| {
+        let [before, after] = [ends[1] - ends[0], ends[2] - ends[1]];
+        (before - after).abs() > SAME_WIDTH * before.max(after)
+    };
+    axis.breaks
+        .windows(3)
+        .filter(differ)
+        .map(|ends| ends[1])
+        .collect()
+}
+
 /// The place of a parameter, the nearest one.
-#[allow(clippy::cast_possible_truncation, reason = "spans and fractions are within their bits")]
+#[allow(
+    clippy::cast_possible_truncation,
+    reason = "spans and fractions are within their bits"
+)]
 fn place(axis: &ParameterSpans, at: f64) -> i32 {
     let breaks = &axis.breaks;
-    let span = breaks.partition_point(|start| *start <= at).clamp(1, breaks.len() - 1) - 1;
+    let span = breaks
+        .partition_point(|start| *start <= at)
+        .clamp(1, breaks.len() - 1)
+        - 1;
     let (start, end) = (breaks[span], breaks[span + 1]);
     let unit = f64::from(1 << FRACTION_BITS);
     ((span as f64 + ((at - start) / (end - start)).clamp(0.0, 1.0)) * unit).round() as i32
@@ -113,7 +169,9 @@ fn place(axis: &ParameterSpans, at: f64) -> i32 {
 
 /// The parameter of a place.
 fn parameter(axis: &ParameterSpans, place: i32) -> f64 {
-    let span = usize::try_from(place >> FRACTION_BITS).unwrap_or(0).min(axis.spans() - 1);
+    let span = usize::try_from(place >> FRACTION_BITS)
+        .unwrap_or(0)
+        .min(axis.spans() - 1);
     let (start, end) = (axis.breaks[span], axis.breaks[span + 1]);
     let within = f64::from(place) / f64::from(1 << FRACTION_BITS) - span as f64;
     start + (end - start) * within
@@ -183,7 +241,10 @@ fn intervals(edges: &[Edge], side: i32, least: i32) -> Vec<[i32; 2]> {
 /// The first and the last line with an interval. Between two vertices an interval's length is linear, so it is greatest at one of them.
 fn lines(edges: &[Edge], least: i32) -> Option<[i32; 2]> {
     let holds = |side: i32| !intervals(edges, side, least).is_empty();
-    let mut sides: Vec<i32> = edges.iter().flat_map(|edge| [edge.side[0], edge.side[1] - 1]).collect();
+    let mut sides: Vec<i32> = edges
+        .iter()
+        .flat_map(|edge| [edge.side[0], edge.side[1] - 1])
+        .collect();
     sides.extend(edges.iter().map(|edge| edge.side[1]));
     sides.sort_unstable();
     sides.dedup();
