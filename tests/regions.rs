@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use inspect::BOUNDS;
 use interp_core::job::region::{CROSSINGS_MAX, EDGE_WORDS, HEAD_WORDS};
-use job::{Along, Job, Pattern, Region, Spacing};
+use job::{Along, AxisLimits, Job, MachineSpec, Pattern, Region, Side, Spacing};
 use machine::prepare::prepare;
 use verify::swept::{Requirements, measure};
 
@@ -73,7 +73,11 @@ fn random_job(seed: u64) -> Job {
     let mut job = load(name);
     job.scallop_mm = scallop_mm;
     job.feed_mm_min = 6000.0;
-    job.machine.limits = None;
+    job.machine = MachineSpec::default();
+    if random.one_of(&[true, false]) {
+        job.machine.limits = Some(AxisLimits::DEFAULT);
+        job.side = Side::Up;
+    }
     job.along = random.one_of(&[Along::U, Along::V]);
     job.pattern = random.one_of(&[Pattern::Zig, Pattern::Zigzag]);
     job.spacing = random.one_of(&[Spacing::Exact, Spacing::Exact, Spacing::FirstOrder]);
@@ -96,7 +100,8 @@ fn random_regions() {
     for seed in first..first + seeds {
         let job = random_job(seed);
         let about = format!(
-            "seed {seed}: {:?} {:?} {:?}, {} loops",
+            "seed {seed}: {:?} {:?} {:?} {:?}, {} loops",
+            job.machine.has_limits(),
             job.along,
             job.pattern,
             job.spacing,
@@ -204,27 +209,4 @@ fn regions_that_the_machine_does_not_take() {
     );
     job.spacing = Spacing::Constant(job::Start::Edge);
     assert!(refused(&job).starts_with("passes of constant scallop height are made for a whole surface only"));
-}
-
-#[test]
-#[ignore = "debug"]
-fn debug_region() {
-    let seed = std::env::var("SEED").unwrap().parse().unwrap();
-    let job = random_job(seed);
-    println!("{:?} {:?} {:?}", job.region, job.along, job.surface.kind());
-    let followed = follow(&job);
-    println!(
-        "{:?} off {}",
-        followed.oracle.surface.domain(),
-        followed.findings.report.off_boundary
-    );
-    for (k, pass) in followed.track.passes.iter().enumerate() {
-        println!(
-            "{k} {} {:?} {:?} {:?}",
-            pass.side,
-            pass.path.first().unwrap(),
-            pass.path.last().unwrap(),
-            followed.oracle.intervals(pass.side)
-        );
-    }
 }

@@ -465,12 +465,15 @@ impl Motion {
             Command::Start => {
                 self.restart();
                 let Self {
-                    program, sequencer, ..
+                    program,
+                    sequencer,
+                    run,
+                    ..
                 } = self;
                 match program.job(store) {
                     Ok(job) if has_limits => {
                         if let Some(axes) = &job.header.axes {
-                            sequencer.restart(job.header, axes);
+                            sequencer.restart(run.first_route(&job), axes);
                         }
                         State::Linking
                     }

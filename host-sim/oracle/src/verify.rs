@@ -119,7 +119,8 @@ impl Verifier {
             let is_off = if self.oracle.spacing.is_constant() {
                 self.is_off_curve(path, side)
             } else if self.oracle.region.is_some() {
-                let ends = [self.current.map_or(path, |pass| pass.start), path];
+                let end = self.at_boundary(sample, path, side);
+                let ends = [self.current.map_or(end, |pass| pass.start), end];
                 self.on_line.push(ends);
                 !self.oracle.is_interval(ends, side)
             } else {
@@ -176,6 +177,17 @@ impl Verifier {
     /// Whether an end of a curved pass is on no boundary of the surface.
     fn is_off_curve(&self, path: f64, side: f64) -> bool {
         !self.oracle.path_range().contains(&path) && !self.oracle.side_range().contains(&side)
+    }
+
+    /// The surface's boundary for an end of a pass next to a turn, the path parameter for any other.
+    fn at_boundary(&self, sample: &PassSample, path: f64, side: f64) -> f64 {
+        let [low, high] = self.oracle.path_range();
+        let nearer = if path - low < high - path { low } else { high };
+        if self.oracle.overruns && !self.is_off(sample, path, side, nearer) {
+            nearer
+        } else {
+            path
+        }
     }
 
     /// Counts a line of a region that leaves out an interval.
@@ -288,7 +300,11 @@ impl Verifier {
             samples: same_line.map_or(0, |before| before.samples),
             finished: false,
             line,
-            start: path,
+            start: if is_region {
+                self.at_boundary(sample, path, side)
+            } else {
+                path
+            },
             backwards: self.oracle.pattern == Pattern::Zigzag && line % 2 == 1,
         });
     }

@@ -3,7 +3,7 @@
 use crate::fault::{Fault, FaultKind, Result};
 use crate::job::program::{Job, Program};
 use crate::job::{Pattern, Spacing};
-use crate::math::arith::{advanced, dot_hi, fraction_to_f32};
+use crate::math::arith::{advanced, dot_hi, fraction_to_f32, truncated};
 use crate::pass::buffer::PatchBuffer;
 use crate::pass::contact::{self, Reach};
 use crate::pass::front::CurveRun;
@@ -446,18 +446,31 @@ impl Run {
         let travel = &self.travel;
         let [start, _] = travel.route.ends;
         let patch = travel.span().abs_diff(start.span);
-        if !travel.piece.is_whole() {
-            return Some([patch, 0]);
-        }
-        let high = (travel.fraction >> 32) * u64::from(cells_per_patch);
-        let within = u16::try_from(high >> 32).unwrap_or(0);
+        let piece = &travel.piece;
+        let within = if piece.is_whole() {
+            let high = (travel.fraction >> 32) * u64::from(cells_per_patch);
+            u16::try_from(high >> 32).unwrap_or(0)
+        } else {
+            let part = fraction_to_f32(travel.fraction.saturating_sub(piece.start()))
+                / fraction_to_f32(piece.end().saturating_sub(piece.start()));
+            let cell = u16::try_from(truncated(part * f32::from(cells_per_patch))).unwrap_or(0);
+            cell.min(cells_per_patch.saturating_sub(1))
+        };
         Some([patch, within])
     }
 
-    /// Arc since the start of a cell of [`Self::cell`], mm, each cell this fraction of the patch; none where, by rounding, the position is before the cell.
-    pub(crate) fn since_station(&self, [_, within]: [u16; 2], part: u64) -> Option<f32> {
+    /// Arc since the start of a cell of [`Self::cell`], mm, by the number of cells per patch and the fraction of a whole patch in one of them; none where, by
+    /// rounding, the position is before the cell.
+    pub(crate) fn since_station(&self, [_, within]: [u16; 2], (cells, part): (u16, u64)) -> Option<f32> {
         let travel = &self.travel;
-        let start = travel.piece.start() + u64::from(within).wrapping_mul(part);
+        let piece = &travel.piece;
+        let part = if piece.is_whole() {
+            part
+        } else {
+            let length = piece.end().saturating_sub(piece.start());
+            length.checked_div(u64::from(cells))?
+        };
+        let start = piece.start() + u64::from(within).wrapping_mul(part);
         let length = fraction_to_f32(travel.fraction.checked_sub(start)?);
         let mean = 1.0 - 0.5 * travel.path.log_speed_derivative * length;
         Some(length * mean / (travel.path.inv_speed * self.buffer.patch().per_mm))
@@ -511,13 +524,14 @@ impl Run {
                     Reach::Beyond(covered) => covered,
                 };
             rest = (arc - covered) / patch.per_mm;
-            if crossings == CROSSINGS_MAX {
-                break;
-            }
-            if !self.next_piece(job)? {
+            if self.travel.route.next(job, &self.travel.piece).is_none() {
                 self.end_pass(job);
                 return Ok(());
             }
+            if crossings == CROSSINGS_MAX {
+                break;
+            }
+            self.next_piece(job)?;
             start = self.buffer.patch().start().checked()?;
         }
         Err(Fault::new(FaultKind::PatchTooShort, rest))

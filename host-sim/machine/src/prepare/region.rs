@@ -32,13 +32,6 @@ pub(super) fn check_job(job: &Job) -> Result<(), JobError> {
             "write spacing = \"exact\", or remove the section [region]",
         ));
     }
-    if job.region.is_some() && job.machine.has_limits() {
-        return Err(job.origin.error(
-            "region",
-            "a part of a surface is machined without axis limits only",
-            "remove the axis limits, or the section [region]",
-        ));
-    }
     Ok(())
 }
 
