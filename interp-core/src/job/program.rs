@@ -3,7 +3,7 @@
 use crate::command::OVERRIDE_MAX;
 use crate::fault::{Fault, FaultKind, Result};
 use crate::job::region::{
-    EDGE_WORDS, EDGES_A_RECORD, HEAD_WORDS, REGION_SPANS_MAX, RegionCheck, RegionWords, ScanLine,
+    EDGE_WORDS, EDGES_A_RECORD, FirstLine, HEAD_WORDS, REGION_SPANS_MAX, RegionCheck, RegionWords, ScanLine,
 };
 use crate::job::stations::{SPANS_MAX as FRONT_SPANS_MAX, Stations};
 use crate::job::{
@@ -234,11 +234,12 @@ impl Program {
     }
 
     /// The first line of a region, once the job is sealed.
-    pub(crate) const fn first_line(&self) -> &ScanLine {
+    pub(crate) const fn first_line(&self) -> &FirstLine {
         self.region.first_line()
     }
 
-    pub(crate) fn check(&mut self, store: &[i32], record: u32) -> Result<()> {
+    /// Checks a record. `line`: one that is free while a job is loaded.
+    pub(crate) fn check(&mut self, store: &[i32], record: u32, line: &mut ScanLine) -> Result<()> {
         let LoadStage::Loading { received, checked } = self.stage else {
             return Err(bad_length(0));
         };
@@ -260,7 +261,7 @@ impl Program {
                     if portion == 0 {
                         self.region.begin(&region);
                     }
-                    self.region.check(&self.header, &region, portion)
+                    self.region.check(&self.header, &region, portion, line)
                 });
             self.stage = LoadStage::Loading {
                 received,

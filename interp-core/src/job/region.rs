@@ -23,7 +23,7 @@ pub const HEAD_WORDS: usize = 3;
 /// Words of an edge.
 pub const EDGE_WORDS: usize = 4;
 /// Most edges that a line may meet; half as many intervals.
-pub const CROSSINGS_MAX: usize = 64;
+pub const CROSSINGS_MAX: usize = 32;
 /// Most spans of a parameter of a surface with a region: the end of the last one is a place, too.
 pub const REGION_SPANS_MAX: u16 = 1_023;
 
@@ -32,6 +32,8 @@ pub(crate) const EDGES_A_RECORD: u32 = 8;
 /// Edges that are taken in, and that are met, in a portion of the planning.
 const TAKEN: u16 = 32;
 const MET: u8 = 2;
+/// Portions of a line whose edges are taken in.
+const PORTIONS_MAX: usize = CROSSINGS_MAX / MET as usize + 2;
 
 /// The place at the end of a parameter of this number of spans.
 #[must_use]
@@ -258,6 +260,26 @@ impl ScanLine {
         joins: [false; 2],
     };
 
+    /// Goes back to the first line of a region: its edges are known from the checks at load.
+    pub(crate) fn restart(&mut self, first: &FirstLine) {
+        self.side = first.side;
+        self.before = i32::MIN;
+        self.taken = first.taken;
+        self.active = first.active;
+        self.count = first.count;
+        self.met = 0;
+        self.joins = [false; 2];
+        self.task = Task::Meet(0);
+    }
+
+    /// The whole rest of the work on a line whose edges are taken in.
+    pub(crate) fn finish(&mut self, region: &RegionWords<'_>, path_end: i32) -> Result<(), BadLine> {
+        for _ in 0..PORTIONS_MAX {
+            self.work(region, path_end)?;
+        }
+        Ok(())
+    }
+
     /// Goes on to a line further up. `skips`: this one is left out, and does not count as the line before.
     pub(crate) const fn go_on(&mut self, side: i32, skips: bool) {
         if !skips {
@@ -442,10 +464,19 @@ impl ScanLine {
     }
 }
 
-/// The checks of a region at load: edge after edge, and the first line on the way.
+/// The first line of a region: its side, the edges up to there, and those that it meets.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct FirstLine {
+    side: i32,
+    taken: u16,
+    count: u8,
+    active: [u16; CROSSINGS_MAX],
+}
+
+/// The checks of a region at load, edge after edge. They find the first line on the way.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct RegionCheck {
-    line: ScanLine,
+    first: FirstLine,
     /// Lower end of the last edge.
     before: i32,
     /// Combination of all ends that is 0 where each occurs an even number of times.
@@ -455,28 +486,42 @@ pub(crate) struct RegionCheck {
 impl RegionCheck {
     /// Before the first edge.
     pub(crate) const START: Self = Self {
-        line: ScanLine::START,
+        first: FirstLine {
+            side: 0,
+            taken: 0,
+            count: 0,
+            active: [0; CROSSINGS_MAX],
+        },
         before: 0,
         parity: 0,
     };
 
     /// The first line, once every edge is checked.
-    pub(crate) const fn first_line(&self) -> &ScanLine {
-        &self.line
+    pub(crate) const fn first_line(&self) -> &FirstLine {
+        &self.first
     }
 
     /// Begins with the first edge.
     pub(crate) const fn begin(&mut self, region: &RegionWords<'_>) {
         *self = Self::START;
-        self.line.side = region.first();
+        self.first.side = region.first();
     }
 
-    /// Checks a portion of edges; the first line after the last of them. Whether they are sound: on the surface, upwards, in order, closed.
-    pub(crate) fn check(&mut self, header: &Header, region: &RegionWords<'_>, portion: u32) -> bool {
-        let path_end = end_of(header.path_spans);
+    /// Checks a portion of edges, and after the last of them, on a line that is free, the first line. Whether they are sound: on the surface, upwards, in order,
+    /// closed.
+    pub(crate) fn check(
+        &mut self,
+        header: &Header,
+        region: &RegionWords<'_>,
+        portion: u32,
+        line: &mut ScanLine,
+    ) -> bool {
         let from = portion.saturating_mul(EDGES_A_RECORD);
         for index in from..from.saturating_add(EDGES_A_RECORD) {
-            let Some(edge) = u16::try_from(index).ok().and_then(|index| region.edge(index)) else {
+            let Some((number, edge)) = u16::try_from(index)
+                .ok()
+                .and_then(|number| region.edge(number).map(|edge| (number, edge)))
+            else {
                 break;
             };
             let [lower, upper] = edge.side;
@@ -485,23 +530,25 @@ impl RegionCheck {
             }
             self.before = lower;
             self.parity ^= mixed(lower) ^ mixed(upper);
-            if lower <= self.line.side {
-                if self.line.take(&edge).is_err() {
-                    return false;
-                }
-                if edge.meets(self.line.side) {
-                    self.line.meet(&edge, path_end);
+            let first = &mut self.first;
+            if lower <= first.side {
+                first.taken = number.saturating_add(1);
+                if edge.meets(first.side) {
+                    let Some(place) = first.active.get_mut(usize::from(first.count)) else {
+                        return false;
+                    };
+                    *place = number;
+                    first.count += 1;
                 }
             }
         }
         if from + EDGES_A_RECORD < u32::from(header.edges) {
             return true;
         }
-        let is_kept = self.line.keep(region.least()).is_ok();
-        self.line.task = Task::Done;
-        is_kept
+        line.restart(&self.first);
+        line.finish(region, end_of(header.path_spans)).is_ok()
+            && line.intervals() > 0
             && self.parity == 0
-            && self.line.intervals() > 0
             && region.least() > 0
             && region.first() <= region.last()
             && region.last() <= end_of(header.side_spans)

@@ -6,7 +6,7 @@
 
 use crate::fault::{Fault, FaultKind, Result};
 use crate::job::program::Job;
-use crate::job::region::{ScanLine, end_of, place_from, place_of, place_to};
+use crate::job::region::{FirstLine, ScanLine, end_of, place_from, place_of, place_to};
 use crate::job::{Header, Pattern};
 use crate::pass::route::Route;
 use crate::pass::schedule;
@@ -20,8 +20,8 @@ pub(crate) const PORTION_CYCLES: u32 = 2_600;
 pub(crate) enum NextPass {
     /// It is still sought.
     Sought,
-    /// The pass on this route.
-    Found(Route),
+    /// [`RegionLines::take`] gives it.
+    Found,
     /// There is none.
     None,
 }
@@ -35,6 +35,8 @@ pub(crate) struct RegionLines {
     done: u8,
     /// A further line is sought.
     is_seeking: bool,
+    /// The job has a region.
+    is_in_use: bool,
     /// The last step-over, units of the side parameter.
     step: f32,
 }
@@ -46,20 +48,31 @@ impl RegionLines {
         reversed: false,
         done: 0,
         is_seeking: false,
+        is_in_use: false,
         step: 0.0,
     };
 
-    /// Resets to the first line.
-    pub(crate) const fn restart(&mut self, first: &ScanLine) {
-        self.line = *first;
+    /// Resets to the first line of a job with a region.
+    pub(crate) fn restart(&mut self, job: &Job<'_>, first: &FirstLine) {
+        self.is_in_use = false;
         self.reversed = false;
         self.done = 0;
         self.is_seeking = false;
+        if let Some(region) = job.region() {
+            self.line.restart(first);
+            // It was checked at load.
+            self.is_in_use = self.line.finish(&region, end_of(job.header.path_spans)).is_ok();
+        }
+    }
+
+    /// The line, for the checks of a job that is loaded.
+    pub(crate) const fn scratch(&mut self) -> &mut ScanLine {
+        &mut self.line
     }
 
     /// Whether the job has a region.
     pub(crate) const fn is_in_use(&self) -> bool {
-        self.line.intervals() > 0 || self.is_seeking
+        self.is_in_use
     }
 
     /// Whether no interval is left on the line, and the next one is not sought yet.
@@ -69,7 +82,7 @@ impl RegionLines {
 
     /// Whether another interval is left on the line.
     const fn has_more(&self) -> bool {
-        !self.is_seeking && self.done < self.line.intervals()
+        self.is_in_use && !self.is_seeking && self.done < self.line.intervals()
     }
 
     /// The next pass on this line.
@@ -148,8 +161,8 @@ impl RegionLines {
     /// [`FaultKind::BadPatch`] where a line meets too many edges; as [`Self::go_on`].
     #[inline(never)]
     pub(crate) fn seek(&mut self, job: &Job<'_>, pass: u32) -> Result<NextPass> {
-        if let Some(route) = self.take(job.header) {
-            return Ok(NextPass::Found(route));
+        if self.has_more() {
+            return Ok(NextPass::Found);
         }
         let Some(region) = job.region() else {
             return Ok(NextPass::None);
@@ -176,7 +189,7 @@ impl RegionLines {
         self.is_seeking = false;
         self.done = 0;
         self.reversed = job.header.pattern == Pattern::Zigzag && !self.reversed;
-        Ok(self.take(job.header).map_or(NextPass::None, NextPass::Found))
+        Ok(NextPass::Found)
     }
 }
 

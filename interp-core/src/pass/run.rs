@@ -176,8 +176,8 @@ impl Run {
     };
 
     /// Resets to the start of a job.
-    pub(crate) fn restart(&mut self, program: &Program) {
-        self.lines.restart(program.first_line());
+    pub(crate) fn restart(&mut self, program: &Program, job: &Job<'_>) {
+        self.lines.restart(job, program.first_line());
         self.next_pass = NextPass::Sought;
         self.pending = None;
         match (&mut self.planning, program.header().spacing.is_constant()) {
@@ -280,7 +280,10 @@ impl Run {
                     return Err(fault);
                 }
                 match self.next_pass {
-                    NextPass::Found(route) => {
+                    NextPass::Found => {
+                        let Some(route) = self.lines.take(job.header) else {
+                            return Ok(false);
+                        };
                         self.next_pass = NextPass::Sought;
                         self.travel.pass = self.travel.pass.wrapping_add(1);
                         self.begin_pass(job, route)?;

@@ -353,10 +353,11 @@ impl Lookahead {
             }
             Task::Seek => match lines.seek(job, out.pass)? {
                 NextPass::Sought => Task::Seek,
-                NextPass::Found(route) => {
-                    out.next = Some(route);
+                NextPass::Found => {
+                    out.next = lines.take(job.header);
+                    let is_joined = |route: &Route| lines.joins(job.header, &out.route, route);
                     out.steps_over =
-                        job.header.pattern == Pattern::Zigzag && lines.joins(job.header, &out.route, &route);
+                        job.header.pattern == Pattern::Zigzag && out.next.as_ref().is_some_and(is_joined);
                     self.choose_link(job, axes, out)
                 }
                 NextPass::None => self.choose_link(job, axes, out),
