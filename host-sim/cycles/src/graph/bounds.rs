@@ -68,6 +68,11 @@ const BOUNDS: &[(&str, u32, &str)] = &[
         "Newton steps: NEWTON_STEPS",
     ),
     (
+        "interp_core::positioning::Periods::shortest",
+        3,
+        "whole numbers beside the best real one",
+    ),
+    (
         "interp_core::feed::curve::Curve as interp_core::feed::pace::Course::advance",
         3,
         "pieces of a curve, and phases of a ramp",
