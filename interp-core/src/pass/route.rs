@@ -65,6 +65,13 @@ impl Route {
         self.front.is_some()
     }
 
+    /// Whether it starts and whether it ends at the surface's boundaries.
+    pub(crate) fn reach_boundaries(&self, job: &Job<'_>) -> [bool; 2] {
+        let whole = Self::whole(self.side, self.reversed, job.header.path_spans);
+        let ([start, end], [first, last]) = (self.ends, whole.ends);
+        [start == first, end == last]
+    }
+
     /// The first piece.
     pub(crate) fn first(&self, job: &Job<'_>) -> Piece {
         let [start, _] = self.ends;
@@ -72,6 +79,12 @@ impl Route {
             Some(front) => self.on_front(front.first(job, &self.ends, self.reversed)),
             None => self.piece(start.span),
         }
+    }
+
+    /// The last piece of a pass on a line.
+    pub(crate) fn last_on_line(&self) -> Piece {
+        let [_, end] = self.ends;
+        self.piece(end.span)
     }
 
     /// The piece after another, if there is one.

@@ -1,12 +1,13 @@
 //! A run of a job, sample by sample: the one file that chains the stages.
 
 use crate::fault::{Fault, FaultKind, Result};
-use crate::job::program::Job;
+use crate::job::program::{Job, Program};
 use crate::job::{Pattern, Spacing};
-use crate::math::arith::{advanced, dot_hi, fraction_to_f32};
+use crate::math::arith::{advanced, dot_hi, fraction_to_f32, truncated};
 use crate::pass::buffer::PatchBuffer;
 use crate::pass::contact::{self, Reach};
-use crate::pass::front::{FrontSequence, NextPass};
+use crate::pass::front::{FrontSequence, NextRoute};
+use crate::pass::lines::{NextPass, RegionLines};
 use crate::pass::patch::Patch;
 use crate::pass::route::{Piece, Route};
 use crate::pass::scan::PassScan;
@@ -92,6 +93,10 @@ pub(crate) struct Run {
     step_over: Option<f32>,
     /// Feed factor of the last step along the pass.
     last_feed_factor: f32,
+    /// The passes of a region, and the next of them without axis limits; a fault of theirs is reported when the tool is there.
+    pub(crate) lines: RegionLines,
+    next_pass: NextPass,
+    pending: Option<Fault>,
 }
 
 impl Travel {
@@ -171,11 +176,17 @@ impl Run {
         last_interval: f32::INFINITY,
         step_over: None,
         last_feed_factor: 0.0,
+        lines: RegionLines::START,
+        next_pass: NextPass::Sought,
+        pending: None,
     };
 
-    /// Resets to the start of a job with this spacing.
-    pub(crate) fn restart(&mut self, spacing: Spacing) {
-        match (&mut self.planning, spacing.is_constant()) {
+    /// Resets to the start of a job.
+    pub(crate) fn restart(&mut self, program: &Program, job: &Job<'_>) {
+        self.lines.restart(job, program.first_line());
+        self.next_pass = NextPass::Sought;
+        self.pending = None;
+        match (&mut self.planning, program.header().spacing.is_constant()) {
             (PassPlanning::Scan(scan), false) => scan.restart(),
             (PassPlanning::Fronts(fronts), true) => fronts.stop(),
             (planning, true) => *planning = PassPlanning::FRONTS,
@@ -185,6 +196,15 @@ impl Run {
         self.buffer.forget();
         self.last_interval = f32::INFINITY;
         self.step_over = None;
+    }
+
+    /// The first pass.
+    pub(crate) fn first_route(&mut self, job: &Job<'_>) -> Route {
+        if let PassPlanning::Fronts(fronts) = &mut self.planning {
+            return fronts.start(job);
+        }
+        let of_region = self.lines.take(job.header);
+        of_region.unwrap_or_else(|| Route::of_pass(job.header, 0, SpanParameter::default()))
     }
 
     /// Pass, path and side parameter of the tool, in the surface's own direction.
@@ -276,16 +296,38 @@ impl Run {
     #[inline(never)]
     fn change_pass(&mut self, job: &Job<'_>) -> Result<Option<bool>> {
         let next = if self.travel.next == Next::Pass {
-            NextPass::Pass(self.first_route(job))
+            NextRoute::Pass(self.first_route(job))
+        } else if self.lines.is_in_use() {
+            self.take_pass(job)?
         } else {
             self.step_over(job)?
         };
         match next {
-            NextPass::Pass(route) => self.begin_pass(job, route)?,
-            NextPass::NotYet => return Ok(Some(false)),
-            NextPass::None => return Ok(None),
+            NextRoute::Pass(route) => self.begin_pass(job, route)?,
+            NextRoute::NotYet => return Ok(Some(false)),
+            NextRoute::None => return Ok(None),
         }
         Ok(Some(true))
+    }
+
+    /// The next pass of a region, once it is known.
+    fn take_pass(&mut self, job: &Job<'_>) -> Result<NextRoute> {
+        if let Some(fault) = self.pending {
+            return Err(fault);
+        }
+        match self.next_pass {
+            NextPass::Found => {
+                let Some(route) = self.lines.take(job.header) else {
+                    return Ok(NextRoute::None);
+                };
+                self.next_pass = NextPass::Sought;
+                self.travel.pass = self.travel.pass.wrapping_add(1);
+                Ok(NextRoute::Pass(route))
+            }
+            NextPass::None => Ok(NextRoute::None),
+            // It stands until the next pass is known.
+            NextPass::Sought => Ok(NextRoute::NotYet),
+        }
     }
 
     /// Collapses the first patch of this pass. The tool does not move.
@@ -418,18 +460,31 @@ impl Run {
         }
         let [start, _] = travel.route.ends;
         let patch = travel.span().abs_diff(start.span);
-        if !travel.piece.is_whole() {
-            return Some([patch, 0]);
-        }
-        let high = (travel.fraction >> 32) * u64::from(cells_per_patch);
-        let within = u16::try_from(high >> 32).unwrap_or(0);
+        let piece = &travel.piece;
+        let within = if piece.is_whole() {
+            let high = (travel.fraction >> 32) * u64::from(cells_per_patch);
+            u16::try_from(high >> 32).unwrap_or(0)
+        } else {
+            let part = fraction_to_f32(travel.fraction.saturating_sub(piece.start()))
+                / fraction_to_f32(piece.end().saturating_sub(piece.start()));
+            let cell = u16::try_from(truncated(part * f32::from(cells_per_patch))).unwrap_or(0);
+            cell.min(cells_per_patch.saturating_sub(1))
+        };
         Some([patch, within])
     }
 
-    /// Arc since the start of a cell of [`Self::cell`], mm, each cell this fraction of the patch; none where, by rounding, the position is before the cell.
-    pub(crate) fn since_station(&self, [_, within]: [u16; 2], part: u64) -> Option<f32> {
+    /// Arc since the start of a cell of [`Self::cell`], mm, by the number of cells per patch and the fraction of a whole patch in one of them; none where, by
+    /// rounding, the position is before the cell.
+    pub(crate) fn since_station(&self, [_, within]: [u16; 2], (cells, part): (u16, u64)) -> Option<f32> {
         let travel = &self.travel;
-        let start = travel.piece.start() + u64::from(within).wrapping_mul(part);
+        let piece = &travel.piece;
+        let part = if piece.is_whole() {
+            part
+        } else {
+            let length = piece.end().saturating_sub(piece.start());
+            length.checked_div(u64::from(cells))?
+        };
+        let start = piece.start() + u64::from(within).wrapping_mul(part);
         let length = fraction_to_f32(travel.fraction.checked_sub(start)?);
         let mean = 1.0 - 0.5 * travel.path.log_speed_derivative * length;
         Some(length * mean / (travel.path.inv_speed * self.buffer.patch().per_mm))
@@ -497,13 +552,14 @@ impl Run {
                     Reach::Beyond(covered) => covered,
                 };
             rest = (arc - covered) / patch.per_mm;
-            if crossings == most {
-                break;
-            }
-            if !self.next_piece(job)? {
+            if self.travel.route.next(job, &self.travel.piece).is_none() {
                 self.end_pass(job);
                 return Ok(());
             }
+            if crossings == most {
+                break;
+            }
+            self.next_piece(job)?;
             start = self.buffer.patch().start().checked()?;
         }
         Err(Fault::new(FaultKind::PatchTooShort, rest))
@@ -511,7 +567,7 @@ impl Run {
 
     /// On a pole, advances the path parameter: the tool stands, but the interval that the pass allows depends on the parameter.
     fn step_on_pole(&mut self, job: &Job<'_>) -> Result<()> {
-        if let Some(fraction) = self.travel.fraction.checked_add(POLE_STEP) {
+        if let Some(fraction) = self.travel.beyond(POLE_STEP) {
             self.travel.fraction = fraction;
         } else if !self.next_piece(job)? {
             self.end_pass(job);
@@ -535,6 +591,7 @@ impl Run {
     /// Begins a pass.
     fn begin_pass(&mut self, job: &Job<'_>, route: Route) -> Result<()> {
         let travel = &mut self.travel;
+        let side_before = travel.route.side;
         travel.route = route;
         travel.side = route.side;
         if route.front.is_some() {
@@ -543,11 +600,19 @@ impl Run {
         }
         travel.piece = route.first(job);
         travel.fraction = travel.piece.start();
-        travel.max_inv_interval_sq = 0.0;
+        // The maximum is that of all passes on the line.
+        let goes_on = travel.pass > 0 && route.side == side_before;
+        if !goes_on {
+            travel.max_inv_interval_sq = 0.0;
+        }
+        if job.header.edges > 0 {
+            // The surface may have turned away in between.
+            travel.offset = [0; 3];
+        }
         travel.next = Next::Along;
         travel.path.log_speed_derivative = f32::NAN;
         if let PassPlanning::Scan(scan) = &mut self.planning {
-            scan.begin(&travel.piece.position);
+            scan.begin(&route, goes_on);
         }
         self.buffer.begin(job, &travel.route, &travel.piece)
     }
@@ -556,8 +621,18 @@ impl Run {
     pub(crate) fn has_to_plan(&self, spacing: Spacing) -> bool {
         match &self.planning {
             PassPlanning::Fronts(fronts) => fronts.has_work(),
-            PassPlanning::Scan(scan) => spacing == Spacing::Exact && (scan.has_work() || self.is_step_due()),
+            PassPlanning::Scan(scan) => {
+                spacing == Spacing::Exact && (scan.has_work() || self.is_step_due()) || self.is_pass_due()
+            }
         }
+    }
+
+    /// Whether the next pass of a region is to be sought.
+    fn is_pass_due(&self) -> bool {
+        self.lines.is_in_use()
+            && self.travel.next == Next::Over
+            && self.next_pass == NextPass::Sought
+            && self.pending.is_none()
     }
 
     /// Whether the pass is over, and the step to the next one is not known yet.
@@ -574,9 +649,33 @@ impl Run {
                 scan.has_work()
             }
         };
-        if self.is_step_due() && !has_work {
+        if self.lines.is_in_use() {
+            if self.is_pass_due() && !has_work {
+                match self.seek_pass(job) {
+                    Ok(next) => self.next_pass = next,
+                    Err(fault) => self.pending = Some(fault),
+                }
+            }
+        } else if self.is_step_due() && !has_work {
             self.step_over = Some(self.find_step_over(job));
         }
+    }
+
+    /// A portion of the search for the next pass of a region.
+    ///
+    /// # Errors
+    /// As [`RegionLines::seek`].
+    #[inline(never)]
+    fn seek_pass(&mut self, job: &Job<'_>) -> Result<NextPass> {
+        if self.lines.is_line_over() {
+            let step = self.find_step_over(job);
+            return Ok(if self.lines.go_on(job, step)? {
+                NextPass::Sought
+            } else {
+                NextPass::None
+            });
+        }
+        self.lines.seek(job, self.travel.pass)
     }
 
     /// The step to the next pass.
@@ -589,7 +688,7 @@ impl Run {
         } = self.travel;
         match (&mut self.planning, job.header.spacing) {
             (PassPlanning::Scan(scan), Spacing::Exact) => scan.step(
-                job.header,
+                job,
                 PassMaximum {
                     inv_interval_sq: max_inv_interval_sq,
                     shape,
@@ -599,12 +698,13 @@ impl Run {
         }
     }
 
-    /// The estimator of the step to the next straight pass.
-    pub(crate) const fn estimator(&mut self) -> Option<&mut StepOverEstimator> {
-        match &mut self.planning {
+    /// The estimator of the step to the next straight pass, and the lines of a region.
+    pub(crate) const fn estimator_and_lines(&mut self) -> (Option<&mut StepOverEstimator>, &mut RegionLines) {
+        let estimator = match &mut self.planning {
             PassPlanning::Scan(scan) => Some(scan.estimator()),
             PassPlanning::Fronts(_) => None,
-        }
+        };
+        (estimator, &mut self.lines)
     }
 
     pub(crate) const fn estimator_ref(&self) -> Option<&StepOverEstimator> {
@@ -633,10 +733,10 @@ impl Run {
     ///
     /// # Errors
     /// As [`FrontSequence::next`].
-    pub(crate) fn next_pass(&mut self, job: &Job<'_>) -> Result<NextPass> {
+    pub(crate) fn next_pass(&mut self, job: &Job<'_>) -> Result<NextRoute> {
         match &mut self.planning {
             PassPlanning::Fronts(fronts) => fronts.next(job),
-            PassPlanning::Scan(_) => Ok(NextPass::None),
+            PassPlanning::Scan(_) => Ok(NextRoute::None),
         }
     }
 
@@ -664,20 +764,12 @@ impl Run {
         }
     }
 
-    /// The first pass.
-    pub(crate) fn first_route(&mut self, job: &Job<'_>) -> Route {
-        match &mut self.planning {
-            PassPlanning::Fronts(fronts) => fronts.start(job),
-            PassPlanning::Scan(_) => Route::of_pass(job.header, 0, SpanParameter::default()),
-        }
-    }
-
     /// The next pass. Its first sample is adjacent to the last pass's first, or to its last where the
     /// pattern is zigzag.
-    fn step_over(&mut self, job: &Job<'_>) -> Result<NextPass> {
+    fn step_over(&mut self, job: &Job<'_>) -> Result<NextRoute> {
         if let PassPlanning::Fronts(fronts) = &mut self.planning {
             let next = fronts.next(job)?;
-            if let NextPass::Pass(_) = next {
+            if let NextRoute::Pass(_) = next {
                 fronts.arrive();
                 self.travel.pass = self.travel.pass.wrapping_add(1);
             }
@@ -694,7 +786,7 @@ impl Run {
         if job.header.pattern == Pattern::Zig {
             travel.offset = self.first_offset;
         }
-        Ok(NextPass::Pass(Route::of_pass(job.header, travel.pass, side)))
+        Ok(NextRoute::Pass(Route::of_pass(job.header, travel.pass, side)))
     }
 
     /// Whether the run is exactly at the end of the pass.
@@ -702,7 +794,9 @@ impl Run {
         self.travel.fraction = self.travel.piece.end();
         let last = match &self.planning {
             PassPlanning::Fronts(fronts) => fronts.is_over(),
-            PassPlanning::Scan(_) => schedule::is_last(self.travel.route.side, job.header.side_spans),
+            PassPlanning::Scan(_) => {
+                schedule::is_last(self.travel.route.side, job.header.side_spans) && job.header.edges == 0
+            }
         };
         self.travel.next = if last { Next::End } else { Next::Over };
     }

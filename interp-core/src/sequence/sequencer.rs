@@ -10,11 +10,13 @@ use crate::feed::limits::MotionLimits;
 use crate::feed::pace::{Course as _, Pace};
 use crate::feed::plan::{Cursor, Plan};
 use crate::feed::planner::{PORTION_CYCLES, Planner};
+use crate::feed::profile::Profiles;
 use crate::feed::turn::Turn;
 use crate::job::program::{Job, Program};
 use crate::job::{AxisLimits, Pattern};
 use crate::math::number::{Bounded, to_f32};
-use crate::pass::front::NextPass;
+use crate::pass::front::NextRoute;
+use crate::pass::route::Route;
 use crate::pass::run::Run;
 use crate::pass::scan::cycles::{NEXT, PATCH};
 use crate::sample::{Sample, SpanParameter};
@@ -29,12 +31,12 @@ const SPARE_PERIODS: u32 = 15;
 
 /// Cycles of one place of a search for a change of the pace, along a pass and along a link, and of its begin along a pass; of a portion of a
 /// step-over's planning.
-const PACE_CYCLES: u32 = 1_560;
-const PACE_BEGIN_CYCLES: u32 = 8_000;
-const LINK_PACE_CYCLES: u32 = 1_000;
+const PACE_CYCLES: u32 = 1_900;
+const PACE_BEGIN_CYCLES: u32 = 9_500;
+const LINK_PACE_CYCLES: u32 = 1_300;
 const STEP_OVER_CYCLES: u32 = 6_000;
 /// Cycles of the same of a hop, and of its planning.
-const HOP_PACE_CYCLES: u32 = 2_500;
+const HOP_PACE_CYCLES: u32 = 3_300;
 const HOP_CYCLES: u32 = 24_000;
 /// Cycles of the begin of a look-ahead, and of the planning of a leg.
 const BEGIN_CYCLES: u32 = 1_500;
@@ -142,6 +144,7 @@ pub(crate) struct Sequencer {
     pub(super) pending: Option<Fault>,
     pub(super) follower: Follower,
     pub(super) pace: Pace<Cursor>,
+    pub(super) profiles: Profiles,
     /// The turn that the tool is in, or was last.
     pub(super) turn: Turn,
     pub(super) straight: StraightMove,
@@ -190,6 +193,7 @@ impl Sequencer {
         pending: None,
         follower: Follower::START,
         pace: Pace::REST,
+        profiles: Profiles::NONE,
         turn: Turn::NONE,
         straight: StraightMove::NONE,
         hop: Hop::NONE,
@@ -209,7 +213,7 @@ impl Sequencer {
     };
 
     /// Starts the job from the tool's position.
-    pub(crate) fn restart(&mut self, job: &Job<'_>, axes: &AxisLimits, run: &mut Run) {
+    pub(crate) fn restart(&mut self, first: Route, axes: &AxisLimits) {
         self.at.get_or_insert(axes.home_nm);
         self.phase = Phase::Await;
         self.second = false;
@@ -225,7 +229,7 @@ impl Sequencer {
         (self.front_spent, self.front_last) = (0, 0);
         self.has_to_choose = false;
         let (_, next) = both(&mut self.plans, self.second);
-        next.route = run.first_route(job);
+        next.route = first;
         self.request_planning(Planning::Requested(0));
     }
 
@@ -437,11 +441,15 @@ impl Sequencer {
                 let known = is_known.then_some(&next.plan);
                 let stops = self.pace.wanted() == 0.0;
                 let road = road(&now.plan, known, next.plan.pace_max, stops);
-                return self.pace.work(&road, &self.follower.cursor);
+                return self.pace.work(&road, &self.follower.cursor, &mut self.profiles);
             }
-            Phase::StepOver if self.step_over.progress.has_work() => return self.step_over.progress.work(),
-            Phase::Leg(_) if self.straight.progress.has_work() => return self.straight.progress.work(),
-            Phase::Hop if self.hop.has_work() => return self.hop.work(),
+            Phase::StepOver if self.step_over.progress.has_work() => {
+                return self.step_over.progress.work(&mut self.profiles);
+            }
+            Phase::Leg(_) if self.straight.progress.has_work() => {
+                return self.straight.progress.work(&mut self.profiles);
+            }
+            Phase::Hop if self.hop.has_work() => return self.hop.work(&mut self.profiles),
             _ => {}
         }
         if let Some(route) = self.pass_ahead().map(|pass| pass.route) {
@@ -474,12 +482,12 @@ impl Sequencer {
         }
         match self.planning {
             Planning::Awaited(pass) => match run.next_pass(job) {
-                Ok(NextPass::Pass(route)) => {
+                Ok(NextRoute::Pass(route)) => {
                     next.route = route;
                     self.planning = Planning::Requested(pass);
                 }
-                Ok(NextPass::NotYet) => {}
-                Ok(NextPass::None) => self.planning = Planning::Complete,
+                Ok(NextRoute::NotYet) => {}
+                Ok(NextRoute::None) => self.planning = Planning::Complete,
                 Err(fault) => self.pending = Some(fault),
             },
             Planning::Requested(pass) => {
@@ -488,8 +496,10 @@ impl Sequencer {
                 self.planning = Planning::Stations;
             }
             Planning::Stations => {
-                self.pending = self.lookahead.work(job, axes, run.estimator(), next).err();
+                let (estimator, lines) = run.estimator_and_lines();
+                self.pending = self.lookahead.work(job, axes, estimator, lines, next).err();
                 if self.lookahead.is_done() {
+                    next.is_last |= next.next.is_none() && !job.header.spacing.is_constant();
                     self.planning = if next.point {
                         Planning::Complete
                     } else {
@@ -503,7 +513,12 @@ impl Sequencer {
             Planning::Feed => {
                 // The pass after it takes as long to plan; off the surface it can be waited for.
                 let is_last = next.is_last && !self.planner.is_walking();
-                let least = if !is_last && job.header.pattern == Pattern::Zigzag {
+                let is_on_surface = if job.header.spacing.is_constant() {
+                    job.header.pattern == Pattern::Zigzag
+                } else {
+                    next.steps_over
+                };
+                let least = if !is_last && is_on_surface {
                     let front = if run.needs_front() {
                         front_periods(self.front_spent, self.front_last)
                     } else {
@@ -595,19 +610,13 @@ impl Sequencer {
     fn choose_link(&mut self, job: &Job<'_>) {
         self.has_to_choose = false;
         let (now, next) = both(&mut self.plans, self.second);
-        let is_along = job.header.pattern == Pattern::Zigzag && now.is_beside(next, job);
-        if is_along {
+        now.steps_over = job.header.pattern == Pattern::Zigzag && now.is_beside(next, job);
+        if now.steps_over {
             self.step_over.request();
             self.has_step_over = true;
         } else {
             self.has_hop = true;
         }
-    }
-
-    /// Whether the link to the next pass is along the boundary.
-    fn steps_over(&self, job: &Job<'_>) -> bool {
-        let is_chosen = !job.header.spacing.is_constant() || self.has_step_over;
-        job.header.pattern == Pattern::Zigzag && is_chosen
     }
 
     /// One period, into `last`. The phases off the passes are separate functions, so that a tick on a pass saves no registers for them.
@@ -678,9 +687,8 @@ impl Sequencer {
             if !self.is_planned() || self.has_to_plan_step_over() || self.has_to_choose {
                 return Ok(());
             }
-            let steps_over = self.on_surface && self.steps_over(job);
             let (now, next) = both(&mut self.plans, self.second);
-            if steps_over {
+            if self.on_surface && now.steps_over {
                 self.phase = Phase::StepOver;
                 let pace = command.feed_factor * job.header.feed_mm_s / self.step_over.feed();
                 self.step_over
@@ -752,11 +760,11 @@ impl Sequencer {
             self.hop.clear();
             return;
         }
-        if job.header.pattern == Pattern::Zigzag && now.next.is_some() && !now.turns() {
+        if now.steps_over && !now.turns() {
             self.step_over.request();
             self.has_step_over = true;
         }
-        self.has_hop = job.header.pattern == Pattern::Zig && now.next.is_some();
+        self.has_hop = !now.steps_over && now.next.is_some();
         self.hop.clear();
     }
 
@@ -827,7 +835,7 @@ impl Sequencer {
             {
                 return Err(fault);
             }
-            let pace = self.pace.tick();
+            let pace = self.pace.tick(&mut self.profiles);
             let (now, _) = both(&mut self.plans, self.second);
             let moved = if pace > 0.0 {
                 self.follower.tick(&now.plan, pace)
@@ -912,7 +920,7 @@ impl Sequencer {
     fn stays_on_surface(&self, job: &Job<'_>) -> bool {
         let (now, _) = self.plans_ref();
         if !job.header.spacing.is_constant() {
-            return job.header.pattern == Pattern::Zigzag;
+            return now.steps_over;
         }
         self.pending.is_some() || (self.has_step_over && self.is_planned()) || !now.faces_up[1]
     }
@@ -921,7 +929,7 @@ impl Sequencer {
     /// measured, because those in which the tool comes to a patch, and the patch after it is prepared, are the worst-case ticks.
     fn correct_progress(&mut self, run: &Run) {
         let (now, _) = both(&mut self.plans, self.second);
-        let (cells, fraction) = now.kept_cells();
+        let kept = now.kept_cells();
         if self.phase != Phase::Pass || now.point {
             return;
         }
@@ -933,7 +941,7 @@ impl Sequencer {
             }
             return;
         }
-        let Some(cell) = run.cell(cells).filter(|cell| *cell != self.cell) else {
+        let Some(cell) = run.cell(kept.0).filter(|cell| *cell != self.cell) else {
             return;
         };
         self.cell = cell;
@@ -941,7 +949,7 @@ impl Sequencer {
             true => now.arc_at_piece_q10(cell[0]),
             false => now.arc_q10(cell),
         };
-        let (Some(start_q10), Some(since_mm)) = (arc, run.since_station(cell, fraction)) else {
+        let (Some(start_q10), Some(since_mm)) = (arc, run.since_station(cell, kept)) else {
             return;
         };
         let arc_q10 = start_q10 + crate::feed::to_q10(since_mm);
@@ -962,6 +970,7 @@ impl Sequencer {
             command.feed_factor.at_most(1.0),
             command.is_fault,
             job.header.period_s,
+            &mut self.profiles,
         ) {
             self.swap(run);
             return self.enter_pass(job, run, command, last);
@@ -979,10 +988,12 @@ impl Sequencer {
     ) -> Result<()> {
         let pace = command.feed_factor * job.header.feed_mm_s / self.step_over.feed();
         let is_over = self.step_over.is_nothing()
-            || self
-                .step_over
-                .progress
-                .tick(pace.at_most(1.0), command.is_fault, job.header.period_s);
+            || self.step_over.progress.tick(
+                pace.at_most(1.0),
+                command.is_fault,
+                job.header.period_s,
+                &mut self.profiles,
+            );
         if is_over {
             return self.enter_pass(job, run, command, last);
         }

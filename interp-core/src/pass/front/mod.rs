@@ -36,4 +36,4 @@ mod spline;
 pub(crate) mod table;
 
 pub(crate) use line::{FrontLine, FrontPiece, PiecePlace};
-pub(crate) use sequence::{FrontSequence, NextPass};
+pub(crate) use sequence::{FrontSequence, NextRoute};

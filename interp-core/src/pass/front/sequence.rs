@@ -31,7 +31,7 @@ enum Line {
 
 /// The next pass.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(crate) enum NextPass {
+pub(crate) enum NextRoute {
     /// It is not made yet.
     NotYet,
     Pass(Route),
@@ -182,21 +182,21 @@ impl FrontSequence {
     ///
     /// # Errors
     /// [`FaultKind::IntervalTooSmall`] where the front does not move.
-    pub(crate) fn next(&mut self, job: &Job<'_>) -> Result<NextPass> {
+    pub(crate) fn next(&mut self, job: &Job<'_>) -> Result<NextRoute> {
         if self.line == Line::Front {
             let swapped = self.swapped != self.is_ahead;
             if let Some(route) = self.next_part(job, swapped) {
-                return Ok(NextPass::Pass(route));
+                return Ok(NextRoute::Pass(route));
             }
         }
         if self.is_over() {
-            return Ok(NextPass::None);
+            return Ok(NextRoute::None);
         }
         if self.is_ahead {
-            return Ok(NextPass::NotYet);
+            return Ok(NextRoute::NotYet);
         }
         let Some(made) = self.advance.made() else {
-            return Ok(NextPass::NotYet);
+            return Ok(NextRoute::NotYet);
         };
         let made = made?;
         if self.begins_part {
@@ -212,13 +212,13 @@ impl FrontSequence {
                 self.after = 0;
                 let route = self.next_part(job, !self.swapped);
                 let route = route.ok_or(Fault::new(FaultKind::IntervalTooSmall, 0.0))?;
-                Ok(NextPass::Pass(route))
+                Ok(NextRoute::Pass(route))
             }
             Made::Beyond => {
                 self.line = Line::Last;
                 self.begins_part = job.header.spacing == Spacing::ConstantFromMiddle && self.part == 0;
                 let boundary = self.direction.boundary(job);
-                Ok(NextPass::Pass(self.whole_line(job, boundary)))
+                Ok(NextRoute::Pass(self.whole_line(job, boundary)))
             }
         }
     }
