@@ -63,11 +63,6 @@ const BOUNDS: &[(&str, u32, &str)] = &[
         "edges of a portion: TAKEN",
     ),
     (
-        "interp_core::pass::contact::solve",
-        2,
-        "Newton steps: NEWTON_STEPS",
-    ),
-    (
         "interp_core::positioning::Periods::shortest",
         3,
         "whole numbers beside the best real one",
@@ -142,11 +137,6 @@ const BOUNDS: &[(&str, u32, &str)] = &[
         "interp_core::feed::road::GateSearch::place",
         160,
         "nodes of a plan: NODES_MAX",
-    ),
-    (
-        "interp_core::feed::road::Road as interp_core::feed::pace::Course::advance",
-        8,
-        "steps that a period is made of: PARTS_MAX",
     ),
     ("interp_core::feed::turn::Turn::bound_speed", 3, "axes"),
     (
