@@ -13,20 +13,24 @@
 //!
 //! Not in the sample path: f64; lengths in mm, angles in rad.
 
+mod crossings;
 mod curve;
 mod error;
 mod exact;
 mod faces;
 mod fit;
-mod invert;
 mod job;
 mod machinable;
 mod measure;
+mod interpolation;
+mod invert;
 mod outline;
 mod placement;
 mod reader;
+mod remap;
 mod spline;
 mod surface;
+mod trim;
 #[cfg(test)]
 mod tests;
 
@@ -37,16 +41,19 @@ pub use fit::Deviation;
 pub use job::{JobOptions, JobText, machined_sign, write_job};
 pub use machinable::{Form, MachinableFace, Options, degrees, machinable};
 pub use measure::{Measures, measure};
+pub use interpolation::interpolation_error_mm;
 pub use outline::{Outline, outline};
 pub use placement::Placement;
 pub use reader::{Model, read};
 pub use spline::{Axis, DEGREE_MAX, Pole, SplineCurve, SplineSurface};
 pub use surface::Surface;
+pub use trim::{Polygon, TrimError, polylines, trim};
 
 use glam::DVec3;
 use serde::{Deserialize, Serialize};
 
-/// One smooth boundary edge as points along it, mm, in the order of the loop.
+/// One smooth boundary edge as points at equal steps of its parameter, mm, in the order of the loop. Between them a cubic through the nearest four
+/// is within 0.1 um of the edge.
 pub type Edge = Vec<DVec3>;
 
 /// Boundary of a face.
