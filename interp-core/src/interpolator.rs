@@ -470,7 +470,7 @@ impl Motion {
                 match program.job(store) {
                     Ok(job) if has_limits => {
                         if let Some(axes) = &job.header.axes {
-                            sequencer.restart(axes);
+                            sequencer.restart(job.header, axes);
                         }
                         State::Linking
                     }

@@ -204,7 +204,8 @@ mod tests {
         let mut lower = axes();
         (lower.velocity_mm_s[1], lower.travel_nm[2]) = (1.0, [-1, 0]);
         assert_eq!(PROFILE.exceeded_by(&lower), None);
-        let change: [(fn(&mut AxisLimits), ProfileLimit, u8); 5] = [
+        type Change = fn(&mut AxisLimits);
+        let changes: [(Change, ProfileLimit, u8); 5] = [
             (|axes| axes.velocity_mm_s[1] = 80.001, ProfileLimit::Velocity, 1),
             (
                 |axes| axes.acceleration_mm_s2[0] = 1001.0,
@@ -215,7 +216,7 @@ mod tests {
             (|axes| axes.travel_nm[0][0] -= 1, ProfileLimit::Travel, 0),
             (|axes| axes.travel_nm[2][1] += 1, ProfileLimit::Travel, 2),
         ];
-        for (change, limit, axis) in change {
+        for (change, limit, axis) in changes {
             let mut axes = axes();
             change(&mut axes);
             let excess = PROFILE.exceeded_by(&axes).unwrap();

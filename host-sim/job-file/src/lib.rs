@@ -10,6 +10,7 @@
 mod file;
 mod machine;
 mod placement;
+mod region;
 mod section;
 mod setup;
 mod steps;
@@ -108,6 +109,7 @@ fn parse_on(
         &[
             "surface",
             "placement",
+            "region",
             "tool",
             "stock",
             "fixture",
@@ -120,6 +122,10 @@ fn parse_on(
     let (surface, placement) = match document.optional_section("placement")? {
         Some(section) => placement::place(&section, &unplaced)?,
         None => (unplaced.clone(), Placement::default()),
+    };
+    let region = match document.optional_section("region")? {
+        Some(section) => Some(region::read(&section, &surface)?),
+        None => None,
     };
     let (radius_mm, body) = setup::tool(&document.section("tool")?)?;
     let setup = setup::read(&document)?;
@@ -164,6 +170,7 @@ fn parse_on(
     }
     Ok(Job {
         surface,
+        region,
         radius_mm,
         body,
         setup,

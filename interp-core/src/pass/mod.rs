@@ -4,7 +4,7 @@
 //!
 //! | file | holds |
 //! |---|---|
-//! | [`position`] | a patch on a pass |
+//! | [`position`], [`route`] | a patch on a pass; a pass from place to place |
 //! | [`patch`], [`buffer`] | the patch at the pass's side parameter; the current patch and the next one |
 //! | [`contact`] | the step along the pass at the commanded feed |
 //! | [`offset`], [`evaluation`] | fit of the ball and cutter location; contact, fit and location in one call |
@@ -24,6 +24,7 @@ pub(crate) mod interval;
 pub(crate) mod offset;
 pub(crate) mod patch;
 pub(crate) mod position;
+pub(crate) mod route;
 pub(crate) mod run;
 pub(crate) mod scan;
 pub(crate) mod schedule;

@@ -8,6 +8,7 @@ use crate::math::number::NM_PER_MM_F32;
 use crate::pass::interval::Interval;
 use crate::pass::offset::{Locator, origin_q30};
 use crate::pass::position::PassPosition;
+use crate::pass::route::Piece;
 use crate::surface::{
     Ball, CirclePass, GridPass, IsoLine, OffsetUnits, POLYNOMIAL_WORDS, PathSpeed, ProfilePass,
     RATIONAL_WORDS, REVOLVED_WORDS, Surface, split_patch, split_revolved,
@@ -28,6 +29,8 @@ pub(crate) struct Patch {
     pub(crate) per_mm: f32,
     /// The pass degenerates to a point on this patch.
     pub(crate) point: bool,
+    /// Start and end of the pass on it, fractions in the direction of travel.
+    pub(crate) range: [u64; 2],
     /// The parametrisation at start and end, once [`Self::find_ends`] was called.
     ends: Option<[PathSpeed; 2]>,
 }
@@ -43,8 +46,18 @@ impl Patch {
         arc: 0.0,
         per_mm: 1.0,
         point: false,
+        range: [0, u64::MAX],
         ends: None,
     };
+
+    /// Becomes the patch of a piece of a pass.
+    ///
+    /// # Errors
+    /// As [`Self::collapse`].
+    pub(crate) fn lay(&mut self, job: &Job<'_>, piece: &Piece) -> Result<()> {
+        self.range = piece.range;
+        self.collapse(job, &piece.position)
+    }
 
     /// Collapses the patch of a pass.
     ///
@@ -110,19 +123,25 @@ impl Patch {
         self.ends.is_some()
     }
 
-    /// The parametrisation at the patch's start, in the direction of travel.
+    /// The parametrisation at the start of the pass on the patch, in the direction of travel.
     pub(crate) fn start(&self) -> PathSpeed {
         match self.ends {
             Some([start, _]) => start,
-            None => self.surface.path_at(0),
+            None => {
+                let [start, _] = self.range;
+                self.surface.path_at(start)
+            }
         }
     }
 
-    /// The parametrisation at the patch's end, in the direction of travel.
+    /// The parametrisation at the end of the pass on the patch, in the direction of travel.
     pub(crate) fn end(&self) -> PathSpeed {
         match self.ends {
             Some([_, end]) => end,
-            None => self.surface.path_at(u64::MAX),
+            None => {
+                let [_, end] = self.range;
+                self.surface.path_at(end)
+            }
         }
     }
 

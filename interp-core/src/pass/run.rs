@@ -8,7 +8,7 @@ use crate::pass::buffer::PatchBuffer;
 use crate::pass::contact::{self, Reach};
 use crate::pass::front::CurveRun;
 use crate::pass::patch::Patch;
-use crate::pass::position::PassPosition;
+use crate::pass::route::{Piece, Route};
 use crate::pass::scan::PassScan;
 use crate::pass::schedule;
 use crate::pass::step_over::PassMaximum;
@@ -40,9 +40,8 @@ enum Next {
 #[derive(Clone, Copy, Debug)]
 struct Travel {
     next: Next,
-    reversed: bool,
-    /// Path span, in the surface's own direction.
-    span: u16,
+    route: Route,
+    piece: Piece,
     /// Fraction of the span, in the direction of travel.
     fraction: u64,
     /// The parametrisation at the last sample, and the logarithmic speed derivative at the sample before; NaN where that is on another patch.
@@ -56,7 +55,6 @@ struct Travel {
     /// Samples so far.
     ticks: u32,
     pass: u32,
-    side: SpanParameter,
 }
 
 /// What is planned while the tool is on a pass, by the job's spacing.
@@ -94,8 +92,8 @@ pub(crate) struct Run {
 impl Travel {
     const START: Self = Self {
         next: Next::Pass,
-        reversed: false,
-        span: 0,
+        route: Route::NONE,
+        piece: Piece::NONE,
         fraction: 0,
         path: PathSpeed {
             inv_speed: 0.0,
@@ -107,25 +105,22 @@ impl Travel {
         shape: [0.0; 2],
         ticks: 0,
         pass: 0,
-        side: SpanParameter { span: 0, fraction: 0 },
     };
 
     /// Fraction of the span, in the surface's own direction.
     const fn own_fraction(&self) -> u64 {
-        if self.reversed {
-            !self.fraction
-        } else {
-            self.fraction
-        }
+        self.route.turned(self.fraction)
     }
 
-    /// The current patch.
-    const fn position(&self) -> PassPosition {
-        PassPosition {
-            side: self.side,
-            reversed: self.reversed,
-            span: self.span,
-        }
+    /// Path span, in the surface's own direction.
+    const fn span(&self) -> u16 {
+        self.piece.position.span
+    }
+
+    /// The place a step beyond, if it is on the piece.
+    #[inline(always)]
+    fn beyond(&self, step: u64) -> Option<u64> {
+        advanced(self.fraction, step).filter(|fraction| *fraction <= self.piece.end())
     }
 
     /// Steps 2 to 4 at the run's position. A fault leaves `last` unchanged. Not inlined: a separate function for
@@ -193,10 +188,10 @@ impl Run {
         }
         let travel = &self.travel;
         let path = SpanParameter {
-            span: travel.span,
+            span: travel.span(),
             fraction: travel.own_fraction(),
         };
-        (travel.pass, path, travel.side)
+        (travel.pass, path, travel.route.side)
     }
 
     /// Minimum path interval of the last finished pass.
@@ -233,11 +228,11 @@ impl Run {
                 travel.log_speed_derivative_before,
                 self.buffer.patch().arc,
             );
-            if let Some(fraction) = step.and_then(|step| advanced(travel.fraction, step)) {
+            if let Some(fraction) = step.and_then(|step| travel.beyond(step)) {
                 travel.fraction = fraction;
                 self.sample(last)?;
                 if self.buffer.has_work() {
-                    self.buffer.work(job, &self.travel.position());
+                    self.buffer.work(job, &self.travel.route, &self.travel.piece);
                 }
                 return Ok(true);
             }
@@ -259,10 +254,10 @@ impl Run {
         match self.travel.next {
             Next::Along if self.buffer.patch().point => self.step_on_pole(job)?,
             Next::Along => self.step_far(job, feed_factor)?,
-            Next::Pass => self.begin_pass(job)?,
+            Next::Pass => self.begin_pass(job, Route::of_pass(job.header, 0, SpanParameter::default()))?,
             Next::Over => {
-                self.step_over(job)?;
-                self.begin_pass(job)?;
+                let route = self.step_over(job)?;
+                self.begin_pass(job, route)?;
             }
             Next::End => return Ok(false),
         }
@@ -276,8 +271,8 @@ impl Run {
         }
         let travel = &self.travel;
         last.pass = travel.pass;
-        last.path.span = travel.span;
-        last.side = travel.side;
+        last.path.span = travel.span();
+        last.side = travel.route.side;
         last.feed_mm_s = if self.buffer.patch().point {
             0.0
         } else {
@@ -286,21 +281,21 @@ impl Run {
         Ok(true)
     }
 
-    /// Collapses the first patch of this pass at this side parameter. The tool does not move.
+    /// Collapses the first patch of this pass. The tool does not move.
     ///
     /// # Errors
     /// As [`Self::advance`].
-    pub(crate) fn enter_pass(&mut self, job: &Job<'_>, pass: u32, side: SpanParameter) -> Result<()> {
+    pub(crate) fn enter_pass(&mut self, job: &Job<'_>, pass: u32, route: Route) -> Result<()> {
         if pass > 0 && job.header.pattern == Pattern::Zig {
             self.travel.offset = self.first_offset;
         }
-        (self.travel.pass, self.travel.side) = (pass, side);
-        self.begin_pass(job)
+        self.travel.pass = pass;
+        self.begin_pass(job, route)
     }
 
     /// Collapses the first patch of a pass ahead of [`Self::enter_pass`], once the present pass needs no further patch.
-    pub(crate) fn prepare_pass(&mut self, job: &Job<'_>, first: &PassPosition) {
-        self.buffer.prepare(job, first);
+    pub(crate) fn prepare_pass(&mut self, job: &Job<'_>, route: &Route) {
+        self.buffer.prepare(job, &route.first(job));
     }
 
     /// Emits the first sample of the pass that was entered; its minimum interval is known from the look-ahead.
@@ -320,14 +315,8 @@ impl Run {
     ///
     /// # Errors
     /// As [`Self::advance`].
-    pub(crate) fn arrive(
-        &mut self,
-        job: &Job<'_>,
-        pass: u32,
-        side: SpanParameter,
-        interval: f32,
-    ) -> Result<()> {
-        self.enter_pass(job, pass, side)?;
+    pub(crate) fn arrive(&mut self, job: &Job<'_>, pass: u32, route: Route, interval: f32) -> Result<()> {
+        self.enter_pass(job, pass, route)?;
         let ticks = self.travel.ticks;
         let mut start = Sample::START;
         self.sample(&mut start)?;
@@ -350,12 +339,12 @@ impl Run {
         let before = travel.path.log_speed_derivative - change;
         self.last_feed_factor = feed_factor;
         let step = contact::step(&travel.path, before, feed_factor * self.buffer.patch().arc);
-        if let Some(fraction) = step.and_then(|step| advanced(travel.fraction, step)) {
+        if let Some(fraction) = step.and_then(|step| travel.beyond(step)) {
             travel.fraction = fraction;
             self.sample(last)?;
             last.feed_mm_s = job.header.feed_mm_s * feed_factor;
             if self.buffer.has_work() {
-                self.buffer.work(job, &self.travel.position());
+                self.buffer.work(job, &self.travel.route, &self.travel.piece);
             }
             return Ok(());
         }
@@ -373,7 +362,9 @@ impl Run {
     /// As [`Self::advance`]; [`FaultKind::PatchTooShort`] where a whole patch is still left.
     pub(crate) fn finish_pass(&mut self, job: &Job<'_>, last: &mut Sample) -> Result<()> {
         if self.is_along() {
-            if self.travel.position().next(job.header.path_spans).is_some() && !self.next_span(job)? {
+            let travel = &self.travel;
+            let is_last = travel.route.next(job, &travel.piece).is_none();
+            if !is_last && !self.next_piece(job)? {
                 return Err(Fault::new(FaultKind::PatchTooShort, 0.0));
             }
             self.end_pass(job);
@@ -410,26 +401,25 @@ impl Run {
 
     /// Number of the patch from the start of the pass, and of the cell within the patch, at the position, for a number of cells per patch; none where
     /// the pass is over.
-    pub(crate) fn cell(&self, job: &Job<'_>, cells_per_patch: u16) -> Option<[u16; 2]> {
+    pub(crate) fn cell(&self, cells_per_patch: u16) -> Option<[u16; 2]> {
         if !self.is_along() {
             return None;
         }
         let travel = &self.travel;
+        let [start, _] = travel.route.ends;
+        let patch = travel.span().abs_diff(start.span);
+        if !travel.piece.is_whole() {
+            return Some([patch, 0]);
+        }
         let high = (travel.fraction >> 32) * u64::from(cells_per_patch);
         let within = u16::try_from(high >> 32).unwrap_or(0);
-        let last = job.header.path_spans.saturating_sub(1);
-        let patch = if travel.reversed {
-            last.saturating_sub(travel.span)
-        } else {
-            travel.span
-        };
         Some([patch, within])
     }
 
     /// Arc since the start of a cell of [`Self::cell`], mm, each cell this fraction of the patch; none where, by rounding, the position is before the cell.
     pub(crate) fn since_station(&self, [_, within]: [u16; 2], part: u64) -> Option<f32> {
         let travel = &self.travel;
-        let start = u64::from(within).wrapping_mul(part);
+        let start = travel.piece.start() + u64::from(within).wrapping_mul(part);
         let length = fraction_to_f32(travel.fraction.checked_sub(start)?);
         let mean = 1.0 - 0.5 * travel.path.log_speed_derivative * length;
         Some(length * mean / (travel.path.inv_speed * self.buffer.patch().per_mm))
@@ -443,8 +433,8 @@ impl Run {
     /// Writes the fields of a sample that change only with the pass.
     const fn describe(&self, feed_mm_s: f32, last: &mut Sample) {
         last.pass = self.travel.pass;
-        last.path.span = self.travel.span;
-        last.side = self.travel.side;
+        last.path.span = self.travel.span();
+        last.side = self.travel.route.side;
         last.feed_mm_s = feed_mm_s;
     }
 
@@ -474,18 +464,19 @@ impl Run {
             let arc = rest * patch.per_mm;
             let end = || Some(patch.end());
             let path_at = |fraction| patch.surface.path_at(fraction);
-            let covered = match contact::solve(path_at, [travel.fraction, u64::MAX], &start, end, arc)? {
-                Reach::Within(fraction) => {
-                    travel.fraction = fraction;
-                    return Ok(());
-                }
-                Reach::Beyond(covered) => covered,
-            };
+            let covered =
+                match contact::solve(path_at, [travel.fraction, travel.piece.end()], &start, end, arc)? {
+                    Reach::Within(fraction) => {
+                        travel.fraction = fraction;
+                        return Ok(());
+                    }
+                    Reach::Beyond(covered) => covered,
+                };
             rest = (arc - covered) / patch.per_mm;
             if crossings == CROSSINGS_MAX {
                 break;
             }
-            if !self.next_span(job)? {
+            if !self.next_piece(job)? {
                 self.end_pass(job);
                 return Ok(());
             }
@@ -498,43 +489,38 @@ impl Run {
     fn step_on_pole(&mut self, job: &Job<'_>) -> Result<()> {
         if let Some(fraction) = self.travel.fraction.checked_add(POLE_STEP) {
             self.travel.fraction = fraction;
-        } else if !self.next_span(job)? {
+        } else if !self.next_piece(job)? {
             self.end_pass(job);
         }
         Ok(())
     }
 
-    /// Moves to the start of the next patch along the pass; false at the pass's end.
-    fn next_span(&mut self, job: &Job<'_>) -> Result<bool> {
+    /// Moves to the start of the next piece of the pass; false at the pass's end.
+    fn next_piece(&mut self, job: &Job<'_>) -> Result<bool> {
         let travel = &mut self.travel;
-        let Some(line) = travel.position().next(job.header.path_spans) else {
+        let Some(piece) = travel.route.next(job, &travel.piece) else {
             return Ok(false);
         };
-        travel.span = line.span;
-        travel.fraction = 0;
+        travel.piece = piece;
+        travel.fraction = piece.start();
         travel.path.log_speed_derivative = f32::NAN;
-        self.buffer.advance(job, &line)?;
+        self.buffer.advance(job, &piece)?;
         Ok(true)
     }
 
-    /// Begins the pass at the current side parameter.
-    fn begin_pass(&mut self, job: &Job<'_>) -> Result<()> {
-        let header = job.header;
+    /// Begins a pass.
+    fn begin_pass(&mut self, job: &Job<'_>, route: Route) -> Result<()> {
         let travel = &mut self.travel;
-        travel.reversed = header.pattern == Pattern::Zigzag && travel.pass % 2 == 1;
-        travel.span = if travel.reversed {
-            header.path_spans.saturating_sub(1)
-        } else {
-            0
-        };
-        travel.fraction = 0;
+        travel.route = route;
+        travel.piece = route.first(job);
+        travel.fraction = travel.piece.start();
         travel.max_inv_interval_sq = 0.0;
         travel.next = Next::Along;
         travel.path.log_speed_derivative = f32::NAN;
         if let PassPlanning::Scan(scan) = &mut self.planning {
-            scan.begin(&travel.position());
+            scan.begin(&travel.piece.position);
         }
-        self.buffer.begin(job, &travel.position())
+        self.buffer.begin(job, &travel.piece)
     }
 
     /// Whether [`Self::plan`] has anything to do.
@@ -584,27 +570,27 @@ impl Run {
         }
     }
 
-    /// The side parameter of the next pass. Its first sample is adjacent to the last pass's first, or to its last where the
+    /// The next pass. Its first sample is adjacent to the last pass's first, or to its last where the
     /// pattern is zigzag.
-    fn step_over(&mut self, job: &Job<'_>) -> Result<()> {
+    fn step_over(&mut self, job: &Job<'_>) -> Result<Route> {
         let step = match self.step_over.take() {
             Some(step) => step,
             None => self.find_step_over(job),
         };
         let travel = &mut self.travel;
         let width = |span| job.side_width(span);
-        travel.side = schedule::next_side(travel.side, step, job.header.side_spans, width)?;
+        let side = schedule::next_side(travel.route.side, step, job.header.side_spans, width)?;
         travel.pass = travel.pass.wrapping_add(1);
         if job.header.pattern == Pattern::Zig {
             travel.offset = self.first_offset;
         }
-        Ok(())
+        Ok(Route::of_pass(job.header, travel.pass, side))
     }
 
     /// Whether the run is exactly at the end of the pass.
     fn end_pass(&mut self, job: &Job<'_>) {
-        self.travel.fraction = u64::MAX;
-        let last = schedule::is_last(self.travel.side, job.header.side_spans);
+        self.travel.fraction = self.travel.piece.end();
+        let last = schedule::is_last(self.travel.route.side, job.header.side_spans);
         self.travel.next = if last { Next::End } else { Next::Over };
     }
 }

@@ -14,6 +14,7 @@ use crate::math::number::{Bounded, MM_PER_NM, cube_root, to_f32};
 use crate::pass::offset::Located;
 use crate::pass::patch::Patch;
 use crate::pass::position::PassPosition;
+use crate::pass::route::Route;
 use crate::pass::schedule;
 use crate::sample::SpanParameter;
 use crate::sequence::lookahead::check_travel;
@@ -262,20 +263,13 @@ impl BoundaryStepOver {
         feed: 1.0,
     };
 
-    /// Begins to plan a step-over from the pass that ends on this patch to another, at this feed, mm/s.
-    pub(crate) fn begin(
-        &mut self,
-        job: &Job<'_>,
-        axes: &AxisLimits,
-        line: &PassPosition,
-        to: SpanParameter,
-        feed: f32,
-    ) {
+    /// Begins to plan a step-over from the end of a pass to another, at this feed, mm/s.
+    pub(crate) fn begin(&mut self, job: &Job<'_>, axes: &AxisLimits, pass: &Route, next: &Route, feed: f32) {
         let width = |span| job.side_width(span);
-        self.from = line.side;
-        self.to = to;
-        self.reach = schedule::apart(line.side, to, width);
-        self.line = *line;
+        self.from = pass.side;
+        self.to = next.side;
+        self.reach = schedule::apart(pass.side, next.side, width);
+        self.line = pass.last(job).position;
         self.task = Task::Ends;
         self.window = Window::EMPTY;
         self.limits = MotionLimits::new(axes, feed, job.header.period_s);

@@ -11,10 +11,10 @@ use crate::feed::turn::{self, Turn, TurnEnd};
 use crate::feed::{MM_PER_Q10, Q10_BITS, to_q10};
 use crate::job::program::Job;
 use crate::job::{AxisLimits, Pattern, Spacing};
-use crate::math::arith::{sqrt, truncated};
+use crate::math::arith::{fraction_to_f32, sqrt, truncated};
 use crate::math::number::{Bounded, MM_PER_NM, nm_to_mm, to_f32};
 use crate::pass::patch::Patch;
-use crate::pass::position::PassPosition;
+use crate::pass::route::{Piece, Route};
 use crate::pass::schedule;
 use crate::pass::step_over::{PassMaximum, StepOverEstimator};
 use crate::sample::{SpanParameter, interval_of};
@@ -45,7 +45,7 @@ const SPANS_TURNED: u16 = (STATIONS - 2 * turn::STATIONS) / 2;
 pub(crate) struct PassPlan {
     pub(crate) plan: Plan,
     pub(crate) pass: u32,
-    pub(crate) side: SpanParameter,
+    pub(crate) route: Route,
     /// Cells of a patch between kept stations, 0 before the first patch, and the fraction of the patch per cell.
     cells: u16,
     cell_fraction: u64,
@@ -61,7 +61,7 @@ pub(crate) struct PassPlan {
     /// Minimum interval of the pass.
     pub(crate) interval: f32,
     /// The pass after this one.
-    pub(crate) next: Option<SpanParameter>,
+    pub(crate) next: Option<Route>,
     /// Stations of half the turn before the pass, and its length, units of 2^-10 nm.
     head: u16,
     pub(crate) head_q10: i64,
@@ -75,7 +75,7 @@ impl PassPlan {
     pub(crate) const NONE: Self = Self {
         plan: Plan::NONE,
         pass: 0,
-        side: SpanParameter { span: 0, fraction: 0 },
+        route: Route::NONE,
         cells: 0,
         cell_fraction: 0,
         group: 1,
@@ -160,7 +160,8 @@ pub(crate) struct Lookahead {
     patch: Patch,
     step_over: StepOverEstimator,
     task: Task,
-    line: PassPosition,
+    /// The piece of the pass that is looked at.
+    piece: Piece,
     /// Station within the patch, from 0, and patches so far.
     station: u16,
     patches: u16,
@@ -194,11 +195,7 @@ impl Lookahead {
         patch: Patch::NONE,
         step_over: StepOverEstimator::START,
         task: Task::Done,
-        line: PassPosition {
-            side: SpanParameter { span: 0, fraction: 0 },
-            reversed: false,
-            span: 0,
-        },
+        piece: Piece::NONE,
         station: 0,
         patches: 0,
         looks: 1,
@@ -237,7 +234,9 @@ impl Lookahead {
             Task::Patch => cycles::PATCH,
             Task::Station => cycles::STATION,
             Task::Derivatives(..) => cycles::DERIVATIVES,
-            Task::Estimate(1..) if self.step_over.makes_patch(&self.line, self.fraction()) => cycles::PATCH,
+            Task::Estimate(1..) if self.step_over.makes_patch(&self.piece.position, self.fraction()) => {
+                cycles::PATCH
+            }
             Task::Estimate(0) => cycles::NEXT,
             Task::Estimate(_) => cycles::ESTIMATE,
             Task::Close => cycles::CLOSE,
@@ -251,21 +250,7 @@ impl Lookahead {
     }
 
     /// Begins to look over this pass.
-    pub(crate) fn begin(
-        &mut self,
-        job: &Job<'_>,
-        pass: u32,
-        side: SpanParameter,
-        head: &Turn,
-        out: &mut PassPlan,
-    ) {
-        let spans = job.header.path_spans;
-        let reversed = job.header.pattern == Pattern::Zigzag && pass % 2 == 1;
-        self.line = PassPosition {
-            side,
-            reversed,
-            span: if reversed { spans.saturating_sub(1) } else { 0 },
-        };
+    pub(crate) fn begin(&mut self, pass: u32, route: Route, head: &Turn, out: &mut PassPlan) {
         let has_head = head.exists();
         self.turn = *head;
         self.task = if has_head { Task::Head(0) } else { Task::Patch };
@@ -279,7 +264,7 @@ impl Lookahead {
         self.step_over.begin();
         out.plan.stations.clear();
         out.pass = pass;
-        out.side = side;
+        out.route = route;
         out.cells = 0;
         out.point = false;
         out.full_pace = 1.0;
@@ -294,7 +279,11 @@ impl Lookahead {
     pub(crate) fn work(&mut self, job: &Job<'_>, axes: &AxisLimits, out: &mut PassPlan) -> Result<()> {
         self.task = match self.task {
             Task::Patch => {
-                self.patch.collapse(job, &self.line)?;
+                let first = self.patches == 0;
+                if first {
+                    self.piece = out.route.first(job);
+                }
+                self.patch.lay(job, &self.piece)?;
                 out.point |= self.patch.point;
                 self.step_over.begin_patch();
                 self.choose_cells(job, out);
@@ -311,20 +300,21 @@ impl Lookahead {
                 if at < last {
                     Task::Derivatives(at + 1, last)
                 } else {
-                    self.estimates(job)
+                    self.estimates(job, out)
                 }
             }
-            Task::Estimate(0) => self.next_station(job),
+            Task::Estimate(0) => self.next_station(job, out),
             Task::Estimate(looks) => {
                 let fraction = self.fraction();
                 let most = self.maximum.inv_interval_sq;
-                self.step_over.work(job, &self.line, &self.patch, fraction, most);
+                self.step_over
+                    .work(job, &self.piece.position, &self.patch, fraction, most);
                 Task::Estimate(looks - 1)
             }
             Task::Close => {
                 if self.looks_again(job) {
-                    let (pass, side, head) = (out.pass, out.side, self.turn);
-                    self.begin(job, pass, side, &head, out);
+                    let (pass, route, head) = (out.pass, out.route, self.turn);
+                    self.begin(pass, route, &head, out);
                     return Ok(());
                 }
                 self.close(job, out)?;
@@ -367,12 +357,11 @@ impl Lookahead {
     /// Pass, path and side parameter of the station.
     pub(crate) fn surface_position(&self, out: &PassPlan) -> (u32, SpanParameter, SpanParameter) {
         let fraction = self.fraction();
-        let own = if self.line.reversed { !fraction } else { fraction };
         let path = SpanParameter {
-            span: self.line.span,
-            fraction: own,
+            span: self.piece.position.span,
+            fraction: out.route.turned(fraction),
         };
-        (out.pass, path, out.side)
+        (out.pass, path, out.route.side)
     }
 
     const fn is_end(&self) -> bool {
@@ -381,9 +370,9 @@ impl Lookahead {
 
     fn fraction(&self) -> u64 {
         if self.is_end() {
-            return u64::MAX;
+            return self.piece.end();
         }
-        u64::from(self.station) * self.cell_fraction
+        self.piece.start() + u64::from(self.station) * self.cell_fraction
     }
 
     /// Chooses the cells of a patch: those between kept stations by the number of patches and their length, the same for the whole pass; those
@@ -391,7 +380,8 @@ impl Lookahead {
     fn choose_cells(&mut self, job: &Job<'_>, out: &mut PassPlan) {
         let spans = job.header.path_spans.max(1);
         let whole = |value: f32| u16::try_from(truncated(value)).unwrap_or(u16::MAX);
-        let part = |cells: u16| u64::MAX.checked_div(u64::from(cells)).unwrap_or(u64::MAX);
+        let whole_part = self.piece.end().saturating_sub(self.piece.start());
+        let part = |cells: u16| whole_part.checked_div(u64::from(cells)).unwrap_or(u64::MAX);
         let length = self.patch_length();
         if out.cells == 0 {
             let fit = stations_of(job)
@@ -405,7 +395,7 @@ impl Lookahead {
                 length
             };
             out.cells = whole(mean / CELL_KEPT_MM).clamp(1, fit);
-            out.cell_fraction = part(out.cells);
+            out.cell_fraction = u64::MAX.checked_div(u64::from(out.cells)).unwrap_or(u64::MAX);
             out.group = spans.div_ceil(PATCHES);
         }
         let fine = whole(length / CELL_FINE_MM).max(CELLS_FINE);
@@ -423,7 +413,9 @@ impl Lookahead {
     /// Length of the patch, roughly, mm; 0 where its surface is not evaluated.
     fn patch_length(&self) -> f32 {
         let at = |fraction| self.patch.evaluate(fraction).map(|(_, located)| located.cc_nm);
-        let (Ok(start), Ok(middle), Ok(end)) = (at(0), at(1 << 63), at(u64::MAX)) else {
+        let [start, end] = self.piece.range;
+        let middle = start + end.saturating_sub(start).div_ceil(2);
+        let (Ok(start), Ok(middle), Ok(end)) = (at(start), at(middle), at(end)) else {
             return 0.0;
         };
         let apart = |from: &[i32; 3], to: &[i32; 3]| {
@@ -440,7 +432,7 @@ impl Lookahead {
     /// The derivatives that can be taken after a station.
     fn after_station(&self, job: &Job<'_>, out: &PassPlan) -> Task {
         if out.point {
-            return self.estimates(job);
+            return self.estimates(job, out);
         }
         let is_end = self.is_end();
         let count = self.window.count();
@@ -454,11 +446,11 @@ impl Lookahead {
         };
         let to = if is_end { last } else { middle };
         if count < WINDOW && !is_end {
-            return self.estimates(job);
+            return self.estimates(job, out);
         }
         match (u8::try_from(from), u8::try_from(to)) {
             (Ok(from), Ok(to)) => Task::Derivatives(from, to),
-            _ => self.estimates(job),
+            _ => self.estimates(job, out),
         }
     }
 
@@ -493,10 +485,10 @@ impl Lookahead {
     }
 
     /// Evaluations of the step-over estimator at a station.
-    fn estimates(&self, job: &Job<'_>) -> Task {
+    fn estimates(&self, job: &Job<'_>, out: &PassPlan) -> Task {
         let first = self.station == 0;
         let begins = first && self.patches == 0;
-        let ends = self.is_end() && self.line.next(job.header.path_spans).is_none();
+        let ends = self.is_end() && out.route.next(job, &self.piece).is_none();
         Task::Estimate(if job.header.spacing == Spacing::FirstOrder {
             0
         } else {
@@ -505,15 +497,15 @@ impl Lookahead {
     }
 
     /// Advances to the next station, the next patch, or the end.
-    fn next_station(&mut self, job: &Job<'_>) -> Task {
+    fn next_station(&mut self, job: &Job<'_>, out: &PassPlan) -> Task {
         if !self.is_end() {
             self.station += 1;
             return Task::Station;
         }
         self.start_q10 += to_q10(self.arc_mm);
-        match self.line.next(job.header.path_spans) {
-            Some(line) => {
-                self.line = line;
+        match out.route.next(job, &self.piece) {
+            Some(piece) => {
+                self.piece = piece;
                 self.station = 0;
                 self.patches += 1;
                 Task::Patch
@@ -589,7 +581,8 @@ impl Lookahead {
 
     /// Arc from the last station, mm: Hermite's two-point rule.
     fn cell_length(&self, contact: &Contact) -> f32 {
-        let length = 1.0 / f32::from(self.cells);
+        let whole = self.piece.end().saturating_sub(self.piece.start());
+        let length = fraction_to_f32(whole) / f32::from(self.cells);
         let (first, last) = (1.0 / self.speed.inv_speed, 1.0 / contact.path.inv_speed);
         let bow = first * self.speed.log_speed_derivative - last * contact.path.log_speed_derivative;
         length * (0.5 * (first + last) + bow * length * (1.0 / 12.0)) / self.patch.per_mm
@@ -608,7 +601,7 @@ impl Lookahead {
 
     /// Turns to the start of the next pass; without a turn where it cannot be evaluated.
     fn look_across(&mut self, job: &Job<'_>, out: &PassPlan) -> Task {
-        let Some(side) = out.next else {
+        let Some(next) = out.next else {
             return Task::Done;
         };
         let last = self.window.count().saturating_sub(1);
@@ -618,12 +611,8 @@ impl Lookahead {
             q: self.window.derivatives(last),
         };
         self.ends = [from, from];
-        self.line = PassPosition {
-            side,
-            reversed: !self.line.reversed,
-            span: self.line.span,
-        };
-        if self.patch.collapse(job, &self.line).is_err() || self.patch.point {
+        self.piece = next.first(job);
+        if self.patch.lay(job, &self.piece).is_err() || self.patch.point {
             return Task::Done;
         }
         self.window = Window::EMPTY;
@@ -737,10 +726,11 @@ impl Lookahead {
             Spacing::FirstOrder => out.interval,
         };
         let width = |span| job.side_width(span);
-        out.next = if schedule::is_last(out.side, header.side_spans) {
+        out.next = if schedule::is_last(out.route.side, header.side_spans) {
             None
         } else {
-            Some(schedule::next_side(out.side, step, header.side_spans, width)?)
+            let side = schedule::next_side(out.route.side, step, header.side_spans, width)?;
+            Some(Route::of_pass(header, out.pass.wrapping_add(1), side))
         };
         Ok(())
     }

@@ -12,9 +12,9 @@ use crate::feed::plan::{Cursor, Plan};
 use crate::feed::planner::{PORTION_CYCLES, Planner};
 use crate::feed::turn::Turn;
 use crate::job::program::Job;
-use crate::job::{AxisLimits, Pattern};
+use crate::job::{AxisLimits, Header, Pattern};
 use crate::math::number::{Bounded, to_f32};
-use crate::pass::position::PassPosition;
+use crate::pass::route::Route;
 use crate::pass::run::Run;
 use crate::pass::scan::cycles::PATCH;
 use crate::sample::{Sample, SpanParameter};
@@ -93,8 +93,8 @@ pub(crate) enum Outcome {
 /// Planning of the next pass.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Planning {
-    /// It is to be begun, for this number of the pass and this side parameter.
-    Requested(u32, SpanParameter),
+    /// It is to be begun, for this number of the pass on this route.
+    Requested(u32, Route),
     /// Its stations are being located.
     Stations,
     /// Its feed is being planned.
@@ -200,7 +200,7 @@ impl Sequencer {
     };
 
     /// Starts the job from the tool's position.
-    pub(crate) fn restart(&mut self, axes: &AxisLimits) {
+    pub(crate) fn restart(&mut self, header: &Header, axes: &AxisLimits) {
         self.at.get_or_insert(axes.home_nm);
         self.phase = Phase::Await;
         self.second = false;
@@ -213,7 +213,7 @@ impl Sequencer {
         }
         self.lookahead.restart();
         self.feed_factor = 1.0;
-        self.request_planning(0, Some(SpanParameter::default()));
+        self.request_planning(0, Some(Route::of_pass(header, 0, SpanParameter::default())));
     }
 
     /// The tool's position, nm, once it is known.
@@ -378,15 +378,15 @@ impl Sequencer {
             Phase::Hop if self.hop.has_work() => return self.hop.work(),
             _ => {}
         }
-        if let Some(first) = self.pass_ahead().map(|pass| first_patch(job, pass)) {
+        if let Some(route) = self.pass_ahead().map(|pass| pass.route) {
             self.has_first_patch = false;
-            return run.prepare_pass(job, &first);
+            return run.prepare_pass(job, &route);
         }
         let (now, next) = both(&mut self.plans, self.second);
         if self.has_step_over && self.step_over.is_requested() {
-            if let Some(side) = now.next {
+            if let Some(route) = now.next {
                 let feed = job.header.feed_mm_s * self.feed_factor.at_least(1.0);
-                self.step_over.begin(job, axes, &last_patch(job, now), side, feed);
+                self.step_over.begin(job, axes, &now.route, &route, feed);
             }
             return;
         }
@@ -395,8 +395,8 @@ impl Sequencer {
             return;
         }
         match self.planning {
-            Planning::Requested(pass, side) => {
-                self.lookahead.begin(job, pass, side, &now.tail, next);
+            Planning::Requested(pass, route) => {
+                self.lookahead.begin(pass, route, &now.tail, next);
                 self.planning = Planning::Stations;
             }
             Planning::Stations => {
@@ -491,8 +491,8 @@ impl Sequencer {
     }
 
     /// Has the pass after the one that is followed next planned, if there is one.
-    fn request_planning(&mut self, pass: u32, side: Option<SpanParameter>) {
-        self.planning = side.map_or(Planning::Complete, |side| Planning::Requested(pass, side));
+    fn request_planning(&mut self, pass: u32, route: Option<Route>) {
+        self.planning = route.map_or(Planning::Complete, |route| Planning::Requested(pass, route));
         self.has_step_over = false;
         self.spent = 0;
     }
@@ -589,8 +589,8 @@ impl Sequencer {
     pub(super) fn swap(&mut self) {
         self.second = !self.second;
         let (now, _) = both(&mut self.plans, self.second);
-        let (pass, side) = (now.pass.wrapping_add(1), now.next);
-        self.request_planning(pass, side);
+        let (pass, route) = (now.pass.wrapping_add(1), now.next);
+        self.request_planning(pass, route);
     }
 
     /// Enters the pass, which begins at the tool's position, and emits its first sample.
@@ -603,7 +603,7 @@ impl Sequencer {
         last: &mut Sample,
     ) -> Result<()> {
         let (now, _) = both(&mut self.plans, self.second);
-        run.enter_pass(job, now.pass, now.side)?;
+        run.enter_pass(job, now.pass, now.route)?;
         run.begin(now.interval, last)?;
         self.on_surface = true;
         self.phase = Phase::Pass;
@@ -673,7 +673,7 @@ impl Sequencer {
         command: FeedCommand,
         last: &mut Sample,
     ) -> Result<()> {
-        self.correct_progress(job, run);
+        self.correct_progress(run);
         let (now, _) = both(&mut self.plans, self.second);
         let is_over = if now.point {
             if command.feed_factor > 0.0 && run.is_along() {
@@ -774,7 +774,7 @@ impl Sequencer {
 
     /// Corrects the progress at each station by the plan's arc, so that errors do not accumulate from station to station: some periods after it was
     /// measured, because those in which the tool comes to a patch, and the patch after it is prepared, are the worst-case ticks.
-    fn correct_progress(&mut self, job: &Job<'_>, run: &Run) {
+    fn correct_progress(&mut self, run: &Run) {
         let (now, _) = both(&mut self.plans, self.second);
         let (cells, fraction) = now.kept_cells();
         if self.phase != Phase::Pass || now.point {
@@ -788,7 +788,7 @@ impl Sequencer {
             }
             return;
         }
-        let Some(cell) = run.cell(job, cells).filter(|cell| *cell != self.cell) else {
+        let Some(cell) = run.cell(cells).filter(|cell| *cell != self.cell) else {
             return;
         };
         self.cell = cell;
@@ -889,27 +889,4 @@ fn is_too_slow(pass: &PassPlan) -> bool {
     let rest_s = feed / acceleration + acceleration / jerk;
     let lasts_s = to_f32(i64::from(pass.plan.periods)) * period;
     lasts_s * (1.0 / pass.plan.pace_max - 1.0) > REST_SHARE * rest_s
-}
-
-/// The first patch of a pass.
-fn first_patch(job: &Job<'_>, pass: &PassPlan) -> PassPosition {
-    end_patch(job, pass, false)
-}
-
-/// The last patch of a pass.
-fn last_patch(job: &Job<'_>, pass: &PassPlan) -> PassPosition {
-    end_patch(job, pass, true)
-}
-
-fn end_patch(job: &Job<'_>, pass: &PassPlan, is_last: bool) -> PassPosition {
-    let reversed = job.header.pattern == Pattern::Zigzag && pass.pass % 2 == 1;
-    PassPosition {
-        side: pass.side,
-        reversed,
-        span: if reversed == is_last {
-            0
-        } else {
-            job.header.path_spans.saturating_sub(1)
-        },
-    }
 }

@@ -92,7 +92,7 @@ impl Sequencer {
         self.turn = now.tail;
         self.swap();
         let (now, _) = self.plans_ref();
-        run.arrive(job, now.pass, now.side, now.interval)?;
+        run.arrive(job, now.pass, now.route, now.interval)?;
         let mut follower = self.follower;
         follower.begin(&now.plan);
         follower.tick(&now.plan, beyond / job.header.period_s);

@@ -102,6 +102,13 @@ pub fn prepare(job: &Job) -> Result<Prepared, JobError> {
             "write along = \"u\" or \"v\", or call `direction::choose`",
         ));
     }
+    if job.region.is_some() {
+        return Err(job.origin.error(
+            "region",
+            "a part of a surface cannot be machined yet",
+            "remove the section, for the whole surface",
+        ));
+    }
     fronts::check_job(job)?;
     let sign = geometry::tool_sign(job)?;
     #[allow(clippy::cast_possible_truncation, reason = "the machine's own precision")]
