@@ -3,7 +3,7 @@
 use cadmpeg_ir::topology::{Coedge, Edge as SourceEdge, LoopBoundary, Sense};
 
 use crate::ir_index::{Translation, entity};
-use cad::{Boundary, Curve, Edge, Placement};
+use cad::{Boundary, Curve, Edge};
 use glam::DVec3;
 
 /// Least number of intervals along a boundary edge, equal in its parameter.
@@ -171,20 +171,4 @@ fn gap_mm(edges: &[Edge]) -> Option<f64> {
             _ => f64::NAN,
         });
     gaps.reduce(|most, gap| if gap > most || gap.is_nan() { gap } else { most })
-}
-
-/// A boundary, transformed by a placement.
-pub(crate) fn placed(boundary: &Boundary, by: &Placement) -> Boundary {
-    match boundary {
-        Boundary::Loops(loops) => Boundary::Loops(
-            loops
-                .iter()
-                .map(|edges| {
-                    let place = |edge: &Edge| edge.iter().map(|p| by.point(*p)).collect();
-                    edges.iter().map(place).collect()
-                })
-                .collect(),
-        ),
-        other => other.clone(),
-    }
 }

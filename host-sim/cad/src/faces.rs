@@ -54,6 +54,7 @@ impl Original {
         let options = Options {
             tolerance_mm: source.tolerance_mm,
             untrimmed: source.untrimmed,
+            around_mm: 0.0,
         };
         let made = machinable(&source.path.display().to_string(), &face, &options)?;
         Ok(matches!(made.form, Form::Fitted { .. }).then(|| Self {
@@ -76,6 +77,7 @@ impl FaceReader for Faces {
         let options = Options {
             tolerance_mm: wanted.tolerance_mm,
             untrimmed: wanted.untrimmed,
+            around_mm: 0.0,
         };
         Ok(machinable(&file, &face, &options)?.spec())
     }

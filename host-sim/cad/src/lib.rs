@@ -46,7 +46,7 @@ pub use outline::{Outline, outline};
 pub use placement::Placement;
 pub use reader::{Model, read};
 pub use spline::{Axis, DEGREE_MAX, Pole, SplineCurve, SplineSurface};
-pub use surface::Surface;
+pub use surface::{Periodic, Surface};
 pub use trim::{Polygon, TrimError, polylines, trim};
 
 use glam::DVec3;
@@ -88,4 +88,35 @@ pub struct Face {
     pub sense: f64,
     /// Whether it bounds a solid; its normal then points out of the material.
     pub solid: bool,
+}
+
+impl Face {
+    /// The face, transformed; `None` if the placement distorts its kind of surface.
+    #[must_use]
+    pub fn placed(&self, by: &Placement) -> Option<Self> {
+        let turn = if by.mirrors() { -1.0 } else { 1.0 };
+        Some(Self {
+            surface: self.surface.placed(by)?,
+            boundary: self.boundary.placed(by),
+            sense: self.sense * turn,
+            ..self.clone()
+        })
+    }
+}
+
+impl Boundary {
+    /// The boundary, transformed.
+    #[must_use]
+    pub fn placed(&self, by: &Placement) -> Self {
+        let place = |edge: &Edge| edge.iter().map(|p| by.point(*p)).collect();
+        match self {
+            Self::Loops(loops) => Self::Loops(
+                loops
+                    .iter()
+                    .map(|edges| edges.iter().map(place).collect())
+                    .collect(),
+            ),
+            other => other.clone(),
+        }
+    }
 }

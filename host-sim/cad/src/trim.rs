@@ -47,23 +47,31 @@ impl From<TrimError> for String {
     }
 }
 
-/// The trimmed region of a face within its rectangle, in the parameters of its surface, or of the exact form over the rectangle if `of_job`. Its polygons are within
-/// the tolerance, mm, of the boundary on the surface.
+/// The trimmed region of a face within its rectangle, in the parameters of its surface, or in those of the exact form over a rectangle. Its polygons are
+/// within the tolerance, mm, of the boundary on the surface.
 ///
 /// # Errors
 /// The boundary is not known, open, off the surface, or crosses itself.
 pub fn trim(
     face: &Face,
     outline: &Outline,
-    of_job: bool,
+    exact_over: Option<[[f64; 2]; 2]>,
     tolerance_mm: f64,
 ) -> Result<Vec<Polygon>, TrimError> {
     let surface = &face.surface;
-    let Boundary::Loops(loops) = &face.boundary else {
-        return match &face.boundary {
-            Boundary::Unknown(why) => Err(format!("its boundary is unknown: {why}").into()),
-            _ => Ok(vec![corners(outline.rectangle)]),
-        };
+    let remap = exact_over.map(|rectangle| Remap::new(surface, rectangle));
+    let whole = || {
+        let corners = corners(outline.rectangle);
+        match &remap {
+            Some(remap) => corners.into_iter().map(|place| remap.at(place)).collect(),
+            None => corners,
+        }
+    };
+    let loops = match &face.boundary {
+        Boundary::Unknown(why) => return Err(format!("its boundary is unknown: {why}").into()),
+        Boundary::Natural => return Ok(vec![whole()]),
+        Boundary::Loops(_) if outline.trimmed.is_none() => return Ok(vec![whole()]),
+        Boundary::Loops(loops) => loops,
     };
     let paths = paths(surface, loops);
     let off_mm = paths.iter().map(|path| path.off_mm).fold(0.0, f64::max);
@@ -74,7 +82,7 @@ pub fn trim(
     let lines: Vec<Polygon> = loops
         .iter()
         .zip(&paths)
-        .map(|(edges, path)| line(surface, edges, path, chord_mm))
+        .map(|(edges, path)| line(surface, edges, path, chord_mm, false))
         .collect();
     closed(surface, &lines, &paths)?;
     let lines: Vec<Polygon> = lines.into_iter().map(unspiked).collect();
@@ -99,7 +107,6 @@ pub fn trim(
         )
         .into());
     }
-    let remap = of_job.then(|| Remap::new(surface, outline.rectangle));
     let polygons = inside.iter().map(|polygon| {
         let fine = match &remap {
             Some(remap) => remap.polygon(surface, polygon, 0.1 * tolerance_mm),
@@ -128,7 +135,7 @@ pub fn polylines(face: &Face, tolerance_mm: f64) -> Vec<Vec<DVec3>> {
         .iter()
         .zip(&paths)
         .map(|(edges, path)| {
-            let line = line(surface, edges, path, tolerance_mm);
+            let line = line(surface, edges, path, tolerance_mm, true);
             let mut points: Vec<DVec3> = line.iter().map(|place| on.at(place[0], place[1]).point).collect();
             points.dedup();
             points
@@ -146,8 +153,8 @@ fn seam_only(paths: &[Path]) -> bool {
     paths.iter().any(|path| path.seam.is_some())
 }
 
-/// A loop as a line of parameters, its chords within the tolerance of the surface's curve, mm.
-fn line(surface: &Surface, edges: &[Edge], path: &Path, chord_mm: f64) -> Polygon {
+/// A loop as a line of parameters, its chords within the tolerance of the surface's curve, mm: the chords of (u, v), or those in space if `in_space`.
+fn line(surface: &Surface, edges: &[Edge], path: &Path, chord_mm: f64, in_space: bool) -> Polygon {
     let mut out: Polygon = Vec::new();
     for (points, places) in edges.iter().zip(&path.edges) {
         let halving = Halving {
@@ -155,6 +162,7 @@ fn line(surface: &Surface, edges: &[Edge], path: &Path, chord_mm: f64) -> Polygo
             on: Periodic::new(surface),
             points,
             chord_mm,
+            in_space,
         };
         out.extend(places.first());
         for (index, ends) in places.windows(2).enumerate() {
@@ -172,6 +180,7 @@ struct Halving<'a> {
     on: Periodic<'a>,
     points: &'a [DVec3],
     chord_mm: f64,
+    in_space: bool,
 }
 
 impl Halving<'_> {
@@ -205,7 +214,8 @@ impl Halving<'_> {
     /// Distance of the surface's point at a place from its point on the chord, across the chord, mm.
     fn off(&self, place: [f64; 2], on_chord: [f64; 2], ends: [[f64; 2]; 2]) -> f64 {
         let point = |[u, v]: [f64; 2]| self.on.at(u, v).point;
-        let gap = point(place) - point(on_chord);
+        let from = if self.in_space { point(ends[0]) } else { point(on_chord) };
+        let gap = point(place) - from;
         let along = (point(ends[1]) - point(ends[0])).normalize_or_zero();
         (gap - along * gap.dot(along)).length()
     }
