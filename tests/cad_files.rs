@@ -270,7 +270,7 @@ fn a_face_far_from_the_origin_can_be_placed() {
         let rest = "[tool]\nkind = \"ball\"\nradius_mm = 3\n[cut]\nfeed_mm_min = 600\nscallop_mm = 0.01\nalong = \"u\"\nside = \"up\"\n";
         let text = format!("[surface]\nkind = \"file\"\npath = \"sheet.step\"\n{placement}{rest}");
         let name = folder.path().join("job.toml").display().to_string();
-        prepare(&job_file::parse_with(&name, &text, &cad::Faces).unwrap())
+        prepare(&job_file::parse_with(&name, &text, &part::Faces).unwrap())
     };
     assert_eq!(
         named("[placement]\nplace = \"corner\"\n").unwrap().patches(),

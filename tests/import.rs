@@ -416,7 +416,7 @@ fn trimmed_faces_are_said() {
 fn sample_jobs_out_of_files() {
     for (name, patches) in [("blade", 12), ("hood", 247)] {
         let job =
-            job_file::load_with(&workspace().join(format!("jobs/cad/{name}.toml")), &cad::Faces).unwrap();
+            job_file::load_with(&workspace().join(format!("jobs/cad/{name}.toml")), &part::Faces).unwrap();
         assert_eq!(prepare(&job).unwrap().patches(), patches, "{name}");
         let (position_nm, ripple_pct, samples, fault) = worst_nm(&job, u64::MAX);
         println!("{name}: {position_nm:.2} nm, ripple {ripple_pct:.6} %, {samples} samples");
@@ -443,7 +443,7 @@ fn jobs_that_name_a_file() {
         )
     };
     let name = folder.join("job.toml").display().to_string();
-    let job = job_file::parse_with(&name, &text("path = \"mouse.step\"\nface = 1"), &cad::Faces).unwrap();
+    let job = job_file::parse_with(&name, &text("path = \"mouse.step\"\nface = 1"), &part::Faces).unwrap();
     let model = read(&cad("mouse.step")).unwrap();
     let made = machinable("", &model.faces[0], &Options::default()).unwrap();
     assert_eq!(job.surface, made.spec());
@@ -461,7 +461,7 @@ fn jobs_that_name_a_file() {
             "does not belong here",
         ),
     ] {
-        let error = job_file::parse_with(&name, &text(surface), &cad::Faces).unwrap_err();
+        let error = job_file::parse_with(&name, &text(surface), &part::Faces).unwrap_err();
         assert!(error.what().contains(words), "{surface}: {error}");
         assert_eq!(error.line_and_column().unwrap().0, line, "{surface}: {error}");
     }
@@ -600,7 +600,7 @@ fn approximated_faces_name_their_source() {
         assert_eq!(text.contains("source = \"part.step\""), fitted);
         let text = format!("{text}\n[placement]\nscale = 2\nrotate_deg = [10, 20, 30]\n");
         let name = folder.path().join("job.toml");
-        let job = job_file::parse_with(name.to_str().unwrap(), &text, &cad::Faces).unwrap();
+        let job = job_file::parse_with(name.to_str().unwrap(), &text, &part::Faces).unwrap();
         let Some(source) = job.origin.cad() else {
             assert!(!fitted);
             continue;

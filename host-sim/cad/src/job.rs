@@ -95,7 +95,11 @@ pub fn write_job(
     options: &JobOptions,
 ) -> Result<JobText, CadError> {
     let measures = measure(&surface.spec());
-    let (chosen, sign) = side(face, &measures);
+    let (chosen, sign) = match (&surface.trimmed, side(face, &measures)) {
+        // The surface around a trimmed face may face another way than the face.
+        (Some(_), (_, sign)) => (if sign > 0.0 { "+" } else { "-" }, sign),
+        (None, chosen) => chosen,
+    };
     let side = options.side.clone().unwrap_or_else(|| chosen.to_owned());
     let sign = match side.as_str() {
         "+" => 1.0,
@@ -118,7 +122,14 @@ pub fn write_job(
         )
     })?;
     let mut warnings = Vec::new();
-    if let Some(why) = &surface.outline.trimmed {
+    if surface.trimmed.is_some() && options.source.is_none() {
+        return Err(CadError::face(
+            source,
+            format!("face {} is trimmed, and a job file cannot name {source:?}", face.number),
+            "give the CAD file a plain name, or machine the whole rectangle around the face with --untrimmed",
+        ));
+    }
+    if let Some(why) = surface.outline.trimmed.as_ref().filter(|_| surface.trimmed.is_none()) {
         warnings.push(if surface.outline.unknown {
             format!("{why}; the whole surface is machined, wherever the face on it ends")
         } else {
@@ -205,8 +216,20 @@ fn text(
         let _ = writeln!(out, "# Note: {}.", one_line(warning));
     }
     out.push('\n');
-    write_surface(&mut out, &surface.nurbs);
-    if let (Form::Fitted { .. }, Some((path, tolerance_mm))) = (&surface.form, &options.source) {
+    let of_file = surface.trimmed.as_ref().and(options.source.as_ref());
+    if let Some((path, tolerance_mm)) = of_file {
+        // Its region is made when the job is read.
+        let _ = writeln!(
+            out,
+            "[surface]\nkind = \"file\"\npath = {path:?}\nface = {}\ntolerance_mm = {tolerance_mm}\n\n\
+             # What must not be cut; the region of the face is what the tool reaches without cutting it.\n\
+             [part]\npath = {path:?}",
+            face.number
+        );
+    } else {
+        write_surface(&mut out, &surface.nurbs);
+    }
+    if let (Form::Fitted { .. }, None, Some((path, tolerance_mm))) = (&surface.form, of_file, &options.source) {
         let _ = writeln!(
             out,
             "# What the surface approximates: `cargo sim verify` measures against it\nsource = {path:?}\nsource_face = {}\ntolerance_mm = {tolerance_mm}",

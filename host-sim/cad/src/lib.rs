@@ -36,7 +36,7 @@ mod tests;
 
 pub use curve::Curve;
 pub use error::CadError;
-pub use faces::{Faces, Original};
+pub use faces::{Original, model_with, surface_of};
 pub use fit::Deviation;
 pub use job::{JobOptions, JobText, machined_sign, write_job};
 pub use machinable::{Form, MachinableFace, Options, degrees, machinable};
@@ -44,7 +44,7 @@ pub use measure::{Measures, measure};
 pub use interpolation::interpolation_error_mm;
 pub use outline::{Outline, outline};
 pub use placement::Placement;
-pub use reader::{Model, read};
+pub use reader::{Model, read, read_once};
 pub use spline::{Axis, DEGREE_MAX, Pole, SplineCurve, SplineSurface};
 pub use surface::{Periodic, Surface};
 pub use trim::{Polygon, TrimError, polylines, trim};

@@ -27,6 +27,15 @@ const CHORD_MM: f64 = 0.003;
 /// Farther in for fewer vertices, mm.
 const SIMPLIFY_MM: f64 = 0.01;
 
+/// Least ball that is tried, mm.
+const RADIUS_MIN_MM: f64 = 0.05;
+/// Share of a face that counts as all of it.
+const NEARLY_ALL: f64 = 0.99;
+/// Bisections of the radius.
+const TRIALS: usize = 10;
+/// Places of a face at which a radius is tried.
+const TRIAL_PLACES: usize = 500;
+
 /// What a region is made of.
 pub struct Request<'a> {
     /// The surface that is machined, placed.
@@ -64,6 +73,8 @@ pub struct Made {
     pub unreachable_mm2: Vec<(Reason, f64)>,
     /// What of the reachable area lies in the polygons, mm2.
     pub inside_mm2: f64,
+    /// The largest ball that reaches 99 % of what is not too steep, mm; `None` if no ball above 0.05 mm does.
+    pub radius_mm: Option<f64>,
 }
 
 /// The edges of the face, to grow it by.
@@ -149,6 +160,7 @@ impl Request<'_> {
         if made.reachable_mm2 == 0.0 && made.area_mm2 > 0.0 && made.unreachable_mm2.iter().all(|(why, _)| *why == Reason::Steep) {
             return made;
         }
+        made.radius_mm = self.largest_ball(&trimmed, &made);
         let border = Border::new(self.face, self.placement);
         let holds = |place: [f64; 2]| {
             (trimmed.contains(place)
@@ -209,6 +221,46 @@ impl Request<'_> {
             }
         }
         out
+    }
+
+    /// The largest ball that reaches nearly all that is not too steep, by bisection.
+    fn largest_ball(&self, trimmed: &Inside, made: &Made) -> Option<f64> {
+        let steep = |(reason, _): &&(Reason, f64)| *reason == Reason::Steep;
+        let too_steep: f64 = made.unreachable_mm2.iter().filter(steep).map(|(_, area)| area).sum();
+        if made.reachable_mm2 >= NEARLY_ALL * (made.area_mm2 - too_steep) {
+            return Some(self.tool.radius);
+        }
+        let places = self.places(trimmed);
+        let every = places.len().div_ceil(TRIAL_PLACES).max(1);
+        let places: Vec<_> = places.into_iter().step_by(every).collect();
+        let reaches = |radius: f64| {
+            let tool = self.tool.with_radius(radius);
+            let clearance = Clearance {
+                tool: &tool,
+                ..self.clearance()
+            };
+            let (mut all, mut reached) = (0.0, 0.0);
+            for (place, area) in &places {
+                match clearance.check(*place) {
+                    Err(Reason::Steep) => {}
+                    Err(_) => all += area,
+                    Ok(()) => {
+                        all += area;
+                        reached += area;
+                    }
+                }
+            }
+            reached >= NEARLY_ALL * all
+        };
+        let (mut low, mut high) = (RADIUS_MIN_MM, self.tool.radius);
+        if !reaches(low) {
+            return None;
+        }
+        for _ in 0..TRIALS {
+            let middle = (low * high).sqrt();
+            if reaches(middle) { low = middle } else { high = middle }
+        }
+        Some(low)
     }
 
     fn sum(&self, trimmed: &Inside, holds: impl Fn([f64; 2]) -> bool) -> f64 {

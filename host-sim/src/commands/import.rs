@@ -10,11 +10,12 @@ use std::path::{Path, PathBuf};
 use clap::Args;
 use serde_json::{Value, json};
 
-use super::{Failure, Result, whole};
+use super::{Failure, Result, region_words, whole};
 use cad::{
     CadError, Face, Form, JobOptions, JobText, MachinableFace, Model, Options, machinable, read, write_job,
 };
 use condition::Condition;
+use job::FaceReach;
 use job_file::TOLERANCE_DEFAULT_MM;
 use list::Key;
 
@@ -151,7 +152,14 @@ fn relative(file: &Path, job: &Path) -> Option<String> {
     (!text.chars().any(char::is_control)).then(|| text.to_owned())
 }
 
-fn report(arguments: &Arguments, path: &Path, face: &Face, made: &MachinableFace, written: &JobText) {
+fn report(
+    arguments: &Arguments,
+    path: &Path,
+    face: &Face,
+    made: &MachinableFace,
+    written: &JobText,
+    reach: Option<&FaceReach>,
+) {
     let size = written.measures.size_mm();
     if arguments.json {
         let value = json!({
@@ -165,10 +173,12 @@ fn report(arguments: &Arguments, path: &Path, face: &Face, made: &MachinableFace
             "least_concave_radius_mm": { "plus": written.measures.concave_mm[0], "minus": written.measures.concave_mm[1] },
             "becomes": if made.form == Form::Exact { "exact" } else { "approximated" },
             "deviation": deviation_json(&made.form),
-            "untrimmed": made.outline.trimmed.is_some(),
+            "trimmed": made.trimmed.is_some(),
+            "untrimmed": made.outline.trimmed.is_some() && made.trimmed.is_none(),
             "radius_mm": written.radius_mm,
             "side": written.side,
             "warnings": written.warnings,
+            "region": reach.map(region_words::json),
         });
         say!("{value}");
         return;
@@ -197,6 +207,11 @@ fn report(arguments: &Arguments, path: &Path, face: &Face, made: &MachinableFace
         written.radius_mm,
         written.side
     );
+    if let Some(reach) = reach {
+        for line in region_words::lines(reach) {
+            say!("  reach        {line}");
+        }
+    }
     for warning in &written.warnings {
         say!("  note         {warning}");
     }
@@ -207,6 +222,7 @@ pub(super) fn command(arguments: &Arguments) -> Result<()> {
     let options = Options {
         tolerance_mm: arguments.tolerance,
         untrimmed: arguments.untrimmed,
+        around_mm: 0.0,
     };
     if !arguments.list && arguments.output.is_none() {
         return Err(Failure::input(
@@ -242,8 +258,8 @@ pub(super) fn command(arguments: &Arguments) -> Result<()> {
         },
     )?;
     // The job is parsed before it is written, so that the options are checked by the rules of the job file.
-    job_file::parse_with(&path.display().to_string(), &written.text, &cad::Faces)?;
+    let job = job_file::parse_with(&path.display().to_string(), &written.text, &part::Faces)?;
     whole::write(path, written.text.as_bytes(), arguments.force)?;
-    report(arguments, path, face, &made, &written);
+    report(arguments, path, face, &made, &written, job.origin.reach());
     Ok(())
 }
