@@ -39,6 +39,12 @@ pub struct JobOptions {
     pub side: Option<String>,
     /// Order of the passes, as in job files.
     pub pattern: Option<String>,
+    /// The job's region is made from the face and its part, whether the face is trimmed or not.
+    pub in_part: bool,
+    /// Rotation of the part about x, y and z, degrees.
+    pub rotate_deg: [f64; 3],
+    /// Its translation after that, mm.
+    pub translate_mm: [f64; 3],
     /// Path of the CAD file relative to the job file, and the tolerance of an approximation, mm: an approximated surface names its source.
     pub source: Option<(String, f64)>,
 }
@@ -95,10 +101,11 @@ pub fn write_job(
     options: &JobOptions,
 ) -> Result<JobText, CadError> {
     let measures = measure(&surface.spec());
-    let (chosen, sign) = match (&surface.trimmed, side(face, &measures)) {
-        // The surface around a trimmed face may face another way than the face.
-        (Some(_), (_, sign)) => (if sign > 0.0 { "+" } else { "-" }, sign),
-        (None, chosen) => chosen,
+    let by_region = options.in_part || surface.trimmed.is_some();
+    let (chosen, sign) = match (by_region, side(face, &measures)) {
+        // The surface around a face may face another way than the face.
+        (true, (_, sign)) => (if sign > 0.0 { "+" } else { "-" }, sign),
+        (false, chosen) => chosen,
     };
     let side = options.side.clone().unwrap_or_else(|| chosen.to_owned());
     let sign = match side.as_str() {
@@ -122,10 +129,10 @@ pub fn write_job(
         )
     })?;
     let mut warnings = Vec::new();
-    if surface.trimmed.is_some() && options.source.is_none() {
+    if by_region && options.source.is_none() {
         return Err(CadError::face(
             source,
-            format!("face {} is trimmed, and a job file cannot name {source:?}", face.number),
+            format!("the job of face {} must name its file, and cannot name {source:?}", face.number),
             "give the CAD file a plain name, or machine the whole rectangle around the face with --untrimmed",
         ));
     }
@@ -148,7 +155,7 @@ pub fn write_job(
         ));
     }
     let facing = facing(&Surface::new(&surface.spec()), sign);
-    if facing.down_share > 0.0 {
+    if facing.down_share > 0.0 && !by_region {
         let turn = facing.turn_deg.map_or_else(
             || "no turn makes all of it look up".to_owned(),
             |turn| format!("rotate_deg = {turn:?} in [placement] turns it up"),
@@ -163,7 +170,7 @@ pub fn write_job(
         .iter()
         .flatten()
         .fold(0.0_f64, |far, x| far.max(x.abs()));
-    let centred = far_mm > REACH_MM;
+    let centred = far_mm > REACH_MM && !options.in_part;
     if centred {
         warnings.push(format!(
             "it lies up to {far_mm:.0} mm from the origin, the machine's range is 2147 mm; it is placed with its centre at the origin"
@@ -216,7 +223,7 @@ fn text(
         let _ = writeln!(out, "# Note: {}.", one_line(warning));
     }
     out.push('\n');
-    let of_file = surface.trimmed.as_ref().and(options.source.as_ref());
+    let of_file = options.source.as_ref().filter(|_| options.in_part || surface.trimmed.is_some());
     if let Some((path, tolerance_mm)) = of_file {
         // Its region is made when the job is read.
         let _ = writeln!(
@@ -236,7 +243,13 @@ fn text(
             face.number
         );
     }
-    if centred {
+    if options.rotate_deg != [0.0; 3] || options.translate_mm != [0.0; 3] {
+        let _ = write!(
+            out,
+            "\n[placement]\nrotate_deg = {:?}    # of the whole part\ntranslate_mm = {:?}\n",
+            options.rotate_deg, options.translate_mm
+        );
+    } else if centred {
         out.push_str("\n[placement]\nplace = \"centre\"            # the centre of its box, at translate_mm\ntranslate_mm = [0, 0, 0]\n");
     }
     let or = |given: &Option<String>, default: &str| given.clone().unwrap_or_else(|| default.to_owned());

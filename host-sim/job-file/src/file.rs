@@ -12,7 +12,7 @@ const FACE_MAX: f64 = 1e6;
 /// Default of the tolerance of an approximated face, mm.
 pub const TOLERANCE_DEFAULT_MM: f64 = 0.001;
 /// Default depth to which the tool may enter the part, mm.
-const PART_TOLERANCE_MM: f64 = 0.002;
+pub const PART_TOLERANCE_MM: f64 = 0.002;
 /// Largest such depth, mm.
 const PART_TOLERANCE_MAX_MM: f64 = 1.0;
 /// Default of the steepest angle that is machined, degrees: steeper, the ball cuts with its equator and the shank rubs.

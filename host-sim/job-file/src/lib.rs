@@ -29,13 +29,13 @@ use patches::placement::Placement;
 use section::{Reader, Section};
 
 pub use file::{
-    Face, FaceError, FaceReader, FaceRegion, FaceSurface, STEEPEST_DEG, TOLERANCE_DEFAULT_MM, TOLERANCE_MAX_MM,
+    Face, FaceError, FaceReader, FaceRegion, FaceSurface, PART_TOLERANCE_MM, STEEPEST_DEG, TOLERANCE_DEFAULT_MM, TOLERANCE_MAX_MM,
 };
 pub use steps::slots_max_us;
 
 /// How far the surface of a face goes on beyond it, in step-overs on a plane: passes begin and end half a step-over beside it, which on hollow places
 /// is twice as long.
-const STEP_OVERS_AROUND: f64 = 1.1;
+pub const STEP_OVERS_AROUND: f64 = 1.1;
 
 /// Reads a job without a surface of `kind = "file"` from a file.
 ///

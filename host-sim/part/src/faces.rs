@@ -1,6 +1,7 @@
 //! Resolves the faces and the parts of jobs: the surface, then the region that the job's tool reaches.
 
 use std::path::{Path, PathBuf};
+use std::sync::{Arc, Mutex};
 
 use cad::{Model, Placement, model_with, surface_of};
 use job::{CadSource, FaceReach, Job, PartSource, Region};
@@ -19,6 +20,9 @@ const METHOD: u32 = 1;
 const CACHE: &str = ".isofeed";
 /// How deep the tool may enter the part, mm, where no part says it: only the grid of a face alone depends on it.
 const TOUCH_MM: f64 = 0.002;
+
+/// Placements that differ by less are one: rounding, as a share and in mm.
+const SAME_MM: f64 = 1e-9;
 
 /// The [`FaceReader`] that uses the reader of CAD files.
 #[derive(Clone, Copy, Debug)]
@@ -126,14 +130,31 @@ pub fn placement(job: &Job) -> Placement {
 ///
 /// # Errors
 /// The file cannot be read.
-pub fn part_of(job: &Job, source: &PartSource) -> Result<Part, FaceError> {
+pub fn part_of(job: &Job, source: &PartSource) -> Result<Arc<Part>, FaceError> {
     let model = model_with(&source.path, 1)?;
-    Ok(placed(&model, &placement(job)))
+    Ok(placed_part(&model, &placement(job)))
 }
 
-fn placed(model: &Model, by: &Placement) -> Part {
+/// The part of a file on the machine. The last one is kept: the faces of a part are asked for one after the other.
+#[must_use]
+pub fn placed_part(model: &Arc<Model>, by: &Placement) -> Arc<Part> {
+    type Last = Option<(Arc<Model>, [[f64; 4]; 3], Arc<Part>)>;
+    static LAST: Mutex<Last> = Mutex::new(None);
+    let lock = || LAST.lock().unwrap_or_else(std::sync::PoisonError::into_inner);
+    let same = |rows: &[[f64; 4]; 3]| {
+        let both = rows.iter().flatten().zip(by.rows.iter().flatten());
+        both.into_iter().all(|(a, b)| (a - b).abs() <= SAME_MM)
+    };
+    if let Some((of, rows, part)) = lock().as_ref()
+        && Arc::ptr_eq(of, model)
+        && same(rows)
+    {
+        return Arc::clone(part);
+    }
     let faces: Vec<cad::Face> = model.faces.iter().filter_map(|face| face.placed(by)).collect();
-    Part::new(&faces)
+    let part = Arc::new(Part::new(&faces));
+    *lock() = Some((Arc::clone(model), by.rows, Arc::clone(&part)));
+    part
 }
 
 /// Whether two paths are of one file.
@@ -183,7 +204,7 @@ fn made(job: &Job, source: &CadSource) -> Result<Found, FaceError> {
         scallop_mm: job.scallop_mm,
         steepest_deg: part.as_ref().map_or(STEEPEST_DEG, |(_, of)| of.steepest_deg),
         touch_mm: part.as_ref().map_or(TOUCH_MM, |(_, of)| of.tolerance_mm),
-        part: part.as_ref().map(|(part, of)| (part, own_face(job, part, of))),
+        part: part.as_ref().map(|(part, of)| (&**part, own_face(job, part, of))),
     };
     let unknown = part.as_ref().map_or_else(Vec::new, |(part, _)| {
         part.missing.iter().map(|missing| missing.number).collect()

@@ -23,7 +23,7 @@ mod triangle;
 pub use body::{Missing, Near, OwnContact, Part, PartFace};
 pub use clear::{Clearance, Place};
 pub use contour::{Precision, Set};
-pub use faces::{Faces, own_face, part_of, placement};
+pub use faces::{Faces, own_face, part_of, placed_part, placement};
 pub use inside::Inside;
 pub use region::{GROWTH, Made, Request, STEP_MAX};
 pub use tool::{Column, Reason, Tool};

@@ -27,6 +27,8 @@ const CHORD_MM: f64 = 0.003;
 /// Farther in for fewer vertices, mm.
 const SIMPLIFY_MM: f64 = 0.01;
 
+/// Places a side at which the reach of a face is measured.
+const SIDE: usize = 64;
 /// Least ball that is tried, mm.
 const RADIUS_MIN_MM: f64 = 0.05;
 /// Share of a face that counts as all of it.
@@ -146,6 +148,12 @@ impl Request<'_> {
         (metric, step)
     }
 
+    /// What can be reached, without a region: by `side` x `side` places around the face.
+    #[must_use]
+    pub fn reach(&self, side: usize) -> Made {
+        self.shares(&Inside::new(self.trimmed), &self.clearance(), side)
+    }
+
     /// Makes the region.
     #[must_use]
     pub fn make(&self) -> Made {
@@ -156,7 +164,7 @@ impl Request<'_> {
         let grow_mm = if self.part.is_some() { GROWTH * step } else { 0.0 };
         let rectangle = self.rectangle(domain, metric, grow_mm);
         let clearance = self.clearance();
-        let mut made = self.shares(&trimmed, &clearance);
+        let mut made = self.shares(&trimmed, &clearance, SIDE);
         if made.reachable_mm2 == 0.0 && made.area_mm2 > 0.0 && made.unreachable_mm2.iter().all(|(why, _)| *why == Reason::Steep) {
             return made;
         }
@@ -197,20 +205,19 @@ impl Request<'_> {
     }
 
     /// Places of the trimmed region in a regular pattern, each with its area.
-    fn places(&self, trimmed: &Inside) -> Vec<([f64; 2], f64)> {
-        const SIDE: usize = 64;
+    fn places(&self, trimmed: &Inside, side: usize) -> Vec<([f64; 2], f64)> {
         let places = || self.trimmed.iter().flatten();
         let range: [[f64; 2]; 2] = std::array::from_fn(|k| {
             places().fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], place| {
                 [low.min(place[k]), high.max(place[k])]
             })
         });
-        let cell = (range[0][1] - range[0][0]) * (range[1][1] - range[1][0]) / (SIDE * SIDE) as f64;
+        let cell = (range[0][1] - range[0][0]) * (range[1][1] - range[1][0]) / (side * side) as f64;
         let mut out = Vec::new();
-        for i in 0..SIDE {
-            for j in 0..SIDE {
+        for i in 0..side {
+            for j in 0..side {
                 // Rank-1 lattice of the golden ratio's kin: no row lines up with an edge (R2 sequence, M. Roberts, 2018).
-                let n = (i * SIDE + j) as f64 + 0.5;
+                let n = (i * side + j) as f64 + 0.5;
                 let share = [(n * 0.754_877_666_246_692_8).fract(), (n * 0.569_840_290_998_053_3).fract()];
                 let place: [f64; 2] =
                     std::array::from_fn(|k| range[k][0] + share[k] * (range[k][1] - range[k][0]));
@@ -230,7 +237,7 @@ impl Request<'_> {
         if made.reachable_mm2 >= NEARLY_ALL * (made.area_mm2 - too_steep) {
             return Some(self.tool.radius);
         }
-        let places = self.places(trimmed);
+        let places = self.places(trimmed, SIDE);
         let every = places.len().div_ceil(TRIAL_PLACES).max(1);
         let places: Vec<_> = places.into_iter().step_by(every).collect();
         let reaches = |radius: f64| {
@@ -264,15 +271,15 @@ impl Request<'_> {
     }
 
     fn sum(&self, trimmed: &Inside, holds: impl Fn([f64; 2]) -> bool) -> f64 {
-        let places = self.places(trimmed);
+        let places = self.places(trimmed, SIDE);
         places.iter().filter(|(place, _)| holds(*place)).map(|(_, area)| area).sum()
     }
 
     /// What can be reached, and why not.
-    fn shares(&self, trimmed: &Inside, clearance: &Clearance<'_>) -> Made {
+    fn shares(&self, trimmed: &Inside, clearance: &Clearance<'_>, side: usize) -> Made {
         let mut made = Made::default();
         let mut lost = [0.0; Reason::ALL.len()];
-        for (place, area) in self.places(trimmed) {
+        for (place, area) in self.places(trimmed, side) {
             made.area_mm2 += area;
             match clearance.check(place) {
                 Ok(()) => made.reachable_mm2 += area,

@@ -28,6 +28,11 @@ pub(super) fn json(reach: &FaceReach) -> Value {
     })
 }
 
+/// A reason in words.
+pub(super) fn reason(name: &str) -> &'static str {
+    REASONS.iter().find(|(other, _)| *other == name).map_or("", |(_, words)| words)
+}
+
 /// The figures as text.
 pub(super) fn lines(reach: &FaceReach) -> Vec<String> {
     let share = |part: f64, of: f64| if of > 0.0 { 100.0 * part / of } else { 0.0 };
@@ -39,8 +44,7 @@ pub(super) fn lines(reach: &FaceReach) -> Vec<String> {
         share(reach.region_mm2, reach.reachable_mm2),
     )];
     for (reason, area) in &reach.unreachable_mm2 {
-        let words = REASONS.iter().find(|(name, _)| name == reason).map_or("", |(_, words)| words);
-        lines.push(format!("{area:.3} mm2 not: {words}"));
+        lines.push(format!("{area:.3} mm2 not: {}", self::reason(reason)));
     }
     let short = reach.unreachable_mm2.iter().any(|(reason, _)| reason != "steep");
     match reach.radius_mm {
