@@ -170,46 +170,95 @@ pub fn own_face(job: &Job, part: &Part, of: &PartSource) -> Option<usize> {
     part.index(source.face)
 }
 
+/// All that the region of a job is made of.
+pub struct Asked {
+    model: Arc<Model>,
+    face: usize,
+    trimmed: Vec<Vec<[f64; 2]>>,
+    oracle: Oracle,
+    placement: Placement,
+    tool: Tool,
+    scallop_mm: f64,
+    part: Option<(Arc<Part>, PartSource)>,
+    own: Option<usize>,
+}
+
+impl Asked {
+    /// Of a job whose surface is of a CAD file.
+    ///
+    /// # Errors
+    /// A file cannot be read.
+    pub fn new(job: &Job, source: &CadSource) -> Result<Self, FaceError> {
+        let model = model_with(&source.path, source.face)?;
+        let wanted = Face {
+            path: source.path.clone(),
+            number: source.face,
+            tolerance_mm: source.tolerance_mm,
+            untrimmed: source.untrimmed,
+            around_mm: source.around_mm,
+        };
+        let (surface, _) = surface_of(&wanted, &model.faces[source.face - 1])?;
+        let oracle = Oracle::new(job).map_err(|error| FaceError {
+            what: error.to_string(),
+            remedy: "give side = \"+\" or \"-\" in [cut]".to_owned(),
+            of_face: true,
+        })?;
+        let part = match job.origin.part() {
+            Some(of) => Some((part_of(job, of)?, of.clone())),
+            None => None,
+        };
+        let [[u0, u1], [v0, v1]] = job.surface.domain();
+        let whole = vec![vec![[u0, v0], [u1, v0], [u1, v1], [u0, v1]]];
+        Ok(Self {
+            face: source.face - 1,
+            trimmed: surface.trimmed.unwrap_or(whole),
+            placement: placement(job),
+            tool: Tool::of(job),
+            scallop_mm: job.scallop_mm,
+            own: part.as_ref().and_then(|(part, of)| own_face(job, part, of)),
+            model,
+            oracle,
+            part,
+        })
+    }
+
+    /// The request.
+    #[must_use]
+    pub fn request(&self) -> Request<'_> {
+        let rules = self.part.as_ref().map(|(_, of)| of);
+        Request {
+            surface: &self.oracle.surface,
+            trimmed: &self.trimmed,
+            face: &self.model.faces[self.face],
+            placement: &self.placement,
+            sign: self.oracle.normal_sign,
+            tool: &self.tool,
+            scallop_mm: self.scallop_mm,
+            steepest_deg: rules.map_or(STEEPEST_DEG, |of| of.steepest_deg),
+            touch_mm: rules.map_or(TOUCH_MM, |of| of.tolerance_mm),
+            part: self.part.as_ref().map(|(part, _)| (&**part, self.own)),
+        }
+    }
+
+    /// The part on the machine.
+    #[must_use]
+    pub fn part(&self) -> Option<&Part> {
+        self.part.as_ref().map(|(part, _)| &**part)
+    }
+
+    /// The tool.
+    #[must_use]
+    pub fn tool(&self) -> &Tool {
+        &self.tool
+    }
+}
+
 fn made(job: &Job, source: &CadSource) -> Result<Found, FaceError> {
-    let model = model_with(&source.path, source.face)?;
-    let face = &model.faces[source.face - 1];
-    let wanted = Face {
-        path: source.path.clone(),
-        number: source.face,
-        tolerance_mm: source.tolerance_mm,
-        untrimmed: source.untrimmed,
-        around_mm: source.around_mm,
-    };
-    let (surface, _) = surface_of(&wanted, face)?;
-    let oracle = Oracle::new(job).map_err(|error| FaceError {
-        what: error.to_string(),
-        remedy: "give side = \"+\" or \"-\" in [cut]".to_owned(),
-        of_face: true,
-    })?;
-    let by = placement(job);
-    let part = match job.origin.part() {
-        Some(of) => Some((part_of(job, of)?, of)),
-        None => None,
-    };
-    let [[u0, u1], [v0, v1]] = job.surface.domain();
-    let whole = vec![vec![[u0, v0], [u1, v0], [u1, v1], [u0, v1]]];
-    let tool = Tool::of(job);
-    let request = Request {
-        surface: &oracle.surface,
-        trimmed: surface.trimmed.as_ref().unwrap_or(&whole),
-        face,
-        placement: &by,
-        sign: oracle.normal_sign,
-        tool: &tool,
-        scallop_mm: job.scallop_mm,
-        steepest_deg: part.as_ref().map_or(STEEPEST_DEG, |(_, of)| of.steepest_deg),
-        touch_mm: part.as_ref().map_or(TOUCH_MM, |(_, of)| of.tolerance_mm),
-        part: part.as_ref().map(|(part, of)| (&**part, own_face(job, part, of))),
-    };
-    let unknown = part.as_ref().map_or_else(Vec::new, |(part, _)| {
+    let asked = Asked::new(job, source)?;
+    let unknown = asked.part().map_or_else(Vec::new, |part| {
         part.missing.iter().map(|missing| missing.number).collect()
     });
-    Ok(Found::new(request.make(), unknown))
+    Ok(Found::new(asked.request().make(), unknown))
 }
 
 /// The tool reaches nothing of the face.

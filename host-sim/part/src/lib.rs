@@ -5,6 +5,8 @@
 //!                                 │ clear.rs     steep, fit, ball, shank, holder: the first rule that a place of a face breaks
 //!                                 ▼
 //! trimmed region of a face ──region.rs──► grown by half a step-over where all rules hold ──contour.rs──► polygons of (u, v)
+//!
+//! emitted centres ──proof.rs──► the deepest place of the tool in the part, what is left on the reachable part of the face
 //! ```
 //!
 //! Not in the sample path: f64; lengths in mm.
@@ -15,6 +17,7 @@ mod clear;
 mod contour;
 mod faces;
 mod inside;
+mod proof;
 mod region;
 mod tool;
 mod tree;
@@ -23,8 +26,9 @@ mod triangle;
 pub use body::{Missing, Near, OwnContact, Part, PartFace};
 pub use clear::{Clearance, Place};
 pub use contour::{Precision, Set};
-pub use faces::{Faces, own_face, part_of, placed_part, placement};
+pub use faces::{Asked, Faces, own_face, part_of, placed_part, placement};
 pub use inside::Inside;
+pub use proof::{Deepest, LEFTOVER_SHARE, LEFTOVER_SIDE, Leftover, Passes, along, deepest, leftover};
 pub use region::{GROWTH, Made, Request, STEP_MAX};
 pub use tool::{Column, Reason, Tool};
 pub use tree::Block;

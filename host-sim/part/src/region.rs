@@ -112,7 +112,9 @@ impl Border {
 }
 
 impl Request<'_> {
-    fn clearance(&self) -> Clearance<'_> {
+    /// The rules for a place.
+    #[must_use]
+    pub fn clearance(&self) -> Clearance<'_> {
         Clearance {
             surface: self.surface,
             sign: self.sign,
@@ -205,7 +207,8 @@ impl Request<'_> {
     }
 
     /// Places of the trimmed region in a regular pattern, each with its area.
-    fn places(&self, trimmed: &Inside, side: usize) -> Vec<([f64; 2], f64)> {
+    #[must_use]
+    pub fn places(&self, trimmed: &Inside, side: usize) -> Vec<([f64; 2], f64)> {
         let places = || self.trimmed.iter().flatten();
         let range: [[f64; 2]; 2] = std::array::from_fn(|k| {
             places().fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], place| {

@@ -21,6 +21,7 @@ mod out;
 mod outcome;
 #[cfg(feature = "developer")]
 mod paper;
+mod part_words;
 mod progress;
 mod reach_words;
 mod region_words;
