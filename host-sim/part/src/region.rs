@@ -27,6 +27,10 @@ const CHORD_MM: f64 = 0.003;
 /// Farther in for fewer vertices, mm.
 const SIMPLIFY_MM: f64 = 0.01;
 
+/// A side shorter than this is a point, mm.
+const POLE_MM: f64 = 1e-6;
+/// Radius around such a point that no pass enters, in step-overs.
+const POLE_STEPS: f64 = 0.35;
 /// Places a side at which the reach of a face is measured.
 const SIDE: usize = 64;
 /// Least ball that is tried, mm.
@@ -172,7 +176,12 @@ impl Request<'_> {
         }
         made.radius_mm = self.largest_ball(&trimmed, &made);
         let border = Border::new(self.face, self.placement);
+        let poles = self.poles(domain);
+        let beside_pole = |point: DVec3| poles.iter().any(|pole| pole.distance(point) < POLE_STEPS * step);
         let holds = |place: [f64; 2]| {
+            if !poles.is_empty() && beside_pole(self.surface.at(place[0], place[1]).point) {
+                return false;
+            }
             (trimmed.contains(place)
                 || grow_mm > 0.0 && border.is_near(self.surface.at(place[0], place[1]).point, grow_mm))
                 && clearance.check(place).is_ok()
@@ -191,6 +200,24 @@ impl Request<'_> {
         let inside = Inside::new(&made.loops);
         made.inside_mm2 = self.sum(&trimmed, |place| inside.contains(place) && clearance.check(place).is_ok());
         made
+    }
+
+    /// Points to which a side of the domain shrinks. A pass on one has no length, and one around it serves it.
+    fn poles(&self, [u, v]: [[f64; 2]; 2]) -> Vec<DVec3> {
+        let mut poles = Vec::new();
+        let share = |[low, high]: [f64; 2], k: usize| low + (high - low) * k as f64 / 4.0;
+        for (along, range, ends) in [(0, u, v), (1, v, u)] {
+            for end in ends {
+                let places: Vec<DVec3> = (0..=4)
+                    .map(|k| if along == 0 { [share(range, k), end] } else { [end, share(range, k)] })
+                    .map(|place| self.surface.at(place[0], place[1]).point)
+                    .collect();
+                if places.iter().all(|point| point.distance(places[0]) < POLE_MM) {
+                    poles.push(places[0]);
+                }
+            }
+        }
+        poles
     }
 
     /// The trimmed region's box, grown.
