@@ -32,6 +32,8 @@ mod spline;
 mod surface;
 mod trim;
 #[cfg(test)]
+mod trim_tests;
+#[cfg(test)]
 mod tests;
 
 pub use curve::Curve;

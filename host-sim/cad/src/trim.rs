@@ -99,7 +99,11 @@ pub fn trim(
         Winding::Both => return Err("its boundary winds around the surface both ways".to_owned().into()),
     };
     let inside = within(surface, polygons, outline.rectangle);
-    if let Some(found) = crossing(surface, &inside, CROSSING_MM) {
+    let rough: Vec<Polygon> = inside
+        .iter()
+        .map(|polygon| simplified(polygon, metric(surface, polygon), CHORD_SHARE * tolerance_mm))
+        .collect();
+    if let Some(found) = crossing(surface, &rough, CROSSING_MM) {
         let [x, y, z] = found.place_mm.to_array();
         return Err(format!(
             "its boundary crosses itself by {:.3} mm at [{x:.3}, {y:.3}, {z:.3}]",
@@ -412,7 +416,10 @@ pub(super) fn clipped(polygon: &Polygon, k: usize, end: f64, sign: f64) -> Polyg
 /// Largest lengths of the derivatives by u and v along a polygon, mm per unit.
 fn metric(surface: &Surface, polygon: &Polygon) -> [f64; 2] {
     let on = Periodic::new(surface);
-    polygon.iter().fold([f64::MIN_POSITIVE; 2], |[a, b], place| {
+    let next = polygon.iter().cycle().skip(1);
+    // Middles of edges, too: all corners may be poles.
+    let places = polygon.iter().zip(next).flat_map(|(a, b)| [*a, [0.5 * (a[0] + b[0]), 0.5 * (a[1] + b[1])]]);
+    places.fold([f64::MIN_POSITIVE; 2], |[a, b], place| {
         let at = on.at(place[0], place[1]);
         [a.max(at.u.length()), b.max(at.v.length())]
     })

@@ -19,6 +19,8 @@ mod faces;
 mod inside;
 mod proof;
 mod region;
+#[cfg(test)]
+mod tests;
 mod tool;
 mod tree;
 mod triangle;
