@@ -25,6 +25,8 @@ const OFF_MM: f64 = 0.05;
 const CROSSING_MM: f64 = 0.02;
 /// Share of the tolerance for the chords between inverted points; most of the rest is for leaving vertices out.
 const CHORD_SHARE: f64 = 0.1;
+/// Largest number of points of a loop from which on its intervals are not halved further: a loop of a file that makes sense has a tenth of it.
+const POINTS_MAX: usize = 50_000;
 /// Halvings of an interval between two points of an edge.
 const HALVINGS: u32 = 12;
 
@@ -84,6 +86,9 @@ pub fn trim(
         .zip(&paths)
         .map(|(edges, path)| line(surface, edges, path, chord_mm, false))
         .collect();
+    if lines.iter().flatten().flatten().any(|x| !x.is_finite()) {
+        return Err("its boundary has no parameters".to_owned().into());
+    }
     closed(surface, &lines, &paths)?;
     let lines: Vec<Polygon> = lines.into_iter().map(unspiked).collect();
     let polygons = match winding(&paths) {
@@ -99,6 +104,9 @@ pub fn trim(
         Winding::Both => return Err("its boundary winds around the surface both ways".to_owned().into()),
     };
     let inside = within(surface, polygons, outline.rectangle);
+    if inside.iter().flatten().flatten().any(|x| !x.is_finite()) {
+        return Err("its boundary has no parameters".to_owned().into());
+    }
     let rough: Vec<Polygon> = inside
         .iter()
         .map(|polygon| simplified(polygon, metric(surface, polygon), CHORD_SHARE * tolerance_mm))
@@ -190,7 +198,7 @@ struct Halving<'a> {
 impl Halving<'_> {
     /// Adds the points between two places of an interval, at these shares of it.
     fn between(&self, index: usize, shares: [f64; 2], ends: [[f64; 2]; 2], left: u32, out: &mut Polygon) {
-        if left == 0 {
+        if left == 0 || out.len() >= POINTS_MAX {
             return;
         }
         let chord = |share: f64| -> [f64; 2] {
