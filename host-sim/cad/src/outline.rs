@@ -336,14 +336,6 @@ fn belt(
     }
     let turning: Vec<_> = paths.iter().filter(|path| path.winding[k] != 0.0).collect();
     let [low, high] = rectangle[across];
-    let flat = (high - low)
-        * turning[0]
-            .edges
-            .iter()
-            .flatten()
-            .map(|p| speed(surface, *p, across))
-            .fold(0.0, f64::max)
-        <= FOLLOWS_MM;
     if turning.len() == 1 {
         // A single line: the face is to its left, seen against the normal of the face.
         let left = turning[0].winding[k] * sense * if k == 0 { 1.0 } else { -1.0 };
@@ -357,9 +349,6 @@ fn belt(
             return Err("its boundary leaves it unbounded".to_owned());
         };
         rectangle[across] = [low.min(end), high.max(end)];
-        if !flat && trimmed.is_none() {
-            trimmed = Some("its boundary is not an iso-parametric line".to_owned());
-        }
     }
     if trimmed.is_none() && turning.len() > 2 {
         trimmed = Some(format!("it has {} boundaries", turning.len()));
