@@ -27,6 +27,7 @@ mod protocol;
 mod qemu;
 mod random_passes;
 mod random_surfaces;
+mod regions;
 mod report_page;
 mod safety;
 mod sample_jobs;

@@ -11,8 +11,8 @@ use crate::feed::pace::{Course as _, Pace};
 use crate::feed::plan::{Cursor, Plan};
 use crate::feed::planner::{PORTION_CYCLES, Planner};
 use crate::feed::turn::Turn;
+use crate::job::AxisLimits;
 use crate::job::program::Job;
-use crate::job::{AxisLimits, Header, Pattern};
 use crate::math::number::{Bounded, to_f32};
 use crate::pass::route::Route;
 use crate::pass::run::Run;
@@ -200,7 +200,7 @@ impl Sequencer {
     };
 
     /// Starts the job from the tool's position.
-    pub(crate) fn restart(&mut self, header: &Header, axes: &AxisLimits) {
+    pub(crate) fn restart(&mut self, first: Route, axes: &AxisLimits) {
         self.at.get_or_insert(axes.home_nm);
         self.phase = Phase::Await;
         self.second = false;
@@ -213,7 +213,7 @@ impl Sequencer {
         }
         self.lookahead.restart();
         self.feed_factor = 1.0;
-        self.request_planning(0, Some(Route::of_pass(header, 0, SpanParameter::default())));
+        self.request_planning(0, Some(first));
     }
 
     /// The tool's position, nm, once it is known.
@@ -396,11 +396,11 @@ impl Sequencer {
         }
         match self.planning {
             Planning::Requested(pass, route) => {
-                self.lookahead.begin(pass, route, &now.tail, next);
+                self.lookahead.begin(job, pass, route, &now.tail, next);
                 self.planning = Planning::Stations;
             }
             Planning::Stations => {
-                self.pending = self.lookahead.work(job, axes, next).err();
+                self.pending = self.lookahead.work(job, axes, &mut run.lines, next).err();
                 if self.lookahead.is_done() {
                     self.planning = if next.point {
                         Planning::Complete
@@ -415,7 +415,7 @@ impl Sequencer {
             Planning::Feed => {
                 // The pass after it takes as long to plan; off the surface it can be waited for.
                 let is_last = next.next.is_none() && !self.planner.is_walking();
-                let least = if !is_last && job.header.pattern == Pattern::Zigzag {
+                let least = if !is_last && next.steps_over {
                     self.spent.saturating_add(SPARE_PERIODS)
                 } else {
                     0
@@ -566,7 +566,7 @@ impl Sequencer {
                 return Ok(());
             }
             let (now, next) = both(&mut self.plans, self.second);
-            if self.on_surface && job.header.pattern == Pattern::Zigzag {
+            if self.on_surface && now.steps_over {
                 self.phase = Phase::StepOver;
                 let pace = command.feed_factor * job.header.feed_mm_s / self.step_over.feed();
                 self.step_over
@@ -610,22 +610,22 @@ impl Sequencer {
         self.follower.begin(&now.plan);
         let pace = pace_on(now, command.feed_factor);
         self.pace.begin(pace, job.header.period_s);
-        self.start_pass(job);
+        self.start_pass();
         Ok(())
     }
 
     /// Resets what belongs to a pass, and requests the link to the next one.
-    pub(super) fn start_pass(&mut self, job: &Job<'_>) {
+    pub(super) fn start_pass(&mut self) {
         self.has_first_patch = true;
         let (now, _) = both(&mut self.plans, self.second);
         self.cell = [0; 2];
         self.correction = None;
         self.replanned = 0.0;
-        if job.header.pattern == Pattern::Zigzag && now.next.is_some() && !now.turns() {
+        if now.steps_over && !now.turns() {
             self.step_over.request();
             self.has_step_over = true;
         }
-        self.has_hop = job.header.pattern == Pattern::Zig && now.next.is_some();
+        self.has_hop = !now.steps_over && now.next.is_some();
         self.hop.clear();
     }
 
@@ -754,7 +754,7 @@ impl Sequencer {
             check_faces_up(now.faces_up[1])?;
             self.goal = Goal::Home;
             self.await_goal(Leg::Retract);
-        } else if job.header.pattern == Pattern::Zigzag {
+        } else if now.steps_over {
             self.phase = Phase::Await;
         } else {
             check_faces_up(now.faces_up[1])?;
@@ -776,7 +776,7 @@ impl Sequencer {
     /// measured, because those in which the tool comes to a patch, and the patch after it is prepared, are the worst-case ticks.
     fn correct_progress(&mut self, run: &Run) {
         let (now, _) = both(&mut self.plans, self.second);
-        let (cells, fraction) = now.kept_cells();
+        let kept = now.kept_cells();
         if self.phase != Phase::Pass || now.point {
             return;
         }
@@ -788,11 +788,11 @@ impl Sequencer {
             }
             return;
         }
-        let Some(cell) = run.cell(cells).filter(|cell| *cell != self.cell) else {
+        let Some(cell) = run.cell(kept.0).filter(|cell| *cell != self.cell) else {
             return;
         };
         self.cell = cell;
-        let (Some(start_q10), Some(since_mm)) = (now.arc_q10(cell), run.since_station(cell, fraction)) else {
+        let (Some(start_q10), Some(since_mm)) = (now.arc_q10(cell), run.since_station(cell, kept)) else {
             return;
         };
         let arc_q10 = start_q10 + crate::feed::to_q10(since_mm);
