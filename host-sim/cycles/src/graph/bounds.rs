@@ -117,6 +117,7 @@ const BOUNDS: &[(&str, u32, &str)] = &[
         24,
         "steps to the place where a change begins: STEPS_AHEAD",
     ),
+    ("interp_core::feed::plan::Plan::span_of", 3, "axes"),
     (
         "compiler_builtins::mem::impls::copy_backward::copy_backward_aligned_words",
         512,
