@@ -105,7 +105,10 @@ impl Oracle {
         for [from, to] in self.region.iter().flat_map(|region| &region.edges) {
             let at = |k: u32| {
                 let share = f64::from(k) / f64::from(parts);
-                let (u, v) = self.swapped(from[0] + share * (to[0] - from[0]), from[1] + share * (to[1] - from[1]));
+                let (u, v) = self.swapped(
+                    from[0] + share * (to[0] - from[0]),
+                    from[1] + share * (to[1] - from[1]),
+                );
                 [u, v]
             };
             match lines.last_mut() {

@@ -63,7 +63,11 @@ impl Mesh {
             outline: oracle
                 .region_outline(OUTLINE_PARTS)
                 .into_iter()
-                .map(|line| line.into_iter().map(|[u, v]| oracle.surface.at(u, v).point).collect())
+                .map(|line| {
+                    line.into_iter()
+                        .map(|[u, v]| oracle.surface.at(u, v).point)
+                        .collect()
+                })
                 .collect(),
         }
     }
