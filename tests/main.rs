@@ -11,6 +11,7 @@ mod export;
 mod faults;
 mod feed;
 mod golden_points;
+mod holds;
 mod home;
 mod house;
 mod images;

@@ -10,6 +10,7 @@ use crate::feed::limits::MotionLimits;
 use crate::feed::pace::{Course as _, Pace};
 use crate::feed::plan::{Cursor, Plan};
 use crate::feed::planner::{PORTION_CYCLES, Planner};
+use crate::feed::profile::Profiles;
 use crate::feed::turn::Turn;
 use crate::job::AxisLimits;
 use crate::job::program::Job;
@@ -29,12 +30,12 @@ const SPARE_PERIODS: u32 = 15;
 
 /// Cycles of one place of a search for a change of the pace, along a pass and along a link, and of its begin along a pass; of a portion of a
 /// step-over's planning.
-const PACE_CYCLES: u32 = 1_560;
-const PACE_BEGIN_CYCLES: u32 = 8_000;
-const LINK_PACE_CYCLES: u32 = 1_000;
+const PACE_CYCLES: u32 = 1_900;
+const PACE_BEGIN_CYCLES: u32 = 9_500;
+const LINK_PACE_CYCLES: u32 = 1_300;
 const STEP_OVER_CYCLES: u32 = 6_000;
 /// Cycles of the same of a hop, and of its planning.
-const HOP_PACE_CYCLES: u32 = 2_500;
+const HOP_PACE_CYCLES: u32 = 3_300;
 const HOP_CYCLES: u32 = 24_000;
 /// Cycles of the begin of a look-ahead, and of the planning of a leg.
 const BEGIN_CYCLES: u32 = 1_500;
@@ -140,6 +141,7 @@ pub(crate) struct Sequencer {
     pub(super) pending: Option<Fault>,
     pub(super) follower: Follower,
     pub(super) pace: Pace<Cursor>,
+    pub(super) profiles: Profiles,
     /// The turn that the tool is in, or was last.
     pub(super) turn: Turn,
     pub(super) straight: StraightMove,
@@ -184,6 +186,7 @@ impl Sequencer {
         pending: None,
         follower: Follower::START,
         pace: Pace::REST,
+        profiles: Profiles::NONE,
         turn: Turn::NONE,
         straight: StraightMove::NONE,
         hop: Hop::NONE,
@@ -371,11 +374,15 @@ impl Sequencer {
                 let known = is_known.then_some(&next.plan);
                 let stops = self.pace.wanted() == 0.0;
                 let road = road(&now.plan, known, next.plan.pace_max, stops);
-                return self.pace.work(&road, &self.follower.cursor);
+                return self.pace.work(&road, &self.follower.cursor, &mut self.profiles);
             }
-            Phase::StepOver if self.step_over.progress.has_work() => return self.step_over.progress.work(),
-            Phase::Leg(_) if self.straight.progress.has_work() => return self.straight.progress.work(),
-            Phase::Hop if self.hop.has_work() => return self.hop.work(),
+            Phase::StepOver if self.step_over.progress.has_work() => {
+                return self.step_over.progress.work(&mut self.profiles);
+            }
+            Phase::Leg(_) if self.straight.progress.has_work() => {
+                return self.straight.progress.work(&mut self.profiles);
+            }
+            Phase::Hop if self.hop.has_work() => return self.hop.work(&mut self.profiles),
             _ => {}
         }
         if let Some(route) = self.pass_ahead().map(|pass| pass.route) {
@@ -693,7 +700,7 @@ impl Sequencer {
             {
                 return Err(fault);
             }
-            let pace = self.pace.tick();
+            let pace = self.pace.tick(&mut self.profiles);
             let (now, _) = both(&mut self.plans, self.second);
             let moved = if pace > 0.0 {
                 self.follower.tick(&now.plan, pace)
@@ -813,6 +820,7 @@ impl Sequencer {
             command.feed_factor.at_most(1.0),
             command.is_fault,
             job.header.period_s,
+            &mut self.profiles,
         ) {
             self.swap();
             return self.enter_pass(job, run, command, last);
@@ -830,10 +838,12 @@ impl Sequencer {
     ) -> Result<()> {
         let pace = command.feed_factor * job.header.feed_mm_s / self.step_over.feed();
         let is_over = self.step_over.is_nothing()
-            || self
-                .step_over
-                .progress
-                .tick(pace.at_most(1.0), command.is_fault, job.header.period_s);
+            || self.step_over.progress.tick(
+                pace.at_most(1.0),
+                command.is_fault,
+                job.header.period_s,
+                &mut self.profiles,
+            );
         if is_over {
             return self.enter_pass(job, run, command, last);
         }

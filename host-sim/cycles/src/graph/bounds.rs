@@ -117,6 +117,7 @@ const BOUNDS: &[(&str, u32, &str)] = &[
         24,
         "steps to the place where a change begins: STEPS_AHEAD",
     ),
+    ("interp_core::feed::plan::Plan::span_of", 3, "axes"),
     (
         "compiler_builtins::mem::impls::copy_backward::copy_backward_aligned_words",
         512,
@@ -141,11 +142,6 @@ const BOUNDS: &[(&str, u32, &str)] = &[
         "interp_core::feed::road::GateSearch::place",
         160,
         "nodes of a plan: NODES_MAX",
-    ),
-    (
-        "interp_core::feed::road::Road as interp_core::feed::pace::Course::advance",
-        8,
-        "steps that a period is made of: PARTS_MAX",
     ),
     ("interp_core::feed::turn::Turn::bound_speed", 3, "axes"),
     (
