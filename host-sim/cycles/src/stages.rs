@@ -28,7 +28,7 @@ const STAGES: [(&str, &str, Stage); 24] = [
     ("pass::scan", "", Stage::PassChange),
     ("pass::run", "step_far", Stage::Step),
     ("pass::buffer", "", Stage::PatchChange),
-    ("pass::run", "next_span", Stage::PatchChange),
+    ("pass::run", "next_piece", Stage::PatchChange),
     ("pass::run", "begin_pass", Stage::PassChange),
     ("pass::run", "step_over", Stage::PassChange),
     ("pass::run", "find_step_over", Stage::PassChange),
