@@ -37,7 +37,7 @@ pub(crate) const PINNED: u16 = 3;
 const NEAR_TURN_NM: u32 = 4_000_000;
 
 /// Distance from an end at speed within which a change of the pace is looked at closely, nm.
-const UNEVEN_NM: u32 = 10_000_000;
+const UNEVEN_NM: u32 = 15_000_000;
 
 /// Where a jump lies: interval, fraction of it in units of 2^-16, and the first of its two stations.
 #[derive(Clone, Copy, Debug)]
