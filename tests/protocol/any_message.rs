@@ -107,6 +107,7 @@ prop_compose! {
             configuration,
             homing: None,
             probe_inverted: has_travel,
+            spindle: None,
         }
     }
 }

@@ -287,6 +287,7 @@ mod tests {
             },
             Reason::NoHoming,
             Reason::ProbeTripped,
+            Reason::NoSpindle,
         ]
     }
 
