@@ -95,7 +95,8 @@ impl<S: AsRef<[i32]> + AsMut<[i32]>> Interpolator<S> {
     /// [`FaultKind::BadLength`] where words are missing or the order is not kept.
     pub fn load_check(&mut self, record: u32) -> Result<()> {
         self.motion.may_load()?;
-        self.motion.program.check(self.store.as_ref(), record)
+        let Motion { program, run, .. } = &mut self.motion;
+        program.check(self.store.as_ref(), record, run.lines.scratch())
     }
 
     /// Seals the job: the machine is ready.
@@ -103,7 +104,7 @@ impl<S: AsRef<[i32]> + AsMut<[i32]>> Interpolator<S> {
     /// # Errors
     /// [`FaultKind::BadLength`] where words or checks are missing; the machine stays idle.
     pub fn load_finish(&mut self) -> Result<()> {
-        self.motion.load_finish()
+        self.motion.load_finish(self.store.as_ref())
     }
 
     /// Drops the loaded job: the machine is idle.
@@ -284,11 +285,11 @@ impl Motion {
         Ok(())
     }
 
-    fn load_finish(&mut self) -> Result<()> {
+    fn load_finish(&mut self, store: &[i32]) -> Result<()> {
         self.may_load()?;
         self.program.seal()?;
         self.state = State::Ready;
-        self.restart();
+        self.restart(store);
         Ok(())
     }
 
@@ -300,8 +301,10 @@ impl Motion {
         Ok(())
     }
 
-    fn restart(&mut self) {
-        self.run.restart(self.program.header().spacing);
+    fn restart(&mut self, store: &[i32]) {
+        if let Ok(job) = self.program.job(store) {
+            self.run.restart(&self.program, &job);
+        }
         self.fault = None;
         self.ending = Ending::Stand;
     }
@@ -465,14 +468,17 @@ impl Motion {
         let has_limits = self.program.header().axes.is_some();
         self.state = match command {
             Command::Start => {
-                self.restart();
+                self.restart(store);
                 let Self {
-                    program, sequencer, ..
+                    program,
+                    sequencer,
+                    run,
+                    ..
                 } = self;
                 match program.job(store) {
                     Ok(job) if has_limits => {
                         if let Some(axes) = &job.header.axes {
-                            sequencer.restart(job.header, axes);
+                            sequencer.restart(run.first_route(&job), axes);
                         }
                         State::Linking
                     }
