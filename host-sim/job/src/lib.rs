@@ -17,7 +17,7 @@ pub use machine::{
     MachineProfile, MachineSpec, PERIOD_DEFAULT_US, PERIOD_RANGE_US, Ratio, Spindle, SpindleDrive,
     StepOutput,
 };
-pub use origin::{AlongChoice, CadSource, DirectionTrial, Origin};
+pub use origin::{AlongChoice, CadSource, DirectionTrial, FaceReach, Origin, PartSource};
 pub use region::Region;
 pub use setup::{Block, Fixture, HolderPart, Setup, TOOL_SIZE_MAX_MM, ToolBody};
 pub use surface::{NurbsSpec, SurfaceSpec};
