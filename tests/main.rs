@@ -37,5 +37,6 @@ mod scallop_limit;
 mod script;
 mod session;
 mod settings;
+mod spindle;
 mod swept;
 mod unusual_motion;
