@@ -20,8 +20,8 @@ use protocol::{
     message::{
         Activity, Batch, Capabilities, Clock, Configuration, Description, Excess, FaultReport, Homing,
         InputLines, JogWay, LinkTimeoutAction, MotionEnd, MotionStatus, Offsets, PassDigest, Profile,
-        ProfileLimit, Reason, Reply, Report, Request, ResetCause, SafetyStatus, SampleRecord, Status,
-        StepSettings, Words, read_reply, read_request,
+        ProfileLimit, Reason, Reply, Report, Request, ResetCause, SafetyStatus, SampleRecord, SpindleOrder,
+        SpindleSettings, Status, StepSettings, Turning, Words, read_reply, read_request,
     },
 };
 
@@ -76,6 +76,10 @@ fn profile() -> Profile {
         configuration: CONFIGURATION,
         homing: Some(homing()),
         probe_inverted: true,
+        spindle: Some(SpindleSettings {
+            max_rpm: 24_000,
+            at_speed_ticks: 3_000,
+        }),
     }
 }
 
@@ -153,6 +157,11 @@ fn requests() -> Vec<Request> {
         Request::Motion,
         Request::Offsets,
         Request::SetOffsets(OFFSETS),
+        Request::Spindle(SpindleOrder {
+            turning: Turning::Counterclockwise,
+            rpm: 12_000,
+            coolant: true,
+        }),
         Request::JobBegin {
             header: Header {
                 axes: Some(axes()),
@@ -302,6 +311,7 @@ fn reasons() -> Vec<Reason> {
         },
         Reason::NoHoming,
         Reason::ProbeTripped,
+        Reason::NoSpindle,
     ]
 }
 

@@ -148,6 +148,8 @@ pub enum Reason {
     NoHoming,
     /// 29: the probe is tripped before the probe move.
     ProbeTripped,
+    /// 30: the profile describes no spindle.
+    NoSpindle,
 }
 
 impl Reason {
@@ -185,6 +187,7 @@ impl Reason {
             Self::BeyondTravel { .. } => 27,
             Self::NoHoming => 28,
             Self::ProbeTripped => 29,
+            Self::NoSpindle => 30,
         }
     }
 
@@ -346,6 +349,7 @@ impl fmt::Display for Reason {
                 wanted_nm,
             } => beyond_travel(axis, travel_nm, wanted_nm, formatter),
             Self::NoHoming => write!(formatter, "the machine's profile describes no homing by switches"),
+            Self::NoSpindle => write!(formatter, "the machine's profile describes no spindle"),
             Self::ProbeTripped => write!(formatter, "the probe is tripped before it moves"),
         }
     }

@@ -108,6 +108,7 @@ prop_compose! {
             configuration,
             homing: None,
             probe_inverted: has_travel,
+            spindle: None,
         }
     }
 }

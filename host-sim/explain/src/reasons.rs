@@ -3,7 +3,7 @@
 use super::{Entry, Family};
 
 /// In the order of codes.
-pub(super) const ENTRIES: [Entry; 30] = [
+pub(super) const ENTRIES: [Entry; 31] = [
     reason(
         0,
         "bad-frame",
@@ -273,6 +273,15 @@ pub(super) const ENTRIES: [Entry; 30] = [
         "It touches already, its wire is broken, or its contact closes when it touches and the profile does not say so.",
         "Move it away; check the wire; `[probe] contact = \"normally-open\"` in the profile for a plate that closes the circuit.",
         "A touch plate on a board whose profile has no [probe].",
+    ),
+    reason(
+        30,
+        "no-spindle",
+        "The machine's profile describes no spindle.",
+        "None.",
+        "It has no section [spindle], so the board does not know which output is which speed.",
+        "Add `[spindle]` with `max_rpm` to the profile (docs/operating.md), or remove the section from the job and switch the spindle by hand.",
+        "A job with [spindle] on a machine whose router has a switch of its own.",
     ),
 ];
 
