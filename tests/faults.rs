@@ -11,6 +11,7 @@ fn job(surface: SurfaceSpec, radius_mm: f64) -> Job {
         radius_mm,
         body: job::ToolBody::default(),
         setup: job::Setup::default(),
+        region: None,
         feed_mm_min: 600.0,
         scallop_mm: 0.05,
         along: Along::U,

@@ -2,7 +2,8 @@
 
 use integration_tests::{dome, scaled_dome};
 use interp_core::{
-    AxisLimits, Command, FaultKind, Header, Inputs, Interpolator, Pattern, Sample, SpanParameter, State,
+    AxisLimits, Command, FaultKind, Header, Inputs, Interpolator, Pattern, Sample, Spacing, SpanParameter,
+    State,
 };
 use machine::prepare::prepare;
 use proptest::prelude::*;
@@ -105,6 +106,22 @@ fn sides(samples: &[Sample]) -> Vec<SpanParameter> {
         }
     }
     sides
+}
+
+/// What tells the passes apart: their side parameters; on curved passes, where each begins.
+fn passes(header: &Header, samples: &[Sample]) -> Vec<SpanParameter> {
+    if !header.spacing.is_constant() {
+        return sides(samples);
+    }
+    let mut starts = Vec::new();
+    let mut pass = None;
+    for sample in samples.iter().filter(|sample| sample.side != SpanParameter::NONE) {
+        if pass != Some(sample.pass) {
+            pass = Some(sample.pass);
+            starts.push(sample.side);
+        }
+    }
+    starts
 }
 
 /// The highest tool centre of a run at constant feed, nm, and its passes.
@@ -313,7 +330,7 @@ fn check_commands(header: &Header, words: &[i32], whole: &[SpanParameter], comma
     }
     // A start begins the job again: the passes of each run are the first ones of the undisturbed run.
     let mut expected = whole.iter();
-    for side in sides(&samples) {
+    for side in passes(header, &samples) {
         if side == whole[0] {
             expected = whole.iter();
         }
@@ -327,7 +344,7 @@ type Undisturbed = (Header, Vec<i32>, Vec<SpanParameter>);
 fn undisturbed((header, words): (Header, Vec<i32>)) -> Undisturbed {
     let (samples, core) = scripted(&header, &words, &[]);
     assert_eq!((core.state(), core.fault()), (State::Finished, None));
-    let whole = sides(&samples);
+    let whole = passes(&header, &samples);
     assert!(whole.len() > 3, "{}", whole.len());
     (header, words, whole)
 }
@@ -418,6 +435,33 @@ fn a_job_interrupted_and_resumed_takes_the_same_path() {
     }
 }
 
+/// The dome on curved passes from the edge, zig or zigzag.
+fn curved_dome(zigzag: bool) -> &'static Undisturbed {
+    static ALL: OnceLock<[Undisturbed; 2]> = OnceLock::new();
+    let all = ALL.get_or_init(|| {
+        [Pattern::Zig, Pattern::Zigzag].map(|pattern| {
+            let (mut header, words) = dome_within_limits(pattern);
+            header.spacing = Spacing::Constant;
+            undisturbed((header, words))
+        })
+    });
+    &all[usize::from(zigzag)]
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(40))]
+
+    /// Holds, overrides, stops and starts on curved passes.
+    #[test]
+    fn no_sequence_of_commands_breaks_a_limit_on_curves(
+        zigzag in any::<bool>(),
+        commands in proptest::collection::vec(command(3000), 0..14),
+    ) {
+        let (header, words, whole) = curved_dome(zigzag);
+        check_commands(header, words, whole, &commands);
+    }
+}
+
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(if cfg!(debug_assertions) { 400 } else { 4000 }))]
 
@@ -465,13 +509,81 @@ fn stop_and_abort() {
             period(&mut core, None);
         }
         period(&mut core, request);
-        while period(&mut core, None).state == State::Stopping {}
+        while period(&mut core, None).state.is_under_way() {}
         assert_eq!(core.state(), State::Ready);
         assert_eq!(core.last().cl_nm[2] == safe, leaves);
         period(&mut core, Command::Start);
         while period(&mut core, None).state.is_under_way() {}
         assert_eq!(core.state(), State::Finished);
     }
+}
+
+/// A run that was stopped, on its way up: the tool is a millimetre above the surface or more.
+fn on_the_way_up(used: &mut Use) -> (Box<Interpolator>, AxisLimits) {
+    let (header, words, _) = undisturbed(dome_within_limits(Pattern::Zigzag));
+    let axes = header.axes.unwrap();
+    let mut core = machine(&header, &words);
+    let mut step = |inputs: Inputs| {
+        let sample = period(&mut core, inputs);
+        used.add(&sample, &axes);
+        sample
+    };
+    step(Command::Start.into());
+    for _ in 0..3000 {
+        step(Inputs::default());
+    }
+    let low = step(Command::Stop.into()).cl_nm[2];
+    while step(Inputs::default()).cl_nm[2] < low + 1_000_000 {}
+    assert_eq!(core.state(), State::Linking);
+    (core, axes)
+}
+
+/// The way up of a stop is a link: it is held, resumed, overridden and aborted like one, within the limits.
+#[test]
+fn the_way_up_of_a_stop_obeys() {
+    for ends in [Command::Resume, Command::Abort, Command::Stop] {
+        let mut used = Use::default();
+        let (mut core, axes) = on_the_way_up(&mut used);
+        let mut step = |core: &mut Interpolator, inputs: Inputs| {
+            let sample = period(core, inputs);
+            used.add(&sample, &axes);
+            sample
+        };
+        step(&mut core, Command::Hold.into());
+        for _ in 0..600 {
+            step(&mut core, Inputs::default());
+        }
+        let held = step(&mut core, Inputs::default());
+        assert_eq!(held.state, State::Held);
+        assert!(held.cl_nm[2] < axes.safe_z_nm);
+        step(&mut core, ends.into());
+        let mut sample = held;
+        for _ in 0..3000 {
+            sample = step(&mut core, Inputs::default());
+        }
+        assert_eq!(sample.state, State::Ready, "{ends:?}");
+        let at = sample.cl_nm[2];
+        assert_eq!(at == axes.safe_z_nm, ends != Command::Abort, "{ends:?}: {at}");
+        used.check(&format!("{ends:?}"));
+    }
+    let (mut core, axes) = on_the_way_up(&mut Use::default());
+    let at = |percent| Inputs {
+        command: None,
+        feed_override: percent,
+    };
+    for _ in 0..1000 {
+        period(&mut core, at(0));
+    }
+    let stands = *core.last();
+    assert_eq!(period(&mut core, at(0)).cl_nm, stands.cl_nm);
+    assert!(stands.state == State::Linking && stands.cl_nm[2] < axes.safe_z_nm);
+    for _ in 0..3000 {
+        period(&mut core, at(50));
+    }
+    assert_eq!(
+        (core.state(), core.last().cl_nm[2]),
+        (State::Ready, axes.safe_z_nm)
+    );
 }
 
 /// Between two zig passes the tool goes up, across and down as one motion: across only at the safe height or above, and no axis waits for another.

@@ -71,6 +71,7 @@ fn job(surface: SurfaceSpec, along: Along, pattern: Pattern) -> Job {
         radius_mm: 3.0,
         body: job::ToolBody::default(),
         setup: job::Setup::default(),
+        region: None,
         feed_mm_min: 600.0,
         scallop_mm: 0.5,
         along,

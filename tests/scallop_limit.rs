@@ -2,7 +2,7 @@
 //! surfaces with what makes the step to the next pass difficult: short passes at high feed, many patches.
 
 mod constant;
-mod shapes;
+pub(crate) mod shapes;
 
 use std::path::PathBuf;
 
@@ -130,6 +130,7 @@ fn random_job(difficulty: Difficulty, random: &mut Random) -> Job {
         radius_mm: 1.0,
         body: job::ToolBody::default(),
         setup: job::Setup::default(),
+        region: None,
         overrun_mm: 0.0,
         feed_mm_min: match difficulty {
             Difficulty::Short => random.one_of(&[1200.0, 3000.0, 6000.0, 12_000.0]),

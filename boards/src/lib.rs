@@ -196,6 +196,16 @@ pub enum Role {
     EmergencyStop,
     /// Input: active when a drive reports a fault.
     DriveFault,
+    /// Input: active when the probe touches.
+    Probe,
+    /// Output: active while the spindle turns.
+    SpindleEnable,
+    /// Output: active while it turns counterclockwise.
+    SpindleDirection,
+    /// Output: the spindle's speed as a pulse-width signal, channel 2 of TIM12.
+    SpindleSpeed,
+    /// Output: active switches the coolant on.
+    Coolant,
     /// Output: active lights the status LED.
     StatusLed,
     /// USART1, to the host.
@@ -221,6 +231,11 @@ impl Role {
             Self::SerialTx => 18,
             Self::SerialRx => 19,
             Self::Parked => 20,
+            Self::Probe => 21,
+            Self::SpindleEnable => 22,
+            Self::SpindleDirection => 23,
+            Self::SpindleSpeed => 24,
+            Self::Coolant => 25,
         }
     }
 
@@ -229,7 +244,12 @@ impl Role {
     pub const fn is_input(self) -> bool {
         matches!(
             self,
-            Self::LimitMin(_) | Self::LimitMax(_) | Self::EmergencyStop | Self::DriveFault | Self::SerialRx
+            Self::LimitMin(_)
+                | Self::LimitMax(_)
+                | Self::EmergencyStop
+                | Self::DriveFault
+                | Self::Probe
+                | Self::SerialRx
         )
     }
 }
@@ -244,6 +264,11 @@ impl core::fmt::Display for Role {
             Self::LimitMax(axis) => write!(f, "{axis:?} limit, upper end"),
             Self::EmergencyStop => f.write_str("emergency stop"),
             Self::DriveFault => f.write_str("drive fault"),
+            Self::Probe => f.write_str("probe"),
+            Self::SpindleEnable => f.write_str("spindle"),
+            Self::SpindleDirection => f.write_str("spindle, counterclockwise"),
+            Self::SpindleSpeed => f.write_str("spindle speed (PWM)"),
+            Self::Coolant => f.write_str("coolant"),
             Self::StatusLed => f.write_str("status LED"),
             Self::SerialTx => f.write_str("serial, to the host"),
             Self::SerialRx => f.write_str("serial, from the host"),

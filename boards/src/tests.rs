@@ -36,6 +36,11 @@ fn roles() -> Vec<Role> {
     roles.extend([
         Role::EmergencyStop,
         Role::DriveFault,
+        Role::Probe,
+        Role::SpindleEnable,
+        Role::SpindleDirection,
+        Role::SpindleSpeed,
+        Role::Coolant,
         Role::StatusLed,
         Role::SerialTx,
         Role::SerialRx,
@@ -94,7 +99,7 @@ fn steps_are_on_one_port() {
 #[test]
 fn inputs_fail_to_the_safe_side() {
     for board in BOARDS {
-        assert_eq!(inputs(board).count(), 8);
+        assert_eq!(inputs(board).count(), 9);
         for line in inputs(board) {
             assert_eq!(line.active, Level::High, "{}: {}", board.id, line.role);
             assert!(line.is_active(line.pin.bit()) && !line.is_active(!line.pin.bit()));
@@ -139,7 +144,7 @@ fn registers_say_what_the_table_says() {
                     assert_eq!(setup.set_reset & (pin.bit() | pin.bit() << 16), 0);
                     continue;
                 };
-                let serial = matches!(line.role, Role::SerialTx | Role::SerialRx);
+                let serial = matches!(line.role, Role::SerialTx | Role::SerialRx | Role::SpindleSpeed);
                 let wanted = match line.role {
                     _ if serial => 0b10,
                     role if role.is_input() => 0b00,

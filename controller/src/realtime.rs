@@ -153,6 +153,8 @@ impl<S: AsRef<[i32]> + AsMut<[i32]>> RealTime<S> {
         }
         let to = if moves(sample.state) {
             sample.cl_nm
+        } else if core::mem::take(&mut self.control.manual.emits) {
+            self.control.manual.at_nm()
         } else {
             steps.target_nm()
         };
@@ -195,7 +197,7 @@ impl<S: AsRef<[i32]> + AsMut<[i32]>> RealTime<S> {
         if self.control.clock == Clock::Lockstep && !self.may_step(events) {
             return;
         }
-        self.step(was_under_way, events);
+        self.step(was_under_way, input.lines, events);
     }
 
     /// A missed tick, or one with more cycles than before or than the budget.
@@ -232,8 +234,13 @@ impl<S: AsRef<[i32]> + AsMut<[i32]>> RealTime<S> {
             Some(Stop::Controlled(fault)) => self.interpolator.controlled_stop(fault),
             None => {}
         }
+        let steady = self.control.safety.status().lines;
         if !self.control.safety.drives_on() {
-            self.lose_position();
+            self.control.manual.drives_are_off(steady);
+            self.control.spindle.off();
+            if !self.control.safety.status().homed {
+                self.lose_position();
+            }
         }
         // Reported here, because in lockstep a further period that would report it may never come.
         if under_way && !self.interpolator.state().is_under_way() {
@@ -256,6 +263,7 @@ impl<S: AsRef<[i32]> + AsMut<[i32]>> RealTime<S> {
             .check_link_timeout(self.control.clock, state, holds)
         {
             self.control.command = Some(Command::Hold);
+            self.control.host_is_gone = true;
         }
     }
 
@@ -309,8 +317,14 @@ impl<S: AsRef<[i32]> + AsMut<[i32]>> RealTime<S> {
 
     /// Executes one period.
     #[inline]
-    fn step(&mut self, was_under_way: bool, events: &mut impl Events) {
+    fn step(&mut self, was_under_way: bool, lines: InputLines, events: &mut impl Events) {
+        if !was_under_way && self.control.manual.is_active() {
+            self.move_manually(lines);
+        }
         let mut command = self.control.command.take();
+        if matches!(command, Some(Command::Start | Command::Resume)) {
+            command = self.with_spindle(command);
+        }
         let starts = command == Some(Command::Start);
         if starts && Command::Start.is_allowed(self.interpolator.state()) {
             command = self.begin();
@@ -327,6 +341,8 @@ impl<S: AsRef<[i32]> + AsMut<[i32]>> RealTime<S> {
         };
         if moves(state) {
             self.count_sample(events);
+        } else if self.control.host_is_gone {
+            self.host_left(state);
         }
         if (was_under_way || starts) && !state.is_under_way() {
             self.end_run(events);
@@ -365,6 +381,7 @@ impl<S: AsRef<[i32]> + AsMut<[i32]>> RealTime<S> {
         }
         self.control.credit = 0;
         self.control.spent = false;
+        self.control.spindle.off();
         self.halt(events);
     }
 
@@ -423,6 +440,7 @@ impl<S: AsRef<[i32]> + AsMut<[i32]>> RealTime<S> {
     /// Reports a sign of life of the host.
     pub const fn heard(&mut self) {
         self.control.safety.heard();
+        self.control.manual.heard();
     }
 
     /// Whether the drives are enabled. Applied after each tick, so that they are off in the tick that detects the cause.
@@ -430,6 +448,13 @@ impl<S: AsRef<[i32]> + AsMut<[i32]>> RealTime<S> {
     #[inline]
     pub const fn drives_on(&self) -> bool {
         self.control.safety.drives_on()
+    }
+
+    /// The outputs beside the steps, as in [`crate::spindle::output`]. Applied after each tick, like the drives that are a part of them.
+    #[must_use]
+    #[inline]
+    pub const fn outputs(&self) -> u32 {
+        self.control.spindle.output() | self.control.safety.drives_on() as u32
     }
 
     /// Whether a tick feeds the watchdog: it ended before the next one, and within its budget. A planning that never ends lets no tick pass.
@@ -452,6 +477,7 @@ impl<S: AsRef<[i32]> + AsMut<[i32]>> RealTime<S> {
     pub fn load_begin(&mut self, header: &Header, words: u32) -> Result<()> {
         self.interpolator.load_begin(header, words)?;
         self.control.command = None;
+        self.control.spindle.clear();
         Ok(())
     }
 

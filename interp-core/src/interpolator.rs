@@ -95,7 +95,8 @@ impl<S: AsRef<[i32]> + AsMut<[i32]>> Interpolator<S> {
     /// [`FaultKind::BadLength`] where words are missing or the order is not kept.
     pub fn load_check(&mut self, record: u32) -> Result<()> {
         self.motion.may_load()?;
-        self.motion.program.check(self.store.as_ref(), record)
+        let Motion { program, run, .. } = &mut self.motion;
+        program.check(self.store.as_ref(), record, run.lines.scratch())
     }
 
     /// Seals the job: the machine is ready.
@@ -103,7 +104,7 @@ impl<S: AsRef<[i32]> + AsMut<[i32]>> Interpolator<S> {
     /// # Errors
     /// [`FaultKind::BadLength`] where words or checks are missing; the machine stays idle.
     pub fn load_finish(&mut self) -> Result<()> {
-        self.motion.load_finish()
+        self.motion.load_finish(self.store.as_ref())
     }
 
     /// Drops the loaded job: the machine is idle.
@@ -253,7 +254,7 @@ enum Ending {
     Stand,
     /// Stop, then retract from the surface.
     Retract,
-    /// The retract is under way.
+    /// The retract is under way, as a link.
     Retracting,
 }
 
@@ -284,11 +285,11 @@ impl Motion {
         Ok(())
     }
 
-    fn load_finish(&mut self) -> Result<()> {
+    fn load_finish(&mut self, store: &[i32]) -> Result<()> {
         self.may_load()?;
         self.program.seal()?;
         self.state = State::Ready;
-        self.restart();
+        self.restart(store);
         Ok(())
     }
 
@@ -300,9 +301,12 @@ impl Motion {
         Ok(())
     }
 
-    fn restart(&mut self) {
-        self.run.restart(self.program.header().spacing);
+    fn restart(&mut self, store: &[i32]) {
+        if let Ok(job) = self.program.job(store) {
+            self.run.restart(&self.program, &job);
+        }
         self.fault = None;
+        self.ending = Ending::Stand;
     }
 
     fn controlled_stop(&mut self, fault: Fault) {
@@ -353,7 +357,7 @@ impl Motion {
         matches!(
             self.state,
             State::Running | State::Linking | State::Holding | State::Held | State::Stopping
-        ) && self.sequencer.has_to_plan()
+        ) && self.sequencer.has_to_plan(&self.run)
     }
 
     #[inline(never)]
@@ -367,21 +371,19 @@ impl Motion {
             run,
             ..
         } = self;
-        if let Ok((job, rest)) = program.job_and_rest(store) {
-            match &job.header.axes {
-                Some(axes) => sequencer.plan(&job, axes, run),
-                None => run.plan(&job, rest),
-            }
+        if program.header().axes.is_some() {
+            sequencer.plan(program, store, run);
+        } else if let Ok((job, rest)) = program.job_and_rest(store) {
+            run.plan(&job, rest);
         }
     }
 
     /// One period of a job with axis limits.
     #[inline(never)]
     fn tick_within_limits(&mut self, store: &[i32], feed_factor: f32) {
-        let feed_factor = match (self.state, self.ending) {
-            (State::Running | State::Linking, _) => feed_factor,
-            (State::Stopping, Ending::Retracting) => 1.0,
-            (State::Holding | State::Stopping, _) => 0.0,
+        let feed_factor = match self.state {
+            State::Running | State::Linking => feed_factor,
+            State::Holding | State::Stopping => 0.0,
             _ => return,
         };
         if feed_factor == 0.0 && self.sequencer.is_at_rest() && self.stand() {
@@ -404,7 +406,7 @@ impl Motion {
         match (outcome, self.state) {
             (Ok(Outcome::Pass), State::Linking) => self.state = State::Running,
             (Ok(Outcome::Link), State::Running) => self.state = State::Linking,
-            (Ok(Outcome::Finished), State::Stopping) => self.state = State::Ready,
+            (Ok(Outcome::Finished), _) if self.ending == Ending::Retracting => self.state = State::Ready,
             (Ok(Outcome::Finished), _) => self.state = State::Finished,
             (Ok(_), _) => {}
             (Err(fault), _) => self.fail(fault),
@@ -417,7 +419,9 @@ impl Motion {
             State::Holding => self.state = State::Held,
             State::Stopping if self.fault.is_some() => self.state = State::Faulted,
             State::Stopping if self.ending == Ending::Retract => {
+                // A link like any other: it obeys hold, abort and override.
                 self.ending = Ending::Retracting;
+                self.state = State::Linking;
                 self.sequencer.retract(&self.run);
             }
             State::Stopping => self.state = State::Ready,
@@ -463,14 +467,18 @@ impl Motion {
         let has_limits = self.program.header().axes.is_some();
         self.state = match command {
             Command::Start => {
-                self.restart();
+                self.restart(store);
                 let Self {
-                    program, sequencer, ..
+                    program,
+                    sequencer,
+                    run,
+                    ..
                 } = self;
                 match program.job(store) {
                     Ok(job) if has_limits => {
                         if let Some(axes) = &job.header.axes {
-                            sequencer.restart(axes);
+                            let first = run.first_route(&job);
+                            sequencer.restart(first, axes);
                         }
                         State::Linking
                     }

@@ -46,6 +46,13 @@
 //! | 20 | `Repeat` | event `u32`, count `u8` | these events again, then `Ack` |
 //! | 21 | `Profile` | | `Profile` |
 //! | 22 | `SetProfile` | option of the fields of [`Profile`] | `Ack`, and it holds, also after a power cut |
+//! | 23 | `Jog` | axis (a byte, from 0), way ([`JogWay`]), speed (mm/s, `f32`) | as `Configure`; a continuous one stops along its ramp when it is not repeated |
+//! | 24 | `Home` | axes (a byte, one bit each) | as `Configure` |
+//! | 25 | `Probe` | axis (a byte), distance (nm, `i32`), speed (mm/s, `f32`) | as `Configure` |
+//! | 26 | `Motion` | | `Motion` |
+//! | 27 | `Offsets` | | `Offsets` |
+//! | 28 | `SetOffsets` | the fields of [`Offsets`] | `Ack`, and it holds, also after a power cut |
+//! | 29 | `Spindle` | turning (a byte: 0 off, 1 clockwise, 2 counterclockwise), speed (1/min, `u32`), coolant (a byte) | as `Configure`; for the runs of the loaded job |
 //!
 //! Header: kind, pattern, spacing, tool side (a byte each), spans along path and side (`u16`), ball radius (mm), feed (mm/s),
 //! scallop height (mm), period (s) (`f32`); then 0, or 1 and the axes' limits: velocity (mm/s), acceleration (mm/s^2), jerk (mm/s^3)
@@ -66,6 +73,8 @@
 //! | 5 | `PassDigest` | event `u32`, the fields of [`PassDigest`] |
 //! | 6 | `Halted` | the fields of [`Status`], with the event in `events` |
 //! | 7 | `Profile` | number, option of the fields of [`Profile`]; an answer like the first four |
+//! | 8 | `Motion` | number, the fields of [`MotionStatus`]; an answer |
+//! | 9 | `Offsets` | number, the fields of [`Offsets`]; an answer |
 //!
 //! A parameter is its span (`u16`) and fraction. `Halted` comes when the ticks of a `Run` are used up, or when a run ends
 //! (finished, faulted, aborted), whichever is first.
@@ -91,6 +100,9 @@
 use interp_core::{command::Command, job::Header};
 use serde::{Deserialize, Serialize};
 
+pub use crate::manual::{
+    Activity, Homing, JogWay, MotionEnd, MotionStatus, OFFSETS_BYTES_MAX, Offsets, WORK_OFFSETS,
+};
 pub use crate::profile::{Excess, PROFILE_BYTES_MAX, Profile, ProfileLimit};
 pub use crate::reason::Reason;
 pub use crate::records::{
@@ -101,6 +113,7 @@ pub use crate::safety::{
     Configuration, InputLines, LinkTimeoutAction, OVERRIDE_MAX_PERCENT, OVERRIDE_NORMAL_PERCENT, ResetCause,
     SafetyStatus,
 };
+pub use crate::spindle::{PWM_STEPS, SpindleOrder, SpindleSettings, Turning};
 use crate::{
     records::HeaderFields,
     version::{PROTOCOL_VERSION, VersionMismatch},
@@ -209,6 +222,38 @@ pub enum Request {
     Profile,
     /// Keeps a profile beyond a power cut; none: forgets it. In force at once; the job has to be loaded again. Refused while a run is under way.
     SetProfile(Option<Profile>),
+    /// Moves an axis outside a job, within the profile's limits, and within its travel once homed. Another one of the same axis and way keeps a continuous
+    /// jog going. `Hold`, `Stop` and `Abort` end it along its ramp.
+    Jog {
+        /// The axis, from 0.
+        axis: u8,
+        /// How far.
+        way: JogWay,
+        /// Speed, mm/s; the profile's velocity bounds it.
+        speed_mm_s: f32,
+    },
+    /// Homes axes by their switches, in the profile's order. Ends along the ramp when the host is not heard any more.
+    Home {
+        /// One bit each; none: all.
+        axes: u8,
+    },
+    /// Moves an axis until the probe trips, at most by a distance.
+    Probe {
+        /// The axis, from 0.
+        axis: u8,
+        /// Greatest distance, nm; negative towards minus.
+        nm: i32,
+        /// Speed, mm/s.
+        speed_mm_s: f32,
+    },
+    /// Asks for the axes' position and motion outside a job.
+    Motion,
+    /// Asks for work offsets and tool length.
+    Offsets,
+    /// Keeps work offsets and tool length beyond a power cut; the job has to be loaded again. Refused while a run is under way.
+    SetOffsets(Offsets),
+    /// Spindle and coolant of the loaded job: on from the start of each run to its end. Refused while a run is under way.
+    Spindle(SpindleOrder),
 }
 
 impl From<Command> for Request {
@@ -319,6 +364,20 @@ pub enum Reply {
         /// The profile; none where the board keeps none.
         profile: Option<Profile>,
     },
+    /// Answer to `Motion`.
+    Motion {
+        /// Number of the request.
+        number: u16,
+        /// The axes outside a job.
+        motion: MotionStatus,
+    },
+    /// Answer to `Offsets`.
+    Offsets {
+        /// Number of the request.
+        number: u16,
+        /// Work offsets and tool length.
+        offsets: Offsets,
+    },
 }
 
 /// A payload with a correct CRC that is not a message of this version.
@@ -428,9 +487,9 @@ mod tests {
     #[test]
     fn codes_out_of_range_are_no_header() {
         let good = [1, 1, 0, 0, 0, 0, 1, 1];
-        let rest = [0; 4 * 4 + 1 + 1 + 8];
+        let rest = [0; 4 * 4 + 1 + 1 + 1 + 8];
         for (place, code) in [(2, 4), (3, 2), (4, 4), (5, 2)] {
-            let mut payload = [0; 8 + 26];
+            let mut payload = [0; 8 + 27];
             payload[..8].copy_from_slice(&good);
             payload[8..].copy_from_slice(&rest);
             assert!(read_request(&payload).is_ok());

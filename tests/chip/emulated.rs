@@ -128,6 +128,11 @@ impl Emulated {
         Self::begin(board, &[], false)
     }
 
+    /// The same, with a machine around the board.
+    pub(super) fn with_machine(board: &'static Board, machine: &str) -> Self {
+        Self::begin(board, &["--machine", machine], false)
+    }
+
     fn begin(board: &'static Board, arguments: &[&str], is_recorded: bool) -> Self {
         let folder = tempfile::tempdir().unwrap();
         let image = format!("target/{}/thumbv7em-none-eabihf/release/firmware", board.build.1);
@@ -248,7 +253,8 @@ fn changes(edges: &[Edge], line: &Line) -> Vec<(u64, Option<bool>)> {
 }
 
 fn is_output(line: &Line) -> bool {
-    !line.role.is_input() && line.role != Role::SerialTx
+    // Those of peripherals are no outputs of the port.
+    !line.role.is_input() && !matches!(line.role, Role::SerialTx | Role::SpindleSpeed)
 }
 
 impl Ended {

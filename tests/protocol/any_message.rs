@@ -55,6 +55,7 @@ prop_compose! {
             feed_mm_s: values[1],
             scallop_mm: values[2],
             period_s: values[3],
+            edges: spans[0],
             axes,
         }
     }
@@ -105,6 +106,9 @@ prop_compose! {
             jerk_mm_s3: axes.jerk_mm_s3,
             travel_nm: has_travel.then_some(axes.travel_nm),
             configuration,
+            homing: None,
+            probe_inverted: has_travel,
+            spindle: None,
         }
     }
 }

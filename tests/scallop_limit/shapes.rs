@@ -209,6 +209,7 @@ pub(crate) fn random_job(shape: Shape, random: &mut Random) -> Job {
         radius_mm: radius,
         body: job::ToolBody::default(),
         setup: job::Setup::default(),
+        region: None,
         overrun_mm: 0.0,
         feed_mm_min: random.one_of(&[600.0, 1200.0, 3000.0]),
         scallop_mm: scallop,

@@ -10,7 +10,9 @@ use protocol::message::{Clock, Report};
 use super::{TickInput, moves, run::RunRecord};
 use crate::{
     machine::{Event, Events, Instruction},
+    manual::Manual,
     safety::Safety,
+    spindle::Spindle,
 };
 
 /// The planning of a period.
@@ -43,8 +45,13 @@ pub(super) struct Control {
     /// Command that waits for the next period.
     pub(super) command: Option<Command>,
     pub(super) safety: Safety,
+    /// Motion outside a job.
+    pub(super) manual: Manual,
+    pub(super) spindle: Spindle,
     /// The next run within limits has to begin at its job's home.
     pub(super) from_home: bool,
+    /// The run is to be held because the host is gone.
+    pub(super) host_is_gone: bool,
     /// The step outputs lead to drives.
     pub(super) has_drives: bool,
 }
@@ -63,7 +70,10 @@ impl Control {
             report: Report::Digests,
             command: None,
             safety: Safety::NEW,
+            manual: Manual::NEW,
+            spindle: Spindle::NEW,
             from_home: true,
+            host_is_gone: false,
             has_drives: false,
         }
     }

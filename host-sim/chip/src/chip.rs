@@ -10,6 +10,7 @@ use crate::{
     SRAM_FILL,
     code::{Block, Code},
     line::Line,
+    machine::Machine,
     memory::Memory,
     options::Options,
     part::{
@@ -18,6 +19,7 @@ use crate::{
         flash::Flash,
         gpio::{Change, Port},
         nvic::{self, Nvic},
+        pwm::Pwm,
         rcc::{Rcc, cause},
         timer::{self, Timer},
         usart::Usart,
@@ -53,12 +55,16 @@ pub(crate) struct Chip {
     pub(crate) tim1: Timer,
     pub(crate) tim2: Timer,
     pub(crate) tim5: Timer,
+    pub(crate) pwm: Pwm,
     pub(crate) dma: Dma,
     pub(crate) usart: Usart,
     pub(crate) watchdog: Watchdog,
     pub(crate) debug: Debug,
     pub(crate) flash: Flash,
     line: Option<Line>,
+    /// The machine around the board, and the last levels of the step pins.
+    pub(crate) machine: Option<Machine>,
+    step_levels: u32,
     /// USART1's interrupt request.
     serial_asks: bool,
     script: Vec<Entry>,
@@ -135,12 +141,15 @@ impl Chip {
             tim1: Timer::new("TIM1", 0xffff),
             tim2: Timer::new("TIM2", u32::MAX),
             tim5: Timer::new("TIM5", u32::MAX),
+            pwm: Pwm::default(),
             dma: Dma::default(),
             usart: Usart::new(),
             watchdog: Watchdog::new(options.lsi_hz),
             debug: Debug::default(),
             flash: Flash::new(options.cut_flash_every),
             line,
+            machine: options.machine.clone(),
+            step_levels: 0,
             serial_asks: false,
             script,
             record: record.map(BufWriter::new),
@@ -180,6 +189,7 @@ impl Chip {
             Timer::new("TIM2", u32::MAX),
             Timer::new("TIM5", u32::MAX),
         );
+        self.pwm = Pwm::default();
         self.dma = Dma::default();
         self.usart = Usart::new();
         self.usart.from_host = from_host;
@@ -202,6 +212,12 @@ impl Chip {
 
     /// Writes a change of a port to the record.
     pub(crate) fn keep(&mut self, change: Change) {
+        if usize::from(change.port) == self.step_port {
+            if let Some(machine) = &mut self.machine {
+                machine.follow(self.board, &change, self.step_levels, &self.ports);
+            }
+            self.step_levels = change.levels.into();
+        }
         if self.moved.is_none()
             && usize::from(change.port) == self.step_port
             && u32::from(change.levels) & self.step_pins != 0
@@ -308,6 +324,9 @@ impl Chip {
         let apb2 = self.rcc.apb2_cycles();
         if self.tim2.update_at() == at {
             self.periods += 1;
+            if let Some(machine) = &mut self.machine {
+                machine.press(self.board, &mut self.ports);
+            }
             let (interrupts, _) = self.tim2.update(at);
             if interrupts {
                 self.nvic.raise(nvic::TIM2, at);

@@ -134,7 +134,9 @@ pub fn fault(fault: Fault) -> (String, &'static str) {
             "see the ranges of the job file",
         ),
         FaultKind::BadPatch => (
-            format!("patch {value} is outside the range in which its polynomials cannot overflow"),
+            format!(
+                "patch {value} is outside the range in which its polynomials cannot overflow, or the edges of the region are wrong"
+            ),
             "this is a defect of the host tool: please report the job",
         ),
         FaultKind::BadLength => (
@@ -278,6 +280,16 @@ mod tests {
             Reason::Storage,
             Reason::OtherProfile,
             Reason::NoLimits,
+            Reason::Moving,
+            Reason::NoProfile,
+            Reason::BeyondTravel {
+                axis: 0,
+                travel_nm: [0, 1],
+                wanted_nm: 2,
+            },
+            Reason::NoHoming,
+            Reason::ProbeTripped,
+            Reason::NoSpindle,
         ]
     }
 

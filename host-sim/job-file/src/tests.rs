@@ -479,3 +479,61 @@ fn too_many_patches_are_refused_at_once() {
     assert_eq!(error.line_and_column().unwrap().0, 6);
     assert!(begun.elapsed().as_secs() < 20, "{:?}", begun.elapsed());
 }
+
+/// The region of (u, v), with the place of each mistake in it.
+#[test]
+fn regions_are_checked_where_they_are_written() {
+    let job = |region: &str| parse("job.toml", &format!("{NURBS}\n[region]\n{region}\n"));
+    assert_eq!(parse("job.toml", NURBS).unwrap().region, None);
+    let read = job("loops = [[[0, 0], [1, 0], [1, 1.0000000000001], [0, 0]], [[0.6, 0.1], [0.8, 0.1], [0.8, 0.1], [0.8, 0.3]]]")
+        .unwrap()
+        .region
+        .unwrap();
+    assert_eq!(
+        read.loops,
+        [
+            [[0.0, 0.0], [1.0, 0.0], [1.0, 1.0]],
+            [[0.6, 0.1], [0.8, 0.1], [0.8, 0.3]]
+        ]
+    );
+    let line = NURBS.lines().count() + 3;
+    for (region, place, what) in [
+        ("", None, "`loops` is missing in [region]"),
+        ("holes = []", None, "unknown key `holes`"),
+        ("loops = []", Some(9), "must have at least one loop"),
+        (
+            "loops = [[[0, 0], [1, 1], [0, 0]]]",
+            Some(10),
+            "must have at least 3 different vertices, not 2",
+        ),
+        (
+            "loops = [[[0, 0], [1, 1], [1, 2.5]]]",
+            Some(27),
+            "lies outside the surface: v = 2.5, but its range is 0 to 1",
+        ),
+        (
+            "loops = [[[0, 0], [1, 1], [1]]]",
+            Some(27),
+            "must have 2 numbers, not 1",
+        ),
+        (
+            "loops = [[[0, 0], [1, 1], [1, 0], [0, 1]]]",
+            Some(11),
+            "crosses itself: its edge from here meets the one from vertex 3 at u = 0.500000, v = 0.500000",
+        ),
+        (
+            "loops = [[[0, 0], [1, 0], [0, 1]], [[0.1, 0.1], [0.9, 0.2], [0.1, 0.2]]]",
+            Some(19),
+            "crosses another loop: its edge from here meets loop 2",
+        ),
+    ] {
+        let error = job(region).unwrap_err();
+        assert!(error.what().contains(what), "{region}: {error}");
+        assert!(!error.remedy().is_empty());
+        if let Some(column) = place {
+            assert_eq!(error.line_and_column(), Some((line, column)), "{region}: {error}");
+        }
+    }
+    // A corner on an edge, and edges that share one line, only touch.
+    job("loops = [[[0, 0], [1, 0], [1, 1], [0, 1]], [[0.5, 0], [0.7, 0.5], [0.3, 0.5]], [[0, 0.2], [0, 0.4], [0.1, 0.3]]]").unwrap();
+}

@@ -6,16 +6,19 @@
 mod error;
 mod machine;
 mod origin;
+mod region;
 mod setup;
 mod surface;
 mod text;
 
 pub use error::JobError;
 pub use machine::{
-    AXES, AxisLimits, HEARTBEAT_TIMEOUT_DEFAULT_MS, HEARTBEAT_TIMEOUT_RANGE_MS, HeartbeatAction,
-    MachineProfile, MachineSpec, PERIOD_DEFAULT_US, PERIOD_RANGE_US, Ratio, StepOutput,
+    AXES, AxisLimits, HEARTBEAT_TIMEOUT_DEFAULT_MS, HEARTBEAT_TIMEOUT_RANGE_MS, HeartbeatAction, Homing,
+    MachineProfile, MachineSpec, PERIOD_DEFAULT_US, PERIOD_RANGE_US, Ratio, Spindle, SpindleDrive,
+    StepOutput,
 };
-pub use origin::{AlongChoice, CadSource, DirectionTrial, Origin};
+pub use origin::{AlongChoice, CadSource, DirectionTrial, FaceReach, Origin, PartSource};
+pub use region::Region;
 pub use setup::{Block, Fixture, HolderPart, Setup, TOOL_SIZE_MAX_MM, ToolBody};
 pub use surface::{NurbsSpec, SurfaceSpec};
 pub use text::{one_line, printable, read_regular};
@@ -105,6 +108,8 @@ impl Spacing {
 pub struct Job {
     /// The surface to be cut, placed as the file's `[placement]` states.
     pub surface: SurfaceSpec,
+    /// The part of the surface that is cut; `None` for the whole surface.
+    pub region: Option<Region>,
     /// Ball radius r, mm, above 0, at most [`RADIUS_MAX_MM`].
     pub radius_mm: f64,
     /// The tool above the ball.

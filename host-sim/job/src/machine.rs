@@ -91,6 +91,45 @@ pub enum HeartbeatAction {
     Hold,
 }
 
+/// Homing of the axes x, y and z by a switch at one end of each.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Homing {
+    /// The axes, 0 to 2, in the order of homing.
+    pub order: [u8; 3],
+    /// Whether the switch is at the upper end.
+    pub at_upper_end: [bool; 3],
+    /// Machine coordinate at which the switch trips, mm.
+    pub position_mm: [f64; 3],
+    /// Speed of the search, mm/s.
+    pub seek_mm_s: [f64; 3],
+    /// Speed of the approach, mm/s.
+    pub approach_mm_s: [f64; 3],
+    /// Distance from the switch before the approach and after homing, mm.
+    pub back_off_mm: [f64; 3],
+    /// The position stays valid while the drives are off.
+    pub survives_off: bool,
+}
+
+/// Spindle and coolant of a job: on from its start to its end.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Spindle {
+    /// Speed, 1/min; 0: the spindle stands.
+    pub rpm: u32,
+    /// It turns counterclockwise.
+    pub counterclockwise: bool,
+    /// Coolant.
+    pub coolant: bool,
+}
+
+/// The spindle of a machine.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct SpindleDrive {
+    /// Speed at the full output, 1/min.
+    pub max_rpm: u32,
+    /// Time from switching on to the first motion, ms.
+    pub at_speed_ms: f64,
+}
+
 /// A machine as its board keeps it: the greatest limits, the drives, the supervision. A job may lower the limits, but not exceed them.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct MachineProfile {
@@ -106,6 +145,12 @@ pub struct MachineProfile {
     pub heartbeat_timeout_ms: f64,
     /// The drives.
     pub step_output: StepOutput,
+    /// Homing by switches. `None`: the position is declared.
+    pub homing: Option<Homing>,
+    /// The probe's contact closes when it touches.
+    pub probe_closes: bool,
+    /// The spindle.
+    pub spindle: Option<SpindleDrive>,
 }
 
 impl MachineProfile {
@@ -149,6 +194,8 @@ pub struct MachineSpec {
     pub heartbeat_timeout_ms: f64,
     /// Requirements of the drives. `None`: the board's own setting.
     pub step_output: Option<StepOutput>,
+    /// Spindle and coolant of the job.
+    pub spindle: Option<Spindle>,
 }
 
 impl Default for MachineSpec {
@@ -165,6 +212,7 @@ impl Default for MachineSpec {
             heartbeat_action: HeartbeatAction::Finish,
             heartbeat_timeout_ms: HEARTBEAT_TIMEOUT_DEFAULT_MS,
             step_output: None,
+            spindle: None,
         }
     }
 }

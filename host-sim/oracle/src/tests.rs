@@ -13,6 +13,7 @@ fn job(surface: SurfaceSpec, along: Along, side: Side) -> Job {
         radius_mm: 5.0,
         body: job::ToolBody::default(),
         setup: job::Setup::default(),
+        region: None,
         feed_mm_min: 600.0,
         scallop_mm: 0.005,
         along,

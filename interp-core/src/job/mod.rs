@@ -6,12 +6,14 @@
 //! |---|---|
 //! | `side_spans` | width of each side span in units of the surface's side parameter, f32 bits |
 //! | `path_spans` | width of each path span, f32 bits (reported only; the step along the path does not use it) |
-//! | remaining | [`SurfaceKind::Polynomial`], [`SurfaceKind::Rational`]: one record per patch, path index fastest; [`SurfaceKind::RevolvedAlongProfile`], [`SurfaceKind::RevolvedAroundAxis`]: one record |
+//! | of the records | [`SurfaceKind::Polynomial`], [`SurfaceKind::Rational`]: one record per patch, path index fastest; [`SurfaceKind::RevolvedAlongProfile`], [`SurfaceKind::RevolvedAroundAxis`]: one record |
+//! | remaining, with a region | its lines and edges: [`region`] |
 //!
 //! The records are described in the files of [`crate::surface`].
 
 pub mod encode;
 pub(crate) mod program;
+pub mod region;
 pub(crate) mod stations;
 
 /// Words of surface data that the reference machine stores: 64 KiB of its 128 KiB RAM, hence 309 polynomial or 237
@@ -186,6 +188,8 @@ pub struct Header {
     pub scallop_mm: f32,
     /// Sampling period T, s, 1e-5 to 0.1.
     pub period_s: f32,
+    /// Edges of the region that is machined, in the words behind the records; 0 for the whole surface. None with passes of constant scallop height.
+    pub edges: u16,
     /// Axis limits; none for a constant feed.
     pub axes: Option<AxisLimits>,
 }

@@ -2,6 +2,9 @@
 
 use crate::command::OVERRIDE_MAX;
 use crate::fault::{Fault, FaultKind, Result};
+use crate::job::region::{
+    EDGE_WORDS, EDGES_A_RECORD, FirstLine, HEAD_WORDS, REGION_SPANS_MAX, RegionCheck, RegionWords, ScanLine,
+};
 use crate::job::stations::{SPANS_MAX as FRONT_SPANS_MAX, Stations};
 use crate::job::{
     AxisLimits, CELLS_MAX, Header, OVERRUN_MAX_MM, SPANS_MAX, STEP_MAX_MM, SurfaceKind, width_words,
@@ -32,6 +35,7 @@ pub(crate) struct Program {
     header: Header,
     /// Length of the job, words.
     length: u32,
+    region: RegionCheck,
 }
 
 /// Words per record of a kind of surface.
@@ -43,14 +47,23 @@ const fn record_words(kind: SurfaceKind) -> usize {
     }
 }
 
-/// Records and words that a header implies.
+/// Patches of a header, and words that it implies.
 pub(crate) fn extent(header: &Header) -> (u32, u64) {
-    let records = u32::from(header.path_spans) * u32::from(header.side_spans);
-    let words = u64::from(records) * record_words(header.kind) as u64;
+    let patches = u32::from(header.path_spans) * u32::from(header.side_spans);
+    let words = u64::from(patches) * record_words(header.kind) as u64;
     (
-        records,
-        words + u64::from(width_words(header.path_spans, header.side_spans)),
+        patches,
+        words + u64::from(width_words(header.path_spans, header.side_spans)) + region_words(header) as u64,
     )
+}
+
+/// Words of a header's region.
+const fn region_words(header: &Header) -> usize {
+    if header.edges == 0 {
+        0
+    } else {
+        HEAD_WORDS + EDGE_WORDS * header.edges as usize
+    }
 }
 
 /// Words of the store that a job takes behind its data, for the stations of passes of constant scallop height; none where it crosses more patches than there
@@ -73,7 +86,11 @@ fn check_header(header: &Header) -> Result<()> {
             return Err(Fault::new(FaultKind::BadHeader, f32::from(spans)));
         }
     }
-    if header.spacing.is_constant() && (header.axes.is_some() || front_words(header).is_none()) {
+    let spans = header.path_spans.max(header.side_spans);
+    if header.edges > 0 && (header.spacing.is_constant() || spans > REGION_SPANS_MAX) {
+        return Err(Fault::new(FaultKind::BadHeader, f32::from(header.edges)));
+    }
+    if front_words(header).is_none() {
         return Err(Fault::new(FaultKind::BadHeader, f32::from(header.path_spans)));
     }
     let ranges = [
@@ -148,12 +165,14 @@ impl Program {
             feed_mm_s: 0.0,
             scallop_mm: 0.0,
             period_s: 0.0,
+            edges: 0,
             axes: None,
         };
         Self {
             stage: LoadStage::Empty,
             header: HEADER,
             length: 0,
+            region: RegionCheck::START,
         }
     }
 
@@ -174,6 +193,7 @@ impl Program {
         };
         self.header = *header;
         self.length = words;
+        self.region = RegionCheck::START;
         Ok(())
     }
 
@@ -204,11 +224,22 @@ impl Program {
         Ok(())
     }
 
+    /// Records: patches, then portions of edges.
     pub(crate) fn records(&self) -> u32 {
+        self.patches() + u32::from(self.header.edges).div_ceil(EDGES_A_RECORD)
+    }
+
+    fn patches(&self) -> u32 {
         extent(&self.header).0
     }
 
-    pub(crate) fn check(&mut self, store: &[i32], record: u32) -> Result<()> {
+    /// The first line of a region, once the job is sealed.
+    pub(crate) const fn first_line(&self) -> &FirstLine {
+        self.region.first_line()
+    }
+
+    /// Checks a record. `line`: one that is free while a job is loaded.
+    pub(crate) fn check(&mut self, store: &[i32], record: u32, line: &mut ScanLine) -> Result<()> {
         let LoadStage::Loading { received, checked } = self.stage else {
             return Err(bad_length(0));
         };
@@ -222,6 +253,21 @@ impl Program {
         };
         if record == 0 {
             job.check_widths()?;
+        }
+        if let Some(portion) = record.checked_sub(self.patches()) {
+            // Once each, in order: the first line is found on the way.
+            let is_sound = record < checked
+                || job.region().is_some_and(|region| {
+                    if portion == 0 {
+                        self.region.begin(&region);
+                    }
+                    self.region.check(&self.header, &region, portion, line)
+                });
+            self.stage = LoadStage::Loading {
+                received,
+                checked: if is_sound { checked.max(record + 1) } else { 0 },
+            };
+            return if is_sound { Ok(()) } else { Err(bad_patch(record)) };
         }
         let index = record as usize;
         let result = match self.header.kind {
@@ -310,6 +356,15 @@ impl<'a> Job<'a> {
     /// The words behind the job's.
     pub(crate) fn rest(&self) -> &'a [i32] {
         self.store.get(self.length..).unwrap_or(&[])
+    }
+
+    /// The region that is machined; none for the whole surface.
+    pub(crate) fn region(&self) -> Option<RegionWords<'a>> {
+        if self.header.edges == 0 {
+            return None;
+        }
+        let from = self.length.checked_sub(region_words(self.header))?;
+        RegionWords::new(self.store.get(from..self.length)?)
     }
 
     /// Width of a side span, in units of the side parameter.

@@ -7,7 +7,7 @@
 use crate::fault::Result;
 use crate::job::program::Job;
 use crate::pass::patch::Patch;
-use crate::pass::position::PassPosition;
+use crate::pass::route::{Piece, Route};
 
 /// The next task, in this order.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -32,7 +32,7 @@ pub(crate) struct PatchBuffer {
     second: bool,
     task: Task,
     /// The first patch of a pass for which the other patch is collapsed.
-    prepared: Option<PassPosition>,
+    prepared: Option<(Route, Piece)>,
 }
 
 impl PatchBuffer {
@@ -61,11 +61,6 @@ impl PatchBuffer {
         }
     }
 
-    /// Both patches, for a pass that evaluates each sample's patch anew.
-    pub(crate) const fn free(&mut self) -> (&mut Patch, &mut Patch) {
-        self.both()
-    }
-
     /// Whether a task is left.
     #[inline(always)]
     pub(crate) fn has_work(&self) -> bool {
@@ -80,10 +75,11 @@ impl PatchBuffer {
 
     /// Collapses the first patch of the next pass ahead of [`Self::begin`], while the present pass needs no further patch. A fault is left for that.
     #[inline(never)]
-    pub(crate) fn prepare(&mut self, job: &Job<'_>, position: &PassPosition) {
+    pub(crate) fn prepare(&mut self, job: &Job<'_>, route: &Route) {
         self.task = Task::Faulty;
-        let is_sound = self.both().1.collapse(job, position).is_ok();
-        self.prepared = is_sound.then_some(*position);
+        let piece = route.first(job);
+        let is_sound = self.both().1.lay(job, route, &piece).is_ok();
+        self.prepared = is_sound.then_some((*route, piece));
     }
 
     /// Forgets what is prepared.
@@ -95,23 +91,23 @@ impl PatchBuffer {
     ///
     /// # Errors
     /// Those of [`Patch::collapse`].
-    pub(crate) fn begin(&mut self, job: &Job<'_>, position: &PassPosition) -> Result<()> {
+    pub(crate) fn begin(&mut self, job: &Job<'_>, route: &Route, piece: &Piece) -> Result<()> {
         self.task = Task::Ends;
-        if self.prepared.take() == Some(*position) {
+        if self.prepared.take() == Some((*route, *piece)) {
             self.second = !self.second;
             return Ok(());
         }
-        self.both().0.collapse(job, position)
+        self.both().0.lay(job, route, piece)
     }
 
-    /// Makes the next patch of the pass, which is at `position`, current.
+    /// Makes the next piece of the pass current.
     ///
     /// # Errors
     /// Those of [`Patch::collapse`].
-    pub(crate) fn advance(&mut self, job: &Job<'_>, position: &PassPosition) -> Result<()> {
+    pub(crate) fn advance(&mut self, job: &Job<'_>, route: &Route, piece: &Piece) -> Result<()> {
         self.prepared = None;
         if !matches!(self.task, Task::AheadEnds | Task::Done) {
-            self.both().1.collapse(job, position)?;
+            self.both().1.lay(job, route, piece)?;
         }
         self.second = !self.second;
         self.task = if self.patch().has_ends() {
@@ -122,9 +118,9 @@ impl PatchBuffer {
         Ok(())
     }
 
-    /// Executes one task, for a run on this patch.
+    /// Executes one task, for a run on this piece.
     #[inline(never)]
-    pub(crate) fn work(&mut self, job: &Job<'_>, position: &PassPosition) {
+    pub(crate) fn work(&mut self, job: &Job<'_>, route: &Route, piece: &Piece) {
         let task = self.task;
         let (patch, ahead) = self.both();
         self.task = match task {
@@ -132,8 +128,8 @@ impl PatchBuffer {
                 patch.find_ends();
                 Task::Ahead
             }
-            Task::Ahead => match position.next(job.header.path_spans) {
-                Some(next) if ahead.collapse(job, &next).is_ok() => Task::AheadEnds,
+            Task::Ahead => match route.next(job, piece) {
+                Some(next) if ahead.lay(job, route, &next).is_ok() => Task::AheadEnds,
                 Some(_) => Task::Faulty,
                 None => Task::Done,
             },

@@ -1,17 +1,18 @@
 //! A run of a job, sample by sample: the one file that chains the stages.
 
 use crate::fault::{Fault, FaultKind, Result};
-use crate::job::program::Job;
+use crate::job::program::{Job, Program};
 use crate::job::{Pattern, Spacing};
-use crate::math::arith::{advanced, dot_hi, fraction_to_f32};
+use crate::math::arith::{advanced, dot_hi, fraction_to_f32, truncated};
 use crate::pass::buffer::PatchBuffer;
 use crate::pass::contact::{self, Reach};
-use crate::pass::front::CurveRun;
+use crate::pass::front::{FrontSequence, NextRoute};
+use crate::pass::lines::{NextPass, RegionLines};
 use crate::pass::patch::Patch;
-use crate::pass::position::PassPosition;
+use crate::pass::route::{Piece, Route};
 use crate::pass::scan::PassScan;
 use crate::pass::schedule;
-use crate::pass::step_over::PassMaximum;
+use crate::pass::step_over::{PassMaximum, StepOverEstimator};
 use crate::sample::{Sample, SpanParameter, interval_of};
 use crate::surface::{AnyPass, Pass, PathSpeed};
 
@@ -22,6 +23,9 @@ const CROSSINGS_MAX: u8 = 1;
 /// Step of the parameter on a pole: 16 per span. Between two steps the speed of the side lines, a rational cubic of the path
 /// parameter, changes little.
 const POLE_STEP: u64 = 1 << 60;
+
+/// The same on a front, whose intervals are two periods long, except on short passes.
+const CROSSINGS_ON_FRONT_MAX: u8 = 4;
 
 /// The task of the next tick.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -40,9 +44,8 @@ enum Next {
 #[derive(Clone, Copy, Debug)]
 struct Travel {
     next: Next,
-    reversed: bool,
-    /// Path span, in the surface's own direction.
-    span: u16,
+    route: Route,
+    piece: Piece,
     /// Fraction of the span, in the direction of travel.
     fraction: u64,
     /// The parametrisation at the last sample, and the logarithmic speed derivative at the sample before; NaN where that is on another patch.
@@ -56,6 +59,7 @@ struct Travel {
     /// Samples so far.
     ticks: u32,
     pass: u32,
+    /// Side parameter at the last sample.
     side: SpanParameter,
 }
 
@@ -65,14 +69,14 @@ struct Travel {
 enum PassPlanning {
     /// The step to the next straight pass.
     Scan(PassScan),
-    /// The run of a job of constant scallop height: of the rest of the run, only the buffer is used then.
-    Curve(CurveRun),
+    /// The next front of a job of constant scallop height.
+    Fronts(FrontSequence),
 }
 
 impl PassPlanning {
     /// The starts as constants, so that they are not made on the stack.
     const SCAN: Self = Self::Scan(PassScan::START);
-    const CURVE: Self = Self::Curve(CurveRun::START);
+    const FRONTS: Self = Self::Fronts(FrontSequence::START);
 }
 
 /// A run: the travel and the patch buffer.
@@ -89,13 +93,17 @@ pub(crate) struct Run {
     step_over: Option<f32>,
     /// Feed factor of the last step along the pass.
     last_feed_factor: f32,
+    /// The passes of a region, and the next of them without axis limits; a fault of theirs is reported when the tool is there.
+    pub(crate) lines: RegionLines,
+    next_pass: NextPass,
+    pending: Option<Fault>,
 }
 
 impl Travel {
     const START: Self = Self {
         next: Next::Pass,
-        reversed: false,
-        span: 0,
+        route: Route::NONE,
+        piece: Piece::NONE,
         fraction: 0,
         path: PathSpeed {
             inv_speed: 0.0,
@@ -112,20 +120,18 @@ impl Travel {
 
     /// Fraction of the span, in the surface's own direction.
     const fn own_fraction(&self) -> u64 {
-        if self.reversed {
-            !self.fraction
-        } else {
-            self.fraction
-        }
+        self.route.turned(self.fraction)
     }
 
-    /// The current patch.
-    const fn position(&self) -> PassPosition {
-        PassPosition {
-            side: self.side,
-            reversed: self.reversed,
-            span: self.span,
-        }
+    /// Path span, in the surface's own direction.
+    const fn span(&self) -> u16 {
+        self.piece.position.span
+    }
+
+    /// The place a step beyond, if it is on the piece.
+    #[inline(always)]
+    fn beyond(&self, step: u64) -> Option<u64> {
+        advanced(self.fraction, step).filter(|fraction| *fraction <= self.piece.end())
     }
 
     /// Steps 2 to 4 at the run's position. A fault leaves `last` unchanged. Not inlined: a separate function for
@@ -170,14 +176,20 @@ impl Run {
         last_interval: f32::INFINITY,
         step_over: None,
         last_feed_factor: 0.0,
+        lines: RegionLines::START,
+        next_pass: NextPass::Sought,
+        pending: None,
     };
 
-    /// Resets to the start of a job with this spacing.
-    pub(crate) fn restart(&mut self, spacing: Spacing) {
-        match (&mut self.planning, spacing.is_constant()) {
+    /// Resets to the start of a job.
+    pub(crate) fn restart(&mut self, program: &Program, job: &Job<'_>) {
+        self.lines.restart(job, program.first_line());
+        self.next_pass = NextPass::Sought;
+        self.pending = None;
+        match (&mut self.planning, program.header().spacing.is_constant()) {
             (PassPlanning::Scan(scan), false) => scan.restart(),
-            (PassPlanning::Curve(curve), true) => curve.restart(),
-            (planning, true) => *planning = PassPlanning::CURVE,
+            (PassPlanning::Fronts(fronts), true) => fronts.stop(),
+            (planning, true) => *planning = PassPlanning::FRONTS,
             (planning, false) => *planning = PassPlanning::SCAN,
         }
         self.travel = Travel::START;
@@ -186,14 +198,20 @@ impl Run {
         self.step_over = None;
     }
 
+    /// The first pass.
+    pub(crate) fn first_route(&mut self, job: &Job<'_>) -> Route {
+        if let PassPlanning::Fronts(fronts) = &mut self.planning {
+            return fronts.start(job);
+        }
+        let of_region = self.lines.take(job.header);
+        of_region.unwrap_or_else(|| Route::of_pass(job.header, 0, SpanParameter::default()))
+    }
+
     /// Pass, path and side parameter of the tool, in the surface's own direction.
     pub(crate) const fn surface_position(&self) -> (u32, SpanParameter, SpanParameter) {
-        if let PassPlanning::Curve(curve) = &self.planning {
-            return curve.surface_position();
-        }
         let travel = &self.travel;
         let path = SpanParameter {
-            span: travel.span,
+            span: travel.span(),
             fraction: travel.own_fraction(),
         };
         (travel.pass, path, travel.side)
@@ -201,20 +219,12 @@ impl Run {
 
     /// Minimum path interval of the last finished pass.
     pub(crate) const fn last_interval(&self) -> f32 {
-        if let PassPlanning::Curve(curve) = &self.planning {
-            curve.last_interval()
-        } else {
-            self.last_interval
-        }
+        self.last_interval
     }
 
     /// Whether the next sample continues the pass.
     pub(crate) fn is_along(&self) -> bool {
-        if let PassPlanning::Curve(curve) = &self.planning {
-            curve.is_along()
-        } else {
-            self.travel.next == Next::Along
-        }
+        self.travel.next == Next::Along
     }
 
     /// Writes the next sample into `last`; false after the last sample.
@@ -223,9 +233,6 @@ impl Run {
     /// The fault that stops the run; `last` is unchanged.
     #[inline(always)]
     pub(crate) fn advance(&mut self, job: &Job<'_>, last: &mut Sample) -> Result<bool> {
-        if matches!(self.planning, PassPlanning::Curve(_)) {
-            return self.advance_far(job, 1.0, last);
-        }
         let travel = &mut self.travel;
         if travel.next == Next::Along {
             let step = contact::step(
@@ -233,11 +240,11 @@ impl Run {
                 travel.log_speed_derivative_before,
                 self.buffer.patch().arc,
             );
-            if let Some(fraction) = step.and_then(|step| advanced(travel.fraction, step)) {
+            if let Some(fraction) = step.and_then(|step| travel.beyond(step)) {
                 travel.fraction = fraction;
                 self.sample(last)?;
                 if self.buffer.has_work() {
-                    self.buffer.work(job, &self.travel.position());
+                    self.buffer.work(job, &self.travel.route, &self.travel.piece);
                 }
                 return Ok(true);
             }
@@ -251,19 +258,18 @@ impl Run {
     /// As [`Self::advance`].
     #[inline(never)]
     pub(crate) fn advance_far(&mut self, job: &Job<'_>, feed_factor: f32, last: &mut Sample) -> Result<bool> {
-        let Self { planning, buffer, .. } = self;
-        if let PassPlanning::Curve(curve) = planning {
-            return curve.advance(job, job.rest(), buffer, feed_factor, last);
-        }
         let begins = !self.is_along();
         match self.travel.next {
             Next::Along if self.buffer.patch().point => self.step_on_pole(job)?,
             Next::Along => self.step_far(job, feed_factor)?,
-            Next::Pass => self.begin_pass(job)?,
-            Next::Over => {
-                self.step_over(job)?;
-                self.begin_pass(job)?;
-            }
+            Next::Pass | Next::Over => match self.change_pass(job)? {
+                Some(true) => {}
+                Some(false) => {
+                    self.stand(last);
+                    return Ok(true);
+                }
+                None => return Ok(false),
+            },
             Next::End => return Ok(false),
         }
         self.sample(last)?;
@@ -276,7 +282,7 @@ impl Run {
         }
         let travel = &self.travel;
         last.pass = travel.pass;
-        last.path.span = travel.span;
+        last.path.span = travel.span();
         last.side = travel.side;
         last.feed_mm_s = if self.buffer.patch().point {
             0.0
@@ -286,21 +292,59 @@ impl Run {
         Ok(true)
     }
 
-    /// Collapses the first patch of this pass at this side parameter. The tool does not move.
+    /// Begins the first pass, or the next one. False where that is not made yet; none where there is none.
+    #[inline(never)]
+    fn change_pass(&mut self, job: &Job<'_>) -> Result<Option<bool>> {
+        let next = if self.travel.next == Next::Pass {
+            NextRoute::Pass(self.first_route(job))
+        } else if self.lines.is_in_use() {
+            self.take_pass(job)?
+        } else {
+            self.step_over(job)?
+        };
+        match next {
+            NextRoute::Pass(route) => self.begin_pass(job, route)?,
+            NextRoute::NotYet => return Ok(Some(false)),
+            NextRoute::None => return Ok(None),
+        }
+        Ok(Some(true))
+    }
+
+    /// The next pass of a region, once it is known.
+    fn take_pass(&mut self, job: &Job<'_>) -> Result<NextRoute> {
+        if let Some(fault) = self.pending {
+            return Err(fault);
+        }
+        match self.next_pass {
+            NextPass::Found => {
+                let Some(route) = self.lines.take(job.header) else {
+                    return Ok(NextRoute::None);
+                };
+                self.next_pass = NextPass::Sought;
+                self.travel.pass = self.travel.pass.wrapping_add(1);
+                Ok(NextRoute::Pass(route))
+            }
+            NextPass::None => Ok(NextRoute::None),
+            // It stands until the next pass is known.
+            NextPass::Sought => Ok(NextRoute::NotYet),
+        }
+    }
+
+    /// Collapses the first patch of this pass. The tool does not move.
     ///
     /// # Errors
     /// As [`Self::advance`].
-    pub(crate) fn enter_pass(&mut self, job: &Job<'_>, pass: u32, side: SpanParameter) -> Result<()> {
+    pub(crate) fn enter_pass(&mut self, job: &Job<'_>, pass: u32, route: Route) -> Result<()> {
         if pass > 0 && job.header.pattern == Pattern::Zig {
             self.travel.offset = self.first_offset;
         }
-        (self.travel.pass, self.travel.side) = (pass, side);
-        self.begin_pass(job)
+        self.travel.pass = pass;
+        self.begin_pass(job, route)
     }
 
     /// Collapses the first patch of a pass ahead of [`Self::enter_pass`], once the present pass needs no further patch.
-    pub(crate) fn prepare_pass(&mut self, job: &Job<'_>, first: &PassPosition) {
-        self.buffer.prepare(job, first);
+    pub(crate) fn prepare_pass(&mut self, job: &Job<'_>, route: &Route) {
+        self.buffer.prepare(job, route);
     }
 
     /// Emits the first sample of the pass that was entered; its minimum interval is known from the look-ahead.
@@ -320,14 +364,8 @@ impl Run {
     ///
     /// # Errors
     /// As [`Self::advance`].
-    pub(crate) fn arrive(
-        &mut self,
-        job: &Job<'_>,
-        pass: u32,
-        side: SpanParameter,
-        interval: f32,
-    ) -> Result<()> {
-        self.enter_pass(job, pass, side)?;
+    pub(crate) fn arrive(&mut self, job: &Job<'_>, pass: u32, route: Route, interval: f32) -> Result<()> {
+        self.enter_pass(job, pass, route)?;
         let ticks = self.travel.ticks;
         let mut start = Sample::START;
         self.sample(&mut start)?;
@@ -350,12 +388,12 @@ impl Run {
         let before = travel.path.log_speed_derivative - change;
         self.last_feed_factor = feed_factor;
         let step = contact::step(&travel.path, before, feed_factor * self.buffer.patch().arc);
-        if let Some(fraction) = step.and_then(|step| advanced(travel.fraction, step)) {
+        if let Some(fraction) = step.and_then(|step| travel.beyond(step)) {
             travel.fraction = fraction;
             self.sample(last)?;
             last.feed_mm_s = job.header.feed_mm_s * feed_factor;
             if self.buffer.has_work() {
-                self.buffer.work(job, &self.travel.position());
+                self.buffer.work(job, &self.travel.route, &self.travel.piece);
             }
             return Ok(());
         }
@@ -373,7 +411,9 @@ impl Run {
     /// As [`Self::advance`]; [`FaultKind::PatchTooShort`] where a whole patch is still left.
     pub(crate) fn finish_pass(&mut self, job: &Job<'_>, last: &mut Sample) -> Result<()> {
         if self.is_along() {
-            if self.travel.position().next(job.header.path_spans).is_some() && !self.next_span(job)? {
+            let travel = &self.travel;
+            let is_last = travel.route.next(job, &travel.piece).is_none();
+            if !is_last && !self.next_piece(job)? {
                 return Err(Fault::new(FaultKind::PatchTooShort, 0.0));
             }
             self.end_pass(job);
@@ -410,26 +450,41 @@ impl Run {
 
     /// Number of the patch from the start of the pass, and of the cell within the patch, at the position, for a number of cells per patch; none where
     /// the pass is over.
-    pub(crate) fn cell(&self, job: &Job<'_>, cells_per_patch: u16) -> Option<[u16; 2]> {
+    pub(crate) fn cell(&self, cells_per_patch: u16) -> Option<[u16; 2]> {
         if !self.is_along() {
             return None;
         }
         let travel = &self.travel;
-        let high = (travel.fraction >> 32) * u64::from(cells_per_patch);
-        let within = u16::try_from(high >> 32).unwrap_or(0);
-        let last = job.header.path_spans.saturating_sub(1);
-        let patch = if travel.reversed {
-            last.saturating_sub(travel.span)
+        if let Some(front) = &travel.piece.front {
+            return Some([front.number, 0]);
+        }
+        let [start, _] = travel.route.ends;
+        let patch = travel.span().abs_diff(start.span);
+        let piece = &travel.piece;
+        let within = if piece.is_whole() {
+            let high = (travel.fraction >> 32) * u64::from(cells_per_patch);
+            u16::try_from(high >> 32).unwrap_or(0)
         } else {
-            travel.span
+            let part = fraction_to_f32(travel.fraction.saturating_sub(piece.start()))
+                / fraction_to_f32(piece.end().saturating_sub(piece.start()));
+            let cell = u16::try_from(truncated(part * f32::from(cells_per_patch))).unwrap_or(0);
+            cell.min(cells_per_patch.saturating_sub(1))
         };
         Some([patch, within])
     }
 
-    /// Arc since the start of a cell of [`Self::cell`], mm, each cell this fraction of the patch; none where, by rounding, the position is before the cell.
-    pub(crate) fn since_station(&self, [_, within]: [u16; 2], part: u64) -> Option<f32> {
+    /// Arc since the start of a cell of [`Self::cell`], mm, by the number of cells per patch and the fraction of a whole patch in one of them; none where, by
+    /// rounding, the position is before the cell.
+    pub(crate) fn since_station(&self, [_, within]: [u16; 2], (cells, part): (u16, u64)) -> Option<f32> {
         let travel = &self.travel;
-        let start = u64::from(within).wrapping_mul(part);
+        let piece = &travel.piece;
+        let part = if piece.is_whole() {
+            part
+        } else {
+            let length = piece.end().saturating_sub(piece.start());
+            length.checked_div(u64::from(cells))?
+        };
+        let start = piece.start() + u64::from(within).wrapping_mul(part);
         let length = fraction_to_f32(travel.fraction.checked_sub(start)?);
         let mean = 1.0 - 0.5 * travel.path.log_speed_derivative * length;
         Some(length * mean / (travel.path.inv_speed * self.buffer.patch().per_mm))
@@ -443,7 +498,7 @@ impl Run {
     /// Writes the fields of a sample that change only with the pass.
     const fn describe(&self, feed_mm_s: f32, last: &mut Sample) {
         last.pass = self.travel.pass;
-        last.path.span = self.travel.span;
+        last.path.span = self.travel.span();
         last.side = self.travel.side;
         last.feed_mm_s = feed_mm_s;
     }
@@ -461,6 +516,15 @@ impl Run {
             AnyPass::Pole(pass) => travel.sample(&pass, patch, last),
             AnyPass::Profile(pass) => travel.sample(pass, patch, last),
             AnyPass::Circle(pass) => travel.sample(pass, patch, last),
+            AnyPass::Curve(pass) => {
+                travel.sample(pass, patch, last)?;
+                travel.side = SpanParameter {
+                    span: travel.piece.position.side.span,
+                    fraction: pass.side(travel.fraction).fraction,
+                };
+                last.side = travel.side;
+                Ok(())
+            }
         }
     }
 
@@ -468,27 +532,34 @@ impl Run {
     fn step_far(&mut self, job: &Job<'_>, feed_factor: f32) -> Result<()> {
         let mut rest = feed_factor * job.header.feed_mm_s * job.header.period_s;
         let mut start = self.travel.path;
-        for crossings in 0..=CROSSINGS_MAX {
+        let most = if self.travel.route.front.is_some() {
+            CROSSINGS_ON_FRONT_MAX
+        } else {
+            CROSSINGS_MAX
+        };
+        for crossings in 0..=CROSSINGS_ON_FRONT_MAX {
             let Self { travel, buffer, .. } = self;
             let patch = buffer.patch();
             let arc = rest * patch.per_mm;
             let end = || Some(patch.end());
             let path_at = |fraction| patch.surface.path_at(fraction);
-            let covered = match contact::solve(path_at, [travel.fraction, u64::MAX], &start, end, arc)? {
-                Reach::Within(fraction) => {
-                    travel.fraction = fraction;
-                    return Ok(());
-                }
-                Reach::Beyond(covered) => covered,
-            };
+            let covered =
+                match contact::solve(path_at, [travel.fraction, travel.piece.end()], &start, end, arc)? {
+                    Reach::Within(fraction) => {
+                        travel.fraction = fraction;
+                        return Ok(());
+                    }
+                    Reach::Beyond(covered) => covered,
+                };
             rest = (arc - covered) / patch.per_mm;
-            if crossings == CROSSINGS_MAX {
-                break;
-            }
-            if !self.next_span(job)? {
+            if self.travel.route.next(job, &self.travel.piece).is_none() {
                 self.end_pass(job);
                 return Ok(());
             }
+            if crossings == most {
+                break;
+            }
+            self.next_piece(job)?;
             start = self.buffer.patch().start().checked()?;
         }
         Err(Fault::new(FaultKind::PatchTooShort, rest))
@@ -496,53 +567,72 @@ impl Run {
 
     /// On a pole, advances the path parameter: the tool stands, but the interval that the pass allows depends on the parameter.
     fn step_on_pole(&mut self, job: &Job<'_>) -> Result<()> {
-        if let Some(fraction) = self.travel.fraction.checked_add(POLE_STEP) {
+        if let Some(fraction) = self.travel.beyond(POLE_STEP) {
             self.travel.fraction = fraction;
-        } else if !self.next_span(job)? {
+        } else if !self.next_piece(job)? {
             self.end_pass(job);
         }
         Ok(())
     }
 
-    /// Moves to the start of the next patch along the pass; false at the pass's end.
-    fn next_span(&mut self, job: &Job<'_>) -> Result<bool> {
+    /// Moves to the start of the next piece of the pass; false at the pass's end.
+    fn next_piece(&mut self, job: &Job<'_>) -> Result<bool> {
         let travel = &mut self.travel;
-        let Some(line) = travel.position().next(job.header.path_spans) else {
+        let Some(piece) = travel.route.next(job, &travel.piece) else {
             return Ok(false);
         };
-        travel.span = line.span;
-        travel.fraction = 0;
+        travel.piece = piece;
+        travel.fraction = piece.start();
         travel.path.log_speed_derivative = f32::NAN;
-        self.buffer.advance(job, &line)?;
+        self.buffer.advance(job, &travel.route, &piece)?;
         Ok(true)
     }
 
-    /// Begins the pass at the current side parameter.
-    fn begin_pass(&mut self, job: &Job<'_>) -> Result<()> {
-        let header = job.header;
+    /// Begins a pass.
+    fn begin_pass(&mut self, job: &Job<'_>, route: Route) -> Result<()> {
         let travel = &mut self.travel;
-        travel.reversed = header.pattern == Pattern::Zigzag && travel.pass % 2 == 1;
-        travel.span = if travel.reversed {
-            header.path_spans.saturating_sub(1)
-        } else {
-            0
-        };
-        travel.fraction = 0;
-        travel.max_inv_interval_sq = 0.0;
+        let side_before = travel.route.side;
+        travel.route = route;
+        travel.side = route.side;
+        if route.front.is_some() {
+            // Fronts begin at places that are not next to each other.
+            travel.offset = [0; 3];
+        }
+        travel.piece = route.first(job);
+        travel.fraction = travel.piece.start();
+        // The maximum is that of all passes on the line.
+        let goes_on = travel.pass > 0 && route.side == side_before;
+        if !goes_on {
+            travel.max_inv_interval_sq = 0.0;
+        }
+        if job.header.edges > 0 {
+            // The surface may have turned away in between.
+            travel.offset = [0; 3];
+        }
         travel.next = Next::Along;
         travel.path.log_speed_derivative = f32::NAN;
         if let PassPlanning::Scan(scan) = &mut self.planning {
-            scan.begin(&travel.position());
+            scan.begin(&route, goes_on);
         }
-        self.buffer.begin(job, &travel.position())
+        self.buffer.begin(job, &travel.route, &travel.piece)
     }
 
     /// Whether [`Self::plan`] has anything to do.
     pub(crate) fn has_to_plan(&self, spacing: Spacing) -> bool {
         match &self.planning {
-            PassPlanning::Curve(curve) => curve.has_to_plan(),
-            PassPlanning::Scan(scan) => spacing == Spacing::Exact && (scan.has_work() || self.is_step_due()),
+            PassPlanning::Fronts(fronts) => fronts.has_work(),
+            PassPlanning::Scan(scan) => {
+                spacing == Spacing::Exact && (scan.has_work() || self.is_step_due()) || self.is_pass_due()
+            }
         }
+    }
+
+    /// Whether the next pass of a region is to be sought.
+    fn is_pass_due(&self) -> bool {
+        self.lines.is_in_use()
+            && self.travel.next == Next::Over
+            && self.next_pass == NextPass::Sought
+            && self.pending.is_none()
     }
 
     /// Whether the pass is over, and the step to the next one is not known yet.
@@ -553,15 +643,39 @@ impl Run {
     /// The planning of one period without axis limits: scans the pass for the step to the next one, or makes the next front in the words behind the job's.
     pub(crate) fn plan(&mut self, job: &Job<'_>, rest: &mut [i32]) {
         let has_work = match &mut self.planning {
-            PassPlanning::Curve(curve) => return curve.plan(job, rest),
+            PassPlanning::Fronts(fronts) => return fronts.plan(job, rest),
             PassPlanning::Scan(scan) => {
                 scan.plan(job);
                 scan.has_work()
             }
         };
-        if self.is_step_due() && !has_work {
+        if self.lines.is_in_use() {
+            if self.is_pass_due() && !has_work {
+                match self.seek_pass(job) {
+                    Ok(next) => self.next_pass = next,
+                    Err(fault) => self.pending = Some(fault),
+                }
+            }
+        } else if self.is_step_due() && !has_work {
             self.step_over = Some(self.find_step_over(job));
         }
+    }
+
+    /// A portion of the search for the next pass of a region.
+    ///
+    /// # Errors
+    /// As [`RegionLines::seek`].
+    #[inline(never)]
+    fn seek_pass(&mut self, job: &Job<'_>) -> Result<NextPass> {
+        if self.lines.is_line_over() {
+            let step = self.find_step_over(job);
+            return Ok(if self.lines.go_on(job, step)? {
+                NextPass::Sought
+            } else {
+                NextPass::None
+            });
+        }
+        self.lines.seek(job, self.travel.pass)
     }
 
     /// The step to the next pass.
@@ -574,7 +688,7 @@ impl Run {
         } = self.travel;
         match (&mut self.planning, job.header.spacing) {
             (PassPlanning::Scan(scan), Spacing::Exact) => scan.step(
-                job.header,
+                job,
                 PassMaximum {
                     inv_interval_sq: max_inv_interval_sq,
                     shape,
@@ -584,27 +698,106 @@ impl Run {
         }
     }
 
-    /// The side parameter of the next pass. Its first sample is adjacent to the last pass's first, or to its last where the
+    /// The estimator of the step to the next straight pass, and the lines of a region.
+    pub(crate) const fn estimator_and_lines(&mut self) -> (Option<&mut StepOverEstimator>, &mut RegionLines) {
+        let estimator = match &mut self.planning {
+            PassPlanning::Scan(scan) => Some(scan.estimator()),
+            PassPlanning::Fronts(_) => None,
+        };
+        (estimator, &mut self.lines)
+    }
+
+    pub(crate) const fn estimator_ref(&self) -> Option<&StepOverEstimator> {
+        match &self.planning {
+            PassPlanning::Scan(scan) => Some(scan.estimator_ref()),
+            PassPlanning::Fronts(_) => None,
+        }
+    }
+
+    /// Cycles of the next portion of the next front; 0 where there is none.
+    pub(crate) const fn front_cycles(&self) -> u32 {
+        match &self.planning {
+            PassPlanning::Fronts(fronts) => fronts.cycles(),
+            PassPlanning::Scan(_) => 0,
+        }
+    }
+
+    /// Makes a portion of the next front, in the words behind the job's.
+    pub(crate) fn make_front(&mut self, job: &Job<'_>, rest: &mut [i32]) {
+        if let PassPlanning::Fronts(fronts) = &mut self.planning {
+            fronts.work(job, rest);
+        }
+    }
+
+    /// The pass after the latest one of a job of constant scallop height.
+    ///
+    /// # Errors
+    /// As [`FrontSequence::next`].
+    pub(crate) fn next_pass(&mut self, job: &Job<'_>) -> Result<NextRoute> {
+        match &mut self.planning {
+            PassPlanning::Fronts(fronts) => fronts.next(job),
+            PassPlanning::Scan(_) => Ok(NextRoute::None),
+        }
+    }
+
+    /// Whether there is no pass after the latest one, of a job of constant scallop height.
+    pub(crate) const fn is_last_pass(&self) -> bool {
+        match &self.planning {
+            PassPlanning::Fronts(fronts) => fronts.is_over(),
+            PassPlanning::Scan(_) => false,
+        }
+    }
+
+    /// Whether the pass after the latest one is on a front that may not be made yet.
+    pub(crate) const fn needs_front(&self) -> bool {
+        match &self.planning {
+            PassPlanning::Fronts(fronts) => fronts.needs_front(),
+            PassPlanning::Scan(_) => false,
+        }
+    }
+
+    /// The tool leaves the pass before the latest one. Returns whether the next front is begun.
+    pub(crate) const fn arrive_on_front(&mut self) -> bool {
+        match &mut self.planning {
+            PassPlanning::Fronts(fronts) => fronts.arrive(),
+            PassPlanning::Scan(_) => false,
+        }
+    }
+
+    /// The next pass. Its first sample is adjacent to the last pass's first, or to its last where the
     /// pattern is zigzag.
-    fn step_over(&mut self, job: &Job<'_>) -> Result<()> {
+    fn step_over(&mut self, job: &Job<'_>) -> Result<NextRoute> {
+        if let PassPlanning::Fronts(fronts) = &mut self.planning {
+            let next = fronts.next(job)?;
+            if let NextRoute::Pass(_) = next {
+                fronts.arrive();
+                self.travel.pass = self.travel.pass.wrapping_add(1);
+            }
+            return Ok(next);
+        }
         let step = match self.step_over.take() {
             Some(step) => step,
             None => self.find_step_over(job),
         };
         let travel = &mut self.travel;
         let width = |span| job.side_width(span);
-        travel.side = schedule::next_side(travel.side, step, job.header.side_spans, width)?;
+        let side = schedule::next_side(travel.route.side, step, job.header.side_spans, width)?;
         travel.pass = travel.pass.wrapping_add(1);
         if job.header.pattern == Pattern::Zig {
             travel.offset = self.first_offset;
         }
-        Ok(())
+        Ok(NextRoute::Pass(Route::of_pass(job.header, travel.pass, side)))
     }
 
     /// Whether the run is exactly at the end of the pass.
     fn end_pass(&mut self, job: &Job<'_>) {
-        self.travel.fraction = u64::MAX;
-        let last = schedule::is_last(self.travel.side, job.header.side_spans);
+        self.travel.fraction = self.travel.piece.end();
+        let last = match &self.planning {
+            PassPlanning::Fronts(fronts) => fronts.is_over(),
+            PassPlanning::Scan(_) => {
+                schedule::is_last(self.travel.route.side, job.header.side_spans) && job.header.edges == 0
+            }
+        };
         self.travel.next = if last { Next::End } else { Next::Over };
     }
 }

@@ -59,7 +59,10 @@ impl Sequencer {
         }
         match leg {
             Leg::Retract => true,
-            Leg::Traverse => !matches!(self.planning, Planning::Requested(..) | Planning::Stations),
+            Leg::Traverse => !matches!(
+                self.planning,
+                Planning::Awaited(_) | Planning::Requested(..) | Planning::Stations
+            ),
             Leg::Plunge => self.is_planned(),
         }
     }
@@ -148,9 +151,10 @@ impl Sequencer {
             command.feed_factor.at_most(1.0),
             command.is_fault,
             job.header.period_s,
+            &mut self.profiles,
         );
         if is_over && leg == Leg::Plunge && self.goal == Goal::Pass {
-            self.swap();
+            self.swap(run);
             return self.enter_pass(job, run, command, last);
         }
         run.off_surface(self.straight.position(), self.straight.progress.speed(), last);

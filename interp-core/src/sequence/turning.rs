@@ -90,9 +90,9 @@ impl Sequencer {
         let (now, _) = self.plans_ref();
         let beyond = now.plan.beyond(&self.follower.cursor);
         self.turn = now.tail;
-        self.swap();
+        self.swap(run);
         let (now, _) = self.plans_ref();
-        run.arrive(job, now.pass, now.side, now.interval)?;
+        run.arrive(job, now.pass, now.route, now.interval)?;
         let mut follower = self.follower;
         follower.begin(&now.plan);
         follower.tick(&now.plan, beyond / job.header.period_s);

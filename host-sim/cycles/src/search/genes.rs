@@ -161,6 +161,7 @@ impl Genes {
             radius_mm,
             body: job::ToolBody::default(),
             setup: job::Setup::default(),
+            region: None,
             // Up to 10 mm in a period of a millisecond, which is the limit.
             feed_mm_min: self.log(Gene::Arc, 60.0, 600_000.0),
             scallop_mm: radius_mm * self.log(Gene::Scallop, 1e-4, 0.95),

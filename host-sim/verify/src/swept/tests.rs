@@ -17,6 +17,7 @@ fn job(surface: SurfaceSpec, along: Along, side: Side, scallop_mm: f64) -> Job {
         radius_mm: RADIUS,
         body: job::ToolBody::default(),
         setup: job::Setup::default(),
+        region: None,
         feed_mm_min: 600.0,
         scallop_mm,
         along,

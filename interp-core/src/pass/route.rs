@@ -1,0 +1,174 @@
+//! A pass from place to place, on a line of constant side parameter or on a front, and its pieces.
+
+use crate::job::program::Job;
+use crate::job::{Header, Pattern};
+use crate::pass::front::{FrontLine, FrontPiece, PiecePlace};
+use crate::pass::position::PassPosition;
+use crate::sample::SpanParameter;
+
+/// A pass from place to place.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Route {
+    /// Side parameter of the line; of a pass on a front that of the surface's start.
+    pub(crate) side: SpanParameter,
+    pub(crate) reversed: bool,
+    /// Start and end, by the surface's own path parameter.
+    pub(crate) ends: [SpanParameter; 2],
+    /// The front that it lies on, if it is not a line.
+    pub(crate) front: Option<FrontLine>,
+}
+
+/// A part of a pass within one patch; on a front also within one interval between its stations.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Piece {
+    pub(crate) position: PassPosition,
+    /// Start and end: fractions of the span in the direction of travel.
+    pub(crate) range: [u64; 2],
+    pub(crate) front: Option<FrontPiece>,
+}
+
+impl Route {
+    pub(crate) const NONE: Self = Self {
+        side: SpanParameter { span: 0, fraction: 0 },
+        reversed: false,
+        ends: [SpanParameter { span: 0, fraction: 0 }; 2],
+        front: None,
+    };
+
+    /// The whole line at a side parameter.
+    pub(crate) const fn whole(side: SpanParameter, reversed: bool, path_spans: u16) -> Self {
+        let near = SpanParameter { span: 0, fraction: 0 };
+        let far = SpanParameter {
+            span: path_spans.saturating_sub(1),
+            fraction: u64::MAX,
+        };
+        Self {
+            side,
+            reversed,
+            ends: if reversed { [far, near] } else { [near, far] },
+            front: None,
+        }
+    }
+
+    /// The whole line of the pass with this number.
+    pub(crate) fn of_pass(header: &Header, pass: u32, side: SpanParameter) -> Self {
+        let reversed = header.pattern == Pattern::Zigzag && pass % 2 == 1;
+        Self::whole(side, reversed, header.path_spans)
+    }
+
+    /// A fraction in the direction of travel, from one in the surface's own direction, or back.
+    pub(crate) const fn turned(&self, fraction: u64) -> u64 {
+        if self.reversed { !fraction } else { fraction }
+    }
+
+    pub(crate) const fn is_on_front(&self) -> bool {
+        self.front.is_some()
+    }
+
+    /// Whether it starts and whether it ends at the surface's boundaries.
+    pub(crate) fn reach_boundaries(&self, job: &Job<'_>) -> [bool; 2] {
+        let whole = Self::whole(self.side, self.reversed, job.header.path_spans);
+        let ([start, end], [first, last]) = (self.ends, whole.ends);
+        [start == first, end == last]
+    }
+
+    /// The first piece.
+    pub(crate) fn first(&self, job: &Job<'_>) -> Piece {
+        let [start, _] = self.ends;
+        match &self.front {
+            Some(front) => self.on_front(front.first(job, &self.ends, self.reversed)),
+            None => self.piece(start.span),
+        }
+    }
+
+    /// The last piece of a pass on a line.
+    pub(crate) fn last_on_line(&self) -> Piece {
+        let [_, end] = self.ends;
+        self.piece(end.span)
+    }
+
+    /// The piece after another, if there is one.
+    pub(crate) fn next(&self, job: &Job<'_>, piece: &Piece) -> Option<Piece> {
+        if let (Some(front), Some(on)) = (&self.front, &piece.front) {
+            let next = front.next(job, &self.ends, self.reversed, (on, piece.end()));
+            return next.map(|next| self.on_front(next));
+        }
+        let [_, end] = self.ends;
+        if piece.position.span == end.span {
+            return None;
+        }
+        let next = piece.position.next(job.header.path_spans)?;
+        Some(self.piece(next.span))
+    }
+
+    const fn on_front(&self, place: PiecePlace) -> Piece {
+        let PiecePlace {
+            piece,
+            span,
+            side_span,
+            range,
+        } = place;
+        Piece {
+            position: PassPosition {
+                side: SpanParameter {
+                    span: side_span,
+                    fraction: 0,
+                },
+                reversed: self.reversed,
+                span,
+            },
+            range,
+            front: Some(piece),
+        }
+    }
+
+    fn piece(&self, span: u16) -> Piece {
+        let [start, end] = self.ends;
+        let from = if span == start.span {
+            self.turned(start.fraction)
+        } else {
+            0
+        };
+        let to = if span == end.span {
+            self.turned(end.fraction)
+        } else {
+            u64::MAX
+        };
+        Piece {
+            position: PassPosition {
+                side: self.side,
+                reversed: self.reversed,
+                span,
+            },
+            range: [from, to],
+            front: None,
+        }
+    }
+}
+
+impl Piece {
+    pub(crate) const NONE: Self = Self {
+        position: PassPosition {
+            side: SpanParameter { span: 0, fraction: 0 },
+            reversed: false,
+            span: 0,
+        },
+        range: [0, u64::MAX],
+        front: None,
+    };
+
+    pub(crate) const fn start(&self) -> u64 {
+        let [start, _] = self.range;
+        start
+    }
+
+    pub(crate) const fn end(&self) -> u64 {
+        let [_, end] = self.range;
+        end
+    }
+
+    /// Whether it is as long as the patch.
+    pub(crate) const fn is_whole(&self) -> bool {
+        matches!(self.range, [0, u64::MAX])
+    }
+}
