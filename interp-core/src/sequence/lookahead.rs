@@ -393,7 +393,8 @@ impl Lookahead {
         out.steps_over = false;
         out.is_last = false;
         out.starts = [0; PIECE_WORDS];
-        self.has_derivatives = false;
+        // Only stretches of a front may be too short for derivatives. The stations before a straight pass are those of its turn.
+        self.has_derivatives = !route.is_on_front();
     }
 
     /// Executes one task.
