@@ -281,7 +281,10 @@ fn faults_come_as_explained() {
         ),
         (
             "freeform",
-            &[("feed_mm_min = 1800", "feed_mm_min = 600000")],
+            &[
+                ("feed_mm_min = 1800", "feed_mm_min = 600000"),
+                ("[tool]", "[machine]\nperiod_us = 2000\n\n[tool]"),
+            ],
             6,
             "patch-too-short",
         ),

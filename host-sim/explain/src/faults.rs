@@ -62,7 +62,7 @@ fn words(kind: FaultKind) -> [&'static str; 5] {
             "The rest of the arc beyond the patch, mm.",
             "Knots are closer together than the arc of one period: 0.01 mm at 600 mm/min and 1 ms.",
             "Lower the feed, or remove knots with such a small spacing.",
-            "jobs/freeform.toml at `feed_mm_min = 600000`: 10 mm per period, longer than its shortest patches.",
+            "jobs/freeform.toml at `feed_mm_min = 600000` and `period_us = 2000`: 20 mm per period, longer than its patches.",
         ],
         FaultKind::IntervalTooSmall => [
             "The path interval is so small that the next pass would coincide with this one.",
