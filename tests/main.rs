@@ -33,5 +33,6 @@ mod scallop_limit;
 mod script;
 mod session;
 mod settings;
+mod streaming;
 mod swept;
 mod unusual_motion;

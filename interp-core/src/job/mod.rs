@@ -13,6 +13,7 @@
 pub mod encode;
 pub(crate) mod program;
 pub(crate) mod stations;
+pub mod stream;
 
 /// Words of surface data that the reference machine stores: 64 KiB of its 128 KiB RAM, hence 309 polynomial or 237
 /// rational patches ([`patches_max`]).
@@ -186,6 +187,8 @@ pub struct Header {
     pub scallop_mm: f32,
     /// Sampling period T, s, 1e-5 to 0.1.
     pub period_s: f32,
+    /// Rows of patches that a pass and what is planned on it may use, for a job that is loaded while it runs: [`stream`]. 0 for one that is stored as a whole.
+    pub window: u16,
     /// Axis limits; none for a constant feed.
     pub axes: Option<AxisLimits>,
 }

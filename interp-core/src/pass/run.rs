@@ -577,14 +577,45 @@ impl Run {
             Some(step) => step,
             None => self.find_step_over(job),
         };
+        let side = self.side_after(job, step)?;
         let travel = &mut self.travel;
-        let width = |span| job.side_width(span);
-        let side = schedule::next_side(travel.route.side, step, job.header.side_spans, width)?;
         travel.pass = travel.pass.wrapping_add(1);
         if job.header.pattern == Pattern::Zig {
             travel.offset = self.first_offset;
         }
         Ok(Route::of_pass(job.header, travel.pass, side))
+    }
+
+    /// Side parameter of the next pass, a step away.
+    fn side_after(&self, job: &Job<'_>, step: f32) -> Result<SpanParameter> {
+        let side = self.travel.route.side;
+        match &self.planning {
+            PassPlanning::Scan(scan) => scan.estimator().next_side(job, side, step),
+            PassPlanning::Curve(_) => Ok(side),
+        }
+    }
+
+    /// The last row of patches that the next tick and the planning after it need, where the next tick begins a pass.
+    pub(crate) fn last_row(&mut self, job: &Job<'_>) -> Option<u16> {
+        if self.travel.next != Next::Over {
+            return None;
+        }
+        let step = match self.step_over {
+            Some(step) => step,
+            None => self.find_step_over(job),
+        };
+        self.step_over = Some(step);
+        // A step that is too small is reported by the tick.
+        let side = self.side_after(job, step).ok()?;
+        match &self.planning {
+            PassPlanning::Scan(scan) => Some(scan.estimator().last_row(job, side)),
+            PassPlanning::Curve(_) => None,
+        }
+    }
+
+    /// Row of patches that the tool is in.
+    pub(crate) const fn row(&self) -> u16 {
+        self.travel.route.side.span
     }
 
     /// Whether the run is exactly at the end of the pass.

@@ -103,6 +103,7 @@ impl PassScan {
 
     /// Begins the scan of a pass whose first patch is at this position.
     pub(crate) const fn begin(&mut self, position: &PassPosition) {
+        self.estimator.enter_row(position.side.span);
         self.line = *position;
         self.piece = Piece::Pass;
     }
@@ -117,6 +118,11 @@ impl PassScan {
         self.is_first_patch = true;
         self.piece = Piece::Patch;
         self.estimator.begin();
+    }
+
+    /// The step-over from the pass.
+    pub(crate) const fn estimator(&self) -> &StepOverEstimator {
+        &self.estimator
     }
 
     /// Whether a piece is left.

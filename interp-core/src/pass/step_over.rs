@@ -9,8 +9,10 @@
 //!
 //! The stations are the caller's ([`crate::pass::scan`], or the look-ahead of a job with axis limits): even parts of each patch, in order.
 
-use crate::job::Header;
+use crate::fault::Result;
 use crate::job::program::Job;
+use crate::job::stream::RowHistory;
+use crate::job::{Header, Spacing};
 use crate::math::arith::sqrt;
 use crate::math::number::Bounded;
 use crate::pass::edge::{self, EdgeCrest, EdgeSearch};
@@ -162,6 +164,7 @@ pub(crate) struct StepOverEstimator {
     path_spans: u16,
     /// The line to evaluate next.
     second: bool,
+    rows: RowHistory,
 }
 
 impl StepOverEstimator {
@@ -181,14 +184,39 @@ impl StepOverEstimator {
         side_span: 0,
         path_spans: 0,
         second: false,
+        rows: RowHistory::START,
     };
 
     /// Resets to the state before the first pass. [`Self::begin`] resets the other fields.
     pub(crate) const fn restart(&mut self) {
         self.before = None;
         self.looked_again = false;
+        self.rows = RowHistory::START;
         self.second = false;
         self.search = EdgeSearch::DONE;
+    }
+
+    /// The pass that is looked at from here on is in this row.
+    pub(crate) const fn enter_row(&mut self, row: u16) {
+        self.rows.enter(row);
+    }
+
+    /// Side parameter of the pass after the one at `from`, by the step to it.
+    ///
+    /// # Errors
+    /// Those of [`schedule::next_side`].
+    pub(crate) fn next_side(&self, job: &Job<'_>, from: SpanParameter, step: f32) -> Result<SpanParameter> {
+        self.rows
+            .next_side(job.header, from, step, |span| job.side_width(span))
+    }
+
+    /// The last row of patches that the planning of the next pass needs, at this side parameter.
+    pub(crate) fn last_row(&self, job: &Job<'_>, side: SpanParameter) -> u16 {
+        if job.header.spacing == Spacing::FirstOrder {
+            return side.span;
+        }
+        self.rows
+            .last_needed(job.header, side, self.expects(), |span| job.side_width(span))
     }
 
     /// Begins a pass.
@@ -319,7 +347,8 @@ impl StepOverEstimator {
             let most = edge_start.at_least(edge_end).at_least(most);
             let [half, whole] = &mut self.lines;
             let beside = if is_second { whole } else { half };
-            beside.work(job, position, fraction, most, expected);
+            let spans = self.rows.spans(job.header);
+            beside.work(job, position, fraction, most, expected, spans);
         }
     }
 
@@ -464,12 +493,13 @@ impl NeighbourLine {
         fraction: u64,
         most: f32,
         expected: Option<f32>,
+        spans: u16,
     ) {
         let is_first = expected.is_none();
         self.task = match self.task {
-            Task::Place => self.place(job, position, most, expected),
+            Task::Place => self.place(job, position, most, expected, spans),
             _ if is_first && most > REPLACE_FACTOR * self.placed_for => {
-                self.place(job, position, most, expected)
+                self.place(job, position, most, expected, spans)
             }
             Task::Patch => self.make_patch(job, position, Task::Start),
             Task::Start => {
@@ -492,9 +522,16 @@ impl NeighbourLine {
         };
     }
 
-    /// Places the line: by the expected step, or by the step that the samples of this pass so far allow; at most at the surface's boundary.
-    fn place(&mut self, job: &Job<'_>, position: &PassPosition, most: f32, expected: Option<f32>) -> Task {
-        let spans = job.header.side_spans;
+    /// Places the line: by the expected step, or by the step that the samples of this pass so far allow; at most at the end of these spans, those of the surface that
+    /// are in the store.
+    fn place(
+        &mut self,
+        job: &Job<'_>,
+        position: &PassPosition,
+        most: f32,
+        expected: Option<f32>,
+        spans: u16,
+    ) -> Task {
         let width = |span| job.side_width(span);
         if schedule::is_last(position.side, spans) {
             return Task::Idle;

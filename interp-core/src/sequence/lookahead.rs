@@ -249,6 +249,16 @@ impl Lookahead {
         }
     }
 
+    /// The pass to look over next is in this row.
+    pub(crate) const fn enter_row(&mut self, row: u16) {
+        self.step_over.enter_row(row);
+    }
+
+    /// The last row of patches that the look over the next pass needs, at this side parameter.
+    pub(crate) fn last_row(&self, job: &Job<'_>, side: SpanParameter) -> u16 {
+        self.step_over.last_row(job, side)
+    }
+
     /// Begins to look over this pass.
     pub(crate) fn begin(&mut self, pass: u32, route: Route, head: &Turn, out: &mut PassPlan) {
         let has_head = head.exists();
@@ -725,11 +735,10 @@ impl Lookahead {
             }
             Spacing::FirstOrder => out.interval,
         };
-        let width = |span| job.side_width(span);
         out.next = if schedule::is_last(out.route.side, header.side_spans) {
             None
         } else {
-            let side = schedule::next_side(out.route.side, step, header.side_spans, width)?;
+            let side = self.step_over.next_side(job, out.route.side, step)?;
             Some(Route::of_pass(header, out.pass.wrapping_add(1), side))
         };
         Ok(())

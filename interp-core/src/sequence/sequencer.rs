@@ -161,6 +161,8 @@ pub(crate) struct Sequencer {
     /// Patch of the pass and cell of the patch that the tool is in.
     cell: [u16; 2],
     correction: Option<Correction>,
+    /// Whether the rows of patches are there that the planning of the pass after the next needs.
+    has_rows: bool,
 }
 
 /// The plans of the current or last pass, and of the next.
@@ -197,6 +199,7 @@ impl Sequencer {
         has_first_patch: false,
         cell: [0; 2],
         correction: None,
+        has_rows: false,
     };
 
     /// Starts the job from the tool's position.
@@ -207,6 +210,7 @@ impl Sequencer {
         self.on_surface = false;
         self.pending = None;
         self.has_first_patch = true;
+        self.has_rows = false;
         self.planner.stop();
         for pass in &mut self.plans {
             pass.tail = Turn::NONE;
@@ -235,6 +239,34 @@ impl Sequencer {
             Phase::Hop => self.hop.is_at_rest(),
             Phase::Await | Phase::AwaitGoal(_) | Phase::Done => true,
         }
+    }
+
+    /// The last row of patches that is needed to go on, where the tool stands before a pass whose successor is to be planned next: at the end of the pass before it, or
+    /// above its start. With the pass begins the planning of that successor.
+    pub(crate) fn last_row(&self, job: &Job<'_>) -> Option<u16> {
+        if self.has_rows || self.pending.is_some() || !self.is_planned() {
+            return None;
+        }
+        let is_due = match self.phase {
+            Phase::Await => !self.has_to_plan_step_over(),
+            Phase::AwaitGoal(Leg::Plunge) => self.goal == Goal::Pass && self.leg == LegPlanning::Complete,
+            Phase::Leg(Leg::Plunge) => self.goal == Goal::Pass,
+            Phase::Hop => true,
+            _ => false,
+        };
+        let (_, next) = self.plans_ref();
+        let after = next.next.filter(|_| is_due)?;
+        Some(self.lookahead.last_row(job, after.side))
+    }
+
+    /// They are there.
+    pub(crate) const fn set_has_rows(&mut self) {
+        self.has_rows = true;
+    }
+
+    /// Whether [`Self::last_row`] is to be asked.
+    pub(crate) const fn may_wait_for_rows(&self) -> bool {
+        !self.has_rows && !matches!(self.phase, Phase::Pass | Phase::Turn | Phase::Done)
     }
 
     /// Whether the tool is between passes.
@@ -396,6 +428,7 @@ impl Sequencer {
         }
         match self.planning {
             Planning::Requested(pass, route) => {
+                self.lookahead.enter_row(route.side.span);
                 self.lookahead.begin(pass, route, &now.tail, next);
                 self.planning = Planning::Stations;
             }
@@ -749,6 +782,7 @@ impl Sequencer {
     /// Chooses what follows a pass.
     #[inline(never)]
     fn end_pass(&mut self, job: &Job<'_>, command: FeedCommand) -> Result<()> {
+        self.has_rows = false;
         let (now, next) = both(&mut self.plans, self.second);
         if now.next.is_none() {
             check_faces_up(now.faces_up[1])?;

@@ -4,13 +4,14 @@ use std::collections::BTreeSet;
 
 use interp_core::encode::{self, Bicubic, EncodeError};
 use interp_core::job::SPANS_MAX;
-use interp_core::surface::{Edges, POLYNOMIAL_WORDS, RATIONAL_WORDS};
-use interp_core::{Header, STORE_WORDS, SurfaceKind};
+use interp_core::surface::Edges;
+use interp_core::{Header, SurfaceKind};
 
 use job::{Along, Job, JobError, SurfaceSpec};
 use patches::pieces::{Piece, Source};
 
-use super::{ParameterSpans, Prepared, steps, widths};
+use super::stream::PATCHES_MAX;
+use super::{ParameterSpans, Prepared, steps, stream, widths};
 
 pub(super) const REMEDY: &str =
     "place it nearer to the origin (`[placement] place = \"centre\"`), or cut it into smaller surfaces";
@@ -59,15 +60,10 @@ fn records(source: &Source, along: Along) -> Result<Records, NoRecords> {
         Along::U => (u, v),
         Along::V => (v, u),
     };
-    let record_words = if source.rational() {
-        RATIONAL_WORDS
-    } else {
-        POLYNOMIAL_WORDS
-    };
     for _ in 0..ROUNDS_MAX {
         // Before the patches are made: a job file has room for a hundred thousand.
         let patches = (path.len() - 1) * (side.len() - 1);
-        if patches > STORE_WORDS / record_words {
+        if patches > PATCHES_MAX {
             return Err(no(
                 too_many(patches),
                 "use fewer knots, or cut the part into several jobs",
@@ -122,17 +118,32 @@ pub fn patch_count(surface: &SurfaceSpec) -> Result<usize, String> {
     let (path_spans, side_spans) = (path.len() - 1, side.len() - 1);
     let patches = path_spans * side_spans;
     // The width of each span is a word, too.
-    if words.len() + path_spans + side_spans > STORE_WORDS {
-        return Err(too_many(patches));
+    let words = words.len() + path_spans + side_spans;
+    let count = |spans| u16::try_from(spans).unwrap_or(u16::MAX);
+    let kind = if source.rational() {
+        SurfaceKind::Rational
+    } else {
+        SurfaceKind::Polynomial
+    };
+    let fits = |path_spans, side_spans| {
+        let header = Header {
+            kind,
+            path_spans: count(path_spans),
+            side_spans: count(side_spans),
+            ..Header::default()
+        };
+        stream::is_machinable(&header, words)
+    };
+    if fits(path_spans, side_spans) || fits(side_spans, path_spans) {
+        Ok(patches)
+    } else {
+        Err(too_many(patches))
     }
-    Ok(patches)
 }
 
 fn too_many(patches: usize) -> String {
     format!(
-        "the surface takes {patches} patches, more than the board's store: about {} polynomial or {} rational ones",
-        STORE_WORDS / (POLYNOMIAL_WORDS + 1),
-        STORE_WORDS / (RATIONAL_WORDS + 1)
+        "the surface takes {patches} patches: more than {PATCHES_MAX}, or so many along either parameter that the board's store does not hold three rows of them"
     )
 }
 

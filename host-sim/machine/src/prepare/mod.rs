@@ -10,6 +10,7 @@ mod fronts;
 mod geometry;
 mod grid;
 mod steps;
+mod stream;
 
 use interp_core::sample::SpanParameter;
 use interp_core::{Header, Pattern, Spacing, StepConfig, SurfaceKind, ToolSide, encode};
@@ -19,6 +20,7 @@ use patches::pieces::Source;
 
 pub use grid::patch_count;
 pub use steps::{config as step_config, configuration};
+pub use stream::{PATCHES_MAX, streamed};
 
 /// One parameter of the prepared surface: its spans, in the parameter's own units.
 #[derive(Clone, Debug, PartialEq)]
@@ -135,6 +137,7 @@ pub fn prepare(job: &Job) -> Result<Prepared, JobError> {
         feed_mm_s: job.feed_mm_s() as f32,
         scallop_mm: job.scallop_mm as f32,
         period_s: job.machine.period_s() as f32,
+        window: 0,
         axes: axes::axes(job, sign)?,
     };
     let prepared = match &job.surface {
@@ -147,7 +150,7 @@ pub fn prepare(job: &Job) -> Result<Prepared, JobError> {
         surface => grid::prepare(job, header, &Source::new(surface)),
     }?;
     fronts::check(job, &prepared)?;
-    Ok(prepared)
+    stream::fit(job, prepared)
 }
 
 /// Words of the widths of spans.

@@ -239,6 +239,7 @@ fn surface_on(line: &Curve) -> (Surface, f64) {
         feed_mm_s: 10.0,
         scallop_mm: 0.01,
         period_s: 1e-3,
+        window: 0,
         axes: None,
         ..Header::default()
     };
