@@ -20,7 +20,7 @@ use protocol::{
     message::{
         Batch, Capabilities, Clock, Configuration, Description, Excess, FaultReport, InputLines,
         LinkTimeoutAction, PassDigest, Profile, ProfileLimit, Reason, Reply, Report, Request, ResetCause,
-        SafetyStatus, SampleRecord, Status, StepSettings, Words, read_reply, read_request,
+        SafetyStatus, SampleRecord, Status, StepSettings, StreamStatus, Words, read_reply, read_request,
     },
 };
 
@@ -176,6 +176,11 @@ fn status() -> Status {
         events: 302,
         steps: 0x1234_5678,
         profile: 0x9abc_def0,
+        stream: StreamStatus {
+            received: 300,
+            room: 20_000,
+            starved: 7,
+        },
         safety: SafetyStatus {
             lines: InputLines(1),
             latched: InputLines(0x201),
@@ -254,6 +259,7 @@ fn reasons() -> Vec<Reason> {
         Reason::Storage,
         Reason::OtherProfile,
         Reason::NoLimits,
+        Reason::RowsGone,
     ]
 }
 
@@ -307,6 +313,10 @@ fn replies() -> Vec<Reply> {
         Reply::Profile {
             number: 5,
             profile: None,
+        },
+        Reply::Room {
+            event: 303,
+            room: 20_000,
         },
     ]);
     replies

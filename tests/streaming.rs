@@ -1,9 +1,13 @@
 //! Jobs that are larger than the store: whatever the size of the ring of rows, and however late the rows come, the samples are those of a job that was there as a whole.
 
+mod over_line;
+
 use interp_core::job::stream::{head_words, row_words};
-use interp_core::{Command, FaultKind, Interpolator, STORE_WORDS, Sample, State};
-use job::{Along, Job};
+use interp_core::{Command, Interpolator, Sample, State};
+use job::Job;
+use machine::Machine;
 use machine::prepare::{Prepared, prepare, streamed};
+use machine::remote::drive::Expected;
 use protocol::digest::Digest;
 
 const LIMITS: &str = "
@@ -227,4 +231,26 @@ fn narrow_rows() {
             }
         }
     }
+}
+
+/// Passes of the job as a whole, as the host computes them.
+fn expected(job: &Prepared) -> Vec<Expected> {
+    let mut passes: Vec<Expected> = Vec::new();
+    let mut digest = Digest::new();
+    let each = |sample: &Sample| {
+        if passes.len() <= sample.pass as usize {
+            passes.push(Expected {
+                first_tick: sample.tick,
+                samples: 0,
+                digest: 0,
+            });
+        }
+        digest.sample(sample);
+        let pass = passes.last_mut().unwrap();
+        pass.samples += 1;
+        pass.digest = digest.value();
+        true
+    };
+    Machine::load(job).unwrap().run(each).unwrap();
+    passes
 }

@@ -25,7 +25,7 @@ use crate::{
 };
 
 /// Maximum length of an answer stored for a retransmission, bytes: a frame of `Status` with every varint at its maximum length. That of a `Profile` is shorter.
-const ANSWER_MAX: usize = 131;
+const ANSWER_MAX: usize = 146;
 
 /// State of the session.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -250,7 +250,8 @@ impl Session {
         };
         if peer != self.peer {
             self.peer = peer;
-            self.upload = None;
+            // A streamed job is under way, or may be: the next session goes on with it.
+            self.upload = self.upload.filter(Upload::is_streamed);
             self.events.clear();
             self.last = Last {
                 number,
@@ -375,6 +376,9 @@ impl Session {
 
     fn job_end(&mut self, machine: &mut impl Machine) -> Result<(), Reason> {
         let upload = self.upload.ok_or(Reason::NoUpload)?;
+        if upload.is_streamed() {
+            return upload.finish(machine);
+        }
         upload.check_complete()?;
         self.upload = None;
         upload.finish(machine)
@@ -486,7 +490,7 @@ pub(crate) fn send(reply: &Reply, out: &mut impl FnMut(&[u8])) {
 mod tests {
     use super::*;
     use interp_core::sample::{SpanParameter, State};
-    use protocol::message::{FaultReport, InputLines, Report, SafetyStatus};
+    use protocol::message::{FaultReport, InputLines, Report, SafetyStatus, StreamStatus};
 
     #[test]
     fn the_longest_status_is_kept() {
@@ -518,6 +522,11 @@ mod tests {
             events: u32::MAX,
             steps: u32::MAX,
             profile: u32::MAX,
+            stream: StreamStatus {
+                received: u32::MAX,
+                room: u32::MAX,
+                starved: u32::MAX,
+            },
             safety: SafetyStatus {
                 lines: InputLines(u16::MAX),
                 latched: InputLines(u16::MAX),

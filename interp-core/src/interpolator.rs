@@ -97,6 +97,12 @@ impl<S: AsRef<[i32]> + AsMut<[i32]>> Interpolator<S> {
         self.motion.program.room()
     }
 
+    /// Whether the job is streamed: loaded while it runs.
+    #[must_use]
+    pub const fn is_streamed(&self) -> bool {
+        self.motion.program.is_streamed()
+    }
+
     /// Copies the next record of a streamed job, so that it can be checked while the job runs: first [`RecordCopy::check`], then [`Self::load_accept`] or
     /// [`Self::load_reject`]. A row's records are there once its digest is.
     ///

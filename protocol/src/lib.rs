@@ -41,6 +41,7 @@
 //! | a number that is not the next | `Nak`, `OutOfOrder` with the one expected | |
 //! | a job, clock or step settings while a run is under way | `Nak`, `WrongState` with the state | |
 //! | a chunk that is not the next, or too many words | `Nak`, `WrongOffset`, `TooLong` | |
+//! | a chunk of a streamed job with a row whose digest is wrong, or that the core refuses | `Nak`, `WrongDigest`, `Job` with fault, value, record | a run stops before that row |
 //! | `JobEnd` too early | `Nak`, `Incomplete` | the upload may go on |
 //! | `JobEnd` with other words than announced | `Nak`, `WrongDigest` | the upload is over, no job is loaded |
 //! | `JobEnd` of a job that the core refuses | `Nak`, `Job` with fault, value, record | the upload is over, no job is loaded |
@@ -55,6 +56,7 @@
 //! | a profile that cannot be kept | `Nak`, `Storage` | |
 //! | a start of a job that was loaded under another profile | `Nak`, `OtherProfile` | |
 //! | a start of a job without axis limits, on a board with drives that has to be homed | `Nak`, `NoLimits` | |
+//! | a start of a streamed job whose first rows were overwritten | `Nak`, `RowsGone` | |
 //! | a `Repeat` of an event that is not kept any more | `Nak`, `EventGone` with the first that is | |
 //!
 //! Where the last column is empty, nothing has changed. An event that the line damages is lost: the host sees it by the numbers of the

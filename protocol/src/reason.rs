@@ -59,7 +59,7 @@ pub enum Reason {
         /// The record of the surface data, where the fault concerns one.
         record: Option<u32>,
     },
-    /// 9: more words than the store holds.
+    /// 9: more words than the store holds, or has room for now.
     TooLong {
         /// Capacity, words.
         limit: u32,
@@ -131,6 +131,8 @@ pub enum Reason {
     OtherProfile,
     /// 24: a job without axis limits, on a board with drives: it would begin with a jump of the position and without a ramp.
     NoLimits,
+    /// 25: a start of a streamed job whose first rows were overwritten: it has to be loaded again.
+    RowsGone,
 }
 
 impl Reason {
@@ -163,6 +165,7 @@ impl Reason {
             Self::Storage => 22,
             Self::OtherProfile => 23,
             Self::NoLimits => 24,
+            Self::RowsGone => 25,
         }
     }
 
@@ -295,6 +298,10 @@ impl fmt::Display for Reason {
             Self::NoLimits => write!(
                 formatter,
                 "the job has no axis limits, and the board has drives: they would jump to its first point"
+            ),
+            Self::RowsGone => write!(
+                formatter,
+                "the first part of the job was overwritten while it ran: load it again"
             ),
         }
     }

@@ -9,7 +9,7 @@ use proptest::prelude::*;
 use protocol::message::{
     CHUNK_WORDS_MAX, Capabilities, Clock, Configuration, Description, FaultReport, InputLines,
     LinkTimeoutAction, PassDigest, Profile, Reason, Reply, Report, Request, ResetCause, SAMPLES_MAX,
-    SafetyStatus, SampleRecord, Status, Words,
+    SafetyStatus, SampleRecord, Status, StreamStatus, Words,
 };
 
 use super::{reasons, requests};
@@ -150,8 +150,9 @@ prop_compose! {
 prop_compose! {
     fn any_status()(at in any_sample(), fault in prop::option::of((any::<u8>(), real())), clock in any_clock(),
                     report in any_report(), counts in any::<[u32; 10]>(), digest in any::<u64>(),
-                    safety in any_safety()) -> Status {
+                    stream in any::<[u32; 3]>(), safety in any_safety()) -> Status {
         let [credit, samples, deadline_misses, tick_cycles_max, samples_lost, frames_bad, halts, events, steps, profile] = counts;
+        let [received, room, starved] = stream;
         Status {
             state: at.state,
             fault: fault.map(|(code, value)| FaultReport { code, value }),
@@ -173,6 +174,7 @@ prop_compose! {
             events,
             steps,
             profile,
+            stream: StreamStatus { received, room, starved },
             safety,
         }
     }
@@ -244,6 +246,7 @@ pub(crate) fn any_reply() -> impl Strategy<Value = Reply> {
             }
         ),
         any_status().prop_map(Reply::Halted),
+        any::<[u32; 2]>().prop_map(|[event, room]| Reply::Room { event, room }),
         (any::<u16>(), prop::option::of(any_profile()))
             .prop_map(|(number, profile)| Reply::Profile { number, profile }),
     ]

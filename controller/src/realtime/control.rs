@@ -47,6 +47,8 @@ pub(super) struct Control {
     pub(super) from_home: bool,
     /// The step outputs lead to drives.
     pub(super) has_drives: bool,
+    /// Words of a streamed job up to which there was room, as last reported.
+    pub(super) room: u32,
 }
 
 impl Control {
@@ -65,6 +67,7 @@ impl Control {
             safety: Safety::NEW,
             from_home: true,
             has_drives: false,
+            room: 0,
         }
     }
 

@@ -278,6 +278,7 @@ mod tests {
             Reason::Storage,
             Reason::OtherProfile,
             Reason::NoLimits,
+            Reason::RowsGone,
         ]
     }
 

@@ -3,7 +3,7 @@
 use super::{Entry, Family};
 
 /// In the order of codes.
-pub(super) const ENTRIES: [Entry; 25] = [
+pub(super) const ENTRIES: [Entry; 26] = [
     reason(
         0,
         "bad-frame",
@@ -228,6 +228,15 @@ pub(super) const ENTRIES: [Entry; 25] = [
         "Such a job runs at constant feed from the first sample: the axes would jump to it, and start without a ramp.",
         "Give the board a machine profile (`cargo sim settings --port DEV --machine FILE`), whose limits the job then has, or set limits in [machine] of the job. On a bench without axes: `homing_required = false`.",
         "`cargo sim run jobs/revolved.toml --port DEV` on a board without a profile.",
+    ),
+    reason(
+        25,
+        "rows-gone",
+        "A start of a job that is larger than the board's store, after its first part was overwritten.",
+        "None.",
+        "Such a job is sent while it runs; the store then holds the part that the tool was on last.",
+        "Send the job again: `cargo sim run` does so before each start.",
+        "A second start of a job of 100 x 100 patches, without an upload.",
     ),
 ];
 

@@ -4,6 +4,7 @@
 //! drive.rs    loads and runs a job there, compares with what was computed here
 //! operate.rs  drives, home, hold and resume: what an operator asks
 //! session.rs  requests, answers; retransmission   |   events.rs  events in order, lost ones again
+//! feed.rs     the words of a job that is larger than the board's store
 //! script.rs   plays what an operator does, period by period
 //! qemu.rs     starts and ends QEMU with the firmware   |   port.rs  a serial port   |   chip.rs  a board's image without the board
 //!             └── guard.rs   their folder; ends them and removes it where this process is killed ──┘
@@ -12,6 +13,7 @@
 pub mod chip;
 pub mod drive;
 mod events;
+mod feed;
 mod guard;
 pub mod operate;
 pub mod port;
