@@ -1,5 +1,6 @@
 //! Jobs that are larger than the store: whatever the size of the ring of rows, and however late the rows come, the samples are those of a job that was there as a whole.
 
+mod in_qemu;
 mod over_line;
 
 use interp_core::job::stream::{head_words, row_words};

@@ -11,13 +11,13 @@
 
 use crate::fault::Result;
 use crate::job::program::Job;
-use crate::job::stream::RowHistory;
 use crate::job::{Header, Spacing};
 use crate::math::arith::sqrt;
 use crate::math::number::Bounded;
 use crate::pass::edge::{self, EdgeCrest, EdgeSearch};
 use crate::pass::patch::Patch;
 use crate::pass::position::PassPosition;
+use crate::pass::row_history::RowHistory;
 use crate::pass::schedule;
 use crate::sample::{SpanParameter, interval_of};
 use crate::surface::{Contact, Pass as _};
