@@ -7,6 +7,7 @@
 mod attached;
 mod disturbed;
 mod emulated;
+mod machine;
 mod pulses;
 mod settings;
 

@@ -137,6 +137,7 @@ fn every_input_is_found_on_its_pin() {
             Role::LimitMin(Axis::Z) => Some("limit switch z-"),
             Role::LimitMax(Axis::Z) => Some("limit switch z+"),
             Role::DriveFault => Some("drive fault"),
+            Role::Probe => Some("probe"),
             _ => None,
         };
         let quiet = |port: Port| {
@@ -164,7 +165,7 @@ fn every_input_is_found_on_its_pin() {
                 found += names.len();
             }
         }
-        assert_eq!(found, 2 * 8, "{}", board.id);
+        assert_eq!(found, 2 * 9, "{}", board.id);
     }
 }
 

@@ -16,6 +16,7 @@ mod house;
 mod images;
 mod import;
 mod lost_events;
+mod manual;
 mod no_panic;
 mod operations;
 mod oracle_golden;

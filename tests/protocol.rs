@@ -18,9 +18,10 @@ use proptest::prelude::*;
 use protocol::{
     frame::{Decoder, FRAME_MAX, FrameError, write_reply},
     message::{
-        Batch, Capabilities, Clock, Configuration, Description, Excess, FaultReport, InputLines,
-        LinkTimeoutAction, PassDigest, Profile, ProfileLimit, Reason, Reply, Report, Request, ResetCause,
-        SafetyStatus, SampleRecord, Status, StepSettings, StreamStatus, Words, read_reply, read_request,
+        Activity, Batch, Capabilities, Clock, Configuration, Description, Excess, FaultReport, Homing,
+        InputLines, JogWay, LinkTimeoutAction, MotionEnd, MotionStatus, Offsets, PassDigest, Profile,
+        ProfileLimit, Reason, Reply, Report, Request, ResetCause, SafetyStatus, SampleRecord, Status,
+        StepSettings, StreamStatus, Words, read_reply, read_request,
     },
 };
 
@@ -73,6 +74,25 @@ fn profile() -> Profile {
         jerk_mm_s3: axes().jerk_mm_s3,
         travel_nm: Some([[-1, 1], [i32::MIN, i32::MAX], [0, 64]]),
         configuration: CONFIGURATION,
+        homing: Some(homing()),
+        probe_inverted: true,
+    }
+}
+
+const OFFSETS: Offsets = Offsets {
+    work_nm: [[1, -2, 300], [4, 5, 6], [0; 3]],
+    tool_nm: -7,
+};
+
+fn homing() -> Homing {
+    Homing {
+        order: [2, 0, 1],
+        at_upper_end: [false, false, true],
+        position_nm: [-2, -3, 64],
+        seek_mm_s: [20.0; 3],
+        approach_mm_s: [1.0; 3],
+        back_off_nm: [300; 3],
+        survives_off: true,
     }
 }
 
@@ -114,6 +134,25 @@ fn requests() -> Vec<Request> {
         Request::Profile,
         Request::SetProfile(Some(profile())),
         Request::SetProfile(None),
+        Request::Jog {
+            axis: 2,
+            way: JogWay::By { nm: -300 },
+            speed_mm_s: 12.5,
+        },
+        Request::Jog {
+            axis: 0,
+            way: JogWay::Minus,
+            speed_mm_s: 12.5,
+        },
+        Request::Home { axes: 5 },
+        Request::Probe {
+            axis: 2,
+            nm: -300,
+            speed_mm_s: 1.5,
+        },
+        Request::Motion,
+        Request::Offsets,
+        Request::SetOffsets(OFFSETS),
         Request::JobBegin {
             header: Header {
                 axes: Some(axes()),
@@ -259,6 +298,15 @@ fn reasons() -> Vec<Reason> {
         Reason::Storage,
         Reason::OtherProfile,
         Reason::NoLimits,
+        Reason::Moving,
+        Reason::NoProfile,
+        Reason::BeyondTravel {
+            axis: 1,
+            travel_nm: [-1, 1_500_000],
+            wanted_nm: 1_500_001,
+        },
+        Reason::NoHoming,
+        Reason::ProbeTripped,
         Reason::RowsGone,
     ]
 }
@@ -313,6 +361,24 @@ fn replies() -> Vec<Reply> {
         Reply::Profile {
             number: 5,
             profile: None,
+        },
+        Reply::Motion {
+            number: 6,
+            motion: MotionStatus {
+                activity: Activity::Approach,
+                axis: 2,
+                at_nm: [1, -2, 300],
+                homed_axes: 3,
+                end: MotionEnd::WrongSwitch,
+                lines: InputLines(0x800),
+                tripped_nm: Some(-64),
+                periods: 300,
+                digest: 0x0123_4567_89ab_cdef,
+            },
+        },
+        Reply::Offsets {
+            number: 7,
+            offsets: OFFSETS,
         },
         Reply::Room {
             event: 303,

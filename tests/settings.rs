@@ -37,6 +37,8 @@ fn profile() -> Profile {
         jerk_mm_s3: [20_000.0; 3],
         travel_nm: Some([[-100_000_000, 100_000_000]; 3]),
         configuration: CONFIGURATION,
+        homing: None,
+        probe_inverted: false,
     }
 }
 

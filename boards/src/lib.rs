@@ -196,6 +196,8 @@ pub enum Role {
     EmergencyStop,
     /// Input: active when a drive reports a fault.
     DriveFault,
+    /// Input: active when the probe touches.
+    Probe,
     /// Output: active lights the status LED.
     StatusLed,
     /// USART1, to the host.
@@ -221,6 +223,7 @@ impl Role {
             Self::SerialTx => 18,
             Self::SerialRx => 19,
             Self::Parked => 20,
+            Self::Probe => 21,
         }
     }
 
@@ -229,7 +232,12 @@ impl Role {
     pub const fn is_input(self) -> bool {
         matches!(
             self,
-            Self::LimitMin(_) | Self::LimitMax(_) | Self::EmergencyStop | Self::DriveFault | Self::SerialRx
+            Self::LimitMin(_)
+                | Self::LimitMax(_)
+                | Self::EmergencyStop
+                | Self::DriveFault
+                | Self::Probe
+                | Self::SerialRx
         )
     }
 }
@@ -244,6 +252,7 @@ impl core::fmt::Display for Role {
             Self::LimitMax(axis) => write!(f, "{axis:?} limit, upper end"),
             Self::EmergencyStop => f.write_str("emergency stop"),
             Self::DriveFault => f.write_str("drive fault"),
+            Self::Probe => f.write_str("probe"),
             Self::StatusLed => f.write_str("status LED"),
             Self::SerialTx => f.write_str("serial, to the host"),
             Self::SerialRx => f.write_str("serial, from the host"),

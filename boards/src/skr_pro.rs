@@ -10,6 +10,7 @@
 //!   with normally closed switches, it is lit when the limit is reached. The sockets E0, E1, E2 take the upper ends.
 //! - Emergency stop and drive fault are on the header EXTENSION-1, which nothing else uses: PC9 is next to ground, so that a
 //!   two-pole plug fits. The header has no filter; the chip's pull-up (40 kOhm) holds the line.
+//! - The probe is on EXP1, whose pin 2 is ground: its port is one that each tick reads anyway.
 //! - USART1 is on the TFT socket, at 3.3 V. USB goes to the OTG port, which this firmware does not use.
 //! - The LED D13 is connected to PA7 through 1 kOhm and is lit while the pin is high.
 //! - Heaters and fans are switched by MOSFETs whose inputs are active high, the enable inputs of the other three drivers are active low: all are
@@ -22,7 +23,7 @@ use crate::{
     Line, Package,
     Port::{A, B, C, D, E, F, G},
     Role::{
-        Direction, DriveFault, EmergencyStop, Enable, LimitMax, LimitMin, Parked, SerialRx, SerialTx,
+        Direction, DriveFault, EmergencyStop, Enable, LimitMax, LimitMin, Parked, Probe, SerialRx, SerialTx,
         StatusLed, Step,
     },
 };
@@ -57,6 +58,7 @@ pub const SKR_PRO: Board = Board {
         Line::new(LimitMax(Z), G, 5, High, "endstop socket E2"),
         Line::new(EmergencyStop, C, 9, High, "EXTENSION-1, beside GND"),
         Line::new(DriveFault, C, 4, High, "EXTENSION-1, fourth of GND's row"),
+        Line::new(Probe, G, 2, High, "EXP1, pin 6"),
         Line::new(StatusLed, A, 7, High, "LED D13 on the board"),
         Line::new(SerialTx, A, 9, High, "TFT socket, TX1"),
         Line::new(SerialRx, A, 10, High, "TFT socket, RX1"),

@@ -11,7 +11,8 @@ use crate::{
     Line, Package,
     Port::{A, B, C},
     Role::{
-        Direction, DriveFault, EmergencyStop, Enable, LimitMax, LimitMin, SerialRx, SerialTx, StatusLed, Step,
+        Direction, DriveFault, EmergencyStop, Enable, LimitMax, LimitMin, Probe, SerialRx, SerialTx,
+        StatusLed, Step,
     },
 };
 
@@ -45,6 +46,7 @@ pub const STM32F405: Board = Board {
         Line::new(LimitMax(Z), B, 9, High, "the pin"),
         Line::new(EmergencyStop, B, 10, High, "the pin"),
         Line::new(DriveFault, B, 11, High, "the pin"),
+        Line::new(Probe, C, 4, High, "the pin"),
         Line::new(StatusLed, C, 12, Low, "LED of the STM32-H405"),
         Line::new(SerialTx, A, 9, High, "the pin"),
         Line::new(SerialRx, A, 10, High, "the pin"),

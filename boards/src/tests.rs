@@ -36,6 +36,7 @@ fn roles() -> Vec<Role> {
     roles.extend([
         Role::EmergencyStop,
         Role::DriveFault,
+        Role::Probe,
         Role::StatusLed,
         Role::SerialTx,
         Role::SerialRx,
@@ -94,7 +95,7 @@ fn steps_are_on_one_port() {
 #[test]
 fn inputs_fail_to_the_safe_side() {
     for board in BOARDS {
-        assert_eq!(inputs(board).count(), 8);
+        assert_eq!(inputs(board).count(), 9);
         for line in inputs(board) {
             assert_eq!(line.active, Level::High, "{}: {}", board.id, line.role);
             assert!(line.is_active(line.pin.bit()) && !line.is_active(!line.pin.bit()));

@@ -8,7 +8,7 @@ use interp_core::{
     job::{Header, STORE_WORDS, stream::RecordCopy},
     steps::{BUFFER_WORDS, CheckedSteps, StepConfig},
 };
-use protocol::message::{Description, InputLines, Profile, Reason, Status};
+use protocol::message::{Description, InputLines, MotionStatus, Offsets, Profile, Reason, Status};
 
 use crate::{
     link::Link,
@@ -96,6 +96,18 @@ impl<const WORDS: usize> Machine for Half<WORDS> {
         self.settings.keep(profile)
     }
 
+    fn motion(&mut self) -> MotionStatus {
+        self.real_time.motion()
+    }
+
+    fn offsets(&mut self) -> Offsets {
+        self.settings.offsets()
+    }
+
+    fn keep_offsets(&mut self, offsets: &Offsets) -> Result<(), StorageError> {
+        self.settings.keep_offsets(offsets)
+    }
+
     fn own_steps(&mut self) -> StepConfig {
         StepConfig::DEFAULT
     }
@@ -140,6 +152,7 @@ pub struct Board<const WORDS: usize = STORE_WORDS> {
     half: Half<WORDS>,
     link: Link,
     sent: Vec<u8>,
+    carriages: [i32; 3],
 }
 
 impl<const WORDS: usize> Default for Board<WORDS> {
@@ -169,6 +182,7 @@ impl<const WORDS: usize> Board<WORDS> {
             half,
             link,
             sent: Vec::new(),
+            carriages: [0; 3],
         }
     }
 
@@ -212,13 +226,36 @@ impl<const WORDS: usize> Board<WORDS> {
         };
         self.half.real_time.tick(input, &mut events);
         if self.half.real_time.steps().is_some() {
-            self.half.real_time.pulses(&mut [0; BUFFER_WORDS]);
+            let mut slots = [0; BUFFER_WORDS];
+            self.half.real_time.pulses(&mut slots);
+            self.count(&slots);
         }
         let sent = &mut self.sent;
         for event in events {
             self.link
                 .event(&event, &mut |bytes| sent.extend_from_slice(bytes));
         }
+    }
+
+    /// Adds the pulses of a period to the carriages, with pins 0 to 2 as the axes' step pins.
+    fn count(&mut self, slots: &[u32; BUFFER_WORDS]) {
+        let minus = self.half.real_time.directions();
+        for (axis, carriage) in self.carriages.iter_mut().enumerate() {
+            let is_high = |word: &u32| word >> axis & 1 != 0;
+            let begins = slots.iter().zip(slots.iter().skip(1));
+            let pulses = begins
+                .filter(|(before, after)| !is_high(before) && is_high(after))
+                .count()
+                + usize::from(slots.first().is_some_and(is_high));
+            let pulses = i32::try_from(pulses).unwrap_or(i32::MAX);
+            *carriage += if minus >> axis & 1 != 0 { -pulses } else { pulses };
+        }
+    }
+
+    /// Steps that the drives have received, once the pulses computed so far are over: those of the last tick two ticks later.
+    #[must_use]
+    pub const fn carriages(&self) -> [i32; 3] {
+        self.carriages
     }
 
     /// Sets the board's inputs directly, not over the line.

@@ -32,6 +32,7 @@ mod history;
 pub mod in_process;
 pub mod link;
 pub mod machine;
+pub mod manual;
 pub mod ram_flash;
 pub mod realtime;
 pub mod safety;

@@ -7,7 +7,8 @@ use interp_core::{
     steps::{CheckedSteps, StepConfig},
 };
 use protocol::message::{
-    CHUNK_WORDS_MAX, Clock, Description, InputLines, PassDigest, Profile, Reason, Report, Status,
+    CHUNK_WORDS_MAX, Clock, Description, InputLines, MotionStatus, Offsets, PassDigest, Profile, Reason,
+    Report, Status,
 };
 
 use crate::{safety::Order, storage::StorageError};
@@ -139,6 +140,18 @@ pub trait Machine {
     /// # Errors
     /// The storage cannot be written: the profile is as before.
     fn keep_profile(&mut self, profile: Option<&Profile>) -> Result<(), StorageError>;
+
+    /// [`crate::realtime::RealTime::motion`].
+    fn motion(&mut self) -> MotionStatus;
+
+    /// Work offsets and tool length.
+    fn offsets(&mut self) -> Offsets;
+
+    /// Keeps work offsets and tool length beyond a power cut.
+    ///
+    /// # Errors
+    /// The storage cannot be written: they are as before.
+    fn keep_offsets(&mut self, offsets: &Offsets) -> Result<(), StorageError>;
 
     /// The board's own settings of the drives: those of a job that has none, on a board without a profile.
     fn own_steps(&mut self) -> StepConfig;

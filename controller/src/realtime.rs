@@ -153,6 +153,8 @@ impl<S: AsRef<[i32]> + AsMut<[i32]>> RealTime<S> {
         }
         let to = if moves(sample.state) {
             sample.cl_nm
+        } else if core::mem::take(&mut self.control.manual.emits) {
+            self.control.manual.at_nm()
         } else {
             steps.target_nm()
         };
@@ -195,7 +197,7 @@ impl<S: AsRef<[i32]> + AsMut<[i32]>> RealTime<S> {
         if self.control.clock == Clock::Lockstep && !self.may_step(events) {
             return;
         }
-        self.step(was_under_way, events);
+        self.step(was_under_way, input.lines, events);
     }
 
     /// A missed tick, or one with more cycles than before or than the budget.
@@ -232,8 +234,12 @@ impl<S: AsRef<[i32]> + AsMut<[i32]>> RealTime<S> {
             Some(Stop::Controlled(fault)) => self.interpolator.controlled_stop(fault),
             None => {}
         }
+        let steady = self.control.safety.status().lines;
         if !self.control.safety.drives_on() {
-            self.lose_position();
+            self.control.manual.drives_are_off(steady);
+            if !self.control.safety.status().homed {
+                self.lose_position();
+            }
         }
         // Reported here, because in lockstep a further period that would report it may never come.
         if under_way && !self.interpolator.state().is_under_way() {
@@ -310,7 +316,10 @@ impl<S: AsRef<[i32]> + AsMut<[i32]>> RealTime<S> {
 
     /// Executes one period.
     #[inline]
-    fn step(&mut self, was_under_way: bool, events: &mut impl Events) {
+    fn step(&mut self, was_under_way: bool, lines: InputLines, events: &mut impl Events) {
+        if !was_under_way && self.control.manual.is_active() {
+            self.move_manually(lines);
+        }
         let mut command = self.control.command.take();
         let starts = command == Some(Command::Start);
         if starts && Command::Start.is_allowed(self.interpolator.state()) {
@@ -462,6 +471,7 @@ impl<S: AsRef<[i32]> + AsMut<[i32]>> RealTime<S> {
     /// Reports a sign of life of the host.
     pub const fn heard(&mut self) {
         self.control.safety.heard();
+        self.control.manual.heard();
     }
 
     /// Whether the drives are enabled. Applied after each tick, so that they are off in the tick that detects the cause.

@@ -13,10 +13,11 @@
 //! run starts while a switch is asserted.
 //! **Drives.** Off after power-up; on only by an order of the host, and never while emergency stop or drive fault is asserted or latched.
 //! Emergency stop and drive fault switch them off; the host can switch them off except during a run.
-//! **Home.** There are no encoders and no homing moves: the operator places the axes, switches the drives on, and
-//! declares their position. Without drives the axes may move, so every switch-off of the drives clears the home.
+//! **Home.** There are no encoders: the axes are homed by their switches ([`crate::manual`]), or the operator places them, switches the drives on, and
+//! declares their position. Without drives the axes may move, so every switch-off of the drives clears the home, unless the profile says that it survives.
 //! **Cost.** A tick with unchanged inputs takes one comparison and one count (`is_unchanged`).
 
+use crate::manual::{Motion, Setup};
 use interp_core::{
     fault::{Fault, FaultKind},
     sample::State,
@@ -35,8 +36,12 @@ const UNSETTLED: u32 = u32::MAX;
 
 /// The host's orders for drives and home. Executed at once, under the lock of the real-time half, so that no tick comes between
 /// check and execution.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Order {
+    /// The profile's part for motion outside a job.
+    SetUp(Option<Setup>),
+    /// Motion outside a job.
+    Move(Motion),
     /// Configuration of the machine.
     Configure(Configuration),
     /// Drives on or off.
@@ -62,7 +67,7 @@ pub(crate) enum Stop {
     Controlled(Fault),
 }
 
-/// Eleven two-bit vertical counters: bit n of both words is the count of input n.
+/// Twelve two-bit vertical counters: bit n of both words is the count of input n.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 struct Debounce {
     steady: u16,
@@ -106,6 +111,9 @@ pub(crate) struct Safety {
     ticks_to_timeout: u32,
     status: SafetyStatus,
     debounce: Debounce,
+    /// Inputs whose level means the opposite.
+    inverted: InputLines,
+    home_survives_off: bool,
     home_nm: [i32; 3],
     /// Whether the end of a run is still to be reported.
     pub(crate) ending: bool,
@@ -117,6 +125,8 @@ impl Safety {
         ticks_to_timeout: u32::MAX,
         status: SafetyStatus::DEFAULT,
         debounce: Debounce::NEW,
+        inverted: InputLines::NONE,
+        home_survives_off: false,
         home_nm: [0; 3],
         ending: false,
     };
@@ -152,7 +162,7 @@ impl Safety {
 
     /// Processes the inputs of a tick for which [`Self::is_unchanged`] was false; returns how they stop a run under way.
     pub(crate) fn watch(&mut self, lines: InputLines, under_way: bool) -> Option<Stop> {
-        let raw = lines.and(InputLines::ALL);
+        let raw = self.raw(lines);
         self.debounce.assert(raw.and(InputLines::EMERGENCY_STOP).0);
         self.debounce.push(raw.0);
         let steady = InputLines(self.debounce.steady);
@@ -175,6 +185,38 @@ impl Safety {
                 Stop::Uncontrolled(fault)
             }
         })
+    }
+
+    /// The asserted inputs, as read.
+    pub(crate) const fn raw(&self, lines: InputLines) -> InputLines {
+        InputLines(lines.0 ^ self.inverted.0).and(InputLines::ALL)
+    }
+
+    /// Puts the profile's part in force: the meaning of the probe's level, and whether the home survives drives that are off.
+    pub(crate) fn set_up(&mut self, setup: Option<&Setup>) {
+        self.home_survives_off = setup.is_some_and(Setup::home_survives_off);
+        self.inverted = if setup.is_some_and(Setup::probe_is_inverted) {
+            InputLines::PROBE
+        } else {
+            InputLines::NONE
+        };
+        self.recheck();
+    }
+
+    /// The axes are homed here, or the position is lost.
+    pub(crate) fn set_homed(&mut self, home_nm: Option<[i32; 3]>) {
+        self.status.homed = home_nm.is_some();
+        self.home_nm = home_nm.unwrap_or(self.home_nm);
+    }
+
+    /// Whether the axes may be moved.
+    pub(crate) fn may_move(&self) -> Result<(), Reason> {
+        may_drive(&self.status)?;
+        if self.status.drives_on {
+            Ok(())
+        } else {
+            Err(Reason::DrivesOff)
+        }
     }
 
     /// Forces a call of [`Self::watch`] in the next tick.
@@ -238,7 +280,7 @@ impl Safety {
             }
             Order::Drives { on: false } => {
                 self.status.drives_on = false;
-                self.status.homed = false;
+                self.status.homed &= self.home_survives_off;
             }
             Order::Drives { on: true } => {
                 may_drive(&self.status)?;
@@ -252,6 +294,8 @@ impl Safety {
                 self.home_nm = home_nm;
                 self.status.homed = true;
             }
+            Order::SetUp(_) => {}
+            Order::Move(_) => self.may_move()?,
         }
         Ok(())
     }

@@ -10,8 +10,8 @@ use interp_core::{
 use protocol::{
     frame::{DELIMITER, FRAME_MAX, Frame, write_reply},
     message::{
-        Capabilities, Clock, Configuration, Excess, NO_NUMBER, OVERRIDE_MAX_PERCENT, Profile, ProfileLimit,
-        Reason, Reply, Request, Status, StepSettings, next_number, read_request,
+        Activity, Capabilities, Clock, Configuration, Excess, NO_NUMBER, OVERRIDE_MAX_PERCENT, Offsets,
+        Profile, ProfileLimit, Reason, Reply, Request, Status, StepSettings, next_number, read_request,
     },
     version::PROTOCOL_VERSION,
 };
@@ -19,13 +19,15 @@ use protocol::{
 use crate::{
     history::History,
     machine::{Busy, Instruction, Machine},
+    manual::{Motion, Setup},
     safety::Order,
     storage::StorageError,
     upload::Upload,
 };
 
-/// Maximum length of an answer stored for a retransmission, bytes: a frame of `Status` with every varint at its maximum length. That of a `Profile` is shorter.
-const ANSWER_MAX: usize = 146;
+/// Maximum length of an answer stored for a retransmission, bytes: a frame of a `Profile` with every varint at its maximum length. That of a
+/// `Status` is shorter.
+const ANSWER_MAX: usize = 185;
 
 /// State of the session.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -125,6 +127,11 @@ impl Session {
         self.profile = profile.map_or(0, |profile| profile.digest());
         let configuration = profile.map_or(Configuration::DEFAULT, |profile| profile.configuration);
         machine.order(Order::Configure(configuration))?;
+        #[allow(clippy::cast_precision_loss, reason = "a period is below 2^24 us")]
+        let period_s = machine.description().period_us as f32 * 1e-6;
+        machine.order(Order::SetUp(
+            profile.map(|profile| Setup::new(&profile, period_s)),
+        ))?;
         let own = own_steps(machine);
         self.set_steps(machine, own)
     }
@@ -144,6 +151,20 @@ impl Session {
         self.is_outdated = true;
         self.upload = None;
         self.enforce_profile(machine)
+    }
+
+    /// Keeps other work offsets. The job loaded was placed by those before.
+    fn set_offsets(&mut self, machine: &mut impl Machine, offsets: &Offsets) -> Result<(), Reason> {
+        let state = machine.status().state;
+        if state.is_under_way() {
+            return Err(Reason::WrongState { state });
+        }
+        machine
+            .keep_offsets(offsets)
+            .map_err(|StorageError| Reason::Storage)?;
+        self.is_outdated = true;
+        self.upload = None;
+        Ok(())
     }
 
     pub(crate) const fn is_open(&self) -> bool {
@@ -296,7 +317,34 @@ impl Session {
                     profile: machine.profile(),
                 };
             }
+            Request::Motion => {
+                return Reply::Motion {
+                    number,
+                    motion: machine.motion(),
+                };
+            }
+            Request::Offsets => {
+                return Reply::Offsets {
+                    number,
+                    offsets: machine.offsets(),
+                };
+            }
+            _ if needs_rest(&request) && machine.motion().activity != Activity::Rest => Err(Reason::Moving),
             Request::SetProfile(profile) => self.set_profile(machine, profile.as_ref()),
+            Request::SetOffsets(offsets) => self.set_offsets(machine, &offsets),
+            Request::Jog {
+                axis,
+                way,
+                speed_mm_s,
+            } => machine.order(Order::Move(Motion::Jog {
+                axis,
+                way,
+                speed_mm_s,
+            })),
+            Request::Probe { axis, nm, speed_mm_s } => {
+                machine.order(Order::Move(Motion::Probe { axis, nm, speed_mm_s }))
+            }
+            Request::Home { axes } => machine.order(Order::Move(Motion::Home { axes })),
             Request::JobBegin {
                 header,
                 words,
@@ -386,6 +434,10 @@ impl Session {
 
     /// Queues a command if the state permits it.
     fn operate(&mut self, machine: &mut impl Machine, command: Command) -> Result<(), Reason> {
+        let ends = matches!(command, Command::Hold | Command::Stop | Command::Abort);
+        if ends && machine.motion().activity != Activity::Rest {
+            return machine.order(Order::Move(Motion::Stop));
+        }
         let state = machine.status().state;
         if !command.is_allowed(state) {
             return Err(Reason::WrongState { state });
@@ -411,6 +463,19 @@ impl Session {
         self.clock = clock;
         Ok(())
     }
+}
+
+/// Whether the axes must not move outside a job while the request is carried out.
+const fn needs_rest(request: &Request) -> bool {
+    matches!(
+        request,
+        Request::JobBegin { .. }
+            | Request::Start
+            | Request::Clock(_)
+            | Request::StepConfig(_)
+            | Request::SetProfile(_)
+            | Request::SetOffsets(_)
+    )
 }
 
 /// The settings of the drives of a job that has none: the profile's, or the board's own.
@@ -493,7 +558,7 @@ mod tests {
     use protocol::message::{FaultReport, InputLines, Report, SafetyStatus, StreamStatus};
 
     #[test]
-    fn the_longest_status_is_kept() {
+    fn the_longest_answers_are_kept() {
         let place = SpanParameter {
             span: u16::MAX,
             fraction: u64::MAX,
@@ -546,6 +611,40 @@ mod tests {
                 status,
             },
         );
+        assert!(!last.answer.is_empty() && last.answer.len() < ANSWER_MAX);
+        let axis = interp_core::steps::AxisSteps {
+            steps: u32::MAX,
+            mm: u32::MAX,
+            inverted: true,
+        };
+        let steps = StepConfig {
+            axes: [axis; 3],
+            pulse_slots: u8::MAX,
+            setup_slots: u16::MAX,
+        };
+        let profile = Profile {
+            steps: steps.into(),
+            velocity_mm_s: [1.0; 3],
+            acceleration_mm_s2: [1.0; 3],
+            jerk_mm_s3: [1.0; 3],
+            travel_nm: Some([[i32::MIN, i32::MAX]; 3]),
+            configuration: status.safety.configuration,
+            homing: Some(protocol::message::Homing {
+                order: [2, 1, 0],
+                at_upper_end: [true; 3],
+                position_nm: [i32::MIN; 3],
+                seek_mm_s: [1.0; 3],
+                approach_mm_s: [1.0; 3],
+                back_off_nm: [i32::MAX; 3],
+                survives_off: true,
+            }),
+            probe_inverted: true,
+        };
+        let longest = Reply::Profile {
+            number: u16::MAX,
+            profile: Some(profile),
+        };
+        last.set(u16::MAX, &Frame { payload: &[], crc: 0 }, &longest);
         assert_eq!(last.answer.len(), ANSWER_MAX);
     }
 }

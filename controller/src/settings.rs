@@ -1,7 +1,7 @@
-//! The machine's profile, kept beyond a power cut.
+//! The machine's profile, work offsets and tool length, kept beyond a power cut.
 
 use embedded_storage::nor_flash::NorFlash;
-use protocol::message::{PROFILE_BYTES_MAX, Profile};
+use protocol::message::{OFFSETS_BYTES_MAX, Offsets, PROFILE_BYTES_MAX, Profile};
 
 use crate::storage::{Kind, Storage, StorageError};
 
@@ -10,6 +10,7 @@ use crate::storage::{Kind, Storage, StorageError};
 pub struct Settings<F> {
     storage: Storage<F>,
     profile: Option<Profile>,
+    offsets: Offsets,
 }
 
 impl<F: NorFlash> Settings<F> {
@@ -19,7 +20,14 @@ impl<F: NorFlash> Settings<F> {
         let profile = storage
             .newest(Kind::Profile)
             .and_then(|payload| Profile::read(payload.bytes()));
-        Self { storage, profile }
+        let offsets = storage
+            .newest(Kind::Offsets)
+            .and_then(|payload| Offsets::read(payload.bytes()));
+        Self {
+            storage,
+            profile,
+            offsets: offsets.unwrap_or(Offsets::NONE),
+        }
     }
 
     /// The flash.
@@ -31,6 +39,23 @@ impl<F: NorFlash> Settings<F> {
     #[must_use]
     pub const fn profile(&self) -> Option<Profile> {
         self.profile
+    }
+
+    /// Work offsets and tool length.
+    #[must_use]
+    pub const fn offsets(&self) -> Offsets {
+        self.offsets
+    }
+
+    /// Keeps work offsets and tool length.
+    ///
+    /// # Errors
+    /// The flash cannot be written: they are as before.
+    pub fn keep_offsets(&mut self, offsets: &Offsets) -> Result<(), StorageError> {
+        let mut bytes = [0; OFFSETS_BYTES_MAX];
+        self.storage.keep(Kind::Offsets, offsets.write(&mut bytes))?;
+        self.offsets = *offsets;
+        Ok(())
     }
 
     /// Keeps a profile; none: forgets it.

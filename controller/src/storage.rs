@@ -37,11 +37,13 @@ pub enum Kind {
     SpareErased = 0,
     /// The machine's profile; an empty payload: none.
     Profile = 1,
+    /// Work offsets and tool length.
+    Offsets = 2,
 }
 
 impl Kind {
     /// The kinds whose newest record is in force.
-    const KEPT: [Self; 1] = [Self::Profile];
+    const KEPT: [Self; 2] = [Self::Profile, Self::Offsets];
 }
 
 /// Flash could not be written: what was kept before is still kept.

@@ -14,7 +14,7 @@ use interp_core::{
     job::{Header, stream::RecordCopy},
     steps::{CheckedSteps, StepConfig},
 };
-use protocol::message::{Description, InputLines, Profile, Reason, Status};
+use protocol::message::{Description, InputLines, MotionStatus, Offsets, Profile, Reason, Status};
 use rtic::Mutex;
 
 use crate::{
@@ -93,6 +93,18 @@ impl<M: Mutex<T = BoardRealTime>> Machine for GuardedMachine<'_, M> {
 
     fn keep_profile(&mut self, profile: Option<&Profile>) -> Result<(), StorageError> {
         self.settings.keep(profile)
+    }
+
+    fn motion(&mut self) -> MotionStatus {
+        self.real_time.lock(|real_time| real_time.motion())
+    }
+
+    fn offsets(&mut self) -> Offsets {
+        self.settings.offsets()
+    }
+
+    fn keep_offsets(&mut self, offsets: &Offsets) -> Result<(), StorageError> {
+        self.settings.keep_offsets(offsets)
     }
 
     fn own_steps(&mut self) -> StepConfig {

@@ -28,6 +28,7 @@
 //! | `pass` | along a pass, and from pass to pass |
 //! | `feed` | the feed within the limits of the axes |
 //! | `sequence` | approach, passes, links and retract on a machine with limits |
+//! | `positioning` | moves of one axis outside a job |
 //! | `steps` | from positions to step pulses |
 //!
 //! A folder uses those above it only, and `steps` none but `math`; `tests/folders.rs` holds it.
@@ -74,6 +75,7 @@ pub mod interpolator;
 pub mod job;
 mod math;
 mod pass;
+pub mod positioning;
 pub mod sample;
 mod sequence;
 pub mod steps;

@@ -19,7 +19,8 @@
 //! | `Clock`, `Report`, `StepConfig` | → ← | `Ack` or `Nak` |
 //! | `Start`, `Hold`, `Resume`, `Stop`, `Abort`, `Override` | → ← | `Ack` or `Nak` |
 //! | `Configure`, `Drives`, `SetHome`, `Acknowledge`, `SetProfile` | → ← | `Ack` or `Nak` |
-//! | `Profile` | → ← | `Profile` |
+//! | `Profile`, `Offsets`, `Motion` | → ← | the same |
+//! | `Jog`, `Home`, `Probe`, `SetOffsets` | → ← | `Ack` or `Nak` |
 //! | `Run` | → ← | `Ack` or `Nak`, later `Halted` |
 //! | `Status` | → ← | `Status` |
 //! | `Repeat` | → ← | events again, then `Ack`; or `Nak` |
@@ -56,6 +57,11 @@
 //! | a profile that cannot be kept | `Nak`, `Storage` | |
 //! | a start of a job that was loaded under another profile | `Nak`, `OtherProfile` | |
 //! | a start of a job without axis limits, on a board with drives that has to be homed | `Nak`, `NoLimits` | |
+//! | a start, an order or settings while the axes move outside a job | `Nak`, `Moving` | |
+//! | a jog, homing or probe move on a board without a profile | `Nak`, `NoProfile` | |
+//! | a jog or probe move beyond the travel | `Nak`, `BeyondTravel` with the range | |
+//! | homing without its section in the profile | `Nak`, `NoHoming` | |
+//! | a probe move while the probe is tripped | `Nak`, `ProbeTripped` | |
 //! | a start of a streamed job whose first rows were overwritten | `Nak`, `RowsGone` | |
 //! | a `Repeat` of an event that is not kept any more | `Nak`, `EventGone` with the first that is | |
 //!
@@ -88,6 +94,7 @@ mod codes;
 pub mod digest;
 pub mod frame;
 mod frame_error;
+mod manual;
 pub mod message;
 mod profile;
 mod reason;

@@ -46,6 +46,12 @@
 //! | 20 | `Repeat` | event `u32`, count `u8` | these events again, then `Ack` |
 //! | 21 | `Profile` | | `Profile` |
 //! | 22 | `SetProfile` | option of the fields of [`Profile`] | `Ack`, and it holds, also after a power cut |
+//! | 23 | `Jog` | axis (a byte, from 0), way ([`JogWay`]), speed (mm/s, `f32`) | as `Configure`; a continuous one stops along its ramp when it is not repeated |
+//! | 24 | `Home` | axes (a byte, one bit each) | as `Configure` |
+//! | 25 | `Probe` | axis (a byte), distance (nm, `i32`), speed (mm/s, `f32`) | as `Configure` |
+//! | 26 | `Motion` | | `Motion` |
+//! | 27 | `Offsets` | | `Offsets` |
+//! | 28 | `SetOffsets` | the fields of [`Offsets`] | `Ack`, and it holds, also after a power cut |
 //!
 //! Header: kind, pattern, spacing, tool side (a byte each), spans along path and side (`u16`), ball radius (mm), feed (mm/s),
 //! scallop height (mm), period (s) (`f32`), window of a streamed job (rows, `u16`; 0 for another one); then 0, or 1 and the axes' limits: velocity (mm/s), acceleration (mm/s^2), jerk (mm/s^3)
@@ -66,7 +72,9 @@
 //! | 5 | `PassDigest` | event `u32`, the fields of [`PassDigest`] |
 //! | 6 | `Halted` | the fields of [`Status`], with the event in `events` |
 //! | 7 | `Profile` | number, option of the fields of [`Profile`]; an answer like the first four |
-//! | 8 | `Room` | event `u32`, words up to which there is room `u32` |
+//! | 8 | `Motion` | number, the fields of [`MotionStatus`]; an answer |
+//! | 9 | `Offsets` | number, the fields of [`Offsets`]; an answer |
+//! | 10 | `Room` | event `u32`, words up to which there is room `u32` |
 //!
 //! A parameter is its span (`u16`) and fraction. `Halted` comes when the ticks of a `Run` are used up, or when a run ends
 //! (finished, faulted, aborted), whichever is first.
@@ -99,6 +107,9 @@
 use interp_core::{command::Command, job::Header};
 use serde::{Deserialize, Serialize};
 
+pub use crate::manual::{
+    Activity, Homing, JogWay, MotionEnd, MotionStatus, OFFSETS_BYTES_MAX, Offsets, WORK_OFFSETS,
+};
 pub use crate::profile::{Excess, PROFILE_BYTES_MAX, Profile, ProfileLimit};
 pub use crate::reason::Reason;
 pub use crate::records::{
@@ -217,6 +228,36 @@ pub enum Request {
     Profile,
     /// Keeps a profile beyond a power cut; none: forgets it. In force at once; the job has to be loaded again. Refused while a run is under way.
     SetProfile(Option<Profile>),
+    /// Moves an axis outside a job, within the profile's limits, and within its travel once homed. Another one of the same axis and way keeps a continuous
+    /// jog going. `Hold`, `Stop` and `Abort` end it along its ramp.
+    Jog {
+        /// The axis, from 0.
+        axis: u8,
+        /// How far.
+        way: JogWay,
+        /// Speed, mm/s; the profile's velocity bounds it.
+        speed_mm_s: f32,
+    },
+    /// Homes axes by their switches, in the profile's order. Ends along the ramp when the host is not heard any more.
+    Home {
+        /// One bit each; none: all.
+        axes: u8,
+    },
+    /// Moves an axis until the probe trips, at most by a distance.
+    Probe {
+        /// The axis, from 0.
+        axis: u8,
+        /// Greatest distance, nm; negative towards minus.
+        nm: i32,
+        /// Speed, mm/s.
+        speed_mm_s: f32,
+    },
+    /// Asks for the axes' position and motion outside a job.
+    Motion,
+    /// Asks for work offsets and tool length.
+    Offsets,
+    /// Keeps work offsets and tool length beyond a power cut; the job has to be loaded again. Refused while a run is under way.
+    SetOffsets(Offsets),
 }
 
 impl From<Command> for Request {
@@ -326,6 +367,20 @@ pub enum Reply {
         number: u16,
         /// The profile; none where the board keeps none.
         profile: Option<Profile>,
+    },
+    /// Answer to `Motion`.
+    Motion {
+        /// Number of the request.
+        number: u16,
+        /// The axes outside a job.
+        motion: MotionStatus,
+    },
+    /// Answer to `Offsets`.
+    Offsets {
+        /// Number of the request.
+        number: u16,
+        /// Work offsets and tool length.
+        offsets: Offsets,
     },
     /// A streamed job: there is room for further words.
     Room {

@@ -3,10 +3,10 @@
 use interp_core::{AxisLimits, steps::StepConfig};
 use serde::{Deserialize, Serialize};
 
-use crate::{frame, records::StepSettings, safety::Configuration};
+use crate::{frame, manual::Homing, records::StepSettings, safety::Configuration};
 
 /// Longest encoding of a [`Profile`], bytes: every varint at its maximum length.
-pub const PROFILE_BYTES_MAX: usize = 111;
+pub const PROFILE_BYTES_MAX: usize = 174;
 
 /// Greatest axis limit that a profile may have, in mm and seconds: far above any machine, and within `f32` whatever is computed of it.
 const LIMIT_MAX: f32 = 1e9;
@@ -27,6 +27,10 @@ pub struct Profile {
     pub travel_nm: Option<[[i32; 2]; 3]>,
     /// Homing and link timeout.
     pub configuration: Configuration,
+    /// Homing by the limit switches; none where a position is declared.
+    pub homing: Option<Homing>,
+    /// The probe is tripped where its input is not asserted: a contact that closes when it touches.
+    pub probe_inverted: bool,
 }
 
 /// A value of a profile that a job may not exceed. The codes on the wire count from 0 in this order.
@@ -124,6 +128,10 @@ impl Profile {
         limits.iter().flatten().all(is_limit)
             && self.travel_nm.is_none_or(ascends)
             && StepConfig::from(self.steps).check().is_ok()
+            // The search for a switch ends with the travel.
+            && self
+                .homing
+                .is_none_or(|homing| self.travel_nm.is_some() && homing.is_valid(self.velocity_mm_s))
     }
 
     /// The first limit that a job's axes exceed, if any.
@@ -182,6 +190,8 @@ mod tests {
         jerk_mm_s3: [20_000.0; 3],
         travel_nm: Some([[-1_000_000, 300_000_000], [0, 200_000_000], [-100_000_000, 0]]),
         configuration: Configuration::DEFAULT,
+        homing: None,
+        probe_inverted: false,
     };
 
     fn axes() -> AxisLimits {
@@ -278,6 +288,15 @@ mod tests {
                 link_timeout_ticks: u32::MAX,
                 ..Configuration::DEFAULT
             },
+            homing: Some(Homing {
+                order: [2, 1, 0],
+                at_upper_end: [true; 3],
+                position_nm: [i32::MIN; 3],
+                seek_mm_s: [1.0; 3],
+                approach_mm_s: [1.0; 3],
+                back_off_nm: [i32::MAX; 3],
+                survives_off: true,
+            }),
             ..PROFILE
         };
         let mut buffer = [0; PROFILE_BYTES_MAX];

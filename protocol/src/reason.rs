@@ -131,7 +131,24 @@ pub enum Reason {
     OtherProfile,
     /// 24: a job without axis limits, on a board with drives: it would begin with a jump of the position and without a ramp.
     NoLimits,
-    /// 25: a start of a streamed job whose first rows were overwritten: it has to be loaded again.
+    /// 25: the axes move outside a job.
+    Moving,
+    /// 26: the board keeps no profile, and so knows no limits to move an axis within.
+    NoProfile,
+    /// 27: a jog or probe move would leave the travel.
+    BeyondTravel {
+        /// The axis, from 0.
+        axis: u8,
+        /// The travel, nm.
+        travel_nm: [i32; 2],
+        /// The requested position, nm; at the end of the range where it is beyond that of an `i32`.
+        wanted_nm: i32,
+    },
+    /// 28: the profile describes no homing by switches.
+    NoHoming,
+    /// 29: the probe is tripped before the probe move.
+    ProbeTripped,
+    /// 30: a start of a streamed job whose first rows were overwritten: it has to be loaded again.
     RowsGone,
 }
 
@@ -165,7 +182,12 @@ impl Reason {
             Self::Storage => 22,
             Self::OtherProfile => 23,
             Self::NoLimits => 24,
-            Self::RowsGone => 25,
+            Self::Moving => 25,
+            Self::NoProfile => 26,
+            Self::BeyondTravel { .. } => 27,
+            Self::NoHoming => 28,
+            Self::ProbeTripped => 29,
+            Self::RowsGone => 30,
         }
     }
 
@@ -194,10 +216,10 @@ fn unsafe_because(fault: FaultReport, formatter: &mut fmt::Formatter<'_>) -> fmt
     Ok(())
 }
 
-/// A position of the axes in millimetres, with nanometre resolution.
-struct Mm([i32; 3]);
+/// Positions in millimetres, with nanometre resolution.
+struct Mm<const N: usize>([i32; N]);
 
-impl fmt::Display for Mm {
+impl<const N: usize> fmt::Display for Mm<N> {
     fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
         for (axis, nm) in self.0.into_iter().enumerate() {
             let separator = if axis == 0 { "" } else { ", " };
@@ -223,6 +245,23 @@ fn not_at_home(
             "and nobody knows where the axes stand since a run without limits"
         ),
     }
+}
+
+/// The position that is outside the travel.
+fn beyond_travel(
+    axis: u8,
+    [least, most]: [i32; 2],
+    wanted_nm: i32,
+    formatter: &mut fmt::Formatter<'_>,
+) -> fmt::Result {
+    let axis = ["x", "y", "z"].get(usize::from(axis)).copied().unwrap_or("?");
+    write!(
+        formatter,
+        "{axis} = {} mm is outside its travel of {} to {} mm",
+        Mm([wanted_nm]),
+        Mm([least]),
+        Mm([most])
+    )
 }
 
 /// What of a job exceeds the profile.
@@ -299,6 +338,18 @@ impl fmt::Display for Reason {
                 formatter,
                 "the job has no axis limits, and the board has drives: they would jump to its first point"
             ),
+            Self::Moving => write!(formatter, "the axes move outside a job"),
+            Self::NoProfile => write!(
+                formatter,
+                "the board keeps no machine profile, so it knows no limits to move the axes within"
+            ),
+            Self::BeyondTravel {
+                axis,
+                travel_nm,
+                wanted_nm,
+            } => beyond_travel(axis, travel_nm, wanted_nm, formatter),
+            Self::NoHoming => write!(formatter, "the machine's profile describes no homing by switches"),
+            Self::ProbeTripped => write!(formatter, "the probe is tripped before it moves"),
             Self::RowsGone => write!(
                 formatter,
                 "the first part of the job was overwritten while it ran: load it again"

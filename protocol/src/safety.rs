@@ -14,6 +14,7 @@ pub use interp_core::command::{OVERRIDE_MAX_PERCENT, OVERRIDE_NORMAL_PERCENT};
 /// | 5, 6 | limit switches z-, z+ |
 /// | 7, 8, 9 | drive fault x, y, z |
 /// | 10 | drive fault, one input for all drives |
+/// | 11 | probe |
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct InputLines(pub u16);
 
@@ -27,10 +28,12 @@ impl InputLines {
     /// The drive faults of all axes, and the common one.
     pub const DRIVE_FAULTS: Self = Self(0x780);
     /// All inputs.
-    pub const ALL: Self = Self(0x7ff);
+    pub const ALL: Self = Self(0xfff);
+    /// The probe, which stops no run.
+    pub const PROBE: Self = Self(0x800);
 
     /// Names of the inputs, by bit.
-    pub const NAMES: [&str; 11] = [
+    pub const NAMES: [&str; 12] = [
         "emergency stop",
         "limit switch x-",
         "limit switch x+",
@@ -42,6 +45,7 @@ impl InputLines {
         "drive fault y",
         "drive fault z",
         "drive fault",
+        "probe",
     ];
 
     /// Intersection.
@@ -66,6 +70,15 @@ impl InputLines {
     #[must_use]
     pub const fn has(self, any_of: Self) -> bool {
         self.0 & any_of.0 != 0
+    }
+
+    /// The limit switch of an axis (from 0) at its upper or lower end.
+    #[must_use]
+    pub const fn limit(axis: u8, is_upper: bool) -> Self {
+        match axis {
+            0..=2 => Self(2 << (2 * axis + is_upper as u8)),
+            _ => Self::NONE,
+        }
     }
 
     /// Whether no input is asserted.
@@ -207,9 +220,10 @@ mod tests {
             InputLines::EMERGENCY_STOP,
             InputLines::LIMITS,
             InputLines::DRIVE_FAULTS,
+            InputLines::PROBE,
         ];
         let counts = classes.map(|class| class.names().count());
-        assert_eq!(counts, [1, 6, 4]);
+        assert_eq!(counts, [1, 6, 4, 1]);
         let all = classes.into_iter().fold(InputLines::NONE, InputLines::or);
         assert_eq!(all, InputLines::ALL);
         assert_eq!(all.names().count(), InputLines::NAMES.len());

@@ -128,6 +128,11 @@ impl Emulated {
         Self::begin(board, &[], false)
     }
 
+    /// The same, with a machine around the board.
+    pub(super) fn with_machine(board: &'static Board, machine: &str) -> Self {
+        Self::begin(board, &["--machine", machine], false)
+    }
+
     fn begin(board: &'static Board, arguments: &[&str], is_recorded: bool) -> Self {
         let folder = tempfile::tempdir().unwrap();
         let image = format!("target/{}/thumbv7em-none-eabihf/release/firmware", board.build.1);

@@ -106,6 +106,8 @@ prop_compose! {
             jerk_mm_s3: axes.jerk_mm_s3,
             travel_nm: has_travel.then_some(axes.travel_nm),
             configuration,
+            homing: None,
+            probe_inverted: has_travel,
         }
     }
 }

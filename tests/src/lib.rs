@@ -20,8 +20,8 @@ use protocol::{
     digest::job_digest,
     frame::{Decoder, FRAME_MAX, write_request},
     message::{
-        Description, InputLines, NO_NUMBER, Profile, Reason, Reply, Request, SafetyStatus, Status, Words,
-        next_number, read_reply,
+        Description, InputLines, MotionStatus, NO_NUMBER, Offsets, Profile, Reason, Reply, Request,
+        SafetyStatus, Status, Words, next_number, read_reply,
     },
 };
 
@@ -180,6 +180,8 @@ pub struct Mock {
     pub heard: u32,
     /// The profile that it keeps.
     pub profile: Option<Profile>,
+    /// The work offsets that it keeps.
+    pub offsets: Offsets,
 }
 
 impl Machine for Mock {
@@ -237,6 +239,19 @@ impl Machine for Mock {
 
     fn keep_profile(&mut self, profile: Option<&Profile>) -> Result<(), StorageError> {
         self.profile = profile.copied();
+        Ok(())
+    }
+
+    fn motion(&mut self) -> MotionStatus {
+        MotionStatus::default()
+    }
+
+    fn offsets(&mut self) -> Offsets {
+        self.offsets
+    }
+
+    fn keep_offsets(&mut self, offsets: &Offsets) -> Result<(), StorageError> {
+        self.offsets = *offsets;
         Ok(())
     }
 

@@ -10,6 +10,7 @@ use protocol::message::{Clock, Report};
 use super::{TickInput, moves, run::RunRecord};
 use crate::{
     machine::{Event, Events, Instruction},
+    manual::Manual,
     safety::Safety,
 };
 
@@ -43,6 +44,8 @@ pub(super) struct Control {
     /// Command that waits for the next period.
     pub(super) command: Option<Command>,
     pub(super) safety: Safety,
+    /// Motion outside a job.
+    pub(super) manual: Manual,
     /// The next run within limits has to begin at its job's home.
     pub(super) from_home: bool,
     /// The step outputs lead to drives.
@@ -65,6 +68,7 @@ impl Control {
             report: Report::Digests,
             command: None,
             safety: Safety::NEW,
+            manual: Manual::NEW,
             from_home: true,
             has_drives: false,
             room: 0,

@@ -7,10 +7,13 @@
 //! **After a job without limits** the axes' position is unknown: no links led from pass to pass.
 
 use interp_core::command::Command;
-use protocol::message::Reason;
+use protocol::message::{InputLines, MotionStatus, Reason};
 
 use super::{RealTime, run::RunRecord};
-use crate::safety::{Order, may_start};
+use crate::{
+    manual::{Change, Motion},
+    safety::{Order, may_start},
+};
 
 impl<S: AsRef<[i32]> + AsMut<[i32]>> RealTime<S> {
     /// Executes the host's order for drives and home.
@@ -19,11 +22,20 @@ impl<S: AsRef<[i32]> + AsMut<[i32]>> RealTime<S> {
     /// The reason of the refusal; nothing has changed.
     pub fn order(&mut self, order: Order) -> Result<(), Reason> {
         let state = self.interpolator.state();
+        let keeps = matches!(order, Order::Move(_) | Order::Acknowledge);
+        if self.control.manual.is_active() && !keeps {
+            return Err(Reason::Moving);
+        }
         self.control.safety.obey(order, state)?;
         match order {
             Order::SetHome { home_nm } => self.set_position(home_nm),
-            Order::Drives { on: false } => self.lose_position(),
-            Order::Drives { on: true } | Order::Configure(_) | Order::Acknowledge => {}
+            Order::Drives { on: false } if !self.control.safety.status().homed => self.lose_position(),
+            Order::Move(motion) => self.begin_motion(motion)?,
+            Order::SetUp(setup) => {
+                self.control.safety.set_up(setup.as_ref());
+                self.control.manual.set_up(setup);
+            }
+            Order::Drives { .. } | Order::Configure(_) | Order::Acknowledge => {}
         }
         Ok(())
     }
@@ -40,6 +52,9 @@ impl<S: AsRef<[i32]> + AsMut<[i32]>> RealTime<S> {
     /// The reason of the refusal: an input asserted or latched, the drives off, the machine not homed, or not at the start position; a job without limits on
     /// drives; a streamed job whose first rows are gone.
     pub fn may_start(&self) -> Result<(), Reason> {
+        if self.control.manual.is_active() {
+            return Err(Reason::Moving);
+        }
         let status = self.control.safety.status();
         may_start(&status)?;
         let has_axes = self.control.has_drives && status.configuration.homing_required;
@@ -81,8 +96,69 @@ impl<S: AsRef<[i32]> + AsMut<[i32]>> RealTime<S> {
         Some(Command::Start)
     }
 
+    /// Begins motion outside a job, from where the axes stand.
+    fn begin_motion(&mut self, motion: Motion) -> Result<(), Reason> {
+        let status = self.control.safety.status();
+        if !self.control.manual.is_active() {
+            let stands_nm = self.interpolator.stands_nm();
+            let target_nm = self.steps.as_ref().map(interp_core::Steps::target_nm);
+            if let Some(at_nm) = stands_nm.or(target_nm) {
+                self.control.manual.place(at_nm);
+            }
+        }
+        self.control.manual.begin(motion, status.lines, status.homed)?;
+        if matches!(motion, Motion::Home { .. }) {
+            // Until every axis is homed.
+            self.control.safety.set_homed(None);
+            self.interpolator.stand_at(None);
+        }
+        Ok(())
+    }
+
+    /// One period of motion outside a job.
+    #[cold]
+    #[inline(never)]
+    pub(super) fn move_manually(&mut self, lines: InputLines) {
+        let steady = self.control.safety.status().lines;
+        let raw = self.control.safety.raw(lines);
+        let change = self.control.manual.tick(raw, steady);
+        let at_nm = self.control.manual.at_nm();
+        match change {
+            Change::None => {
+                if self.control.safety.status().homed {
+                    self.interpolator.stand_at(Some(at_nm));
+                }
+            }
+            Change::Placed => {
+                if let Some(steps) = &mut self.steps {
+                    steps.place(at_nm);
+                }
+            }
+            Change::Homed => {
+                self.control.safety.set_homed(Some(at_nm));
+                self.interpolator.stand_at(Some(at_nm));
+                self.control.from_home = true;
+            }
+        }
+    }
+
+    /// The axes outside a job.
+    #[must_use]
+    pub fn motion(&self) -> MotionStatus {
+        let motion = self.control.manual.status();
+        let stands_nm = self.interpolator.stands_nm();
+        MotionStatus {
+            // After a run, or a declaration, its position.
+            at_nm: stands_nm
+                .filter(|_| !self.control.manual.is_active())
+                .unwrap_or(motion.at_nm),
+            ..motion
+        }
+    }
+
     /// Sets the axes' position for steps and runs.
     fn set_position(&mut self, at_nm: [i32; 3]) {
+        self.control.manual.place(at_nm);
         self.interpolator.stand_at(Some(at_nm));
         if let Some(steps) = &mut self.steps {
             steps.place(at_nm);
@@ -92,6 +168,7 @@ impl<S: AsRef<[i32]> + AsMut<[i32]>> RealTime<S> {
 
     /// The axes' position is unknown from here on.
     pub(super) fn lose_position(&mut self) {
+        self.control.manual.lose_home();
         self.interpolator.stand_at(None);
     }
 }

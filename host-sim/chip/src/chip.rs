@@ -10,6 +10,7 @@ use crate::{
     SRAM_FILL,
     code::{Block, Code},
     line::Line,
+    machine::Machine,
     memory::Memory,
     options::Options,
     part::{
@@ -59,6 +60,9 @@ pub(crate) struct Chip {
     pub(crate) debug: Debug,
     pub(crate) flash: Flash,
     line: Option<Line>,
+    /// The machine around the board, and the last levels of the step pins.
+    pub(crate) machine: Option<Machine>,
+    step_levels: u32,
     /// USART1's interrupt request.
     serial_asks: bool,
     script: Vec<Entry>,
@@ -141,6 +145,8 @@ impl Chip {
             debug: Debug::default(),
             flash: Flash::new(options.cut_flash_every),
             line,
+            machine: options.machine.clone(),
+            step_levels: 0,
             serial_asks: false,
             script,
             record: record.map(BufWriter::new),
@@ -202,6 +208,12 @@ impl Chip {
 
     /// Writes a change of a port to the record.
     pub(crate) fn keep(&mut self, change: Change) {
+        if usize::from(change.port) == self.step_port {
+            if let Some(machine) = &mut self.machine {
+                machine.follow(self.board, &change, self.step_levels, &self.ports);
+            }
+            self.step_levels = change.levels.into();
+        }
         if self.moved.is_none()
             && usize::from(change.port) == self.step_port
             && u32::from(change.levels) & self.step_pins != 0
@@ -308,6 +320,9 @@ impl Chip {
         let apb2 = self.rcc.apb2_cycles();
         if self.tim2.update_at() == at {
             self.periods += 1;
+            if let Some(machine) = &mut self.machine {
+                machine.press(self.board, &mut self.ports);
+            }
             let (interrupts, _) = self.tim2.update(at);
             if interrupts {
                 self.nvic.raise(nvic::TIM2, at);

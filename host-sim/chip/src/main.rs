@@ -5,6 +5,7 @@
 //!  main.rs ── processor.rs   exceptions, sleep, resets        ── unicorn.rs   instructions (libunicorn2)
 //!                 │                                            ── memory.rs    flash and SRAM
 //!             chip.rs        the peripherals, and the order of their events
+//!                 │          ── machine.rs  carriages, switches, a probe plate
 //!                 │          ── script.rs   inputs, hang, fault, brown-out      ── line.rs   the host's pseudo-terminal
 //!             bus.rs         address decoding; clocks of peripherals; bit-band
 //!                 │
@@ -23,6 +24,7 @@ mod bus;
 mod chip;
 mod code;
 mod line;
+mod machine;
 mod memory;
 mod options;
 mod part;

@@ -7,6 +7,8 @@ use std::sync::atomic::{AtomicBool, Ordering};
 
 use clap::Parser;
 
+use crate::machine::Machine;
+
 /// Executes the image that would be flashed to an STM32F405/407, unchanged, on models of the chip. Ends with --ms, or with its standard input.
 ///
 /// Inputs of the board's table are closed to ground unless an event opens them.
@@ -49,6 +51,10 @@ pub(crate) struct Options {
     /// The supply fails in every N-th byte or sector that the program writes or erases in flash, and comes back at once.
     #[arg(long, value_name = "N")]
     pub(crate) cut_flash_every: Option<u64>,
+    /// A machine around the board: `key=value;..` with start, lower, upper (mm, three numbers each: carriages and switches), steps (per mm), plate (mm); stuck, never
+    /// (an input), swap (two inputs), bounce (periods), reverse (axes).
+    #[arg(long, value_name = "SPEC", value_parser = Machine::parse)]
+    pub(crate) machine: Option<Machine>,
     /// Says what happens as it does.
     #[arg(short, long)]
     pub(crate) verbose: bool,

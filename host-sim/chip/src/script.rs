@@ -33,10 +33,11 @@ pub(crate) struct Entry {
 }
 
 /// The name of an input on the command line.
-fn input_name(role: Role) -> Option<&'static str> {
+pub(crate) fn input_of(role: Role) -> Option<&'static str> {
     Some(match role {
         Role::EmergencyStop => "emergency-stop",
         Role::DriveFault => "drive-fault",
+        Role::Probe => "probe",
         Role::LimitMin(Axis::X) => "x-min",
         Role::LimitMin(Axis::Y) => "y-min",
         Role::LimitMin(Axis::Z) => "z-min",
@@ -49,7 +50,7 @@ fn input_name(role: Role) -> Option<&'static str> {
 
 /// The safety inputs of a board.
 pub(crate) fn inputs(board: &Board) -> impl Iterator<Item = &Line> {
-    board.lines.iter().filter(|line| input_name(line.role).is_some())
+    board.lines.iter().filter(|line| input_of(line.role).is_some())
 }
 
 /// Reads an entry for this board.
@@ -75,7 +76,7 @@ pub(crate) fn entry(text: &str, board: &Board) -> Result<Entry, String> {
         "brown-out" => Event::BrownOut,
         input => {
             let line = inputs(board)
-                .find(|line| input_name(line.role) == Some(input))
+                .find(|line| input_of(line.role) == Some(input))
                 .ok_or_else(|| {
                     format!("{input}: neither an input of the board nor hang, fault, brown-out")
                 })?;

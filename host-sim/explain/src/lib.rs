@@ -278,6 +278,15 @@ mod tests {
             Reason::Storage,
             Reason::OtherProfile,
             Reason::NoLimits,
+            Reason::Moving,
+            Reason::NoProfile,
+            Reason::BeyondTravel {
+                axis: 0,
+                travel_nm: [0, 1],
+                wanted_nm: 2,
+            },
+            Reason::NoHoming,
+            Reason::ProbeTripped,
             Reason::RowsGone,
         ]
     }

@@ -3,7 +3,7 @@
 use super::{Entry, Family};
 
 /// In the order of codes.
-pub(super) const ENTRIES: [Entry; 26] = [
+pub(super) const ENTRIES: [Entry; 31] = [
     reason(
         0,
         "bad-frame",
@@ -231,6 +231,51 @@ pub(super) const ENTRIES: [Entry; 26] = [
     ),
     reason(
         25,
+        "moving",
+        "The axes move outside a job: a jog, homing or a probe move is under way.",
+        "None.",
+        "A run, settings, drives and the position are refused until the axes rest.",
+        "Wait, or stop them: `cargo sim operate --port DEV stop`.",
+        "`operate off` during a jog.",
+    ),
+    reason(
+        26,
+        "no-profile",
+        "The board keeps no machine profile, so it knows no limits to move the axes within.",
+        "None.",
+        "Jog, homing and probe moves are planned by the profile's velocity, acceleration and jerk.",
+        "Give the board one: `cargo sim settings --port DEV --machine machine.toml`.",
+        "`operate jog x+10` on a board as it was flashed.",
+    ),
+    reason(
+        27,
+        "beyond-travel",
+        "A jog or probe move would leave the travel of its axis.",
+        "The axis, its travel, and the position asked for.",
+        "On a homed machine the soft limits hold for every motion.",
+        "Ask for less; `operate status` shows the position.",
+        "`operate jog z+20` at 10 mm below the upper end.",
+    ),
+    reason(
+        28,
+        "no-homing",
+        "The machine's profile describes no homing by switches.",
+        "None.",
+        "It has no section [home].",
+        "Add the section to the profile (docs/operating.md has its keys), or declare the position: `operate home X,Y,Z`.",
+        "`operate home` on a machine whose axes are placed by hand.",
+    ),
+    reason(
+        29,
+        "probe-tripped",
+        "The probe is tripped before it moves.",
+        "None.",
+        "It touches already, its wire is broken, or its contact closes when it touches and the profile does not say so.",
+        "Move it away; check the wire; `[probe] contact = \"normally-open\"` in the profile for a plate that closes the circuit.",
+        "A touch plate on a board whose profile has no [probe].",
+    ),
+    reason(
+        30,
         "rows-gone",
         "A start of a job that is larger than the board's store, after its first part was overwritten.",
         "None.",

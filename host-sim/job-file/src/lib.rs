@@ -8,6 +8,7 @@
 //! Reading a job file starts no process: a surface of `kind = "file"` is resolved by the [`FaceReader`] that the caller passes.
 
 mod file;
+mod homing;
 mod machine;
 mod placement;
 mod region;
@@ -77,8 +78,8 @@ pub fn load_profile(path: &Path) -> Result<MachineProfile, JobError> {
 /// As [`load_profile`].
 pub fn parse_profile(name: &str, text: &str) -> Result<MachineProfile, JobError> {
     let document = Reader::new(name, text).document()?;
-    document.only(&["machine"], &[])?;
-    machine::read_profile(&document.section("machine")?)
+    document.only(&["machine", "home", "probe"], &[])?;
+    machine::read_profile(&document)
 }
 
 /// Reads a job without a surface of `kind = "file"` from text; errors name the file `name`.

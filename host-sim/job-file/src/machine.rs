@@ -6,7 +6,7 @@ use job::{
 };
 
 use crate::section::Section;
-use crate::steps;
+use crate::{homing, steps};
 
 /// Largest clearance and plunge, mm.
 const HEIGHT_MAX_MM: f64 = 1000.0;
@@ -27,16 +27,25 @@ const COMMON: [&str; 7] = [
 /// Keys of a job alone.
 const OF_JOBS: [&str; 5] = ["period_us", "home_mm", "safe_z_mm", "clearance_mm", "plunge_mm"];
 
-/// A machine's profile: the section `[machine]` of its file.
-pub(super) fn read_profile(machine: &Section<'_>) -> Result<MachineProfile, JobError> {
+/// A machine's profile: the sections `[machine]`, `[home]` and `[probe]` of its file.
+pub(super) fn read_profile(document: &Section<'_>) -> Result<MachineProfile, JobError> {
+    let machine = &document.section("machine")?;
     let of_jobs = OF_JOBS.map(|key| (key, "it is a job's"));
     machine.only(&[&COMMON[..], &steps::KEYS].concat(), &of_jobs)?;
     let mut read = MachineSpec::default();
     read_supervision(machine, &mut read)?;
-    let limits = read_limits(machine)?;
+    let limits = read_limits(machine)?.unwrap_or(AxisLimits::DEFAULT);
+    let travel_mm = read_travel(machine)?;
+    let homing = document
+        .optional_section("home")?
+        .map(|home| homing::read(&home, &limits, travel_mm))
+        .transpose()?;
+    let probe = document.optional_section("probe")?;
     Ok(MachineProfile {
-        limits: limits.unwrap_or(AxisLimits::DEFAULT),
-        travel_mm: read_travel(machine)?,
+        limits,
+        travel_mm,
+        homing,
+        probe_closes: probe.map_or(Ok(false), |probe| homing::read_probe(&probe))?,
         homing_required: read.homing_required,
         heartbeat_action: read.heartbeat_action,
         heartbeat_timeout_ms: read.heartbeat_timeout_ms,

@@ -91,6 +91,25 @@ pub enum HeartbeatAction {
     Hold,
 }
 
+/// Homing of the axes x, y and z by a switch at one end of each.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Homing {
+    /// The axes, 0 to 2, in the order of homing.
+    pub order: [u8; 3],
+    /// Whether the switch is at the upper end.
+    pub at_upper_end: [bool; 3],
+    /// Machine coordinate at which the switch trips, mm.
+    pub position_mm: [f64; 3],
+    /// Speed of the search, mm/s.
+    pub seek_mm_s: [f64; 3],
+    /// Speed of the approach, mm/s.
+    pub approach_mm_s: [f64; 3],
+    /// Distance from the switch before the approach and after homing, mm.
+    pub back_off_mm: [f64; 3],
+    /// The position stays valid while the drives are off.
+    pub survives_off: bool,
+}
+
 /// A machine as its board keeps it: the greatest limits, the drives, the supervision. A job may lower the limits, but not exceed them.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct MachineProfile {
@@ -106,6 +125,10 @@ pub struct MachineProfile {
     pub heartbeat_timeout_ms: f64,
     /// The drives.
     pub step_output: StepOutput,
+    /// Homing by switches. `None`: the position is declared.
+    pub homing: Option<Homing>,
+    /// The probe's contact closes when it touches.
+    pub probe_closes: bool,
 }
 
 impl MachineProfile {

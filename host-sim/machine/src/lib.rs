@@ -12,5 +12,6 @@ pub mod profile;
 pub mod remote;
 pub mod script;
 pub mod travel;
+pub mod work;
 
 pub use in_process::Machine;

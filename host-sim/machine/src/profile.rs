@@ -3,7 +3,7 @@
 use std::fmt::Write as _;
 
 use interp_core::StepConfig;
-use job::{AxisLimits, HeartbeatAction, MachineProfile, PERIOD_DEFAULT_US, Ratio, StepOutput};
+use job::{AXES, AxisLimits, HeartbeatAction, MachineProfile, PERIOD_DEFAULT_US, Ratio, StepOutput};
 use protocol::message::{LinkTimeoutAction, Profile};
 
 use crate::prepare;
@@ -20,8 +20,6 @@ pub fn for_board(profile: &MachineProfile) -> Profile {
         .limits
         .by_order()
         .map(|limits| limits.map(|limit| limit as f32));
-    #[allow(clippy::cast_possible_truncation, reason = "the cast saturates")]
-    let nm = |mm: f64| (mm * NM_PER_MM).round() as i32;
     Profile {
         steps: prepare::step_config(&spec).unwrap_or(StepConfig::DEFAULT).into(),
         velocity_mm_s,
@@ -29,6 +27,8 @@ pub fn for_board(profile: &MachineProfile) -> Profile {
         jerk_mm_s3,
         travel_nm: profile.travel_mm.map(|travel| travel.map(|range| range.map(nm))),
         configuration: prepare::configuration(&spec),
+        homing: profile.homing.map(|homing| homing_for_board(&homing)),
+        probe_inverted: profile.probe_closes,
     }
 }
 
@@ -42,9 +42,9 @@ pub fn of_board(profile: &Profile) -> MachineProfile {
         jerk_mm_s3,
         travel_nm,
         configuration,
+        homing,
+        probe_inverted,
     } = *profile;
-    let decimal =
-        |limits: [f32; 3]| limits.map(|limit| limit.to_string().parse().unwrap_or(f64::from(limit)));
     let slot_us = PERIOD_DEFAULT_US / f64::from(interp_core::steps::SLOTS);
     let config = StepConfig::from(steps);
     MachineProfile {
@@ -69,6 +69,45 @@ pub fn of_board(profile: &Profile) -> MachineProfile {
             pulse_us: f64::from(config.pulse_slots) * slot_us,
             direction_setup_us: f64::from(config.setup_slots) * slot_us,
         },
+        homing: homing.map(|homing| homing_of_board(&homing)),
+        probe_closes: probe_inverted,
+    }
+}
+
+/// The shortest decimal numbers that the board's stand for.
+fn decimal(values: [f32; 3]) -> [f64; 3] {
+    values.map(|value| value.to_string().parse().unwrap_or(f64::from(value)))
+}
+
+/// A length in nm.
+#[allow(clippy::cast_possible_truncation, reason = "the cast saturates")]
+fn nm(mm: f64) -> i32 {
+    (mm * NM_PER_MM).round() as i32
+}
+
+#[allow(clippy::cast_possible_truncation, reason = "the board's precision")]
+fn homing_for_board(homing: &job::Homing) -> protocol::message::Homing {
+    protocol::message::Homing {
+        order: homing.order,
+        at_upper_end: homing.at_upper_end,
+        position_nm: homing.position_mm.map(nm),
+        seek_mm_s: homing.seek_mm_s.map(|speed| speed as f32),
+        approach_mm_s: homing.approach_mm_s.map(|speed| speed as f32),
+        back_off_nm: homing.back_off_mm.map(nm),
+        survives_off: homing.survives_off,
+    }
+}
+
+fn homing_of_board(homing: &protocol::message::Homing) -> job::Homing {
+    let mm = |nm: i32| f64::from(nm) / NM_PER_MM;
+    job::Homing {
+        order: homing.order,
+        at_upper_end: homing.at_upper_end,
+        position_mm: homing.position_nm.map(mm),
+        seek_mm_s: decimal(homing.seek_mm_s),
+        approach_mm_s: decimal(homing.approach_mm_s),
+        back_off_mm: homing.back_off_nm.map(mm),
+        survives_off: homing.survives_off,
     }
 }
 
@@ -82,6 +121,8 @@ pub fn text(profile: &MachineProfile) -> String {
         heartbeat_action,
         heartbeat_timeout_ms,
         step_output,
+        homing,
+        probe_closes,
     } = profile;
     let ratio = |ratio: Ratio| match ratio.denominator {
         1 => ratio.numerator.to_string(),
@@ -119,6 +160,22 @@ pub fn text(profile: &MachineProfile) -> String {
     };
     line(format_args!("host_gone = \"{action}\""));
     line(format_args!("host_gone_ms = {heartbeat_timeout_ms:?}"));
+    if let Some(homing) = homing {
+        let order = homing
+            .order
+            .map(|axis| AXES.get(usize::from(axis)).copied().unwrap_or("?"));
+        line(format_args!("\n[home]"));
+        line(format_args!("order = \"{}\"", order.concat()));
+        line(format_args!("at_upper_end = {:?}", homing.at_upper_end));
+        line(format_args!("position_mm = {:?}", homing.position_mm));
+        line(format_args!("seek_mm_s = {:?}", homing.seek_mm_s));
+        line(format_args!("approach_mm_s = {:?}", homing.approach_mm_s));
+        line(format_args!("back_off_mm = {:?}", homing.back_off_mm));
+        line(format_args!("survives_off = {}", homing.survives_off));
+    }
+    if *probe_closes {
+        line(format_args!("\n[probe]\ncontact = \"normally-open\""));
+    }
     text
 }
 
@@ -138,6 +195,16 @@ direction_setup_us = 20
 direction_inverted = [true, false, true]
 host_gone = "hold"
 host_gone_ms = 750
+
+[home]
+order = "zyx"
+at_upper_end = [false, false, true]
+position_mm = [-2, -2.5, 1.000001]
+seek_mm_s = [40, 40.7, 20]
+back_off_mm = [3, 3, 3]
+
+[probe]
+contact = "normally-open"
 "#;
 
     /// What is kept by a board is what its text says, and the text again.

@@ -6,6 +6,7 @@ use super::{Result, read_job, settled};
 use job::{Job, MachineProfile};
 use machine::prepare::Prepared;
 use machine::remote::RemoteError;
+use machine::work;
 
 const MM_PER_NM: f64 = 1e-6;
 
@@ -44,13 +45,23 @@ pub(super) fn position(text: &str) -> std::result::Result<PositionNm, String> {
     }
 }
 
-/// Loads a job for a machine with this profile; if it has no `home_mm`, `home` becomes its home.
+/// Loads a job for a machine with this profile, its origin at this position of the machine; if it has no `home_mm`, it begins where the axes stand.
 pub(super) fn load(
     path: &std::path::Path,
     profile: Option<&MachineProfile>,
+    origin: Option<PositionNm>,
     stands: Option<PositionNm>,
 ) -> Result<(Job, Prepared)> {
     let mut job = read_job(path, profile)?;
+    if let Some(origin) = origin {
+        work::place(&mut job, origin.mm()).map_err(|error| {
+            job.origin.error(
+                "surface",
+                error.to_string(),
+                "choose another work offset, or set it anew: cargo sim operate touch, zero",
+            )
+        })?;
+    }
     if let Some(stands) = stands {
         job.machine.home_mm.get_or_insert(stands.mm());
     }
@@ -72,8 +83,8 @@ pub(super) fn elsewhere(error: &RemoteError) -> Option<String> {
         return None;
     };
     let bring = format!(
-        "move the axes there with the drives off, and declare the position: --home {}",
-        PositionNm(*home_nm).words().replace(' ', "")
+        "move the axes there: operate goto {home} on a homed machine; or with the drives off, and declare the position: --home {home}",
+        home = PositionNm(*home_nm).words().replace(' ', "")
     );
     let remedy = match stands_nm {
         Some(at_nm) => format!(

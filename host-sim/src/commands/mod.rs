@@ -3,6 +3,7 @@
 mod along;
 mod approach;
 mod attach;
+mod axes;
 #[cfg(feature = "developer")]
 mod budget;
 mod completions;

@@ -6,13 +6,15 @@ use protocol::message::{OVERRIDE_MAX_PERCENT, Request, Status};
 use serde_json::json;
 
 use super::out::{say, to_stderr};
-use super::{Failure, Result, attach, home, run};
+use super::{Failure, Result, attach, axes, home, run};
 use machine::remote::operate::{act, sentences};
 
-/// Switches a board's drives, declares its home, holds, resumes or stops its run, follows it, and prints its state.
+/// Switches a board's drives, homes and jogs its axes, touches off, holds, resumes or stops its run, follows it, and prints its state.
 ///
 /// Example: cargo sim operate --port /dev/ttyUSB0 status
-/// Example: cargo sim operate --port /dev/ttyUSB0 home 0,0,50
+/// Example: cargo sim operate --port /dev/ttyUSB0 home
+/// Example: cargo sim operate --port /dev/ttyUSB0 jog x+10
+/// Example: cargo sim operate --port /dev/ttyUSB0 touch z-30 --work 1 --plate 15 --radius 3
 /// Example: cargo sim operate --port /dev/ttyUSB0 attach
 #[derive(Debug, Args)]
 #[command(verbatim_doc_comment)]
@@ -31,6 +33,8 @@ pub(super) struct Arguments {
 enum Action {
     /// Follows the run to its end, keeps its heartbeat, and takes operator commands from standard input.
     Attach,
+    #[command(flatten)]
+    Axes(axes::Action),
     #[command(flatten)]
     Command(OperatorCommand),
 }
@@ -57,20 +61,41 @@ enum OperatorCommand {
     On,
     /// Switches the drives off: the axes can be moved by hand, and home is lost.
     Off,
-    /// Declares the position of the axes; the drives must be on.
+    /// Homes the axes by their switches, in the order of the profile; with a position: declares it. The drives must be on.
     Home {
-        /// Position of the ball centre, mm: X,Y,Z.
+        /// Declares that the axes stand here, mm: X,Y,Z.
         #[arg(value_parser = home::position, allow_hyphen_values = true)]
-        position_mm: home::PositionNm,
+        position_mm: Option<home::PositionNm>,
+        /// Homes these axes only, such as `z` or `xy`.
+        #[arg(long, value_parser = axes::axes, conflicts_with = "position_mm")]
+        axes: Option<u8>,
+    },
+    /// Jogs an axis by a distance, such as x+10 or z-0.5 (mm).
+    Jog {
+        /// Axis and distance, mm. Without: by keys, for as long as they are held.
+        #[arg(value_parser = axes::distance, allow_hyphen_values = true)]
+        by: Option<axes::Distance>,
+        /// Speed, mm/s; the profile's velocity bounds it.
+        #[arg(long, default_value_t = axes::JOG_MM_S)]
+        speed: f32,
+    },
+    /// Moves an axis until the probe trips, at most by a distance, such as z-30 (mm).
+    Probe {
+        /// Axis and greatest distance, mm.
+        #[arg(value_parser = axes::distance, allow_hyphen_values = true)]
+        by: axes::Distance,
+        /// Speed, mm/s.
+        #[arg(long, default_value_t = axes::PROBE_MM_S)]
+        speed: f32,
     },
     /// Acknowledges a released emergency stop or drive fault.
     Acknowledge,
 }
 
 impl OperatorCommand {
-    /// The request on the line.
-    fn request(&self) -> Request {
-        match self {
+    /// The request on the line; none for a jog by keys.
+    fn request(&self) -> Option<Request> {
+        Some(match self {
             Self::Status => Request::Status,
             Self::Hold => Command::Hold.into(),
             Self::Resume => Command::Resume.into(),
@@ -79,11 +104,17 @@ impl OperatorCommand {
             Self::Override { percent } => Request::Override { percent: *percent },
             Self::On => Request::Drives { on: true },
             Self::Off => Request::Drives { on: false },
-            Self::Home { position_mm } => Request::SetHome {
-                home_nm: position_mm.0,
+            Self::Home {
+                position_mm: Some(position),
+                ..
+            } => Request::SetHome { home_nm: position.0 },
+            Self::Home { axes, .. } => Request::Home {
+                axes: axes.unwrap_or(0),
             },
+            Self::Jog { by, speed } => by.as_ref()?.jog(*speed),
+            Self::Probe { by, speed } => by.probe(*speed),
             Self::Acknowledge => Request::Acknowledge,
-        }
+        })
     }
 }
 
@@ -104,7 +135,10 @@ pub(super) fn typed(line: &str) -> std::result::Result<Option<Request>, String> 
         return Ok(None);
     }
     match Line::try_parse_from(words) {
-        Ok(line) => Ok(Some(line.command.request())),
+        Ok(line) => match line.command.request() {
+            Some(request) => Ok(Some(request)),
+            None => Err("error: a jog needs its distance here, such as jog x+10".to_owned()),
+        },
         Err(error) => Err(error.to_string()),
     }
 }
@@ -126,18 +160,29 @@ pub(super) fn command(arguments: &Arguments) -> Result<()> {
     };
     let command = match &arguments.action {
         Action::Attach => return attach::to_port(port, arguments.json),
+        Action::Axes(action) => return axes::command(action, port, arguments.json),
         Action::Command(command) => command,
     };
     let mut session = run::open_port(port)?;
-    let status = act(&mut session, &command.request()).map_err(Failure::from)?;
+    let Some(request) = command.request() else {
+        return axes::by_keys(&mut session);
+    };
+    if axes::moves(&request) {
+        return axes::go(&mut session, &request, arguments.json);
+    }
+    let status = act(&mut session, &request).map_err(Failure::from)?;
     let board = session.capabilities().description.board.clone();
     let stays = matches!(command, OperatorCommand::Resume) && attach::needs_a_host(&status);
+    let motion = session.motion()?;
     if arguments.json {
         if !stays {
-            say!("{}", json_of(&status, &board));
+            let mut state = json_of(&status, &board);
+            state["axes"] = axes::json_of(&motion);
+            say!("{state}");
         }
     } else {
         print(&status, &board);
+        say!("  axes at {} mm", home::PositionNm(motion.at_nm).words());
     }
     if stays {
         to_stderr(format_args!(
@@ -193,8 +238,27 @@ mod tests {
             Ok(Some(Request::Override { percent: 50 }))
         );
         assert_eq!(typed("hold"), Ok(Some(Request::Hold)));
+        assert_eq!(typed("home"), Ok(Some(Request::Home { axes: 0 })));
+        let declared = Request::SetHome {
+            home_nm: [0, 0, -1_500_000],
+        };
+        assert_eq!(typed("home 0,0,-1.5"), Ok(Some(declared)));
+        let jog = Request::Jog {
+            axis: 2,
+            way: protocol::message::JogWay::By { nm: -500_000 },
+            speed_mm_s: 3.0,
+        };
+        assert_eq!(typed("jog z-0.5 --speed 3"), Ok(Some(jog)));
         assert_eq!(typed(" "), Ok(None));
-        for wrong in ["overide 50", "override 201", "hold on", "override"] {
+        for wrong in [
+            "overide 50",
+            "override 201",
+            "hold on",
+            "override",
+            "jog",
+            "jog w+1",
+            "jog x+1e9",
+        ] {
             assert!(
                 typed(wrong).is_err_and(|why| why.starts_with("error: ")),
                 "{wrong}"

@@ -40,6 +40,7 @@ use machine::travel;
 /// Example: cargo sim run jobs/plate_machine.toml --chip skr-pro
 /// Example: cargo sim run jobs/plate_machine.toml --qemu --machine machine.toml
 /// Example: cargo sim run jobs/plate_machine.toml --port /dev/ttyUSB0 --home 40,30,40
+/// Example: cargo sim run part.toml --port /dev/ttyUSB0 --work 1
 #[derive(Debug, Args)]
 #[command(verbatim_doc_comment)]
 pub(super) struct Arguments {
@@ -70,6 +71,9 @@ pub(super) struct Arguments {
     /// models of a chip, which have no axes: the job's home.
     #[arg(long, value_name = "X,Y,Z", value_parser = home::position, allow_hyphen_values = true)]
     home: Option<PositionNm>,
+    /// Places the job's origin at this work offset of the board (operate touch, zero). Default: the job's coordinates are the machine's.
+    #[arg(long, value_name = "N", requires = "port", value_parser = super::axes::work_number())]
+    work: Option<u8>,
     /// Applies the operator commands in this file, in lockstep: lines `tick N: hold`, or resume, stop, abort, start, override P.
     #[arg(long, value_name = "FILE", conflicts_with_all = ["port", "report", "trace"])]
     script: Option<PathBuf>,
@@ -350,15 +354,42 @@ fn by_sample(arguments: &Arguments, reference: &Reference<'_>, session: &mut Ses
     Ok(run)
 }
 
-/// The line to a board, and the profile of the machine: of `--machine`, or the one that the board keeps.
-fn machine(arguments: &Arguments) -> Result<(Option<Connected>, Option<MachineProfile>)> {
+/// A machine, as a job needs it before it is computed.
+struct Bench {
+    /// The line to a board.
+    connected: Option<Connected>,
+    /// Of `--machine`, or the one that the board keeps.
+    profile: Option<MachineProfile>,
+    /// The origin of the job, in machine coordinates.
+    origin: Option<PositionNm>,
+    /// Where the axes stand: declared by `--home`, or known to the board.
+    stands: Option<PositionNm>,
+}
+
+fn bench(arguments: &Arguments) -> Result<Bench> {
     let given = read_profile(arguments.machine.as_ref())?;
-    if given.is_some() || arguments.target.port.is_none() {
-        return Ok((None, given));
+    let mut bench = Bench {
+        connected: None,
+        profile: given,
+        origin: None,
+        stands: arguments.home,
+    };
+    if arguments.target.port.is_none() {
+        return Ok(bench);
     }
     let (peer, mut session) = connect(arguments)?;
-    let kept = session.profile()?;
-    Ok((Some((peer, session)), kept.as_ref().map(profile::of_board)))
+    if given.is_none() {
+        bench.profile = session.profile()?.as_ref().map(profile::of_board);
+    }
+    if bench.stands.is_none() && session.status()?.safety.homed {
+        bench.stands = Some(PositionNm(session.motion()?.at_nm));
+    }
+    if let Some(number) = arguments.work {
+        let origin = session.offsets()?.origin_nm(usize::from(number) - 1);
+        bench.origin = origin.map(PositionNm);
+    }
+    bench.connected = Some((peer, session));
+    Ok(bench)
 }
 
 /// Makes sure that the board keeps this profile: a simulated one takes it, another one must have it.
@@ -386,8 +417,13 @@ fn agree(arguments: &Arguments, wanted: Option<&MachineProfile>, session: &mut S
 }
 
 pub(super) fn command(arguments: &Arguments) -> Result<()> {
-    let (connected, profile) = machine(arguments)?;
-    let (job, prepared) = home::load(&arguments.job, profile.as_ref(), arguments.home)?;
+    let Bench {
+        connected,
+        profile,
+        origin,
+        stands,
+    } = bench(arguments)?;
+    let (job, prepared) = home::load(&arguments.job, profile.as_ref(), origin, stands)?;
     travel::check(&job)?;
     arguments
         .script
@@ -465,6 +501,12 @@ pub(super) fn command(arguments: &Arguments) -> Result<()> {
         say!("{}", json_of(&outcome, &run, board));
     } else {
         say!("{} on {board}", arguments.job.display());
+        if let (Some(number), Some(origin)) = (arguments.work, origin) {
+            say!(
+                "  origin       work offset {number}, at {} mm of the machine",
+                origin.words()
+            );
+        }
         outcome.print(page.as_deref());
         let (speed, missed) = (run.ticks_per_second.round(), run.status.deadline_misses);
         say!("  board        {speed} ticks per second, {missed} missed");

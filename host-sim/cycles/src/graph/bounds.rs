@@ -43,6 +43,12 @@ const BOUNDS: &[(&str, u32, &str)] = &[
     ),
     ("controller::step_output::StepOutput::turn", 3, "axes"),
     (
+        "interp_core::positioning::Periods::shortest",
+        3,
+        "whole numbers beside the best real one",
+    ),
+    ("interp_core::pass::contact::solve", 2, "Newton steps"),
+    (
         "interp_core::pass::run::Run::step_far",
         2,
         "patches of an arc: CROSSINGS_MAX + 1",

@@ -3,6 +3,7 @@
 //! ```text
 //! drive.rs    loads and runs a job there, compares with what was computed here
 //! operate.rs  drives, home, hold and resume: what an operator asks
+//! axes.rs     jog, homing, probing: followed to their end
 //! session.rs  requests, answers; retransmission   |   events.rs  events in order, lost ones again
 //! feed.rs     the words of a job that is larger than the board's store
 //! script.rs   plays what an operator does, period by period
@@ -10,6 +11,7 @@
 //!             └── guard.rs   their folder; ends them and removes it where this process is killed ──┘
 //! ```
 
+pub mod axes;
 pub mod chip;
 pub mod drive;
 mod events;

@@ -5,7 +5,8 @@ use std::time::{Duration, Instant};
 
 use protocol::frame::{DELIMITER, Decoder, FRAME_MAX, write_request};
 use protocol::message::{
-    Capabilities, Clock, Profile, Reason, Reply, Request, Status, next_number, read_reply,
+    Capabilities, Clock, MotionStatus, Offsets, Profile, Reason, Reply, Request, Status, next_number,
+    read_reply,
 };
 use protocol::version::{PROTOCOL_VERSION, VersionMismatch};
 
@@ -144,6 +145,11 @@ fn name(request: &Request) -> &'static str {
         Request::StepConfig(_) => "the steps of the axes",
         Request::Repeat { .. } => "lost events",
         Request::Profile | Request::SetProfile(_) => "the machine's profile",
+        Request::Jog { .. } => "the jog",
+        Request::Home { .. } => "homing",
+        Request::Probe { .. } => "the probe move",
+        Request::Motion => "the position of the axes",
+        Request::Offsets | Request::SetOffsets(_) => "the work offsets",
     }
 }
 
@@ -272,6 +278,36 @@ impl Session {
                 reason,
             }),
             _ => Err(RemoteError::Silent("it did not answer with its profile")),
+        }
+    }
+
+    /// Requests position and motion of the axes outside a job.
+    ///
+    /// # Errors
+    /// As [`Self::command`].
+    pub fn motion(&mut self) -> Result<MotionStatus, RemoteError> {
+        match self.ask(&Request::Motion)? {
+            Reply::Motion { motion, .. } => Ok(motion),
+            Reply::Nak { reason, .. } => Err(RemoteError::Refused {
+                request: name(&Request::Motion),
+                reason,
+            }),
+            _ => Err(RemoteError::Silent("it did not answer with its position")),
+        }
+    }
+
+    /// Requests work offsets and tool length.
+    ///
+    /// # Errors
+    /// As [`Self::command`].
+    pub fn offsets(&mut self) -> Result<Offsets, RemoteError> {
+        match self.ask(&Request::Offsets)? {
+            Reply::Offsets { offsets, .. } => Ok(offsets),
+            Reply::Nak { reason, .. } => Err(RemoteError::Refused {
+                request: name(&Request::Offsets),
+                reason,
+            }),
+            _ => Err(RemoteError::Silent("it did not answer with its work offsets")),
         }
     }
 
@@ -591,7 +627,9 @@ fn answered(reply: &Reply) -> Option<u16> {
         Reply::Ack { number }
         | Reply::Nak { number, .. }
         | Reply::Status { number, .. }
-        | Reply::Profile { number, .. } => Some(*number),
+        | Reply::Profile { number, .. }
+        | Reply::Motion { number, .. }
+        | Reply::Offsets { number, .. } => Some(*number),
         Reply::Samples { .. } | Reply::PassDigest { .. } | Reply::Room { .. } | Reply::Halted(_) => None,
     }
 }

@@ -1,0 +1,476 @@
+//! Motion outside a job: home, jog, probe, touch-off, work offsets, tool length.
+
+use clap::Subcommand;
+use console::{Key, Term};
+use protocol::message::{
+    InputLines, JogWay, MotionEnd, MotionStatus, Offsets, Profile, Request, WORK_OFFSETS,
+};
+use serde_json::json;
+
+use super::home::{self, PositionNm};
+use super::out::{say, to_stderr};
+use super::{Failure, Result, run};
+use job::AXES;
+use machine::remote::Session;
+use machine::remote::axes;
+
+/// Default speeds, mm/s: of a jog, of a probe move, and of its second, slow one.
+pub(super) const JOG_MM_S: f32 = 1000.0;
+pub(super) const PROBE_MM_S: f32 = 5.0;
+const SLOW_MM_S: f32 = 0.5;
+
+/// Way back before the slow probe move, and the length of it, nm.
+const BACK_NM: i32 = 1_000_000;
+const AGAIN_NM: i32 = 2 * BACK_NM;
+
+const NM_PER_MM: f64 = 1e6;
+
+/// An axis and a distance.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) struct Distance {
+    axis: u8,
+    nm: i32,
+}
+
+impl Distance {
+    pub(super) fn jog(self, speed_mm_s: f32) -> Request {
+        Request::Jog {
+            axis: self.axis,
+            way: JogWay::By { nm: self.nm },
+            speed_mm_s,
+        }
+    }
+
+    pub(super) fn probe(self, speed_mm_s: f32) -> Request {
+        Request::Probe {
+            axis: self.axis,
+            nm: self.nm,
+            speed_mm_s,
+        }
+    }
+}
+
+fn axis_of(letter: char) -> Option<u8> {
+    (0..)
+        .zip(AXES)
+        .find(|(_, name)| name.starts_with(letter))
+        .map(|(axis, _)| axis)
+}
+
+/// Parses an axis with a distance in mm: `x+10`, `z-0.5`.
+pub(super) fn distance(text: &str) -> std::result::Result<Distance, String> {
+    let wrong = || "expected an axis and a signed distance in mm, such as x+10 or z-0.5".to_owned();
+    let mut letters = text.chars();
+    let axis = letters.next().and_then(axis_of).ok_or_else(wrong)?;
+    let rest = letters.as_str();
+    if !rest.starts_with(['+', '-']) {
+        return Err(wrong());
+    }
+    let nm = (rest.parse::<f64>().map_err(|_| wrong())? * NM_PER_MM).round();
+    #[expect(clippy::cast_possible_truncation, reason = "within the range of an i32")]
+    match nm.abs() <= f64::from(i32::MAX) {
+        true => Ok(Distance { axis, nm: nm as i32 }),
+        false => Err(wrong()),
+    }
+}
+
+/// Parses axes as bits: `z`, `xy`.
+pub(super) fn axes(text: &str) -> std::result::Result<u8, String> {
+    let bits: Option<u8> = text
+        .chars()
+        .map(|letter| axis_of(letter).map(|axis| 1 << axis))
+        .try_fold(0, |bits, bit| Some(bits | bit?));
+    bits.filter(|bits| *bits != 0)
+        .ok_or_else(|| "expected axes, such as z or xy".to_owned())
+}
+
+/// Number of a work offset, from 1.
+pub(super) fn work_number() -> clap::builder::RangedI64ValueParser<u8> {
+    clap::value_parser!(u8).range(1..=WORK_OFFSETS as i64)
+}
+
+#[derive(Clone, Debug, Subcommand)]
+pub(super) enum Action {
+    /// Moves to a position of the machine, mm: z first where it goes up, last where it goes down.
+    Goto {
+        /// Machine coordinates, mm: X,Y,Z.
+        #[arg(value_parser = home::position, allow_hyphen_values = true)]
+        position: PositionNm,
+        /// The position is one of this work offset's coordinates.
+        #[arg(long, value_name = "N", value_parser = work_number())]
+        work: Option<u8>,
+        /// Speed, mm/s; the profile's velocity bounds it.
+        #[arg(long, default_value_t = JOG_MM_S)]
+        speed: f32,
+    },
+    /// Probes along an axis, fast and then slowly, and sets a work offset by the place: touch z-30 --work 1 --plate 15 --radius 3.
+    Touch {
+        /// Axis and greatest distance, mm.
+        #[arg(value_parser = distance, allow_hyphen_values = true)]
+        by: Distance,
+        /// The work offset, 1 to 3.
+        #[arg(long, value_name = "N", value_parser = work_number())]
+        work: u8,
+        /// Work coordinate of the touched face, mm.
+        #[arg(long, default_value_t = 0.0, allow_hyphen_values = true)]
+        at: f64,
+        /// Thickness of a plate or block between face and tool, mm.
+        #[arg(long, default_value_t = 0.0)]
+        plate: f64,
+        /// Radius of the tool's ball, mm: positions are its centre's.
+        #[arg(long, default_value_t = 0.0)]
+        radius: f64,
+        /// Speed of the first move, mm/s.
+        #[arg(long, default_value_t = PROBE_MM_S)]
+        speed: f32,
+    },
+    /// Sets a work offset so that the axes stand at these work coordinates: zero xy --work 1.
+    Zero {
+        /// The axes, such as xy or z.
+        #[arg(value_parser = axes)]
+        axes: u8,
+        /// The work offset, 1 to 3.
+        #[arg(long, value_name = "N", value_parser = work_number())]
+        work: u8,
+        /// Work coordinate of where they stand, mm.
+        #[arg(long, default_value_t = 0.0, allow_hyphen_values = true)]
+        at: f64,
+    },
+    /// Measures the tool's length on a tool setter below it: tool z-60 (the reference tool), later tool z-60 --setter Z.
+    Tool {
+        /// Axis and greatest distance, mm.
+        #[arg(value_parser = distance, allow_hyphen_values = true)]
+        by: Distance,
+        /// Where the reference tool tripped, mm: printed when it was measured. Without: this is the reference tool.
+        #[arg(long, allow_hyphen_values = true)]
+        setter: Option<f64>,
+        /// Speed of the first move, mm/s.
+        #[arg(long, default_value_t = PROBE_MM_S)]
+        speed: f32,
+    },
+    /// Prints the work offsets and the tool length.
+    Offsets,
+}
+
+/// Whether a request is followed until the axes rest.
+pub(super) const fn moves(request: &Request) -> bool {
+    matches!(
+        request,
+        Request::Jog { .. } | Request::Home { .. } | Request::Probe { .. }
+    )
+}
+
+/// Carries out a motion; an end other than the wanted one is a failure.
+fn carried_out(session: &mut Session, request: &Request) -> Result<MotionStatus> {
+    let motion = axes::go(session, request, |_| {})?;
+    match axes::failure(&motion) {
+        None => Ok(motion),
+        Some((what, remedy)) => Err(Failure::Failed(Some(format!(
+            "{what}, with {} in motion, at {} mm\n  help: {remedy}",
+            AXES.get(usize::from(motion.axis)).copied().unwrap_or("?"),
+            PositionNm(motion.at_nm).words()
+        )))),
+    }
+}
+
+pub(super) fn json_of(motion: &MotionStatus) -> serde_json::Value {
+    let mm = |nm: i32| f64::from(nm) / NM_PER_MM;
+    json!({
+        "at_mm": motion.at_nm.map(mm),
+        "activity": motion.activity.name(),
+        "end": motion.end.name(),
+        "inputs": motion.lines.names().collect::<Vec<_>>(),
+        "tripped_mm": motion.tripped_nm.map(mm),
+        "homed_axes": AXES.iter().enumerate()
+            .filter(|(axis, _)| motion.homed_axes >> axis & 1 != 0)
+            .map(|(_, name)| name).collect::<Vec<_>>(),
+        "periods": motion.periods,
+        "digest": format!("{:016x}", motion.digest),
+    })
+}
+
+/// A motion, and the position after it.
+pub(super) fn go(session: &mut Session, request: &Request, as_json: bool) -> Result<()> {
+    let motion = carried_out(session, request)?;
+    if as_json {
+        say!("{}", json_of(&motion));
+        return Ok(());
+    }
+    if let (Request::Probe { axis, .. }, Some(tripped)) = (request, motion.tripped_nm) {
+        let axis = AXES.get(usize::from(*axis)).copied().unwrap_or("?");
+        say!(
+            "the probe tripped at {axis} = {:.6} mm",
+            f64::from(tripped) / NM_PER_MM
+        );
+    }
+    if let Request::Home { .. } = request {
+        say!("homed");
+    }
+    say!("axes at {} mm", PositionNm(motion.at_nm).words());
+    Ok(())
+}
+
+pub(super) fn command(action: &Action, port: &str, as_json: bool) -> Result<()> {
+    let mut session = run::open_port(port)?;
+    let session = &mut session;
+    match action {
+        Action::Goto {
+            position,
+            work,
+            speed,
+        } => go_to(session, *position, *work, *speed)?,
+        Action::Touch {
+            by,
+            work,
+            at,
+            plate,
+            radius,
+            speed,
+        } => {
+            let tripped = touched(session, *by, *speed)?;
+            // The face is on the far side of plate and ball.
+            let beyond = if by.nm < 0 {
+                plate + radius
+            } else {
+                -(plate + radius)
+            };
+            let face = nm_of(at + beyond)?;
+            let mut offsets = session.offsets()?;
+            let mut machine_nm = tripped;
+            if by.axis == 2 {
+                machine_nm = machine_nm.wrapping_sub(offsets.tool_nm);
+            }
+            set(&mut offsets, *work, by.axis, machine_nm.wrapping_sub(face));
+            session.command(&Request::SetOffsets(offsets))?;
+        }
+        Action::Zero { axes, work, at } => {
+            must_be_homed(session)?;
+            let at = nm_of(*at)?;
+            let stands = session.motion()?.at_nm;
+            let mut offsets = session.offsets()?;
+            for (axis, nm) in (0_u8..).zip(stands) {
+                if axes >> axis & 1 != 0 {
+                    let tool = if axis == 2 { offsets.tool_nm } else { 0 };
+                    set(&mut offsets, *work, axis, nm.wrapping_sub(tool).wrapping_sub(at));
+                }
+            }
+            session.command(&Request::SetOffsets(offsets))?;
+        }
+        Action::Tool { by, setter, speed } => {
+            let tripped = touched(session, *by, *speed)?;
+            let mut offsets = session.offsets()?;
+            offsets.tool_nm = match setter {
+                Some(setter) => tripped.wrapping_sub(nm_of(*setter)?),
+                None => 0,
+            };
+            session.command(&Request::SetOffsets(offsets))?;
+            if setter.is_none() && !as_json {
+                let mm = f64::from(tripped) / NM_PER_MM;
+                say!("this is the reference tool; for every other one: tool .. --setter {mm:.6}");
+            }
+        }
+        Action::Offsets => {}
+    }
+    let (motion, offsets) = (session.motion()?, session.offsets()?);
+    if as_json {
+        let mm = |nm: i32| f64::from(nm) / NM_PER_MM;
+        say!(
+            "{}",
+            json!({
+                "axes": json_of(&motion),
+                "work_mm": offsets.work_nm.map(|origin| origin.map(mm)),
+                "tool_mm": mm(offsets.tool_nm),
+            })
+        );
+        return Ok(());
+    }
+    say!("axes at {} mm", PositionNm(motion.at_nm).words());
+    for (number, origin) in (1..).zip(offsets.work_nm) {
+        say!("  work offset {number}: {} mm", PositionNm(origin).words());
+    }
+    say!("  tool length: {:.6} mm", f64::from(offsets.tool_nm) / NM_PER_MM);
+    Ok(())
+}
+
+fn set(offsets: &mut Offsets, work: u8, axis: u8, nm: i32) {
+    let origin = offsets.work_nm.get_mut(usize::from(work).wrapping_sub(1));
+    if let Some(place) = origin.and_then(|origin| origin.get_mut(usize::from(axis))) {
+        *place = nm;
+    }
+}
+
+/// A length in mm, as nm.
+fn nm_of(mm: f64) -> Result<i32> {
+    home::position(&format!("{mm},0,0"))
+        .map(|position| position.0[0])
+        .map_err(|why| Failure::input(why, "give a length in mm"))
+}
+
+fn must_be_homed(session: &mut Session) -> Result<()> {
+    if session.status()?.safety.homed {
+        return Ok(());
+    }
+    Err(Failure::Failed(Some(
+        "the machine is not homed, so its coordinates mean nothing yet\n  help: operate home".to_owned(),
+    )))
+}
+
+/// Probes fast, goes back, probes slowly, and goes back: where it tripped.
+fn touched(session: &mut Session, by: Distance, speed: f32) -> Result<i32> {
+    must_be_homed(session)?;
+    carried_out(session, &by.probe(speed))?;
+    let sign = by.nm.signum();
+    let back = Distance {
+        nm: -sign * BACK_NM,
+        ..by
+    };
+    carried_out(session, &back.jog(speed))?;
+    let again = Distance {
+        nm: sign * AGAIN_NM,
+        ..by
+    };
+    let motion = carried_out(session, &again.probe(SLOW_MM_S.min(speed)))?;
+    carried_out(session, &back.jog(speed))?;
+    motion
+        .tripped_nm
+        .ok_or_else(|| Failure::Failed(Some("the board did not latch the position".to_owned())))
+}
+
+/// Moves along one axis after the other.
+fn go_to(session: &mut Session, to: PositionNm, work: Option<u8>, speed: f32) -> Result<()> {
+    must_be_homed(session)?;
+    let mut to_nm = to.0;
+    if let Some(work) = work {
+        let origin = session
+            .offsets()?
+            .origin_nm(usize::from(work) - 1)
+            .unwrap_or([0; 3]);
+        for (value, by) in to_nm.iter_mut().zip(origin) {
+            *value = value.wrapping_add(by);
+        }
+    }
+    let stands = session.motion()?.at_nm;
+    let order = if to_nm[2] > stands[2] {
+        [2, 0, 1]
+    } else {
+        [0, 1, 2]
+    };
+    for axis in order {
+        let nm = to_nm[usize::from(axis)].wrapping_sub(stands[usize::from(axis)]);
+        if nm != 0 {
+            carried_out(session, &Distance { axis, nm }.jog(speed))?;
+        }
+    }
+    Ok(())
+}
+
+/// Speeds of the jog by keys, as shares of the profile's velocity.
+const SHARES: [f32; 4] = [0.02, 0.1, 0.3, 1.0];
+
+/// The jog of a key.
+const fn jog_of(key: &Key) -> Option<(u8, JogWay)> {
+    Some(match key {
+        Key::ArrowRight => (0, JogWay::Plus),
+        Key::ArrowLeft => (0, JogWay::Minus),
+        Key::ArrowUp => (1, JogWay::Plus),
+        Key::ArrowDown => (1, JogWay::Minus),
+        Key::PageUp => (2, JogWay::Plus),
+        Key::PageDown => (2, JogWay::Minus),
+        _ => return None,
+    })
+}
+
+/// Jogs for as long as keys are held: the board stops the axis when the key's repetition ends.
+pub(super) fn by_keys(session: &mut Session) -> Result<()> {
+    let term = Term::stderr();
+    if !term.is_term() || !console::user_attended() {
+        return Err(Failure::input(
+            "a jog by keys needs a terminal",
+            "give the distance: operate jog x+10",
+        ));
+    }
+    let Some(Profile { velocity_mm_s, .. }) = session.profile()? else {
+        return Err(Failure::Failed(Some(
+            "the board keeps no machine profile\n  help: cargo sim settings --port DEV --machine machine.toml".to_owned(),
+        )));
+    };
+    to_stderr(format_args!(
+        "hold a key: arrows x and y, page up and down z; + and - speed; q or Escape ends. An axis stops when its key is released."
+    ));
+    let (sender, keys) = std::sync::mpsc::channel();
+    // The thread ends with the process, or with the last key.
+    std::thread::spawn(move || {
+        while let Ok(key) = Term::stderr().read_key() {
+            if sender.send(key).is_err() {
+                break;
+            }
+        }
+    });
+    let mut share = 1;
+    let mut lit = InputLines::NONE;
+    loop {
+        let first = keys.recv_timeout(std::time::Duration::from_millis(500));
+        // Keys that have waited while the board answered are one wish: the last.
+        let key = std::iter::once(first).chain(keys.try_iter().map(Ok)).last();
+        match key {
+            Some(Ok(Key::Escape | Key::Char('q' | 'Q') | Key::CtrlC)) => {
+                session.command(&Request::Hold).ok();
+                return Ok(());
+            }
+            Some(Ok(Key::Char('+'))) => share = (share + 1).min(SHARES.len() - 1),
+            Some(Ok(Key::Char('-'))) => share = share.saturating_sub(1),
+            Some(Ok(key)) => {
+                if let Some((axis, way)) = jog_of(&key) {
+                    let speed_mm_s = velocity_mm_s[usize::from(axis)] * SHARES[share];
+                    let request = Request::Jog {
+                        axis,
+                        way,
+                        speed_mm_s,
+                    };
+                    if let Err(error) = session.command(&request) {
+                        to_stderr(format_args!("{error}"));
+                    }
+                }
+            }
+            Some(Err(std::sync::mpsc::RecvTimeoutError::Disconnected)) => return Ok(()),
+            Some(Err(std::sync::mpsc::RecvTimeoutError::Timeout)) | None => {}
+        }
+        let motion = session.motion()?;
+        if motion.end == MotionEnd::LimitSwitch
+            && motion.lines != lit
+            && let Some((what, remedy)) = axes::failure(&motion)
+        {
+            to_stderr(format_args!("{what}; {remedy}"));
+        }
+        lit = motion.lines;
+        let [x, y, z] = motion.at_nm.map(|nm| f64::from(nm) / NM_PER_MM);
+        let percent = SHARES[share] * 100.0;
+        term.clear_line().ok();
+        term.write_str(&format!(
+            "x {x:9.3}  y {y:9.3}  z {z:9.3} mm   speed {percent:.0} %\r"
+        ))
+        .ok();
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_distance_is_an_axis_and_a_signed_number() {
+        assert_eq!(
+            distance("x+10"),
+            Ok(Distance {
+                axis: 0,
+                nm: 10_000_000
+            })
+        );
+        assert_eq!(distance("z-0.0005"), Ok(Distance { axis: 2, nm: -500 }));
+        for wrong in ["x10", "+10", "w+1", "x", "x+", "y+3000", "x+inf", "x-nan", ""] {
+            assert!(distance(wrong).is_err(), "{wrong}");
+        }
+        assert_eq!((axes("z"), axes("xy"), axes("zyx")), (Ok(4), Ok(3), Ok(7)));
+        assert!(axes("").is_err() && axes("xa").is_err());
+    }
+}
