@@ -49,11 +49,6 @@ const BOUNDS: &[(&str, u32, &str)] = &[
     ),
     ("interp_core::pass::contact::solve", 2, "Newton steps"),
     (
-        "interp_core::pass::run::Run::step_far",
-        2,
-        "patches of an arc: CROSSINGS_MAX + 1",
-    ),
-    (
         "interp_core::feed::curve::Curve as interp_core::feed::pace::Course::advance",
         3,
         "pieces of a curve, and phases of a ramp",
