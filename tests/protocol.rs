@@ -37,6 +37,7 @@ fn header() -> Header {
         feed_mm_s: 10.0,
         scallop_mm: 0.005,
         period_s: 0.001,
+        edges: 0,
         window: 0,
         axes: None,
     }

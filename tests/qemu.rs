@@ -126,6 +126,23 @@ fn constant_scallop_height() {
     ]);
 }
 
+/// Passes clipped to a region, without axis limits and with them.
+#[test]
+fn region() {
+    let with_limits = {
+        let path = format!("{}/../jobs/region.toml", env!("CARGO_MANIFEST_DIR"));
+        let mut job = job_file::load(path.as_ref()).unwrap();
+        job.scallop_mm = 0.2;
+        job.machine.limits = Some(job::AxisLimits::DEFAULT);
+        prepare(&job).unwrap()
+    };
+    compare_prepared(&[
+        ("region", job("region")),
+        ("region with limits", with_limits),
+        ("torus", job("torus")),
+    ]);
+}
+
 /// A job with axis limits, before and after one without.
 #[test]
 fn with_limits() {

@@ -63,6 +63,7 @@ jobs! {
     plate: 164,
     plate_machine: 53,
     plate_v: 146,
+    region: 82,
     revolved: 319,
     revolved_v: 110,
     ruled_printed: 132,

@@ -2,7 +2,7 @@
 //! surfaces with what makes the step to the next pass difficult: short passes at high feed, many patches.
 
 mod constant;
-mod shapes;
+pub(crate) mod shapes;
 
 use std::path::PathBuf;
 

@@ -26,7 +26,8 @@ pub enum FaultKind {
     /// A header value is not finite or out of its range. Value: the value.
     BadHeader = 8,
     /// A patch's coefficients exceed the range in which its polynomials cannot overflow, its weights vary more than
-    /// 4 : 1, or a boundary flagged as a pole does not collapse. Value: the patch's index.
+    /// 4 : 1, or a boundary flagged as a pole does not collapse; or edges of the region are not in order, outside of the surface, not closed, or too many on
+    /// one line. Value: the record's index: patches, then portions of eight edges; the pass where there are too many on a line.
     BadPatch = 9,
     /// The job's data are incomplete, or their length is not the one that the header implies. Value: the wrong number of words or offset.
     BadLength = 10,

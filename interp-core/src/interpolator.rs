@@ -145,7 +145,8 @@ impl<S: AsRef<[i32]> + AsMut<[i32]>> Interpolator<S> {
     /// [`FaultKind::BadLength`] where words are missing or the order is not kept.
     pub fn load_check(&mut self, record: u32) -> Result<()> {
         self.motion.may_continue_loading()?;
-        self.motion.program.check(self.store.as_ref(), record)
+        let Motion { program, run, .. } = &mut self.motion;
+        program.check(self.store.as_ref(), record, run.lines.scratch())
     }
 
     /// Seals the job: the machine is ready.
@@ -153,7 +154,7 @@ impl<S: AsRef<[i32]> + AsMut<[i32]>> Interpolator<S> {
     /// # Errors
     /// [`FaultKind::BadLength`] where words or checks are missing, of a streamed job those of the first rows; the machine stays idle.
     pub fn load_finish(&mut self) -> Result<()> {
-        self.motion.load_finish()
+        self.motion.load_finish(self.store.as_ref())
     }
 
     /// Drops the loaded job: the machine is idle.
@@ -344,11 +345,11 @@ impl Motion {
         Ok(())
     }
 
-    fn load_finish(&mut self) -> Result<()> {
+    fn load_finish(&mut self, store: &[i32]) -> Result<()> {
         self.may_load()?;
         self.program.seal()?;
         self.state = State::Ready;
-        self.restart();
+        self.restart(store);
         Ok(())
     }
 
@@ -360,8 +361,10 @@ impl Motion {
         Ok(())
     }
 
-    fn restart(&mut self) {
-        self.run.restart(self.program.header().spacing);
+    fn restart(&mut self, store: &[i32]) {
+        if let Ok(job) = self.program.job(store) {
+            self.run.restart(&self.program, &job);
+        }
         self.fault = None;
     }
 
@@ -577,17 +580,20 @@ impl Motion {
         let has_limits = self.program.header().axes.is_some();
         self.state = match command {
             Command::Start => {
-                self.restart();
+                self.restart(store);
                 if let Err(fault) = self.program.rewind() {
                     return self.fail(fault);
                 }
                 let Self {
-                    program, sequencer, ..
+                    program,
+                    sequencer,
+                    run,
+                    ..
                 } = self;
                 match program.job(store) {
                     Ok(job) if has_limits => {
                         if let Some(axes) = &job.header.axes {
-                            sequencer.restart(job.header, axes);
+                            sequencer.restart(run.first_route(&job), axes);
                         }
                         State::Linking
                     }

@@ -263,6 +263,7 @@ pub(crate) struct HeaderFields {
     feed_mm_s: f32,
     scallop_mm: f32,
     period_s: f32,
+    edges: u16,
     window: u16,
     #[serde(with = "axes")]
     axes: Option<AxisLimits>,

@@ -55,6 +55,7 @@ prop_compose! {
             feed_mm_s: values[1],
             scallop_mm: values[2],
             period_s: values[3],
+            edges: spans[0],
             window: spans[0] ^ spans[1],
             axes,
         }

@@ -129,8 +129,8 @@ pub fn verify_run<'a>(
     progress: &dyn Progress,
 ) -> Result<Verification, InspectError> {
     let measured = measure(job, prepared, timed, each, requirements, progress)?;
-    // Curved passes are checked by the scallop height alone.
-    let scanned = match job.spacing.is_constant() {
+    // Curved passes are checked by the scallop height alone; those of a region line by line, because a line more or less may pass by a vertex or meet it.
+    let scanned = match job.spacing.is_constant() || job.region.is_some() {
         true => None,
         false => oracle(job)?.schedule().ok().map(|passes| passes.len()),
     };

@@ -3,6 +3,7 @@
 use std::fmt;
 
 use super::derivatives::Derivatives;
+use super::region::RegionEdges;
 use super::surface::Surface;
 use glam::DVec3;
 use job::{Along, Job, Pattern, Side, Spacing};
@@ -132,6 +133,8 @@ pub struct Oracle {
     pub feed_mm_s: f64,
     /// Whether turns beyond the boundary join the passes: these then begin and end within a period's step of it.
     pub overruns: bool,
+    /// The region that is machined; `None` for the whole surface.
+    pub region: Option<RegionEdges>,
 }
 
 /// Curvatures of a contact, 1/mm; see [`Contact`].
@@ -153,8 +156,20 @@ impl Oracle {
             Side::Plus => 1.0,
             Side::Minus => -1.0,
         };
+        let region = job.region.as_ref().map(|region| {
+            let breaks = match job.along {
+                Along::U => [Along::U, Along::V],
+                Along::V => [Along::V, Along::U],
+            };
+            RegionEdges::new(
+                region,
+                job.along,
+                breaks.map(|parameter| surface.breaks(parameter)),
+            )
+        });
         Ok(Self {
             surface,
+            region,
             along: job.along,
             pattern: job.pattern,
             normal_sign,

@@ -9,6 +9,7 @@
 //!             -> contact.rs             normal, curvatures, step-over, interval (steps 2 to 4 of the interpolator)
 //!             -> arc.rs                 arc length along a pass
 //!             -> offset.rs              the offset path of the tool centre: its derivative, and the foot point of a given centre
+//!             -> region.rs              intervals of a region on a line
 //!             -> schedule.rs            passes by a dense scan
 //!             -> facing.rs              what looks down, and the turn after which nothing does
 //!             -> front/                 passes of constant scallop height, curved and partial
@@ -28,6 +29,7 @@ mod facing;
 pub mod front;
 mod nurbs;
 mod offset;
+mod region;
 mod report;
 mod schedule;
 mod surface;
@@ -39,6 +41,7 @@ pub use contact::{Contact, Oracle, OracleError};
 pub use derivatives::Derivatives;
 pub use facing::{Facing, facing, turned_further};
 pub use offset::OffsetPoint;
+pub use region::RegionEdges;
 pub use report::{AccuracyBounds, AccuracyFigure, AccuracyReport, ErrorStatistics, SampleLocation};
 pub use schedule::ScheduledPass;
 pub use surface::Surface;

@@ -32,49 +32,62 @@ const NEWTON_STEPS: u8 = 12;
 /// Largest number of passes of a schedule.
 const PASSES_MAX: usize = 1_000_000;
 
-/// A pass: its side parameter, and the largest distance to the next pass.
+/// A pass: its side parameter and its ends, and the largest distance to the next line.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ScheduledPass {
     /// Side parameter.
     pub side: f64,
-    /// Largest step to the next pass, in the side parameter; for passes spaced by the first order the least interval on the pass.
+    /// Path parameters of its ends, ascending: those of the surface, or of an interval of the region.
+    pub ends: [f64; 2],
+    /// Largest step to the next line, in the side parameter; for passes spaced by the first order the least interval on the pass.
     pub interval: f64,
 }
 
 impl Oracle {
-    /// All passes from one boundary of the side parameter to the other (steps 5 and 6).
+    /// All passes from one boundary of the side parameter to the other (steps 5 and 6), or of a region: its intervals on lines from its first to its last.
     ///
     /// # Errors
     /// [`OracleError::BallDoesNotFit`] and [`OracleError::Degenerate`] at the first such point,
     /// [`OracleError::TooManyPasses`] if the intervals converge to 0.
     pub fn schedule(&self) -> Result<Vec<ScheduledPass>, OracleError> {
-        let [start, end] = self.side_range();
+        let [start, _] = self.pass_range();
+        let end = self.last_line();
         let mut passes = Vec::new();
-        let mut side = start;
+        let mut steps = Vec::new();
+        let Some(mut side) = self.next_line(start) else {
+            return Ok(passes);
+        };
         while passes.len() < PASSES_MAX {
-            let before: Vec<f64> = passes
-                .iter()
-                .rev()
-                .take(2)
-                .map(|pass: &ScheduledPass| pass.interval)
-                .collect();
+            let before: Vec<f64> = steps.iter().rev().take(2).copied().collect();
             let interval = match self.spacing {
                 Spacing::FirstOrder => self.least_interval(side)?,
                 Spacing::Exact | Spacing::Constant(_) => self.exact_interval(side, &before)?,
             };
-            passes.push(ScheduledPass { side, interval });
+            steps.push(interval);
+            let intervals = self.certain_intervals(side).into_iter();
+            passes.extend(intervals.map(|ends| ScheduledPass { side, ends, interval }));
             if side >= end {
                 return Ok(passes);
             }
-            let next = side + interval;
-            if next <= side {
-                return Err(OracleError::TooManyPasses);
+            // Lines without an interval are left out; where the line meets nothing at all, the region begins again.
+            let mut next = side;
+            loop {
+                if next + interval <= next {
+                    return Err(OracleError::TooManyPasses);
+                }
+                next += interval;
+                if end - next <= BOUNDARY_SHARE * interval {
+                    next = end;
+                }
+                if next >= end || !self.certain_intervals(next).is_empty() {
+                    break;
+                }
+                if self.intervals(next).is_empty() {
+                    next = self.next_line(next).unwrap_or(end);
+                    break;
+                }
             }
-            side = if end - next <= BOUNDARY_SHARE * interval {
-                end
-            } else {
-                next
-            };
+            side = next;
         }
         Err(OracleError::TooManyPasses)
     }
@@ -84,8 +97,9 @@ impl Oracle {
     /// # Errors
     /// As [`Oracle::schedule`].
     pub fn exact_interval(&self, side: f64, before: &[f64]) -> Result<f64, OracleError> {
-        let [_, end] = self.side_range();
-        let here = self.greatest_density(side)?;
+        let end = self.last_line();
+        let places = self.places_on(side);
+        let here = self.greatest_density(side, &places)?;
         if here <= 0.0 || side >= end {
             return Ok(f64::INFINITY);
         }
@@ -98,7 +112,7 @@ impl Oracle {
             _ => first,
         };
         let distance = expected.min(end - side);
-        let beside = |share: f64| self.greatest_density(side + share * distance);
+        let beside = |share: f64| self.greatest_density(side + share * distance, &places);
         let (half, whole) = (beside(0.5)?, beside(1.0)?);
         let breaks = self.surface.breaks(self.across());
         let has_knot = |from: f64, to: f64| {
@@ -124,12 +138,24 @@ impl Oracle {
         Ok(step * first)
     }
 
-    /// Greatest exact density on the line at `side`, skew ends included.
-    fn greatest_density(&self, side: f64) -> Result<f64, OracleError> {
-        let places = self.scan_places();
+    /// Places of the scan within the intervals of a line, their ends included.
+    fn places_on(&self, side: f64) -> Vec<f64> {
+        let mut places = self.scan_places();
+        if self.region.is_some() {
+            let intervals = self.certain_intervals(side);
+            places.retain(|place| intervals.iter().any(|[from, to]| (from..=to).contains(&place)));
+            places.extend(intervals.iter().flatten());
+            places.sort_by(f64::total_cmp);
+        }
+        places
+    }
+
+    /// Greatest exact density at these places of the line at `side`, skew ends at the surface's boundaries included.
+    fn greatest_density(&self, side: f64, places: &[f64]) -> Result<f64, OracleError> {
+        let boundaries = self.path_range();
         let mut most = 0.0_f64;
-        for (index, place) in places.iter().enumerate() {
-            let is_end = index == 0 || index + 1 == places.len();
+        for place in places {
+            let is_end = boundaries.contains(place);
             most = most.max(self.exact_density(*place, side, is_end)?);
         }
         Ok(most)
@@ -170,7 +196,7 @@ impl Oracle {
     /// # Errors
     /// As [`Oracle::schedule`].
     pub fn least_interval(&self, side: f64) -> Result<f64, OracleError> {
-        let places = self.scan_places();
+        let places = self.places_on(side);
         let mut intervals = Vec::with_capacity(places.len());
         for place in &places {
             intervals.push(self.interval_at(*place, side)?);

@@ -54,6 +54,8 @@ pub struct Verifier {
     breaks: Vec<f64>,
     report: AccuracyReport,
     current: Option<PassState>,
+    /// Ends of the passes on the current line of a region.
+    on_line: Vec<[f64; 2]>,
 }
 
 /// State of the current pass.
@@ -70,6 +72,10 @@ struct PassState {
     inverse_squares: f64,
     samples: u64,
     finished: bool,
+    /// Number of the line, and path parameters at the ends of the passes on it so far; of the current one at its start.
+    line: u32,
+    start: f64,
+    backwards: bool,
 }
 
 /// Longest step of a period, as a multiple of that at the programmed feed: the greatest override.
@@ -88,6 +94,7 @@ impl Verifier {
             oracle: oracle.clone(),
             report,
             current: None,
+            on_line: Vec::new(),
         }
     }
 
@@ -111,6 +118,11 @@ impl Verifier {
         if sample.last_of_pass {
             let is_off = if self.oracle.spacing.is_constant() {
                 self.is_off_curve(path, side)
+            } else if self.oracle.region.is_some() {
+                let end = self.at_boundary(sample, path, side);
+                let ends = [self.current.map_or(end, |pass| pass.start), end];
+                self.on_line.push(ends);
+                !self.oracle.is_interval(ends, side)
             } else {
                 self.is_off(sample, path, side, self.pass_ends(sample.pass)[1])
             };
@@ -138,7 +150,13 @@ impl Verifier {
                 Spacing::Constant(Start::Middle) => first,
                 _ => last,
             };
-            self.report.last_on_boundary = pass.side == end;
+            self.report.last_on_boundary = if self.oracle.region.is_some() {
+                self.check_line(pass.side);
+                self.oracle
+                    .is_empty_between(pass.side, self.oracle.pass_range()[1])
+            } else {
+                pass.side == end
+            };
         }
         self.report
     }
@@ -161,6 +179,58 @@ impl Verifier {
         !self.oracle.path_range().contains(&path) && !self.oracle.side_range().contains(&side)
     }
 
+    /// The surface's boundary for an end of a pass next to a turn, the path parameter for any other.
+    fn at_boundary(&self, sample: &PassSample, path: f64, side: f64) -> f64 {
+        let [low, high] = self.oracle.path_range();
+        let nearer = if path - low < high - path { low } else { high };
+        if self.oracle.overruns && !self.is_off(sample, path, side, nearer) {
+            nearer
+        } else {
+            path
+        }
+    }
+
+    /// Counts a line of a region that leaves out an interval.
+    fn check_line(&mut self, side: f64) {
+        if !self.oracle.is_line_complete(&self.on_line, side) {
+            self.report.off_boundary += 1;
+        }
+        self.on_line.clear();
+    }
+
+    /// Begins a pass of a region: on the line of the one before, or on the next one.
+    fn begin_interval(&mut self, sample: &PassSample, side: f64, spot: SampleLocation) {
+        let Some(before) = self.current else {
+            let [first, _] = self.oracle.pass_range();
+            self.report.first_on_boundary = sample.pass == 0 && self.oracle.is_empty_between(first, side);
+            return;
+        };
+        if !before.finished || sample.pass != self.report.passes {
+            self.report.off_boundary += 1;
+        }
+        if side == before.side {
+            return;
+        }
+        self.check_line(before.side);
+        // Where the region ends in between, the lines are not neighbours.
+        if side < before.side || self.oracle.intervals(0.5 * (before.side + side)).is_empty() {
+            return;
+        }
+        let last = self.oracle.last_line();
+        let interval = before.least_interval.min(last - before.side);
+        if self.oracle.spacing == Spacing::FirstOrder && last - side > self.oracle.near_side() {
+            // The line is rounded down to a place.
+            let error = side - (before.side + interval);
+            let error = if error < 0.0 {
+                (error + self.oracle.near_side()).min(0.0)
+            } else {
+                error
+            };
+            self.report.side_step.add(error / interval, spot);
+        }
+        self.close_scallop(&before, side - before.side);
+    }
+
     /// Path parameters where a pass starts and ends.
     fn pass_ends(&self, pass: u32) -> [f64; 2] {
         let [low, high] = self.oracle.path_range();
@@ -172,7 +242,10 @@ impl Verifier {
     fn begin_pass(&mut self, sample: &PassSample, path: f64, side: f64, spot: SampleLocation) {
         let [first, last] = self.oracle.side_range();
         let is_curve = self.oracle.spacing.is_constant();
+        let is_region = self.oracle.region.is_some();
+        let before = self.current;
         match self.current {
+            _ if is_region => self.begin_interval(sample, side, spot),
             None => {
                 let start = match self.oracle.spacing {
                     Spacing::Constant(Start::Middle) => 0.5 * (first + last),
@@ -201,6 +274,8 @@ impl Verifier {
         }
         let is_off = if is_curve {
             self.is_off_curve(path, side)
+        } else if is_region {
+            false
         } else {
             self.is_off(sample, path, side, self.pass_ends(sample.pass)[0])
         };
@@ -208,15 +283,29 @@ impl Verifier {
             self.report.off_boundary += 1;
         }
         self.report.passes += 1;
+        let same_line = before.filter(|before| is_region && before.side == side);
+        let line = match (before, same_line) {
+            (_, Some(before)) => before.line,
+            (Some(before), None) => before.line + 1,
+            (None, None) => 0,
+        };
         self.current = Some(PassState {
             side,
             path,
             before: [None, Some([path, side])],
-            least_interval: f64::INFINITY,
-            least_at: spot,
-            inverse_squares: 0.0,
-            samples: 0,
+            // The step to the next line is that of all passes on this one.
+            least_interval: same_line.map_or(f64::INFINITY, |before| before.least_interval),
+            least_at: same_line.map_or(spot, |before| before.least_at),
+            inverse_squares: same_line.map_or(0.0, |before| before.inverse_squares),
+            samples: same_line.map_or(0, |before| before.samples),
             finished: false,
+            line,
+            start: if is_region {
+                self.at_boundary(sample, path, side)
+            } else {
+                path
+            },
+            backwards: self.oracle.pattern == Pattern::Zigzag && line % 2 == 1,
         });
     }
 
@@ -244,11 +333,7 @@ impl Verifier {
         if self.oracle.spacing.is_constant() {
             return self.check_curve(sample, [path, side], spot);
         }
-        let forwards = if self.oracle.pattern == Pattern::Zigzag && sample.pass % 2 == 1 {
-            -1.0
-        } else {
-            1.0
-        };
+        let forwards = if pass.backwards { -1.0 } else { 1.0 };
         let from = pass.path;
         pass.path = path;
         if side != pass.side || (path - from) * forwards < 0.0 || pass.finished {

@@ -302,8 +302,18 @@ fn settled(job: Job) -> Result<(Job, Prepared)> {
     Ok(settled?)
 }
 
-/// Refuses passes of constant scallop height, which only the board makes.
+/// Refuses passes of constant scallop height and those of a region, which only the board makes.
 fn straight_passes(job: &Job) -> Result<()> {
+    if job.region.is_some() {
+        return Err(job
+            .origin
+            .error(
+                "region",
+                "the other approaches machine a whole surface only",
+                "remove the section [region]",
+            )
+            .into());
+    }
     if job.spacing.is_constant() {
         return Err(job
             .origin

@@ -264,7 +264,14 @@ fn scallop(job: &Job, found: &SweptResult) {
         um(error.search_mm)
     );
     row("", &parts);
-    row("", "first and last pass lie on the boundaries: no uncut margin");
+    row(
+        "",
+        if job.region.is_some() {
+            "between passes of neighbouring lines; half a step-over from the region's boundary is left out"
+        } else {
+            "first and last pass lie on the boundaries: no uncut margin"
+        },
+    );
 }
 
 #[allow(clippy::cast_precision_loss, reason = "sizes of memories")]

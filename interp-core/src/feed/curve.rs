@@ -1,6 +1,7 @@
 //! Rest to rest along one coordinate in closed form, for links: constant jerk, constant acceleration, constant jerk, cruise, and back.
 
 use super::pace::{Course, Use};
+use super::profile::{SlotAt, Span, fastest_around};
 use super::{MM_PER_Q10, to_q10};
 use crate::math::arith::sqrt;
 use crate::math::number::{Bounded, cube_root, to_f32};
@@ -16,6 +17,9 @@ pub(crate) struct CurveLimits {
 /// Fractions of the limits that a link uses: what is left is for a hold, and for the rounding of positions.
 const ACCELERATION: f32 = 0.98;
 const JERK: f32 = 0.96;
+
+/// A place just before the end of a ramp, as a share of it.
+const BEFORE_END: f32 = 0.999;
 
 /// A piece: a ramp from one speed to another, then a cruise at that speed.
 #[derive(Clone, Copy, Debug)]
@@ -362,9 +366,64 @@ impl Course for Curve {
             jerk: ((j * r * r + 3.0 * a * r1) * r + v * r2).abs() / limits.jerk,
         }
     }
+
+    fn span_at(&self, cursor: &CurveCursor, slot: &SlotAt, room: &Use) -> Span {
+        let SlotAt {
+            r,
+            first,
+            slot_s,
+            around,
+        } = *slot;
+        let [v, a, j] = self.piece(cursor.piece).rates(cursor.time);
+        let limits = &self.limits;
+        let mut span = Span::WIDE;
+        let later = a + 0.5 * slot_s * r * j;
+        span.add_acceleration(
+            [a, later].map(|a| a * r * r),
+            v,
+            room.acceleration * limits.acceleration,
+        );
+        // The speed changes over the time around the place, and the jerk steps.
+        let fastest = fastest_around([v, a, j], r * around);
+        let by_first = 3.0 * a * r;
+        let [before, behind] = self.jerk_beside(cursor, r * around, v);
+        let least = j.at_most(before).at_most(behind);
+        let greatest = j.at_least(before).at_least(behind);
+        span.add_jerk(
+            [least, greatest].map(|j| j * r * r * r + by_first * first),
+            [fastest, fastest + by_first * slot_s],
+            room.jerk * limits.jerk,
+        );
+        span
+    }
 }
 
 impl Curve {
+    /// Jerk this time before and behind a place with this speed.
+    fn jerk_beside(&self, cursor: &CurveCursor, around: f32, speed: f32) -> [f32; 2] {
+        let piece = self.piece(cursor.piece);
+        let jerk = |piece: &Piece, time: f32| {
+            let [_, _, jerk] = piece.rates(time);
+            jerk
+        };
+        let moved = to_f32(piece.cruise_q10 - cursor.left_q10) * MM_PER_Q10;
+        let before = match cursor.piece.checked_sub(1).map(|before| self.piece(before)) {
+            _ if moved > speed * around => 0.0,
+            Some(before) if cursor.time < around && before.cruise_q10 == 0 => {
+                jerk(before, before.ramp_s * BEFORE_END)
+            }
+            _ => jerk(piece, (cursor.time - around).at_least(0.0)),
+        };
+        let ends =
+            cursor.time + around >= piece.ramp_s && to_f32(cursor.left_q10) * MM_PER_Q10 <= speed * around;
+        let behind = if ends && !self.is_last(cursor.piece) {
+            jerk(self.piece(cursor.piece + 1), 0.0)
+        } else {
+            jerk(piece, cursor.time + around)
+        };
+        [before, behind]
+    }
+
     const fn is_last(&self, piece: u8) -> bool {
         piece >= self.last
     }

@@ -13,8 +13,8 @@ const LEAD_STEPS: u16 = 2 * CHANGE_MIN;
 
 impl Lead {
     /// [`Self::look`] at a plan that is being checked, a period after the last look.
-    pub(crate) fn look_draft(&mut self, plan: &Plan, cursor: &Cursor) {
-        self.count(plan, cursor, cursor.draft_speed_sqr(plan), 1.0);
+    pub(crate) fn look_draft(&mut self, plan: &Plan, draft: &[f32], cursor: &Cursor) {
+        self.count(plan, cursor, cursor.draft_speed_sqr(plan, draft), 1.0);
     }
 
     /// Counts the time for which the plan is near the feed. `periods`: since the last look.

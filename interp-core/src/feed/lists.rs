@@ -8,7 +8,19 @@ pub(crate) const LIST: usize = 170;
 const _: () = assert!(LIST >= STATIONS_MAX + 2 && LIST >= NODES_MAX + 3);
 
 /// Lists that the stages of the planner use, each for what it needs.
-pub(crate) type Lists = [[f32; LIST]; 5];
+pub(crate) type Lists = [[f32; LIST]; 6];
+
+/// The pace that is being planned, in the last list: coefficients of a quadratic B-spline.
+pub(crate) const fn draft(lists: &Lists) -> &[f32; LIST] {
+    let [.., draft] = lists;
+    draft
+}
+
+/// See [`draft`].
+pub(crate) const fn draft_mut(lists: &mut Lists) -> &mut [f32; LIST] {
+    let [.., draft] = lists;
+    draft
+}
 
 /// A value; 0 outside of the lists.
 pub(super) fn get(lists: &Lists, list: usize, index: u16) -> f32 {

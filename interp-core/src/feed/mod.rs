@@ -20,6 +20,7 @@
 //! | [`planner`] | all of it in portions, and a check of the result period by period |
 //! | [`follow`] | one period along a plan, at exactly the programmed feed where the plan reaches it |
 //! | [`pace`] | hold, resume, override: checked changes of pace |
+//! | [`profile`] | a change of the pace that uses at each place what the axes leave there |
 //! | [`curve`] | rest to rest along a short or straight link in closed form |
 
 mod cell_motion;
@@ -33,6 +34,7 @@ mod node_times;
 pub(crate) mod pace;
 pub(crate) mod plan;
 pub(crate) mod planner;
+pub(crate) mod profile;
 pub(crate) mod road;
 pub(crate) mod stations;
 pub(crate) mod turn;

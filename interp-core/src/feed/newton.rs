@@ -6,7 +6,7 @@
 //! speed also in the middle of each interval. A place is weighted by its share of the time.
 
 use super::limits::MotionLimits;
-use super::lists::{LIST, Lists, get, put};
+use super::lists::{LIST, Lists, draft, get, put};
 use super::plan::{COEFFICIENTS, PINNED, Plan};
 use super::stations::Derivatives;
 
@@ -304,7 +304,7 @@ impl Sweep {
 }
 
 /// Derivatives of a B-spline's coefficients at a node: c, c', c''; at the ends c'' is that of the other side.
-fn local(values: &[f32; COEFFICIENTS], node: u16, intervals: u16) -> Local {
+fn local(values: &[f32], node: u16, intervals: u16) -> Local {
     let at = |index: usize| values.get(index).copied().unwrap_or(0.0);
     let index = usize::from(node);
     let (here, next) = (at(index), at(index + 1));
@@ -321,9 +321,9 @@ fn local(values: &[f32; COEFFICIENTS], node: u16, intervals: u16) -> Local {
 }
 
 /// The three coefficients of the pace of an interval.
-fn three(plan: &Plan, interval: u16) -> [f32; 3] {
+fn three(lists: &Lists, interval: u16) -> [f32; 3] {
     let from = usize::from(interval);
-    match plan.draft.get(from..from + 3) {
+    match draft(lists).get(from..from + 3) {
         Some(&[a, b, c]) => [a, b, c],
         _ => [1.0; 3],
     }
@@ -431,16 +431,16 @@ fn at_middle([a, b, c]: &[f32; 3]) -> f32 {
 
 /// Greatest factor of the pace that keeps the rows of a node and behind it.
 #[inline(never)]
-pub(crate) fn factor(plan: &Plan, limits: &MotionLimits, sweep: &mut Sweep) -> f32 {
+pub(crate) fn factor(plan: &Plan, limits: &MotionLimits, lists: &Lists, sweep: &mut Sweep) -> f32 {
     let (place, speed) = at_node(plan, limits, sweep.node);
-    let pace = local(&plan.draft, sweep.node, plan.intervals);
+    let pace = local(draft(lists), sweep.node, plan.intervals);
     let mut factor = place.factor(limits, speed * place.v * place.v, &pace);
     if let Some((interval, row)) = middle(plan, sweep.node, [sweep.speed, speed]) {
-        let use_of_row = row * at_middle(&three(plan, interval));
+        let use_of_row = row * at_middle(&three(lists, interval));
         factor = factor.at_most(1.0 / use_of_row.at_least(1e-9));
     }
     sweep.speed = speed;
-    let coefficients = three(plan, sweep.node);
+    let coefficients = three(lists, sweep.node);
     at_jumps(plan, limits, sweep, &mut |place, weights| {
         let pace = at_stencil(weights, &coefficients);
         factor = factor.at_most(place.factor(limits, 0.0, &pace));
@@ -472,7 +472,7 @@ pub(crate) fn assemble(
 ) {
     let node = sweep.node;
     let (place, speed) = at_node(plan, limits, node);
-    let pace = local(&plan.draft, node, plan.intervals);
+    let pace = local(draft(lists), node, plan.intervals);
     let mu = mu * share(lists, weight, node);
     let mut sums = Sums::default();
     // The place's part of the time, and the row of its speed.
@@ -487,16 +487,16 @@ pub(crate) fn assemble(
     place.barrier(limits, &pace, mu, &mut sums);
     scatter_node(lists, node, plan.intervals, &sums);
     if let Some((interval, row)) = middle(plan, node, [sweep.speed, speed]) {
-        let force = row / (1.0 - row * at_middle(&three(plan, interval))).at_least(SLACK_MIN);
+        let force = row / (1.0 - row * at_middle(&three(lists, interval))).at_least(SLACK_MIN);
         scatter(lists, interval, &MIDDLE, mu * force, mu * force * force);
     }
     sweep.speed = speed;
     // Every coefficient stays positive.
-    positive(plan, lists, node, mu);
+    positive(lists, node, mu);
     if node == plan.intervals {
-        positive(plan, lists, node + 1, mu);
+        positive(lists, node + 1, mu);
     }
-    let coefficients = three(plan, node);
+    let coefficients = three(lists, node);
     at_jumps(plan, limits, sweep, &mut |place, weights| {
         let mut sums = Sums::default();
         place.barrier(limits, &at_stencil(weights, &coefficients), mu, &mut sums);
@@ -504,8 +504,8 @@ pub(crate) fn assemble(
     });
 }
 
-fn positive(plan: &Plan, lists: &mut Lists, index: u16, mu: f32) {
-    let value = plan.draft.get(usize::from(index)).copied().unwrap_or(1.0);
+fn positive(lists: &mut Lists, index: u16, mu: f32) {
+    let value = draft(lists).get(usize::from(index)).copied().unwrap_or(1.0);
     let force = 1.0 / value.at_least(1e-9);
     add(lists, GRADIENT, index, -mu * force);
     let [diagonal, _, _] = DIAGONALS;
@@ -649,7 +649,7 @@ pub(crate) fn extend(
         return;
     };
     let (place, speed) = at_node(plan, limits, node);
-    let pace = local(&plan.draft, node, plan.intervals);
+    let pace = local(draft(lists), node, plan.intervals);
     let direction = direction(gradient, node, plan.intervals);
     let row = speed * place.v * place.v;
     reach.add(1.0 - row * pace.c, row * direction.c);
@@ -658,16 +658,16 @@ pub(crate) fn extend(
         let at = |index: u16| -get(lists, GRADIENT, index);
         [at(index), at(index + 1), at(index + 2)]
     };
-    let coefficients = three(plan, node);
+    let coefficients = three(lists, node);
     let steps = back(node);
     // The last node has one coefficient more.
     let last = if node == plan.intervals { node + 1 } else { node };
     for index in node..=last {
-        let value = plan.draft.get(usize::from(index)).copied().unwrap_or(1.0);
+        let value = draft(lists).get(usize::from(index)).copied().unwrap_or(1.0);
         reach.add(value, get(lists, GRADIENT, index));
     }
     if let Some((interval, row)) = middle(plan, node, [sweep.speed, speed]) {
-        let value = at_middle(&three(plan, interval));
+        let value = at_middle(&three(lists, interval));
         reach.add(1.0 - row * value, row * at_middle(&back(interval)));
     }
     sweep.speed = speed;
@@ -695,13 +695,14 @@ fn direction(gradient: &[f32; LIST], node: u16, intervals: u16) -> Local {
 }
 
 /// Takes the step.
-pub(crate) fn take(plan: &mut Plan, lists: &Lists, step: f32) {
+pub(crate) fn take(plan: &Plan, lists: &mut Lists, step: f32) {
     if !(step > 0.0) {
         return;
     }
-    let count = plan.intervals + 2;
-    for (index, pace) in (0..count).zip(&mut plan.draft) {
-        *pace -= step * get(lists, GRADIENT, index);
+    let count = usize::from(plan.intervals) + 2;
+    let [gradient, .., draft] = lists;
+    for (pace, direction) in draft.iter_mut().zip(gradient).take(count) {
+        *pace -= step * *direction;
     }
 }
 

@@ -1,8 +1,9 @@
 //! A plan: the path's stations, a walk along them and the pace of the walk; and a cursor that moves along it.
 
-use super::limits::{FeedChange, MotionLimits};
+use super::limits::{AxisMotion, FeedChange, MotionLimits};
 use super::pace::{Course, Use};
-use super::stations::Stations;
+use super::profile::{SlotAt, Span, fastest_around};
+use super::stations::{Derivatives, Stations};
 use super::{MM_PER_Q10, Q10_BITS, Q10_PER_MM, to_q10};
 use crate::math::arith::{sqrt, truncated};
 use crate::math::number::{Bounded, to_f32};
@@ -34,6 +35,9 @@ pub(crate) const PINNED: u16 = 3;
 
 /// Distance from an end at speed within which the walk is made slower until the plan can begin at it, nm.
 const NEAR_TURN_NM: u32 = 4_000_000;
+
+/// Distance from an end at speed within which a change of the pace is looked at closely, nm.
+const UNEVEN_NM: u32 = 15_000_000;
 
 /// Where a jump lies: interval, fraction of it in units of 2^-16, and the first of its two stations.
 #[derive(Clone, Copy, Debug)]
@@ -86,9 +90,8 @@ pub(crate) struct Plan {
     pub(crate) inverse_step: f32,
     /// The walk: S is a cubic B-spline; differences of its coefficients, mm.
     pub(crate) walk: [f32; COEFFICIENTS],
-    /// The pace c that is followed, and the one that is being planned: coefficients of a quadratic B-spline.
+    /// The pace c that is followed: coefficients of a quadratic B-spline.
     pub(crate) pace: [f32; COEFFICIENTS],
-    pub(crate) draft: [f32; COEFFICIENTS],
     /// Cell of the stations at each node, and the fraction of it in units of 2^-16.
     pub(crate) cells: [u16; NODES_MAX + 1],
     pub(crate) parts: [u16; NODES_MAX + 1],
@@ -168,7 +171,6 @@ impl Plan {
         inverse_step: 0.0,
         walk: [0.0; COEFFICIENTS],
         pace: [0.0; COEFFICIENTS],
-        draft: [0.0; COEFFICIENTS],
         cells: [0; NODES_MAX + 1],
         parts: [0; NODES_MAX + 1],
         knots: [Knot {
@@ -188,8 +190,8 @@ impl Plan {
     }
 
     /// An interval with this pace.
-    fn interval_of(&self, pace: &[f32; COEFFICIENTS], index: u16) -> Interval {
-        let three = |values: &[f32; COEFFICIENTS]| {
+    fn interval_of(&self, pace: &[f32], index: u16) -> Interval {
+        let three = |values: &[f32]| {
             let from = usize::from(index);
             match values.get(from..from + 3) {
                 Some(&[a, b, c]) => [a, b, c],
@@ -335,9 +337,9 @@ impl Cursor {
         self.speed_sqr_of(&plan.interval(self.interval), plan)
     }
 
-    /// The same of the pace that is being planned.
-    pub(crate) fn draft_speed_sqr(&self, plan: &Plan) -> f32 {
-        self.speed_sqr_of(&plan.interval_of(&plan.draft, self.interval), plan)
+    /// The same of a pace that is being planned.
+    pub(crate) fn draft_speed_sqr(&self, plan: &Plan, draft: &[f32]) -> f32 {
+        self.speed_sqr_of(&plan.interval_of(draft, self.interval), plan)
     }
 
     fn speed_sqr_of(&self, interval: &Interval, plan: &Plan) -> f32 {
@@ -391,9 +393,13 @@ impl Plan {
 
     /// Whether an arc is near an end at speed.
     pub(crate) fn is_near_turn(&self, arc_nm: u32) -> bool {
+        self.is_near_end_at_speed(arc_nm, NEAR_TURN_NM)
+    }
+
+    fn is_near_end_at_speed(&self, arc_nm: u32, near_nm: u32) -> bool {
         let [start, end] = self.ends;
         let left = self.stations.length_nm().saturating_sub(arc_nm);
-        (start > 0.0 && arc_nm < NEAR_TURN_NM) || (end > 0.0 && left < NEAR_TURN_NM)
+        (start > 0.0 && arc_nm < near_nm) || (end > 0.0 && left < near_nm)
     }
 
     /// Time at pace 1 by which a cursor is beyond the end, s.
@@ -421,11 +427,20 @@ impl Course for Plan {
     fn use_at(&self, cursor: &Cursor, rates: [f32; 3], around: f32) -> Use {
         self.use_of(&self.pace, &self.limits, cursor, rates, around)
     }
+
+    fn is_uneven(&self, cursor: &Cursor) -> bool {
+        let arc_nm = u32::try_from(cursor.start_q10 >> Q10_BITS).unwrap_or(u32::MAX);
+        self.is_near_end_at_speed(arc_nm, UNEVEN_NM)
+    }
+
+    fn span_at(&self, cursor: &Cursor, slot: &SlotAt, room: &Use) -> Span {
+        self.span_of(&self.limits, cursor, slot, room)
+    }
 }
 
 impl Plan {
     /// Moves on at this pace; see [`Course::advance`].
-    fn advance_at(&self, pace: &[f32; COEFFICIENTS], cursor: &mut Cursor, seconds: f32) {
+    fn advance_at(&self, pace: &[f32], cursor: &mut Cursor, seconds: f32) {
         let by = seconds * self.inverse_step;
         let intervals = by * self.interval_of(pace, cursor.interval).speed(cursor.x);
         // As a rule a step stays within two intervals.
@@ -443,7 +458,7 @@ impl Plan {
 
     /// A step by the midpoint rule, in time of an interval at pace 1.
     #[inline(always)]
-    fn step_at(&self, pace: &[f32; COEFFICIENTS], cursor: &mut Cursor, by: f32) {
+    fn step_at(&self, pace: &[f32], cursor: &mut Cursor, by: f32) {
         let here = self.interval_of(pace, cursor.interval);
         let half = cursor.x + 0.5 * by * here.speed(cursor.x);
         let middle = if half < 1.0 || cursor.interval + 1 >= self.intervals {
@@ -458,13 +473,84 @@ impl Plan {
     /// Use of these limits at this pace; see [`Course::use_at`].
     fn use_of(
         &self,
-        pace: &[f32; COEFFICIENTS],
+        pace: &[f32],
         limits: &MotionLimits,
         cursor: &Cursor,
         rates: [f32; 3],
         around: f32,
     ) -> Use {
         let [r, r1, r2] = rates;
+        let here = self.motion_at(pace, limits, cursor, r, around);
+        let v = here.v;
+        let speed = v * r;
+        let mut most = Use {
+            feed: speed / limits.feed,
+            ..Use::NONE
+        };
+        here.each_axis(limits, |axis| {
+            let jerk = |j: f32| {
+                let jerk = (j * r * r + 3.0 * axis.acceleration * r1) * r + axis.slope * v * r2;
+                jerk.abs()
+            };
+            let [j, j_beside] = axis.jerk;
+            let of_pace = jerk(j).at_least(jerk(j_beside));
+            most.add(&Use {
+                feed: 0.0,
+                velocity: (axis.slope * speed).abs() * axis.inverse.velocity,
+                acceleration: (axis.acceleration * r * r + axis.slope * v * r1).abs()
+                    * axis.inverse.acceleration,
+                jerk: of_pace * axis.inverse.jerk + axis.of_jump,
+            });
+        });
+        most
+    }
+
+    /// What the limits leave to the derivatives of the pace; see [`Course::span_at`].
+    fn span_of(&self, limits: &MotionLimits, cursor: &Cursor, slot: &SlotAt, room: &Use) -> Span {
+        let SlotAt {
+            r,
+            first,
+            slot_s,
+            around,
+        } = *slot;
+        let here = self.motion_at(&self.pace, limits, cursor, r, around);
+        // The speed changes over the time around the place.
+        let [j, j_beside] = here.j;
+        let fastest = fastest_around([here.v, here.a, j.abs().at_least(j_beside.abs())], r * around);
+        let mut span = Span::WIDE;
+        here.each_axis(limits, |axis| {
+            let along = axis.slope * fastest;
+            let [jerk, _] = axis.jerk;
+            let later = axis.acceleration + 0.5 * slot_s * r * jerk;
+            span.add_acceleration(
+                [axis.acceleration, later].map(|a| a * r * r * axis.inverse.acceleration),
+                axis.slope * here.v * axis.inverse.acceleration,
+                room.acceleration,
+            );
+            let inverse = axis.inverse.jerk;
+            let by_first = 3.0 * axis.acceleration * r;
+            let [one, other] = axis.jerk;
+            let cube = r * r * r * inverse;
+            let of_first = by_first * first * inverse;
+            span.add_jerk(
+                [one.at_most(other), one.at_least(other)].map(|j| j * cube + of_first),
+                [along * inverse, (along + by_first * slot_s) * inverse],
+                room.jerk - axis.of_jump,
+            );
+        });
+        span
+    }
+
+    /// The motion at a place, and at the pace r the jumps that a time around it sees.
+    #[inline(always)]
+    fn motion_at(
+        &self,
+        pace: &[f32],
+        limits: &MotionLimits,
+        cursor: &Cursor,
+        r: f32,
+        around: f32,
+    ) -> MotionAt {
         let interval = self.interval_of(pace, cursor.interval);
         let x = cursor.x.at_most(1.0);
         let inverse = self.inverse_step;
@@ -505,40 +591,68 @@ impl Plan {
         } else {
             None
         };
-        let extra = jump.map_or([[0.0; 2]; 3], |station| {
+        let jump = jump.map_or([[0.0; 2]; 3], |station| {
             limits.jump_jerk(&self.stations.jump(station))
         });
-        let speed = v * r;
-        let mut most = Use {
-            feed: speed / limits.feed,
-            ..Use::NONE
-        };
-        for ((inverse, [q1, q2, q3]), [first, second]) in limits.inverse.iter().zip(&q).zip(&extra) {
-            let acceleration = q2 * v * v + q1 * a;
+        MotionAt {
+            v,
+            a,
+            j: [j, j_beside],
+            speed: v * r,
+            q,
+            jump,
+        }
+    }
+
+    /// Moves on at a pace that is being planned.
+    pub(crate) fn advance_draft(&self, draft: &[f32], cursor: &mut Cursor, seconds: f32) {
+        self.advance_at(draft, cursor, seconds);
+    }
+
+    /// Use of these limits at a pace that is being planned.
+    pub(crate) fn use_draft(&self, draft: &[f32], limits: &MotionLimits, cursor: &Cursor) -> Use {
+        self.use_of(draft, limits, cursor, [1.0, 0.0, 0.0], 0.0)
+    }
+}
+
+/// The motion of a plan at a place.
+struct MotionAt {
+    /// mm/s, mm/s^2; jerk on either side of a node nearby, mm/s^3.
+    v: f32,
+    a: f32,
+    j: [f32; 2],
+    /// Speed at the pace, mm/s.
+    speed: f32,
+    q: Derivatives,
+    jump: [[f32; 2]; 3],
+}
+
+/// The motion of an axis at a place.
+struct AxisAt<'a> {
+    slope: f32,
+    /// mm/s^2, and mm/s^3 on either side of a node nearby.
+    acceleration: f32,
+    jerk: [f32; 2],
+    /// Jerk of a jump nearby, as a fraction of the limit.
+    of_jump: f32,
+    inverse: &'a AxisMotion,
+}
+
+impl MotionAt {
+    /// Calls `each` with each axis.
+    #[inline(always)]
+    fn each_axis(&self, limits: &MotionLimits, mut each: impl FnMut(&AxisAt)) {
+        let Self { v, a, speed, .. } = *self;
+        for ((inverse, [q1, q2, q3]), [first, second]) in limits.inverse.iter().zip(&self.q).zip(&self.jump) {
             let bend = (q3 * v * v + 3.0 * q2 * a) * v;
-            let jerk = |j: f32| {
-                let jerk = ((bend + q1 * j) * r * r + 3.0 * acceleration * r1) * r + q1 * v * r2;
-                jerk.abs()
-            };
-            let of_pace = jerk(j).at_least(jerk(j_beside));
-            most.add(&Use {
-                feed: 0.0,
-                velocity: (q1 * speed).abs() * inverse.velocity,
-                acceleration: (acceleration * r * r + q1 * v * r1).abs() * inverse.acceleration,
-                jerk: of_pace * inverse.jerk + (first + second * speed) * speed,
+            each(&AxisAt {
+                slope: *q1,
+                acceleration: q2 * v * v + q1 * a,
+                jerk: self.j.map(|j| bend + q1 * j),
+                of_jump: (first + second * speed) * speed,
+                inverse,
             });
         }
-        most
-    }
-
-    /// Moves on at the planned pace.
-    pub(crate) fn advance_draft(&self, cursor: &mut Cursor, seconds: f32) {
-        self.advance_at(&self.draft, cursor, seconds);
-    }
-
-    /// Use of these limits at the planned pace.
-    pub(crate) fn use_draft(&self, limits: &MotionLimits, cursor: &Cursor) -> Use {
-        self.use_of(&self.draft, limits, cursor, [1.0, 0.0, 0.0], 0.0)
     }
 }
 

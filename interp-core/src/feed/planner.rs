@@ -1,10 +1,10 @@
 //! Plans a path in portions: walk, barrier method, check.
 
 use super::limits::{FeedChange, MotionLimits};
-use super::lists::{LIST, Lists};
-use super::newton::{self, Reach, SHAPE, Sweep};
+use super::lists::{LIST, Lists, draft, draft_mut};
+use super::newton::{self, Reach, Sweep};
 use super::pace::{Course, Use};
-use super::plan::{Cursor, Lead, NODES_MAX, Plan};
+use super::plan::{COEFFICIENTS, Cursor, Lead, NODES_MAX, Plan};
 use super::road::GateSearch;
 use super::walk::Walker;
 use crate::math::arith::{inverse_sqrt, sqrt, truncated};
@@ -130,7 +130,7 @@ impl Planner {
     /// Idle.
     pub(crate) const IDLE: Self = Self {
         stage: Stage::Done,
-        lists: [[0.0; LIST]; 5],
+        lists: [[0.0; LIST]; 6],
         walker: Walker::IDLE,
         machine: MotionLimits::NONE,
         limits: MotionLimits::NONE,
@@ -168,7 +168,9 @@ impl Planner {
         self.limits = self.machine.planned();
         self.first = first;
         (self.holds, self.drawn, self.effort) = (false, 0, Effort::Usual);
-        plan.draft = plan.pace;
+        for (draft, pace) in draft_mut(&mut self.lists).iter_mut().zip(&plan.pace) {
+            *draft = *pace;
+        }
         self.begin_method(plan);
         newton::clear(&mut self.lists);
         self.stage = Stage::Assemble;
@@ -181,7 +183,7 @@ impl Planner {
 
     /// Follows the plan of the rest from now on.
     pub(crate) fn take_over(&mut self, plan: &mut Plan) -> MotionLimits {
-        plan.pace = plan.draft;
+        self.keep(plan);
         plan.change = FeedChange::new(&self.machine);
         self.holds = false;
         self.machine
@@ -239,7 +241,7 @@ impl Planner {
             }
             Stage::Factor => {
                 let limits = limits_at(plan, &self.sweep, [&self.limits, &self.turn_limits]);
-                let factor = newton::factor(plan, limits, &mut self.sweep);
+                let factor = newton::factor(plan, limits, &self.lists, &mut self.sweep);
                 let [cell, _] = plan.node(self.sweep.node());
                 if !plan.is_near_turn(plan.stations.get(cell).arc_nm) {
                     self.factor = factor.at_most(self.factor);
@@ -265,11 +267,11 @@ impl Planner {
                     Effort::Usual
                 };
                 if plan.pinned() == [0; 2] {
-                    for pace in &mut plan.draft {
+                    for pace in draft_mut(&mut self.lists).iter_mut().take(COEFFICIENTS) {
                         *pace *= factor;
                     }
                 } else {
-                    scale(plan, factor);
+                    scale(plan, draft_mut(&mut self.lists), factor);
                 }
                 newton::clear(&mut self.lists);
                 Stage::Assemble
@@ -351,11 +353,10 @@ impl Planner {
     fn begin_method(&mut self, plan: &Plan) {
         let mut sum = 0.0;
         let count = usize::from(plan.intervals) + 2;
-        if let Some(shape) = self.lists.get_mut(SHAPE) {
-            for (shape, pace) in shape.iter_mut().zip(&plan.draft).take(count) {
-                *shape = *pace;
-                sum += inverse_sqrt(pace.at_least(1e-9));
-            }
+        let [.., shape, draft] = &mut self.lists;
+        for (shape, pace) in shape.iter_mut().zip(draft).take(count) {
+            *shape = *pace;
+            sum += inverse_sqrt(pace.at_least(1e-9));
         }
         self.weight = 1.0 / sum.at_least(1e-9);
         self.factor = f32::MAX;
@@ -364,7 +365,7 @@ impl Planner {
 
     /// Takes the step that was solved for, and begins the next, or the check.
     fn take(&mut self, plan: &mut Plan) -> Stage {
-        newton::take(plan, &self.lists, self.reach.step());
+        newton::take(plan, &mut self.lists, self.reach.step());
         newton::clear(&mut self.lists);
         self.step += 1;
         if usize::from(self.step) < self.barrier().len() {
@@ -402,7 +403,7 @@ impl Planner {
             return Stage::Done;
         }
         self.drawn += 1;
-        for (draft, pace) in plan.draft.iter_mut().zip(&plan.pace) {
+        for (draft, pace) in draft_mut(&mut self.lists).iter_mut().zip(&plan.pace) {
             *draft = pace + DRAWN * (*draft - pace);
         }
         self.begin_check(plan);
@@ -412,16 +413,16 @@ impl Planner {
     /// One period of the plan; whether it is over.
     fn check(&mut self, plan: &mut Plan) -> bool {
         if self.periods < u32::from(plan.change.lead()) {
-            self.lead.look_draft(plan, &self.cursor);
+            self.lead.look_draft(plan, draft(&self.lists), &self.cursor);
             self.lead.cursor = self.cursor;
         }
-        let here = plan.use_draft(&self.machine, &self.cursor);
+        let here = plan.use_draft(draft(&self.lists), &self.machine, &self.cursor);
         self.most.add(&here);
         if here.velocity > here.feed {
             plan.forbid_feed(self.cursor.interval);
         }
         let period = plan.limits.period;
-        plan.advance_draft(&mut self.cursor, period);
+        plan.advance_draft(draft(&self.lists), &mut self.cursor, period);
         self.periods = self.periods.saturating_add(1);
         plan.is_over(&self.cursor)
     }
@@ -450,11 +451,18 @@ impl Planner {
         } else if factor > 1.0 {
             plan.lead.near = 0.0;
             let share = 1.0 / (factor * factor);
-            for pace in &mut plan.draft {
+            for pace in draft_mut(&mut self.lists).iter_mut().take(COEFFICIENTS) {
                 *pace *= share;
             }
         }
-        plan.pace = plan.draft;
+        self.keep(plan);
+    }
+
+    /// The pace that was planned becomes the plan's.
+    fn keep(&self, plan: &mut Plan) {
+        for (pace, draft) in plan.pace.iter_mut().zip(draft(&self.lists)) {
+            *pace = *draft;
+        }
     }
 }
 
@@ -472,7 +480,7 @@ fn limits_at<'a>(plan: &Plan, sweep: &Sweep, [usual, in_turn]: [&'a MotionLimits
 }
 
 /// Multiplies the pace of the walk, but near an end at speed.
-fn scale(plan: &mut Plan, factor: f32) {
+fn scale(plan: &Plan, draft: &mut [f32; LIST], factor: f32) {
     let count = plan.intervals + 2;
     let [at_start, at_end] = plan.ends.map(|speed| speed > 0.0);
     let is_near = |index: u16| {
@@ -489,7 +497,7 @@ fn scale(plan: &mut Plan, factor: f32) {
     } else {
         count
     };
-    for (index, pace) in (0..count).zip(&mut plan.draft) {
+    for (index, pace) in (0..count).zip(draft) {
         let share = |is_at: bool, away: u16| {
             let by = (f32::from(away) * (1.0 / f32::from(BLENDED))).at_most(1.0);
             if is_at { by * by * (3.0 - 2.0 * by) } else { 1.0 }

@@ -3,6 +3,7 @@
 
 use super::pace::{Change, Course, Use, room_of};
 use super::plan::{Cursor, Gate, Plan};
+use super::profile::{SlotAt, Span};
 use crate::math::arith::inverse_sqrt;
 use crate::math::number::Bounded;
 
@@ -84,6 +85,17 @@ impl Course for Road<'_> {
             most.jerk = most.jerk.at_least(FORBIDDEN);
         }
         most
+    }
+
+    fn is_uneven(&self, cursor: &Cursor) -> bool {
+        self.plan(cursor).is_uneven(cursor)
+    }
+
+    fn span_at(&self, cursor: &Cursor, slot: &SlotAt, room: &Use) -> Span {
+        if self.is_beyond(cursor) || (cursor.is_next && slot.r > self.next_pace * 1.001) {
+            return Span::NONE;
+        }
+        self.plan(cursor).span_at(cursor, slot, room)
     }
 }
 

@@ -4,7 +4,7 @@
 use super::cell_motion::CellMotion;
 use super::knots::find_knots;
 use super::limits::{MotionLimits, SLOPE_MIN};
-use super::lists::{Lists, get, put};
+use super::lists::{Lists, draft_mut, get, put};
 use super::node_times::NodeTimes;
 use super::plan::{NODES_FEW, NODES_MAX, NODES_MIN, Plan};
 use super::stations::{Derivatives, Station, between};
@@ -800,7 +800,7 @@ impl Walker {
     }
 
     /// A coefficient of a walk with an end at speed.
-    fn mean_at_speed(&mut self, lists: &Lists, plan: &mut Plan, index: u16) {
+    fn mean_at_speed(&mut self, lists: &mut Lists, plan: &mut Plan, index: u16) {
         let n = i32::from(self.mean);
         let newest = i32::from(index) + self.skipped() - 2;
         let (in_q10, in_s) = self.step_of(lists, plan, newest);
@@ -811,7 +811,7 @@ impl Walker {
         let [start, end] = plan.pinned();
         let is_pinned = index < start || index + end >= plan.intervals + 2;
         let at = usize::from(index);
-        if let (Some(walk), Some(pace)) = (plan.walk.get_mut(at), plan.draft.get_mut(at)) {
+        if let (Some(walk), Some(pace)) = (plan.walk.get_mut(at), draft_mut(lists).get_mut(at)) {
             *walk = to_f32(self.sum_q10) * MM_PER_Q10 * inverse;
             let ratio = plan.step_s / (self.sum_s * inverse).at_least(1e-9);
             *pace = if is_pinned { 1.0 } else { ratio * ratio };
@@ -824,7 +824,7 @@ impl Walker {
     }
 
     /// A mean: a step of the walk, and its pace as it is.
-    fn mean(&mut self, lists: &Lists, plan: &mut Plan, index: u16) {
+    fn mean(&mut self, lists: &mut Lists, plan: &mut Plan, index: u16) {
         let pairs = self.times - 1;
         let n = self.mean_nodes();
         let inverse = 1.0 / f32::from(n);
@@ -844,7 +844,7 @@ impl Walker {
             sum_s += h - duration(oldest);
         }
         let index = usize::from(index);
-        if let (Some(walk), Some(pace)) = (plan.walk.get_mut(index), plan.draft.get_mut(index)) {
+        if let (Some(walk), Some(pace)) = (plan.walk.get_mut(index), draft_mut(lists).get_mut(index)) {
             *walk = to_f32(sum_q10) * MM_PER_Q10 * inverse;
             let ratio = h / (sum_s * inverse).at_least(1e-9);
             *pace = ratio * ratio;

@@ -6,12 +6,14 @@
 //! |---|---|
 //! | `side_spans` | width of each side span in units of the surface's side parameter, f32 bits |
 //! | `path_spans` | width of each path span, f32 bits (reported only; the step along the path does not use it) |
-//! | remaining | [`SurfaceKind::Polynomial`], [`SurfaceKind::Rational`]: one record per patch, path index fastest; [`SurfaceKind::RevolvedAlongProfile`], [`SurfaceKind::RevolvedAroundAxis`]: one record |
+//! | of the records | [`SurfaceKind::Polynomial`], [`SurfaceKind::Rational`]: one record per patch, path index fastest; [`SurfaceKind::RevolvedAlongProfile`], [`SurfaceKind::RevolvedAroundAxis`]: one record |
+//! | remaining, with a region | its lines and edges: [`region`] |
 //!
 //! The records are described in the files of [`crate::surface`].
 
 pub mod encode;
 pub(crate) mod program;
+pub mod region;
 pub(crate) mod stations;
 pub mod stream;
 
@@ -187,6 +189,8 @@ pub struct Header {
     pub scallop_mm: f32,
     /// Sampling period T, s, 1e-5 to 0.1.
     pub period_s: f32,
+    /// Edges of the region that is machined, in the words behind the records; 0 for the whole surface. None with passes of constant scallop height.
+    pub edges: u16,
     /// Rows of patches that a pass and what is planned on it may use, for a job that is loaded while it runs: [`stream`]. 0 for one that is stored as a whole.
     pub window: u16,
     /// Axis limits; none for a constant feed.

@@ -2,6 +2,9 @@
 
 use crate::command::OVERRIDE_MAX;
 use crate::fault::{Fault, FaultKind, Result};
+use crate::job::region::{
+    EDGE_WORDS, EDGES_A_RECORD, FirstLine, HEAD_WORDS, REGION_SPANS_MAX, RegionCheck, RegionWords, ScanLine,
+};
 use crate::job::stations::{SPANS_MAX as FRONT_SPANS_MAX, Stations};
 use crate::job::stream::{DIGEST_WORDS, RecordCopy, Rows, WINDOW_MIN};
 use crate::job::{
@@ -33,6 +36,7 @@ pub(crate) struct Program {
     header: Header,
     /// Length of the job, words.
     length: u32,
+    region: RegionCheck,
     rows: Rows,
 }
 
@@ -45,19 +49,29 @@ pub(crate) const fn record_words(kind: SurfaceKind) -> usize {
     }
 }
 
-/// Records and words that a header implies.
+/// Patches of a header, and words that it implies.
 pub(crate) fn extent(header: &Header) -> (u32, u64) {
-    let records = u32::from(header.path_spans) * u32::from(header.side_spans);
+    let patches = u32::from(header.path_spans) * u32::from(header.side_spans);
+    let words = u64::from(patches) * record_words(header.kind) as u64;
     let digests = if header.window > 0 {
         DIGEST_WORDS as u64 * u64::from(header.side_spans)
     } else {
         0
     };
-    let words = u64::from(records) * record_words(header.kind) as u64 + digests;
+    let words = words + digests;
     (
-        records,
-        words + u64::from(width_words(header.path_spans, header.side_spans)),
+        patches,
+        words + u64::from(width_words(header.path_spans, header.side_spans)) + region_words(header) as u64,
     )
+}
+
+/// Words of a header's region.
+const fn region_words(header: &Header) -> usize {
+    if header.edges == 0 {
+        0
+    } else {
+        HEAD_WORDS + EDGE_WORDS * header.edges as usize
+    }
 }
 
 /// Words of the store that a job takes behind its data, for the stations of passes of constant scallop height; none where it crosses more patches than there
@@ -79,6 +93,10 @@ fn check_header(header: &Header) -> Result<()> {
         if !(1..=spans_max).contains(&spans) {
             return Err(Fault::new(FaultKind::BadHeader, f32::from(spans)));
         }
+    }
+    let spans = header.path_spans.max(header.side_spans);
+    if header.edges > 0 && (header.spacing.is_constant() || spans > REGION_SPANS_MAX) {
+        return Err(Fault::new(FaultKind::BadHeader, f32::from(header.edges)));
     }
     if header.spacing.is_constant() && (header.axes.is_some() || front_words(header).is_none()) {
         return Err(Fault::new(FaultKind::BadHeader, f32::from(header.path_spans)));
@@ -108,7 +126,7 @@ fn check_header(header: &Header) -> Result<()> {
 fn check_streamed(header: &Header) -> Result<()> {
     let is_grid = matches!(header.kind, SurfaceKind::Polynomial | SurfaceKind::Rational);
     let turns = header.axes.is_some_and(|axes| axes.overrun_mm > 0.0);
-    if !is_grid || header.spacing.is_constant() || turns || header.window < WINDOW_MIN {
+    if !is_grid || header.edges > 0 || header.spacing.is_constant() || turns || header.window < WINDOW_MIN {
         return Err(Fault::new(FaultKind::BadHeader, f32::from(header.window)));
     }
     Ok(())
@@ -168,6 +186,7 @@ impl Program {
             feed_mm_s: 0.0,
             scallop_mm: 0.0,
             period_s: 0.0,
+            edges: 0,
             window: 0,
             axes: None,
         };
@@ -175,6 +194,7 @@ impl Program {
             stage: LoadStage::Empty,
             header: HEADER,
             length: 0,
+            region: RegionCheck::START,
             rows: Rows::NONE,
         }
     }
@@ -201,6 +221,7 @@ impl Program {
         };
         self.header = *header;
         self.length = words;
+        self.region = RegionCheck::START;
         self.rows = rows;
         Ok(())
     }
@@ -274,7 +295,12 @@ impl Program {
         Ok(())
     }
 
+    /// Records: patches, then portions of edges.
     pub(crate) fn records(&self) -> u32 {
+        self.patches() + u32::from(self.header.edges).div_ceil(EDGES_A_RECORD)
+    }
+
+    fn patches(&self) -> u32 {
         extent(&self.header).0
     }
 
@@ -328,7 +354,13 @@ impl Program {
         }
     }
 
-    pub(crate) fn check(&mut self, store: &[i32], record: u32) -> Result<()> {
+    /// The first line of a region, once the job is sealed.
+    pub(crate) const fn first_line(&self) -> &FirstLine {
+        self.region.first_line()
+    }
+
+    /// Checks a record. `line`: one that is free while a job is loaded.
+    pub(crate) fn check(&mut self, store: &[i32], record: u32, line: &mut ScanLine) -> Result<()> {
         if self.is_streamed() {
             self.copy(store, record)?.check()?;
             return self.accept(store, record);
@@ -339,9 +371,29 @@ impl Program {
         if received != self.length || record > checked || record >= self.records() {
             return Err(bad_length(received));
         }
-        let job = self.view(store);
+        let job = Job {
+            header: &self.header,
+            store,
+            length: self.length as usize,
+            rows: &self.rows,
+        };
         if record == 0 {
             job.check_widths()?;
+        }
+        if let Some(portion) = record.checked_sub(self.patches()) {
+            // Once each, in order: the first line is found on the way.
+            let is_sound = record < checked
+                || job.region().is_some_and(|region| {
+                    if portion == 0 {
+                        self.region.begin(&region);
+                    }
+                    self.region.check(&self.header, &region, portion, line)
+                });
+            self.stage = LoadStage::Loading {
+                received,
+                checked: if is_sound { checked.max(record + 1) } else { 0 },
+            };
+            return if is_sound { Ok(()) } else { Err(bad_patch(record)) };
         }
         let index = record as usize;
         let result = match self.header.kind {
@@ -427,6 +479,15 @@ impl<'a> Job<'a> {
     /// The words behind the job's.
     pub(crate) fn rest(&self) -> &'a [i32] {
         self.store.get(self.length..).unwrap_or(&[])
+    }
+
+    /// The region that is machined; none for the whole surface.
+    pub(crate) fn region(&self) -> Option<RegionWords<'a>> {
+        if self.header.edges == 0 {
+            return None;
+        }
+        let from = self.length.checked_sub(region_words(self.header))?;
+        RegionWords::new(self.store.get(from..self.length)?)
     }
 
     /// Width of a side span, in units of the side parameter.

@@ -10,7 +10,7 @@
 //! | [`offset`], [`evaluation`] | fit of the ball and cutter location; contact, fit and location in one call |
 //! | [`interval`], [`step_over`] | candidate of the path interval at a sample; the step-over that a pass allows |
 //! | [`edge`] | the crest at an end of the gap to the next pass |
-//! | [`schedule`] | the next pass |
+//! | [`schedule`], [`lines`] | the next pass, of the whole surface and of a region |
 //! | [`front`] | passes of constant scallop height |
 //! | [`scan`] | the look over a pass for the step to the next one, without axis limits |
 //! | [`run`] | chains them |
@@ -21,6 +21,7 @@ mod edge;
 mod evaluation;
 pub(crate) mod front;
 pub(crate) mod interval;
+pub(crate) mod lines;
 pub(crate) mod offset;
 pub(crate) mod patch;
 pub(crate) mod position;

@@ -55,6 +55,13 @@ impl Route {
         if self.reversed { !fraction } else { fraction }
     }
 
+    /// Whether it starts and whether it ends at the surface's boundaries.
+    pub(crate) fn reach_boundaries(&self, job: &Job<'_>) -> [bool; 2] {
+        let whole = Self::whole(self.side, self.reversed, job.header.path_spans);
+        let ([start, end], [first, last]) = (self.ends, whole.ends);
+        [start == first, end == last]
+    }
+
     /// The first piece.
     pub(crate) fn first(&self, job: &Job<'_>) -> Piece {
         let [start, _] = self.ends;

@@ -1,12 +1,13 @@
 //! A run of a job, sample by sample: the one file that chains the stages.
 
 use crate::fault::{Fault, FaultKind, Result};
-use crate::job::program::Job;
+use crate::job::program::{Job, Program};
 use crate::job::{Pattern, Spacing};
-use crate::math::arith::{advanced, dot_hi, fraction_to_f32};
+use crate::math::arith::{advanced, dot_hi, fraction_to_f32, truncated};
 use crate::pass::buffer::PatchBuffer;
 use crate::pass::contact::{self, Reach};
 use crate::pass::front::CurveRun;
+use crate::pass::lines::{NextPass, RegionLines};
 use crate::pass::patch::Patch;
 use crate::pass::route::{Piece, Route};
 use crate::pass::scan::PassScan;
@@ -87,6 +88,10 @@ pub(crate) struct Run {
     step_over: Option<f32>,
     /// Feed factor of the last step along the pass.
     last_feed_factor: f32,
+    /// The passes of a region, and the next of them without axis limits; a fault of theirs is reported when the tool is there.
+    pub(crate) lines: RegionLines,
+    next_pass: NextPass,
+    pending: Option<Fault>,
 }
 
 impl Travel {
@@ -165,11 +170,17 @@ impl Run {
         last_interval: f32::INFINITY,
         step_over: None,
         last_feed_factor: 0.0,
+        lines: RegionLines::START,
+        next_pass: NextPass::Sought,
+        pending: None,
     };
 
-    /// Resets to the start of a job with this spacing.
-    pub(crate) fn restart(&mut self, spacing: Spacing) {
-        match (&mut self.planning, spacing.is_constant()) {
+    /// Resets to the start of a job.
+    pub(crate) fn restart(&mut self, program: &Program, job: &Job<'_>) {
+        self.lines.restart(job, program.first_line());
+        self.next_pass = NextPass::Sought;
+        self.pending = None;
+        match (&mut self.planning, program.header().spacing.is_constant()) {
             (PassPlanning::Scan(scan), false) => scan.restart(),
             (PassPlanning::Curve(curve), true) => curve.restart(),
             (planning, true) => *planning = PassPlanning::CURVE,
@@ -179,6 +190,12 @@ impl Run {
         self.buffer.forget();
         self.last_interval = f32::INFINITY;
         self.step_over = None;
+    }
+
+    /// The first pass.
+    pub(crate) fn first_route(&mut self, job: &Job<'_>) -> Route {
+        let of_region = self.lines.take(job.header);
+        of_region.unwrap_or_else(|| Route::of_pass(job.header, 0, SpanParameter::default()))
     }
 
     /// Pass, path and side parameter of the tool, in the surface's own direction.
@@ -254,7 +271,31 @@ impl Run {
         match self.travel.next {
             Next::Along if self.buffer.patch().point => self.step_on_pole(job)?,
             Next::Along => self.step_far(job, feed_factor)?,
-            Next::Pass => self.begin_pass(job, Route::of_pass(job.header, 0, SpanParameter::default()))?,
+            Next::Pass => {
+                let route = self.first_route(job);
+                self.begin_pass(job, route)?;
+            }
+            Next::Over if job.header.edges > 0 => {
+                if let Some(fault) = self.pending {
+                    return Err(fault);
+                }
+                match self.next_pass {
+                    NextPass::Found => {
+                        let Some(route) = self.lines.take(job.header) else {
+                            return Ok(false);
+                        };
+                        self.next_pass = NextPass::Sought;
+                        self.travel.pass = self.travel.pass.wrapping_add(1);
+                        self.begin_pass(job, route)?;
+                    }
+                    NextPass::None => return Ok(false),
+                    // It stands until the next pass is known.
+                    NextPass::Sought => {
+                        self.stand(last);
+                        return Ok(true);
+                    }
+                }
+            }
             Next::Over => {
                 let route = self.step_over(job)?;
                 self.begin_pass(job, route)?;
@@ -408,18 +449,31 @@ impl Run {
         let travel = &self.travel;
         let [start, _] = travel.route.ends;
         let patch = travel.span().abs_diff(start.span);
-        if !travel.piece.is_whole() {
-            return Some([patch, 0]);
-        }
-        let high = (travel.fraction >> 32) * u64::from(cells_per_patch);
-        let within = u16::try_from(high >> 32).unwrap_or(0);
+        let piece = &travel.piece;
+        let within = if piece.is_whole() {
+            let high = (travel.fraction >> 32) * u64::from(cells_per_patch);
+            u16::try_from(high >> 32).unwrap_or(0)
+        } else {
+            let part = fraction_to_f32(travel.fraction.saturating_sub(piece.start()))
+                / fraction_to_f32(piece.end().saturating_sub(piece.start()));
+            let cell = u16::try_from(truncated(part * f32::from(cells_per_patch))).unwrap_or(0);
+            cell.min(cells_per_patch.saturating_sub(1))
+        };
         Some([patch, within])
     }
 
-    /// Arc since the start of a cell of [`Self::cell`], mm, each cell this fraction of the patch; none where, by rounding, the position is before the cell.
-    pub(crate) fn since_station(&self, [_, within]: [u16; 2], part: u64) -> Option<f32> {
+    /// Arc since the start of a cell of [`Self::cell`], mm, by the number of cells per patch and the fraction of a whole patch in one of them; none where, by
+    /// rounding, the position is before the cell.
+    pub(crate) fn since_station(&self, [_, within]: [u16; 2], (cells, part): (u16, u64)) -> Option<f32> {
         let travel = &self.travel;
-        let start = travel.piece.start() + u64::from(within).wrapping_mul(part);
+        let piece = &travel.piece;
+        let part = if piece.is_whole() {
+            part
+        } else {
+            let length = piece.end().saturating_sub(piece.start());
+            length.checked_div(u64::from(cells))?
+        };
+        let start = piece.start() + u64::from(within).wrapping_mul(part);
         let length = fraction_to_f32(travel.fraction.checked_sub(start)?);
         let mean = 1.0 - 0.5 * travel.path.log_speed_derivative * length;
         Some(length * mean / (travel.path.inv_speed * self.buffer.patch().per_mm))
@@ -473,13 +527,14 @@ impl Run {
                     Reach::Beyond(covered) => covered,
                 };
             rest = (arc - covered) / patch.per_mm;
-            if crossings == CROSSINGS_MAX {
-                break;
-            }
-            if !self.next_piece(job)? {
+            if self.travel.route.next(job, &self.travel.piece).is_none() {
                 self.end_pass(job);
                 return Ok(());
             }
+            if crossings == CROSSINGS_MAX {
+                break;
+            }
+            self.next_piece(job)?;
             start = self.buffer.patch().start().checked()?;
         }
         Err(Fault::new(FaultKind::PatchTooShort, rest))
@@ -487,7 +542,7 @@ impl Run {
 
     /// On a pole, advances the path parameter: the tool stands, but the interval that the pass allows depends on the parameter.
     fn step_on_pole(&mut self, job: &Job<'_>) -> Result<()> {
-        if let Some(fraction) = self.travel.fraction.checked_add(POLE_STEP) {
+        if let Some(fraction) = self.travel.beyond(POLE_STEP) {
             self.travel.fraction = fraction;
         } else if !self.next_piece(job)? {
             self.end_pass(job);
@@ -511,14 +566,23 @@ impl Run {
     /// Begins a pass.
     fn begin_pass(&mut self, job: &Job<'_>, route: Route) -> Result<()> {
         let travel = &mut self.travel;
+        let side_before = travel.route.side;
         travel.route = route;
         travel.piece = route.first(job);
         travel.fraction = travel.piece.start();
-        travel.max_inv_interval_sq = 0.0;
+        // The maximum is that of all passes on the line.
+        let goes_on = travel.pass > 0 && route.side == side_before;
+        if !goes_on {
+            travel.max_inv_interval_sq = 0.0;
+        }
+        if job.header.edges > 0 {
+            // The surface may have turned away in between.
+            travel.offset = [0; 3];
+        }
         travel.next = Next::Along;
         travel.path.log_speed_derivative = f32::NAN;
         if let PassPlanning::Scan(scan) = &mut self.planning {
-            scan.begin(&travel.piece.position);
+            scan.begin(&route, goes_on);
         }
         self.buffer.begin(job, &travel.piece)
     }
@@ -527,8 +591,18 @@ impl Run {
     pub(crate) fn has_to_plan(&self, spacing: Spacing) -> bool {
         match &self.planning {
             PassPlanning::Curve(curve) => curve.has_to_plan(),
-            PassPlanning::Scan(scan) => spacing == Spacing::Exact && (scan.has_work() || self.is_step_due()),
+            PassPlanning::Scan(scan) => {
+                spacing == Spacing::Exact && (scan.has_work() || self.is_step_due()) || self.is_pass_due()
+            }
         }
+    }
+
+    /// Whether the next pass of a region is to be sought.
+    fn is_pass_due(&self) -> bool {
+        self.lines.is_in_use()
+            && self.travel.next == Next::Over
+            && self.next_pass == NextPass::Sought
+            && self.pending.is_none()
     }
 
     /// Whether the pass is over, and the step to the next one is not known yet.
@@ -545,9 +619,33 @@ impl Run {
                 scan.has_work()
             }
         };
-        if self.is_step_due() && !has_work {
+        if self.lines.is_in_use() {
+            if self.is_pass_due() && !has_work {
+                match self.seek_pass(job) {
+                    Ok(next) => self.next_pass = next,
+                    Err(fault) => self.pending = Some(fault),
+                }
+            }
+        } else if self.is_step_due() && !has_work {
             self.step_over = Some(self.find_step_over(job));
         }
+    }
+
+    /// A portion of the search for the next pass of a region.
+    ///
+    /// # Errors
+    /// As [`RegionLines::seek`].
+    #[inline(never)]
+    fn seek_pass(&mut self, job: &Job<'_>) -> Result<NextPass> {
+        if self.lines.is_line_over() {
+            let step = self.find_step_over(job);
+            return Ok(if self.lines.go_on(job, step)? {
+                NextPass::Sought
+            } else {
+                NextPass::None
+            });
+        }
+        self.lines.seek(job, self.travel.pass)
     }
 
     /// The step to the next pass.
@@ -560,7 +658,7 @@ impl Run {
         } = self.travel;
         match (&mut self.planning, job.header.spacing) {
             (PassPlanning::Scan(scan), Spacing::Exact) => scan.step(
-                job.header,
+                job,
                 PassMaximum {
                     inv_interval_sq: max_inv_interval_sq,
                     shape,
@@ -622,7 +720,11 @@ impl Run {
     fn end_pass(&mut self, job: &Job<'_>) {
         self.travel.fraction = self.travel.piece.end();
         let last = schedule::is_last(self.travel.route.side, job.header.side_spans);
-        self.travel.next = if last { Next::End } else { Next::Over };
+        self.travel.next = if last && job.header.edges == 0 {
+            Next::End
+        } else {
+            Next::Over
+        };
     }
 }
 

@@ -8,14 +8,12 @@
 //! The first pass has no previous step by which the neighbouring lines are placed. It is scanned twice, the first time at few stations and without lines,
 //! and once more where the lines turn out to be far from the step.
 
-use crate::job::Header;
 use crate::job::program::Job;
 use crate::math::arith::{sqrt, truncated};
 use crate::math::number::{Bounded, MM_PER_NM, to_f32};
 use crate::pass::patch::Patch;
-use crate::pass::position::PassPosition;
+use crate::pass::route::{Piece, Route};
 use crate::pass::step_over::{PassMaximum, StepOverEstimator};
-use crate::sample::SpanParameter;
 use crate::surface::Pass as _;
 
 /// Cycles of the pieces, by the pessimistic model of `cargo sim budget`.
@@ -45,7 +43,7 @@ const FIRST_LAP: u16 = 4;
 
 /// The next piece.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Piece {
+enum Task {
     /// Begin a pass.
     Pass,
     /// Collapse the patch of the pass, and choose its cells.
@@ -61,9 +59,13 @@ enum Piece {
 /// The scan of one pass.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct PassScan {
-    line: PassPosition,
-    patch: Patch,
+    route: Route,
+    /// The piece of the pass that is scanned.
     piece: Piece,
+    patch: Patch,
+    task: Task,
+    /// The pass is not the first on its line.
+    goes_on: bool,
     /// The first lap of the first pass: without neighbouring lines.
     is_first_lap: bool,
     /// Station within the patch, from 0, cells of the patch, and the fraction of the patch per cell.
@@ -79,13 +81,11 @@ pub(crate) struct PassScan {
 impl PassScan {
     /// State before the first pass.
     pub(crate) const START: Self = Self {
-        line: PassPosition {
-            side: SpanParameter { span: 0, fraction: 0 },
-            reversed: false,
-            span: 0,
-        },
+        route: Route::NONE,
+        piece: Piece::NONE,
         patch: Patch::NONE,
-        piece: Piece::Done,
+        task: Task::Done,
+        goes_on: false,
         is_first_lap: false,
         station: 0,
         cells: 1,
@@ -98,26 +98,34 @@ impl PassScan {
     /// Resets to the state before the first pass.
     pub(crate) const fn restart(&mut self) {
         self.estimator.restart();
-        self.piece = Piece::Done;
+        self.task = Task::Done;
     }
 
-    /// Begins the scan of a pass whose first patch is at this position.
-    pub(crate) const fn begin(&mut self, position: &PassPosition) {
-        self.estimator.enter_row(position.side.span);
-        self.line = *position;
-        self.piece = Piece::Pass;
+    /// Begins the scan of a pass. `goes_on`: it is on the line of the one before.
+    pub(crate) const fn begin(&mut self, route: &Route, goes_on: bool) {
+        self.estimator.enter_row(route.side.span);
+        self.route = *route;
+        self.goes_on = goes_on;
+        self.task = Task::Pass;
     }
 
-    fn begin_pass(&mut self) {
-        self.first_lap = 0.0;
-        self.is_first_lap = self.estimator.is_first();
-        self.begin_lap();
+    fn begin_pass(&mut self, job: &Job<'_>) {
+        if !self.goes_on {
+            self.first_lap = 0.0;
+        }
+        self.is_first_lap = self.estimator.is_first() && !self.goes_on;
+        self.begin_lap(job);
     }
 
-    fn begin_lap(&mut self) {
+    fn begin_lap(&mut self, job: &Job<'_>) {
         self.is_first_patch = true;
-        self.piece = Piece::Patch;
-        self.estimator.begin();
+        self.piece = self.route.first(job);
+        self.task = Task::Patch;
+        if self.goes_on {
+            self.estimator.go_on(job, &self.route);
+        } else {
+            self.estimator.begin(job, &self.route);
+        }
     }
 
     /// The step-over from the pass.
@@ -127,16 +135,16 @@ impl PassScan {
 
     /// Whether a piece is left.
     pub(crate) fn has_work(&self) -> bool {
-        self.piece != Piece::Done
+        self.task != Task::Done
     }
 
     /// The step from the pass to the next one; `maximum`: that of the pass's samples.
-    pub(crate) fn step(&mut self, header: &Header, maximum: PassMaximum) -> f32 {
-        if self.piece == Piece::Pass {
-            self.begin_pass();
+    pub(crate) fn step(&mut self, job: &Job<'_>, maximum: PassMaximum) -> f32 {
+        if self.task == Task::Pass {
+            self.begin_pass(job);
         }
-        self.piece = Piece::Done;
-        self.estimator.step(header, maximum)
+        self.task = Task::Done;
+        self.estimator.step(job.header, maximum)
     }
 
     /// The pieces of one period.
@@ -156,46 +164,49 @@ impl PassScan {
 
     /// Cycles of the next piece; 0 where none is left.
     fn cycles(&self) -> u32 {
-        match self.piece {
-            Piece::Pass => cycles::NEXT,
-            Piece::Patch => cycles::MEASURED_PATCH,
-            Piece::Station => cycles::STATION,
-            Piece::Estimate(0) => cycles::NEXT,
-            Piece::Estimate(_) if self.estimator.makes_patch(&self.line, self.fraction()) => cycles::PATCH,
-            Piece::Estimate(_) => cycles::ESTIMATE,
-            Piece::Done => 0,
+        match self.task {
+            Task::Pass => cycles::NEXT,
+            Task::Patch => cycles::MEASURED_PATCH,
+            Task::Station => cycles::STATION,
+            Task::Estimate(0) => cycles::NEXT,
+            Task::Estimate(_) if self.estimator.makes_patch(&self.piece.position, self.fraction()) => {
+                cycles::PATCH
+            }
+            Task::Estimate(_) => cycles::ESTIMATE,
+            Task::Done => 0,
         }
     }
 
     fn work(&mut self, job: &Job<'_>) {
-        self.piece = match self.piece {
-            Piece::Pass => {
-                self.begin_pass();
-                Piece::Patch
+        self.task = match self.task {
+            Task::Pass => {
+                self.begin_pass(job);
+                Task::Patch
             }
-            Piece::Patch => self.begin_patch(job),
-            Piece::Station => {
+            Task::Patch => self.begin_patch(job),
+            Task::Station => {
                 let fraction = self.fraction();
                 // A fault is reported by the tick that reaches it.
                 if let Ok(contact) = self.patch.surface.contact(fraction, &self.patch.ball) {
                     self.estimator.see(job, &self.patch, &contact, fraction);
                 }
-                Piece::Estimate(self.estimates(job))
+                Task::Estimate(self.estimates(job))
             }
-            Piece::Estimate(0) => self.next_station(job),
-            Piece::Estimate(left) => {
+            Task::Estimate(0) => self.next_station(job),
+            Task::Estimate(left) => {
                 let most = self.estimator.most().at_least(self.first_lap);
                 let fraction = self.fraction();
-                self.estimator.work(job, &self.line, &self.patch, fraction, most);
-                Piece::Estimate(left - 1)
+                self.estimator
+                    .work(job, &self.piece.position, &self.patch, fraction, most);
+                Task::Estimate(left - 1)
             }
-            Piece::Done => Piece::Done,
+            Task::Done => Task::Done,
         };
     }
 
-    fn begin_patch(&mut self, job: &Job<'_>) -> Piece {
-        if self.patch.collapse(job, &self.line).is_err() {
-            return Piece::Done;
+    fn begin_patch(&mut self, job: &Job<'_>) -> Task {
+        if self.patch.lay(job, &self.piece).is_err() {
+            return Task::Done;
         }
         self.estimator.begin_patch();
         let periods = if self.patch.point {
@@ -210,16 +221,19 @@ impl PassScan {
         } else {
             cells
         };
-        let part = u64::MAX.checked_div(u64::from(self.cells));
+        let [start, end] = self.piece.range;
+        let part = end.saturating_sub(start).checked_div(u64::from(self.cells));
         self.cell_fraction = part.unwrap_or(u64::MAX);
         self.station = 0;
-        Piece::Station
+        Task::Station
     }
 
     /// Length of the patch, roughly, units; 0 where its surface is not evaluated.
     fn length(&self) -> f32 {
         let at = |fraction| self.patch.evaluate(fraction).map(|(_, located)| located.cc_nm);
-        let (Ok(start), Ok(middle), Ok(end)) = (at(0), at(1 << 63), at(u64::MAX)) else {
+        let [start, end] = self.piece.range;
+        let middle = (start + (end.saturating_sub(start) >> 1)).saturating_add(1);
+        let (Ok(start), Ok(middle), Ok(end)) = (at(start), at(middle), at(end)) else {
             return 0.0;
         };
         let apart = |from: &[i32; 3], to: &[i32; 3]| {
@@ -239,9 +253,9 @@ impl PassScan {
 
     fn fraction(&self) -> u64 {
         if self.is_end() {
-            u64::MAX
+            self.piece.end()
         } else {
-            u64::from(self.station) * self.cell_fraction
+            self.piece.start() + u64::from(self.station) * self.cell_fraction
         }
     }
 
@@ -250,34 +264,28 @@ impl PassScan {
             return 0;
         }
         let first = self.station == 0;
-        let last = self.is_end() && self.line.next(job.header.path_spans).is_none();
+        let last = self.is_end() && self.route.next(job, &self.piece).is_none();
         self.estimator
             .evaluations(first, first && self.is_first_patch, last)
     }
 
     /// Advances to the next station, the next patch, the second lap, or the end.
-    fn next_station(&mut self, job: &Job<'_>) -> Piece {
+    fn next_station(&mut self, job: &Job<'_>) -> Task {
         if !self.is_end() {
             self.station += 1;
-            return Piece::Station;
+            return Task::Station;
         }
-        let spans = job.header.path_spans;
-        if let Some(line) = self.line.next(spans) {
-            self.line = line;
+        if let Some(piece) = self.route.next(job, &self.piece) {
+            self.piece = piece;
             self.is_first_patch = false;
-            return Piece::Patch;
+            return Task::Patch;
         }
-        if !self.is_first_lap && !self.estimator.looks_again(job.header) {
-            return Piece::Done;
+        if !self.is_first_lap && (self.goes_on || !self.estimator.looks_again(job.header)) {
+            return Task::Done;
         }
         self.is_first_lap = false;
         self.first_lap = self.estimator.most();
-        self.line.span = if self.line.reversed {
-            spans.saturating_sub(1)
-        } else {
-            0
-        };
-        self.begin_lap();
-        Piece::Patch
+        self.begin_lap(job);
+        Task::Patch
     }
 }

@@ -17,6 +17,7 @@ use crate::math::number::Bounded;
 use crate::pass::edge::{self, EdgeCrest, EdgeSearch};
 use crate::pass::patch::Patch;
 use crate::pass::position::PassPosition;
+use crate::pass::route::Route;
 use crate::pass::row_history::RowHistory;
 use crate::pass::schedule;
 use crate::sample::{SpanParameter, interval_of};
@@ -103,6 +104,16 @@ impl Peak {
     }
 }
 
+/// A place on the pass.
+struct PlaceOnPass {
+    position: PassPosition,
+    fraction: u64,
+    /// Fractions at the start of the pass and at its end.
+    range: [u64; 2],
+    /// On the last patch.
+    is_last: bool,
+}
+
 /// A line at a constant side parameter beside the pass, towards the next pass.
 #[derive(Clone, Copy, Debug)]
 struct NeighbourLine {
@@ -159,9 +170,13 @@ pub(crate) struct StepOverEstimator {
     expected: f32,
     /// The first pass is looked at for the second time.
     looked_again: bool,
-    /// Side span of the pass, and spans along the path.
+    /// Side span of the pass, and patches of it so far.
     side_span: u16,
-    path_spans: u16,
+    patches: u16,
+    /// The last path span of the pass, the fractions at which it starts on its first patch and ends on its last, and whether these are the surface's boundaries.
+    last_span: u16,
+    range: [u64; 2],
+    is_whole: [bool; 2],
     /// The line to evaluate next.
     second: bool,
     rows: RowHistory,
@@ -182,7 +197,10 @@ impl StepOverEstimator {
         expected: 0.0,
         looked_again: false,
         side_span: 0,
-        path_spans: 0,
+        patches: 0,
+        last_span: 0,
+        range: [0, u64::MAX],
+        is_whole: [true; 2],
         second: false,
         rows: RowHistory::START,
     };
@@ -219,16 +237,34 @@ impl StepOverEstimator {
             .last_needed(job.header, side, self.expects(), |span| job.side_width(span))
     }
 
-    /// Begins a pass.
-    pub(crate) fn begin(&mut self) {
+    /// Begins a pass on a new line.
+    pub(crate) fn begin(&mut self, job: &Job<'_>, route: &Route) {
         let [half, whole] = &mut self.lines;
         half.begin();
         whole.begin();
         self.own = Peak::NONE;
         self.edges = [0.0; 2];
-        self.ends = [true; 2];
         self.crests = [None; 2];
-        self.searches = [true; 2];
+        self.patches = 0;
+        self.begin_range(job, route);
+    }
+
+    /// Begins another pass on the same line: the step-over is that of both.
+    pub(crate) fn go_on(&mut self, job: &Job<'_>, route: &Route) {
+        let [half, whole] = &mut self.lines;
+        half.go_on();
+        whole.go_on();
+        self.own.cut();
+        self.begin_range(job, route);
+    }
+
+    fn begin_range(&mut self, job: &Job<'_>, route: &Route) {
+        let (first, last) = (route.first(job), route.last(job));
+        self.is_whole = route.reach_boundaries(job);
+        self.ends = self.is_whole;
+        self.searches = self.is_whole;
+        self.range = [first.start(), last.end()];
+        self.last_span = last.position.span;
         self.search.stop();
         self.at_last = 0;
     }
@@ -236,6 +272,7 @@ impl StepOverEstimator {
     /// A patch of the pass begins.
     pub(crate) const fn begin_patch(&mut self) {
         self.own.cut();
+        self.patches = self.patches.saturating_add(1);
     }
 
     /// A station of the pass.
@@ -257,8 +294,11 @@ impl StepOverEstimator {
     /// `begins`, `ends`: the station is the first of a patch, the first and the last of the pass.
     pub(crate) fn evaluations(&self, begins_patch: bool, begins: bool, ends: bool) -> u8 {
         let rounds = 1 + u8::from(self.is_first());
-        let at_an_end = 4 + rounds * edge::EVALUATIONS;
-        2 + 2 * u8::from(begins_patch) + at_an_end * (u8::from(begins) + u8::from(ends))
+        let of_end = |is_whole: bool| 4 + u8::from(is_whole) * rounds * edge::EVALUATIONS;
+        let [start, end] = self.is_whole;
+        let at_start = if begins { of_end(start) } else { 0 };
+        let at_end = if ends { of_end(end) } else { 0 };
+        2 + 2 * u8::from(begins_patch) + at_start + at_end
     }
 
     /// Whether the next task at this fraction of this patch collapses a patch.
@@ -266,10 +306,7 @@ impl StepOverEstimator {
         if self.search.is_active() {
             return self.search.makes_patch();
         }
-        if self
-            .due_search(is_end(self.path_spans, position, fraction))
-            .is_some()
-        {
+        if self.due_search(self.is_end(position, fraction)).is_some() {
             return true;
         }
         let beside = self.next_line();
@@ -317,13 +354,13 @@ impl StepOverEstimator {
     ) {
         let [start, end] = self.ends;
         let [edge_start, edge_end] = self.edges;
-        self.path_spans = job.header.path_spans;
-        let is_end = is_end(self.path_spans, position, fraction);
+        let is_end = self.is_end(position, fraction);
+        let is_last = position.span == self.last_span;
         if start {
             self.ends = [false, end];
             self.edges = [at_end(job, patch, 0), edge_end];
-        } else if end && position.next(job.header.path_spans).is_none() {
-            self.ends = [false; 2];
+        } else if end && is_last {
+            self.ends = [start, false];
             self.edges = [edge_start, at_end(job, patch, u64::MAX)];
         } else if self.search.is_active() {
             self.search(job, position, patch);
@@ -348,8 +385,20 @@ impl StepOverEstimator {
             let [half, whole] = &mut self.lines;
             let beside = if is_second { whole } else { half };
             let spans = self.rows.spans(job.header);
-            beside.work(job, position, fraction, most, expected, spans);
+            let place = PlaceOnPass {
+                position: *position,
+                fraction,
+                range: self.range,
+                is_last,
+            };
+            beside.work(job, &place, most, expected, spans);
         }
+    }
+
+    /// Whether this is the end of the pass.
+    fn is_end(&self, position: &PassPosition, fraction: u64) -> bool {
+        let [_, end] = self.range;
+        fraction == end && position.span == self.last_span
     }
 
     /// One evaluation of the search for a crest.
@@ -420,7 +469,7 @@ impl StepOverEstimator {
             return None;
         }
         let [half, whole] = &self.lines;
-        let found = |line: &NeighbourLine| line.found(header, here);
+        let found = |line: &NeighbourLine| line.found(self.patches, here);
         let knots = [
             half.side.span != self.side_span,
             whole.side.span != half.side.span,
@@ -442,6 +491,8 @@ impl StepOverEstimator {
         for (crest, edge) in self.crests.iter().zip(&self.edges) {
             let allowed = match crest {
                 Some(crest) => crest.step(jumps),
+                // No boundary.
+                None if !(*edge > 0.0) => f32::INFINITY,
                 // As the pass itself where the crest was not measured in time.
                 None => step_over(*edge, *edge * (mean / here).at_least(1.0), whole.distance),
             };
@@ -485,16 +536,22 @@ impl NeighbourLine {
         self.peak = Peak::NONE;
     }
 
+    /// Another pass begins on the same line.
+    const fn go_on(&mut self) {
+        if !matches!(self.task, Task::Idle | Task::Place) {
+            self.task = Task::Patch;
+        }
+        self.peak.cut();
+    }
+
     #[inline(never)]
-    fn work(
-        &mut self,
-        job: &Job<'_>,
-        position: &PassPosition,
-        fraction: u64,
-        most: f32,
-        expected: Option<f32>,
-        spans: u16,
-    ) {
+    fn work(&mut self, job: &Job<'_>, place: &PlaceOnPass, most: f32, expected: Option<f32>, spans: u16) {
+        let PlaceOnPass {
+            position,
+            fraction,
+            range: [start, end],
+            is_last,
+        } = place;
         let is_first = expected.is_none();
         self.task = match self.task {
             Task::Place => self.place(job, position, most, expected, spans),
@@ -503,18 +560,18 @@ impl NeighbourLine {
             }
             Task::Patch => self.make_patch(job, position, Task::Start),
             Task::Start => {
-                self.see_end(job, 0);
+                self.see_end(job, *start);
                 Task::Evaluate
             }
             Task::Evaluate if self.span != position.span => self.make_patch(job, position, Task::Evaluate),
-            Task::Evaluate if position.next(job.header.path_spans).is_none() => Task::End,
+            Task::Evaluate if *is_last => Task::End,
             Task::End => {
-                self.see_end(job, u64::MAX);
+                self.see_end(job, *end);
                 Task::EvaluateLast
             }
             Task::Evaluate | Task::EvaluateLast => {
-                if let Ok(contact) = self.patch.surface.contact(fraction, &self.patch.ball) {
-                    self.peak.see(exact_at(job, &self.patch, &contact), fraction);
+                if let Ok(contact) = self.patch.surface.contact(*fraction, &self.patch.ball) {
+                    self.peak.see(exact_at(job, &self.patch, &contact), *fraction);
                 }
                 self.task
             }
@@ -570,10 +627,10 @@ impl NeighbourLine {
         }
     }
 
-    /// Maximum inverse square interval on the line; for a line evaluated in part, at least that of the pass.
-    fn found(&self, header: &Header, here: f32) -> Option<f32> {
+    /// Maximum inverse square interval on the line beside this number of patches; for a line evaluated in part, at least that of the pass.
+    fn found(&self, patches: u16, here: f32) -> Option<f32> {
         match self.task {
-            Task::EvaluateLast if self.spans >= header.path_spans => Some(self.peak.most),
+            Task::EvaluateLast if self.spans >= patches => Some(self.peak.most),
             Task::EvaluateLast | Task::End | Task::Evaluate => Some(self.peak.most.at_least(here)),
             Task::Place | Task::Patch | Task::Start | Task::Idle => None,
         }
@@ -600,11 +657,6 @@ fn mean(here: f32, half: f32, whole: f32, knots: [bool; 2]) -> f32 {
         mean = (0.5 * (here + whole)).at_least(mean);
     }
     mean
-}
-
-/// Whether this is the end of the pass.
-fn is_end(path_spans: u16, position: &PassPosition, fraction: u64) -> bool {
-    fraction == u64::MAX && position.next(path_spans).is_none()
 }
 
 /// The inverse square interval at an end of a line; 0 where there is no contact. Where path lines are skew, the scallop crest between two passes lies beyond

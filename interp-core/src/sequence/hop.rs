@@ -3,6 +3,7 @@
 
 use crate::feed::curve::{Curve, CurveCursor};
 use crate::feed::pace::{Course, Pace, Use};
+use crate::feed::profile::{Profiles, SlotAt, Span};
 use crate::job::AxisLimits;
 use crate::math::arith::{sqrt, truncated};
 use crate::math::number::Bounded;
@@ -53,6 +54,14 @@ impl Course for Curves {
         let mut most = Use::NONE;
         for (place, curve) in cursor.curves.iter().zip(&self.curves) {
             most.add(&curve.use_at(place, rates, around));
+        }
+        most
+    }
+
+    fn span_at(&self, cursor: &HopCursor, slot: &SlotAt, room: &Use) -> Span {
+        let mut most = Span::WIDE;
+        for (place, curve) in cursor.curves.iter().zip(&self.curves) {
+            most.add(&curve.span_at(place, slot, room));
         }
         most
     }
@@ -139,9 +148,9 @@ impl Hop {
     }
 
     /// One period; returns whether the end is reached.
-    pub(crate) fn tick(&mut self, pace: f32, is_fault: bool, period: f32) -> bool {
+    pub(crate) fn tick(&mut self, pace: f32, is_fault: bool, period: f32, profiles: &mut Profiles) -> bool {
         self.pace.want(pace, is_fault);
-        let pace = self.pace.tick();
+        let pace = self.pace.tick(profiles);
         self.curves.advance(&mut self.cursor, pace * period);
         self.curves.is_over(&self.cursor)
     }
@@ -156,8 +165,8 @@ impl Hop {
     }
 
     /// One place of the search for a change of the pace.
-    pub(crate) fn work(&mut self) {
-        self.pace.work(&self.curves, &self.cursor);
+    pub(crate) fn work(&mut self, profiles: &mut Profiles) {
+        self.pace.work(&self.curves, &self.cursor, profiles);
     }
 
     /// The position.

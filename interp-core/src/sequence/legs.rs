@@ -148,6 +148,7 @@ impl Sequencer {
             command.feed_factor.at_most(1.0),
             command.is_fault,
             job.header.period_s,
+            &mut self.profiles,
         );
         if is_over && leg == Leg::Plunge && self.goal == Goal::Pass {
             self.swap();

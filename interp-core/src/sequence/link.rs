@@ -5,6 +5,7 @@ use crate::fault::{Fault, FaultKind, Result};
 use crate::feed::curve::{Curve, CurveCursor, CurveLimits};
 use crate::feed::limits::{MotionLimits, SLOPE_MIN};
 use crate::feed::pace::{Course as _, Pace};
+use crate::feed::profile::Profiles;
 use crate::feed::stations::{Derivatives, WINDOW, Window};
 use crate::feed::to_q10;
 use crate::job::AxisLimits;
@@ -70,9 +71,9 @@ impl Progress {
     }
 
     /// One period; returns whether the end is reached.
-    pub(crate) fn tick(&mut self, pace: f32, is_fault: bool, period: f32) -> bool {
+    pub(crate) fn tick(&mut self, pace: f32, is_fault: bool, period: f32, profiles: &mut Profiles) -> bool {
         self.pace.want(pace, is_fault);
-        let pace = self.pace.tick();
+        let pace = self.pace.tick(profiles);
         self.curve.advance(&mut self.cursor, pace * period);
         self.is_over()
     }
@@ -91,8 +92,8 @@ impl Progress {
     }
 
     /// One place of the search for a change of the pace.
-    pub(crate) fn work(&mut self) {
-        self.pace.work(&self.curve, &self.cursor);
+    pub(crate) fn work(&mut self, profiles: &mut Profiles) {
+        self.pace.work(&self.curve, &self.cursor, profiles);
     }
 
     /// Speed along the link, mm/s.

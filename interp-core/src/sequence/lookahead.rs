@@ -13,6 +13,7 @@ use crate::job::program::Job;
 use crate::job::{AxisLimits, Pattern, Spacing};
 use crate::math::arith::{fraction_to_f32, sqrt, truncated};
 use crate::math::number::{Bounded, MM_PER_NM, nm_to_mm, to_f32};
+use crate::pass::lines::{self, NextPass, RegionLines};
 use crate::pass::patch::Patch;
 use crate::pass::route::{Piece, Route};
 use crate::pass::schedule;
@@ -60,8 +61,9 @@ pub(crate) struct PassPlan {
     pub(crate) faces_up: [bool; 2],
     /// Minimum interval of the pass.
     pub(crate) interval: f32,
-    /// The pass after this one.
+    /// The pass after this one, and whether a step-over on the surface leads there: along the boundary where both end.
     pub(crate) next: Option<Route>,
+    pub(crate) steps_over: bool,
     /// Stations of half the turn before the pass, and its length, units of 2^-10 nm.
     head: u16,
     pub(crate) head_q10: i64,
@@ -85,6 +87,7 @@ impl PassPlan {
         faces_up: [false; 2],
         interval: 0.0,
         next: None,
+        steps_over: false,
         head: 0,
         head_q10: 0,
         tail: Turn::NONE,
@@ -129,6 +132,8 @@ enum Task {
     /// Run the step-over estimator, with this number of evaluations left at the station.
     Estimate(u8),
     Close,
+    /// Seek the next pass of a region.
+    Seek,
     /// Append a station of the half of the turn before the pass.
     Head(u16),
     /// Begin to look at the start of the next pass, at one of its stations.
@@ -181,6 +186,9 @@ pub(crate) struct Lookahead {
     arc_mm: f32,
     start_q10: i64,
     maximum: PassMaximum,
+    /// Side parameter of the pass, and whether the pass before is on the same line.
+    line: Option<SpanParameter>,
+    goes_on: bool,
     /// The turn before the pass; then the one behind it, its ends and the length that is tried.
     turn: Turn,
     ends: [TurnEnd; 2],
@@ -209,6 +217,8 @@ impl Lookahead {
         arc_mm: 0.0,
         start_q10: 0,
         maximum: PassMaximum::NONE,
+        line: None,
+        goes_on: false,
         turn: Turn::NONE,
         ends: [TurnEnd::NONE; 2],
         length: 0.0,
@@ -218,6 +228,7 @@ impl Lookahead {
     /// Resets to the state before the first pass.
     pub(crate) const fn restart(&mut self) {
         self.step_over.restart();
+        self.line = None;
         self.patch_mm = 0.0;
         self.without = 0;
         self.task = Task::Done;
@@ -240,6 +251,7 @@ impl Lookahead {
             Task::Estimate(0) => cycles::NEXT,
             Task::Estimate(_) => cycles::ESTIMATE,
             Task::Close => cycles::CLOSE,
+            Task::Seek => lines::PORTION_CYCLES,
             Task::Across => cycles::PATCH,
             Task::Start => cycles::STATION,
             Task::Turn(_) => cycles::TURN,
@@ -260,7 +272,9 @@ impl Lookahead {
     }
 
     /// Begins to look over this pass.
-    pub(crate) fn begin(&mut self, pass: u32, route: Route, head: &Turn, out: &mut PassPlan) {
+    pub(crate) fn begin(&mut self, job: &Job<'_>, pass: u32, route: Route, head: &Turn, out: &mut PassPlan) {
+        let goes_on = pass > 0 && self.line == Some(route.side);
+        self.line = Some(route.side);
         let has_head = head.exists();
         self.turn = *head;
         self.task = if has_head { Task::Head(0) } else { Task::Patch };
@@ -270,8 +284,14 @@ impl Lookahead {
         out.head_q10 = self.start_q10;
         out.tail = Turn::NONE;
         out.plan.ends = [head.speed, 0.0];
-        self.maximum = PassMaximum::NONE;
-        self.step_over.begin();
+        // The step-over is that of all passes on the line.
+        self.goes_on = goes_on;
+        if goes_on {
+            self.step_over.go_on(job, &route);
+        } else {
+            self.maximum = PassMaximum::NONE;
+            self.step_over.begin(job, &route);
+        }
         out.plan.stations.clear();
         out.pass = pass;
         out.route = route;
@@ -279,6 +299,7 @@ impl Lookahead {
         out.point = false;
         out.full_pace = 1.0;
         out.next = None;
+        out.steps_over = false;
     }
 
     /// Executes one task.
@@ -286,7 +307,13 @@ impl Lookahead {
     /// # Errors
     /// The fault of the surface at the next station; [`FaultKind::SoftLimit`] where the station is outside the travel.
     #[inline(never)]
-    pub(crate) fn work(&mut self, job: &Job<'_>, axes: &AxisLimits, out: &mut PassPlan) -> Result<()> {
+    pub(crate) fn work(
+        &mut self,
+        job: &Job<'_>,
+        axes: &AxisLimits,
+        lines: &mut RegionLines,
+        out: &mut PassPlan,
+    ) -> Result<()> {
         self.task = match self.task {
             Task::Patch => {
                 let first = self.patches == 0;
@@ -322,20 +349,29 @@ impl Lookahead {
                 Task::Estimate(looks - 1)
             }
             Task::Close => {
-                if self.looks_again(job) {
+                if !self.goes_on && self.looks_again(job) {
                     let (pass, route, head) = (out.pass, out.route, self.turn);
-                    self.begin(pass, route, &head, out);
+                    self.line = None;
+                    self.begin(job, pass, route, &head, out);
                     return Ok(());
                 }
-                self.close(job, out)?;
-                let rests = self.without > 0;
-                self.without = self.without.saturating_sub(1);
-                if !rests && self.may_turn(job, axes, out) {
-                    Task::Across
+                if self.close(job, lines, out)? {
+                    self.choose_link(job, axes, out)
                 } else {
-                    Task::Done
+                    Task::Seek
                 }
             }
+            Task::Seek => match lines.seek(job, out.pass)? {
+                NextPass::Sought => Task::Seek,
+                NextPass::Found => {
+                    out.next = lines.take(job.header);
+                    let is_joined = |route: &Route| lines.joins(job.header, &out.route, route);
+                    out.steps_over =
+                        job.header.pattern == Pattern::Zigzag && out.next.as_ref().is_some_and(is_joined);
+                    self.choose_link(job, axes, out)
+                }
+                NextPass::None => self.choose_link(job, axes, out),
+            },
             Task::Head(index) => {
                 self.push_half(true, index, out);
                 if index + 1 < turn::STATIONS {
@@ -394,12 +430,25 @@ impl Lookahead {
         let part = |cells: u16| whole_part.checked_div(u64::from(cells)).unwrap_or(u64::MAX);
         let length = self.patch_length();
         if out.cells == 0 {
+            let [start, end] = out.route.ends;
+            let spans = if job.header.edges > 0 {
+                start.span.abs_diff(end.span).saturating_add(1)
+            } else {
+                spans
+            };
             let fit = stations_of(job)
                 .checked_div(spans)
                 .unwrap_or(1)
                 .saturating_sub(1)
                 .max(1);
-            let mean = if self.patch_mm > 0.0 {
+            let mean = if job.header.edges > 0 {
+                // The last pass may have been one of a small part of the patch.
+                if spans > 1 {
+                    self.patch_mm.at_least(length)
+                } else {
+                    length
+                }
+            } else if self.patch_mm > 0.0 {
                 self.patch_mm
             } else {
                 length
@@ -606,7 +655,13 @@ impl Lookahead {
     /// Whether a turn may lead to the next pass.
     fn may_turn(&self, job: &Job<'_>, axes: &AxisLimits, out: &PassPlan) -> bool {
         let [_, is_up] = out.faces_up;
-        axes.overrun_mm > 0.0 && has_turns(job) && out.next.is_some() && is_up && !out.point && out.group == 1
+        axes.overrun_mm > 0.0
+            && has_turns(job)
+            && out.next.is_some()
+            && out.steps_over
+            && is_up
+            && !out.point
+            && out.group == 1
     }
 
     /// Turns to the start of the next pass; without a turn where it cannot be evaluated.
@@ -723,25 +778,42 @@ impl Lookahead {
         job.header.spacing == Spacing::Exact && self.step_over.looks_again(job.header)
     }
 
-    /// Computes the interval and the next pass.
-    fn close(&mut self, job: &Job<'_>, out: &mut PassPlan) -> Result<()> {
+    /// Begins to look for a turn where there may be one.
+    fn choose_link(&mut self, job: &Job<'_>, axes: &AxisLimits, out: &PassPlan) -> Task {
+        let rests = self.without > 0;
+        self.without = self.without.saturating_sub(1);
+        if !rests && self.may_turn(job, axes, out) {
+            Task::Across
+        } else {
+            Task::Done
+        }
+    }
+
+    /// Computes the interval and the next pass; returns whether that is known, and not to be sought in a region.
+    fn close(&mut self, job: &Job<'_>, lines: &mut RegionLines, out: &mut PassPlan) -> Result<bool> {
         let patches = f32::from(self.patches.saturating_add(1));
         self.patch_mm = to_f32(self.start_q10 - out.head_q10) * MM_PER_Q10 / patches;
         let header = job.header;
         out.interval = interval_of(self.maximum.inv_interval_sq);
+        if let Some(route) = lines.take(header) {
+            out.next = Some(route);
+            return Ok(true);
+        }
         let step = match header.spacing {
             Spacing::Exact | Spacing::Constant | Spacing::ConstantFromMiddle => {
                 self.step_over.step(header, self.maximum)
             }
             Spacing::FirstOrder => out.interval,
         };
-        out.next = if schedule::is_last(out.route.side, header.side_spans) {
-            None
-        } else {
+        if header.edges > 0 {
+            return Ok(!lines.go_on(job, step)?);
+        }
+        if !schedule::is_last(out.route.side, header.side_spans) {
             let side = self.step_over.next_side(job, out.route.side, step)?;
-            Some(Route::of_pass(header, out.pass.wrapping_add(1), side))
-        };
-        Ok(())
+            out.next = Some(Route::of_pass(header, out.pass.wrapping_add(1), side));
+            out.steps_over = header.pattern == Pattern::Zigzag;
+        }
+        Ok(true)
     }
 }
 

@@ -10,9 +10,10 @@ use crate::feed::limits::MotionLimits;
 use crate::feed::pace::{Course as _, Pace};
 use crate::feed::plan::{Cursor, Plan};
 use crate::feed::planner::{PORTION_CYCLES, Planner};
+use crate::feed::profile::Profiles;
 use crate::feed::turn::Turn;
+use crate::job::AxisLimits;
 use crate::job::program::Job;
-use crate::job::{AxisLimits, Header, Pattern};
 use crate::math::number::{Bounded, to_f32};
 use crate::pass::route::Route;
 use crate::pass::run::Run;
@@ -29,12 +30,12 @@ const SPARE_PERIODS: u32 = 15;
 
 /// Cycles of one place of a search for a change of the pace, along a pass and along a link, and of its begin along a pass; of a portion of a
 /// step-over's planning.
-const PACE_CYCLES: u32 = 1_560;
-const PACE_BEGIN_CYCLES: u32 = 8_000;
-const LINK_PACE_CYCLES: u32 = 1_000;
+const PACE_CYCLES: u32 = 1_900;
+const PACE_BEGIN_CYCLES: u32 = 9_500;
+const LINK_PACE_CYCLES: u32 = 1_300;
 const STEP_OVER_CYCLES: u32 = 6_000;
 /// Cycles of the same of a hop, and of its planning.
-const HOP_PACE_CYCLES: u32 = 2_500;
+const HOP_PACE_CYCLES: u32 = 3_300;
 const HOP_CYCLES: u32 = 24_000;
 /// Cycles of the begin of a look-ahead, and of the planning of a leg.
 const BEGIN_CYCLES: u32 = 1_500;
@@ -140,6 +141,7 @@ pub(crate) struct Sequencer {
     pub(super) pending: Option<Fault>,
     pub(super) follower: Follower,
     pub(super) pace: Pace<Cursor>,
+    pub(super) profiles: Profiles,
     /// The turn that the tool is in, or was last.
     pub(super) turn: Turn,
     pub(super) straight: StraightMove,
@@ -186,6 +188,7 @@ impl Sequencer {
         pending: None,
         follower: Follower::START,
         pace: Pace::REST,
+        profiles: Profiles::NONE,
         turn: Turn::NONE,
         straight: StraightMove::NONE,
         hop: Hop::NONE,
@@ -203,7 +206,7 @@ impl Sequencer {
     };
 
     /// Starts the job from the tool's position.
-    pub(crate) fn restart(&mut self, header: &Header, axes: &AxisLimits) {
+    pub(crate) fn restart(&mut self, first: Route, axes: &AxisLimits) {
         self.at.get_or_insert(axes.home_nm);
         self.phase = Phase::Await;
         self.second = false;
@@ -217,7 +220,7 @@ impl Sequencer {
         }
         self.lookahead.restart();
         self.feed_factor = 1.0;
-        self.request_planning(0, Some(Route::of_pass(header, 0, SpanParameter::default())));
+        self.request_planning(0, Some(first));
     }
 
     /// The tool's position, nm, once it is known.
@@ -403,11 +406,15 @@ impl Sequencer {
                 let known = is_known.then_some(&next.plan);
                 let stops = self.pace.wanted() == 0.0;
                 let road = road(&now.plan, known, next.plan.pace_max, stops);
-                return self.pace.work(&road, &self.follower.cursor);
+                return self.pace.work(&road, &self.follower.cursor, &mut self.profiles);
             }
-            Phase::StepOver if self.step_over.progress.has_work() => return self.step_over.progress.work(),
-            Phase::Leg(_) if self.straight.progress.has_work() => return self.straight.progress.work(),
-            Phase::Hop if self.hop.has_work() => return self.hop.work(),
+            Phase::StepOver if self.step_over.progress.has_work() => {
+                return self.step_over.progress.work(&mut self.profiles);
+            }
+            Phase::Leg(_) if self.straight.progress.has_work() => {
+                return self.straight.progress.work(&mut self.profiles);
+            }
+            Phase::Hop if self.hop.has_work() => return self.hop.work(&mut self.profiles),
             _ => {}
         }
         if let Some(route) = self.pass_ahead().map(|pass| pass.route) {
@@ -429,11 +436,11 @@ impl Sequencer {
         match self.planning {
             Planning::Requested(pass, route) => {
                 self.lookahead.enter_row(route.side.span);
-                self.lookahead.begin(pass, route, &now.tail, next);
+                self.lookahead.begin(job, pass, route, &now.tail, next);
                 self.planning = Planning::Stations;
             }
             Planning::Stations => {
-                self.pending = self.lookahead.work(job, axes, next).err();
+                self.pending = self.lookahead.work(job, axes, &mut run.lines, next).err();
                 if self.lookahead.is_done() {
                     self.planning = if next.point {
                         Planning::Complete
@@ -448,7 +455,7 @@ impl Sequencer {
             Planning::Feed => {
                 // The pass after it takes as long to plan; off the surface it can be waited for.
                 let is_last = next.next.is_none() && !self.planner.is_walking();
-                let least = if !is_last && job.header.pattern == Pattern::Zigzag {
+                let least = if !is_last && next.steps_over {
                     self.spent.saturating_add(SPARE_PERIODS)
                 } else {
                     0
@@ -599,7 +606,7 @@ impl Sequencer {
                 return Ok(());
             }
             let (now, next) = both(&mut self.plans, self.second);
-            if self.on_surface && job.header.pattern == Pattern::Zigzag {
+            if self.on_surface && now.steps_over {
                 self.phase = Phase::StepOver;
                 let pace = command.feed_factor * job.header.feed_mm_s / self.step_over.feed();
                 self.step_over
@@ -643,22 +650,22 @@ impl Sequencer {
         self.follower.begin(&now.plan);
         let pace = pace_on(now, command.feed_factor);
         self.pace.begin(pace, job.header.period_s);
-        self.start_pass(job);
+        self.start_pass();
         Ok(())
     }
 
     /// Resets what belongs to a pass, and requests the link to the next one.
-    pub(super) fn start_pass(&mut self, job: &Job<'_>) {
+    pub(super) fn start_pass(&mut self) {
         self.has_first_patch = true;
         let (now, _) = both(&mut self.plans, self.second);
         self.cell = [0; 2];
         self.correction = None;
         self.replanned = 0.0;
-        if job.header.pattern == Pattern::Zigzag && now.next.is_some() && !now.turns() {
+        if now.steps_over && !now.turns() {
             self.step_over.request();
             self.has_step_over = true;
         }
-        self.has_hop = job.header.pattern == Pattern::Zig && now.next.is_some();
+        self.has_hop = !now.steps_over && now.next.is_some();
         self.hop.clear();
     }
 
@@ -726,7 +733,7 @@ impl Sequencer {
             {
                 return Err(fault);
             }
-            let pace = self.pace.tick();
+            let pace = self.pace.tick(&mut self.profiles);
             let (now, _) = both(&mut self.plans, self.second);
             let moved = if pace > 0.0 {
                 self.follower.tick(&now.plan, pace)
@@ -788,7 +795,7 @@ impl Sequencer {
             check_faces_up(now.faces_up[1])?;
             self.goal = Goal::Home;
             self.await_goal(Leg::Retract);
-        } else if job.header.pattern == Pattern::Zigzag {
+        } else if now.steps_over {
             self.phase = Phase::Await;
         } else {
             check_faces_up(now.faces_up[1])?;
@@ -810,7 +817,7 @@ impl Sequencer {
     /// measured, because those in which the tool comes to a patch, and the patch after it is prepared, are the worst-case ticks.
     fn correct_progress(&mut self, run: &Run) {
         let (now, _) = both(&mut self.plans, self.second);
-        let (cells, fraction) = now.kept_cells();
+        let kept = now.kept_cells();
         if self.phase != Phase::Pass || now.point {
             return;
         }
@@ -822,11 +829,11 @@ impl Sequencer {
             }
             return;
         }
-        let Some(cell) = run.cell(cells).filter(|cell| *cell != self.cell) else {
+        let Some(cell) = run.cell(kept.0).filter(|cell| *cell != self.cell) else {
             return;
         };
         self.cell = cell;
-        let (Some(start_q10), Some(since_mm)) = (now.arc_q10(cell), run.since_station(cell, fraction)) else {
+        let (Some(start_q10), Some(since_mm)) = (now.arc_q10(cell), run.since_station(cell, kept)) else {
             return;
         };
         let arc_q10 = start_q10 + crate::feed::to_q10(since_mm);
@@ -847,6 +854,7 @@ impl Sequencer {
             command.feed_factor.at_most(1.0),
             command.is_fault,
             job.header.period_s,
+            &mut self.profiles,
         ) {
             self.swap();
             return self.enter_pass(job, run, command, last);
@@ -864,10 +872,12 @@ impl Sequencer {
     ) -> Result<()> {
         let pace = command.feed_factor * job.header.feed_mm_s / self.step_over.feed();
         let is_over = self.step_over.is_nothing()
-            || self
-                .step_over
-                .progress
-                .tick(pace.at_most(1.0), command.is_fault, job.header.period_s);
+            || self.step_over.progress.tick(
+                pace.at_most(1.0),
+                command.is_fault,
+                job.header.period_s,
+                &mut self.profiles,
+            );
         if is_over {
             return self.enter_pass(job, run, command, last);
         }

@@ -98,7 +98,7 @@ impl Sequencer {
         follower.tick(&now.plan, beyond / job.header.period_s);
         self.follower = follower;
         self.pace.relocate(Cursor::come_near);
-        self.start_pass(job);
+        self.start_pass();
         Ok(())
     }
 }

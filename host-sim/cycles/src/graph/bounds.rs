@@ -43,11 +43,35 @@ const BOUNDS: &[(&str, u32, &str)] = &[
     ),
     ("controller::step_output::StepOutput::turn", 3, "axes"),
     (
+        "interp_core::job::region::ScanLine::drop_passed",
+        32,
+        "edges that a line meets: CROSSINGS_MAX",
+    ),
+    (
+        "interp_core::job::region::ScanLine::keep",
+        17,
+        "intervals of a line, and one more: CROSSINGS_MAX / 2 + 1",
+    ),
+    (
+        "interp_core::job::region::ScanLine::meet",
+        32,
+        "crossings of a line: CROSSINGS_MAX",
+    ),
+    (
+        "interp_core::job::region::ScanLine::take_in",
+        32,
+        "edges of a portion: TAKEN",
+    ),
+    (
+        "interp_core::pass::contact::solve",
+        2,
+        "Newton steps: NEWTON_STEPS",
+    ),
+    (
         "interp_core::positioning::Periods::shortest",
         3,
         "whole numbers beside the best real one",
     ),
-    ("interp_core::pass::contact::solve", 2, "Newton steps"),
     (
         "interp_core::feed::curve::Curve as interp_core::feed::pace::Course::advance",
         3,
@@ -93,6 +117,7 @@ const BOUNDS: &[(&str, u32, &str)] = &[
         24,
         "steps to the place where a change begins: STEPS_AHEAD",
     ),
+    ("interp_core::feed::plan::Plan::span_of", 3, "axes"),
     (
         "compiler_builtins::mem::impls::copy_backward::copy_backward_aligned_words",
         512,

@@ -9,11 +9,11 @@ use super::geometry;
 
 const NM_PER_MM: f64 = 1e6;
 
-/// Limits, travel and home of the axes; `None` for a job without limits.
+/// Limits, travel and home of the axes; `None` for a job without limits. `start`: (u, v) at the start of the first pass.
 ///
 /// # Errors
 /// A place outside the travel, with the key that names it.
-pub(super) fn axes(job: &Job, tool_sign: f64) -> Result<Option<AxisLimits>, JobError> {
+pub(super) fn axes(job: &Job, tool_sign: f64, start: [f64; 2]) -> Result<Option<AxisLimits>, JobError> {
     let machine = &job.machine;
     let Some(limits) = machine.limits else {
         return Ok(None);
@@ -26,7 +26,7 @@ pub(super) fn axes(job: &Job, tool_sign: f64) -> Result<Option<AxisLimits>, JobE
         Some(home_mm) => home_mm,
         // Above the start of the first pass, where the surface has a normal.
         None => {
-            let DVec3 { x, y, .. } = geometry::first_centre_mm(job, tool_sign).unwrap_or_default();
+            let DVec3 { x, y, .. } = geometry::centre_mm(job, tool_sign, start).unwrap_or_default();
             [x, y, safe_z_mm]
         }
     };

@@ -142,11 +142,11 @@ pub(super) fn tool_sign(job: &Job) -> Result<f64, JobError> {
     ))
 }
 
-/// The tool centre over the first contact of the first pass, mm; `None` where the surface has no normal there.
-pub(super) fn first_centre_mm(job: &Job, sign: f64) -> Option<DVec3> {
+/// The tool centre over the contact at (u, v), the first of the first pass, mm; `None` where the surface has no normal there.
+pub(super) fn centre_mm(job: &Job, sign: f64, [u, v]: [f64; 2]) -> Option<DVec3> {
     let surface = SurfaceEvaluator::new(&job.surface);
     let [us, vs] = job.surface.domain();
-    let frame = surface.at(us[0], vs[0]);
+    let frame = surface.at(u, v);
     let (reach_u, reach_v) = (
         frame.u.length() * (us[1] - us[0]),
         frame.v.length() * (vs[1] - vs[0]),
@@ -156,11 +156,14 @@ pub(super) fn first_centre_mm(job: &Job, sign: f64) -> Option<DVec3> {
     } else {
         // The normal near the pole, extrapolated to it by a parabola.
         let beside = |k: f64| {
-            let step = |[start, end]: [f64; 2]| start + k * POLE_STEP * (end - start);
+            let step = |at: f64, [start, end]: [f64; 2]| {
+                let way = k * POLE_STEP * (end - start);
+                if at + way < end { at + way } else { at - way }
+            };
             let place = if reach_u < reach_v {
-                surface.at(us[0], step(vs))
+                surface.at(u, step(v, vs))
             } else {
-                surface.at(step(us), vs[0])
+                surface.at(step(u, us), v)
             };
             unit(place.u.cross(place.v))
         };
@@ -213,7 +216,7 @@ mod tests {
                 assert_eq!(sign, oracle.normal_sign, "{name} {side:?}");
                 let [us, vs] = job.surface.domain();
                 let exact = oracle.contact(us[0], vs[0]).unwrap().cl_mm;
-                let ours = first_centre_mm(&job, sign).unwrap();
+                let ours = centre_mm(&job, sign, [us[0], vs[0]]).unwrap();
                 // A nanometre: the machine's own resolution.
                 assert!(ours.distance(exact) < 1e-6, "{name} {side:?}: {ours} for {exact}");
             }

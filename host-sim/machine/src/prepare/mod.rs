@@ -9,6 +9,7 @@ mod axes;
 mod fronts;
 mod geometry;
 mod grid;
+mod region;
 mod steps;
 mod stream;
 
@@ -104,13 +105,7 @@ pub fn prepare(job: &Job) -> Result<Prepared, JobError> {
             "write along = \"u\" or \"v\", or call `direction::choose`",
         ));
     }
-    if job.region.is_some() {
-        return Err(job.origin.error(
-            "region",
-            "a part of a surface cannot be machined yet",
-            "remove the section, for the whole surface",
-        ));
-    }
+    region::check_job(job)?;
     fronts::check_job(job)?;
     let sign = geometry::tool_sign(job)?;
     #[allow(clippy::cast_possible_truncation, reason = "the machine's own precision")]
@@ -137,10 +132,11 @@ pub fn prepare(job: &Job) -> Result<Prepared, JobError> {
         feed_mm_s: job.feed_mm_s() as f32,
         scallop_mm: job.scallop_mm as f32,
         period_s: job.machine.period_s() as f32,
+        edges: 0,
         window: 0,
-        axes: axes::axes(job, sign)?,
+        axes: None,
     };
-    let prepared = match &job.surface {
+    let mut prepared = match &job.surface {
         SurfaceSpec::Revolved {
             radius_mm,
             height_mm,
@@ -149,6 +145,12 @@ pub fn prepare(job: &Job) -> Result<Prepared, JobError> {
         } => revolved(job, header, [*radius_mm, *height_mm], *u, *v_rad),
         surface => grid::prepare(job, header, &Source::new(surface)),
     }?;
+    let [us, vs] = job.surface.domain();
+    let start = match &job.region {
+        Some(region) => region::add(job, region, &mut prepared)?,
+        None => [us[0], vs[0]],
+    };
+    prepared.header.axes = axes::axes(job, sign, start)?;
     fronts::check(job, &prepared)?;
     stream::fit(job, prepared)
 }

@@ -33,6 +33,13 @@ pub(super) fn fit(job: &Job, prepared: Prepared) -> Result<Prepared, JobError> {
             "write spacing = \"exact\", use fewer knots, or cut the part into several jobs",
         );
     }
+    if prepared.header.edges > 0 {
+        return no(
+            "region",
+            "a region needs all of them at once",
+            "remove the section, use fewer knots, or cut the part into several jobs",
+        );
+    }
     if job.overrun_mm > 0.0 {
         return no(
             "cut.overrun_mm",

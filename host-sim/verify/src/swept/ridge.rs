@@ -73,7 +73,7 @@ pub(super) struct Gap<'a> {
     sides: [f64; 2],
     /// Indices of the passes.
     pub(super) indices: [usize; 2],
-    /// Range of the path parameter of a gap between curved passes.
+    /// Range of the path parameter of a gap between curved passes, or between passes of a region.
     range: Option<[f64; 2]>,
     /// Shares of the gap that are evaluated, 0 and 1 among them.
     across: Vec<f64>,
@@ -93,7 +93,7 @@ impl<'a> Gap<'a> {
         let mut ends = vec![0.0];
         for at in oracle.surface.breaks(oracle.across()) {
             let share = (at - sides[0]) / width;
-            if range.is_none() && share > 1e-9 && share < 1.0 - 1e-9 {
+            if !oracle.spacing.is_constant() && share > 1e-9 && share < 1.0 - 1e-9 {
                 ends.push(share);
             }
         }
@@ -137,6 +137,9 @@ impl<'a> Gap<'a> {
 
     /// All gaps between passes: each pass and the next one, or of curved passes that which is next to it at each path parameter.
     pub(super) fn all(oracle: &'a Oracle, heights: &[PassHeight<'a>], tree: &'a PathTree<'a>) -> Vec<Self> {
+        if oracle.region.is_some() {
+            return Self::within_region(oracle, heights, tree);
+        }
         if !oracle.spacing.is_constant() {
             let pairs = heights.windows(2).enumerate();
             return pairs
@@ -174,6 +177,32 @@ impl<'a> Gap<'a> {
             .into_iter()
             .map(|(pair, range)| Self::new(oracle, pair.map(|k| heights[k]), pair, Some(range), tree))
             .collect()
+    }
+
+    /// The gaps of a region: between the passes of neighbouring lines, where they are beside each other. Beside the region's boundary the last ball stands at the end
+    /// of a pass, so half a step-over of it is left out.
+    fn within_region(oracle: &'a Oracle, heights: &[PassHeight<'a>], tree: &'a PathTree<'a>) -> Vec<Self> {
+        let lines: Vec<&[PassHeight<'a>]> = heights.chunk_by(|a, b| a.pass().side == b.pass().side).collect();
+        let mut gaps = Vec::new();
+        let mut first = 0;
+        for pair in lines.windows(2) {
+            let second = first + pair[0].len();
+            for (i, near) in pair[0].iter().enumerate() {
+                for (j, far) in pair[1].iter().enumerate() {
+                    if let Some(range) = beside(oracle, [near, far]) {
+                        gaps.push(Self::new(
+                            oracle,
+                            [*near, *far],
+                            [first + i, second + j],
+                            Some(range),
+                            tree,
+                        ));
+                    }
+                }
+            }
+            first = second;
+        }
+        gaps
     }
 
     /// Heights of both passes at a point.
@@ -444,6 +473,27 @@ impl<'a> Gap<'a> {
             skipped,
         }
     }
+}
+
+/// Range of the path parameter where two passes of a region are beside each other, without the ends that are no boundary of the surface.
+fn beside(oracle: &Oracle, passes: [&PassHeight<'_>; 2]) -> Option<[f64; 2]> {
+    let [[a, b], [c, d]] = [passes[0].pass().path_range()?, passes[1].pass().path_range()?];
+    let side = 0.5 * (passes[0].pass().side + passes[1].pass().side);
+    let boundaries = oracle.path_range();
+    let inwards = |at: f64| {
+        if boundaries.contains(&at) {
+            return 0.0;
+        }
+        let (u, v) = oracle.swapped(at, side);
+        let contact = oracle.contact(u, v).ok();
+        let half = contact.map(|contact| 0.5 * contact.step_over_mm / contact.path_speed);
+        half.filter(|half| half.is_finite()).unwrap_or(0.0)
+    };
+    let (low, high) = (a.max(c), b.min(d));
+    let range = [low + inwards(low), high - inwards(high)];
+    // Where the region ends between them, the lines are not neighbours.
+    let is_inside = |[from, to]: &[f64; 2]| *from < range[1] && range[0] < *to;
+    (range[0] < range[1] && oracle.intervals(side).iter().any(is_inside)).then_some(range)
 }
 
 fn highest(crests: &[Crest]) -> f64 {

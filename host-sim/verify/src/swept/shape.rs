@@ -44,6 +44,7 @@ impl SurfaceCheck {
         let mut degenerate: Vec<[f64; 2]> = (0..grid.count())
             .filter(|index| grid.curvatures[*index].is_none())
             .map(|index| grid.cell(index).middle().into())
+            .filter(|[u, v]: &[f64; 2]| oracle.is_in_region(*u, *v))
             .collect();
         let mut poles = Vec::new();
         for (name, line) in boundaries(oracle) {
@@ -58,7 +59,8 @@ impl SurfaceCheck {
                 let inside = &line[1..line.len() - 1];
                 let spans =
                     |[u, v]: &&[f64; 2]| local_curvature(&oracle.surface.at(*u, *v), oracle).is_none();
-                degenerate.extend(inside.iter().filter(spans));
+                let is_inside = |[u, v]: &&[f64; 2]| oracle.is_in_region(*u, *v);
+                degenerate.extend(inside.iter().filter(spans).filter(is_inside));
             }
         }
         Self {
@@ -93,6 +95,9 @@ fn boundaries(oracle: &Oracle) -> Vec<(String, Vec<[f64; 2]>)> {
 /// The tightest concave radius: the cell with the largest curvature, then a pattern search with bisected steps.
 fn concave_radius(oracle: &Oracle, grid: &CellGrid) -> Option<ConcaveRadius> {
     let curvature = |u: f64, v: f64| {
+        if !oracle.is_in_region(u, v) {
+            return f64::NEG_INFINITY;
+        }
         local_curvature(&oracle.surface.at(u, v), oracle)
             .map_or(f64::NEG_INFINITY, |(_, curvature)| curvature.principal[1])
     };
@@ -102,7 +107,9 @@ fn concave_radius(oracle: &Oracle, grid: &CellGrid) -> Option<ConcaveRadius> {
         .map(|index| {
             let cell = grid.cell(index);
             let corners = cell.u.into_iter().flat_map(|u| cell.v.map(|v| curvature(u, v)));
-            let middle = grid.curvatures[index].map_or(f64::NEG_INFINITY, |curvature| curvature.principal[1]);
+            let (u, v) = cell.middle();
+            let inside = grid.curvatures[index].filter(|_| oracle.is_in_region(u, v));
+            let middle = inside.map_or(f64::NEG_INFINITY, |curvature| curvature.principal[1]);
             (index, corners.fold(middle, f64::max))
         })
         .reduce(

@@ -239,6 +239,7 @@ fn surface_on(line: &Curve) -> (Surface, f64) {
         feed_mm_s: 10.0,
         scallop_mm: 0.01,
         period_s: 1e-3,
+        edges: 0,
         window: 0,
         axes: None,
         ..Header::default()
@@ -247,7 +248,9 @@ fn surface_on(line: &Curve) -> (Surface, f64) {
     let mut program = Program::new();
     program.begin(&header, 54, store.len()).unwrap();
     program.write(&mut store, 0, &words).unwrap();
-    program.check(&store, 0).unwrap();
+    program
+        .check(&store, 0, &mut crate::job::region::ScanLine::START.clone())
+        .unwrap();
     program.seal().unwrap();
     let mut patch = Patch::NONE;
     let job = program.job(&store).unwrap();

@@ -45,7 +45,9 @@ fn wave(pattern: Pattern) -> (Program, Vec<i32>) {
     program.begin(&header, words.len() as u32, words.len()).unwrap();
     program.write(&mut store, 0, &words).unwrap();
     for record in 0..program.records() {
-        program.check(&store, record).unwrap();
+        program
+            .check(&store, record, &mut crate::job::region::ScanLine::START.clone())
+            .unwrap();
     }
     program.seal().unwrap();
     (program, store)
@@ -89,7 +91,7 @@ fn a_run_that_is_begun_again_is_the_same() {
             assert!(again.advance(&job, &mut there).unwrap());
             again.plan(&job, &mut []);
         }
-        again.restart(Spacing::Exact);
+        again.restart(&program, &job);
         while first.advance(&job, &mut here).unwrap() && here.pass < 4 {
             assert!(again.advance(&job, &mut there).unwrap());
             assert_eq!(here, there, "after {stopped} samples");

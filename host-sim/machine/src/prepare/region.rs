@@ -1,0 +1,263 @@
+//! The region of a job as edges in the machine's store.
+//!
+//! Vertices are rounded to places of the path and the side parameter, 2^-21 of a span. The first and the last line are the first and the last that meet an interval
+//! that is long enough, so the machine finds a pass on both.
+
+use interp_core::STORE_WORDS;
+use interp_core::job::region::{CROSSINGS_MAX, Edge, FRACTION_BITS, REGION_SPANS_MAX};
+use job::{Along, Job, JobError, Region};
+
+use super::geometry::SurfaceEvaluator;
+use super::{ParameterSpans, Prepared};
+
+/// Shortest interval, as a share of the step-over of a plane.
+const LEAST_SHARE: f64 = 0.1;
+/// Points along and across each span at which the speed of the path parameter is taken.
+const SPEEDS: u32 = 9;
+
+/// Widths of spans that differ by less, relatively, are the same: over 1024 spans it adds up to less than a place.
+const SAME_WIDTH: f64 = 1e-10;
+
+const KEY: &str = "region.loops";
+
+/// Refuses what passes of a region are not made for.
+///
+/// # Errors
+/// Passes of constant scallop height.
+pub(super) fn check_job(job: &Job) -> Result<(), JobError> {
+    if job.region.is_some() && job.spacing.is_constant() {
+        return Err(job.origin.error(
+            "cut.spacing",
+            "passes of constant scallop height are made for a whole surface only",
+            "write spacing = \"exact\", or remove the section [region]",
+        ));
+    }
+    Ok(())
+}
+
+/// Adds the region's words; returns where its first pass starts, (u, v).
+///
+/// # Errors
+/// The region takes too many words, meets a line too often, or holds no pass.
+pub(super) fn add(job: &Job, region: &Region, prepared: &mut Prepared) -> Result<[f64; 2], JobError> {
+    let no = |what: String, remedy: &str| Err(job.origin.error(KEY, what, remedy));
+    if prepared.path.spans().max(prepared.side.spans()) > usize::from(REGION_SPANS_MAX) {
+        return no(
+            format!(
+                "a surface with a region may have at most {REGION_SPANS_MAX} patches along each parameter"
+            ),
+            "use fewer knots, or cut the part into several jobs",
+        );
+    }
+    let edges = edges(job.along, region, prepared);
+    let words = prepared.words.len() + 3 + 4 * edges.len();
+    if words > STORE_WORDS {
+        return no(
+            format!(
+                "the surface and its region take {words} words, more than the {STORE_WORDS} of the board's store"
+            ),
+            "simplify the loops, use fewer knots, or cut the part into several jobs",
+        );
+    }
+    let name = match job.along {
+        Along::U => "v",
+        Along::V => "u",
+    };
+    let (side, most) = most_met(&edges);
+    if most > CROSSINGS_MAX {
+        return no(
+            format!(
+                "a pass at {name} = {:.6} meets {most} edges of the region, more than {CROSSINGS_MAX}",
+                parameter(&prepared.side, side)
+            ),
+            "let the passes run along the other parameter, or cut the region into several jobs",
+        );
+    }
+    let least = least(job, prepared);
+    let Some([first, last]) = lines(&edges, least) else {
+        return no(
+            "the region holds no pass: it is narrower than a tenth of the step-over everywhere".to_owned(),
+            "draw a wider region",
+        );
+    };
+    prepared.header.edges = u16::try_from(edges.len()).unwrap_or(u16::MAX);
+    prepared.words.extend([first, last, least]);
+    prepared
+        .words
+        .extend(edges.iter().flat_map(|edge| edge.to_words()));
+    let start = intervals(&edges, first, least)
+        .first()
+        .map_or(0, |[from, _]| *from);
+    let (path, side) = (parameter(&prepared.path, start), parameter(&prepared.side, first));
+    Ok(match job.along {
+        Along::U => [path, side],
+        Along::V => [side, path],
+    })
+}
+
+/// The edges in order, without those of constant side. Places are fractions of spans, so an edge is parted where it crosses a knot between spans of
+/// different width: it is straight on both sides, but not over both.
+fn edges(along: Along, region: &Region, prepared: &Prepared) -> Vec<Edge> {
+    let swapped = |[u, v]: [f64; 2]| match along {
+        Along::U => [u, v],
+        Along::V => [v, u],
+    };
+    let axes = [&prepared.path, &prepared.side];
+    let knots = axes.map(bends);
+    let at = |point: [f64; 2]| [0, 1].map(|k| place(axes[k], point[k]));
+    let mut edges = Vec::new();
+    for [from, to] in region.edges() {
+        let (from, to) = (swapped(from), swapped(to));
+        let mut shares: Vec<f64> = (0..2)
+            .flat_map(|k| {
+                knots[k]
+                    .iter()
+                    .map(move |knot| (knot - from[k]) / (to[k] - from[k]))
+            })
+            .filter(|share| *share > 0.0 && *share < 1.0)
+            .collect();
+        shares.sort_by(f64::total_cmp);
+        let middle = shares
+            .iter()
+            .map(|share| [0, 1].map(|k| from[k] + share * (to[k] - from[k])));
+        let vertices: Vec<[i32; 2]> = [from].into_iter().chain(middle).chain([to]).map(at).collect();
+        edges.extend(
+            vertices
+                .windows(2)
+                .filter_map(|ends| Edge::between(ends[0], ends[1])),
+        );
+    }
+    edges.sort();
+    edges
+}
+
+/// The knots between spans of different width.
+fn bends(axis: &ParameterSpans) -> Vec<f64> {
+    let differ = |ends: &&[f64]| {
+        let [before, after] = [ends[1] - ends[0], ends[2] - ends[1]];
+        (before - after).abs() > SAME_WIDTH * before.max(after)
+    };
+    axis.breaks
+        .windows(3)
+        .filter(differ)
+        .map(|ends| ends[1])
+        .collect()
+}
+
+/// The place of a parameter, the nearest one.
+#[allow(
+    clippy::cast_possible_truncation,
+    reason = "spans and fractions are within their bits"
+)]
+fn place(axis: &ParameterSpans, at: f64) -> i32 {
+    let breaks = &axis.breaks;
+    let span = breaks
+        .partition_point(|start| *start <= at)
+        .clamp(1, breaks.len() - 1)
+        - 1;
+    let (start, end) = (breaks[span], breaks[span + 1]);
+    let unit = f64::from(1 << FRACTION_BITS);
+    ((span as f64 + ((at - start) / (end - start)).clamp(0.0, 1.0)) * unit).round() as i32
+}
+
+/// The parameter of a place.
+fn parameter(axis: &ParameterSpans, place: i32) -> f64 {
+    let span = usize::try_from(place >> FRACTION_BITS)
+        .unwrap_or(0)
+        .min(axis.spans() - 1);
+    let (start, end) = (axis.breaks[span], axis.breaks[span + 1]);
+    let within = f64::from(place) / f64::from(1 << FRACTION_BITS) - span as f64;
+    start + (end - start) * within
+}
+
+/// The line that meets most edges, and how many.
+fn most_met(edges: &[Edge]) -> (i32, usize) {
+    let mut ends: Vec<i32> = edges.iter().map(|edge| edge.side[1]).collect();
+    ends.sort_unstable();
+    let (mut ended, mut most) = (0, (0, 0));
+    for (index, edge) in edges.iter().enumerate() {
+        let [side, _] = edge.side;
+        while ends[ended] <= side {
+            ended += 1;
+        }
+        let met = index + 1 - ended;
+        if met > most.1 {
+            most = (side, met);
+        }
+    }
+    most
+}
+
+/// Shortest interval: that is shorter than a tenth of the step-over wherever it lies.
+#[allow(clippy::cast_possible_truncation, reason = "the cast saturates")]
+fn least(job: &Job, prepared: &Prepared) -> i32 {
+    let surface = SurfaceEvaluator::new(&job.surface);
+    let at = |[start, end]: [f64; 2], k: u32| start + (end - start) * f64::from(k) / f64::from(SPEEDS - 1);
+    let mut most_mm = 0.0_f64;
+    for path in prepared.path.breaks.windows(2).map(|ends| [ends[0], ends[1]]) {
+        for side in prepared.side.breaks.windows(2).map(|ends| [ends[0], ends[1]]) {
+            for (i, j) in (0..SPEEDS).flat_map(|i| (0..SPEEDS).map(move |j| (i, j))) {
+                let (path_at, side_at) = (at(path, i), at(side, j));
+                let speed = match job.along {
+                    Along::U => surface.at(path_at, side_at).u,
+                    Along::V => surface.at(side_at, path_at).v,
+                };
+                most_mm = most_mm.max(speed.length() * (path[1] - path[0]));
+            }
+        }
+    }
+    let step_over_mm = (8.0 * job.radius_mm * job.scallop_mm).sqrt();
+    let places = LEAST_SHARE * step_over_mm / most_mm * f64::from(1 << FRACTION_BITS);
+    (places.floor() as i32).max(1)
+}
+
+/// Intervals of a line that are long enough; those that meet are one.
+fn intervals(edges: &[Edge], side: i32, least: i32) -> Vec<[i32; 2]> {
+    let mut crossings: Vec<i32> = edges
+        .iter()
+        .take_while(|edge| edge.side[0] <= side)
+        .filter(|edge| edge.meets(side))
+        .map(|edge| edge.crossing(side))
+        .collect();
+    crossings.sort_unstable();
+    let mut intervals: Vec<[i32; 2]> = Vec::new();
+    for pair in crossings.as_chunks::<2>().0 {
+        match intervals.last_mut() {
+            Some([_, end]) if *end == pair[0] => *end = pair[1],
+            _ => intervals.push(*pair),
+        }
+    }
+    intervals.retain(|[from, to]| to - from >= least);
+    intervals
+}
+
+/// The first and the last line with an interval. Between two vertices an interval's length is linear, so it is greatest at one of them.
+fn lines(edges: &[Edge], least: i32) -> Option<[i32; 2]> {
+    let holds = |side: i32| !intervals(edges, side, least).is_empty();
+    let mut sides: Vec<i32> = edges
+        .iter()
+        .flat_map(|edge| [edge.side[0], edge.side[1] - 1])
+        .collect();
+    sides.extend(edges.iter().map(|edge| edge.side[1]));
+    sides.sort_unstable();
+    sides.dedup();
+    let search = |mut without: i32, mut with: i32| {
+        while (with - without).abs() > 1 {
+            let middle = without + (with - without) / 2;
+            if holds(middle) {
+                with = middle;
+            } else {
+                without = middle;
+            }
+        }
+        with
+    };
+    let first = sides.iter().position(|side| holds(*side))?;
+    let last = sides.iter().rposition(|side| holds(*side))?;
+    let before = first.checked_sub(1).map(|index| sides[index]);
+    let behind = sides.get(last + 1);
+    Some([
+        before.map_or(sides[first], |before| search(before, sides[first])),
+        behind.map_or(sides[last], |behind| search(*behind, sides[last])),
+    ])
+}

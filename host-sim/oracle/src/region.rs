@@ -1,0 +1,322 @@
+//! The region of a job in f64: its intervals on a line of constant side parameter, and how far a place is from its boundary.
+//!
+//! Independent of the machine's integers: it knows only that these round places to 2^-21 of a patch, or finer.
+
+use super::contact::Oracle;
+use job::{Along, Region};
+
+/// A place of the machine, as a share of the longest span between two knots: the machine's patches are those or shorter.
+const PLACE_SHARE: f64 = 1.0 / 2_097_152.0;
+/// Distance from the boundary within which an end of a pass is on it, in places: the rounding of the vertices, of the line, and of the crossing.
+const NEAR_PLACES: f64 = 3.0;
+/// Length of an interval that is a pass in any case, as a share of a plane's step-over: the machine leaves out those below 0.1 where the path parameter is fastest,
+/// which it knows from a grid of points, and shorter ones elsewhere.
+const CERTAIN_SHARE: f64 = 0.102;
+/// Points at which the length of an interval is taken.
+const LENGTH_POINTS: u32 = 16;
+
+/// The region's edges and its places.
+#[derive(Clone, Debug)]
+pub struct RegionEdges {
+    /// Ends of each edge: path and side parameter.
+    edges: Vec<[[f64; 2]; 2]>,
+    /// A place along the path and along the side parameter.
+    place: [f64; 2],
+}
+
+impl RegionEdges {
+    pub(super) fn new(region: &Region, along: Along, breaks: [Vec<f64>; 2]) -> Self {
+        let swapped = |[u, v]: [f64; 2]| match along {
+            Along::U => [u, v],
+            Along::V => [v, u],
+        };
+        let longest = |breaks: &[f64]| {
+            let widths = breaks.windows(2).map(|ends| ends[1] - ends[0]);
+            widths.fold(0.0, f64::max) * PLACE_SHARE
+        };
+        Self {
+            edges: region.edges().map(|edge| edge.map(swapped)).collect(),
+            place: breaks.each_ref().map(|breaks| longest(breaks)),
+        }
+    }
+
+    /// Crossings of a line, ascending; a line through a vertex crosses the edges above it.
+    fn crossings(&self, side: f64) -> Vec<f64> {
+        let mut crossings: Vec<f64> = self
+            .edges
+            .iter()
+            .filter(|[from, to]| (from[1] <= side) != (to[1] <= side))
+            .map(|[from, to]| from[0] + (side - from[1]) / (to[1] - from[1]) * (to[0] - from[0]))
+            .collect();
+        crossings.sort_by(f64::total_cmp);
+        crossings
+    }
+
+    /// Distance of a place on (path, side) from the boundary, in the machine's places.
+    fn places_away(&self, at: [f64; 2]) -> f64 {
+        let scaled = |point: &[f64; 2]| [0, 1].map(|k| (point[k] - at[k]) / self.place[k]);
+        let distance = |[from, to]: &[[f64; 2]; 2]| {
+            let (a, b) = (scaled(from), scaled(to));
+            let way = [b[0] - a[0], b[1] - a[1]];
+            let length = way[0] * way[0] + way[1] * way[1];
+            let share = if length > 0.0 {
+                (-(a[0] * way[0] + a[1] * way[1]) / length).clamp(0.0, 1.0)
+            } else {
+                0.0
+            };
+            (a[0] + share * way[0]).hypot(a[1] + share * way[1])
+        };
+        self.edges.iter().map(distance).fold(f64::INFINITY, f64::min)
+    }
+
+    /// Whether a place is on the boundary, but for the machine's rounding.
+    pub(super) fn is_on(&self, path: f64, side: f64) -> bool {
+        self.places_away([path, side]) <= NEAR_PLACES
+    }
+
+    /// A few places along the side parameter.
+    pub(super) fn near_side(&self) -> f64 {
+        NEAR_PLACES * self.place[1]
+    }
+
+    /// Least and greatest side parameter.
+    fn extent(&self) -> [f64; 2] {
+        let sides = self.edges.iter().flatten().map(|point| point[1]);
+        sides.fold([f64::INFINITY, f64::NEG_INFINITY], |[least, most], side| {
+            [least.min(side), most.max(side)]
+        })
+    }
+
+    /// Side parameters of the vertices.
+    fn sides(&self) -> Vec<f64> {
+        let mut sides: Vec<f64> = self.edges.iter().map(|[from, _]| from[1]).collect();
+        sides.sort_by(f64::total_cmp);
+        sides.dedup();
+        sides
+    }
+}
+
+impl Oracle {
+    /// Whether (u, v) is in the region; everything is where the job has none.
+    #[must_use]
+    pub fn is_in_region(&self, u: f64, v: f64) -> bool {
+        let Some(region) = &self.region else {
+            return true;
+        };
+        let (path, side) = self.swapped(u, v);
+        let below = region.crossings(side).iter().filter(|at| **at <= path).count();
+        below % 2 == 1
+    }
+
+    /// Whether (u, v) is in the region and at least this far from those parts of its boundary that are not the surface's, mm: by the metric there, along the path
+    /// parameter and along the side parameter.
+    #[must_use]
+    pub fn is_deep_in_region(&self, u: f64, v: f64, depth_mm: f64) -> bool {
+        let Some(region) = &self.region else {
+            return true;
+        };
+        if !self.is_in_region(u, v) {
+            return false;
+        }
+        let at = self.surface.at(u, v);
+        let (path, side) = self.swapped(u, v);
+        let (a, b) = match self.along {
+            Along::U => (at.u, at.v),
+            Along::V => (at.v, at.u),
+        };
+        let boundaries = [self.path_range(), self.side_range()];
+        let is_cut = |edge: &[[f64; 2]; 2]| {
+            let [from, to] = edge;
+            !(0..2).any(|k| from[k] == to[k] && boundaries[k].contains(&from[k]))
+        };
+        let distance = |[from, to]: &[[f64; 2]; 2]| {
+            let mm = |point: &[f64; 2]| a * (point[0] - path) + b * (point[1] - side);
+            let (from, to) = (mm(from), mm(to));
+            let way = to - from;
+            let share = if way.length_squared() > 0.0 {
+                (-from.dot(way) / way.length_squared()).clamp(0.0, 1.0)
+            } else {
+                0.0
+            };
+            (from + share * way).length()
+        };
+        region
+            .edges
+            .iter()
+            .filter(|edge| is_cut(edge))
+            .all(|edge| distance(edge) >= depth_mm)
+    }
+
+    /// Intervals of a line that lie in the region, ascending; the whole line where the job has none.
+    #[must_use]
+    pub fn intervals(&self, side: f64) -> Vec<[f64; 2]> {
+        let Some(region) = &self.region else {
+            return vec![self.path_range()];
+        };
+        // The line on the upper boundary is the one below it.
+        let [_, most] = region.extent();
+        let side = side.min(most - 1e-3 * region.place[1]);
+        let mut intervals: Vec<[f64; 2]> = Vec::new();
+        for pair in region.crossings(side).as_chunks::<2>().0 {
+            match intervals.last_mut() {
+                Some([_, end]) if pair[0] - *end <= 0.0 => *end = pair[1],
+                _ => intervals.push(*pair),
+            }
+        }
+        intervals
+    }
+
+    /// Length of an interval, mm.
+    fn interval_mm(&self, [from, to]: [f64; 2], side: f64) -> f64 {
+        let at = |k: u32| {
+            let path = from + (to - from) * f64::from(k) / f64::from(LENGTH_POINTS);
+            let (u, v) = self.swapped(path, side);
+            self.surface.at(u, v).point
+        };
+        (0..LENGTH_POINTS).map(|k| at(k).distance(at(k + 1))).sum()
+    }
+
+    /// Intervals that are passes whatever the parametrisation.
+    pub(super) fn certain_intervals(&self, side: f64) -> Vec<[f64; 2]> {
+        let least_mm = CERTAIN_SHARE * (8.0 * self.radius_mm * self.scallop_mm).sqrt();
+        let rounding = self
+            .region
+            .as_ref()
+            .map_or(0.0, |region| NEAR_PLACES * region.place[0]);
+        let is_long = |interval: &[f64; 2]| {
+            let length = interval[1] - interval[0];
+            self.interval_mm(*interval, side) * (1.0 - rounding / length) > least_mm
+        };
+        let mut intervals = self.intervals(side);
+        intervals.retain(is_long);
+        intervals
+    }
+
+    /// Whether a pass from one path parameter to another lies in the region and ends at its boundary, but for the machine's rounding.
+    pub(super) fn is_interval(&self, ends: [f64; 2], side: f64) -> bool {
+        let Some(region) = &self.region else {
+            return true;
+        };
+        if !ends.iter().all(|end| region.is_on(*end, side)) {
+            return false;
+        }
+        let (low, high) = (ends[0].min(ends[1]), ends[0].max(ends[1]));
+        let middle = 0.5 * (low + high);
+        // What is outside of the interval by f64 is a strip along the boundary.
+        self.intervals(side)
+            .iter()
+            .find(|[from, to]| (*from..=*to).contains(&middle))
+            .is_some_and(|[from, to]| {
+                (*from <= low || region.is_on(0.5 * (from + low), side))
+                    && (*to >= high || region.is_on(0.5 * (to + high), side))
+            })
+    }
+
+    /// Whether the passes of a line leave out no interval.
+    pub(super) fn is_line_complete(&self, passes: &[[f64; 2]], side: f64) -> bool {
+        self.region.is_none()
+            || self.certain_intervals(side).iter().all(|[from, to]| {
+                let middle = 0.5 * (from + to);
+                passes
+                    .iter()
+                    .any(|[a, b]| (a.min(*b)..=a.max(*b)).contains(&middle))
+            })
+    }
+
+    /// A few places of the machine along the side parameter.
+    pub(super) fn near_side(&self) -> f64 {
+        self.region.as_ref().map_or(0.0, RegionEdges::near_side)
+    }
+
+    /// Whether no line between two side parameters has an interval, apart from both of them.
+    pub(super) fn is_empty_between(&self, from: f64, to: f64) -> bool {
+        let Some(region) = &self.region else {
+            return from >= to;
+        };
+        let off = region.near_side();
+        let mut sides = vec![from + off, to - off];
+        sides.extend(
+            region
+                .sides()
+                .iter()
+                .flat_map(|side| [side - off, *side, side + off]),
+        );
+        sides
+            .iter()
+            .filter(|side| (from + off..=to - off).contains(side))
+            .all(|side| self.certain_intervals(*side).is_empty())
+    }
+
+    /// Side parameters between which the passes lie.
+    #[must_use]
+    pub fn pass_range(&self) -> [f64; 2] {
+        self.region
+            .as_ref()
+            .map_or_else(|| self.side_range(), RegionEdges::extent)
+    }
+
+    /// The first line of the region at a side parameter or above it that has an interval.
+    pub(super) fn next_line(&self, side: f64) -> Option<f64> {
+        let Some(region) = &self.region else {
+            return Some(side);
+        };
+        if !self.certain_intervals(side).is_empty() {
+            return Some(side);
+        }
+        let [_, most] = self.pass_range();
+        let mut below = side;
+        for above in region.sides().into_iter().chain([most]) {
+            let above = if above >= most { most } else { above };
+            if above <= side {
+                continue;
+            }
+            // Between two vertices an interval's length is linear.
+            for end in [above - region.near_side(), above] {
+                if end > below && !self.certain_intervals(end).is_empty() {
+                    let (mut without, mut with) = (below, end);
+                    for _ in 0..60 {
+                        let middle = 0.5 * (without + with);
+                        if self.certain_intervals(middle).is_empty() {
+                            without = middle;
+                        } else {
+                            with = middle;
+                        }
+                    }
+                    return Some(with);
+                }
+                below = below.max(end);
+            }
+        }
+        None
+    }
+
+    /// The last line of the region that has an interval.
+    pub(super) fn last_line(&self) -> f64 {
+        let [first, most] = self.pass_range();
+        let Some(region) = &self.region else {
+            return most;
+        };
+        let mut above = most;
+        for side in region.sides().into_iter().rev() {
+            for end in [side, side - region.near_side()] {
+                if !self.certain_intervals(end.min(most)).is_empty() {
+                    let (mut without, mut with) = (above, end);
+                    if without <= with {
+                        return end;
+                    }
+                    for _ in 0..60 {
+                        let middle = 0.5 * (without + with);
+                        if self.certain_intervals(middle).is_empty() {
+                            without = middle;
+                        } else {
+                            with = middle;
+                        }
+                    }
+                    return with;
+                }
+                above = end;
+            }
+        }
+        first
+    }
+}

@@ -1,0 +1,567 @@
+//! A job's region: the part of the surface that is machined, as the edges of closed polygons in the store, and its intervals on a line of constant side
+//! parameter.
+//!
+//! Words behind the records:
+//!
+//! | words | content |
+//! |---|---|
+//! | 3 | side of the first and of the last line, shortest interval on the path parameter |
+//! | 4 an edge | side and path at its lower end, side and path at its upper end; sorted by the first |
+//!
+//! A place on a parameter is an i32: the span in the upper bits, the fraction in the lower [`FRACTION_BITS`]. Edges of constant side are left out. A line meets an
+//! edge where lower end <= line < upper end, so that one through a vertex meets one of two edges that pass on and none or both of two that turn back. Between the
+//! first crossing and the second, the third and the fourth, ... the line is inside.
+
+use crate::job::Header;
+use crate::sample::SpanParameter;
+
+/// Bits of the fraction of a place.
+pub const FRACTION_BITS: u32 = 21;
+const FRACTION_MASK: i32 = (1 << FRACTION_BITS) - 1;
+/// Words before the edges, and of an edge.
+pub const HEAD_WORDS: usize = 3;
+/// Words of an edge.
+pub const EDGE_WORDS: usize = 4;
+/// Most edges that a line may meet; half as many intervals.
+pub const CROSSINGS_MAX: usize = 32;
+/// Most spans of a parameter of a surface with a region: the end of the last one is a place, too.
+pub const REGION_SPANS_MAX: u16 = 1_023;
+
+/// Edges of a record, for the checks at load.
+pub(crate) const EDGES_A_RECORD: u32 = 8;
+/// Edges that are taken in, and that are met, in a portion of the planning.
+const TAKEN: u16 = 32;
+const MET: u8 = 2;
+/// Portions of a line whose edges are taken in.
+const PORTIONS_MAX: usize = CROSSINGS_MAX / MET as usize + 2;
+
+/// The place at the end of a parameter of this number of spans.
+#[must_use]
+pub const fn end_of(spans: u16) -> i32 {
+    (spans as i32) << FRACTION_BITS
+}
+
+/// An edge, from its lower end upwards.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub struct Edge {
+    /// Side parameter at both ends, the lower end first.
+    pub side: [i32; 2],
+    /// Path parameter at both ends.
+    pub path: [i32; 2],
+}
+
+impl Edge {
+    /// The edge between two vertices, each a place on the path and one on the side parameter; none where the side is the same.
+    #[must_use]
+    pub const fn between(a: [i32; 2], b: [i32; 2]) -> Option<Self> {
+        let ([a_path, a_side], [b_path, b_side]) = (a, b);
+        if a_side < b_side {
+            Some(Self {
+                side: [a_side, b_side],
+                path: [a_path, b_path],
+            })
+        } else if a_side > b_side {
+            Some(Self {
+                side: [b_side, a_side],
+                path: [b_path, a_path],
+            })
+        } else {
+            None
+        }
+    }
+
+    /// Its words.
+    #[must_use]
+    pub const fn to_words(self) -> [i32; EDGE_WORDS] {
+        let ([from, to], [path_from, path_to]) = (self.side, self.path);
+        [from, path_from, to, path_to]
+    }
+
+    /// The edge with these words.
+    #[must_use]
+    pub const fn from_words([from, path_from, to, path_to]: [i32; EDGE_WORDS]) -> Self {
+        Self {
+            side: [from, to],
+            path: [path_from, path_to],
+        }
+    }
+
+    /// Whether a line meets it.
+    #[must_use]
+    pub const fn meets(&self, side: i32) -> bool {
+        let [from, to] = self.side;
+        from <= side && side < to
+    }
+
+    /// Where a line that meets it crosses it, rounded to the nearest place.
+    #[must_use]
+    pub fn crossing(&self, side: i32) -> i32 {
+        let ([from, to], [path_from, path_to]) = (self.side, self.path);
+        let apart = i64::from(path_to) - i64::from(path_from);
+        if apart == 0 {
+            return path_from;
+        }
+        let whole = i64::from(to) - i64::from(from);
+        // Places are below 2^31, so the product is below 2^62.
+        let part = (i64::from(side) - i64::from(from)) * apart;
+        let half = whole >> 1;
+        let rounded = if part < 0 { part - half } else { part + half };
+        let moved = rounded.checked_div(whole).unwrap_or(0);
+        i32::try_from(i64::from(path_from) + moved).unwrap_or(path_from)
+    }
+
+    /// Whether its places are on the surface, and it goes upwards.
+    pub(crate) const fn is_sound(&self, header: &Header) -> bool {
+        let ([from, to], [path_from, path_to]) = (self.side, self.path);
+        let (side_end, path_end) = (end_of(header.side_spans), end_of(header.path_spans));
+        0 <= from
+            && from < to
+            && to <= side_end
+            && 0 <= path_from
+            && path_from <= path_end
+            && 0 <= path_to
+            && path_to <= path_end
+    }
+}
+
+/// A place that a span begins at or that lies within it.
+pub(crate) const fn place_from(at: i32) -> SpanParameter {
+    SpanParameter {
+        span: span_of(at),
+        fraction: fraction_of(at),
+    }
+}
+
+/// A place that a span ends at or that lies within it.
+pub(crate) const fn place_to(at: i32) -> SpanParameter {
+    if at & FRACTION_MASK == 0 && at > 0 {
+        SpanParameter {
+            span: span_of(at - 1),
+            fraction: u64::MAX,
+        }
+    } else {
+        place_from(at)
+    }
+}
+
+#[allow(
+    clippy::cast_possible_truncation,
+    clippy::cast_sign_loss,
+    reason = "ten bits of a place that is not negative"
+)]
+const fn span_of(at: i32) -> u16 {
+    (at >> FRACTION_BITS) as u16
+}
+
+#[allow(clippy::cast_sign_loss, reason = "masked")]
+const fn fraction_of(at: i32) -> u64 {
+    ((at & FRACTION_MASK) as u64) << (64 - FRACTION_BITS)
+}
+
+/// The place of a parameter, rounded down.
+#[allow(clippy::cast_possible_truncation, reason = "the upper bits")]
+pub(crate) const fn place_of(at: SpanParameter) -> i32 {
+    if at.fraction == u64::MAX {
+        end_of(at.span + 1)
+    } else {
+        ((at.span as i32) << FRACTION_BITS) | (at.fraction >> (64 - FRACTION_BITS)) as i32
+    }
+}
+
+/// The words of a region.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct RegionWords<'a> {
+    head: [i32; HEAD_WORDS],
+    edges: &'a [[i32; EDGE_WORDS]],
+}
+
+impl<'a> RegionWords<'a> {
+    /// None where they are not complete.
+    pub(crate) fn new(words: &'a [i32]) -> Option<Self> {
+        let (head, rest) = words.split_first_chunk::<HEAD_WORDS>()?;
+        Some(Self {
+            head: *head,
+            edges: rest.as_chunks().0,
+        })
+    }
+
+    /// Side of the first line.
+    pub(crate) const fn first(&self) -> i32 {
+        let [first, _, _] = self.head;
+        first
+    }
+
+    /// Side of the last line.
+    pub(crate) const fn last(&self) -> i32 {
+        let [_, last, _] = self.head;
+        last
+    }
+
+    /// Shortest interval.
+    pub(crate) const fn least(&self) -> i32 {
+        let [_, _, least] = self.head;
+        least
+    }
+
+    /// An edge by its number.
+    pub(crate) fn edge(&self, index: u16) -> Option<Edge> {
+        self.edges.get(usize::from(index)).copied().map(Edge::from_words)
+    }
+}
+
+/// The next task on a line.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Task {
+    /// Drop the edges that end at the line or below it.
+    Drop,
+    /// Take in those that begin below it or at it.
+    TakeIn,
+    /// Find where the line meets the edge with this number in the list.
+    Meet(u8),
+    /// Keep the intervals that are long enough.
+    Keep,
+    /// The line is known.
+    Done,
+}
+
+/// A region has more edges at a line than there is room for, or an odd number of them.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) struct BadLine;
+
+/// A line of constant side parameter that goes over a region from its first line to its last.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct ScanLine {
+    task: Task,
+    side: i32,
+    /// The line before.
+    before: i32,
+    /// Edges that were taken in so far, and those of them that the line meets.
+    taken: u16,
+    active: [u16; CROSSINGS_MAX],
+    count: u8,
+    /// Where the line meets them, ascending; then the ends of the intervals.
+    crossings: [i32; CROSSINGS_MAX],
+    met: u8,
+    /// Whether the region reaches from the line before to this one along the boundary at the start of the path parameter, and at its end.
+    joins: [bool; 2],
+}
+
+impl ScanLine {
+    /// Before the first line.
+    pub(crate) const START: Self = Self {
+        task: Task::Drop,
+        side: 0,
+        before: i32::MIN,
+        taken: 0,
+        active: [0; CROSSINGS_MAX],
+        count: 0,
+        crossings: [0; CROSSINGS_MAX],
+        met: 0,
+        joins: [false; 2],
+    };
+
+    /// Goes back to the first line of a region: its edges are known from the checks at load.
+    pub(crate) fn restart(&mut self, first: &FirstLine) {
+        self.side = first.side;
+        self.before = i32::MIN;
+        self.taken = first.taken;
+        self.active = first.active;
+        self.count = first.count;
+        self.met = 0;
+        self.joins = [false; 2];
+        self.task = Task::Meet(0);
+    }
+
+    /// The whole rest of the work on a line whose edges are taken in.
+    pub(crate) fn finish(&mut self, region: &RegionWords<'_>, path_end: i32) -> Result<(), BadLine> {
+        for _ in 0..PORTIONS_MAX {
+            self.work(region, path_end)?;
+        }
+        Ok(())
+    }
+
+    /// Goes on to a line further up. `skips`: this one is left out, and does not count as the line before.
+    pub(crate) const fn go_on(&mut self, side: i32, skips: bool) {
+        if !skips {
+            self.before = self.side;
+        }
+        self.side = side;
+        self.met = 0;
+        self.joins = [false; 2];
+        self.task = Task::Drop;
+    }
+
+    /// Side of the line.
+    pub(crate) const fn side(&self) -> i32 {
+        self.side
+    }
+
+    /// Whether the line is known.
+    pub(crate) fn is_done(&self) -> bool {
+        self.task == Task::Done
+    }
+
+    /// Whether the region reaches from the line before to this one along the path parameter's boundaries.
+    pub(crate) const fn joins(&self) -> [bool; 2] {
+        self.joins
+    }
+
+    /// Intervals of the line.
+    pub(crate) const fn intervals(&self) -> u8 {
+        self.met / 2
+    }
+
+    /// Ends of an interval, ascending.
+    pub(crate) fn interval(&self, index: u8) -> Option<[i32; 2]> {
+        if index >= self.intervals() {
+            return None;
+        }
+        let (pairs, _) = self.crossings.as_chunks::<2>();
+        pairs.get(usize::from(index)).copied()
+    }
+
+    /// The side at which the region begins again, where the line is above one part of it and below the next.
+    pub(crate) fn begins_again(&self, region: &RegionWords<'_>) -> Option<i32> {
+        if self.count > 0 {
+            return None;
+        }
+        let [from, _] = region.edge(self.taken)?.side;
+        Some(from)
+    }
+
+    /// One portion of the work on a line.
+    ///
+    /// # Errors
+    /// The line meets too many edges, or an odd number of them.
+    #[inline(never)]
+    pub(crate) fn work(&mut self, region: &RegionWords<'_>, path_end: i32) -> Result<(), BadLine> {
+        self.task = match self.task {
+            Task::Drop => {
+                self.drop_passed(region);
+                Task::TakeIn
+            }
+            Task::TakeIn => {
+                if self.take_in(region)? {
+                    Task::TakeIn
+                } else {
+                    Task::Meet(0)
+                }
+            }
+            Task::Meet(index) => {
+                let end = index.saturating_add(MET).min(self.count);
+                for index in index..end {
+                    let number = self.active.get(usize::from(index)).copied().unwrap_or(0);
+                    if let Some(edge) = region.edge(number) {
+                        self.meet(&edge, path_end);
+                    }
+                }
+                if end < self.count {
+                    Task::Meet(end)
+                } else {
+                    Task::Keep
+                }
+            }
+            Task::Keep => {
+                self.keep(region.least())?;
+                Task::Done
+            }
+            Task::Done => Task::Done,
+        };
+        Ok(())
+    }
+
+    /// Drops the edges that the line does not meet any more.
+    fn drop_passed(&mut self, region: &RegionWords<'_>) {
+        let mut kept = 0_u8;
+        for index in 0..self.count {
+            let number = self.active.get(usize::from(index)).copied().unwrap_or(0);
+            let is_met = region.edge(number).is_some_and(|edge| edge.meets(self.side));
+            if is_met && let Some(place) = self.active.get_mut(usize::from(kept)) {
+                *place = number;
+                kept += 1;
+            }
+        }
+        self.count = kept;
+    }
+
+    /// Takes in a portion of edges; returns whether more of them may be due.
+    fn take_in(&mut self, region: &RegionWords<'_>) -> Result<bool, BadLine> {
+        for _ in 0..TAKEN {
+            let Some(edge) = region.edge(self.taken) else {
+                return Ok(false);
+            };
+            let [from, _] = edge.side;
+            if from > self.side {
+                return Ok(false);
+            }
+            self.take(&edge)?;
+        }
+        Ok(true)
+    }
+
+    /// Takes in the next edge, which begins below the line or at it.
+    fn take(&mut self, edge: &Edge) -> Result<(), BadLine> {
+        if edge.meets(self.side) {
+            let place = self.active.get_mut(usize::from(self.count)).ok_or(BadLine)?;
+            *place = self.taken;
+            self.count += 1;
+        }
+        self.taken += 1;
+        Ok(())
+    }
+
+    /// Inserts the crossing with an edge.
+    fn meet(&mut self, edge: &Edge, path_end: i32) {
+        let at = edge.crossing(self.side);
+        let ([from, _], [path_from, path_to]) = (edge.side, edge.path);
+        if path_from == path_to && from <= self.before {
+            let [near, far] = self.joins;
+            self.joins = [near || at == 0, far || at == path_end];
+        }
+        let mut place = usize::from(self.met).min(CROSSINGS_MAX - 1);
+        while place > 0 {
+            let before = self.crossings.get(place - 1).copied().unwrap_or(i32::MIN);
+            if before <= at {
+                break;
+            }
+            if let Some(to) = self.crossings.get_mut(place) {
+                *to = before;
+            }
+            place -= 1;
+        }
+        if let Some(to) = self.crossings.get_mut(place) {
+            *to = at;
+        }
+        self.met += 1;
+    }
+
+    /// Joins intervals that meet, and keeps those that are at least this long.
+    fn keep(&mut self, least: i32) -> Result<(), BadLine> {
+        if self.met % 2 == 1 {
+            return Err(BadLine);
+        }
+        let mut kept = 0_u8;
+        let mut open: Option<[i32; 2]> = None;
+        for index in 0..=self.intervals() {
+            let next = self.interval(index);
+            open = match (open, next) {
+                (Some([from, to]), Some([begins, ends])) if begins == to => Some([from, ends]),
+                (Some([from, to]), _) => {
+                    let (pairs, _) = self.crossings.as_chunks_mut::<2>();
+                    if to - from >= least
+                        && let Some(pair) = pairs.get_mut(usize::from(kept))
+                    {
+                        *pair = [from, to];
+                        kept += 1;
+                    }
+                    next
+                }
+                (None, _) => next,
+            };
+        }
+        self.met = 2 * kept;
+        Ok(())
+    }
+}
+
+/// The first line of a region: its side, the edges up to there, and those that it meets.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct FirstLine {
+    side: i32,
+    taken: u16,
+    count: u8,
+    active: [u16; CROSSINGS_MAX],
+}
+
+/// The checks of a region at load, edge after edge. They find the first line on the way.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct RegionCheck {
+    first: FirstLine,
+    /// Lower end of the last edge.
+    before: i32,
+    /// Combination of all ends that is 0 where each occurs an even number of times.
+    parity: u32,
+}
+
+impl RegionCheck {
+    /// Before the first edge.
+    pub(crate) const START: Self = Self {
+        first: FirstLine {
+            side: 0,
+            taken: 0,
+            count: 0,
+            active: [0; CROSSINGS_MAX],
+        },
+        before: 0,
+        parity: 0,
+    };
+
+    /// The first line, once every edge is checked.
+    pub(crate) const fn first_line(&self) -> &FirstLine {
+        &self.first
+    }
+
+    /// Begins with the first edge.
+    pub(crate) const fn begin(&mut self, region: &RegionWords<'_>) {
+        *self = Self::START;
+        self.first.side = region.first();
+    }
+
+    /// Checks a portion of edges, and after the last of them, on a line that is free, the first line. Whether they are sound: on the surface, upwards, in order,
+    /// closed.
+    pub(crate) fn check(
+        &mut self,
+        header: &Header,
+        region: &RegionWords<'_>,
+        portion: u32,
+        line: &mut ScanLine,
+    ) -> bool {
+        let from = portion.saturating_mul(EDGES_A_RECORD);
+        for index in from..from.saturating_add(EDGES_A_RECORD) {
+            let Some((number, edge)) = u16::try_from(index)
+                .ok()
+                .and_then(|number| region.edge(number).map(|edge| (number, edge)))
+            else {
+                break;
+            };
+            let [lower, upper] = edge.side;
+            if !edge.is_sound(header) || lower < self.before {
+                return false;
+            }
+            self.before = lower;
+            self.parity ^= mixed(lower) ^ mixed(upper);
+            let first = &mut self.first;
+            if lower <= first.side {
+                first.taken = number.saturating_add(1);
+                if edge.meets(first.side) {
+                    let Some(place) = first.active.get_mut(usize::from(first.count)) else {
+                        return false;
+                    };
+                    *place = number;
+                    first.count += 1;
+                }
+            }
+        }
+        if from + EDGES_A_RECORD < u32::from(header.edges) {
+            return true;
+        }
+        line.restart(&self.first);
+        line.finish(region, end_of(header.path_spans)).is_ok()
+            && line.intervals() > 0
+            && self.parity == 0
+            && region.least() > 0
+            && region.first() <= region.last()
+            && region.last() <= end_of(header.side_spans)
+    }
+}
+
+/// A place with its bits mixed, so that different ones do not cancel.
+const fn mixed(at: i32) -> u32 {
+    let mut bits = at.cast_unsigned().wrapping_mul(0x9e37_79b1);
+    bits ^= bits >> 15;
+    bits = bits.wrapping_mul(0x85eb_ca77);
+    bits ^ (bits >> 13)
+}
+
+#[cfg(test)]
+mod tests;

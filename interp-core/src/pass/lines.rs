@@ -1,0 +1,203 @@
+//! The passes of a job with a region: its intervals on one line after the other.
+//!
+//! The first line is known since the job was loaded. From there the next one is sought in portions of the planning, once the step-over is known: lines that meet no
+//! interval long enough are skipped by the same step, and where the line meets no edge at all, it goes on where the region begins again. The last line is the
+//! last one that meets an interval.
+
+use crate::fault::{Fault, FaultKind, Result};
+use crate::job::program::Job;
+use crate::job::region::{FirstLine, ScanLine, end_of, place_from, place_of, place_to};
+use crate::job::{Header, Pattern};
+use crate::pass::route::Route;
+use crate::pass::schedule;
+use crate::sample::SpanParameter;
+
+/// Cycles of a portion, by the pessimistic model of `cargo sim budget`.
+pub(crate) const PORTION_CYCLES: u32 = 2_600;
+
+/// The next pass.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum NextPass {
+    /// It is still sought.
+    Sought,
+    /// [`RegionLines::take`] gives it.
+    Found,
+    /// There is none.
+    None,
+}
+
+/// The lines of a region.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct RegionLines {
+    line: ScanLine,
+    reversed: bool,
+    /// Intervals of the line that were passes already.
+    done: u8,
+    /// A further line is sought.
+    is_seeking: bool,
+    /// The job has a region.
+    is_in_use: bool,
+    /// The last step-over, units of the side parameter.
+    step: f32,
+}
+
+impl RegionLines {
+    /// Without a region.
+    pub(crate) const START: Self = Self {
+        line: ScanLine::START,
+        reversed: false,
+        done: 0,
+        is_seeking: false,
+        is_in_use: false,
+        step: 0.0,
+    };
+
+    /// Resets to the first line of a job with a region.
+    pub(crate) fn restart(&mut self, job: &Job<'_>, first: &FirstLine) {
+        self.is_in_use = false;
+        self.reversed = false;
+        self.done = 0;
+        self.is_seeking = false;
+        if let Some(region) = job.region() {
+            self.line.restart(first);
+            // It was checked at load.
+            self.is_in_use = self.line.finish(&region, end_of(job.header.path_spans)).is_ok();
+        }
+    }
+
+    /// The line, for the checks of a job that is loaded.
+    pub(crate) const fn scratch(&mut self) -> &mut ScanLine {
+        &mut self.line
+    }
+
+    /// Whether the job has a region.
+    pub(crate) const fn is_in_use(&self) -> bool {
+        self.is_in_use
+    }
+
+    /// Whether no interval is left on the line, and the next one is not sought yet.
+    pub(crate) const fn is_line_over(&self) -> bool {
+        !self.is_seeking && self.done >= self.line.intervals()
+    }
+
+    /// Whether another interval is left on the line.
+    const fn has_more(&self) -> bool {
+        self.is_in_use && !self.is_seeking && self.done < self.line.intervals()
+    }
+
+    /// The next pass on this line.
+    pub(crate) fn take(&mut self, header: &Header) -> Option<Route> {
+        if !self.has_more() {
+            return None;
+        }
+        let index = if self.reversed {
+            self.line.intervals().saturating_sub(1 + self.done)
+        } else {
+            self.done
+        };
+        let [from, to] = self.line.interval(index)?;
+        self.done += 1;
+        let ends = if self.reversed {
+            [place_to(to), place_from(from)]
+        } else {
+            [place_from(from), place_to(to)]
+        };
+        Some(Route {
+            side: side_at(header, self.line.side()),
+            reversed: self.reversed,
+            ends,
+        })
+    }
+
+    /// Whether the tool may go on the surface, along the boundary, from the end of a pass to the start of this one, which is the first on its line.
+    pub(crate) fn joins(&self, header: &Header, from: &Route, to: &Route) -> bool {
+        let ([_, end], [start, _]) = (from.ends, to.ends);
+        let [near, far] = self.line.joins();
+        let is_boundary = if from.reversed {
+            near && place_of(start) == 0
+        } else {
+            far && place_of(start) == end_of(header.path_spans)
+        };
+        self.done == 1 && is_boundary && start == end && from.reversed != to.reversed
+    }
+
+    /// Goes on to the next line after a step-over; false after the last line.
+    ///
+    /// # Errors
+    /// [`FaultKind::IntervalTooSmall`] where the step does not advance the line.
+    pub(crate) fn go_on(&mut self, job: &Job<'_>, step: f32) -> Result<bool> {
+        self.step = step;
+        self.is_seeking = true;
+        self.next_line(job, false)
+    }
+
+    /// Moves the line by the step; false after the last line.
+    fn next_line(&mut self, job: &Job<'_>, skips: bool) -> Result<bool> {
+        let Some(region) = job.region() else {
+            return Ok(false);
+        };
+        let side = self.line.side();
+        if side >= region.last() {
+            return Ok(false);
+        }
+        let next = match self.line.begins_again(&region) {
+            Some(next) => next.max(side + 1),
+            None => {
+                let width = |span| job.side_width(span);
+                let at = schedule::next_side(place_from(side), self.step, job.header.side_spans, width)?;
+                place_of(at)
+            }
+        };
+        if next <= side {
+            return Err(Fault::new(FaultKind::IntervalTooSmall, self.step));
+        }
+        self.line.go_on(next.min(region.last()), skips);
+        Ok(true)
+    }
+
+    /// One portion of the search for the next pass.
+    ///
+    /// # Errors
+    /// [`FaultKind::BadPatch`] where a line meets too many edges; as [`Self::go_on`].
+    #[inline(never)]
+    pub(crate) fn seek(&mut self, job: &Job<'_>, pass: u32) -> Result<NextPass> {
+        if self.has_more() {
+            return Ok(NextPass::Found);
+        }
+        let Some(region) = job.region() else {
+            return Ok(NextPass::None);
+        };
+        if !self.is_seeking {
+            return Ok(NextPass::None);
+        }
+        if !self.line.is_done() {
+            let worked = self.line.work(&region, end_of(job.header.path_spans));
+            if worked.is_err() {
+                let pass = crate::math::arith::count_to_f32(pass);
+                return Err(Fault::new(FaultKind::BadPatch, pass));
+            }
+            return Ok(NextPass::Sought);
+        }
+        if self.line.intervals() == 0 {
+            return Ok(if self.next_line(job, true)? {
+                NextPass::Sought
+            } else {
+                self.is_seeking = false;
+                NextPass::None
+            });
+        }
+        self.is_seeking = false;
+        self.done = 0;
+        self.reversed = job.header.pattern == Pattern::Zigzag && !self.reversed;
+        Ok(NextPass::Found)
+    }
+}
+
+/// The side parameter of a line: the boundary where the line is a unit or less below it, because no edge reaches it.
+fn side_at(header: &Header, at: i32) -> SpanParameter {
+    if at + 1 >= end_of(header.side_spans) {
+        place_to(end_of(header.side_spans))
+    } else {
+        place_from(at)
+    }
+}

@@ -1,0 +1,214 @@
+//! Jobs with a region: passes end at its boundary, none is left out, and the scallop height is within its limit between them.
+
+use std::path::PathBuf;
+
+use inspect::BOUNDS;
+use interp_core::job::region::{CROSSINGS_MAX, EDGE_WORDS, HEAD_WORDS};
+use job::{Along, AxisLimits, Job, MachineSpec, Pattern, Region, Side, Spacing};
+use machine::prepare::prepare;
+use verify::swept::{Requirements, measure};
+
+use crate::scallop_limit::shapes::Random;
+use crate::swept::follow;
+
+fn load(name: &str) -> Job {
+    let jobs = PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("../jobs");
+    job_file::load(&jobs.join(format!("{name}.toml"))).unwrap()
+}
+
+/// A star-shaped loop around a place, as shares of the domain.
+fn star(random: &mut Random, [u, v]: [f64; 2], reach: f64) -> Vec<[f64; 2]> {
+    let corners = random.one_of(&[3, 4, 5, 8, 40]);
+    (0..corners)
+        .map(|k| {
+            let (sin, cos) = (f64::from(k) / f64::from(corners) * std::f64::consts::TAU).sin_cos();
+            let radius = reach * random.within(0.4, 1.0);
+            [u + radius * cos, v + radius * sin]
+        })
+        .collect()
+}
+
+/// A random region: one or two loops, with holes, some cut off at the surface's boundaries or with corners on lines.
+fn region(random: &mut Random, domain: [[f64; 2]; 2]) -> Region {
+    let mut loops = Vec::new();
+    let parts = random.one_of(&[1, 1, 2]);
+    for part in 0..parts {
+        let centre = if parts == 1 {
+            [random.within(0.3, 0.7), random.within(0.3, 0.7)]
+        } else {
+            [0.25 + 0.5 * f64::from(part), random.within(0.25, 0.75)]
+        };
+        let reach = if parts == 1 { random.within(0.3, 0.9) } else { 0.22 };
+        loops.push(star(random, centre, reach));
+        if random.one_of(&[true, false]) {
+            loops.push(star(random, centre, 0.3 * reach));
+        }
+    }
+    let grid = random.one_of(&[0.0, 0.0, 8.0]);
+    let placed = |share: f64, [low, high]: [f64; 2]| {
+        let share = if grid > 0.0 {
+            (share * grid).round() / grid
+        } else {
+            share
+        };
+        low + share.clamp(0.0, 1.0) * (high - low)
+    };
+    let [us, vs] = domain;
+    for point in loops.iter_mut().flatten() {
+        *point = [placed(point[0], us), placed(point[1], vs)];
+    }
+    Region { loops }
+}
+
+fn random_job(seed: u64) -> Job {
+    let mut random = Random(seed);
+    let (name, scallop_mm) = random.one_of(&[
+        ("plate", 0.1),
+        ("freeform", 0.05),
+        ("torus", 0.05),
+        ("revolved", 0.3),
+        ("sphere_cap", 0.05),
+        ("ruled_reconstructed", 0.05),
+    ]);
+    let mut job = load(name);
+    job.scallop_mm = scallop_mm;
+    job.feed_mm_min = 6000.0;
+    job.machine = MachineSpec::default();
+    if random.one_of(&[true, false]) {
+        job.machine.limits = Some(AxisLimits::DEFAULT);
+        job.side = Side::Up;
+    }
+    job.along = random.one_of(&[Along::U, Along::V]);
+    job.pattern = random.one_of(&[Pattern::Zig, Pattern::Zigzag]);
+    job.spacing = random.one_of(&[Spacing::Exact, Spacing::Exact, Spacing::FirstOrder]);
+    job.region = Some(region(&mut random, job.surface.domain()));
+    job
+}
+
+/// Random regions on the surfaces of the sample jobs: every sample is checked by the oracle, whose clipping is its own.
+#[test]
+fn random_regions() {
+    let seeds: u64 = std::env::var("REGIONS")
+        .ok()
+        .and_then(|count| count.parse().ok())
+        .unwrap_or(12);
+    let first: u64 = std::env::var("REGIONS_FROM")
+        .ok()
+        .and_then(|count| count.parse().ok())
+        .unwrap_or(0);
+    let (mut passes, mut prepared_jobs) = (0, 0);
+    for seed in first..first + seeds {
+        let job = random_job(seed);
+        let about = format!(
+            "seed {seed}: {:?} {:?} {:?} {:?}, {} loops",
+            job.machine.has_limits(),
+            job.along,
+            job.pattern,
+            job.spacing,
+            job.region.as_ref().unwrap().loops.len()
+        );
+        if let Err(error) = prepare(&job) {
+            assert!(error.what().contains("holds no pass"), "{about}: {error}");
+            continue;
+        }
+        prepared_jobs += 1;
+        let followed = follow(&job);
+        let report = &followed.findings.report;
+        let failures = report.failures(&BOUNDS);
+        assert!(failures.is_empty(), "{about}: {failures:?}");
+        passes += followed.findings.passes;
+        let scanned = followed.oracle.schedule().unwrap().len();
+        let apart = scanned.abs_diff(followed.findings.passes as usize);
+        assert!(
+            apart <= 2 + scanned / 30,
+            "{about}: {} passes, {scanned} by the scan",
+            followed.findings.passes
+        );
+        if job.spacing == Spacing::Exact {
+            let requirements = Requirements::default();
+            let swept = measure(&job, &followed.oracle, &followed.track, true, &requirements, &());
+            assert!(swept.failures.is_empty(), "{about}: {:?}", swept.failures);
+        }
+    }
+    assert!(
+        seeds < 20 || passes > 400 && prepared_jobs > 15,
+        "{passes} {prepared_jobs}"
+    );
+}
+
+/// A region that is the whole surface has the passes of the whole surface, but for the rounding of the lines.
+#[test]
+fn the_whole_surface_as_a_region() {
+    for name in ["plate", "torus"] {
+        let mut job = load(name);
+        job.machine.limits = None;
+        job.scallop_mm = 0.1;
+        let without = follow(&job);
+        let [[u0, u1], [v0, v1]] = job.surface.domain();
+        job.region = Some(Region {
+            loops: vec![vec![[u0, v0], [u1, v0], [u1, v1], [u0, v1]]],
+        });
+        let with = follow(&job);
+        assert_eq!(with.findings.passes, without.findings.passes, "{name}");
+        for (one, other) in with.track.passes.iter().zip(&without.track.passes) {
+            assert!(
+                (one.side - other.side).abs() < 1e-4 * (v1 - v0).max(u1 - u0),
+                "{name}"
+            );
+            assert_eq!(one.path.first(), other.path.first());
+            assert_eq!(one.path.last(), other.path.last());
+        }
+        assert_eq!(
+            with.track.passes.last().unwrap().side,
+            without.track.passes.last().unwrap().side
+        );
+    }
+}
+
+/// What is refused, with the place and the reason.
+#[test]
+fn regions_that_the_machine_does_not_take() {
+    let mut job = load("plate");
+    let refused = |job: &Job| {
+        let error = prepare(job).unwrap_err();
+        assert!(!error.remedy().is_empty());
+        error.what().to_owned()
+    };
+    let tooth = |at: f64| vec![[at, 0.1], [at + 0.01, 0.1], [at + 0.01, 0.9], [at, 0.9]];
+    let comb = |teeth: usize| Region {
+        loops: (0..teeth).map(|k| tooth(k as f64 / 40.0)).collect(),
+    };
+    job.region = Some(comb(CROSSINGS_MAX / 2));
+    let prepared = prepare(&job).unwrap();
+    assert_eq!(usize::from(prepared.header.edges), CROSSINGS_MAX);
+    assert!(prepared.words.len() > HEAD_WORDS + EDGE_WORDS * CROSSINGS_MAX);
+    job.region = Some(comb(CROSSINGS_MAX / 2 + 1));
+    let most = CROSSINGS_MAX;
+    let what = format!(
+        "a pass at v = 0.100000 meets {} edges of the region, more than {most}",
+        most + 2
+    );
+    assert_eq!(refused(&job), what);
+    // Across the teeth there is no line with that many.
+    job.along = Along::V;
+    prepare(&job).unwrap();
+    job.region = Some(Region {
+        loops: vec![vec![[0.1, 0.1], [0.1001, 0.1], [0.1001, 0.1001]]],
+    });
+    assert!(refused(&job).starts_with("the region holds no pass"));
+    job.region = Some(Region {
+        loops: vec![
+            (0..4090)
+                .map(|k| f64::from(k) / 4090.0 * std::f64::consts::TAU)
+                .map(|at| [0.5 + 0.4 * at.cos(), 0.5 + 0.4 * at.sin()])
+                .collect(),
+        ],
+    });
+    assert!(
+        refused(&job).starts_with("the surface and its region take 164"),
+        "{}",
+        refused(&job)
+    );
+    job.spacing = Spacing::Constant(job::Start::Edge);
+    assert!(refused(&job).starts_with("passes of constant scallop height are made for a whole surface only"));
+}
