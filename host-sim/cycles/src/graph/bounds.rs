@@ -143,11 +143,6 @@ const BOUNDS: &[(&str, u32, &str)] = &[
         160,
         "nodes of a plan: NODES_MAX",
     ),
-    (
-        "interp_core::feed::road::Road as interp_core::feed::pace::Course::advance",
-        8,
-        "steps that a period is made of: PARTS_MAX",
-    ),
     ("interp_core::feed::turn::Turn::bound_speed", 3, "axes"),
     (
         "interp_core::feed::turn::Turn::overrun",
