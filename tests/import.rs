@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use std::time::Instant;
 
 use cad::{
-    Axis, Face, Form, JobOptions, MachinableFace, Model, Options, SplineSurface, Surface, machinable, read,
+    Axis, Face, Form, JobOptions, MachinableFace, Model, Options, SplineSurface, Surface, machinable, outline, read,
     write_job,
 };
 use glam::DVec3;
@@ -208,6 +208,7 @@ fn fits_keep_the_tolerance() {
         let mut patches = 0;
         for tolerance_mm in [0.3, 0.1, 0.02] {
             let options = Options {
+                around_mm: 0.0,
                 tolerance_mm,
                 untrimmed: true,
             };
@@ -353,7 +354,7 @@ fn samples_on_every_face() {
     }
 }
 
-/// A trimmed face is refused, and converted untrimmed only on request; the job file then has a note.
+/// A trimmed face becomes a job that names its file, with its region; untrimmed only on request, and the job file then has a note.
 #[test]
 fn trimmed_faces_are_said() {
     for name in ["hood.step", "hood.igs"] {
@@ -361,18 +362,30 @@ fn trimmed_faces_are_said() {
         let trimmed: Vec<&Face> = model
             .faces
             .iter()
-            .filter(|face| {
-                let refused = machinable(name, face, &Options::default()).err();
-                refused.is_some_and(|error| error.what.contains("is trimmed"))
-            })
+            .filter(|face| outline(face).unwrap().trimmed.is_some())
             .collect();
         let [face] = trimmed.as_slice() else {
             panic!("{name}: one of two faces is trimmed, not {}", trimmed.len())
         };
-        let error = machinable(name, face, &Options::default()).unwrap_err();
-        assert!(error.what.contains("trimmed"), "{error}");
+        let coarse = Options {
+            tolerance_mm: 0.02,
+            ..Options::default()
+        };
+        let made = machinable(name, face, &coarse).unwrap();
+        let hole = made.trimmed.as_ref().unwrap();
+        assert_eq!(hole.len(), 2, "{name}: the boundary and the hole");
+        let error = write_job(name, face, &made, &JobOptions::default()).unwrap_err();
         assert!(error.remedy.contains("--untrimmed"), "{}", error.remedy);
+        let named = JobOptions {
+            source: Some((name.to_owned(), 0.02)),
+            ..JobOptions::default()
+        };
+        let written = write_job(name, face, &made, &named).unwrap();
+        for words in ["kind = \"file\"", "[part]"] {
+            assert!(written.text.contains(words), "{name}: {}", written.text);
+        }
         let made = taken(name, face);
+        assert_eq!(made.trimmed, None);
         let written = write_job(name, face, &made, &JobOptions::default()).unwrap();
         assert!(
             written.text.contains("# Note: the face is trimmed"),
@@ -387,7 +400,10 @@ fn trimmed_faces_are_said() {
         let mut kinds: Vec<_> = model
             .faces
             .iter()
-            .filter(|face| machinable("", face, &Options::default()).is_err() == trimmed)
+            .filter(|face| {
+                let made = machinable("", face, &Options::default()).unwrap();
+                made.trimmed.is_some() == trimmed
+            })
             .map(|face| face.surface.kind())
             .collect();
         kinds.sort_unstable();
@@ -416,7 +432,7 @@ fn trimmed_faces_are_said() {
 fn sample_jobs_out_of_files() {
     for (name, patches) in [("blade", 12), ("hood", 247)] {
         let job =
-            job_file::load_with(&workspace().join(format!("jobs/cad/{name}.toml")), &cad::Faces).unwrap();
+            job_file::load_with(&workspace().join(format!("jobs/cad/{name}.toml")), &part::Faces).unwrap();
         assert_eq!(prepare(&job).unwrap().patches(), patches, "{name}");
         let (position_nm, ripple_pct, samples, fault) = worst_nm(&job, u64::MAX);
         println!("{name}: {position_nm:.2} nm, ripple {ripple_pct:.6} %, {samples} samples");
@@ -443,7 +459,7 @@ fn jobs_that_name_a_file() {
         )
     };
     let name = folder.join("job.toml").display().to_string();
-    let job = job_file::parse_with(&name, &text("path = \"mouse.step\"\nface = 1"), &cad::Faces).unwrap();
+    let job = job_file::parse_with(&name, &text("path = \"mouse.step\"\nface = 1"), &part::Faces).unwrap();
     let model = read(&cad("mouse.step")).unwrap();
     let made = machinable("", &model.faces[0], &Options::default()).unwrap();
     assert_eq!(job.surface, made.spec());
@@ -451,7 +467,7 @@ fn jobs_that_name_a_file() {
         ("path = \"missing.step\"", 3, "cannot read"),
         ("path = \"mouse.step\"\nface = 2", 4, "has no face 2"),
         ("path = \"mouse.step\"\nface = 1.5", 4, "whole number"),
-        ("path = \"hood.step\"\nface = 1", 4, "trimmed"),
+        ("path = \"hood.step\"\nface = 1", 4, "the board's store"),
         ("path = \"mouse.step\"\nuntrimmed = 3", 4, "true or false"),
         ("path = \"mouse.step\"\ntolerance_mm = 0", 4, "must be above 0"),
         ("path = 5", 3, "text in quotes"),
@@ -461,7 +477,7 @@ fn jobs_that_name_a_file() {
             "does not belong here",
         ),
     ] {
-        let error = job_file::parse_with(&name, &text(surface), &cad::Faces).unwrap_err();
+        let error = job_file::parse_with(&name, &text(surface), &part::Faces).unwrap_err();
         assert!(error.what().contains(words), "{surface}: {error}");
         assert_eq!(error.line_and_column().unwrap().0, line, "{surface}: {error}");
     }
@@ -600,7 +616,7 @@ fn approximated_faces_name_their_source() {
         assert_eq!(text.contains("source = \"part.step\""), fitted);
         let text = format!("{text}\n[placement]\nscale = 2\nrotate_deg = [10, 20, 30]\n");
         let name = folder.path().join("job.toml");
-        let job = job_file::parse_with(name.to_str().unwrap(), &text, &cad::Faces).unwrap();
+        let job = job_file::parse_with(name.to_str().unwrap(), &text, &part::Faces).unwrap();
         let Some(source) = job.origin.cad() else {
             assert!(!fitted);
             continue;

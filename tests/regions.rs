@@ -127,7 +127,14 @@ fn random_regions() {
         if job.spacing == Spacing::Exact {
             let requirements = Requirements::default();
             let swept = measure(&job, &followed.oracle, &followed.track, true, &requirements, &());
-            assert!(swept.failures.is_empty(), "{about}: {:?}", swept.failures);
+            // A small region has no two passes beside each other, away from its boundary.
+            let is_small = |failure: &String| failure.contains("fewer than two whole passes");
+            let failures: Vec<_> = swept
+                .failures
+                .iter()
+                .filter(|failure| !is_small(failure))
+                .collect();
+            assert!(failures.is_empty(), "{about}: {failures:?}");
         }
     }
     assert!(

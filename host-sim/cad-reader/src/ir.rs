@@ -10,7 +10,6 @@ use cadmpeg_ir::report::Severity;
 use cadmpeg_ir::topology::{BodyKind, Sense};
 use cadmpeg_ir::{Codec, DecodeOptions};
 
-use crate::ir_boundary::placed;
 use crate::ir_geometry::{SURFACE_DEPTH_MAX, placement, point, solved_surface, vector};
 use crate::ir_index::{Translation, entity};
 use cad::Model;
@@ -282,7 +281,7 @@ impl<'m> Translation<'m> {
                     // A reflection keeps the parameters, so that S_u x S_v is reversed.
                     sense: sense * turn,
                     surface,
-                    boundary: placed(&boundary, &home),
+                    boundary: boundary.placed(&home),
                     solid,
                 });
             }

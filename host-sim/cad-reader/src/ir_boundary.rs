@@ -3,11 +3,15 @@
 use cadmpeg_ir::topology::{Coedge, Edge as SourceEdge, LoopBoundary, Sense};
 
 use crate::ir_index::{Translation, entity};
-use cad::{Boundary, Curve, Edge, Placement};
+use cad::{Boundary, Curve, Edge};
 use glam::DVec3;
 
-/// Points along a boundary edge, its ends included.
-const EDGE_POINTS: usize = 17;
+/// Least number of intervals along a boundary edge, equal in its parameter.
+const EDGE_INTERVALS: usize = 16;
+/// Largest number of intervals: then the edge is as exact as it gets.
+const EDGE_INTERVALS_MAX: usize = 1024;
+/// A cubic through four neighbouring points is this close to the edge between them, mm: whoever traces the edge interpolates so.
+const CUBIC_MM: f64 = 1e-4;
 /// Largest distance between the ends of an edge's curve and its vertices, mm; above it the edge is not supported.
 const VERTEX_MM: f64 = 0.05;
 
@@ -80,11 +84,9 @@ impl Translation<'_> {
         let [Some(start), Some(end)] = ends else {
             return Err(format!("edge {} has no ends", entity(edge.id.as_str())));
         };
-        let share = |k: usize| k as f64 / (EDGE_POINTS - 1) as f64;
         if let Curve::Line { .. } = curve {
             // A line is defined by its ends.
-            let points = (0..EDGE_POINTS).map(|k| start + (end - start) * share(k));
-            return Ok(vec![points.collect()]);
+            return Ok(vec![evenly(EDGE_INTERVALS, |share| start + (end - start) * share)]);
         }
         let given = edge.carrier.param_range().map(|range| range.get());
         let closed = edge.start == edge.end || start.distance(end) < 1e-9;
@@ -129,8 +131,17 @@ impl Translation<'_> {
         let parts: Vec<Edge> = ends
             .windows(2)
             .map(|part| {
-                let place = |k: usize| part[0] + (part[1] - part[0]) * share(k);
-                (0..EDGE_POINTS).map(|k| curve.at(place(k))[0]).collect()
+                let point = |share: f64| curve.at(part[0] + (part[1] - part[0]) * share)[0];
+                let mut intervals = EDGE_INTERVALS;
+                let mut points = evenly(intervals, point);
+                while intervals < EDGE_INTERVALS_MAX {
+                    let finer = evenly(2 * intervals, point);
+                    if cad::interpolation_error_mm(&points, &finer) <= CUBIC_MM {
+                        break;
+                    }
+                    (intervals, points) = (2 * intervals, finer);
+                }
+                points
             })
             .collect();
         let [first, last] = [curve.at(range[0])[0], curve.at(range[1])[0]];
@@ -140,6 +151,13 @@ impl Translation<'_> {
         }
         Ok(parts)
     }
+}
+
+/// Points at equal steps of the share of an edge, its ends included.
+fn evenly(intervals: usize, point: impl Fn(f64) -> DVec3) -> Edge {
+    (0..=intervals)
+        .map(|k| point(k as f64 / intervals as f64))
+        .collect()
 }
 
 /// Largest distance between the end of an edge and the beginning of the next, mm.
@@ -153,20 +171,4 @@ fn gap_mm(edges: &[Edge]) -> Option<f64> {
             _ => f64::NAN,
         });
     gaps.reduce(|most, gap| if gap > most || gap.is_nan() { gap } else { most })
-}
-
-/// A boundary, transformed by a placement.
-pub(crate) fn placed(boundary: &Boundary, by: &Placement) -> Boundary {
-    match boundary {
-        Boundary::Loops(loops) => Boundary::Loops(
-            loops
-                .iter()
-                .map(|edges| {
-                    let place = |edge: &Edge| edge.iter().map(|p| by.point(*p)).collect();
-                    edges.iter().map(place).collect()
-                })
-                .collect(),
-        ),
-        other => other.clone(),
-    }
 }

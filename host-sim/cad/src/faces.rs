@@ -1,16 +1,13 @@
 //! Resolves the faces of jobs with `kind = "file"`.
 
 use std::path::Path;
+use std::sync::Arc;
 
 use glam::DVec3;
-use job::{CadSource, SurfaceSpec};
-use job_file::{Face, FaceError, FaceReader};
+use job::CadSource;
+use job_file::{Face, FaceError, FaceSurface};
 
-use crate::{CadError, Form, Options, machinable, read};
-
-/// The [`FaceReader`] that uses the reader of CAD files.
-#[derive(Clone, Copy, Debug)]
-pub struct Faces;
+use crate::{CadError, Form, MachinableFace, Model, Options, machinable, read_once};
 
 impl From<CadError> for FaceError {
     fn from(error: CadError) -> Self {
@@ -22,10 +19,13 @@ impl From<CadError> for FaceError {
     }
 }
 
-/// The face of this number.
-fn face_of(path: &Path, number: usize) -> Result<crate::Face, FaceError> {
+/// The model of a file that has a face of this number.
+///
+/// # Errors
+/// The file cannot be read, or has no such face.
+pub fn model_with(path: &Path, number: usize) -> Result<Arc<Model>, FaceError> {
     let file = path.display().to_string();
-    let mut model = read(path)?;
+    let model = read_once(path)?;
     let count = model.faces.len();
     if number == 0 || number > count {
         return Err(FaceError {
@@ -34,7 +34,7 @@ fn face_of(path: &Path, number: usize) -> Result<crate::Face, FaceError> {
             of_face: true,
         });
     }
-    Ok(model.faces.swap_remove(number - 1))
+    Ok(model)
 }
 
 /// The face that a job's surface approximates.
@@ -50,14 +50,16 @@ impl Original {
     /// # Errors
     /// The file cannot be read, or has no such face, or the face cannot be machined.
     pub fn read(source: &CadSource) -> Result<Option<Self>, FaceError> {
-        let face = face_of(&source.path, source.face)?;
+        let model = model_with(&source.path, source.face)?;
+        let face = &model.faces[source.face - 1];
         let options = Options {
             tolerance_mm: source.tolerance_mm,
             untrimmed: source.untrimmed,
+            around_mm: source.around_mm,
         };
-        let made = machinable(&source.path.display().to_string(), &face, &options)?;
+        let made = machinable(&source.path.display().to_string(), face, &options)?;
         Ok(matches!(made.form, Form::Fitted { .. }).then(|| Self {
-            surface: face.surface,
+            surface: face.surface.clone(),
             scale: source.scale,
         }))
     }
@@ -69,14 +71,20 @@ impl Original {
     }
 }
 
-impl FaceReader for Faces {
-    fn surface(&self, wanted: &Face) -> Result<SurfaceSpec, FaceError> {
-        let file = wanted.path.display().to_string();
-        let face = face_of(&wanted.path, wanted.number)?;
-        let options = Options {
-            tolerance_mm: wanted.tolerance_mm,
-            untrimmed: wanted.untrimmed,
-        };
-        Ok(machinable(&file, &face, &options)?.spec())
-    }
+/// The surface of a face that a job asks for, and whether the face is less of it.
+///
+/// # Errors
+/// The face cannot be machined.
+pub fn surface_of(wanted: &Face, face: &crate::Face) -> Result<(MachinableFace, FaceSurface), FaceError> {
+    let options = Options {
+        tolerance_mm: wanted.tolerance_mm,
+        untrimmed: wanted.untrimmed,
+        around_mm: wanted.around_mm,
+    };
+    let made = machinable(&wanted.path.display().to_string(), face, &options)?;
+    let surface = FaceSurface {
+        surface: made.spec(),
+        trimmed: made.trimmed.is_some(),
+    };
+    Ok((made, surface))
 }

@@ -10,6 +10,8 @@ use super::surface::Surface;
 const SEEDS: usize = 3;
 /// Largest number of seeds per side of the whole surface; with many patches, several share a seed.
 const SEEDS_MAX: usize = 96;
+/// A point found from a guess is this close to the surface, mm; otherwise the whole surface is searched.
+const FOUND_MM: f64 = 1e-4;
 /// Newton iterations from the best seed.
 const STEPS: usize = 40;
 /// Largest number of halvings of a step that does not reduce the distance.
@@ -25,7 +27,7 @@ impl Surface {
             _ => self.seed(to),
         };
         let mut found = self.refined(start, to);
-        if near.is_some() && !self.closed_form() {
+        if near.is_some() && !self.closed_form() && found.1 > FOUND_MM {
             // Points on the surface are found from the guess; if that fails, the whole surface is searched.
             start = self.seed(to);
             let afresh = self.refined(start, to);

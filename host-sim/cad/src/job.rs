@@ -39,6 +39,12 @@ pub struct JobOptions {
     pub side: Option<String>,
     /// Order of the passes, as in job files.
     pub pattern: Option<String>,
+    /// The job's region is made from the face and its part, whether the face is trimmed or not.
+    pub in_part: bool,
+    /// Rotation of the part about x, y and z, degrees.
+    pub rotate_deg: [f64; 3],
+    /// Its translation after that, mm.
+    pub translate_mm: [f64; 3],
     /// Path of the CAD file relative to the job file, and the tolerance of an approximation, mm: an approximated surface names its source.
     pub source: Option<(String, f64)>,
 }
@@ -95,7 +101,12 @@ pub fn write_job(
     options: &JobOptions,
 ) -> Result<JobText, CadError> {
     let measures = measure(&surface.spec());
-    let (chosen, sign) = side(face, &measures);
+    let by_region = options.in_part || surface.trimmed.is_some();
+    let (chosen, sign) = match (by_region, side(face, &measures)) {
+        // The surface around a face may face another way than the face.
+        (true, (_, sign)) => (if sign > 0.0 { "+" } else { "-" }, sign),
+        (false, chosen) => chosen,
+    };
     let side = options.side.clone().unwrap_or_else(|| chosen.to_owned());
     let sign = match side.as_str() {
         "+" => 1.0,
@@ -118,7 +129,14 @@ pub fn write_job(
         )
     })?;
     let mut warnings = Vec::new();
-    if let Some(why) = &surface.outline.trimmed {
+    if by_region && options.source.is_none() {
+        return Err(CadError::face(
+            source,
+            format!("the job of face {} must name its file, and cannot name {source:?}", face.number),
+            "give the CAD file a plain name, or machine the whole rectangle around the face with --untrimmed",
+        ));
+    }
+    if let Some(why) = surface.outline.trimmed.as_ref().filter(|_| surface.trimmed.is_none()) {
         warnings.push(if surface.outline.unknown {
             format!("{why}; the whole surface is machined, wherever the face on it ends")
         } else {
@@ -137,7 +155,7 @@ pub fn write_job(
         ));
     }
     let facing = facing(&Surface::new(&surface.spec()), sign);
-    if facing.down_share > 0.0 {
+    if facing.down_share > 0.0 && !by_region {
         let turn = facing.turn_deg.map_or_else(
             || "no turn makes all of it look up".to_owned(),
             |turn| format!("rotate_deg = {turn:?} in [placement] turns it up"),
@@ -152,7 +170,7 @@ pub fn write_job(
         .iter()
         .flatten()
         .fold(0.0_f64, |far, x| far.max(x.abs()));
-    let centred = far_mm > REACH_MM;
+    let centred = far_mm > REACH_MM && !options.in_part;
     if centred {
         warnings.push(format!(
             "it lies up to {far_mm:.0} mm from the origin, the machine's range is 2147 mm; it is placed with its centre at the origin"
@@ -205,15 +223,33 @@ fn text(
         let _ = writeln!(out, "# Note: {}.", one_line(warning));
     }
     out.push('\n');
-    write_surface(&mut out, &surface.nurbs);
-    if let (Form::Fitted { .. }, Some((path, tolerance_mm))) = (&surface.form, &options.source) {
+    let of_file = options.source.as_ref().filter(|_| options.in_part || surface.trimmed.is_some());
+    if let Some((path, tolerance_mm)) = of_file {
+        // Its region is made when the job is read.
+        let _ = writeln!(
+            out,
+            "[surface]\nkind = \"file\"\npath = {path:?}\nface = {}\ntolerance_mm = {tolerance_mm}\n\n\
+             # What must not be cut; the region of the face is what the tool reaches without cutting it.\n\
+             [part]\npath = {path:?}",
+            face.number
+        );
+    } else {
+        write_surface(&mut out, &surface.nurbs);
+    }
+    if let (Form::Fitted { .. }, None, Some((path, tolerance_mm))) = (&surface.form, of_file, &options.source) {
         let _ = writeln!(
             out,
             "# What the surface approximates: `cargo sim verify` measures against it\nsource = {path:?}\nsource_face = {}\ntolerance_mm = {tolerance_mm}",
             face.number
         );
     }
-    if centred {
+    if options.rotate_deg != [0.0; 3] || options.translate_mm != [0.0; 3] {
+        let _ = write!(
+            out,
+            "\n[placement]\nrotate_deg = {:?}    # of the whole part\ntranslate_mm = {:?}\n",
+            options.rotate_deg, options.translate_mm
+        );
+    } else if centred {
         out.push_str("\n[placement]\nplace = \"centre\"            # the centre of its box, at translate_mm\ntranslate_mm = [0, 0, 0]\n");
     }
     let or = |given: &Option<String>, default: &str| given.clone().unwrap_or_else(|| default.to_owned());

@@ -13,40 +13,49 @@
 //!
 //! Not in the sample path: f64; lengths in mm, angles in rad.
 
+mod crossings;
 mod curve;
 mod error;
 mod exact;
 mod faces;
 mod fit;
-mod invert;
 mod job;
 mod machinable;
 mod measure;
+mod interpolation;
+mod invert;
 mod outline;
 mod placement;
 mod reader;
+mod remap;
 mod spline;
 mod surface;
+mod trim;
+#[cfg(test)]
+mod trim_tests;
 #[cfg(test)]
 mod tests;
 
 pub use curve::Curve;
 pub use error::CadError;
-pub use faces::{Faces, Original};
+pub use faces::{Original, model_with, surface_of};
 pub use fit::Deviation;
 pub use job::{JobOptions, JobText, machined_sign, write_job};
 pub use machinable::{Form, MachinableFace, Options, degrees, machinable};
 pub use measure::{Measures, measure};
+pub use interpolation::interpolation_error_mm;
 pub use outline::{Outline, outline};
 pub use placement::Placement;
-pub use reader::{Model, read};
+pub use reader::{Model, read, read_once};
 pub use spline::{Axis, DEGREE_MAX, Pole, SplineCurve, SplineSurface};
-pub use surface::Surface;
+pub use surface::{Periodic, Surface};
+pub use trim::{Polygon, TrimError, polylines, trim};
 
 use glam::DVec3;
 use serde::{Deserialize, Serialize};
 
-/// One smooth boundary edge as points along it, mm, in the order of the loop.
+/// One smooth boundary edge as points at equal steps of its parameter, mm, in the order of the loop. Between them a cubic through the nearest four
+/// is within 0.1 um of the edge.
 pub type Edge = Vec<DVec3>;
 
 /// Boundary of a face.
@@ -81,4 +90,35 @@ pub struct Face {
     pub sense: f64,
     /// Whether it bounds a solid; its normal then points out of the material.
     pub solid: bool,
+}
+
+impl Face {
+    /// The face, transformed; `None` if the placement distorts its kind of surface.
+    #[must_use]
+    pub fn placed(&self, by: &Placement) -> Option<Self> {
+        let turn = if by.mirrors() { -1.0 } else { 1.0 };
+        Some(Self {
+            surface: self.surface.placed(by)?,
+            boundary: self.boundary.placed(by),
+            sense: self.sense * turn,
+            ..self.clone()
+        })
+    }
+}
+
+impl Boundary {
+    /// The boundary, transformed.
+    #[must_use]
+    pub fn placed(&self, by: &Placement) -> Self {
+        let place = |edge: &Edge| edge.iter().map(|p| by.point(*p)).collect();
+        match self {
+            Self::Loops(loops) => Self::Loops(
+                loops
+                    .iter()
+                    .map(|edges| edges.iter().map(place).collect())
+                    .collect(),
+            ),
+            other => other.clone(),
+        }
+    }
 }

@@ -3,6 +3,8 @@
 use super::exact::exact;
 use super::fit::{Deviation, FitError, deviation, fit};
 use super::spline::SplineSurface;
+use super::surface::Periodic;
+use super::trim::{Polygon, trim};
 use super::{CadError, Face, Outline, Surface, outline};
 use job::{NurbsSpec, SurfaceSpec};
 use job_file::{TOLERANCE_DEFAULT_MM, TOLERANCE_MAX_MM};
@@ -10,6 +12,9 @@ use machine::prepare::patch_count;
 
 /// Highest degree of the surface of a job.
 const DEGREE_EXACT: usize = 3;
+/// Precision of a trimmed region's polygons, mm.
+const TRIM_MM: f64 = 0.002;
+
 /// Options of an import.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Options {
@@ -17,6 +22,8 @@ pub struct Options {
     pub tolerance_mm: f64,
     /// Accept a trimmed face, as the rectangle around its boundary.
     pub untrimmed: bool,
+    /// How far the surface goes on beyond the face, where it has more, mm.
+    pub around_mm: f64,
 }
 
 impl Default for Options {
@@ -24,6 +31,7 @@ impl Default for Options {
         Self {
             tolerance_mm: TOLERANCE_DEFAULT_MM,
             untrimmed: false,
+            around_mm: 0.0,
         }
     }
 }
@@ -51,6 +59,8 @@ pub struct MachinableFace {
     pub form: Form,
     /// The part of the surface that the face uses.
     pub outline: Outline,
+    /// The face on it, as polygons of (u, v); `None` where the surface is all that is known or wanted of it.
+    pub trimmed: Option<Vec<Polygon>>,
     /// Patches on the board.
     pub patches: usize,
 }
@@ -110,7 +120,7 @@ fn patches(nurbs: &NurbsSpec) -> Result<usize, String> {
 /// Converts a face to the surface of a job.
 ///
 /// # Errors
-/// The face is trimmed and `untrimmed` is not set; it is unbounded; no fit within the tolerance is small enough for the
+/// The boundary of the face is not known, open or crosses itself, and `untrimmed` is not set; it is unbounded; no fit within the tolerance is small enough for the
 /// board; the tolerance is out of range.
 pub fn machinable(file: &str, face: &Face, options: &Options) -> Result<MachinableFace, CadError> {
     let name = format!("face {} ({}, {})", face.number, face.entity, face.surface.kind());
@@ -128,24 +138,92 @@ pub fn machinable(file: &str, face: &Face, options: &Options) -> Result<Machinab
             "choose another face; import --list shows them",
         )
     })?;
-    if let Some(why) = outline.trimmed.as_ref().filter(|_| !options.untrimmed) {
-        let (what, remedy) = if outline.unknown {
-            (
-                format!("{name}: {why}"),
-                "export the part as STEP, or import it with --untrimmed (in a job: untrimmed = true) to machine the whole \
-                 surface, wherever the face on it ends",
-            )
-        } else {
-            (
-                format!("{name} is trimmed: {why}"),
-                "import it with --untrimmed (in a job: untrimmed = true) to machine the whole rectangle around it, or split \
-                 the face in the CAD system",
-            )
-        };
-        return Err(CadError::face(file, what, remedy));
+    if outline.unknown && !options.untrimmed {
+        let why = outline.trimmed.as_deref().unwrap_or_default();
+        return Err(CadError::face(
+            file,
+            format!("{name}: {why}"),
+            "export the part as STEP, or import it with --untrimmed (in a job: untrimmed = true) to machine the whole \
+             surface, wherever the face on it ends",
+        ));
     }
+    let grown = grown(&face.surface, outline.rectangle, options.around_mm);
+    let made = converted(file, face, options, &outline, grown, &name);
+    let (mut made, rectangle) = match made {
+        // What is around a face is wanted, the face is needed.
+        Err(_) if grown != outline.rectangle => (
+            converted(file, face, options, &outline, outline.rectangle, &name)?,
+            outline.rectangle,
+        ),
+        made => (made?, grown),
+    };
+    if !options.untrimmed && (outline.trimmed.is_some() || rectangle != outline.rectangle) {
+        let over = (made.form == Form::Exact).then_some(rectangle);
+        let polygons = trim(face, &outline, over, TRIM_MM).map_err(|error| {
+            CadError::face(
+                file,
+                format!("{name}: {}", error.what),
+                "repair the face in the CAD system, or import it with --untrimmed (in a job: untrimmed = true) to machine the \
+                 whole rectangle around it",
+            )
+        })?;
+        made.trimmed = Some(polygons);
+    }
+    Ok(made)
+}
+
+/// A rectangle of parameters with more of the surface around it, as far as there is any.
+fn grown(surface: &Surface, rectangle: [[f64; 2]; 2], around_mm: f64) -> [[f64; 2]; 2] {
+    if around_mm <= 0.0 {
+        return rectangle;
+    }
+    let middle = rectangle.map(|[low, high]| 0.5 * (low + high));
+    let on = Periodic::new(surface);
+    std::array::from_fn(|k| {
+        let [mut low, mut high] = rectangle[k];
+        if let Some(period) = surface.periods()[k]
+            && high - low >= period * (1.0 - 1e-9)
+        {
+            return [low, high];
+        }
+        // Where the parameter is slower than in the middle, more of it is needed, but not at a pole.
+        let by = |end: f64| {
+            let speed = |at: [f64; 2]| {
+                let at = on.at(at[0], at[1]);
+                if k == 0 { at.u.length() } else { at.v.length() }
+            };
+            let mut at = middle;
+            at[k] = end;
+            around_mm / speed(at).max(0.3 * speed(middle)).max(f64::MIN_POSITIVE)
+        };
+        (low, high) = (low - by(low), high + by(high));
+        match (surface.domain()[k], surface.periods()[k]) {
+            (_, Some(period)) if high - low > period => {
+                [middle[k] - 0.5 * period, middle[k] + 0.5 * period]
+            }
+            (Some([least, most]), None) => [low.max(least), high.min(most)],
+            _ => match surface {
+                Surface::Cone { radius, slope, .. } if k == 1 && *slope != 0.0 => {
+                    let apex = -radius / slope;
+                    if middle[1] < apex { [low, high.min(apex)] } else { [low.max(apex), high] }
+                }
+                _ => [low, high],
+            },
+        }
+    })
+}
+
+/// The surface of a job over a rectangle of a face's surface.
+fn converted(
+    file: &str,
+    face: &Face,
+    options: &Options,
+    outline: &Outline,
+    rectangle: [[f64; 2]; 2],
+    name: &str,
+) -> Result<MachinableFace, CadError> {
     let mut why_fitted = "it has no exact form".to_owned();
-    if let Some(spline) = exact(&face.surface, outline.rectangle) {
+    if let Some(spline) = exact(&face.surface, rectangle) {
         let degree = spline.axes.iter().map(|axis| axis.degree).max().unwrap_or(0);
         if degree <= DEGREE_EXACT {
             let nurbs = nurbs(&spline);
@@ -154,7 +232,8 @@ pub fn machinable(file: &str, face: &Face, options: &Options) -> Result<Machinab
                     return Ok(MachinableFace {
                         nurbs,
                         form: Form::Exact,
-                        outline,
+                        outline: outline.clone(),
+                        trimmed: None,
                         patches,
                     });
                 }
@@ -164,14 +243,15 @@ pub fn machinable(file: &str, face: &Face, options: &Options) -> Result<Machinab
             why_fitted = format!("its degree is {degree}, the core's at most {DEGREE_EXACT}");
         }
     }
-    fitted(file, face, options, outline, why_fitted, &name)
+    fitted(file, face, options, outline, rectangle, why_fitted, name)
 }
 
 fn fitted(
     file: &str,
     face: &Face,
     options: &Options,
-    outline: Outline,
+    outline: &Outline,
+    rectangle: [[f64; 2]; 2],
     why: String,
     name: &str,
 ) -> Result<MachinableFace, CadError> {
@@ -185,7 +265,7 @@ fn fitted(
             ),
         )
     };
-    let made = fit(&face.surface, outline.rectangle, options.tolerance_mm);
+    let made = fit(&face.surface, rectangle, options.tolerance_mm);
     let (spline, _) = made.map_err(|error| match error {
         FitError::TooManySpans => too_fine(format!(
             "no fit within {} mm has few enough spans",
@@ -204,7 +284,8 @@ fn fitted(
     Ok(MachinableFace {
         nurbs,
         form: Form::Fitted { why, deviation },
-        outline,
+        outline: outline.clone(),
+        trimmed: None,
         patches,
     })
 }

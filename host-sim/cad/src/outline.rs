@@ -26,14 +26,70 @@ pub struct Outline {
 }
 
 /// A boundary loop in parameters.
-struct Path {
-    edges: Vec<Vec<[f64; 2]>>,
+pub(super) struct Path {
+    pub(super) edges: Vec<Vec<[f64; 2]>>,
     /// Winding numbers in u and in v.
-    winding: [f64; 2],
-    /// Touches a degenerate boundary.
-    pole: bool,
+    pub(super) winding: [f64; 2],
+    /// The loop is the seam of a surface that is closed in this parameter: it encloses all of it.
+    pub(super) seam: Option<usize>,
     /// Largest distance of a boundary point from the surface, mm.
-    off_mm: f64,
+    pub(super) off_mm: f64,
+}
+
+/// How the loops of a face wind around its surface.
+pub(super) enum Winding {
+    None,
+    /// In this parameter.
+    Along(usize),
+    Both,
+}
+
+pub(super) fn winding(paths: &[Path]) -> Winding {
+    match [0, 1].map(|k| paths.iter().any(|path| path.winding[k] != 0.0)) {
+        [false, false] => Winding::None,
+        [true, false] => Winding::Along(0),
+        [false, true] => Winding::Along(1),
+        [true, true] => Winding::Both,
+    }
+}
+
+/// The loops of a face in parameters. Those that do not wind around a closed surface lie in the turn of the largest one.
+pub(super) fn paths(surface: &Surface, loops: &[Vec<Edge>]) -> Vec<Path> {
+    let mut paths: Vec<Path> = loops.iter().map(|edges| trace(surface, edges)).collect();
+    let periods = surface.periods();
+    for path in &mut paths {
+        path.seam = (0..2).find(|k| {
+            let [low, high] = path.extent(*k);
+            let fastest = path.edges.iter().flatten().map(|place| speed(surface, *place, *k)).fold(0.0, f64::max);
+            periods[*k].is_some() && path.winding == [0.0; 2] && (high - low) * fastest <= FOLLOWS_MM
+        });
+    }
+    let middle = |path: &Path, k: usize| path.extent(k).iter().sum::<f64>() * 0.5;
+    let Some(largest) = (0..paths.len()).max_by(|a, b| {
+        let size = |path: &Path| if path.seam.is_some() { f64::INFINITY } else { path.area().abs() };
+        size(&paths[*a]).total_cmp(&size(&paths[*b]))
+    }) else {
+        return paths;
+    };
+    for k in 0..2 {
+        let Some(period) = periods[k] else { continue };
+        let home = middle(&paths[largest], k) + if paths[largest].seam == Some(k) { 0.5 * period } else { 0.0 };
+        for (index, path) in paths.iter_mut().enumerate() {
+            let turns = ((home - middle(path, k)) / period).round();
+            if index != largest && path.winding[k] == 0.0 && turns != 0.0 {
+                path.edges.iter_mut().flatten().for_each(|place| place[k] += turns * period);
+            }
+        }
+    }
+    paths
+}
+
+/// Whether the loops of a face on a closed surface are its holes alone: the face is on the outer side of the largest.
+pub(super) fn complementary(surface: &Surface, paths: &[Path], sense: f64) -> bool {
+    let (periods, domain) = (surface.periods(), surface.domain());
+    let closed = (0..2).any(|k| periods[k].is_some()) && domain.iter().all(Option::is_some);
+    let largest = paths.iter().map(Path::area).max_by(|a, b| a.abs().total_cmp(&b.abs()));
+    closed && paths.iter().all(|path| path.seam.is_none()) && largest.is_some_and(|area| area * sense < 0.0)
 }
 
 impl Path {
@@ -77,7 +133,7 @@ fn trace(surface: &Surface, edges: &[Edge]) -> Path {
     let mut path = Path {
         edges: Vec::new(),
         winding: [0.0; 2],
-        pole: false,
+        seam: None,
         off_mm: 0.0,
     };
     let mut near = None;
@@ -99,7 +155,6 @@ fn trace(surface: &Surface, edges: &[Edge]) -> Path {
             places.push(place);
         }
         for k in 0..2 {
-            path.pole |= polar.iter().any(|on_pole| on_pole[k]);
             off_the_pole(&mut places, &polar, k);
         }
         near = places.last().copied().or(near);
@@ -167,18 +222,20 @@ pub fn outline(face: &Face) -> Result<Outline, String> {
         }
         Boundary::Loops(loops) => loops,
     };
-    let paths: Vec<Path> = loops.iter().map(|edges| trace(surface, edges)).collect();
+    let paths = paths(surface, loops);
     let off_mm = paths.iter().map(|path| path.off_mm).fold(0.0, f64::max);
     let mut rectangle = around(&paths);
-    let winding: Vec<_> = (0..2)
-        .filter(|k| paths.iter().any(|path| path.winding[*k] != 0.0))
-        .collect();
-    let trimmed = match winding.as_slice() {
-        [] => single(surface, &paths, &mut rectangle),
-        [k] => belt(surface, &paths, *k, face.sense, &mut rectangle)?,
-        _ => Some("its boundary winds around the surface both ways".to_owned()),
+    let holes_alone = complementary(surface, &paths, face.sense);
+    let trimmed = match winding(&paths) {
+        Winding::None if holes_alone => {
+            rectangle = natural()?;
+            Some(format!("it has {} holes", paths.len()))
+        }
+        Winding::None => single(surface, &paths, &mut rectangle),
+        Winding::Along(k) => belt(surface, &paths, k, face.sense, &mut rectangle)?,
+        Winding::Both => Some("its boundary winds around the surface both ways".to_owned()),
     };
-    if trimmed.is_some() {
+    if trimmed.is_some() && !holes_alone {
         for (k, range) in rectangle.iter_mut().enumerate() {
             let sag = paths.iter().map(|path| path.sag(k)).fold(0.0, f64::max);
             *range = [range[0] - sag, range[1] + sag];
@@ -214,16 +271,13 @@ fn around(paths: &[Path]) -> [[f64; 2]; 2] {
 /// reason if not.
 fn single(surface: &Surface, paths: &[Path], rectangle: &mut [[f64; 2]; 2]) -> Option<String> {
     let mut whole_turn = false;
-    for (k, range) in rectangle.iter_mut().enumerate() {
-        let [low, high] = *range;
-        let widest = paths
-            .iter()
-            .flat_map(|path| path.edges.iter().flatten())
-            .map(|place| speed(surface, *place, k))
-            .fold(0.0, f64::max);
-        if let Some(period) = surface.periods()[k].filter(|_| (high - low) * widest <= FOLLOWS_MM) {
-            // The boundary consists of the seam alone: the face covers a whole period.
-            *range = [low, low + period];
+    for path in paths {
+        if let Some(k) = path.seam
+            && let Some(period) = surface.periods()[k]
+        {
+            // The loop consists of the seam alone: the face covers a whole period.
+            let low = path.extent(k)[0];
+            rectangle[k] = [low, low + period];
             whole_turn = true;
         }
     }
@@ -282,15 +336,7 @@ fn belt(
     }
     let turning: Vec<_> = paths.iter().filter(|path| path.winding[k] != 0.0).collect();
     let [low, high] = rectangle[across];
-    let flat = (high - low)
-        * turning[0]
-            .edges
-            .iter()
-            .flatten()
-            .map(|p| speed(surface, *p, across))
-            .fold(0.0, f64::max)
-        <= FOLLOWS_MM;
-    if turning.len() == 1 && flat {
+    if turning.len() == 1 {
         // A single line: the face is to its left, seen against the normal of the face.
         let left = turning[0].winding[k] * sense * if k == 0 { 1.0 } else { -1.0 };
         let end = surface.domain()[across]

@@ -4,8 +4,8 @@
 use std::io::Read;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
-use std::sync::OnceLock;
-use std::time::{Duration, Instant};
+use std::sync::{Arc, Mutex, OnceLock};
+use std::time::{Duration, Instant, SystemTime};
 
 use serde::{Deserialize, Serialize};
 
@@ -48,6 +48,25 @@ pub fn read(path: &Path) -> Result<Model, CadError> {
             error.remedy(),
         )),
     }
+}
+
+/// The model of a file, read once by this process as long as the file does not change: a job asks for its face, its part and its original.
+///
+/// # Errors
+/// As [`read`].
+pub fn read_once(path: &Path) -> Result<Arc<Model>, CadError> {
+    type Last = Option<(PathBuf, SystemTime, u64, Arc<Model>)>;
+    static LAST: Mutex<Last> = Mutex::new(None);
+    let state = std::fs::metadata(path).and_then(|data| Ok((data.modified()?, data.len()))).ok();
+    let lock = || LAST.lock().unwrap_or_else(std::sync::PoisonError::into_inner);
+    if let (Some((file, modified, length, model)), Some(now)) = (lock().as_ref(), state)
+        && (file.as_path(), *modified, *length) == (path, now.0, now.1)
+    {
+        return Ok(Arc::clone(model));
+    }
+    let model = Arc::new(read(path)?);
+    *lock() = state.map(|(modified, length)| (path.to_owned(), modified, length, Arc::clone(&model)));
+    Ok(model)
 }
 
 /// Checks that need no parsing.

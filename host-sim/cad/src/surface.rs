@@ -269,6 +269,12 @@ impl Surface {
         }
     }
 
+    /// Parameters of direction k (0: u, 1: v) inside a range at which the surface or one of its first two derivatives may jump.
+    #[must_use]
+    pub fn joints(&self, k: usize, range: [f64; 2]) -> Vec<f64> {
+        super::exact::joints(self, k, range).into_iter().map(|(t, _)| t).collect()
+    }
+
     /// S and its derivatives, with parameters that may lie one period beyond the seam of a closed B-spline.
     #[must_use]
     pub fn at_periodic(&self, u: f64, v: f64) -> Derivatives {
@@ -390,14 +396,16 @@ impl Surface {
 }
 
 /// A surface whose parameters may lie beyond the seam of a closed B-spline, one period further: its polynomials end there.
-pub(super) struct Periodic<'s> {
+pub struct Periodic<'s> {
     surface: &'s Surface,
     /// Domain of the parameters that are wrapped.
     wrapped: [Option<[f64; 2]>; 2],
 }
 
 impl<'s> Periodic<'s> {
-    pub(super) fn new(surface: &'s Surface) -> Self {
+    /// Of a surface.
+    #[must_use]
+    pub fn new(surface: &'s Surface) -> Self {
         let mut base = surface;
         while let Surface::Offset { base: inner, .. } = base {
             base = inner;
@@ -413,7 +421,8 @@ impl<'s> Periodic<'s> {
     }
 
     /// S and its derivatives.
-    pub(super) fn at(&self, u: f64, v: f64) -> Derivatives {
+    #[must_use]
+    pub fn at(&self, u: f64, v: f64) -> Derivatives {
         let inside = |t: f64, range: Option<[f64; 2]>| match range {
             Some([start, end]) if t < start || t > end => start + (t - start).rem_euclid(end - start),
             _ => t,

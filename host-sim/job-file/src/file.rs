@@ -3,7 +3,7 @@
 use std::fmt;
 use std::path::{Path, PathBuf};
 
-use job::{JobError, SurfaceSpec};
+use job::{FaceReach, Job, JobError, PartSource, Region, SurfaceSpec};
 
 use crate::section::Section;
 
@@ -11,6 +11,14 @@ use crate::section::Section;
 const FACE_MAX: f64 = 1e6;
 /// Default of the tolerance of an approximated face, mm.
 pub const TOLERANCE_DEFAULT_MM: f64 = 0.001;
+/// Default depth to which the tool may enter the part, mm.
+pub const PART_TOLERANCE_MM: f64 = 0.002;
+/// Largest such depth, mm.
+const PART_TOLERANCE_MAX_MM: f64 = 1.0;
+/// Default of the steepest angle that is machined, degrees: steeper, the ball cuts with its equator and the shank rubs.
+pub const STEEPEST_DEG: f64 = 85.0;
+/// Largest of these angles, degrees.
+const STEEPEST_MAX_DEG: f64 = 89.9;
 /// Largest tolerance of an approximated face, mm.
 pub const TOLERANCE_MAX_MM: f64 = 1.0;
 
@@ -25,6 +33,26 @@ pub struct Face {
     pub tolerance_mm: f64,
     /// A trimmed face is machined over the rectangle that encloses it.
     pub untrimmed: bool,
+    /// How far the surface goes on beyond the face, where it has more, mm.
+    pub around_mm: f64,
+}
+
+/// The surface of a face.
+#[derive(Clone, Debug, PartialEq)]
+pub struct FaceSurface {
+    /// The surface.
+    pub surface: SurfaceSpec,
+    /// The face is less of it: its region is made by [`FaceReader::region`].
+    pub trimmed: bool,
+}
+
+/// The region of a face.
+#[derive(Clone, Debug, PartialEq)]
+pub struct FaceRegion {
+    /// The region.
+    pub region: Region,
+    /// What the tool reaches.
+    pub reach: FaceReach,
 }
 
 /// Reason for which a face cannot be read.
@@ -50,23 +78,61 @@ pub trait FaceReader {
     ///
     /// # Errors
     /// The file cannot be read, has no such face, or the face cannot be machined.
-    fn surface(&self, face: &Face) -> Result<SurfaceSpec, FaceError>;
+    fn surface(&self, face: &Face) -> Result<FaceSurface, FaceError>;
+
+    /// The region of a job whose surface is of a trimmed face, or that names its part.
+    ///
+    /// # Errors
+    /// A file cannot be read; the tool reaches nothing of the face.
+    fn region(&self, job: &Job) -> Result<FaceRegion, FaceError>;
 }
 
 /// A reader that refuses every CAD file.
 pub(crate) struct NoFaces;
 
 impl FaceReader for NoFaces {
-    fn surface(&self, face: &Face) -> Result<SurfaceSpec, FaceError> {
-        Err(FaceError {
-            what: format!(
-                "{} is a CAD file, which this command cannot read",
-                face.path.display()
-            ),
-            remedy: "make a job of the face with `cargo sim import`".to_owned(),
-            of_face: false,
-        })
+    fn surface(&self, face: &Face) -> Result<FaceSurface, FaceError> {
+        Err(no_reader(&face.path))
     }
+
+    fn region(&self, job: &Job) -> Result<FaceRegion, FaceError> {
+        let path = job.origin.part().map(|part| part.path.clone());
+        Err(no_reader(&path.unwrap_or_default()))
+    }
+}
+
+fn no_reader(path: &Path) -> FaceError {
+    FaceError {
+        what: format!("{} is a CAD file, which this command cannot read", path.display()),
+        remedy: "make a job of the face with `cargo sim import`".to_owned(),
+        of_face: false,
+    }
+}
+
+/// The section `[part]`.
+pub(crate) fn part(section: &Section<'_>) -> Result<PartSource, JobError> {
+    section.only(&["path", "tolerance_mm", "steepest_deg"], &[])?;
+    let or = |key: &str, default: f64, least: f64, most: f64, want: &str| match section.has(key) {
+        true => section.number_within(key, least, most, want),
+        false => Ok(default),
+    };
+    Ok(PartSource {
+        path: beside(section, section.text("path")?),
+        tolerance_mm: or(
+            "tolerance_mm",
+            PART_TOLERANCE_MM,
+            0.0,
+            PART_TOLERANCE_MAX_MM,
+            "how deep the tool may enter the part, in mm, e.g. 0.002",
+        )?,
+        steepest_deg: or(
+            "steepest_deg",
+            STEEPEST_DEG,
+            0.0,
+            STEEPEST_MAX_DEG,
+            "the steepest angle from the horizontal that is machined, in degrees, e.g. 85",
+        )?,
+    })
 }
 
 /// The surface of kind "file", and its face.
@@ -74,13 +140,15 @@ pub(crate) fn read(
     section: &Section<'_>,
     elsewhere: &[(&str, &str)],
     faces: &dyn FaceReader,
-) -> Result<(SurfaceSpec, Face), JobError> {
+    around_mm: f64,
+) -> Result<(FaceSurface, Face), JobError> {
     section.only(&["kind", "path", "face", "tolerance_mm", "untrimmed"], elsewhere)?;
     let face = Face {
         path: beside(section, section.text("path")?),
         number: read_number(section, "face")?,
         tolerance_mm: read_tolerance(section)?,
         untrimmed: section.switch("untrimmed")?,
+        around_mm,
     };
     let surface = faces.surface(&face).map_err(|error| {
         let key = if error.of_face { "face" } else { "path" };
@@ -109,6 +177,7 @@ pub(crate) fn source(section: &Section<'_>) -> Result<Option<Face>, JobError> {
         number: read_number(section, "source_face")?,
         tolerance_mm: read_tolerance(section)?,
         untrimmed: true,
+        around_mm: 0.0,
     }))
 }
 

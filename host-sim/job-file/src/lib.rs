@@ -29,8 +29,14 @@ use job::{
 use patches::placement::Placement;
 use section::{Reader, Section};
 
-pub use file::{Face, FaceError, FaceReader, TOLERANCE_DEFAULT_MM, TOLERANCE_MAX_MM};
+pub use file::{
+    Face, FaceError, FaceReader, FaceRegion, FaceSurface, PART_TOLERANCE_MM, STEEPEST_DEG, TOLERANCE_DEFAULT_MM, TOLERANCE_MAX_MM,
+};
 pub use steps::slots_max_us;
+
+/// How far the surface of a face goes on beyond it, in step-overs on a plane: passes begin and end half a step-over beside it, which on hollow places
+/// is twice as long.
+pub const STEP_OVERS_AROUND: f64 = 1.1;
 
 /// Reads a job without a surface of `kind = "file"` from a file.
 ///
@@ -114,12 +120,19 @@ fn parse_on(
             "tool",
             "stock",
             "fixture",
+            "part",
             "cut",
             "machine",
         ],
         &[],
     )?;
-    let (unplaced, face) = surface::read(&document.section("surface")?, faces)?;
+    let part = match document.optional_section("part")? {
+        Some(section) => Some(file::part(&section)?),
+        None => None,
+    };
+    let around_mm = if part.is_some() { around_mm(&document)? } else { 0.0 };
+    let (of_face, face) = surface::read(&document.section("surface")?, faces, around_mm)?;
+    let (unplaced, trimmed) = (of_face.surface, of_face.trimmed);
     let (surface, placement) = match document.optional_section("placement")? {
         Some(section) => placement::place(&section, &unplaced)?,
         None => (unplaced.clone(), Placement::default()),
@@ -162,14 +175,17 @@ fn parse_on(
         face: face.number,
         tolerance_mm: face.tolerance_mm,
         untrimmed: face.untrimmed,
+        around_mm: face.around_mm,
+        trimmed,
         surface: unplaced,
         scale: placement.scale,
     }));
+    origin.set_part(part);
     origin.set_rotate_deg(placement.rotate_deg);
     if along.is_none() {
         origin.set_along_choice(AlongChoice::Auto);
     }
-    Ok(Job {
+    let mut job = Job {
         surface,
         region,
         radius_mm,
@@ -199,7 +215,46 @@ fn parse_on(
         },
         machine: machine::read_on(document.optional_section("machine")?.as_ref(), profile)?,
         origin,
-    })
+    };
+    if trimmed || job.origin.part().is_some() {
+        own_region(&document, &mut job, faces)?;
+    }
+    Ok(job)
+}
+
+/// How far the surface of a face must go on beyond it, in mm of its file, for passes to begin and end beside it.
+fn around_mm(document: &Section<'_>) -> Result<f64, JobError> {
+    let (radius_mm, _) = setup::tool(&document.section("tool")?)?;
+    let scallop_mm = document.section("cut")?.number("scallop_mm")?;
+    let scale = match document.optional_section("placement")? {
+        Some(section) => placement::read(&section)?.scale,
+        None => 1.0,
+    };
+    Ok(STEP_OVERS_AROUND * (8.0 * radius_mm * scallop_mm.max(0.0)).sqrt() / scale)
+}
+
+/// Makes the region of a job from its face and its part.
+fn own_region(document: &Section<'_>, job: &mut Job, faces: &dyn FaceReader) -> Result<(), JobError> {
+    if let Some(section) = document.optional_section("region")? {
+        return Err(section.error(
+            "loops",
+            "the region is made from the trimmed face and the part, and the job gives another",
+            "remove [region]; or remove [part] and set untrimmed = true in [surface]",
+        ));
+    }
+    let made = faces.region(job).map_err(|error| {
+        let (section, key) = match (error.of_face, job.origin.part().is_some()) {
+            (false, true) => (document.section("part"), "path"),
+            _ => (document.section("surface"), "face"),
+        };
+        match section {
+            Ok(section) => section.error(key, error.what, error.remedy),
+            Err(error) => error,
+        }
+    })?;
+    job.region = Some(made.region);
+    job.origin.set_reach(made.reach);
+    Ok(())
 }
 
 /// The rule for the distance between passes, and where passes of constant scallop height start.

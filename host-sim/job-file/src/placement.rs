@@ -11,7 +11,7 @@ const SCALE_MAX: f64 = 1e6;
 const TURN_MAX_DEG: f64 = 360.0;
 
 /// Reads the section.
-fn read(section: &Section<'_>) -> Result<Placement, JobError> {
+pub(super) fn read(section: &Section<'_>) -> Result<Placement, JobError> {
     section.only(&["scale", "rotate_deg", "place", "translate_mm"], &[])?;
     let mut read = Placement::default();
     if section.has("scale") {

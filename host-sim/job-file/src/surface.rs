@@ -4,7 +4,7 @@ use std::f64::consts::TAU;
 
 use job::{JobError, NurbsSpec, SurfaceSpec};
 
-use crate::file::{Face, FaceReader};
+use crate::file::{Face, FaceReader, FaceSurface};
 use crate::section::{Section, Value};
 
 /// Highest degree of a NURBS surface: the core's patches are bicubic.
@@ -46,11 +46,13 @@ enum Kind {
 
 /// Reads the section `[surface]`.
 ///
-/// Returns the surface, and the face of a CAD file that it was made from.
+/// `around_mm`: how far the surface of a face goes on beyond it. Returns the surface, and the face of a CAD file that it was made from.
 pub(super) fn read(
     section: &Section<'_>,
     faces: &dyn FaceReader,
-) -> Result<(SurfaceSpec, Option<Face>), JobError> {
+    around_mm: f64,
+) -> Result<(FaceSurface, Option<Face>), JobError> {
+    let whole = |surface: SurfaceSpec| FaceSurface { surface, trimmed: false };
     let kind = section.choice(
         "kind",
         &[
@@ -62,11 +64,11 @@ pub(super) fn read(
         ],
     )?;
     match kind {
-        Kind::Revolved => Ok((revolved(section)?, None)),
-        Kind::Ruled => Ok((ruled(section)?, None)),
-        Kind::Bicubic => Ok((bicubic(section)?, None)),
-        Kind::Nurbs => Ok((nurbs(section)?, crate::file::source(section)?)),
-        Kind::File => crate::file::read(section, &KEYS, faces).map(|(surface, face)| (surface, Some(face))),
+        Kind::Revolved => Ok((whole(revolved(section)?), None)),
+        Kind::Ruled => Ok((whole(ruled(section)?), None)),
+        Kind::Bicubic => Ok((whole(bicubic(section)?), None)),
+        Kind::Nurbs => Ok((whole(nurbs(section)?), crate::file::source(section)?)),
+        Kind::File => crate::file::read(section, &KEYS, faces, around_mm).map(|(surface, face)| (surface, Some(face))),
     }
 }
 

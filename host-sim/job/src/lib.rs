@@ -16,7 +16,7 @@ pub use machine::{
     AXES, AxisLimits, HEARTBEAT_TIMEOUT_DEFAULT_MS, HEARTBEAT_TIMEOUT_RANGE_MS, HeartbeatAction, Homing,
     MachineProfile, MachineSpec, PERIOD_DEFAULT_US, PERIOD_RANGE_US, Ratio, StepOutput,
 };
-pub use origin::{AlongChoice, CadSource, DirectionTrial, Origin};
+pub use origin::{AlongChoice, CadSource, DirectionTrial, FaceReach, Origin, PartSource};
 pub use region::Region;
 pub use setup::{Block, Fixture, HolderPart, Setup, TOOL_SIZE_MAX_MM, ToolBody};
 pub use surface::{NurbsSpec, SurfaceSpec};

@@ -43,8 +43,40 @@ pub struct CadSource {
     pub untrimmed: bool,
     /// The job's surface before its placement, with the parameters of the face if it is an approximation.
     pub surface: SurfaceSpec,
+    /// How far the surface goes on beyond the face, where it has more, mm.
+    pub around_mm: f64,
+    /// The face is trimmed: the job's region is made from it.
+    pub trimmed: bool,
     /// Scale of the placement.
     pub scale: f64,
+}
+
+/// What must not be cut: all faces of a CAD file.
+#[derive(Clone, Debug, PartialEq)]
+pub struct PartSource {
+    /// The CAD file, relative to the working directory.
+    pub path: PathBuf,
+    /// How deep the tool may enter it, mm.
+    pub tolerance_mm: f64,
+    /// Steepest angle of the surface from the horizontal that is machined, degrees.
+    pub steepest_deg: f64,
+}
+
+/// What a tool reaches of a face.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct FaceReach {
+    /// Area of the face, mm2.
+    pub area_mm2: f64,
+    /// What of it the tool reaches, mm2.
+    pub reachable_mm2: f64,
+    /// What of that is in the job's region, mm2.
+    pub region_mm2: f64,
+    /// What it does not reach, mm2, by the first test that failed: `steep`, `fit`, `ball`, `shank`, `holder`.
+    pub unreachable_mm2: Vec<(String, f64)>,
+    /// The largest ball that reaches 99 % of what is not too steep, mm; `None` if no ball above 0.05 mm does.
+    pub radius_mm: Option<f64>,
+    /// Faces of the part that are not known, by their numbers in the file: gouging them is not checked.
+    pub unknown: Vec<usize>,
 }
 
 /// Origin of a job: the file and the ranges of its keys, to which later errors refer, and the choice of the direction.
@@ -55,6 +87,8 @@ pub struct Origin {
     keys: BTreeMap<String, Range<usize>>,
     along_choice: AlongChoice,
     cad: Option<Arc<CadSource>>,
+    part: Option<Arc<PartSource>>,
+    reach: Option<Arc<FaceReach>>,
     rotate_deg: [f64; 3],
 }
 
@@ -68,6 +102,8 @@ impl Origin {
             keys,
             along_choice: AlongChoice::Given,
             cad: None,
+            part: None,
+            reach: None,
             rotate_deg: [0.0; 3],
         }
     }
@@ -120,6 +156,28 @@ impl Origin {
     /// Records the source of the surface.
     pub fn set_cad(&mut self, cad: Option<CadSource>) {
         self.cad = cad.map(Arc::new);
+    }
+
+    /// The part that must not be cut.
+    #[must_use]
+    pub fn part(&self) -> Option<&PartSource> {
+        self.part.as_deref()
+    }
+
+    /// Records the part.
+    pub fn set_part(&mut self, part: Option<PartSource>) {
+        self.part = part.map(Arc::new);
+    }
+
+    /// What the tool reaches of the face, if the region was made from it.
+    #[must_use]
+    pub fn reach(&self) -> Option<&FaceReach> {
+        self.reach.as_deref()
+    }
+
+    /// Records what the tool reaches.
+    pub fn set_reach(&mut self, reach: FaceReach) {
+        self.reach = Some(Arc::new(reach));
     }
 
     /// An error at the value of `section.key`; at the section, else at the file, where the key is missing.

@@ -97,6 +97,29 @@ impl RegionEdges {
 }
 
 impl Oracle {
+    /// The region's boundary as lines of (u, v), `parts` points an edge; none where the job has none.
+    #[must_use]
+    pub fn region_outline(&self, parts: u32) -> Vec<Vec<[f64; 2]>> {
+        let mut lines: Vec<Vec<[f64; 2]>> = Vec::new();
+        let mut last = None;
+        for [from, to] in self.region.iter().flat_map(|region| &region.edges) {
+            let at = |k: u32| {
+                let share = f64::from(k) / f64::from(parts);
+                let (u, v) = self.swapped(
+                    from[0] + share * (to[0] - from[0]),
+                    from[1] + share * (to[1] - from[1]),
+                );
+                [u, v]
+            };
+            match lines.last_mut() {
+                Some(line) if last == Some(*from) => line.extend((1..=parts).map(at)),
+                _ => lines.push((0..=parts).map(at).collect()),
+            }
+            last = Some(*to);
+        }
+        lines
+    }
+
     /// Whether (u, v) is in the region; everything is where the job has none.
     #[must_use]
     pub fn is_in_region(&self, u: f64, v: f64) -> bool {

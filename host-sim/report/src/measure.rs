@@ -42,5 +42,7 @@ pub(super) fn gaps(oracle: &Oracle, passes: &[PassInterval]) -> Vec<Gap> {
         Some((last, others)) if last.step < (1.0 - CUT_SHARE) * last.least => others,
         _ => passes,
     };
-    whole.iter().map(gap).collect()
+    // Of a region's passes on one line only the last is beside the next line.
+    let is_gap = |pass: &&PassInterval| pass.step != 0.0;
+    whole.iter().filter(is_gap).map(gap).collect()
 }

@@ -30,7 +30,12 @@ pub(super) struct Mesh {
     points: Vec<DVec3>,
     /// 1 or -1: the sign of the tool side on the grid's own normals.
     sign: f64,
+    /// The boundary of the region that is machined.
+    outline: Vec<Vec<DVec3>>,
 }
+
+/// Points of the outline an edge of the region.
+const OUTLINE_PARTS: u32 = 24;
 
 impl Mesh {
     /// The grid over a job's whole surface.
@@ -55,6 +60,15 @@ impl Mesh {
             cells,
             points,
             sign: oracle.normal_sign,
+            outline: oracle
+                .region_outline(OUTLINE_PARTS)
+                .into_iter()
+                .map(|line| {
+                    line.into_iter()
+                        .map(|[u, v]| oracle.surface.at(u, v).point)
+                        .collect()
+                })
+                .collect(),
         }
     }
 
@@ -114,7 +128,7 @@ impl Mesh {
             .collect()
     }
 
-    /// The boundary curves of the surface, without degenerate ones.
+    /// The boundary curves of the surface, without degenerate ones, and of the region.
     pub(super) fn edges(&self) -> Vec<Vec<DVec3>> {
         let [rows, columns] = self.cells;
         let edges = [
@@ -125,7 +139,8 @@ impl Mesh {
         ];
         let is_long =
             |edge: &Vec<DVec3>| edge.windows(2).map(|ends| ends[1].distance(ends[0])).sum::<f64>() > 1e-9;
-        edges.into_iter().filter(is_long).collect()
+        let all = edges.into_iter().chain(self.outline.iter().cloned());
+        all.filter(is_long).collect()
     }
 
     /// An iso-parametric line through the middle of the surface.

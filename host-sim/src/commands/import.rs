@@ -3,6 +3,7 @@
 mod condition;
 mod list;
 mod page;
+mod whole_part;
 
 use super::out::{complain, say};
 use std::path::{Path, PathBuf};
@@ -10,13 +11,15 @@ use std::path::{Path, PathBuf};
 use clap::Args;
 use serde_json::{Value, json};
 
-use super::{Failure, Result, whole};
+use super::{Failure, Result, region_words, whole};
 use cad::{
-    CadError, Face, Form, JobOptions, JobText, MachinableFace, Model, Options, machinable, read, write_job,
+    CadError, Face, Form, JobOptions, JobText, MachinableFace, Model, Options, machinable, read_once, write_job,
 };
 use condition::Condition;
+use job::FaceReach;
 use job_file::TOLERANCE_DEFAULT_MM;
 use list::Key;
+use whole_part::Up;
 
 /// Converts a face of a STEP, IGES or 3DM file to a job, or lists the faces.
 ///
@@ -27,6 +30,7 @@ use list::Key;
 /// Example: cargo sim import jobs/cad/blade.step --list --only up --only whole --sort area --reverse
 /// Example: cargo sim import jobs/cad/blade.step --list --page faces.html
 /// Example: cargo sim import jobs/cad/blade.step --face 2 -o blade.toml --radius-mm 4
+/// Example: cargo sim import jobs/cad/blade.step --part --tool 3 -o blade/
 #[derive(Debug, Args)]
 #[command(verbatim_doc_comment)]
 pub(super) struct Arguments {
@@ -63,8 +67,17 @@ pub(super) struct Arguments {
     /// Machines a trimmed face over the whole rectangle of the surface around its boundary.
     #[arg(long)]
     untrimmed: bool,
+    /// A job for each face of the part that the tool reaches without touching another, into the folder -o, with a summary and a page of the part.
+    #[arg(long, conflicts_with_all = ["list", "face", "untrimmed", "side", "page"], requires = "output")]
+    part: bool,
+    /// With --part: only these faces, e.g. 1,4,7.
+    #[arg(long, value_name = "N,...", value_delimiter = ',', requires = "part")]
+    faces: Vec<usize>,
+    /// With --part: the side of the part that looks up.
+    #[arg(long, value_enum, requires = "part", default_value = "+z", allow_hyphen_values = true)]
+    up: Up,
     /// Ball radius, mm. Default: the largest standard radius below the least concave radius.
-    #[arg(long, value_name = "MM")]
+    #[arg(long, value_name = "MM", visible_alias = "tool")]
     radius_mm: Option<f64>,
     /// Feed along the surface, mm/min.
     #[arg(long, value_name = "F")]
@@ -151,7 +164,14 @@ fn relative(file: &Path, job: &Path) -> Option<String> {
     (!text.chars().any(char::is_control)).then(|| text.to_owned())
 }
 
-fn report(arguments: &Arguments, path: &Path, face: &Face, made: &MachinableFace, written: &JobText) {
+fn report(
+    arguments: &Arguments,
+    path: &Path,
+    face: &Face,
+    made: &MachinableFace,
+    written: &JobText,
+    reach: Option<&FaceReach>,
+) {
     let size = written.measures.size_mm();
     if arguments.json {
         let value = json!({
@@ -165,10 +185,12 @@ fn report(arguments: &Arguments, path: &Path, face: &Face, made: &MachinableFace
             "least_concave_radius_mm": { "plus": written.measures.concave_mm[0], "minus": written.measures.concave_mm[1] },
             "becomes": if made.form == Form::Exact { "exact" } else { "approximated" },
             "deviation": deviation_json(&made.form),
-            "untrimmed": made.outline.trimmed.is_some(),
+            "trimmed": made.trimmed.is_some(),
+            "untrimmed": made.outline.trimmed.is_some() && made.trimmed.is_none(),
             "radius_mm": written.radius_mm,
             "side": written.side,
             "warnings": written.warnings,
+            "region": reach.map(region_words::json),
         });
         say!("{value}");
         return;
@@ -197,6 +219,11 @@ fn report(arguments: &Arguments, path: &Path, face: &Face, made: &MachinableFace
         written.radius_mm,
         written.side
     );
+    if let Some(reach) = reach {
+        for line in region_words::lines(reach) {
+            say!("  reach        {line}");
+        }
+    }
     for warning in &written.warnings {
         say!("  note         {warning}");
     }
@@ -207,6 +234,7 @@ pub(super) fn command(arguments: &Arguments) -> Result<()> {
     let options = Options {
         tolerance_mm: arguments.tolerance,
         untrimmed: arguments.untrimmed,
+        around_mm: 0.0,
     };
     if !arguments.list && arguments.output.is_none() {
         return Err(Failure::input(
@@ -215,12 +243,15 @@ pub(super) fn command(arguments: &Arguments) -> Result<()> {
         ));
     }
     whole::note_input(&arguments.file);
-    for path in arguments.output.iter().chain(&arguments.page) {
+    for path in arguments.output.iter().filter(|_| !arguments.part).chain(&arguments.page) {
         whole::check(path, arguments.force)?;
     }
-    let model = read(&arguments.file)?;
+    let model = read_once(&arguments.file)?;
     for warning in &model.warnings {
         complain!("warning: {warning}");
+    }
+    if let Some(folder) = arguments.output.as_ref().filter(|_| arguments.part) {
+        return whole_part::command(arguments, &file, &model, folder);
     }
     let Some(path) = arguments.output.as_ref().filter(|_| !arguments.list) else {
         return list::list(arguments, &file, &model, &options);
@@ -238,12 +269,15 @@ pub(super) fn command(arguments: &Arguments) -> Result<()> {
             along: arguments.along.clone(),
             side: arguments.side.clone(),
             pattern: arguments.pattern.clone(),
+            in_part: false,
+            rotate_deg: [0.0; 3],
+            translate_mm: [0.0; 3],
             source: relative(&arguments.file, path).map(|source| (source, arguments.tolerance)),
         },
     )?;
     // The job is parsed before it is written, so that the options are checked by the rules of the job file.
-    job_file::parse_with(&path.display().to_string(), &written.text, &cad::Faces)?;
+    let job = job_file::parse_with(&path.display().to_string(), &written.text, &part::Faces)?;
     whole::write(path, written.text.as_bytes(), arguments.force)?;
-    report(arguments, path, face, &made, &written);
+    report(arguments, path, face, &made, &written, job.origin.reach());
     Ok(())
 }

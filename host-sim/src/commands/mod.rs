@@ -22,8 +22,10 @@ mod out;
 mod outcome;
 #[cfg(feature = "developer")]
 mod paper;
+mod part_words;
 mod progress;
 mod reach_words;
+mod region_words;
 mod run;
 mod scripted;
 mod settings;
@@ -262,9 +264,19 @@ pub fn main() -> ExitCode {
 struct Faces;
 
 impl job_file::FaceReader for Faces {
-    fn surface(&self, face: &job_file::Face) -> std::result::Result<job::SurfaceSpec, job_file::FaceError> {
+    fn surface(
+        &self,
+        face: &job_file::Face,
+    ) -> std::result::Result<job_file::FaceSurface, job_file::FaceError> {
         whole::note_input(&face.path);
-        cad::Faces.surface(face)
+        part::Faces.surface(face)
+    }
+
+    fn region(&self, job: &Job) -> std::result::Result<job_file::FaceRegion, job_file::FaceError> {
+        if let Some(part) = job.origin.part() {
+            whole::note_input(&part.path);
+        }
+        part::Faces.region(job)
     }
 }
 

@@ -15,7 +15,10 @@ use verify::swept;
 
 use super::out::{complain, say};
 use super::simulate::{WantedReport, remarks, report, timed};
-use super::{Bar, Failure, Result, along, error_json, load_on, motion_words, reach_words, swept_words};
+use super::part_words::{Centres, PartProof};
+use super::{
+    Bar, Failure, Result, along, error_json, load_on, motion_words, part_words, reach_words, swept_words,
+};
 
 /// Checks a job before it runs on a machine. Every sample against an independent f64 oracle: positions, normals, feed ripple, path
 /// intervals, schedule. The swept envelope of the ball against the surface: scallop height, local and global gouges. Axis travel. With
@@ -173,7 +176,7 @@ fn json(job: &Job, prepared: &Prepared, found: &Verification) -> Value {
 }
 
 /// Prints the figures as text.
-fn print_verification(job: &Job, prepared: &Prepared, found: &Verification) {
+fn print_verification(job: &Job, prepared: &Prepared, found: &Verification, proof: Option<&PartProof>) {
     let RunMeasurements {
         findings,
         swept,
@@ -187,6 +190,9 @@ fn print_verification(job: &Job, prepared: &Prepared, found: &Verification) {
     print(findings, found.scanned);
     swept_words::print(job, prepared, findings, swept, axes);
     reach_words::print(job, reach);
+    if let Some(proof) = proof {
+        proof.print(job);
+    }
     motion_words::print(times, optimum);
     for failure in &found.failures {
         say!("  FAIL {failure}");
@@ -290,14 +296,28 @@ fn verify_job(arguments: &Arguments, path: &Path, directory: Option<&Path>) -> R
         },
     };
     let mut sketch = directory.map(|_| Sketch::new(&job, timed.passes.len()));
-    let mut draw = sketch
-        .as_mut()
-        .map(|sketch| |emitted: &PassSample, checked: &SampleCheck| sketch.add(emitted, checked));
-    let each = draw.as_mut().map(|draw| draw as &mut SampleObserver<'_>);
+    let mut centres = job.origin.reach().map(|_| Centres::default());
+    let mut draw = |emitted: &PassSample, checked: &SampleCheck| {
+        if let Some(centres) = &mut centres {
+            centres.add(emitted);
+        }
+        if let Some(sketch) = &mut sketch {
+            sketch.add(emitted, checked);
+        }
+    };
+    let each: &mut SampleObserver<'_> = &mut draw;
     let bar = Bar::new();
-    let found = verify_run(&job, &prepared, &timed, each, &requirements, &bar);
+    let found = verify_run(&job, &prepared, &timed, Some(each), &requirements, &bar);
     bar.clear();
-    let found = found?;
+    let mut found = found?;
+    let proof = match &centres {
+        Some(centres) => part_words::measure(&job, centres, &found.measured.links_mm)?,
+        None => None,
+    };
+    if let Some(proof) = &proof {
+        found.failures.extend(proof.failures().iter().cloned());
+        found.warnings.extend(proof.warnings().iter().cloned());
+    }
     let RunMeasurements { findings, swept, .. } = &found.measured;
     let mut remarks = Remarks {
         failures: found.failures.clone(),
@@ -309,16 +329,18 @@ fn verify_job(arguments: &Arguments, path: &Path, directory: Option<&Path>) -> R
         ..remarks(&timed, findings)
     };
     remarks.warnings.extend(found.warnings.iter().cloned());
+    remarks.marks.extend(proof.iter().flat_map(PartProof::marks));
     let page = report(&job, directory, sketch.as_ref(), findings, &remarks)?;
     let passed = found.failures.is_empty();
     if !arguments.json {
         say!("{}", path.display());
-        print_verification(&job, &prepared, &found);
+        print_verification(&job, &prepared, &found, proof.as_ref());
         if let Some(page) = page {
             say!("  report {}", page.display());
         }
     }
     let mut value = json(&job, &prepared, &found);
+    value["part"] = proof.as_ref().map_or(Value::Null, |proof| proof.json(&job));
     value["job"] = path.display().to_string().into();
     Ok((passed, value))
 }

@@ -107,6 +107,43 @@ pub(super) fn page(file: &str, rows: &[Row<'_>]) -> String {
     PAGE.replace("@DATA@", &data.to_string().replace('<', "\\u003c"))
 }
 
+/// A face of a whole part, as the page shows it.
+pub(super) struct PartRow<'f> {
+    /// The face on the machine.
+    pub(super) face: &'f Face,
+    /// Area, mm2.
+    pub(super) area_mm2: Option<f64>,
+    /// What becomes of it.
+    pub(super) state: String,
+    /// Its job, if it has one.
+    pub(super) job: Option<String>,
+    /// What is finished of it, as rings in space.
+    pub(super) region: Vec<Vec<[f64; 3]>>,
+    /// Red, green, blue.
+    pub(super) tint: [u8; 3],
+}
+
+/// The page of a whole part.
+pub(super) fn part_page(file: &str, legend: &str, rows: &[PartRow<'_>]) -> String {
+    let quads = QUADS[usize::from(rows.len() > MANY)];
+    let faces = rows.iter().map(|row| {
+        let outline = cad::outline(row.face).ok();
+        let polygons = polygons(row.face, outline.as_ref(), quads);
+        let ring = |ring: &Vec<[f64; 3]>| ring.iter().map(|point| rounded(*point)).collect::<Vec<_>>();
+        let region: Vec<_> = row.region.iter().map(ring).collect();
+        let command = row.job.as_ref().map_or(String::new(), |job| {
+            format!("{} verify {}", programs::command_name(), quoted(job))
+        });
+        json!({
+            "number": row.face.number, "entity": row.face.entity, "kind": row.face.surface.kind(), "name": row.face.name, "rgb": row.tint,
+            "area": row.area_mm2, "size": null, "state": row.state, "command": command, "whole_outline": polygons.len() == 1,
+            "polygons": polygons, "regions": if region.is_empty() { Vec::new() } else { vec![region] },
+        })
+    });
+    let data = json!({ "file": file, "legend": legend, "faces": faces.collect::<Vec<_>>() });
+    PAGE.replace("@DATA@", &data.to_string().replace('<', "\\u003c"))
+}
+
 #[cfg(test)]
 mod tests {
     use super::quoted;

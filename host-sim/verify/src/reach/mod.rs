@@ -66,13 +66,15 @@ pub fn measure(
     progress.begin("reach", 0);
     let surface = SurfaceObstacle::new(oracle);
     let between = PathTree::new(links(motion, CHORD_RADII * job.radius_mm));
-    if !between.chords.is_empty() {
+    // The surface goes on where its face has ended; the whole part is checked elsewhere, face by face.
+    let is_obstacle = job.origin.part().is_none();
+    if is_obstacle && !between.chords.is_empty() {
         let shape = Shape::Ball(job.radius_mm);
         let found = search(&surface, &between, &shape, floor(&shape));
         let uv = found.deepest.map(|deepest| surface.parameters(&deepest.cell));
         findings.push(finding(&shape, Obstacle::Surface, &found, uv));
     }
-    for solid in &solids {
+    for solid in solids.iter().filter(|_| is_obstacle) {
         let shape = Shape::Solid(*solid);
         let found = search(&surface, &tree, &shape, floor(&shape));
         let uv = found.deepest.map(|deepest| surface.parameters(&deepest.cell));

@@ -1,0 +1,100 @@
+//! Whether a tool may touch a place of a face: steepness, fit of the ball, and everything else of the part.
+
+use glam::DVec3;
+use oracle::Surface;
+
+use crate::body::{OwnContact, Part};
+use crate::tool::{Reason, Tool};
+
+/// The share of the tool's permitted depth that a region uses; the rest is for rounding.
+const DEPTH_SHARE: f64 = 0.5;
+/// Places of the own face nearer to the contact than this share of the ball's radius do not count: there the fit of the ball decides.
+const OWN_SHARE: f64 = 0.3;
+/// Ball radius times the curvature towards it, at most: towards 1 the step-over grows without bound, and the board refuses what is above.
+const FIT_MAX: f64 = 0.97;
+
+/// A face, the tool and the part.
+pub struct Clearance<'a> {
+    /// The face's surface as it is machined.
+    pub surface: &'a Surface,
+    /// Sign of the tool's side on `S_u x S_v`.
+    pub sign: f64,
+    /// The tool.
+    pub tool: &'a Tool,
+    /// Least z of the normal.
+    pub normal_z_min: f64,
+    /// How deep the tool may enter the part, mm.
+    pub touch_mm: f64,
+    /// The part, and the index of the face in it; `None`: only the face's own rules.
+    pub part: Option<(&'a Part, Option<usize>)>,
+}
+
+/// A contact.
+#[derive(Clone, Copy, Debug)]
+pub struct Place {
+    /// On the surface.
+    pub point: DVec3,
+    /// Towards the tool.
+    pub normal: DVec3,
+    /// Area of the surface for each unit of u and v, mm2.
+    pub area: f64,
+}
+
+impl Clearance<'_> {
+    /// The contact at a place, and whether the ball fits.
+    #[must_use]
+    pub fn place(&self, [u, v]: [f64; 2]) -> (Place, bool) {
+        let at = self.surface.at(u, v);
+        let cross = at.u.cross(at.v);
+        let area = cross.length();
+        let normal = cross * (self.sign / area);
+        let place = Place {
+            point: at.point,
+            normal,
+            area,
+        };
+        if area.is_nan() || area <= 1e-9 * at.u.length() * at.v.length() {
+            return (place, false);
+        }
+        let [_, most] = at.principal_curvatures(normal);
+        (place, most * self.tool.radius <= FIT_MAX)
+    }
+
+    /// The first rule that a place breaks.
+    ///
+    /// # Errors
+    /// The rule.
+    pub fn check(&self, uv: [f64; 2]) -> Result<(), Reason> {
+        let (place, fits) = self.place(uv);
+        if place.normal.z.is_nan() || place.normal.z < self.normal_z_min {
+            return Err(Reason::Steep);
+        }
+        if !fits {
+            return Err(Reason::Fit);
+        }
+        self.check_part(&place)
+    }
+
+    fn check_part(&self, place: &Place) -> Result<(), Reason> {
+        let Some((part, own)) = self.part else {
+            return Ok(());
+        };
+        let centre = place.point + place.normal * self.tool.radius;
+        let own = own.map(|face| OwnContact {
+            face,
+            place: place.point,
+            radius: OWN_SHARE * self.tool.radius,
+        });
+        let depth = DEPTH_SHARE * self.touch_mm;
+        if part.nearest(centre, self.tool.radius - depth, own.as_ref(), true).is_some() {
+            return Err(Reason::Ball);
+        }
+        for column in &self.tool.columns {
+            let z = column.z.map(|z| centre.z + z);
+            if part.beside(centre, z, column.radius - depth, true).is_some() {
+                return Err(column.part);
+            }
+        }
+        Ok(())
+    }
+}

@@ -1,0 +1,293 @@
+//! The boundary of a set of places that is known by a question alone: marching squares on a grid, vertices bisected to the boundary, chords halved
+//! until they follow it, then pulled in and left with the fewest vertices that stay inside.
+
+use rayon::prelude::*;
+use std::collections::HashMap;
+
+/// Bisections of a vertex between a place inside and one outside: a grid of 0.2 mm to 0.05 um.
+const BISECTIONS: usize = 12;
+/// Halvings of a chord.
+const HALVINGS: u32 = 7;
+/// Most places of the grid.
+const PLACES_MAX: usize = 4_000_000;
+
+type Place = [f64; 2];
+
+/// What is asked of the contour.
+#[derive(Clone, Copy, Debug)]
+pub struct Precision {
+    /// Spacing of the grid, mm.
+    pub grid_mm: f64,
+    /// Distance of the contour's chords from the boundary, mm.
+    pub chord_mm: f64,
+    /// How far the contour is pulled in, mm.
+    pub inset_mm: f64,
+    /// How much farther in it may be for fewer vertices, mm.
+    pub simplify_mm: f64,
+}
+
+/// A set of places within a rectangle of (u, v).
+pub struct Set<'a> {
+    /// The rectangle.
+    pub rectangle: [[f64; 2]; 2],
+    /// Lengths of the derivatives by u and v, mm: at most.
+    pub metric: [f64; 2],
+    /// Whether a place is in it.
+    pub holds: &'a (dyn Fn(Place) -> bool + Sync),
+}
+
+/// The grid with its answers; one line of places beyond each side is outside.
+struct Grid {
+    counts: [usize; 2],
+    holds: Vec<bool>,
+}
+
+impl Grid {
+    fn index(&self, i: usize, j: usize) -> usize {
+        j * (self.counts[0] + 3) + i
+    }
+
+    fn at(&self, i: usize, j: usize) -> bool {
+        self.holds[self.index(i, j)]
+    }
+}
+
+impl Set<'_> {
+    /// Place of a grid point, whose lines beyond the sides are at the sides.
+    fn place(&self, counts: [usize; 2], i: usize, j: usize) -> Place {
+        let at = |k: usize, index: usize| {
+            let [low, high] = self.rectangle[k];
+            let index = index.clamp(1, counts[k] + 1) - 1;
+            if index == counts[k] { high } else { low + (high - low) * index as f64 / counts[k] as f64 }
+        };
+        [at(0, i), at(1, j)]
+    }
+
+    fn grid(&self, spacing: f64) -> Grid {
+        let size = |k: usize| (self.rectangle[k][1] - self.rectangle[k][0]) * self.metric[k];
+        let wanted = (size(0) / spacing).ceil() * (size(1) / spacing).ceil();
+        let spacing = spacing * (wanted / PLACES_MAX as f64).max(1.0).sqrt();
+        #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "at most a few million")]
+        let counts = [0, 1].map(|k| ((size(k) / spacing).ceil() as usize).clamp(8, PLACES_MAX));
+        let mut grid = Grid {
+            counts,
+            holds: vec![false; (counts[0] + 3) * (counts[1] + 3)],
+        };
+        let width = counts[0] + 3;
+        grid.holds.par_chunks_mut(width).enumerate().for_each(|(j, row)| {
+            if j == 0 || j == counts[1] + 2 {
+                return;
+            }
+            for (i, holds) in row.iter_mut().enumerate().take(counts[0] + 2).skip(1) {
+                *holds = (self.holds)(self.place(counts, i, j));
+            }
+        });
+        grid
+    }
+
+    /// The place nearest to the boundary on the inner side.
+    fn bisected(&self, mut inner: Place, mut outer: Place) -> Place {
+        if inner == outer {
+            return inner;
+        }
+        for _ in 0..BISECTIONS {
+            let middle = [0.5 * (inner[0] + outer[0]), 0.5 * (inner[1] + outer[1])];
+            if (self.holds)(middle) {
+                inner = middle;
+            } else {
+                outer = middle;
+            }
+        }
+        inner
+    }
+
+    fn length(&self, a: Place, b: Place) -> f64 {
+        ((b[0] - a[0]) * self.metric[0]).hypot((b[1] - a[1]) * self.metric[1])
+    }
+
+    /// A place moved to the left of the direction from a to b, mm.
+    fn beside(&self, from: Place, a: Place, b: Place, by: f64) -> Place {
+        let (du, dv) = ((b[0] - a[0]) * self.metric[0], (b[1] - a[1]) * self.metric[1]);
+        let length = du.hypot(dv).max(f64::MIN_POSITIVE);
+        let moved = [from[0] - by * dv / length / self.metric[0], from[1] + by * du / length / self.metric[1]];
+        std::array::from_fn(|k| moved[k].clamp(self.rectangle[k][0], self.rectangle[k][1]))
+    }
+
+    /// Closed polygons around the set, inside of it; the set is on their left.
+    #[must_use]
+    pub fn contours(&self, precision: &Precision) -> Vec<Vec<Place>> {
+        let grid = self.grid(precision.grid_mm);
+        let loops = self.marched(&grid);
+        let step = precision.grid_mm;
+        loops
+            .into_par_iter()
+            .filter_map(|rough| {
+                let mut fine = Vec::new();
+                for (index, a) in rough.iter().enumerate() {
+                    fine.push(*a);
+                    self.chord(*a, rough[(index + 1) % rough.len()], step, precision.chord_mm, HALVINGS, &mut fine);
+                }
+                fine.dedup();
+                let pulled = self.pulled_in(&fine, precision.inset_mm);
+                let simple = self.simplified(&pulled, precision);
+                (simple.len() > 2 && self.area(&simple).abs() > precision.inset_mm * precision.grid_mm).then_some(simple)
+            })
+            .collect()
+    }
+
+    /// Area, mm2 by the metric, positive for a polygon with the set inside of it.
+    fn area(&self, polygon: &[Place]) -> f64 {
+        let next = polygon.iter().cycle().skip(1);
+        let sum: f64 = polygon.iter().zip(next).map(|(a, b)| 0.5 * (a[0] * b[1] - b[0] * a[1])).sum();
+        sum * self.metric[0] * self.metric[1]
+    }
+
+    /// The loops through the bisected edges of the grid, the set on their left.
+    fn marched(&self, grid: &Grid) -> Vec<Vec<Place>> {
+        let [nu, nv] = grid.counts;
+        let width = nu + 3;
+        // Edges of the grid by their first place: 2 index along u, 2 index + 1 along v.
+        let mut next: HashMap<usize, usize> = HashMap::new();
+        let mut starts = Vec::new();
+        for j in 0..nv + 2 {
+            for i in 0..nu + 2 {
+                let corners = [grid.at(i, j), grid.at(i + 1, j), grid.at(i + 1, j + 1), grid.at(i, j + 1)];
+                if corners == [true; 4] || corners == [false; 4] {
+                    continue;
+                }
+                let base = grid.index(i, j);
+                let edges = [2 * base, 2 * (base + 1) + 1, 2 * (base + width), 2 * base + 1];
+                // Counter-clockwise around the cell: the set begins on an edge from outside to inside, and ends on one from inside to outside.
+                let enters: Vec<usize> = (0..4).filter(|k| !corners[*k] && corners[(k + 1) % 4]).collect();
+                let leaves: Vec<usize> = (0..4).filter(|k| corners[*k] && !corners[(k + 1) % 4]).collect();
+                let is_joined = enters.len() == 2 && {
+                    let (a, b) = (self.place(grid.counts, i, j), self.place(grid.counts, i + 1, j + 1));
+                    (self.holds)([0.5 * (a[0] + b[0]), 0.5 * (a[1] + b[1])])
+                };
+                for leave in &leaves {
+                    // With the set on the left, the line enters the cell where the set ends, counter-clockwise, and leaves it where the set begins: after it, or,
+                    // if the two corners of the set are apart, before it.
+                    let turn = |k: &&usize| if is_joined { (**k + 4 - leave) % 4 } else { (leave + 4 - **k) % 4 };
+                    if let Some(enter) = enters.iter().min_by_key(turn) {
+                        next.insert(edges[*leave], edges[*enter]);
+                        starts.push(edges[*leave]);
+                    }
+                }
+            }
+        }
+        let vertex = |edge: usize| {
+            let (index, along_v) = (edge / 2, edge % 2);
+            let (i, j) = (index % width, index / width);
+            let ends = [(i, j), (i + 1 - along_v, j + along_v)];
+            let [a, b] = ends.map(|(i, j)| self.place(grid.counts, i, j));
+            if grid.at(ends[0].0, ends[0].1) { self.bisected(a, b) } else { self.bisected(b, a) }
+        };
+        let mut loops = Vec::new();
+        for start in starts {
+            let mut edges = Vec::new();
+            let mut at = start;
+            while let Some(to) = next.remove(&at) {
+                edges.push(at);
+                at = to;
+            }
+            if edges.len() > 2 {
+                loops.push(edges.par_iter().map(|edge| vertex(*edge)).collect());
+            }
+        }
+        loops
+    }
+
+    /// Adds the vertices between two of a loop, at which its chord follows the boundary.
+    fn chord(&self, a: Place, b: Place, step: f64, chord_mm: f64, left: u32, out: &mut Vec<Place>) {
+        let length = self.length(a, b);
+        if left == 0 || length < 2.0 * chord_mm {
+            return;
+        }
+        let middle = [0.5 * (a[0] + b[0]), 0.5 * (a[1] + b[1])];
+        let reach = (0.75 * length).min(step);
+        let is_in = (self.holds)(middle);
+        let side = if is_in { -1.0 } else { 1.0 };
+        let near = self.beside(middle, a, b, side * chord_mm);
+        if (self.holds)(near) != is_in && is_in {
+            return;
+        }
+        let far = self.beside(middle, a, b, side * reach);
+        if (self.holds)(far) == is_in {
+            return;
+        }
+        let found = if is_in { self.bisected(middle, far) } else { self.bisected(far, middle) };
+        if self.length(found, middle) <= chord_mm && is_in {
+            return;
+        }
+        self.chord(a, found, step, chord_mm, left - 1, out);
+        out.push(found);
+        self.chord(found, b, step, chord_mm, left - 1, out);
+    }
+
+    /// Each vertex moved in, to the left of its edges; those on a side of the rectangle stay on it.
+    fn pulled_in(&self, polygon: &[Place], by: f64) -> Vec<Place> {
+        let count = polygon.len();
+        (0..count)
+            .map(|index| {
+                let (before, here, after) =
+                    (polygon[(index + count - 1) % count], polygon[index], polygon[(index + 1) % count]);
+                let unit = |a: Place, b: Place| {
+                    let length = self.length(a, b).max(f64::MIN_POSITIVE);
+                    [-(b[1] - a[1]) * self.metric[1] / length, (b[0] - a[0]) * self.metric[0] / length]
+                };
+                let (m, n) = (unit(before, here), unit(here, after));
+                let sum = [m[0] + n[0], m[1] + n[1]];
+                let share = (by / (0.5 * (sum[0] * sum[0] + sum[1] * sum[1])).max(0.25)).min(2.0 * by);
+                std::array::from_fn(|k| {
+                    let [low, high] = self.rectangle[k];
+                    let on_side = here[k] == low || here[k] == high;
+                    if on_side { here[k] } else { (here[k] + share * sum[k] / self.metric[k]).clamp(low, high) }
+                })
+            })
+            .collect()
+    }
+
+    /// The fewest vertices whose chords stay inside of the polygon, or leave it by a fifth of the inset at most.
+    fn simplified(&self, polygon: &[Place], precision: &Precision) -> Vec<Place> {
+        let count = polygon.len();
+        if count < 4 {
+            return polygon.to_vec();
+        }
+        let fits = |from: usize, to: usize| {
+            let (a, b) = (polygon[from % count], polygon[to % count]);
+            let length = self.length(a, b);
+            let (du, dv) = ((b[0] - a[0]) * self.metric[0], (b[1] - a[1]) * self.metric[1]);
+            (from + 1..to).all(|index| {
+                let p = polygon[index % count];
+                let (eu, ev) = ((p[0] - a[0]) * self.metric[0], (p[1] - a[1]) * self.metric[1]);
+                let (off, along) = ((du * ev - dv * eu) / length, (du * eu + dv * ev) / length);
+                // The set is on the left: where a vertex is there, the chord leaves the set.
+                length > 0.0
+                    && off <= 0.2 * precision.inset_mm
+                    && off >= -precision.simplify_mm
+                    && (0.0..=length).contains(&along)
+            })
+        };
+        let mut kept = vec![polygon[0]];
+        let mut from = 0;
+        while from < count {
+            let mut to = from + 1;
+            let mut step = 1;
+            while to + step <= count && fits(from, to + step) {
+                to += step;
+                step *= 2;
+            }
+            while step > 0 {
+                if to + step <= count && fits(from, to + step) {
+                    to += step;
+                }
+                step /= 2;
+            }
+            from = to;
+            if from < count {
+                kept.push(polygon[from]);
+            }
+        }
+        kept
+    }
+}

@@ -1,0 +1,36 @@
+//! Whole parts: what a ball-end tool, its axis along z, reaches of each face without touching another.
+//!
+//! ```text
+//! faces of a file ──body.rs──► Part: cells of certified deviation, edges; each in a tree     distance of the part from a ball, from a cylinder
+//!                                 │ clear.rs     steep, fit, ball, shank, holder: the first rule that a place of a face breaks
+//!                                 ▼
+//! trimmed region of a face ──region.rs──► grown by half a step-over where all rules hold ──contour.rs──► polygons of (u, v)
+//!
+//! emitted centres ──proof.rs──► the deepest place of the tool in the part, what is left on the reachable part of the face
+//! ```
+//!
+//! Not in the sample path: f64; lengths in mm.
+
+mod body;
+mod cell;
+mod clear;
+mod contour;
+mod faces;
+mod inside;
+mod proof;
+mod region;
+#[cfg(test)]
+mod tests;
+mod tool;
+mod tree;
+mod triangle;
+
+pub use body::{Missing, Near, OwnContact, Part, PartFace};
+pub use clear::{Clearance, Place};
+pub use contour::{Precision, Set};
+pub use faces::{Asked, Faces, own_face, part_of, placed_part, placement};
+pub use inside::Inside;
+pub use proof::{Deepest, LEFTOVER_SHARE, LEFTOVER_SIDE, Leftover, Passes, along, deepest, leftover};
+pub use region::{GROWTH, Made, Request, STEP_MAX};
+pub use tool::{Column, Reason, Tool};
+pub use tree::Block;

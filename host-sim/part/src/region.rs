@@ -1,0 +1,322 @@
+//! The region of a face that a tool finishes: where the face is, and half a step-over around it, as far as nothing is in the way.
+
+use cad::{Face, Placement, polylines};
+use glam::DVec3;
+use oracle::Surface;
+
+use crate::body::Part;
+use crate::clear::Clearance;
+use crate::contour::{Precision, Set};
+use crate::inside::Inside;
+use crate::tool::{Reason, Tool};
+use crate::tree::{Block, Tree};
+use crate::triangle::edge_nearest;
+
+/// Half a step-over, and what is left for the ends of passes.
+pub const GROWTH: f64 = 0.51;
+/// Steps on hollow places are longer than on a plane; by so much at most.
+pub const STEP_MAX: f64 = 2.0;
+/// Places a side at which a face is looked at for its step-over and metric.
+const LOOKS: usize = 24;
+/// Precision of the face's own boundary, mm.
+const EDGE_MM: f64 = 0.002;
+/// How far loops are pulled in, mm: gouges of emitted centres lay within 3.3 um of the loop.
+const INSET_MM: f64 = 0.01;
+/// Distance of chords from the boundary, mm.
+const CHORD_MM: f64 = 0.003;
+/// Farther in for fewer vertices, mm.
+const SIMPLIFY_MM: f64 = 0.01;
+
+/// A side shorter than this is a point, mm.
+const POLE_MM: f64 = 1e-6;
+/// Radius around such a point that no pass enters, in step-overs.
+const POLE_STEPS: f64 = 0.35;
+/// Places a side at which the reach of a face is measured.
+const SIDE: usize = 64;
+/// Least ball that is tried, mm.
+const RADIUS_MIN_MM: f64 = 0.05;
+/// Share of a face that counts as all of it.
+const NEARLY_ALL: f64 = 0.99;
+/// Bisections of the radius.
+const TRIALS: usize = 10;
+/// Places of a face at which a radius is tried.
+const TRIAL_PLACES: usize = 500;
+
+/// What a region is made of.
+pub struct Request<'a> {
+    /// The surface that is machined, placed.
+    pub surface: &'a Surface,
+    /// The trimmed region on it.
+    pub trimmed: &'a [Vec<[f64; 2]>],
+    /// The face as it is in the file.
+    pub face: &'a Face,
+    /// From the file to the machine.
+    pub placement: &'a Placement,
+    /// Sign of the tool's side on `S_u x S_v`.
+    pub sign: f64,
+    /// The tool.
+    pub tool: &'a Tool,
+    /// Scallop height, mm.
+    pub scallop_mm: f64,
+    /// Steepest angle of the surface from the horizontal, degrees.
+    pub steepest_deg: f64,
+    /// How deep the tool may enter the part, mm.
+    pub touch_mm: f64,
+    /// The part on the machine, and the index of the face in it.
+    pub part: Option<(&'a Part, Option<usize>)>,
+}
+
+/// A region.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Made {
+    /// Its polygons.
+    pub loops: Vec<Vec<[f64; 2]>>,
+    /// The area of the trimmed face, mm2.
+    pub area_mm2: f64,
+    /// What of it can be reached, mm2.
+    pub reachable_mm2: f64,
+    /// What cannot, by the first rule that it breaks.
+    pub unreachable_mm2: Vec<(Reason, f64)>,
+    /// What of the reachable area lies in the polygons, mm2.
+    pub inside_mm2: f64,
+    /// The largest ball that reaches 99 % of what is not too steep, mm; `None` if no ball above 0.05 mm does.
+    pub radius_mm: Option<f64>,
+}
+
+/// The edges of the face, to grow it by.
+struct Border {
+    edges: Vec<[DVec3; 2]>,
+    tree: Tree,
+}
+
+impl Border {
+    fn new(face: &Face, by: &Placement) -> Self {
+        let lines = polylines(face, EDGE_MM);
+        let edges: Vec<[DVec3; 2]> = lines
+            .iter()
+            .flat_map(|line| line.windows(2).map(|ends| [by.point(ends[0]), by.point(ends[1])]))
+            .collect();
+        let blocks: Vec<Block> = edges.iter().map(|ends| Block::around(*ends)).collect();
+        Self {
+            tree: Tree::new(&blocks),
+            edges,
+        }
+    }
+
+    fn is_near(&self, point: DVec3, within: f64) -> bool {
+        let mut bound = within;
+        self.tree.nearest(&mut bound, |block| block.distance(point), |index, bound| {
+            let (distance, _) = edge_nearest(point, self.edges[index]);
+            if distance < *bound {
+                *bound = 0.0;
+            }
+        });
+        bound < within
+    }
+}
+
+impl Request<'_> {
+    /// The rules for a place.
+    #[must_use]
+    pub fn clearance(&self) -> Clearance<'_> {
+        Clearance {
+            surface: self.surface,
+            sign: self.sign,
+            tool: self.tool,
+            normal_z_min: (90.0 - self.steepest_deg).to_radians().sin(),
+            touch_mm: self.touch_mm,
+            part: self.part,
+        }
+    }
+
+    /// Largest derivatives and the largest step-over on the face, mm.
+    fn looks(&self, rectangle: [[f64; 2]; 2]) -> ([f64; 2], f64) {
+        let r = self.tool.radius;
+        let plane = (8.0 * r * self.scallop_mm).sqrt();
+        let (mut metric, mut step) = ([1e-9_f64; 2], plane);
+        let clearance = self.clearance();
+        for i in 0..=LOOKS {
+            for j in 0..=LOOKS {
+                let share = |k: usize, n: usize| {
+                    rectangle[k][0] + (rectangle[k][1] - rectangle[k][0]) * n as f64 / LOOKS as f64
+                };
+                let (u, v) = (share(0, i), share(1, j));
+                let at = self.surface.at(u, v);
+                metric = [metric[0].max(at.u.length()), metric[1].max(at.v.length())];
+                let (place, fits) = clearance.place([u, v]);
+                if fits {
+                    let [_, most] = at.principal_curvatures(place.normal);
+                    let share = (1.0 - r * most).max(1.0 / STEP_MAX / STEP_MAX);
+                    step = step.max(plane / share.sqrt());
+                }
+            }
+        }
+        (metric, step)
+    }
+
+    /// What can be reached, without a region: by `side` x `side` places around the face.
+    #[must_use]
+    pub fn reach(&self, side: usize) -> Made {
+        self.shares(&Inside::new(self.trimmed), &self.clearance(), side)
+    }
+
+    /// Makes the region.
+    #[must_use]
+    pub fn make(&self) -> Made {
+        let trimmed = Inside::new(self.trimmed);
+        let domain = self.surface.domain();
+        let (metric, step) = self.looks(domain);
+        // What is beside the face is not known without the part.
+        let grow_mm = if self.part.is_some() { GROWTH * step } else { 0.0 };
+        let rectangle = self.rectangle(domain, metric, grow_mm);
+        let clearance = self.clearance();
+        let mut made = self.shares(&trimmed, &clearance, SIDE);
+        if made.reachable_mm2 == 0.0 && made.area_mm2 > 0.0 && made.unreachable_mm2.iter().all(|(why, _)| *why == Reason::Steep) {
+            return made;
+        }
+        made.radius_mm = self.largest_ball(&trimmed, &made);
+        let border = Border::new(self.face, self.placement);
+        let poles = self.poles(domain);
+        let beside_pole = |point: DVec3| poles.iter().any(|pole| pole.distance(point) < POLE_STEPS * step);
+        let holds = |place: [f64; 2]| {
+            if !poles.is_empty() && beside_pole(self.surface.at(place[0], place[1]).point) {
+                return false;
+            }
+            (trimmed.contains(place)
+                || grow_mm > 0.0 && border.is_near(self.surface.at(place[0], place[1]).point, grow_mm))
+                && clearance.check(place).is_ok()
+        };
+        let set = Set {
+            rectangle,
+            metric,
+            holds: &holds,
+        };
+        made.loops = set.contours(&Precision {
+            grid_mm: 2.0 * (self.tool.radius * self.touch_mm).sqrt(),
+            chord_mm: CHORD_MM,
+            inset_mm: INSET_MM,
+            simplify_mm: SIMPLIFY_MM,
+        });
+        let inside = Inside::new(&made.loops);
+        made.inside_mm2 = self.sum(&trimmed, |place| inside.contains(place) && clearance.check(place).is_ok());
+        made
+    }
+
+    /// Points to which a side of the domain shrinks. A pass on one has no length, and one around it serves it.
+    fn poles(&self, [u, v]: [[f64; 2]; 2]) -> Vec<DVec3> {
+        let mut poles = Vec::new();
+        let share = |[low, high]: [f64; 2], k: usize| low + (high - low) * k as f64 / 4.0;
+        for (along, range, ends) in [(0, u, v), (1, v, u)] {
+            for end in ends {
+                let places: Vec<DVec3> = (0..=4)
+                    .map(|k| if along == 0 { [share(range, k), end] } else { [end, share(range, k)] })
+                    .map(|place| self.surface.at(place[0], place[1]).point)
+                    .collect();
+                if places.iter().all(|point| point.distance(places[0]) < POLE_MM) {
+                    poles.push(places[0]);
+                }
+            }
+        }
+        poles
+    }
+
+    /// The trimmed region's box, grown.
+    fn rectangle(&self, domain: [[f64; 2]; 2], metric: [f64; 2], grow_mm: f64) -> [[f64; 2]; 2] {
+        let places = || self.trimmed.iter().flatten();
+        std::array::from_fn(|k| {
+            let [low, high] = places().fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], place| {
+                [low.min(place[k]), high.max(place[k])]
+            });
+            // The derivative may be shorter where the box ends.
+            let by = 2.0 * grow_mm / metric[k];
+            [(low - by).max(domain[k][0]), (high + by).min(domain[k][1])]
+        })
+    }
+
+    /// Places of the trimmed region in a regular pattern, each with its area.
+    #[must_use]
+    pub fn places(&self, trimmed: &Inside, side: usize) -> Vec<([f64; 2], f64)> {
+        let places = || self.trimmed.iter().flatten();
+        let range: [[f64; 2]; 2] = std::array::from_fn(|k| {
+            places().fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], place| {
+                [low.min(place[k]), high.max(place[k])]
+            })
+        });
+        let cell = (range[0][1] - range[0][0]) * (range[1][1] - range[1][0]) / (side * side) as f64;
+        let mut out = Vec::new();
+        for i in 0..side {
+            for j in 0..side {
+                // Rank-1 lattice of the golden ratio's kin: no row lines up with an edge (R2 sequence, M. Roberts, 2018).
+                let n = (i * side + j) as f64 + 0.5;
+                let share = [(n * 0.754_877_666_246_692_8).fract(), (n * 0.569_840_290_998_053_3).fract()];
+                let place: [f64; 2] =
+                    std::array::from_fn(|k| range[k][0] + share[k] * (range[k][1] - range[k][0]));
+                if trimmed.contains(place) {
+                    let at = self.surface.at(place[0], place[1]);
+                    out.push((place, at.u.cross(at.v).length() * cell));
+                }
+            }
+        }
+        out
+    }
+
+    /// The largest ball that reaches nearly all that is not too steep, by bisection.
+    fn largest_ball(&self, trimmed: &Inside, made: &Made) -> Option<f64> {
+        let steep = |(reason, _): &&(Reason, f64)| *reason == Reason::Steep;
+        let too_steep: f64 = made.unreachable_mm2.iter().filter(steep).map(|(_, area)| area).sum();
+        if made.reachable_mm2 >= NEARLY_ALL * (made.area_mm2 - too_steep) {
+            return Some(self.tool.radius);
+        }
+        let places = self.places(trimmed, SIDE);
+        let every = places.len().div_ceil(TRIAL_PLACES).max(1);
+        let places: Vec<_> = places.into_iter().step_by(every).collect();
+        let reaches = |radius: f64| {
+            let tool = self.tool.with_radius(radius);
+            let clearance = Clearance {
+                tool: &tool,
+                ..self.clearance()
+            };
+            let (mut all, mut reached) = (0.0, 0.0);
+            for (place, area) in &places {
+                match clearance.check(*place) {
+                    Err(Reason::Steep) => {}
+                    Err(_) => all += area,
+                    Ok(()) => {
+                        all += area;
+                        reached += area;
+                    }
+                }
+            }
+            reached >= NEARLY_ALL * all
+        };
+        let (mut low, mut high) = (RADIUS_MIN_MM, self.tool.radius);
+        if !reaches(low) {
+            return None;
+        }
+        for _ in 0..TRIALS {
+            let middle = (low * high).sqrt();
+            if reaches(middle) { low = middle } else { high = middle }
+        }
+        Some(low)
+    }
+
+    fn sum(&self, trimmed: &Inside, holds: impl Fn([f64; 2]) -> bool) -> f64 {
+        let places = self.places(trimmed, SIDE);
+        places.iter().filter(|(place, _)| holds(*place)).map(|(_, area)| area).sum()
+    }
+
+    /// What can be reached, and why not.
+    fn shares(&self, trimmed: &Inside, clearance: &Clearance<'_>, side: usize) -> Made {
+        let mut made = Made::default();
+        let mut lost = [0.0; Reason::ALL.len()];
+        for (place, area) in self.places(trimmed, side) {
+            made.area_mm2 += area;
+            match clearance.check(place) {
+                Ok(()) => made.reachable_mm2 += area,
+                Err(why) => lost[Reason::ALL.iter().position(|reason| *reason == why).unwrap_or(0)] += area,
+            }
+        }
+        made.unreachable_mm2 = Reason::ALL.into_iter().zip(lost).filter(|(_, area)| *area > 0.0).collect();
+        made
+    }
+}
