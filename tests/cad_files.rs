@@ -388,7 +388,10 @@ fn conic_edges_are_read() {
         // The vertices of its region are on the conic.
         let trimmed = made.trimmed.unwrap();
         let form = oracle::Surface::new(&job::SurfaceSpec::Nurbs(made.nurbs));
-        let on = trimmed.iter().flatten().filter(|place| holds(form.at(place[0], place[1]).point).abs() < 1e-6);
+        let on = trimmed
+            .iter()
+            .flatten()
+            .filter(|place| holds(form.at(place[0], place[1]).point).abs() < 1e-6);
         assert!(on.count() > 8, "{curve}: {trimmed:?}");
     }
 }

@@ -5,8 +5,8 @@ use std::path::{Path, PathBuf};
 use std::time::Instant;
 
 use cad::{
-    Axis, Face, Form, JobOptions, MachinableFace, Model, Options, SplineSurface, Surface, machinable, outline, read,
-    write_job,
+    Axis, Face, Form, JobOptions, MachinableFace, Model, Options, SplineSurface, Surface, machinable,
+    outline, read, write_job,
 };
 use glam::DVec3;
 use inspect::BOUNDS;

@@ -255,3 +255,24 @@ fn expected(job: &Prepared) -> Vec<Expected> {
     Machine::load(job).unwrap().run(each).unwrap();
     passes
 }
+
+/// Rows of an interval or two: where the tool does not go along the boundary to the next pass, three rows are enough for the passes of the whole job.
+#[test]
+fn rows_of_an_interval() {
+    for (cut, machine) in &CUTS[..4] {
+        let job = prepare(&bumpy([4, 24], [4.0, 0.6], cut, machine)).unwrap();
+        let wanted = whole(&job);
+        let job = streamed(&job, 3);
+        for late in [None, Some(2)] {
+            let outcome = Streamed::new(&job, room(&job, 3)).run(late);
+            assert_eq!(
+                Outcome {
+                    starved: 0,
+                    ..outcome
+                },
+                wanted,
+                "{cut}, late {late:?}"
+            );
+        }
+    }
+}

@@ -64,7 +64,8 @@ impl Rows {
         within.is_some() && left == 1
     }
 
-    /// Checks a row that is complete, a record at a time, so that a run is not delayed by more than a copy.
+    /// Checks a row that is complete, a record at a time, so that a run is not delayed by more than a copy. Not inlined: the copies would take stack from every other request.
+    #[inline(never)]
     fn check(&mut self, machine: &mut impl Machine) -> Result<(), Reason> {
         if self.digest.value() != self.told {
             #[allow(clippy::cast_precision_loss, reason = "a report; at most 2^20")]

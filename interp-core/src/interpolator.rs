@@ -420,16 +420,18 @@ impl Motion {
             run,
             ..
         } = self;
-        program.release(run.row());
         let job = program.job(store)?;
         let has_limits = job.header.axes.is_some();
-        let row = if has_limits {
-            sequencer.last_row(&job)
+        let rows = if has_limits {
+            sequencer.rows_needed(&job)
         } else {
-            run.last_row(&job)
+            run.rows_needed(&job)
         };
-        let Some(row) = row else { return Ok(false) };
-        if !program.rows().has(row)? {
+        let Some([first, last]) = rows else {
+            return Ok(false);
+        };
+        program.release(first);
+        if !program.rows().has(last)? {
             self.is_starved = true;
         } else if has_limits {
             sequencer.set_has_rows();

@@ -86,7 +86,9 @@ impl Translation<'_> {
         };
         if let Curve::Line { .. } = curve {
             // A line is defined by its ends.
-            return Ok(vec![evenly(EDGE_INTERVALS, |share| start + (end - start) * share)]);
+            return Ok(vec![evenly(EDGE_INTERVALS, |share| {
+                start + (end - start) * share
+            })]);
         }
         let given = edge.carrier.param_range().map(|range| range.get());
         let closed = edge.start == edge.end || start.distance(end) < 1e-9;

@@ -32,10 +32,18 @@ pub(super) fn crossing(surface: &Surface, polygons: &[Polygon], deeper_mm: f64) 
             high[k] = high[k].max(place[k]);
         }
     }
-    #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a few hundred")]
+    #[allow(
+        clippy::cast_possible_truncation,
+        clippy::cast_sign_loss,
+        reason = "a few hundred"
+    )]
     let cells = ((edges.len() as f64).sqrt().ceil() as usize).clamp(1, 128);
     let cell = |place: f64, k: usize| {
-        #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "within the cells")]
+        #[allow(
+            clippy::cast_possible_truncation,
+            clippy::cast_sign_loss,
+            reason = "within the cells"
+        )]
         let index = ((place - low[k]) / (high[k] - low[k]).max(f64::MIN_POSITIVE) * cells as f64) as usize;
         index.min(cells - 1)
     };
@@ -93,6 +101,7 @@ fn depth(first: &Segment, second: &Segment, scale: [f64; 2]) -> f64 {
         let share = ((e[0] * d[0] + e[1] * d[1]) / (d[0] * d[0] + d[1] * d[1])).clamp(0.0, 1.0);
         (e[0] - share * d[0]).hypot(e[1] - share * d[1])
     };
-    let of = |edge: &Segment, other: &Segment| edge.iter().map(|p| from(*p, other)).fold(f64::INFINITY, f64::min);
+    let of =
+        |edge: &Segment, other: &Segment| edge.iter().map(|p| from(*p, other)).fold(f64::INFINITY, f64::min);
     of(first, second).min(of(second, first))
 }

@@ -132,11 +132,19 @@ pub fn write_job(
     if by_region && options.source.is_none() {
         return Err(CadError::face(
             source,
-            format!("the job of face {} must name its file, and cannot name {source:?}", face.number),
+            format!(
+                "the job of face {} must name its file, and cannot name {source:?}",
+                face.number
+            ),
             "give the CAD file a plain name, or machine the whole rectangle around the face with --untrimmed",
         ));
     }
-    if let Some(why) = surface.outline.trimmed.as_ref().filter(|_| surface.trimmed.is_none()) {
+    if let Some(why) = surface
+        .outline
+        .trimmed
+        .as_ref()
+        .filter(|_| surface.trimmed.is_none())
+    {
         warnings.push(if surface.outline.unknown {
             format!("{why}; the whole surface is machined, wherever the face on it ends")
         } else {
@@ -223,7 +231,10 @@ fn text(
         let _ = writeln!(out, "# Note: {}.", one_line(warning));
     }
     out.push('\n');
-    let of_file = options.source.as_ref().filter(|_| options.in_part || surface.trimmed.is_some());
+    let of_file = options
+        .source
+        .as_ref()
+        .filter(|_| options.in_part || surface.trimmed.is_some());
     if let Some((path, tolerance_mm)) = of_file {
         // Its region is made when the job is read.
         let _ = writeln!(
@@ -236,7 +247,8 @@ fn text(
     } else {
         write_surface(&mut out, &surface.nurbs);
     }
-    if let (Form::Fitted { .. }, None, Some((path, tolerance_mm))) = (&surface.form, of_file, &options.source) {
+    if let (Form::Fitted { .. }, None, Some((path, tolerance_mm))) = (&surface.form, of_file, &options.source)
+    {
         let _ = writeln!(
             out,
             "# What the surface approximates: `cargo sim verify` measures against it\nsource = {path:?}\nsource_face = {}\ntolerance_mm = {tolerance_mm}",

@@ -19,31 +19,31 @@ mod error;
 mod exact;
 mod faces;
 mod fit;
+mod interpolation;
+mod invert;
 mod job;
 mod machinable;
 mod measure;
-mod interpolation;
-mod invert;
 mod outline;
 mod placement;
 mod reader;
 mod remap;
 mod spline;
 mod surface;
+#[cfg(test)]
+mod tests;
 mod trim;
 #[cfg(test)]
 mod trim_tests;
-#[cfg(test)]
-mod tests;
 
 pub use curve::Curve;
 pub use error::CadError;
 pub use faces::{Original, model_with, surface_of};
 pub use fit::Deviation;
+pub use interpolation::interpolation_error_mm;
 pub use job::{JobOptions, JobText, machined_sign, write_job};
 pub use machinable::{Form, MachinableFace, Options, degrees, machinable};
 pub use measure::{Measures, measure};
-pub use interpolation::interpolation_error_mm;
 pub use outline::{Outline, outline};
 pub use placement::Placement;
 pub use reader::{Model, read, read_once};

@@ -198,14 +198,16 @@ fn grown(surface: &Surface, rectangle: [[f64; 2]; 2], around_mm: f64) -> [[f64; 
         };
         (low, high) = (low - by(low), high + by(high));
         match (surface.domain()[k], surface.periods()[k]) {
-            (_, Some(period)) if high - low > period => {
-                [middle[k] - 0.5 * period, middle[k] + 0.5 * period]
-            }
+            (_, Some(period)) if high - low > period => [middle[k] - 0.5 * period, middle[k] + 0.5 * period],
             (Some([least, most]), None) => [low.max(least), high.min(most)],
             _ => match surface {
                 Surface::Cone { radius, slope, .. } if k == 1 && *slope != 0.0 => {
                     let apex = -radius / slope;
-                    if middle[1] < apex { [low, high.min(apex)] } else { [low.max(apex), high] }
+                    if middle[1] < apex {
+                        [low, high.min(apex)]
+                    } else {
+                        [low.max(apex), high]
+                    }
                 }
                 _ => [low, high],
             },

@@ -60,24 +60,43 @@ pub(super) fn paths(surface: &Surface, loops: &[Vec<Edge>]) -> Vec<Path> {
     for path in &mut paths {
         path.seam = (0..2).find(|k| {
             let [low, high] = path.extent(*k);
-            let fastest = path.edges.iter().flatten().map(|place| speed(surface, *place, *k)).fold(0.0, f64::max);
+            let fastest = path
+                .edges
+                .iter()
+                .flatten()
+                .map(|place| speed(surface, *place, *k))
+                .fold(0.0, f64::max);
             periods[*k].is_some() && path.winding == [0.0; 2] && (high - low) * fastest <= FOLLOWS_MM
         });
     }
     let middle = |path: &Path, k: usize| path.extent(k).iter().sum::<f64>() * 0.5;
     let Some(largest) = (0..paths.len()).max_by(|a, b| {
-        let size = |path: &Path| if path.seam.is_some() { f64::INFINITY } else { path.area().abs() };
+        let size = |path: &Path| {
+            if path.seam.is_some() {
+                f64::INFINITY
+            } else {
+                path.area().abs()
+            }
+        };
         size(&paths[*a]).total_cmp(&size(&paths[*b]))
     }) else {
         return paths;
     };
     for k in 0..2 {
         let Some(period) = periods[k] else { continue };
-        let home = middle(&paths[largest], k) + if paths[largest].seam == Some(k) { 0.5 * period } else { 0.0 };
+        let home = middle(&paths[largest], k)
+            + if paths[largest].seam == Some(k) {
+                0.5 * period
+            } else {
+                0.0
+            };
         for (index, path) in paths.iter_mut().enumerate() {
             let turns = ((home - middle(path, k)) / period).round();
             if index != largest && path.winding[k] == 0.0 && turns != 0.0 {
-                path.edges.iter_mut().flatten().for_each(|place| place[k] += turns * period);
+                path.edges
+                    .iter_mut()
+                    .flatten()
+                    .for_each(|place| place[k] += turns * period);
             }
         }
     }
@@ -88,7 +107,10 @@ pub(super) fn paths(surface: &Surface, loops: &[Vec<Edge>]) -> Vec<Path> {
 pub(super) fn complementary(surface: &Surface, paths: &[Path], sense: f64) -> bool {
     let (periods, domain) = (surface.periods(), surface.domain());
     let closed = (0..2).any(|k| periods[k].is_some()) && domain.iter().all(Option::is_some);
-    let largest = paths.iter().map(Path::area).max_by(|a, b| a.abs().total_cmp(&b.abs()));
+    let largest = paths
+        .iter()
+        .map(Path::area)
+        .max_by(|a, b| a.abs().total_cmp(&b.abs()));
     closed && paths.iter().all(|path| path.seam.is_none()) && largest.is_some_and(|area| area * sense < 0.0)
 }
 

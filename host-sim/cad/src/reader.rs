@@ -57,7 +57,9 @@ pub fn read(path: &Path) -> Result<Model, CadError> {
 pub fn read_once(path: &Path) -> Result<Arc<Model>, CadError> {
     type Last = Option<(PathBuf, SystemTime, u64, Arc<Model>)>;
     static LAST: Mutex<Last> = Mutex::new(None);
-    let state = std::fs::metadata(path).and_then(|data| Ok((data.modified()?, data.len()))).ok();
+    let state = std::fs::metadata(path)
+        .and_then(|data| Ok((data.modified()?, data.len())))
+        .ok();
     let lock = || LAST.lock().unwrap_or_else(std::sync::PoisonError::into_inner);
     if let (Some((file, modified, length, model)), Some(now)) = (lock().as_ref(), state)
         && (file.as_path(), *modified, *length) == (path, now.0, now.1)

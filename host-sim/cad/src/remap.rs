@@ -100,7 +100,14 @@ impl<'s> Remap<'s> {
         out
     }
 
-    fn edge(&self, surface: &Surface, [a, b]: [[f64; 2]; 2], tolerance_mm: f64, left: u32, out: &mut Polygon) {
+    fn edge(
+        &self,
+        surface: &Surface,
+        [a, b]: [[f64; 2]; 2],
+        tolerance_mm: f64,
+        left: u32,
+        out: &mut Polygon,
+    ) {
         let middle: [f64; 2] = std::array::from_fn(|k| 0.5 * (a[k] + b[k]));
         let (ends, exact) = ([self.at(a), self.at(b)], self.at(middle));
         let at = Periodic::new(surface).at(middle[0], middle[1]);

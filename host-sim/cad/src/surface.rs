@@ -272,7 +272,10 @@ impl Surface {
     /// Parameters of direction k (0: u, 1: v) inside a range at which the surface or one of its first two derivatives may jump.
     #[must_use]
     pub fn joints(&self, k: usize, range: [f64; 2]) -> Vec<f64> {
-        super::exact::joints(self, k, range).into_iter().map(|(t, _)| t).collect()
+        super::exact::joints(self, k, range)
+            .into_iter()
+            .map(|(t, _)| t)
+            .collect()
     }
 
     /// S and its derivatives, with parameters that may lie one period beyond the seam of a closed B-spline.

@@ -93,15 +93,18 @@ pub fn trim(
     let lines: Vec<Polygon> = lines.into_iter().map(unspiked).collect();
     let polygons = match winding(&paths) {
         Winding::None => {
-            let mut polygons: Vec<Polygon> =
-                lines.into_iter().filter(|line| line.len() > 2).collect();
+            let mut polygons: Vec<Polygon> = lines.into_iter().filter(|line| line.len() > 2).collect();
             if polygons.is_empty() || seam_only(&paths) || complementary(surface, &paths, face.sense) {
                 polygons.push(corners(outline.rectangle));
             }
             polygons
         }
         Winding::Along(k) => belts(surface, &lines, &paths, k, face.sense, outline.rectangle)?,
-        Winding::Both => return Err("its boundary winds around the surface both ways".to_owned().into()),
+        Winding::Both => {
+            return Err("its boundary winds around the surface both ways"
+                .to_owned()
+                .into());
+        }
     };
     let inside = within(surface, polygons, outline.rectangle);
     if inside.iter().flatten().flatten().any(|x| !x.is_finite()) {
@@ -220,13 +223,19 @@ impl Halving<'_> {
     }
 
     fn place(&self, index: usize, share: f64, near: [f64; 2]) -> [f64; 2] {
-        self.surface.invert(between(self.points, index, share), Some(near)).0
+        self.surface
+            .invert(between(self.points, index, share), Some(near))
+            .0
     }
 
     /// Distance of the surface's point at a place from its point on the chord, across the chord, mm.
     fn off(&self, place: [f64; 2], on_chord: [f64; 2], ends: [[f64; 2]; 2]) -> f64 {
         let point = |[u, v]: [f64; 2]| self.on.at(u, v).point;
-        let from = if self.in_space { point(ends[0]) } else { point(on_chord) };
+        let from = if self.in_space {
+            point(ends[0])
+        } else {
+            point(on_chord)
+        };
         let gap = point(place) - from;
         let along = (point(ends[1]) - point(ends[0])).normalize_or_zero();
         (gap - along * gap.dot(along)).length()
@@ -241,9 +250,11 @@ fn closed(surface: &Surface, lines: &[Polygon], paths: &[Path]) -> Result<(), Tr
         let (Some(first), Some(last)) = (line.first(), line.last()) else {
             continue;
         };
-        let back: [f64; 2] =
-            std::array::from_fn(|k| last[k] - path.winding[k] * periods[k].unwrap_or(0.0));
-        let gap_mm = on.at(first[0], first[1]).point.distance(on.at(back[0], back[1]).point);
+        let back: [f64; 2] = std::array::from_fn(|k| last[k] - path.winding[k] * periods[k].unwrap_or(0.0));
+        let gap_mm = on
+            .at(first[0], first[1])
+            .point
+            .distance(on.at(back[0], back[1]).point);
         if gap_mm.is_nan() || gap_mm > GAP_MM {
             return Err(format!("a loop of its boundary is open by {gap_mm:.3} mm").into());
         }
@@ -281,7 +292,9 @@ fn belts(
     rectangle: [[f64; 2]; 2],
 ) -> Result<Vec<Polygon>, TrimError> {
     let Some(period) = surface.periods()[k] else {
-        return Err("its boundary winds around a surface that is not closed".to_owned().into());
+        return Err("its boundary winds around a surface that is not closed"
+            .to_owned()
+            .into());
     };
     let ([start, end], [low, high]) = (rectangle[k], rectangle[1 - k]);
     let mut polygons = Vec::new();
@@ -293,7 +306,9 @@ fn belts(
             continue;
         }
         if path.winding[k].abs() != 1.0 {
-            return Err("its boundary winds around the surface more than once".to_owned().into());
+            return Err("its boundary winds around the surface more than once"
+                .to_owned()
+                .into());
         }
         side = path.winding[k] * sense * if k == 0 { 1.0 } else { -1.0 };
         around.push(unrolled(line, path.winding[k], k, period, [start, end]));
@@ -331,22 +346,28 @@ fn unrolled(line: &Polygon, winding: f64, k: usize, period: f64, [start, end]: [
         })
     };
     let first = ((start - line[0][k]) / period).floor();
-    let turns: Polygon = (-1..3).flat_map(|turn| shifted(first + f64::from(turn))).collect();
+    let turns: Polygon = (-1..3)
+        .flat_map(|turn| shifted(first + f64::from(turn)))
+        .collect();
     // From its last way over the start to its first way over the end after that.
-    let crosses = |t: f64| {
-        move |pair: &[[f64; 2]]| pair[0][k] < t && pair[1][k] >= t
-    };
+    let crosses = |t: f64| move |pair: &[[f64; 2]]| pair[0][k] < t && pair[1][k] >= t;
     let at = |pair: &[[f64; 2]], t: f64| -> [f64; 2] {
         let share = (t - pair[0][k]) / (pair[1][k] - pair[0][k]);
-        let mut place: [f64; 2] =
-            std::array::from_fn(|j| pair[0][j] + share * (pair[1][j] - pair[0][j]));
+        let mut place: [f64; 2] = std::array::from_fn(|j| pair[0][j] + share * (pair[1][j] - pair[0][j]));
         place[k] = t;
         place
     };
     let from = turns.windows(2).rposition(crosses(start)).unwrap_or(0);
-    let to = turns[from..].windows(2).position(crosses(end)).map_or(turns.len() - 2, |to| from + to);
+    let to = turns[from..]
+        .windows(2)
+        .position(crosses(end))
+        .map_or(turns.len() - 2, |to| from + to);
     let mut out = vec![at(&turns[from..from + 2], start)];
-    out.extend(turns[from + 1..=to].iter().filter(|place| place[k] > start && place[k] < end));
+    out.extend(
+        turns[from + 1..=to]
+            .iter()
+            .filter(|place| place[k] > start && place[k] < end),
+    );
     out.push(at(&turns[to..to + 2], end));
     out
 }
@@ -426,7 +447,10 @@ fn metric(surface: &Surface, polygon: &Polygon) -> [f64; 2] {
     let on = Periodic::new(surface);
     let next = polygon.iter().cycle().skip(1);
     // Middles of edges, too: all corners may be poles.
-    let places = polygon.iter().zip(next).flat_map(|(a, b)| [*a, [0.5 * (a[0] + b[0]), 0.5 * (a[1] + b[1])]]);
+    let places = polygon
+        .iter()
+        .zip(next)
+        .flat_map(|(a, b)| [*a, [0.5 * (a[0] + b[0]), 0.5 * (a[1] + b[1])]]);
     places.fold([f64::MIN_POSITIVE; 2], |[a, b], place| {
         let at = on.at(place[0], place[1]);
         [a.max(at.u.length()), b.max(at.v.length())]

@@ -31,7 +31,9 @@ fn edge(surface: &Surface, place: impl Fn(f64) -> [f64; 2]) -> Edge {
 }
 
 fn straight(surface: &Surface, from: [f64; 2], to: [f64; 2]) -> Edge {
-    edge(surface, |share| [0, 1].map(|k| from[k] + share * (to[k] - from[k])))
+    edge(surface, |share| {
+        [0, 1].map(|k| from[k] + share * (to[k] - from[k]))
+    })
 }
 
 fn around(surface: &Surface, corners: &[[f64; 2]]) -> Vec<Edge> {
@@ -47,7 +49,10 @@ fn around(surface: &Surface, corners: &[[f64; 2]]) -> Vec<Edge> {
 fn ellipse(surface: &Surface, middle: [f64; 2], half: [f64; 2], turn: f64) -> Vec<Edge> {
     vec![edge(surface, |share| {
         let angle = turn * TAU * share;
-        [middle[0] + half[0] * angle.cos(), middle[1] + half[1] * angle.sin()]
+        [
+            middle[0] + half[0] * angle.cos(),
+            middle[1] + half[1] * angle.sin(),
+        ]
     })]
 }
 
@@ -82,9 +87,8 @@ fn contains(polygons: &[Polygon], [u, v]: [f64; 2]) -> bool {
         let next = polygon.iter().cycle().skip(1);
         polygon.iter().zip(next)
     });
-    let crossed = edges.filter(|([u0, v0], [u1, v1])| {
-        (*v0 <= v) != (*v1 <= v) && u < u0 + (v - v0) * (u1 - u0) / (v1 - v0)
-    });
+    let crossed = edges
+        .filter(|([u0, v0], [u1, v1])| (*v0 <= v) != (*v1 <= v) && u < u0 + (v - v0) * (u1 - u0) / (v1 - v0));
     crossed.count() % 2 == 1
 }
 
@@ -112,7 +116,11 @@ fn traced(face: &Face) -> (Outline, Vec<Polygon>) {
     for place in polygons.iter().flatten() {
         for k in 0..2 {
             let [low, high] = outline.rectangle[k];
-            assert!((low..=high).contains(&place[k]), "{place:?} in {:?}", outline.rectangle);
+            assert!(
+                (low..=high).contains(&place[k]),
+                "{place:?} in {:?}",
+                outline.rectangle
+            );
         }
     }
     (outline, polygons)
@@ -121,7 +129,11 @@ fn traced(face: &Face) -> (Outline, Vec<Polygon>) {
 fn is_area(face: &Face, wanted: f64) -> Vec<Polygon> {
     let (outline, polygons) = traced(face);
     let found = area(&face.surface, &outline, &polygons);
-    assert!((found / wanted - 1.0).abs() < 3e-3, "{}: {found}, {wanted}", face.surface.kind());
+    assert!(
+        (found / wanted - 1.0).abs() < 3e-3,
+        "{}: {found}, {wanted}",
+        face.surface.kind()
+    );
     polygons
 }
 
@@ -137,8 +149,15 @@ fn holes_are_left_out_and_arcs_are_followed() {
     let face = face(plane, loops, 1.0);
     let polygons = is_area(&face, 1200.0 - PI * 36.0 - PI * 40.0);
     assert_eq!(polygons.len(), 3);
-    assert_eq!(polygons[0].len(), 4, "straight edges have no vertices between their ends");
-    let circle = polygons.iter().find(|polygon| polygon.iter().all(|[u, _]| *u < 19.0)).unwrap();
+    assert_eq!(
+        polygons[0].len(),
+        4,
+        "straight edges have no vertices between their ends"
+    );
+    let circle = polygons
+        .iter()
+        .find(|polygon| polygon.iter().all(|[u, _]| *u < 19.0))
+        .unwrap();
     assert!(circle.len() < 140, "{}", circle.len());
     // Vertices and the middles of the edges between them.
     let next = circle.iter().cycle().skip(1);
@@ -161,7 +180,11 @@ fn regions_cross_the_seam() {
     // A whole belt with a window over the seam, and one that ends in a wave.
     let ring = |v: f64, turn: f64| vec![edge(&surface, |share| [0.7 + turn * TAU * share, v])];
     let window = ellipse(&surface, [0.0, 5.0], [0.3, 2.0], -1.0);
-    let belt = face(surface.clone(), vec![ring(0.0, 1.0), ring(10.0, -1.0), window], 1.0);
+    let belt = face(
+        surface.clone(),
+        vec![ring(0.0, 1.0), ring(10.0, -1.0), window],
+        1.0,
+    );
     is_area(&belt, TAU * 100.0 - PI * 3.0 * 2.0);
     let wave = vec![edge(&surface, |share| {
         let u = 0.3 - TAU * share;
@@ -178,7 +201,10 @@ fn regions_cross_the_seam() {
     ]
     .to_vec();
     let window = ellipse(&surface, [3.0, 5.0], [0.3, 2.0], -1.0);
-    is_area(&face(surface.clone(), vec![seamed, window], 1.0), TAU * 100.0 - PI * 3.0 * 2.0);
+    is_area(
+        &face(surface.clone(), vec![seamed, window], 1.0),
+        TAU * 100.0 - PI * 3.0 * 2.0,
+    );
 }
 
 #[test]
@@ -195,9 +221,15 @@ fn poles_are_enclosed() {
     };
     for (turn, sense) in [(1.0, 1.0), (-1.0, -1.0)] {
         let rim: Edge = (0..=256).map(|k| at(k, turn)).collect();
-        is_area(&face(surface.clone(), vec![vec![rim]], sense), TAU * 10.0 * (10.0 - height));
+        is_area(
+            &face(surface.clone(), vec![vec![rim]], sense),
+            TAU * 10.0 * (10.0 - height),
+        );
         let rim: Edge = (0..=256).map(|k| at(k, -turn)).collect();
-        is_area(&face(surface.clone(), vec![vec![rim]], sense), TAU * 10.0 * (10.0 + height));
+        is_area(
+            &face(surface.clone(), vec![vec![rim]], sense),
+            TAU * 10.0 * (10.0 + height),
+        );
     }
     // An octant: two of its edges end at the pole.
     let octant = [
@@ -205,12 +237,18 @@ fn poles_are_enclosed() {
         straight(&surface, [FRAC_PI_2, 0.0], [FRAC_PI_2, FRAC_PI_2]),
         straight(&surface, [0.0, FRAC_PI_2], [0.0, 0.0]),
     ];
-    is_area(&face(surface.clone(), vec![octant.to_vec()], 1.0), 4.0 * PI * 100.0 / 8.0);
+    is_area(
+        &face(surface.clone(), vec![octant.to_vec()], 1.0),
+        4.0 * PI * 100.0 / 8.0,
+    );
     // A whole sphere, of which only a window is missing.
     let window = ellipse(&surface, [2.0, 0.3], [0.2, 0.2], -1.0);
     let (outline, polygons) = traced(&face(surface.clone(), vec![window], 1.0));
     let missing = 4.0 * PI * 100.0 - area(&surface, &outline, &polygons);
-    assert!((missing / (PI * 4.0 * 0.3_f64.cos()) - 1.0).abs() < 0.02, "{missing}");
+    assert!(
+        (missing / (PI * 4.0 * 0.3_f64.cos()) - 1.0).abs() < 0.02,
+        "{missing}"
+    );
 }
 
 /// A face whose edges lie on the boundary of its surface, with a corner cut off; in the parameters of the exact form, too.
@@ -245,7 +283,11 @@ fn polygons_are_those_of_the_exact_form() {
                         .map(f64::abs)
                         .fold(f64::INFINITY, f64::min);
                     assert!(off <= TOLERANCE_MM, "{off} at {u}, {v}");
-                    if share == 0.0 && corners.iter().any(|c| (c[0] - u).abs() < 1e-6 && (c[1] - v).abs() < 1e-6) {
+                    if share == 0.0
+                        && corners
+                            .iter()
+                            .any(|c| (c[0] - u).abs() < 1e-6 && (c[1] - v).abs() < 1e-6)
+                    {
                         corners_met += 1;
                     }
                 }
@@ -268,6 +310,9 @@ fn open_and_crossing_loops_are_refused_with_the_gap() {
         let error = trim(&face, &found, None, TOLERANCE_MM).unwrap_err();
         assert!(error.what.contains(words), "{}", error.what);
         let refused = machinable("part.step", &face, &Options::default()).unwrap_err();
-        assert!(refused.what.contains(words) && refused.remedy.contains("--untrimmed"), "{refused}");
+        assert!(
+            refused.what.contains(words) && refused.remedy.contains("--untrimmed"),
+            "{refused}"
+        );
     }
 }

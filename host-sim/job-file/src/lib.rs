@@ -30,7 +30,8 @@ use patches::placement::Placement;
 use section::{Reader, Section};
 
 pub use file::{
-    Face, FaceError, FaceReader, FaceRegion, FaceSurface, PART_TOLERANCE_MM, STEEPEST_DEG, TOLERANCE_DEFAULT_MM, TOLERANCE_MAX_MM,
+    Face, FaceError, FaceReader, FaceRegion, FaceSurface, PART_TOLERANCE_MM, STEEPEST_DEG,
+    TOLERANCE_DEFAULT_MM, TOLERANCE_MAX_MM,
 };
 pub use steps::slots_max_us;
 
@@ -130,7 +131,11 @@ fn parse_on(
         Some(section) => Some(file::part(&section)?),
         None => None,
     };
-    let around_mm = if part.is_some() { around_mm(&document)? } else { 0.0 };
+    let around_mm = if part.is_some() {
+        around_mm(&document)?
+    } else {
+        0.0
+    };
     let (of_face, face) = surface::read(&document.section("surface")?, faces, around_mm)?;
     let (unplaced, trimmed) = (of_face.surface, of_face.trimmed);
     let (surface, placement) = match document.optional_section("placement")? {

@@ -52,7 +52,10 @@ pub(super) fn read(
     faces: &dyn FaceReader,
     around_mm: f64,
 ) -> Result<(FaceSurface, Option<Face>), JobError> {
-    let whole = |surface: SurfaceSpec| FaceSurface { surface, trimmed: false };
+    let whole = |surface: SurfaceSpec| FaceSurface {
+        surface,
+        trimmed: false,
+    };
     let kind = section.choice(
         "kind",
         &[
@@ -68,7 +71,9 @@ pub(super) fn read(
         Kind::Ruled => Ok((whole(ruled(section)?), None)),
         Kind::Bicubic => Ok((whole(bicubic(section)?), None)),
         Kind::Nurbs => Ok((whole(nurbs(section)?), crate::file::source(section)?)),
-        Kind::File => crate::file::read(section, &KEYS, faces, around_mm).map(|(surface, face)| (surface, Some(face))),
+        Kind::File => {
+            crate::file::read(section, &KEYS, faces, around_mm).map(|(surface, face)| (surface, Some(face)))
+        }
     }
 }
 

@@ -111,7 +111,9 @@ impl Part {
             .enumerate()
             .map(|(index, face)| {
                 let lines = polylines(&face.face, EDGE_MM);
-                let edges = lines.iter().flat_map(|line| line.windows(2).map(|ends| [ends[0], ends[1]]));
+                let edges = lines
+                    .iter()
+                    .flat_map(|line| line.windows(2).map(|ends| [ends[0], ends[1]]));
                 (cells(index as u32, face), edges.collect())
             })
             .collect();
@@ -172,10 +174,18 @@ impl Part {
             }
             let cell = &self.cells[index];
             let face = cell.face as usize;
-            let skip = own.filter(|own| own.face == face).map(|own| (own.place, own.radius));
+            let skip = own
+                .filter(|own| own.face == face)
+                .map(|own| (own.place, own.radius));
             let measure = FromPoint { point, skip };
-            if cell.lower(&measure, &self.faces[face].inside, bound, any).is_some() {
-                found = Some(Near { distance: *bound, face });
+            if cell
+                .lower(&measure, &self.faces[face].inside, bound, any)
+                .is_some()
+            {
+                found = Some(Near {
+                    distance: *bound,
+                    face,
+                });
             }
         });
         found
@@ -194,7 +204,10 @@ impl Part {
             let (ends, face) = self.edges[index];
             if let Some(distance) = edge_beside(point, ends, z).filter(|distance| *distance < *bound) {
                 *bound = distance;
-                found = Some(Near { distance, face: face as usize });
+                found = Some(Near {
+                    distance,
+                    face: face as usize,
+                });
             }
         });
         if any && found.is_some() {
@@ -207,8 +220,14 @@ impl Part {
             }
             let cell = &self.cells[index];
             let face = cell.face as usize;
-            if cell.lower(&measure, &self.faces[face].inside, bound, any).is_some() {
-                found = Some(Near { distance: *bound, face });
+            if cell
+                .lower(&measure, &self.faces[face].inside, bound, any)
+                .is_some()
+            {
+                found = Some(Near {
+                    distance: *bound,
+                    face,
+                });
             }
         });
         found

@@ -59,12 +59,16 @@ impl Measure for FromPoint {
 
     fn ignores(&self, corners: &[[DVec3; 2]; 2], slack: f64) -> bool {
         self.skip.is_some_and(|(place, radius)| {
-            corners.iter().flatten().all(|corner| corner.distance(place) + slack < radius)
+            corners
+                .iter()
+                .flatten()
+                .all(|corner| corner.distance(place) + slack < radius)
         })
     }
 
     fn ignores_point(&self, point: DVec3) -> bool {
-        self.skip.is_some_and(|(place, radius)| point.distance(place) < radius)
+        self.skip
+            .is_some_and(|(place, radius)| point.distance(place) < radius)
     }
 }
 
@@ -85,8 +89,12 @@ impl Cell {
     pub(crate) fn new(face: u32, uv: [[f64; 2]; 2], points: [[DVec3; 3]; 3], is_cut: bool) -> Self {
         let p = &points;
         let bend = |a: DVec3, b: DVec3, c: DVec3| 4.0 * (a - 2.0 * b + c).length();
-        let in_u = (0..3).map(|j| bend(p[0][j], p[1][j], p[2][j])).fold(0.0, f64::max);
-        let in_v = (0..3).map(|i| bend(p[i][0], p[i][1], p[i][2])).fold(0.0, f64::max);
+        let in_u = (0..3)
+            .map(|j| bend(p[0][j], p[1][j], p[2][j]))
+            .fold(0.0, f64::max);
+        let in_v = (0..3)
+            .map(|i| bend(p[i][0], p[i][1], p[i][2]))
+            .fold(0.0, f64::max);
         let twist = (0..4)
             .map(|k| (k / 2, k % 2))
             .map(|(i, j)| 4.0 * (p[i + 1][j + 1] - p[i + 1][j] - p[i][j + 1] + p[i][j]).length())
@@ -105,8 +113,12 @@ impl Cell {
         let p = &self.points;
         let bend = |a: DVec3, b: DVec3, c: DVec3| (a - 2.0 * b + c).length();
         [
-            (0..3).map(|j| bend(p[0][j], p[1][j], p[2][j])).fold(0.0, f64::max),
-            (0..3).map(|i| bend(p[i][0], p[i][1], p[i][2])).fold(0.0, f64::max),
+            (0..3)
+                .map(|j| bend(p[0][j], p[1][j], p[2][j]))
+                .fold(0.0, f64::max),
+            (0..3)
+                .map(|i| bend(p[i][0], p[i][1], p[i][2]))
+                .fold(0.0, f64::max),
         ]
     }
 
@@ -114,8 +126,12 @@ impl Cell {
     pub(crate) fn sizes(&self) -> [f64; 2] {
         let p = &self.points;
         [
-            (0..3).map(|j| p[0][j].distance(p[1][j]) + p[1][j].distance(p[2][j])).fold(0.0, f64::max),
-            (0..3).map(|i| p[i][0].distance(p[i][1]) + p[i][1].distance(p[i][2])).fold(0.0, f64::max),
+            (0..3)
+                .map(|j| p[0][j].distance(p[1][j]) + p[1][j].distance(p[2][j]))
+                .fold(0.0, f64::max),
+            (0..3)
+                .map(|i| p[i][0].distance(p[i][1]) + p[i][1].distance(p[i][2]))
+                .fold(0.0, f64::max),
         ]
     }
 
@@ -127,15 +143,29 @@ impl Cell {
 
     /// Its point at `[s, t]`, each 0 to 1.
     pub(crate) fn at(&self, [s, t]: [f64; 2]) -> DVec3 {
-        let of = |x: f64| [(1.0 - x) * (1.0 - 2.0 * x), 4.0 * x * (1.0 - x), x * (2.0 * x - 1.0)];
+        let of = |x: f64| {
+            [
+                (1.0 - x) * (1.0 - 2.0 * x),
+                4.0 * x * (1.0 - x),
+                x * (2.0 * x - 1.0),
+            ]
+        };
         let (in_u, in_v) = (of(s), of(t));
-        let row = |i: usize| self.points[i][0] * in_v[0] + self.points[i][1] * in_v[1] + self.points[i][2] * in_v[2];
+        let row = |i: usize| {
+            self.points[i][0] * in_v[0] + self.points[i][1] * in_v[1] + self.points[i][2] * in_v[2]
+        };
         row(0) * in_u[0] + row(1) * in_u[1] + row(2) * in_u[2]
     }
 
     /// Lowers `best` to the distance of the cell's part within the trimmed region, if that is below it. `any`: a distance below the first bound will do.
     /// Returns the nearest place, if it was lowered.
-    pub(crate) fn lower(&self, measure: &impl Measure, inside: &Inside, best: &mut f64, any: bool) -> Option<[f64; 2]> {
+    pub(crate) fn lower(
+        &self,
+        measure: &impl Measure,
+        inside: &Inside,
+        best: &mut f64,
+        any: bool,
+    ) -> Option<[f64; 2]> {
         let p = &self.points;
         let whole = Quad {
             from: [0.0; 2],
@@ -196,9 +226,8 @@ impl Cell {
             return;
         }
         let half = 0.5 * quad.size;
-        let at_half = |i: usize, j: usize| {
-            self.at([quad.from[0] + half * i as f64, quad.from[1] + half * j as f64])
-        };
+        let at_half =
+            |i: usize, j: usize| self.at([quad.from[0] + half * i as f64, quad.from[1] + half * j as f64]);
         let (left, right) = (at_half(0, 1), at_half(2, 1));
         let (bottom, top, middle) = (at_half(1, 0), at_half(1, 2), at_half(1, 1));
         let nodes = [[a, left, b], [bottom, middle, top], [c, right, d]];
@@ -209,7 +238,10 @@ impl Cell {
             let quarter = Quad {
                 from: [quad.from[0] + half * i as f64, quad.from[1] + half * j as f64],
                 size: half,
-                corners: [[nodes[i][j], nodes[i][j + 1]], [nodes[i + 1][j], nodes[i + 1][j + 1]]],
+                corners: [
+                    [nodes[i][j], nodes[i][j + 1]],
+                    [nodes[i + 1][j], nodes[i + 1][j + 1]],
+                ],
                 deviation: 0.25 * quad.deviation,
             };
             self.visit(&quarter, measure, inside, best, any, found);

@@ -86,7 +86,10 @@ impl Clearance<'_> {
             radius: OWN_SHARE * self.tool.radius,
         });
         let depth = DEPTH_SHARE * self.touch_mm;
-        if part.nearest(centre, self.tool.radius - depth, own.as_ref(), true).is_some() {
+        if part
+            .nearest(centre, self.tool.radius - depth, own.as_ref(), true)
+            .is_some()
+        {
             return Err(Reason::Ball);
         }
         for column in &self.tool.columns {

@@ -58,7 +58,11 @@ impl Set<'_> {
         let at = |k: usize, index: usize| {
             let [low, high] = self.rectangle[k];
             let index = index.clamp(1, counts[k] + 1) - 1;
-            if index == counts[k] { high } else { low + (high - low) * index as f64 / counts[k] as f64 }
+            if index == counts[k] {
+                high
+            } else {
+                low + (high - low) * index as f64 / counts[k] as f64
+            }
         };
         [at(0, i), at(1, j)]
     }
@@ -67,7 +71,11 @@ impl Set<'_> {
         let size = |k: usize| (self.rectangle[k][1] - self.rectangle[k][0]) * self.metric[k];
         let wanted = (size(0) / spacing).ceil() * (size(1) / spacing).ceil();
         let spacing = spacing * (wanted / PLACES_MAX as f64).max(1.0).sqrt();
-        #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "at most a few million")]
+        #[allow(
+            clippy::cast_possible_truncation,
+            clippy::cast_sign_loss,
+            reason = "at most a few million"
+        )]
         let counts = [0, 1].map(|k| ((size(k) / spacing).ceil() as usize).clamp(8, PLACES_MAX));
         let mut grid = Grid {
             counts,
@@ -109,7 +117,10 @@ impl Set<'_> {
     fn beside(&self, from: Place, a: Place, b: Place, by: f64) -> Place {
         let (du, dv) = ((b[0] - a[0]) * self.metric[0], (b[1] - a[1]) * self.metric[1]);
         let length = du.hypot(dv).max(f64::MIN_POSITIVE);
-        let moved = [from[0] - by * dv / length / self.metric[0], from[1] + by * du / length / self.metric[1]];
+        let moved = [
+            from[0] - by * dv / length / self.metric[0],
+            from[1] + by * du / length / self.metric[1],
+        ];
         std::array::from_fn(|k| moved[k].clamp(self.rectangle[k][0], self.rectangle[k][1]))
     }
 
@@ -125,12 +136,20 @@ impl Set<'_> {
                 let mut fine = Vec::new();
                 for (index, a) in rough.iter().enumerate() {
                     fine.push(*a);
-                    self.chord(*a, rough[(index + 1) % rough.len()], step, precision.chord_mm, HALVINGS, &mut fine);
+                    self.chord(
+                        *a,
+                        rough[(index + 1) % rough.len()],
+                        step,
+                        precision.chord_mm,
+                        HALVINGS,
+                        &mut fine,
+                    );
                 }
                 fine.dedup();
                 let pulled = self.pulled_in(&fine, precision.inset_mm);
                 let simple = self.simplified(&pulled, precision);
-                (simple.len() > 2 && self.area(&simple).abs() > precision.inset_mm * precision.grid_mm).then_some(simple)
+                (simple.len() > 2 && self.area(&simple).abs() > precision.inset_mm * precision.grid_mm)
+                    .then_some(simple)
             })
             .collect()
     }
@@ -138,7 +157,11 @@ impl Set<'_> {
     /// Area, mm2 by the metric, positive for a polygon with the set inside of it.
     fn area(&self, polygon: &[Place]) -> f64 {
         let next = polygon.iter().cycle().skip(1);
-        let sum: f64 = polygon.iter().zip(next).map(|(a, b)| 0.5 * (a[0] * b[1] - b[0] * a[1])).sum();
+        let sum: f64 = polygon
+            .iter()
+            .zip(next)
+            .map(|(a, b)| 0.5 * (a[0] * b[1] - b[0] * a[1]))
+            .sum();
         sum * self.metric[0] * self.metric[1]
     }
 
@@ -151,7 +174,12 @@ impl Set<'_> {
         let mut starts = Vec::new();
         for j in 0..nv + 2 {
             for i in 0..nu + 2 {
-                let corners = [grid.at(i, j), grid.at(i + 1, j), grid.at(i + 1, j + 1), grid.at(i, j + 1)];
+                let corners = [
+                    grid.at(i, j),
+                    grid.at(i + 1, j),
+                    grid.at(i + 1, j + 1),
+                    grid.at(i, j + 1),
+                ];
                 if corners == [true; 4] || corners == [false; 4] {
                     continue;
                 }
@@ -161,13 +189,22 @@ impl Set<'_> {
                 let enters: Vec<usize> = (0..4).filter(|k| !corners[*k] && corners[(k + 1) % 4]).collect();
                 let leaves: Vec<usize> = (0..4).filter(|k| corners[*k] && !corners[(k + 1) % 4]).collect();
                 let is_joined = enters.len() == 2 && {
-                    let (a, b) = (self.place(grid.counts, i, j), self.place(grid.counts, i + 1, j + 1));
+                    let (a, b) = (
+                        self.place(grid.counts, i, j),
+                        self.place(grid.counts, i + 1, j + 1),
+                    );
                     (self.holds)([0.5 * (a[0] + b[0]), 0.5 * (a[1] + b[1])])
                 };
                 for leave in &leaves {
                     // With the set on the left, the line enters the cell where the set ends, counter-clockwise, and leaves it where the set begins: after it, or,
                     // if the two corners of the set are apart, before it.
-                    let turn = |k: &&usize| if is_joined { (**k + 4 - leave) % 4 } else { (leave + 4 - **k) % 4 };
+                    let turn = |k: &&usize| {
+                        if is_joined {
+                            (**k + 4 - leave) % 4
+                        } else {
+                            (leave + 4 - **k) % 4
+                        }
+                    };
                     if let Some(enter) = enters.iter().min_by_key(turn) {
                         next.insert(edges[*leave], edges[*enter]);
                         starts.push(edges[*leave]);
@@ -180,7 +217,11 @@ impl Set<'_> {
             let (i, j) = (index % width, index / width);
             let ends = [(i, j), (i + 1 - along_v, j + along_v)];
             let [a, b] = ends.map(|(i, j)| self.place(grid.counts, i, j));
-            if grid.at(ends[0].0, ends[0].1) { self.bisected(a, b) } else { self.bisected(b, a) }
+            if grid.at(ends[0].0, ends[0].1) {
+                self.bisected(a, b)
+            } else {
+                self.bisected(b, a)
+            }
         };
         let mut loops = Vec::new();
         for start in starts {
@@ -215,7 +256,11 @@ impl Set<'_> {
         if (self.holds)(far) == is_in {
             return;
         }
-        let found = if is_in { self.bisected(middle, far) } else { self.bisected(far, middle) };
+        let found = if is_in {
+            self.bisected(middle, far)
+        } else {
+            self.bisected(far, middle)
+        };
         if self.length(found, middle) <= chord_mm && is_in {
             return;
         }
@@ -229,11 +274,17 @@ impl Set<'_> {
         let count = polygon.len();
         (0..count)
             .map(|index| {
-                let (before, here, after) =
-                    (polygon[(index + count - 1) % count], polygon[index], polygon[(index + 1) % count]);
+                let (before, here, after) = (
+                    polygon[(index + count - 1) % count],
+                    polygon[index],
+                    polygon[(index + 1) % count],
+                );
                 let unit = |a: Place, b: Place| {
                     let length = self.length(a, b).max(f64::MIN_POSITIVE);
-                    [-(b[1] - a[1]) * self.metric[1] / length, (b[0] - a[0]) * self.metric[0] / length]
+                    [
+                        -(b[1] - a[1]) * self.metric[1] / length,
+                        (b[0] - a[0]) * self.metric[0] / length,
+                    ]
                 };
                 let (m, n) = (unit(before, here), unit(here, after));
                 let sum = [m[0] + n[0], m[1] + n[1]];
@@ -241,7 +292,11 @@ impl Set<'_> {
                 std::array::from_fn(|k| {
                     let [low, high] = self.rectangle[k];
                     let on_side = here[k] == low || here[k] == high;
-                    if on_side { here[k] } else { (here[k] + share * sum[k] / self.metric[k]).clamp(low, high) }
+                    if on_side {
+                        here[k]
+                    } else {
+                        (here[k] + share * sum[k] / self.metric[k]).clamp(low, high)
+                    }
                 })
             })
             .collect()

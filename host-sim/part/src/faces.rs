@@ -38,7 +38,8 @@ impl FaceReader for Faces {
         let Some(source) = job.origin.cad() else {
             return Err(FaceError {
                 what: "the surface is of no CAD file, so that its place in the part is not known".to_owned(),
-                remedy: "give the face of the part: [surface] kind = \"file\", path, face; or remove [part]".to_owned(),
+                remedy: "give the face of the part: [surface] kind = \"file\", path, face; or remove [part]"
+                    .to_owned(),
                 of_face: false,
             });
         };
@@ -166,7 +167,10 @@ fn same_file(a: &Path, b: &Path) -> bool {
 /// Index of a job's face in its part.
 #[must_use]
 pub fn own_face(job: &Job, part: &Part, of: &PartSource) -> Option<usize> {
-    let source = job.origin.cad().filter(|source| same_file(&source.path, &of.path))?;
+    let source = job
+        .origin
+        .cad()
+        .filter(|source| same_file(&source.path, &of.path))?;
     part.index(source.face)
 }
 

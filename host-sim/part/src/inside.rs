@@ -23,9 +23,12 @@ impl Inside {
                 polygon.iter().zip(next).map(|(a, b)| [*a, *b])
             })
             .collect();
-        let v = edges.iter().flatten().fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], place| {
-            [low.min(place[1]), high.max(place[1])]
-        });
+        let v = edges
+            .iter()
+            .flatten()
+            .fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], place| {
+                [low.min(place[1]), high.max(place[1])]
+            });
         let mut found = Self {
             strips: vec![Vec::new(); edges.len().clamp(1, STRIPS_MAX)],
             edges: Vec::new(),
@@ -41,7 +44,11 @@ impl Inside {
         found
     }
 
-    #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "clamped to the strips")]
+    #[allow(
+        clippy::cast_possible_truncation,
+        clippy::cast_sign_loss,
+        reason = "clamped to the strips"
+    )]
     fn strip(&self, v: f64) -> usize {
         let count = self.strips.len();
         let share = (v - self.v[0]) / (self.v[1] - self.v[0]).max(f64::MIN_POSITIVE);

@@ -70,7 +70,11 @@ pub fn along(way: &[DVec3]) -> Vec<DVec3> {
     let mut places: Vec<DVec3> = way.first().copied().into_iter().collect();
     for ends in way.windows(2) {
         let steps = (ends[0].distance(ends[1]) / STEP_MM).ceil().max(1.0);
-        #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a few thousand")]
+        #[allow(
+            clippy::cast_possible_truncation,
+            clippy::cast_sign_loss,
+            reason = "a few thousand"
+        )]
         let count = steps.min(1e5) as usize;
         places.extend((1..=count).map(|k| ends[0].lerp(ends[1], k as f64 / count as f64)));
     }
@@ -114,39 +118,53 @@ impl Passes {
     pub fn height(&self, place: DVec3, normal: DVec3, radius: f64) -> f64 {
         let mut least = f64::INFINITY;
         let mut bound = 1.5 * radius;
-        self.tree.nearest(&mut bound, |block| block.distance(place), |index, bound| {
-            let (distance, centre) = edge_nearest(place, self.pieces[index]);
-            if distance >= *bound {
-                return;
-            }
-            // The normal enters the ball around the nearest centre at this height.
-            let from = centre - place;
-            let along = from.dot(normal);
-            let square = along * along - (distance * distance - radius * radius);
-            if square >= 0.0 {
-                least = least.min((along - square.sqrt()).max(0.0));
-            }
-            // Centres farther than the radius and what is left cannot lower it; one step of slack for the slant.
-            *bound = bound.min(distance + 0.2 * radius);
-        });
+        self.tree.nearest(
+            &mut bound,
+            |block| block.distance(place),
+            |index, bound| {
+                let (distance, centre) = edge_nearest(place, self.pieces[index]);
+                if distance >= *bound {
+                    return;
+                }
+                // The normal enters the ball around the nearest centre at this height.
+                let from = centre - place;
+                let along = from.dot(normal);
+                let square = along * along - (distance * distance - radius * radius);
+                if square >= 0.0 {
+                    least = least.min((along - square.sqrt()).max(0.0));
+                }
+                // Centres farther than the radius and what is left cannot lower it; one step of slack for the slant.
+                *bound = bound.min(distance + 0.2 * radius);
+            },
+        );
         least
     }
 }
 
 /// What the passes leave on a face: at places with their areas, all of the trimmed face.
 #[must_use]
-pub fn leftover(clearance: &Clearance<'_>, places: &[([f64; 2], f64)], passes: &Passes, limit_mm: f64) -> Leftover {
+pub fn leftover(
+    clearance: &Clearance<'_>,
+    places: &[([f64; 2], f64)],
+    passes: &Passes,
+    limit_mm: f64,
+) -> Leftover {
     let heights: Vec<Option<(f64, DVec3)>> = places
         .par_iter()
         .map(|(uv, _)| {
             clearance.check(*uv).ok()?;
             let (place, _) = clearance.place(*uv);
-            Some((passes.height(place.point, place.normal, clearance.tool.radius), place.point))
+            Some((
+                passes.height(place.point, place.normal, clearance.tool.radius),
+                place.point,
+            ))
         })
         .collect();
     let mut found = Leftover::default();
     for ((uv, area), height) in places.iter().zip(heights) {
-        let Some((height, place_mm)) = height else { continue };
+        let Some((height, place_mm)) = height else {
+            continue;
+        };
         found.reachable_mm2 += area;
         if height <= (1.0 + LEFTOVER_SHARE) * limit_mm {
             found.within_mm2 += area;

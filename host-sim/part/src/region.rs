@@ -105,12 +105,16 @@ impl Border {
 
     fn is_near(&self, point: DVec3, within: f64) -> bool {
         let mut bound = within;
-        self.tree.nearest(&mut bound, |block| block.distance(point), |index, bound| {
-            let (distance, _) = edge_nearest(point, self.edges[index]);
-            if distance < *bound {
-                *bound = 0.0;
-            }
-        });
+        self.tree.nearest(
+            &mut bound,
+            |block| block.distance(point),
+            |index, bound| {
+                let (distance, _) = edge_nearest(point, self.edges[index]);
+                if distance < *bound {
+                    *bound = 0.0;
+                }
+            },
+        );
         bound < within
     }
 }
@@ -171,7 +175,10 @@ impl Request<'_> {
         let rectangle = self.rectangle(domain, metric, grow_mm);
         let clearance = self.clearance();
         let mut made = self.shares(&trimmed, &clearance, SIDE);
-        if made.reachable_mm2 == 0.0 && made.area_mm2 > 0.0 && made.unreachable_mm2.iter().all(|(why, _)| *why == Reason::Steep) {
+        if made.reachable_mm2 == 0.0
+            && made.area_mm2 > 0.0
+            && made.unreachable_mm2.iter().all(|(why, _)| *why == Reason::Steep)
+        {
             return made;
         }
         made.radius_mm = self.largest_ball(&trimmed, &made);
@@ -198,7 +205,9 @@ impl Request<'_> {
             simplify_mm: SIMPLIFY_MM,
         });
         let inside = Inside::new(&made.loops);
-        made.inside_mm2 = self.sum(&trimmed, |place| inside.contains(place) && clearance.check(place).is_ok());
+        made.inside_mm2 = self.sum(&trimmed, |place| {
+            inside.contains(place) && clearance.check(place).is_ok()
+        });
         made
     }
 
@@ -209,7 +218,13 @@ impl Request<'_> {
         for (along, range, ends) in [(0, u, v), (1, v, u)] {
             for end in ends {
                 let places: Vec<DVec3> = (0..=4)
-                    .map(|k| if along == 0 { [share(range, k), end] } else { [end, share(range, k)] })
+                    .map(|k| {
+                        if along == 0 {
+                            [share(range, k), end]
+                        } else {
+                            [end, share(range, k)]
+                        }
+                    })
                     .map(|place| self.surface.at(place[0], place[1]).point)
                     .collect();
                 if places.iter().all(|point| point.distance(places[0]) < POLE_MM) {
@@ -248,7 +263,10 @@ impl Request<'_> {
             for j in 0..side {
                 // Rank-1 lattice of the golden ratio's kin: no row lines up with an edge (R2 sequence, M. Roberts, 2018).
                 let n = (i * side + j) as f64 + 0.5;
-                let share = [(n * 0.754_877_666_246_692_8).fract(), (n * 0.569_840_290_998_053_3).fract()];
+                let share = [
+                    (n * 0.754_877_666_246_692_8).fract(),
+                    (n * 0.569_840_290_998_053_3).fract(),
+                ];
                 let place: [f64; 2] =
                     std::array::from_fn(|k| range[k][0] + share[k] * (range[k][1] - range[k][0]));
                 if trimmed.contains(place) {
@@ -263,7 +281,12 @@ impl Request<'_> {
     /// The largest ball that reaches nearly all that is not too steep, by bisection.
     fn largest_ball(&self, trimmed: &Inside, made: &Made) -> Option<f64> {
         let steep = |(reason, _): &&(Reason, f64)| *reason == Reason::Steep;
-        let too_steep: f64 = made.unreachable_mm2.iter().filter(steep).map(|(_, area)| area).sum();
+        let too_steep: f64 = made
+            .unreachable_mm2
+            .iter()
+            .filter(steep)
+            .map(|(_, area)| area)
+            .sum();
         if made.reachable_mm2 >= NEARLY_ALL * (made.area_mm2 - too_steep) {
             return Some(self.tool.radius);
         }
@@ -295,14 +318,22 @@ impl Request<'_> {
         }
         for _ in 0..TRIALS {
             let middle = (low * high).sqrt();
-            if reaches(middle) { low = middle } else { high = middle }
+            if reaches(middle) {
+                low = middle
+            } else {
+                high = middle
+            }
         }
         Some(low)
     }
 
     fn sum(&self, trimmed: &Inside, holds: impl Fn([f64; 2]) -> bool) -> f64 {
         let places = self.places(trimmed, SIDE);
-        places.iter().filter(|(place, _)| holds(*place)).map(|(_, area)| area).sum()
+        places
+            .iter()
+            .filter(|(place, _)| holds(*place))
+            .map(|(_, area)| area)
+            .sum()
     }
 
     /// What can be reached, and why not.
@@ -316,7 +347,11 @@ impl Request<'_> {
                 Err(why) => lost[Reason::ALL.iter().position(|reason| *reason == why).unwrap_or(0)] += area,
             }
         }
-        made.unreachable_mm2 = Reason::ALL.into_iter().zip(lost).filter(|(_, area)| *area > 0.0).collect();
+        made.unreachable_mm2 = Reason::ALL
+            .into_iter()
+            .zip(lost)
+            .filter(|(_, area)| *area > 0.0)
+            .collect();
         made
     }
 }

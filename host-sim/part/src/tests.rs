@@ -54,14 +54,29 @@ fn boss(number: usize, radius: f64, z: [f64; 2]) -> Face {
         y: radius * DVec3::Y,
         z: DVec3::Z,
     };
-    face(number, side, vec![circle(radius, z[0], 1.0), circle(radius, z[1], -1.0)], 1.0)
+    face(
+        number,
+        side,
+        vec![circle(radius, z[0], 1.0), circle(radius, z[1], -1.0)],
+        1.0,
+    )
 }
 
 /// A plate of 60 x 60 mm with a boss in its middle: plate, side, top.
 fn plate(radius: f64, height: f64) -> Vec<Face> {
-    let corners = [dvec3(-30.0, -30.0, 0.0), dvec3(30.0, -30.0, 0.0), dvec3(30.0, 30.0, 0.0), dvec3(-30.0, 30.0, 0.0)];
+    let corners = [
+        dvec3(-30.0, -30.0, 0.0),
+        dvec3(30.0, -30.0, 0.0),
+        dvec3(30.0, 30.0, 0.0),
+        dvec3(-30.0, 30.0, 0.0),
+    ];
     vec![
-        face(1, plane(0.0), vec![polygon(&corners), circle(radius, 0.0, -1.0)], 1.0),
+        face(
+            1,
+            plane(0.0),
+            vec![polygon(&corners), circle(radius, 0.0, -1.0)],
+            1.0,
+        ),
         boss(2, radius, [0.0, height]),
         face(3, plane(height), vec![circle(radius, height, 1.0)], 1.0),
     ]
@@ -74,7 +89,10 @@ fn flat(low: f64, high: f64, height: impl Fn(f64, f64) -> f64) -> oracle::Surfac
         degree: [1, 1],
         knots_u: vec![low, low, high, high],
         knots_v: vec![low, low, high, high],
-        poles_mm: vec![vec![pole(low, low), pole(low, high)], vec![pole(high, low), pole(high, high)]],
+        poles_mm: vec![
+            vec![pole(low, low), pole(low, high)],
+            vec![pole(high, low), pole(high, high)],
+        ],
         rational: false,
     }))
 }
@@ -103,19 +121,31 @@ fn trimmed(radius: f64) -> Vec<Vec<[f64; 2]>> {
         let angle = f64::from(k) / 720.0 * TAU;
         [radius * angle.cos(), radius * angle.sin()]
     });
-    vec![vec![[-30.0, -30.0], [30.0, -30.0], [30.0, 30.0], [-30.0, 30.0]], hole.collect()]
+    vec![
+        vec![[-30.0, -30.0], [30.0, -30.0], [30.0, 30.0], [-30.0, 30.0]],
+        hole.collect(),
+    ]
 }
 
 /// Least and greatest distance from the z axis of the loop around it.
 fn around(made: &Made) -> [f64; 2] {
-    let hole = made.loops.iter().find(|points| points.iter().all(|[x, y]| x.hypot(*y) < 29.0));
-    let radii = hole.expect("a loop around the boss").iter().map(|[x, y]| x.hypot(*y));
+    let hole = made
+        .loops
+        .iter()
+        .find(|points| points.iter().all(|[x, y]| x.hypot(*y) < 29.0));
+    let radii = hole
+        .expect("a loop around the boss")
+        .iter()
+        .map(|[x, y]| x.hypot(*y));
     radii.fold([f64::INFINITY, 0.0], |[low, high], r| [low.min(r), high.max(r)])
 }
 
 /// Loops are pulled in by 10 um, have 10 um more for fewer vertices, and the tool may enter by 1 um.
 fn is_just_outside(found: [f64; 2], wanted: f64) {
-    assert!(found[0] > wanted && found[1] < wanted + 0.03, "{found:?}, not just above {wanted}");
+    assert!(
+        found[0] > wanted && found[1] < wanted + 0.03,
+        "{found:?}, not just above {wanted}"
+    );
 }
 
 #[test]
@@ -130,7 +160,11 @@ fn a_region_ends_beside_a_boss_by_the_balls_radius() {
         let grown = 30.0 + GROWTH * (8.0 * radius * 0.01_f64).sqrt();
         assert!((most - grown.min(31.0)).abs() < 0.03, "{most}, {grown}");
         let reachable = 3600.0 - PI * (boss + radius).powi(2);
-        assert!((made.reachable_mm2 / reachable - 1.0).abs() < 0.01, "{}", made.reachable_mm2);
+        assert!(
+            (made.reachable_mm2 / reachable - 1.0).abs() < 0.01,
+            "{}",
+            made.reachable_mm2
+        );
         assert!(made.inside_mm2 > 0.995 * made.reachable_mm2);
         assert_eq!(made.unreachable_mm2.len(), 1);
         assert_eq!(made.unreachable_mm2[0].0, Reason::Ball);
@@ -156,7 +190,12 @@ fn a_shank_and_a_holder_keep_away_from_what_is_higher() {
     };
     // Above the ball's centre, but below the shank; then above where it begins.
     for (height, reach, why) in [(4.5, 3.0, Reason::Ball), (9.0, 7.0, Reason::Shank)] {
-        let made = region(&plate(8.0, height), &surface, &trimmed(8.0), &Tool::new(3.0, &wide));
+        let made = region(
+            &plate(8.0, height),
+            &surface,
+            &trimmed(8.0),
+            &Tool::new(3.0, &wide),
+        );
         is_just_outside(around(&made), 8.0 + reach);
         assert!(made.unreachable_mm2.iter().any(|(reason, _)| *reason == why));
     }
@@ -169,7 +208,12 @@ fn a_shank_and_a_holder_keep_away_from_what_is_higher() {
         ..ToolBody::default()
     };
     for (height, reach) in [(19.0, 3.0), (21.0, 15.0)] {
-        let made = region(&plate(8.0, height), &surface, &trimmed(8.0), &Tool::new(3.0, &held));
+        let made = region(
+            &plate(8.0, height),
+            &surface,
+            &trimmed(8.0),
+            &Tool::new(3.0, &held),
+        );
         is_just_outside(around(&made), 8.0 + reach);
     }
 }
@@ -188,19 +232,35 @@ fn a_groove_is_reached_as_far_as_the_ball_fits() {
                 x: dvec3(sign, 0.0, slope.tan()),
                 y: DVec3::Y,
             };
-            face(if sign > 0.0 { 1 } else { 2 }, surface, vec![polygon(&corners)], sign)
+            face(
+                if sign > 0.0 { 1 } else { 2 },
+                surface,
+                vec![polygon(&corners)],
+                sign,
+            )
         };
         let faces = [flank(1.0), flank(-1.0)];
         let surface = flat(-12.0, 22.0, |x, _| x * slope.tan());
         let trimmed = vec![vec![[0.0, -10.0], [20.0, -10.0], [20.0, 10.0], [0.0, 10.0]]];
-        let made = region(&faces, &surface, &trimmed, &Tool::new(radius, &ToolBody::default()));
+        let made = region(
+            &faces,
+            &surface,
+            &trimmed,
+            &Tool::new(radius, &ToolBody::default()),
+        );
         // Beside the ends of the groove the other flank is farther away.
         let inside = Inside::new(&made.loops);
         let holds = |x: f64| (-18..=18).all(|k| inside.contains([x, 0.5 * f64::from(k)]));
-        let least = (0..40_000).map(|k| 1e-4 * f64::from(k)).find(|x| holds(*x)).expect("the groove is reached");
+        let least = (0..40_000)
+            .map(|k| 1e-4 * f64::from(k))
+            .find(|x| holds(*x))
+            .expect("the groove is reached");
         // The contact's distance from the edge along the flank is r tan(slope), in x r sin(slope).
         let wanted = radius * slope.sin();
-        assert!(least > wanted && least < wanted + 0.03, "{degrees}: {least}, {wanted}");
+        assert!(
+            least > wanted && least < wanted + 0.03,
+            "{degrees}: {least}, {wanted}"
+        );
         let widest = made.radius_mm;
         assert!(widest.is_some_and(|widest| widest < radius), "{widest:?}");
     }
@@ -225,10 +285,19 @@ fn distances_are_those_of_the_surfaces() {
         (dvec3(5.0, 0.0, -4.0), 5.0),
     ];
     for (point, wanted) in cases {
-        let found = part.nearest(point, 20.0, None, false).expect("near the part").distance;
+        let found = part
+            .nearest(point, 20.0, None, false)
+            .expect("near the part")
+            .distance;
         assert!((found - wanted).abs() < 1e-3, "{point}: {found}, {wanted}");
-        assert!(part.nearest(point, wanted + 0.002, None, true).is_some(), "{point}");
-        assert!(part.nearest(point, wanted - 0.002, None, true).is_none(), "{point}");
+        assert!(
+            part.nearest(point, wanted + 0.002, None, true).is_some(),
+            "{point}"
+        );
+        assert!(
+            part.nearest(point, wanted - 0.002, None, true).is_none(),
+            "{point}"
+        );
     }
     for (point, z, wanted) in [
         (dvec3(11.0, 0.0, 0.0), [6.0, 1e9], 3.0),
@@ -236,10 +305,16 @@ fn distances_are_those_of_the_surfaces() {
         (dvec3(3.0, 0.0, 0.0), [11.0, 1e9], 0.0),
         (dvec3(0.0, 40.0, 0.0), [-1.0, 1.0], 10.0),
     ] {
-        let found = part.beside(point, z, 30.0, false).expect("beside the part").distance;
+        let found = part
+            .beside(point, z, 30.0, false)
+            .expect("beside the part")
+            .distance;
         assert!((found - wanted).abs() < 1e-3, "{point}: {found}, {wanted}");
     }
-    assert!(part.beside(dvec3(11.0, 0.0, 0.0), [12.5, 1e9], 30.0, false).is_none());
+    assert!(
+        part.beside(dvec3(11.0, 0.0, 0.0), [12.5, 1e9], 30.0, false)
+            .is_none()
+    );
 }
 
 /// Passes one step-over apart on a plane leave the scallop height between them.
@@ -249,9 +324,17 @@ fn what_is_left_between_passes_is_the_scallop() {
     let pass = |y: f64| [dvec3(-10.0, y, radius), dvec3(10.0, y, radius)];
     let passes = Passes::new((0..20).map(|k| pass(step * f64::from(k))).collect());
     let scallop = radius - (radius * radius - 0.25 * step * step).sqrt();
-    for (y, wanted) in [(2.5 * step, scallop), (3.0 * step, 0.0), (19.0 * step + 0.3, scallop)] {
+    for (y, wanted) in [
+        (2.5 * step, scallop),
+        (3.0 * step, 0.0),
+        (19.0 * step + 0.3, scallop),
+    ] {
         let height = passes.height(dvec3(0.3, y, 0.0), DVec3::Z, radius);
         assert!((height - wanted).abs() < 1e-9, "{y}: {height}, {wanted}");
     }
-    assert!(passes.height(dvec3(0.0, 30.0, 0.0), DVec3::Z, radius).is_infinite());
+    assert!(
+        passes
+            .height(dvec3(0.0, 30.0, 0.0), DVec3::Z, radius)
+            .is_infinite()
+    );
 }

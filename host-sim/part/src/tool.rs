@@ -75,7 +75,11 @@ impl Tool {
         if from > 0.0 {
             add(Reason::Shank, [0.0, from], radius);
         }
-        let top = if body.holder.is_empty() { f64::INFINITY } else { face };
+        let top = if body.holder.is_empty() {
+            f64::INFINITY
+        } else {
+            face
+        };
         add(Reason::Shank, [from, top], shank);
         let mut z = face;
         for part in &body.holder {
@@ -100,7 +104,11 @@ impl Tool {
     #[must_use]
     pub fn with_radius(&self, radius: f64) -> Self {
         let columns = self.columns.iter().map(|column| Column {
-            radius: if column.radius == self.radius { radius } else { column.radius },
+            radius: if column.radius == self.radius {
+                radius
+            } else {
+                column.radius
+            },
             ..*column
         });
         Self {

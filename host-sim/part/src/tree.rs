@@ -126,7 +126,12 @@ impl Tree {
     }
 
     /// Visits the items of all boxes that `distance` puts nearer than the bound, the nearer boxes first. `visit` may lower the bound.
-    pub(crate) fn nearest(&self, bound: &mut f64, distance: impl Fn(&Block) -> f64, mut visit: impl FnMut(usize, &mut f64)) {
+    pub(crate) fn nearest(
+        &self,
+        bound: &mut f64,
+        distance: impl Fn(&Block) -> f64,
+        mut visit: impl FnMut(usize, &mut f64),
+    ) {
         let mut open = [(0_u32, 0.0_f64); DEPTH];
         let mut count = 0;
         if let Some(root) = self.nodes.first() {
@@ -147,7 +152,8 @@ impl Tree {
                 }
                 continue;
             }
-            let mut children = [index + 1, node.at].map(|child| (child, distance(&self.nodes[child as usize].block)));
+            let mut children =
+                [index + 1, node.at].map(|child| (child, distance(&self.nodes[child as usize].block)));
             if children[0].1 < children[1].1 {
                 children.swap(0, 1);
             }

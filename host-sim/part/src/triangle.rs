@@ -142,7 +142,10 @@ pub(crate) fn beside(p: DVec3, triangle: [DVec3; 3], z: [f64; 2]) -> Option<(f64
         let [a, b, c] = triangle;
         let (ab, ac, ap) = (b - a, c - a, p - a);
         let det = ab.x * ac.y - ab.y * ac.x;
-        let weights = [(ap.x * ac.y - ap.y * ac.x) / det, (ab.x * ap.y - ab.y * ap.x) / det];
+        let weights = [
+            (ap.x * ac.y - ap.y * ac.x) / det,
+            (ab.x * ap.y - ab.y * ap.x) / det,
+        ];
         return Some((0.0, weights));
     }
     Some(best)
@@ -153,7 +156,11 @@ pub(crate) fn beside(p: DVec3, triangle: [DVec3; 3], z: [f64; 2]) -> Option<(f64
 pub(crate) fn edge_nearest(p: DVec3, [a, b]: [DVec3; 2]) -> (f64, DVec3) {
     let along = b - a;
     let length = along.length_squared();
-    let share = if length > 0.0 { ((p - a).dot(along) / length).clamp(0.0, 1.0) } else { 0.0 };
+    let share = if length > 0.0 {
+        ((p - a).dot(along) / length).clamp(0.0, 1.0)
+    } else {
+        0.0
+    };
     let near = a + along * share;
     (near.distance(p), near)
 }

@@ -13,7 +13,8 @@ use serde_json::{Value, json};
 
 use super::{Failure, Result, region_words, whole};
 use cad::{
-    CadError, Face, Form, JobOptions, JobText, MachinableFace, Model, Options, machinable, read_once, write_job,
+    CadError, Face, Form, JobOptions, JobText, MachinableFace, Model, Options, machinable, read_once,
+    write_job,
 };
 use condition::Condition;
 use job::FaceReach;
@@ -74,7 +75,13 @@ pub(super) struct Arguments {
     #[arg(long, value_name = "N,...", value_delimiter = ',', requires = "part")]
     faces: Vec<usize>,
     /// With --part: the side of the part that looks up.
-    #[arg(long, value_enum, requires = "part", default_value = "+z", allow_hyphen_values = true)]
+    #[arg(
+        long,
+        value_enum,
+        requires = "part",
+        default_value = "+z",
+        allow_hyphen_values = true
+    )]
     up: Up,
     /// Ball radius, mm. Default: the largest standard radius below the least concave radius.
     #[arg(long, value_name = "MM", visible_alias = "tool")]
@@ -243,7 +250,12 @@ pub(super) fn command(arguments: &Arguments) -> Result<()> {
         ));
     }
     whole::note_input(&arguments.file);
-    for path in arguments.output.iter().filter(|_| !arguments.part).chain(&arguments.page) {
+    for path in arguments
+        .output
+        .iter()
+        .filter(|_| !arguments.part)
+        .chain(&arguments.page)
+    {
         whole::check(path, arguments.force)?;
     }
     let model = read_once(&arguments.file)?;

@@ -66,8 +66,9 @@ pub(super) fn measure(job: &Job, centres: &Centres, links_mm: &[Vec<DVec3>]) -> 
     let asked = Asked::new(job, source).map_err(|error| Failure::input(error.what, error.remedy))?;
     let request = asked.request();
     let between: Vec<DVec3> = links_mm.iter().flat_map(|way| along(way)).collect();
-    let deepest =
-        asked.part().map(|part| [&centres.centres, &between].map(|centres| deepest(part, asked.tool(), centres)));
+    let deepest = asked
+        .part()
+        .map(|part| [&centres.centres, &between].map(|centres| deepest(part, asked.tool(), centres)));
     let places = request.places(&Inside::new(request.trimmed), LEFTOVER_SIDE);
     let passes = Passes::new(centres.pieces(job.radius_mm));
     let leftover = leftover(&request.clearance(), &places, &passes, job.scallop_mm);
@@ -123,8 +124,16 @@ impl PartProof {
     }
 
     fn within(&self) -> f64 {
-        let Leftover { reachable_mm2, within_mm2, .. } = self.leftover;
-        if reachable_mm2 > 0.0 { within_mm2 / reachable_mm2 } else { 0.0 }
+        let Leftover {
+            reachable_mm2,
+            within_mm2,
+            ..
+        } = self.leftover;
+        if reachable_mm2 > 0.0 {
+            within_mm2 / reachable_mm2
+        } else {
+            0.0
+        }
     }
 
     /// Reasons against the job.
@@ -142,7 +151,12 @@ impl PartProof {
         let found = self.deepest.iter().flatten().flatten();
         let deep = found.filter(|found| found.depth_mm > self.tolerance_mm);
         deep.map(|found| Mark {
-            what: format!("{} {:.4} mm in face {}", found.part.name(), found.depth_mm, found.face),
+            what: format!(
+                "{} {:.4} mm in face {}",
+                found.part.name(),
+                found.depth_mm,
+                found.face
+            ),
             place_mm: found.centre_mm,
             tick: self.tick,
         })
@@ -156,11 +170,18 @@ impl PartProof {
                 say!("       {:<22} {line}", "face: reach");
             }
         }
-        for (index, name) in ["part: on passes", "part: between passes"].into_iter().enumerate() {
+        for (index, name) in ["part: on passes", "part: between passes"]
+            .into_iter()
+            .enumerate()
+        {
             let Some(found) = self.deepest.map(|deepest| deepest[index]) else {
                 continue;
             };
-            let mark = if found.is_some_and(|found| found.depth_mm > self.tolerance_mm) { "FAIL" } else { "ok  " };
+            let mark = if found.is_some_and(|found| found.depth_mm > self.tolerance_mm) {
+                "FAIL"
+            } else {
+                "ok  "
+            };
             match found {
                 Some(found) => say!(
                     "  {mark} {name:<22} {} {:.4} mm in face {} at [{:.3}, {:.3}, {:.3}] (at most {}); {} centres",
@@ -173,7 +194,10 @@ impl PartProof {
                     self.tolerance_mm,
                     self.counts[index]
                 ),
-                None => say!("  {mark} {name:<22} nowhere deeper than 0.0005 mm; {} centres", self.counts[index]),
+                None => say!(
+                    "  {mark} {name:<22} nowhere deeper than 0.0005 mm; {} centres",
+                    self.counts[index]
+                ),
             }
         }
         let left = &self.leftover;

@@ -30,7 +30,10 @@ pub(super) fn json(reach: &FaceReach) -> Value {
 
 /// A reason in words.
 pub(super) fn reason(name: &str) -> &'static str {
-    REASONS.iter().find(|(other, _)| *other == name).map_or("", |(_, words)| words)
+    REASONS
+        .iter()
+        .find(|(other, _)| *other == name)
+        .map_or("", |(_, words)| words)
 }
 
 /// The figures as text.
@@ -48,7 +51,9 @@ pub(super) fn lines(reach: &FaceReach) -> Vec<String> {
     }
     let short = reach.unreachable_mm2.iter().any(|(reason, _)| reason != "steep");
     match reach.radius_mm {
-        Some(radius_mm) if short => lines.push(format!("a ball of {radius_mm:.3} mm would reach 99 % of what is not too steep")),
+        Some(radius_mm) if short => lines.push(format!(
+            "a ball of {radius_mm:.3} mm would reach 99 % of what is not too steep"
+        )),
         None if short => lines.push("no ball would reach 99 % of what is not too steep".to_owned()),
         _ => {}
     }

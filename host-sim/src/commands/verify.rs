@@ -14,8 +14,8 @@ use verify::survey::{SampleObserver, SurveyResult};
 use verify::swept;
 
 use super::out::{complain, say};
-use super::simulate::{WantedReport, remarks, report, timed};
 use super::part_words::{Centres, PartProof};
+use super::simulate::{WantedReport, remarks, report, timed};
 use super::{
     Bar, Failure, Result, along, error_json, load_on, motion_words, part_words, reach_words, swept_words,
 };

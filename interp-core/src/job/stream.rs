@@ -5,8 +5,9 @@
 //! (apart from those of the digests), low word first; the core does not read them.
 //!
 //! **The window.** [`Header::window`] is the number of rows that is certain to be in the ring: it belongs to the job, so that the passes do not depend on the
-//! ring's size. What is planned for a pass looks at rows up to `window - 1` after the one of the pass before the last, because the tool stands there when the planning
-//! begins; where an interval reaches farther it is cut short (`pass/row_history.rs`). No interval does that whose three times are in a row.
+//! ring's size. What is planned for a pass looks at rows up to `window - 1`
+//! after the first one that is needed then: the pass's own, that of the pass before, or, where the tool goes along the boundary from one to the other, that of the pass before
+//! that (`pass/row_history.rs`). Where an interval reaches farther it is cut short: none whose three times are in a row.
 //!
 //! **Waiting.** The planning of a pass begins only when the rows that it needs are checked. Until then the whole machine stands still at the end of the last
 //! pass but one, or above it: neither tool nor planning goes on, and the tick is not counted. So the samples are those of a job that was loaded before.

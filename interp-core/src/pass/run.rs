@@ -693,8 +693,8 @@ impl Run {
         }
     }
 
-    /// The last row of patches that the next tick and the planning after it need, where the next tick begins a pass.
-    pub(crate) fn last_row(&mut self, job: &Job<'_>) -> Option<u16> {
+    /// The first and the last row of patches that the next tick and the planning after it need, where the next tick begins a pass.
+    pub(crate) fn rows_needed(&mut self, job: &Job<'_>) -> Option<[u16; 2]> {
         if self.travel.next != Next::Over {
             return None;
         }
@@ -706,7 +706,7 @@ impl Run {
         // A step that is too small is reported by the tick.
         let side = self.side_after(job, step).ok()?;
         match &self.planning {
-            PassPlanning::Scan(scan) => Some(scan.estimator().last_row(job, side)),
+            PassPlanning::Scan(scan) => Some(scan.estimator().rows_needed(job, side)),
             PassPlanning::Curve(_) => None,
         }
     }

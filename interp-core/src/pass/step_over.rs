@@ -228,13 +228,15 @@ impl StepOverEstimator {
             .next_side(job.header, from, step, |span| job.side_width(span))
     }
 
-    /// The last row of patches that the planning of the next pass needs, at this side parameter.
-    pub(crate) fn last_row(&self, job: &Job<'_>, side: SpanParameter) -> u16 {
-        if job.header.spacing == Spacing::FirstOrder {
-            return side.span;
-        }
+    /// The first and the last row of patches that the planning of the next pass needs, at this side parameter.
+    pub(crate) fn rows_needed(&self, job: &Job<'_>, side: SpanParameter) -> [u16; 2] {
+        let expected = if job.header.spacing == Spacing::FirstOrder {
+            Some(0.0)
+        } else {
+            self.expects()
+        };
         self.rows
-            .last_needed(job.header, side, self.expects(), |span| job.side_width(span))
+            .needed(job.header, side, expected, |span| job.side_width(span))
     }
 
     /// Begins a pass on a new line.

@@ -266,9 +266,9 @@ impl Lookahead {
         self.step_over.enter_row(row);
     }
 
-    /// The last row of patches that the look over the next pass needs, at this side parameter.
-    pub(crate) fn last_row(&self, job: &Job<'_>, side: SpanParameter) -> u16 {
-        self.step_over.last_row(job, side)
+    /// The first and the last row of patches that the look over the next pass needs, at this side parameter.
+    pub(crate) fn rows_needed(&self, job: &Job<'_>, side: SpanParameter) -> [u16; 2] {
+        self.step_over.rows_needed(job, side)
     }
 
     /// Begins to look over this pass.

@@ -244,9 +244,9 @@ impl Sequencer {
         }
     }
 
-    /// The last row of patches that is needed to go on, where the tool stands before a pass whose successor is to be planned next: at the end of the pass before it, or
+    /// The first and the last row of patches that are needed to go on, where the tool stands before a pass whose successor is to be planned next: at the end of the pass before it, or
     /// above its start. With the pass begins the planning of that successor.
-    pub(crate) fn last_row(&self, job: &Job<'_>) -> Option<u16> {
+    pub(crate) fn rows_needed(&self, job: &Job<'_>) -> Option<[u16; 2]> {
         if self.has_rows || self.pending.is_some() || !self.is_planned() {
             return None;
         }
@@ -259,7 +259,7 @@ impl Sequencer {
         };
         let (_, next) = self.plans_ref();
         let after = next.next.filter(|_| is_due)?;
-        Some(self.lookahead.last_row(job, after.side))
+        Some(self.lookahead.rows_needed(job, after.side))
     }
 
     /// They are there.
@@ -267,7 +267,7 @@ impl Sequencer {
         self.has_rows = true;
     }
 
-    /// Whether [`Self::last_row`] is to be asked.
+    /// Whether [`Self::rows_needed`] is to be asked.
     pub(crate) const fn may_wait_for_rows(&self) -> bool {
         !self.has_rows && !matches!(self.phase, Phase::Pass | Phase::Turn | Phase::Done)
     }

@@ -4,14 +4,14 @@ use std::collections::BTreeSet;
 
 use interp_core::encode::{self, Bicubic, EncodeError};
 use interp_core::job::SPANS_MAX;
-use interp_core::surface::Edges;
-use interp_core::{Header, SurfaceKind};
+use interp_core::surface::{Edges, POLYNOMIAL_WORDS, RATIONAL_WORDS};
+use interp_core::{Header, STORE_WORDS, SurfaceKind};
 
 use job::{Along, Job, JobError, SurfaceSpec};
 use patches::pieces::{Piece, Source};
 
 use super::stream::PATCHES_MAX;
-use super::{ParameterSpans, Prepared, steps, stream, widths};
+use super::{ParameterSpans, Prepared, steps, widths};
 
 pub(super) const REMEDY: &str =
     "place it nearer to the origin (`[placement] place = \"centre\"`), or cut it into smaller surfaces";
@@ -108,7 +108,7 @@ pub(super) fn prepare(job: &Job, header: Header, source: &Source) -> Result<Prep
     finish(job, header, source.rational(), path, side, words)
 }
 
-/// Number of patches of a surface that is not revolved, with passes along u.
+/// Number of patches of a surface that is not revolved and fits the board's store at once, with passes along u.
 ///
 /// # Errors
 /// A sentence with the reason for which the surface cannot be encoded.
@@ -117,34 +117,19 @@ pub fn patch_count(surface: &SurfaceSpec) -> Result<usize, String> {
     let Records { words, path, side } = records(&source, Along::U).map_err(|no| no.what)?;
     let (path_spans, side_spans) = (path.len() - 1, side.len() - 1);
     let patches = path_spans * side_spans;
-    // The width of each span is a word, too.
-    let words = words.len() + path_spans + side_spans;
-    let count = |spans| u16::try_from(spans).unwrap_or(u16::MAX);
-    let kind = if source.rational() {
-        SurfaceKind::Rational
-    } else {
-        SurfaceKind::Polynomial
-    };
-    let fits = |path_spans, side_spans| {
-        let header = Header {
-            kind,
-            path_spans: count(path_spans),
-            side_spans: count(side_spans),
-            ..Header::default()
-        };
-        stream::is_machinable(&header, words)
-    };
-    if fits(path_spans, side_spans) || fits(side_spans, path_spans) {
-        Ok(patches)
-    } else {
-        Err(too_many(patches))
+    // The width of each span is a word, too. A larger surface is streamed, but a fit of a face is better made coarser.
+    if words.len() + path_spans + side_spans > STORE_WORDS {
+        return Err(format!(
+            "the surface takes {patches} patches, more than the board's store: about {} polynomial or {} rational ones",
+            STORE_WORDS / (POLYNOMIAL_WORDS + 1),
+            STORE_WORDS / (RATIONAL_WORDS + 1)
+        ));
     }
+    Ok(patches)
 }
 
 fn too_many(patches: usize) -> String {
-    format!(
-        "the surface takes {patches} patches: more than {PATCHES_MAX}, or so many along either parameter that the board's store does not hold three rows of them"
-    )
+    format!("the surface takes {patches} patches, more than the {PATCHES_MAX} of a job")
 }
 
 fn halve(breaks: &mut Vec<f64>, spans: &BTreeSet<usize>) {

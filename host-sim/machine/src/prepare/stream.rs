@@ -67,15 +67,6 @@ pub(super) fn fit(job: &Job, prepared: Prepared) -> Result<Prepared, JobError> {
     Ok(streamed(&prepared, window))
 }
 
-/// Whether a grid of patches with this header can be stored or streamed.
-pub(super) fn is_machinable(header: &Header, words: usize) -> bool {
-    let streamed = Header {
-        window: WINDOW_MIN,
-        ..*header
-    };
-    words <= STORE_WORDS || rows_max(&streamed, STORE_WORDS) >= WINDOW_MIN.into()
-}
-
 /// The job in the form in which it is streamed, with a window of this number of rows.
 #[must_use]
 pub fn streamed(prepared: &Prepared, window: u16) -> Prepared {

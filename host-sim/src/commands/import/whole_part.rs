@@ -50,8 +50,14 @@ pub(super) enum Up {
 }
 
 impl Up {
-    const SIX: [Self; 6] =
-        [Self::PlusZ, Self::MinusZ, Self::PlusX, Self::MinusX, Self::PlusY, Self::MinusY];
+    const SIX: [Self; 6] = [
+        Self::PlusZ,
+        Self::MinusZ,
+        Self::PlusX,
+        Self::MinusX,
+        Self::PlusY,
+        Self::MinusY,
+    ];
 
     /// Rotations about x, y and z that turn it up.
     fn rotate_deg(self) -> [f64; 3] {
@@ -198,8 +204,10 @@ pub(super) fn command(arguments: &Arguments, file: &str, model: &Arc<Model>, fol
     let tool = Tool::new(radius_mm, &job::ToolBody::default());
     let wanted = |face: &&Face| arguments.faces.is_empty() || arguments.faces.contains(&face.number);
     let faces: Vec<&Face> = model.faces.iter().filter(wanted).collect();
-    let made: Vec<std::result::Result<MachinableFace, CadError>> =
-        faces.iter().map(|face| machinable(file, face, &options)).collect();
+    let made: Vec<std::result::Result<MachinableFace, CadError>> = faces
+        .iter()
+        .map(|face| machinable(file, face, &options))
+        .collect();
     let (setup, part) = match arguments.up {
         Up::Auto => best_side(model, &faces, &made, &tool, scallop_mm),
         up => Setup::new(up, model),
@@ -238,11 +246,19 @@ fn best_side(
             scallop_mm,
             setup: &setup,
         };
-        let known = faces.iter().zip(made).filter_map(|(face, made)| Some((face, made.as_ref().ok()?)));
-        let reached: f64 = known.map(|(face, made)| asked.reach(face, made, LOOKS).reachable_mm2).sum();
+        let known = faces
+            .iter()
+            .zip(made)
+            .filter_map(|(face, made)| Some((face, made.as_ref().ok()?)));
+        let reached: f64 = known
+            .map(|(face, made)| asked.reach(face, made, LOOKS).reachable_mm2)
+            .sum();
         (reached, up)
     });
-    let best = tried.into_iter().fold((-1.0, Up::PlusZ), |best, one| if one.0 > best.0 { one } else { best });
+    let best = tried.into_iter().fold(
+        (-1.0, Up::PlusZ),
+        |best, one| if one.0 > best.0 { one } else { best },
+    );
     Setup::new(best.1, model)
 }
 
@@ -298,7 +314,8 @@ fn outcome(
     );
     let read = written.map_err(|error| error.to_string()).and_then(|written| {
         let job = job_file::parse_with(&path.display().to_string(), &written.text, &part::Faces);
-        job.map(|job| (job, written.text)).map_err(|error| error.what().to_owned())
+        job.map(|job| (job, written.text))
+            .map_err(|error| error.what().to_owned())
     });
     match read {
         Ok((job, text)) => {
@@ -307,7 +324,11 @@ fn outcome(
             }
             if let Some(region) = job.region {
                 let surface = oracle::Surface::new(&job.surface);
-                let heights = region.loops.iter().flatten().map(|[u, v]| surface.at(*u, *v).point.z);
+                let heights = region
+                    .loops
+                    .iter()
+                    .flatten()
+                    .map(|[u, v]| surface.at(*u, *v).point.z);
                 outcome.top_mm = heights.fold(f64::NEG_INFINITY, f64::max);
                 outcome.region = Some((region, job.surface));
                 outcome.text = text;
@@ -338,7 +359,11 @@ impl Sums {
             };
             sums.area += reach.area_mm2;
             sums.reachable += reach.reachable_mm2;
-            sums.region += if outcome.job.is_some() { reach.region_mm2 } else { 0.0 };
+            sums.region += if outcome.job.is_some() {
+                reach.region_mm2
+            } else {
+                0.0
+            };
             for (reason, area) in &reach.unreachable_mm2 {
                 match sums.unreachable.iter_mut().find(|(name, _)| name == reason) {
                     Some((_, sum)) => *sum += area,
@@ -363,7 +388,9 @@ fn write(
     setup: &Setup,
     mut outcomes: Vec<Outcome>,
 ) -> Result<()> {
-    let mut order: Vec<usize> = (0..outcomes.len()).filter(|index| outcomes[*index].region.is_some()).collect();
+    let mut order: Vec<usize> = (0..outcomes.len())
+        .filter(|index| outcomes[*index].region.is_some())
+        .collect();
     order.sort_by(|a, b| outcomes[*b].top_mm.total_cmp(&outcomes[*a].top_mm));
     for (place, index) in (1..).zip(&order) {
         let outcome = &mut outcomes[*index];
@@ -482,7 +509,9 @@ fn page(file: &str, model: &Arc<Model>, setup: &Setup, outcomes: &[Outcome]) -> 
                 (_, Some(reach), _) => {
                     let worst = reach.unreachable_mm2.iter().max_by(|a, b| a.1.total_cmp(&b.1));
                     match worst {
-                        Some((reason, _)) if reason == "steep" => ("unreachable: steep".to_owned(), [165, 175, 185]),
+                        Some((reason, _)) if reason == "steep" => {
+                            ("unreachable: steep".to_owned(), [165, 175, 185])
+                        }
                         Some((reason, _)) => (format!("unreachable: {reason}"), [210, 80, 70]),
                         None => ("empty".to_owned(), [165, 175, 185]),
                     }
@@ -492,7 +521,11 @@ fn page(file: &str, model: &Arc<Model>, setup: &Setup, outcomes: &[Outcome]) -> 
             let region = outcome.region.as_ref().map_or_else(Vec::new, |(region, spec)| {
                 let surface = oracle::Surface::new(spec);
                 let point = |place: &[f64; 2]| surface.at(place[0], place[1]).point.to_array();
-                region.loops.iter().map(|ring| dense(ring).iter().map(point).collect()).collect()
+                region
+                    .loops
+                    .iter()
+                    .map(|ring| dense(ring).iter().map(point).collect())
+                    .collect()
             });
             PartRow {
                 face,
