@@ -2,7 +2,8 @@
 
 use integration_tests::{dome, scaled_dome};
 use interp_core::{
-    AxisLimits, Command, FaultKind, Header, Inputs, Interpolator, Pattern, Sample, SpanParameter, State,
+    AxisLimits, Command, FaultKind, Header, Inputs, Interpolator, Pattern, Sample, Spacing, SpanParameter,
+    State,
 };
 use machine::prepare::prepare;
 use proptest::prelude::*;
@@ -105,6 +106,22 @@ fn sides(samples: &[Sample]) -> Vec<SpanParameter> {
         }
     }
     sides
+}
+
+/// What tells the passes apart: their side parameters; on curved passes, where each begins.
+fn passes(header: &Header, samples: &[Sample]) -> Vec<SpanParameter> {
+    if !header.spacing.is_constant() {
+        return sides(samples);
+    }
+    let mut starts = Vec::new();
+    let mut pass = None;
+    for sample in samples.iter().filter(|sample| sample.side != SpanParameter::NONE) {
+        if pass != Some(sample.pass) {
+            pass = Some(sample.pass);
+            starts.push(sample.side);
+        }
+    }
+    starts
 }
 
 /// The highest tool centre of a run at constant feed, nm, and its passes.
@@ -314,7 +331,7 @@ fn check_commands(header: &Header, words: &[i32], whole: &[SpanParameter], comma
     }
     // A start begins the job again: the passes of each run are the first ones of the undisturbed run.
     let mut expected = whole.iter();
-    for side in sides(&samples) {
+    for side in passes(header, &samples) {
         if side == whole[0] {
             expected = whole.iter();
         }
@@ -328,7 +345,7 @@ type Undisturbed = (Header, Vec<i32>, Vec<SpanParameter>);
 fn undisturbed((header, words): (Header, Vec<i32>)) -> Undisturbed {
     let (samples, core) = scripted(&header, &words, &[]);
     assert_eq!((core.state(), core.fault()), (State::Finished, None));
-    let whole = sides(&samples);
+    let whole = passes(&header, &samples);
     assert!(whole.len() > 3, "{}", whole.len());
     (header, words, whole)
 }
@@ -416,6 +433,33 @@ fn a_job_interrupted_and_resumed_takes_the_same_path() {
         assert_eq!(samples.last().map(|sample| sample.cl_nm), Some(home_nm));
         assert!(samples.iter().any(|sample| sample.state == State::Held));
         check_commands(header, words, whole, &interruptions);
+    }
+}
+
+/// The dome on curved passes from the edge, zig or zigzag.
+fn curved_dome(zigzag: bool) -> &'static Undisturbed {
+    static ALL: OnceLock<[Undisturbed; 2]> = OnceLock::new();
+    let all = ALL.get_or_init(|| {
+        [Pattern::Zig, Pattern::Zigzag].map(|pattern| {
+            let (mut header, words) = dome_within_limits(pattern);
+            header.spacing = Spacing::Constant;
+            undisturbed((header, words))
+        })
+    });
+    &all[usize::from(zigzag)]
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(40))]
+
+    /// Holds, overrides, stops and starts on curved passes.
+    #[test]
+    fn no_sequence_of_commands_breaks_a_limit_on_curves(
+        zigzag in any::<bool>(),
+        commands in proptest::collection::vec(command(3000), 0..14),
+    ) {
+        let (header, words, whole) = curved_dome(zigzag);
+        check_commands(header, words, whole, &commands);
     }
 }
 

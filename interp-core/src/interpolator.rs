@@ -423,7 +423,7 @@ impl Motion {
         let job = program.job(store)?;
         let has_limits = job.header.axes.is_some();
         let rows = if has_limits {
-            sequencer.rows_needed(&job)
+            sequencer.rows_needed(&job, run)
         } else {
             run.rows_needed(&job)
         };
@@ -450,7 +450,7 @@ impl Motion {
         matches!(
             self.state,
             State::Running | State::Linking | State::Holding | State::Held | State::Stopping
-        ) && self.sequencer.has_to_plan()
+        ) && self.sequencer.has_to_plan(&self.run)
     }
 
     #[inline(never)]
@@ -464,11 +464,10 @@ impl Motion {
             run,
             ..
         } = self;
-        if let Ok((job, rest)) = program.job_and_rest(store) {
-            match &job.header.axes {
-                Some(axes) => sequencer.plan(&job, axes, run),
-                None => run.plan(&job, rest),
-            }
+        if program.header().axes.is_some() {
+            sequencer.plan(program, store, run);
+        } else if let Ok((job, rest)) = program.job_and_rest(store) {
+            run.plan(&job, rest);
         }
     }
 
@@ -595,7 +594,8 @@ impl Motion {
                 match program.job(store) {
                     Ok(job) if has_limits => {
                         if let Some(axes) = &job.header.axes {
-                            sequencer.restart(run.first_route(&job), axes);
+                            let first = run.first_route(&job);
+                            sequencer.restart(first, axes);
                         }
                         State::Linking
                     }

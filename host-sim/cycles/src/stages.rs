@@ -15,7 +15,7 @@ use cycle_plugin::plan::Stage;
 
 /// A module of `interp_core` (a function in it, or all of it) and its stage; the first match applies. A name that occurs nowhere in
 /// the image is an error: rename it here together with the core.
-const STAGES: [(&str, &str, Stage); 24] = [
+const STAGES: [(&str, &str, Stage); 26] = [
     ("pass::contact", "", Stage::Step),
     ("surface::ball", "", Stage::Offset),
     ("surface", "collapse", Stage::PatchChange),
@@ -26,9 +26,11 @@ const STAGES: [(&str, &str, Stage); 24] = [
     ("pass::schedule", "", Stage::PassChange),
     ("pass::step_over", "", Stage::PassChange),
     ("pass::scan", "", Stage::PassChange),
+    ("pass::lines", "", Stage::PassChange),
+    ("job::region", "", Stage::PassChange),
     ("pass::run", "step_far", Stage::Step),
     ("pass::buffer", "", Stage::PatchChange),
-    ("pass::run", "next_span", Stage::PatchChange),
+    ("pass::run", "next_piece", Stage::PatchChange),
     ("pass::run", "begin_pass", Stage::PassChange),
     ("pass::run", "step_over", Stage::PassChange),
     ("pass::run", "find_step_over", Stage::PassChange),

@@ -134,7 +134,9 @@ pub fn fault(fault: Fault) -> (String, &'static str) {
             "see the ranges of the job file",
         ),
         FaultKind::BadPatch => (
-            format!("patch {value} is outside the range in which its polynomials cannot overflow"),
+            format!(
+                "patch {value} is outside the range in which its polynomials cannot overflow, or the edges of the region are wrong"
+            ),
             "this is a defect of the host tool: please report the job",
         ),
         FaultKind::BadLength => (

@@ -5,6 +5,9 @@ use super::report::{AccuracyReport, SampleLocation};
 use glam::DVec3;
 use job::{Pattern, Spacing, Start};
 
+/// Excess of a last step over that of its feed, as a share of the programmed one, that the rounding of its parameters makes.
+const LAST_STEP_ROUNDING: f64 = 1e-5;
+
 /// Nanometres in a millimetre.
 const NM_PER_MM: f64 = 1e6;
 
@@ -384,14 +387,20 @@ impl Verifier {
     ) -> (Option<f64>, Option<f64>) {
         self.report.cc_length_mm += arc;
         let wanted = sample.feed_mm_s * self.oracle.period_s;
-        if sample.last_of_pass {
-            self.report
-                .last_step
-                .add(if wanted > 0.0 { arc / wanted } else { 0.0 }, spot);
-            return (Some(arc), None);
-        }
         // The deviation refers to the larger of the commanded and the programmed step.
         let whole = wanted.max(self.oracle.feed_mm_s * self.oracle.period_s);
+        if sample.last_of_pass {
+            let is_rounding = (0.0..LAST_STEP_ROUNDING).contains(&((arc - wanted) / whole));
+            self.report.last_step.add(
+                match wanted > 0.0 {
+                    true if is_rounding => 1.0,
+                    true => arc / wanted,
+                    false => 0.0,
+                },
+                spot,
+            );
+            return (Some(arc), None);
+        }
         let ripple_pct = (wanted > 0.0).then(|| 100.0 * (arc - wanted) / whole);
         if let Some(ripple_pct) = ripple_pct {
             self.report.ripple_pct.add(ripple_pct, spot);

@@ -98,7 +98,7 @@ fn check_header(header: &Header) -> Result<()> {
     if header.edges > 0 && (header.spacing.is_constant() || spans > REGION_SPANS_MAX) {
         return Err(Fault::new(FaultKind::BadHeader, f32::from(header.edges)));
     }
-    if header.spacing.is_constant() && (header.axes.is_some() || front_words(header).is_none()) {
+    if front_words(header).is_none() {
         return Err(Fault::new(FaultKind::BadHeader, f32::from(header.path_spans)));
     }
     if header.window > 0 {

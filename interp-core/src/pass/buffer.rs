@@ -32,7 +32,7 @@ pub(crate) struct PatchBuffer {
     second: bool,
     task: Task,
     /// The first patch of a pass for which the other patch is collapsed.
-    prepared: Option<Piece>,
+    prepared: Option<(Route, Piece)>,
 }
 
 impl PatchBuffer {
@@ -61,11 +61,6 @@ impl PatchBuffer {
         }
     }
 
-    /// Both patches, for a pass that evaluates each sample's patch anew.
-    pub(crate) const fn free(&mut self) -> (&mut Patch, &mut Patch) {
-        self.both()
-    }
-
     /// Whether a task is left.
     #[inline(always)]
     pub(crate) fn has_work(&self) -> bool {
@@ -80,10 +75,11 @@ impl PatchBuffer {
 
     /// Collapses the first patch of the next pass ahead of [`Self::begin`], while the present pass needs no further patch. A fault is left for that.
     #[inline(never)]
-    pub(crate) fn prepare(&mut self, job: &Job<'_>, piece: &Piece) {
+    pub(crate) fn prepare(&mut self, job: &Job<'_>, route: &Route) {
         self.task = Task::Faulty;
-        let is_sound = self.both().1.lay(job, piece).is_ok();
-        self.prepared = is_sound.then_some(*piece);
+        let piece = route.first(job);
+        let is_sound = self.both().1.lay(job, route, &piece).is_ok();
+        self.prepared = is_sound.then_some((*route, piece));
     }
 
     /// Forgets what is prepared.
@@ -95,23 +91,23 @@ impl PatchBuffer {
     ///
     /// # Errors
     /// Those of [`Patch::collapse`].
-    pub(crate) fn begin(&mut self, job: &Job<'_>, piece: &Piece) -> Result<()> {
+    pub(crate) fn begin(&mut self, job: &Job<'_>, route: &Route, piece: &Piece) -> Result<()> {
         self.task = Task::Ends;
-        if self.prepared.take() == Some(*piece) {
+        if self.prepared.take() == Some((*route, *piece)) {
             self.second = !self.second;
             return Ok(());
         }
-        self.both().0.lay(job, piece)
+        self.both().0.lay(job, route, piece)
     }
 
     /// Makes the next piece of the pass current.
     ///
     /// # Errors
     /// Those of [`Patch::collapse`].
-    pub(crate) fn advance(&mut self, job: &Job<'_>, piece: &Piece) -> Result<()> {
+    pub(crate) fn advance(&mut self, job: &Job<'_>, route: &Route, piece: &Piece) -> Result<()> {
         self.prepared = None;
         if !matches!(self.task, Task::AheadEnds | Task::Done) {
-            self.both().1.lay(job, piece)?;
+            self.both().1.lay(job, route, piece)?;
         }
         self.second = !self.second;
         self.task = if self.patch().has_ends() {
@@ -133,7 +129,7 @@ impl PatchBuffer {
                 Task::Ahead
             }
             Task::Ahead => match route.next(job, piece) {
-                Some(next) if ahead.lay(job, &next).is_ok() => Task::AheadEnds,
+                Some(next) if ahead.lay(job, route, &next).is_ok() => Task::AheadEnds,
                 Some(_) => Task::Faulty,
                 None => Task::Done,
             },

@@ -12,7 +12,7 @@ use crate::pass::patch::Patch;
 use crate::pass::position::PassPosition;
 use crate::pass::schedule;
 use crate::pass::step_over::{exact_at, height_limit_mm, skew_factor, step_over};
-use crate::surface::{Contact, Pass as _};
+use crate::surface::Contact;
 
 /// Share of the chord between the contacts at which the first ball off the pass's end is tried: that of side lines at 45 degrees.
 const FIRST_TRIAL: f32 = 0.7;
@@ -203,7 +203,7 @@ impl EdgeSearch {
                     self.stop();
                 }
             }
-            1 => match between.surface.contact(self.fraction(0.0), &between.ball) {
+            1 => match between.surface.contact_on_line(self.fraction(0.0), &between.ball) {
                 Ok(contact) => {
                     self.point = between.locator.contact_q30(&contact, &between.origin);
                     self.normal_mm = between.locator.offset_mm(&contact);
@@ -259,7 +259,7 @@ impl EdgeSearch {
         if trial > 0 && !(at > 0.0) {
             return;
         }
-        let Ok(contact) = patch.surface.contact(self.fraction(at), &patch.ball) else {
+        let Ok(contact) = patch.surface.contact_on_line(self.fraction(at), &patch.ball) else {
             return;
         };
         let seen = self.see(patch, &contact);

@@ -32,6 +32,16 @@ impl Patch {
         self.evaluate_on(&self.surface, fraction)
     }
 
+    /// [`Self::evaluate`] on a line of constant side parameter.
+    ///
+    /// # Errors
+    /// As [`Self::evaluate_on`].
+    pub(crate) fn evaluate_on_line(&self, fraction: u64) -> Result<Located> {
+        let contact = self.surface.contact_on_line(fraction, &self.ball)?;
+        check_fit(&contact)?;
+        self.locator.locate(&contact, &self.origin)
+    }
+
     /// Whether the surface faces up at a contact with this offset, so that the tool can retract upwards.
     pub(crate) fn faces_up(&self, offset: [i32; 3]) -> bool {
         let [_, _, z] = self.ball.normal(offset);

@@ -106,6 +106,7 @@ impl RegionLines {
             side: side_at(header, self.line.side()),
             reversed: self.reversed,
             ends,
+            front: None,
         })
     }
 

@@ -1,17 +1,19 @@
 //! A patch on a pass: the surface at the pass's side parameter, with ball, feed and scallop limit in the patch's units.
 
-use crate::fault::Result;
+use crate::fault::{Fault, FaultKind, Result};
 use crate::job::program::Job;
 use crate::job::{SurfaceKind, ToolSide};
 use crate::math::arith::{centred, power_of_two};
 use crate::math::number::NM_PER_MM_F32;
+use crate::pass::front::{FrontLine, FrontPiece};
 use crate::pass::interval::Interval;
 use crate::pass::offset::{Locator, origin_q30};
 use crate::pass::position::PassPosition;
-use crate::pass::route::Piece;
+use crate::pass::route::{Piece, Route};
+use crate::sample::SpanParameter;
 use crate::surface::{
-    Ball, CirclePass, GridPass, IsoLine, OffsetUnits, POLYNOMIAL_WORDS, PathSpeed, ProfilePass,
-    RATIONAL_WORDS, REVOLVED_WORDS, Surface, split_patch, split_revolved,
+    Ball, CirclePass, Contact, CurvePass, Derivatives, GridPass, IsoLine, OffsetUnits, POLYNOMIAL_WORDS,
+    PathSpeed, ProfilePass, RATIONAL_WORDS, REVOLVED_WORDS, RecordKind, Surface, split_patch, split_revolved,
 };
 
 /// A patch on a pass. Units are the patch's, 2^-shift nm.
@@ -54,9 +56,95 @@ impl Patch {
     ///
     /// # Errors
     /// As [`Self::collapse`].
-    pub(crate) fn lay(&mut self, job: &Job<'_>, piece: &Piece) -> Result<()> {
+    pub(crate) fn lay(&mut self, job: &Job<'_>, route: &Route, piece: &Piece) -> Result<()> {
         self.range = piece.range;
-        self.collapse(job, &piece.position)
+        match (&route.front, &piece.front) {
+            (Some(line), Some(on)) => self.lay_on_front(job, line, on, &piece.position),
+            _ => self.collapse(job, &piece.position),
+        }
+    }
+
+    /// Becomes the patch of a piece of a pass on a front.
+    fn lay_on_front(
+        &mut self,
+        job: &Job<'_>,
+        line: &FrontLine,
+        piece: &FrontPiece,
+        position: &PassPosition,
+    ) -> Result<()> {
+        let PassPosition { side, span, reversed } = *position;
+        self.take_record(job, [span, side.span])?;
+        let range = self.range;
+        if let Surface::Curve(pass) = &mut self.surface {
+            let (are_on, is_far) = line.boundary_of(piece);
+            pass.set_curve(line.side_curve(job, piece));
+            pass.set_ends(reversed, range, are_on, is_far);
+        }
+        Ok(())
+    }
+
+    /// Becomes the patch of a path span and a side span, to be evaluated at any place.
+    ///
+    /// # Errors
+    /// As [`Self::collapse`].
+    #[inline(never)]
+    pub(crate) fn take_record(&mut self, job: &Job<'_>, [span, side_span]: [u16; 2]) -> Result<()> {
+        let tool = if job.header.tool_side == ToolSide::Plus {
+            1.0
+        } else {
+            -1.0
+        };
+        let (kind, words) = match job.header.kind {
+            SurfaceKind::Polynomial => {
+                let words = job.patch::<POLYNOMIAL_WORDS>(span, side_span)?;
+                (RecordKind::Polynomial, words.as_slice())
+            }
+            SurfaceKind::Rational => {
+                let words = job.patch::<RATIONAL_WORDS>(span, side_span)?;
+                (RecordKind::Rational, words.as_slice())
+            }
+            SurfaceKind::RevolvedAlongProfile => {
+                let words = job.patch::<REVOLVED_WORDS>(span, side_span)?;
+                (RecordKind::Profile, words.as_slice())
+            }
+            SurfaceKind::RevolvedAroundAxis => {
+                let words = job.patch::<REVOLVED_WORDS>(span, side_span)?;
+                (RecordKind::Circle, words.as_slice())
+            }
+        };
+        let (origin_nm, shift) = match kind {
+            RecordKind::Polynomial | RecordKind::Rational => {
+                let (origin_nm, shift, _, _) = split_patch(words);
+                (origin_nm, shift)
+            }
+            RecordKind::Profile | RecordKind::Circle => {
+                let (shift, height_nm) = words.first_chunk().map_or((0, 0), split_revolved);
+                ([0, 0, height_nm], shift)
+            }
+        };
+        self.origin = origin_q30(origin_nm);
+        self.measure(job, shift, side_span, tool);
+        let radius = tool * job.header.ball_radius_mm * self.per_mm;
+        if !matches!(self.surface, Surface::Curve(_)) {
+            self.surface = Surface::Curve(CurvePass::NONE);
+        }
+        if let Surface::Curve(pass) = &mut self.surface {
+            pass.take(kind, words, radius);
+        }
+        self.point = false;
+        self.ends = None;
+        Ok(())
+    }
+
+    /// Contact and derivatives at any place of a patch of [`Self::take_record`], by fractions of its path span and its side span.
+    ///
+    /// # Errors
+    /// As [`Self::evaluate`].
+    pub(crate) fn surface_at(&self, path: u64, side: u64) -> Result<(Contact, Derivatives)> {
+        match &self.surface {
+            Surface::Curve(pass) => pass.at(path, side, &self.ball),
+            _ => Err(Fault::new(FaultKind::DegenerateSurface, 0.0)),
+        }
     }
 
     /// Collapses the patch of a pass.
@@ -111,6 +199,17 @@ impl Patch {
         self.point = self.surface.is_point();
         self.ends = None;
         Ok(())
+    }
+
+    /// The side parameter at a fraction of the patch, in the direction of travel.
+    pub(crate) fn side_at(&self, position: &PassPosition, fraction: u64) -> SpanParameter {
+        match &self.surface {
+            Surface::Curve(pass) => SpanParameter {
+                span: position.side.span,
+                fraction: pass.side(fraction).fraction,
+            },
+            _ => position.side,
+        }
     }
 
     /// Computes the parametrisation at both ends, and stores it for [`Self::start`] and [`Self::end`].

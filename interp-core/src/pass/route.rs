@@ -1,26 +1,30 @@
-//! A pass from place to place on a line of the surface, and its pieces: one patch each.
+//! A pass from place to place, on a line of constant side parameter or on a front, and its pieces.
 
 use crate::job::program::Job;
 use crate::job::{Header, Pattern};
+use crate::pass::front::{FrontLine, FrontPiece, PiecePlace};
 use crate::pass::position::PassPosition;
 use crate::sample::SpanParameter;
 
 /// A pass from place to place.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Route {
-    /// Side parameter of the line.
+    /// Side parameter of the line; of a pass on a front that of the surface's start.
     pub(crate) side: SpanParameter,
     pub(crate) reversed: bool,
     /// Start and end, by the surface's own path parameter.
     pub(crate) ends: [SpanParameter; 2],
+    /// The front that it lies on, if it is not a line.
+    pub(crate) front: Option<FrontLine>,
 }
 
-/// A part of a pass within one patch.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+/// A part of a pass within one patch; on a front also within one interval between its stations.
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Piece {
     pub(crate) position: PassPosition,
     /// Start and end: fractions of the span in the direction of travel.
     pub(crate) range: [u64; 2],
+    pub(crate) front: Option<FrontPiece>,
 }
 
 impl Route {
@@ -28,6 +32,7 @@ impl Route {
         side: SpanParameter { span: 0, fraction: 0 },
         reversed: false,
         ends: [SpanParameter { span: 0, fraction: 0 }; 2],
+        front: None,
     };
 
     /// The whole line at a side parameter.
@@ -41,6 +46,7 @@ impl Route {
             side,
             reversed,
             ends: if reversed { [far, near] } else { [near, far] },
+            front: None,
         }
     }
 
@@ -55,6 +61,10 @@ impl Route {
         if self.reversed { !fraction } else { fraction }
     }
 
+    pub(crate) const fn is_on_front(&self) -> bool {
+        self.front.is_some()
+    }
+
     /// Whether it starts and whether it ends at the surface's boundaries.
     pub(crate) fn reach_boundaries(&self, job: &Job<'_>) -> [bool; 2] {
         let whole = Self::whole(self.side, self.reversed, job.header.path_spans);
@@ -65,26 +75,54 @@ impl Route {
     /// The first piece.
     pub(crate) fn first(&self, job: &Job<'_>) -> Piece {
         let [start, _] = self.ends;
-        self.piece(job, start.span)
+        match &self.front {
+            Some(front) => self.on_front(front.first(job, &self.ends, self.reversed)),
+            None => self.piece(start.span),
+        }
     }
 
-    /// The last piece.
-    pub(crate) fn last(&self, job: &Job<'_>) -> Piece {
+    /// The last piece of a pass on a line.
+    pub(crate) fn last_on_line(&self) -> Piece {
         let [_, end] = self.ends;
-        self.piece(job, end.span)
+        self.piece(end.span)
     }
 
     /// The piece after another, if there is one.
     pub(crate) fn next(&self, job: &Job<'_>, piece: &Piece) -> Option<Piece> {
+        if let (Some(front), Some(on)) = (&self.front, &piece.front) {
+            let next = front.next(job, &self.ends, self.reversed, (on, piece.end()));
+            return next.map(|next| self.on_front(next));
+        }
         let [_, end] = self.ends;
         if piece.position.span == end.span {
             return None;
         }
         let next = piece.position.next(job.header.path_spans)?;
-        Some(self.piece(job, next.span))
+        Some(self.piece(next.span))
     }
 
-    fn piece(&self, _job: &Job<'_>, span: u16) -> Piece {
+    const fn on_front(&self, place: PiecePlace) -> Piece {
+        let PiecePlace {
+            piece,
+            span,
+            side_span,
+            range,
+        } = place;
+        Piece {
+            position: PassPosition {
+                side: SpanParameter {
+                    span: side_span,
+                    fraction: 0,
+                },
+                reversed: self.reversed,
+                span,
+            },
+            range,
+            front: Some(piece),
+        }
+    }
+
+    fn piece(&self, span: u16) -> Piece {
         let [start, end] = self.ends;
         let from = if span == start.span {
             self.turned(start.fraction)
@@ -103,6 +141,7 @@ impl Route {
                 span,
             },
             range: [from, to],
+            front: None,
         }
     }
 }
@@ -115,6 +154,7 @@ impl Piece {
             span: 0,
         },
         range: [0, u64::MAX],
+        front: None,
     };
 
     pub(crate) const fn start(&self) -> u64 {

@@ -6,13 +6,13 @@ use crate::job::{Pattern, Spacing};
 use crate::math::arith::{advanced, dot_hi, fraction_to_f32, truncated};
 use crate::pass::buffer::PatchBuffer;
 use crate::pass::contact::{self, Reach};
-use crate::pass::front::CurveRun;
+use crate::pass::front::{FrontSequence, NextRoute};
 use crate::pass::lines::{NextPass, RegionLines};
 use crate::pass::patch::Patch;
 use crate::pass::route::{Piece, Route};
 use crate::pass::scan::PassScan;
 use crate::pass::schedule;
-use crate::pass::step_over::PassMaximum;
+use crate::pass::step_over::{PassMaximum, StepOverEstimator};
 use crate::sample::{Sample, SpanParameter, interval_of};
 use crate::surface::{AnyPass, Pass, PathSpeed};
 
@@ -23,6 +23,9 @@ const CROSSINGS_MAX: u8 = 1;
 /// Step of the parameter on a pole: 16 per span. Between two steps the speed of the side lines, a rational cubic of the path
 /// parameter, changes little.
 const POLE_STEP: u64 = 1 << 60;
+
+/// The same on a front, whose intervals are two periods long, except on short passes.
+const CROSSINGS_ON_FRONT_MAX: u8 = 4;
 
 /// The task of the next tick.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -56,6 +59,8 @@ struct Travel {
     /// Samples so far.
     ticks: u32,
     pass: u32,
+    /// Side parameter at the last sample.
+    side: SpanParameter,
 }
 
 /// What is planned while the tool is on a pass, by the job's spacing.
@@ -64,14 +69,14 @@ struct Travel {
 enum PassPlanning {
     /// The step to the next straight pass.
     Scan(PassScan),
-    /// The run of a job of constant scallop height: of the rest of the run, only the buffer is used then.
-    Curve(CurveRun),
+    /// The next front of a job of constant scallop height.
+    Fronts(FrontSequence),
 }
 
 impl PassPlanning {
     /// The starts as constants, so that they are not made on the stack.
     const SCAN: Self = Self::Scan(PassScan::START);
-    const CURVE: Self = Self::Curve(CurveRun::START);
+    const FRONTS: Self = Self::Fronts(FrontSequence::START);
 }
 
 /// A run: the travel and the patch buffer.
@@ -110,6 +115,7 @@ impl Travel {
         shape: [0.0; 2],
         ticks: 0,
         pass: 0,
+        side: SpanParameter { span: 0, fraction: 0 },
     };
 
     /// Fraction of the span, in the surface's own direction.
@@ -182,8 +188,8 @@ impl Run {
         self.pending = None;
         match (&mut self.planning, program.header().spacing.is_constant()) {
             (PassPlanning::Scan(scan), false) => scan.restart(),
-            (PassPlanning::Curve(curve), true) => curve.restart(),
-            (planning, true) => *planning = PassPlanning::CURVE,
+            (PassPlanning::Fronts(fronts), true) => fronts.stop(),
+            (planning, true) => *planning = PassPlanning::FRONTS,
             (planning, false) => *planning = PassPlanning::SCAN,
         }
         self.travel = Travel::START;
@@ -194,39 +200,31 @@ impl Run {
 
     /// The first pass.
     pub(crate) fn first_route(&mut self, job: &Job<'_>) -> Route {
+        if let PassPlanning::Fronts(fronts) = &mut self.planning {
+            return fronts.start(job);
+        }
         let of_region = self.lines.take(job.header);
         of_region.unwrap_or_else(|| Route::of_pass(job.header, 0, SpanParameter::default()))
     }
 
     /// Pass, path and side parameter of the tool, in the surface's own direction.
     pub(crate) const fn surface_position(&self) -> (u32, SpanParameter, SpanParameter) {
-        if let PassPlanning::Curve(curve) = &self.planning {
-            return curve.surface_position();
-        }
         let travel = &self.travel;
         let path = SpanParameter {
             span: travel.span(),
             fraction: travel.own_fraction(),
         };
-        (travel.pass, path, travel.route.side)
+        (travel.pass, path, travel.side)
     }
 
     /// Minimum path interval of the last finished pass.
     pub(crate) const fn last_interval(&self) -> f32 {
-        if let PassPlanning::Curve(curve) = &self.planning {
-            curve.last_interval()
-        } else {
-            self.last_interval
-        }
+        self.last_interval
     }
 
     /// Whether the next sample continues the pass.
     pub(crate) fn is_along(&self) -> bool {
-        if let PassPlanning::Curve(curve) = &self.planning {
-            curve.is_along()
-        } else {
-            self.travel.next == Next::Along
-        }
+        self.travel.next == Next::Along
     }
 
     /// Writes the next sample into `last`; false after the last sample.
@@ -235,9 +233,6 @@ impl Run {
     /// The fault that stops the run; `last` is unchanged.
     #[inline(always)]
     pub(crate) fn advance(&mut self, job: &Job<'_>, last: &mut Sample) -> Result<bool> {
-        if matches!(self.planning, PassPlanning::Curve(_)) {
-            return self.advance_far(job, 1.0, last);
-        }
         let travel = &mut self.travel;
         if travel.next == Next::Along {
             let step = contact::step(
@@ -263,43 +258,18 @@ impl Run {
     /// As [`Self::advance`].
     #[inline(never)]
     pub(crate) fn advance_far(&mut self, job: &Job<'_>, feed_factor: f32, last: &mut Sample) -> Result<bool> {
-        let Self { planning, buffer, .. } = self;
-        if let PassPlanning::Curve(curve) = planning {
-            return curve.advance(job, job.rest(), buffer, feed_factor, last);
-        }
         let begins = !self.is_along();
         match self.travel.next {
             Next::Along if self.buffer.patch().point => self.step_on_pole(job)?,
             Next::Along => self.step_far(job, feed_factor)?,
-            Next::Pass => {
-                let route = self.first_route(job);
-                self.begin_pass(job, route)?;
-            }
-            Next::Over if job.header.edges > 0 => {
-                if let Some(fault) = self.pending {
-                    return Err(fault);
+            Next::Pass | Next::Over => match self.change_pass(job)? {
+                Some(true) => {}
+                Some(false) => {
+                    self.stand(last);
+                    return Ok(true);
                 }
-                match self.next_pass {
-                    NextPass::Found => {
-                        let Some(route) = self.lines.take(job.header) else {
-                            return Ok(false);
-                        };
-                        self.next_pass = NextPass::Sought;
-                        self.travel.pass = self.travel.pass.wrapping_add(1);
-                        self.begin_pass(job, route)?;
-                    }
-                    NextPass::None => return Ok(false),
-                    // It stands until the next pass is known.
-                    NextPass::Sought => {
-                        self.stand(last);
-                        return Ok(true);
-                    }
-                }
-            }
-            Next::Over => {
-                let route = self.step_over(job)?;
-                self.begin_pass(job, route)?;
-            }
+                None => return Ok(false),
+            },
             Next::End => return Ok(false),
         }
         self.sample(last)?;
@@ -313,13 +283,51 @@ impl Run {
         let travel = &self.travel;
         last.pass = travel.pass;
         last.path.span = travel.span();
-        last.side = travel.route.side;
+        last.side = travel.side;
         last.feed_mm_s = if self.buffer.patch().point {
             0.0
         } else {
             job.header.feed_mm_s * feed_factor
         };
         Ok(true)
+    }
+
+    /// Begins the first pass, or the next one. False where that is not made yet; none where there is none.
+    #[inline(never)]
+    fn change_pass(&mut self, job: &Job<'_>) -> Result<Option<bool>> {
+        let next = if self.travel.next == Next::Pass {
+            NextRoute::Pass(self.first_route(job))
+        } else if self.lines.is_in_use() {
+            self.take_pass(job)?
+        } else {
+            self.step_over(job)?
+        };
+        match next {
+            NextRoute::Pass(route) => self.begin_pass(job, route)?,
+            NextRoute::NotYet => return Ok(Some(false)),
+            NextRoute::None => return Ok(None),
+        }
+        Ok(Some(true))
+    }
+
+    /// The next pass of a region, once it is known.
+    fn take_pass(&mut self, job: &Job<'_>) -> Result<NextRoute> {
+        if let Some(fault) = self.pending {
+            return Err(fault);
+        }
+        match self.next_pass {
+            NextPass::Found => {
+                let Some(route) = self.lines.take(job.header) else {
+                    return Ok(NextRoute::None);
+                };
+                self.next_pass = NextPass::Sought;
+                self.travel.pass = self.travel.pass.wrapping_add(1);
+                Ok(NextRoute::Pass(route))
+            }
+            NextPass::None => Ok(NextRoute::None),
+            // It stands until the next pass is known.
+            NextPass::Sought => Ok(NextRoute::NotYet),
+        }
     }
 
     /// Collapses the first patch of this pass. The tool does not move.
@@ -336,7 +344,7 @@ impl Run {
 
     /// Collapses the first patch of a pass ahead of [`Self::enter_pass`], once the present pass needs no further patch.
     pub(crate) fn prepare_pass(&mut self, job: &Job<'_>, route: &Route) {
-        self.buffer.prepare(job, &route.first(job));
+        self.buffer.prepare(job, route);
     }
 
     /// Emits the first sample of the pass that was entered; its minimum interval is known from the look-ahead.
@@ -447,6 +455,9 @@ impl Run {
             return None;
         }
         let travel = &self.travel;
+        if let Some(front) = &travel.piece.front {
+            return Some([front.number, 0]);
+        }
         let [start, _] = travel.route.ends;
         let patch = travel.span().abs_diff(start.span);
         let piece = &travel.piece;
@@ -488,7 +499,7 @@ impl Run {
     const fn describe(&self, feed_mm_s: f32, last: &mut Sample) {
         last.pass = self.travel.pass;
         last.path.span = self.travel.span();
-        last.side = self.travel.route.side;
+        last.side = self.travel.side;
         last.feed_mm_s = feed_mm_s;
     }
 
@@ -505,6 +516,15 @@ impl Run {
             AnyPass::Pole(pass) => travel.sample(&pass, patch, last),
             AnyPass::Profile(pass) => travel.sample(pass, patch, last),
             AnyPass::Circle(pass) => travel.sample(pass, patch, last),
+            AnyPass::Curve(pass) => {
+                travel.sample(pass, patch, last)?;
+                travel.side = SpanParameter {
+                    span: travel.piece.position.side.span,
+                    fraction: pass.side(travel.fraction).fraction,
+                };
+                last.side = travel.side;
+                Ok(())
+            }
         }
     }
 
@@ -512,7 +532,12 @@ impl Run {
     fn step_far(&mut self, job: &Job<'_>, feed_factor: f32) -> Result<()> {
         let mut rest = feed_factor * job.header.feed_mm_s * job.header.period_s;
         let mut start = self.travel.path;
-        for crossings in 0..=CROSSINGS_MAX {
+        let most = if self.travel.route.front.is_some() {
+            CROSSINGS_ON_FRONT_MAX
+        } else {
+            CROSSINGS_MAX
+        };
+        for crossings in 0..=CROSSINGS_ON_FRONT_MAX {
             let Self { travel, buffer, .. } = self;
             let patch = buffer.patch();
             let arc = rest * patch.per_mm;
@@ -531,7 +556,7 @@ impl Run {
                 self.end_pass(job);
                 return Ok(());
             }
-            if crossings == CROSSINGS_MAX {
+            if crossings == most {
                 break;
             }
             self.next_piece(job)?;
@@ -559,7 +584,7 @@ impl Run {
         travel.piece = piece;
         travel.fraction = piece.start();
         travel.path.log_speed_derivative = f32::NAN;
-        self.buffer.advance(job, &piece)?;
+        self.buffer.advance(job, &travel.route, &piece)?;
         Ok(true)
     }
 
@@ -568,6 +593,11 @@ impl Run {
         let travel = &mut self.travel;
         let side_before = travel.route.side;
         travel.route = route;
+        travel.side = route.side;
+        if route.front.is_some() {
+            // Fronts begin at places that are not next to each other.
+            travel.offset = [0; 3];
+        }
         travel.piece = route.first(job);
         travel.fraction = travel.piece.start();
         // The maximum is that of all passes on the line.
@@ -582,15 +612,19 @@ impl Run {
         travel.next = Next::Along;
         travel.path.log_speed_derivative = f32::NAN;
         if let PassPlanning::Scan(scan) = &mut self.planning {
+            // With limits the estimator is the look-ahead's.
+            if job.header.axes.is_none() {
+                scan.estimator().enter_row(route.side.span);
+            }
             scan.begin(&route, goes_on);
         }
-        self.buffer.begin(job, &travel.piece)
+        self.buffer.begin(job, &travel.route, &travel.piece)
     }
 
     /// Whether [`Self::plan`] has anything to do.
     pub(crate) fn has_to_plan(&self, spacing: Spacing) -> bool {
         match &self.planning {
-            PassPlanning::Curve(curve) => curve.has_to_plan(),
+            PassPlanning::Fronts(fronts) => fronts.has_work(),
             PassPlanning::Scan(scan) => {
                 spacing == Spacing::Exact && (scan.has_work() || self.is_step_due()) || self.is_pass_due()
             }
@@ -613,7 +647,7 @@ impl Run {
     /// The planning of one period without axis limits: scans the pass for the step to the next one, or makes the next front in the words behind the job's.
     pub(crate) fn plan(&mut self, job: &Job<'_>, rest: &mut [i32]) {
         let has_work = match &mut self.planning {
-            PassPlanning::Curve(curve) => return curve.plan(job, rest),
+            PassPlanning::Fronts(fronts) => return fronts.plan(job, rest),
             PassPlanning::Scan(scan) => {
                 scan.plan(job);
                 scan.has_work()
@@ -668,9 +702,83 @@ impl Run {
         }
     }
 
+    /// The estimator of the step to the next straight pass, and the lines of a region.
+    pub(crate) const fn estimator_and_lines(&mut self) -> (Option<&mut StepOverEstimator>, &mut RegionLines) {
+        let estimator = match &mut self.planning {
+            PassPlanning::Scan(scan) => Some(scan.estimator()),
+            PassPlanning::Fronts(_) => None,
+        };
+        (estimator, &mut self.lines)
+    }
+
+    pub(crate) const fn estimator_ref(&self) -> Option<&StepOverEstimator> {
+        match &self.planning {
+            PassPlanning::Scan(scan) => Some(scan.estimator_ref()),
+            PassPlanning::Fronts(_) => None,
+        }
+    }
+
+    /// Cycles of the next portion of the next front; 0 where there is none.
+    pub(crate) const fn front_cycles(&self) -> u32 {
+        match &self.planning {
+            PassPlanning::Fronts(fronts) => fronts.cycles(),
+            PassPlanning::Scan(_) => 0,
+        }
+    }
+
+    /// Makes a portion of the next front, in the words behind the job's.
+    pub(crate) fn make_front(&mut self, job: &Job<'_>, rest: &mut [i32]) {
+        if let PassPlanning::Fronts(fronts) = &mut self.planning {
+            fronts.work(job, rest);
+        }
+    }
+
+    /// The pass after the latest one of a job of constant scallop height.
+    ///
+    /// # Errors
+    /// As [`FrontSequence::next`].
+    pub(crate) fn next_pass(&mut self, job: &Job<'_>) -> Result<NextRoute> {
+        match &mut self.planning {
+            PassPlanning::Fronts(fronts) => fronts.next(job),
+            PassPlanning::Scan(_) => Ok(NextRoute::None),
+        }
+    }
+
+    /// Whether there is no pass after the latest one, of a job of constant scallop height.
+    pub(crate) const fn is_last_pass(&self) -> bool {
+        match &self.planning {
+            PassPlanning::Fronts(fronts) => fronts.is_over(),
+            PassPlanning::Scan(_) => false,
+        }
+    }
+
+    /// Whether the pass after the latest one is on a front that may not be made yet.
+    pub(crate) const fn needs_front(&self) -> bool {
+        match &self.planning {
+            PassPlanning::Fronts(fronts) => fronts.needs_front(),
+            PassPlanning::Scan(_) => false,
+        }
+    }
+
+    /// The tool leaves the pass before the latest one. Returns whether the next front is begun.
+    pub(crate) const fn arrive_on_front(&mut self) -> bool {
+        match &mut self.planning {
+            PassPlanning::Fronts(fronts) => fronts.arrive(),
+            PassPlanning::Scan(_) => false,
+        }
+    }
+
     /// The next pass. Its first sample is adjacent to the last pass's first, or to its last where the
     /// pattern is zigzag.
-    fn step_over(&mut self, job: &Job<'_>) -> Result<Route> {
+    fn step_over(&mut self, job: &Job<'_>) -> Result<NextRoute> {
+        if let PassPlanning::Fronts(fronts) = &mut self.planning {
+            let next = fronts.next(job)?;
+            if let NextRoute::Pass(_) = next {
+                fronts.arrive();
+                self.travel.pass = self.travel.pass.wrapping_add(1);
+            }
+            return Ok(next);
+        }
         let step = match self.step_over.take() {
             Some(step) => step,
             None => self.find_step_over(job),
@@ -681,15 +789,15 @@ impl Run {
         if job.header.pattern == Pattern::Zig {
             travel.offset = self.first_offset;
         }
-        Ok(Route::of_pass(job.header, travel.pass, side))
+        Ok(NextRoute::Pass(Route::of_pass(job.header, travel.pass, side)))
     }
 
     /// Side parameter of the next pass, a step away.
     fn side_after(&self, job: &Job<'_>, step: f32) -> Result<SpanParameter> {
         let side = self.travel.route.side;
         match &self.planning {
-            PassPlanning::Scan(scan) => scan.estimator().next_side(job, side, step),
-            PassPlanning::Curve(_) => Ok(side),
+            PassPlanning::Scan(scan) => scan.estimator_ref().next_side(job, side, step),
+            PassPlanning::Fronts(_) => Ok(side),
         }
     }
 
@@ -706,8 +814,16 @@ impl Run {
         // A step that is too small is reported by the tick.
         let side = self.side_after(job, step).ok()?;
         match &self.planning {
-            PassPlanning::Scan(scan) => Some(scan.estimator().rows_needed(job, side)),
-            PassPlanning::Curve(_) => None,
+            PassPlanning::Scan(scan) => Some(scan.estimator_ref().rows_needed(job, side)),
+            PassPlanning::Fronts(_) => None,
+        }
+    }
+
+    /// The same for the look-ahead of a job with limits, over the next pass at this side parameter.
+    pub(crate) fn rows_ahead(&self, job: &Job<'_>, side: SpanParameter) -> Option<[u16; 2]> {
+        match &self.planning {
+            PassPlanning::Scan(scan) => Some(scan.estimator_ref().rows_needed(job, side)),
+            PassPlanning::Fronts(_) => None,
         }
     }
 
@@ -719,12 +835,13 @@ impl Run {
     /// Whether the run is exactly at the end of the pass.
     fn end_pass(&mut self, job: &Job<'_>) {
         self.travel.fraction = self.travel.piece.end();
-        let last = schedule::is_last(self.travel.route.side, job.header.side_spans);
-        self.travel.next = if last && job.header.edges == 0 {
-            Next::End
-        } else {
-            Next::Over
+        let last = match &self.planning {
+            PassPlanning::Fronts(fronts) => fronts.is_over(),
+            PassPlanning::Scan(_) => {
+                schedule::is_last(self.travel.route.side, job.header.side_spans) && job.header.edges == 0
+            }
         };
+        self.travel.next = if last { Next::End } else { Next::Over };
     }
 }
 

@@ -14,7 +14,6 @@ use crate::math::number::{Bounded, MM_PER_NM, to_f32};
 use crate::pass::patch::Patch;
 use crate::pass::route::{Piece, Route};
 use crate::pass::step_over::{PassMaximum, StepOverEstimator};
-use crate::surface::Pass as _;
 
 /// Cycles of the pieces, by the pessimistic model of `cargo sim budget`.
 pub(crate) mod cycles {
@@ -101,9 +100,17 @@ impl PassScan {
         self.task = Task::Done;
     }
 
+    /// The estimator of the step to the next pass; a job with limits uses it in its look-ahead.
+    pub(crate) const fn estimator(&mut self) -> &mut StepOverEstimator {
+        &mut self.estimator
+    }
+
+    pub(crate) const fn estimator_ref(&self) -> &StepOverEstimator {
+        &self.estimator
+    }
+
     /// Begins the scan of a pass. `goes_on`: it is on the line of the one before.
     pub(crate) const fn begin(&mut self, route: &Route, goes_on: bool) {
-        self.estimator.enter_row(route.side.span);
         self.route = *route;
         self.goes_on = goes_on;
         self.task = Task::Pass;
@@ -126,11 +133,6 @@ impl PassScan {
         } else {
             self.estimator.begin(job, &self.route);
         }
-    }
-
-    /// The step-over from the pass.
-    pub(crate) const fn estimator(&self) -> &StepOverEstimator {
-        &self.estimator
     }
 
     /// Whether a piece is left.
@@ -187,7 +189,7 @@ impl PassScan {
             Task::Station => {
                 let fraction = self.fraction();
                 // A fault is reported by the tick that reaches it.
-                if let Ok(contact) = self.patch.surface.contact(fraction, &self.patch.ball) {
+                if let Ok(contact) = self.patch.surface.contact_on_line(fraction, &self.patch.ball) {
                     self.estimator.see(job, &self.patch, &contact, fraction);
                 }
                 Task::Estimate(self.estimates(job))
@@ -205,7 +207,7 @@ impl PassScan {
     }
 
     fn begin_patch(&mut self, job: &Job<'_>) -> Task {
-        if self.patch.lay(job, &self.piece).is_err() {
+        if self.patch.lay(job, &self.route, &self.piece).is_err() {
             return Task::Done;
         }
         self.estimator.begin_patch();
@@ -230,7 +232,7 @@ impl PassScan {
 
     /// Length of the patch, roughly, units; 0 where its surface is not evaluated.
     fn length(&self) -> f32 {
-        let at = |fraction| self.patch.evaluate(fraction).map(|(_, located)| located.cc_nm);
+        let at = |fraction| self.patch.evaluate_on_line(fraction).map(|located| located.cc_nm);
         let [start, end] = self.piece.range;
         let middle = (start + (end.saturating_sub(start) >> 1)).saturating_add(1);
         let (Ok(start), Ok(middle), Ok(end)) = (at(start), at(middle), at(end)) else {

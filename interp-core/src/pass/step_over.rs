@@ -21,7 +21,7 @@ use crate::pass::route::Route;
 use crate::pass::row_history::RowHistory;
 use crate::pass::schedule;
 use crate::sample::{SpanParameter, interval_of};
-use crate::surface::{Contact, Pass as _};
+use crate::surface::Contact;
 
 /// Maximum ratio of the step to the first-order step: the neighbouring lines extend no further.
 const STEP_MAX: f32 = 1.25;
@@ -261,7 +261,7 @@ impl StepOverEstimator {
     }
 
     fn begin_range(&mut self, job: &Job<'_>, route: &Route) {
-        let (first, last) = (route.first(job), route.last(job));
+        let (first, last) = (route.first(job), route.last_on_line());
         self.is_whole = route.reach_boundaries(job);
         self.ends = self.is_whole;
         self.searches = self.is_whole;
@@ -527,7 +527,7 @@ impl NeighbourLine {
 
     /// Evaluates the line's start or end.
     fn see_end(&mut self, job: &Job<'_>, fraction: u64) {
-        if let Ok(contact) = self.patch.surface.contact(fraction, &self.patch.ball) {
+        if let Ok(contact) = self.patch.surface.contact_on_line(fraction, &self.patch.ball) {
             self.peak.most = exact_at(job, &self.patch, &contact).at_least(self.peak.most);
         }
     }
@@ -572,7 +572,7 @@ impl NeighbourLine {
                 Task::EvaluateLast
             }
             Task::Evaluate | Task::EvaluateLast => {
-                if let Ok(contact) = self.patch.surface.contact(*fraction, &self.patch.ball) {
+                if let Ok(contact) = self.patch.surface.contact_on_line(*fraction, &self.patch.ball) {
                     self.peak.see(exact_at(job, &self.patch, &contact), *fraction);
                 }
                 self.task
@@ -666,7 +666,7 @@ fn mean(here: f32, half: f32, whole: f32, knots: [bool; 2]) -> f32 {
 /// With a and b for |d|^2 (1 + r c) of these two directions, the crest height is multiplied by 4/(1 + sqrt(a/b))^2.
 #[inline(never)]
 fn at_end(job: &Job<'_>, patch: &Patch, fraction: u64) -> f32 {
-    let Ok(contact) = patch.surface.contact(fraction, &patch.ball) else {
+    let Ok(contact) = patch.surface.contact_on_line(fraction, &patch.ball) else {
         return 0.0;
     };
     let inv_interval_sq = exact_at(job, patch, &contact);

@@ -59,7 +59,10 @@ impl Sequencer {
         }
         match leg {
             Leg::Retract => true,
-            Leg::Traverse => !matches!(self.planning, Planning::Requested(..) | Planning::Stations),
+            Leg::Traverse => !matches!(
+                self.planning,
+                Planning::Awaited(_) | Planning::Requested(..) | Planning::Stations
+            ),
             Leg::Plunge => self.is_planned(),
         }
     }
@@ -151,7 +154,7 @@ impl Sequencer {
             &mut self.profiles,
         );
         if is_over && leg == Leg::Plunge && self.goal == Goal::Pass {
-            self.swap();
+            self.swap(run);
             return self.enter_pass(job, run, command, last);
         }
         run.off_surface(self.straight.position(), self.straight.progress.speed(), last);

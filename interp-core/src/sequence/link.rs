@@ -15,7 +15,6 @@ use crate::math::number::{Bounded, MM_PER_NM, cube_root, to_f32};
 use crate::pass::offset::Located;
 use crate::pass::patch::Patch;
 use crate::pass::position::PassPosition;
-use crate::pass::route::Route;
 use crate::pass::schedule;
 use crate::sample::SpanParameter;
 use crate::sequence::lookahead::check_travel;
@@ -202,6 +201,39 @@ enum Task {
     Done,
 }
 
+/// An end of a pass on a boundary of the surface.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct BoundaryEnd {
+    pub(crate) path: SpanParameter,
+    pub(crate) side: SpanParameter,
+}
+
+/// The parameter that changes along a step-over.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Along {
+    /// The boundary is an end of the path parameter.
+    Side,
+    /// It is the last one of the side parameter.
+    Path,
+}
+
+impl Along {
+    /// Width of a span.
+    fn width(self, job: &Job<'_>, span: u16) -> f32 {
+        match self {
+            Self::Side => job.side_width(span),
+            Self::Path => job.path_width(span),
+        }
+    }
+
+    const fn spans(self, job: &Job<'_>) -> u16 {
+        match self {
+            Self::Side => job.header.side_spans,
+            Self::Path => job.header.path_spans,
+        }
+    }
+}
+
 /// A step-over from the end of a pass to the start of the next, along the boundary.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct BoundaryStepOver {
@@ -209,10 +241,12 @@ pub(crate) struct BoundaryStepOver {
     patch: Patch,
     from: SpanParameter,
     to: SpanParameter,
-    /// Distance of the two passes in the side parameter.
+    /// The parameter from and to which it leads, and its distance.
+    along: Along,
     reach: f32,
-    /// Path span and direction at the end of the pass.
+    /// The patch at the end of the pass, and the fraction of its path span there.
     line: PassPosition,
+    at: u64,
     task: Task,
     window: Window,
     length: f32,
@@ -244,6 +278,8 @@ impl BoundaryStepOver {
         patch: Patch::NONE,
         from: SpanParameter { span: 0, fraction: 0 },
         to: SpanParameter { span: 0, fraction: 0 },
+        along: Along::Side,
+        at: u64::MAX,
         reach: 0.0,
         line: PassPosition {
             side: SpanParameter { span: 0, fraction: 0 },
@@ -264,13 +300,37 @@ impl BoundaryStepOver {
         feed: 1.0,
     };
 
-    /// Begins to plan a step-over from the end of a pass to another, at this feed, mm/s.
-    pub(crate) fn begin(&mut self, job: &Job<'_>, axes: &AxisLimits, pass: &Route, next: &Route, feed: f32) {
-        let width = |span| job.side_width(span);
-        self.from = pass.side;
-        self.to = next.side;
-        self.reach = schedule::apart(pass.side, next.side, width);
-        self.line = pass.last(job).position;
+    /// Begins to plan a step-over from the end of a pass, travelled in this direction, to the start of another, at this feed, mm/s.
+    pub(crate) fn begin(
+        &mut self,
+        job: &Job<'_>,
+        axes: &AxisLimits,
+        (along, reversed): (Along, bool),
+        [end, start]: [BoundaryEnd; 2],
+        feed: f32,
+    ) {
+        let width = |span| along.width(job, span);
+        (self.from, self.to) = match along {
+            Along::Side => (end.side, start.side),
+            Along::Path => (end.path, start.path),
+        };
+        self.along = along;
+        self.reach = if self.goes_back() {
+            schedule::apart(self.to, self.from, width)
+        } else {
+            schedule::apart(self.from, self.to, width)
+        };
+        let reversed = reversed && along == Along::Side;
+        self.at = if reversed {
+            !end.path.fraction
+        } else {
+            end.path.fraction
+        };
+        self.line = PassPosition {
+            side: end.side,
+            reversed,
+            span: end.path.span,
+        };
         self.task = Task::Ends;
         self.window = Window::EMPTY;
         self.limits = MotionLimits::new(axes, feed, job.header.period_s);
@@ -300,21 +360,57 @@ impl BoundaryStepOver {
         !(self.length > to_mm(NOTHING_NM))
     }
 
+    /// Whether the parameter decreases.
+    fn goes_back(&self) -> bool {
+        (self.to.span, self.to.fraction) < (self.from.span, self.from.fraction)
+    }
+
+    /// The parameter at this fraction of the step-over, 0 to 1.
+    fn parameter(&self, job: &Job<'_>, part: f32) -> SpanParameter {
+        let width = |span| self.along.width(job, span);
+        let spans = self.along.spans(job);
+        if part >= 1.0 {
+            self.to
+        } else if !self.goes_back() {
+            schedule::next_side(self.from, self.reach * part, spans, width).unwrap_or(self.from)
+        } else if part <= 0.0 {
+            self.from
+        } else {
+            schedule::next_side(self.to, self.reach * (1.0 - part), spans, width).unwrap_or(self.to)
+        }
+    }
+
     /// Contact and ball centre at this fraction of the step-over, 0 to 1.
     ///
     /// # Errors
     /// The fault of the surface there.
     fn locate(&mut self, job: &Job<'_>, part: f32) -> Result<Located> {
-        let width = |span| job.side_width(span);
-        let side = if part >= 1.0 {
-            self.to
-        } else {
-            let side = schedule::next_side(self.from, self.reach * part, job.header.side_spans, width);
-            side.unwrap_or(self.from)
-        };
-        self.patch.collapse(job, &PassPosition { side, ..self.line })?;
-        let (_, located) = self.patch.evaluate(u64::MAX)?;
+        let parameter = self.parameter(job, part);
+        let at = self.move_to(job, parameter)?;
+        let (_, located) = self.patch.evaluate(at)?;
         Ok(located)
+    }
+
+    /// Collapses the patch at a place of the boundary. Returns the fraction of its path span.
+    fn move_to(&mut self, job: &Job<'_>, parameter: SpanParameter) -> Result<u64> {
+        let (position, at) = match self.along {
+            Along::Side => {
+                let position = PassPosition {
+                    side: parameter,
+                    ..self.line
+                };
+                (position, self.at)
+            }
+            Along::Path => {
+                let position = PassPosition {
+                    span: parameter.span,
+                    ..self.line
+                };
+                (position, parameter.fraction)
+            }
+        };
+        self.patch.collapse(job, &position)?;
+        Ok(at)
     }
 
     /// Plans one portion.
@@ -377,7 +473,8 @@ impl BoundaryStepOver {
 
     /// The task for a knot, if the step-over crosses as many; the first station else.
     const fn next_knot(&self, index: u16) -> Task {
-        if index < KNOTS_MAX && self.from.span + index < self.to.span {
+        let apart = self.to.span.abs_diff(self.from.span);
+        if index < KNOTS_MAX && index < apart {
             Task::Knot(index)
         } else {
             Task::Station(0)
@@ -386,7 +483,7 @@ impl BoundaryStepOver {
 
     /// Where the curvature across a knot jumps, so does the direction of the centre's motion.
     fn look_at_knot(&mut self, job: &Job<'_>, index: u16) -> Result<()> {
-        let span = self.from.span + index;
+        let span = self.from.span.min(self.to.span) + index;
         let before = SpanParameter {
             span,
             fraction: u64::MAX,
@@ -396,23 +493,26 @@ impl BoundaryStepOver {
             fraction: 0,
         };
         let mut sides = [0.0; 2];
-        for (of_side, side) in sides.iter_mut().zip([before, behind]) {
-            self.patch.collapse(job, &PassPosition { side, ..self.line })?;
-            let (contact, _) = self.patch.evaluate(u64::MAX)?;
-            *of_side = contact.across / contact.lateral_squared;
+        for (of_side, parameter) in sides.iter_mut().zip([before, behind]) {
+            let at = self.move_to(job, parameter)?;
+            let (contact, _) = self.patch.evaluate(at)?;
+            *of_side = match self.along {
+                Along::Side => contact.across / contact.lateral_squared,
+                Along::Path => contact.along,
+            };
         }
-        let [before, behind] = sides;
-        let jump = (behind - before).abs();
+        let [bend_before, bend_behind] = sides;
+        let jump = (bend_behind - bend_before).abs();
         // A NaN, at a pole, is none.
         if jump > self.jump {
-            let width = |span| job.side_width(span);
-            let start = SpanParameter {
-                span: span + 1,
-                fraction: 0,
-            };
+            let width = |span| self.along.width(job, span);
             self.jump_beside = self.jump;
             self.jump = jump;
-            self.jump_at = schedule::apart(self.from, start, width) / self.reach;
+            self.jump_at = if self.goes_back() {
+                schedule::apart(behind, self.from, width) / self.reach
+            } else {
+                schedule::apart(self.from, behind, width) / self.reach
+            };
         } else if jump > self.jump_beside {
             self.jump_beside = jump;
         }

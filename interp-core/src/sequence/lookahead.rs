@@ -19,6 +19,7 @@ use crate::pass::route::{Piece, Route};
 use crate::pass::schedule;
 use crate::pass::step_over::{PassMaximum, StepOverEstimator};
 use crate::sample::{SpanParameter, interval_of};
+use crate::sequence::link::{Along, BoundaryEnd};
 use crate::surface::{Contact, PathSpeed};
 
 /// Least length of a cell, mm: a shorter one has differences of rounded positions.
@@ -37,6 +38,16 @@ const NO_JUMP: f32 = 4e-6;
 /// Most stations of a pass, and most patches of which both ends are kept.
 const STATIONS: u16 = 168;
 const PATCHES: u16 = STATIONS / 2;
+/// Words of a bit for each piece of a pass on a front: intervals between stations, and as many crossings of knots; a stretch beyond begins without its arc noted.
+const PIECE_WORDS: usize = 20;
+/// Least length of a stretch of a pass on a front, mm, and of one that ends at a knot; shorter ones have no derivatives of their own.
+const STRETCH_MIN_MM: f32 = 0.6;
+const STRETCH_KNOT_MM: f32 = 0.3;
+const STRETCH_SHORT_MM: f32 = 0.2;
+/// Greatest distance of two passes between which the tool stays on the boundary, mm, in a job of constant scallop height.
+const BESIDE_MM: f32 = 6.0;
+/// Most path spans of a pass on a front that are divided into stretches.
+const SPANS_DIVIDED: u16 = 60;
 const _: () = assert!(STATIONS as usize == STATIONS_MAX);
 /// Most patches of a pass with turns: both ends of each are kept.
 const SPANS_TURNED: u16 = (STATIONS - 2 * turn::STATIONS) / 2;
@@ -47,7 +58,7 @@ pub(crate) struct PassPlan {
     pub(crate) plan: Plan,
     pub(crate) pass: u32,
     pub(crate) route: Route,
-    /// Cells of a patch between kept stations, 0 before the first patch, and the fraction of the patch per cell.
+    /// Cells of a patch (on a front: of a stretch) between kept stations, 0 before the first patch, and the fraction of the patch per cell.
     cells: u16,
     cell_fraction: u64,
     /// Patches of a group: where a pass has more than [`PATCHES`], the ends of groups are kept, with the greatest derivatives within them.
@@ -59,11 +70,17 @@ pub(crate) struct PassPlan {
     /// Cutter location at start and end, nm, and whether the surface faces up there.
     pub(crate) ends: [[i32; 3]; 2],
     pub(crate) faces_up: [bool; 2],
+    /// Side parameter at start and end.
+    pub(crate) sides: [SpanParameter; 2],
+    /// Of a pass on a front, a bit for each piece with which a stretch begins.
+    starts: [u32; PIECE_WORDS],
     /// Minimum interval of the pass.
     pub(crate) interval: f32,
-    /// The pass after this one, and whether a step-over on the surface leads there: along the boundary where both end.
+    /// The pass after this one, where that is known from the pass alone, and whether a step-over on the surface leads there: along the boundary where both end.
     pub(crate) next: Option<Route>,
     pub(crate) steps_over: bool,
+    /// There is no pass after this one.
+    pub(crate) is_last: bool,
     /// Stations of half the turn before the pass, and its length, units of 2^-10 nm.
     head: u16,
     pub(crate) head_q10: i64,
@@ -85,9 +102,12 @@ impl PassPlan {
         full_pace: 1.0,
         ends: [[0; 3]; 2],
         faces_up: [false; 2],
+        sides: [SpanParameter { span: 0, fraction: 0 }; 2],
+        starts: [0; PIECE_WORDS],
         interval: 0.0,
         next: None,
         steps_over: false,
+        is_last: false,
         head: 0,
         head_q10: 0,
         tail: Turn::NONE,
@@ -122,10 +142,71 @@ impl PassPlan {
     }
 }
 
+impl PassPlan {
+    /// Arc at the start of a piece of a pass on a front, units of 2^-10 nm, if a stretch begins with it.
+    pub(crate) fn arc_at_piece_q10(&self, number: u16) -> Option<i64> {
+        let (word, bit) = (usize::from(number >> 5), number & 31);
+        let starts = *self.starts.get(word)?;
+        if starts >> bit & 1 == 0 {
+            return None;
+        }
+        let mut index = (starts & ((1 << bit) - 1)).count_ones();
+        for starts in self.starts.iter().take(word) {
+            index += starts.count_ones();
+        }
+        let station = u16::try_from(index).ok()?.saturating_mul(self.cells + 1);
+        Some(i64::from(self.plan.stations.get(station).arc_nm) << Q10_BITS)
+    }
+
+    /// The start of the pass.
+    pub(crate) const fn start(&self) -> BoundaryEnd {
+        let ([path, _], [side, _]) = (self.route.ends, self.sides);
+        BoundaryEnd { path, side }
+    }
+
+    /// The end of the pass.
+    pub(crate) const fn end(&self) -> BoundaryEnd {
+        let ([_, path], [_, side]) = (self.route.ends, self.sides);
+        BoundaryEnd { path, side }
+    }
+
+    /// The parameter that changes along the boundary that the pass ends on.
+    pub(crate) fn end_boundary(&self, _job: &Job<'_>) -> Along {
+        match self.route.front {
+            Some(front) if front.are_on_boundary[1] => Along::Path,
+            _ => Along::Side,
+        }
+    }
+
+    /// Whether the next pass begins on the boundary that this one ends on, near that end.
+    pub(crate) fn is_beside(&self, next: &Self, job: &Job<'_>) -> bool {
+        let (end, start) = (self.end(), next.start());
+        let is_on_it = match self.end_boundary(job) {
+            Along::Path => start.side == end.side,
+            Along::Side => start.path == end.path,
+        };
+        let mut square = 0.0;
+        for (from, to) in self.ends[1].iter().zip(&next.ends[0]) {
+            let mm = to_f32(i64::from(*to) - i64::from(*from)) * MM_PER_NM;
+            square += mm * mm;
+        }
+        is_on_it && square <= BESIDE_MM * BESIDE_MM
+    }
+
+    /// Notes the piece with which a stretch begins.
+    fn note_stretch(&mut self, number: u16) {
+        if let Some(starts) = self.starts.get_mut(usize::from(number >> 5)) {
+            *starts |= 1 << (number & 31);
+        }
+    }
+}
+
 /// The next task.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Task {
     Patch,
+    /// Lengthen the stretch of a pass on a front by a piece, or end it.
+    Extend,
     Station,
     /// Compute the derivatives at one of the last stations, by its place in the window, up to another.
     Derivatives(u8, u8),
@@ -152,6 +233,10 @@ enum Task {
 mod cycles {
     pub(super) use crate::pass::scan::cycles::{ESTIMATE, NEXT, PATCH, STATION};
 
+    /// On a front: a piece, the next one, a station.
+    pub(super) const PIECE: u32 = 5_000;
+    pub(super) const EXTEND: u32 = 3_000;
+    pub(super) const FRONT_STATION: u32 = 8_000;
     pub(super) const DERIVATIVES: u32 = 3_400;
     pub(super) const CLOSE: u32 = 1_700;
     pub(super) const HALF: u32 = 1_500;
@@ -163,10 +248,20 @@ mod cycles {
 #[derive(Clone, Debug)]
 pub(crate) struct Lookahead {
     patch: Patch,
-    step_over: StepOverEstimator,
     task: Task,
-    /// The piece of the pass that is looked at.
+    /// The piece of the pass that is looked at, and the range of the path span whose stations are counted: the piece's, or on a front that of a stretch of several
+    /// pieces in one span, long enough for differences.
     piece: Piece,
+    range: [u64; 2],
+    /// The first and the last piece of the stretch, and the piece after it.
+    stretch: [Piece; 2],
+    after: Option<Piece>,
+    /// The stretch is too short for derivatives of its own; none was long enough so far.
+    is_short: bool,
+    has_derivatives: bool,
+    /// Least length of a stretch of the pass, mm, and length of the last pass.
+    least_mm: f32,
+    pass_mm: f32,
     /// Station within the patch, from 0, and patches so far.
     station: u16,
     patches: u16,
@@ -176,8 +271,9 @@ pub(crate) struct Lookahead {
     cell_fraction: u64,
     /// Mean length of a patch of the last pass, mm.
     patch_mm: f32,
-    /// What is continuous if the direction of the tool centre's path is, at the end of the last patch: 1 - r k along the path, r times the twist.
-    bend: [f32; 2],
+    /// What is continuous if the direction of the tool centre's path is, at the end of the last patch: 1 - r k along the path, r times the twist;
+    /// on a front 1 - r k across, too.
+    bend: [f32; 3],
     /// Whether it is, from the last patch to this.
     is_smooth: bool,
     speed: PathSpeed,
@@ -201,16 +297,22 @@ impl Lookahead {
     /// No pass yet.
     pub(crate) const START: Self = Self {
         patch: Patch::NONE,
-        step_over: StepOverEstimator::START,
         task: Task::Done,
         piece: Piece::NONE,
+        range: [0, u64::MAX],
+        stretch: [Piece::NONE; 2],
+        after: None,
+        is_short: false,
+        has_derivatives: false,
+        least_mm: STRETCH_MIN_MM,
+        pass_mm: 0.0,
         station: 0,
         patches: 0,
         looks: 1,
         cells: 1,
         cell_fraction: 0,
         patch_mm: 0.0,
-        bend: [0.0; 2],
+        bend: [0.0; 3],
         is_smooth: false,
         speed: PathSpeed::STILL,
         window: Window::EMPTY,
@@ -227,9 +329,8 @@ impl Lookahead {
 
     /// Resets to the state before the first pass.
     pub(crate) const fn restart(&mut self) {
-        self.step_over.restart();
         self.line = None;
-        self.patch_mm = 0.0;
+        (self.patch_mm, self.pass_mm) = (0.0, 0.0);
         self.without = 0;
         self.task = Task::Done;
     }
@@ -240,14 +341,17 @@ impl Lookahead {
     }
 
     /// Cycles of the next task.
-    pub(crate) fn cycles(&self) -> u32 {
+    pub(crate) fn cycles(&self, estimator: Option<&StepOverEstimator>) -> u32 {
+        let makes_patch =
+            |estimator: &StepOverEstimator| estimator.makes_patch(&self.piece.position, self.fraction());
         match self.task {
             Task::Patch => cycles::PATCH,
+            Task::Extend => cycles::EXTEND,
+            Task::Station if self.is_on_front() && self.is_beyond_piece() => cycles::PIECE,
+            Task::Station if self.is_on_front() => cycles::FRONT_STATION,
             Task::Station => cycles::STATION,
             Task::Derivatives(..) => cycles::DERIVATIVES,
-            Task::Estimate(1..) if self.step_over.makes_patch(&self.piece.position, self.fraction()) => {
-                cycles::PATCH
-            }
+            Task::Estimate(1..) if estimator.is_some_and(makes_patch) => cycles::PATCH,
             Task::Estimate(0) => cycles::NEXT,
             Task::Estimate(_) => cycles::ESTIMATE,
             Task::Close => cycles::CLOSE,
@@ -261,18 +365,8 @@ impl Lookahead {
         }
     }
 
-    /// The pass to look over next is in this row.
-    pub(crate) const fn enter_row(&mut self, row: u16) {
-        self.step_over.enter_row(row);
-    }
-
-    /// The first and the last row of patches that the look over the next pass needs, at this side parameter.
-    pub(crate) fn rows_needed(&self, job: &Job<'_>, side: SpanParameter) -> [u16; 2] {
-        self.step_over.rows_needed(job, side)
-    }
-
     /// Begins to look over this pass.
-    pub(crate) fn begin(&mut self, job: &Job<'_>, pass: u32, route: Route, head: &Turn, out: &mut PassPlan) {
+    pub(crate) fn begin(&mut self, pass: u32, route: Route, head: &Turn, out: &mut PassPlan) {
         let goes_on = pass > 0 && self.line == Some(route.side);
         self.line = Some(route.side);
         let has_head = head.exists();
@@ -286,11 +380,8 @@ impl Lookahead {
         out.plan.ends = [head.speed, 0.0];
         // The step-over is that of all passes on the line.
         self.goes_on = goes_on;
-        if goes_on {
-            self.step_over.go_on(job, &route);
-        } else {
+        if !goes_on {
             self.maximum = PassMaximum::NONE;
-            self.step_over.begin(job, &route);
         }
         out.plan.stations.clear();
         out.pass = pass;
@@ -300,6 +391,9 @@ impl Lookahead {
         out.full_pace = 1.0;
         out.next = None;
         out.steps_over = false;
+        out.is_last = false;
+        out.starts = [0; PIECE_WORDS];
+        self.has_derivatives = false;
     }
 
     /// Executes one task.
@@ -311,6 +405,7 @@ impl Lookahead {
         &mut self,
         job: &Job<'_>,
         axes: &AxisLimits,
+        mut estimator: Option<&mut StepOverEstimator>,
         lines: &mut RegionLines,
         out: &mut PassPlan,
     ) -> Result<()> {
@@ -320,42 +415,63 @@ impl Lookahead {
                 if first {
                     self.piece = out.route.first(job);
                 }
-                self.patch.lay(job, &self.piece)?;
+                self.patch.lay(job, &out.route, &self.piece)?;
+                self.range = self.piece.range;
+                if self.is_on_front() {
+                    self.begin_stretch(out)?;
+                    self.task = Task::Extend;
+                    return Ok(());
+                }
                 out.point |= self.patch.point;
-                self.step_over.begin_patch();
+                if let Some(estimator) = estimator {
+                    if first && self.goes_on {
+                        estimator.go_on(job, &out.route);
+                    } else if first {
+                        estimator.begin(job, &out.route);
+                    }
+                    estimator.begin_patch();
+                }
                 self.choose_cells(job, out);
                 self.window = Window::EMPTY;
                 self.arc_mm = 0.0;
                 Task::Station
             }
+            Task::Extend => self.extend_stretch(job, out),
+            Task::Station if self.is_on_front() && self.is_beyond_piece() => {
+                let next = out.route.next(job, &self.piece);
+                self.piece = next.ok_or(Fault::new(FaultKind::PatchTooShort, 0.0))?;
+                self.patch.lay(job, &out.route, &self.piece)?;
+                Task::Station
+            }
             Task::Station => {
-                self.visit(job, axes, out)?;
-                self.after_station(job, out)
+                self.visit(job, axes, estimator.as_deref_mut(), out)?;
+                self.after_station(job, estimator.as_deref(), out)
             }
             Task::Derivatives(at, last) => {
                 self.differentiate(at, out);
                 if at < last {
                     Task::Derivatives(at + 1, last)
                 } else {
-                    self.estimates(job, out)
+                    self.estimates(job, estimator.as_deref(), out)
                 }
             }
             Task::Estimate(0) => self.next_station(job, out),
             Task::Estimate(looks) => {
                 let fraction = self.fraction();
                 let most = self.maximum.inv_interval_sq;
-                self.step_over
-                    .work(job, &self.piece.position, &self.patch, fraction, most);
+                if let Some(estimator) = estimator {
+                    estimator.work(job, &self.piece.position, &self.patch, fraction, most);
+                }
                 Task::Estimate(looks - 1)
             }
             Task::Close => {
-                if !self.goes_on && self.looks_again(job) {
+                if !self.goes_on && looks_again(job, estimator.as_deref_mut()) {
                     let (pass, route, head) = (out.pass, out.route, self.turn);
                     self.line = None;
-                    self.begin(job, pass, route, &head, out);
+                    self.begin(pass, route, &head, out);
                     return Ok(());
                 }
-                if self.close(job, lines, out)? {
+                if self.close(job, estimator, lines, out)? {
                     self.choose_link(job, axes, out)
                 } else {
                     Task::Seek
@@ -407,18 +523,141 @@ impl Lookahead {
             span: self.piece.position.span,
             fraction: out.route.turned(fraction),
         };
-        (out.pass, path, out.route.side)
+        (out.pass, path, self.patch.side_at(&self.piece.position, fraction))
+    }
+
+    const fn is_on_front(&self) -> bool {
+        self.piece.front.is_some()
+    }
+
+    /// Whether the station is on a later piece.
+    const fn is_beyond_piece(&self) -> bool {
+        self.fraction() > self.piece.end()
+    }
+
+    /// Length of a part of the path span on this patch, roughly, mm; 0 where it is not known.
+    fn part_mm(&self, part: u64) -> f32 {
+        let length = fraction_to_f32(part) / self.speed.inv_speed;
+        if length.is_finite() { length } else { 0.0 }
+    }
+
+    /// Begins a stretch of a pass on a front.
+    fn begin_stretch(&mut self, out: &mut PassPlan) -> Result<()> {
+        let PathSpeed {
+            inv_speed,
+            log_speed_derivative,
+        } = self.patch.start().checked()?;
+        self.speed = PathSpeed {
+            inv_speed: inv_speed * self.patch.per_mm,
+            log_speed_derivative,
+        };
+        self.stretch = [self.piece; 2];
+        if self.patches > 0 {
+            return Ok(());
+        }
+        let [start, end] = out.route.ends;
+        let spans = start.span.abs_diff(end.span) + 1;
+        let pieces = out.route.front.map_or(1, |front| front.pieces);
+        out.group = if spans > SPANS_DIVIDED {
+            spans.div_ceil(PATCHES)
+        } else {
+            1
+        };
+        let room = PATCHES.saturating_sub(SPANS_DIVIDED.min(spans)).saturating_sub(8);
+        self.least_mm = if spans > SPANS_DIVIDED {
+            f32::MAX
+        } else if pieces + 4 <= PATCHES {
+            STRETCH_MIN_MM
+        } else {
+            (self.pass_mm / f32::from(room)).at_least(STRETCH_MIN_MM)
+        };
+        let expected = pieces.min(PATCHES - 4) + 4;
+        let fit = STATIONS
+            .checked_div(expected)
+            .unwrap_or(1)
+            .saturating_sub(1)
+            .max(1);
+        let kept = u16::try_from(truncated(self.least_mm / CELL_KEPT_MM)).unwrap_or(u16::MAX);
+        out.cells = kept.clamp(1, fit);
+        if out.group > 1 {
+            out.cells = 1;
+        }
+        Ok(())
+    }
+
+    /// Lengthens the stretch by a piece, or ends it.
+    fn extend_stretch(&mut self, job: &Job<'_>, out: &mut PassPlan) -> Task {
+        let [first, last] = self.stretch;
+        self.after = out.route.next(job, &last);
+        let span = first.position.span;
+        if let Some(next) = self.after.filter(|next| next.position.span == span)
+            && !self.is_long_enough(&last, out)
+        {
+            self.stretch = [first, next];
+            self.range = [self.range[0], next.end()];
+            return Task::Extend;
+        }
+        if let Some(front) = first.front.filter(|_| self.patches.is_multiple_of(out.group)) {
+            out.note_stretch(front.number);
+        }
+        let [start, end] = self.range;
+        let length = self.part_mm(end.saturating_sub(start));
+        let whole = |value: f32| u16::try_from(truncated(value)).unwrap_or(u16::MAX);
+        let fine = whole(length / CELL_FINE_MM).max(CELLS_FINE);
+        let most = whole(length / CELL_MIN_MM).max(2);
+        self.is_short = length < STRETCH_SHORT_MM;
+        self.looks = if self.is_short {
+            1
+        } else {
+            fine.min(most).div_ceil(out.cells.max(1)).clamp(1, LOOKS_MAX)
+        };
+        self.cells = out.cells * self.looks;
+        let part = end.saturating_sub(start).checked_div(u64::from(self.cells));
+        self.cell_fraction = part.unwrap_or(u64::MAX);
+        if !self.is_short {
+            out.plan.stations.note_spacing(length / f32::from(self.cells));
+        }
+        self.window = Window::EMPTY;
+        self.arc_mm = 0.0;
+        self.station = 0;
+        Task::Station
+    }
+
+    /// Whether the stretch that ends with this piece has the length for differences, and leaves it to the rest of the span.
+    fn is_long_enough(&self, last: &Piece, out: &PassPlan) -> bool {
+        let [start, end] = self.range;
+        let [_, pass_end] = out.route.ends;
+        let span = last.position.span;
+        let span_end = if span == pass_end.span {
+            out.route.turned(pass_end.fraction)
+        } else {
+            u64::MAX
+        };
+        let at_knot = last.front.is_some_and(|front| front.is_at_knot());
+        let least = if at_knot {
+            self.least_mm.at_most(STRETCH_KNOT_MM)
+        } else {
+            self.least_mm
+        };
+        // Each span that is left takes a stretch.
+        let spans = span.abs_diff(pass_end.span) + 2;
+        let taken = (self.patches + spans).saturating_mul(out.cells + 1);
+        self.least_mm < f32::MAX
+            && taken < STATIONS
+            && self.part_mm(end.saturating_sub(start)) >= least
+            && self.part_mm(span_end.saturating_sub(end)) >= STRETCH_KNOT_MM
     }
 
     const fn is_end(&self) -> bool {
         self.station >= self.cells
     }
 
-    fn fraction(&self) -> u64 {
+    const fn fraction(&self) -> u64 {
+        let [start, end] = self.range;
         if self.is_end() {
-            return self.piece.end();
+            return end;
         }
-        self.piece.start() + u64::from(self.station) * self.cell_fraction
+        start + self.station as u64 * self.cell_fraction
     }
 
     /// Chooses the cells of a patch: those between kept stations by the number of patches and their length, the same for the whole pass; those
@@ -471,7 +710,7 @@ impl Lookahead {
 
     /// Length of the patch, roughly, mm; 0 where its surface is not evaluated.
     fn patch_length(&self) -> f32 {
-        let at = |fraction| self.patch.evaluate(fraction).map(|(_, located)| located.cc_nm);
+        let at = |fraction| self.patch.evaluate_on_line(fraction).map(|located| located.cc_nm);
         let [start, end] = self.piece.range;
         let middle = start + end.saturating_sub(start).div_ceil(2);
         let (Ok(start), Ok(middle), Ok(end)) = (at(start), at(middle), at(end)) else {
@@ -489,9 +728,9 @@ impl Lookahead {
     }
 
     /// The derivatives that can be taken after a station.
-    fn after_station(&self, job: &Job<'_>, out: &PassPlan) -> Task {
-        if out.point {
-            return self.estimates(job, out);
+    fn after_station(&self, job: &Job<'_>, estimator: Option<&StepOverEstimator>, out: &PassPlan) -> Task {
+        if out.point || (self.is_on_front() && self.is_short) {
+            return self.estimates(job, estimator, out);
         }
         let is_end = self.is_end();
         let count = self.window.count();
@@ -505,16 +744,16 @@ impl Lookahead {
         };
         let to = if is_end { last } else { middle };
         if count < WINDOW && !is_end {
-            return self.estimates(job, out);
+            return self.estimates(job, estimator, out);
         }
         match (u8::try_from(from), u8::try_from(to)) {
             (Ok(from), Ok(to)) => Task::Derivatives(from, to),
-            _ => self.estimates(job, out),
+            _ => self.estimates(job, estimator, out),
         }
     }
 
     /// Stores the derivatives at a place of the window, if its station is kept or belongs to a group.
-    fn differentiate(&self, at: u8, out: &mut PassPlan) {
+    fn differentiate(&mut self, at: u8, out: &mut PassPlan) {
         let behind = self.window.count().saturating_sub(1 + usize::from(at));
         let station = self.station.saturating_sub(u16::try_from(behind).unwrap_or(0));
         let looks = self.looks.max(1);
@@ -534,9 +773,19 @@ impl Lookahead {
                 // The direction at the start of a patch is that at the end of the last, where it is known not to jump.
                 let direction = place.q;
                 place.q = self.window.derivatives(usize::from(at));
-                if station == 0 && self.is_smooth {
+                if station == 0 && self.is_smooth && self.has_derivatives {
                     for (q, direction) in place.q.iter_mut().zip(&direction) {
                         q[0] = direction[0];
+                    }
+                }
+                if !self.has_derivatives {
+                    // Those before were too short for derivatives of their own.
+                    self.has_derivatives = true;
+                    let q = place.q;
+                    for before in back..=stations.count() {
+                        if let Some(place) = stations.back_mut(before) {
+                            place.q = q;
+                        }
                     }
                 }
             }
@@ -544,15 +793,12 @@ impl Lookahead {
     }
 
     /// Evaluations of the step-over estimator at a station.
-    fn estimates(&self, job: &Job<'_>, out: &PassPlan) -> Task {
+    fn estimates(&self, job: &Job<'_>, estimator: Option<&StepOverEstimator>, out: &PassPlan) -> Task {
         let first = self.station == 0;
         let begins = first && self.patches == 0;
         let ends = self.is_end() && out.route.next(job, &self.piece).is_none();
-        Task::Estimate(if job.header.spacing == Spacing::FirstOrder {
-            0
-        } else {
-            self.step_over.evaluations(first, begins, ends)
-        })
+        let estimator = estimator.filter(|_| job.header.spacing == Spacing::Exact);
+        Task::Estimate(estimator.map_or(0, |estimator| estimator.evaluations(first, begins, ends)))
     }
 
     /// Advances to the next station, the next patch, or the end.
@@ -562,7 +808,12 @@ impl Lookahead {
             return Task::Station;
         }
         self.start_q10 += to_q10(self.arc_mm);
-        match out.route.next(job, &self.piece) {
+        let next = if self.is_on_front() {
+            self.after
+        } else {
+            out.route.next(job, &self.piece)
+        };
+        match next {
             Some(piece) => {
                 self.piece = piece;
                 self.station = 0;
@@ -574,7 +825,13 @@ impl Lookahead {
     }
 
     /// Evaluates the station: fit of the ball, travel, inverse square interval, arc.
-    fn visit(&mut self, job: &Job<'_>, axes: &AxisLimits, out: &mut PassPlan) -> Result<()> {
+    fn visit(
+        &mut self,
+        job: &Job<'_>,
+        axes: &AxisLimits,
+        estimator: Option<&mut StepOverEstimator>,
+        out: &mut PassPlan,
+    ) -> Result<()> {
         let fraction = self.fraction();
         let (contact, located) = self.patch.evaluate(fraction)?;
         check_travel(axes, &located.cl_nm)?;
@@ -586,30 +843,39 @@ impl Lookahead {
                 shape: [contact.across, contact.lateral_squared],
             };
         }
-        self.step_over.see(job, &self.patch, &contact, fraction);
+        if let Some(estimator) = estimator {
+            estimator.see(job, &self.patch, &contact, fraction);
+        }
+        let side = self.patch.side_at(&self.piece.position, fraction);
         let is_up = self.patch.faces_up(contact.offset);
         if (self.patches == 0 && self.station == 0) || out.point {
-            (out.ends, out.faces_up) = ([located.cl_nm; 2], [is_up; 2]);
+            (out.ends, out.faces_up, out.sides) = ([located.cl_nm; 2], [is_up; 2], [side; 2]);
         }
-        (out.ends[1], out.faces_up[1]) = (located.cl_nm, is_up);
+        (out.ends[1], out.faces_up[1], out.sides[1]) = (located.cl_nm, is_up, side);
         if out.point {
             return Ok(());
         }
+        let path = self.speed_of(&contact);
         if self.station > 0 {
-            self.arc_mm += self.cell_length(&contact);
+            self.arc_mm += self.cell_length(&path);
         }
         let twist = if contact.lateral_squared > 0.0 {
             sqrt((contact.twist_squared / contact.lateral_squared).at_least(0.0))
         } else {
             0.0
         };
-        let bend = [contact.along, twist];
+        let across = if self.is_on_front() {
+            contact.across / contact.lateral_squared
+        } else {
+            0.0
+        };
+        let bend = [contact.along, twist, across];
         if self.station == 0 {
             let apart = |(from, to): (&f32, &f32)| (to - from).abs() > NO_JUMP;
             self.is_smooth = self.patches > 0 && !self.bend.iter().zip(&bend).any(apart);
         }
         self.bend = bend;
-        self.speed = contact.path;
+        self.speed = path;
         self.window.push(located.cl_nm, self.arc_mm);
         self.keep(out);
         Ok(())
@@ -639,12 +905,33 @@ impl Lookahead {
     }
 
     /// Arc from the last station, mm: Hermite's two-point rule.
-    fn cell_length(&self, contact: &Contact) -> f32 {
-        let whole = self.piece.end().saturating_sub(self.piece.start());
-        let length = fraction_to_f32(whole) / f32::from(self.cells);
-        let (first, last) = (1.0 / self.speed.inv_speed, 1.0 / contact.path.inv_speed);
-        let bow = first * self.speed.log_speed_derivative - last * contact.path.log_speed_derivative;
-        length * (0.5 * (first + last) + bow * length * (1.0 / 12.0)) / self.patch.per_mm
+    fn cell_length(&self, path: &PathSpeed) -> f32 {
+        let [start, end] = self.range;
+        let length = fraction_to_f32(end.saturating_sub(start)) / f32::from(self.cells);
+        let (first, last) = (1.0 / self.speed.inv_speed, 1.0 / path.inv_speed);
+        let bow = first * self.speed.log_speed_derivative - last * path.log_speed_derivative;
+        let units = length * (0.5 * (first + last) + bow * length * (1.0 / 12.0));
+        if self.is_on_front() {
+            units
+        } else {
+            units / self.patch.per_mm
+        }
+    }
+
+    /// The parametrisation at a station; on a front, where the next station may be on another patch, per mm.
+    fn speed_of(&self, contact: &Contact) -> PathSpeed {
+        let PathSpeed {
+            inv_speed,
+            log_speed_derivative,
+        } = contact.path;
+        PathSpeed {
+            inv_speed: if self.is_on_front() {
+                inv_speed * self.patch.per_mm
+            } else {
+                inv_speed
+            },
+            log_speed_derivative,
+        }
     }
 
     /// No turn is tried for some passes: the plan before the last one is slower than a rest would make it.
@@ -677,9 +964,10 @@ impl Lookahead {
         };
         self.ends = [from, from];
         self.piece = next.first(job);
-        if self.patch.lay(job, &self.piece).is_err() || self.patch.point {
+        if self.patch.lay(job, &next, &self.piece).is_err() || self.patch.point {
             return Task::Done;
         }
+        self.range = self.piece.range;
         self.window = Window::EMPTY;
         (self.station, self.arc_mm) = (0, 0.0);
         Task::Start
@@ -697,7 +985,7 @@ impl Lookahead {
                 return Task::Done;
             }
         } else {
-            self.arc_mm += self.cell_length(&contact);
+            self.arc_mm += self.cell_length(&contact.path);
         }
         self.speed = contact.path;
         self.window.push(located.cl_nm, self.arc_mm);
@@ -773,11 +1061,6 @@ impl Lookahead {
         });
     }
 
-    /// Whether the first pass is to be looked at again for the step-over.
-    fn looks_again(&mut self, job: &Job<'_>) -> bool {
-        job.header.spacing == Spacing::Exact && self.step_over.looks_again(job.header)
-    }
-
     /// Begins to look for a turn where there may be one.
     fn choose_link(&mut self, job: &Job<'_>, axes: &AxisLimits, out: &PassPlan) -> Task {
         let rests = self.without > 0;
@@ -790,9 +1073,16 @@ impl Lookahead {
     }
 
     /// Computes the interval and the next pass; returns whether that is known, and not to be sought in a region.
-    fn close(&mut self, job: &Job<'_>, lines: &mut RegionLines, out: &mut PassPlan) -> Result<bool> {
+    fn close(
+        &mut self,
+        job: &Job<'_>,
+        mut estimator: Option<&mut StepOverEstimator>,
+        lines: &mut RegionLines,
+        out: &mut PassPlan,
+    ) -> Result<bool> {
         let patches = f32::from(self.patches.saturating_add(1));
-        self.patch_mm = to_f32(self.start_q10 - out.head_q10) * MM_PER_Q10 / patches;
+        self.pass_mm = to_f32(self.start_q10 - out.head_q10) * MM_PER_Q10;
+        self.patch_mm = self.pass_mm / patches;
         let header = job.header;
         out.interval = interval_of(self.maximum.inv_interval_sq);
         if let Some(route) = lines.take(header) {
@@ -800,21 +1090,53 @@ impl Lookahead {
             return Ok(true);
         }
         let step = match header.spacing {
-            Spacing::Exact | Spacing::Constant | Spacing::ConstantFromMiddle => {
-                self.step_over.step(header, self.maximum)
+            Spacing::Exact => {
+                let estimator = estimator.as_deref_mut();
+                estimator.map_or(out.interval, |estimator| estimator.step(header, self.maximum))
             }
             Spacing::FirstOrder => out.interval,
+            Spacing::Constant | Spacing::ConstantFromMiddle => {
+                self.finish_short(out);
+                return Ok(true);
+            }
         };
         if header.edges > 0 {
             return Ok(!lines.go_on(job, step)?);
         }
         if !schedule::is_last(out.route.side, header.side_spans) {
-            let side = self.step_over.next_side(job, out.route.side, step)?;
+            let side = match estimator {
+                Some(estimator) => estimator.next_side(job, out.route.side, step)?,
+                None => out.route.side,
+            };
             out.next = Some(Route::of_pass(header, out.pass.wrapping_add(1), side));
             out.steps_over = header.pattern == Pattern::Zigzag;
         }
         Ok(true)
     }
+
+    /// A pass that is too short for derivatives is straight.
+    fn finish_short(&self, out: &mut PassPlan) {
+        if !out.route.is_on_front() || self.has_derivatives {
+            return;
+        }
+        let [from, to] = out.ends;
+        let length = self.pass_mm.at_least(MM_PER_NM);
+        let mut q = [[0.0; 3]; 3];
+        for ((q, from), to) in q.iter_mut().zip(from).zip(to) {
+            q[0] = to_f32(i64::from(to) - i64::from(from)) * MM_PER_NM / length;
+        }
+        for station in 1..=out.plan.stations.count() {
+            if let Some(place) = out.plan.stations.back_mut(station) {
+                place.q = q;
+            }
+        }
+    }
+}
+
+/// Whether the first pass is to be looked at again for the step-over.
+fn looks_again(job: &Job<'_>, estimator: Option<&mut StepOverEstimator>) -> bool {
+    let estimator = estimator.filter(|_| job.header.spacing == Spacing::Exact);
+    estimator.is_some_and(|estimator| estimator.looks_again(job.header))
 }
 
 /// Passes without a turn after one whose plan had to be slowed down for it.

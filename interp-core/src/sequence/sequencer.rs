@@ -12,16 +12,17 @@ use crate::feed::plan::{Cursor, Plan};
 use crate::feed::planner::{PORTION_CYCLES, Planner};
 use crate::feed::profile::Profiles;
 use crate::feed::turn::Turn;
-use crate::job::AxisLimits;
-use crate::job::program::Job;
+use crate::job::program::{Job, Program};
+use crate::job::{AxisLimits, Pattern};
 use crate::math::number::{Bounded, to_f32};
+use crate::pass::front::NextRoute;
 use crate::pass::route::Route;
 use crate::pass::run::Run;
-use crate::pass::scan::cycles::PATCH;
+use crate::pass::scan::cycles::{NEXT, PATCH};
 use crate::sample::{Sample, SpanParameter};
 use crate::sequence::hop::Hop;
 use crate::sequence::legs::{Goal, Leg, LegPlanning};
-use crate::sequence::link::{BoundaryStepOver, StraightMove, check_faces_up};
+use crate::sequence::link::{BoundaryEnd, BoundaryStepOver, StraightMove, check_faces_up};
 use crate::sequence::lookahead::{Lookahead, PassPlan, has_turns};
 use crate::sequence::turning::{Part, road};
 
@@ -94,8 +95,10 @@ pub(crate) enum Outcome {
 /// Planning of the next pass.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Planning {
-    /// It is to be begun, for this number of the pass on this route.
-    Requested(u32, Route),
+    /// It waits until the pass with this number is made, of a job of constant scallop height.
+    Awaited(u32),
+    /// It is to be begun, for this number of the pass on the plan's route.
+    Requested(u32),
     /// Its stations are being located.
     Stations,
     /// Its feed is being planned.
@@ -151,8 +154,12 @@ pub(crate) struct Sequencer {
     step_over: BoundaryStepOver,
     /// Whether the step-over to the next pass is begun.
     has_step_over: bool,
-    /// Periods of planning of the next pass so far.
+    /// Whether the link to the next pass of a job of constant scallop height is to be chosen.
+    has_to_choose: bool,
+    /// Periods of planning of the next pass so far, and of making the next front and the one before it.
     spent: u32,
+    front_spent: u32,
+    front_last: u32,
     /// Feed factor of the last period, and the feed that the rest of the pass was last planned for, mm/s.
     feed_factor: f32,
     replanned: f32,
@@ -195,7 +202,10 @@ impl Sequencer {
         has_hop: false,
         step_over: BoundaryStepOver::NONE,
         has_step_over: false,
+        has_to_choose: false,
         spent: 0,
+        front_spent: 0,
+        front_last: 0,
         feed_factor: 1.0,
         replanned: 0.0,
         at: None,
@@ -220,7 +230,11 @@ impl Sequencer {
         }
         self.lookahead.restart();
         self.feed_factor = 1.0;
-        self.request_planning(0, Some(first));
+        (self.front_spent, self.front_last) = (0, 0);
+        self.has_to_choose = false;
+        let (_, next) = both(&mut self.plans, self.second);
+        next.route = first;
+        self.request_planning(Planning::Requested(0));
     }
 
     /// The tool's position, nm, once it is known.
@@ -246,7 +260,7 @@ impl Sequencer {
 
     /// The first and the last row of patches that are needed to go on, where the tool stands before a pass whose successor is to be planned next: at the end of the pass before it, or
     /// above its start. With the pass begins the planning of that successor.
-    pub(crate) fn rows_needed(&self, job: &Job<'_>) -> Option<[u16; 2]> {
+    pub(crate) fn rows_needed(&self, job: &Job<'_>, run: &Run) -> Option<[u16; 2]> {
         if self.has_rows || self.pending.is_some() || !self.is_planned() {
             return None;
         }
@@ -259,7 +273,7 @@ impl Sequencer {
         };
         let (_, next) = self.plans_ref();
         let after = next.next.filter(|_| is_due)?;
-        Some(self.lookahead.rows_needed(job, after.side))
+        run.rows_ahead(job, after.side)
     }
 
     /// They are there.
@@ -296,7 +310,7 @@ impl Sequencer {
     }
 
     /// Whether [`Self::plan`] has anything to do.
-    pub(crate) fn has_to_plan(&self) -> bool {
+    pub(crate) fn has_to_plan(&self, run: &Run) -> bool {
         let is_busy = match self.phase {
             Phase::Pass | Phase::Turn => self.pace.has_work(),
             Phase::StepOver => self.step_over.progress.has_work(),
@@ -310,7 +324,11 @@ impl Sequencer {
             || wants_more
             || self.pass_ahead().is_some()
             || (self.pending.is_none()
-                && (self.planning != Planning::Complete || self.has_to_plan_step_over() || self.has_hop))
+                && (self.planning != Planning::Complete
+                    || self.has_to_plan_step_over()
+                    || self.has_hop
+                    || self.may_choose()
+                    || run.front_cycles() > 0))
     }
 
     /// Whether the next pass is planned.
@@ -322,25 +340,56 @@ impl Sequencer {
         self.has_step_over && !self.step_over.is_planned()
     }
 
+    /// Whether the link to the next pass can be chosen, and has to be.
+    fn may_choose(&self) -> bool {
+        self.has_to_choose
+            && matches!(self.phase, Phase::Pass | Phase::Await)
+            && matches!(
+                self.planning,
+                Planning::Feed | Planning::Rest | Planning::Complete
+            )
+    }
+
     /// The planning of one period: work of at most [`PORTION_CYCLES`] cycles.
     #[inline(never)]
-    pub(crate) fn plan(&mut self, job: &Job<'_>, axes: &AxisLimits, run: &mut Run) {
+    pub(crate) fn plan(&mut self, program: &Program, store: &mut [i32], run: &mut Run) {
+        let Some(axes) = &program.header().axes else {
+            return;
+        };
         let mut left = PORTION_CYCLES;
         match self.planning {
             Planning::Requested(..) | Planning::Stations | Planning::Feed => {
                 self.spent = self.spent.saturating_add(1);
             }
-            Planning::Complete if self.wants_more(job) => return self.plan_for_override(job, axes),
-            Planning::Complete | Planning::Rest => {}
+            Planning::Complete => {
+                if let Ok(job) = program.job(store)
+                    && self.wants_more(&job)
+                {
+                    self.plan_for_override(&job, axes);
+                    if run.front_cycles() == 0 {
+                        return;
+                    }
+                }
+            }
+            Planning::Awaited(_) | Planning::Rest => {}
         }
+        let mut makes_front = false;
         for _ in 0..PIECES_MAX {
-            let cycles = self.next_cycles();
+            let (is_front, cycles) = self.next_cycles(run);
             if cycles == 0 || cycles > left {
-                return;
+                break;
             }
             left -= cycles;
-            self.work(job, axes, run);
+            if is_front {
+                makes_front = true;
+                if let Ok((job, rest)) = program.job_and_rest(store) {
+                    run.make_front(&job, rest);
+                }
+            } else if let Ok(job) = program.job(store) {
+                self.work(&job, axes, run);
+            }
         }
+        self.front_spent = self.front_spent.saturating_add(u32::from(makes_front));
     }
 
     /// Whether the override asks for more than the plans give.
@@ -354,8 +403,21 @@ impl Sequencer {
         self.phase == Phase::Pass && self.feed_factor > 1.0 && (of(one) || of(other)) && !self.pace.has_work()
     }
 
-    /// Cycles of the next piece of planning; 0 where there is none.
-    fn next_cycles(&self) -> u32 {
+    /// Cycles of the next piece of planning, 0 where there is none; and whether it is a portion of the next front.
+    fn next_cycles(&self, run: &Run) -> (bool, u32) {
+        let cycles = self.next_own_cycles(run);
+        let waits = matches!(self.planning, Planning::Awaited(_) | Planning::Complete);
+        let front = run.front_cycles();
+        match cycles {
+            Some(cycles) => (false, cycles),
+            None if waits && front > 0 => (true, front),
+            None if matches!(self.planning, Planning::Awaited(_)) => (false, BEGIN_CYCLES),
+            None => (false, 0),
+        }
+    }
+
+    /// Cycles of the next piece apart from the next front; none where there is none, or the next front comes first.
+    fn next_own_cycles(&self, run: &Run) -> Option<u32> {
         let [one, other] = &self.plans;
         let (now, next) = if self.second {
             (&other.plan, &one.plan)
@@ -364,35 +426,40 @@ impl Sequencer {
         };
         match self.phase {
             Phase::Pass | Phase::Turn if self.pace.has_work() && self.pace.begins_search() => {
-                return PACE_BEGIN_CYCLES;
+                return Some(PACE_BEGIN_CYCLES);
             }
-            Phase::Pass | Phase::Turn if self.pace.has_work() => return PACE_CYCLES,
-            Phase::StepOver if self.step_over.progress.has_work() => return LINK_PACE_CYCLES,
-            Phase::Leg(_) if self.straight.progress.has_work() => return LINK_PACE_CYCLES,
-            Phase::Hop if self.hop.has_work() => return HOP_PACE_CYCLES,
-            Phase::AwaitGoal(leg) if self.has_to_plan_leg(leg) => return LEG_CYCLES,
+            Phase::Pass | Phase::Turn if self.pace.has_work() => return Some(PACE_CYCLES),
+            Phase::StepOver if self.step_over.progress.has_work() => return Some(LINK_PACE_CYCLES),
+            Phase::Leg(_) if self.straight.progress.has_work() => return Some(LINK_PACE_CYCLES),
+            Phase::Hop if self.hop.has_work() => return Some(HOP_PACE_CYCLES),
+            Phase::AwaitGoal(leg) if self.has_to_plan_leg(leg) => return Some(LEG_CYCLES),
             _ => {}
         }
         if self.pass_ahead().is_some() {
-            return PATCH;
+            return Some(PATCH);
         }
         if self.pending.is_some() {
-            return 0;
+            return Some(0);
+        }
+        if self.may_choose() {
+            return Some(NEXT);
         }
         if self.has_to_plan_step_over() {
-            return STEP_OVER_CYCLES;
+            return Some(STEP_OVER_CYCLES);
         }
-        match self.planning {
+        Some(match self.planning {
+            Planning::Awaited(_) => return None,
             Planning::Requested(..) => BEGIN_CYCLES,
-            Planning::Stations => self.lookahead.cycles(),
+            Planning::Stations => self.lookahead.cycles(run.estimator_ref()),
             Planning::Feed => self.planner.cycles(next),
             Planning::Rest if self.planner.is_done() => TAKE_OVER_CYCLES,
             Planning::Rest => self.planner.cycles(now),
             Planning::Complete if self.has_hop => HOP_CYCLES,
-            Planning::Complete => 0,
-        }
+            Planning::Complete => return None,
+        })
     }
 
+    #[inline(never)]
     fn work(&mut self, job: &Job<'_>, axes: &AxisLimits, run: &mut Run) {
         if let Phase::AwaitGoal(leg) = self.phase
             && self.has_to_plan_leg(leg)
@@ -421,11 +488,23 @@ impl Sequencer {
             self.has_first_patch = false;
             return run.prepare_pass(job, &route);
         }
+        if self.may_choose() {
+            return self.choose_link(job);
+        }
         let (now, next) = both(&mut self.plans, self.second);
         if self.has_step_over && self.step_over.is_requested() {
-            if let Some(route) = now.next {
+            let start = if job.header.spacing.is_constant() {
+                Some(next.start())
+            } else {
+                now.next.map(|route| BoundaryEnd {
+                    path: route.ends[0],
+                    side: route.side,
+                })
+            };
+            if let Some(start) = start {
                 let feed = job.header.feed_mm_s * self.feed_factor.at_least(1.0);
-                self.step_over.begin(job, axes, &now.route, &route, feed);
+                let way = (now.end_boundary(job), now.route.reversed);
+                self.step_over.begin(job, axes, way, [now.end(), start], feed);
             }
             return;
         }
@@ -434,14 +513,28 @@ impl Sequencer {
             return;
         }
         match self.planning {
-            Planning::Requested(pass, route) => {
-                self.lookahead.enter_row(route.side.span);
-                self.lookahead.begin(job, pass, route, &now.tail, next);
+            Planning::Awaited(pass) => match run.next_pass(job) {
+                Ok(NextRoute::Pass(route)) => {
+                    next.route = route;
+                    self.planning = Planning::Requested(pass);
+                }
+                Ok(NextRoute::NotYet) => {}
+                Ok(NextRoute::None) => self.planning = Planning::Complete,
+                Err(fault) => self.pending = Some(fault),
+            },
+            Planning::Requested(pass) => {
+                if let (Some(estimator), _) = run.estimator_and_lines() {
+                    estimator.enter_row(next.route.side.span);
+                }
+                self.lookahead.begin(pass, next.route, &now.tail, next);
+                next.is_last = run.is_last_pass();
                 self.planning = Planning::Stations;
             }
             Planning::Stations => {
-                self.pending = self.lookahead.work(job, axes, &mut run.lines, next).err();
+                let (estimator, lines) = run.estimator_and_lines();
+                self.pending = self.lookahead.work(job, axes, estimator, lines, next).err();
                 if self.lookahead.is_done() {
+                    next.is_last |= next.next.is_none() && !job.header.spacing.is_constant();
                     self.planning = if next.point {
                         Planning::Complete
                     } else {
@@ -454,9 +547,19 @@ impl Sequencer {
             }
             Planning::Feed => {
                 // The pass after it takes as long to plan; off the surface it can be waited for.
-                let is_last = next.next.is_none() && !self.planner.is_walking();
-                let least = if !is_last && next.steps_over {
-                    self.spent.saturating_add(SPARE_PERIODS)
+                let is_last = next.is_last && !self.planner.is_walking();
+                let is_on_surface = if job.header.spacing.is_constant() {
+                    job.header.pattern == Pattern::Zigzag
+                } else {
+                    next.steps_over
+                };
+                let least = if !is_last && is_on_surface {
+                    let front = if run.needs_front() {
+                        front_periods(self.front_spent, self.front_last)
+                    } else {
+                        0
+                    };
+                    self.spent.saturating_add(front).saturating_add(SPARE_PERIODS)
                 } else {
                     0
                 };
@@ -519,7 +622,7 @@ impl Sequencer {
                 self.follower.keep_to_plan(true);
                 self.planning = Planning::Rest;
             }
-        } else if now.next.is_some()
+        } else if !now.is_last
             && !next.point
             && feed > REPLANNED * next.plan.limits.feed
             && left_periods > 1.5 * f32::from(next.plan.intervals) * PERIODS_A_NODE + PERIODS_A_PASS
@@ -531,10 +634,24 @@ impl Sequencer {
     }
 
     /// Has the pass after the one that is followed next planned, if there is one.
-    fn request_planning(&mut self, pass: u32, route: Option<Route>) {
-        self.planning = route.map_or(Planning::Complete, |route| Planning::Requested(pass, route));
+    const fn request_planning(&mut self, planning: Planning) {
+        self.planning = planning;
         self.has_step_over = false;
+        self.has_to_choose = false;
         self.spent = 0;
+    }
+
+    /// Chooses the link to the next pass of a job of constant scallop height: along the boundary where both passes end on the same one, near each other.
+    fn choose_link(&mut self, job: &Job<'_>) {
+        self.has_to_choose = false;
+        let (now, next) = both(&mut self.plans, self.second);
+        now.steps_over = job.header.pattern == Pattern::Zigzag && now.is_beside(next, job);
+        if now.steps_over {
+            self.step_over.request();
+            self.has_step_over = true;
+        } else {
+            self.has_hop = true;
+        }
     }
 
     /// One period, into `last`. The phases off the passes are separate functions, so that a tick on a pass saves no registers for them.
@@ -581,7 +698,7 @@ impl Sequencer {
         command: FeedCommand,
         last: &mut Sample,
     ) -> Result<()> {
-        self.leave(job, command)?;
+        self.leave(job, run, command)?;
         match self.phase {
             Phase::StepOver => self.follow_step_over(job, run, command, last),
             Phase::Leg(leg) => self.follow_leg(leg, job, run, command, last),
@@ -597,12 +714,12 @@ impl Sequencer {
     }
 
     /// Ends a wait where what is waited for is there.
-    fn leave(&mut self, job: &Job<'_>, command: FeedCommand) -> Result<()> {
+    fn leave(&mut self, job: &Job<'_>, run: &mut Run, command: FeedCommand) -> Result<()> {
         if self.phase == Phase::Await {
             if let Some(fault) = self.pending {
                 return Err(fault);
             }
-            if !self.is_planned() || self.has_to_plan_step_over() {
+            if !self.is_planned() || self.has_to_plan_step_over() || self.has_to_choose {
                 return Ok(());
             }
             let (now, next) = both(&mut self.plans, self.second);
@@ -612,7 +729,7 @@ impl Sequencer {
                 self.step_over
                     .progress
                     .begin(pace.at_most(1.0), job.header.period_s);
-                self.swap();
+                self.swap(run);
             } else {
                 check_faces_up(next.faces_up[0] && (now.faces_up[1] || !self.on_surface))?;
                 self.goal = Goal::Pass;
@@ -626,11 +743,22 @@ impl Sequencer {
     }
 
     /// The next pass becomes the one that is followed, and the one after it is planned.
-    pub(super) fn swap(&mut self) {
+    pub(super) fn swap(&mut self, run: &mut Run) {
         self.second = !self.second;
-        let (now, _) = both(&mut self.plans, self.second);
-        let (pass, route) = (now.pass.wrapping_add(1), now.next);
-        self.request_planning(pass, route);
+        let (now, next) = both(&mut self.plans, self.second);
+        let pass = now.pass.wrapping_add(1);
+        let planning = match now.next {
+            Some(route) => {
+                next.route = route;
+                Planning::Requested(pass)
+            }
+            None if now.is_last => Planning::Complete,
+            None => Planning::Awaited(pass),
+        };
+        if run.arrive_on_front() {
+            (self.front_last, self.front_spent) = (self.front_spent, 0);
+        }
+        self.request_planning(planning);
     }
 
     /// Enters the pass, which begins at the tool's position, and emits its first sample.
@@ -650,17 +778,23 @@ impl Sequencer {
         self.follower.begin(&now.plan);
         let pace = pace_on(now, command.feed_factor);
         self.pace.begin(pace, job.header.period_s);
-        self.start_pass();
+        self.start_pass(job);
         Ok(())
     }
 
     /// Resets what belongs to a pass, and requests the link to the next one.
-    pub(super) fn start_pass(&mut self) {
+    pub(super) fn start_pass(&mut self, job: &Job<'_>) {
         self.has_first_patch = true;
         let (now, _) = both(&mut self.plans, self.second);
         self.cell = [0; 2];
         self.correction = None;
         self.replanned = 0.0;
+        if job.header.spacing.is_constant() {
+            self.has_to_choose = !now.is_last;
+            self.has_hop = false;
+            self.hop.clear();
+            return;
+        }
         if now.steps_over && !now.turns() {
             self.step_over.request();
             self.has_step_over = true;
@@ -686,7 +820,10 @@ impl Sequencer {
             return None;
         }
         let (now, next) = self.plans_ref();
-        let is_located = !matches!(self.planning, Planning::Requested(..) | Planning::Stations);
+        let is_located = !matches!(
+            self.planning,
+            Planning::Awaited(_) | Planning::Requested(..) | Planning::Stations
+        );
         match self.phase {
             Phase::StepOver => Some(now),
             Phase::Turn => {
@@ -790,12 +927,13 @@ impl Sequencer {
     #[inline(never)]
     fn end_pass(&mut self, job: &Job<'_>, command: FeedCommand) -> Result<()> {
         self.has_rows = false;
+        let stays = self.stays_on_surface(job);
         let (now, next) = both(&mut self.plans, self.second);
-        if now.next.is_none() {
+        if now.is_last {
             check_faces_up(now.faces_up[1])?;
             self.goal = Goal::Home;
             self.await_goal(Leg::Retract);
-        } else if now.steps_over {
+        } else if stays {
             self.phase = Phase::Await;
         } else {
             check_faces_up(now.faces_up[1])?;
@@ -811,6 +949,16 @@ impl Sequencer {
             }
         }
         Ok(())
+    }
+
+    /// Whether the tool waits on the surface for the link from a pass that has ended: along the boundary, which is planned; of straight passes of a zigzag job
+    /// always, because their planning keeps ahead. A fault of the next pass stops it there.
+    fn stays_on_surface(&self, job: &Job<'_>) -> bool {
+        let (now, _) = self.plans_ref();
+        if !job.header.spacing.is_constant() {
+            return now.steps_over;
+        }
+        self.pending.is_some() || (self.has_step_over && self.is_planned()) || !now.faces_up[1]
     }
 
     /// Corrects the progress at each station by the plan's arc, so that errors do not accumulate from station to station: some periods after it was
@@ -833,7 +981,11 @@ impl Sequencer {
             return;
         };
         self.cell = cell;
-        let (Some(start_q10), Some(since_mm)) = (now.arc_q10(cell), run.since_station(cell, kept)) else {
+        let arc = match now.route.is_on_front() {
+            true => now.arc_at_piece_q10(cell[0]),
+            false => now.arc_q10(cell),
+        };
+        let (Some(start_q10), Some(since_mm)) = (arc, run.since_station(cell, kept)) else {
             return;
         };
         let arc_q10 = start_q10 + crate::feed::to_q10(since_mm);
@@ -856,7 +1008,7 @@ impl Sequencer {
             job.header.period_s,
             &mut self.profiles,
         ) {
-            self.swap();
+            self.swap(run);
             return self.enter_pass(job, run, command, last);
         }
         run.off_surface(self.hop.position(), self.hop.speed(), last);
@@ -933,4 +1085,10 @@ fn is_too_slow(pass: &PassPlan) -> bool {
     let rest_s = feed / acceleration + acceleration / jerk;
     let lasts_s = to_f32(i64::from(pass.plan.periods)) * period;
     lasts_s * (1.0 / pass.plan.pace_max - 1.0) > REST_SHARE * rest_s
+}
+
+/// Periods that making the front after the next takes, by those of the next front and of the one before, with a quarter more.
+const fn front_periods(so_far: u32, last: u32) -> u32 {
+    let most = if so_far > last { so_far } else { last };
+    most.saturating_add(most / 4)
 }

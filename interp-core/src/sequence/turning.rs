@@ -90,7 +90,7 @@ impl Sequencer {
         let (now, _) = self.plans_ref();
         let beyond = now.plan.beyond(&self.follower.cursor);
         self.turn = now.tail;
-        self.swap();
+        self.swap(run);
         let (now, _) = self.plans_ref();
         run.arrive(job, now.pass, now.route, now.interval)?;
         let mut follower = self.follower;
@@ -98,7 +98,7 @@ impl Sequencer {
         follower.tick(&now.plan, beyond / job.header.period_s);
         self.follower = follower;
         self.pace.relocate(Cursor::come_near);
-        self.start_pass();
+        self.start_pass(job);
         Ok(())
     }
 }

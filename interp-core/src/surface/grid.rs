@@ -3,7 +3,6 @@
 
 use super::lines::CoordinateCubics;
 use super::pole::Reduced;
-use super::rational::WEIGHT_ONE;
 use super::{Edges, IsoLine};
 
 /// The evaluation routine of the cubics.
@@ -69,10 +68,7 @@ impl GridPass {
         }
         if self.kind == GridKind::Pole {
             if weight.is_none() {
-                self.weight = CoordinateCubics {
-                    value: [WEIGHT_ONE, 0, 0, 0],
-                    ..CoordinateCubics::NONE
-                };
+                self.weight = CoordinateCubics::ONE;
             }
             self.reduced.collapse(&self.axes, blocks, edges, at);
         }

@@ -1,6 +1,7 @@
 //! One coordinate of a patch on a pass, and the records' common parts.
 
 use super::range::{HeadWord, Root};
+use super::rational::WEIGHT_ONE;
 use super::{Edges, IsoLine};
 use crate::math::arith::{cubic, jet, quadratic};
 
@@ -22,6 +23,21 @@ impl CoordinateCubics {
         side: [0; 4],
         side2: [0; 4],
     };
+
+    /// A weight of 1.
+    pub(super) const ONE: Self = Self {
+        value: [WEIGHT_ONE, 0, 0, 0],
+        side: [0; 4],
+        side2: [0; 4],
+    };
+
+    /// Those of a block at a side parameter.
+    #[inline(always)]
+    pub(super) fn at(block: &[i32; 16], at: &IsoLine) -> Self {
+        let mut cubics = Self::NONE;
+        cubics.collapse(block, at);
+        cubics
+    }
 
     /// Collapses `c[i][j]` of `path^i side^j`, j fastest, at a side parameter.
     #[inline(always)]

@@ -10,12 +10,15 @@
 //! normal times the ball's radius is an integer vector, used for the cutter location; its products with the
 //! second derivatives are r times the second fundamental form. Both parameters are centred, -1/2 to 1/2 over a span.
 //!
+//! Along a curve of both parameters ([`CurvePass`]) a patch is not collapsed once, because the side parameter changes with each sample.
+//!
 //! **Poles.** Where a boundary collapses into a point, one first derivative vanishes along it. A flag of the patch marks the boundary,
 //! and `collapse` divides that derivative by its root exactly (synthetic division of the polynomial): `A = a Ã`, `B = b B̃`
 //! with scalars a (fixed on a pass) and b (linear along it) that carry the zero. The normal is computed from `Ã x B̃`, as accurate
 //! at the pole as elsewhere, and no quotient has a or b as divisor unless it is known to be non-zero.
 
 mod ball;
+mod curve;
 mod grid;
 mod lines;
 mod pole;
@@ -30,6 +33,7 @@ pub use rational::{RATIONAL_WORDS, RationalRecord};
 pub use revolved::{REVOLVED_WORDS, RevolvedRecord};
 
 pub(crate) use ball::{Ball, OffsetUnits};
+pub(crate) use curve::{CurvePass, RecordKind, SideCurve};
 pub(crate) use grid::{GridKind, GridPass};
 pub(crate) use pole::PolePass;
 pub(crate) use polynomial::{ExtrudedPass, PolynomialPass, RuledPass};
@@ -292,6 +296,7 @@ pub(crate) enum Surface {
     Grid(GridPass),
     Profile(ProfilePass),
     Circle(CirclePass),
+    Curve(CurvePass),
 }
 
 /// A surface on one pass, by its kind.
@@ -303,6 +308,7 @@ pub(crate) enum AnyPass<'a> {
     Pole(PolePass<'a>),
     Profile(&'a ProfilePass),
     Circle(&'a CirclePass),
+    Curve(&'a CurvePass),
 }
 
 /// The sample path's interface to a surface on a pass.
@@ -318,6 +324,20 @@ impl Pass for Surface {
     /// Dispatches at run time: for callers outside the sample path.
     #[inline(never)]
     fn contact(&self, fraction: u64, ball: &Ball) -> Result<Contact> {
+        match self {
+            Self::Curve(pass) => pass.contact(fraction, ball),
+            _ => self.contact_on_line(fraction, ball),
+        }
+    }
+}
+
+impl Surface {
+    /// [`Pass::contact`] on a line of constant side parameter, for what is never on a curve.
+    ///
+    /// # Errors
+    /// As [`Pass::contact`].
+    #[inline(never)]
+    pub(crate) fn contact_on_line(&self, fraction: u64, ball: &Ball) -> Result<Contact> {
         match self.pass() {
             // Bit-identical to the specialised evaluations, see the tests in polynomial.rs.
             AnyPass::Polynomial(PolynomialPass(pass))
@@ -327,11 +347,10 @@ impl Pass for Surface {
             AnyPass::Pole(pass) => pass.contact(fraction, ball),
             AnyPass::Profile(pass) => pass.contact(fraction, ball),
             AnyPass::Circle(pass) => pass.contact(fraction, ball),
+            AnyPass::Curve(_) => Err(degenerate(0.0, 0.0)),
         }
     }
-}
 
-impl Surface {
     /// The pass by its kind.
     #[inline(always)]
     pub(crate) const fn pass(&self) -> AnyPass<'_> {
@@ -345,20 +364,7 @@ impl Surface {
             },
             Self::Profile(pass) => AnyPass::Profile(pass),
             Self::Circle(pass) => AnyPass::Circle(pass),
-        }
-    }
-
-    /// First and second derivatives at a fraction of the patch, in the direction of travel.
-    #[inline(never)]
-    pub(crate) fn derivatives(&self, fraction: u64) -> Derivatives {
-        match self.pass() {
-            AnyPass::Polynomial(PolynomialPass(pass))
-            | AnyPass::Ruled(RuledPass(pass))
-            | AnyPass::Extruded(ExtrudedPass(pass)) => PolynomialPass(pass).derivatives(fraction),
-            AnyPass::Rational(pass) => pass.derivatives(fraction),
-            AnyPass::Pole(pass) => pass.derivatives(fraction),
-            AnyPass::Profile(pass) => pass.derivatives(fraction),
-            AnyPass::Circle(pass) => pass.derivatives(fraction),
+            Self::Curve(pass) => AnyPass::Curve(pass),
         }
     }
 
@@ -382,6 +388,7 @@ impl Surface {
             AnyPass::Pole(pass) => pass.path_at(fraction),
             AnyPass::Profile(pass) => pass.path_at(fraction),
             AnyPass::Circle(pass) => pass.path(),
+            AnyPass::Curve(pass) => pass.path_at(fraction),
         }
     }
 }

@@ -10,7 +10,7 @@ use super::grid::GridPass;
 use super::lines::{CoordinateCubics, quotient_across, quotient_along};
 use super::range::{Edges, Root};
 use super::rational::{Weight, quarter};
-use super::{Contact, Derivatives, Factors, IsoLine, Local, Pass, PathSpeed, path_factor};
+use super::{Contact, Factors, IsoLine, Local, Pass, PathSpeed, path_factor};
 use crate::fault::Result;
 use crate::math::arith::{centred, centred_to_f32, cubic, jet, mul_q30, quarter_of, subtract, tangent};
 
@@ -67,23 +67,96 @@ impl Reduced {
         edges: Edges,
         at: &IsoLine,
     ) {
-        self.pole = match edges.path_root(at.reversed) {
-            Some(root) if edges.side_root().is_none() => Pole::AtEnd(root),
-            _ => Pole::Beside,
-        };
+        self.pole = Pole::of(edges, at);
         (self.path_factor, self.inverse_path_factor) = path_factor(edges, at);
         for ((axis, line), block) in self.axes.iter_mut().zip(lines).zip(blocks) {
-            if let Pole::AtEnd(root) = self.pole {
-                axis.value = quotient_along(&line.value, root);
-                axis.side = quotient_along(&line.side, root);
-                axis.side2 = quotient_along(&line.side2, root);
-            } else {
-                if let Some(root) = edges.side_root() {
-                    axis.value = quotient_across(block, root, at);
-                }
-                axis.side = line.side;
-                axis.side2 = line.side2;
+            axis.reduce(line, block, self.pole, edges, at);
+        }
+    }
+}
+
+impl Pole {
+    fn of(edges: Edges, at: &IsoLine) -> Self {
+        match edges.path_root(at.reversed) {
+            Some(root) if edges.side_root().is_none() => Self::AtEnd(root),
+            _ => Self::Beside,
+        }
+    }
+}
+
+impl Pole {
+    /// b of B = b B~.
+    fn side_factor(self, w: i32) -> f32 {
+        match self {
+            Self::Beside => 1.0,
+            Self::AtEnd(root) => {
+                let [offset, slope] = root.linear();
+                offset + slope * centred_to_f32(w)
             }
+        }
+    }
+}
+
+impl ReducedCubics {
+    /// Divides a coordinate by the root of the patch's flagged boundary.
+    fn reduce(&mut self, line: &CoordinateCubics, block: &[i32; 16], pole: Pole, edges: Edges, at: &IsoLine) {
+        if let Pole::AtEnd(root) = pole {
+            self.value = quotient_along(&line.value, root);
+            self.side = quotient_along(&line.side, root);
+            self.side2 = quotient_along(&line.side2, root);
+        } else {
+            if let Some(root) = edges.side_root() {
+                self.value = quotient_across(block, root, at);
+            }
+            self.side = line.side;
+            self.side2 = line.side2;
+        }
+    }
+}
+
+/// The pole of a patch on a line of the side parameter, for an evaluation that collapses one coordinate at a time.
+pub(super) struct PoleAt {
+    pole: Pole,
+    edges: Edges,
+    path_factors: (f32, f32),
+}
+
+impl PoleAt {
+    /// The pole of a patch with these collapsed boundaries, if there is one.
+    pub(super) fn new(edges: Edges, at: &IsoLine) -> Option<Self> {
+        (edges.count() > 0).then(|| Self {
+            pole: Pole::of(edges, at),
+            edges,
+            path_factors: path_factor(edges, at),
+        })
+    }
+
+    /// One coordinate of a [`Local`]: position, path, path2, side, mixed, side2.
+    #[inline(never)]
+    pub(super) fn axis(
+        &self,
+        line: &CoordinateCubics,
+        block: &[i32; 16],
+        at: &IsoLine,
+        weight: &Weight,
+        w: i32,
+    ) -> [i32; 6] {
+        let mut reduced = ReducedCubics::default();
+        reduced.reduce(line, block, self.pole, self.edges, at);
+        let line = PoleLine {
+            line,
+            reduced: &reduced,
+            pole: self.pole,
+        };
+        line.at(weight, w)
+    }
+
+    pub(super) fn factors(&self, w: i32) -> Factors {
+        let (path, inverse_path) = self.path_factors;
+        Factors {
+            path,
+            inverse_path,
+            side: self.pole.side_factor(w),
         }
     }
 }
@@ -194,26 +267,11 @@ impl Part {
 
 impl PolePass<'_> {
     fn factors(&self, w: i32) -> Factors {
-        let side = match self.0.reduced.pole {
-            Pole::Beside => 1.0,
-            Pole::AtEnd(root) => {
-                let [offset, slope] = root.linear();
-                offset + slope * centred_to_f32(w)
-            }
-        };
         Factors {
             path: self.0.reduced.path_factor,
             inverse_path: self.0.reduced.inverse_path_factor,
-            side,
+            side: self.0.reduced.pole.side_factor(w),
         }
-    }
-
-    /// Derivatives at a fraction of the patch.
-    pub(crate) fn derivatives(&self, fraction: u64) -> Derivatives {
-        let w = centred(fraction);
-        let weight = Weight::at(&self.0.weight, w);
-        self.local(w)
-            .derivatives(&self.factors(w), weight.log_derivatives())
     }
 }
 

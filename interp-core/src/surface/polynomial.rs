@@ -8,7 +8,7 @@ use super::Ball;
 use super::grid::GridPass;
 use super::lines::{CoordinateCubics, coefficients, collapses, record_words, split};
 use super::range::{BAD_PATCH, Edges, HeadWord, fits};
-use super::{Contact, Derivatives, Factors, Local, Pass, PathSpeed};
+use super::{Contact, Factors, Local, Pass, PathSpeed};
 use crate::fault::Result;
 use crate::math::arith::{centred, cubic, jet, tangent};
 
@@ -110,13 +110,6 @@ impl PolynomialPass<'_> {
     pub(crate) fn path_at(&self, fraction: u64) -> PathSpeed {
         let local = local::<false, false>(self.0, fraction);
         PathSpeed::new(&local.path, &local.path2, 0.0, 1.0)
-    }
-}
-
-impl PolynomialPass<'_> {
-    /// Derivatives at a fraction of the patch.
-    pub(crate) fn derivatives(&self, fraction: u64) -> Derivatives {
-        local::<true, true>(self.0, fraction).derivatives(&Factors::ONE, [0.0; 2])
     }
 }
 

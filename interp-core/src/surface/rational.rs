@@ -9,7 +9,7 @@ use super::Ball;
 use super::grid::GridPass;
 use super::lines::{CoordinateCubics, coefficients, collapses, record_words, split};
 use super::range::{BAD_PATCH, Edges, HeadWord, Root, fits, patch_bound};
-use super::{Contact, Derivatives, Factors, Local, Pass, PathSpeed};
+use super::{Contact, Factors, Local, Pass, PathSpeed};
 use crate::fault::Result;
 use crate::math::arith::{
     centred, cubic, jet, mul_hi, mul_q29, quarter_of, reciprocal_q29, subtract, tangent, to_f32,
@@ -196,7 +196,7 @@ pub(crate) struct RationalPass<'a>(pub(super) &'a GridPass);
 
 /// One coordinate of a [`Local`]: position, path, path2, side, mixed, side2.
 #[inline(always)]
-fn axis(line: &CoordinateCubics, weight: &Weight, w: i32) -> [i32; 6] {
+pub(super) fn axis(line: &CoordinateCubics, weight: &Weight, w: i32) -> [i32; 6] {
     let [value, path, path2] = jet(&line.value, w);
     let [side, mixed] = tangent(&line.side, w);
     let s = weight.divide(value);
@@ -215,13 +215,6 @@ impl RationalPass<'_> {
     pub(crate) fn path_at(&self, fraction: u64) -> PathSpeed {
         let local = self.local(fraction);
         PathSpeed::new(&local.path, &local.path2, local.excess, local.g)
-    }
-
-    /// Derivatives at a fraction of the patch.
-    pub(crate) fn derivatives(&self, fraction: u64) -> Derivatives {
-        let weight = Weight::at(&self.0.weight, centred(fraction));
-        self.local(fraction)
-            .derivatives(&Factors::ONE, weight.log_derivatives())
     }
 
     /// The quotient rule with the numerators' derivatives relative to the point: `w S_path = P_path - S w_path`, and

@@ -63,11 +63,6 @@ const BOUNDS: &[(&str, u32, &str)] = &[
         "edges of a portion: TAKEN",
     ),
     (
-        "interp_core::pass::contact::solve",
-        2,
-        "Newton steps: NEWTON_STEPS",
-    ),
-    (
         "interp_core::positioning::Periods::shortest",
         3,
         "whole numbers beside the best real one",
@@ -296,11 +291,6 @@ const BOUNDS: &[(&str, u32, &str)] = &[
         "steps of an estimate: AHEAD_STEPS",
     ),
     (
-        "interp_core::sequence::sequencer::Sequencer::work",
-        64,
-        "periods ahead of the tool: LEAD",
-    ),
-    (
         "interp_core::pass::schedule::apart",
         16,
         "spans between two passes: WALK_MAX",
@@ -321,12 +311,6 @@ const BOUNDS: &[(&str, u32, &str)] = &[
         "pulses of a period: SLOTS over the shortest spacing, 2",
     ),
     (
-        "interp_core::surface::lines::CoordinateCubics::collapse",
-        4,
-        "rows of a block",
-    ),
-    ("interp_core::surface::pole::Reduced::collapse", 3, "axes"),
-    (
         "interp_core::job::stations::Stations::for_intervals",
         10,
         "powers of two of a span's parts",
@@ -340,11 +324,6 @@ const BOUNDS: &[(&str, u32, &str)] = &[
         "interp_core::pass::front::advance::Advance::sweep",
         8,
         "members that leave the hull: MEMBERS_MAX; columns of a station",
-    ),
-    (
-        "interp_core::pass::front::advance::Advance::work",
-        16,
-        "rows of a portion: CHUNK",
     ),
     (
         "interp_core::pass::front::crest::shifted",
@@ -382,14 +361,54 @@ const BOUNDS: &[(&str, u32, &str)] = &[
         "intervals beside a station",
     ),
     (
-        "interp_core::pass::front::travel::CurveRun::along",
-        4,
-        "stations and spans of an arc: CROSSINGS_MAX + 1",
-    ),
-    (
-        "interp_core::pass::front::travel::CurveRun::next_part_of_front",
+        "interp_core::pass::front::sequence::FrontSequence::next_part",
         513,
         "stations: PARTS_MAX + 1",
+    ),
+    (
+        "interp_core::pass::front::line::FrontLine::leaves",
+        31,
+        "bisections of a place: BISECTIONS; extrema of a cubic",
+    ),
+    (
+        "interp_core::sequence::link::BoundaryStepOver::look_at_knot",
+        2,
+        "sides of a knot",
+    ),
+    (
+        "interp_core::sequence::lookahead::Lookahead::differentiate",
+        168,
+        "stations of a pass: STATIONS",
+    ),
+    (
+        "interp_core::sequence::lookahead::Lookahead::finish_short",
+        168,
+        "stations of a pass: STATIONS",
+    ),
+    (
+        "interp_core::sequence::lookahead::PassPlan::arc_at_piece_q10",
+        20,
+        "words of the pieces: PIECE_WORDS",
+    ),
+    (
+        "interp_core::pass::run::Run::step_far",
+        5,
+        "pieces of an arc: CROSSINGS_ON_FRONT_MAX + 1",
+    ),
+    (
+        "interp_core::surface::curve::weighted_at",
+        4,
+        "rows of a block; coordinates",
+    ),
+    (
+        "interp_core::surface::grid::GridPass::collapse",
+        4,
+        "rows of a block; coordinates",
+    ),
+    (
+        "interp_core::sequence::sequencer::Sequencer::next_own_cycles",
+        2,
+        "ends of a plan that are compared",
     ),
 ];
 

@@ -16,21 +16,6 @@ const CREASE_MAX: f64 = 1e-3;
 /// Radius of a circle that is a point, mm.
 const POINT_MM: f64 = 1e-5;
 
-/// Refuses what the fronts are not made for, before the surface is prepared.
-///
-/// # Errors
-/// Axis limits.
-pub(super) fn check_job(job: &Job) -> Result<(), JobError> {
-    if job.spacing.is_constant() && job.machine.has_limits() {
-        return Err(job.origin.error(
-            "cut.spacing",
-            "passes of constant scallop height are made for jobs without axis limits only",
-            "write spacing = \"exact\", or remove the axis limits",
-        ));
-    }
-    Ok(())
-}
-
 /// Refuses a crease, a pole beside the passes, too many path spans, and a job for whose stations the store has no room.
 ///
 /// # Errors

@@ -106,7 +106,6 @@ pub fn prepare(job: &Job) -> Result<Prepared, JobError> {
         ));
     }
     region::check_job(job)?;
-    fronts::check_job(job)?;
     let sign = geometry::tool_sign(job)?;
     #[allow(clippy::cast_possible_truncation, reason = "the machine's own precision")]
     let header = Header {

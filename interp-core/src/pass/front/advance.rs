@@ -9,12 +9,11 @@ use crate::math::arith::{sqrt, to_f32, truncated};
 use crate::math::number::{Bounded, MM_PER_NM, to_f32 as wide_to_f32};
 use crate::pass::front::crest::{CURRENT, CrestSearch, NEXT, Place, Tools};
 use crate::pass::front::foot::{FootStep, Found};
-use crate::pass::front::frame::{Frame, MARGIN};
+use crate::pass::front::frame::{Frame, FreePatch, MARGIN};
 use crate::pass::front::limits::Limiter;
 use crate::pass::front::side::{Direction, SideCursor, UNIT, WHOLE};
 use crate::pass::front::spline::{self, Cubic};
 use crate::pass::front::table::{Column, Table, UNMEASURED};
-use crate::pass::patch::Patch;
 use crate::pass::scan::cycles;
 use crate::sample::SpanParameter;
 
@@ -121,7 +120,7 @@ pub(crate) struct Advance {
     stations: Stations,
     pub(crate) direction: Direction,
     cursor: SideCursor,
-    patch: Patch,
+    patch: FreePatch,
     limiter: Limiter,
     foot: FootStep,
     search: CrestSearch,
@@ -152,7 +151,7 @@ impl Advance {
         stations: Stations { spans: 1, bits: 6 },
         direction: Direction::FROM_EDGE,
         cursor: SideCursor::NONE,
-        patch: Patch::NONE,
+        patch: FreePatch::NONE,
         limiter: Limiter::NONE,
         foot: FootStep::NONE,
         search: CrestSearch::NONE,
@@ -171,6 +170,7 @@ impl Advance {
         self.station = 0;
         if is_first {
             self.cursor = cursor;
+            self.patch.forget();
             self.advanced = 0.0;
             self.length_mm = 0.0;
             self.before = None;

@@ -8,11 +8,10 @@ use crate::math::arith::{power_of_two, sqrt, to_f32, truncated};
 use crate::math::number::{Bounded, MM_PER_NM, to_f32 as wide_to_f32};
 use crate::math::vec3::Vec3;
 use crate::pass::edge::Seen;
-use crate::pass::front::frame::Frame;
+use crate::pass::front::frame::{Frame, FreePatch};
 use crate::pass::front::side::{Direction, SideCursor, UNIT};
 use crate::pass::front::spline::{Cubic, CurvePoint};
 use crate::pass::front::table::{Column, Table};
-use crate::pass::patch::Patch;
 use crate::pass::step_over::height_limit_mm;
 
 /// Iterations for the foot of the point on a pass.
@@ -53,7 +52,7 @@ pub(crate) struct CrestSearch {
 
 /// What the search evaluates with.
 pub(crate) struct Tools<'a, 'b> {
-    pub(crate) patch: &'a mut Patch,
+    pub(crate) patch: &'a mut FreePatch,
     pub(crate) job: &'a Job<'b>,
     pub(crate) cursor: &'a mut SideCursor,
     pub(crate) direction: &'a Direction,

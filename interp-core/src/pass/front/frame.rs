@@ -9,13 +9,30 @@ use crate::math::vec3::Vec3;
 use crate::pass::front::side::{Direction, SideCursor, fine};
 use crate::pass::offset::check_fit;
 use crate::pass::patch::Patch;
-use crate::pass::position::PassPosition;
 use crate::pass::step_over::height_limit_mm;
 use crate::sample::SpanParameter;
-use crate::surface::Pass as _;
 
 /// Scallop height for which the fronts are made, as a share of the limit.
 pub(crate) const MARGIN: f32 = 0.993;
+
+/// A patch that is evaluated at any place, with the spans of its record.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct FreePatch {
+    patch: Patch,
+    record: Option<[u16; 2]>,
+}
+
+impl FreePatch {
+    pub(crate) const NONE: Self = Self {
+        patch: Patch::NONE,
+        record: None,
+    };
+
+    /// Forgets the record: the job may be another.
+    pub(crate) const fn forget(&mut self) {
+        self.record = None;
+    }
+}
 
 /// First fundamental form (e, f, g) and `I - r II` (a, b, c) by the path parameter and the share of the whole side parameter, mm^2.
 #[derive(Clone, Copy, Debug, Default)]
@@ -42,7 +59,7 @@ impl Frame {
     /// As [`Patch::evaluate`].
     #[inline(never)]
     pub(crate) fn at(
-        patch: &mut Patch,
+        patch: &mut FreePatch,
         job: &Job<'_>,
         cursor: &mut SideCursor,
         direction: &Direction,
@@ -50,17 +67,15 @@ impl Frame {
         distance: i32,
     ) -> Result<Self> {
         let (side, share) = cursor.seek(job, direction, fine(distance));
-        patch.collapse(
-            job,
-            &PassPosition {
-                side,
-                reversed: false,
-                span: path.span,
-            },
-        )?;
-        let contact = patch.surface.contact(path.fraction, &patch.ball)?;
+        let record = [path.span, side.span];
+        if patch.record != Some(record) {
+            patch.record = None;
+            patch.patch.take_record(job, record)?;
+            patch.record = Some(record);
+        }
+        let patch = &patch.patch;
+        let (contact, by) = patch.surface_at(path.fraction, side.fraction)?;
         check_fit(&contact)?;
-        let by = patch.surface.derivatives(path.fraction);
         let along = 1.0 / (job.path_width(path.span) * patch.per_mm);
         let out = direction.sign() / (share * patch.per_mm);
         let offset = patch.locator.offset_mm(&contact);

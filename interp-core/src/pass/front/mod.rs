@@ -21,16 +21,19 @@
 //! | [`limits`] | slope and turning of a front |
 //! | [`crest`] | the height between two fronts, measured by the balls |
 //! | [`advance`] | the next front, in portions |
-//! | [`travel`] | the samples along the fronts |
+//! | [`line`] | a pass on a front, and its pieces |
+//! | [`sequence`] | the passes in order |
 
 mod advance;
 mod crest;
 mod foot;
 mod frame;
 mod limits;
+mod line;
+mod sequence;
 mod side;
 mod spline;
 pub(crate) mod table;
-mod travel;
 
-pub(crate) use travel::CurveRun;
+pub(crate) use line::{FrontLine, FrontPiece, PiecePlace};
+pub(crate) use sequence::{FrontSequence, NextRoute};

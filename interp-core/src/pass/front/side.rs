@@ -13,8 +13,8 @@ pub(crate) const UNIT: f32 = power_of_two(-28);
 pub(crate) const FINE_BITS: u32 = 12;
 
 /// A distance in fine units.
-pub(crate) fn fine(distance: i32) -> i64 {
-    i64::from(distance) << FINE_BITS
+pub(crate) const fn fine(distance: i32) -> i64 {
+    (distance as i64) << FINE_BITS
 }
 
 /// A fine distance in units, rounded down.
@@ -60,6 +60,28 @@ impl Direction {
         self.end + self.end / 2
     }
 
+    /// The side parameter of the boundary.
+    pub(crate) fn boundary(&self, job: &Job<'_>) -> SpanParameter {
+        if self.forwards {
+            SpanParameter {
+                span: job.header.side_spans.saturating_sub(1),
+                fraction: u64::MAX,
+            }
+        } else {
+            SpanParameter { span: 0, fraction: 0 }
+        }
+    }
+
+    /// The side parameter at a distance from the first front, fine units.
+    const fn whole(&self, distance: i64) -> i64 {
+        let origin = fine(self.origin);
+        if self.forwards {
+            origin.wrapping_add(distance)
+        } else {
+            origin.wrapping_sub(distance)
+        }
+    }
+
     /// Sign of the side parameter's change.
     pub(crate) const fn sign(&self) -> f32 {
         if self.forwards { 1.0 } else { -1.0 }
@@ -67,7 +89,7 @@ impl Direction {
 }
 
 /// A span of the side parameter, moved by neighbours.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct SideCursor {
     /// Units per unit of the parameter's widths.
     scale: f32,
@@ -107,6 +129,44 @@ impl SideCursor {
         truncated(job.side_width(span) * self.scale).max(1)
     }
 
+    pub(crate) const fn span(&self) -> u16 {
+        self.span
+    }
+
+    /// Start of the span, and its width.
+    pub(crate) const fn start(&self) -> i32 {
+        self.start
+    }
+
+    pub(crate) const fn width(&self) -> i32 {
+        self.width
+    }
+
+    /// Moves to the span behind this one, or to that before it, if there is one.
+    pub(crate) fn step(&mut self, job: &Job<'_>, behind: bool) {
+        if behind && self.span + 1 < job.header.side_spans {
+            self.span += 1;
+            self.start = self.start.saturating_add(self.width);
+            self.width = self.width_of(job, self.span);
+        } else if !behind && self.span > 0 {
+            self.span -= 1;
+            self.width = truncated(job.side_width(self.span) * self.scale).max(1);
+            self.start = self.start.saturating_sub(self.width);
+        }
+    }
+
+    /// Whether a distance from the first front, fine units, is behind the span (true) or before it (false), and there is another span there; none where it is on it.
+    pub(crate) fn side_of(&self, job: &Job<'_>, direction: &Direction, distance: i64) -> Option<bool> {
+        let from_start = direction.whole(distance).wrapping_sub(fine(self.start));
+        if from_start < 0 && self.span > 0 {
+            Some(false)
+        } else if from_start > fine(self.width) && self.span + 1 < job.header.side_spans {
+            Some(true)
+        } else {
+            None
+        }
+    }
+
     /// Moves to the span of a distance from the first front, fine units. Returns the side parameter, and the span's share of the whole parameter.
     pub(crate) fn seek(
         &mut self,
@@ -115,23 +175,14 @@ impl SideCursor {
         distance: i64,
     ) -> (SpanParameter, f32) {
         let distance = distance.min(fine(direction.end)).max(0);
-        let origin = fine(direction.origin);
-        let whole = if direction.forwards {
-            origin.wrapping_add(distance)
-        } else {
-            origin.wrapping_sub(distance)
-        };
+        let whole = direction.whole(distance);
         let at = coarse(whole);
         let spans = job.header.side_spans;
         for _ in 0..crate::job::SPANS_MAX {
             if at < self.start && self.span > 0 {
-                self.span -= 1;
-                self.width = truncated(job.side_width(self.span) * self.scale).max(1);
-                self.start = self.start.saturating_sub(self.width);
+                self.step(job, false);
             } else if at.wrapping_sub(self.start) >= self.width && self.span + 1 < spans {
-                self.span += 1;
-                self.start = self.start.saturating_add(self.width);
-                self.width = self.width_of(job, self.span);
+                self.step(job, true);
             } else {
                 break;
             }

@@ -14,19 +14,17 @@ const WITHIN: f32 = power_of_two(-31);
 /// The cubic between two stations: its coefficients in units of the front times 2^-shift, as fine as they allow.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) struct Cubic {
-    shift: u32,
-    start: i32,
-    first: i32,
-    second: i32,
-    third: i32,
+    pub(super) shift: u32,
+    pub(super) start: i32,
+    pub(super) first: i32,
+    pub(super) second: i32,
+    pub(super) third: i32,
 }
 
 /// A point of a front: distance, and the first two derivatives of its share of the whole by the path parameter.
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct CurvePoint {
     pub(crate) at: i32,
-    /// The distance in fine units.
-    pub(crate) fine: i64,
     pub(crate) slope: f32,
     pub(crate) bend: f32,
 }
@@ -82,7 +80,6 @@ impl Cubic {
         let inverse = 1.0 / length;
         CurvePoint {
             at: self.value(at),
-            fine: self.fine(at),
             slope: (first + t * (2.0 * second + 3.0 * third * t)) * inverse,
             bend: (2.0 * second + 6.0 * third * t) * (inverse * inverse),
         }
