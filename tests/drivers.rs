@@ -15,6 +15,7 @@ use std::{
 };
 
 use boards::{Axis, BOARDS, Level, Port, Role};
+use controller::spindle::output;
 use drive_enable::{DriveEnable, WritePorts};
 use protocol::message::{InputLines, ResetCause};
 use safety_inputs::{ReadPorts, SafetyInputs, pins_of};
@@ -106,6 +107,7 @@ struct Chip {
     inputs: Rc<RefCell<[u32; 8]>>,
     outputs: Rc<RefCell<[u32; 8]>>,
     writes: Rc<Cell<u32>>,
+    duty: Rc<Cell<u32>>,
 }
 
 impl ReadPorts for Chip {
@@ -119,6 +121,10 @@ impl WritePorts for Chip {
         self.writes.set(self.writes.get() + 1);
         let output = &mut self.outputs.borrow_mut()[port.index()];
         *output = *output & !(bits >> 16) | bits & 0xffff;
+    }
+
+    fn duty(&mut self, steps: u32) {
+        self.duty.set(steps);
     }
 }
 
@@ -192,13 +198,13 @@ fn drives_are_switched_once_and_touch_no_other_pin() {
     for board in BOARDS {
         let chip = Chip::default();
         *chip.outputs.borrow_mut() = [0x5a5a; 8];
-        let mut drives = DriveEnable::new(chip.clone(), board);
-        drives.set(false);
+        let mut drives = DriveEnable::new(chip.clone(), board, true);
+        drives.set(0);
         assert_eq!(chip.writes.get(), 0);
         for on in [true, false, true] {
             let before = (*chip.outputs.borrow(), chip.writes.get());
-            drives.set(on);
-            drives.set(on);
+            drives.set(on.into());
+            drives.set(on.into());
             assert_eq!(chip.writes.get(), before.1 + 3);
             let mut own = [0; 8];
             for axis in Axis::ALL {
@@ -210,6 +216,17 @@ fn drives_are_switched_once_and_touch_no_other_pin() {
             for (port, own) in own.into_iter().enumerate() {
                 let changed = chip.outputs.borrow()[port] ^ before.0[port];
                 assert_eq!(changed & !own, 0);
+            }
+        }
+        // Spindle and coolant have lines of their own; with the drives everything goes off.
+        let spindle = output::DRIVES | output::SPINDLE | output::COUNTERCLOCKWISE | output::COOLANT;
+        let roles = [Role::SpindleEnable, Role::SpindleDirection, Role::Coolant];
+        for (word, duty) in [(spindle | 1234 << output::DUTY_SHIFT, 1234), (0, 0)] {
+            drives.set(word);
+            assert_eq!(chip.duty.get(), duty);
+            for line in roles.map(|role| board.line(role)) {
+                let pins = chip.outputs.borrow()[line.pin.port.index()];
+                assert_eq!(line.is_active(pins), word != 0, "{} {}", board.id, line.role);
             }
         }
     }

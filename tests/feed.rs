@@ -510,13 +510,81 @@ fn stop_and_abort() {
             period(&mut core, None);
         }
         period(&mut core, request);
-        while period(&mut core, None).state == State::Stopping {}
+        while period(&mut core, None).state.is_under_way() {}
         assert_eq!(core.state(), State::Ready);
         assert_eq!(core.last().cl_nm[2] == safe, leaves);
         period(&mut core, Command::Start);
         while period(&mut core, None).state.is_under_way() {}
         assert_eq!(core.state(), State::Finished);
     }
+}
+
+/// A run that was stopped, on its way up: the tool is a millimetre above the surface or more.
+fn on_the_way_up(used: &mut Use) -> (Box<Interpolator>, AxisLimits) {
+    let (header, words, _) = undisturbed(dome_within_limits(Pattern::Zigzag));
+    let axes = header.axes.unwrap();
+    let mut core = machine(&header, &words);
+    let mut step = |inputs: Inputs| {
+        let sample = period(&mut core, inputs);
+        used.add(&sample, &axes);
+        sample
+    };
+    step(Command::Start.into());
+    for _ in 0..3000 {
+        step(Inputs::default());
+    }
+    let low = step(Command::Stop.into()).cl_nm[2];
+    while step(Inputs::default()).cl_nm[2] < low + 1_000_000 {}
+    assert_eq!(core.state(), State::Linking);
+    (core, axes)
+}
+
+/// The way up of a stop is a link: it is held, resumed, overridden and aborted like one, within the limits.
+#[test]
+fn the_way_up_of_a_stop_obeys() {
+    for ends in [Command::Resume, Command::Abort, Command::Stop] {
+        let mut used = Use::default();
+        let (mut core, axes) = on_the_way_up(&mut used);
+        let mut step = |core: &mut Interpolator, inputs: Inputs| {
+            let sample = period(core, inputs);
+            used.add(&sample, &axes);
+            sample
+        };
+        step(&mut core, Command::Hold.into());
+        for _ in 0..600 {
+            step(&mut core, Inputs::default());
+        }
+        let held = step(&mut core, Inputs::default());
+        assert_eq!(held.state, State::Held);
+        assert!(held.cl_nm[2] < axes.safe_z_nm);
+        step(&mut core, ends.into());
+        let mut sample = held;
+        for _ in 0..3000 {
+            sample = step(&mut core, Inputs::default());
+        }
+        assert_eq!(sample.state, State::Ready, "{ends:?}");
+        let at = sample.cl_nm[2];
+        assert_eq!(at == axes.safe_z_nm, ends != Command::Abort, "{ends:?}: {at}");
+        used.check(&format!("{ends:?}"));
+    }
+    let (mut core, axes) = on_the_way_up(&mut Use::default());
+    let at = |percent| Inputs {
+        command: None,
+        feed_override: percent,
+    };
+    for _ in 0..1000 {
+        period(&mut core, at(0));
+    }
+    let stands = *core.last();
+    assert_eq!(period(&mut core, at(0)).cl_nm, stands.cl_nm);
+    assert!(stands.state == State::Linking && stands.cl_nm[2] < axes.safe_z_nm);
+    for _ in 0..3000 {
+        period(&mut core, at(50));
+    }
+    assert_eq!(
+        (core.state(), core.last().cl_nm[2]),
+        (State::Ready, axes.safe_z_nm)
+    );
 }
 
 /// Between two zig passes the tool goes up, across and down as one motion: across only at the safe height or above, and no axis waits for another.

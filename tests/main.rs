@@ -36,6 +36,7 @@ mod scallop_limit;
 mod script;
 mod session;
 mod settings;
+mod spindle;
 mod streaming;
 mod swept;
 mod unusual_motion;

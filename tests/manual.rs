@@ -32,6 +32,7 @@ pub(crate) fn profile() -> Profile {
             survives_off: false,
         }),
         probe_inverted: false,
+        spindle: None,
     }
 }
 

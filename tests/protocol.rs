@@ -20,8 +20,8 @@ use protocol::{
     message::{
         Activity, Batch, Capabilities, Clock, Configuration, Description, Excess, FaultReport, Homing,
         InputLines, JogWay, LinkTimeoutAction, MotionEnd, MotionStatus, Offsets, PassDigest, Profile,
-        ProfileLimit, Reason, Reply, Report, Request, ResetCause, SafetyStatus, SampleRecord, Status,
-        StepSettings, StreamStatus, Words, read_reply, read_request,
+        ProfileLimit, Reason, Reply, Report, Request, ResetCause, SafetyStatus, SampleRecord, SpindleOrder,
+        SpindleSettings, Status, StepSettings, StreamStatus, Turning, Words, read_reply, read_request,
     },
 };
 
@@ -77,6 +77,10 @@ fn profile() -> Profile {
         configuration: CONFIGURATION,
         homing: Some(homing()),
         probe_inverted: true,
+        spindle: Some(SpindleSettings {
+            max_rpm: 24_000,
+            at_speed_ticks: 3_000,
+        }),
     }
 }
 
@@ -154,6 +158,11 @@ fn requests() -> Vec<Request> {
         Request::Motion,
         Request::Offsets,
         Request::SetOffsets(OFFSETS),
+        Request::Spindle(SpindleOrder {
+            turning: Turning::Counterclockwise,
+            rpm: 12_000,
+            coolant: true,
+        }),
         Request::JobBegin {
             header: Header {
                 axes: Some(axes()),
@@ -308,6 +317,7 @@ fn reasons() -> Vec<Reason> {
         },
         Reason::NoHoming,
         Reason::ProbeTripped,
+        Reason::NoSpindle,
         Reason::RowsGone,
     ]
 }

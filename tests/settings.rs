@@ -39,6 +39,7 @@ fn profile() -> Profile {
         configuration: CONFIGURATION,
         homing: None,
         probe_inverted: false,
+        spindle: None,
     }
 }
 

@@ -198,6 +198,14 @@ pub enum Role {
     DriveFault,
     /// Input: active when the probe touches.
     Probe,
+    /// Output: active while the spindle turns.
+    SpindleEnable,
+    /// Output: active while it turns counterclockwise.
+    SpindleDirection,
+    /// Output: the spindle's speed as a pulse-width signal, channel 2 of TIM12.
+    SpindleSpeed,
+    /// Output: active switches the coolant on.
+    Coolant,
     /// Output: active lights the status LED.
     StatusLed,
     /// USART1, to the host.
@@ -224,6 +232,10 @@ impl Role {
             Self::SerialRx => 19,
             Self::Parked => 20,
             Self::Probe => 21,
+            Self::SpindleEnable => 22,
+            Self::SpindleDirection => 23,
+            Self::SpindleSpeed => 24,
+            Self::Coolant => 25,
         }
     }
 
@@ -253,6 +265,10 @@ impl core::fmt::Display for Role {
             Self::EmergencyStop => f.write_str("emergency stop"),
             Self::DriveFault => f.write_str("drive fault"),
             Self::Probe => f.write_str("probe"),
+            Self::SpindleEnable => f.write_str("spindle"),
+            Self::SpindleDirection => f.write_str("spindle, counterclockwise"),
+            Self::SpindleSpeed => f.write_str("spindle speed (PWM)"),
+            Self::Coolant => f.write_str("coolant"),
             Self::StatusLed => f.write_str("status LED"),
             Self::SerialTx => f.write_str("serial, to the host"),
             Self::SerialRx => f.write_str("serial, from the host"),

@@ -10,8 +10,9 @@ const ALTERNATE: u32 = 0b10;
 const MEDIUM: u32 = 0b01;
 /// `PUPDR`: pulled up.
 const PULL_UP: u32 = 0b01;
-/// `AFR`: USART1.
+/// `AFR`: USART1, TIM12.
 const USART1: u32 = 7;
+const TIM12: u32 = 9;
 
 /// A masked write of a register: the bits to change and their values.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -76,9 +77,14 @@ impl PortSetup {
     const fn with(mut self, line: &Line) -> Self {
         let number = line.pin.number;
         match line.role {
-            Role::SerialTx | Role::SerialRx => {
+            Role::SerialTx | Role::SerialRx | Role::SpindleSpeed => {
                 let half = (number / 8) as usize;
-                self.alternate[half] = self.alternate[half].with(number % 8, 4, USART1);
+                let function = if matches!(line.role, Role::SpindleSpeed) {
+                    TIM12
+                } else {
+                    USART1
+                };
+                self.alternate[half] = self.alternate[half].with(number % 8, 4, function);
                 self.mode = self.mode.with(number, 2, ALTERNATE);
             }
             role if role.is_input() => self.mode = self.mode.with(number, 2, 0),

@@ -11,6 +11,7 @@
 //! - Emergency stop and drive fault are on the header EXTENSION-1, which nothing else uses: PC9 is next to ground, so that a
 //!   two-pole plug fits. The header has no filter; the chip's pull-up (40 kOhm) holds the line.
 //! - The probe is on EXP1, whose pin 2 is ground: its port is one that each tick reads anyway.
+//! - The spindle is on EXP1 and EXP2, 3.3 V: enable and direction, and PB15 as the only free output of a timer that nothing else uses. FAN0 switches the coolant.
 //! - USART1 is on the TFT socket, at 3.3 V. USB goes to the OTG port, which this firmware does not use.
 //! - The LED D13 is connected to PA7 through 1 kOhm and is lit while the pin is high.
 //! - Heaters and fans are switched by MOSFETs whose inputs are active high, the enable inputs of the other three drivers are active low: all are
@@ -23,8 +24,8 @@ use crate::{
     Line, Package,
     Port::{A, B, C, D, E, F, G},
     Role::{
-        Direction, DriveFault, EmergencyStop, Enable, LimitMax, LimitMin, Parked, Probe, SerialRx, SerialTx,
-        StatusLed, Step,
+        Coolant, Direction, DriveFault, EmergencyStop, Enable, LimitMax, LimitMin, Parked, Probe, SerialRx,
+        SerialTx, SpindleDirection, SpindleEnable, SpindleSpeed, StatusLed, Step,
     },
 };
 
@@ -59,6 +60,10 @@ pub const SKR_PRO: Board = Board {
         Line::new(EmergencyStop, C, 9, High, "EXTENSION-1, beside GND"),
         Line::new(DriveFault, C, 4, High, "EXTENSION-1, fourth of GND's row"),
         Line::new(Probe, G, 2, High, "EXP1, pin 6"),
+        Line::new(SpindleEnable, G, 3, High, "EXP1, pin 5"),
+        Line::new(SpindleDirection, G, 6, High, "EXP1, pin 4"),
+        Line::new(SpindleSpeed, B, 15, High, "EXP2, pin 5"),
+        Line::new(Coolant, C, 8, High, "FAN0"),
         Line::new(StatusLed, A, 7, High, "LED D13 on the board"),
         Line::new(SerialTx, A, 9, High, "TFT socket, TX1"),
         Line::new(SerialRx, A, 10, High, "TFT socket, RX1"),
@@ -66,7 +71,6 @@ pub const SKR_PRO: Board = Board {
         Line::new(Parked, D, 14, High, "HEAT1"),
         Line::new(Parked, B, 0, High, "HEAT2"),
         Line::new(Parked, D, 12, High, "BED"),
-        Line::new(Parked, C, 8, High, "FAN0"),
         Line::new(Parked, E, 5, High, "FAN1"),
         Line::new(Parked, E, 6, High, "FAN2"),
         Line::new(Parked, C, 3, Low, "driver socket E0, enable"),

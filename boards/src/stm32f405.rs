@@ -11,8 +11,8 @@ use crate::{
     Line, Package,
     Port::{A, B, C},
     Role::{
-        Direction, DriveFault, EmergencyStop, Enable, LimitMax, LimitMin, Probe, SerialRx, SerialTx,
-        StatusLed, Step,
+        Coolant, Direction, DriveFault, EmergencyStop, Enable, LimitMax, LimitMin, Probe, SerialRx, SerialTx,
+        SpindleDirection, SpindleEnable, SpindleSpeed, StatusLed, Step,
     },
 };
 
@@ -47,6 +47,10 @@ pub const STM32F405: Board = Board {
         Line::new(EmergencyStop, B, 10, High, "the pin"),
         Line::new(DriveFault, B, 11, High, "the pin"),
         Line::new(Probe, C, 4, High, "the pin"),
+        Line::new(SpindleEnable, C, 9, High, "the pin"),
+        Line::new(SpindleDirection, C, 10, High, "the pin"),
+        Line::new(SpindleSpeed, B, 15, High, "the pin"),
+        Line::new(Coolant, C, 11, High, "the pin"),
         Line::new(StatusLed, C, 12, Low, "LED of the STM32-H405"),
         Line::new(SerialTx, A, 9, High, "the pin"),
         Line::new(SerialRx, A, 10, High, "the pin"),

@@ -37,6 +37,10 @@ fn roles() -> Vec<Role> {
         Role::EmergencyStop,
         Role::DriveFault,
         Role::Probe,
+        Role::SpindleEnable,
+        Role::SpindleDirection,
+        Role::SpindleSpeed,
+        Role::Coolant,
         Role::StatusLed,
         Role::SerialTx,
         Role::SerialRx,
@@ -140,7 +144,7 @@ fn registers_say_what_the_table_says() {
                     assert_eq!(setup.set_reset & (pin.bit() | pin.bit() << 16), 0);
                     continue;
                 };
-                let serial = matches!(line.role, Role::SerialTx | Role::SerialRx);
+                let serial = matches!(line.role, Role::SerialTx | Role::SerialRx | Role::SpindleSpeed);
                 let wanted = match line.role {
                     _ if serial => 0b10,
                     role if role.is_input() => 0b00,

@@ -38,6 +38,7 @@ pub mod realtime;
 pub mod safety;
 mod session;
 pub mod settings;
+pub mod spindle;
 pub mod step_output;
 pub mod storage;
 mod upload;

@@ -19,6 +19,7 @@ use protocol::{
     digest::Digest,
     message::{
         Activity, Homing as HomingProfile, InputLines, JogWay, MotionEnd, MotionStatus, Profile, Reason,
+        SpindleSettings,
     },
 };
 
@@ -45,6 +46,7 @@ pub struct Setup {
     homing: Option<HomingProfile>,
     period_s: f32,
     probe_inverted: bool,
+    spindle: Option<SpindleSettings>,
 }
 
 impl Setup {
@@ -62,7 +64,12 @@ impl Setup {
             homing: profile.homing,
             period_s,
             probe_inverted: profile.probe_inverted,
+            spindle: profile.spindle,
         }
+    }
+
+    pub(crate) const fn spindle(&self) -> Option<SpindleSettings> {
+        self.spindle
     }
 
     /// Whether the probe's contact closes when it touches.
@@ -442,7 +449,7 @@ impl Manual {
         match self.status.activity {
             Activity::Probe => InputLines::PROBE,
             Activity::Seek | Activity::BackOff | Activity::Approach | Activity::Clear => self.homing.switch(),
-            Activity::Rest | Activity::Jog => InputLines::NONE,
+            Activity::Rest | Activity::Jog | Activity::SpinUp => InputLines::NONE,
         }
     }
 
@@ -512,7 +519,7 @@ impl Manual {
             return Change::None;
         }
         match self.status.activity {
-            Activity::Rest => {}
+            Activity::Rest | Activity::SpinUp => {}
             Activity::Jog => self.finish(MotionEnd::Done, InputLines::NONE),
             Activity::Probe => {
                 let end = self.judge_contact(steady, MotionEnd::NotTripped);

@@ -237,6 +237,7 @@ impl<S: AsRef<[i32]> + AsMut<[i32]>> RealTime<S> {
         let steady = self.control.safety.status().lines;
         if !self.control.safety.drives_on() {
             self.control.manual.drives_are_off(steady);
+            self.control.spindle.off();
             if !self.control.safety.status().homed {
                 self.lose_position();
             }
@@ -262,6 +263,7 @@ impl<S: AsRef<[i32]> + AsMut<[i32]>> RealTime<S> {
             .check_link_timeout(self.control.clock, state, holds)
         {
             self.control.command = Some(Command::Hold);
+            self.control.host_is_gone = true;
         }
     }
 
@@ -321,6 +323,9 @@ impl<S: AsRef<[i32]> + AsMut<[i32]>> RealTime<S> {
             self.move_manually(lines);
         }
         let mut command = self.control.command.take();
+        if matches!(command, Some(Command::Start | Command::Resume)) {
+            command = self.with_spindle(command);
+        }
         let starts = command == Some(Command::Start);
         if starts && Command::Start.is_allowed(self.interpolator.state()) {
             command = self.begin();
@@ -340,6 +345,8 @@ impl<S: AsRef<[i32]> + AsMut<[i32]>> RealTime<S> {
         };
         if moves(state) {
             self.count_sample(events);
+        } else if self.control.host_is_gone {
+            self.host_left(state);
         }
         if (was_under_way || starts) && !state.is_under_way() {
             self.end_run(events);
@@ -407,6 +414,7 @@ impl<S: AsRef<[i32]> + AsMut<[i32]>> RealTime<S> {
         }
         self.control.credit = 0;
         self.control.spent = false;
+        self.control.spindle.off();
         self.halt(events);
     }
 
@@ -481,6 +489,13 @@ impl<S: AsRef<[i32]> + AsMut<[i32]>> RealTime<S> {
         self.control.safety.drives_on()
     }
 
+    /// The outputs beside the steps, as in [`crate::spindle::output`]. Applied after each tick, like the drives that are a part of them.
+    #[must_use]
+    #[inline]
+    pub const fn outputs(&self) -> u32 {
+        self.control.spindle.output() | self.control.safety.drives_on() as u32
+    }
+
     /// Whether a tick feeds the watchdog: it ended before the next one, and within its budget. A planning that never ends lets no tick pass.
     #[must_use]
     #[inline]
@@ -501,6 +516,7 @@ impl<S: AsRef<[i32]> + AsMut<[i32]>> RealTime<S> {
     pub fn load_begin(&mut self, header: &Header, words: u32) -> Result<()> {
         self.interpolator.load_begin(header, words)?;
         self.control.command = None;
+        self.control.spindle.clear();
         Ok(())
     }
 

@@ -24,7 +24,7 @@ use interp_core::{
 };
 use protocol::message::{
     Clock, Configuration, InputLines, LinkTimeoutAction, OVERRIDE_MAX_PERCENT, Reason, ResetCause,
-    SafetyStatus,
+    SafetyStatus, SpindleOrder,
 };
 
 /// Debounce: consecutive ticks for which an input has to differ before it is accepted, and before the emergency stop counts as released. At 1 ms, the
@@ -42,6 +42,8 @@ pub enum Order {
     SetUp(Option<Setup>),
     /// Motion outside a job.
     Move(Motion),
+    /// Spindle and coolant of the loaded job.
+    Spindle(SpindleOrder),
     /// Configuration of the machine.
     Configure(Configuration),
     /// Drives on or off.
@@ -294,7 +296,7 @@ impl Safety {
                 self.home_nm = home_nm;
                 self.status.homed = true;
             }
-            Order::SetUp(_) => {}
+            Order::SetUp(_) | Order::Spindle(_) => {}
             Order::Move(_) => self.may_move()?,
         }
         Ok(())

@@ -27,7 +27,7 @@ use crate::{
 
 /// Maximum length of an answer stored for a retransmission, bytes: a frame of a `Profile` with every varint at its maximum length. That of a
 /// `Status` is shorter.
-const ANSWER_MAX: usize = 185;
+const ANSWER_MAX: usize = 196;
 
 /// State of the session.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -344,6 +344,7 @@ impl Session {
             Request::Probe { axis, nm, speed_mm_s } => {
                 machine.order(Order::Move(Motion::Probe { axis, nm, speed_mm_s }))
             }
+            Request::Spindle(order) => machine.order(Order::Spindle(order)),
             Request::Home { axes } => machine.order(Order::Move(Motion::Home { axes })),
             Request::JobBegin {
                 header,
@@ -475,6 +476,7 @@ const fn needs_rest(request: &Request) -> bool {
             | Request::StepConfig(_)
             | Request::SetProfile(_)
             | Request::SetOffsets(_)
+            | Request::Spindle(_)
     )
 }
 
@@ -639,6 +641,10 @@ mod tests {
                 survives_off: true,
             }),
             probe_inverted: true,
+            spindle: Some(protocol::message::SpindleSettings {
+                max_rpm: u32::MAX,
+                at_speed_ticks: u32::MAX,
+            }),
         };
         let longest = Reply::Profile {
             number: u16::MAX,

@@ -74,8 +74,8 @@ mod app {
     /// The board's safety inputs.
     const INPUTS: SafetyInputs<board::InputPorts> = SafetyInputs::new(board::InputPorts, BOARD.lines);
 
-    /// The drive enables, initially off.
-    const DRIVES: DriveEnable<gpio::Ports> = DriveEnable::new(gpio::Ports, BOARD);
+    /// Drive enables, spindle and coolant, initially off.
+    const DRIVES: DriveEnable<gpio::Ports> = DriveEnable::new(gpio::Ports, BOARD, !board::TIME_IS_SIMULATED);
 
     #[shared]
     struct Shared {

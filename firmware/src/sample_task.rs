@@ -26,7 +26,7 @@ use crate::{
 pub(crate) struct Guards<I, O, W> {
     /// The safety inputs.
     pub(crate) inputs: SafetyInputs<I>,
-    /// The drives.
+    /// The drives, spindle and coolant.
     pub(crate) drives: DriveEnable<O>,
     /// The watchdog, started.
     pub(crate) watchdog: Watchdog<W>,
@@ -94,7 +94,7 @@ impl SampleTask {
             lines: guards.inputs.read(),
         };
         real_time.tick(input, &mut self.events);
-        guards.drives.set(real_time.drives_on());
+        guards.drives.set(real_time.outputs());
         if let Some(slots) = output.slots() {
             real_time.pulses(slots);
         }

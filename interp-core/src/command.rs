@@ -25,7 +25,7 @@ pub enum Command {
     /// limits the tool slows down along its path first.
     Abort = 4,
     /// Running or held: give the run up, and leave the surface: with limits, the tool slows down along its path and retracts to the safe
-    /// height; without, as an abort.
+    /// height, which is a link like any other; without, as an abort.
     Stop = 5,
 }
 

@@ -306,7 +306,7 @@ enum Ending {
     Stand,
     /// Stop, then retract from the surface.
     Retract,
-    /// The retract is under way.
+    /// The retract is under way, as a link.
     Retracting,
 }
 
@@ -366,6 +366,7 @@ impl Motion {
             self.run.restart(&self.program, &job);
         }
         self.fault = None;
+        self.ending = Ending::Stand;
     }
 
     fn controlled_stop(&mut self, fault: Fault) {
@@ -474,10 +475,9 @@ impl Motion {
     /// One period of a job with axis limits.
     #[inline(never)]
     fn tick_within_limits(&mut self, store: &[i32], feed_factor: f32) {
-        let feed_factor = match (self.state, self.ending) {
-            (State::Running | State::Linking, _) => feed_factor,
-            (State::Stopping, Ending::Retracting) => 1.0,
-            (State::Holding | State::Stopping, _) => 0.0,
+        let feed_factor = match self.state {
+            State::Running | State::Linking => feed_factor,
+            State::Holding | State::Stopping => 0.0,
             _ => return,
         };
         if feed_factor == 0.0 && self.sequencer.is_at_rest() && self.stand() {
@@ -513,7 +513,7 @@ impl Motion {
                 self.program.release(self.run.row());
             }
             (Ok(Outcome::Link), State::Running) => self.state = State::Linking,
-            (Ok(Outcome::Finished), State::Stopping) => self.state = State::Ready,
+            (Ok(Outcome::Finished), _) if self.ending == Ending::Retracting => self.state = State::Ready,
             (Ok(Outcome::Finished), _) => self.state = State::Finished,
             (Ok(_), _) => {}
             (Err(fault), _) => self.fail(fault),
@@ -526,7 +526,9 @@ impl Motion {
             State::Holding => self.state = State::Held,
             State::Stopping if self.fault.is_some() => self.state = State::Faulted,
             State::Stopping if self.ending == Ending::Retract => {
+                // A link like any other: it obeys hold, abort and override.
                 self.ending = Ending::Retracting;
+                self.state = State::Linking;
                 self.sequencer.retract(&self.run);
             }
             State::Stopping => self.state = State::Ready,

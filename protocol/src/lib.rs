@@ -20,7 +20,7 @@
 //! | `Start`, `Hold`, `Resume`, `Stop`, `Abort`, `Override` | → ← | `Ack` or `Nak` |
 //! | `Configure`, `Drives`, `SetHome`, `Acknowledge`, `SetProfile` | → ← | `Ack` or `Nak` |
 //! | `Profile`, `Offsets`, `Motion` | → ← | the same |
-//! | `Jog`, `Home`, `Probe`, `SetOffsets` | → ← | `Ack` or `Nak` |
+//! | `Jog`, `Home`, `Probe`, `SetOffsets`, `Spindle` | → ← | `Ack` or `Nak` |
 //! | `Run` | → ← | `Ack` or `Nak`, later `Halted` |
 //! | `Status` | → ← | `Status` |
 //! | `Repeat` | → ← | events again, then `Ack`; or `Nak` |
@@ -62,6 +62,7 @@
 //! | a jog or probe move beyond the travel | `Nak`, `BeyondTravel` with the range | |
 //! | homing without its section in the profile | `Nak`, `NoHoming` | |
 //! | a probe move while the probe is tripped | `Nak`, `ProbeTripped` | |
+//! | a spindle on a machine without one | `Nak`, `NoSpindle` | |
 //! | a start of a streamed job whose first rows were overwritten | `Nak`, `RowsGone` | |
 //! | a `Repeat` of an event that is not kept any more | `Nak`, `EventGone` with the first that is | |
 //!
@@ -100,6 +101,7 @@ mod profile;
 mod reason;
 mod records;
 pub mod safety;
+mod spindle;
 pub mod version;
 
 pub use version::{PROTOCOL_VERSION, VersionMismatch};

@@ -36,6 +36,8 @@ pub enum Activity {
     Approach,
     /// 6: homing: off the switch, to rest.
     Clear,
+    /// 7: a start that waits for the spindle.
+    SpinUp,
 }
 
 impl Activity {
@@ -50,6 +52,7 @@ impl Activity {
             Self::BackOff => "home-back-off",
             Self::Approach => "home-approach",
             Self::Clear => "home-clear",
+            Self::SpinUp => "spin-up",
         }
     }
 }

@@ -52,6 +52,7 @@
 //! | 26 | `Motion` | | `Motion` |
 //! | 27 | `Offsets` | | `Offsets` |
 //! | 28 | `SetOffsets` | the fields of [`Offsets`] | `Ack`, and it holds, also after a power cut |
+//! | 29 | `Spindle` | turning (a byte: 0 off, 1 clockwise, 2 counterclockwise), speed (1/min, `u32`), coolant (a byte) | as `Configure`; for the runs of the loaded job |
 //!
 //! Header: kind, pattern, spacing, tool side (a byte each), spans along path and side (`u16`), ball radius (mm), feed (mm/s),
 //! scallop height (mm), period (s) (`f32`), window of a streamed job (rows, `u16`; 0 for another one); then 0, or 1 and the axes' limits: velocity (mm/s), acceleration (mm/s^2), jerk (mm/s^3)
@@ -120,6 +121,7 @@ pub use crate::safety::{
     Configuration, InputLines, LinkTimeoutAction, OVERRIDE_MAX_PERCENT, OVERRIDE_NORMAL_PERCENT, ResetCause,
     SafetyStatus,
 };
+pub use crate::spindle::{PWM_STEPS, SpindleOrder, SpindleSettings, Turning};
 use crate::{
     records::HeaderFields,
     version::{PROTOCOL_VERSION, VersionMismatch},
@@ -258,6 +260,8 @@ pub enum Request {
     Offsets,
     /// Keeps work offsets and tool length beyond a power cut; the job has to be loaded again. Refused while a run is under way.
     SetOffsets(Offsets),
+    /// Spindle and coolant of the loaded job: on from the start of each run to its end. Refused while a run is under way.
+    Spindle(SpindleOrder),
 }
 
 impl From<Command> for Request {

@@ -3,10 +3,10 @@
 use interp_core::{AxisLimits, steps::StepConfig};
 use serde::{Deserialize, Serialize};
 
-use crate::{frame, manual::Homing, records::StepSettings, safety::Configuration};
+use crate::{frame, manual::Homing, records::StepSettings, safety::Configuration, spindle::SpindleSettings};
 
 /// Longest encoding of a [`Profile`], bytes: every varint at its maximum length.
-pub const PROFILE_BYTES_MAX: usize = 174;
+pub const PROFILE_BYTES_MAX: usize = 185;
 
 /// Greatest axis limit that a profile may have, in mm and seconds: far above any machine, and within `f32` whatever is computed of it.
 const LIMIT_MAX: f32 = 1e9;
@@ -31,6 +31,8 @@ pub struct Profile {
     pub homing: Option<Homing>,
     /// The probe is tripped where its input is not asserted: a contact that closes when it touches.
     pub probe_inverted: bool,
+    /// The spindle, if there is one.
+    pub spindle: Option<SpindleSettings>,
 }
 
 /// A value of a profile that a job may not exceed. The codes on the wire count from 0 in this order.
@@ -128,6 +130,7 @@ impl Profile {
         limits.iter().flatten().all(is_limit)
             && self.travel_nm.is_none_or(ascends)
             && StepConfig::from(self.steps).check().is_ok()
+            && self.spindle.is_none_or(|spindle| spindle.max_rpm > 0)
             // The search for a switch ends with the travel.
             && self
                 .homing
@@ -192,6 +195,7 @@ mod tests {
         configuration: Configuration::DEFAULT,
         homing: None,
         probe_inverted: false,
+        spindle: None,
     };
 
     fn axes() -> AxisLimits {
@@ -296,6 +300,10 @@ mod tests {
                 approach_mm_s: [1.0; 3],
                 back_off_nm: [i32::MAX; 3],
                 survives_off: true,
+            }),
+            spindle: Some(SpindleSettings {
+                max_rpm: u32::MAX,
+                at_speed_ticks: u32::MAX,
             }),
             ..PROFILE
         };

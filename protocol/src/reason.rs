@@ -148,7 +148,9 @@ pub enum Reason {
     NoHoming,
     /// 29: the probe is tripped before the probe move.
     ProbeTripped,
-    /// 30: a start of a streamed job whose first rows were overwritten: it has to be loaded again.
+    /// 30: the profile describes no spindle.
+    NoSpindle,
+    /// 31: a start of a streamed job whose first rows were overwritten: it has to be loaded again.
     RowsGone,
 }
 
@@ -187,7 +189,8 @@ impl Reason {
             Self::BeyondTravel { .. } => 27,
             Self::NoHoming => 28,
             Self::ProbeTripped => 29,
-            Self::RowsGone => 30,
+            Self::NoSpindle => 30,
+            Self::RowsGone => 31,
         }
     }
 
@@ -349,6 +352,7 @@ impl fmt::Display for Reason {
                 wanted_nm,
             } => beyond_travel(axis, travel_nm, wanted_nm, formatter),
             Self::NoHoming => write!(formatter, "the machine's profile describes no homing by switches"),
+            Self::NoSpindle => write!(formatter, "the machine's profile describes no spindle"),
             Self::ProbeTripped => write!(formatter, "the probe is tripped before it moves"),
             Self::RowsGone => write!(
                 formatter,

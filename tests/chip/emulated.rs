@@ -253,7 +253,8 @@ fn changes(edges: &[Edge], line: &Line) -> Vec<(u64, Option<bool>)> {
 }
 
 fn is_output(line: &Line) -> bool {
-    !line.role.is_input() && line.role != Role::SerialTx
+    // Those of peripherals are no outputs of the port.
+    !line.role.is_input() && !matches!(line.role, Role::SerialTx | Role::SpindleSpeed)
 }
 
 impl Ended {

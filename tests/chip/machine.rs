@@ -31,6 +31,10 @@ seek_mm_s = [20.0, 20.0, 15.0]
 approach_mm_s = [2.0, 2.0, 2.0]
 back_off_mm = [2.0, 2.0, 2.0]
 survives_off = false
+
+[spindle]
+max_rpm = 24000
+at_speed_ms = 200.0
 ";
 
 /// A board with the profile and its drives on.
@@ -134,7 +138,7 @@ fn from_a_bare_board_to_a_placed_job() {
     bench.operate(&["goto", "0,0,14", "--work", "2"]);
     let job = bench.file(
         "job.toml",
-        "[surface]\nkind = \"ruled\"\nrail0_mm = [[0, 0, 6, 0], [0, 0, 0, 0], [0, 0, 0, 0]]\nrail1_mm = [[0, 0, 6, 0], [0, 0, 0, 2], [0, 0, 0, 0]]\n[tool]\nkind = \"ball\"\nradius_mm = 3\n[cut]\nfeed_mm_min = 900\nscallop_mm = 0.05\nalong = \"u\"\nside = \"up\"\npattern = \"zigzag\"\n",
+        "[surface]\nkind = \"ruled\"\nrail0_mm = [[0, 0, 6, 0], [0, 0, 0, 0], [0, 0, 0, 0]]\nrail1_mm = [[0, 0, 6, 0], [0, 0, 0, 2], [0, 0, 0, 0]]\n[tool]\nkind = \"ball\"\nradius_mm = 3\n[cut]\nfeed_mm_min = 900\nscallop_mm = 0.05\nalong = \"u\"\nside = \"up\"\npattern = \"zigzag\"\n[spindle]\nrpm = 18000\ncoolant = true\n",
     );
     let port = bench.emulated.port();
     let (is_done, said) = sim(["run", &job, "--port", &port, "--work", "2"]);
@@ -149,6 +153,10 @@ fn from_a_bare_board_to_a_placed_job() {
     let at = bench.json(&["status"])["axes"]["at_mm"].clone();
     let ended = bench.emulated.end();
     ended.no_complaint();
+    // The spindle turned during the run, at its speed, and stands now.
+    let duty = |key: &str| ended.report[key].as_f64().unwrap();
+    assert!((duty("spindle_duty_max") - 0.75).abs() < 1e-4);
+    assert_eq!(duty("spindle_duty"), 0.0);
     for axis in 0..3 {
         let believed = at[axis].as_f64().unwrap();
         let really = ended.report["carriages_mm"][axis].as_f64().unwrap();

@@ -109,6 +109,7 @@ prop_compose! {
             configuration,
             homing: None,
             probe_inverted: has_travel,
+            spindle: None,
         }
     }
 }

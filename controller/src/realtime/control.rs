@@ -12,6 +12,7 @@ use crate::{
     machine::{Event, Events, Instruction},
     manual::Manual,
     safety::Safety,
+    spindle::Spindle,
 };
 
 /// The planning of a period.
@@ -46,8 +47,11 @@ pub(super) struct Control {
     pub(super) safety: Safety,
     /// Motion outside a job.
     pub(super) manual: Manual,
+    pub(super) spindle: Spindle,
     /// The next run within limits has to begin at its job's home.
     pub(super) from_home: bool,
+    /// The run is to be held because the host is gone.
+    pub(super) host_is_gone: bool,
     /// The step outputs lead to drives.
     pub(super) has_drives: bool,
     /// Words of a streamed job up to which there was room, as last reported.
@@ -69,7 +73,9 @@ impl Control {
             command: None,
             safety: Safety::NEW,
             manual: Manual::NEW,
+            spindle: Spindle::NEW,
             from_home: true,
+            host_is_gone: false,
             has_drives: false,
             room: 0,
         }

@@ -6,8 +6,8 @@
 //! **Without a home.** Where none is required and none was declared, the axes count as standing at the job's home.
 //! **After a job without limits** the axes' position is unknown: no links led from pass to pass.
 
-use interp_core::command::Command;
-use protocol::message::{InputLines, MotionStatus, Reason};
+use interp_core::{command::Command, sample::State};
+use protocol::message::{Activity, Clock, InputLines, MotionStatus, Reason};
 
 use super::{RealTime, run::RunRecord};
 use crate::{
@@ -33,8 +33,12 @@ impl<S: AsRef<[i32]> + AsMut<[i32]>> RealTime<S> {
             Order::Move(motion) => self.begin_motion(motion)?,
             Order::SetUp(setup) => {
                 self.control.safety.set_up(setup.as_ref());
+                self.control
+                    .spindle
+                    .set_up(setup.and_then(|setup| setup.spindle()));
                 self.control.manual.set_up(setup);
             }
+            Order::Spindle(order) => self.control.spindle.order(order)?,
             Order::Drives { .. } | Order::Configure(_) | Order::Acknowledge => {}
         }
         Ok(())
@@ -96,8 +100,49 @@ impl<S: AsRef<[i32]> + AsMut<[i32]>> RealTime<S> {
         Some(Command::Start)
     }
 
+    /// A start or resume: held back until the spindle is at speed. In lockstep time is the host's, and nothing turns.
+    #[cold]
+    #[inline(never)]
+    pub(super) fn with_spindle(&mut self, command: Option<Command>) -> Option<Command> {
+        let state = self.interpolator.state();
+        let may = match command {
+            Some(Command::Start) => Command::Start.is_allowed(state) && self.may_start().is_ok(),
+            _ => state == State::Held,
+        };
+        self.control.host_is_gone = false;
+        let waits = may && !self.control.spindle.is_ready() && self.control.clock == Clock::Free;
+        if waits {
+            self.control.command = command;
+            return None;
+        }
+        command
+    }
+
+    /// A start waits for the spindle.
+    fn spins_up(&self) -> bool {
+        self.control.command == Some(Command::Start) && self.control.spindle.output() != 0
+    }
+
+    /// The run came to rest because the host is gone: the spindle too.
+    #[cold]
+    #[inline(never)]
+    pub(super) fn host_left(&mut self, state: State) {
+        self.control.host_is_gone = false;
+        if state == State::Held {
+            self.control.spindle.off();
+        }
+    }
+
     /// Begins motion outside a job, from where the axes stand.
     fn begin_motion(&mut self, motion: Motion) -> Result<(), Reason> {
+        if motion == Motion::Stop && self.spins_up() {
+            self.control.command = None;
+            self.control.spindle.off();
+            // The end of a run that has not begun.
+            self.control.safety.ending = true;
+            self.control.safety.recheck();
+            return Ok(());
+        }
         let status = self.control.safety.status();
         if !self.control.manual.is_active() {
             let stands_nm = self.interpolator.stands_nm();
@@ -148,6 +193,11 @@ impl<S: AsRef<[i32]> + AsMut<[i32]>> RealTime<S> {
         let motion = self.control.manual.status();
         let stands_nm = self.interpolator.stands_nm();
         MotionStatus {
+            activity: if self.spins_up() {
+                Activity::SpinUp
+            } else {
+                motion.activity
+            },
             // After a run, or a declaration, its position.
             at_nm: stands_nm
                 .filter(|_| !self.control.manual.is_active())

@@ -13,6 +13,8 @@ mod iwdg;
 pub(crate) mod safety_inputs;
 #[path = "../../src/drivers/sample_timer.rs"]
 pub(crate) mod sample_timer;
+#[path = "../../src/drivers/speed_output.rs"]
+pub(crate) mod speed_output;
 #[path = "../../src/drivers/step_output.rs"]
 pub(crate) mod step_output;
 #[path = "../../src/drivers/watchdog.rs"]

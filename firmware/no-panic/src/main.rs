@@ -48,7 +48,7 @@ mod app {
     const BOARD: &boards::Board = &boards::SKR_PRO;
 
     const INPUTS: SafetyInputs<Ports> = SafetyInputs::new(Ports, BOARD.lines);
-    const DRIVES: DriveEnable<Ports> = DriveEnable::new(Ports, BOARD);
+    const DRIVES: DriveEnable<Ports> = DriveEnable::new(Ports, BOARD, true);
 
     #[shared]
     struct Shared {

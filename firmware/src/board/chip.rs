@@ -12,7 +12,7 @@ use stm32f4xx_hal::{
 use super::{BOARD, Board, take_reset_cause};
 use crate::{
     design_parameters::{PERIOD_US, SERIAL_BAUD},
-    drivers::gpio,
+    drivers::{gpio, speed_output},
 };
 
 /// The processor's clock, MHz: the chip's maximum.
@@ -70,6 +70,7 @@ pub(crate) fn init(device: pac::Peripherals) -> Board {
 
     pac::TIM2::enable(&mut rcc);
     pac::TIM5::enable(&mut rcc);
+    pac::TIM12::enable(&mut rcc);
     pac::USART1::enable(&mut rcc);
     // Keeps the clocks on in sleep, so that the probe can read the log.
     device.DBGMCU.cr().modify(|_, w| w.dbg_sleep().set_bit());
@@ -84,6 +85,8 @@ pub(crate) fn init(device: pac::Peripherals) -> Board {
     });
 
     device.DBGMCU.apb2_fz().modify(|_, w| w.dbg_tim1_stop().set_bit());
+
+    speed_output::begin(&device.TIM12);
 
     Board {
         tim1: device.TIM1,

@@ -54,6 +54,10 @@ impl WritePorts for Ports {
         #[allow(unsafe_code, reason = "a whole register is written")]
         registers(port).bsrr().write(|w| unsafe { w.bits(bits) });
     }
+
+    fn duty(&mut self, steps: u32) {
+        super::speed_output::set(steps);
+    }
 }
 
 /// An output.

@@ -11,6 +11,7 @@ pub(crate) mod sample_timer;
 pub(crate) mod serial;
 #[cfg(not(feature = "board-qemu"))]
 pub(crate) mod settings_flash;
+pub(crate) mod speed_output;
 pub(crate) mod status_led;
 pub(crate) mod step_output;
 pub(crate) mod watchdog;

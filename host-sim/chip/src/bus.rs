@@ -13,9 +13,10 @@ use crate::{
 /// A peripheral: base address, size in bytes, clock, name.
 type Device = (u32, u32, Gate, &'static str);
 
-const DEVICES: [Device; 16] = [
+const DEVICES: [Device; 17] = [
     (0x4000_0000, 0x400, Gate::Apb1(0), "TIM2"),
     (0x4000_0c00, 0x400, Gate::Apb1(3), "TIM5"),
+    (0x4000_1800, 0x400, Gate::Apb1(6), "TIM12"),
     (0x4000_7000, 0x400, Gate::Apb1(28), "PWR"),
     (0x4001_0000, 0x400, Gate::Apb2(0), "TIM1"),
     (0x4001_1000, 0x400, Gate::Apb2(4), "USART1"),
@@ -68,6 +69,7 @@ impl Chip {
         match address {
             0x4000_0000..0x4000_0400 => self.tim2.read(address & 0x3ff, world),
             0x4000_0c00..0x4000_1000 => self.tim5.read(address & 0x3ff, world),
+            0x4000_1800..0x4000_1c00 => self.pwm.read(address & 0x3ff, world),
             0x4000_3000..0x4000_3400 => self.watchdog.read(address & 0x3ff, world),
             0x4000_7000 => self.rcc.pwr_cr,
             // PWR_CSR: VOS ready.
@@ -110,6 +112,7 @@ impl Chip {
                 self.tim5
                     .write(address & 0x3ff, value, self.rcc.timer_cycles(1), world)
             }
+            0x4000_1800..0x4000_1c00 => self.pwm.write(address & 0x3ff, value, world),
             0x4000_3000..0x4000_3400 => self.watchdog.write(address & 0x3ff, value, world),
             0x4000_7000 => {
                 self.rcc.pwr_cr = value;

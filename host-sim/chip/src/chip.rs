@@ -19,6 +19,7 @@ use crate::{
         flash::Flash,
         gpio::{Change, Port},
         nvic::{self, Nvic},
+        pwm::Pwm,
         rcc::{Rcc, cause},
         timer::{self, Timer},
         usart::Usart,
@@ -54,6 +55,7 @@ pub(crate) struct Chip {
     pub(crate) tim1: Timer,
     pub(crate) tim2: Timer,
     pub(crate) tim5: Timer,
+    pub(crate) pwm: Pwm,
     pub(crate) dma: Dma,
     pub(crate) usart: Usart,
     pub(crate) watchdog: Watchdog,
@@ -139,6 +141,7 @@ impl Chip {
             tim1: Timer::new("TIM1", 0xffff),
             tim2: Timer::new("TIM2", u32::MAX),
             tim5: Timer::new("TIM5", u32::MAX),
+            pwm: Pwm::default(),
             dma: Dma::default(),
             usart: Usart::new(),
             watchdog: Watchdog::new(options.lsi_hz),
@@ -186,6 +189,7 @@ impl Chip {
             Timer::new("TIM2", u32::MAX),
             Timer::new("TIM5", u32::MAX),
         );
+        self.pwm = Pwm::default();
         self.dma = Dma::default();
         self.usart = Usart::new();
         self.usart.from_host = from_host;

@@ -59,6 +59,8 @@ pub(crate) fn of(chip: &Chip, account: &Account, seconds_spent: f64) -> Value {
         "periods": chip.periods,
         "slots_from_cycle": chip.slots_from,
         "carriages_mm": chip.machine.as_ref().map(crate::machine::Machine::at_mm),
+        "spindle_duty": chip.pwm.duty(),
+        "spindle_duty_max": chip.pwm.most,
         "first_pulse_ms": chip.moved.map(|seconds| seconds * 1e3),
         "tim2": interrupt(chip, nvic::TIM2),
         "usart1": interrupt(chip, nvic::USART1),

@@ -289,6 +289,7 @@ mod tests {
             },
             Reason::NoHoming,
             Reason::ProbeTripped,
+            Reason::NoSpindle,
             Reason::RowsGone,
         ]
     }

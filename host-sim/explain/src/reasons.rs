@@ -3,7 +3,7 @@
 use super::{Entry, Family};
 
 /// In the order of codes.
-pub(super) const ENTRIES: [Entry; 31] = [
+pub(super) const ENTRIES: [Entry; 32] = [
     reason(
         0,
         "bad-frame",
@@ -276,6 +276,15 @@ pub(super) const ENTRIES: [Entry; 31] = [
     ),
     reason(
         30,
+        "no-spindle",
+        "The machine's profile describes no spindle.",
+        "None.",
+        "It has no section [spindle], so the board does not know which output is which speed.",
+        "Add `[spindle]` with `max_rpm` to the profile (docs/operating.md), or remove the section from the job and switch the spindle by hand.",
+        "A job with [spindle] on a machine whose router has a switch of its own.",
+    ),
+    reason(
+        31,
         "rows-gone",
         "A start of a job that is larger than the board's store, after its first part was overwritten.",
         "None.",

@@ -14,6 +14,7 @@ mod placement;
 mod region;
 mod section;
 mod setup;
+mod spindle;
 mod steps;
 mod surface;
 #[cfg(test)]
@@ -24,7 +25,7 @@ use std::path::Path;
 
 use job::{
     Along, AlongChoice, CHORD_DEFAULT_MM, CadSource, FEED_MAX_MM_MIN, FEED_MIN_MM_MIN, Job, JobError,
-    MachineProfile, OVERRUN_MAX_MM, Pattern, Side, Spacing, Start,
+    MachineProfile, MachineSpec, OVERRUN_MAX_MM, Pattern, Side, Spacing, Start,
 };
 use patches::placement::Placement;
 use section::{Reader, Section};
@@ -85,7 +86,7 @@ pub fn load_profile(path: &Path) -> Result<MachineProfile, JobError> {
 /// As [`load_profile`].
 pub fn parse_profile(name: &str, text: &str) -> Result<MachineProfile, JobError> {
     let document = Reader::new(name, text).document()?;
-    document.only(&["machine", "home", "probe"], &[])?;
+    document.only(&["machine", "home", "probe", "spindle"], &[])?;
     machine::read_profile(&document)
 }
 
@@ -124,6 +125,7 @@ fn parse_on(
             "part",
             "cut",
             "machine",
+            "spindle",
         ],
         &[],
     )?;
@@ -218,7 +220,13 @@ fn parse_on(
             true => read_overrun(&cut)?,
             false => 0.0,
         },
-        machine: machine::read_on(document.optional_section("machine")?.as_ref(), profile)?,
+        machine: MachineSpec {
+            spindle: document
+                .optional_section("spindle")?
+                .map(|spindle| spindle::read(&spindle, profile))
+                .transpose()?,
+            ..machine::read_on(document.optional_section("machine")?.as_ref(), profile)?
+        },
         origin,
     };
     if trimmed || job.origin.part().is_some() {

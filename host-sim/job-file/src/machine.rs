@@ -6,7 +6,7 @@ use job::{
 };
 
 use crate::section::Section;
-use crate::{homing, steps};
+use crate::{homing, spindle, steps};
 
 /// Largest clearance and plunge, mm.
 const HEIGHT_MAX_MM: f64 = 1000.0;
@@ -27,7 +27,7 @@ const COMMON: [&str; 7] = [
 /// Keys of a job alone.
 const OF_JOBS: [&str; 5] = ["period_us", "home_mm", "safe_z_mm", "clearance_mm", "plunge_mm"];
 
-/// A machine's profile: the sections `[machine]`, `[home]` and `[probe]` of its file.
+/// A machine's profile: the sections `[machine]`, `[home]`, `[probe]` and `[spindle]` of its file.
 pub(super) fn read_profile(document: &Section<'_>) -> Result<MachineProfile, JobError> {
     let machine = &document.section("machine")?;
     let of_jobs = OF_JOBS.map(|key| (key, "it is a job's"));
@@ -41,10 +41,12 @@ pub(super) fn read_profile(document: &Section<'_>) -> Result<MachineProfile, Job
         .map(|home| homing::read(&home, &limits, travel_mm))
         .transpose()?;
     let probe = document.optional_section("probe")?;
+    let spindle = document.optional_section("spindle")?;
     Ok(MachineProfile {
         limits,
         travel_mm,
         homing,
+        spindle: spindle.map(|spindle| spindle::read_drive(&spindle)).transpose()?,
         probe_closes: probe.map_or(Ok(false), |probe| homing::read_probe(&probe))?,
         homing_required: read.homing_required,
         heartbeat_action: read.heartbeat_action,

@@ -110,6 +110,26 @@ pub struct Homing {
     pub survives_off: bool,
 }
 
+/// Spindle and coolant of a job: on from its start to its end.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Spindle {
+    /// Speed, 1/min; 0: the spindle stands.
+    pub rpm: u32,
+    /// It turns counterclockwise.
+    pub counterclockwise: bool,
+    /// Coolant.
+    pub coolant: bool,
+}
+
+/// The spindle of a machine.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct SpindleDrive {
+    /// Speed at the full output, 1/min.
+    pub max_rpm: u32,
+    /// Time from switching on to the first motion, ms.
+    pub at_speed_ms: f64,
+}
+
 /// A machine as its board keeps it: the greatest limits, the drives, the supervision. A job may lower the limits, but not exceed them.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct MachineProfile {
@@ -129,6 +149,8 @@ pub struct MachineProfile {
     pub homing: Option<Homing>,
     /// The probe's contact closes when it touches.
     pub probe_closes: bool,
+    /// The spindle.
+    pub spindle: Option<SpindleDrive>,
 }
 
 impl MachineProfile {
@@ -172,6 +194,8 @@ pub struct MachineSpec {
     pub heartbeat_timeout_ms: f64,
     /// Requirements of the drives. `None`: the board's own setting.
     pub step_output: Option<StepOutput>,
+    /// Spindle and coolant of the job.
+    pub spindle: Option<Spindle>,
 }
 
 impl Default for MachineSpec {
@@ -188,6 +212,7 @@ impl Default for MachineSpec {
             heartbeat_action: HeartbeatAction::Finish,
             heartbeat_timeout_ms: HEARTBEAT_TIMEOUT_DEFAULT_MS,
             step_output: None,
+            spindle: None,
         }
     }
 }

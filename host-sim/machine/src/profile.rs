@@ -3,8 +3,10 @@
 use std::fmt::Write as _;
 
 use interp_core::StepConfig;
-use job::{AXES, AxisLimits, HeartbeatAction, MachineProfile, PERIOD_DEFAULT_US, Ratio, StepOutput};
-use protocol::message::{LinkTimeoutAction, Profile};
+use job::{
+    AXES, AxisLimits, HeartbeatAction, MachineProfile, PERIOD_DEFAULT_US, Ratio, SpindleDrive, StepOutput,
+};
+use protocol::message::{LinkTimeoutAction, Profile, SpindleOrder, SpindleSettings, Turning};
 
 use crate::prepare;
 
@@ -29,6 +31,10 @@ pub fn for_board(profile: &MachineProfile) -> Profile {
         configuration: prepare::configuration(&spec),
         homing: profile.homing.map(|homing| homing_for_board(&homing)),
         probe_inverted: profile.probe_closes,
+        spindle: profile.spindle.map(|spindle| SpindleSettings {
+            max_rpm: spindle.max_rpm,
+            at_speed_ticks: ticks(spindle.at_speed_ms),
+        }),
     }
 }
 
@@ -44,6 +50,7 @@ pub fn of_board(profile: &Profile) -> MachineProfile {
         configuration,
         homing,
         probe_inverted,
+        spindle,
     } = *profile;
     let slot_us = PERIOD_DEFAULT_US / f64::from(interp_core::steps::SLOTS);
     let config = StepConfig::from(steps);
@@ -71,12 +78,40 @@ pub fn of_board(profile: &Profile) -> MachineProfile {
         },
         homing: homing.map(|homing| homing_of_board(&homing)),
         probe_closes: probe_inverted,
+        spindle: spindle.map(|spindle| SpindleDrive {
+            max_rpm: spindle.max_rpm,
+            at_speed_ms: f64::from(spindle.at_speed_ticks) * PERIOD_DEFAULT_US / US_PER_MS,
+        }),
     }
 }
 
 /// The shortest decimal numbers that the board's stand for.
 fn decimal(values: [f32; 3]) -> [f64; 3] {
     values.map(|value| value.to_string().parse().unwrap_or(f64::from(value)))
+}
+
+/// A time in the board's periods.
+#[allow(
+    clippy::cast_possible_truncation,
+    clippy::cast_sign_loss,
+    reason = "the cast saturates"
+)]
+fn ticks(ms: f64) -> u32 {
+    (ms * US_PER_MS / PERIOD_DEFAULT_US).round() as u32
+}
+
+/// The order for a board's spindle.
+#[must_use]
+pub fn spindle_order(spindle: Option<job::Spindle>) -> SpindleOrder {
+    spindle.map_or(SpindleOrder::OFF, |spindle| SpindleOrder {
+        turning: match spindle.counterclockwise {
+            _ if spindle.rpm == 0 => Turning::Off,
+            false => Turning::Clockwise,
+            true => Turning::Counterclockwise,
+        },
+        rpm: spindle.rpm,
+        coolant: spindle.coolant,
+    })
 }
 
 /// A length in nm.
@@ -123,6 +158,7 @@ pub fn text(profile: &MachineProfile) -> String {
         step_output,
         homing,
         probe_closes,
+        spindle,
     } = profile;
     let ratio = |ratio: Ratio| match ratio.denominator {
         1 => ratio.numerator.to_string(),
@@ -176,6 +212,10 @@ pub fn text(profile: &MachineProfile) -> String {
     if *probe_closes {
         line(format_args!("\n[probe]\ncontact = \"normally-open\""));
     }
+    if let Some(spindle) = spindle {
+        line(format_args!("\n[spindle]\nmax_rpm = {}", spindle.max_rpm));
+        line(format_args!("at_speed_ms = {:?}", spindle.at_speed_ms));
+    }
     text
 }
 
@@ -205,6 +245,10 @@ back_off_mm = [3, 3, 3]
 
 [probe]
 contact = "normally-open"
+
+[spindle]
+max_rpm = 24000
+at_speed_ms = 2500
 "#;
 
     /// What is kept by a board is what its text says, and the text again.

@@ -177,7 +177,13 @@ impl Oracle {
             return vec![self.path_range()];
         };
         // The line on the upper boundary is the one below it.
-        let [_, most] = region.extent();
+        let [least, most] = region.extent();
+        // A line on the lower boundary may be rounded to a place below it.
+        let side = if side < least && least - side <= region.near_side() {
+            least
+        } else {
+            side
+        };
         let side = side.min(most - 1e-3 * region.place[1]);
         let mut intervals: Vec<[f64; 2]> = Vec::new();
         for pair in region.crossings(side).as_chunks::<2>().0 {

@@ -469,6 +469,9 @@ pub(super) fn command(arguments: &Arguments) -> Result<()> {
     let bar = progress(prepared.words.len() as u64, "uploading");
     drive::upload(&mut session, &prepared, |words| bar.set_position(words as u64))?;
     bar.finish_and_clear();
+    if job.machine.spindle.is_some() && profile.is_some_and(|profile| profile.spindle.is_some()) {
+        session.command(&Request::Spindle(profile::spindle_order(job.machine.spindle)))?;
+    }
     let reference = Reference {
         job: &job,
         prepared: &prepared,

@@ -5,6 +5,7 @@ pub(crate) mod dma;
 pub(crate) mod flash;
 pub(crate) mod gpio;
 pub(crate) mod nvic;
+pub(crate) mod pwm;
 pub(crate) mod rcc;
 pub(crate) mod timer;
 pub(crate) mod usart;

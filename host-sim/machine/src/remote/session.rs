@@ -149,6 +149,7 @@ fn name(request: &Request) -> &'static str {
         Request::Home { .. } => "homing",
         Request::Probe { .. } => "the probe move",
         Request::Motion => "the position of the axes",
+        Request::Spindle(_) => "spindle and coolant",
         Request::Offsets | Request::SetOffsets(_) => "the work offsets",
     }
 }

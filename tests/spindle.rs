@@ -1,0 +1,233 @@
+//! Spindle and coolant: on from the start of a run to its end, at speed before the first motion, off whenever the run ends or the host is gone.
+
+use controller::{in_process::Board, spindle::output};
+use integration_tests::{HELLO, Host, dome, upload};
+use interp_core::{AxisLimits, State};
+use protocol::message::{
+    Activity, Configuration, InputLines, LinkTimeoutAction, MotionStatus, PWM_STEPS, Reason, Reply, Request,
+    SpindleOrder, SpindleSettings, Status, Turning,
+};
+
+const AT_SPEED: u32 = 300;
+const MAX_RPM: u32 = 24_000;
+const ORDER: SpindleOrder = SpindleOrder {
+    turning: Turning::Counterclockwise,
+    rpm: 12_000,
+    coolant: true,
+};
+/// A half of the speed, counterclockwise, with coolant and drives.
+const ON: u32 = output::DRIVES
+    | output::SPINDLE
+    | output::COUNTERCLOCKWISE
+    | output::COOLANT
+    | (PWM_STEPS / 2) << output::DUTY_SHIFT;
+
+struct Desk {
+    host: Host,
+    board: Board<64>,
+    halts: u32,
+}
+
+impl Desk {
+    /// A board with a spindle and a job within limits that uses it, ready to start.
+    fn ready() -> Self {
+        let mut desk = Self {
+            host: Host::default(),
+            board: Board::new(),
+            halts: 0,
+        };
+        desk.board.receive(&desk.host.next(&HELLO));
+        desk.board.take_sent();
+        let mut profile = super::manual::profile();
+        profile.travel_nm = None;
+        profile.homing = None;
+        profile.spindle = Some(SpindleSettings {
+            max_rpm: MAX_RPM,
+            at_speed_ticks: AT_SPEED,
+        });
+        desk.ask(&Request::SetProfile(Some(profile))).unwrap();
+        desk.load();
+        desk.ask(&Request::Drives { on: true }).unwrap();
+        let home_nm = [0, 0, 50_000_000];
+        desk.ask(&Request::SetHome { home_nm }).unwrap();
+        desk.ask(&Request::Spindle(ORDER)).unwrap();
+        desk
+    }
+
+    fn load(&mut self) {
+        let (mut header, words) = dome();
+        header.axes = Some(AxisLimits {
+            velocity_mm_s: [100.0, 100.0, 50.0],
+            acceleration_mm_s2: [1000.0, 1000.0, 500.0],
+            jerk_mm_s3: [20_000.0, 20_000.0, 10_000.0],
+            chord_mm: 0.005,
+            overrun_mm: 0.0,
+            travel_nm: [[i32::MIN, i32::MAX]; 3],
+            home_nm: [0, 0, 50_000_000],
+            plunge_mm: 2.0,
+            safe_z_nm: 40_000_000,
+        });
+        for request in upload(header, &words) {
+            self.ask(&request).unwrap();
+        }
+    }
+
+    fn ticks(&mut self, ticks: u32) {
+        for _ in 0..ticks {
+            self.board.tick();
+        }
+        let sent = self.board.take_sent();
+        let halted = |reply: &&Reply| matches!(reply, Reply::Halted(_));
+        self.halts += self.host.read(&sent).iter().filter(halted).count() as u32;
+    }
+
+    fn answer(&mut self, request: &Request) -> Reply {
+        self.ticks(0);
+        self.board.receive(&self.host.next(request));
+        let sent = self.board.take_sent();
+        let reply = self.host.read(&sent).pop().unwrap();
+        self.ticks(1);
+        reply
+    }
+
+    fn ask(&mut self, request: &Request) -> Result<(), Reason> {
+        match self.answer(request) {
+            Reply::Ack { .. } => Ok(()),
+            Reply::Nak { reason, .. } => Err(reason),
+            other => panic!("{other:?}"),
+        }
+    }
+
+    fn status(&mut self) -> Status {
+        self.board.status()
+    }
+
+    fn motion(&mut self) -> MotionStatus {
+        self.board.real_time().motion()
+    }
+
+    fn outputs(&mut self) -> u32 {
+        self.board.real_time().outputs()
+    }
+
+    fn running(mut self) -> Self {
+        self.ask(&Request::Start).unwrap();
+        self.ticks(AT_SPEED + 100);
+        assert!(self.status().state.is_under_way());
+        assert_eq!(self.outputs(), ON);
+        self
+    }
+}
+
+#[test]
+fn a_run_begins_when_the_spindle_is_at_speed() {
+    let mut desk = Desk::ready();
+    assert_eq!(desk.outputs(), output::DRIVES);
+    desk.ask(&Request::Start).unwrap();
+    assert_eq!(desk.outputs(), ON);
+    assert_eq!(desk.motion().activity, Activity::SpinUp);
+    desk.ticks(AT_SPEED - 2);
+    assert_eq!(desk.status().state, State::Ready);
+    assert_eq!(
+        desk.ask(&Request::Spindle(SpindleOrder::OFF)),
+        Err(Reason::Moving)
+    );
+    desk.ticks(2);
+    assert_eq!(desk.status().state, State::Linking);
+    assert_eq!((desk.outputs(), desk.motion().activity), (ON, Activity::Rest));
+}
+
+#[test]
+fn every_end_of_a_run_switches_it_off() {
+    for end in [Request::Stop, Request::Abort] {
+        let mut desk = Desk::ready().running();
+        desk.ask(&end).unwrap();
+        desk.ticks(4000);
+        assert_eq!(
+            (desk.status().state, desk.outputs()),
+            (State::Ready, output::DRIVES)
+        );
+    }
+    for (lines, outputs) in [
+        (InputLines::EMERGENCY_STOP, 0),
+        (InputLines(1 << 10), 0),
+        (InputLines::limit(0, true), output::DRIVES),
+    ] {
+        let mut desk = Desk::ready().running();
+        desk.board.simulate(lines);
+        desk.ticks(1500);
+        assert_eq!((desk.status().state, desk.outputs()), (State::Faulted, outputs));
+    }
+}
+
+#[test]
+fn a_start_that_waits_can_be_taken_back() {
+    let mut desk = Desk::ready();
+    desk.ask(&Request::Start).unwrap();
+    desk.ticks(10);
+    desk.ask(&Request::Stop).unwrap();
+    desk.ticks(2);
+    assert_eq!((desk.outputs(), desk.halts), (output::DRIVES, 1));
+    desk.ticks(1000);
+    assert_eq!(desk.status().state, State::Ready);
+    // Neither does it turn when an input forbids the start meanwhile.
+    desk.ask(&Request::Start).unwrap();
+    desk.ticks(10);
+    desk.board.simulate(InputLines::EMERGENCY_STOP);
+    desk.ticks(2);
+    assert_eq!(desk.outputs(), 0);
+    desk.ticks(1000);
+    assert_eq!((desk.outputs(), desk.status().state), (0, State::Ready));
+}
+
+#[test]
+fn a_run_held_because_the_host_is_gone_stands_without_it() {
+    let mut desk = Desk::ready();
+    let hold = Configuration {
+        on_link_timeout: LinkTimeoutAction::Hold,
+        link_timeout_ticks: 1000,
+        ..Configuration::DEFAULT
+    };
+    desk.ask(&Request::Configure(hold)).unwrap();
+    let mut desk = desk.running();
+    desk.ticks(2500);
+    assert_eq!(
+        (desk.status().state, desk.outputs()),
+        (State::Held, output::DRIVES)
+    );
+    desk.ask(&Request::Resume).unwrap();
+    assert_eq!(desk.outputs(), ON);
+    desk.ticks(AT_SPEED - 2);
+    assert_eq!(desk.status().state, State::Held);
+    desk.ticks(3);
+    assert!(matches!(desk.status().state, State::Running | State::Linking));
+    // The operator's own hold leaves it on.
+    desk.ask(&Request::Hold).unwrap();
+    desk.ticks(800);
+    assert_eq!((desk.status().state, desk.outputs()), (State::Held, ON));
+}
+
+#[test]
+fn an_order_is_for_one_job_and_within_the_profile() {
+    let mut desk = Desk::ready();
+    let fast = SpindleOrder {
+        rpm: MAX_RPM + 1,
+        ..ORDER
+    };
+    assert!(matches!(
+        desk.ask(&Request::Spindle(fast)),
+        Err(Reason::OutOfRange { .. })
+    ));
+    desk.load();
+    desk.ask(&Request::Start).unwrap();
+    desk.ticks(2);
+    assert_eq!(
+        (desk.outputs(), desk.status().state),
+        (output::DRIVES, State::Linking)
+    );
+    desk.ask(&Request::Abort).unwrap();
+    desk.ticks(500);
+    let without = super::manual::profile();
+    desk.ask(&Request::SetProfile(Some(without))).unwrap();
+    assert_eq!(desk.ask(&Request::Spindle(ORDER)), Err(Reason::NoSpindle));
+}
