@@ -16,6 +16,7 @@ mod home;
 mod house;
 mod images;
 mod import;
+mod job_times;
 mod lost_events;
 mod manual;
 mod no_panic;

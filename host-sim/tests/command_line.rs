@@ -586,7 +586,7 @@ fn verify_prints_an_object_of_the_schema_for_every_outcome() {
     assert!(told["error"]["help"].as_str().unwrap().contains("600"));
 }
 
-/// A scallop above its limit is told with what helps, and both remedies do.
+/// The message of a scallop above its limit names two remedies, and both help.
 #[test]
 fn remedies_for_a_scallop_help() {
     // The paper's spacing exceeds the height on this job.
@@ -617,8 +617,8 @@ fn remedies_for_a_scallop_help() {
     assert!(found["scallop_max_mm"].as_f64().unwrap() <= 0.005, "{found}");
 }
 
-/// A plane that leans over the tool by 10 degrees: the contact is above the ball's equator, the shank in the plane. The turn that is told helps,
-/// and a holder that touches a fixture is told with its place.
+/// A plane that leans over the tool by 10 degrees: the contact is above the ball's equator, the shank in the plane. The reported turn helps,
+/// and a holder that touches a fixture is reported with its place.
 #[test]
 fn verify_tells_what_the_tool_does_not_reach() {
     let folder = tempfile::tempdir().unwrap();

@@ -253,7 +253,7 @@ fn a_difference_is_found_whatever_is_lost() {
     }
 }
 
-/// An end that is told once by a status is not told again by its event, nor an earlier one: runs follow each other on one session.
+/// An end that a status reported is not reported again by its event, nor is an earlier one: runs follow each other on one session.
 #[test]
 fn one_run_after_the_other_has_its_own_end() {
     let bench = dome();

@@ -422,7 +422,7 @@ mod tests {
         }
         let optimum = &found.measured.optimum;
         assert!(optimum.passes.len() >= 3 && optimum.passes.iter().all(|time| time.ours_s.is_some()));
-        // No pass is worse than the worst one solved, or than the bound that is told.
+        // No pass is worse than the worst one solved, or than the reported bound.
         let worst = optimum.ratio_max.unwrap();
         assert!((0.999..1.3).contains(&worst), "{worst}");
         assert!(

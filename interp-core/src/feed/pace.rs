@@ -10,7 +10,7 @@ use crate::math::number::{Bounded, to_f32};
 
 /// Periods from the start of a search to the change that it finds, for the search: some, and as many as the places of two short trials take.
 const LATENCY: u16 = 8;
-const PLACES_A_PERIOD: f32 = 13.0;
+const PLACES_A_PERIOD: f32 = 14.0;
 /// The most of it, and steps in which the place there is found.
 const LATENCY_MAX: u16 = 96;
 const STEPS_AHEAD: u16 = 24;
@@ -18,6 +18,7 @@ const STEPS_AHEAD: u16 = 24;
 /// The same of a profile: least periods, and places for the shortest change, as a multiple of its slots.
 const LATENCY_OF_PROFILE: u16 = 3;
 const PROFILE_PLACES: f32 = 2.5;
+const PLACES_FINE: f32 = 1.4;
 /// Least duration of a slot of a profile, s, first and where that fails, and slots of the shortest change that are enough; longest period with profiles, s.
 const SLOT_MIN: f32 = 2e-3;
 const SLOT_FINE: f32 = 1e-3;
@@ -493,7 +494,8 @@ impl<C: Copy> Pace<C> {
         let widest = if is_uneven { SPACING } else { SPACING_WIDE };
         let slot_s = if is_uneven { finest } else { self.slot(shortest) };
         let places = if makes_profile {
-            PROFILE_PLACES * shortest / slot_s
+            let share = if is_uneven { PLACES_FINE } else { PROFILE_PLACES };
+            share * shortest / slot_s
         } else {
             2.0 * shortest / spacing(shortest, widest)
         };
@@ -567,7 +569,7 @@ impl<C: Copy> Pace<C> {
 
     /// Whether a profile is made for the change that is wanted.
     fn makes_profile(&self) -> bool {
-        self.period <= PROFILE_PERIOD_MAX && self.wanted < self.now()
+        self.period <= PROFILE_PERIOD_MAX && self.wanted == 0.0
     }
 
     /// Duration of a slot, s: whole periods.

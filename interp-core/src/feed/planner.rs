@@ -4,7 +4,7 @@ use super::limits::{FeedChange, MotionLimits};
 use super::lists::{LIST, Lists, draft, draft_mut};
 use super::newton::{self, Reach, Sweep};
 use super::pace::{Course, Use};
-use super::plan::{COEFFICIENTS, Cursor, Lead, NODES_MAX, Plan};
+use super::plan::{COEFFICIENTS, Cursor, Lead, Plan};
 use super::road::GateSearch;
 use super::walk::Walker;
 use crate::math::arith::{inverse_sqrt, sqrt, truncated};
@@ -18,12 +18,17 @@ const BARRIER: [f32; 12] = [
 /// The same of a pass that takes no longer than its planning.
 const BARRIER_SHORT: [f32; 7] = [0.05, 0.02, 0.008, 0.002, 0.0007, 0.00025, 0.00025];
 /// The same of a pass that lasts long against its planning: more steps are worth their time.
-const BARRIER_LONG: [f32; 18] = [
+const STEPS_LONG: u8 = 18;
+const BARRIER_LONG: [f32; STEPS_LONG as usize] = [
     0.05, 0.05, 0.05, 0.02, 0.02, 0.008, 0.008, 0.008, 0.003, 0.003, 0.003, 0.001, 0.001, 0.001, 0.00025,
     0.00025, 0.00025, 0.00025,
 ];
-/// Periods of the start's motion that such a pass has at least, for each of its nodes.
-const LONG_PERIODS: f32 = 16.0;
+/// Share of the start's motion that a plan takes at least, periods that a step of the method takes for each node, and the rest of the planning with the
+/// check, apart from a share of the plan's own.
+const LASTS: f32 = 0.65;
+const PERIODS_A_STEP: f32 = 0.27;
+const PERIODS_A_PLAN: f32 = 70.0;
+const PERIODS_A_PLACE: f32 = 0.07;
 
 /// Share of the greatest factor of the walk's pace that the method starts from.
 const START_SHARE: f32 = 0.85;
@@ -254,14 +259,10 @@ impl Planner {
             }
             Stage::Scale => {
                 let factor = START_SHARE * self.factor.at_least(1e-9);
-                let nodes = f32::from(plan.intervals);
                 let lasts = plan.step_s / (self.weight * sqrt(factor) * plan.limits.period);
                 self.effort = if self.walker.is_short {
                     Effort::Little
-                } else if plan.pinned() == [0; 2]
-                    && usize::from(plan.intervals) >= NODES_MAX
-                    && lasts > LONG_PERIODS * nodes
-                {
+                } else if self.has_time(plan, lasts, least) {
                     Effort::Much
                 } else {
                     Effort::Usual
@@ -340,6 +341,14 @@ impl Planner {
             }
             Stage::Done => Stage::Done,
         };
+    }
+
+    /// Whether the most steps are worth their time: the plan lasts longer than its planning takes with them. `lasts`: periods of the start's motion;
+    /// `least`: those of the planning so far.
+    fn has_time(&self, plan: &Plan, lasts: f32, least: u32) -> bool {
+        let of_steps = PERIODS_A_STEP * f32::from(plan.intervals) * f32::from(STEPS_LONG);
+        LASTS * (1.0 - PERIODS_A_PLACE) * lasts > to_f32(least) + PERIODS_A_PLAN + of_steps
+            && plan.pinned() == [0; 2]
     }
 
     const fn barrier(&self) -> &'static [f32] {

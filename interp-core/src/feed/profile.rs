@@ -7,7 +7,7 @@
 use crate::math::number::Bounded;
 
 /// Segments of a profile: slots in a row of the same r''.
-const SEGMENTS: usize = 48;
+const SEGMENTS: usize = 40;
 /// Most slots of a segment, and of a profile.
 const SLOTS_A_SEGMENT: u8 = u8::MAX;
 const SLOTS_MAX: u16 = 300;

@@ -1140,7 +1140,7 @@ fn looks_again(job: &Job<'_>, estimator: Option<&mut StepOverEstimator>) -> bool
 }
 
 /// Passes without a turn after one whose plan had to be slowed down for it.
-const PASSES_WITHOUT: u8 = 60;
+const PASSES_WITHOUT: u8 = 15;
 
 /// Stations that a pass may have: in a job with turns there is room for their halves.
 fn stations_of(job: &Job<'_>) -> u16 {

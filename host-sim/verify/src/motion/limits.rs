@@ -459,7 +459,7 @@ mod tests {
                 // The velocity is reached for 50 ms, longer than every base.
                 assert!(peaks[0].share.unwrap() > 0.99, "{:?}", peaks[0]);
                 let told = peaks[2].verdict == Verdict::Met;
-                // Of the jerk all is told, but where the acceleration's ramp is shorter than the base that the noise needs.
+                // The jerk has a verdict unless the acceleration's ramp is shorter than the base that the noise needs.
                 assert!(
                     told || acceleration / jerk < 0.012,
                     "{jerk} {acceleration} {peaks:?}"
