@@ -4,6 +4,7 @@
 mod board;
 mod cad_files;
 mod chip;
+mod curves_end;
 mod cycles;
 mod debug_probe;
 mod drivers;

@@ -393,7 +393,8 @@ impl Lookahead {
         out.steps_over = false;
         out.is_last = false;
         out.starts = [0; PIECE_WORDS];
-        self.has_derivatives = false;
+        // Only stretches of a front may be too short for derivatives. The stations before a straight pass are those of its turn.
+        self.has_derivatives = !route.is_on_front();
     }
 
     /// Executes one task.
@@ -680,8 +681,8 @@ impl Lookahead {
                 .unwrap_or(1)
                 .saturating_sub(1)
                 .max(1);
-            let mean = if job.header.edges > 0 {
-                // The last pass may have been one of a small part of the patch.
+            let mean = if job.header.edges > 0 || job.header.spacing.is_constant() {
+                // The last pass may have been one of a small part of the patch, or short stretches of a front.
                 if spans > 1 {
                     self.patch_mm.at_least(length)
                 } else {
@@ -693,6 +694,10 @@ impl Lookahead {
                 length
             };
             out.cells = whole(mean / CELL_KEPT_MM).clamp(1, fit);
+            if spans == 1 {
+                // A place between the rests.
+                out.cells = out.cells.max(2);
+            }
             out.cell_fraction = u64::MAX.checked_div(u64::from(out.cells)).unwrap_or(u64::MAX);
             out.group = spans.div_ceil(PATCHES);
         }

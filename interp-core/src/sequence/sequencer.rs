@@ -518,6 +518,10 @@ impl Sequencer {
                     next.route = route;
                     self.planning = Planning::Requested(pass);
                 }
+                // Nothing that could make it is left: a fault, not a wait without end.
+                Ok(NextRoute::NotYet) if run.front_cycles() == 0 => {
+                    self.pending = Some(Fault::new(FaultKind::IntervalTooSmall, 0.0));
+                }
                 Ok(NextRoute::NotYet) => {}
                 Ok(NextRoute::None) => self.planning = Planning::Complete,
                 Err(fault) => self.pending = Some(fault),

@@ -10,7 +10,7 @@
 //! normal times the ball's radius is an integer vector, used for the cutter location; its products with the
 //! second derivatives are r times the second fundamental form. Both parameters are centred, -1/2 to 1/2 over a span.
 //!
-//! Along a curve of both parameters ([`CurvePass`]) a patch is not collapsed once, because the side parameter changes with each sample.
+//! Along a curve of both parameters (`curve::CurvePass`) a patch is not collapsed once, because the side parameter changes with each sample.
 //!
 //! **Poles.** Where a boundary collapses into a point, one first derivative vanishes along it. A flag of the patch marks the boundary,
 //! and `collapse` divides that derivative by its root exactly (synthetic division of the polynomial): `A = a Ã`, `B = b B̃`
