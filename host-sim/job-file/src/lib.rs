@@ -298,6 +298,13 @@ fn read_spacing(cut: &Section<'_>) -> Result<Spacing, JobError> {
 /// The overrun of turns, mm.
 fn read_overrun(cut: &Section<'_>) -> Result<f64, JobError> {
     let value = cut.number("overrun_mm")?;
+    if value > 0.0 && read_spacing(cut)?.is_constant() {
+        return Err(cut.error(
+            "overrun_mm",
+            "passes of constant scallop height have no turns beyond the boundary",
+            "remove it, or write spacing = \"exact\"",
+        ));
+    }
     if (0.0..=OVERRUN_MAX_MM).contains(&value) {
         return Ok(value);
     }
