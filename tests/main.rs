@@ -39,5 +39,6 @@ mod script;
 mod session;
 mod settings;
 mod spindle;
+mod streaming;
 mod swept;
 mod unusual_motion;

@@ -21,7 +21,7 @@ use protocol::{
         Activity, Batch, Capabilities, Clock, Configuration, Description, Excess, FaultReport, Homing,
         InputLines, JogWay, LinkTimeoutAction, MotionEnd, MotionStatus, Offsets, PassDigest, Profile,
         ProfileLimit, Reason, Reply, Report, Request, ResetCause, SafetyStatus, SampleRecord, SpindleOrder,
-        SpindleSettings, Status, StepSettings, Turning, Words, read_reply, read_request,
+        SpindleSettings, Status, StepSettings, StreamStatus, Turning, Words, read_reply, read_request,
     },
 };
 
@@ -38,6 +38,7 @@ fn header() -> Header {
         scallop_mm: 0.005,
         period_s: 0.001,
         edges: 0,
+        window: 0,
         axes: None,
     }
 }
@@ -224,6 +225,11 @@ fn status() -> Status {
         events: 302,
         steps: 0x1234_5678,
         profile: 0x9abc_def0,
+        stream: StreamStatus {
+            received: 300,
+            room: 20_000,
+            starved: 7,
+        },
         safety: SafetyStatus {
             lines: InputLines(1),
             latched: InputLines(0x201),
@@ -312,6 +318,7 @@ fn reasons() -> Vec<Reason> {
         Reason::NoHoming,
         Reason::ProbeTripped,
         Reason::NoSpindle,
+        Reason::RowsGone,
     ]
 }
 
@@ -383,6 +390,10 @@ fn replies() -> Vec<Reply> {
         Reply::Offsets {
             number: 7,
             offsets: OFFSETS,
+        },
+        Reply::Room {
+            event: 303,
+            room: 20_000,
         },
     ]);
     replies

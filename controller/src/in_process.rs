@@ -5,7 +5,7 @@ use std::vec::Vec;
 
 use interp_core::{
     fault::Fault,
-    job::{Header, STORE_WORDS},
+    job::{Header, STORE_WORDS, stream::RecordCopy},
     steps::{BUFFER_WORDS, CheckedSteps, StepConfig},
 };
 use protocol::message::{Description, InputLines, MotionStatus, Offsets, Profile, Reason, Status};
@@ -62,6 +62,18 @@ impl<const WORDS: usize> Machine for Half<WORDS> {
 
     fn load_words(&mut self, offset: u32, words: &[i32]) -> Result<(), Fault> {
         self.real_time.load_words(offset, words)
+    }
+
+    fn load_room(&mut self) -> [u32; 2] {
+        self.real_time.load_room()
+    }
+
+    fn load_copy(&mut self, record: u32) -> Result<RecordCopy, Fault> {
+        self.real_time.load_copy(record)
+    }
+
+    fn load_judged(&mut self, record: u32, checked: Result<(), Fault>) -> Result<(), Fault> {
+        self.real_time.load_judged(record, checked)
     }
 
     fn load_records(&mut self) -> u32 {

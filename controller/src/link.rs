@@ -86,6 +86,7 @@ impl Link {
         match event {
             Event::Sample(sample) => self.sample(sample, out),
             Event::Pass(pass) => self.pass(pass, out),
+            Event::Room(room) => self.room(*room, out),
             Event::Halted(status) => self.halted(status, out),
         }
     }
@@ -112,6 +113,12 @@ impl Link {
         self.flush(out);
         let pass = *pass;
         self.session.event(|event| Reply::PassDigest { event, pass }, out);
+    }
+
+    /// Writes that there is room for words of a streamed job.
+    pub fn room(&mut self, room: u32, out: &mut impl FnMut(&[u8])) {
+        self.flush(out);
+        self.session.event(|event| Reply::Room { event, room }, out);
     }
 
     /// Writes the end of a run, or that its ticks are used up.

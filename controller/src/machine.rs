@@ -3,7 +3,7 @@
 use interp_core::{
     command::Command,
     fault::Fault,
-    job::{Header, SurfaceKind, patches_max},
+    job::{Header, SurfaceKind, patches_max, stream::RecordCopy},
     steps::{CheckedSteps, StepConfig},
 };
 use protocol::message::{
@@ -45,6 +45,8 @@ pub enum Event {
     Sample(interp_core::sample::Sample),
     /// A pass is over.
     Pass(PassDigest),
+    /// A streamed job: words up to which there is room.
+    Room(u32),
     /// The ticks of a `Run` are used up, or the run is over.
     Halted(Status),
 }
@@ -99,6 +101,21 @@ pub trait Machine {
     /// # Errors
     /// The core's.
     fn load_words(&mut self, offset: u32, words: &[i32]) -> Result<(), Fault>;
+
+    /// [`interp_core::Interpolator::load_room`].
+    fn load_room(&mut self) -> [u32; 2];
+
+    /// [`interp_core::Interpolator::load_copy`]; one record.
+    ///
+    /// # Errors
+    /// The core's.
+    fn load_copy(&mut self, record: u32) -> Result<RecordCopy, Fault>;
+
+    /// [`crate::realtime::RealTime::load_judged`].
+    ///
+    /// # Errors
+    /// The core's.
+    fn load_judged(&mut self, record: u32, checked: Result<(), Fault>) -> Result<(), Fault>;
 
     /// [`interp_core::Interpolator::load_records`].
     fn load_records(&mut self) -> u32;

@@ -21,11 +21,11 @@ use interp_core::{
     command::{Command, Inputs},
     fault::{Fault, FaultKind, Result},
     interpolator::Interpolator,
-    job::{Header, STORE_WORDS},
+    job::{Header, STORE_WORDS, stream::RecordCopy},
     sample::{Sample, State},
     steps::{BUFFER_WORDS, CheckedSteps, Steps},
 };
-use protocol::message::{Clock, FaultReport, InputLines, Report, ResetCause, Status};
+use protocol::message::{Clock, FaultReport, InputLines, Report, ResetCause, Status, StreamStatus};
 
 use self::{
     control::{Control, Planning},
@@ -271,7 +271,8 @@ impl<S: AsRef<[i32]> + AsMut<[i32]>> RealTime<S> {
     /// simulated then need not wait for its timer.
     #[must_use]
     pub fn wants_tick(&self) -> bool {
-        self.control.clock == Clock::Lockstep && (self.control.credit > 0 || self.control.spent)
+        let has_credit = self.control.credit > 0 && !self.interpolator.is_starved();
+        self.control.clock == Clock::Lockstep && (has_credit || self.control.spent)
     }
 
     /// Whether the planning of the last period is due: [`Self::plan`] is then to be called before the next tick.
@@ -334,6 +335,9 @@ impl<S: AsRef<[i32]> + AsMut<[i32]>> RealTime<S> {
             feed_override: self.control.safety.status().feed_override,
         };
         let state = self.interpolator.tick(inputs).state;
+        if self.interpolator.is_starved() {
+            return self.starve();
+        }
         self.control.planning = if self.interpolator.has_to_plan() {
             Planning::Due
         } else {
@@ -351,20 +355,49 @@ impl<S: AsRef<[i32]> + AsMut<[i32]>> RealTime<S> {
         }
     }
 
+    /// A period in which the run waited for words: it is none of its ticks, and costs no credit.
+    #[cold]
+    #[inline(never)]
+    fn starve(&mut self) {
+        let control = &mut self.control;
+        control.planning = Planning::Complete;
+        control.run.starved = control.run.starved.saturating_add(1);
+        if control.clock == Clock::Lockstep {
+            control.credit = control.credit.saturating_add(1);
+        }
+    }
+
+    /// The first sample of a pass: reports the pass before it, and the room for further words of a streamed job.
+    #[cold]
+    #[inline(never)]
+    fn begin_pass(&mut self, events: &mut impl Events) {
+        let sample = *self.interpolator.last();
+        if let Some(over) = self
+            .control
+            .run
+            .begin_pass(&sample, self.interpolator.last_interval())
+        {
+            self.control.put(Event::Pass(over), events);
+        }
+        let [_, room] = self.interpolator.load_room();
+        if self.interpolator.is_streamed() && room != self.control.room {
+            self.control.room = room;
+            self.control.put(Event::Room(room), events);
+        }
+    }
+
     /// Adds the last sample to the record of the run, and reports it as configured by `Report`.
     #[inline]
     fn count_sample(&mut self, events: &mut impl Events) {
+        if self.control.run.begins_pass(self.interpolator.last()) {
+            self.begin_pass(events);
+        }
         let Self {
             control,
             interpolator,
             ..
         } = self;
         let sample = interpolator.last();
-        if control.run.begins_pass(sample)
-            && let Some(over) = control.run.begin_pass(sample, interpolator.last_interval())
-        {
-            control.put(Event::Pass(over), events);
-        }
         control.run.add(sample);
         if control.report == Report::Samples {
             control.put(Event::Sample(*sample), events);
@@ -412,6 +445,7 @@ impl<S: AsRef<[i32]> + AsMut<[i32]>> RealTime<S> {
         } else {
             (last.pass, last.path, last.side)
         };
+        let [received, room] = self.interpolator.load_room();
         Status {
             state: self.interpolator.state(),
             fault: fault.map(FaultReport::from),
@@ -433,6 +467,11 @@ impl<S: AsRef<[i32]> + AsMut<[i32]>> RealTime<S> {
             events: 0,
             steps: 0,
             profile: 0,
+            stream: StreamStatus {
+                received,
+                room,
+                starved: run.starved,
+            },
             safety: self.control.safety.status(),
         }
     }
@@ -489,6 +528,32 @@ impl<S: AsRef<[i32]> + AsMut<[i32]>> RealTime<S> {
         self.interpolator.load_words(offset, words)
     }
 
+    /// [`Interpolator::load_room`].
+    #[must_use]
+    pub fn load_room(&self) -> [u32; 2] {
+        self.interpolator.load_room()
+    }
+
+    /// [`Interpolator::load_copy`].
+    ///
+    /// # Errors
+    /// Those of the interpolator.
+    pub fn load_copy(&self, record: u32) -> Result<RecordCopy> {
+        self.interpolator.load_copy(record)
+    }
+
+    /// [`Interpolator::load_accept`], or [`Interpolator::load_reject`] with a fault.
+    ///
+    /// # Errors
+    /// Those of the interpolator.
+    pub fn load_judged(&mut self, record: u32, checked: Result<()>) -> Result<()> {
+        if let Err(fault) = checked {
+            self.interpolator.load_reject(fault);
+            return checked;
+        }
+        self.interpolator.load_accept(record)
+    }
+
     /// [`Interpolator::load_records`].
     #[must_use]
     pub fn load_records(&self) -> u32 {
@@ -509,6 +574,7 @@ impl<S: AsRef<[i32]> + AsMut<[i32]>> RealTime<S> {
     /// Those of [`Interpolator::load_finish`].
     pub fn load_finish(&mut self) -> Result<()> {
         self.interpolator.load_finish()?;
+        [_, self.control.room] = self.interpolator.load_room();
         self.control.command = None;
         self.control.run = RunRecord::NEW;
         self.control.from_home = true;

@@ -271,7 +271,8 @@ impl Session {
         };
         if peer != self.peer {
             self.peer = peer;
-            self.upload = None;
+            // A streamed job is under way, or may be: the next session goes on with it.
+            self.upload = self.upload.filter(Upload::is_streamed);
             self.events.clear();
             self.last = Last {
                 number,
@@ -424,6 +425,9 @@ impl Session {
 
     fn job_end(&mut self, machine: &mut impl Machine) -> Result<(), Reason> {
         let upload = self.upload.ok_or(Reason::NoUpload)?;
+        if upload.is_streamed() {
+            return upload.finish(machine);
+        }
         upload.check_complete()?;
         self.upload = None;
         upload.finish(machine)
@@ -553,7 +557,7 @@ pub(crate) fn send(reply: &Reply, out: &mut impl FnMut(&[u8])) {
 mod tests {
     use super::*;
     use interp_core::sample::{SpanParameter, State};
-    use protocol::message::{FaultReport, InputLines, Report, SafetyStatus};
+    use protocol::message::{FaultReport, InputLines, Report, SafetyStatus, StreamStatus};
 
     #[test]
     fn the_longest_answers_are_kept() {
@@ -585,6 +589,11 @@ mod tests {
             events: u32::MAX,
             steps: u32::MAX,
             profile: u32::MAX,
+            stream: StreamStatus {
+                received: u32::MAX,
+                room: u32::MAX,
+                starved: u32::MAX,
+            },
             safety: SafetyStatus {
                 lines: InputLines(u16::MAX),
                 latched: InputLines(u16::MAX),

@@ -1,6 +1,12 @@
 //! Upload of a job: checks order, completeness and digest.
 
-use interp_core::{fault::Fault, job::Header};
+use interp_core::{
+    fault::{Fault, FaultKind},
+    job::{
+        Header,
+        stream::{DIGEST_WORDS, head_words, row_words},
+    },
+};
 use protocol::{digest::Digest, message::Reason};
 
 use crate::machine::Machine;
@@ -12,6 +18,75 @@ pub(crate) struct Upload {
     received: u32,
     wanted: u64,
     digest: Digest,
+    /// Of a streamed job.
+    rows: Option<Rows>,
+}
+
+/// The rows of a streamed job: each is followed by the digest of the words up to it, apart from those of the digests.
+#[derive(Clone, Copy, Debug)]
+struct Rows {
+    /// Words before the first row, words of a row with its digest, and patches of a row.
+    head: u32,
+    words: u32,
+    patches: u32,
+    digest: Digest,
+    /// The words of the digest that came so far.
+    told: u64,
+    /// Records checked.
+    checked: u32,
+}
+
+impl Rows {
+    fn new(header: &Header) -> Self {
+        let count = |words: usize| u32::try_from(words).unwrap_or(u32::MAX);
+        Self {
+            head: count(head_words(header)),
+            words: count(row_words(header)),
+            patches: header.path_spans.into(),
+            digest: Digest::new(),
+            told: 0,
+            checked: 0,
+        }
+    }
+
+    /// Takes a word; whether it completes a row.
+    fn take(&mut self, at: u32, word: i32) -> bool {
+        let within = at
+            .checked_sub(self.head)
+            .and_then(|behind| behind.checked_rem(self.words));
+        let left = self.words - within.unwrap_or(0);
+        #[allow(clippy::cast_possible_truncation, reason = "2")]
+        if within.is_some() && left <= DIGEST_WORDS as u32 {
+            self.told = (self.told >> 32) | u64::from(word.cast_unsigned()) << 32;
+        } else {
+            self.digest.words(&[word]);
+        }
+        within.is_some() && left == 1
+    }
+
+    /// Checks a row that is complete, a record at a time, so that a run is not delayed by more than a copy. Not inlined: the copies would take stack from every other request.
+    #[inline(never)]
+    fn check(&mut self, machine: &mut impl Machine) -> Result<(), Reason> {
+        if self.digest.value() != self.told {
+            #[allow(clippy::cast_precision_loss, reason = "a report; at most 2^20")]
+            let bad = Fault::new(FaultKind::BadPatch, self.checked as f32);
+            // It returns the same fault.
+            let _ = machine.load_judged(self.checked, Err(bad));
+            return Err(Reason::WrongDigest {
+                wanted: self.told,
+                received: self.digest.value(),
+            });
+        }
+        for _ in 0..self.patches {
+            let record = self.checked;
+            let checked = machine.load_copy(record).and_then(|copy| copy.check());
+            machine
+                .load_judged(record, checked)
+                .map_err(|fault| refused(fault, Some(record)))?;
+            self.checked += 1;
+        }
+        Ok(())
+    }
 }
 
 /// The core's fault as the reason of a `Nak`.
@@ -42,7 +117,8 @@ impl Upload {
     ) -> Result<Self, Reason> {
         check_state(machine)?;
         let limit = machine.description().store_words;
-        if words > limit {
+        let rows = (header.window > 0).then(|| Rows::new(header));
+        if words > limit && rows.is_none() {
             return Err(Reason::TooLong { limit, wanted: words });
         }
         machine
@@ -53,10 +129,16 @@ impl Upload {
             received: 0,
             wanted,
             digest: Digest::new(),
+            rows,
         })
     }
 
-    /// `JobChunk`. A refusal leaves the upload unchanged.
+    /// Whether the job is loaded while it runs.
+    pub(crate) const fn is_streamed(&self) -> bool {
+        self.rows.is_some()
+    }
+
+    /// `JobChunk`. A refusal leaves the upload unchanged, unless it is that of a row of a streamed job.
     pub(crate) fn chunk(
         &mut self,
         machine: &mut impl Machine,
@@ -70,17 +152,28 @@ impl Upload {
         }
         let length = u32::try_from(words.len()).unwrap_or(u32::MAX);
         let end = offset.saturating_add(length);
-        if end > self.words {
-            return Err(Reason::TooLong {
-                limit: self.words,
-                wanted: end,
-            });
+        let limit = if self.is_streamed() {
+            let [_, room] = machine.load_room();
+            room
+        } else {
+            self.words
+        };
+        if end > limit {
+            return Err(Reason::TooLong { limit, wanted: end });
         }
         machine
             .load_words(offset, words)
             .map_err(|fault| refused(fault, None))?;
-        self.digest.words(words);
         self.received = end;
+        let Some(rows) = &mut self.rows else {
+            self.digest.words(words);
+            return Ok(());
+        };
+        for (at, word) in (offset..).zip(words) {
+            if rows.take(at, *word) {
+                rows.check(machine)?;
+            }
+        }
         Ok(())
     }
 
@@ -96,8 +189,11 @@ impl Upload {
         }
     }
 
-    /// `JobEnd`. Ends the upload with either outcome; after a refusal the machine is idle.
+    /// `JobEnd`. Ends the upload with either outcome; after a refusal the machine is idle. That of a streamed job goes on, and its rows are checked already.
     pub(crate) fn finish(self, machine: &mut impl Machine) -> Result<(), Reason> {
+        if self.is_streamed() {
+            return machine.load_finish().map_err(|fault| refused(fault, None));
+        }
         let received = self.digest.value();
         if received != self.wanted {
             return Err(Reason::WrongDigest {

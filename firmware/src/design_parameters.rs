@@ -66,7 +66,7 @@ pub(crate) const COMMAND_PLACES: usize = 8;
 
 /// Capacity of the event queue. While the link sends its longest frame, about four samples are produced;
 /// the remaining capacity is for requests that take longer to answer.
-pub(crate) const EVENT_PLACES: usize = 36;
+pub(crate) const EVENT_PLACES: usize = 32;
 
 /// Periods after which an incomplete frame of samples is sent: short for an operator, long for a run.
 pub(crate) const FLUSH_PERIODS: u32 = 32;

@@ -11,7 +11,7 @@ use controller::{
 use heapless::spsc::Producer;
 use interp_core::{
     fault::Fault,
-    job::Header,
+    job::{Header, stream::RecordCopy},
     steps::{CheckedSteps, StepConfig},
 };
 use protocol::message::{Description, InputLines, MotionStatus, Offsets, Profile, Reason, Status};
@@ -60,6 +60,19 @@ impl<M: Mutex<T = BoardRealTime>> Machine for GuardedMachine<'_, M> {
     fn load_words(&mut self, offset: u32, words: &[i32]) -> Result<(), Fault> {
         self.real_time
             .lock(|real_time| real_time.load_words(offset, words))
+    }
+
+    fn load_room(&mut self) -> [u32; 2] {
+        self.real_time.lock(|real_time| real_time.load_room())
+    }
+
+    fn load_copy(&mut self, record: u32) -> Result<RecordCopy, Fault> {
+        self.real_time.lock(|real_time| real_time.load_copy(record))
+    }
+
+    fn load_judged(&mut self, record: u32, checked: Result<(), Fault>) -> Result<(), Fault> {
+        self.real_time
+            .lock(|real_time| real_time.load_judged(record, checked))
     }
 
     fn load_records(&mut self) -> u32 {

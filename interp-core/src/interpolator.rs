@@ -3,6 +3,7 @@
 use crate::command::{Command, Inputs};
 use crate::fault::{Fault, FaultKind, Result};
 use crate::job::program::Program;
+use crate::job::stream::RecordCopy;
 use crate::job::{Header, STORE_WORDS};
 use crate::pass::patch::Patch;
 use crate::pass::position::PassPosition;
@@ -74,11 +75,13 @@ impl<S: AsRef<[i32]> + AsMut<[i32]>> Interpolator<S> {
 
     /// Writes data words at `offset`: at the end of the words received so far, or over them again.
     ///
+    /// Of a streamed job, only at the end and up to [`Self::load_room`], but also while it runs.
+    ///
     /// # Errors
     /// [`FaultKind::WrongState`]; [`FaultKind::BadLength`] where no load has begun, the words leave a gap or exceed the
     /// job's length. Nothing is written on error.
     pub fn load_words(&mut self, offset: u32, words: &[i32]) -> Result<()> {
-        self.motion.may_load()?;
+        self.motion.may_continue_loading()?;
         self.motion.program.write(self.store.as_mut(), offset, words)
     }
 
@@ -88,13 +91,60 @@ impl<S: AsRef<[i32]> + AsMut<[i32]>> Interpolator<S> {
         self.motion.program.records()
     }
 
+    /// Data words received, and up to which there is room now: for a streamed job that runs, up to the row of the tool again.
+    #[must_use]
+    pub fn load_room(&self) -> [u32; 2] {
+        self.motion.program.room()
+    }
+
+    /// Whether the job is streamed: loaded while it runs.
+    #[must_use]
+    pub const fn is_streamed(&self) -> bool {
+        self.motion.program.is_streamed()
+    }
+
+    /// Copies the next record of a streamed job, so that it can be checked while the job runs: first [`RecordCopy::check`], then [`Self::load_accept`] or
+    /// [`Self::load_reject`]. A row's records are there once its digest is.
+    ///
+    /// # Errors
+    /// [`FaultKind::BadLength`] where the record is not the next one, or its row is not complete.
+    pub fn load_copy(&self, record: u32) -> Result<RecordCopy> {
+        self.motion.program.copy(self.store.as_ref(), record)
+    }
+
+    /// Seals a record of a streamed job that was checked. A run goes on to a row once all of its records are sealed.
+    ///
+    /// # Errors
+    /// As [`Self::load_copy`]; [`FaultKind::BadHeader`] for a span width, with the first record.
+    pub fn load_accept(&mut self, record: u32) -> Result<()> {
+        self.motion.program.accept(self.store.as_ref(), record)
+    }
+
+    /// The next record of a streamed job is not sound: a run stops with this fault where it would need its row.
+    pub const fn load_reject(&mut self, fault: Fault) {
+        self.motion.program.reject(fault);
+    }
+
+    /// Whether the last tick was none of the run: the next rows of a streamed job are not there. The tool stands, the sample is as it was, and nothing is planned.
+    #[must_use]
+    #[inline]
+    pub const fn is_starved(&self) -> bool {
+        self.motion.is_starved
+    }
+
+    /// Whether the loaded job can start: the first rows of a streamed job are no longer there once it has run.
+    #[must_use]
+    pub fn can_start(&self) -> bool {
+        self.motion.program.can_rewind()
+    }
+
     /// Checks one record, in order from 0. Takes a few thousand cycles, so that a board can check between ticks.
     ///
     /// # Errors
     /// [`FaultKind::BadPatch`] with the record's index, [`FaultKind::BadHeader`] for a span width,
     /// [`FaultKind::BadLength`] where words are missing or the order is not kept.
     pub fn load_check(&mut self, record: u32) -> Result<()> {
-        self.motion.may_load()?;
+        self.motion.may_continue_loading()?;
         let Motion { program, run, .. } = &mut self.motion;
         program.check(self.store.as_ref(), record, run.lines.scratch())
     }
@@ -102,7 +152,7 @@ impl<S: AsRef<[i32]> + AsMut<[i32]>> Interpolator<S> {
     /// Seals the job: the machine is ready.
     ///
     /// # Errors
-    /// [`FaultKind::BadLength`] where words or checks are missing; the machine stays idle.
+    /// [`FaultKind::BadLength`] where words or checks are missing, of a streamed job those of the first rows; the machine stays idle.
     pub fn load_finish(&mut self) -> Result<()> {
         self.motion.load_finish(self.store.as_ref())
     }
@@ -245,6 +295,8 @@ struct Motion {
     run: Run,
     program: Program,
     sequencer: Sequencer,
+    /// The last tick waited for rows of a streamed job.
+    is_starved: bool,
 }
 
 /// Remaining motion of an aborted run.
@@ -268,6 +320,7 @@ impl Motion {
         run: Run::START,
         program: Program::new(),
         sequencer: Sequencer::START,
+        is_starved: false,
     };
 
     fn may_load(&self) -> Result<()> {
@@ -275,6 +328,13 @@ impl Motion {
             return Err(Fault::new(FaultKind::WrongState, f32::from(self.state as u8)));
         }
         Ok(())
+    }
+
+    fn may_continue_loading(&self) -> Result<()> {
+        if self.program.is_streamed() {
+            return Ok(());
+        }
+        self.may_load()
     }
 
     fn load_begin(&mut self, header: &Header, words: u32, capacity: usize) -> Result<()> {
@@ -334,6 +394,7 @@ impl Motion {
 
     #[inline(never)]
     fn tick(&mut self, store: &[i32], inputs: Inputs) {
+        self.is_starved = false;
         if let Some(command) = inputs.command {
             self.execute(store, command);
         }
@@ -349,7 +410,40 @@ impl Motion {
         self.last.state = self.state;
     }
 
+    /// Whether a tick that begins a pass, or the way to one, has to wait for the rows of patches that it and the planning after it need. Those before the tool's row
+    /// are free.
+    #[cold]
+    #[inline(never)]
+    fn waits_for_rows(&mut self, store: &[i32]) -> Result<bool> {
+        let Self {
+            program,
+            sequencer,
+            run,
+            ..
+        } = self;
+        let job = program.job(store)?;
+        let has_limits = job.header.axes.is_some();
+        let rows = if has_limits {
+            sequencer.rows_needed(&job, run)
+        } else {
+            run.rows_needed(&job)
+        };
+        let Some([first, last]) = rows else {
+            return Ok(false);
+        };
+        program.release(first);
+        if !program.rows().has(last)? {
+            self.is_starved = true;
+        } else if has_limits {
+            sequencer.set_has_rows();
+        }
+        Ok(self.is_starved)
+    }
+
     fn has_to_plan(&self) -> bool {
+        if self.is_starved {
+            return false;
+        }
         let header = self.program.header();
         if header.axes.is_none() {
             return self.state == State::Running && self.run.has_to_plan(header.spacing);
@@ -389,6 +483,16 @@ impl Motion {
         if feed_factor == 0.0 && self.sequencer.is_at_rest() && self.stand() {
             return;
         }
+        if self.program.is_streamed()
+            && matches!(self.state, State::Running | State::Linking)
+            && self.sequencer.may_wait_for_rows()
+        {
+            match self.waits_for_rows(store) {
+                Ok(false) => {}
+                Ok(true) => return,
+                Err(fault) => return self.fail(fault),
+            }
+        }
         let command = FeedCommand {
             feed_factor,
             is_fault: self.fault.is_some(),
@@ -404,7 +508,10 @@ impl Motion {
             .job(store)
             .and_then(|job| sequencer.tick(&job, run, command, last));
         match (outcome, self.state) {
-            (Ok(Outcome::Pass), State::Linking) => self.state = State::Running,
+            (Ok(Outcome::Pass), State::Linking) => {
+                self.state = State::Running;
+                self.program.release(self.run.row());
+            }
             (Ok(Outcome::Link), State::Running) => self.state = State::Linking,
             (Ok(Outcome::Finished), _) if self.ending == Ending::Retracting => self.state = State::Ready,
             (Ok(Outcome::Finished), _) => self.state = State::Finished,
@@ -432,11 +539,20 @@ impl Motion {
 
     #[inline(always)]
     fn advance(&mut self, store: &[i32]) {
+        let begins = self.program.is_streamed() && !self.run.is_along();
+        if begins {
+            match self.waits_for_rows(store) {
+                Ok(false) => {}
+                Ok(true) => return,
+                Err(fault) => return self.fail(fault),
+            }
+        }
         let job = match self.program.job(store) {
             Ok(job) => job,
             Err(fault) => return self.fail(fault),
         };
         match self.run.advance(&job, &mut self.last) {
+            Ok(true) if begins => self.program.release(self.run.row()),
             Ok(true) => {}
             Ok(false) => self.state = State::Finished,
             Err(fault) => self.fail(fault),
@@ -468,6 +584,9 @@ impl Motion {
         self.state = match command {
             Command::Start => {
                 self.restart(store);
+                if let Err(fault) = self.program.rewind() {
+                    return self.fail(fault);
+                }
                 let Self {
                     program,
                     sequencer,

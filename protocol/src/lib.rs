@@ -42,6 +42,7 @@
 //! | a number that is not the next | `Nak`, `OutOfOrder` with the one expected | |
 //! | a job, clock or step settings while a run is under way | `Nak`, `WrongState` with the state | |
 //! | a chunk that is not the next, or too many words | `Nak`, `WrongOffset`, `TooLong` | |
+//! | a chunk of a streamed job with a row whose digest is wrong, or that the core refuses | `Nak`, `WrongDigest`, `Job` with fault, value, record | a run stops before that row |
 //! | `JobEnd` too early | `Nak`, `Incomplete` | the upload may go on |
 //! | `JobEnd` with other words than announced | `Nak`, `WrongDigest` | the upload is over, no job is loaded |
 //! | `JobEnd` of a job that the core refuses | `Nak`, `Job` with fault, value, record | the upload is over, no job is loaded |
@@ -62,6 +63,7 @@
 //! | homing without its section in the profile | `Nak`, `NoHoming` | |
 //! | a probe move while the probe is tripped | `Nak`, `ProbeTripped` | |
 //! | a spindle on a machine without one | `Nak`, `NoSpindle` | |
+//! | a start of a streamed job whose first rows were overwritten | `Nak`, `RowsGone` | |
 //! | a `Repeat` of an event that is not kept any more | `Nak`, `EventGone` with the first that is | |
 //!
 //! Where the last column is empty, nothing has changed. An event that the line damages is lost: the host sees it by the numbers of the

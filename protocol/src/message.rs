@@ -55,7 +55,7 @@
 //! | 29 | `Spindle` | turning (a byte: 0 off, 1 clockwise, 2 counterclockwise), speed (1/min, `u32`), coolant (a byte) | as `Configure`; for the runs of the loaded job |
 //!
 //! Header: kind, pattern, spacing, tool side (a byte each), spans along path and side (`u16`), ball radius (mm), feed (mm/s),
-//! scallop height (mm), period (s) (`f32`); then 0, or 1 and the axes' limits: velocity (mm/s), acceleration (mm/s^2), jerk (mm/s^3)
+//! scallop height (mm), period (s) (`f32`), window of a streamed job (rows, `u16`; 0 for another one); then 0, or 1 and the axes' limits: velocity (mm/s), acceleration (mm/s^2), jerk (mm/s^3)
 //! (three `f32` each), chord error (mm, `f32`), travel (least and most of each axis), home (nm, `i32`), plunge (mm, `f32`), safe height
 //! (nm, `i32`).
 //!
@@ -75,6 +75,7 @@
 //! | 7 | `Profile` | number, option of the fields of [`Profile`]; an answer like the first four |
 //! | 8 | `Motion` | number, the fields of [`MotionStatus`]; an answer |
 //! | 9 | `Offsets` | number, the fields of [`Offsets`]; an answer |
+//! | 10 | `Room` | event `u32`, words up to which there is room `u32` |
 //!
 //! A parameter is its span (`u16`) and fraction. `Halted` comes when the ticks of a `Run` are used up, or when a run ends
 //! (finished, faulted, aborted), whichever is first.
@@ -85,6 +86,13 @@
 //! them again for `Repeat`, with the numbers and bytes that they had. A host sees a loss by the next event's number, or by `events` of a status, which is
 //! the number of the last event before it. The board counts each `Halted` in `halts`, so a status tells the end of a run whose `Halted` was
 //! lost, and its digest covers the whole run.
+//!
+//! # Streamed jobs
+//!
+//! A job whose header has a window ([`interp_core::job::stream`]) may have more words than the store. `JobEnd` then follows when the first rows are sent, as many as the
+//! window has, or all; and after it further chunks, also while the job runs, up to the word that `room` of the status or the last `Room` event told. Each row is
+//! checked when it is complete: its digest, then its records. `room` and `received` of the status only grow, so no loss of an event matters, and a host that connects
+//! anew goes on at `received`. A start after the first rows were overwritten is refused: the job has to be loaded again.
 //!
 //! # Compatibility
 //!
@@ -107,7 +115,7 @@ pub use crate::profile::{Excess, PROFILE_BYTES_MAX, Profile, ProfileLimit};
 pub use crate::reason::Reason;
 pub use crate::records::{
     BOARD_NAME_MAX, Batch, CHUNK_WORDS_MAX, Clock, Description, FaultReport, PassDigest, Report, SAMPLES_MAX,
-    SampleRecord, Status, StepSettings, Words,
+    SampleRecord, Status, StepSettings, StreamStatus, Words,
 };
 pub use crate::safety::{
     Configuration, InputLines, LinkTimeoutAction, OVERRIDE_MAX_PERCENT, OVERRIDE_NORMAL_PERCENT, ResetCause,
@@ -378,6 +386,13 @@ pub enum Reply {
         /// Work offsets and tool length.
         offsets: Offsets,
     },
+    /// A streamed job: there is room for further words.
+    Room {
+        /// Number of the event.
+        event: u32,
+        /// Words up to which there is room.
+        room: u32,
+    },
 }
 
 /// A payload with a correct CRC that is not a message of this version.
@@ -487,9 +502,9 @@ mod tests {
     #[test]
     fn codes_out_of_range_are_no_header() {
         let good = [1, 1, 0, 0, 0, 0, 1, 1];
-        let rest = [0; 4 * 4 + 1 + 1 + 1 + 8];
+        let rest = [0; 4 * 4 + 1 + 1 + 1 + 1 + 8];
         for (place, code) in [(2, 4), (3, 2), (4, 4), (5, 2)] {
-            let mut payload = [0; 8 + 27];
+            let mut payload = [0; 8 + 28];
             payload[..8].copy_from_slice(&good);
             payload[8..].copy_from_slice(&rest);
             assert!(read_request(&payload).is_ok());

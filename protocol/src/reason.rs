@@ -59,7 +59,7 @@ pub enum Reason {
         /// The record of the surface data, where the fault concerns one.
         record: Option<u32>,
     },
-    /// 9: more words than the store holds.
+    /// 9: more words than the store holds, or has room for now.
     TooLong {
         /// Capacity, words.
         limit: u32,
@@ -150,6 +150,8 @@ pub enum Reason {
     ProbeTripped,
     /// 30: the profile describes no spindle.
     NoSpindle,
+    /// 31: a start of a streamed job whose first rows were overwritten: it has to be loaded again.
+    RowsGone,
 }
 
 impl Reason {
@@ -188,6 +190,7 @@ impl Reason {
             Self::NoHoming => 28,
             Self::ProbeTripped => 29,
             Self::NoSpindle => 30,
+            Self::RowsGone => 31,
         }
     }
 
@@ -351,6 +354,10 @@ impl fmt::Display for Reason {
             Self::NoHoming => write!(formatter, "the machine's profile describes no homing by switches"),
             Self::NoSpindle => write!(formatter, "the machine's profile describes no spindle"),
             Self::ProbeTripped => write!(formatter, "the probe is tripped before it moves"),
+            Self::RowsGone => write!(
+                formatter,
+                "the first part of the job was overwritten while it ran: load it again"
+            ),
         }
     }
 }

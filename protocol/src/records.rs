@@ -54,7 +54,7 @@ pub struct Description {
     pub firmware: [u16; 3],
     /// Display name of the board.
     pub board: String<BOARD_NAME_MAX>,
-    /// Maximum data words of a job.
+    /// Maximum data words of a job that is not streamed.
     pub store_words: u32,
     /// Maximum polynomial patches in these words, together with the span widths.
     pub patches_max_polynomial: u32,
@@ -157,8 +157,21 @@ pub struct Status {
     pub steps: u32,
     /// Digest of the profile that the board keeps, [`crate::message::Profile::digest`]; 0 where it keeps none.
     pub profile: u32,
+    /// Progress of the job's upload.
+    pub stream: StreamStatus,
     /// Inputs, drives, home.
     pub safety: SafetyStatus,
+}
+
+/// Progress of a job's upload, which for a streamed job goes on while it runs.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+pub struct StreamStatus {
+    /// Data words received: the next chunk's offset.
+    pub received: u32,
+    /// Data words up to which the store has room now.
+    pub room: u32,
+    /// Periods in which the run waited for words, not counted as ticks.
+    pub starved: u32,
 }
 
 impl Default for Status {
@@ -184,6 +197,7 @@ impl Default for Status {
             events: 0,
             steps: 0,
             profile: 0,
+            stream: StreamStatus::default(),
             safety: SafetyStatus::DEFAULT,
         }
     }
@@ -250,6 +264,7 @@ pub(crate) struct HeaderFields {
     scallop_mm: f32,
     period_s: f32,
     edges: u16,
+    window: u16,
     #[serde(with = "axes")]
     axes: Option<AxisLimits>,
 }

@@ -9,7 +9,7 @@ use proptest::prelude::*;
 use protocol::message::{
     CHUNK_WORDS_MAX, Capabilities, Clock, Configuration, Description, FaultReport, InputLines,
     LinkTimeoutAction, PassDigest, Profile, Reason, Reply, Report, Request, ResetCause, SAMPLES_MAX,
-    SafetyStatus, SampleRecord, Status, Words,
+    SafetyStatus, SampleRecord, Status, StreamStatus, Words,
 };
 
 use super::{reasons, requests};
@@ -56,6 +56,7 @@ prop_compose! {
             scallop_mm: values[2],
             period_s: values[3],
             edges: spans[0],
+            window: spans[0] ^ spans[1],
             axes,
         }
     }
@@ -153,8 +154,9 @@ prop_compose! {
 prop_compose! {
     fn any_status()(at in any_sample(), fault in prop::option::of((any::<u8>(), real())), clock in any_clock(),
                     report in any_report(), counts in any::<[u32; 10]>(), digest in any::<u64>(),
-                    safety in any_safety()) -> Status {
+                    stream in any::<[u32; 3]>(), safety in any_safety()) -> Status {
         let [credit, samples, deadline_misses, tick_cycles_max, samples_lost, frames_bad, halts, events, steps, profile] = counts;
+        let [received, room, starved] = stream;
         Status {
             state: at.state,
             fault: fault.map(|(code, value)| FaultReport { code, value }),
@@ -176,6 +178,7 @@ prop_compose! {
             events,
             steps,
             profile,
+            stream: StreamStatus { received, room, starved },
             safety,
         }
     }
@@ -247,6 +250,7 @@ pub(crate) fn any_reply() -> impl Strategy<Value = Reply> {
             }
         ),
         any_status().prop_map(Reply::Halted),
+        any::<[u32; 2]>().prop_map(|[event, room]| Reply::Room { event, room }),
         (any::<u16>(), prop::option::of(any_profile()))
             .prop_map(|(number, profile)| Reply::Profile { number, profile }),
     ]

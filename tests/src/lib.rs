@@ -12,7 +12,7 @@ use controller::{
 use interp_core::{
     encode,
     fault::{Fault, FaultKind},
-    job::Header,
+    job::{Header, stream::RecordCopy},
     steps::{CheckedSteps, StepConfig},
 };
 use protocol::{
@@ -128,6 +128,7 @@ pub fn scaled_dome(scale: f64) -> (Header, Vec<i32>) {
         feed_mm_s: 1000.0,
         scallop_mm: 1.0,
         period_s: 0.001,
+        window: 0,
         axes: None,
         ..Header::default()
     };
@@ -200,6 +201,18 @@ impl Machine for Mock {
     fn load_words(&mut self, offset: u32, words: &[i32]) -> Result<(), Fault> {
         self.calls.push(Call::Words(offset, words.to_vec()));
         Ok(())
+    }
+
+    fn load_room(&mut self) -> [u32; 2] {
+        [0; 2]
+    }
+
+    fn load_copy(&mut self, record: u32) -> Result<RecordCopy, Fault> {
+        Err(Fault::new(FaultKind::BadLength, record as f32))
+    }
+
+    fn load_judged(&mut self, _: u32, checked: Result<(), Fault>) -> Result<(), Fault> {
+        checked
     }
 
     fn load_records(&mut self) -> u32 {

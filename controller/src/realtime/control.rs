@@ -54,6 +54,8 @@ pub(super) struct Control {
     pub(super) host_is_gone: bool,
     /// The step outputs lead to drives.
     pub(super) has_drives: bool,
+    /// Words of a streamed job up to which there was room, as last reported.
+    pub(super) room: u32,
 }
 
 impl Control {
@@ -75,6 +77,7 @@ impl Control {
             from_home: true,
             host_is_gone: false,
             has_drives: false,
+            room: 0,
         }
     }
 

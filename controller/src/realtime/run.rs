@@ -12,6 +12,8 @@ pub(super) struct RunRecord {
     pub(super) deadline_misses: u32,
     pub(super) tick_cycles_max: u32,
     pub(super) events_lost: u32,
+    /// Periods in which the run waited for the words of a streamed job.
+    pub(super) starved: u32,
 }
 
 impl RunRecord {
@@ -28,6 +30,7 @@ impl RunRecord {
         deadline_misses: 0,
         tick_cycles_max: 0,
         events_lost: 0,
+        starved: 0,
     };
 
     /// Whether the sample is the first of a pass.

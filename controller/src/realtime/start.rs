@@ -54,7 +54,7 @@ impl<S: AsRef<[i32]> + AsMut<[i32]>> RealTime<S> {
     ///
     /// # Errors
     /// The reason of the refusal: an input asserted or latched, the drives off, the machine not homed, or not at the start position; a job without limits on
-    /// drives.
+    /// drives; a streamed job whose first rows are gone.
     pub fn may_start(&self) -> Result<(), Reason> {
         if self.control.manual.is_active() {
             return Err(Reason::Moving);
@@ -64,6 +64,9 @@ impl<S: AsRef<[i32]> + AsMut<[i32]>> RealTime<S> {
         let has_axes = self.control.has_drives && status.configuration.homing_required;
         if has_axes && !self.interpolator.has_limits() {
             return Err(Reason::NoLimits);
+        }
+        if !self.interpolator.can_start() {
+            return Err(Reason::RowsGone);
         }
         let stands_nm = self.interpolator.stands_nm();
         match self.interpolator.home_nm() {

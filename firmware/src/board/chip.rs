@@ -2,7 +2,7 @@
 //! the panic handler.
 
 use defmt_rtt as _;
-use protocol::message::InputLines;
+use protocol::message::{InputLines, PWM_STEPS};
 use stm32f4xx_hal::{
     pac,
     prelude::*,
@@ -12,7 +12,7 @@ use stm32f4xx_hal::{
 use super::{BOARD, Board, take_reset_cause};
 use crate::{
     design_parameters::{PERIOD_US, SERIAL_BAUD},
-    drivers::{gpio, speed_output},
+    drivers::gpio,
 };
 
 /// The processor's clock, MHz: the chip's maximum.
@@ -86,7 +86,7 @@ pub(crate) fn init(device: pac::Peripherals) -> Board {
 
     device.DBGMCU.apb2_fz().modify(|_, w| w.dbg_tim1_stop().set_bit());
 
-    speed_output::begin(&device.TIM12);
+    begin_speed_output(&device.TIM12);
 
     Board {
         tim1: device.TIM1,
@@ -126,4 +126,18 @@ fn panic(info: &core::panic::PanicInfo<'_>) -> ! {
     gpio::rest(&super::REST);
     super::log_panic(info);
     stop_for_good()
+}
+
+/// Sets up channel 2 of the spindle's speed output with a duty cycle of 0. Its clock has to be on.
+#[allow(unsafe_code, reason = "whole registers are written")]
+fn begin_speed_output(timer: &pac::TIM12) {
+    // SAFETY: values of the reference manual: reload, PWM mode 1 with preload on channel 2, its output, start with preloaded reload.
+    unsafe {
+        timer.arr().write(|w| w.bits(PWM_STEPS - 1));
+        timer.ccr2().write(|w| w.bits(0));
+        timer.ccmr1_output().write(|w| w.bits(0b110 << 12 | 1 << 11));
+        timer.ccer().write(|w| w.bits(1 << 4));
+        timer.egr().write(|w| w.bits(1));
+        timer.cr1().write(|w| w.bits(1 << 7 | 1));
+    }
 }

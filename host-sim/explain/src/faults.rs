@@ -51,11 +51,11 @@ fn words(kind: FaultKind) -> [&'static str; 5] {
             "A level surface at z = 2145 mm, with a ball of 5 mm above it: the centre would be at 2.150 m.",
         ],
         FaultKind::TooManyPatches => [
-            "The surface data of the job exceed the machine's store.",
-            "The 32-bit words of the job.",
-            "Each span between knots, in u and in v, becomes a patch of 52 words, or 68 if it is rational.",
-            "Use fewer knots, or cut the part into several jobs.",
-            "A surface of 20 x 20 bicubic patches: 400 patches, where 309 fit.",
+            "The surface data of the job exceed the machine's store, or of a streamed job the rows that have to be there at once.",
+            "The 32-bit words of the job, or of these rows.",
+            "Each span between knots, in u and in v, becomes a patch of 52 words, or 68 if it is rational. More than 309 (237 rational) are streamed, which takes room for three rows.",
+            "Use fewer knots, give the other direction with `along`, or cut the part into several jobs.",
+            "A surface of 150 x 150 bicubic patches: three rows of 150 are 450 patches, where about 309 fit.",
         ],
         FaultKind::PatchTooShort => [
             "The arc of one period is longer than a whole patch.",

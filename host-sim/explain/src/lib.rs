@@ -115,7 +115,7 @@ pub fn fault(fault: Fault) -> (String, &'static str) {
         ),
         FaultKind::TooManyPatches => (
             format!(
-                "the job has {value} words of surface data; the machine stores {STORE_WORDS}: at most {} polynomial or {} rational patches",
+                "the job has {value} words of surface data that have to be there at once; the machine stores {STORE_WORDS}: at most {} polynomial or {} rational patches",
                 patches_max(SurfaceKind::Polynomial, STORE_WORDS),
                 patches_max(SurfaceKind::Rational, STORE_WORDS)
             ),
@@ -290,6 +290,7 @@ mod tests {
             Reason::NoHoming,
             Reason::ProbeTripped,
             Reason::NoSpindle,
+            Reason::RowsGone,
         ]
     }
 

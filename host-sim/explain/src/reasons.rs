@@ -3,7 +3,7 @@
 use super::{Entry, Family};
 
 /// In the order of codes.
-pub(super) const ENTRIES: [Entry; 31] = [
+pub(super) const ENTRIES: [Entry; 32] = [
     reason(
         0,
         "bad-frame",
@@ -282,6 +282,15 @@ pub(super) const ENTRIES: [Entry; 31] = [
         "It has no section [spindle], so the board does not know which output is which speed.",
         "Add `[spindle]` with `max_rpm` to the profile (docs/operating.md), or remove the section from the job and switch the spindle by hand.",
         "A job with [spindle] on a machine whose router has a switch of its own.",
+    ),
+    reason(
+        31,
+        "rows-gone",
+        "A start of a job that is larger than the board's store, after its first part was overwritten.",
+        "None.",
+        "Such a job is sent while it runs; the store then holds the part that the tool was on last.",
+        "Send the job again: `cargo sim run` does so before each start.",
+        "A second start of a job of 100 x 100 patches, without an upload.",
     ),
 ];
 

@@ -2,8 +2,6 @@
 
 use std::f64::consts::TAU;
 
-use interp_core::STORE_WORDS;
-use interp_core::surface::POLYNOMIAL_WORDS;
 use job::{JobError, NurbsSpec, SurfaceSpec};
 
 use crate::file::{Face, FaceReader, FaceSurface};
@@ -174,19 +172,20 @@ fn nurbs(section: &Section<'_>) -> Result<SurfaceSpec, JobError> {
     }))
 }
 
-/// The board's store holds the patches between the knots; a file has room for a hundred thousand, which would take minutes to place.
+/// Patches of a job at most: a file has room for more, which would take minutes to place.
+const PATCHES_MAX: usize = 65_536;
+
+/// The patches between the knots.
 fn few_enough(section: &Section<'_>, degree: [usize; 2], knots: [&[f64]; 2]) -> Result<(), JobError> {
     let spans = |knots: &[f64], degree: usize| {
         let inside = &knots[degree..knots.len() - degree];
         inside.windows(2).filter(|pair| pair[0] < pair[1]).count()
     };
     let patches = spans(knots[0], degree[0]) * spans(knots[1], degree[1]);
-    if patches <= STORE_WORDS / POLYNOMIAL_WORDS {
+    if patches <= PATCHES_MAX {
         return Ok(());
     }
-    // The width of a span is a word, too.
-    let most = STORE_WORDS / (POLYNOMIAL_WORDS + 1);
-    let what = format!("the knots make {patches} patches; the board's store holds about {most}");
+    let what = format!("the knots make {patches} patches; a job has at most {PATCHES_MAX}");
     Err(section.error(
         "poles_mm",
         what,

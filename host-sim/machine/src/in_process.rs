@@ -1,14 +1,16 @@
 //! The machine in this process: the core with a job loaded, a tick and the planning of the period in one call.
 
 use interp_core::steps::BUFFER_WORDS;
-use interp_core::{Command, Fault, Inputs, Interpolator, Sample, SpanParameter, State, Steps, SurfacePoint};
+use interp_core::{
+    Command, Fault, Inputs, Interpolator, STORE_WORDS, Sample, SpanParameter, State, Steps, SurfacePoint,
+};
 
 use crate::prepare::Prepared;
 
-/// The core, with the job store of the board's capacity.
+/// The core, with the job store of the board's capacity; for a job that a board is given while it runs, with one that holds all of it.
 #[derive(Debug)]
 pub struct Machine {
-    core: Box<Interpolator>,
+    core: Box<Interpolator<Vec<i32>>>,
     steps: Option<(Steps, Box<[u32; BUFFER_WORDS]>)>,
 }
 
@@ -18,7 +20,12 @@ impl Machine {
     /// # Errors
     /// The core refuses the job: too many patches, a header value out of range, an invalid patch.
     pub fn load(job: &Prepared) -> Result<Self, Fault> {
-        let mut core = Box::new(Interpolator::new());
+        let capacity = if job.header.window > 0 {
+            job.words.len()
+        } else {
+            STORE_WORDS
+        };
+        let mut core = Box::new(Interpolator::with_store(vec![0; capacity]));
         let words = u32::try_from(job.words.len()).unwrap_or(u32::MAX);
         core.load_begin(&job.header, words)?;
         core.load_words(0, &job.words)?;

@@ -1,5 +1,7 @@
 //! `attach`: follows a run on a board that another command started, keeps its heartbeat, and takes what is typed.
 
+use std::path::{Path, PathBuf};
+
 use clap::Args;
 use interp_core::{Fault, State};
 use protocol::message::{LinkTimeoutAction, Status};
@@ -7,8 +9,9 @@ use protocol::message::{LinkTimeoutAction, Status};
 use super::operate::{json_of, print};
 use super::out::{say, to_stderr};
 use super::typed::{Console, WORDS};
-use super::{Failure, Result, run, spinner};
+use super::{Failure, Result, load, run, spinner};
 use job::{HeartbeatAction, MachineSpec};
+use machine::remote::drive;
 use machine::remote::operate::follow;
 use machine::remote::session::Event;
 use machine::remote::{RemoteError, Session};
@@ -23,17 +26,21 @@ pub(super) struct Arguments {
     /// The board's serial port.
     #[arg(long, value_name = "DEV")]
     port: String,
+    /// The job that runs, if it is larger than the board's store: the words that it still needs are sent. As `run` was given it, without --work.
+    #[arg(long, value_name = "JOB")]
+    job: Option<PathBuf>,
     /// Prints one JSON object instead of text.
     #[arg(long)]
     pub(super) json: bool,
 }
 
 pub(super) fn command(arguments: &Arguments) -> Result<()> {
-    to_port(&arguments.port, arguments.json)
+    to_port(&arguments.port, arguments.job.as_deref(), arguments.json)
 }
 
 /// Attaches to the board at this port.
-pub(super) fn to_port(port: &str, as_json: bool) -> Result<()> {
+pub(super) fn to_port(port: &str, job: Option<&Path>, as_json: bool) -> Result<()> {
+    let job = job.map(load).transpose()?;
     let mut session = run::open_port(port)?;
     let status = session.status()?;
     if !status.state.is_under_way() {
@@ -49,6 +56,9 @@ pub(super) fn to_port(port: &str, as_json: bool) -> Result<()> {
     if !as_json {
         let board = session.capabilities().description.board.clone();
         print(&status, &board);
+    }
+    if let Some((_, prepared)) = &job {
+        drive::resume_upload(&mut session, prepared)?;
     }
     to_run(&mut session, port, as_json)
 }

@@ -159,7 +159,7 @@ pub(super) fn command(arguments: &Arguments) -> Result<()> {
         ));
     };
     let command = match &arguments.action {
-        Action::Attach => return attach::to_port(port, arguments.json),
+        Action::Attach => return attach::to_port(port, None, arguments.json),
         Action::Axes(action) => return axes::command(action, port, arguments.json),
         Action::Command(command) => command,
     };

@@ -15,6 +15,7 @@ pub mod encode;
 pub(crate) mod program;
 pub mod region;
 pub(crate) mod stations;
+pub mod stream;
 
 /// Words of surface data that the reference machine stores: 64 KiB of its 128 KiB RAM, hence 309 polynomial or 237
 /// rational patches ([`patches_max`]).
@@ -190,6 +191,8 @@ pub struct Header {
     pub period_s: f32,
     /// Edges of the region that is machined, in the words behind the records; 0 for the whole surface. None with passes of constant scallop height.
     pub edges: u16,
+    /// Rows of patches that a pass and what is planned on it may use, for a job that is loaded while it runs: [`stream`]. 0 for one that is stored as a whole.
+    pub window: u16,
     /// Axis limits; none for a constant feed.
     pub axes: Option<AxisLimits>,
 }

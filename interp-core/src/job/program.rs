@@ -6,6 +6,7 @@ use crate::job::region::{
     EDGE_WORDS, EDGES_A_RECORD, FirstLine, HEAD_WORDS, REGION_SPANS_MAX, RegionCheck, RegionWords, ScanLine,
 };
 use crate::job::stations::{SPANS_MAX as FRONT_SPANS_MAX, Stations};
+use crate::job::stream::{DIGEST_WORDS, RecordCopy, Rows, WINDOW_MIN};
 use crate::job::{
     AxisLimits, CELLS_MAX, Header, OVERRUN_MAX_MM, SPANS_MAX, STEP_MAX_MM, SurfaceKind, width_words,
 };
@@ -36,10 +37,11 @@ pub(crate) struct Program {
     /// Length of the job, words.
     length: u32,
     region: RegionCheck,
+    rows: Rows,
 }
 
 /// Words per record of a kind of surface.
-const fn record_words(kind: SurfaceKind) -> usize {
+pub(crate) const fn record_words(kind: SurfaceKind) -> usize {
     match kind {
         SurfaceKind::Polynomial => POLYNOMIAL_WORDS,
         SurfaceKind::Rational => RATIONAL_WORDS,
@@ -51,6 +53,12 @@ const fn record_words(kind: SurfaceKind) -> usize {
 pub(crate) fn extent(header: &Header) -> (u32, u64) {
     let patches = u32::from(header.path_spans) * u32::from(header.side_spans);
     let words = u64::from(patches) * record_words(header.kind) as u64;
+    let digests = if header.window > 0 {
+        DIGEST_WORDS as u64 * u64::from(header.side_spans)
+    } else {
+        0
+    };
+    let words = words + digests;
     (
         patches,
         words + u64::from(width_words(header.path_spans, header.side_spans)) + region_words(header) as u64,
@@ -93,6 +101,9 @@ fn check_header(header: &Header) -> Result<()> {
     if front_words(header).is_none() {
         return Err(Fault::new(FaultKind::BadHeader, f32::from(header.path_spans)));
     }
+    if header.window > 0 {
+        check_streamed(header)?;
+    }
     let ranges = [
         (header.ball_radius_mm, f32::MIN_POSITIVE, 1000.0),
         (header.feed_mm_s, 1e-3, 10_000.0),
@@ -109,6 +120,16 @@ fn check_header(header: &Header) -> Result<()> {
         .axes
         .as_ref()
         .map_or(Ok(()), |axes| check_axes(header, axes))
+}
+
+/// A job that is loaded while it runs: straight passes over a grid, without turns, because the tool has to be able to wait at the end of each pass.
+fn check_streamed(header: &Header) -> Result<()> {
+    let is_grid = matches!(header.kind, SurfaceKind::Polynomial | SurfaceKind::Rational);
+    let turns = header.axes.is_some_and(|axes| axes.overrun_mm > 0.0);
+    if !is_grid || header.edges > 0 || header.spacing.is_constant() || turns || header.window < WINDOW_MIN {
+        return Err(Fault::new(FaultKind::BadHeader, f32::from(header.window)));
+    }
+    Ok(())
 }
 
 /// Ranges of the axis limits, within which the step of a period fits its integer and no product of the planner overflows.
@@ -166,6 +187,7 @@ impl Program {
             scallop_mm: 0.0,
             period_s: 0.0,
             edges: 0,
+            window: 0,
             axes: None,
         };
         Self {
@@ -173,13 +195,19 @@ impl Program {
             header: HEADER,
             length: 0,
             region: RegionCheck::START,
+            rows: Rows::NONE,
         }
     }
 
     pub(crate) fn begin(&mut self, header: &Header, words: u32, capacity: usize) -> Result<()> {
         check_header(header)?;
         let (_, needed) = extent(header);
-        let stored = needed + front_words(header).unwrap_or(0) as u64;
+        let rows = Rows::new(header, capacity);
+        let stored = if header.window > 0 {
+            rows.least_words()
+        } else {
+            needed + front_words(header).unwrap_or(0) as u64
+        };
         if stored > capacity as u64 {
             #[allow(clippy::cast_precision_loss, reason = "a report; at most 2^27")]
             return Err(Fault::new(FaultKind::TooManyPatches, stored as f32));
@@ -194,7 +222,46 @@ impl Program {
         self.header = *header;
         self.length = words;
         self.region = RegionCheck::START;
+        self.rows = rows;
         Ok(())
+    }
+
+    /// Whether the job is loaded while it runs.
+    pub(crate) const fn is_streamed(&self) -> bool {
+        self.header.window > 0
+    }
+
+    /// The rows of the job in the store.
+    pub(crate) const fn rows(&self) -> &Rows {
+        &self.rows
+    }
+
+    /// Words that have been received, and up to which the store has room now.
+    pub(crate) fn room(&self) -> [u32; 2] {
+        match self.stage {
+            LoadStage::Empty => [0; 2],
+            _ if self.is_streamed() => [self.rows.received(), self.rows.limit().min(self.length)],
+            LoadStage::Loading { received, .. } => [received, self.length],
+            LoadStage::Sealed => [self.length; 2],
+        }
+    }
+
+    /// The run is on a pass in this row: those before it may be overwritten.
+    pub(crate) const fn release(&mut self, row: u16) {
+        self.rows.release(row);
+    }
+
+    /// The run begins anew.
+    ///
+    /// # Errors
+    /// [`FaultKind::WrongState`] where the first rows are overwritten.
+    pub(crate) fn rewind(&mut self) -> Result<()> {
+        self.rows.rewind()
+    }
+
+    /// Whether [`Self::rewind`] would succeed.
+    pub(crate) fn can_rewind(&self) -> bool {
+        self.rows.can_rewind()
     }
 
     pub(crate) fn clear(&mut self) {
@@ -202,6 +269,10 @@ impl Program {
     }
 
     pub(crate) fn write(&mut self, store: &mut [i32], offset: u32, words: &[i32]) -> Result<()> {
+        if self.is_streamed() && self.stage != LoadStage::Empty {
+            let most = self.length;
+            return self.rows.write(store, offset, words, most).map_err(bad_length);
+        }
         let LoadStage::Loading { received, .. } = self.stage else {
             return Err(bad_length(offset));
         };
@@ -233,6 +304,56 @@ impl Program {
         extent(&self.header).0
     }
 
+    /// Copies a record of a streamed job, to be checked.
+    ///
+    /// # Errors
+    /// [`FaultKind::BadLength`] where it is not the next one, or not there yet.
+    pub(crate) fn copy(&self, store: &[i32], record: u32) -> Result<RecordCopy> {
+        let is_there = self.is_streamed() && self.stage != LoadStage::Empty && self.rows.is_next(record);
+        let job = self.view(store);
+        let spans = usize::from(self.header.path_spans.max(1));
+        let (index, first) = (record as usize, record as usize - record as usize % spans);
+        let words = |index| match self.header.kind {
+            SurfaceKind::Polynomial => job.record::<POLYNOMIAL_WORDS>(index).map(<[i32; _]>::as_slice),
+            SurfaceKind::Rational => job.record::<RATIONAL_WORDS>(index).map(<[i32; _]>::as_slice),
+            SurfaceKind::RevolvedAlongProfile | SurfaceKind::RevolvedAroundAxis => None,
+        };
+        match (words(index), words(first)) {
+            (Some(words), Some(first)) if is_there => Ok(RecordCopy::new(record, words, first)),
+            _ => Err(bad_length(record)),
+        }
+    }
+
+    /// Seals a record of a streamed job whose copy is sound.
+    ///
+    /// # Errors
+    /// As [`Self::copy`]; [`FaultKind::BadHeader`] for a width of a span, with the first record.
+    pub(crate) fn accept(&mut self, store: &[i32], record: u32) -> Result<()> {
+        if record == 0 {
+            self.view(store).check_widths()?;
+        }
+        if self.rows.accept(record) {
+            Ok(())
+        } else {
+            Err(bad_length(record))
+        }
+    }
+
+    /// A record of a streamed job is not sound: a run does not go on to its row.
+    pub(crate) const fn reject(&mut self, fault: Fault) {
+        self.rows.reject(fault);
+    }
+
+    /// The words, also of a job that is not sealed.
+    const fn view<'a>(&'a self, store: &'a [i32]) -> Job<'a> {
+        Job {
+            header: &self.header,
+            store,
+            length: self.length as usize,
+            rows: &self.rows,
+        }
+    }
+
     /// The first line of a region, once the job is sealed.
     pub(crate) const fn first_line(&self) -> &FirstLine {
         self.region.first_line()
@@ -240,6 +361,10 @@ impl Program {
 
     /// Checks a record. `line`: one that is free while a job is loaded.
     pub(crate) fn check(&mut self, store: &[i32], record: u32, line: &mut ScanLine) -> Result<()> {
+        if self.is_streamed() {
+            self.copy(store, record)?.check()?;
+            return self.accept(store, record);
+        }
         let LoadStage::Loading { received, checked } = self.stage else {
             return Err(bad_length(0));
         };
@@ -250,6 +375,7 @@ impl Program {
             header: &self.header,
             store,
             length: self.length as usize,
+            rows: &self.rows,
         };
         if record == 0 {
             job.check_widths()?;
@@ -292,6 +418,13 @@ impl Program {
 
     pub(crate) fn seal(&mut self) -> Result<()> {
         match self.stage {
+            LoadStage::Loading { .. } if self.is_streamed() => {
+                if !self.rows.can_begin() {
+                    return Err(bad_length(self.rows.received()));
+                }
+                self.stage = LoadStage::Sealed;
+                Ok(())
+            }
             LoadStage::Loading { received, checked }
                 if received == self.length && checked == self.records() =>
             {
@@ -313,17 +446,10 @@ impl Program {
     /// As [`Self::job`].
     pub(crate) fn job_and_rest<'a>(&'a self, store: &'a mut [i32]) -> Result<(Job<'a>, &'a mut [i32])> {
         self.job(store)?;
-        let length = self.length as usize;
+        let length = (self.length as usize).min(store.len());
         let split = store.split_at_mut_checked(length);
         let (store, rest) = split.ok_or(const { Fault::new(FaultKind::WrongState, 0.0) })?;
-        Ok((
-            Job {
-                header: &self.header,
-                store,
-                length,
-            },
-            rest,
-        ))
+        Ok((self.view(store), rest))
     }
 
     /// The sealed job.
@@ -332,11 +458,7 @@ impl Program {
     /// [`FaultKind::WrongState`] where no job is sealed.
     pub(crate) fn job<'a>(&'a self, store: &'a [i32]) -> Result<Job<'a>> {
         if self.stage == LoadStage::Sealed {
-            Ok(Job {
-                header: &self.header,
-                store,
-                length: self.length as usize,
-            })
+            Ok(self.view(store))
         } else {
             Err(Fault::new(FaultKind::WrongState, 0.0))
         }
@@ -350,6 +472,7 @@ pub(crate) struct Job<'a> {
     store: &'a [i32],
     /// Words of the job.
     length: usize,
+    rows: &'a Rows,
 }
 
 impl<'a> Job<'a> {
@@ -380,7 +503,9 @@ impl<'a> Job<'a> {
     }
 
     fn record<const N: usize>(&self, index: usize) -> Option<&'a [i32; N]> {
-        let start = width_words(self.header.path_spans, self.header.side_spans) as usize + index * N;
+        let spans = usize::from(self.header.path_spans);
+        let (row, within) = (index.checked_div(spans)?, index.checked_rem(spans)?);
+        let start = self.rows.start(row)? + within * N;
         self.store.get(start..)?.first_chunk::<N>()
     }
 
@@ -389,8 +514,13 @@ impl<'a> Job<'a> {
     /// # Errors
     /// [`FaultKind::WrongState`] where the job has no such patch.
     pub(crate) fn patch<const N: usize>(&self, path_span: u16, side_span: u16) -> Result<&'a [i32; N]> {
-        let index = usize::from(side_span) * usize::from(self.header.path_spans) + usize::from(path_span);
-        self.record(index)
+        let start = self.rows.start(side_span.into());
+        start
+            .and_then(|start| {
+                self.store
+                    .get(start + usize::from(path_span) * N..)?
+                    .first_chunk::<N>()
+            })
             .ok_or(const { Fault::new(FaultKind::WrongState, 0.0) })
     }
 
@@ -421,7 +551,7 @@ impl<'a> Job<'a> {
     }
 }
 
-fn bad_patch(record: u32) -> Fault {
+pub(crate) fn bad_patch(record: u32) -> Fault {
     Fault::new(FaultKind::BadPatch, crate::math::arith::count_to_f32(record))
 }
 

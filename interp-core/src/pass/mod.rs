@@ -26,6 +26,7 @@ pub(crate) mod offset;
 pub(crate) mod patch;
 pub(crate) mod position;
 pub(crate) mod route;
+pub(crate) mod row_history;
 pub(crate) mod run;
 pub(crate) mod scan;
 pub(crate) mod schedule;

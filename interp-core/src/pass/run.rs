@@ -612,6 +612,10 @@ impl Run {
         travel.next = Next::Along;
         travel.path.log_speed_derivative = f32::NAN;
         if let PassPlanning::Scan(scan) = &mut self.planning {
+            // With limits the estimator is the look-ahead's.
+            if job.header.axes.is_none() {
+                scan.estimator().enter_row(route.side.span);
+            }
             scan.begin(&route, goes_on);
         }
         self.buffer.begin(job, &travel.route, &travel.piece)
@@ -779,14 +783,53 @@ impl Run {
             Some(step) => step,
             None => self.find_step_over(job),
         };
+        let side = self.side_after(job, step)?;
         let travel = &mut self.travel;
-        let width = |span| job.side_width(span);
-        let side = schedule::next_side(travel.route.side, step, job.header.side_spans, width)?;
         travel.pass = travel.pass.wrapping_add(1);
         if job.header.pattern == Pattern::Zig {
             travel.offset = self.first_offset;
         }
         Ok(NextRoute::Pass(Route::of_pass(job.header, travel.pass, side)))
+    }
+
+    /// Side parameter of the next pass, a step away.
+    fn side_after(&self, job: &Job<'_>, step: f32) -> Result<SpanParameter> {
+        let side = self.travel.route.side;
+        match &self.planning {
+            PassPlanning::Scan(scan) => scan.estimator_ref().next_side(job, side, step),
+            PassPlanning::Fronts(_) => Ok(side),
+        }
+    }
+
+    /// The first and the last row of patches that the next tick and the planning after it need, where the next tick begins a pass.
+    pub(crate) fn rows_needed(&mut self, job: &Job<'_>) -> Option<[u16; 2]> {
+        if self.travel.next != Next::Over {
+            return None;
+        }
+        let step = match self.step_over {
+            Some(step) => step,
+            None => self.find_step_over(job),
+        };
+        self.step_over = Some(step);
+        // A step that is too small is reported by the tick.
+        let side = self.side_after(job, step).ok()?;
+        match &self.planning {
+            PassPlanning::Scan(scan) => Some(scan.estimator_ref().rows_needed(job, side)),
+            PassPlanning::Fronts(_) => None,
+        }
+    }
+
+    /// The same for the look-ahead of a job with limits, over the next pass at this side parameter.
+    pub(crate) fn rows_ahead(&self, job: &Job<'_>, side: SpanParameter) -> Option<[u16; 2]> {
+        match &self.planning {
+            PassPlanning::Scan(scan) => Some(scan.estimator_ref().rows_needed(job, side)),
+            PassPlanning::Fronts(_) => None,
+        }
+    }
+
+    /// Row of patches that the tool is in.
+    pub(crate) const fn row(&self) -> u16 {
+        self.travel.route.side.span
     }
 
     /// Whether the run is exactly at the end of the pass.

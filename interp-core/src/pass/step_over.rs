@@ -9,14 +9,16 @@
 //!
 //! The stations are the caller's ([`crate::pass::scan`], or the look-ahead of a job with axis limits): even parts of each patch, in order.
 
-use crate::job::Header;
+use crate::fault::Result;
 use crate::job::program::Job;
+use crate::job::{Header, Spacing};
 use crate::math::arith::sqrt;
 use crate::math::number::Bounded;
 use crate::pass::edge::{self, EdgeCrest, EdgeSearch};
 use crate::pass::patch::Patch;
 use crate::pass::position::PassPosition;
 use crate::pass::route::Route;
+use crate::pass::row_history::RowHistory;
 use crate::pass::schedule;
 use crate::sample::{SpanParameter, interval_of};
 use crate::surface::Contact;
@@ -177,6 +179,7 @@ pub(crate) struct StepOverEstimator {
     is_whole: [bool; 2],
     /// The line to evaluate next.
     second: bool,
+    rows: RowHistory,
 }
 
 impl StepOverEstimator {
@@ -199,14 +202,41 @@ impl StepOverEstimator {
         range: [0, u64::MAX],
         is_whole: [true; 2],
         second: false,
+        rows: RowHistory::START,
     };
 
     /// Resets to the state before the first pass. [`Self::begin`] resets the other fields.
     pub(crate) const fn restart(&mut self) {
         self.before = None;
         self.looked_again = false;
+        self.rows = RowHistory::START;
         self.second = false;
         self.search = EdgeSearch::DONE;
+    }
+
+    /// The pass that is looked at from here on is in this row.
+    pub(crate) const fn enter_row(&mut self, row: u16) {
+        self.rows.enter(row);
+    }
+
+    /// Side parameter of the pass after the one at `from`, by the step to it.
+    ///
+    /// # Errors
+    /// Those of [`schedule::next_side`].
+    pub(crate) fn next_side(&self, job: &Job<'_>, from: SpanParameter, step: f32) -> Result<SpanParameter> {
+        self.rows
+            .next_side(job.header, from, step, |span| job.side_width(span))
+    }
+
+    /// The first and the last row of patches that the planning of the next pass needs, at this side parameter.
+    pub(crate) fn rows_needed(&self, job: &Job<'_>, side: SpanParameter) -> [u16; 2] {
+        let expected = if job.header.spacing == Spacing::FirstOrder {
+            Some(0.0)
+        } else {
+            self.expects()
+        };
+        self.rows
+            .needed(job.header, side, expected, |span| job.side_width(span))
     }
 
     /// Begins a pass on a new line.
@@ -356,13 +386,14 @@ impl StepOverEstimator {
             let most = edge_start.at_least(edge_end).at_least(most);
             let [half, whole] = &mut self.lines;
             let beside = if is_second { whole } else { half };
+            let spans = self.rows.spans(job.header);
             let place = PlaceOnPass {
                 position: *position,
                 fraction,
                 range: self.range,
                 is_last,
             };
-            beside.work(job, &place, most, expected);
+            beside.work(job, &place, most, expected, spans);
         }
     }
 
@@ -516,7 +547,7 @@ impl NeighbourLine {
     }
 
     #[inline(never)]
-    fn work(&mut self, job: &Job<'_>, place: &PlaceOnPass, most: f32, expected: Option<f32>) {
+    fn work(&mut self, job: &Job<'_>, place: &PlaceOnPass, most: f32, expected: Option<f32>, spans: u16) {
         let PlaceOnPass {
             position,
             fraction,
@@ -525,9 +556,9 @@ impl NeighbourLine {
         } = place;
         let is_first = expected.is_none();
         self.task = match self.task {
-            Task::Place => self.place(job, position, most, expected),
+            Task::Place => self.place(job, position, most, expected, spans),
             _ if is_first && most > REPLACE_FACTOR * self.placed_for => {
-                self.place(job, position, most, expected)
+                self.place(job, position, most, expected, spans)
             }
             Task::Patch => self.make_patch(job, position, Task::Start),
             Task::Start => {
@@ -550,9 +581,16 @@ impl NeighbourLine {
         };
     }
 
-    /// Places the line: by the expected step, or by the step that the samples of this pass so far allow; at most at the surface's boundary.
-    fn place(&mut self, job: &Job<'_>, position: &PassPosition, most: f32, expected: Option<f32>) -> Task {
-        let spans = job.header.side_spans;
+    /// Places the line: by the expected step, or by the step that the samples of this pass so far allow; at most at the end of these spans, those of the surface that
+    /// are in the store.
+    fn place(
+        &mut self,
+        job: &Job<'_>,
+        position: &PassPosition,
+        most: f32,
+        expected: Option<f32>,
+        spans: u16,
+    ) -> Task {
         let width = |span| job.side_width(span);
         if schedule::is_last(position.side, spans) {
             return Task::Idle;

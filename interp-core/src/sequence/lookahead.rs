@@ -1081,7 +1081,7 @@ impl Lookahead {
     fn close(
         &mut self,
         job: &Job<'_>,
-        estimator: Option<&mut StepOverEstimator>,
+        mut estimator: Option<&mut StepOverEstimator>,
         lines: &mut RegionLines,
         out: &mut PassPlan,
     ) -> Result<bool> {
@@ -1096,6 +1096,7 @@ impl Lookahead {
         }
         let step = match header.spacing {
             Spacing::Exact => {
+                let estimator = estimator.as_deref_mut();
                 estimator.map_or(out.interval, |estimator| estimator.step(header, self.maximum))
             }
             Spacing::FirstOrder => out.interval,
@@ -1107,9 +1108,11 @@ impl Lookahead {
         if header.edges > 0 {
             return Ok(!lines.go_on(job, step)?);
         }
-        let width = |span| job.side_width(span);
         if !schedule::is_last(out.route.side, header.side_spans) {
-            let side = schedule::next_side(out.route.side, step, header.side_spans, width)?;
+            let side = match estimator {
+                Some(estimator) => estimator.next_side(job, out.route.side, step)?,
+                None => out.route.side,
+            };
             out.next = Some(Route::of_pass(header, out.pass.wrapping_add(1), side));
             out.steps_over = header.pattern == Pattern::Zigzag;
         }

@@ -170,6 +170,8 @@ pub(crate) struct Sequencer {
     /// Patch of the pass and cell of the patch that the tool is in.
     cell: [u16; 2],
     correction: Option<Correction>,
+    /// Whether the rows of patches are there that the planning of the pass after the next needs.
+    has_rows: bool,
 }
 
 /// The plans of the current or last pass, and of the next.
@@ -210,6 +212,7 @@ impl Sequencer {
         has_first_patch: false,
         cell: [0; 2],
         correction: None,
+        has_rows: false,
     };
 
     /// Starts the job from the tool's position.
@@ -220,6 +223,7 @@ impl Sequencer {
         self.on_surface = false;
         self.pending = None;
         self.has_first_patch = true;
+        self.has_rows = false;
         self.planner.stop();
         for pass in &mut self.plans {
             pass.tail = Turn::NONE;
@@ -252,6 +256,34 @@ impl Sequencer {
             Phase::Hop => self.hop.is_at_rest(),
             Phase::Await | Phase::AwaitGoal(_) | Phase::Done => true,
         }
+    }
+
+    /// The first and the last row of patches that are needed to go on, where the tool stands before a pass whose successor is to be planned next: at the end of the pass before it, or
+    /// above its start. With the pass begins the planning of that successor.
+    pub(crate) fn rows_needed(&self, job: &Job<'_>, run: &Run) -> Option<[u16; 2]> {
+        if self.has_rows || self.pending.is_some() || !self.is_planned() {
+            return None;
+        }
+        let is_due = match self.phase {
+            Phase::Await => !self.has_to_plan_step_over(),
+            Phase::AwaitGoal(Leg::Plunge) => self.goal == Goal::Pass && self.leg == LegPlanning::Complete,
+            Phase::Leg(Leg::Plunge) => self.goal == Goal::Pass,
+            Phase::Hop => true,
+            _ => false,
+        };
+        let (_, next) = self.plans_ref();
+        let after = next.next.filter(|_| is_due)?;
+        run.rows_ahead(job, after.side)
+    }
+
+    /// They are there.
+    pub(crate) const fn set_has_rows(&mut self) {
+        self.has_rows = true;
+    }
+
+    /// Whether [`Self::rows_needed`] is to be asked.
+    pub(crate) const fn may_wait_for_rows(&self) -> bool {
+        !self.has_rows && !matches!(self.phase, Phase::Pass | Phase::Turn | Phase::Done)
     }
 
     /// Whether the tool is between passes.
@@ -495,6 +527,9 @@ impl Sequencer {
                 Err(fault) => self.pending = Some(fault),
             },
             Planning::Requested(pass) => {
+                if let (Some(estimator), _) = run.estimator_and_lines() {
+                    estimator.enter_row(next.route.side.span);
+                }
                 self.lookahead.begin(pass, next.route, &now.tail, next);
                 next.is_last = run.is_last_pass();
                 self.planning = Planning::Stations;
@@ -895,6 +930,7 @@ impl Sequencer {
     /// Chooses what follows a pass.
     #[inline(never)]
     fn end_pass(&mut self, job: &Job<'_>, command: FeedCommand) -> Result<()> {
+        self.has_rows = false;
         let stays = self.stays_on_surface(job);
         let (now, next) = both(&mut self.plans, self.second);
         if now.is_last {

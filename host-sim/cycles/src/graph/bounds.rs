@@ -406,7 +406,7 @@ const BOUNDS: &[(&str, u32, &str)] = &[
         "rows of a block; coordinates",
     ),
     (
-        "interp_core::sequence::sequencer::Sequencer::next_own_cycles",
+        "interp_core::sequence::sequencer::Sequencer::next_cycles",
         2,
         "ends of a plan that are compared",
     ),

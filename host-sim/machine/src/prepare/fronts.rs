@@ -52,7 +52,7 @@ pub(super) fn check(job: &Job, prepared: &Prepared) -> Result<(), JobError> {
     if prepared.words.len() + words > STORE_WORDS {
         return no(
             format!(
-                "the surface and the stations of its passes take {} words, more than the {STORE_WORDS} of the board's store",
+                "the surface and the stations of its passes of constant scallop height take {} words, more than the {STORE_WORDS} of the board's store, and they need all of it at once",
                 prepared.words.len() + words
             ),
             "use fewer knots, cut the part into several jobs, or write spacing = \"exact\"",

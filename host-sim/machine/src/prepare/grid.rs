@@ -10,6 +10,7 @@ use interp_core::{Header, STORE_WORDS, SurfaceKind};
 use job::{Along, Job, JobError, SurfaceSpec};
 use patches::pieces::{Piece, Source};
 
+use super::stream::PATCHES_MAX;
 use super::{ParameterSpans, Prepared, steps, widths};
 
 pub(super) const REMEDY: &str =
@@ -59,15 +60,10 @@ fn records(source: &Source, along: Along) -> Result<Records, NoRecords> {
         Along::U => (u, v),
         Along::V => (v, u),
     };
-    let record_words = if source.rational() {
-        RATIONAL_WORDS
-    } else {
-        POLYNOMIAL_WORDS
-    };
     for _ in 0..ROUNDS_MAX {
         // Before the patches are made: a job file has room for a hundred thousand.
         let patches = (path.len() - 1) * (side.len() - 1);
-        if patches > STORE_WORDS / record_words {
+        if patches > PATCHES_MAX {
             return Err(no(
                 too_many(patches),
                 "use fewer knots, or cut the part into several jobs",
@@ -112,7 +108,7 @@ pub(super) fn prepare(job: &Job, header: Header, source: &Source) -> Result<Prep
     finish(job, header, source.rational(), path, side, words)
 }
 
-/// Number of patches of a surface that is not revolved, with passes along u.
+/// Number of patches of a surface that is not revolved and fits the board's store at once, with passes along u.
 ///
 /// # Errors
 /// A sentence with the reason for which the surface cannot be encoded.
@@ -121,19 +117,19 @@ pub fn patch_count(surface: &SurfaceSpec) -> Result<usize, String> {
     let Records { words, path, side } = records(&source, Along::U).map_err(|no| no.what)?;
     let (path_spans, side_spans) = (path.len() - 1, side.len() - 1);
     let patches = path_spans * side_spans;
-    // The width of each span is a word, too.
+    // The width of each span is a word, too. A larger surface is streamed, but a fit of a face is better made coarser.
     if words.len() + path_spans + side_spans > STORE_WORDS {
-        return Err(too_many(patches));
+        return Err(format!(
+            "the surface takes {patches} patches, more than the board's store: about {} polynomial or {} rational ones",
+            STORE_WORDS / (POLYNOMIAL_WORDS + 1),
+            STORE_WORDS / (RATIONAL_WORDS + 1)
+        ));
     }
     Ok(patches)
 }
 
 fn too_many(patches: usize) -> String {
-    format!(
-        "the surface takes {patches} patches, more than the board's store: about {} polynomial or {} rational ones",
-        STORE_WORDS / (POLYNOMIAL_WORDS + 1),
-        STORE_WORDS / (RATIONAL_WORDS + 1)
-    )
+    format!("the surface takes {patches} patches, more than the {PATCHES_MAX} of a job")
 }
 
 fn halve(breaks: &mut Vec<f64>, spans: &BTreeSet<usize>) {

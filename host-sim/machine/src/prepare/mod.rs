@@ -11,6 +11,7 @@ mod geometry;
 mod grid;
 mod region;
 mod steps;
+mod stream;
 
 use interp_core::sample::SpanParameter;
 use interp_core::{Header, Pattern, Spacing, StepConfig, SurfaceKind, ToolSide, encode};
@@ -20,6 +21,7 @@ use patches::pieces::Source;
 
 pub use grid::patch_count;
 pub use steps::{config as step_config, configuration};
+pub use stream::{PATCHES_MAX, streamed};
 
 /// One parameter of the prepared surface: its spans, in the parameter's own units.
 #[derive(Clone, Debug, PartialEq)]
@@ -130,6 +132,7 @@ pub fn prepare(job: &Job) -> Result<Prepared, JobError> {
         scallop_mm: job.scallop_mm as f32,
         period_s: job.machine.period_s() as f32,
         edges: 0,
+        window: 0,
         axes: None,
     };
     let mut prepared = match &job.surface {
@@ -148,7 +151,7 @@ pub fn prepare(job: &Job) -> Result<Prepared, JobError> {
     };
     prepared.header.axes = axes::axes(job, sign, start)?;
     fronts::check(job, &prepared)?;
-    Ok(prepared)
+    stream::fit(job, prepared)
 }
 
 /// Words of the widths of spans.

@@ -4,6 +4,7 @@ use interp_core::{Sample, State};
 use protocol::digest::job_digest;
 use protocol::message::{CHUNK_WORDS_MAX, Clock, PassDigest, Report, Request, Status, StepSettings, Words};
 
+use super::feed::Feed;
 use super::operate::{self, Following, Operator};
 use super::session::{Event, LineLosses, RemoteError, Session};
 use crate::prepare::Prepared;
@@ -34,7 +35,7 @@ pub struct Compared {
     pub losses: LineLosses,
 }
 
-/// Uploads a job, then the settings of its drives if it gives any; the board has its own for a job without. `progress` is called with the number of words transferred.
+/// Uploads a job, or what the store has room for of a streamed one, whose rest is sent while the session waits for events of its run; then the settings of its drives if it gives any; the board has its own for a job without. `progress` is called with the number of words transferred.
 ///
 /// # Errors
 /// The line breaks, the board refuses the job, or it reports other settings of the drives than the job's.
@@ -43,6 +44,7 @@ pub fn upload(
     job: &Prepared,
     mut progress: impl FnMut(usize),
 ) -> Result<(), RemoteError> {
+    session.set_feed(None);
     let words = u32::try_from(job.words.len()).unwrap_or(u32::MAX);
     let digest = job_digest(&job.words);
     session.command(&Request::JobBegin {
@@ -50,13 +52,20 @@ pub fn upload(
         words,
         digest,
     })?;
-    let most = usize::from(session.capabilities().description.chunk_words_max).clamp(1, CHUNK_WORDS_MAX);
-    let mut offset = 0_u32;
-    for chunk in job.words.chunks(most) {
-        let words = Words::new(chunk).unwrap_or_default();
-        session.command(&Request::JobChunk { offset, words })?;
-        offset += u32::try_from(chunk.len()).unwrap_or(0);
-        progress(offset as usize);
+    if job.header.window > 0 {
+        session.set_feed(Some(Feed::new(job, 0)));
+        let status = session.status()?;
+        while session.feed_board()? {}
+        progress(status.stream.room as usize);
+    } else {
+        let most = usize::from(session.capabilities().description.chunk_words_max).clamp(1, CHUNK_WORDS_MAX);
+        let mut offset = 0_u32;
+        for chunk in job.words.chunks(most) {
+            let words = Words::new(chunk).unwrap_or_default();
+            session.command(&Request::JobChunk { offset, words })?;
+            offset += u32::try_from(chunk.len()).unwrap_or(0);
+            progress(offset as usize);
+        }
     }
     session.command(&Request::JobEnd)?;
     let Some(steps) = job.steps.map(StepSettings::from) else {
@@ -68,6 +77,17 @@ pub fn upload(
     } else {
         Err(RemoteError::OtherSteps)
     }
+}
+
+/// Goes on with the words of a streamed job that the board has loaded, or runs, from where it received the last ones in an earlier session.
+///
+/// # Errors
+/// The line breaks.
+pub fn resume_upload(session: &mut Session, job: &Prepared) -> Result<(), RemoteError> {
+    let received = session.status()?.stream.received;
+    session.set_feed((job.header.window > 0).then(|| Feed::new(job, received)));
+    session.status()?;
+    Ok(())
 }
 
 /// Starts the loaded job: in lockstep for a number of periods, or on the board's own clock.
@@ -216,6 +236,10 @@ pub fn samples_between(session: &mut Session, from: u32, count: u32) -> Result<V
         session.command(&Request::Abort)?;
         session.command(&Request::Run { ticks: 1 })?;
         wait_halted(session, &mut Vec::new())?;
+    }
+    if let Some(job) = session.streamed().cloned() {
+        // Its first rows are gone.
+        upload(session, &job, |_| {})?;
     }
     let mut samples = Vec::new();
     if from > 0 {

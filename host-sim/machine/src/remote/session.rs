@@ -14,6 +14,7 @@ use interp_core::State;
 
 use super::events::Received;
 pub use super::events::{Event, LineLosses};
+use super::feed::Feed;
 
 /// Time-out of a reply, after which the request is sent again. A reply takes 0.2 ms in QEMU and a few ms over a serial line; a board that
 /// checks a job, or a QEMU that shares its processor, may take longer.
@@ -23,6 +24,13 @@ const ANSWER_TIMEOUT: Duration = Duration::from_millis(1500);
 /// within its patience. Not below what a USB-serial adapter may keep a frame back.
 const KEEP_ALIVE_SHARE: u32 = 4;
 const ANSWER_TIMEOUT_MIN: Duration = Duration::from_millis(40);
+
+/// The same of a part of a job, whose frame is the longest and so the first to suffer on a bad line: it takes 3 ms on a serial line, and the board a few more for a row
+/// of a streamed job.
+const CHUNK_TIMEOUT: Duration = Duration::from_millis(200);
+
+/// Frames of a part of a job after which the next parts are shorter.
+const TRIES_MANY: u32 = 3;
 
 /// Time after which a request is given up.
 const GIVE_UP: Duration = Duration::from_secs(6);
@@ -104,6 +112,12 @@ pub struct Session {
     asked: Instant,
     /// Time of the last event of the run.
     heard: Instant,
+    /// The streamed job that is loaded or runs.
+    feed: Option<Feed>,
+    /// Frames of the last request.
+    tries: u32,
+    /// A damaged frame came since the last one.
+    is_damaged: bool,
 }
 
 fn name(request: &Request) -> &'static str {
@@ -160,6 +174,9 @@ impl Session {
             patient: false,
             asked: Instant::now(),
             heard: Instant::now(),
+            feed: None,
+            tries: 0,
+            is_damaged: false,
         };
         // Terminates a partial frame left by noise or by an earlier host.
         session.stream.write_all(&[DELIMITER])?;
@@ -239,6 +256,7 @@ impl Session {
         match self.ask(&Request::Status)? {
             Reply::Status { status, .. } => {
                 self.events.announce(status.events);
+                self.has_room(status.stream.room);
                 Ok(status)
             }
             Reply::Nak { reason, .. } => Err(RemoteError::Refused {
@@ -294,6 +312,63 @@ impl Session {
         }
     }
 
+    /// The job whose words are sent while it runs, or none.
+    pub(super) fn set_feed(&mut self, feed: Option<Feed>) {
+        self.feed = feed;
+    }
+
+    /// The streamed job, if the last one was.
+    pub(super) fn streamed(&self) -> Option<&crate::prepare::Prepared> {
+        self.feed.as_ref().map(|feed| &feed.job)
+    }
+
+    fn has_room(&mut self, room: u32) {
+        if let Some(feed) = &mut self.feed {
+            feed.has_room(room);
+        }
+    }
+
+    /// Whether words of a streamed job are left.
+    pub(super) fn has_words(&self) -> bool {
+        self.feed.as_ref().is_some_and(|feed| !feed.is_over())
+    }
+
+    /// Sends the next words of a streamed job, if there is room for any; false where there is none.
+    ///
+    /// # Errors
+    /// As [`Self::command`].
+    pub(super) fn feed_board(&mut self) -> Result<bool, RemoteError> {
+        let most = self.capabilities.description.chunk_words_max;
+        let Some((chunk, sent)) = self.feed.as_ref().and_then(|feed| feed.next(most)) else {
+            return Ok(false);
+        };
+        let reply = self.ask(&chunk)?;
+        let is_bad = self.tries > TRIES_MANY;
+        let Some(feed) = &mut self.feed else {
+            return Ok(false);
+        };
+        feed.adapt(is_bad);
+        match reply {
+            Reply::Nak {
+                reason: Reason::TooLong { limit, .. },
+                ..
+            } => feed.has_no_room(limit),
+            Reply::Nak {
+                reason: Reason::WrongOffset { expected },
+                ..
+            } => feed.has(expected),
+            Reply::Nak { reason, .. } => {
+                self.feed = None;
+                return Err(RemoteError::Refused {
+                    request: name(&chunk),
+                    reason,
+                });
+            }
+            _ => feed.has(sent),
+        }
+        Ok(true)
+    }
+
     /// Drops the events so far: [`Self::event`] is then about what follows. Returns the board's status.
     ///
     /// # Errors
@@ -330,6 +405,9 @@ impl Session {
     /// # Errors
     /// The line breaks, or no event arrived within the time-out.
     pub fn poll(&mut self) -> Result<Option<Event>, RemoteError> {
+        if self.feed_board()? {
+            return Ok(None);
+        }
         // What was read after the last answer. An answer here belongs to a request that has been answered already.
         while self.next_reply()?.is_some() {}
         if let Some(event) = self.events.pop() {
@@ -373,7 +451,7 @@ impl Session {
         let since = self.asked.elapsed();
         self.ending.is_some()
             || self.keep_alive.is_some_and(|every| since >= every)
-            || (!self.quiet && since >= look && self.heard.elapsed() >= look)
+            || ((!self.quiet || self.has_words()) && since >= look && self.heard.elapsed() >= look)
     }
 
     /// Requests missing events again, or gives them up.
@@ -447,7 +525,13 @@ impl Session {
             (GIVE_UP, "a request was repeated for 6 s")
         };
         let mut timeout = self.answer_timeout();
+        if matches!(request, Request::JobChunk { .. }) {
+            timeout = timeout.min(CHUNK_TIMEOUT);
+        }
+        self.tries = 0;
         while self.asked.elapsed() < give_up {
+            self.tries += 1;
+            self.is_damaged = false;
             self.stream.write_all(frame)?;
             self.stream.flush()?;
             let deadline = Instant::now() + timeout;
@@ -467,6 +551,8 @@ impl Session {
                         Some(0) => break,
                         _ => {}
                     },
+                    // Perhaps the answer: the board sends it again for the same bytes.
+                    None if self.is_damaged => break,
                     None => self.read_some()?,
                 }
             }
@@ -503,8 +589,13 @@ impl Session {
     fn next_reply(&mut self) -> Result<Option<Reply>, RemoteError> {
         let input = std::mem::take(&mut self.input);
         for (index, &byte) in input.iter().enumerate() {
-            let Some(Ok(frame)) = self.decoder.push(byte) else {
-                continue;
+            let frame = match self.decoder.push(byte) {
+                None => continue,
+                Some(Err(_)) => {
+                    self.is_damaged = true;
+                    continue;
+                }
+                Some(Ok(frame)) => frame,
             };
             let Ok(reply) = read_reply(frame.payload) else {
                 continue;
@@ -515,6 +606,10 @@ impl Session {
                     self.events.take(event, samples.collect());
                 }
                 Reply::PassDigest { event, pass } => self.events.take(event, vec![Event::Pass(pass)]),
+                Reply::Room { event, room } => {
+                    self.has_room(room);
+                    self.events.take(event, Vec::new());
+                }
                 Reply::Halted(status) => self.events.take(status.events, vec![Event::Halted(status)]),
                 answer => {
                     self.input = input[index + 1..].to_vec();
@@ -536,6 +631,6 @@ fn answered(reply: &Reply) -> Option<u16> {
         | Reply::Profile { number, .. }
         | Reply::Motion { number, .. }
         | Reply::Offsets { number, .. } => Some(*number),
-        Reply::Samples { .. } | Reply::PassDigest { .. } | Reply::Halted(_) => None,
+        Reply::Samples { .. } | Reply::PassDigest { .. } | Reply::Room { .. } | Reply::Halted(_) => None,
     }
 }

@@ -1,0 +1,77 @@
+//! A job of 100 x 100 patches on the firmware in QEMU: 32 times what its store holds.
+
+use std::time::Instant;
+
+use interp_core::{Sample, State};
+use machine::Machine;
+use machine::prepare::{Prepared, prepare};
+use machine::remote::operate::{Setup, make_ready};
+use machine::remote::qemu::Qemu;
+use machine::remote::session::Event;
+use machine::remote::{Session, drive};
+use protocol::digest::Digest;
+use protocol::message::{Configuration, Report, Request};
+
+use super::{LIMITS, bumpy};
+use crate::images;
+
+/// Digest of the run after each of its first passes, and its ticks up to there.
+fn first_passes(job: &Prepared, passes: u32) -> (Vec<u64>, u32) {
+    let (mut digests, mut digest, mut ticks) = (Vec::new(), Digest::new(), 0);
+    let each = |sample: &Sample| {
+        if sample.pass as usize > digests.len() {
+            digests.push(digest.value());
+        }
+        digest.sample(sample);
+        ticks += 1;
+        sample.pass < passes
+    };
+    Machine::load(job).unwrap().run(each).unwrap();
+    (digests, ticks)
+}
+
+/// With limits and without: as many passes as cross some rows, so that rows are sent while the tool moves.
+#[test]
+fn the_first_passes_of_a_hundred_rows() {
+    let (_qemu, stream) = Qemu::start(images::for_qemu()).unwrap();
+    let mut session = Session::open(stream, 1).unwrap();
+    make_ready(&mut session, &Setup::simulated(Configuration::DEFAULT)).unwrap();
+    let cut = "scallop_mm = 0.04\npattern = \"zigzag\"";
+    for (machine, passes) in [("", 18), (LIMITS, 12)] {
+        let job = prepare(&bumpy([100, 100], [0.5, 0.8], cut, machine)).unwrap();
+        assert_eq!((job.patches(), job.header.window), (10_000, 3));
+        let (wanted, ticks) = first_passes(&job, passes);
+        drive::upload(&mut session, &job, |_| {}).unwrap();
+        session
+            .command(&Request::Clock(protocol::message::Clock::Lockstep))
+            .unwrap();
+        session.command(&Request::Report(Report::Digests)).unwrap();
+        session.command(&Request::Start).unwrap();
+        session.command(&Request::Run { ticks }).unwrap();
+        let start = Instant::now();
+        let mut digests = Vec::new();
+        let status = loop {
+            match session.event().unwrap() {
+                Event::Pass(pass) => digests.push(pass.digest),
+                Event::Halted(status) => break status,
+                _ => {}
+            }
+        };
+        println!(
+            "{passes} passes, {ticks} ticks, in {:.1} s: {:?}",
+            start.elapsed().as_secs_f64(),
+            status.stream
+        );
+        assert_eq!(digests, wanted);
+        assert!(
+            matches!(status.state, State::Running | State::Linking),
+            "{status:?}"
+        );
+        assert!(status.side.span > 5, "{:?}", status.side);
+        assert!(status.stream.received > 8 * 5202, "{:?}", status.stream);
+        assert_eq!((status.deadline_misses, status.samples_lost), (0, 0));
+        session.command(&Request::Abort).unwrap();
+        session.command(&Request::Run { ticks: 1 }).unwrap();
+        while !matches!(session.event().unwrap(), Event::Halted(_)) {}
+    }
+}
