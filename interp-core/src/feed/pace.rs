@@ -10,7 +10,7 @@ use crate::math::number::{Bounded, to_f32};
 
 /// Periods from the start of a search to the change that it finds, for the search: some, and as many as the places of two short trials take.
 const LATENCY: u16 = 8;
-const PLACES_A_PERIOD: f32 = 14.0;
+const PLACES_A_PERIOD: f32 = 12.0;
 /// The most of it, and steps in which the place there is found.
 const LATENCY_MAX: u16 = 96;
 const STEPS_AHEAD: u16 = 24;

@@ -334,7 +334,7 @@ fn the_feed_is_exact_where_the_plan_is_near_it() {
 }
 
 /// Places of a trial that a period looks at.
-const PLACES: u32 = 14;
+const PLACES: u32 = 12;
 
 struct Random(u64);
 

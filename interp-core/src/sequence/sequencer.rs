@@ -31,7 +31,7 @@ const SPARE_PERIODS: u32 = 15;
 
 /// Cycles of one place of a search for a change of the pace, along a pass and along a link, and of its begin along a pass; of a portion of a
 /// step-over's planning.
-const PACE_CYCLES: u32 = 1_850;
+const PACE_CYCLES: u32 = 2_150;
 const PACE_BEGIN_CYCLES: u32 = 9_500;
 const LINK_PACE_CYCLES: u32 = 1_300;
 const STEP_OVER_CYCLES: u32 = 6_000;
