@@ -63,6 +63,8 @@ const ROOM_PLANNED: Use = Use {
     jerk: 1.001,
 };
 const NEARLY_PLANNED: f32 = 0.97;
+/// Share of the jerk in [`ROOM`] that a change may use near a turn, whose jerk is known at its stations only.
+const JERK_NEAR_TURNS: f32 = 0.9;
 /// The same after a fault.
 const ROOM_FAULT: Use = Use {
     feed: 1.0,
@@ -184,6 +186,15 @@ pub(crate) fn room_of(is_fault: bool, pace: f32) -> &'static Use {
         (false, true) => &ROOM_PLANNED,
         (false, false) => &ROOM,
     }
+}
+
+/// The same of a change that is looked at at places at most so far apart, s: closer ones are near a turn.
+fn room_of_change(is_fault: bool, pace: f32, widest: f32) -> Use {
+    let mut room = *room_of(is_fault, pace);
+    if widest < SPACING_WIDE && pace <= NEARLY_PLANNED {
+        room.jerk *= JERK_NEAR_TURNS;
+    }
+    room
 }
 
 /// A search for a change.
@@ -410,11 +421,11 @@ impl<C: Copy> Pace<C> {
         if let Some(making) = &mut search.making {
             let profile = profiles.made();
             let slot_at = making.slot(profile, 0.5 * self.period);
-            let room = room_of(self.is_fault, slot_at.r);
+            let room = room_of_change(self.is_fault, slot_at.r, search.widest);
             let room = Use {
                 acceleration: PROFILE_ACCELERATION * room.acceleration,
                 jerk: PROFILE_JERK * room.jerk,
-                ..*room
+                ..room
             };
             let span = course.span_at(&search.at, &slot_at, &room);
             let slot = making.append(profile, &span, PACE_MAX);
@@ -448,8 +459,8 @@ impl<C: Copy> Pace<C> {
         let time = (step * f32::from(search.points)).at_most(duration);
         let rates = search.change.rates(time);
         let [pace, first, _] = rates;
-        let room = room_of(self.is_fault, pace);
-        let mut ratio = course.use_at(&search.at, rates, 0.5 * step).ratio(room);
+        let room = room_of_change(self.is_fault, pace, search.widest);
+        let mut ratio = course.use_at(&search.at, rates, 0.5 * step).ratio(&room);
         ratio = ratio.at_least(first.abs() * self.period * (1.0 / CHANGE_MAX));
         if !(PACE_MIN..=PACE_MAX).contains(&pace) {
             ratio = ratio.at_least(RATIO_MAX);
