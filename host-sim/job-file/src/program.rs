@@ -61,7 +61,7 @@ pub(super) fn read(path: &Path) -> Result<String, JobError> {
         (None, Some(number)) => Err(JobError::of_file(
             &name,
             format!("the job has one surface, no face {number}"),
-            &format!("write {}", file.display()),
+            format!("write {}", file.display()),
         )),
         (Some(table), None) => {
             let numbers = numbers(&name, &table)?;
@@ -69,7 +69,7 @@ pub(super) fn read(path: &Path) -> Result<String, JobError> {
             Err(JobError::of_file(
                 &name,
                 format!("the job has {} faces, and this command takes one", numbers.len()),
-                &format!("name one: {name}#{first}; `verify` and `run` take all of them"),
+                format!("name one: {name}#{first}; `verify` and `run` take all of them"),
             ))
         }
         (Some(table), Some(number)) => one(&name, table, number),
@@ -123,7 +123,7 @@ fn one(name: &str, mut table: Table, number: usize) -> Result<String, JobError> 
         return Err(JobError::of_file(
             name,
             format!("the job has no face {number}"),
-            &format!("its faces: {numbers:?}"),
+            format!("its faces: {numbers:?}"),
         ));
     };
     if let Some(section) = FOREIGN.iter().find(|section| table.contains_key(**section)) {
