@@ -286,10 +286,10 @@ pub(super) fn command(arguments: &Arguments) -> Result<()> {
 /// The jobs together: how many passed, and their time.
 fn summary(values: &[Value]) {
     let passed = values.iter().filter(|value| value["passed"] == true).count();
-    let time_s: f64 = values
+    let times = values
         .iter()
-        .filter_map(|value| value["time_s"]["whole"].as_f64())
-        .sum();
+        .filter_map(|value| value["time_s"]["whole"].as_f64());
+    let time_s = times.fold(0.0, |sum, time_s| sum + time_s);
     say!(
         "{passed} of {} jobs passed, {:.2} min in all",
         values.len(),

@@ -13,7 +13,7 @@ use super::super::{Failure, Result, progress, region_words, whole};
 use super::page::{PartRow, part_page};
 use super::{Arguments, relative};
 use cad::{CadError, Face, JobOptions, MachinableFace, Model, Options, Placement, machinable, write_job};
-use part::{Part, Request, Tool, placed_part};
+use part::{Part, Reason, Request, State, Tool, placed_part};
 
 /// Default scallop height, mm, as in a job of a face.
 const SCALLOP_MM: f64 = 0.01;
@@ -181,6 +181,8 @@ struct Outcome {
     along: &'static str,
     side: &'static str,
     passes_s: f64,
+    /// The face in cells, each with its colour; none for a plane, whose regions are exact polygons.
+    cells: Vec<([u8; 3], [[f64; 3]; 4])>,
 }
 
 /// The request for the region of a face with this surface.
@@ -192,7 +194,8 @@ struct Asked<'a> {
 }
 
 impl Asked<'_> {
-    fn reach(&self, face: &Face, made: &MachinableFace, side: usize) -> FaceReach {
+    /// Something of the request for the region of a face.
+    fn of<T>(&self, face: &Face, made: &MachinableFace, take: impl FnOnce(&Request<'_>) -> T) -> T {
         let placed = face.placed(&self.setup.placement);
         let spec = made.spec();
         let [[u0, u1], [v0, v1]] = spec.domain();
@@ -211,7 +214,11 @@ impl Asked<'_> {
             touch_mm: job_file::PART_TOLERANCE_MM,
             part: Some((self.part, self.part.index(face.number))),
         };
-        let found = request.reach(side);
+        take(&request)
+    }
+
+    fn reach(&self, face: &Face, made: &MachinableFace, side: usize) -> FaceReach {
+        let found = self.of(face, made, |request| request.reach(side));
         FaceReach {
             area_mm2: found.area_mm2,
             reachable_mm2: found.reachable_mm2,
@@ -286,7 +293,11 @@ pub(super) fn command(arguments: &Arguments, file: &str, model: &Arc<Model>, out
     let bar = progress(faces.len() as u64, "regions");
     let mut outcomes = Vec::new();
     for (face, made) in faces.iter().zip(&made) {
-        outcomes.push(outcome(arguments, file, face, made.as_ref(), &asked, &folder));
+        let mut found = outcome(arguments, file, face, made.as_ref(), &asked, &folder);
+        if let (Ok(made), true) = (made, face.surface.kind() != "plane") {
+            found.cells = cells(&asked, face, made, &found);
+        }
+        outcomes.push(found);
         bar.inc(1);
     }
     bar.finish_and_clear();
@@ -325,6 +336,47 @@ fn best_side(
     Setup::new(best.1, model, scallop_mm)
 }
 
+/// Cells of a picture a side of a face as large as the part, and the least and the most of a face.
+const CELLS: f64 = 64.0;
+const CELLS_OF_FACE: [f64; 2] = [6.0, 40.0];
+
+/// A face in cells, each with its colour: smaller ones on larger faces.
+fn cells(
+    asked: &Asked<'_>,
+    face: &Face,
+    made: &MachinableFace,
+    found: &Outcome,
+) -> Vec<([u8; 3], [[f64; 3]; 4])> {
+    let block = asked.part.block();
+    let share = cad::measure(&made.spec())
+        .size_mm()
+        .into_iter()
+        .fold(0.0, f64::max)
+        / (block.high - block.low).max_element();
+    let [least, most] = CELLS_OF_FACE;
+    #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "clamped")]
+    let side = (CELLS * share).clamp(least, most) as usize;
+    let loops = found
+        .region
+        .as_ref()
+        .map_or([].as_slice(), |(region, _)| region.loops.as_slice());
+    let cells = asked.of(face, made, |request| request.picture(loops, side));
+    cells
+        .into_iter()
+        .map(|(state, corners)| (tint(state), corners.map(|corner| corner.to_array())))
+        .collect()
+}
+
+/// The colour of a place.
+fn tint(state: State) -> [u8; 3] {
+    match state {
+        State::Finished => [60, 170, 80],
+        State::Left => [220, 150, 110],
+        State::Unreachable(Reason::Steep) => [165, 175, 185],
+        State::Unreachable(_) => [210, 80, 70],
+    }
+}
+
 /// What becomes of a face; its job is not written yet.
 fn outcome(
     arguments: &Arguments,
@@ -345,6 +397,7 @@ fn outcome(
         along: "u",
         side: if face.sense > 0.0 { "+" } else { "-" },
         passes_s: 0.0,
+        cells: Vec::new(),
     };
     let made = match made {
         Ok(made) => made,
@@ -724,23 +777,24 @@ fn page(file: &str, model: &Arc<Model>, setup: &Setup, outcomes: &[Outcome]) -> 
         .map(|(index, face)| {
             let outcome = &outcomes[*index];
             let reach = outcome.reach.as_ref();
+            let worst =
+                reach.and_then(|reach| reach.unreachable_mm2.iter().max_by(|a, b| a.1.total_cmp(&b.1)));
+            let rest = match worst {
+                Some((reason, _)) if reason == "steep" => tint(State::Unreachable(Reason::Steep)),
+                Some(_) => tint(State::Unreachable(Reason::Ball)),
+                None => tint(State::Left),
+            };
             let (state, tint) = match (&outcome.job, reach, &outcome.refused) {
                 (Some(_), Some(reach), _) => (
                     format!("{:.2} % finished", Sums::share(reach.region_mm2, reach.area_mm2)),
-                    [220, 150, 110],
+                    rest,
                 ),
-                (None, _, Some(why)) => (why.clone(), [200, 80, 200]),
-                (_, Some(reach), _) => {
-                    let worst = reach.unreachable_mm2.iter().max_by(|a, b| a.1.total_cmp(&b.1));
-                    match worst {
-                        Some((reason, _)) if reason == "steep" => {
-                            ("unreachable: steep".to_owned(), [165, 175, 185])
-                        }
-                        Some((reason, _)) => (format!("unreachable: {reason}"), [210, 80, 70]),
-                        None => ("empty".to_owned(), [165, 175, 185]),
-                    }
-                }
-                _ => ("not known".to_owned(), [200, 80, 200]),
+                (None, _, Some(why)) => (why.clone(), NOT_IMPORTED),
+                (_, Some(_), _) => match worst {
+                    Some((reason, _)) => (format!("unreachable: {reason}"), rest),
+                    None => ("empty".to_owned(), rest),
+                },
+                _ => ("not known".to_owned(), NOT_IMPORTED),
             };
             let region = outcome.region.as_ref().map_or_else(Vec::new, |(region, spec)| {
                 let surface = oracle::Surface::new(spec);
@@ -757,14 +811,23 @@ fn page(file: &str, model: &Arc<Model>, setup: &Setup, outcomes: &[Outcome]) -> 
                 state,
                 job: outcome.job.as_ref().map(|path| path.display().to_string()),
                 region,
+                cells: &outcome.cells,
                 tint,
             }
         })
         .collect();
-    let legend = "Green: finished. Orange: the rest of a face with a job. Red: the tool does not reach it. Grey: too steep, or \
-                  looks down. Violet: not imported.";
-    part_page(file, legend, &rows)
+    let sums = Sums::of(outcomes);
+    let legend = format!(
+        "Green: finished, {:.2} % of what the tool reaches. Red: the tool does not reach it. Grey: too steep, or looks down. Orange: reached, but left. \
+         Violet: not imported. Passes: about {:.1} min.",
+        Sums::share(sums.region, sums.reachable),
+        outcomes.iter().map(|outcome| outcome.passes_s).sum::<f64>() / 60.0
+    );
+    part_page(file, &legend, &rows)
 }
+
+/// The colour of a face that is not known.
+const NOT_IMPORTED: [u8; 3] = [200, 80, 200];
 
 /// A ring with places between its vertices: on a curved surface an edge is no line.
 fn dense(ring: &[[f64; 2]]) -> Vec<[f64; 2]> {
