@@ -31,7 +31,7 @@ use whole_part::Up;
 /// Example: cargo sim import jobs/cad/blade.step --list --only up --only whole --sort area --reverse
 /// Example: cargo sim import jobs/cad/blade.step --list --page faces.html
 /// Example: cargo sim import jobs/cad/blade.step --face 2 -o blade.toml --radius-mm 4
-/// Example: cargo sim import jobs/cad/blade.step --part --tool 3 -o blade.toml
+/// Example: cargo sim import jobs/cad/blade.step --part --tool 3 -o part.toml
 /// Example: cargo sim import jobs/cad/blade.step --part --tool 3 -o blade/
 #[derive(Debug, Args)]
 #[command(verbatim_doc_comment)]
