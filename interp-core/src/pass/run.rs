@@ -726,10 +726,11 @@ impl Run {
         }
     }
 
-    /// Makes a portion of the next front, in the words behind the job's.
-    pub(crate) fn make_front(&mut self, job: &Job<'_>, rest: &mut [i32]) {
-        if let PassPlanning::Fronts(fronts) = &mut self.planning {
-            fronts.work(job, rest);
+    /// Makes a portion of the next front, in the words behind the job's. Returns its cycles.
+    pub(crate) fn make_front(&mut self, job: &Job<'_>, rest: &mut [i32]) -> u32 {
+        match &mut self.planning {
+            PassPlanning::Fronts(fronts) => fronts.work(job, rest),
+            PassPlanning::Scan(_) => 0,
         }
     }
 

@@ -379,13 +379,15 @@ impl Sequencer {
             if cycles == 0 || cycles > left {
                 break;
             }
-            left -= cycles;
             if is_front {
                 makes_front = true;
                 if let Ok((job, rest)) = program.job_and_rest(store) {
-                    run.make_front(&job, rest);
+                    left = left.saturating_sub(run.make_front(&job, rest));
                 }
-            } else if let Ok(job) = program.job(store) {
+                continue;
+            }
+            left -= cycles;
+            if let Ok(job) = program.job(store) {
                 self.work(&job, axes, run);
             }
         }

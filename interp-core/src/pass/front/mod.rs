@@ -21,10 +21,12 @@
 //! | [`limits`] | slope and turning of a front |
 //! | [`crest`] | the height between two fronts, measured by the balls |
 //! | [`advance`] | the next front, in portions |
+//! | [`cost`] | cycles of the portions |
 //! | [`line`] | a pass on a front, and its pieces |
 //! | [`sequence`] | the passes in order |
 
 mod advance;
+mod cost;
 mod crest;
 mod foot;
 mod frame;

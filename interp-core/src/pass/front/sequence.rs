@@ -103,15 +103,15 @@ impl FrontSequence {
         self.advance.has_work()
     }
 
-    /// Cycles of the next portion; 0 where there is none.
+    /// Most cycles of the next portion; 0 where there is none.
     pub(crate) const fn cycles(&self) -> u32 {
         self.advance.cycles()
     }
 
-    /// A portion of the next front, into the words behind the job's.
-    pub(crate) fn work(&mut self, job: &Job<'_>, words: &mut [i32]) {
+    /// A portion of the next front, into the words behind the job's. Returns its cycles.
+    pub(crate) fn work(&mut self, job: &Job<'_>, words: &mut [i32]) -> u32 {
         let mut table = Table::new(&mut *words, self.advance.stations(), self.swapped);
-        self.advance.work(job, &mut table);
+        self.advance.work(job, &mut table)
     }
 
     /// The planning of one period of a job without limits.
@@ -120,12 +120,12 @@ impl FrontSequence {
         let share = (job.header.period_s / PORTION_PERIOD_S).at_most(1.0);
         let mut left = share * PORTION_CYCLES;
         for portion in 0..PORTIONS_MAX {
-            let cycles = f32::from(u16::try_from(self.cycles()).unwrap_or(u16::MAX));
-            if cycles == 0.0 || (cycles > left && portion > 0) {
+            let real = |cycles: u32| f32::from(u16::try_from(cycles).unwrap_or(u16::MAX));
+            let most = real(self.cycles());
+            if most == 0.0 || (most > left && portion > 0) {
                 return;
             }
-            left -= cycles;
-            self.work(job, words);
+            left -= real(self.work(job, words));
         }
     }
 
