@@ -303,12 +303,15 @@ fn load_on(path: &Path, machine: Option<&PathBuf>) -> Result<(Job, Prepared)> {
     settled(read_job(path, read_profile(machine)?.as_ref())?)
 }
 
-/// Chooses the direction of a job if `along = "auto"`, and prepares it.
+/// Chooses the direction of a job if `along = "auto"`, the start if `start = "auto"`, and prepares it.
 fn settled(job: Job) -> Result<(Job, Prepared)> {
-    if job.origin.along_choice() != &AlongChoice::Auto {
+    if !job.origin.has_to_choose() {
         return Ok(direction::choose(job)?);
     }
-    let bar = spinner("running along u and along v");
+    let bar = spinner(match job.origin.along_choice() {
+        AlongChoice::Auto => "running along u and along v",
+        _ => "running from the edge and from the middle",
+    });
     let settled = direction::choose(job);
     bar.finish_and_clear();
     Ok(settled?)

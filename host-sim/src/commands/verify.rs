@@ -187,6 +187,9 @@ fn print_verification(job: &Job, prepared: &Prepared, found: &Verification, proo
         ..
     } = &found.measured;
     say!("  along        {}", along::sentence(job));
+    if let Some(start) = along::start_sentence(job) {
+        say!("  start        {start}");
+    }
     print(findings, found.scanned);
     swept_words::print(job, prepared, findings, swept, axes);
     reach_words::print(job, reach);

@@ -726,6 +726,14 @@ impl Run {
         }
     }
 
+    /// Whether the next pass is another part of the front, and found.
+    pub(crate) const fn has_part(&self) -> bool {
+        match &self.planning {
+            PassPlanning::Fronts(fronts) => fronts.has_part(),
+            PassPlanning::Scan(_) => false,
+        }
+    }
+
     /// Makes a portion of the next front, in the words behind the job's. Returns its cycles.
     pub(crate) fn make_front(&mut self, job: &Job<'_>, rest: &mut [i32]) -> u32 {
         match &mut self.planning {

@@ -412,6 +412,7 @@ impl Sequencer {
         let front = run.front_cycles();
         match cycles {
             Some(cycles) => (false, cycles),
+            None if matches!(self.planning, Planning::Awaited(_)) && run.has_part() => (false, BEGIN_CYCLES),
             None if waits && front > 0 => (true, front),
             None if matches!(self.planning, Planning::Awaited(_)) => (false, BEGIN_CYCLES),
             None => (false, 0),

@@ -361,11 +361,6 @@ const BOUNDS: &[(&str, u32, &str)] = &[
         "intervals beside a station",
     ),
     (
-        "interp_core::pass::front::sequence::FrontSequence::next_part",
-        513,
-        "stations: PARTS_MAX + 1",
-    ),
-    (
         "interp_core::pass::front::line::FrontLine::leaves",
         31,
         "bisections of a place: BISECTIONS; extrema of a cubic",

@@ -14,6 +14,9 @@ pub(crate) const SWEEP: u32 = 7_400;
 pub(crate) const HULL: u32 = 8_400;
 pub(crate) const SUBSTITUTE: u32 = 10_400;
 
+/// Stations of a front, in search for its parts, a chunk.
+pub(crate) const PART: u32 = 7_500;
+
 /// Cycles of an evaluation; those after the last one are the last.
 pub(crate) const fn of<const N: usize>(evaluations: &[u32; N], number: u8) -> u32 {
     let mut left = number;

@@ -23,6 +23,7 @@
 //! | [`advance`] | the next front, in portions |
 //! | [`cost`] | cycles of the portions |
 //! | [`line`] | a pass on a front, and its pieces |
+//! | [`part`] | the parts of a front before the boundary |
 //! | [`sequence`] | the passes in order |
 
 mod advance;
@@ -32,6 +33,7 @@ mod foot;
 mod frame;
 mod limits;
 mod line;
+mod part;
 mod sequence;
 mod side;
 mod spline;
