@@ -321,6 +321,31 @@ const BOUNDS: &[(&str, u32, &str)] = &[
         "powers of two of a span's parts",
     ),
     (
+        "interp_core::pass::front::advance::Advance::has_crest",
+        16,
+        "places that are passed over: CHUNK",
+    ),
+    (
+        "interp_core::pass::front::advance::Advance::is_near",
+        18,
+        "stations beside one: 2 REACH + 1",
+    ),
+    (
+        "interp_core::pass::front::advance::Advance::pass_over",
+        16,
+        "places that are passed over: CHUNK",
+    ),
+    (
+        "interp_core::pass::front::part::PartSearch::look",
+        1_024,
+        "side spans: SPANS_MAX; bisections of an interval",
+    ),
+    (
+        "interp_core::pass::front::sequence::FrontSequence::plan",
+        8,
+        "portions of a period: PORTIONS_MAX; stations of one: CHUNK",
+    ),
+    (
         "interp_core::pass::front::advance::Advance::sweep",
         8,
         "members that leave the hull: MEMBERS_MAX; columns of a station",
