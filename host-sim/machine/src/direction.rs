@@ -34,9 +34,9 @@ impl fmt::Display for DirectionError {
 impl std::error::Error for DirectionError {}
 
 /// Result of a trial.
-struct TrialResult {
+pub(crate) struct TrialResult {
     along: Along,
-    trial: SpacingTrial,
+    pub(crate) trial: SpacingTrial,
     ready: Option<Ready>,
     /// The machine accepted the job.
     started: bool,
@@ -53,7 +53,7 @@ impl TrialResult {
 }
 
 /// The one with less time; the first if both take the same, or neither can be machined.
-fn fastest(first: TrialResult, second: TrialResult) -> TrialResult {
+pub(crate) fn fastest(first: TrialResult, second: TrialResult) -> TrialResult {
     let is_refused = |tried: &TrialResult| tried.trial.rejection.is_some();
     let is_faster = second.trial.ticks < first.trial.ticks || is_refused(&first);
     if is_faster && !is_refused(&second) {
@@ -98,7 +98,7 @@ fn run_direction(job: &Job, along: Along) -> TrialResult {
     if job.origin.start_choice() == &StartChoice::Auto {
         run_starts(job, along).0
     } else {
-        run_trial(job, along, job.spacing)
+        run_trial(job, along, job.spacing, u64::MAX)
     }
 }
 
@@ -106,8 +106,8 @@ fn run_direction(job: &Job, along: Along) -> TrialResult {
 fn run_starts(job: &Job, along: Along) -> (TrialResult, [SpacingTrial; 2]) {
     let [edge, middle] = [Start::Edge, Start::Middle].map(Spacing::Constant);
     let (edge, middle) = std::thread::scope(|scope| {
-        let middle = scope.spawn(|| run_trial(job, along, middle));
-        (run_trial(job, along, edge), middle.join())
+        let middle = scope.spawn(|| run_trial(job, along, middle, u64::MAX));
+        (run_trial(job, along, edge, u64::MAX), middle.join())
     });
     let middle = middle.unwrap_or_else(|panic| std::panic::resume_unwind(panic));
     let trials = [edge.trial.clone(), middle.trial.clone()];
@@ -130,77 +130,6 @@ fn neither_start(job: &Job, trials: &[SpacingTrial; 2], started: bool) -> Direct
     );
     let remedy = "remove the cause given for one of the starts, or write spacing = \"exact\"";
     refusal(job, "cut.start", what, remedy, started)
-}
-
-/// A rule that takes less time than straight passes, by trials of the whole job.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub struct SpacingAdvice {
-    /// Straight passes at the exact step; passes of constant scallop height from the edge and from the middle. With `along = "auto"` each in its faster
-    /// direction.
-    pub trials: [SpacingTrial; 3],
-    /// The rule to take.
-    pub spacing: Spacing,
-}
-
-/// Time that passes of constant scallop height have to save to be advised, as a share.
-const SAVED_MIN: f64 = 0.02;
-
-impl SpacingAdvice {
-    /// Time that the faster of both starts saves against straight passes, as a share, negative where it takes more; `None` where one of them cannot be machined.
-    #[must_use]
-    pub fn saved(&self) -> Option<f64> {
-        let [exact, constant @ ..] = &self.trials;
-        let least = constant
-            .iter()
-            .filter(|trial| trial.rejection.is_none())
-            .map(|trial| trial.ticks)
-            .min()?;
-        #[allow(clippy::cast_precision_loss, reason = "below 2^53")]
-        let saved = 1.0 - least as f64 / exact.ticks.max(1) as f64;
-        exact.rejection.is_none().then_some(saved)
-    }
-}
-
-/// Runs the whole job with straight passes and with those of constant scallop height, and advises the latter where they save more than 2 % of the time.
-#[must_use]
-pub fn advise_spacing(job: &Job) -> SpacingAdvice {
-    let spacings = [
-        Spacing::Exact,
-        Spacing::Constant(Start::Edge),
-        Spacing::Constant(Start::Middle),
-    ];
-    let trial = |spacing: Spacing| match job.origin.along_choice() {
-        AlongChoice::Auto => {
-            fastest(
-                run_trial(job, Along::U, spacing),
-                run_trial(job, Along::V, spacing),
-            )
-            .trial
-        }
-        _ => run_trial(job, job.along, spacing).trial,
-    };
-    let trial = &trial;
-    let trials = std::thread::scope(|scope| {
-        let threads = spacings.map(|spacing| scope.spawn(move || trial(spacing)));
-        threads.map(|thread| {
-            thread
-                .join()
-                .unwrap_or_else(|panic| std::panic::resume_unwind(panic))
-        })
-    });
-    let mut advice = SpacingAdvice {
-        trials,
-        spacing: Spacing::Exact,
-    };
-    if advice.saved().is_some_and(|saved| saved > SAVED_MIN) {
-        let [_, constant @ ..] = &advice.trials;
-        let best = constant
-            .iter()
-            .filter(|trial| trial.rejection.is_none())
-            .min_by_key(|trial| trial.ticks);
-        advice.spacing = best.map_or(Spacing::Exact, |trial| trial.spacing);
-    }
-    advice
 }
 
 fn neither(job: &Job, trials: &[DirectionTrial; 2], started: bool) -> DirectionError {
@@ -229,8 +158,8 @@ fn refusal(job: &Job, key: &str, what: String, remedy: &str, started: bool) -> D
     }
 }
 
-/// Runs the job in one direction to its end, with this rule for the distance between passes.
-fn run_trial(job: &Job, along: Along, spacing: Spacing) -> TrialResult {
+/// Runs the job in one direction to its end, or for so many periods, with this rule for the distance between passes.
+pub(crate) fn run_trial(job: &Job, along: Along, spacing: Spacing, ticks_max: u64) -> TrialResult {
     let mut job = job.clone();
     (job.along, job.spacing) = (along, spacing);
     job.origin.set_along_choice(AlongChoice::Given);
@@ -257,12 +186,21 @@ fn run_trial(job: &Job, along: Along, spacing: Spacing) -> TrialResult {
     let mut ticks = 0_u64;
     let ran = machine.run(|_| {
         ticks += 1;
-        true
+        ticks <= ticks_max
     });
-    let rejection = ran.err().map(|fault| {
-        let (pass, path, side) = machine.place();
-        explain::fault_at(fault, ticks, pass, prepared.parameters(path, side))
-    });
+    let rejection = match ran {
+        Err(fault) => {
+            let (pass, path, side) = machine.place();
+            Some(explain::fault_at(
+                fault,
+                ticks,
+                pass,
+                prepared.parameters(path, side),
+            ))
+        }
+        Ok(()) if ticks > ticks_max => Some(format!("it takes more than {ticks_max} periods")),
+        Ok(()) => None,
+    };
     TrialResult {
         along,
         trial: trial(ticks, rejection),

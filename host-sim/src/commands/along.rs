@@ -1,5 +1,6 @@
 //! Direction and spacing of the passes, and how they were chosen, as text and as JSON, for all commands.
 
+use inspect::{CurvedFigures, PathFigures};
 use serde_json::{Map, Value, json};
 
 use job::{AlongChoice, DirectionTrial, Job, SpacingTrial, Start, StartChoice};
@@ -87,4 +88,62 @@ pub(super) fn start_sentence(job: &Job) -> Option<String> {
     Some(format!(
         "{chosen}, chosen: {least:.2} min, {less:.1} % less than the {most:.2} min {from}"
     ))
+}
+
+/// The key `curved`: passes of constant scallop height beside straight ones.
+pub(super) fn curved_json(figures: &CurvedFigures) -> Value {
+    let saved = figures.saved();
+    let path = |path: &PathFigures| {
+        json!({
+            "passes": path.passes, "partial_passes": path.partial, "cc_length_mm": path.length_mm, "machining_time_s": path.time_s,
+        })
+    };
+    json!({
+        "passes": figures.own.passes,
+        "partial_passes": figures.own.partial,
+        "cc_length_mm": figures.own.length_mm,
+        "straight": figures.straight.as_ref().map(path),
+        "length_saved_pct": saved.map(|[length, _]| 100.0 * length),
+        "time_saved_pct": saved.map(|[_, time]| 100.0 * time),
+    })
+}
+
+/// Names and values of the same.
+pub(super) fn curved_words(figures: &CurvedFigures) -> Vec<(&'static str, String)> {
+    let own = &figures.own;
+    let mut words = vec![(
+        "Curved passes",
+        format!("{}, {} of them partial", own.passes, own.partial),
+    )];
+    let Some((straight, [length, time])) = figures.straight.as_ref().zip(figures.saved()) else {
+        words.push((
+            "Straight passes",
+            "the core does not machine the job with them".to_owned(),
+        ));
+        return words;
+    };
+    let share = |saved: f64| {
+        let word = if saved < 0.0 { "more" } else { "less" };
+        format!("{:.1} % {word}", 100.0 * saved.abs())
+    };
+    words.push((
+        "Length against straight passes",
+        format!(
+            "{:.1} mm, {} than {:.1} mm of {} passes",
+            own.length_mm,
+            share(length),
+            straight.length_mm,
+            straight.passes
+        ),
+    ));
+    words.push((
+        "Time against straight passes",
+        format!(
+            "{:.1} s, {} than {:.1} s",
+            own.time_s,
+            share(time),
+            straight.time_s
+        ),
+    ));
+    words
 }
