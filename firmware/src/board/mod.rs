@@ -62,6 +62,8 @@ mod skr_pro;
 #[cfg(feature = "board-skr-pro")]
 pub(crate) use skr_pro::BOARD;
 
+#[cfg(feature = "behind-loader")]
+mod behind_loader;
 mod reset_pins;
 
 use boards::{Axis, Level, Line};
