@@ -317,8 +317,8 @@ fn settled(job: Job) -> Result<(Job, Prepared)> {
     Ok(settled?)
 }
 
-/// Refuses passes of constant scallop height and those of a region, which only the board makes.
-fn straight_passes(job: &Job) -> Result<()> {
+/// Refuses passes of a region, which only the board makes.
+fn whole_surface(job: &Job) -> Result<()> {
     if job.region.is_some() {
         return Err(job
             .origin
@@ -329,6 +329,12 @@ fn straight_passes(job: &Job) -> Result<()> {
             )
             .into());
     }
+    Ok(())
+}
+
+/// Refuses passes of constant scallop height, too.
+fn straight_passes(job: &Job) -> Result<()> {
+    whole_surface(job)?;
     if job.spacing.is_constant() {
         return Err(job
             .origin
