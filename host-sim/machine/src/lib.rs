@@ -8,6 +8,7 @@
 pub mod advice;
 pub mod direction;
 mod in_process;
+pub mod links;
 pub mod prepare;
 pub mod profile;
 pub mod remote;

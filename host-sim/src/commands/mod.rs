@@ -14,6 +14,7 @@ mod flash;
 mod home;
 mod import;
 mod judge;
+mod link_words;
 mod log;
 mod motion_words;
 mod new;
@@ -305,16 +306,19 @@ fn load_on(path: &Path, machine: Option<&PathBuf>) -> Result<(Job, Prepared)> {
 
 /// Chooses the direction of a job if `along = "auto"`, the start if `start = "auto"`, and prepares it.
 fn settled(job: Job) -> Result<(Job, Prepared)> {
-    if !job.origin.has_to_choose() {
-        return Ok(direction::choose(job)?);
-    }
-    let bar = spinner(match job.origin.along_choice() {
-        AlongChoice::Auto => "running along u and along v",
-        _ => "running from the edge and from the middle",
-    });
-    let settled = direction::choose(job);
-    bar.finish_and_clear();
-    Ok(settled?)
+    let (job, mut prepared) = if job.origin.has_to_choose() {
+        let bar = spinner(match job.origin.along_choice() {
+            AlongChoice::Auto => "running along u and along v",
+            _ => "running from the edge and from the middle",
+        });
+        let settled = direction::choose(job);
+        bar.finish_and_clear();
+        settled?
+    } else {
+        direction::choose(job)?
+    };
+    link_words::add(&job, &mut prepared)?;
+    Ok((job, prepared))
 }
 
 /// Refuses passes of a region, which only the board makes.
