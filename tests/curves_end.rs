@@ -126,3 +126,43 @@ fn small_job_passes_the_verifier() {
         assert!(failures.is_empty(), "{start:?}: {failures:?}");
     }
 }
+
+/// Last steps of the passes, nm.
+#[test]
+#[ignore = "prints"]
+fn last_steps() {
+    for (name, scallop, start) in [
+        ("sphere_cap", 0.02, Start::Edge),
+        ("sphere_cap", 0.02, Start::Middle),
+        ("plate", 0.05, Start::Edge),
+        ("freeform", 0.1, Start::Edge),
+    ] {
+        let mut job = curved(name, start, Pattern::Zigzag, 3600.0);
+        job.scallop_mm = scallop;
+        let prepared = prepare(&job).unwrap();
+        let mut machine = Machine::load(&prepared).unwrap();
+        let mut steps: Vec<f64> = Vec::new();
+        let mut last: Option<(u32, [i32; 3])> = None;
+        machine
+            .run(|sample| {
+                let on = inspect::is_on_pass(sample);
+                if let Some((pass, at)) = last {
+                    if on && pass == sample.pass {
+                        let d: f64 = (0..3)
+                            .map(|i| f64::from(sample.cl_nm[i] - at[i]).powi(2))
+                            .sum::<f64>()
+                            .sqrt();
+                        steps.push(d);
+                    } else {
+                        let n = steps.len();
+                        let tail: Vec<i64> = steps[n.saturating_sub(8)..].iter().map(|d| *d as i64).collect();
+                        println!("{name} {start:?} pass {pass}: {n} steps, last {tail:?}");
+                        steps.clear();
+                    }
+                }
+                last = on.then_some((sample.pass, sample.cl_nm));
+                true
+            })
+            .unwrap();
+    }
+}
