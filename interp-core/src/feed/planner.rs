@@ -10,24 +10,28 @@ use super::walk::Walker;
 use crate::math::arith::{inverse_sqrt, sqrt, truncated};
 use crate::math::number::{Bounded, cube_root};
 
-/// Weight of the barrier in each step: as a rule; of a plan for which there is more time; and of one for which there is less.
-const BARRIER: [f32; 12] = [
-    0.05, 0.05, 0.05, 0.008, 0.008, 0.002, 0.002, 0.0007, 0.0007, 0.00025, 0.00025, 0.00025,
-];
-const BARRIER_LONG: [f32; 18] = [
-    0.05, 0.05, 0.05, 0.02, 0.02, 0.008, 0.008, 0.008, 0.003, 0.003, 0.003, 0.001, 0.001, 0.001, 0.00025,
-    0.00025, 0.00025, 0.00025,
-];
-const BARRIER_SHORT: [f32; 7] = [0.05, 0.05, 0.05, 0.008, 0.002, 0.0007, 0.00025];
-/// Steps for which there has to be time.
-const USUAL_FROM: u16 = 10;
-const LONG_FROM: u16 = 15;
-/// Weight of further steps, which are taken while a step is cut short and there is time, and the most steps.
-const BARRIER_LAST: f32 = 0.00025;
+/// Weight of the barrier in the first steps, and in the last one.
+const BARRIER_FIRST: f32 = 0.05;
+const BARRIER_LAST: f32 = 2.5e-4;
+const STEPS_FIRST: u8 = 3;
+/// How it changes after a step: where the step could go as far as the first of these shares of its way, or of the second, or less. A step that is cut
+/// short is too close to a limit, and a greater weight leads away from it.
+const WENT_FAR: f32 = 0.6;
+const WENT: f32 = 0.25;
+const AFTER_FAR: f32 = 0.4;
+const AFTER_NEAR: f32 = 0.6;
+const AFTER_CUT: f32 = 1.5;
+/// The greatest weight in the last steps, and how many those are.
+const BARRIER_AT_END: f32 = 7e-4;
+const STEPS_AT_END: u16 = 2;
+/// Most steps from rest to rest. Otherwise, and for the rest of a path: usual, and few.
 const STEPS_MAX: u8 = 18;
-/// Steps after which it is seen for how many there is time: the plan takes about this share of the time that the motion takes then.
-const STEPS_TRIED: u8 = 3;
-const LASTS: f32 = 0.72;
+const STEPS: u8 = 12;
+const STEPS_FEW: u8 = 7;
+/// Share of the time that a motion takes after the first steps, and after some more, that the plan takes about.
+const LASTS_FIRST: f32 = 0.72;
+const LASTS: f32 = 0.9;
+const STEPS_SOME: u8 = 7;
 /// Periods that a step of the method takes for each node and apart from them, the check for each period of the plan, and what is left.
 const PERIODS_A_STEP: f32 = 0.27;
 const PERIODS_OF_STEP: f32 = 3.0;
@@ -96,14 +100,6 @@ enum Stage {
     Gate,
 }
 
-/// How many steps of the method are worth their time.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Effort {
-    Little,
-    Usual,
-    Much,
-}
-
 /// The planning of one path.
 #[derive(Clone, Debug)]
 pub(crate) struct Planner {
@@ -120,9 +116,9 @@ pub(crate) struct Planner {
     holds: bool,
     drawn: u8,
     sweep: Sweep,
-    /// Steps of the method so far, and how many are worth their time.
+    /// Steps of the method so far, and the weight of its barrier.
     step: u8,
-    effort: Effort,
+    barrier: f32,
     /// One over the sum of the coefficients' times, and the greatest factor of the start.
     weight: f32,
     factor: f32,
@@ -149,7 +145,7 @@ impl Planner {
         drawn: 0,
         sweep: Sweep::START,
         step: 0,
-        effort: Effort::Usual,
+        barrier: BARRIER_FIRST,
         weight: 0.0,
         factor: 0.0,
         reach: Reach::NONE,
@@ -176,7 +172,7 @@ impl Planner {
         self.machine = plan.limits.with_feed(feed);
         self.limits = self.machine.planned();
         self.first = first;
-        (self.holds, self.drawn, self.effort) = (false, 0, Effort::Usual);
+        (self.holds, self.drawn) = (false, 0);
         for (draft, pace) in draft_mut(&mut self.lists).iter_mut().zip(&plan.pace) {
             *draft = *pace;
         }
@@ -263,11 +259,6 @@ impl Planner {
             }
             Stage::Scale => {
                 let factor = START_SHARE * self.factor.at_least(1e-9);
-                self.effort = if self.walker.is_short {
-                    Effort::Little
-                } else {
-                    Effort::Usual
-                };
                 if plan.pinned() == [0; 2] {
                     for pace in draft_mut(&mut self.lists).iter_mut().take(COEFFICIENTS) {
                         *pace *= factor;
@@ -279,18 +270,13 @@ impl Planner {
                 Stage::Assemble
             }
             Stage::Assemble => {
-                let barrier = self
-                    .barrier()
-                    .get(usize::from(self.step))
-                    .copied()
-                    .unwrap_or(BARRIER_LAST);
                 let limits = limits_at(plan, &self.sweep, [&self.limits, &self.turn_limits]);
                 newton::assemble(
                     plan,
                     limits,
                     &mut self.lists,
                     &mut self.sweep,
-                    barrier,
+                    self.barrier,
                     self.weight,
                 );
                 if self.sweep.next(plan) {
@@ -344,38 +330,56 @@ impl Planner {
         };
     }
 
-    /// Steps for which there is time before the planning lasts longer than a motion of so many periods. `least`: periods of the planning so far, 0 where
-    /// they do not matter.
+    /// Steps that there is time for. From rest to rest the plan is slowed down to what its planning takes, so one that comes too late makes it slower.
+    /// `lasts`: periods of the motion; `least`: those of the planning so far, 0 where they do not matter.
     fn steps_left(&self, plan: &Plan, lasts: f32, least: u32) -> u16 {
-        if least == 0 {
-            return u16::from(STEPS_MAX);
+        let most = if self.first == 0 && plan.pinned() == [0; 2] {
+            STEPS_MAX
+        } else if self.first == 0 && self.walker.is_short {
+            STEPS_FEW
+        } else {
+            STEPS
+        };
+        let most_left = u16::from(most.saturating_sub(self.step));
+        if least == 0 || most < STEPS_MAX {
+            return most_left;
         }
         let left = (1.0 - PERIODS_A_PLACE) * lasts - PERIODS_LEFT - to_f32(least);
         let of_step = PERIODS_A_STEP * f32::from(plan.intervals) + PERIODS_OF_STEP;
-        u16::try_from(truncated(left.at_least(0.0) / of_step)).unwrap_or(u16::MAX)
+        let steps = u16::try_from(truncated(left.at_least(0.0) / of_step)).unwrap_or(u16::MAX);
+        steps.min(most_left)
     }
 
-    /// Whether another step is to be taken: the plan is slowed down to what its planning takes, so a step that comes too late makes it slower.
+    /// Whether another step is to be taken; chooses its barrier.
     fn goes_on(&mut self, plan: &Plan, least: u32) -> bool {
-        let is_in_table = usize::from(self.step) < self.barrier().len();
-        if self.first > 0 || plan.pinned() != [0; 2] {
-            return is_in_table;
+        if self.step < STEPS_FIRST {
+            return true;
         }
         let lasts = self.lasts(plan);
-        match self.step {
-            0..STEPS_TRIED => true,
-            STEPS_TRIED => {
-                let more = self.steps_left(plan, LASTS * lasts, least);
-                self.effort = match more.saturating_add(u16::from(STEPS_TRIED)) {
-                    LONG_FROM.. => Effort::Much,
-                    USUAL_FROM.. => Effort::Usual,
-                    _ => Effort::Little,
-                };
-                true
-            }
-            STEPS_MAX.. => false,
-            _ => self.steps_left(plan, lasts, least) > 0 && (is_in_table || self.reach.step() < 1.0),
+        let went = self.reach.step();
+        let is_solved = self.barrier <= BARRIER_LAST && went >= 1.0;
+        if is_solved || self.steps_left(plan, lasts, least) == 0 {
+            return false;
         }
+        let change = if went > WENT_FAR {
+            AFTER_FAR
+        } else if went > WENT {
+            AFTER_NEAR
+        } else {
+            AFTER_CUT
+        };
+        let share = match self.step {
+            STEPS_FIRST => LASTS_FIRST,
+            0..STEPS_SOME => LASTS,
+            _ => 1.0,
+        };
+        let most = if self.steps_left(plan, share * lasts, least) <= STEPS_AT_END {
+            BARRIER_AT_END
+        } else {
+            BARRIER_FIRST
+        };
+        self.barrier = (change * self.barrier).at_least(BARRIER_LAST).at_most(most);
+        true
     }
 
     /// Periods that the motion takes at the pace as it is.
@@ -389,14 +393,6 @@ impl Planner {
         sum * plan.step_s / plan.limits.period
     }
 
-    const fn barrier(&self) -> &'static [f32] {
-        match self.effort {
-            Effort::Little => &BARRIER_SHORT,
-            Effort::Usual => &BARRIER,
-            Effort::Much => &BARRIER_LONG,
-        }
-    }
-
     fn begin_method(&mut self, plan: &Plan) {
         let mut sum = 0.0;
         let count = usize::from(plan.intervals) + 2;
@@ -407,7 +403,8 @@ impl Planner {
         }
         self.weight = 1.0 / sum.at_least(1e-9);
         self.factor = f32::MAX;
-        (self.sweep, self.step) = (Sweep::from(self.first.saturating_sub(SEEN)), 0);
+        (self.step, self.barrier) = (0, BARRIER_FIRST);
+        self.sweep = Sweep::from(self.first.saturating_sub(SEEN));
     }
 
     /// Takes the step that was solved for, and begins the next, or the check.

@@ -25,7 +25,7 @@ const SPACING_WORTH: f32 = 4e-3;
 const MEAN_MAX: f32 = 0.05;
 const FLAT: f32 = 1.0;
 /// Periods that the rest of the planning takes: for a node, for a place of the check, and for what is left.
-const PERIODS_A_NODE: f32 = 3.2;
+const PERIODS_A_NODE: f32 = 2.8;
 const PERIODS_A_PLACE: f32 = 0.07;
 const PERIODS_A_PLAN: f32 = 55.0;
 /// The same for the last stop before a turn, and the shares of the walk's time that a plan takes: with an end at speed, and from rest to rest.
@@ -35,7 +35,7 @@ const WALKED_TO_REST: f32 = 0.7;
 /// Speed over a jump below which the walk rests there, as a share of the one that a ramp without constant acceleration reaches; nodes by which the rest is
 /// longer than the mean.
 const REST_BELOW: f32 = 0.05;
-const REST_NODES: f32 = 1.5;
+const REST_NODES: f32 = 1.0;
 /// Bisections of the spacing.
 const BISECTIONS: u8 = 12;
 /// Tries to coarsen the ends.
