@@ -32,6 +32,8 @@ pub(crate) fn profile() -> Profile {
             survives_off: false,
         }),
         probe_inverted: false,
+        step_inverted: 0,
+        enable_inverted: 0,
         spindle: None,
     }
 }

@@ -668,6 +668,8 @@ mod tests {
                 survives_off: true,
             }),
             probe_inverted: true,
+            step_inverted: 0b111,
+            enable_inverted: 0b111,
             spindle: Some(protocol::message::SpindleSettings {
                 max_rpm: u32::MAX,
                 at_speed_ticks: u32::MAX,

@@ -40,7 +40,16 @@ pub(crate) struct StepDriver {
     /// Axes whose direction pin is high towards plus, one bit each.
     plus_is_high: u8,
     buffers: &'static mut Buffers,
+    /// The idle word, which the DMA reads.
+    rest: &'static mut u32,
+    /// Set and reset bit of each axis's step pin.
+    bits: [u32; 3],
+    /// Ticks in which no buffer may be filled, because the idle word has changed.
+    settles: u8,
 }
+
+/// Ticks after a change of the idle word until a buffer holds nothing else: the one that is output at the change is cleared whole only when it is output again.
+const SETTLE_TICKS: u8 = 2;
 
 impl StepDriver {
     /// Starts the output; see [`StepOutput::start`]. `rest`: [`interp_core::Steps::rest`]. `plus_is_high`: axes whose direction pin is high
@@ -75,6 +84,31 @@ impl StepDriver {
             output: StepOutput::start(chip, wiring, memory, slot_counts),
             plus_is_high,
             buffers,
+            rest,
+            bits: wiring.step.map(|pin| 0x1_0001 << (pin & 15)),
+            settles: 0,
+        }
+    }
+
+    /// Sets the idle level of the step pins: high for axes whose pulses are inverted, one bit each ([`interp_core::Steps::set_low_pulses`]). Pins follow within three periods; to
+    /// be called at rest.
+    #[cold]
+    #[inline(never)]
+    pub(crate) fn set_levels(&mut self, inverted: u8) {
+        let [x, y, z] = self.bits;
+        let low = |axis: u8, bits: u32| {
+            if inverted >> axis & 1 != 0 {
+                bits & 0xffff
+            } else {
+                bits & 0xffff_0000
+            }
+        };
+        let rest = low(0, x) | low(1, y) | low(2, z);
+        if *self.rest != rest {
+            *self.rest = rest;
+            self.settles = SETTLE_TICKS;
+            // Completes the write before the DMA reads.
+            cortex_m::asm::dmb();
         }
     }
 
@@ -98,6 +132,10 @@ impl StepDriver {
     /// At the end of a tick: the slots to fill, if enough are left.
     #[inline]
     pub(crate) fn slots(&mut self) -> Option<&mut [u32; BUFFER_WORDS]> {
+        if self.settles != 0 {
+            self.settles -= 1;
+            return None;
+        }
         let idle = self.output.free()?;
         // The DMA has cleared these words: they are read again.
         cortex_m::asm::dmb();
