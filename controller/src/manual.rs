@@ -73,12 +73,14 @@ impl Setup {
     }
 
     /// Axes whose step pulses have the level opposite to the one in the board's table, one bit each.
-    pub(crate) const fn step_inverted(&self) -> u8 {
+    #[must_use]
+    pub const fn step_inverted(&self) -> u8 {
         self.step_inverted
     }
 
     /// The levels of steps and enables, as in [`crate::spindle::output`].
-    pub(crate) const fn levels(&self) -> u32 {
+    #[must_use]
+    pub const fn levels(&self) -> u32 {
         use crate::spindle::output::{ENABLE_INVERTED_SHIFT, STEP_INVERTED_SHIFT};
         (self.step_inverted as u32) << STEP_INVERTED_SHIFT
             | (self.enable_inverted as u32) << ENABLE_INVERTED_SHIFT

@@ -53,20 +53,18 @@ const SETTLE_TICKS: u8 = 2;
 
 impl StepDriver {
     /// Starts the output; see [`StepOutput::start`]. `rest`: [`interp_core::Steps::rest`]. `plus_is_high`: axes whose direction pin is high
-    /// towards plus, a bit each.
+    /// towards plus, a bit each. `inverted`: axes whose step pulses are low, likewise.
     pub(crate) fn new(
         timer: pac::TIM1,
         dma: pac::DMA2,
         wiring: Wiring,
         plus_is_high: u8,
         slot_counts: u16,
-        buffers: &'static mut Buffers,
-        rest: &'static mut u32,
+        inverted: u8,
+        (buffers, rest): (&'static mut Buffers, &'static mut u32),
     ) -> Self {
-        *rest = wiring
-            .step
-            .iter()
-            .fold(0, |word, pin| word | 1 << (16 + (pin & 15)));
+        let bits = wiring.step.map(|pin| 0x1_0001 << (pin & 15));
+        *rest = idle_word(bits, inverted);
         for slot in buffers.iter_mut().flatten() {
             *slot = *rest;
         }
@@ -85,7 +83,7 @@ impl StepDriver {
             plus_is_high,
             buffers,
             rest,
-            bits: wiring.step.map(|pin| 0x1_0001 << (pin & 15)),
+            bits,
             settles: 0,
         }
     }
@@ -95,21 +93,18 @@ impl StepDriver {
     #[cold]
     #[inline(never)]
     pub(crate) fn set_levels(&mut self, inverted: u8) {
-        let [x, y, z] = self.bits;
-        let low = |axis: u8, bits: u32| {
-            if inverted >> axis & 1 != 0 {
-                bits & 0xffff
-            } else {
-                bits & 0xffff_0000
-            }
-        };
-        let rest = low(0, x) | low(1, y) | low(2, z);
+        let rest = idle_word(self.bits, inverted);
         if *self.rest != rest {
             *self.rest = rest;
             self.settles = SETTLE_TICKS;
             // Completes the write before the DMA reads.
             cortex_m::asm::dmb();
         }
+    }
+
+    /// The word of a slot without a pulse.
+    pub(crate) const fn rest(&self) -> u32 {
+        *self.rest
     }
 
     /// Whether the hardware is present; false in QEMU.
@@ -141,6 +136,15 @@ impl StepDriver {
         cortex_m::asm::dmb();
         self.buffers.get_mut(idle)
     }
+}
+
+/// The word of a slot without a pulse: pins whose pulses are inverted are high.
+fn idle_word([x, y, z]: [u32; 3], inverted: u8) -> u32 {
+    let idle = |axis: u8, bits: u32| {
+        let is_high = inverted >> axis & 1 != 0;
+        bits & if is_high { 0x0000_ffff } else { 0xffff_0000 }
+    };
+    idle(0, x) | idle(1, y) | idle(2, z)
 }
 
 /// An address in the form of a DMA register.
