@@ -34,8 +34,7 @@ defmt::timestamp!("{=u64:us}", u64::from(uptime_periods()) * u64::from(PERIOD_US
 mod app {
     use boards::{Line, Role};
     use controller::{
-        link::Link, machine::Instruction, manual::Setup, realtime::RealTime, safety::Order,
-        settings::Settings, step_output::Buffers,
+        link::Link, machine::Instruction, realtime::RealTime, settings::Settings, step_output::Buffers,
     };
     use cortex_m::peripheral::NVIC;
     use heapless::spsc::{Consumer, Producer, Queue};
@@ -46,12 +45,12 @@ mod app {
     use crate::{
         board::{self, BOARD},
         design_parameters::{
-            COMMAND_PLACES, EVENT_PLACES, FLUSH_PERIODS, JOB_WORDS, PERIOD_COUNTS, PERIOD_US, RECEIVE_PLACES,
+            COMMAND_PLACES, EVENT_PLACES, FLUSH_PERIODS, JOB_WORDS, PERIOD_COUNTS, RECEIVE_PLACES,
             SLOT_COUNTS, TICK_BUDGET_CYCLES, WATCHDOG_RELOAD,
         },
         drivers::{
             cycle_counter::CycleCounter,
-            drive_enable::{DriveEnable, WritePorts as _},
+            drive_enable::DriveEnable,
             gpio::{self, Output},
             safety_inputs::SafetyInputs,
             sample_timer::{SampleTimer, uptime_periods},
@@ -121,11 +120,6 @@ mod app {
         let (bytes_in, bytes_out) = context.local.bytes.split();
         let (commands_in, commands_out) = context.local.commands.split();
         let (events_in, events_out) = context.local.events.split();
-        // The levels of steps and enables, before anything that takes long.
-        let (flash, profile) = Settings::peek(board.settings);
-        let setup = profile.map(|profile| Setup::new(&profile, PERIOD_US as f32 * 1e-6));
-        let mut drives = DRIVES;
-        drives.set(setup.map_or(0, |setup| setup.levels()));
         // Before the sample timer, whose first update starts it.
         let output = StepDriver::new(
             board.tim1,
@@ -133,25 +127,19 @@ mod app {
             board::WIRING,
             board::PLUS_IS_HIGH,
             SLOT_COUNTS,
-            setup.map_or(0, |setup| setup.step_inverted()),
+            0,
             (context.local.slots, context.local.rest),
         );
-        gpio::Ports.set_reset(BOARD.step_port(), output.rest());
         if !output.is_present() {
             defmt::warn!("this board puts no steps out");
         }
         // Before the first tick, because an erase stops the processor.
-        let settings = Settings::open(flash);
+        let settings = Settings::open(board.settings);
         let timer = SampleTimer::new(board.tim2, board.tim5, board::TIMER_RELOAD, PERIOD_COUNTS);
         let mut real_time = RealTime::with_store(context.local.store);
         real_time.set_tick_budget(TICK_BUDGET_CYCLES);
         real_time.set_reset_cause(board.reset);
         real_time.set_has_drives(output.is_present());
-        if let Ok(steps) = board::STEPS.check() {
-            real_time.set_step_pins(steps, board::WIRING.step);
-        }
-        // Nothing is under way that it could be refused for.
-        let _ = real_time.order(Order::SetUp(setup));
         match board.reset {
             ResetCause::Watchdog => defmt::error!("the watchdog has reset the board"),
             cause => defmt::info!("last reset: {=str}", cause.name()),
@@ -163,9 +151,12 @@ mod app {
         }
         let guards = Guards {
             inputs: INPUTS,
-            drives,
+            drives: DRIVES,
             watchdog,
         };
+        if let Ok(steps) = board::STEPS.check() {
+            real_time.set_step_pins(steps, board::WIRING.step);
+        }
         let (transmitter, receiver) = serial::open(board.usart1, board::SERIAL_DIVIDER);
         (
             Shared { real_time },

@@ -2,7 +2,7 @@
 
 use boards::{Axis, Level, Line, SKR_PRO};
 
-use super::emulated::{CYCLES_US, Emulated, Job, RESET_CYCLES_US, sim};
+use super::emulated::{CYCLES_US, Emulated, Job, sim};
 
 const PROFILE: &str = "[machine]
 velocity_max_mm_s = [20, 20, 10]
@@ -17,8 +17,9 @@ const STEP_INVERTED: [bool; 3] = [true, false, true];
 const ENABLE_INVERTED: [bool; 3] = [false, true, false];
 const PULSE_US: u64 = 2;
 
-/// Time from a reset until the pins have the profile's levels, us: RAM, clocks and the profile come first. Until then they have those of the board's table.
-const LEVELS_US: u64 = 40_000;
+/// Cycles from a reset until the pins have the profile's levels, two seconds and a half: the erase of a sector comes first, once after the profile was written. Until then they have
+/// those of the board's table.
+const LEVELS_CYCLES: u64 = 2_500_000 * CYCLES_US;
 
 /// The active level of a line.
 fn active(line: &Line, is_inverted: bool) -> bool {
@@ -98,11 +99,7 @@ fn levels_of_steps_and_enables_are_the_profiles() {
                 line.role,
                 since.saturating_sub(reset)
             );
-            assert!(
-                since.saturating_sub(reset) <= LEVELS_US * RESET_CYCLES_US,
-                "{}",
-                line.role
-            );
+            assert!(since.saturating_sub(reset) <= LEVELS_CYCLES, "{}", line.role);
         }
     }
 }

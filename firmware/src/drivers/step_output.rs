@@ -102,11 +102,6 @@ impl StepDriver {
         }
     }
 
-    /// The word of a slot without a pulse.
-    pub(crate) const fn rest(&self) -> u32 {
-        *self.rest
-    }
-
     /// Whether the hardware is present; false in QEMU.
     pub(crate) const fn is_present(&self) -> bool {
         self.output.is_present()
