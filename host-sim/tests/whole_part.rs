@@ -37,42 +37,78 @@ fn number(value: &Value) -> f64 {
     value.as_f64().unwrap_or_else(|| panic!("{value} is no number"))
 }
 
-/// Every job that `import --part` writes is verified against the whole part, on its passes and between them; a face without a job has a reason.
+/// The job of all faces that `import --part` writes is verified against the whole part, face by face, on its passes and between them; a face without a job has a reason. One
+/// face alone is `FILE#FACE`.
 #[test]
-fn every_job_of_a_part_is_verified() {
-    for (file, options, jobs) in [
-        ("blade.step", "--tool 3 --scallop-mm 0.2 --feed-mm-min 3000", 4),
-        ("hood.step", "--tool 3", 0),
-    ] {
-        let folder = tempfile::tempdir().unwrap();
-        std::fs::copy(cad(file), folder.path().join(file)).unwrap();
-        let (summary, code) = json(
-            folder.path(),
-            &format!("import {file} --part {options} -o part --json"),
-        );
-        assert_eq!(code, Some(0), "{summary}");
-        let written = summary["jobs"].as_array().unwrap();
-        assert_eq!(written.len(), jobs, "{summary}");
-        for face in summary["faces"].as_array().unwrap() {
-            let reached = face["region"]["reachable_mm2"].as_f64().unwrap_or(0.0) > 0.0;
-            let known = !face["region"].is_null();
-            assert!(face["job"].is_string() || !reached, "{face}");
-            assert!(known || face["error"].is_string(), "{face}");
-        }
-        for job in written {
-            let (found, code) = json(folder.path(), &format!("verify {} --json", job.as_str().unwrap()));
-            assert_eq!(code, Some(0), "{job}: {}", found["failures"]);
-            let part = &found["part"];
-            assert_eq!(part["checked"], true, "{part}");
-            assert!(
-                number(&part["centres"]) > 0.0 && number(&part["centres_between"]) > 0.0,
-                "{part}"
-            );
-            for deepest in ["deepest", "deepest_between"] {
-                let depth = part[deepest]["depth_mm"].as_f64().unwrap_or(0.0);
-                assert!(depth <= number(&part["tolerance_mm"]), "{job}: {part}");
-            }
-            assert!(number(&part["left"]["within_share"]) > 0.99, "{job}: {part}");
-        }
+fn every_face_of_a_part_is_verified() {
+    let folder = tempfile::tempdir().unwrap();
+    let folder = folder.path();
+    std::fs::copy(cad("blade.step"), folder.join("blade.step")).unwrap();
+    let options = "--tool 3 --scallop-mm 0.2 --feed-mm-min 3000";
+    let (summary, code) = json(
+        folder,
+        &format!("import blade.step --part {options} -o blade.toml --json"),
+    );
+    assert_eq!(code, Some(0), "{summary}");
+    assert_eq!(summary["jobs"].as_array().unwrap().len(), 4, "{summary}");
+    for face in summary["faces"].as_array().unwrap() {
+        let reached = face["region"]["reachable_mm2"].as_f64().unwrap_or(0.0) > 0.0;
+        assert!(face["job"].is_string() || !reached, "{face}");
+        assert!(!face["region"].is_null() || face["error"].is_string(), "{face}");
     }
+    for written in ["blade.toml", "blade.html", "blade.json"] {
+        assert!(folder.join(written).is_file(), "{written}");
+    }
+    let (found, code) = json(folder, "verify blade.toml --json");
+    assert_eq!((code, &found["passed"]), (Some(0), &Value::Bool(true)), "{found}");
+    let jobs = found["jobs"].as_array().unwrap();
+    assert_eq!(jobs.len(), 4);
+    for job in jobs {
+        let part = &job["part"];
+        assert_eq!(part["checked"], true, "{part}");
+        assert!(
+            number(&part["centres"]) > 0.0 && number(&part["centres_between"]) > 0.0,
+            "{part}"
+        );
+        for deepest in ["deepest", "deepest_between"] {
+            let depth = part[deepest]["depth_mm"].as_f64().unwrap_or(0.0);
+            assert!(depth <= number(&part["tolerance_mm"]), "{}: {part}", job["job"]);
+        }
+        assert!(
+            number(&part["left"]["within_share"]) > 0.99,
+            "{}: {part}",
+            job["job"]
+        );
+    }
+    // One of them, and what no command of one surface takes.
+    let output = run(folder, "simulate blade.toml#13 --json");
+    assert_eq!(output.status.code(), Some(0));
+    for (arguments, words) in [
+        ("simulate blade.toml", "4 faces"),
+        ("simulate blade.toml#5", "no face 5"),
+        ("run blade.toml --qemu --trace t.csv", "name the face"),
+    ] {
+        let output = run(folder, arguments);
+        assert_eq!(output.status.code(), Some(2), "{arguments}");
+        let said = String::from_utf8_lossy(&output.stderr).replace('\n', " ");
+        assert!(said.contains(words), "{arguments}: {said}");
+    }
+}
+
+/// A part of which nothing can be imported has no job, and says why.
+#[test]
+fn a_part_without_a_job_tells_why() {
+    let folder = tempfile::tempdir().unwrap();
+    std::fs::copy(cad("hood.step"), folder.path().join("hood.step")).unwrap();
+    let (summary, code) = json(folder.path(), "import hood.step --part --tool 3 -o hood --json");
+    assert_eq!(code, Some(0), "{summary}");
+    for face in summary["faces"].as_array().unwrap() {
+        assert!(face["job"].is_null() && face["error"].is_string(), "{face}");
+    }
+    assert_eq!(
+        run(folder.path(), "import hood.step --part --tool 3 -o hood.toml")
+            .status
+            .code(),
+        Some(2)
+    );
 }

@@ -232,13 +232,19 @@ impl Oracle {
         let (low, high) = (ends[0].min(ends[1]), ends[0].max(ends[1]));
         let middle = 0.5 * (low + high);
         // What is outside of the interval by f64 is a strip along the boundary.
-        self.intervals(side)
-            .iter()
-            .find(|[from, to]| (*from..=*to).contains(&middle))
-            .is_some_and(|[from, to]| {
+        let is_at = |of: f64| {
+            let intervals = self.intervals(of);
+            let around = intervals
+                .iter()
+                .find(|[from, to]| (*from..=*to).contains(&middle));
+            around.is_some_and(|[from, to]| {
                 (*from <= low || region.is_on(0.5 * (from + low), side))
                     && (*to >= high || region.is_on(0.5 * (to + high), side))
             })
+        };
+        // Beside an edge of constant side parameter the machine's line may be rounded across it.
+        let near = region.near_side();
+        [0.0, near, -near].into_iter().any(|by| is_at(side + by))
     }
 
     /// Whether the passes of a line leave out no interval.

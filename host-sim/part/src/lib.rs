@@ -19,6 +19,7 @@ mod contour;
 mod faces;
 mod inside;
 mod links;
+mod picture;
 mod proof;
 mod region;
 #[cfg(test)]
@@ -33,6 +34,7 @@ pub use contour::{Precision, Set};
 pub use faces::{Asked, Faces, own_face, part_of, placed_part, placement};
 pub use inside::Inside;
 pub use links::{Way, ways};
+pub use picture::State;
 pub use proof::{Deepest, LEFTOVER_SHARE, LEFTOVER_SIDE, Leftover, Passes, along, deepest, leftover};
 pub use region::{GROWTH, Made, Request, STEP_MAX};
 pub use tool::{Column, Reason, Tool};

@@ -2,20 +2,20 @@
 
 use std::cmp::Ordering as Order;
 use std::num::NonZeroUsize;
-use std::sync::Mutex;
 use std::sync::atomic::{AtomicUsize, Ordering};
+use std::sync::{Arc, Mutex};
 
 use clap::ValueEnum;
 use serde_json::{Value, json};
 
 use super::super::out::say;
-use super::super::{Result, progress, whole};
-use super::{Arguments, condition, deviation_json, page};
+use super::super::{Result, progress, region_words, whole};
+use super::{Arguments, condition, deviation_json, page, whole_part};
 use cad::{
     CadError, Face, Form, MachinableFace, Measures, Model, Options, degrees, machinable, machined_sign,
     measure,
 };
-use job::one_line;
+use job::{FaceReach, one_line};
 use oracle::{Facing, Surface, facing};
 
 /// What the faces are sorted by, ascending.
@@ -282,7 +282,7 @@ fn print_rows(rows: &[Row<'_>]) {
 ///
 /// # Errors
 /// The page cannot be written.
-pub(super) fn list(arguments: &Arguments, file: &str, model: &Model, options: &Options) -> Result<()> {
+pub(super) fn list(arguments: &Arguments, file: &str, model: &Arc<Model>, options: &Options) -> Result<()> {
     let mut rows = rows(file, &model.faces, options);
     rows.retain(|row| arguments.only.iter().all(|condition| condition.holds(row)));
     arguments.sort.sort(&mut rows);
@@ -292,10 +292,21 @@ pub(super) fn list(arguments: &Arguments, file: &str, model: &Model, options: &O
     if let Some(path) = &arguments.page {
         whole::write(path, page::page(file, &rows).as_bytes(), arguments.force)?;
     }
+    let faces: Vec<&Face> = rows.iter().map(|row| row.face).collect();
+    let reaches = arguments
+        .radius_mm
+        .map(|radius_mm| whole_part::reaches(arguments, file, model, &faces, radius_mm));
     if arguments.json {
+        let faces = rows.iter().enumerate().map(|(index, row)| {
+            let mut value = row_json(row);
+            if let Some(reaches) = &reaches {
+                value["reach"] = reaches[index].as_ref().map_or(Value::Null, region_words::json);
+            }
+            value
+        });
         let value = json!({
             "file": file,
-            "faces": rows.iter().map(row_json).collect::<Vec<_>>(),
+            "faces": faces.collect::<Vec<_>>(),
             "warnings": model.warnings,
         });
         say!("{value}");
@@ -309,8 +320,41 @@ pub(super) fn list(arguments: &Arguments, file: &str, model: &Model, options: &O
         rows.len(),
         model.faces.len()
     );
+    if let Some(reaches) = &reaches {
+        print_reaches(arguments, &faces, reaches);
+    }
     if let Some(path) = &arguments.page {
         say!("page: {}", path.display());
     }
     Ok(())
+}
+
+/// What the ball reaches of each face without touching another.
+fn print_reaches(arguments: &Arguments, faces: &[&Face], reaches: &[Option<FaceReach>]) {
+    let radius_mm = arguments.radius_mm.unwrap_or(0.0);
+    say!("reach of a ball of {radius_mm} mm from +z, without touching another face:");
+    let mut sums = [0.0; 2];
+    for (face, reach) in faces.iter().zip(reaches) {
+        let Some(reach) = reach else {
+            say!("{:>5} not known", face.number);
+            continue;
+        };
+        sums = [sums[0] + reach.reachable_mm2, sums[1] + reach.area_mm2];
+        let lost: Vec<String> = (reach.unreachable_mm2.iter())
+            .map(|(reason, area)| format!("{area:.2} mm2 {reason}"))
+            .collect();
+        say!(
+            "{:>5} {:>11.2} of {:>11.2} mm2  {}",
+            face.number,
+            reach.reachable_mm2,
+            reach.area_mm2,
+            lost.join(", ")
+        );
+    }
+    let share = if sums[1] > 0.0 {
+        100.0 * sums[0] / sums[1]
+    } else {
+        0.0
+    };
+    say!("  all {:>11.2} of {:>11.2} mm2 ({share:.2} %)", sums[0], sums[1]);
 }

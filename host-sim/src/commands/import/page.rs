@@ -119,8 +119,22 @@ pub(super) struct PartRow<'f> {
     pub(super) job: Option<String>,
     /// What is finished of it, as rings in space.
     pub(super) region: Vec<Vec<[f64; 3]>>,
+    /// The face in cells, each with its colour; empty where the polygons above are exact.
+    pub(super) cells: &'f [([u8; 3], [[f64; 3]; 4])],
     /// Red, green, blue.
     pub(super) tint: [u8; 3],
+}
+
+/// An edge with few enough points for a picture.
+fn thinned(edge: &Edge) -> Vec<[f64; 3]> {
+    const POINTS: usize = 24;
+    let step = edge.len().div_ceil(POINTS).max(1);
+    let last = edge.last().filter(|_| edge.len() % step != 1);
+    edge.iter()
+        .step_by(step)
+        .chain(last)
+        .map(|point| rounded(*point))
+        .collect()
 }
 
 /// The page of a whole part.
@@ -128,7 +142,13 @@ pub(super) fn part_page(file: &str, legend: &str, rows: &[PartRow<'_>]) -> Strin
     let quads = QUADS[usize::from(rows.len() > MANY)];
     let faces = rows.iter().map(|row| {
         let outline = cad::outline(row.face).ok();
-        let polygons = polygons(row.face, outline.as_ref(), quads);
+        let in_cells = !row.cells.is_empty();
+        let polygons = if in_cells { Vec::new() } else { polygons(row.face, outline.as_ref(), quads) };
+        let cells: Vec<_> = row.cells.iter().map(|(tint, corners)| (tint, corners.map(rounded))).collect();
+        let edges: Vec<Vec<[f64; 3]>> = match &row.face.boundary {
+            Boundary::Loops(loops) if in_cells => loops.iter().flatten().map(thinned).collect(),
+            _ => Vec::new(),
+        };
         let ring = |ring: &Vec<[f64; 3]>| ring.iter().map(|point| rounded(*point)).collect::<Vec<_>>();
         let region: Vec<_> = row.region.iter().map(ring).collect();
         let command = row.job.as_ref().map_or(String::new(), |job| {
@@ -137,7 +157,8 @@ pub(super) fn part_page(file: &str, legend: &str, rows: &[PartRow<'_>]) -> Strin
         json!({
             "number": row.face.number, "entity": row.face.entity, "kind": row.face.surface.kind(), "name": row.face.name, "rgb": row.tint,
             "area": row.area_mm2, "size": null, "state": row.state, "command": command, "whole_outline": polygons.len() == 1,
-            "polygons": polygons, "regions": if region.is_empty() { Vec::new() } else { vec![region] },
+            "polygons": polygons, "cells": cells, "edges": edges,
+            "regions": if region.is_empty() || in_cells { Vec::new() } else { vec![region] },
         })
     });
     let data = json!({ "file": file, "legend": legend, "faces": faces.collect::<Vec<_>>() });

@@ -1,19 +1,26 @@
 //! `import --part`: a job for each face of a part that the tool reaches, in order, with a summary and a page.
 
+mod effort;
+mod picture;
+mod program;
+
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use clap::ValueEnum;
 use job::{Along, FaceReach, Region, SurfaceSpec};
 use patches::placement::Rotation;
+use rayon::prelude::*;
 use serde_json::{Value, json};
 
 use super::super::out::say;
 use super::super::{Failure, Result, progress, region_words, whole};
-use super::page::{PartRow, part_page};
 use super::{Arguments, relative};
 use cad::{CadError, Face, JobOptions, MachinableFace, Model, Options, Placement, machinable, write_job};
+use effort::effort_s;
 use part::{Part, Request, Tool, placed_part};
+use picture::{cells, page};
+use program::program;
 
 /// Default scallop height, mm, as in a job of a face.
 const SCALLOP_MM: f64 = 0.01;
@@ -181,6 +188,8 @@ struct Outcome {
     along: &'static str,
     side: &'static str,
     passes_s: f64,
+    /// The face in cells, each with its colour; none for a plane, whose regions are exact polygons.
+    cells: Vec<([u8; 3], [[f64; 3]; 4])>,
 }
 
 /// The request for the region of a face with this surface.
@@ -192,7 +201,8 @@ struct Asked<'a> {
 }
 
 impl Asked<'_> {
-    fn reach(&self, face: &Face, made: &MachinableFace, side: usize) -> FaceReach {
+    /// Something of the request for the region of a face.
+    fn of<T>(&self, face: &Face, made: &MachinableFace, take: impl FnOnce(&Request<'_>) -> T) -> T {
         let placed = face.placed(&self.setup.placement);
         let spec = made.spec();
         let [[u0, u1], [v0, v1]] = spec.domain();
@@ -211,7 +221,11 @@ impl Asked<'_> {
             touch_mm: job_file::PART_TOLERANCE_MM,
             part: Some((self.part, self.part.index(face.number))),
         };
-        let found = request.reach(side);
+        take(&request)
+    }
+
+    fn reach(&self, face: &Face, made: &MachinableFace, side: usize) -> FaceReach {
+        let found = self.of(face, made, |request| request.reach(side));
         FaceReach {
             area_mm2: found.area_mm2,
             reachable_mm2: found.reachable_mm2,
@@ -261,7 +275,7 @@ pub(super) fn command(arguments: &Arguments, file: &str, model: &Arc<Model>, out
     let wanted = |face: &&Face| arguments.faces.is_empty() || arguments.faces.contains(&face.number);
     let faces: Vec<&Face> = model.faces.iter().filter(wanted).collect();
     let made: Vec<std::result::Result<MachinableFace, CadError>> = faces
-        .iter()
+        .par_iter()
         .map(|face| machinable(file, face, &options))
         .collect();
     let setup = match arguments.up {
@@ -284,13 +298,49 @@ pub(super) fn command(arguments: &Arguments, file: &str, model: &Arc<Model>, out
     }
     std::fs::create_dir_all(&folder).map_err(|error| super::super::cannot_write(&folder, &error))?;
     let bar = progress(faces.len() as u64, "regions");
-    let mut outcomes = Vec::new();
-    for (face, made) in faces.iter().zip(&made) {
-        outcomes.push(outcome(arguments, file, face, made.as_ref(), &asked, &folder));
+    let each = faces.par_iter().zip(&made).map(|(face, made)| {
+        let mut found = outcome(arguments, file, face, made.as_ref(), &asked, &folder);
+        if let (Ok(made), true) = (made, face.surface.kind() != "plane") {
+            found.cells = cells(&asked, face, made, &found);
+        }
         bar.inc(1);
-    }
+        found
+    });
+    let outcomes = each.collect();
     bar.finish_and_clear();
     write(arguments, file, model, &output, &setup, outcomes)
+}
+
+/// What a ball reaches of each of these faces from above; `None` where a face is not known.
+pub(super) fn reaches(
+    arguments: &Arguments,
+    file: &str,
+    model: &Arc<Model>,
+    faces: &[&Face],
+    radius_mm: f64,
+) -> Vec<Option<FaceReach>> {
+    let scallop_mm = arguments.scallop_mm.unwrap_or(SCALLOP_MM.min(0.1 * radius_mm));
+    let options = Options {
+        tolerance_mm: arguments.tolerance,
+        untrimmed: false,
+        around_mm: STEP_OVERS_AROUND * (8.0 * radius_mm * scallop_mm).sqrt(),
+    };
+    let setup = Setup::new(Up::PlusZ, model, scallop_mm);
+    let asked = Asked {
+        part: &setup.part,
+        tool: &Tool::new(radius_mm, &job::ToolBody::default()),
+        scallop_mm,
+        setup: &setup,
+    };
+    let bar = progress(faces.len() as u64, "reach");
+    let found = faces.par_iter().map(|face| {
+        let made = machinable(file, face, &options).ok();
+        bar.inc(1);
+        made.map(|made| asked.reach(face, &made, 64))
+    });
+    let found = found.collect();
+    bar.finish_and_clear();
+    found
 }
 
 /// The side of which most can be reached.
@@ -345,6 +395,7 @@ fn outcome(
         along: "u",
         side: if face.sense > 0.0 { "+" } else { "-" },
         passes_s: 0.0,
+        cells: Vec::new(),
     };
     let made = match made {
         Ok(made) => made,
@@ -416,67 +467,6 @@ fn outcome(
         Err(why) => outcome.refused = Some(why),
     }
     outcome
-}
-
-/// Most lines that are looked at for the direction of the passes, parts of an interval, and the time that each interval costs beside its length, s.
-const LINES_MAX: usize = 4000;
-const PARTS: u32 = 8;
-const INTERVAL_S: f64 = 0.15;
-
-/// Time of the passes along a parameter about, s: their length at the feed, and some time for each.
-fn effort_s(
-    surface: &oracle::Surface,
-    region: &Region,
-    along: Along,
-    step_over_mm: f64,
-    feed_mm_s: f64,
-) -> f64 {
-    let swapped = |[u, v]: [f64; 2]| match along {
-        Along::U => [u, v],
-        Along::V => [v, u],
-    };
-    // Lengths of the derivatives along the pass and across it.
-    let speeds = |path: f64, side: f64| {
-        let [u, v] = swapped([path, side]);
-        let at = surface.at(u, v);
-        swapped([at.u.length(), at.v.length()])
-    };
-    let edges: Vec<[[f64; 2]; 2]> = region.edges().map(|ends| ends.map(swapped)).collect();
-    let sides = || edges.iter().flatten().map(|end| end[1]);
-    let (low, high) = (
-        sides().fold(f64::INFINITY, f64::min),
-        sides().fold(f64::NEG_INFINITY, f64::max),
-    );
-    let (mut side, mut sum) = (low, 0.0);
-    for _ in 0..LINES_MAX {
-        let met = |ends: &&[[f64; 2]; 2]| (ends[0][1] <= side) != (ends[1][1] <= side);
-        let mut crossings: Vec<f64> = edges
-            .iter()
-            .filter(met)
-            .map(|[a, b]| a[0] + (side - a[1]) / (b[1] - a[1]) * (b[0] - a[0]))
-            .collect();
-        crossings.sort_by(f64::total_cmp);
-        let mut widest = 0.0_f64;
-        for [from, to] in crossings.as_chunks::<2>().0 {
-            for part in 0..PARTS {
-                let share = (f64::from(part) + 0.5) / f64::from(PARTS);
-                let [speed, across] = speeds(from + share * (to - from), side);
-                sum += speed * (to - from) / f64::from(PARTS) / feed_mm_s;
-                widest = widest.max(across);
-            }
-            sum += INTERVAL_S;
-        }
-        let step = if widest > 0.0 {
-            step_over_mm / widest
-        } else {
-            (high - low) / 100.0
-        };
-        side += step.max((high - low) / LINES_MAX as f64);
-        if side >= high {
-            break;
-        }
-    }
-    sum
 }
 
 /// Sums over all faces, mm2.
@@ -568,70 +558,6 @@ fn write(
     Ok(())
 }
 
-/// One file with all faces: what they have in common, from the text of the first one, and a section for each.
-fn program(
-    arguments: &Arguments,
-    file: &str,
-    output: &Output<'_>,
-    setup: &Setup,
-    order: &[usize],
-    outcomes: &[Outcome],
-) -> String {
-    use std::fmt::Write;
-
-    let path = relative(&arguments.file, output.path).unwrap_or_default();
-    let radius_mm = arguments.radius_mm.unwrap_or(0.0);
-    let mut out = format!(
-        "# {} faces of {}, each with the region that a ball of {radius_mm} mm reaches, in this order. One alone: {}#{}\n\n\
-         # What must not be cut, and what the faces are of.\n[part]\npath = {path:?}\n",
-        order.len(),
-        job::one_line(file),
-        output.path.file_name().unwrap_or_default().to_string_lossy(),
-        order.first().map_or(1, |index| outcomes[*index].number),
-    );
-    if setup.up.rotate_deg() != [0.0; 3] || setup.translate_mm != [0.0; 3] {
-        let _ = write!(
-            out,
-            "\n[placement]\nrotate_deg = {:?}    # of the whole part\ntranslate_mm = {:?}\n",
-            setup.up.rotate_deg(),
-            setup.translate_mm
-        );
-    }
-    let block = setup.part.block();
-    let middle = 0.5 * (block.low + block.high);
-    let _ = write!(
-        out,
-        "\n[tool]\nkind = \"ball\"\nradius_mm = {radius_mm}\n\n\
-         [cut]                       # of every face, unless its section says otherwise\n\
-         feed_mm_min = {}            # of the cutter contact along the surface\n\
-         scallop_mm = {}             # scallop height limit between passes\n\
-         pattern = \"{}\"\n\n\
-         [machine]\n{}\
-         home_mm = [{:.3}, {:.3}, {:.3}]    # where the ball's centre stands before, between and after the faces\n",
-        arguments.feed_mm_min.unwrap_or(cad::FEED_MM_MIN),
-        setup.scallop_mm,
-        arguments.pattern.as_deref().unwrap_or("zigzag"),
-        cad::LIMITS,
-        middle.x,
-        middle.y,
-        block.high.z + radius_mm + job::CLEARANCE_DEFAULT_MM,
-    );
-    for index in order {
-        let outcome = &outcomes[*index];
-        let share = outcome
-            .reach
-            .as_ref()
-            .map_or(0.0, |reach| Sums::share(reach.region_mm2, reach.area_mm2));
-        let along = arguments.along.as_deref().unwrap_or(outcome.along);
-        let _ = write!(
-            out,
-            "\n[[face]]\nface = {}\ntolerance_mm = {}\nalong = {along:?}\nside = {:?}    # {share:.1} % of the face\n",
-            outcome.number, arguments.tolerance, outcome.side,
-        );
-    }
-    out
-}
-
 fn summary(
     arguments: &Arguments,
     file: &str,
@@ -707,78 +633,4 @@ fn print(file: &str, page: &Path, setup: &Setup, order: &[usize], outcomes: &[Ou
         passes_s / 60.0
     );
     say!("  page         {}", page.display());
-}
-
-/// The page: what is finished, what is not.
-fn page(file: &str, model: &Arc<Model>, setup: &Setup, outcomes: &[Outcome]) -> String {
-    let placed: Vec<(usize, Face)> = outcomes
-        .iter()
-        .enumerate()
-        .filter_map(|(index, outcome)| {
-            let face = model.faces.get(outcome.number - 1)?;
-            Some((index, face.placed(&setup.placement)?))
-        })
-        .collect();
-    let rows: Vec<PartRow<'_>> = placed
-        .iter()
-        .map(|(index, face)| {
-            let outcome = &outcomes[*index];
-            let reach = outcome.reach.as_ref();
-            let (state, tint) = match (&outcome.job, reach, &outcome.refused) {
-                (Some(_), Some(reach), _) => (
-                    format!("{:.2} % finished", Sums::share(reach.region_mm2, reach.area_mm2)),
-                    [220, 150, 110],
-                ),
-                (None, _, Some(why)) => (why.clone(), [200, 80, 200]),
-                (_, Some(reach), _) => {
-                    let worst = reach.unreachable_mm2.iter().max_by(|a, b| a.1.total_cmp(&b.1));
-                    match worst {
-                        Some((reason, _)) if reason == "steep" => {
-                            ("unreachable: steep".to_owned(), [165, 175, 185])
-                        }
-                        Some((reason, _)) => (format!("unreachable: {reason}"), [210, 80, 70]),
-                        None => ("empty".to_owned(), [165, 175, 185]),
-                    }
-                }
-                _ => ("not known".to_owned(), [200, 80, 200]),
-            };
-            let region = outcome.region.as_ref().map_or_else(Vec::new, |(region, spec)| {
-                let surface = oracle::Surface::new(spec);
-                let point = |place: &[f64; 2]| surface.at(place[0], place[1]).point.to_array();
-                region
-                    .loops
-                    .iter()
-                    .map(|ring| dense(ring).iter().map(point).collect())
-                    .collect()
-            });
-            PartRow {
-                face,
-                area_mm2: reach.map(|reach| reach.area_mm2),
-                state,
-                job: outcome.job.as_ref().map(|path| path.display().to_string()),
-                region,
-                tint,
-            }
-        })
-        .collect();
-    let legend = "Green: finished. Orange: the rest of a face with a job. Red: the tool does not reach it. Grey: too steep, or \
-                  looks down. Violet: not imported.";
-    part_page(file, legend, &rows)
-}
-
-/// A ring with places between its vertices: on a curved surface an edge is no line.
-fn dense(ring: &[[f64; 2]]) -> Vec<[f64; 2]> {
-    const BETWEEN: usize = 8;
-    if ring.len() > 20 * BETWEEN {
-        return ring.to_vec();
-    }
-    let next = ring.iter().cycle().skip(1);
-    let ends = ring.iter().zip(next);
-    ends.flat_map(|(a, b)| {
-        (0..BETWEEN).map(move |k| {
-            let share = k as f64 / BETWEEN as f64;
-            [a[0] + share * (b[0] - a[0]), a[1] + share * (b[1] - a[1])]
-        })
-    })
-    .collect()
 }
