@@ -30,12 +30,6 @@ impl<F: NorFlash> Settings<F> {
         }
     }
 
-    /// The profile before [`Self::open`], which may take seconds: drives need the levels of their inputs at once.
-    pub fn peek(flash: F) -> (F, Option<Profile>) {
-        let (flash, payload) = Storage::peek(flash, Kind::Profile);
-        (flash, payload.and_then(|payload| Profile::read(payload.bytes())))
-    }
-
     /// The flash.
     pub fn into_flash(self) -> F {
         self.storage.into_flash()

@@ -138,22 +138,6 @@ impl<F: NorFlash> Storage<F> {
         storage
     }
 
-    /// The newest payload of a kind before the storage is opened: nothing is erased, so this takes milliseconds.
-    pub fn peek(flash: F, kind: Kind) -> (F, Option<Payload>) {
-        let mut storage = Self {
-            flash,
-            active: Active {
-                sector: 0,
-                next: 0,
-                sequence: 0,
-                has_spare: false,
-            },
-        };
-        let found = [0, 1].map(|sector| storage.newest_in(sector, kind));
-        let newest = found.into_iter().flatten().max_by_key(|(sequence, _)| *sequence);
-        (storage.flash, newest.map(|(_, payload)| payload))
-    }
-
     /// The flash.
     pub fn into_flash(self) -> F {
         self.flash
