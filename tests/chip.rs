@@ -8,6 +8,7 @@ mod attached;
 mod card;
 mod disturbed;
 mod emulated;
+mod levels;
 mod machine;
 mod pulses;
 mod settings;

@@ -14,7 +14,7 @@ use std::{
     rc::Rc,
 };
 
-use boards::{Axis, BOARDS, Level, Port, Role};
+use boards::{Axis, BOARDS, Level, Pin, Port, Role};
 use controller::spindle::output;
 use drive_enable::{DriveEnable, WritePorts};
 use protocol::message::{InputLines, ResetCause};
@@ -117,6 +117,8 @@ impl ReadPorts for Chip {
 }
 
 impl WritePorts for Chip {
+    fn invert(&mut self, _: Pin, _: bool) {}
+
     fn set_reset(&mut self, port: Port, bits: u32) {
         self.writes.set(self.writes.get() + 1);
         let output = &mut self.outputs.borrow_mut()[port.index()];

@@ -4,7 +4,8 @@ mod rig;
 
 use interp_core::steps::StepConfig;
 use protocol::message::{
-    Activity, Configuration, Homing, InputLines, JogWay, MotionEnd, Offsets, Profile, Reason, Request,
+    Activity, Configuration, Homing, InputLines, JogWay, MotionEnd, NO_AXIS, Offsets, Profile, Reason,
+    Request,
 };
 
 use rig::{Fault, Rig};
@@ -32,6 +33,8 @@ pub(crate) fn profile() -> Profile {
             survives_off: false,
         }),
         probe_inverted: false,
+        step_inverted: 0,
+        enable_inverted: 0,
         spindle: None,
     }
 }
@@ -80,6 +83,49 @@ fn every_axis_finds_its_switch_wherever_it_stands() {
         assert!(rig.status().safety.lines.is_none());
         assert_eq!(motion.at_nm, [MM, MM, -MM]);
     }
+}
+
+/// A machine without a switch of z: x and y are homed, their travel is a soft limit, that of z is none; a run is refused until z is declared.
+#[test]
+fn an_axis_without_a_switch_is_declared() {
+    let mut rig = Rig::new([120 * MM, 30 * MM, -40 * MM]);
+    let mut some = profile();
+    some.homing = some.homing.map(|homing| Homing {
+        order: [1, 0, NO_AXIS],
+        ..homing
+    });
+    rig.ask(&Request::SetProfile(Some(some))).unwrap();
+    rig.ask(&Request::Drives { on: true }).unwrap();
+    rig.rest(10);
+    assert_eq!(rig.ask(&Request::Home { axes: 0b100 }), Err(Reason::NoHoming));
+    rig.ask(&HOME).unwrap();
+    let motion = rig.until_rest();
+    assert_eq!((motion.end, motion.homed_axes), (MotionEnd::Done, 0b011));
+    assert!(!rig.status().safety.homed, "z is not known");
+    assert_eq!(motion.at_nm, [MM, MM, 0], "z counts from where it stood");
+    assert!(matches!(
+        rig.ask(&by(0, -10)),
+        Err(Reason::BeyondTravel { axis: 0, .. })
+    ));
+    // Its travel ends at 0.
+    rig.ask(&by(2, 10)).unwrap();
+    assert_eq!(rig.until_rest().at_nm, [MM, MM, 10 * MM]);
+    let home_nm = [MM, MM, -20 * MM];
+    rig.ask(&Request::SetHome { home_nm }).unwrap();
+    rig.rest(10);
+    assert!(rig.status().safety.homed);
+    assert!(matches!(
+        rig.ask(&by(2, 30)),
+        Err(Reason::BeyondTravel { axis: 2, .. })
+    ));
+    // Homed anew, the declared axis keeps its place; off, all is lost.
+    rig.ask(&HOME).unwrap();
+    let motion = rig.until_rest();
+    assert_eq!((motion.homed_axes, motion.at_nm), (0b111, home_nm));
+    assert!(rig.status().safety.homed);
+    rig.ask(&Request::Drives { on: false }).unwrap();
+    rig.rest(10);
+    assert!(!rig.status().safety.homed);
 }
 
 #[test]

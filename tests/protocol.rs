@@ -78,6 +78,8 @@ fn profile() -> Profile {
         configuration: CONFIGURATION,
         homing: Some(homing()),
         probe_inverted: true,
+        step_inverted: 0b010,
+        enable_inverted: 0b101,
         spindle: Some(SpindleSettings {
             max_rpm: 24_000,
             at_speed_ticks: 3_000,

@@ -39,6 +39,8 @@ fn profile() -> Profile {
         configuration: CONFIGURATION,
         homing: None,
         probe_inverted: false,
+        step_inverted: 0,
+        enable_inverted: 0,
         spindle: None,
     }
 }

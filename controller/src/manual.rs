@@ -47,6 +47,8 @@ pub struct Setup {
     period_s: f32,
     probe_inverted: bool,
     spindle: Option<SpindleSettings>,
+    step_inverted: u8,
+    enable_inverted: u8,
 }
 
 impl Setup {
@@ -65,7 +67,23 @@ impl Setup {
             period_s,
             probe_inverted: profile.probe_inverted,
             spindle: profile.spindle,
+            step_inverted: profile.step_inverted,
+            enable_inverted: profile.enable_inverted,
         }
+    }
+
+    /// Axes whose step pulses have the level opposite to the one in the board's table, one bit each.
+    #[must_use]
+    pub const fn step_inverted(&self) -> u8 {
+        self.step_inverted
+    }
+
+    /// The levels of steps and enables, as in [`crate::spindle::output`].
+    #[must_use]
+    pub const fn levels(&self) -> u32 {
+        use crate::spindle::output::{ENABLE_INVERTED_SHIFT, STEP_INVERTED_SHIFT};
+        (self.step_inverted as u32) << STEP_INVERTED_SHIFT
+            | (self.enable_inverted as u32) << ENABLE_INVERTED_SHIFT
     }
 
     pub(crate) const fn spindle(&self) -> Option<SpindleSettings> {
@@ -184,7 +202,7 @@ pub(crate) enum Change {
     None,
     /// An axis has another coordinate where it stands: its home was found.
     Placed,
-    /// Every axis is homed by its switch.
+    /// Every axis is homed by its switch, or declared.
     Homed,
 }
 
@@ -262,6 +280,11 @@ impl Manual {
         self.status.at_nm = at_nm;
     }
 
+    /// The position of every axis was declared.
+    pub(crate) const fn declared(&mut self) {
+        self.status.homed_axes = ALL_AXES;
+    }
+
     /// The position is lost: no axis is homed.
     pub(crate) const fn lose_home(&mut self) {
         self.status.homed_axes = 0;
@@ -304,17 +327,22 @@ impl Manual {
             return Err(Reason::Moving);
         }
         let setup = self.setup.ok_or(Reason::NoProfile)?;
+        let is_known =
+            |axis: u8| is_homed || self.status.homed_axes.checked_shr(axis.into()).unwrap_or(0) & 1 != 0;
         match motion {
             Motion::Jog {
                 axis,
                 way,
                 speed_mm_s,
-            } => self.begin_jog(&setup, axis, way, speed_mm_s, lines, is_homed),
+            } => self.begin_jog(&setup, axis, way, speed_mm_s, lines, is_known(axis)),
             Motion::Probe { axis, nm, speed_mm_s } => {
-                self.begin_probe(&setup, axis, nm, speed_mm_s, lines, is_homed)
+                self.begin_probe(&setup, axis, nm, speed_mm_s, lines, is_known(axis))
             }
             Motion::Home { axes } => {
                 let profile = setup.homing.ok_or(Reason::NoHoming)?;
+                if axes & ALL_AXES & !profile.axes() != 0 {
+                    return Err(Reason::NoHoming);
+                }
                 self.homing = Homing::new(&profile, axes);
                 self.repeated = None;
                 self.next_axis(lines);

@@ -493,7 +493,7 @@ impl<S: AsRef<[i32]> + AsMut<[i32]>> RealTime<S> {
     #[must_use]
     #[inline]
     pub const fn outputs(&self) -> u32 {
-        self.control.spindle.output() | self.control.safety.drives_on() as u32
+        self.control.spindle.output() | self.control.levels | self.control.safety.drives_on() as u32
     }
 
     /// Whether a tick feeds the watchdog: it ended before the next one, and within its budget. A planning that never ends lets no tick pass.

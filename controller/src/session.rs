@@ -27,7 +27,7 @@ use crate::{
 
 /// Maximum length of an answer stored for a retransmission, bytes: a frame of a `Profile` with every varint at its maximum length. That of a
 /// `Status` is shorter.
-const ANSWER_MAX: usize = 196;
+const ANSWER_MAX: usize = 198;
 
 /// State of the session.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -668,6 +668,8 @@ mod tests {
                 survives_off: true,
             }),
             probe_inverted: true,
+            step_inverted: 0b111,
+            enable_inverted: 0b111,
             spindle: Some(protocol::message::SpindleSettings {
                 max_rpm: u32::MAX,
                 at_speed_ticks: u32::MAX,

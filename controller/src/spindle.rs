@@ -15,6 +15,10 @@ pub mod output {
     pub const COUNTERCLOCKWISE: u32 = 4;
     /// Coolant.
     pub const COOLANT: u32 = 8;
+    /// First of the bits of the axes whose drives are enabled by the level opposite to the one in the board's table.
+    pub const ENABLE_INVERTED_SHIFT: u32 = 4;
+    /// First of the bits of the axes whose step pulses are inverted likewise.
+    pub const STEP_INVERTED_SHIFT: u32 = 7;
     /// First bit of the duty cycle.
     pub const DUTY_SHIFT: u32 = 16;
 }

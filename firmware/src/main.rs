@@ -127,8 +127,8 @@ mod app {
             board::WIRING,
             board::PLUS_IS_HIGH,
             SLOT_COUNTS,
-            context.local.slots,
-            context.local.rest,
+            0,
+            (context.local.slots, context.local.rest),
         );
         if !output.is_present() {
             defmt::warn!("this board puts no steps out");

@@ -95,7 +95,9 @@ impl SampleTask {
             lines: guards.inputs.read(),
         };
         real_time.tick(input, &mut self.events);
-        guards.drives.set(real_time.outputs());
+        if let Some(inverted) = guards.drives.set(real_time.outputs()) {
+            output.set_levels(inverted);
+        }
         if let Some(slots) = output.slots() {
             real_time.pulses(slots);
         }

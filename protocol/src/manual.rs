@@ -129,7 +129,7 @@ pub struct MotionStatus {
     pub axis: u8,
     /// Commanded position, nm; in machine coordinates once homed.
     pub at_nm: [i32; 3],
-    /// Axes that have been homed by their switches since the position was last lost, one bit each.
+    /// Axes whose position is known: homed by their switches, or declared, since the position was last lost; one bit each.
     pub homed_axes: u8,
     /// How the last motion ended.
     pub end: MotionEnd,
@@ -147,7 +147,7 @@ pub struct MotionStatus {
 /// Homing of the axes: each towards a limit switch at its end, in this order.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Homing {
-    /// The axes, from 0, in the order of homing; each once.
+    /// The axes, from 0, in the order of homing; each once at most. [`NO_AXIS`] stands for those that have no switch.
     pub order: [u8; 3],
     /// Whether the switch is at the upper end of the axis.
     pub at_upper_end: [bool; 3],
@@ -163,15 +163,26 @@ pub struct Homing {
     pub survives_off: bool,
 }
 
+/// In [`Homing::order`]: no axis.
+pub const NO_AXIS: u8 = 3;
+
 impl Homing {
-    /// Whether every axis comes once, speeds and distances are above 0, and speeds within the axes' velocities, mm/s.
+    /// The axes that have a switch, one bit each.
+    #[must_use]
+    pub fn axes(&self) -> u8 {
+        let bit = |axis: &u8| 1_u8.checked_shl(u32::from(*axis)).unwrap_or(0);
+        self.order.iter().map(bit).fold(0, |axes, bit| axes | bit) & 0b111
+    }
+
+    /// Whether an axis comes, and none twice, speeds and distances are above 0, and speeds within the axes' velocities, mm/s.
     #[must_use]
     pub fn is_valid(&self, velocity_mm_s: [f32; 3]) -> bool {
-        let seen = self.order.iter().fold(0_u8, |seen, axis| {
-            seen | 1_u8.checked_shl(u32::from(*axis)).unwrap_or(0)
-        });
+        let is_known = |axis: &u8| *axis <= NO_AXIS;
+        let named = self.order.iter().filter(|axis| **axis < NO_AXIS).count();
         let speeds = self.seek_mm_s.iter().zip(&self.approach_mm_s);
-        seen == 0b111
+        self.order.iter().all(is_known)
+            && named > 0
+            && self.axes().count_ones() as usize == named
             && speeds
                 .zip(&velocity_mm_s)
                 .all(|((seek, approach), most)| *approach > 0.0 && approach <= seek && seek <= most)
@@ -242,7 +253,7 @@ mod tests {
     }
 
     #[test]
-    fn homing_takes_every_axis_once() {
+    fn homing_takes_no_axis_twice() {
         let homing = Homing {
             order: [2, 0, 1],
             at_upper_end: [false, false, true],
@@ -253,8 +264,12 @@ mod tests {
             survives_off: false,
         };
         assert!(homing.is_valid([10.0; 3]) && !homing.is_valid([10.0, 9.0, 10.0]));
-        for order in [[0, 1, 1], [0, 1, 3], [0, 1, 255]] {
+        for order in [[0, 1, 1], [0, 1, 4], [0, 1, 255], [3, 3, 3]] {
             assert!(!Homing { order, ..homing }.is_valid([10.0; 3]));
+        }
+        for (order, axes) in [([0, 1, 3], 0b011), ([2, 3, 3], 0b100)] {
+            let some = Homing { order, ..homing };
+            assert!(some.is_valid([10.0; 3]) && some.axes() == axes);
         }
         let slow = [1.0, f32::NAN, 1.0];
         assert!(

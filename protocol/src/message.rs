@@ -109,7 +109,7 @@ use interp_core::{command::Command, job::Header};
 use serde::{Deserialize, Serialize};
 
 pub use crate::manual::{
-    Activity, Homing, JogWay, MotionEnd, MotionStatus, OFFSETS_BYTES_MAX, Offsets, WORK_OFFSETS,
+    Activity, Homing, JogWay, MotionEnd, MotionStatus, NO_AXIS, OFFSETS_BYTES_MAX, Offsets, WORK_OFFSETS,
 };
 pub use crate::profile::{Excess, PROFILE_BYTES_MAX, Profile, ProfileLimit};
 pub use crate::reason::Reason;

@@ -6,7 +6,7 @@ use serde::{Deserialize, Serialize};
 use crate::{frame, manual::Homing, records::StepSettings, safety::Configuration, spindle::SpindleSettings};
 
 /// Longest encoding of a [`Profile`], bytes: every varint at its maximum length.
-pub const PROFILE_BYTES_MAX: usize = 185;
+pub const PROFILE_BYTES_MAX: usize = 187;
 
 /// Greatest axis limit that a profile may have, in mm and seconds: far above any machine, and within `f32` whatever is computed of it.
 const LIMIT_MAX: f32 = 1e9;
@@ -33,6 +33,10 @@ pub struct Profile {
     pub probe_inverted: bool,
     /// The spindle, if there is one.
     pub spindle: Option<SpindleSettings>,
+    /// Axes whose step pulses have the level opposite to the one in the board's table, one bit each.
+    pub step_inverted: u8,
+    /// Axes whose drives are enabled by the level opposite to the one in the board's table, one bit each.
+    pub enable_inverted: u8,
 }
 
 /// A value of a profile that a job may not exceed. The codes on the wire count from 0 in this order.
@@ -131,6 +135,7 @@ impl Profile {
             && self.travel_nm.is_none_or(ascends)
             && StepConfig::from(self.steps).check().is_ok()
             && self.spindle.is_none_or(|spindle| spindle.max_rpm > 0)
+            && self.step_inverted | self.enable_inverted <= 0b111
             // The search for a switch ends with the travel.
             && self
                 .homing
@@ -196,6 +201,8 @@ mod tests {
         homing: None,
         probe_inverted: false,
         spindle: None,
+        step_inverted: 0,
+        enable_inverted: 0,
     };
 
     fn axes() -> AxisLimits {
@@ -264,6 +271,10 @@ mod tests {
             },
             Profile {
                 travel_nm: Some([[1, 1]; 3]),
+                ..PROFILE
+            },
+            Profile {
+                step_inverted: 0b1000,
                 ..PROFILE
             },
         ] {

@@ -325,6 +325,14 @@ impl Ended {
         last
     }
 
+    /// Cycle of the first change of a step pin while the drives are on.
+    pub(super) fn first_pulse(&self) -> u64 {
+        let on = self.drives(true, 0).expect("the drives were on");
+        let changes = Axis::ALL.map(|axis| self.changes(&self.board.axis(axis).step));
+        let after = changes.iter().flatten().map(|(at, _)| *at).filter(|at| *at > on);
+        after.min().expect("there were pulses")
+    }
+
     /// Cycle of the last rising edge of a step pin before a cycle.
     pub(super) fn last_pulse(&self, until: u64) -> u64 {
         let rises = Axis::ALL.map(|axis| {

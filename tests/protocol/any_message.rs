@@ -110,6 +110,8 @@ prop_compose! {
             configuration,
             homing: None,
             probe_inverted: has_travel,
+            step_inverted: u8::from(has_travel),
+            enable_inverted: 7,
             spindle: None,
         }
     }

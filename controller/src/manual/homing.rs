@@ -53,15 +53,16 @@ impl Homing {
         tries: 0,
     };
 
-    /// Of these axes; none: all.
-    pub(super) const fn new(profile: &Profile, axes: u8) -> Self {
+    /// Of these axes; none: all that have a switch.
+    pub(super) fn new(profile: &Profile, axes: u8) -> Self {
+        let wanted = if axes & super::ALL_AXES == 0 {
+            super::ALL_AXES
+        } else {
+            axes
+        };
         Self {
             profile: Some(*profile),
-            left: if axes & super::ALL_AXES == 0 {
-                super::ALL_AXES
-            } else {
-                axes & super::ALL_AXES
-            },
+            left: wanted & profile.axes(),
             ..Self::NONE
         }
     }

@@ -48,6 +48,8 @@ pub(super) struct Control {
     /// Motion outside a job.
     pub(super) manual: Manual,
     pub(super) spindle: Spindle,
+    /// The profile's levels of steps and enables, as in [`crate::spindle::output`].
+    pub(super) levels: u32,
     /// The next run within limits has to begin at its job's home.
     pub(super) from_home: bool,
     /// The run is to be held because the host is gone.
@@ -74,6 +76,7 @@ impl Control {
             safety: Safety::NEW,
             manual: Manual::NEW,
             spindle: Spindle::NEW,
+            levels: 0,
             from_home: true,
             host_is_gone: false,
             has_drives: false,

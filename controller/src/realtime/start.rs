@@ -28,7 +28,10 @@ impl<S: AsRef<[i32]> + AsMut<[i32]>> RealTime<S> {
         }
         self.control.safety.obey(order, state)?;
         match order {
-            Order::SetHome { home_nm } => self.set_position(home_nm),
+            Order::SetHome { home_nm } => {
+                self.set_position(home_nm);
+                self.control.manual.declared();
+            }
             Order::Drives { on: false } if !self.control.safety.status().homed => self.lose_position(),
             Order::Move(motion) => self.begin_motion(motion)?,
             Order::SetUp(setup) => {
@@ -37,6 +40,10 @@ impl<S: AsRef<[i32]> + AsMut<[i32]>> RealTime<S> {
                     .spindle
                     .set_up(setup.and_then(|setup| setup.spindle()));
                 self.control.manual.set_up(setup);
+                self.control.levels = setup.map_or(0, |setup| setup.levels());
+                if let Some(steps) = &mut self.steps {
+                    steps.set_low_pulses(setup.map_or(0, |setup| setup.step_inverted()));
+                }
             }
             Order::Spindle(order) => self.control.spindle.order(order)?,
             Order::Drives { .. } | Order::Configure(_) | Order::Acknowledge => {}

@@ -83,7 +83,7 @@ mod app {
             direction: [Pin(Port::C, 6), Pin(Port::C, 7), Pin(Port::C, 8)],
         };
         let (slots, rest) = (context.local.slots, context.local.rest);
-        let output = StepDriver::new(device.TIM1, device.DMA2, wiring, 0b111, 168, slots, rest);
+        let output = StepDriver::new(device.TIM1, device.DMA2, wiring, 0b111, 168, 0, (slots, rest));
         let mut real_time = RealTime::with_store(context.local.store);
         if let Ok(steps) = StepConfig::DEFAULT.check() {
             real_time.set_step_pins(steps, wiring.step);

@@ -3,7 +3,10 @@
 //! An output is switched by the port's set/reset register: one write, which changes no other pin, so that drivers with pins on
 //! the same port are independent.
 
-use core::convert::Infallible;
+use core::{
+    convert::Infallible,
+    sync::atomic::{AtomicU32, Ordering},
+};
 
 use boards::{Pin, Port};
 use embedded_hal::digital::{ErrorType, OutputPin};
@@ -25,14 +28,19 @@ fn registers(port: Port) -> &'static pac::gpioi::RegisterBlock {
     }
 }
 
+/// Pins of each port whose inactive level is the opposite of the table's, by the machine's profile.
+static INVERTED: [AtomicU32; Port::ALL.len()] = [const { AtomicU32::new(0) }; Port::ALL.len()];
+
 /// Makes every output inactive: drives, heaters and fans are off. `rest`: the words for the ports' set/reset registers
 /// ([`boards::setup::rest`]); a port without an output may have no clock, and is not written.
 pub(crate) fn rest(rest: &[u32; Port::ALL.len()]) {
-    for (port, bits) in Port::ALL.into_iter().zip(rest) {
+    for ((port, bits), inverted) in Port::ALL.into_iter().zip(rest).zip(&INVERTED) {
         if *bits != 0 {
+            let pins = inverted.load(Ordering::Relaxed) * 0x1_0001;
+            let bits = bits & !pins | bits.rotate_left(16) & pins;
             // SAFETY: any bits may be written here; these are the table's outputs.
             #[allow(unsafe_code, reason = "a whole register is written")]
-            registers(port).bsrr().write(|w| unsafe { w.bits(*bits) });
+            registers(port).bsrr().write(|w| unsafe { w.bits(bits) });
         }
     }
 }
@@ -53,6 +61,16 @@ impl WritePorts for Ports {
         // SAFETY: any bits may be written here; the caller's are its own pins'.
         #[allow(unsafe_code, reason = "a whole register is written")]
         registers(port).bsrr().write(|w| unsafe { w.bits(bits) });
+    }
+
+    fn invert(&mut self, pin: Pin, is_inverted: bool) {
+        if let Some(inverted) = INVERTED.get(pin.port.index()) {
+            let others = inverted.load(Ordering::Relaxed) & !pin.bit();
+            inverted.store(
+                if is_inverted { others | pin.bit() } else { others },
+                Ordering::Relaxed,
+            );
+        }
     }
 
     fn duty(&mut self, steps: u32) {

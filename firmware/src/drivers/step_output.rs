@@ -40,24 +40,31 @@ pub(crate) struct StepDriver {
     /// Axes whose direction pin is high towards plus, one bit each.
     plus_is_high: u8,
     buffers: &'static mut Buffers,
+    /// The idle word, which the DMA reads.
+    rest: &'static mut u32,
+    /// Set and reset bit of each axis's step pin.
+    bits: [u32; 3],
+    /// Ticks in which no buffer may be filled, because the idle word has changed.
+    settles: u8,
 }
+
+/// Ticks after a change of the idle word until a buffer holds nothing else: the one that is output at the change is cleared whole only when it is output again.
+const SETTLE_TICKS: u8 = 2;
 
 impl StepDriver {
     /// Starts the output; see [`StepOutput::start`]. `rest`: [`interp_core::Steps::rest`]. `plus_is_high`: axes whose direction pin is high
-    /// towards plus, a bit each.
+    /// towards plus, a bit each. `inverted`: axes whose step pulses are low, likewise.
     pub(crate) fn new(
         timer: pac::TIM1,
         dma: pac::DMA2,
         wiring: Wiring,
         plus_is_high: u8,
         slot_counts: u16,
-        buffers: &'static mut Buffers,
-        rest: &'static mut u32,
+        inverted: u8,
+        (buffers, rest): (&'static mut Buffers, &'static mut u32),
     ) -> Self {
-        *rest = wiring
-            .step
-            .iter()
-            .fold(0, |word, pin| word | 1 << (16 + (pin & 15)));
+        let bits = wiring.step.map(|pin| 0x1_0001 << (pin & 15));
+        *rest = idle_word(bits, inverted);
         for slot in buffers.iter_mut().flatten() {
             *slot = *rest;
         }
@@ -75,6 +82,23 @@ impl StepDriver {
             output: StepOutput::start(chip, wiring, memory, slot_counts),
             plus_is_high,
             buffers,
+            rest,
+            bits,
+            settles: 0,
+        }
+    }
+
+    /// Sets the idle level of the step pins: high for axes whose pulses are inverted, one bit each ([`interp_core::Steps::set_low_pulses`]). Pins follow within three periods; to
+    /// be called at rest.
+    #[cold]
+    #[inline(never)]
+    pub(crate) fn set_levels(&mut self, inverted: u8) {
+        let rest = idle_word(self.bits, inverted);
+        if *self.rest != rest {
+            *self.rest = rest;
+            self.settles = SETTLE_TICKS;
+            // Completes the write before the DMA reads.
+            cortex_m::asm::dmb();
         }
     }
 
@@ -98,11 +122,24 @@ impl StepDriver {
     /// At the end of a tick: the slots to fill, if enough are left.
     #[inline]
     pub(crate) fn slots(&mut self) -> Option<&mut [u32; BUFFER_WORDS]> {
+        if self.settles != 0 {
+            self.settles -= 1;
+            return None;
+        }
         let idle = self.output.free()?;
         // The DMA has cleared these words: they are read again.
         cortex_m::asm::dmb();
         self.buffers.get_mut(idle)
     }
+}
+
+/// The word of a slot without a pulse: pins whose pulses are inverted are high.
+fn idle_word([x, y, z]: [u32; 3], inverted: u8) -> u32 {
+    let idle = |axis: u8, bits: u32| {
+        let is_high = inverted >> axis & 1 != 0;
+        bits & if is_high { 0x0000_ffff } else { 0xffff_0000 }
+    };
+    idle(0, x) | idle(1, y) | idle(2, z)
 }
 
 /// An address in the form of a DMA register.

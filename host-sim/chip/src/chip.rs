@@ -40,6 +40,9 @@ const LOOK_S: (f64, f64) = (0.1e-3, 0.3e-3);
 /// Lag behind real time, seconds, beyond which the pace restarts from the present.
 const LAG_S: f64 = 0.05;
 
+/// Longest step pulse, seconds.
+const PULSE_MAX_S: f64 = 25e-6;
+
 pub(crate) struct Chip {
     pub(crate) world: World,
     pub(crate) board: &'static Board,
@@ -67,6 +70,8 @@ pub(crate) struct Chip {
     /// The machine around the board, and the last levels of the step pins.
     pub(crate) machine: Option<Machine>,
     step_levels: u32,
+    /// The step pins that changed last, and when.
+    step_edge: (u32, u64),
     /// USART1's interrupt request.
     serial_asks: bool,
     script: Vec<Entry>,
@@ -153,6 +158,7 @@ impl Chip {
             line,
             machine: options.machine.clone(),
             step_levels: 0,
+            step_edge: (0, 0),
             serial_asks: false,
             script,
             record: record.map(BufWriter::new),
@@ -216,19 +222,15 @@ impl Chip {
 
     /// Writes a change of a port to the record.
     pub(crate) fn keep(&mut self, change: Change) {
+        let changed = self.step_levels ^ u32::from(change.levels);
         if usize::from(change.port) == self.step_port {
             if let Some(machine) = &mut self.machine {
                 machine.follow(self.board, &change, self.step_levels, &self.ports);
             }
             self.step_levels = change.levels.into();
         }
-        if self.moved.is_none()
-            && usize::from(change.port) == self.step_port
-            && u32::from(change.levels) & self.step_pins != 0
-        {
-            self.moved = Some(self.world.seconds(change.at));
-            self.world.note("the first step pulse");
-            self.plan();
+        if self.moved.is_none() && usize::from(change.port) == self.step_port {
+            self.look_for_pulse(change.at, changed & self.step_pins);
         }
         if let Some(record) = &mut self.record {
             let mut bytes = [0; 16];
@@ -239,6 +241,19 @@ impl Chip {
             bytes[12..14].copy_from_slice(&change.outputs.to_le_bytes());
             // A failed write is detected by the reader of the record.
             let _ = record.write_all(&bytes);
+        }
+    }
+
+    /// The first pulse: a step pin that goes back to its level within [`PULSE_MAX_S`]. A change of the idle level is none.
+    fn look_for_pulse(&mut self, at: u64, pins: u32) {
+        if pins == 0 {
+            return;
+        }
+        let (before, since) = std::mem::replace(&mut self.step_edge, (pins, at));
+        if before & pins != 0 && at - since <= self.world.lasting(PULSE_MAX_S) {
+            self.moved = Some(self.world.seconds(since));
+            self.world.note("the first step pulse");
+            self.plan();
         }
     }
 

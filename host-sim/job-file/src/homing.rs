@@ -15,6 +15,9 @@ const KEYS: [&str; 7] = [
     "survives_off",
 ];
 
+/// In the order: no axis.
+const NO_AXIS: u8 = 3;
+
 /// What three speeds or distances are.
 const ABOVE_0: &str = "three numbers above 0, one each for x, y and z, e.g. [20, 20, 10]";
 
@@ -61,6 +64,9 @@ pub(super) fn read(
             approach_mm_s[index],
             limits.velocity_mm_s[index],
         );
+        if !order.contains(&u8::try_from(index).unwrap_or(NO_AXIS)) {
+            continue;
+        }
         if seek > most {
             let what =
                 format!("`seek_mm_s` is faster than {axis} may be: {seek}, {most} in velocity_max_mm_s");
@@ -120,13 +126,16 @@ fn read_order(home: &Section<'_>) -> Result<[u8; 3], JobError> {
             _ => None,
         })
         .collect();
-    let order = axes.and_then(|axes| <[u8; 3]>::try_from(axes).ok());
-    match order {
-        Some(order) if (0..3).all(|axis| order.contains(&axis)) => Ok(order),
-        _ => Err(home.error(
+    let has_none_twice =
+        |axes: &Vec<u8>| (0..3).all(|axis| axes.iter().filter(|other| **other == axis).count() <= 1);
+    match axes.filter(|axes| !axes.is_empty() && has_none_twice(axes)) {
+        Some(axes) => Ok(std::array::from_fn(|place| {
+            axes.get(place).copied().unwrap_or(NO_AXIS)
+        })),
+        None => Err(home.error(
             "order",
-            format!("`order` must have each axis once, not \"{text}\""),
-            "write order = \"zxy\"",
+            format!("`order` must name the axes that have a switch, each once, not \"{text}\""),
+            "write order = \"zxy\", or \"xy\" for a machine without a switch of z",
         )),
     }
 }

@@ -24,6 +24,8 @@ const COMMON: [&str; 7] = [
     "host_gone",
     "host_gone_ms",
 ];
+/// Keys of a machine's profile alone.
+const OF_PROFILES: [&str; 2] = ["step_inverted", "enable_inverted"];
 /// Keys of a job alone.
 const OF_JOBS: [&str; 5] = ["period_us", "home_mm", "safe_z_mm", "clearance_mm", "plunge_mm"];
 
@@ -31,7 +33,8 @@ const OF_JOBS: [&str; 5] = ["period_us", "home_mm", "safe_z_mm", "clearance_mm",
 pub(super) fn read_profile(document: &Section<'_>) -> Result<MachineProfile, JobError> {
     let machine = &document.section("machine")?;
     let of_jobs = OF_JOBS.map(|key| (key, "it is a job's"));
-    machine.only(&[&COMMON[..], &steps::KEYS].concat(), &of_jobs)?;
+    machine.only(&[&COMMON[..], &OF_PROFILES, &steps::KEYS].concat(), &of_jobs)?;
+    let [step, enable] = OF_PROFILES;
     let mut read = MachineSpec::default();
     read_supervision(machine, &mut read)?;
     let limits = read_limits(machine)?.unwrap_or(AxisLimits::DEFAULT);
@@ -45,6 +48,8 @@ pub(super) fn read_profile(document: &Section<'_>) -> Result<MachineProfile, Job
     Ok(MachineProfile {
         limits,
         travel_mm,
+        step_inverted: steps::read_inverted(machine, step)?,
+        enable_inverted: steps::read_inverted(machine, enable)?,
         homing,
         spindle: spindle.map(|spindle| spindle::read_drive(&spindle)).transpose()?,
         probe_closes: probe.map_or(Ok(false), |probe| homing::read_probe(&probe))?,
@@ -149,7 +154,8 @@ fn within(machine: &Section<'_>, spec: &mut MachineSpec, profile: &MachineProfil
 
 /// The section `[machine]` of a job, without a profile.
 fn read(machine: &Section<'_>) -> Result<MachineSpec, JobError> {
-    machine.only(&[&COMMON[..], &OF_JOBS, &steps::KEYS].concat(), &[])?;
+    let of_profiles = OF_PROFILES.map(|key| (key, "it is the machine profile's (docs/operating.md)"));
+    machine.only(&[&COMMON[..], &OF_JOBS, &steps::KEYS].concat(), &of_profiles)?;
     let mut read = MachineSpec::default();
     if machine.has("period_us") {
         let [least, most] = PERIOD_RANGE_US;

@@ -154,7 +154,7 @@ pub(super) fn read(machine: &Section<'_>, period_us: f64) -> Result<Option<StepO
 }
 
 /// One Boolean per axis; all false where the key is missing.
-fn read_inverted(machine: &Section<'_>, key: &str) -> Result<[bool; 3], JobError> {
+pub(super) fn read_inverted(machine: &Section<'_>, key: &str) -> Result<[bool; 3], JobError> {
     let mut inverted = [false; 3];
     if machine.has(key) {
         let flags = machine.value(key)?.list_of(3, "switch")?;

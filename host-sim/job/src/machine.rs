@@ -145,6 +145,10 @@ pub struct MachineProfile {
     pub heartbeat_timeout_ms: f64,
     /// The drives.
     pub step_output: StepOutput,
+    /// Axes whose step pulses have the level opposite to the one in the board's table.
+    pub step_inverted: [bool; 3],
+    /// Axes whose drives are enabled by the level opposite to the one in the board's table.
+    pub enable_inverted: [bool; 3],
     /// Homing by switches. `None`: the position is declared.
     pub homing: Option<Homing>,
     /// The probe's contact closes when it touches.

@@ -35,7 +35,14 @@ pub fn for_board(profile: &MachineProfile) -> Profile {
             max_rpm: spindle.max_rpm,
             at_speed_ticks: ticks(spindle.at_speed_ms),
         }),
+        step_inverted: bits(profile.step_inverted),
+        enable_inverted: bits(profile.enable_inverted),
     }
+}
+
+/// One bit an axis.
+fn bits([x, y, z]: [bool; 3]) -> u8 {
+    u8::from(x) | u8::from(y) << 1 | u8::from(z) << 2
 }
 
 /// The profile of a board: limits as the shortest decimal numbers that the board's stand for.
@@ -51,7 +58,10 @@ pub fn of_board(profile: &Profile) -> MachineProfile {
         homing,
         probe_inverted,
         spindle,
+        step_inverted,
+        enable_inverted,
     } = *profile;
+    let axes = |bits: u8| [0, 1, 2].map(|axis| bits >> axis & 1 != 0);
     let slot_us = PERIOD_DEFAULT_US / f64::from(interp_core::steps::SLOTS);
     let config = StepConfig::from(steps);
     MachineProfile {
@@ -76,6 +86,8 @@ pub fn of_board(profile: &Profile) -> MachineProfile {
             pulse_us: f64::from(config.pulse_slots) * slot_us,
             direction_setup_us: f64::from(config.setup_slots) * slot_us,
         },
+        step_inverted: axes(step_inverted),
+        enable_inverted: axes(enable_inverted),
         homing: homing.map(|homing| homing_of_board(&homing)),
         probe_closes: probe_inverted,
         spindle: spindle.map(|spindle| SpindleDrive {
@@ -156,6 +168,8 @@ pub fn text(profile: &MachineProfile) -> String {
         heartbeat_action,
         heartbeat_timeout_ms,
         step_output,
+        step_inverted,
+        enable_inverted,
         homing,
         probe_closes,
         spindle,
@@ -189,6 +203,14 @@ pub fn text(profile: &MachineProfile) -> String {
         "direction_inverted = {:?}",
         step_output.direction_inverted
     ));
+    for (key, inverted) in [
+        ("step_inverted", step_inverted),
+        ("enable_inverted", enable_inverted),
+    ] {
+        if *inverted != [false; 3] {
+            line(format_args!("{key} = {inverted:?}"));
+        }
+    }
     line(format_args!("homing_required = {homing_required}"));
     let action = match heartbeat_action {
         HeartbeatAction::Finish => "finish",
@@ -199,7 +221,7 @@ pub fn text(profile: &MachineProfile) -> String {
     if let Some(homing) = homing {
         let order = homing
             .order
-            .map(|axis| AXES.get(usize::from(axis)).copied().unwrap_or("?"));
+            .map(|axis| AXES.get(usize::from(axis)).copied().unwrap_or_default());
         line(format_args!("\n[home]"));
         line(format_args!("order = \"{}\"", order.concat()));
         line(format_args!("at_upper_end = {:?}", homing.at_upper_end));
@@ -233,11 +255,13 @@ steps_per_mm = [400, 78.74, "3200/7"]
 pulse_us = 2.5
 direction_setup_us = 20
 direction_inverted = [true, false, true]
+step_inverted = [false, true, false]
+enable_inverted = [true, true, false]
 host_gone = "hold"
 host_gone_ms = 750
 
 [home]
-order = "zyx"
+order = "yx"
 at_upper_end = [false, false, true]
 position_mm = [-2, -2.5, 1.000001]
 seek_mm_s = [40, 40.7, 20]

@@ -74,6 +74,14 @@ pub(super) fn distance(text: &str) -> std::result::Result<Distance, String> {
     }
 }
 
+/// Parses an axis with a coordinate in mm: `z=0`, `x=-12.5`.
+fn coordinate(text: &str) -> std::result::Result<Distance, String> {
+    let wrong = || "expected an axis and a position in mm, such as z=0".to_owned();
+    let (axis, position) = text.split_once('=').ok_or_else(wrong)?;
+    let sign = if position.starts_with(['+', '-']) { "" } else { "+" };
+    distance(&format!("{axis}{sign}{position}")).map_err(|_| wrong())
+}
+
 /// Parses axes as bits: `z`, `xy`.
 pub(super) fn axes(text: &str) -> std::result::Result<u8, String> {
     let bits: Option<u8> = text
@@ -148,6 +156,12 @@ pub(super) enum Action {
         #[arg(long, default_value_t = PROBE_MM_S)]
         speed: f32,
     },
+    /// Declares where an axis without a switch stands, in machine coordinates, once the others are homed: place z=0.
+    Place {
+        /// Axis and position, mm.
+        #[arg(value_parser = coordinate)]
+        at: Distance,
+    },
     /// Prints the work offsets and the tool length.
     Offsets,
 }
@@ -189,6 +203,36 @@ pub(super) fn json_of(motion: &MotionStatus) -> serde_json::Value {
     })
 }
 
+/// Letters of axes, one bit each.
+fn letters(axes: u8) -> String {
+    let names: Vec<_> = AXES
+        .iter()
+        .enumerate()
+        .filter(|(axis, _)| axes >> axis & 1 != 0)
+        .map(|(_, name)| *name)
+        .collect();
+    names.join(", ")
+}
+
+/// The axes whose position is not known.
+const fn unknown(motion: &MotionStatus) -> u8 {
+    !motion.homed_axes & 0b111
+}
+
+/// Which axes are homed, and what is to be done for the others.
+pub(super) fn homed_words(motion: &MotionStatus) -> String {
+    match unknown(motion) {
+        0 => "homed".to_owned(),
+        0b111 => "no axis is homed".to_owned(),
+        rest => format!(
+            "homed: {}; not homed: {}: home it, or jog it to a place that you know and declare it, as by: operate place {}=0",
+            letters(motion.homed_axes),
+            letters(rest),
+            AXES.get(rest.trailing_zeros() as usize).copied().unwrap_or("z"),
+        ),
+    }
+}
+
 /// A motion, and the position after it.
 pub(super) fn go(session: &mut Session, request: &Request, as_json: bool) -> Result<()> {
     let motion = carried_out(session, request)?;
@@ -204,7 +248,7 @@ pub(super) fn go(session: &mut Session, request: &Request, as_json: bool) -> Res
         );
     }
     if let Request::Home { .. } = request {
-        say!("homed");
+        say!("{}", homed_words(&motion));
     }
     say!("axes at {} mm", PositionNm(motion.at_nm).words());
     Ok(())
@@ -268,6 +312,22 @@ pub(super) fn command(action: &Action, port: &str, as_json: bool) -> Result<()> 
                 let mm = f64::from(tripped) / NM_PER_MM;
                 say!("this is the reference tool; for every other one: tool .. --setter {mm:.6}");
             }
+        }
+        Action::Place { at } => {
+            let motion = session.motion()?;
+            let others = unknown(&motion) & !(1 << at.axis);
+            if others != 0 {
+                return Err(Failure::Failed(Some(format!(
+                    "{} is not homed\n  help: home first, then declare {}; or declare all three: operate home X,Y,Z",
+                    letters(others),
+                    letters(1 << at.axis),
+                ))));
+            }
+            let mut home_nm = motion.at_nm;
+            if let Some(place) = home_nm.get_mut(usize::from(at.axis)) {
+                *place = at.nm;
+            }
+            session.command(&Request::SetHome { home_nm })?;
         }
         Action::Offsets => {}
     }

@@ -182,6 +182,7 @@ pub(super) fn command(arguments: &Arguments) -> Result<()> {
         }
     } else {
         print(&status, &board);
+        say!("  {}", axes::homed_words(&motion));
         say!("  axes at {} mm", home::PositionNm(motion.at_nm).words());
     }
     if stays {

@@ -103,7 +103,7 @@ impl Axis {
         }
         // The remainder of a pulse that began in the last period.
         for slot in slots.iter_mut().take(self.high as usize) {
-            *slot |= bit;
+            *slot ^= bit;
         }
         let owed_before = self.target.wrapping_sub(self.sent);
         let from = self.remainder;
@@ -239,7 +239,7 @@ fn add(slots: &mut [u32; BUFFER_WORDS], first: u32, distance: u32, count: u32, b
     let mut pulse = || {
         // Ten bits are always within the buffer, so the compiler removes the bounds check.
         if let Some(slot) = slots.get_mut((place >> FRACTION_BITS) as usize) {
-            *slot |= bit;
+            *slot ^= bit;
         }
         place = place.wrapping_add(distance);
     };

@@ -13,8 +13,9 @@
 //!
 //! # Words
 //! A slot's word goes to a port's set/reset register: set bits in its low half, reset bits in its high half; set has priority
-//! where both are given (RM0090, 8.4.7). A slot without a pulse resets every step pin ([`Steps::rest`]); a pulse adds its set bit to one slot
-//! per slot of its length. So a pulse ends without further action, and an unwritten buffer holds every pin low.
+//! where both are given (RM0090, 8.4.7). A slot without a pulse holds every step pin at its idle level ([`Steps::rest`]); a pulse exchanges the set and the reset bit of
+//! its pin in one slot per slot of its length. So a pulse ends without further action, an unwritten buffer holds every pin idle, and a pin whose pulses are low costs what
+//! any other does.
 //!
 //! # Guarantees
 //! - The number of steps is that of the position, rounded to the nearest, at any distance: the position is kept as
@@ -181,8 +182,10 @@ impl CheckedSteps {
 #[derive(Debug)]
 pub struct Steps {
     checked: CheckedSteps,
-    /// Set bit of each axis in its port's word.
+    /// Set and reset bit of each axis in its port's word.
     bits: [u32; 3],
+    /// The word of a slot without a pulse.
+    rest: u32,
     axes: [Axis; 3],
     /// The last target position of the axes, nm.
     cl_nm: [i32; 3],
@@ -194,12 +197,25 @@ impl Steps {
     pub fn new(checked: CheckedSteps, pins: [u8; 3]) -> Self {
         let mut steps = Self {
             checked,
-            bits: pins.map(|pin| 1 << (pin & 15)),
+            bits: pins.map(|pin| 0x1_0001 << (pin & 15)),
+            rest: 0,
             axes: [Axis::new(); 3],
             cl_nm: [0; 3],
         };
+        steps.set_low_pulses(0);
         steps.place([0; 3]);
         steps
+    }
+
+    /// Axes whose pulses are low, one bit each; the others' are high. The slots have to be at the new [`Self::rest`] before the next pulse.
+    pub fn set_low_pulses(&mut self, axes: u8) {
+        let [x, y, z] = self.bits;
+        let low = [x, y, z]
+            .into_iter()
+            .enumerate()
+            .filter(|(axis, _)| axes >> axis & 1 != 0)
+            .fold(0, |bits, (_, bit)| bits | bit);
+        self.rest = (low & 0xffff) | ((x | y | z) & !low & 0xffff_0000);
     }
 
     /// Changes the settings of the drives. The position is kept; steps carried over are dropped.
@@ -228,11 +244,10 @@ impl Steps {
         &self.checked
     }
 
-    /// The word of a slot without a pulse: every step pin low.
+    /// The word of a slot without a pulse: every step pin at its idle level.
     #[must_use]
-    pub fn rest(&self) -> u32 {
-        let [x, y, z] = self.bits;
-        (x | y | z) << 16
+    pub const fn rest(&self) -> u32 {
+        self.rest
     }
 
     /// Steps output to each axis, as of the end of the next period.

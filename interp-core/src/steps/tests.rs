@@ -27,12 +27,20 @@ struct Port {
     config: StepConfig,
     periods: u64,
     pins: [Pin; 3],
+    /// Axes whose pulses are low, one bit each.
+    low: u8,
 }
 
 impl Port {
     fn new(config: StepConfig) -> Self {
-        let steps = Steps::new(config.check().unwrap(), PINS);
+        Self::with_low(config, 0)
+    }
+
+    fn with_low(config: StepConfig, low: u8) -> Self {
+        let mut steps = Steps::new(config.check().unwrap(), PINS);
+        steps.set_low_pulses(low);
         Self {
+            low,
             slots: [steps.rest(); BUFFER_WORDS],
             steps,
             config,
@@ -55,12 +63,13 @@ impl Port {
             pin.rises.clear();
         }
         let rest = self.steps.rest();
-        let known = rest >> 16 | rest;
+        let pins = PINS.iter().fold(0, |bits, pin| bits | 1 << pin);
         for (slot, word) in (begin..).zip(&mut self.slots[..SLOTS as usize]) {
-            assert_eq!(*word & !known, 0, "another pin is touched");
-            assert_eq!(*word & rest, rest);
+            // Each pin is either set or reset, and no other is touched.
+            assert_eq!((*word >> 16, *word & 0xffff & !pins), (!*word & pins, 0));
             for (axis, pin) in self.pins.iter_mut().enumerate() {
-                pin.take(slot, *word >> PINS[axis] & 1 == 1, axis, &self.config);
+                let is_pulse = *word >> PINS[axis] & 1 != u32::from(self.low >> axis & 1);
+                pin.take(slot, is_pulse, axis, &self.config);
             }
             *word = rest;
         }
@@ -296,7 +305,7 @@ fn walk(random: &mut Random, periods: u32) -> u64 {
     let ratios = [ratio(random), ratio(random), ratio(random)];
     let config = config(ratios, 1 + random.below(24) as u8, random.below(481) as u16);
     let Ok(checked) = config.check() else { return 0 };
-    let mut port = Port::new(config);
+    let mut port = Port::with_low(config, random.below(8) as u8);
     let mut at = [0, 1, 2].map(|_| random.within(1_000_000_000) as i32);
     port.place(at);
     let most_nm = ratios.map(|(steps, mm)| {
