@@ -157,6 +157,6 @@ mod tests {
         let text = include_str!("../../../jobs/sphere_cap.toml").replace("along = \"u\"", "along = \"v\"");
         let found = advice(&text);
         assert_eq!((found.spacing, found.saved()), (Spacing::Exact, None));
-        assert!(found.sentence().contains("pole"), "{}", found.sentence());
+        assert!(found.sentence().contains("single point"), "{}", found.sentence());
     }
 }

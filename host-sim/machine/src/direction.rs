@@ -201,10 +201,11 @@ pub(crate) fn run_trial(job: &Job, along: Along, spacing: Spacing, ticks_max: u6
         Ok(()) if ticks > ticks_max => Some(format!("it takes more than {ticks_max} periods")),
         Ok(()) => None,
     };
+    let ready = rejection.is_none().then_some((job, prepared));
     TrialResult {
         along,
         trial: trial(ticks, rejection),
-        ready: Some((job, prepared)),
+        ready,
         started: true,
     }
 }
