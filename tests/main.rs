@@ -25,6 +25,7 @@ mod operations;
 mod oracle_golden;
 mod overrun;
 mod paper;
+mod pause;
 mod pass_times;
 mod protocol;
 mod qemu;

@@ -62,7 +62,7 @@ mod app {
             step_output::StepDriver,
             watchdog::Watchdog,
         },
-        guarded_machine::{BoardRealTime, GuardedMachine},
+        guarded_machine::{BoardJournal, BoardRealTime, GuardedMachine},
         plan_task,
         sample_task::{Guards, SampleTask},
         watch::Watch,
@@ -91,6 +91,7 @@ mod app {
         transmitter: Transmitter,
         led: StatusLed<Output>,
         settings: Settings<board::SettingsFlash>,
+        journal: BoardJournal,
         bytes_in: Producer<'static, u8>,
         bytes_out: Consumer<'static, u8>,
         commands_in: Producer<'static, Instruction>,
@@ -137,6 +138,7 @@ mod app {
         }
         // Before the first tick, because an erase stops the processor.
         let settings = Settings::open(board.settings);
+        let journal = BoardJournal::open(board.journal);
         let timer = SampleTimer::new(board.tim2, board.tim5, board::TIMER_RELOAD, PERIOD_COUNTS);
         let mut real_time = RealTime::with_store(context.local.store);
         real_time.set_tick_budget(TICK_BUDGET_CYCLES);
@@ -170,6 +172,7 @@ mod app {
                 transmitter,
                 led: StatusLed::new(Output::new(LED.pin), LED.active),
                 settings,
+                journal,
                 bytes_in,
                 bytes_out,
                 commands_in,
@@ -243,13 +246,14 @@ mod app {
     /// | a miss | in lockstep time waits for it; on a free clock events are lost once their queue is full, and counted (`samples_lost`) |
     #[idle(
         shared = [real_time],
-        local = [transmitter, led, settings, bytes_out, commands_in, events_out]
+        local = [transmitter, led, settings, journal, bytes_out, commands_in, events_out]
     )]
     fn idle(context: idle::Context) -> ! {
         let idle::LocalResources {
             transmitter,
             led,
             settings,
+            journal,
             bytes_out,
             commands_in,
             events_out,
@@ -260,6 +264,7 @@ mod app {
             real_time,
             commands: commands_in,
             settings,
+            journal,
         };
         transmitter.listen();
         let mut link = Link::new();
@@ -280,6 +285,7 @@ mod app {
                 link.flush(&mut send);
                 last_event = None;
             }
+            link.keep_journal(now, &mut machine);
             if watch.is_due(now) {
                 watch.look(now, &mut machine, bytes_lost());
                 led.show(watch.state, now);

@@ -304,6 +304,7 @@ mod tests {
             spindle: Some(SpindleSettings {
                 max_rpm: u32::MAX,
                 at_speed_ticks: u32::MAX,
+                stops_at_pause: true,
             }),
             ..PROFILE
         };

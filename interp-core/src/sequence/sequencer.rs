@@ -14,6 +14,7 @@ use crate::feed::profile::Profiles;
 use crate::feed::turn::Turn;
 use crate::job::program::{Job, Program};
 use crate::job::{AxisLimits, Pattern};
+use crate::math::arith::count_to_f32;
 use crate::math::number::{Bounded, to_f32};
 use crate::pass::front::NextRoute;
 use crate::pass::route::Route;
@@ -21,6 +22,7 @@ use crate::pass::run::Run;
 use crate::pass::scan::cycles::{NEXT, PATCH};
 use crate::sample::{Sample, SpanParameter};
 use crate::sequence::hop::Hop;
+use crate::sequence::pause::Return;
 use crate::sequence::legs::{Goal, Leg, LegPlanning};
 use crate::sequence::link::{BoundaryEnd, BoundaryStepOver, StraightMove, check_faces_up};
 use crate::sequence::lookahead::{Lookahead, PassPlan, has_turns};
@@ -77,6 +79,8 @@ pub(super) enum Phase {
     Pass,
     /// The tool is in a turn from pass to pass.
     Turn,
+    /// The tool is held at the safe height, for a pause.
+    Lifted,
     /// The sequence is over.
     Done,
 }
@@ -90,6 +94,8 @@ pub(crate) enum Outcome {
     Link,
     /// The last sample was emitted.
     Finished,
+    /// The tool has retracted for a pause, and waits.
+    Lifted,
 }
 
 /// Planning of the next pass.
@@ -139,7 +145,7 @@ pub(crate) struct Sequencer {
     /// The second plan is that of the current or last pass.
     pub(super) second: bool,
     /// Whether the tool has been on a pass since the start.
-    on_surface: bool,
+    pub(super) on_surface: bool,
     /// A fault of the next pass, reported when the tool reaches the pass.
     pub(super) pending: Option<Fault>,
     pub(super) follower: Follower,
@@ -148,7 +154,7 @@ pub(crate) struct Sequencer {
     /// The turn that the tool is in, or was last.
     pub(super) turn: Turn,
     pub(super) straight: StraightMove,
-    hop: Hop,
+    pub(super) hop: Hop,
     /// Whether the hop to the next pass is to be planned.
     has_hop: bool,
     step_over: BoundaryStepOver,
@@ -172,6 +178,11 @@ pub(crate) struct Sequencer {
     correction: Option<Correction>,
     /// Whether the rows of patches are there that the planning of the pass after the next needs.
     has_rows: bool,
+    /// Where a pause leads back to.
+    pub(super) back: Return,
+    /// The first pass of the next run, and of this one: those before it are skipped.
+    wanted_pass: u32,
+    first_pass: u32,
 }
 
 /// The plans of the current or last pass, and of the next.
@@ -213,11 +224,26 @@ impl Sequencer {
         cell: [0; 2],
         correction: None,
         has_rows: false,
+        back: Return::NONE,
+        wanted_pass: 0,
+        first_pass: 0,
     };
+
+    /// Sets the pass with which the next run begins.
+    pub(crate) const fn begin_at(&mut self, pass: u32) {
+        self.wanted_pass = pass;
+    }
+
+    /// The pass with which this run begins.
+    pub(crate) const fn first_pass(&self) -> u32 {
+        self.first_pass
+    }
 
     /// Starts the job from the tool's position.
     pub(crate) fn restart(&mut self, first: Route, axes: &AxisLimits) {
+        self.first_pass = core::mem::take(&mut self.wanted_pass);
         self.at.get_or_insert(axes.home_nm);
+        self.back = Return::NONE;
         self.phase = Phase::Await;
         self.second = false;
         self.on_surface = false;
@@ -254,7 +280,7 @@ impl Sequencer {
             Phase::StepOver => self.step_over.progress.is_at_rest(),
             Phase::Leg(_) => self.straight.progress.is_at_rest(),
             Phase::Hop => self.hop.is_at_rest(),
-            Phase::Await | Phase::AwaitGoal(_) | Phase::Done => true,
+            Phase::Await | Phase::AwaitGoal(_) | Phase::Lifted | Phase::Done => true,
         }
     }
 
@@ -317,7 +343,7 @@ impl Sequencer {
             Phase::Leg(_) => self.straight.progress.has_work(),
             Phase::Hop => self.hop.has_work(),
             Phase::AwaitGoal(leg) => self.has_to_plan_leg(leg),
-            Phase::Await | Phase::Done => false,
+            Phase::Await | Phase::Lifted | Phase::Done => false,
         };
         let wants_more = self.phase == Phase::Pass && self.feed_factor > 1.0;
         is_busy
@@ -530,6 +556,10 @@ impl Sequencer {
                 if let (Some(estimator), _) = run.estimator_and_lines() {
                     estimator.enter_row(next.route.side.span);
                 }
+                if pass == self.first_pass {
+                    // It begins at rest, wherever the pass before it would have led.
+                    now.tail = Turn::NONE;
+                }
                 self.lookahead.begin(pass, next.route, &now.tail, next);
                 next.is_last = run.is_last_pass();
                 self.planning = Planning::Stations;
@@ -539,6 +569,9 @@ impl Sequencer {
                 self.pending = self.lookahead.work(job, axes, estimator, lines, next).err();
                 if self.lookahead.is_done() {
                     next.is_last |= next.next.is_none() && !job.header.spacing.is_constant();
+                    if next.pass < self.first_pass {
+                        return self.skip(run);
+                    }
                     self.planning = if next.point {
                         Planning::Complete
                     } else {
@@ -601,6 +634,19 @@ impl Sequencer {
             }
             Planning::Complete => {}
         }
+    }
+
+    /// Goes on to the pass after one that is skipped, as if the tool had been on it.
+    fn skip(&mut self, run: &mut Run) {
+        let (_, next) = both(&mut self.plans, self.second);
+        if self.pending.is_some() {
+            return;
+        }
+        if next.is_last {
+            self.pending = Some(Fault::new(FaultKind::WrongState, count_to_f32(next.pass)));
+            return;
+        }
+        self.swap(run);
     }
 
     /// Plans what is ahead anew where the override asks for more than the plans give.
@@ -685,6 +731,9 @@ impl Sequencer {
             self.follow_link(job, run, command, last)?;
         }
         self.at = Some(last.cl_nm);
+        if self.phase == Phase::Lifted {
+            return Ok(Outcome::Lifted);
+        }
         // The first and the last sample of a pass belong to the pass.
         Ok(if was_link && self.is_link() {
             Outcome::Link
@@ -837,7 +886,7 @@ impl Sequencer {
             Phase::Hop | Phase::Leg(_) | Phase::AwaitGoal(_) => {
                 Some(next).filter(|_| self.goal == Goal::Pass && is_located)
             }
-            Phase::Await | Phase::Pass | Phase::Done => None,
+            Phase::Await | Phase::Pass | Phase::Lifted | Phase::Done => None,
         }
     }
 
