@@ -5,6 +5,7 @@
 //! files.
 
 mod attached;
+mod card;
 mod disturbed;
 mod emulated;
 mod machine;

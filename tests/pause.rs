@@ -8,7 +8,7 @@ use machine::prepare::prepare;
 use crate::pass_times::limited;
 
 /// A sample job within limits.
-fn sample_job(name: &str, pattern: Pattern, overrun_mm: f64, spacing: Option<Spacing>) -> Job {
+pub(crate) fn sample_job(name: &str, pattern: Pattern, overrun_mm: f64, spacing: Option<Spacing>) -> Job {
     let path = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join(format!("../jobs/{name}.toml"));
     let mut job = limited(job_file::load(&path).unwrap(), 50.0);
     job.machine.limits = Some(AxisLimits {
@@ -33,8 +33,16 @@ fn jobs() -> Vec<(String, Job)> {
         let job = sample_job("torus", pattern, overrun_mm, None);
         jobs.push((format!("torus {pattern:?} {overrun_mm}"), job));
     }
-    jobs.push(("region".to_owned(), sample_job("region", Pattern::Zigzag, 0.0, None)));
-    let constant = sample_job("freeform", Pattern::Zigzag, 0.0, Some(Spacing::Constant(job::Start::Edge)));
+    jobs.push((
+        "region".to_owned(),
+        sample_job("region", Pattern::Zigzag, 0.0, None),
+    ));
+    let constant = sample_job(
+        "freeform",
+        Pattern::Zigzag,
+        0.0,
+        Some(Spacing::Constant(job::Start::Edge)),
+    );
     jobs.push(("constant".to_owned(), constant));
     jobs
 }
@@ -89,7 +97,11 @@ fn a_run_that_begins_at_a_pass_has_the_same_passes() {
                 for (rest, all) in rest.iter().zip(all) {
                     assert_eq!(rest.pass, all.pass, "{name} {first}");
                     let apart = distance_nm(rest.cl_nm, all.cl_nm);
-                    assert!(apart <= most, "{name} {first}: pass {} is {apart} nm off", all.pass);
+                    assert!(
+                        apart <= most,
+                        "{name} {first}: pass {} is {apart} nm off",
+                        all.pass
+                    );
                     if !matches!(job.spacing, Spacing::Constant(_)) {
                         assert_eq!(rest.side, all.side, "{name} {first}");
                     }
@@ -198,11 +210,15 @@ fn a_pause_comes_back_to_the_same_sample() {
             let away = with_pause.len();
             rest(&mut paused, Command::Resume, &mut with_pause);
             check_limits(&name, &with_pause, &limits);
-            if stood.path == interp_core::SpanParameter::NONE && stood.pass == 0 && stood.cc_nm == stood.cl_nm {
+            if stood.path == interp_core::SpanParameter::NONE && stood.pass == 0 && stood.cc_nm == stood.cl_nm
+            {
                 // On the way to a pass: it leads there from above.
                 continue;
             }
-            let Some(back) = with_pause[away..].iter().position(|sample| sample.cl_nm == stood.cl_nm) else {
+            let Some(back) = with_pause[away..]
+                .iter()
+                .position(|sample| sample.cl_nm == stood.cl_nm)
+            else {
                 assert_eq!(stood.cc_nm, stood.cl_nm, "{name}: it does not come back");
                 continue;
             };
@@ -225,9 +241,15 @@ fn a_pause_comes_back_to_the_same_sample() {
             if matches!(job.spacing, Spacing::Constant(_)) {
                 // The ways of the pause take planning from the next front, so the passes behind it may be slower; they are the same.
                 let places = |samples: &[Sample]| -> Vec<_> {
-                    ends(samples).iter().map(|ends| ends.map(|end| end.cl_nm)).collect()
+                    ends(samples)
+                        .iter()
+                        .map(|ends| ends.map(|end| end.cl_nm))
+                        .collect()
                 };
-                assert!(places(&with_pause[back..]) == places(&with_hold[from..]), "{name}");
+                assert!(
+                    places(&with_pause[back..]) == places(&with_hold[from..]),
+                    "{name}"
+                );
             } else {
                 let same = path(&with_pause[back..]) == path(&with_hold[from..]);
                 assert!(same, "{name}: the path after it");

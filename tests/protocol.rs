@@ -19,9 +19,10 @@ use protocol::{
     frame::{Decoder, FRAME_MAX, FrameError, write_reply},
     message::{
         Activity, Batch, Capabilities, Clock, Configuration, Description, Excess, FaultReport, Homing,
-        InputLines, JogWay, Journal, LinkTimeoutAction, MotionEnd, MotionStatus, Offsets, PassDigest, Profile,
-        ProfileLimit, Reason, Reply, Report, Request, ResetCause, SafetyStatus, SampleRecord, SpindleOrder,
-        SpindleSettings, Status, StepSettings, StreamStatus, Turning, Words, read_reply, read_request,
+        InputLines, JogWay, Journal, LinkTimeoutAction, MotionEnd, MotionStatus, Offsets, PassDigest,
+        Profile, ProfileLimit, Reason, Reply, Report, Request, ResetCause, SafetyStatus, SampleRecord,
+        SpindleOrder, SpindleSettings, Status, StepSettings, StreamStatus, Turning, Words, read_reply,
+        read_request,
     },
 };
 

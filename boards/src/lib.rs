@@ -42,8 +42,25 @@ pub struct Board {
     pub crystal_mhz: u32,
     /// The Cargo alias that builds its image, and the image's folder under `target/`.
     pub build: (&'static str, &'static str),
+    /// Its boot loader, which takes an image from a card; none where the chip starts the image itself.
+    pub loader: Option<Loader>,
+    /// How to enter the chip's own loader (DFU by USB), in words; none where the board cannot.
+    pub dfu: Option<&'static str>,
     /// Every pin that is used or held inactive.
     pub lines: &'static [Line],
+}
+
+/// A boot loader in the first sectors of flash.
+#[derive(Clone, Copy, Debug)]
+pub struct Loader {
+    /// The Cargo alias that builds the image for it, and the image's folder under `target/`.
+    pub build: (&'static str, &'static str),
+    /// First address of the image.
+    pub image_begin: u32,
+    /// The file that it looks for in the card's root folder.
+    pub file: &'static str,
+    /// The file's name after it was written.
+    pub done_file: &'static str,
 }
 
 /// A chip: its identity in the reference manual (RM0090) and in probe-rs, and its package.

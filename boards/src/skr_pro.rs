@@ -14,6 +14,8 @@
 //! - The spindle is on EXP1 and EXP2, 3.3 V: enable and direction, and PB15 as the only free output of a timer that nothing else uses. FAN0 switches the coolant.
 //! - USART1 is on the TFT socket, at 3.3 V. USB goes to the OTG port, which this firmware does not use.
 //! - The LED D13 is connected to PA7 through 1 kOhm and is lit while the pin is high.
+//! - The maker's boot loader is in sectors 0 and 1, 32 KB: Marlin's environment `BIGTREE_SKR_PRO` and Klipper's configuration link behind it, too. The chip's own loader
+//!   cannot be reached by USB on this board (Klipper's `Bootloaders.md`), but by USART1 on the TFT socket.
 //! - Heaters and fans are switched by MOSFETs whose inputs are active high, the enable inputs of the other three drivers are active low: all are
 //!   kept off.
 
@@ -21,7 +23,7 @@ use crate::{
     Axis::{X, Y, Z},
     Board, Chip,
     Level::{High, Low},
-    Line, Package,
+    Line, Loader, Package,
     Port::{A, B, C, D, E, F, G},
     Role::{
         Coolant, Direction, DriveFault, EmergencyStop, Enable, LimitMax, LimitMin, Parked, Probe, SerialRx,
@@ -41,6 +43,13 @@ pub const SKR_PRO: Board = Board {
     },
     crystal_mhz: 8,
     build: ("fw-skr-pro", "skr-pro"),
+    loader: Some(Loader {
+        build: ("fw-skr-pro-card", "skr-pro-card"),
+        image_begin: 0x0800_8000,
+        file: "firmware.bin",
+        done_file: "FIRMWARE.CUR",
+    }),
+    dfu: None,
     lines: &[
         Line::new(Step(X), E, 9, High, "driver socket X"),
         Line::new(Direction(X), F, 1, High, "driver socket X"),

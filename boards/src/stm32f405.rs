@@ -28,6 +28,10 @@ pub const STM32F405: Board = Board {
     },
     crystal_mhz: 8,
     build: ("fw-chip", "chip"),
+    loader: None,
+    dfu: Some(
+        "connect BOOT0 to 3.3 V and BOOT1 (PB2) to ground, PA11 and PA12 to D- and D+ of a USB plug, and switch the board on",
+    ),
     lines: &[
         Line::new(Step(X), C, 6, High, "the pin"),
         Line::new(Direction(X), B, 12, High, "the pin"),

@@ -42,12 +42,14 @@ impl Link {
     }
 
     /// Puts the profile that the board keeps in force. To be called once, before the first byte.
+    #[inline(never)]
     pub fn power_up(&mut self, machine: &mut impl Machine) {
         // Nothing is under way yet, which alone could refuse it.
         let _ = self.session.enforce_profile(machine);
     }
 
     /// Takes one byte from the host; `out` receives the bytes of the answer, if the byte ends a frame.
+    #[inline(never)]
     pub fn receive(&mut self, byte: u8, machine: &mut impl Machine, out: &mut impl FnMut(&[u8])) {
         match self.decoder.push(byte) {
             None => {}
@@ -63,6 +65,7 @@ impl Link {
     }
 
     /// Reports a frame lost before it reached the link (by a receiver overrun, for instance).
+    #[inline(never)]
     pub fn damaged(&mut self, error: FrameError, out: &mut impl FnMut(&[u8])) {
         self.session.count_bad_frame();
         out(&[DELIMITER]);
@@ -82,6 +85,7 @@ impl Link {
     }
 
     /// Writes an event. Samples are collected until a frame is full; every other event sends them first.
+    #[inline(never)]
     pub fn event(&mut self, event: &Event, out: &mut impl FnMut(&[u8])) {
         match event {
             Event::Sample(sample) => self.sample(sample, out),
@@ -103,6 +107,7 @@ impl Link {
     }
 
     /// Adds a sample, and writes the frame once it is full.
+    #[inline(never)]
     pub fn sample(&mut self, sample: &Sample, out: &mut impl FnMut(&[u8])) {
         if !self.is_open() {
             return;
@@ -140,6 +145,7 @@ impl Link {
 }
 
 /// Writes the samples collected so far, if there are any. Not a method, because a frame of the decoder is borrowed where it is called.
+#[inline(never)]
 fn flush(batch: &mut Batch, session: &mut Session, out: &mut impl FnMut(&[u8])) {
     if !batch.is_empty() {
         let samples = core::mem::take(batch);

@@ -7,8 +7,8 @@ use interp_core::{
     steps::{CheckedSteps, StepConfig},
 };
 use protocol::message::{
-    CHUNK_WORDS_MAX, Clock, Description, InputLines, Journal, MotionStatus, Offsets, PassDigest, Profile, Reason,
-    Report, Status,
+    CHUNK_WORDS_MAX, Clock, Description, InputLines, Journal, MotionStatus, Offsets, PassDigest, Profile,
+    Reason, Report, Status,
 };
 
 use crate::{safety::Order, storage::StorageError};

@@ -11,10 +11,9 @@ use interp_core::{
 use protocol::{
     frame::{DELIMITER, FRAME_MAX, Frame, write_reply},
     message::{
-        Activity, Capabilities, Clock, Configuration, Excess, Journal, NO_NUMBER, OVERRIDE_MAX_PERCENT, Offsets,
-        PassDigest,
-        Profile, ProfileLimit, Reason, Reply, Request, Status, StepSettings, job_mark, next_number,
-        read_request,
+        Activity, Capabilities, Clock, Configuration, Excess, Journal, NO_NUMBER, OVERRIDE_MAX_PERCENT,
+        Offsets, PassDigest, Profile, ProfileLimit, Reason, Reply, Request, Status, StepSettings, job_mark,
+        next_number, read_request,
     },
     version::PROTOCOL_VERSION,
 };
@@ -73,13 +72,11 @@ impl Last {
             && self.crc == frame.crc
     }
 
+    #[inline(never)]
     fn set(&mut self, number: u16, frame: &Frame<'_>, answer: &Reply) {
-        *self = Self {
-            number,
-            length: frame.payload.len(),
-            crc: frame.crc,
-            answer: Vec::new(),
-        };
+        self.number = number;
+        self.length = frame.payload.len();
+        self.crc = frame.crc;
         let capacity = self.answer.capacity();
         self.answer.resize_default(capacity).ok();
         let length = write_reply(answer, &mut self.answer).map_or(0, <[u8]>::len);
@@ -132,25 +129,16 @@ impl Session {
     /// # Errors
     /// A run is under way.
     pub(crate) fn enforce_profile(&mut self, machine: &mut impl Machine) -> Result<(), Reason> {
-        let profile = machine.profile();
-        self.profile = profile.map_or(0, |profile| profile.digest());
-        let configuration = profile.map_or(Configuration::DEFAULT, |profile| profile.configuration);
-        machine.order(Order::Configure(configuration))?;
-        #[allow(clippy::cast_precision_loss, reason = "a period is below 2^24 us")]
-        let period_s = machine.description().period_us as f32 * 1e-6;
-        machine.order(Order::SetUp(
-            profile.map(|profile| Setup::new(&profile, period_s)),
-        ))?;
+        self.profile = supervise(machine)?;
+        set_up(machine)?;
         let own = own_steps(machine);
         self.set_steps(machine, own)
     }
 
     /// Keeps another profile, or none.
+    #[inline(never)]
     fn set_profile(&mut self, machine: &mut impl Machine, profile: Option<&Profile>) -> Result<(), Reason> {
-        let state = machine.status().state;
-        if state.is_under_way() {
-            return Err(Reason::WrongState { state });
-        }
+        no_run(machine)?;
         if profile.is_some_and(|profile| !profile.is_valid()) {
             return Err(Reason::BadProfile);
         }
@@ -163,11 +151,9 @@ impl Session {
     }
 
     /// Keeps other work offsets. The job loaded was placed by those before.
+    #[inline(never)]
     fn set_offsets(&mut self, machine: &mut impl Machine, offsets: &Offsets) -> Result<(), Reason> {
-        let state = machine.status().state;
-        if state.is_under_way() {
-            return Err(Reason::WrongState { state });
-        }
+        no_run(machine)?;
         machine
             .keep_offsets(offsets)
             .map_err(|StorageError| Reason::Storage)?;
@@ -185,6 +171,7 @@ impl Session {
     }
 
     /// The status of an answer: with the link's counters, and the settings of the drives.
+    #[inline(never)]
     fn complete_with_steps(&mut self, machine: &mut impl Machine) -> Status {
         let config = self.steps.unwrap_or_else(|| own_steps(machine));
         self.steps = Some(config);
@@ -259,6 +246,7 @@ impl Session {
     }
 
     /// Writes the end of a run, or that its ticks are used up.
+    #[inline(never)]
     pub(crate) fn halted(&mut self, status: &Status, out: &mut impl FnMut(&[u8])) {
         let status = self.complete(*status);
         self.event(|events| Reply::Halted(Status { events, ..status }), out);
@@ -266,27 +254,21 @@ impl Session {
 
     /// Answers a frame. Whether it is a sign of life: a request that was carried out or refused on its merits, now or when it was first sent. Noise, frames of
     /// another session and requests out of order are none.
+    #[inline(never)]
     pub(crate) fn frame(
         &mut self,
         frame: Frame<'_>,
         machine: &mut impl Machine,
         out: &mut impl FnMut(&[u8]),
     ) -> bool {
-        let (number, request) = match read_request(frame.payload) {
-            Ok((number, request)) => (number, Some(request)),
-            Err(unreadable) => (unreadable.number, None),
+        let read = read_request(frame.payload);
+        let number = match &read {
+            Ok((number, _)) => *number,
+            Err(unreadable) => unreadable.number,
         };
-        if let Some(Request::Hello { version, session }) = request {
+        if let Ok((_, Request::Hello { version, session })) = read {
             self.hello(number, version, session);
-            let description = machine.description();
-            let capabilities = Capabilities {
-                number,
-                version: PROTOCOL_VERSION,
-                session,
-                description,
-            };
-            out(&[DELIMITER]);
-            send(&Reply::Capabilities(capabilities), out);
+            send_capabilities(number, session, machine, out);
             return self.is_open();
         }
         if self.last.is(number, &frame) {
@@ -294,27 +276,22 @@ impl Session {
             return true;
         }
         if let Some(reason) = self.refusal(number) {
-            send(&Reply::Nak { number, reason }, out);
+            refuse(number, reason, out);
             return false;
         }
-        if let Some(request) = request {
+        if let Ok((_, request)) = &read {
             let answer = self.answer(number, request, machine, out);
             self.last.set(number, &frame, &answer);
             out(&self.last.answer);
             true
         } else {
-            send(
-                &Reply::Nak {
-                    number,
-                    reason: Reason::Unreadable,
-                },
-                out,
-            );
+            refuse(number, Reason::Unreadable, out);
             false
         }
     }
 
     /// Opens a session, unless it is open already: then this `Hello` is a retransmission, and changes nothing.
+    #[inline(never)]
     fn hello(&mut self, number: u16, version: u16, session: u32) {
         let peer = if version == PROTOCOL_VERSION {
             Peer::Host { session }
@@ -349,14 +326,15 @@ impl Session {
     }
 
     /// Executes a request.
+    #[inline(never)]
     fn answer(
         &mut self,
         number: u16,
-        request: Request,
+        request: &Request,
         machine: &mut impl Machine,
         out: &mut impl FnMut(&[u8]),
     ) -> Reply {
-        let done = match request {
+        let done = match *request {
             Request::Status => {
                 return Reply::Status {
                     number,
@@ -387,9 +365,9 @@ impl Session {
                     offsets: machine.offsets(),
                 };
             }
-            _ if needs_rest(&request) && machine.motion().activity != Activity::Rest => Err(Reason::Moving),
-            Request::SetProfile(profile) => self.set_profile(machine, profile.as_ref()),
-            Request::SetOffsets(offsets) => self.set_offsets(machine, &offsets),
+            _ if needs_rest(request) && machine.motion().activity != Activity::Rest => Err(Reason::Moving),
+            Request::SetProfile(ref profile) => self.set_profile(machine, profile.as_ref()),
+            Request::SetOffsets(ref offsets) => self.set_offsets(machine, offsets),
             Request::Jog {
                 axis,
                 way,
@@ -405,11 +383,11 @@ impl Session {
             Request::Spindle(order) => machine.order(Order::Spindle(order)),
             Request::Home { axes } => machine.order(Order::Move(Motion::Home { axes })),
             Request::JobBegin {
-                header,
+                ref header,
                 words,
                 digest,
-            } => self.job_begin(machine, &header, words, digest),
-            Request::JobChunk { offset, words } => match &mut self.upload {
+            } => self.job_begin(machine, header, words, digest),
+            Request::JobChunk { offset, ref words } => match &mut self.upload {
                 Some(upload) => upload.chunk(machine, offset, words.as_slice()),
                 None => Err(Reason::NoUpload),
             },
@@ -455,6 +433,7 @@ impl Session {
     }
 
     /// Refuses while commands for the previous job are queued.
+    #[inline(never)]
     fn job_begin(
         &mut self,
         machine: &mut impl Machine,
@@ -487,6 +466,7 @@ impl Session {
         Ok(())
     }
 
+    #[inline(never)]
     fn job_end(&mut self, machine: &mut impl Machine) -> Result<(), Reason> {
         let upload = self.upload.ok_or(Reason::NoUpload)?;
         if upload.is_streamed() {
@@ -498,6 +478,7 @@ impl Session {
     }
 
     /// Queues a command if the state permits it. `pass`: the one that a start begins with.
+    #[inline(never)]
     fn operate(&mut self, machine: &mut impl Machine, command: Command, pass: u32) -> Result<(), Reason> {
         let ends = matches!(
             command,
@@ -533,10 +514,7 @@ impl Session {
 
     /// A change of the clock during a motion would be a velocity step of the axes.
     fn set_clock(&mut self, machine: &mut impl Machine, clock: Clock) -> Result<(), Reason> {
-        let state = machine.status().state;
-        if state.is_under_way() {
-            return Err(Reason::WrongState { state });
-        }
+        no_run(machine)?;
         instruct(machine, Instruction::Clock(clock))?;
         self.clock = clock;
         Ok(())
@@ -558,7 +536,38 @@ const fn needs_rest(request: &Request) -> bool {
     )
 }
 
+/// Refuses while a run is under way.
+#[inline(never)]
+fn no_run(machine: &mut impl Machine) -> Result<(), Reason> {
+    let state = machine.status().state;
+    if state.is_under_way() {
+        return Err(Reason::WrongState { state });
+    }
+    Ok(())
+}
+
+/// Puts the supervision of the kept profile in force; returns the profile's digest, 0 where there is none.
+#[inline(never)]
+fn supervise(machine: &mut impl Machine) -> Result<u32, Reason> {
+    let profile = machine.profile();
+    let configuration = profile.map_or(Configuration::DEFAULT, |profile| profile.configuration);
+    machine.order(Order::Configure(configuration))?;
+    Ok(profile.map_or(0, |profile| profile.digest()))
+}
+
+/// Puts what the kept profile says of motion outside a job in force.
+#[inline(never)]
+fn set_up(machine: &mut impl Machine) -> Result<(), Reason> {
+    #[allow(clippy::cast_precision_loss, reason = "a period is below 2^24 us")]
+    let period_s = machine.description().period_us as f32 * 1e-6;
+    let profile = machine.profile();
+    machine.order(Order::SetUp(
+        profile.map(|profile| Setup::new(&profile, period_s)),
+    ))
+}
+
 /// The settings of the drives of a job that has none: the profile's, or the board's own.
+#[inline(never)]
 fn own_steps(machine: &mut impl Machine) -> StepConfig {
     match machine.profile() {
         Some(profile) => profile.steps.into(),
@@ -598,10 +607,7 @@ fn set_override(machine: &mut impl Machine, percent: u8) -> Result<(), Reason> {
 
 /// Validated here, outside the tick; applied between two ticks.
 fn set_steps(machine: &mut impl Machine, config: StepConfig) -> Result<(), Reason> {
-    let state = machine.status().state;
-    if state.is_under_way() {
-        return Err(Reason::WrongState { state });
-    }
+    no_run(machine)?;
     let refused = |value: f32, record| Reason::Job {
         fault: Fault::new(FaultKind::BadHeader, value).into(),
         record,
@@ -621,6 +627,26 @@ fn set_steps(machine: &mut impl Machine, config: StepConfig) -> Result<(), Reaso
 
 fn instruct(machine: &mut impl Machine, instruction: Instruction) -> Result<(), Reason> {
     machine.send(instruction).map_err(|Busy| Reason::Busy)
+}
+
+/// Writes what the board is. Apart from [`Session::frame`], like the refusal, so that its stack is not a part of every request's.
+#[inline(never)]
+fn send_capabilities(number: u16, session: u32, machine: &mut impl Machine, out: &mut impl FnMut(&[u8])) {
+    out(&[DELIMITER]);
+    send(
+        &Reply::Capabilities(Capabilities {
+            number,
+            version: PROTOCOL_VERSION,
+            session,
+            description: machine.description(),
+        }),
+        out,
+    );
+}
+
+#[inline(never)]
+fn refuse(number: u16, reason: Reason, out: &mut impl FnMut(&[u8])) {
+    send(&Reply::Nak { number, reason }, out);
 }
 
 /// Writes one reply as a frame. Every message fits into [`FRAME_MAX`], as a test of the protocol checks.

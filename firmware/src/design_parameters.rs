@@ -6,13 +6,17 @@ use core::mem::size_of;
 
 use crate::guarded_machine::BoardRealTime;
 use controller::{
-    machine::{Event, Events, Instruction},
+    machine::{Events, Instruction},
     step_output::{Buffers, slot_counts},
 };
 use interp_core::job::{STORE_WORDS, SurfaceKind, patches_max};
 use protocol::{frame::FRAME_MAX, message::SAMPLES_MAX};
 
-use crate::{board, drivers::watchdog, sample_task::EventQueue};
+use crate::{
+    board,
+    drivers::watchdog,
+    events::{EventMemory, EventQueue},
+};
 
 /// Version reported to the host and in the first line of the log.
 pub(crate) const FIRMWARE_VERSION: [u16; 3] = [
@@ -118,7 +122,7 @@ const _: () = {
     // Memory.
     let machine = size_of::<BoardRealTime>() + 4 * JOB_WORDS + size_of::<Buffers>();
     let queues =
-        RECEIVE_PLACES + COMMAND_PLACES * size_of::<Instruction>() + EVENT_PLACES * size_of::<Event>();
+        RECEIVE_PLACES + COMMAND_PLACES * size_of::<Instruction>() + size_of::<EventMemory<EVENT_PLACES>>();
     assert!(
         machine + queues + STACK_BYTES <= RAM_BYTES,
         "no room is left for the stack"

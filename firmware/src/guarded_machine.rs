@@ -96,6 +96,7 @@ impl<M: Mutex<T = BoardRealTime>> Machine for GuardedMachine<'_, M> {
         self.settings.profile()
     }
 
+    #[inline(never)]
     fn keep_profile(&mut self, profile: Option<&Profile>) -> Result<(), StorageError> {
         self.settings.keep(profile)
     }

@@ -19,6 +19,7 @@
 mod board;
 mod design_parameters;
 mod drivers;
+mod events;
 mod guarded_machine;
 mod plan_task;
 mod sample_task;
@@ -33,11 +34,7 @@ defmt::timestamp!("{=u64:us}", u64::from(uptime_periods()) * u64::from(PERIOD_US
 mod app {
     use boards::{Line, Role};
     use controller::{
-        link::Link,
-        machine::{Event, Instruction},
-        realtime::RealTime,
-        settings::Settings,
-        step_output::Buffers,
+        link::Link, machine::Instruction, realtime::RealTime, settings::Settings, step_output::Buffers,
     };
     use cortex_m::peripheral::NVIC;
     use heapless::spsc::{Consumer, Producer, Queue};
@@ -62,6 +59,7 @@ mod app {
             step_output::StepDriver,
             watchdog::Watchdog,
         },
+        events::{EventMemory, EventSource},
         guarded_machine::{BoardJournal, BoardRealTime, GuardedMachine},
         plan_task,
         sample_task::{Guards, SampleTask},
@@ -95,7 +93,7 @@ mod app {
         bytes_in: Producer<'static, u8>,
         bytes_out: Consumer<'static, u8>,
         commands_in: Producer<'static, Instruction>,
-        events_out: Consumer<'static, Event>,
+        events_out: EventSource,
     }
 
     /// Interrupts are off until this returns, so that initialisation is complete before the first tick.
@@ -107,7 +105,7 @@ mod app {
         rest: u32 = 0,
         bytes: Queue<u8, RECEIVE_PLACES> = Queue::new(),
         commands: Queue<Instruction, COMMAND_PLACES> = Queue::new(),
-        events: Queue<Event, EVENT_PLACES> = Queue::new(),
+        events: EventMemory<EVENT_PLACES> = EventMemory::new(),
     ])]
     fn init(context: init::Context) -> (Shared, Local) {
         let board = board::init(context.device);

@@ -4,10 +4,10 @@
 use core::hint::black_box;
 
 use controller::{
-    machine::{Event, Events, Instruction},
+    machine::Instruction,
     realtime::{RealTime, TickInput},
 };
-use heapless::spsc::{Consumer, Producer};
+use heapless::spsc::Consumer;
 
 use crate::{
     drivers::{
@@ -18,6 +18,7 @@ use crate::{
         step_output::StepDriver,
         watchdog::{Registers, Watchdog},
     },
+    events::EventQueue,
     plan_task,
 };
 
@@ -50,13 +51,13 @@ impl SampleTask {
         timer: SampleTimer,
         counter: CycleCounter,
         commands: Consumer<'static, Instruction>,
-        events: Producer<'static, Event>,
+        events: EventQueue,
     ) -> Self {
         Self {
             timer,
             counter,
             commands,
-            events: EventQueue(events),
+            events,
             missed: 0,
             cycles: 0,
         }
@@ -104,19 +105,5 @@ impl SampleTask {
             guards.watchdog.feed();
         }
         plan_task::pend(real_time);
-    }
-}
-
-/// The event queue to the link.
-pub(crate) struct EventQueue(Producer<'static, Event>);
-
-impl Events for EventQueue {
-    #[inline]
-    fn has_room(&self) -> bool {
-        self.0.capacity() - self.0.len() >= Self::TICK_MAX
-    }
-
-    fn put(&mut self, event: Event) -> bool {
-        self.0.enqueue(event).is_ok()
     }
 }

@@ -207,6 +207,16 @@ fn nonsense_gets_a_remedy() {
             &["job.toml: it is no ELF file", "cargo fw-skr-pro"],
         ),
         (
+            "flash --board stm32f405 --sd .",
+            &["no boot loader that reads a card", "--dfu"],
+        ),
+        ("flash --board skr-pro --dfu", &["by USB", "--sd DIR"]),
+        (
+            "flash --board skr-pro --sd nowhere",
+            &["no folder nowhere", "FAT32"],
+        ),
+        ("flash --sd . --dfu", &["cannot be used with"]),
+        (
             "log --image part.step",
             &["part.step: it is no ELF file", "help:"],
         ),

@@ -436,6 +436,8 @@ pub(crate) struct Numbered<'a> {
 ///
 /// # Errors
 /// [`Unreadable`] for an unknown code, a value out of range, or bytes missing or left over.
+// Its stack is for the reading alone, not for what the caller does with the request.
+#[inline(never)]
 pub fn read_request(payload: &[u8]) -> Result<(u16, Request), Unreadable> {
     let (number, rest) =
         postcard::take_from_bytes::<u16>(payload).map_err(|_| Unreadable { number: NO_NUMBER })?;

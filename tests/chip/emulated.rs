@@ -133,15 +133,24 @@ impl Emulated {
         Self::begin(board, &["--machine", machine], false)
     }
 
+    /// Starts an execution of another image that records every change of the outputs.
+    pub(super) fn of_image(board: &'static Board, image: &Path, arguments: &[&str]) -> Self {
+        Self::begin_image(board, image, &[&["--fast"], arguments].concat(), true)
+    }
+
     fn begin(board: &'static Board, arguments: &[&str], is_recorded: bool) -> Self {
-        let folder = tempfile::tempdir().unwrap();
         let image = format!("target/{}/thumbv7em-none-eabihf/release/firmware", board.build.1);
+        Self::begin_image(board, &workspace().join(image), arguments, is_recorded)
+    }
+
+    fn begin_image(board: &'static Board, image: &Path, arguments: &[&str], is_recorded: bool) -> Self {
+        let folder = tempfile::tempdir().unwrap();
         let mut command = Command::new(&built().chip);
         if is_recorded {
             command.arg("--edges").arg(folder.path().join("edges"));
         }
         let child = command
-            .arg(workspace().join(image))
+            .arg(image)
             .arg("--pty")
             .arg(folder.path().join("line"))
             .arg("--report")

@@ -199,7 +199,9 @@ impl Bench {
             Order::Configure(_) | Order::Drives { on: false } => !under_way,
             Order::Drives { on: true } => !under_way && stops | rules.latched == 0,
             Order::SetHome { .. } => !under_way && rules.drives,
-            Order::SetUp(_) | Order::Move(_) | Order::Spindle(_) | Order::BeginAt(_) => unreachable!("not tried here"),
+            Order::SetUp(_) | Order::Move(_) | Order::Spindle(_) | Order::BeginAt(_) => {
+                unreachable!("not tried here")
+            }
         };
         prop_assert_eq!(self.half.order(order).is_ok(), allowed, "{:?}", order);
         if allowed {

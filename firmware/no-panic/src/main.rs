@@ -14,6 +14,8 @@
 use defmt as _;
 
 mod drivers;
+#[path = "../../src/events.rs"]
+mod events;
 #[path = "../../src/plan_task.rs"]
 mod plan_task;
 #[path = "../../src/sample_task.rs"]
@@ -24,11 +26,11 @@ mod app {
     use core::hint::black_box;
 
     use controller::{
-        machine::{Event, Instruction},
+        machine::Instruction,
         realtime::RealTime,
         step_output::{Buffers, Pin, Port, Wiring},
     };
-    use heapless::spsc::{Consumer, Producer, Queue};
+    use heapless::spsc::{Producer, Queue};
     use interp_core::{StepConfig, job::STORE_WORDS, steps::BUFFER_WORDS};
     use stm32f4xx_hal::pac;
 
@@ -37,6 +39,7 @@ mod app {
             cycle_counter::CycleCounter, drive_enable::DriveEnable, gpio::Ports, safety_inputs::SafetyInputs,
             sample_timer::SampleTimer, step_output::StepDriver, watchdog::Watchdog,
         },
+        events::{EventMemory, EventSource},
         plan_task,
         sample_task::{Guards, SampleTask},
     };
@@ -61,7 +64,7 @@ mod app {
         guards: Guards<Ports, Ports, pac::IWDG>,
         output: StepDriver,
         commands_in: Producer<'static, Instruction>,
-        events_out: Consumer<'static, Event>,
+        events_out: EventSource,
     }
 
     #[init(local = [
@@ -69,7 +72,7 @@ mod app {
         slots: Buffers = [[0; BUFFER_WORDS]; 2],
         rest: u32 = 0,
         commands: Queue<Instruction, 8> = Queue::new(),
-        events: Queue<Event, 64> = Queue::new(),
+        events: EventMemory<64> = EventMemory::new(),
     ])]
     fn init(context: init::Context) -> (Shared, Local) {
         let counter = CycleCounter::new(context.core.DCB, context.core.DWT);

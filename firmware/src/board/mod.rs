@@ -40,16 +40,16 @@ compile_error!("choose one board: `cargo fw-qemu`, `cargo fw-chip` or `cargo fw-
 mod qemu;
 #[cfg(feature = "board-qemu")]
 pub(crate) use qemu::{
-    BOARD, InputPorts, SERIAL_DIVIDER, STEP_TIMER_HZ, JournalFlash, SettingsFlash, TIME_IS_SIMULATED, TIMER_HZ,
-    TIMER_RELOAD, init, simulate, stop_for_good,
+    BOARD, InputPorts, JournalFlash, SERIAL_DIVIDER, STEP_TIMER_HZ, SettingsFlash, TIME_IS_SIMULATED,
+    TIMER_HZ, TIMER_RELOAD, init, simulate, stop_for_good,
 };
 
 #[cfg(not(feature = "board-qemu"))]
 mod chip;
 #[cfg(not(feature = "board-qemu"))]
 pub(crate) use chip::{
-    InputPorts, SERIAL_DIVIDER, STEP_TIMER_HZ, JournalFlash, SettingsFlash, TIME_IS_SIMULATED, TIMER_HZ, TIMER_RELOAD,
-    init, simulate, stop_for_good,
+    InputPorts, JournalFlash, SERIAL_DIVIDER, STEP_TIMER_HZ, SettingsFlash, TIME_IS_SIMULATED, TIMER_HZ,
+    TIMER_RELOAD, init, simulate, stop_for_good,
 };
 
 #[cfg(feature = "board-stm32f405")]
@@ -62,6 +62,8 @@ mod skr_pro;
 #[cfg(feature = "board-skr-pro")]
 pub(crate) use skr_pro::BOARD;
 
+#[cfg(feature = "behind-loader")]
+mod behind_loader;
 mod reset_pins;
 
 use boards::{Axis, Level, Line};

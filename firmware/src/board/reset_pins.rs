@@ -15,15 +15,29 @@ const COUNT: usize = writes_count(BOARD.lines);
 /// The register writes.
 static WRITES: [Write; COUNT] = writes(BOARD.lines);
 
-// `cortex-m-rt` calls this function first; it overrides the crate's weak default, which is empty.
+/// The function's name. `cortex-m-rt` calls `__pre_init` first, which overrides the crate's weak default, an empty one. Behind a boot loader another
+/// function comes before (`behind_loader.rs`).
+#[cfg(not(feature = "behind-loader"))]
+macro_rules! entry {
+    () => {
+        "__pre_init"
+    };
+}
+#[cfg(feature = "behind-loader")]
+macro_rules! entry {
+    () => {
+        "isofeed_reset_pins"
+    };
+}
+
 #[allow(unsafe_code, reason = "no Rust code may run there")]
 mod pre_init {
     core::arch::global_asm!(
         ".section .text.__pre_init, \"ax\"",
-        ".global __pre_init",
-        ".type __pre_init,%function",
+        concat!(".global ", entry!()),
+        concat!(".type ", entry!(), ",%function"),
         ".thumb_func",
-        "__pre_init:",
+        concat!(entry!(), ":"),
         "movw r0, #:lower16:{writes}",
         "movt r0, #:upper16:{writes}",
         "movw r1, #{bytes}",
@@ -39,7 +53,7 @@ mod pre_init {
         "cmp r0, r1",
         "bne 2b",
         "bx lr",
-        ".size __pre_init, . - __pre_init",
+        concat!(".size ", entry!(), ", . - ", entry!()),
         writes = sym super::WRITES,
         bytes = const core::mem::size_of::<[super::Write; super::COUNT]>(),
     );

@@ -130,7 +130,10 @@ impl Chip {
                     self.keep(change);
                 }
             }
-            0x4002_3800..0x4002_3900 => self.rcc.write(address & 0xff, value, world),
+            0x4002_3800..0x4002_3900 => {
+                self.rcc.write(address & 0xff, value, world);
+                self.reset_parts(address as usize & 0xff, value);
+            }
             0x4002_3c00 => {
                 self.rcc.flash_acr = value;
                 self.rcc.check_supply(world);

@@ -4,7 +4,7 @@ use std::fs::File;
 use std::io::{BufWriter, Write};
 use std::time::{Duration, Instant};
 
-use boards::{Axis, Board, Level};
+use boards::{Axis, Board, FLASH_BEGIN, Level};
 
 use crate::{
     SRAM_FILL,
@@ -49,6 +49,8 @@ pub(crate) struct Chip {
     pub(crate) block: Block,
     pub(crate) at: u32,
     pub(crate) sram: Memory,
+    /// First address of the image; beyond the begin of flash where a boot loader starts it.
+    pub(crate) image_begin: u32,
     pub(crate) rcc: Rcc,
     pub(crate) nvic: Nvic,
     pub(crate) ports: [Port; 9],
@@ -131,6 +133,7 @@ impl Chip {
             block: Block::default(),
             at: 0,
             sram,
+            image_begin: FLASH_BEGIN,
             rcc: Rcc::new(
                 options.hse_mhz * 1e6,
                 !options.no_crystal,
@@ -207,6 +210,7 @@ impl Chip {
         }
         (self.hangs, self.fault, self.reset, self.serial_asks) = (false, false, None, false);
         self.usart.begin(self.world.now, 1);
+        self.leave_loader();
         self.plan();
     }
 
@@ -248,6 +252,10 @@ impl Chip {
         match when {
             When::Start(seconds) => self.world.cycles(seconds),
             When::Motion(after) => self.moved.map_or(NEVER, |moved| self.world.cycles(moved + after)),
+            When::Pulses(count) => {
+                let pulses = self.machine.as_ref().map_or(0, Machine::pulses);
+                if pulses >= count { self.world.now } else { NEVER }
+            }
         }
     }
 

@@ -7,7 +7,7 @@
 //!             chip.rs        the peripherals, and the order of their events
 //!                 │          ── machine.rs  carriages, switches, a probe plate
 //!                 │          ── script.rs   inputs, hang, fault, brown-out      ── line.rs   the host's pseudo-terminal
-//!             bus.rs         address decoding; clocks of peripherals; bit-band
+//!             bus.rs         address decoding; clocks of peripherals; bit-band      ── loader.rs   what a boot loader leaves behind
 //!                 │
 //!             part/          rcc (with FLASH, PWR), nvic (with SCB), gpio, timer, dma, usart, watchdog, debug (DWT, DBGMCU)
 //! ```
@@ -24,6 +24,7 @@ mod bus;
 mod chip;
 mod code;
 mod line;
+mod loader;
 mod machine;
 mod memory;
 mod options;
@@ -57,10 +58,17 @@ const SRAM_FILL: u8 = 0xa5;
 /// Contents of erased flash.
 const FLASH_FILL: u8 = 0xff;
 
-/// Writes the image's segments to flash, and reads the board of the image.
-fn load(data: &[u8], flash: Memory) -> Result<&'static Board, String> {
+/// What a boot loader's flash is filled with here: no vector of it can be taken.
+const LOADER_FILL: u8 = 0xde;
+
+/// Writes an image to flash: an ELF file, or the flat file that a board's boot loader takes from a card. Returns its board and its first address.
+fn load(data: &[u8], flash: Memory) -> Result<(&'static Board, u32), String> {
+    if !data.starts_with(&object::elf::ELFMAG) {
+        return load_flat(data, flash);
+    }
     let file =
         object::read::elf::ElfFile32::<object::Endianness>::parse(data).map_err(|error| error.to_string())?;
+    let mut begin = u32::MAX;
     for header in file.elf_program_headers() {
         use object::read::elf::ProgramHeader;
         let endian = object::Endianness::Little;
@@ -70,6 +78,7 @@ fn load(data: &[u8], flash: Memory) -> Result<&'static Board, String> {
         if is_loaded && !flash.load(at, bytes) {
             return Err(format!("a segment at {at:#x} is outside flash"));
         }
+        begin = begin.min(if is_loaded { at } else { begin });
     }
     let mark = file
         .symbols()
@@ -84,10 +93,27 @@ fn load(data: &[u8], flash: Memory) -> Result<&'static Board, String> {
                 .flatten()
         })
         .ok_or("the board's name is not in the image")?;
-    BOARDS
+    let board = BOARDS
         .into_iter()
         .find(|board| board.mark() == bytes)
-        .ok_or_else(|| "an image for a board that is not known".to_owned())
+        .ok_or("an image for a board that is not known")?;
+    Ok((board, begin))
+}
+
+/// The same for a flat file, which lies where its board's loader begins it.
+fn load_flat(data: &[u8], flash: Memory) -> Result<(&'static Board, u32), String> {
+    let is_in_it = |board: &&Board| data.windows(MARK_BYTES).any(|bytes| bytes == board.mark());
+    let board = BOARDS
+        .into_iter()
+        .find(is_in_it)
+        .ok_or("it is neither an ELF file nor a card's image for a known board")?;
+    let loader = board
+        .loader
+        .ok_or_else(|| format!("{} has no boot loader that takes a card's image", board.id))?;
+    if !flash.load(loader.image_begin, data) {
+        return Err(format!("{} bytes do not fit into flash", data.len()));
+    }
+    Ok((board, loader.image_begin))
 }
 
 fn run(options: Options) -> Result<bool, String> {
@@ -96,7 +122,9 @@ fn run(options: Options) -> Result<bool, String> {
         std::fs::read(&options.image).map_err(|error| format!("{}: {error}", options.image.display()))?;
     let flash = Memory::new(FLASH_BEGIN, SETTINGS - FLASH_BEGIN, FLASH_FILL);
     let sram = Memory::new(SRAM_BEGIN, SRAM_BYTES, SRAM_FILL);
-    let board = load(&data, flash).map_err(|error| format!("{}: {error}", options.image.display()))?;
+    let (board, begin) =
+        load(&data, flash).map_err(|error| format!("{}: {error}", options.image.display()))?;
+    flash.load(FLASH_BEGIN, &vec![LOADER_FILL; (begin - FLASH_BEGIN) as usize]);
     let line = options
         .pty
         .as_ref()
@@ -106,6 +134,8 @@ fn run(options: Options) -> Result<bool, String> {
     options.watch_input();
     let report = options.report.clone();
     let mut chip = Chip::new(board, options, flash, sram, line)?;
+    chip.image_begin = begin;
+    chip.leave_loader();
     chip.plan();
     let mut account = Account {
         least_sp: u32::MAX,

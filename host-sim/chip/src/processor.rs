@@ -18,6 +18,8 @@ const FLOAT_FRAME: u32 = 0x68;
 const EXC_RETURN: u32 = 0xffff_ff00;
 const WFI: u16 = 0xbf30;
 const HARD_FAULT: u32 = 3;
+/// Stack pointer of a boot loader that does not set the image's.
+const LOADER_STACK: u32 = 0x2000_4ff8;
 /// QEMU's number of an exception's exit.
 const EXIT: u32 = 8;
 
@@ -40,13 +42,21 @@ pub(crate) struct Processor {
 }
 
 impl Processor {
-    /// A processor after its reset.
+    /// A processor after its reset, or as a boot loader calls the image: with the loader's stack.
     pub(crate) fn new(chip: Chip, flash: Memory, sram: Memory, account: Account) -> Result<Self, String> {
+        let begin = chip.image_begin;
         let engine = Engine::new(chip, flash, sram)?;
         let registers = engine.registers();
-        registers.set(Register::SP, flash.word(flash.base()).unwrap_or(0));
+        let stack = if begin == flash.base() {
+            flash.word(begin).unwrap_or(0)
+        } else {
+            LOADER_STACK
+        };
+        registers.set(Register::SP, stack);
+        // A loader holds interrupts off where it leaves some pending: it could not take them any more.
+        registers.set(Register::PRIMASK, u32::from(begin != flash.base()));
         registers.set(Register::LR, u32::MAX);
-        registers.set(Register::PC, flash.word(flash.base() + 4).unwrap_or(0) & !1);
+        registers.set(Register::PC, flash.word(begin + 4).unwrap_or(0) & !1);
         Ok(Self {
             engine,
             flash,
@@ -191,6 +201,10 @@ impl Processor {
         let flash = self.flash;
         let chip = self.engine.surroundings();
         let table = chip.nvic.table().max(flash.base());
+        if chip.nvic.has_systick() {
+            chip.world
+                .wrong_once("SysTick, which the boot loader left on, interrupts the program".to_owned());
+        }
         let vector = flash.word(table + 4 * number).unwrap_or(0);
         if vector & 1 == 0 {
             chip.world.wrong(format!("vector {number} is {vector:#x}"));

@@ -24,13 +24,23 @@ pub enum Part {
     QemuImage,
     /// The firmware for a board.
     BoardImage(&'static Board),
+    /// The firmware for a board's boot loader; the board's own image where it has none.
+    LoaderImage(&'static Board),
 }
 
 impl Part {
     /// What an installation has, with this reader of CAD files.
     #[must_use]
     pub fn installation(reader: Self) -> Vec<Self> {
-        let images = boards::BOARDS.into_iter().map(Self::BoardImage);
+        let has_loader = |board: &&'static Board| board.loader.is_some();
+        let for_loaders = boards::BOARDS
+            .into_iter()
+            .filter(has_loader)
+            .map(Self::LoaderImage);
+        let images = boards::BOARDS
+            .into_iter()
+            .map(Self::BoardImage)
+            .chain(for_loaders);
         [reader, Self::DebugProbe, Self::CyclePlugin, Self::QemuImage]
             .into_iter()
             .chain(images)
@@ -42,6 +52,7 @@ impl Part {
         match self {
             Self::QemuImage => Some(("fw-qemu", "qemu")),
             Self::BoardImage(board) => Some(board.build),
+            Self::LoaderImage(board) => Some(board.loader.map_or(board.build, |loader| loader.build)),
             Self::CadReader
             | Self::FastCadReader
             | Self::DebugProbe
@@ -58,7 +69,7 @@ impl Part {
             Self::DebugProbe => Some(("debug-probe", "plain", "debug-probe")),
             Self::CyclePlugin => Some(("cycle-plugin", "release", "libcycle_plugin.so")),
             Self::ChipEmulator => Some(("chip", "dev", "chip")),
-            Self::QemuImage | Self::BoardImage(_) => None,
+            Self::QemuImage | Self::BoardImage(_) | Self::LoaderImage(_) => None,
         }
     }
 
@@ -103,7 +114,9 @@ impl Part {
             Self::CyclePlugin => "plugin",
             // Beside the tests, which share its dependencies.
             Self::ChipEmulator => return "target".to_owned(),
-            Self::QemuImage | Self::BoardImage(_) => self.image().unwrap_or_default().1,
+            Self::QemuImage | Self::BoardImage(_) | Self::LoaderImage(_) => {
+                self.image().unwrap_or_default().1
+            }
         };
         format!("target/{name}")
     }
@@ -125,6 +138,7 @@ impl Part {
         match self {
             Self::QemuImage => format!("{SHARE}/images/qemu.elf"),
             Self::BoardImage(board) => format!("{SHARE}/images/{}.elf", board.id),
+            Self::LoaderImage(board) => format!("{SHARE}/images/{}-card.elf", board.id),
             Self::CadReader
             | Self::FastCadReader
             | Self::DebugProbe

@@ -1,4 +1,6 @@
-//! `flash`: writes the firmware into the flash of a board by a debug probe.
+//! `flash`: writes the firmware into the flash of a board by a debug probe, or an image for the board's boot loader or the chip's own.
+
+mod loader;
 
 use std::path::{Path, PathBuf};
 use std::time::Instant;
@@ -13,12 +15,14 @@ use super::{Failure, Result, progress, spinner};
 use crate::probe::{self, Event, Image, ProbeError, Problem, Program, Request, Target, Work};
 use programs::{Part, image_remedy};
 
-/// Writes the firmware into a board's flash by a debug probe, compares what was written, and starts it.
+/// Writes the firmware into a board's flash by a debug probe, compares what was written, and starts it. Without a probe: by a card (--sd) or by USB (--dfu).
 ///
 /// Builds the firmware first if it has changed. Switch off the power of the drives before: while the chip is being written, the state
 /// of its pins is undefined. docs/bring-up.md describes the wiring.
 ///
 /// Example: cargo sim flash --board skr-pro
+/// Example: cargo sim flash --board skr-pro --sd /media/card
+/// Example: cargo sim flash --board stm32f405 --dfu
 /// Example: cargo sim flash --board stm32f405 --chip STM32F407VETx --probe 0483:3748
 #[derive(Debug, Args)]
 #[command(verbatim_doc_comment)]
@@ -28,6 +32,18 @@ pub(super) struct Arguments {
     /// Compares only: writes nothing, and does not interrupt the running firmware.
     #[arg(long)]
     verify: bool,
+    /// Writes the image for the board's own boot loader into this folder, the root of a card.
+    #[arg(long, value_name = "DIR", conflicts_with_all = ["verify", "probe", "chip", "dfu", "dfu_file"])]
+    sd: Option<PathBuf>,
+    /// Writes the flash by USB, through the loader in the chip's ROM. Needs dfu-util.
+    #[arg(long, conflicts_with_all = ["verify", "probe", "chip", "dfu_file"])]
+    dfu: bool,
+    /// Writes the image as a DfuSe file, for another program that talks to the loader in the chip's ROM.
+    #[arg(long, value_name = "FILE", conflicts_with_all = ["verify", "probe", "chip"])]
+    dfu_file: Option<PathBuf>,
+    /// Overwrites an existing file of --sd or --dfu-file.
+    #[arg(long)]
+    force: bool,
     /// Prints one JSON object instead of text.
     #[arg(long)]
     pub(super) json: bool,
@@ -111,8 +127,11 @@ impl BoardArguments {
 
     /// The image: the one given, or the board's, which is built.
     pub(super) fn image(&self) -> Result<PathBuf> {
-        let board = self.board();
-        let part = Part::BoardImage(board);
+        self.image_of(Part::BoardImage(self.board()))
+    }
+
+    /// The same for an image of another kind.
+    fn image_of(&self, part: Part) -> Result<PathBuf> {
         let Some(image) = &self.image else {
             let bar = spinner("building the firmware");
             let image = programs::find(part);
@@ -197,6 +216,9 @@ impl Bars {
 pub(super) fn command(arguments: &Arguments) -> Result<()> {
     let place = &arguments.place;
     let board = place.board();
+    if arguments.sd.is_some() || arguments.dfu || arguments.dfu_file.is_some() {
+        return loader::command(arguments);
+    }
     // First the checks that need no probe, then those that need no firmware.
     if place.image.is_some() {
         load(&place.image()?, board)?;

@@ -14,7 +14,9 @@ const fn hindrance(journal: Option<&Journal>, job: u64, profile: u32) -> Option<
             "the board has journalled no run",
             "run the job from its beginning, without --resume",
         ],
-        Some(Journal { is_finished: true, .. }) => [
+        Some(Journal {
+            is_finished: true, ..
+        }) => [
             "the last run of the board came to its end",
             "run the job from its beginning, without --resume",
         ],

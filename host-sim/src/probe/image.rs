@@ -99,11 +99,19 @@ impl Image {
         Ok(reach)
     }
 
-    /// Checks that the image is for this board, fits its flash, and starts there.
+    /// Checks that the image is for this board, fits its flash, and starts at its begin.
     ///
     /// # Errors
     /// The first check that fails, as text.
     pub fn check_for(&self, board: &Board) -> Result<(), String> {
+        self.check_at(board, FLASH_BEGIN)
+    }
+
+    /// The same for an image that starts at `begin`, behind a loader.
+    ///
+    /// # Errors
+    /// The first check that fails, as text.
+    pub fn check_at(&self, board: &Board, begin: u32) -> Result<(), String> {
         match self.board.as_deref() {
             Some(id) if id == board.id => {}
             Some(id) => return Err(format!("the image is for the board {id}, not for {}", board.id)),
@@ -115,17 +123,33 @@ impl Image {
                 "it needs {reach} bytes of flash, and the chip has {room}"
             ));
         }
-        self.check_start()
+        self.check_start(begin)
+    }
+
+    /// The bytes from `begin` to the end of the last segment; between segments those of erased flash. None where a segment lies before `begin`.
+    #[must_use]
+    pub fn flat(&self, begin: u32) -> Option<Vec<u8>> {
+        let mut flat = Vec::new();
+        for (address, data) in &self.segments {
+            flat.resize(usize::try_from(address.checked_sub(begin)?).ok()?, 0xff);
+            flat.extend_from_slice(data);
+        }
+        Some(flat)
     }
 
     /// Checks the vector table: stack pointer in RAM, reset vector in flash with the Thumb bit.
-    fn check_start(&self) -> Result<(), String> {
+    fn check_start(&self, begin: u32) -> Result<(), String> {
         let reach = self.reach_bytes()?;
         let start = match self.segments.first() {
-            Some((FLASH_BEGIN, data)) if data.len() >= 8 => data,
-            _ => {
+            Some((address, data)) if *address == begin && data.len() >= 8 => data,
+            _ if begin == FLASH_BEGIN => {
                 return Err(format!(
                     "it has no vector table at {FLASH_BEGIN:#010x}, where the chip begins: is it for a loader?"
+                ));
+            }
+            _ => {
+                return Err(format!(
+                    "it has no vector table at {begin:#010x}, where it would be started"
                 ));
             }
         };
@@ -133,7 +157,7 @@ impl Image {
         let (stack, reset) = (word(0), word(4));
         let in_flash = reset
             .checked_sub(FLASH_BEGIN)
-            .is_some_and(|offset| offset < reach);
+            .is_some_and(|offset| offset < reach && reset >= begin);
         if !RAM.contains(&stack) || !in_flash || reset & 1 == 0 {
             return Err(format!(
                 "its vector table is none: stack at {stack:#010x}, start at {reset:#010x}"

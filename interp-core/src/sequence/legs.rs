@@ -105,11 +105,7 @@ impl Sequencer {
         }
         check_travel(axes, &to)?;
         let comes_down = (is_approach || self.goal == Goal::Back) && leg == Leg::Plunge;
-        let slow_mm = if comes_down {
-            axes.plunge_mm
-        } else {
-            0.0
-        };
+        let slow_mm = if comes_down { axes.plunge_mm } else { 0.0 };
         let feed = job.header.feed_mm_s;
         Ok(self.straight.lead(from, to, slow_mm, feed, axes))
     }

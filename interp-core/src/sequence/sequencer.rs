@@ -22,10 +22,10 @@ use crate::pass::run::Run;
 use crate::pass::scan::cycles::{NEXT, PATCH};
 use crate::sample::{Sample, SpanParameter};
 use crate::sequence::hop::Hop;
-use crate::sequence::pause::Return;
 use crate::sequence::legs::{Goal, Leg, LegPlanning};
 use crate::sequence::link::{BoundaryEnd, BoundaryStepOver, StraightMove, check_faces_up};
 use crate::sequence::lookahead::{Lookahead, PassPlan, has_turns};
+use crate::sequence::pause::Return;
 use crate::sequence::turning::{Part, road};
 
 /// Periods that a pass takes longer than the planning of the next one.

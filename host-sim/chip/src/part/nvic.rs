@@ -48,6 +48,9 @@ pub(crate) struct Nvic {
     shcsr: u32,
     scr: u32,
     fpccr: u32,
+    /// SysTick's control, and whether it is pending. It does not count.
+    systick: u32,
+    systick_pends: bool,
     /// `SYSRESETREQ` was written.
     pub(crate) reset_wanted: bool,
 }
@@ -69,8 +72,25 @@ impl Nvic {
             shcsr: 0,
             scr: 0,
             fpccr: 0xc000_0000,
+            systick: 0,
+            systick_pends: false,
             reset_wanted: false,
         }
+    }
+
+    /// As a boot loader leaves it: SysTick at work, its interrupts enabled, some of them pending, the vectors its own.
+    pub(crate) fn left_by_loader(&mut self, table: u32, at: u64) {
+        const SDIO: usize = 49;
+        self.vtor = table;
+        (self.systick, self.systick_pends) = (0b111, true);
+        self.enabled = 1 << TIM2 | 1 << USART1 | 1 << SDIO;
+        self.raise(TIM2, at);
+        self.raise(SDIO, at);
+    }
+
+    /// Whether SysTick interrupts.
+    pub(crate) const fn has_systick(&self) -> bool {
+        self.systick_pends || self.systick & 0b11 == 0b11
     }
 
     pub(crate) fn raise(&mut self, line: usize, at: u64) {
@@ -153,6 +173,7 @@ impl Nvic {
     pub(crate) fn read(&self, offset: u32, world: &mut World) -> u32 {
         let words = |bits: u128| (bits >> (8 * (offset & 0x7f))) as u32;
         match offset {
+            0x010 => self.systick,
             0x100..0x110 | 0x180..0x190 => words(self.enabled),
             0x200..0x210 | 0x280..0x290 => words(self.pending),
             0x400..0x480 => {
@@ -183,6 +204,12 @@ impl Nvic {
     pub(crate) fn write(&mut self, offset: u32, bytes: u32, value: u32, world: &mut World) {
         let bits = u128::from(value) << (8 * (offset & 0x7f)).min(96);
         match offset {
+            0x010 => {
+                if value & 0b11 == 0b11 {
+                    world.wrong("SysTick is switched on: not modelled");
+                }
+                self.systick = value & 0b111;
+            }
             0x100..0x110 => self.enabled |= bits,
             0x180..0x190 => self.enabled &= !bits,
             0x200..0x210 => (0..LINES)
@@ -195,6 +222,8 @@ impl Nvic {
                         (value >> (8 * byte) & PRIORITY) as u8;
                 }
             }
+            // `PENDSTCLR`; `PENDSVCLR` has nothing to clear.
+            0xd04 if value & !(1 << 25 | 1 << 27) == 0 => self.systick_pends &= value >> 25 & 1 == 0,
             0xd08 => self.vtor = value,
             0xd0c if value >> 16 == 0x05fa => {
                 self.reset_wanted |= value & 4 != 0;

@@ -20,6 +20,9 @@ const SCALE_2_MAX_HZ: f64 = 144e6;
 const CR: usize = 0x00;
 const PLLCFGR: usize = 0x04;
 const CFGR: usize = 0x08;
+pub(crate) const AHB1RSTR: usize = 0x10;
+pub(crate) const APB1RSTR: usize = 0x20;
+pub(crate) const APB2RSTR: usize = 0x24;
 const AHB1ENR: usize = 0x30;
 const APB1ENR: usize = 0x40;
 const APB2ENR: usize = 0x44;
@@ -78,6 +81,19 @@ impl Rcc {
         }
     }
 
+    /// As a boot loader leaves it: 168 MHz from the crystal by the PLL, and the clocks of ports, DMA2, TIM2, PWR, USART1 and SDIO on.
+    pub(crate) fn left_by_loader(&mut self, world: &mut World) {
+        (self.hse_ready, self.pll_ready) = (0, 0);
+        (self.flash_acr, self.pwr_cr) = (0x705, 0x4000);
+        self.registers[CR / 4] = 0x83 | 1 << 16 | 1 << 24;
+        self.registers[PLLCFGR / 4] = 7 << 24 | 1 << 22 | 336 << 6 | 8;
+        self.registers[CFGR / 4] = 4 << 13 | 5 << 10 | 2;
+        self.registers[AHB1ENR / 4] |= 0x1ff | 1 << 22;
+        self.registers[APB1ENR / 4] |= 1 << 28 | 1;
+        self.registers[APB2ENR / 4] |= 1 << 11 | 1 << 4;
+        self.clocks(world);
+    }
+
     /// Frequency after a reset.
     pub(crate) const RESET_HZ: f64 = HSI_HZ;
 
@@ -100,10 +116,11 @@ impl Rcc {
         }
     }
 
-    /// Whether a peripheral has its clock.
+    /// Whether a peripheral has its clock, and is not held in reset.
     pub(crate) fn is_on(&self, gate: Gate) -> bool {
         let (index, bit) = Self::enable_register(gate);
-        self.registers[[AHB1ENR, APB1ENR, APB2ENR][index] / 4] & bit != 0
+        let is_reset = self.registers[[AHB1RSTR, APB1RSTR, APB2RSTR][index] / 4] & bit != 0;
+        self.registers[[AHB1ENR, APB1ENR, APB2ENR][index] / 4] & bit != 0 && !is_reset
     }
 
     /// Whether its clock was enabled at the present time without the required delay (ES0182, 2.1.13).

@@ -5,8 +5,8 @@ use std::time::{Duration, Instant};
 
 use protocol::frame::{DELIMITER, Decoder, FRAME_MAX, write_request};
 use protocol::message::{
-    Capabilities, Clock, Journal, MotionStatus, Offsets, Profile, Reason, Reply, Request, Status, next_number,
-    read_reply,
+    Capabilities, Clock, Journal, MotionStatus, Offsets, Profile, Reason, Reply, Request, Status,
+    next_number, read_reply,
 };
 use protocol::version::{PROTOCOL_VERSION, VersionMismatch};
 

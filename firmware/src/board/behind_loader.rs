@@ -1,0 +1,111 @@
+//! Takes the chip over from a boot loader, which has called the image in place of a reset; the pins follow (`reset_pins.rs`).
+//!
+//! A loader that has read a card leaves the PLL on, peripherals and DMA at work, and interrupts enabled whose handlers were its own. Here they are off, and the registers
+//! that the image relies on have their values after a reset (RM0090, 7.3). Nothing ends a watchdog: a loader must not start one.
+//!
+//! In assembly, because no Rust code may run before memory is initialised. No memory is written.
+
+#[allow(unsafe_code, reason = "no Rust code may run there")]
+mod pre_init {
+    core::arch::global_asm!(
+        ".section .text.__pre_init, \"ax\"",
+        ".global __pre_init",
+        ".type __pre_init,%function",
+        ".thumb_func",
+        "__pre_init:",
+        // First of all: until then the vectors and the stack are the loader's, and so are its interrupts. (The features of `cortex-m-rt` for both would set them with interrupts on.)
+        "cpsid i",
+        "movw r0, #:lower16:_stack_start",
+        "movt r0, #:upper16:_stack_start",
+        "msr msp, r0",
+        "movw r0, #:lower16:__vector_table",
+        "movt r0, #:upper16:__vector_table",
+        "movw r1, #0xed08",
+        "movt r1, #0xe000",
+        "str r0, [r1]",
+        "movs r0, #0",
+        "msr basepri, r0",
+        "msr faultmask, r0",
+        // Main stack, privileged, no floating-point context.
+        "msr control, r0",
+        "isb",
+        // SysTick off; ICSR: neither SysTick nor PendSV pending.
+        "movw r1, #0xe010",
+        "movt r1, #0xe000",
+        "str r0, [r1]",
+        "movw r1, #0xed04",
+        "movt r1, #0xe000",
+        "mov.w r2, #0x0a000000",
+        "str r2, [r1]",
+        // NVIC, three words each: no interrupt enabled (ICER), none pending (ICPR).
+        "movw r1, #0xe180",
+        "movt r1, #0xe000",
+        "mov.w r2, #-1",
+        "str r2, [r1]",
+        "str r2, [r1, #4]",
+        "str r2, [r1, #8]",
+        "str r2, [r1, #0x100]",
+        "str r2, [r1, #0x104]",
+        "str r2, [r1, #0x108]",
+        // RCC: HSI on and ready, selected, all prescalers 1.
+        "movw r1, #0x3800",
+        "movt r1, #0x4002",
+        "ldr r2, [r1]",
+        "orr r2, r2, #1",
+        "str r2, [r1]",
+        "2:",
+        "ldr r2, [r1]",
+        "tst r2, #2",
+        "beq 2b",
+        "str r0, [r1, #8]",
+        "3:",
+        "ldr r2, [r1, #8]",
+        "tst r2, #0xc",
+        "bne 3b",
+        // HSE, its bypass and security, PLL and PLLI2S off: only then may their settings change.
+        "ldr r2, [r1]",
+        "bic r2, r2, #0x05000000",
+        "bic r2, r2, #0x000d0000",
+        "str r2, [r1]",
+        "4:",
+        "ldr r2, [r1]",
+        "tst r2, #0x02000000",
+        "bne 4b",
+        "movw r2, #0x3010",
+        "movt r2, #0x2400",
+        "str r2, [r1, #4]",
+        // Its interrupts off, and their flags cleared.
+        "mov.w r2, #0x009f0000",
+        "str r2, [r1, #0xc]",
+        // All peripherals reset: AHB1, AHB2, AHB3, APB1, APB2.
+        "movw r2, #0x11ff",
+        "movt r2, #0x2260",
+        "str r2, [r1, #0x10]",
+        "mov.w r2, #0xf1",
+        "str r2, [r1, #0x14]",
+        "movs r2, #1",
+        "str r2, [r1, #0x18]",
+        "movw r2, #0xc9ff",
+        "movt r2, #0xf6fe",
+        "str r2, [r1, #0x20]",
+        "movw r2, #0x7933",
+        "movt r2, #0x0477",
+        "str r2, [r1, #0x24]",
+        "dsb",
+        "str r0, [r1, #0x10]",
+        "str r0, [r1, #0x14]",
+        "str r0, [r1, #0x18]",
+        "str r0, [r1, #0x20]",
+        "str r0, [r1, #0x24]",
+        // Their clocks off, but that of the core-coupled memory.
+        "mov.w r2, #0x00100000",
+        "str r2, [r1, #0x30]",
+        "str r0, [r1, #0x34]",
+        "str r0, [r1, #0x38]",
+        "str r0, [r1, #0x40]",
+        "str r0, [r1, #0x44]",
+        "dsb",
+        "b.w isofeed_reset_pins",
+        ".size __pre_init, . - __pre_init",
+    );
+}
