@@ -21,6 +21,11 @@ const UP: f64 = 0.1;
 /// A surface that reaches farther than this from the origin is placed with its centre there, mm: the machine's range is 2147 mm either way, and
 /// the ball and its way up and down need some.
 const REACH_MM: f64 = 2000.0;
+/// Axis limits of a face of a part, those of the job file's defaults: without limits a job has no links, and no place between its passes would be safe.
+const LIMITS: &str = "# Axis limits: put in those of the machine, or run with its profile.\n\
+     velocity_max_mm_s = [100, 100, 50]\n\
+     acceleration_max_mm_s2 = [1000, 1000, 500]\n\
+     jerk_max_mm_s3 = [20000, 20000, 10000]\n";
 /// Digits of a written coordinate: full precision of f64.
 const COLUMN: usize = 100;
 
@@ -288,12 +293,16 @@ fn text(
          pattern = {}              # \"zig\": every pass in the same direction; \"zigzag\": alternating\n\
          chord_mm = 0.005            # chord error limit, for export and the approaches made of chords\n\n\
          [machine]\n\
-         period_us = 1000            # sampling period\n",
+         period_us = 1000            # sampling period\n{}",
         options.feed_mm_min.unwrap_or(FEED_MM_MIN),
         options.scallop_mm.unwrap_or(SCALLOP_MM.min(0.1 * radius_mm)),
         quoted(&or(&options.along, "u")),
         quoted(side),
-        quoted(&or(&options.pattern, "zig")),
+        quoted(&or(
+            &options.pattern,
+            if options.in_part { "zigzag" } else { "zig" }
+        )),
+        if options.in_part { LIMITS } else { "" }
     );
     out
 }

@@ -266,6 +266,7 @@ fn own_region(document: &Section<'_>, job: &mut Job, faces: &dyn FaceReader) -> 
         }
     })?;
     job.region = Some(made.region);
+    job.machine.part_top_mm = made.reach.top_mm;
     job.origin.set_reach(made.reach);
     Ok(())
 }

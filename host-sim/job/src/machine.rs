@@ -184,8 +184,10 @@ pub struct MachineSpec {
     pub home_mm: Option<[f64; 3]>,
     /// z of the tool centre at which the tool clears every obstacle, mm. `None`: from [`Self::clearance_mm`].
     pub safe_z_mm: Option<f64>,
-    /// Distance from the highest point of the surface to the ball at the safe height, mm, where `safe_z_mm` is `None`.
+    /// Distance from the highest point of the surface, and of [`Self::part_top_mm`], to the ball at the safe height, mm, where `safe_z_mm` is `None`.
     pub clearance_mm: f64,
+    /// Highest point of the whole part, mm, where it is known: the safe height is above it, too.
+    pub part_top_mm: Option<f64>,
     /// Length of the last part of the plunge, which runs at the feed, mm.
     pub plunge_mm: f64,
     /// A board starts a run only after homing.
@@ -209,6 +211,7 @@ impl Default for MachineSpec {
             home_mm: None,
             safe_z_mm: None,
             clearance_mm: CLEARANCE_DEFAULT_MM,
+            part_top_mm: None,
             plunge_mm: PLUNGE_DEFAULT_MM,
             homing_required: true,
             heartbeat_action: HeartbeatAction::Finish,

@@ -75,6 +75,8 @@ pub struct FaceReach {
     pub unreachable_mm2: Vec<(String, f64)>,
     /// The largest ball that reaches 99 % of what is not too steep, mm; `None` if no ball above 0.05 mm does.
     pub radius_mm: Option<f64>,
+    /// Highest point of the whole part, mm; `None` without one.
+    pub top_mm: Option<f64>,
     /// Faces of the part that are not known, by their numbers in the file: gouging them is not checked.
     pub unknown: Vec<usize>,
 }

@@ -26,8 +26,9 @@ pub fn place(job: &mut Job, origin_mm: [f64; 3]) -> Result<(), OutOfMachineRange
     if let Some(home_mm) = &mut job.machine.home_mm {
         add(home_mm);
     }
-    if let Some(safe_z_mm) = &mut job.machine.safe_z_mm {
-        *safe_z_mm += origin_mm[2];
+    let heights = [&mut job.machine.safe_z_mm, &mut job.machine.part_top_mm];
+    for height_mm in heights.into_iter().flatten() {
+        *height_mm += origin_mm[2];
     }
     Ok(())
 }

@@ -15,7 +15,7 @@ use crate::region::{Made, Request};
 use crate::tool::{Reason, Tool};
 
 /// The method by which regions are made: others in a cache are not used.
-const METHOD: u32 = 2;
+const METHOD: u32 = 3;
 /// Folder beside the job in which regions are kept.
 const CACHE: &str = ".isofeed";
 /// How deep the tool may enter the part, mm, where no part says it: only the grid of a face alone depends on it.
@@ -76,11 +76,12 @@ struct Found {
     region_mm2: f64,
     unreachable_mm2: Vec<(String, f64)>,
     radius_mm: Option<f64>,
+    top_mm: Option<f64>,
     unknown: Vec<usize>,
 }
 
 impl Found {
-    fn new(made: Made, unknown: Vec<usize>) -> Self {
+    fn new(made: Made, part: Option<&Part>) -> Self {
         let named = |(reason, area): (Reason, f64)| (reason.name().to_owned(), area);
         Self {
             loops: made.loops,
@@ -89,7 +90,10 @@ impl Found {
             region_mm2: made.inside_mm2,
             unreachable_mm2: made.unreachable_mm2.into_iter().map(named).collect(),
             radius_mm: made.radius_mm,
-            unknown,
+            top_mm: part.map(|part| part.block().high.z),
+            unknown: part.map_or_else(Vec::new, |part| {
+                part.missing.iter().map(|missing| missing.number).collect()
+            }),
         }
     }
 
@@ -100,6 +104,7 @@ impl Found {
             region_mm2: self.region_mm2,
             unreachable_mm2: self.unreachable_mm2.clone(),
             radius_mm: self.radius_mm,
+            top_mm: self.top_mm,
             unknown: self.unknown.clone(),
         }
     }
@@ -259,10 +264,7 @@ impl Asked {
 
 fn made(job: &Job, source: &CadSource) -> Result<Found, FaceError> {
     let asked = Asked::new(job, source)?;
-    let unknown = asked.part().map_or_else(Vec::new, |part| {
-        part.missing.iter().map(|missing| missing.number).collect()
-    });
-    Ok(Found::new(asked.request().make(), unknown))
+    Ok(Found::new(asked.request().make(), asked.part()))
 }
 
 /// The tool reaches nothing of the face.

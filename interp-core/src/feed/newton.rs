@@ -44,8 +44,9 @@ struct Place {
     j: [f32; 2],
     h: f32,
     q: Derivatives,
-    /// Jerk that a jump nearby takes.
+    /// Jerk that a jump nearby takes, and the speed over it, mm/s.
     jump: [[f32; 2]; 3],
+    at_jump: f32,
 }
 
 /// The rows of an axis at a place.
@@ -81,8 +82,8 @@ impl Place {
                 ],
                 y1: 1.5 * h * t2 * inverse.jerk,
                 y2: h * t1 * inverse.jerk,
-                e1: first * v,
-                e2: second * v2,
+                e1: first * self.at_jump,
+                e2: second * self.at_jump * self.at_jump,
             });
         }
     }
@@ -286,6 +287,24 @@ impl Sweep {
         }
     }
 
+    /// Speed of the walk over a jump near the node, mm/s; none of a jump that does not matter.
+    fn speed_over(&self, plan: &Plan, station: u16) -> Option<f32> {
+        let places = [
+            self.knot,
+            self.knot.wrapping_sub(1),
+            self.knot + 1,
+            self.knot.wrapping_sub(2),
+        ];
+        let knot = places
+            .iter()
+            .filter_map(|place| plan.knot(*place))
+            .find(|knot| knot.station == station)?;
+        let [slope, _, _] = plan
+            .interval(knot.interval)
+            .walk_rates(f32::from(knot.part) * (1.0 / 65536.0));
+        Some(slope * plan.inverse_step)
+    }
+
     /// Whether there is a jump behind the node.
     pub(crate) fn has_jump(&self, plan: &Plan) -> bool {
         plan.knot(self.knot)
@@ -330,7 +349,8 @@ fn three(lists: &Lists, interval: u16) -> [f32; 3] {
 }
 
 /// A node's place, and the inverse square of the speed that the path allows there.
-fn at_node(plan: &Plan, limits: &MotionLimits, node: u16) -> (Place, f32) {
+fn at_node(plan: &Plan, limits: &MotionLimits, sweep: &Sweep) -> (Place, f32) {
+    let node = sweep.node;
     let h = plan.inverse_step;
     let h2 = h * h;
     let walk = local(&plan.walk, node, plan.intervals);
@@ -355,6 +375,9 @@ fn at_node(plan: &Plan, limits: &MotionLimits, node: u16) -> (Place, f32) {
         h,
         q: stations.blend(cell, part),
         jump: jump.map_or([[0.0; 2]; 3], |station| limits.jump_jerk(&stations.jump(station))),
+        at_jump: jump
+            .and_then(|station| sweep.speed_over(plan, station))
+            .unwrap_or(v),
     };
     let speed = limits.inverse_speed_sqr(&place.q);
     (place, speed)
@@ -405,6 +428,7 @@ fn at_jumps(
                     h,
                     q: plan.stations.get(side).q,
                     jump,
+                    at_jump: s1 * h,
                 };
                 each(&place, &stencil(x));
             }
@@ -432,7 +456,7 @@ fn at_middle([a, b, c]: &[f32; 3]) -> f32 {
 /// Greatest factor of the pace that keeps the rows of a node and behind it.
 #[inline(never)]
 pub(crate) fn factor(plan: &Plan, limits: &MotionLimits, lists: &Lists, sweep: &mut Sweep) -> f32 {
-    let (place, speed) = at_node(plan, limits, sweep.node);
+    let (place, speed) = at_node(plan, limits, sweep);
     let pace = local(draft(lists), sweep.node, plan.intervals);
     let mut factor = place.factor(limits, speed * place.v * place.v, &pace);
     if let Some((interval, row)) = middle(plan, sweep.node, [sweep.speed, speed]) {
@@ -471,7 +495,7 @@ pub(crate) fn assemble(
     weight: f32,
 ) {
     let node = sweep.node;
-    let (place, speed) = at_node(plan, limits, node);
+    let (place, speed) = at_node(plan, limits, sweep);
     let pace = local(draft(lists), node, plan.intervals);
     let mu = mu * share(lists, weight, node);
     let mut sums = Sums::default();
@@ -648,7 +672,7 @@ pub(crate) fn extend(
     let Some(gradient) = lists.get(GRADIENT) else {
         return;
     };
-    let (place, speed) = at_node(plan, limits, node);
+    let (place, speed) = at_node(plan, limits, sweep);
     let pace = local(draft(lists), node, plan.intervals);
     let direction = direction(gradient, node, plan.intervals);
     let row = speed * place.v * place.v;

@@ -22,6 +22,12 @@ pub(crate) const KNOTS_MAX: usize = 84;
 /// Distance from a jump within which a period may see it, periods.
 const JUMP_REACH: f32 = 1.2;
 
+/// Intervals before a place from which a jump near it is sought, and places that are looked at.
+const KNOT_NEAR: u16 = 2;
+const KNOTS_NEAR: usize = 8;
+const KNOT_BITS: u32 = 7;
+const _: () = assert!(KNOTS_MAX < 1 << KNOT_BITS);
+
 /// Intervals that a step of a cursor may pass, and steps that a period is made of where nodes are closer together than that.
 const INTERVALS_A_STEP: u16 = 4;
 const PARTS_MAX: u8 = 8;
@@ -591,17 +597,38 @@ impl Plan {
         } else {
             None
         };
+        let mut at_jump = 0.0;
         let jump = jump.map_or([[0.0; 2]; 3], |station| {
+            at_jump = self.speed_over(pace, station, cursor.interval).unwrap_or(v) * r;
             limits.jump_jerk(&self.stations.jump(station))
         });
         MotionAt {
             v,
             a,
             j: [j, j_beside],
-            speed: v * r,
+            at_jump,
             q,
             jump,
         }
+    }
+
+    /// Speed of a pace over a jump that is near an interval, mm/s; none of a jump that does not matter.
+    fn speed_over(&self, pace: &[f32], station: u16, near: u16) -> Option<f32> {
+        let knots = self.knots.get(..usize::from(self.knot_count))?;
+        let from = near.saturating_sub(KNOT_NEAR);
+        let mut first = 0;
+        for bit in (0..KNOT_BITS).rev() {
+            let further = first + (1 << bit);
+            if knots.get(further - 1).is_some_and(|knot| knot.interval < from) {
+                first = further;
+            }
+        }
+        let mut near = knots.get(first..)?.iter().take(KNOTS_NEAR);
+        let knot = near.find(|knot| knot.station == station)?;
+        let x = f32::from(knot.part) * (1.0 / 65536.0);
+        let interval = self.interval_of(pace, knot.interval);
+        let [slope, _, _] = interval.walk_rates(x);
+        Some(slope * interval.speed(x) * self.inverse_step)
     }
 
     /// Moves on at a pace that is being planned.
@@ -621,8 +648,8 @@ struct MotionAt {
     v: f32,
     a: f32,
     j: [f32; 2],
-    /// Speed at the pace, mm/s.
-    speed: f32,
+    /// Speed at the pace over a jump nearby, mm/s.
+    at_jump: f32,
     q: Derivatives,
     jump: [[f32; 2]; 3],
 }
@@ -642,14 +669,14 @@ impl MotionAt {
     /// Calls `each` with each axis.
     #[inline(always)]
     fn each_axis(&self, limits: &MotionLimits, mut each: impl FnMut(&AxisAt)) {
-        let Self { v, a, speed, .. } = *self;
+        let Self { v, a, at_jump, .. } = *self;
         for ((inverse, [q1, q2, q3]), [first, second]) in limits.inverse.iter().zip(&self.q).zip(&self.jump) {
             let bend = (q3 * v * v + 3.0 * q2 * a) * v;
             each(&AxisAt {
                 slope: *q1,
                 acceleration: q2 * v * v + q1 * a,
                 jerk: self.j.map(|j| bend + q1 * j),
-                of_jump: (first + second * speed) * speed,
+                of_jump: (first + second * at_jump) * at_jump,
                 inverse,
             });
         }

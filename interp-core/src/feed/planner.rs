@@ -10,25 +10,29 @@ use super::walk::Walker;
 use crate::math::arith::{inverse_sqrt, sqrt, truncated};
 use crate::math::number::{Bounded, cube_root};
 
-/// Weight of the barrier in each step.
+/// Weight of the barrier in each step: as a rule; of a plan for which there is more time; and of one for which there is less.
 const BARRIER: [f32; 12] = [
     0.05, 0.05, 0.05, 0.008, 0.008, 0.002, 0.002, 0.0007, 0.0007, 0.00025, 0.00025, 0.00025,
 ];
-
-/// The same of a pass that takes no longer than its planning.
-const BARRIER_SHORT: [f32; 7] = [0.05, 0.02, 0.008, 0.002, 0.0007, 0.00025, 0.00025];
-/// The same of a pass that lasts long against its planning: more steps are worth their time.
-const STEPS_LONG: u8 = 18;
-const BARRIER_LONG: [f32; STEPS_LONG as usize] = [
+const BARRIER_LONG: [f32; 18] = [
     0.05, 0.05, 0.05, 0.02, 0.02, 0.008, 0.008, 0.008, 0.003, 0.003, 0.003, 0.001, 0.001, 0.001, 0.00025,
     0.00025, 0.00025, 0.00025,
 ];
-/// Share of the start's motion that a plan takes at least, periods that a step of the method takes for each node, and the rest of the planning with the
-/// check, apart from a share of the plan's own.
-const LASTS: f32 = 0.65;
+const BARRIER_SHORT: [f32; 7] = [0.05, 0.05, 0.05, 0.008, 0.002, 0.0007, 0.00025];
+/// Steps for which there has to be time.
+const USUAL_FROM: u16 = 10;
+const LONG_FROM: u16 = 15;
+/// Weight of further steps, which are taken while a step is cut short and there is time, and the most steps.
+const BARRIER_LAST: f32 = 0.00025;
+const STEPS_MAX: u8 = 18;
+/// Steps after which it is seen for how many there is time: the plan takes about this share of the time that the motion takes then.
+const STEPS_TRIED: u8 = 3;
+const LASTS: f32 = 0.72;
+/// Periods that a step of the method takes for each node and apart from them, the check for each period of the plan, and what is left.
 const PERIODS_A_STEP: f32 = 0.27;
-const PERIODS_A_PLAN: f32 = 70.0;
+const PERIODS_OF_STEP: f32 = 3.0;
 const PERIODS_A_PLACE: f32 = 0.07;
+const PERIODS_LEFT: f32 = 3.0;
 
 /// Share of the greatest factor of the walk's pace that the method starts from.
 const START_SHARE: f32 = 0.85;
@@ -259,11 +263,8 @@ impl Planner {
             }
             Stage::Scale => {
                 let factor = START_SHARE * self.factor.at_least(1e-9);
-                let lasts = plan.step_s / (self.weight * sqrt(factor) * plan.limits.period);
                 self.effort = if self.walker.is_short {
                     Effort::Little
-                } else if self.has_time(plan, lasts, least) {
-                    Effort::Much
                 } else {
                     Effort::Usual
                 };
@@ -282,7 +283,7 @@ impl Planner {
                     .barrier()
                     .get(usize::from(self.step))
                     .copied()
-                    .unwrap_or(1e-3);
+                    .unwrap_or(BARRIER_LAST);
                 let limits = limits_at(plan, &self.sweep, [&self.limits, &self.turn_limits]);
                 newton::assemble(
                     plan,
@@ -313,7 +314,7 @@ impl Planner {
                     Stage::Reach
                 }
             }
-            Stage::Take => self.take(plan),
+            Stage::Take => self.take(plan, least),
             Stage::Check => {
                 if !self.check(plan) {
                     Stage::Check
@@ -343,12 +344,49 @@ impl Planner {
         };
     }
 
-    /// Whether the most steps are worth their time: the plan lasts longer than its planning takes with them. `lasts`: periods of the start's motion;
-    /// `least`: those of the planning so far.
-    fn has_time(&self, plan: &Plan, lasts: f32, least: u32) -> bool {
-        let of_steps = PERIODS_A_STEP * f32::from(plan.intervals) * f32::from(STEPS_LONG);
-        LASTS * (1.0 - PERIODS_A_PLACE) * lasts > to_f32(least) + PERIODS_A_PLAN + of_steps
-            && plan.pinned() == [0; 2]
+    /// Steps for which there is time before the planning lasts longer than a motion of so many periods. `least`: periods of the planning so far, 0 where
+    /// they do not matter.
+    fn steps_left(&self, plan: &Plan, lasts: f32, least: u32) -> u16 {
+        if least == 0 {
+            return u16::from(STEPS_MAX);
+        }
+        let left = (1.0 - PERIODS_A_PLACE) * lasts - PERIODS_LEFT - to_f32(least);
+        let of_step = PERIODS_A_STEP * f32::from(plan.intervals) + PERIODS_OF_STEP;
+        u16::try_from(truncated(left.at_least(0.0) / of_step)).unwrap_or(u16::MAX)
+    }
+
+    /// Whether another step is to be taken: the plan is slowed down to what its planning takes, so a step that comes too late makes it slower.
+    fn goes_on(&mut self, plan: &Plan, least: u32) -> bool {
+        let is_in_table = usize::from(self.step) < self.barrier().len();
+        if self.first > 0 || plan.pinned() != [0; 2] {
+            return is_in_table;
+        }
+        let lasts = self.lasts(plan);
+        match self.step {
+            0..STEPS_TRIED => true,
+            STEPS_TRIED => {
+                let more = self.steps_left(plan, LASTS * lasts, least);
+                self.effort = match more.saturating_add(u16::from(STEPS_TRIED)) {
+                    LONG_FROM.. => Effort::Much,
+                    USUAL_FROM.. => Effort::Usual,
+                    _ => Effort::Little,
+                };
+                true
+            }
+            STEPS_MAX.. => false,
+            _ => self.steps_left(plan, lasts, least) > 0 && (is_in_table || self.reach.step() < 1.0),
+        }
+    }
+
+    /// Periods that the motion takes at the pace as it is.
+    fn lasts(&self, plan: &Plan) -> f32 {
+        let count = usize::from(plan.intervals) + 2;
+        let sum: f32 = draft(&self.lists)
+            .iter()
+            .take(count)
+            .map(|pace| inverse_sqrt(pace.at_least(1e-9)))
+            .sum();
+        sum * plan.step_s / plan.limits.period
     }
 
     const fn barrier(&self) -> &'static [f32] {
@@ -373,11 +411,11 @@ impl Planner {
     }
 
     /// Takes the step that was solved for, and begins the next, or the check.
-    fn take(&mut self, plan: &mut Plan) -> Stage {
+    fn take(&mut self, plan: &mut Plan, least: u32) -> Stage {
         newton::take(plan, &mut self.lists, self.reach.step());
         newton::clear(&mut self.lists);
         self.step += 1;
-        if usize::from(self.step) < self.barrier().len() {
+        if self.goes_on(plan, least) {
             return Stage::Assemble;
         }
         self.begin_check(plan);

@@ -34,7 +34,7 @@ const WALKED: f32 = 0.75;
 const WALKED_TO_REST: f32 = 0.7;
 /// Speed over a jump below which the walk rests there, as a share of the one that a ramp without constant acceleration reaches; nodes by which the rest is
 /// longer than the mean.
-const REST_BELOW: f32 = 0.1;
+const REST_BELOW: f32 = 0.05;
 const REST_NODES: f32 = 1.5;
 /// Bisections of the spacing.
 const BISECTIONS: u8 = 12;

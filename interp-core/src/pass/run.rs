@@ -91,6 +91,8 @@ pub(crate) struct Run {
     last_interval: f32,
     /// Step-over from that pass to the next, in units of the side parameter, where it is known.
     step_over: Option<f32>,
+    /// That pass, once its first patch is collapsed.
+    next_route: Option<Route>,
     /// Feed factor of the last step along the pass.
     last_feed_factor: f32,
     /// The passes of a region, and the next of them without axis limits; a fault of theirs is reported when the tool is there.
@@ -175,6 +177,7 @@ impl Run {
         first_offset: [0; 3],
         last_interval: f32::INFINITY,
         step_over: None,
+        next_route: None,
         last_feed_factor: 0.0,
         lines: RegionLines::START,
         next_pass: NextPass::Sought,
@@ -196,6 +199,7 @@ impl Run {
         self.buffer.forget();
         self.last_interval = f32::INFINITY;
         self.step_over = None;
+        self.next_route = None;
     }
 
     /// The first pass.
@@ -683,7 +687,21 @@ impl Run {
                 }
             }
         } else if self.is_step_due() && !has_work {
-            self.step_over = Some(self.find_step_over(job));
+            let step = self.find_step_over(job);
+            self.step_over = Some(step);
+            self.prepare_step_over(job, step);
+        }
+    }
+
+    /// Collapses the first patch of the pass a step away, ahead of the tick that begins it. A fault is left for that tick.
+    fn prepare_step_over(&mut self, job: &Job<'_>, step: f32) {
+        // The rows of a streamed job may not be here yet.
+        if job.header.window == 0
+            && let Ok(side) = self.side_after(job, step)
+        {
+            let route = Route::of_pass(job.header, self.travel.pass.wrapping_add(1), side);
+            self.buffer.prepare(job, &route);
+            self.next_route = Some(route);
         }
     }
 
@@ -801,17 +819,22 @@ impl Run {
             }
             return Ok(next);
         }
-        let step = match self.step_over.take() {
-            Some(step) => step,
-            None => self.find_step_over(job),
+        let step = self.step_over.take();
+        let pass = self.travel.pass.wrapping_add(1);
+        let route = if let Some(route) = self.next_route.take() {
+            route
+        } else {
+            let step = match step {
+                Some(step) => step,
+                None => self.find_step_over(job),
+            };
+            Route::of_pass(job.header, pass, self.side_after(job, step)?)
         };
-        let side = self.side_after(job, step)?;
-        let travel = &mut self.travel;
-        travel.pass = travel.pass.wrapping_add(1);
+        self.travel.pass = pass;
         if job.header.pattern == Pattern::Zig {
-            travel.offset = self.first_offset;
+            self.travel.offset = self.first_offset;
         }
-        Ok(NextRoute::Pass(Route::of_pass(job.header, travel.pass, side)))
+        Ok(NextRoute::Pass(route))
     }
 
     /// Side parameter of the next pass, a step away.

@@ -195,6 +195,16 @@ const BOUNDS: &[(&str, u32, &str)] = &[
         "halvings of the stations: CELL_BISECTIONS",
     ),
     (
+        "interp_core::feed::plan::Plan::speed_over",
+        8,
+        "halvings of the jumps, and those near a place",
+    ),
+    (
+        "interp_core::feed::planner::Planner::lasts",
+        162,
+        "coefficients of a plan",
+    ),
+    (
         "interp_core::feed::planner::Planner::begin_method",
         162,
         "coefficients of a pace: COEFFICIENTS",

@@ -18,7 +18,8 @@ pub(super) fn axes(job: &Job, tool_sign: f64, start: [f64; 2]) -> Result<Option<
     let Some(limits) = machine.limits else {
         return Ok(None);
     };
-    let [_, _, [_, top]] = extent_mm(&job.surface);
+    let [_, _, [_, own_top]] = extent_mm(&job.surface);
+    let top = machine.part_top_mm.map_or(own_top, |top| top.max(own_top));
     let safe_z_mm = machine
         .safe_z_mm
         .unwrap_or(top + job.radius_mm + machine.clearance_mm);

@@ -259,6 +259,11 @@ impl SweptResult {
         (super::ERROR_SHARE_MAX * job.scallop_mm).max(GOUGE_SEEN_MM)
     }
 
+    /// Whether the job's region holds no two neighbouring passes.
+    fn has_no_gap(&self, job: &Job) -> bool {
+        job.region.is_some() && self.ridges.is_empty()
+    }
+
     fn scallop_failure(&self, job: &Job) -> Option<String> {
         let (most, limit) = (&self.scallop_max, job.scallop_mm);
         let place = format!(
@@ -287,6 +292,8 @@ impl SweptResult {
                 ASKED_SHARE * limit * limit / most.height_mm,
                 100.0 * ((most.height_mm / limit - 1.0).max(0.0) + ACCEPTED_MARGIN)
             )),
+            // Of a small region no pass may have a neighbour; what is left beside one pass is the region's own.
+            Verdict::Unknown if self.has_no_gap(job) => None,
             Verdict::Unknown if self.ridges.is_empty() => {
                 Some("the scallop height is not measured: fewer than two whole passes".to_owned())
             }
@@ -368,6 +375,12 @@ impl SweptResult {
             warnings.push(format!(
                 "{skipped} stations without a normal were left out of the scallop measurement"
             ));
+        }
+        if self.has_no_gap(job) && parts.complete {
+            warnings.push(
+                "the region holds no two passes beside each other: there is no scallop between passes to be measured"
+                    .to_owned(),
+            );
         }
         if !parts.complete {
             warnings.push(
