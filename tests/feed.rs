@@ -128,6 +128,7 @@ fn passes(header: &Header, samples: &[Sample]) -> Vec<SpanParameter> {
 fn height(header: &Header, words: &[i32]) -> (i32, u32) {
     let mut core = machine(
         &Header {
+            links: 0,
             window: 0,
             axes: None,
             ..*header

@@ -39,6 +39,7 @@ fn header() -> Header {
         scallop_mm: 0.005,
         period_s: 0.001,
         edges: 0,
+        links: 0,
         window: 0,
         axes: None,
     }

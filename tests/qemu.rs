@@ -4,6 +4,7 @@
 use interp_core::{FaultKind, Sample, State};
 use job::{Spacing, Start};
 use machine::Machine;
+use machine::links::Link;
 use machine::prepare::{Prepared, prepare};
 use machine::remote::drive::{self, Expected};
 use machine::remote::operate::{self, Setup};
@@ -136,9 +137,21 @@ fn region() {
         job.machine.limits = Some(job::AxisLimits::DEFAULT);
         prepare(&job).unwrap()
     };
+    // Links of every kind, some of which begin before their pass is planned.
+    let mut with_links = with_limits.clone();
+    let links: Vec<Link> = (machine::links::ends(&with_limits).iter().zip(0..))
+        .map(|([from, to], index)| match index % 3 {
+            0 => Link::Straight,
+            1 => Link::Across(from[2].max(to[2]) + 300_000),
+            _ => Link::Across(i32::MIN + 1),
+        })
+        .collect();
+    machine::links::add(&mut with_links, &links);
+    assert!(with_links.header.links > 10);
     compare_prepared(&[
         ("region", job("region")),
         ("region with limits", with_limits),
+        ("region with links", with_links),
         ("torus", job("torus")),
     ]);
 }

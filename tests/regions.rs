@@ -5,7 +5,8 @@ use std::path::PathBuf;
 use inspect::BOUNDS;
 use interp_core::job::region::{CROSSINGS_MAX, EDGE_WORDS, HEAD_WORDS};
 use job::{Along, AxisLimits, Job, MachineSpec, Pattern, Region, Side, Spacing};
-use machine::prepare::prepare;
+use machine::links::{self, Link};
+use machine::prepare::{Prepared, prepare};
 use verify::swept::{Requirements, measure};
 
 use crate::scallop_limit::shapes::Random;
@@ -218,4 +219,89 @@ fn regions_that_the_machine_does_not_take() {
     );
     job.spacing = Spacing::Constant(job::Start::Edge);
     assert!(refused(&job).starts_with("passes of constant scallop height are made for a whole surface only"));
+}
+
+/// Links with heights of their own leave the passes as they are; each rises to its height, and no farther than a hop of its length gains by; within the limits, in less time.
+#[test]
+fn a_link_rises_to_its_height() {
+    let mut job = load("region");
+    (job.scallop_mm, job.machine.limits) = (0.1, Some(AxisLimits::DEFAULT));
+    for pattern in [Pattern::Zig, Pattern::Zigzag] {
+        job.pattern = pattern;
+        let safe = prepare(&job).unwrap();
+        let ends = links::ends(&safe);
+        let heights: Vec<i32> = ends
+            .iter()
+            .map(|[from, to]| from[2].max(to[2]) + 2_000_000)
+            .collect();
+        let mut low = safe.clone();
+        let words: Vec<Link> = heights.iter().map(|height| Link::Across(*height)).collect();
+        links::add(&mut low, &words);
+        assert_eq!(usize::from(low.header.links), ends.len());
+        assert_eq!(links::ends(&low), ends);
+        let highest = highest(&low);
+        let mut lowered = 0;
+        for (pass, (height, [from, to])) in heights.iter().zip(&ends).enumerate() {
+            let [x, y] = [0, 1].map(|k: usize| f64::from(to[k] - from[k]));
+            let above = f64::from(highest[&(pass as u32)] - height);
+            // Some are joined on the boundary, and do not rise.
+            if highest[&(pass as u32)] > from[2].max(to[2]) + 1_000_000 {
+                lowered += 1;
+                assert!(above >= 0.0, "link {pass}: {above} nm below its height");
+                assert!(
+                    above <= 0.34 * x.hypot(y).max(1.0) + 1e6,
+                    "link {pass}: {above} nm above its height"
+                );
+            }
+        }
+        assert!(lowered > 5, "{lowered}");
+        // As high as they need to be.
+        let millimetres = |nm: [i32; 3]| glam::DVec3::from(nm.map(f64::from)) * 1e-6;
+        let safe_mm = f64::from(safe.header.axes.unwrap().safe_z_nm) * 1e-6;
+        let ends_mm = ends.iter().map(|ends| ends.map(millimetres)).collect();
+        let ways = part::ways(&job, b"", safe_mm, || ends_mm).unwrap();
+        let needed: Vec<Link> = ways
+            .iter()
+            .map(|way| match way {
+                part::Way::Straight => Link::Straight,
+                part::Way::Across(height_mm) => Link::Across((height_mm * 1e6).ceil() as i32),
+            })
+            .collect();
+        let mut low = safe.clone();
+        links::add(&mut low, &needed);
+        let times = [&safe, &low].map(|prepared| {
+            let timed = inspect::time_run(&job, prepared, &()).unwrap();
+            let found = inspect::verify_run(
+                &job,
+                prepared,
+                &timed,
+                None,
+                &inspect::Requirements::default(),
+                &(),
+            );
+            let found = found.unwrap();
+            assert!(found.failures.is_empty(), "{:?}", found.failures);
+            found.measured.times.whole_s
+        });
+        assert!(times[1] < times[0], "{times:?}");
+    }
+}
+
+/// Highest place of the ball's centre between a pass and the next, nm, by the number of the pass.
+fn highest(prepared: &Prepared) -> std::collections::BTreeMap<u32, i32> {
+    let mut highest = std::collections::BTreeMap::new();
+    let (mut pass, mut began) = (0, false);
+    let mut machine = machine::Machine::load(prepared).unwrap();
+    machine
+        .run(|sample| {
+            if sample.state == interp_core::State::Running {
+                (pass, began) = (sample.pass, true);
+            } else if began {
+                let most = highest.entry(pass).or_insert(i32::MIN);
+                *most = (*most).max(sample.cl_nm[2]);
+            }
+            true
+        })
+        .unwrap();
+    highest
 }

@@ -264,6 +264,7 @@ pub(crate) struct HeaderFields {
     scallop_mm: f32,
     period_s: f32,
     edges: u16,
+    links: u16,
     window: u16,
     #[serde(with = "axes")]
     axes: Option<AxisLimits>,

@@ -56,6 +56,7 @@ prop_compose! {
             scallop_mm: values[2],
             period_s: values[3],
             edges: spans[0],
+            links: spans[1],
             window: spans[0] ^ spans[1],
             axes,
         }

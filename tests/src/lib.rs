@@ -128,6 +128,7 @@ pub fn scaled_dome(scale: f64) -> (Header, Vec<i32>) {
         feed_mm_s: 1000.0,
         scallop_mm: 1.0,
         period_s: 0.001,
+        links: 0,
         window: 0,
         axes: None,
         ..Header::default()

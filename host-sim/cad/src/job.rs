@@ -13,7 +13,7 @@ const RADII_MM: [f64; 13] = [0.25, 0.5, 0.75, 1.0, 1.5, 2.0, 2.5, 3.0, 4.0, 5.0,
 /// surface grows without bound.
 const FIT: f64 = 0.8;
 /// Default feed, mm/min.
-const FEED_MM_MIN: f64 = 1200.0;
+pub const FEED_MM_MIN: f64 = 1200.0;
 /// Default scallop height, mm.
 const SCALLOP_MM: f64 = 0.01;
 /// Least z of the mean normal of a surface that faces up.
@@ -22,7 +22,7 @@ const UP: f64 = 0.1;
 /// the ball and its way up and down need some.
 const REACH_MM: f64 = 2000.0;
 /// Axis limits of a face of a part, those of the job file's defaults: without limits a job has no links, and no place between its passes would be safe.
-const LIMITS: &str = "# Axis limits: put in those of the machine, or run with its profile.\n\
+pub const LIMITS: &str = "# Axis limits: put in those of the machine, or run with its profile.\n\
      velocity_max_mm_s = [100, 100, 50]\n\
      acceleration_max_mm_s2 = [1000, 1000, 500]\n\
      jerk_max_mm_s3 = [20000, 20000, 10000]\n";

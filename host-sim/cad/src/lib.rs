@@ -41,7 +41,7 @@ pub use error::CadError;
 pub use faces::{Original, model_with, surface_of};
 pub use fit::Deviation;
 pub use interpolation::interpolation_error_mm;
-pub use job::{JobOptions, JobText, machined_sign, write_job};
+pub use job::{FEED_MM_MIN, JobOptions, JobText, LIMITS, machined_sign, write_job};
 pub use machinable::{Form, MachinableFace, Options, degrees, machinable};
 pub use measure::{Measures, measure};
 pub use outline::{Outline, outline};

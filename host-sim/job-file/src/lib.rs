@@ -11,6 +11,7 @@ mod file;
 mod homing;
 mod machine;
 mod placement;
+mod program;
 mod region;
 mod section;
 mod setup;
@@ -34,6 +35,7 @@ pub use file::{
     Face, FaceError, FaceReader, FaceRegion, FaceSurface, PART_TOLERANCE_MM, STEEPEST_DEG,
     TOLERANCE_DEFAULT_MM, TOLERANCE_MAX_MM,
 };
+pub use program::jobs_of;
 pub use steps::slots_max_us;
 
 /// How far the surface of a face goes on beyond it, in step-overs on a plane: passes begin and end half a step-over beside it, which on hollow places
@@ -54,7 +56,7 @@ pub fn load(path: &Path) -> Result<Job, JobError> {
 /// The file cannot be read, is not TOML, or a value in it is missing, unknown, of the wrong shape or out of range; the errors of `faces`.
 pub fn load_with(path: &Path, faces: &dyn FaceReader) -> Result<Job, JobError> {
     let name = path.display().to_string();
-    let text = text::read(path)?;
+    let text = program::read(path)?;
     parse_with(&name, &text, faces)
 }
 
@@ -68,7 +70,7 @@ pub fn load_on(
     profile: Option<&MachineProfile>,
 ) -> Result<Job, JobError> {
     let name = path.display().to_string();
-    let text = text::read(path)?;
+    let text = program::read(path)?;
     parse_on(&name, &text, faces, profile)
 }
 

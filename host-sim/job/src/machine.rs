@@ -11,7 +11,7 @@ pub const HEARTBEAT_TIMEOUT_RANGE_MS: [f64; 2] = [100.0, 60_000.0];
 /// Default of the heartbeat timeout, ms.
 pub const HEARTBEAT_TIMEOUT_DEFAULT_MS: f64 = 1000.0;
 /// Default of the distance from the highest point of the surface to the ball at the safe height, mm.
-const CLEARANCE_DEFAULT_MM: f64 = 5.0;
+pub const CLEARANCE_DEFAULT_MM: f64 = 5.0;
 /// Default of the length of the plunge at the feed, mm.
 const PLUNGE_DEFAULT_MM: f64 = 2.0;
 

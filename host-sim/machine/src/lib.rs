@@ -7,6 +7,7 @@
 
 pub mod direction;
 mod in_process;
+pub mod links;
 pub mod prepare;
 pub mod profile;
 pub mod remote;

@@ -2,6 +2,8 @@
 
 use cad::{Face, Periodic, outline, polylines, trim};
 use glam::DVec3;
+use job::Along;
+use oracle::Surface;
 use rayon::prelude::*;
 
 use crate::cell::{Cell, FromLine, FromPoint};
@@ -53,6 +55,8 @@ pub struct Part {
     cell_tree: Tree,
     edges: Vec<([DVec3; 2], u32)>,
     edge_tree: Tree,
+    /// Stands for the trimmed region of what is no face of a file: none of its cells is cut.
+    whole: Inside,
 }
 
 /// The place of a part that is nearest.
@@ -121,11 +125,32 @@ impl Part {
             part.cells.extend(cells);
             part.edges.extend(edges.into_iter().map(|ends| (ends, index)));
         }
-        let blocks: Vec<Block> = part.cells.iter().map(Cell::block).collect();
-        part.cell_tree = Tree::new(&blocks);
-        let blocks: Vec<Block> = part.edges.iter().map(|(ends, _)| Block::around(*ends)).collect();
-        part.edge_tree = Tree::new(&blocks);
+        part.plant();
         part
+    }
+
+    /// Of one surface, all of it, that is no face of a file.
+    #[must_use]
+    pub fn of_surface(surface: &Surface) -> Self {
+        let at = |u: f64, v: f64| surface.at(u, v).point;
+        let mut part = Self::default();
+        let breaks = [Along::U, Along::V].map(|along| surface.breaks(along));
+        part.cells = cells_between(0, None, &at, &breaks);
+        part.plant();
+        part
+    }
+
+    /// The trees.
+    fn plant(&mut self) {
+        let blocks: Vec<Block> = self.cells.iter().map(Cell::block).collect();
+        self.cell_tree = Tree::new(&blocks);
+        let blocks: Vec<Block> = self.edges.iter().map(|(ends, _)| Block::around(*ends)).collect();
+        self.edge_tree = Tree::new(&blocks);
+    }
+
+    /// The trimmed region of a face.
+    fn inside(&self, face: usize) -> &Inside {
+        self.faces.get(face).map_or(&self.whole, |face| &face.inside)
     }
 
     /// Number of cells and of edges.
@@ -178,10 +203,7 @@ impl Part {
                 .filter(|own| own.face == face)
                 .map(|own| (own.place, own.radius));
             let measure = FromPoint { point, skip };
-            if cell
-                .lower(&measure, &self.faces[face].inside, bound, any)
-                .is_some()
-            {
+            if cell.lower(&measure, self.inside(face), bound, any).is_some() {
                 found = Some(Near {
                     distance: *bound,
                     face,
@@ -220,10 +242,7 @@ impl Part {
             }
             let cell = &self.cells[index];
             let face = cell.face as usize;
-            if cell
-                .lower(&measure, &self.faces[face].inside, bound, any)
-                .is_some()
-            {
+            if cell.lower(&measure, self.inside(face), bound, any).is_some() {
                 found = Some(Near {
                     distance: *bound,
                     face,
@@ -237,11 +256,7 @@ impl Part {
 /// The cells of a face.
 fn cells(index: u32, face: &PartFace) -> Vec<Cell> {
     let surface = &face.face.surface;
-    let maker = Maker {
-        index,
-        face,
-        on: Periodic::new(surface),
-    };
+    let on = Periodic::new(surface);
     let breaks = |k: usize| -> Vec<f64> {
         let [low, high] = face.rectangle[k];
         let mut breaks = vec![low];
@@ -249,8 +264,21 @@ fn cells(index: u32, face: &PartFace) -> Vec<Cell> {
         breaks.push(high);
         breaks
     };
-    let (us, vs) = (breaks(0), breaks(1));
-    let edges: Vec<u32> = (0..).take(face.inside.edges().len()).collect();
+    let at = |u: f64, v: f64| on.at(u, v).point;
+    cells_between(index, Some(&face.inside), &at, &[breaks(0), breaks(1)])
+}
+
+/// The cells of a surface that is smooth between these parameters; without a trimmed region, of all of it.
+fn cells_between(
+    index: u32,
+    inside: Option<&Inside>,
+    at: &dyn Fn(f64, f64) -> DVec3,
+    [us, vs]: &[Vec<f64>; 2],
+) -> Vec<Cell> {
+    let maker = Maker { index, inside, at };
+    let edges: Vec<u32> = (0..)
+        .take(inside.map_or(0, |inside| inside.edges().len()))
+        .collect();
     let mut cells = Vec::new();
     for u in us.windows(2) {
         for v in vs.windows(2) {
@@ -262,14 +290,14 @@ fn cells(index: u32, face: &PartFace) -> Vec<Cell> {
 
 struct Maker<'p> {
     index: u32,
-    face: &'p PartFace,
-    on: Periodic<'p>,
+    inside: Option<&'p Inside>,
+    at: &'p dyn Fn(f64, f64) -> DVec3,
 }
 
 impl Maker<'_> {
     /// Adds the cells of a rectangle; `edges`: those of the trimmed region that may cross it.
     fn cells(&self, uv: [[f64; 2]; 2], edges: &[u32], left: u32, out: &mut Vec<Cell>) {
-        let all = self.face.inside.edges();
+        let all = self.inside.map_or([].as_slice(), Inside::edges);
         let edges: Vec<u32> = edges
             .iter()
             .copied()
@@ -280,12 +308,12 @@ impl Maker<'_> {
             .collect();
         let middle = uv.map(|[low, high]| 0.5 * (low + high));
         let is_cut = !edges.is_empty();
-        if !is_cut && !self.face.inside.contains(middle) {
+        if !is_cut && self.inside.is_some_and(|inside| !inside.contains(middle)) {
             return;
         }
         let at = |s: f64, t: f64| {
             let [[u0, u1], [v0, v1]] = uv;
-            self.on.at(u0 + s * (u1 - u0), v0 + t * (v1 - v0)).point
+            (self.at)(u0 + s * (u1 - u0), v0 + t * (v1 - v0))
         };
         let points = std::array::from_fn(|i| std::array::from_fn(|j| at(0.5 * i as f64, 0.5 * j as f64)));
         let cell = Cell::new(self.index, uv, points, is_cut);

@@ -147,7 +147,7 @@ impl Set<'_> {
                 }
                 fine.dedup();
                 let pulled = self.pulled_in(&fine, precision.inset_mm);
-                let simple = self.simplified(&pulled, precision);
+                let simple = without_spikes(self.simplified(&pulled, precision));
                 (simple.len() > 2 && self.area(&simple).abs() > precision.inset_mm * precision.grid_mm)
                     .then_some(simple)
             })
@@ -344,5 +344,45 @@ impl Set<'_> {
             }
         }
         kept
+    }
+}
+
+/// A polygon without vertices at which it goes back along the way that it came: on a side of the rectangle nothing lies between the two ways, but the polygon reaches there.
+fn without_spikes(mut polygon: Vec<Place>) -> Vec<Place> {
+    let is_spike = |[a, b, c]: [Place; 3]| {
+        let [to, on] = [[b[0] - a[0], b[1] - a[1]], [c[0] - b[0], c[1] - b[1]]];
+        to[0] * on[1] == to[1] * on[0] && to[0] * on[0] + to[1] * on[1] <= 0.0
+    };
+    let mut index = 0;
+    while polygon.len() > 2 && index < polygon.len() {
+        let count = polygon.len();
+        let around = [count - 1, 0, 1].map(|k| polygon[(index + k) % count]);
+        if is_spike(around) {
+            polygon.remove(index);
+            // The one before it may be one now.
+            index = index.saturating_sub(1);
+        } else {
+            index += 1;
+        }
+    }
+    polygon
+}
+
+#[cfg(test)]
+mod tests {
+    use super::without_spikes;
+
+    #[test]
+    fn a_way_there_and_back_is_left_out() {
+        let square = vec![[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]];
+        let mut spiked = square.clone();
+        spiked.insert(1, [1.0, -0.25]);
+        // (0, 0), (1, -0.25), (1, 0): no spike; one from (1, 1) upwards is.
+        assert_eq!(without_spikes(spiked.clone()), spiked);
+        let mut spiked = square.clone();
+        spiked.insert(3, [1.0, 1.5]);
+        spiked.insert(4, [1.0, 1.0]);
+        assert_eq!(without_spikes(spiked), square);
+        assert_eq!(without_spikes(vec![[0.0, 0.0], [1.0, 0.0], [2.0, 0.0]]).len(), 2);
     }
 }

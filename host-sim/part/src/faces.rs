@@ -8,6 +8,7 @@ use job::{CadSource, FaceReach, Job, PartSource, Region};
 use job_file::{Face, FaceError, FaceReader, FaceRegion, FaceSurface, STEEPEST_DEG};
 use oracle::{Oracle, Surface};
 use patches::placement::Rotation;
+use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
 
 use crate::body::Part;
@@ -15,7 +16,7 @@ use crate::region::{Made, Request};
 use crate::tool::{Reason, Tool};
 
 /// The method by which regions are made: others in a cache are not used.
-const METHOD: u32 = 3;
+const METHOD: u32 = 4;
 /// Folder beside the job in which regions are kept.
 const CACHE: &str = ".isofeed";
 /// How deep the tool may enter the part, mm, where no part says it: only the grid of a face alone depends on it.
@@ -328,12 +329,45 @@ fn cache_file(job: &Job, source: &CadSource) -> Option<PathBuf> {
     Some(folder.join(CACHE).join(format!("region-{name_of:016x}.json")))
 }
 
-fn kept(file: &Path) -> Option<Found> {
+/// A value that is kept beside a job, by a digest of all that it depends on: `keys`, and the bytes of a file. A job without a folder, or without a face of a CAD file, keeps nothing.
+///
+/// # Errors
+/// Those of `make`.
+pub(crate) fn cached<T: Serialize + DeserializeOwned>(
+    job: &Job,
+    what: &str,
+    keys: &[&[u8]],
+    file: Option<&Path>,
+    make: impl FnOnce() -> Result<T, FaceError>,
+) -> Result<T, FaceError> {
+    let name = Path::new(job.origin.name());
+    let folder = name.parent().filter(|folder| {
+        let is_named = name.file_name().is_some() && job.origin.cad().is_some();
+        is_named && (folder.as_os_str().is_empty() || folder.is_dir())
+    });
+    let bytes = file.and_then(|file| std::fs::read(file).ok()).unwrap_or_default();
+    let keys: Vec<&[u8]> = keys.iter().copied().chain([bytes.as_slice()]).collect();
+    let place = folder.map(|folder| {
+        folder
+            .join(CACHE)
+            .join(format!("{what}-{:016x}.json", digest(&keys)))
+    });
+    if let Some(kept) = place.as_ref().and_then(|place| kept(place)) {
+        return Ok(kept);
+    }
+    let made = make()?;
+    if let Some(place) = &place {
+        keep(place, &made);
+    }
+    Ok(made)
+}
+
+fn kept<T: DeserializeOwned>(file: &Path) -> Option<T> {
     serde_json::from_slice(&std::fs::read(file).ok()?).ok()
 }
 
 /// Keeps a region; where that fails it is made again the next time.
-fn keep(file: &Path, found: &Found) {
+fn keep<T: Serialize>(file: &Path, found: &T) {
     let (Some(folder), Ok(text)) = (file.parent(), serde_json::to_vec(found)) else {
         return;
     };

@@ -11,6 +11,13 @@ pub struct Inside {
     v: [f64; 2],
 }
 
+impl Default for Inside {
+    /// Nothing is inside.
+    fn default() -> Self {
+        Self::new(&[])
+    }
+}
+
 impl Inside {
     /// Of closed polygons.
     #[must_use]

@@ -6,6 +6,7 @@
 //!                                 ▼
 //! trimmed region of a face ──region.rs──► grown by half a step-over where all rules hold ──contour.rs──► polygons of (u, v)
 //!
+//! ends of passes ──links.rs──► how each link goes: straight, or at the height that the tool needs over the part
 //! emitted centres ──proof.rs──► the deepest place of the tool in the part, what is left on the reachable part of the face
 //! ```
 //!
@@ -17,6 +18,7 @@ mod clear;
 mod contour;
 mod faces;
 mod inside;
+mod links;
 mod proof;
 mod region;
 #[cfg(test)]
@@ -30,6 +32,7 @@ pub use clear::{Clearance, Place};
 pub use contour::{Precision, Set};
 pub use faces::{Asked, Faces, own_face, part_of, placed_part, placement};
 pub use inside::Inside;
+pub use links::{Way, ways};
 pub use proof::{Deepest, LEFTOVER_SHARE, LEFTOVER_SIDE, Leftover, Passes, along, deepest, leftover};
 pub use region::{GROWTH, Made, Request, STEP_MAX};
 pub use tool::{Column, Reason, Tool};

@@ -100,6 +100,19 @@ impl Tool {
         Self { radius, columns }
     }
 
+    /// The same tool with no part thinner than the ball.
+    #[must_use]
+    pub fn wide(&self) -> Self {
+        let columns = self.columns.iter().map(|column| Column {
+            radius: column.radius.max(self.radius),
+            ..*column
+        });
+        Self {
+            radius: self.radius,
+            columns: columns.collect(),
+        }
+    }
+
     /// The same body with another ball.
     #[must_use]
     pub fn with_radius(&self, radius: f64) -> Self {

@@ -31,6 +31,7 @@ use whole_part::Up;
 /// Example: cargo sim import jobs/cad/blade.step --list --only up --only whole --sort area --reverse
 /// Example: cargo sim import jobs/cad/blade.step --list --page faces.html
 /// Example: cargo sim import jobs/cad/blade.step --face 2 -o blade.toml --radius-mm 4
+/// Example: cargo sim import jobs/cad/blade.step --part --tool 3 -o blade.toml
 /// Example: cargo sim import jobs/cad/blade.step --part --tool 3 -o blade/
 #[derive(Debug, Args)]
 #[command(verbatim_doc_comment)]
@@ -68,7 +69,8 @@ pub(super) struct Arguments {
     /// Machines a trimmed face over the whole rectangle of the surface around its boundary.
     #[arg(long)]
     untrimmed: bool,
-    /// A job for each face of the part that the tool reaches without touching another, into the folder -o, with a summary and a page of the part.
+    /// A job of all faces of the part that the tool reaches without touching another, into the file -o (.toml), or a job for each into the folder -o; with a summary
+    /// and a page of the part.
     #[arg(long, conflicts_with_all = ["list", "face", "untrimmed", "side", "page"], requires = "output")]
     part: bool,
     /// With --part: only these faces, e.g. 1,4,7.

@@ -14,6 +14,7 @@ mod flash;
 mod home;
 mod import;
 mod judge;
+mod link_words;
 mod log;
 mod motion_words;
 mod new;
@@ -306,13 +307,16 @@ fn load_on(path: &Path, machine: Option<&PathBuf>) -> Result<(Job, Prepared)> {
 
 /// Chooses the direction of a job if `along = "auto"`, and prepares it.
 fn settled(job: Job) -> Result<(Job, Prepared)> {
-    if job.origin.along_choice() != &AlongChoice::Auto {
-        return Ok(direction::choose(job)?);
-    }
-    let bar = spinner("running along u and along v");
-    let settled = direction::choose(job);
-    bar.finish_and_clear();
-    Ok(settled?)
+    let (job, mut prepared) = if job.origin.along_choice() == &AlongChoice::Auto {
+        let bar = spinner("running along u and along v");
+        let settled = direction::choose(job);
+        bar.finish_and_clear();
+        settled?
+    } else {
+        direction::choose(job)?
+    };
+    link_words::add(&job, &mut prepared)?;
+    Ok((job, prepared))
 }
 
 /// Refuses passes of constant scallop height and those of a region, which only the board makes.

@@ -421,18 +421,74 @@ fn agree(arguments: &Arguments, wanted: Option<&MachineProfile>, session: &mut S
     ))))
 }
 
+/// Runs the job; of a job of many faces one after the other on the same board, which comes home in between, until one fails.
 pub(super) fn command(arguments: &Arguments) -> Result<()> {
-    let Bench {
-        mut connected,
-        profile,
-        origin,
-        stands,
-    } = bench(arguments)?;
-    let (job, mut prepared) = home::load(&arguments.job, profile.as_ref(), origin, stands)?;
-    if let (true, Some((_, session))) = (arguments.resume, &mut connected) {
+    let jobs = job_file::jobs_of(&arguments.job)?;
+    let several = jobs.len() > 1;
+    if several && (arguments.trace.is_some() || arguments.script.is_some() || arguments.resume) {
+        return Err(Failure::input(
+            format!(
+                "the job has {} faces, --trace, --script and --resume are for one",
+                jobs.len()
+            ),
+            format!("name the face: {}", jobs[0].display()),
+        ));
+    }
+    let mut bench = bench(arguments)?;
+    let (mut values, mut failure) = (Vec::new(), None);
+    for path in &jobs {
+        let ran = run_job(arguments, path, several, &mut bench)?;
+        values.push(ran.value);
+        failure = ran.failure;
+        if failure.is_some() {
+            break;
+        }
+    }
+    if let Some((peer, _)) = &mut bench.connected {
+        failure = failure.or_else(|| models_failure(peer, arguments.json));
+    }
+    if several {
+        print_all(arguments, &jobs, &values, failure.is_none());
+    } else if let (true, Some(value)) = (arguments.json, values.pop().filter(|value| !value.is_null())) {
+        say!("{value}");
+    }
+    failure.map_or(Ok(()), |failure| Err(Failure::Failed(Some(failure))))
+}
+
+/// All faces together.
+fn print_all(arguments: &Arguments, jobs: &[PathBuf], values: &[Value], passed: bool) {
+    if arguments.json {
+        say!("{}", json!({ "jobs": values, "passed": passed }));
+        return;
+    }
+    let sum = |key: &str| values.iter().filter_map(|value| value[key].as_f64()).sum::<f64>();
+    say!(
+        "{} of {} faces ran, {:.2} min, {} samples compared",
+        values.len(),
+        jobs.len(),
+        sum("machining_time_s") / 60.0,
+        sum("compared_samples")
+    );
+}
+
+/// What came of a job.
+struct Ran {
+    /// Null for a script, which prints for itself.
+    value: Value,
+    failure: Option<String>,
+}
+
+fn run_job(arguments: &Arguments, path: &Path, several: bool, bench: &mut Bench) -> Result<Ran> {
+    let (profile, origin) = (bench.profile, bench.origin);
+    let (job, mut prepared) = home::load(path, profile.as_ref(), origin, bench.stands)?;
+    if let (true, Some((_, session))) = (arguments.resume, &mut bench.connected) {
         prepared.first_pass = resume::first_pass(session, &prepared)?;
     }
     travel::check(&job)?;
+    let folder = arguments.report.as_ref().map(|folder| match several {
+        true => folder.join(path.file_name().unwrap_or(path.as_os_str())),
+        false => folder.clone(),
+    });
     arguments
         .script
         .iter()
@@ -440,7 +496,7 @@ pub(super) fn command(arguments: &Arguments) -> Result<()> {
     if let Some(path) = &arguments.trace {
         whole::check(path, arguments.force)?;
     }
-    let directory = WantedReport::new(arguments.report.as_deref(), arguments.force)?;
+    let directory = WantedReport::new(folder.as_deref(), arguments.force)?;
     if arguments.fast && job.machine.heartbeat_action == HeartbeatAction::Hold {
         return Err(Failure::input(
             "the emulated chip's time runs faster than this computer can send heartbeats, and the job has host_gone = \"hold\"",
@@ -449,15 +505,16 @@ pub(super) fn command(arguments: &Arguments) -> Result<()> {
     }
     if let Some(script) = &arguments.script {
         let scripted = scripted::play(&job, &prepared, script, None)?;
-        let (mut peer, mut session) = connect(arguments)?;
-        agree(arguments, profile.as_ref(), &mut session)?;
-        check_period(&job, &session)?;
-        make_ready(arguments, &job, &prepared, &mut session)?;
-        drive::upload(&mut session, &prepared, |_| {})?;
-        let verdict = scripted.run(&job, &mut session, arguments.json);
-        let failure = models_failure(&mut peer, arguments.json);
-        verdict?;
-        return failure.map_or(Ok(()), |failure| Err(Failure::Failed(Some(failure))));
+        let session = session_of(arguments, bench)?;
+        agree(arguments, profile.as_ref(), session)?;
+        check_period(&job, session)?;
+        make_ready(arguments, &job, &prepared, session)?;
+        drive::upload(session, &prepared, |_| {})?;
+        scripted.run(&job, session, arguments.json)?;
+        return Ok(Ran {
+            value: Value::Null,
+            failure: None,
+        });
     }
     let here = timed(&job, &prepared)?;
     if let Some(fault) = here
@@ -467,15 +524,12 @@ pub(super) fn command(arguments: &Arguments) -> Result<()> {
     {
         return Err(Failure::Failed(Some(fault.sentence_of(&job))));
     }
-    let (mut peer, mut session) = match connected {
-        Some(connected) => connected,
-        None => connect(arguments)?,
-    };
-    agree(arguments, profile.as_ref(), &mut session)?;
-    check_period(&job, &session)?;
-    make_ready(arguments, &job, &prepared, &mut session)?;
+    let session = session_of(arguments, bench)?;
+    agree(arguments, profile.as_ref(), session)?;
+    check_period(&job, session)?;
+    make_ready(arguments, &job, &prepared, session)?;
     let bar = progress(prepared.words.len() as u64, "uploading");
-    drive::upload(&mut session, &prepared, |words| bar.set_position(words as u64))?;
+    drive::upload(session, &prepared, |words| bar.set_position(words as u64))?;
     bar.finish_and_clear();
     if job.machine.spindle.is_some() && profile.is_some_and(|profile| profile.spindle.is_some()) {
         session.command(&Request::Spindle(profile::spindle_order(job.machine.spindle)))?;
@@ -486,9 +540,9 @@ pub(super) fn command(arguments: &Arguments) -> Result<()> {
         run: &here,
     };
     let run = if arguments.trace.is_some() {
-        by_sample(arguments, &reference, &mut session)?
+        by_sample(arguments, &reference, session)?
     } else {
-        by_digest(arguments, &reference, &mut session)?
+        by_digest(arguments, &reference, session)?
     };
     let (findings, sketch) = surveyed(&job, &prepared, &here, None, directory.is_some())?;
     let failure = run.failure(&here, &job);
@@ -508,10 +562,12 @@ pub(super) fn command(arguments: &Arguments) -> Result<()> {
         fault: here.fault,
     };
     let board = session.capabilities().description.board.as_str();
-    if arguments.json {
-        say!("{}", json_of(&outcome, &run, board));
-    } else {
-        say!("{} on {board}", arguments.job.display());
+    let mut value = json_of(&outcome, &run, board);
+    if several {
+        value["job"] = path.display().to_string().into();
+    }
+    if !arguments.json {
+        say!("{} on {board}", path.display());
         if let (Some(number), Some(origin)) = (arguments.work, origin) {
             say!(
                 "  origin       work offset {number}, at {} mm of the machine",
@@ -530,8 +586,17 @@ pub(super) fn command(arguments: &Arguments) -> Result<()> {
         }
         print_line(&run);
     }
-    let failure = failure.or_else(|| models_failure(&mut peer, arguments.json));
-    failure.map_or(Ok(()), |failure| Err(Failure::Failed(Some(failure))))
+    Ok(Ran { value, failure })
+}
+
+/// The session with the board: begun with the first job.
+fn session_of<'b>(arguments: &Arguments, bench: &'b mut Bench) -> Result<&'b mut Session> {
+    let connected = match bench.connected.take() {
+        Some(connected) => connected,
+        None => connect(arguments)?,
+    };
+    let (_, session) = bench.connected.insert(connected);
+    Ok(session)
 }
 
 /// What the line did to the run, and the result of the comparison.

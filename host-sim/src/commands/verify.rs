@@ -224,7 +224,11 @@ fn original(job: &Job) -> Result<Option<(Box<swept::OriginalOffset<'static>>, f6
 
 /// Verifies the jobs, prints the figures, and fails if any job does; with the exit code of bad input if a job cannot be read.
 pub(super) fn command(arguments: &Arguments) -> Result<()> {
-    if let [job] = arguments.jobs.as_slice() {
+    let mut jobs = Vec::new();
+    for path in &arguments.jobs {
+        jobs.extend(job_file::jobs_of(path)?);
+    }
+    if let [job] = jobs.as_slice() {
         let (passed, value) = verify_job(arguments, job, arguments.report.as_deref())?;
         if arguments.json {
             say!("{value}");
@@ -236,7 +240,7 @@ pub(super) fn command(arguments: &Arguments) -> Result<()> {
         };
     }
     let (mut values, mut all_passed, mut refused) = (Vec::new(), true, None);
-    for job in &arguments.jobs {
+    for job in &jobs {
         let directory = arguments
             .report
             .as_ref()
@@ -266,6 +270,8 @@ pub(super) fn command(arguments: &Arguments) -> Result<()> {
     }
     if arguments.json {
         say!("{}", serde_json::json!({ "jobs": values, "passed": all_passed }));
+    } else {
+        summary(&values);
     }
     match refused {
         Some(job) => Err(Failure::input(
@@ -275,6 +281,20 @@ pub(super) fn command(arguments: &Arguments) -> Result<()> {
         None if all_passed => Ok(()),
         None => Err(Failure::Failed(None)),
     }
+}
+
+/// The jobs together: how many passed, and their time.
+fn summary(values: &[Value]) {
+    let passed = values.iter().filter(|value| value["passed"] == true).count();
+    let time_s: f64 = values
+        .iter()
+        .filter_map(|value| value["time_s"]["whole"].as_f64())
+        .sum();
+    say!(
+        "{passed} of {} jobs passed, {:.2} min in all",
+        values.len(),
+        time_s / 60.0
+    );
 }
 
 /// Verifies one job and prints its figures unless JSON is requested. Returns whether it passed, and its JSON object.

@@ -8,7 +8,8 @@ use crate::job::region::{
 use crate::job::stations::{SPANS_MAX as FRONT_SPANS_MAX, Stations};
 use crate::job::stream::{DIGEST_WORDS, RecordCopy, Rows, WINDOW_MIN};
 use crate::job::{
-    AxisLimits, CELLS_MAX, Header, OVERRUN_MAX_MM, SPANS_MAX, STEP_MAX_MM, SurfaceKind, width_words,
+    AxisLimits, CELLS_MAX, Header, LINK_STRAIGHT, OVERRUN_MAX_MM, SPANS_MAX, STEP_MAX_MM, SurfaceKind,
+    width_words,
 };
 use crate::math::number::nm_to_mm;
 use crate::surface::{
@@ -61,7 +62,10 @@ pub(crate) fn extent(header: &Header) -> (u32, u64) {
     let words = words + digests;
     (
         patches,
-        words + u64::from(width_words(header.path_spans, header.side_spans)) + region_words(header) as u64,
+        words
+            + u64::from(width_words(header.path_spans, header.side_spans))
+            + region_words(header) as u64
+            + u64::from(header.links),
     )
 }
 
@@ -98,6 +102,9 @@ fn check_header(header: &Header) -> Result<()> {
     if header.edges > 0 && (header.spacing.is_constant() || spans > REGION_SPANS_MAX) {
         return Err(Fault::new(FaultKind::BadHeader, f32::from(header.edges)));
     }
+    if header.links > 0 && (header.spacing.is_constant() || header.axes.is_none()) {
+        return Err(Fault::new(FaultKind::BadHeader, f32::from(header.links)));
+    }
     if front_words(header).is_none() {
         return Err(Fault::new(FaultKind::BadHeader, f32::from(header.path_spans)));
     }
@@ -126,7 +133,13 @@ fn check_header(header: &Header) -> Result<()> {
 fn check_streamed(header: &Header) -> Result<()> {
     let is_grid = matches!(header.kind, SurfaceKind::Polynomial | SurfaceKind::Rational);
     let turns = header.axes.is_some_and(|axes| axes.overrun_mm > 0.0);
-    if !is_grid || header.edges > 0 || header.spacing.is_constant() || turns || header.window < WINDOW_MIN {
+    if !is_grid
+        || header.edges > 0
+        || header.links > 0
+        || header.spacing.is_constant()
+        || turns
+        || header.window < WINDOW_MIN
+    {
         return Err(Fault::new(FaultKind::BadHeader, f32::from(header.window)));
     }
     Ok(())
@@ -187,6 +200,7 @@ impl Program {
             scallop_mm: 0.0,
             period_s: 0.0,
             edges: 0,
+            links: 0,
             window: 0,
             axes: None,
         };
@@ -465,6 +479,15 @@ impl Program {
     }
 }
 
+/// The way to a pass.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Link {
+    /// Straight, at the feed.
+    Straight,
+    /// Up to this height of the ball's centre, nm, across and down.
+    Across(i32),
+}
+
 /// A job and its store.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Job<'a> {
@@ -486,8 +509,26 @@ impl<'a> Job<'a> {
         if self.header.edges == 0 {
             return None;
         }
-        let from = self.length.checked_sub(region_words(self.header))?;
-        RegionWords::new(self.store.get(from..self.length)?)
+        let end = self.length.checked_sub(self.header.links.into())?;
+        let from = end.checked_sub(region_words(self.header))?;
+        RegionWords::new(self.store.get(from..end)?)
+    }
+
+    /// How the tool goes to a pass that is not joined to the one before it on the surface. A height is not above the safe height.
+    pub(crate) fn link_to(&self, pass: u32, axes: &AxisLimits) -> Link {
+        let links = u32::from(self.header.links);
+        let word = pass
+            .checked_sub(1)
+            .filter(|index| *index < links)
+            .and_then(|index| {
+                let behind = usize::try_from(links - index).ok()?;
+                self.store.get(self.length.checked_sub(behind)?).copied()
+            });
+        match word {
+            Some(LINK_STRAIGHT) => Link::Straight,
+            Some(height_nm) => Link::Across(height_nm.min(axes.safe_z_nm)),
+            None => Link::Across(axes.safe_z_nm),
+        }
     }
 
     /// Width of a side span, in units of the side parameter.

@@ -104,12 +104,22 @@ impl Hop {
         self.ends == Some([from, to])
     }
 
-    /// Plans a hop, if its top is within the travel and each part of it has a length. Takes some 15 000 cycles.
+    /// Plans a hop that crosses at this height, nm, or above the ends, if its top is within the travel and each part of it has a length. Takes some 15 000 cycles.
     #[inline(never)]
-    pub(crate) fn plan(&mut self, from: [i32; 3], to: [i32; 3], feed_mm_s: f32, axes: &AxisLimits) {
+    pub(crate) fn plan(
+        &mut self,
+        [from, to]: [[i32; 3]; 2],
+        height_nm: i32,
+        feed_mm_s: f32,
+        axes: &AxisLimits,
+    ) {
         self.ends = None;
-        let safe = from[2].max(to[2]).max(axes.safe_z_nm);
-        let above_nm = truncated(1e6 * braking_mm(axes).at_most(ABOVE_MAX_MM));
+        let safe = from[2].max(to[2]).max(height_nm);
+        let mut above_mm = braking_mm(axes).at_most(ABOVE_MAX_MM);
+        if height_nm < axes.safe_z_nm {
+            above_mm = above_mm.at_most(above_for(&from, &to, axes));
+        }
+        let above_nm = truncated(1e6 * above_mm);
         let [_, _, [_, highest]] = axes.travel_nm;
         let top = safe.saturating_add(above_nm).min(highest).max(safe);
         let above = [from[0], from[1], top];
@@ -191,6 +201,18 @@ impl Hop {
         }
         self.pace.now() * sqrt(sum)
     }
+}
+
+/// Height above the crossing at which a short hop spends as long as it takes to cross, mm: both by the jerk alone, `2 (6 above / j_z)^(1/3) = (32 apart / j)^(1/3)`.
+fn above_for(from: &[i32; 3], to: &[i32; 3], axes: &AxisLimits) -> f32 {
+    let [jx, jy, jz] = axes.jerk_mm_s3;
+    let [x, y] = [0, 1].map(|axis: usize| {
+        let ends = from.get(axis).zip(to.get(axis));
+        ends.map_or(0.0, |(from, to)| {
+            crate::math::number::nm_to_mm(from.saturating_sub(*to)).abs()
+        })
+    });
+    2.0 / 3.0 * jz * (x / jx).at_least(y / jy)
 }
 
 /// Length in which the z axis comes to rest from its greatest speed, mm.

@@ -2,7 +2,7 @@
 
 use crate::fault::{Fault, Result};
 use crate::job::AxisLimits;
-use crate::job::program::Job;
+use crate::job::program::{Job, Link};
 use crate::math::number::Bounded;
 use crate::pass::run::Run;
 use crate::sample::Sample;
@@ -86,7 +86,7 @@ impl Sequencer {
         if let Some(fault) = self.pending.filter(|_| is_approach) {
             return Err(fault);
         }
-        let (_, next) = both(&mut self.plans, self.second);
+        let (now, next) = both(&mut self.plans, self.second);
         let from = self.at.unwrap_or(axes.home_nm);
         let [x, y, z] = match self.goal {
             Goal::Pass => next.ends[0],
@@ -94,7 +94,15 @@ impl Sequencer {
             Goal::SafeHeight | Goal::Lift => from,
             Goal::Back => self.back.at,
         };
-        let height = from[2].max(axes.safe_z_nm);
+        let height_nm = match self.goal {
+            // A straight link that could not begin in time goes at the safe height.
+            Goal::Pass if self.on_surface => match job.link_to(now.pass.wrapping_add(1), axes) {
+                Link::Across(height_nm) => height_nm,
+                Link::Straight => axes.safe_z_nm,
+            },
+            _ => axes.safe_z_nm,
+        };
+        let height = from[2].max(height_nm);
         let to = match leg {
             Leg::Retract => [from[0], from[1], height],
             Leg::Traverse => [x, y, from[2]],
@@ -105,7 +113,13 @@ impl Sequencer {
         }
         check_travel(axes, &to)?;
         let comes_down = (is_approach || self.goal == Goal::Back) && leg == Leg::Plunge;
-        let slow_mm = if comes_down { axes.plunge_mm } else { 0.0 };
+        let slow_mm = if is_approach && self.is_straight {
+            f32::MAX
+        } else if comes_down {
+            axes.plunge_mm
+        } else {
+            0.0
+        };
         let feed = job.header.feed_mm_s;
         Ok(self.straight.lead(from, to, slow_mm, feed, axes))
     }

@@ -51,6 +51,8 @@ impl Sequencer {
                 at,
             };
         }
+        // From above it goes across and down.
+        self.is_straight = false;
         self.goal = Goal::Lift;
         self.await_goal(Leg::Retract);
         true

@@ -12,7 +12,7 @@ use crate::feed::plan::{Cursor, Plan};
 use crate::feed::planner::{PORTION_CYCLES, Planner};
 use crate::feed::profile::Profiles;
 use crate::feed::turn::Turn;
-use crate::job::program::{Job, Program};
+use crate::job::program::{Job, Link, Program};
 use crate::job::{AxisLimits, Pattern};
 use crate::math::arith::count_to_f32;
 use crate::math::number::{Bounded, to_f32};
@@ -146,6 +146,8 @@ pub(crate) struct Sequencer {
     pub(super) second: bool,
     /// Whether the tool has been on a pass since the start.
     pub(super) on_surface: bool,
+    /// The leg to the next pass goes straight there from the end of the last one.
+    pub(super) is_straight: bool,
     /// A fault of the next pass, reported when the tool reaches the pass.
     pub(super) pending: Option<Fault>,
     pub(super) follower: Follower,
@@ -203,6 +205,7 @@ impl Sequencer {
         plans: [PassPlan::NONE; 2],
         second: false,
         on_surface: false,
+        is_straight: false,
         pending: None,
         follower: Follower::START,
         pace: Pace::REST,
@@ -247,6 +250,7 @@ impl Sequencer {
         self.phase = Phase::Await;
         self.second = false;
         self.on_surface = false;
+        self.is_straight = false;
         self.pending = None;
         self.has_first_patch = true;
         self.has_rows = false;
@@ -328,6 +332,7 @@ impl Sequencer {
     pub(crate) fn retract(&mut self, run: &Run) {
         let is_free = self.is_link() || run.faces_up();
         self.goal = Goal::SafeHeight;
+        self.is_straight = false;
         if is_free {
             self.await_goal(Leg::Retract);
         } else {
@@ -588,7 +593,7 @@ impl Sequencer {
                 let is_on_surface = if job.header.spacing.is_constant() {
                     job.header.pattern == Pattern::Zigzag
                 } else {
-                    next.steps_over
+                    next.steps_over || job.link_to(next.pass.wrapping_add(1), axes) == Link::Straight
                 };
                 let least = if !is_last && is_on_surface {
                     let front = if run.needs_front() {
@@ -629,8 +634,10 @@ impl Sequencer {
             }
             Planning::Complete if self.has_hop => {
                 self.has_hop = false;
-                self.hop
-                    .plan(now.ends[1], next.ends[0], job.header.feed_mm_s, axes);
+                if let Link::Across(height_nm) = job.link_to(next.pass, axes) {
+                    let ends = [now.ends[1], next.ends[0]];
+                    self.hop.plan(ends, height_nm, job.header.feed_mm_s, axes);
+                }
             }
             Planning::Complete => {}
         }
@@ -827,6 +834,7 @@ impl Sequencer {
         run.enter_pass(job, now.pass, now.route)?;
         run.begin(now.interval, last)?;
         self.on_surface = true;
+        self.is_straight = false;
         self.phase = Phase::Pass;
         self.follower.begin(&now.plan);
         let pace = pace_on(now, command.feed_factor);
@@ -993,7 +1001,12 @@ impl Sequencer {
             self.goal = Goal::Pass;
             // Planning never delays the lift: what is not planned yet is waited for above the surface.
             let is_planned = self.pending.is_none() && self.planning == Planning::Complete;
-            if is_planned && next.faces_up[0] && self.hop.leads(now.ends[1], next.ends[0]) {
+            let is_straight =
+                (job.header.axes.as_ref()).is_some_and(|axes| job.link_to(next.pass, axes) == Link::Straight);
+            if is_planned && is_straight && next.faces_up[0] {
+                self.is_straight = true;
+                self.await_goal(Leg::Plunge);
+            } else if is_planned && next.faces_up[0] && self.hop.leads(now.ends[1], next.ends[0]) {
                 self.hop
                     .begin(command.feed_factor.at_most(1.0), job.header.period_s);
                 self.phase = Phase::Hop;

@@ -134,6 +134,7 @@ pub fn prepare(job: &Job) -> Result<Prepared, JobError> {
         scallop_mm: job.scallop_mm as f32,
         period_s: job.machine.period_s() as f32,
         edges: 0,
+        links: 0,
         window: 0,
         axes: None,
     };

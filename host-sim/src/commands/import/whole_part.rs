@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use clap::ValueEnum;
-use job::{FaceReach, Region, SurfaceSpec};
+use job::{Along, FaceReach, Region, SurfaceSpec};
 use patches::placement::Rotation;
 use serde_json::{Value, json};
 
@@ -85,32 +85,83 @@ impl Up {
 }
 
 /// How a part lies on the machine.
-#[derive(Clone, Copy)]
 struct Setup {
     up: Up,
     translate_mm: [f64; 3],
     placement: Placement,
+    part: Arc<Part>,
+    scallop_mm: f64,
 }
 
 impl Setup {
-    fn new(up: Up, model: &Arc<Model>) -> (Self, Arc<Part>) {
+    fn new(up: Up, model: &Arc<Model>, scallop_mm: f64) -> Self {
         let linear = Rotation::of_degrees(up.rotate_deg()).0;
         let rows = |by: [f64; 3]| Placement {
             rows: std::array::from_fn(|i| [linear[i][0], linear[i][1], linear[i][2], by[i]]),
         };
+        let placement = rows([0.0; 3]);
         let mut setup = Self {
             up,
             translate_mm: [0.0; 3],
-            placement: rows([0.0; 3]),
+            placement,
+            part: placed_part(model, &placement),
+            scallop_mm,
         };
-        let mut part = placed_part(model, &setup.placement);
-        let block = part.block();
+        let block = setup.part.block();
         if block.low.abs().max(block.high.abs()).max_element() > RANGE_MM {
             setup.translate_mm = (-0.5 * (block.low + block.high)).round().to_array();
             setup.placement = rows(setup.translate_mm);
-            part = placed_part(model, &setup.placement);
+            setup.part = placed_part(model, &setup.placement);
         }
-        (setup, part)
+        setup
+    }
+}
+
+/// Where the jobs go: a file with all of them, or a folder with one for each face.
+struct Output<'a> {
+    path: &'a Path,
+    is_file: bool,
+}
+
+impl<'a> Output<'a> {
+    fn new(path: &'a Path) -> Self {
+        Self {
+            path,
+            is_file: path.extension().is_some_and(|extension| extension == "toml"),
+        }
+    }
+
+    fn folder(&self) -> PathBuf {
+        match self.path.parent().filter(|_| self.is_file) {
+            Some(parent) if parent.as_os_str().is_empty() => PathBuf::from("."),
+            Some(parent) => parent.to_owned(),
+            None => self.path.to_owned(),
+        }
+    }
+
+    fn page(&self) -> PathBuf {
+        if self.is_file {
+            self.path.with_extension("html")
+        } else {
+            self.path.join("part.html")
+        }
+    }
+
+    fn summary(&self) -> PathBuf {
+        if self.is_file {
+            self.path.with_extension("json")
+        } else {
+            self.path.join("summary.json")
+        }
+    }
+
+    /// The job of a face, the `place`-th to be machined.
+    fn job(&self, place: usize, face: usize) -> PathBuf {
+        if self.is_file {
+            PathBuf::from(format!("{}#{face}", self.path.display()))
+        } else {
+            self.path.join(format!("{place:03}-face-{face}.toml"))
+        }
     }
 }
 
@@ -126,6 +177,10 @@ struct Outcome {
     /// Highest z of the region, mm.
     top_mm: f64,
     text: String,
+    /// Direction of the passes and side of the tool, as in job files, and the time of the passes about, s.
+    along: &'static str,
+    side: &'static str,
+    passes_s: f64,
 }
 
 /// The request for the region of a face with this surface.
@@ -188,7 +243,8 @@ fn moved(spec: &SurfaceSpec, by: &Placement) -> SurfaceSpec {
 ///
 /// # Errors
 /// No tool is given; the folder cannot be written.
-pub(super) fn command(arguments: &Arguments, file: &str, model: &Arc<Model>, folder: &Path) -> Result<()> {
+pub(super) fn command(arguments: &Arguments, file: &str, model: &Arc<Model>, output: &Path) -> Result<()> {
+    let output = Output::new(output);
     let Some(radius_mm) = arguments.radius_mm else {
         return Err(Failure::input(
             "no tool is given",
@@ -208,26 +264,33 @@ pub(super) fn command(arguments: &Arguments, file: &str, model: &Arc<Model>, fol
         .iter()
         .map(|face| machinable(file, face, &options))
         .collect();
-    let (setup, part) = match arguments.up {
+    let setup = match arguments.up {
         Up::Auto => best_side(model, &faces, &made, &tool, scallop_mm),
-        up => Setup::new(up, model),
+        up => Setup::new(up, model, scallop_mm),
     };
     let asked = Asked {
-        part: &part,
+        part: &setup.part,
         tool: &tool,
         scallop_mm,
         setup: &setup,
     };
-    whole::check_folder(folder, &["summary.json", "part.html"], arguments.force)?;
-    std::fs::create_dir_all(folder).map_err(|error| super::super::cannot_write(folder, &error))?;
+    let folder = output.folder();
+    if output.is_file {
+        for path in [output.path.to_owned(), output.page(), output.summary()] {
+            whole::check(&path, arguments.force)?;
+        }
+    } else {
+        whole::check_folder(&folder, &["summary.json", "part.html"], arguments.force)?;
+    }
+    std::fs::create_dir_all(&folder).map_err(|error| super::super::cannot_write(&folder, &error))?;
     let bar = progress(faces.len() as u64, "regions");
     let mut outcomes = Vec::new();
     for (face, made) in faces.iter().zip(&made) {
-        outcomes.push(outcome(arguments, file, face, made.as_ref(), &asked, folder));
+        outcomes.push(outcome(arguments, file, face, made.as_ref(), &asked, &folder));
         bar.inc(1);
     }
     bar.finish_and_clear();
-    write(arguments, file, model, folder, &setup, outcomes)
+    write(arguments, file, model, &output, &setup, outcomes)
 }
 
 /// The side of which most can be reached.
@@ -237,11 +300,11 @@ fn best_side(
     made: &[std::result::Result<MachinableFace, CadError>],
     tool: &Tool,
     scallop_mm: f64,
-) -> (Setup, Arc<Part>) {
+) -> Setup {
     let tried = Up::SIX.map(|up| {
-        let (setup, part) = Setup::new(up, model);
+        let setup = Setup::new(up, model, scallop_mm);
         let asked = Asked {
-            part: &part,
+            part: &setup.part,
             tool,
             scallop_mm,
             setup: &setup,
@@ -259,7 +322,7 @@ fn best_side(
         (-1.0, Up::PlusZ),
         |best, one| if one.0 > best.0 { one } else { best },
     );
-    Setup::new(best.1, model)
+    Setup::new(best.1, model, scallop_mm)
 }
 
 /// What becomes of a face; its job is not written yet.
@@ -279,6 +342,9 @@ fn outcome(
         job: None,
         top_mm: f64::NEG_INFINITY,
         text: String::new(),
+        along: "u",
+        side: if face.sense > 0.0 { "+" } else { "-" },
+        passes_s: 0.0,
     };
     let made = match made {
         Ok(made) => made,
@@ -303,8 +369,13 @@ fn outcome(
             radius_mm: arguments.radius_mm,
             feed_mm_min: arguments.feed_mm_min,
             scallop_mm: Some(asked.scallop_mm),
-            along: arguments.along.clone(),
-            side: Some(if face.sense > 0.0 { "+" } else { "-" }.to_owned()),
+            along: Some(
+                arguments
+                    .along
+                    .clone()
+                    .unwrap_or_else(|| outcome.along.to_owned()),
+            ),
+            side: Some(outcome.side.to_owned()),
             pattern: arguments.pattern.clone(),
             in_part: true,
             rotate_deg: asked.setup.up.rotate_deg(),
@@ -330,13 +401,82 @@ fn outcome(
                     .flatten()
                     .map(|[u, v]| surface.at(*u, *v).point.z);
                 outcome.top_mm = heights.fold(f64::NEG_INFINITY, f64::max);
+                let step_over_mm = (8.0 * job.radius_mm * job.scallop_mm).sqrt();
+                let efforts = [Along::U, Along::V]
+                    .map(|along| effort_s(&surface, &region, along, step_over_mm, job.feed_mm_min / 60.0));
+                outcome.along = if efforts[1] < efforts[0] { "v" } else { "u" };
+                outcome.passes_s = efforts[0].min(efforts[1]);
                 outcome.region = Some((region, job.surface));
-                outcome.text = text;
+                outcome.text = match &arguments.along {
+                    Some(_) => text,
+                    None => text.replacen("along = \"u\"", &format!("along = \"{}\"", outcome.along), 1),
+                };
             }
         }
         Err(why) => outcome.refused = Some(why),
     }
     outcome
+}
+
+/// Most lines that are looked at for the direction of the passes, parts of an interval, and the time that each interval costs beside its length, s.
+const LINES_MAX: usize = 4000;
+const PARTS: u32 = 8;
+const INTERVAL_S: f64 = 0.15;
+
+/// Time of the passes along a parameter about, s: their length at the feed, and some time for each.
+fn effort_s(
+    surface: &oracle::Surface,
+    region: &Region,
+    along: Along,
+    step_over_mm: f64,
+    feed_mm_s: f64,
+) -> f64 {
+    let swapped = |[u, v]: [f64; 2]| match along {
+        Along::U => [u, v],
+        Along::V => [v, u],
+    };
+    // Lengths of the derivatives along the pass and across it.
+    let speeds = |path: f64, side: f64| {
+        let [u, v] = swapped([path, side]);
+        let at = surface.at(u, v);
+        swapped([at.u.length(), at.v.length()])
+    };
+    let edges: Vec<[[f64; 2]; 2]> = region.edges().map(|ends| ends.map(swapped)).collect();
+    let sides = || edges.iter().flatten().map(|end| end[1]);
+    let (low, high) = (
+        sides().fold(f64::INFINITY, f64::min),
+        sides().fold(f64::NEG_INFINITY, f64::max),
+    );
+    let (mut side, mut sum) = (low, 0.0);
+    for _ in 0..LINES_MAX {
+        let met = |ends: &&[[f64; 2]; 2]| (ends[0][1] <= side) != (ends[1][1] <= side);
+        let mut crossings: Vec<f64> = edges
+            .iter()
+            .filter(met)
+            .map(|[a, b]| a[0] + (side - a[1]) / (b[1] - a[1]) * (b[0] - a[0]))
+            .collect();
+        crossings.sort_by(f64::total_cmp);
+        let mut widest = 0.0_f64;
+        for [from, to] in crossings.as_chunks::<2>().0 {
+            for part in 0..PARTS {
+                let share = (f64::from(part) + 0.5) / f64::from(PARTS);
+                let [speed, across] = speeds(from + share * (to - from), side);
+                sum += speed * (to - from) / f64::from(PARTS) / feed_mm_s;
+                widest = widest.max(across);
+            }
+            sum += INTERVAL_S;
+        }
+        let step = if widest > 0.0 {
+            step_over_mm / widest
+        } else {
+            (high - low) / 100.0
+        };
+        side += step.max((high - low) / LINES_MAX as f64);
+        if side >= high {
+            break;
+        }
+    }
+    sum
 }
 
 /// Sums over all faces, mm2.
@@ -384,7 +524,7 @@ fn write(
     arguments: &Arguments,
     file: &str,
     model: &Arc<Model>,
-    folder: &Path,
+    output: &Output<'_>,
     setup: &Setup,
     mut outcomes: Vec<Outcome>,
 ) -> Result<()> {
@@ -394,23 +534,102 @@ fn write(
     order.sort_by(|a, b| outcomes[*b].top_mm.total_cmp(&outcomes[*a].top_mm));
     for (place, index) in (1..).zip(&order) {
         let outcome = &mut outcomes[*index];
-        let path = folder.join(format!("{place:03}-face-{}.toml", outcome.number));
-        whole::write(&path, outcome.text.as_bytes(), arguments.force)?;
+        let path = output.job(place, outcome.number);
+        if !output.is_file {
+            whole::write(&path, outcome.text.as_bytes(), arguments.force)?;
+        }
         outcome.job = Some(path);
+    }
+    if output.is_file {
+        if order.is_empty() {
+            return Err(Failure::input(
+                format!(
+                    "a ball of {} mm reaches no face of {file}",
+                    arguments.radius_mm.unwrap_or(0.0)
+                ),
+                "take a smaller ball, or turn another side up with --up auto",
+            ));
+        }
+        let text = program(arguments, file, output, setup, &order, &outcomes);
+        whole::write(output.path, text.as_bytes(), arguments.force)?;
     }
     let sums = Sums::of(&outcomes);
     let page = page(file, model, setup, &outcomes);
-    let page_path = folder.join("part.html");
+    let page_path = output.page();
     whole::write(&page_path, page.as_bytes(), arguments.force)?;
     let summary = summary(arguments, file, setup, &order, &outcomes, &sums, &page_path);
     let text = serde_json::to_string_pretty(&summary).unwrap_or_default();
-    whole::write(&folder.join("summary.json"), text.as_bytes(), arguments.force)?;
+    whole::write(&output.summary(), text.as_bytes(), arguments.force)?;
     if arguments.json {
         say!("{summary}");
         return Ok(());
     }
-    print(file, folder, setup, &order, &outcomes, &sums);
+    print(file, &page_path, setup, &order, &outcomes, &sums);
     Ok(())
+}
+
+/// One file with all faces: what they have in common, from the text of the first one, and a section for each.
+fn program(
+    arguments: &Arguments,
+    file: &str,
+    output: &Output<'_>,
+    setup: &Setup,
+    order: &[usize],
+    outcomes: &[Outcome],
+) -> String {
+    use std::fmt::Write;
+
+    let path = relative(&arguments.file, output.path).unwrap_or_default();
+    let radius_mm = arguments.radius_mm.unwrap_or(0.0);
+    let mut out = format!(
+        "# {} faces of {}, each with the region that a ball of {radius_mm} mm reaches, in this order. One alone: {}#{}\n\n\
+         # What must not be cut, and what the faces are of.\n[part]\npath = {path:?}\n",
+        order.len(),
+        job::one_line(file),
+        output.path.file_name().unwrap_or_default().to_string_lossy(),
+        order.first().map_or(1, |index| outcomes[*index].number),
+    );
+    if setup.up.rotate_deg() != [0.0; 3] || setup.translate_mm != [0.0; 3] {
+        let _ = write!(
+            out,
+            "\n[placement]\nrotate_deg = {:?}    # of the whole part\ntranslate_mm = {:?}\n",
+            setup.up.rotate_deg(),
+            setup.translate_mm
+        );
+    }
+    let block = setup.part.block();
+    let middle = 0.5 * (block.low + block.high);
+    let _ = write!(
+        out,
+        "\n[tool]\nkind = \"ball\"\nradius_mm = {radius_mm}\n\n\
+         [cut]                       # of every face, unless its section says otherwise\n\
+         feed_mm_min = {}            # of the cutter contact along the surface\n\
+         scallop_mm = {}             # scallop height limit between passes\n\
+         pattern = \"{}\"\n\n\
+         [machine]\n{}\
+         home_mm = [{:.3}, {:.3}, {:.3}]    # where the ball's centre stands before, between and after the faces\n",
+        arguments.feed_mm_min.unwrap_or(cad::FEED_MM_MIN),
+        setup.scallop_mm,
+        arguments.pattern.as_deref().unwrap_or("zigzag"),
+        cad::LIMITS,
+        middle.x,
+        middle.y,
+        block.high.z + radius_mm + job::CLEARANCE_DEFAULT_MM,
+    );
+    for index in order {
+        let outcome = &outcomes[*index];
+        let share = outcome
+            .reach
+            .as_ref()
+            .map_or(0.0, |reach| Sums::share(reach.region_mm2, reach.area_mm2));
+        let along = arguments.along.as_deref().unwrap_or(outcome.along);
+        let _ = write!(
+            out,
+            "\n[[face]]\nface = {}\ntolerance_mm = {}\nalong = {along:?}\nside = {:?}    # {share:.1} % of the face\n",
+            outcome.number, arguments.tolerance, outcome.side,
+        );
+    }
+    out
 }
 
 fn summary(
@@ -447,7 +666,7 @@ fn summary(
     })
 }
 
-fn print(file: &str, folder: &Path, setup: &Setup, order: &[usize], outcomes: &[Outcome], sums: &Sums) {
+fn print(file: &str, page: &Path, setup: &Setup, order: &[usize], outcomes: &[Outcome], sums: &Sums) {
     say!("{file}, {} up", setup.up.name());
     for index in order {
         let outcome = &outcomes[*index];
@@ -482,7 +701,12 @@ fn print(file: &str, folder: &Path, setup: &Setup, order: &[usize], outcomes: &[
     if sums.unknown > 0 {
         say!("  {} faces are not known", sums.unknown);
     }
-    say!("  page         {}", folder.join("part.html").display());
+    let passes_s: f64 = order.iter().map(|index| outcomes[*index].passes_s).sum();
+    say!(
+        "  passes       about {:.1} min; `verify` tells the time",
+        passes_s / 60.0
+    );
+    say!("  page         {}", page.display());
 }
 
 /// The page: what is finished, what is not.

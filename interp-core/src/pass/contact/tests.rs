@@ -240,6 +240,7 @@ fn surface_on(line: &Curve) -> (Surface, f64) {
         scallop_mm: 0.01,
         period_s: 1e-3,
         edges: 0,
+        links: 0,
         window: 0,
         axes: None,
         ..Header::default()
